@@ -1,0 +1,20 @@
+//! Arduino Mega 2560 with a grbl-style shield: the pinout of grbl-Mega.
+
+use super::Port::{A, B, C, H};
+use super::{Board, MotorPins, Timer, pin};
+
+/// Arduino Mega 2560 with a grbl-style shield.
+pub const MEGA2560_GRBL: Board = Board {
+    name: "mega2560-grbl",
+    clock_hz: 16_000_000,
+    motors: [
+        MotorPins { step: pin(A, 2), dir: pin(C, 7), enable: None }, // D24, D30
+        MotorPins { step: pin(A, 3), dir: pin(C, 6), enable: None }, // D25, D31
+        MotorPins { step: pin(A, 4), dir: pin(C, 5), enable: None }, // D26, D32
+        MotorPins { step: pin(A, 5), dir: pin(C, 4), enable: None }, // D27, D33
+    ],
+    enable_all: Some(pin(B, 7)),                            // D13
+    hazards: &[pin(H, 3), pin(H, 4), pin(H, 5), pin(H, 6)], // D6 to D9: spindle, coolant
+    step_timer: Timer::T1,
+    tick_timer: Timer::T0,
+};

@@ -1,0 +1,20 @@
+//! Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder.
+
+use super::Port::{A, B, D, F, H, K, L};
+use super::{Board, MotorPins, Timer, pin};
+
+/// Arduino Mega 2560 with RAMPS 1.4.
+pub const RAMPS14: Board = Board {
+    name: "ramps14",
+    clock_hz: 16_000_000,
+    motors: [
+        MotorPins { step: pin(F, 0), dir: pin(F, 1), enable: Some(pin(D, 7)) }, // X: A0, A1, D38
+        MotorPins { step: pin(F, 6), dir: pin(F, 7), enable: Some(pin(F, 2)) }, // Y: A6, A7, A2
+        MotorPins { step: pin(L, 3), dir: pin(L, 1), enable: Some(pin(K, 0)) }, // Z: D46, D48, A8
+        MotorPins { step: pin(A, 4), dir: pin(A, 6), enable: Some(pin(A, 2)) }, // E0: D26, D28, D24
+    ],
+    enable_all: None,
+    hazards: &[pin(B, 4), pin(H, 5), pin(H, 6)], // D10, D8, D9: hot end, bed, fan
+    step_timer: Timer::T1,
+    tick_timer: Timer::T0,
+};

@@ -1,0 +1,193 @@
+//! Boards as data: which pin does what, and which timer belongs to whom.
+//!
+//! A board is one constant in one file under `boards/`. The AVR image is built for [`ACTIVE`];
+//! host tools see them all through [`by_name`]. A pin or a timer that is used twice fails the
+//! build (see [`Board::check`]).
+
+#[path = "../boards/mega2560-grbl.rs"]
+mod mega2560_grbl;
+#[path = "../boards/ramps14.rs"]
+mod ramps14;
+
+pub use mega2560_grbl::MEGA2560_GRBL;
+pub use ramps14::RAMPS14;
+
+/// Motors a board drives.
+pub const MOTORS: usize = 4;
+
+/// An I/O port of the ATmega2560, by its letter.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs)]
+pub enum Port {
+    A,
+    B,
+    C,
+    D,
+    E,
+    F,
+    G,
+    H,
+    J,
+    K,
+    L,
+}
+
+impl Port {
+    /// The letter the data sheet uses.
+    pub const fn letter(self) -> char {
+        match self {
+            Port::A => 'A',
+            Port::B => 'B',
+            Port::C => 'C',
+            Port::D => 'D',
+            Port::E => 'E',
+            Port::F => 'F',
+            Port::G => 'G',
+            Port::H => 'H',
+            Port::J => 'J',
+            Port::K => 'K',
+            Port::L => 'L',
+        }
+    }
+
+    /// Data-space address of the PORT register; PIN is two below it and DDR one below
+    /// (ATmega2560 data sheet, register summary).
+    pub const fn address(self) -> usize {
+        match self {
+            Port::A => 0x22,
+            Port::B => 0x25,
+            Port::C => 0x28,
+            Port::D => 0x2B,
+            Port::E => 0x2E,
+            Port::F => 0x31,
+            Port::G => 0x34,
+            Port::H => 0x102,
+            Port::J => 0x105,
+            Port::K => 0x108,
+            Port::L => 0x10B,
+        }
+    }
+}
+
+/// One pin.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Pin {
+    /// Its port.
+    pub port: Port,
+    /// Its bit in the port, 0 to 7.
+    pub bit: u8,
+}
+
+/// Shorthand that board files use.
+pub const fn pin(port: Port, bit: u8) -> Pin {
+    Pin { port, bit }
+}
+
+/// The pins of one stepper driver.
+#[derive(Clone, Copy, Debug)]
+pub struct MotorPins {
+    /// Steps on the rising edge.
+    pub step: Pin,
+    /// Low is the positive direction unless the motor's polarity setting inverts it.
+    pub dir: Pin,
+    /// Active low; `None` when the driver has no enable of its own.
+    pub enable: Option<Pin>,
+}
+
+/// A 16-bit or 8-bit timer of the ATmega2560.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs)]
+pub enum Timer {
+    T0,
+    T1,
+    T2,
+    T3,
+    T4,
+    T5,
+}
+
+/// A board.
+#[derive(Clone, Copy, Debug)]
+pub struct Board {
+    /// The name that `--board` takes.
+    pub name: &'static str,
+    /// CPU clock, Hz.
+    pub clock_hz: u32,
+    /// The four stepper drivers, motor 1 first.
+    pub motors: [MotorPins; MOTORS],
+    /// An enable shared by all drivers, active low.
+    pub enable_all: Option<Pin>,
+    /// Outputs that the panic handler drives low: spindles, heaters, fans.
+    pub hazards: &'static [Pin],
+    /// Timer of the step interrupt (16 bit).
+    pub step_timer: Timer,
+    /// Timer of the 1 kHz tick.
+    pub tick_timer: Timer,
+}
+
+const MAX_PINS: usize = 3 * MOTORS + 1 + 8;
+
+impl Board {
+    /// Panics, so fails the build when evaluated in a constant, if a pin or a timer has two users.
+    pub const fn check(&self) {
+        let mut pins = [None; MAX_PINS];
+        let mut n = 0;
+        let mut m = 0;
+        while m < MOTORS {
+            pins[n] = Some(self.motors[m].step);
+            pins[n + 1] = Some(self.motors[m].dir);
+            pins[n + 2] = self.motors[m].enable;
+            n += 3;
+            m += 1;
+        }
+        pins[n] = self.enable_all;
+        n += 1;
+        let mut h = 0;
+        while h < self.hazards.len() {
+            pins[n] = Some(self.hazards[h]);
+            n += 1;
+            h += 1;
+        }
+        let mut i = 0;
+        while i < n {
+            let mut j = i + 1;
+            while j < n {
+                if let (Some(a), Some(b)) = (pins[i], pins[j]) {
+                    assert!(
+                        a.port as u8 != b.port as u8 || a.bit != b.bit,
+                        "a pin of this board is used twice"
+                    );
+                }
+                j += 1;
+            }
+            i += 1;
+        }
+        assert!(
+            self.step_timer as u8 != self.tick_timer as u8,
+            "a timer of this board is used twice"
+        );
+    }
+}
+
+/// Every board Kerf knows.
+pub const ALL: [&Board; 2] = [&MEGA2560_GRBL, &RAMPS14];
+
+const _: () = {
+    let mut i = 0;
+    while i < ALL.len() {
+        ALL[i].check();
+        i += 1;
+    }
+};
+
+/// The board with this name.
+pub fn by_name(name: &str) -> Option<&'static Board> {
+    ALL.into_iter().find(|b| b.name == name)
+}
+
+/// The board that this image is built for.
+#[cfg(feature = "board-ramps14")]
+pub const ACTIVE: &Board = &RAMPS14;
+/// The board that this image is built for.
+#[cfg(not(feature = "board-ramps14"))]
+pub const ACTIVE: &Board = &MEGA2560_GRBL;

@@ -1,0 +1,13 @@
+//! Kerf: motion-control firmware for 8-bit AVR boards, in async Rust on Embassy.
+//!
+//! This library is the whole firmware but for the image's entry point. It is `no_std` and runs on
+//! the ATmega2560 and, for tests and tools, on the host. `ARCHITECTURE.md` is the tour of the house.
+#![no_std]
+#![cfg_attr(target_arch = "avr", feature(abi_avr_interrupt, asm_experimental_arch))]
+
+#[cfg(not(target_arch = "avr"))]
+extern crate std;
+
+pub mod boards;
+pub mod status;
+pub mod units;

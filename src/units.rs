@@ -1,0 +1,41 @@
+//! The currency between modules: exact lengths and exact decimals. No floats here.
+
+/// A position or distance in units of 0.1 um for a linear axis, 0.0001 degree for a rotary one.
+///
+/// The range is +-214 m (or degrees times 1000). 0.0001 mm is exactly one unit; an inch is exactly
+/// 254,000 units, so five decimals of an inch stay distinct.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
+pub struct Length(pub i32);
+
+impl Length {
+    /// Zero.
+    pub const ZERO: Length = Length(0);
+    /// Units in a millimetre or a degree.
+    pub const PER_MM: i32 = 10_000;
+    /// Units in an inch.
+    pub const PER_INCH: i32 = 254_000;
+
+    /// In millimetres, rounded to a float. For dynamics only, never for positions.
+    pub fn to_mm(self) -> f32 {
+        self.0 as f32 * 1e-4
+    }
+
+    /// Sum, or `None` beyond the range.
+    pub fn checked_add(self, other: Length) -> Option<Length> {
+        self.0.checked_add(other.0).map(Length)
+    }
+
+    /// Difference, or `None` beyond the range.
+    pub fn checked_sub(self, other: Length) -> Option<Length> {
+        self.0.checked_sub(other.0).map(Length)
+    }
+}
+
+/// Axes in their order everywhere: X Y Z A B C.
+pub const AXES: usize = 6;
+/// The letters of the axes, lower case.
+pub const AXIS_LETTERS: [u8; AXES] = *b"xyzabc";
+/// The first axis that turns.
+pub const FIRST_ROTARY: usize = 3;
+/// A value for each axis.
+pub type PerAxis<T> = [T; AXES];
