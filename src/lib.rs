@@ -9,5 +9,7 @@
 extern crate std;
 
 pub mod boards;
+pub mod math;
+pub mod progmem;
 pub mod status;
 pub mod units;

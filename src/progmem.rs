@@ -1,0 +1,150 @@
+//! Tables and text in program memory.
+//!
+//! On AVR a constant lives in RAM unless it is placed in flash and read with `lpm`. [`Progmem`] does
+//! both: the only way to a value is a copy out of flash. The linker puts these sections right behind
+//! the vectors, inside the first 64 KiB, where `lpm` reaches without touching RAMPZ, so reading is
+//! safe in interrupts too. On the host it is an ordinary constant.
+//!
+//! Cost on AVR: about 4 cycles a byte.
+
+/// A value in program memory. Make one with [`progmem!`](crate::progmem!) only.
+#[repr(transparent)]
+pub struct Progmem<T>(T);
+
+impl<T: Copy> Progmem<T> {
+    /// Wraps a value.
+    ///
+    /// # Safety
+    /// On AVR the value must be a static in a `.progmem` section: reads go to program memory at its
+    /// address. [`progmem!`](crate::progmem!) sees to that.
+    pub const unsafe fn new(value: T) -> Self {
+        Self(value)
+    }
+
+    /// A copy of the value.
+    pub fn get(&self) -> T {
+        load(&raw const self.0)
+    }
+}
+
+impl<T: Copy, const N: usize> Progmem<[T; N]> {
+    /// Number of elements.
+    #[allow(clippy::len_without_is_empty)]
+    pub const fn len(&self) -> usize {
+        N
+    }
+
+    /// A copy of element `index`, or `None` beyond the end.
+    pub fn at(&self, index: usize) -> Option<T> {
+        // The pointer arithmetic stays inside the array, and nothing is read but through `load`.
+        (index < N).then(|| load((&raw const self.0).cast::<T>().wrapping_add(index)))
+    }
+}
+
+#[cfg(target_arch = "avr")]
+fn load<T: Copy>(from: *const T) -> T {
+    let mut value = core::mem::MaybeUninit::<T>::uninit();
+    let mut to = value.as_mut_ptr().cast::<u8>();
+    let mut from = from.cast::<u8>();
+    for _ in 0..core::mem::size_of::<T>() {
+        // SAFETY: `from` walks a static in program memory (the contract of `Progmem::new`), `to`
+        // walks `value`; both are `size_of::<T>()` bytes long.
+        unsafe {
+            let byte: u8;
+            core::arch::asm!("lpm {b}, Z+", b = out(reg) byte, inout("Z") from,
+                options(readonly, nostack, preserves_flags));
+            to.write(byte);
+            to = to.add(1);
+        }
+    }
+    // SAFETY: every byte was copied from a valid `T`.
+    unsafe { value.assume_init() }
+}
+
+#[cfg(not(target_arch = "avr"))]
+fn load<T: Copy>(from: *const T) -> T {
+    // SAFETY: callers pass a pointer into a live `Progmem` of theirs.
+    unsafe { from.read() }
+}
+
+/// Text in program memory: a pointer that only [`Text::bytes`] follows.
+#[derive(Clone, Copy)]
+pub struct Text {
+    start: *const u8,
+    len: u8,
+}
+
+// SAFETY: it points at immutable statics only.
+unsafe impl Sync for Text {}
+
+impl Text {
+    /// Text at `bytes`.
+    ///
+    /// # Safety
+    /// On AVR, `bytes` must lie in program memory. [`text!`](crate::text!) sees to that.
+    pub const unsafe fn new<const N: usize>(bytes: &'static Progmem<[u8; N]>) -> Self {
+        assert!(N < 256, "a program-memory text is at most 255 bytes");
+        Self { start: (&raw const bytes.0).cast(), len: N as u8 }
+    }
+
+    /// Number of bytes.
+    pub const fn len(&self) -> usize {
+        self.len as usize
+    }
+
+    /// Whether there is none.
+    pub const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Byte `index`, or `None` beyond the end.
+    pub fn at(&self, index: usize) -> Option<u8> {
+        (index < self.len()).then(|| load(self.start.wrapping_add(index)))
+    }
+
+    /// Its bytes, one by one.
+    pub fn bytes(self) -> impl Iterator<Item = u8> {
+        (0..self.len()).map(move |i| load(self.start.wrapping_add(i)))
+    }
+}
+
+/// Declares a static in program memory: `progmem! { /// Doc
+/// pub static NAME: [u8; 3] = [1, 2, 3]; }`.
+#[macro_export]
+macro_rules! progmem {
+    ($($(#[$meta:meta])* $vis:vis static $name:ident: $type:ty = $value:expr;)+) => {$(
+        $(#[$meta])*
+        #[cfg_attr(target_arch = "avr", unsafe(link_section = ".progmem.data"))]
+        // SAFETY: the attribute above places it in program memory.
+        $vis static $name: $crate::progmem::Progmem<$type> =
+            unsafe { $crate::progmem::Progmem::new($value) };
+    )+};
+}
+
+/// A [`Text`](crate::progmem::Text) from a literal: `text!("SYSTEM READY")`.
+#[macro_export]
+macro_rules! text {
+    ($literal:literal) => {{
+        const BYTES: [u8; $literal.len()] = *$literal.as_bytes().first_chunk().unwrap();
+        $crate::progmem! { static TEXT: [u8; BYTES.len()] = BYTES; }
+        // SAFETY: `progmem!` placed it in program memory.
+        const { unsafe { $crate::progmem::Text::new(&TEXT) } }
+    }};
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    progmem! { static TABLE: [u16; 3] = [10, 20, 30]; }
+
+    #[test]
+    fn reads_back_what_was_placed() {
+        assert_eq!(TABLE.at(1), Some(20));
+        assert_eq!(TABLE.at(3), None);
+        assert_eq!(TABLE.get(), [10, 20, 30]);
+        let t = crate::text!("SYSTEM READY");
+        assert_eq!(t.bytes().collect::<Vec<u8>>(), b"SYSTEM READY");
+        assert_eq!(t.at(12), None);
+    }
+}
