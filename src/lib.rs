@@ -9,6 +9,7 @@
 extern crate std;
 
 pub mod boards;
+pub mod gcode;
 pub mod math;
 pub mod progmem;
 pub mod status;

@@ -1,0 +1,3 @@
+//! G-code: from the bytes of a line to canonical commands.
+
+pub mod command;
