@@ -11,6 +11,7 @@ extern crate std;
 pub mod boards;
 pub mod gcode;
 pub mod math;
+pub mod motion;
 pub mod progmem;
 pub mod status;
 pub mod units;

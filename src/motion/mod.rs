@@ -1,0 +1,3 @@
+//! Motion: from targets to step pulses.
+
+pub mod block;
