@@ -1,3 +1,4 @@
 //! Motion: from targets to step pulses.
 
 pub mod block;
+pub mod profile;
