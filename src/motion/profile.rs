@@ -11,7 +11,7 @@
 //!             jerk  jerk
 //! ```
 //!
-//! Called by exec ([`Ramp`], [`peak`]) and by the look-ahead ([`reach`]). Pure functions.
+//! Called by exec ([`Ramp`], [`peak`], [`reach`]) and by the look-ahead ([`brake`]). Pure functions.
 //!
 //! Units: mm, s (degrees for a rotary-only move). Inputs are finite and not negative. A limit below
 //! [`NEGLIGIBLE`] means none: without a jerk limit ramps are trapezoids, without either they take
@@ -174,13 +174,37 @@ pub fn reach(v: f32, length: f32, limits: &Limits) -> f32 {
         if length >= (v + v + knee) * phase {
             let low = v - 0.5 * knee;
             let w = sqrt(low * low + 2.0 * length * accel) - 0.5 * knee;
-            return next_below(w).max(v);
+            return greater(next_below(w), v);
         }
     } else if jerk <= NEGLIGIBLE {
         return f32::MAX;
     }
     let phase = jerk_phase(v, length, jerk);
-    next_below(v + jerk * phase * phase).max(v)
+    greater(next_below(v + jerk * phase * phase), v)
+}
+
+/// The highest velocity at which `length` may be entered if it is to be left at `exit`, or at any
+/// higher velocity that is found possible later.
+///
+/// That is not simply `reach(exit, ..)`: a ramp from w down to w/3 is 9 % *longer* than one down to
+/// 0, so that `reach` falls with `exit` at first, by up to 5.5 %. A machine that entered at
+/// `reach(0)` could not keep to a later, higher `exit`. So this is the greatest function below
+/// `reach` that never falls as `exit` rises, or a little less. It is at least `exit`.
+///
+/// Cost: 100 to 500 more than [`reach`].
+pub fn brake(exit: f32, length: f32, limits: &Limits) -> f32 {
+    let &Limits { accel, jerk } = limits;
+    // `reach` rises from exit^3 = length^2 J / 32 on, and from exit = A^2 / 2J on. The first in
+    // logarithms: their error is below 0.28 octaves in total, to the safe side with the 36.
+    let cubed = 3 * log(exit) + 5 * 128;
+    let rises = jerk <= NEGLIGIBLE
+        || cubed > 2 * log(length) + log(jerk) + 36
+        || (accel > NEGLIGIBLE && 2.0 * exit * jerk >= accel * accel);
+    if rises {
+        reach(exit, length, limits)
+    } else {
+        greater(0.944 * reach(0.0, length, limits), exit)
+    }
 }
 
 /// The time y of a jerk phase with (2 v + J y^2) y = length, or up to 0.022 % less. Cost: 3,500.
@@ -201,7 +225,6 @@ fn jerk_phase(v: f32, length: f32, jerk: f32) -> f32 {
 /// The root of `J y^3 + 2 v y = length` within 15 %, without a float operation: the bits of a float
 /// are its logarithm, roughly. Works in 1/128 octave. Cost: 120.
 fn rough_phase(v: f32, length: f32, jerk: f32) -> f32 {
-    let log = |x: f32| (x.to_bits() >> 16) as i32;
     let one = log(1.0);
     // Where the cubic term rules, and where the linear one does: each alone is above the root.
     let cubic = (((log(length) - log(jerk)) * 21_845) >> 16) + one;
@@ -212,24 +235,40 @@ fn rough_phase(v: f32, length: f32, jerk: f32) -> f32 {
     f32::from_bits((root.max(128) as u32) << 16)
 }
 
+/// The logarithm of a number that is not negative in 1/128 octaves, plus a constant; up to 12 too
+/// small. Cost: 20.
+fn log(x: f32) -> i32 {
+    (x.to_bits() >> 16 & 0x7FFF) as i32
+}
+
+/// The lesser of two numbers. On AVR `f32::min` is a call that also sees to NaN. Cost: 70.
+pub(super) fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers. Cost: 70.
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 /// A few roundings less, at least 0. Cost: 20.
 fn next_below(x: f32) -> f32 {
     f32::from_bits(x.to_bits().saturating_sub(8))
 }
 
 /// The highest velocity in `max(v0, v1)..=cruise` with which a ramp from `v0` up to it and a ramp
-/// down from it to `v1` fit in `length`, or up to 0.03 % of the rise less. Never one that does not
+/// down from it to `v1` fit in `length`, or up to 0.05 % of the rise less. Never one that does not
 /// fit, unless already the ramp between `v0` and `v1` does not: then it is `max(v0, v1)`.
 ///
 /// Cost: 200 if `v0` or `v1` is `cruise`; `reach` if they are equal; 2,900 if both ramps get to the
-/// acceleration limit; 4,200 more if `cruise` fits; else about 14,000 (three iterations, at most 8).
+/// acceleration limit; 4,200 more if `cruise` fits; else about 14,000 (two iterations, rarely three, at most 8).
 pub fn peak(v0: f32, v1: f32, length: f32, cruise: f32, limits: &Limits) -> f32 {
     let (low, high) = if v0 < v1 { (v0, v1) } else { (v1, v0) };
     if high >= cruise {
         return high;
     }
     if low == high {
-        return reach(low, 0.5 * length, limits).min(cruise);
+        return lesser(reach(low, 0.5 * length, limits), cruise);
     }
     let &Limits { accel, jerk } = limits;
     if accel > NEGLIGIBLE {
@@ -238,7 +277,7 @@ pub fn peak(v0: f32, v1: f32, length: f32, cruise: f32, limits: &Limits) -> f32 
         let (a, b) = (low - 0.5 * knee, high - 0.5 * knee);
         let p = sqrt(length * accel + 0.5 * (a * a + b * b)) - 0.5 * knee;
         if p >= high + knee || jerk <= NEGLIGIBLE {
-            return next_below(p).max(high).min(cruise);
+            return lesser(greater(next_below(p), high), cruise);
         }
     } else if jerk <= NEGLIGIBLE {
         return cruise;
@@ -246,7 +285,7 @@ pub fn peak(v0: f32, v1: f32, length: f32, cruise: f32, limits: &Limits) -> f32 
     if limits.length(low, cruise) + limits.length(high, cruise) <= length {
         return cruise;
     }
-    between(low, high, length, limits).max(high).min(cruise)
+    lesser(greater(between(low, high, length, limits), high), cruise)
 }
 
 /// [`peak`] when the ramp from `high` does not get to the acceleration limit. Cost: 3,000 + 3,500
@@ -272,7 +311,7 @@ fn between(low: f32, high: f32, length: f32, limits: &Limits) -> f32 {
         let (long, slope) = if dv > knee {
             (half * sum * (dv + knee), (half + half) * (sum + dv + knee) * jerk * x)
         } else {
-            let s = sqrt(x * x + shift).max(f32::MIN_POSITIVE);
+            let s = greater(sqrt(x * x + shift), f32::MIN_POSITIVE);
             (sum * s, x * (sum + dv + dv) / s)
         };
         let step = ((high + p) * x + long - length) / (high + p + jxx + jxx + slope);
@@ -282,6 +321,6 @@ fn between(low: f32, high: f32, length: f32, limits: &Limits) -> f32 {
             break;
         }
     }
-    let x = x.max(0.0) * (1.0 - 1.3e-4);
+    let x = greater(x, 0.0) * (1.0 - 1.3e-4);
     next_below(high + jerk * x * x)
 }
