@@ -1,3 +1,4 @@
 //! G-code: from the bytes of a line to canonical commands.
 
+pub mod arc;
 pub mod command;
