@@ -1,0 +1,176 @@
+//! Which circle the words of a G2 or G3 line describe, and whether they describe one.
+
+use super::arc;
+use super::block::{Block, slot};
+use super::command::{Arc, Motion};
+use super::interpreter::{Interpreter, exact};
+use super::number::Decimal;
+use crate::math;
+use crate::status::Status;
+use crate::units::{Length, PerAxis};
+
+/// The smallest radius: 0.1 mm, in units.
+const MIN_RADIUS: i32 = 1_000;
+/// The largest R: 150 m, which keeps its square in 64 bits.
+const MAX_RADIUS: i32 = 1_500_000_000;
+/// Radii at start and end always may differ by this much (5 um) ...
+const SLACK: f32 = 50.0;
+/// ... or by this part of the radius ...
+const SLACK_PART: f32 = 0.001;
+/// ... but never by more than this (1 mm).
+const MAX_SLACK: f32 = 10_000.0;
+
+/// Words that make a line an arc.
+const ARC_WORDS: u16 = slot::AXES | slot::OFFSETS | 1 << slot::R | 1 << slot::P;
+
+impl Interpreter {
+    /// G2 and G3. Cost on AVR: 5,000 cycles and the words.
+    pub(super) fn arc(&mut self, block: &mut Block, clockwise: bool) -> Result<Motion, Status> {
+        if !block.has(ARC_WORDS) {
+            return Ok(Motion::None);
+        }
+        let feed = self.rate(block, false)?;
+        let [first, second, linear] = self.modal.plane.axes();
+        let radius = self.radius(block, first, second)?;
+        let turns = turns(block)?;
+        let start = self.position;
+        self.advance(block)?;
+        let target = self.position;
+        let mut arc =
+            Arc { first, second, linear, center: [Length::ZERO; 2], clockwise, extra_turns: turns };
+        arc.center = match radius {
+            Some(radius) => radius_form(&start, &target, &arc, radius)?,
+            None => self.center_form(block, &start, &target, &arc)?,
+        };
+        if arc::closes(&start, &target, &arc) {
+            arc.extra_turns = turns.saturating_sub(1);
+        }
+        Ok(Motion::Arc { target, feed, arc })
+    }
+
+    /// R, in units; negative for the long way round.
+    fn radius(&self, block: &mut Block, first: u8, second: u8) -> Result<Option<Length>, Status> {
+        let Some(word) = block.take(slot::R) else { return Ok(None) };
+        if block.has(slot::OFFSETS) {
+            return Err(Status::ArcSpecification);
+        }
+        if !block.has(1 << first | 1 << second) {
+            return Err(Status::ArcAxisMissing);
+        }
+        let radius = exact(&word, first, self.modal.units)?.units;
+        match radius.0.abs() {
+            ..MIN_RADIUS => Err(Status::ArcRadiusTolerance),
+            MIN_RADIUS..=MAX_RADIUS => Ok(Some(radius)),
+            _ => Err(Status::OutOfRange),
+        }
+    }
+
+    /// The centre from I, J, K, which count from the start in every distance mode.
+    fn center_form(
+        &self,
+        block: &mut Block,
+        start: &PerAxis<Length>,
+        target: &PerAxis<Length>,
+        arc: &Arc,
+    ) -> Result<[Length; 2], Status> {
+        if block.has(1 << (slot::I + arc.linear)) {
+            return Err(Status::ArcSpecification);
+        }
+        let mut offset = |axis: u8| match block.take(slot::I + axis) {
+            Some(word) => Ok(exact(&word, axis, self.modal.units)?.units),
+            None => Ok(Length::ZERO),
+        };
+        let (first, second) = (offset(arc.first)?, offset(arc.second)?);
+        if first == Length::ZERO && second == Length::ZERO {
+            return Err(Status::ArcOffsetsMissing);
+        }
+        let from = in_plane(start, arc);
+        let center = [sum(from[0], first.0)?, sum(from[1], second.0)?];
+        check_radii(&Arc { center, ..*arc }, start, target)?;
+        Ok(center)
+    }
+}
+
+/// P: full turns.
+fn turns(block: &mut Block) -> Result<u16, Status> {
+    match block.take(slot::P) {
+        None => Ok(0),
+        Some(Decimal { negative: true, .. }) => Err(Status::PWordNegative),
+        Some(word) => {
+            let turns = word.integer().ok().and_then(|turns| turns.try_into().ok());
+            turns.ok_or(Status::PWordInvalid)
+        }
+    }
+}
+
+/// Refuses a centre from which start and end are not equally far, or in the same direction though
+/// they differ.
+fn check_radii(arc: &Arc, start: &PerAxis<Length>, target: &PerAxis<Length>) -> Result<(), Status> {
+    let [from, to] = [arc::spoke(start, arc), arc::spoke(target, arc)];
+    let radius = math::sqrt(from[0] * from[0] + from[1] * from[1]);
+    let error = (radius - math::sqrt(to[0] * to[0] + to[1] * to[1])).abs();
+    if error > MAX_SLACK || (error > SLACK && error > SLACK_PART * radius) {
+        return Err(Status::ArcSpecification);
+    }
+    let parallel = from[0] * to[1] == from[1] * to[0];
+    let alike = from[0] * to[0] + from[1] * to[1] > 0.0;
+    if parallel && alike && !arc::closes(start, target, arc) {
+        return Err(Status::ArcEndpointIsStart);
+    }
+    Ok(())
+}
+
+/// The centre from R: on the perpendicular through the middle of the chord, at the distance
+/// h = sqrt(r^2 - (chord / 2)^2).
+///
+/// The difference of squares is formed exactly, in 64 bits, or the centre of a half circle would be
+/// off by the square root of a rounding error.
+fn radius_form(
+    start: &PerAxis<Length>,
+    target: &PerAxis<Length>,
+    arc: &Arc,
+    radius: Length,
+) -> Result<[Length; 2], Status> {
+    let (from, to) = (in_plane(start, arc), in_plane(target, arc));
+    let chord = [difference(to[0], from[0])?, difference(to[1], from[1])?];
+    if chord == [0, 0] {
+        return Err(Status::ArcEndpointIsStart);
+    }
+    let square = |x: i32| i64::from(x) * i64::from(x);
+    let chord_squared = square(chord[0]).saturating_add(square(chord[1]));
+    let excess = 4 * square(radius.0) - chord_squared;
+    // Half a chord up to 5 um longer than R passes for a half circle.
+    if excess < -(8 * SLACK as i64) * i64::from(radius.0.abs()) {
+        return Err(Status::ArcRadiusTolerance);
+    }
+    // 2 h / chord. To the left of the chord lies the centre of the short way counter-clockwise.
+    let ratio = root(excess.max(0) as u64) / root(chord_squared as u64);
+    let left = if arc.clockwise == (radius.0 < 0) { 0.5 } else { -0.5 };
+    let across = |component: i32| arc::round(component as f32 * ratio * left);
+    let first = sum(from[0], chord[0] / 2).and_then(|middle| sum(middle, -across(chord[1])))?;
+    let second = sum(from[1], chord[1] / 2).and_then(|middle| sum(middle, across(chord[0])))?;
+    Ok([first, second])
+}
+
+/// Square root of an integer of any size, as precise as a float is.
+fn root(mut square: u64) -> f32 {
+    let mut scale = 1.0;
+    while square > u64::from(u32::MAX) {
+        square >>= 8;
+        scale *= 16.0;
+    }
+    math::sqrt(square as u32 as f32) * scale
+}
+
+/// The two coordinates in the plane of an arc.
+fn in_plane(point: &PerAxis<Length>, arc: &Arc) -> [Length; 2] {
+    [arc.first, arc.second].map(|axis| point.get(usize::from(axis)).copied().unwrap_or_default())
+}
+
+fn sum(length: Length, units: i32) -> Result<Length, Status> {
+    length.checked_add(Length(units)).ok_or(Status::OutOfRange)
+}
+
+fn difference(a: Length, b: Length) -> Result<i32, Status> {
+    a.checked_sub(b).map(|difference| difference.0).ok_or(Status::OutOfRange)
+}

@@ -1,0 +1,157 @@
+//! The language: every G and M code, and what it does. A new code is a row here.
+//!
+//! The variant of an [`Action`] is the modal group of the code: a line may carry one of each.
+
+use super::command::Stop;
+use super::modal::{Distance, FeedMode, MotionMode, PathMode, Plane, Units};
+use crate::progmem::Progmem;
+
+/// What a code does, by modal group (RS274/NGC section 3.4).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Action {
+    /// Group 0.
+    NonModal(NonModal),
+    /// Group 1.
+    Motion(MotionMode),
+    /// Group 2.
+    Plane(Plane),
+    /// Group 3.
+    Distance(Distance),
+    /// Group 5.
+    FeedMode(FeedMode),
+    /// Group 6.
+    Units(Units),
+    /// Group 13.
+    Path(PathMode),
+    /// Groups in which this machine has one mode, so that selecting it changes nothing.
+    Only(OnlyMode),
+    /// Group 4, M codes.
+    Stop(Stop),
+}
+
+/// Group 0: for one line only.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum NonModal {
+    /// G4.
+    Dwell,
+    /// G28.3.
+    SetPosition,
+    /// G92.
+    SetOffset,
+    /// G92.1.
+    ClearOffset,
+}
+
+impl NonModal {
+    /// Whether the axis words of the line belong to it.
+    pub fn uses_axes(self) -> bool {
+        matches!(self, NonModal::SetPosition | NonModal::SetOffset)
+    }
+}
+
+/// Codes that name the only mode of their group.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum OnlyMode {
+    /// Group 7, G40: no cutter compensation.
+    Cutter = 1,
+    /// Group 8, G49: no tool length offset.
+    ToolLength = 2,
+    /// Group 12, G54: the coordinate system.
+    Coordinates = 4,
+}
+
+/// A row: the number of the code in tenths, and what it does.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Code {
+    number: u16,
+    action: Action,
+}
+
+const fn code(number: u16, action: Action) -> Code {
+    Code { number, action }
+}
+
+crate::progmem! {
+    /// G codes, by number.
+    static G: [Code; 23] = [
+        code(0, Action::Motion(MotionMode::Traverse)),
+        code(10, Action::Motion(MotionMode::Feed)),
+        code(20, Action::Motion(MotionMode::ClockwiseArc)),
+        code(30, Action::Motion(MotionMode::CounterclockwiseArc)),
+        code(40, Action::NonModal(NonModal::Dwell)),
+        code(170, Action::Plane(Plane::Xy)),
+        code(180, Action::Plane(Plane::Zx)),
+        code(190, Action::Plane(Plane::Yz)),
+        code(200, Action::Units(Units::Inch)),
+        code(210, Action::Units(Units::Mm)),
+        code(283, Action::NonModal(NonModal::SetPosition)),
+        code(400, Action::Only(OnlyMode::Cutter)),
+        code(490, Action::Only(OnlyMode::ToolLength)),
+        code(540, Action::Only(OnlyMode::Coordinates)),
+        code(610, Action::Path(PathMode::Exact)),
+        code(640, Action::Path(PathMode::Continuous)),
+        code(800, Action::Motion(MotionMode::None)),
+        code(900, Action::Distance(Distance::Absolute)),
+        code(910, Action::Distance(Distance::Incremental)),
+        code(920, Action::NonModal(NonModal::SetOffset)),
+        code(921, Action::NonModal(NonModal::ClearOffset)),
+        code(930, Action::FeedMode(FeedMode::InverseTime)),
+        code(940, Action::FeedMode(FeedMode::PerMinute)),
+    ];
+    /// M codes, by number.
+    static M: [Code; 5] = [
+        code(0, Action::Stop(Stop::Program)),
+        code(10, Action::Stop(Stop::Program)),
+        code(20, Action::Stop(Stop::End)),
+        code(300, Action::Stop(Stop::End)),
+        code(600, Action::Stop(Stop::Program)),
+    ];
+}
+
+/// What G code `number` (in tenths) does.
+pub fn g(number: u16) -> Option<Action> {
+    find(&G, number)
+}
+
+/// What M code `number` (in tenths) does.
+pub fn m(number: u16) -> Option<Action> {
+    find(&M, number)
+}
+
+/// Binary search. Cost on AVR: about 60 cycles a step, five steps.
+fn find<const N: usize>(table: &Progmem<[Code; N]>, number: u16) -> Option<Action> {
+    let (mut low, mut high) = (0, N);
+    while low < high {
+        let middle = (low + high) / 2;
+        let row = table.at(middle)?;
+        match row.number.cmp(&number) {
+            core::cmp::Ordering::Equal => return Some(row.action),
+            core::cmp::Ordering::Less => low = middle + 1,
+            core::cmp::Ordering::Greater => high = middle,
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_sorted() {
+        assert!(G.get().is_sorted_by_key(|row| row.number));
+        assert!(M.get().is_sorted_by_key(|row| row.number));
+    }
+
+    #[test]
+    fn every_row_is_found_and_nothing_else() {
+        let rows = G.get();
+        for number in 0..=u16::MAX {
+            let row = rows.iter().find(|row| row.number == number);
+            assert_eq!(g(number), row.map(|row| row.action), "{number}");
+        }
+        assert_eq!(m(300), Some(Action::Stop(Stop::End)));
+        assert_eq!(m(30), None);
+    }
+}

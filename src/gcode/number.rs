@@ -1,0 +1,286 @@
+//! Numbers of a G-code line: exact decimals, and their conversions.
+//!
+//! A number is kept as written, in three pieces that need no wide arithmetic: the whole part, four
+//! decimals (the resolution of [`Length`]) and four more (what rounding and the residue of
+//! incremental moves need). Decimals beyond the eighth are ignored: in inches that is 0.25 nm.
+
+use super::lexer::{Lexed, failure, is_blank};
+use crate::status::Status;
+use crate::units::Length;
+
+/// A decimal number, exact to eight decimals. Zero is never negative.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Decimal {
+    /// Left of the point.
+    pub whole: u32,
+    /// The first four decimals, 0 to 9999.
+    pub frac: u16,
+    /// The next four decimals, 0 to 9999.
+    pub tail: u16,
+    /// Less than zero.
+    pub negative: bool,
+}
+
+/// A length together with what rounding took from it: `units` + `rest` / 10,000 units.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Exact {
+    /// Rounded to the nearest unit, halves away from zero.
+    pub units: Length,
+    /// What is left, -5000 to 5000 ten-thousandths of a unit.
+    pub rest: i16,
+}
+
+/// Ten-thousandths in a unit: the scale of [`Exact::rest`].
+const REST: i16 = 10_000;
+
+impl Exact {
+    /// With `carried` added to the rest, as an incremental move does with what the last one left.
+    /// Both rests are at most half a unit, so their sum carries one unit at most.
+    pub fn carry(self, carried: i16) -> Option<Exact> {
+        let rest = self.rest + carried;
+        let (step, rest) = match rest {
+            5_000.. => (1, rest - REST),
+            ..=-5_000 => (-1, rest + REST),
+            _ => (0, rest),
+        };
+        Some(Exact { units: self.units.checked_add(Length(step))?, rest })
+    }
+}
+
+impl Decimal {
+    /// As millimetres or degrees.
+    pub fn mm(&self) -> Result<Exact, Status> {
+        if self.whole > (i32::MAX / Length::PER_MM) as u32 {
+            return Err(Status::OutOfRange);
+        }
+        self.exact(self.whole * Length::PER_MM as u32 + u32::from(self.frac), self.tail)
+    }
+
+    /// As inches, exact to seven decimals.
+    ///
+    /// 254,000 units per inch, piece by piece in 32 bits: a fourth decimal is 25.4 units, a seventh
+    /// 0.0254. Cost on AVR: two 32-bit divisions, 1,300 cycles.
+    pub fn inch(&self) -> Result<Exact, Status> {
+        if self.whole > (i32::MAX / Length::PER_INCH) as u32 {
+            return Err(Status::OutOfRange);
+        }
+        let tenths = u32::from(self.frac) * 254;
+        let rest = tenths % 10 * 1_000 + u32::from(self.tail / 10) * 254;
+        let units = self.whole * Length::PER_INCH as u32 + tenths / 10 + rest / REST as u32;
+        self.exact(units, (rest % REST as u32) as u16)
+    }
+
+    /// Rounds and signs a magnitude of `units` + `rest` / 10,000.
+    fn exact(&self, units: u32, rest: u16) -> Result<Exact, Status> {
+        let up = rest >= 5_000;
+        let rest = if up { rest as i16 - REST } else { rest as i16 };
+        let units = units + u32::from(up);
+        let units = i32::try_from(units).map_err(|_| Status::OutOfRange)?;
+        Ok(match self.negative {
+            true => Exact { units: Length(-units), rest: -rest },
+            false => Exact { units: Length(units), rest },
+        })
+    }
+
+    /// As a whole number: 110 if negative, 102 with decimals.
+    pub fn integer(&self) -> Result<u32, Status> {
+        match self {
+            Decimal { negative: true, .. } => Err(Status::OutOfRange),
+            Decimal { frac: 0, tail: 0, whole, .. } => Ok(*whole),
+            _ => Err(Status::BadNumber),
+        }
+    }
+
+    /// As the number of a G or M code in tenths: 283 of `G28.3`. `None` if no code has such a number.
+    pub fn code(&self) -> Option<u16> {
+        let tenths = self.frac / 1_000;
+        let fits = !self.negative && self.whole < 1_000 && self.tail == 0;
+        (fits && tenths * 1_000 == self.frac).then(|| self.whole as u16 * 10 + tenths)
+    }
+
+    /// As seconds, in milliseconds: 163 if negative, 110 beyond 32 bits.
+    pub fn milliseconds(&self) -> Result<u32, Status> {
+        if self.negative {
+            return Err(Status::PWordNegative);
+        }
+        let part = u32::from((self.frac + 5) / 10);
+        let whole = (self.whole < u32::MAX / 1_000).then(|| self.whole * 1_000);
+        whole.map(|whole| whole + part).ok_or(Status::OutOfRange)
+    }
+
+    /// Rounded to a float: for feeds, never for positions.
+    pub fn to_f32(self) -> f32 {
+        let mut value = self.whole as f32;
+        if self.frac != 0 || self.tail != 0 {
+            value += f32::from(self.frac) * 1e-4 + f32::from(self.tail) * 1e-8;
+        }
+        if self.negative { -value } else { value }
+    }
+}
+
+/// A number: sign, digits, point, digits; blanks anywhere, at least one digit, no exponent.
+///
+/// Cost on AVR: about 40 cycles a digit.
+pub fn decimal(input: &[u8]) -> Lexed<'_, Decimal> {
+    let mut value = Decimal::default();
+    let (input, sign) = optional(input, |byte| matches!(byte, b'-' | b'+'));
+    let (input, digits) = whole(input, &mut value)?;
+    let (input, point) = optional(input, |byte| byte == b'.');
+    let (input, decimals) = match point {
+        Some(_) => fraction(input, &mut value),
+        None => (input, 0),
+    };
+    if digits + decimals == 0 {
+        return Err(failure(Status::BadNumber));
+    }
+    let zero = value.whole == 0 && value.frac == 0 && value.tail == 0;
+    value.negative = sign == Some(b'-') && !zero;
+    Ok((input, value))
+}
+
+/// The digits left of the point, and how many there are (at most 255 count).
+fn whole<'a>(mut input: &'a [u8], value: &mut Decimal) -> Lexed<'a, u8> {
+    let mut count = 0u8;
+    while let (rest, Some(byte)) = optional(input, |byte| byte.is_ascii_digit()) {
+        if value.whole > u32::MAX / 10 {
+            return Err(failure(Status::OutOfRange));
+        }
+        let tenfold = (value.whole << 3).wrapping_add(value.whole << 1);
+        let sum = tenfold.checked_add(u32::from(byte - b'0'));
+        value.whole = sum.ok_or(failure(Status::OutOfRange))?;
+        count = count.saturating_add(1);
+        input = rest;
+    }
+    Ok((input, count))
+}
+
+/// The digits right of the point, and how many there are (at most 8 count).
+fn fraction<'a>(mut input: &'a [u8], value: &mut Decimal) -> (&'a [u8], u8) {
+    let mut count = 0;
+    while let (rest, Some(byte)) = optional(input, |byte| byte.is_ascii_digit()) {
+        let digit = u16::from(byte - b'0');
+        match count {
+            0..4 => value.frac = value.frac * 10 + digit,
+            4..8 => value.tail = value.tail * 10 + digit,
+            _ => {}
+        }
+        count = if count < 8 { count + 1 } else { count };
+        input = rest;
+    }
+    value.frac = (count..4).fold(value.frac, |frac, _| frac * 10);
+    if count > 4 {
+        value.tail = (count..8).fold(value.tail, |tail, _| tail * 10);
+    }
+    (input, count)
+}
+
+/// The next byte that is no blank, if it is `wanted`; otherwise the input unchanged.
+fn optional(input: &[u8], wanted: impl Fn(u8) -> bool) -> (&[u8], Option<u8>) {
+    let mut rest = input;
+    while let Some((&byte, after)) = rest.split_first() {
+        if wanted(byte) {
+            return (after, Some(byte));
+        }
+        if !is_blank(byte) {
+            break;
+        }
+        rest = after;
+    }
+    (input, None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Decimal {
+        let (rest, value) = decimal(text.as_bytes()).expect(text);
+        assert!(rest.is_empty(), "{text}");
+        value
+    }
+
+    fn refusal(text: &str) -> Status {
+        match decimal(text.as_bytes()) {
+            Err(nom::Err::Failure(fault)) => fault.0,
+            other => panic!("{text}: {other:?}"),
+        }
+    }
+
+    fn mm(text: &str) -> Result<(i32, i16), Status> {
+        read(text).mm().map(|exact| (exact.units.0, exact.rest))
+    }
+
+    fn inch(text: &str) -> Result<(i32, i16), Status> {
+        read(text).inch().map(|exact| (exact.units.0, exact.rest))
+    }
+
+    #[test]
+    fn every_way_to_write_a_number() {
+        let quarter = Decimal { whole: 0, frac: 2_500, tail: 0, negative: false };
+        for text in ["0.25", ".25", "+.25", "00.2500", " 0 . 2\t5", ".250000000"] {
+            assert_eq!(read(text), quarter, "{text}");
+        }
+        assert_eq!(read("-0"), Decimal::default());
+        assert_eq!(read("5."), Decimal { whole: 5, ..Decimal::default() });
+        let long = Decimal { whole: 12, frac: 3_456, tail: 7_890, negative: true };
+        assert_eq!(read("-12.3456789"), long);
+        assert_eq!(read("4294967295").integer(), Ok(u32::MAX));
+    }
+
+    #[test]
+    fn what_is_no_number() {
+        for text in ["", "-", ".", "+.", "x", "--1"] {
+            assert_eq!(refusal(text), Status::BadNumber, "{text}");
+        }
+        for text in ["4294967296", "42949672950", "99999999999999"] {
+            assert_eq!(refusal(text), Status::OutOfRange, "{text}");
+        }
+        assert_eq!(read("1.5").integer(), Err(Status::BadNumber));
+        assert_eq!(read("-1").integer(), Err(Status::OutOfRange));
+    }
+
+    #[test]
+    fn millimetres_round_halves_away_from_zero() {
+        assert_eq!(mm("12.3456"), Ok((123_456, 0)));
+        assert_eq!(mm("0.00004"), Ok((0, 4_000)));
+        assert_eq!(mm("0.00005"), Ok((1, -5_000)));
+        assert_eq!(mm("-0.00005"), Ok((-1, 5_000)));
+        assert_eq!(mm("0.99999"), Ok((10_000, -1_000)));
+        assert_eq!(mm("214748.3647"), Ok((i32::MAX, 0)));
+        assert_eq!(mm("-214748.3647"), Ok((-i32::MAX, 0)));
+        assert_eq!(mm("214748.36475"), Err(Status::OutOfRange));
+        assert_eq!(mm("214749"), Err(Status::OutOfRange));
+    }
+
+    #[test]
+    fn inches_are_exact() {
+        assert_eq!(inch("1"), Ok((254_000, 0)));
+        assert_eq!(inch("0.0001"), Ok((25, 4_000)));
+        assert_eq!(inch("-0.00001"), Ok((-3, 4_600)));
+        assert_eq!(inch("0.0000001"), Ok((0, 254)));
+        assert_eq!(inch("8454.6588"), Ok((2_147_483_335, 2_000)));
+        assert_eq!(inch("8454.7"), Err(Status::OutOfRange));
+        assert_eq!(inch("8455"), Err(Status::OutOfRange));
+    }
+
+    #[test]
+    fn codes_are_read_digit_by_digit() {
+        assert_eq!(read("28.3").code(), Some(283));
+        assert_eq!(read("1.00").code(), Some(10));
+        assert_eq!(read("028.30").code(), Some(283));
+        assert_eq!(read("256").code(), Some(2_560));
+        for text in ["28.35", "28.30001", "-1", "65537", "1000"] {
+            assert_eq!(read(text).code(), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn seconds_and_feeds() {
+        assert_eq!(read("1.2345").milliseconds(), Ok(1_235));
+        assert_eq!(read("0.9999").milliseconds(), Ok(1_000));
+        assert_eq!(read("-1").milliseconds(), Err(Status::PWordNegative));
+        assert_eq!(read("4294968").milliseconds(), Err(Status::OutOfRange));
+        assert_eq!(read("1500").to_f32(), 1_500.0);
+        assert_eq!(read("-0.5").to_f32(), -0.5);
+    }
+}

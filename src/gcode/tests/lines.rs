@@ -1,0 +1,181 @@
+//! Modes, feeds, offsets, refusals.
+
+use super::{feed, position, refusal, run};
+use crate::gcode::command::{Commands, Feed, Motion, Stop};
+use crate::gcode::interpreter::Interpreter;
+use crate::gcode::modal::{Distance, FeedMode, Modal, MotionMode, PathMode, Plane, Units};
+use crate::status::Status;
+use crate::units::Length;
+
+#[test]
+fn traverse_and_feed() {
+    let (state, out) = run(&["N7 g0 x1 y-2.5 c90"]);
+    assert_eq!(out.line, 7);
+    assert_eq!(out.motion, Motion::Traverse { target: *state.position() });
+    assert_eq!(state.position().map(|at| at.0), [10_000, -25_000, 0, 0, 0, 900_000]);
+    let (state, out) = run(&["G1 F100", "X1"]);
+    assert_eq!(
+        out.motion,
+        Motion::Feed { target: *state.position(), feed: Feed::PerMinute(100.0) }
+    );
+    assert_eq!((out.line, state.line()), (0, 0));
+}
+
+#[test]
+fn lines_that_do_nothing() {
+    for line in ["", "  ", "%", "(x)", "; x", "G0", "G80", "G40G49G54", "N5", "F0", "/X", "G2"] {
+        let (_, out) = run(&[line]);
+        assert_eq!(Commands { line: 0, ..out }, Commands::default(), "{line}");
+    }
+    let info = Interpreter::new().interpret(b"/G0 X1", &mut Commands::default()).unwrap();
+    assert!(info.deleted);
+}
+
+#[test]
+fn modes_stay_in_force() {
+    let set = Modal {
+        motion: MotionMode::Feed,
+        plane: Plane::Zx,
+        distance: Distance::Incremental,
+        feed_mode: FeedMode::InverseTime,
+        units: Units::Inch,
+        path: PathMode::Exact,
+    };
+    let (state, _) = run(&["G1 G18 G20 G91 G93 G61 F1"]);
+    assert_eq!(state.modal(), &set);
+}
+
+#[test]
+fn program_end_resets_all_but_units_and_path() {
+    let lines = ["G20 G61 G19 G91 G93 F1 G1 X1", "G92 X5", "M30"];
+    let (state, out) = run(&lines);
+    assert_eq!(out.stop, Stop::End);
+    let kept = Modal { units: Units::Inch, path: PathMode::Exact, ..Modal::new() };
+    assert_eq!(state.modal(), &kept);
+    assert_eq!(state.work_offset()[0], Length::ZERO);
+    assert_eq!(state.position()[0], Length(254_000));
+    assert_eq!(run(&["M2"]).1.stop, Stop::End);
+    for line in ["M0", "M1", "M60"] {
+        assert_eq!(run(&[line]).1.stop, Stop::Program, "{line}");
+    }
+    assert!(matches!(run(&["G0 X1 M2"]).1.motion, Motion::Traverse { .. }));
+}
+
+#[test]
+fn feed_is_in_the_units_of_its_line() {
+    assert_eq!(feed(&["G20 F10 G1 X1"]), Feed::PerMinute(254.0));
+    assert_eq!(feed(&["G20", "G21 F10 G1 X1"]), Feed::PerMinute(10.0));
+    assert_eq!(feed(&["G20 F10", "G21 G1 X1"]), Feed::PerMinute(254.0));
+    assert_eq!(run(&["G20 F10"]).0.feed_rate(), 254.0);
+    // Degrees are degrees.
+    assert_eq!(feed(&["G20 F10 G1 A1"]), Feed::PerMinute(10.0));
+    assert_eq!(feed(&["G20 F10 G1 A1 X1"]), Feed::PerMinute(254.0));
+}
+
+#[test]
+fn feed_must_be_there() {
+    let missing = Status::FeedrateMissing;
+    for lines in [&["G1 X1"][..], &["G1"], &["F0 G1 X1"], &["G93 G1 X1"], &["G2 X1 I1"]] {
+        assert_eq!(refusal(lines), missing, "{lines:?}");
+    }
+    assert_eq!(refusal(&["F100", "G93", "G1 X1"]), missing);
+    assert_eq!(refusal(&["F100", "G93 G1 X1 F2", "X2"]), missing);
+    assert_eq!(refusal(&["F100", "G93 G1 X1 F2", "G94 X2"]), missing);
+    assert_eq!(refusal(&["G93 G1 X1 F0"]), missing);
+    assert_eq!(refusal(&["F-1"]), Status::OutOfRange);
+    assert_eq!(refusal(&["G93 G1 X1 F-1"]), Status::OutOfRange);
+}
+
+#[test]
+fn inverse_time() {
+    assert_eq!(feed(&["G93 G1 X1 F4"]), Feed::Minutes(0.25));
+    assert_eq!(feed(&["G20 G93 G1 X1 F4", "X2 F2"]), Feed::Minutes(0.5));
+    assert_eq!(feed(&["G93", "G94 F100 G1 X1"]), Feed::PerMinute(100.0));
+    // F means nothing to lines that are not timed by it.
+    run(&["G93 G0 X1 F4"]);
+    run(&["G93 F4"]);
+}
+
+#[test]
+fn dwell() {
+    assert_eq!(run(&["G4 P1.5"]).1.dwell_ms, Some(1_500));
+    assert_eq!(run(&["G4 P0"]).1.dwell_ms, Some(0));
+    let (_, out) = run(&["G4 P.001 G0 X1"]);
+    assert!(out.dwell_ms == Some(1) && out.motion != Motion::None);
+    assert_eq!(refusal(&["G4"]), Status::PWordMissing);
+    assert_eq!(refusal(&["G4 X1"]), Status::PWordMissing);
+    assert_eq!(refusal(&["G4 P-1"]), Status::PWordNegative);
+}
+
+#[test]
+fn set_position_in_machine_coordinates() {
+    let (state, out) = run(&["G92 X1", "G0 X5", "G20 G28.3 X1 A1"]);
+    let named = out.set_position.unwrap();
+    assert_eq!((named[0], named[1], named[3]), (Some(Length(254_000)), None, Some(Length(10_000))));
+    assert_eq!(out.motion, Motion::None);
+    assert_eq!(state.position()[0], Length(254_000));
+    assert_eq!(state.work_offset()[0], Length(-10_000));
+    assert_eq!(refusal(&["G28.3"]), Status::AxisWordMissing);
+}
+
+#[test]
+fn work_offset() {
+    assert_eq!(position(&["G0 X10 Y5", "G92 X1", "G0 X2 Y2"])[..2], [110_000, 20_000]);
+    assert_eq!(position(&["G0 X10", "G92 X1", "G91 X1"])[0], 110_000);
+    assert_eq!(position(&["G0 X10", "G92 X1", "G92.1 X2"])[0], 20_000);
+    assert_eq!(run(&["G0 X10", "G92 X1 Y0"]).0.work_offset()[0], Length(90_000));
+    assert_eq!(refusal(&["G92"]), Status::AxisWordMissing);
+    assert_eq!(refusal(&["G0 X200000", "G92 X-100000"]), Status::OutOfRange);
+    assert_eq!(refusal(&["G0 X200000", "G92 X0", "G0 X100000"]), Status::OutOfRange);
+}
+
+#[test]
+fn inches_and_increments_do_not_drift() {
+    assert_eq!(position(&["G20 G0 X1 Y-.5 A1"])[..4], [254_000, -127_000, 0, 10_000]);
+    let mut lines = std::vec!["G20 G91 G0"];
+    lines.extend(["X.0001"; 1_000]);
+    assert_eq!(position(&lines)[0], 25_400);
+    lines.push("G21 X-2.54");
+    assert_eq!(position(&lines)[0], 0);
+    let mut thirds = std::vec!["G91 G0"];
+    thirds.extend(["X-.00003333"; 3_000]);
+    assert_eq!(position(&thirds)[0], -1_000);
+}
+
+#[test]
+fn axis_words_belong_to_one_code() {
+    for line in ["G92 X1 G1 F1", "G0 G28.3 X1", "G2 G92 X1"] {
+        assert_eq!(refusal(&[line]), Status::ModalGroupViolation, "{line}");
+    }
+    run(&["G80 G92 X1"]);
+    run(&["G0", "G92 X1"]);
+    for lines in [&["X1"][..], &["G0", "G80 X1"], &["G4 P1 X1"], &["G0", "M2", "X1"]] {
+        assert_eq!(refusal(lines), Status::AxisNotAllowed, "{lines:?}");
+    }
+}
+
+#[test]
+fn words_that_nothing_uses() {
+    for line in ["P1", "G0 X1 P1", "R1", "I1", "G0 X1 J1", "G1 F1 X1 R2", "G92 X1 K1"] {
+        assert_eq!(refusal(&[line]), Status::GcodeGeneric, "{line}");
+    }
+}
+
+#[test]
+fn a_refused_line_leaves_no_trace() {
+    let lines = ["G20 G91 G93 G18 N9 G2 X1", "F50 X1 G0 Q1", "G92 X1 P1", "G0 X1 Y99999999"];
+    for line in lines.iter().chain(&["M30 P1", "G28.3 X1 R1", "N1.5", "N-1", "G0 X"]) {
+        refusal(&["G0 X1 F5", line]);
+    }
+    assert_eq!(refusal(&["N1.5"]), Status::BadNumber);
+    assert_eq!(refusal(&["G0 X214749"]), Status::OutOfRange);
+    assert_eq!(refusal(&["G0 X200000", "G91 X200000"]), Status::OutOfRange);
+}
+
+#[test]
+fn resynchronised_with_the_machine() {
+    let (mut state, mut out) = run(&["G91 G20 G0 X.0001 Y1"]);
+    state.set_position(&[Length(7); 6]);
+    state.interpret(b"X.0001", &mut out).unwrap();
+    assert_eq!(state.position().map(|at| at.0), [32, 7, 7, 7, 7, 7]);
+}
