@@ -9,12 +9,14 @@
 //! | [`size`], [`caps`] | prints and limits what an image takes |
 //! | [`sim`] | runs the image on the simulated board |
 //! | [`checks`] | everything that must pass before a merge |
+//! | [`jobs`] | writes the example jobs |
 
 mod boards;
 mod caps;
 mod checks;
 mod elf;
 mod firmware;
+mod jobs;
 mod process;
 mod setup;
 mod sim;
@@ -45,6 +47,8 @@ enum Command {
     Test,
     /// Write the firmware to a board
     Flash(firmware::FlashArgs),
+    /// Write the example jobs again
+    Jobs,
 }
 
 #[derive(clap::Args)]
@@ -73,6 +77,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Serve(args) => return sim::serve(&args),
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
+        Command::Jobs => jobs::write()?,
     }
     Ok(ExitCode::SUCCESS)
 }
