@@ -1,4 +1,4 @@
-//! `cargo xtask test`: everything that must pass before a merge, cheapest first.
+//! `cargo xtask test`: everything that must pass before a merge.
 
 use std::process::Command;
 
@@ -19,10 +19,10 @@ struct Stage {
 const STAGES: [Stage; 7] = [
     Stage { name: "tools", run: || setup::ensure(Scope::Everything) },
     Stage { name: "format", run: format },
+    Stage { name: "lints", run: lints },
     Stage { name: "host tests", run: || cargo(&["test"]) },
     Stage { name: "firmware of every board", run: build_all },
     Stage { name: "sizes and stack of every board", run: size_all },
-    Stage { name: "lints", run: lints },
     Stage { name: "simulator tests", run: simulator_tests },
 ];
 
