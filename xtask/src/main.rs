@@ -1,2 +1,90 @@
-//! Developer commands; see `cargo xtask help`.
-fn main() {}
+//! Developer commands of Kerf: `cargo xtask help` lists them.
+//!
+//! | module | for |
+//! |---|---|
+//! | [`setup`] | finds the tools, installs what is missing |
+//! | [`toolchain`] | which Rust builds for AVR, and its environment |
+//! | [`firmware`] | builds the image of a board, flashes it |
+//! | [`elf`] | what is in an image: sizes, stack, forbidden arithmetic |
+//! | [`size`], [`caps`] | prints and limits what an image takes |
+//! | [`sim`] | runs the image on the simulated board |
+//! | [`checks`] | everything that must pass before a merge |
+//! | [`jobs`] | writes the example jobs |
+
+mod boards;
+mod caps;
+mod checks;
+mod elf;
+mod firmware;
+mod jobs;
+mod process;
+mod setup;
+mod sim;
+mod size;
+mod toolchain;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use boards::Board;
+use setup::Scope;
+
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", about = "Developer commands of Kerf")]
+enum Command {
+    /// Find the tools that Kerf needs and install what is missing
+    Setup,
+    /// Build the firmware of a board; the last line is `elf: PATH`
+    Build(BoardArg),
+    /// Show what the firmware takes of flash, RAM and stack; fail past the caps
+    Size(size::SizeArgs),
+    /// Run a job on the simulated board
+    Sim(sim::RunArgs),
+    /// Offer the simulated board as a serial port
+    Serve(sim::ServeArgs),
+    /// Run every check: format, lints, host tests, firmware, sizes, simulator
+    Test,
+    /// Write the firmware to a board
+    Flash(firmware::FlashArgs),
+    /// Write the example jobs again
+    Jobs,
+}
+
+#[derive(clap::Args)]
+struct BoardArg {
+    /// The board to build for
+    #[arg(long, value_enum, default_value_t)]
+    board: Board,
+}
+
+fn main() -> ExitCode {
+    match dispatch(Command::parse()) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
+    match command {
+        Command::Setup => setup::report()?,
+        Command::Build(arg) => build(arg.board)?,
+        Command::Size(args) => size::run(&args)?,
+        Command::Sim(args) => return sim::run(&args),
+        Command::Serve(args) => return sim::serve(&args),
+        Command::Test => checks::run()?,
+        Command::Flash(args) => firmware::flash(&args)?,
+        Command::Jobs => jobs::write()?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn build(board: Board) -> anyhow::Result<()> {
+    setup::ensure(Scope::Firmware)?;
+    let elf = firmware::build(board)?;
+    println!("elf: {}", elf.display());
+    Ok(())
+}

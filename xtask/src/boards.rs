@@ -1,0 +1,66 @@
+//! The boards by name. Their pins and timers are data in `boards/`.
+
+use std::fmt;
+
+use clap::ValueEnum;
+
+/// A board that firmware is built for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Board {
+    /// Arduino Mega 2560 with a grbl-style shield
+    #[default]
+    #[value(name = "mega2560-grbl")]
+    Mega2560Grbl,
+    /// Arduino Mega 2560 with RAMPS 1.4
+    #[value(name = "ramps14")]
+    Ramps14,
+}
+
+impl Board {
+    /// Every board.
+    pub fn all() -> &'static [Board] {
+        Board::value_variants()
+    }
+
+    /// The name in `boards/`, on the command line and after `board-` in the package's features.
+    pub fn name(self) -> &'static str {
+        match self {
+            Board::Mega2560Grbl => "mega2560-grbl",
+            Board::Ramps14 => "ramps14",
+        }
+    }
+}
+
+impl fmt::Display for Board {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::process::root;
+
+    #[test]
+    fn every_board_file_has_a_name_here_and_a_feature() {
+        let files = std::fs::read_dir(root().join("boards")).unwrap();
+        let mut files: Vec<_> =
+            files.map(|f| f.unwrap().path().file_stem().unwrap().to_owned()).collect();
+        files.sort();
+        let names: Vec<_> = Board::all().iter().map(|b| b.name()).collect();
+        assert_eq!(files, names);
+
+        let manifest = std::fs::read_to_string(root().join("Cargo.toml")).unwrap();
+        for name in names {
+            assert!(manifest.contains(&format!("\nboard-{name} = ")), "no feature board-{name}");
+        }
+    }
+
+    #[test]
+    fn command_line_names_are_the_board_names() {
+        for board in Board::all() {
+            assert_eq!(board.to_possible_value().unwrap().get_name(), board.name());
+        }
+    }
+}

@@ -1,0 +1,18 @@
+//! What a firmware image may take: the one place where these limits stand.
+//!
+//! Raise a cap only together with the reason for it.
+
+/// Flash: below 128 KiB a far call needs no care with EIND.
+pub const FLASH: u64 = 131_072;
+/// `.data`: constants that landed in RAM; tables and text belong in program memory.
+pub const DATA: u64 = 400;
+/// `.data` and `.bss` together, of the chip's 8192 bytes.
+pub const STATIC_RAM: u64 = 6_000;
+/// What must be left between the statics and the deepest stack by analysis.
+pub const FREE_STACK: i64 = 400;
+
+/// RAM of the ATmega2560.
+pub const RAM: u64 = 8_192;
+
+/// Tasks that run on the interrupt-mode executor; every other task runs in thread mode.
+pub const INTERRUPT_TASKS: &[&str] = &["exec"];

@@ -1,0 +1,89 @@
+//! `cargo xtask test`: everything that must pass before a merge.
+
+use std::process::Command;
+
+use anyhow::{Context, Result};
+
+use crate::boards::Board;
+use crate::firmware;
+use crate::process::{host_cargo, probe, root, run as run_child, which};
+use crate::setup::{self, Scope};
+use crate::size;
+
+/// A check and what it is called.
+struct Stage {
+    name: &'static str,
+    run: fn() -> Result<()>,
+}
+
+const STAGES: [Stage; 7] = [
+    Stage { name: "tools", run: || setup::ensure(Scope::Everything) },
+    Stage { name: "format", run: format },
+    Stage { name: "lints", run: lints },
+    Stage { name: "host tests", run: || cargo(&["test"]) },
+    Stage { name: "firmware of every board", run: build_all },
+    Stage { name: "sizes and stack of every board", run: size_all },
+    Stage { name: "simulator tests", run: simulator_tests },
+];
+
+/// Runs the stages; stops at the first that fails.
+pub fn run() -> Result<()> {
+    for (index, stage) in STAGES.iter().enumerate() {
+        println!("\n=== {}/{} {} ===", index + 1, STAGES.len(), stage.name);
+        (stage.run)().with_context(|| format!("stage `{}`", stage.name))?;
+    }
+    println!("\ncargo xtask test: all stages passed");
+    Ok(())
+}
+
+fn format() -> Result<()> {
+    if has_component("fmt", "rustfmt") {
+        cargo(&["fmt", "--all", "--check"])?;
+    }
+    Ok(())
+}
+
+/// The simulator's package apart from the rest: in its own profile simavr is compiled once.
+fn lints() -> Result<()> {
+    if has_component("clippy", "clippy") {
+        let deny = ["--all-targets", "--", "-D", "warnings"];
+        cargo(&[&["clippy", "--workspace", "--exclude", "kerf-sim"], &deny[..]].concat())?;
+        cargo(&[&["clippy", "--package", "kerf-sim", "--profile", "sim"], &deny[..]].concat())?;
+    }
+    Ok(())
+}
+
+/// Whether cargo has this subcommand; rustup may have to bring it first. Without rustup and
+/// without the component the stage is skipped, and says so.
+fn has_component(subcommand: &str, component: &str) -> bool {
+    let there = || probe(host_cargo().args([subcommand, "--version"])).is_some();
+    if !there() && which("rustup").is_some() {
+        let _ = run_child(Command::new("rustup").args(["component", "add", component]));
+    }
+    let found = there();
+    if !found {
+        println!("SKIPPED: this Rust has no {component}, and none could be installed");
+    }
+    found
+}
+
+fn build_all() -> Result<()> {
+    for board in Board::all() {
+        println!("elf: {}", firmware::build(*board)?.display());
+    }
+    Ok(())
+}
+
+fn size_all() -> Result<()> {
+    Board::all().iter().try_for_each(|board| size::show(&firmware::image(*board)))
+}
+
+fn simulator_tests() -> Result<()> {
+    let mut test = host_cargo();
+    test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());
+    run_child(test.args(["test", "--package", "kerf-sim", "--profile", "sim"]))
+}
+
+fn cargo(args: &[&str]) -> Result<()> {
+    run_child(host_cargo().current_dir(root()).args(args))
+}

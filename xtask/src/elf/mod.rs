@@ -1,0 +1,145 @@
+//! What is in a firmware image: sections, symbols with readable names, code.
+
+pub mod arithmetic;
+mod disasm;
+mod flow;
+pub mod places;
+pub mod stack;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use object::elf::SHF_ALLOC;
+use object::{File, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind};
+
+/// From here up, avr-gcc's addresses mean RAM; below, flash.
+const RAM_BASE: u64 = 0x80_0000;
+/// From here up they mean EEPROM and fuses.
+const EEPROM_BASE: u64 = 0x81_0000;
+
+/// A named place in the image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Symbol {
+    /// As in the source, as far as the mangling tells.
+    pub name: String,
+    /// Byte address; RAM from 0x800000.
+    pub address: u64,
+    /// Bytes; 0 for labels of assembler code.
+    pub size: u64,
+}
+
+impl Symbol {
+    /// Whether it is a place in RAM.
+    pub fn is_in_ram(&self) -> bool {
+        (RAM_BASE..EEPROM_BASE).contains(&self.address)
+    }
+}
+
+/// What an image takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sizes {
+    /// Code, constants and the initial values of `.data`.
+    pub flash: u64,
+    /// Statics with an initial value.
+    pub data: u64,
+    /// Statics that start at zero or not at all.
+    pub bss: u64,
+}
+
+impl Sizes {
+    /// All statics.
+    pub fn ram(self) -> u64 {
+        self.data + self.bss
+    }
+
+    fn add(&mut self, address: u64, size: u64, has_bytes: bool) {
+        if address >= EEPROM_BASE {
+            return;
+        }
+        if has_bytes {
+            self.flash += size;
+        }
+        match (address >= RAM_BASE, has_bytes) {
+            (true, true) => self.data += size,
+            (true, false) => self.bss += size,
+            (false, _) => {}
+        }
+    }
+}
+
+/// A firmware image.
+pub struct Image {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// What it takes.
+    pub sizes: Sizes,
+    /// Named places by address.
+    pub symbols: Vec<Symbol>,
+}
+
+impl Image {
+    /// Reads an ELF file.
+    pub fn load(path: &Path) -> Result<Image> {
+        let shown = path.display();
+        let bytes = std::fs::read(path).with_context(|| format!("cannot read {shown}"))?;
+        let file = File::parse(&*bytes).with_context(|| format!("{shown} is no ELF file"))?;
+        Ok(Image { path: path.to_owned(), sizes: sizes(&file), symbols: symbols(&file) })
+    }
+
+    /// The places whose name satisfies `wanted`.
+    pub fn named<'a>(
+        &'a self,
+        wanted: impl Fn(&str) -> bool + 'a,
+    ) -> impl Iterator<Item = &'a Symbol> + 'a {
+        self.symbols.iter().filter(move |symbol| wanted(&symbol.name))
+    }
+}
+
+fn sizes(file: &File) -> Sizes {
+    let mut sizes = Sizes::default();
+    for section in file.sections() {
+        if let SectionFlags::Elf { sh_flags } = section.flags()
+            && sh_flags & u64::from(SHF_ALLOC) != 0
+        {
+            let no_bits = section.kind() == SectionKind::UninitializedData;
+            sizes.add(section.address(), section.size(), !no_bits);
+        }
+    }
+    sizes
+}
+
+fn symbols(file: &File) -> Vec<Symbol> {
+    // Labels of assembler code have a section but no type.
+    let defined = file.symbols().filter(|s| s.section_index().is_some());
+    let mut symbols: Vec<_> = defined
+        .filter_map(|s| {
+            let name = s.name().ok().filter(|name| !name.is_empty())?;
+            let name = format!("{:#}", rustc_demangle::demangle(name));
+            Some(Symbol { name, address: s.address(), size: s.size() })
+        })
+        .collect();
+    symbols.sort_by_key(|symbol| (symbol.address, std::cmp::Reverse(symbol.size)));
+    symbols
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sections_are_counted_where_they_lie() {
+        let mut sizes = Sizes::default();
+        sizes.add(0, 1000, true); // .text
+        sizes.add(0x80_0200, 26, true); // .data: RAM, and its initial values in flash
+        sizes.add(0x80_021a, 199, false); // .bss
+        sizes.add(0x81_0000, 64, true); // .eeprom
+        assert_eq!(sizes, Sizes { flash: 1026, data: 26, bss: 199 });
+        assert_eq!(sizes.ram(), 225);
+    }
+
+    #[test]
+    fn what_is_no_elf_is_refused() {
+        let error = Image::load(Path::new(file!()).file_name().unwrap().as_ref());
+        assert!(error.is_err());
+    }
+}

@@ -1,0 +1,64 @@
+//! Places in the code that the stack analysis starts from or has to know.
+
+use super::disasm::Code;
+use super::flow::Landmarks;
+use super::{Image, RAM_BASE};
+
+/// The interrupt handlers. Vectors without one of their own share a way to the reset.
+pub fn handlers(image: &Image) -> Vec<u32> {
+    let bad = image.named(|name| name == "__bad_interrupt").next().map(|s| s.address);
+    let is_handler = |name: &str| name.strip_prefix("__vector_").is_some_and(is_number);
+    let vectors = image.named(is_handler).map(|s| s.address);
+    let mut entries: Vec<_> = vectors.filter(|entry| Some(*entry) != bad).map(address).collect();
+    entries.dedup();
+    entries
+}
+
+fn is_number(text: &str) -> bool {
+    text.parse::<u8>().is_ok()
+}
+
+/// The functions whose address is taken: the linker makes a stub for each.
+pub fn addresses_taken(image: &Image, code: &Code) -> Vec<u32> {
+    let place = |wanted: &str| image.named(|name| name == wanted).next().map(|s| s.address);
+    let stubs = place("__trampolines_start").zip(place("__trampolines_end"));
+    let (start, end) = stubs.map_or((0, 0), |(start, end)| (address(start), address(end)));
+    let inside = (start..end).step_by(2).filter_map(|at| code.get(code.at(at)?)?.target);
+    let mut taken: Vec<_> = inside.collect();
+    taken.sort_unstable();
+    taken.dedup();
+    taken
+}
+
+pub fn landmarks(image: &Image) -> Landmarks {
+    let code = image.symbols.iter().filter(|s| s.address < RAM_BASE && s.size > 0);
+    let ends = code.map(|s| address(s.address + s.size)).collect();
+    let saves = image.named(|name| name == "__prologue_saves__").next();
+    let prologue_saves = saves.map_or(0..0, |s| address(s.address)..address(s.address + s.size));
+    Landmarks { ends, prologue_saves }
+}
+
+/// The name of an address; of several, that of the function with a size.
+pub fn name_at(image: &Image, entry: u32) -> String {
+    let at = image.symbols.binary_search_by_key(&u64::from(entry), |s| s.address);
+    let Ok(mut at) = at else { return format!("{entry:#x}") };
+    while at > 0 && image.symbols[at - 1].address == u64::from(entry) {
+        at -= 1;
+    }
+    image.symbols[at].name.clone()
+}
+
+/// `exec` of `<...TaskStorage<kerf::tasks::__exec_task::...>>::poll`.
+pub fn task_name(poll: &str) -> Option<String> {
+    if !poll.contains("TaskStorage<") || !poll.ends_with("::poll") {
+        return None;
+    }
+    let (_, rest) = poll.split_once("::__")?;
+    let (name, _) = rest.split_once("_task")?;
+    Some(name.to_owned())
+}
+
+/// Code addresses fit.
+pub fn address(address: u64) -> u32 {
+    u32::try_from(address).expect("AVR addresses have 24 bits")
+}

@@ -1,0 +1,93 @@
+//! Builds the firmware image of a board, and writes it to one.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use crate::boards::Board;
+use crate::elf::{Image, arithmetic};
+use crate::process::{self, root, run};
+use crate::setup::{self, Scope};
+use crate::toolchain::Toolchain;
+
+const FLAGS: &str = "-C target-cpu=atmega2560 -C linker=avr-gcc -C link-arg=-mmcu=atmega2560 \
+                     -C link-arg=-Wl,--gc-sections";
+
+/// Where the images lie, one `BOARD.elf` each.
+pub fn directory() -> PathBuf {
+    root().join("target/firmware")
+}
+
+/// Where the image of a board lies once it is built.
+pub fn image(board: Board) -> PathBuf {
+    directory().join(format!("{board}.elf"))
+}
+
+/// Builds and checks the image; returns where it lies.
+pub fn build(board: Board) -> Result<PathBuf> {
+    let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
+    // One target directory for all boards: the dependencies are built once.
+    let target = root().join("target/avr");
+    let mut cargo = rust.cargo();
+    cargo.current_dir(root()).env("RUSTFLAGS", FLAGS);
+    cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none"]);
+    cargo.args(["--package", "kerf", "--bin", "kerf", "--features", &format!("board-{board}")]);
+    run(cargo.arg("--target-dir").arg(&target))?;
+    keep(&target.join("avr-none/release/kerf.elf"), board)
+}
+
+/// Copies the image to its own name and refuses one with forbidden arithmetic.
+fn keep(built: &Path, board: Board) -> Result<PathBuf> {
+    let elf = image(board);
+    std::fs::create_dir_all(directory())?;
+    std::fs::copy(built, &elf).with_context(|| format!("cannot copy {}", built.display()))?;
+    arithmetic::check(&Image::load(&elf)?)?;
+    Ok(elf)
+}
+
+/// `cargo xtask flash`
+#[derive(Args)]
+pub struct FlashArgs {
+    /// The board to build for
+    #[arg(long, value_enum, default_value_t)]
+    board: Board,
+    /// The board's serial port, such as /dev/ttyACM0
+    #[arg(long)]
+    port: String,
+    /// Only print the command
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// Builds, then writes the image through the boot loader of the board.
+pub fn flash(args: &FlashArgs) -> Result<()> {
+    setup::ensure(Scope::Firmware)?;
+    let elf = build(args.board)?;
+    let mut avrdude = avrdude(&args.port, &elf);
+    println!("{}", process::shown(&avrdude));
+    if args.dry_run {
+        return Ok(());
+    }
+    run(&mut avrdude).context("is avrdude installed, and the port right?")
+}
+
+fn avrdude(port: &str, elf: &Path) -> std::process::Command {
+    let mut command = std::process::Command::new("avrdude");
+    command.args(["-p", "m2560", "-c", "wiring", "-P", port, "-b", "115200", "-D"]);
+    command.arg("-U").arg(format!("flash:w:{}:e", elf.display()));
+    command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn avrdude_writes_the_elf_to_flash() {
+        assert_eq!(
+            process::shown(&avrdude("/dev/ttyACM0", Path::new("a.elf"))),
+            "avrdude -p m2560 -c wiring -P /dev/ttyACM0 -b 115200 -D -U flash:w:a.elf:e"
+        );
+    }
+}

@@ -1,0 +1,120 @@
+//! What the commands need, how to see that it is there, and Debian's names for it.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::process::{probe, which};
+use crate::toolchain::Toolchain;
+
+/// How much a command needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Scope {
+    /// Building the firmware.
+    Firmware,
+    /// Building the simulator as well.
+    Everything,
+}
+
+/// One thing that must be there.
+pub struct Need {
+    /// What it is.
+    pub what: &'static str,
+    /// The Debian packages that bring it.
+    pub packages: &'static [&'static str],
+    /// Whether it is a Rust toolchain, which rustup could bring as well.
+    pub is_rust: bool,
+    scope: Scope,
+    present: fn() -> bool,
+}
+
+/// Everything, in the order in which it is reported.
+pub static NEEDS: [Need; 7] = [
+    Need {
+        what: "Rust with its library sources (rustup nightly with rust-src, or Debian's)",
+        packages: &["rustc-web", "cargo-web", "rust-web-src"],
+        is_rust: true,
+        scope: Scope::Firmware,
+        present: || Toolchain::find().is_some(),
+    },
+    tool("avr-gcc, which links the firmware", &["gcc-avr"], Scope::Firmware, || has("avr-gcc")),
+    tool("avr-objdump, which checks it", &["binutils-avr"], Scope::Firmware, || has("avr-objdump")),
+    tool("avr-libc, start-up code and arithmetic", &["avr-libc"], Scope::Firmware, avr_libc),
+    tool("a C compiler and make, for simavr", &["gcc", "libc6-dev", "make"], SIM, || {
+        has("cc") && has("gcc") && has("make")
+    }),
+    tool("clang and libclang, for the bindings to simavr", &["clang", "libclang-dev"], SIM, || {
+        has("clang") && libclang()
+    }),
+    tool("libelf, zlib and zstd with their headers, for simavr", ELF_PACKAGES, SIM, || {
+        let libraries = ["--exists", "libelf", "zlib", "libzstd"];
+        probe(Command::new("pkg-config").args(libraries)).is_some()
+    }),
+];
+
+const SIM: Scope = Scope::Everything;
+const ELF_PACKAGES: &[&str] = &["pkg-config", "libelf-dev", "zlib1g-dev", "libzstd-dev"];
+
+const fn tool(
+    what: &'static str,
+    packages: &'static [&'static str],
+    scope: Scope,
+    present: fn() -> bool,
+) -> Need {
+    Need { what, packages, is_rust: false, scope, present }
+}
+
+/// What is not there.
+pub fn missing(scope: Scope) -> Vec<&'static Need> {
+    NEEDS.iter().filter(|need| need.scope <= scope && !(need.present)()).collect()
+}
+
+fn has(program: &str) -> bool {
+    which(program).is_some()
+}
+
+/// avr-gcc prints a path when it finds the start-up code, else just the name.
+fn avr_libc() -> bool {
+    let ask = ["-mmcu=atmega2560", "-print-file-name=crtatmega2560.o"];
+    probe(Command::new("avr-gcc").args(ask)).is_some_and(|file| Path::new(&file).is_absolute())
+}
+
+/// Looks where bindgen looks.
+fn libclang() -> bool {
+    let given = std::env::var_os("LIBCLANG_PATH").into_iter().map(Into::into);
+    let asked = probe(Command::new("llvm-config").arg("--libdir")).into_iter().map(Into::into);
+    let fixed = ["/usr/lib", "/usr/lib64", "/usr/local/lib", "/opt/homebrew/opt/llvm/lib"];
+    let versions = ["/usr/lib", "/usr/local"].into_iter().flat_map(|dir| list(Path::new(dir)));
+    let versions = versions.flat_map(|dir| [dir.join("lib"), dir]);
+    given.chain(asked).chain(fixed.map(Into::into)).chain(versions).any(|dir| holds_libclang(&dir))
+}
+
+fn holds_libclang(dir: &Path) -> bool {
+    let is_it = |file: std::path::PathBuf| {
+        let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        name.starts_with("libclang.") || name.starts_with("libclang-") && name.contains(".so")
+    };
+    list(dir).into_iter().any(is_it)
+}
+
+fn list(dir: &Path) -> Vec<std::path::PathBuf> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten();
+    entries.filter_map(|entry| Some(entry.ok()?.path())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_firmware_needs_a_part_of_everything() {
+        let firmware = NEEDS.iter().filter(|n| n.scope <= Scope::Firmware).count();
+        assert_eq!(firmware, 4);
+        assert!(NEEDS.iter().all(|n| n.scope <= Scope::Everything));
+    }
+
+    #[test]
+    fn an_empty_directory_holds_no_libclang() {
+        assert!(!holds_libclang(Path::new("/nonexistent")));
+        assert!(!has("no-such-program-anywhere"));
+    }
+}

@@ -1,0 +1,138 @@
+//! Runs the firmware on the simulated board. The simulator is a program of its own (`tests/sim`),
+//! because it links simavr, which is under the GPL.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use anyhow::{Result, ensure};
+use clap::Args;
+
+use crate::boards::Board;
+use crate::firmware;
+use crate::process::{host_cargo, pass_through, root};
+use crate::setup::{self, Scope};
+
+/// `cargo xtask sim`
+#[derive(Args)]
+pub struct RunArgs {
+    /// The job, a file of G-code
+    job: PathBuf,
+    /// The board to simulate
+    #[arg(long, value_enum, default_value_t)]
+    board: Board,
+    /// A setting sent before the job, as the sender would: '{"xvm":800}'
+    #[arg(long, value_name = "JSON")]
+    set: Vec<String>,
+    /// The speed of the serial line
+    #[arg(long)]
+    baud: Option<u32>,
+    /// Write what happened to this file
+    #[arg(long, value_name = "FILE.json")]
+    report: Option<PathBuf>,
+    /// Write the pins' waveforms to this file
+    #[arg(long, value_name = "FILE.vcd")]
+    vcd: Option<PathBuf>,
+}
+
+/// `cargo xtask serve`
+#[derive(Args)]
+pub struct ServeArgs {
+    /// The board to simulate
+    #[arg(long, value_enum, default_value_t)]
+    board: Board,
+    /// How many times faster than a real board, or `max`
+    #[arg(long, value_name = "N|max")]
+    speed: Option<String>,
+    /// Where to put a link to the serial port
+    #[arg(long, value_name = "PATH")]
+    link: Option<PathBuf>,
+}
+
+/// Builds and runs a job; the simulator's exit code is ours.
+pub fn run(args: &RunArgs) -> Result<ExitCode> {
+    ensure!(args.job.is_file(), "there is no job {}", args.job.display());
+    let elf = prepare(args.board)?;
+    pass_through(&mut run_command(args, &elf))
+}
+
+/// Builds and offers the simulated board as a serial port.
+pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
+    let elf = prepare(args.board)?;
+    pass_through(&mut serve_command(args, &elf))
+}
+
+fn prepare(board: Board) -> Result<PathBuf> {
+    setup::ensure(Scope::Everything)?;
+    let elf = firmware::build(board)?;
+    if !root().join("target/sim/kerf-sim").exists() {
+        eprintln!("building the simulator: some minutes, this once");
+    }
+    Ok(elf)
+}
+
+fn run_command(args: &RunArgs, elf: &Path) -> Command {
+    let mut command = simulator("run", elf, args.board);
+    command.arg(&args.job);
+    for set in &args.set {
+        command.args(["--set", set]);
+    }
+    option(&mut command, "--baud", args.baud.map(|baud| baud.to_string()));
+    option(&mut command, "--report", args.report.as_ref());
+    option(&mut command, "--vcd", args.vcd.as_ref());
+    command
+}
+
+fn serve_command(args: &ServeArgs, elf: &Path) -> Command {
+    let mut command = simulator("serve", elf, args.board);
+    option(&mut command, "--speed", args.speed.as_ref());
+    option(&mut command, "--link", args.link.as_ref());
+    command
+}
+
+fn simulator(verb: &str, elf: &Path, board: Board) -> Command {
+    let mut cargo = host_cargo();
+    cargo.args(["run", "--quiet", "--profile", "sim", "--package", "kerf-sim"]);
+    cargo.args(["--bin", "kerf-sim", "--manifest-path"]).arg(root().join("Cargo.toml"));
+    cargo.args(["--", verb, "--elf"]).arg(elf).args(["--board", board.name()]);
+    cargo
+}
+
+fn option(command: &mut Command, name: &str, value: Option<impl AsRef<std::ffi::OsStr>>) {
+    if let Some(value) = value {
+        command.arg(name).arg(value);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::process::shown;
+
+    fn after_dashes(command: &Command) -> String {
+        shown(command).split_once(" -- ").unwrap().1.to_owned()
+    }
+
+    #[test]
+    fn every_option_reaches_the_simulator() {
+        let args = RunArgs {
+            job: "a.gcode".into(),
+            board: Board::Ramps14,
+            set: vec!["{\"xvm\":800}".into(), "{\"yvm\":800}".into()],
+            baud: Some(250_000),
+            report: Some("r.json".into()),
+            vcd: Some("v.vcd".into()),
+        };
+        assert_eq!(
+            after_dashes(&run_command(&args, Path::new("k.elf"))),
+            "run --elf k.elf --board ramps14 a.gcode --set {\"xvm\":800} --set {\"yvm\":800} \
+             --baud 250000 --report r.json --vcd v.vcd"
+        );
+    }
+
+    #[test]
+    fn nothing_is_sent_that_was_not_asked_for() {
+        let args = ServeArgs { board: Board::default(), speed: None, link: None };
+        let command = serve_command(&args, Path::new("k.elf"));
+        assert_eq!(after_dashes(&command), "serve --elf k.elf --board mega2560-grbl");
+    }
+}
