@@ -9,8 +9,10 @@
 extern crate std;
 
 pub mod boards;
+pub mod config;
 pub mod gcode;
 pub mod math;
 pub mod progmem;
+pub mod protocol;
 pub mod status;
 pub mod units;
