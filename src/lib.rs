@@ -9,9 +9,11 @@
 extern crate std;
 
 pub mod boards;
+pub mod config;
 pub mod gcode;
 pub mod math;
 pub mod motion;
 pub mod progmem;
+pub mod protocol;
 pub mod status;
 pub mod units;

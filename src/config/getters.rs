@@ -1,0 +1,216 @@
+//! The settings in the units that the rest of the firmware works in.
+//!
+//! Axes and motors count from 0; one that is not there reads 0. A getter that returns a float costs
+//! about 300 cycles on AVR, the others about 20.
+
+use super::{Settings, StepRatio, axis, motor, setting::small_of, system};
+use crate::units::Length;
+
+/// Motors.
+impl Settings {
+    /// The axis that a motor drives; none above 5.
+    pub fn motor_axis(&self, motor: usize) -> u8 {
+        self.motor(motor, motor::MA)
+    }
+
+    /// Whether its direction is inverted.
+    pub fn motor_reversed(&self, motor: usize) -> bool {
+        self.motor(motor, motor::PO) != 0
+    }
+
+    /// When it is powered: 0 never, 1 always, 2 in a cycle, 3 while it moves.
+    pub fn motor_power_mode(&self, motor: usize) -> u8 {
+        self.motor(motor, motor::PM)
+    }
+
+    /// Its microsteps.
+    pub fn motor_microsteps(&self, motor: usize) -> u8 {
+        self.motor(motor, motor::MI)
+    }
+
+    /// Its steps for a length.
+    pub fn step_ratio(&self, motor: usize) -> StepRatio {
+        self.ratios.get(motor).copied().unwrap_or(StepRatio::NONE)
+    }
+}
+
+/// Axes.
+impl Settings {
+    /// 0 disabled, 1 standard, 2 inhibited, 3 radius.
+    pub fn axis_mode(&self, axis: usize) -> u8 {
+        self.small(small_of(axis as u8) + axis::AM)
+    }
+
+    /// Traverse limit, mm or degrees per minute.
+    pub fn velocity_max(&self, axis: usize) -> f32 {
+        self.axis(axis, axis::VM) as f32 * 1e-3
+    }
+
+    /// Feed limit, mm or degrees per minute.
+    pub fn feedrate_max(&self, axis: usize) -> f32 {
+        self.axis(axis, axis::FR) as f32 * 1e-3
+    }
+
+    /// The lower end of its travel.
+    pub fn travel_min(&self, axis: usize) -> Length {
+        Length(self.axis(axis, axis::TN))
+    }
+
+    /// The upper end of its travel.
+    pub fn travel_max(&self, axis: usize) -> Length {
+        Length(self.axis(axis, axis::TM))
+    }
+
+    /// Jerk limit, mm or degrees per minute cubed.
+    pub fn jerk_max(&self, axis: usize) -> f32 {
+        self.axis(axis, axis::JM) as f32 * 1e3
+    }
+
+    /// Jerk limit while homing and probing, mm or degrees per minute cubed.
+    pub fn jerk_homing(&self, axis: usize) -> f32 {
+        self.homing(axis, axis::JH) as f32 * 1e3
+    }
+
+    /// Junction deviation, mm.
+    pub fn junction_deviation(&self, axis: usize) -> f32 {
+        self.axis(axis, axis::JD) as f32 * 1e-6
+    }
+
+    /// Radius that turns a length into an angle, mm.
+    pub fn radius(&self, axis: usize) -> f32 {
+        self.axis(axis, axis::RA) as f32 * 1e-6
+    }
+
+    /// Switch at the lower end: 0 off, 1 homing, 2 limit, 3 both.
+    pub fn switch_min(&self, axis: usize) -> u8 {
+        self.switch(axis, axis::SN)
+    }
+
+    /// Switch at the upper end, likewise.
+    pub fn switch_max(&self, axis: usize) -> u8 {
+        self.switch(axis, axis::SX)
+    }
+
+    /// Speed towards a homing switch, mm or degrees per minute.
+    pub fn search_velocity(&self, axis: usize) -> f32 {
+        self.homing(axis, axis::SV) as f32 * 1e-3
+    }
+
+    /// Speed off a homing switch, mm or degrees per minute.
+    pub fn latch_velocity(&self, axis: usize) -> f32 {
+        self.homing(axis, axis::LV) as f32 * 1e-3
+    }
+
+    /// Way off a homing switch before it is latched.
+    pub fn latch_backoff(&self, axis: usize) -> Length {
+        Length(self.homing(axis, axis::LB))
+    }
+
+    /// Way from the latched switch to zero.
+    pub fn zero_backoff(&self, axis: usize) -> Length {
+        Length(self.homing(axis, axis::ZB))
+    }
+}
+
+/// The machine.
+impl Settings {
+    /// Acceleration towards the centre of a junction, mm per minute squared.
+    pub fn junction_acceleration(&self) -> f32 {
+        self.system_large(system::JA) as f32 * 1e-2
+    }
+
+    /// How far a chord may leave its arc, mm.
+    pub fn chordal_tolerance(&self) -> f32 {
+        self.system_large(system::CT) as f32 * 1e-6
+    }
+
+    /// Whether moves beyond the travel are refused.
+    pub fn soft_limits(&self) -> bool {
+        self.system(system::SL) != 0
+    }
+
+    /// Whether switches open when they are hit.
+    pub fn switches_normally_closed(&self) -> bool {
+        self.system(system::ST) != 0
+    }
+
+    /// How long motors stay powered after a move, in hundredths of a second.
+    pub fn motor_timeout_centis(&self) -> u32 {
+        self.system_large(system::MT).unsigned_abs()
+    }
+
+    /// Whether the machine starts in JSON mode.
+    pub fn starts_in_json(&self) -> bool {
+        self.system(system::EJ) != 0
+    }
+
+    /// 0 silent, 1 footers, 2 messages, 3 settings, 4 line numbers, 5 blocks.
+    pub fn json_verbosity(&self) -> u8 {
+        self.system(system::JV)
+    }
+
+    /// Whether keys are quoted.
+    pub fn json_strict(&self) -> bool {
+        self.system(system::JS) != 0
+    }
+
+    /// 0 no prompts, 1 prompts.
+    pub fn text_verbosity(&self) -> u8 {
+        self.system(system::TV)
+    }
+
+    /// 0 off, 1 free blocks, 2 and 3 also those added and removed.
+    pub fn queue_verbosity(&self) -> u8 {
+        self.system(system::QV)
+    }
+
+    /// 0 off, 1 changes, 2 everything.
+    pub fn status_verbosity(&self) -> u8 {
+        self.system(system::SV)
+    }
+
+    /// Time between status reports.
+    pub fn status_interval_ms(&self) -> u16 {
+        self.system_large(system::SI) as u16
+    }
+
+    /// Whether lines end in LF CR.
+    pub fn expand_line_feeds(&self) -> bool {
+        self.system(system::EC) != 0
+    }
+
+    /// Whether what is received is sent back.
+    pub fn echo(&self) -> bool {
+        self.system(system::EE) != 0
+    }
+
+    /// 0 none, 1 XON/XOFF, 2 RTS/CTS.
+    pub fn flow_control(&self) -> u8 {
+        self.system(system::EX)
+    }
+
+    /// Plane at power-up and program end: 0 G17, 1 G18, 2 G19.
+    pub fn default_plane(&self) -> u8 {
+        self.system(system::GPL)
+    }
+
+    /// Units at power-up and program end: 0 G20, 1 G21.
+    pub fn default_units(&self) -> u8 {
+        self.system(system::GUN)
+    }
+
+    /// Coordinate system at power-up and program end, 1 G54 to 6 G59.
+    pub fn default_coordinates(&self) -> u8 {
+        self.system(system::GCO)
+    }
+
+    /// Path control at power-up and program end: 0 G61, 1 G61.1, 2 G64.
+    pub fn default_path_control(&self) -> u8 {
+        self.system(system::GPA)
+    }
+
+    /// Distance mode at power-up and program end: 0 G90, 1 G91.
+    pub fn default_distance_mode(&self) -> u8 {
+        self.system(system::GDI)
+    }
+}

@@ -1,0 +1,200 @@
+//! Settings: the table of what there is, and the values in force.
+//!
+//! `protocol` reads and writes them by name through [`Setting`]; everything else uses the getters of
+//! [`Settings`], which cost a load. Values are integers scaled by a power of ten, so text goes in
+//! and out exactly. They live in RAM only.
+
+pub mod name;
+pub mod number;
+pub mod ratio;
+pub mod setting;
+pub mod table;
+
+pub use name::Name;
+pub use number::{Digits, Fixed, Number};
+pub use ratio::StepRatio;
+pub use setting::{Owner, Place, Setting};
+
+use crate::boards::MOTORS;
+use crate::status::Status;
+use crate::units::{AXES, FIRST_ROTARY};
+use setting::{LARGES, SMALLS, large_of, small_of};
+use table::{CLAMP, JERK, Kind, MODE, RADIUS, RANGE, Row, UNIT, axis, motor, system};
+
+/// The values in force.
+pub struct Settings {
+    small: [u8; SMALLS],
+    large: [i32; LARGES],
+    /// Derived from a motor's angle, travel and microsteps; used for every block.
+    ratios: [StepRatio; MOTORS],
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Settings {
+    /// The defaults.
+    pub fn new() -> Settings {
+        let ratios = [StepRatio::NONE; MOTORS];
+        let mut settings = Settings { small: [0; SMALLS], large: [0; LARGES], ratios };
+        for setting in (0..Setting::NUMBERS).filter_map(Setting::from_number) {
+            settings.keep(setting, setting.default_value());
+        }
+        for motor in 0..MOTORS as u8 {
+            settings.derive(motor);
+        }
+        settings
+    }
+
+    /// The value of a setting, scaled as kept.
+    pub fn get(&self, setting: Setting) -> i32 {
+        match setting.place() {
+            Place::Small(slot) => self.small(slot).into(),
+            Place::Large(slot) => self.large(slot),
+            Place::Constant => setting.default_value(),
+        }
+    }
+
+    /// Sets a value that [`Settings::check`] returned.
+    pub fn store(&mut self, setting: Setting, value: i32) {
+        self.keep(setting, value);
+        if let Owner::Motor(motor) = setting.owner() {
+            self.derive(motor);
+        }
+    }
+
+    /// The value to store for `number` as sent, or why it is refused.
+    pub fn check(&self, setting: Setting, number: Number, inches: bool) -> Result<i32, Status> {
+        let row = setting.row();
+        if matches!(row.kind, Kind::Constant | Kind::Text) {
+            return Err(Status::ReadOnly);
+        }
+        if row.stored == 0 && !number.is_integer() {
+            return Err(Status::BadNumber);
+        }
+        let million = number.fixed(0, false).is_none_or(|v| v > 1_000_000);
+        let number = if row.is(JERK) && million { number.millionth() } else { number };
+        let inches = inches && self.is_length(setting, &row);
+        let linear_mode = row.is(MODE) && !setting.owner().is_rotary();
+        limit(&row, row.max - i32::from(linear_mode), number, inches)
+    }
+
+    /// The value of a setting as shown.
+    pub fn show(&self, setting: Setting, inches: bool) -> Fixed {
+        let row = setting.row();
+        let value = Fixed { value: self.get(setting), decimals: row.stored };
+        if inches && self.is_length(setting, &row) {
+            value.inches(row.shown)
+        } else {
+            value.rounded(row.shown)
+        }
+    }
+
+    fn is_length(&self, setting: Setting, row: &Row) -> bool {
+        let rotary = match setting.owner() {
+            Owner::Motor(motor) => {
+                (FIRST_ROTARY..AXES).contains(&usize::from(self.motor_axis(motor.into())))
+            }
+            owner => owner.is_rotary() && !row.is(RADIUS),
+        };
+        row.is(UNIT) && !rotary
+    }
+
+    fn keep(&mut self, setting: Setting, value: i32) {
+        match setting.place() {
+            Place::Small(slot) => {
+                if let Some(place) = self.small.get_mut(usize::from(slot)) {
+                    *place = value as u8;
+                }
+            }
+            Place::Large(slot) => {
+                if let Some(place) = self.large.get_mut(usize::from(slot)) {
+                    *place = value;
+                }
+            }
+            Place::Constant => {}
+        }
+    }
+
+    fn derive(&mut self, motor: u8) {
+        let base = motor * motor::LARGE as u8;
+        let (angle, travel) = (self.large(base + motor::SA), self.large(base + motor::TR));
+        let microsteps = self.motor(motor.into(), motor::MI);
+        if let Some(ratio) = self.ratios.get_mut(usize::from(motor)) {
+            *ratio = StepRatio::new(angle, travel, microsteps);
+        }
+    }
+
+    fn small(&self, slot: u8) -> u8 {
+        self.small.get(usize::from(slot)).copied().unwrap_or(0)
+    }
+
+    fn large(&self, slot: u8) -> i32 {
+        self.large.get(usize::from(slot)).copied().unwrap_or(0)
+    }
+
+    fn motor(&self, motor: usize, slot: u8) -> u8 {
+        self.small((motor * motor::SMALL) as u8 + slot)
+    }
+
+    fn axis(&self, axis: usize, slot: u8) -> i32 {
+        self.large(large_of(axis as u8) + slot)
+    }
+
+    fn switch(&self, axis: usize, slot: u8) -> u8 {
+        if axis <= FIRST_ROTARY { self.small(small_of(axis as u8) + slot) } else { 0 }
+    }
+
+    fn homing(&self, axis: usize, slot: u8) -> i32 {
+        if axis <= FIRST_ROTARY { self.axis(axis, slot) } else { 0 }
+    }
+
+    fn system(&self, slot: u8) -> u8 {
+        self.small(small_of(AXES as u8) + slot)
+    }
+
+    fn system_large(&self, slot: u8) -> i32 {
+        self.large(large_of(AXES as u8) + slot)
+    }
+}
+
+/// `number` scaled as kept and within the limits of `row` with upper limit `max`.
+fn limit(row: &Row, max: i32, number: Number, inches: bool) -> Result<i32, Status> {
+    let clamp = row.is(CLAMP);
+    let (below, above) = if row.is(RANGE) && !row.is(MODE) {
+        (Status::OutOfRange, Status::OutOfRange)
+    } else {
+        (Status::BelowMinimum, Status::AboveMaximum)
+    };
+    match number.fixed(row.stored, inches) {
+        Some(value) if (row.min..=max).contains(&value) => Ok(value),
+        Some(value) if value < row.min => {
+            if clamp {
+                Ok(row.min)
+            } else {
+                Err(below)
+            }
+        }
+        None if number.is_negative() => {
+            if clamp {
+                Ok(row.min)
+            } else {
+                Err(below)
+            }
+        }
+        _ => {
+            if clamp {
+                Ok(max)
+            } else {
+                Err(above)
+            }
+        }
+    }
+}
+
+mod getters;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,114 @@
+//! Names of settings and values: at most five bytes, lower case, as senders write them.
+
+use crate::progmem::Text;
+
+/// The longest name, in bytes.
+pub const LONGEST: usize = 5;
+
+/// A name, padded with zeros.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Name {
+    bytes: [u8; LONGEST],
+    len: u8,
+}
+
+impl Name {
+    /// The empty name.
+    pub fn new() -> Name {
+        Name::default()
+    }
+
+    /// This name with `text` behind it in lower case, or `None` if that is too long.
+    pub fn with(mut self, text: &[u8]) -> Option<Name> {
+        for &byte in text {
+            *self.bytes.get_mut(usize::from(self.len))? = byte.to_ascii_lowercase();
+            self.len += 1;
+        }
+        Some(self)
+    }
+
+    /// This name with the bytes of a table's `token`, up to its zeros.
+    pub fn with_token(self, token: [u8; 4]) -> Name {
+        let len = token.iter().position(|&b| b == 0).unwrap_or(token.len());
+        self.with(token.get(..len).unwrap_or(&[])).unwrap_or(self)
+    }
+
+    /// The bytes.
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get(..usize::from(self.len)).unwrap_or(&[])
+    }
+
+    /// Whether it is `text`.
+    pub fn is(&self, text: Text) -> bool {
+        text.bytes().eq(self.bytes().iter().copied())
+    }
+
+    /// The first byte, 0 if there is none.
+    pub fn first(&self) -> u8 {
+        self.bytes[0]
+    }
+
+    /// The last byte, 0 if there is none.
+    pub fn last(&self) -> u8 {
+        self.bytes().last().copied().unwrap_or(0)
+    }
+
+    /// Whether what follows the first `skip` bytes is `token`, a table's zero-padded name.
+    pub fn matches(&self, skip: usize, token: [u8; 4]) -> bool {
+        let mut rest = self.bytes.iter().skip(skip).copied().chain([0; LONGEST]);
+        token.iter().all(|&b| rest.next() == Some(b)) && rest.next() == Some(0)
+    }
+}
+
+/// The letter of an axis, X Y Z A B C in lower case.
+pub fn axis_letter(axis: u8) -> u8 {
+    if axis < 3 { b'x' + axis } else { b'a' + (axis - 3) }
+}
+
+/// The axis of a lower-case letter.
+pub fn axis_of(letter: u8) -> Option<u8> {
+    match letter {
+        b'x'..=b'z' => Some(letter - b'x'),
+        b'a'..=b'c' => Some(letter - b'a' + 3),
+        _ => None,
+    }
+}
+
+/// A zero-padded table name from a literal.
+pub const fn token(text: &str) -> [u8; 4] {
+    let text = text.as_bytes();
+    assert!(text.len() <= 4, "a table's name is at most 4 bytes");
+    let mut bytes = [0; 4];
+    let mut i = 0;
+    while i < text.len() {
+        bytes[i] = text[i];
+        i += 1;
+    }
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn matches_whole_names_only() {
+        let name = Name::new().with(b"XVm").unwrap();
+        assert_eq!(name.bytes(), b"xvm");
+        assert!(name.matches(1, token("vm")));
+        assert!(!name.matches(1, token("v")));
+        assert!(!name.matches(0, token("xv")));
+        assert!(Name::new().with(b"posxyz").is_none());
+        assert!(Name::new().with(b"abaud").unwrap().matches(1, token("baud")));
+        assert!(!Name::new().with(b"bauds").unwrap().matches(0, token("baud")));
+    }
+
+    #[test]
+    fn axes_have_letters() {
+        for axis in 0..6 {
+            assert_eq!(axis_letter(axis), crate::units::AXIS_LETTERS[usize::from(axis)]);
+            assert_eq!(axis_of(axis_letter(axis)), Some(axis));
+        }
+        assert_eq!(axis_of(b'd'), None);
+    }
+}

@@ -1,0 +1,279 @@
+//! A setting's handle: its row of the table and whose it is.
+
+use super::name::{Name, axis_letter, axis_of};
+use super::table::{
+    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, HOMING, Kind, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS, RADIUS,
+    Row, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS,
+};
+use crate::boards::MOTORS;
+use crate::units::{AXES, FIRST_ROTARY};
+
+const FIRST_MOTOR: u8 = SYSTEM_ROWS as u8;
+const FIRST_AXIS: u8 = FIRST_MOTOR + (MOTORS * MOTOR_ROWS) as u8;
+
+/// Whose a setting is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Owner {
+    /// The machine's.
+    System,
+    /// A motor's, 0 to 3.
+    Motor(u8),
+    /// An axis's, 0 to 5.
+    Axis(u8),
+}
+
+impl Owner {
+    /// Rows of the table that describe its settings.
+    pub fn rows(self) -> u8 {
+        match self {
+            Owner::System => SYSTEM_ROWS as u8,
+            Owner::Motor(_) => MOTOR_ROWS as u8,
+            Owner::Axis(_) => AXIS_ROWS as u8,
+        }
+    }
+
+    /// The group's name, which is the prefix of its settings' names; none for the system.
+    pub fn prefix(self) -> Name {
+        let letter = match self {
+            Owner::System => return Name::new(),
+            Owner::Motor(motor) => b'1' + motor,
+            Owner::Axis(axis) => axis_letter(axis),
+        };
+        Name::new().with(&[letter]).unwrap_or_default()
+    }
+
+    /// The motor or axis that names beginning with `letter` belong to.
+    pub fn of_letter(letter: u8) -> Option<Owner> {
+        match letter {
+            b'1'..=b'4' => Some(Owner::Motor(letter - b'1')),
+            _ => axis_of(letter).map(Owner::Axis),
+        }
+    }
+
+    /// Whether it is an axis that turns.
+    pub fn is_rotary(self) -> bool {
+        matches!(self, Owner::Axis(axis) if usize::from(axis) >= FIRST_ROTARY)
+    }
+
+    fn has(self, row: &Row) -> bool {
+        match self {
+            Owner::Axis(axis) if row.is(HOMING) => usize::from(axis) <= FIRST_ROTARY,
+            Owner::Axis(_) if row.is(RADIUS) => self.is_rotary(),
+            _ => true,
+        }
+    }
+
+    /// Row `row` of its table, if it has that.
+    fn load(self, row: u8) -> Option<Row> {
+        let row = usize::from(row);
+        let row = match self {
+            Owner::System => SYSTEM.at(row),
+            Owner::Motor(motor) if usize::from(motor) < MOTORS => MOTOR.at(row),
+            Owner::Axis(axis) if usize::from(axis) < AXES => AXIS.at(row),
+            _ => None,
+        };
+        row.filter(|row| self.has(row))
+    }
+}
+
+/// Where a setting's value is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Place {
+    /// In the bytes.
+    Small(u8),
+    /// In the words.
+    Large(u8),
+    /// In the table, as its default.
+    Constant,
+}
+
+/// Bytes that the settings take.
+pub const SMALLS: usize = small_of(AXES as u8) as usize + table::system::SMALL;
+/// Words that the settings take.
+pub const LARGES: usize = large_of(AXES as u8) as usize + table::system::LARGE;
+
+const fn base(axis: u8, full: usize, short: usize) -> u8 {
+    let homing = FIRST_ROTARY as u8 + 1;
+    let fulls = if axis < homing { axis } else { homing };
+    fulls * full as u8 + (axis - fulls) * short as u8
+}
+
+/// The first byte of an axis; of the system for axis 6. Motors come first.
+pub const fn small_of(axis: u8) -> u8 {
+    (MOTORS * table::motor::SMALL) as u8 + base(axis, table::axis::SMALL, table::axis::SHORT_SMALL)
+}
+
+/// The first word of an axis; of the system for axis 6. Motors come first.
+pub const fn large_of(axis: u8) -> u8 {
+    (MOTORS * table::motor::LARGE) as u8 + base(axis, table::axis::LARGE, table::axis::SHORT_LARGE)
+}
+
+/// A setting.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Setting(u8);
+
+impl Setting {
+    /// Numbers below this may be settings.
+    pub const NUMBERS: u8 = FIRST_AXIS + (AXES * AXIS_ROWS) as u8;
+
+    /// Its number.
+    pub fn number(self) -> u8 {
+        self.0
+    }
+
+    /// The setting of that number, if there is one: an axis may lack some.
+    pub fn from_number(number: u8) -> Option<Setting> {
+        let setting = Setting(number);
+        setting.owner().load(setting.index()).map(|_| setting)
+    }
+
+    /// The setting of `owner` in `row` of its table, if it has that.
+    pub fn of(owner: Owner, row: u8) -> Option<Setting> {
+        let base = match owner {
+            Owner::System => 0,
+            Owner::Motor(motor) => FIRST_MOTOR + motor * MOTOR_ROWS as u8,
+            Owner::Axis(axis) => FIRST_AXIS + axis * AXIS_ROWS as u8,
+        };
+        owner.load(row).map(|_| Setting(base + row))
+    }
+
+    /// The setting called `name`. About 10,000 cycles on AVR.
+    pub fn find(name: &Name) -> Option<Setting> {
+        let search = |owner: Owner| {
+            let skip = owner.prefix().bytes().len();
+            let called = |row: &u8| owner.load(*row).is_some_and(|r| name.matches(skip, r.token));
+            (0..owner.rows()).find(called).and_then(|row| Setting::of(owner, row))
+        };
+        let owner = Owner::of_letter(name.first());
+        owner.and_then(search).or_else(|| search(Owner::System))
+    }
+
+    /// Whether it is a motor's microsteps.
+    pub fn is_microsteps(self) -> bool {
+        let row = self.row();
+        let motor = matches!(self.owner(), Owner::Motor(_));
+        motor && row.kind == Kind::Small && row.slot == table::motor::MI
+    }
+
+    /// Whose it is.
+    pub fn owner(self) -> Owner {
+        if self.0 < FIRST_MOTOR {
+            Owner::System
+        } else if self.0 < FIRST_AXIS {
+            Owner::Motor((self.0 - FIRST_MOTOR) / MOTOR_ROWS as u8)
+        } else {
+            Owner::Axis((self.0 - FIRST_AXIS) / AXIS_ROWS as u8)
+        }
+    }
+
+    /// Its full name.
+    pub fn name(self) -> Name {
+        self.owner().prefix().with_token(self.row().token)
+    }
+
+    /// The number of its row.
+    fn index(self) -> u8 {
+        match self.owner() {
+            Owner::System => self.0,
+            Owner::Motor(_) => (self.0 - FIRST_MOTOR) % MOTOR_ROWS as u8,
+            Owner::Axis(_) => (self.0 - FIRST_AXIS) % AXIS_ROWS as u8,
+        }
+    }
+
+    /// Its row of the table.
+    pub fn row(self) -> Row {
+        // A handle is only made of a number that has a row.
+        self.owner().load(self.index()).unwrap_or(Row::NONE)
+    }
+
+    /// Its default, scaled as kept.
+    pub fn default_value(self) -> i32 {
+        let index = usize::from(self.index());
+        let value = match self.owner() {
+            Owner::System => SYSTEM_DEFAULTS.at(index),
+            Owner::Motor(motor) => {
+                MOTOR_DEFAULTS.at(index).and_then(|d| d.get(usize::from(motor)).copied())
+            }
+            Owner::Axis(axis) => {
+                AXIS_DEFAULTS.at(index).and_then(|d| d.get(usize::from(axis)).copied())
+            }
+        };
+        value.unwrap_or(0)
+    }
+
+    /// Where its value is kept.
+    pub fn place(self) -> Place {
+        let row = self.row();
+        let (small, large) = match self.owner() {
+            Owner::System => (small_of(AXES as u8), large_of(AXES as u8)),
+            Owner::Motor(motor) => {
+                (motor * table::motor::SMALL as u8, motor * table::motor::LARGE as u8)
+            }
+            Owner::Axis(axis) => (small_of(axis), large_of(axis)),
+        };
+        match row.kind {
+            Kind::Small => Place::Small(small + row.slot),
+            Kind::Large => Place::Large(large + row.slot),
+            Kind::Constant | Kind::Text => Place::Constant,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+    use std::string::String;
+    use std::vec::Vec;
+
+    fn all() -> impl Iterator<Item = Setting> {
+        (0..=u8::MAX).filter_map(Setting::from_number)
+    }
+
+    #[test]
+    fn every_name_finds_its_setting() {
+        for setting in all() {
+            assert_eq!(Setting::find(&setting.name()), Some(setting), "{:?}", setting.name());
+            assert!(setting.number() < Setting::NUMBERS);
+        }
+        for bad in ["", "x", "xra", "bsn", "5ma", "foo", "bauds", "xvmm"] {
+            assert_eq!(Setting::find(&Name::new().with(bad.as_bytes()).unwrap()), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn no_place_is_used_twice() {
+        let mut places = HashSet::new();
+        for setting in all() {
+            let place = setting.place();
+            assert!(place == Place::Constant || places.insert(std::format!("{place:?}")));
+            match place {
+                Place::Small(slot) => assert!(usize::from(slot) < SMALLS),
+                Place::Large(slot) => assert!(usize::from(slot) < LARGES),
+                Place::Constant => {}
+            }
+        }
+        // X Y Z do without a radius.
+        assert_eq!(places.len(), SMALLS + LARGES - 3);
+    }
+
+    #[test]
+    fn defaults_keep_the_limits() {
+        for setting in all().filter(|s| s.place() != Place::Constant) {
+            let (row, value) = (setting.row(), setting.default_value());
+            assert!((row.min..=row.max).contains(&value), "{:?}", setting.name());
+        }
+    }
+
+    #[test]
+    fn axes_list_what_they_have() {
+        let list = |owner: Owner| -> Vec<String> {
+            let rows = (0..owner.rows()).filter_map(|row| Setting::of(owner, row));
+            rows.map(|s| String::from_utf8(s.name().bytes()[1..].to_vec()).unwrap()).collect()
+        };
+        assert_eq!(list(Owner::Axis(0)).join(" "), "am vm fr tn tm jm jh jd sn sx sv lv lb zb");
+        assert_eq!(list(Owner::Axis(3)).join(" "), "am vm fr tn tm jm jh jd ra sn sx sv lv lb zb");
+        assert_eq!(list(Owner::Axis(5)).join(" "), "am vm fr tn tm jm jd ra");
+        assert_eq!(list(Owner::Motor(2)).join(" "), "ma sa tr mi po pm");
+    }
+}

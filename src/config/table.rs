@@ -1,0 +1,278 @@
+//! The settings, as data in program memory: the one truth about names, storage, limits, defaults.
+//!
+//! Rows stand in the order that groups are listed in. A motor or axis setting has one row for all
+//! motors or axes; its defaults are a row of the table behind. Sizes: 51 rows of 17 bytes and 576
+//! bytes of defaults.
+// The program-memory macros expand to unsafe blocks, one around the other in a table of texts.
+#![allow(unused_unsafe, clippy::undocumented_unsafe_blocks)]
+
+use super::name::token;
+use crate::progmem;
+
+/// How a setting is kept.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Kind {
+    /// Nowhere: its default is its value.
+    Constant,
+    /// In one byte; an integer.
+    Small,
+    /// In 32 bits, fixed point.
+    Large,
+    /// Nowhere: it is the board's name.
+    Text,
+}
+
+/// Converted from and to inches in G20 (on an axis that turns: never).
+pub const UNIT: u8 = 1;
+/// Out of limits is a range error, not a minimum or maximum.
+pub const RANGE: u8 = 2;
+/// Out of limits is pulled to the limit.
+pub const CLAMP: u8 = 4;
+/// In millions: a value over a million is divided by one.
+pub const JERK: u8 = 8;
+/// Only axes that turn have it; it is a length even there.
+pub const RADIUS: u8 = 16;
+/// Only axes that home have it: X Y Z A.
+pub const HOMING: u8 = 32;
+/// The axis mode: a linear axis lacks the last one.
+pub const MODE: u8 = 64;
+
+/// A setting, or the same setting of every motor or axis.
+#[derive(Clone, Copy)]
+pub struct Row {
+    /// Its name, without the group; zero padded.
+    pub token: [u8; 4],
+    /// Its place among the small or large ones of the system, the motor, the axis.
+    pub slot: u8,
+    /// How it is kept.
+    pub kind: Kind,
+    /// See the constants above.
+    pub flags: u8,
+    /// Decimals kept.
+    pub stored: u8,
+    /// Decimals shown.
+    pub shown: u8,
+    /// Lower limit, scaled as kept.
+    pub min: i32,
+    /// Upper limit, scaled as kept.
+    pub max: i32,
+}
+
+impl Row {
+    /// No setting's. All zeros, so that it needs no memory.
+    pub const NONE: Row = constant("", 0);
+
+    const fn with(mut self, flags: u8) -> Row {
+        self.flags |= flags;
+        self
+    }
+
+    /// Whether it has all of `flags`.
+    pub fn is(&self, flags: u8) -> bool {
+        self.flags & flags == flags
+    }
+}
+
+/// An integer of one byte.
+const fn int(name: &str, slot: u8, min: i32, max: i32) -> Row {
+    let (kind, flags, stored, shown) = (Kind::Small, RANGE, 0, 0);
+    Row { token: token(name), slot, kind, flags, stored, shown, min, max }
+}
+
+/// A fixed-point number of `stored` decimals, of which `shown` are shown.
+const fn fixed(name: &str, slot: u8, stored: u8, shown: u8, min: i32) -> Row {
+    let (kind, flags, max) = (Kind::Large, 0, i32::MAX);
+    Row { token: token(name), slot, kind, flags, stored, shown, min, max }
+}
+
+/// A number that never changes.
+const fn constant(name: &str, decimals: u8) -> Row {
+    let (kind, slot, flags) = (Kind::Constant, 0, 0);
+    let (stored, shown, min, max) = (decimals, decimals, 0, 0);
+    Row { token: token(name), slot, kind, flags, stored, shown, min, max }
+}
+
+const fn board_name() -> Row {
+    let mut row = constant("id", 0);
+    row.kind = Kind::Text;
+    row
+}
+
+const fn up_to(mut row: Row, max: i32) -> Row {
+    row.max = max;
+    row
+}
+
+/// Rows of [`SYSTEM`].
+pub const SYSTEM_ROWS: usize = 26;
+/// Rows of [`MOTOR`].
+pub const MOTOR_ROWS: usize = 6;
+/// Rows of [`AXIS`].
+pub const AXIS_ROWS: usize = 15;
+
+/// Slots of the system, small and large.
+#[allow(missing_docs)]
+pub mod system {
+    pub const SL: u8 = 0;
+    pub const ST: u8 = 1;
+    pub const EJ: u8 = 2;
+    pub const JV: u8 = 3;
+    pub const JS: u8 = 4;
+    pub const TV: u8 = 5;
+    pub const QV: u8 = 6;
+    pub const SV: u8 = 7;
+    pub const EC: u8 = 8;
+    pub const EE: u8 = 9;
+    pub const EX: u8 = 10;
+    pub const GPL: u8 = 11;
+    pub const GUN: u8 = 12;
+    pub const GCO: u8 = 13;
+    pub const GPA: u8 = 14;
+    pub const GDI: u8 = 15;
+    pub const SMALL: usize = 16;
+
+    pub const JA: u8 = 0;
+    pub const CT: u8 = 1;
+    pub const MT: u8 = 2;
+    pub const SI: u8 = 3;
+    pub const LARGE: usize = 4;
+}
+
+/// Slots of a motor, small and large.
+#[allow(missing_docs)]
+pub mod motor {
+    pub const MA: u8 = 0;
+    pub const MI: u8 = 1;
+    pub const PO: u8 = 2;
+    pub const PM: u8 = 3;
+    pub const SMALL: usize = 4;
+
+    pub const SA: u8 = 0;
+    pub const TR: u8 = 1;
+    pub const LARGE: usize = 2;
+}
+
+/// Slots of an axis, small and large. B and C have those before `SHORT` only.
+#[allow(missing_docs)]
+pub mod axis {
+    pub const AM: u8 = 0;
+    pub const SHORT_SMALL: usize = 1;
+    pub const SN: u8 = 1;
+    pub const SX: u8 = 2;
+    pub const SMALL: usize = 3;
+
+    pub const VM: u8 = 0;
+    pub const FR: u8 = 1;
+    pub const TN: u8 = 2;
+    pub const TM: u8 = 3;
+    pub const JM: u8 = 4;
+    pub const JD: u8 = 5;
+    pub const RA: u8 = 6;
+    pub const SHORT_LARGE: usize = 7;
+    pub const JH: u8 = 7;
+    pub const SV: u8 = 8;
+    pub const LV: u8 = 9;
+    pub const LB: u8 = 10;
+    pub const ZB: u8 = 11;
+    pub const LARGE: usize = 12;
+}
+
+const ANY: i32 = -i32::MAX;
+const POSITIVE: i32 = 1;
+
+progmem! {
+    /// The group `sys`.
+    pub static SYSTEM: [Row; SYSTEM_ROWS] = [
+        constant("fb", 2),
+        constant("fv", 3),
+        constant("hp", 0),
+        constant("hv", 0),
+        board_name(),
+        fixed("ja", system::JA, 2, 0, POSITIVE).with(UNIT),
+        fixed("ct", system::CT, 6, 4, 1_000).with(UNIT),
+        int("sl", system::SL, 0, 1),
+        int("st", system::ST, 0, 1),
+        up_to(fixed("mt", system::MT, 2, 2, 10), 429_496_700).with(CLAMP),
+        int("ej", system::EJ, 0, 1),
+        int("jv", system::JV, 0, 5),
+        int("js", system::JS, 0, 1),
+        int("tv", system::TV, 0, 1),
+        int("qv", system::QV, 0, 3),
+        int("sv", system::SV, 0, 2),
+        up_to(fixed("si", system::SI, 0, 0, 100), 65_535).with(CLAMP),
+        int("ec", system::EC, 0, 1),
+        int("ee", system::EE, 0, 1),
+        int("ex", system::EX, 0, 2),
+        constant("baud", 0),
+        int("gpl", system::GPL, 0, 2),
+        int("gun", system::GUN, 0, 1),
+        int("gco", system::GCO, 1, 6),
+        int("gpa", system::GPA, 0, 2),
+        int("gdi", system::GDI, 0, 1),
+    ];
+
+    /// Their defaults, scaled as kept.
+    pub static SYSTEM_DEFAULTS: [i32; SYSTEM_ROWS] = [
+        44_020, 970, 1, 8, 0, 10_000_000, 10_000, 0, 0, 200, 1, 2, 1, 1, 0, 1, 500, 0, 0, 1, 5,
+        0, 1, 1, 2, 0,
+    ];
+
+    /// The groups `1` to `4`.
+    pub static MOTOR: [Row; MOTOR_ROWS] = [
+        int("ma", motor::MA, 0, 255),
+        fixed("sa", motor::SA, 4, 3, POSITIVE),
+        fixed("tr", motor::TR, 6, 4, POSITIVE).with(UNIT),
+        int("mi", motor::MI, 1, 255),
+        int("po", motor::PO, 0, 1),
+        int("pm", motor::PM, 0, 3),
+    ];
+
+    /// Their defaults, by motor.
+    pub static MOTOR_DEFAULTS: [[i32; 4]; MOTOR_ROWS] = [
+        [0, 1, 2, 3],
+        [1_8000; 4],
+        [1_250_000, 1_250_000, 1_250_000, 360_000_000],
+        [8; 4],
+        [0; 4],
+        [2; 4],
+    ];
+
+    /// The groups `x` to `c`.
+    pub static AXIS: [Row; AXIS_ROWS] = [
+        int("am", axis::AM, 0, 3).with(MODE),
+        fixed("vm", axis::VM, 3, 0, POSITIVE).with(UNIT),
+        fixed("fr", axis::FR, 3, 0, POSITIVE).with(UNIT),
+        fixed("tn", axis::TN, 4, 3, ANY).with(UNIT),
+        fixed("tm", axis::TM, 4, 3, ANY).with(UNIT),
+        fixed("jm", axis::JM, 3, 0, POSITIVE).with(UNIT | JERK),
+        fixed("jh", axis::JH, 3, 0, POSITIVE).with(UNIT | JERK | HOMING),
+        fixed("jd", axis::JD, 6, 4, 0).with(UNIT),
+        fixed("ra", axis::RA, 6, 3, POSITIVE).with(UNIT | RADIUS),
+        int("sn", axis::SN, 0, 3).with(HOMING),
+        int("sx", axis::SX, 0, 3).with(HOMING),
+        fixed("sv", axis::SV, 3, 0, 0).with(UNIT | HOMING),
+        fixed("lv", axis::LV, 3, 0, 0).with(UNIT | HOMING),
+        fixed("lb", axis::LB, 4, 3, 0).with(UNIT | HOMING),
+        fixed("zb", axis::ZB, 4, 3, 0).with(UNIT | HOMING),
+    ];
+
+    /// Their defaults, by axis.
+    pub static AXIS_DEFAULTS: [[i32; 6]; AXIS_ROWS] = [
+        [1, 1, 1, 3, 0, 0],
+        [800_000, 800_000, 800_000, 230_400_000, 3_600_000, 3_600_000],
+        [800_000, 800_000, 800_000, 230_400_000, 3_600_000, 3_600_000],
+        [0, 0, 0, -1_0000, -1_0000, -1_0000],
+        [150_0000, 150_0000, 75_0000, -1_0000, -1_0000, -1_0000],
+        [20_000, 20_000, 20_000, 5_760_000, 20_000, 20_000],
+        [40_000, 40_000, 40_000, 11_520_000, 0, 0],
+        [50_000; 6],
+        [0, 0, 0, 198_944, 1_000_000, 1_000_000],
+        [1, 1, 0, 1, 0, 0],
+        [0, 0, 1, 0, 0, 0],
+        [500_000, 500_000, 400_000, 600_000, 0, 0],
+        [100_000, 100_000, 100_000, 100_000, 0, 0],
+        [5_0000, 5_0000, 5_0000, 5_0000, 0, 0],
+        [1_0000, 1_0000, 1_0000, 2_0000, 0, 0],
+    ];
+}

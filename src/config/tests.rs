@@ -1,0 +1,151 @@
+//! Setting and showing values.
+
+use super::*;
+use crate::units::Length;
+use proptest::prelude::*;
+use std::string::String;
+
+fn setting(name: &str) -> Setting {
+    Name::new().with(name.as_bytes()).and_then(|name| Setting::find(&name)).unwrap()
+}
+
+fn set(settings: &mut Settings, name: &str, value: &str, inches: bool) -> Result<(), Status> {
+    let (setting, number) = (setting(name), Number::parse(value.as_bytes()).unwrap());
+    let value = settings.check(setting, number, inches)?;
+    settings.store(setting, value);
+    Ok(())
+}
+
+fn shown(settings: &Settings, name: &str, inches: bool) -> String {
+    let mut buffer = Digits::default();
+    let text = settings.show(setting(name), inches).render(&mut buffer).to_vec();
+    String::from_utf8(text).unwrap()
+}
+
+#[test]
+fn defaults_show_as_documented() {
+    let settings = Settings::new();
+    for (name, value) in [
+        ("fb", "440.20"),
+        ("fv", "0.970"),
+        ("hp", "1"),
+        ("ja", "100000"),
+        ("ct", "0.0100"),
+        ("mt", "2.00"),
+        ("1tr", "1.2500"),
+        ("4tr", "360.0000"),
+        ("1sa", "1.800"),
+        ("xvm", "800"),
+        ("ajm", "5760"),
+        ("ara", "0.199"),
+        ("ztm", "75.000"),
+        ("atn", "-1.000"),
+        ("cjd", "0.0500"),
+        ("gpa", "2"),
+    ] {
+        assert_eq!(shown(&settings, name, false), value, "{name}");
+    }
+}
+
+#[test]
+fn inches_convert_lengths_only() {
+    let mut settings = Settings::new();
+    set(&mut settings, "xvm", "100", true).unwrap();
+    assert_eq!(shown(&settings, "xvm", false), "2540");
+    assert_eq!(shown(&settings, "xvm", true), "100");
+    set(&mut settings, "avm", "100", true).unwrap();
+    assert_eq!(shown(&settings, "avm", true), "100");
+    set(&mut settings, "ara", "1", true).unwrap();
+    assert_eq!(shown(&settings, "ara", false), "25.400");
+    set(&mut settings, "1tr", "0.05", true).unwrap();
+    assert_eq!(shown(&settings, "1tr", false), "1.2700");
+    set(&mut settings, "4tr", "90", true).unwrap();
+    assert_eq!(shown(&settings, "4tr", true), "90.0000");
+}
+
+#[test]
+fn refusals_have_their_codes() {
+    let mut settings = Settings::new();
+    for (name, value, status) in [
+        ("gun", "2", Status::OutOfRange),
+        ("gun", "-1", Status::OutOfRange),
+        ("gun", "0.5", Status::BadNumber),
+        ("1mi", "0", Status::OutOfRange),
+        ("xam", "3", Status::AboveMaximum),
+        ("xvm", "0", Status::BelowMinimum),
+        ("xvm", "1e9", Status::AboveMaximum),
+        ("xvm", "-1e99", Status::BelowMinimum),
+        ("1sa", "0", Status::BelowMinimum),
+        ("1tr", "-1", Status::BelowMinimum),
+        ("fb", "1", Status::ReadOnly),
+        ("id", "1", Status::ReadOnly),
+        ("baud", "3", Status::ReadOnly),
+        ("si", "200.5", Status::BadNumber),
+    ] {
+        assert_eq!(set(&mut settings, name, value, false), Err(status), "{name} {value}");
+    }
+    assert_eq!(shown(&settings, "xvm", false), "800");
+    assert_eq!(set(&mut settings, "aam", "3", false), Ok(()));
+}
+
+#[test]
+fn some_values_are_pulled_to_their_limits() {
+    let mut settings = Settings::new();
+    for (name, value, result) in [
+        ("si", "10", "100"),
+        ("si", "-10", "100"),
+        ("si", "1e20", "65535"),
+        ("mt", "0", "0.10"),
+        ("mt", "5000000", "4294967.00"),
+        ("xjm", "50000000", "50"),
+        ("xjm", "1000000", "1000000"),
+    ] {
+        set(&mut settings, name, value, false).unwrap();
+        assert_eq!(shown(&settings, name, false), result, "{name}");
+    }
+}
+
+#[test]
+fn getters_have_their_units() {
+    let mut settings = Settings::new();
+    assert!((settings.velocity_max(3) - 230_400.0).abs() < 0.1);
+    assert!((settings.feedrate_max(5) - 3_600.0).abs() < 0.001);
+    assert_eq!(settings.jerk_max(0), 20e6);
+    assert_eq!(settings.jerk_homing(4), 0.0);
+    assert_eq!(settings.junction_deviation(0), 0.05);
+    assert_eq!(settings.junction_acceleration(), 100_000.0);
+    assert_eq!(settings.chordal_tolerance(), 0.01);
+    assert_eq!(settings.travel_max(2), Length(750_000));
+    assert_eq!((settings.axis_mode(0), settings.axis_mode(3), settings.axis_mode(5)), (1, 3, 0));
+    assert_eq!((settings.switch_min(0), settings.switch_max(2), settings.switch_max(5)), (1, 1, 0));
+    assert_eq!(settings.status_interval_ms(), 500);
+    assert_eq!((settings.json_verbosity(), settings.motor_axis(3)), (2, 3));
+    assert_eq!(settings.step_ratio(0), StepRatio { num: 16, den: 125 });
+    set(&mut settings, "1mi", "16", false).unwrap();
+    assert_eq!(settings.step_ratio(0), StepRatio { num: 32, den: 125 });
+    assert_eq!(settings.step_ratio(4), StepRatio::NONE);
+}
+
+#[test]
+fn ram_is_accounted_for() {
+    assert_eq!(size_of::<Settings>(), 376);
+    assert!(size_of::<Row>() * 47 + (26 + 6 * 4 + 15 * 6) * 4 < 2048);
+}
+
+proptest! {
+    #[test]
+    fn what_is_shown_can_be_set(number in 0..Setting::NUMBERS, value: i32, inches: bool) {
+        let Some(setting) = Setting::from_number(number) else { return Ok(()) };
+        let mut settings = Settings::new();
+        let (row, mut buffer) = (setting.row(), Digits::default());
+        // Shown decimals only, so that nothing is lost.
+        let text = Fixed { value, decimals: row.shown }.render(&mut buffer).to_vec();
+        let number = Number::parse(&text).unwrap();
+        let Ok(value) = settings.check(setting, number, inches) else { return Ok(()) };
+        settings.store(setting, value);
+        prop_assert_eq!(settings.get(setting), value);
+        let shown = settings.show(setting, inches).render(&mut buffer).to_vec();
+        let clamped = row.is(CLAMP) || row.is(JERK);
+        prop_assert!(shown == text || clamped, "{:?} {:?}", text, shown);
+    }
+}

@@ -1,0 +1,109 @@
+//! What holds for any line whatever.
+
+use super::Mode;
+use super::fake::Fake;
+use crate::status::Status;
+use proptest::prelude::*;
+use std::string::String;
+use std::vec::Vec;
+use std::{format, vec};
+
+/// Whether an answer nests, separates and quotes as JSON must.
+fn is_json(answer: &[u8]) -> bool {
+    let (mut depth, mut quoted, mut escaped, mut last) = (0, false, false, b' ');
+    let mut separated = true;
+    for &byte in answer {
+        match byte {
+            _ if escaped => escaped = false,
+            b'\\' => escaped = true,
+            b'"' => quoted = !quoted,
+            _ if quoted => {}
+            b'{' | b'[' => depth += 1,
+            b'}' | b']' => depth -= 1,
+            _ => {}
+        }
+        if !quoted {
+            separated &= !matches!((last, byte), (b'{' | b',' | b':', b',' | b':') | (b',', b'}'));
+            last = byte;
+        }
+    }
+    depth == 0 && !quoted && separated
+}
+
+/// Lines that mean something, or nearly.
+fn lines() -> impl Strategy<Value = Vec<u8>> {
+    let word = || {
+        prop::sample::select(vec![
+            "{", "}", "{sr:{", "x", "xvm", "\"", ":", ",", "n", "t", "f", "gc", "\\", "1", "-1.5",
+            "posx", "stat", "1mi", "(msg ", ")", " ", "g0x1", "?", "$", "jv", "js", "sys", "é",
+        ])
+    };
+    let sensible = prop::collection::vec(word(), 0..60).prop_map(|w| w.concat().into_bytes());
+    let pair = (
+        prop::sample::select(vec![
+            "xvm",
+            "x",
+            "sr",
+            "sys",
+            "1mi",
+            "jv",
+            "js",
+            "stat",
+            "foo",
+            "\"GC\"",
+            "clear",
+            "me",
+            "vm",
+            "pos",
+            "fb",
+            "aReallyVeryLongNameThatNobodyHas",
+        ]),
+        prop::sample::select(vec![
+            "n",
+            "t",
+            "f",
+            "\"\"",
+            "1",
+            "-0012345678.123456789e-1",
+            "3.5",
+            "\"g0x1 (msg \\\"a)\"",
+            "{}",
+            "{vm:1,fr:n}",
+            "{posx:t,foo:t}",
+            "{stat:f}",
+            "{mi:16,foo:true}",
+            "{x:n}",
+        ]),
+    );
+    let valid = prop::collection::vec(pair, 0..8).prop_map(|pairs| {
+        let pairs: Vec<_> = pairs.iter().map(|(name, value)| format!("{name}:{value}")).collect();
+        format!("{{{}}}", pairs.join(",")).into_bytes()
+    });
+    prop_oneof![sensible, valid, prop::collection::vec(any::<u8>(), 0..300)]
+}
+
+proptest! {
+    #[test]
+    fn every_line_gets_one_response(line in lines(), mode in 0..2u8, status in 0..3usize) {
+        let mut fake = Fake::new();
+        fake.mode = if mode == 0 { Mode::Json } else { Mode::Text };
+        fake.outcome = [Status::Ok, Status::InverseTimeNotAllowed, Status::Noop][status];
+        let answer = fake.send(&line);
+        let blank = line.iter().all(|b| matches!(b, b' ' | b'\t')) && line.len() < 256;
+        let lines = answer.iter().filter(|&&b| b == b'\n').count();
+        let responses = answer.split(|&b| b == b'\n').filter(|l| l.starts_with(b"{\"r\":")).count();
+        match fake.mode {
+            Mode::Json if blank => prop_assert!(answer.is_empty()),
+            // Verbosity and style may have been set by the line itself.
+            Mode::Json if fake.settings.json_verbosity() == 0 => {}
+            Mode::Json if !fake.settings.json_strict() => prop_assert_eq!(lines, 1),
+            Mode::Json => {
+                prop_assert_eq!((lines, responses), (1, 1));
+                prop_assert!(is_json(&answer), "{:?}", String::from_utf8_lossy(&answer));
+            }
+            Mode::Text => prop_assert!(lines == 1 || lines == 12),
+        }
+        prop_assert!(answer.is_empty() || answer.ends_with(b"\n"));
+        prop_assert!(answer.is_ascii());
+    }
+}

@@ -1,0 +1,116 @@
+//! What a response tells of its G-code block: the block itself, its message, its line number.
+
+use super::machine::Machine;
+use super::request::{Context, Phase, Request};
+use super::value::Value;
+use super::write::{Out, Writer};
+use crate::config::Fixed;
+use crate::status::Status;
+use crate::text;
+
+/// Verbosities from which the parts show.
+const LINE_NUMBERS: u8 = 4;
+const BLOCKS: u8 = 5;
+
+impl Request {
+    pub(super) fn block<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        self.open(c);
+        self.phase = Phase::Message;
+        if self.verbosity >= BLOCKS {
+            let mut writer = Writer::body(c.out, &mut self.format);
+            writer.key_text(text!("gc"));
+            writer.byte(b'"');
+            self.item = self.block.start;
+            self.phase = Phase::BlockText;
+        }
+    }
+
+    /// The block as it is read: upper case, without blanks and comments.
+    pub(super) fn block_text<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let mut writer = Writer::body(c.out, &mut self.format);
+        for _ in 0..super::CHUNK / 2 {
+            match byte_of(c.line, self.item, self.block.end) {
+                None | Some(b'(' | b';') => {
+                    writer.byte(b'"');
+                    self.phase = Phase::Message;
+                    return;
+                }
+                Some(byte) if byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'.') => {
+                    writer.byte(byte.to_ascii_uppercase());
+                }
+                Some(_) => {}
+            }
+            self.item = self.item.saturating_add(1);
+        }
+    }
+
+    pub(super) fn message<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        self.phase = Phase::Number;
+        let Some(start) = message_start(c.line, self.block.start, self.block.end) else {
+            return;
+        };
+        self.item = start;
+        self.phase = Phase::MessageText;
+        if !self.format.is_plain() {
+            let mut writer = Writer::body(c.out, &mut self.format);
+            writer.key_text(text!("msg"));
+            writer.byte(b'"');
+        }
+    }
+
+    pub(super) fn message_text<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let plain = self.format.is_plain();
+        let mut writer = Writer::body(c.out, &mut self.format);
+        for _ in 0..super::CHUNK / 2 {
+            match byte_of(c.line, self.item, self.block.end) {
+                None | Some(b')') => {
+                    if !plain {
+                        writer.byte(b'"');
+                    }
+                    self.phase = Phase::Number;
+                    return;
+                }
+                Some(byte) if plain => writer.printable(byte),
+                Some(byte) => writer.escaped(byte),
+            }
+            self.item = self.item.saturating_add(1);
+        }
+    }
+
+    pub(super) fn number<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        if self.format.is_plain() {
+            Writer::body(c.out, &mut self.format).byte(b'\n');
+            self.phase = Phase::Done;
+            return;
+        }
+        let line = c.machine.value(Value::BlockLine);
+        if self.verbosity >= LINE_NUMBERS && line != 0 {
+            let mut writer = Writer::body(c.out, &mut self.format);
+            writer.key_text(text!("n"));
+            writer.fixed(Fixed::int(line));
+        }
+        let on = self.is_json && self.status == Status::Ok;
+        self.phase = if on { Phase::Pair } else { Phase::Warning };
+    }
+}
+
+/// Byte `at` of the line if that is before `end`.
+pub(super) fn byte_of(line: &[u8], at: u8, end: u8) -> Option<u8> {
+    line.get(usize::from(at)).copied().filter(|_| at < end)
+}
+
+/// Where the message of a comment `(MSG text)` begins.
+fn message_start(line: &[u8], start: u8, end: u8) -> Option<u8> {
+    let byte = |at| byte_of(line, at, end);
+    let mut at = (start..end).find(|&at| matches!(byte(at), Some(b'(' | b';')))? + 1;
+    while byte(at).is_some_and(|b| matches!(b, b' ' | b'\t')) {
+        at += 1;
+    }
+    for letter in [b'M', b'S', b'G'] {
+        if !byte(at)?.eq_ignore_ascii_case(&letter) {
+            return None;
+        }
+        at += 1;
+    }
+    Some(at)
+}

@@ -1,0 +1,123 @@
+//! A machine for tests, and the caller that steps requests for it.
+
+use super::{CHUNK, Machine, Mode, Next, Out, Request, StatusReport, Value};
+use crate::config::{Setting, Settings};
+use crate::status::Status;
+use std::string::String;
+use std::vec::Vec;
+
+pub struct Fake {
+    pub settings: Settings,
+    pub report: StatusReport,
+    pub mode: Mode,
+    pub inches: bool,
+    pub position: i32,
+    pub line: i32,
+    pub powered: [bool; 4],
+    pub state: i32,
+    /// What a block of G-code is answered with, and the blocks that were run.
+    pub outcome: Status,
+    pub blocks: Vec<String>,
+}
+
+impl Fake {
+    pub fn new() -> Fake {
+        Fake {
+            settings: Settings::new(),
+            report: StatusReport::new(),
+            mode: Mode::Json,
+            inches: false,
+            position: 0,
+            line: 0,
+            powered: [false; 4],
+            state: 1,
+            outcome: Status::Ok,
+            blocks: Vec::new(),
+        }
+    }
+
+    /// What the machine answers to a line.
+    pub fn send(&mut self, line: &[u8]) -> Vec<u8> {
+        let mut mode = self.mode;
+        let request = Request::begin(line, &mut mode);
+        self.mode = mode;
+        let Some(mut request) = request else { return Vec::new() };
+        let mut answer = Vec::new();
+        for _ in 0..1000 {
+            let mut chunk = Chunk::default();
+            let next = request.step(line, self, &mut chunk);
+            answer.extend(chunk.0);
+            match next {
+                Next::More => {}
+                Next::Gcode { start, end } => {
+                    assert!(answer.is_empty(), "a response has begun before its block has run");
+                    let block = &line[usize::from(start)..usize::from(end)];
+                    self.blocks.push(String::from_utf8_lossy(block).into_owned());
+                    request.ran(self.outcome);
+                }
+                Next::Done(_) => return answer,
+            }
+        }
+        panic!("no end to {line:?}");
+    }
+
+    /// The same as text, without the last line feed.
+    pub fn ask(&mut self, line: &str) -> String {
+        let answer = String::from_utf8(self.send(line.as_bytes())).unwrap();
+        String::from(answer.strip_suffix('\n').unwrap_or(&answer))
+    }
+}
+
+/// Output that insists on the limit of a step.
+#[derive(Default)]
+pub struct Chunk(pub Vec<u8>);
+
+impl Out for Chunk {
+    fn put(&mut self, byte: u8) {
+        self.0.push(byte);
+        assert!(self.0.len() <= CHUNK, "a step puts too much");
+    }
+}
+
+impl Machine for Fake {
+    fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    fn set(&mut self, setting: Setting, value: i32) -> Status {
+        self.settings.store(setting, value);
+        Status::Ok
+    }
+
+    fn value(&mut self, value: Value) -> i32 {
+        match value {
+            Value::Units => i32::from(!self.inches),
+            Value::State => self.state,
+            Value::Coordinates | Value::FeedMode => 1,
+            Value::MotionMode => 4,
+            Value::QueueFree => 32,
+            Value::SlotsFree => 7,
+            Value::BlockLine => self.line,
+            Value::Position(0) => self.position,
+            Value::MachinePosition(_) => i32::MIN,
+            Value::Powered(motor) => self.powered[usize::from(motor)].into(),
+            _ => 0,
+        }
+    }
+
+    fn report(&mut self) -> &mut StatusReport {
+        &mut self.report
+    }
+
+    fn clear(&mut self) -> Status {
+        Status::Ok
+    }
+
+    fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {
+        match motor {
+            Some(motor) => self.powered[usize::from(motor)] = on,
+            None => self.powered = [on; 4],
+        }
+        Status::Ok
+    }
+}

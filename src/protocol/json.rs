@@ -1,0 +1,305 @@
+//! Reading a line of relaxed JSON in place: no copies, no tree.
+//!
+//! [`check`] judges a whole line before anything of it is done; [`pair`] then reads one name and
+//! value at a time. Keys may be bare, blanks may stand anywhere, values are numbers, strings, words
+//! of which the first letter counts (`t`, `f`, `n`), and one level of objects.
+
+/// The longest name that is read.
+const LONGEST_NAME: u8 = 32;
+/// The longest number: any 64-bit float fits.
+const LONGEST_NUMBER: u8 = 24;
+
+/// A part of a line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Span {
+    /// Its first byte.
+    pub start: u8,
+    /// The byte behind it.
+    pub end: u8,
+}
+
+impl Span {
+    /// Its bytes.
+    pub fn of(self, line: &[u8]) -> &[u8] {
+        line.get(usize::from(self.start)..usize::from(self.end)).unwrap_or(&[])
+    }
+}
+
+/// What a value is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Kind {
+    /// A word beginning with `n`, or the empty string.
+    Null,
+    /// A word beginning with `t`.
+    True,
+    /// A word beginning with `f`.
+    False,
+    /// A number.
+    Number,
+    /// A string; the span is between the quotes, escapes included.
+    Text,
+    /// An object; the span is empty and behind its brace.
+    Object,
+}
+
+/// A name and its value.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Pair {
+    /// The name, without quotes.
+    pub name: Span,
+    /// What the value is.
+    pub kind: Kind,
+    /// Where the value is.
+    pub value: Span,
+    /// Where to read on.
+    pub next: u8,
+}
+
+fn is_punctuation(byte: u8) -> bool {
+    matches!(byte, b'"' | b'{' | b'}' | b'[' | b']' | b':' | b',' | b'\\')
+}
+
+/// Whether `line` is one object, no deeper than `{x:{vm:n}}`. About 80 cycles a byte on AVR.
+pub fn check(line: &[u8]) -> bool {
+    Cursor { line, at: 0 }.object().is_some()
+}
+
+/// The pair at `at`, or `None` at the end of the object. The line has passed [`check`].
+pub fn pair(line: &[u8], at: u8) -> Option<Pair> {
+    let mut cursor = Cursor { line, at };
+    cursor.take(b',');
+    cursor.pair()
+}
+
+/// Where to read on behind the brace that closes an object and at or behind `at`.
+pub fn behind_object(line: &[u8], at: u8) -> u8 {
+    let mut cursor = Cursor { line, at };
+    cursor.take(b'}');
+    cursor.at
+}
+
+/// The first byte of `line` that is not a blank, as an index.
+pub fn skip_blanks(line: &[u8]) -> u8 {
+    let mut cursor = Cursor { line, at: 0 };
+    cursor.blanks();
+    cursor.at
+}
+
+struct Cursor<'a> {
+    line: &'a [u8],
+    at: u8,
+}
+
+impl Cursor<'_> {
+    fn peek(&self) -> Option<u8> {
+        self.line.get(usize::from(self.at)).copied()
+    }
+
+    fn next_if(&mut self, wanted: impl Fn(u8) -> bool) -> Option<u8> {
+        let byte = self.peek().filter(|&b| wanted(b))?;
+        self.at = self.at.checked_add(1)?;
+        Some(byte)
+    }
+
+    fn blanks(&mut self) {
+        while self.next_if(|b| matches!(b, b' ' | b'\t')).is_some() {}
+    }
+
+    fn take(&mut self, byte: u8) -> bool {
+        self.blanks();
+        self.next_if(|b| b == byte).is_some()
+    }
+
+    fn span(&mut self, wanted: impl Fn(u8) -> bool) -> Span {
+        let start = self.at;
+        while self.next_if(&wanted).is_some() {}
+        Span { start, end: self.at }
+    }
+
+    fn object(&mut self) -> Option<()> {
+        let mut depth = u8::from(self.take(b'{'));
+        let mut empty = true;
+        while depth > 0 {
+            if !(empty && self.take(b'}')) {
+                let deeper = self.pair()?.kind == Kind::Object;
+                if deeper {
+                    depth += 1;
+                    empty = true;
+                    if depth > 2 {
+                        return None;
+                    }
+                    continue;
+                }
+            } else {
+                depth -= 1;
+            }
+            while depth > 0 && self.take(b'}') {
+                depth -= 1;
+            }
+            if depth == 0 {
+                self.blanks();
+                return self.peek().is_none().then_some(());
+            }
+            if !self.take(b',') {
+                return None;
+            }
+            empty = false;
+        }
+        None
+    }
+
+    fn pair(&mut self) -> Option<Pair> {
+        self.blanks();
+        let name = match self.peek()? {
+            b'"' => self.quoted().filter(|name| !name.of(self.line).contains(&b'\\'))?,
+            _ => self.span(|b| b.is_ascii_graphic() && !is_punctuation(b)),
+        };
+        if name.start == name.end || name.end - name.start > LONGEST_NAME || !self.take(b':') {
+            return None;
+        }
+        self.blanks();
+        let (kind, value) = self.value()?;
+        Some(Pair { name, kind, value, next: self.at })
+    }
+
+    fn value(&mut self) -> Option<(Kind, Span)> {
+        match self.peek()?.to_ascii_lowercase() {
+            b'"' => {
+                let text = self.quoted()?;
+                Some((if text.start == text.end { Kind::Null } else { Kind::Text }, text))
+            }
+            b'-' | b'0'..=b'9' => self.number().map(|span| (Kind::Number, span)),
+            b'{' => {
+                self.take(b'{');
+                Some((Kind::Object, Span { start: self.at, end: self.at }))
+            }
+            letter => {
+                let kind = match letter {
+                    b'n' => Kind::Null,
+                    b't' => Kind::True,
+                    b'f' => Kind::False,
+                    _ => return None,
+                };
+                Some((kind, self.span(|b| b.is_ascii_alphanumeric())))
+            }
+        }
+    }
+
+    /// A string of printing ASCII and escapes; anything above is kept out by framing or refused.
+    fn quoted(&mut self) -> Option<Span> {
+        self.next_if(|b| b == b'"')?;
+        let start = self.at;
+        loop {
+            let end = self.at;
+            match self.next_if(|b| matches!(b, b' '..=b'~' | b'\t'))? {
+                b'"' => return Some(Span { start, end }),
+                b'\\' => {
+                    self.next_if(|b| matches!(b, b' '..=b'~'))?;
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn number(&mut self) -> Option<Span> {
+        let start = self.at;
+        self.next_if(|b| b == b'-');
+        self.digits()?;
+        if self.next_if(|b| b == b'.').is_some() {
+            self.digits()?;
+        }
+        if self.next_if(|b| matches!(b, b'e' | b'E')).is_some() {
+            self.next_if(|b| matches!(b, b'-' | b'+'));
+            self.digits()?;
+        }
+        let short = self.at - start <= LONGEST_NUMBER;
+        short.then_some(Span { start, end: self.at })
+    }
+
+    fn digits(&mut self) -> Option<()> {
+        let digits = self.span(|b| b.is_ascii_digit());
+        (digits.start != digits.end).then_some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accepts_what_senders_write() {
+        for line in [
+            "{}",
+            "{fb:n}",
+            " { \"xvm\" : 1200 } ",
+            "{x:{vm:1000,fr:n},y:{vm:\"\"}}",
+            "{sr:{}}",
+            "{sr:{posx:t,posy:true},qr:NULL}",
+            "{\"gc\":\"g0 (a \\\"b\\\")\"}",
+            "{xvm:-1.5e-3}",
+            "{xvm:0800}",
+            "{x:{},y:n}",
+        ] {
+            assert!(check(line.as_bytes()), "{line}");
+        }
+    }
+
+    #[test]
+    fn refuses_the_rest() {
+        for line in [
+            "",
+            "{",
+            "{xvm",
+            "{xvm:",
+            "{\"xvm\":}",
+            "{xvm:n",
+            "{xvm:n,}",
+            "{xvm:n}}",
+            "{xvm:n} x",
+            "{xvm:+1}",
+            "{xvm:.5}",
+            "{xvm:5.}",
+            "{xvm:1e}",
+            "{xvm:[1]}",
+            "{:n}",
+            "{\"\":n}",
+            "{a:{b:{c:n}}}",
+            "{a:{b:n}c:n}",
+            "{,a:n}",
+            "{a:\"b}",
+            "{a:\"b\\",
+            "{xvm:0000000000000000000000001}",
+            "{abcdefghijklmnopqrstuvwxyz0123456:n}",
+            "x{}",
+        ] {
+            assert!(!check(line.as_bytes()), "{line}");
+        }
+    }
+
+    #[test]
+    fn a_line_may_fill_the_index() {
+        let mut line = std::vec![b' '; 255];
+        line[..6].copy_from_slice(b"{fb:n}");
+        assert!(check(&line));
+        line[254] = b'}';
+        assert!(!check(&line));
+        line[5] = b' ';
+        assert!(check(&line));
+    }
+
+    #[test]
+    fn reads_pairs_in_turn() {
+        let line = b"{ a:1 , \"b\":{c:t}, d:\"x\\\"y\" }";
+        let read = |at| pair(line, at).map(|p| (p.name.of(line), p.kind, p.value.of(line), p.next));
+        let first = read(2).unwrap();
+        assert_eq!((first.0, first.1, first.2), (&b"a"[..], Kind::Number, &b"1"[..]));
+        let second = read(first.3).unwrap();
+        assert_eq!((second.0, second.1), (&b"b"[..], Kind::Object));
+        let inner = read(second.3).unwrap();
+        assert_eq!((inner.0, inner.1), (&b"c"[..], Kind::True));
+        assert_eq!(read(inner.3), None);
+        let last = read(behind_object(line, inner.3)).unwrap();
+        assert_eq!((last.0, last.1, last.2), (&b"d"[..], Kind::Text, &b"x\\\"y"[..]));
+        assert_eq!(read(last.3), None);
+    }
+}

@@ -1,0 +1,61 @@
+//! The TinyG protocol: JSON lines in, responses and reports out.
+//!
+//! Pure and synchronous; the tasks own the bytes and the waiting. A line becomes a [`Request`],
+//! which the parser task steps until it is done; [`Report`] and the [`notice`]s are stepped alike.
+//! No step puts more than [`CHUNK`] bytes, keeps a reference, allocates or recurses. Tables and
+//! texts are in program memory.
+//!
+//! Wire format: TinyG 0.97 build 440.20 with the three-element footer `[1,status,free line slots]`.
+// The program-memory macros expand to unsafe blocks, one around the other in a table of texts.
+#![allow(unused_unsafe, clippy::undocumented_unsafe_blocks)]
+
+/// Bytes that one step puts at most.
+pub const CHUNK: usize = 64;
+
+mod block;
+mod json;
+mod machine;
+pub mod notice;
+mod pairs;
+mod prompt;
+mod report;
+mod request;
+mod screen;
+mod status_text;
+mod token;
+mod value;
+mod write;
+
+pub use machine::Machine;
+pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report};
+pub use request::{Next, Request};
+pub use status_text::status_text;
+pub use token::Token;
+pub use value::{Value, thousandths};
+pub use write::{Format, Out};
+
+/// How the host wants to be spoken to: as it spoke last.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Mode {
+    /// In JSON.
+    Json,
+    /// In text, with prompts.
+    Text,
+}
+
+impl Mode {
+    /// The format of unasked reports.
+    fn format(self, machine: &impl Machine) -> Format {
+        match self {
+            Mode::Json => Format::json(machine.settings().json_strict()),
+            Mode::Text => Format::plain(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod any_line;
+#[cfg(test)]
+mod fake;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,102 @@
+//! What the machine tells once: that it is ready, and that something has gone wrong.
+
+use super::machine::Machine;
+use super::status_text::status_text;
+use super::token::Token;
+use super::write::{Format, Out, Writer};
+use crate::config::Fixed;
+use crate::status::Status;
+use crate::text;
+
+/// The greeting after a reset:
+/// `{"r":{"fv":0.970,"fb":440.20,"hp":1,"hv":8,"id":"...","msg":"SYSTEM READY"},"f":[1,0,0]}`.
+pub struct Banner {
+    stage: u8,
+    format: Format,
+}
+
+/// The rows of `sys` that the greeting tells, in its order.
+const BANNER_ROWS: u8 = 5;
+
+impl Banner {
+    /// Begins. It is whole whatever the verbosity, unless that is 0.
+    pub fn begin(machine: &impl Machine) -> Banner {
+        let settings = machine.settings();
+        let verbosity = if settings.json_verbosity() == 0 { 0 } else { u8::MAX };
+        Banner { stage: 0, format: Format::response(settings.json_strict(), verbosity) }
+    }
+
+    /// Does the next part. Whether there is more to do.
+    pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+        let mut writer = Writer::body(out, &mut self.format);
+        if self.stage == 0 {
+            writer.open();
+            writer.key_text(text!("r"));
+            writer.open();
+        }
+        match self.stage {
+            0..BANNER_ROWS => {
+                // The version comes before the build.
+                let row = if self.stage < 2 { 1 - self.stage } else { self.stage };
+                let token = Token::system(row);
+                writer.key(token.name().bytes());
+                writer.shown(token.read(machine));
+            }
+            BANNER_ROWS => {
+                writer.key_text(text!("msg"));
+                writer.string(text!("SYSTEM READY"));
+            }
+            _ => {
+                writer.close();
+                writer.footer(Status::Ok as u8, 0);
+                return false;
+            }
+        }
+        self.stage += 1;
+        true
+    }
+}
+
+/// An exception report, `{"er":{"fb":440.20,"st":13,"msg":"Buffer full"}}`; sent whatever the
+/// verbosity, and always as JSON.
+pub struct Exception {
+    stage: u8,
+    status: Status,
+    format: Format,
+}
+
+impl Exception {
+    /// Begins.
+    pub fn begin(status: Status, machine: &impl Machine) -> Exception {
+        Exception { stage: 0, status, format: Format::json(machine.settings().json_strict()) }
+    }
+
+    /// Does the next part. Whether there is more to do.
+    pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+        let mut writer = Writer::body(out, &mut self.format);
+        match self.stage {
+            0 => {
+                writer.open();
+                writer.key_text(text!("er"));
+                writer.open();
+                let build = Token::system(0);
+                writer.key(build.name().bytes());
+                writer.shown(build.read(machine));
+                writer.key_text(text!("st"));
+                writer.fixed(Fixed::int((self.status as u8).into()));
+            }
+            1 => {
+                if let Some(text) = status_text(self.status) {
+                    writer.key_text(text!("msg"));
+                    writer.string(text);
+                }
+            }
+            _ => {
+                writer.text(text!("}}\n"));
+                return false;
+            }
+        }
+        self.stage += 1;
+        true
+    }
+}

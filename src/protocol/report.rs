@@ -1,0 +1,189 @@
+//! What the machine tells unasked: status reports and queue reports.
+//!
+//! [`StatusReport`] is the list of what to tell and what was told last; [`Report`] sends one report
+//! in steps, [`queue_report`] one queue report at once. The reporting task holds the transmitter
+//! from the first step of a report to its last.
+
+use super::Mode;
+use super::machine::Machine;
+use super::token::{DEFAULT_REPORT, DEFAULT_TOKENS, Shown, Token};
+use super::value::Value;
+use super::write::{Format, Out, Writer};
+use crate::config::Fixed;
+use crate::progmem::Text;
+use crate::text;
+
+/// Entries a report may have.
+pub const LONGEST_REPORT: usize = 40;
+
+/// The status report: its tokens, in order, and the value of each as last sent.
+pub struct StatusReport {
+    tokens: [Token; LONGEST_REPORT],
+    sent: [i32; LONGEST_REPORT],
+    len: u8,
+    /// The list is new: what was sent means nothing.
+    fresh: bool,
+}
+
+impl Default for StatusReport {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl StatusReport {
+    /// The default list.
+    pub fn new() -> StatusReport {
+        let first = DEFAULT_TOKENS.get();
+        let mut report = StatusReport {
+            tokens: [first[0]; LONGEST_REPORT],
+            sent: [0; LONGEST_REPORT],
+            len: DEFAULT_REPORT as u8,
+            fresh: true,
+        };
+        report.tokens.iter_mut().zip(first).for_each(|(to, token)| *to = token);
+        report
+    }
+
+    /// Entry `index`.
+    pub fn token(&self, index: u8) -> Option<Token> {
+        self.tokens.get(..usize::from(self.len))?.get(usize::from(index)).copied()
+    }
+
+    /// Empties the list.
+    pub fn clear(&mut self) {
+        self.len = 0;
+        self.fresh = true;
+    }
+
+    /// Adds a token behind the others, once. Whether there was room.
+    pub fn add(&mut self, token: Token) -> bool {
+        if self.tokens.iter().take(usize::from(self.len)).any(|&t| t == token) {
+            return true;
+        }
+        match self.tokens.get_mut(usize::from(self.len)) {
+            Some(place) => *place = token,
+            None => return false,
+        }
+        self.len += 1;
+        true
+    }
+
+    /// Has the next report tell everything, as after a reset.
+    pub fn refresh(&mut self) {
+        self.fresh = true;
+    }
+
+    /// Notes that `value` is being sent for an entry. Whether it differs from the last.
+    fn note(&mut self, index: u8, value: i32) -> bool {
+        match self.sent.get_mut(usize::from(index)) {
+            Some(sent) => core::mem::replace(sent, value) != value,
+            None => false,
+        }
+    }
+}
+
+/// A status report on its way.
+pub struct Report {
+    index: u8,
+    all: bool,
+    begun: bool,
+    format: Format,
+}
+
+impl Report {
+    /// Begins an automatic report, if the settings want any: of what has changed, or everything.
+    pub fn begin(mode: Mode, machine: &mut impl Machine) -> Option<Report> {
+        let verbosity = machine.settings().status_verbosity();
+        if verbosity == 0 {
+            return None;
+        }
+        let fresh = core::mem::take(&mut machine.report().fresh);
+        let format = mode.format(machine);
+        Some(Report { index: 0, all: fresh || verbosity > 1, begun: false, format })
+    }
+
+    /// Looks at one entry. Whether there is more to do. If nothing has changed, nothing is sent.
+    pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+        let Some(token) = machine.report().token(self.index) else {
+            self.end(out);
+            return false;
+        };
+        let shown = token.read(machine);
+        let value = match shown {
+            Shown::Number(fixed) => fixed.value,
+            Shown::Text(_) => 0,
+        };
+        let changed = machine.report().note(self.index, value);
+        self.index += 1;
+        if changed || self.all {
+            let mut writer = Writer::body(out, &mut self.format);
+            if !core::mem::replace(&mut self.begun, true) {
+                writer.head(text!("sr"));
+            }
+            writer.key(token.name().bytes());
+            writer.shown(shown);
+        }
+        true
+    }
+
+    fn end(&mut self, out: &mut impl Out) {
+        if self.begun {
+            Writer::body(out, &mut self.format).tail();
+        }
+    }
+}
+
+/// Sends a queue report if the settings want any: free blocks, and with more verbosity those added
+/// and removed since the last.
+pub fn queue_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) {
+    let verbosity = machine.settings().queue_verbosity();
+    if verbosity == 0 {
+        return;
+    }
+    let mut format = mode.format(machine);
+    let mut writer = Writer::body(out, &mut format);
+    writer.begin_object();
+    writer.count(text!("qr"), machine.value(Value::QueueFree));
+    if verbosity > 1 {
+        writer.count(text!("qi"), machine.value(Value::QueueAdded));
+        writer.count(text!("qo"), machine.value(Value::QueueRemoved));
+    }
+    writer.end_object();
+}
+
+impl<O: Out> Writer<'_, O> {
+    /// Begins a report: nothing in text, else `{"name":{`.
+    fn head(&mut self, name: Text) {
+        if !self.is_plain() {
+            self.open();
+            self.key_text(name);
+            self.open();
+        }
+    }
+
+    fn tail(&mut self) {
+        if !self.is_plain() {
+            self.close();
+        }
+        self.end_object();
+    }
+
+    fn begin_object(&mut self) {
+        if !self.is_plain() {
+            self.open();
+        }
+    }
+
+    fn end_object(&mut self) {
+        if !self.is_plain() {
+            self.close();
+        }
+        self.byte(b'\n');
+    }
+
+    fn count(&mut self, name: Text, value: i32) {
+        self.key_text(name);
+        self.fixed(Fixed::int(value));
+    }
+}

@@ -1,0 +1,71 @@
+//! The texts of status codes, for people.
+
+use crate::progmem;
+use crate::progmem::Text;
+use crate::status::Status;
+use crate::text;
+
+/// The text of a status; `None` for one that prints its number.
+pub fn status_text(status: Status) -> Option<Text> {
+    (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
+}
+
+const ENTRIES: usize = 44;
+
+progmem! {
+    static TEXTS: [(Status, Text); ENTRIES] = [
+        (Status::Ok, text!("OK")),
+        (Status::Error, text!("Error")),
+        (Status::Noop, text!("Noop")),
+        (Status::BufferFull, text!("Buffer full")),
+        (Status::Initializing, text!("Initializing")),
+        (Status::InternalError, text!("Internal error")),
+        (Status::ExceptionReport, text!("Generic exception report")),
+        (Status::UnrecognizedName, text!("Unrecognized command or config name")),
+        (Status::MalformedCommand, text!("Invalid or malformed command")),
+        (Status::BadNumber, text!("Bad number format")),
+        (Status::UnsupportedType, text!("Unsupported number or JSON type")),
+        (Status::ReadOnly, text!("Parameter is read-only")),
+        (Status::CannotRead, text!("Parameter cannot be read")),
+        (Status::NotAccepted, text!("Command not accepted at this time")),
+        (Status::InputTooLong, text!("Input exceeds max length")),
+        (Status::BelowMinimum, text!("Input less than minimum value")),
+        (Status::AboveMaximum, text!("Input exceeds maximum value")),
+        (Status::OutOfRange, text!("Input value range error")),
+        (Status::JsonSyntax, text!("JSON syntax error")),
+        (Status::JsonTooManyPairs, text!("JSON input has too many pairs")),
+        (Status::GcodeGeneric, text!("Generic Gcode input error")),
+        (Status::GcodeUnsupported, text!("Gcode command unsupported")),
+        (Status::McodeUnsupported, text!("M code unsupported")),
+        (Status::ModalGroupViolation, text!("Gcode modal group violation")),
+        (Status::AxisWordMissing, text!("Axis word missing")),
+        (Status::AxisNotAllowed, text!("Axis cannot be present")),
+        (Status::AxisInvalid, text!("Axis is invalid for this command")),
+        (Status::AxisDisabled, text!("Axis is disabled")),
+        (Status::AxisTargetMissing, text!("Axis target position is missing")),
+        (Status::PlaneMissing, text!("Selected plane is missing")),
+        (Status::FeedrateMissing, text!("Feedrate not specified")),
+        (
+            Status::InverseTimeNotAllowed,
+            text!("Inverse time mode cannot be used with this command"),
+        ),
+        (Status::VelocityExceeded, text!("Requested velocity exceeds limits")),
+        (Status::ArcSpecification, text!("Arc specification error")),
+        (Status::ArcAxisMissing, text!("Arc specification error - missing axis(es)")),
+        (Status::ArcOffsetsMissing, text!("Arc specification error - missing offset(s)")),
+        (
+            Status::ArcRadiusTolerance,
+            text!("Arc specification error - radius arc out of tolerance"),
+        ),
+        (
+            Status::ArcEndpointIsStart,
+            text!("Arc specification error - endpoint is starting point"),
+        ),
+        (Status::PWordMissing, text!("P word is missing")),
+        (Status::PWordInvalid, text!("P word is invalid")),
+        (Status::PWordNegative, text!("P word is negative")),
+        (Status::Alarmed, text!("Machine is alarmed - Command not processed")),
+        (Status::LimitHit, text!("Limit switch hit - Shutdown occurred")),
+        (Status::SoftLimit, text!("Soft limit exceeded")),
+    ];
+}

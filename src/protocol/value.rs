@@ -1,0 +1,244 @@
+//! What can be read of the machine beside its settings: names, units and texts, as tables.
+
+use crate::config::Fixed;
+use crate::config::name::token;
+use crate::progmem;
+use crate::progmem::Text;
+use crate::text;
+use crate::units::FIRST_ROTARY;
+
+/// A value of the machine, and what [`Machine::value`](super::Machine::value) returns for it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Value {
+    /// `n`: line number of the block read last.
+    BlockLine,
+    /// `line`: line number of the block that moves.
+    MotionLine,
+    /// `vel`: speed now, in 0.001 mm/min.
+    Velocity,
+    /// `feed`: feed rate, in 0.001 mm/min.
+    Feed,
+    /// `stat`: the state in one number.
+    State,
+    /// `macs`: machine state.
+    Machine,
+    /// `cycs`: cycle.
+    Cycle,
+    /// `mots`: motion.
+    Motion,
+    /// `hold`: feedhold.
+    Hold,
+    /// `unit`: 0 inch, 1 mm.
+    Units,
+    /// `coor`: 0 G53, 1 to 6 G54 to G59.
+    Coordinates,
+    /// `momo`: 0 to 3 G0 to G3, 4 G80.
+    MotionMode,
+    /// `plan`: 0 to 2 G17 to G19.
+    Plane,
+    /// `path`: 0 G61, 1 G61.1, 2 G64.
+    Path,
+    /// `dist`: 0 G90, 1 G91.
+    Distance,
+    /// `frmo`: 0 G93, 1 G94.
+    FeedMode,
+    /// `tool`: tool number.
+    Tool,
+    /// `home`: 0 not homed, 1 homed, 2 homing.
+    Home,
+    /// `qr`: free blocks of the planner.
+    QueueFree,
+    /// `qi`: blocks added since this was last read.
+    QueueAdded,
+    /// `qo`: blocks removed since this was last read.
+    QueueRemoved,
+    /// `rx`: free line slots. Also the third element of every footer.
+    SlotsFree,
+    /// `mpox` and so on: position in machine coordinates, in units of a `Length`.
+    MachinePosition(u8),
+    /// `posx` and so on: position in work coordinates, in units of a `Length`.
+    Position(u8),
+    /// `ofsx` and so on: work offset, in units of a `Length`.
+    Offset(u8),
+    /// `homx` and so on: 1 if the axis is homed.
+    Homed(u8),
+    /// `pwr1` and so on: 1 if the motor is powered.
+    Powered(u8),
+}
+
+/// A speed as [`Machine::value`](super::Machine::value) returns it: thousandths, saturating.
+pub fn thousandths(speed: f32) -> i32 {
+    (speed * 1e3 + if speed < 0.0 { -0.5 } else { 0.5 }) as i32
+}
+
+/// What a value is measured in.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Form {
+    /// An integer, or a choice.
+    Count,
+    /// A speed.
+    Speed,
+    /// A length or angle.
+    Length,
+    /// A length in millimetres whatever the units, or an angle.
+    Millimetres,
+}
+
+impl Form {
+    /// `value` as shown, lengths in inches if `inches`.
+    pub fn show(self, value: i32, inches: bool) -> Fixed {
+        let (stored, shown) = match self {
+            Form::Count => return Fixed::int(value),
+            Form::Speed => (3, 2),
+            Form::Length | Form::Millimetres => (4, 3),
+        };
+        let value = Fixed { value, decimals: stored };
+        if inches && self != Form::Millimetres { value.inches(shown) } else { value.rounded(shown) }
+    }
+}
+
+/// A value with a name of its own.
+#[derive(Clone, Copy)]
+pub struct Single {
+    /// Its name, zero padded.
+    pub token: [u8; 4],
+    /// What it is.
+    pub value: Value,
+    /// What it is measured in.
+    pub form: Form,
+    /// What text reports call it; empty if they do not know it.
+    pub label: Text,
+    /// The names of its numbers from 0, separated by `|`; empty if they have none.
+    pub choices: Text,
+}
+
+/// Values of each axis or motor.
+#[derive(Clone, Copy)]
+pub struct Vector {
+    /// The group's name, zero padded.
+    pub token: [u8; 4],
+    /// What they are measured in.
+    pub form: Form,
+    /// Members: axes, or motors.
+    pub members: u8,
+    /// What text reports call it, behind the axis's letter.
+    pub label: Text,
+}
+
+impl Vector {
+    /// How member `index` is shown: an angle never in inches.
+    pub fn form(&self, index: u8) -> Form {
+        let rotary = usize::from(index) >= FIRST_ROTARY;
+        if rotary && self.form == Form::Length { Form::Millimetres } else { self.form }
+    }
+}
+
+/// Entries of [`SINGLES`].
+pub const SINGLE_COUNT: usize = 22;
+/// Entries of [`VECTORS`].
+pub const VECTOR_COUNT: usize = 5;
+
+const NONE: Text = text!("");
+const LINE: Text = text!("Line number:");
+const STATES: Text = text!(
+    "Initializing|Ready|Alarm|Stop|End|Run|Hold|Probe|Cycle|Homing|Jog|Interlock|Shutdown|Panic"
+);
+const MACHINE: Text = text!("Initializing|Ready|Alarm|Stop|End|Cycle|Interlock|Shutdown|Panic");
+const COORDINATES: Text = text!(
+    "G53 - machine coordinate system|G54 - coordinate system 1|G55 - coordinate system 2|\
+     G56 - coordinate system 3|G57 - coordinate system 4|G58 - coordinate system 5|\
+     G59 - coordinate system 6"
+);
+const MOTION: Text = text!(
+    "G0  - linear traverse|G1  - linear feed|G2  - clockwise arc feed|\
+     G3  - counter clockwise arc feed|G80 - cancel motion mode (none active)"
+);
+const FEED: Text = text!(
+    "G93 - inverse time mode|G94 - units-per-minute mode (i.e. feedrate mode)|\
+     G95 - units-per-revolution mode"
+);
+const DISTANCE: Text = text!("G90 - absolute distance mode|G91 - incremental distance mode");
+const PATH: Text = text!("G61 - exact path mode|G61.1 - exact stop mode|G64 - continuous mode");
+
+const fn count(name: &str, value: Value, label: Text, choices: Text) -> Single {
+    Single { token: token(name), value, form: Form::Count, label, choices }
+}
+
+const fn speed(name: &str, value: Value, label: Text) -> Single {
+    Single { token: token(name), value, form: Form::Speed, label, choices: NONE }
+}
+
+const fn vector(name: &str, form: Form, members: u8, label: Text) -> Vector {
+    Vector { token: token(name), form, members, label }
+}
+
+progmem! {
+    /// Values with names of their own.
+    pub static SINGLES: [Single; SINGLE_COUNT] = [
+        count("n", Value::BlockLine, LINE, NONE),
+        count("line", Value::MotionLine, LINE, NONE),
+        speed("vel", Value::Velocity, text!("Velocity:")),
+        speed("feed", Value::Feed, text!("Feed rate:")),
+        count("stat", Value::State, text!("Machine state:"), STATES),
+        count("macs", Value::Machine, text!("Raw machine state:"), MACHINE),
+        count("cycs", Value::Cycle, text!("Cycle state:"), text!("Off|Machining|Probe|Homing|Jog")),
+        count("mots", Value::Motion, text!("Motion state:"), text!("Stop|Run|Hold")),
+        count("hold", Value::Hold, text!("Feedhold state:"), text!("Off|Sync|Plan|Decel|Hold|End-Hold")),
+        count("unit", Value::Units, text!("Units:"), text!("G20 - inches mode|G21 - millimeter mode")),
+        count("coor", Value::Coordinates, text!("Coordinate system:"), COORDINATES),
+        count("momo", Value::MotionMode, text!("Motion mode:"), MOTION),
+        count("plan", Value::Plane, text!("Plane:"), text!("G17 - XY plane|G18 - XZ plane|G19 - YZ plane")),
+        count("path", Value::Path, text!("Path Mode:"), PATH),
+        count("dist", Value::Distance, text!("Distance mode:"), DISTANCE),
+        count("frmo", Value::FeedMode, text!("Feed rate mode:"), FEED),
+        count("tool", Value::Tool, text!("Tool number"), NONE),
+        count("home", Value::Home, text!("Homing state:"), text!("Not Homed|Homed|Homing")),
+        count("qr", Value::QueueFree, NONE, NONE),
+        count("qi", Value::QueueAdded, NONE, NONE),
+        count("qo", Value::QueueRemoved, NONE, NONE),
+        count("rx", Value::SlotsFree, NONE, NONE),
+    ];
+
+    /// Values of each axis or motor; [`vector_value`] gives the order.
+    pub static VECTORS: [Vector; VECTOR_COUNT] = [
+        vector("mpo", Form::Millimetres, 6, text!(" machine posn:")),
+        vector("pos", Form::Length, 6, text!(" position:")),
+        vector("ofs", Form::Length, 6, text!(" work offset:")),
+        vector("hom", Form::Count, 6, text!(" axis homing state:")),
+        vector("pwr", Form::Count, 4, NONE),
+    ];
+}
+
+/// Member `index` of a vector.
+pub fn vector_value(vector: u8, index: u8) -> Value {
+    match vector {
+        0 => Value::MachinePosition(index),
+        1 => Value::Position(index),
+        2 => Value::Offset(index),
+        3 => Value::Homed(index),
+        _ => Value::Powered(index),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speeds_saturate() {
+        assert_eq!(thousandths(1.2345), 1235);
+        assert_eq!(thousandths(-0.0005), -1);
+        assert_eq!(thousandths(1e30), i32::MAX);
+        assert_eq!(thousandths(f32::NAN), 0);
+    }
+
+    #[test]
+    fn shows_in_the_units_in_force() {
+        let show = |form: Form, value, inches| form.show(value, inches);
+        assert_eq!(show(Form::Speed, 25_400, true), Fixed { value: 100, decimals: 2 });
+        assert_eq!(show(Form::Length, 254_000, true), Fixed { value: 1000, decimals: 3 });
+        assert_eq!(show(Form::Millimetres, 254_000, true), Fixed { value: 25_400, decimals: 3 });
+        assert_eq!(show(Form::Count, 7, true), Fixed::int(7));
+    }
+}
