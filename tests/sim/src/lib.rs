@@ -1,1 +1,38 @@
-//! Simulated machine.
+//! The simulated machine that Kerf is tested on.
+//!
+//! The firmware's ELF runs on simavr's CPU core with peripherals of our own around it, made to
+//! behave like the chip in what matters here: serial frames, FIFO depth and overruns, timer flags,
+//! the cost of entering an interrupt, software interrupts. Time is counted in CPU cycles and is
+//! exactly repeatable.
+//!
+//! [`Machine`] is the chip on its board, [`Host`] a sender on its serial line, [`oracle`] an
+//! independent reading of the same G-code, and [`job`] all of them together.
+
+mod bus;
+mod cpu;
+mod eeprom;
+mod host;
+mod image;
+pub mod job;
+mod machine;
+mod meters;
+pub mod oracle;
+pub mod protocol;
+mod recorder;
+pub mod report;
+mod summary;
+mod timer;
+mod trace;
+mod uart;
+mod vectors;
+mod wire;
+
+pub use host::{Answered, Host, LINES_IN_FLIGHT};
+pub use image::Image;
+pub use machine::{Fault, Machine};
+pub use meters::{Meters, Service, Window};
+pub use recorder::{Motor, Recorder, Step, Sums};
+pub use trace::Trace;
+pub use uart::Uart;
+pub use vectors::name as vector_name;
+pub use wire::Wire;

@@ -1,0 +1,275 @@
+//! The peripherals that replace simavr's, and the way from a register to them.
+
+use std::ffi::{c_int, c_void};
+use std::ptr::NonNull;
+
+use simavr_ffi as ffi;
+
+use crate::cpu::Cpu;
+use crate::eeprom::Eeprom;
+use crate::recorder::{Recorder, Sums};
+use crate::timer::{LAYOUTS, Timer};
+use crate::uart::{OFFSETS, PLACES, Uart};
+use crate::vectors;
+use crate::wire::Wire;
+
+/// Whose register it is.
+#[derive(Clone, Copy)]
+enum Owner {
+    Nobody,
+    Timer(usize),
+    Uart(usize),
+    Eeprom,
+}
+
+/// First address after the I/O registers.
+const IO_END: usize = 0x138;
+
+/// Everything around the CPU.
+pub struct Bus {
+    pub(crate) cpu: Cpu,
+    owners: [Owner; IO_END],
+    pub(crate) timers: [Timer; 6],
+    pub(crate) uarts: [Uart; 4],
+    pub(crate) eeprom: Eeprom,
+    pub(crate) wire: Wire,
+    pub(crate) recorder: Recorder,
+    pub(crate) sums: Sums,
+    /// Interrupts that ask for service, by vector.
+    pub(crate) pending: u64,
+    /// When each of them began to ask.
+    raised_at: [u64; vectors::COUNT],
+    /// Cycle of the next thing to happen.
+    pub(crate) due: u64,
+}
+
+impl Bus {
+    /// Puts the peripherals around a CPU, which keeps the pointer returned.
+    pub fn install(cpu: Cpu, wire: Wire) -> NonNull<Bus> {
+        let bus = Box::new(Bus {
+            cpu,
+            owners: owners(),
+            timers: std::array::from_fn(|i| Timer::new(&LAYOUTS[i])),
+            uarts: std::array::from_fn(Uart::new),
+            eeprom: Eeprom::new(),
+            wire,
+            recorder: Recorder::new(),
+            sums: Sums::default(),
+            pending: 0,
+            raised_at: [0; vectors::COUNT],
+            due: u64::MAX,
+        });
+        let bus = NonNull::from(Box::leak(bus));
+        let param = bus.as_ptr().cast::<c_void>();
+        for (addr, owner) in owners().iter().enumerate() {
+            if !matches!(owner, Owner::Nobody) {
+                cpu.hook(addr as u16, Some(io_read), Some(io_write), param);
+            }
+        }
+        for (timer, layout) in LAYOUTS.iter().enumerate() {
+            cpu.hook_bits(layout.tifr, TIFR_BITS[timer], param);
+        }
+        bus
+    }
+
+    /// All peripherals as after a reset; the world outside keeps its state.
+    pub fn reset(&mut self) {
+        self.timers = std::array::from_fn(|i| Timer::new(&LAYOUTS[i]));
+        self.uarts = std::array::from_fn(Uart::new);
+        self.eeprom.reset();
+        self.pending = 0;
+        self.refresh_due();
+    }
+
+    /// Does everything that is due by `now`.
+    pub fn run(&mut self, now: u64) {
+        while self.due <= now {
+            if self.wire.due() <= now {
+                self.wire.pump(&mut self.uarts[0]);
+            }
+            for i in 0..self.timers.len() {
+                if self.timers[i].due() <= now {
+                    self.timers[i].advance(now);
+                    self.update_timer(i, self.timers[i].last_event());
+                }
+            }
+            for i in 0..self.uarts.len() {
+                if self.uarts[i].due() <= now {
+                    let at = self.uarts[i].due();
+                    self.uarts[i].advance(now);
+                    self.update_uart(i, at);
+                }
+            }
+            if self.eeprom.due() <= now {
+                self.eeprom.advance(now);
+                self.update_eeprom(now);
+            }
+            self.wire.listen(&mut self.uarts[0]);
+            self.refresh_due();
+        }
+    }
+
+    /// The interrupt is being served.
+    pub fn acknowledge(&mut self, vector: u8, now: u64) {
+        let bit = 1u64 << vector;
+        if let Some(i) = (0..6).find(|i| LAYOUTS[*i].vectors.contains(&vector)) {
+            self.timers[i].acknowledge(vector, now);
+            self.update_timer(i, now);
+        } else if let Some(i) = (0..4).find(|i| (7u64 << PLACES[*i].1) & bit != 0) {
+            self.uarts[i].acknowledge(vector);
+            self.update_uart(i, now);
+        }
+        self.refresh_due();
+    }
+
+    /// When a pending interrupt began to ask for service.
+    pub fn raised_at(&self, vector: u8) -> u64 {
+        self.raised_at[usize::from(vector)]
+    }
+
+    /// Begins sending bytes to USART0.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.wire.send(bytes, self.cpu.cycle());
+        self.refresh_due();
+    }
+
+    /// Sends a byte to USART0 ahead of what still waits.
+    pub fn send_first(&mut self, byte: u8) {
+        self.wire.send_first(byte, self.cpu.cycle());
+        self.refresh_due();
+    }
+
+    fn refresh_due(&mut self) {
+        let timers = self.timers.iter().map(Timer::due);
+        let uarts = self.uarts.iter().map(Uart::due);
+        let others = [self.wire.due(), self.eeprom.due()];
+        self.due = timers.chain(uarts).chain(others).min().unwrap_or(u64::MAX);
+    }
+
+    fn update_timer(&mut self, i: usize, at: u64) {
+        let mask = LAYOUTS[i].vectors.iter().filter(|v| **v != 0).fold(0, |m, v| m | 1u64 << v);
+        self.set_lines(mask, self.timers[i].lines(), at);
+    }
+
+    fn update_uart(&mut self, i: usize, at: u64) {
+        self.set_lines(7u64 << PLACES[i].1, self.uarts[i].lines(), at);
+    }
+
+    fn update_eeprom(&mut self, at: u64) {
+        self.set_lines(1u64 << Eeprom::VECTOR, self.eeprom.lines(), at);
+    }
+
+    fn set_lines(&mut self, mask: u64, lines: u64, at: u64) {
+        let mut fresh = lines & !self.pending;
+        self.pending = (self.pending & !mask) | lines;
+        while fresh != 0 {
+            self.raised_at[fresh.trailing_zeros() as usize] = at;
+            fresh &= fresh - 1;
+        }
+    }
+
+    fn store(&mut self, addr: u16, value: u8) {
+        let now = self.cpu.write_cycle();
+        self.cpu.set_data(usize::from(addr), value);
+        match self.owners[usize::from(addr)] {
+            Owner::Timer(i) => {
+                self.timers[i].write(addr, value, now);
+                self.update_timer(i, now);
+            }
+            Owner::Uart(i) => {
+                self.uarts[i].write(addr, value, now);
+                self.update_uart(i, now);
+            }
+            Owner::Eeprom => {
+                let hold = self.eeprom.write(addr, value, now);
+                self.cpu.set_cycle(self.cpu.cycle() + hold);
+                self.update_eeprom(now);
+            }
+            Owner::Nobody => {}
+        }
+        self.refresh_due();
+    }
+
+    fn load(&mut self, addr: u16) -> u8 {
+        let now = self.cpu.read_cycle();
+        let kept = self.cpu.data(usize::from(addr));
+        let value = match self.owners[usize::from(addr)] {
+            Owner::Timer(i) => {
+                let value = self.timers[i].read(addr, now);
+                self.update_timer(i, now);
+                value
+            }
+            Owner::Uart(i) => {
+                let value = self.uarts[i].read(addr, now);
+                self.update_uart(i, now);
+                value
+            }
+            Owner::Eeprom => self.eeprom.read(addr, now),
+            Owner::Nobody => None,
+        };
+        self.refresh_due();
+        value.unwrap_or(kept)
+    }
+
+    fn clear_flag(&mut self, timer: usize, bit: u8) {
+        let now = self.cpu.write_cycle();
+        self.timers[timer].clear(1 << bit, now);
+        self.update_timer(timer, now);
+        self.refresh_due();
+    }
+}
+
+fn owners() -> [Owner; IO_END] {
+    let mut owners = [Owner::Nobody; IO_END];
+    for (i, layout) in LAYOUTS.iter().enumerate() {
+        for addr in layout.registers() {
+            owners[usize::from(addr)] = Owner::Timer(i);
+        }
+    }
+    for (i, (base, _)) in PLACES.iter().enumerate() {
+        for offset in OFFSETS {
+            owners[usize::from(base + offset)] = Owner::Uart(i);
+        }
+    }
+    for addr in Eeprom::REGISTERS {
+        owners[usize::from(addr)] = Owner::Eeprom;
+    }
+    owners
+}
+
+/// The bus behind a callback's parameter.
+///
+/// # Safety
+/// `param` is what `Bus::install` gave to simavr, and simavr is executing an instruction: the
+/// machine holds no reference to its bus then.
+unsafe fn bus_of<'a>(param: *mut c_void) -> &'a mut Bus {
+    // SAFETY: as the function demands.
+    unsafe { &mut *param.cast::<Bus>() }
+}
+
+unsafe extern "C" fn io_write(_: *mut ffi::avr_t, addr: u16, value: u8, param: *mut c_void) {
+    // SAFETY: simavr calls this only while it executes an instruction.
+    unsafe { bus_of(param) }.store(addr, value);
+}
+
+unsafe extern "C" fn io_read(_: *mut ffi::avr_t, addr: u16, param: *mut c_void) -> u8 {
+    // SAFETY: simavr calls this only while it executes an instruction.
+    unsafe { bus_of(param) }.load(addr)
+}
+
+/// SBI and CBI on a TIFR touch one flag only.
+unsafe extern "C" fn tifr_bit<const TIMER: usize>(
+    _: *mut ffi::avr_t,
+    bit: u8,
+    value: u8,
+    param: *mut c_void,
+) -> c_int {
+    if value != 0 {
+        // SAFETY: simavr calls this only while it executes an instruction.
+        unsafe { bus_of(param) }.clear_flag(TIMER, bit);
+    }
+    1
+}
+
+const TIFR_BITS: [crate::cpu::BitWrite; 6] =
+    [tifr_bit::<0>, tifr_bit::<1>, tifr_bit::<2>, tifr_bit::<3>, tifr_bit::<4>, tifr_bit::<5>];

@@ -1,0 +1,233 @@
+//! A sender on the serial line: some lines in flight, one answer for each.
+
+use std::collections::VecDeque;
+
+use anyhow::{Context, Result, bail};
+use serde_json::Value;
+
+use crate::machine::Machine;
+use crate::protocol::{Incoming, Response, classify, control_name, state_of};
+
+/// Lines in flight unless asked otherwise.
+pub const LINES_IN_FLIGHT: usize = 4;
+
+/// A line that was sent.
+#[derive(Clone, Debug)]
+struct Line {
+    number: usize,
+    text: String,
+    /// Set on a control line: it may be answered before G-code that was sent earlier.
+    name: Option<String>,
+}
+
+/// A line and what the firmware said to it.
+#[derive(Clone, Debug)]
+pub struct Answered {
+    /// The number given to `queue`.
+    pub number: usize,
+    /// What was sent.
+    pub text: String,
+    /// What came back.
+    pub response: Response,
+}
+
+/// The sender.
+pub struct Host {
+    limit: usize,
+    queue: VecDeque<(usize, String)>,
+    awaiting: VecDeque<Line>,
+    partial: Vec<u8>,
+    answered: VecDeque<Answered>,
+    reports: Vec<Value>,
+    strays: Vec<String>,
+    banners: usize,
+    stat: Option<i64>,
+    heard_at: u64,
+}
+
+impl Host {
+    /// A sender that keeps up to `limit` lines in flight.
+    pub fn new(limit: usize) -> Self {
+        Host {
+            limit: limit.max(1),
+            queue: VecDeque::new(),
+            awaiting: VecDeque::new(),
+            partial: Vec::new(),
+            answered: VecDeque::new(),
+            reports: Vec::new(),
+            strays: Vec::new(),
+            banners: 0,
+            stat: None,
+            heard_at: 0,
+        }
+    }
+
+    /// Queues a line, without its line end, under a number of the caller's choice.
+    pub fn queue(&mut self, number: usize, text: &str) {
+        self.queue.push_back((number, text.to_string()));
+    }
+
+    /// Whether every line was sent and answered.
+    pub fn is_done(&self) -> bool {
+        self.queue.is_empty() && self.awaiting.is_empty()
+    }
+
+    /// Lines sent and not yet answered.
+    pub fn in_flight(&self) -> usize {
+        self.awaiting.len()
+    }
+
+    /// The oldest line that waits for its answer.
+    pub fn oldest(&self) -> Option<&str> {
+        self.awaiting.front().map(|l| l.text.as_str())
+    }
+
+    /// Takes the lines answered since the last call.
+    pub fn take_answered(&mut self) -> Vec<Answered> {
+        self.answered.drain(..).collect()
+    }
+
+    /// Takes the reports that came since the last call.
+    pub fn take_reports(&mut self) -> Vec<Value> {
+        std::mem::take(&mut self.reports)
+    }
+
+    /// Lines that were no JSON, and answers that no line had asked for.
+    pub fn strays(&self) -> &[String] {
+        &self.strays
+    }
+
+    /// Banners seen.
+    pub fn banners(&self) -> usize {
+        self.banners
+    }
+
+    /// The machine state last reported.
+    pub fn stat(&self) -> Option<i64> {
+        self.stat
+    }
+
+    /// Cycle at which the last line came.
+    pub fn heard_at(&self) -> u64 {
+        self.heard_at
+    }
+
+    /// Runs the machine to a cycle, sending and listening.
+    pub fn run_until(&mut self, machine: &mut Machine, cycle: u64) -> Result<()> {
+        while self.run_until_line(machine, cycle)? {}
+        Ok(())
+    }
+
+    /// Runs the machine for a time, sending and listening.
+    pub fn run_for_ms(&mut self, machine: &mut Machine, ms: u64) -> Result<()> {
+        self.run_until(machine, machine.cycle() + machine.cycles(ms))
+    }
+
+    /// Like `run_until`, but stops after any line from the firmware. False when time is up.
+    pub fn run_until_line(&mut self, machine: &mut Machine, cycle: u64) -> Result<bool> {
+        self.fill(machine);
+        machine.run_until_line(cycle)?;
+        self.listen(machine);
+        self.fill(machine);
+        Ok(machine.cycle() < cycle)
+    }
+
+    /// Runs until the banner comes, then a little for the line to fall silent.
+    pub fn boot(&mut self, machine: &mut Machine, timeout_ms: u64) -> Result<()> {
+        let seen = self.banners;
+        let end = machine.cycle() + machine.cycles(timeout_ms);
+        while self.banners == seen {
+            if !self.run_until_line(machine, end)? {
+                bail!("{}", self.no_banner(machine, timeout_ms));
+            }
+        }
+        self.run_for_ms(machine, 50)
+    }
+
+    fn no_banner(&self, machine: &Machine, timeout_ms: u64) -> String {
+        let garbled = machine.wire().garbled();
+        let heard = match self.strays.last() {
+            _ if garbled > 0 => format!("{garbled} bytes came at another speed"),
+            Some(line) => format!("last heard: {line}"),
+            None => "nothing was heard".to_string(),
+        };
+        format!("no SYSTEM READY within {timeout_ms} ms of reset; {heard}")
+    }
+
+    /// Sends a line at once, ahead of those queued and whatever is in flight.
+    pub fn send(&mut self, machine: &mut Machine, number: usize, text: &str) {
+        machine.send(text.as_bytes());
+        machine.send(b"\n");
+        let name = control_name(text);
+        self.awaiting.push_back(Line { number, text: text.to_string(), name });
+    }
+
+    /// Sends a line at once and waits for its answer.
+    pub fn ask(&mut self, machine: &mut Machine, text: &str, timeout_ms: u64) -> Result<Response> {
+        const ASKED: usize = usize::MAX;
+        self.send(machine, ASKED, text);
+        let end = machine.cycle() + machine.cycles(timeout_ms);
+        loop {
+            let more = self.run_until_line(machine, end)?;
+            if let Some(i) = self.answered.iter().position(|a| a.number == ASKED) {
+                return self.answered.remove(i).map(|a| a.response).context("lost an answer");
+            }
+            if !more {
+                bail!("no answer to {text} within {timeout_ms} ms");
+            }
+        }
+    }
+
+    fn fill(&mut self, machine: &mut Machine) {
+        while self.awaiting.len() < self.limit {
+            let Some((number, text)) = self.queue.pop_front() else { return };
+            self.send(machine, number, &text);
+        }
+    }
+
+    fn listen(&mut self, machine: &mut Machine) {
+        for byte in machine.receive() {
+            if byte != b'\n' && byte != b'\r' {
+                self.partial.push(byte);
+            } else if !self.partial.is_empty() {
+                let line = String::from_utf8_lossy(&self.partial).into_owned();
+                self.partial.clear();
+                self.heard_at = machine.cycle();
+                self.hear(&line);
+            }
+        }
+    }
+
+    fn hear(&mut self, line: &str) {
+        match classify(line) {
+            Incoming::Banner => self.banners += 1,
+            Incoming::Report(report) => {
+                self.stat = state_of(&report).or(self.stat);
+                self.reports.push(report);
+            }
+            Incoming::Response(response) => self.answer(response),
+            Incoming::Other(line) => self.strays.push(line),
+        }
+    }
+
+    fn answer(&mut self, response: Response) {
+        self.stat = state_of(&response.body).or(self.stat);
+        let named = |l: &Line| {
+            let name = l.name.as_deref();
+            name.is_some_and(|n| response.body.get(n).is_some())
+        };
+        let plain = |l: &Line| l.name.is_none();
+        let at = self
+            .awaiting
+            .iter()
+            .position(named)
+            .or_else(|| self.awaiting.iter().position(plain))
+            .unwrap_or(0);
+        match self.awaiting.remove(at) {
+            Some(Line { number, text, .. }) => {
+                self.answered.push_back(Answered { number, text, response });
+            }
+            None => self.strays.push(response.raw),
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! A job from boot to rest, watched all the way.
+
+mod setup;
+mod watch;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use crate::host::{Host, LINES_IN_FLIGHT};
+use crate::machine::Machine;
+use crate::oracle::{self, Outcome, Setup, Unclear};
+use crate::protocol::STATUS_NOOP;
+use crate::report::{Measured, Rejected, Report};
+use crate::trace::Trace;
+
+pub use setup::read_setup;
+
+/// How long a reset may take, ms of AVR time.
+const BOOT_MS: u64 = 5_000;
+/// How long a setting may take.
+const ASK_MS: u64 = 5_000;
+
+/// The lines of a job, each with its number in the file.
+pub type Lines = Vec<(usize, String)>;
+
+/// How to run a job.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Settings to send first; each must be accepted.
+    pub settings: Vec<String>,
+    /// Lines in flight.
+    pub in_flight: usize,
+    /// Where to write the step and direction signals.
+    pub vcd: Option<PathBuf>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options { settings: Vec::new(), in_flight: LINES_IN_FLIGHT, vcd: None }
+    }
+}
+
+/// Splits G-code text into the lines a sender sends: no blank ones and no `%`, which would flush
+/// the queue.
+pub fn lines_of(text: &str) -> Lines {
+    let numbered = text.lines().enumerate().map(|(i, l)| (i + 1, l.trim()));
+    numbered
+        .filter(|(_, l)| !l.is_empty() && !l.starts_with('%'))
+        .map(|(i, l)| (i, l.to_string()))
+        .collect()
+}
+
+/// Reads a job from a file.
+pub fn read_lines(path: &Path) -> Result<Lines> {
+    let name = path.display();
+    let bytes = fs::read(path).with_context(|| format!("cannot read {name}"))?;
+    let lines = lines_of(&String::from_utf8_lossy(&bytes));
+    if lines.is_empty() {
+        bail!("{name} has no lines to send");
+    }
+    Ok(lines)
+}
+
+/// What is known of a job while it runs.
+struct Run<'a> {
+    machine: &'a mut Machine,
+    host: Host,
+    setup: Setup,
+    expected: Result<Outcome, Unclear>,
+    acknowledged: usize,
+    skipped: usize,
+    rejected: Vec<Rejected>,
+    began: u64,
+    progress_at: u64,
+}
+
+/// Boots the machine, runs a job on it and says how it went. An error means that the job could not
+/// begin; all that goes wrong later is in the report. `progress` gets the lines answered so far.
+pub fn run(
+    machine: &mut Machine,
+    lines: &Lines,
+    options: &Options,
+    mut progress: impl FnMut(usize),
+) -> Result<Report> {
+    let mut host = Host::new(options.in_flight);
+    host.boot(machine, BOOT_MS)?;
+    for line in &options.settings {
+        let response = host.ask(machine, line, ASK_MS)?;
+        if response.status != 0 {
+            bail!("the firmware refuses {line} with status {}: {}", response.status, response.raw);
+        }
+    }
+    let setup = read_setup(machine, &mut host)?;
+    let expected = oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup);
+    let began = machine.cycle();
+    let trace = options.vcd.as_deref().map(|path| {
+        let clock_hz = machine.board().clock_hz;
+        Trace::create(path, clock_hz, began)
+    });
+    machine.set_trace(trace.transpose()?);
+    machine.recorder_mut().clear();
+    machine.meters_mut().clear();
+    let banners = host.banners();
+    let mut run = Run {
+        machine,
+        host,
+        setup,
+        expected,
+        acknowledged: 0,
+        skipped: 0,
+        rejected: Vec::new(),
+        began,
+        progress_at: began,
+    };
+    let end = run.stream(lines, &mut progress).and_then(|()| run.settle());
+    if let Some(trace) = run.machine.set_trace(None) {
+        trace.finish()?;
+    }
+    let restarts = run.host.banners() - banners;
+    Ok(run.report(lines.len(), restarts, end))
+}
+
+impl Run<'_> {
+    fn stream(&mut self, lines: &Lines, progress: &mut impl FnMut(usize)) -> Result<()> {
+        for (number, text) in lines {
+            self.host.queue(*number, text);
+        }
+        let mut watch = watch::Watch::new(self.longest_dwell_ms());
+        loop {
+            let slice = self.machine.cycle() + self.machine.cycles(100);
+            while self.host.run_until_line(self.machine, slice)? {
+                self.collect(progress);
+            }
+            self.collect(progress);
+            if self.host.is_done() {
+                return Ok(());
+            }
+            watch.check(self.machine, &mut self.host, self.progress_at)?;
+        }
+    }
+
+    fn collect(&mut self, progress: &mut impl FnMut(usize)) {
+        for answered in self.host.take_answered() {
+            if answered.number == watch::POLL {
+                continue;
+            }
+            self.progress_at = self.machine.cycle();
+            self.acknowledged += 1;
+            self.skipped += usize::from(answered.response.status == STATUS_NOOP);
+            if !answered.response.is_ok() {
+                self.rejected.push(Rejected {
+                    line: answered.number,
+                    text: answered.text,
+                    status: answered.response.status,
+                });
+            }
+            progress(self.acknowledged);
+        }
+        self.host.take_reports();
+    }
+
+    /// Waits for the end of motion.
+    fn settle(&mut self) -> Result<()> {
+        let mut watch = watch::Watch::new(self.longest_dwell_ms());
+        watch.settle(self.machine, &mut self.host)
+    }
+
+    fn longest_dwell_ms(&self) -> u64 {
+        self.expected.as_ref().map_or(0, |e| e.longest_dwell_ms)
+    }
+
+    fn report(self, lines: usize, restarts: usize, end: Result<()>) -> Report {
+        let idle_at = self.host.heard_at().max(self.machine.recorder().last_step().unwrap_or(0));
+        Report::new(
+            self.machine,
+            Measured {
+                lines,
+                acknowledged: self.acknowledged,
+                skipped: self.skipped,
+                rejected: self.rejected,
+                restarts,
+                strays: self.host.strays().to_vec(),
+                seconds_to_idle: self.machine.seconds(idle_at.saturating_sub(self.began)),
+                setup: self.setup,
+                expected: self.expected,
+                fault: end.err().map(|e| format!("{e:#}")),
+            },
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::lines_of;
+
+    #[test]
+    fn only_what_a_sender_sends() {
+        let lines = lines_of("%\n\nG0 X1  \r\n (note)\n%\n");
+        assert_eq!(lines, [(3, "G0 X1".to_string()), (4, "(note)".to_string())]);
+    }
+}

@@ -1,0 +1,67 @@
+//! The settings that the oracle needs, asked of the firmware.
+
+use anyhow::{Context, Result, bail};
+use kerf::boards::MOTORS;
+use serde_json::Value;
+
+use super::ASK_MS;
+use crate::host::Host;
+use crate::machine::Machine;
+use crate::oracle::{AXES, AxisMode, Decimal, MotorSetup, Setup};
+
+const AXIS_NAMES: [char; AXES] = ['x', 'y', 'z', 'a', 'b', 'c'];
+
+/// Reads motors and axes from the firmware.
+pub fn read_setup(machine: &mut Machine, host: &mut Host) -> Result<Setup> {
+    let mut motors = Vec::with_capacity(MOTORS);
+    for n in 1..=MOTORS {
+        let response = host.ask(machine, &format!("{{{n}:n}}"), ASK_MS)?;
+        let group = response.body.get(n.to_string());
+        let motor = group.and_then(motor_of);
+        let raw = &response.raw;
+        motors.push(motor.with_context(|| format!("no settings of motor {n} in {raw}"))?);
+    }
+    let mut modes = [AxisMode::Standard; AXES];
+    for motor in &motors {
+        modes[motor.axis] = mode_of(machine, host, motor.axis)?;
+    }
+    Ok(Setup { motors, modes })
+}
+
+fn motor_of(group: &Value) -> Option<MotorSetup> {
+    let number = |key| Decimal::parse(&group.get(key)?.as_number()?.to_string());
+    let whole = |key| number(key)?.as_whole();
+    let axis = usize::try_from(whole("ma")?).ok().filter(|a| *a < AXES)?;
+    Some(MotorSetup {
+        axis,
+        step_angle: number("sa")?,
+        travel: number("tr")?,
+        microsteps: u32::try_from(whole("mi")?).ok()?,
+        inverted: whole("po")? != 0,
+    })
+}
+
+fn mode_of(machine: &mut Machine, host: &mut Host, axis: usize) -> Result<AxisMode> {
+    let name = format!("{}am", AXIS_NAMES[axis]);
+    let response = host.ask(machine, &format!("{{{name}:n}}"), ASK_MS)?;
+    Ok(match response.body.get(&name).and_then(Value::as_i64) {
+        Some(0) => AxisMode::Disabled,
+        Some(2) => AxisMode::Inhibited,
+        Some(3) => bail!("axis {} is in radius mode: its end is not known", AXIS_NAMES[axis]),
+        _ => AxisMode::Standard,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_a_motor_group() {
+        let group = serde_json::json!({"ma":2,"sa":1.8,"tr":1.25,"mi":8,"po":1,"pm":2});
+        let motor = motor_of(&group).unwrap();
+        assert_eq!((motor.axis, motor.microsteps, motor.inverted), (2, 8, true));
+        assert_eq!(motor.steps(10_000), 1280);
+        assert!(motor_of(&serde_json::json!({"ma":9})).is_none());
+    }
+}

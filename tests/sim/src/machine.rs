@@ -1,0 +1,366 @@
+//! The machine: CPU, peripherals and meters, and the loop that drives them.
+
+use std::fmt;
+use std::path::Path;
+use std::ptr::NonNull;
+
+use anyhow::Result;
+use kerf::boards::Board;
+
+use crate::bus::Bus;
+use crate::cpu::{Cpu, Mode};
+use crate::eeprom;
+use crate::image::Image;
+use crate::meters::{Meters, Window};
+use crate::recorder::{self, Probe, Recorder};
+use crate::trace::Trace;
+use crate::uart::Uart;
+use crate::vectors;
+use crate::wire::Wire;
+
+/// Cycles from acceptance of an interrupt to the first instruction at its vector.
+const ENTRY_CYCLES: u64 = 5;
+/// Cycles more when it ends a sleep.
+const WAKE_CYCLES: u64 = 4;
+
+/// Why a machine cannot go on.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Fault {
+    /// An instruction that does not exist, or a jump out of the program.
+    BadInstruction {
+        /// Where.
+        place: String,
+    },
+    /// Sleep with interrupts off: nothing can wake it.
+    SleepsForever {
+        /// Where.
+        place: String,
+    },
+    /// The stack has reached static data.
+    StackOverflow {
+        /// Where.
+        place: String,
+        /// Bytes of static data overwritten.
+        bytes: u16,
+    },
+    /// Interrupts nest without end.
+    EndlessNesting,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Fault::BadInstruction { place } => write!(f, "bad instruction in {place}"),
+            Fault::SleepsForever { place } => write!(f, "sleeps with interrupts off in {place}"),
+            Fault::StackOverflow { place, bytes } => {
+                write!(f, "the stack runs {bytes} bytes into static data in {place}")
+            }
+            Fault::EndlessNesting => f.write_str("interrupts nest without end"),
+        }
+    }
+}
+
+impl std::error::Error for Fault {}
+
+/// A simulated ATmega2560 on a board, running a firmware image.
+pub struct Machine {
+    cpu: Cpu,
+    bus: NonNull<Bus>,
+    /// The pins' callbacks point into these.
+    _probes: Vec<Probe>,
+    meters: Meters,
+    image: Image,
+    board: &'static Board,
+    resets: u64,
+}
+
+impl Machine {
+    /// A machine with this image in its flash, at cycle 0. Its serial line runs at 115200 baud.
+    pub fn new(image: Image, board: &'static Board) -> Result<Self> {
+        let cpu = Cpu::power_up(&image, board.clock_hz)?;
+        let bus = Bus::install(cpu, Wire::new(board.clock_hz, 115_200));
+        let probes = recorder::attach(bus, cpu, board);
+        let meters = Meters::new(vectors::compare_a(board.step_timer));
+        Ok(Machine { cpu, bus, _probes: probes, meters, image, board, resets: 0 })
+    }
+
+    /// A machine with the ELF file at `path` in its flash.
+    pub fn load(path: &Path, board: &'static Board) -> Result<Self> {
+        Self::new(Image::read(path)?, board)
+    }
+
+    pub(crate) fn bus(&self) -> &Bus {
+        // SAFETY: the bus lives as long as the machine; `&self` keeps the CPU from running.
+        unsafe { self.bus.as_ref() }
+    }
+
+    pub(crate) fn bus_mut(&mut self) -> &mut Bus {
+        // SAFETY: the bus lives as long as the machine; `&mut self` keeps the CPU from running.
+        unsafe { self.bus.as_mut() }
+    }
+
+    /// Executes one instruction and serves at most one interrupt. Asleep, it goes on to the next
+    /// event or to cycle `limit`, whichever is first.
+    #[inline]
+    pub fn step(&mut self, limit: u64) -> Result<(), Fault> {
+        let cpu = self.cpu;
+        let mut woken = false;
+        if cpu.mode() == Mode::Running {
+            let (pc, began) = (cpu.pc(), cpu.cycle());
+            cpu.execute();
+            self.meters.executed(cpu, pc, began);
+            if usize::from(cpu.depth()) < self.meters.depth() {
+                self.leave();
+            }
+        } else {
+            self.idle(limit)?;
+            woken = true;
+        }
+        if cpu.cycle() >= self.bus().due {
+            self.bus_mut().run(cpu.cycle());
+        }
+        if cpu.cycle() >= cpu.native_due() && cpu.run_native() {
+            self.was_reset();
+        }
+        if cpu.take_shadow() {
+            return Ok(());
+        }
+        if (self.bus().pending != 0 || cpu.native_pending()) && cpu.interrupts_on() {
+            return self.serve(woken);
+        }
+        Ok(())
+    }
+
+    /// Runs to a cycle. The last instruction may end a few cycles after it.
+    pub fn run_until(&mut self, cycle: u64) -> Result<(), Fault> {
+        while self.cpu.cycle() < cycle {
+            self.step(cycle)?;
+        }
+        self.check_stack()
+    }
+
+    /// Runs to a cycle, or until a whole line has come over the serial line.
+    pub fn run_until_line(&mut self, cycle: u64) -> Result<(), Fault> {
+        while self.cpu.cycle() < cycle && !self.bus().wire.has_line() {
+            self.step(cycle)?;
+        }
+        self.check_stack()
+    }
+
+    /// Runs for a time.
+    pub fn run_for_ms(&mut self, ms: u64) -> Result<(), Fault> {
+        self.run_until(self.cycle() + self.cycles(ms))
+    }
+
+    fn idle(&mut self, limit: u64) -> Result<(), Fault> {
+        let cpu = self.cpu;
+        if cpu.mode() == Mode::Crashed {
+            return Err(Fault::BadInstruction { place: self.place(cpu.pc()) });
+        }
+        if !cpu.interrupts_on() {
+            return Err(Fault::SleepsForever { place: self.place(cpu.pc()) });
+        }
+        let now = cpu.cycle();
+        let next = self.bus().due.min(cpu.native_due()).min(limit).max(now);
+        cpu.set_cycle(next);
+        self.bus_mut().sums.asleep += next - now;
+        Ok(())
+    }
+
+    fn leave(&mut self) {
+        if let Some(total) = self.meters.left(self.cpu.cycle()) {
+            self.bus_mut().sums.in_interrupts += total;
+        }
+    }
+
+    fn serve(&mut self, woken: bool) -> Result<(), Fault> {
+        let cpu = self.cpu;
+        let pending = self.bus().pending;
+        let own = (pending != 0).then(|| pending.trailing_zeros() as u8);
+        let native = if cpu.native_pending() { cpu.native_vector() } else { None };
+        let Some(vector) = own.into_iter().chain(native).min() else { return Ok(()) };
+        let at = cpu.cycle();
+        let raised = (own == Some(vector)).then(|| self.bus().raised_at(vector));
+        let asleep = woken || cpu.mode() == Mode::Sleeping;
+        cpu.wake();
+        if !cpu.enter(vector) {
+            return Err(Fault::EndlessNesting);
+        }
+        cpu.set_cycle(at + ENTRY_CYCLES + if asleep { WAKE_CYCLES } else { 0 });
+        if own == Some(vector) {
+            self.bus_mut().acknowledge(vector, at);
+        } else {
+            cpu.native_acknowledge(vector);
+        }
+        self.meters.entered(vector, at, cpu.pc(), raised);
+        Ok(())
+    }
+
+    fn was_reset(&mut self) {
+        self.resets += 1;
+        self.bus_mut().reset();
+        self.meters.reset();
+    }
+
+    fn check_stack(&self) -> Result<(), Fault> {
+        match self.free_stack() {
+            Some(free) if free < 0 && self.meters.booted() => {
+                let place = self.place(self.cpu.pc());
+                Err(Fault::StackOverflow { place, bytes: free.unsigned_abs() as u16 })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Bytes between the end of static data and the deepest stack so far. `None` when the image
+    /// does not say where its static data ends.
+    pub fn free_stack(&self) -> Option<i32> {
+        let end = self.image.static_end;
+        let sp = self.meters.lowest_sp()?;
+        (end != 0).then(|| i32::from(sp) + 1 - i32::from(end))
+    }
+
+    /// Cycles since power-up.
+    pub fn cycle(&self) -> u64 {
+        self.cpu.cycle()
+    }
+
+    /// Cycles in so many milliseconds.
+    pub fn cycles(&self, ms: u64) -> u64 {
+        ms * u64::from(self.board.clock_hz) / 1000
+    }
+
+    /// Seconds that so many cycles take.
+    pub fn seconds(&self, cycles: u64) -> f64 {
+        cycles as f64 / f64::from(self.board.clock_hz)
+    }
+
+    /// The board.
+    pub fn board(&self) -> &'static Board {
+        self.board
+    }
+
+    /// The firmware.
+    pub fn image(&self) -> &Image {
+        &self.image
+    }
+
+    /// Resets that the watchdog has made.
+    pub fn resets(&self) -> u64 {
+        self.resets
+    }
+
+    /// The step and direction pins.
+    pub fn recorder(&self) -> &Recorder {
+        &self.bus().recorder
+    }
+
+    /// The step and direction pins, to be cleared or told to keep a log.
+    pub fn recorder_mut(&mut self) -> &mut Recorder {
+        &mut self.bus_mut().recorder
+    }
+
+    /// Begins a VCD file, or ends it with `None`. Returns the one before.
+    pub fn set_trace(&mut self, trace: Option<Trace>) -> Option<Trace> {
+        self.bus_mut().recorder.set_trace(trace)
+    }
+
+    /// The meters.
+    pub fn meters(&self) -> &Meters {
+        &self.meters
+    }
+
+    /// The meters, to be cleared.
+    pub fn meters_mut(&mut self) -> &mut Meters {
+        &mut self.meters
+    }
+
+    /// One of the four USARTs.
+    pub fn uart(&self, index: usize) -> &Uart {
+        &self.bus().uarts[index]
+    }
+
+    /// CTC tops of the step timer that were written behind its counter.
+    pub fn missed_tops(&self) -> u64 {
+        self.bus().timers[self.board.step_timer as usize].missed()
+    }
+
+    /// A byte of the data space, as memory holds it.
+    pub fn peek(&self, addr: u16) -> u8 {
+        self.cpu.data(usize::from(addr))
+    }
+
+    /// A word of the data space, as memory holds it.
+    pub fn peek_word(&self, addr: u16) -> u16 {
+        u16::from_le_bytes([self.peek(addr), self.peek(addr + 1)])
+    }
+
+    /// Drives an input pin, say of a limit switch.
+    pub fn drive_pin(&mut self, port: char, bit: u8, high: bool) {
+        self.cpu.drive_pin(port, bit, high);
+    }
+
+    /// The EEPROM's contents.
+    pub fn eeprom(&self) -> &[u8; eeprom::SIZE] {
+        self.bus().eeprom.cells()
+    }
+
+    /// Bytes written to the EEPROM so far.
+    pub fn eeprom_writes(&self) -> u64 {
+        self.bus().eeprom.writes()
+    }
+
+    /// Replaces the EEPROM's contents, best before the first instruction.
+    pub fn set_eeprom(&mut self, cells: &[u8; eeprom::SIZE]) {
+        self.bus_mut().eeprom.set_cells(cells);
+    }
+
+    /// Sets the speed of the host's side of the serial line.
+    pub fn set_baud(&mut self, baud: u32) {
+        let clock_hz = self.board.clock_hz;
+        self.bus_mut().wire.set_baud(clock_hz, baud);
+    }
+
+    /// Queues bytes on the serial line; they travel at its speed.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.bus_mut().send(bytes);
+    }
+
+    /// Queues a real-time character ahead of the bytes that still wait.
+    pub fn send_now(&mut self, byte: u8) {
+        self.bus_mut().send_first(byte);
+    }
+
+    /// Bytes that have come from the machine since the last call.
+    pub fn receive(&mut self) -> Vec<u8> {
+        self.bus_mut().wire.take_received()
+    }
+
+    /// The host's side of the serial line.
+    pub fn wire(&self) -> &Wire {
+        &self.bus().wire
+    }
+
+    /// A function name for a flash address; vectors by their own names.
+    pub fn place(&self, pc: u32) -> String {
+        let vector = pc / 4;
+        if pc.is_multiple_of(4) && (1..vectors::COUNT as u32).contains(&vector) {
+            return vectors::name(vector as u8).to_string();
+        }
+        self.image.function_at(pc)
+    }
+
+    /// Says where a window was.
+    pub fn describe(&self, window: &Window) -> String {
+        let (from, to) = (self.place(window.from_pc), self.place(window.to_pc));
+        if from == to { from } else { format!("{from} .. {to}") }
+    }
+}
+
+impl Drop for Machine {
+    fn drop(&mut self) {
+        self.cpu.power_down();
+        // SAFETY: `Bus::install` leaked this box; the CPU that had the pointer is gone.
+        drop(unsafe { Box::from_raw(self.bus.as_ptr()) });
+    }
+}

@@ -1,0 +1,191 @@
+//! What an observer outside the chip can tell: time in interrupts, time with interrupts off,
+//! stack depth.
+
+use crate::cpu::Cpu;
+use crate::vectors;
+
+/// The opcode of `out SPH, Rr` under this mask.
+const OUT_SPH: u16 = 0xBE0E;
+const OUT_MASK: u16 = 0xFE0F;
+
+/// The longest time with interrupts off in some context.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
+pub struct Window {
+    /// Its length.
+    pub cycles: u64,
+    /// Byte address at which interrupts went off.
+    pub from_pc: u32,
+    /// Byte address at which they went on again.
+    pub to_pc: u32,
+    /// When it began.
+    pub at: u64,
+    /// The interrupt it was in; `None` in thread code.
+    pub vector: Option<u8>,
+}
+
+/// One vector's service. Times are in cycles, from acceptance to the end of RETI.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
+pub struct Service {
+    /// How often it was served.
+    pub count: u64,
+    /// Longest time, without the interrupts nested in it.
+    pub own_max: u64,
+    /// All that time.
+    pub own_sum: u64,
+    /// Longest time from the flag to acceptance.
+    pub latency_max: u64,
+}
+
+#[derive(Clone, Copy)]
+struct Frame {
+    vector: u8,
+    began: u64,
+    nested: u64,
+}
+
+/// All meters. `clear` begins a new measurement.
+pub struct Meters {
+    step_vector: u8,
+    services: [Service; vectors::COUNT],
+    frames: Vec<Frame>,
+    window_outside: Window,
+    window_step: Window,
+    open: Option<Window>,
+    was_on: bool,
+    booted: bool,
+    lowest_sp: u16,
+}
+
+impl Meters {
+    /// Meters at rest; `step_vector` is the step interrupt.
+    pub fn new(step_vector: u8) -> Self {
+        Meters {
+            step_vector,
+            services: [Service::default(); vectors::COUNT],
+            frames: Vec::new(),
+            window_outside: Window::default(),
+            window_step: Window::default(),
+            open: None,
+            was_on: false,
+            booted: false,
+            lowest_sp: u16::MAX,
+        }
+    }
+
+    /// Forgets what was measured.
+    pub fn clear(&mut self) {
+        self.services = [Service::default(); vectors::COUNT];
+        self.window_outside = Window::default();
+        self.window_step = Window::default();
+        self.lowest_sp = u16::MAX;
+    }
+
+    /// The chip was reset.
+    pub fn reset(&mut self) {
+        self.frames.clear();
+        self.open = None;
+        self.was_on = false;
+        self.booted = false;
+    }
+
+    /// How a vector was served.
+    pub fn service(&self, vector: u8) -> Service {
+        self.services.get(usize::from(vector)).copied().unwrap_or_default()
+    }
+
+    /// Longest time with interrupts off anywhere but in the step interrupt.
+    pub fn window_outside(&self) -> Window {
+        self.window_outside
+    }
+
+    /// Longest time with interrupts off in the step interrupt.
+    pub fn window_step(&self) -> Window {
+        self.window_step
+    }
+
+    /// Lowest stack pointer seen; `None` before any use of the stack.
+    pub fn lowest_sp(&self) -> Option<u16> {
+        (self.lowest_sp != u16::MAX).then_some(self.lowest_sp)
+    }
+
+    /// Whether interrupts have been on since the reset.
+    pub fn booted(&self) -> bool {
+        self.booted
+    }
+
+    /// Interrupts being served.
+    #[inline]
+    pub fn depth(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// The instruction at `pc`, begun at `began`, was executed.
+    #[inline]
+    pub fn executed(&mut self, cpu: Cpu, pc: u32, began: u64) {
+        let on = cpu.interrupts_on();
+        if on != self.was_on {
+            self.was_on = on;
+            if on { self.went_on(cpu, pc) } else { self.went_off(pc, began) }
+        }
+        let sp = cpu.sp();
+        if sp < self.lowest_sp {
+            self.sank(cpu, pc, sp);
+        }
+    }
+
+    fn went_off(&mut self, pc: u32, at: u64) {
+        let vector = self.frames.last().map(|f| f.vector);
+        self.open = Some(Window { cycles: 0, from_pc: pc, to_pc: pc, at, vector });
+    }
+
+    fn went_on(&mut self, cpu: Cpu, pc: u32) {
+        self.booted = true;
+        let Some(mut window) = self.open.take() else { return };
+        window.cycles = cpu.cycle() - window.at;
+        window.to_pc = pc;
+        let inside = window.vector == Some(self.step_vector);
+        let worst = if inside { &mut self.window_step } else { &mut self.window_outside };
+        if window.cycles > worst.cycles {
+            *worst = window;
+        }
+    }
+
+    fn sank(&mut self, cpu: Cpu, pc: u32, sp: u16) {
+        // A stack pointer is written in two halves, high half first, with one instruction in
+        // between. In the meantime it means nothing.
+        let is_half = |pc: u32| cpu.opcode(pc) & OUT_MASK == OUT_SPH;
+        let half_written = is_half(pc) || is_half(pc.saturating_sub(2));
+        if !half_written && sp >= 0x200 {
+            self.lowest_sp = sp;
+        }
+    }
+
+    /// An interrupt was accepted at cycle `at`; its flag went up at `raised`, if that is known.
+    pub fn entered(&mut self, vector: u8, at: u64, pc: u32, raised: Option<u64>) {
+        self.frames.push(Frame { vector, began: at, nested: 0 });
+        self.was_on = false;
+        self.went_off(pc, at);
+        if let Some(raised) = raised {
+            let service = &mut self.services[usize::from(vector)];
+            service.latency_max = service.latency_max.max(at.saturating_sub(raised));
+        }
+    }
+
+    /// RETI ended at cycle `now`. Returns the time in interrupts, if this was the outermost.
+    pub fn left(&mut self, now: u64) -> Option<u64> {
+        let frame = self.frames.pop()?;
+        let total = now - frame.began;
+        let own = total - frame.nested.min(total);
+        let service = &mut self.services[usize::from(frame.vector)];
+        service.count += 1;
+        service.own_sum += own;
+        service.own_max = service.own_max.max(own);
+        match self.frames.last_mut() {
+            Some(outer) => {
+                outer.nested += total;
+                None
+            }
+            None => Some(total),
+        }
+    }
+}

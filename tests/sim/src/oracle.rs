@@ -1,0 +1,327 @@
+//! Where a job must end: a second reading of the same G-code.
+//!
+//! It shares no code with the firmware and knows nothing of motion, only of positions. All
+//! arithmetic is in whole numbers: a position is in units of 0.1 um (0.0001 degree), to which each
+//! axis word is rounded, and steps follow from it by one division, halves away from zero.
+
+mod exact;
+mod words;
+
+use std::fmt;
+
+pub use exact::Decimal;
+use exact::divide;
+use words::{Word, split};
+
+/// Axes, X Y Z A B C.
+pub const AXES: usize = 6;
+/// Units in a millimetre or a degree.
+pub const UNITS: i128 = 10_000;
+/// Units in an inch.
+const UNITS_PER_INCH: i128 = 254_000;
+const FIRST_ROTARY: usize = 3;
+const LETTERS: [char; AXES] = ['X', 'Y', 'Z', 'A', 'B', 'C'];
+
+/// A motor's settings.
+#[derive(Clone, Copy, Debug)]
+pub struct MotorSetup {
+    /// The axis it moves (`ma`), counted from 0.
+    pub axis: usize,
+    /// Degrees per full step (`sa`).
+    pub step_angle: Decimal,
+    /// Travel per turn (`tr`).
+    pub travel: Decimal,
+    /// Microsteps per full step (`mi`).
+    pub microsteps: u32,
+    /// Turns the other way round (`po`).
+    pub inverted: bool,
+}
+
+impl MotorSetup {
+    /// Steps from zero to a position.
+    pub fn steps(&self, position: i64) -> i64 {
+        let (angle, angle_one) = self.step_angle.ratio();
+        let (travel, travel_one) = self.travel.ratio();
+        let up = i128::from(position) * 360 * i128::from(self.microsteps) * angle_one * travel_one;
+        let down = angle * travel * UNITS;
+        if down == 0 { 0 } else { divide(up, down) as i64 }
+    }
+}
+
+/// How an axis takes its words (`am`).
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum AxisMode {
+    /// Its words are ignored.
+    Disabled,
+    /// As usual.
+    #[default]
+    Standard,
+    /// Planned, but its motors stand still.
+    Inhibited,
+}
+
+/// The machine a job runs on.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// Its motors, motor 1 first.
+    pub motors: Vec<MotorSetup>,
+    /// Its axes.
+    pub modes: [AxisMode; AXES],
+}
+
+/// Where a job ends.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Outcome {
+    /// Machine position of each axis, in units.
+    pub position: [i64; AXES],
+    /// Steps each motor has made on balance.
+    pub steps: Vec<i64>,
+    /// Longest dwell, in milliseconds.
+    pub longest_dwell_ms: u64,
+}
+
+/// A line whose end position this oracle cannot tell.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Unclear {
+    /// Line number in the job, from 1.
+    pub line: usize,
+    /// What it is about.
+    pub what: String,
+}
+
+impl fmt::Display for Unclear {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}: the oracle does not know {}", self.line, self.what)
+    }
+}
+
+impl std::error::Error for Unclear {}
+
+/// Reads a whole job.
+pub fn run<'a>(
+    lines: impl IntoIterator<Item = (usize, &'a str)>,
+    setup: &Setup,
+) -> Result<Outcome, Unclear> {
+    let mut reader = Reader::new(setup);
+    for (line, text) in lines {
+        reader.line(text).map_err(|what| Unclear { line, what })?;
+    }
+    Ok(reader.finish())
+}
+
+/// What a line does once, G-code times ten.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Once {
+    Dwell,
+    Offsets,
+    SetPosition,
+    SetZero(i64),
+}
+
+struct Reader<'a> {
+    setup: &'a Setup,
+    position: [i64; AXES],
+    /// Where the motors would be counted from: moved by G28.3.
+    origin: [i64; AXES],
+    steps: Vec<i64>,
+    moving: bool,
+    inches: bool,
+    incremental: bool,
+    system: usize,
+    systems: [[i64; AXES]; 7],
+    zero: [i64; AXES],
+    zero_on: bool,
+    longest_dwell_ms: u64,
+}
+
+impl<'a> Reader<'a> {
+    fn new(setup: &'a Setup) -> Self {
+        Reader {
+            setup,
+            position: [0; AXES],
+            origin: [0; AXES],
+            steps: vec![0; setup.motors.len()],
+            moving: true,
+            inches: false,
+            incremental: false,
+            system: 1,
+            systems: [[0; AXES]; 7],
+            zero: [0; AXES],
+            zero_on: false,
+            longest_dwell_ms: 0,
+        }
+    }
+
+    fn line(&mut self, text: &str) -> Result<(), String> {
+        let words = split(text)?;
+        let mut once = None;
+        let mut machine_coordinates = false;
+        let mut end = false;
+        for word in &words {
+            match word.letter {
+                'G' => self.g_code(word.value.tenths(), &mut once, &mut machine_coordinates)?,
+                'M' => end |= self.m_code(word.value.tenths())?,
+                c if LETTERS.contains(&c) || "FIJKLNPRST".contains(c) => {}
+                c => return Err(format!("the letter {c}")),
+            }
+        }
+        match once {
+            Some(Once::Dwell) => self.dwell(&words),
+            Some(Once::Offsets) => self.offsets(&words)?,
+            Some(Once::SetPosition) => self.set_position(&words),
+            Some(Once::SetZero(code)) => self.set_zero(code, &words),
+            None if self.moving => self.travel(&words, machine_coordinates),
+            None => {}
+        }
+        if end {
+            self.program_end();
+        }
+        Ok(())
+    }
+
+    fn g_code(
+        &mut self,
+        tenths: i64,
+        once: &mut Option<Once>,
+        machine: &mut bool,
+    ) -> Result<(), String> {
+        match tenths {
+            0 | 10 | 20 | 30 => self.moving = true,
+            800 => self.moving = false,
+            40 => *once = Some(Once::Dwell),
+            100 => *once = Some(Once::Offsets),
+            283 => *once = Some(Once::SetPosition),
+            920..=923 => *once = Some(Once::SetZero(tenths)),
+            200 => self.inches = true,
+            210 => self.inches = false,
+            900 => self.incremental = false,
+            910 => self.incremental = true,
+            530 => *machine = true,
+            540 | 550 | 560 | 570 | 580 | 590 => self.system = (tenths / 10 - 53) as usize,
+            // Planes, feed modes, path modes, arc distance, cutter compensation off.
+            170 | 180 | 190 | 930 | 940 | 610 | 611 | 640 | 901 | 911 | 400 => {}
+            _ => return Err(format!("G{}", tenths as f64 / 10.0)),
+        }
+        Ok(())
+    }
+
+    /// True when the program ends.
+    fn m_code(&mut self, tenths: i64) -> Result<bool, String> {
+        match tenths {
+            20 | 300 => Ok(true),
+            0 | 10 | 600 | 30 | 40 | 50 | 60 | 70 | 80 | 90 => Ok(false),
+            480 | 490 | 500 | 510 => Ok(false),
+            _ => Err(format!("M{}", tenths as f64 / 10.0)),
+        }
+    }
+
+    /// The axis words of a line, in units.
+    fn axis_words(&self, words: &[Word]) -> [Option<i64>; AXES] {
+        let mut values = [None; AXES];
+        for word in words {
+            let Some(axis) = LETTERS.iter().position(|l| *l == word.letter) else { continue };
+            if self.setup.modes[axis] == AxisMode::Disabled {
+                continue;
+            }
+            let inches = self.inches && axis < FIRST_ROTARY;
+            let unit = if inches { UNITS_PER_INCH } else { UNITS };
+            values[axis] = Some(word.value.scaled(unit));
+        }
+        values
+    }
+
+    fn offset(&self, axis: usize) -> i64 {
+        let zero = if self.zero_on { self.zero[axis] } else { 0 };
+        self.systems[self.system][axis] + zero
+    }
+
+    fn travel(&mut self, words: &[Word], machine_coordinates: bool) {
+        for (axis, value) in self.axis_words(words).into_iter().enumerate() {
+            let Some(value) = value else { continue };
+            self.position[axis] = if machine_coordinates {
+                value
+            } else if self.incremental {
+                self.position[axis] + value
+            } else {
+                self.offset(axis) + value
+            };
+        }
+    }
+
+    fn dwell(&mut self, words: &[Word]) {
+        let seconds = words.iter().rev().find(|w| w.letter == 'P');
+        let ms = seconds.map_or(0, |w| w.value.scaled(1000)).max(0) as u64;
+        self.longest_dwell_ms = self.longest_dwell_ms.max(ms);
+    }
+
+    fn offsets(&mut self, words: &[Word]) -> Result<(), String> {
+        let number = |letter| {
+            let word = words.iter().rev().find(|w| w.letter == letter);
+            word.and_then(|w| w.value.as_whole())
+        };
+        let (form, system) = (number('L'), number('P'));
+        let Some(system @ 1..=6) = system else { return Err("G10 without P1 to P6".into()) };
+        for (axis, value) in self.axis_words(words).into_iter().enumerate() {
+            let Some(value) = value else { continue };
+            self.systems[system as usize][axis] = match form {
+                Some(2) | None => value,
+                Some(20) => self.position[axis] - value,
+                Some(other) => return Err(format!("G10 L{other}")),
+            };
+        }
+        Ok(())
+    }
+
+    fn set_position(&mut self, words: &[Word]) {
+        self.count_steps();
+        for (axis, value) in self.axis_words(words).into_iter().enumerate() {
+            self.position[axis] = value.unwrap_or(self.position[axis]);
+        }
+        self.origin = self.position;
+    }
+
+    fn set_zero(&mut self, code: i64, words: &[Word]) {
+        match code {
+            921 => (self.zero, self.zero_on) = ([0; AXES], false),
+            922 => self.zero_on = false,
+            923 => self.zero_on = true,
+            _ => {
+                self.zero_on = true;
+                for (axis, value) in self.axis_words(words).into_iter().enumerate() {
+                    let Some(value) = value else { continue };
+                    let system = self.systems[self.system][axis];
+                    self.zero[axis] = self.position[axis] - system - value;
+                }
+            }
+        }
+    }
+
+    fn program_end(&mut self) {
+        (self.zero, self.zero_on) = ([0; AXES], false);
+        self.system = 1;
+        self.incremental = false;
+        self.moving = false;
+    }
+
+    /// Adds the steps from `origin` to the position.
+    fn count_steps(&mut self) {
+        for (motor, steps) in self.setup.motors.iter().zip(&mut self.steps) {
+            if self.setup.modes[motor.axis] == AxisMode::Standard {
+                let (from, to) = (self.origin[motor.axis], self.position[motor.axis]);
+                *steps += motor.steps(to) - motor.steps(from);
+            }
+        }
+    }
+
+    fn finish(mut self) -> Outcome {
+        self.count_steps();
+        Outcome {
+            position: self.position,
+            steps: self.steps,
+            longest_dwell_ms: self.longest_dwell_ms,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,97 @@
+//! Splitting a line of G-code into words.
+
+use super::exact::Decimal;
+
+/// A letter with its number.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Word {
+    /// Upper case.
+    pub letter: char,
+    /// What follows it.
+    pub value: Decimal,
+}
+
+/// The words of a line; none for a line that is blank, deleted, a comment, or no G-code at all.
+pub fn split(line: &str) -> Result<Vec<Word>, String> {
+    let text = code_of(line);
+    let mut words = Vec::new();
+    let mut rest = text.as_str();
+    while let Some(letter) = rest.chars().next() {
+        if !letter.is_ascii_uppercase() {
+            return Err(format!("{letter:?} where a letter belongs"));
+        }
+        rest = &rest[1..];
+        let end = rest.find(|c: char| c.is_ascii_uppercase()).unwrap_or(rest.len());
+        let (number, after) = rest.split_at(end);
+        let value = Decimal::parse(number).ok_or_else(|| format!("{letter}{number}"))?;
+        words.push(Word { letter, value });
+        rest = after;
+    }
+    Ok(words)
+}
+
+/// A line without comments and blanks, in upper case.
+fn code_of(line: &str) -> String {
+    let line = line.trim();
+    let line = match line.strip_prefix('{') {
+        Some(_) => match gc_of(line) {
+            Some(inner) => inner,
+            None => return String::new(),
+        },
+        None => line.to_string(),
+    };
+    if line.starts_with(['/', '$', '?', '%']) {
+        return String::new();
+    }
+    let mut depth = 0;
+    let mut code = String::new();
+    for c in line.chars() {
+        match c {
+            '(' => depth = 1,
+            ')' => depth = 0,
+            ';' if depth == 0 => break,
+            c if depth == 0 && !c.is_whitespace() => code.push(c.to_ascii_uppercase()),
+            _ => {}
+        }
+    }
+    code
+}
+
+/// The G-code inside `{"gc":"..."}`.
+fn gc_of(line: &str) -> Option<String> {
+    let value: serde_json::Value = serde_json::from_str(line).ok()?;
+    Some(value.get("gc")?.as_str()?.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn letters(line: &str) -> String {
+        split(line).unwrap().iter().map(|w| w.letter).collect()
+    }
+
+    #[test]
+    fn words_with_and_without_blanks() {
+        assert_eq!(letters("n3g1x1.5 y-.5F600"), "NGXYF");
+    }
+
+    #[test]
+    fn comments_and_deleted_lines() {
+        assert_eq!(letters("G1 (to the left) X1 ; go"), "GX");
+        assert_eq!(letters("/G1 X1"), "");
+        assert_eq!(letters("(only) ; this"), "");
+    }
+
+    #[test]
+    fn json() {
+        assert_eq!(letters(r#"{"gc":"G0X1"}"#), "GX");
+        assert_eq!(letters("{sr:n}"), "");
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        assert!(split("G1 X").is_err());
+        assert!(split("12").is_err());
+    }
+}

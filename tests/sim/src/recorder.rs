@@ -1,0 +1,228 @@
+//! What the step and direction pins do.
+
+use std::ffi::c_void;
+use std::ptr::NonNull;
+
+use kerf::boards::{Board, MOTORS};
+use simavr_ffi as ffi;
+
+use crate::bus::Bus;
+use crate::cpu::Cpu;
+use crate::trace::Trace;
+
+/// A step: when, which motor (0 is motor 1), which way.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Step {
+    /// Cycle of the rising edge.
+    pub cycle: u64,
+    /// Motor, counted from 0.
+    pub motor: u8,
+    /// Direction pin low.
+    pub positive: bool,
+}
+
+/// Running totals at the moment of a step.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Sums {
+    /// Cycles asleep.
+    pub asleep: u64,
+    /// Cycles inside interrupts, nested ones counted once.
+    pub in_interrupts: u64,
+}
+
+/// What is known of one motor. Times are in cycles.
+#[derive(Clone, Debug)]
+pub struct Motor {
+    /// Steps up minus steps down; a low direction pin is up.
+    pub position: i64,
+    /// All steps.
+    pub steps: u64,
+    /// Shortest time between two steps.
+    pub min_interval: Option<u64>,
+    /// Shortest and longest pulse.
+    pub pulse: Option<(u64, u64)>,
+    /// Shortest time from a change of direction to the next step.
+    pub min_setup: Option<u64>,
+    step_high: bool,
+    dir_high: bool,
+    rose_at: Option<u64>,
+    turned_at: Option<u64>,
+}
+
+impl Motor {
+    fn new() -> Self {
+        Motor {
+            position: 0,
+            steps: 0,
+            min_interval: None,
+            pulse: None,
+            min_setup: None,
+            step_high: false,
+            dir_high: false,
+            rose_at: None,
+            turned_at: None,
+        }
+    }
+
+    fn rise(&mut self, now: u64) {
+        self.position += if self.dir_high { -1 } else { 1 };
+        self.steps += 1;
+        if let Some(before) = self.rose_at {
+            least(&mut self.min_interval, now - before);
+        }
+        if let Some(turned) = self.turned_at.take() {
+            least(&mut self.min_setup, now - turned);
+        }
+        self.rose_at = Some(now);
+    }
+
+    fn fall(&mut self, now: u64) {
+        if let Some(rose) = self.rose_at {
+            let width = now - rose;
+            let (low, high) = self.pulse.unwrap_or((width, width));
+            self.pulse = Some((low.min(width), high.max(width)));
+        }
+    }
+}
+
+fn least(slot: &mut Option<u64>, value: u64) {
+    *slot = Some(slot.map_or(value, |v| v.min(value)));
+}
+
+/// Records the four motors of a board.
+pub struct Recorder {
+    motors: [Motor; MOTORS],
+    first: Option<(u64, Sums)>,
+    last: Option<(u64, Sums)>,
+    log: Option<Vec<Step>>,
+    trace: Option<Trace>,
+}
+
+impl Recorder {
+    pub(crate) fn new() -> Self {
+        Recorder {
+            motors: std::array::from_fn(|_| Motor::new()),
+            first: None,
+            last: None,
+            log: None,
+            trace: None,
+        }
+    }
+
+    /// The motors, motor 1 first.
+    pub fn motors(&self) -> &[Motor; MOTORS] {
+        &self.motors
+    }
+
+    /// Steps of all motors.
+    pub fn steps(&self) -> u64 {
+        self.motors.iter().map(|m| m.steps).sum()
+    }
+
+    /// Cycle of the first and of the last step, with the running totals at each.
+    pub fn span(&self) -> Option<((u64, Sums), (u64, Sums))> {
+        self.first.zip(self.last)
+    }
+
+    /// Cycle of the last step.
+    pub fn last_step(&self) -> Option<u64> {
+        self.last.map(|(cycle, _)| cycle)
+    }
+
+    /// Keeps every step from now on.
+    pub fn keep_log(&mut self) {
+        self.log = Some(Vec::new());
+    }
+
+    /// The steps kept.
+    pub fn log(&self) -> &[Step] {
+        self.log.as_deref().unwrap_or_default()
+    }
+
+    pub(crate) fn set_trace(&mut self, trace: Option<Trace>) -> Option<Trace> {
+        std::mem::replace(&mut self.trace, trace)
+    }
+
+    /// Forgets all but the levels of the pins.
+    pub fn clear(&mut self) {
+        for m in &mut self.motors {
+            let (step_high, dir_high) = (m.step_high, m.dir_high);
+            *m = Motor { step_high, dir_high, ..Motor::new() };
+        }
+        (self.first, self.last) = (None, None);
+        if let Some(log) = &mut self.log {
+            log.clear();
+        }
+    }
+
+    fn step_edge(&mut self, motor: usize, high: bool, now: u64, sums: Sums) {
+        let m = &mut self.motors[motor];
+        if m.step_high == high {
+            return;
+        }
+        m.step_high = high;
+        if high {
+            m.rise(now);
+            let positive = !m.dir_high;
+            self.first.get_or_insert((now, sums));
+            self.last = Some((now, sums));
+            if let Some(log) = &mut self.log {
+                log.push(Step { cycle: now, motor: motor as u8, positive });
+            }
+        } else {
+            m.fall(now);
+        }
+        if let Some(trace) = &mut self.trace {
+            trace.step(motor, high, !self.motors[motor].dir_high, now);
+        }
+    }
+
+    fn dir_edge(&mut self, motor: usize, high: bool, now: u64) {
+        let m = &mut self.motors[motor];
+        if m.dir_high == high {
+            return;
+        }
+        m.dir_high = high;
+        m.turned_at = Some(now);
+        if let Some(trace) = &mut self.trace {
+            trace.dir(motor, high, now);
+        }
+    }
+}
+
+/// What a pin's callback needs to know.
+pub(crate) struct Probe {
+    bus: NonNull<Bus>,
+    motor: usize,
+    is_step: bool,
+}
+
+/// Listens to the pins of a board. The probes must live as long as the CPU.
+pub(crate) fn attach(bus: NonNull<Bus>, cpu: Cpu, board: &Board) -> Vec<Probe> {
+    let of_motor = |motor| [true, false].map(|is_step| Probe { bus, motor, is_step });
+    let mut probes: Vec<Probe> = (0..MOTORS).flat_map(of_motor).collect();
+    for probe in &mut probes {
+        let pins = &board.motors[probe.motor];
+        let pin = if probe.is_step { pins.step } else { pins.dir };
+        let param = (&raw mut *probe).cast::<c_void>();
+        cpu.watch_pin(pin.port.letter(), pin.bit, Some(pin_changed), param);
+    }
+    probes
+}
+
+unsafe extern "C" fn pin_changed(_: *mut ffi::avr_irq_t, value: u32, param: *mut c_void) {
+    // SAFETY: `param` is a probe that `attach` made. The machine holds no reference to its bus
+    // while instructions run or pins are driven, which is when simavr calls this.
+    let (probe, bus) = unsafe {
+        let probe = &*param.cast::<Probe>();
+        (probe, &mut *probe.bus.as_ptr())
+    };
+    let now = bus.cpu.write_cycle();
+    let high = value & 1 != 0;
+    if probe.is_step {
+        let sums = bus.sums;
+        bus.recorder.step_edge(probe.motor, high, now, sums);
+    } else {
+        bus.recorder.dir_edge(probe.motor, high, now);
+    }
+}

@@ -1,0 +1,297 @@
+//! How a job went, as data.
+
+use serde::Serialize;
+
+use crate::machine::Machine;
+use crate::meters::Window;
+use crate::oracle::{AXES, MotorSetup, Outcome, Setup, UNITS, Unclear};
+use crate::recorder::Motor;
+use crate::vectors;
+
+const AXIS_NAMES: [char; AXES] = ['X', 'Y', 'Z', 'A', 'B', 'C'];
+
+/// A line that the firmware refused.
+#[derive(Clone, Serialize, Debug)]
+pub struct Rejected {
+    /// Its number in the job.
+    pub line: usize,
+    /// What it says.
+    pub text: String,
+    /// Why it was refused.
+    pub status: i64,
+}
+
+/// What the job's driver knows when it ends.
+pub struct Measured {
+    /// Lines in the job.
+    pub lines: usize,
+    /// Lines answered.
+    pub acknowledged: usize,
+    /// Lines skipped by block delete.
+    pub skipped: usize,
+    /// Lines refused.
+    pub rejected: Vec<Rejected>,
+    /// Banners that came while the job ran.
+    pub restarts: usize,
+    /// What came and should not have.
+    pub strays: Vec<String>,
+    /// From the first line to rest.
+    pub seconds_to_idle: f64,
+    /// Motors and axes.
+    pub setup: Setup,
+    /// What the oracle says.
+    pub expected: Result<Outcome, Unclear>,
+    /// What ended the job before its time.
+    pub fault: Option<String>,
+}
+
+/// One motor in a report.
+#[derive(Clone, Serialize, Debug)]
+pub struct MotorReport {
+    /// From 1.
+    pub motor: usize,
+    /// The axis it moves.
+    pub axis: char,
+    /// Steps on balance.
+    pub steps: i64,
+    /// The oracle's.
+    pub expected: Option<i64>,
+    /// Steps in both directions.
+    pub total: u64,
+    /// By the shortest time between two steps.
+    pub highest_rate_hz: Option<f64>,
+    /// Shortest and longest pulse.
+    pub pulse_us: Option<(f64, f64)>,
+    /// Shortest time from direction to step.
+    pub dir_setup_us: Option<f64>,
+}
+
+/// One axis in a report, in millimetres or degrees.
+#[derive(Clone, Serialize, Debug)]
+pub struct AxisReport {
+    /// Its letter.
+    pub axis: char,
+    /// By the steps made.
+    pub position: f64,
+    /// The oracle's.
+    pub expected: f64,
+}
+
+/// A time with interrupts off.
+#[derive(Clone, Serialize, Debug)]
+pub struct WindowReport {
+    /// In cycles.
+    pub cycles: u64,
+    /// In microseconds.
+    pub us: f64,
+    /// The interrupt it was in, or `thread`.
+    pub context: &'static str,
+    /// Where it began and ended.
+    pub place: String,
+}
+
+/// One interrupt's service.
+#[derive(Clone, Serialize, Debug)]
+pub struct VectorReport {
+    /// Its name.
+    pub vector: &'static str,
+    /// How often.
+    pub count: u64,
+    /// Mean cycles, without nested interrupts.
+    pub own_mean: f64,
+    /// Most cycles, without nested interrupts.
+    pub own_max: u64,
+    /// Most cycles from flag to acceptance.
+    pub latency_max: u64,
+}
+
+/// How a job went.
+#[derive(Clone, Serialize, Debug)]
+pub struct Report {
+    /// Everything as it should be.
+    pub ok: bool,
+    /// What is not.
+    pub problems: Vec<String>,
+    /// The board.
+    pub board: &'static str,
+    /// Lines in the job.
+    pub lines: usize,
+    /// Lines answered.
+    pub acknowledged: usize,
+    /// Lines skipped by block delete.
+    pub skipped: usize,
+    /// Lines refused.
+    pub rejected: Vec<Rejected>,
+    /// From the first step to the last.
+    pub seconds_moving: f64,
+    /// From the first line to rest.
+    pub seconds_to_idle: f64,
+    /// The motors.
+    pub motors: Vec<MotorReport>,
+    /// The axes that have motors.
+    pub axes: Vec<AxisReport>,
+    /// Share of time not asleep, from the first step to the last.
+    pub cpu_load: Option<f64>,
+    /// Share of time in interrupts, likewise.
+    pub interrupt_load: Option<f64>,
+    /// Longest time with interrupts off outside the step interrupt.
+    pub interrupts_off: WindowReport,
+    /// Longest time with interrupts off inside it.
+    pub interrupts_off_in_step: WindowReport,
+    /// Bytes never touched between static data and stack.
+    pub free_stack: Option<i32>,
+    /// Bytes that came in faster than they were read.
+    pub uart_overruns: u64,
+    /// Tops of the step timer written behind its counter.
+    pub missed_tops: u64,
+    /// Resets by the watchdog.
+    pub resets: u64,
+    /// The interrupts that were served.
+    pub vectors: Vec<VectorReport>,
+}
+
+impl Report {
+    /// Puts together what the driver and the meters know.
+    pub fn new(machine: &Machine, measured: Measured) -> Self {
+        let expected = measured.expected.as_ref().ok();
+        let recorder = machine.recorder();
+        let motors = measured.setup.motors.iter().zip(recorder.motors()).enumerate();
+        let motors: Vec<_> = motors
+            .map(|(i, (setup, motor))| motor_report(machine, i, setup, motor, expected))
+            .collect();
+        let axes = expected.map_or(Vec::new(), |e| axis_reports(&motors, &measured.setup, e));
+        let (cpu_load, interrupt_load) = loads(machine);
+        let span = recorder.span();
+        let mut report = Report {
+            ok: false,
+            problems: Vec::new(),
+            board: machine.board().name,
+            lines: measured.lines,
+            acknowledged: measured.acknowledged,
+            skipped: measured.skipped,
+            rejected: measured.rejected.clone(),
+            seconds_moving: span.map_or(0.0, |((a, _), (b, _))| machine.seconds(b - a)),
+            seconds_to_idle: measured.seconds_to_idle,
+            motors,
+            axes,
+            cpu_load,
+            interrupt_load,
+            interrupts_off: window_report(machine, machine.meters().window_outside()),
+            interrupts_off_in_step: window_report(machine, machine.meters().window_step()),
+            free_stack: machine.free_stack(),
+            uart_overruns: machine.uart(0).overruns(),
+            missed_tops: machine.missed_tops(),
+            resets: machine.resets(),
+            vectors: vector_reports(machine),
+        };
+        report.problems = report.find_problems(&measured);
+        report.ok = report.problems.is_empty();
+        report
+    }
+
+    fn find_problems(&self, measured: &Measured) -> Vec<String> {
+        let mut problems: Vec<String> = measured.fault.iter().cloned().collect();
+        if let Some(first) = self.rejected.first() {
+            let n = self.rejected.len();
+            problems.push(format!("{n} lines rejected, the first is line {}", first.line));
+        }
+        if self.acknowledged < self.lines && measured.fault.is_none() {
+            problems.push(format!("{} lines never answered", self.lines - self.acknowledged));
+        }
+        if let Some(first) = measured.strays.first() {
+            let n = measured.strays.len();
+            problems.push(format!("{n} lines nobody asked for, the first is {first}"));
+        }
+        match &measured.expected {
+            Err(unclear) => problems.push(unclear.to_string()),
+            Ok(_) => problems.extend(self.wrong_motors()),
+        }
+        if measured.restarts > 0 {
+            problems.push(format!("the firmware restarted {} times", measured.restarts));
+        }
+        if self.resets > 0 {
+            problems.push(format!("{} resets by the watchdog", self.resets));
+        }
+        problems
+    }
+
+    fn wrong_motors(&self) -> impl Iterator<Item = String> {
+        self.motors.iter().filter_map(|m| {
+            let expected = m.expected.filter(|e| *e != m.steps)?;
+            Some(format!("motor {} is at {} steps instead of {expected}", m.motor, m.steps))
+        })
+    }
+}
+
+fn microseconds(machine: &Machine, cycles: u64) -> f64 {
+    machine.seconds(cycles) * 1e6
+}
+
+fn motor_report(
+    machine: &Machine,
+    index: usize,
+    setup: &MotorSetup,
+    motor: &Motor,
+    expected: Option<&Outcome>,
+) -> MotorReport {
+    let us = |cycles| microseconds(machine, cycles);
+    MotorReport {
+        motor: index + 1,
+        axis: AXIS_NAMES[setup.axis],
+        steps: if setup.inverted { -motor.position } else { motor.position },
+        expected: expected.map(|e| e.steps[index]),
+        total: motor.steps,
+        highest_rate_hz: motor.min_interval.map(|c| 1.0 / machine.seconds(c)),
+        pulse_us: motor.pulse.map(|(a, b)| (us(a), us(b))),
+        dir_setup_us: motor.min_setup.map(us),
+    }
+}
+
+/// Each axis once, by its first motor.
+fn axis_reports(motors: &[MotorReport], setup: &Setup, expected: &Outcome) -> Vec<AxisReport> {
+    let mut axes: Vec<AxisReport> = Vec::new();
+    for (motor, of) in motors.iter().zip(&setup.motors) {
+        if axes.iter().any(|a| a.axis == motor.axis) {
+            continue;
+        }
+        let want = expected.position[of.axis] as f64 / UNITS as f64;
+        let per_unit = of.steps(1_000_000 * UNITS as i64) as f64 / 1e6;
+        let off = motor.steps - motor.expected.unwrap_or(motor.steps);
+        let error = if per_unit == 0.0 { 0.0 } else { off as f64 / per_unit };
+        axes.push(AxisReport { axis: motor.axis, position: want + error, expected: want });
+    }
+    axes
+}
+
+fn loads(machine: &Machine) -> (Option<f64>, Option<f64>) {
+    let Some(((from, a), (to, b))) = machine.recorder().span() else { return (None, None) };
+    let all = (to - from) as f64;
+    if all == 0.0 {
+        return (None, None);
+    }
+    let asleep = (b.asleep - a.asleep) as f64;
+    let inside = (b.in_interrupts - a.in_interrupts) as f64;
+    (Some(1.0 - asleep / all), Some(inside / all))
+}
+
+fn window_report(machine: &Machine, window: Window) -> WindowReport {
+    WindowReport {
+        cycles: window.cycles,
+        us: microseconds(machine, window.cycles),
+        context: window.vector.map_or("thread", vectors::name),
+        place: if window.cycles == 0 { String::new() } else { machine.describe(&window) },
+    }
+}
+
+fn vector_reports(machine: &Machine) -> Vec<VectorReport> {
+    let all = (0..vectors::COUNT as u8).map(|v| (v, machine.meters().service(v)));
+    all.filter(|(_, s)| s.count > 0)
+        .map(|(v, s)| VectorReport {
+            vector: vectors::name(v),
+            count: s.count,
+            own_mean: s.own_sum as f64 / s.count as f64,
+            own_max: s.own_max,
+            latency_max: s.latency_max,
+        })
+        .collect()
+}

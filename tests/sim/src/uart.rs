@@ -1,0 +1,248 @@
+//! The USARTs as asynchronous serial ports.
+//!
+//! A frame takes exactly its bits. The receiver has a two-byte FIFO behind the shift register; a
+//! third byte waits in the shift register and is lost, with DOR set, when a fourth begins. RXC and
+//! UDRE are levels: they ask for service as long as their condition holds, so UDRIE makes a
+//! software interrupt out of a transmitter that is never written to.
+
+use std::collections::VecDeque;
+
+const NEVER: u64 = u64::MAX;
+
+// UCSRnA
+const RXC: u8 = 1 << 7;
+const TXC: u8 = 1 << 6;
+const UDRE: u8 = 1 << 5;
+const FE: u8 = 1 << 4;
+const DOR: u8 = 1 << 3;
+const U2X: u8 = 1 << 1;
+const MPCM: u8 = 1;
+// UCSRnB; the interrupt enables are at the bits of their flags.
+const RXEN: u8 = 1 << 4;
+const TXEN: u8 = 1 << 3;
+// UCSRnC
+const PARITY: u8 = 1 << 5;
+const TWO_STOPS: u8 = 1 << 3;
+
+/// Bit time mismatch that a receiver no longer copes with.
+const TOLERANCE: f64 = 0.045;
+
+// Register offsets from UCSRnA.
+const UCSRB: u16 = 1;
+const UCSRC: u16 = 2;
+const UBRRL: u16 = 4;
+const UBRRH: u16 = 5;
+const UDR: u16 = 6;
+
+/// Base register and first vector (RX; UDRE and TX follow) of USART0 to USART3.
+pub const PLACES: [(u16, u8); 4] = [(0xC0, 25), (0xC8, 36), (0xD0, 51), (0x130, 54)];
+/// Register offsets that are in use.
+pub const OFFSETS: [u16; 6] = [0, UCSRB, UCSRC, UBRRL, UBRRH, UDR];
+
+/// A byte on its way through a shift register.
+#[derive(Clone, Copy)]
+struct Frame {
+    byte: u8,
+    done: u64,
+}
+
+/// One USART.
+pub struct Uart {
+    base: u16,
+    vector: u8,
+    status: u8,
+    control: u8,
+    format: u8,
+    divisor: u16,
+    fifo: VecDeque<u8>,
+    receiving: Option<Frame>,
+    /// A complete byte that found the FIFO full.
+    waiting: Option<u8>,
+    sending: Option<Frame>,
+    buffered: Option<u8>,
+    sent: VecDeque<(u64, u8)>,
+    overruns: u64,
+    misframed: u64,
+}
+
+impl Uart {
+    /// USART `index` as it is after reset.
+    pub fn new(index: usize) -> Self {
+        let (base, vector) = PLACES[index];
+        Uart {
+            base,
+            vector,
+            status: UDRE,
+            control: 0,
+            format: 0x06,
+            divisor: 0,
+            fifo: VecDeque::new(),
+            receiving: None,
+            waiting: None,
+            sending: None,
+            buffered: None,
+            sent: VecDeque::new(),
+            overruns: 0,
+            misframed: 0,
+        }
+    }
+
+    /// Cycle at which a frame is complete next.
+    pub fn due(&self) -> u64 {
+        let rx = self.receiving.map_or(NEVER, |f| f.done);
+        let tx = self.sending.map_or(NEVER, |f| f.done);
+        rx.min(tx)
+    }
+
+    /// Vectors that ask for service, as a bit set.
+    pub fn lines(&self) -> u64 {
+        let active = self.status & self.control & (RXC | UDRE | TXC);
+        let rx = u64::from(active & RXC != 0);
+        let empty = u64::from(active & UDRE != 0);
+        let done = u64::from(active & TXC != 0);
+        (rx | empty << 1 | done << 2) << self.vector
+    }
+
+    /// The interrupt is being served. Only TXC goes by itself.
+    pub fn acknowledge(&mut self, vector: u8) {
+        if vector == self.vector + 2 {
+            self.status &= !TXC;
+        }
+    }
+
+    /// Bytes lost because they were not read in time.
+    pub fn overruns(&self) -> u64 {
+        self.overruns
+    }
+
+    /// Frames received at a speed too far from the receiver's own.
+    pub fn misframed(&self) -> u64 {
+        self.misframed
+    }
+
+    /// Bytes sent, each with the cycle at which its last stop bit ended.
+    pub fn take_sent(&mut self) -> Option<(u64, u8)> {
+        self.sent.pop_front()
+    }
+
+    /// Cycles per bit.
+    pub fn bit_cycles(&self) -> u64 {
+        (u64::from(self.divisor) + 1) * if self.status & U2X != 0 { 8 } else { 16 }
+    }
+
+    /// Bits in a frame, start and stop included.
+    pub fn frame_bits(&self) -> u64 {
+        let size = (self.format >> 1 & 3) | (self.control & 4);
+        let data = [5, 6, 7, 8, 8, 8, 8, 9][usize::from(size)];
+        let parity = u64::from(self.format & PARITY != 0);
+        let stops = if self.format & TWO_STOPS != 0 { 2 } else { 1 };
+        1 + data + parity + stops
+    }
+
+    /// A start bit of a sender with `bit_cycles` per bit begins at cycle `now`.
+    pub fn start_bit(&mut self, byte: u8, bit_cycles: f64, now: u64) {
+        self.advance(now);
+        if self.control & RXEN == 0 || self.receiving.is_some() {
+            return;
+        }
+        if self.waiting.take().is_some() {
+            self.overruns += 1;
+            self.status |= DOR;
+        }
+        let own = self.bit_cycles() as f64;
+        if (own - bit_cycles).abs() > bit_cycles * TOLERANCE {
+            self.misframed += 1;
+            self.status |= FE;
+        }
+        let byte = if self.status & FE != 0 { !byte } else { byte };
+        // Complete in the middle of the stop bit.
+        let done = now + self.bit_cycles() * (2 * self.frame_bits() - 1) / 2;
+        self.receiving = Some(Frame { byte, done });
+    }
+
+    /// Completes the frames that are due by `now`.
+    pub fn advance(&mut self, now: u64) {
+        if let Some(frame) = self.receiving.take_if(|f| f.done <= now) {
+            self.waiting = Some(frame.byte);
+            self.settle();
+        }
+        while let Some(frame) = self.sending.take_if(|f| f.done <= now) {
+            self.sent.push_back((frame.done, frame.byte));
+            match self.buffered.take() {
+                Some(byte) => self.begin_frame(byte, frame.done),
+                None => self.status |= TXC,
+            }
+            self.status |= UDRE;
+        }
+    }
+
+    fn begin_frame(&mut self, byte: u8, now: u64) {
+        let done = now + self.bit_cycles() * self.frame_bits();
+        self.sending = Some(Frame { byte, done });
+    }
+
+    /// Moves a waiting byte into the FIFO if there is room.
+    fn settle(&mut self) {
+        if self.fifo.len() < 2 {
+            self.fifo.extend(self.waiting.take());
+        }
+        self.status = (self.status & !RXC) | if self.fifo.is_empty() { 0 } else { RXC };
+    }
+
+    /// A load that samples at cycle `now`; `None` for registers without side effects.
+    pub fn read(&mut self, addr: u16, now: u64) -> Option<u8> {
+        self.advance(now);
+        match addr - self.base {
+            0 => Some(self.status),
+            UDR => {
+                let byte = self.fifo.pop_front().unwrap_or(0);
+                self.status &= !(DOR | FE);
+                self.settle();
+                Some(byte)
+            }
+            _ => None,
+        }
+    }
+
+    /// A store that takes effect at cycle `now`.
+    pub fn write(&mut self, addr: u16, value: u8, now: u64) {
+        self.advance(now);
+        match addr - self.base {
+            0 => {
+                let kept = self.status & !(U2X | MPCM) & !(value & TXC);
+                self.status = kept | (value & (U2X | MPCM));
+            }
+            UCSRB => self.write_control(value),
+            UCSRC => self.format = value,
+            UBRRL => self.divisor = (self.divisor & 0x0F00) | u16::from(value),
+            UBRRH => self.divisor = (self.divisor & 0x00FF) | u16::from(value & 0x0F) << 8,
+            UDR => self.transmit(value, now),
+            _ => {}
+        }
+    }
+
+    fn write_control(&mut self, value: u8) {
+        self.control = value;
+        if value & RXEN == 0 {
+            self.fifo.clear();
+            self.waiting = None;
+            self.receiving = None;
+            self.status &= !(RXC | DOR | FE);
+        }
+    }
+
+    fn transmit(&mut self, byte: u8, now: u64) {
+        if self.control & TXEN == 0 {
+            return;
+        }
+        if self.sending.is_none() {
+            self.begin_frame(byte, now);
+        } else if self.buffered.is_none() {
+            self.buffered = Some(byte);
+            self.status &= !UDRE;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

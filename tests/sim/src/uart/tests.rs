@@ -1,0 +1,84 @@
+use super::*;
+
+const BASE: u16 = 0xC0;
+/// 117647 baud at 16 MHz, as near to 115200 as it gets.
+const BIT: u64 = 136;
+const BYTE: u64 = 10 * BIT;
+
+fn uart() -> Uart {
+    let mut u = Uart::new(0);
+    u.write(BASE, U2X, 0);
+    u.write(BASE + UBRRL, 16, 0);
+    u.write(BASE + UCSRB, RXEN | TXEN | RXC, 0);
+    u
+}
+
+fn receive(u: &mut Uart, bytes: &[u8]) -> u64 {
+    let mut now = 1000;
+    for byte in bytes {
+        u.start_bit(*byte, BIT as f64, now);
+        now += BYTE;
+        u.advance(now);
+    }
+    now
+}
+
+#[test]
+fn a_frame_is_ten_bits() {
+    let mut u = uart();
+    u.write(BASE + UDR, b'a', 100);
+    assert_eq!(u.due(), 100 + BYTE);
+    u.write(BASE + UDR, b'b', 110);
+    assert_eq!(u.read(BASE, 120).unwrap() & UDRE, 0, "both places taken");
+    u.advance(100 + 2 * BYTE);
+    assert_eq!(u.take_sent(), Some((100 + BYTE, b'a')));
+    assert_eq!(u.take_sent(), Some((100 + 2 * BYTE, b'b')));
+    assert_eq!(u.read(BASE, 5000).unwrap() & (UDRE | TXC), UDRE | TXC);
+}
+
+#[test]
+fn a_byte_is_there_in_its_stop_bit() {
+    let mut u = uart();
+    u.start_bit(b'x', BIT as f64, 1000);
+    assert_eq!(u.due(), 1000 + BYTE - BIT / 2);
+    assert_eq!(u.lines(), 0);
+    u.advance(u.due());
+    assert_eq!(u.lines(), 1 << 25);
+    assert_eq!(u.read(BASE + UDR, 3000), Some(b'x'));
+    assert_eq!(u.lines(), 0);
+}
+
+#[test]
+fn three_bytes_wait_and_the_fourth_start_bit_costs_one() {
+    let mut u = uart();
+    let now = receive(&mut u, b"abc");
+    assert_eq!(u.overruns(), 0);
+    u.start_bit(b'd', BIT as f64, now);
+    assert_eq!(u.overruns(), 1);
+    assert_eq!(u.read(BASE, now).unwrap() & DOR, DOR);
+    u.advance(now + BYTE);
+    let read: Vec<u8> = (0..3).map(|_| u.read(BASE + UDR, now + BYTE).unwrap()).collect();
+    assert_eq!(read, b"abd");
+    assert_eq!(u.read(BASE, now + BYTE).unwrap() & (DOR | RXC), 0);
+}
+
+#[test]
+fn the_empty_transmitter_is_a_level() {
+    let mut u = Uart::new(3);
+    assert_eq!(u.lines(), 0);
+    u.write(0x131, TXEN | UDRE, 0);
+    assert_eq!(u.lines(), 1 << 55);
+    u.acknowledge(55);
+    assert_eq!(u.lines(), 1 << 55, "service alone does not clear it");
+    u.write(0x131, TXEN, 0);
+    assert_eq!(u.lines(), 0);
+}
+
+#[test]
+fn a_receiver_at_another_speed_reads_rubbish() {
+    let mut u = uart();
+    u.start_bit(b'a', 2.0 * BIT as f64, 0);
+    u.advance(BYTE);
+    assert_eq!(u.misframed(), 1);
+    assert_ne!(u.read(BASE + UDR, BYTE), Some(b'a'));
+}

@@ -1,0 +1,112 @@
+//! The serial line between the host and USART0, at the host's exact pace.
+
+use std::collections::VecDeque;
+
+use crate::uart::Uart;
+
+const NEVER: u64 = u64::MAX;
+
+/// Bits of a frame as the host sends it: start, eight data, stop.
+const FRAME_BITS: f64 = 10.0;
+/// Speed mismatch that the host's receiver no longer copes with.
+const TOLERANCE: f64 = 0.045;
+
+/// Both directions of the line.
+pub struct Wire {
+    bit_cycles: f64,
+    outgoing: VecDeque<u8>,
+    /// When the next start bit may begin.
+    free_at: u64,
+    due: u64,
+    received: VecDeque<u8>,
+    lines_waiting: usize,
+    garbled: u64,
+    sent: u64,
+}
+
+impl Wire {
+    /// An idle line.
+    pub fn new(clock_hz: u32, baud: u32) -> Self {
+        Wire {
+            bit_cycles: f64::from(clock_hz) / f64::from(baud),
+            outgoing: VecDeque::new(),
+            free_at: 0,
+            due: NEVER,
+            received: VecDeque::new(),
+            lines_waiting: 0,
+            garbled: 0,
+            sent: 0,
+        }
+    }
+
+    /// Changes the host's speed.
+    pub fn set_baud(&mut self, clock_hz: u32, baud: u32) {
+        self.bit_cycles = f64::from(clock_hz) / f64::from(baud);
+    }
+
+    /// Cycle of the next start bit towards the machine.
+    pub fn due(&self) -> u64 {
+        self.due
+    }
+
+    /// Bytes that still wait for their turn.
+    pub fn backlog(&self) -> usize {
+        self.outgoing.len()
+    }
+
+    /// Bytes sent so far.
+    pub fn sent(&self) -> u64 {
+        self.sent
+    }
+
+    /// Bytes that came at a speed the host cannot read.
+    pub fn garbled(&self) -> u64 {
+        self.garbled
+    }
+
+    /// Queues bytes for the machine.
+    pub fn send(&mut self, bytes: &[u8], now: u64) {
+        self.outgoing.extend(bytes);
+        self.due = if self.outgoing.is_empty() { NEVER } else { self.free_at.max(now) };
+    }
+
+    /// Puts a byte in front of those that wait.
+    pub fn send_first(&mut self, byte: u8, now: u64) {
+        self.outgoing.push_front(byte);
+        self.due = self.free_at.max(now);
+    }
+
+    /// Begins the frame that is due.
+    pub fn pump(&mut self, uart: &mut Uart) {
+        if let Some(byte) = self.outgoing.pop_front() {
+            uart.start_bit(byte, self.bit_cycles, self.due);
+            self.free_at = self.due + (self.bit_cycles * FRAME_BITS).round() as u64;
+            self.sent += 1;
+        }
+        self.due = if self.outgoing.is_empty() { NEVER } else { self.free_at };
+    }
+
+    /// Takes what the machine has sent.
+    pub fn listen(&mut self, uart: &mut Uart) {
+        let own = uart.bit_cycles() as f64;
+        while let Some((_, byte)) = uart.take_sent() {
+            if (own - self.bit_cycles).abs() > self.bit_cycles * TOLERANCE {
+                self.garbled += 1;
+                continue;
+            }
+            self.lines_waiting += usize::from(byte == b'\n');
+            self.received.push_back(byte);
+        }
+    }
+
+    /// Whether a whole line has come and was not taken yet.
+    pub fn has_line(&self) -> bool {
+        self.lines_waiting > 0
+    }
+
+    /// Everything that has come.
+    pub fn take_received(&mut self) -> Vec<u8> {
+        self.lines_waiting = 0;
+        self.received.drain(..).collect()
+    }
+}
