@@ -8,6 +8,10 @@
 #[cfg(not(target_arch = "avr"))]
 extern crate std;
 
+#[macro_use]
+pub mod hal;
+
+pub mod app;
 pub mod boards;
 pub mod config;
 pub mod gcode;
@@ -15,5 +19,7 @@ pub mod math;
 pub mod motion;
 pub mod progmem;
 pub mod protocol;
+pub mod realtime;
 pub mod status;
+pub mod tasks;
 pub mod units;

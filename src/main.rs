@@ -1,6 +1,36 @@
 //! The AVR image. On the host it only says what it is.
-#![cfg_attr(target_arch = "avr", no_std, no_main)]
-#![cfg_attr(target_arch = "avr", feature(abi_avr_interrupt))]
+#![cfg_attr(target_arch = "avr", no_std, no_main, feature(abi_avr_interrupt))]
+
+#[cfg(target_arch = "avr")]
+mod image {
+    use embassy_executor::raw::Executor;
+    use kerf::hal::imp::{self, exec, executor, gpio, panic, time};
+    use static_cell::StaticCell;
+
+    // Naming avr-libc and libgcc in the image itself puts them before `compiler_builtins` in the link:
+    // see `kerf::math`.
+    #[link(name = "m")]
+    #[link(name = "gcc")]
+    unsafe extern "C" {}
+
+    const BAUD: u32 = 115_200;
+
+    #[avr_device::entry]
+    fn main() -> ! {
+        static MAIN: StaticCell<Executor> = StaticCell::new();
+        static EXEC: StaticCell<Executor> = StaticCell::new();
+        imp::watchdog_off();
+        gpio::start();
+        let main: &'static Executor = MAIN.init(Executor::new(executor::THREAD));
+        let interrupt: &'static Executor = EXEC.init(Executor::new(executor::EXEC));
+        if kerf::app::start(main.spawner(), interrupt.spawner(), BAUD).is_none() {
+            panic::halt();
+        }
+        time::start();
+        exec::start(interrupt);
+        executor::run(main)
+    }
+}
 
 #[cfg(not(target_arch = "avr"))]
 fn main() {

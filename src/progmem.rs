@@ -115,9 +115,11 @@ macro_rules! progmem {
     ($($(#[$meta:meta])* $vis:vis static $name:ident: $type:ty = $value:expr;)+) => {$(
         $(#[$meta])*
         #[cfg_attr(target_arch = "avr", unsafe(link_section = ".progmem.data"))]
-        // SAFETY: the attribute above places it in program memory.
-        $vis static $name: $crate::progmem::Progmem<$type> =
-            unsafe { $crate::progmem::Progmem::new($value) };
+        $vis static $name: $crate::progmem::Progmem<$type> = {
+            const VALUE: $type = $value;
+            // SAFETY: the attribute above places it in program memory.
+            unsafe { $crate::progmem::Progmem::new(VALUE) }
+        };
     )+};
 }
 
@@ -127,8 +129,10 @@ macro_rules! text {
     ($literal:literal) => {{
         const BYTES: [u8; $literal.len()] = *$literal.as_bytes().first_chunk().unwrap();
         $crate::progmem! { static TEXT: [u8; BYTES.len()] = BYTES; }
-        // SAFETY: `progmem!` placed it in program memory.
-        const { unsafe { $crate::progmem::Text::new(&TEXT) } }
+        const {
+            // SAFETY: `progmem!` placed it in program memory.
+            unsafe { $crate::progmem::Text::new(&TEXT) }
+        }
     }};
 }
 

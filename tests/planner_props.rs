@@ -210,11 +210,8 @@ struct Ring {
 }
 
 impl Queue for Ring {
-    fn len(&self) -> usize {
-        self.blocks.len()
-    }
-    fn block(&self, back: usize) -> &Block {
-        &self.blocks[self.blocks.len() - 1 - back]
+    fn block(&self, back: usize) -> Option<&Block> {
+        self.blocks.iter().rev().nth(back)
     }
     fn set_entry(&mut self, back: usize, velocity: f32) -> bool {
         let index = self.blocks.len() - 1 - back;

@@ -3,8 +3,6 @@
 //! Rows stand in the order that groups are listed in. A motor or axis setting has one row for all
 //! motors or axes; its defaults are a row of the table behind. Sizes: 51 rows of 17 bytes and 576
 //! bytes of defaults.
-// The program-memory macros expand to unsafe blocks, one around the other in a table of texts.
-#![allow(unused_unsafe, clippy::undocumented_unsafe_blocks)]
 
 use super::name::token;
 use crate::progmem;

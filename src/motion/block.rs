@@ -11,7 +11,7 @@ pub enum Kind {
     /// Moves the motors.
     #[default]
     Line,
-    /// Stands still for `length` seconds.
+    /// Stands still for `steps[0]` milliseconds.
     Dwell,
     /// G28.3: from here on the motor positions are `steps`.
     SetPosition,

@@ -122,7 +122,8 @@ impl Builder {
     /// The block that stands still.
     pub fn dwell(&mut self, ms: u32, line: u32) -> Block {
         self.stopped();
-        Block { length: ms as f32 / 1000.0, line, kind: Kind::Dwell, ..Block::default() }
+        let ms = i32::try_from(ms).unwrap_or(i32::MAX);
+        Block { steps: [ms, 0, 0, 0], line, kind: Kind::Dwell, ..Block::default() }
     }
 
     /// The block for a program stop or end.

@@ -27,14 +27,8 @@ use super::profile::{Limits, brake, lesser};
 
 /// The blocks between planner and exec, seen from the planner.
 pub trait Queue {
-    /// Blocks in it. Exec may take blocks away at any time.
-    fn len(&self) -> usize;
-    /// True if there are none.
-    fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-    /// A block; 0 is the newest. One that exec has just taken away is still readable.
-    fn block(&self, back: usize) -> &Block;
+    /// A block; 0 is the newest. `None` if exec has taken it away.
+    fn block(&self, back: usize) -> Option<&Block>;
     /// Plans a block's entry velocity. False, and nothing done, if exec has committed itself to the
     /// present one: the block is gone or running, or the one before it is too far run.
     fn set_entry(&mut self, back: usize, velocity: f32) -> bool;
@@ -47,8 +41,7 @@ pub trait Queue {
 pub fn replan(queue: &mut impl Queue) {
     let mut exit = 0.0;
     let mut back = 0;
-    while back < queue.len() {
-        let block = queue.block(back);
+    while let Some(block) = queue.block(back) {
         let entry = entry(block, exit);
         if back > 0 && entry == block.entry {
             return;

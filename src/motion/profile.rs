@@ -242,12 +242,12 @@ fn log(x: f32) -> i32 {
 }
 
 /// The lesser of two numbers. On AVR `f32::min` is a call that also sees to NaN. Cost: 70.
-pub(super) fn lesser(a: f32, b: f32) -> f32 {
+pub(crate) fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 /// The greater of two numbers. Cost: 70.
-fn greater(a: f32, b: f32) -> f32 {
+pub(crate) fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 

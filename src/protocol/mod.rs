@@ -6,8 +6,6 @@
 //! texts are in program memory.
 //!
 //! Wire format: TinyG 0.97 build 440.20 with the three-element footer `[1,status,free line slots]`.
-// The program-memory macros expand to unsafe blocks, one around the other in a table of texts.
-#![allow(unused_unsafe, clippy::undocumented_unsafe_blocks)]
 
 /// Bytes that one step puts at most.
 pub const CHUNK: usize = 64;

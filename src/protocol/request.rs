@@ -142,6 +142,13 @@ impl Request {
         Some(request)
     }
 
+    /// Answers a line that could not be kept with a status.
+    pub fn refused(status: Status, mode: Mode) -> Request {
+        let mut request = Request::new();
+        request.fail(status, mode);
+        request
+    }
+
     fn new() -> Request {
         Request {
             phase: Phase::Gcode,

@@ -1,0 +1,94 @@
+//! Putting it together: makes the links, hands every end to its task, starts the hardware.
+//!
+//! The same on AVR and on the host; what differs is in `hal::imp`.
+
+use core::cell::{Cell, RefCell};
+
+use embassy_executor::Spawner;
+use embassy_sync::mutex::Mutex;
+use embassy_sync::signal::Signal;
+
+use crate::config::Settings;
+use crate::gcode::command::Commands;
+use crate::gcode::interpreter::Interpreter;
+use crate::hal::imp::uart::{Outgoing, Received};
+use crate::hal::imp::{stepper, uart};
+use crate::hal::ring::Producer;
+use crate::motion::dda::{SEGMENTS, Segment};
+use crate::motion::queue::{self, BlockQueue, BlockSource};
+use crate::protocol::{Mode, StatusReport};
+use crate::tasks::lines::LinePool;
+use crate::tasks::links::{Links, QueueCount};
+use crate::tasks::tx::Tx;
+use crate::tasks::{control, exec, parser, planner, reader, reporter};
+
+impl Links {
+    fn new(tx: Outgoing) -> Self {
+        Self {
+            lines: RefCell::new(LinePool::new()),
+            pool_space: Signal::new(),
+            parser_wake: Signal::new(),
+            commands: RefCell::new(Commands::default()),
+            commands_taken: Cell::new(false),
+            planner_wake: Signal::new(),
+            reporter_wake: Signal::new(),
+            queue_count: QueueCount::default(),
+            resync: Cell::new(false),
+            losing: Cell::new(false),
+            exception: Cell::new(None),
+            mode: Cell::new(Mode::Json),
+            report: RefCell::new(StatusReport::new()),
+            tx: Mutex::new(Tx::new(tx)),
+            settings: RefCell::new(Settings::new()),
+            model: RefCell::new(Interpreter::new()),
+        }
+    }
+}
+
+#[cfg(target_arch = "avr")]
+fn place(links: Links) -> &'static Links {
+    static LINKS: static_cell::StaticCell<Links> = static_cell::StaticCell::new();
+    LINKS.init(links)
+}
+
+#[cfg(not(target_arch = "avr"))]
+fn place(links: Links) -> &'static Links {
+    std::boxed::Box::leak(std::boxed::Box::new(links))
+}
+
+/// Starts the firmware: `main` is the thread-mode executor, `exec_level` the interrupt-mode one.
+///
+/// Interrupts are off. `None` if it has been started before.
+pub fn start(main: Spawner, exec_level: Spawner, baud: u32) -> Option<()> {
+    let (received, outgoing) = uart::start(baud)?;
+    let segments = stepper::start()?;
+    let (queue, source) = queue::ring().split()?;
+    let links = place(Links::new(outgoing));
+    exec_level.spawn(exec_task(source, segments).ok()?);
+    main.spawn(reader_task(links, received).ok()?);
+    main.spawn(planner_task(links, BlockQueue::new(queue)).ok()?);
+    main.spawn(reporter_task(links).ok()?);
+    main.spawn(parser_task(links).ok()?);
+    main.spawn(control_task(links).ok()?);
+    Some(())
+}
+
+/// Declares tasks: one of each on AVR; on the host one for each machine that tests make.
+macro_rules! tasks {
+    ($(fn $name:ident($($arg:ident: $type:ty),*) = $run:path;)+) => {$(
+        #[cfg_attr(target_arch = "avr", embassy_executor::task)]
+        #[cfg_attr(not(target_arch = "avr"), embassy_executor::task(pool_size = 200))]
+        async fn $name($($arg: $type),*) -> ! {
+            $run($($arg),*).await
+        }
+    )+};
+}
+
+tasks! {
+    fn exec_task(blocks: BlockSource, segments: Producer<Segment, SEGMENTS>) = exec::run;
+    fn reader_task(links: &'static Links, received: Received) = reader::run;
+    fn planner_task(links: &'static Links, queue: BlockQueue) = planner::run;
+    fn reporter_task(links: &'static Links) = reporter::run;
+    fn control_task(links: &'static Links) = control::run;
+    fn parser_task(links: &'static Links) = parser::run;
+}

@@ -1,0 +1,93 @@
+//! The ATmega2560: all the registers, the interrupts, the two executors' loops.
+//!
+//! | interrupt | file | level | does |
+//! |---|---|---|---|
+//! | TIMER1_COMPA | `stepper` | 0 | one tick of the step generator |
+//! | USART0_RX, USART0_UDRE | `uart` | 1 | bytes between the line and the rings |
+//! | TIMER0_COMPA | `time` | 1 | counts milliseconds |
+//! | USART3_UDRE | `exec` | 2 | software interrupt: polls the exec executor, interrupts on |
+//!
+//! Everything else runs in thread mode, from `executor::run`.
+
+pub mod exec;
+pub mod executor;
+pub mod gpio;
+pub mod panic;
+pub mod stepper;
+pub mod time;
+pub mod uart;
+
+use avr_device::atmega2560::Peripherals;
+
+use crate::hal::event::Event;
+
+/// The peripherals.
+///
+/// Each register has one owner, named in the table above; the others are set up before interrupts
+/// are on.
+pub(super) fn peripherals() -> Peripherals {
+    // SAFETY: see above: no register is written from two levels, but for single-instruction bit
+    // operations.
+    unsafe { Peripherals::steal() }
+}
+
+/// Starts the firmware anew, as if the reset button had been pressed: by the watchdog.
+pub fn reset() -> ! {
+    avr_device::interrupt::disable();
+    stepper::kill();
+    const WDTCSR: *mut u8 = 0x60 as *mut u8;
+    const CHANGE: u8 = 1 << 4 | 1 << 3;
+    const SHORTEST: u8 = 1 << 3;
+    // SAFETY: the timed sequence of the data sheet (13.5), with interrupts off.
+    unsafe {
+        WDTCSR.write_volatile(CHANGE);
+        WDTCSR.write_volatile(SHORTEST);
+    }
+    loop {
+        avr_device::asm::nop();
+    }
+}
+
+/// Takes the watchdog off, which stays on over the reset it causes. First thing at start-up.
+pub fn watchdog_off() {
+    const MCUSR: *mut u8 = 0x54 as *mut u8;
+    const WDTCSR: *mut u8 = 0x60 as *mut u8;
+    // SAFETY: the sequence of the data sheet (13.5), with interrupts off; nobody else is running.
+    unsafe {
+        MCUSR.write_volatile(0);
+        WDTCSR.write_volatile(1 << 4 | 1 << 3);
+        WDTCSR.write_volatile(0);
+    }
+}
+
+/// The event bits: general-purpose I/O register 0, where a bit is set or cleared in one instruction.
+pub mod flags {
+    use super::Event;
+
+    const GPIOR0: *mut u8 = 0x3E as *mut u8;
+
+    /// Sets a bit. Any level.
+    #[inline(always)]
+    pub fn set(event: Event) {
+        // One `sbi` for a constant bit: cannot be torn.
+        // SAFETY: the register is nobody else's.
+        unsafe { GPIOR0.write_volatile(GPIOR0.read_volatile() | 1 << event as u8) };
+    }
+
+    /// The bits that are set, cleared by reading. Thread mode.
+    pub fn take() -> u8 {
+        // SAFETY: the register is nobody else's; interrupts are off in between.
+        avr_device::interrupt::free(|_| unsafe {
+            let bits = GPIOR0.read_volatile();
+            GPIOR0.write_volatile(0);
+            bits
+        })
+    }
+
+    /// Whether any is set.
+    #[inline(always)]
+    pub fn any() -> bool {
+        // SAFETY: as in `set`.
+        unsafe { GPIOR0.read_volatile() != 0 }
+    }
+}

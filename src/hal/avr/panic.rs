@@ -1,0 +1,22 @@
+//! The last resort. No panic is meant to be reachable after start-up; should one be, motion and
+//! outputs stop and the machine stays still until it is reset.
+
+use crate::boards::ACTIVE;
+
+/// Stops the step timer, switches drivers and hazardous outputs off, and stays.
+pub fn halt() -> ! {
+    avr_device::interrupt::disable();
+    super::stepper::kill();
+    for &hazard in ACTIVE.hazards {
+        super::gpio::low(hazard);
+    }
+    super::gpio::power(false);
+    loop {
+        avr_device::asm::nop();
+    }
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    halt()
+}

@@ -1,0 +1,167 @@
+//! The step timer and the step interrupt.
+//!
+//! Timer 1 counts CPU cycles up to the segment's tick period (CTC), so ticks are exact to the cycle
+//! whatever the interrupt takes. The interrupt is level 0: it runs with interrupts off and owns the
+//! step generator and the pins.
+
+use core::cell::UnsafeCell;
+
+use super::{exec, gpio};
+use crate::boards::{ACTIVE, Timer};
+use crate::hal::byte::SharedByte;
+use crate::hal::ring::{Consumer, Producer, Ring};
+use crate::motion::dda::{Dda, Pins, SEGMENTS, Segment};
+
+const _: () = assert!(matches!(ACTIVE.step_timer, Timer::T1), "the step timer is timer 1");
+
+const TCCR1B: *mut u8 = 0x81 as *mut u8;
+const TCNT1: *mut u16 = 0x84 as *mut u16;
+const OCR1A: *mut u16 = 0x88 as *mut u16;
+const TIFR1: *mut u8 = 0x36 as *mut u8;
+const TIMSK1: *mut u8 = 0x6F as *mut u8;
+/// CTC with OCR1A as top, clock not divided.
+const RUN: u8 = 1 << 3 | 1;
+/// The same, stopped.
+const HALT: u8 = 1 << 3;
+const OCF1A: u8 = 1 << 1;
+
+/// Cycles from starting the timer to the first tick.
+const FIRST_TICK: u16 = 400;
+
+static RING: Ring<Segment, SEGMENTS> = Ring::new();
+static RUNNING: SharedByte = SharedByte::new(0);
+/// Bit m: motor m's direction pin is inverted.
+static INVERTED: SharedByte = SharedByte::new(0);
+
+struct Level0 {
+    dda: Dda,
+    segments: Option<Consumer<Segment, SEGMENTS>>,
+}
+
+struct Owned(UnsafeCell<Level0>);
+
+// SAFETY: touched by the step interrupt only, after `start`, which runs before interrupts are on.
+unsafe impl Sync for Owned {}
+
+static STATE: Owned = Owned(UnsafeCell::new(Level0 { dda: Dda::new(), segments: None }));
+
+/// Sets the timer up. Before interrupts are on; `None` after the first time.
+pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
+    let (producer, consumer) = RING.split()?;
+    // SAFETY: interrupts are off, nobody else looks.
+    unsafe {
+        (*STATE.0.get()).segments = Some(consumer);
+        TCCR1B.write_volatile(HALT);
+        TIMSK1.write_volatile(1 << 1);
+    }
+    Some(producer)
+}
+
+/// Starts the ticks if they have stopped. For exec, after it has queued a segment.
+pub fn go() {
+    if RUNNING.get() != 0 {
+        return;
+    }
+    gpio::power(true);
+    RUNNING.set(1);
+    // SAFETY: the timer stands still, so its interrupt cannot interfere.
+    unsafe {
+        TCNT1.write_volatile(0);
+        OCR1A.write_volatile(FIRST_TICK);
+        TIFR1.write_volatile(OCF1A);
+        TCCR1B.write_volatile(RUN);
+    }
+}
+
+/// Whether ticks are coming.
+pub fn running() -> bool {
+    RUNNING.get() != 0
+}
+
+/// Which direction pins are inverted: bit m for motor m. Takes effect when a direction changes.
+pub fn set_inverted(motors: u8) {
+    INVERTED.set(motors);
+}
+
+/// Stops the ticks at once, wherever the motors are. For the panic handler.
+pub fn kill() {
+    // SAFETY: a single store; the machine stops for good.
+    unsafe { TCCR1B.write_volatile(HALT) };
+}
+
+struct BoardPins;
+
+/// Does the same for each motor with a constant index, so that pins fold into single instructions.
+macro_rules! each_motor {
+    ($m:ident => $body:expr) => {{
+        {
+            const $m: usize = 0;
+            $body
+        }
+        {
+            const $m: usize = 1;
+            $body
+        }
+        {
+            const $m: usize = 2;
+            $body
+        }
+        {
+            const $m: usize = 3;
+            $body
+        }
+    }};
+}
+
+impl Pins for BoardPins {
+    #[inline(always)]
+    fn rise(&mut self, motors: u8) {
+        each_motor!(M => if motors & (1 << M) != 0 {
+            gpio::high(ACTIVE.motors[M].step);
+        });
+    }
+
+    #[inline(always)]
+    fn fall(&mut self, _motors: u8) {
+        each_motor!(M => gpio::low(ACTIVE.motors[M].step));
+    }
+
+    #[inline(always)]
+    fn direction(&mut self, backwards: u8) {
+        let level = backwards ^ INVERTED.get();
+        each_motor!(M => if level & (1 << M) != 0 {
+            gpio::high(ACTIVE.motors[M].dir);
+        } else {
+            gpio::low(ACTIVE.motors[M].dir);
+        });
+    }
+
+    #[inline(always)]
+    fn period(&mut self, cycles: u16) {
+        // The counter has just passed 0, so the new top is always ahead of it.
+        // SAFETY: the step timer's register, at level 0.
+        unsafe { OCR1A.write_volatile(cycles - 1) };
+    }
+
+    #[inline(always)]
+    fn slot_free(&mut self) {
+        exec::pend();
+    }
+
+    #[inline(always)]
+    fn stop(&mut self) {
+        // SAFETY: the step timer's register, at level 0.
+        unsafe { TCCR1B.write_volatile(HALT) };
+        RUNNING.set(0);
+        exec::pend();
+    }
+}
+
+#[avr_device::interrupt(atmega2560)]
+fn TIMER1_COMPA() {
+    // SAFETY: this interrupt owns it, and does not nest.
+    let state = unsafe { &mut *STATE.0.get() };
+    if let Some(segments) = &mut state.segments {
+        state.dda.tick(&mut BoardPins, segments);
+    }
+}

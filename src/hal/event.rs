@@ -1,0 +1,92 @@
+//! Event bits: how interrupts and the exec level tell thread-mode tasks that something happened.
+//!
+//! An interrupt never calls a `Waker`: it sets one bit of [`imp::flags`](super::imp::flags), which
+//! costs two cycles. The main loop turns bits into wake-ups between polls, in thread mode. A bit stays
+//! set until then, so no event is lost; events that repeat before the loop looks merge into one.
+//! Each event has one waiting task at most.
+
+use core::cell::Cell;
+use core::future::poll_fn;
+use core::task::{Poll, Waker};
+
+use super::imp;
+
+/// What happened. The discriminant is the bit.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Event {
+    /// Bytes arrived, or were lost.
+    Received = 0,
+    /// The transmit ring drained by a byte.
+    Transmitted = 1,
+    /// A millisecond has passed.
+    Tick = 2,
+    /// Exec released a block.
+    BlockDone = 3,
+    /// A real-time character arrived.
+    Realtime = 4,
+    /// A thread-mode task was woken: the executor has work.
+    Thread = 7,
+}
+
+/// Events that tasks wait for: those below this bit.
+const WAITABLE: usize = 5;
+
+/// The waiting tasks. Thread mode only.
+pub struct Waiters([Cell<Option<Waker>>; WAITABLE]);
+
+// SAFETY: touched in thread mode only, by `wait` and `dispatch`, neither of which preempts the other.
+unsafe impl Sync for Waiters {}
+
+impl Waiters {
+    /// Nobody waits.
+    pub const fn new() -> Self {
+        Self([const { Cell::new(None) }; WAITABLE])
+    }
+}
+
+impl Default for Waiters {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+machine_static! {
+    fn waiters() -> Waiters = Waiters::new();
+}
+
+/// Waits until `ready` gives a value, asking again after each `event`. Thread mode only.
+pub async fn wait<R>(event: Event, mut ready: impl FnMut() -> Option<R>) -> R {
+    poll_fn(|cx| {
+        // An event between the question and the registration sets its bit, which the main loop
+        // sees after this poll: nothing is missed.
+        if let Some(value) = ready() {
+            return Poll::Ready(value);
+        }
+        if let Some(slot) = waiters().0.get(event as usize) {
+            slot.set(Some(cx.waker().clone()));
+        }
+        Poll::Pending
+    })
+    .await
+}
+
+/// Waits for the next `event` after now.
+pub async fn next(event: Event) {
+    let mut first = true;
+    wait(event, || (!core::mem::replace(&mut first, false)).then_some(())).await;
+}
+
+/// Wakes who waits for the events in `bits`. The main loop calls it, in thread mode.
+pub fn dispatch(bits: u8) {
+    for (bit, slot) in waiters().0.iter().enumerate() {
+        if bits & (1 << bit) != 0 {
+            if let Some(waker) = slot.take() {
+                waker.wake();
+            }
+        }
+    }
+    if bits & (1 << Event::Tick as u8) != 0 {
+        imp::time::wake_expired();
+    }
+}

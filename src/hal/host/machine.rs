@@ -1,0 +1,99 @@
+//! One machine on the host: the firmware's tasks, its clock, and a sender's end of the line.
+
+use std::boxed::Box;
+use std::vec::Vec;
+
+use embassy_executor::raw::Executor;
+
+use super::{clock, exec, executor, flags, now, stepper, time, uart};
+use crate::hal::event;
+
+/// The machine of this thread.
+pub struct Machine {
+    main: &'static Executor,
+    exec: &'static Executor,
+}
+
+impl Machine {
+    /// Makes the machine and boots the firmware at `baud`. One for each thread: `None` for a second.
+    pub fn boot(baud: u32) -> Option<Self> {
+        let main: &'static Executor = Box::leak(Box::new(Executor::new(executor::THREAD)));
+        let exec: &'static Executor = Box::leak(Box::new(Executor::new(executor::EXEC)));
+        crate::app::start(main.spawner(), exec.spawner(), baud)?;
+        let machine = Self { main, exec };
+        machine.settle();
+        Some(machine)
+    }
+
+    /// The sender puts bytes on the line; they take their time.
+    pub fn send(&self, bytes: &[u8]) {
+        uart::send(bytes);
+    }
+
+    /// What the firmware has sent since the last call.
+    pub fn received(&self) -> Vec<u8> {
+        uart::received()
+    }
+
+    /// What the step pins have done so far.
+    pub fn emitted(&self) -> stepper::Emitted {
+        stepper::emitted()
+    }
+
+    /// Runs for a time.
+    pub fn run_ms(&self, ms: u64) {
+        let end = now() + ms * time::CYCLES_PER_MS;
+        while self.advance(end) {}
+    }
+
+    /// Runs until `done`, for `ms` at most. Whether it came to that.
+    pub fn run_until(&self, ms: u64, mut done: impl FnMut() -> bool) -> bool {
+        let end = now() + ms * time::CYCLES_PER_MS;
+        while !done() {
+            if !self.advance(end) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Moves the clock to the next event before `end` and lets the firmware react.
+    fn advance(&self, end: u64) -> bool {
+        let step = stepper::next_tick();
+        let bytes = uart::next_event();
+        let tick = time::next_tick();
+        let next = step.min(bytes).min(tick);
+        if next > end {
+            clock().set(end);
+            return false;
+        }
+        clock().set(next);
+        if step == next {
+            stepper::tick();
+        }
+        if bytes == next {
+            uart::advance();
+        }
+        if tick == next {
+            time::tick();
+        }
+        self.settle();
+        true
+    }
+
+    /// Polls until nobody has anything left to do now.
+    fn settle(&self) {
+        loop {
+            if exec::take_request() {
+                // SAFETY: not called from inside a task.
+                unsafe { self.exec.poll() };
+            } else if flags::any() {
+                event::dispatch(flags::take());
+                // SAFETY: not called from inside a task.
+                unsafe { self.main.poll() };
+            } else {
+                break;
+            }
+        }
+    }
+}

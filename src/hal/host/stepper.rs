@@ -1,0 +1,160 @@
+//! The step timer on the host: the real step generator, ticking in mocked time, with pins that count.
+
+use core::cell::{Cell, RefCell};
+use std::vec::Vec;
+
+use super::{NEVER, exec, gpio, now};
+use crate::boards::MOTORS;
+use crate::hal::ring::{Consumer, Producer, Ring};
+use crate::motion::dda::{Dda, Pins, SEGMENTS, Segment};
+
+const FIRST_TICK: u64 = 400;
+
+/// A step as the pins see it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StepEdge {
+    /// CPU cycle.
+    pub cycle: u64,
+    /// Motor, 0 to 3.
+    pub motor: u8,
+    /// Direction.
+    pub backwards: bool,
+}
+
+/// What the pins have done so far.
+#[derive(Clone, Debug, Default)]
+pub struct Emitted {
+    /// Position of each motor by its pulses.
+    pub position: [i64; MOTORS],
+    /// Pulses of each motor.
+    pub steps: [u64; MOTORS],
+    /// Every step, if [`record`] asked for it.
+    pub edges: Vec<StepEdge>,
+}
+
+struct Pinned {
+    backwards: u8,
+    inverted: u8,
+    period: u64,
+    stopped: bool,
+    recording: bool,
+    emitted: Emitted,
+}
+
+struct Stepper {
+    segments: RefCell<Option<Consumer<Segment, SEGMENTS>>>,
+    dda: RefCell<Dda>,
+    pins: RefCell<Pinned>,
+    next_tick: Cell<u64>,
+}
+
+machine_static! {
+    fn ring() -> Ring<Segment, SEGMENTS> = Ring::new();
+    fn stepper() -> Stepper = Stepper {
+        segments: RefCell::new(None),
+        dda: RefCell::new(Dda::new()),
+        pins: RefCell::new(Pinned {
+            backwards: 0,
+            inverted: 0,
+            period: 0,
+            stopped: true,
+            recording: false,
+            emitted: Emitted::default(),
+        }),
+        next_tick: Cell::new(NEVER),
+    };
+}
+
+impl Pins for Pinned {
+    fn rise(&mut self, motors: u8) {
+        for m in 0..MOTORS {
+            if motors & (1 << m) != 0 {
+                let backwards = self.backwards & (1 << m) != 0;
+                self.emitted.position[m] += if backwards { -1 } else { 1 };
+                self.emitted.steps[m] += 1;
+                if self.recording {
+                    let edge = StepEdge { cycle: now(), motor: m as u8, backwards };
+                    self.emitted.edges.push(edge);
+                }
+            }
+        }
+    }
+
+    fn fall(&mut self, _motors: u8) {}
+
+    fn direction(&mut self, backwards: u8) {
+        self.backwards = backwards;
+    }
+
+    fn period(&mut self, cycles: u16) {
+        self.period = u64::from(cycles);
+    }
+
+    fn slot_free(&mut self) {
+        exec::pend();
+    }
+
+    fn stop(&mut self) {
+        self.stopped = true;
+        exec::pend();
+    }
+}
+
+/// Sets the timer up; `None` after the first time.
+pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
+    let (producer, consumer) = ring().split()?;
+    stepper().segments.replace(Some(consumer));
+    Some(producer)
+}
+
+/// Starts the ticks if they have stopped.
+pub fn go() {
+    if !running() {
+        gpio::power(true);
+        let mut pins = stepper().pins.borrow_mut();
+        pins.stopped = false;
+        pins.period = FIRST_TICK;
+        stepper().next_tick.set(now() + FIRST_TICK);
+    }
+}
+
+/// Whether ticks are coming.
+pub fn running() -> bool {
+    stepper().next_tick.get() != NEVER
+}
+
+/// Which direction pins are inverted.
+pub fn set_inverted(motors: u8) {
+    stepper().pins.borrow_mut().inverted = motors;
+}
+
+/// Which direction pins are inverted, as last set.
+pub fn inverted() -> u8 {
+    stepper().pins.borrow().inverted
+}
+
+/// Keeps every step from now on, not only counts.
+pub fn record() {
+    stepper().pins.borrow_mut().recording = true;
+}
+
+/// What the pins have done so far.
+pub fn emitted() -> Emitted {
+    stepper().pins.borrow().emitted.clone()
+}
+
+/// When the next tick is due.
+pub(super) fn next_tick() -> u64 {
+    stepper().next_tick.get()
+}
+
+/// One tick, at its time.
+pub(super) fn tick() {
+    let s = stepper();
+    let mut pins = s.pins.borrow_mut();
+    if let Some(segments) = s.segments.borrow_mut().as_mut() {
+        s.dda.borrow_mut().tick(&mut *pins, segments);
+    }
+    let next = if pins.stopped { NEVER } else { now() + pins.period };
+    s.next_tick.set(next);
+}

@@ -1,0 +1,54 @@
+//! embassy-time's driver over the machine's clock.
+
+use core::cell::RefCell;
+use core::task::Waker;
+
+use embassy_time_driver::{Driver, time_driver_impl};
+use embassy_time_queue_utils::Queue;
+
+use super::{flags, now};
+use crate::boards::ACTIVE;
+use crate::hal::event::Event;
+
+/// CPU cycles in a millisecond.
+pub(super) const CYCLES_PER_MS: u64 = ACTIVE.clock_hz as u64 / 1000;
+
+struct Timers(RefCell<Queue>);
+
+machine_static! {
+    fn timers() -> Timers = Timers(RefCell::new(Queue::new()));
+}
+
+struct Millis;
+
+time_driver_impl!(static DRIVER: Millis = Millis);
+
+impl Driver for Millis {
+    fn now(&self) -> u64 {
+        now() / CYCLES_PER_MS
+    }
+
+    fn schedule_wake(&self, at: u64, waker: &Waker) {
+        timers().0.borrow_mut().schedule_wake(at, waker);
+    }
+}
+
+/// Milliseconds since the machine was made.
+pub fn millis() -> u32 {
+    DRIVER.now() as u32
+}
+
+/// Wakes the tasks whose time has come.
+pub fn wake_expired() {
+    timers().0.borrow_mut().next_expiration(DRIVER.now());
+}
+
+/// When the next millisecond is due.
+pub(super) fn next_tick() -> u64 {
+    (now() / CYCLES_PER_MS + 1) * CYCLES_PER_MS
+}
+
+/// A millisecond has passed.
+pub(super) fn tick() {
+    flags::set(Event::Tick);
+}

@@ -1,0 +1,144 @@
+//! The serial line on the host: bytes arrive and leave one after the other at the baud rate.
+
+use core::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::vec::Vec;
+
+use super::{NEVER, flags, now};
+use crate::boards::ACTIVE;
+use crate::hal::event::Event;
+use crate::hal::ring::{Consumer, Producer, Ring};
+use crate::realtime;
+
+/// Size of each ring.
+pub const RING: usize = 256;
+
+/// What stands where bytes were lost. No line of text has it.
+pub const LOSS: u8 = 0;
+/// The same, where the byte that is replaced ended its line.
+pub const LOSS_AT_END: u8 = 1;
+
+fn loss_mark(byte: u8) -> u8 {
+    if byte == b'\n' || byte == b'\r' { LOSS_AT_END } else { LOSS }
+}
+
+/// Bytes received.
+pub type Received = Consumer<u8, RING>;
+/// Bytes to send. Call [`kick`] after filling it.
+pub type Outgoing = Producer<u8, RING>;
+
+#[derive(Default)]
+struct Line {
+    rx_in: Option<Producer<u8, RING>>,
+    tx_out: Option<Consumer<u8, RING>>,
+    /// Bytes the sender has yet to put on the line.
+    arriving: VecDeque<u8>,
+    /// What the firmware has sent.
+    sent: Vec<u8>,
+    /// The byte that is leaving.
+    leaving: Option<u8>,
+    lost: bool,
+    realtime: u8,
+}
+
+struct Uart {
+    line: RefCell<Line>,
+    byte_cycles: Cell<u64>,
+    next_rx: Cell<u64>,
+    next_tx: Cell<u64>,
+}
+
+machine_static! {
+    fn rx() -> Ring<u8, RING> = Ring::new();
+    fn tx() -> Ring<u8, RING> = Ring::new();
+    fn uart() -> Uart = Uart {
+        line: RefCell::new(Line::default()),
+        byte_cycles: Cell::new(1),
+        next_rx: Cell::new(NEVER),
+        next_tx: Cell::new(NEVER),
+    };
+}
+
+/// Starts the line at `baud`; `None` after the first time.
+pub fn start(baud: u32) -> Option<(Received, Outgoing)> {
+    let (rx_in, rx_out) = rx().split()?;
+    let (tx_in, tx_out) = tx().split()?;
+    let mut line = uart().line.borrow_mut();
+    line.rx_in = Some(rx_in);
+    line.tx_out = Some(tx_out);
+    uart().byte_cycles.set(u64::from(ACTIVE.clock_hz * 10 / baud));
+    Some((rx_out, tx_in))
+}
+
+/// Sends what the ring holds.
+pub fn kick() {
+    if uart().next_tx.get() == NEVER {
+        load_tx(&mut uart().line.borrow_mut());
+    }
+}
+
+/// Whether bytes have been lost since the last one queued: a mark is still to come.
+pub fn losing() -> bool {
+    uart().line.borrow().lost
+}
+
+/// The real-time characters since the last call, as bits (see [`realtime`]).
+pub fn take_realtime() -> u8 {
+    core::mem::take(&mut uart().line.borrow_mut().realtime)
+}
+
+/// The sender puts bytes on the line.
+pub(super) fn send(bytes: &[u8]) {
+    uart().line.borrow_mut().arriving.extend(bytes);
+    if uart().next_rx.get() == NEVER {
+        uart().next_rx.set(now() + uart().byte_cycles.get());
+    }
+}
+
+/// Takes what the firmware has sent.
+pub(super) fn received() -> Vec<u8> {
+    core::mem::take(&mut uart().line.borrow_mut().sent)
+}
+
+/// When the next byte is through, in either direction.
+pub(super) fn next_event() -> u64 {
+    uart().next_rx.get().min(uart().next_tx.get())
+}
+
+/// The bytes that are through by now.
+pub(super) fn advance() {
+    let u = uart();
+    let mut line = u.line.borrow_mut();
+    if u.next_rx.get() <= now() {
+        if let Some(byte) = line.arriving.pop_front() {
+            arrive(&mut line, byte);
+        }
+        let more = !line.arriving.is_empty();
+        u.next_rx.set(if more { now() + u.byte_cycles.get() } else { NEVER });
+    }
+    if u.next_tx.get() <= now() {
+        if let Some(byte) = line.leaving.take() {
+            line.sent.push(byte);
+        }
+        flags::set(Event::Transmitted);
+        load_tx(&mut line);
+    }
+}
+
+fn load_tx(line: &mut Line) {
+    line.leaving = line.tx_out.as_mut().and_then(Consumer::pop);
+    let busy = line.leaving.is_some();
+    uart().next_tx.set(if busy { now() + uart().byte_cycles.get() } else { NEVER });
+}
+
+fn arrive(line: &mut Line, byte: u8) {
+    let special = realtime::bit(byte);
+    if special != 0 {
+        line.realtime |= special;
+        flags::set(Event::Realtime);
+        return;
+    }
+    let byte = if line.lost { loss_mark(byte) } else { byte };
+    line.lost = line.rx_in.as_mut().is_some_and(|ring| ring.push(byte).is_err());
+    flags::set(Event::Received);
+}

@@ -1,0 +1,254 @@
+//! A ring between one producer and one consumer that may preempt each other.
+//!
+//! The indices are single bytes, which an 8-bit CPU reads and writes in one instruction, so neither
+//! side ever masks interrupts. Slots are filled and read in place. One slot stays empty to tell full
+//! from empty: a `Ring<T, N>` holds `N - 1`.
+//!
+//! When full, [`Producer::slot`] is `None`; the producer waits, or counts the loss.
+
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+
+use super::byte::SharedByte;
+
+/// The storage. `N` is 2 to 256.
+pub struct Ring<T, const N: usize> {
+    slots: UnsafeCell<[MaybeUninit<T>; N]>,
+    /// Next slot to fill; written by the producer only.
+    head: SharedByte,
+    /// Next slot to read; written by the consumer only.
+    tail: SharedByte,
+    taken: SharedByte,
+}
+
+// SAFETY: a slot belongs to the producer until `head` has moved past it and to the consumer until
+// `tail` has; `split` hands out one of each, once.
+unsafe impl<T: Send, const N: usize> Sync for Ring<T, N> {}
+
+const fn next<const N: usize>(index: u8) -> u8 {
+    let next = index.wrapping_add(1);
+    if next as usize == N { 0 } else { next }
+}
+
+impl<T: Copy, const N: usize> Ring<T, N> {
+    const SIZE_OK: () = assert!(N >= 2 && N <= 256);
+
+    /// An empty ring.
+    pub const fn new() -> Self {
+        const { Self::SIZE_OK };
+        Self {
+            slots: UnsafeCell::new([MaybeUninit::uninit(); N]),
+            head: SharedByte::new(0),
+            tail: SharedByte::new(0),
+            taken: SharedByte::new(0),
+        }
+    }
+
+    /// Its two ends. `None` after the first time.
+    pub fn split(&'static self) -> Option<(Producer<T, N>, Consumer<T, N>)> {
+        // No compare-and-swap on AVR; this runs once, before interrupts are on.
+        if self.taken.get() != 0 {
+            return None;
+        }
+        self.taken.set(1);
+        Some((Producer(self), Consumer(self)))
+    }
+
+    /// Values put in and not yet released. Each side sees the other's doings at once or a little later.
+    pub fn used(&self) -> usize {
+        let head = self.head.get() as usize;
+        let tail = self.tail.get() as usize;
+        if head >= tail { head - tail } else { N - (tail - head) }
+    }
+
+    fn slot(&self, index: u8) -> *mut T {
+        // Stays inside the array: indices are below N by construction.
+        self.slots.get().cast::<T>().wrapping_add(index as usize)
+    }
+}
+
+impl<T: Copy, const N: usize> Default for Ring<T, N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The end that fills.
+pub struct Producer<T: 'static, const N: usize>(&'static Ring<T, N>);
+
+impl<T: Copy, const N: usize> Producer<T, N> {
+    /// Number of slots that can be filled now.
+    #[inline]
+    pub fn free(&self) -> usize {
+        N - 1 - self.0.used()
+    }
+
+    /// Number of slots the consumer has not released.
+    #[inline]
+    pub fn used(&self) -> usize {
+        self.0.used()
+    }
+
+    /// Puts a value in. Gives it back if the ring is full.
+    #[inline]
+    pub fn push(&mut self, value: T) -> Result<(), T> {
+        let head = self.0.head.get();
+        let after = next::<N>(head);
+        if after == self.0.tail.get() {
+            return Err(value);
+        }
+        // SAFETY: the slot at `head` is the producer's until `head` moves.
+        unsafe { self.0.slot(head).write(value) };
+        self.0.head.set(after);
+        Ok(())
+    }
+
+    /// A look at a value pushed earlier; `back` 0 is the newest. `None` if it has been released.
+    pub fn pushed(&self, back: usize) -> Option<&T> {
+        if back >= self.0.used() {
+            return None;
+        }
+        // SAFETY: the slot was written by this producer, which alone could overwrite it, and the
+        // consumer never writes to slots; the borrow of `self` keeps `push` and `amend` away.
+        Some(unsafe { &*self.0.slot(self.index_of(back)) })
+    }
+
+    /// Changes a value pushed earlier; `back` 0 is the newest. False if it has been released.
+    ///
+    /// The caller keeps the consumer from running meanwhile (see `imp::exec::lock`): `_ceiling` is
+    /// the witness.
+    pub fn amend(&mut self, _ceiling: &Ceiling, back: usize, change: impl FnOnce(&mut T)) -> bool {
+        if back >= self.0.used() {
+            return false;
+        }
+        // SAFETY: the witness says that the consumer cannot run, and it holds no reference into
+        // the ring while it does not run: `Consumer` gives out copies only.
+        change(unsafe { &mut *self.0.slot(self.index_of(back)) });
+        true
+    }
+
+    fn index_of(&self, back: usize) -> u8 {
+        let head = self.0.head.get() as usize;
+        let index = if head > back { head - 1 - back } else { head + N - 1 - back };
+        index as u8
+    }
+}
+
+/// The end that reads.
+pub struct Consumer<T: 'static, const N: usize>(&'static Ring<T, N>);
+
+impl<T: Copy, const N: usize> Consumer<T, N> {
+    /// Number of values waiting.
+    #[inline]
+    pub fn len(&self) -> usize {
+        self.0.used()
+    }
+
+    /// Whether none waits.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.0.head.get() == self.0.tail.get()
+    }
+
+    /// A copy of what `look` picks from the value `ahead` places behind the oldest.
+    #[inline]
+    pub fn peek<R: Copy>(&self, ahead: usize, look: impl FnOnce(&T) -> R) -> Option<R> {
+        if ahead >= self.0.used() {
+            return None;
+        }
+        let tail = self.0.tail.get() as usize;
+        let index = if tail + ahead >= N { tail + ahead - N } else { tail + ahead };
+        // SAFETY: the slot is the consumer's until `tail` moves past it.
+        Some(look(unsafe { &*self.0.slot(index as u8) }))
+    }
+
+    /// Releases the oldest value.
+    #[inline]
+    pub fn release(&mut self) {
+        if !self.is_empty() {
+            let tail = self.0.tail.get();
+            self.0.tail.set(next::<N>(tail));
+        }
+    }
+
+    /// Takes the oldest value.
+    #[inline]
+    pub fn pop(&mut self) -> Option<T> {
+        if self.is_empty() {
+            return None;
+        }
+        let tail = self.0.tail.get();
+        // SAFETY: as in `peek`.
+        let value = unsafe { self.0.slot(tail).read() };
+        self.0.tail.set(next::<N>(tail));
+        Some(value)
+    }
+}
+
+/// Witness that the exec level cannot run: only `imp::exec::lock` and tests make one.
+pub struct Ceiling(pub(in crate::hal) ());
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    fn ring<const N: usize>() -> (Producer<u16, N>, Consumer<u16, N>) {
+        let ring: &'static Ring<u16, N> = Box::leak(Box::new(Ring::new()));
+        ring.split().expect("first split")
+    }
+
+    #[test]
+    fn keeps_order_and_says_when_full() {
+        let (mut p, mut c) = ring::<4>();
+        for round in 0..10 {
+            assert_eq!(p.free(), 3);
+            for i in 0..3 {
+                assert_eq!(p.push(round * 10 + i), Ok(()));
+            }
+            assert_eq!(p.push(99), Err(99));
+            assert_eq!(c.len(), 3);
+            assert_eq!(c.peek(2, |v| *v), Some(round * 10 + 2));
+            assert_eq!(c.peek(3, |v| *v), None);
+            let got: Vec<u16> = core::iter::from_fn(|| c.pop()).collect();
+            assert_eq!(got, [round * 10, round * 10 + 1, round * 10 + 2]);
+        }
+    }
+
+    #[test]
+    fn the_producer_sees_and_amends_what_is_still_queued() {
+        let (mut p, mut c) = ring::<4>();
+        for v in 1..=3 {
+            p.push(v).expect("room");
+        }
+        c.release();
+        p.push(4).expect("room");
+        assert_eq!((p.pushed(0), p.pushed(2), p.pushed(3)), (Some(&4), Some(&2), None));
+        assert!(p.amend(&Ceiling(()), 1, |v| *v = 30));
+        assert!(!p.amend(&Ceiling(()), 3, |v| *v = 0));
+        let got: Vec<u16> = core::iter::from_fn(|| c.pop()).collect();
+        assert_eq!(got, [2, 30, 4]);
+    }
+
+    #[test]
+    fn wraps_at_256_with_byte_indices() {
+        let (mut p, mut c) = ring::<256>();
+        for i in 0..1000u16 {
+            p.push(i).expect("room");
+            assert_eq!(p.used(), 1);
+            assert_eq!(c.pop(), Some(i));
+        }
+        for i in 0..255 {
+            p.push(i).expect("room");
+        }
+        assert_eq!(p.free(), 0);
+    }
+
+    #[test]
+    fn splits_once() {
+        let ring: &'static Ring<u8, 4> = Box::leak(Box::new(Ring::new()));
+        assert!(ring.split().is_some());
+        assert!(ring.split().is_none());
+    }
+}

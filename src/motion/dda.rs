@@ -1,0 +1,152 @@
+//! The step generator: what happens at one tick of the step timer, without any register.
+//!
+//! Owned by the step interrupt (level 0). Each motor has a 16-bit phase; [`STEP`] of it is one step.
+//! A tick adds the segment's increment, and a step is due when bit 15 flips: the phase passed a
+//! multiple of [`STEP`]. So a motor steps at most once a tick, `increment = STEP` is a step on every
+//! tick, and a motor whose increment is `STEP / 2^k` steps on every `2^k`th tick exactly.
+//!
+//! ```text
+//!   tick   n-1          n           n+1
+//!          |            |            |
+//!          +-out        +-out        +-out     step pins rise: the bits computed one tick before
+//!          +-load?      +-load?      +-load?   segment used up: take the next, set directions
+//!          +-add        +-add        +-add     phases advance, bits for the next tick
+//!          +-fall       +-fall       +-fall    step pins fall
+//! ```
+//!
+//! Pins rise first, so a pulse's time does not depend on the computation, and fall last, so that a
+//! pulse is as wide as the computation (over 2 us). Directions change after the last pulse of the old
+//! segment and a whole tick before the first of the new one.
+//!
+//! A phase is the motor's true position between steps. When the direction of a motor reverses, its
+//! phase is complemented: counting a complement up is counting the phase down, so the fraction
+//! of a step survives any reversal.
+//!
+//! Cost: see `tests/sim/tests/budgets.rs`, which measures the whole interrupt.
+
+use crate::boards::MOTORS;
+use crate::hal::ring::Consumer;
+
+/// One step, in phase units.
+pub const STEP: u16 = 0x8000;
+
+/// Where phases start: a little past half a step, so that a position is rounded to the nearest step
+/// and a rest of up to [`PHASE_MARGIN`] left by the segments before never moves a step of a motor that
+/// runs on exact ticks.
+pub const PHASE_START: u16 = STEP / 2 + PHASE_MARGIN;
+
+/// See [`PHASE_START`].
+pub const PHASE_MARGIN: u16 = 1024;
+
+/// Segments prepared ahead, plus one slot that stays empty.
+pub const SEGMENTS: usize = 5;
+
+/// A stretch of constant velocity, ready for the interrupt.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Segment {
+    /// Phase added per tick, 0 to [`STEP`].
+    pub increment: [u16; MOTORS],
+    /// Ticks it lasts, at least 1.
+    pub ticks: u16,
+    /// CPU cycles from tick to tick.
+    pub period: u16,
+    /// Bit m set: motor m runs backwards.
+    pub backwards: u8,
+}
+
+/// What the step generator does to the outside.
+pub trait Pins {
+    /// Raises the step pins in `motors` (bit m: motor m).
+    fn rise(&mut self, motors: u8);
+    /// Lets the step pins in `motors` fall.
+    fn fall(&mut self, motors: u8);
+    /// Sets all direction pins (bit m set: motor m runs backwards).
+    fn direction(&mut self, backwards: u8);
+    /// Ticks come this many CPU cycles apart from now on.
+    fn period(&mut self, cycles: u16);
+    /// A segment slot is free.
+    fn slot_free(&mut self);
+    /// No segment: no more ticks.
+    fn stop(&mut self);
+}
+
+/// The generator's state.
+#[derive(Debug)]
+pub struct Dda {
+    phase: [u16; MOTORS],
+    increment: [u16; MOTORS],
+    ticks: u16,
+    backwards: u8,
+    /// Steps due at the next tick.
+    due: u8,
+}
+
+impl Dda {
+    /// At rest.
+    pub const fn new() -> Self {
+        Self {
+            phase: [PHASE_START; MOTORS],
+            increment: [0; MOTORS],
+            ticks: 0,
+            backwards: 0,
+            due: 0,
+        }
+    }
+
+    /// One tick.
+    #[inline(always)]
+    pub fn tick(&mut self, pins: &mut impl Pins, segments: &mut Consumer<Segment, SEGMENTS>) {
+        let due = self.due;
+        pins.rise(due);
+        if self.ticks == 0 && !self.load(pins, segments) {
+            self.due = 0;
+            pins.fall(due);
+            pins.stop();
+            return;
+        }
+        self.ticks -= 1;
+        let mut next = 0;
+        let mut m = 0;
+        while m < MOTORS {
+            let before = self.phase[m];
+            let after = before.wrapping_add(self.increment[m]);
+            self.phase[m] = after;
+            if (before ^ after) & STEP != 0 {
+                next |= 1 << m;
+            }
+            m += 1;
+        }
+        self.due = next;
+        pins.fall(due);
+    }
+
+    /// Takes the next segment. False when there is none.
+    #[inline(always)]
+    fn load(&mut self, pins: &mut impl Pins, segments: &mut Consumer<Segment, SEGMENTS>) -> bool {
+        let Some(segment) = segments.pop() else {
+            return false;
+        };
+        let turned = segment.backwards ^ self.backwards;
+        // Always, so that a polarity that was changed meanwhile takes effect.
+        pins.direction(segment.backwards);
+        if turned != 0 {
+            self.backwards = segment.backwards;
+            for m in 0..MOTORS {
+                if turned & (1 << m) != 0 {
+                    self.phase[m] = !self.phase[m];
+                }
+            }
+        }
+        self.increment = segment.increment;
+        self.ticks = segment.ticks;
+        pins.period(segment.period);
+        pins.slot_free();
+        true
+    }
+}
+
+impl Default for Dda {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,120 @@
+//! Every link between tasks: what goes through it, who fills it, who empties it, what happens when it
+//! is full.
+//!
+//! | link | carries | depth | RAM | from | to | when full |
+//! |---|---|---|---|---|---|---|
+//! | `uart` receive ring | bytes | 255 | 260 B | RX interrupt | reader | the line is damaged: refused with status 13 |
+//! | [`Links::lines`] | lines | 8 lines, 640 B | 670 B | reader | parser | bytes stay in the receive ring |
+//! | [`Links::commands`] | canonical commands | 1 | 70 B | parser | planner | the parser takes control lines only |
+//! | block ring | blocks | 40 | 1,900 B | planner | exec | the planner waits; `commands` stays taken |
+//! | segment ring | segments | 4 | 60 B | exec | step interrupt | exec waits for its next run |
+//! | `uart` transmit ring | bytes | 255 | 260 B | parser, reporter | TX interrupt | the writer waits, response half sent |
+//!
+//! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
+//! lines wait in the pool, and their responses wait with them. The sender has at most its lines in
+//! flight there.
+//!
+//! All but the interrupt rings belong to thread-mode tasks of one executor, which take turns: plain
+//! `RefCell`s, never borrowed across an `.await`.
+
+use core::cell::{Cell, RefCell};
+
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::mutex::Mutex;
+use embassy_sync::signal::Signal;
+
+use super::lines::LinePool;
+use super::tx::Tx;
+use crate::config::Settings;
+use crate::gcode::command::Commands;
+use crate::gcode::interpreter::Interpreter;
+use crate::motion::exec::Snapshot;
+use crate::motion::queue;
+use crate::protocol::{Mode, StatusReport};
+use crate::status::Status;
+
+/// A signal between thread-mode tasks.
+pub type Wake = Signal<NoopRawMutex, ()>;
+
+/// The links. One for the machine, made at start-up.
+pub struct Links {
+    /// Received lines.
+    pub lines: RefCell<LinePool>,
+    /// The reader waits for it when the pool is full.
+    pub pool_space: Wake,
+    /// There is a line, or the planner is ready: the parser looks again.
+    pub parser_wake: Wake,
+    /// What the planner is to do; valid while `commands_taken`.
+    pub commands: RefCell<Commands>,
+    /// The planner works on `commands`.
+    pub commands_taken: Cell<bool>,
+    /// `commands` was filled.
+    pub planner_wake: Wake,
+    /// Something that reports show may have changed.
+    pub reporter_wake: Wake,
+    /// Blocks that came and went, for queue reports.
+    pub queue_count: QueueCount,
+    /// A setting has changed what steps mean: the planner counts them anew.
+    pub resync: Cell<bool>,
+    /// The line is losing bytes, and the sender has been told.
+    pub losing: Cell<bool>,
+    /// An exception to report.
+    pub exception: Cell<Option<Status>>,
+    /// How the sender wants to be answered.
+    pub mode: Cell<Mode>,
+    /// What status reports hold.
+    pub report: RefCell<StatusReport>,
+    /// The line to the sender.
+    pub tx: Mutex<NoopRawMutex, Tx>,
+    /// Settings in force.
+    pub settings: RefCell<Settings>,
+    /// The G-code model. The parser advances it; reports read it.
+    pub model: RefCell<Interpreter>,
+}
+
+/// Counts blocks through the queue, modulo 2^16.
+#[derive(Default)]
+pub struct QueueCount {
+    added: Cell<u16>,
+    told_added: Cell<u16>,
+    told_removed: Cell<u16>,
+}
+
+impl QueueCount {
+    /// A block has been queued.
+    pub fn add(&self) {
+        self.added.set(self.added.get().wrapping_add(1));
+    }
+
+    /// Blocks added since the last call.
+    pub fn take_added(&self) -> i32 {
+        let added = self.added.get();
+        added.wrapping_sub(self.told_added.replace(added)).into()
+    }
+
+    /// Blocks removed since the last call.
+    pub fn take_removed(&self) -> i32 {
+        let removed = self.added.get().wrapping_sub(queue::used() as u16);
+        removed.wrapping_sub(self.told_removed.replace(removed)).into()
+    }
+}
+
+/// What exec tells the others: written at level 2, read under the ceiling.
+pub struct Published(Cell<Snapshot>);
+
+// SAFETY: exec writes it, and thread mode reads it while exec is locked out.
+unsafe impl Sync for Published {}
+
+machine_static! {
+    fn published() -> Published = Published(Cell::new(Snapshot::new()));
+}
+
+/// Publishes how motion stands. Exec only.
+pub fn publish(snapshot: Snapshot) {
+    published().0.set(snapshot);
+}
+
+/// How motion stands. Thread mode only.
+pub fn snapshot() -> Snapshot {
+    crate::hal::imp::exec::lock(|_| published().0.get())
+}

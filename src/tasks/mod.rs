@@ -1,0 +1,13 @@
+//! The tasks. Each is a thin `async fn` around a part that knows nothing of tasks; `links` lists
+//! everything that connects them.
+
+pub mod control;
+pub mod exec;
+pub mod lines;
+pub mod links;
+pub mod parser;
+pub mod planner;
+pub mod reader;
+pub mod reporter;
+pub mod tx;
+pub mod view;

@@ -1,0 +1,53 @@
+//! The reader task: bytes from the receive ring into the line pool.
+//!
+//! Reads the receive ring, writes the line pool, waits on [`Event::Received`] or for pool space; never
+//! runs longer than the ring is full (255 bytes, about 15,000 cycles). When the pool is full the bytes
+//! stay in the ring, and when that is full too the line is damaged and refused: see `lines`.
+
+use embassy_futures::yield_now;
+
+use super::links::Links;
+use crate::hal::event::{Event, wait};
+use crate::hal::imp::uart::{LOSS, LOSS_AT_END, Received, losing};
+use crate::status::Status;
+
+/// Bytes taken before others get a turn.
+const TURN: usize = 64;
+
+/// The task.
+pub async fn run(links: &'static Links, mut received: Received) -> ! {
+    loop {
+        wait(Event::Received, || (!received.is_empty()).then_some(())).await;
+        if !take_some(links, &mut received) {
+            links.pool_space.wait().await;
+        }
+        yield_now().await;
+    }
+}
+
+/// Takes up to a turn's bytes. False when the pool has no room for more.
+fn take_some(links: &Links, received: &mut Received) -> bool {
+    let mut pool = links.lines.borrow_mut();
+    for _ in 0..TURN {
+        if !pool.ready() {
+            return false;
+        }
+        let Some(byte) = received.pop() else {
+            break;
+        };
+        let damaged = byte == LOSS || byte == LOSS_AT_END;
+        if damaged {
+            pool.spoil(Status::BufferFull);
+        }
+        if byte != LOSS && pool.put(if damaged { b'\n' } else { byte }) {
+            links.parser_wake.signal(());
+        }
+    }
+    if losing() && !links.losing.replace(true) {
+        links.exception.set(Some(Status::BufferFull));
+        links.reporter_wake.signal(());
+    } else if !losing() {
+        links.losing.set(false);
+    }
+    true
+}

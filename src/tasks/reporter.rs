@@ -1,0 +1,109 @@
+//! The reporter task: the greeting, then status and queue reports.
+//!
+//! Reads everything through [`View`], writes to the sender; waits for something to report, and polls
+//! every [`POLL_MS`] while the machine is busy. A change of `stat` is told at once, anything else every
+//! `si` milliseconds. While the sender is slow it waits, and then reports what is so by then: it never
+//! holds up anything else.
+
+use embassy_futures::select::select;
+use embassy_time::Timer;
+
+use super::links::Links;
+use super::view::{RUN, View};
+use crate::hal::imp::time::millis;
+use crate::motion::queue;
+use crate::protocol::notice::{Banner, Exception};
+use crate::protocol::{Machine, Report, queue_report};
+use crate::status::Status;
+
+/// How often a busy machine is looked at, ms.
+const POLL_MS: u64 = 10;
+
+/// What was told last.
+struct Told {
+    state: i32,
+    blocks_free: usize,
+    at: u32,
+}
+
+/// The task.
+pub async fn run(links: &'static Links) -> ! {
+    greet(links).await;
+    let mut told = Told { state: 0, blocks_free: queue::free(), at: millis() };
+    let mut due = true;
+    loop {
+        let state = View::of(links).state();
+        if let Some(status) = links.exception.take() {
+            report_exception(links, status).await;
+        }
+        if queue::free() != told.blocks_free {
+            told.blocks_free = queue::free();
+            report_queue(links).await;
+        }
+        let elapsed = millis().wrapping_sub(told.at);
+        let interval = u32::from(View::of(links).settings().status_interval_ms());
+        due |= state == RUN;
+        if state != told.state || (due && elapsed >= interval) {
+            told.state = state;
+            told.at = millis();
+            due = false;
+            report_status(links).await;
+        }
+        if due || state == RUN {
+            let pause = Timer::after_ticks(POLL_MS);
+            select(pause, links.reporter_wake.wait()).await;
+        } else {
+            links.reporter_wake.wait().await;
+            due = true;
+        }
+    }
+}
+
+async fn greet(links: &Links) {
+    let mut tx = links.tx.lock().await;
+    let mut banner = Banner::begin(&View::of(links));
+    loop {
+        tx.room().await;
+        let more = banner.step(&mut View::of(links), &mut *tx);
+        tx.flush();
+        if !more {
+            break;
+        }
+    }
+}
+
+async fn report_status(links: &Links) {
+    let mut tx = links.tx.lock().await;
+    let report = Report::begin(links.mode.get(), &mut View::of(links));
+    let Some(mut report) = report else {
+        return;
+    };
+    loop {
+        tx.room().await;
+        let more = report.step(&mut View::of(links), &mut *tx);
+        tx.flush();
+        if !more {
+            break;
+        }
+    }
+}
+
+async fn report_exception(links: &Links, status: Status) {
+    let mut tx = links.tx.lock().await;
+    let mut exception = Exception::begin(status, &View::of(links));
+    loop {
+        tx.room().await;
+        let more = exception.step(&mut View::of(links), &mut *tx);
+        tx.flush();
+        if !more {
+            break;
+        }
+    }
+}
+
+async fn report_queue(links: &Links) {
+    let mut tx = links.tx.lock().await;
+    tx.room().await;
+    queue_report(links.mode.get(), &mut View::of(links), &mut *tx);
+    tx.flush();
+}

@@ -1,0 +1,160 @@
+//! What the protocol sees of the machine: the links, through one borrow at a time.
+//!
+//! Made anew for each step of a response or report, never kept across an `.await`. Positions and
+//! speed come from exec's snapshot while something runs, from the G-code model when nothing does.
+
+use core::cell::{OnceCell, RefMut};
+
+use super::links::{Links, snapshot};
+use crate::boards::MOTORS;
+use crate::config::{Owner, Setting, Settings};
+use crate::hal::imp::{gpio, stepper};
+use crate::motion::exec::{Program, Snapshot};
+use crate::motion::queue;
+use crate::protocol::{Machine, StatusReport, Value, thousandths};
+use crate::status::Status;
+use crate::units::Length;
+
+/// `stat` while the machine is in a machining cycle.
+pub const RUN: i32 = 5;
+
+/// A look at the machine.
+pub struct View<'a> {
+    links: &'a Links,
+    settings: RefMut<'a, Settings>,
+    report: RefMut<'a, StatusReport>,
+    motion: OnceCell<Snapshot>,
+}
+
+impl<'a> View<'a> {
+    /// Looks at the machine now.
+    pub fn of(links: &'a Links) -> Self {
+        Self {
+            links,
+            settings: links.settings.borrow_mut(),
+            report: links.report.borrow_mut(),
+            motion: OnceCell::new(),
+        }
+    }
+
+    fn motion(&self) -> &Snapshot {
+        self.motion.get_or_init(snapshot)
+    }
+
+    /// Whether anything is queued or runs.
+    fn busy(&self) -> bool {
+        self.motion().running || queue::used() > 0 || self.links.commands_taken.get()
+    }
+
+    /// `stat`.
+    pub fn state(&self) -> i32 {
+        if self.busy() {
+            return RUN;
+        }
+        match self.motion().program {
+            Program::Ready => 1,
+            Program::Stopped => 3,
+            Program::Ended => 4,
+        }
+    }
+
+    /// The machine position of an axis.
+    fn position(&self, axis: usize) -> Length {
+        let programmed = self.links.model.borrow().position().get(axis).copied();
+        let programmed = programmed.unwrap_or(Length::ZERO);
+        if !self.busy() {
+            return programmed;
+        }
+        // Of several motors on an axis the first tells; an axis without one is where it should be.
+        (0..MOTORS)
+            .find(|m| usize::from(self.settings.motor_axis(*m)) == axis)
+            .and_then(|m| self.settings.step_ratio(m).length(self.motion().position(m)))
+            .unwrap_or(programmed)
+    }
+
+    fn offset(&self, axis: usize) -> Length {
+        self.links.model.borrow().work_offset().get(axis).copied().unwrap_or(Length::ZERO)
+    }
+
+    fn modal(&self, value: Value) -> i32 {
+        let model = self.links.model.borrow();
+        let modal = model.modal();
+        match value {
+            Value::Units => modal.units as i32,
+            Value::Plane => modal.plane as i32,
+            Value::Path => modal.path as i32,
+            Value::Distance => modal.distance as i32,
+            Value::FeedMode => modal.feed_mode as i32,
+            Value::MotionMode => modal.motion as i32,
+            Value::Coordinates => model.coordinate_system().into(),
+            Value::Feed => thousandths(model.feed_rate()),
+            Value::BlockLine => model.line() as i32,
+            _ => 0,
+        }
+    }
+}
+
+impl Machine for View<'_> {
+    fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    fn set(&mut self, setting: Setting, value: i32) -> Status {
+        if let Owner::Motor(_) = setting.owner() {
+            // Steps would change their meaning under way.
+            if self.busy() {
+                return Status::NotAccepted;
+            }
+            self.links.resync.set(true);
+        }
+        self.settings.store(setting, value);
+        stepper::set_inverted(inverted(&self.settings));
+        Status::Ok
+    }
+
+    fn value(&mut self, value: Value) -> i32 {
+        match value {
+            Value::State => self.state(),
+            // They differ only where there are alarms and cycles.
+            Value::Machine => self.state(),
+            Value::Cycle => i32::from(self.busy()),
+            Value::Motion => i32::from(self.motion().running),
+            Value::MotionLine => self.motion().line as i32,
+            Value::Velocity => thousandths(self.motion().velocity * 60.0),
+            Value::QueueFree => queue::free() as i32,
+            Value::QueueAdded => self.links.queue_count.take_added(),
+            Value::QueueRemoved => self.links.queue_count.take_removed(),
+            Value::SlotsFree => self.links.lines.borrow().free().into(),
+            Value::MachinePosition(axis) => self.position(axis.into()).0,
+            Value::Position(axis) => {
+                let axis = axis.into();
+                self.position(axis).0.wrapping_sub(self.offset(axis).0)
+            }
+            Value::Offset(axis) => self.offset(axis.into()).0,
+            Value::Powered(_) => i32::from(gpio::is_powered()),
+            Value::Hold | Value::Tool | Value::Home | Value::Homed(_) => 0,
+            modal => self.modal(modal),
+        }
+    }
+
+    fn report(&mut self) -> &mut StatusReport {
+        &mut self.report
+    }
+
+    fn clear(&mut self) -> Status {
+        Status::Ok
+    }
+
+    fn energize(&mut self, _motor: Option<u8>, on: bool) -> Status {
+        if self.busy() {
+            return Status::NotAccepted;
+        }
+        gpio::power(on);
+        Status::Ok
+    }
+}
+
+/// The motors whose direction pins are inverted, as bits.
+fn inverted(settings: &Settings) -> u8 {
+    (0..MOTORS).fold(0, |bits, m| bits | u8::from(settings.motor_reversed(m)) << m)
+}

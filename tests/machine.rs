@@ -1,0 +1,123 @@
+//! The whole firmware on the host, over mocked time: bytes in, responses and steps out.
+
+use kerf::hal::imp::Machine;
+use kerf::motion::queue::{self, CAPACITY};
+
+/// A sender's end of the line, and all it has heard.
+struct Sender {
+    machine: Machine,
+    heard: String,
+}
+
+impl Sender {
+    fn boot() -> Self {
+        let machine = Machine::boot(115_200).expect("one machine for each test thread");
+        let mut sender = Sender { machine, heard: String::new() };
+        let banner = sender.ask("", 100);
+        assert!(banner.starts_with("{\"r\":{\"fv\":0.970,\"fb\":440.20,"), "{banner}");
+        assert!(banner.contains("\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"), "{banner}");
+        sender
+    }
+
+    /// What the machine says within some milliseconds of being sent something.
+    fn ask(&mut self, text: &str, ms: u64) -> String {
+        let before = self.heard.len();
+        self.machine.send(text.as_bytes());
+        self.machine.run_ms(ms);
+        self.heard += &String::from_utf8(self.machine.received()).expect("ASCII");
+        self.heard[before..].to_string()
+    }
+
+    /// Responses so far, not counting the greeting.
+    fn answered(&self) -> usize {
+        self.heard.matches("{\"r\":").count() - 1
+    }
+}
+
+#[test]
+fn a_move_ends_on_its_step() {
+    let mut sender = Sender::boot();
+    let build = sender.ask("{fb:n}\n", 20);
+    assert_eq!(build.lines().next(), Some("{\"r\":{\"fb\":440.20},\"f\":[1,0,7]}"));
+    let answer = sender.ask("g1x10f500\n", 5_000);
+    assert_eq!(answer.lines().next(), Some("{\"r\":{},\"f\":[1,0,7]}"));
+    assert!(answer.contains("\"stat\":5"), "{answer}");
+    assert!(answer.trim_end().ends_with("\"stat\":3}}"), "{answer}");
+    assert_eq!(sender.machine.emitted().position, [12_800, 0, 0, 0]);
+}
+
+#[test]
+fn refused_lines_move_nothing() {
+    let mut sender = Sender::boot();
+    for (line, status) in
+        [("g1x10", 142), ("g99", 131), ("m77", 132), ("g1x", 102), ("g2x1f100", 157)]
+    {
+        let answer = sender.ask(&format!("{line}\n"), 300);
+        assert_eq!(answer.lines().next(), Some(&*format!("{{\"r\":{{}},\"f\":[1,{status},7]}}")));
+    }
+    assert_eq!(sender.machine.emitted().steps, [0; 4]);
+}
+
+#[test]
+fn back_pressure_reaches_the_sender() {
+    let mut sender = Sender::boot();
+    // Far more moves than blocks, four lines in flight: the responses stop when the planner is full...
+    let mut sent = 0;
+    while sender.answered() == sent {
+        sender.ask("g1f800x1\ng1x2\ng1x3\ng1x4\n", 100);
+        sent += 4;
+        assert!(sent < 400, "somebody should have to wait");
+    }
+    assert!(sent >= CAPACITY, "it takes all blocks first");
+    assert!(queue::used() >= CAPACITY - 1, "{} blocks", queue::used());
+    // ...a control line is still answered...
+    assert!(sender.ask("{qr:n}\n", 50).contains("{\"r\":{\"qr\":"), "control lines overtake");
+    // ...and every line is answered once in the end, and carried out.
+    sender.ask("", 60_000);
+    assert_eq!(sender.answered(), sent + 1);
+    assert_eq!(sender.machine.emitted().position[0], 4 * 1280);
+    assert!(sender.heard.trim_end().ends_with("\"stat\":3}}"));
+}
+
+#[test]
+fn a_flood_is_answered_by_errors_and_not_by_corruption() {
+    let mut sender = Sender::boot();
+    // No flow control at all: 600 lines as fast as the line goes. What does not fit is refused.
+    let job: String = (0..600).map(|n| format!("g1 f800 x{}\n", n % 2 * 10)).collect();
+    sender.ask(&job, 200_000);
+    assert!(sender.heard.contains("{\"er\":{\"fb\":440.20,\"st\":13,"), "loss is reported");
+    let position = sender.machine.emitted().position[0];
+    assert!(position == 0 || position == 12_800, "never anywhere else: {position}");
+    // The line behind the damage cannot be told from it; the next one can.
+    assert_eq!(sender.ask("g1 x77\n", 50), "{\"r\":{},\"f\":[1,13,7]}\n");
+    assert!(sender.ask("{fb:n}\n", 50).contains("440.20"), "and it still answers");
+    assert_eq!(sender.machine.emitted().position[0], position);
+}
+
+#[test]
+fn over_long_lines_are_refused_whole() {
+    let mut sender = Sender::boot();
+    let line = format!("g1 f100 x1 ({})\n", "x".repeat(300));
+    let answer = sender.ask(&line, 200);
+    assert_eq!(answer.lines().next(), Some("{\"r\":{},\"f\":[1,107,7]}"));
+    assert_eq!(sender.machine.emitted().steps, [0; 4]);
+}
+
+#[test]
+fn enquiry_and_reset_act_at_once() {
+    let mut sender = Sender::boot();
+    assert_eq!(sender.ask("g1\x05", 20), "{\"ack\":true}\n");
+    sender.ask("\x18", 20);
+    assert!(kerf::hal::imp::was_reset());
+}
+
+#[test]
+fn new_steps_per_unit_never_make_the_machine_jump() {
+    let mut sender = Sender::boot();
+    sender.ask("g1 f800 x10\n", 5_000);
+    sender.ask("{1tr:2.5}\n", 50);
+    sender.ask("g1 x10\n", 500);
+    assert_eq!(sender.machine.emitted().position[0], 12_800);
+    sender.ask("g1 x11\n", 2_000);
+    assert_eq!(sender.machine.emitted().position[0], 12_800 + 640);
+}
