@@ -77,6 +77,7 @@ impl Bus {
         self.timers = std::array::from_fn(|i| Timer::new(&LAYOUTS[i]));
         self.uarts = std::array::from_fn(Uart::new);
         self.eeprom.reset();
+        self.recorder.pins_released();
         self.pending = 0;
         self.refresh_due();
     }

@@ -1,8 +1,10 @@
 //! The command line.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
-use clap::{Args, Parser, Subcommand};
+use clap::builder::RangedI64ValueParser;
+use clap::{Args, Parser, Subcommand, value_parser};
 
 /// Runs the Kerf firmware on a simulated board.
 #[derive(Parser, Debug)]
@@ -18,6 +20,8 @@ pub struct Cli {
 pub enum Command {
     /// Stream a G-code file and check every step.
     Run(RunArgs),
+    /// Put the machine behind a pseudo-terminal, for a sender to connect to.
+    Serve(ServeArgs),
 }
 
 /// The firmware and the board under it.
@@ -44,7 +48,7 @@ pub struct RunArgs {
     #[arg(long = "set", value_name = "LINE")]
     pub settings: Vec<String>,
     /// Speed of the serial line.
-    #[arg(long, default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..=2_000_000))]
+    #[arg(long, default_value_t = 115_200, value_parser = baud())]
     pub baud: u32,
     /// Lines in flight.
     #[arg(long, value_name = "N", default_value_t = kerf_sim::LINES_IN_FLIGHT)]
@@ -58,4 +62,49 @@ pub struct RunArgs {
     /// Print the result only.
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// Arguments of `serve`.
+#[derive(Args, Debug)]
+pub struct ServeArgs {
+    /// Firmware and board.
+    #[command(flatten)]
+    pub target: Target,
+    /// How many times faster than real time, or `max`.
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub speed: Speed,
+    /// Make a symbolic link to the pseudo-terminal.
+    #[arg(long, value_name = "PATH")]
+    pub link: Option<PathBuf>,
+    /// Speed of the serial line.
+    #[arg(long, default_value_t = 115_200, value_parser = baud())]
+    pub baud: u32,
+}
+
+/// The pace of `serve`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Speed {
+    /// As fast as it can.
+    Max,
+    /// This many times as fast as a real machine.
+    Times(f64),
+}
+
+impl FromStr for Speed {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "max" {
+            return Ok(Speed::Max);
+        }
+        match text.parse::<f64>() {
+            Ok(n) if n.is_finite() && n > 0.0 => Ok(Speed::Times(n)),
+            _ => Err("a number above 0, or max".to_string()),
+        }
+    }
+}
+
+/// Speeds that a USART of the ATmega2560 can make.
+fn baud() -> RangedI64ValueParser<u32> {
+    value_parser!(u32).range(300..=2_000_000)
 }

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::machine::Machine;
-use crate::protocol::{Incoming, Response, classify, control_name, state_of};
+use crate::protocol::{Incoming, Response, classify, control_name, is_idle, state_of};
 
 /// Lines in flight unless asked otherwise.
 pub const LINES_IN_FLIGHT: usize = 4;
@@ -43,6 +43,7 @@ pub struct Host {
     banners: usize,
     stat: Option<i64>,
     heard_at: u64,
+    idle_since: Option<u64>,
 }
 
 impl Host {
@@ -59,6 +60,7 @@ impl Host {
             banners: 0,
             stat: None,
             heard_at: 0,
+            idle_since: None,
         }
     }
 
@@ -105,6 +107,11 @@ impl Host {
     /// The machine state last reported.
     pub fn stat(&self) -> Option<i64> {
         self.stat
+    }
+
+    /// Cycle at which the firmware began to report that nothing moves; `None` while it moves.
+    pub fn idle_since(&self) -> Option<u64> {
+        self.idle_since
     }
 
     /// Cycle at which the last line came.
@@ -202,7 +209,7 @@ impl Host {
         match classify(line) {
             Incoming::Banner => self.banners += 1,
             Incoming::Report(report) => {
-                self.stat = state_of(&report).or(self.stat);
+                self.note_state(&report);
                 self.reports.push(report);
             }
             Incoming::Response(response) => self.answer(response),
@@ -210,8 +217,14 @@ impl Host {
         }
     }
 
+    fn note_state(&mut self, value: &Value) {
+        let Some(stat) = state_of(value) else { return };
+        self.stat = Some(stat);
+        self.idle_since = is_idle(stat).then(|| self.idle_since.unwrap_or(self.heard_at));
+    }
+
     fn answer(&mut self, response: Response) {
-        self.stat = state_of(&response.body).or(self.stat);
+        self.note_state(&response.body);
         let named = |l: &Line| {
             let name = l.name.as_deref();
             name.is_some_and(|n| response.body.get(n).is_some())

@@ -172,7 +172,8 @@ impl Run<'_> {
     }
 
     fn report(self, lines: usize, restarts: usize, end: Result<()>) -> Report {
-        let idle_at = self.host.heard_at().max(self.machine.recorder().last_step().unwrap_or(0));
+        let moved = self.machine.recorder().last_step().unwrap_or(self.began);
+        let idle_at = self.host.idle_since().unwrap_or(0).max(moved).max(self.progress_at);
         Report::new(
             self.machine,
             Measured {

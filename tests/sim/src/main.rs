@@ -1,7 +1,9 @@
 //! `kerf-sim`: runs the firmware on a simulated board.
 
 mod cli;
+mod pty;
 mod run;
+mod serve;
 
 use std::process::ExitCode;
 
@@ -12,6 +14,7 @@ use crate::cli::{Cli, Command};
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(args) => run::run(&args),
+        Command::Serve(args) => serve::serve(&args),
     };
     match result {
         Ok(true) => ExitCode::SUCCESS,

@@ -72,12 +72,11 @@ impl Meters {
         }
     }
 
-    /// Forgets what was measured.
+    /// Forgets what was measured, but for the stack: its lowest point counts from power-up.
     pub fn clear(&mut self) {
         self.services = [Service::default(); vectors::COUNT];
         self.window_outside = Window::default();
         self.window_step = Window::default();
-        self.lowest_sp = u16::MAX;
     }
 
     /// The chip was reset.

@@ -58,6 +58,9 @@ pub enum AxisMode {
     Standard,
     /// Planned, but its motors stand still.
     Inhibited,
+    /// Its words are lengths along a circumference. A job that uses it is unclear: the angle is
+    /// no decimal number.
+    Radius,
 }
 
 /// The machine a job runs on.
@@ -161,6 +164,7 @@ impl<'a> Reader<'a> {
             match word.letter {
                 'G' => self.g_code(word.value.tenths(), &mut once, &mut machine_coordinates)?,
                 'M' => end |= self.m_code(word.value.tenths())?,
+                c if self.is_on_a_radius(c) => return Err(format!("{c} in radius mode")),
                 c if LETTERS.contains(&c) || "FIJKLNPRST".contains(c) => {}
                 c => return Err(format!("the letter {c}")),
             }
@@ -213,6 +217,11 @@ impl<'a> Reader<'a> {
             480 | 490 | 500 | 510 => Ok(false),
             _ => Err(format!("M{}", tenths as f64 / 10.0)),
         }
+    }
+
+    fn is_on_a_radius(&self, letter: char) -> bool {
+        let axis = LETTERS.iter().position(|l| *l == letter);
+        axis.is_some_and(|axis| self.setup.modes[axis] == AxisMode::Radius)
     }
 
     /// The axis words of a line, in units.

@@ -155,6 +155,13 @@ impl Recorder {
         }
     }
 
+    /// A reset has made all pins inputs; the drivers see them low.
+    pub(crate) fn pins_released(&mut self) {
+        for m in &mut self.motors {
+            (m.step_high, m.dir_high) = (false, false);
+        }
+    }
+
     fn step_edge(&mut self, motor: usize, high: bool, now: u64, sums: Sums) {
         let m = &mut self.motors[motor];
         if m.step_high == high {

@@ -192,15 +192,15 @@ impl Report {
     fn find_problems(&self, measured: &Measured) -> Vec<String> {
         let mut problems: Vec<String> = measured.fault.iter().cloned().collect();
         if let Some(first) = self.rejected.first() {
-            let n = self.rejected.len();
-            problems.push(format!("{n} lines rejected, the first is line {}", first.line));
+            let (n, of) = (self.rejected.len(), self.lines);
+            problems.push(format!("{n} of {of} lines rejected, the first is line {}", first.line));
         }
         if self.acknowledged < self.lines && measured.fault.is_none() {
-            problems.push(format!("{} lines never answered", self.lines - self.acknowledged));
+            problems.push(format!("only {} of {} lines answered", self.acknowledged, self.lines));
         }
         if let Some(first) = measured.strays.first() {
             let n = measured.strays.len();
-            problems.push(format!("{n} lines nobody asked for, the first is {first}"));
+            problems.push(format!("unasked-for lines ({n}), the first is {first}"));
         }
         match &measured.expected {
             Err(unclear) => problems.push(unclear.to_string()),

@@ -5,26 +5,25 @@ use std::path::Path;
 
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
-use kerf::boards;
+use kerf::boards::{self, Board};
+use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
 use kerf_sim::report::Report;
-use kerf_sim::{Image, Machine};
 
-use crate::cli::{RunArgs, Target};
+use crate::cli::RunArgs;
 
-/// A machine with the firmware in it.
-pub fn machine(target: &Target) -> Result<Machine> {
-    let board = boards::by_name(&target.board).ok_or_else(|| {
+/// The board of this name.
+pub fn board(name: &str) -> Result<&'static Board> {
+    boards::by_name(name).ok_or_else(|| {
         let known: Vec<_> = boards::ALL.iter().map(|b| b.name).collect();
-        anyhow!("no board {}; there are {}", target.board, known.join(", "))
-    })?;
-    Machine::new(Image::read(&target.elf)?, board)
+        anyhow!("no board {name}; there are {}", known.join(", "))
+    })
 }
 
 /// Runs a job. True when all went well.
 pub fn run(args: &RunArgs) -> Result<bool> {
     let lines = job::read_lines(&args.job)?;
-    let mut machine = machine(&args.target)?;
+    let mut machine = Machine::load(&args.target.elf, board(&args.target.board)?)?;
     machine.set_baud(args.baud);
     let options = Options {
         settings: args.settings.clone(),

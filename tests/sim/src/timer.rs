@@ -358,3 +358,6 @@ fn wide_mode(mode: u8) -> (Wave, Top) {
         _ => (Wave::Normal, Top::Fixed(0xFFFF)),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -75,6 +75,14 @@ fn an_eeprom_write_takes_its_time() {
 }
 
 #[test]
+fn a_watchdog_reset_is_counted() {
+    let mut m = machine("watchdog.c");
+    m.run_for_ms(50).unwrap();
+    assert_eq!((m.resets(), word(&m, "boots"), word(&m, "by_watchdog")), (2, 3, 2));
+    assert!(m.cycle() >= m.cycles(50), "time goes on");
+}
+
+#[test]
 fn sleep_needs_its_enable_bit() {
     // sleep; rjmp .-4 with SE clear: never asleep.
     let mut m = machine_of(&[0x9588, 0xCFFE]);

@@ -47,7 +47,7 @@ fn what_the_oracle_cannot_tell_fails() {
 
 #[test]
 fn a_rejected_line_is_named() {
-    fails_with("G0 X1\nREJECT\nG0 X2", "1 lines rejected, the first is line 2");
+    fails_with("G0 X1\nREJECT\nG0 X2", "1 of 3 lines rejected, the first is line 2");
 }
 
 #[test]
@@ -62,7 +62,7 @@ fn a_crash_is_named() {
 
 #[test]
 fn an_answer_too_many_is_noticed() {
-    fails_with("G0 X1\nSTRAY", "lines nobody asked for");
+    fails_with("G0 X1\nSTRAY", "unasked-for lines (1)");
 }
 
 #[test]

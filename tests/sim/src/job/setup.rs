@@ -1,6 +1,6 @@
 //! The settings that the oracle needs, asked of the firmware.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use kerf::boards::MOTORS;
 use serde_json::Value;
 
@@ -47,7 +47,7 @@ fn mode_of(machine: &mut Machine, host: &mut Host, axis: usize) -> Result<AxisMo
     Ok(match response.body.get(&name).and_then(Value::as_i64) {
         Some(0) => AxisMode::Disabled,
         Some(2) => AxisMode::Inhibited,
-        Some(3) => bail!("axis {} is in radius mode: its end is not known", AXIS_NAMES[axis]),
+        Some(3) => AxisMode::Radius,
         _ => AxisMode::Standard,
     })
 }

@@ -97,6 +97,15 @@ fn modes_of_axes() {
 }
 
 #[test]
+fn a_radius_is_unclear_only_when_used() {
+    let mut setup = setup();
+    setup.modes[3] = AxisMode::Radius;
+    assert!(run([(1, "G0 X1")], &setup).is_ok());
+    let unclear = run([(1, "G0 A1")], &setup).unwrap_err();
+    assert_eq!(unclear.to_string(), "line 1: the oracle does not know A in radius mode");
+}
+
+#[test]
 fn what_it_does_not_know_it_says() {
     let unclear = run([(1, "G0 X1"), (2, "G38.2 Z-5 F10")], &setup()).unwrap_err();
     assert_eq!(unclear.to_string(), "line 2: the oracle does not know G38.2");

@@ -1,0 +1,161 @@
+//! `kerf-sim serve`: the machine behind a pseudo-terminal, at the pace of real time.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use kerf_sim::{Image, Machine};
+
+use crate::cli::{ServeArgs, Speed};
+use crate::pty::{Peer, Pty};
+use crate::run::board;
+
+/// How often the two sides are looked at.
+const TICK: Duration = Duration::from_millis(2);
+/// AVR time between two looks at full speed.
+const SLICE_MS: u64 = 2;
+/// From opening to the reset, as on a board that DTR resets; senders flush their input meanwhile.
+const RESET_DELAY: Duration = Duration::from_millis(100);
+/// A machine further behind than this does not try to catch up.
+const MAX_LAG: Duration = Duration::from_millis(200);
+
+/// Bytes that may wait for the serial line, as in the buffer of a real port.
+const BACKLOG: usize = 256;
+
+struct Server {
+    machine: Machine,
+    image: Image,
+    baud: u32,
+    pty: Pty,
+    speed: Speed,
+    peer: Peer,
+    reset_at: Option<Instant>,
+    /// The cycle that belongs to an instant.
+    anchor: (Instant, u64),
+    boots: u64,
+}
+
+/// Serves until interrupted. True when the firmware was still alive then.
+pub fn serve(args: &ServeArgs) -> Result<bool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
+        .context("cannot handle interrupts")?;
+    let mut server = Server::new(args)?;
+    println!("{}", server.pty.path().display());
+    let mut end = Ok(());
+    while !stop.load(Ordering::Relaxed) && end.is_ok() {
+        end = server.turn();
+    }
+    print!("{}", server.summary());
+    if let Err(error) = &end {
+        eprintln!("kerf-sim: {error:#}");
+    }
+    Ok(end.is_ok())
+}
+
+impl Server {
+    fn new(args: &ServeArgs) -> Result<Self> {
+        let image = Image::read(&args.target.elf)?;
+        let mut machine = Machine::new(image.clone(), board(&args.target.board)?)?;
+        machine.set_baud(args.baud);
+        let mut pty = Pty::new()?;
+        if let Some(link) = &args.link {
+            pty.link(link)?;
+        }
+        Ok(Server {
+            anchor: (Instant::now(), machine.cycle()),
+            machine,
+            image,
+            baud: args.baud,
+            pty,
+            speed: args.speed,
+            peer: Peer::Closed,
+            reset_at: None,
+            boots: 0,
+        })
+    }
+
+    /// Looks at the sender, runs the machine, carries bytes both ways.
+    fn turn(&mut self) -> Result<()> {
+        let peer = self.pty.wait(Duration::ZERO)?;
+        if peer != self.peer {
+            self.peer = peer;
+            self.reset_at = (peer == Peer::Open).then(|| Instant::now() + RESET_DELAY);
+        }
+        if self.reset_at.is_some_and(|at| at <= Instant::now()) {
+            self.reset_at = None;
+            self.reset()?;
+        }
+        let room = self.machine.wire().backlog() < BACKLOG;
+        let bytes = if room { self.pty.read()? } else { Vec::new() };
+        if !bytes.is_empty() && self.reset_at.is_none() {
+            self.machine.send(&bytes);
+        }
+        self.run()?;
+        let answer = self.machine.receive();
+        match self.peer {
+            Peer::Open if self.reset_at.is_none() => self.pty.write(&answer)?,
+            _ => self.pty.discard(),
+        }
+        self.pause();
+        Ok(())
+    }
+
+    fn reset(&mut self) -> Result<()> {
+        let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
+        fresh.set_baud(self.baud);
+        fresh.set_eeprom(self.machine.eeprom());
+        self.machine = fresh;
+        self.anchor = (Instant::now(), 0);
+        self.boots += 1;
+        Ok(())
+    }
+
+    fn run(&mut self) -> Result<()> {
+        let until = match self.speed {
+            Speed::Max => self.machine.cycle() + self.machine.cycles(SLICE_MS),
+            Speed::Times(factor) => self.pace(factor),
+        };
+        Ok(self.machine.run_until(until)?)
+    }
+
+    /// The cycle that it is now, or a little earlier for a machine that lags far behind.
+    fn pace(&mut self, factor: f64) -> u64 {
+        let hz = f64::from(self.machine.board().clock_hz) * factor;
+        let target = self.anchor.1 + (self.anchor.0.elapsed().as_secs_f64() * hz) as u64;
+        let most = self.machine.cycle() + (MAX_LAG.as_secs_f64() * hz) as u64;
+        if target > most {
+            self.anchor = (Instant::now(), most);
+        }
+        target.min(most)
+    }
+
+    /// Waits for bytes when there is nothing to catch up with.
+    fn pause(&self) {
+        if self.speed != Speed::Max {
+            std::thread::sleep(TICK);
+        }
+    }
+
+    fn summary(&self) -> String {
+        let m = &self.machine;
+        let time = m.seconds(m.cycle());
+        let mut text = format!("\n{} boots; {time:.3} s of AVR time since the last\n", self.boots);
+        for (i, motor) in m.recorder().motors().iter().enumerate() {
+            let rate = motor.min_interval.map_or(0.0, |c| 1.0 / m.seconds(c));
+            text += &format!(
+                "motor {}  position {:>10}  steps {:>10}  highest rate {rate:>7.0} Hz\n",
+                i + 1,
+                motor.position,
+                motor.steps
+            );
+        }
+        let off = m.meters().window_outside();
+        let stack = m.free_stack().map_or("unknown".to_string(), |n| format!("{n} bytes"));
+        text += &format!("interrupts off for up to {} cycles: {}\n", off.cycles, m.describe(&off));
+        text += &format!("free stack {stack}, UART overruns {}\n", m.uart(0).overruns());
+        text
+    }
+}
