@@ -10,7 +10,7 @@
 //! Where the radius at the end differs from that at the start (by what the interpreter tolerates),
 //! the radius changes evenly along the arc.
 //!
-//! Cost on AVR: [`Chords::new`] 12,000 cycles; a chord 6,000, and 400 for each other axis that moves.
+//! Cost on AVR: [`Chords::new`] 13,000 cycles; a chord 8,700, and 600 for each other axis that moves.
 
 use core::f32::consts::TAU;
 

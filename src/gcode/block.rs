@@ -3,6 +3,7 @@
 //! The interpreter takes the numbers out as it uses them; whatever is left at the end belongs to
 //! nothing on the line, which is refused. Lives on the stack for the time of one line.
 
+use heapless::Vec;
 use nom::Offset;
 
 use super::codes::{self, Action, NonModal};
@@ -11,6 +12,7 @@ use super::lexer::{self, Item};
 use super::modal::{Distance, FeedMode, MotionMode, PathMode, Plane, Units};
 use super::number::Decimal;
 use crate::status::Status;
+use crate::units::AXES;
 
 /// The words with a number that counts, axes first.
 pub mod slot {
@@ -60,7 +62,8 @@ pub struct Block {
     only: u8,
     /// Slots that are filled and not taken.
     present: u16,
-    values: [Decimal; slot::COUNT],
+    /// What was in them, in the order of the line.
+    values: Vec<(u8, Decimal), { slot::COUNT }>,
     /// Begins with a slash: the rest was not looked at.
     pub deleted: bool,
     /// Where in the line the text of a message lies.
@@ -73,7 +76,7 @@ impl Block {
         if line.len() > u8::MAX as usize {
             return Err(Status::InputTooLong);
         }
-        let (mut rest, _) = lexer::blanks(line).map_err(status)?;
+        let (rest, _) = lexer::blanks(line).map_err(status)?;
         match rest.split_first() {
             Some((b'/', _)) => {
                 self.deleted = true;
@@ -83,6 +86,14 @@ impl Block {
             Some((b'%', after)) if after.iter().all(|&byte| lexer::is_blank(byte)) => return Ok(()),
             _ => {}
         }
+        self.items(line, rest)
+    }
+
+    /// Reads the items of a line, of which `rest` is the part to read.
+    // By itself it has a small stack frame, which AVR reaches in one instruction; inlined into a frame
+    // of more than 64 bytes every access would take five more.
+    #[inline(never)]
+    fn items(&mut self, line: &[u8], mut rest: &[u8]) -> Result<(), Status> {
         while !rest.is_empty() {
             let (after, item) = lexer::item(rest).map_err(status)?;
             match item {
@@ -128,15 +139,13 @@ impl Block {
 
     fn value(&mut self, letter: u8, value: Decimal) -> Result<(), Status> {
         let slot = SLOT.at(usize::from(letter.wrapping_sub(b'A'))).unwrap_or(slot::NONE);
-        let Some(place) = self.values.get_mut(usize::from(slot)) else {
-            return Err(Status::GcodeUnsupported);
-        };
-        if self.present & (1 << slot) != 0 {
+        let bit = 1u16.checked_shl(slot.into()).ok_or(Status::GcodeUnsupported)?;
+        if self.present & bit != 0 {
             return Err(Status::GcodeGeneric);
         }
-        self.present |= 1 << slot;
-        *place = value;
-        Ok(())
+        self.present |= bit;
+        // No slot twice, so there is room for all.
+        self.values.push((slot, value)).map_err(|_| Status::InternalError)
     }
 
     fn comment(&mut self, line: &[u8], text: &[u8]) {
@@ -159,7 +168,14 @@ impl Block {
             return None;
         }
         self.present &= !bit;
-        self.values.get(usize::from(slot)).copied()
+        self.values.iter().find(|word| word.0 == slot).map(|word| word.1)
+    }
+
+    /// All axis words, which are then used. Not for a line whose axes went to [`Self::take`].
+    pub fn take_axes(&mut self) -> impl Iterator<Item = (u8, &Decimal)> {
+        self.present &= !slot::AXES;
+        let words = self.values.iter().map(|(slot, value)| (*slot, value));
+        words.filter(|(slot, _)| usize::from(*slot) < AXES)
     }
 
     /// Refuses words that nothing on the line has used.

@@ -2,7 +2,7 @@
 
 use super::arc;
 use super::block::{Block, slot};
-use super::command::{Arc, Motion};
+use super::command::{Arc, Commands, Motion};
 use super::interpreter::{Interpreter, exact};
 use super::number::Decimal;
 use crate::math;
@@ -24,10 +24,15 @@ const MAX_SLACK: f32 = 10_000.0;
 const ARC_WORDS: u16 = slot::AXES | slot::OFFSETS | 1 << slot::R | 1 << slot::P;
 
 impl Interpreter {
-    /// G2 and G3. Cost on AVR: 5,000 cycles and the words.
-    pub(super) fn arc(&mut self, block: &mut Block, clockwise: bool) -> Result<Motion, Status> {
+    /// G2 and G3.
+    pub(super) fn arc(
+        &mut self,
+        block: &mut Block,
+        clockwise: bool,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         if !block.has(ARC_WORDS) {
-            return Ok(Motion::None);
+            return Ok(());
         }
         let feed = self.rate(block, false)?;
         let [first, second, linear] = self.modal.plane.axes();
@@ -45,7 +50,8 @@ impl Interpreter {
         if arc::closes(&start, &target, &arc) {
             arc.extra_turns = turns.saturating_sub(1);
         }
-        Ok(Motion::Arc { target, feed, arc })
+        out.motion = Motion::Arc { target, feed, arc };
+        Ok(())
     }
 
     /// R, in units; negative for the long way round.

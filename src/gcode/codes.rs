@@ -119,7 +119,7 @@ pub fn m(number: u16) -> Option<Action> {
     find(&M, number)
 }
 
-/// Binary search. Cost on AVR: about 60 cycles a step, five steps.
+/// Binary search. Cost on AVR: 90 cycles a step, five steps.
 fn find<const N: usize>(table: &Progmem<[Code; N]>, number: u16) -> Option<Action> {
     let (mut low, mut high) = (0, N);
     while low < high {

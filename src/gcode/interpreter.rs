@@ -8,11 +8,13 @@
 //! of its own line. LinuxCNC and TinyG read `G20 F10` in the units of the line before, which is 25.4
 //! times too fast or too slow, and which their users keep reporting.
 //!
-//! Budget on AVR: a G1 line with four words in 6,000 cycles.
+//! Cost on AVR, words and comments included: `X12.345 Y67.890` 4,700 cycles, with `G1` and `F1500`
+//! 6,700; in inches 1,800 more for each axis; an arc 11,000, with R 14,000. Stack: 450 bytes, for an
+//! arc 600.
 
 use super::block::{Block, slot};
 use super::codes::NonModal;
-use super::command::{Commands, Stop};
+use super::command::{Commands, Motion, Stop};
 use super::modal::{FeedMode, Modal, Units};
 use super::number::{Decimal, Exact};
 use crate::status::Status;
@@ -64,20 +66,21 @@ impl Interpreter {
     /// `Err`: the state is what it was, and `out` empty.
     pub fn interpret(&mut self, line: &[u8], out: &mut Commands) -> Result<Info, Status> {
         let before = *self;
-        *out = Commands::default();
+        clear(out);
         let mut block = Block::default();
         let done = block.read(line).and_then(|()| self.execute(&mut block, out));
         match done {
             Ok(()) => Ok(Info { message: block.message, deleted: block.deleted }),
             Err(status) => {
                 *self = before;
-                *out = Commands::default();
+                clear(out);
                 Err(status)
             }
         }
     }
 
     /// The order of execution.
+    #[inline(never)]
     fn execute(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
         if block.deleted {
             return Ok(());
@@ -226,6 +229,15 @@ pub(super) fn exact(word: &Decimal, axis: u8, units: Units) -> Result<Exact, Sta
         Units::Inch if usize::from(axis) < FIRST_ROTARY => word.inch(),
         _ => word.mm(),
     }
+}
+
+/// Empties `out`, touching nothing but the tags: it is large.
+fn clear(out: &mut Commands) {
+    out.line = 0;
+    out.dwell_ms = None;
+    out.set_position = None;
+    out.motion = Motion::None;
+    out.stop = Stop::None;
 }
 
 fn set<T>(mode: &mut T, new: Option<T>) {

@@ -1,13 +1,14 @@
 //! Words and comments, with `nom`: `G01 X-1.5 (comment) ; comment`.
 //!
-//! Blanks may stand anywhere, inside numbers too (RS274). Cost on AVR: about 60 cycles a byte.
+//! Blanks may stand anywhere, inside numbers too (RS274). The parsers are leaves called
+//! one after the other, not trees of combinators: on AVR every level would copy what it returns.
 
 use nom::branch::alt;
 use nom::bytes::complete::{take_till, take_while};
 use nom::character::complete::{char, satisfy};
 use nom::combinator::{map, opt, rest};
 use nom::error::{ErrorKind, ParseError};
-use nom::sequence::{delimited, pair, preceded, terminated};
+use nom::sequence::{delimited, preceded, terminated};
 use nom::{IResult, Parser};
 
 use super::number::{Decimal, decimal};
@@ -57,21 +58,23 @@ pub fn blanks(input: &[u8]) -> Lexed<'_, &[u8]> {
 ///
 /// 101 where no item can begin, 102 for a letter without a number.
 pub fn item(input: &[u8]) -> Lexed<'_, Item<'_>> {
-    terminated(alt((word, comment)), blanks).parse(input)
+    match input.first() {
+        Some(b'(' | b';') => comment(input),
+        _ => word(input),
+    }
 }
 
 fn word(input: &[u8]) -> Lexed<'_, Item<'_>> {
-    let letter = satisfy(|c| c.is_ascii_alphabetic());
-    let number = pair(letter, decimal);
-    let upper = |(letter, value)| Item::Word((letter as u8).to_ascii_uppercase(), value);
-    map(number, upper).parse(input)
+    let (input, letter) = satisfy(|c| c.is_ascii_alphabetic()).parse(input)?;
+    let (input, number) = decimal(input)?;
+    Ok((input, Item::Word((letter as u8).to_ascii_uppercase(), number)))
 }
 
 /// `( ... )`, closed or not, or `;` to the end of the line.
 fn comment(input: &[u8]) -> Lexed<'_, Item<'_>> {
     let inline = delimited(char('('), take_till(|byte| byte == b')'), opt(char(')')));
     let trailing = preceded(char(';'), rest);
-    map(alt((inline, trailing)), Item::Comment).parse(input)
+    terminated(map(alt((inline, trailing)), Item::Comment), blanks).parse(input)
 }
 
 /// The text behind `MSG` in a comment that has one, from the first byte after it (or its comma).

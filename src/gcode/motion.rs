@@ -5,7 +5,7 @@ use super::command::{Commands, Feed, Motion};
 use super::interpreter::{Interpreter, exact};
 use super::modal::{Distance, FeedMode, MotionMode, Units};
 use crate::status::Status;
-use crate::units::{FIRST_ROTARY, Length, PerAxis};
+use crate::units::FIRST_ROTARY;
 
 impl Interpreter {
     /// The move of a line, if it has one: axis words move in the mode in force, unless a non-modal
@@ -19,13 +19,13 @@ impl Interpreter {
                 Some(_) => Err(Status::ModalGroupViolation),
             };
         }
-        out.motion = match mode {
-            MotionMode::None => Motion::None,
-            MotionMode::Traverse => self.traverse(block)?,
-            MotionMode::Feed => self.straight_feed(block)?,
-            MotionMode::ClockwiseArc => self.arc(block, true)?,
-            MotionMode::CounterclockwiseArc => self.arc(block, false)?,
-        };
+        match mode {
+            MotionMode::None => {}
+            MotionMode::Traverse => self.traverse(block, out)?,
+            MotionMode::Feed => self.straight_feed(block, out)?,
+            MotionMode::ClockwiseArc => self.arc(block, true, out)?,
+            MotionMode::CounterclockwiseArc => self.arc(block, false, out)?,
+        }
         if self.modal.feed_mode == FeedMode::InverseTime {
             // An F that no feed move took means nothing with G93.
             block.take(slot::F);
@@ -33,39 +33,56 @@ impl Interpreter {
         Ok(())
     }
 
-    fn traverse(&mut self, block: &mut Block) -> Result<Motion, Status> {
-        if !block.has(slot::AXES) {
-            return Ok(Motion::None);
+    fn traverse(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+        if block.has(slot::AXES) {
+            self.advance(block)?;
+            out.motion = Motion::Traverse { target: self.position };
         }
-        self.advance(block)?;
-        Ok(Motion::Traverse { target: self.position })
+        Ok(())
     }
 
-    fn straight_feed(&mut self, block: &mut Block) -> Result<Motion, Status> {
+    fn straight_feed(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
         let moves = block.has(slot::AXES);
         if !moves && block.motion.is_none() {
-            return Ok(Motion::None);
+            return Ok(());
         }
-        let start = self.position;
-        self.advance(block)?;
-        let feed = self.rate(block, turns_only(&start, &self.position))?;
-        Ok(if moves { Motion::Feed { target: self.position, feed } } else { Motion::None })
+        let moved = self.advance(block)?;
+        // Of rotary axes alone, F is the degrees per minute, in all units.
+        let feed = self.rate(block, moved.rotary && !moved.linear)?;
+        if moves {
+            out.motion = Motion::Feed { target: self.position, feed };
+        }
+        Ok(())
     }
 
     /// Moves the model by the axis words.
-    pub(super) fn advance(&mut self, block: &mut Block) -> Result<(), Status> {
-        let axes = self.position.iter_mut().zip(&mut self.residue).zip(&self.offset);
-        for (axis, ((position, residue), offset)) in (0..).zip(axes) {
-            let Some(word) = block.take(axis) else { continue };
-            let word = exact(&word, axis, self.modal.units)?;
-            let (from, by) = match self.modal.distance {
-                Distance::Absolute => (*offset, Some(word)),
-                Distance::Incremental => (*position, word.carry(*residue)),
+    pub(super) fn advance(&mut self, block: &mut Block) -> Result<Moved, Status> {
+        let mut moved = Moved::default();
+        for (axis, word) in block.take_axes() {
+            let i = usize::from(axis);
+            let (Some(position), Some(residue)) =
+                (self.position.get_mut(i), self.residue.get_mut(i))
+            else {
+                break;
             };
-            let target = by.and_then(|by| Some((from.checked_add(by.units)?, by.rest)));
-            (*position, *residue) = target.ok_or(Status::OutOfRange)?;
+            let mut by = exact(word, axis, self.modal.units)?;
+            let from = match self.modal.distance {
+                Distance::Absolute => self.offset.get(i).copied().unwrap_or_default(),
+                Distance::Incremental => {
+                    by = by.carry(*residue).ok_or(Status::OutOfRange)?;
+                    *position
+                }
+            };
+            let target = from.checked_add(by.units).ok_or(Status::OutOfRange)?;
+            if target != *position {
+                match i {
+                    ..FIRST_ROTARY => moved.linear = true,
+                    _ => moved.rotary = true,
+                }
+            }
+            (*position, *residue) = (target, by.rest);
         }
-        Ok(())
+        Ok(moved)
     }
 
     /// The feed of a move; 142 if there is none.
@@ -91,10 +108,9 @@ impl Interpreter {
     }
 }
 
-/// Whether a move turns rotary axes and nothing else: F is then degrees per minute, in all units.
-fn turns_only(start: &PerAxis<Length>, target: &PerAxis<Length>) -> bool {
-    let differs = |(a, b): (&Length, &Length)| a != b;
-    let mut linear = start.iter().zip(target).take(FIRST_ROTARY);
-    let mut rotary = start.iter().zip(target).skip(FIRST_ROTARY);
-    !linear.any(differs) && rotary.any(differs)
+/// Which kinds of axes a line moves.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Moved {
+    linear: bool,
+    rotary: bool,
 }
