@@ -9,6 +9,7 @@ mod image {
 
     // Naming avr-libc and libgcc in the image itself puts them before `compiler_builtins` in the link:
     // see `kerf::math`.
+    #[link(name = "c")]
     #[link(name = "m")]
     #[link(name = "gcc")]
     unsafe extern "C" {}

@@ -227,6 +227,7 @@ impl Exec {
         Segment { ticks, period: CYCLES_PER_MS as u16, ..self.prep.idle(0, 1).0 }
     }
 
+    #[inline(never)]
     /// Takes up a line block. It stays in the ring until its last segment, so that the planner
     /// counts it as work in hand.
     fn begin(&mut self, block: &Block, blocks: &mut BlockSource) -> Step {
@@ -267,6 +268,7 @@ impl Exec {
         Step::Again
     }
 
+    #[inline(never)]
     /// Prepares the next stretch of the block being run.
     fn run(&mut self, mut running: Running, blocks: &mut BlockSource) -> Step {
         running.raise_exit(exit_wish(blocks, running.cruise));
@@ -376,6 +378,7 @@ impl Running {
     }
 
     /// Advances the time; returns the distance, in phase units of the dominant motor.
+    #[inline(never)]
     fn advance(&mut self, seconds: f32) -> u32 {
         let mut travel = 0.0;
         let mut seconds = seconds;

@@ -68,6 +68,7 @@ async fn answer(links: &Links, id: LineId, class: Class) {
     tx.flush();
 }
 
+#[inline(never)]
 fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
     let lines = links.lines.borrow();
     let next = request.step(lines.text(id), &mut View::of(links), tx);
@@ -75,6 +76,7 @@ fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
     next
 }
 
+#[inline(never)]
 /// Interprets a block and hands its commands to the planner.
 fn interpret(links: &Links, id: LineId, start: u8, end: u8) -> Status {
     let lines = links.lines.borrow();

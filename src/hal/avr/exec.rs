@@ -103,9 +103,7 @@ fn USART3_UDRE() {
 #[inline(never)]
 fn poll() {
     if let Some(waker) = CONTEXT.waker.take() {
-        // Pends this very interrupt again, by way of the pender: withdraw it.
         waker.wake();
-        withdraw();
     }
     if let Some(executor) = CONTEXT.executor.get() {
         // SAFETY: the only place that polls it, and it does not nest.

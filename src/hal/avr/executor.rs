@@ -2,7 +2,7 @@
 
 use embassy_executor::raw::Executor;
 
-use super::{exec, flags};
+use super::flags;
 use crate::hal::event::{self, Event};
 
 /// Pender context of the main executor.
@@ -12,10 +12,9 @@ pub const EXEC: *mut () = 1 as *mut ();
 
 #[unsafe(export_name = "__pender")]
 fn pender(context: *mut ()) {
+    // The exec task is woken by the exec interrupt only, just before it polls: nothing to pend.
     if context == THREAD {
         flags::set(Event::Thread);
-    } else {
-        exec::pend();
     }
 }
 
