@@ -1,9 +1,12 @@
 //! The step generator: what happens at one tick of the step timer, without any register.
 //!
-//! Owned by the step interrupt (level 0). Each motor has a 16-bit phase; [`STEP`] of it is one step.
-//! A tick adds the segment's increment, and a step is due when bit 15 flips: the phase passed a
-//! multiple of [`STEP`]. So a motor steps at most once a tick, `increment = STEP` is a step on every
-//! tick, and a motor whose increment is `STEP / 2^k` steps on every `2^k`th tick exactly.
+//! Owned by the step interrupt (level 0). Each motor has a phase below [`STEP`], which is one step. A
+//! tick adds the segment's increment; when that fills bit 15, the bit is taken off and a step is due.
+//! So a motor steps at most once a tick, `increment = STEP` is a step on every tick, and a motor whose
+//! increment is `STEP / 2^k` steps on every `2^k`th tick exactly.
+//!
+//! On AVR, [`Dda::tick`] has a twin in assembly (`hal/avr/step_isr.rs`), which works on the same
+//! [`Dda`], field by field; [`Dda::load`] serves both. The host runs this one.
 //!
 //! ```text
 //!   tick   n-1          n           n+1
@@ -21,8 +24,6 @@
 //! A phase is the motor's true position between steps. When the direction of a motor reverses, its
 //! phase is complemented: counting a complement up is counting the phase down, so the fraction
 //! of a step survives any reversal.
-//!
-//! Cost: see `tests/sim/tests/budgets.rs`, which measures the whole interrupt.
 
 use crate::boards::MOTORS;
 use crate::hal::ring::Consumer;
@@ -70,15 +71,18 @@ pub trait Pins {
     fn stop(&mut self);
 }
 
-/// The generator's state.
+/// The generator's state. The assembly knows its layout by `offset_of`.
 #[derive(Debug)]
+#[repr(C)]
 pub struct Dda {
-    phase: [u16; MOTORS],
-    increment: [u16; MOTORS],
-    ticks: u16,
+    /// Below [`STEP`].
+    pub(crate) phase: [u16; MOTORS],
+    pub(crate) increment: [u16; MOTORS],
+    /// Ticks left of the segment.
+    pub(crate) ticks: u16,
+    /// Steps due at the next tick, bit m for motor m.
+    pub(crate) due: u8,
     backwards: u8,
-    /// Steps due at the next tick.
-    due: u8,
 }
 
 impl Dda {
@@ -108,10 +112,9 @@ impl Dda {
         let mut next = 0;
         let mut m = 0;
         while m < MOTORS {
-            let before = self.phase[m];
-            let after = before.wrapping_add(self.increment[m]);
-            self.phase[m] = after;
-            if (before ^ after) & STEP != 0 {
+            let after = self.phase[m] + self.increment[m];
+            self.phase[m] = after & !STEP;
+            if after & STEP != 0 {
                 next |= 1 << m;
             }
             m += 1;
@@ -122,7 +125,11 @@ impl Dda {
 
     /// Takes the next segment. False when there is none.
     #[inline(always)]
-    fn load(&mut self, pins: &mut impl Pins, segments: &mut Consumer<Segment, SEGMENTS>) -> bool {
+    pub fn load(
+        &mut self,
+        pins: &mut impl Pins,
+        segments: &mut Consumer<Segment, SEGMENTS>,
+    ) -> bool {
         let Some(segment) = segments.pop() else {
             return false;
         };
@@ -133,7 +140,7 @@ impl Dda {
             self.backwards = segment.backwards;
             for m in 0..MOTORS {
                 if turned & (1 << m) != 0 {
-                    self.phase[m] = !self.phase[m];
+                    self.phase[m] = !self.phase[m] & !STEP;
                 }
             }
         }

@@ -2,7 +2,7 @@
 //!
 //! | interrupt | file | level | does |
 //! |---|---|---|---|
-//! | TIMER1_COMPA | `stepper` | 0 | one tick of the step generator |
+//! | TIMER1_COMPA | `step_isr` | 0 | one tick of the step generator |
 //! | USART0_RX, USART0_UDRE | `uart` | 1 | bytes between the line and the rings |
 //! | TIMER0_COMPA | `time` | 1 | counts milliseconds |
 //! | USART3_UDRE | `exec` | 2 | software interrupt: polls the exec executor, interrupts on |
@@ -13,6 +13,7 @@ pub mod exec;
 pub mod executor;
 pub mod gpio;
 pub mod panic;
+mod step_isr;
 pub mod stepper;
 pub mod time;
 pub mod uart;

@@ -1,8 +1,8 @@
 //! The step timer and the step interrupt.
 //!
 //! Timer 1 counts CPU cycles up to the segment's tick period (CTC), so ticks are exact to the cycle
-//! whatever the interrupt takes. The interrupt is level 0: it runs with interrupts off and owns the
-//! step generator and the pins.
+//! whatever the interrupt takes. The interrupt (`step_isr`) is level 0: it runs with interrupts off and
+//! owns the step generator and the pins.
 
 use core::cell::UnsafeCell;
 
@@ -33,17 +33,20 @@ static RUNNING: SharedByte = SharedByte::new(0);
 /// Bit m: motor m's direction pin is inverted.
 static INVERTED: SharedByte = SharedByte::new(0);
 
-struct Level0 {
+/// What the step interrupt owns. The generator comes first: the assembly counts on it.
+#[repr(C)]
+pub(super) struct Level0 {
     dda: Dda,
     segments: Option<Consumer<Segment, SEGMENTS>>,
 }
 
-struct Owned(UnsafeCell<Level0>);
+#[repr(transparent)]
+pub(super) struct Owned(UnsafeCell<Level0>);
 
 // SAFETY: touched by the step interrupt only, after `start`, which runs before interrupts are on.
 unsafe impl Sync for Owned {}
 
-static STATE: Owned = Owned(UnsafeCell::new(Level0 { dda: Dda::new(), segments: None }));
+pub(super) static STATE: Owned = Owned(UnsafeCell::new(Level0 { dda: Dda::new(), segments: None }));
 
 /// Sets the timer up. Before interrupts are on; `None` after the first time.
 pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
@@ -89,6 +92,21 @@ pub fn kill() {
     unsafe { TCCR1B.write_volatile(HALT) };
 }
 
+/// Loads the next segment for the interrupt. Called by it alone, at level 0. Whether there was one.
+pub(super) extern "C" fn load() -> bool {
+    // SAFETY: the interrupt owns it, and does not nest.
+    let state = unsafe { &mut *STATE.0.get() };
+    match &mut state.segments {
+        Some(segments) => state.dda.load(&mut BoardPins, segments),
+        None => false,
+    }
+}
+
+/// No segment is left: no more ticks. Called by the interrupt alone, at level 0.
+pub(super) extern "C" fn halt() {
+    BoardPins.stop();
+}
+
 struct BoardPins;
 
 /// Does the same for each motor with a constant index, so that pins fold into single instructions.
@@ -114,17 +132,9 @@ macro_rules! each_motor {
 }
 
 impl Pins for BoardPins {
-    #[inline(always)]
-    fn rise(&mut self, motors: u8) {
-        each_motor!(M => if motors & (1 << M) != 0 {
-            gpio::high(ACTIVE.motors[M].step);
-        });
-    }
-
-    #[inline(always)]
-    fn fall(&mut self, _motors: u8) {
-        each_motor!(M => gpio::low(ACTIVE.motors[M].step));
-    }
+    // The assembly does these two itself.
+    fn rise(&mut self, _motors: u8) {}
+    fn fall(&mut self, _motors: u8) {}
 
     #[inline(always)]
     fn direction(&mut self, backwards: u8) {
@@ -154,14 +164,5 @@ impl Pins for BoardPins {
         unsafe { TCCR1B.write_volatile(HALT) };
         RUNNING.set(0);
         exec::pend();
-    }
-}
-
-#[avr_device::interrupt(atmega2560)]
-fn TIMER1_COMPA() {
-    // SAFETY: this interrupt owns it, and does not nest.
-    let state = unsafe { &mut *STATE.0.get() };
-    if let Some(segments) = &mut state.segments {
-        state.dda.tick(&mut BoardPins, segments);
     }
 }
