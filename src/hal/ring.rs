@@ -14,14 +14,14 @@ use super::byte::SharedByte;
 /// The storage. `N` is 2 to 256.
 pub struct Ring<T, const N: usize> {
     slots: UnsafeCell<[MaybeUninit<T>; N]>,
-    /// Next slot to fill; written by the producer only.
+    /// The slot filled last; written by the producer only.
     head: SharedByte,
-    /// Next slot to read; written by the consumer only.
+    /// The slot read last; written by the consumer only.
     tail: SharedByte,
     taken: SharedByte,
 }
 
-// SAFETY: a slot belongs to the producer until `head` has moved past it and to the consumer until
+// SAFETY: a slot belongs to the producer until `head` has moved onto it and to the consumer until
 // `tail` has; `split` hands out one of each, once.
 unsafe impl<T: Send, const N: usize> Sync for Ring<T, N> {}
 
@@ -31,6 +31,13 @@ const fn next<const N: usize>(index: u8) -> u8 {
 }
 
 impl<T: Copy, const N: usize> Ring<T, N> {
+    /// Where things lie, for interrupts in assembly that do a `push` or `pop` of their own.
+    pub const SLOTS: usize = core::mem::offset_of!(Self, slots);
+    /// See [`Ring::SLOTS`].
+    pub const HEAD: usize = core::mem::offset_of!(Self, head);
+    /// See [`Ring::SLOTS`].
+    pub const TAIL: usize = core::mem::offset_of!(Self, tail);
+
     const SIZE_OK: () = assert!(N >= 2 && N <= 256);
 
     /// An empty ring.
@@ -97,8 +104,8 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         if after == self.0.tail.get() {
             return Err(value);
         }
-        // SAFETY: the slot at `head` is the producer's until `head` moves.
-        unsafe { self.0.slot(head).write(value) };
+        // SAFETY: the slot behind `head` is the producer's until `head` moves onto it.
+        unsafe { self.0.slot(after).write(value) };
         self.0.head.set(after);
         Ok(())
     }
@@ -129,7 +136,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
 
     fn index_of(&self, back: usize) -> u8 {
         let head = self.0.head.get() as usize;
-        let index = if head > back { head - 1 - back } else { head + N - 1 - back };
+        let index = if head >= back { head - back } else { head + N - back };
         index as u8
     }
 }
@@ -157,8 +164,9 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
             return None;
         }
         let tail = self.0.tail.get() as usize;
-        let index = if tail + ahead >= N { tail + ahead - N } else { tail + ahead };
-        // SAFETY: the slot is the consumer's until `tail` moves past it.
+        let index = tail + 1 + ahead;
+        let index = if index >= N { index - N } else { index };
+        // SAFETY: the slot is the consumer's until `tail` moves onto it and the producer wraps.
         Some(look(unsafe { &*self.0.slot(index as u8) }))
     }
 
@@ -178,9 +186,10 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
             return None;
         }
         let tail = self.0.tail.get();
+        let after = next::<N>(tail);
         // SAFETY: as in `peek`.
-        let value = unsafe { self.0.slot(tail).read() };
-        self.0.tail.set(next::<N>(tail));
+        let value = unsafe { self.0.slot(after).read() };
+        self.0.tail.set(after);
         Some(value)
     }
 }

@@ -4,7 +4,7 @@
 //! Where bytes were lost, because the ring was full or the hardware overran, the next byte that fits is
 //! replaced by [`LOSS`]: it marks the damaged line, which the reader refuses.
 
-use core::cell::UnsafeCell;
+use core::arch::asm;
 
 use super::flags;
 use crate::boards::ACTIVE;
@@ -21,30 +21,18 @@ pub const LOSS: u8 = 0;
 /// The same, where the byte that is replaced ended its line.
 pub const LOSS_AT_END: u8 = 1;
 
-#[inline(always)]
-fn loss_mark(byte: u8) -> u8 {
-    if byte == b'\n' || byte == b'\r' { LOSS_AT_END } else { LOSS }
-}
-
 /// Bytes received.
 pub type Received = Consumer<u8, RING>;
 /// Bytes to send. Call [`kick`] after filling it.
 pub type Outgoing = Producer<u8, RING>;
 
-static RX: Ring<u8, RING> = Ring::new();
-static TX: Ring<u8, RING> = Ring::new();
+type ByteRing = Ring<u8, RING>;
+
+static RX: ByteRing = Ring::new();
+static TX: ByteRing = Ring::new();
 /// Bytes were lost since the last one queued. The receive interrupt's own.
 static LOST: SharedByte = SharedByte::new(0);
 static REALTIME: SharedByte = SharedByte::new(0);
-
-/// What an interrupt owns of the rings.
-struct Owned<T>(UnsafeCell<Option<T>>);
-
-// SAFETY: written at start-up before interrupts are on, then touched by one interrupt only.
-unsafe impl<T> Sync for Owned<T> {}
-
-static RX_END: Owned<Producer<u8, RING>> = Owned(UnsafeCell::new(None));
-static TX_END: Owned<Consumer<u8, RING>> = Owned(UnsafeCell::new(None));
 
 const UCSR0B: *mut u8 = 0xC1 as *mut u8;
 const RXCIE: u8 = 1 << 7;
@@ -56,11 +44,8 @@ const TXEN: u8 = 1 << 3;
 pub fn start(baud: u32) -> Option<(Received, Outgoing)> {
     let (rx_in, rx_out) = RX.split()?;
     let (tx_in, tx_out) = TX.split()?;
-    // SAFETY: interrupts are off, nobody else looks.
-    unsafe {
-        *RX_END.0.get() = Some(rx_in);
-        *TX_END.0.get() = Some(tx_out);
-    }
+    // From now on those two ends are the interrupts', which push and pop in assembly.
+    let (_, _) = (rx_in, tx_out);
     let uart = super::peripherals().USART0;
     uart.ubrr0().write(|w| w.set(divisor(baud)));
     uart.ucsr0a().write(|w| w.u2x0().set_bit());
@@ -95,43 +80,181 @@ pub fn take_realtime() -> u8 {
     })
 }
 
-#[avr_device::interrupt(atmega2560)]
-fn USART0_RX() {
-    const UCSR0A: *const u8 = 0xC0 as *const u8;
-    const UDR0: *const u8 = 0xC6 as *const u8;
-    const DATA_OVERRUN: u8 = 1 << 3;
-    const FRAME_ERROR: u8 = 1 << 4;
-    // SAFETY: the status must be read before the data; reading them has no other reader.
-    let (status, byte) = unsafe { (UCSR0A.read_volatile(), UDR0.read_volatile()) };
-    let special = realtime::bit(byte);
-    if special != 0 {
-        REALTIME.set(REALTIME.get() | special);
-        flags::set(Event::Realtime);
-        return;
+/// USART0_RX: takes a byte.
+///
+/// Interrupts are off for 60 cycles at most. They are on again while registers are restored: the data
+/// register has been read, so this interrupt comes again for the next byte only, and nests three deep
+/// at most.
+#[unsafe(no_mangle)]
+extern "C" fn __vector_25() -> ! {
+    // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only producer
+    // of the receive ring and the only one to touch `LOST` and to set bits of `REALTIME`.
+    unsafe {
+        asm!(
+            "push r24",
+            "in   r24, 0x3F",
+            "push r24",
+            "push r30",
+            "push r31",
+            // The status goes with the byte that is read after it.
+            "lds  r31, 0xC0",
+            "lds  r24, 0xC6",
+            // Letters, digits and dots, the most of it, are no real-time characters.
+            "cpi  r24, 0x26",
+            "brlo 5f",
+            "cpi  r24, 0x7E",
+            "breq 12f",
+            // Queue it. Frame error or overrun: something was lost.
+            "1:",
+            "andi r31, 0x18",
+            "lds  r30, {lost}",
+            "or   r31, r30",
+            "brne 4f",
+            "2:",
+            "lds  r30, {rx} + {head}",
+            "inc  r30",
+            "lds  r31, {rx} + {tail}",
+            "cp   r30, r31",
+            "breq 8f",
+            "sts  {rx} + {head}, r30",
+            "ldi  r31, 0",
+            "subi r30, lo8(-({rx} + {slots}))",
+            "sbci r31, hi8(-({rx} + {slots}))",
+            "st   Z, r24",
+            "sbi  0x1E, {received}",
+            "3:",
+            "sei",
+            "pop  r31",
+            "pop  r30",
+            "pop  r24",
+            "out  0x3F, r24",
+            "pop  r24",
+            "reti",
+            // Bytes were lost before this one: a mark takes its place.
+            "4:",
+            "cpi  r24, 0x0A",
+            "ldi  r24, {loss_at_end}",
+            "breq 41f",
+            "ldi  r24, {loss}",
+            "41:",
+            "ldi  r30, 0",
+            "sts  {lost}, r30",
+            "rjmp 2b",
+            // Up to a percent sign.
+            "5:",
+            "cpi  r24, 0x20",
+            "brsh 6f",
+            "cpi  r24, 0x0A",
+            "breq 1b",
+            "cpi  r24, 0x18",
+            "breq 13f",
+            "cpi  r24, 0x05",
+            "breq 14f",
+            "cpi  r24, 0x04",
+            "breq 15f",
+            "rjmp 1b",
+            "6:",
+            "cpi  r24, 0x21",
+            "breq 10f",
+            "cpi  r24, 0x25",
+            "breq 11f",
+            "rjmp 1b",
+            // The ring is full.
+            "8:",
+            "ldi  r30, 1",
+            "sts  {lost}, r30",
+            "sbi  0x1E, {received}",
+            "rjmp 3b",
+            "10:",
+            "ldi  r30, {hold}",
+            "rjmp 16f",
+            "11:",
+            "ldi  r30, {flush}",
+            "rjmp 16f",
+            "12:",
+            "ldi  r30, {resume}",
+            "rjmp 16f",
+            "13:",
+            "ldi  r30, {reset}",
+            "rjmp 16f",
+            "14:",
+            "ldi  r30, {enquiry}",
+            "rjmp 16f",
+            "15:",
+            "ldi  r30, {kill}",
+            "16:",
+            "lds  r31, {realtime}",
+            "or   r31, r30",
+            "sts  {realtime}, r31",
+            "sbi  0x1E, {special}",
+            "rjmp 3b",
+            rx = sym RX,
+            head = const ByteRing::HEAD,
+            tail = const ByteRing::TAIL,
+            slots = const ByteRing::SLOTS,
+            lost = sym LOST,
+            realtime = sym REALTIME,
+            loss = const LOSS,
+            loss_at_end = const LOSS_AT_END,
+            received = const Event::Received as u8,
+            special = const Event::Realtime as u8,
+            hold = const realtime::HOLD,
+            resume = const realtime::RESUME,
+            flush = const realtime::FLUSH,
+            reset = const realtime::RESET,
+            kill = const realtime::KILL,
+            enquiry = const realtime::ENQUIRY,
+            options(noreturn),
+        );
     }
-    let lost = LOST.get() != 0 || status & (DATA_OVERRUN | FRAME_ERROR) != 0;
-    let byte = if lost { loss_mark(byte) } else { byte };
-    // SAFETY: this interrupt owns it, and does not nest.
-    if let Some(ring) = unsafe { &mut *RX_END.0.get() } {
-        LOST.set(u8::from(ring.push(byte).is_err()));
-    }
-    flags::set(Event::Received);
 }
 
-#[avr_device::interrupt(atmega2560)]
-fn USART0_UDRE() {
-    const UDR0: *mut u8 = 0xC6 as *mut u8;
-    // SAFETY: this interrupt owns it, and does not nest.
-    let byte = match unsafe { &mut *TX_END.0.get() } {
-        Some(ring) => ring.pop(),
-        None => None,
-    };
-    // SAFETY: the data register is this interrupt's alone; the control register is written whole.
+/// USART0_UDRE: sends a byte, or stops asking when there is none.
+///
+/// Interrupts are off for 40 cycles, and on again while registers are restored. It may come again then
+/// at once, for the transmitter holds two bytes; it nests no deeper.
+#[unsafe(no_mangle)]
+extern "C" fn __vector_26() -> ! {
+    // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only consumer
+    // of the transmit ring.
     unsafe {
-        match byte {
-            Some(byte) => UDR0.write_volatile(byte),
-            None => UCSR0B.write_volatile(RXCIE | RXEN | TXEN),
-        }
+        asm!(
+            "push r24",
+            "in   r24, 0x3F",
+            "push r24",
+            "push r30",
+            "push r31",
+            "lds  r30, {tx} + {tail}",
+            "lds  r31, {tx} + {head}",
+            "cp   r30, r31",
+            "breq 2f",
+            "inc  r30",
+            "sts  {tx} + {tail}, r30",
+            "ldi  r31, 0",
+            "subi r30, lo8(-({tx} + {slots}))",
+            "sbci r31, hi8(-({tx} + {slots}))",
+            "ld   r24, Z",
+            "sts  0xC6, r24",
+            "1:",
+            "sbi  0x1E, {transmitted}",
+            "sei",
+            "pop  r31",
+            "pop  r30",
+            "pop  r24",
+            "out  0x3F, r24",
+            "pop  r24",
+            "reti",
+            "2:",
+            "ldi  r24, {quiet}",
+            "sts  0xC1, r24",
+            "rjmp 1b",
+            tx = sym TX,
+            head = const ByteRing::HEAD,
+            tail = const ByteRing::TAIL,
+            slots = const ByteRing::SLOTS,
+            quiet = const RXCIE | RXEN | TXEN,
+            transmitted = const Event::Transmitted as u8,
+            options(noreturn),
+        );
     }
-    flags::set(Event::Transmitted);
 }
