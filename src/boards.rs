@@ -191,3 +191,28 @@ pub const ACTIVE: &Board = &RAMPS14;
 /// The board that this image is built for.
 #[cfg(not(feature = "board-ramps14"))]
 pub const ACTIVE: &Board = &MEGA2560_GRBL;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boards_are_found_by_name() {
+        assert!(by_name("ramps14").is_some_and(|b| b.motors[2].step == pin(Port::L, 3)));
+        assert!(by_name("nothing").is_none());
+    }
+
+    #[test]
+    #[should_panic(expected = "pin of this board is used twice")]
+    fn a_pin_that_is_used_twice_is_refused() {
+        let mut board = MEGA2560_GRBL;
+        board.enable_all = Some(board.motors[1].step);
+        board.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "timer of this board is used twice")]
+    fn a_timer_that_is_used_twice_is_refused() {
+        Board { tick_timer: Timer::T1, ..MEGA2560_GRBL }.check();
+    }
+}

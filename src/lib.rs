@@ -3,7 +3,7 @@
 //! This library is the whole firmware but for the image's entry point. It is `no_std` and runs on
 //! the ATmega2560 and, for tests and tools, on the host. `ARCHITECTURE.md` is the tour of the house.
 #![no_std]
-#![cfg_attr(target_arch = "avr", feature(abi_avr_interrupt, asm_experimental_arch))]
+#![cfg_attr(target_arch = "avr", feature(asm_experimental_arch))]
 
 #[cfg(not(target_arch = "avr"))]
 extern crate std;

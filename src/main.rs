@@ -1,5 +1,5 @@
 //! The AVR image. On the host it only says what it is.
-#![cfg_attr(target_arch = "avr", no_std, no_main, feature(abi_avr_interrupt))]
+#![cfg_attr(target_arch = "avr", no_std, no_main)]
 
 #[cfg(target_arch = "avr")]
 mod image {

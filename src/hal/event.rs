@@ -80,10 +80,10 @@ pub async fn next(event: Event) {
 /// Wakes who waits for the events in `bits`. The main loop calls it, in thread mode.
 pub fn dispatch(bits: u8) {
     for (bit, slot) in waiters().0.iter().enumerate() {
-        if bits & (1 << bit) != 0 {
-            if let Some(waker) = slot.take() {
-                waker.wake();
-            }
+        if bits & (1 << bit) != 0
+            && let Some(waker) = slot.take()
+        {
+            waker.wake();
         }
     }
     if bits & (1 << Event::Tick as u8) != 0 {

@@ -121,7 +121,7 @@ impl Prep {
     pub fn segment(&mut self, distance: u32, cycles: u32, period_min: u16) -> (Segment, Rest) {
         let shift = tick_shift(distance, cycles, period_min);
         // Fits 32 bits: `tick_shift` sees to that.
-        let period = if distance == 0 { u32::MAX } else { (cycles << shift) / distance };
+        let period = (cycles << shift).checked_div(distance).unwrap_or(u32::MAX);
         if period > 0xFFFF {
             return self.idle(distance, cycles);
         }

@@ -59,14 +59,14 @@ impl Planner {
             Motion::Arc { target, feed, arc } => {
                 let tolerance = self.links.settings.borrow().chordal_tolerance();
                 let start = self.position;
-                let mut chords = Chords::new(&start, target, arc, tolerance);
+                let chords = Chords::new(&start, target, arc, tolerance);
                 // The time of an inverse-time arc is that of all its chords together.
                 let feed = match *feed {
                     Feed::Minutes(minutes) if minutes > 0.0 => chords.length() / minutes,
                     Feed::Minutes(_) => f32::MAX,
                     Feed::PerMinute(rate) => rate,
                 };
-                while let Some(end) = chords.next() {
+                for end in chords {
                     self.straight(&end, Some(Feed::PerMinute(feed)), line).await;
                 }
             }

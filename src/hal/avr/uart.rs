@@ -6,7 +6,6 @@
 
 use core::arch::asm;
 
-use super::flags;
 use crate::boards::ACTIVE;
 use crate::hal::byte::SharedByte;
 use crate::hal::event::Event;
