@@ -5,7 +5,8 @@ use kerf::boards::MOTORS;
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf::motion::block::{Block, Kind};
 use kerf::motion::dda::{Dda, Pins, SEGMENTS, Segment};
-use kerf::motion::exec::{Exec, PERIOD_MIN, Step};
+use kerf::motion::exec::{Exec, Step};
+use kerf::motion::prep::PERIOD_MIN;
 use kerf::motion::queue::{BLOCKS, BlockQueue, BlockSource};
 use proptest::prelude::*;
 

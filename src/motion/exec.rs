@@ -17,7 +17,7 @@
 
 use super::block::{Block, Kind};
 use super::dda::Segment;
-use super::prep::{Prep, Rest};
+use super::prep::{PERIOD_MIN, Prep, Rest};
 use super::profile::{Limits, Ramp, greater, lesser, peak, reach};
 use super::queue::BlockSource;
 use crate::boards::MOTORS;
@@ -31,14 +31,18 @@ const CYCLES_PER_MS: u32 = crate::boards::ACTIVE.clock_hz / 1000;
 /// Nominal time of a segment. Four of them are the latency from exec to the pins.
 pub const SEGMENT_S: f32 = 0.004;
 
-/// Shortest tick period, CPU cycles: what the step interrupt sustains beside everything else.
-pub const PERIOD_MIN: u16 = 400;
+/// The same in CPU cycles.
+const SEGMENT_CYCLES: u32 = (SEGMENT_S * CYCLES_PER_S) as u32;
 
 /// Highest step rate of a motor, steps per second: a step on every tick.
 pub const STEP_RATE_MAX: f32 = CYCLES_PER_S / PERIOD_MIN as f32;
 
 /// Slowest cruise, mm/s: only keeps a division by zero away.
 const CRUISE_MIN: f32 = 1e-4;
+
+/// Shortest block with steps, s: about what exec takes to begin one and to prepare it while the step
+/// interrupt is at its busiest.
+pub const BLOCK_S_MIN: f32 = 0.004;
 
 /// A dwell's segment: this many ticks of a millisecond.
 const DWELL_TICKS: u16 = 4;
@@ -79,8 +83,11 @@ struct Running {
     scale: f32,
     /// Phase units of the dominant motor until the end, beyond those handed to `Prep`.
     left: u64,
-    /// All phase units of the block.
-    total: f32,
+    /// One over all phase units of the block.
+    per_total: f32,
+    /// One over `scale`, and over `cruise`.
+    per_scale: f32,
+    per_cruise: f32,
     /// What is below a phase unit.
     fraction: f32,
 }
@@ -163,8 +170,8 @@ impl Exec {
     }
 
     /// What reports show.
-    pub fn snapshot(&self) -> Snapshot {
-        self.snapshot
+    pub fn snapshot(&self) -> &Snapshot {
+        &self.snapshot
     }
 
     /// Does the next thing there is to do. `standstill` says that the steppers have stopped.
@@ -172,8 +179,8 @@ impl Exec {
         if self.dwell_ms > 0 {
             return Step::Segment(self.dwell());
         }
-        if let Some(running) = self.running.take() {
-            return self.run(running, blocks);
+        if self.running.is_some() {
+            return self.run(blocks);
         }
         let Some(block) = blocks.peek(0, |block| *block) else {
             return self.idle(standstill);
@@ -268,27 +275,31 @@ impl Exec {
         Step::Again
     }
 
+    /// Prepares the next stretch of the block being run. In place: copying its state would cost as
+    /// much as the mathematics.
     #[inline(never)]
-    /// Prepares the next stretch of the block being run.
-    fn run(&mut self, mut running: Running, blocks: &mut BlockSource) -> Step {
+    fn run(&mut self, blocks: &mut BlockSource) -> Step {
+        let Some(running) = &mut self.running else {
+            return Step::Again;
+        };
         running.raise_exit(exit_wish(blocks, running.cruise));
-        let left = running.time_left();
+        let body = running.body_left();
+        let left = running.time_left(body);
         let rest = core::mem::take(&mut self.rest);
         if left <= 1.5 * SEGMENT_S {
             self.velocity = running.exit;
             self.snapshot.velocity = running.exit;
             self.snapshot.share_left = 0.0;
+            self.running = None;
             blocks.release();
             let cycles = cycles_of(left) + rest.cycles;
-            return self.prep.last(cycles, PERIOD_MIN).map_or(Step::Again, Step::Segment);
+            return self.prep.last(cycles).map_or(Step::Again, Step::Segment);
         }
-        let distance = running.advance(SEGMENT_S) + rest.distance;
-        let cycles = cycles_of(SEGMENT_S) + rest.cycles;
-        let (segment, rest) = self.prep.segment(distance, cycles, PERIOD_MIN);
+        let distance = running.advance(SEGMENT_S, body) + rest.distance;
+        let (segment, rest) = self.prep.segment(distance, SEGMENT_CYCLES + rest.cycles);
         self.rest = rest;
         self.snapshot.velocity = running.velocity();
         self.snapshot.share_left = running.share_left();
-        self.running = Some(running);
         Step::Segment(segment)
     }
 }
@@ -322,6 +333,8 @@ impl Running {
         };
         let cruise = greater(peak(entry, exit, length, block.cruise, &limits), CRUISE_MIN);
         let left = u64::from(most) << 15;
+        let total = units(left);
+        let scale = total / length;
         Self {
             head: Ramp::new(entry, cruise, &limits),
             tail: Ramp::new(cruise, exit, &limits),
@@ -330,8 +343,10 @@ impl Running {
             cruise,
             exit,
             limits,
-            scale: units(left) / length,
-            total: units(left),
+            scale,
+            per_scale: 1.0 / scale,
+            per_cruise: 1.0 / cruise,
+            per_total: 1.0 / total,
             left,
             fraction: 0.0,
         }
@@ -348,24 +363,24 @@ impl Running {
     /// Length of the cruise still to be run, mm. In the head, of the whole cruise.
     fn body_left(&self) -> f32 {
         let head = if self.phase == Phase::Head { self.head.remaining(self.time) } else { 0.0 };
-        greater(units(self.left) / self.scale - head - self.tail.length(), 0.0)
+        greater(units(self.left) * self.per_scale - head - self.tail.length(), 0.0)
     }
 
-    /// Seconds until the end of the block.
-    fn time_left(&self) -> f32 {
+    /// Seconds until the end of the block, of whose cruise `body` mm are left.
+    fn time_left(&self, body: f32) -> f32 {
         match self.phase {
             Phase::Tail => self.tail.time() - self.time,
-            Phase::Body => self.body_left() / self.cruise + self.tail.time(),
+            Phase::Body => body * self.per_cruise + self.tail.time(),
             Phase::Head => {
                 let head = self.head.time() - self.time;
-                head + self.body_left() / self.cruise + self.tail.time()
+                head + body * self.per_cruise + self.tail.time()
             }
         }
     }
 
     /// Share of the block that is left.
     fn share_left(&self) -> f32 {
-        units(self.left) / self.total
+        units(self.left) * self.per_total
     }
 
     /// Velocity now, mm/s.
@@ -377,30 +392,29 @@ impl Running {
         }
     }
 
-    /// Advances the time; returns the distance, in phase units of the dominant motor.
-    #[inline(never)]
-    fn advance(&mut self, seconds: f32) -> u32 {
+    /// Advances the time; returns the distance, in phase units of the dominant motor. `body` mm of
+    /// the cruise are left.
+    fn advance(&mut self, seconds: f32, body: f32) -> u32 {
         let mut travel = 0.0;
         let mut seconds = seconds;
         if self.phase == Phase::Head {
             let until = self.time + seconds;
-            travel = self.head.remaining(self.time);
             if until < self.head.time() {
                 travel = self.head.distance(until) - self.head.distance(self.time);
                 self.time = until;
                 return self.take(travel);
             }
+            travel = self.head.remaining(self.time);
             seconds = until - self.head.time();
             self.phase = Phase::Body;
         }
         if self.phase == Phase::Body {
-            let body = greater(self.body_left() - travel, 0.0);
             let possible = self.cruise * seconds;
             if possible < body {
                 return self.take(travel + possible);
             }
             travel += body;
-            seconds -= body / self.cruise;
+            seconds -= body * self.per_cruise;
             self.phase = Phase::Tail;
             self.time = 0.0;
         }

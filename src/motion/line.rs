@@ -39,6 +39,11 @@ pub trait Machine {
     fn steps(&self, motor: usize, position: Length) -> i32;
     /// Steps a second that a motor can be given.
     fn max_step_rate(&self) -> f32;
+    /// Shortest time in which a block with steps can be prepared, s; 0 for no limit. Shorter ones are
+    /// slowed down, so that exec never falls behind the steppers.
+    fn min_block_time(&self) -> f32 {
+        0.0
+    }
 }
 
 /// A straight move.
@@ -75,7 +80,7 @@ impl Builder {
         let target = targets(line.to, &self.steps, machine);
         let steps = difference(&target, &self.steps)?;
         path.limit(line.feed, machine);
-        path.limit_steps(&steps, machine.max_step_rate());
+        path.limit_steps(&steps, machine.max_step_rate(), machine.min_block_time());
         let heading = Heading::new(path.unit, |axis| machine.junction_deviation(axis));
         let mut entry_max = lesser(path.cruise, self.cruise);
         if entry_max > 0.0 {
@@ -224,11 +229,14 @@ impl Path {
         self.jerk = if self.jerk < f32::MAX { self.jerk * PER_MINUTE3 } else { 0.0 };
     }
 
-    /// Keeps every motor within `rate` steps a second.
-    fn limit_steps(&mut self, steps: &[i32; MOTORS], rate: f32) {
+    /// Keeps every motor within `rate` steps a second, and a block with steps at `time` or longer.
+    fn limit_steps(&mut self, steps: &[i32; MOTORS], rate: f32, time: f32) {
         let most = steps.iter().map(|steps| steps.unsigned_abs()).max().unwrap_or(0);
         if most > 0 {
             lower(&mut self.cruise, rate / most as f32, self.length);
+            if time > 0.0 {
+                lower(&mut self.cruise, self.length / time, 1.0);
+            }
         }
     }
 }

@@ -23,6 +23,15 @@ use crate::boards::MOTORS;
 
 const STEP_LOG2: u32 = 15;
 
+/// Shortest tick period, CPU cycles: what the step interrupt sustains beside everything else.
+pub const PERIOD_MIN: u16 = 400;
+
+/// `cycles / PERIOD_MIN`, a little too high: 1 / 400 is 10.24 / 4096. A division would take 690 cycles.
+fn ticks_in(cycles: u32) -> u32 {
+    const { assert!(PERIOD_MIN == 400) };
+    (cycles * 41) >> 14
+}
+
 /// Most ticks of a segment: keeps the rounding rest below [`super::dda::PHASE_MARGIN`].
 pub const TICKS_MAX: u32 = 2000;
 
@@ -54,6 +63,13 @@ pub struct Prep {
 /// Rounded quotient of a non-negative by a positive number.
 fn div_round(a: u32, b: u32) -> u32 {
     (a + b / 2) / b
+}
+
+/// Rounded quotient of what is wanted by the ticks there are; 0 if it is less than nothing. Motors that
+/// stand still are not worth a division.
+fn quotient(wanted: i32, ticks: u32) -> u32 {
+    let wanted = wanted.max(0) as u32;
+    if wanted < ticks / 2 { 0 } else { div_round(wanted, ticks) }
 }
 
 impl Prep {
@@ -117,15 +133,15 @@ impl Prep {
     }
 
     /// Prepares a stretch: the dominant motor is to travel `distance` phase units in `cycles` CPU
-    /// cycles (1 to 2^17), with ticks no closer than `period_min`.
-    pub fn segment(&mut self, distance: u32, cycles: u32, period_min: u16) -> (Segment, Rest) {
-        let shift = tick_shift(distance, cycles, period_min);
+    /// cycles (1 to 2^17).
+    pub fn segment(&mut self, distance: u32, cycles: u32) -> (Segment, Rest) {
+        let shift = tick_shift(distance, cycles);
         // Fits 32 bits: `tick_shift` sees to that.
         let period = (cycles << shift).checked_div(distance).unwrap_or(u32::MAX);
         if period > 0xFFFF {
             return self.idle(distance, cycles);
         }
-        let period = period.max(u32::from(period_min));
+        let period = period.max(u32::from(PERIOD_MIN));
         let ticks = (distance >> shift).clamp(1, TICKS_MAX);
         let travel = ticks << shift;
         let rest =
@@ -147,7 +163,7 @@ impl Prep {
 
     /// Prepares the last stretch of the block: everything that is left, in `cycles`. `None` when
     /// nothing is left.
-    pub fn last(&mut self, cycles: u32, period_min: u16) -> Option<Segment> {
+    pub fn last(&mut self, cycles: u32) -> Option<Segment> {
         // All but the dominant motor may have a little more or less left than their share.
         let distance = self.left.iter().map(|left| *left as i32).max().unwrap_or(0);
         // Nothing but a rest of rounding, to either side: leave it to the next block.
@@ -155,11 +171,11 @@ impl Prep {
             return None;
         }
         let distance = distance as u32;
-        let shift = tick_shift(distance, cycles, period_min);
+        let shift = tick_shift(distance, cycles);
         // A motor makes a step on each tick at most.
         let ticks = div_round(distance, 1 << shift).max(distance.div_ceil(STEP.into()));
         let ticks = ticks.clamp(1, TICKS_MAX);
-        let period = (cycles / ticks).clamp(u32::from(period_min), 0xFFFF);
+        let period = (cycles / ticks).clamp(u32::from(PERIOD_MIN), 0xFFFF);
         for m in 0..MOTORS {
             self.owed[m] = 0;
         }
@@ -181,7 +197,7 @@ impl Prep {
         };
         for m in 0..MOTORS {
             let wanted = travel(self, m) + self.owed[m];
-            let increment = div_round(wanted.max(0) as u32, ticks).min(u32::from(STEP));
+            let increment = quotient(wanted, ticks).min(u32::from(STEP));
             let done = increment * ticks;
             self.owed[m] = wanted - done as i32;
             self.left[m] = self.left[m].wrapping_sub(done);
@@ -197,13 +213,16 @@ fn ratio(steps: u32, most: u32) -> u32 {
 }
 
 /// The exponent of a tick's travel, `STEP >> k`, for the finest tick that keeps ticks at least
-/// `period_min` apart and makes no more than [`TICKS_MAX`] of them.
-fn tick_shift(distance: u32, cycles: u32, period_min: u16) -> u32 {
-    let finest = (cycles / u32::from(period_min)).clamp(1, TICKS_MAX);
+/// [`PERIOD_MIN`] apart and makes no more than [`TICKS_MAX`] of them.
+fn tick_shift(distance: u32, cycles: u32) -> u32 {
+    let finest = ticks_in(cycles).clamp(1, TICKS_MAX);
+    // `cycles << shift` must fit 32 bits.
+    let most = STEP_LOG2.min(cycles.leading_zeros());
     let mut shift = 0;
-    while shift < STEP_LOG2 && distance >> shift > finest {
+    let mut ticks = distance;
+    while shift < most && ticks > finest {
+        ticks >>= 1;
         shift += 1;
     }
-    // `cycles << shift` must fit 32 bits.
-    shift.min(cycles.leading_zeros())
+    shift
 }

@@ -33,7 +33,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
 
 /// Tells thread mode what changed.
 fn announce(machine: &Exec, released: bool) {
-    links::publish(machine.snapshot());
+    links::publish(*machine.snapshot());
     if released {
         flags::set(Event::BlockDone);
     }

@@ -12,7 +12,7 @@ use crate::gcode::command::{Commands, Feed, Motion, Stop};
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::exec;
 use crate::motion::block::{Block, Kind};
-use crate::motion::exec::STEP_RATE_MAX;
+use crate::motion::exec::{BLOCK_S_MIN, STEP_RATE_MAX};
 use crate::motion::line::{Builder, Line, Machine};
 use crate::motion::queue::BlockQueue;
 use crate::units::{AXES, Length, PerAxis};
@@ -148,5 +148,8 @@ impl Machine for Settings {
     }
     fn max_step_rate(&self) -> f32 {
         STEP_RATE_MAX
+    }
+    fn min_block_time(&self) -> f32 {
+        BLOCK_S_MIN
     }
 }

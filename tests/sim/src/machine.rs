@@ -72,6 +72,8 @@ pub struct Machine {
     image: Image,
     board: &'static Board,
     resets: u64,
+    /// Cycles spent at each word of flash, if asked for.
+    profile: Option<Vec<u64>>,
 }
 
 impl Machine {
@@ -81,7 +83,7 @@ impl Machine {
         let bus = Bus::install(cpu, Wire::new(board.clock_hz, 115_200));
         let probes = recorder::attach(bus, cpu, board);
         let meters = Meters::new(vectors::compare_a(board.step_timer));
-        Ok(Machine { cpu, bus, _probes: probes, meters, image, board, resets: 0 })
+        Ok(Machine { cpu, bus, _probes: probes, meters, image, board, resets: 0, profile: None })
     }
 
     /// A machine with the ELF file at `path` in its flash.
@@ -109,6 +111,9 @@ impl Machine {
             let (pc, began) = (cpu.pc(), cpu.cycle());
             cpu.execute();
             self.meters.executed(cpu, pc, began);
+            if let Some(spent) = self.profile.as_mut().and_then(|p| p.get_mut(pc as usize / 2)) {
+                *spent += cpu.cycle() - began;
+            }
             if usize::from(cpu.depth()) < self.meters.depth() {
                 self.leave();
             }
@@ -129,6 +134,22 @@ impl Machine {
             return self.serve(woken);
         }
         Ok(())
+    }
+
+    /// Counts from now on where cycles are spent.
+    pub fn start_profile(&mut self) {
+        self.profile = Some(vec![0; 1 << 17]);
+    }
+
+    /// Cycles spent in each function since [`Machine::start_profile`], most first.
+    pub fn profile(&self) -> Vec<(String, u64)> {
+        let mut functions = std::collections::HashMap::new();
+        for (word, &cycles) in self.profile.iter().flatten().enumerate().filter(|(_, c)| **c > 0) {
+            *functions.entry(self.image.function_at(word as u32 * 2)).or_insert(0) += cycles;
+        }
+        let mut sorted: Vec<_> = functions.into_iter().collect();
+        sorted.sort_by_key(|(_, cycles)| std::cmp::Reverse(*cycles));
+        sorted
     }
 
     /// Runs to a cycle. The last instruction may end a few cycles after it.
