@@ -566,7 +566,10 @@ fn stops() {
     assert_eq!(x10(&mut builder).entry_max, 0.0);
     assert!(x10(&mut builder).entry_max > 13.0);
     let dwell = builder.dwell(1500, 3);
-    assert_eq!((dwell.kind, dwell.length, dwell.entry_max, dwell.line), (Kind::Dwell, 1.5, 0.0, 3));
+    assert_eq!(
+        (dwell.kind, dwell.steps[0], dwell.entry_max, dwell.line),
+        (Kind::Dwell, 1500, 0.0, 3)
+    );
     assert_eq!(x10(&mut builder).entry_max, 0.0);
     builder.stopped();
     assert_eq!(x10(&mut builder).entry_max, 0.0);
