@@ -45,25 +45,28 @@ impl Links {
     }
 }
 
+/// Makes the links where they stay. Not inlined: what it needs of the stack is free again after it.
 #[cfg(target_arch = "avr")]
-fn place(links: Links) -> &'static Links {
+#[inline(never)]
+fn place(tx: Outgoing) -> &'static Links {
     static LINKS: static_cell::StaticCell<Links> = static_cell::StaticCell::new();
-    LINKS.init(links)
+    LINKS.init_with(|| Links::new(tx))
 }
 
 #[cfg(not(target_arch = "avr"))]
-fn place(links: Links) -> &'static Links {
-    std::boxed::Box::leak(std::boxed::Box::new(links))
+fn place(tx: Outgoing) -> &'static Links {
+    std::boxed::Box::leak(std::boxed::Box::new(Links::new(tx)))
 }
 
 /// Starts the firmware: `main` is the thread-mode executor, `exec_level` the interrupt-mode one.
 ///
 /// Interrupts are off. `None` if it has been started before.
+#[inline(never)]
 pub fn start(main: Spawner, exec_level: Spawner, baud: u32) -> Option<()> {
     let (received, outgoing) = uart::start(baud)?;
     let segments = stepper::start()?;
     let (queue, source) = queue::ring().split()?;
-    let links = place(Links::new(outgoing));
+    let links = place(outgoing);
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received).ok()?);
     main.spawn(planner_task(links, BlockQueue::new(queue)).ok()?);
