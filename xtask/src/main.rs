@@ -10,10 +10,13 @@
 //! | [`sim`] | runs the image on the simulated board |
 //! | [`checks`] | everything that must pass before a merge |
 //! | [`jobs`] | writes the example jobs |
+//! | `docs` | test: what the documents name exists |
 
 mod boards;
 mod caps;
 mod checks;
+#[cfg(test)]
+mod docs;
 mod elf;
 mod firmware;
 mod jobs;
