@@ -14,5 +14,6 @@ pub const FREE_STACK: i64 = 400;
 /// RAM of the ATmega2560.
 pub const RAM: u64 = 8_192;
 
-/// Tasks that run on the interrupt-mode executor; every other task runs in thread mode.
+/// Tasks that run on the interrupt-mode executor, by the names of their functions in `src/app.rs` up to
+/// `_task`; every other task runs in thread mode.
 pub const INTERRUPT_TASKS: &[&str] = &["exec"];

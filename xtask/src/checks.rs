@@ -1,6 +1,7 @@
 //! `cargo xtask test`: everything that must pass before a merge.
 
 use std::process::Command;
+use std::time::Instant;
 
 use anyhow::{Context, Result};
 
@@ -26,11 +27,13 @@ const STAGES: [Stage; 7] = [
     Stage { name: "simulator tests", run: simulator_tests },
 ];
 
-/// Runs the stages; stops at the first that fails.
+/// Runs the stages; stops at the first that fails. The simulator comes last: it needs the images.
 pub fn run() -> Result<()> {
     for (index, stage) in STAGES.iter().enumerate() {
         println!("\n=== {}/{} {} ===", index + 1, STAGES.len(), stage.name);
+        let start = Instant::now();
         (stage.run)().with_context(|| format!("stage `{}`", stage.name))?;
+        println!("({} s)", start.elapsed().as_secs());
     }
     println!("\ncargo xtask test: all stages passed");
     Ok(())

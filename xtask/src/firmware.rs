@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::boards::Board;
-use crate::elf::{Image, arithmetic};
+use crate::elf;
 use crate::process::{self, root, run};
 use crate::setup::{self, Scope};
 use crate::toolchain::Toolchain;
@@ -37,13 +37,13 @@ pub fn build(board: Board) -> Result<PathBuf> {
     keep(&target.join("avr-none/release/kerf.elf"), board)
 }
 
-/// Copies the image to its own name and refuses one with forbidden arithmetic.
+/// Copies the image to its own name and refuses one that would not work: see [`elf::check`].
 fn keep(built: &Path, board: Board) -> Result<PathBuf> {
-    let elf = image(board);
+    let kept = image(board);
     std::fs::create_dir_all(directory())?;
-    std::fs::copy(built, &elf).with_context(|| format!("cannot copy {}", built.display()))?;
-    arithmetic::check(&Image::load(&elf)?)?;
-    Ok(elf)
+    std::fs::copy(built, &kept).with_context(|| format!("cannot copy {}", built.display()))?;
+    elf::check(&kept)?;
+    Ok(kept)
 }
 
 /// `cargo xtask flash`

@@ -5,15 +5,18 @@
 //! | [`setup`] | finds the tools, installs what is missing |
 //! | [`toolchain`] | which Rust builds for AVR, and its environment |
 //! | [`firmware`] | builds the image of a board, flashes it |
-//! | [`elf`] | what is in an image: sizes, stack, forbidden arithmetic |
+//! | [`elf`] | what is in an image: sizes, stack, what must not be in it |
 //! | [`size`], [`caps`] | prints and limits what an image takes |
 //! | [`sim`] | runs the image on the simulated board |
 //! | [`checks`] | everything that must pass before a merge |
 //! | [`jobs`] | writes the example jobs |
+//! | `docs` | test: what the documents name exists |
 
 mod boards;
 mod caps;
 mod checks;
+#[cfg(test)]
+mod docs;
 mod elf;
 mod firmware;
 mod jobs;

@@ -9,7 +9,7 @@ use crate::boards::Board;
 use crate::caps;
 use crate::elf::places::task_name;
 use crate::elf::stack::{Chain, Stack};
-use crate::elf::{Image, Sizes, Symbol, arithmetic};
+use crate::elf::{self, Image, Sizes, Symbol};
 use crate::firmware;
 use crate::setup::{self, Scope};
 
@@ -31,9 +31,9 @@ pub struct SizeArgs {
 pub fn run(args: &SizeArgs) -> Result<()> {
     setup::ensure(Scope::Firmware)?;
     match &args.elf {
-        Some(elf) => {
-            arithmetic::check(&Image::load(elf)?)?;
-            show(elf)
+        Some(path) => {
+            elf::check(path)?;
+            show(path)
         }
         None => show(&firmware::build(args.board)?),
     }

@@ -42,6 +42,11 @@ impl Code {
         Code { insns, index }
     }
 
+    /// Number of instructions.
+    pub fn len(&self) -> usize {
+        self.insns.len()
+    }
+
     /// Position of the instruction at an address.
     pub fn at(&self, address: u32) -> Option<usize> {
         self.index.get(&address).copied()

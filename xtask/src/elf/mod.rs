@@ -1,16 +1,20 @@
-//! What is in a firmware image: sections, symbols with readable names, code.
+//! What is in a firmware image: sections, symbols with readable names, code; and what must not be.
 
-pub mod arithmetic;
+mod arithmetic;
 mod disasm;
 mod flow;
 pub mod places;
+mod scratch;
 pub mod stack;
+mod tables;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use object::elf::SHF_ALLOC;
-use object::{File, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind};
+use object::{File, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
+
+use disasm::Code;
 
 /// From here up, avr-gcc's addresses mean RAM; below, flash.
 const RAM_BASE: u64 = 0x80_0000;
@@ -26,6 +30,8 @@ pub struct Symbol {
     pub address: u64,
     /// Bytes; 0 for labels of assembler code.
     pub size: u64,
+    /// A static or a constant, not code.
+    pub is_data: bool,
 }
 
 impl Symbol {
@@ -65,6 +71,14 @@ impl Sizes {
             (false, _) => {}
         }
     }
+}
+
+/// Refuses an image that would not work, or far too slowly: see the modules.
+pub fn check(path: &Path) -> Result<()> {
+    let image = Image::load(path)?;
+    arithmetic::check(&image)?;
+    tables::check(&image)?;
+    scratch::check(&image, &Code::load(path)?)
 }
 
 /// A firmware image.
@@ -115,7 +129,8 @@ fn symbols(file: &File) -> Vec<Symbol> {
         .filter_map(|s| {
             let name = s.name().ok().filter(|name| !name.is_empty())?;
             let name = format!("{:#}", rustc_demangle::demangle(name));
-            Some(Symbol { name, address: s.address(), size: s.size() })
+            let is_data = s.kind() == SymbolKind::Data;
+            Some(Symbol { name, address: s.address(), size: s.size(), is_data })
         })
         .collect();
     symbols.sort_by_key(|symbol| (symbol.address, std::cmp::Reverse(symbol.size)));

@@ -48,7 +48,14 @@ pub fn name_at(image: &Image, entry: u32) -> String {
     image.symbols[at].name.clone()
 }
 
-/// `exec` of `<...TaskStorage<kerf::tasks::__exec_task::...>>::poll`.
+/// The function that an instruction belongs to: labels of assembler code have no size.
+pub fn function_at(image: &Image, insn: u32) -> &str {
+    let before = |s: &&super::Symbol| s.address <= u64::from(insn) && !s.is_data;
+    image.symbols.iter().rfind(before).map_or("code without a name", |symbol| &symbol.name)
+}
+
+/// `exec` of `<...TaskStorage<kerf::app::__exec_task_task::...>>::poll`: `embassy_executor::task` puts
+/// another `_task` behind the name of the function.
 pub fn task_name(poll: &str) -> Option<String> {
     if !poll.contains("TaskStorage<") || !poll.ends_with("::poll") {
         return None;

@@ -37,7 +37,7 @@ const LISTING: &str = "\
 ";
 
 fn symbol(name: &str, address: u64, size: u64) -> Symbol {
-    Symbol { name: name.into(), address, size }
+    Symbol { name: name.into(), address, size, is_data: false }
 }
 
 fn poll(task: &str, address: u64) -> Symbol {
@@ -102,5 +102,6 @@ fn recursion_is_reported() {
 #[test]
 fn tasks_are_named_as_in_the_source() {
     assert_eq!(task_name(&poll("exec", 0).name).as_deref(), Some("exec"));
+    assert_eq!(task_name(&poll("exec_task", 0).name).as_deref(), Some("exec"));
     assert_eq!(task_name("embassy_executor::raw::Executor::poll"), None);
 }

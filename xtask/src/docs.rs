@@ -1,0 +1,146 @@
+//! Keeps the documents true: whatever they name in `code` must exist.
+//!
+//! A code span with a slash, or with the ending of a file, is a path from the repository's root or from
+//! `src`. A span that reads like a name of Rust (`Name::method`, `field.other`) must consist of words of
+//! the sources, and two neighbours must stand in one file, or be a module and a word in its file.
+//! Anything else, such as G-code or a command, is left alone, and so are fenced blocks.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+use crate::process::root;
+
+/// The documents.
+const DOCUMENTS: [&str; 4] = ["ARCHITECTURE.md", "README.md", "CHANGELOG.md", "boards/README.md"];
+/// Where the sources are.
+const SOURCES: [&str; 7] = ["src", "boards", "tests", "xtask", "Cargo.toml", ".cargo", ".ci"];
+
+/// A file of the sources: its path, the words of its path, and those of its text.
+struct Source {
+    modules: HashSet<String>,
+    words: HashSet<String>,
+}
+
+fn sources() -> Vec<Source> {
+    let mut files = Vec::new();
+    SOURCES.iter().for_each(|name| collect(&root().join(name), &mut files));
+    files.retain(|file| !file.ends_with("xtask/src/docs.rs"));
+    files.iter().filter_map(|file| read(file)).collect()
+}
+
+fn collect(path: &Path, files: &mut Vec<PathBuf>) {
+    match std::fs::read_dir(path) {
+        Ok(entries) => entries.flatten().for_each(|entry| collect(&entry.path(), files)),
+        Err(_) if !path.ends_with("Cargo.lock") => files.push(path.to_owned()),
+        Err(_) => {}
+    }
+}
+
+fn read(file: &Path) -> Option<Source> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let path = file.strip_prefix(root()).ok()?.with_extension("");
+    Some(Source { modules: words(&path.to_string_lossy()), words: words(&text) })
+}
+
+fn words(text: &str) -> HashSet<String> {
+    let parts = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+    parts.filter(|part| !part.is_empty()).map(str::to_owned).collect()
+}
+
+/// The code spans outside fenced blocks, with their lines.
+fn spans(text: &str) -> Vec<(usize, &str)> {
+    let mut fenced = false;
+    let mut spans = Vec::new();
+    for (number, line) in (1..).zip(text.lines()) {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        } else if !fenced {
+            spans.extend(line.split('`').skip(1).step_by(2).map(|span| (number, span)));
+        }
+    }
+    spans
+}
+
+/// The targets of links to files, with their lines.
+fn links(text: &str) -> Vec<(usize, &str)> {
+    let lines = (1..).zip(text.lines());
+    let targets = lines.flat_map(|(number, line)| {
+        let rest = line.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+        rest.map(move |target| (number, target))
+    });
+    targets.filter(|(_, target)| !target.contains("://") && !target.starts_with('#')).collect()
+}
+
+fn is_path(span: &str) -> bool {
+    const ENDINGS: [&str; 4] = [".rs", ".md", ".toml", ".gcode"];
+    let is_one = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);
+    span.chars().all(is_one)
+        && !span.starts_with('/')
+        && (span.trim_end_matches('/').contains('/') || ENDINGS.iter().any(|e| span.ends_with(e)))
+}
+
+/// The parts of a name of Rust; `None` if it is none.
+fn parts(span: &str) -> Option<Vec<&str>> {
+    let name = span.strip_suffix("()").or(span.strip_suffix('!')).unwrap_or(span);
+    let parts: Vec<_> = name.split("::").flat_map(|part| part.split('.')).collect();
+    let is_word = |part: &&str| {
+        part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+            && part.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+    };
+    parts.iter().all(is_word).then_some(parts)
+}
+
+fn exists(span: &str, sources: &[Source]) -> bool {
+    if is_path(span) {
+        return [root().join(span), root().join("src").join(span)].iter().any(|path| path.exists());
+    }
+    let Some(parts) = parts(span) else { return true };
+    let together = |pair: &[&str]| {
+        sources.iter().any(|source| {
+            let knows = |word: &str| source.words.contains(word) || source.modules.contains(word);
+            knows(pair[0]) && source.words.contains(pair[1])
+                || knows(pair[0]) && source.modules.contains(pair[1])
+        })
+    };
+    let known = sources.iter().any(|s| s.words.contains(parts[0]) || s.modules.contains(parts[0]));
+    known && parts.windows(2).all(together)
+}
+
+#[test]
+fn what_the_documents_name_exists() {
+    let sources = sources();
+    let mut wrong = Vec::new();
+    for document in DOCUMENTS {
+        let text = std::fs::read_to_string(root().join(document)).expect(document);
+        let folder = root().join(document).parent().expect("a folder").to_owned();
+        let spans = spans(&text).into_iter().filter(|(_, span)| !exists(span, &sources));
+        wrong.extend(spans.map(|(line, span)| format!("{document}:{line}: `{span}`")));
+        let links = links(&text).into_iter().filter(|(_, target)| !folder.join(target).exists());
+        wrong.extend(links.map(|(line, target)| format!("{document}:{line}: link to {target}")));
+    }
+    assert!(wrong.is_empty(), "named in a document but not there:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_tour_stays_short() {
+    for (document, most) in [("ARCHITECTURE.md", 300), ("README.md", 120)] {
+        let lines = std::fs::read_to_string(root().join(document)).expect(document).lines().count();
+        assert!(lines <= most, "{document} has {lines} lines, more than {most}");
+    }
+}
+
+#[test]
+fn wrong_names_are_noticed() {
+    let sources = sources();
+    for span in ["Prep::segment", "exec::pend", "motion/prep.rs", "src/motion", "links.commands"] {
+        assert!(exists(span, &sources), "{span}");
+    }
+    for span in ["Prep::no_such_thing", "NoSuchThing", "motion/no_such.rs", "src/nowhere/x"] {
+        assert!(!exists(span, &sources), "{span}");
+    }
+    for span in ["G1 X10", "{xvm:1200}", "cargo xtask size", "^x", "--board"] {
+        assert!(exists(span, &sources), "{span}");
+    }
+    assert_eq!(spans("a `b` c `d e`\n```\n`f`\n```\n`g`"), [(1, "b"), (1, "d e"), (5, "g")]);
+    assert_eq!(links("[a](b.md) [c](https://d/e)\n[f](#g)"), [(1, "b.md")]);
+}
