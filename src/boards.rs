@@ -125,7 +125,11 @@ pub struct Board {
     pub tick_timer: Timer,
 }
 
-const MAX_PINS: usize = 3 * MOTORS + 1 + 8;
+/// Pins that the firmware itself uses on every board: the serial line, and the transmitter of USART2,
+/// which is driven high for the sake of its interrupt (`hal::avr::exec`).
+const OWN_PINS: [Pin; 3] = [pin(Port::E, 0), pin(Port::E, 1), pin(Port::H, 1)];
+
+const MAX_PINS: usize = 3 * MOTORS + 1 + 8 + OWN_PINS.len();
 
 impl Board {
     /// Panics, so fails the build when evaluated in a constant, if a pin or a timer has two users.
@@ -147,6 +151,12 @@ impl Board {
             pins[n] = Some(self.hazards[h]);
             n += 1;
             h += 1;
+        }
+        let mut o = 0;
+        while o < OWN_PINS.len() {
+            pins[n] = Some(OWN_PINS[o]);
+            n += 1;
+            o += 1;
         }
         let mut i = 0;
         while i < n {
@@ -208,6 +218,13 @@ mod tests {
         let mut board = MEGA2560_GRBL;
         board.enable_all = Some(board.motors[1].step);
         board.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "pin of this board is used twice")]
+    fn the_serial_line_is_taken() {
+        const TAKEN: &[Pin] = &[pin(Port::E, 1)];
+        Board { hazards: TAKEN, ..MEGA2560_GRBL }.check();
     }
 
     #[test]

@@ -57,8 +57,13 @@ async fn answer(links: &Links, id: LineId, class: Class) {
         match step(links, id, &mut request, &mut tx) {
             Next::More => {}
             Next::Gcode { start, end } => {
-                while links.commands_taken.get() {
-                    links.parser_wake.wait().await;
+                if links.commands_taken.get() {
+                    // Nothing of the response has been put yet: others may talk meanwhile.
+                    drop(tx);
+                    while links.commands_taken.get() {
+                        links.parser_wake.wait().await;
+                    }
+                    tx = links.tx.lock().await;
                 }
                 request.ran(interpret(links, id, start, end));
             }

@@ -1,6 +1,6 @@
 //! Level 2: the exec executor, polled from a software interrupt.
 //!
-//! The interrupt is USART3's data-register-empty: that transmitter never sends, so its condition
+//! The interrupt is USART2's data-register-empty: that transmitter never sends, so its condition
 //! always holds, and setting or clearing the enable bit raises or withdraws the interrupt. It runs
 //! with interrupts on, so the step interrupt and the short ones go on.
 //!
@@ -17,9 +17,9 @@ use embassy_executor::raw::Executor;
 use crate::hal::byte::SharedByte;
 use crate::hal::ring::Ceiling;
 
-const UCSR3B: *mut u8 = 0x131 as *mut u8;
-const TXEN3: u8 = 1 << 3;
-const UDRIE3: u8 = 1 << 5;
+const UCSR2B: *mut u8 = 0xD1 as *mut u8;
+const TXEN2: u8 = 1 << 3;
+const UDRIE2: u8 = 1 << 5;
 
 /// Exec runs, or may not run.
 static CLOSED: SharedByte = SharedByte::new(1);
@@ -40,7 +40,7 @@ static CONTEXT: Context = Context { executor: Cell::new(None), waker: Cell::new(
 #[inline(always)]
 pub fn pend() {
     // SAFETY: the register has two values, written whole: no read-modify-write to tear.
-    unsafe { UCSR3B.write_volatile(TXEN3 | UDRIE3) };
+    unsafe { UCSR2B.write_volatile(TXEN2 | UDRIE2) };
 }
 
 /// Lets exec run from now on.
@@ -74,11 +74,11 @@ pub async fn wait<R>(mut ready: impl FnMut() -> Option<R>) -> R {
     .await
 }
 
-/// USART3_UDRE: runs exec, with interrupts on, until nobody has asked for it meanwhile.
+/// USART2_UDRE: runs exec, with interrupts on, until nobody has asked for it meanwhile.
 ///
 /// Interrupts are off for 25 cycles on the way in and 50 on the way out.
 #[unsafe(no_mangle)]
-extern "C" fn __vector_55() -> ! {
+extern "C" fn __vector_52() -> ! {
     // SAFETY: it restores what it changes and what a called function may change, and returns by
     // `reti`. `CLOSED` keeps it from nesting while interrupts are on.
     unsafe {
@@ -87,7 +87,7 @@ extern "C" fn __vector_55() -> ! {
             "in   r24, 0x3F",
             "push r24",
             "ldi  r24, {idle}",
-            "sts  0x131, r24",
+            "sts  0xD1, r24",
             "lds  r24, {closed}",
             "tst  r24",
             "brne 9f",
@@ -140,7 +140,7 @@ extern "C" fn __vector_55() -> ! {
             "ldi  r24, 1",
             "sts  {missed}, r24",
             "rjmp 2b",
-            idle = const TXEN3,
+            idle = const TXEN2,
             closed = sym CLOSED,
             missed = sym MISSED,
             poll = sym poll,

@@ -5,7 +5,7 @@
 //! | TIMER1_COMPA | `step_isr` | 0 | one tick of the step generator |
 //! | USART0_RX, USART0_UDRE | `uart` | 1 | bytes between the line and the rings |
 //! | TIMER0_COMPA | `time` | 1 | counts milliseconds |
-//! | USART3_UDRE | `exec` | 2 | software interrupt: polls the exec executor, interrupts on |
+//! | USART2_UDRE | `exec` | 2 | software interrupt: polls the exec executor, interrupts on |
 //!
 //! Everything else runs in thread mode, from `executor::run`.
 
