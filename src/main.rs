@@ -5,6 +5,7 @@
 mod image {
     use embassy_executor::raw::Executor;
     use kerf::hal::imp::{self, exec, executor, gpio, panic, time};
+    use kerf::hal::pender;
     use static_cell::StaticCell;
 
     // Naming avr-libc and libgcc in the image itself puts them before `compiler_builtins` in the link:
@@ -22,8 +23,8 @@ mod image {
         static EXEC: StaticCell<Executor> = StaticCell::new();
         imp::watchdog_off();
         gpio::start();
-        let main: &'static Executor = MAIN.init(Executor::new(executor::THREAD));
-        let interrupt: &'static Executor = EXEC.init(Executor::new(executor::EXEC));
+        let main: &'static Executor = MAIN.init(Executor::new(pender::THREAD));
+        let interrupt: &'static Executor = EXEC.init(Executor::new(pender::EXEC));
         if kerf::app::start(main.spawner(), interrupt.spawner(), BAUD).is_none() {
             panic::halt();
         }

@@ -32,6 +32,7 @@ macro_rules! machine_static {
 
 pub mod byte;
 pub mod event;
+pub mod pender;
 pub mod ring;
 
 #[cfg(target_arch = "avr")]

@@ -15,3 +15,4 @@ pub mod lookahead;
 pub mod prep;
 pub mod profile;
 pub mod queue;
+pub mod running;

@@ -9,6 +9,7 @@ use embassy_futures::select::select;
 use embassy_time::Timer;
 
 use super::links::Links;
+use super::tx::Tx;
 use super::view::{RUN, View};
 use crate::hal::imp::time::millis;
 use crate::motion::queue;
@@ -59,12 +60,11 @@ pub async fn run(links: &'static Links) -> ! {
     }
 }
 
-async fn greet(links: &Links) {
-    let mut tx = links.tx.lock().await;
-    let mut banner = Banner::begin(&View::of(links));
+/// Sends something that is put in steps: `step` says whether there is more.
+async fn send(links: &Links, tx: &mut Tx, mut step: impl FnMut(&mut View, &mut Tx) -> bool) {
     loop {
         tx.room().await;
-        let more = banner.step(&mut View::of(links), &mut *tx);
+        let more = step(&mut View::of(links), tx);
         tx.flush();
         if !more {
             break;
@@ -72,38 +72,31 @@ async fn greet(links: &Links) {
     }
 }
 
+async fn greet(links: &Links) {
+    let mut tx = links.tx.lock().await;
+    let mut banner = Banner::begin(&View::of(links));
+    send(links, &mut tx, |view, tx| banner.step(view, tx)).await;
+}
+
 async fn report_status(links: &Links) {
     let mut tx = links.tx.lock().await;
     let report = Report::begin(links.mode.get(), &mut View::of(links));
-    let Some(mut report) = report else {
-        return;
-    };
-    loop {
-        tx.room().await;
-        let more = report.step(&mut View::of(links), &mut *tx);
-        tx.flush();
-        if !more {
-            break;
-        }
+    if let Some(mut report) = report {
+        send(links, &mut tx, |view, tx| report.step(view, tx)).await;
     }
 }
 
 async fn report_exception(links: &Links, status: Status) {
     let mut tx = links.tx.lock().await;
     let mut exception = Exception::begin(status, &View::of(links));
-    loop {
-        tx.room().await;
-        let more = exception.step(&mut View::of(links), &mut *tx);
-        tx.flush();
-        if !more {
-            break;
-        }
-    }
+    send(links, &mut tx, |view, tx| exception.step(view, tx)).await;
 }
 
 async fn report_queue(links: &Links) {
     let mut tx = links.tx.lock().await;
-    tx.room().await;
-    queue_report(links.mode.get(), &mut View::of(links), &mut *tx);
-    tx.flush();
+    send(links, &mut tx, |view, tx| {
+        queue_report(links.mode.get(), view, tx);
+        false
+    })
+    .await;
 }

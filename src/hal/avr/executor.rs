@@ -1,22 +1,9 @@
-//! The thread-mode loop, and the pender that tells the two executors apart.
+//! The thread-mode loop.
 
 use embassy_executor::raw::Executor;
 
 use super::flags;
-use crate::hal::event::{self, Event};
-
-/// Pender context of the main executor.
-pub const THREAD: *mut () = core::ptr::null_mut();
-/// Pender context of the exec executor.
-pub const EXEC: *mut () = core::ptr::dangling_mut();
-
-#[unsafe(export_name = "__pender")]
-fn pender(context: *mut ()) {
-    // The exec task is woken by the exec interrupt only, just before it polls: nothing to pend.
-    if context == THREAD {
-        flags::set(Event::Thread);
-    }
-}
+use crate::hal::event;
 
 /// Runs the main executor for ever, asleep when there is nothing to do.
 pub fn run(executor: &'static Executor) -> ! {

@@ -5,8 +5,8 @@ use std::vec::Vec;
 
 use embassy_executor::raw::Executor;
 
-use super::{clock, exec, executor, flags, now, stepper, time, uart};
-use crate::hal::event;
+use super::{clock, exec, flags, now, stepper, time, uart};
+use crate::hal::{event, pender};
 
 /// The machine of this thread.
 pub struct Machine {
@@ -17,8 +17,8 @@ pub struct Machine {
 impl Machine {
     /// Makes the machine and boots the firmware at `baud`. One for each thread: `None` for a second.
     pub fn boot(baud: u32) -> Option<Self> {
-        let main: &'static Executor = Box::leak(Box::new(Executor::new(executor::THREAD)));
-        let exec: &'static Executor = Box::leak(Box::new(Executor::new(executor::EXEC)));
+        let main: &'static Executor = Box::leak(Box::new(Executor::new(pender::THREAD)));
+        let exec: &'static Executor = Box::leak(Box::new(Executor::new(pender::EXEC)));
         crate::app::start(main.spawner(), exec.spawner(), baud)?;
         let machine = Self { main, exec };
         machine.settle();

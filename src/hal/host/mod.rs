@@ -6,7 +6,6 @@
 //! generator as the image.
 
 pub mod exec;
-pub mod executor;
 pub mod gpio;
 mod machine;
 pub mod stepper;
