@@ -42,8 +42,9 @@ pub fn word(machine: &Machine, name: &str) -> u16 {
 
 /// Where the firmware's image for a board lies.
 pub fn image(board: &Board) -> PathBuf {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/firmware");
-    let folder = std::env::var_os("KERF_ELF_DIR").map_or(workspace, PathBuf::from);
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap();
+    let folder = std::env::var_os("KERF_ELF_DIR")
+        .map_or_else(|| workspace.join("target/firmware"), PathBuf::from);
     let elf = folder.join(format!("{}.elf", board.name));
     let (elf_name, name) = (elf.display(), board.name);
     assert!(elf.exists(), "no {elf_name}: `cargo xtask build --board {name}` makes it");
