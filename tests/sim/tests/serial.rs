@@ -17,9 +17,11 @@ fn two_thousand_lines_at_full_speed_are_answered_once_each_and_in_order() {
     const LINES: usize = 2_000;
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     set(&mut machine, &mut host, "{jv:4}");
+    let began = machine.cycle();
     (1..=LINES).for_each(|n| host.queue(n, &format!("N{n}")));
-    let end = machine.cycle() + machine.cycles(60_000);
+    let end = began + machine.cycles(60_000);
     while !host.is_done() && host.run_until_line(&mut machine, end).unwrap() {}
+    let seconds = machine.seconds(machine.cycle() - began);
     host.run_for_ms(&mut machine, 100).unwrap();
     let answered = host.take_answered();
     assert_eq!(answered.len(), LINES);
@@ -30,6 +32,10 @@ fn two_thousand_lines_at_full_speed_are_answered_once_each_and_in_order() {
     }
     assert!(host.strays().is_empty(), "{:?}", host.strays());
     assert_eq!(machine.uart(0).overruns(), 0);
+    // The answers are longer than the lines: their way back is all that takes time.
+    let bytes: usize = answered.iter().map(|a| a.response.raw.len() + 1).sum();
+    let least = bytes as f64 * 10.0 / 115_200.0;
+    assert!(seconds < 1.1 * least, "{seconds} s for {LINES} lines instead of {least} s");
 }
 
 /// What came back of a flood.
