@@ -3,7 +3,7 @@
 mod common;
 
 use common::{booted, set};
-use kerf::boards::MEGA2560_GRBL;
+use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14};
 use kerf_sim::{Host, Machine};
 
 /// Cycles in a second.
@@ -12,8 +12,8 @@ const SECOND: u64 = 16_000_000;
 const PATIENCE_MS: u64 = 120_000;
 
 /// A machine with these settings that keeps every step.
-fn machine(settings: &[&str]) -> (Machine, Host) {
-    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+fn machine(board: &'static Board, settings: &[&str]) -> (Machine, Host) {
+    let (mut machine, mut host) = booted(board);
     for line in settings {
         set(&mut machine, &mut host, line);
     }
@@ -56,9 +56,18 @@ fn held(steps: &[u64], cycles: f64, motor: u8) {
 
 #[test]
 fn three_motors_are_held_at_20000_steps_a_second() {
+    three_motors_are_held_on(&MEGA2560_GRBL);
+}
+
+#[test]
+fn three_motors_are_held_at_20000_steps_a_second_on_ramps() {
+    three_motors_are_held_on(&RAMPS14);
+}
+
+fn three_motors_are_held_on(board: &'static Board) {
     // 1280 steps/mm: 937.5 mm/min are 20,000 steps a second.
     let settings = ["{x:{vm:937.5}}", "{y:{vm:937.5}}", "{z:{vm:937.5}}"];
-    let (mut machine, mut host) = machine(&settings);
+    let (mut machine, mut host) = machine(board, &settings);
     carry_out(&mut machine, &mut host, "g0 x55 y55 z55", 3 * 55 * 1280);
     // 3.52 s and the ramps: two seconds in the middle are all cruise.
     for motor in 0..3 {
@@ -73,7 +82,7 @@ fn three_motors_are_held_at_20000_steps_a_second() {
 #[test]
 fn mixed_rates_are_held_together() {
     let settings = ["{x:{vm:937.5,fr:937.5}}"];
-    let (mut machine, mut host) = machine(&settings);
+    let (mut machine, mut host) = machine(&MEGA2560_GRBL, &settings);
     // 70 : 10 : 0.1, that is 20,000, 2857.1 and 28.57 steps a second.
     carry_out(&mut machine, &mut host, "g0 x70 y10 z0.1", 70 * 1280 + 10 * 1280 + 128);
     let first = steps_of(&machine, 0);
@@ -94,7 +103,7 @@ fn ten_seconds_each(machine: &Machine) {
 #[test]
 fn one_step_every_ten_seconds_with_coarse_steps() {
     // One step a millimetre.
-    let (mut machine, mut host) = machine(&["{1:{tr:1600}}"]);
+    let (mut machine, mut host) = machine(&MEGA2560_GRBL, &["{1:{tr:1600}}"]);
     carry_out(&mut machine, &mut host, "g1 x4 f6", 4);
     ten_seconds_each(&machine);
 }
@@ -102,7 +111,7 @@ fn one_step_every_ten_seconds_with_coarse_steps() {
 #[test]
 fn one_step_every_ten_seconds_with_fine_steps() {
     // 1280 steps/mm, so that 3.1 um are four steps, nearly.
-    let (mut machine, mut host) = machine(&[]);
+    let (mut machine, mut host) = machine(&MEGA2560_GRBL, &[]);
     carry_out(&mut machine, &mut host, "g1 x0.0031 f0.00465", 4);
     ten_seconds_each(&machine);
 }
