@@ -19,7 +19,7 @@ use kerf_sim::report::Report;
 /// The longest first.
 const JOBS: [&str; 4] = ["bracket", "spiral", "engraving", "square"];
 
-/// Cycles with interrupts off, outside the step interrupt: half of what delays a step by 8 us.
+/// Cycles with interrupts off, outside the step interrupt: what a step may be late, 4 us.
 const OFF_CYCLES: u64 = 64;
 /// Bytes between the statics and the deepest stack.
 const FREE_STACK: i32 = 400;

@@ -88,8 +88,9 @@ fn a_flood_without_flow_control_loses_lines_and_corrupts_none() {
     }
     // Of different lengths, so that a line torn or joined would move elsewhere.
     let tenths = |n: u64| n * 7 % 23 + 1;
+    let back = |n: u64| n.is_multiple_of(2);
     for n in 1..=600 {
-        let way = if n % 2 == 0 { "-" } else { "" };
+        let way = if back(n) { "-" } else { "" };
         let tenth = tenths(n);
         machine.send(format!("N{n} G1 X{way}{}.{} F800\n", tenth / 10, tenth % 10).as_bytes());
     }
@@ -99,7 +100,7 @@ fn a_flood_without_flow_control_loses_lines_and_corrupts_none() {
     assert!(heard.losses > 0, "losses are reported");
     assert!(heard.taken.is_sorted(), "{:?}", heard.taken);
     assert!(heard.taken.len() >= 40, "{} taken", heard.taken.len());
-    let asked = |n: &u64| tenths(*n) as i64 * if n % 2 == 0 { -128 } else { 128 };
+    let asked = |n: &u64| tenths(*n) as i64 * if back(*n) { -128 } else { 128 };
     let want: i64 = heard.taken.iter().map(asked).sum();
     let motors = machine.recorder().motors();
     assert_eq!(motors[0].position, want, "{} lines were taken", heard.taken.len());
