@@ -1,11 +1,11 @@
-//! Building fixtures and running them.
+//! Building fixtures and running them, and the firmware itself.
 #![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use kerf::boards::MEGA2560_GRBL;
-use kerf_sim::{Image, Machine};
+use kerf::boards::{Board, MEGA2560_GRBL};
+use kerf_sim::{Host, Image, LINES_IN_FLIGHT, Machine};
 
 /// Compiles a fixture and returns the ELF file's path.
 pub fn build(name: &str) -> PathBuf {
@@ -38,4 +38,33 @@ pub fn machine_of(words: &[u16]) -> Machine {
 pub fn word(machine: &Machine, name: &str) -> u16 {
     let addr = machine.image().variable(name);
     machine.peek_word(addr.unwrap_or_else(|| panic!("no variable {name}")))
+}
+
+/// Where the firmware's image for a board lies.
+pub fn image(board: &Board) -> PathBuf {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap();
+    let folder = std::env::var_os("KERF_ELF_DIR")
+        .map_or_else(|| workspace.join("target/firmware"), PathBuf::from);
+    let elf = folder.join(format!("{}.elf", board.name));
+    let (elf_name, name) = (elf.display(), board.name);
+    assert!(elf.exists(), "no {elf_name}: `cargo xtask build --board {name}` makes it");
+    elf
+}
+
+/// A machine that runs the firmware.
+pub fn firmware(board: &'static Board) -> Machine {
+    Machine::load(&image(board), board).unwrap()
+}
+
+/// A machine that runs the firmware, booted, and a sender.
+pub fn booted(board: &'static Board) -> (Machine, Host) {
+    let (mut machine, mut host) = (firmware(board), Host::new(LINES_IN_FLIGHT));
+    host.boot(&mut machine, 1_000).unwrap();
+    (machine, host)
+}
+
+/// Sends a line that must be taken.
+pub fn set(machine: &mut Machine, host: &mut Host, line: &str) {
+    let response = host.ask(machine, line, 5_000).unwrap();
+    assert_eq!(response.status, 0, "{line} is answered by {}", response.raw);
 }

@@ -1,0 +1,117 @@
+//! Step rates, high and low and mixed, measured pulse by pulse.
+
+mod common;
+
+use common::{booted, set};
+use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14};
+use kerf_sim::{Host, Machine};
+
+/// Cycles in a second.
+const SECOND: u64 = 16_000_000;
+/// The longest that anything here may take, ms.
+const PATIENCE_MS: u64 = 120_000;
+
+/// A machine with these settings that keeps every step.
+fn machine(board: &'static Board, settings: &[&str]) -> (Machine, Host) {
+    let (mut machine, mut host) = booted(board);
+    for line in settings {
+        set(&mut machine, &mut host, line);
+    }
+    machine.recorder_mut().keep_log();
+    (machine, host)
+}
+
+/// Sends a move and waits until its steps are made and the machine says that it rests.
+fn carry_out(machine: &mut Machine, host: &mut Host, line: &str, steps: u64) {
+    set(machine, host, line);
+    let end = machine.cycle() + machine.cycles(PATIENCE_MS);
+    while machine.recorder().steps() < steps || host.idle_since().is_none() {
+        assert!(machine.cycle() < end, "{} of {steps} steps", machine.recorder().steps());
+        host.run_for_ms(machine, 20).unwrap();
+    }
+    assert_eq!(machine.recorder().steps(), steps);
+    assert_eq!(machine.uart(0).overruns(), 0);
+}
+
+/// When a motor stepped.
+fn steps_of(machine: &Machine, motor: u8) -> Vec<u64> {
+    machine.recorder().log().iter().filter(|s| s.motor == motor).map(|s| s.cycle).collect()
+}
+
+/// The steps between two moments.
+fn between(steps: &[u64], from: u64, to: u64) -> &[u64] {
+    let (from, to) = (steps.partition_point(|s| *s < from), steps.partition_point(|s| *s < to));
+    &steps[from..to]
+}
+
+/// The mean interval is `cycles` to a part in a thousand, and none is longer than two of it.
+fn held(steps: &[u64], cycles: f64, motor: u8) {
+    let gaps = || steps.windows(2).map(|w| w[1] - w[0]);
+    let mean = (steps[steps.len() - 1] - steps[0]) as f64 / (steps.len() - 1) as f64;
+    let (least, most) = (gaps().min().unwrap(), gaps().max().unwrap());
+    let all = format!("motor {}: mean {mean:.2}, {least} to {most}, not {cycles}", motor + 1);
+    assert!((mean / cycles - 1.0).abs() < 1e-3, "{all}");
+    assert!(most as f64 <= 2.0 * cycles, "{all}");
+}
+
+#[test]
+fn three_motors_are_held_at_20000_steps_a_second() {
+    three_motors_are_held_on(&MEGA2560_GRBL);
+}
+
+#[test]
+fn three_motors_are_held_at_20000_steps_a_second_on_ramps() {
+    three_motors_are_held_on(&RAMPS14);
+}
+
+fn three_motors_are_held_on(board: &'static Board) {
+    // 1280 steps/mm: 937.5 mm/min are 20,000 steps a second.
+    let settings = ["{x:{vm:937.5}}", "{y:{vm:937.5}}", "{z:{vm:937.5}}"];
+    let (mut machine, mut host) = machine(board, &settings);
+    carry_out(&mut machine, &mut host, "g0 x55 y55 z55", 3 * 55 * 1280);
+    // 3.52 s and the ramps: two seconds in the middle are all cruise.
+    for motor in 0..3 {
+        let steps = steps_of(&machine, motor);
+        let middle = steps[0].midpoint(steps[steps.len() - 1]);
+        let cruise = between(&steps, middle - SECOND, middle + SECOND);
+        held(cruise, 800.0, motor);
+        assert!(cruise.len().abs_diff(40_000) <= 40, "{} in two seconds", cruise.len());
+    }
+}
+
+#[test]
+fn mixed_rates_are_held_together() {
+    let settings = ["{x:{vm:937.5,fr:937.5}}"];
+    let (mut machine, mut host) = machine(&MEGA2560_GRBL, &settings);
+    // 70 : 10 : 0.1, that is 20,000, 2857.1 and 28.57 steps a second.
+    carry_out(&mut machine, &mut host, "g0 x70 y10 z0.1", 70 * 1280 + 10 * 1280 + 128);
+    let first = steps_of(&machine, 0);
+    let middle = first[0].midpoint(first[first.len() - 1]);
+    for (motor, cycles) in [(0, 800.0), (1, 5_600.0), (2, 560_000.0)] {
+        let steps = steps_of(&machine, motor);
+        held(between(&steps, middle - SECOND, middle + SECOND), cycles, motor);
+    }
+}
+
+fn ten_seconds_each(machine: &Machine) {
+    for w in steps_of(machine, 0).windows(2) {
+        let seconds = machine.seconds(w[1] - w[0]);
+        assert!((seconds / 10.0 - 1.0).abs() < 1e-3, "{seconds} s between two steps");
+    }
+}
+
+#[test]
+fn one_step_every_ten_seconds_with_coarse_steps() {
+    // One step a millimetre.
+    let (mut machine, mut host) = machine(&MEGA2560_GRBL, &["{1:{tr:1600}}"]);
+    carry_out(&mut machine, &mut host, "g1 x4 f6", 4);
+    ten_seconds_each(&machine);
+}
+
+#[test]
+fn one_step_every_ten_seconds_with_fine_steps() {
+    // 1280 steps/mm, so that 3.1 um are four steps, nearly.
+    let (mut machine, mut host) = machine(&MEGA2560_GRBL, &[]);
+    carry_out(&mut machine, &mut host, "g1 x0.0031 f0.00465", 4);
+    ten_seconds_each(&machine);
+}

@@ -1,0 +1,144 @@
+//! The serial line at full speed, at too much speed, and while the planner is full.
+
+mod common;
+
+use common::{booted, set};
+use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::Machine;
+use kerf_sim::protocol::{Incoming, classify};
+
+/// Status of a line that was lost in part.
+const BUFFER_FULL: i64 = 13;
+/// Steps in a millimetre.
+const PER_MM: u64 = 1_280;
+
+#[test]
+fn two_thousand_lines_at_full_speed_are_answered_once_each_and_in_order() {
+    const LINES: usize = 2_000;
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    set(&mut machine, &mut host, "{jv:4}");
+    let began = machine.cycle();
+    (1..=LINES).for_each(|n| host.queue(n, &format!("N{n}")));
+    let end = began + machine.cycles(60_000);
+    while !host.is_done() && host.run_until_line(&mut machine, end).unwrap() {}
+    let seconds = machine.seconds(machine.cycle() - began);
+    host.run_for_ms(&mut machine, 100).unwrap();
+    let answered = host.take_answered();
+    assert_eq!(answered.len(), LINES);
+    for (number, answered) in (1..).zip(&answered) {
+        let raw = &answered.response.raw;
+        assert_eq!((answered.number, answered.response.status), (number, 0), "{raw}");
+        assert_eq!(answered.response.body["n"], number, "{raw}");
+    }
+    assert!(host.strays().is_empty(), "{:?}", host.strays());
+    assert_eq!(machine.uart(0).overruns(), 0);
+    // The answers are longer than the lines: their way back is all that takes time.
+    let bytes: usize = answered.iter().map(|a| a.response.raw.len() + 1).sum();
+    let least = bytes as f64 * 10.0 / 115_200.0;
+    assert!(seconds < 1.1 * least, "{seconds} s for {LINES} lines instead of {least} s");
+}
+
+/// What came back of a flood.
+#[derive(Default)]
+struct Heard {
+    /// The N words of the lines that were taken, in order.
+    taken: Vec<u64>,
+    refused: usize,
+    losses: usize,
+    strange: Vec<String>,
+}
+
+impl Heard {
+    fn lines(&mut self, text: &str) {
+        for line in text.lines() {
+            match classify(line) {
+                Incoming::Response(r) if r.status == 0 => {
+                    self.taken.extend(r.body.get("n").and_then(|n| n.as_u64()));
+                }
+                Incoming::Response(r) if r.status == BUFFER_FULL => self.refused += 1,
+                Incoming::Report(r) if r["er"]["st"] == BUFFER_FULL => self.losses += 1,
+                Incoming::Report(r) if r.get("er").is_none() => {}
+                _ => self.strange.push(line.to_string()),
+            }
+        }
+    }
+}
+
+/// Waits until no motor has moved and nothing was heard for a second; returns all that was heard.
+fn hear_out(machine: &mut Machine) -> Heard {
+    let (mut text, mut quiet_ms) = (Vec::new(), 0);
+    while quiet_ms < 1_000 {
+        let steps = machine.recorder().steps();
+        machine.run_for_ms(100).unwrap();
+        let heard = machine.receive();
+        let still = machine.recorder().steps() == steps && heard.is_empty();
+        quiet_ms = if still { quiet_ms + 100 } else { 0 };
+        text.extend(heard);
+    }
+    let mut heard = Heard::default();
+    heard.lines(&String::from_utf8(text).expect("no byte is garbled"));
+    heard
+}
+
+#[test]
+fn a_flood_without_flow_control_loses_lines_and_corrupts_none() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    for line in ["{jv:4}", "g91 f800"] {
+        set(&mut machine, &mut host, line);
+    }
+    // Of different lengths, so that a line torn or joined would move elsewhere.
+    let tenths = |n: u64| n * 7 % 23 + 1;
+    let back = |n: u64| n.is_multiple_of(2);
+    for n in 1..=600 {
+        let way = if back(n) { "-" } else { "" };
+        let tenth = tenths(n);
+        machine.send(format!("N{n} G1 X{way}{}.{} F800\n", tenth / 10, tenth % 10).as_bytes());
+    }
+    let heard = hear_out(&mut machine);
+    assert!(heard.strange.is_empty(), "{:?}", heard.strange);
+    assert!(heard.refused + heard.losses > 0, "nothing was lost: no flood");
+    assert!(heard.losses > 0, "losses are reported");
+    assert!(heard.taken.is_sorted(), "{:?}", heard.taken);
+    assert!(heard.taken.len() >= 40, "{} taken", heard.taken.len());
+    let asked = |n: &u64| tenths(*n) as i64 * if back(*n) { -128 } else { 128 };
+    let want: i64 = heard.taken.iter().map(asked).sum();
+    let motors = machine.recorder().motors();
+    assert_eq!(motors[0].position, want, "{} lines were taken", heard.taken.len());
+    assert_eq!(motors[1].steps + motors[2].steps + motors[3].steps, 0);
+    // The line behind the damage cannot be told from it; then all is as before.
+    machine.send(b"\n{fb:n}\n");
+    machine.run_for_ms(100).unwrap();
+    let after = String::from_utf8(machine.receive()).unwrap();
+    assert!(after.contains("\"fb\":440.20},\"f\":[1,0,7]"), "{after}");
+    assert_eq!(machine.uart(0).overruns(), 0, "the firmware itself loses them, knowingly");
+}
+
+#[test]
+fn answers_stop_while_the_planner_is_full_and_come_again() {
+    const LINES: usize = 80;
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    set(&mut machine, &mut host, "g1 g91 f800");
+    // 0.75 s a move.
+    (1..=LINES).for_each(|n| host.queue(n, "x10"));
+    host.run_for_ms(&mut machine, 700).unwrap();
+    let at_once = host.take_answered().len();
+    assert!((40..60).contains(&at_once), "{at_once} lines fill the planner");
+    assert_eq!(host.in_flight(), 4, "the others wait");
+    host.run_for_ms(&mut machine, 3_000).unwrap();
+    let later = host.take_answered().len();
+    assert!((3..=6).contains(&later), "{later} answers in the time of four moves");
+    // A question overtakes them.
+    let queue = host.ask(&mut machine, "{qr:n}", 100).unwrap();
+    assert!(queue.body["qr"].as_i64().is_some_and(|free| free <= 1), "{}", queue.raw);
+    let end = machine.cycle() + machine.cycles(90_000);
+    while !host.is_done() && host.run_until_line(&mut machine, end).unwrap() {}
+    let rest = host.take_answered();
+    assert_eq!(at_once + later + rest.len(), LINES);
+    assert!(rest.iter().all(|a| a.response.status == 0));
+    let steps = LINES as u64 * 10 * PER_MM;
+    while machine.recorder().steps() < steps && machine.cycle() < end {
+        host.run_for_ms(&mut machine, 100).unwrap();
+    }
+    assert_eq!(machine.recorder().motors()[0].position, steps as i64);
+    assert!(host.strays().is_empty(), "{:?}", host.strays());
+}

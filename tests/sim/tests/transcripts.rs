@@ -1,0 +1,36 @@
+//! The transcripts, played to the firmware's image on the simulated chip.
+
+mod common;
+#[path = "../../support/transcript.rs"]
+mod transcript;
+
+use std::path::Path;
+
+use common::firmware;
+use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::Machine;
+use transcript::Side;
+
+impl Side for Machine {
+    fn send(&mut self, bytes: &[u8]) {
+        Machine::send(self, bytes);
+    }
+
+    fn run_ms(&mut self, ms: u64) {
+        self.run_for_ms(ms).unwrap();
+    }
+
+    fn heard(&mut self) -> Vec<u8> {
+        self.receive()
+    }
+
+    fn steps(&self) -> [i64; 4] {
+        self.recorder().motors().each_ref().map(|motor| motor.position)
+    }
+}
+
+#[test]
+fn the_image_keeps_to_the_transcripts() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../transcripts");
+    transcript::play_all(transcript::read_all(&folder), 2, || firmware(&MEGA2560_GRBL));
+}

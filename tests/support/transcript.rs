@@ -1,0 +1,234 @@
+//! Transcripts: conversations with the machine, and where the motors end.
+//!
+//! A transcript is played from power-up. Its first line, a comment, says why it exists. Then, a line each:
+//!
+//! ```text
+//! # what follows is for people
+//! -> g1 x10 f500              a line is sent; \x05 is the byte 5
+//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this
+//! <~ {"qr":*}                 from here on such lines may come, any number of them; * is anything
+//! @ +50ms                     time passes
+//! steps X=12800 Y=0           the motors come to rest there; those not named are at 0
+//! ```
+//!
+//! Automatic reports (`sr`, `qr`) are passed over unless they are the line expected next. Any other line
+//! that nobody expects fails the transcript, and so does silence where a line is expected. Motors 1 to 4
+//! are `M1` to `M4`, or `X Y Z A`, which is what they move by default.
+
+use std::collections::VecDeque;
+use std::fs;
+use std::path::Path;
+
+/// Longest wait for a line.
+const HEAR_MS: u64 = 20_000;
+/// Longest wait for the motors to rest, and the time without a step that is called rest.
+const MOVE_MS: u64 = 120_000;
+const REST_MS: u64 = 200;
+/// Time at the end in which nothing unexpected may come.
+const LAST_MS: u64 = 100;
+
+/// A machine and the sender's end of its line.
+pub trait Side {
+    /// Puts bytes on the line.
+    fn send(&mut self, bytes: &[u8]);
+    /// Lets time pass.
+    fn run_ms(&mut self, ms: u64);
+    /// The bytes heard since the last call.
+    fn heard(&mut self) -> Vec<u8>;
+    /// Where the motors are, in steps.
+    fn steps(&self) -> [i64; 4];
+}
+
+/// One line of a transcript.
+#[derive(Clone, PartialEq, Debug)]
+enum Event {
+    Send(Vec<u8>),
+    Hear(String),
+    Allow(String),
+    Pass(u64),
+    Steps([i64; 4]),
+}
+
+/// A transcript, read.
+pub struct Transcript {
+    /// The name of its file.
+    pub name: String,
+    events: Vec<(usize, Event)>,
+}
+
+/// Reads every transcript in a folder.
+pub fn read_all(folder: &Path) -> Vec<Transcript> {
+    let entries = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|e| e == "txt"));
+    paths.sort();
+    assert!(!paths.is_empty(), "no transcripts in {}", folder.display());
+    paths.iter().map(|path| read(path)).collect()
+}
+
+/// Plays each transcript on a machine of its own, `at_once` of them at a time; fails with all that went
+/// wrong.
+pub fn play_all<S: Side>(
+    transcripts: Vec<Transcript>,
+    at_once: usize,
+    boot: impl Fn() -> S + Sync,
+) {
+    let mut failed = Vec::new();
+    for some in transcripts.chunks(at_once) {
+        std::thread::scope(|scope| {
+            let played = some.iter().map(|t| scope.spawn(|| t.play(&mut boot()).err()));
+            let played: Vec<_> = played.collect();
+            failed.extend(played.into_iter().filter_map(|thread| thread.join().unwrap()));
+        });
+    }
+    let (n, of) = (failed.len(), transcripts.len());
+    assert!(failed.is_empty(), "{n} of {of} transcripts fail:\n{}", failed.join("\n"));
+}
+
+fn read(path: &Path) -> Transcript {
+    let name = path.file_name().unwrap().to_string_lossy().into_owned();
+    let text = fs::read_to_string(path).unwrap();
+    assert!(text.starts_with("# "), "{name}: the first line says why it exists");
+    let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line));
+    let events = numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let event =
+        |(n, line)| (n, parse(line).unwrap_or_else(|| panic!("{name}:{n}: what is {line}?")));
+    let events = events.map(event).collect();
+    Transcript { name, events }
+}
+
+fn parse(line: &str) -> Option<Event> {
+    let (mark, rest) = line.split_once(' ').unwrap_or((line, ""));
+    match mark {
+        "->" => unescape(rest).map(Event::Send),
+        "<-" => Some(Event::Hear(rest.to_string())),
+        "<~" => Some(Event::Allow(rest.to_string())),
+        "@" => rest.strip_prefix('+')?.strip_suffix("ms")?.parse().ok().map(Event::Pass),
+        "steps" => steps(rest).map(Event::Steps),
+        _ => None,
+    }
+}
+
+/// The bytes of a line to send, with its end.
+fn unescape(text: &str) -> Option<Vec<u8>> {
+    let mut parts = text.split("\\x");
+    let mut bytes = parts.next()?.as_bytes().to_vec();
+    for part in parts {
+        bytes.push(u8::from_str_radix(part.get(..2)?, 16).ok()?);
+        bytes.extend(&part.as_bytes()[2..]);
+    }
+    bytes.push(b'\n');
+    Some(bytes)
+}
+
+fn steps(text: &str) -> Option<[i64; 4]> {
+    let mut steps = [0; 4];
+    for word in text.split_whitespace() {
+        let (motor, value) = word.split_once('=')?;
+        let letter = "XYZA".find(motor).filter(|_| motor.len() == 1);
+        let number = || motor.strip_prefix('M')?.parse::<usize>().ok()?.checked_sub(1);
+        *steps.get_mut(letter.or_else(number)?)? = value.parse().ok()?;
+    }
+    Some(steps)
+}
+
+/// Whether `pattern`, in which `*` is anything, is all of `text`.
+fn matches(pattern: &str, text: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == text,
+        Some((before, after)) => text.strip_prefix(before).is_some_and(|rest| {
+            (0..=rest.len()).any(|at| rest.is_char_boundary(at) && matches(after, &rest[at..]))
+        }),
+    }
+}
+
+impl Transcript {
+    /// Plays it; the error says where it fails and how.
+    pub fn play(&self, side: &mut impl Side) -> Result<(), String> {
+        let mut player =
+            Player { side, partial: String::new(), lines: VecDeque::new(), allowed: Vec::new() };
+        for (line, event) in &self.events {
+            player.play(event).map_err(|what| format!("{}:{line}: {what}", self.name))?;
+        }
+        player.side.run_ms(LAST_MS);
+        player.silence().map_err(|what| format!("{}: at the end: {what}", self.name))
+    }
+}
+
+/// A transcript being played.
+struct Player<'a, S> {
+    side: &'a mut S,
+    partial: String,
+    lines: VecDeque<String>,
+    allowed: Vec<String>,
+}
+
+impl<S: Side> Player<'_, S> {
+    fn play(&mut self, event: &Event) -> Result<(), String> {
+        match event {
+            Event::Send(bytes) => self.side.send(bytes),
+            Event::Hear(line) => return self.hear(line),
+            Event::Allow(pattern) => self.allowed.push(pattern.clone()),
+            Event::Pass(ms) => self.side.run_ms(*ms),
+            Event::Steps(steps) => return self.rest_at(steps),
+        }
+        Ok(())
+    }
+
+    fn hear(&mut self, wanted: &str) -> Result<(), String> {
+        let mut waited = 0;
+        loop {
+            match self.next_line() {
+                Some(line) if line == wanted => return Ok(()),
+                Some(line) if self.may_come(&line) => {}
+                Some(line) => return Err(format!("heard    {line}\ninstead of {wanted}")),
+                None if waited == HEAR_MS => {
+                    return Err(format!("heard nothing instead of {wanted}"));
+                }
+                None => {
+                    self.side.run_ms(1);
+                    waited += 1;
+                }
+            }
+        }
+    }
+
+    fn may_come(&self, line: &str) -> bool {
+        let report = line.starts_with("{\"sr\":") || line.starts_with("{\"qr\":");
+        report || self.allowed.iter().any(|pattern| matches(pattern, line))
+    }
+
+    fn next_line(&mut self) -> Option<String> {
+        self.partial += &String::from_utf8_lossy(&self.side.heard());
+        while let Some((line, rest)) = self.partial.split_once('\n') {
+            self.lines.push_back(line.to_string());
+            self.partial = rest.to_string();
+        }
+        self.lines.pop_front()
+    }
+
+    fn silence(&mut self) -> Result<(), String> {
+        while let Some(line) = self.next_line() {
+            if !self.may_come(&line) {
+                return Err(format!("heard {line}, which nothing expects"));
+            }
+        }
+        Ok(())
+    }
+
+    fn rest_at(&mut self, wanted: &[i64; 4]) -> Result<(), String> {
+        let (mut before, mut waited) = (self.side.steps(), 0);
+        loop {
+            self.side.run_ms(REST_MS);
+            let steps = self.side.steps();
+            if steps == before && steps == *wanted {
+                return Ok(());
+            }
+            if steps == before && waited >= MOVE_MS.min(10 * REST_MS) {
+                return Err(format!("the motors rest at {steps:?} instead of {wanted:?}"));
+            }
+            waited = if steps == before { waited + REST_MS } else { 0 };
+            before = steps;
+        }
+    }
+}
