@@ -11,7 +11,7 @@ use super::block::Block;
 use super::profile::{Limits, Ramp, greater, lesser, peak, reach};
 
 /// Slowest cruise, mm/s: only keeps a division by zero away.
-pub const CRUISE_MIN: f32 = 1e-4;
+pub const CRUISE_MIN: f32 = 1e-9;
 
 /// Where in its block exec is.
 #[derive(Clone, Copy, Debug, PartialEq)]

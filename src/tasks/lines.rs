@@ -50,12 +50,29 @@ pub struct LinePool {
     partial: u8,
     /// Why the line that is coming in cannot be kept.
     fault: Option<Status>,
+    /// The last byte was a carriage return: a line feed right behind it ends the same line.
+    returned: bool,
+    /// Empty lines are kept: in text mode they are answered by a prompt.
+    keep_empty: bool,
 }
 
 impl LinePool {
     /// An empty pool.
     pub const fn new() -> Self {
-        Self { bytes: [0; POOL], entries: Vec::new(), complete: 0, partial: 0, fault: None }
+        Self {
+            bytes: [0; POOL],
+            entries: Vec::new(),
+            complete: 0,
+            partial: 0,
+            fault: None,
+            returned: false,
+            keep_empty: false,
+        }
+    }
+
+    /// Whether empty lines are lines, from now on.
+    pub fn keep_empty(&mut self, keep: bool) {
+        self.keep_empty = keep;
     }
 
     /// Free slots, not counting the one a line is coming into.
@@ -71,6 +88,10 @@ impl LinePool {
 
     /// Takes a byte. Returns true when it completes a line.
     pub fn put(&mut self, byte: u8) -> bool {
+        let returned = core::mem::replace(&mut self.returned, byte == b'\r');
+        if byte == b'\n' && returned {
+            return false;
+        }
         if byte == b'\n' || byte == b'\r' {
             return self.end_line();
         }
@@ -98,7 +119,7 @@ impl LinePool {
         let len = self.partial;
         let class = match self.fault.take() {
             Some(status) => Class::Fault(status),
-            None if len == 0 => return false,
+            None if len == 0 && !self.keep_empty => return false,
             None => classify(self.slice(usize::from(self.complete), len)),
         };
         self.partial = 0;
@@ -229,6 +250,18 @@ mod tests {
         assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"good".to_vec()));
         assert_eq!(take(&mut pool, true).map(|l| l.1), Some(Class::Fault(Status::BufferFull)));
         assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"ok".to_vec()));
+    }
+
+    #[test]
+    fn empty_lines_count_where_they_are_wanted() {
+        let mut pool = LinePool::new();
+        feed(&mut pool, b"\r\n\n");
+        assert_eq!(pool.free(), 8);
+        pool.keep_empty(true);
+        feed(&mut pool, b"?\r\n\r\n\n");
+        assert_eq!(pool.free(), 5);
+        assert_eq!(take(&mut pool, true), Some((b"?".to_vec(), Class::Control)));
+        assert_eq!(take(&mut pool, true), Some((b"".to_vec(), Class::Data)));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use embassy_futures::yield_now;
 use super::links::Links;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::uart::{LOSS, LOSS_AT_END, Received, losing};
+use crate::protocol::Mode;
 use crate::status::Status;
 
 /// Bytes taken before others get a turn.
@@ -28,6 +29,7 @@ pub async fn run(links: &'static Links, mut received: Received) -> ! {
 /// Takes up to a turn's bytes. False when the pool has no room for more.
 fn take_some(links: &Links, received: &mut Received) -> bool {
     let mut pool = links.lines.borrow_mut();
+    pool.keep_empty(links.mode.get() == Mode::Text);
     for _ in 0..TURN {
         if !pool.ready() {
             return false;
