@@ -121,3 +121,26 @@ fn new_steps_per_unit_never_make_the_machine_jump() {
     sender.ask("g1 x11\n", 2_000);
     assert_eq!(sender.machine.emitted().position[0], 12_800 + 640);
 }
+
+#[test]
+fn a_rotary_axis_keeps_its_limit_beside_the_smallest_linear_travel() {
+    for line in ["g0 a360\n", "g0 x0.0001 a360\n"] {
+        let ms = std::thread::spawn(move || {
+            let mut sender = Sender::boot();
+            sender.ask("{avm:600}\n", 50);
+            sender.machine.send(line.as_bytes());
+            let mut heard = Vec::new();
+            let mut ms = 0;
+            while !String::from_utf8_lossy(&heard).contains("\"stat\":3") && ms < 60_000 {
+                sender.machine.run_ms(100);
+                heard.extend(sender.machine.received());
+                ms += 100;
+            }
+            ms
+        })
+        .join()
+        .expect("no panic");
+        // 360 degrees at 600 a minute, and a ramp.
+        assert!((36_000..38_000).contains(&ms), "{line:?} took {ms} ms");
+    }
+}

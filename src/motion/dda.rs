@@ -133,6 +133,8 @@ impl Dda {
         let Some(segment) = segments.pop() else {
             return false;
         };
+        // First: on AVR the counter is running towards the old top.
+        pins.period(segment.period);
         let turned = segment.backwards ^ self.backwards;
         // Always, so that a polarity that was changed meanwhile takes effect.
         pins.direction(segment.backwards);
@@ -146,7 +148,6 @@ impl Dda {
         }
         self.increment = segment.increment;
         self.ticks = segment.ticks;
-        pins.period(segment.period);
         pins.slot_free();
         true
     }

@@ -236,7 +236,7 @@ impl Exec {
         self.rest.cycles += cycles_of(seconds - ms as f32 * 0.001);
         if self.rest.cycles >= CYCLES_PER_MS {
             self.rest.cycles -= CYCLES_PER_MS;
-            self.dwell_ms += 1;
+            self.dwell_ms = self.dwell_ms.saturating_add(1);
         }
         Step::Again
     }

@@ -185,7 +185,7 @@ fn is_blank(byte: u8) -> bool {
 /// Control lines are those whose first character says so; JSON that wraps G-code is data.
 fn classify(line: &[u8]) -> Class {
     match line.first() {
-        Some(b'$' | b'?' | b'h' | b'H') => Class::Control,
+        Some(b'$' | b'?') => Class::Control,
         Some(b'{') if !wraps_gcode(line) => Class::Control,
         _ => Class::Data,
     }

@@ -43,8 +43,9 @@ impl Planner {
     /// Does everything a line asks for, in order.
     async fn carry_out(&mut self, commands: &Commands) {
         let line = commands.line;
-        if self.links.resync.take() {
+        if self.links.resync.get() {
             self.set_position(&[None; AXES], line).await;
+            self.links.resync.set(false);
         }
         if let Some(ms) = commands.dwell_ms {
             self.dwell(ms, line).await;

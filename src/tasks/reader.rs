@@ -30,6 +30,9 @@ pub async fn run(links: &'static Links, mut received: Received) -> ! {
 fn take_some(links: &Links, received: &mut Received) -> bool {
     let mut pool = links.lines.borrow_mut();
     pool.keep_empty(links.mode.get() == Mode::Text);
+    if losing() && !links.losing.get() {
+        report_loss(links);
+    }
     for _ in 0..TURN {
         if !pool.ready() {
             return false;
@@ -40,16 +43,21 @@ fn take_some(links: &Links, received: &mut Received) -> bool {
         let damaged = byte == LOSS || byte == LOSS_AT_END;
         if damaged {
             pool.spoil(Status::BufferFull);
+            if !links.losing.get() {
+                report_loss(links);
+            }
+            links.losing.set(false);
         }
         if byte != LOSS && pool.put(if damaged { b'\n' } else { byte }) {
             links.parser_wake.signal(());
         }
     }
-    if losing() && !links.losing.replace(true) {
-        links.exception.set(Some(Status::BufferFull));
-        links.reporter_wake.signal(());
-    } else if !losing() {
-        links.losing.set(false);
-    }
     true
+}
+
+/// Tells the sender that bytes are being lost, once for each stretch of them.
+fn report_loss(links: &Links) {
+    links.losing.set(true);
+    links.exception.set(Some(Status::BufferFull));
+    links.reporter_wake.signal(());
 }

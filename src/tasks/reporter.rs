@@ -14,7 +14,7 @@ use super::view::{RUN, View};
 use crate::hal::imp::time::millis;
 use crate::motion::queue;
 use crate::protocol::notice::{Banner, Exception};
-use crate::protocol::{Machine, Report, queue_report};
+use crate::protocol::{Machine, Report, Value, queue_report};
 use crate::status::Status;
 
 /// How often a busy machine is looked at, ms.
@@ -38,8 +38,7 @@ pub async fn run(links: &'static Links) -> ! {
             report_exception(links, status).await;
         }
         if queue::free() != told.blocks_free {
-            told.blocks_free = queue::free();
-            report_queue(links).await;
+            told.blocks_free = report_queue(links).await;
         }
         let elapsed = millis().wrapping_sub(told.at);
         let interval = u32::from(View::of(links).settings().status_interval_ms());
@@ -92,11 +91,16 @@ async fn report_exception(links: &Links, status: Status) {
     send(links, &mut tx, |view, tx| exception.step(view, tx)).await;
 }
 
-async fn report_queue(links: &Links) {
+/// Returns the number of free blocks as it was told, which may have changed during the wait for the
+/// transmitter.
+async fn report_queue(links: &Links) -> usize {
     let mut tx = links.tx.lock().await;
+    let mut told = 0;
     send(links, &mut tx, |view, tx| {
+        told = view.value(Value::QueueFree) as usize;
         queue_report(links.mode.get(), view, tx);
         false
     })
     .await;
+    told
 }

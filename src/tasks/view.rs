@@ -62,7 +62,8 @@ impl<'a> View<'a> {
     fn position(&self, axis: usize) -> Length {
         let programmed = self.links.model.borrow().position().get(axis).copied();
         let programmed = programmed.unwrap_or(Length::ZERO);
-        if !self.busy() {
+        // Until the planner has counted anew, steps mean what they meant before a setting changed.
+        if !self.busy() || self.links.resync.get() {
             return programmed;
         }
         // Of several motors on an axis the first tells; an axis without one is where it should be.

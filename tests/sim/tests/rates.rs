@@ -115,3 +115,29 @@ fn one_step_every_ten_seconds_with_fine_steps() {
     carry_out(&mut machine, &mut host, "g1 x0.0031 f0.00465", 4);
     ten_seconds_each(&machine);
 }
+
+/// Loading a segment takes longest when every motor turns round. The new, shorter tick period must still
+/// be in force before the timer gets there, or it counts through to 65,535: 4 ms without a step.
+#[test]
+fn reversals_of_all_motors_never_miss_a_tick() {
+    let settings = ["{4ma:3}", "{aam:1}", "{avm:3600}", "{afr:3600}", "{4tr:1.25}", "{xjm:2000}"];
+    let (mut machine, mut host) = machine(&RAMPS14, &settings);
+    let mut heard = 0;
+    for n in 1..=120 {
+        let to = n % 2;
+        // Uneven lengths, so that bytes come at all phases of a tick.
+        let line = format!("g1 f700 x{to} y{to}.1 z{to}.01 a{to}.001{}", " ".repeat(n % 7));
+        host.queue(n, &line);
+        host.run_for_ms(&mut machine, 5).unwrap();
+        heard += host.take_answered().len();
+    }
+    let end = machine.cycle() + machine.cycles(PATIENCE_MS);
+    while (heard < 120 || host.idle_since().is_none()) && machine.cycle() < end {
+        host.run_for_ms(&mut machine, 20).unwrap();
+        heard += host.take_answered().len();
+    }
+    assert_eq!(heard, 120);
+    assert_eq!(machine.missed_tops(), 0);
+    let steps: Vec<i64> = machine.recorder().motors().iter().map(|m| m.position).collect();
+    assert_eq!(steps, [0, 128, 13, 1]);
+}
