@@ -7,7 +7,7 @@
 //! | [`Links::lines`] | lines | 8 lines, 640 B | 670 B | reader | parser | bytes stay in the receive ring |
 //! | [`Links::commands`] | canonical commands | 1 | 70 B | parser | planner | the parser takes control lines only |
 //! | block ring | blocks | 40 | 1,900 B | planner | exec | the planner waits; `commands` stays taken |
-//! | segment ring | segments | 4 | 60 B | exec | step interrupt | exec waits for its next run |
+//! | segment ring | segments | 4 | 68 B | exec | step interrupt | exec waits for its next run |
 //! | `uart` transmit ring | bytes | 255 | 260 B | parser, reporter | TX interrupt | the writer waits, response half sent |
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
