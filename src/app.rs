@@ -11,9 +11,9 @@ use embassy_sync::signal::Signal;
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
-use crate::hal::imp::uart::{Outgoing, Received};
 use crate::hal::imp::{stepper, uart};
 use crate::hal::ring::Producer;
+use crate::hal::serial::{Outgoing, Received};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Mode, StatusReport};
@@ -34,7 +34,6 @@ impl Links {
             reporter_wake: Signal::new(),
             queue_count: QueueCount::default(),
             resync: Cell::new(false),
-            losing: Cell::new(false),
             exception: Cell::new(None),
             mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),

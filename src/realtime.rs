@@ -17,7 +17,8 @@ pub const ENQUIRY: u8 = 1 << 5;
 
 /// The bit of a real-time character, 0 for any other byte.
 ///
-/// Runs in the receive interrupt: a few compares, no table.
+/// The receive interrupt of the AVR has its twin in assembly (`hal/avr/uart.rs`); the transcripts, which
+/// run on both, hold the two together.
 #[inline(always)]
 pub const fn bit(byte: u8) -> u8 {
     // Most bytes of G-code are letters, digits and dots: one test lets them pass.

@@ -71,12 +71,6 @@ pub async fn wait<R>(event: Event, mut ready: impl FnMut() -> Option<R>) -> R {
     .await
 }
 
-/// Waits for the next `event` after now.
-pub async fn next(event: Event) {
-    let mut first = true;
-    wait(event, || (!core::mem::replace(&mut first, false)).then_some(())).await;
-}
-
 /// Wakes who waits for the events in `bits`. The main loop calls it, in thread mode.
 pub fn dispatch(bits: u8) {
     for (bit, slot) in waiters().0.iter().enumerate() {

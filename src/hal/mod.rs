@@ -34,6 +34,7 @@ pub mod byte;
 pub mod event;
 pub mod pender;
 pub mod ring;
+pub mod serial;
 
 #[cfg(target_arch = "avr")]
 #[path = "avr/mod.rs"]

@@ -113,11 +113,10 @@ impl Request {
     ///
     /// A JSON line is checked as a whole here: up to 20,000 cycles on AVR.
     pub fn begin(line: &[u8], mode: &mut Mode) -> Option<Request> {
-        let mut request = Request::new();
         if line.len() > usize::from(u8::MAX) {
-            request.fail(Status::InputTooLong, *mode);
-            return Some(request);
+            return Some(Request::refused(Status::InputTooLong, *mode));
         }
+        let mut request = Request::new();
         let start = json::skip_blanks(line);
         let end = line.len() as u8;
         match line.get(usize::from(start)) {

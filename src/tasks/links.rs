@@ -56,8 +56,6 @@ pub struct Links {
     pub queue_count: QueueCount,
     /// A setting has changed what steps mean: the planner counts them anew.
     pub resync: Cell<bool>,
-    /// The line is losing bytes, and the sender has been told.
-    pub losing: Cell<bool>,
     /// An exception to report.
     pub exception: Cell<Option<Status>>,
     /// How the sender wants to be answered.

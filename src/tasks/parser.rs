@@ -81,8 +81,8 @@ fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
     next
 }
 
-#[inline(never)]
 /// Interprets a block and hands its commands to the planner.
+#[inline(never)]
 fn interpret(links: &Links, id: LineId, start: u8, end: u8) -> Status {
     let lines = links.lines.borrow();
     let text = lines.text(id).get(start.into()..end.into()).unwrap_or(&[]);

@@ -8,7 +8,8 @@ use embassy_futures::yield_now;
 
 use super::links::Links;
 use crate::hal::event::{Event, wait};
-use crate::hal::imp::uart::{LOSS, LOSS_AT_END, Received, losing};
+use crate::hal::imp::uart::losing;
+use crate::hal::serial::{LOSS, LOSS_AT_END, Received};
 use crate::protocol::Mode;
 use crate::status::Status;
 
@@ -17,9 +18,10 @@ const TURN: usize = 64;
 
 /// The task.
 pub async fn run(links: &'static Links, mut received: Received) -> ! {
+    let mut told = false;
     loop {
         wait(Event::Received, || (!received.is_empty()).then_some(())).await;
-        if !take_some(links, &mut received) {
+        if !take_some(links, &mut received, &mut told) {
             links.pool_space.wait().await;
         }
         yield_now().await;
@@ -27,11 +29,11 @@ pub async fn run(links: &'static Links, mut received: Received) -> ! {
 }
 
 /// Takes up to a turn's bytes. False when the pool has no room for more.
-fn take_some(links: &Links, received: &mut Received) -> bool {
+fn take_some(links: &Links, received: &mut Received, told: &mut bool) -> bool {
     let mut pool = links.lines.borrow_mut();
     pool.keep_empty(links.mode.get() == Mode::Text);
-    if losing() && !links.losing.get() {
-        report_loss(links);
+    if losing() {
+        report_loss(links, told);
     }
     for _ in 0..TURN {
         if !pool.ready() {
@@ -43,10 +45,8 @@ fn take_some(links: &Links, received: &mut Received) -> bool {
         let damaged = byte == LOSS || byte == LOSS_AT_END;
         if damaged {
             pool.spoil(Status::BufferFull);
-            if !links.losing.get() {
-                report_loss(links);
-            }
-            links.losing.set(false);
+            report_loss(links, told);
+            *told = false;
         }
         if byte != LOSS && pool.put(if damaged { b'\n' } else { byte }) {
             links.parser_wake.signal(());
@@ -55,9 +55,10 @@ fn take_some(links: &Links, received: &mut Received) -> bool {
     true
 }
 
-/// Tells the sender that bytes are being lost, once for each stretch of them.
-fn report_loss(links: &Links) {
-    links.losing.set(true);
-    links.exception.set(Some(Status::BufferFull));
-    links.reporter_wake.signal(());
+/// Tells the sender that bytes are being lost, unless it has been `told` of this stretch of them.
+fn report_loss(links: &Links, told: &mut bool) {
+    if !core::mem::replace(told, true) {
+        links.exception.set(Some(Status::BufferFull));
+        links.reporter_wake.signal(());
+    }
 }

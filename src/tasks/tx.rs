@@ -4,7 +4,8 @@
 //! [`Tx::room`] before each piece of at most [`PIECE`] bytes; it waits until the transmit ring has room.
 
 use crate::hal::event::{Event, wait};
-use crate::hal::imp::uart::{self, Outgoing};
+use crate::hal::imp::uart;
+use crate::hal::serial::Outgoing;
 
 /// Most bytes written between two calls of [`Tx::room`].
 pub const PIECE: usize = 64;

@@ -9,21 +9,9 @@ use core::arch::asm;
 use crate::boards::ACTIVE;
 use crate::hal::byte::SharedByte;
 use crate::hal::event::Event;
-use crate::hal::ring::{Consumer, Producer, Ring};
+use crate::hal::ring::Ring;
+use crate::hal::serial::{LOSS, LOSS_AT_END, Outgoing, RING, Received};
 use crate::realtime;
-
-/// Size of each ring.
-pub const RING: usize = 256;
-
-/// What stands where bytes were lost. No line of text has it.
-pub const LOSS: u8 = 0;
-/// The same, where the byte that is replaced ended its line.
-pub const LOSS_AT_END: u8 = 1;
-
-/// Bytes received.
-pub type Received = Consumer<u8, RING>;
-/// Bytes to send. Call [`kick`] after filling it.
-pub type Outgoing = Producer<u8, RING>;
 
 type ByteRing = Ring<u8, RING>;
 

@@ -1,7 +1,6 @@
 //! The step timer on the host: the real step generator, ticking in mocked time, with pins that count.
 
 use core::cell::{Cell, RefCell};
-use std::vec::Vec;
 
 use super::{NEVER, exec, gpio, now};
 use crate::boards::MOTORS;
@@ -10,17 +9,6 @@ use crate::motion::dda::{Dda, Pins, SEGMENTS, Segment};
 
 const FIRST_TICK: u64 = 400;
 
-/// A step as the pins see it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StepEdge {
-    /// CPU cycle.
-    pub cycle: u64,
-    /// Motor, 0 to 3.
-    pub motor: u8,
-    /// Direction.
-    pub backwards: bool,
-}
-
 /// What the pins have done so far.
 #[derive(Clone, Debug, Default)]
 pub struct Emitted {
@@ -28,16 +16,12 @@ pub struct Emitted {
     pub position: [i64; MOTORS],
     /// Pulses of each motor.
     pub steps: [u64; MOTORS],
-    /// Every step, if [`record`] asked for it.
-    pub edges: Vec<StepEdge>,
 }
 
 struct Pinned {
     backwards: u8,
-    inverted: u8,
     period: u64,
     stopped: bool,
-    recording: bool,
     emitted: Emitted,
 }
 
@@ -55,10 +39,8 @@ machine_static! {
         dda: RefCell::new(Dda::new()),
         pins: RefCell::new(Pinned {
             backwards: 0,
-            inverted: 0,
             period: 0,
             stopped: true,
-            recording: false,
             emitted: Emitted::default(),
         }),
         next_tick: Cell::new(NEVER),
@@ -72,10 +54,6 @@ impl Pins for Pinned {
                 let backwards = self.backwards & (1 << m) != 0;
                 self.emitted.position[m] += if backwards { -1 } else { 1 };
                 self.emitted.steps[m] += 1;
-                if self.recording {
-                    let edge = StepEdge { cycle: now(), motor: m as u8, backwards };
-                    self.emitted.edges.push(edge);
-                }
             }
         }
     }
@@ -123,20 +101,8 @@ pub fn running() -> bool {
     stepper().next_tick.get() != NEVER
 }
 
-/// Which direction pins are inverted.
-pub fn set_inverted(motors: u8) {
-    stepper().pins.borrow_mut().inverted = motors;
-}
-
-/// Which direction pins are inverted, as last set.
-pub fn inverted() -> u8 {
-    stepper().pins.borrow().inverted
-}
-
-/// Keeps every step from now on, not only counts.
-pub fn record() {
-    stepper().pins.borrow_mut().recording = true;
-}
+/// Which direction pins are inverted: of no account here, where positions are counted before the pins.
+pub fn set_inverted(_motors: u8) {}
 
 /// What the pins have done so far.
 pub fn emitted() -> Emitted {
