@@ -110,10 +110,10 @@ impl Prep {
             // The rest was measured in the old direction.
             self.left[m] = self.left[m].wrapping_neg();
         }
+        // The rest goes into the block's first segment.
+        self.owed[m] = self.left[m] as i32;
         let steps = steps.unsigned_abs();
         self.left[m] = self.left[m].wrapping_add(steps << STEP_LOG2);
-        // The rest goes into the block's first segment.
-        self.owed[m] = self.left[m].wrapping_sub(steps << STEP_LOG2) as i32;
         if steps == most {
             self.full |= bit;
         } else {

@@ -81,7 +81,7 @@ pub fn running() -> bool {
     RUNNING.get() != 0
 }
 
-/// Which direction pins are inverted: bit m for motor m. Takes effect when a direction changes.
+/// Which direction pins are inverted: bit m for motor m. Takes effect with the next segment.
 pub fn set_inverted(motors: u8) {
     INVERTED.set(motors);
 }
