@@ -34,6 +34,7 @@ impl Links {
             reporter_wake: Signal::new(),
             queue_count: QueueCount::default(),
             resync: Cell::new(false),
+            settings_changed: Cell::new(true),
             exception: Cell::new(None),
             mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),
@@ -64,11 +65,11 @@ fn place(tx: Outgoing) -> &'static Links {
 pub fn start(main: Spawner, exec_level: Spawner, baud: u32) -> Option<()> {
     let (received, outgoing) = uart::start(baud)?;
     let segments = stepper::start()?;
-    let (queue, source) = queue::ring().split()?;
+    let (queue, source) = queue::store().split()?;
     let links = place(outgoing);
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received).ok()?);
-    main.spawn(planner_task(links, BlockQueue::new(queue)).ok()?);
+    main.spawn(planner_task(links, queue).ok()?);
     main.spawn(reporter_task(links).ok()?);
     main.spawn(parser_task(links).ok()?);
     main.spawn(control_task(links).ok()?);

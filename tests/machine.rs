@@ -84,7 +84,7 @@ fn a_flood_is_answered_by_errors_and_not_by_corruption() {
     let mut sender = Sender::boot();
     // No flow control at all: 600 lines as fast as the line goes. What does not fit is refused.
     let job: String = (0..600).map(|n| format!("g1 f800 x{}\n", n % 2 * 10)).collect();
-    sender.ask(&job, 200_000);
+    sender.ask(&job, 400_000);
     assert!(sender.heard.contains("{\"er\":{\"fb\":440.20,\"st\":13,"), "loss is reported");
     let position = sender.machine.emitted().position[0];
     assert!(position == 0 || position == 12_800, "never anywhere else: {position}");

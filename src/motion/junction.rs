@@ -6,6 +6,7 @@
 //!
 //! Called by the line builder. Units: mm (degrees for rotary axes), s. Costs are AVR cycles.
 
+use super::dynamics::Dynamics;
 use crate::math::sqrt;
 use crate::units::PerAxis;
 
@@ -26,41 +27,60 @@ pub struct Heading {
 }
 
 impl Heading {
-    /// The heading along `unit` with the junction deviation of each axis. Cost: 900 + 750 for each
-    /// axis that moves.
-    pub fn new(unit: PerAxis<f32>, deviation: impl Fn(usize) -> f32) -> Self {
+    /// The heading along `unit`, with the junction deviation of each axis. Cost: 200 where all axes that
+    /// move have the same, else 900 + 750 for each axis that moves.
+    pub fn new(unit: PerAxis<f32>, dynamics: &Dynamics) -> Self {
+        let mut same = None;
+        let mut mixed = false;
+        for (&u, axis) in unit.iter().zip(&dynamics.axes) {
+            if u != 0.0 && *same.get_or_insert(axis.deviation) != axis.deviation {
+                mixed = true;
+            }
+        }
+        let deviation = match same {
+            Some(same) if !mixed => same.get(),
+            _ => Self::mean_deviation(&unit, dynamics),
+        };
+        Heading { unit, deviation }
+    }
+
+    #[inline(never)]
+    fn mean_deviation(unit: &PerAxis<f32>, dynamics: &Dynamics) -> f32 {
         let (mut norm, mut sum) = (0.0, 0.0);
-        for (axis, &u) in unit.iter().enumerate() {
+        for (&u, axis) in unit.iter().zip(&dynamics.axes) {
             if u != 0.0 {
-                let part = u * deviation(axis);
+                let part = u * axis.deviation.get();
                 norm += u * u;
                 sum += part * part;
             }
         }
-        if norm > 1.001 {
-            sum /= norm;
-        }
-        Heading { unit, deviation: sqrt(sum) }
+        if norm > 0.0 { sqrt(sum / norm) } else { 0.0 }
     }
 }
 
 /// The highest velocity from heading `a` into heading `b`, mm/s, with the junction `acceleration`,
-/// mm/s^2: 0 for a reversal, [`f32::MAX`] straight on.
+/// mm/s^2: 0 for a reversal, [`f32::MAX`] straight on, or where it is above `most`.
 ///
 /// The axes' velocities change by `(b.unit - a.unit) * velocity`, also where the two paths are
 /// measured differently (linear, rotary, both), so that it is this difference that counts.
 ///
-/// Cost: 2,300 + 430 for each axis that moves.
-pub fn limit(a: &Heading, b: &Heading, acceleration: f32) -> f32 {
+/// Cost: 700 + 430 for each axis that moves; 1,600 more for one below `most`.
+pub fn limit(a: &Heading, b: &Heading, acceleration: f32, most: f32) -> f32 {
     // |b - a| = 2 sin(angle / 2): precise for small angles, which 1 - cos(angle) is not.
     let mut sine = 0.0;
     for (&from, &to) in a.unit.iter().zip(&b.unit) {
-        if from != to {
-            let change = 0.5 * (to - from);
+        if from.to_bits() != to.to_bits() {
+            let change = to - from;
             sine += change * change;
         }
     }
+    let sine = 0.25 * sine;
     if sine < STRAIGHT {
+        return f32::MAX;
+    }
+    let product = 0.5 * (a.deviation + b.deviation) * acceleration;
+    // Up to 75 degrees the factor of the cosine below is above 1.
+    if sine < 0.36 && sine * most * most < product {
         return f32::MAX;
     }
     if sine > REVERSED {
@@ -68,6 +88,5 @@ pub fn limit(a: &Heading, b: &Heading, acceleration: f32) -> f32 {
     }
     // Radius = deviation * c / (1 - c) with c = cos(angle / 2).
     let cosine = sqrt(1.0 - sine);
-    let deviation = 0.5 * (a.deviation + b.deviation);
-    sqrt(deviation * acceleration * cosine * (1.0 + cosine) / sine)
+    sqrt(product * cosine * (1.0 + cosine) / sine)
 }

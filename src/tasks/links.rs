@@ -17,7 +17,7 @@
 //! All but the interrupt rings belong to thread-mode tasks of one executor, which take turns: plain
 //! `RefCell`s, never borrowed across an `.await`.
 
-use core::cell::{Cell, RefCell};
+use core::cell::{Cell, RefCell, UnsafeCell};
 
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::Mutex;
@@ -64,6 +64,8 @@ pub struct Links {
     pub report: RefCell<StatusReport>,
     /// The line to the sender.
     pub tx: Mutex<NoopRawMutex, Tx>,
+    /// A setting has changed since the planner looked.
+    pub settings_changed: Cell<bool>,
     /// Settings in force.
     pub settings: RefCell<Settings>,
     /// The G-code model. The parser advances it; reports read it.
@@ -98,21 +100,23 @@ impl QueueCount {
 }
 
 /// What exec tells the others: written at level 2, read under the ceiling.
-pub struct Published(Cell<Snapshot>);
+pub struct Published(UnsafeCell<Snapshot>);
 
 // SAFETY: exec writes it, and thread mode reads it while exec is locked out.
 unsafe impl Sync for Published {}
 
 machine_static! {
-    fn published() -> Published = Published(Cell::new(Snapshot::new()));
+    fn published() -> Published = Published(UnsafeCell::new(Snapshot::new()));
 }
 
-/// Publishes how motion stands. Exec only.
-pub fn publish(snapshot: Snapshot) {
-    published().0.set(snapshot);
+/// Changes how motion stands. Exec only, and not from within `change`.
+pub fn update<R>(change: impl FnOnce(&mut Snapshot) -> R) -> R {
+    // SAFETY: the only writer; readers keep it from running.
+    change(unsafe { &mut *published().0.get() })
 }
 
 /// How motion stands. Thread mode only.
 pub fn snapshot() -> Snapshot {
-    crate::hal::imp::exec::lock(|_| published().0.get())
+    // SAFETY: the writer does not run under the lock.
+    crate::hal::imp::exec::lock(|_| unsafe { *published().0.get() })
 }

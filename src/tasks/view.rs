@@ -109,6 +109,7 @@ impl Machine for View<'_> {
             self.links.resync.set(true);
         }
         self.settings.store(setting, value);
+        self.links.settings_changed.set(true);
         stepper::set_inverted(inverted(&self.settings));
         Status::Ok
     }

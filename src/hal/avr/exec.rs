@@ -20,6 +20,8 @@ use crate::hal::ring::Ceiling;
 const UCSR2B: *mut u8 = 0xD1 as *mut u8;
 const TXEN2: u8 = 1 << 3;
 const UDRIE2: u8 = 1 << 5;
+/// What raises the interrupt when written to the register: the transmitter on, and asking.
+pub(super) const PEND: u8 = TXEN2 | UDRIE2;
 
 /// Exec runs, or may not run.
 static CLOSED: SharedByte = SharedByte::new(1);
@@ -40,7 +42,7 @@ static CONTEXT: Context = Context { executor: Cell::new(None), waker: Cell::new(
 #[inline(always)]
 pub fn pend() {
     // SAFETY: the register has two values, written whole: no read-modify-write to tear.
-    unsafe { UCSR2B.write_volatile(TXEN2 | UDRIE2) };
+    unsafe { UCSR2B.write_volatile(PEND) };
 }
 
 /// Lets exec run from now on.

@@ -1,29 +1,40 @@
 //! The step interrupt, in assembly: [`Dda::tick`](crate::motion::dda::Dda::tick) on the board's pins.
 //!
-//! Rust's own translation of that function takes 340 cycles, most of them saving registers and copying
-//! between them; this one takes 138 with four motors on ports A to G, entry and return included, and
-//! 5 more for each step pin on ports H to L. Every 4 ms or so it calls [`stepper::load`], which is Rust
-//! and takes about 300 more.
+//! | a tick in which | cycles, entry and return included |
+//! |---|---|
+//! | nothing is due, two motors move | 108 |
+//! | two motors step | 130, and up to the segment's `settle` |
+//! | four motors step | 166, and up to `settle` |
+//! | all moving motors step on every tick (lockstep) | 92, and up to `settle` |
+//! | a segment is loaded | 65 more; 20 for each direction that changes |
 //!
-//! It saves what it uses: r24 to r26, r30, r31 and SREG; for the call also all that a called function
-//! may use.
+//! A pin on ports H to L adds 2 cycles a motor. Step and direction pins are toggled by writing ones to
+//! PIN registers: one instruction, which disturbs no other pin of the port and whose time does not
+//! depend on whether the pin toggles. That makes pulses of all motors as exact as the tick, and the
+//! idle level (polarity) a matter of how the pins stand when nothing moves.
+//!
+//! It saves what it uses: r24 to r26 and SREG, and r27, r30 and r31 unless in lockstep.
 
 use core::arch::asm;
-use core::mem::offset_of;
+use core::mem::{offset_of, size_of};
 
 use super::stepper;
 use crate::boards::{ACTIVE, Pin, Timer};
-use crate::motion::dda::Dda;
+use crate::hal::ring::Ring;
+use crate::motion::dda::{Dda, SEGMENTS, Segment};
 
 const _: () = assert!(matches!(ACTIVE.step_timer, Timer::T1), "vector 17 is timer 1, compare A");
+const _: () = assert!(size_of::<Segment>() == 16, "slots are found by shifting the index by four");
+const _: () = assert!(SEGMENTS.is_power_of_two() && SEGMENTS <= 16, "see above");
 
-const fn port(motor: usize) -> usize {
-    ACTIVE.motors[motor].step.port.address()
+type Segments = Ring<Segment, SEGMENTS>;
+
+const fn pin_register(pin: Pin) -> usize {
+    pin.port.address() - 2
 }
 
-const fn bit(motor: usize) -> u8 {
-    let Pin { bit, .. } = ACTIVE.motors[motor].step;
-    bit
+const fn mask(pin: Pin) -> u8 {
+    1 << pin.bit
 }
 
 /// TIMER1_COMPA.
@@ -32,34 +43,48 @@ const fn bit(motor: usize) -> u8 {
 /// before or behind it: a naked function, on every toolchain.
 #[unsafe(no_mangle)]
 extern "C" fn __vector_17() -> ! {
-    // SAFETY: every register it changes is restored but r0 and r1 within the call it makes, which it
-    // saves too; it returns by `reti` with the stack as it was.
+    // SAFETY: every register it changes is restored; it returns by `reti` with the stack as it was. It
+    // alone touches the generator's state and takes segments while interrupts are on.
     unsafe {
         asm!(
-            // Raises the step pin of a motor if its bit of r26 is set. Ports above 0x3F have no `sbi`.
-            ".macro KERF_RISE motor, port, bit",
-            ".if \\port < 0x40",
-            "    sbrc r26, \\motor",
-            "    sbi  \\port - 0x20, \\bit",
+            // Toggles a pin if the motor's bit is set; 3 cycles, or 4 on ports that need `sts`.
+            ".macro KERF_TOGGLE bits, motor, pin, mask",
+            "    ldi  r24, \\mask",
+            "    sbrc \\bits, \\motor",
+            ".if \\pin < 0x40",
+            "    out  \\pin - 0x20, r24",
             ".else",
-            "    sbrs r26, \\motor",
-            "    rjmp .Lkerf_low_\\motor",
-            "    lds  r24, \\port",
-            "    ori  r24, 1 << \\bit",
-            "    sts  \\port, r24",
-            ".Lkerf_low_\\motor:",
+            "    sts  \\pin, r24",
             ".endif",
             ".endm",
-            ".macro KERF_FALL port, bit",
-            ".if \\port < 0x40",
-            "    cbi  \\port - 0x20, \\bit",
-            ".else",
-            "    lds  r24, \\port",
-            "    andi r24, 0xFF - (1 << \\bit)",
-            "    sts  \\port, r24",
-            ".endif",
+            ".macro KERF_STEP_PINS",
+            "    KERF_TOGGLE r26, 0, {step0}, {step_mask0}",
+            "    KERF_TOGGLE r26, 1, {step1}, {step_mask1}",
+            "    KERF_TOGGLE r26, 2, {step2}, {step_mask2}",
+            "    KERF_TOGGLE r26, 3, {step3}, {step_mask3}",
             ".endm",
-            // Adds the increment to a phase; bit 15 of the sum becomes the motor's bit of r26.
+            // Waits until the counter is at `settle`, to the cycle, if that is still to come.
+            ".macro KERF_SETTLE",
+            "    lds  r25, {state} + {settle}",
+            "    lds  r24, 0x84",
+            "    sub  r25, r24",
+            "    brcs 73f",
+            // A cycle for bit 0, two for bit 1, four for each of the rest.
+            "    lsr  r25",
+            "    brcs 70f",
+            "70:",
+            "    lsr  r25",
+            "    brcc 71f",
+            "    nop",
+            "    nop",
+            "    nop",
+            "71:",
+            "    subi r25, 1",
+            "    brcs 73f",
+            "    rjmp 71b",
+            "73:",
+            ".endm",
+            // Adds the increment to a phase; bit 15 of the sum becomes the motor's bit of r27.
             ".macro KERF_ADD motor",
             "    lds  r30, {state} + {phase} + 2 * \\motor",
             "    lds  r31, {state} + {increment} + 2 * \\motor",
@@ -69,98 +94,232 @@ extern "C" fn __vector_17() -> ! {
             "    lds  r31, {state} + {increment} + 2 * \\motor + 1",
             "    adc  r30, r31",
             "    bst  r30, 7",
-            "    bld  r26, \\motor",
+            "    bld  r27, \\motor",
             "    andi r30, 0x7F",
             "    sts  {state} + {phase} + 2 * \\motor + 1, r30",
+            ".endm",
+            ".macro KERF_LOAD_INCREMENT motor",
+            "    ldd  r24, Z + {s_increment} + 2 * \\motor",
+            "    ldd  r25, Z + {s_increment} + 2 * \\motor + 1",
+            "    sts  {state} + {increment} + 2 * \\motor, r24",
+            "    sts  {state} + {increment} + 2 * \\motor + 1, r25",
+            ".endm",
+            // Reverses a motor if its bit of r27 is set: the pin, and the phase by its complement.
+            ".macro KERF_TURN motor, pin, mask",
+            "    sbrs r27, \\motor",
+            "    rjmp 74f",
+            "    KERF_TOGGLE r27, \\motor, \\pin, \\mask",
+            "    lds  r24, {state} + {phase} + 2 * \\motor",
+            "    com  r24",
+            "    sts  {state} + {phase} + 2 * \\motor, r24",
+            "    lds  r24, {state} + {phase} + 2 * \\motor + 1",
+            "    com  r24",
+            "    andi r24, 0x7F",
+            "    sts  {state} + {phase} + 2 * \\motor + 1, r24",
+            "74:",
             ".endm",
             "    push r24",
             "    in   r24, 0x3F",
             "    push r24",
             "    push r25",
             "    push r26",
-            "    push r30",
-            "    push r31",
             "    lds  r26, {state} + {due}",
-            "    KERF_RISE 0, {port0}, {bit0}",
-            "    KERF_RISE 1, {port1}, {bit1}",
-            "    KERF_RISE 2, {port2}, {bit2}",
-            "    KERF_RISE 3, {port3}, {bit3}",
+            "    lds  r24, {state} + {lockstep}",
+            "    tst  r24",
+            "    brne 1f",
+            "    rjmp 10f",
+            // Lockstep: what was due is due again.
+            "1:",
+            "    KERF_SETTLE",
+            "    KERF_STEP_PINS",
             "    lds  r24, {state} + {ticks}",
             "    lds  r25, {state} + {ticks} + 1",
             "    sbiw r24, 1",
-            "    brcc 1f",
-            "    rjmp 3f",
-            "1:",
+            "    brcs 3f",
             "    sts  {state} + {ticks}, r24",
             "    sts  {state} + {ticks} + 1, r25",
-            "    KERF_ADD 0",
-            "    KERF_ADD 1",
-            "    KERF_ADD 2",
-            "    KERF_ADD 3",
-            "    sts  {state} + {due}, r26",
+            "    lds  r24, {lockstep_width}",
             "2:",
-            "    KERF_FALL {port0}, {bit0}",
-            "    KERF_FALL {port1}, {bit1}",
-            "    KERF_FALL {port2}, {bit2}",
-            "    KERF_FALL {port3}, {bit3}",
-            "    pop  r31",
-            "    pop  r30",
+            "    dec  r24",
+            "    brne 2b",
+            "    KERF_STEP_PINS",
             "    pop  r26",
             "    pop  r25",
             "    pop  r24",
             "    out  0x3F, r24",
             "    pop  r24",
             "    reti",
-            // The segment is used up.
             "3:",
-            "    push r0",
-            "    push r1",
-            "    push r18",
-            "    push r19",
-            "    push r20",
-            "    push r21",
-            "    push r22",
-            "    push r23",
             "    push r27",
-            "    clr  r1",
-            "    call {load}",
-            "    mov  r26, r24",
-            "    sbrs r26, 0",
-            "    call {halt}",
-            "    pop  r27",
-            "    pop  r23",
-            "    pop  r22",
-            "    pop  r21",
-            "    pop  r20",
-            "    pop  r19",
-            "    pop  r18",
-            "    pop  r1",
-            "    pop  r0",
+            "    push r30",
+            "    push r31",
+            "    rjmp 20f",
+            // Not in lockstep.
+            "10:",
+            "    push r27",
+            "    push r30",
+            "    push r31",
+            "    tst  r26",
+            "    breq 11f",
+            "    KERF_SETTLE",
+            "    KERF_STEP_PINS",
+            "11:",
             "    lds  r24, {state} + {ticks}",
             "    lds  r25, {state} + {ticks} + 1",
             "    sbiw r24, 1",
-            "    brcs 4f",
-            "    rjmp 1b",
-            "4:",
-            // None was left: nothing is due.
-            "    clr  r26",
-            "    sts  {state} + {due}, r26",
-            "    rjmp 2b",
+            "    brcc 12f",
+            "    rjmp 20f",
+            "12:",
+            "    sts  {state} + {ticks}, r24",
+            "    sts  {state} + {ticks} + 1, r25",
+            "    clr  r27",
+            "    KERF_ADD 0",
+            "    KERF_ADD 1",
+            "    lds  r24, {state} + {wide}",
+            "    tst  r24",
+            "    breq 13f",
+            "    KERF_ADD 2",
+            "    KERF_ADD 3",
+            "13:",
+            "    sts  {state} + {due}, r27",
+            "    tst  r26",
+            "    breq 15f",
+            "    lds  r24, {width}",
+            "14:",
+            "    dec  r24",
+            "    brne 14b",
+            "    KERF_STEP_PINS",
+            "15:",
+            "    pop  r31",
+            "    pop  r30",
+            "    pop  r27",
+            "    pop  r26",
+            "    pop  r25",
+            "    pop  r24",
+            "    out  0x3F, r24",
+            "    pop  r24",
+            "    reti",
+            // The segment is used up: where is the next?
+            "20:",
+            "    lds  r30, {segments} + {tail}",
+            "    lds  r24, {segments} + {head}",
+            "    cp   r24, r30",
+            "    brne 21f",
+            "    rjmp 30f",
+            "21:",
+            "    inc  r30",
+            "    andi r30, {last}",
+            "    sts  {segments} + {tail}, r30",
+            "    swap r30",
+            "    ldi  r31, 0",
+            "    subi r30, lo8(-({segments} + {slots}))",
+            "    sbci r31, hi8(-({segments} + {slots}))",
+            // The period first: the counter runs towards the old top.
+            "    ldd  r24, Z + {s_period}",
+            "    ldd  r25, Z + {s_period} + 1",
+            "    sbiw r24, 1",
+            "    sts  0x89, r25",
+            "    sts  0x88, r24",
+            // Should it be past the new top, this tick starts anew, or it would run to the end.
+            "    lds  r27, 0x84",
+            "    cp   r24, r27",
+            "    lds  r27, 0x85",
+            "    cpc  r25, r27",
+            "    brcc 22f",
+            "    ldi  r24, 0",
+            "    sts  0x85, r24",
+            "    sts  0x84, r24",
+            "22:",
+            // A slot is free: exec may fill it.
+            "    ldi  r24, {pend}",
+            "    sts  0xD1, r24",
+            "    ldd  r24, Z + {s_settle}",
+            "    sts  {state} + {settle}, r24",
+            "    lds  r27, {state} + {backwards}",
+            "    ldd  r24, Z + {s_backwards}",
+            "    eor  r27, r24",
+            "    brne 23f",
+            "    rjmp 24f",
+            "23:",
+            "    sts  {state} + {backwards}, r24",
+            "    KERF_TURN 0, {dir0}, {dir_mask0}",
+            "    KERF_TURN 1, {dir1}, {dir_mask1}",
+            "    KERF_TURN 2, {dir2}, {dir_mask2}",
+            "    KERF_TURN 3, {dir3}, {dir_mask3}",
+            "24:",
+            "    ldd  r27, Z + {s_lockstep}",
+            "    sts  {state} + {lockstep}, r27",
+            "    tst  r27",
+            "    brne 25f",
+            "    ldd  r24, Z + {s_wide}",
+            "    sts  {state} + {wide}, r24",
+            "    KERF_LOAD_INCREMENT 0",
+            "    KERF_LOAD_INCREMENT 1",
+            "    KERF_LOAD_INCREMENT 2",
+            "    KERF_LOAD_INCREMENT 3",
+            "    ldd  r24, Z + {s_ticks}",
+            "    ldd  r25, Z + {s_ticks} + 1",
+            "    sbiw r24, 1",
+            "    rjmp 12b",
+            "25:",
+            "    ldd  r24, Z + {s_ticks}",
+            "    ldd  r25, Z + {s_ticks} + 1",
+            "    sbiw r24, 1",
+            "    sts  {state} + {ticks}, r24",
+            "    sts  {state} + {ticks} + 1, r25",
+            "    rjmp 13b",
+            // There is none: no more ticks.
+            "30:",
+            "    ldi  r24, {halt}",
+            "    sts  0x81, r24",
+            "    ldi  r24, {pend}",
+            "    sts  0xD1, r24",
+            "    clr  r27",
+            "    sts  {running}, r27",
+            "    sts  {state} + {lockstep}, r27",
+            "    rjmp 13b",
             state = sym stepper::STATE,
             phase = const offset_of!(Dda, phase),
             increment = const offset_of!(Dda, increment),
             ticks = const offset_of!(Dda, ticks),
             due = const offset_of!(Dda, due),
-            port0 = const port(0),
-            port1 = const port(1),
-            port2 = const port(2),
-            port3 = const port(3),
-            bit0 = const bit(0),
-            bit1 = const bit(1),
-            bit2 = const bit(2),
-            bit3 = const bit(3),
-            load = sym stepper::load,
-            halt = sym stepper::halt,
+            backwards = const offset_of!(Dda, backwards),
+            lockstep = const offset_of!(Dda, lockstep),
+            settle = const offset_of!(Dda, settle),
+            wide = const offset_of!(Dda, wide),
+            s_increment = const offset_of!(Segment, increment),
+            s_ticks = const offset_of!(Segment, ticks),
+            s_period = const offset_of!(Segment, period),
+            s_backwards = const offset_of!(Segment, backwards),
+            s_lockstep = const offset_of!(Segment, lockstep),
+            s_settle = const offset_of!(Segment, settle),
+            s_wide = const offset_of!(Segment, wide),
+            segments = sym stepper::SEGMENT_RING,
+            slots = const Segments::SLOTS,
+            head = const Segments::HEAD,
+            tail = const Segments::TAIL,
+            last = const SEGMENTS - 1,
+            running = sym stepper::RUNNING,
+            width = sym stepper::WIDTH,
+            lockstep_width = sym stepper::LOCKSTEP_WIDTH,
+            halt = const stepper::HALT,
+            pend = const super::exec::PEND,
+            step0 = const pin_register(ACTIVE.motors[0].step),
+            step1 = const pin_register(ACTIVE.motors[1].step),
+            step2 = const pin_register(ACTIVE.motors[2].step),
+            step3 = const pin_register(ACTIVE.motors[3].step),
+            step_mask0 = const mask(ACTIVE.motors[0].step),
+            step_mask1 = const mask(ACTIVE.motors[1].step),
+            step_mask2 = const mask(ACTIVE.motors[2].step),
+            step_mask3 = const mask(ACTIVE.motors[3].step),
+            dir0 = const pin_register(ACTIVE.motors[0].dir),
+            dir1 = const pin_register(ACTIVE.motors[1].dir),
+            dir2 = const pin_register(ACTIVE.motors[2].dir),
+            dir3 = const pin_register(ACTIVE.motors[3].dir),
+            dir_mask0 = const mask(ACTIVE.motors[0].dir),
+            dir_mask1 = const mask(ACTIVE.motors[1].dir),
+            dir_mask2 = const mask(ACTIVE.motors[2].dir),
+            dir_mask3 = const mask(ACTIVE.motors[3].dir),
             options(noreturn),
         );
     }
