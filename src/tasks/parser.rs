@@ -19,8 +19,8 @@ pub async fn run(links: &'static Links) -> ! {
         let (id, class) = next_line(links).await;
         answer(links, id, class).await;
         links.lines.borrow_mut().remove(id);
-        links.pool_space.signal(());
-        links.reporter_wake.signal(());
+        links.pool_space.signal();
+        links.reporter_wake.signal();
     }
 }
 
@@ -92,7 +92,7 @@ fn interpret(links: &Links, id: LineId, start: u8, end: u8) -> Status {
         Ok(_) => {
             if asks_for_something(&commands) {
                 links.commands_taken.set(true);
-                links.planner_wake.signal(());
+                links.planner_wake.signal();
             }
             Status::Ok
         }

@@ -35,7 +35,7 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         let commands = *links.commands.borrow();
         planner.carry_out(&commands).await;
         links.commands_taken.set(false);
-        links.parser_wake.signal(());
+        links.parser_wake.signal();
     }
 }
 
@@ -120,7 +120,7 @@ impl Planner {
         let _ = self.queue.push(block);
         exec::pend();
         links.queue_count.add();
-        links.reporter_wake.signal(());
+        links.reporter_wake.signal();
         yield_now().await;
     }
 }

@@ -54,12 +54,38 @@ pub fn start(executor: &'static Executor) {
 pub fn lock<R>(critical: impl FnOnce(&Ceiling) -> R) -> R {
     CLOSED.set(1);
     let result = critical(&Ceiling(()));
+    open();
+    result
+}
+
+/// Lets exec in again, at once if it was asked for meanwhile.
+#[inline(always)]
+fn open() {
     CLOSED.set(0);
     if MISSED.get() != 0 {
         MISSED.set(0);
         pend();
     }
-    result
+}
+
+struct CeilingSection;
+critical_section::set_impl!(CeilingSection);
+
+// SAFETY: critical sections (the executors' run queues) are entered by thread mode and by exec, and by
+// no other interrupt: keeping exec out while thread mode is in one keeps them apart. While exec runs,
+// or before it has been started, `CLOSED` is set anyway.
+unsafe impl critical_section::Impl for CeilingSection {
+    unsafe fn acquire() -> bool {
+        let closed = CLOSED.get() != 0;
+        CLOSED.set(1);
+        closed
+    }
+
+    unsafe fn release(closed: bool) {
+        if !closed {
+            open();
+        }
+    }
 }
 
 /// Waits until `ready` gives a value, asking again each time exec is pended. For the exec task.
