@@ -71,6 +71,12 @@ pub async fn wait<R>(event: Event, mut ready: impl FnMut() -> Option<R>) -> R {
     .await
 }
 
+/// Waits for the next `event` after the last poll of the task. Thread mode only.
+pub async fn next(event: Event) {
+    let mut asked = false;
+    wait(event, || core::mem::replace(&mut asked, true).then_some(())).await;
+}
+
 /// Wakes who waits for the events in `bits`. The main loop calls it, in thread mode.
 pub fn dispatch(bits: u8) {
     for (bit, slot) in waiters().0.iter().enumerate() {

@@ -95,7 +95,8 @@ impl LinePool {
     /// Takes the printing bytes that `bytes` begins with, as far as they fit and are no matter for
     /// [`LinePool::put`]. Returns how many. Cost: 15 cycles a byte.
     pub fn put_text(&mut self, bytes: &[u8]) -> u8 {
-        if self.fault.is_some() || (self.partial == 0 && bytes.first().is_none_or(|b| is_blank(*b))) {
+        if self.fault.is_some() || (self.partial == 0 && bytes.first().is_none_or(|b| is_blank(*b)))
+        {
             return 0;
         }
         let room = usize::from(LINE_MAX as u8 - self.partial);
@@ -153,6 +154,23 @@ impl LinePool {
     pub fn spoil(&mut self, status: Status) {
         self.partial = 0;
         self.fault = Some(status);
+    }
+
+    /// Forgets the line that is coming in.
+    pub fn forget(&mut self) {
+        self.partial = 0;
+        self.fault = None;
+    }
+
+    /// The next byte follows a carriage return, or does not.
+    pub fn follow(&mut self, returned: bool) {
+        self.returned = returned;
+    }
+
+    /// Takes the end of a line; `returned` if it was a carriage return. Returns true if that was a line.
+    pub fn end(&mut self, returned: bool) -> bool {
+        self.returned = returned;
+        self.end_line()
     }
 
     fn end_line(&mut self) -> bool {

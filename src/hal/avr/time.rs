@@ -19,12 +19,14 @@ const _: () = assert!(matches!(ACTIVE.tick_timer, Timer::T0), "the tick is on ti
 /// Milliseconds since reset. The interrupt alone writes it.
 static mut MILLIS: u32 = 0;
 
-/// TIMER0_COMPA: counts. Interrupts are off for 25 cycles, rarely 40.
+/// TIMER0_COMPA: counts. Others may interrupt it from its first instruction on: it does not come again
+/// for a millisecond.
 #[unsafe(no_mangle)]
 extern "C" fn __vector_21() -> ! {
     // SAFETY: every register it changes is restored, and it returns by `reti`. Only it writes `MILLIS`.
     unsafe {
         asm!(
+            "sei",
             "push r24",
             "in   r24, 0x3F",
             "push r24",

@@ -9,8 +9,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use kerf_sim::Machine;
-use kerf_sim::{Host, LINES_IN_FLIGHT};
 use kerf_sim::job;
+use kerf_sim::{Host, LINES_IN_FLIGHT};
 
 /// How long the line of a job may take, ms of AVR time.
 const LINE_MS: u64 = 1_000;
