@@ -99,11 +99,15 @@ impl LinePool {
         {
             return 0;
         }
-        let room = usize::from(LINE_MAX as u8 - self.partial);
+        let room = LINE_MAX - usize::from(self.partial);
         let at = self.room_at();
         let slots = self.bytes.get_mut(at..).unwrap_or(&mut []);
+        let most = room.min(slots.len()).min(bytes.len());
+        let (Some(slots), Some(bytes)) = (slots.get_mut(..most), bytes.get(..most)) else {
+            return 0;
+        };
         let mut count = 0;
-        for (slot, &byte) in slots.iter_mut().zip(bytes.iter().take(room)) {
+        for (slot, &byte) in slots.iter_mut().zip(bytes) {
             if byte < b' ' {
                 break;
             }

@@ -37,4 +37,8 @@ impl crate::protocol::Out for Tx {
         // Room was made by `room`; a byte beyond it is a defect that tests of `protocol` exclude.
         let _ = self.ring.push(byte);
     }
+
+    fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
+        self.ring.push_all(bytes);
+    }
 }
