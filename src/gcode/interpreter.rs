@@ -79,7 +79,12 @@ impl Interpreter {
 
     #[inline(never)]
     fn execute_or_undo(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
-        let before = Before::of(self, block);
+        let offset = match block.non_modal {
+            Some(_) => Some(self.offset),
+            None => None,
+        };
+        let mut before = Before::of(self, offset);
+        before.save_axes(self, block);
         let done = self.execute(block, out);
         if done.is_err() {
             before.restore(self);
@@ -198,18 +203,20 @@ struct Before {
 
 impl Before {
     #[inline(always)]
-    fn of(state: &Interpreter, block: &Block) -> Self {
+    fn of(state: &Interpreter, offset: Option<PerAxis<Length>>) -> Self {
         let Interpreter { modal, feed, feed_units, line, .. } = *state;
-        let mut axes = Vec::new();
+        Self { modal, feed, feed_units, line, axes: Vec::new(), offset }
+    }
+
+    #[inline(always)]
+    fn save_axes(&mut self, state: &Interpreter, block: &Block) {
         for axis in block.axes() {
             let i = usize::from(axis);
             if let (Some(position), Some(residue)) = (state.position.get(i), state.residue.get(i)) {
                 // There is room for all axes.
-                let _ = axes.push((axis, *position, *residue));
+                let _ = self.axes.push((axis, *position, *residue));
             }
         }
-        let offset = block.non_modal.map(|_| state.offset);
-        Self { modal, feed, feed_units, line, axes, offset }
     }
 
     #[inline(never)]

@@ -199,10 +199,15 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
     /// The oldest values, as many as lie side by side; empty only if none waits.
     #[inline]
     pub fn waiting(&self) -> &[T] {
+        // Read once: the producer may move it meanwhile.
         let head = self.0.head.get();
-        let start = next::<N>(self.0.tail.get());
-        let end = if head >= start { usize::from(head) + 1 } else { N };
-        let len = if self.is_empty() { 0 } else { end - usize::from(start) };
+        let tail = self.0.tail.get();
+        let start = next::<N>(tail);
+        let len = match head {
+            _ if head == tail => 0,
+            _ if head >= start => usize::from(head - start) + 1,
+            _ => N - usize::from(start),
+        };
         // SAFETY: `head` has moved onto or past these slots, so they are filled, and the consumer's
         // until `tail` moves, which takes `&mut self`.
         unsafe { core::slice::from_raw_parts(self.0.slot(start), len) }
@@ -211,7 +216,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
     /// Releases the oldest `count` values, of those that [`Consumer::waiting`] gave.
     #[inline]
     pub fn release_many(&mut self, count: u8) {
-        let count = usize::from(count).min(self.waiting().len());
+        let count = usize::from(count).min(self.0.used());
         let tail = usize::from(self.0.tail.get()) + count;
         self.0.tail.set(if tail >= N { tail - N } else { tail } as u8);
     }
@@ -304,7 +309,7 @@ mod tests {
             p.push_all([99].into_iter());
             let run = c.waiting().to_vec();
             assert!(!run.is_empty());
-            c.release_many(2);
+            c.release_many(run.len().min(2) as u8);
             taken.extend(run.iter().take(2));
         }
         assert!(taken.iter().copied().eq(0..taken.len() as u16));

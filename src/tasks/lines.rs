@@ -39,9 +39,9 @@ struct Entry {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LineId(u8);
 
-/// The pool.
+/// The pool. The buffer is last: what lies before it, AVR reaches in one instruction.
+#[repr(C)]
 pub struct LinePool {
-    bytes: [u8; POOL],
     /// Complete lines, in order; their bytes lie end to end.
     entries: Vec<Entry, SLOTS>,
     /// How many of them are control lines.
@@ -58,13 +58,13 @@ pub struct LinePool {
     returned: bool,
     /// Empty lines are kept: in text mode they are answered by a prompt.
     keep_empty: bool,
+    bytes: [u8; POOL],
 }
 
 impl LinePool {
     /// An empty pool.
     pub const fn new() -> Self {
         Self {
-            bytes: [0; POOL],
             entries: Vec::new(),
             controls: 0,
             start: 0,
@@ -73,6 +73,7 @@ impl LinePool {
             fault: None,
             returned: false,
             keep_empty: false,
+            bytes: [0; POOL],
         }
     }
 
@@ -94,6 +95,7 @@ impl LinePool {
 
     /// Takes the printing bytes that `bytes` begins with, as far as they fit and are no matter for
     /// [`LinePool::put`]. Returns how many. Cost: 15 cycles a byte.
+    #[inline(never)]
     pub fn put_text(&mut self, bytes: &[u8]) -> u8 {
         if self.fault.is_some() || (self.partial == 0 && bytes.first().is_none_or(|b| is_blank(*b)))
         {
@@ -120,6 +122,7 @@ impl LinePool {
     }
 
     /// Takes a byte. Returns true when it completes a line.
+    #[inline(never)]
     pub fn put(&mut self, byte: u8) -> bool {
         let returned = core::mem::replace(&mut self.returned, byte == b'\r');
         if byte == b'\n' && returned {
@@ -144,11 +147,18 @@ impl LinePool {
 
     /// Where the next byte goes. When the lines have reached the end of the buffer they all move to its
     /// beginning, which with short lines happens once in thirty.
+    #[inline(always)]
     fn room_at(&mut self) -> usize {
         let at = usize::from(self.end) + usize::from(self.partial);
         if at < POOL || self.start == 0 {
             return at;
         }
+        self.to_the_beginning(at)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn to_the_beginning(&mut self, at: usize) -> usize {
         self.bytes.copy_within(usize::from(self.start)..at, 0);
         self.end -= self.start;
         at - usize::from(core::mem::take(&mut self.start))

@@ -16,8 +16,8 @@ use crate::status::Status;
 pub async fn run(links: &'static Links) -> ! {
     loop {
         let (id, class) = next_line(links).await;
-        if let Some(request) = begin(links, id, class) {
-            answer(links, id, request).await;
+        if let Some(mut request) = begin(links, id, class) {
+            answer(links, id, &mut request).await;
         }
         finish(links, id);
     }
@@ -55,11 +55,11 @@ fn begin(links: &Links, id: LineId, class: Class) -> Option<Request> {
 }
 
 /// Writes the response to a line.
-async fn answer(links: &Links, id: LineId, mut request: Request) {
+async fn answer(links: &Links, id: LineId, request: &mut Request) {
     let mut tx = links.tx.lock().await;
     loop {
         tx.room().await;
-        match step(links, id, &mut request, &mut tx) {
+        match step(links, id, request, &mut tx) {
             Next::More => {}
             Next::Gcode { start, end } => {
                 if links.commands_taken.get() {

@@ -51,21 +51,17 @@ struct Intake {
 
 impl Intake {
     /// Takes a turn's bytes.
+    #[inline(never)]
     fn turn(&mut self, links: &Links) -> Left {
         let mut pool = links.lines.borrow_mut();
+        let pool = &mut *pool;
         pool.keep_empty(links.mode.get() == Mode::Text);
         for _ in 0..TURN {
-            while self.refused > 0 {
-                if !pool.ready() {
-                    return Left::Full;
-                }
-                self.refuse(&mut pool);
-                links.parser_wake.signal();
+            if self.refused > 0 && !self.refuse(pool, links) {
+                return Left::Full;
             }
-            if pool.ready() {
-                let text = pool.put_text(self.received.waiting());
-                self.received.release_many(text);
-            }
+            let text = pool.put_text(self.received.waiting());
+            self.received.release_many(text);
             if !pool.ready() {
                 return Left::Full;
             }
@@ -73,7 +69,7 @@ impl Intake {
                 return Left::Nothing;
             };
             let is_line = match byte {
-                ..MARKS => self.loss(&mut pool, byte, links),
+                ..MARKS => self.loss(pool, byte, links),
                 _ => pool.put(byte),
             };
             if is_line {
@@ -84,6 +80,8 @@ impl Intake {
     }
 
     /// Bytes were lost here. Returns whether the mark stands for the end of a whole line.
+    #[cold]
+    #[inline(never)]
     fn loss(&mut self, pool: &mut LinePool, mark: u8, links: &Links) -> bool {
         let ends = lost_ends();
         self.refused = ends.wrapping_sub(core::mem::replace(&mut self.seen, ends));
@@ -102,14 +100,20 @@ impl Intake {
         is_line
     }
 
-    /// Enters a line that was lost.
-    fn refuse(&mut self, pool: &mut LinePool) {
-        pool.spoil(Status::BufferFull);
-        pool.end(false);
-        self.refused -= 1;
-        if self.refused == 0 {
-            self.after(pool);
+    /// Enters the lines that were lost. False if there is no room for all of them.
+    #[cold]
+    #[inline(never)]
+    fn refuse(&mut self, pool: &mut LinePool, links: &Links) -> bool {
+        while self.refused > 0 && pool.ready() {
+            pool.spoil(Status::BufferFull);
+            pool.end(false);
+            links.parser_wake.signal();
+            self.refused -= 1;
+            if self.refused == 0 {
+                self.after(pool);
+            }
         }
+        self.refused == 0
     }
 
     /// What follows is a line of its own, or the rest of one that is damaged.

@@ -21,6 +21,14 @@ const UCSR2B: *mut u8 = 0xD1 as *mut u8;
 const TXEN2: u8 = 1 << 3;
 const UDRIE2: u8 = 1 << 5;
 
+/// What raises the interrupt.
+pub(super) const PENDED: u8 = TXEN2 | UDRIE2;
+/// Bit of general-purpose register 0: an interrupt is under way that exec must not delay. Its twin is
+/// [`HELD`]. Neither is ever seen set in thread mode.
+pub(super) const HOLD: u8 = 5;
+/// Exec was asked for meanwhile; that interrupt will pend it at its end.
+pub(super) const HELD: u8 = 6;
+
 /// Exec runs, or may not run.
 static CLOSED: SharedByte = SharedByte::new(1);
 /// Exec was asked for meanwhile.
@@ -40,7 +48,7 @@ static CONTEXT: Context = Context { executor: Cell::new(None), waker: Cell::new(
 #[inline(always)]
 pub fn pend() {
     // SAFETY: the register has two values, written whole: no read-modify-write to tear.
-    unsafe { UCSR2B.write_volatile(TXEN2 | UDRIE2) };
+    unsafe { UCSR2B.write_volatile(PENDED) };
 }
 
 /// Lets exec run from now on.
@@ -116,6 +124,8 @@ extern "C" fn __vector_52() -> ! {
             "sei",
             "in   r24, 0x3F",
             "push r24",
+            "sbic 0x1E, {hold}",
+            "rjmp 8f",
             "lds  r24, {closed}",
             "tst  r24",
             "brne 9f",
@@ -168,12 +178,17 @@ extern "C" fn __vector_52() -> ! {
             "ldi  r24, 0",
             "rjmp 1b",
             // Not now: remember it.
+            "8:",
+            "sbi  0x1E, {held}",
+            "rjmp 2b",
             "9:",
             "ldi  r24, 1",
             "sts  {missed}, r24",
             "rjmp 2b",
             idle = const TXEN2,
-            pended = const TXEN2 | UDRIE2,
+            pended = const PENDED,
+            hold = const HOLD,
+            held = const HELD,
             closed = sym CLOSED,
             missed = sym MISSED,
             poll = sym poll,

@@ -19,20 +19,22 @@ const _: () = assert!(matches!(ACTIVE.tick_timer, Timer::T0), "the tick is on ti
 /// Milliseconds since reset. The interrupt alone writes it.
 static mut MILLIS: u32 = 0;
 
-/// TIMER0_COMPA: counts. Others may interrupt it from its first instruction on: it does not come again
-/// for a millisecond.
+/// TIMER0_COMPA: counts. Interrupts are off for 20 cycles.
+///
+/// They are on again while it carries into the upper bytes, every 256 ms. Exec, which may come then and
+/// stay for some of these, does not ask for the time.
 #[unsafe(no_mangle)]
 extern "C" fn __vector_21() -> ! {
     // SAFETY: every register it changes is restored, and it returns by `reti`. Only it writes `MILLIS`.
     unsafe {
         asm!(
-            "sei",
             "push r24",
             "in   r24, 0x3F",
             "push r24",
             "lds  r24, {millis}",
             "inc  r24",
             "sts  {millis}, r24",
+            "sei",
             "brne 1f",
             "lds  r24, {millis} + 1",
             "inc  r24",
