@@ -204,16 +204,9 @@ impl Block {
         self.values.iter().find(|word| word.0 == slot).map(|word| word.1)
     }
 
-    /// The axes that are named and not taken.
+    /// The axes that the line names.
     pub fn axes(&self) -> impl Iterator<Item = u8> {
-        (0..AXES as u8)
-            .scan(self.present as u8, |left, axis| {
-                let named = *left & 1 != 0;
-                *left >>= 1;
-                Some((axis, named))
-            })
-            .filter(|(_, named)| *named)
-            .map(|(axis, _)| axis)
+        self.values.iter().map(|word| word.0).filter(|slot| usize::from(*slot) < AXES)
     }
 
     /// All axis words, which are then used. Not for a line whose axes went to [`Self::take`].

@@ -79,15 +79,26 @@ impl Interpreter {
 
     #[inline(never)]
     fn execute_or_undo(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
-        let offset = match block.non_modal {
-            Some(_) => Some(self.offset),
-            None => None,
-        };
-        let mut before = Before::of(self, offset);
+        if block.non_modal.is_some() {
+            return self.execute_rarity(block, out);
+        }
+        let mut before = Before::of(self);
         before.save_axes(self, block);
         let done = self.execute(block, out);
         if done.is_err() {
             before.restore(self);
+            clear(out);
+        }
+        done
+    }
+
+    /// The same for a block that may change more than modes and the position of its axes.
+    #[inline(never)]
+    fn execute_rarity(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+        let before = *self;
+        let done = self.execute(block, out);
+        if done.is_err() {
+            *self = before;
             clear(out);
         }
         done
@@ -189,7 +200,8 @@ impl Interpreter {
     }
 }
 
-/// What a block may change of the state, as it was: all of it would take 600 cycles to copy.
+/// What a block of moves and modes may change of the state, as it was: all of it would take 600 cycles
+/// to copy.
 struct Before {
     modal: Modal,
     feed: f32,
@@ -197,15 +209,13 @@ struct Before {
     line: u32,
     /// Position and residue of the axes that the block names.
     axes: Vec<(u8, Length, i16), AXES>,
-    /// The offsets, if it has a code that may change them.
-    offset: Option<PerAxis<Length>>,
 }
 
 impl Before {
     #[inline(always)]
-    fn of(state: &Interpreter, offset: Option<PerAxis<Length>>) -> Self {
+    fn of(state: &Interpreter) -> Self {
         let Interpreter { modal, feed, feed_units, line, .. } = *state;
-        Self { modal, feed, feed_units, line, axes: Vec::new(), offset }
+        Self { modal, feed, feed_units, line, axes: Vec::new() }
     }
 
     #[inline(always)]
@@ -231,7 +241,6 @@ impl Before {
                 (*p, *r) = (*position, *residue);
             }
         }
-        state.offset = self.offset.unwrap_or(state.offset);
     }
 }
 

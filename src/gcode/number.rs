@@ -4,6 +4,8 @@
 //! decimals (the resolution of [`Length`]) and four more (what rounding and the residue of
 //! incremental moves need). Decimals beyond the eighth are ignored: in inches that is 0.25 nm.
 
+use core::slice;
+
 use super::lexer::{Lexed, blanks, failure, is_blank};
 use crate::status::Status;
 use crate::units::Length;
@@ -49,22 +51,33 @@ impl Exact {
 
 impl Decimal {
     /// As millimetres or degrees.
+    #[inline(always)]
     pub fn mm(&self) -> Result<Exact, Status> {
+        // Most lengths are below 65 m and have four decimals at most: nothing to round, and a product
+        // of 16 bits by 16.
+        match u16::try_from(self.whole) {
+            Ok(whole) if self.tail == 0 => {
+                let units = u32::from(whole) * Length::PER_MM as u32 + u32::from(self.frac);
+                let units = if self.negative { -(units as i32) } else { units as i32 };
+                Ok(Exact { units: Length(units), rest: 0 })
+            }
+            _ => self.long_mm(),
+        }
+    }
+
+    #[inline(never)]
+    fn long_mm(&self) -> Result<Exact, Status> {
         if self.whole > (i32::MAX / Length::PER_MM) as u32 {
             return Err(Status::OutOfRange);
         }
-        // Most lengths are below 65 m, where a product of 16 bits by 16 does.
-        let whole = match u16::try_from(self.whole) {
-            Ok(whole) => u32::from(whole) * Length::PER_MM as u32,
-            Err(_) => self.whole * Length::PER_MM as u32,
-        };
-        self.exact(whole + u32::from(self.frac), self.tail)
+        self.exact(self.whole * Length::PER_MM as u32 + u32::from(self.frac), self.tail)
     }
 
     /// As inches, exact to seven decimals.
     ///
     /// 254,000 units per inch, piece by piece in 32 bits: a fourth decimal is 25.4 units, a seventh
     /// 0.0254. Cost on AVR: two 32-bit divisions, 1,800 cycles.
+    #[inline(never)]
     pub fn inch(&self) -> Result<Exact, Status> {
         if self.whole > (i32::MAX / Length::PER_INCH) as u32 {
             return Err(Status::OutOfRange);
@@ -141,50 +154,62 @@ pub fn decimal(input: &[u8]) -> Lexed<'_, Decimal> {
 /// `None` for whatever else may stand there.
 #[inline(always)]
 fn usual(input: &[u8]) -> Option<(&[u8], Decimal)> {
-    let mut rest = input;
-    let negative = rest.first() == Some(&b'-');
+    let mut at = input.iter();
+    let negative = input.first() == Some(&b'-');
     if negative {
-        rest = rest.get(1..)?;
+        at.next();
     }
-    let (whole, count) = digits(&mut rest);
-    if count == 0 {
-        return None;
-    }
+    let whole = usual_whole(&mut at)?;
     let mut frac = 0;
-    if let Some((b'.', after)) = rest.split_first() {
-        rest = after;
-        let (value, count) = digits(&mut rest);
-        frac = aligned(value, count);
+    if at.as_slice().first() == Some(&b'.') {
+        at.next();
+        frac = usual_fraction(&mut at);
     }
-    if let Some((&byte, _)) = rest.split_first() {
-        if is_blank(byte) {
-            (rest, _) = blanks(rest).ok()?;
-        }
-        // More digits, or what is none of a number: the other parser will know.
-        if rest.first().is_some_and(|&byte| byte < b'A' && byte != b'(') {
-            return None;
-        }
+    let mut rest = at.as_slice();
+    if rest.first().is_some_and(|&byte| is_blank(byte)) {
+        (rest, _) = blanks(rest).ok()?;
+    }
+    // More digits, or what is none of a number: the other parser will know.
+    if rest.first().is_some_and(|&byte| byte < b'A' && byte != b'(') {
+        return None;
     }
     let negative = negative && (whole | frac) != 0;
     Some((rest, Decimal { whole: whole.into(), frac, tail: 0, negative }))
 }
 
-/// Up to four digits, and how many there were.
+/// One to four digits: bytes by pairs, for AVR multiplies bytes.
 #[inline(always)]
-fn digits(rest: &mut &[u8]) -> (u16, u8) {
-    let (mut value, mut count) = (0u16, 0);
-    let mut at = *rest;
-    while let Some((&byte, after)) = at.split_first() {
-        let digit = byte.wrapping_sub(b'0');
-        if digit > 9 || count == 4 {
-            break;
-        }
-        at = after;
-        value = value * 10 + u16::from(digit);
-        count += 1;
+fn usual_whole(at: &mut slice::Iter<u8>) -> Option<u16> {
+    let first = digit(at)?;
+    let Some(second) = digit(at) else { return Some(first.into()) };
+    let high = pair(first, second);
+    let Some(third) = digit(at) else { return Some(high.into()) };
+    let Some(fourth) = digit(at) else { return Some(u16::from(high) * 10 + u16::from(third)) };
+    Some(u16::from(high) * 100 + u16::from(pair(third, fourth)))
+}
+
+/// Up to four decimals, as ten-thousandths.
+#[inline(always)]
+fn usual_fraction(at: &mut slice::Iter<u8>) -> u16 {
+    let Some(first) = digit(at) else { return 0 };
+    let second = digit(at);
+    let high = u16::from(pair(first, second.unwrap_or(0))) * 100;
+    let Some(third) = second.and_then(|_| digit(at)) else { return high };
+    high + u16::from(pair(third, digit(at).unwrap_or(0)))
+}
+
+fn pair(ten: u8, one: u8) -> u8 {
+    ten * 10 + one
+}
+
+#[inline(always)]
+fn digit(at: &mut slice::Iter<u8>) -> Option<u8> {
+    let digit = at.as_slice().first()?.wrapping_sub(b'0');
+    if digit > 9 {
+        return None;
     }
-    *rest = at;
-    (value, count)
+    at.next();
+    Some(digit)
 }
 
 /// Any number.

@@ -209,20 +209,12 @@ impl<'a, O: Out> Writer<'a, O> {
         self.text(text!("]}\n"));
     }
 
-    /// A number of up to three digits.
+    /// A number, which most often has one digit.
     fn small(&mut self, value: u8) {
-        let mut rest = value;
-        for place in [100, 10] {
-            let mut digit = b'0';
-            while rest >= place {
-                rest -= place;
-                digit += 1;
-            }
-            if value >= place {
-                self.byte(digit);
-            }
+        match value {
+            ..10 => self.byte(b'0' + value),
+            _ => self.fixed(Fixed::int(value.into())),
         }
-        self.byte(b'0' + rest);
     }
 }
 

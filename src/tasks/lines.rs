@@ -88,6 +88,7 @@ impl LinePool {
     }
 
     /// Whether the next byte can be taken, whatever it is.
+    #[inline(never)]
     pub fn ready(&self) -> bool {
         let used = self.end - self.start + u16::from(self.partial);
         self.entries.len() < SLOTS && used < POOL as u16
@@ -227,6 +228,9 @@ impl LinePool {
     }
 
     fn start_of(&self, index: usize) -> usize {
+        if index == 0 {
+            return self.start.into();
+        }
         let before = self.entries.iter().take(index);
         before.fold(usize::from(self.start), |at, e| at + usize::from(e.len))
     }

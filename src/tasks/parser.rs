@@ -16,10 +16,25 @@ use crate::status::Status;
 pub async fn run(links: &'static Links) -> ! {
     loop {
         let (id, class) = next_line(links).await;
-        if let Some(mut request) = begin(links, id, class) {
+        if let Some(mut request) = begin(links, id, class)
+            && !answer_at_once(links, id, &mut request)
+        {
             answer(links, id, &mut request).await;
         }
         finish(links, id);
+    }
+}
+
+/// Answers a line as far as that goes without waiting: most of them to the end. Returns whether it was
+/// this one.
+#[inline(never)]
+fn answer_at_once(links: &Links, id: LineId, request: &mut Request) -> bool {
+    match links.tx.try_lock() {
+        // What waits for the planner is left to `answer`.
+        Ok(mut tx) if tx.has_room() && request.gcode().is_none() => {
+            matches!(step(links, id, request, &mut tx), Next::Done(_))
+        }
+        _ => false,
     }
 }
 

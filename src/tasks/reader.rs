@@ -60,6 +60,9 @@ impl Intake {
             if self.refused > 0 && !self.refuse(pool, links) {
                 return Left::Full;
             }
+            if self.received.is_empty() {
+                return Left::Nothing;
+            }
             let text = pool.put_text(self.received.waiting());
             self.received.release_many(text);
             if !pool.ready() {

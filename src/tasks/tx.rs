@@ -23,7 +23,12 @@ impl Tx {
 
     /// Waits until a piece fits.
     pub async fn room(&mut self) {
-        wait(Event::Transmitted, || (self.ring.free() >= PIECE).then_some(())).await;
+        wait(Event::Transmitted, || self.has_room().then_some(())).await;
+    }
+
+    /// Whether a piece fits now.
+    pub fn has_room(&self) -> bool {
+        self.ring.free() >= PIECE
     }
 
     /// Sends what has been put.

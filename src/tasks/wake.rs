@@ -16,6 +16,7 @@ pub struct Wake {
 
 impl Wake {
     /// Wakes the task that waits, or the next that will.
+    #[inline(never)]
     pub fn signal(&self) {
         if !self.signalled.replace(true)
             && let Some(waiter) = self.waiter.take()
