@@ -293,6 +293,7 @@ impl Default for Interpreter {
 }
 
 /// The length that the word of an axis gives: rotary axes count degrees in all units.
+#[inline(always)]
 pub(super) fn exact(word: &Decimal, axis: u8, units: Units) -> Result<Exact, Status> {
     match units {
         Units::Inch if usize::from(axis) < FIRST_ROTARY => word.inch(),

@@ -5,7 +5,7 @@
 //! millisecond.
 
 use core::arch::asm;
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use core::task::Waker;
 
 use embassy_time_driver::{Driver, time_driver_impl};
@@ -68,12 +68,17 @@ pub fn millis() -> u32 {
 
 struct Millis {
     queue: RefCell<Queue>,
+    /// When the first timer expires, or earlier; far off if there is none.
+    next: Cell<u32>,
 }
 
 // SAFETY: the queue is touched in thread mode only.
 unsafe impl Sync for Millis {}
 
-time_driver_impl!(static DRIVER: Millis = Millis { queue: RefCell::new(Queue::new()) });
+time_driver_impl!(static DRIVER: Millis = Millis {
+    queue: RefCell::new(Queue::new()),
+    next: Cell::new(u32::MAX),
+});
 
 impl Driver for Millis {
     fn now(&self) -> u64 {
@@ -84,14 +89,21 @@ impl Driver for Millis {
     fn schedule_wake(&self, at: u64, waker: &Waker) {
         if let Ok(mut queue) = self.queue.try_borrow_mut() {
             queue.schedule_wake(at, waker);
+            let at = u32::try_from(at).unwrap_or(u32::MAX);
+            self.next.set(self.next.get().min(at));
         }
     }
 }
 
 /// Wakes the tasks whose time has come. Thread mode, after a tick.
 pub fn wake_expired() {
+    let now = millis();
+    if now < DRIVER.next.get() {
+        return;
+    }
     if let Ok(mut queue) = DRIVER.queue.try_borrow_mut() {
-        queue.next_expiration(DRIVER.now());
+        let next = queue.next_expiration(now.into());
+        DRIVER.next.set(u32::try_from(next).unwrap_or(u32::MAX));
     }
 }
 
