@@ -81,9 +81,23 @@ fn back_pressure_reaches_the_sender() {
 
 #[test]
 fn a_flood_is_answered_by_errors_and_not_by_corruption() {
+    flood("\n");
+}
+
+#[test]
+fn a_flood_of_lines_with_two_ends_is_answered_too() {
+    flood("\r\n");
+}
+
+#[test]
+fn a_flood_of_lines_that_end_in_returns_is_answered_too() {
+    flood("\r");
+}
+
+fn flood(end: &str) {
     let mut sender = Sender::boot();
     // No flow control at all: 600 lines as fast as the line goes. What does not fit is refused.
-    let job: String = (0..600).map(|n| format!("g1 f800 x{}\n", n % 2 * 10)).collect();
+    let job: String = (0..600).map(|n| format!("g1 f800 x{}{end}", n % 2 * 10)).collect();
     sender.ask(&job, 200_000);
     assert!(sender.heard.contains("{\"er\":{\"fb\":440.20,\"st\":13,"), "loss is reported");
     let position = sender.machine.emitted().position[0];

@@ -48,3 +48,31 @@ pub fn lose(mark: u8, byte: u8) -> (u8, bool) {
         _ => (begun, false),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mark and the count of ends after all of `lost` came to a full ring that ended in `newest`.
+    fn after(newest: u8, lost: &[u8]) -> (u8, usize) {
+        lost.iter().fold((mark(newest), 0), |(mark, ends), byte| {
+            let (mark, is_end) = lose(super::mark(mark), *byte);
+            (mark, ends + usize::from(is_end))
+        })
+    }
+
+    #[test]
+    fn a_mark_tells_where_it_stands_and_how_the_loss_ended() {
+        assert_eq!(after(b'x', b"y"), (0, 0));
+        assert_eq!(after(b'x', b"y\n"), (CLEAN, 1));
+        assert_eq!(after(b'\n', b"y\nz"), (BEHIND_END, 1));
+        assert_eq!(after(b'\n', b"a\nb\n"), (BEHIND_END | CLEAN, 2));
+    }
+
+    #[test]
+    fn a_line_feed_behind_a_return_is_no_end_of_its_own() {
+        assert_eq!(after(b'\r', b"\n"), (BEHIND_END | CLEAN, 0));
+        assert_eq!(after(b'x', b"\r\ny\r"), (CLEAN | RETURNED, 2));
+        assert_eq!(after(b'x', b"\r\r"), (CLEAN | RETURNED, 2));
+    }
+}
