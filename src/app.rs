@@ -6,7 +6,6 @@ use core::cell::{Cell, RefCell};
 
 use embassy_executor::Spawner;
 use embassy_sync::mutex::Mutex;
-use embassy_sync::signal::Signal;
 
 use crate::config::Settings;
 use crate::gcode::command::Commands;
@@ -20,18 +19,19 @@ use crate::protocol::{Mode, StatusReport};
 use crate::tasks::lines::LinePool;
 use crate::tasks::links::{Links, QueueCount};
 use crate::tasks::tx::Tx;
+use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, reader, reporter};
 
 impl Links {
     fn new(tx: Outgoing) -> Self {
         Self {
             lines: RefCell::new(LinePool::new()),
-            pool_space: Signal::new(),
-            parser_wake: Signal::new(),
+            pool_space: Wake::default(),
+            parser_wake: Wake::default(),
             commands: RefCell::new(Commands::default()),
             commands_taken: Cell::new(false),
-            planner_wake: Signal::new(),
-            reporter_wake: Signal::new(),
+            planner_wake: Wake::default(),
+            reporter_wake: News::default(),
             queue_count: QueueCount::default(),
             resync: Cell::new(false),
             settings_changed: Cell::new(true),

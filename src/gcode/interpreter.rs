@@ -12,6 +12,8 @@
 //! 6,700; in inches 1,800 more for each axis; an arc 11,000, with R 14,000. Stack: 450 bytes, for an
 //! arc 600.
 
+use heapless::Vec;
+
 use super::block::{Block, slot};
 use super::codes::NonModal;
 use super::command::{Commands, Motion, Stop};
@@ -27,6 +29,8 @@ pub struct Info {
     pub message: Option<(u8, u8)>,
     /// A slash deleted the line: to be answered with [`Status::Noop`].
     pub deleted: bool,
+    /// There was a comment.
+    pub commented: bool,
 }
 
 /// The state of the G-code interpreter.
@@ -65,18 +69,39 @@ impl Interpreter {
     /// `Ok`: `out` is what the machine has to do, and the state has advanced as if it had done so.
     /// `Err`: the state is what it was, and `out` empty.
     pub fn interpret(&mut self, line: &[u8], out: &mut Commands) -> Result<Info, Status> {
-        let before = *self;
         clear(out);
-        let mut block = Block::default();
-        let done = block.read(line).and_then(|()| self.execute(&mut block, out));
-        match done {
-            Ok(()) => Ok(Info { message: block.message, deleted: block.deleted }),
-            Err(status) => {
-                *self = before;
-                clear(out);
-                Err(status)
-            }
+        let mut block = Block::new();
+        block.read(line)?;
+        self.execute_or_undo(&mut block, out)?;
+        let Block { message, deleted, commented, .. } = block;
+        Ok(Info { message, deleted, commented })
+    }
+
+    #[inline(never)]
+    fn execute_or_undo(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+        if block.non_modal.is_some() {
+            return self.execute_rarity(block, out);
         }
+        let mut before = Before::of(self);
+        before.save_axes(self, block);
+        let done = self.execute(block, out);
+        if done.is_err() {
+            before.restore(self);
+            clear(out);
+        }
+        done
+    }
+
+    /// The same for a block that may change more than modes and the position of its axes.
+    #[inline(never)]
+    fn execute_rarity(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+        let before = *self;
+        let done = self.execute(block, out);
+        if done.is_err() {
+            *self = before;
+            clear(out);
+        }
+        done
     }
 
     /// The order of execution.
@@ -175,6 +200,50 @@ impl Interpreter {
     }
 }
 
+/// What a block of moves and modes may change of the state, as it was: all of it would take 600 cycles
+/// to copy.
+struct Before {
+    modal: Modal,
+    feed: f32,
+    feed_units: Units,
+    line: u32,
+    /// Position and residue of the axes that the block names.
+    axes: Vec<(u8, Length, i16), AXES>,
+}
+
+impl Before {
+    #[inline(always)]
+    fn of(state: &Interpreter) -> Self {
+        let Interpreter { modal, feed, feed_units, line, .. } = *state;
+        Self { modal, feed, feed_units, line, axes: Vec::new() }
+    }
+
+    #[inline(always)]
+    fn save_axes(&mut self, state: &Interpreter, block: &Block) {
+        for axis in block.axes() {
+            let i = usize::from(axis);
+            if let (Some(position), Some(residue)) = (state.position.get(i), state.residue.get(i)) {
+                // There is room for all axes.
+                let _ = self.axes.push((axis, *position, *residue));
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn restore(&self, state: &mut Interpreter) {
+        state.modal = self.modal;
+        state.feed = self.feed;
+        state.feed_units = self.feed_units;
+        state.line = self.line;
+        for (axis, position, residue) in &self.axes {
+            let i = usize::from(*axis);
+            if let (Some(p), Some(r)) = (state.position.get_mut(i), state.residue.get_mut(i)) {
+                (*p, *r) = (*position, *residue);
+            }
+        }
+    }
+}
+
 /// What reports read, and what the machine corrects.
 impl Interpreter {
     /// The modes in force.
@@ -224,6 +293,7 @@ impl Default for Interpreter {
 }
 
 /// The length that the word of an axis gives: rotary axes count degrees in all units.
+#[inline(always)]
 pub(super) fn exact(word: &Decimal, axis: u8, units: Units) -> Result<Exact, Status> {
     match units {
         Units::Inch if usize::from(axis) < FIRST_ROTARY => word.inch(),

@@ -21,10 +21,10 @@ use core::cell::{Cell, RefCell, UnsafeCell};
 
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::Mutex;
-use embassy_sync::signal::Signal;
 
 use super::lines::LinePool;
 use super::tx::Tx;
+use super::wake::{News, Wake};
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
@@ -32,9 +32,6 @@ use crate::motion::exec::Snapshot;
 use crate::motion::queue;
 use crate::protocol::{Mode, StatusReport};
 use crate::status::Status;
-
-/// A signal between thread-mode tasks.
-pub type Wake = Signal<NoopRawMutex, ()>;
 
 /// The links. One for the machine, made at start-up.
 pub struct Links {
@@ -51,7 +48,7 @@ pub struct Links {
     /// `commands` was filled.
     pub planner_wake: Wake,
     /// Something that reports show may have changed.
-    pub reporter_wake: Wake,
+    pub reporter_wake: News,
     /// Blocks that came and went, for queue reports.
     pub queue_count: QueueCount,
     /// A setting has changed what steps mean: the planner counts them anew.

@@ -11,3 +11,4 @@ pub mod reader;
 pub mod reporter;
 pub mod tx;
 pub mod view;
+pub mod wake;

@@ -44,7 +44,7 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         let commands = *links.commands.borrow();
         planner.carry_out(&commands).await;
         links.commands_taken.set(false);
-        links.parser_wake.signal(());
+        links.parser_wake.signal();
     }
 }
 
@@ -176,7 +176,7 @@ impl Planner {
     async fn pushed(&self) {
         exec::pend();
         self.links.queue_count.add();
-        self.links.reporter_wake.signal(());
+        self.links.reporter_wake.signal();
         yield_now().await;
     }
 }

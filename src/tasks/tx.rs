@@ -23,7 +23,12 @@ impl Tx {
 
     /// Waits until a piece fits.
     pub async fn room(&mut self) {
-        wait(Event::Transmitted, || (self.ring.free() >= PIECE).then_some(())).await;
+        wait(Event::Transmitted, || self.has_room().then_some(())).await;
+    }
+
+    /// Whether a piece fits now.
+    pub fn has_room(&self) -> bool {
+        self.ring.free() >= PIECE
     }
 
     /// Sends what has been put.
@@ -36,5 +41,9 @@ impl crate::protocol::Out for Tx {
     fn put(&mut self, byte: u8) {
         // Room was made by `room`; a byte beyond it is a defect that tests of `protocol` exclude.
         let _ = self.ring.push(byte);
+    }
+
+    fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
+        self.ring.push_all(bytes);
     }
 }

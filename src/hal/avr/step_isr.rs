@@ -303,7 +303,7 @@ extern "C" fn __vector_17() -> ! {
             width = sym stepper::WIDTH,
             lockstep_width = sym stepper::LOCKSTEP_WIDTH,
             halt = const stepper::HALT,
-            pend = const super::exec::PEND,
+            pend = const super::exec::PENDED,
             step0 = const pin_register(ACTIVE.motors[0].step),
             step1 = const pin_register(ACTIVE.motors[1].step),
             step2 = const pin_register(ACTIVE.motors[2].step),

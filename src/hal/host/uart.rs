@@ -7,13 +7,9 @@ use std::vec::Vec;
 use super::{NEVER, flags, now};
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
-use crate::hal::ring::{Consumer, Producer, Ring};
-use crate::hal::serial::{LOSS, LOSS_AT_END, Outgoing, RING, Received};
+use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
+use crate::hal::serial::{BATCH, MARKS, Outgoing, RING, Received, lose, mark};
 use crate::realtime;
-
-fn loss_mark(byte: u8) -> u8 {
-    if byte == b'\n' || byte == b'\r' { LOSS_AT_END } else { LOSS }
-}
 
 #[derive(Default)]
 struct Line {
@@ -25,7 +21,9 @@ struct Line {
     sent: Vec<u8>,
     /// The byte that is leaving.
     leaving: Option<u8>,
-    lost: bool,
+    lost_ends: u16,
+    /// Bytes queued, modulo 256.
+    queued: u8,
     realtime: u8,
 }
 
@@ -65,9 +63,9 @@ pub fn kick() {
     }
 }
 
-/// Whether bytes have been lost since the last one queued: a mark is still to come.
-pub fn losing() -> bool {
-    uart().line.borrow().lost
+/// Line ends lost since start-up, modulo 2^16.
+pub fn lost_ends() -> u16 {
+    uart().line.borrow().lost_ends
 }
 
 /// The real-time characters since the last call, as bits (see [`realtime`]).
@@ -126,7 +124,28 @@ fn arrive(line: &mut Line, byte: u8) {
         flags::set(Event::Realtime);
         return;
     }
-    let byte = if line.lost { loss_mark(byte) } else { byte };
-    line.lost = line.rx_in.as_mut().is_some_and(|ring| ring.push(byte).is_err());
-    flags::set(Event::Received);
+    let Some(ring) = line.rx_in.as_mut() else { return };
+    let full = ring.free() == 0;
+    if byte < MARKS && !full {
+        line.lost_ends = line.lost_ends.wrapping_add(queue_mark(ring, 0, byte));
+    } else if full {
+        let newest = mark(ring.pushed(0).copied().unwrap_or(0));
+        line.lost_ends = line.lost_ends.wrapping_add(queue_mark(ring, newest, byte));
+    } else {
+        let _ = ring.push(byte);
+    }
+    line.queued = line.queued.wrapping_add(1);
+    if full || byte < b' ' || line.queued % BATCH == 0 {
+        flags::set(Event::Received);
+    }
+}
+
+/// Puts a mark where there is room, else over the newest byte. Returns the line ends that it counts.
+fn queue_mark(ring: &mut Producer<u8, RING>, begun: u8, byte: u8) -> u16 {
+    let (mark, is_end) = lose(begun, byte);
+    if ring.push(mark).is_err() {
+        // The reader is not running: everything here is one thread.
+        ring.amend(&Ceiling(()), 0, |newest| *newest = mark);
+    }
+    is_end.into()
 }

@@ -152,6 +152,12 @@ impl Machine {
         sorted
     }
 
+    /// Cycles spent at each instruction since [`Machine::start_profile`], by byte address.
+    pub fn profile_by_address(&self) -> impl Iterator<Item = (u32, u64)> {
+        let spent = self.profile.iter().flatten().enumerate();
+        spent.filter(|(_, c)| **c > 0).map(|(word, &cycles)| (word as u32 * 2, cycles))
+    }
+
     /// Runs to a cycle. The last instruction may end a few cycles after it.
     pub fn run_until(&mut self, cycle: u64) -> Result<(), Fault> {
         while self.cpu.cycle() < cycle {
