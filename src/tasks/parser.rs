@@ -71,6 +71,9 @@ async fn answer(links: &Links, id: LineId, class: Class) {
         }
     }
     tx.flush();
+    if let Some(rate) = links.rate.take() {
+        tx.set_rate(rate).await;
+    }
 }
 
 #[inline(never)]

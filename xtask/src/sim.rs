@@ -23,7 +23,7 @@ pub struct RunArgs {
     /// A setting sent before the job, as the sender would: '{"xvm":800}'
     #[arg(long, value_name = "JSON")]
     set: Vec<String>,
-    /// The speed of the serial line
+    /// The speed of the serial line, which the firmware is told to change to
     #[arg(long)]
     baud: Option<u32>,
     /// Write what happened to this file

@@ -47,9 +47,9 @@ pub struct RunArgs {
     /// A line to send before the job, such as '{xvm:20000}'; may be given more than once.
     #[arg(long = "set", value_name = "LINE")]
     pub settings: Vec<String>,
-    /// Speed of the serial line.
-    #[arg(long, default_value_t = 115_200, value_parser = baud())]
-    pub baud: u32,
+    /// Speed of the serial line during the job; the firmware is told to change to it.
+    #[arg(long, value_name = "N", value_parser = baud())]
+    pub baud: Option<u32>,
     /// Lines in flight.
     #[arg(long, value_name = "N", default_value_t = kerf_sim::LINES_IN_FLIGHT)]
     pub in_flight: usize,

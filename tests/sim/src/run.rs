@@ -24,8 +24,8 @@ pub fn board(name: &str) -> Result<&'static Board> {
 pub fn run(args: &RunArgs) -> Result<bool> {
     let lines = job::read_lines(&args.job)?;
     let mut machine = Machine::load(&args.target.elf, board(&args.target.board)?)?;
-    machine.set_baud(args.baud);
     let options = Options {
+        baud: args.baud,
         settings: args.settings.clone(),
         in_flight: args.in_flight,
         vcd: args.vcd.clone(),
