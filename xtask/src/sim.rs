@@ -48,6 +48,14 @@ pub struct ServeArgs {
     link: Option<PathBuf>,
 }
 
+/// `cargo xtask bench`
+#[derive(Args)]
+pub struct BenchArgs {
+    /// Measure this row only; may be given more than once
+    #[arg(long, value_name = "NAME")]
+    row: Vec<String>,
+}
+
 /// Builds and runs a job; the simulator's exit code is ours.
 pub fn run(args: &RunArgs) -> Result<ExitCode> {
     ensure!(args.job.is_file(), "there is no job {}", args.job.display());
@@ -59,6 +67,12 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
 pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
     let elf = prepare(args.board)?;
     pass_through(&mut serve_command(args, &elf))
+}
+
+/// Builds and measures, on the board that others were measured on.
+pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
+    let elf = prepare(Board::default())?;
+    pass_through(&mut bench_command(args, &elf))
 }
 
 fn prepare(board: Board) -> Result<PathBuf> {
@@ -86,6 +100,14 @@ fn serve_command(args: &ServeArgs, elf: &Path) -> Command {
     let mut command = simulator("serve", elf, args.board);
     option(&mut command, "--speed", args.speed.as_ref());
     option(&mut command, "--link", args.link.as_ref());
+    command
+}
+
+fn bench_command(args: &BenchArgs, elf: &Path) -> Command {
+    let mut command = simulator("bench", elf, Board::default());
+    for row in &args.row {
+        command.args(["--row", row]);
+    }
     command
 }
 
@@ -127,6 +149,14 @@ mod tests {
             "run --elf k.elf --board ramps14 a.gcode --set {\"xvm\":800} --set {\"yvm\":800} \
              --baud 250000 --report r.json --vcd v.vcd"
         );
+    }
+
+    #[test]
+    fn rows_reach_the_simulator() {
+        let args = BenchArgs { row: vec!["rate-1".into(), "lines".into()] };
+        let command = bench_command(&args, Path::new("k.elf"));
+        let want = "bench --elf k.elf --board mega2560-grbl --row rate-1 --row lines";
+        assert_eq!(after_dashes(&command), want);
     }
 
     #[test]

@@ -22,6 +22,8 @@ pub enum Command {
     Run(RunArgs),
     /// Put the machine behind a pseudo-terminal, for a sender to connect to.
     Serve(ServeArgs),
+    /// Measure what the firmware achieves and print it beside other firmwares' figures.
+    Bench(BenchArgs),
 }
 
 /// The firmware and the board under it.
@@ -79,6 +81,17 @@ pub struct ServeArgs {
     /// Speed of the serial line.
     #[arg(long, default_value_t = 115_200, value_parser = baud())]
     pub baud: u32,
+}
+
+/// Arguments of `bench`.
+#[derive(Args, Debug)]
+pub struct BenchArgs {
+    /// Firmware and board.
+    #[command(flatten)]
+    pub target: Target,
+    /// Measure this row only; may be given more than once.
+    #[arg(long = "row", value_name = "NAME")]
+    pub rows: Vec<String>,
 }
 
 /// The pace of `serve`.

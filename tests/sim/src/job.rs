@@ -189,6 +189,7 @@ impl Run<'_> {
                 restarts,
                 strays: self.host.strays().to_vec(),
                 seconds_to_idle: self.machine.seconds(idle_at.saturating_sub(self.began)),
+                seconds_to_answer: self.machine.seconds(self.progress_at - self.began),
                 setup: self.setup,
                 expected: self.expected,
                 fault: end.err().map(|e| format!("{e:#}")),
