@@ -32,6 +32,15 @@ pub struct RunArgs {
     /// Write the pins' waveforms to this file
     #[arg(long, value_name = "FILE.vcd")]
     vcd: Option<PathBuf>,
+    /// Draw path, velocity, acceleration and jerk, as the steps made them, into this file
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// The seconds that the curves of the plot show
+    #[arg(long, value_name = "FROM..TO", requires = "plot")]
+    span: Option<String>,
+    /// The milliseconds over which the plot is smoothed
+    #[arg(long, value_name = "MS", requires = "plot")]
+    smooth: Option<u32>,
 }
 
 /// `cargo xtask serve`
@@ -93,6 +102,9 @@ fn run_command(args: &RunArgs, elf: &Path) -> Command {
     option(&mut command, "--baud", args.baud.map(|baud| baud.to_string()));
     option(&mut command, "--report", args.report.as_ref());
     option(&mut command, "--vcd", args.vcd.as_ref());
+    option(&mut command, "--plot", args.plot.as_ref());
+    option(&mut command, "--span", args.span.as_ref());
+    option(&mut command, "--smooth", args.smooth.map(|ms| ms.to_string()));
     command
 }
 
@@ -143,11 +155,14 @@ mod tests {
             baud: Some(250_000),
             report: Some("r.json".into()),
             vcd: Some("v.vcd".into()),
+            plot: Some("p.svg".into()),
+            span: Some("1..2".into()),
+            smooth: Some(30),
         };
         assert_eq!(
             after_dashes(&run_command(&args, Path::new("k.elf"))),
             "run --elf k.elf --board ramps14 a.gcode --set {\"xvm\":800} --set {\"yvm\":800} \
-             --baud 250000 --report r.json --vcd v.vcd"
+             --baud 250000 --report r.json --vcd v.vcd --plot p.svg --span 1..2 --smooth 30"
         );
     }
 

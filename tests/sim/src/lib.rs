@@ -18,6 +18,7 @@ pub mod job;
 mod machine;
 mod meters;
 pub mod oracle;
+pub mod plot;
 pub mod protocol;
 mod recorder;
 pub mod report;

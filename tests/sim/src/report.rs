@@ -152,6 +152,9 @@ pub struct Report {
     pub resets: u64,
     /// The interrupts that were served.
     pub vectors: Vec<VectorReport>,
+    /// Motors and axes, as the firmware has them.
+    #[serde(skip)]
+    pub setup: Setup,
 }
 
 impl Report {
@@ -188,6 +191,7 @@ impl Report {
             missed_tops: machine.missed_tops(),
             resets: machine.resets(),
             vectors: vector_reports(machine),
+            setup: measured.setup.clone(),
         };
         report.problems = report.find_problems(&measured);
         report.ok = report.problems.is_empty();

@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use kerf::boards::{self, Board};
 use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
+use kerf_sim::plot::{self, Look};
 use kerf_sim::report::Report;
 
 use crate::cli::RunArgs;
@@ -30,11 +31,18 @@ pub fn run(args: &RunArgs) -> Result<bool> {
         in_flight: args.in_flight,
         vcd: args.vcd.clone(),
     };
+    if args.plot.is_some() {
+        machine.recorder_mut().keep_log();
+    }
     let bar = progress_bar(lines.len(), args.quiet)?;
     let report = job::run(&mut machine, &lines, &options, |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     if let Some(path) = &args.report {
         write_report(path, &report)?;
+    }
+    if let Some(path) = &args.plot {
+        let look = Look { span: args.span.clone(), window_ms: args.smooth };
+        plot::write(path, &machine, &report.setup, &look)?;
     }
     let text = report.to_string();
     match args.quiet {
