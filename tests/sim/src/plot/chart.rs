@@ -145,6 +145,7 @@ fn curve(area: &Area<'_>, values: &[f64], name: &str, span: &Range<f64>) -> Draw
     let around = (range.end - range.start) * 0.06;
     let mut chart = ChartBuilder::on(area)
         .margin(MARGIN)
+        .margin_right(2 * MARGIN)
         .x_label_area_size(LABELS_BELOW)
         .y_label_area_size(LABELS_LEFT)
         .build_cartesian_2d(span.clone(), range.start - around..range.end + around)?;
