@@ -9,6 +9,7 @@
 //! | block ring | blocks | 40 | 1,900 B | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 4 | 68 B | exec | step interrupt | exec waits for its next run |
 //! | `uart` transmit ring | bytes | 255 | 260 B | parser, reporter | TX interrupt | the writer waits, response half sent |
+//! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
 //! lines wait in the pool, and their responses wait with them. The sender has at most its lines in
@@ -53,6 +54,8 @@ pub struct Links {
     pub queue_count: QueueCount,
     /// A setting has changed what steps mean: the planner counts them anew.
     pub resync: Cell<bool>,
+    /// A new rate of the line, in bits a second: the parser sets it when its response has left.
+    pub rate: Cell<Option<u32>>,
     /// An exception to report.
     pub exception: Cell<Option<Status>>,
     /// How the sender wants to be answered.

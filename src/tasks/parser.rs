@@ -93,6 +93,9 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
             Next::Done(_) => break,
         }
     }
+    if let Some(rate) = links.rate.take() {
+        tx.set_rate(rate).await;
+    }
 }
 
 /// The line's slot is free again.

@@ -6,6 +6,7 @@
 use core::cell::{OnceCell, RefMut};
 
 use super::links::{Links, snapshot};
+use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Owner, Setting, Settings};
 use crate::hal::imp::{gpio, stepper};
@@ -107,6 +108,9 @@ impl Machine for View<'_> {
                 return Status::NotAccepted;
             }
             self.links.resync.set(true);
+        }
+        if setting.is_baud() {
+            self.links.rate.set(baud::rate(value));
         }
         self.settings.store(setting, value);
         self.links.settings_changed.set(true);

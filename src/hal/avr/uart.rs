@@ -12,7 +12,7 @@
 use core::arch::asm;
 
 use super::exec;
-use crate::boards::ACTIVE;
+use crate::baud;
 use crate::hal::byte::SharedByte;
 use crate::hal::event::Event;
 use crate::hal::ring::Ring;
@@ -33,24 +33,24 @@ const UDRIE: u8 = 1 << 5;
 const RXEN: u8 = 1 << 4;
 const TXEN: u8 = 1 << 3;
 
-/// Starts the line at `baud`, 8N1. Before interrupts are on; `None` after the first time.
-pub fn start(baud: u32) -> Option<(Received, Outgoing)> {
+/// Starts the line at `rate` bits a second, 8N1. Before interrupts are on; `None` after the first time.
+pub fn start(rate: u32) -> Option<(Received, Outgoing)> {
     let (rx_in, rx_out) = RX.split()?;
     let (tx_in, tx_out) = TX.split()?;
     // From now on those two ends are the interrupts', which push and pop in assembly.
     let (_, _) = (rx_in, tx_out);
     let uart = super::peripherals().USART0;
-    uart.ubrr0().write(|w| w.set(divisor(baud)));
+    uart.ubrr0().write(|w| w.set(baud::divisor(rate)));
     uart.ucsr0a().write(|w| w.u2x0().set_bit());
     // SAFETY: start-up.
     unsafe { UCSR0B.write_volatile(RXCIE | RXEN | TXEN) };
     Some((rx_out, tx_in))
 }
 
-/// The divisor nearest to a baud rate, at double speed (data sheet, table 22-1).
-const fn divisor(baud: u32) -> u16 {
-    let eighth = ACTIVE.clock_hz / 8;
-    ((eighth + baud / 2) / baud - 1) as u16
+/// Goes on at `rate` bits a second. A byte on the line meanwhile, in either direction, is spoilt. Thread
+/// mode.
+pub fn set_rate(rate: u32) {
+    super::peripherals().USART0.ubrr0().write(|w| w.set(baud::divisor(rate)));
 }
 
 /// Sends what the ring holds.

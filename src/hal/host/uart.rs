@@ -29,7 +29,9 @@ struct Line {
 
 struct Uart {
     line: RefCell<Line>,
+    /// A byte's time at this end of the line and at the sender's.
     byte_cycles: Cell<u64>,
+    sender_cycles: Cell<u64>,
     next_rx: Cell<u64>,
     next_tx: Cell<u64>,
 }
@@ -40,20 +42,42 @@ machine_static! {
     fn uart() -> Uart = Uart {
         line: RefCell::new(Line::default()),
         byte_cycles: Cell::new(1),
+        sender_cycles: Cell::new(1),
         next_rx: Cell::new(NEVER),
         next_tx: Cell::new(NEVER),
     };
 }
 
-/// Starts the line at `baud`; `None` after the first time.
-pub fn start(baud: u32) -> Option<(Received, Outgoing)> {
+/// Starts the line at `rate` bits a second, the sender's end too; `None` after the first time.
+pub fn start(rate: u32) -> Option<(Received, Outgoing)> {
     let (rx_in, rx_out) = rx().split()?;
     let (tx_in, tx_out) = tx().split()?;
     let mut line = uart().line.borrow_mut();
     line.rx_in = Some(rx_in);
     line.tx_out = Some(tx_out);
-    uart().byte_cycles.set(u64::from(ACTIVE.clock_hz * 10 / baud));
+    set_rate(rate);
+    set_sender_rate(rate);
     Some((rx_out, tx_in))
+}
+
+/// Goes on at `rate` bits a second.
+pub fn set_rate(rate: u32) {
+    uart().byte_cycles.set(byte_cycles(rate));
+}
+
+/// The sender goes on at `rate` bits a second.
+pub(super) fn set_sender_rate(rate: u32) {
+    uart().sender_cycles.set(byte_cycles(rate));
+}
+
+fn byte_cycles(rate: u32) -> u64 {
+    u64::from(ACTIVE.clock_hz) * 10 / u64::from(rate)
+}
+
+/// Whether the two ends differ too much to understand each other: by more than 4.5 %.
+fn garbles() -> bool {
+    let (own, sender) = (uart().byte_cycles.get(), uart().sender_cycles.get());
+    own.abs_diff(sender) * 1_000 > sender * 45
 }
 
 /// Sends what the ring holds.
@@ -77,7 +101,7 @@ pub fn take_realtime() -> u8 {
 pub(super) fn send(bytes: &[u8]) {
     uart().line.borrow_mut().arriving.extend(bytes);
     if uart().next_rx.get() == NEVER {
-        uart().next_rx.set(now() + uart().byte_cycles.get());
+        uart().next_rx.set(now() + uart().sender_cycles.get());
     }
 }
 
@@ -100,11 +124,11 @@ pub(super) fn advance() {
             arrive(&mut line, byte);
         }
         let more = !line.arriving.is_empty();
-        u.next_rx.set(if more { now() + u.byte_cycles.get() } else { NEVER });
+        u.next_rx.set(if more { now() + u.sender_cycles.get() } else { NEVER });
     }
     if u.next_tx.get() <= now() {
         if let Some(byte) = line.leaving.take() {
-            line.sent.push(byte);
+            line.sent.push(if garbles() { !byte } else { byte });
         }
         flags::set(Event::Transmitted);
         load_tx(&mut line);
@@ -126,7 +150,7 @@ fn arrive(line: &mut Line, byte: u8) {
     }
     let Some(ring) = line.rx_in.as_mut() else { return };
     let full = ring.free() == 0;
-    if byte < MARKS && !full {
+    if (byte < MARKS || garbles()) && !full {
         line.lost_ends = line.lost_ends.wrapping_add(queue_mark(ring, 0, byte));
     } else if full {
         let newest = mark(ring.pushed(0).copied().unwrap_or(0));

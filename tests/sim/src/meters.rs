@@ -134,6 +134,14 @@ impl Meters {
         self.frames.len()
     }
 
+    /// The time so far of an interrupt, without those nested in it, if it is what runs: not interrupted,
+    /// and not nested in itself.
+    pub fn serving(&self, vector: u8, now: u64) -> Option<u64> {
+        let (top, below) = self.frames.split_last()?;
+        let outermost = top.vector == vector && below.iter().all(|f| f.vector != vector);
+        outermost.then(|| (now - top.began).saturating_sub(top.nested))
+    }
+
     /// The instruction at `pc`, begun at `began`, was executed.
     #[inline]
     pub fn executed(&mut self, cpu: Cpu, pc: u32, began: u64) {

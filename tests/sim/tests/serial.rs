@@ -150,3 +150,21 @@ fn answers_stop_while_the_planner_is_full_and_come_again() {
     assert_eq!(machine.recorder().motors()[0].position, steps as i64);
     assert!(host.strays().is_empty(), "{:?}", host.strays());
 }
+
+#[test]
+fn a_change_of_speed_spoils_no_byte_of_its_response() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    for baud in [9_600, 1_000_000, 230_400, 500_000, 250_000, 115_200] {
+        host.change_speed(&mut machine, baud).unwrap();
+        assert_eq!(host.in_flight(), 0);
+        let began = machine.cycle();
+        let answer = host.ask(&mut machine, "{baud:n}", 100).unwrap();
+        assert_eq!(answer.body["baud"], baud, "{}", answer.raw);
+        let least = (answer.raw.len() + 10) as f64 * 10.0 / f64::from(baud);
+        let seconds = machine.seconds(machine.cycle() - began);
+        // The firmware takes some ms to find the name.
+        assert!(seconds < 1.1 * least + 0.006, "{seconds} s at {baud} baud, not {least} s");
+    }
+    assert_eq!((machine.wire().garbled(), machine.uart(0).misframed()), (0, 0));
+    assert!(host.strays().is_empty(), "{:?}", host.strays());
+}
