@@ -62,13 +62,22 @@ pub struct Segment {
     pub period: u16,
     /// Bit m set: motor m runs backwards.
     pub backwards: u8,
-    /// The motors that step on every tick, if no other motor moves; else 0. Set by [`Segment::seal`].
-    pub lockstep: u8,
     /// Cycles from a tick to its pulses; 0 for pulses as soon as may be.
     pub settle: u8,
-    /// Whether a motor beyond the first two moves. Set by [`Segment::seal`].
-    pub wide: bool,
+    /// What the interrupt may leave out: [`NARROW`], [`WIDE`], or [`LOCKSTEP`] and the motors that step on
+    /// every tick. Set by [`Segment::seal`].
+    pub mode: u8,
+    /// Makes it 16 bytes long.
+    pub reserved: u8,
 }
+
+/// None but the first two motors move.
+pub const NARROW: u8 = 0;
+/// Others do.
+pub const WIDE: u8 = 1;
+/// All motors that move step on every tick.
+pub const LOCKSTEP: u8 = 0x80;
+
 
 impl Segment {
     /// Completes what follows from the increments. Cost: 60.
@@ -85,8 +94,13 @@ impl Segment {
             }
             m += 1;
         }
-        self.lockstep = if mixed { 0 } else { lockstep };
-        self.wide = self.increment[2] | self.increment[3] != 0;
+        self.mode = if lockstep != 0 && !mixed {
+            LOCKSTEP | lockstep
+        } else if self.increment[2] | self.increment[3] != 0 {
+            WIDE
+        } else {
+            NARROW
+        };
         self
     }
 }
@@ -120,11 +134,9 @@ pub struct Dda {
     pub(crate) due: u8,
     pub(crate) backwards: u8,
     /// As in the segment.
-    pub(crate) lockstep: u8,
-    /// As in the segment.
     pub(crate) settle: u8,
     /// As in the segment.
-    pub(crate) wide: bool,
+    pub(crate) mode: u8,
 }
 
 impl Dda {
@@ -136,9 +148,8 @@ impl Dda {
             ticks: 0,
             due: 0,
             backwards: 0,
-            lockstep: 0,
             settle: 0,
-            wide: false,
+            mode: NARROW,
         }
     }
 
@@ -192,9 +203,8 @@ impl Dda {
         }
         self.increment = segment.increment;
         self.ticks = segment.ticks;
-        self.lockstep = segment.lockstep;
         self.settle = segment.settle;
-        self.wide = segment.wide;
+        self.mode = segment.mode;
         pins.slot_free();
         true
     }

@@ -17,7 +17,7 @@
 use super::block::{Block, Body, Line};
 use super::dda::Segment;
 use super::governor::{Ahead, Governor};
-use super::prep::{CYCLES_MAX, Prep, shortest};
+use super::prep::{CYCLES_MAX, FINE_S, Prep, shortest};
 use super::queue::{Anchor, BlockSource};
 use crate::boards::MOTORS;
 
@@ -247,7 +247,7 @@ impl Exec {
     #[inline(never)]
     fn begin(&mut self, line: &Line, blocks: &mut BlockSource, out: &mut Snapshot) {
         blocks.enter();
-        let most = self.prep.begin(&line.steps);
+        let most = self.prep.begin(&line.steps, line.cruise * FINE_S < line.length);
         let mut m = 0;
         while m < MOTORS {
             out.target[m] = out.target[m].wrapping_add(line.steps[m].into());

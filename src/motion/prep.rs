@@ -43,27 +43,30 @@ struct Pace {
     /// Shortest tick period, CPU cycles: the step interrupt with so many motors, a short interrupt
     /// before it, and some time for everything else.
     shortest: u16,
-    /// 2^22 / the tick period for steady motion.
+    /// 2^22 / the tick period of steady motion: as fine as leaves exec and the planner a third of the CPU.
     fine: u16,
+    /// 2^22 / that of short blocks, for which they need more.
+    coarse: u16,
+    /// From this tick period on pulses wait for the interrupt's worst latency ([`Segment::settle`]).
+    settles: u16,
 }
 
 /// By the number of motors that move, less one.
 const PACES: [Pace; MOTORS] = [
-    Pace { shortest: 160, fine: per(200) },
-    Pace { shortest: 200, fine: per(200) },
-    Pace { shortest: 240, fine: per(256) },
-    Pace { shortest: 320, fine: per(320) },
+    Pace { shortest: 160, fine: per(200), coarse: per(400), settles: 200 },
+    Pace { shortest: 200, fine: per(200), coarse: per(400), settles: 200 },
+    Pace { shortest: 240, fine: per(320), coarse: per(480), settles: 300 },
+    Pace { shortest: 320, fine: per(400), coarse: per(560), settles: 320 },
 ];
 
-/// Ticks of blocks so short that they are a segment: preparing them takes the time that
-/// finer ticks would.
-const COARSE: u16 = per(640);
+/// Ticks of blocks so short that they are a single segment.
+const COARSEST: u16 = per(640);
 
-/// From this tick period on pulses wait for the interrupt's worst latency ([`Segment::settle`]).
-const SETTLE_PERIOD: u16 = 200;
+/// Blocks that take longer than this have fine ticks, s.
+pub const FINE_S: f32 = 0.05;
 
 /// Latest cycle of a tick at which the interrupt may find itself ready for its pulses.
-const SETTLE: u8 = 92;
+const SETTLE: u8 = 68;
 
 /// A lockstep segment has at least half as many ticks, if it is shorter than as many steps.
 const LOCKSTEP_TICKS: u32 = 16;
@@ -110,6 +113,8 @@ pub struct Prep {
     /// Motors that move, less one.
     others: u8,
     backwards: u8,
+    /// Ticks are to be as fine as can be.
+    fine: bool,
 }
 
 impl Prep {
@@ -127,11 +132,13 @@ impl Prep {
             minor: 0,
             others: 0,
             backwards: 0,
+            fine: false,
         }
     }
 
-    /// Starts a block. Returns the steps of its dominant motor.
-    pub fn begin(&mut self, steps: &[i16; MOTORS]) -> u16 {
+    /// Starts a block, with fine ticks or not. Returns the steps of its dominant motor.
+    pub fn begin(&mut self, steps: &[i16; MOTORS], fine: bool) -> u16 {
+        self.fine = fine;
         let mut most = 0;
         for (minor, &steps) in self.minors.iter_mut().zip(steps) {
             minor.steps = steps.unsigned_abs();
@@ -190,7 +197,7 @@ impl Prep {
     pub fn segment(&mut self, left: u32, cycles: u32) -> Option<Segment> {
         let travel = self.left.saturating_sub(left);
         let cycles = self.time.saturating_add(cycles as i32).max(1) as u32;
-        let limit = self.limit(cycles, PACES[usize::from(self.others)].fine);
+        let limit = self.limit(cycles, self.pace());
         let (_, shift) = coarsen(travel, limit);
         // What is left must be whole ticks, now and at the end: of up to an eighth of this stretch.
         let shift = shift.min(self.left.trailing_zeros() as u8);
@@ -216,7 +223,7 @@ impl Prep {
             self.time = cycles as i32;
             return None;
         }
-        let pace = if whole { COARSE } else { PACES[usize::from(self.others)].fine };
+        let pace = if whole { COARSEST } else { self.pace() };
         let (_, shift) = coarsen(self.left, self.limit(cycles, pace));
         // Ticks that do not go into what is left would leave a rest.
         let shift = shift.min(self.left.trailing_zeros() as u8);
@@ -232,6 +239,11 @@ impl Prep {
         }
         let period = self.period(cycles, self.left, shift).min(PERIOD_MAX);
         Some(self.emit(ticks as u16, shift, period as u16, cycles))
+    }
+
+    fn pace(&self) -> u16 {
+        let pace = &PACES[usize::from(self.others)];
+        if self.fine { pace.fine } else { pace.coarse }
     }
 
     /// Most ticks for a stretch.
@@ -292,7 +304,7 @@ impl Prep {
         let travel = u32::from(ticks) << shift;
         self.left -= travel;
         let mut segment = self.pause(ticks, period);
-        if period >= SETTLE_PERIOD {
+        if period >= PACES[usize::from(self.others)].settles {
             segment.settle = SETTLE;
         }
         let mut bit = 1;

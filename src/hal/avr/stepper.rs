@@ -32,9 +32,9 @@ pub(super) static SEGMENT_RING: Ring<Segment, SEGMENTS> = Ring::new();
 pub(super) static RUNNING: SharedByte = SharedByte::new(0);
 
 /// Turns of a loop of 3 cycles that widen a pulse, at least 1: in lockstep, and else.
-pub(super) static LOCKSTEP_WIDTH: SharedByte = SharedByte::new(width_turns(2, 26));
+pub(super) static LOCKSTEP_WIDTH: SharedByte = SharedByte::new(width_turns(2, 23));
 /// See [`LOCKSTEP_WIDTH`].
-pub(super) static WIDTH: SharedByte = SharedByte::new(width_turns(2, 57));
+pub(super) static WIDTH: SharedByte = SharedByte::new(width_turns(2, 55));
 
 /// The turns for pulses of `us` microseconds that last `cycles` without any.
 const fn width_turns(us: u8, cycles: u16) -> u8 {
