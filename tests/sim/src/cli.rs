@@ -89,7 +89,7 @@ pub struct ServeArgs {
     /// Make a symbolic link to the pseudo-terminal.
     #[arg(long, value_name = "PATH")]
     pub link: Option<PathBuf>,
-    /// Speed of the serial line.
+    /// Speed of the serial line at power-up; it goes along when the firmware changes its own.
     #[arg(long, default_value_t = 115_200, value_parser = baud())]
     pub baud: u32,
 }

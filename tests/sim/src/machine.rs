@@ -382,6 +382,11 @@ impl Machine {
         self.bus_mut().wire.set_baud(clock_hz, baud);
     }
 
+    /// Has the host's side of the serial line change its speed whenever the firmware does.
+    pub fn follow_speed(&mut self) {
+        self.bus_mut().wire.follow();
+    }
+
     /// Queues bytes on the serial line; they travel at its speed.
     pub fn send(&mut self, bytes: &[u8]) {
         self.bus_mut().send(bytes);

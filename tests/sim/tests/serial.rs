@@ -152,6 +152,18 @@ fn answers_stop_while_the_planner_is_full_and_come_again() {
 }
 
 #[test]
+fn a_line_without_a_speed_goes_along_with_the_firmware() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    machine.follow_speed();
+    for baud in [500_000, 9_600, 115_200] {
+        set(&mut machine, &mut host, &format!("{{baud:{baud}}}"));
+        host.run_for_ms(&mut machine, 10).unwrap();
+        set(&mut machine, &mut host, "{baud:n}");
+    }
+    assert_eq!((machine.wire().garbled(), machine.uart(0).misframed()), (0, 0));
+}
+
+#[test]
 fn a_change_of_speed_spoils_no_byte_of_its_response() {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     for baud in [9_600, 1_000_000, 230_400, 500_000, 250_000, 115_200] {
