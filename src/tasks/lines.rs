@@ -154,12 +154,12 @@ impl LinePool {
         if at < POOL || self.start == 0 {
             return at;
         }
-        self.to_the_beginning(at)
+        self.move_down(at)
     }
 
     #[cold]
     #[inline(never)]
-    fn to_the_beginning(&mut self, at: usize) -> usize {
+    fn move_down(&mut self, at: usize) -> usize {
         self.bytes.copy_within(usize::from(self.start)..at, 0);
         self.end -= self.start;
         at - usize::from(core::mem::take(&mut self.start))

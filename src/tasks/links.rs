@@ -3,7 +3,7 @@
 //!
 //! | link | carries | depth | RAM | from | to | when full |
 //! |---|---|---|---|---|---|---|
-//! | `uart` receive ring | bytes | 255 | 260 B | RX interrupt | reader | the line is damaged: refused with status 13 |
+//! | `uart` receive ring | bytes | 255 | 260 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
 //! | [`Links::lines`] | lines | 8 lines, 640 B | 670 B | reader | parser | bytes stay in the receive ring |
 //! | [`Links::commands`] | canonical commands | 1 | 70 B | parser | planner | the parser takes control lines only |
 //! | block ring | blocks | 40 | 1,900 B | planner | exec | the planner waits; `commands` stays taken |

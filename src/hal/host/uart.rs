@@ -159,7 +159,7 @@ fn arrive(line: &mut Line, byte: u8) {
         let _ = ring.push(byte);
     }
     line.queued = line.queued.wrapping_add(1);
-    if full || byte < b' ' || line.queued % BATCH == 0 {
+    if full || byte < b' ' || line.queued.is_multiple_of(BATCH) {
         flags::set(Event::Received);
     }
 }

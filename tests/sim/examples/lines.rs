@@ -13,7 +13,7 @@ use kerf_sim::job;
 use kerf_sim::{Host, LINES_IN_FLIGHT};
 
 /// How long the line of a job may take, ms of AVR time.
-const LINE_MS: u64 = 1_000;
+const LINE_MS: u64 = 10_000;
 
 fn main() -> Result<()> {
     let mut args = std::env::args().skip(1);
