@@ -78,7 +78,6 @@ pub const WIDE: u8 = 1;
 /// All motors that move step on every tick.
 pub const LOCKSTEP: u8 = 0x80;
 
-
 impl Segment {
     /// Completes what follows from the increments. Cost: 60.
     #[inline]

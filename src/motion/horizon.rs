@@ -40,18 +40,22 @@
 //! Cost: a push 1,000 cycles, and 700 for each key dropped.
 
 use super::block::Line;
+use super::float::{below, greater, lesser, some};
 use super::queue::BLOCKS;
 
 /// Half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`,
 /// 0 without one. Cost: 650.
 pub fn kappa(accel: f32, jerk: f32) -> f32 {
-    if jerk > 0.0 { 0.5 * accel * accel / jerk } else { 0.0 }
+    if some(jerk) { 0.5 * accel * accel / jerk } else { 0.0 }
 }
 
 /// The part of a key that does not depend on the place, for velocity `w`. Cost: 400.
 pub fn key(w: f32, kappa: f32) -> f32 {
+    if !some(kappa) {
+        return w * w;
+    }
     let kept = if w < kappa + kappa { kappa } else { w - kappa };
-    if kappa > 0.0 { kept * kept } else { w * w }
+    kept * kept
 }
 
 impl Line {
@@ -67,16 +71,23 @@ impl Line {
         self.start + entry * entry
     }
 
-    /// How much potential it has, (mm/s)^2. Capped: more than the square of its own velocity never
-    /// matters. Cost: 500.
+    /// How much potential it has, (mm/s)^2. More than several times the square of its own velocity
+    /// never matters, and is left away where it is much. Cost: 350.
+    #[inline(never)]
     pub fn gain(&self) -> f32 {
-        let accel = self.accel.get();
-        let full = 2.0 * accel * self.length;
-        let speed = self.cruise + 2.0 * kappa(accel, self.jerk.get());
-        let most = 4.0 * speed * speed;
-        if full < most { full } else { most }
+        let full = 2.0 * self.accel.get() * self.length;
+        if below(full, MUCH) { full } else { self.capped(full) }
+    }
+
+    #[inline(never)]
+    fn capped(&self, full: f32) -> f32 {
+        let speed = self.cruise + 2.0 * kappa(self.accel.get(), self.jerk.get());
+        greater(MUCH, lesser(full, 4.0 * speed * speed))
     }
 }
+
+/// See [`Line::gain`].
+const MUCH: f32 = 65536.0;
 
 /// Keys of blocks in the queue, lowest first, which is nearest first too.
 #[derive(Debug)]

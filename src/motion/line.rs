@@ -14,7 +14,7 @@
 use super::block::{Block, Body, Line as Move};
 use super::dynamics::{Axis, Dynamics};
 use super::exec::{BLOCK_S_MIN, step_rate_max};
-use super::float::lesser;
+use super::float::{below, least, size, some};
 use super::governor::{ACCEL_MOST, effective_jerk};
 use super::junction::{self, Heading};
 use super::prep::STEPS_MAX;
@@ -73,41 +73,35 @@ impl Builder {
     /// Cost: 3,000 + 1,200 for each axis that moves and 600 for each motor, for short moves.
     #[inline(never)]
     pub fn line(&mut self, line: &Line, dynamics: &Dynamics, machine: &impl Motors) -> Built {
-        let Some(mut path) = Path::new(line.from, line.to) else {
-            return Built::Nothing;
-        };
-        let motors = self.moved(&path, line.to, machine);
-        let mut steps = [0; MOTORS];
-        let mut most = 0;
-        let mut moving = 0;
-        for (m, steps) in steps.iter_mut().enumerate() {
-            let way = i64::from(motors[m].steps) - i64::from(self.motors[m].steps);
-            if way == 0 {
-                continue;
-            }
-            moving += 1;
-            let size = way.unsigned_abs();
-            if size > u64::from(STEPS_MAX) {
-                return Built::Parts(parts(size));
-            }
-            *steps = way as i16;
-            most = if size as u16 > most { size as u16 } else { most };
+        let mut path = Path::default();
+        match path.measure(line.from, line.to) {
+            Way::None => return Built::Nothing,
+            Way::Far => return Built::Parts(2),
+            Way::Near => {}
+        }
+        let mut motors = self.motors;
+        path.drive(&mut motors, line.to, machine);
+        if let Some(parts) = path.count(&self.motors, &motors) {
+            return Built::Parts(parts);
         }
         path.limit(line.feed, dynamics);
-        path.limit_steps(most, moving);
-        let heading = Heading::new(path.unit, dynamics);
-        let mut entry = lesser(path.cruise, self.cruise);
-        if entry > 0.0 {
-            let corner = junction::limit(&self.heading, &heading, dynamics.junction, entry);
-            entry = lesser(entry, corner);
+        path.limit_change(dynamics);
+        path.limit_steps();
+        path.heading.deviation = junction::deviation(&path.heading.unit, dynamics);
+        let mut entry = least(path.cruise, self.cruise);
+        if some(entry) {
+            let corner = junction::limit(&self.heading, &path.heading, dynamics.junction, entry);
+            entry = least(entry, corner);
         }
-        *self = Builder { heading, cruise: path.cruise, motors };
+        self.heading = path.heading;
+        self.cruise = path.cruise;
+        self.motors = motors;
         let block = Move {
-            steps,
+            steps: path.steps,
             length: path.length,
             cruise: path.cruise,
             start: 0.0,
-            entry: Short::default(),
+            entry: Short::ZERO,
             accel: path.accel,
             jerk: path.jerk,
         };
@@ -135,124 +129,154 @@ impl Builder {
         self.stopped();
         Block { body, line }
     }
-
-    fn moved(&self, path: &Path, to: &PerAxis<Length>, machine: &impl Motors) -> [Motor; MOTORS] {
-        let mut motors = self.motors;
-        for (m, motor) in motors.iter_mut().enumerate() {
-            let axis = usize::from(machine.motor_axis(m));
-            if axis < AXES && path.unit[axis] != 0.0 {
-                let ratio = machine.ratio(m);
-                *motor = match path.travel[axis] {
-                    Some(travel) => motor.moved(ratio, travel, to[axis]),
-                    None => Motor::at(ratio, to[axis]),
-                };
-            }
-        }
-        motors
-    }
 }
 
 /// Parts of at most [`STEPS_MAX`] steps.
 #[inline(never)]
-fn parts(steps: u64) -> u16 {
+fn parts(from: i32, to: i32) -> u16 {
     // The rounding of their ends may add a step.
-    u16::try_from(steps / u64::from(STEPS_MAX - 1) + 1).unwrap_or(u16::MAX)
+    u16::try_from(from.abs_diff(to) / u32::from(STEPS_MAX - 1) + 1).unwrap_or(u16::MAX)
 }
 
-/// The way from here to there, and what limits it.
+/// Whether there is a way.
+enum Way {
+    None,
+    Near,
+    /// More than [`Length`] holds.
+    Far,
+}
+
+/// The way from here to there, and what limits it. Filled in place: to move it costs as much as a
+/// multiplication of floats.
+#[derive(Default)]
 struct Path {
-    /// Travel of each axis, in units of [`Length`], if it is in range.
-    travel: PerAxis<Option<i32>>,
+    /// Travel of each axis, in units of [`Length`].
+    travel: PerAxis<i32>,
+    /// mm.
     length: f32,
     /// Travel of each axis for a unit of length.
-    unit: PerAxis<f32>,
+    heading: Heading,
+    steps: [i16; MOTORS],
+    /// Steps of the motor that makes most, and how many motors move.
+    most: u16,
+    moving: u8,
     cruise: f32,
     accel: Short,
     jerk: Short,
 }
 
 impl Path {
-    /// Length and direction, without limits. `None` if it has no length. The length is that of the
-    /// linear axes; of the rotary ones if no linear one moves.
-    fn new(from: &PerAxis<Length>, to: &PerAxis<Length>) -> Option<Self> {
-        let mut travel = [None; AXES];
-        let mut unit = [0.0; AXES];
+    /// Length and direction. The length is that of the linear axes; of the rotary ones if no linear
+    /// one moves.
+    #[inline(never)]
+    fn measure(&mut self, from: &PerAxis<Length>, to: &PerAxis<Length>) -> Way {
+        let mut linear = Norm::default();
+        let mut rotary = Norm::default();
         for axis in 0..AXES {
-            let way = to[axis].0.checked_sub(from[axis].0);
-            travel[axis] = way;
-            unit[axis] = match way {
-                Some(0) => 0.0,
-                Some(way) => way as f32,
-                None => to[axis].0 as f32 - from[axis].0 as f32,
-            };
+            if from[axis] != to[axis] {
+                let Some(way) = to[axis].0.checked_sub(from[axis].0) else {
+                    return Way::Far;
+                };
+                self.travel[axis] = way;
+                let unit = way as f32;
+                self.heading.unit[axis] = unit;
+                let norm = if axis < FIRST_ROTARY { &mut linear } else { &mut rotary };
+                norm.add(unit);
+            }
         }
-        let (linear, rotary) = unit.split_at(FIRST_ROTARY);
-        let mut length = norm(linear);
-        if length == 0.0 {
-            length = norm(rotary);
-        }
-        if length == 0.0 {
-            return None;
+        let length = if linear.terms > 0 { linear.root() } else { rotary.root() };
+        if !some(length) {
+            return Way::None;
         }
         let scale = 1.0 / length;
-        for u in &mut unit {
-            if *u != 0.0 {
+        for u in &mut self.heading.unit {
+            if some(*u) {
                 *u *= scale;
             }
         }
-        let length = length * 1e-4;
-        let (accel, jerk) = (Short::default(), Short::default());
-        Some(Path { travel, length, unit, cruise: f32::MAX, accel, jerk })
+        self.length = length * 1e-4;
+        Way::Near
     }
 
-    /// Applies the feed and the limits of every axis that moves.
-    fn limit(&mut self, feed: Option<Feed>, dynamics: &Dynamics) {
-        match feed {
-            Some(Feed::PerMinute(feed)) if feed > 0.0 => self.cruise = feed * (1.0 / 60.0),
-            Some(Feed::Minutes(time)) if time > 0.0 => {
-                self.cruise = self.length / (time * 60.0);
+    /// Takes the motors to the end of the move.
+    #[inline(never)]
+    fn drive(&self, motors: &mut [Motor; MOTORS], to: &PerAxis<Length>, machine: &impl Motors) {
+        for (m, motor) in motors.iter_mut().enumerate() {
+            let axis = usize::from(machine.motor_axis(m));
+            if axis < AXES && self.travel[axis] != 0 {
+                motor.go(machine.ratio(m), self.travel[axis], to[axis]);
             }
-            _ => {}
         }
-        for (&u, axis) in self.unit.iter().zip(&dynamics.axes) {
-            if u != 0.0 {
+    }
+
+    /// Counts the steps, or says in how many parts they would fit.
+    #[inline(never)]
+    fn count(&mut self, from: &[Motor; MOTORS], to: &[Motor; MOTORS]) -> Option<u16> {
+        for m in 0..MOTORS {
+            let (from, to) = (from[m].steps, to[m].steps);
+            if from == to {
+                continue;
+            }
+            let steps = match to.checked_sub(from).map(i16::try_from) {
+                Some(Ok(steps)) if steps != i16::MIN => steps,
+                _ => return Some(parts(from, to)),
+            };
+            self.steps[m] = steps;
+            self.moving += 1;
+            self.most = self.most.max(steps.unsigned_abs());
+        }
+        None
+    }
+
+    /// Applies the feed and the velocity limit of every axis that moves.
+    #[inline(never)]
+    fn limit(&mut self, feed: Option<Feed>, dynamics: &Dynamics) {
+        self.cruise = match feed {
+            Some(Feed::PerMinute(feed)) => feed * (1.0 / 60.0),
+            Some(Feed::Minutes(time)) if time > 0.0 => self.length / (time * 60.0),
+            _ => CRUISE_MOST,
+        };
+        for (&u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
+            if some(u) {
                 let velocity = if feed.is_some() { axis.feed } else { axis.velocity };
                 let u = size(u);
-                if velocity > 0.0 && u * self.cruise > velocity {
+                if some(velocity) && below(velocity, u * self.cruise) {
                     self.cruise = velocity / u;
                 }
             }
         }
-        // Slower than any machine, so that no division goes wrong.
-        if self.cruise > CRUISE_MOST {
+        // Within what no division goes wrong with.
+        if below(CRUISE_MOST, self.cruise) {
             self.cruise = CRUISE_MOST;
-        } else if self.cruise < CRUISE_LEAST {
+        } else if below(self.cruise, CRUISE_LEAST) {
             self.cruise = CRUISE_LEAST;
         }
-        self.limit_change(dynamics);
     }
 
     /// Acceleration and jerk.
+    #[inline(never)]
     fn limit_change(&mut self, dynamics: &Dynamics) {
         let mut slowest = Slowest::default();
-        for (&u, axis) in self.unit.iter().zip(&dynamics.axes) {
-            if u != 0.0 {
+        for (&u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
+            if some(u) {
                 slowest.look(size(u), axis);
             }
         }
-        let jerk = slowest.jerk;
-        if slowest.accel > 0.0 {
-            let least = slowest.least;
+        let mut jerk = slowest.jerk.get();
+        let mut least = slowest.least.get();
+        // Moves of both linear and rotary axes may have units above 1.
+        if below(1.0, slowest.most) {
+            jerk /= slowest.most;
+            least /= slowest.most;
+        }
+        if some(least) {
             let jerk = effective_jerk(jerk, least);
-            // Moves of both linear and rotary axes have units above 1.
-            let accel =
-                if jerk > 0.0 { least / slowest.most } else { slowest.accel / slowest.unit };
-            self.accel = Short::new(lesser(accel, ACCEL_MOST));
-            self.jerk = Short::new(if jerk > 0.0 { jerk / slowest.most } else { 0.0 });
-        } else if jerk > 0.0 {
+            let accel = if some(jerk) { least } else { slowest.accel.get() / slowest.unit };
+            self.accel = Short::new(least_of(accel));
+            self.jerk = Short::new(jerk);
+        } else if some(jerk) {
             // What a ramp to full speed comes to, so that the jerk alone limits it.
-            let jerk = jerk / slowest.most;
-            let accel = lesser(sqrt(jerk * power_of_two_above(self.cruise)), ACCEL_MOST);
+            let accel = least_of(sqrt(jerk * power_of_two_above(self.cruise)));
             self.accel = Short::new(accel);
             self.jerk = Short::new(effective_jerk(jerk, accel));
         } else {
@@ -262,20 +286,51 @@ impl Path {
 
     /// Keeps motors within the rate that so many can have together, and a block with steps long
     /// enough for exec.
-    fn limit_steps(&mut self, most: u16, moving: usize) {
+    #[inline(never)]
+    fn limit_steps(&mut self) {
         const RATES: [f32; MOTORS] =
             [step_rate_max(1), step_rate_max(2), step_rate_max(3), step_rate_max(4)];
-        if moving == 0 {
+        if self.moving == 0 {
             return;
         }
-        let way = RATES[moving - 1] * self.length;
-        let most = f32::from(most);
-        if self.cruise * most > way {
+        let way = RATES[usize::from(self.moving) - 1] * self.length;
+        let most = f32::from(self.most);
+        if below(way, self.cruise * most) {
             self.cruise = way / most;
         }
-        if self.cruise * BLOCK_S_MIN > self.length {
+        if below(self.length, self.cruise * BLOCK_S_MIN) {
             self.cruise = self.length * (1.0 / BLOCK_S_MIN);
         }
+    }
+}
+
+fn least_of(accel: f32) -> f32 {
+    least(accel, ACCEL_MOST)
+}
+
+/// The length of a vector, of which one term is usual.
+#[derive(Default)]
+struct Norm {
+    only: f32,
+    sum: f32,
+    terms: u8,
+}
+
+impl Norm {
+    fn add(&mut self, term: f32) {
+        if self.terms == 0 {
+            self.only = term;
+        } else {
+            if self.terms == 1 {
+                self.sum = self.only * self.only;
+            }
+            self.sum += term * term;
+        }
+        self.terms += 1;
+    }
+
+    fn root(&self) -> f32 {
+        if self.terms < 2 { size(self.only) } else { sqrt(self.sum) }
     }
 }
 
@@ -288,41 +343,36 @@ const CRUISE_LEAST: f32 = 1e-6;
 #[derive(Default)]
 struct Slowest {
     /// Limit and unit of the axis that limits most.
-    accel: f32,
+    accel: Short,
     unit: f32,
-    least: f32,
-    jerk: f32,
-    /// The largest unit, at least 1.
+    least: Short,
+    jerk: Short,
+    /// The largest unit.
     most: f32,
 }
 
 impl Slowest {
     fn look(&mut self, u: f32, axis: &Axis) {
-        let accel = axis.accel.get();
-        if accel > 0.0 {
-            if self.accel == 0.0 || accel < self.least {
-                self.least = accel;
+        if axis.accel != Short::ZERO {
+            if self.least == Short::ZERO || axis.accel < self.least {
+                self.least = axis.accel;
             }
-            let slower = if self.accel == 0.0 {
+            let slower = if self.accel == Short::ZERO {
                 true
-            } else if accel == self.accel {
-                u > self.unit
+            } else if axis.accel == self.accel {
+                below(self.unit, u)
             } else {
-                accel * self.unit < self.accel * u
+                below(axis.accel.get() * self.unit, self.accel.get() * u)
             };
             if slower {
-                self.accel = accel;
+                self.accel = axis.accel;
                 self.unit = u;
             }
         }
-        let jerk = axis.jerk.get();
-        if jerk > 0.0 && (self.jerk == 0.0 || jerk < self.jerk) {
-            self.jerk = jerk;
+        if axis.jerk != Short::ZERO && (self.jerk == Short::ZERO || axis.jerk < self.jerk) {
+            self.jerk = axis.jerk;
         }
-        if self.most == 0.0 {
-            self.most = 1.0;
-        }
-        if u > self.most {
+        if below(self.most, u) {
             self.most = u;
         }
     }
@@ -333,22 +383,4 @@ impl Slowest {
 fn power_of_two_above(x: f32) -> f32 {
     let bits = x.to_bits();
     f32::from_bits((bits + 0x007F_FFFF) & 0xFF80_0000)
-}
-
-fn size(u: f32) -> f32 {
-    f32::from_bits(u.to_bits() & 0x7FFF_FFFF)
-}
-
-fn norm(travel: &[f32]) -> f32 {
-    let mut sum = 0.0;
-    let mut moving = 0;
-    let mut only = 0.0;
-    for &d in travel {
-        if d != 0.0 {
-            moving += 1;
-            only = d;
-            sum += d * d;
-        }
-    }
-    if moving == 1 { size(only) } else { sqrt(sum) }
 }

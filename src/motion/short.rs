@@ -1,7 +1,7 @@
 //! A positive float in two bytes, for limits kept in every block.
 
 /// Eight bits of exponent and eight of mantissa: 0.4 % exact, rounded down, so that a limit stays one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Short(u16);
 
 impl Short {
@@ -11,6 +11,9 @@ impl Short {
         let bits = x.to_bits();
         if bits >> 31 != 0 { Short(0) } else { Short((bits >> 15) as u16) }
     }
+
+    /// Zero.
+    pub const ZERO: Self = Short(0);
 
     /// As a float again. Cost: 15.
     #[inline]

@@ -4,7 +4,7 @@
 //! rounded to the nearest step, half away from zero: what [`StepRatio::steps`] says. A short move starts
 //! from the position before and what rounding left there, which gives the same with small numbers.
 
-use super::divide::quotient;
+use super::divide::quotient_remainder;
 use crate::config::StepRatio;
 use crate::units::Length;
 
@@ -29,43 +29,53 @@ impl Motor {
         Self { steps, rest: rest as i32 }
     }
 
-    /// The motor after its axis has gone `travel` to `position`. Cost: 500 for short moves.
-    pub fn moved(&self, ratio: StepRatio, travel: i32, position: Length) -> Self {
-        self.near(ratio, travel, position).unwrap_or_else(|| Self::at(ratio, position))
+    /// Its axis has gone `travel` to `position`. Cost: 600 for short moves.
+    #[inline(never)]
+    pub fn go(&mut self, ratio: StepRatio, travel: i32, position: Length) {
+        if !self.go_near(ratio, travel, position) {
+            *self = Self::at(ratio, position);
+        }
     }
 
-    /// As long as 32 and 16 bits will do.
-    fn near(&self, ratio: StepRatio, travel: i32, position: Length) -> Option<Self> {
-        let den = u16::try_from(ratio.den).ok().filter(|den| *den < 0x4000)?;
-        let num = u16::try_from(ratio.num).ok()?;
-        let way = u16::try_from(travel.unsigned_abs()).ok()?;
-        let way = u32::from(way) * u32::from(num);
-        if way >> 30 != 0 {
-            return None;
-        }
-        let way = if travel < 0 { -(way as i32) } else { way as i32 };
-        // The rest is below `den` in size.
-        let sum = self.rest + way;
-        let size = sum.unsigned_abs() + u32::from(den / 2);
-        if (size >> 16) as u16 >= den {
-            return None;
-        }
-        let whole = i32::from(quotient(size, den));
-        let whole = if sum < 0 { -whole } else { whole };
-        let mut next = Self {
-            steps: self.steps.checked_add(whole)?,
-            rest: sum - whole.wrapping_mul(den.into()),
+    /// As long as 32 and 16 bits will do; false, and nothing done, otherwise.
+    #[inline(always)]
+    fn go_near(&mut self, ratio: StepRatio, travel: i32, position: Length) -> bool {
+        let (Ok(num), Ok(den)) = (u16::try_from(ratio.num), u16::try_from(ratio.den)) else {
+            return false;
         };
-        // Half a step goes away from zero, not away from where it was.
-        let twice = next.rest + next.rest;
-        if twice == i32::from(den) && position.0 > 0 {
-            next.steps += 1;
-            next.rest -= i32::from(den);
-        } else if -twice == i32::from(den) && position.0 < 0 {
-            next.steps -= 1;
-            next.rest += i32::from(den);
+        let Ok(way) = u16::try_from(travel.unsigned_abs()) else {
+            return false;
+        };
+        // The rest is below `den` in size.
+        let way = u32::from(way) * u32::from(num);
+        if den >= 0x4000 || way >> 30 != 0 {
+            return false;
         }
-        Some(next)
+        let sum = if travel < 0 { self.rest - way as i32 } else { self.rest + way as i32 };
+        let rounded = sum.unsigned_abs() + u32::from(den / 2);
+        if (rounded >> 16) as u16 >= den {
+            return false;
+        }
+        let (whole, over) = quotient_remainder(rounded, den);
+        // What has been added for rounding is in `over`.
+        let rest = i32::from(over) - i32::from(den / 2);
+        if sum < 0 {
+            self.steps = self.steps.wrapping_sub(whole.into());
+            self.rest = -rest;
+        } else {
+            self.steps = self.steps.wrapping_add(whole.into());
+            self.rest = rest;
+        }
+        // Half a step goes away from zero, not away from where it was.
+        let twice = self.rest + self.rest;
+        if twice == i32::from(den) && position.0 > 0 {
+            self.steps += 1;
+            self.rest -= i32::from(den);
+        } else if -twice == i32::from(den) && position.0 < 0 {
+            self.steps -= 1;
+            self.rest += i32::from(den);
+        }
+        true
     }
 }
 
@@ -85,7 +95,7 @@ mod tests {
             let mut motor = Motor::at(ratio, position);
             for travel in moves {
                 position.0 += travel;
-                motor = motor.moved(ratio, travel, position);
+                motor.go(ratio, travel, position);
                 prop_assert_eq!(motor.steps, ratio.steps(position));
                 prop_assert_eq!(motor, Motor::at(ratio, position));
             }
