@@ -174,9 +174,9 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         self.0.head.get() == self.0.tail.get()
     }
 
-    /// A copy of what `look` picks from the value `ahead` places behind the oldest.
+    /// What `look` makes of the value `ahead` places behind the oldest.
     #[inline]
-    pub fn peek<R: Copy>(&self, ahead: usize, look: impl FnOnce(&T) -> R) -> Option<R> {
+    pub fn peek<R>(&self, ahead: usize, look: impl FnOnce(&T) -> R) -> Option<R> {
         if ahead >= self.0.used() {
             return None;
         }

@@ -81,7 +81,7 @@ pub const LOCKSTEP: u8 = 0x80;
 impl Segment {
     /// Completes what follows from the increments. Cost: 60.
     #[inline]
-    pub fn seal(mut self) -> Self {
+    pub fn seal(&mut self) {
         let mut lockstep = 0;
         let mut mixed = false;
         let mut m = 0;
@@ -100,7 +100,6 @@ impl Segment {
         } else {
             NARROW
         };
-        self
     }
 }
 

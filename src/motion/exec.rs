@@ -16,8 +16,9 @@
 
 use super::block::{Block, Body, Line};
 use super::dda::Segment;
+use super::float::{below, scaled, some};
 use super::governor::{Ahead, Governor};
-use super::prep::{CYCLES_MAX, FINE_S, Prep, shortest};
+use super::prep::{CYCLES_MAX, FINE_LOG2, Prep, shortest};
 use super::queue::{Anchor, BlockSource};
 use crate::boards::MOTORS;
 
@@ -45,10 +46,10 @@ pub const BLOCK_S_MIN: f32 = 0.000_75;
 const DWELL_TICKS: u16 = 2;
 
 /// What [`Exec::step`] found to do.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// A segment to queue.
-    Segment(Segment),
+    Segment,
     /// Nothing to queue, but something was done: ask again.
     Again,
     /// A program stop or end is due: ask again when the steppers stand still.
@@ -122,7 +123,7 @@ struct Running {
     left: f32,
     /// Velocity limit, mm/s.
     cruise: f32,
-    /// Phase units of the dominant motor in a mm.
+    /// Phase units of the dominant motor in a mm; before the first stretch, its steps.
     scale: f32,
     /// Without a jerk limit: the square of the velocity that may be left at the end.
     headroom: f32,
@@ -165,36 +166,42 @@ impl Exec {
         Self { prep: Prep::new(), governor: Governor::new(), running: None, dwell_ms: 0 }
     }
 
-    /// Does the next thing there is to do. `standstill` says that the steppers have stopped.
-    pub fn step(&mut self, blocks: &mut BlockSource, standstill: bool, out: &mut Snapshot) -> Step {
+    /// Does the next thing there is to do; puts a segment into `segment` if it says so. `standstill` says
+    /// that the steppers have stopped.
+    pub fn step(
+        &mut self,
+        blocks: &mut BlockSource,
+        standstill: bool,
+        out: &mut Snapshot,
+        segment: &mut Segment,
+    ) -> Step {
         if self.dwell_ms > 0 {
-            return Step::Segment(self.dwell());
+            self.dwell(segment);
+            return Step::Segment;
         }
         if self.running.is_none() {
-            let Some(block) = blocks.oldest() else {
+            if blocks.is_empty() {
                 return self.idle(standstill, out);
-            };
-            if let Some(step) = self.take_up(&block, blocks, standstill, out) {
-                return step;
+            }
+            if !self.begin(blocks, out)
+                && let Some(block) = blocks.oldest()
+            {
+                return self.take_up(&block, blocks, standstill, out);
             }
         }
-        self.run(blocks, out)
+        self.run(blocks, out, segment)
     }
 
-    /// Begins the oldest block. `None` if it is a line, which is to be run now.
+    /// Does what the oldest block asks for, which is no line.
+    #[inline(never)]
     fn take_up(
         &mut self,
         block: &Block,
         blocks: &mut BlockSource,
         standstill: bool,
         out: &mut Snapshot,
-    ) -> Option<Step> {
-        out.line = block.line;
+    ) -> Step {
         match &block.body {
-            Body::Line(line) => {
-                self.begin(line, blocks, out);
-                return None;
-            }
             Body::Dwell(ms) => {
                 self.dwell_ms = *ms;
                 self.halt(out);
@@ -207,7 +214,7 @@ impl Exec {
             Body::ProgramStop | Body::ProgramEnd => {
                 self.halt(out);
                 if !standstill {
-                    return Some(Step::Standstill);
+                    return Step::Standstill;
                 }
                 out.running = false;
                 out.program = match block.body {
@@ -215,10 +222,10 @@ impl Exec {
                     _ => Program::Stopped,
                 };
             }
-            Body::Nothing => {}
+            Body::Nothing | Body::Line(_) => {}
         }
         blocks.release();
-        Some(Step::Again)
+        Step::Again
     }
 
     fn halt(&mut self, out: &mut Snapshot) {
@@ -236,22 +243,35 @@ impl Exec {
         Step::Idle
     }
 
-    fn dwell(&mut self) -> Segment {
+    fn dwell(&mut self, segment: &mut Segment) {
         let ticks = if self.dwell_ms < u32::from(DWELL_TICKS) { 1 } else { DWELL_TICKS };
         self.dwell_ms -= u32::from(ticks);
-        self.prep.pause(ticks, CYCLES_PER_MS)
+        self.prep.pause(ticks, CYCLES_PER_MS, segment);
     }
 
-    /// Takes up a line. It stays in the ring until its last segment, so that the planner counts it as
-    /// work in hand.
+    /// Takes up the oldest block if it is a line. It stays in the ring until its last segment, so that
+    /// the planner counts it as work in hand.
     #[inline(never)]
-    fn begin(&mut self, line: &Line, blocks: &mut BlockSource, out: &mut Snapshot) {
+    fn begin(&mut self, blocks: &mut BlockSource, out: &mut Snapshot) -> bool {
         blocks.enter();
-        let most = self.prep.begin(&line.steps, line.cruise * FINE_S < line.length);
-        let mut m = 0;
-        while m < MOTORS {
-            out.target[m] = out.target[m].wrapping_add(line.steps[m].into());
-            m += 1;
+        let version = blocks.version().wrapping_sub(1);
+        let lined = blocks.look(|block| {
+            out.line = block.line;
+            let Body::Line(line) = &block.body else { return false };
+            self.begin_line(line, version, out);
+            true
+        });
+        lined == Some(true)
+    }
+
+    #[inline(always)]
+    fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
+        let fine = below(scaled(line.cruise, FINE_LOG2), line.length);
+        let most = self.prep.begin(&line.steps, fine);
+        for m in 0..MOTORS {
+            if line.steps[m] != 0 {
+                out.target[m] = out.target[m].wrapping_add(line.steps[m].into());
+            }
         }
         out.steps = line.steps;
         out.length = line.length;
@@ -261,25 +281,24 @@ impl Exec {
         self.running = Some(Running {
             left: line.length,
             cruise: line.cruise,
-            // The block's units, to be divided by its length when that is needed.
-            scale: f32::from(most) * 32768.0,
+            scale: f32::from(most),
             headroom: 0.0,
-            version: blocks.version().wrapping_sub(1),
+            version,
             fresh: true,
             done: false,
-            jerk: jerk > 0.0,
+            jerk: some(jerk),
         });
     }
 
     /// Prepares the next stretch of the line being run. In place: copying its state would cost as
     /// much as the mathematics.
     #[inline(never)]
-    fn run(&mut self, blocks: &mut BlockSource, out: &mut Snapshot) -> Step {
+    fn run(&mut self, blocks: &mut BlockSource, out: &mut Snapshot, segment: &mut Segment) -> Step {
         let Some(running) = &mut self.running else {
             return Step::Again;
         };
         if running.done {
-            return self.end(0, false, blocks);
+            return self.end(0, false, blocks, segment);
         }
         let version = blocks.version();
         if version != running.version {
@@ -298,27 +317,37 @@ impl Exec {
             out.left = 0.0;
             running.done = true;
             let whole = running.fresh;
-            return self.end(cycles, whole, blocks);
+            return self.end(cycles, whole, blocks, segment);
         }
         if running.fresh {
             running.fresh = false;
-            running.scale /= running.left;
+            running.scale = running.scale * 32768.0 / running.left;
         }
         running.left -= stretch.distance;
         out.left = running.left;
         let left = (running.left * running.scale) as u32;
-        self.prep.segment(left, cycles).map_or(Step::Again, Step::Segment)
+        step(self.prep.segment(left, cycles, segment))
     }
 
     /// Hands out what is left of the line being run.
-    fn end(&mut self, cycles: u32, whole: bool, blocks: &mut BlockSource) -> Step {
-        let segment = self.prep.last(cycles, whole);
+    fn end(
+        &mut self,
+        cycles: u32,
+        whole: bool,
+        blocks: &mut BlockSource,
+        segment: &mut Segment,
+    ) -> Step {
+        let some = self.prep.last(cycles, whole, segment);
         if self.prep.left() == 0 {
             self.running = None;
             blocks.release();
         }
-        segment.map_or(Step::Again, Step::Segment)
+        step(some)
     }
+}
+
+fn step(segment: bool) -> Step {
+    if segment { Step::Segment } else { Step::Again }
 }
 
 /// CPU cycles in `seconds`; at least 1, at most what [`Prep`] takes.

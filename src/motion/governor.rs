@@ -22,7 +22,7 @@
 //! with one about 5,000.
 
 use super::brake::Brake;
-use super::float::{greater, lesser};
+use super::float::{below, greater, lesser};
 use super::horizon::kappa;
 pub use super::reach::Ahead;
 use super::state::{Limits, State};
@@ -116,8 +116,14 @@ impl Governor {
     fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32, seconds: f32) -> Stretch {
         let v = self.state.velocity;
         let gain = self.limits.accel * seconds;
-        // Short blocks are a stretch at once.
-        if left > v * seconds {
+        // Steady over a block that is short enough to be one stretch.
+        if v.to_bits() == cruise.to_bits()
+            && below(cruise * cruise, headroom)
+            && below(left, cruise * (seconds + seconds))
+        {
+            return Stretch { seconds: left / v, distance: left, ends: true };
+        }
+        if below(v * (seconds + seconds), left) {
             let half = 0.5 * seconds;
             let mut next = lesser(v + gain, cruise);
             let mut distance = (v + next) * half;

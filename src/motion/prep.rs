@@ -62,8 +62,8 @@ const PACES: [Pace; MOTORS] = [
 /// Ticks of blocks so short that they are a single segment.
 const COARSEST: u16 = per(640);
 
-/// Blocks that take longer than this have fine ticks, s.
-pub const FINE_S: f32 = 0.05;
+/// Blocks that take longer than 1/16 s have fine ticks: that power of two.
+pub const FINE_LOG2: i8 = -4;
 
 /// Latest cycle of a tick at which the interrupt may find itself ready for its pulses.
 const SETTLE: u8 = 68;
@@ -193,8 +193,8 @@ impl Prep {
     }
 
     /// Prepares a stretch of `cycles`, up to [`CYCLES_MAX`], at the end of which the dominant motor has
-    /// about `left` phase units to go. `None` when that time is kept for the next stretch.
-    pub fn segment(&mut self, left: u32, cycles: u32) -> Option<Segment> {
+    /// about `left` phase units to go. False, and no segment, when that time is kept for the next stretch.
+    pub fn segment(&mut self, left: u32, cycles: u32, out: &mut Segment) -> bool {
         let travel = self.left.saturating_sub(left);
         let cycles = self.time.saturating_add(cycles as i32).max(1) as u32;
         let limit = self.limit(cycles, self.pace());
@@ -204,24 +204,25 @@ impl Prep {
         let grain = grain(travel >> shift, shift);
         let short = (self.left - travel).wrapping_neg() & !(u32::MAX << grain);
         if travel <= short {
-            return self.idle(cycles);
+            return self.idle(cycles, out);
         }
         let aligned = travel - short;
         let ticks = ((aligned >> shift) as u16).min(TICKS_MAX);
         let period = self.period(cycles, travel, shift);
         if period > PERIOD_MAX {
-            return self.idle(cycles);
+            return self.idle(cycles, out);
         }
-        Some(self.emit(ticks, shift, period as u16, cycles))
+        self.emit(ticks, shift, period as u16, cycles, out);
+        true
     }
 
-    /// Prepares the last stretch of the block, everything that is left, in `cycles`. `None` when
-    /// nothing is left; the time is kept then.
-    pub fn last(&mut self, cycles: u32, whole: bool) -> Option<Segment> {
+    /// Prepares the last stretch of the block, everything that is left, in `cycles`. False,
+    /// and no segment, when nothing is left; the time is kept then.
+    pub fn last(&mut self, cycles: u32, whole: bool, out: &mut Segment) -> bool {
         let cycles = self.time.saturating_add(cycles as i32).max(1) as u32;
         if self.left == 0 {
             self.time = cycles as i32;
-            return None;
+            return false;
         }
         let pace = if whole { COARSEST } else { self.pace() };
         let (_, shift) = coarsen(self.left, self.limit(cycles, pace));
@@ -230,15 +231,13 @@ impl Prep {
         let ticks = self.left >> shift;
         if ticks > u32::from(TICKS_MAX) {
             // Too much for one segment: a part of it, and the rest when asked again.
-            return Some(self.emit(
-                TICKS_MAX,
-                shift,
-                self.period(cycles, self.left, shift) as u16,
-                cycles,
-            ));
+            let period = self.period(cycles, self.left, shift) as u16;
+            self.emit(TICKS_MAX, shift, period, cycles, out);
+            return true;
         }
         let period = self.period(cycles, self.left, shift).min(PERIOD_MAX);
-        Some(self.emit(ticks as u16, shift, period as u16, cycles))
+        self.emit(ticks as u16, shift, period as u16, cycles, out);
+        true
     }
 
     fn pace(&self) -> u16 {
@@ -278,23 +277,25 @@ impl Prep {
 
     /// Nothing moves: the next step is too far off. A tick of the time there is, at most; short times
     /// are kept.
-    fn idle(&mut self, cycles: u32) -> Option<Segment> {
+    fn idle(&mut self, cycles: u32, out: &mut Segment) -> bool {
         if cycles < PERIOD_MAX / 2 {
             self.time = cycles as i32;
-            return None;
+            return false;
         }
         let period = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
         self.time = (cycles - u32::from(period)) as i32;
-        Some(self.pause(1, period))
+        self.pause(1, period, out);
+        true
     }
 
     /// A segment in which nothing moves.
-    pub fn pause(&self, ticks: u16, period: u16) -> Segment {
-        Segment { ticks, period, backwards: self.backwards, ..Segment::default() }
+    pub fn pause(&self, ticks: u16, period: u16, out: &mut Segment) {
+        *out = Segment { ticks, period, backwards: self.backwards, ..Segment::default() };
     }
 
     /// A segment of `ticks` in each of which the dominant motor travels `1 << shift`.
-    fn emit(&mut self, ticks: u16, shift: u8, period: u16, cycles: u32) -> Segment {
+    #[inline(never)]
+    fn emit(&mut self, ticks: u16, shift: u8, period: u16, cycles: u32, out: &mut Segment) {
         if shift != self.shift {
             self.scale(shift);
         }
@@ -303,23 +304,26 @@ impl Prep {
         self.time = (cycles as i32 - used as i32).max(-1000);
         let travel = u32::from(ticks) << shift;
         self.left -= travel;
-        let mut segment = self.pause(ticks, period);
-        if period >= PACES[usize::from(self.others)].settles {
-            segment.settle = SETTLE;
-        }
+        out.ticks = ticks;
+        out.period = period;
+        out.backwards = self.backwards;
+        let settles = period >= PACES[usize::from(self.others)].settles;
+        out.settle = if settles { SETTLE } else { 0 };
         let mut bit = 1;
         for m in 0..MOTORS {
-            if self.full & bit != 0 {
-                segment.increment[m] = 1 << shift;
+            out.increment[m] = if self.full & bit != 0 {
+                1 << shift
             } else if self.minor & bit != 0 {
-                segment.increment[m] = self.minors[m].advance(ticks, self.most);
-            }
+                self.minors[m].advance(ticks, self.most)
+            } else {
+                0
+            };
             bit <<= 1;
         }
         if self.left == 0 {
             self.settle_debts();
         }
-        segment.seal()
+        out.seal();
     }
 
     /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.

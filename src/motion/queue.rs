@@ -280,7 +280,13 @@ impl BlockSource {
 
     /// A copy of the oldest block.
     pub fn oldest(&self) -> Option<Block> {
-        self.ring.peek(0, |block| *block)
+        self.look(|block| *block)
+    }
+
+    /// What `look` makes of the oldest block.
+    #[inline(always)]
+    pub fn look<R>(&self, look: impl FnOnce(&Block) -> R) -> Option<R> {
+        self.ring.peek(0, look)
     }
 
     /// The oldest block is done.

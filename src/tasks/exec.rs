@@ -22,13 +22,14 @@ const LONG_QUEUED: usize = 4;
 /// The task.
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
     let mut machine = Exec::new();
+    let mut segment = Segment::default();
     let mut most = LONG_QUEUED;
     loop {
         exec::wait(|| (segments.used() < most).then_some(())).await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
-        let step = links::update(|snapshot| machine.step(&mut blocks, standstill, snapshot));
-        if let Step::Segment(segment) = step {
+        let step = links::update(|out| machine.step(&mut blocks, standstill, out, &mut segment));
+        if step == Step::Segment {
             // There is room: this task alone fills the ring.
             let _ = segments.push(segment);
             stepper::go();
@@ -39,7 +40,9 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             flags::set(Event::BlockDone);
         }
         if matches!(step, Step::Idle | Step::Standstill) {
+            links::hungry(true);
             exec_asked_again().await;
+            links::hungry(false);
         }
     }
 }

@@ -29,6 +29,7 @@ use super::wake::{News, Wake};
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
+use crate::hal::byte::SharedByte;
 use crate::motion::exec::Snapshot;
 use crate::motion::queue;
 use crate::protocol::{Mode, StatusReport};
@@ -119,4 +120,20 @@ pub fn update<R>(change: impl FnOnce(&mut Snapshot) -> R) -> R {
 pub fn snapshot() -> Snapshot {
     // SAFETY: the writer does not run under the lock.
     crate::hal::imp::exec::lock(|_| unsafe { *published().0.get() })
+}
+
+machine_static! {
+    fn hunger() -> SharedByte = SharedByte::new(1);
+}
+
+/// Exec waits for a block, or no more. Exec only.
+pub fn hungry(waits: bool) {
+    hunger().set(waits.into());
+}
+
+/// A block has been queued: exec is pended if it waits for one. Else it looks when a segment has been used up.
+pub fn feed() {
+    if hunger().get() != 0 {
+        crate::hal::imp::exec::pend();
+    }
 }

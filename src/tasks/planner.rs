@@ -5,12 +5,11 @@
 
 use embassy_futures::yield_now;
 
-use super::links::Links;
+use super::links::{self, Links};
 use crate::config::{Settings, StepRatio};
 use crate::gcode::arc::Chords;
 use crate::gcode::command::{Commands, Feed, Motion, Stop};
 use crate::hal::event::{Event, wait};
-use crate::hal::imp::exec;
 use crate::motion::block::{Block, Body};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line, Motors};
@@ -207,7 +206,7 @@ impl Planner {
     }
 
     fn announce(&self) {
-        exec::pend();
+        links::feed();
         self.links.queue_count.add();
         self.links.reporter_wake.signal();
     }

@@ -187,8 +187,10 @@ impl Rig {
 
     /// Runs exec once and the steppers as long as segments are queued.
     pub fn turn(&mut self) -> Step {
-        let step = self.exec.step(&mut self.source, self.pins.stopped, &mut self.snapshot);
-        if let Step::Segment(segment) = step {
+        let mut segment = Segment::default();
+        let step =
+            self.exec.step(&mut self.source, self.pins.stopped, &mut self.snapshot, &mut segment);
+        if step == Step::Segment {
             assert!(segment.ticks > 0 && segment.period > 0, "{segment:?}");
             assert!(segment.increment.iter().all(|i| *i <= 0x8000), "{segment:?}");
             self.segments += 1;
