@@ -7,7 +7,7 @@
 //! Called by the line builder. Units: mm (degrees for rotary axes), s. Costs are AVR cycles.
 
 use super::dynamics::Dynamics;
-use super::float::{below, some};
+use super::float::{OCTAVE, below, log, scaled, some};
 use crate::math::sqrt;
 use crate::units::PerAxis;
 
@@ -63,7 +63,8 @@ fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> f32 {
 /// The axes' velocities change by `(b.unit - a.unit) * velocity`, also where the two paths are
 /// measured differently (linear, rotary, both), so that it is this difference that counts.
 ///
-/// Cost: 800 + 50 for each axis that moves; 1,600 more for one below `most`.
+/// Cost: 400 + 50 for each axis that moves where the corner is plainly no limit, else 800 more; 1,600
+/// more for one below `most`.
 #[inline(never)]
 pub fn limit(a: &Heading, b: &Heading, acceleration: f32, most: f32) -> f32 {
     // |b - a| = 2 sin(angle / 2): precise for small angles, which 1 - cos(angle) is not.
@@ -75,7 +76,16 @@ pub fn limit(a: &Heading, b: &Heading, acceleration: f32, most: f32) -> f32 {
     if sum < STRAIGHT {
         return f32::MAX;
     }
-    let sine = sum as f32 * (0.25 / (ONE as f32 * ONE as f32));
+    // The square of twice the sine.
+    let sum = scaled(sum as f32, -28);
+    if a.deviation.to_bits() == b.deviation.to_bits() && below(sum, 1.44) {
+        // Far below what limits: 4 product > sum most^2, with an octave for the logarithms' error.
+        let limit = log(a.deviation) + log(acceleration) + 2 * OCTAVE;
+        if log(sum) + 2 * log(most) + OCTAVE < limit {
+            return f32::MAX;
+        }
+    }
+    let sine = scaled(sum, -2);
     let deviation = if a.deviation.to_bits() == b.deviation.to_bits() {
         a.deviation
     } else {

@@ -15,7 +15,7 @@ use super::block::{Block, Body, Line as Move};
 use super::divide::{quotient, root};
 use super::dynamics::{Axis, Dynamics};
 use super::exec::{BLOCK_S_MIN, step_rate_max};
-use super::float::{below, least, scaled, some};
+use super::float::{OCTAVE, below, least, log, scaled, some};
 use super::governor::{ACCEL_MOST, effective_jerk};
 use super::junction::{self, Heading, ONE};
 use super::prep::STEPS_MAX;
@@ -52,7 +52,7 @@ pub enum Built {
     /// Nothing: it has no length.
     Nothing,
     /// A block, which may be entered at so many mm/s.
-    Line(Move, f32),
+    Line(f32),
     /// More steps than a block holds: to be made in so many parts.
     Parts(u16),
 }
@@ -69,20 +69,25 @@ pub struct Builder {
 }
 
 impl Builder {
-    /// The block for a move. Nothing is changed unless it is [`Built::Line`].
+    /// The block for a move, put into `out` if it is [`Built::Line`]. Nothing is changed otherwise.
     ///
-    /// Cost: 3,000 + 1,200 for each axis that moves and 600 for each motor, for short moves.
+    /// Cost: 3,500 + 1,300 for each axis that moves with its motor, for short moves.
     #[inline(never)]
-    pub fn line(&mut self, line: &Line, dynamics: &Dynamics, machine: &impl Motors) -> Built {
+    pub fn line(
+        &mut self,
+        line: &Line,
+        dynamics: &Dynamics,
+        machine: &impl Motors,
+        out: &mut Move,
+    ) -> Built {
         let mut path = Path::default();
         match path.measure(line.from, line.to) {
             Way::None => return Built::Nothing,
             Way::Far => return Built::Parts(2),
             Way::Near => {}
         }
-        let mut motors = self.motors;
-        path.drive(&mut motors, line.to, machine);
-        if let Some(parts) = path.count(&self.motors, &motors) {
+        out.steps = [0; MOTORS];
+        if let Some(parts) = path.drive(&self.motors, line.to, machine, &mut out.steps) {
             return Built::Parts(parts);
         }
         path.limit(line.feed, dynamics);
@@ -96,17 +101,16 @@ impl Builder {
         }
         self.heading = path.heading;
         self.cruise = path.cruise;
-        self.motors = motors;
-        let block = Move {
-            steps: path.steps,
-            length: path.length,
-            cruise: path.cruise,
-            start: 0.0,
-            entry: Short::ZERO,
-            accel: path.accel,
-            jerk: path.jerk,
-        };
-        Built::Line(block, entry)
+        for m in 0..MOTORS {
+            if path.moved & (1 << m) != 0 {
+                self.motors[m] = path.motors[m];
+            }
+        }
+        out.length = path.length;
+        out.cruise = path.cruise;
+        out.accel = path.accel;
+        out.jerk = path.jerk;
+        Built::Line(entry)
     }
 
     /// The next move starts from rest.
@@ -157,8 +161,10 @@ struct Path {
     length: f32,
     /// Travel of each axis for a unit of length.
     heading: Heading,
-    steps: [i16; MOTORS],
-    /// Steps of the motor that makes most, and how many motors move.
+    /// Where the motors come to whose axes move: those in `moved`.
+    motors: [Motor; MOTORS],
+    moved: u8,
+    /// Steps of the motor that makes most, and how many motors make any.
     most: u16,
     moving: u8,
     cruise: f32,
@@ -203,32 +209,36 @@ impl Path {
         Way::Near
     }
 
-    /// Takes the motors to the end of the move.
+    /// Takes the motors to the end of the move and counts their steps, or says in how many parts these
+    /// would fit.
     #[inline(never)]
-    fn drive(&self, motors: &mut [Motor; MOTORS], to: &PerAxis<Length>, machine: &impl Motors) {
-        for (m, motor) in motors.iter_mut().enumerate() {
-            let axis = usize::from(machine.motor_axis(m));
-            if axis < AXES && self.travel[axis] != 0 {
-                motor.go(machine.ratio(m), self.travel[axis], to[axis]);
-            }
-        }
-    }
-
-    /// Counts the steps, or says in how many parts they would fit.
-    #[inline(never)]
-    fn count(&mut self, from: &[Motor; MOTORS], to: &[Motor; MOTORS]) -> Option<u16> {
+    fn drive(
+        &mut self,
+        from: &[Motor; MOTORS],
+        to: &PerAxis<Length>,
+        machine: &impl Motors,
+        steps: &mut [i16; MOTORS],
+    ) -> Option<u16> {
         for m in 0..MOTORS {
-            let (from, to) = (from[m].steps, to[m].steps);
-            if from == to {
+            let axis = usize::from(machine.motor_axis(m));
+            if axis >= AXES || self.travel[axis] == 0 {
                 continue;
             }
-            let steps = match to.checked_sub(from).map(i16::try_from) {
-                Some(Ok(steps)) if steps != i16::MIN => steps,
-                _ => return Some(parts(from, to)),
-            };
-            self.steps[m] = steps;
-            self.moving += 1;
-            self.most = self.most.max(steps.unsigned_abs());
+            let mut motor = from[m];
+            motor.go(machine.ratio(m), self.travel[axis], to[axis]);
+            self.motors[m] = motor;
+            self.moved |= 1 << m;
+            let (before, after) = (from[m].steps, motor.steps);
+            let way = after.wrapping_sub(before);
+            let size = way.unsigned_abs();
+            if size > u32::from(STEPS_MAX) || (way < 0) != (after < before) {
+                return Some(parts(before, after));
+            }
+            if size != 0 {
+                steps[m] = way as i16;
+                self.moving += 1;
+                self.most = self.most.max(size as u16);
+            }
         }
         None
     }
@@ -238,7 +248,7 @@ impl Path {
     fn limit(&mut self, feed: Option<Feed>, dynamics: &Dynamics) {
         self.cruise = match feed {
             Some(Feed::PerMinute(feed)) => feed * (1.0 / 60.0),
-            Some(Feed::Minutes(time)) if time > 0.0 => self.length / (time * 60.0),
+            Some(Feed::Minutes(time)) if some(time) => self.length / (time * 60.0),
             _ => CRUISE_MOST,
         };
         for (&u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
@@ -302,10 +312,14 @@ impl Path {
         if self.moving == 0 {
             return;
         }
-        let way = RATES[usize::from(self.moving) - 1] * self.length;
+        let rate = RATES[usize::from(self.moving) - 1];
         let most = f32::from(self.most);
-        if below(way, self.cruise * most) {
-            self.cruise = way / most;
+        // Two octaves: plainly below the limit, whatever the logarithms' error.
+        if log(self.cruise) + log(most) + 2 * OCTAVE > log(rate) + log(self.length) {
+            let way = rate * self.length;
+            if below(way, self.cruise * most) {
+                self.cruise = way / most;
+            }
         }
         if below(self.length, self.cruise * BLOCK_S_MIN) {
             self.cruise = self.length * (1.0 / BLOCK_S_MIN);

@@ -10,7 +10,7 @@ use crate::config::{Settings, StepRatio};
 use crate::gcode::arc::Chords;
 use crate::gcode::command::{Commands, Feed, Motion, Stop};
 use crate::hal::event::{Event, wait};
-use crate::motion::block::{Block, Body};
+use crate::motion::block::{Block, Body, Line as Move};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line, Motors};
 use crate::motion::queue::BlockQueue;
@@ -131,11 +131,12 @@ impl Planner {
     fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) -> Option<u16> {
         let settings = self.links.settings.borrow();
         let line = Line { from: &self.position, to: target, feed };
-        match self.builder.line(&line, &self.dynamics, &*settings) {
+        let mut block = Move::default();
+        match self.builder.line(&line, &self.dynamics, &*settings, &mut block) {
             Built::Nothing => None,
             Built::Parts(parts) => Some(parts),
-            Built::Line(block, entry) => {
-                self.queue.push_line(block, entry, self.line);
+            Built::Line(entry) => {
+                self.queue.push_line(&mut block, entry, self.line);
                 None
             }
         }

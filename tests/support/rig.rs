@@ -4,7 +4,7 @@ use kerf::boards::MOTORS;
 use kerf::config::StepRatio;
 use kerf::gcode::command::Feed;
 use kerf::hal::ring::{Consumer, Producer, Ring};
-use kerf::motion::block::Block;
+use kerf::motion::block::{Block, Line as Move};
 use kerf::motion::dda::{Dda, Pins, SEGMENTS, Segment};
 use kerf::motion::dynamics::{Dynamics, Machine};
 use kerf::motion::exec::{Exec, Snapshot, Step};
@@ -167,10 +167,11 @@ impl Rig {
     pub fn line(&mut self, to: PerAxis<Length>, velocity: f32, number: u32) {
         let feed = Some(Feed::PerMinute(velocity * 60.0));
         let line = Line { from: &self.position, to: &to, feed };
-        match self.builder.line(&line, &self.dynamics, &self.config) {
+        let mut block = Move::default();
+        match self.builder.line(&line, &self.dynamics, &self.config, &mut block) {
             Built::Nothing => {}
             Built::Parts(_) => panic!("too long for a test"),
-            Built::Line(block, entry) => assert!(self.queue.push_line(block, entry, number)),
+            Built::Line(entry) => assert!(self.queue.push_line(&mut block, entry, number)),
         }
         self.position = to;
     }
