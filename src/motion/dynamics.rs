@@ -3,7 +3,9 @@
 //! Owned by the planner task, made from the settings when they change: they keep integers in the units
 //! of the sender, whose conversion takes longer than planning a block.
 
+use super::line::Motors;
 use super::short::Short;
+use crate::boards::MOTORS;
 use crate::units::{AXES, PerAxis};
 
 /// Where the limits come from: the settings, in their units. Axes are 0 to 5 for X Y Z A B C; a limit that
@@ -45,11 +47,13 @@ pub struct Dynamics {
     pub axes: PerAxis<Axis>,
     /// Junction acceleration, mm/s^2.
     pub junction: f32,
+    /// The axis that each motor drives; [`AXES`] or more if none.
+    pub drives: [u8; MOTORS],
 }
 
 impl Dynamics {
     /// Cost: 2,000 an axis.
-    pub fn new(machine: &impl Machine) -> Self {
+    pub fn new(machine: &(impl Machine + Motors)) -> Self {
         let mut axes = [Axis::default(); AXES];
         for (n, axis) in axes.iter_mut().enumerate() {
             *axis = Axis {
@@ -60,6 +64,10 @@ impl Dynamics {
                 deviation: Short::new(machine.junction_deviation(n)),
             };
         }
-        Self { axes, junction: machine.junction_acceleration() * (1.0 / 3_600.0) }
+        let mut drives = [0; MOTORS];
+        for (m, axis) in drives.iter_mut().enumerate() {
+            *axis = machine.motor_axis(m);
+        }
+        Self { axes, junction: machine.junction_acceleration() * (1.0 / 3_600.0), drives }
     }
 }

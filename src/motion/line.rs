@@ -87,7 +87,7 @@ impl Builder {
             Way::Near => {}
         }
         out.steps = [0; MOTORS];
-        if let Some(parts) = path.drive(&self.motors, line.to, machine, &mut out.steps) {
+        if let Some(parts) = path.drive(&self.motors, line.to, dynamics, machine, &mut out.steps) {
             return Built::Parts(parts);
         }
         path.limit(line.feed, dynamics);
@@ -216,11 +216,12 @@ impl Path {
         &mut self,
         from: &[Motor; MOTORS],
         to: &PerAxis<Length>,
+        dynamics: &Dynamics,
         machine: &impl Motors,
         steps: &mut [i16; MOTORS],
     ) -> Option<u16> {
         for m in 0..MOTORS {
-            let axis = usize::from(machine.motor_axis(m));
+            let axis = usize::from(dynamics.drives[m]);
             if axis >= AXES || self.travel[axis] == 0 {
                 continue;
             }
@@ -336,29 +337,32 @@ fn least_of(accel: f32) -> f32 {
 #[inline(never)]
 fn normalize(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, bits: u32) -> i8 {
     const MOST: u32 = 1 << 14;
-    let mut bits = bits;
     let mut shift = 0i8;
+    if bits < 2 * MOST {
+        // All 16 bits wide.
+        let mut bits = bits as u16;
+        while bits < MOST as u16 {
+            bits <<= 1;
+            shift += 1;
+        }
+        for (unit, &way) in unit.iter_mut().zip(travel) {
+            let mut way = way as i16;
+            if way != 0 {
+                for _ in 0..shift {
+                    way <<= 1;
+                }
+            }
+            *unit = way;
+        }
+        return -shift;
+    }
+    let mut bits = bits;
     while bits >= 2 * MOST {
         bits >>= 1;
         shift += 1;
     }
-    while bits < MOST {
-        bits <<= 1;
-        shift -= 1;
-    }
     for (unit, &way) in unit.iter_mut().zip(travel) {
-        *unit = if way == 0 {
-            0
-        } else if shift <= 0 {
-            // The result has 15 bits: no more are needed on the way.
-            let mut way = way as i16;
-            for _ in 0..-shift {
-                way <<= 1;
-            }
-            way
-        } else {
-            (way >> shift) as i16
-        };
+        *unit = if way == 0 { 0 } else { (way >> shift) as i16 };
     }
     shift
 }

@@ -163,12 +163,10 @@ impl Prep {
                     // It was measured in the old direction.
                     self.debt[m] = -self.debt[m];
                 }
-                let minor = &mut self.minors[m];
-                if minor.steps == most {
+                if self.minors[m].steps == most {
                     self.full |= bit;
                 } else {
                     self.minor |= bit;
-                    minor.owed = product(self.debt[m], most);
                 }
             }
             bit <<= 1;
@@ -216,15 +214,69 @@ impl Prep {
         true
     }
 
+    /// Prepares the whole of a block that begins: `cycles` for it, no more than a few milliseconds. False,
+    /// and no segment, when it has no steps; the time is kept then.
+    ///
+    /// The same as `last` for it, but short and simple. Cost: 700, and 400 for each motor but the dominant.
+    #[inline(never)]
+    pub fn whole(&mut self, cycles: u32, out: &mut Segment) -> bool {
+        let cycles = self.time.saturating_add(cycles as i32).max(1) as u32;
+        let most = self.most;
+        if most == 0 || most > TICKS_MAX {
+            return self.last_of(cycles, COARSEST, out);
+        }
+        let limit = self.limit(cycles, COARSEST) as u16;
+        let (mut ticks, mut increment) = (most, STEP);
+        while ticks <= limit / 2 {
+            ticks *= 2;
+            increment /= 2;
+        }
+        let shortest = PACES[usize::from(self.others)].shortest;
+        let long = (cycles >> 16) as u16 >= ticks;
+        let period = if long { u16::MAX } else { quotient(cycles + u32::from(ticks / 2), ticks) };
+        let period = period.max(shortest);
+        self.time = (cycles as i32 - (u32::from(ticks) * u32::from(period)) as i32).max(-1000);
+        self.left = 0;
+        out.ticks = ticks;
+        out.period = period;
+        out.backwards = self.backwards;
+        out.settle = 0;
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            out.increment[m] = if self.full & bit != 0 {
+                increment
+            } else if self.minor & bit != 0 {
+                self.even(m, ticks)
+            } else {
+                0
+            };
+            bit <<= 1;
+        }
+        out.seal();
+        true
+    }
+
+    /// The increment that takes a motor over its block in `ticks`, and what it is short of then.
+    fn even(&mut self, m: usize, ticks: u16) -> u16 {
+        let wanted = (u32::from(self.minors[m].steps) << 16 >> 1) as i32 + i32::from(self.debt[m]);
+        let wanted = wanted.max(0);
+        let increment = quotient(wanted as u32 + u32::from(ticks / 2), ticks).min(STEP);
+        self.debt[m] = (wanted - (u32::from(increment) * u32::from(ticks)) as i32) as i16;
+        increment
+    }
+
     /// Prepares the last stretch of the block, everything that is left, in `cycles`. False,
     /// and no segment, when nothing is left; the time is kept then.
-    pub fn last(&mut self, cycles: u32, whole: bool, out: &mut Segment) -> bool {
+    pub fn last(&mut self, cycles: u32, out: &mut Segment) -> bool {
         let cycles = self.time.saturating_add(cycles as i32).max(1) as u32;
+        self.last_of(cycles, self.pace(), out)
+    }
+
+    fn last_of(&mut self, cycles: u32, pace: u16, out: &mut Segment) -> bool {
         if self.left == 0 {
             self.time = cycles as i32;
             return false;
         }
-        let pace = if whole { COARSEST } else { self.pace() };
         let (_, shift) = coarsen(self.left, self.limit(cycles, pace));
         // Ticks that do not go into what is left would leave a rest.
         let shift = shift.min(self.left.trailing_zeros() as u8);
@@ -297,6 +349,9 @@ impl Prep {
     #[inline(never)]
     fn emit(&mut self, ticks: u16, shift: u8, period: u16, cycles: u32, out: &mut Segment) {
         if shift != self.shift {
+            if self.shift == u8::MAX {
+                self.take_up_debts();
+            }
             self.scale(shift);
         }
         let used = u32::from(ticks) * u32::from(period);
@@ -324,6 +379,17 @@ impl Prep {
             self.settle_debts();
         }
         out.seal();
+    }
+
+    /// What motors are short of from blocks before, in the units of this one.
+    fn take_up_debts(&mut self) {
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            if self.minor & bit != 0 {
+                self.minors[m].owed = product(self.debt[m], self.most);
+            }
+            bit <<= 1;
+        }
     }
 
     /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.
