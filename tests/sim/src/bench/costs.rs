@@ -15,7 +15,7 @@ const EXEC_VECTOR: u8 = 52;
 /// Called once for each segment that exec has prepared.
 const SEGMENT_READY: &str = "kerf::hal::imp::stepper::go";
 /// Queues a block and plans again.
-const QUEUE_PUSH: &str = "<kerf::motion::queue::BlockQueue>::push";
+const QUEUE_PUSH: &str = "<kerf::motion::queue::BlockQueue>::push_line";
 
 /// The short moves: how many, how long (mm), at what feed (mm/min). 4,000 a second would do.
 const SHORT: (u32, f64, f64) = (3_000, 0.05, 12_000.0);
