@@ -193,15 +193,17 @@ impl Governor {
                 break;
             }
             if time < phase.time || stretch.seconds >= most {
-                // What would be left is not worth a stretch.
-                if most > nominal || left - stretch.distance > 0.5 * nominal * state.velocity {
+                // What would be left, of the block or the brake, is not worth a stretch.
+                let short = left - stretch.distance <= 0.5 * nominal * state.velocity
+                    || brake.rest() < 0.25 * nominal;
+                if most > nominal || !short {
                     break;
                 }
                 most += nominal;
             }
         }
         self.brake = Some(brake);
-        if brake.phase().is_none() {
+        if brake.rest() < 0.05 * nominal {
             state = State { velocity: brake.velocity, alpha: 0.0 };
             self.brake = None;
         }
