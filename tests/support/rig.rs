@@ -112,8 +112,8 @@ pub struct Emitted {
     pub velocity: f32,
     /// The block it belongs to: the line number given with the move.
     pub line: u32,
-    /// mm to the end of that block.
-    pub left: f32,
+    /// How far the motors are ahead of where the governor is at its end, steps of the one that moves most.
+    pub ahead: f64,
 }
 
 pub struct Rig {
@@ -198,8 +198,9 @@ impl Rig {
             self.segments += 1;
             self.add(&segment);
             if self.keep {
-                let Snapshot { velocity, line, left, .. } = self.snapshot;
-                self.emitted.push(Emitted { segment, velocity, line, left });
+                let Snapshot { velocity, line, .. } = self.snapshot;
+                let ahead = self.ahead();
+                self.emitted.push(Emitted { segment, velocity, line, ahead });
             }
             self.fill.push(segment).expect("room");
             self.pins.stopped = false;
@@ -223,6 +224,17 @@ impl Rig {
             let way = i64::from(segment.increment[m]) * i64::from(segment.ticks);
             *travel += if segment.backwards & (1 << m) != 0 { -way } else { way };
         }
+    }
+
+    /// See [`Emitted::ahead`].
+    fn ahead(&self) -> f64 {
+        let of = |m: &usize| self.snapshot.steps[*m].unsigned_abs();
+        let most = (0..MOTORS).max_by_key(of).expect("motors");
+        let steps = f64::from(self.snapshot.steps[most]);
+        let left = f64::from(self.snapshot.left / self.snapshot.length.max(1e-9)) * steps;
+        let planned = f64::from(self.snapshot.target[most]) - left;
+        let ahead = self.travel[most] as f64 / f64::from(STEP) - planned;
+        if steps < 0.0 { -ahead } else { ahead }
     }
 
     /// A block has come to its end: so have the motors, but for what never moves a step.
