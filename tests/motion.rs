@@ -1,10 +1,12 @@
 //! Random jobs through planner, exec and step generator, on the host: every block ends on its step, within
 //! the limits of every axis, and no later than need be.
 
+#[allow(dead_code, reason = "each test uses a part")]
 #[path = "support/jobs.rs"]
 mod jobs;
 #[path = "support/optimum.rs"]
 mod optimum;
+#[allow(dead_code, reason = "each test uses a part")]
 #[path = "support/rig.rs"]
 mod rig;
 

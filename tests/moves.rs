@@ -1,9 +1,12 @@
 //! Single moves on the host: their time against the optimum, their rate, and what takes time without steps.
 
+#[allow(dead_code, reason = "each test uses a part")]
 #[path = "support/jobs.rs"]
 mod jobs;
+#[allow(dead_code, reason = "each test uses a part")]
 #[path = "support/optimum.rs"]
 mod optimum;
+#[allow(dead_code, reason = "each test uses a part")]
 #[path = "support/rig.rs"]
 mod rig;
 
@@ -12,8 +15,8 @@ use kerf::motion::block::{Block, Body};
 use optimum::rest_to_rest;
 use rig::{Config, Rig, at};
 
-/// What the length of stretches costs a move, s: three of them.
-const COST: f64 = 3.0 * kerf::motion::exec::SEGMENT_S as f64;
+/// What the length of stretches costs a move at most, s: three and a half of them.
+const COST: f64 = 3.5 * kerf::motion::exec::SEGMENT_S as f64;
 
 /// Time of a move by itself, and the shortest with its limits, s.
 fn lone(mm: f64, velocity: f32, accel: f32, jerk: f32) -> (f64, f64) {
@@ -43,7 +46,7 @@ fn moves_take_little_longer_than_the_optimum() {
             }
         }
     }
-    // On the average a third of that.
+    // On the average less than a third of that.
     let moves = (LENGTHS.len() * limits.len() * 2) as f64;
     assert!(lost / moves <= COST / 3.0, "{} s on the average", lost / moves);
 }
@@ -67,12 +70,14 @@ fn a_high_jerk_is_the_exact_trapezoid() {
     }
 }
 
-/// Steps per second of motor X between a quarter and three quarters of what it did.
-fn rate(rig: &Rig) -> f64 {
+/// Steps per second of motor X between a quarter and three quarters of what it did, and how many steps
+/// that is.
+fn rate(rig: &Rig) -> (f64, f64) {
     let edges = &rig.pins.edges[0];
     let middle = &edges[edges.len() / 4..edges.len() * 3 / 4];
     let cycles = (middle[middle.len() - 1] - middle[0]) as f64;
-    (middle.len() - 1) as f64 * 16e6 / cycles
+    let steps = (middle.len() - 1) as f64;
+    (steps * 16e6 / cycles, steps)
 }
 
 #[test]
@@ -81,14 +86,16 @@ fn cruises_at_the_commanded_rate() {
         for velocity in [0.1f32, 1.0, 37.0, 99.9, 250.0] {
             let mut rig = Rig::new(Config::new(300.0, 5000.0, jerk));
             rig.pins.keep_edges = true;
-            let mm = f64::from(velocity) * 2.0 + 1.0;
+            let mm = f64::from(velocity) * 1.2 + 1.0;
             rig.line(at([mm, mm / 3.0, 0.0, 0.0]), velocity, 1);
             rig.finish();
             assert_eq!(rig.pins.position, rig.target());
             // X makes its share of the path's velocity.
             let wanted = f64::from(velocity) * 80.0 / (1.0f64 + 1.0 / 9.0).sqrt();
-            let got = rate(&rig);
-            assert!((got / wanted - 1.0).abs() < 1e-3, "{got} steps/s, not {wanted}");
+            let (got, steps) = rate(&rig);
+            // Stretches end on whole ticks: a step may come a quarter early or late.
+            let most = 1e-3 + 0.25 / steps;
+            assert!((got / wanted - 1.0).abs() < most, "{got} steps/s, not {wanted}");
         }
     }
 }
