@@ -4,7 +4,8 @@
 //! stretch by stretch, whatever length they have: distances are integrals, so that it comes out where it
 //! was to, to what floats are off.
 //!
-//! Three phases: alpha falls, is kept, and rises to 0 again. Units as in `reach`, s. Cost on AVR: 4,500
+//! Five phases: an acceleration ends, the velocity is kept until it is time to brake, alpha falls, is kept,
+//! and rises to 0 again. Units as in `reach`, s. Cost on AVR: 4,500
 //! cycles to make, 1,500 a stretch and 1,000 more in which phases change.
 
 use super::float::{greater, lesser};
@@ -13,15 +14,6 @@ use super::reach::{Ahead, Demand, Reach};
 use super::state::{Limits, State};
 use crate::math::sqrt;
 
-/// A part of a brake.
-#[derive(Clone, Copy, Debug)]
-pub struct Phase {
-    /// Change of alpha in a second.
-    pub rate: f32,
-    /// How long it takes, s.
-    pub time: f32,
-}
-
 /// What is left of a brake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brake {
@@ -29,6 +21,9 @@ pub struct Brake {
     pub velocity: f32,
     /// There are other limits to be thought of.
     pub alone: bool,
+    /// What is left of the phases, s.
+    level: f32,
+    coast: f32,
     fall: f32,
     hold: f32,
     rise: f32,
@@ -41,85 +36,123 @@ impl Brake {
     /// From a state to what is demanded.
     #[inline(never)]
     pub fn new(state: &State, reach: &Reach, demand: &Demand, limits: &Limits) -> Self {
-        if demand.share + state.alpha <= 0.0 {
-            return Self::soft(state, demand, limits);
+        if state.alpha < 0.0 {
+            return match Self::soft(state, demand, limits) {
+                Some(brake) => brake,
+                None => Self::harder(state, reach, demand, limits),
+            };
         }
-        let mut share = demand.share;
-        let pace = limits.pace;
-        let drop = reach.top() - demand.velocity;
-        let mut hold = drop / (share * limits.accel) - share / pace;
-        if hold < 0.0 {
-            share = sqrt(0.5 * drop / limits.kappa);
-            hold = 0.0;
-        }
+        let (pace, velocity) = (limits.pace, demand.velocity);
+        let drop = reach.top() - velocity;
+        let share = full_share(drop, limits);
         let rise = share / pace;
-        let fall = rise + state.alpha / pace;
-        Brake { velocity: demand.velocity, fall, hold, rise, pace, ease: pace, alone: demand.alone }
+        let hold = greater(drop / (share * limits.accel) - rise, 0.0);
+        let coast = 0.5 * greater(demand.slack, 0.0) / (limits.accel * reach.top());
+        let level = state.alpha / pace;
+        let alone = demand.alone;
+        Brake { velocity, level, coast, fall: rise, hold, rise, ease: pace, pace, alone }
+    }
+
+    /// It brakes already, but not as hard as it has to: just so hard.
+    #[inline(never)]
+    fn harder(state: &State, reach: &Reach, demand: &Demand, limits: &Limits) -> Self {
+        let velocity = demand.velocity;
+        let (drop, sum) = (reach.top() - velocity, reach.top() + velocity);
+        let product = drop * sum;
+        let way = demand.way - reach.spent();
+        let root = sqrt(way * way - 8.0 * limits.kappa * sum * product);
+        let share = lesser(2.0 * product / (way + root), full_share(drop, limits));
+        Self::braking(velocity, share, drop, state, limits, demand.alone)
+    }
+
+    /// Three phases, from a top that is past.
+    fn braking(
+        velocity: f32,
+        share: f32,
+        drop: f32,
+        state: &State,
+        limits: &Limits,
+        alone: bool,
+    ) -> Self {
+        let pace = limits.pace;
+        let rise = share / pace;
+        let fall = greater(rise + state.alpha / pace, 0.0);
+        let hold = greater(drop / (share * limits.accel) - rise, 0.0);
+        Brake { velocity, level: 0.0, coast: 0.0, fall, hold, rise, ease: pace, pace, alone }
     }
 
     /// To a standstill, as fast as may be.
-    pub fn hard(state: &State, reach: &Reach, limits: &Limits) -> Self {
-        let demand = Demand { velocity: 0.0, way: 0.0, share: 1.0, fits: true, alone: true };
-        Self::new(state, reach, &demand, limits)
+    pub fn hard(state: &State, limits: &Limits) -> Self {
+        let top = state.velocity + limits.kappa * state.alpha * state.alpha;
+        let share = greater(full_share(top, limits), -state.alpha);
+        Self::braking(0.0, share, top, state, limits, true)
     }
 
-    /// It brakes as hard as it has to, or harder: keeps that, and eases it slower than it could.
-    fn soft(state: &State, demand: &Demand, limits: &Limits) -> Self {
+    /// It brakes as hard as it has to, or harder, or else `None`: keeps that, and
+    /// eases it slower than it could.
+    #[inline(never)]
+    fn soft(state: &State, demand: &Demand, limits: &Limits) -> Option<Self> {
         let w = demand.velocity;
         let brake = -state.alpha * limits.accel;
         let drop = state.velocity - w;
         // The way that is left if it braked so to the end: `brake rise^2 / 24 + w rise / 2`.
         let way = 0.5 * demand.way / limits.accel;
-        let rest = greater(way - 0.5 * drop * (state.velocity + w) / brake, 0.0);
+        let rest = way - 0.5 * drop * (state.velocity + w) / brake;
+        if rest <= 0.0 {
+            return None;
+        }
         let half = 0.5 * w;
         let mut rise = 2.0 * rest / (half + sqrt(half * half + brake * rest * (1.0 / 6.0)));
-        let least = -state.alpha / limits.pace;
-        // What the way left does not allow, rounding asks for.
-        rise = greater(rise, least);
+        if rise < -0.9999 * state.alpha / limits.pace {
+            return None;
+        }
         let mut hold = drop / brake - 0.5 * rise;
         if hold < 0.0 {
             hold = 0.0;
             // Nothing but a parabola to the end: if it is too far, from a lower acceleration.
             rise = 3.0 * way / (state.velocity + w + w);
         }
-        let ease = 2.0 * drop / (limits.accel * rise * rise);
-        let ease = if hold > 0.0 { -state.alpha / rise } else { ease };
-        Brake { velocity: w, fall: 0.0, hold, rise, pace: limits.pace, ease, alone: demand.alone }
+        let ease = if hold > 0.0 {
+            -state.alpha / rise
+        } else {
+            2.0 * drop / (limits.accel * rise * rise)
+        };
+        let (pace, alone) = (limits.pace, demand.alone);
+        let fall = 0.0;
+        Some(Brake { velocity: w, level: fall, coast: fall, fall, hold, rise, pace, ease, alone })
     }
 
     /// The alpha to go on with from here: easing begins with what it ends with.
-    pub fn alpha(&self, alpha: f32) -> f32 {
-        if self.fall <= 0.0 && self.hold <= 0.0 { -self.ease * self.rise } else { alpha }
+    fn alpha(&self, alpha: f32) -> f32 {
+        let easing = self.level + self.coast + self.fall + self.hold <= 0.0;
+        if easing { -self.ease * self.rise } else { alpha }
     }
 
-    /// The phase it is in. `None` when it is done.
-    pub fn phase(&self) -> Option<Phase> {
-        if self.fall > 0.0 {
-            Some(Phase { rate: -self.pace, time: self.fall })
+    /// The phase it is in: change of alpha in a second, and how long it takes, s.
+    fn phase(&mut self) -> (f32, &mut f32) {
+        if self.level > 0.0 {
+            (-self.pace, &mut self.level)
+        } else if self.coast > 0.0 {
+            (0.0, &mut self.coast)
+        } else if self.fall > 0.0 {
+            (-self.pace, &mut self.fall)
         } else if self.hold > 0.0 {
-            Some(Phase { rate: 0.0, time: self.hold })
-        } else if self.rise > 0.0 {
-            Some(Phase { rate: self.ease, time: self.rise })
+            (0.0, &mut self.hold)
         } else {
-            None
+            (self.ease, &mut self.rise)
         }
     }
 
     /// How long it goes on, s.
     pub fn rest(&self) -> f32 {
-        self.fall + self.hold + self.rise
+        self.level + self.coast + self.fall + self.hold + self.rise
     }
+}
 
-    /// So much of the phase is done.
-    pub fn pass(&mut self, t: f32) {
-        if self.fall > 0.0 {
-            self.fall -= t;
-        } else if self.hold > 0.0 {
-            self.hold -= t;
-        } else {
-            self.rise -= t;
-        }
-    }
+/// The share of the acceleration limit that a ramp over `drop` gets to.
+fn full_share(drop: f32, limits: &Limits) -> f32 {
+    let twice = limits.kappa + limits.kappa;
+    if drop < twice { sqrt(drop / twice) } else { 1.0 }
 }
 
 impl Governor {
@@ -139,8 +172,7 @@ impl Governor {
     /// Brakes as hard as it may, for a stretch.
     #[inline(never)]
     fn hard(&mut self, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
-        let reach = Reach::new(self.state.velocity, self.state.alpha, self.limits.kappa);
-        let brake = Brake::hard(&self.state, &reach, &self.limits);
+        let brake = Brake::hard(&self.state, &self.limits);
         let stretch = self.run(brake, left, ahead, nominal);
         self.brake = None;
         stretch
@@ -176,32 +208,36 @@ impl Governor {
         let mut state = self.state;
         let mut most = nominal;
         let mut stretch = Stretch { seconds: 0.0, distance: 0.0, ends: false };
-        while let Some(phase) = brake.phase() {
+        while brake.rest() > 0.0 {
             state.alpha = brake.alpha(state.alpha);
-            let mut time = lesser(phase.time, most - stretch.seconds);
-            let way = state.way(time, phase.rate, accel);
+            let (rate, rest) = brake.phase();
+            let mut time = lesser(*rest, most - stretch.seconds);
+            let way = state.way(time, rate, accel);
             if stretch.distance + way >= left {
                 stretch.ends = true;
-                time = state.time(left - stretch.distance, time, phase.rate, accel);
+                time = state.time(left - stretch.distance, time, rate, accel);
             }
             stretch.distance += way;
             stretch.seconds += time;
-            state.velocity = greater(state.velocity_after(time, phase.rate, accel), 0.0);
-            state.alpha += phase.rate * time;
-            brake.pass(time);
+            state.velocity = greater(state.velocity_after(time, rate, accel), 0.0);
+            state.alpha += rate * time;
+            *rest -= time;
+            let through = *rest <= 0.0;
             if stretch.ends {
                 break;
             }
-            if time < phase.time || stretch.seconds >= most {
-                // What would be left is not worth a stretch.
-                if most > nominal || left - stretch.distance > 0.5 * nominal * state.velocity {
+            if !through || stretch.seconds >= most {
+                // What would be left, of the block or the brake, is not worth a stretch.
+                let short = left - stretch.distance <= 0.5 * nominal * state.velocity
+                    || brake.rest() < 0.25 * nominal;
+                if most > nominal || !short {
                     break;
                 }
                 most += nominal;
             }
         }
         self.brake = Some(brake);
-        if brake.phase().is_none() {
+        if brake.rest() < 0.05 * nominal {
             state = State { velocity: brake.velocity, alpha: 0.0 };
             self.brake = None;
         }
@@ -220,7 +256,7 @@ impl Governor {
                 && v > anchor.velocity
             {
                 // It should have got there by now: what is left is rounding.
-                seconds += lesser(brake.rest(), nominal);
+                seconds += lesser(brake.rest(), 4.0 * nominal);
                 self.state = State { velocity: anchor.velocity, alpha: 0.0 };
                 self.brake = None;
             }

@@ -337,11 +337,8 @@ impl Exec {
         blocks: &mut BlockSource,
         segment: &mut Segment,
     ) -> Step {
-        let some = if whole {
-            self.prep.whole(cycles, segment)
-        } else {
-            self.prep.last(cycles, segment)
-        };
+        let some =
+            if whole { self.prep.whole(cycles, segment) } else { self.prep.last(cycles, segment) };
         if self.prep.left() == 0 {
             self.running = None;
             blocks.release();

@@ -20,9 +20,7 @@ const REVERSED: f32 = 1.0 - 1e-5;
 /// The direction of a move.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heading {
-    /// How far each axis travels for a unit of the path, in 2^-14: up to [`ONE`] for moves whose path is
-    /// that of these axes. Moves of linear and rotary axes together have the path of the linear ones,
-    /// and may have more of a rotary one.
+    /// How far each axis travels for a unit of the path, in 2^-14: up to [`ONE`].
     pub unit: PerAxis<i16>,
     /// Junction deviation in this direction, mm.
     pub deviation: f32,

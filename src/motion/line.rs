@@ -161,6 +161,8 @@ struct Path {
     length: f32,
     /// Travel of each axis for a unit of length.
     heading: Heading,
+    /// How much longer the way of the rotary axes is than that of the linear ones, if it is; else 0.
+    stretch: f32,
     /// Where the motors come to whose axes move: those in `moved`.
     motors: [Motor; MOTORS],
     moved: u8,
@@ -173,32 +175,43 @@ struct Path {
 }
 
 impl Path {
-    /// Length and direction. The length is that of the linear axes; of the rotary ones if no linear
-    /// one moves. In 15 bits: 0.01 % exact.
+    /// Length and direction. 0.01 % exact, for a single axis exact.
+    ///
+    /// The length is that of the linear axes, or of the rotary ones (degrees) if these have the longer
+    /// way; the feed, which is that of the linear axes where they move, is more by as much.
     #[inline(never)]
     fn measure(&mut self, from: &PerAxis<Length>, to: &PerAxis<Length>) -> Way {
-        let mut bits = 0;
+        let mut bits = [0u32; 2];
+        let mut axes = 0u8;
+        let mut last = 0;
         for axis in 0..AXES {
             if from[axis] != to[axis] {
                 let Some(way) = to[axis].0.checked_sub(from[axis].0) else {
                     return Way::Far;
                 };
                 self.travel[axis] = way;
-                bits |= way.unsigned_abs();
+                bits[usize::from(axis >= FIRST_ROTARY)] |= way.unsigned_abs();
+                axes += 1;
+                last = axis;
             }
         }
-        if bits == 0 {
-            return Way::None;
+        let all = bits[0] | bits[1];
+        if axes < 2 {
+            self.heading.unit[last] = if self.travel[last] < 0 { -ONE } else { ONE };
+            self.length = all as f32 * 1e-4;
+            return if axes == 0 { Way::None } else { Way::Near };
         }
-        let shift = normalize(&mut self.heading.unit, &self.travel, bits);
+        let shift = normalize(&mut self.heading.unit, &self.travel, all);
         let (linear, rotary) = self.heading.unit.split_at(FIRST_ROTARY);
         let mut length = norm(linear);
-        if length == 0 {
-            length = norm(rotary);
-        }
-        if length == 0 {
-            // A linear move too short beside its rotary one to be told from none.
-            length = 1;
+        if bits[1] != 0 {
+            let turn = norm(rotary);
+            if turn > length {
+                length = turn;
+                if bits[0] != 0 {
+                    self.stretch = stretch(&self.travel);
+                }
+            }
         }
         for u in &mut self.heading.unit {
             if *u != 0 {
@@ -244,22 +257,29 @@ impl Path {
         None
     }
 
+    /// The size of an axis' part of the heading, or a little more: never less than it is.
+    fn most_of(&self, axis: usize) -> u16 {
+        let u = self.heading.unit[axis].unsigned_abs();
+        (u + 2).min(ONE as u16)
+    }
+
     /// Applies the feed and the velocity limit of every axis that moves.
     #[inline(never)]
     fn limit(&mut self, feed: Option<Feed>, dynamics: &Dynamics) {
         self.cruise = match feed {
+            Some(Feed::PerMinute(feed)) if some(self.stretch) => feed * (1.0 / 60.0) * self.stretch,
             Some(Feed::PerMinute(feed)) => feed * (1.0 / 60.0),
             Some(Feed::Minutes(time)) if some(time) => self.length / (time * 60.0),
             _ => CRUISE_MOST,
         };
-        for (&u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
-            if u == 0 {
+        for (n, axis) in dynamics.axes.iter().enumerate() {
+            if self.travel[n] == 0 {
                 continue;
             }
             let velocity = if feed.is_some() { axis.feed } else { axis.velocity };
             // Most axes are slower than the path.
-            if some(velocity) && (below(velocity, self.cruise) || u.unsigned_abs() > ONE as u16) {
-                let u = float(u.unsigned_abs());
+            if some(velocity) && below(velocity, self.cruise) {
+                let u = float(self.most_of(n));
                 if below(velocity, u * self.cruise) {
                     self.cruise = velocity / u;
                 }
@@ -277,18 +297,13 @@ impl Path {
     #[inline(never)]
     fn limit_change(&mut self, dynamics: &Dynamics) {
         let mut slowest = Slowest::default();
-        for (&u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
-            if u != 0 {
-                slowest.look(u.unsigned_abs(), axis);
+        for (n, axis) in dynamics.axes.iter().enumerate() {
+            if self.travel[n] != 0 {
+                slowest.look(self.most_of(n), axis);
             }
         }
-        let mut jerk = slowest.jerk.get();
-        let mut least = slowest.least.get();
-        // Moves of both linear and rotary axes may have units above 1.
-        if slowest.most > ONE as u16 {
-            jerk /= float(slowest.most);
-            least /= float(slowest.most);
-        }
+        let jerk = slowest.jerk.get();
+        let least = slowest.least.get();
         if some(least) {
             let jerk = effective_jerk(jerk, least);
             let accel = if some(jerk) { least } else { slowest.accel.get() / float(slowest.unit) };
@@ -371,28 +386,32 @@ fn normalize(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, bits: u32) -> i8 {
 #[inline(never)]
 fn norm(vector: &[i16]) -> u16 {
     let mut sum = 0u32;
-    let mut only = 0u16;
-    let mut terms = 0u8;
     for &term in vector {
-        if term != 0 {
-            terms += 1;
-            only = term.unsigned_abs();
-            sum += u32::from(only) * u32::from(only);
-        }
+        let size = term.unsigned_abs();
+        sum += u32::from(size) * u32::from(size);
     }
-    if terms < 2 { only } else { root(sum) }
+    root(sum)
 }
 
-/// `part / whole` in the units of a heading.
+/// How much longer the way of the rotary axes is than that of the linear ones.
+#[inline(never)]
+fn stretch(travel: &PerAxis<i32>) -> f32 {
+    let norm = |travel: &[i32]| {
+        let mut sum = 0.0;
+        for &way in travel {
+            sum += way as f32 * way as f32;
+        }
+        sqrt(sum)
+    };
+    let (linear, rotary) = travel.split_at(FIRST_ROTARY);
+    norm(rotary) / norm(linear)
+}
+
+/// `part / whole` in the units of a heading; no more than [`ONE`].
 #[inline(never)]
 fn share(part: i16, whole: u16) -> i16 {
     let size = part.unsigned_abs();
-    // Twice and more: a rotary axis beside a linear one.
-    let share = if size >> 1 >= whole {
-        i16::MAX
-    } else {
-        quotient(u32::from(size) << 14, whole).min(i16::MAX as u16) as i16
-    };
+    let share = if size >= whole { ONE } else { quotient(u32::from(size) << 14, whole) as i16 };
     if part < 0 { -share } else { share }
 }
 
@@ -414,8 +433,6 @@ struct Slowest {
     unit: u16,
     least: Short,
     jerk: Short,
-    /// The largest unit.
-    most: u16,
 }
 
 impl Slowest {
@@ -438,9 +455,6 @@ impl Slowest {
         }
         if axis.jerk != Short::ZERO && (self.jerk == Short::ZERO || axis.jerk < self.jerk) {
             self.jerk = axis.jerk;
-        }
-        if self.most < u {
-            self.most = u;
         }
     }
 }

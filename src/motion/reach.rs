@@ -31,7 +31,6 @@
 //!
 //! Cost on AVR: 800 cycles a state, and for each limit below its top 1,500 to 2,500.
 
-use super::float::lesser;
 use super::queue::Anchor;
 use crate::math::sqrt;
 
@@ -65,8 +64,8 @@ pub struct Demand {
     pub velocity: f32,
     /// Way to there, brake potential from where the state is.
     pub way: f32,
-    /// The share of the acceleration limit that just does it, if braking begins at the top.
-    pub share: f32,
+    /// What is not needed of it if braking begins at the top.
+    pub slack: f32,
     /// There is way enough.
     pub fits: bool,
     /// Nothing else has to be thought of on the way.
@@ -119,21 +118,21 @@ impl Reach {
         true
     }
 
-    /// The limit ahead that has to be braked for hardest.
+    /// The limit ahead that has to be braked for first.
     #[inline(never)]
     pub fn demand(&self, within: f32, ahead: &impl Ahead) -> Option<Demand> {
-        let mut hardest: Option<Demand> = None;
+        let mut first: Option<Demand> = None;
         let mut alone = true;
         let mut n = 0;
         while let Some(anchor) = ahead.anchor(n) {
-            if self.level > anchor.velocity {
+            if self.level > anchor.velocity * ROUNDING {
                 let way = anchor.ahead + within;
-                let share = self.share(way, anchor.velocity);
-                alone = hardest.is_none();
-                if hardest.is_none_or(|demand| share > demand.share) {
-                    let velocity = anchor.velocity;
+                let velocity = anchor.velocity;
+                let slack = self.slack(way, velocity);
+                alone = first.is_none();
+                if first.is_none_or(|demand| slack < demand.slack) {
                     let fits = self.fits(way, velocity);
-                    hardest = Some(Demand { velocity, way, share, fits, alone });
+                    first = Some(Demand { velocity, way, slack, fits, alone });
                 }
                 if self.fits(way, 0.0) {
                     break;
@@ -144,7 +143,7 @@ impl Reach {
             }
             n += 1;
         }
-        let mut demand = hardest?;
+        let mut demand = first?;
         demand.alone = alone && {
             let there = Reach::new(demand.velocity, 0.0, self.kappa);
             there.safe(within - demand.way, ahead, NONE)
@@ -152,20 +151,21 @@ impl Reach {
         Some(demand)
     }
 
-    /// The share of the acceleration limit with which it comes down to `w` in `way`.
-    fn share(&self, way: f32, w: f32) -> f32 {
-        let way = way - self.spent;
+    /// What is left of `way` if it comes down to `w`, below the top, as late as may be: brake potential.
+    fn slack(&self, way: f32, w: f32) -> f32 {
         let (drop, sum) = (self.top - w, self.top + w);
-        let product = sum * drop;
-        if way <= 0.0 {
-            return 1.0;
-        }
-        let share = 2.0 * product / (way + sqrt(way * way - 8.0 * self.kappa * sum * product));
-        lesser(share, 1.0)
+        let twice = self.kappa + self.kappa;
+        let needed = if drop >= twice { drop + twice } else { sqrt(4.0 * twice * drop) };
+        way - self.spent - sum * needed
     }
 
     /// The velocity from which it comes, or to which it goes, with alpha 0.
     pub fn top(&self) -> f32 {
         self.top
+    }
+
+    /// The way to there, less than 0 if it is past, brake potential.
+    pub fn spent(&self) -> f32 {
+        self.spent
     }
 }

@@ -62,7 +62,16 @@ impl Governor {
         if !ends && next.distance + 0.5 * nominal * after >= left {
             // What would be left is not worth a stretch.
             ends = true;
-            seconds = lesser(self.time_to(after, left, nominal), nominal);
+            seconds = self.time_to(after, left, nominal);
+            next = self.choose(left, cruise, ahead, seconds, true)?;
+        }
+        // Another state may be safe at the very end, one that takes less time to get there.
+        for _ in 0..3 {
+            let time = self.time_to(next.state.velocity, left, nominal);
+            if !ends || time >= 0.99 * seconds {
+                break;
+            }
+            seconds = time;
             next = self.choose(left, cruise, ahead, seconds, true)?;
         }
         let after = next.state.velocity;

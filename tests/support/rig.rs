@@ -5,7 +5,7 @@ use kerf::config::StepRatio;
 use kerf::gcode::command::Feed;
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf::motion::block::{Block, Line as Move};
-use kerf::motion::dda::{Dda, Pins, SEGMENTS, Segment};
+use kerf::motion::dda::{Dda, PHASE_MARGIN, Pins, SEGMENTS, STEP, Segment};
 use kerf::motion::dynamics::{Dynamics, Machine};
 use kerf::motion::exec::{Exec, Snapshot, Step};
 use kerf::motion::line::{Builder, Built, Line, Motors};
@@ -112,8 +112,8 @@ pub struct Emitted {
     pub velocity: f32,
     /// The block it belongs to: the line number given with the move.
     pub line: u32,
-    /// mm to the end of that block.
-    pub left: f32,
+    /// How far the motors are ahead of where the governor is at its end, steps of the one that moves most.
+    pub ahead: f64,
 }
 
 pub struct Rig {
@@ -132,6 +132,8 @@ pub struct Rig {
     pub emitted: Vec<Emitted>,
     pub keep: bool,
     pub segments: u64,
+    /// What segments have moved each motor by, phase units.
+    travel: [i64; MOTORS],
 }
 
 impl Rig {
@@ -156,6 +158,7 @@ impl Rig {
             emitted: Vec::new(),
             keep: true,
             segments: 0,
+            travel: [0; MOTORS],
         }
     }
 
@@ -188,6 +191,7 @@ impl Rig {
 
     /// Runs exec once and the steppers as long as segments are queued.
     pub fn turn(&mut self) -> Step {
+        let blocks = self.source.len();
         let mut segment = Segment::default();
         let step =
             self.exec.step(&mut self.source, self.pins.stopped, &mut self.snapshot, &mut segment);
@@ -195,12 +199,17 @@ impl Rig {
             assert!(segment.ticks > 0 && segment.period > 0, "{segment:?}");
             assert!(segment.increment.iter().all(|i| *i <= 0x8000), "{segment:?}");
             self.segments += 1;
+            self.add(&segment);
             if self.keep {
-                let Snapshot { velocity, line, left, .. } = self.snapshot;
-                self.emitted.push(Emitted { segment, velocity, line, left });
+                let Snapshot { velocity, line, .. } = self.snapshot;
+                let ahead = self.ahead();
+                self.emitted.push(Emitted { segment, velocity, line, ahead });
             }
             self.fill.push(segment).expect("room");
             self.pins.stopped = false;
+        }
+        if self.source.len() < blocks {
+            self.check_block();
         }
         while !self.drain.is_empty() {
             self.tick();
@@ -211,6 +220,32 @@ impl Rig {
             }
         }
         step
+    }
+
+    fn add(&mut self, segment: &Segment) {
+        for (m, travel) in self.travel.iter_mut().enumerate() {
+            let way = i64::from(segment.increment[m]) * i64::from(segment.ticks);
+            *travel += if segment.backwards & (1 << m) != 0 { -way } else { way };
+        }
+    }
+
+    /// See [`Emitted::ahead`].
+    fn ahead(&self) -> f64 {
+        let of = |m: &usize| self.snapshot.steps[*m].unsigned_abs();
+        let most = (0..MOTORS).max_by_key(of).expect("motors");
+        let steps = f64::from(self.snapshot.steps[most]);
+        let left = f64::from(self.snapshot.left / self.snapshot.length.max(1e-9)) * steps;
+        let planned = f64::from(self.snapshot.target[most]) - left;
+        let ahead = self.travel[most] as f64 / f64::from(STEP) - planned;
+        if steps < 0.0 { -ahead } else { ahead }
+    }
+
+    /// A block has come to its end: so have the motors, but for what never moves a step.
+    fn check_block(&self) {
+        for (travel, target) in self.travel.iter().zip(self.snapshot.target) {
+            let short = travel - i64::from(target) * i64::from(STEP);
+            assert!(short.abs() <= PHASE_MARGIN.into(), "{short} units off at {:?}", self.snapshot);
+        }
     }
 
     fn tick(&mut self) {

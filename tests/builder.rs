@@ -1,0 +1,289 @@
+//! From moves to blocks: limits of axes, motors and feed, corners, steps, against f64.
+
+#[allow(dead_code, reason = "each test uses a part")]
+#[path = "support/rig.rs"]
+mod rig;
+
+use kerf::boards::MOTORS;
+use kerf::config::StepRatio;
+use kerf::gcode::command::Feed;
+use kerf::motion::block::{Body, Line as Move};
+use kerf::motion::dynamics::Dynamics;
+use kerf::motion::exec::BLOCK_S_MIN;
+use kerf::motion::junction::{self, Heading, ONE};
+use kerf::motion::line::{Builder, Built, Line};
+use kerf::motion::prep::STEPS_MAX;
+use kerf::units::{AXES, FIRST_ROTARY, Length, PerAxis};
+use proptest::prelude::*;
+use rig::{Config, at};
+
+/// Limits are kept in two bytes, rounded down by at most so much.
+const SHORT: f64 = 1.0 / 256.0;
+
+/// Directions have 14 bits.
+const EXACT: f64 = 1.0005;
+
+/// The block of a move; there must be one.
+fn built(
+    builder: &mut Builder,
+    config: &Config,
+    ends: [PerAxis<Length>; 2],
+    feed: Option<Feed>,
+) -> (Move, f32) {
+    let line = Line { from: &ends[0], to: &ends[1], feed };
+    let mut block = Move::default();
+    match builder.line(&line, &Dynamics::new(config), config, &mut block) {
+        Built::Line(entry) => (block, entry),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn decades(low: f32, high: f32) -> impl Strategy<Value = f32> {
+    (low.ln()..high.ln()).prop_map(f32::exp)
+}
+
+prop_compose! {
+    fn any_config()(
+        velocity in prop::array::uniform6(decades(1.0, 500.0)),
+        accel in prop::array::uniform6(prop_oneof![decades(10.0, 1e4), Just(0.0)]),
+        jerk in prop::array::uniform6(prop_oneof![3 => decades(1e3, 1e8), 2 => Just(0.0)]),
+        sharp in any::<bool>(),
+        den in prop::array::uniform4(5u32..10_000),
+    ) -> Config {
+        let ratio = den.map(|den| StepRatio { num: 1, den });
+        let jerk = if sharp { [0.0; AXES] } else { jerk };
+        Config { velocity, accel, jerk, ratio, ..Config::new(1.0, 1.0, 1.0) }
+    }
+}
+
+/// Moves of one to six axes, from a tenth of a micrometre to metres, and their feeds.
+fn any_moves() -> impl Strategy<Value = Vec<(PerAxis<Length>, Option<Feed>)>> {
+    let place = prop_oneof![
+        4 => Just(0),
+        3 => -2000i32..2000,
+        2 => -20_000_000i32..20_000_000,
+        1 => -1i32..=1,
+    ];
+    let feed = prop_oneof![
+        Just(None),
+        decades(0.1, 1e5).prop_map(|f| Some(Feed::PerMinute(f))),
+        decades(1e-4, 10.0).prop_map(|t| Some(Feed::Minutes(t))),
+    ];
+    prop::collection::vec((prop::array::uniform6(place).prop_map(|to| to.map(Length)), feed), 1..20)
+}
+
+/// How far each axis goes for a unit of length, and the length, mm.
+fn unit(from: &PerAxis<Length>, to: &PerAxis<Length>) -> (PerAxis<f64>, f64) {
+    let way: PerAxis<f64> =
+        std::array::from_fn(|axis| (f64::from(to[axis].0) - f64::from(from[axis].0)) * 1e-4);
+    let norm = |way: &[f64]| way.iter().map(|d| d * d).sum::<f64>().sqrt();
+    let length = norm(&way[..FIRST_ROTARY]).max(norm(&way[FIRST_ROTARY..]));
+    (way.map(|d| d.abs() / length), length)
+}
+
+/// No limit of an axis or the feed is exceeded, and some limit is the reason for the velocity.
+fn check_limits(
+    block: &Move,
+    unit: &PerAxis<f64>,
+    length: f64,
+    feed: Option<Feed>,
+    config: &Config,
+) {
+    assert!((f64::from(block.length) / length - 1.0).abs() < 2e-4);
+    let mut cruise = match feed {
+        Some(Feed::PerMinute(feed)) => {
+            let linear = unit[..FIRST_ROTARY].iter().map(|u| u * u).sum::<f64>().sqrt();
+            f64::from(feed) / 60.0 / if linear > 0.0 { linear } else { 1.0 }
+        }
+        Some(Feed::Minutes(time)) => length / f64::from(time) / 60.0,
+        None => f64::INFINITY,
+    };
+    let (accel, jerk) = (f64::from(block.accel.get()), f64::from(block.jerk.get()));
+    let (mut least, mut limited) = (f64::INFINITY, false);
+    let mut slowest = cruise;
+    for axis in (0..AXES).filter(|&axis| unit[axis] > 0.0) {
+        cruise = cruise.min(f64::from(config.velocity[axis]) / unit[axis]);
+        let rounded = unit[axis] + 3.0 / f64::from(ONE);
+        slowest = slowest.min(f64::from(config.velocity[axis]) / rounded);
+        let most = f64::from(config.accel[axis]);
+        if most > 0.0 {
+            assert!(accel * unit[axis] <= most * EXACT, "axis {axis}: {accel} of {most}");
+            // Parts of a direction are rounded up.
+            least = least.min(most / (unit[axis] + 3.0 / f64::from(ONE)));
+        }
+        let most = f64::from(config.jerk[axis]);
+        limited |= most > 0.0;
+        if most > 0.0 && jerk > 0.0 {
+            assert!(jerk * unit[axis] <= most * EXACT, "axis {axis}: {jerk} of {most}");
+        }
+    }
+    assert!(limited || jerk == 0.0);
+    if !limited && least.is_finite() {
+        assert!(accel >= least.min(1e6) * (1.0 - 2.5 * SHORT), "{accel} of {least} mm/s^2");
+    }
+    // The slowest there is.
+    let cruise = cruise.max(1e-6);
+    let got = f64::from(block.cruise);
+    assert!(got <= cruise * EXACT, "{got} of {cruise} mm/s");
+    // Slower only for motors, and blocks too short for exec.
+    let slow = block.steps.iter().any(|&s| s != 0);
+    let shortest = length / f64::from(BLOCK_S_MIN);
+    assert!(slow || got >= slowest.max(1e-6) * (2.0 - EXACT), "{got} of {cruise} mm/s");
+    assert!(!slow || got <= shortest * EXACT);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// Limits are kept, and steps are the difference of exact positions.
+    #[test]
+    fn builder_keeps_limits_and_steps(config in any_config(), moves in any_moves()) {
+        let dynamics = Dynamics::new(&config);
+        let mut builder = Builder::default();
+        let mut from = at([0.0]);
+        let mut motors = [0i64; MOTORS];
+        let mut cruise = 0.0;
+        for (to, feed) in moves {
+            let line = Line { from: &from, to: &to, feed };
+            let mut block = Move::default();
+            match builder.line(&line, &dynamics, &config, &mut block) {
+                Built::Nothing => prop_assert_eq!(from, to),
+                // Nothing has changed: as if it had not been asked for.
+                Built::Parts(parts) => {
+                    let steps =
+                        |m: usize| (i64::from(config.ratio[m].steps(to[m])) - motors[m]).unsigned_abs();
+                    let long = (0..MOTORS).map(steps).find(|&steps| steps > STEPS_MAX.into());
+                    let far = (0..AXES).any(|axis| to[axis].checked_sub(from[axis]).is_none());
+                    prop_assert!(parts > 1 && (far || long.is_some()));
+                    if far {
+                        continue;
+                    }
+                    let room = u64::from(parts) * u64::from(STEPS_MAX);
+                    prop_assert!(room >= long.unwrap() || parts == u16::MAX);
+                    continue;
+                }
+                Built::Line(entry) => {
+                    let (unit, length) = unit(&from, &to);
+                    check_limits(&block, &unit, length, feed, &config);
+                    prop_assert!(entry <= cruise && entry <= block.cruise);
+                    cruise = block.cruise;
+                    for m in 0..MOTORS {
+                        motors[m] += i64::from(block.steps[m]);
+                        prop_assert_eq!(motors[m], i64::from(config.ratio[m].steps(to[m])));
+                    }
+                }
+            }
+            from = to;
+        }
+    }
+
+    /// Splitting a line makes no corners.
+    #[test]
+    fn junction_of_a_split_line_is_free(
+        way in prop::array::uniform3(-2_000_000i32..2_000_000), parts in 2i32..50,
+    ) {
+        // Long enough for the positions' unit not to matter.
+        prop_assume!(way.iter().any(|d| d.abs() > 2_000 * parts));
+        let config = Config::new(10.0, 500.0, 0.0);
+        let mut builder = Builder::default();
+        let mut from = at([0.0]);
+        for part in 1..=parts {
+            let share = |d: i32| Length((i64::from(d) * i64::from(part) / i64::from(parts)) as i32);
+            let mut to = from;
+            for axis in 0..3 {
+                to[axis] = share(way[axis]);
+            }
+            let (block, entry) = built(&mut builder, &config, [from, to], None);
+            prop_assert!(part == 1 || entry > 0.99 * block.cruise);
+            from = to;
+        }
+    }
+}
+
+/// The velocities of an XY corner, by change of direction in degrees, mm/min: deviation 0.05 mm, junction
+/// acceleration 100,000 mm/min^2.
+#[test]
+fn junction_velocities() {
+    let mut config = Config::new(1e4, 500.0, 0.0);
+    config.deviation = 0.05;
+    let dynamics = Dynamics::new(&config);
+    let heading = |degrees: f64| {
+        let (y, x) = degrees.to_radians().sin_cos();
+        let unit = [x, y, 0.0, 0.0, 0.0, 0.0].map(|u| (u * f64::from(ONE)).round() as i16);
+        Heading { unit, deviation: junction::deviation(&unit, &dynamics) }
+    };
+    for start in [0.0, 30.0, 200.0] {
+        let corner = |angle: f64| {
+            let (a, b) = (heading(start), heading(start + angle));
+            60.0 * junction::limit(&a, &b, 1e5 / 3600.0, 1e9)
+        };
+        for (angle, velocity) in [
+            (10.0, 1144.10),
+            (15.0, 761.21),
+            (30.0, 376.48),
+            (45.0, 246.34),
+            (60.0, 179.78),
+            (90.0, 109.87),
+            (120.0, 70.71),
+            (135.0, 55.67),
+            (150.0, 41.79),
+            (170.0, 21.85),
+        ] {
+            let limit = corner(angle);
+            // The deviation is kept in two bytes.
+            assert!(
+                limit <= velocity * 1.001 && limit >= velocity * (0.999 - SHORT as f32),
+                "{angle}: {limit}"
+            );
+            assert!((corner(-angle) / limit - 1.0).abs() < 2e-3);
+        }
+        assert!(corner(0.0) > 1e30);
+        assert_eq!(corner(180.0), 0.0);
+        assert!(corner(1.0) > 10_000.0 && corner(179.0) < 7.0);
+    }
+}
+
+/// A rotary-only move is measured in degrees; with a linear axis, the longer one counts.
+#[test]
+fn rotary_moves() {
+    let mut config = Config::new(100.0, 500.0, 0.0);
+    config.velocity[3] = 360.0;
+    let zero = at([0.0]);
+    let turned = at([0.0, 0.0, 0.0, 90.0]);
+    let (block, _) = built(&mut Builder::default(), &config, [zero, turned], None);
+    assert_eq!(block.length, 90.0);
+    assert!((block.cruise - 360.0).abs() < 1e-3, "{}", block.cruise);
+    let both = at([9.0, 0.0, 0.0, 90.0]);
+    let (block, _) = built(&mut Builder::default(), &config, [zero, both], None);
+    assert!((block.length - 90.0).abs() < 0.01, "{}", block.length);
+    assert!((block.cruise - 360.0).abs() < 0.05, "{}", block.cruise);
+    // The feed is that of the linear axis.
+    let feed = Some(Feed::PerMinute(60.0));
+    let (block, _) = built(&mut Builder::default(), &config, [zero, both], feed);
+    assert!((block.cruise - 10.0).abs() < 0.01, "{}", block.cruise);
+}
+
+/// Stops and set positions are left at rest, and the move after goes on from there.
+#[test]
+fn stops() {
+    let config = Config::new(100.0, 500.0, 0.0);
+    let mut builder = Builder::default();
+    let mut x = 0.0;
+    let mut next = |builder: &mut Builder, from: Option<f64>| {
+        x = from.unwrap_or(x);
+        let ends = [at([x]), at([x + 10.0])];
+        x += 10.0;
+        built(builder, &config, ends, None)
+    };
+    assert_eq!(next(&mut builder, None).1, 0.0);
+    let (block, entry) = next(&mut builder, None);
+    assert!(entry == block.cruise && (entry - 100.0).abs() < 1e-3, "{entry}");
+    assert_eq!(builder.pause(Body::Dwell(1500), 3).line, 3);
+    assert_eq!(next(&mut builder, None).1, 0.0);
+    builder.stopped();
+    assert_eq!(next(&mut builder, None).1, 0.0);
+    let body = builder.set_position(&at([1.0]), &config);
+    assert!(matches!(body, Body::SetPosition([80, 0, 0, 0])), "{body:?}");
+    let (block, entry) = next(&mut builder, Some(1.0));
+    assert_eq!((block.steps, entry), ([800, 0, 0, 0], 0.0));
+}

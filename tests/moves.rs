@@ -1,0 +1,211 @@
+//! Single moves on the host: their time against the optimum, their rate, and what takes time without steps.
+
+#[allow(dead_code, reason = "each test uses a part")]
+#[path = "support/jobs.rs"]
+mod jobs;
+#[allow(dead_code, reason = "each test uses a part")]
+#[path = "support/optimum.rs"]
+mod optimum;
+#[allow(dead_code, reason = "each test uses a part")]
+#[path = "support/rig.rs"]
+mod rig;
+
+use jobs::{Job, Move, plan};
+use kerf::motion::block::{Block, Body};
+use optimum::rest_to_rest;
+use rig::{Config, Rig, at};
+
+/// What the length of stretches costs a move at most, s: three and a half of them.
+const COST: f64 = 3.5 * kerf::motion::exec::SEGMENT_S as f64;
+
+/// Time of a move by itself, and the shortest with its limits, s.
+fn lone(mm: f64, velocity: f32, accel: f32, jerk: f32) -> (f64, f64) {
+    let config = Config::new(velocity, accel, jerk);
+    let way = [(mm * 1e4) as i32, 0, 0, 0];
+    let moves = vec![Move { way, velocity, stop: false, turns: 0 }];
+    let planned = plan(&Job { config, moves });
+    let seconds = planned.iter().map(|p| f64::from(p.stretch.seconds)).sum();
+    let p = planned[0];
+    (seconds, rest_to_rest(p.length, p.cruise, p.accel, p.jerk))
+}
+
+const LENGTHS: [f64; 11] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 200.0, 300.0];
+
+#[test]
+fn moves_take_little_longer_than_the_optimum() {
+    let limits = [(0.0, 1e4), (0.0, 1e5), (0.0, 1e6), (500.0, 1e4), (500.0, 1e5), (3000.0, 1e6)];
+    let mut lost = 0.0;
+    for mm in LENGTHS {
+        for (accel, jerk) in limits {
+            for velocity in [30.0, 200.0] {
+                let (seconds, best) = lone(mm, velocity, accel, jerk);
+                let what = format!("{mm} mm at {velocity} mm/s, {accel} mm/s^2, {jerk} mm/s^3");
+                assert!(seconds <= best * 1.005 + COST, "{what}: {seconds} s, not {best}");
+                assert!(seconds >= best * 0.998 - 1e-4, "{what}: {seconds} s is below {best}");
+                lost += seconds - best;
+            }
+        }
+    }
+    // On the average less than a third of that.
+    let moves = (LENGTHS.len() * limits.len() * 2) as f64;
+    assert!(lost / moves <= COST / 3.0, "{} s on the average", lost / moves);
+}
+
+#[test]
+fn a_high_jerk_is_the_exact_trapezoid() {
+    for mm in LENGTHS {
+        for accel in [50.0, 500.0, 5000.0] {
+            for velocity in [5.0, 30.0, 200.0] {
+                let (sharp, best) = lone(mm, velocity, accel, 0.0);
+                let (high, _) = lone(mm, velocity, accel, 1e9);
+                let what = format!("{mm} mm at {velocity} mm/s, {accel} mm/s^2");
+                assert_eq!(sharp, high, "{what}");
+                // A peak within a stretch is cut off.
+                assert!(
+                    (sharp - best).abs() <= best * 5e-4 + 0.25 * COST,
+                    "{what}: {sharp}, not {best}"
+                );
+            }
+        }
+    }
+}
+
+/// Steps per second of motor X between a quarter and three quarters of what it did, and how many steps
+/// that is.
+fn rate(rig: &Rig) -> (f64, f64) {
+    let edges = &rig.pins.edges[0];
+    let middle = &edges[edges.len() / 4..edges.len() * 3 / 4];
+    let cycles = (middle[middle.len() - 1] - middle[0]) as f64;
+    let steps = (middle.len() - 1) as f64;
+    (steps * 16e6 / cycles, steps)
+}
+
+#[test]
+fn cruises_at_the_commanded_rate() {
+    for jerk in [0.0, 1e6] {
+        for velocity in [0.1f32, 1.0, 37.0, 99.9, 250.0] {
+            let mut rig = Rig::new(Config::new(300.0, 5000.0, jerk));
+            rig.pins.keep_edges = true;
+            let mm = f64::from(velocity) * 1.2 + 1.0;
+            rig.line(at([mm, mm / 3.0, 0.0, 0.0]), velocity, 1);
+            rig.finish();
+            assert_eq!(rig.pins.position, rig.target());
+            // X makes its share of the path's velocity.
+            let wanted = f64::from(velocity) * 80.0 / (1.0f64 + 1.0 / 9.0).sqrt();
+            let (got, steps) = rate(&rig);
+            // Stretches end on whole ticks: a step may come a quarter early or late.
+            let most = 1e-3 + 0.25 / steps;
+            assert!((got / wanted - 1.0).abs() < most, "{got} steps/s, not {wanted}");
+        }
+    }
+}
+
+#[test]
+fn one_step_in_ten_seconds_takes_ten_seconds() {
+    let mut rig = Rig::new(Config::new(100.0, 500.0, 1e5));
+    rig.pins.keep_edges = true;
+    rig.line(at([0.05]), 0.00125, 1);
+    rig.finish();
+    let edges = &rig.pins.edges[0];
+    assert_eq!(edges.len(), 4);
+    for gap in edges.windows(2) {
+        let seconds = (gap[1] - gap[0]) as f64 / 16e6;
+        assert!((seconds - 10.0).abs() < 0.02, "{seconds} s");
+    }
+}
+
+#[test]
+fn blocks_without_a_step_keep_their_time() {
+    for jerk in [0.0, 1e6] {
+        let mut rig = Rig::new(Config::new(100.0, 500.0, jerk));
+        for n in 1..=800 {
+            while rig.free() == 0 {
+                rig.turn();
+            }
+            rig.line(at([f64::from(n) * 0.001]), 0.2, n as u32);
+        }
+        rig.finish();
+        assert_eq!(rig.pins.position[0], 64);
+        let seconds = rig.seconds();
+        assert!((seconds - 4.0).abs() < 0.05, "0.8 mm at 0.2 mm/s took {seconds} s");
+    }
+}
+
+#[test]
+fn a_dwell_lasts_as_long_as_asked() {
+    let mut rig = Rig::new(Config::new(100.0, 500.0, 1e5));
+    rig.push(Block { body: Body::Dwell(1235), line: 0 });
+    rig.finish();
+    let ms = rig.seconds() * 1e3;
+    assert!((ms - 1235.0).abs() < 1.5, "{ms} ms");
+}
+
+/// A dwell between moves: both come to rest, neither takes time from the other.
+#[test]
+fn moves_stop_for_a_dwell() {
+    let time = |dwell: bool| {
+        let mut rig = Rig::new(Config::new(100.0, 500.0, 1e5));
+        rig.line(at([10.0]), 50.0, 1);
+        if dwell {
+            rig.push(Block { body: Body::Dwell(500), line: 0 });
+        } else {
+            rig.stop();
+        }
+        rig.line(at([20.0]), 50.0, 2);
+        rig.finish();
+        assert_eq!(rig.pins.position, rig.target());
+        rig.seconds()
+    };
+    let more = time(true) - time(false);
+    assert!((more - 0.5).abs() < 0.003, "{more} s");
+}
+
+/// Motors are where the governor is, at all times: what a stretch carries over is less than a step.
+#[test]
+fn segments_follow_the_plan() {
+    for (jerk, velocity) in [(0.0, 1.0f32), (0.0, 60.0), (1e5, 1.0), (1e5, 60.0), (1e6, 200.0)] {
+        let mut rig = Rig::new(Config::new(200.0, 1000.0, jerk));
+        for n in 1..=20 {
+            let x = f64::from(n) * 1.7;
+            rig.line(at([x, 0.3 * x, 0.0, 0.1 * x]), velocity, n as u32);
+        }
+        rig.keep = true;
+        rig.finish();
+        assert_eq!(rig.pins.position, rig.target());
+        let most = rig.emitted.iter().map(|e| e.ahead.abs()).fold(0.0, f64::max);
+        assert!(most < 1.0, "{most} steps off at {velocity} mm/s");
+    }
+}
+
+/// Nothing adds up: rates from a step in a second to the highest, for a million segments.
+#[test]
+fn a_million_segments_end_on_the_step() {
+    let mut rig = Rig::new(Config::new(400.0, 8000.0, 2e6));
+    rig.keep = false;
+    let mut seed = 1u32;
+    let mut random = |most: f32| {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 8) as f32 / 16_777_216.0 * most
+    };
+    let mut number = 0;
+    while rig.segments < 1_000_000 {
+        number += 1;
+        while rig.free() == 0 {
+            rig.turn();
+        }
+        // Around the middle, or it would wander off.
+        let size = [0.03, 0.3, 3.0, 30.0][random(4.0) as usize];
+        let to = [0, 1, 2, 3].map(|m| {
+            let way = f64::from(random(size) - 0.5 * size);
+            f64::from(rig.position[m].0) * 1e-4 * 0.999 + way
+        });
+        let velocity = if random(10.0) < 1.0 { size * 3.0 } else { 20.0 + random(300.0) };
+        rig.line(at(to), velocity, number);
+        if number % 1000 == 0 {
+            rig.finish();
+            assert_eq!(rig.pins.position, rig.target(), "after {} segments", rig.segments);
+        }
+    }
+    rig.finish();
+    assert_eq!(rig.pins.position, rig.target());
+}
