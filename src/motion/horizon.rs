@@ -75,7 +75,7 @@ impl Line {
         let accel = self.accel.get();
         let full = 2.0 * accel * self.length;
         let speed = self.cruise + 2.0 * kappa(accel, self.jerk.get());
-        let most = 4.0 * speed * speed;
+        let most = 2.0 * speed * speed;
         if full < most { full } else { most }
     }
 }
