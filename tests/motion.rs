@@ -20,13 +20,15 @@ const STRETCH: f64 = SEGMENT_S as f64;
 /// Velocity, acceleration and jerk along the path stay within the block's limits.
 ///
 /// What the length of stretches adds: acceleration 1 %, and what is gone to at once, a velocity less than
-/// `J t^2` away, or a thousandth of the feed, for which the queue keeps no key.
+/// `J t^2` away, or a thousandth of the highest feed: the queue keeps no key for less, and potentials are
+/// no finer.
 fn check_limits(planned: &[Planned]) {
+    let little = planned.iter().map(|p| p.cruise).fold(0.0, f64::max) * 1e-3;
     for (n, p) in planned.iter().enumerate() {
         let seconds = f64::from(p.stretch.seconds);
         assert!(p.after <= p.cruise * 1.0011, "{n}: {p:?}");
         let change = p.after - p.before;
-        assert!(change.abs() <= p.accel * seconds * 1.01 + 1e-3 * p.cruise, "{n}: {p:?}");
+        assert!(change.abs() <= p.accel * seconds * 1.01 + little, "{n}: {p:?}");
         let mean = f64::from(p.stretch.distance) / seconds;
         let high = p.before.max(p.after) + 0.5 * p.accel * seconds;
         assert!(mean <= high * 1.001 || p.stretch.distance < 1e-5, "{n}: {mean} mm/s in {p:?}");

@@ -252,7 +252,7 @@ impl Governor {
         if got.ends {
             if let Some(brake) = self.brake
                 && let Some(anchor) = ahead.anchor(0)
-                && anchor.ahead <= 0.0
+                && self.here(anchor.ahead)
                 && v > anchor.velocity
             {
                 // It should have got there by now: what is left is rounding.

@@ -116,6 +116,8 @@ impl Governor {
     fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32, seconds: f32) -> Stretch {
         let v = self.state.velocity;
         let gain = self.limits.accel * seconds;
+        // Rounding may put a stop before the end of the block.
+        let headroom = greater(headroom, 0.0);
         // Steady over a block that is short enough to be one stretch.
         if v.to_bits() == cruise.to_bits()
             && below(cruise * cruise, headroom)
@@ -136,7 +138,7 @@ impl Governor {
                 next = greater(lesser(next, cruise), greater(least, 0.0));
                 distance = (v + next) * half;
             }
-            if distance + half * next < left {
+            if distance + half * next < left && distance > 0.0 {
                 self.state.velocity = next;
                 return Stretch { seconds, distance, ends: false };
             }

@@ -42,7 +42,7 @@
 //! Cost: a push 1,000 cycles, and 700 for each key dropped.
 
 use super::block::Line;
-use super::float::{below, greater, lesser, some};
+use super::float::{OCTAVE, lesser, log, some};
 use super::queue::BLOCKS;
 
 /// Half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`,
@@ -78,18 +78,16 @@ impl Line {
     #[inline(never)]
     pub fn gain(&self) -> f32 {
         let full = 2.0 * self.accel.get() * self.length;
-        if below(full, MUCH) { full } else { self.capped(full) }
+        // Plainly below the square of its velocity, as short blocks have it.
+        if log(full) + OCTAVE < 2 * log(self.cruise) { full } else { self.capped(full) }
     }
 
     #[inline(never)]
     fn capped(&self, full: f32) -> f32 {
         let speed = self.cruise + 2.0 * kappa(self.accel.get(), self.jerk.get());
-        greater(MUCH, lesser(full, 4.0 * speed * speed))
+        lesser(full, 2.0 * speed * speed)
     }
 }
-
-/// See [`Line::gain`].
-const MUCH: f32 = 65536.0;
 
 /// Keys of blocks in the queue, lowest first, which is nearest first too.
 #[derive(Debug)]

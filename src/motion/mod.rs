@@ -22,5 +22,6 @@ pub mod queue;
 pub mod reach;
 pub mod short;
 pub mod smooth;
+pub mod source;
 pub mod state;
 pub mod steps;

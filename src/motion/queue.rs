@@ -1,5 +1,5 @@
-//! The block queue, seen from the planner's side and from exec's: a ring of blocks, and the horizon that
-//! says how fast they may be run.
+//! The block queue, seen from the planner's side: a ring of blocks, and the horizon that says how fast they
+//! may be run. Exec's side is `source`.
 //!
 //! The planner changes the horizon under the ceiling lock only, exec at any time. When the ring is
 //! full the planner waits ([`BlockQueue::free`]).
@@ -7,11 +7,12 @@
 use core::cell::UnsafeCell;
 
 use super::block::{Block, Body, Line};
-use super::float::{below, greater, lesser};
+use super::float::{OCTAVE, greater, lesser, log, some};
 use super::horizon::{self, Horizon, kappa};
 use super::short::Short;
+pub use super::source::{Anchor, BlockSource};
 use crate::hal::imp::exec;
-use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
+use crate::hal::ring::{Ceiling, Producer, Ring};
 use crate::math::sqrt;
 
 /// Blocks the planner can queue, plus one slot that stays empty. At most 128: sequence numbers have
@@ -22,24 +23,24 @@ pub const BLOCKS: usize = 69;
 pub const CAPACITY: usize = BLOCKS - 1;
 
 /// Sequence numbers.
-const SEQ: u8 = 0x7F;
+pub(super) const SEQ: u8 = 0x7F;
 
 /// Marks a key that stays even before a lower one.
-const FIRM: u8 = 0x80;
+pub(super) const FIRM: u8 = 0x80;
 
 /// A corner is worth a key if it is slower than this share of what holds on both sides.
 const WORTH: f32 = 0.999;
 
-/// Potentials below this are never coarse, (mm/s)^2.
-const PLENTY: f32 = 65536.0;
-
 /// Potentials beyond so many times the square of the velocity are made small again.
 const COARSE: f32 = 1024.0;
+
+/// The logarithm of half of it.
+const FINE: i32 = 9 * OCTAVE;
 
 /// The storage.
 pub struct BlockStore {
     ring: Ring<Block, BLOCKS>,
-    horizon: UnsafeCell<Horizon>,
+    pub(super) horizon: UnsafeCell<Horizon>,
 }
 
 // SAFETY: the ends of the ring are safe to share; the horizon belongs to exec, and to whoever keeps exec
@@ -56,7 +57,7 @@ impl BlockStore {
     pub fn split(&'static self) -> Option<(BlockQueue, BlockSource)> {
         let (producer, consumer) = self.ring.split()?;
         let queue = BlockQueue { ring: producer, store: self, newest: SEQ, last: None, end: 0.0 };
-        Some((queue, BlockSource { ring: consumer, store: self, oldest: 0 }))
+        Some((queue, BlockSource::new(consumer, self)))
     }
 
     fn with_horizon<R>(&self, _: &Ceiling, change: impl FnOnce(&mut Horizon) -> R) -> R {
@@ -202,8 +203,11 @@ impl BlockQueue {
 
     /// Makes potentials small if they have become large for this line.
     fn refine(&mut self, line: &Line) {
-        let large = !below(self.end, PLENTY) && self.end > COARSE * line.cruise * line.cruise;
-        if large {
+        // Nothing is there, or it is plainly fine: no need to compare.
+        if !some(self.end) || log(self.end) < 2 * log(line.cruise) + FINE {
+            return;
+        }
+        if self.end > COARSE * line.cruise * line.cruise {
             exec::lock(|ceiling| self.rebase(ceiling));
         }
     }
@@ -267,132 +271,5 @@ impl BlockQueue {
             // Gone already: no limit.
             _ => f32::MAX,
         }
-    }
-}
-
-/// A limit ahead of exec.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Anchor {
-    /// Velocity there, mm/s.
-    pub velocity: f32,
-    /// Brake potential from the end of the oldest block to there.
-    pub ahead: f32,
-    /// Limits change there: what comes after is for the line that begins there.
-    pub firm: bool,
-}
-
-/// Exec's end.
-pub struct BlockSource {
-    ring: Consumer<Block, BLOCKS>,
-    store: &'static BlockStore,
-    /// Sequence number of the oldest block.
-    oldest: u8,
-}
-
-impl BlockSource {
-    /// Blocks waiting, with the one that runs.
-    pub fn len(&self) -> usize {
-        self.ring.len()
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.ring.is_empty()
-    }
-
-    /// A copy of the oldest block.
-    pub fn oldest(&self) -> Option<Block> {
-        self.look(|block| *block)
-    }
-
-    /// What `look` makes of the oldest block.
-    #[inline(always)]
-    pub fn look<R>(&self, look: impl FnOnce(&Block) -> R) -> Option<R> {
-        self.ring.peek(0, look)
-    }
-
-    /// The oldest block is done.
-    pub fn release(&mut self) {
-        if !self.is_empty() {
-            self.ring.release();
-            self.oldest = self.oldest.wrapping_add(1) & SEQ;
-        }
-    }
-
-    /// The oldest block begins: what limited its start is of the past.
-    pub fn enter(&mut self) {
-        let oldest = self.oldest;
-        let horizon = self.horizon_mut();
-        if horizon.nth(0).is_some_and(|seq| seq & SEQ == oldest) {
-            horizon.pass();
-        }
-    }
-
-    /// Changes when what is ahead changes.
-    pub fn version(&self) -> u8 {
-        self.horizon().version
-    }
-
-    /// The square of the velocity, (mm/s)^2, at which the oldest block, a line, may be left for the
-    /// sake of all that follow, if there is no jerk limit. Cost: 900.
-    pub fn headroom(&self) -> f32 {
-        let horizon = self.horizon();
-        let key = match horizon.nth(0).and_then(|seq| self.line(seq, Line::sharp_key)) {
-            Some(key) => lesser(key, horizon.end),
-            None => horizon.end,
-        };
-        key - self.end()
-    }
-
-    /// The `n`th limit ahead, nearest first, seen from the end of the oldest block. The last is the
-    /// end of the queue. Cost: 1,000.
-    pub fn anchor(&self, n: u8) -> Option<Anchor> {
-        let horizon = self.horizon();
-        let Some(seq) = horizon.nth(n) else {
-            let last = n == 0 || horizon.nth(n - 1).is_some();
-            let ahead = horizon.end - self.end();
-            return last.then_some(Anchor { velocity: 0.0, ahead, firm: true });
-        };
-        let firm = seq & FIRM != 0;
-        self.line(seq, |line| (line.entry.get(), line.start)).map(|(velocity, start)| Anchor {
-            velocity,
-            ahead: start - self.end(),
-            firm,
-        })
-    }
-
-    /// Potential at the end of the oldest block: where the next begins, if that is a line.
-    fn end(&self) -> f32 {
-        if let Some(Some(start)) = self.ring.peek(1, |block| match &block.body {
-            Body::Line(line) => Some(line.start),
-            _ => None,
-        }) {
-            return start;
-        }
-        self.ring
-            .peek(0, |block| match &block.body {
-                Body::Line(line) => line.start + line.gain(),
-                _ => 0.0,
-            })
-            .unwrap_or(0.0)
-    }
-
-    /// Something of a line in the queue.
-    fn line<R: Copy>(&self, seq: u8, look: impl FnOnce(&Line) -> R) -> Option<R> {
-        let ahead = usize::from(seq.wrapping_sub(self.oldest) & SEQ);
-        self.ring.peek(ahead, |block| match &block.body {
-            Body::Line(line) => Some(look(line)),
-            _ => None,
-        })?
-    }
-
-    fn horizon(&self) -> &Horizon {
-        // SAFETY: exec runs, so nobody holds the ceiling lock.
-        unsafe { &*self.store.horizon.get() }
-    }
-
-    fn horizon_mut(&mut self) -> &mut Horizon {
-        // SAFETY: as in `horizon`; the borrow of `self` keeps the others away.
-        unsafe { &mut *self.store.horizon.get() }
     }
 }

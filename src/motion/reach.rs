@@ -98,19 +98,18 @@ impl Reach {
 
     /// Whether it is safe with `within` to go to the end of the block. Limits of `but` do not count.
     pub fn safe(&self, within: f32, ahead: &impl Ahead, but: f32) -> bool {
+        let mut stop = None;
         let mut n = 0;
         while let Some(anchor) = ahead.anchor(n) {
             let w = anchor.velocity;
+            let way = anchor.ahead + within;
             if self.level > w * ROUNDING && w != but {
-                let way = anchor.ahead + within;
-                if !self.fits(way, w) {
-                    return false;
-                }
-                if w == 0.0 || self.fits(way, 0.0) {
-                    return true;
+                let fits = self.fits(way, w);
+                if !fits || w == 0.0 {
+                    return fits;
                 }
             }
-            if anchor.firm {
+            if anchor.firm || way >= *stop.get_or_insert_with(|| self.needed(0.0)) {
                 return true;
             }
             n += 1;
@@ -123,22 +122,20 @@ impl Reach {
     pub fn demand(&self, within: f32, ahead: &impl Ahead) -> Option<Demand> {
         let mut first: Option<Demand> = None;
         let mut alone = true;
+        let stop = self.needed(0.0);
         let mut n = 0;
         while let Some(anchor) = ahead.anchor(n) {
-            if self.level > anchor.velocity * ROUNDING {
-                let way = anchor.ahead + within;
-                let velocity = anchor.velocity;
-                let slack = self.slack(way, velocity);
+            let velocity = anchor.velocity;
+            let way = anchor.ahead + within;
+            if self.level > velocity * ROUNDING {
+                let slack = way - self.needed(velocity);
                 alone = first.is_none();
                 if first.is_none_or(|demand| slack < demand.slack) {
                     let fits = self.fits(way, velocity);
                     first = Some(Demand { velocity, way, slack, fits, alone });
                 }
-                if self.fits(way, 0.0) {
-                    break;
-                }
             }
-            if anchor.firm {
+            if anchor.firm || way >= stop {
                 break;
             }
             n += 1;
@@ -151,12 +148,12 @@ impl Reach {
         Some(demand)
     }
 
-    /// What is left of `way` if it comes down to `w`, below the top, as late as may be: brake potential.
-    fn slack(&self, way: f32, w: f32) -> f32 {
+    /// The way it takes to come down to `w`, below the top.
+    fn needed(&self, w: f32) -> f32 {
         let (drop, sum) = (self.top - w, self.top + w);
         let twice = self.kappa + self.kappa;
         let needed = if drop >= twice { drop + twice } else { sqrt(4.0 * twice * drop) };
-        way - self.spent - sum * needed
+        self.spent + sum * needed
     }
 
     /// The velocity from which it comes, or to which it goes, with alpha 0.

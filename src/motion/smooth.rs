@@ -110,10 +110,15 @@ impl Governor {
         0.2 * self.limits.jerk * nominal * nominal
     }
 
+    /// A place that is nearer to the end of the block than any other is at it, but for rounding.
+    pub(super) fn here(&self, ahead: f32) -> bool {
+        ahead <= 1e-4 * self.limits.accel
+    }
+
     /// A limit at the very end of the block is kept exactly: stretches are not as fine.
     pub(super) fn arrive(&self, next: &mut State, ahead: &impl Ahead) {
         if let Some(anchor) = ahead.anchor(0)
-            && anchor.ahead <= 0.0
+            && self.here(anchor.ahead)
             && next.velocity > anchor.velocity
         {
             *next = State { velocity: anchor.velocity, alpha: 0.0 };

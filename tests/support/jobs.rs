@@ -94,8 +94,8 @@ pub fn run(job: &Job) -> Rig {
     let mut rig = Rig::new(job.config.clone());
     for (n, step) in job.moves.iter().enumerate() {
         let mut to: PerAxis<Length> = rig.position;
-        for axis in 0..4 {
-            to[axis].0 += step.way[axis];
+        for (to, way) in to.iter_mut().zip(step.way) {
+            to.0 += way;
         }
         let mut patience = 0;
         while rig.free() == 0 {
@@ -189,8 +189,8 @@ pub fn plan(job: &Job) -> Vec<Planned> {
     };
     for (n, next) in job.moves.iter().enumerate() {
         let mut to: PerAxis<Length> = rig.position;
-        for axis in 0..4 {
-            to[axis].0 += next.way[axis];
+        for (to, way) in to.iter_mut().zip(next.way) {
+            to.0 += way;
         }
         while rig.free() == 0 {
             step(&mut rig);

@@ -1,0 +1,152 @@
+//! The block queue, seen from exec's side: the oldest block, and how fast it may be left.
+//!
+//! Owned by exec, which takes block after block, and asks for the limits ahead whenever the horizon has
+//! changed. Never waits: an empty queue is one that ends here. Units: mm, s; brake potentials as in
+//! `horizon`.
+
+use core::cell::Cell;
+
+use super::block::{Block, Body, Line};
+use super::float::lesser;
+use super::horizon::Horizon;
+use super::queue::{BLOCKS, BlockStore, FIRM, SEQ};
+use crate::hal::ring::Consumer;
+
+/// A limit ahead of exec.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Anchor {
+    /// Velocity there, mm/s.
+    pub velocity: f32,
+    /// Brake potential from the end of the oldest block to there.
+    pub ahead: f32,
+    /// Limits change there: what comes after is for the line that begins there.
+    pub firm: bool,
+}
+
+/// Exec's end.
+pub struct BlockSource {
+    ring: Consumer<Block, BLOCKS>,
+    store: &'static BlockStore,
+    /// Sequence number of the oldest block.
+    oldest: u8,
+    /// Potential at its end, and the version of the horizon it is of.
+    end: Cell<Option<(u8, f32)>>,
+}
+
+impl BlockSource {
+    /// Of a store whose planner's end goes elsewhere.
+    pub(super) fn new(ring: Consumer<Block, BLOCKS>, store: &'static BlockStore) -> Self {
+        Self { ring, store, oldest: 0, end: Cell::new(None) }
+    }
+
+    /// Blocks waiting, with the one that runs.
+    pub fn len(&self) -> usize {
+        self.ring.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.ring.is_empty()
+    }
+
+    /// A copy of the oldest block.
+    pub fn oldest(&self) -> Option<Block> {
+        self.look(|block| *block)
+    }
+
+    /// What `look` makes of the oldest block.
+    #[inline(always)]
+    pub fn look<R>(&self, look: impl FnOnce(&Block) -> R) -> Option<R> {
+        self.ring.peek(0, look)
+    }
+
+    /// The oldest block is done.
+    pub fn release(&mut self) {
+        if !self.is_empty() {
+            self.ring.release();
+            self.end.set(None);
+            self.oldest = self.oldest.wrapping_add(1) & SEQ;
+        }
+    }
+
+    /// The oldest block begins: what limited its start is of the past.
+    pub fn enter(&mut self) {
+        let oldest = self.oldest;
+        let horizon = self.horizon_mut();
+        if horizon.nth(0).is_some_and(|seq| seq & SEQ == oldest) {
+            horizon.pass();
+        }
+    }
+
+    /// Changes when what is ahead changes.
+    pub fn version(&self) -> u8 {
+        self.horizon().version
+    }
+
+    /// The square of the velocity, (mm/s)^2, at which the oldest block, a line, may be left for the
+    /// sake of all that follow, if there is no jerk limit. Cost: 900.
+    pub fn headroom(&self) -> f32 {
+        let horizon = self.horizon();
+        let key = match horizon.nth(0).and_then(|seq| self.line(seq, Line::sharp_key)) {
+            Some(key) => lesser(key, horizon.end),
+            None => horizon.end,
+        };
+        key - self.end()
+    }
+
+    /// The `n`th limit ahead, nearest first, seen from the end of the oldest block. The last is the
+    /// end of the queue. Cost: 350, and 1,500 more the first time after a change.
+    pub fn anchor(&self, n: u8) -> Option<Anchor> {
+        let horizon = self.horizon();
+        let Some(seq) = horizon.nth(n) else {
+            let last = n == 0 || horizon.nth(n - 1).is_some();
+            let ahead = horizon.end - self.end();
+            return last.then_some(Anchor { velocity: 0.0, ahead, firm: true });
+        };
+        let firm = seq & FIRM != 0;
+        self.line(seq, |line| (line.entry.get(), line.start)).map(|(velocity, start)| Anchor {
+            velocity,
+            ahead: start - self.end(),
+            firm,
+        })
+    }
+
+    /// Potential at the end of the oldest block.
+    fn end(&self) -> f32 {
+        let version = self.version();
+        if let Some((of, end)) = self.end.get()
+            && of == version
+        {
+            return end;
+        }
+        // Where the next begins, if that is a line.
+        let next = self.ring.peek(1, |block| match &block.body {
+            Body::Line(line) => Some(line.start),
+            _ => None,
+        });
+        let end = next.flatten().unwrap_or_else(|| {
+            self.line(self.oldest, |line| line.start + line.gain()).unwrap_or(0.0)
+        });
+        self.end.set(Some((version, end)));
+        end
+    }
+
+    /// Something of a line in the queue.
+    fn line<R: Copy>(&self, seq: u8, look: impl FnOnce(&Line) -> R) -> Option<R> {
+        let ahead = usize::from(seq.wrapping_sub(self.oldest) & SEQ);
+        self.ring.peek(ahead, |block| match &block.body {
+            Body::Line(line) => Some(look(line)),
+            _ => None,
+        })?
+    }
+
+    fn horizon(&self) -> &Horizon {
+        // SAFETY: exec runs, so nobody holds the ceiling lock.
+        unsafe { &*self.store.horizon.get() }
+    }
+
+    fn horizon_mut(&mut self) -> &mut Horizon {
+        // SAFETY: as in `horizon`; the borrow of `self` keeps the others away.
+        unsafe { &mut *self.store.horizon.get() }
+    }
+}
