@@ -47,7 +47,7 @@ pub struct Interpreter {
     pub(super) residue: PerAxis<i16>,
     /// Machine coordinates of the work origin (G92).
     pub(super) offset: PerAxis<Length>,
-    line: u32,
+    pub(super) line: u32,
 }
 
 impl Interpreter {
@@ -69,6 +69,15 @@ impl Interpreter {
     /// `Ok`: `out` is what the machine has to do, and the state has advanced as if it had done so.
     /// `Err`: the state is what it was, and `out` empty.
     pub fn interpret(&mut self, line: &[u8], out: &mut Commands) -> Result<Info, Status> {
+        if self.usual(line, out) {
+            return Ok(Info::default());
+        }
+        self.general(line, out)
+    }
+
+    /// The same for a line of any kind.
+    #[inline(never)]
+    pub(super) fn general(&mut self, line: &[u8], out: &mut Commands) -> Result<Info, Status> {
         clear(out);
         let mut block = Block::new();
         block.read(line)?;

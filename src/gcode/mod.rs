@@ -5,6 +5,7 @@
 //!       -> interpreter (modal state, position; order of execution) -> Commands
 //!                                   Commands with an arc -> arc (chords) -> planner
 //! ```
+//! A plain move takes none of these steps: `usual` reads and carries it out in one pass.
 //! [`codes`] is the language: one table row per code. Everything here is pure and never waits.
 
 pub mod arc;
@@ -19,5 +20,6 @@ mod motion;
 pub mod number;
 #[cfg(test)]
 mod tests;
+mod usual;
 
 pub use interpreter::{Info, Interpreter};

@@ -2,6 +2,7 @@
 
 mod arcs;
 mod lines;
+mod usual;
 
 use super::command::{Commands, Feed, Motion};
 use super::interpreter::Interpreter;

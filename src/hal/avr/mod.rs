@@ -12,6 +12,7 @@
 pub mod exec;
 pub mod executor;
 pub mod gpio;
+mod mem;
 pub mod panic;
 mod step_isr;
 pub mod stepper;
