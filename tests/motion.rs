@@ -58,7 +58,7 @@ fn check_time(planned: &[Planned]) {
     let mut blocks: Vec<&Planned> = planned.iter().collect();
     blocks.dedup_by_key(|p| p.line);
     let stops: f64 = blocks.iter().map(|p| rest_to_rest(p.length, p.cruise, p.accel, p.jerk)).sum();
-    let most = stops * 1.02 + 3.5 * STRETCH * blocks.len() as f64;
+    let most = stops * 1.02 + 4.0 * STRETCH * blocks.len() as f64;
     assert!(
         total <= most,
         "{total} s; {stops} s if it stopped at each of {} corners",
