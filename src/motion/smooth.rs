@@ -2,9 +2,9 @@
 //!
 //! Called by [`Governor::stretch`](super::governor::Governor::stretch). In each stretch it tries to raise the
 //! acceleration, to have none, and to keep it, and takes the first that leaves it safe (`reach`). If none
-//! does it brakes: for the limit that has to be braked for hardest, at the very rate that gets it there
-//! (`brake`). That brake it follows to its end. Only if more blocks come it looks whether there is something
-//! better, and goes on braking if not: they never make the way shorter.
+//! does it brakes: for the limit that has to be braked for first, as late as may be, so that it comes out at
+//! the very place (`brake`). That brake it follows to its end. Only if more blocks come it looks whether
+//! there is something better, and goes on braking if not: they never make the way shorter.
 //!
 //! Where one limit closely follows another, the way to the one may be too fast for the other: each
 //! stretch of such a brake is looked at, and if it is not safe, is one of hard braking, which always is.
