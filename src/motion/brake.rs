@@ -124,8 +124,17 @@ impl Brake {
 
     /// The alpha to go on with from here: easing begins with what it ends with.
     fn alpha(&self, alpha: f32) -> f32 {
-        let easing = self.level + self.coast + self.fall + self.hold <= 0.0;
-        if easing { -self.ease * self.rise } else { alpha }
+        if self.is_easing() { -self.ease * self.rise } else { alpha }
+    }
+
+    /// It is in its last phase.
+    fn is_easing(&self) -> bool {
+        self.hold <= 0.0 && self.fall <= 0.0 && self.coast <= 0.0 && self.level <= 0.0
+    }
+
+    /// It is done in `t` seconds or less.
+    fn is_within(&self, t: f32) -> bool {
+        self.is_easing() && self.rise <= t
     }
 
     /// The phase it is in: change of alpha in a second, and how long it takes, s.
@@ -144,7 +153,7 @@ impl Brake {
     }
 
     /// How long it goes on, s.
-    pub fn rest(&self) -> f32 {
+    fn rest(&self) -> f32 {
         self.level + self.coast + self.fall + self.hold + self.rise
     }
 }
@@ -162,8 +171,8 @@ impl Governor {
         let reach = Reach::new(self.state.velocity, self.state.alpha, self.limits.kappa);
         match reach.demand(2.0 * self.limits.accel * left, ahead) {
             Some(demand) if demand.fits => {
-                let brake = Brake::new(&self.state, &reach, &demand, &self.limits);
-                self.follow(brake, left, ahead, nominal)
+                self.brake = Some(Brake::new(&self.state, &reach, &demand, &self.limits));
+                self.follow(left, ahead, nominal)
             }
             _ => self.hard(left, ahead, nominal),
         }
@@ -172,29 +181,24 @@ impl Governor {
     /// Brakes as hard as it may, for a stretch.
     #[inline(never)]
     fn hard(&mut self, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
-        let brake = Brake::hard(&self.state, &self.limits);
-        let stretch = self.run(brake, left, ahead, nominal);
+        self.brake = Some(Brake::hard(&self.state, &self.limits));
+        let stretch = self.run(left, ahead, nominal);
         self.brake = None;
         stretch
     }
 
     /// Goes on with a brake; harder than that, if it would not be safe for what comes after.
     #[inline(never)]
-    pub(super) fn follow(
-        &mut self,
-        brake: Brake,
-        left: f32,
-        ahead: &impl Ahead,
-        nominal: f32,
-    ) -> Stretch {
+    pub(super) fn follow(&mut self, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
         let before = self.state;
-        let stretch = self.run(brake, left, ahead, nominal);
-        if brake.alone {
+        let (alone, velocity) = self.brake.as_ref().map_or((true, 0.0), |b| (b.alone, b.velocity));
+        let stretch = self.run(left, ahead, nominal);
+        if alone {
             return stretch;
         }
         let reach = Reach::new(self.state.velocity, self.state.alpha, self.limits.kappa);
         let rest = if stretch.ends { 0.0 } else { left - stretch.distance };
-        if reach.safe(2.0 * self.limits.accel * rest, ahead, brake.velocity) {
+        if reach.safe(2.0 * self.limits.accel * rest, ahead, velocity) {
             return stretch;
         }
         self.state = before;
@@ -203,12 +207,12 @@ impl Governor {
 
     /// A stretch of a brake.
     #[inline(never)]
-    fn run(&mut self, mut brake: Brake, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
+    fn run(&mut self, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
         let accel = self.limits.accel;
-        let mut state = self.state;
+        let state = &mut self.state;
         let mut most = nominal;
         let mut stretch = Stretch { seconds: 0.0, distance: 0.0, ends: false };
-        while brake.rest() > 0.0 {
+        while let Some(brake) = &mut self.brake {
             state.alpha = brake.alpha(state.alpha);
             let (rate, rest) = brake.phase();
             let mut time = lesser(*rest, most - stretch.seconds);
@@ -223,34 +227,34 @@ impl Governor {
             state.alpha += rate * time;
             *rest -= time;
             let through = *rest <= 0.0;
-            if stretch.ends {
+            let done = brake.is_within(0.05 * nominal);
+            if done {
+                *state = State { velocity: brake.velocity, alpha: 0.0 };
+            }
+            let full = !through || stretch.seconds >= most;
+            // What would be left, of the block or the brake, is not worth a stretch.
+            let short = left - stretch.distance <= 0.5 * nominal * state.velocity
+                || brake.is_within(0.25 * nominal);
+            if done {
+                self.brake = None;
+            }
+            if stretch.ends || (full && (most > nominal || !short)) {
                 break;
             }
-            if !through || stretch.seconds >= most {
-                // What would be left, of the block or the brake, is not worth a stretch.
-                let short = left - stretch.distance <= 0.5 * nominal * state.velocity
-                    || brake.rest() < 0.25 * nominal;
-                if most > nominal || !short {
-                    break;
-                }
+            if full {
                 most += nominal;
             }
         }
-        self.brake = Some(brake);
-        if brake.rest() < 0.05 * nominal {
-            state = State { velocity: brake.velocity, alpha: 0.0 };
-            self.brake = None;
-        }
-        self.state = state;
         self.close(left, stretch, ahead, nominal)
     }
 
     /// A stretch of a brake that has come to the end of the block, or of itself.
+    #[inline(never)]
     fn close(&mut self, left: f32, got: Stretch, ahead: &impl Ahead, nominal: f32) -> Stretch {
         let v = self.state.velocity;
         let mut seconds = got.seconds;
         if got.ends {
-            if let Some(brake) = self.brake
+            if let Some(brake) = &self.brake
                 && let Some(anchor) = ahead.anchor(0)
                 && self.here(anchor.ahead)
                 && v > anchor.velocity

@@ -2,9 +2,9 @@
 //!
 //! Called by [`Governor::stretch`](super::governor::Governor::stretch). In each stretch it tries to raise the
 //! acceleration, to have none, and to keep it, and takes the first that leaves it safe (`reach`). If none
-//! does it brakes: for the limit that has to be braked for hardest, at the very rate that gets it there
-//! (`brake`). That brake it follows to its end. Only if more blocks come it looks whether there is something
-//! better, and goes on braking if not: they never make the way shorter.
+//! does it brakes: for the limit that has to be braked for first, as late as may be, so that it comes out at
+//! the very place (`brake`). That brake it follows to its end. Only if more blocks come it looks whether
+//! there is something better, and goes on braking if not: they never make the way shorter.
 //!
 //! Where one limit closely follows another, the way to the one may be too fast for the other: each
 //! stretch of such a brake is looked at, and if it is not safe, is one of hard braking, which always is.
@@ -43,8 +43,8 @@ impl Governor {
                 return stretch;
             }
         }
-        if let Some(brake) = self.brake {
-            return self.follow(brake, left, ahead, nominal);
+        if self.brake.is_some() {
+            return self.follow(left, ahead, nominal);
         }
         if self.state.velocity > self.crawl(nominal) {
             return self.brake(left, ahead, nominal);
@@ -53,6 +53,7 @@ impl Governor {
     }
 
     /// A stretch without a brake, if that is safe.
+    #[inline(never)]
     fn go(&mut self, left: f32, cruise: f32, ahead: &impl Ahead, nominal: f32) -> Option<Stretch> {
         let v = self.state.velocity;
         let mut ends = left <= v * nominal;
@@ -135,6 +136,7 @@ impl Governor {
     }
 
     /// The best safe state to be in after `seconds`.
+    #[inline(never)]
     fn choose(
         &self,
         left: f32,
@@ -189,6 +191,7 @@ impl Governor {
 
     /// The alpha with which the velocity comes to `cruise` if alpha goes to 0 from there:
     /// `v' + k alpha'^2 = cruise`.
+    #[inline(never)]
     fn towards(&self, cruise: f32, seconds: f32) -> f32 {
         let half = 0.5 * self.limits.accel * seconds;
         let way = cruise - self.state.velocity - half * self.state.alpha;
@@ -199,6 +202,7 @@ impl Governor {
     }
 
     /// The state when alpha has gone to `alpha` in this time.
+    #[inline(never)]
     fn next(&self, alpha: f32, seconds: f32) -> Next {
         let State { velocity, alpha: before } = self.state;
         let gain = self.limits.accel * seconds;
