@@ -152,7 +152,8 @@ proptest! {
                 Built::Parts(parts) => {
                     let steps =
                         |m: usize| (i64::from(config.ratio[m].steps(to[m])) - motors[m]).unsigned_abs();
-                    let long = (0..MOTORS).map(steps).find(|&steps| steps > STEPS_MAX.into());
+                    let most = (0..MOTORS).map(steps).max().unwrap();
+                    let long = Some(most).filter(|&steps| steps > STEPS_MAX.into());
                     let far = (0..AXES).any(|axis| to[axis].checked_sub(from[axis]).is_none());
                     prop_assert!(parts > 1 && (far || long.is_some()));
                     if far {

@@ -11,7 +11,7 @@
 use super::float::{greater, lesser};
 use super::governor::{Governor, Stretch};
 use super::reach::{Ahead, Demand, Reach};
-use super::state::{Limits, State};
+use super::state::State;
 use crate::math::sqrt;
 
 /// What is left of a brake.
@@ -33,95 +33,6 @@ pub struct Brake {
 }
 
 impl Brake {
-    /// From a state to what is demanded.
-    #[inline(never)]
-    pub fn new(state: &State, reach: &Reach, demand: &Demand, limits: &Limits) -> Self {
-        if state.alpha < 0.0 {
-            return match Self::soft(state, demand, limits) {
-                Some(brake) => brake,
-                None => Self::harder(state, reach, demand, limits),
-            };
-        }
-        let (pace, velocity) = (limits.pace, demand.velocity);
-        let drop = reach.top() - velocity;
-        let share = full_share(drop, limits);
-        let rise = share / pace;
-        let hold = greater(drop / (share * limits.accel) - rise, 0.0);
-        let coast = 0.5 * greater(demand.slack, 0.0) / (limits.accel * reach.top());
-        let level = state.alpha / pace;
-        let alone = demand.alone;
-        Brake { velocity, level, coast, fall: rise, hold, rise, ease: pace, pace, alone }
-    }
-
-    /// It brakes already, but not as hard as it has to: just so hard.
-    #[inline(never)]
-    fn harder(state: &State, reach: &Reach, demand: &Demand, limits: &Limits) -> Self {
-        let velocity = demand.velocity;
-        let (drop, sum) = (reach.top() - velocity, reach.top() + velocity);
-        let product = drop * sum;
-        let way = demand.way - reach.spent();
-        let root = sqrt(way * way - 8.0 * limits.kappa * sum * product);
-        let share = lesser(2.0 * product / (way + root), full_share(drop, limits));
-        Self::braking(velocity, share, drop, state, limits, demand.alone)
-    }
-
-    /// Three phases, from a top that is past.
-    fn braking(
-        velocity: f32,
-        share: f32,
-        drop: f32,
-        state: &State,
-        limits: &Limits,
-        alone: bool,
-    ) -> Self {
-        let pace = limits.pace;
-        let rise = share / pace;
-        let fall = greater(rise + state.alpha / pace, 0.0);
-        let hold = greater(drop / (share * limits.accel) - rise, 0.0);
-        Brake { velocity, level: 0.0, coast: 0.0, fall, hold, rise, ease: pace, pace, alone }
-    }
-
-    /// To a standstill, as fast as may be.
-    pub fn hard(state: &State, limits: &Limits) -> Self {
-        let top = state.velocity + limits.kappa * state.alpha * state.alpha;
-        let share = greater(full_share(top, limits), -state.alpha);
-        Self::braking(0.0, share, top, state, limits, true)
-    }
-
-    /// It brakes as hard as it has to, or harder, or else `None`: keeps that, and
-    /// eases it slower than it could.
-    #[inline(never)]
-    fn soft(state: &State, demand: &Demand, limits: &Limits) -> Option<Self> {
-        let w = demand.velocity;
-        let brake = -state.alpha * limits.accel;
-        let drop = state.velocity - w;
-        // The way that is left if it braked so to the end: `brake rise^2 / 24 + w rise / 2`.
-        let way = 0.5 * demand.way / limits.accel;
-        let rest = way - 0.5 * drop * (state.velocity + w) / brake;
-        if rest <= 0.0 {
-            return None;
-        }
-        let half = 0.5 * w;
-        let mut rise = 2.0 * rest / (half + sqrt(half * half + brake * rest * (1.0 / 6.0)));
-        if rise < -0.9999 * state.alpha / limits.pace {
-            return None;
-        }
-        let mut hold = drop / brake - 0.5 * rise;
-        if hold < 0.0 {
-            hold = 0.0;
-            // Nothing but a parabola to the end: if it is too far, from a lower acceleration.
-            rise = 3.0 * way / (state.velocity + w + w);
-        }
-        let ease = if hold > 0.0 {
-            -state.alpha / rise
-        } else {
-            2.0 * drop / (limits.accel * rise * rise)
-        };
-        let (pace, alone) = (limits.pace, demand.alone);
-        let fall = 0.0;
-        Some(Brake { velocity: w, level: fall, coast: fall, fall, hold, rise, pace, ease, alone })
-    }
-
     /// The alpha to go on with from here: easing begins with what it ends with.
     fn alpha(&self, alpha: f32) -> f32 {
         if self.is_easing() { -self.ease * self.rise } else { alpha }
@@ -159,9 +70,99 @@ impl Brake {
 }
 
 /// The share of the acceleration limit that a ramp over `drop` gets to.
-fn full_share(drop: f32, limits: &Limits) -> f32 {
-    let twice = limits.kappa + limits.kappa;
+fn full_share(drop: f32, kappa: f32) -> f32 {
+    let twice = kappa + kappa;
     if drop < twice { sqrt(drop / twice) } else { 1.0 }
+}
+
+/// Making brakes. They are methods of the governor, and not functions of its parts, for the sake of the
+/// arguments: see `state`.
+impl Governor {
+    /// From where it is to what is demanded.
+    #[inline(never)]
+    fn brake_for(&self, reach: &Reach, demand: &Demand) -> Brake {
+        if self.state.alpha < 0.0 {
+            return match self.soft(demand) {
+                Some(brake) => brake,
+                None => self.harder(reach, demand),
+            };
+        }
+        let (pace, velocity) = (self.limits.pace, demand.velocity);
+        let drop = reach.top() - velocity;
+        let share = full_share(drop, self.limits.kappa);
+        let rise = share / pace;
+        let hold = greater(drop / (share * self.limits.accel) - rise, 0.0);
+        let coast = 0.5 * greater(demand.slack, 0.0) / (self.limits.accel * reach.top());
+        let level = self.state.alpha / pace;
+        let alone = demand.alone;
+        Brake { velocity, level, coast, fall: rise, hold, rise, ease: pace, pace, alone }
+    }
+
+    /// It brakes already, but not as hard as it has to: just so hard.
+    #[inline(never)]
+    fn harder(&self, reach: &Reach, demand: &Demand) -> Brake {
+        let velocity = demand.velocity;
+        let (drop, sum) = (reach.top() - velocity, reach.top() + velocity);
+        let product = drop * sum;
+        let way = demand.way - reach.spent();
+        let root = sqrt(way * way - 8.0 * self.limits.kappa * sum * product);
+        let share = lesser(2.0 * product / (way + root), full_share(drop, self.limits.kappa));
+        let mut brake = self.braking(share, drop);
+        brake.velocity = velocity;
+        brake.alone = demand.alone;
+        brake
+    }
+
+    /// Three phases to a standstill, from a top that is past.
+    fn braking(&self, share: f32, drop: f32) -> Brake {
+        let pace = self.limits.pace;
+        let rise = share / pace;
+        let fall = greater(rise + self.state.alpha / pace, 0.0);
+        let hold = greater(drop / (share * self.limits.accel) - rise, 0.0);
+        let (velocity, level, coast) = (0.0, 0.0, 0.0);
+        Brake { velocity, level, coast, fall, hold, rise, ease: pace, pace, alone: true }
+    }
+
+    /// To a standstill, as fast as may be.
+    fn hardest(&self) -> Brake {
+        let alpha = self.state.alpha;
+        let top = self.state.velocity + self.limits.kappa * alpha * alpha;
+        let share = greater(full_share(top, self.limits.kappa), -alpha);
+        self.braking(share, top)
+    }
+
+    /// It brakes as hard as it has to, or harder, or else `None`: keeps that, and
+    /// eases it slower than it could.
+    #[inline(never)]
+    fn soft(&self, demand: &Demand) -> Option<Brake> {
+        let State { velocity, alpha } = self.state;
+        let limits = &self.limits;
+        let w = demand.velocity;
+        let brake = -alpha * limits.accel;
+        let drop = velocity - w;
+        // The way that is left if it braked so to the end: `brake rise^2 / 24 + w rise / 2`.
+        let way = 0.5 * demand.way / limits.accel;
+        let rest = way - 0.5 * drop * (velocity + w) / brake;
+        if rest <= 0.0 {
+            return None;
+        }
+        let half = 0.5 * w;
+        let mut rise = 2.0 * rest / (half + sqrt(half * half + brake * rest * (1.0 / 6.0)));
+        if rise < -0.9999 * alpha / limits.pace {
+            return None;
+        }
+        let mut hold = drop / brake - 0.5 * rise;
+        if hold < 0.0 {
+            hold = 0.0;
+            // Nothing but a parabola to the end: if it is too far, from a lower acceleration.
+            rise = 3.0 * way / (velocity + w + w);
+        }
+        let ease =
+            if hold > 0.0 { -alpha / rise } else { 2.0 * drop / (limits.accel * rise * rise) };
+        let (pace, alone) = (limits.pace, demand.alone);
+        let fall = 0.0;
+        Some(Brake { velocity: w, level: fall, coast: fall, fall, hold, rise, pace, ease, alone })
+    }
 }
 
 impl Governor {
@@ -171,7 +172,7 @@ impl Governor {
         let reach = Reach::new(self.state.velocity, self.state.alpha, self.limits.kappa);
         match reach.demand(2.0 * self.limits.accel * left, ahead) {
             Some(demand) if demand.fits => {
-                self.brake = Some(Brake::new(&self.state, &reach, &demand, &self.limits));
+                self.brake = Some(self.brake_for(&reach, &demand));
                 self.follow(left, ahead, nominal)
             }
             _ => self.hard(left, ahead, nominal),
@@ -181,7 +182,7 @@ impl Governor {
     /// Brakes as hard as it may, for a stretch.
     #[inline(never)]
     fn hard(&mut self, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
-        self.brake = Some(Brake::hard(&self.state, &self.limits));
+        self.brake = Some(self.hardest());
         let stretch = self.run(left, ahead, nominal);
         self.brake = None;
         stretch

@@ -138,7 +138,7 @@ impl Builder {
 
 /// Parts of at most [`STEPS_MAX`] steps.
 #[inline(never)]
-fn parts(from: i32, to: i32) -> u16 {
+fn parts_of(from: i32, to: i32) -> u16 {
     // The rounding of their ends may add a step.
     u16::try_from(from.abs_diff(to) / u32::from(STEPS_MAX - 1) + 1).unwrap_or(u16::MAX)
 }
@@ -233,6 +233,7 @@ impl Path {
         machine: &impl Motors,
         steps: &mut [i16; MOTORS],
     ) -> Option<u16> {
+        let mut parts = 0;
         for m in 0..MOTORS {
             let axis = usize::from(dynamics.drives[m]);
             if axis >= AXES || self.travel[axis] == 0 {
@@ -246,15 +247,14 @@ impl Path {
             let way = after.wrapping_sub(before);
             let size = way.unsigned_abs();
             if size > u32::from(STEPS_MAX) || (way < 0) != (after < before) {
-                return Some(parts(before, after));
-            }
-            if size != 0 {
+                parts = parts.max(parts_of(before, after));
+            } else if size != 0 {
                 steps[m] = way as i16;
                 self.moving += 1;
                 self.most = self.most.max(size as u16);
             }
         }
-        None
+        (parts > 0).then_some(parts)
     }
 
     /// The size of an axis' part of the heading, or a little more: never less than it is.

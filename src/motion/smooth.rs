@@ -27,6 +27,17 @@ struct Next {
     distance: f32,
 }
 
+/// A time to look ahead for.
+struct Span {
+    /// Way to the end of the block, mm.
+    left: f32,
+    /// Velocity limit, mm/s.
+    cruise: f32,
+    seconds: f32,
+    /// The block is to be over then.
+    ends: bool,
+}
+
 impl Governor {
     /// The next stretch.
     pub(super) fn smooth(
@@ -56,25 +67,27 @@ impl Governor {
     #[inline(never)]
     fn go(&mut self, left: f32, cruise: f32, ahead: &impl Ahead, nominal: f32) -> Option<Stretch> {
         let v = self.state.velocity;
-        let mut ends = left <= v * nominal;
-        let mut seconds = if ends { self.shortest(left, cruise) } else { nominal };
-        let mut next = self.choose(left, cruise, ahead, seconds, ends)?;
+        let ends = left <= v * nominal;
+        let seconds = if ends { self.shortest(left, cruise) } else { nominal };
+        let mut span = Span { left, cruise, seconds, ends };
+        let mut next = self.choose(&span, ahead)?;
         let after = next.state.velocity;
-        if !ends && next.distance + 0.5 * nominal * after >= left {
+        if !span.ends && next.distance + 0.5 * nominal * after >= left {
             // What would be left is not worth a stretch.
-            ends = true;
-            seconds = self.time_to(after, left, nominal);
-            next = self.choose(left, cruise, ahead, seconds, true)?;
+            span.ends = true;
+            span.seconds = self.time_to(after, left, nominal);
+            next = self.choose(&span, ahead)?;
         }
         // Another state may be safe at the very end, one that takes less time to get there.
         for _ in 0..3 {
             let time = self.time_to(next.state.velocity, left, nominal);
-            if !ends || time >= 0.99 * seconds {
+            if !span.ends || time >= 0.99 * span.seconds {
                 break;
             }
-            seconds = time;
-            next = self.choose(left, cruise, ahead, seconds, true)?;
+            span.seconds = time;
+            next = self.choose(&span, ahead)?;
         }
+        let Span { mut seconds, ends, .. } = span;
         let after = next.state.velocity;
         if after <= v && v < self.crawl(nominal) && v < 0.5 * cruise {
             return None;
@@ -135,16 +148,10 @@ impl Governor {
         Stretch { seconds: greater(seconds, left / cruise), distance: left, ends: true }
     }
 
-    /// The best safe state to be in after `seconds`.
+    /// The best safe state to be in at the end of a span.
     #[inline(never)]
-    fn choose(
-        &self,
-        left: f32,
-        cruise: f32,
-        ahead: &impl Ahead,
-        seconds: f32,
-        ends: bool,
-    ) -> Option<Next> {
+    fn choose(&self, span: &Span, ahead: &impl Ahead) -> Option<Next> {
+        let &Span { left, cruise, seconds, ends } = span;
         let alpha = self.state.alpha;
         let change = self.limits.pace * seconds;
         // Up to the feed and no further.
