@@ -66,6 +66,11 @@ impl Settings {
         self.axis(axis, axis::JM) as f32 * 1e3
     }
 
+    /// Acceleration limit, mm or degrees per minute squared; 0 for none. It is kept per second.
+    pub fn accel_max(&self, axis: usize) -> f32 {
+        self.axis(axis, axis::AC) as f32 * (0.1 * 3_600.0)
+    }
+
     /// Jerk limit while homing and probing, mm or degrees per minute cubed.
     pub fn jerk_homing(&self, axis: usize) -> f32 {
         self.homing(axis, axis::JH) as f32 * 1e3

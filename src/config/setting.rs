@@ -271,9 +271,12 @@ mod tests {
             let rows = (0..owner.rows()).filter_map(|row| Setting::of(owner, row));
             rows.map(|s| String::from_utf8(s.name().bytes()[1..].to_vec()).unwrap()).collect()
         };
-        assert_eq!(list(Owner::Axis(0)).join(" "), "am vm fr tn tm jm jh jd sn sx sv lv lb zb");
-        assert_eq!(list(Owner::Axis(3)).join(" "), "am vm fr tn tm jm jh jd ra sn sx sv lv lb zb");
-        assert_eq!(list(Owner::Axis(5)).join(" "), "am vm fr tn tm jm jd ra");
+        assert_eq!(list(Owner::Axis(0)).join(" "), "am vm fr tn tm jm jh jd sn sx sv lv lb zb ac");
+        assert_eq!(
+            list(Owner::Axis(3)).join(" "),
+            "am vm fr tn tm jm jh jd ra sn sx sv lv lb zb ac"
+        );
+        assert_eq!(list(Owner::Axis(5)).join(" "), "am vm fr tn tm jm jd ra ac");
         assert_eq!(list(Owner::Motor(2)).join(" "), "ma sa tr mi po pm");
     }
 }

@@ -1,8 +1,8 @@
 //! The settings, as data in program memory: the one truth about names, storage, limits, defaults.
 //!
 //! Rows stand in the order that groups are listed in. A motor or axis setting has one row for all
-//! motors or axes; its defaults are a row of the table behind. Sizes: 51 rows of 17 bytes and 576
-//! bytes of defaults.
+//! motors or axes; its defaults are a row of the table behind. Sizes: 48 rows of 17 bytes and 584
+//! bytes of defaults. TinyG's settings come first in each group, then those of Kerf alone.
 
 use super::name::token;
 use crate::progmem;
@@ -107,7 +107,7 @@ pub const SYSTEM_ROWS: usize = 26;
 /// Rows of [`MOTOR`].
 pub const MOTOR_ROWS: usize = 6;
 /// Rows of [`AXIS`].
-pub const AXIS_ROWS: usize = 15;
+pub const AXIS_ROWS: usize = 16;
 
 /// Slots of the system, small and large.
 #[allow(missing_docs)]
@@ -167,13 +167,14 @@ pub mod axis {
     pub const JM: u8 = 4;
     pub const JD: u8 = 5;
     pub const RA: u8 = 6;
-    pub const SHORT_LARGE: usize = 7;
-    pub const JH: u8 = 7;
-    pub const SV: u8 = 8;
-    pub const LV: u8 = 9;
-    pub const LB: u8 = 10;
-    pub const ZB: u8 = 11;
-    pub const LARGE: usize = 12;
+    pub const AC: u8 = 7;
+    pub const SHORT_LARGE: usize = 8;
+    pub const JH: u8 = 8;
+    pub const SV: u8 = 9;
+    pub const LV: u8 = 10;
+    pub const LB: u8 = 11;
+    pub const ZB: u8 = 12;
+    pub const LARGE: usize = 13;
 }
 
 const ANY: i32 = -i32::MAX;
@@ -253,6 +254,7 @@ progmem! {
         fixed("lv", axis::LV, 3, 0, 0).with(UNIT | HOMING),
         fixed("lb", axis::LB, 4, 3, 0).with(UNIT | HOMING),
         fixed("zb", axis::ZB, 4, 3, 0).with(UNIT | HOMING),
+        fixed("ac", axis::AC, 1, 1, 0).with(UNIT),
     ];
 
     /// Their defaults, by axis.
@@ -272,5 +274,6 @@ progmem! {
         [100_000, 100_000, 100_000, 100_000, 0, 0],
         [5_0000, 5_0000, 5_0000, 5_0000, 0, 0],
         [1_0000, 1_0000, 1_0000, 2_0000, 0, 0],
+        [0; 6],
     ];
 }

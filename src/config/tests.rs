@@ -41,6 +41,7 @@ fn defaults_show_as_documented() {
         ("ztm", "75.000"),
         ("atn", "-1.000"),
         ("cjd", "0.0500"),
+        ("xac", "0.0"),
         ("gpa", "2"),
     ] {
         assert_eq!(shown(&settings, name, false), value, "{name}");
@@ -57,6 +58,11 @@ fn inches_convert_lengths_only() {
     assert_eq!(shown(&settings, "avm", true), "100");
     set(&mut settings, "ara", "1", true).unwrap();
     assert_eq!(shown(&settings, "ara", false), "25.400");
+    set(&mut settings, "xac", "20", true).unwrap();
+    assert_eq!(shown(&settings, "xac", false), "508.0");
+    assert_eq!(shown(&settings, "xac", true), "20.0");
+    set(&mut settings, "cac", "20", true).unwrap();
+    assert_eq!(shown(&settings, "cac", true), "20.0");
     set(&mut settings, "1tr", "0.05", true).unwrap();
     assert_eq!(shown(&settings, "1tr", false), "1.2700");
     set(&mut settings, "4tr", "90", true).unwrap();
@@ -75,6 +81,7 @@ fn refusals_have_their_codes() {
         ("xvm", "0", Status::BelowMinimum),
         ("xvm", "1e9", Status::AboveMaximum),
         ("xvm", "-1e99", Status::BelowMinimum),
+        ("xac", "-1", Status::BelowMinimum),
         ("1sa", "0", Status::BelowMinimum),
         ("1tr", "-1", Status::BelowMinimum),
         ("fb", "1", Status::ReadOnly),
@@ -112,6 +119,9 @@ fn getters_have_their_units() {
     assert!((settings.feedrate_max(5) - 3_600.0).abs() < 0.001);
     assert_eq!(settings.jerk_max(0), 20e6);
     assert_eq!(settings.jerk_homing(4), 0.0);
+    assert_eq!(settings.accel_max(0), 0.0);
+    set(&mut settings, "xac", "500", false).unwrap();
+    assert_eq!(settings.accel_max(0), 1_800_000.0);
     assert_eq!(settings.junction_deviation(0), 0.05);
     assert_eq!(settings.junction_acceleration(), 100_000.0);
     assert_eq!(settings.chordal_tolerance(), 0.01);
@@ -128,8 +138,8 @@ fn getters_have_their_units() {
 
 #[test]
 fn ram_is_accounted_for() {
-    assert_eq!(size_of::<Settings>(), 376);
-    assert!(size_of::<Row>() * 47 + (26 + 6 * 4 + 15 * 6) * 4 < 2048);
+    assert_eq!(size_of::<Settings>(), 400);
+    assert!(size_of::<Row>() * 48 + (26 + 6 * 4 + 16 * 6) * 4 < 2048);
 }
 
 proptest! {

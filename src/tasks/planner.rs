@@ -135,6 +135,9 @@ impl Machine for Settings {
     fn jerk_max(&self, axis: usize) -> f32 {
         Settings::jerk_max(self, axis)
     }
+    fn accel_max(&self, axis: usize) -> f32 {
+        Settings::accel_max(self, axis)
+    }
     fn junction_deviation(&self, axis: usize) -> f32 {
         Settings::junction_deviation(self, axis)
     }
