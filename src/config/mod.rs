@@ -196,5 +196,6 @@ fn limit(row: &Row, max: i32, number: Number, inches: bool) -> Result<i32, Statu
 }
 
 mod getters;
+mod rates;
 #[cfg(test)]
 mod tests;

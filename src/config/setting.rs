@@ -2,8 +2,8 @@
 
 use super::name::{Name, axis_letter, axis_of};
 use super::table::{
-    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, HOMING, Kind, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS, RADIUS,
-    Row, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS,
+    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, HOMING, IDLE, Kind, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS,
+    RADIUS, Row, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS,
 };
 use crate::boards::MOTORS;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -155,6 +155,12 @@ impl Setting {
         motor && row.kind == Kind::Small && row.slot == table::motor::MI
     }
 
+    /// Whether it is refused while anything moves: a step, or what becomes of one, would change its
+    /// meaning under way.
+    pub fn needs_rest(self) -> bool {
+        matches!(self.owner(), Owner::Motor(_)) || self.row().is(IDLE)
+    }
+
     /// Whose it is.
     pub fn owner(self) -> Owner {
         if self.0 < FIRST_MOTOR {
@@ -277,6 +283,6 @@ mod tests {
             "am vm fr tn tm jm jh jd ra sn sx sv lv lb zb ac"
         );
         assert_eq!(list(Owner::Axis(5)).join(" "), "am vm fr tn tm jm jd ra ac");
-        assert_eq!(list(Owner::Motor(2)).join(" "), "ma sa tr mi po pm");
+        assert_eq!(list(Owner::Motor(2)).join(" "), "ma sa tr mi po pm sp");
     }
 }

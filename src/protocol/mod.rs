@@ -24,7 +24,7 @@ mod token;
 mod value;
 mod write;
 
-pub use machine::Machine;
+pub use machine::{Machine, Warning};
 pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report};
 pub use request::{Next, Request};
 pub use status_text::status_text;

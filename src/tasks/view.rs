@@ -7,11 +7,11 @@ use core::cell::{OnceCell, RefMut};
 
 use super::links::{Links, snapshot};
 use crate::boards::MOTORS;
-use crate::config::{Owner, Setting, Settings};
+use crate::config::{Setting, Settings};
 use crate::hal::imp::{gpio, stepper};
-use crate::motion::exec::{Program, Snapshot};
+use crate::motion::exec::{Program, STEP_RATE_MAX, Snapshot};
 use crate::motion::queue;
-use crate::protocol::{Machine, StatusReport, Value, thousandths};
+use crate::protocol::{Machine, StatusReport, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::units::Length;
 
@@ -100,17 +100,17 @@ impl Machine for View<'_> {
         &self.settings
     }
 
-    fn set(&mut self, setting: Setting, value: i32) -> Status {
-        if let Owner::Motor(_) = setting.owner() {
-            // Steps would change their meaning under way.
+    fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
+        if setting.needs_rest() {
             if self.busy() {
-                return Status::NotAccepted;
+                return Err(Status::NotAccepted);
             }
             self.links.resync.set(true);
         }
         self.settings.store(setting, value);
-        stepper::set_inverted(inverted(&self.settings));
-        Status::Ok
+        set_outputs(&self.settings);
+        let lowered = self.settings.limit_velocity(setting, STEP_RATE_MAX as u32);
+        Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 
     fn value(&mut self, value: Value) -> i32 {
@@ -155,7 +155,13 @@ impl Machine for View<'_> {
     }
 }
 
-/// The motors whose direction pins are inverted, as bits.
-fn inverted(settings: &Settings) -> u8 {
-    (0..MOTORS).fold(0, |bits, m| bits | u8::from(settings.motor_reversed(m)) << m)
+/// Tells the stepper what the settings say of its pins.
+fn set_outputs(settings: &Settings) {
+    stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
+    stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));
+}
+
+/// The motors of which something is so, as bits.
+fn motors(is: impl Fn(usize) -> bool) -> u8 {
+    (0..MOTORS).fold(0, |bits, m| bits | u8::from(is(m)) << m)
 }

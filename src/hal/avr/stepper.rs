@@ -32,6 +32,32 @@ static RING: Ring<Segment, SEGMENTS> = Ring::new();
 static RUNNING: SharedByte = SharedByte::new(0);
 /// Bit m: motor m's direction pin is inverted.
 static INVERTED: SharedByte = SharedByte::new(0);
+/// Bit m: motor m's step pin rests high.
+static STEP_INVERTED: SharedByte = SharedByte::new(0);
+/// How wide a step pulse is, microseconds.
+static PULSE_US: SharedByte = SharedByte::new(2);
+
+/// Does the same for each motor with a constant index, so that pins fold into single instructions.
+macro_rules! each_motor {
+    ($m:ident => $body:expr) => {{
+        {
+            const $m: usize = 0;
+            $body
+        }
+        {
+            const $m: usize = 1;
+            $body
+        }
+        {
+            const $m: usize = 2;
+            $body
+        }
+        {
+            const $m: usize = 3;
+            $body
+        }
+    }};
+}
 
 /// What the step interrupt owns. The generator comes first: the assembly counts on it.
 #[repr(C)]
@@ -86,6 +112,28 @@ pub fn set_inverted(motors: u8) {
     INVERTED.set(motors);
 }
 
+/// How wide a step pulse is, in microseconds, and which step pins rest high (bit m for motor m). The
+/// pins go to rest at once if nothing moves. Thread mode.
+pub fn set_step_output(pulse_us: u8, inverted: u8) {
+    PULSE_US.set(pulse_us);
+    STEP_INVERTED.set(inverted);
+    // Exec could start the ticks in between; the pins are the interrupt's then.
+    exec::lock(|_| {
+        if !running() {
+            rest(inverted);
+        }
+    });
+}
+
+/// Step pins at the level between pulses.
+fn rest(inverted: u8) {
+    each_motor!(M => if inverted & (1 << M) != 0 {
+        gpio::high(ACTIVE.motors[M].step);
+    } else {
+        gpio::low(ACTIVE.motors[M].step);
+    });
+}
+
 /// Stops the ticks at once, wherever the motors are. For the panic handler.
 pub fn kill() {
     // SAFETY: a single store; the machine stops for good.
@@ -108,28 +156,6 @@ pub(super) extern "C" fn halt() {
 }
 
 struct BoardPins;
-
-/// Does the same for each motor with a constant index, so that pins fold into single instructions.
-macro_rules! each_motor {
-    ($m:ident => $body:expr) => {{
-        {
-            const $m: usize = 0;
-            $body
-        }
-        {
-            const $m: usize = 1;
-            $body
-        }
-        {
-            const $m: usize = 2;
-            $body
-        }
-        {
-            const $m: usize = 3;
-            $body
-        }
-    }};
-}
 
 impl Pins for BoardPins {
     // The assembly does these two itself.
