@@ -17,6 +17,8 @@ pub struct Commands {
     pub set_position: Option<PerAxis<Option<Length>>>,
     /// The move, if any.
     pub motion: Motion,
+    /// G61.1 is in force: the move ends at rest. By itself it is nothing to carry out.
+    pub exact_stop: bool,
     /// M0, M1, M2, M30, M60.
     pub stop: Stop,
 }

@@ -15,7 +15,7 @@
 use super::block::{Block, slot};
 use super::codes::NonModal;
 use super::command::{Commands, Motion, Stop};
-use super::modal::{FeedMode, Modal, Units};
+use super::modal::{FeedMode, Modal, PathMode, Units};
 use super::number::{Decimal, Exact};
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
@@ -90,6 +90,7 @@ impl Interpreter {
         self.feed(block)?;
         self.non_modal(block, out)?;
         self.motion(block, out)?;
+        out.exact_stop = self.modal.path == PathMode::ExactStop;
         block.finish()?;
         self.stop(block, out);
         Ok(())
@@ -237,6 +238,7 @@ fn clear(out: &mut Commands) {
     out.dwell_ms = None;
     out.set_position = None;
     out.motion = Motion::None;
+    out.exact_stop = false;
     out.stop = Stop::None;
 }
 

@@ -101,5 +101,6 @@ fn interpret(links: &Links, id: LineId, start: u8, end: u8) -> Status {
 }
 
 fn asks_for_something(commands: &Commands) -> bool {
-    *commands != Commands { line: commands.line, ..Commands::default() }
+    let Commands { line, exact_stop, .. } = *commands;
+    *commands != Commands { line, exact_stop, ..Commands::default() }
 }

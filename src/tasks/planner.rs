@@ -72,6 +72,9 @@ impl Planner {
                 }
             }
         }
+        if commands.exact_stop {
+            self.builder.stopped();
+        }
         match commands.stop {
             Stop::None => {}
             Stop::Program => self.stop(Kind::ProgramStop, line).await,

@@ -46,6 +46,18 @@ fn modes_stay_in_force() {
 }
 
 #[test]
+fn exact_stop_is_modal_and_asks_for_nothing_itself() {
+    let (state, out) = run(&["G61.1"]);
+    assert_eq!(state.modal().path, PathMode::ExactStop);
+    assert_eq!(out, Commands { exact_stop: true, ..Commands::default() });
+    assert!(run(&["G61.1", "G0 X1"]).1.exact_stop);
+    assert!(run(&["G61.1", "M30", "G0 X1"]).1.exact_stop);
+    for line in ["G61", "G64"] {
+        assert!(!run(&["G61.1", line, "G0 X1"]).1.exact_stop, "{line}");
+    }
+}
+
+#[test]
 fn program_end_resets_all_but_units_and_path() {
     let lines = ["G20 G61 G19 G91 G93 F1 G1 X1", "G92 X5", "M30"];
     let (state, out) = run(&lines);
