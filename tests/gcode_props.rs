@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use kerf::gcode::Interpreter;
 use kerf::gcode::arc::Chords;
+use kerf::gcode::axes::Usual;
 use kerf::gcode::command::{Arc, Commands, Motion};
 use kerf::gcode::number::decimal;
 use kerf::units::{Length, PerAxis};
@@ -26,7 +27,7 @@ fn line() -> impl Strategy<Value = String> {
 fn interpret(interpreter: &mut Interpreter, line: &[u8]) -> Commands {
     let before = *interpreter;
     let mut out = Commands::default();
-    match interpreter.interpret(line, &mut out) {
+    match interpreter.interpret(line, &Usual, &mut out) {
         Ok(info) => {
             if let Some((start, end)) = info.message {
                 assert!(line.get(usize::from(start)..usize::from(end)).is_some());
@@ -104,14 +105,14 @@ proptest! {
     fn units_may_alternate(moves in prop::collection::vec((any::<bool>(), -2_000_000i64..2_000_000), 1..200)) {
         let mut interpreter = Interpreter::new();
         let mut out = Commands::default();
-        interpreter.interpret(b"G91 G0", &mut out).unwrap();
+        interpreter.interpret(b"G91 G0", &Usual, &mut out).unwrap();
         let mut sum = 0i64;
         for (inch, millionths) in moves {
             let (code, scale) = if inch { (20, 2_540) } else { (21, 100) };
             let sign = if millionths < 0 { "-" } else { "" };
             let size = millionths.abs();
             let line = format!("G{code} X{sign}{}.{:06}", size / 1_000_000, size % 1_000_000);
-            interpreter.interpret(line.as_bytes(), &mut out).unwrap();
+            interpreter.interpret(line.as_bytes(), &Usual, &mut out).unwrap();
             sum += millionths * scale;
         }
         let error = i64::from(interpreter.position()[0].0) * 10_000 - sum;
@@ -239,7 +240,7 @@ proptest! {
             letter[second], print(target[second].0),
             print(radius),
         );
-        interpreter.interpret(line.as_bytes(), &mut out).unwrap();
+        interpreter.interpret(line.as_bytes(), &Usual, &mut out).unwrap();
         let Motion::Arc { arc, .. } = out.motion else { panic!("no arc") };
         for (found, center) in arc.center.iter().zip(case.center) {
             prop_assert!((found.0 - center).abs() <= 40, "{} {center}", found.0);

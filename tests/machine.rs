@@ -140,7 +140,7 @@ fn a_rotary_axis_keeps_its_limit_beside_the_smallest_linear_travel() {
     for line in ["g0 a360\n", "g0 x0.0001 a360\n"] {
         let ms = std::thread::spawn(move || {
             let mut sender = Sender::boot();
-            sender.ask("{avm:600}\n", 50);
+            sender.ask("{aam:1,avm:600}\n", 50);
             sender.time(line, 100)
         })
         .join()

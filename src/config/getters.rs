@@ -86,9 +86,9 @@ impl Settings {
         self.axis(axis, axis::JD) as f32 * 1e-6
     }
 
-    /// Radius that turns a length into an angle, mm.
-    pub fn radius(&self, axis: usize) -> f32 {
-        self.axis(axis, axis::RA) as f32 * 1e-6
+    /// Radius that turns a length into an angle, nm.
+    pub fn radius_nm(&self, axis: usize) -> u32 {
+        self.axis(axis, axis::RA).unsigned_abs()
     }
 
     /// Switch at the lower end: 0 off, 1 homing, 2 limit, 3 both.

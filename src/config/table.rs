@@ -248,7 +248,7 @@ progmem! {
 
     /// The groups `x` to `c`.
     pub static AXIS: [Row; AXIS_ROWS] = [
-        int("am", axis::AM, 0, 3).with(MODE),
+        int("am", axis::AM, 0, 3).with(MODE | IDLE),
         fixed("vm", axis::VM, 3, 0, POSITIVE).with(UNIT),
         fixed("fr", axis::FR, 3, 0, POSITIVE).with(UNIT),
         fixed("tn", axis::TN, 4, 3, ANY).with(UNIT),

@@ -12,13 +12,13 @@
 //! 6,700; in inches 1,800 more for each axis; an arc 11,000, with R 14,000. Stack: 450 bytes, for an
 //! arc 600.
 
+use super::axes::{self, Axes};
 use super::block::{Block, slot};
 use super::codes::NonModal;
 use super::command::{Commands, Motion, Stop};
 use super::modal::{FeedMode, Modal, PathMode, Units};
-use super::number::{Decimal, Exact};
 use crate::status::Status;
-use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
+use crate::units::{AXES, Length, PerAxis};
 
 /// What a line was, besides commands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -60,15 +60,20 @@ impl Interpreter {
         }
     }
 
-    /// Interprets one line without its terminator.
+    /// Interprets one line without its terminator, for a machine with these `axes`.
     ///
     /// `Ok`: `out` is what the machine has to do, and the state has advanced as if it had done so.
     /// `Err`: the state is what it was, and `out` empty.
-    pub fn interpret(&mut self, line: &[u8], out: &mut Commands) -> Result<Info, Status> {
+    pub fn interpret(
+        &mut self,
+        line: &[u8],
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<Info, Status> {
         let before = *self;
         clear(out);
         let mut block = Block::default();
-        let done = block.read(line).and_then(|()| self.execute(&mut block, out));
+        let done = block.read(line).and_then(|()| self.execute(&mut block, axes, out));
         match done {
             Ok(()) => Ok(Info { message: block.message, deleted: block.deleted }),
             Err(status) => {
@@ -81,15 +86,20 @@ impl Interpreter {
 
     /// The order of execution.
     #[inline(never)]
-    fn execute(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+    fn execute(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         if block.deleted {
             return Ok(());
         }
         self.number(block, out)?;
         self.modes(block);
         self.feed(block)?;
-        self.non_modal(block, out)?;
-        self.motion(block, out)?;
+        self.non_modal(block, axes, out)?;
+        self.motion(block, axes, out)?;
         out.exact_stop = self.modal.path == PathMode::ExactStop;
         block.finish()?;
         self.stop(block, out);
@@ -126,7 +136,12 @@ impl Interpreter {
         Ok(())
     }
 
-    fn non_modal(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+    fn non_modal(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         let Some(code) = block.non_modal else { return Ok(()) };
         if code.uses_axes() && !block.has(slot::AXES) {
             return Err(Status::AxisWordMissing);
@@ -136,31 +151,37 @@ impl Interpreter {
                 let seconds = block.take(slot::P).ok_or(Status::PWordMissing)?;
                 out.dwell_ms = Some(seconds.milliseconds()?);
             }
-            NonModal::SetPosition => out.set_position = Some(self.redefine_position(block)?),
-            NonModal::SetOffset => self.redefine_offset(block)?,
+            NonModal::SetPosition => {
+                out.set_position = Some(self.redefine_position(block, axes)?);
+            }
+            NonModal::SetOffset => self.redefine_offset(block, axes)?,
             NonModal::ClearOffset => self.offset = [Length::ZERO; AXES],
         }
         Ok(())
     }
 
     /// G28.3: the position is called the axis words, in machine coordinates.
-    fn redefine_position(&mut self, block: &mut Block) -> Result<PerAxis<Option<Length>>, Status> {
+    fn redefine_position(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+    ) -> Result<PerAxis<Option<Length>>, Status> {
         let mut named = [None; AXES];
-        let axes = self.position.iter_mut().zip(&mut self.residue).zip(&mut named);
-        for (axis, ((position, residue), named)) in (0..).zip(axes) {
-            let Some(word) = block.take(axis) else { continue };
-            let value = exact(&word, axis, self.modal.units)?;
+        let all = self.position.iter_mut().zip(&mut self.residue).zip(&mut named);
+        for (axis, ((position, residue), named)) in (0..).zip(all) {
+            let value = axes::take(block, axis, self.modal.units, axes)?;
+            let Some(value) = value else { continue };
             (*position, *residue, *named) = (value.units, value.rest, Some(value.units));
         }
         Ok(named)
     }
 
     /// G92: the position is called the axis words, in work coordinates.
-    fn redefine_offset(&mut self, block: &mut Block) -> Result<(), Status> {
-        let axes = self.position.iter().zip(&mut self.residue).zip(&mut self.offset);
-        for (axis, ((position, residue), offset)) in (0..).zip(axes) {
-            let Some(word) = block.take(axis) else { continue };
-            let value = exact(&word, axis, self.modal.units)?;
+    fn redefine_offset(&mut self, block: &mut Block, axes: &impl Axes) -> Result<(), Status> {
+        let all = self.position.iter().zip(&mut self.residue).zip(&mut self.offset);
+        for (axis, ((position, residue), offset)) in (0..).zip(all) {
+            let value = axes::take(block, axis, self.modal.units, axes)?;
+            let Some(value) = value else { continue };
             *offset = position.checked_sub(value.units).ok_or(Status::OutOfRange)?;
             *residue = value.rest;
         }
@@ -221,14 +242,6 @@ impl Interpreter {
 impl Default for Interpreter {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-/// The length that the word of an axis gives: rotary axes count degrees in all units.
-pub(super) fn exact(word: &Decimal, axis: u8, units: Units) -> Result<Exact, Status> {
-    match units {
-        Units::Inch if usize::from(axis) < FIRST_ROTARY => word.inch(),
-        _ => word.mm(),
     }
 }
 

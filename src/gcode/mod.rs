@@ -8,6 +8,7 @@
 //! [`codes`] is the language: one table row per code. Everything here is pure and never waits.
 
 pub mod arc;
+pub mod axes;
 mod block;
 mod circle;
 pub mod codes;

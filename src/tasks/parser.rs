@@ -87,7 +87,8 @@ fn interpret(links: &Links, id: LineId, start: u8, end: u8) -> Status {
     let lines = links.lines.borrow();
     let text = lines.text(id).get(start.into()..end.into()).unwrap_or(&[]);
     let mut commands = links.commands.borrow_mut();
-    match links.model.borrow_mut().interpret(text, &mut commands) {
+    let settings = links.settings.borrow();
+    match links.model.borrow_mut().interpret(text, &*settings, &mut commands) {
         Ok(info) if info.deleted => Status::Noop,
         Ok(_) => {
             if asks_for_something(&commands) {

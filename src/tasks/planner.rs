@@ -5,6 +5,7 @@
 
 use embassy_futures::yield_now;
 
+use super::axes::moved_by;
 use super::links::Links;
 use crate::config::Settings;
 use crate::gcode::arc::Chords;
@@ -148,7 +149,7 @@ impl Machine for Settings {
         Settings::junction_acceleration(self)
     }
     fn motor_axis(&self, motor: usize) -> u8 {
-        Settings::motor_axis(self, motor)
+        moved_by(self, motor)
     }
     fn steps(&self, motor: usize, position: Length) -> i32 {
         self.step_ratio(motor).steps(position)

@@ -5,6 +5,7 @@
 
 use core::cell::{OnceCell, RefMut};
 
+use super::axes::moved_by;
 use super::links::{Links, snapshot};
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
@@ -66,9 +67,9 @@ impl<'a> View<'a> {
         if !self.busy() || self.links.resync.get() {
             return programmed;
         }
-        // Of several motors on an axis the first tells; an axis without one is where it should be.
+        // Of several motors on an axis the first tells; an axis that moves none is where it should be.
         (0..MOTORS)
-            .find(|m| usize::from(self.settings.motor_axis(*m)) == axis)
+            .find(|m| usize::from(moved_by(&self.settings, *m)) == axis)
             .and_then(|m| self.settings.step_ratio(m).length(self.motion().position(m)))
             .unwrap_or(programmed)
     }

@@ -3,6 +3,7 @@
 mod arcs;
 mod lines;
 
+use super::axes::Usual;
 use super::command::{Commands, Feed, Motion};
 use super::interpreter::Interpreter;
 use crate::status::Status;
@@ -12,7 +13,7 @@ fn run(lines: &[&str]) -> (Interpreter, Commands) {
     let mut interpreter = Interpreter::new();
     let mut out = Commands::default();
     for line in lines {
-        interpreter.interpret(line.as_bytes(), &mut out).expect(line);
+        interpreter.interpret(line.as_bytes(), &Usual, &mut out).expect(line);
     }
     (interpreter, out)
 }
@@ -22,7 +23,7 @@ fn refusal(lines: &[&str]) -> Status {
     let (last, before) = lines.split_last().unwrap();
     let (mut interpreter, mut out) = run(before);
     let state = interpreter;
-    let status = interpreter.interpret(last.as_bytes(), &mut out).expect_err(last);
+    let status = interpreter.interpret(last.as_bytes(), &Usual, &mut out).expect_err(last);
     assert_eq!(interpreter, state, "{last}");
     assert_eq!(out, Commands::default(), "{last}");
     status
