@@ -20,7 +20,7 @@ use crate::protocol::{Mode, StatusReport};
 use crate::tasks::lines::LinePool;
 use crate::tasks::links::{Links, QueueCount};
 use crate::tasks::tx::Tx;
-use crate::tasks::{control, exec, parser, planner, reader, reporter};
+use crate::tasks::{control, exec, parser, planner, power, reader, reporter};
 
 impl Links {
     fn new(tx: Outgoing) -> Self {
@@ -70,6 +70,7 @@ pub fn start(main: Spawner, exec_level: Spawner, baud: u32) -> Option<()> {
     main.spawn(reader_task(links, received).ok()?);
     main.spawn(planner_task(links, BlockQueue::new(queue)).ok()?);
     main.spawn(reporter_task(links).ok()?);
+    main.spawn(power_task(links).ok()?);
     main.spawn(parser_task(links).ok()?);
     main.spawn(control_task(links).ok()?);
     Some(())
@@ -92,5 +93,6 @@ tasks! {
     fn planner_task(links: &'static Links, queue: BlockQueue) = planner::run;
     fn reporter_task(links: &'static Links) = reporter::run;
     fn control_task(links: &'static Links) = control::run;
+    fn power_task(links: &'static Links) = power::run;
     fn parser_task(links: &'static Links) = parser::run;
 }

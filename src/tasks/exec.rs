@@ -10,7 +10,7 @@ use crate::hal::ring::Producer;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::queue::BlockSource;
-use crate::tasks::links;
+use crate::tasks::{links, power};
 
 /// The task.
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
@@ -20,6 +20,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         let waiting = blocks.len();
         let step = machine.step(&mut blocks, !stepper::running());
         if let Step::Segment(segment) = step {
+            power::segment(&segment, &machine.snapshot().steps);
             // There is room: this task alone fills the ring.
             let _ = segments.push(segment);
             stepper::go();

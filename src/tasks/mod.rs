@@ -8,6 +8,7 @@ pub mod lines;
 pub mod links;
 pub mod parser;
 pub mod planner;
+pub mod power;
 pub mod reader;
 pub mod reporter;
 pub mod tx;

@@ -7,6 +7,7 @@ use core::cell::{OnceCell, RefMut};
 
 use super::axes::moved_by;
 use super::links::{Links, snapshot};
+use super::power;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::hal::imp::{gpio, stepper};
@@ -133,7 +134,7 @@ impl Machine for View<'_> {
                 self.position(axis).0.wrapping_sub(self.offset(axis).0)
             }
             Value::Offset(axis) => self.offset(axis.into()).0,
-            Value::Powered(_) => i32::from(gpio::is_powered()),
+            Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Hold | Value::Tool | Value::Home | Value::Homed(_) => 0,
             modal => self.modal(modal),
         }
@@ -147,17 +148,24 @@ impl Machine for View<'_> {
         Status::Ok
     }
 
-    fn energize(&mut self, _motor: Option<u8>, on: bool) -> Status {
-        if self.busy() {
+    fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {
+        // Without power a motor that moves would lose its position.
+        if self.busy() && !on {
             return Status::NotAccepted;
         }
-        gpio::power(on);
+        let motors = motor.map_or(u8::MAX, |motor| 1 << motor);
+        if on {
+            power::energize(motors)
+        } else {
+            power::release(motors)
+        }
         Status::Ok
     }
 }
 
-/// Tells the stepper what the settings say of its pins.
+/// Tells the outputs what the settings say of them.
 fn set_outputs(settings: &Settings) {
+    power::set_modes(settings);
     stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
     stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));
 }

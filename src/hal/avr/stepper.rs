@@ -6,7 +6,8 @@
 
 use core::cell::UnsafeCell;
 
-use super::{exec, gpio};
+use super::exec;
+use super::gpio::{self, each_motor};
 use crate::boards::{ACTIVE, Timer};
 use crate::hal::byte::SharedByte;
 use crate::hal::ring::{Consumer, Producer, Ring};
@@ -36,28 +37,6 @@ static INVERTED: SharedByte = SharedByte::new(0);
 static STEP_INVERTED: SharedByte = SharedByte::new(0);
 /// How wide a step pulse is, microseconds.
 static PULSE_US: SharedByte = SharedByte::new(2);
-
-/// Does the same for each motor with a constant index, so that pins fold into single instructions.
-macro_rules! each_motor {
-    ($m:ident => $body:expr) => {{
-        {
-            const $m: usize = 0;
-            $body
-        }
-        {
-            const $m: usize = 1;
-            $body
-        }
-        {
-            const $m: usize = 2;
-            $body
-        }
-        {
-            const $m: usize = 3;
-            $body
-        }
-    }};
-}
 
 /// What the step interrupt owns. The generator comes first: the assembly counts on it.
 #[repr(C)]
@@ -91,7 +70,6 @@ pub fn go() {
     if RUNNING.get() != 0 {
         return;
     }
-    gpio::power(true);
     RUNNING.set(1);
     // SAFETY: the timer stands still, so its interrupt cannot interfere.
     unsafe {

@@ -2,7 +2,7 @@
 
 use core::cell::{Cell, RefCell};
 
-use super::{NEVER, exec, gpio, now};
+use super::{NEVER, exec, now};
 use crate::boards::MOTORS;
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::motion::dda::{Dda, Pins, SEGMENTS, Segment};
@@ -90,7 +90,6 @@ pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
 /// Starts the ticks if they have stopped.
 pub fn go() {
     if !running() {
-        gpio::power(true);
         let mut pins = stepper().pins.borrow_mut();
         pins.stopped = false;
         pins.period = FIRST_TICK;
