@@ -6,6 +6,7 @@ mod flow;
 pub mod places;
 mod scratch;
 pub mod stack;
+mod stack_args;
 mod tables;
 
 use std::path::{Path, PathBuf};
@@ -78,7 +79,9 @@ pub fn check(path: &Path) -> Result<()> {
     let image = Image::load(path)?;
     arithmetic::check(&image)?;
     tables::check(&image)?;
-    scratch::check(&image, &Code::load(path)?)
+    let code = Code::load(path)?;
+    scratch::check(&image, &code)?;
+    stack_args::check(&image, &code)
 }
 
 /// A firmware image.
