@@ -39,6 +39,9 @@ impl Settings {
     }
 }
 
+/// An end of travel that is none.
+pub const TRAVEL_NONE: Length = Length(-i32::MAX);
+
 /// Axes.
 impl Settings {
     /// 0 disabled, 1 standard, 2 inhibited, 3 radius.

@@ -28,6 +28,8 @@ pub trait Axes {
     fn mode(&self, axis: u8) -> AxisMode;
     /// The radius that turns a length into an angle, nm; more than 0.
     fn radius(&self, axis: u8) -> u32;
+    /// The ends of its travel in machine coordinates, if moves beyond them are to be refused.
+    fn travel(&self, axis: u8) -> Option<(Length, Length)>;
 }
 
 /// All axes as usual.
@@ -40,6 +42,9 @@ impl Axes for Usual {
     }
     fn radius(&self, _axis: u8) -> u32 {
         1
+    }
+    fn travel(&self, _axis: u8) -> Option<(Length, Length)> {
+        None
     }
 }
 

@@ -16,6 +16,7 @@ use super::axes::{self, Axes};
 use super::block::{Block, slot};
 use super::codes::NonModal;
 use super::command::{Commands, Motion, Stop};
+use super::limits;
 use super::modal::{FeedMode, Modal, PathMode, Units};
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
@@ -43,6 +44,8 @@ pub struct Interpreter {
     pub(super) residue: PerAxis<i16>,
     /// Machine coordinates of the work origin (G92).
     pub(super) offset: PerAxis<Length>,
+    /// The axes whose position has been set to what it is (G28.3), as bits.
+    homed: u8,
     line: u32,
 }
 
@@ -56,6 +59,7 @@ impl Interpreter {
             position: [Length::ZERO; AXES],
             residue: [0; AXES],
             offset: [Length::ZERO; AXES],
+            homed: 0,
             line: 0,
         }
     }
@@ -99,7 +103,9 @@ impl Interpreter {
         self.modes(block);
         self.feed(block)?;
         self.non_modal(block, axes, out)?;
+        let start = self.position;
         self.motion(block, axes, out)?;
+        limits::check(&start, &out.motion, self.homed, axes)?;
         out.exact_stop = self.modal.path == PathMode::ExactStop;
         block.finish()?;
         self.stop(block, out);
@@ -172,6 +178,7 @@ impl Interpreter {
             let value = axes::take(block, axis, self.modal.units, axes)?;
             let Some(value) = value else { continue };
             (*position, *residue, *named) = (value.units, value.rest, Some(value.units));
+            self.homed |= 1 << axis;
         }
         Ok(named)
     }
@@ -225,6 +232,11 @@ impl Interpreter {
     /// The coordinate system: 1, which is G54.
     pub fn coordinate_system(&self) -> u8 {
         1
+    }
+
+    /// Whether an axis is homed: soft limits are for such axes alone.
+    pub fn is_homed(&self, axis: u8) -> bool {
+        self.homed & 1 << axis != 0
     }
 
     /// The N word of the last line, 0 if it had none.

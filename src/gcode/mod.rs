@@ -15,6 +15,7 @@ pub mod codes;
 pub mod command;
 pub mod interpreter;
 mod lexer;
+mod limits;
 pub mod modal;
 mod motion;
 pub mod number;

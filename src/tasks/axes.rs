@@ -1,7 +1,9 @@
 //! What the settings say of the axes to those who interpret lines and those who plan moves.
 
 use crate::config::Settings;
+use crate::config::getters::TRAVEL_NONE;
 use crate::gcode::axes::{Axes, AxisMode};
+use crate::units::Length;
 
 impl Axes for Settings {
     fn mode(&self, axis: u8) -> AxisMode {
@@ -15,6 +17,16 @@ impl Axes for Settings {
 
     fn radius(&self, axis: u8) -> u32 {
         self.radius_nm(axis.into())
+    }
+
+    fn travel(&self, axis: u8) -> Option<(Length, Length)> {
+        let (low, high) = (self.travel_min(axis.into()), self.travel_max(axis.into()));
+        if !self.soft_limits() || low == high {
+            return None;
+        }
+        // The lowest that can be set, and anything below it, means no limit, at either end.
+        let end = |end, far| if end == TRAVEL_NONE { Length(far) } else { end };
+        Some((end(low, i32::MIN), end(high, i32::MAX)))
     }
 }
 

@@ -135,7 +135,8 @@ impl Machine for View<'_> {
             }
             Value::Offset(axis) => self.offset(axis.into()).0,
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
-            Value::Hold | Value::Tool | Value::Home | Value::Homed(_) => 0,
+            Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
+            Value::Hold | Value::Tool | Value::Home => 0,
             modal => self.modal(modal),
         }
     }

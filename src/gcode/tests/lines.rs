@@ -73,6 +73,9 @@ impl Axes for Odd {
     fn radius(&self, _axis: u8) -> u32 {
         1_000_000
     }
+    fn travel(&self, _axis: u8) -> Option<(Length, Length)> {
+        None
+    }
 }
 
 fn odd(lines: &[&str]) -> Result<[i32; 6], Status> {
