@@ -171,3 +171,13 @@ fn exact_stop_stops_between_moves_and_not_within_an_arc() {
     let (stopping_arc, _) = time("g61.1 g1 f600 x1\ng2 i5\n");
     assert!((arc..arc + 300).contains(&stopping_arc), "{stopping_arc} and {arc} ms");
 }
+
+#[test]
+fn the_steppers_are_told_what_the_drivers_want() {
+    let mut sender = Sender::boot();
+    sender.ask("{spw:5,2sp:1}\n", 50);
+    assert_eq!(kerf::hal::imp::stepper::step_output(), (5, 0b0010));
+    // Not while something moves.
+    sender.ask("g1 f500 x1\n{spw:7}\n", 50);
+    assert_eq!(kerf::hal::imp::stepper::step_output(), (5, 0b0010));
+}
