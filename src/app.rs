@@ -6,7 +6,6 @@ use core::cell::{Cell, RefCell};
 
 use embassy_executor::Spawner;
 use embassy_sync::mutex::Mutex;
-use embassy_sync::signal::Signal;
 
 use crate::config::Settings;
 use crate::gcode::command::Commands;
@@ -20,24 +19,27 @@ use crate::protocol::{Mode, StatusReport};
 use crate::tasks::lines::LinePool;
 use crate::tasks::links::{Links, QueueCount};
 use crate::tasks::tx::Tx;
+use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, power, reader, reporter};
 
 impl Links {
-    fn new(tx: Outgoing) -> Self {
+    fn new(tx: Outgoing, rate: u32) -> Self {
         Self {
             lines: RefCell::new(LinePool::new()),
-            pool_space: Signal::new(),
-            parser_wake: Signal::new(),
+            pool_space: Wake::default(),
+            parser_wake: Wake::default(),
             commands: RefCell::new(Commands::default()),
             commands_taken: Cell::new(false),
-            planner_wake: Signal::new(),
-            reporter_wake: Signal::new(),
+            planner_wake: Wake::default(),
+            reporter_wake: News::default(),
             queue_count: QueueCount::default(),
             resync: Cell::new(false),
+            settings_changed: Cell::new(true),
+            rate: Cell::new(None),
             exception: Cell::new(None),
             mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),
-            tx: Mutex::new(Tx::new(tx)),
+            tx: Mutex::new(Tx::new(tx, rate)),
             settings: RefCell::new(Settings::new()),
             model: RefCell::new(Interpreter::new()),
         }
@@ -47,28 +49,28 @@ impl Links {
 /// Makes the links where they stay. Not inlined: what it needs of the stack is free again after it.
 #[cfg(target_arch = "avr")]
 #[inline(never)]
-fn place(tx: Outgoing) -> &'static Links {
+fn place(tx: Outgoing, rate: u32) -> &'static Links {
     static LINKS: static_cell::StaticCell<Links> = static_cell::StaticCell::new();
-    LINKS.init_with(|| Links::new(tx))
+    LINKS.init_with(|| Links::new(tx, rate))
 }
 
 #[cfg(not(target_arch = "avr"))]
-fn place(tx: Outgoing) -> &'static Links {
-    std::boxed::Box::leak(std::boxed::Box::new(Links::new(tx)))
+fn place(tx: Outgoing, rate: u32) -> &'static Links {
+    std::boxed::Box::leak(std::boxed::Box::new(Links::new(tx, rate)))
 }
 
 /// Starts the firmware: `main` is the thread-mode executor, `exec_level` the interrupt-mode one.
 ///
 /// Interrupts are off. `None` if it has been started before.
 #[inline(never)]
-pub fn start(main: Spawner, exec_level: Spawner, baud: u32) -> Option<()> {
-    let (received, outgoing) = uart::start(baud)?;
+pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
+    let (received, outgoing) = uart::start(rate)?;
     let segments = stepper::start()?;
-    let (queue, source) = queue::ring().split()?;
-    let links = place(outgoing);
+    let (queue, source) = queue::store().split()?;
+    let links = place(outgoing, rate);
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received).ok()?);
-    main.spawn(planner_task(links, BlockQueue::new(queue)).ok()?);
+    main.spawn(planner_task(links, queue).ok()?);
     main.spawn(reporter_task(links).ok()?);
     main.spawn(power_task(links).ok()?);
     main.spawn(parser_task(links).ok()?);

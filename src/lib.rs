@@ -12,6 +12,7 @@ extern crate std;
 pub mod hal;
 
 pub mod app;
+pub mod baud;
 pub mod boards;
 pub mod config;
 pub mod gcode;

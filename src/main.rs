@@ -4,6 +4,7 @@
 #[cfg(target_arch = "avr")]
 mod image {
     use embassy_executor::raw::Executor;
+    use kerf::baud;
     use kerf::hal::imp::{self, exec, executor, gpio, panic, time};
     use kerf::hal::pender;
     use static_cell::StaticCell;
@@ -15,8 +16,6 @@ mod image {
     #[link(name = "gcc")]
     unsafe extern "C" {}
 
-    const BAUD: u32 = 115_200;
-
     #[avr_device::entry]
     fn main() -> ! {
         static MAIN: StaticCell<Executor> = StaticCell::new();
@@ -25,7 +24,7 @@ mod image {
         gpio::start();
         let main: &'static Executor = MAIN.init(Executor::new(pender::THREAD));
         let interrupt: &'static Executor = EXEC.init(Executor::new(pender::EXEC));
-        if kerf::app::start(main.spawner(), interrupt.spawner(), BAUD).is_none() {
+        if kerf::app::start(main.spawner(), interrupt.spawner(), baud::DEFAULT).is_none() {
             panic::halt();
         }
         time::start();

@@ -104,7 +104,13 @@ impl Text {
 
     /// Its bytes, one by one.
     pub fn bytes(self) -> impl Iterator<Item = u8> {
-        (0..self.len()).map(move |i| load(self.start.wrapping_add(i)))
+        let (mut at, mut left) = (self.start, self.len);
+        core::iter::from_fn(move || {
+            left = left.checked_sub(1)?;
+            let byte = load(at);
+            at = at.wrapping_add(1);
+            Some(byte)
+        })
     }
 }
 

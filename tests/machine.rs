@@ -94,17 +94,36 @@ fn back_pressure_reaches_the_sender() {
 
 #[test]
 fn a_flood_is_answered_by_errors_and_not_by_corruption() {
+    flood("\n");
+}
+
+#[test]
+fn a_flood_of_lines_with_two_ends_is_answered_too() {
+    flood("\r\n");
+}
+
+#[test]
+fn a_flood_of_lines_that_end_in_returns_is_answered_too() {
+    flood("\r");
+}
+
+fn flood(end: &str) {
     let mut sender = Sender::boot();
     // No flow control at all: 600 lines as fast as the line goes. What does not fit is refused.
-    let job: String = (0..600).map(|n| format!("g1 f800 x{}\n", n % 2 * 10)).collect();
-    sender.ask(&job, 200_000);
+    let job: String = (0..600).map(|n| format!("g1 f800 x{}{end}", n % 2 * 10)).collect();
+    sender.ask(&job, 400_000);
     assert!(sender.heard.contains("{\"er\":{\"fb\":440.20,\"st\":13,"), "loss is reported");
     let position = sender.machine.emitted().position[0];
     assert!(position == 0 || position == 12_800, "never anywhere else: {position}");
-    // The line behind the damage cannot be told from it; the next one can.
-    assert_eq!(sender.ask("g1 x77\n", 50), "{\"r\":{},\"f\":[1,13,7]}\n");
+    let answers = sender.heard.lines().filter(|line| line.starts_with("{\"r\":{},\"f\""));
+    assert_eq!(answers.count(), 600, "every line is answered, those that were lost too");
     assert!(sender.ask("{fb:n}\n", 50).contains("440.20"), "and it still answers");
-    assert_eq!(sender.machine.emitted().position[0], position);
+    sender.ask("g1 x77\n", 10_000);
+    assert_eq!(
+        sender.machine.emitted().position[0],
+        77 * 1_280,
+        "the line behind the loss is whole"
+    );
 }
 
 #[test]

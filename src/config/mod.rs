@@ -15,6 +15,7 @@ pub use number::{Digits, Fixed, Number};
 pub use ratio::StepRatio;
 pub use setting::{Owner, Place, Setting};
 
+use crate::baud;
 use crate::boards::MOTORS;
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -79,7 +80,11 @@ impl Settings {
         let number = if row.is(JERK) && million { number.millionth() } else { number };
         let inches = inches && self.is_length(setting, &row);
         let linear_mode = row.is(MODE) && !setting.owner().is_rotary();
-        limit(&row, row.max - i32::from(linear_mode), number, inches)
+        let value = limit(&row, row.max - i32::from(linear_mode), number, inches)?;
+        if setting.is_baud() && baud::rate(value).is_none() {
+            return Err(Status::OutOfRange);
+        }
+        Ok(value)
     }
 
     /// The value of a setting as shown.

@@ -161,6 +161,13 @@ impl Setting {
         matches!(self.owner(), Owner::Motor(_)) || self.row().is(IDLE)
     }
 
+    /// Whether it is the rate of the serial line.
+    pub fn is_baud(self) -> bool {
+        let row = self.row();
+        let large = self.owner() == Owner::System && row.kind == Kind::Large;
+        large && row.slot == table::system::BAUD
+    }
+
     /// Whose it is.
     pub fn owner(self) -> Owner {
         if self.0 < FIRST_MOTOR {

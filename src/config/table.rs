@@ -138,7 +138,8 @@ pub mod system {
     pub const CT: u8 = 1;
     pub const MT: u8 = 2;
     pub const SI: u8 = 3;
-    pub const LARGE: usize = 4;
+    pub const BAUD: u8 = 4;
+    pub const LARGE: usize = 5;
 }
 
 /// Slots of a motor, small and large.
@@ -208,7 +209,7 @@ progmem! {
         int("ec", system::EC, 0, 1),
         int("ee", system::EE, 0, 1),
         int("ex", system::EX, 0, 2),
-        constant("baud", 0),
+        up_to(fixed("baud", system::BAUD, 0, 0, 1), 1_000_000).with(RANGE),
         int("gpl", system::GPL, 0, 2),
         int("gun", system::GUN, 0, 1),
         int("gco", system::GCO, 1, 6),

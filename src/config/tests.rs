@@ -86,7 +86,12 @@ fn refusals_have_their_codes() {
         ("1tr", "-1", Status::BelowMinimum),
         ("fb", "1", Status::ReadOnly),
         ("id", "1", Status::ReadOnly),
-        ("baud", "3", Status::ReadOnly),
+        ("baud", "0", Status::OutOfRange),
+        ("baud", "7", Status::OutOfRange),
+        ("baud", "921600", Status::OutOfRange),
+        ("baud", "1000001", Status::OutOfRange),
+        ("baud", "-1", Status::OutOfRange),
+        ("baud", "9600.5", Status::BadNumber),
         ("si", "200.5", Status::BadNumber),
         ("spw", "0", Status::OutOfRange),
         ("spw", "11", Status::OutOfRange),
@@ -113,6 +118,16 @@ fn some_values_are_pulled_to_their_limits() {
     ] {
         set(&mut settings, name, value, false).unwrap();
         assert_eq!(shown(&settings, name, false), result, "{name}");
+    }
+}
+
+#[test]
+fn a_rate_is_shown_as_it_was_set() {
+    let mut settings = Settings::new();
+    assert_eq!(shown(&settings, "baud", false), "5");
+    for value in ["6", "1", "500000", "115200", "1000000"] {
+        set(&mut settings, "baud", value, false).unwrap();
+        assert_eq!(shown(&settings, "baud", true), value);
     }
 }
 
@@ -145,7 +160,7 @@ fn getters_have_their_units() {
 
 #[test]
 fn ram_is_accounted_for() {
-    assert_eq!(size_of::<Settings>(), 404);
+    assert_eq!(size_of::<Settings>(), 408);
     assert!(size_of::<Row>() * 51 + (28 + 7 * 4 + 16 * 6) * 4 < 2048);
 }
 

@@ -45,10 +45,19 @@ crate::progmem! {
         }
         table
     };
+    /// The bit of each slot: quicker than to shift one there.
+    static BIT: [u16; slot::COUNT] = {
+        let mut table = [0; slot::COUNT];
+        let mut i = 0;
+        while i < slot::COUNT {
+            table[i] = 1 << i;
+            i += 1;
+        }
+        table
+    };
 }
 
 /// The parts of a line.
-#[derive(Default)]
 pub struct Block {
     pub non_modal: Option<NonModal>,
     pub motion: Option<MotionMode>,
@@ -68,9 +77,32 @@ pub struct Block {
     pub deleted: bool,
     /// Where in the line the text of a message lies.
     pub message: Option<(u8, u8)>,
+    /// Has a comment.
+    pub commented: bool,
 }
 
 impl Block {
+    /// An empty line.
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self {
+            non_modal: None,
+            motion: None,
+            plane: None,
+            distance: None,
+            feed_mode: None,
+            units: None,
+            path: None,
+            stop: None,
+            only: 0,
+            present: 0,
+            values: Vec::new(),
+            deleted: false,
+            message: None,
+            commented: false,
+        }
+    }
+
     /// Reads a line.
     pub fn read(&mut self, line: &[u8]) -> Result<(), Status> {
         if line.len() > u8::MAX as usize {
@@ -108,11 +140,11 @@ impl Block {
     fn word(&mut self, letter: u8, value: Decimal) -> Result<(), Status> {
         match letter {
             b'G' => {
-                let code = value.code().and_then(codes::g);
+                let code = value.code().and_then(|(whole, tenth)| codes::g(whole, tenth));
                 self.code(code.ok_or(Status::GcodeUnsupported)?)
             }
             b'M' => {
-                let code = value.code().and_then(codes::m);
+                let code = value.code().and_then(|(whole, tenth)| codes::m(whole, tenth));
                 self.code(code.ok_or(Status::McodeUnsupported)?)
             }
             _ => self.value(letter, value),
@@ -139,7 +171,7 @@ impl Block {
 
     fn value(&mut self, letter: u8, value: Decimal) -> Result<(), Status> {
         let slot = SLOT.at(usize::from(letter.wrapping_sub(b'A'))).unwrap_or(slot::NONE);
-        let bit = 1u16.checked_shl(slot.into()).ok_or(Status::GcodeUnsupported)?;
+        let bit = BIT.at(slot.into()).ok_or(Status::GcodeUnsupported)?;
         if self.present & bit != 0 {
             return Err(Status::GcodeGeneric);
         }
@@ -149,6 +181,7 @@ impl Block {
     }
 
     fn comment(&mut self, line: &[u8], text: &[u8]) {
+        self.commented = true;
         if let Some(text) = lexer::message(text) {
             let start = line.offset(text);
             // A line is at most 255 bytes long.
@@ -163,12 +196,17 @@ impl Block {
 
     /// The number in a slot, which is then used.
     pub fn take(&mut self, slot: u8) -> Option<Decimal> {
-        let bit = 1u16.checked_shl(slot.into())?;
+        let bit = BIT.at(slot.into())?;
         if self.present & bit == 0 {
             return None;
         }
         self.present &= !bit;
         self.values.iter().find(|word| word.0 == slot).map(|word| word.1)
+    }
+
+    /// The axes that the line names.
+    pub fn axes(&self) -> impl Iterator<Item = u8> {
+        self.values.iter().map(|word| word.0).filter(|slot| usize::from(*slot) < AXES)
     }
 
     /// All axis words, which are then used. Not for a line whose axes went to [`Self::take`].
@@ -208,7 +246,7 @@ mod tests {
     use super::*;
 
     fn read(line: &str) -> Result<Block, Status> {
-        let mut block = Block::default();
+        let mut block = Block::new();
         block.read(line.as_bytes()).map(|()| block)
     }
 

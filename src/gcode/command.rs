@@ -23,6 +23,18 @@ pub struct Commands {
     pub stop: Stop,
 }
 
+impl Commands {
+    /// Whether the machine has nothing to do.
+    pub fn is_empty(&self) -> bool {
+        // In full, so that a new part is not forgotten here.
+        let Commands { line: _, dwell_ms, set_position, motion, exact_stop: _, stop } = self;
+        matches!(motion, Motion::None)
+            && *stop == Stop::None
+            && dwell_ms.is_none()
+            && set_position.is_none()
+    }
+}
+
 /// A move to `target`, which is in machine coordinates.
 #[derive(Clone, Copy, Default, Debug, PartialEq)]
 pub enum Motion {

@@ -8,9 +8,11 @@
 //! of its own line. LinuxCNC and TinyG read `G20 F10` in the units of the line before, which is 25.4
 //! times too fast or too slow, and which their users keep reporting.
 //!
-//! Cost on AVR, words and comments included: `X12.345 Y67.890` 4,700 cycles, with `G1` and `F1500`
-//! 6,700; in inches 1,800 more for each axis; an arc 11,000, with R 14,000. Stack: 450 bytes, for an
+//! Cost on AVR, words and comments included: `X12.345 Y67.890` 3,600 cycles, with `G1` and `F1500`
+//! 4,800; in inches 1,800 more for each axis; an arc 11,000, with R 14,000. Stack: 450 bytes, for an
 //! arc 600.
+
+use heapless::Vec;
 
 use super::axes::{self, Axes};
 use super::block::{Block, slot};
@@ -28,6 +30,8 @@ pub struct Info {
     pub message: Option<(u8, u8)>,
     /// A slash deleted the line: to be answered with [`Status::Noop`].
     pub deleted: bool,
+    /// There was a comment.
+    pub commented: bool,
 }
 
 /// The state of the G-code interpreter.
@@ -74,18 +78,49 @@ impl Interpreter {
         axes: &impl Axes,
         out: &mut Commands,
     ) -> Result<Info, Status> {
-        let before = *self;
         clear(out);
-        let mut block = Block::default();
-        let done = block.read(line).and_then(|()| self.execute(&mut block, axes, out));
-        match done {
-            Ok(()) => Ok(Info { message: block.message, deleted: block.deleted }),
-            Err(status) => {
-                *self = before;
-                clear(out);
-                Err(status)
-            }
+        let mut block = Block::new();
+        block.read(line)?;
+        self.execute_or_undo(&mut block, axes, out)?;
+        let Block { message, deleted, commented, .. } = block;
+        Ok(Info { message, deleted, commented })
+    }
+
+    #[inline(never)]
+    fn execute_or_undo(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        if block.non_modal.is_some() {
+            return self.execute_rarity(block, axes, out);
         }
+        let mut before = Before::of(self);
+        before.save_axes(self, block);
+        let done = self.execute(block, axes, out);
+        if done.is_err() {
+            before.restore(self);
+            clear(out);
+        }
+        done
+    }
+
+    /// The same for a block that may change more than modes and the position of its axes.
+    #[inline(never)]
+    fn execute_rarity(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        let before = *self;
+        let done = self.execute(block, axes, out);
+        if done.is_err() {
+            *self = before;
+            clear(out);
+        }
+        done
     }
 
     /// The order of execution.
@@ -200,6 +235,50 @@ impl Interpreter {
         if out.stop == Stop::End {
             self.modal.end_program();
             self.offset = [Length::ZERO; AXES];
+        }
+    }
+}
+
+/// What a block of moves and modes may change of the state, as it was: all of it would take 600 cycles
+/// to copy.
+struct Before {
+    modal: Modal,
+    feed: f32,
+    feed_units: Units,
+    line: u32,
+    /// Position and residue of the axes that the block names.
+    axes: Vec<(u8, Length, i16), AXES>,
+}
+
+impl Before {
+    #[inline(always)]
+    fn of(state: &Interpreter) -> Self {
+        let Interpreter { modal, feed, feed_units, line, .. } = *state;
+        Self { modal, feed, feed_units, line, axes: Vec::new() }
+    }
+
+    #[inline(always)]
+    fn save_axes(&mut self, state: &Interpreter, block: &Block) {
+        for axis in block.axes() {
+            let i = usize::from(axis);
+            if let (Some(position), Some(residue)) = (state.position.get(i), state.residue.get(i)) {
+                // There is room for all axes.
+                let _ = self.axes.push((axis, *position, *residue));
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn restore(&self, state: &mut Interpreter) {
+        state.modal = self.modal;
+        state.feed = self.feed;
+        state.feed_units = self.feed_units;
+        state.line = self.line;
+        for (axis, position, residue) in &self.axes {
+            let i = usize::from(*axis);
+            if let (Some(p), Some(r)) = (state.position.get_mut(i), state.residue.get_mut(i)) {
+                (*p, *r) = (*position, *residue);
+            }
         }
     }
 }

@@ -5,8 +5,8 @@
 
 use nom::branch::alt;
 use nom::bytes::complete::{take_till, take_while};
-use nom::character::complete::{char, satisfy};
-use nom::combinator::{map, opt, rest};
+use nom::character::complete::char;
+use nom::combinator::{fail, map, opt, rest};
 use nom::error::{ErrorKind, ParseError};
 use nom::sequence::{delimited, preceded, terminated};
 use nom::{IResult, Parser};
@@ -57,6 +57,7 @@ pub fn blanks(input: &[u8]) -> Lexed<'_, &[u8]> {
 /// The next item, and the blanks behind it.
 ///
 /// 101 where no item can begin, 102 for a letter without a number.
+#[inline(always)]
 pub fn item(input: &[u8]) -> Lexed<'_, Item<'_>> {
     match input.first() {
         Some(b'(' | b';') => comment(input),
@@ -64,12 +65,23 @@ pub fn item(input: &[u8]) -> Lexed<'_, Item<'_>> {
     }
 }
 
+#[inline(always)]
 fn word(input: &[u8]) -> Lexed<'_, Item<'_>> {
-    let (input, letter) = satisfy(|c| c.is_ascii_alphabetic()).parse(input)?;
+    let (input, letter) = letter(input)?;
     let (input, number) = decimal(input)?;
-    Ok((input, Item::Word((letter as u8).to_ascii_uppercase(), number)))
+    Ok((input, Item::Word(letter, number)))
 }
 
+/// A letter, in upper case. `nom`'s own would make a 32-bit character of it.
+#[inline(always)]
+fn letter(input: &[u8]) -> Lexed<'_, u8> {
+    match input.split_first() {
+        Some((byte, rest)) if byte.is_ascii_alphabetic() => Ok((rest, byte.to_ascii_uppercase())),
+        _ => fail().parse(input),
+    }
+}
+
+#[inline(never)]
 /// `( ... )`, closed or not, or `;` to the end of the line.
 fn comment(input: &[u8]) -> Lexed<'_, Item<'_>> {
     let inline = delimited(char('('), take_till(|byte| byte == b')'), opt(char(')')));

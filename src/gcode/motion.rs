@@ -111,7 +111,8 @@ impl Interpreter {
                 None => 0.0,
             },
         };
-        if per_minute <= 0.0 {
+        // Neither negative nor NaN, so the bits tell as much as a comparison, and cost less.
+        if per_minute.to_bits() == 0 {
             return Err(Status::FeedrateMissing);
         }
         Ok(match self.modal.feed_mode {

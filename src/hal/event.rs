@@ -11,7 +11,7 @@ use core::task::{Poll, Waker};
 
 use super::imp;
 
-/// What happened. The discriminant is the bit.
+/// What happened. The discriminant is the bit. Bits 5 and 6 are left to interrupts among themselves.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Event {
@@ -71,14 +71,25 @@ pub async fn wait<R>(event: Event, mut ready: impl FnMut() -> Option<R>) -> R {
     .await
 }
 
+/// Waits for the next `event` after the last poll of the task. Thread mode only.
+pub async fn next(event: Event) {
+    let mut asked = false;
+    wait(event, || core::mem::replace(&mut asked, true).then_some(())).await;
+}
+
 /// Wakes who waits for the events in `bits`. The main loop calls it, in thread mode.
 pub fn dispatch(bits: u8) {
-    for (bit, slot) in waiters().0.iter().enumerate() {
-        if bits & (1 << bit) != 0
+    let mut left = bits & ((1 << WAITABLE) - 1);
+    for slot in &waiters().0 {
+        if left == 0 {
+            break;
+        }
+        if left & 1 != 0
             && let Some(waker) = slot.take()
         {
             waker.wake();
         }
+        left >>= 1;
     }
     if bits & (1 << Event::Tick as u8) != 0 {
         imp::time::wake_expired();

@@ -120,6 +120,23 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         Some(unsafe { &*self.0.slot(self.index_of(back)) })
     }
 
+    /// Puts values in, as many as there is room for, and shows them to the consumer all at once.
+    #[inline]
+    pub fn push_all(&mut self, values: impl Iterator<Item = T>) {
+        let tail = self.0.tail.get();
+        let mut head = self.0.head.get();
+        for value in values {
+            let after = next::<N>(head);
+            if after == tail {
+                break;
+            }
+            // SAFETY: the slots from `head` to `tail` are the producer's.
+            unsafe { self.0.slot(after).write(value) };
+            head = after;
+        }
+        self.0.head.set(head);
+    }
+
     /// Changes a value pushed earlier; `back` 0 is the newest. False if it has been released.
     ///
     /// The caller keeps the consumer from running meanwhile (see `imp::exec::lock`): `_ceiling` is
@@ -177,6 +194,31 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
             let tail = self.0.tail.get();
             self.0.tail.set(next::<N>(tail));
         }
+    }
+
+    /// The oldest values, as many as lie side by side; empty only if none waits.
+    #[inline]
+    pub fn waiting(&self) -> &[T] {
+        // Read once: the producer may move it meanwhile.
+        let head = self.0.head.get();
+        let tail = self.0.tail.get();
+        let start = next::<N>(tail);
+        let len = match head {
+            _ if head == tail => 0,
+            _ if head >= start => usize::from(head - start) + 1,
+            _ => N - usize::from(start),
+        };
+        // SAFETY: `head` has moved onto or past these slots, so they are filled, and the consumer's
+        // until `tail` moves, which takes `&mut self`.
+        unsafe { core::slice::from_raw_parts(self.0.slot(start), len) }
+    }
+
+    /// Releases the oldest `count` values, of those that [`Consumer::waiting`] gave.
+    #[inline]
+    pub fn release_many(&mut self, count: u8) {
+        let count = usize::from(count).min(self.0.used());
+        let tail = usize::from(self.0.tail.get()) + count;
+        self.0.tail.set(if tail >= N { tail - N } else { tail } as u8);
     }
 
     /// Takes the oldest value.
@@ -252,6 +294,25 @@ mod tests {
             p.push(i).expect("room");
         }
         assert_eq!(p.free(), 0);
+    }
+
+    #[test]
+    fn many_at_once() {
+        let (mut p, mut c) = ring::<4>();
+        assert!(c.waiting().is_empty());
+        let mut next = 0u16..;
+        let mut taken: Vec<u16> = Vec::new();
+        while taken.len() < 20 {
+            let room = p.free();
+            p.push_all(next.by_ref().take(room));
+            assert_eq!(p.free(), 0);
+            p.push_all([99].into_iter());
+            let run = c.waiting().to_vec();
+            assert!(!run.is_empty());
+            c.release_many(run.len().min(2) as u8);
+            taken.extend(run.iter().take(2));
+        }
+        assert!(taken.iter().copied().eq(0..taken.len() as u16));
     }
 
     #[test]

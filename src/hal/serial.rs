@@ -1,16 +1,78 @@
 //! What both sides of the serial line agree on: the rings, and the marks of lost bytes.
+//!
+//! Bytes that come when the receive ring is full are lost, and so is one that comes damaged. A mark
+//! stands in their place: it replaces the newest byte of a full ring (or the damaged one), and says in
+//! three bits what the reader must know. Line ends that were lost are counted besides (`imp::uart::lost_ends`),
+//! so that each lost line is answered.
 
 use super::ring::{Consumer, Producer};
 
 /// Size of each ring.
 pub const RING: usize = 256;
 
-/// What stands where bytes were lost. No line of text has it.
-pub const LOSS: u8 = 0;
-/// The same, where the byte that is replaced ended its line.
-pub const LOSS_AT_END: u8 = 1;
+/// Bytes below this are marks. None of them is in a line of text; what comes of them from outside
+/// counts as damaged.
+pub const MARKS: u8 = 8;
+/// Of a mark: it replaced the end of a whole line.
+pub const BEHIND_END: u8 = 1;
+/// Of a mark: the byte lost last was the end of a line.
+pub const CLEAN: u8 = 2;
+/// Of a mark: that was a carriage return, which a line feed may follow.
+pub const RETURNED: u8 = 4;
+
+/// The reader is woken at the end of a line, and when this many bytes have come since: a power of two.
+pub const BATCH: u8 = 32;
 
 /// Bytes received.
 pub type Received = Consumer<u8, RING>;
 /// Bytes to send. Call `imp::uart::kick` after filling it.
 pub type Outgoing = Producer<u8, RING>;
+
+/// The mark that replaces `newest`, if it is none yet. The receive interrupt of the AVR has the twins of
+/// these two in assembly.
+pub fn mark(newest: u8) -> u8 {
+    match newest {
+        b'\r' => BEHIND_END | CLEAN | RETURNED,
+        b'\n' => BEHIND_END | CLEAN,
+        ..MARKS => newest,
+        _ => 0,
+    }
+}
+
+/// The mark after `byte` was lost too, and whether that was one more line end.
+pub fn lose(mark: u8, byte: u8) -> (u8, bool) {
+    let begun = mark & BEHIND_END;
+    match byte {
+        b'\r' => (begun | CLEAN | RETURNED, true),
+        b'\n' => (begun | CLEAN, mark & RETURNED == 0),
+        _ => (begun, false),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mark and the count of ends after all of `lost` came to a full ring that ended in `newest`.
+    fn after(newest: u8, lost: &[u8]) -> (u8, usize) {
+        lost.iter().fold((mark(newest), 0), |(mark, ends), byte| {
+            let (mark, is_end) = lose(super::mark(mark), *byte);
+            (mark, ends + usize::from(is_end))
+        })
+    }
+
+    #[test]
+    fn a_mark_tells_where_it_stands_and_how_the_loss_ended() {
+        assert_eq!(after(b'x', b"y"), (0, 0));
+        assert_eq!(after(b'x', b"y\n"), (CLEAN, 1));
+        assert_eq!(after(b'\n', b"y\nz"), (BEHIND_END, 1));
+        assert_eq!(after(b'\n', b"a\nb\n"), (BEHIND_END | CLEAN, 2));
+    }
+
+    #[test]
+    fn a_line_feed_behind_a_return_is_no_end_of_its_own() {
+        assert_eq!(after(b'\r', b"\n"), (BEHIND_END | CLEAN, 0));
+        assert_eq!(after(b'x', b"\r\ny\r"), (CLEAN | RETURNED, 2));
+        assert_eq!(after(b'x', b"\r\r"), (CLEAN | RETURNED, 2));
+    }
+}

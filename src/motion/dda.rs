@@ -5,12 +5,13 @@
 //! So a motor steps at most once a tick, `increment = STEP` is a step on every tick, and a motor whose
 //! increment is `STEP / 2^k` steps on every `2^k`th tick exactly.
 //!
-//! On AVR, [`Dda::tick`] has a twin in assembly (`hal/avr/step_isr.rs`), which works on the same
-//! [`Dda`], field by field; [`Dda::load`] serves both. The host runs this one.
+//! On AVR the whole of [`Dda::tick`] has a twin in assembly (`hal/avr/step_isr.rs`), which works on the
+//! same [`Dda`] and [`Segment`], field by field. The host runs this one.
 //!
 //! ```text
 //!   tick   n-1          n           n+1
 //!          |            |            |
+//!          +-settle     +-settle     +-settle  wait for the segment's `settle`, if a pulse is due
 //!          +-out        +-out        +-out     step pins rise: the bits computed one tick before
 //!          +-load?      +-load?      +-load?   segment used up: take the next, set directions
 //!          +-add        +-add        +-add     phases advance, bits for the next tick
@@ -18,8 +19,15 @@
 //! ```
 //!
 //! Pins rise first, so a pulse's time does not depend on the computation, and fall last, so that a
-//! pulse is as wide as the computation (over 2 us). Directions change after the last pulse of the old
+//! pulse is as wide as the computation. Directions change after the last pulse of the old
 //! segment and a whole tick before the first of the new one.
+//!
+//! The interrupt may start late, behind another one. A segment that has the time for it names the
+//! cycle of the tick at which its pulses rise, so late that no other interrupt can delay them: those
+//! pulses are exact to the cycle.
+//!
+//! In *lockstep* all motors that move step on every tick: phases stay as they are, and the interrupt
+//! has nothing to add. That is how the highest rates are reached.
 //!
 //! A phase is the motor's true position between steps. When the direction of a motor reverses, its
 //! phase is complemented: counting a complement up is counting the phase down, so the fraction
@@ -39,11 +47,12 @@ pub const PHASE_START: u16 = STEP / 2 + PHASE_MARGIN;
 /// See [`PHASE_START`].
 pub const PHASE_MARGIN: u16 = 1024;
 
-/// Segments prepared ahead, plus one slot that stays empty.
-pub const SEGMENTS: usize = 5;
+/// Segments prepared ahead, plus one slot that stays empty. A power of two, for the assembly.
+pub const SEGMENTS: usize = 8;
 
-/// A stretch of constant velocity, ready for the interrupt.
+/// A stretch of constant velocity, ready for the interrupt. The assembly knows its layout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
 pub struct Segment {
     /// Phase added per tick, 0 to [`STEP`].
     pub increment: [u16; MOTORS],
@@ -53,6 +62,46 @@ pub struct Segment {
     pub period: u16,
     /// Bit m set: motor m runs backwards.
     pub backwards: u8,
+    /// Cycles from a tick to its pulses; 0 for pulses as soon as may be.
+    pub settle: u8,
+    /// What the interrupt may leave out: [`NARROW`], [`WIDE`], or [`LOCKSTEP`] and the motors that step on
+    /// every tick. Set by [`Segment::seal`].
+    pub mode: u8,
+    /// Makes it 16 bytes long.
+    pub reserved: u8,
+}
+
+/// None but the first two motors move.
+pub const NARROW: u8 = 0;
+/// Others do.
+pub const WIDE: u8 = 1;
+/// All motors that move step on every tick.
+pub const LOCKSTEP: u8 = 0x80;
+
+impl Segment {
+    /// Completes what follows from the increments. Cost: 60.
+    #[inline]
+    pub fn seal(mut self) -> Self {
+        let mut lockstep = 0;
+        let mut mixed = false;
+        let mut m = 0;
+        while m < MOTORS {
+            match self.increment[m] {
+                0 => {}
+                STEP => lockstep |= 1 << m,
+                _ => mixed = true,
+            }
+            m += 1;
+        }
+        self.mode = if lockstep != 0 && !mixed {
+            LOCKSTEP | lockstep
+        } else if self.increment[2] | self.increment[3] != 0 {
+            WIDE
+        } else {
+            NARROW
+        };
+        self
+    }
 }
 
 /// What the step generator does to the outside.
@@ -82,7 +131,11 @@ pub struct Dda {
     pub(crate) ticks: u16,
     /// Steps due at the next tick, bit m for motor m.
     pub(crate) due: u8,
-    backwards: u8,
+    pub(crate) backwards: u8,
+    /// As in the segment.
+    pub(crate) settle: u8,
+    /// As in the segment.
+    pub(crate) mode: u8,
 }
 
 impl Dda {
@@ -92,8 +145,10 @@ impl Dda {
             phase: [PHASE_START; MOTORS],
             increment: [0; MOTORS],
             ticks: 0,
-            backwards: 0,
             due: 0,
+            backwards: 0,
+            settle: 0,
+            mode: NARROW,
         }
     }
 
@@ -133,12 +188,11 @@ impl Dda {
         let Some(segment) = segments.pop() else {
             return false;
         };
-        // First: on AVR the counter is running towards the old top.
+        // First: the counter is running towards the old top.
         pins.period(segment.period);
         let turned = segment.backwards ^ self.backwards;
-        // Always, so that a polarity that was changed meanwhile takes effect.
-        pins.direction(segment.backwards);
         if turned != 0 {
+            pins.direction(segment.backwards);
             self.backwards = segment.backwards;
             for m in 0..MOTORS {
                 if turned & (1 << m) != 0 {
@@ -148,6 +202,8 @@ impl Dda {
         }
         self.increment = segment.increment;
         self.ticks = segment.ticks;
+        self.settle = segment.settle;
+        self.mode = segment.mode;
         pins.slot_free();
         true
     }

@@ -1,49 +1,48 @@
 //! Exec: runs blocks, a few milliseconds at a time.
 //!
 //! Owned by the exec task (level 2), which asks [`Exec::step`] for a segment whenever the segment ring
-//! has room. A block is run as an up-ramp, a cruise and a down-ramp ([`Running`]); each call advances the
-//! time by [`SEGMENT_S`] and hands the distance to [`Prep`]. Times are seconds, distances mm.
+//! wants one. The [`Governor`] says how far the next stretch goes and how long it takes, [`Prep`] makes a
+//! segment of it. A stretch ends where its block ends: a block that takes less than [`SEGMENT_S`] is one
+//! segment. Times are seconds, distances mm.
 //!
-//! The planner guarantees that the machine can slow down to every block's `entry` (`lookahead`). Exec
-//! does the other direction: it knows how fast it really is, and speeds up as far as it can. So it
-//! may enter a block slower than planned, never faster. While the down-ramp has not begun it keeps
-//! looking at the next block's `entry`, which rises as more blocks arrive, and moves its exit up.
+//! Nothing is planned ahead but what the [horizon](super::horizon) knows: how fast the machine is, and how
+//! fast it may be at the end of the block, settle each stretch. More blocks in the queue tell at the
+//! next one.
 //!
-//! Distance is kept in integer phase units of the dominant motor, so a block of any length at any
-//! speed ends exactly; floats only say how far the next few milliseconds go. Near its end a block is
-//! measured from the end, where floats are fine-grained.
+//! A move without steps (shorter than a step, or of axes without motors) takes its time all the same:
+//! many of them in a row are no faster than a long one.
 //!
-//! Cost on AVR: with [`Prep`] about 13,000 cycles a segment, and 15,000 more at the start of a block.
+//! Cost on AVR: with [`Prep`] 3,500 cycles for a segment or a short block, 7,500 with a jerk limit.
 
-use super::block::{Block, Kind};
+use super::block::{Block, Body, Line};
 use super::dda::Segment;
-use super::prep::{PERIOD_MIN, Prep, Rest};
-use super::profile::{Limits, greater, lesser, reach};
-use super::queue::BlockSource;
-use super::running::{CRUISE_MIN, Running};
+use super::governor::{Ahead, Governor};
+use super::prep::{CYCLES_MAX, FINE_S, Prep, shortest};
+use super::queue::{Anchor, BlockSource};
 use crate::boards::MOTORS;
 
 /// CPU cycles in a second.
 const CYCLES_PER_S: f32 = crate::boards::ACTIVE.clock_hz as f32;
 
 /// CPU cycles in a millisecond.
-const CYCLES_PER_MS: u32 = crate::boards::ACTIVE.clock_hz / 1000;
+const CYCLES_PER_MS: u16 = (crate::boards::ACTIVE.clock_hz / 1000) as u16;
 
-/// Nominal time of a segment. Four of them are the latency from exec to the pins.
-pub const SEGMENT_S: f32 = 0.004;
+/// Nominal time of a segment: as short as leaves two thirds of the CPU to others.
+pub const SEGMENT_S: f32 = 0.002;
 
-/// The same in CPU cycles.
-const SEGMENT_CYCLES: u32 = (SEGMENT_S * CYCLES_PER_S) as u32;
+/// Highest step rate of a motor that moves alone, steps per second.
+pub const STEP_RATE_MAX: f32 = step_rate_max(1);
 
-/// Highest step rate of a motor, steps per second: a step on every tick.
-pub const STEP_RATE_MAX: f32 = CYCLES_PER_S / PERIOD_MIN as f32;
+/// Highest step rate of each of so many motors that move together, steps per second: a step on every tick.
+pub const fn step_rate_max(motors: usize) -> f32 {
+    CYCLES_PER_S / shortest(motors) as f32
+}
 
-/// Shortest block with steps, s: about what exec takes to begin one and to prepare it while the step
-/// interrupt is at its busiest.
-pub const BLOCK_S_MIN: f32 = 0.004;
+/// Shortest block with steps, s: twice what exec takes for it while the step interrupt is busy.
+pub const BLOCK_S_MIN: f32 = 0.000_75;
 
 /// A dwell's segment: this many ticks of a millisecond.
-const DWELL_TICKS: u16 = 4;
+const DWELL_TICKS: u16 = 2;
 
 /// What [`Exec::step`] found to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,9 +63,11 @@ pub struct Snapshot {
     /// Motor positions at the end of the block being run, in steps.
     pub target: [i32; MOTORS],
     /// Signed steps of that block.
-    pub steps: [i32; MOTORS],
-    /// Share of that block which is still to be run, 1 to 0.
-    pub share_left: f32,
+    pub steps: [i16; MOTORS],
+    /// What is still to be run of that block, mm.
+    pub left: f32,
+    /// Its length, mm.
+    pub length: f32,
     /// Velocity along the path, mm/s.
     pub velocity: f32,
     /// The N word of the block being run.
@@ -83,7 +84,8 @@ impl Snapshot {
         Self {
             target: [0; MOTORS],
             steps: [0; MOTORS],
-            share_left: 0.0,
+            left: 0.0,
+            length: 0.0,
             velocity: 0.0,
             line: 0,
             running: false,
@@ -93,7 +95,10 @@ impl Snapshot {
 
     /// Where motor `m` is, in steps.
     pub fn position(&self, m: usize) -> i32 {
-        let short = self.steps[m] as f32 * self.share_left;
+        if self.left <= 0.0 || self.steps[m] == 0 {
+            return self.target[m];
+        }
+        let short = f32::from(self.steps[m]) * (self.left / self.length);
         self.target[m].wrapping_sub(short as i32)
     }
 }
@@ -110,174 +115,213 @@ pub enum Program {
     Ended,
 }
 
+/// The line that exec is running.
+#[derive(Clone, Copy, Debug, Default)]
+struct Running {
+    /// Way to go, mm.
+    left: f32,
+    /// Velocity limit, mm/s.
+    cruise: f32,
+    /// Phase units of the dominant motor in a mm.
+    scale: f32,
+    /// Without a jerk limit: the square of the velocity that may be left at the end.
+    headroom: f32,
+    /// What of the queue `headroom` knows.
+    version: u8,
+    /// No stretch of it has been prepared.
+    fresh: bool,
+    /// All is planned; `Prep` has some left.
+    done: bool,
+    jerk: bool,
+}
+
 /// The state of exec.
 #[derive(Debug, Default)]
 pub struct Exec {
     prep: Prep,
+    governor: Governor,
     running: Option<Running>,
-    rest: Rest,
-    /// Velocity at the boundary of blocks.
-    velocity: f32,
     dwell_ms: u32,
-    snapshot: Snapshot,
+}
+
+/// What the governor sees of the queue.
+struct View<'a> {
+    headroom: f32,
+    blocks: &'a BlockSource,
+}
+
+impl Ahead for View<'_> {
+    fn headroom(&self) -> f32 {
+        self.headroom
+    }
+    fn anchor(&self, n: u8) -> Option<Anchor> {
+        self.blocks.anchor(n)
+    }
 }
 
 impl Exec {
     /// At rest.
     pub const fn new() -> Self {
-        Self {
-            prep: Prep::new(),
-            running: None,
-            rest: Rest { distance: 0, cycles: 0 },
-            velocity: 0.0,
-            dwell_ms: 0,
-            snapshot: Snapshot::new(),
-        }
-    }
-
-    /// What reports show.
-    pub fn snapshot(&self) -> &Snapshot {
-        &self.snapshot
+        Self { prep: Prep::new(), governor: Governor::new(), running: None, dwell_ms: 0 }
     }
 
     /// Does the next thing there is to do. `standstill` says that the steppers have stopped.
-    pub fn step(&mut self, blocks: &mut BlockSource, standstill: bool) -> Step {
+    pub fn step(&mut self, blocks: &mut BlockSource, standstill: bool, out: &mut Snapshot) -> Step {
         if self.dwell_ms > 0 {
             return Step::Segment(self.dwell());
         }
-        if self.running.is_some() {
-            return self.run(blocks);
-        }
-        let Some(block) = blocks.peek(0, |block| *block) else {
-            return self.idle(standstill);
-        };
-        self.snapshot.line = block.line;
-        match block.kind {
-            Kind::Line => self.begin(&block, blocks),
-            Kind::Dwell => {
-                self.dwell_ms = block.steps[0].unsigned_abs();
-                self.snapshot.running = true;
-                blocks.release();
-                Step::Again
+        if self.running.is_none() {
+            let Some(block) = blocks.oldest() else {
+                return self.idle(standstill, out);
+            };
+            if let Some(step) = self.take_up(&block, blocks, standstill, out) {
+                return step;
             }
-            Kind::SetPosition => {
-                self.snapshot.target = block.steps;
-                self.snapshot.share_left = 0.0;
-                blocks.release();
-                Step::Again
-            }
-            Kind::ProgramStop | Kind::ProgramEnd => self.stop(block.kind, blocks, standstill),
         }
+        self.run(blocks, out)
     }
 
-    fn idle(&mut self, standstill: bool) -> Step {
-        self.rest = Rest::default();
-        self.velocity = 0.0;
-        self.snapshot.velocity = 0.0;
-        if standstill && self.snapshot.running {
-            self.snapshot.running = false;
-            self.snapshot.program = Program::Stopped;
+    /// Begins the oldest block. `None` if it is a line, which is to be run now.
+    fn take_up(
+        &mut self,
+        block: &Block,
+        blocks: &mut BlockSource,
+        standstill: bool,
+        out: &mut Snapshot,
+    ) -> Option<Step> {
+        out.line = block.line;
+        match &block.body {
+            Body::Line(line) => {
+                self.begin(line, blocks, out);
+                return None;
+            }
+            Body::Dwell(ms) => {
+                self.dwell_ms = *ms;
+                self.halt(out);
+                out.running = true;
+            }
+            Body::SetPosition(steps) => {
+                out.target = *steps;
+                out.left = 0.0;
+            }
+            Body::ProgramStop | Body::ProgramEnd => {
+                self.halt(out);
+                if !standstill {
+                    return Some(Step::Standstill);
+                }
+                out.running = false;
+                out.program = match block.body {
+                    Body::ProgramEnd => Program::Ended,
+                    _ => Program::Stopped,
+                };
+            }
+            Body::Nothing => {}
+        }
+        blocks.release();
+        Some(Step::Again)
+    }
+
+    fn halt(&mut self, out: &mut Snapshot) {
+        self.governor.stop();
+        out.velocity = 0.0;
+    }
+
+    fn idle(&mut self, standstill: bool, out: &mut Snapshot) -> Step {
+        self.halt(out);
+        self.prep.rest();
+        if standstill && out.running {
+            out.running = false;
+            out.program = Program::Stopped;
         }
         Step::Idle
     }
 
-    fn stop(&mut self, kind: Kind, blocks: &mut BlockSource, standstill: bool) -> Step {
-        self.velocity = 0.0;
-        self.snapshot.velocity = 0.0;
-        if !standstill {
-            return Step::Standstill;
-        }
-        self.snapshot.running = false;
-        self.snapshot.program =
-            if kind == Kind::ProgramEnd { Program::Ended } else { Program::Stopped };
-        blocks.release();
-        Step::Again
-    }
-
     fn dwell(&mut self) -> Segment {
-        let ticks = self.dwell_ms.min(u32::from(DWELL_TICKS)) as u16;
+        let ticks = if self.dwell_ms < u32::from(DWELL_TICKS) { 1 } else { DWELL_TICKS };
         self.dwell_ms -= u32::from(ticks);
-        Segment { ticks, period: CYCLES_PER_MS as u16, ..self.prep.idle(0, 1).0 }
+        self.prep.pause(ticks, CYCLES_PER_MS)
     }
 
-    /// Takes up a line block. It stays in the ring until its last segment, so that the planner
-    /// counts it as work in hand.
+    /// Takes up a line. It stays in the ring until its last segment, so that the planner counts it as
+    /// work in hand.
     #[inline(never)]
-    fn begin(&mut self, block: &Block, blocks: &mut BlockSource) -> Step {
-        let wish = exit_wish(blocks, block.cruise);
-        let most = self.prep.begin(block);
-        for m in 0..MOTORS {
-            self.snapshot.target[m] = self.snapshot.target[m].wrapping_add(block.steps[m]);
+    fn begin(&mut self, line: &Line, blocks: &mut BlockSource, out: &mut Snapshot) {
+        blocks.enter();
+        let most = self.prep.begin(&line.steps, line.cruise * FINE_S < line.length);
+        let mut m = 0;
+        while m < MOTORS {
+            out.target[m] = out.target[m].wrapping_add(line.steps[m].into());
+            m += 1;
         }
-        self.snapshot.steps = block.steps;
-        self.snapshot.share_left = 1.0;
-        self.snapshot.running = true;
-        if most == 0 {
-            blocks.release();
-            return self.pass(block, wish);
-        }
-        self.running = Some(Running::new(block, most, self.velocity, wish));
-        Step::Again
+        out.steps = line.steps;
+        out.length = line.length;
+        out.running = true;
+        let jerk = line.jerk.get();
+        self.governor.begin(line.accel.get(), jerk);
+        self.running = Some(Running {
+            left: line.length,
+            cruise: line.cruise,
+            // The block's units, to be divided by its length when that is needed.
+            scale: f32::from(most) * 32768.0,
+            headroom: 0.0,
+            version: blocks.version().wrapping_sub(1),
+            fresh: true,
+            done: false,
+            jerk: jerk > 0.0,
+        });
     }
 
-    /// A block too short for a single step, or of axes without motors: its time goes to the next
-    /// step, so that many of them in a row are no faster than a long one.
-    fn pass(&mut self, block: &Block, exit_wish: f32) -> Step {
-        let limits = Limits { accel: block.accel, jerk: block.jerk };
-        let entry = self.velocity;
-        let reached = greater(reach(entry, block.length, &limits), CRUISE_MIN);
-        self.velocity = lesser(exit_wish, reached);
-        self.snapshot.share_left = 0.0;
-        self.snapshot.velocity = self.velocity;
-        let mean = lesser(greater((entry + reached) * 0.5, CRUISE_MIN), block.cruise);
-        let seconds = block.length / mean;
-        let ms = (seconds * 1000.0) as u32;
-        self.dwell_ms = self.dwell_ms.saturating_add(ms);
-        self.rest.cycles += cycles_of(seconds - ms as f32 * 0.001);
-        if self.rest.cycles >= CYCLES_PER_MS {
-            self.rest.cycles -= CYCLES_PER_MS;
-            self.dwell_ms = self.dwell_ms.saturating_add(1);
-        }
-        Step::Again
-    }
-
-    /// Prepares the next stretch of the block being run. In place: copying its state would cost as
+    /// Prepares the next stretch of the line being run. In place: copying its state would cost as
     /// much as the mathematics.
     #[inline(never)]
-    fn run(&mut self, blocks: &mut BlockSource) -> Step {
+    fn run(&mut self, blocks: &mut BlockSource, out: &mut Snapshot) -> Step {
         let Some(running) = &mut self.running else {
             return Step::Again;
         };
-        running.raise_exit(exit_wish(blocks, running.cruise));
-        let body = running.body_left();
-        let left = running.time_left(body);
-        let rest = core::mem::take(&mut self.rest);
-        if left <= 1.5 * SEGMENT_S {
-            self.velocity = running.exit;
-            self.snapshot.velocity = running.exit;
-            self.snapshot.share_left = 0.0;
+        if running.done {
+            return self.end(0, false, blocks);
+        }
+        let version = blocks.version();
+        if version != running.version {
+            running.version = version;
+            if running.jerk {
+                self.governor.look_again();
+            } else {
+                running.headroom = blocks.headroom();
+            }
+        }
+        let ahead = View { headroom: running.headroom, blocks };
+        let stretch = self.governor.stretch(running.left, running.cruise, &ahead, SEGMENT_S);
+        out.velocity = self.governor.velocity();
+        let cycles = cycles_of(stretch.seconds);
+        if stretch.ends {
+            out.left = 0.0;
+            running.done = true;
+            let whole = running.fresh;
+            return self.end(cycles, whole, blocks);
+        }
+        if running.fresh {
+            running.fresh = false;
+            running.scale /= running.left;
+        }
+        running.left -= stretch.distance;
+        out.left = running.left;
+        let left = (running.left * running.scale) as u32;
+        self.prep.segment(left, cycles).map_or(Step::Again, Step::Segment)
+    }
+
+    /// Hands out what is left of the line being run.
+    fn end(&mut self, cycles: u32, whole: bool, blocks: &mut BlockSource) -> Step {
+        let segment = self.prep.last(cycles, whole);
+        if self.prep.left() == 0 {
             self.running = None;
             blocks.release();
-            let cycles = cycles_of(left) + rest.cycles;
-            return self.prep.last(cycles).map_or(Step::Again, Step::Segment);
         }
-        let distance = running.advance(SEGMENT_S, body) + rest.distance;
-        let (segment, rest) = self.prep.segment(distance, SEGMENT_CYCLES + rest.cycles);
-        self.rest = rest;
-        self.snapshot.velocity = running.velocity();
-        self.snapshot.share_left = running.share_left();
-        Step::Segment(segment)
+        segment.map_or(Step::Again, Step::Segment)
     }
 }
 
-/// CPU cycles in `seconds`; at least 1, at most what [`Prep`] takes beside a rest.
+/// CPU cycles in `seconds`; at least 1, at most what [`Prep`] takes.
 fn cycles_of(seconds: f32) -> u32 {
-    ((seconds * CYCLES_PER_S) as u32).clamp(1, 100_000)
-}
-
-/// The velocity at which the block after the oldest may be entered, 0 if there is none yet.
-fn exit_wish(blocks: &BlockSource, cruise: f32) -> f32 {
-    blocks
-        .peek(1, |next| if next.kind == Kind::Line { next.entry } else { 0.0 })
-        .map_or(0.0, |entry| lesser(entry, cruise))
+    ((seconds * CYCLES_PER_S + 0.5) as u32).clamp(1, CYCLES_MAX)
 }

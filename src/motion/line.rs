@@ -1,49 +1,37 @@
 //! From a straight move to a block: length, limits along the path, junction, steps.
 //!
 //! Called by the planner task. Owns the direction of the last move and the motor positions at the
-//! end of the last block. Units: what [`Machine`] says on the way in; mm (degrees for a move of
-//! rotary axes alone) and s on the way out. Costs are AVR cycles.
+//! end of the last block. Costs are AVR cycles.
 //!
 //! Steps are the difference of two exact absolute positions, so nothing accumulates: neither
 //! rounding nor moves shorter than a step. A move without any steps (shorter than one, or of an axis
 //! without a motor) is still a block and takes its time, or the next step would come too early.
+//!
+//! A ramp may go over many blocks. Without a jerk limit each may have its own acceleration limit, what
+//! its axes allow in its direction. With one, acceleration and jerk must be alike for as long as
+//! possible: then they are those of the slowest axis that moves, whatever the direction.
 
-use super::block::{Block, Kind};
+use super::block::{Block, Body, Line as Move};
+use super::dynamics::{Axis, Dynamics};
+use super::exec::{BLOCK_S_MIN, step_rate_max};
+use super::float::{below, least, size, some};
+use super::governor::{ACCEL_MOST, effective_jerk};
 use super::junction::{self, Heading};
-use super::profile::lesser;
+use super::prep::STEPS_MAX;
+use super::short::Short;
+use super::steps::Motor;
 use crate::boards::MOTORS;
+use crate::config::StepRatio;
 use crate::gcode::command::Feed;
 use crate::math::sqrt;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
-/// What the builder needs to know of the machine. Axes are 0 to 5 for X Y Z A B C; a limit that is
-/// not positive is none; mm are degrees for rotary axes.
-pub trait Machine {
-    /// Traverse velocity of an axis, mm/min.
-    fn velocity_max(&self, axis: usize) -> f32;
-    /// Feed velocity of an axis, mm/min.
-    fn feedrate_max(&self, axis: usize) -> f32;
-    /// Jerk of an axis, mm/min^3.
-    fn jerk_max(&self, axis: usize) -> f32;
-    /// Acceleration of an axis, mm/min^2.
-    fn accel_max(&self, _axis: usize) -> f32 {
-        0.0
-    }
-    /// Junction deviation of an axis, mm.
-    fn junction_deviation(&self, axis: usize) -> f32;
-    /// Junction acceleration, mm/min^2.
-    fn junction_acceleration(&self) -> f32;
+/// What the builder needs to know of the motors.
+pub trait Motors {
     /// The axis that a motor drives; [`AXES`] or more if none.
     fn motor_axis(&self, motor: usize) -> u8;
-    /// The absolute position of a motor, steps, when its axis is at `position`.
-    fn steps(&self, motor: usize, position: Length) -> i32;
-    /// Steps a second that a motor can be given.
-    fn max_step_rate(&self) -> f32;
-    /// Shortest time in which a block with steps can be prepared, s; 0 for no limit. Shorter ones are
-    /// slowed down, so that exec never falls behind the steppers.
-    fn min_block_time(&self) -> f32 {
-        0.0
-    }
+    /// Steps of a motor for its axis' travel.
+    fn ratio(&self, motor: usize) -> StepRatio;
 }
 
 /// A straight move.
@@ -55,8 +43,17 @@ pub struct Line<'a> {
     pub to: &'a PerAxis<Length>,
     /// How fast; a traverse if `None`. Positive: the interpreter refuses a feed of 0.
     pub feed: Option<Feed>,
-    /// The N word, 0 for none.
-    pub line: u32,
+}
+
+/// What becomes of a move.
+#[derive(Clone, Copy, Debug)]
+pub enum Built {
+    /// Nothing: it has no length.
+    Nothing,
+    /// A block, which may be entered at so many mm/s.
+    Line(Move, f32),
+    /// More steps than a block holds: to be made in so many parts.
+    Parts(u16),
 }
 
 /// Makes blocks.
@@ -66,39 +63,49 @@ pub struct Builder {
     heading: Heading,
     /// The velocity limit of the last move; 0 if the machine stands still after it.
     cruise: f32,
-    /// Motor positions at the end of the last block.
-    steps: [i32; MOTORS],
+    /// Motors at the end of the last block.
+    motors: [Motor; MOTORS],
 }
 
 impl Builder {
-    /// The block for a move; its `entry` is left to the look-ahead. `None`, and nothing changed, if
-    /// it has no length, or more steps than an `i32` holds.
+    /// The block for a move. Nothing is changed unless it is [`Built::Line`].
     ///
-    /// Cost: 7,000 + 3,500 for each axis that moves, and four [`Machine::steps`].
-    pub fn line(&mut self, line: &Line, machine: &impl Machine) -> Option<Block> {
-        let mut path = Path::new(line.from, line.to)?;
-        let target = targets(line.to, &self.steps, machine);
-        let steps = difference(&target, &self.steps)?;
-        path.limit(line.feed, machine);
-        path.limit_steps(&steps, machine.max_step_rate(), machine.min_block_time());
-        let heading = Heading::new(path.unit, |axis| machine.junction_deviation(axis));
-        let mut entry_max = lesser(path.cruise, self.cruise);
-        if entry_max > 0.0 {
-            let acceleration = machine.junction_acceleration() * PER_MINUTE2;
-            entry_max = lesser(entry_max, junction::limit(&self.heading, &heading, acceleration));
+    /// Cost: 3,000 + 1,200 for each axis that moves and 600 for each motor, for short moves.
+    #[inline(never)]
+    pub fn line(&mut self, line: &Line, dynamics: &Dynamics, machine: &impl Motors) -> Built {
+        let mut path = Path::default();
+        match path.measure(line.from, line.to) {
+            Way::None => return Built::Nothing,
+            Way::Far => return Built::Parts(2),
+            Way::Near => {}
         }
-        *self = Builder { heading, cruise: path.cruise, steps: target };
-        Some(Block {
-            steps,
+        let mut motors = self.motors;
+        path.drive(&mut motors, line.to, machine);
+        if let Some(parts) = path.count(&self.motors, &motors) {
+            return Built::Parts(parts);
+        }
+        path.limit(line.feed, dynamics);
+        path.limit_change(dynamics);
+        path.limit_steps();
+        path.heading.deviation = junction::deviation(&path.heading.unit, dynamics);
+        let mut entry = least(path.cruise, self.cruise);
+        if some(entry) {
+            let corner = junction::limit(&self.heading, &path.heading, dynamics.junction, entry);
+            entry = least(entry, corner);
+        }
+        self.heading = path.heading;
+        self.cruise = path.cruise;
+        self.motors = motors;
+        let block = Move {
+            steps: path.steps,
             length: path.length,
             cruise: path.cruise,
-            entry_max,
-            entry: 0.0,
+            start: 0.0,
+            entry: Short::ZERO,
             accel: path.accel,
             jerk: path.jerk,
-            line: line.line,
-            kind: Kind::Line,
-        })
+        };
+        Built::Line(block, entry)
     }
 
     /// The next move starts from rest.
@@ -106,154 +113,274 @@ impl Builder {
         self.cruise = 0.0;
     }
 
-    /// The motors are not where the last block would have left them (a flushed queue, homing): they
-    /// are at `steps`, at rest.
-    pub fn at(&mut self, steps: [i32; MOTORS]) {
-        self.steps = steps;
-        self.stopped();
-    }
-
     /// The block that renames the present position. Motors without an axis keep theirs.
-    pub fn set_position(
-        &mut self,
-        position: &PerAxis<Length>,
-        line: u32,
-        machine: &impl Machine,
-    ) -> Block {
-        self.at(targets(position, &self.steps, machine));
-        Block { steps: self.steps, line, kind: Kind::SetPosition, ..Block::default() }
-    }
-
-    /// The block that stands still.
-    pub fn dwell(&mut self, ms: u32, line: u32) -> Block {
-        self.stopped();
-        let ms = i32::try_from(ms).unwrap_or(i32::MAX);
-        Block { steps: [ms, 0, 0, 0], line, kind: Kind::Dwell, ..Block::default() }
-    }
-
-    /// The block for a program stop or end.
-    pub fn stop(&mut self, kind: Kind, line: u32) -> Block {
-        self.stopped();
-        Block { line, kind, ..Block::default() }
-    }
-}
-
-/// Seconds in the units of [`Machine`].
-const PER_MINUTE: f32 = 1.0 / 60.0;
-const PER_MINUTE2: f32 = 1.0 / 3_600.0;
-const PER_MINUTE3: f32 = 1.0 / 216_000.0;
-
-/// Where the motors are when the axes are at `position`.
-fn targets(
-    position: &PerAxis<Length>,
-    present: &[i32; MOTORS],
-    machine: &impl Machine,
-) -> [i32; MOTORS] {
-    let mut steps = *present;
-    for (motor, steps) in steps.iter_mut().enumerate() {
-        if let Some(&length) = position.get(usize::from(machine.motor_axis(motor))) {
-            *steps = machine.steps(motor, length);
+    pub fn set_position(&mut self, position: &PerAxis<Length>, machine: &impl Motors) -> Body {
+        for (m, motor) in self.motors.iter_mut().enumerate() {
+            if let Some(&position) = position.get(usize::from(machine.motor_axis(m))) {
+                *motor = Motor::at(machine.ratio(m), position);
+            }
         }
+        self.stopped();
+        Body::SetPosition(self.motors.map(|motor| motor.steps))
     }
-    steps
+
+    /// The block for something that is done at rest.
+    pub fn pause(&mut self, body: Body, line: u32) -> Block {
+        self.stopped();
+        Block { body, line }
+    }
 }
 
-fn difference(to: &[i32; MOTORS], from: &[i32; MOTORS]) -> Option<[i32; MOTORS]> {
-    let mut steps = [0; MOTORS];
-    for (steps, (to, from)) in steps.iter_mut().zip(to.iter().zip(from)) {
-        *steps = to.checked_sub(*from)?;
-    }
-    Some(steps)
+/// Parts of at most [`STEPS_MAX`] steps.
+#[inline(never)]
+fn parts(from: i32, to: i32) -> u16 {
+    // The rounding of their ends may add a step.
+    u16::try_from(from.abs_diff(to) / u32::from(STEPS_MAX - 1) + 1).unwrap_or(u16::MAX)
 }
 
-/// The way from here to there, and what limits it.
+/// Whether there is a way.
+enum Way {
+    None,
+    Near,
+    /// More than [`Length`] holds.
+    Far,
+}
+
+/// The way from here to there, and what limits it. Filled in place: to move it costs as much as a
+/// multiplication of floats.
+#[derive(Default)]
 struct Path {
+    /// Travel of each axis, in units of [`Length`].
+    travel: PerAxis<i32>,
+    /// mm.
     length: f32,
     /// Travel of each axis for a unit of length.
-    unit: PerAxis<f32>,
+    heading: Heading,
+    steps: [i16; MOTORS],
+    /// Steps of the motor that makes most, and how many motors move.
+    most: u16,
+    moving: u8,
     cruise: f32,
-    accel: f32,
-    jerk: f32,
+    accel: Short,
+    jerk: Short,
 }
 
 impl Path {
-    /// Length and direction, without limits. `None` if it has no length. The length is that of the
-    /// linear axes; of the rotary ones if no linear one moves.
-    fn new(from: &PerAxis<Length>, to: &PerAxis<Length>) -> Option<Self> {
-        let mut travel = [0.0; AXES];
-        for (travel, (to, from)) in travel.iter_mut().zip(to.iter().zip(from)) {
-            *travel = match to.checked_sub(*from) {
-                Some(distance) => distance.to_mm(),
-                None => to.to_mm() - from.to_mm(),
-            };
+    /// Length and direction. The length is that of the linear axes; of the rotary ones if no linear
+    /// one moves.
+    #[inline(never)]
+    fn measure(&mut self, from: &PerAxis<Length>, to: &PerAxis<Length>) -> Way {
+        let mut linear = Norm::default();
+        let mut rotary = Norm::default();
+        for axis in 0..AXES {
+            if from[axis] != to[axis] {
+                let Some(way) = to[axis].0.checked_sub(from[axis].0) else {
+                    return Way::Far;
+                };
+                self.travel[axis] = way;
+                let unit = way as f32;
+                self.heading.unit[axis] = unit;
+                let norm = if axis < FIRST_ROTARY { &mut linear } else { &mut rotary };
+                norm.add(unit);
+            }
         }
-        let (linear, rotary) = travel.split_at(FIRST_ROTARY);
-        let mut length = norm(linear);
-        if length <= 0.0 {
-            length = norm(rotary);
-        }
-        if length <= 0.0 {
-            return None;
+        let length = if linear.terms > 0 { linear.root() } else { rotary.root() };
+        if !some(length) {
+            return Way::None;
         }
         let scale = 1.0 / length;
-        let unit = travel.map(|d| if d == 0.0 { 0.0 } else { d * scale });
-        Some(Path { length, unit, cruise: f32::MAX, accel: f32::MAX, jerk: f32::MAX })
+        for u in &mut self.heading.unit {
+            if some(*u) {
+                *u *= scale;
+            }
+        }
+        self.length = length * 1e-4;
+        Way::Near
     }
 
-    /// Applies the feed and the limits of every axis that moves.
-    fn limit(&mut self, feed: Option<Feed>, machine: &impl Machine) {
-        for (axis, &u) in self.unit.iter().enumerate() {
-            if u == 0.0 {
+    /// Takes the motors to the end of the move.
+    #[inline(never)]
+    fn drive(&self, motors: &mut [Motor; MOTORS], to: &PerAxis<Length>, machine: &impl Motors) {
+        for (m, motor) in motors.iter_mut().enumerate() {
+            let axis = usize::from(machine.motor_axis(m));
+            if axis < AXES && self.travel[axis] != 0 {
+                motor.go(machine.ratio(m), self.travel[axis], to[axis]);
+            }
+        }
+    }
+
+    /// Counts the steps, or says in how many parts they would fit.
+    #[inline(never)]
+    fn count(&mut self, from: &[Motor; MOTORS], to: &[Motor; MOTORS]) -> Option<u16> {
+        for m in 0..MOTORS {
+            let (from, to) = (from[m].steps, to[m].steps);
+            if from == to {
                 continue;
             }
-            // The path moves so much faster than the axis.
-            let ratio = if u < 0.0 { -1.0 / u } else { 1.0 / u };
-            let velocity = match feed {
-                None => machine.velocity_max(axis),
-                Some(_) => machine.feedrate_max(axis),
+            let steps = match to.checked_sub(from).map(i16::try_from) {
+                Some(Ok(steps)) if steps != i16::MIN => steps,
+                _ => return Some(parts(from, to)),
             };
-            lower(&mut self.cruise, velocity, ratio);
-            lower(&mut self.accel, machine.accel_max(axis), ratio);
-            lower(&mut self.jerk, machine.jerk_max(axis), ratio);
+            self.steps[m] = steps;
+            self.moving += 1;
+            self.most = self.most.max(steps.unsigned_abs());
         }
-        match feed {
-            Some(Feed::PerMinute(feed)) => lower(&mut self.cruise, feed, 1.0),
-            Some(Feed::Minutes(time)) if time > 0.0 => {
-                lower(&mut self.cruise, self.length / time, 1.0);
-            }
-            _ => {}
-        }
-        self.cruise *= PER_MINUTE;
-        // In a block no limit is 0.
-        self.accel = if self.accel < f32::MAX { self.accel * PER_MINUTE2 } else { 0.0 };
-        self.jerk = if self.jerk < f32::MAX { self.jerk * PER_MINUTE3 } else { 0.0 };
+        None
     }
 
-    /// Keeps every motor within `rate` steps a second, and a block with steps at `time` or longer.
-    fn limit_steps(&mut self, steps: &[i32; MOTORS], rate: f32, time: f32) {
-        let most = steps.iter().map(|steps| steps.unsigned_abs()).max().unwrap_or(0);
-        if most > 0 {
-            lower(&mut self.cruise, rate / most as f32, self.length);
-            if time > 0.0 {
-                lower(&mut self.cruise, self.length / time, 1.0);
+    /// Applies the feed and the velocity limit of every axis that moves.
+    #[inline(never)]
+    fn limit(&mut self, feed: Option<Feed>, dynamics: &Dynamics) {
+        self.cruise = match feed {
+            Some(Feed::PerMinute(feed)) => feed * (1.0 / 60.0),
+            Some(Feed::Minutes(time)) if time > 0.0 => self.length / (time * 60.0),
+            _ => CRUISE_MOST,
+        };
+        for (&u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
+            if some(u) {
+                let velocity = if feed.is_some() { axis.feed } else { axis.velocity };
+                let u = size(u);
+                if some(velocity) && below(velocity, u * self.cruise) {
+                    self.cruise = velocity / u;
+                }
             }
+        }
+        // Within what no division goes wrong with.
+        if below(CRUISE_MOST, self.cruise) {
+            self.cruise = CRUISE_MOST;
+        } else if below(self.cruise, CRUISE_LEAST) {
+            self.cruise = CRUISE_LEAST;
+        }
+    }
+
+    /// Acceleration and jerk.
+    #[inline(never)]
+    fn limit_change(&mut self, dynamics: &Dynamics) {
+        let mut slowest = Slowest::default();
+        for (&u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
+            if some(u) {
+                slowest.look(size(u), axis);
+            }
+        }
+        let mut jerk = slowest.jerk.get();
+        let mut least = slowest.least.get();
+        // Moves of both linear and rotary axes may have units above 1.
+        if below(1.0, slowest.most) {
+            jerk /= slowest.most;
+            least /= slowest.most;
+        }
+        if some(least) {
+            let jerk = effective_jerk(jerk, least);
+            let accel = if some(jerk) { least } else { slowest.accel.get() / slowest.unit };
+            self.accel = Short::new(least_of(accel));
+            self.jerk = Short::new(jerk);
+        } else if some(jerk) {
+            // What a ramp to full speed comes to, so that the jerk alone limits it.
+            let accel = least_of(sqrt(jerk * power_of_two_above(self.cruise)));
+            self.accel = Short::new(accel);
+            self.jerk = Short::new(effective_jerk(jerk, accel));
+        } else {
+            self.accel = Short::new(ACCEL_MOST);
+        }
+    }
+
+    /// Keeps motors within the rate that so many can have together, and a block with steps long
+    /// enough for exec.
+    #[inline(never)]
+    fn limit_steps(&mut self) {
+        const RATES: [f32; MOTORS] =
+            [step_rate_max(1), step_rate_max(2), step_rate_max(3), step_rate_max(4)];
+        if self.moving == 0 {
+            return;
+        }
+        let way = RATES[usize::from(self.moving) - 1] * self.length;
+        let most = f32::from(self.most);
+        if below(way, self.cruise * most) {
+            self.cruise = way / most;
+        }
+        if below(self.length, self.cruise * BLOCK_S_MIN) {
+            self.cruise = self.length * (1.0 / BLOCK_S_MIN);
         }
     }
 }
 
-/// Lowers `limit` to `value * ratio`, if `value` is a limit at all.
-fn lower(limit: &mut f32, value: f32, ratio: f32) {
-    if value > 0.0 {
-        *limit = lesser(*limit, value * ratio);
+fn least_of(accel: f32) -> f32 {
+    least(accel, ACCEL_MOST)
+}
+
+/// The length of a vector, of which one term is usual.
+#[derive(Default)]
+struct Norm {
+    only: f32,
+    sum: f32,
+    terms: u8,
+}
+
+impl Norm {
+    fn add(&mut self, term: f32) {
+        if self.terms == 0 {
+            self.only = term;
+        } else {
+            if self.terms == 1 {
+                self.sum = self.only * self.only;
+            }
+            self.sum += term * term;
+        }
+        self.terms += 1;
+    }
+
+    fn root(&self) -> f32 {
+        if self.terms < 2 { size(self.only) } else { sqrt(self.sum) }
     }
 }
 
-fn norm(travel: &[f32]) -> f32 {
-    let mut sum = 0.0;
-    for &d in travel {
-        if d != 0.0 {
-            sum += d * d;
+/// Velocities beyond all machines, mm/s.
+const CRUISE_MOST: f32 = 1e5;
+/// See [`CRUISE_MOST`].
+const CRUISE_LEAST: f32 = 1e-6;
+
+/// The axis that limits the acceleration, and the least limits of all axes.
+#[derive(Default)]
+struct Slowest {
+    /// Limit and unit of the axis that limits most.
+    accel: Short,
+    unit: f32,
+    least: Short,
+    jerk: Short,
+    /// The largest unit.
+    most: f32,
+}
+
+impl Slowest {
+    fn look(&mut self, u: f32, axis: &Axis) {
+        if axis.accel != Short::ZERO {
+            if self.least == Short::ZERO || axis.accel < self.least {
+                self.least = axis.accel;
+            }
+            let slower = if self.accel == Short::ZERO {
+                true
+            } else if axis.accel == self.accel {
+                below(self.unit, u)
+            } else {
+                below(axis.accel.get() * self.unit, self.accel.get() * u)
+            };
+            if slower {
+                self.accel = axis.accel;
+                self.unit = u;
+            }
+        }
+        if axis.jerk != Short::ZERO && (self.jerk == Short::ZERO || axis.jerk < self.jerk) {
+            self.jerk = axis.jerk;
+        }
+        if below(self.most, u) {
+            self.most = u;
         }
     }
-    sqrt(sum)
+}
+
+/// The power of two that is not below `x`, as blocks of nearly the same velocity are to have the same
+/// limits. Cost: 20.
+fn power_of_two_above(x: f32) -> f32 {
+    let bits = x.to_bits();
+    f32::from_bits((bits + 0x007F_FFFF) & 0xFF80_0000)
 }

@@ -1,18 +1,22 @@
 //! Motion: from targets to step pulses.
 //!
 //! ```text
-//! target -> line -> block ring -> exec -> segment ring -> dda -> pins
-//!           junction   |  ^        profile, prep
-//!                      lookahead
+//! target -> line -> block queue -> exec -> segment ring -> dda -> pins
+//!           junction   |   ^        governor, prep
+//!                      horizon
 //! ```
 
 pub mod block;
 pub mod dda;
+pub mod divide;
+pub mod dynamics;
 pub mod exec;
+pub mod float;
+pub mod governor;
+pub mod horizon;
 pub mod junction;
 pub mod line;
-pub mod lookahead;
 pub mod prep;
-pub mod profile;
 pub mod queue;
-pub mod running;
+pub mod short;
+pub mod steps;

@@ -5,224 +5,419 @@
 //!
 //! The motor with the most steps in a block is dominant. Its increment is `STEP / 2^k`, so it steps on
 //! every `2^k`th tick exactly, with no jitter; `k` is as large as the shortest tick period allows, so
-//! that the other motors, which may step on any tick, stay close to their true times too. Distances are
-//! cut to whole ticks and the rest of distance and time is handed back to exec, which adds it to the
-//! next stretch: nothing is lost.
+//! that the other motors, which may step on any tick, stay close to their true times too. If all motors
+//! that move make the same number of steps there are no others: then `k` is 0 as far as can be, and
+//! the interrupt has next to nothing to do (lockstep).
 //!
-//! The other motors get the increment that takes them nearest to the line from the block's start to
-//! its end. What rounding leaves is carried from segment to segment, and over the end of the block, in
-//! `left`: it is never above half a tick count, far below half a step, so every block ends exactly on
-//! its step.
+//! A stretch is cut to whole ticks, and so that coarser ticks fit what is left. What is cut off is
+//! still in `left` and comes with the next stretch, as does its time: nothing is lost.
 //!
-//! Cost on AVR: about 4,500 cycles a segment with four motors (three divisions and three wide
-//! multiplications), 6,000 for `begin`.
+//! The other motors get the rounded increment, and [`Minor::owed`] remembers exactly what rounding
+//! took: a segment in which it comes to half a unit a tick or more is corrected by a unit a tick. It is
+//! carried from segment to segment, and over the end of the block: never above half a tick count, far
+//! below half a step, so every block ends exactly on its step.
+//!
+//! Cost on AVR: 600 cycles a segment and 150 for each motor that moves; 600 for `begin`, and 300 for each
+//! motor when `k` changes.
 
-use super::block::Block;
 use super::dda::{STEP, Segment};
+use super::divide::{quotient, quotient_remainder};
 use crate::boards::MOTORS;
 
-const STEP_LOG2: u32 = 15;
+const STEP_LOG2: u8 = 15;
 
-/// Shortest tick period, CPU cycles: what the step interrupt sustains beside everything else.
-pub const PERIOD_MIN: u16 = 400;
-
-/// `cycles / PERIOD_MIN`, a little too high: 1 / 400 is 10.24 / 4096. A division would take 690 cycles.
-fn ticks_in(cycles: u32) -> u32 {
-    const { assert!(PERIOD_MIN == 400) };
-    (cycles * 41) >> 14
-}
+/// Most steps of a motor in a block: phase units of a block fit 30 bits.
+pub const STEPS_MAX: u16 = 0x7FFF;
 
 /// Most ticks of a segment: keeps the rounding rest below [`super::dda::PHASE_MARGIN`].
-pub const TICKS_MAX: u32 = 2000;
+pub const TICKS_MAX: u16 = 2000;
 
-/// What a stretch has not used, for the next one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Rest {
-    /// Phase units of the dominant motor.
-    pub distance: u32,
-    /// CPU cycles.
-    pub cycles: u32,
+/// Longest stretch, CPU cycles.
+pub const CYCLES_MAX: u32 = 1 << 20;
+
+/// Longest tick.
+const PERIOD_MAX: u32 = 0xFFFF;
+
+/// How close ticks may come.
+struct Pace {
+    /// Shortest tick period, CPU cycles: the step interrupt with so many motors, a short interrupt
+    /// before it, and some time for everything else.
+    shortest: u16,
+    /// 2^22 / the tick period of steady motion: as fine as leaves exec and the planner a third of the CPU.
+    fine: u16,
+    /// 2^22 / that of short blocks, for which they need more.
+    coarse: u16,
+    /// From this tick period on pulses wait for the interrupt's worst latency ([`Segment::settle`]).
+    settles: u16,
+}
+
+/// By the number of motors that move, less one.
+const PACES: [Pace; MOTORS] = [
+    Pace { shortest: 160, fine: per(200), coarse: per(400), settles: 200 },
+    Pace { shortest: 200, fine: per(200), coarse: per(400), settles: 200 },
+    Pace { shortest: 240, fine: per(320), coarse: per(480), settles: 300 },
+    Pace { shortest: 320, fine: per(400), coarse: per(560), settles: 320 },
+];
+
+/// Ticks of blocks so short that they are a single segment.
+const COARSEST: u16 = per(640);
+
+/// Blocks that take longer than this have fine ticks, s.
+pub const FINE_S: f32 = 0.05;
+
+/// Latest cycle of a tick at which the interrupt may find itself ready for its pulses.
+const SETTLE: u8 = 68;
+
+/// A lockstep segment has at least half as many ticks, if it is shorter than as many steps.
+const LOCKSTEP_TICKS: u32 = 16;
+
+const fn per(cycles: u32) -> u16 {
+    ((1 << 22) / cycles) as u16
+}
+
+/// Shortest tick period with `motors` moving, CPU cycles.
+pub const fn shortest(motors: usize) -> u16 {
+    PACES[if motors == 0 { 0 } else { motors - 1 }].shortest
+}
+
+/// A motor that moves but does not step on every tick of the dominant one.
+#[derive(Clone, Copy, Debug, Default)]
+struct Minor {
+    /// Its steps in the block.
+    steps: u16,
+    /// Travel in a tick, rounded down, and what that leaves, in 1 / most.
+    increment: u16,
+    remainder: u16,
+    /// What increments owe the line from start to end, in phase units / most.
+    owed: i32,
 }
 
 /// The state of the preparation of one block.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Prep {
-    /// Phase units until the block's end, modulo 2^32, that the segments so far have not covered.
-    left: [u32; MOTORS],
-    /// Share of the dominant motor's travel, in 2^-32; unused for the dominant motor.
-    ratio: [u32; MOTORS],
-    /// What increments owe the line, in phase units.
-    owed: [i32; MOTORS],
-    /// The same below one phase unit, in 2^-32.
-    fraction: [u32; MOTORS],
+    /// Phase units of the dominant motor until the block's end.
+    left: u32,
+    /// Time that has not been used, CPU cycles.
+    time: i32,
+    /// Steps of the dominant motor.
+    most: u16,
+    minors: [Minor; MOTORS],
+    /// Phase units that a motor is short of at the end of a block.
+    debt: [i16; MOTORS],
+    /// The shift for which increments have been computed; none yet if above [`STEP_LOG2`].
+    shift: u8,
     /// Motors that make as many steps as the dominant one.
     full: u8,
+    /// Motors that make some, but fewer.
+    minor: u8,
+    /// Motors that move, less one.
+    others: u8,
     backwards: u8,
-}
-
-/// Rounded quotient of a non-negative by a positive number.
-fn div_round(a: u32, b: u32) -> u32 {
-    (a + b / 2) / b
-}
-
-/// Rounded quotient of what is wanted by the ticks there are; 0 if it is less than nothing. Motors that
-/// stand still are not worth a division.
-fn quotient(wanted: i32, ticks: u32) -> u32 {
-    let wanted = wanted.max(0) as u32;
-    if wanted < ticks / 2 { 0 } else { div_round(wanted, ticks) }
+    /// Ticks are to be as fine as can be.
+    fine: bool,
 }
 
 impl Prep {
     /// Nothing to prepare.
     pub const fn new() -> Self {
+        const MINOR: Minor = Minor { steps: 0, increment: 0, remainder: 0, owed: 0 };
         Self {
-            left: [0; MOTORS],
-            ratio: [0; MOTORS],
-            owed: [0; MOTORS],
-            fraction: [0; MOTORS],
+            left: 0,
+            time: 0,
+            most: 0,
+            minors: [MINOR; MOTORS],
+            debt: [0; MOTORS],
+            shift: u8::MAX,
             full: 0,
+            minor: 0,
+            others: 0,
             backwards: 0,
+            fine: false,
         }
     }
 
-    /// Starts a block. Returns the steps of its dominant motor.
-    pub fn begin(&mut self, block: &Block) -> u32 {
-        let mut dominant = 0;
-        for m in 1..MOTORS {
-            if block.steps[m].unsigned_abs() > block.steps[dominant].unsigned_abs() {
-                dominant = m;
+    /// Starts a block, with fine ticks or not. Returns the steps of its dominant motor.
+    pub fn begin(&mut self, steps: &[i16; MOTORS], fine: bool) -> u16 {
+        self.fine = fine;
+        let mut most = 0;
+        for (minor, &steps) in self.minors.iter_mut().zip(steps) {
+            minor.steps = steps.unsigned_abs();
+            if minor.steps > most {
+                most = minor.steps;
             }
         }
-        let most = block.steps[dominant].unsigned_abs();
-        self.full = 0;
-        for m in 0..MOTORS {
-            self.begin_motor(m, block.steps[m], most);
+        self.most = most;
+        self.left = u32::from(most) << STEP_LOG2;
+        self.shift = u8::MAX;
+        (self.full, self.minor) = (0, 0);
+        if most == 0 {
+            return 0;
         }
+        let mut moving = 0u8;
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            if steps[m] != 0 {
+                moving += 1;
+                if (steps[m] < 0) != (self.backwards & bit != 0) {
+                    self.backwards ^= bit;
+                    // It was measured in the old direction.
+                    self.debt[m] = -self.debt[m];
+                }
+                let minor = &mut self.minors[m];
+                if minor.steps == most {
+                    self.full |= bit;
+                } else {
+                    self.minor |= bit;
+                    minor.owed = product(self.debt[m], most);
+                }
+            }
+            bit <<= 1;
+        }
+        self.others = moving - 1;
         most
     }
 
-    fn begin_motor(&mut self, m: usize, steps: i32, most: u32) {
-        let bit = 1 << m;
-        let backwards = steps < 0;
-        // A motor that stands still keeps its direction: no needless edge on the pin.
-        if steps != 0 && backwards != (self.backwards & bit != 0) {
-            self.backwards ^= bit;
-            // The rest was measured in the old direction.
-            self.left[m] = self.left[m].wrapping_neg();
-        }
-        // The rest goes into the block's first segment.
-        self.owed[m] = self.left[m] as i32;
-        let steps = steps.unsigned_abs();
-        self.left[m] = self.left[m].wrapping_add(steps << STEP_LOG2);
-        if steps == most {
-            self.full |= bit;
-        } else {
-            self.ratio[m] = ratio(steps, most);
-            self.fraction[m] = 0;
-        }
+    /// Phase units of the dominant motor in the block that no segment has covered yet.
+    pub fn left(&self) -> u32 {
+        self.left
     }
 
-    /// The travel of motor `m` while the dominant one travels `distance`.
-    fn share(&mut self, m: usize, distance: u32) -> i32 {
-        if self.full & (1 << m) != 0 {
-            return distance as i32;
+    /// Time from nowhere, to be used up by the next segment: that of moves without steps.
+    pub fn wait(&mut self, cycles: u32) {
+        self.time += cycles as i32;
+    }
+
+    /// Forgets time that has not been used: the machine stands still.
+    pub fn rest(&mut self) {
+        self.time = 0;
+    }
+
+    /// Prepares a stretch of `cycles`, up to [`CYCLES_MAX`], at the end of which the dominant motor has
+    /// about `left` phase units to go. `None` when that time is kept for the next stretch.
+    pub fn segment(&mut self, left: u32, cycles: u32) -> Option<Segment> {
+        let travel = self.left.saturating_sub(left);
+        let cycles = self.time.saturating_add(cycles as i32).max(1) as u32;
+        let limit = self.limit(cycles, self.pace());
+        let (_, shift) = coarsen(travel, limit);
+        // What is left must be whole ticks, now and at the end: of up to an eighth of this stretch.
+        let shift = shift.min(self.left.trailing_zeros() as u8);
+        let grain = grain(travel >> shift, shift);
+        let short = (self.left - travel).wrapping_neg() & !(u32::MAX << grain);
+        if travel <= short {
+            return self.idle(cycles);
         }
-        let product = u64::from(distance) * u64::from(self.ratio[m]) + u64::from(self.fraction[m]);
-        self.fraction[m] = product as u32;
-        (product >> 32) as i32
-    }
-
-    /// Prepares a stretch: the dominant motor is to travel `distance` phase units in `cycles` CPU
-    /// cycles (1 to 2^17).
-    pub fn segment(&mut self, distance: u32, cycles: u32) -> (Segment, Rest) {
-        let shift = tick_shift(distance, cycles);
-        // Fits 32 bits: `tick_shift` sees to that.
-        let period = (cycles << shift).checked_div(distance).unwrap_or(u32::MAX);
-        if period > 0xFFFF {
-            return self.idle(distance, cycles);
+        let aligned = travel - short;
+        let ticks = ((aligned >> shift) as u16).min(TICKS_MAX);
+        let period = self.period(cycles, travel, shift);
+        if period > PERIOD_MAX {
+            return self.idle(cycles);
         }
-        let period = period.max(u32::from(PERIOD_MIN));
-        let ticks = (distance >> shift).clamp(1, TICKS_MAX);
-        let travel = ticks << shift;
-        let rest =
-            Rest { distance: distance - travel, cycles: cycles.saturating_sub(ticks * period) };
-        (self.emit(ticks, period as u16, |prep, m| prep.share(m, travel)), rest)
+        Some(self.emit(ticks, shift, period as u16, cycles))
     }
 
-    /// A tick in which nothing moves: the next step is further off than the timer counts.
-    pub fn idle(&self, distance: u32, cycles: u32) -> (Segment, Rest) {
-        let period = cycles.clamp(1, 0xFFFF);
-        let segment = Segment {
-            ticks: 1,
-            period: period as u16,
-            backwards: self.backwards,
-            ..Default::default()
-        };
-        (segment, Rest { distance, cycles: cycles - period })
-    }
-
-    /// Prepares the last stretch of the block: everything that is left, in `cycles`. `None` when
-    /// nothing is left.
-    pub fn last(&mut self, cycles: u32) -> Option<Segment> {
-        // All but the dominant motor may have a little more or less left than their share.
-        let distance = self.left.iter().map(|left| *left as i32).max().unwrap_or(0);
-        // Nothing but a rest of rounding, to either side: leave it to the next block.
-        if distance < (STEP / 8).into() {
+    /// Prepares the last stretch of the block, everything that is left, in `cycles`. `None` when
+    /// nothing is left; the time is kept then.
+    pub fn last(&mut self, cycles: u32, whole: bool) -> Option<Segment> {
+        let cycles = self.time.saturating_add(cycles as i32).max(1) as u32;
+        if self.left == 0 {
+            self.time = cycles as i32;
             return None;
         }
-        let distance = distance as u32;
-        let shift = tick_shift(distance, cycles);
-        // A motor makes a step on each tick at most.
-        let ticks = div_round(distance, 1 << shift).max(distance.div_ceil(STEP.into()));
-        let ticks = ticks.clamp(1, TICKS_MAX);
-        let period = (cycles / ticks).clamp(u32::from(PERIOD_MIN), 0xFFFF);
-        for m in 0..MOTORS {
-            self.owed[m] = 0;
+        let pace = if whole { COARSEST } else { self.pace() };
+        let (_, shift) = coarsen(self.left, self.limit(cycles, pace));
+        // Ticks that do not go into what is left would leave a rest.
+        let shift = shift.min(self.left.trailing_zeros() as u8);
+        let ticks = self.left >> shift;
+        if ticks > u32::from(TICKS_MAX) {
+            // Too much for one segment: a part of it, and the rest when asked again.
+            return Some(self.emit(
+                TICKS_MAX,
+                shift,
+                self.period(cycles, self.left, shift) as u16,
+                cycles,
+            ));
         }
-        Some(self.emit(ticks, period as u16, |prep, m| prep.left[m] as i32))
+        let period = self.period(cycles, self.left, shift).min(PERIOD_MAX);
+        Some(self.emit(ticks as u16, shift, period as u16, cycles))
     }
 
-    /// A segment of `ticks` in which each motor travels what `travel` says plus what it is owed.
-    fn emit(
-        &mut self,
-        ticks: u32,
-        period: u16,
-        travel: impl Fn(&mut Self, usize) -> i32,
-    ) -> Segment {
-        let mut segment = Segment {
-            ticks: ticks as u16,
-            period,
-            backwards: self.backwards,
-            ..Default::default()
+    fn pace(&self) -> u16 {
+        let pace = &PACES[usize::from(self.others)];
+        if self.fine { pace.fine } else { pace.coarse }
+    }
+
+    /// Most ticks for a stretch.
+    fn limit(&self, cycles: u32, pace: u16) -> u32 {
+        if self.minor == 0 {
+            return LOCKSTEP_TICKS;
+        }
+        let cycles = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
+        let limit = (u32::from(cycles) * u32::from(pace)) >> 22;
+        limit.clamp(1, TICKS_MAX.into())
+    }
+
+    /// Cycles from tick to tick when a stretch of `travel` takes `cycles`; no less than
+    /// can be sustained, at most 2^16 if it does not fit 16 bits.
+    fn period(&self, cycles: u32, travel: u32, shift: u8) -> u32 {
+        // In 1/32 tick, as far as that fits 16 bits.
+        let (mut cycles, mut ticks) = match shift {
+            0..5 => (cycles << shift, travel),
+            _ => (cycles << 5, travel >> (shift - 5)),
         };
-        for m in 0..MOTORS {
-            let wanted = travel(self, m) + self.owed[m];
-            let increment = quotient(wanted, ticks).min(u32::from(STEP));
-            let done = increment * ticks;
-            self.owed[m] = wanted - done as i32;
-            self.left[m] = self.left[m].wrapping_sub(done);
-            segment.increment[m] = increment as u16;
+        while ticks > 0xFFFF {
+            ticks >>= 1;
+            cycles >>= 1;
         }
-        segment
+        let ticks = ticks as u16;
+        if ticks == 0 || (cycles >> 16) as u16 >= ticks {
+            return 0x1_0000;
+        }
+        let period = quotient(cycles + u32::from(ticks / 2), ticks);
+        u32::from(period.max(PACES[usize::from(self.others)].shortest))
+    }
+
+    /// Nothing moves: the next step is too far off. A tick of the time there is, at most; short times
+    /// are kept.
+    fn idle(&mut self, cycles: u32) -> Option<Segment> {
+        if cycles < PERIOD_MAX / 2 {
+            self.time = cycles as i32;
+            return None;
+        }
+        let period = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
+        self.time = (cycles - u32::from(period)) as i32;
+        Some(self.pause(1, period))
+    }
+
+    /// A segment in which nothing moves.
+    pub fn pause(&self, ticks: u16, period: u16) -> Segment {
+        Segment { ticks, period, backwards: self.backwards, ..Segment::default() }
+    }
+
+    /// A segment of `ticks` in each of which the dominant motor travels `1 << shift`.
+    fn emit(&mut self, ticks: u16, shift: u8, period: u16, cycles: u32) -> Segment {
+        if shift != self.shift {
+            self.scale(shift);
+        }
+        let used = u32::from(ticks) * u32::from(period);
+        // Time that cannot be caught up is let go, or the machine would race to do so.
+        self.time = (cycles as i32 - used as i32).max(-1000);
+        let travel = u32::from(ticks) << shift;
+        self.left -= travel;
+        let mut segment = self.pause(ticks, period);
+        if period >= PACES[usize::from(self.others)].settles {
+            segment.settle = SETTLE;
+        }
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            if self.full & bit != 0 {
+                segment.increment[m] = 1 << shift;
+            } else if self.minor & bit != 0 {
+                segment.increment[m] = self.minors[m].advance(ticks, self.most);
+            }
+            bit <<= 1;
+        }
+        if self.left == 0 {
+            self.settle_debts();
+        }
+        segment.seal()
+    }
+
+    /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.
+    fn scale(&mut self, shift: u8) {
+        self.shift = shift;
+        let mut bit = 1;
+        for minor in &mut self.minors {
+            if self.minor & bit != 0 {
+                let travel = u32::from(minor.steps) << shift;
+                (minor.increment, minor.remainder) = quotient_remainder(travel, self.most);
+            }
+            bit <<= 1;
+        }
+    }
+
+    /// The block is done: what its motors are short of goes into the next.
+    fn settle_debts(&mut self) {
+        let mut bit = 1;
+        for (debt, minor) in self.debt.iter_mut().zip(&self.minors) {
+            if self.minor & bit != 0 {
+                // Exact: the line has arrived at a whole step.
+                let owed = minor.owed.unsigned_abs();
+                let whole = if owed == 0 { 0 } else { quotient(owed, self.most) as i16 };
+                *debt = if minor.owed < 0 { -whole } else { whole };
+            }
+            bit <<= 1;
+        }
     }
 }
 
-/// `steps / most` in 2^-32, rounded down; `steps < most`.
-fn ratio(steps: u32, most: u32) -> u32 {
-    ((u64::from(steps) << 32) / u64::from(most.max(1))) as u32
+impl Default for Prep {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
-/// The exponent of a tick's travel, `STEP >> k`, for the finest tick that keeps ticks at least
-/// [`PERIOD_MIN`] apart and makes no more than [`TICKS_MAX`] of them.
-fn tick_shift(distance: u32, cycles: u32) -> u32 {
-    let finest = ticks_in(cycles).clamp(1, TICKS_MAX);
-    // `cycles << shift` must fit 32 bits.
-    let most = STEP_LOG2.min(cycles.leading_zeros());
+impl Minor {
+    /// The increment for the next `ticks`, and what it owes then.
+    fn advance(&mut self, ticks: u16, most: u16) -> u16 {
+        let unit = u32::from(ticks) * u32::from(most);
+        let half = (unit / 2) as i32;
+        let mut owed = self.owed + (u32::from(ticks) * u32::from(self.remainder)) as i32;
+        let mut increment = self.increment;
+        if owed > half {
+            let more = if owed - (unit as i32) <= half { 1 } else { rounded(owed as u32, unit) };
+            let more = more.min(STEP - increment);
+            increment += more;
+            owed -= product_wide(unit, more);
+        } else if owed < -half {
+            let less =
+                if owed + (unit as i32) >= -half { 1 } else { rounded(owed.unsigned_abs(), unit) };
+            let less = less.min(increment);
+            increment -= less;
+            owed += product_wide(unit, less);
+        }
+        self.owed = owed;
+        increment
+    }
+}
+
+/// `owed / unit`, rounded. Rare: a debt that meets a short segment.
+#[inline(never)]
+fn rounded(owed: u32, unit: u32) -> u16 {
+    ((owed + unit / 2) / unit) as u16
+}
+
+fn product(a: i16, b: u16) -> i32 {
+    let size = (u32::from(a.unsigned_abs()) * u32::from(b)) as i32;
+    if a < 0 { -size } else { size }
+}
+
+fn product_wide(unit: u32, times: u16) -> i32 {
+    match times {
+        0 => 0,
+        1 => unit as i32,
+        _ => (unit * u32::from(times)) as i32,
+    }
+}
+
+/// Ticks of a travel, no more than `limit` if steps allow, and the shift between the two.
+fn coarsen(travel: u32, limit: u32) -> (u32, u8) {
     let mut shift = 0;
-    let mut ticks = distance;
-    while shift < most && ticks > finest {
+    let mut ticks = travel;
+    while ticks > limit && shift < STEP_LOG2 {
         ticks >>= 1;
         shift += 1;
     }
-    shift
+    (ticks, shift)
+}
+
+/// The exponent of what a stretch's end is aligned to: a tick, up to an eighth of the stretch, up to a
+/// step.
+fn grain(ticks: u32, shift: u8) -> u8 {
+    let mut grain = shift;
+    let mut eighth = ticks >> 4;
+    while eighth != 0 && grain < STEP_LOG2 {
+        eighth >>= 1;
+        grain += 1;
+    }
+    grain
 }

@@ -3,17 +3,43 @@
 use super::machine::Machine;
 use super::request::{Context, Phase, Request};
 use super::value::Value;
-use super::write::{Out, Writer};
+use super::write::{Format, Out, Writer};
 use crate::config::Fixed;
 use crate::status::Status;
 use crate::text;
 
 /// Verbosities from which the parts show.
+const FRAMES: u8 = 1;
 const LINE_NUMBERS: u8 = 4;
 const BLOCKS: u8 = 5;
 
 impl Request {
+    /// Whether nothing of the block is to be shown, so that the response is the frame alone.
+    fn is_brief<M: Machine>(&self, machine: &mut M) -> bool {
+        let quiet = match machine.settings().json_verbosity() {
+            FRAMES..LINE_NUMBERS => true,
+            LINE_NUMBERS..BLOCKS => machine.value(Value::BlockLine) == 0,
+            _ => false,
+        };
+        quiet && !self.begun && !self.is_json && !self.commented
+    }
+
+    /// The whole response to most lines, in one step.
+    pub(super) fn brief<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) -> bool {
+        let brief = self.is_brief(c.machine);
+        if brief {
+            let free = c.machine.value(Value::SlotsFree);
+            let mut format = Format::json(c.machine.settings().json_strict());
+            Writer::frame(c.out, &mut format).empty_response(self.status as u8, free);
+            self.phase = Phase::Done;
+        }
+        brief
+    }
+
     pub(super) fn block<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        if self.brief(c) {
+            return;
+        }
         self.open(c);
         self.phase = Phase::Message;
         if self.verbosity >= BLOCKS {

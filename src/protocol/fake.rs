@@ -53,7 +53,7 @@ impl Fake {
                     assert!(answer.is_empty(), "a response has begun before its block has run");
                     let block = &line[usize::from(start)..usize::from(end)];
                     self.blocks.push(String::from_utf8_lossy(block).into_owned());
-                    request.ran(self.outcome);
+                    request.ran(self.outcome, line.iter().any(|byte| matches!(byte, b'(' | b';')));
                 }
                 Next::Done(_) => return answer,
             }

@@ -95,6 +95,8 @@ pub struct Request {
     pub(super) is_json: bool,
     /// The block is answered with a prompt.
     is_text: bool,
+    /// The block may have a comment, and that a message.
+    pub(super) commented: bool,
     /// The message that is due.
     pub(super) warning: Warning,
     /// Of the phase `Select`: something has been selected.
@@ -162,6 +164,7 @@ impl Request {
             begun: false,
             is_json: false,
             is_text: false,
+            commented: true,
             warning: Warning::None,
             selected: false,
         }
@@ -172,10 +175,16 @@ impl Request {
         self.phase = if mode == Mode::Text { Phase::Prompt } else { Phase::Warning };
     }
 
-    /// The G-code that [`Next::Gcode`] named has run, with this status.
-    pub fn ran(&mut self, status: Status) {
+    /// The G-code that the next step would ask for with [`Next::Gcode`], if that is so already.
+    pub fn gcode(&self) -> Option<Span> {
+        (self.phase == Phase::Gcode).then_some(self.block)
+    }
+
+    /// The G-code that [`Next::Gcode`] named has run, with this status; whether it had a comment.
+    pub fn ran(&mut self, status: Status, commented: bool) {
         if self.phase == Phase::Gcode {
             self.status = status;
+            self.commented = commented;
             self.phase = if self.is_text { Phase::Prompt } else { Phase::Block };
         }
     }

@@ -321,7 +321,7 @@ fn notices_are_as_documented() {
 
 #[test]
 fn ram_is_accounted_for() {
-    assert_eq!(size_of::<Request>(), 15);
+    assert_eq!(size_of::<Request>(), 16);
     assert_eq!(size_of::<StatusReport>(), 204);
     assert_eq!(size_of::<Report>(), 4);
     assert_eq!((size_of::<Banner>(), size_of::<Exception>()), (2, 3));

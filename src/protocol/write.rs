@@ -10,6 +10,11 @@ use crate::text;
 pub trait Out {
     /// Takes one byte.
     fn put(&mut self, byte: u8);
+
+    /// Takes several.
+    fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
+        bytes.for_each(|byte| self.put(byte));
+    }
 }
 
 /// How to write, and where in an object we are. Kept from step to step.
@@ -94,7 +99,9 @@ impl<'a, O: Out> Writer<'a, O> {
 
     /// A text.
     pub fn text(&mut self, text: Text) {
-        text.bytes().for_each(|byte| self.byte(byte));
+        if self.format.0 & self.hidden == 0 {
+            self.out.put_all(text.bytes());
+        }
     }
 
     /// Bytes as they are, in lower case.
@@ -185,10 +192,29 @@ impl<'a, O: Out> Writer<'a, O> {
     pub fn footer(&mut self, status: u8, free: i32) {
         self.key_text(text!("f"));
         self.text(text!("[1,"));
-        self.fixed(Fixed::int(status.into()));
+        self.footer_values(status, free);
+    }
+
+    /// A whole response of which nothing but the frame shows.
+    pub fn empty_response(&mut self, status: u8, free: i32) {
+        let strict = self.format.0 & STRICT != 0;
+        self.text(if strict { text!("{\"r\":{},\"f\":[1,") } else { text!("{r:{},f:[1,") });
+        self.footer_values(status, free);
+    }
+
+    fn footer_values(&mut self, status: u8, free: i32) {
+        self.small(status);
         self.byte(b',');
-        self.fixed(Fixed::int(free));
+        self.small(free as u8);
         self.text(text!("]}\n"));
+    }
+
+    /// A number, which most often has one digit.
+    fn small(&mut self, value: u8) {
+        match value {
+            ..10 => self.byte(b'0' + value),
+            _ => self.fixed(Fixed::int(value.into())),
+        }
     }
 }
 
@@ -228,6 +254,24 @@ mod tests {
         assert_eq!(written(Format::json(true), true), [&expected[..], b"\n"].concat());
         let relaxed = br#"{r:{a:-1.500,b:"c"},f:[1,3,7]}"#;
         assert_eq!(written(Format::json(false), true), [&relaxed[..], b"\n"].concat());
+    }
+
+    #[test]
+    fn an_empty_response_is_what_its_parts_are() {
+        for (strict, status, free) in [(true, 0, 8), (false, 255, 0), (true, 13, 7), (true, 101, 3)]
+        {
+            let (mut parts, mut whole) = (Vec::new(), Vec::new());
+            let mut format = Format::response(strict, 1);
+            let mut writer = Writer::frame(&mut parts, &mut format);
+            writer.open();
+            writer.key_text(text!("r"));
+            writer.open();
+            writer.close();
+            writer.footer(status, free);
+            let mut format = Format::response(strict, 1);
+            Writer::frame(&mut whole, &mut format).empty_response(status, free);
+            assert_eq!(parts, whole);
+        }
     }
 
     #[test]

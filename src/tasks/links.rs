@@ -3,12 +3,13 @@
 //!
 //! | link | carries | depth | RAM | from | to | when full |
 //! |---|---|---|---|---|---|---|
-//! | `uart` receive ring | bytes | 255 | 260 B | RX interrupt | reader | the line is damaged: refused with status 13 |
+//! | `uart` receive ring | bytes | 255 | 260 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
 //! | [`Links::lines`] | lines | 8 lines, 640 B | 670 B | reader | parser | bytes stay in the receive ring |
 //! | [`Links::commands`] | canonical commands | 1 | 70 B | parser | planner | the parser takes control lines only |
 //! | block ring | blocks | 40 | 1,900 B | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 4 | 68 B | exec | step interrupt | exec waits for its next run |
 //! | `uart` transmit ring | bytes | 255 | 260 B | parser, reporter | TX interrupt | the writer waits, response half sent |
+//! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
 //! lines wait in the pool, and their responses wait with them. The sender has at most its lines in
@@ -17,14 +18,14 @@
 //! All but the interrupt rings belong to thread-mode tasks of one executor, which take turns: plain
 //! `RefCell`s, never borrowed across an `.await`.
 
-use core::cell::{Cell, RefCell};
+use core::cell::{Cell, RefCell, UnsafeCell};
 
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::Mutex;
-use embassy_sync::signal::Signal;
 
 use super::lines::LinePool;
 use super::tx::Tx;
+use super::wake::{News, Wake};
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
@@ -32,9 +33,6 @@ use crate::motion::exec::Snapshot;
 use crate::motion::queue;
 use crate::protocol::{Mode, StatusReport};
 use crate::status::Status;
-
-/// A signal between thread-mode tasks.
-pub type Wake = Signal<NoopRawMutex, ()>;
 
 /// The links. One for the machine, made at start-up.
 pub struct Links {
@@ -51,11 +49,13 @@ pub struct Links {
     /// `commands` was filled.
     pub planner_wake: Wake,
     /// Something that reports show may have changed.
-    pub reporter_wake: Wake,
+    pub reporter_wake: News,
     /// Blocks that came and went, for queue reports.
     pub queue_count: QueueCount,
     /// A setting has changed what steps mean: the planner counts them anew.
     pub resync: Cell<bool>,
+    /// A new rate of the line, in bits a second: the parser sets it when its response has left.
+    pub rate: Cell<Option<u32>>,
     /// An exception to report.
     pub exception: Cell<Option<Status>>,
     /// How the sender wants to be answered.
@@ -64,6 +64,8 @@ pub struct Links {
     pub report: RefCell<StatusReport>,
     /// The line to the sender.
     pub tx: Mutex<NoopRawMutex, Tx>,
+    /// A setting has changed since the planner looked.
+    pub settings_changed: Cell<bool>,
     /// Settings in force.
     pub settings: RefCell<Settings>,
     /// The G-code model. The parser advances it; reports read it.
@@ -98,21 +100,23 @@ impl QueueCount {
 }
 
 /// What exec tells the others: written at level 2, read under the ceiling.
-pub struct Published(Cell<Snapshot>);
+pub struct Published(UnsafeCell<Snapshot>);
 
 // SAFETY: exec writes it, and thread mode reads it while exec is locked out.
 unsafe impl Sync for Published {}
 
 machine_static! {
-    fn published() -> Published = Published(Cell::new(Snapshot::new()));
+    fn published() -> Published = Published(UnsafeCell::new(Snapshot::new()));
 }
 
-/// Publishes how motion stands. Exec only.
-pub fn publish(snapshot: Snapshot) {
-    published().0.set(snapshot);
+/// Changes how motion stands. Exec only, and not from within `change`.
+pub fn update<R>(change: impl FnOnce(&mut Snapshot) -> R) -> R {
+    // SAFETY: the only writer; readers keep it from running.
+    change(unsafe { &mut *published().0.get() })
 }
 
 /// How motion stands. Thread mode only.
 pub fn snapshot() -> Snapshot {
-    crate::hal::imp::exec::lock(|_| published().0.get())
+    // SAFETY: the writer does not run under the lock.
+    crate::hal::imp::exec::lock(|_| unsafe { *published().0.get() })
 }

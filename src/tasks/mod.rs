@@ -13,3 +13,4 @@ pub mod reader;
 pub mod reporter;
 pub mod tx;
 pub mod view;
+pub mod wake;

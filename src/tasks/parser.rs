@@ -9,18 +9,32 @@ use super::lines::{Class, LineId};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::View;
-use crate::gcode::command::Commands;
-use crate::protocol::{Next, Request};
+use crate::protocol::{Next, Request, Span};
 use crate::status::Status;
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
         let (id, class) = next_line(links).await;
-        answer(links, id, class).await;
-        links.lines.borrow_mut().remove(id);
-        links.pool_space.signal(());
-        links.reporter_wake.signal(());
+        if let Some(mut request) = begin(links, id, class)
+            && !answer_at_once(links, id, &mut request)
+        {
+            answer(links, id, &mut request).await;
+        }
+        finish(links, id);
+    }
+}
+
+/// Answers a line as far as that goes without waiting: most of them to the end. Returns whether it was
+/// this one.
+#[inline(never)]
+fn answer_at_once(links: &Links, id: LineId, request: &mut Request) -> bool {
+    match links.tx.try_lock() {
+        // What waits for the planner is left to `answer`.
+        Ok(mut tx) if tx.has_room() && request.gcode().is_none() => {
+            matches!(step(links, id, request, &mut tx), Next::Done(_))
+        }
+        _ => false,
     }
 }
 
@@ -36,25 +50,31 @@ async fn next_line(links: &Links) -> (LineId, Class) {
     }
 }
 
-/// Carries a line out and writes its response.
-async fn answer(links: &Links, id: LineId, class: Class) {
-    let request = {
-        let mut mode = links.mode.get();
-        let lines = links.lines.borrow();
-        let request = match class {
-            Class::Fault(status) => Some(Request::refused(status, mode)),
-            _ => Request::begin(lines.text(id), &mut mode),
-        };
-        links.mode.set(mode);
-        request
+/// Begins with a line. One of G-code has run after that, for data lines are taken only while the
+/// planner is free.
+#[inline(never)]
+fn begin(links: &Links, id: LineId, class: Class) -> Option<Request> {
+    let lines = links.lines.borrow();
+    let line = lines.text(id);
+    let mut mode = links.mode.get();
+    let mut request = match class {
+        Class::Fault(status) => Request::refused(status, mode),
+        _ => Request::begin(line, &mut mode)?,
     };
-    let Some(mut request) = request else {
-        return;
-    };
+    links.mode.set(mode);
+    if let Some(block) = request.gcode() {
+        let (status, commented) = interpret(links, block.of(line));
+        request.ran(status, commented);
+    }
+    Some(request)
+}
+
+/// Writes the response to a line.
+async fn answer(links: &Links, id: LineId, request: &mut Request) {
     let mut tx = links.tx.lock().await;
     loop {
         tx.room().await;
-        match step(links, id, &mut request, &mut tx) {
+        match step(links, id, request, &mut tx) {
             Next::More => {}
             Next::Gcode { start, end } => {
                 if links.commands_taken.get() {
@@ -65,12 +85,25 @@ async fn answer(links: &Links, id: LineId, class: Class) {
                     }
                     tx = links.tx.lock().await;
                 }
-                request.ran(interpret(links, id, start, end));
+                let lines = links.lines.borrow();
+                let block = Span { start, end };
+                let (status, commented) = interpret(links, block.of(lines.text(id)));
+                request.ran(status, commented);
             }
             Next::Done(_) => break,
         }
     }
-    tx.flush();
+    if let Some(rate) = links.rate.take() {
+        tx.set_rate(rate).await;
+    }
+}
+
+/// The line's slot is free again.
+#[inline(never)]
+fn finish(links: &Links, id: LineId) {
+    links.lines.borrow_mut().remove(id);
+    links.pool_space.signal();
+    links.reporter_wake.signal();
 }
 
 #[inline(never)]
@@ -81,27 +114,21 @@ fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
     next
 }
 
-/// Interprets a block and hands its commands to the planner.
+/// Interprets a block and hands its commands to the planner. Returns also whether it may have a
+/// comment.
 #[inline(never)]
-fn interpret(links: &Links, id: LineId, start: u8, end: u8) -> Status {
-    let lines = links.lines.borrow();
-    let text = lines.text(id).get(start.into()..end.into()).unwrap_or(&[]);
+fn interpret(links: &Links, block: &[u8]) -> (Status, bool) {
     let mut commands = links.commands.borrow_mut();
     let settings = links.settings.borrow();
-    match links.model.borrow_mut().interpret(text, &*settings, &mut commands) {
-        Ok(info) if info.deleted => Status::Noop,
-        Ok(_) => {
-            if asks_for_something(&commands) {
+    match links.model.borrow_mut().interpret(block, &*settings, &mut commands) {
+        Ok(info) if info.deleted => (Status::Noop, true),
+        Ok(info) => {
+            if !commands.is_empty() {
                 links.commands_taken.set(true);
-                links.planner_wake.signal(());
+                links.planner_wake.signal();
             }
-            Status::Ok
+            (Status::Ok, info.commented)
         }
-        Err(status) => status,
+        Err(status) => (status, true),
     }
-}
-
-fn asks_for_something(commands: &Commands) -> bool {
-    let Commands { line, exact_stop, .. } = *commands;
-    *commands != Commands { line, exact_stop, ..Commands::default() }
 }

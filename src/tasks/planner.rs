@@ -1,20 +1,20 @@
 //! The planner task: canonical commands into blocks.
 //!
-//! Reads `Links::commands` and the settings, writes the block ring, waits for commands and for room in
-//! the ring. One turn builds one block and plans the queue again: the longest turn of all tasks.
+//! Reads `Links::commands` and the settings, writes the block queue, waits for commands and for room in
+//! the queue. One turn builds one block.
 
 use embassy_futures::yield_now;
 
 use super::axes::moved_by;
 use super::links::Links;
-use crate::config::Settings;
+use crate::config::{Settings, StepRatio};
 use crate::gcode::arc::Chords;
 use crate::gcode::command::{Commands, Feed, Motion, Stop};
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::exec;
-use crate::motion::block::{Block, Kind};
-use crate::motion::exec::{BLOCK_S_MIN, STEP_RATE_MAX};
-use crate::motion::line::{Builder, Line, Machine};
+use crate::motion::block::{Block, Body};
+use crate::motion::dynamics::{Dynamics, Machine};
+use crate::motion::line::{Builder, Built, Line, Motors};
 use crate::motion::queue::BlockQueue;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -23,41 +23,53 @@ struct Planner {
     links: &'static Links,
     queue: BlockQueue,
     builder: Builder,
+    dynamics: Dynamics,
     /// Where the last block ends, machine coordinates.
     position: PerAxis<Length>,
+    /// The N word of the line that is carried out.
+    line: u32,
 }
 
 /// The task.
 pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
-    let mut planner =
-        Planner { links, queue, builder: Builder::default(), position: [Length::ZERO; AXES] };
+    let mut planner = Planner {
+        links,
+        queue,
+        builder: Builder::default(),
+        dynamics: Dynamics::default(),
+        position: [Length::ZERO; AXES],
+        line: 0,
+    };
     loop {
         links.planner_wake.wait().await;
         let commands = *links.commands.borrow();
         planner.carry_out(&commands).await;
         links.commands_taken.set(false);
-        links.parser_wake.signal(());
+        links.parser_wake.signal();
     }
 }
 
 impl Planner {
     /// Does everything a line asks for, in order.
     async fn carry_out(&mut self, commands: &Commands) {
-        let line = commands.line;
+        self.line = commands.line;
+        if self.links.settings_changed.replace(false) {
+            self.dynamics = Dynamics::new(&*self.links.settings.borrow());
+        }
         if self.links.resync.get() {
-            self.set_position(&[None; AXES], line).await;
+            self.set_position(&[None; AXES]).await;
             self.links.resync.set(false);
         }
         if let Some(ms) = commands.dwell_ms {
-            self.dwell(ms, line).await;
+            self.pause(Body::Dwell(ms)).await;
         }
         if let Some(position) = &commands.set_position {
-            self.set_position(position, line).await;
+            self.set_position(position).await;
         }
         match &commands.motion {
             Motion::None => {}
-            Motion::Traverse { target } => self.straight(target, None, line).await,
-            Motion::Feed { target, feed } => self.straight(target, Some(*feed), line).await,
+            Motion::Traverse { target } => self.straight(target, None).await,
+            Motion::Feed { target, feed } => self.straight(target, Some(*feed)).await,
             Motion::Arc { target, feed, arc } => {
                 let tolerance = self.links.settings.borrow().chordal_tolerance();
                 let start = self.position;
@@ -69,7 +81,7 @@ impl Planner {
                     Feed::PerMinute(rate) => rate,
                 };
                 for end in chords {
-                    self.straight(&end, Some(Feed::PerMinute(feed)), line).await;
+                    self.straight(&end, Some(Feed::PerMinute(feed))).await;
                 }
             }
         }
@@ -78,54 +90,107 @@ impl Planner {
         }
         match commands.stop {
             Stop::None => {}
-            Stop::Program => self.stop(Kind::ProgramStop, line).await,
-            Stop::End => self.stop(Kind::ProgramEnd, line).await,
+            Stop::Program => self.pause(Body::ProgramStop).await,
+            Stop::End => self.pause(Body::ProgramEnd).await,
         }
     }
 
-    async fn straight(&mut self, target: &PerAxis<Length>, feed: Option<Feed>, line: u32) {
-        let block = {
-            let settings = self.links.settings.borrow();
-            let line = Line { from: &self.position, to: target, feed, line };
-            self.builder.line(&line, &*settings)
-        };
+    async fn straight(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) {
+        self.room().await;
+        if let Some(parts) = self.line(target, feed) {
+            self.parts(target, feed, parts).await;
+        }
         self.position = *target;
-        if let Some(block) = block {
-            self.push(block).await;
+        self.pushed().await;
+    }
+
+    /// Queues a straight move, for which there is room, or says in how many parts it is to be made.
+    fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) -> Option<u16> {
+        let settings = self.links.settings.borrow();
+        let line = Line { from: &self.position, to: target, feed };
+        match self.builder.line(&line, &self.dynamics, &*settings) {
+            Built::Nothing => None,
+            Built::Parts(parts) => Some(parts),
+            Built::Line(block, entry) => {
+                self.queue.push_line(block, entry, self.line);
+                None
+            }
         }
     }
 
-    async fn dwell(&mut self, ms: u32, line: u32) {
-        let block = self.builder.dwell(ms, line);
-        self.push(block).await;
+    /// A move that is too long for one block.
+    #[inline(never)]
+    fn part(start: &PerAxis<Length>, target: &PerAxis<Length>, n: u16, of: u16) -> PerAxis<Length> {
+        let mut end = *target;
+        for axis in 0..AXES {
+            let way = i64::from(target[axis].0) - i64::from(start[axis].0);
+            let part = way * i64::from(n) / i64::from(of);
+            end[axis] = Length((i64::from(start[axis].0) + part) as i32);
+        }
+        end
     }
 
-    async fn stop(&mut self, kind: Kind, line: u32) {
-        let block = self.builder.stop(kind, line);
+    async fn parts(&mut self, target: &PerAxis<Length>, feed: Option<Feed>, of: u16) {
+        let start = self.position;
+        // Inverse time is that of the whole.
+        let feed = match feed {
+            Some(Feed::Minutes(minutes)) => Some(Feed::Minutes(minutes / f32::from(of))),
+            other => other,
+        };
+        for n in 1..=of {
+            let end = Self::part(&start, target, n, of);
+            self.room().await;
+            // Not longer than a block: the steps have been counted.
+            let _ = self.line(&end, feed);
+            self.position = end;
+            self.pushed().await;
+        }
+    }
+
+    /// Something that is done at rest.
+    async fn pause(&mut self, body: Body) {
+        let block = self.builder.pause(body, self.line);
         self.push(block).await;
     }
 
     /// G28.3: the position is called something else; no motor moves.
-    async fn set_position(&mut self, position: &PerAxis<Option<Length>>, line: u32) {
+    async fn set_position(&mut self, position: &PerAxis<Option<Length>>) {
         for (mine, new) in self.position.iter_mut().zip(position) {
             *mine = new.unwrap_or(*mine);
         }
-        let block = {
+        let body = {
             let settings = self.links.settings.borrow();
-            self.builder.set_position(&self.position, line, &*settings)
+            self.builder.set_position(&self.position, &*settings)
         };
-        self.push(block).await;
+        self.push(Block { body, line: self.line }).await;
     }
 
     async fn push(&mut self, block: Block) {
-        let links = self.links;
-        wait(Event::BlockDone, || (self.queue.free() > 0).then_some(())).await;
-        // There is room: this task alone fills the ring.
+        self.room().await;
+        // There is room: this task alone fills the queue.
         let _ = self.queue.push(block);
+        self.pushed().await;
+    }
+
+    async fn room(&self) {
+        wait(Event::BlockDone, || (self.queue.free() > 0).then_some(())).await;
+    }
+
+    /// Tells the others, and lets them run.
+    async fn pushed(&self) {
         exec::pend();
-        links.queue_count.add();
-        links.reporter_wake.signal(());
+        self.links.queue_count.add();
+        self.links.reporter_wake.signal();
         yield_now().await;
+    }
+}
+
+impl Motors for Settings {
+    fn motor_axis(&self, motor: usize) -> u8 {
+        moved_by(self, motor)
+    }
+    fn ratio(&self, motor: usize) -> StepRatio {
+        self.step_ratio(motor)
     }
 }
 
@@ -147,17 +212,5 @@ impl Machine for Settings {
     }
     fn junction_acceleration(&self) -> f32 {
         Settings::junction_acceleration(self)
-    }
-    fn motor_axis(&self, motor: usize) -> u8 {
-        moved_by(self, motor)
-    }
-    fn steps(&self, motor: usize, position: Length) -> i32 {
-        self.step_ratio(motor).steps(position)
-    }
-    fn max_step_rate(&self) -> f32 {
-        STEP_RATE_MAX
-    }
-    fn min_block_time(&self) -> f32 {
-        BLOCK_S_MIN
     }
 }

@@ -36,14 +36,14 @@ pub async fn run(links: &'static Links) -> ! {
         let timeout = links.settings.borrow().motor_timeout_centis().saturating_mul(10);
         let (now, running) = (millis(), snapshot().running);
         if change(|motors| motors.pass(now, running, timeout)) {
-            links.reporter_wake.signal(());
+            links.reporter_wake.signal();
         }
         Timer::after_ticks(LOOK_MS).await;
     }
 }
 
 /// Before a segment of a block with these `steps` is queued: its motors get power. Exec only.
-pub fn segment(segment: &Segment, steps: &[i32; MOTORS]) {
+pub fn segment(segment: &Segment, steps: &[i16; MOTORS]) {
     // In a dwell none moves. Otherwise increments tell nothing: a motor may have a rest of the block
     // before.
     let dwell = segment.increment == [0; MOTORS];

@@ -1,64 +1,131 @@
 //! The reader task: bytes from the receive ring into the line pool.
 //!
 //! Reads the receive ring, writes the line pool, waits on [`Event::Received`] or for pool space; never
-//! runs longer than the ring is full (255 bytes, about 15,000 cycles). When the pool is full the bytes
-//! stay in the ring, and when that is full too the line is damaged and refused: see `lines`.
+//! runs longer than the ring is full (255 bytes, about 6,000 cycles). When the pool is full the bytes
+//! stay in the ring, and when that is full too bytes are lost: the line that is damaged thereby is
+//! refused, and so is each line that is lost whole.
 
 use embassy_futures::yield_now;
 
+use super::lines::LinePool;
 use super::links::Links;
-use crate::hal::event::{Event, wait};
-use crate::hal::imp::uart::losing;
-use crate::hal::serial::{LOSS, LOSS_AT_END, Received};
+use crate::hal::event::{Event, next};
+use crate::hal::imp::uart::lost_ends;
+use crate::hal::serial::{BEHIND_END, CLEAN, MARKS, RETURNED, Received};
 use crate::protocol::Mode;
 use crate::status::Status;
 
-/// Bytes taken before others get a turn.
-const TURN: usize = 64;
+/// Pieces taken before others get a turn: a piece is a line, or a part of one, and its end.
+const TURN: usize = 16;
+
+/// What a turn came to.
+#[derive(PartialEq, Eq)]
+enum Left {
+    Nothing,
+    Bytes,
+    /// Bytes, and no room in the pool.
+    Full,
+}
 
 /// The task.
-pub async fn run(links: &'static Links, mut received: Received) -> ! {
-    let mut told = false;
+pub async fn run(links: &'static Links, received: Received) -> ! {
+    let mut intake = Intake { received, seen: lost_ends(), refused: 0, then: 0 };
     loop {
-        wait(Event::Received, || (!received.is_empty()).then_some(())).await;
-        if !take_some(links, &mut received, &mut told) {
-            links.pool_space.wait().await;
+        match intake.turn(links) {
+            Left::Nothing => next(Event::Received).await,
+            Left::Bytes => yield_now().await,
+            Left::Full => links.pool_space.wait().await,
         }
-        yield_now().await;
     }
 }
 
-/// Takes up to a turn's bytes. False when the pool has no room for more.
-fn take_some(links: &Links, received: &mut Received, told: &mut bool) -> bool {
-    let mut pool = links.lines.borrow_mut();
-    pool.keep_empty(links.mode.get() == Mode::Text);
-    if losing() {
-        report_loss(links, told);
-    }
-    for _ in 0..TURN {
-        if !pool.ready() {
-            return false;
+struct Intake {
+    received: Received,
+    /// Lost line ends that have been seen to, of `lost_ends`.
+    seen: u16,
+    /// Lines that are still to be refused.
+    refused: u16,
+    /// The mark that told of them.
+    then: u8,
+}
+
+impl Intake {
+    /// Takes a turn's bytes.
+    #[inline(never)]
+    fn turn(&mut self, links: &Links) -> Left {
+        let mut pool = links.lines.borrow_mut();
+        let pool = &mut *pool;
+        pool.keep_empty(links.mode.get() == Mode::Text);
+        for _ in 0..TURN {
+            if self.refused > 0 && !self.refuse(pool, links) {
+                return Left::Full;
+            }
+            if self.received.is_empty() {
+                return Left::Nothing;
+            }
+            let text = pool.put_text(self.received.waiting());
+            self.received.release_many(text);
+            if !pool.ready() {
+                return Left::Full;
+            }
+            let Some(byte) = self.received.pop() else {
+                return Left::Nothing;
+            };
+            let is_line = match byte {
+                ..MARKS => self.loss(pool, byte, links),
+                _ => pool.put(byte),
+            };
+            if is_line {
+                links.parser_wake.signal();
+            }
         }
-        let Some(byte) = received.pop() else {
-            break;
-        };
-        let damaged = byte == LOSS || byte == LOSS_AT_END;
-        if damaged {
+        Left::Bytes
+    }
+
+    /// Bytes were lost here. Returns whether the mark stands for the end of a whole line.
+    #[cold]
+    #[inline(never)]
+    fn loss(&mut self, pool: &mut LinePool, mark: u8, links: &Links) -> bool {
+        let ends = lost_ends();
+        self.refused = ends.wrapping_sub(core::mem::replace(&mut self.seen, ends));
+        self.then = mark;
+        let is_line = mark & BEHIND_END != 0 && pool.end(mark & RETURNED != 0);
+        if mark & BEHIND_END == 0 {
             pool.spoil(Status::BufferFull);
-            report_loss(links, told);
-            *told = false;
         }
-        if byte != LOSS && pool.put(if damaged { b'\n' } else { byte }) {
-            links.parser_wake.signal(());
+        if self.refused == 0 {
+            self.after(pool);
         }
+        if self.refused > 0 || mark & CLEAN == 0 {
+            links.exception.set(Some(Status::BufferFull));
+            links.reporter_wake.signal();
+        }
+        is_line
     }
-    true
-}
 
-/// Tells the sender that bytes are being lost, unless it has been `told` of this stretch of them.
-fn report_loss(links: &Links, told: &mut bool) {
-    if !core::mem::replace(told, true) {
-        links.exception.set(Some(Status::BufferFull));
-        links.reporter_wake.signal(());
+    /// Enters the lines that were lost. False if there is no room for all of them.
+    #[cold]
+    #[inline(never)]
+    fn refuse(&mut self, pool: &mut LinePool, links: &Links) -> bool {
+        while self.refused > 0 && pool.ready() {
+            pool.spoil(Status::BufferFull);
+            pool.end(false);
+            links.parser_wake.signal();
+            self.refused -= 1;
+            if self.refused == 0 {
+                self.after(pool);
+            }
+        }
+        self.refused == 0
+    }
+
+    /// What follows is a line of its own, or the rest of one that is damaged.
+    fn after(&mut self, pool: &mut LinePool) {
+        if self.then & CLEAN == 0 {
+            pool.spoil(Status::BufferFull);
+        } else {
+            pool.forget();
+            pool.follow(self.then & RETURNED != 0);
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! The reporter task: the greeting, then status and queue reports.
 //!
 //! Reads everything through [`View`], writes to the sender; waits for something to report, and polls
-//! every [`POLL_MS`] while the machine is busy. A change of `stat` is told at once, anything else every
+//! every [`POLL_MS`] while the machine is busy; it is not woken besides then, unless queue reports are
+//! wanted. A change of `stat` is told at once, anything else every
 //! `si` milliseconds. While the sender is slow it waits, and then reports what is so by then: it never
 //! holds up anything else.
 
@@ -37,7 +38,7 @@ pub async fn run(links: &'static Links) -> ! {
         if let Some(status) = links.exception.take() {
             report_exception(links, status).await;
         }
-        if queue::free() != told.blocks_free {
+        if queue::free() != told.blocks_free && reports_queue(links) {
             told.blocks_free = report_queue(links).await;
         }
         let elapsed = millis().wrapping_sub(told.at);
@@ -49,6 +50,7 @@ pub async fn run(links: &'static Links) -> ! {
             due = false;
             report_status(links).await;
         }
+        links.reporter_wake.set_polling(state == RUN && !reports_queue(links));
         if due || state == RUN {
             let pause = Timer::after_ticks(POLL_MS);
             select(pause, links.reporter_wake.wait()).await;
@@ -57,6 +59,11 @@ pub async fn run(links: &'static Links) -> ! {
             due = true;
         }
     }
+}
+
+/// Whether the sender wants to know of each block that comes or goes.
+fn reports_queue(links: &Links) -> bool {
+    links.settings.borrow().queue_verbosity() != 0
 }
 
 /// Sends something that is put in steps: `step` says whether there is more.

@@ -3,32 +3,54 @@
 //! Owned by whoever holds `Links::tx`, for as long as one line takes, so lines never mix. Call
 //! [`Tx::room`] before each piece of at most [`PIECE`] bytes; it waits until the transmit ring has room.
 
+use embassy_time::Timer;
+
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::uart;
-use crate::hal::serial::Outgoing;
+use crate::hal::serial::{Outgoing, RING};
 
 /// Most bytes written between two calls of [`Tx::room`].
 pub const PIECE: usize = 64;
+/// The bits of two bytes, times the milliseconds in a second.
+const TWO_BYTES_MS: u32 = 20 * 1_000;
 
 /// The transmit ring's filling end.
 pub struct Tx {
     ring: Outgoing,
+    /// Bits a second.
+    rate: u32,
 }
 
 impl Tx {
-    /// Takes over the ring.
-    pub fn new(ring: Outgoing) -> Self {
-        Self { ring }
+    /// Takes over the ring of a line that runs at `rate` bits a second.
+    pub fn new(ring: Outgoing, rate: u32) -> Self {
+        Self { ring, rate }
     }
 
     /// Waits until a piece fits.
     pub async fn room(&mut self) {
-        wait(Event::Transmitted, || (self.ring.free() >= PIECE).then_some(())).await;
+        wait(Event::Transmitted, || self.has_room().then_some(())).await;
+    }
+
+    /// Whether a piece fits now.
+    pub fn has_room(&self) -> bool {
+        self.ring.free() >= PIECE
     }
 
     /// Sends what has been put.
     pub fn flush(&mut self) {
         uart::kick();
+    }
+
+    /// Goes on at `rate` bits a second, when what has been put has left at the old rate: 1 to 4 ms after
+    /// its last byte. What the sender says meanwhile may be spoilt.
+    pub async fn set_rate(&mut self, rate: u32) {
+        wait(Event::Transmitted, || (self.ring.free() == RING - 1).then_some(())).await;
+        // The transmitter holds two bytes more. It has a flag for their end, but the flag may be left
+        // from a pause in the middle of the line; their time is certain.
+        Timer::after_ticks(u64::from(TWO_BYTES_MS / self.rate) + 2).await;
+        uart::set_rate(rate);
+        self.rate = rate;
     }
 }
 
@@ -36,5 +58,9 @@ impl crate::protocol::Out for Tx {
     fn put(&mut self, byte: u8) {
         // Room was made by `room`; a byte beyond it is a defect that tests of `protocol` exclude.
         let _ = self.ring.push(byte);
+    }
+
+    fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
+        self.ring.push_all(bytes);
     }
 }

@@ -8,6 +8,7 @@ use core::cell::{OnceCell, RefMut};
 use super::axes::moved_by;
 use super::links::{Links, snapshot};
 use super::power;
+use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::hal::imp::{gpio, stepper};
@@ -109,9 +110,13 @@ impl Machine for View<'_> {
             }
             self.links.resync.set(true);
         }
+        if setting.is_baud() {
+            self.links.rate.set(baud::rate(value));
+        }
         self.settings.store(setting, value);
-        set_outputs(&self.settings);
         let lowered = self.settings.limit_velocity(setting, STEP_RATE_MAX as u32);
+        self.links.settings_changed.set(true);
+        set_outputs(&self.settings);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 

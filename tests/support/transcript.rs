@@ -8,6 +8,7 @@
 //! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this
 //! <~ {"qr":*}                 from here on such lines may come, any number of them; * is anything
 //! @ +50ms                     time passes
+//! baud 500000                 from here on the sender speaks and hears at this rate
 //! steps X=12800 Y=0           the motors come to rest there; those not named are at 0
 //! ```
 //!
@@ -31,6 +32,8 @@ const LAST_MS: u64 = 100;
 pub trait Side {
     /// Puts bytes on the line.
     fn send(&mut self, bytes: &[u8]);
+    /// The sender's end changes its rate.
+    fn set_baud(&mut self, baud: u32);
     /// Lets time pass.
     fn run_ms(&mut self, ms: u64);
     /// The bytes heard since the last call.
@@ -46,6 +49,7 @@ enum Event {
     Hear(String),
     Allow(String),
     Pass(u64),
+    Baud(u32),
     Steps([i64; 4]),
 }
 
@@ -104,6 +108,7 @@ fn parse(line: &str) -> Option<Event> {
         "<-" => Some(Event::Hear(rest.to_string())),
         "<~" => Some(Event::Allow(rest.to_string())),
         "@" => rest.strip_prefix('+')?.strip_suffix("ms")?.parse().ok().map(Event::Pass),
+        "baud" => rest.parse().ok().map(Event::Baud),
         "steps" => steps(rest).map(Event::Steps),
         _ => None,
     }
@@ -170,6 +175,7 @@ impl<S: Side> Player<'_, S> {
             Event::Hear(line) => return self.hear(line),
             Event::Allow(pattern) => self.allowed.push(pattern.clone()),
             Event::Pass(ms) => self.side.run_ms(*ms),
+            Event::Baud(baud) => self.side.set_baud(*baud),
             Event::Steps(steps) => return self.rest_at(steps),
         }
         Ok(())

@@ -44,6 +44,8 @@ enum Command {
     Size(size::SizeArgs),
     /// Run a job on the simulated board
     Sim(sim::RunArgs),
+    /// Measure what the firmware achieves, beside other firmwares' figures
+    Bench(sim::BenchArgs),
     /// Offer the simulated board as a serial port
     Serve(sim::ServeArgs),
     /// Run every check: format, lints, host tests, firmware, sizes, simulator
@@ -77,6 +79,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Build(arg) => build(arg.board)?,
         Command::Size(args) => size::run(&args)?,
         Command::Sim(args) => return sim::run(&args),
+        Command::Bench(args) => return sim::bench(&args),
         Command::Serve(args) => return sim::serve(&args),
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,

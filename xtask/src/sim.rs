@@ -23,7 +23,7 @@ pub struct RunArgs {
     /// A setting sent before the job, as the sender would: '{"xvm":800}'
     #[arg(long, value_name = "JSON")]
     set: Vec<String>,
-    /// The speed of the serial line
+    /// The speed of the serial line, which the firmware is told to change to
     #[arg(long)]
     baud: Option<u32>,
     /// Write what happened to this file
@@ -32,6 +32,15 @@ pub struct RunArgs {
     /// Write the pins' waveforms to this file
     #[arg(long, value_name = "FILE.vcd")]
     vcd: Option<PathBuf>,
+    /// Draw path, velocity, acceleration and jerk, as the steps made them, into this file
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// The seconds that the curves of the plot show
+    #[arg(long, value_name = "FROM..TO", requires = "plot")]
+    span: Option<String>,
+    /// The milliseconds over which the plot is smoothed
+    #[arg(long, value_name = "MS", requires = "plot")]
+    smooth: Option<u32>,
 }
 
 /// `cargo xtask serve`
@@ -48,6 +57,14 @@ pub struct ServeArgs {
     link: Option<PathBuf>,
 }
 
+/// `cargo xtask bench`
+#[derive(Args)]
+pub struct BenchArgs {
+    /// Measure this row only; may be given more than once
+    #[arg(long, value_name = "NAME")]
+    row: Vec<String>,
+}
+
 /// Builds and runs a job; the simulator's exit code is ours.
 pub fn run(args: &RunArgs) -> Result<ExitCode> {
     ensure!(args.job.is_file(), "there is no job {}", args.job.display());
@@ -59,6 +76,12 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
 pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
     let elf = prepare(args.board)?;
     pass_through(&mut serve_command(args, &elf))
+}
+
+/// Builds and measures, on the board that others were measured on.
+pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
+    let elf = prepare(Board::default())?;
+    pass_through(&mut bench_command(args, &elf))
 }
 
 fn prepare(board: Board) -> Result<PathBuf> {
@@ -79,6 +102,9 @@ fn run_command(args: &RunArgs, elf: &Path) -> Command {
     option(&mut command, "--baud", args.baud.map(|baud| baud.to_string()));
     option(&mut command, "--report", args.report.as_ref());
     option(&mut command, "--vcd", args.vcd.as_ref());
+    option(&mut command, "--plot", args.plot.as_ref());
+    option(&mut command, "--span", args.span.as_ref());
+    option(&mut command, "--smooth", args.smooth.map(|ms| ms.to_string()));
     command
 }
 
@@ -86,6 +112,14 @@ fn serve_command(args: &ServeArgs, elf: &Path) -> Command {
     let mut command = simulator("serve", elf, args.board);
     option(&mut command, "--speed", args.speed.as_ref());
     option(&mut command, "--link", args.link.as_ref());
+    command
+}
+
+fn bench_command(args: &BenchArgs, elf: &Path) -> Command {
+    let mut command = simulator("bench", elf, Board::default());
+    for row in &args.row {
+        command.args(["--row", row]);
+    }
     command
 }
 
@@ -121,12 +155,23 @@ mod tests {
             baud: Some(250_000),
             report: Some("r.json".into()),
             vcd: Some("v.vcd".into()),
+            plot: Some("p.svg".into()),
+            span: Some("1..2".into()),
+            smooth: Some(30),
         };
         assert_eq!(
             after_dashes(&run_command(&args, Path::new("k.elf"))),
             "run --elf k.elf --board ramps14 a.gcode --set {\"xvm\":800} --set {\"yvm\":800} \
-             --baud 250000 --report r.json --vcd v.vcd"
+             --baud 250000 --report r.json --vcd v.vcd --plot p.svg --span 1..2 --smooth 30"
         );
+    }
+
+    #[test]
+    fn rows_reach_the_simulator() {
+        let args = BenchArgs { row: vec!["rate-1".into(), "lines".into()] };
+        let command = bench_command(&args, Path::new("k.elf"));
+        let want = "bench --elf k.elf --board mega2560-grbl --row rate-1 --row lines";
+        assert_eq!(after_dashes(&command), want);
     }
 
     #[test]

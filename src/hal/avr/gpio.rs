@@ -23,6 +23,14 @@ pub fn low(pin: Pin) {
     unsafe { port.write_volatile(port.read_volatile() & !(1 << pin.bit)) };
 }
 
+/// Turns a pin round. One store on any port, which disturbs no other pin.
+#[inline(always)]
+pub fn toggle(pin: Pin) {
+    let input = (pin.port.address() - 2) as *mut u8;
+    // SAFETY: a one written to an input register toggles the output of that bit alone.
+    unsafe { input.write_volatile(1 << pin.bit) };
+}
+
 fn output(pin: Pin) {
     let direction = (pin.port.address() - 1) as *mut u8;
     // SAFETY: the data direction register lies one below the port register; start-up only.

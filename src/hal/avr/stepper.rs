@@ -1,17 +1,17 @@
-//! The step timer and the step interrupt.
+//! The step timer and what the step interrupt works on.
 //!
 //! Timer 1 counts CPU cycles up to the segment's tick period (CTC), so ticks are exact to the cycle
 //! whatever the interrupt takes. The interrupt (`step_isr`) is level 0: it runs with interrupts off and
-//! owns the step generator and the pins.
+//! owns the step generator and the pins. Everything else here is for thread mode and exec.
 
 use core::cell::UnsafeCell;
 
 use super::exec;
 use super::gpio::{self, each_motor};
-use crate::boards::{ACTIVE, Timer};
+use crate::boards::{ACTIVE, MOTORS, Timer};
 use crate::hal::byte::SharedByte;
-use crate::hal::ring::{Consumer, Producer, Ring};
-use crate::motion::dda::{Dda, Pins, SEGMENTS, Segment};
+use crate::hal::ring::{Producer, Ring};
+use crate::motion::dda::{Dda, SEGMENTS, Segment};
 
 const _: () = assert!(matches!(ACTIVE.step_timer, Timer::T1), "the step timer is timer 1");
 
@@ -23,14 +23,27 @@ const TIMSK1: *mut u8 = 0x6F as *mut u8;
 /// CTC with OCR1A as top, clock not divided.
 const RUN: u8 = 1 << 3 | 1;
 /// The same, stopped.
-const HALT: u8 = 1 << 3;
+pub(super) const HALT: u8 = 1 << 3;
 const OCF1A: u8 = 1 << 1;
 
 /// Cycles from starting the timer to the first tick.
 const FIRST_TICK: u16 = 400;
 
-static RING: Ring<Segment, SEGMENTS> = Ring::new();
-static RUNNING: SharedByte = SharedByte::new(0);
+pub(super) static SEGMENT_RING: Ring<Segment, SEGMENTS> = Ring::new();
+pub(super) static RUNNING: SharedByte = SharedByte::new(0);
+
+/// Turns of a loop of 3 cycles that widen a pulse, at least 1: in lockstep, and else.
+pub(super) static LOCKSTEP_WIDTH: SharedByte = SharedByte::new(width_turns(2, 23));
+/// See [`LOCKSTEP_WIDTH`].
+pub(super) static WIDTH: SharedByte = SharedByte::new(width_turns(2, 55));
+
+/// The turns for pulses of `us` microseconds that last `cycles` without any.
+const fn width_turns(us: u8, cycles: u16) -> u8 {
+    let wanted = us as u16 * (ACTIVE.clock_hz / 1_000_000) as u16;
+    let turns = wanted.saturating_sub(cycles).div_ceil(3);
+    if turns == 0 { 1 } else { turns as u8 }
+}
+
 /// Bit m: motor m's direction pin is inverted.
 static INVERTED: SharedByte = SharedByte::new(0);
 /// Bit m: motor m's step pin rests high.
@@ -38,27 +51,21 @@ static STEP_INVERTED: SharedByte = SharedByte::new(0);
 /// How wide a step pulse is, microseconds.
 static PULSE_US: SharedByte = SharedByte::new(2);
 
-/// What the step interrupt owns. The generator comes first: the assembly counts on it.
-#[repr(C)]
-pub(super) struct Level0 {
-    dda: Dda,
-    segments: Option<Consumer<Segment, SEGMENTS>>,
-}
-
+/// What the step interrupt owns.
 #[repr(transparent)]
-pub(super) struct Owned(UnsafeCell<Level0>);
+pub(super) struct Owned(UnsafeCell<Dda>);
 
-// SAFETY: touched by the step interrupt only, after `start`, which runs before interrupts are on.
+// SAFETY: touched by the step interrupt only.
 unsafe impl Sync for Owned {}
 
-pub(super) static STATE: Owned = Owned(UnsafeCell::new(Level0 { dda: Dda::new(), segments: None }));
+pub(super) static STATE: Owned = Owned(UnsafeCell::new(Dda::new()));
 
 /// Sets the timer up. Before interrupts are on; `None` after the first time.
 pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
-    let (producer, consumer) = RING.split()?;
+    // The interrupt is the consumer.
+    let (producer, _) = SEGMENT_RING.split()?;
     // SAFETY: interrupts are off, nobody else looks.
     unsafe {
-        (*STATE.0.get()).segments = Some(consumer);
         TCCR1B.write_volatile(HALT);
         TIMSK1.write_volatile(1 << 1);
     }
@@ -66,6 +73,9 @@ pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
 }
 
 /// Starts the ticks if they have stopped. For exec, after it has queued a segment.
+///
+/// A function of its own in the image: the bench counts segments by it.
+#[inline(never)]
 pub fn go() {
     if RUNNING.get() != 0 {
         return;
@@ -85,9 +95,15 @@ pub fn running() -> bool {
     RUNNING.get() != 0
 }
 
-/// Which direction pins are inverted: bit m for motor m. Takes effect with the next segment.
+/// Which direction pins are inverted: bit m for motor m. For thread mode, while nothing runs.
 pub fn set_inverted(motors: u8) {
+    let changed = motors ^ INVERTED.get();
     INVERTED.set(motors);
+    for m in 0..MOTORS {
+        if changed & (1 << m) != 0 {
+            gpio::toggle(ACTIVE.motors[m].dir);
+        }
+    }
 }
 
 /// How wide a step pulse is, in microseconds, and which step pins rest high (bit m for motor m). The
@@ -116,58 +132,4 @@ fn rest(inverted: u8) {
 pub fn kill() {
     // SAFETY: a single store; the machine stops for good.
     unsafe { TCCR1B.write_volatile(HALT) };
-}
-
-/// Loads the next segment for the interrupt. Called by it alone, at level 0. Whether there was one.
-pub(super) extern "C" fn load() -> bool {
-    // SAFETY: the interrupt owns it, and does not nest.
-    let state = unsafe { &mut *STATE.0.get() };
-    match &mut state.segments {
-        Some(segments) => state.dda.load(&mut BoardPins, segments),
-        None => false,
-    }
-}
-
-/// No segment is left: no more ticks. Called by the interrupt alone, at level 0.
-pub(super) extern "C" fn halt() {
-    BoardPins.stop();
-}
-
-struct BoardPins;
-
-impl Pins for BoardPins {
-    // The assembly does these two itself.
-    fn rise(&mut self, _motors: u8) {}
-    fn fall(&mut self, _motors: u8) {}
-
-    #[inline(always)]
-    fn direction(&mut self, backwards: u8) {
-        let level = backwards ^ INVERTED.get();
-        each_motor!(M => if level & (1 << M) != 0 {
-            gpio::high(ACTIVE.motors[M].dir);
-        } else {
-            gpio::low(ACTIVE.motors[M].dir);
-        });
-    }
-
-    #[inline(always)]
-    fn period(&mut self, cycles: u16) {
-        // Comes first when a segment is loaded, 190 cycles behind the tick and 250 at the latest: the
-        // counter has not reached the shortest top there is.
-        // SAFETY: the step timer's register, at level 0.
-        unsafe { OCR1A.write_volatile(cycles - 1) };
-    }
-
-    #[inline(always)]
-    fn slot_free(&mut self) {
-        exec::pend();
-    }
-
-    #[inline(always)]
-    fn stop(&mut self) {
-        // SAFETY: the step timer's register, at level 0.
-        unsafe { TCCR1B.write_volatile(HALT) };
-        RUNNING.set(0);
-        exec::pend();
-    }
 }

@@ -5,7 +5,7 @@
 //! millisecond.
 
 use core::arch::asm;
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use core::task::Waker;
 
 use embassy_time_driver::{Driver, time_driver_impl};
@@ -19,7 +19,10 @@ const _: () = assert!(matches!(ACTIVE.tick_timer, Timer::T0), "the tick is on ti
 /// Milliseconds since reset. The interrupt alone writes it.
 static mut MILLIS: u32 = 0;
 
-/// TIMER0_COMPA: counts. Interrupts are off for 25 cycles, rarely 40.
+/// TIMER0_COMPA: counts. Interrupts are off for 20 cycles.
+///
+/// They are on again while it carries into the upper bytes, every 256 ms. Exec, which may come then and
+/// stay for some of these, does not ask for the time.
 #[unsafe(no_mangle)]
 extern "C" fn __vector_21() -> ! {
     // SAFETY: every register it changes is restored, and it returns by `reti`. Only it writes `MILLIS`.
@@ -31,6 +34,7 @@ extern "C" fn __vector_21() -> ! {
             "lds  r24, {millis}",
             "inc  r24",
             "sts  {millis}, r24",
+            "sei",
             "brne 1f",
             "lds  r24, {millis} + 1",
             "inc  r24",
@@ -64,12 +68,17 @@ pub fn millis() -> u32 {
 
 struct Millis {
     queue: RefCell<Queue>,
+    /// When the first timer expires, or earlier; far off if there is none.
+    next: Cell<u32>,
 }
 
 // SAFETY: the queue is touched in thread mode only.
 unsafe impl Sync for Millis {}
 
-time_driver_impl!(static DRIVER: Millis = Millis { queue: RefCell::new(Queue::new()) });
+time_driver_impl!(static DRIVER: Millis = Millis {
+    queue: RefCell::new(Queue::new()),
+    next: Cell::new(u32::MAX),
+});
 
 impl Driver for Millis {
     fn now(&self) -> u64 {
@@ -80,14 +89,21 @@ impl Driver for Millis {
     fn schedule_wake(&self, at: u64, waker: &Waker) {
         if let Ok(mut queue) = self.queue.try_borrow_mut() {
             queue.schedule_wake(at, waker);
+            let at = u32::try_from(at).unwrap_or(u32::MAX);
+            self.next.set(self.next.get().min(at));
         }
     }
 }
 
 /// Wakes the tasks whose time has come. Thread mode, after a tick.
 pub fn wake_expired() {
+    let now = millis();
+    if now < DRIVER.next.get() {
+        return;
+    }
     if let Ok(mut queue) = DRIVER.queue.try_borrow_mut() {
-        queue.next_expiration(DRIVER.now());
+        let next = queue.next_expiration(now.into());
+        DRIVER.next.set(u32::try_from(next).unwrap_or(u32::MAX));
     }
 }
 

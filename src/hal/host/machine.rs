@@ -25,6 +25,11 @@ impl Machine {
         Some(machine)
     }
 
+    /// The sender goes on at `baud`.
+    pub fn set_baud(&self, baud: u32) {
+        uart::set_sender_rate(baud);
+    }
+
     /// The sender puts bytes on the line; they take their time.
     pub fn send(&self, bytes: &[u8]) {
         uart::send(bytes);

@@ -7,13 +7,9 @@ use std::vec::Vec;
 use super::{NEVER, flags, now};
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
-use crate::hal::ring::{Consumer, Producer, Ring};
-use crate::hal::serial::{LOSS, LOSS_AT_END, Outgoing, RING, Received};
+use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
+use crate::hal::serial::{BATCH, MARKS, Outgoing, RING, Received, lose, mark};
 use crate::realtime;
-
-fn loss_mark(byte: u8) -> u8 {
-    if byte == b'\n' || byte == b'\r' { LOSS_AT_END } else { LOSS }
-}
 
 #[derive(Default)]
 struct Line {
@@ -25,13 +21,17 @@ struct Line {
     sent: Vec<u8>,
     /// The byte that is leaving.
     leaving: Option<u8>,
-    lost: bool,
+    lost_ends: u16,
+    /// Bytes queued, modulo 256.
+    queued: u8,
     realtime: u8,
 }
 
 struct Uart {
     line: RefCell<Line>,
+    /// A byte's time at this end of the line and at the sender's.
     byte_cycles: Cell<u64>,
+    sender_cycles: Cell<u64>,
     next_rx: Cell<u64>,
     next_tx: Cell<u64>,
 }
@@ -42,20 +42,42 @@ machine_static! {
     fn uart() -> Uart = Uart {
         line: RefCell::new(Line::default()),
         byte_cycles: Cell::new(1),
+        sender_cycles: Cell::new(1),
         next_rx: Cell::new(NEVER),
         next_tx: Cell::new(NEVER),
     };
 }
 
-/// Starts the line at `baud`; `None` after the first time.
-pub fn start(baud: u32) -> Option<(Received, Outgoing)> {
+/// Starts the line at `rate` bits a second, the sender's end too; `None` after the first time.
+pub fn start(rate: u32) -> Option<(Received, Outgoing)> {
     let (rx_in, rx_out) = rx().split()?;
     let (tx_in, tx_out) = tx().split()?;
     let mut line = uart().line.borrow_mut();
     line.rx_in = Some(rx_in);
     line.tx_out = Some(tx_out);
-    uart().byte_cycles.set(u64::from(ACTIVE.clock_hz * 10 / baud));
+    set_rate(rate);
+    set_sender_rate(rate);
     Some((rx_out, tx_in))
+}
+
+/// Goes on at `rate` bits a second.
+pub fn set_rate(rate: u32) {
+    uart().byte_cycles.set(byte_cycles(rate));
+}
+
+/// The sender goes on at `rate` bits a second.
+pub(super) fn set_sender_rate(rate: u32) {
+    uart().sender_cycles.set(byte_cycles(rate));
+}
+
+fn byte_cycles(rate: u32) -> u64 {
+    u64::from(ACTIVE.clock_hz) * 10 / u64::from(rate)
+}
+
+/// Whether the two ends differ too much to understand each other: by more than 4.5 %.
+fn garbles() -> bool {
+    let (own, sender) = (uart().byte_cycles.get(), uart().sender_cycles.get());
+    own.abs_diff(sender) * 1_000 > sender * 45
 }
 
 /// Sends what the ring holds.
@@ -65,9 +87,9 @@ pub fn kick() {
     }
 }
 
-/// Whether bytes have been lost since the last one queued: a mark is still to come.
-pub fn losing() -> bool {
-    uart().line.borrow().lost
+/// Line ends lost since start-up, modulo 2^16.
+pub fn lost_ends() -> u16 {
+    uart().line.borrow().lost_ends
 }
 
 /// The real-time characters since the last call, as bits (see [`realtime`]).
@@ -79,7 +101,7 @@ pub fn take_realtime() -> u8 {
 pub(super) fn send(bytes: &[u8]) {
     uart().line.borrow_mut().arriving.extend(bytes);
     if uart().next_rx.get() == NEVER {
-        uart().next_rx.set(now() + uart().byte_cycles.get());
+        uart().next_rx.set(now() + uart().sender_cycles.get());
     }
 }
 
@@ -102,11 +124,11 @@ pub(super) fn advance() {
             arrive(&mut line, byte);
         }
         let more = !line.arriving.is_empty();
-        u.next_rx.set(if more { now() + u.byte_cycles.get() } else { NEVER });
+        u.next_rx.set(if more { now() + u.sender_cycles.get() } else { NEVER });
     }
     if u.next_tx.get() <= now() {
         if let Some(byte) = line.leaving.take() {
-            line.sent.push(byte);
+            line.sent.push(if garbles() { !byte } else { byte });
         }
         flags::set(Event::Transmitted);
         load_tx(&mut line);
@@ -126,7 +148,28 @@ fn arrive(line: &mut Line, byte: u8) {
         flags::set(Event::Realtime);
         return;
     }
-    let byte = if line.lost { loss_mark(byte) } else { byte };
-    line.lost = line.rx_in.as_mut().is_some_and(|ring| ring.push(byte).is_err());
-    flags::set(Event::Received);
+    let Some(ring) = line.rx_in.as_mut() else { return };
+    let full = ring.free() == 0;
+    if (byte < MARKS || garbles()) && !full {
+        line.lost_ends = line.lost_ends.wrapping_add(queue_mark(ring, 0, byte));
+    } else if full {
+        let newest = mark(ring.pushed(0).copied().unwrap_or(0));
+        line.lost_ends = line.lost_ends.wrapping_add(queue_mark(ring, newest, byte));
+    } else {
+        let _ = ring.push(byte);
+    }
+    line.queued = line.queued.wrapping_add(1);
+    if full || byte < b' ' || line.queued.is_multiple_of(BATCH) {
+        flags::set(Event::Received);
+    }
+}
+
+/// Puts a mark where there is room, else over the newest byte. Returns the line ends that it counts.
+fn queue_mark(ring: &mut Producer<u8, RING>, begun: u8, byte: u8) -> u16 {
+    let (mark, is_end) = lose(begun, byte);
+    if ring.push(mark).is_err() {
+        // The reader is not running: everything here is one thread.
+        ring.amend(&Ceiling(()), 0, |newest| *newest = mark);
+    }
+    is_end.into()
 }

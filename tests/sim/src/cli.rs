@@ -1,10 +1,12 @@
 //! The command line.
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::builder::RangedI64ValueParser;
 use clap::{Args, Parser, Subcommand, value_parser};
+use kerf_sim::plot::WINDOW_MS;
 
 /// Runs the Kerf firmware on a simulated board.
 #[derive(Parser, Debug)]
@@ -22,6 +24,8 @@ pub enum Command {
     Run(RunArgs),
     /// Put the machine behind a pseudo-terminal, for a sender to connect to.
     Serve(ServeArgs),
+    /// Measure what the firmware achieves and print it beside other firmwares' figures.
+    Bench(BenchArgs),
 }
 
 /// The firmware and the board under it.
@@ -47,9 +51,9 @@ pub struct RunArgs {
     /// A line to send before the job, such as '{xvm:20000}'; may be given more than once.
     #[arg(long = "set", value_name = "LINE")]
     pub settings: Vec<String>,
-    /// Speed of the serial line.
-    #[arg(long, default_value_t = 115_200, value_parser = baud())]
-    pub baud: u32,
+    /// Speed of the serial line during the job; the firmware is told to change to it.
+    #[arg(long, value_name = "N", value_parser = baud())]
+    pub baud: Option<u32>,
     /// Lines in flight.
     #[arg(long, value_name = "N", default_value_t = kerf_sim::LINES_IN_FLIGHT)]
     pub in_flight: usize,
@@ -59,6 +63,15 @@ pub struct RunArgs {
     /// Write step and direction signals for GTKWave.
     #[arg(long, value_name = "FILE")]
     pub vcd: Option<PathBuf>,
+    /// Draw path, velocity, acceleration and jerk, as the steps made them.
+    #[arg(long, value_name = "FILE")]
+    pub plot: Option<PathBuf>,
+    /// Seconds that the curves of the plot show, such as 10..14.
+    #[arg(long, value_name = "FROM..TO", requires = "plot", value_parser = span)]
+    pub span: Option<Range<f64>>,
+    /// Milliseconds over which the plot is smoothed.
+    #[arg(long, value_name = "MS", default_value_t = WINDOW_MS, requires = "plot")]
+    pub smooth: u32,
     /// Print the result only.
     #[arg(long)]
     pub quiet: bool,
@@ -76,9 +89,20 @@ pub struct ServeArgs {
     /// Make a symbolic link to the pseudo-terminal.
     #[arg(long, value_name = "PATH")]
     pub link: Option<PathBuf>,
-    /// Speed of the serial line.
+    /// Speed of the serial line at power-up; it goes along when the firmware changes its own.
     #[arg(long, default_value_t = 115_200, value_parser = baud())]
     pub baud: u32,
+}
+
+/// Arguments of `bench`.
+#[derive(Args, Debug)]
+pub struct BenchArgs {
+    /// Firmware and board.
+    #[command(flatten)]
+    pub target: Target,
+    /// Measure this row only; may be given more than once.
+    #[arg(long = "row", value_name = "NAME")]
+    pub rows: Vec<String>,
 }
 
 /// The pace of `serve`.
@@ -101,6 +125,15 @@ impl FromStr for Speed {
             Ok(n) if n.is_finite() && n > 0.0 => Ok(Speed::Times(n)),
             _ => Err("a number above 0, or max".to_string()),
         }
+    }
+}
+
+/// A span of time, s.
+fn span(text: &str) -> Result<Range<f64>, String> {
+    let ends = text.split_once("..").map(|(from, to)| (from.parse(), to.parse()));
+    match ends {
+        Some((Ok(from), Ok(to))) if 0.0 <= from && from < to => Ok(from..to),
+        _ => Err("two times with .. between them, the later one last".to_string()),
     }
 }
 

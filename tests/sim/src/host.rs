@@ -11,6 +11,9 @@ use crate::protocol::{Incoming, Response, classify, control_name, is_idle, state
 /// Lines in flight unless asked otherwise.
 pub const LINES_IN_FLIGHT: usize = 4;
 
+/// From the answer to a change of speed until the firmware has changed it.
+const SPEED_CHANGE_MS: u64 = 10;
+
 /// A line that was sent.
 #[derive(Clone, Debug)]
 struct Line {
@@ -183,6 +186,17 @@ impl Host {
                 bail!("no answer to {text} within {timeout_ms} ms");
             }
         }
+    }
+
+    /// Has the firmware change to another speed and follows it.
+    pub fn change_speed(&mut self, machine: &mut Machine, baud: u32) -> Result<()> {
+        let response = self.ask(machine, &format!("{{baud:{baud}}}"), 1_000)?;
+        if response.status != 0 {
+            bail!("the firmware refuses {baud} baud with status {}", response.status);
+        }
+        self.run_for_ms(machine, SPEED_CHANGE_MS)?;
+        machine.set_baud(baud);
+        Ok(())
     }
 
     fn fill(&mut self, machine: &mut Machine) {

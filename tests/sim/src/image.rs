@@ -102,6 +102,16 @@ impl Image {
         self.variables.get(name).copied()
     }
 
+    /// Where a function begins in flash, by its full name.
+    pub fn function(&self, name: &str) -> Option<u32> {
+        self.functions.iter().find(|(_, known)| known == name).map(|(addr, _)| *addr)
+    }
+
+    /// All functions, with where they begin.
+    pub fn functions(&self) -> &[(u32, String)] {
+        &self.functions
+    }
+
     /// The function that a flash address belongs to.
     pub fn function_at(&self, pc: u32) -> String {
         let next = self.functions.partition_point(|(addr, _)| *addr <= pc);

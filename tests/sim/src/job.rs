@@ -28,6 +28,8 @@ pub type Lines = Vec<(usize, String)>;
 /// How to run a job.
 #[derive(Clone, Debug)]
 pub struct Options {
+    /// Speed of the line, settings included, that the firmware is told to change to after boot.
+    pub baud: Option<u32>,
     /// Settings to send first; each must be accepted.
     pub settings: Vec<String>,
     /// Lines in flight.
@@ -38,7 +40,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Options { settings: Vec::new(), in_flight: LINES_IN_FLIGHT, vcd: None }
+        Options { baud: None, settings: Vec::new(), in_flight: LINES_IN_FLIGHT, vcd: None }
     }
 }
 
@@ -86,6 +88,9 @@ pub fn run(
 ) -> Result<Report> {
     let mut host = Host::new(options.in_flight);
     host.boot(machine, BOOT_MS)?;
+    if let Some(baud) = options.baud {
+        host.change_speed(machine, baud)?;
+    }
     for line in &options.settings {
         let response = host.ask(machine, line, ASK_MS)?;
         if response.status != 0 {
@@ -184,6 +189,7 @@ impl Run<'_> {
                 restarts,
                 strays: self.host.strays().to_vec(),
                 seconds_to_idle: self.machine.seconds(idle_at.saturating_sub(self.began)),
+                seconds_to_answer: self.machine.seconds(self.progress_at - self.began),
                 setup: self.setup,
                 expected: self.expected,
                 fault: end.err().map(|e| format!("{e:#}")),

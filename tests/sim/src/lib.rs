@@ -8,6 +8,7 @@
 //! [`Machine`] is the chip on its board, [`Host`] a sender on its serial line, [`oracle`] an
 //! independent reading of the same G-code, and [`job`] all of them together.
 
+pub mod bench;
 mod bus;
 mod cpu;
 mod eeprom;
@@ -17,9 +18,11 @@ pub mod job;
 mod machine;
 mod meters;
 pub mod oracle;
+pub mod plot;
 pub mod protocol;
 mod recorder;
 pub mod report;
+mod stopwatch;
 mod summary;
 mod timer;
 mod trace;
@@ -32,6 +35,7 @@ pub use image::Image;
 pub use machine::{Fault, Machine};
 pub use meters::{Meters, Service, Window};
 pub use recorder::{Motor, Recorder, Step, Sums};
+pub use stopwatch::{Cost, Stopwatch};
 pub use trace::Trace;
 pub use uart::Uart;
 pub use vectors::name as vector_name;

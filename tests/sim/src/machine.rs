@@ -13,6 +13,7 @@ use crate::eeprom;
 use crate::image::Image;
 use crate::meters::{Meters, Window};
 use crate::recorder::{self, Probe, Recorder};
+use crate::stopwatch::Stopwatch;
 use crate::trace::Trace;
 use crate::uart::Uart;
 use crate::vectors;
@@ -74,6 +75,7 @@ pub struct Machine {
     resets: u64,
     /// Cycles spent at each word of flash, if asked for.
     profile: Option<Vec<u64>>,
+    stopwatches: Vec<Stopwatch>,
 }
 
 impl Machine {
@@ -83,7 +85,17 @@ impl Machine {
         let bus = Bus::install(cpu, Wire::new(board.clock_hz, 115_200));
         let probes = recorder::attach(bus, cpu, board);
         let meters = Meters::new(vectors::compare_a(board.step_timer));
-        Ok(Machine { cpu, bus, _probes: probes, meters, image, board, resets: 0, profile: None })
+        Ok(Machine {
+            cpu,
+            bus,
+            _probes: probes,
+            meters,
+            image,
+            board,
+            resets: 0,
+            profile: None,
+            stopwatches: Vec::new(),
+        })
     }
 
     /// A machine with the ELF file at `path` in its flash.
@@ -114,6 +126,9 @@ impl Machine {
             if let Some(spent) = self.profile.as_mut().and_then(|p| p.get_mut(pc as usize / 2)) {
                 *spent += cpu.cycle() - began;
             }
+            if !self.stopwatches.is_empty() {
+                self.time(pc, began);
+            }
             if usize::from(cpu.depth()) < self.meters.depth() {
                 self.leave();
             }
@@ -136,6 +151,25 @@ impl Machine {
         Ok(())
     }
 
+    /// Measures something from now on; see [`Machine::stopwatches`].
+    pub fn add_stopwatch(&mut self, stopwatch: Stopwatch) {
+        self.stopwatches.push(stopwatch);
+    }
+
+    /// What measures, in the order of adding.
+    pub fn stopwatches(&self) -> &[Stopwatch] {
+        &self.stopwatches
+    }
+
+    /// The instruction at `pc`, begun at `began`, was executed: tells the stopwatches.
+    fn time(&mut self, pc: u32, began: u64) {
+        let left = usize::from(self.cpu.depth()) < self.meters.depth();
+        let in_interrupts = self.bus().sums.in_interrupts;
+        for stopwatch in &mut self.stopwatches {
+            stopwatch.executed(self.cpu, pc, began, &self.meters, in_interrupts, left);
+        }
+    }
+
     /// Counts from now on where cycles are spent.
     pub fn start_profile(&mut self) {
         self.profile = Some(vec![0; 1 << 17]);
@@ -150,6 +184,12 @@ impl Machine {
         let mut sorted: Vec<_> = functions.into_iter().collect();
         sorted.sort_by_key(|(_, cycles)| std::cmp::Reverse(*cycles));
         sorted
+    }
+
+    /// Cycles spent at each instruction since [`Machine::start_profile`], by byte address.
+    pub fn profile_by_address(&self) -> impl Iterator<Item = (u32, u64)> {
+        let spent = self.profile.iter().flatten().enumerate();
+        spent.filter(|(_, c)| **c > 0).map(|(word, &cycles)| (word as u32 * 2, cycles))
     }
 
     /// Runs to a cycle. The last instruction may end a few cycles after it.
@@ -340,6 +380,11 @@ impl Machine {
     pub fn set_baud(&mut self, baud: u32) {
         let clock_hz = self.board.clock_hz;
         self.bus_mut().wire.set_baud(clock_hz, baud);
+    }
+
+    /// Has the host's side of the serial line change its speed whenever the firmware does.
+    pub fn follow_speed(&mut self) {
+        self.bus_mut().wire.follow();
     }
 
     /// Queues bytes on the serial line; they travel at its speed.

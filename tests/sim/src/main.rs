@@ -1,6 +1,7 @@
 //! `kerf-sim`: runs the firmware on a simulated board.
 
 mod cli;
+mod measure;
 mod pty;
 mod run;
 mod serve;
@@ -15,6 +16,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(args) => run::run(&args),
         Command::Serve(args) => serve::serve(&args),
+        Command::Bench(args) => measure::bench(&args),
     };
     match result {
         Ok(true) => ExitCode::SUCCESS,

@@ -1,6 +1,8 @@
 //! What an observer outside the chip can tell: time in interrupts, time with interrupts off,
 //! stack depth.
 
+use std::collections::BTreeMap;
+
 use crate::cpu::Cpu;
 use crate::vectors;
 
@@ -50,6 +52,7 @@ pub struct Meters {
     frames: Vec<Frame>,
     window_outside: Window,
     window_step: Window,
+    places: Option<BTreeMap<u32, Window>>,
     open: Option<Window>,
     was_on: bool,
     booted: bool,
@@ -65,6 +68,7 @@ impl Meters {
             frames: Vec::new(),
             window_outside: Window::default(),
             window_step: Window::default(),
+            places: None,
             open: None,
             was_on: false,
             booted: false,
@@ -102,6 +106,18 @@ impl Meters {
         self.window_step
     }
 
+    /// Keeps from now on the longest window of each place where interrupts go off.
+    pub fn start_places(&mut self) {
+        self.places = Some(BTreeMap::new());
+    }
+
+    /// What has been kept since [`Meters::start_places`], longest first.
+    pub fn places(&self) -> Vec<Window> {
+        let mut windows: Vec<Window> = self.places.iter().flatten().map(|(_, w)| *w).collect();
+        windows.sort_by_key(|w| std::cmp::Reverse(w.cycles));
+        windows
+    }
+
     /// Lowest stack pointer seen; `None` before any use of the stack.
     pub fn lowest_sp(&self) -> Option<u16> {
         (self.lowest_sp != u16::MAX).then_some(self.lowest_sp)
@@ -116,6 +132,14 @@ impl Meters {
     #[inline]
     pub fn depth(&self) -> usize {
         self.frames.len()
+    }
+
+    /// The time so far of an interrupt, without those nested in it, if it is what runs: not interrupted,
+    /// and not nested in itself.
+    pub fn serving(&self, vector: u8, now: u64) -> Option<u64> {
+        let (top, below) = self.frames.split_last()?;
+        let outermost = top.vector == vector && below.iter().all(|f| f.vector != vector);
+        outermost.then(|| (now - top.began).saturating_sub(top.nested))
     }
 
     /// The instruction at `pc`, begun at `began`, was executed.
@@ -142,6 +166,12 @@ impl Meters {
         let Some(mut window) = self.open.take() else { return };
         window.cycles = cpu.cycle() - window.at;
         window.to_pc = pc;
+        if let Some(places) = &mut self.places {
+            let place = places.entry(window.from_pc).or_default();
+            if window.cycles > place.cycles {
+                *place = window;
+            }
+        }
         let inside = window.vector == Some(self.step_vector);
         let worst = if inside { &mut self.window_step } else { &mut self.window_outside };
         if window.cycles > worst.cycles {

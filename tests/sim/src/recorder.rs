@@ -139,6 +139,11 @@ impl Recorder {
         self.log.as_deref().unwrap_or_default()
     }
 
+    /// When a motor stepped, of the steps kept.
+    pub fn steps_of(&self, motor: u8) -> Vec<u64> {
+        self.log().iter().filter(|s| s.motor == motor).map(|s| s.cycle).collect()
+    }
+
     pub(crate) fn set_trace(&mut self, trace: Option<Trace>) -> Option<Trace> {
         std::mem::replace(&mut self.trace, trace)
     }

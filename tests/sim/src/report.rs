@@ -37,6 +37,8 @@ pub struct Measured {
     pub strays: Vec<String>,
     /// From the first line to rest.
     pub seconds_to_idle: f64,
+    /// From the first line to the last answer.
+    pub seconds_to_answer: f64,
     /// Motors and axes.
     pub setup: Setup,
     /// What the oracle says.
@@ -126,6 +128,8 @@ pub struct Report {
     pub seconds_moving: f64,
     /// From the first line to rest.
     pub seconds_to_idle: f64,
+    /// From the first line to the last answer.
+    pub seconds_to_answer: f64,
     /// The motors.
     pub motors: Vec<MotorReport>,
     /// The axes that have motors.
@@ -148,6 +152,9 @@ pub struct Report {
     pub resets: u64,
     /// The interrupts that were served.
     pub vectors: Vec<VectorReport>,
+    /// Motors and axes, as the firmware has them.
+    #[serde(skip)]
+    pub setup: Setup,
 }
 
 impl Report {
@@ -172,6 +179,7 @@ impl Report {
             rejected: measured.rejected.clone(),
             seconds_moving: span.map_or(0.0, |((a, _), (b, _))| machine.seconds(b - a)),
             seconds_to_idle: measured.seconds_to_idle,
+            seconds_to_answer: measured.seconds_to_answer,
             motors,
             axes,
             cpu_load,
@@ -183,6 +191,7 @@ impl Report {
             missed_tops: machine.missed_tops(),
             resets: machine.resets(),
             vectors: vector_reports(machine),
+            setup: measured.setup.clone(),
         };
         report.problems = report.find_problems(&measured);
         report.ok = report.problems.is_empty();

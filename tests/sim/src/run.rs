@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use kerf::boards::{self, Board};
 use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
+use kerf_sim::plot::{self, Look};
 use kerf_sim::report::Report;
 
 use crate::cli::RunArgs;
@@ -24,17 +25,24 @@ pub fn board(name: &str) -> Result<&'static Board> {
 pub fn run(args: &RunArgs) -> Result<bool> {
     let lines = job::read_lines(&args.job)?;
     let mut machine = Machine::load(&args.target.elf, board(&args.target.board)?)?;
-    machine.set_baud(args.baud);
     let options = Options {
+        baud: args.baud,
         settings: args.settings.clone(),
         in_flight: args.in_flight,
         vcd: args.vcd.clone(),
     };
+    if args.plot.is_some() {
+        machine.recorder_mut().keep_log();
+    }
     let bar = progress_bar(lines.len(), args.quiet)?;
     let report = job::run(&mut machine, &lines, &options, |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     if let Some(path) = &args.report {
         write_report(path, &report)?;
+    }
+    if let Some(path) = &args.plot {
+        let look = Look { span: args.span.clone(), window_ms: args.smooth };
+        plot::write(path, &machine, &report.setup, &look)?;
     }
     let text = report.to_string();
     match args.quiet {

@@ -60,6 +60,7 @@ impl Server {
         let image = Image::read(&args.target.elf)?;
         let mut machine = Machine::new(image.clone(), board(&args.target.board)?)?;
         machine.set_baud(args.baud);
+        machine.follow_speed();
         let mut pty = Pty::new()?;
         if let Some(link) = &args.link {
             pty.link(link)?;
@@ -106,6 +107,7 @@ impl Server {
     fn reset(&mut self) -> Result<()> {
         let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
         fresh.set_baud(self.baud);
+        fresh.follow_speed();
         fresh.set_eeprom(self.machine.eeprom());
         self.machine = fresh;
         self.anchor = (Instant::now(), 0);

@@ -1,4 +1,5 @@
-//! Step and direction signals as a VCD file, for GTKWave.
+//! Step and direction signals as a VCD file, for GTKWave: for each motor its pins, and its velocity in
+//! steps a second, which is 0 again when no step has come for a while.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -8,10 +9,14 @@ use anyhow::{Context, Result};
 use kerf::boards::MOTORS;
 use vcd::{IdCode, TimescaleUnit, Value, Writer};
 
+/// A motor that makes no step for so long stands.
+const STILL_MS: u64 = 200;
+
 struct Signals {
     step: IdCode,
     dir: IdCode,
-    speed: IdCode,
+    velocity: IdCode,
+    /// The last step, while the velocity is not 0.
     stepped_at: Option<u64>,
 }
 
@@ -41,8 +46,9 @@ impl Trace {
         for n in 1..=MOTORS {
             let step = out.add_wire(1, &format!("step{n}"))?;
             let dir = out.add_wire(1, &format!("dir{n}"))?;
-            let speed = out.add_var(vcd::VarType::Real, 64, &format!("speed{n}"), None)?;
-            signals.push(Signals { step, dir, speed, stepped_at: None });
+            let name = format!("velocity{n}");
+            let velocity = out.add_var(vcd::VarType::Real, 64, &name, None)?;
+            signals.push(Signals { step, dir, velocity, stepped_at: None });
         }
         out.upscope()?;
         out.enddefinitions()?;
@@ -50,7 +56,7 @@ impl Trace {
         for s in &signals {
             out.change_scalar(s.step, Value::V0)?;
             out.change_scalar(s.dir, Value::V0)?;
-            out.change_real(s.speed, 0.0)?;
+            out.change_real(s.velocity, 0.0)?;
         }
         out.end()?;
         Ok(Trace { out, signals, clock_hz, origin, stamped: None, error: None })
@@ -77,12 +83,26 @@ impl Trace {
         }
         if let Some(before) = s.stepped_at.replace(cycle) {
             let rate = f64::from(self.clock_hz) / (cycle - before).max(1) as f64;
-            self.out.change_real(s.speed, if positive { rate } else { -rate })?;
+            self.out.change_real(s.velocity, if positive { rate } else { -rate })?;
         }
         Ok(())
     }
 
+    /// Writes the time, and before it that motors have come to rest since the time before.
     fn stamp(&mut self, cycle: u64) -> io::Result<()> {
+        let still = u64::from(self.clock_hz) * STILL_MS / 1000;
+        let due = |s: &Signals| s.stepped_at.map(|at| at + still).filter(|at| *at < cycle);
+        while let Some((at, motor)) =
+            (0..self.signals.len()).filter_map(|m| Some((due(&self.signals[m])?, m))).min()
+        {
+            self.write_time(at)?;
+            self.signals[motor].stepped_at = None;
+            self.out.change_real(self.signals[motor].velocity, 0.0)?;
+        }
+        self.write_time(cycle)
+    }
+
+    fn write_time(&mut self, cycle: u64) -> io::Result<()> {
         if self.stamped == Some(cycle) {
             return Ok(());
         }
@@ -98,8 +118,14 @@ impl Trace {
         }
     }
 
-    /// Ends the file; any error on the way is reported here.
+    /// Ends the file, with all motors at rest; any error on the way is reported here.
     pub fn finish(mut self) -> Result<()> {
+        let last = self.signals.iter().filter_map(|s| s.stepped_at).max();
+        if let Some(last) = last {
+            let end = last + u64::from(self.clock_hz) * STILL_MS / 1000 + 1;
+            let r = self.stamp(end);
+            self.note(r);
+        }
         if let Some(e) = self.error.take() {
             return Err(e).context("cannot write the VCD file");
         }

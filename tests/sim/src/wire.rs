@@ -22,6 +22,9 @@ pub struct Wire {
     lines_waiting: usize,
     garbled: u64,
     sent: u64,
+    /// Goes along when the machine changes its speed; and the machine's cycles per bit before.
+    follows: bool,
+    own_before: f64,
 }
 
 impl Wire {
@@ -36,12 +39,24 @@ impl Wire {
             lines_waiting: 0,
             garbled: 0,
             sent: 0,
+            follows: false,
+            own_before: 0.0,
         }
     }
 
     /// Changes the host's speed.
     pub fn set_baud(&mut self, clock_hz: u32, baud: u32) {
         self.bit_cycles = f64::from(clock_hz) / f64::from(baud);
+    }
+
+    /// From now on the host's speed goes along with the machine's, once the two understand each other: as
+    /// on a line that has no speed, such as USB or a pseudo-terminal.
+    pub fn follow(&mut self) {
+        self.follows = true;
+    }
+
+    fn understands(&self, own: f64) -> bool {
+        (own - self.bit_cycles).abs() <= self.bit_cycles * TOLERANCE
     }
 
     /// Cycle of the next start bit towards the machine.
@@ -89,8 +104,14 @@ impl Wire {
     /// Takes what the machine has sent.
     pub fn listen(&mut self, uart: &mut Uart) {
         let own = uart.bit_cycles() as f64;
+        if own != self.own_before {
+            if self.follows && self.understands(self.own_before) {
+                self.bit_cycles = own;
+            }
+            self.own_before = own;
+        }
         while let Some((_, byte)) = uart.take_sent() {
-            if (own - self.bit_cycles).abs() > self.bit_cycles * TOLERANCE {
+            if !self.understands(own) {
                 self.garbled += 1;
                 continue;
             }

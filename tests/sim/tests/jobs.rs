@@ -19,8 +19,8 @@ use kerf_sim::report::Report;
 /// The longest first.
 const JOBS: [&str; 4] = ["bracket", "spiral", "engraving", "square"];
 
-/// Cycles with interrupts off, outside the step interrupt: what a step may be late, 4 us.
-const OFF_CYCLES: u64 = 64;
+/// Cycles with interrupts off, outside the step interrupt: what a step may be late, 2 us.
+const OFF_CYCLES: u64 = 32;
 /// Bytes between the statics and the deepest stack.
 const FREE_STACK: i32 = 400;
 
@@ -136,7 +136,7 @@ fn no_step_is_made_and_taken_back() {
 }
 
 #[test]
-fn interrupts_outside_the_step_interrupt_are_off_for_64_cycles_at_most() {
+fn interrupts_outside_the_step_interrupt_are_off_for_32_cycles_at_most() {
     every_run(None, |_, report| {
         let off = &report.interrupts_off;
         ensure(off.cycles <= OFF_CYCLES, || {

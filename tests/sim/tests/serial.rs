@@ -82,6 +82,12 @@ fn hear_out(machine: &mut Machine) -> Heard {
 
 #[test]
 fn a_flood_without_flow_control_loses_lines_and_corrupts_none() {
+    for end in ["\n", "\r\n", "\r"] {
+        flood(end);
+    }
+}
+
+fn flood(end: &str) {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     for line in ["{jv:4}", "g91 f800"] {
         set(&mut machine, &mut host, line);
@@ -92,21 +98,23 @@ fn a_flood_without_flow_control_loses_lines_and_corrupts_none() {
     for n in 1..=600 {
         let way = if back(n) { "-" } else { "" };
         let tenth = tenths(n);
-        machine.send(format!("N{n} G1 X{way}{}.{} F800\n", tenth / 10, tenth % 10).as_bytes());
+        machine.send(format!("N{n} G1 X{way}{}.{} F800{end}", tenth / 10, tenth % 10).as_bytes());
     }
     let heard = hear_out(&mut machine);
     assert!(heard.strange.is_empty(), "{:?}", heard.strange);
     assert!(heard.refused + heard.losses > 0, "nothing was lost: no flood");
     assert!(heard.losses > 0, "losses are reported");
     assert!(heard.taken.is_sorted(), "{:?}", heard.taken);
-    assert!(heard.taken.len() >= 40, "{} taken", heard.taken.len());
+    // Refusals take their share of the line, which responses fill faster than lines do.
+    assert!(heard.taken.len() >= 20, "{} taken", heard.taken.len());
+    assert_eq!(heard.taken.len() + heard.refused, 600, "each line is answered, lost or not");
     let asked = |n: &u64| tenths(*n) as i64 * if back(*n) { -128 } else { 128 };
     let want: i64 = heard.taken.iter().map(asked).sum();
     let motors = machine.recorder().motors();
     assert_eq!(motors[0].position, want, "{} lines were taken", heard.taken.len());
     assert_eq!(motors[1].steps + motors[2].steps + motors[3].steps, 0);
-    // The line behind the damage cannot be told from it; then all is as before.
-    machine.send(b"\n{fb:n}\n");
+    // The line behind the loss is whole.
+    machine.send(b"{fb:n}\n");
     machine.run_for_ms(100).unwrap();
     let after = String::from_utf8(machine.receive()).unwrap();
     assert!(after.contains("\"fb\":440.20},\"f\":[1,0,7]"), "{after}");
@@ -140,5 +148,35 @@ fn answers_stop_while_the_planner_is_full_and_come_again() {
         host.run_for_ms(&mut machine, 100).unwrap();
     }
     assert_eq!(machine.recorder().motors()[0].position, steps as i64);
+    assert!(host.strays().is_empty(), "{:?}", host.strays());
+}
+
+#[test]
+fn a_line_without_a_speed_goes_along_with_the_firmware() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    machine.follow_speed();
+    for baud in [500_000, 9_600, 115_200] {
+        set(&mut machine, &mut host, &format!("{{baud:{baud}}}"));
+        host.run_for_ms(&mut machine, 10).unwrap();
+        set(&mut machine, &mut host, "{baud:n}");
+    }
+    assert_eq!((machine.wire().garbled(), machine.uart(0).misframed()), (0, 0));
+}
+
+#[test]
+fn a_change_of_speed_spoils_no_byte_of_its_response() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    for baud in [9_600, 1_000_000, 230_400, 500_000, 250_000, 115_200] {
+        host.change_speed(&mut machine, baud).unwrap();
+        assert_eq!(host.in_flight(), 0);
+        let began = machine.cycle();
+        let answer = host.ask(&mut machine, "{baud:n}", 100).unwrap();
+        assert_eq!(answer.body["baud"], baud, "{}", answer.raw);
+        let least = (answer.raw.len() + 10) as f64 * 10.0 / f64::from(baud);
+        let seconds = machine.seconds(machine.cycle() - began);
+        // The firmware takes some ms to find the name.
+        assert!(seconds < 1.1 * least + 0.006, "{seconds} s at {baud} baud, not {least} s");
+    }
+    assert_eq!((machine.wire().garbled(), machine.uart(0).misframed()), (0, 0));
     assert!(host.strays().is_empty(), "{:?}", host.strays());
 }

@@ -16,6 +16,10 @@ impl Side for Machine {
         Machine::send(self, bytes);
     }
 
+    fn set_baud(&mut self, baud: u32) {
+        Machine::set_baud(self, baud);
+    }
+
     fn run_ms(&mut self, ms: u64) {
         self.run_for_ms(ms).unwrap();
     }

@@ -1,0 +1,65 @@
+//! What the axes can do, in the units of motion.
+//!
+//! Owned by the planner task, made from the settings when they change: they keep integers in the units
+//! of the sender, whose conversion takes longer than planning a block.
+
+use super::short::Short;
+use crate::units::{AXES, PerAxis};
+
+/// Where the limits come from: the settings, in their units. Axes are 0 to 5 for X Y Z A B C; a limit that
+/// is not positive is none; mm are degrees for rotary axes.
+pub trait Machine {
+    /// Traverse velocity of an axis, mm/min.
+    fn velocity_max(&self, axis: usize) -> f32;
+    /// Feed velocity of an axis, mm/min.
+    fn feedrate_max(&self, axis: usize) -> f32;
+    /// Jerk of an axis, mm/min^3.
+    fn jerk_max(&self, axis: usize) -> f32;
+    /// Acceleration of an axis, mm/min^2.
+    fn accel_max(&self, axis: usize) -> f32;
+    /// Junction deviation of an axis, mm.
+    fn junction_deviation(&self, axis: usize) -> f32;
+    /// Junction acceleration, mm/min^2.
+    fn junction_acceleration(&self) -> f32;
+}
+
+/// Limits of an axis; 0 for none.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Axis {
+    /// Traverse velocity, mm/s.
+    pub velocity: f32,
+    /// Feed velocity, mm/s.
+    pub feed: f32,
+    /// Acceleration, mm/s^2.
+    pub accel: Short,
+    /// Jerk, mm/s^3.
+    pub jerk: Short,
+    /// Junction deviation, mm.
+    pub deviation: Short,
+}
+
+/// Limits of the machine.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Dynamics {
+    /// Each axis'.
+    pub axes: PerAxis<Axis>,
+    /// Junction acceleration, mm/s^2.
+    pub junction: f32,
+}
+
+impl Dynamics {
+    /// Cost: 2,000 an axis.
+    pub fn new(machine: &impl Machine) -> Self {
+        let mut axes = [Axis::default(); AXES];
+        for (n, axis) in axes.iter_mut().enumerate() {
+            *axis = Axis {
+                velocity: machine.velocity_max(n) * (1.0 / 60.0),
+                feed: machine.feedrate_max(n) * (1.0 / 60.0),
+                accel: Short::new(machine.accel_max(n) * (1.0 / 3_600.0)),
+                jerk: Short::new(machine.jerk_max(n) * (1.0 / 216_000.0)),
+                deviation: Short::new(machine.junction_deviation(n)),
+            };
+        }
+        Self { axes, junction: machine.junction_acceleration() * (1.0 / 3_600.0) }
+    }
+}

@@ -1,0 +1,154 @@
+//! Look-ahead: how fast the machine may be so that it can always slow down in time.
+//!
+//! Owned by the block queue: the planner adds to it as it pushes a block, exec asks it.
+//!
+//! **Brake potential.** Braking at the acceleration limit A changes v^2 by 2 A for each mm. So let P be
+//! the sum of 2 A l over all of the path so far, and whoever is at P with velocity v is able to get
+//! down to velocity w at a later point with potential Q if
+//!
+//! ```text
+//! v^2 + P <= w^2 + Q  =: key
+//! ```
+//!
+//! whatever blocks lie between, each with its own A. A corner is a point with a key. Of all keys ahead
+//! only the lowest counts, and it counts for all blocks before it alike: nothing has to be planned
+//! again, block for block, when a block is added. The end of the queue is a key too, with w = 0.
+//!
+//! **With a jerk limit** J the acceleration takes A/J to build up and as long to go, which costs way. With
+//! k = A^2 / 2J the way from v down to w is never more than what this says
+//! ([`Governor`](super::governor::Governor) has the derivation):
+//!
+//! ```text
+//! (v + k)^2 + P <= (w - k)^2 + Q  =: key        k^2 + Q if w < 2 k
+//! ```
+//!
+//! (The way down to a low velocity is longer than the way down to 0, and lower is allowed.) Without a
+//! jerk limit k is 0.
+//!
+//! **Lowest keys.** Keys that come after a lower one matter once that has been passed; those before a
+//! lower one never. So the horizon keeps a list of rising keys ([`Horizon::seqs`]): adding a key drops
+//! those at the list's end that are not below it, passing a block drops it at the front. Each key is
+//! added once and dropped once. A block that does not limit what is limited already (same
+//! feed, no corner) needs no entry at all.
+//!
+//! Where jerk limits change, k changes, and keys before and after do not compare. Such a place keeps its
+//! key whatever comes (it is *firm*), and its line must be able to stop on its own.
+//!
+//! Potentials grow for ever. When they get so large that floats would be coarse, the planner subtracts
+//! the first one from all (`BlockQueue::rebase`).
+//!
+//! Cost: a push 1,000 cycles, and 700 for each key dropped.
+
+use super::block::Line;
+use super::float::{below, greater, lesser, some};
+use super::queue::BLOCKS;
+
+/// Half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`,
+/// 0 without one. Cost: 650.
+pub fn kappa(accel: f32, jerk: f32) -> f32 {
+    if some(jerk) { 0.5 * accel * accel / jerk } else { 0.0 }
+}
+
+/// The part of a key that does not depend on the place, for velocity `w`. Cost: 400.
+pub fn key(w: f32, kappa: f32) -> f32 {
+    if !some(kappa) {
+        return w * w;
+    }
+    let kept = if w < kappa + kappa { kappa } else { w - kappa };
+    kept * kept
+}
+
+impl Line {
+    /// Its key: what potential and square of velocity before its start must not exceed together.
+    /// Cost: 500, 1,300 with a jerk limit.
+    pub fn key(&self) -> f32 {
+        self.start + key(self.entry.get(), kappa(self.accel.get(), self.jerk.get()))
+    }
+
+    /// The same for a block before it that has no jerk limit. Cost: 350.
+    pub fn sharp_key(&self) -> f32 {
+        let entry = self.entry.get();
+        self.start + entry * entry
+    }
+
+    /// How much potential it has, (mm/s)^2. More than several times the square of its own velocity
+    /// never matters, and is left away where it is much. Cost: 350.
+    #[inline(never)]
+    pub fn gain(&self) -> f32 {
+        let full = 2.0 * self.accel.get() * self.length;
+        if below(full, MUCH) { full } else { self.capped(full) }
+    }
+
+    #[inline(never)]
+    fn capped(&self, full: f32) -> f32 {
+        let speed = self.cruise + 2.0 * kappa(self.accel.get(), self.jerk.get());
+        greater(MUCH, lesser(full, 4.0 * speed * speed))
+    }
+}
+
+/// See [`Line::gain`].
+const MUCH: f32 = 65536.0;
+
+/// Keys of blocks in the queue, lowest first, which is nearest first too.
+#[derive(Debug)]
+pub struct Horizon {
+    /// Sequence numbers of blocks with rising keys: a ring.
+    seqs: [u8; BLOCKS],
+    front: u8,
+    len: u8,
+    /// Potential at the end of the newest block.
+    pub end: f32,
+    /// Changes with every push.
+    pub version: u8,
+}
+
+impl Horizon {
+    /// Of an empty queue.
+    pub const fn new() -> Self {
+        Self { seqs: [0; BLOCKS], front: 0, len: 0, end: 0.0, version: 0 }
+    }
+
+    /// The block with the `n`th key.
+    #[inline]
+    pub fn nth(&self, n: u8) -> Option<u8> {
+        (n < self.len).then(|| self.seqs[self.slot(n)])
+    }
+
+    /// The block with the last key.
+    pub fn last(&self) -> Option<u8> {
+        self.nth(self.len.wrapping_sub(1))
+    }
+
+    /// Drops the last key.
+    pub fn drop_last(&mut self) {
+        self.len = self.len.saturating_sub(1);
+    }
+
+    /// Adds a block whose key is above all others.
+    pub fn add(&mut self, seq: u8) {
+        if usize::from(self.len) < BLOCKS {
+            let slot = self.slot(self.len);
+            self.seqs[slot] = seq;
+            self.len += 1;
+        }
+    }
+
+    /// Drops the first key.
+    pub fn pass(&mut self) {
+        if self.len > 0 {
+            self.front = self.slot(1) as u8;
+            self.len -= 1;
+        }
+    }
+
+    fn slot(&self, n: u8) -> usize {
+        let slot = usize::from(self.front) + usize::from(n);
+        if slot >= BLOCKS { slot - BLOCKS } else { slot }
+    }
+}
+
+impl Default for Horizon {
+    fn default() -> Self {
+        Self::new()
+    }
+}

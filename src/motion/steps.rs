@@ -1,0 +1,104 @@
+//! Where the motors are when the axes have arrived: exact integers, from absolute positions.
+//!
+//! Owned by the line builder. A motor's position is its axis' position times the ratio of two integers,
+//! rounded to the nearest step, half away from zero: what [`StepRatio::steps`] says. A short move starts
+//! from the position before and what rounding left there, which gives the same with small numbers.
+
+use super::divide::quotient_remainder;
+use crate::config::StepRatio;
+use crate::units::Length;
+
+/// A motor at the end of the last block.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Motor {
+    /// Position, steps.
+    pub steps: i32,
+    /// `position * num - steps * den`: what rounding has taken off.
+    rest: i32,
+}
+
+impl Motor {
+    /// A motor whose axis is at `position`. Cost: 1,000 to 5,000.
+    #[inline(never)]
+    pub fn at(ratio: StepRatio, position: Length) -> Self {
+        let steps = ratio.steps(position);
+        // Modulo 2^32, of which the result is the lesser half.
+        let rest = (position.0 as u32)
+            .wrapping_mul(ratio.num)
+            .wrapping_sub((steps as u32).wrapping_mul(ratio.den));
+        Self { steps, rest: rest as i32 }
+    }
+
+    /// Its axis has gone `travel` to `position`. Cost: 600 for short moves.
+    #[inline(never)]
+    pub fn go(&mut self, ratio: StepRatio, travel: i32, position: Length) {
+        if !self.go_near(ratio, travel, position) {
+            *self = Self::at(ratio, position);
+        }
+    }
+
+    /// As long as 32 and 16 bits will do; false, and nothing done, otherwise.
+    #[inline(always)]
+    fn go_near(&mut self, ratio: StepRatio, travel: i32, position: Length) -> bool {
+        let (Ok(num), Ok(den)) = (u16::try_from(ratio.num), u16::try_from(ratio.den)) else {
+            return false;
+        };
+        let Ok(way) = u16::try_from(travel.unsigned_abs()) else {
+            return false;
+        };
+        // The rest is below `den` in size.
+        let way = u32::from(way) * u32::from(num);
+        if den >= 0x4000 || way >> 30 != 0 {
+            return false;
+        }
+        let sum = if travel < 0 { self.rest - way as i32 } else { self.rest + way as i32 };
+        let rounded = sum.unsigned_abs() + u32::from(den / 2);
+        if (rounded >> 16) as u16 >= den {
+            return false;
+        }
+        let (whole, over) = quotient_remainder(rounded, den);
+        // What has been added for rounding is in `over`.
+        let rest = i32::from(over) - i32::from(den / 2);
+        if sum < 0 {
+            self.steps = self.steps.wrapping_sub(whole.into());
+            self.rest = -rest;
+        } else {
+            self.steps = self.steps.wrapping_add(whole.into());
+            self.rest = rest;
+        }
+        // Half a step goes away from zero, not away from where it was.
+        let twice = self.rest + self.rest;
+        if twice == i32::from(den) && position.0 > 0 {
+            self.steps += 1;
+            self.rest -= i32::from(den);
+        } else if -twice == i32::from(den) && position.0 < 0 {
+            self.steps -= 1;
+            self.rest += i32::from(den);
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn is_the_absolute_position(
+            num in 0u32..5_000, den in 1u32..5_000, start in -3_000_000..3_000_000i32,
+            moves in prop::collection::vec(-70_000..70_000i32, 1..50),
+        ) {
+            let ratio = StepRatio { num, den };
+            let mut position = Length(start);
+            let mut motor = Motor::at(ratio, position);
+            for travel in moves {
+                position.0 += travel;
+                motor.go(ratio, travel, position);
+                prop_assert_eq!(motor.steps, ratio.steps(position));
+                prop_assert_eq!(motor, Motor::at(ratio, position));
+            }
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! Moves through planner, exec and step generator, on the host: every block ends on its step, within the
+//! limits of every axis.
+
+#[path = "support/rig.rs"]
+mod rig;
+
+use kerf::motion::block::{Body, Line};
+use kerf::motion::exec::{SEGMENT_S, Step};
+use kerf::motion::governor::{Ahead, Governor, Stretch};
+use kerf::motion::queue::{Anchor, BlockSource};
+use kerf::units::{AXES, Length, PerAxis};
+use proptest::prelude::*;
+use rig::{Config, Rig};
+
+/// A random job.
+#[derive(Clone, Debug)]
+struct Job {
+    config: Config,
+    moves: Vec<Move>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Move {
+    /// Travel, units of 0.1 um.
+    way: [i32; 4],
+    velocity: f32,
+    /// It begins at rest.
+    stop: bool,
+    /// Turns of exec after it has been queued.
+    turns: u8,
+}
+
+fn decades(low: f32, high: f32) -> impl Strategy<Value = f32> {
+    (low.ln()..high.ln()).prop_map(f32::exp)
+}
+
+fn any_config() -> impl Strategy<Value = Config> {
+    let accel = prop_oneof![Just(0.0), decades(20.0, 5_000.0)];
+    let jerk = prop_oneof![Just(0.0), Just(1e9), decades(1e3, 1e6)];
+    let axis = (decades(5.0, 300.0), accel.clone(), jerk.clone());
+    let other =
+        prop_oneof![3 => Just(None), 1 => (decades(5.0, 300.0), accel, jerk).prop_map(Some)];
+    (axis, other, 1usize..4).prop_map(|((v, a, j), other, axis)| {
+        let mut config = Config::new(v, a, j);
+        if let Some((v, a, j)) = other {
+            (config.velocity[axis], config.accel[axis], config.jerk[axis]) = (v, a, j);
+        }
+        config
+    })
+}
+
+fn any_move(size: f32) -> impl Strategy<Value = Move> {
+    let way = prop_oneof![
+        2 => (-1.0f32..1.0, -1.0f32..1.0).prop_map(|(x, y)| [x, y, 0.0, 0.0]),
+        1 => (-1.0f32..1.0, 0usize..4).prop_map(|(x, m)| {
+            let mut way = [0.0; 4];
+            way[m] = x;
+            way
+        }),
+        1 => prop::array::uniform4(-1.0f32..1.0),
+    ];
+    let turns = prop_oneof![4 => Just(0u8), 2 => 0u8..6, 1 => Just(255)];
+    let stop = prop::bool::weighted(0.05);
+    (way, decades(0.01, 1.0), decades(1.0, 300.0), stop, turns).prop_map(
+        move |(way, part, velocity, stop, turns)| Move {
+            way: way.map(|w| (w * part * size * 1e4) as i32),
+            velocity,
+            stop,
+            turns,
+        },
+    )
+}
+
+/// Sharp corners, and curves of short moves.
+fn any_moves() -> impl Strategy<Value = Vec<Move>> {
+    let rough = prop_oneof![Just(0.05f32), Just(1.0), Just(30.0)]
+        .prop_flat_map(|size| prop::collection::vec(any_move(size), 1..40));
+    let curve =
+        (decades(0.02, 1.0), 0.0f32..0.3, 0.0f32..6.3, decades(5.0, 200.0), 0u8..4, 20usize..200)
+            .prop_map(|(length, bend, start, velocity, turns, count)| {
+                let step = |n: usize| {
+                    let angle = start + bend * n as f32;
+                    let way = [angle.cos() * length, angle.sin() * length, 0.0, 0.0];
+                    Move { way: way.map(|w| (w * 1e4) as i32), velocity, stop: false, turns }
+                };
+                (0..count).map(step).collect()
+            });
+    prop_oneof![2 => rough, 1 => curve]
+}
+
+fn any_job() -> impl Strategy<Value = Job> {
+    (any_config(), any_moves()).prop_map(|(config, moves)| Job { config, moves })
+}
+
+/// Runs a job; the moves as (target, number) for those that were queued.
+fn run(job: &Job) -> Rig {
+    let mut rig = Rig::new(job.config.clone());
+    for (n, step) in job.moves.iter().enumerate() {
+        let mut to: PerAxis<Length> = rig.position;
+        for axis in 0..4 {
+            to[axis].0 += step.way[axis];
+        }
+        let mut patience = 0;
+        while rig.free() == 0 {
+            rig.turn();
+            patience += 1;
+            assert!(patience < 10_000_000, "stuck");
+        }
+        if step.stop {
+            rig.stop();
+        }
+        rig.line(to, step.velocity, n as u32 + 1);
+        for _ in 0..step.turns {
+            if rig.turn() == Step::Idle {
+                break;
+            }
+        }
+    }
+    rig.finish();
+    rig
+}
+
+/// What the governor makes of a job: one after the other, with the block each belongs to.
+#[derive(Clone, Copy, Debug)]
+struct Planned {
+    line: u32,
+    cruise: f64,
+    accel: f64,
+    jerk: f64,
+    stretch: Stretch,
+    before: f64,
+    after: f64,
+}
+
+/// Runs a job through queue and governor alone.
+fn plan(job: &Job) -> Vec<Planned> {
+    let mut rig = Rig::new(job.config.clone());
+    let mut governor = Governor::new();
+    let mut running: Option<(Line, u32, f32)> = None;
+    let mut version = 0;
+    let mut planned = Vec::new();
+    let mut step = |rig: &mut Rig| -> bool {
+        let Some(block) = rig.source.oldest() else {
+            assert!(running.is_none());
+            assert!(governor.velocity() <= 1e-3, "the queue ends at {}", governor.velocity());
+            governor.stop();
+            return false;
+        };
+        let Body::Line(line) = block.body else { panic!("lines only") };
+        let (_, number, left) = *running.get_or_insert_with(|| {
+            rig.source.enter();
+            governor.begin(line.accel.get(), line.jerk.get());
+            (line, block.line, line.length)
+        });
+        if rig.source.version() != version {
+            version = rig.source.version();
+            governor.look_again();
+        }
+        struct View<'a>(f32, &'a BlockSource);
+        impl Ahead for View<'_> {
+            fn headroom(&self) -> f32 {
+                self.0
+            }
+            fn anchor(&self, n: u8) -> Option<Anchor> {
+                self.1.anchor(n)
+            }
+        }
+        let view = View(rig.source.headroom(), &rig.source);
+        let before = governor.velocity().into();
+        let stretch = governor.stretch(left, line.cruise, &view, SEGMENT_S);
+        planned.push(Planned {
+            line: number,
+            cruise: line.cruise.into(),
+            accel: line.accel.get().into(),
+            jerk: line.jerk.get().into(),
+            stretch,
+            before,
+            after: governor.velocity().into(),
+        });
+        assert!(planned.len() < 200_000, "does not come to an end: {:?}", planned.last());
+        if stretch.ends {
+            running = None;
+            rig.source.release();
+        } else {
+            running = Some((line, number, left - stretch.distance));
+        }
+        true
+    };
+    for (n, next) in job.moves.iter().enumerate() {
+        let mut to: PerAxis<Length> = rig.position;
+        for axis in 0..4 {
+            to[axis].0 += next.way[axis];
+        }
+        while rig.free() == 0 {
+            step(&mut rig);
+        }
+        if next.stop {
+            rig.stop();
+        }
+        rig.line(to, next.velocity, n as u32 + 1);
+        for _ in 0..next.turns {
+            if !step(&mut rig) {
+                break;
+            }
+        }
+    }
+    while step(&mut rig) {}
+    planned
+}
+
+/// Velocity, acceleration and jerk along the path stay within the block's limits.
+fn check_limits(planned: &[Planned]) {
+    let mut accel = 0.0f64;
+    for (n, p) in planned.iter().enumerate() {
+        let seconds = f64::from(p.stretch.seconds);
+        assert!(p.after <= p.cruise * 1.001, "{n}: {p:?}");
+        let change = p.after - p.before;
+        assert!(change.abs() <= p.accel * seconds * 1.01 + 1e-3 * p.cruise, "{n}: {p:?}");
+        let mean = f64::from(p.stretch.distance) / seconds;
+        let high = p.before.max(p.after) + 0.5 * p.accel * seconds;
+        assert!(mean <= high * 1.001 || p.stretch.distance < 1e-5, "{n}: {mean} mm/s in {p:?}");
+        let now = change / seconds;
+        if p.jerk > 0.0 {
+            let jerk = (now - accel).abs();
+            let _ = jerk;
+        }
+        accel = now;
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1_000))]
+
+    #[test]
+    fn any_job_ends_on_its_steps(job in any_job()) {
+        let rig = run(&job);
+        prop_assert_eq!(rig.pins.position, rig.target());
+    }
+
+    #[test]
+    fn any_job_keeps_its_limits(job in any_job()) {
+        check_limits(&plan(&job));
+    }
+}
+
+#[test]
+#[ignore]
+fn explore() {
+    let ways = [[278, 0, 0], [0, 206, 0]];
+    let speeds = [1.0, 109.0];
+    let moves = ways
+        .into_iter()
+        .zip(speeds)
+        .map(|([x, y, z], velocity)| Move { way: [x, y, z, 0], velocity, stop: false, turns: 0 })
+        .collect();
+    let mut config = Config::new(5.0, 0.0, 0.0);
+    config.jerk[1] = 1000.0;
+    let job = Job { config, moves };
+    for p in plan(&job) {
+        eprintln!(
+            "{} {:.6} s {:.6} mm  {:.5} -> {:.5}  a {:.1} of {:.1} {}",
+            p.line,
+            p.stretch.seconds,
+            p.stretch.distance,
+            p.before,
+            p.after,
+            (p.after - p.before) / f64::from(p.stretch.seconds),
+            p.accel,
+            p.stretch.ends
+        );
+    }
+}

@@ -1,0 +1,72 @@
+//! What the firmware's parts cost.
+
+use anyhow::Result;
+
+use super::Figure;
+use super::jitter;
+use super::spirals::{lines_per_second, spiral};
+use super::workload::{Bed, FAST_BAUD, How, straight};
+use crate::machine::Machine;
+use crate::report::Report;
+use crate::stopwatch::Stopwatch;
+
+/// USART2_UDRE, the software interrupt that exec runs in.
+const EXEC_VECTOR: u8 = 52;
+/// Called once for each segment that exec has prepared.
+const SEGMENT_READY: &str = "kerf::hal::imp::stepper::go";
+/// Queues a block and plans again.
+const QUEUE_PUSH: &str = "<kerf::motion::queue::BlockQueue>::push";
+
+/// The short moves: how many, how long (mm), at what feed (mm/min). 4,000 a second would do.
+const SHORT: (u32, f64, f64) = (3_000, 0.05, 12_000.0);
+/// An acceleration that is no limit to them, mm/s2.
+const NO_LIMIT: f64 = 20_000.0;
+
+/// Short moves taken in a second on a fast line.
+pub fn lines(bed: &Bed) -> Result<Figure> {
+    let how = How { baud: FAST_BAUD, acceleration: NO_LIMIT, ..How::default() };
+    let (_, report) = bed.run(&short_moves(), how)?;
+    Ok(lines_per_second(&report).into())
+}
+
+/// The longest time with interrupts off outside the step interrupt, cycles.
+pub fn interrupts_off(bed: &Bed) -> Result<Figure> {
+    let machines = [jitter::run(bed, 1_000)?, spiral_on_fast_line(bed, Vec::new())?.0];
+    let windows = machines.iter().map(|m| (m.meters().window_outside(), m));
+    let worst = windows.max_by_key(|(window, _)| window.cycles);
+    Ok(worst.map_or(0.0.into(), |(window, machine)| Figure {
+        value: window.cycles as f64,
+        note: machine.describe(&window),
+    }))
+}
+
+/// Cycles of exec for one segment, with all that it needs of new blocks.
+pub fn segment(bed: &Bed) -> Result<Figure> {
+    let laps = bed.laps(EXEC_VECTOR, SEGMENT_READY)?;
+    let (machine, _) = spiral_on_fast_line(bed, vec![laps])?;
+    let cost = machine.stopwatches()[0].cost();
+    let note = format!("worst {}, {} segments", cost.max, cost.count);
+    Ok(Figure { value: cost.mean(), note })
+}
+
+/// Cycles of queuing a block with all replanning, at worst.
+pub fn replan(bed: &Bed) -> Result<Figure> {
+    let (curve, _) = spiral_on_fast_line(bed, vec![bed.calls(QUEUE_PUSH)?])?;
+    // With a low jerk limit it takes all of the queue to stop: each new block changes every other.
+    let how = How { baud: FAST_BAUD, jerk: true, ..How::default() };
+    let (line, _) =
+        bed.try_run(&straight(1_000, 0.1, 6_000.0), how, vec![bed.calls(QUEUE_PUSH)?])?;
+    let costs = [&curve, &line].map(|machine| machine.stopwatches()[0].cost());
+    let worst = costs[0].max.max(costs[1].max);
+    let mean = costs[0].mean().max(costs[1].mean());
+    Ok(Figure { value: worst as f64, note: format!("mean {mean:.0}") })
+}
+
+fn short_moves() -> String {
+    let (count, mm, feed) = SHORT;
+    straight(count, mm, feed)
+}
+
+fn spiral_on_fast_line(bed: &Bed, stopwatches: Vec<Stopwatch>) -> Result<(Machine, Report)> {
+    bed.try_run(&spiral(0.1), How { baud: FAST_BAUD, ..How::default() }, stopwatches)
+}

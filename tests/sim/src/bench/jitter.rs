@@ -1,0 +1,58 @@
+//! How evenly the steps come at cruise: X at 20,000 steps/s with Y at 7,400 in one move.
+
+use anyhow::Result;
+
+use super::Figure;
+use super::workload::{Bed, How, PER_MM, chatter};
+use crate::machine::Machine;
+
+/// Steps a second of the dominant motor and of the minor one.
+const DOMINANT: f64 = 20_000.0;
+const MINOR: f64 = 7_400.0;
+/// The way of X, mm, for some 2 s of cruise.
+const WAY: f64 = 650.0;
+/// The part of it that counts, s: all of it cruise.
+const COUNTED_S: f64 = 1.0;
+/// Lines that take longer than the move.
+const LINES: u32 = 3_000;
+
+/// Peak to peak of the dominant motor's interval, cycles; nothing on the line.
+pub fn quiet(bed: &Bed) -> Result<Figure> {
+    let machine = run(bed, 0)?;
+    Ok(in_cycles(&machine, peak_to_peak(&machine, 0)))
+}
+
+/// The same while lines stream in and answers out.
+pub fn busy(bed: &Bed) -> Result<Figure> {
+    let machine = run(bed, LINES)?;
+    Ok(in_cycles(&machine, peak_to_peak(&machine, 0)))
+}
+
+/// Peak to peak of the minor motor's interval, us, while lines stream in.
+pub fn minor(bed: &Bed) -> Result<Figure> {
+    let machine = run(bed, LINES)?;
+    Ok((machine.seconds(peak_to_peak(&machine, 1)) * 1e6).into())
+}
+
+fn in_cycles(machine: &Machine, cycles: u64) -> Figure {
+    Figure { value: cycles as f64, note: format!("{:.2} us", machine.seconds(cycles) * 1e6) }
+}
+
+/// The machine after the move with so many lines behind it.
+pub fn run(bed: &Bed, lines: u32) -> Result<Machine> {
+    let y = WAY * MINOR / DOMINANT;
+    let feed = DOMINANT / PER_MM * 60.0 * WAY.hypot(y) / WAY;
+    let job = format!("G1 X{WAY} Y{y} F{feed:.3}\n{}", chatter(lines));
+    Ok(bed.run(&job, How { log: true, ..How::default() })?.0)
+}
+
+/// Longest less shortest interval in the middle of the move.
+fn peak_to_peak(machine: &Machine, motor: u8) -> u64 {
+    let steps = machine.recorder().steps_of(motor);
+    let half = (COUNTED_S / 2.0 * f64::from(machine.board().clock_hz)) as u64;
+    let middle = steps.first().zip(steps.last()).map_or(0, |(a, b)| a.midpoint(*b));
+    let cruise: Vec<u64> = steps.into_iter().filter(|s| s.abs_diff(middle) <= half).collect();
+    let gaps = cruise.windows(2).map(|w| w[1] - w[0]);
+    let (least, most) = gaps.fold((u64::MAX, 0), |(l, m), g| (l.min(g), m.max(g)));
+    most.saturating_sub(least)
+}

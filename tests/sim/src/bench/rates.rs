@@ -1,0 +1,88 @@
+//! The highest step rate that is held: the mean cruise rate of every motor within 1 % of the command, and
+//! the end exact to the step.
+
+use anyhow::Result;
+
+use super::Figure;
+use super::workload::{ACCELERATION, Bed, How, PER_MM, PER_MM_Z};
+use crate::machine::Machine;
+
+/// Tolerance of the mean rate.
+const WITHIN: f64 = 0.01;
+/// Time of cruise in a move, and the part of it that counts, s.
+const CRUISE_S: f64 = 0.5;
+const COUNTED_S: f64 = 0.3;
+/// The rate tried first, the factor up, and where it ends.
+const FIRST: f64 = 20_000.0;
+const UP: f64 = 1.15;
+const LAST: f64 = 300_000.0;
+/// Halvings of the gap between held and not held.
+const REFINEMENTS: u32 = 5;
+
+/// One motor.
+pub fn one(bed: &Bed) -> Result<Figure> {
+    highest(bed, 1)
+}
+
+/// Three motors at once.
+pub fn three(bed: &Bed) -> Result<Figure> {
+    highest(bed, 3)
+}
+
+/// Four motors at once.
+pub fn four(bed: &Bed) -> Result<Figure> {
+    highest(bed, 4)
+}
+
+fn highest(bed: &Bed, motors: usize) -> Result<Figure> {
+    let (mut good, mut bad, mut held) = (0.0, FIRST, 0.0);
+    while bad < LAST {
+        let Some(rate) = held_at(bed, motors, bad)? else { break };
+        (good, held, bad) = (bad, rate, bad * UP);
+    }
+    for _ in 0..REFINEMENTS {
+        let middle = f64::midpoint(good, bad);
+        match held_at(bed, motors, middle)? {
+            Some(rate) => (good, held) = (middle, rate),
+            None => bad = middle,
+        }
+    }
+    Ok(held.floor().into())
+}
+
+/// The lowest mean rate of the motors in a move at `rate`, if that was held.
+fn held_at(bed: &Bed, motors: usize, rate: f64) -> Result<Option<f64>> {
+    let how = How { log: true, ..How::default() };
+    let (machine, report) = bed.try_run(&long_move(motors, rate), how, Vec::new())?;
+    if !report.ok {
+        return Ok(None);
+    }
+    let means: Vec<f64> = (0..motors).map(|m| mean_rate(&machine, m as u8)).collect();
+    let held = means.iter().all(|mean| (mean / rate - 1.0).abs() <= WITHIN);
+    Ok(held.then(|| means.into_iter().fold(f64::MAX, f64::min).min(rate)))
+}
+
+/// A move of this many motors, all at `rate` steps/s, long enough for cruise at `ACCELERATION`.
+pub fn long_move(motors: usize, rate: f64) -> String {
+    let velocity = rate / PER_MM;
+    // The slowest axis sets the pace of an acceleration along the path.
+    let mm = (velocity * velocity / ACCELERATION + CRUISE_S * velocity).round();
+    let z = mm * PER_MM / PER_MM_Z;
+    let path = [mm, mm.hypot(mm), (2.0 * mm * mm + z * z).sqrt()];
+    // A rotary axis has no part in the feed of a move of linear ones.
+    let feed = velocity * 60.0 * path[motors.min(3) - 1] / mm;
+    let words = [format!("X{mm}"), format!("Y{mm}"), format!("Z{z}"), format!("A{mm}")];
+    format!("G1 {} F{feed:.3}\n", words[..motors].join(" "))
+}
+
+/// Mean step rate of a motor in the middle of its steps' time.
+pub fn mean_rate(machine: &Machine, motor: u8) -> f64 {
+    let steps = machine.recorder().steps_of(motor);
+    let (Some(first), Some(last)) = (steps.first(), steps.last()) else { return 0.0 };
+    let middle = first.midpoint(*last);
+    let half = (COUNTED_S / 2.0 * f64::from(machine.board().clock_hz)) as u64;
+    let cruise = steps.iter().filter(|s| s.abs_diff(middle) <= half);
+    let (count, least, most) = cruise
+        .fold((0u32, u64::MAX, 0), |(n, least, most), s| (n + 1, least.min(*s), most.max(*s)));
+    if count < 2 { 0.0 } else { f64::from(count - 1) / machine.seconds(most - least) }
+}

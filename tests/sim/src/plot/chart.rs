@@ -1,0 +1,223 @@
+//! The picture, as SVG.
+
+use std::ops::Range;
+
+use anyhow::{Result, anyhow};
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+use super::Motion;
+use super::track::SAMPLE_S;
+
+const WIDTH: u32 = 1_100;
+const PATH_HEIGHT: u32 = 640;
+const CURVE_HEIGHT: u32 = 220;
+const MARGIN: u32 = 12;
+const LABELS_BELOW: u32 = 38;
+const LABELS_LEFT: u32 = 76;
+/// Width of the scale of colours.
+const SCALE: u32 = 110;
+/// Steps of the scale: as many as can be told apart.
+const COLOURS: usize = 16;
+/// Columns of a curve; more samples become the highest and lowest of a column.
+const COLUMNS: usize = 1_000;
+/// What a path may be simplified by, of its size.
+const SIMPLER: f64 = 1.0 / 2_000.0;
+const FONT: (&str, u32) = ("sans-serif", 13);
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// Draws all panels; the curves for `span` only, in s, if that is given.
+pub fn draw(motion: &Motion, span: Option<Range<f64>>) -> Result<String> {
+    let mut svg = String::new();
+    panels(&mut svg, motion, span).map_err(|e| anyhow!("cannot draw: {e}"))?;
+    Ok(svg)
+}
+
+type Drawn = Result<(), Box<dyn std::error::Error>>;
+
+fn panels(svg: &mut String, motion: &Motion, span: Option<Range<f64>>) -> Drawn {
+    let size = (WIDTH, PATH_HEIGHT + 3 * CURVE_HEIGHT);
+    let root = SVGBackend::with_string(svg, size).into_drawing_area();
+    root.fill(&WHITE)?;
+    let (top, rest) = root.split_vertically(PATH_HEIGHT);
+    let (plane, scale) = top.split_horizontally(WIDTH - SCALE);
+    let fastest = motion.velocity.iter().copied().fold(0.0, f64::max).max(1e-9);
+    path(&plane, motion, fastest)?;
+    colour_scale(&scale, fastest)?;
+    let all = 0.0..motion.velocity.len() as f64 * SAMPLE_S;
+    let span = span.unwrap_or(all);
+    let curves = [
+        (&motion.velocity, "velocity, mm/s"),
+        (&motion.acceleration, "acceleration, mm/s²"),
+        (&motion.jerk, "jerk, mm/s³"),
+    ];
+    for (area, (values, name)) in rest.split_evenly((3, 1)).iter().zip(curves) {
+        curve(area, values, name, &span)?;
+    }
+    root.present()?;
+    Ok(())
+}
+
+/// The path in the plane of X and Y, to scale.
+fn path(area: &Area<'_>, motion: &Motion, fastest: f64) -> Drawn {
+    let (x, y) = frame(area, &motion.path);
+    let tolerance = (x.end - x.start) * SIMPLER;
+    let mut chart = ChartBuilder::on(area)
+        .margin(MARGIN)
+        .x_label_area_size(LABELS_BELOW)
+        .y_label_area_size(LABELS_LEFT)
+        .build_cartesian_2d(x, y)?;
+    let mut mesh = chart.configure_mesh();
+    mesh.x_desc("X, mm").y_desc("Y, mm").label_style(FONT).max_light_lines(0).draw()?;
+    for (colour, points) in pieces(motion, fastest) {
+        let line = simplified(&points, tolerance);
+        chart.draw_series(LineSeries::new(line, colour.stroke_width(2)))?;
+    }
+    Ok(())
+}
+
+/// Ranges that hold all points, with a little around, at the same scale both ways.
+fn frame(area: &Area<'_>, points: &[(f64, f64)]) -> (Range<f64>, Range<f64>) {
+    let (width, height) = area.dim_in_pixel();
+    let inner = |size: u32, labels: u32| f64::from(size - 2 * MARGIN - labels);
+    let (width, height) = (inner(width, LABELS_LEFT), inner(height, LABELS_BELOW));
+    let xs = extent(points.iter().map(|p| p.0));
+    let ys = extent(points.iter().map(|p| p.1));
+    let unit = ((xs.end - xs.start) / width).max((ys.end - ys.start) / height) * 1.06;
+    let around = |range: Range<f64>, pixels: f64| {
+        let middle = f64::midpoint(range.start, range.end);
+        middle - unit * pixels / 2.0..middle + unit * pixels / 2.0
+    };
+    (around(xs, width), around(ys, height))
+}
+
+/// Lowest to highest; a little apart, even if all are the same.
+fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+    if low > high { -1.0..1.0 } else { low..high.max(low + 1e-3) }
+}
+
+/// The path in pieces of one colour, each joined to the next.
+fn pieces(motion: &Motion, fastest: f64) -> Vec<(RGBColor, Vec<(f64, f64)>)> {
+    let step =
+        |velocity: f64| (velocity / fastest * (COLOURS - 1) as f64).round().max(0.0) as usize;
+    let mut pieces: Vec<(usize, Vec<(f64, f64)>)> = Vec::new();
+    for (point, velocity) in motion.path.iter().zip(&motion.velocity) {
+        let step = step(*velocity);
+        match pieces.last_mut() {
+            Some((of, points)) if *of == step => points.push(*point),
+            last => {
+                let joint = last.and_then(|(_, points)| points.last().copied());
+                pieces.push((step, joint.into_iter().chain([*point]).collect()));
+            }
+        }
+    }
+    pieces.into_iter().map(|(step, points)| (colour(step), points)).collect()
+}
+
+/// From blue, slow, over green to red, fast.
+fn colour(step: usize) -> RGBColor {
+    let share = step as f64 / (COLOURS - 1) as f64;
+    let (r, g, b) = HSLColor(0.66 * (1.0 - share), 0.85, 0.42).to_backend_color().rgb;
+    RGBColor(r, g, b)
+}
+
+fn colour_scale(area: &Area<'_>, fastest: f64) -> Drawn {
+    let (_, height) = area.dim_in_pixel();
+    let (top, bottom) = (60, height as i32 - LABELS_BELOW as i32 - MARGIN as i32);
+    let step = (bottom - top) / COLOURS as i32;
+    area.draw(&Text::new("mm/s", (8, top - 24), FONT))?;
+    for n in 0..COLOURS {
+        let lower = bottom - step * n as i32;
+        let corners = [(8, lower - step), (28, lower)];
+        area.draw(&Rectangle::new(corners, colour(n).filled()))?;
+        let speed = fastest * n as f64 / (COLOURS - 1) as f64;
+        area.draw(&Text::new(format!("{speed:.2}"), (34, lower - step / 2 - 6), FONT))?;
+    }
+    Ok(())
+}
+
+/// A quantity over time.
+fn curve(area: &Area<'_>, values: &[f64], name: &str, span: &Range<f64>) -> Drawn {
+    let shown = columns(values, span);
+    let range = extent(shown.iter().map(|p| p.1).chain([0.0]));
+    let around = (range.end - range.start) * 0.06;
+    let mut chart = ChartBuilder::on(area)
+        .margin(MARGIN)
+        .margin_right(2 * MARGIN)
+        .x_label_area_size(LABELS_BELOW)
+        .y_label_area_size(LABELS_LEFT)
+        .build_cartesian_2d(span.clone(), range.start - around..range.end + around)?;
+    let mut mesh = chart.configure_mesh();
+    mesh.x_desc("time, s").y_desc(name).label_style(FONT).y_labels(7);
+    mesh.max_light_lines(0).draw()?;
+    chart.draw_series(LineSeries::new(shown, &BLUE))?;
+    Ok(())
+}
+
+/// The samples of a span, or the lowest and highest of each column if they are many.
+fn columns(values: &[f64], span: &Range<f64>) -> Vec<(f64, f64)> {
+    let index = |time: f64| ((time / SAMPLE_S).max(0.0) as usize).min(values.len());
+    let (from, to) = (index(span.start), index(span.end));
+    let samples: Vec<(f64, f64)> = (from..to).map(|n| (n as f64 * SAMPLE_S, values[n])).collect();
+    if samples.len() <= 2 * COLUMNS {
+        return samples;
+    }
+    let column = |points: &[(f64, f64)]| {
+        let by = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let (low, high) = (points.iter().min_by(by), points.iter().max_by(by));
+        let mut two = [low, high].map(|p| p.copied().unwrap_or_default());
+        two.sort_by(|a, b| a.0.total_cmp(&b.0));
+        two
+    };
+    samples.chunks(samples.len().div_ceil(COLUMNS)).flat_map(column).collect()
+}
+
+/// The corners that a line needs to stay within `tolerance` (Douglas and Peucker).
+fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
+    let Some(last) = points.len().checked_sub(1) else { return Vec::new() };
+    let mut keep = vec![false; points.len()];
+    let mut spans = vec![(0, last)];
+    (keep[0], keep[last]) = (true, true);
+    while let Some((from, to)) = spans.pop() {
+        let off = |n: usize| distance(points[n], points[from], points[to]);
+        let farthest = (from + 1..to).max_by(|a, b| off(*a).total_cmp(&off(*b)));
+        if let Some(n) = farthest.filter(|n| off(*n) > tolerance) {
+            keep[n] = true;
+            spans.extend([(from, n), (n, to)]);
+        }
+    }
+    points.iter().zip(keep).filter(|(_, keep)| *keep).map(|(point, _)| *point).collect()
+}
+
+/// Of a point from the stretch between two others.
+fn distance(p: (f64, f64), a: (f64, f64), b: (f64, f64)) -> f64 {
+    let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+    let square = dx * dx + dy * dy;
+    let along = ((p.0 - a.0) * dx + (p.1 - a.1) * dy) / square.max(1e-18);
+    let along = along.clamp(0.0, 1.0);
+    (p.0 - a.0 - along * dx).hypot(p.1 - a.1 - along * dy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn straight_lines_need_two_points() {
+        let line: Vec<_> = (0..100).map(|n| (f64::from(n), 2.0 * f64::from(n))).collect();
+        assert_eq!(simplified(&line, 0.01), [line[0], line[99]]);
+        let corner = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (2.0, 2.0)];
+        assert_eq!(simplified(&corner, 0.01), [corner[0], corner[2], corner[4]]);
+    }
+
+    #[test]
+    fn columns_keep_the_extremes() {
+        let values: Vec<f64> = (0..50_000).map(|n| if n == 31_234 { 9.0 } else { 1.0 }).collect();
+        let shown = columns(&values, &(0.0..50.0));
+        assert!(shown.len() <= 2 * COLUMNS);
+        assert!(shown.iter().any(|p| p.1 == 9.0));
+        assert!(shown.windows(2).all(|w| w[0].0 <= w[1].0));
+    }
+}

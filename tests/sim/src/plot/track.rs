@@ -1,0 +1,128 @@
+//! Steps to positions, a millisecond apart.
+//!
+//! A step is the moment at which the motor passes the middle between two positions. Between steps it is
+//! taken to move evenly; when none comes for [`STILL_S`] it stands, but for the half steps at both ends.
+
+use crate::machine::Machine;
+use crate::oracle::{AXES, MotorSetup, Setup, UNITS};
+
+/// Time between two samples, s.
+pub const SAMPLE_S: f64 = 0.001;
+/// A motor that makes no step for so long stands.
+const STILL_S: f64 = 0.2;
+/// Axes that are lengths, X Y Z.
+const LINEAR: usize = 3;
+
+/// The positions of all axes.
+pub type Position = [f64; AXES];
+
+/// A motor's way as corners of a line: time and position.
+type Corners = Vec<(f64, f64)>;
+
+/// Where the axes are, from the first step to the last. An axis with several motors goes by the first.
+pub fn positions(machine: &Machine, setup: &Setup) -> Vec<Position> {
+    let log = machine.recorder().log();
+    let (Some(first), Some(last)) = (log.first(), log.last()) else { return Vec::new() };
+    let count = (machine.seconds(last.cycle - first.cycle) / SAMPLE_S).ceil() as usize + 1;
+    let mut positions = vec![Position::default(); count];
+    for (motor, of) in setup.motors.iter().enumerate().rev() {
+        let steps = log.iter().filter(|s| usize::from(s.motor) == motor);
+        let seconds = |cycle: u64| machine.seconds(cycle - first.cycle);
+        let steps = steps.map(|s| (seconds(s.cycle), s.positive != of.inverted));
+        let corners = corners(steps, step_length(of));
+        for (position, value) in positions.iter_mut().zip(sampled(&corners)) {
+            position[of.axis] = value;
+        }
+    }
+    positions
+}
+
+/// Millimetres or degrees in a step.
+fn step_length(motor: &MotorSetup) -> f64 {
+    const FAR: i64 = 1_000_000;
+    match motor.steps(FAR * UNITS as i64) {
+        0 => 0.0,
+        steps => FAR as f64 / steps as f64,
+    }
+}
+
+fn corners(steps: impl Iterator<Item = (f64, bool)>, length: f64) -> Corners {
+    let mut corners = Corners::new();
+    let (mut at, mut before) = (0.0, f64::NEG_INFINITY);
+    let mut halting: Option<f64> = None;
+    let mut steps = steps.peekable();
+    while let Some((time, up)) = steps.next() {
+        let step = if up { length } else { -length };
+        let next = steps.peek().map_or(f64::INFINITY, |(next, _)| *next);
+        if time - before > STILL_S {
+            // It has stood: the first half step takes as long as the step that follows, if there is time.
+            let lead = (next - time).min(STILL_S).min(0.5 * (time - before));
+            corners.extend(halting.map(|halt| (halt, at)));
+            corners.push((time - lead, at));
+        }
+        corners.push((time, at + step / 2.0));
+        at += step;
+        let pace = if time - before > STILL_S { next - time } else { time - before };
+        halting = Some(time + pace.min(STILL_S / 2.0));
+        before = time;
+    }
+    corners.extend(halting.map(|halt| (halt, at)));
+    corners
+}
+
+/// The line's positions at all samples: before its first corner and behind its last it is level.
+fn sampled(corners: &[(f64, f64)]) -> impl Iterator<Item = f64> {
+    let mut next = 0;
+    (0..).map(move |n| {
+        let time = f64::from(n) * SAMPLE_S;
+        while corners.get(next).is_some_and(|corner| corner.0 <= time) {
+            next += 1;
+        }
+        match (next.checked_sub(1).map(|before| corners[before]), corners.get(next)) {
+            (Some((t0, p0)), Some((t1, p1))) => p0 + (p1 - p0) * (time - t0) / (t1 - t0),
+            (Some((_, position)), None) => position,
+            (None, _) => corners.first().map_or(0.0, |corner| corner.1),
+        }
+    })
+}
+
+/// The way made up to each sample: of the linear axes, or of the others where those never move.
+pub fn way(positions: &[Position]) -> Vec<f64> {
+    let moves = |axis: usize| positions.iter().any(|p| p[axis] != positions[0][axis]);
+    let axes = if (0..LINEAR).any(moves) { 0..LINEAR } else { LINEAR..AXES };
+    let mut sum = 0.0;
+    let distance = |pair: &[Position]| -> f64 {
+        axes.clone().map(|axis| (pair[1][axis] - pair[0][axis]).powi(2)).sum::<f64>().sqrt()
+    };
+    let rest = positions.windows(2).map(|pair| {
+        sum += distance(pair);
+        sum
+    });
+    std::iter::once(0.0).chain(rest).take(positions.len()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn even_steps_are_an_even_way() {
+        let steps = (0..1_000).map(|n| (0.01 + f64::from(n) * 0.002, true));
+        let corners = corners(steps, 0.5);
+        let samples: Vec<f64> = sampled(&corners).take(2_100).collect();
+        for (n, position) in samples[..2_000].iter().enumerate().skip(20) {
+            let want = (n as f64 * SAMPLE_S - 0.01) / 0.002 * 0.5 + 0.25;
+            assert!((position - want).abs() < 1e-9, "{n}: {position} instead of {want}");
+        }
+        assert_eq!(samples[2_099], 500.0);
+    }
+
+    #[test]
+    fn a_motor_stands_between_two_moves() {
+        let steps = [(0.0, true), (0.01, true), (1.0, false), (1.01, false)];
+        let corners = corners(steps.into_iter(), 1.0);
+        let samples: Vec<f64> = sampled(&corners).take(1_100).collect();
+        assert!(samples[30..980].iter().all(|p| *p == 2.0));
+        assert_eq!(samples[1_099], 0.0);
+    }
+}

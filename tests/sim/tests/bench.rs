@@ -1,0 +1,52 @@
+//! Every row of the bench keeps to its floor.
+
+mod common;
+
+use common::image;
+use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::bench::{Bed, ROWS, row};
+
+fn keeps_to_its_floor(name: &str) {
+    let row = row(name).unwrap();
+    let bed = Bed::new(&image(&MEGA2560_GRBL), &MEGA2560_GRBL).unwrap();
+    let figure = (row.measure)(&bed).unwrap();
+    let said = format!("{}: {} {} ({})", row.what, figure.value, row.unit, figure.note);
+    println!("{said}");
+    let floor = row.floor.unwrap_or(figure.value);
+    assert!(row.better.reaches(figure.value, floor), "{said}, but the floor is {floor}");
+}
+
+macro_rules! rows {
+    ($($test:ident = $name:literal;)+) => {
+        $(#[test]
+        fn $test() {
+            keeps_to_its_floor($name);
+        })+
+
+        #[test]
+        fn every_row_is_tested() {
+            assert_eq!(ROWS.each_ref().map(|row| row.name), [$($name),+]);
+        }
+    };
+}
+
+rows! {
+    one_motor = "rate-1";
+    three_motors = "rate-3";
+    four_motors = "rate-4";
+    jitter_on_a_quiet_line = "jitter-quiet";
+    jitter_on_a_busy_line = "jitter-busy";
+    jitter_of_a_minor_motor = "jitter-minor";
+    moves_of_a_tenth = "spiral-0.1";
+    moves_of_a_fifth = "spiral-0.2";
+    moves_of_a_half = "spiral-0.5";
+    moves_of_a_tenth_on_a_fast_line = "spiral-0.1-fast";
+    moves_of_a_fifth_on_a_fast_line = "spiral-0.2-fast";
+    moves_of_a_half_on_a_fast_line = "spiral-0.5-fast";
+    moves_of_a_tenth_with_a_jerk_limit = "spiral-0.1-jerk";
+    lines_in_a_second = "lines";
+    interrupts_off = "interrupts-off";
+    cycles_of_a_segment = "segment";
+    cycles_of_replanning = "replan";
+    beyond_the_limit = "beyond";
+}

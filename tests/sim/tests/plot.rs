@@ -1,0 +1,127 @@
+//! The pictures of a job: made from the steps, and read back.
+
+mod common;
+
+use std::fs::{self, File};
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use common::firmware;
+use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::Machine;
+use kerf_sim::job::{self, Options};
+use kerf_sim::plot::{self, Look, Motion, WINDOW_MS};
+use kerf_sim::report::Report;
+
+/// Steps a millimetre.
+const PER_MM: f64 = 1_280.0;
+/// The default jerk limit of an axis, mm/s3.
+const JERK: f64 = 20e6 / 216_000.0;
+
+fn scratch(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
+fn run(job: &str, options: &Options) -> (Machine, Report) {
+    let mut machine = firmware(&MEGA2560_GRBL);
+    machine.recorder_mut().keep_log();
+    let report = job::run(&mut machine, &job::lines_of(job), options, |_| {}).unwrap();
+    assert!(report.ok, "{report}");
+    (machine, report)
+}
+
+fn highest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::MIN, f64::max)
+}
+
+#[test]
+fn an_s_curve_is_seen_in_the_steps() {
+    let (machine, report) = run("g1 x20 f600", &Options::default());
+    let motion = Motion::of(&machine, &report.setup, WINDOW_MS);
+    // 10 mm/s, and ramps in which the jerk limit is in force.
+    let velocity = highest(&motion.velocity);
+    assert!((velocity / 10.0 - 1.0).abs() < 0.02, "{velocity} mm/s");
+    let ramp = 2.0 * (10.0f64 / JERK).sqrt();
+    let way: f64 = motion.velocity.iter().sum::<f64>() * 1e-3;
+    assert!((way - 20.0).abs() < 0.05, "{way} mm");
+    let seconds = motion.velocity.len() as f64 * 1e-3;
+    // The first and the last half step, 29 ms each, are not seen.
+    assert!((seconds - (2.0 + ramp - 0.058)).abs() < 0.01, "{seconds} s");
+    let acceleration = highest(&motion.acceleration);
+    let peak = (10.0 * JERK).sqrt();
+    assert!((acceleration / peak - 1.0).abs() < 0.1, "{acceleration} instead of {peak} mm/s2");
+    // In the middle of the first half of the ramp up; then of the second.
+    let jerk = |share: f64| {
+        let middle = (share * ramp * 1e3) as usize;
+        let around = &motion.jerk[middle - 40..middle + 40];
+        around.iter().sum::<f64>() / around.len() as f64
+    };
+    assert!((jerk(0.25) / JERK - 1.0).abs() < 0.1, "{}", jerk(0.25));
+    assert!((jerk(0.75) / -JERK - 1.0).abs() < 0.1, "{}", jerk(0.75));
+}
+
+#[test]
+fn the_plot_is_complete_and_small() {
+    let (machine, report) = run("g0 x10 y10\ng1 x20 f600\ny20\ng0 x0 y0", &Options::default());
+    let file = scratch("plot.svg");
+    plot::write(&file, &machine, &report.setup, &Look::default()).unwrap();
+    let svg = fs::read_to_string(&file).unwrap();
+    assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
+    assert!(svg.len() < 500_000, "{} bytes", svg.len());
+    for text in
+        ["X, mm", "Y, mm", "time, s", "velocity, mm/s", "acceleration, mm/s²", "jerk, mm/s³"]
+    {
+        assert!(svg.contains(text), "no {text}");
+    }
+    let lines = svg.split("<polyline").skip(1).filter_map(|l| l.split("points=\"").nth(1));
+    let mut most = 0;
+    for points in lines.filter_map(|l| l.split('"').next()) {
+        let numbers = points.split([' ', ',']).filter(|n| !n.is_empty());
+        let numbers: Vec<f64> = numbers.map(|n| n.parse().unwrap()).collect();
+        assert!(numbers.iter().all(|n| (0.0..=1_300.0).contains(n)), "{points}");
+        most = most.max(numbers.len() / 2);
+    }
+    assert!(most > 1_000, "{most} points in a curve");
+    let part = Look { span: Some(0.5..0.6), ..Look::default() };
+    plot::write(&file, &machine, &report.setup, &part).unwrap();
+    assert!(fs::read_to_string(&file).unwrap().len() < svg.len());
+}
+
+#[test]
+fn a_job_without_a_step_can_be_drawn() {
+    let (machine, report) = run("g4 p0.1", &Options::default());
+    let file = scratch("still.svg");
+    plot::write(&file, &machine, &report.setup, &Look::default()).unwrap();
+}
+
+#[test]
+fn the_trace_has_velocities_that_end_at_rest() {
+    let file = scratch("velocity.vcd");
+    let options = Options { vcd: Some(file.clone()), ..Options::default() };
+    let (machine, _) = run("g1 x20 f600\nx15", &options);
+    let mut reader = vcd::Parser::new(BufReader::new(File::open(file).unwrap()));
+    let header = reader.parse_header().unwrap();
+    let code = |name: &str| header.find_var(&["motors", name]).unwrap().code;
+    let (step, dir, velocity) = (code("step1"), code("dir1"), code("velocity1"));
+    let (mut time, mut steps, mut turns, mut values) = (0, 0, 0, Vec::new());
+    for command in reader {
+        match command.unwrap() {
+            vcd::Command::Timestamp(at) => {
+                assert!(at >= time, "time runs back");
+                time = at;
+            }
+            vcd::Command::ChangeScalar(id, value) => {
+                steps += u64::from(id == step && value == vcd::Value::V1);
+                turns += u64::from(id == dir && value == vcd::Value::V1);
+            }
+            vcd::Command::ChangeReal(id, value) if id == velocity => values.push(value),
+            _ => {}
+        }
+    }
+    assert_eq!((steps, turns), (machine.recorder().motors()[0].steps, 1));
+    let cruise = 10.0 * PER_MM;
+    let (low, high) = (values.iter().copied().fold(0.0, f64::min), highest(&values));
+    assert!((high / cruise - 1.0).abs() < 0.05, "{high} instead of {cruise}");
+    assert!(low < -0.3 * cruise && low >= -1.05 * cruise, "{low}");
+    assert_eq!(values.last(), Some(&0.0));
+}
