@@ -185,6 +185,8 @@ fn exact_stop_stops_between_moves_and_not_within_an_arc() {
     assert_eq!(continuous, exact_path);
     // Two more stops: half of the ramp down and half of the ramp up are lost at each.
     assert!(exact_stop > continuous + 100, "{exact_stop} and {continuous} ms");
+    let (one, _) = time("g1 f600 x2\n");
+    assert!(exact_stop + 50 > 3 * one, "each of {exact_stop} ms is from rest to rest, {one} ms");
     assert_eq!((end, stop_end), ([7_680, 0, 0, 0], [7_680, 0, 0, 0]));
     let (arc, _) = time("g64 g1 f600 x1\ng2 i5\n");
     let (stopping_arc, _) = time("g61.1 g1 f600 x1\ng2 i5\n");

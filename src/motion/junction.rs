@@ -7,32 +7,36 @@
 //! Called by the line builder. Units: mm (degrees for rotary axes), s. Costs are AVR cycles.
 
 use super::dynamics::Dynamics;
-use super::float::{below, quarter, some};
+use super::float::{below, some};
 use crate::math::sqrt;
 use crate::units::PerAxis;
 
-/// Squared sine of half a change of direction, about 0.1 degree, that counts as none: positions in
-/// units of 0.1 um turn 0.1 mm segments of a straight line by as much.
-const STRAIGHT: f32 = 1e-6;
+/// The square of a change of direction, about 0.1 degree, that counts as none: positions in units of
+/// 0.1 um turn 0.1 mm segments of a straight line by as much. In 2^-28.
+const STRAIGHT: u32 = 1000;
 /// Beyond this the direction is reversed, about 0.4 degree from it; rounding decides what is left.
 const REVERSED: f32 = 1.0 - 1e-5;
 
 /// The direction of a move.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heading {
-    /// How far each axis travels for a unit of the path. A unit vector but for moves of linear and
-    /// rotary axes together, whose path is that of the linear ones: then it is longer.
-    pub unit: PerAxis<f32>,
+    /// How far each axis travels for a unit of the path, in 2^-14: up to [`ONE`] for moves whose path is
+    /// that of these axes. Moves of linear and rotary axes together have the path of the linear ones,
+    /// and may have more of a rotary one.
+    pub unit: PerAxis<i16>,
     /// Junction deviation in this direction, mm.
     pub deviation: f32,
 }
 
-/// The junction deviation along `unit`. Cost: 100 where all axes that move have the same, else
-/// 900 + 750 for each axis that moves.
-pub fn deviation(unit: &PerAxis<f32>, dynamics: &Dynamics) -> f32 {
+/// 1 in the units of a heading.
+pub const ONE: i16 = 1 << 14;
+
+/// The junction deviation along `unit`. Cost: 150 where all axes that move have the same, else
+/// 1,000 + 900 for each axis that moves.
+pub fn deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> f32 {
     let mut same = None;
     for (&u, axis) in unit.iter().zip(&dynamics.axes) {
-        if some(u) && *same.get_or_insert(axis.deviation) != axis.deviation {
+        if u != 0 && *same.get_or_insert(axis.deviation) != axis.deviation {
             return mean_deviation(unit, dynamics);
         }
     }
@@ -40,10 +44,11 @@ pub fn deviation(unit: &PerAxis<f32>, dynamics: &Dynamics) -> f32 {
 }
 
 #[inline(never)]
-fn mean_deviation(unit: &PerAxis<f32>, dynamics: &Dynamics) -> f32 {
+fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> f32 {
     let (mut norm, mut sum) = (0.0, 0.0);
     for (&u, axis) in unit.iter().zip(&dynamics.axes) {
-        if some(u) {
+        if u != 0 {
+            let u = f32::from(u);
             let part = u * axis.deviation.get();
             norm += u * u;
             sum += part * part;
@@ -58,20 +63,19 @@ fn mean_deviation(unit: &PerAxis<f32>, dynamics: &Dynamics) -> f32 {
 /// The axes' velocities change by `(b.unit - a.unit) * velocity`, also where the two paths are
 /// measured differently (linear, rotary, both), so that it is this difference that counts.
 ///
-/// Cost: 600 + 430 for each axis that moves; 1,600 more for one below `most`.
+/// Cost: 800 + 50 for each axis that moves; 1,600 more for one below `most`.
+#[inline(never)]
 pub fn limit(a: &Heading, b: &Heading, acceleration: f32, most: f32) -> f32 {
     // |b - a| = 2 sin(angle / 2): precise for small angles, which 1 - cos(angle) is not.
-    let mut sine = 0.0;
+    let mut sum = 0u32;
     for (from, to) in a.unit.iter().zip(&b.unit) {
-        if from.to_bits() != to.to_bits() {
-            let change = to - from;
-            sine += change * change;
-        }
+        let change = u32::from(to.abs_diff(*from));
+        sum = sum.saturating_add(change * change);
     }
-    let sine = quarter(sine);
-    if below(sine, STRAIGHT) {
+    if sum < STRAIGHT {
         return f32::MAX;
     }
+    let sine = sum as f32 * (0.25 / (ONE as f32 * ONE as f32));
     let deviation = if a.deviation.to_bits() == b.deviation.to_bits() {
         a.deviation
     } else {

@@ -12,11 +12,12 @@
 //! possible: then they are those of the slowest axis that moves, whatever the direction.
 
 use super::block::{Block, Body, Line as Move};
+use super::divide::{quotient, root};
 use super::dynamics::{Axis, Dynamics};
 use super::exec::{BLOCK_S_MIN, step_rate_max};
-use super::float::{below, least, size, some};
+use super::float::{below, least, scaled, some};
 use super::governor::{ACCEL_MOST, effective_jerk};
-use super::junction::{self, Heading};
+use super::junction::{self, Heading, ONE};
 use super::prep::STEPS_MAX;
 use super::short::Short;
 use super::steps::Motor;
@@ -167,34 +168,38 @@ struct Path {
 
 impl Path {
     /// Length and direction. The length is that of the linear axes; of the rotary ones if no linear
-    /// one moves.
+    /// one moves. In 15 bits: 0.01 % exact.
     #[inline(never)]
     fn measure(&mut self, from: &PerAxis<Length>, to: &PerAxis<Length>) -> Way {
-        let mut linear = Norm::default();
-        let mut rotary = Norm::default();
+        let mut bits = 0;
         for axis in 0..AXES {
             if from[axis] != to[axis] {
                 let Some(way) = to[axis].0.checked_sub(from[axis].0) else {
                     return Way::Far;
                 };
                 self.travel[axis] = way;
-                let unit = way as f32;
-                self.heading.unit[axis] = unit;
-                let norm = if axis < FIRST_ROTARY { &mut linear } else { &mut rotary };
-                norm.add(unit);
+                bits |= way.unsigned_abs();
             }
         }
-        let length = if linear.terms > 0 { linear.root() } else { rotary.root() };
-        if !some(length) {
+        if bits == 0 {
             return Way::None;
         }
-        let scale = 1.0 / length;
+        let shift = normalize(&mut self.heading.unit, &self.travel, bits);
+        let (linear, rotary) = self.heading.unit.split_at(FIRST_ROTARY);
+        let mut length = norm(linear);
+        if length == 0 {
+            length = norm(rotary);
+        }
+        if length == 0 {
+            // A linear move too short beside its rotary one to be told from none.
+            length = 1;
+        }
         for u in &mut self.heading.unit {
-            if some(*u) {
-                *u *= scale;
+            if *u != 0 {
+                *u = share(*u, length);
             }
         }
-        self.length = length * 1e-4;
+        self.length = scaled(f32::from(length) * 1e-4, shift);
         Way::Near
     }
 
@@ -237,10 +242,14 @@ impl Path {
             _ => CRUISE_MOST,
         };
         for (&u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
-            if some(u) {
-                let velocity = if feed.is_some() { axis.feed } else { axis.velocity };
-                let u = size(u);
-                if some(velocity) && below(velocity, u * self.cruise) {
+            if u == 0 {
+                continue;
+            }
+            let velocity = if feed.is_some() { axis.feed } else { axis.velocity };
+            // Most axes are slower than the path.
+            if some(velocity) && (below(velocity, self.cruise) || u.unsigned_abs() > ONE as u16) {
+                let u = float(u.unsigned_abs());
+                if below(velocity, u * self.cruise) {
                     self.cruise = velocity / u;
                 }
             }
@@ -258,20 +267,20 @@ impl Path {
     fn limit_change(&mut self, dynamics: &Dynamics) {
         let mut slowest = Slowest::default();
         for (&u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
-            if some(u) {
-                slowest.look(size(u), axis);
+            if u != 0 {
+                slowest.look(u.unsigned_abs(), axis);
             }
         }
         let mut jerk = slowest.jerk.get();
         let mut least = slowest.least.get();
         // Moves of both linear and rotary axes may have units above 1.
-        if below(1.0, slowest.most) {
-            jerk /= slowest.most;
-            least /= slowest.most;
+        if slowest.most > ONE as u16 {
+            jerk /= float(slowest.most);
+            least /= float(slowest.most);
         }
         if some(least) {
             let jerk = effective_jerk(jerk, least);
-            let accel = if some(jerk) { least } else { slowest.accel.get() / slowest.unit };
+            let accel = if some(jerk) { least } else { slowest.accel.get() / float(slowest.unit) };
             self.accel = Short::new(least_of(accel));
             self.jerk = Short::new(jerk);
         } else if some(jerk) {
@@ -308,30 +317,70 @@ fn least_of(accel: f32) -> f32 {
     least(accel, ACCEL_MOST)
 }
 
-/// The length of a vector, of which one term is usual.
-#[derive(Default)]
-struct Norm {
-    only: f32,
-    sum: f32,
-    terms: u8,
+/// The travel in 15 bits and a sign, and the power of two that takes it back. `bits` is the union of
+/// the sizes.
+#[inline(never)]
+fn normalize(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, bits: u32) -> i8 {
+    const MOST: u32 = 1 << 14;
+    let mut bits = bits;
+    let mut shift = 0i8;
+    while bits >= 2 * MOST {
+        bits >>= 1;
+        shift += 1;
+    }
+    while bits < MOST {
+        bits <<= 1;
+        shift -= 1;
+    }
+    for (unit, &way) in unit.iter_mut().zip(travel) {
+        *unit = if way == 0 {
+            0
+        } else if shift <= 0 {
+            // The result has 15 bits: no more are needed on the way.
+            let mut way = way as i16;
+            for _ in 0..-shift {
+                way <<= 1;
+            }
+            way
+        } else {
+            (way >> shift) as i16
+        };
+    }
+    shift
 }
 
-impl Norm {
-    fn add(&mut self, term: f32) {
-        if self.terms == 0 {
-            self.only = term;
-        } else {
-            if self.terms == 1 {
-                self.sum = self.only * self.only;
-            }
-            self.sum += term * term;
+/// The length of a vector.
+#[inline(never)]
+fn norm(vector: &[i16]) -> u16 {
+    let mut sum = 0u32;
+    let mut only = 0u16;
+    let mut terms = 0u8;
+    for &term in vector {
+        if term != 0 {
+            terms += 1;
+            only = term.unsigned_abs();
+            sum += u32::from(only) * u32::from(only);
         }
-        self.terms += 1;
     }
+    if terms < 2 { only } else { root(sum) }
+}
 
-    fn root(&self) -> f32 {
-        if self.terms < 2 { size(self.only) } else { sqrt(self.sum) }
-    }
+/// `part / whole` in the units of a heading.
+#[inline(never)]
+fn share(part: i16, whole: u16) -> i16 {
+    let size = part.unsigned_abs();
+    // Twice and more: a rotary axis beside a linear one.
+    let share = if size >> 1 >= whole {
+        i16::MAX
+    } else {
+        quotient(u32::from(size) << 14, whole).min(i16::MAX as u16) as i16
+    };
+    if part < 0 { -share } else { share }
+}
+
+/// A part of a heading as a float.
+fn float(u: u16) -> f32 {
+    scaled(f32::from(u), -14)
 }
 
 /// Velocities beyond all machines, mm/s.
@@ -344,15 +393,15 @@ const CRUISE_LEAST: f32 = 1e-6;
 struct Slowest {
     /// Limit and unit of the axis that limits most.
     accel: Short,
-    unit: f32,
+    unit: u16,
     least: Short,
     jerk: Short,
     /// The largest unit.
-    most: f32,
+    most: u16,
 }
 
 impl Slowest {
-    fn look(&mut self, u: f32, axis: &Axis) {
+    fn look(&mut self, u: u16, axis: &Axis) {
         if axis.accel != Short::ZERO {
             if self.least == Short::ZERO || axis.accel < self.least {
                 self.least = axis.accel;
@@ -360,9 +409,9 @@ impl Slowest {
             let slower = if self.accel == Short::ZERO {
                 true
             } else if axis.accel == self.accel {
-                below(self.unit, u)
+                self.unit < u
             } else {
-                below(axis.accel.get() * self.unit, self.accel.get() * u)
+                below(axis.accel.get() * f32::from(self.unit), self.accel.get() * f32::from(u))
             };
             if slower {
                 self.accel = axis.accel;
@@ -372,7 +421,7 @@ impl Slowest {
         if axis.jerk != Short::ZERO && (self.jerk == Short::ZERO || axis.jerk < self.jerk) {
             self.jerk = axis.jerk;
         }
-        if below(self.most, u) {
+        if self.most < u {
             self.most = u;
         }
     }

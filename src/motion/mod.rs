@@ -3,10 +3,11 @@
 //! ```text
 //! target -> line -> block queue -> exec -> segment ring -> dda -> pins
 //!           junction   |   ^        governor, prep
-//!                      horizon
+//!                      horizon      smooth, brake, reach
 //! ```
 
 pub mod block;
+pub mod brake;
 pub mod dda;
 pub mod divide;
 pub mod dynamics;
@@ -18,5 +19,8 @@ pub mod junction;
 pub mod line;
 pub mod prep;
 pub mod queue;
+pub mod reach;
 pub mod short;
+pub mod smooth;
+pub mod state;
 pub mod steps;

@@ -7,8 +7,8 @@
 use core::cell::UnsafeCell;
 
 use super::block::{Block, Body, Line};
-use super::float::lesser;
-use super::horizon::{Horizon, kappa};
+use super::float::{greater, lesser};
+use super::horizon::{self, Horizon, kappa};
 use super::short::Short;
 use crate::hal::imp::exec;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
@@ -88,6 +88,8 @@ pub fn used() -> usize {
 #[derive(Clone, Copy)]
 struct Last {
     cruise: f32,
+    /// The highest velocity since the last key: many that are a little slower each do need one.
+    high: f32,
     kappa: f32,
     limits: (Short, Short),
 }
@@ -137,11 +139,22 @@ impl BlockQueue {
             None => true,
             Some(last) => {
                 let limit = lesser(last.cruise, line.cruise) * WORTH;
-                entry < limit || line.cruise < last.cruise * WORTH
+                entry < limit || line.cruise < last.high * WORTH
             }
         };
-        let firm = self.last.is_some_and(|last| last.jerk_limits_change(&line, kappa));
-        let key = (needed || firm).then(|| (line.key(), if firm { FIRM } else { 0 }));
+        let mut key = None;
+        match self.last {
+            // What comes before brakes with its own limits.
+            Some(last) if last.jerk_limits_change(&line, kappa) => {
+                key = Some((line.start + horizon::key(line.entry.get(), last.kappa), FIRM));
+            }
+            _ if needed => key = Some((line.key(), 0)),
+            _ => {}
+        }
+        let high = match self.last {
+            Some(last) if key.is_none() => greater(last.high, line.cruise),
+            _ => line.cruise,
+        };
         let end = line.start + line.gain();
         let pushed = self.put(Block { body: Body::Line(line), line: number }, key, |horizon| {
             horizon.end = end;
@@ -149,7 +162,7 @@ impl BlockQueue {
         });
         if pushed {
             let limits = (line.accel, line.jerk);
-            self.last = Some(Last { cruise: line.cruise, kappa, limits });
+            self.last = Some(Last { cruise: line.cruise, high, kappa, limits });
         }
         pushed
     }
@@ -242,6 +255,8 @@ pub struct Anchor {
     pub velocity: f32,
     /// Brake potential from the end of the oldest block to there.
     pub ahead: f32,
+    /// Limits change there: what comes after is for the line that begins there.
+    pub firm: bool,
 }
 
 /// Exec's end.
@@ -305,14 +320,17 @@ impl BlockSource {
     /// end of the queue. Cost: 1,000.
     pub fn anchor(&self, n: u8) -> Option<Anchor> {
         let horizon = self.horizon();
-        let anchor = |line: &Line| (line.entry.get(), line.start);
-        match horizon.nth(n).and_then(|seq| self.line(seq, anchor)) {
-            Some((velocity, start)) => Some(Anchor { velocity, ahead: start - self.end() }),
-            None if n == 0 || horizon.nth(n - 1).is_some() => {
-                Some(Anchor { velocity: 0.0, ahead: horizon.end - self.end() })
-            }
-            None => None,
-        }
+        let Some(seq) = horizon.nth(n) else {
+            let last = n == 0 || horizon.nth(n - 1).is_some();
+            let ahead = horizon.end - self.end();
+            return last.then_some(Anchor { velocity: 0.0, ahead, firm: true });
+        };
+        let firm = seq & FIRM != 0;
+        self.line(seq, |line| (line.entry.get(), line.start)).map(|(velocity, start)| Anchor {
+            velocity,
+            ahead: start - self.end(),
+            firm,
+        })
     }
 
     /// Potential at the end of the oldest block.

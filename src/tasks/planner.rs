@@ -42,14 +42,45 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
     };
     loop {
         links.planner_wake.wait().await;
-        let commands = *links.commands.borrow();
-        planner.carry_out(&commands).await;
+        if !planner.carry_out_at_once() {
+            let commands = *links.commands.borrow();
+            planner.carry_out(&commands).await;
+        }
         links.commands_taken.set(false);
         links.parser_wake.signal();
     }
 }
 
 impl Planner {
+    /// Most lines are a straight move for which there is room: no need to copy what they ask for, nor
+    /// to be prepared for a wait. False, and nothing done, for all others.
+    #[inline(never)]
+    fn carry_out_at_once(&mut self) -> bool {
+        let commands = self.links.commands.borrow();
+        let (target, feed) = match &commands.motion {
+            Motion::Traverse { target } => (target, None),
+            Motion::Feed { target, feed } => (target, Some(*feed)),
+            _ => return false,
+        };
+        let alone = commands.dwell_ms.is_none()
+            && commands.set_position.is_none()
+            && commands.stop == Stop::None;
+        let quiet = !self.links.settings_changed.get() && !self.links.resync.get();
+        if !alone || !quiet || self.queue.free() == 0 {
+            return false;
+        }
+        self.line = commands.line;
+        if self.line(target, feed).is_some() {
+            return false;
+        }
+        if commands.exact_stop {
+            self.builder.stopped();
+        }
+        self.position = *target;
+        self.announce();
+        true
+    }
+
     /// Does everything a line asks for, in order.
     async fn carry_out(&mut self, commands: &Commands) {
         self.line = commands.line;
@@ -178,10 +209,14 @@ impl Planner {
 
     /// Tells the others, and lets them run.
     async fn pushed(&self) {
+        self.announce();
+        yield_now().await;
+    }
+
+    fn announce(&self) {
         exec::pend();
         self.links.queue_count.add();
         self.links.reporter_wake.signal();
-        yield_now().await;
     }
 }
 
