@@ -19,6 +19,7 @@ use crate::protocol::{Mode, StatusReport};
 use crate::tasks::lines::LinePool;
 use crate::tasks::links::{Links, QueueCount};
 use crate::tasks::tx::Tx;
+use crate::tasks::view::set_outputs;
 use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, power, reader, reporter};
 
@@ -68,6 +69,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     let segments = stepper::start()?;
     let (queue, source) = queue::store().split()?;
     let links = place(outgoing, rate);
+    set_outputs(&links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received).ok()?);
     main.spawn(planner_task(links, queue).ok()?);

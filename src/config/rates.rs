@@ -11,18 +11,30 @@ use crate::boards::MOTORS;
 use crate::units::AXES;
 
 impl Settings {
-    /// Lowers the velocity limits of the axis that `setting` is about to what its motors can follow at
-    /// `rate` steps a second. Whether one was above it.
-    pub fn limit_velocity(&mut self, setting: Setting, rate: u32) -> bool {
-        let axis = match setting.owner() {
-            Owner::System => return false,
-            Owner::Motor(motor) => self.motor_axis(motor.into()),
-            Owner::Axis(axis) => axis,
-        };
+    /// Lowers the velocity limits of the axes that `setting` is about to what their motors can follow:
+    /// `rate` steps a second for so many motors. Whether one was above it.
+    pub fn limit_velocity(&mut self, setting: Setting, rate: impl Fn(usize) -> u32) -> bool {
+        match setting.owner() {
+            Owner::System if setting.is_pulse_width() => {
+                let mut lowered = false;
+                for axis in 0..AXES as u8 {
+                    lowered |= self.limit_axis(axis, &rate);
+                }
+                lowered
+            }
+            Owner::System => false,
+            Owner::Motor(motor) => self.limit_axis(self.motor_axis(motor.into()), &rate),
+            Owner::Axis(axis) => self.limit_axis(axis, &rate),
+        }
+    }
+
+    #[inline(never)]
+    fn limit_axis(&mut self, axis: u8, rate: &impl Fn(usize) -> u32) -> bool {
         if usize::from(axis) >= AXES {
             return false;
         }
         let motors = (0..MOTORS).filter(|motor| self.motor_axis(*motor) == axis);
+        let rate = rate(motors.clone().count());
         let most = motors.filter_map(|motor| fastest(self.step_ratio(motor), rate)).min();
         let Some(most) = most else { return false };
         let mut lowered = false;
@@ -60,7 +72,7 @@ mod tests {
 
     fn store(settings: &mut Settings, name: &str, value: i32) -> bool {
         settings.store(setting(name), value);
-        settings.limit_velocity(setting(name), 40_000)
+        settings.limit_velocity(setting(name), |_| 40_000)
     }
 
     fn get(settings: &Settings, name: &str) -> i32 {

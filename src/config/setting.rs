@@ -168,6 +168,13 @@ impl Setting {
         large && row.slot == table::system::BAUD
     }
 
+    /// Whether it is the width of step pulses.
+    pub fn is_pulse_width(self) -> bool {
+        let row = self.row();
+        let small = self.owner() == Owner::System && row.kind == Kind::Small;
+        small && row.slot == table::system::SPW
+    }
+
     /// Whose it is.
     pub fn owner(self) -> Owner {
         if self.0 < FIRST_MOTOR {

@@ -3,7 +3,9 @@
 //! Owned by the planner task, made from the settings when they change: they keep integers in the units
 //! of the sender, whose conversion takes longer than planning a block.
 
+use super::pace::Drivers;
 use super::short::Short;
+use crate::boards::MOTORS;
 use crate::units::{AXES, PerAxis};
 
 /// Where the limits come from: the settings, in their units. Axes are 0 to 5 for X Y Z A B C; a limit that
@@ -21,6 +23,10 @@ pub trait Machine {
     fn junction_deviation(&self, axis: usize) -> f32;
     /// Junction acceleration, mm/min^2.
     fn junction_acceleration(&self) -> f32;
+    /// What the drivers ask for.
+    fn drivers(&self) -> Drivers {
+        Drivers::USUAL
+    }
 }
 
 /// Limits of an axis; 0 for none.
@@ -45,10 +51,12 @@ pub struct Dynamics {
     pub axes: PerAxis<Axis>,
     /// Junction acceleration, mm/s^2.
     pub junction: f32,
+    /// Highest step rate of each motor when so many move, less one; steps/s.
+    pub rates: [f32; MOTORS],
 }
 
 impl Dynamics {
-    /// Cost: 2,000 an axis.
+    /// Cost: 2,000 an axis, 600 for each number of motors.
     pub fn new(machine: &impl Machine) -> Self {
         let mut axes = [Axis::default(); AXES];
         for (n, axis) in axes.iter_mut().enumerate() {
@@ -60,6 +68,11 @@ impl Dynamics {
                 deviation: Short::new(machine.junction_deviation(n)),
             };
         }
-        Self { axes, junction: machine.junction_acceleration() * (1.0 / 3_600.0) }
+        let drivers = machine.drivers();
+        Self {
+            axes,
+            junction: machine.junction_acceleration() * (1.0 / 3_600.0),
+            rates: core::array::from_fn(|others| drivers.step_rate_max(others + 1)),
+        }
     }
 }

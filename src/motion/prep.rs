@@ -22,6 +22,7 @@
 
 use super::dda::{STEP, Segment};
 use super::divide::{quotient, quotient_remainder};
+use super::pace::{COARSEST, Drivers, Pace, paces};
 use crate::boards::MOTORS;
 
 const STEP_LOG2: u8 = 15;
@@ -38,47 +39,17 @@ pub const CYCLES_MAX: u32 = 1 << 20;
 /// Longest tick.
 const PERIOD_MAX: u32 = 0xFFFF;
 
-/// How close ticks may come.
-struct Pace {
-    /// Shortest tick period, CPU cycles: the step interrupt with so many motors, a short interrupt
-    /// before it, and some time for everything else.
-    shortest: u16,
-    /// 2^22 / the tick period of steady motion: as fine as leaves exec and the planner a third of the CPU.
-    fine: u16,
-    /// 2^22 / that of short blocks, for which they need more.
-    coarse: u16,
-    /// From this tick period on pulses wait for the interrupt's worst latency ([`Segment::settle`]).
-    settles: u16,
-}
-
-/// By the number of motors that move, less one.
-const PACES: [Pace; MOTORS] = [
-    Pace { shortest: 160, fine: per(200), coarse: per(400), settles: 200 },
-    Pace { shortest: 200, fine: per(200), coarse: per(400), settles: 200 },
-    Pace { shortest: 240, fine: per(320), coarse: per(480), settles: 300 },
-    Pace { shortest: 320, fine: per(400), coarse: per(560), settles: 320 },
-];
-
-/// Ticks of blocks so short that they are a single segment.
-const COARSEST: u16 = per(640);
-
 /// Blocks that take longer than this have fine ticks, s.
 pub const FINE_S: f32 = 0.05;
 
 /// Latest cycle of a tick at which the interrupt may find itself ready for its pulses.
 const SETTLE: u8 = 68;
 
+/// Latest cycle behind its tick at which a segment's directions stand.
+const TURNED: u16 = 150;
+
 /// A lockstep segment has at least half as many ticks, if it is shorter than as many steps.
 const LOCKSTEP_TICKS: u32 = 16;
-
-const fn per(cycles: u32) -> u16 {
-    ((1 << 22) / cycles) as u16
-}
-
-/// Shortest tick period with `motors` moving, CPU cycles.
-pub const fn shortest(motors: usize) -> u16 {
-    PACES[if motors == 0 { 0 } else { motors - 1 }].shortest
-}
 
 /// A motor that moves but does not step on every tick of the dominant one.
 #[derive(Clone, Copy, Debug, Default)]
@@ -115,6 +86,14 @@ pub struct Prep {
     backwards: u8,
     /// Ticks are to be as fine as can be.
     fine: bool,
+    /// A motor has turned round, and no segment tells of it yet.
+    turned: bool,
+    /// By the number of motors that move, less one.
+    paces: [Pace; MOTORS],
+    /// How long directions must stand before the first step, CPU cycles.
+    setup: u16,
+    /// A segment that comes behind one in which directions settle.
+    held: Option<Segment>,
 }
 
 impl Prep {
@@ -133,7 +112,24 @@ impl Prep {
             others: 0,
             backwards: 0,
             fine: false,
+            turned: false,
+            paces: paces(Drivers::USUAL),
+            setup: Drivers::USUAL.setup(),
+            held: None,
         }
+    }
+
+    /// From the next block on, this is what the drivers ask for.
+    #[inline(never)]
+    pub fn set_drivers(&mut self, drivers: Drivers) {
+        self.paces = paces(drivers);
+        self.setup = drivers.setup();
+    }
+
+    /// The segment that comes before any other, if there is one.
+    #[inline(always)]
+    pub fn held(&mut self) -> Option<Segment> {
+        self.held.take()
     }
 
     /// Starts a block, with fine ticks or not. Returns the steps of its dominant motor.
@@ -160,6 +156,7 @@ impl Prep {
                 moving += 1;
                 if (steps[m] < 0) != (self.backwards & bit != 0) {
                     self.backwards ^= bit;
+                    self.turned = true;
                     // It was measured in the old direction.
                     self.debt[m] = -self.debt[m];
                 }
@@ -241,8 +238,12 @@ impl Prep {
         Some(self.emit(ticks as u16, shift, period as u16, cycles))
     }
 
+    fn paces(&self) -> &Pace {
+        &self.paces[usize::from(self.others)]
+    }
+
     fn pace(&self) -> u16 {
-        let pace = &PACES[usize::from(self.others)];
+        let pace = self.paces();
         if self.fine { pace.fine } else { pace.coarse }
     }
 
@@ -273,7 +274,7 @@ impl Prep {
             return 0x1_0000;
         }
         let period = quotient(cycles + u32::from(ticks / 2), ticks);
-        u32::from(period.max(PACES[usize::from(self.others)].shortest))
+        u32::from(period.max(self.paces().shortest))
     }
 
     /// Nothing moves: the next step is too far off. A tick of the time there is, at most; short times
@@ -285,6 +286,8 @@ impl Prep {
         }
         let period = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
         self.time = (cycles - u32::from(period)) as i32;
+        // By far long enough for directions.
+        self.turned = false;
         Some(self.pause(1, period))
     }
 
@@ -304,7 +307,7 @@ impl Prep {
         let travel = u32::from(ticks) << shift;
         self.left -= travel;
         let mut segment = self.pause(ticks, period);
-        if period >= PACES[usize::from(self.others)].settles {
+        if period >= self.paces().settles {
             segment.settle = SETTLE;
         }
         let mut bit = 1;
@@ -319,7 +322,21 @@ impl Prep {
         if self.left == 0 {
             self.settle_debts();
         }
-        segment.seal()
+        let segment = segment.seal();
+        if self.turned { self.behind_turn(segment) } else { segment }
+    }
+
+    /// The first segment after motors have turned round, or, if its first steps come too soon after
+    /// that, a tick in which directions settle. Its time is not made up for.
+    #[inline(never)]
+    fn behind_turn(&mut self, segment: Segment) -> Segment {
+        self.turned = false;
+        let stand = segment.period.saturating_sub(TURNED);
+        if stand >= self.setup {
+            return segment;
+        }
+        self.held = Some(segment);
+        self.pause(1, (self.setup - stand).max(self.paces().shortest))
     }
 
     /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.

@@ -86,7 +86,7 @@ impl Machine for Fake {
 
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
         self.settings.store(setting, value);
-        let lowered = self.settings.limit_velocity(setting, 40_000);
+        let lowered = self.settings.limit_velocity(setting, |_| 40_000);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 

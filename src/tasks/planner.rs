@@ -15,6 +15,7 @@ use crate::hal::imp::exec;
 use crate::motion::block::{Block, Body};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line, Motors};
+use crate::motion::pace::Drivers;
 use crate::motion::queue::BlockQueue;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -28,6 +29,8 @@ struct Planner {
     position: PerAxis<Length>,
     /// The N word of the line that is carried out.
     line: u32,
+    /// What exec has been told that drivers ask for.
+    drivers: Drivers,
 }
 
 /// The task.
@@ -39,6 +42,7 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         dynamics: Dynamics::default(),
         position: [Length::ZERO; AXES],
         line: 0,
+        drivers: Drivers::USUAL,
     };
     loop {
         links.planner_wake.wait().await;
@@ -89,6 +93,7 @@ impl Planner {
         }
         if self.links.resync.get() {
             self.set_position(&[None; AXES]).await;
+            self.set_drivers().await;
             self.links.resync.set(false);
         }
         if let Some(ms) = commands.dwell_ms {
@@ -196,6 +201,15 @@ impl Planner {
         self.push(Block { body, line: self.line }).await;
     }
 
+    /// Tells exec what the drivers ask for, if that has changed.
+    async fn set_drivers(&mut self) {
+        let drivers = Machine::drivers(&*self.links.settings.borrow());
+        if drivers != self.drivers {
+            self.drivers = drivers;
+            self.push(Block { body: Body::Drivers(drivers), line: self.line }).await;
+        }
+    }
+
     async fn push(&mut self, block: Block) {
         self.room().await;
         // There is room: this task alone fills the queue.
@@ -247,5 +261,8 @@ impl Machine for Settings {
     }
     fn junction_acceleration(&self) -> f32 {
         Settings::junction_acceleration(self)
+    }
+    fn drivers(&self) -> Drivers {
+        Drivers { pulse_us: self.step_pulse_us(), setup_us: self.direction_setup_us() }
     }
 }

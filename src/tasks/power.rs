@@ -31,7 +31,6 @@ machine_static! {
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
-    set_modes(&links.settings.borrow());
     loop {
         let timeout = links.settings.borrow().motor_timeout_centis().saturating_mul(10);
         let (now, running) = (millis(), snapshot().running);

@@ -12,7 +12,8 @@ use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::hal::imp::{gpio, stepper};
-use crate::motion::exec::{Program, STEP_RATE_MAX, Snapshot};
+use crate::motion::dynamics;
+use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
 use crate::protocol::{Machine, StatusReport, Value, Warning, thousandths};
 use crate::status::Status;
@@ -114,7 +115,9 @@ impl Machine for View<'_> {
             self.links.rate.set(baud::rate(value));
         }
         self.settings.store(setting, value);
-        let lowered = self.settings.limit_velocity(setting, STEP_RATE_MAX as u32);
+        let drivers = dynamics::Machine::drivers(&*self.settings);
+        let rate = |motors| drivers.step_rate_max(motors) as u32;
+        let lowered = self.settings.limit_velocity(setting, rate);
         self.links.settings_changed.set(true);
         set_outputs(&self.settings);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
@@ -169,8 +172,8 @@ impl Machine for View<'_> {
     }
 }
 
-/// Tells the outputs what the settings say of them.
-fn set_outputs(settings: &Settings) {
+/// Tells the outputs what the settings say of them. Thread mode, or before interrupts are on.
+pub fn set_outputs(settings: &Settings) {
     power::set_modes(settings);
     stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
     stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));
