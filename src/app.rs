@@ -19,8 +19,9 @@ use crate::protocol::{Mode, StatusReport};
 use crate::tasks::lines::LinePool;
 use crate::tasks::links::{Links, QueueCount};
 use crate::tasks::tx::Tx;
+use crate::tasks::view::set_outputs;
 use crate::tasks::wake::{News, Wake};
-use crate::tasks::{control, exec, parser, planner, reader, reporter};
+use crate::tasks::{control, exec, parser, planner, power, reader, reporter};
 
 impl Links {
     fn new(tx: Outgoing, rate: u32) -> Self {
@@ -68,10 +69,12 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     let segments = stepper::start()?;
     let (queue, source) = queue::store().split()?;
     let links = place(outgoing, rate);
+    set_outputs(&links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received).ok()?);
     main.spawn(planner_task(links, queue).ok()?);
     main.spawn(reporter_task(links).ok()?);
+    main.spawn(power_task(links).ok()?);
     main.spawn(parser_task(links).ok()?);
     main.spawn(control_task(links).ok()?);
     Some(())
@@ -94,5 +97,6 @@ tasks! {
     fn planner_task(links: &'static Links, queue: BlockQueue) = planner::run;
     fn reporter_task(links: &'static Links) = reporter::run;
     fn control_task(links: &'static Links) = control::run;
+    fn power_task(links: &'static Links) = power::run;
     fn parser_task(links: &'static Links) = parser::run;
 }

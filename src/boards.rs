@@ -132,6 +132,16 @@ const OWN_PINS: [Pin; 3] = [pin(Port::E, 0), pin(Port::E, 1), pin(Port::H, 1)];
 const MAX_PINS: usize = 3 * MOTORS + 1 + 8 + OWN_PINS.len();
 
 impl Board {
+    /// The motors whose drivers are on (bits) when those of `wanted` are to be: all of them where they
+    /// share one enable, and always where there is none.
+    pub fn powered(&self, wanted: u8) -> u8 {
+        let shared = self.enable_all.is_none() || wanted != 0;
+        self.motors.iter().enumerate().fold(0, |bits, (m, motor)| {
+            let own = motor.enable.is_none() || wanted & 1 << m != 0;
+            bits | u8::from(shared && own) << m
+        })
+    }
+
     /// Panics, so fails the build when evaluated in a constant, if a pin or a timer has two users.
     pub const fn check(&self) {
         let mut pins = [None; MAX_PINS];
@@ -210,6 +220,17 @@ mod tests {
     fn boards_are_found_by_name() {
         assert!(by_name("ramps14").is_some_and(|b| b.motors[2].step == pin(Port::L, 3)));
         assert!(by_name("nothing").is_none());
+    }
+
+    #[test]
+    fn a_shared_enable_powers_all() {
+        let powered = |board: &Board| [0, 0b0010, 0b1111].map(|wanted| board.powered(wanted));
+        assert_eq!(powered(&MEGA2560_GRBL), [0, 0b1111, 0b1111]);
+        assert_eq!(powered(&RAMPS14), [0, 0b0010, 0b1111]);
+        let both = Board { enable_all: Some(pin(Port::G, 0)), ..RAMPS14 };
+        assert_eq!(powered(&both), [0, 0b0010, 0b1111]);
+        let neither = Board { enable_all: None, ..MEGA2560_GRBL };
+        assert_eq!(powered(&neither), [0b1111; 3]);
     }
 
     #[test]

@@ -18,6 +18,7 @@ pub mod config;
 pub mod gcode;
 pub mod math;
 pub mod motion;
+pub mod motors;
 pub mod progmem;
 pub mod protocol;
 pub mod realtime;

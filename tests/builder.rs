@@ -39,7 +39,7 @@ fn built(
 }
 
 fn decades(low: f32, high: f32) -> impl Strategy<Value = f32> {
-    (low.ln()..high.ln()).prop_map(f32::exp)
+    (0u16..=10_000).prop_map(move |n| low * (high / low).powf(f32::from(n) * 1e-4))
 }
 
 prop_compose! {

@@ -28,6 +28,19 @@ impl Sender {
         self.heard[before..].to_string()
     }
 
+    /// How long these lines take until the machine stops, in ms, to a multiple of `step`.
+    fn time(&mut self, lines: &str, step: u64) -> u64 {
+        self.machine.send(lines.as_bytes());
+        let mut heard = Vec::new();
+        let mut ms = 0;
+        while !String::from_utf8_lossy(&heard).contains("\"stat\":3") && ms < 60_000 {
+            self.machine.run_ms(step);
+            heard.extend(self.machine.received());
+            ms += step;
+        }
+        ms
+    }
+
     /// Responses so far, not counting the greeting.
     fn answered(&self) -> usize {
         self.heard.matches("{\"r\":").count() - 1
@@ -146,20 +159,46 @@ fn a_rotary_axis_keeps_its_limit_beside_the_smallest_linear_travel() {
     for line in ["g0 a360\n", "g0 x0.0001 a360\n"] {
         let ms = std::thread::spawn(move || {
             let mut sender = Sender::boot();
-            sender.ask("{avm:600}\n", 50);
-            sender.machine.send(line.as_bytes());
-            let mut heard = Vec::new();
-            let mut ms = 0;
-            while !String::from_utf8_lossy(&heard).contains("\"stat\":3") && ms < 60_000 {
-                sender.machine.run_ms(100);
-                heard.extend(sender.machine.received());
-                ms += 100;
-            }
-            ms
+            sender.ask("{aam:1,avm:600}\n", 50);
+            sender.time(line, 100)
         })
         .join()
         .expect("no panic");
         // 360 degrees at 600 a minute, and a ramp.
         assert!((36_000..38_000).contains(&ms), "{line:?} took {ms} ms");
     }
+}
+
+#[test]
+fn exact_stop_stops_between_moves_and_not_within_an_arc() {
+    let time = |lines: &'static str| {
+        let timed = std::thread::spawn(move || {
+            let mut sender = Sender::boot();
+            let ms = sender.time(lines, 10);
+            (ms, sender.machine.emitted().position)
+        });
+        timed.join().expect("no panic")
+    };
+    let (continuous, end) = time("g64 g1 f600 x2\nx4\nx6\n");
+    let (exact_path, _) = time("g61 g1 f600 x2\nx4\nx6\n");
+    let (exact_stop, stop_end) = time("g61.1 g1 f600 x2\nx4\nx6\n");
+    assert_eq!(continuous, exact_path);
+    // Two more stops: half of the ramp down and half of the ramp up are lost at each.
+    assert!(exact_stop > continuous + 100, "{exact_stop} and {continuous} ms");
+    let (one, _) = time("g1 f600 x2\n");
+    assert!(exact_stop + 50 > 3 * one, "each of {exact_stop} ms is from rest to rest, {one} ms");
+    assert_eq!((end, stop_end), ([7_680, 0, 0, 0], [7_680, 0, 0, 0]));
+    let (arc, _) = time("g64 g1 f600 x1\ng2 i5\n");
+    let (stopping_arc, _) = time("g61.1 g1 f600 x1\ng2 i5\n");
+    assert!((arc..arc + 300).contains(&stopping_arc), "{stopping_arc} and {arc} ms");
+}
+
+#[test]
+fn the_steppers_are_told_what_the_drivers_want() {
+    let mut sender = Sender::boot();
+    sender.ask("{spw:5,2sp:1}\n", 50);
+    assert_eq!(kerf::hal::imp::stepper::step_output(), (5, 0b0010));
+    // Not while something moves.
+    sender.ask("g1 f500 x1\n{spw:7}\n", 50);
+    assert_eq!(kerf::hal::imp::stepper::step_output(), (5, 0b0010));
 }

@@ -18,6 +18,11 @@ impl Settings {
         self.motor(motor, motor::PO) != 0
     }
 
+    /// Whether its driver steps on a falling edge: its step pin rests high.
+    pub fn step_inverted(&self, motor: usize) -> bool {
+        self.motor(motor, motor::SP) != 0
+    }
+
     /// When it is powered: 0 never, 1 always, 2 in a cycle, 3 while it moves.
     pub fn motor_power_mode(&self, motor: usize) -> u8 {
         self.motor(motor, motor::PM)
@@ -33,6 +38,9 @@ impl Settings {
         self.ratios.get(motor).copied().unwrap_or(StepRatio::NONE)
     }
 }
+
+/// An end of travel that is none.
+pub const TRAVEL_NONE: Length = Length(-i32::MAX);
 
 /// Axes.
 impl Settings {
@@ -81,9 +89,9 @@ impl Settings {
         self.axis(axis, axis::JD) as f32 * 1e-6
     }
 
-    /// Radius that turns a length into an angle, mm.
-    pub fn radius(&self, axis: usize) -> f32 {
-        self.axis(axis, axis::RA) as f32 * 1e-6
+    /// Radius that turns a length into an angle, nm.
+    pub fn radius_nm(&self, axis: usize) -> u32 {
+        self.axis(axis, axis::RA).unsigned_abs()
     }
 
     /// Switch at the lower end: 0 off, 1 homing, 2 limit, 3 both.
@@ -142,6 +150,16 @@ impl Settings {
     /// How long motors stay powered after a move, in hundredths of a second.
     pub fn motor_timeout_centis(&self) -> u32 {
         self.system_large(system::MT).unsigned_abs()
+    }
+
+    /// How long a step pulse lasts, microseconds, 1 to 10.
+    pub fn step_pulse_us(&self) -> u8 {
+        self.system(system::SPW)
+    }
+
+    /// How long a direction pin must stand before a step, microseconds, 0 to 100.
+    pub fn direction_setup_us(&self) -> u8 {
+        self.system(system::DSU)
     }
 
     /// Whether the machine starts in JSON mode.

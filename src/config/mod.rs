@@ -200,6 +200,7 @@ fn limit(row: &Row, max: i32, number: Number, inches: bool) -> Result<i32, Statu
     }
 }
 
-mod getters;
+pub mod getters;
+mod rates;
 #[cfg(test)]
 mod tests;

@@ -2,8 +2,8 @@
 
 use super::name::{Name, axis_letter, axis_of};
 use super::table::{
-    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, HOMING, Kind, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS, RADIUS,
-    Row, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS,
+    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, HOMING, IDLE, Kind, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS,
+    RADIUS, Row, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS,
 };
 use crate::boards::MOTORS;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -155,11 +155,24 @@ impl Setting {
         motor && row.kind == Kind::Small && row.slot == table::motor::MI
     }
 
+    /// Whether it is refused while anything moves: a step, or what becomes of one, would change its
+    /// meaning under way.
+    pub fn needs_rest(self) -> bool {
+        matches!(self.owner(), Owner::Motor(_)) || self.row().is(IDLE)
+    }
+
     /// Whether it is the rate of the serial line.
     pub fn is_baud(self) -> bool {
         let row = self.row();
         let large = self.owner() == Owner::System && row.kind == Kind::Large;
         large && row.slot == table::system::BAUD
+    }
+
+    /// Whether it is the width of step pulses.
+    pub fn is_pulse_width(self) -> bool {
+        let row = self.row();
+        let small = self.owner() == Owner::System && row.kind == Kind::Small;
+        small && row.slot == table::system::SPW
     }
 
     /// Whose it is.
@@ -284,6 +297,6 @@ mod tests {
             "am vm fr tn tm jm jh jd ra sn sx sv lv lb zb ac"
         );
         assert_eq!(list(Owner::Axis(5)).join(" "), "am vm fr tn tm jm jd ra ac");
-        assert_eq!(list(Owner::Motor(2)).join(" "), "ma sa tr mi po pm");
+        assert_eq!(list(Owner::Motor(2)).join(" "), "ma sa tr mi po pm sp");
     }
 }

@@ -1,7 +1,7 @@
 //! The settings, as data in program memory: the one truth about names, storage, limits, defaults.
 //!
 //! Rows stand in the order that groups are listed in. A motor or axis setting has one row for all
-//! motors or axes; its defaults are a row of the table behind. Sizes: 48 rows of 17 bytes and 584
+//! motors or axes; its defaults are a row of the table behind. Sizes: 51 rows of 17 bytes and 624
 //! bytes of defaults. TinyG's settings come first in each group, then those of Kerf alone.
 
 use super::name::token;
@@ -35,6 +35,8 @@ pub const RADIUS: u8 = 16;
 pub const HOMING: u8 = 32;
 /// The axis mode: a linear axis lacks the last one.
 pub const MODE: u8 = 64;
+/// Refused while anything moves, as all settings of motors are.
+pub const IDLE: u8 = 128;
 
 /// A setting, or the same setting of every motor or axis.
 #[derive(Clone, Copy)]
@@ -103,9 +105,9 @@ const fn up_to(mut row: Row, max: i32) -> Row {
 }
 
 /// Rows of [`SYSTEM`].
-pub const SYSTEM_ROWS: usize = 26;
+pub const SYSTEM_ROWS: usize = 28;
 /// Rows of [`MOTOR`].
-pub const MOTOR_ROWS: usize = 6;
+pub const MOTOR_ROWS: usize = 7;
 /// Rows of [`AXIS`].
 pub const AXIS_ROWS: usize = 16;
 
@@ -128,7 +130,9 @@ pub mod system {
     pub const GCO: u8 = 13;
     pub const GPA: u8 = 14;
     pub const GDI: u8 = 15;
-    pub const SMALL: usize = 16;
+    pub const SPW: u8 = 16;
+    pub const DSU: u8 = 17;
+    pub const SMALL: usize = 18;
 
     pub const JA: u8 = 0;
     pub const CT: u8 = 1;
@@ -145,7 +149,8 @@ pub mod motor {
     pub const MI: u8 = 1;
     pub const PO: u8 = 2;
     pub const PM: u8 = 3;
-    pub const SMALL: usize = 4;
+    pub const SP: u8 = 4;
+    pub const SMALL: usize = 5;
 
     pub const SA: u8 = 0;
     pub const TR: u8 = 1;
@@ -210,12 +215,14 @@ progmem! {
         int("gco", system::GCO, 1, 6),
         int("gpa", system::GPA, 0, 2),
         int("gdi", system::GDI, 0, 1),
+        int("spw", system::SPW, 1, 10).with(IDLE),
+        int("dsu", system::DSU, 0, 100).with(IDLE),
     ];
 
     /// Their defaults, scaled as kept.
     pub static SYSTEM_DEFAULTS: [i32; SYSTEM_ROWS] = [
         44_020, 970, 1, 8, 0, 10_000_000, 10_000, 0, 0, 200, 1, 2, 1, 1, 0, 1, 500, 0, 0, 1, 5,
-        0, 1, 1, 2, 0,
+        0, 1, 1, 2, 0, 2, 1,
     ];
 
     /// The groups `1` to `4`.
@@ -226,6 +233,7 @@ progmem! {
         int("mi", motor::MI, 1, 255),
         int("po", motor::PO, 0, 1),
         int("pm", motor::PM, 0, 3),
+        int("sp", motor::SP, 0, 1),
     ];
 
     /// Their defaults, by motor.
@@ -236,15 +244,16 @@ progmem! {
         [8; 4],
         [0; 4],
         [2; 4],
+        [0; 4],
     ];
 
     /// The groups `x` to `c`.
     pub static AXIS: [Row; AXIS_ROWS] = [
-        int("am", axis::AM, 0, 3).with(MODE),
+        int("am", axis::AM, 0, 3).with(MODE | IDLE),
         fixed("vm", axis::VM, 3, 0, POSITIVE).with(UNIT),
         fixed("fr", axis::FR, 3, 0, POSITIVE).with(UNIT),
-        fixed("tn", axis::TN, 4, 3, ANY).with(UNIT),
-        fixed("tm", axis::TM, 4, 3, ANY).with(UNIT),
+        fixed("tn", axis::TN, 4, 3, ANY).with(UNIT | CLAMP),
+        fixed("tm", axis::TM, 4, 3, ANY).with(UNIT | CLAMP),
         fixed("jm", axis::JM, 3, 0, POSITIVE).with(UNIT | JERK),
         fixed("jh", axis::JH, 3, 0, POSITIVE).with(UNIT | JERK | HOMING),
         fixed("jd", axis::JD, 6, 4, 0).with(UNIT),

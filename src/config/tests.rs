@@ -93,6 +93,10 @@ fn refusals_have_their_codes() {
         ("baud", "-1", Status::OutOfRange),
         ("baud", "9600.5", Status::BadNumber),
         ("si", "200.5", Status::BadNumber),
+        ("spw", "0", Status::OutOfRange),
+        ("spw", "11", Status::OutOfRange),
+        ("dsu", "101", Status::OutOfRange),
+        ("1sp", "2", Status::OutOfRange),
     ] {
         assert_eq!(set(&mut settings, name, value, false), Err(status), "{name} {value}");
     }
@@ -149,12 +153,15 @@ fn getters_have_their_units() {
     set(&mut settings, "1mi", "16", false).unwrap();
     assert_eq!(settings.step_ratio(0), StepRatio { num: 32, den: 125 });
     assert_eq!(settings.step_ratio(4), StepRatio::NONE);
+    assert_eq!((settings.step_pulse_us(), settings.direction_setup_us()), (2, 1));
+    set(&mut settings, "2sp", "1", false).unwrap();
+    assert_eq!((settings.step_inverted(0), settings.step_inverted(1)), (false, true));
 }
 
 #[test]
 fn ram_is_accounted_for() {
-    assert_eq!(size_of::<Settings>(), 404);
-    assert!(size_of::<Row>() * 48 + (26 + 6 * 4 + 16 * 6) * 4 < 2048);
+    assert_eq!(size_of::<Settings>(), 408);
+    assert!(size_of::<Row>() * 51 + (28 + 7 * 4 + 16 * 6) * 4 < 2048);
 }
 
 proptest! {

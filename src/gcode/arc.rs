@@ -55,7 +55,7 @@ impl<'a> Chords<'a> {
     ) -> Self {
         let (spoke, end) = (spoke(start, arc), spoke(target, arc));
         let (radius, end_radius) = (norm(spoke), norm(end));
-        let part = travel(spoke, end, closes(start, target, arc), arc.clockwise);
+        let part = part(start, target, arc);
         let planar = (part + f32::from(arc.extra_turns)) * TAU * (radius + end_radius) * 0.5;
         let count = count(planar, radius.max(end_radius), tolerance * Length::PER_MM as f32);
         let grows = (end_radius - radius).abs() > SAME_RADIUS && radius > 0.0;
@@ -162,11 +162,16 @@ pub(super) fn spoke(point: &PerAxis<Length>, arc: &Arc) -> [f32; 2] {
     })
 }
 
-/// The angle from one spoke to another in the sense of the arc, as a part of a turn, 0 to 1.
-fn travel(from: [f32; 2], to: [f32; 2], full: bool, clockwise: bool) -> f32 {
-    if full {
+/// The angle from start to end, as a part of a turn, 0 to 1; further turns not counted.
+pub(super) fn part(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> f32 {
+    if closes(start, target, arc) {
         return 1.0;
     }
+    turned(spoke(start, arc), spoke(target, arc), arc.clockwise)
+}
+
+/// The angle from one spoke to another in the sense of the arc, as a part of a turn, 0 to 1.
+pub(super) fn turned(from: [f32; 2], to: [f32; 2], clockwise: bool) -> f32 {
     // From the difference, which is exact: short arcs of large radius keep their precision.
     let cross = from[0] * (to[1] - from[1]) - from[1] * (to[0] - from[0]);
     let dot = from[0] * to[0] + from[1] * to[1];
@@ -194,7 +199,7 @@ fn way(start: &PerAxis<Length>, target: &PerAxis<Length>, axis: u8) -> f32 {
     at(target) - at(start)
 }
 
-fn norm([x, y]: [f32; 2]) -> f32 {
+pub(super) fn norm([x, y]: [f32; 2]) -> f32 {
     math::sqrt(x * x + y * y)
 }
 

@@ -1,9 +1,10 @@
 //! Which circle the words of a G2 or G3 line describe, and whether they describe one.
 
 use super::arc;
+use super::axes::{self, Axes, AxisMode};
 use super::block::{Block, slot};
 use super::command::{Arc, Commands, Motion};
-use super::interpreter::{Interpreter, exact};
+use super::interpreter::Interpreter;
 use super::number::Decimal;
 use crate::math;
 use crate::status::Status;
@@ -29,6 +30,7 @@ impl Interpreter {
         &mut self,
         block: &mut Block,
         clockwise: bool,
+        axes: &impl Axes,
         out: &mut Commands,
     ) -> Result<(), Status> {
         if !block.has(ARC_WORDS) {
@@ -36,10 +38,13 @@ impl Interpreter {
         }
         let feed = self.rate(block, false)?;
         let [first, second, linear] = self.modal.plane.axes();
+        if [first, second].iter().any(|axis| axes.mode(*axis) == AxisMode::Disabled) {
+            return Err(Status::AxisDisabled);
+        }
         let radius = self.radius(block, first, second)?;
         let turns = turns(block)?;
         let start = self.position;
-        self.advance(block)?;
+        self.advance(block, axes)?;
         let target = self.position;
         let mut arc =
             Arc { first, second, linear, center: [Length::ZERO; 2], clockwise, extra_turns: turns };
@@ -63,7 +68,7 @@ impl Interpreter {
         if !block.has(1 << first | 1 << second) {
             return Err(Status::ArcAxisMissing);
         }
-        let radius = exact(&word, first, self.modal.units)?.units;
+        let radius = axes::length(&word, self.modal.units)?.units;
         match radius.0.abs() {
             ..MIN_RADIUS => Err(Status::ArcRadiusTolerance),
             MIN_RADIUS..=MAX_RADIUS => Ok(Some(radius)),
@@ -83,7 +88,7 @@ impl Interpreter {
             return Err(Status::ArcSpecification);
         }
         let mut offset = |axis: u8| match block.take(slot::I + axis) {
-            Some(word) => Ok(exact(&word, axis, self.modal.units)?.units),
+            Some(word) => Ok(axes::length(&word, self.modal.units)?.units),
             None => Ok(Length::ZERO),
         };
         let (first, second) = (offset(arc.first)?, offset(arc.second)?);

@@ -73,7 +73,7 @@ const fn code(number: u16, action: Action) -> Code {
 }
 
 /// G codes, by number.
-const G_ROWS: [Code; 23] = [
+const G_ROWS: [Code; 24] = [
     code(0, Action::Motion(MotionMode::Traverse)),
     code(10, Action::Motion(MotionMode::Feed)),
     code(20, Action::Motion(MotionMode::ClockwiseArc)),
@@ -89,6 +89,7 @@ const G_ROWS: [Code; 23] = [
     code(490, Action::Only(OnlyMode::ToolLength)),
     code(540, Action::Only(OnlyMode::Coordinates)),
     code(610, Action::Path(PathMode::Exact)),
+    code(611, Action::Path(PathMode::ExactStop)),
     code(640, Action::Path(PathMode::Continuous)),
     code(800, Action::Motion(MotionMode::None)),
     code(900, Action::Distance(Distance::Absolute)),

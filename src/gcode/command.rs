@@ -17,6 +17,8 @@ pub struct Commands {
     pub set_position: Option<PerAxis<Option<Length>>>,
     /// The move, if any.
     pub motion: Motion,
+    /// G61.1 is in force: the move ends at rest. By itself it is nothing to carry out.
+    pub exact_stop: bool,
     /// M0, M1, M2, M30, M60.
     pub stop: Stop,
 }
@@ -25,7 +27,7 @@ impl Commands {
     /// Whether the machine has nothing to do.
     pub fn is_empty(&self) -> bool {
         // In full, so that a new part is not forgotten here.
-        let Commands { line: _, dwell_ms, set_position, motion, stop } = self;
+        let Commands { line: _, dwell_ms, set_position, motion, exact_stop: _, stop } = self;
         matches!(motion, Motion::None)
             && *stop == Stop::None
             && dwell_ms.is_none()

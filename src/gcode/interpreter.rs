@@ -14,13 +14,14 @@
 
 use heapless::Vec;
 
+use super::axes::{self, Axes};
 use super::block::{Block, slot};
 use super::codes::NonModal;
 use super::command::{Commands, Motion, Stop};
-use super::modal::{FeedMode, Modal, Units};
-use super::number::{Decimal, Exact};
+use super::limits;
+use super::modal::{FeedMode, Modal, PathMode, Units};
 use crate::status::Status;
-use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
+use crate::units::{AXES, Length, PerAxis};
 
 /// What a line was, besides commands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -47,6 +48,8 @@ pub struct Interpreter {
     pub(super) residue: PerAxis<i16>,
     /// Machine coordinates of the work origin (G92).
     pub(super) offset: PerAxis<Length>,
+    /// The axes whose position has been set to what it is (G28.3), as bits.
+    homed: u8,
     pub(super) line: u32,
 }
 
@@ -60,40 +63,56 @@ impl Interpreter {
             position: [Length::ZERO; AXES],
             residue: [0; AXES],
             offset: [Length::ZERO; AXES],
+            homed: 0,
             line: 0,
         }
     }
 
-    /// Interprets one line without its terminator.
+    /// Interprets one line without its terminator, for a machine with these `axes`.
     ///
     /// `Ok`: `out` is what the machine has to do, and the state has advanced as if it had done so.
     /// `Err`: the state is what it was, and `out` empty.
-    pub fn interpret(&mut self, line: &[u8], out: &mut Commands) -> Result<Info, Status> {
-        if self.usual(line, out) {
+    pub fn interpret(
+        &mut self,
+        line: &[u8],
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<Info, Status> {
+        if self.usual(line, axes, out) {
             return Ok(Info::default());
         }
-        self.general(line, out)
+        self.general(line, axes, out)
     }
 
     /// The same for a line of any kind.
     #[inline(never)]
-    pub(super) fn general(&mut self, line: &[u8], out: &mut Commands) -> Result<Info, Status> {
+    pub(super) fn general(
+        &mut self,
+        line: &[u8],
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<Info, Status> {
         clear(out);
         let mut block = Block::new();
         block.read(line)?;
-        self.execute_or_undo(&mut block, out)?;
+        self.execute_or_undo(&mut block, axes, out)?;
         let Block { message, deleted, commented, .. } = block;
         Ok(Info { message, deleted, commented })
     }
 
     #[inline(never)]
-    fn execute_or_undo(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+    fn execute_or_undo(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         if block.non_modal.is_some() {
-            return self.execute_rarity(block, out);
+            return self.execute_rarity(block, axes, out);
         }
         let mut before = Before::of(self);
         before.save_axes(self, block);
-        let done = self.execute(block, out);
+        let done = self.execute(block, axes, out);
         if done.is_err() {
             before.restore(self);
             clear(out);
@@ -103,9 +122,14 @@ impl Interpreter {
 
     /// The same for a block that may change more than modes and the position of its axes.
     #[inline(never)]
-    fn execute_rarity(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+    fn execute_rarity(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         let before = *self;
-        let done = self.execute(block, out);
+        let done = self.execute(block, axes, out);
         if done.is_err() {
             *self = before;
             clear(out);
@@ -115,15 +139,23 @@ impl Interpreter {
 
     /// The order of execution.
     #[inline(never)]
-    fn execute(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+    fn execute(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         if block.deleted {
             return Ok(());
         }
         self.number(block, out)?;
         self.modes(block);
         self.feed(block)?;
-        self.non_modal(block, out)?;
-        self.motion(block, out)?;
+        self.non_modal(block, axes, out)?;
+        let start = self.position;
+        self.motion(block, axes, out)?;
+        limits::check(&start, &out.motion, self.homed, axes)?;
+        out.exact_stop = self.modal.path == PathMode::ExactStop;
         block.finish()?;
         self.stop(block, out);
         Ok(())
@@ -159,7 +191,12 @@ impl Interpreter {
         Ok(())
     }
 
-    fn non_modal(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+    fn non_modal(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         let Some(code) = block.non_modal else { return Ok(()) };
         if code.uses_axes() && !block.has(slot::AXES) {
             return Err(Status::AxisWordMissing);
@@ -169,31 +206,38 @@ impl Interpreter {
                 let seconds = block.take(slot::P).ok_or(Status::PWordMissing)?;
                 out.dwell_ms = Some(seconds.milliseconds()?);
             }
-            NonModal::SetPosition => out.set_position = Some(self.redefine_position(block)?),
-            NonModal::SetOffset => self.redefine_offset(block)?,
+            NonModal::SetPosition => {
+                out.set_position = Some(self.redefine_position(block, axes)?);
+            }
+            NonModal::SetOffset => self.redefine_offset(block, axes)?,
             NonModal::ClearOffset => self.offset = [Length::ZERO; AXES],
         }
         Ok(())
     }
 
     /// G28.3: the position is called the axis words, in machine coordinates.
-    fn redefine_position(&mut self, block: &mut Block) -> Result<PerAxis<Option<Length>>, Status> {
+    fn redefine_position(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+    ) -> Result<PerAxis<Option<Length>>, Status> {
         let mut named = [None; AXES];
-        let axes = self.position.iter_mut().zip(&mut self.residue).zip(&mut named);
-        for (axis, ((position, residue), named)) in (0..).zip(axes) {
-            let Some(word) = block.take(axis) else { continue };
-            let value = exact(&word, axis, self.modal.units)?;
+        let all = self.position.iter_mut().zip(&mut self.residue).zip(&mut named);
+        for (axis, ((position, residue), named)) in (0..).zip(all) {
+            let value = axes::take(block, axis, self.modal.units, axes)?;
+            let Some(value) = value else { continue };
             (*position, *residue, *named) = (value.units, value.rest, Some(value.units));
+            self.homed |= 1 << axis;
         }
         Ok(named)
     }
 
     /// G92: the position is called the axis words, in work coordinates.
-    fn redefine_offset(&mut self, block: &mut Block) -> Result<(), Status> {
-        let axes = self.position.iter().zip(&mut self.residue).zip(&mut self.offset);
-        for (axis, ((position, residue), offset)) in (0..).zip(axes) {
-            let Some(word) = block.take(axis) else { continue };
-            let value = exact(&word, axis, self.modal.units)?;
+    fn redefine_offset(&mut self, block: &mut Block, axes: &impl Axes) -> Result<(), Status> {
+        let all = self.position.iter().zip(&mut self.residue).zip(&mut self.offset);
+        for (axis, ((position, residue), offset)) in (0..).zip(all) {
+            let value = axes::take(block, axis, self.modal.units, axes)?;
+            let Some(value) = value else { continue };
             *offset = position.checked_sub(value.units).ok_or(Status::OutOfRange)?;
             *residue = value.rest;
         }
@@ -283,6 +327,11 @@ impl Interpreter {
         1
     }
 
+    /// Whether an axis is homed: soft limits are for such axes alone.
+    pub fn is_homed(&self, axis: u8) -> bool {
+        self.homed & 1 << axis != 0
+    }
+
     /// The N word of the last line, 0 if it had none.
     pub fn line(&self) -> u32 {
         self.line
@@ -301,21 +350,13 @@ impl Default for Interpreter {
     }
 }
 
-/// The length that the word of an axis gives: rotary axes count degrees in all units.
-#[inline(always)]
-pub(super) fn exact(word: &Decimal, axis: u8, units: Units) -> Result<Exact, Status> {
-    match units {
-        Units::Inch if usize::from(axis) < FIRST_ROTARY => word.inch(),
-        _ => word.mm(),
-    }
-}
-
 /// Empties `out`, touching nothing but the tags: it is large.
 fn clear(out: &mut Commands) {
     out.line = 0;
     out.dwell_ms = None;
     out.set_position = None;
     out.motion = Motion::None;
+    out.exact_stop = false;
     out.stop = Stop::None;
 }
 

@@ -9,12 +9,14 @@
 //! [`codes`] is the language: one table row per code. Everything here is pure and never waits.
 
 pub mod arc;
+pub mod axes;
 mod block;
 mod circle;
 pub mod codes;
 pub mod command;
 pub mod interpreter;
 mod lexer;
+mod limits;
 pub mod modal;
 mod motion;
 pub mod number;

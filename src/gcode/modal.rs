@@ -71,12 +71,15 @@ pub enum Units {
     Mm = 1,
 }
 
-/// Group 13: how closely the path is followed. Kerf's planner never leaves the path, so both do.
+/// Group 13: how closely the path is followed. Kerf's planner never leaves the path, so that the first
+/// and the last are the same.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum PathMode {
     /// G61.
     Exact = 0,
+    /// G61.1: a stop at the end of each move.
+    ExactStop = 1,
     /// G64.
     Continuous = 2,
 }

@@ -1,8 +1,9 @@
 //! Group 1: from axis words to a target, and from F to a feed.
 
+use super::axes::{self, Axes};
 use super::block::{Block, slot};
 use super::command::{Commands, Feed, Motion};
-use super::interpreter::{Interpreter, exact};
+use super::interpreter::Interpreter;
 use super::modal::{Distance, FeedMode, MotionMode, Units};
 use crate::status::Status;
 use crate::units::FIRST_ROTARY;
@@ -10,7 +11,12 @@ use crate::units::FIRST_ROTARY;
 impl Interpreter {
     /// The move of a line, if it has one: axis words move in the mode in force, unless a non-modal
     /// code has taken them.
-    pub(super) fn motion(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+    pub(super) fn motion(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         let mode = block.motion.unwrap_or(self.modal.motion);
         self.modal.motion = mode;
         if block.non_modal.is_some_and(|code| code.uses_axes()) {
@@ -21,10 +27,10 @@ impl Interpreter {
         }
         match mode {
             MotionMode::None => {}
-            MotionMode::Traverse => self.traverse(block, out)?,
-            MotionMode::Feed => self.straight_feed(block, out)?,
-            MotionMode::ClockwiseArc => self.arc(block, true, out)?,
-            MotionMode::CounterclockwiseArc => self.arc(block, false, out)?,
+            MotionMode::Traverse => self.traverse(block, axes, out)?,
+            MotionMode::Feed => self.straight_feed(block, axes, out)?,
+            MotionMode::ClockwiseArc => self.arc(block, true, axes, out)?,
+            MotionMode::CounterclockwiseArc => self.arc(block, false, axes, out)?,
         }
         if self.modal.feed_mode == FeedMode::InverseTime {
             // An F that no feed move took means nothing with G93.
@@ -33,20 +39,30 @@ impl Interpreter {
         Ok(())
     }
 
-    fn traverse(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+    fn traverse(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         if block.has(slot::AXES) {
-            self.advance(block)?;
+            self.advance(block, axes)?;
             out.motion = Motion::Traverse { target: self.position };
         }
         Ok(())
     }
 
-    fn straight_feed(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
+    fn straight_feed(
+        &mut self,
+        block: &mut Block,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         let moves = block.has(slot::AXES);
         if !moves && block.motion.is_none() {
             return Ok(());
         }
-        let moved = self.advance(block)?;
+        let moved = self.advance(block, axes)?;
         // Of rotary axes alone, F is the degrees per minute, in all units.
         let feed = self.rate(block, moved.rotary && !moved.linear)?;
         if moves {
@@ -56,7 +72,7 @@ impl Interpreter {
     }
 
     /// Moves the model by the axis words.
-    pub(super) fn advance(&mut self, block: &mut Block) -> Result<Moved, Status> {
+    pub(super) fn advance(&mut self, block: &mut Block, axes: &impl Axes) -> Result<Moved, Status> {
         let mut moved = Moved::default();
         for (axis, word) in block.take_axes() {
             let i = usize::from(axis);
@@ -65,7 +81,7 @@ impl Interpreter {
             else {
                 break;
             };
-            let mut by = exact(word, axis, self.modal.units)?;
+            let Some(mut by) = axes::value(word, axis, self.modal.units, axes)? else { continue };
             let from = match self.modal.distance {
                 Distance::Absolute => self.offset.get(i).copied().unwrap_or_default(),
                 Distance::Incremental => {

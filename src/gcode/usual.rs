@@ -11,9 +11,10 @@ use core::slice;
 
 use heapless::Vec;
 
+use super::axes::{Axes, AxisMode};
 use super::command::{Commands, Feed, Motion, Stop};
 use super::interpreter::Interpreter;
-use super::modal::{Distance, FeedMode, MotionMode, Units};
+use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units};
 use super::number::Decimal;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
@@ -42,7 +43,7 @@ struct Words<'a> {
 impl Interpreter {
     /// Carries a usual line out. False, and nothing done, if it is none or cannot be carried out.
     #[inline(never)]
-    pub(super) fn usual(&mut self, line: &[u8], out: &mut Commands) -> bool {
+    pub(super) fn usual(&mut self, line: &[u8], axes: &impl Axes, out: &mut Commands) -> bool {
         let modal = &self.modal;
         if modal.units != Units::Mm
             || modal.distance != Distance::Absolute
@@ -52,7 +53,9 @@ impl Interpreter {
             return false;
         }
         let mut words = Words::new(line);
-        words.read(&self.offset) && self.carry_out(&words, out)
+        words.read(&self.offset)
+            && words.targets.iter().all(|(axis, _)| is_usual(*axis, axes))
+            && self.carry_out(&words, out)
     }
 
     #[inline(never)]
@@ -83,12 +86,19 @@ impl Interpreter {
         out.dwell_ms = None;
         out.set_position = None;
         out.stop = Stop::None;
+        out.exact_stop = self.modal.path == PathMode::ExactStop;
         match mode {
             MotionMode::Traverse => out.motion = Motion::Traverse { target: self.position },
             _ => straight(&self.position, feed, out),
         }
         true
     }
+}
+
+/// An axis whose words are positions, anywhere.
+fn is_usual(axis: u8, axes: &impl Axes) -> bool {
+    matches!(axes.mode(axis), AxisMode::Standard | AxisMode::Inhibited)
+        && axes.travel(axis).is_none()
 }
 
 /// By itself: of both moves in one place the compiler would make a third one, to copy.

@@ -3,6 +3,7 @@
 //! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block decides how
 //! far Kerf looks ahead: limits take two bytes each.
 
+use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
 
@@ -27,6 +28,8 @@ pub enum Body {
     Dwell(u32),
     /// G28.3: from here on the motor positions are these.
     SetPosition([i32; MOTORS]),
+    /// The drivers ask for something else from here on.
+    Drivers(Drivers),
     /// M0, M1, M60.
     ProgramStop,
     /// M2, M30.

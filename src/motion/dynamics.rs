@@ -4,6 +4,7 @@
 //! of the sender, whose conversion takes longer than planning a block.
 
 use super::line::Motors;
+use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
 use crate::units::{AXES, PerAxis};
@@ -23,6 +24,10 @@ pub trait Machine {
     fn junction_deviation(&self, axis: usize) -> f32;
     /// Junction acceleration, mm/min^2.
     fn junction_acceleration(&self) -> f32;
+    /// What the drivers ask for.
+    fn drivers(&self) -> Drivers {
+        Drivers::USUAL
+    }
 }
 
 /// Limits of an axis; 0 for none.
@@ -49,10 +54,12 @@ pub struct Dynamics {
     pub junction: f32,
     /// The axis that each motor drives; [`AXES`] or more if none.
     pub drives: [u8; MOTORS],
+    /// Highest step rate of each motor when so many move, less one; steps/s.
+    pub rates: [f32; MOTORS],
 }
 
 impl Dynamics {
-    /// Cost: 2,000 an axis.
+    /// Cost: 2,000 an axis, 600 for each number of motors.
     pub fn new(machine: &(impl Machine + Motors)) -> Self {
         let mut axes = [Axis::default(); AXES];
         for (n, axis) in axes.iter_mut().enumerate() {
@@ -68,6 +75,12 @@ impl Dynamics {
         for (m, axis) in drives.iter_mut().enumerate() {
             *axis = machine.motor_axis(m);
         }
-        Self { axes, junction: machine.junction_acceleration() * (1.0 / 3_600.0), drives }
+        let drivers = machine.drivers();
+        Self {
+            axes,
+            junction: machine.junction_acceleration() * (1.0 / 3_600.0),
+            drives,
+            rates: core::array::from_fn(|others| drivers.step_rate_max(others + 1)),
+        }
     }
 }

@@ -18,7 +18,7 @@ use super::block::{Block, Body, Line};
 use super::dda::Segment;
 use super::float::{below, scaled, some};
 use super::governor::{Ahead, Governor};
-use super::prep::{CYCLES_MAX, FINE_LOG2, Prep, shortest};
+use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
 use crate::boards::MOTORS;
 
@@ -30,14 +30,6 @@ const CYCLES_PER_MS: u16 = (crate::boards::ACTIVE.clock_hz / 1000) as u16;
 
 /// Nominal time of a segment: as short as leaves two thirds of the CPU to others.
 pub const SEGMENT_S: f32 = 0.002;
-
-/// Highest step rate of a motor that moves alone, steps per second.
-pub const STEP_RATE_MAX: f32 = step_rate_max(1);
-
-/// Highest step rate of each of so many motors that move together, steps per second: a step on every tick.
-pub const fn step_rate_max(motors: usize) -> f32 {
-    CYCLES_PER_S / shortest(motors) as f32
-}
 
 /// Shortest block with steps, s: twice what exec takes for it while the step interrupt is busy.
 pub const BLOCK_S_MIN: f32 = 0.000_75;
@@ -175,6 +167,9 @@ impl Exec {
         out: &mut Snapshot,
         segment: &mut Segment,
     ) -> Step {
+        if self.prep.held(segment) {
+            return Step::Segment;
+        }
         if self.dwell_ms > 0 {
             self.dwell(segment);
             return Step::Segment;
@@ -222,6 +217,7 @@ impl Exec {
                     _ => Program::Stopped,
                 };
             }
+            Body::Drivers(drivers) => self.prep.set_drivers(*drivers),
             Body::Nothing | Body::Line(_) => {}
         }
         blocks.release();

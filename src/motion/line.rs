@@ -14,7 +14,7 @@
 use super::block::{Block, Body, Line as Move};
 use super::divide::{quotient, root};
 use super::dynamics::{Axis, Dynamics};
-use super::exec::{BLOCK_S_MIN, step_rate_max};
+use super::exec::BLOCK_S_MIN;
 use super::float::{OCTAVE, below, least, log, scaled, some};
 use super::governor::{ACCEL_MOST, effective_jerk};
 use super::junction::{self, Heading, ONE};
@@ -92,7 +92,7 @@ impl Builder {
         }
         path.limit(line.feed, dynamics);
         path.limit_change(dynamics);
-        path.limit_steps();
+        path.limit_steps(&dynamics.rates);
         path.heading.deviation = junction::deviation(&path.heading.unit, dynamics);
         let mut entry = least(path.cruise, self.cruise);
         if some(entry) {
@@ -322,13 +322,11 @@ impl Path {
     /// Keeps motors within the rate that so many can have together, and a block with steps long
     /// enough for exec.
     #[inline(never)]
-    fn limit_steps(&mut self) {
-        const RATES: [f32; MOTORS] =
-            [step_rate_max(1), step_rate_max(2), step_rate_max(3), step_rate_max(4)];
+    fn limit_steps(&mut self, rates: &[f32; MOTORS]) {
         if self.moving == 0 {
             return;
         }
-        let rate = RATES[usize::from(self.moving) - 1];
+        let rate = rates[usize::from(self.moving) - 1];
         let most = f32::from(self.most);
         // Two octaves: plainly below the limit, whatever the logarithms' error.
         if log(self.cruise) + log(most) + 2 * OCTAVE > log(rate) + log(self.length) {

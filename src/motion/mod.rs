@@ -17,6 +17,7 @@ pub mod governor;
 pub mod horizon;
 pub mod junction;
 pub mod line;
+pub mod pace;
 pub mod prep;
 pub mod queue;
 pub mod reach;

@@ -22,6 +22,7 @@
 
 use super::dda::{STEP, Segment};
 use super::divide::{quotient, quotient_remainder};
+use super::pace::{COARSEST, Drivers, Pace, paces};
 use crate::boards::MOTORS;
 
 const STEP_LOG2: u8 = 15;
@@ -38,47 +39,17 @@ pub const CYCLES_MAX: u32 = 1 << 20;
 /// Longest tick.
 const PERIOD_MAX: u32 = 0xFFFF;
 
-/// How close ticks may come.
-struct Pace {
-    /// Shortest tick period, CPU cycles: the step interrupt with so many motors, a short interrupt
-    /// before it, and some time for everything else.
-    shortest: u16,
-    /// 2^22 / the tick period of steady motion: as fine as leaves exec and the planner a third of the CPU.
-    fine: u16,
-    /// 2^22 / that of short blocks, for which they need more.
-    coarse: u16,
-    /// From this tick period on pulses wait for the interrupt's worst latency ([`Segment::settle`]).
-    settles: u16,
-}
-
-/// By the number of motors that move, less one.
-const PACES: [Pace; MOTORS] = [
-    Pace { shortest: 160, fine: per(200), coarse: per(400), settles: 200 },
-    Pace { shortest: 200, fine: per(200), coarse: per(400), settles: 200 },
-    Pace { shortest: 240, fine: per(320), coarse: per(480), settles: 300 },
-    Pace { shortest: 320, fine: per(400), coarse: per(560), settles: 320 },
-];
-
-/// Ticks of blocks so short that they are a single segment.
-const COARSEST: u16 = per(640);
-
 /// Blocks that take longer than 1/16 s have fine ticks: that power of two.
 pub const FINE_LOG2: i8 = -4;
 
 /// Latest cycle of a tick at which the interrupt may find itself ready for its pulses.
 const SETTLE: u8 = 68;
 
+/// Latest cycle behind its tick at which a segment's directions stand.
+const TURNED: u16 = 150;
+
 /// A lockstep segment has at least half as many ticks, if it is shorter than as many steps.
 const LOCKSTEP_TICKS: u32 = 16;
-
-const fn per(cycles: u32) -> u16 {
-    ((1 << 22) / cycles) as u16
-}
-
-/// Shortest tick period with `motors` moving, CPU cycles.
-pub const fn shortest(motors: usize) -> u16 {
-    PACES[if motors == 0 { 0 } else { motors - 1 }].shortest
-}
 
 /// A motor that moves but does not step on every tick of the dominant one.
 #[derive(Clone, Copy, Debug, Default)]
@@ -115,6 +86,14 @@ pub struct Prep {
     backwards: u8,
     /// Ticks are to be as fine as can be.
     fine: bool,
+    /// A motor has turned round, and no segment tells of it yet.
+    turned: bool,
+    /// By the number of motors that move, less one.
+    paces: [Pace; MOTORS],
+    /// How long directions must stand before the first step, CPU cycles.
+    setup: u16,
+    /// A segment that comes behind one in which directions settle.
+    held: Option<Segment>,
 }
 
 impl Prep {
@@ -133,6 +112,29 @@ impl Prep {
             others: 0,
             backwards: 0,
             fine: false,
+            turned: false,
+            paces: paces(Drivers::USUAL),
+            setup: Drivers::USUAL.setup(),
+            held: None,
+        }
+    }
+
+    /// From the next block on, this is what the drivers ask for.
+    #[inline(never)]
+    pub fn set_drivers(&mut self, drivers: Drivers) {
+        self.paces = paces(drivers);
+        self.setup = drivers.setup();
+    }
+
+    /// The segment that comes before any other, if there is one.
+    #[inline(always)]
+    pub fn held(&mut self, out: &mut Segment) -> bool {
+        match self.held.take() {
+            Some(segment) => {
+                *out = segment;
+                true
+            }
+            None => false,
         }
     }
 
@@ -160,6 +162,7 @@ impl Prep {
                 moving += 1;
                 if (steps[m] < 0) != (self.backwards & bit != 0) {
                     self.backwards ^= bit;
+                    self.turned = true;
                     // It was measured in the old direction.
                     self.debt[m] = -self.debt[m];
                 }
@@ -231,7 +234,7 @@ impl Prep {
             ticks *= 2;
             increment /= 2;
         }
-        let shortest = PACES[usize::from(self.others)].shortest;
+        let shortest = self.paces().shortest;
         let long = (cycles >> 16) as u16 >= ticks;
         let period = if long { u16::MAX } else { quotient(cycles + u32::from(ticks / 2), ticks) };
         let period = period.max(shortest);
@@ -253,6 +256,9 @@ impl Prep {
             bit <<= 1;
         }
         out.seal();
+        if self.turned {
+            self.behind_turn(out);
+        }
         true
     }
 
@@ -292,8 +298,12 @@ impl Prep {
         true
     }
 
+    fn paces(&self) -> &Pace {
+        &self.paces[usize::from(self.others)]
+    }
+
     fn pace(&self) -> u16 {
-        let pace = &PACES[usize::from(self.others)];
+        let pace = self.paces();
         if self.fine { pace.fine } else { pace.coarse }
     }
 
@@ -324,7 +334,7 @@ impl Prep {
             return 0x1_0000;
         }
         let period = quotient(cycles + u32::from(ticks / 2), ticks);
-        u32::from(period.max(PACES[usize::from(self.others)].shortest))
+        u32::from(period.max(self.paces().shortest))
     }
 
     /// Nothing moves: the next step is too far off. A tick of the time there is, at most; short times
@@ -336,6 +346,8 @@ impl Prep {
         }
         let period = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
         self.time = (cycles - u32::from(period)) as i32;
+        // By far long enough for directions.
+        self.turned = false;
         self.pause(1, period, out);
         true
     }
@@ -362,7 +374,7 @@ impl Prep {
         out.ticks = ticks;
         out.period = period;
         out.backwards = self.backwards;
-        let settles = period >= PACES[usize::from(self.others)].settles;
+        let settles = period >= self.paces().settles;
         out.settle = if settles { SETTLE } else { 0 };
         let mut bit = 1;
         for m in 0..MOTORS {
@@ -379,6 +391,9 @@ impl Prep {
             self.settle_debts();
         }
         out.seal();
+        if self.turned {
+            self.behind_turn(out);
+        }
     }
 
     /// What motors are short of from blocks before, in the units of this one.
@@ -390,6 +405,19 @@ impl Prep {
             }
             bit <<= 1;
         }
+    }
+
+    /// The first segment after motors have turned round, or, if its first steps come too soon after
+    /// that, a tick in which directions settle. Its time is not made up for.
+    #[inline(never)]
+    fn behind_turn(&mut self, segment: &mut Segment) {
+        self.turned = false;
+        let stand = segment.period.saturating_sub(TURNED);
+        if stand >= self.setup {
+            return;
+        }
+        self.held = Some(*segment);
+        self.pause(1, (self.setup - stand).max(self.paces().shortest), segment);
     }
 
     /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.

@@ -1,6 +1,6 @@
 //! A machine for tests, and the caller that steps requests for it.
 
-use super::{CHUNK, Machine, Mode, Next, Out, Request, StatusReport, Value};
+use super::{CHUNK, Machine, Mode, Next, Out, Request, StatusReport, Value, Warning};
 use crate::config::{Setting, Settings};
 use crate::status::Status;
 use std::string::String;
@@ -84,9 +84,10 @@ impl Machine for Fake {
         &self.settings
     }
 
-    fn set(&mut self, setting: Setting, value: i32) -> Status {
+    fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
         self.settings.store(setting, value);
-        Status::Ok
+        let lowered = self.settings.limit_velocity(setting, |_| 40_000);
+        Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 
     fn value(&mut self, value: Value) -> i32 {

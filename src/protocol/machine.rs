@@ -5,12 +5,24 @@ use super::value::Value;
 use crate::config::{Setting, Settings};
 use crate::status::Status;
 
+/// What is told beside a setting that has been stored; the last one counts most.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
+pub enum Warning {
+    /// Nothing.
+    #[default]
+    None,
+    /// Drivers with so many microsteps are unusual.
+    Microsteps,
+    /// The velocity limits of an axis were lowered to what its motors can follow.
+    Velocity,
+}
+
 /// The machine behind the protocol. Nothing here waits.
 pub trait Machine {
     /// The settings in force.
     fn settings(&self) -> &Settings;
     /// Stores a value that [`Settings::check`] returned and lets it take effect, or refuses it.
-    fn set(&mut self, setting: Setting, value: i32) -> Status;
+    fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status>;
     /// A value now, in the unit that [`Value`] states.
     fn value(&mut self, value: Value) -> i32;
     /// What status reports hold.

@@ -25,7 +25,7 @@ mod value;
 mod write;
 
 pub use json::Span;
-pub use machine::Machine;
+pub use machine::{Machine, Warning};
 pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report};
 pub use request::{Next, Request};
 pub use status_text::status_text;

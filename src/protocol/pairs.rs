@@ -1,7 +1,7 @@
 //! Names and values of a JSON line: reading, setting, doing, and telling the result.
 
 use super::json::{self, Kind, Pair};
-use super::machine::Machine;
+use super::machine::{Machine, Warning};
 use super::request::{Context, Phase, Request};
 use super::token::{Action, Group, Target, Token, resolve};
 use super::write::{Out, Writer};
@@ -187,8 +187,10 @@ impl Request {
         };
         let inches = c.machine.inches();
         let value = c.machine.settings().check(setting, number, inches)?;
-        done(c.machine.set(setting, value))?;
-        self.warn |= setting.is_microsteps() && !matches!(value, 1 | 2 | 4 | 8);
+        let warning = c.machine.set(setting, value)?;
+        let unusual = setting.is_microsteps() && !matches!(value, 1 | 2 | 4 | 8);
+        let unusual = if unusual { Warning::Microsteps } else { Warning::None };
+        self.warning = self.warning.max(warning).max(unusual);
         Ok(())
     }
 

@@ -18,7 +18,7 @@
 
 use super::block::byte_of;
 use super::json::{self, Span};
-use super::machine::Machine;
+use super::machine::{Machine, Warning};
 use super::token::Group;
 use super::write::{Format, Out, Writer};
 use super::{Mode, value::Value};
@@ -97,8 +97,9 @@ pub struct Request {
     is_text: bool,
     /// The block may have a comment, and that a message.
     pub(super) commented: bool,
-    /// Of the phases: a message is due; something has been selected.
-    pub(super) warn: bool,
+    /// The message that is due.
+    pub(super) warning: Warning,
+    /// Of the phase `Select`: something has been selected.
     pub(super) selected: bool,
 }
 
@@ -164,7 +165,7 @@ impl Request {
             is_json: false,
             is_text: false,
             commented: true,
-            warn: false,
+            warning: Warning::None,
             selected: false,
         }
     }
@@ -231,10 +232,15 @@ impl Request {
 
     fn warning<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         self.open(c);
-        if self.warn {
+        let text = match self.warning {
+            Warning::None => text!(""),
+            Warning::Microsteps => text!("*** WARNING *** Setting non-standard microstep value"),
+            Warning::Velocity => text!("*** WARNING *** Velocity limited by the step rate"),
+        };
+        if !text.is_empty() {
             let mut writer = Writer::body(c.out, &mut self.format);
             writer.key_text(text!("msg"));
-            writer.string(text!("*** WARNING *** Setting non-standard microstep value"));
+            writer.string(text);
         }
         self.phase = Phase::Footer;
     }

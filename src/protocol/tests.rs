@@ -180,8 +180,8 @@ fn inches_are_spoken() {
     fake.inches = true;
     fake.position = 508_000;
     assert_eq!(
-        fake.ask("{posx:n,xvm:100,xtm:n}"),
-        r#"{"r":{"posx":2.000,"xvm":100,"xtm":5.906},"f":[1,0,7]}"#
+        fake.ask("{posx:n,xvm:50,xtm:n}"),
+        r#"{"r":{"posx":2.000,"xvm":50,"xtm":5.906},"f":[1,0,7]}"#
     );
 }
 

@@ -11,7 +11,7 @@ use crate::hal::ring::Producer;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::queue::BlockSource;
-use crate::tasks::links;
+use crate::tasks::{links, power};
 
 /// Segments shorter than this, CPU cycles, may fill the ring.
 const SHORT: u32 = ACTIVE.clock_hz / 800;
@@ -28,8 +28,11 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         exec::wait(|| (segments.used() < most).then_some(())).await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
-        let step = links::update(|out| machine.step(&mut blocks, standstill, out, &mut segment));
+        let (step, steps) = links::update(|out| {
+            (machine.step(&mut blocks, standstill, out, &mut segment), out.steps)
+        });
         if step == Step::Segment {
+            power::segment(&segment, &steps);
             // There is room: this task alone fills the ring.
             let _ = segments.push(segment);
             stepper::go();

@@ -1,12 +1,14 @@
 //! The tasks. Each is a thin `async fn` around a part that knows nothing of tasks; `links` lists
 //! everything that connects them.
 
+mod axes;
 pub mod control;
 pub mod exec;
 pub mod lines;
 pub mod links;
 pub mod parser;
 pub mod planner;
+pub mod power;
 pub mod reader;
 pub mod reporter;
 pub mod tx;

@@ -119,7 +119,8 @@ fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
 #[inline(never)]
 fn interpret(links: &Links, block: &[u8]) -> (Status, bool) {
     let mut commands = links.commands.borrow_mut();
-    match links.model.borrow_mut().interpret(block, &mut commands) {
+    let settings = links.settings.borrow();
+    match links.model.borrow_mut().interpret(block, &*settings, &mut commands) {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
             if !commands.is_empty() {

@@ -5,6 +5,7 @@
 
 use embassy_futures::yield_now;
 
+use super::axes::moved_by;
 use super::links::{self, Links};
 use crate::config::{Settings, StepRatio};
 use crate::gcode::arc::Chords;
@@ -13,6 +14,7 @@ use crate::hal::event::{Event, wait};
 use crate::motion::block::{Block, Body, Line as Move};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line, Motors};
+use crate::motion::pace::Drivers;
 use crate::motion::queue::BlockQueue;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -26,6 +28,8 @@ struct Planner {
     position: PerAxis<Length>,
     /// The N word of the line that is carried out.
     line: u32,
+    /// What exec has been told that drivers ask for.
+    drivers: Drivers,
 }
 
 /// The task.
@@ -37,6 +41,7 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         dynamics: Dynamics::default(),
         position: [Length::ZERO; AXES],
         line: 0,
+        drivers: Drivers::USUAL,
     };
     loop {
         links.planner_wake.wait().await;
@@ -71,6 +76,9 @@ impl Planner {
         if self.line(target, feed).is_some() {
             return false;
         }
+        if commands.exact_stop {
+            self.builder.stopped();
+        }
         self.position = *target;
         self.announce();
         true
@@ -84,6 +92,7 @@ impl Planner {
         }
         if self.links.resync.get() {
             self.set_position(&[None; AXES]).await;
+            self.set_drivers().await;
             self.links.resync.set(false);
         }
         if let Some(ms) = commands.dwell_ms {
@@ -110,6 +119,9 @@ impl Planner {
                     self.straight(&end, Some(Feed::PerMinute(feed))).await;
                 }
             }
+        }
+        if commands.exact_stop {
+            self.builder.stopped();
         }
         match commands.stop {
             Stop::None => {}
@@ -189,6 +201,15 @@ impl Planner {
         self.push(Block { body, line: self.line }).await;
     }
 
+    /// Tells exec what the drivers ask for, if that has changed.
+    async fn set_drivers(&mut self) {
+        let drivers = Machine::drivers(&*self.links.settings.borrow());
+        if drivers != self.drivers {
+            self.drivers = drivers;
+            self.push(Block { body: Body::Drivers(drivers), line: self.line }).await;
+        }
+    }
+
     async fn push(&mut self, block: Block) {
         self.room().await;
         // There is room: this task alone fills the queue.
@@ -215,7 +236,7 @@ impl Planner {
 
 impl Motors for Settings {
     fn motor_axis(&self, motor: usize) -> u8 {
-        Settings::motor_axis(self, motor)
+        moved_by(self, motor)
     }
     fn ratio(&self, motor: usize) -> StepRatio {
         self.step_ratio(motor)
@@ -240,5 +261,8 @@ impl Machine for Settings {
     }
     fn junction_acceleration(&self) -> f32 {
         Settings::junction_acceleration(self)
+    }
+    fn drivers(&self) -> Drivers {
+        Drivers { pulse_us: self.step_pulse_us(), setup_us: self.direction_setup_us() }
     }
 }

@@ -5,14 +5,17 @@
 
 use core::cell::{OnceCell, RefMut};
 
+use super::axes::moved_by;
 use super::links::{Links, snapshot};
+use super::power;
 use crate::baud;
 use crate::boards::MOTORS;
-use crate::config::{Owner, Setting, Settings};
+use crate::config::{Setting, Settings};
 use crate::hal::imp::{gpio, stepper};
+use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
-use crate::protocol::{Machine, StatusReport, Value, thousandths};
+use crate::protocol::{Machine, StatusReport, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::units::Length;
 
@@ -67,9 +70,9 @@ impl<'a> View<'a> {
         if !self.busy() || self.links.resync.get() {
             return programmed;
         }
-        // Of several motors on an axis the first tells; an axis without one is where it should be.
+        // Of several motors on an axis the first tells; an axis that moves none is where it should be.
         (0..MOTORS)
-            .find(|m| usize::from(self.settings.motor_axis(*m)) == axis)
+            .find(|m| usize::from(moved_by(&self.settings, *m)) == axis)
             .and_then(|m| self.settings.step_ratio(m).length(self.motion().position(m)))
             .unwrap_or(programmed)
     }
@@ -101,11 +104,10 @@ impl Machine for View<'_> {
         &self.settings
     }
 
-    fn set(&mut self, setting: Setting, value: i32) -> Status {
-        if let Owner::Motor(_) = setting.owner() {
-            // Steps would change their meaning under way.
+    fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
+        if setting.needs_rest() {
             if self.busy() {
-                return Status::NotAccepted;
+                return Err(Status::NotAccepted);
             }
             self.links.resync.set(true);
         }
@@ -113,9 +115,12 @@ impl Machine for View<'_> {
             self.links.rate.set(baud::rate(value));
         }
         self.settings.store(setting, value);
+        let drivers = dynamics::Machine::drivers(&*self.settings);
+        let rate = |motors| drivers.step_rate_max(motors) as u32;
+        let lowered = self.settings.limit_velocity(setting, rate);
         self.links.settings_changed.set(true);
-        stepper::set_inverted(inverted(&self.settings));
-        Status::Ok
+        set_outputs(&self.settings);
+        Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 
     fn value(&mut self, value: Value) -> i32 {
@@ -137,8 +142,9 @@ impl Machine for View<'_> {
                 self.position(axis).0.wrapping_sub(self.offset(axis).0)
             }
             Value::Offset(axis) => self.offset(axis.into()).0,
-            Value::Powered(_) => i32::from(gpio::is_powered()),
-            Value::Hold | Value::Tool | Value::Home | Value::Homed(_) => 0,
+            Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
+            Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
+            Value::Hold | Value::Tool | Value::Home => 0,
             modal => self.modal(modal),
         }
     }
@@ -151,16 +157,29 @@ impl Machine for View<'_> {
         Status::Ok
     }
 
-    fn energize(&mut self, _motor: Option<u8>, on: bool) -> Status {
-        if self.busy() {
+    fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {
+        // Without power a motor that moves would lose its position.
+        if self.busy() && !on {
             return Status::NotAccepted;
         }
-        gpio::power(on);
+        let motors = motor.map_or(u8::MAX, |motor| 1 << motor);
+        if on {
+            power::energize(motors)
+        } else {
+            power::release(motors)
+        }
         Status::Ok
     }
 }
 
-/// The motors whose direction pins are inverted, as bits.
-fn inverted(settings: &Settings) -> u8 {
-    (0..MOTORS).fold(0, |bits, m| bits | u8::from(settings.motor_reversed(m)) << m)
+/// Tells the outputs what the settings say of them. Thread mode, or before interrupts are on.
+pub fn set_outputs(settings: &Settings) {
+    power::set_modes(settings);
+    stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
+    stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));
+}
+
+/// The motors of which something is so, as bits.
+fn motors(is: impl Fn(usize) -> bool) -> u8 {
+    (0..MOTORS).fold(0, |bits, m| bits | u8::from(is(m)) << m)
 }

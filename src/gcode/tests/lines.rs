@@ -1,11 +1,13 @@
 //! Modes, feeds, offsets, refusals.
 
 use super::{feed, position, refusal, run};
+use crate::gcode::axes::{Axes, AxisMode, Usual};
 use crate::gcode::command::{Commands, Feed, Motion, Stop};
 use crate::gcode::interpreter::Interpreter;
 use crate::gcode::modal::{Distance, FeedMode, Modal, MotionMode, PathMode, Plane, Units};
 use crate::status::Status;
 use crate::units::Length;
+use std::vec;
 
 #[test]
 fn traverse_and_feed() {
@@ -27,7 +29,7 @@ fn lines_that_do_nothing() {
         let (_, out) = run(&[line]);
         assert_eq!(Commands { line: 0, ..out }, Commands::default(), "{line}");
     }
-    let info = Interpreter::new().interpret(b"/G0 X1", &mut Commands::default()).unwrap();
+    let info = Interpreter::new().interpret(b"/G0 X1", &Usual, &mut Commands::default()).unwrap();
     assert!(info.deleted);
 }
 
@@ -43,6 +45,67 @@ fn modes_stay_in_force() {
     };
     let (state, _) = run(&["G1 G18 G20 G91 G93 G61 F1"]);
     assert_eq!(state.modal(), &set);
+}
+
+#[test]
+fn exact_stop_is_modal_and_asks_for_nothing_itself() {
+    let (state, out) = run(&["G61.1"]);
+    assert_eq!(state.modal().path, PathMode::ExactStop);
+    assert_eq!(out, Commands { exact_stop: true, ..Commands::default() });
+    assert!(run(&["G61.1", "G0 X1"]).1.exact_stop);
+    assert!(run(&["G61.1", "M30", "G0 X1"]).1.exact_stop);
+    for line in ["G61", "G64"] {
+        assert!(!run(&["G61.1", line, "G0 X1"]).1.exact_stop, "{line}");
+    }
+}
+
+/// X disabled, A by a radius of 1 mm.
+struct Odd;
+
+impl Axes for Odd {
+    fn mode(&self, axis: u8) -> AxisMode {
+        match axis {
+            0 => AxisMode::Disabled,
+            3 => AxisMode::Radius,
+            _ => AxisMode::Standard,
+        }
+    }
+    fn radius(&self, _axis: u8) -> u32 {
+        1_000_000
+    }
+    fn travel(&self, _axis: u8) -> Option<(Length, Length)> {
+        None
+    }
+}
+
+fn odd(lines: &[&str]) -> Result<[i32; 6], Status> {
+    let (mut state, mut out) = (Interpreter::new(), Commands::default());
+    for line in lines {
+        state.interpret(line.as_bytes(), &Odd, &mut out)?;
+    }
+    Ok(state.position().map(|at| at.0))
+}
+
+#[test]
+fn words_of_a_disabled_axis_mean_nothing() {
+    assert_eq!(odd(&["G0 X1 Y1"]), Ok([0, 10_000, 0, 0, 0, 0]));
+    assert_eq!(odd(&["G28.3 X1", "G91 G0 X1", "G92 X5", "G90 X3"]), Ok([0; 6]));
+    assert_eq!(odd(&["G1 F100 X5"]), Ok([0; 6]));
+    assert_eq!(odd(&["G2 I5 F100"]), Err(Status::AxisDisabled));
+    assert_eq!(odd(&["G18 G3 Z2 K1 F100"]), Err(Status::AxisDisabled));
+    assert_eq!(odd(&["G19 G3 Z2 K1 X7 F100"]), Ok([0, 0, 20_000, 0, 0, 0]));
+}
+
+#[test]
+fn words_of_a_radius_axis_are_lengths() {
+    assert_eq!(odd(&["G0 A1"]), Ok([0, 0, 0, 572_958, 0, 0]));
+    assert_eq!(odd(&["G20 G0 A1 B1"]), Ok([0, 0, 0, 14_553_128, 10_000, 0]));
+    assert_eq!(odd(&["G28.3 A1", "G92 A0", "G0 A1"]), Ok([0, 0, 0, 1_145_916, 0, 0]));
+    // What rounding takes is carried on.
+    let mut lines = vec!["G91 G0"];
+    lines.extend(["A0.0001"; 1000]);
+    assert_eq!(odd(&lines), Ok([0, 0, 0, 57_296, 0, 0]));
+    assert_eq!(odd(&["G0 A200000"]), Err(Status::OutOfRange));
 }
 
 #[test]
@@ -176,6 +239,6 @@ fn a_refused_line_leaves_no_trace() {
 fn resynchronised_with_the_machine() {
     let (mut state, mut out) = run(&["G91 G20 G0 X.0001 Y1"]);
     state.set_position(&[Length(7); 6]);
-    state.interpret(b"X.0001", &mut out).unwrap();
+    state.interpret(b"X.0001", &Usual, &mut out).unwrap();
     assert_eq!(state.position().map(|at| at.0), [32, 7, 7, 7, 7, 7]);
 }

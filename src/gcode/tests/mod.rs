@@ -4,6 +4,7 @@ mod arcs;
 mod lines;
 mod usual;
 
+use super::axes::Usual;
 use super::command::{Commands, Feed, Motion};
 use super::interpreter::Interpreter;
 use crate::status::Status;
@@ -13,7 +14,7 @@ fn run(lines: &[&str]) -> (Interpreter, Commands) {
     let mut interpreter = Interpreter::new();
     let mut out = Commands::default();
     for line in lines {
-        interpreter.interpret(line.as_bytes(), &mut out).expect(line);
+        interpreter.interpret(line.as_bytes(), &Usual, &mut out).expect(line);
     }
     (interpreter, out)
 }
@@ -23,7 +24,7 @@ fn refusal(lines: &[&str]) -> Status {
     let (last, before) = lines.split_last().unwrap();
     let (mut interpreter, mut out) = run(before);
     let state = interpreter;
-    let status = interpreter.interpret(last.as_bytes(), &mut out).expect_err(last);
+    let status = interpreter.interpret(last.as_bytes(), &Usual, &mut out).expect_err(last);
     assert_eq!(interpreter, state, "{last}");
     assert_eq!(out, Commands::default(), "{last}");
     status

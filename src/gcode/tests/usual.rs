@@ -4,6 +4,7 @@ use std::string::String;
 
 use proptest::prelude::*;
 
+use crate::gcode::axes::Usual;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 
@@ -24,9 +25,9 @@ fn line() -> impl Strategy<Value = String> {
 fn both_ways(interpreter: &mut Interpreter, line: &[u8]) -> bool {
     let mut general = *interpreter;
     let (mut out, mut expected) = (Commands::default(), Commands::default());
-    let is_usual = { *interpreter }.usual(line, &mut Commands::default());
-    let done = interpreter.interpret(line, &mut out);
-    assert_eq!(done, general.general(line, &mut expected), "{line:?}");
+    let is_usual = { *interpreter }.usual(line, &Usual, &mut Commands::default());
+    let done = interpreter.interpret(line, &Usual, &mut out);
+    assert_eq!(done, general.general(line, &Usual, &mut expected), "{line:?}");
     assert_eq!((*interpreter, out), (general, expected), "{line:?}");
     is_usual
 }

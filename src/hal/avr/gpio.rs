@@ -1,9 +1,10 @@
-//! Pins of the board, as constants: setting one is a single `sbi` or `cbi` on ports A to G.
+//! Pins of the board, as constants: setting one is a single `sbi` or `cbi` on ports A to G, as long as
+//! its level is a constant too.
 //!
-//! Ports H to L take a read-modify-write, so a pin there must share its port with no pin that
-//! another level writes.
+//! Otherwise, and on ports H to L, it is a read-modify-write, so the pin must share its port with no pin
+//! that another level writes meanwhile. Enables see to that themselves.
 
-use crate::boards::{ACTIVE, MOTORS, Pin};
+use crate::boards::{ACTIVE, Pin};
 use crate::hal::byte::SharedByte;
 
 /// Drives a pin high.
@@ -57,23 +58,53 @@ pub fn start() {
     }
 }
 
-static POWERED: SharedByte = SharedByte::new(0);
-
-/// Whether the motor drivers are on.
-pub fn is_powered() -> bool {
-    POWERED.get() != 0
+/// Does the same for each motor with a constant index, so that pins fold into single instructions.
+macro_rules! each_motor {
+    ($m:ident => $body:expr) => {{
+        {
+            const $m: usize = 0;
+            $body
+        }
+        {
+            const $m: usize = 1;
+            $body
+        }
+        {
+            const $m: usize = 2;
+            $body
+        }
+        {
+            const $m: usize = 3;
+            $body
+        }
+    }};
 }
 
-/// Switches all motor drivers on or off.
-pub fn power(on: bool) {
-    POWERED.set(on.into());
-    let set = if on { low } else { high };
-    for m in 0..MOTORS {
-        if let Some(enable) = ACTIVE.motors[m].enable {
-            set(enable);
-        }
-    }
+pub(super) use each_motor;
+
+/// The motors whose drivers are wanted on, as bits.
+static WANTED: SharedByte = SharedByte::new(0);
+
+/// The motors whose drivers are on, as bits.
+pub fn powered() -> u8 {
+    ACTIVE.powered(WANTED.get())
+}
+
+/// Switches the drivers of these motors (bits) on, and the others off as far as the board can: an
+/// enable that all drivers share is on for any of them. Exec, or while it cannot run.
+pub fn power(motors: u8) {
+    WANTED.set(motors);
+    each_motor!(M => if let Some(enable) = ACTIVE.motors[M].enable {
+        set_active_low(enable, motors & (1 << M) != 0);
+    });
     if let Some(enable) = ACTIVE.enable_all {
-        set(enable);
+        set_active_low(enable, motors != 0);
     }
+}
+
+/// The compiler makes one read-modify-write of the two cases, and the port may be shared with pins of the
+/// step interrupt, which must not come in between: 8 cycles.
+#[inline(always)]
+fn set_active_low(pin: Pin, on: bool) {
+    avr_device::interrupt::free(|_| if on { low(pin) } else { high(pin) });
 }

@@ -10,7 +10,7 @@ pub fn halt() -> ! {
     for &hazard in ACTIVE.hazards {
         super::gpio::low(hazard);
     }
-    super::gpio::power(false);
+    super::gpio::power(0);
     loop {
         avr_device::asm::nop();
     }

@@ -6,11 +6,12 @@
 
 use core::cell::UnsafeCell;
 
-use super::gpio;
-use crate::boards::{ACTIVE, MOTORS, Timer};
+use super::gpio::{self, each_motor};
+use crate::boards::{ACTIVE, Timer};
 use crate::hal::byte::SharedByte;
 use crate::hal::ring::{Producer, Ring};
 use crate::motion::dda::{Dda, SEGMENTS, Segment};
+use crate::motion::pace::Drivers;
 
 const _: () = assert!(matches!(ACTIVE.step_timer, Timer::T1), "the step timer is timer 1");
 
@@ -31,10 +32,16 @@ const FIRST_TICK: u16 = 400;
 pub(super) static SEGMENT_RING: Ring<Segment, SEGMENTS> = Ring::new();
 pub(super) static RUNNING: SharedByte = SharedByte::new(0);
 
+/// How long pulses last, cycles, that no turn of a loop widens: in lockstep, and else.
+const LOCKSTEP_CYCLES: u16 = 21;
+/// See [`LOCKSTEP_CYCLES`].
+const CYCLES: u16 = 51;
+
 /// Turns of a loop of 3 cycles that widen a pulse, at least 1: in lockstep, and else.
-pub(super) static LOCKSTEP_WIDTH: SharedByte = SharedByte::new(width_turns(2, 23));
+pub(super) static LOCKSTEP_WIDTH: SharedByte =
+    SharedByte::new(width_turns(Drivers::USUAL.pulse_us, LOCKSTEP_CYCLES));
 /// See [`LOCKSTEP_WIDTH`].
-pub(super) static WIDTH: SharedByte = SharedByte::new(width_turns(2, 55));
+pub(super) static WIDTH: SharedByte = SharedByte::new(width_turns(Drivers::USUAL.pulse_us, CYCLES));
 
 /// The turns for pulses of `us` microseconds that last `cycles` without any.
 const fn width_turns(us: u8, cycles: u16) -> u8 {
@@ -45,6 +52,8 @@ const fn width_turns(us: u8, cycles: u16) -> u8 {
 
 /// Bit m: motor m's direction pin is inverted.
 static INVERTED: SharedByte = SharedByte::new(0);
+/// Bit m: motor m's step pin rests high.
+static STEP_INVERTED: SharedByte = SharedByte::new(0);
 
 /// What the step interrupt owns.
 #[repr(transparent)]
@@ -75,7 +84,6 @@ pub fn go() {
     if RUNNING.get() != 0 {
         return;
     }
-    gpio::power(true);
     RUNNING.set(1);
     // SAFETY: the timer stands still, so its interrupt cannot interfere.
     unsafe {
@@ -95,11 +103,22 @@ pub fn running() -> bool {
 pub fn set_inverted(motors: u8) {
     let changed = motors ^ INVERTED.get();
     INVERTED.set(motors);
-    for m in 0..MOTORS {
-        if changed & (1 << m) != 0 {
-            gpio::toggle(ACTIVE.motors[m].dir);
-        }
-    }
+    each_motor!(M => if changed & (1 << M) != 0 {
+        gpio::toggle(ACTIVE.motors[M].dir);
+    });
+}
+
+/// How wide a step pulse is, in microseconds, and which step pins rest high (bit m for motor m). For
+/// thread mode; a change only while nothing runs.
+pub fn set_step_output(pulse_us: u8, inverted: u8) {
+    LOCKSTEP_WIDTH.set(width_turns(pulse_us, LOCKSTEP_CYCLES));
+    WIDTH.set(width_turns(pulse_us, CYCLES));
+    let changed = inverted ^ STEP_INVERTED.get();
+    STEP_INVERTED.set(inverted);
+    // The interrupt toggles pins, so that the level at rest is all there is to polarity.
+    each_motor!(M => if changed & (1 << M) != 0 {
+        gpio::toggle(ACTIVE.motors[M].step);
+    });
 }
 
 /// Stops the ticks at once, wherever the motors are. For the panic handler.

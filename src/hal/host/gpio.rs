@@ -1,17 +1,18 @@
 //! Outputs that are not steps.
 
 use super::Local;
+use crate::boards::ACTIVE;
 
 machine_static! {
-    fn powered() -> Local<bool> = Local::new(false);
+    fn wanted() -> Local<u8> = Local::new(0);
 }
 
-/// Switches all motor drivers on or off.
-pub fn power(on: bool) {
-    powered().set(on);
+/// Switches the drivers of these motors (bits) on, and the others off as far as the board can.
+pub fn power(motors: u8) {
+    wanted().set(motors);
 }
 
-/// Whether the drivers are on.
-pub fn is_powered() -> bool {
-    powered().get()
+/// The motors whose drivers are on, as bits.
+pub fn powered() -> u8 {
+    ACTIVE.powered(wanted().get())
 }

@@ -2,7 +2,7 @@
 
 use core::cell::{Cell, RefCell};
 
-use super::{NEVER, exec, gpio, now};
+use super::{NEVER, exec, now};
 use crate::boards::MOTORS;
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::motion::dda::{Dda, Pins, SEGMENTS, Segment};
@@ -30,6 +30,7 @@ struct Stepper {
     dda: RefCell<Dda>,
     pins: RefCell<Pinned>,
     next_tick: Cell<u64>,
+    output: Cell<(u8, u8)>,
 }
 
 machine_static! {
@@ -44,6 +45,7 @@ machine_static! {
             emitted: Emitted::default(),
         }),
         next_tick: Cell::new(NEVER),
+        output: Cell::new((0, 0)),
     };
 }
 
@@ -88,7 +90,6 @@ pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
 /// Starts the ticks if they have stopped.
 pub fn go() {
     if !running() {
-        gpio::power(true);
         let mut pins = stepper().pins.borrow_mut();
         pins.stopped = false;
         pins.period = FIRST_TICK;
@@ -103,6 +104,17 @@ pub fn running() -> bool {
 
 /// Which direction pins are inverted: of no account here, where positions are counted before the pins.
 pub fn set_inverted(_motors: u8) {}
+
+/// How wide a step pulse is, in microseconds, and which step pins rest high: of no account either, but
+/// kept for tests.
+pub fn set_step_output(pulse_us: u8, inverted: u8) {
+    stepper().output.set((pulse_us, inverted));
+}
+
+/// What was set last: pulse width, and the inverted motors as bits.
+pub fn step_output() -> (u8, u8) {
+    stepper().output.get()
+}
 
 /// What the pins have done so far.
 pub fn emitted() -> Emitted {

@@ -105,6 +105,9 @@ pub fn run(
         Trace::create(path, clock_hz, began)
     });
     machine.set_trace(trace.transpose()?);
+    let active_low = setup.motors.iter().enumerate();
+    let active_low = active_low.fold(0, |bits, (m, motor)| bits | u8::from(motor.active_low) << m);
+    machine.recorder_mut().set_active_low(active_low);
     machine.recorder_mut().clear();
     machine.meters_mut().clear();
     let banners = host.banners();

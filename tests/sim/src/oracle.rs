@@ -35,6 +35,8 @@ pub struct MotorSetup {
     pub microsteps: u32,
     /// Turns the other way round (`po`).
     pub inverted: bool,
+    /// Steps on a falling edge (`sp`).
+    pub active_low: bool,
 }
 
 impl MotorSetup {

@@ -13,7 +13,7 @@ use crate::trace::Trace;
 /// A step: when, which motor (0 is motor 1), which way.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Step {
-    /// Cycle of the rising edge.
+    /// Cycle at which the pulse begins.
     pub cycle: u64,
     /// Motor, counted from 0.
     pub motor: u8,
@@ -43,6 +43,8 @@ pub struct Motor {
     pub pulse: Option<(u64, u64)>,
     /// Shortest time from a change of direction to the next step.
     pub min_setup: Option<u64>,
+    /// Steps on a falling edge: the pin rests high.
+    active_low: bool,
     step_high: bool,
     dir_high: bool,
     rose_at: Option<u64>,
@@ -57,6 +59,7 @@ impl Motor {
             min_interval: None,
             pulse: None,
             min_setup: None,
+            active_low: false,
             step_high: false,
             dir_high: false,
             rose_at: None,
@@ -64,7 +67,7 @@ impl Motor {
         }
     }
 
-    fn rise(&mut self, now: u64) {
+    fn begin_pulse(&mut self, now: u64) {
         self.position += if self.dir_high { -1 } else { 1 };
         self.steps += 1;
         if let Some(before) = self.rose_at {
@@ -76,7 +79,7 @@ impl Motor {
         self.rose_at = Some(now);
     }
 
-    fn fall(&mut self, now: u64) {
+    fn end_pulse(&mut self, now: u64) {
         if let Some(rose) = self.rose_at {
             let width = now - rose;
             let (low, high) = self.pulse.unwrap_or((width, width));
@@ -151,12 +154,19 @@ impl Recorder {
     /// Forgets all but the levels of the pins.
     pub fn clear(&mut self) {
         for m in &mut self.motors {
-            let (step_high, dir_high) = (m.step_high, m.dir_high);
-            *m = Motor { step_high, dir_high, ..Motor::new() };
+            let Motor { active_low, step_high, dir_high, .. } = *m;
+            *m = Motor { active_low, step_high, dir_high, ..Motor::new() };
         }
         (self.first, self.last) = (None, None);
         if let Some(log) = &mut self.log {
             log.clear();
+        }
+    }
+
+    /// Which motors step on a falling edge, as bits, from now on.
+    pub fn set_active_low(&mut self, motors: u8) {
+        for (bit, m) in self.motors.iter_mut().enumerate() {
+            m.active_low = motors & 1 << bit != 0;
         }
     }
 
@@ -173,8 +183,8 @@ impl Recorder {
             return;
         }
         m.step_high = high;
-        if high {
-            m.rise(now);
+        if high != m.active_low {
+            m.begin_pulse(now);
             let positive = !m.dir_high;
             self.first.get_or_insert((now, sums));
             self.last = Some((now, sums));
@@ -182,7 +192,7 @@ impl Recorder {
                 log.push(Step { cycle: now, motor: motor as u8, positive });
             }
         } else {
-            m.fall(now);
+            m.end_pulse(now);
         }
         if let Some(trace) = &mut self.trace {
             trace.step(motor, high, !self.motors[motor].dir_high, now);

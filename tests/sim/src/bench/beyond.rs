@@ -19,8 +19,11 @@ pub fn twice(bed: &Bed) -> Result<Figure> {
     let mut machine = bed.machine()?;
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut machine, 1_000)?;
+    let told = |value: &Value| ["er", "msg"].iter().any(|key| value.get(key).is_some());
+    // Either when the limits are set beyond what can be, or when the move comes.
+    let mut warned = false;
     for line in bed.settings(How::default()) {
-        host.ask(&mut machine, &line, 1_000)?;
+        warned |= told(&host.ask(&mut machine, &line, 1_000)?.body);
     }
     machine.recorder_mut().keep_log();
     host.take_reports();
@@ -29,13 +32,15 @@ pub fn twice(bed: &Bed) -> Result<Figure> {
     let wanted = rest(&mut machine, &mut host, &job)?;
     let rate = mean_rate(&machine, 0);
     let position = machine.recorder().motors()[0].position;
-    let told = |value: &Value| ["er", "msg"].iter().any(|key| value.get(key).is_some());
     let facts = [
         ("exact", position == wanted && machine.missed_tops() == 0),
         ("clamped", rate > 0.0 && rate < ASKED / 1.5),
         (
             "told",
-            response.status != 0 || told(&response.body) || host.take_reports().iter().any(told),
+            warned
+                || response.status != 0
+                || told(&response.body)
+                || host.take_reports().iter().any(told),
         ),
     ];
     let said = facts.map(|(what, so)| if so { what.to_string() } else { format!("not {what}") });

@@ -207,7 +207,7 @@ pub const ROWS: [Row; 18] = [
         better: Higher,
         peers: ["position lost", "-", "slows to a crawl"],
         target: Some(3.0),
-        floor: Some(2.0),
+        floor: Some(3.0),
         measure: beyond::twice,
     },
 ];

@@ -38,6 +38,7 @@ fn motor_of(group: &Value) -> Option<MotorSetup> {
         travel: number("tr")?,
         microsteps: u32::try_from(whole("mi")?).ok()?,
         inverted: whole("po")? != 0,
+        active_low: whole("sp")? != 0,
     })
 }
 
@@ -58,7 +59,7 @@ mod tests {
 
     #[test]
     fn reads_a_motor_group() {
-        let group = serde_json::json!({"ma":2,"sa":1.8,"tr":1.25,"mi":8,"po":1,"pm":2});
+        let group = serde_json::json!({"ma":2,"sa":1.8,"tr":1.25,"mi":8,"po":1,"pm":2,"sp":0});
         let motor = motor_of(&group).unwrap();
         assert_eq!((motor.axis, motor.microsteps, motor.inverted), (2, 8, true));
         assert_eq!(motor.steps(10_000), 1280);

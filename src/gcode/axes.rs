@@ -1,0 +1,150 @@
+//! What the words of an axis mean: its mode, and lengths as angles.
+//!
+//! Who interprets lines says so by an [`Axes`], which the settings are (`tasks::axes`).
+
+use super::block::Block;
+use super::modal::Units;
+use super::number::{Decimal, Exact};
+use crate::status::Status;
+use crate::units::{FIRST_ROTARY, Length};
+
+/// How an axis takes its words. The discriminants are TinyG's numbers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum AxisMode {
+    /// Words are accepted and mean nothing: the axis stays where it is.
+    Disabled = 0,
+    /// Lengths, or degrees of an axis that turns.
+    Standard = 1,
+    /// As standard; the position goes on, the motors stand still.
+    Inhibited = 2,
+    /// Of an axis that turns: lengths along a circumference.
+    Radius = 3,
+}
+
+/// What the interpreter asks about the axes, X Y Z A B C from 0.
+pub trait Axes {
+    /// How an axis takes its words.
+    fn mode(&self, axis: u8) -> AxisMode;
+    /// The radius that turns a length into an angle, nm; more than 0.
+    fn radius(&self, axis: u8) -> u32;
+    /// The ends of its travel in machine coordinates, if moves beyond them are to be refused.
+    fn travel(&self, axis: u8) -> Option<(Length, Length)>;
+}
+
+/// All axes as usual.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Usual;
+
+impl Axes for Usual {
+    fn mode(&self, _axis: u8) -> AxisMode {
+        AxisMode::Standard
+    }
+    fn radius(&self, _axis: u8) -> u32 {
+        1
+    }
+    fn travel(&self, _axis: u8) -> Option<(Length, Length)> {
+        None
+    }
+}
+
+/// The length that a word gives, whatever the axis.
+pub(super) fn length(word: &Decimal, units: Units) -> Result<Exact, Status> {
+    match units {
+        Units::Inch => word.inch(),
+        Units::Mm => word.mm(),
+    }
+}
+
+/// What the word of an axis says; `None` if the axis is disabled.
+pub(super) fn value(
+    word: &Decimal,
+    axis: u8,
+    units: Units,
+    axes: &impl Axes,
+) -> Result<Option<Exact>, Status> {
+    match axes.mode(axis) {
+        AxisMode::Disabled => Ok(None),
+        AxisMode::Radius => angle(length(word, units)?, axes.radius(axis)).map(Some),
+        // Degrees are degrees in all units.
+        _ if usize::from(axis) >= FIRST_ROTARY => word.mm().map(Some),
+        _ => length(word, units).map(Some),
+    }
+}
+
+/// Takes the word of an axis from the line.
+pub(super) fn take(
+    block: &mut Block,
+    axis: u8,
+    units: Units,
+    axes: &impl Axes,
+) -> Result<Option<Exact>, Status> {
+    block.take(axis).map_or(Ok(None), |word| value(&word, axis, units, axes))
+}
+
+/// Units of angle for a unit of length at a radius of 1 nm (10^6 * 180 / pi), times [`SCALE`].
+const UNITS: i64 = 3_666_929_889;
+/// Leaves [`UNITS`] 32 bits, and so a product with any length 63.
+const SCALE: i64 = 64;
+/// The scale of [`Exact::rest`].
+const REST: i64 = 10_000;
+
+/// The angle at which an arc of this `length` is seen from the centre of a circle of `radius` nm; 110
+/// beyond the range.
+///
+/// In integers and with the rest, so that incremental moves add up. Three 64-bit divisions: 15,000
+/// cycles on AVR.
+#[inline(never)]
+fn angle(length: Exact, radius: u32) -> Result<Exact, Status> {
+    let divisor = i64::from(radius.max(1)) * SCALE;
+    let product = i64::from(length.units.0) * UNITS;
+    let whole = product.div_euclid(divisor);
+    let left = (product - whole * divisor) * REST + i64::from(length.rest) * UNITS;
+    let rest = (left + divisor / 2).div_euclid(divisor);
+    let carry = (rest + REST / 2).div_euclid(REST);
+    let units = whole.checked_add(carry).and_then(|units| i32::try_from(units).ok());
+    let units = Length(units.ok_or(Status::OutOfRange)?);
+    Ok(Exact { units, rest: (rest - carry * REST) as i16 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn angle_of(units: i32, rest: i16, radius: u32) -> Option<(i32, i16)> {
+        let angle = angle(Exact { units: Length(units), rest }, radius).ok()?;
+        Some((angle.units.0, angle.rest))
+    }
+
+    #[test]
+    fn lengths_on_a_circumference() {
+        // 1 mm at 0.198944 mm is 288 degrees; 6.2832 mm at 1 mm is a turn and a little.
+        assert_eq!(angle_of(10_000, 0, 198_944), Some((2_879_995, 3_512)));
+        assert_eq!(angle_of(62_832, 0, 1_000_000), Some((3_600_008, 4_185)));
+        assert_eq!(angle_of(-62_832, 0, 1_000_000), Some((-3_600_008, -4_185)));
+        assert_eq!(angle_of(0, 0, 1), Some((0, 0)));
+        assert_eq!(angle_of(0, 1, 1_000), Some((6, -2_704)));
+        assert_eq!(angle_of(i32::MAX, 0, 1), None);
+        assert!(angle_of(i32::MIN, 5_000, u32::MAX).is_some());
+    }
+
+    proptest! {
+        #[test]
+        fn angles_are_right_to_a_ten_thousandth(
+            units in -200_000_000i32..200_000_000, rest in -5_000i16..=5_000,
+            radius in 1_000u32..2_000_000_000,
+        ) {
+            let exact = (f64::from(units) + f64::from(rest) * 1e-4) * 1e6 * 180.0
+                / core::f64::consts::PI / f64::from(radius);
+            match angle_of(units, rest, radius) {
+                Some((units, rest)) => {
+                    let error = f64::from(units) + f64::from(rest) * 1e-4 - exact;
+                    prop_assert!(error.abs() <= 1e-4 + exact.abs() * 1e-10, "{error}");
+                    prop_assert!((-5_000..=5_000).contains(&rest));
+                }
+                None => prop_assert!(exact.abs() > 2e9),
+            }
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! Soft limits: whether a move stays within the travel of the axes that are homed.
+//!
+//! Asked for each move before anything is planned; positions are machine coordinates. An axis that a
+//! line does not move is not looked at, so that one beyond its travel does not lock the others. Cost on
+//! AVR: 200 cycles for each axis that moves; an arc 25,000 more.
+
+use super::arc::{norm, part, round, spoke, turned};
+use super::axes::Axes;
+use super::command::{Arc, Motion};
+use crate::status::Status;
+use crate::units::{Length, PerAxis};
+
+/// An arc may bulge this far over a limit (1 um), and by this part of its radius: so exact is a float.
+const SLACK: f32 = 10.0;
+const SLACK_PART: f32 = 2e-7;
+
+/// Refuses (220) a move from `start` that leaves the travel of an axis whose bit in `homed` is set.
+pub(super) fn check(
+    start: &PerAxis<Length>,
+    motion: &Motion,
+    homed: u8,
+    axes: &impl Axes,
+) -> Result<(), Status> {
+    let limits = |axis: u8| if homed & 1 << axis != 0 { axes.travel(axis) } else { None };
+    let target = match motion {
+        Motion::None => return Ok(()),
+        Motion::Traverse { target } | Motion::Feed { target, .. } => target,
+        Motion::Arc { target, arc, .. } => {
+            if !arc_is_within(start, target, arc, limits) {
+                return Err(Status::SoftLimit);
+            }
+            target
+        }
+    };
+    for (axis, (from, to)) in (0..).zip(start.iter().zip(target)) {
+        if from != to
+            && let Some((low, high)) = limits(axis)
+            && !(low..=high).contains(to)
+        {
+            return Err(Status::SoftLimit);
+        }
+    }
+    Ok(())
+}
+
+/// Whether the points of an arc that lie farthest out in its plane are within the limits; its end is
+/// not looked at. A helix advances evenly, so that its end is the farthest point along its axis.
+fn arc_is_within(
+    start: &PerAxis<Length>,
+    target: &PerAxis<Length>,
+    arc: &Arc,
+    limits: impl Fn(u8) -> Option<(Length, Length)>,
+) -> bool {
+    let both = [arc.first, arc.second].map(&limits);
+    if both == [None, None] {
+        return true;
+    }
+    let (from, to) = (spoke(start, arc), spoke(target, arc));
+    let radius = norm(from).max(norm(to));
+    let part = part(start, target, arc) + f32::from(arc.extra_turns);
+    let slack = SLACK + SLACK_PART * radius;
+    let passes = |out: [f32; 2]| part >= 1.0 || turned(from, out, arc.clockwise) < part;
+    for (i, (limits, center)) in both.iter().zip(arc.center).enumerate() {
+        let Some((low, high)) = limits else { continue };
+        let mut out = [0.0; 2];
+        for (out_here, within) in [
+            (radius, center.0.saturating_add(round(radius - slack)) <= high.0),
+            (-radius, center.0.saturating_add(round(slack - radius)) >= low.0),
+        ] {
+            if let Some(component) = out.get_mut(i) {
+                *component = out_here;
+            }
+            if !within && passes(out) {
+                return false;
+            }
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gcode::arc::Chords;
+    use crate::gcode::axes::AxisMode;
+    use crate::gcode::command::Commands;
+    use crate::gcode::interpreter::Interpreter;
+    use crate::units::AXES;
+    use core::f32::consts::PI;
+    use proptest::prelude::*;
+    use std::format;
+
+    /// X, Y, Z from 0 to 100 mm; A from -10 degrees on.
+    struct Cube;
+
+    impl Axes for Cube {
+        fn mode(&self, _axis: u8) -> AxisMode {
+            AxisMode::Standard
+        }
+        fn radius(&self, _axis: u8) -> u32 {
+            1
+        }
+        fn travel(&self, axis: u8) -> Option<(Length, Length)> {
+            match axis {
+                0..3 => Some((Length(0), Length(1_000_000))),
+                3 => Some((Length(-100_000), Length(i32::MAX))),
+                _ => None,
+            }
+        }
+    }
+
+    fn run(lines: &[&str]) -> Result<(), Status> {
+        let (mut state, mut out) = (Interpreter::new(), Commands::default());
+        let home = ["G28.3 X50 Y50 Z50 A0"];
+        for line in home.iter().chain(lines) {
+            state.interpret(line.as_bytes(), &Cube, &mut out)?;
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn straight_moves() {
+        for line in ["G0 X0 Y100", "G1 F1 Z100 A-10", "G0 A200000 B-5", "G91 G0 X-50", "G92 X0 G90"]
+        {
+            assert_eq!(run(&[line]), Ok(()), "{line}");
+        }
+        for line in ["G0 X-0.0001", "G0 Y100.0001", "G1 F1 Z101", "G0 A-10.1", "G20 G0 X4"] {
+            assert_eq!(run(&[line]), Err(Status::SoftLimit), "{line}");
+        }
+        assert_eq!(run(&["G92 X0", "G0 X51"]), Err(Status::SoftLimit), "machine coordinates count");
+        assert_eq!(run(&["G92 X0", "G0 X50"]), Ok(()));
+    }
+
+    #[test]
+    fn only_what_moves_counts_and_the_way_back_is_free() {
+        let outside = "G28.3 X150";
+        assert_eq!(run(&[outside, "G0 Y60"]), Ok(()));
+        assert_eq!(run(&[outside, "G0 X150"]), Ok(()));
+        assert_eq!(run(&[outside, "G0 X100"]), Ok(()));
+        assert_eq!(run(&[outside, "G0 X149"]), Err(Status::SoftLimit));
+    }
+
+    #[test]
+    fn axes_that_are_not_homed_are_free() {
+        let (mut state, mut out) = (Interpreter::new(), Commands::default());
+        for line in ["G0 X-5", "G28.3 Y0", "X-6", "Y50", "G2 I-50 F1"] {
+            assert_eq!(state.interpret(line.as_bytes(), &Cube, &mut out).err(), None, "{line}");
+        }
+        assert_eq!(state.interpret(b"G0 Y-5", &Cube, &mut out), Err(Status::SoftLimit));
+    }
+
+    #[test]
+    fn arcs_over_all_of_their_way() {
+        // These touch at most.
+        for line in [
+            "G2 I25",
+            "G3 I-25",
+            "G2 J25 P3",
+            "G3 X100 Y50 I25",
+            "G2 I15 J20",
+            "G18 G2 K25",
+            "G19 G3 J-25",
+            "G2 X60 R5 Z100",
+            "G3 X60 Y60 I10",
+        ] {
+            assert_eq!(run(&[&format!("{line} F100")]), Ok(()), "{line}");
+        }
+        for line in [
+            "G2 I25.01",
+            "G2 J-25.01",
+            "G3 X0.0001 Y50 R-25.5",
+            "G18 G2 K25.01",
+            "G19 G3 J-25.01",
+            "G2 X60 R5 Z101",
+            "G2 I20 A-11",
+        ] {
+            assert_eq!(run(&[&format!("{line} F100")]), Err(Status::SoftLimit), "{line}");
+        }
+        // From the wall along the wall: up is in, down is out.
+        assert_eq!(run(&["G0 X0 Y20", "G3 X0 Y40 R10 F9"]), Ok(()));
+        assert_eq!(run(&["G0 X0 Y20", "G2 X0 Y40 R10 F9"]), Err(Status::SoftLimit));
+    }
+
+    proptest! {
+        #[test]
+        fn agrees_with_the_chords(
+            x in 0.0f32..100.0, y in 0.0f32..100.0, radius in 1.0f32..80.0, at in -PI..PI,
+            sweep in 0.05f32..6.2, clockwise: bool, plane in 0u8..3,
+        ) {
+            let (first, second) = (plane, (plane + 1) % 3);
+            let units = |mm: f32| Length((mm * 1e4) as i32);
+            let point = |a: f32| {
+                let mut point = [units(50.0); AXES];
+                point[usize::from(first)] = units(x + radius * a.cos());
+                point[usize::from(second)] = units(y + radius * a.sin());
+                point
+            };
+            let end = if clockwise { at - sweep } else { at + sweep };
+            let (start, target) = (point(at), point(end));
+            let linear = 3 - first - second;
+            let center = [units(x), units(y)];
+            let arc = Arc { first, second, linear, center, clockwise, extra_turns: 0 };
+            let motion = Motion::Arc {
+                target, arc, feed: crate::gcode::command::Feed::PerMinute(1.0),
+            };
+            let refused = check(&start, &motion, 0b1111, &Cube).is_err();
+            let beyond = |point: &PerAxis<Length>, margin: i32| {
+                [first, second].iter().any(|axis| {
+                    let at = point[usize::from(*axis)].0;
+                    at < -margin || at > 1_000_000 + margin
+                })
+            };
+            // Who starts outside may come back.
+            if beyond(&start, -50) {
+                return Ok(());
+            }
+            let farthest = |margin: i32| {
+                Chords::new(&start, &target, &arc, 0.0002).any(|point| beyond(&point, margin))
+            };
+            if farthest(50) {
+                prop_assert!(refused);
+            }
+            if !farthest(-50) {
+                prop_assert!(!refused);
+            }
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! How close ticks may come: so that the step interrupt, exec and everything else have their time.
+//!
+//! Owned by [`Prep`](super::prep::Prep); the planner and the settings ask for the highest rates. The step
+//! interrupt waits out each pulse, so that ticks keep the more distance the wider a pulse is. Times are
+//! CPU cycles unless they are named otherwise.
+
+use crate::boards::{ACTIVE, MOTORS};
+
+const CYCLES_PER_US: u16 = (ACTIVE.clock_hz / 1_000_000) as u16;
+
+/// What the drivers of the motors ask of their pins.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Drivers {
+    /// How long a step pulse lasts, us.
+    pub pulse_us: u8,
+    /// How long a direction stands before the first step, us.
+    pub setup_us: u8,
+}
+
+impl Drivers {
+    /// What the settings have by default, and what the interrupt's times are measured with.
+    pub const USUAL: Self = Self { pulse_us: 2, setup_us: 1 };
+
+    /// By how much ticks are longer than usual.
+    const fn extra(self) -> u16 {
+        self.pulse_us.saturating_sub(Self::USUAL.pulse_us) as u16 * CYCLES_PER_US
+    }
+
+    /// How long a direction stands before the first step.
+    pub const fn setup(self) -> u16 {
+        self.setup_us as u16 * CYCLES_PER_US
+    }
+
+    /// Highest step rate of each of so many motors that move together, steps per second: a step on every
+    /// tick.
+    pub const fn step_rate_max(self, motors: usize) -> f32 {
+        let usual = &USUAL[if motors == 0 { 0 } else { motors - 1 }];
+        ACTIVE.clock_hz as f32 / (usual.shortest + self.extra()) as f32
+    }
+}
+
+/// Tick periods with usual pulses.
+struct Usual {
+    shortest: u16,
+    fine: u16,
+    coarse: u16,
+    settles: u16,
+}
+
+/// By the number of motors that move, less one.
+const USUAL: [Usual; MOTORS] = [
+    Usual { shortest: 160, fine: 200, coarse: 400, settles: 200 },
+    Usual { shortest: 200, fine: 200, coarse: 400, settles: 200 },
+    Usual { shortest: 240, fine: 320, coarse: 480, settles: 300 },
+    Usual { shortest: 320, fine: 400, coarse: 560, settles: 320 },
+];
+
+/// Ticks of blocks so short that they are a single segment: 2^22 / the tick period.
+pub const COARSEST: u16 = per(640);
+
+/// How close ticks may come.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    /// Shortest tick period: the step interrupt with so many motors, a short interrupt before it, and
+    /// some time for everything else.
+    pub shortest: u16,
+    /// 2^22 / the tick period of steady motion: as fine as leaves exec and the planner a third of the CPU.
+    pub fine: u16,
+    /// 2^22 / that of short blocks, for which they need more.
+    pub coarse: u16,
+    /// From this tick period on pulses wait for the interrupt's worst latency ([`super::dda::Segment::settle`]).
+    pub settles: u16,
+}
+
+/// The paces for such drivers, by the number of motors that move, less one. Cost: 6,000.
+pub const fn paces(drivers: Drivers) -> [Pace; MOTORS] {
+    let extra = drivers.extra();
+    let mut paces = [Pace { shortest: 0, fine: 0, coarse: 0, settles: 0 }; MOTORS];
+    let mut m = 0;
+    while m < MOTORS {
+        paces[m] = Pace {
+            shortest: USUAL[m].shortest + extra,
+            fine: per(USUAL[m].fine + extra),
+            coarse: per(USUAL[m].coarse + extra),
+            settles: USUAL[m].settles + extra,
+        };
+        m += 1;
+    }
+    paces
+}
+
+const fn per(cycles: u16) -> u16 {
+    ((1 << 22) / cycles as u32) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wider_pulses_take_their_time_from_each_tick() {
+        let rate = |pulse_us, motors| {
+            Drivers { pulse_us, ..Drivers::USUAL }.step_rate_max(motors).round() as u32
+        };
+        assert_eq!([1, 2].map(|us| rate(us, 1)), [100_000; 2]);
+        // 160 cycles and 8 us of 16.
+        assert_eq!((rate(10, 1), rate(10, 4)), (55_556, 35_714));
+        let [usual, wide] = [2, 10].map(|pulse_us| paces(Drivers { pulse_us, setup_us: 1 }));
+        for (usual, wide) in usual.iter().zip(&wide) {
+            assert_eq!(wide.shortest, usual.shortest + 128);
+            assert!(wide.fine < usual.fine && wide.coarse < usual.coarse);
+        }
+    }
+}

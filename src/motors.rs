@@ -1,0 +1,219 @@
+//! Which motors have power, and until when: the decisions, without any pin.
+//!
+//! Each motor has a mode (setting `pm`): never, always, in a cycle, or while it moves; the last two keep
+//! power for a timeout (setting `mt`) after their last use. `{me:..}` and `{md:..}` overrule that until
+//! the next move. Positions do not depend on any of it.
+//!
+//! [`Motors::segment`] is for exec, before a segment goes to the steppers, so that power always comes
+//! before the step; the rest is for thread mode (`tasks::power`). Times are milliseconds since reset,
+//! modulo 2^32.
+
+use crate::boards::MOTORS;
+
+/// All motors, as bits.
+const ALL: u8 = (1 << MOTORS) - 1;
+
+/// When motors have power: a bit for each motor, in at most one of the masks.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Modes {
+    /// From the start.
+    pub always: u8,
+    /// While anything moves or dwells, and for the timeout after it.
+    pub in_cycle: u8,
+    /// While it moves itself, and for the timeout after it.
+    pub moving: u8,
+}
+
+impl Modes {
+    /// From the mode of each motor: 0 never, 1 always, 2 in a cycle, 3 while it moves.
+    pub fn new(mode: impl Fn(usize) -> u8) -> Self {
+        let are = |wanted| (0..MOTORS).fold(0, |bits, m| bits | u8::from(mode(m) == wanted) << m);
+        Self { always: are(1), in_cycle: are(2), moving: are(3) }
+    }
+
+    fn any(&self) -> u8 {
+        self.always | self.in_cycle | self.moving
+    }
+}
+
+/// The state of the motors' power.
+#[derive(Clone, Copy, Debug)]
+pub struct Motors {
+    modes: Modes,
+    /// They have power.
+    on: u8,
+    /// They are in use by the segment that was queued last.
+    busy: u8,
+    /// They have been used since the last look at the clock.
+    used: u8,
+    /// When each was used last.
+    last: [u32; MOTORS],
+}
+
+impl Motors {
+    /// No power; all motors get it in a cycle, as the settings have it by default.
+    pub const fn new() -> Self {
+        let modes = Modes { always: 0, in_cycle: ALL, moving: 0 };
+        Self { modes, on: 0, busy: 0, used: 0, last: [0; MOTORS] }
+    }
+
+    /// The motors that have power, as bits.
+    pub fn on(&self) -> u8 {
+        self.on
+    }
+
+    /// A segment is about to be queued in which `stepping` motors step; `None` of them in a dwell.
+    pub fn segment(&mut self, stepping: u8) {
+        self.busy = self.modes.in_cycle | self.modes.moving & stepping;
+        self.used |= self.busy;
+        self.on |= self.busy | self.modes.always;
+    }
+
+    /// Other modes. One that always has power gets it now, one that never has it loses it; a motor
+    /// that was on for another reason is on for the timeout.
+    pub fn set_modes(&mut self, modes: Modes) {
+        if modes == self.modes {
+            return;
+        }
+        self.modes = modes;
+        self.used |= self.on;
+        self.on = (self.on | modes.always) & modes.any();
+    }
+
+    /// Powers `motors` for the timeout, but for those that never have power.
+    pub fn energize(&mut self, motors: u8) {
+        let motors = motors & self.modes.any();
+        self.on |= motors;
+        self.used |= motors;
+    }
+
+    /// Takes power from `motors`, until they are used.
+    pub fn release(&mut self, motors: u8) {
+        self.on &= !motors;
+    }
+
+    /// Time passes: it is `now`; `running` says that the machine moves or dwells. Takes power from
+    /// motors that have not been used for `timeout`. Whether any lost it.
+    pub fn pass(&mut self, now: u32, running: bool, timeout: u32) -> bool {
+        if !running {
+            self.busy = 0;
+        }
+        let used = self.used | self.busy;
+        self.used = 0;
+        let mut idle = 0;
+        for (m, last) in self.last.iter_mut().enumerate() {
+            if used & 1 << m != 0 {
+                *last = now;
+            } else if now.wrapping_sub(*last) >= timeout {
+                idle |= 1 << m;
+            }
+        }
+        let before = self.on;
+        self.on &= !idle | self.modes.always;
+        self.on != before
+    }
+}
+
+impl Default for Motors {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TIMEOUT: u32 = 2_000;
+
+    fn motors(modes: [u8; MOTORS]) -> Motors {
+        let mut motors = Motors::new();
+        motors.set_modes(Modes::new(|m| modes[m]));
+        motors
+    }
+
+    #[test]
+    fn each_mode_has_its_time() {
+        let mut motors = motors([0, 1, 2, 3]);
+        assert_eq!(motors.on(), 0b0010, "always means now");
+        motors.segment(0b0001);
+        assert_eq!(motors.on(), 0b0110, "in a cycle means with any segment, never means never");
+        motors.segment(0b1001);
+        assert_eq!(motors.on(), 0b1110);
+        assert!(!motors.pass(100, true, TIMEOUT));
+        assert!(!motors.pass(2_099, false, TIMEOUT) && motors.on() == 0b1110);
+        assert!(motors.pass(4_099, false, TIMEOUT));
+        assert_eq!(motors.on(), 0b0010);
+    }
+
+    #[test]
+    fn what_moves_keeps_its_power_however_long_it_takes() {
+        let mut motors = motors([3, 3, 2, 2]);
+        motors.segment(0b0011);
+        motors.pass(0, true, TIMEOUT);
+        for now in 1..100 {
+            motors.segment(0b0001);
+            motors.pass(now * 1_000, true, TIMEOUT);
+        }
+        assert_eq!(motors.on(), 0b1101, "the second motor has stopped");
+        // A dwell is part of the cycle.
+        motors.segment(0);
+        motors.pass(100_000, true, TIMEOUT);
+        assert_eq!(motors.on(), 0b1100 | 0b0001);
+        motors.pass(103_000, true, TIMEOUT);
+        assert_eq!(motors.on(), 0b1100);
+        assert!(motors.pass(106_000, false, TIMEOUT));
+        assert_eq!(motors.on(), 0);
+    }
+
+    #[test]
+    fn a_short_move_between_two_looks_counts_from_the_second() {
+        let mut motors = motors([3; 4]);
+        motors.segment(0b0001);
+        motors.segment(0b0010);
+        assert!(!motors.pass(1_000_000, true, TIMEOUT));
+        assert_eq!(motors.on(), 0b0011);
+        assert!(!motors.pass(1_001_999, false, TIMEOUT));
+        assert!(motors.pass(1_003_999, false, TIMEOUT));
+    }
+
+    #[test]
+    fn energize_and_release_overrule() {
+        let mut motors = motors([0, 1, 2, 3]);
+        motors.energize(ALL);
+        assert_eq!(motors.on(), 0b1110, "never means never");
+        motors.pass(10, false, TIMEOUT);
+        motors.release(0b0110);
+        assert_eq!(motors.on(), 0b1000);
+        motors.pass(20, false, TIMEOUT);
+        assert_eq!(motors.on(), 0b1000, "not even always brings it back");
+        motors.segment(0);
+        assert_eq!(motors.on(), 0b1110, "until the next move");
+    }
+
+    #[test]
+    fn other_modes_act_at_once() {
+        let mut motors = motors([2; 4]);
+        motors.set_modes(Modes::new(|m| [1, 2, 2, 2][m]));
+        assert_eq!(motors.on(), 0b0001);
+        // No longer always: for the timeout from now on.
+        motors.pass(50_000, false, TIMEOUT);
+        motors.set_modes(Modes::new(|_| 3));
+        assert!(!motors.pass(100_000, false, TIMEOUT));
+        assert!(motors.pass(102_000, false, TIMEOUT) && motors.on() == 0);
+        motors.energize(ALL);
+        motors.set_modes(Modes::new(|_| 0));
+        assert_eq!(motors.on(), 0);
+    }
+
+    #[test]
+    fn the_clock_may_wrap() {
+        let mut motors = motors([2; 4]);
+        motors.segment(1);
+        motors.pass(u32::MAX - 500, true, TIMEOUT);
+        motors.pass(u32::MAX, false, TIMEOUT);
+        assert_eq!(motors.on(), ALL);
+        assert!(!motors.pass(1_000, false, TIMEOUT));
+        assert!(motors.pass(2_000, false, TIMEOUT));
+    }
+}

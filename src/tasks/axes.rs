@@ -1,0 +1,40 @@
+//! What the settings say of the axes to those who interpret lines and those who plan moves.
+
+use crate::config::Settings;
+use crate::config::getters::TRAVEL_NONE;
+use crate::gcode::axes::{Axes, AxisMode};
+use crate::units::Length;
+
+impl Axes for Settings {
+    fn mode(&self, axis: u8) -> AxisMode {
+        match self.axis_mode(axis.into()) {
+            0 => AxisMode::Disabled,
+            2 => AxisMode::Inhibited,
+            3 => AxisMode::Radius,
+            _ => AxisMode::Standard,
+        }
+    }
+
+    fn radius(&self, axis: u8) -> u32 {
+        self.radius_nm(axis.into())
+    }
+
+    fn travel(&self, axis: u8) -> Option<(Length, Length)> {
+        if !self.soft_limits() {
+            return None;
+        }
+        let (low, high) = (self.travel_min(axis.into()), self.travel_max(axis.into()));
+        if low == high {
+            return None;
+        }
+        // The lowest that can be set, and anything below it, means no limit, at either end.
+        let end = |end, far| if end == TRAVEL_NONE { Length(far) } else { end };
+        Some((end(low, i32::MIN), end(high, i32::MAX)))
+    }
+}
+
+/// The axis whose position moves a motor; none above 5: that of an inhibited axis stands still.
+pub fn moved_by(settings: &Settings, motor: usize) -> u8 {
+    let axis = settings.motor_axis(motor);
+    if settings.mode(axis) == AxisMode::Inhibited { u8::MAX } else { axis }
+}

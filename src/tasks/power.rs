@@ -1,0 +1,83 @@
+//! The power task: gives motors power, and takes it from them when they have been idle.
+//!
+//! Reads the settings, the milliseconds and exec's snapshot; writes the drivers' enables. Waits for
+//! [`LOOK_MS`] between looks. Exec calls [`segment`] before it queues one, so that a driver is on before
+//! its step; that costs 300 cycles a segment. Everyone else changes the state under the ceiling.
+
+use core::cell::Cell;
+
+use embassy_time::Timer;
+
+use super::links::{Links, snapshot};
+use crate::boards::MOTORS;
+use crate::config::Settings;
+use crate::hal::imp::time::millis;
+use crate::hal::imp::{exec, gpio};
+use crate::motion::dda::Segment;
+use crate::motors::{Modes, Motors};
+
+/// How often idle motors are looked for, ms.
+const LOOK_MS: u64 = 20;
+
+/// The state: exec's, and thread mode's while exec is locked out.
+struct Shared(Cell<Motors>);
+
+// SAFETY: exec changes it, and thread mode does while exec cannot run.
+unsafe impl Sync for Shared {}
+
+machine_static! {
+    fn shared() -> Shared = Shared(Cell::new(Motors::new()));
+}
+
+/// The task.
+pub async fn run(links: &'static Links) -> ! {
+    loop {
+        let timeout = links.settings.borrow().motor_timeout_centis().saturating_mul(10);
+        let (now, running) = (millis(), snapshot().running);
+        if change(|motors| motors.pass(now, running, timeout)) {
+            links.reporter_wake.signal();
+        }
+        Timer::after_ticks(LOOK_MS).await;
+    }
+}
+
+/// Before a segment of a block with these `steps` is queued: its motors get power. Exec only.
+pub fn segment(segment: &Segment, steps: &[i16; MOTORS]) {
+    // In a dwell none moves. Otherwise increments tell nothing: a motor may have a rest of the block
+    // before.
+    let dwell = segment.increment == [0; MOTORS];
+    let moves = |m: usize| !dwell && steps[m] != 0;
+    let stepping = (0..MOTORS).fold(0, |bits, m| bits | u8::from(moves(m)) << m);
+    carry_out(|motors| motors.segment(stepping));
+}
+
+/// Takes over the modes of the settings. Thread mode only.
+pub fn set_modes(settings: &Settings) {
+    let modes = Modes::new(|m| settings.motor_power_mode(m));
+    change(|motors| motors.set_modes(modes));
+}
+
+/// Powers `motors` (bits). Thread mode only.
+pub fn energize(motors: u8) {
+    change(|all| all.energize(motors));
+}
+
+/// Takes power from `motors` (bits). Thread mode only.
+pub fn release(motors: u8) {
+    change(|all| all.release(motors));
+}
+
+fn change<R>(what: impl FnOnce(&mut Motors) -> R) -> R {
+    exec::lock(|_| carry_out(what))
+}
+
+fn carry_out<R>(what: impl FnOnce(&mut Motors) -> R) -> R {
+    let mut motors = shared().0.get();
+    let before = motors.on();
+    let result = what(&mut motors);
+    if motors.on() != before {
+        gpio::power(motors.on());
+    }
+    shared().0.set(motors);
+    result
+}
