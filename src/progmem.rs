@@ -7,6 +7,8 @@
 //!
 //! Cost on AVR: about 4 cycles a byte.
 
+use core::mem::MaybeUninit;
+
 /// A value in program memory. Make one with [`progmem!`](crate::progmem!) only.
 #[repr(transparent)]
 pub struct Progmem<T>(T);
@@ -43,7 +45,7 @@ impl<T: Copy, const N: usize> Progmem<[T; N]> {
 
 #[cfg(target_arch = "avr")]
 fn load<T: Copy>(from: *const T) -> T {
-    let mut value = core::mem::MaybeUninit::<T>::uninit();
+    let mut value = MaybeUninit::<T>::uninit();
     let mut to = value.as_mut_ptr().cast::<u8>();
     let mut from = from.cast::<u8>();
     for _ in 0..core::mem::size_of::<T>() {
@@ -100,6 +102,18 @@ impl Text {
     /// Byte `index`, or `None` beyond the end.
     pub fn at(&self, index: usize) -> Option<u8> {
         (index < self.len()).then(|| load(self.start.wrapping_add(index)))
+    }
+
+    /// Copies it to the beginning of `to`, or does nothing if that is too short. Cost on AVR: 10 cycles a
+    /// byte.
+    #[inline(always)]
+    pub fn copy(self, to: &mut [MaybeUninit<u8>]) {
+        let Some(to) = to.get_mut(..self.len()) else { return };
+        let mut at = self.start;
+        for slot in to {
+            slot.write(load(at));
+            at = at.wrapping_add(1);
+        }
     }
 
     /// Its bytes, one by one.

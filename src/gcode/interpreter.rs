@@ -69,7 +69,7 @@ impl Interpreter {
     /// `Ok`: `out` is what the machine has to do, and the state has advanced as if it had done so.
     /// `Err`: the state is what it was, and `out` empty.
     pub fn interpret(&mut self, line: &[u8], out: &mut Commands) -> Result<Info, Status> {
-        if self.usual(line, out) {
+        if self.usual(line, true, out) {
             return Ok(Info::default());
         }
         self.general(line, out)

@@ -40,9 +40,10 @@ struct Words<'a> {
 }
 
 impl Interpreter {
-    /// Carries a usual line out. False, and nothing done, if it is none or cannot be carried out.
+    /// Carries a usual line out: with [`Interpreter::interpret`] it would be `Ok`, without a comment, and
+    /// a move. False, and nothing done, if it is none; `numbered` says whether it may have an N word.
     #[inline(never)]
-    pub(super) fn usual(&mut self, line: &[u8], out: &mut Commands) -> bool {
+    pub fn usual(&mut self, line: &[u8], numbered: bool, out: &mut Commands) -> bool {
         let modal = &self.modal;
         if modal.units != Units::Mm
             || modal.distance != Distance::Absolute
@@ -51,7 +52,7 @@ impl Interpreter {
         {
             return false;
         }
-        let mut words = Words::new(line);
+        let mut words = Words::new(line, numbered);
         words.read(&self.offset) && self.carry_out(&words, out)
     }
 
@@ -99,11 +100,12 @@ fn straight(target: &PerAxis<Length>, per_minute: f32, out: &mut Commands) {
 
 impl<'a> Words<'a> {
     #[inline(always)]
-    fn new(line: &'a [u8]) -> Self {
+    fn new(line: &'a [u8], numbered: bool) -> Self {
+        let seen = if numbered { 0 } else { N_SEEN };
         // A byte 0 would pass for the end of the line.
         let byte = if line.last() == Some(&0) { BAD } else { b' ' };
         let targets = Vec::new();
-        Words { byte, rest: line.iter(), seen: 0, mode: None, feed: 0.0, line: 0, targets }
+        Words { byte, rest: line.iter(), seen, mode: None, feed: 0.0, line: 0, targets }
     }
 
     /// Reads the line. False if it is not usual.

@@ -137,6 +137,27 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         self.0.head.set(head);
     }
 
+    /// The slots that a run of values goes to, as many as lie side by side: fill them from the first on, then
+    /// call [`Producer::publish`].
+    #[inline]
+    pub fn vacant(&mut self) -> &mut [MaybeUninit<T>] {
+        let start = next::<N>(self.0.head.get());
+        let len = self.free().min(N - usize::from(start));
+        // SAFETY: the slots behind `head` are the producer's, as many as are free, and these do not
+        // go beyond the end; `MaybeUninit` may lie there whatever was written.
+        unsafe { core::slice::from_raw_parts_mut(self.0.slot(start).cast(), len) }
+    }
+
+    /// Shows the consumer the first `count` of the slots that [`Producer::vacant`] gave.
+    ///
+    /// # Safety
+    /// They have been filled.
+    #[inline]
+    pub unsafe fn publish(&mut self, count: u8) {
+        let head = usize::from(self.0.head.get()) + usize::from(count);
+        self.0.head.set(if head >= N { head - N } else { head } as u8);
+    }
+
     /// Changes a value pushed earlier; `back` 0 is the newest. False if it has been released.
     ///
     /// The caller keeps the consumer from running meanwhile (see `imp::exec::lock`): `_ceiling` is

@@ -218,6 +218,21 @@ impl LinePool {
         self.entries.get(index).map(|e| (LineId(index as u8), e.class))
     }
 
+    /// The text of the oldest line, if that is next, and data.
+    pub fn oldest(&self) -> Option<&[u8]> {
+        match self.entries.first() {
+            Some(Entry { len, class: Class::Data }) if self.controls == 0 => {
+                Some(self.slice(self.start.into(), *len))
+            }
+            _ => None,
+        }
+    }
+
+    /// Removes it.
+    pub fn remove_oldest(&mut self) {
+        self.remove(LineId(0));
+    }
+
     /// The text of a line.
     pub fn text(&self, id: LineId) -> &[u8] {
         let index = usize::from(id.0);

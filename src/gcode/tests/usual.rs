@@ -24,7 +24,7 @@ fn line() -> impl Strategy<Value = String> {
 fn both_ways(interpreter: &mut Interpreter, line: &[u8]) -> bool {
     let mut general = *interpreter;
     let (mut out, mut expected) = (Commands::default(), Commands::default());
-    let is_usual = { *interpreter }.usual(line, &mut Commands::default());
+    let is_usual = { *interpreter }.usual(line, true, &mut Commands::default());
     let done = interpreter.interpret(line, &mut out);
     assert_eq!(done, general.general(line, &mut expected), "{line:?}");
     assert_eq!((*interpreter, out), (general, expected), "{line:?}");
@@ -54,6 +54,7 @@ fn what_is_usual() {
     {
         assert!(!both_ways(&mut interpreter, line.as_bytes()), "{line}");
     }
+    assert!(!interpreter.usual(b"N1X1", false, &mut Commands::default()));
     for mode in ["G20", "G91", "G93"] {
         let mut interpreter = interpreter;
         both_ways(&mut interpreter, mode.as_bytes());
