@@ -13,6 +13,7 @@ mod block;
 mod circle;
 pub mod codes;
 pub mod command;
+mod digits;
 pub mod interpreter;
 mod lexer;
 pub mod modal;

@@ -7,11 +7,10 @@
 //!
 //! Cost on AVR: `G1X12.345Y-3.21` 1,100 cycles, where the others take 4,100.
 
-use core::slice;
-
 use heapless::Vec;
 
 use super::command::{Commands, Feed, Motion, Stop};
+use super::digits::{Digits, ten_thousand_times};
 use super::interpreter::Interpreter;
 use super::modal::{Distance, FeedMode, MotionMode, Units};
 use super::number::Decimal;
@@ -29,8 +28,9 @@ const F_SEEN: u8 = 1 << 7;
 struct Words<'a> {
     /// The byte to look at; 0 at the end.
     byte: u8,
-    /// Those behind it.
-    rest: slice::Iter<'a, u8>,
+    text: &'a [u8],
+    /// Where in the line the byte behind it is.
+    next: u8,
     seen: u8,
     mode: Option<MotionMode>,
     feed: f32,
@@ -100,12 +100,12 @@ fn straight(target: &PerAxis<Length>, per_minute: f32, out: &mut Commands) {
 
 impl<'a> Words<'a> {
     #[inline(always)]
-    fn new(line: &'a [u8], numbered: bool) -> Self {
+    fn new(text: &'a [u8], numbered: bool) -> Self {
         let seen = if numbered { 0 } else { N_SEEN };
         // A byte 0 would pass for the end of the line.
-        let byte = if line.last() == Some(&0) { BAD } else { b' ' };
+        let byte = if text.last() == Some(&0) { BAD } else { b' ' };
         let targets = Vec::new();
-        Words { byte, rest: line.iter(), seen, mode: None, feed: 0.0, line: 0, targets }
+        Words { byte, text, next: 0, seen, mode: None, feed: 0.0, line: 0, targets }
     }
 
     /// Reads the line. False if it is not usual.
@@ -121,7 +121,7 @@ impl<'a> Words<'a> {
                     self.step();
                     continue;
                 }
-                0 => return self.rest.as_slice().is_empty() && !self.targets.is_empty(),
+                0 => return usize::from(self.next) == self.text.len() && !self.targets.is_empty(),
                 _ if self.other(letter) => continue,
                 _ => return false,
             };
@@ -168,102 +168,51 @@ impl<'a> Words<'a> {
     /// A number in ten-thousandths. One that is not usual leaves `BAD` to be read.
     #[inline(never)]
     fn number(&mut self) -> i32 {
-        let mut at = Digits { byte: self.byte, rest: self.rest.clone() };
-        let negative = at.byte == b'-';
+        let negative = self.byte == b'-';
         if negative {
-            at.step();
+            self.step();
         }
-        let (whole, frac) = at.decimal();
-        (self.byte, self.rest) = (at.byte, at.rest);
+        let (whole, frac) = self.decimal();
         // 65,535.9999 at most: that fits.
-        let value = u32::from(whole) * Length::PER_MM as u32 + u32::from(frac);
-        if negative { -(value as i32) } else { value as i32 }
+        let value = (ten_thousand_times(whole) + u32::from(frac)) as i32;
+        if negative { -value } else { value }
     }
 
     #[inline(never)]
     fn feed(&mut self) -> f32 {
-        let mut at = Digits { byte: self.byte, rest: self.rest.clone() };
-        let (whole, frac) = at.decimal();
-        (self.byte, self.rest) = (at.byte, at.rest);
+        let (whole, frac) = self.decimal();
         Decimal { whole: whole.into(), frac, ..Decimal::default() }.to_f32()
+    }
+
+    #[inline(always)]
+    fn decimal(&mut self) -> (u16, u16) {
+        let rest = self.text.get(usize::from(self.next)..).unwrap_or(&[]);
+        let mut digits = Digits::new(self.byte, rest);
+        let number = digits.decimal();
+        self.next = self.text.len() as u8 - digits.left();
+        self.byte = if number.is_some() { digits.byte } else { BAD };
+        number.unwrap_or_default()
     }
 
     /// A whole number below a billion.
     #[inline(never)]
     fn integer(&mut self) -> u32 {
-        let mut at = Digits { byte: self.byte, rest: self.rest.clone() };
-        let mut value = at.digit().map_or(0, u32::from);
-        let known = self.byte.is_ascii_digit();
-        while value < 100_000_000
-            && let Some(digit) = at.digit()
-        {
-            value = value * 10 + u32::from(digit);
+        let mut value = 0;
+        if !self.byte.is_ascii_digit() {
+            self.byte = BAD;
         }
-        (self.byte, self.rest) = (if known { at.byte } else { BAD }, at.rest);
+        while value < 100_000_000 && self.byte.is_ascii_digit() {
+            value = value * 10 + u32::from(self.byte - b'0');
+            self.step();
+        }
         value
     }
 
     #[inline(always)]
     fn step(&mut self) {
-        self.byte = self.rest.next().copied().unwrap_or(0);
-    }
-}
-
-/// The digits of a number. A copy of where a line is read, which stays in registers.
-struct Digits<'a> {
-    byte: u8,
-    rest: slice::Iter<'a, u8>,
-}
-
-impl Digits<'_> {
-    #[inline(always)]
-    fn step(&mut self) {
-        self.byte = self.rest.next().copied().unwrap_or(0);
-    }
-
-    /// Takes a digit, if there is one.
-    #[inline(always)]
-    fn digit(&mut self) -> Option<u8> {
-        let digit = self.byte.wrapping_sub(b'0');
-        if digit > 9 {
-            return None;
+        match self.text.get(usize::from(self.next)) {
+            Some(byte) => (self.byte, self.next) = (*byte, self.next + 1),
+            None => self.byte = 0,
         }
-        self.step();
-        Some(digit)
-    }
-
-    /// A number below 65,530 without a sign: the whole, and up to four decimals as ten-thousandths.
-    /// More digits are left, and as no word can begin with them, the line is not usual.
-    #[inline(always)]
-    fn decimal(&mut self) -> (u16, u16) {
-        let first = self.byte;
-        let mut whole = 0;
-        while whole < u16::MAX / 10
-            && let Some(digit) = self.digit()
-        {
-            whole = whole * 10 + u16::from(digit);
-        }
-        let mut frac = 0;
-        if self.byte == b'.' {
-            self.step();
-            // A lone point is no number.
-            let known = first != b'.' || self.byte.is_ascii_digit();
-            frac = self.fraction();
-            self.byte = if known { self.byte } else { BAD };
-        } else if !first.is_ascii_digit() {
-            self.byte = BAD;
-        }
-        (whole, frac)
-    }
-
-    /// Up to four decimals: by pairs, for AVR multiplies bytes.
-    #[inline(always)]
-    fn fraction(&mut self) -> u16 {
-        let Some(first) = self.digit() else { return 0 };
-        let Some(second) = self.digit() else { return u16::from(first * 10) * 100 };
-        let high = u16::from(first * 10 + second) * 100;
-        let Some(third) = self.digit() else { return high };
-        let fourth = self.digit().unwrap_or(0);
-        high + u16::from(third * 10 + fourth)
     }
 }

@@ -7,6 +7,7 @@ pub mod lines;
 pub mod links;
 pub mod parser;
 pub mod planner;
+mod printing;
 pub mod reader;
 pub mod reporter;
 pub mod tx;
