@@ -7,8 +7,6 @@
 //!
 //! Cost on AVR: `G1X12.345Y-3.21` 1,100 cycles, where the others take 4,100.
 
-use heapless::Vec;
-
 use super::command::{Commands, Feed, Motion, Stop};
 use super::digits::{Digits, ten_thousand_times};
 use super::interpreter::Interpreter;
@@ -21,6 +19,7 @@ const CASE: u8 = 0x20;
 /// What no line has where a word may begin: reading ends there.
 const BAD: u8 = 0x7F;
 /// Words that were seen: an axis has the bit of its number, N and F have these. G is in `mode`.
+const AXES_SEEN: u8 = (1 << AXES) - 1;
 const N_SEEN: u8 = 1 << 6;
 const F_SEEN: u8 = 1 << 7;
 
@@ -35,8 +34,8 @@ struct Words<'a> {
     mode: Option<MotionMode>,
     feed: f32,
     line: u32,
-    /// Where to on which axes, machine coordinates.
-    targets: Vec<(u8, Length), AXES>,
+    /// Where to, machine coordinates, on the axes that were seen.
+    target: PerAxis<Length>,
 }
 
 impl Interpreter {
@@ -72,14 +71,7 @@ impl Interpreter {
         self.modal.motion = mode;
         (self.feed, self.feed_units) = (feed, units);
         self.line = words.line;
-        for (axis, target) in &words.targets {
-            let i = usize::from(*axis);
-            if let (Some(position), Some(residue)) =
-                (self.position.get_mut(i), self.residue.get_mut(i))
-            {
-                (*position, *residue) = (*target, 0);
-            }
-        }
+        self.go(words.seen & AXES_SEEN, &words.target);
         out.line = words.line;
         out.dwell_ms = None;
         out.set_position = None;
@@ -89,6 +81,21 @@ impl Interpreter {
             _ => straight(&self.position, feed, out),
         }
         true
+    }
+
+    /// The position on the `named` axes.
+    #[inline(always)]
+    fn go(&mut self, mut named: u8, target: &PerAxis<Length>) {
+        let axes = self.position.iter_mut().zip(&mut self.residue).zip(target);
+        for ((position, residue), target) in axes {
+            if named & 1 != 0 {
+                (*position, *residue) = (*target, 0);
+            }
+            named >>= 1;
+            if named == 0 {
+                break;
+            }
+        }
     }
 }
 
@@ -104,8 +111,8 @@ impl<'a> Words<'a> {
         let seen = if numbered { 0 } else { N_SEEN };
         // A byte 0 would pass for the end of the line.
         let byte = if text.last() == Some(&0) { BAD } else { b' ' };
-        let targets = Vec::new();
-        Words { byte, text, next: 0, seen, mode: None, feed: 0.0, line: 0, targets }
+        let target = [Length::ZERO; AXES];
+        Words { byte, text, next: 0, seen, mode: None, feed: 0.0, line: 0, target }
     }
 
     /// Reads the line. False if it is not usual.
@@ -121,7 +128,9 @@ impl<'a> Words<'a> {
                     self.step();
                     continue;
                 }
-                0 => return usize::from(self.next) == self.text.len() && !self.targets.is_empty(),
+                0 => {
+                    return usize::from(self.next) == self.text.len() && self.seen & AXES_SEEN != 0;
+                }
                 _ if self.other(letter) => continue,
                 _ => return false,
             };
@@ -132,10 +141,13 @@ impl<'a> Words<'a> {
             self.seen |= bit;
             self.step();
             let value = Length(self.number());
-            let origin = offset.get(usize::from(axis)).copied().unwrap_or_default();
-            // There is room for each axis once.
-            if origin.checked_add(value).is_none_or(|at| self.targets.push((axis, at)).is_err()) {
+            let i = usize::from(axis);
+            let (Some(target), Some(origin)) = (self.target.get_mut(i), offset.get(i)) else {
                 return false;
+            };
+            match origin.checked_add(value) {
+                Some(sum) => *target = sum,
+                None => return false,
             }
         }
     }
