@@ -69,6 +69,40 @@ fn load<T: Copy>(from: *const T) -> T {
     unsafe { from.read() }
 }
 
+/// Copies `count` bytes, 1 to 255, out of program memory.
+///
+/// # Safety
+/// `from` points to a [`Progmem`], `to` to memory, of at least as many bytes.
+#[cfg(target_arch = "avr")]
+#[inline(always)]
+unsafe fn copy(from: *const u8, to: *mut u8, count: u8) {
+    // SAFETY: the caller's.
+    unsafe {
+        core::arch::asm!(
+            "1:",
+            "lpm  {byte}, Z+",
+            "st   X+, {byte}",
+            "dec  {count}",
+            "brne 1b",
+            byte = out(reg) _,
+            count = inout(reg) count => _,
+            inout("Z") from => _,
+            inout("X") to => _,
+            options(nostack),
+        );
+    }
+}
+
+/// The same.
+///
+/// # Safety
+/// As above.
+#[cfg(not(target_arch = "avr"))]
+unsafe fn copy(from: *const u8, to: *mut u8, count: u8) {
+    // SAFETY: the caller's.
+    unsafe { from.copy_to_nonoverlapping(to, count.into()) }
+}
+
 /// Text in program memory: a pointer that only [`Text::bytes`] follows.
 #[derive(Clone, Copy)]
 pub struct Text {
@@ -104,15 +138,13 @@ impl Text {
         (index < self.len()).then(|| load(self.start.wrapping_add(index)))
     }
 
-    /// Copies it to the beginning of `to`, or does nothing if that is too short. Cost on AVR: 10 cycles a
+    /// Copies it to the beginning of `to`, or does nothing if that is too short. Cost on AVR: 8 cycles a
     /// byte.
     #[inline(always)]
     pub fn copy(self, to: &mut [MaybeUninit<u8>]) {
-        let Some(to) = to.get_mut(..self.len()) else { return };
-        let mut at = self.start;
-        for slot in to {
-            slot.write(load(at));
-            at = at.wrapping_add(1);
+        if !self.is_empty() && self.len() <= to.len() {
+            // SAFETY: `to` has room for as many bytes, and there is at least one.
+            unsafe { copy(self.start, to.as_mut_ptr().cast(), self.len) }
         }
     }
 

@@ -337,6 +337,28 @@ mod tests {
     }
 
     #[test]
+    fn vacant_slots_are_filled_in_place() {
+        let ring: &'static Ring<u16, 8> = Box::leak(Box::new(Ring::new()));
+        let (mut p, mut c) = ring.split().unwrap();
+        let (mut next, mut taken) = (0.., Vec::new());
+        for round in 0..50u8 {
+            let slots = p.vacant();
+            let count = slots.len().min(usize::from(round % 5));
+            slots.iter_mut().zip(&mut next).take(count).for_each(|(slot, value)| {
+                slot.write(value);
+            });
+            // SAFETY: as many have been written.
+            unsafe { p.publish(count as u8) };
+            assert!(p.free() == 0 || !p.vacant().is_empty());
+            if round % 3 != 0 {
+                taken.extend_from_slice(c.waiting());
+                c.release_many(c.waiting().len() as u8);
+            }
+        }
+        assert!(taken.len() > 50 && taken.iter().copied().eq(0..taken.len() as u16));
+    }
+
+    #[test]
     fn splits_once() {
         let ring: &'static Ring<u8, 4> = Box::leak(Box::new(Ring::new()));
         assert!(ring.split().is_some());

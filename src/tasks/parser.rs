@@ -3,7 +3,7 @@
 //! Reads the line pool, writes `Links::commands`, the G-code model, the settings and the response;
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
 //! data lines only while the planner is free, so that a long job never locks the sender out. A line
-//! keeps its slot until its response has been written.
+//! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`].
 
 use super::lines::{Class, LineId};
 use super::links::Links;
@@ -35,7 +35,7 @@ pub async fn run(links: &'static Links) -> ! {
 
 /// Does all there is to do for a usual line: a move that is answered with a brief response. False, and
 /// nothing done, if the next line is none, or if it has to wait for room to transmit. What the others do in
-/// four steps and with a [`Request`], in a quarter of the time.
+/// four steps and with a [`Request`], in half the time.
 #[inline(never)]
 fn usual(links: &Links) -> bool {
     if links.mode.get() != Mode::Json {

@@ -61,6 +61,8 @@ impl crate::protocol::Out for Tx {
         let _ = self.ring.push(byte);
     }
 
+    // By itself, for it is called in many places.
+    #[inline(never)]
     fn put_text(&mut self, text: Text) {
         let slots = self.ring.vacant();
         if slots.len() < text.len() {
