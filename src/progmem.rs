@@ -7,6 +7,8 @@
 //!
 //! Cost on AVR: about 4 cycles a byte.
 
+use core::mem::MaybeUninit;
+
 /// A value in program memory. Make one with [`progmem!`](crate::progmem!) only.
 #[repr(transparent)]
 pub struct Progmem<T>(T);
@@ -43,7 +45,7 @@ impl<T: Copy, const N: usize> Progmem<[T; N]> {
 
 #[cfg(target_arch = "avr")]
 fn load<T: Copy>(from: *const T) -> T {
-    let mut value = core::mem::MaybeUninit::<T>::uninit();
+    let mut value = MaybeUninit::<T>::uninit();
     let mut to = value.as_mut_ptr().cast::<u8>();
     let mut from = from.cast::<u8>();
     for _ in 0..core::mem::size_of::<T>() {
@@ -65,6 +67,40 @@ fn load<T: Copy>(from: *const T) -> T {
 fn load<T: Copy>(from: *const T) -> T {
     // SAFETY: callers pass a pointer into a live `Progmem` of theirs.
     unsafe { from.read() }
+}
+
+/// Copies `count` bytes, 1 to 255, out of program memory.
+///
+/// # Safety
+/// `from` points to a [`Progmem`], `to` to memory, of at least as many bytes.
+#[cfg(target_arch = "avr")]
+#[inline(always)]
+unsafe fn copy(from: *const u8, to: *mut u8, count: u8) {
+    // SAFETY: the caller's.
+    unsafe {
+        core::arch::asm!(
+            "1:",
+            "lpm  {byte}, Z+",
+            "st   X+, {byte}",
+            "dec  {count}",
+            "brne 1b",
+            byte = out(reg) _,
+            count = inout(reg) count => _,
+            inout("Z") from => _,
+            inout("X") to => _,
+            options(nostack),
+        );
+    }
+}
+
+/// The same.
+///
+/// # Safety
+/// As above.
+#[cfg(not(target_arch = "avr"))]
+unsafe fn copy(from: *const u8, to: *mut u8, count: u8) {
+    // SAFETY: the caller's.
+    unsafe { from.copy_to_nonoverlapping(to, count.into()) }
 }
 
 /// Text in program memory: a pointer that only [`Text::bytes`] follows.
@@ -100,6 +136,16 @@ impl Text {
     /// Byte `index`, or `None` beyond the end.
     pub fn at(&self, index: usize) -> Option<u8> {
         (index < self.len()).then(|| load(self.start.wrapping_add(index)))
+    }
+
+    /// Copies it to the beginning of `to`, or does nothing if that is too short. Cost on AVR: 8 cycles a
+    /// byte.
+    #[inline(always)]
+    pub fn copy(self, to: &mut [MaybeUninit<u8>]) {
+        if !self.is_empty() && self.len() <= to.len() {
+            // SAFETY: `to` has room for as many bytes, and there is at least one.
+            unsafe { copy(self.start, to.as_mut_ptr().cast(), self.len) }
+        }
     }
 
     /// Its bytes, one by one.

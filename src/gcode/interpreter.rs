@@ -8,7 +8,7 @@
 //! of its own line. LinuxCNC and TinyG read `G20 F10` in the units of the line before, which is 25.4
 //! times too fast or too slow, and which their users keep reporting.
 //!
-//! Cost on AVR, words and comments included: `X12.345 Y67.890` 3,600 cycles, with `G1` and `F1500`
+//! Cost on AVR: of a usual line see `usual`; else, words and comments included: `X12.345 Y67.890` 3,600 cycles, with `G1` and `F1500`
 //! 4,800; in inches 1,800 more for each axis; an arc 11,000, with R 14,000. Stack: 450 bytes, for an
 //! arc 600.
 
@@ -78,7 +78,7 @@ impl Interpreter {
         axes: &impl Axes,
         out: &mut Commands,
     ) -> Result<Info, Status> {
-        if self.usual(line, axes, out) {
+        if self.usual(line, true, axes, out) {
             return Ok(Info::default());
         }
         self.general(line, axes, out)

@@ -14,6 +14,7 @@ mod block;
 mod circle;
 pub mod codes;
 pub mod command;
+mod digits;
 pub mod interpreter;
 mod lexer;
 mod limits;

@@ -5,14 +5,11 @@
 //! and goes through `lexer`, `block` and `motion`, which say what is wrong with it, too. The result is
 //! theirs to the bit: a property of `tests` holds the two against each other.
 //!
-//! Cost on AVR: `G1X12.345Y-3.21` 1,100 cycles, where the others take 4,100.
-
-use core::slice;
-
-use heapless::Vec;
+//! Cost on AVR: `G1X12.345Y-3.21` 1,950 cycles, where the others take 4,100.
 
 use super::axes::{Axes, AxisMode};
 use super::command::{Commands, Feed, Motion, Stop};
+use super::digits::{Digits, ten_thousand_times};
 use super::interpreter::Interpreter;
 use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units};
 use super::number::Decimal;
@@ -23,6 +20,7 @@ const CASE: u8 = 0x20;
 /// What no line has where a word may begin: reading ends there.
 const BAD: u8 = 0x7F;
 /// Words that were seen: an axis has the bit of its number, N and F have these. G is in `mode`.
+const AXES_SEEN: u8 = (1 << AXES) - 1;
 const N_SEEN: u8 = 1 << 6;
 const F_SEEN: u8 = 1 << 7;
 
@@ -30,20 +28,28 @@ const F_SEEN: u8 = 1 << 7;
 struct Words<'a> {
     /// The byte to look at; 0 at the end.
     byte: u8,
-    /// Those behind it.
-    rest: slice::Iter<'a, u8>,
+    text: &'a [u8],
+    /// Where in the line the byte behind it is.
+    next: u8,
     seen: u8,
     mode: Option<MotionMode>,
     feed: f32,
     line: u32,
-    /// Where to on which axes, machine coordinates.
-    targets: Vec<(u8, Length), AXES>,
+    /// Where to, machine coordinates, on the axes that were seen.
+    target: PerAxis<Length>,
 }
 
 impl Interpreter {
-    /// Carries a usual line out. False, and nothing done, if it is none or cannot be carried out.
+    /// Carries a usual line out: with [`Interpreter::interpret`] it would be `Ok`, without a comment, and
+    /// a move. False, and nothing done, if it is none; `numbered` says whether it may have an N word.
     #[inline(never)]
-    pub(super) fn usual(&mut self, line: &[u8], axes: &impl Axes, out: &mut Commands) -> bool {
+    pub fn usual(
+        &mut self,
+        line: &[u8],
+        numbered: bool,
+        axes: &impl Axes,
+        out: &mut Commands,
+    ) -> bool {
         let modal = &self.modal;
         if modal.units != Units::Mm
             || modal.distance != Distance::Absolute
@@ -52,9 +58,9 @@ impl Interpreter {
         {
             return false;
         }
-        let mut words = Words::new(line);
+        let mut words = Words::new(line, numbered);
         words.read(&self.offset)
-            && words.targets.iter().all(|(axis, _)| is_usual(*axis, axes))
+            && are_usual(words.seen & AXES_SEEN, axes)
             && self.carry_out(&words, out)
     }
 
@@ -74,14 +80,7 @@ impl Interpreter {
         self.modal.motion = mode;
         (self.feed, self.feed_units) = (feed, units);
         self.line = words.line;
-        for (axis, target) in &words.targets {
-            let i = usize::from(*axis);
-            if let (Some(position), Some(residue)) =
-                (self.position.get_mut(i), self.residue.get_mut(i))
-            {
-                (*position, *residue) = (*target, 0);
-            }
-        }
+        self.go(words.seen & AXES_SEEN, &words.target);
         out.line = words.line;
         out.dwell_ms = None;
         out.set_position = None;
@@ -93,12 +92,37 @@ impl Interpreter {
         }
         true
     }
+
+    /// The position on the `named` axes.
+    #[inline(always)]
+    fn go(&mut self, mut named: u8, target: &PerAxis<Length>) {
+        let axes = self.position.iter_mut().zip(&mut self.residue).zip(target);
+        for ((position, residue), target) in axes {
+            if named & 1 != 0 {
+                (*position, *residue) = (*target, 0);
+            }
+            named >>= 1;
+            if named == 0 {
+                break;
+            }
+        }
+    }
 }
 
-/// An axis whose words are positions, anywhere.
-fn is_usual(axis: u8, axes: &impl Axes) -> bool {
-    matches!(axes.mode(axis), AxisMode::Standard | AxisMode::Inhibited)
-        && axes.travel(axis).is_none()
+/// Whether words of the `named` axes are positions, anywhere.
+fn are_usual(mut named: u8, axes: &impl Axes) -> bool {
+    let mut axis = 0;
+    while named != 0 {
+        let positions = named & 1 == 0
+            || (matches!(axes.mode(axis), AxisMode::Standard | AxisMode::Inhibited)
+                && axes.travel(axis).is_none());
+        if !positions {
+            return false;
+        }
+        named >>= 1;
+        axis += 1;
+    }
+    true
 }
 
 /// By itself: of both moves in one place the compiler would make a third one, to copy.
@@ -109,11 +133,12 @@ fn straight(target: &PerAxis<Length>, per_minute: f32, out: &mut Commands) {
 
 impl<'a> Words<'a> {
     #[inline(always)]
-    fn new(line: &'a [u8]) -> Self {
+    fn new(text: &'a [u8], numbered: bool) -> Self {
+        let seen = if numbered { 0 } else { N_SEEN };
         // A byte 0 would pass for the end of the line.
-        let byte = if line.last() == Some(&0) { BAD } else { b' ' };
-        let targets = Vec::new();
-        Words { byte, rest: line.iter(), seen: 0, mode: None, feed: 0.0, line: 0, targets }
+        let byte = if text.last() == Some(&0) { BAD } else { b' ' };
+        let target = [Length::ZERO; AXES];
+        Words { byte, text, next: 0, seen, mode: None, feed: 0.0, line: 0, target }
     }
 
     /// Reads the line. False if it is not usual.
@@ -129,7 +154,9 @@ impl<'a> Words<'a> {
                     self.step();
                     continue;
                 }
-                0 => return self.rest.as_slice().is_empty() && !self.targets.is_empty(),
+                0 => {
+                    return usize::from(self.next) == self.text.len() && self.seen & AXES_SEEN != 0;
+                }
                 _ if self.other(letter) => continue,
                 _ => return false,
             };
@@ -140,10 +167,13 @@ impl<'a> Words<'a> {
             self.seen |= bit;
             self.step();
             let value = Length(self.number());
-            let origin = offset.get(usize::from(axis)).copied().unwrap_or_default();
-            // There is room for each axis once.
-            if origin.checked_add(value).is_none_or(|at| self.targets.push((axis, at)).is_err()) {
+            let i = usize::from(axis);
+            let (Some(target), Some(origin)) = (self.target.get_mut(i), offset.get(i)) else {
                 return false;
+            };
+            match origin.checked_add(value) {
+                Some(sum) => *target = sum,
+                None => return false,
             }
         }
     }
@@ -176,102 +206,56 @@ impl<'a> Words<'a> {
     /// A number in ten-thousandths. One that is not usual leaves `BAD` to be read.
     #[inline(never)]
     fn number(&mut self) -> i32 {
-        let mut at = Digits { byte: self.byte, rest: self.rest.clone() };
-        let negative = at.byte == b'-';
+        let negative = self.byte == b'-';
         if negative {
-            at.step();
+            self.step();
         }
-        let (whole, frac) = at.decimal();
-        (self.byte, self.rest) = (at.byte, at.rest);
+        let (whole, frac) = self.decimal();
         // 65,535.9999 at most: that fits.
-        let value = u32::from(whole) * Length::PER_MM as u32 + u32::from(frac);
-        if negative { -(value as i32) } else { value as i32 }
+        let value = (ten_thousand_times(whole) + u32::from(frac)) as i32;
+        if negative { -value } else { value }
     }
 
+    /// The number of an F word.
     #[inline(never)]
     fn feed(&mut self) -> f32 {
-        let mut at = Digits { byte: self.byte, rest: self.rest.clone() };
-        let (whole, frac) = at.decimal();
-        (self.byte, self.rest) = (at.byte, at.rest);
-        Decimal { whole: whole.into(), frac, ..Decimal::default() }.to_f32()
+        let Ok(value) = u32::try_from(self.number()) else {
+            self.byte = BAD;
+            return 0.0;
+        };
+        let (whole, frac) = (value / Length::PER_MM as u32, value % Length::PER_MM as u32);
+        Decimal { whole, frac: frac as u16, ..Decimal::default() }.to_f32()
+    }
+
+    #[inline(always)]
+    fn decimal(&mut self) -> (u16, u16) {
+        let rest = self.text.get(usize::from(self.next)..).unwrap_or(&[]);
+        let mut digits = Digits::new(self.byte, rest);
+        let number = digits.decimal();
+        self.next = self.text.len() as u8 - digits.left();
+        self.byte = if number.is_some() { digits.byte } else { BAD };
+        number.unwrap_or_default()
     }
 
     /// A whole number below a billion.
     #[inline(never)]
     fn integer(&mut self) -> u32 {
-        let mut at = Digits { byte: self.byte, rest: self.rest.clone() };
-        let mut value = at.digit().map_or(0, u32::from);
-        let known = self.byte.is_ascii_digit();
-        while value < 100_000_000
-            && let Some(digit) = at.digit()
-        {
-            value = value * 10 + u32::from(digit);
+        let mut value = 0;
+        if !self.byte.is_ascii_digit() {
+            self.byte = BAD;
         }
-        (self.byte, self.rest) = (if known { at.byte } else { BAD }, at.rest);
+        while value < 100_000_000 && self.byte.is_ascii_digit() {
+            value = value * 10 + u32::from(self.byte - b'0');
+            self.step();
+        }
         value
     }
 
     #[inline(always)]
     fn step(&mut self) {
-        self.byte = self.rest.next().copied().unwrap_or(0);
-    }
-}
-
-/// The digits of a number. A copy of where a line is read, which stays in registers.
-struct Digits<'a> {
-    byte: u8,
-    rest: slice::Iter<'a, u8>,
-}
-
-impl Digits<'_> {
-    #[inline(always)]
-    fn step(&mut self) {
-        self.byte = self.rest.next().copied().unwrap_or(0);
-    }
-
-    /// Takes a digit, if there is one.
-    #[inline(always)]
-    fn digit(&mut self) -> Option<u8> {
-        let digit = self.byte.wrapping_sub(b'0');
-        if digit > 9 {
-            return None;
+        match self.text.get(usize::from(self.next)) {
+            Some(byte) => (self.byte, self.next) = (*byte, self.next + 1),
+            None => self.byte = 0,
         }
-        self.step();
-        Some(digit)
-    }
-
-    /// A number below 65,530 without a sign: the whole, and up to four decimals as ten-thousandths.
-    /// More digits are left, and as no word can begin with them, the line is not usual.
-    #[inline(always)]
-    fn decimal(&mut self) -> (u16, u16) {
-        let first = self.byte;
-        let mut whole = 0;
-        while whole < u16::MAX / 10
-            && let Some(digit) = self.digit()
-        {
-            whole = whole * 10 + u16::from(digit);
-        }
-        let mut frac = 0;
-        if self.byte == b'.' {
-            self.step();
-            // A lone point is no number.
-            let known = first != b'.' || self.byte.is_ascii_digit();
-            frac = self.fraction();
-            self.byte = if known { self.byte } else { BAD };
-        } else if !first.is_ascii_digit() {
-            self.byte = BAD;
-        }
-        (whole, frac)
-    }
-
-    /// Up to four decimals: by pairs, for AVR multiplies bytes.
-    #[inline(always)]
-    fn fraction(&mut self) -> u16 {
-        let Some(first) = self.digit() else { return 0 };
-        let Some(second) = self.digit() else { return u16::from(first * 10) * 100 };
-        let high = u16::from(first * 10 + second) * 100;
-        let Some(third) = self.digit() else { return high };
-        let fourth = self.digit().unwrap_or(0);
-        high + u16::from(third * 10 + fourth)
     }
 }

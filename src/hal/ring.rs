@@ -137,6 +137,27 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         self.0.head.set(head);
     }
 
+    /// The slots that a run of values goes to, as many as lie side by side: fill them from the first on, then
+    /// call [`Producer::publish`].
+    #[inline]
+    pub fn vacant(&mut self) -> &mut [MaybeUninit<T>] {
+        let start = next::<N>(self.0.head.get());
+        let len = self.free().min(N - usize::from(start));
+        // SAFETY: the slots behind `head` are the producer's, as many as are free, and these do not
+        // go beyond the end; `MaybeUninit` may lie there whatever was written.
+        unsafe { core::slice::from_raw_parts_mut(self.0.slot(start).cast(), len) }
+    }
+
+    /// Shows the consumer the first `count` of the slots that [`Producer::vacant`] gave.
+    ///
+    /// # Safety
+    /// They have been filled.
+    #[inline]
+    pub unsafe fn publish(&mut self, count: u8) {
+        let head = usize::from(self.0.head.get()) + usize::from(count);
+        self.0.head.set(if head >= N { head - N } else { head } as u8);
+    }
+
     /// Changes a value pushed earlier; `back` 0 is the newest. False if it has been released.
     ///
     /// The caller keeps the consumer from running meanwhile (see `imp::exec::lock`): `_ceiling` is
@@ -313,6 +334,28 @@ mod tests {
             taken.extend(run.iter().take(2));
         }
         assert!(taken.iter().copied().eq(0..taken.len() as u16));
+    }
+
+    #[test]
+    fn vacant_slots_are_filled_in_place() {
+        let ring: &'static Ring<u16, 8> = Box::leak(Box::new(Ring::new()));
+        let (mut p, mut c) = ring.split().unwrap();
+        let (mut next, mut taken) = (0.., Vec::new());
+        for round in 0..50u8 {
+            let slots = p.vacant();
+            let count = slots.len().min(usize::from(round % 5));
+            slots.iter_mut().zip(&mut next).take(count).for_each(|(slot, value)| {
+                slot.write(value);
+            });
+            // SAFETY: as many have been written.
+            unsafe { p.publish(count as u8) };
+            assert!(p.free() == 0 || !p.vacant().is_empty());
+            if round % 3 != 0 {
+                taken.extend_from_slice(c.waiting());
+                c.release_many(c.waiting().len() as u8);
+            }
+        }
+        assert!(taken.len() > 50 && taken.iter().copied().eq(0..taken.len() as u16));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::machine::Machine;
 use super::request::{Context, Phase, Request};
 use super::value::Value;
 use super::write::{Format, Out, Writer};
-use crate::config::Fixed;
+use crate::config::{Fixed, Settings};
 use crate::status::Status;
 use crate::text;
 
@@ -13,14 +13,29 @@ const FRAMES: u8 = 1;
 const LINE_NUMBERS: u8 = 4;
 const BLOCKS: u8 = 5;
 
+/// Whether nothing of a block is to be shown, so that the response is the frame alone: of a block
+/// without a comment, in JSON mode, and `numbered` or not.
+pub fn is_brief(settings: &Settings, numbered: bool) -> bool {
+    match settings.json_verbosity() {
+        FRAMES..LINE_NUMBERS => true,
+        LINE_NUMBERS..BLOCKS => !numbered,
+        _ => false,
+    }
+}
+
+/// The response to a block that has run, of which nothing is to be shown; `free` line slots.
+pub fn put_brief(settings: &Settings, free: u8, out: &mut impl Out) {
+    let strict = settings.json_strict();
+    out.put_text(if strict { text!("{\"r\":{},\"f\":[1,0,") } else { text!("{r:{},f:[1,0,") });
+    // There are fewer than ten.
+    out.put(b'0' + free % 10);
+    out.put_text(text!("]}\n"));
+}
+
 impl Request {
-    /// Whether nothing of the block is to be shown, so that the response is the frame alone.
     fn is_brief<M: Machine>(&self, machine: &mut M) -> bool {
-        let quiet = match machine.settings().json_verbosity() {
-            FRAMES..LINE_NUMBERS => true,
-            LINE_NUMBERS..BLOCKS => machine.value(Value::BlockLine) == 0,
-            _ => false,
-        };
+        let quiet = is_brief(machine.settings(), true)
+            || (is_brief(machine.settings(), false) && machine.value(Value::BlockLine) == 0);
         quiet && !self.begun && !self.is_json && !self.commented
     }
 

@@ -24,6 +24,7 @@ mod token;
 mod value;
 mod write;
 
+pub use block::{is_brief, put_brief};
 pub use json::Span;
 pub use machine::{Machine, Warning};
 pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report};

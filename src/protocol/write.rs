@@ -11,6 +11,11 @@ pub trait Out {
     /// Takes one byte.
     fn put(&mut self, byte: u8);
 
+    /// Takes a text.
+    fn put_text(&mut self, text: Text) {
+        self.put_all(text.bytes());
+    }
+
     /// Takes several.
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
         bytes.for_each(|byte| self.put(byte));
@@ -100,7 +105,7 @@ impl<'a, O: Out> Writer<'a, O> {
     /// A text.
     pub fn text(&mut self, text: Text) {
         if self.format.0 & self.hidden == 0 {
-            self.out.put_all(text.bytes());
+            self.out.put_text(text);
         }
     }
 

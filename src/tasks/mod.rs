@@ -9,6 +9,7 @@ pub mod links;
 pub mod parser;
 pub mod planner;
 pub mod power;
+mod printing;
 pub mod reader;
 pub mod reporter;
 pub mod tx;

@@ -8,6 +8,7 @@ use embassy_time::Timer;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::uart;
 use crate::hal::serial::{Outgoing, RING};
+use crate::progmem::Text;
 
 /// Most bytes written between two calls of [`Tx::room`].
 pub const PIECE: usize = 64;
@@ -58,6 +59,18 @@ impl crate::protocol::Out for Tx {
     fn put(&mut self, byte: u8) {
         // Room was made by `room`; a byte beyond it is a defect that tests of `protocol` exclude.
         let _ = self.ring.push(byte);
+    }
+
+    // By itself, for it is called in many places.
+    #[inline(never)]
+    fn put_text(&mut self, text: Text) {
+        let slots = self.ring.vacant();
+        if slots.len() < text.len() {
+            return self.put_all(text.bytes());
+        }
+        text.copy(slots);
+        // SAFETY: so many have been copied there.
+        unsafe { self.ring.publish(text.len() as u8) };
     }
 
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {

@@ -25,7 +25,7 @@ fn line() -> impl Strategy<Value = String> {
 fn both_ways(interpreter: &mut Interpreter, line: &[u8]) -> bool {
     let mut general = *interpreter;
     let (mut out, mut expected) = (Commands::default(), Commands::default());
-    let is_usual = { *interpreter }.usual(line, &Usual, &mut Commands::default());
+    let is_usual = { *interpreter }.usual(line, true, &Usual, &mut Commands::default());
     let done = interpreter.interpret(line, &Usual, &mut out);
     assert_eq!(done, general.general(line, &Usual, &mut expected), "{line:?}");
     assert_eq!((*interpreter, out), (general, expected), "{line:?}");
@@ -55,6 +55,7 @@ fn what_is_usual() {
     {
         assert!(!both_ways(&mut interpreter, line.as_bytes()), "{line}");
     }
+    assert!(!interpreter.usual(b"N1X1", false, &Usual, &mut Commands::default()));
     for mode in ["G20", "G91", "G93"] {
         let mut interpreter = interpreter;
         both_ways(&mut interpreter, mode.as_bytes());
