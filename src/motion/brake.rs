@@ -10,7 +10,7 @@
 use super::float::{greater, lesser};
 use super::governor::{Governor, Stretch};
 use super::reach::{Ahead, Demand, Reach};
-use super::state::{Limits, State};
+use super::state::{Curve, Limits, State};
 use crate::math::sqrt;
 
 /// A part of a brake.
@@ -182,7 +182,8 @@ impl Governor {
             let way = state.way(time, phase.rate, accel);
             if stretch.distance + way >= left {
                 stretch.ends = true;
-                time = state.time(left - stretch.distance, time, phase.rate, accel);
+                let curve = Curve { t: time, rate: phase.rate, accel };
+                time = state.time(left - stretch.distance, &curve);
             }
             stretch.distance += way;
             stretch.seconds += time;

@@ -19,6 +19,18 @@ use super::reach::{Ahead, NONE, Reach};
 use super::state::State;
 use crate::math::sqrt;
 
+/// The stretch to choose a state for. In one, as arguments that do not fit into registers go wrong on
+/// AVR.
+struct Aim {
+    /// Way left in the block, mm.
+    left: f32,
+    /// Velocity limit, mm/s.
+    cruise: f32,
+    seconds: f32,
+    /// It is the last of the block.
+    ends: bool,
+}
+
 /// A possible next state.
 #[derive(Clone, Copy)]
 struct Next {
@@ -57,13 +69,13 @@ impl Governor {
         let v = self.state.velocity;
         let mut ends = left <= v * nominal;
         let mut seconds = if ends { self.shortest(left, cruise) } else { nominal };
-        let mut next = self.choose(left, cruise, ahead, seconds, ends)?;
+        let mut next = self.choose(&Aim { left, cruise, seconds, ends }, ahead)?;
         let after = next.state.velocity;
         if !ends && next.distance + 0.5 * nominal * after >= left {
             // What would be left is not worth a stretch.
             ends = true;
             seconds = lesser(self.time_to(after, left, nominal), nominal);
-            next = self.choose(left, cruise, ahead, seconds, true)?;
+            next = self.choose(&Aim { left, cruise, seconds, ends }, ahead)?;
         }
         let after = next.state.velocity;
         if after <= v && v < self.crawl(nominal) && v < 0.5 * cruise {
@@ -120,17 +132,10 @@ impl Governor {
         Stretch { seconds: greater(seconds, left / cruise), distance: left, ends: true }
     }
 
-    /// The best safe state to be in after `seconds`. In line: it would have more arguments than registers,
-    /// which goes wrong on AVR.
-    #[inline(always)]
-    fn choose(
-        &self,
-        left: f32,
-        cruise: f32,
-        ahead: &impl Ahead,
-        seconds: f32,
-        ends: bool,
-    ) -> Option<Next> {
+    /// The best safe state to be in after a stretch.
+    #[inline(never)]
+    fn choose(&self, aim: &Aim, ahead: &impl Ahead) -> Option<Next> {
+        let Aim { left, cruise, seconds, ends } = *aim;
         let alpha = self.state.alpha;
         let change = self.limits.pace * seconds;
         // Up to the feed and no further.

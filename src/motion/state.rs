@@ -18,6 +18,17 @@ pub struct Limits {
     pub pace: f32,
 }
 
+/// A time of constant jerk. In one, as arguments that do not fit into registers go wrong on AVR.
+#[derive(Clone, Copy, Debug)]
+pub struct Curve {
+    /// How long it lasts, s.
+    pub t: f32,
+    /// By how much alpha changes in a second.
+    pub rate: f32,
+    /// The acceleration limit, mm/s^2.
+    pub accel: f32,
+}
+
 /// Velocity and acceleration along the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State {
@@ -36,10 +47,10 @@ impl State {
     pub fn way(&self, t: f32, rate: f32, accel: f32) -> f32 {
         t * (self.velocity + 0.5 * accel * t * (self.alpha + rate * t * (1.0 / 3.0)))
     }
-    /// The time it takes for `way`, no more than `t`; velocity does not rise. In line: it would have more
-    /// arguments than registers, which goes wrong on AVR.
-    #[inline(always)]
-    pub fn time(&self, way: f32, t: f32, rate: f32, accel: f32) -> f32 {
+    /// The time it takes for `way`, no more than `t`; velocity does not rise.
+    #[inline(never)]
+    pub fn time(&self, way: f32, curve: &Curve) -> f32 {
+        let Curve { t, rate, accel } = *curve;
         let mut time = lesser(way / self.velocity, t);
         for _ in 0..3 {
             let speed = self.velocity_after(time, rate, accel);
