@@ -129,6 +129,10 @@ impl Prep {
     /// The segment that comes before any other, if there is one.
     #[inline(always)]
     pub fn held(&mut self) -> Option<Segment> {
+        // Hardly ever: nothing is copied then.
+        if self.held.is_none() {
+            return None;
+        }
         self.held.take()
     }
 

@@ -27,11 +27,14 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         exec::wait(|| (segments.used() < most).then_some(())).await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
-        let (step, steps) = links::update(|snapshot| {
-            (machine.step(&mut blocks, standstill, snapshot), snapshot.steps)
+        let step = links::update(|snapshot| {
+            let step = machine.step(&mut blocks, standstill, snapshot);
+            if let Step::Segment(segment) = &step {
+                power::segment(segment, &snapshot.steps);
+            }
+            step
         });
         if let Step::Segment(segment) = step {
-            power::segment(&segment, &steps);
             // There is room: this task alone fills the ring.
             let _ = segments.push(segment);
             stepper::go();
