@@ -41,7 +41,8 @@ impl Links {
             mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),
             tx: Mutex::new(Tx::new(tx, rate)),
-            settings: RefCell::new(Settings::new()),
+            // Their defaults come when they are in place: they would take as much of the stack.
+            settings: RefCell::new(Settings::blank()),
             model: RefCell::new(Interpreter::new()),
         }
     }
@@ -69,6 +70,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     let segments = stepper::start()?;
     let (queue, source) = queue::store().split()?;
     let links = place(outgoing, rate);
+    links.settings.borrow_mut().set_defaults();
     set_outputs(&links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received).ok()?);

@@ -39,15 +39,26 @@ impl Default for Settings {
 impl Settings {
     /// The defaults.
     pub fn new() -> Settings {
+        let mut settings = Settings::blank();
+        settings.set_defaults();
+        settings
+    }
+
+    /// Nothing set, for [`Settings::set_defaults`].
+    pub const fn blank() -> Settings {
         let ratios = [StepRatio::NONE; MOTORS];
-        let mut settings = Settings { small: [0; SMALLS], large: [0; LARGES], ratios };
+        Settings { small: [0; SMALLS], large: [0; LARGES], ratios }
+    }
+
+    /// Sets everything to its default.
+    #[inline(never)]
+    pub fn set_defaults(&mut self) {
         for setting in (0..Setting::NUMBERS).filter_map(Setting::from_number) {
-            settings.keep(setting, setting.default_value());
+            self.keep(setting, setting.default_value());
         }
         for motor in 0..MOTORS as u8 {
-            settings.derive(motor);
+            self.derive(motor);
         }
-        settings
     }
 
     /// The value of a setting, scaled as kept.

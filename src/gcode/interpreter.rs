@@ -152,9 +152,12 @@ impl Interpreter {
         self.modes(block);
         self.feed(block)?;
         self.non_modal(block, axes, out)?;
-        let start = self.position;
+        // Limits are for homed axes alone; most machines are spared the copy.
+        let start = if self.homed == 0 { None } else { Some(self.position) };
         self.motion(block, axes, out)?;
-        limits::check(&start, &out.motion, self.homed, axes)?;
+        if let Some(start) = &start {
+            limits::check(start, &out.motion, self.homed, axes)?;
+        }
         out.exact_stop = self.modal.path == PathMode::ExactStop;
         block.finish()?;
         self.stop(block, out);

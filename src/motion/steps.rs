@@ -26,7 +26,9 @@ impl Motor {
         let rest = (position.0 as u32)
             .wrapping_mul(ratio.num)
             .wrapping_sub((steps as u32).wrapping_mul(ratio.den));
-        Self { steps, rest: rest as i32 }
+        // Beyond the range of steps there is no rest, and no short way from there.
+        let saturated = steps.unsigned_abs() >= i32::MAX as u32;
+        Self { steps, rest: if saturated { i32::MIN } else { rest as i32 } }
     }
 
     /// Its axis has gone `travel` to `position`. Cost: 600 for short moves.
@@ -46,7 +48,9 @@ impl Motor {
         let Ok(way) = u16::try_from(travel.unsigned_abs()) else {
             return false;
         };
-        // The rest is below `den` in size.
+        if self.rest.unsigned_abs() >= u32::from(den) {
+            return false;
+        }
         let way = u32::from(way) * u32::from(num);
         if den >= 0x4000 || way >> 30 != 0 {
             return false;

@@ -28,11 +28,14 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         exec::wait(|| (segments.used() < most).then_some(())).await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
-        let (step, steps) = links::update(|out| {
-            (machine.step(&mut blocks, standstill, out, &mut segment), out.steps)
+        let step = links::update(|out| {
+            let step = machine.step(&mut blocks, standstill, out, &mut segment);
+            if step == Step::Segment {
+                power::segment(&segment, &out.steps);
+            }
+            step
         });
         if step == Step::Segment {
-            power::segment(&segment, &steps);
             // There is room: this task alone fills the ring.
             let _ = segments.push(segment);
             stepper::go();
