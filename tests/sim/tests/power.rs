@@ -44,7 +44,7 @@ fn a_motor_that_stands_still_stays_off() {
     machine.run_for_ms(60).unwrap();
     let on = |machine: &Machine| RAMPS14.motors.map(|motor| is_on(machine, motor.enable.unwrap()));
     assert_eq!(on(&machine), [false, true, true, false]);
-    machine.run_for_ms(1_000).unwrap();
+    machine.run_for_ms(2_000).unwrap();
     assert_eq!(on(&machine), [false; 4]);
     assert_eq!(machine.recorder().motors()[1].position, 1280);
 }
