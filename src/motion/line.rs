@@ -218,7 +218,12 @@ impl Path {
                 *u = share(*u, length);
             }
         }
-        self.length = scaled(f32::from(length) * 1e-4, shift);
+        // Long moves have the time to be measured exactly, and their steps come evenly.
+        self.length = if shift > 0 {
+            length_of(&self.travel)
+        } else {
+            scaled(f32::from(length) * 1e-4, shift)
+        };
         Way::Near
     }
 
@@ -391,18 +396,28 @@ fn norm(vector: &[i16]) -> u16 {
     root(sum)
 }
 
+/// The length of a move, mm: that of the linear axes or of the rotary ones, whichever is longer.
+#[inline(never)]
+fn length_of(travel: &PerAxis<i32>) -> f32 {
+    let (linear, rotary) = travel.split_at(FIRST_ROTARY);
+    let (linear, rotary) = (exact_norm(linear), exact_norm(rotary));
+    1e-4 * if below(linear, rotary) { rotary } else { linear }
+}
+
 /// How much longer the way of the rotary axes is than that of the linear ones.
 #[inline(never)]
 fn stretch(travel: &PerAxis<i32>) -> f32 {
-    let norm = |travel: &[i32]| {
-        let mut sum = 0.0;
-        for &way in travel {
-            sum += way as f32 * way as f32;
-        }
-        sqrt(sum)
-    };
     let (linear, rotary) = travel.split_at(FIRST_ROTARY);
-    norm(rotary) / norm(linear)
+    exact_norm(rotary) / exact_norm(linear)
+}
+
+#[inline(never)]
+fn exact_norm(travel: &[i32]) -> f32 {
+    let mut sum = 0.0;
+    for &way in travel {
+        sum += way as f32 * way as f32;
+    }
+    sqrt(sum)
 }
 
 /// `part / whole` in the units of a heading; no more than [`ONE`].

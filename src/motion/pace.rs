@@ -52,7 +52,7 @@ const USUAL: [Usual; MOTORS] = [
     Usual { shortest: 160, fine: 200, coarse: 400, settles: 200 },
     Usual { shortest: 200, fine: 200, coarse: 400, settles: 200 },
     Usual { shortest: 240, fine: 320, coarse: 480, settles: 300 },
-    Usual { shortest: 320, fine: 400, coarse: 560, settles: 320 },
+    Usual { shortest: 319, fine: 400, coarse: 560, settles: 320 },
 ];
 
 /// Ticks of blocks so short that they are a single segment: 2^22 / the tick period.
@@ -104,7 +104,7 @@ mod tests {
         };
         assert_eq!([1, 2].map(|us| rate(us, 1)), [100_000; 2]);
         // 160 cycles and 8 us of 16.
-        assert_eq!((rate(10, 1), rate(10, 4)), (55_556, 35_714));
+        assert_eq!((rate(10, 1), rate(10, 4)), (55_556, 35_794));
         let [usual, wide] = [2, 10].map(|pulse_us| paces(Drivers { pulse_us, setup_us: 1 }));
         for (usual, wide) in usual.iter().zip(&wide) {
             assert_eq!(wide.shortest, usual.shortest + 128);
