@@ -157,10 +157,10 @@ impl Prep {
         }
         let mut moving = 0u8;
         let mut bit = 1;
-        for m in 0..MOTORS {
-            if steps[m] != 0 {
+        for (m, &way) in steps.iter().enumerate() {
+            if way != 0 {
                 moving += 1;
-                if (steps[m] < 0) != (self.backwards & bit != 0) {
+                if (way < 0) != (self.backwards & bit != 0) {
                     self.backwards ^= bit;
                     self.turned = true;
                     // It was measured in the old direction.
