@@ -4,7 +4,7 @@
 //! Called by exec's preparation of segments and by the line builder, a few times each. No units.
 
 /// `a / b`, rounded down, if that fits 16 bits: `a >> 16 < b`. Else something, without a panic.
-/// Cost: 230.
+/// Cost: 230, 140 if it fits eight bits.
 #[inline(never)]
 pub fn quotient(a: u32, b: u16) -> u16 {
     divide(a, b).0
@@ -26,6 +26,16 @@ fn divide(a: u32, b: u16) -> (u16, u16) {
     unsafe {
         core::arch::asm!(
             "ldi  {n}, 16",
+            // Where the quotient has eight bits there is no need to look for more.
+            "cp   {low:h}, {b:l}",
+            "cpc  {rest:l}, {b:h}",
+            "cpc  {rest:h}, {zero}",
+            "brcc 1f",
+            "mov  {rest:h}, {rest:l}",
+            "mov  {rest:l}, {low:h}",
+            "mov  {low:h}, {low:l}",
+            "clr  {low:l}",
+            "ldi  {n}, 8",
             "1:",
             "lsl  {low:l}",
             "rol  {low:h}",
@@ -47,6 +57,7 @@ fn divide(a: u32, b: u16) -> (u16, u16) {
             low = inout(reg_pair) low,
             rest = inout(reg_pair) rest,
             b = in(reg_pair) b,
+            zero = in(reg) 0u8,
             options(pure, nomem, nostack),
         );
     }
