@@ -19,10 +19,11 @@ pub fn below(a: f32, b: f32) -> bool {
     a.to_bits() < b.to_bits()
 }
 
-/// Whether a number is not 0 (or -0).
+/// Whether a number is not 0 (or -0, or below 1e-40). Cost: 5: of all bits the compiler would make a
+/// comparison of floats.
 #[inline(always)]
 pub fn some(a: f32) -> bool {
-    a.to_bits() << 1 != 0
+    (a.to_bits() >> 16) as u16 & 0x7FFF != 0
 }
 
 /// The lesser of two numbers that are not negative. Cost: 25.

@@ -43,7 +43,7 @@
 //! Cost: a push 1,000 cycles, and 700 for each key dropped.
 
 use super::block::Line;
-use super::float::{OCTAVE, lesser, log, some};
+use super::float::{OCTAVE, lesser, log, scaled, some};
 use super::queue::BLOCKS;
 
 /// Half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`,
@@ -78,7 +78,7 @@ impl Line {
     /// never matters, and is left away where it is much. Cost: 350.
     #[inline(never)]
     pub fn gain(&self) -> f32 {
-        let full = 2.0 * self.accel.get() * self.length;
+        let full = scaled(self.accel.get(), 1) * self.length;
         // Plainly below the square of its velocity, as short blocks have it.
         if log(full) + OCTAVE < 2 * log(self.cruise) { full } else { self.capped(full) }
     }

@@ -68,8 +68,11 @@ pub fn limit(a: &Heading, b: &Heading, acceleration: f32, most: f32) -> f32 {
     // |b - a| = 2 sin(angle / 2): precise for small angles, which 1 - cos(angle) is not.
     let mut sum = 0u32;
     for (from, to) in a.unit.iter().zip(&b.unit) {
-        let change = u32::from(to.abs_diff(*from));
-        sum = sum.saturating_add(change * change);
+        let change = to.abs_diff(*from);
+        if change != 0 {
+            // At most 8 in 2^-28: each of the two, linear and rotary, up to 2 long.
+            sum = sum.wrapping_add(u32::from(change) * u32::from(change));
+        }
     }
     if sum < STRAIGHT {
         return f32::MAX;

@@ -31,7 +31,7 @@ impl Motor {
         Self { steps, rest: if saturated { i32::MIN } else { rest as i32 } }
     }
 
-    /// Its axis has gone `travel` to `position`. Cost: 600 for short moves.
+    /// Its axis has gone `travel` to `position`. Cost: 400 for short moves.
     #[inline(never)]
     pub fn go(&mut self, ratio: StepRatio, travel: i32, position: Length) {
         if !self.go_near(ratio, travel, position) {
@@ -42,43 +42,35 @@ impl Motor {
     /// As long as 32 and 16 bits will do; false, and nothing done, otherwise.
     #[inline(always)]
     fn go_near(&mut self, ratio: StepRatio, travel: i32, position: Length) -> bool {
-        let (Ok(num), Ok(den)) = (u16::try_from(ratio.num), u16::try_from(ratio.den)) else {
-            return false;
-        };
-        let Ok(way) = u16::try_from(travel.unsigned_abs()) else {
-            return false;
-        };
-        if self.rest.unsigned_abs() >= u32::from(den) {
+        let way = travel.unsigned_abs();
+        let (num, den, rest) = (ratio.num as u16, ratio.den as u16, self.rest as i16);
+        if (ratio.num | ratio.den | way) >> 16 != 0 || i32::from(rest) != self.rest {
             return false;
         }
-        let way = u32::from(way) * u32::from(num);
-        if den >= 0x4000 || way >> 30 != 0 {
+        if den >= 0x4000 || rest.unsigned_abs() >= den {
             return false;
         }
-        let sum = if travel < 0 { self.rest - way as i32 } else { self.rest + way as i32 };
-        let rounded = sum.unsigned_abs() + u32::from(den / 2);
-        if (rounded >> 16) as u16 >= den {
+        // As if it went forward. With half a step for rounding, and one so that it is positive.
+        let back = travel < 0;
+        let half = den / 2;
+        let more = (den + half).wrapping_add_signed(if back { -rest } else { rest });
+        let sum = u32::from(way as u16) * u32::from(num) + u32::from(more);
+        if (sum >> 16) as u16 >= den {
             return false;
         }
-        let (whole, over) = quotient_remainder(rounded, den);
-        // What has been added for rounding is in `over`.
-        let rest = i32::from(over) - i32::from(den / 2);
-        if sum < 0 {
-            self.steps = self.steps.wrapping_sub(whole.into());
-            self.rest = -rest;
-        } else {
-            self.steps = self.steps.wrapping_add(whole.into());
-            self.rest = rest;
+        let (whole, over) = quotient_remainder(sum, den);
+        let mut steps = i32::from(whole) - 1;
+        let mut rest = over as i16 - half as i16;
+        // Half a step goes away from zero, not to where it goes.
+        if over == 0 && den & 1 == 0 && (position.0 < 0) != back {
+            steps -= 1;
+            rest = half as i16;
         }
-        // Half a step goes away from zero, not away from where it was.
-        let twice = self.rest + self.rest;
-        if twice == i32::from(den) && position.0 > 0 {
-            self.steps += 1;
-            self.rest -= i32::from(den);
-        } else if -twice == i32::from(den) && position.0 < 0 {
-            self.steps -= 1;
-            self.rest += i32::from(den);
+        if back {
+            (steps, rest) = (-steps, -rest);
         }
+        self.steps = self.steps.wrapping_add(steps);
+        self.rest = rest.into();
         true
     }
 }
