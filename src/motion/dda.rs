@@ -67,8 +67,9 @@ pub struct Segment {
     /// What the interrupt may leave out: [`NARROW`], [`WIDE`], or [`LOCKSTEP`] and the motors that step on
     /// every tick. Set by [`Segment::seal`].
     pub mode: u8,
-    /// Makes it 16 bytes long.
-    pub reserved: u8,
+    /// Motors of its block that move, as bits, none in a pause: for their power. The interrupt does not
+    /// read it. It makes the segment 16 bytes long.
+    pub moving: u8,
 }
 
 /// None but the first two motors move.

@@ -31,7 +31,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         let step = links::update(|out| {
             let step = machine.step(&mut blocks, standstill, out, &mut segment);
             if step == Step::Segment {
-                power::segment(&segment, &out.steps);
+                power::segment(segment.moving);
             }
             step
         });
