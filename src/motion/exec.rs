@@ -242,6 +242,7 @@ impl Exec {
         out.velocity = 0.0;
     }
 
+    #[inline(never)]
     fn idle(&mut self, standstill: bool, out: &mut Snapshot) -> Step {
         self.halt(out);
         self.prep.rest();
@@ -252,6 +253,7 @@ impl Exec {
         Step::Idle
     }
 
+    #[inline(never)]
     fn dwell(&mut self, segment: &mut Segment) {
         let ticks = if self.dwell_ms < u32::from(DWELL_TICKS) { 1 } else { DWELL_TICKS };
         self.dwell_ms -= u32::from(ticks);

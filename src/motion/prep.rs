@@ -263,7 +263,7 @@ impl Prep {
             };
             bit <<= 1;
         }
-        out.seal();
+        out.seal(self.full, increment);
         if self.turned {
             self.behind_turn(out);
         }
@@ -399,7 +399,7 @@ impl Prep {
         if self.left == 0 {
             self.settle_debts();
         }
-        out.seal();
+        out.seal(self.full, 1 << shift);
         if self.turned {
             self.behind_turn(out);
         }

@@ -37,7 +37,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         });
         if step == Step::Segment {
             // There is room: this task alone fills the ring.
-            let _ = segments.push(segment);
+            let _ = segments.push_copy(&segment);
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
             most = if cycles < SHORT { SEGMENTS - 1 } else { LONG_QUEUED };
