@@ -67,8 +67,9 @@ pub struct Segment {
     /// What the interrupt may leave out: [`NARROW`], [`WIDE`], or [`LOCKSTEP`] and the motors that step on
     /// every tick. Set by [`Segment::seal`].
     pub mode: u8,
-    /// Makes it 16 bytes long.
-    pub reserved: u8,
+    /// Motors of its block that move, as bits, none in a pause: for their power. The interrupt does not
+    /// read it. It makes the segment 16 bytes long.
+    pub moving: u8,
 }
 
 /// None but the first two motors move.
@@ -79,23 +80,13 @@ pub const WIDE: u8 = 1;
 pub const LOCKSTEP: u8 = 0x80;
 
 impl Segment {
-    /// Completes what follows from the increments. Cost: 60.
+    /// Completes it: the motors `full` (bits) travel `step` a tick, the rest of those that move less.
+    /// Cost: 20.
     #[inline]
-    pub fn seal(&mut self) {
-        let mut lockstep = 0;
-        let mut mixed = false;
-        let mut m = 0;
-        while m < MOTORS {
-            match self.increment[m] {
-                0 => {}
-                STEP => lockstep |= 1 << m,
-                _ => mixed = true,
-            }
-            m += 1;
-        }
-        self.mode = if lockstep != 0 && !mixed {
-            LOCKSTEP | lockstep
-        } else if self.increment[2] | self.increment[3] != 0 {
+    pub fn seal(&mut self, full: u8, step: u16) {
+        self.mode = if step == STEP && self.moving == full {
+            LOCKSTEP | full
+        } else if self.moving & !0b11 != 0 {
             WIDE
         } else {
             NARROW

@@ -16,14 +16,14 @@
 
 use super::block::{Block, Body, Line};
 use super::dda::Segment;
-use super::float::{below, scaled, some};
+use super::float::{below, scaled, some, whole};
 use super::governor::{Ahead, Governor};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
 use crate::boards::MOTORS;
 
-/// CPU cycles in a second.
-const CYCLES_PER_S: f32 = crate::boards::ACTIVE.clock_hz as f32;
+/// Half CPU cycles in a second.
+const HALVES_PER_S: f32 = 2.0 * crate::boards::ACTIVE.clock_hz as f32;
 
 /// CPU cycles in a millisecond.
 const CYCLES_PER_MS: u16 = (crate::boards::ACTIVE.clock_hz / 1000) as u16;
@@ -111,11 +111,13 @@ pub enum Program {
 /// The line that exec is running.
 #[derive(Clone, Copy, Debug, Default)]
 struct Running {
+    /// There is one.
+    active: bool,
     /// Way to go, mm.
     left: f32,
     /// Velocity limit, mm/s.
     cruise: f32,
-    /// Phase units of the dominant motor in a mm; before the first stretch, its steps.
+    /// Phase units of the dominant motor in a mm, unless `fresh`.
     scale: f32,
     /// Without a jerk limit: the square of the velocity that may be left at the end.
     headroom: f32,
@@ -133,7 +135,7 @@ struct Running {
 pub struct Exec {
     prep: Prep,
     governor: Governor,
-    running: Option<Running>,
+    running: Running,
     dwell_ms: u32,
 }
 
@@ -155,7 +157,18 @@ impl Ahead for View<'_> {
 impl Exec {
     /// At rest.
     pub const fn new() -> Self {
-        Self { prep: Prep::new(), governor: Governor::new(), running: None, dwell_ms: 0 }
+        let running = Running {
+            active: false,
+            left: 0.0,
+            cruise: 0.0,
+            scale: 0.0,
+            headroom: 0.0,
+            version: 0,
+            fresh: false,
+            done: false,
+            jerk: false,
+        };
+        Self { prep: Prep::new(), governor: Governor::new(), running, dwell_ms: 0 }
     }
 
     /// Does the next thing there is to do; puts a segment into `segment` if it says so. `standstill` says
@@ -174,7 +187,7 @@ impl Exec {
             self.dwell(segment);
             return Step::Segment;
         }
-        if self.running.is_none() {
+        if !self.running.active {
             if blocks.is_empty() {
                 return self.idle(standstill, out);
             }
@@ -229,6 +242,7 @@ impl Exec {
         out.velocity = 0.0;
     }
 
+    #[inline(never)]
     fn idle(&mut self, standstill: bool, out: &mut Snapshot) -> Step {
         self.halt(out);
         self.prep.rest();
@@ -239,6 +253,7 @@ impl Exec {
         Step::Idle
     }
 
+    #[inline(never)]
     fn dwell(&mut self, segment: &mut Segment) {
         let ticks = if self.dwell_ms < u32::from(DWELL_TICKS) { 1 } else { DWELL_TICKS };
         self.dwell_ms -= u32::from(ticks);
@@ -263,7 +278,7 @@ impl Exec {
     #[inline(always)]
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
         let fine = below(scaled(line.cruise, FINE_LOG2), line.length);
-        let most = self.prep.begin(&line.steps, fine);
+        self.prep.begin(&line.steps, fine);
         for m in 0..MOTORS {
             if line.steps[m] != 0 {
                 out.target[m] = out.target[m].wrapping_add(line.steps[m].into());
@@ -274,25 +289,22 @@ impl Exec {
         out.running = true;
         let jerk = line.jerk.get();
         self.governor.begin(line.accel.get(), jerk);
-        self.running = Some(Running {
-            left: line.length,
-            cruise: line.cruise,
-            scale: f32::from(most),
-            headroom: 0.0,
-            version,
-            fresh: true,
-            done: false,
-            jerk: some(jerk),
-        });
+        // Field by field: in place. The others are set before they are read.
+        let running = &mut self.running;
+        running.active = true;
+        running.left = line.length;
+        running.cruise = line.cruise;
+        running.version = version;
+        running.fresh = true;
+        running.done = false;
+        running.jerk = some(jerk);
     }
 
     /// Prepares the next stretch of the line being run. In place: copying its state would cost as
     /// much as the mathematics.
     #[inline(never)]
     fn run(&mut self, blocks: &mut BlockSource, out: &mut Snapshot, segment: &mut Segment) -> Step {
-        let Some(running) = &mut self.running else {
-            return Step::Again;
-        };
+        let running = &mut self.running;
         if running.done {
             return self.end(0, false, blocks, segment);
         }
@@ -317,11 +329,11 @@ impl Exec {
         }
         if running.fresh {
             running.fresh = false;
-            running.scale = running.scale * 32768.0 / running.left;
+            running.scale = self.prep.left() as f32 / running.left;
         }
         running.left -= stretch.distance;
         out.left = running.left;
-        let left = (running.left * running.scale) as u32;
+        let left = whole(running.left * running.scale);
         step(self.prep.segment(left, cycles, segment))
     }
 
@@ -336,7 +348,7 @@ impl Exec {
         let some =
             if whole { self.prep.whole(cycles, segment) } else { self.prep.last(cycles, segment) };
         if self.prep.left() == 0 {
-            self.running = None;
+            self.running.active = false;
             blocks.release();
         }
         step(some)
@@ -349,5 +361,6 @@ fn step(segment: bool) -> Step {
 
 /// CPU cycles in `seconds`; at least 1, at most what [`Prep`] takes.
 fn cycles_of(seconds: f32) -> u32 {
-    ((seconds * CYCLES_PER_S + 0.5) as u32).clamp(1, CYCLES_MAX)
+    let cycles = (whole(seconds * HALVES_PER_S) + 1) >> 1;
+    cycles.clamp(1, CYCLES_MAX)
 }

@@ -22,7 +22,7 @@
 //! with one about 5,000.
 
 use super::brake::Brake;
-use super::float::{below, greater, lesser};
+use super::float::{OCTAVE, below, greater, least, lesser, log, scaled, some};
 use super::horizon::kappa;
 pub use super::reach::Ahead;
 use super::state::{Limits, State};
@@ -48,6 +48,14 @@ const JERK_TIME_MIN: f32 = 0.001;
 /// The jerk to put into a block, 0 for none; `accel` is its acceleration. Cost: 500.
 pub fn effective_jerk(jerk: f32, accel: f32) -> f32 {
     if jerk > 0.0 && accel > jerk * JERK_TIME_MIN { jerk } else { 0.0 }
+}
+
+/// Logarithms that are further apart leave no doubt about the product of two numbers.
+const PLAIN: i32 = OCTAVE / 5;
+
+/// Whether two limits are equal, or one velocity is the other. Cost: 15.
+fn same(a: f32, b: f32) -> bool {
+    a.to_bits() == b.to_bits()
 }
 
 /// Velocity and acceleration along the path.
@@ -81,7 +89,7 @@ impl Governor {
     /// A block with these limits begins, mm/s^2 and mm/s^3. If they are others than before, it goes on with
     /// as much of its deceleration as may be ended in time; acceleration ends at once.
     pub fn begin(&mut self, accel: f32, jerk: f32) {
-        if accel == self.limits.accel && jerk == self.limits.jerk {
+        if same(accel, self.limits.accel) && same(jerk, self.limits.jerk) {
             return;
         }
         self.brake = None;
@@ -107,7 +115,7 @@ impl Governor {
     /// The next stretch, of about `seconds`, in a block with `left` mm to go at up to `cruise` mm/s.
     #[inline(never)]
     pub fn stretch(&mut self, left: f32, cruise: f32, ahead: &impl Ahead, seconds: f32) -> Stretch {
-        if self.limits.jerk == 0.0 {
+        if !some(self.limits.jerk) {
             return self.trapezoid(left, cruise, ahead.headroom(), seconds);
         }
         self.smooth(left, cruise, ahead, seconds)
@@ -115,17 +123,20 @@ impl Governor {
 
     fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32, seconds: f32) -> Stretch {
         let v = self.state.velocity;
-        let gain = self.limits.accel * seconds;
         // Rounding may put a stop before the end of the block.
-        let headroom = greater(headroom, 0.0);
+        let headroom = if headroom.is_sign_negative() { 0.0 } else { headroom };
         // Steady over a block that is short enough to be one stretch.
-        if v.to_bits() == cruise.to_bits()
+        if same(v, cruise)
             && below(cruise * cruise, headroom)
             && below(left, cruise * (seconds + seconds))
         {
             return Stretch { seconds: left / v, distance: left, ends: true };
         }
-        if below(v * (seconds + seconds), left) {
+        // Mostly plain: a block that is run through in no more than one.
+        if log(v) + log(seconds + seconds) < log(left) + PLAIN
+            && below(v * (seconds + seconds), left)
+        {
+            let gain = self.limits.accel * seconds;
             let half = 0.5 * seconds;
             let mut next = lesser(v + gain, cruise);
             let mut distance = (v + next) * half;
@@ -150,17 +161,14 @@ impl Governor {
     #[inline(never)]
     fn finish(&mut self, left: f32, cruise: f32, headroom: f32, nominal: f32) -> Stretch {
         let v = self.state.velocity;
-        let gain = 2.0 * self.limits.accel * left;
+        let gain = scaled(self.limits.accel * left, 1);
         let square = v * v + gain;
-        let mut next = sqrt(lesser(square, headroom));
-        if next > cruise {
-            next = cruise;
-        }
+        let next = least(sqrt(least(square, headroom)), cruise);
         self.state.velocity = next;
         let sum = v + next;
         let mut seconds = 2.0 * nominal;
-        if sum * nominal > left {
-            seconds = (left + left) / sum;
+        if log(sum) + log(nominal) > log(left) + PLAIN || below(left, sum * nominal) {
+            seconds = scaled(left, 1) / sum;
         } else if square > 0.0 {
             // From rest to rest or nearly so: there is a peak between.
             let peak = sqrt(0.5 * (square + next * next));

@@ -129,53 +129,60 @@ impl Prep {
     /// The segment that comes before any other, if there is one.
     #[inline(always)]
     pub fn held(&mut self, out: &mut Segment) -> bool {
-        match self.held.take() {
-            Some(segment) => {
-                *out = segment;
-                true
-            }
-            None => false,
-        }
+        // Looked at first: to take nothing costs as much as to take something.
+        self.held.is_some() && self.release(out)
     }
 
-    /// Starts a block, with fine ticks or not. Returns the steps of its dominant motor.
-    pub fn begin(&mut self, steps: &[i16; MOTORS], fine: bool) -> u16 {
+    #[inline(never)]
+    fn release(&mut self, out: &mut Segment) -> bool {
+        if let Some(segment) = self.held.take() {
+            *out = segment;
+        }
+        true
+    }
+
+    /// Starts a block, with fine ticks or not.
+    #[inline(never)]
+    pub fn begin(&mut self, steps: &[i16; MOTORS], fine: bool) {
         self.fine = fine;
-        let mut most = 0;
-        for (minor, &steps) in self.minors.iter_mut().zip(steps) {
-            minor.steps = steps.unsigned_abs();
-            if minor.steps > most {
-                most = minor.steps;
-            }
-        }
-        self.most = most;
-        self.left = u32::from(most) << STEP_LOG2;
         self.shift = u8::MAX;
-        (self.full, self.minor) = (0, 0);
-        if most == 0 {
-            return 0;
-        }
-        let mut moving = 0u8;
+        let (mut most, mut moving, mut full, mut others) = (0, 0, 0, u8::MAX);
         let mut bit = 1;
-        for (m, &way) in steps.iter().enumerate() {
-            if way != 0 {
-                moving += 1;
-                if (way < 0) != (self.backwards & bit != 0) {
-                    self.backwards ^= bit;
-                    self.turned = true;
-                    // It was measured in the old direction.
-                    self.debt[m] = -self.debt[m];
+        for m in 0..MOTORS {
+            let signed = steps[m];
+            if signed != 0 {
+                others = others.wrapping_add(1);
+                moving |= bit;
+                let steps = signed.unsigned_abs();
+                self.minors[m].steps = steps;
+                if steps > most {
+                    (most, full) = (steps, 0);
                 }
-                if self.minors[m].steps == most {
-                    self.full |= bit;
-                } else {
-                    self.minor |= bit;
+                if steps == most {
+                    full |= bit;
+                }
+                let backwards = if signed < 0 { bit } else { 0 };
+                if backwards != self.backwards & bit {
+                    self.turn(m, bit);
                 }
             }
             bit <<= 1;
         }
-        self.others = moving - 1;
-        most
+        self.most = most;
+        self.left = u32::from(most) << STEP_LOG2;
+        self.full = full;
+        self.minor = moving & !full;
+        // Without motors there are no ticks to pace.
+        self.others = if moving == 0 { 0 } else { others };
+    }
+
+    /// Motor `m` turns round.
+    #[inline(never)]
+    fn turn(&mut self, m: usize, bit: u8) {
+        self.backwards ^= bit;
+        self.turned = true;
+        // It was measured in the old direction.
+        self.debt[m] = -self.debt[m];
     }
 
     /// Phase units of the dominant motor in the block that no segment has covered yet.
@@ -244,6 +251,7 @@ impl Prep {
         out.period = period;
         out.backwards = self.backwards;
         out.settle = 0;
+        out.moving = self.full | self.minor;
         let mut bit = 1;
         for m in 0..MOTORS {
             out.increment[m] = if self.full & bit != 0 {
@@ -255,7 +263,7 @@ impl Prep {
             };
             bit <<= 1;
         }
-        out.seal();
+        out.seal(self.full, increment);
         if self.turned {
             self.behind_turn(out);
         }
@@ -376,6 +384,7 @@ impl Prep {
         out.backwards = self.backwards;
         let settles = period >= self.paces().settles;
         out.settle = if settles { SETTLE } else { 0 };
+        out.moving = self.full | self.minor;
         let mut bit = 1;
         for m in 0..MOTORS {
             out.increment[m] = if self.full & bit != 0 {
@@ -390,7 +399,7 @@ impl Prep {
         if self.left == 0 {
             self.settle_debts();
         }
-        out.seal();
+        out.seal(self.full, 1 << shift);
         if self.turned {
             self.behind_turn(out);
         }

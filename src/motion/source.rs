@@ -88,6 +88,12 @@ impl BlockSource {
     pub fn headroom(&self) -> f32 {
         let horizon = self.horizon();
         let key = match horizon.nth(0).and_then(|seq| self.line(seq, Line::sharp_key)) {
+            // Bits tell, mostly: both are above 0.
+            Some(key)
+                if key.to_bits() < horizon.end.to_bits() && !horizon.end.is_sign_negative() =>
+            {
+                key
+            }
             Some(key) => lesser(key, horizon.end),
             None => horizon.end,
         };

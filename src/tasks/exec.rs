@@ -31,13 +31,13 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         let step = links::update(|out| {
             let step = machine.step(&mut blocks, standstill, out, &mut segment);
             if step == Step::Segment {
-                power::segment(&segment, &out.steps);
+                power::segment(segment.moving);
             }
             step
         });
         if step == Step::Segment {
             // There is room: this task alone fills the ring.
-            let _ = segments.push(segment);
+            let _ = segments.push_copy(&segment);
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
             most = if cycles < SHORT { SEGMENTS - 1 } else { LONG_QUEUED };

@@ -8,7 +8,7 @@
 //! exec reads (a priority ceiling). Either way the request is remembered and served right after.
 
 use core::arch::asm;
-use core::cell::Cell;
+use core::cell::{Cell, UnsafeCell};
 use core::future::poll_fn;
 use core::task::{Poll, Waker};
 
@@ -35,13 +35,14 @@ static MISSED: SharedByte = SharedByte::new(0);
 
 struct Context {
     executor: Cell<Option<&'static Executor>>,
-    waker: Cell<Option<Waker>>,
+    /// Of the exec task, the only one; from its first wait on.
+    waker: UnsafeCell<Option<Waker>>,
 }
 
 // SAFETY: written at start-up, with exec closed, and by exec itself.
 unsafe impl Sync for Context {}
 
-static CONTEXT: Context = Context { executor: Cell::new(None), waker: Cell::new(None) };
+static CONTEXT: Context = Context { executor: Cell::new(None), waker: UnsafeCell::new(None) };
 
 /// Asks for exec to run. Any level.
 #[inline(always)]
@@ -100,11 +101,20 @@ pub async fn wait<R>(mut ready: impl FnMut() -> Option<R>) -> R {
     poll_fn(|cx| match ready() {
         Some(value) => Poll::Ready(value),
         None => {
-            CONTEXT.waker.set(Some(cx.waker().clone()));
+            keep(cx.waker());
             Poll::Pending
         }
     })
     .await
+}
+
+/// Keeps the exec task's waker, which is the same each time.
+fn keep(waker: &Waker) {
+    // SAFETY: exec runs, and no reference outlives a call of this or `poll`'s wake.
+    let kept = unsafe { &mut *CONTEXT.waker.get() };
+    if kept.is_none() {
+        *kept = Some(waker.clone());
+    }
 }
 
 /// USART2_UDRE: runs exec, with interrupts on.
@@ -198,8 +208,9 @@ extern "C" fn __vector_52() -> ! {
 
 /// What the interrupt runs.
 extern "C" fn poll() {
-    if let Some(waker) = CONTEXT.waker.take() {
-        waker.wake();
+    // SAFETY: as in `keep`; the task does not run yet.
+    if let Some(waker) = unsafe { &*CONTEXT.waker.get() } {
+        waker.wake_by_ref();
     }
     if let Some(executor) = CONTEXT.executor.get() {
         // SAFETY: the only place that polls it, and it does not nest.
