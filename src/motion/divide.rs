@@ -80,6 +80,44 @@ fn divide(a: u32, b: u16) -> (u16, u16) {
     (low, rest)
 }
 
+/// `a * b`. Cost: 20, where the compiler calls a multiplication of 32 bits for 80.
+#[cfg(target_arch = "avr")]
+#[inline(always)]
+pub fn product(a: u16, b: u16) -> u32 {
+    let (low, high): (u16, u16);
+    // SAFETY: arithmetic on its operands; r0 is scratch, and r1 is 0 again at the end.
+    unsafe {
+        core::arch::asm!(
+            "mul  {a:l}, {b:l}",
+            "movw {low:l}, r0",
+            "mul  {a:h}, {b:h}",
+            "movw {high:l}, r0",
+            "mul  {a:h}, {b:l}",
+            "add  {low:h}, r0",
+            "adc  {high:l}, r1",
+            "clr  r1",
+            "adc  {high:h}, r1",
+            "mul  {a:l}, {b:h}",
+            "add  {low:h}, r0",
+            "adc  {high:l}, r1",
+            "clr  r1",
+            "adc  {high:h}, r1",
+            a = in(reg_pair) a,
+            b = in(reg_pair) b,
+            low = out(reg_pair) low,
+            high = out(reg_pair) high,
+            options(pure, nomem, nostack),
+        );
+    }
+    u32::from(high) << 16 | u32::from(low)
+}
+
+/// `a * b`.
+#[cfg(not(target_arch = "avr"))]
+pub fn product(a: u16, b: u16) -> u32 {
+    u32::from(a) * u32::from(b)
+}
+
 /// The square root, rounded down. Cost: 320.
 #[inline(never)]
 pub fn root(x: u32) -> u16 {

@@ -6,6 +6,7 @@
 //!
 //! Called by the line builder. Units: mm (degrees for rotary axes), s. Costs are AVR cycles.
 
+use super::divide::product;
 use super::dynamics::Dynamics;
 use super::float::{OCTAVE, below, log, scaled, some};
 use crate::math::sqrt;
@@ -61,38 +62,57 @@ fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> f32 {
 /// The axes' velocities change by `(b.unit - a.unit) * velocity`, also where the two paths are
 /// measured differently (linear, rotary, both), so that it is this difference that counts.
 ///
-/// Cost: 400 + 50 for each axis that moves where the corner is plainly no limit, else 800 more; 1,600
+/// Cost: 350 + 50 for each axis that moves where the corner is plainly no limit, else 800 more; 1,600
 /// more for one below `most`.
 #[inline(never)]
 pub fn limit(a: &Heading, b: &Heading, acceleration: f32, most: f32) -> f32 {
-    // |b - a| = 2 sin(angle / 2): precise for small angles, which 1 - cos(angle) is not.
-    let mut sum = 0u32;
-    for (from, to) in a.unit.iter().zip(&b.unit) {
-        let change = to.abs_diff(*from);
-        if change != 0 {
-            // At most 8 in 2^-28: each of the two, linear and rotary, up to 2 long.
-            sum = sum.wrapping_add(u32::from(change) * u32::from(change));
-        }
-    }
+    let sum = turn(&a.unit, &b.unit);
     if sum < STRAIGHT {
+        return f32::MAX;
+    }
+    let same = a.deviation.to_bits() == b.deviation.to_bits();
+    // Far below what limits: 4 product > sum most^2, with an octave for the logarithms' error.
+    let plain = |sum: i32| {
+        let limit = log(a.deviation) + log(acceleration) + 2 * OCTAVE;
+        sum + 2 * log(most) + OCTAVE < limit
+    };
+    if same && sum < 1 << 16 && plain(-12 * OCTAVE) {
         return f32::MAX;
     }
     // The square of twice the sine.
     let sum = scaled(sum as f32, -28);
-    if a.deviation.to_bits() == b.deviation.to_bits() && below(sum, 1.44) {
-        // Far below what limits: 4 product > sum most^2, with an octave for the logarithms' error.
-        let limit = log(a.deviation) + log(acceleration) + 2 * OCTAVE;
-        if log(sum) + 2 * log(most) + OCTAVE < limit {
-            return f32::MAX;
+    if same && below(sum, 1.44) && plain(log(sum)) {
+        return f32::MAX;
+    }
+    let deviation = if same { a.deviation } else { mean(a.deviation, b.deviation) };
+    arc(scaled(sum, -2), deviation * acceleration, most)
+}
+
+/// The square of the change of direction, in 2^-28.
+#[inline(never)]
+fn turn(a: &PerAxis<i16>, b: &PerAxis<i16>) -> u32 {
+    // |b - a| = 2 sin(angle / 2): precise for small angles, which 1 - cos(angle) is not.
+    let mut sum = 0u32;
+    for (from, to) in a.iter().zip(b) {
+        let change = to.abs_diff(*from);
+        if change != 0 {
+            // At most 8 in 2^-28: each of the two, linear and rotary, up to 2 long.
+            sum = sum.wrapping_add(product(change, change));
         }
     }
-    let sine = scaled(sum, -2);
-    let deviation = if a.deviation.to_bits() == b.deviation.to_bits() {
-        a.deviation
-    } else {
-        0.5 * (a.deviation + b.deviation)
-    };
-    let product = deviation * acceleration;
+    sum
+}
+
+/// Not inlined: or it would be worked out where it is not asked for.
+#[inline(never)]
+fn mean(a: f32, b: f32) -> f32 {
+    0.5 * (a + b)
+}
+
+/// The velocity on the arc, from the square of the sine of half the angle and the product of deviation
+/// and acceleration.
+#[inline(never)]
+fn arc(sine: f32, product: f32, most: f32) -> f32 {
     // Up to 75 degrees the factor of the cosine below is above 1.
     if below(sine, 0.36) && below(sine * most * most, product) {
         return f32::MAX;

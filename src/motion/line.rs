@@ -12,7 +12,7 @@
 //! possible: then they are those of the slowest axis that moves, whatever the direction.
 
 use super::block::{Block, Body, Line as Move};
-use super::divide::{quotient, root};
+use super::divide::{product, quotient, root};
 use super::dynamics::{Axis, Dynamics};
 use super::exec::BLOCK_S_MIN;
 use super::float::{OCTAVE, below, least, log, scaled, some};
@@ -64,8 +64,35 @@ pub struct Builder {
     heading: Heading,
     /// The velocity limit of the last move; 0 if the machine stands still after it.
     cruise: f32,
+    /// The feed of the last move.
+    feed: LastFeed,
     /// Motors at the end of the last block.
     motors: [Motor; MOTORS],
+}
+
+/// A feed and what it comes to: mostly that of the move before.
+#[derive(Clone, Copy, Debug, Default)]
+struct LastFeed {
+    /// mm/min.
+    feed: f32,
+    /// mm/s.
+    velocity: f32,
+}
+
+impl LastFeed {
+    /// `feed`, mm/min, in mm/s, times `stretch` if there is one. Cost: 30; 300 for another feed.
+    fn per_second(&mut self, feed: f32, stretch: f32) -> f32 {
+        if self.feed.to_bits() != feed.to_bits() {
+            *self = Self { feed, velocity: times(feed, 1.0 / 60.0) };
+        }
+        if some(stretch) { times(self.velocity, stretch) } else { self.velocity }
+    }
+}
+
+/// Not inlined: or it would be worked out where it is not asked for.
+#[inline(never)]
+fn times(a: f32, b: f32) -> f32 {
+    a * b
 }
 
 impl Builder {
@@ -92,7 +119,7 @@ impl Builder {
             self.put_back(line.from, dynamics, machine);
             return Built::Parts(parts);
         }
-        path.limit(line.feed, dynamics);
+        path.limit(line.feed, &mut self.feed, dynamics);
         path.limit_change(dynamics);
         path.limit_steps(&dynamics.rates);
         path.heading.deviation = junction::deviation(&path.heading.unit, dynamics);
@@ -224,7 +251,7 @@ impl Path {
         self.length = if shift > 0 {
             length_of(&self.travel)
         } else {
-            scaled(f32::from(length) * 1e-4, shift)
+            composed(length, 127 + 15 + i16::from(shift)) * 1e-4
         };
         Way::Near
     }
@@ -300,10 +327,9 @@ impl Path {
 
     /// Applies the feed and the velocity limit of every axis that moves.
     #[inline(never)]
-    fn limit(&mut self, feed: Option<Feed>, dynamics: &Dynamics) {
+    fn limit(&mut self, feed: Option<Feed>, last: &mut LastFeed, dynamics: &Dynamics) {
         self.cruise = match feed {
-            Some(Feed::PerMinute(feed)) if some(self.stretch) => feed * (1.0 / 60.0) * self.stretch,
-            Some(Feed::PerMinute(feed)) => feed * (1.0 / 60.0),
+            Some(Feed::PerMinute(feed)) => last.per_second(feed, self.stretch),
             Some(Feed::Minutes(time)) if some(time) => self.length / (time * 60.0),
             _ => CRUISE_MOST,
         };
@@ -416,7 +442,9 @@ fn norm(vector: &[i16]) -> u16 {
     let mut sum = 0u32;
     for &term in vector {
         let size = term.unsigned_abs();
-        sum += u32::from(size) * u32::from(size);
+        if size != 0 {
+            sum += product(size, size);
+        }
     }
     root(sum)
 }
@@ -463,8 +491,15 @@ fn over(limit: Short, u: u16) -> f32 {
     let below = (u >> 8) as u16 | 0x8000;
     let quotient = quotient(above, below);
     let power = (limit >> 23) as i16 - (u >> 23) as i16 + 127 + 14;
+    composed(quotient, power)
+}
+
+/// A float from its first 16 bits, the top one of which may be 0, but not the next one as well, and its
+/// exponent if it is not. Cost: 30.
+#[inline(never)]
+fn composed(bits: u16, power: i16) -> f32 {
     let (mantissa, power) =
-        if quotient >= 0x8000 { (quotient << 1, power) } else { (quotient << 2, power - 1) };
+        if bits >= 0x8000 { (bits << 1, power) } else { (bits << 2, power - 1) };
     f32::from_bits(u32::from(power as u16) << 23 | u32::from(mantissa) << 7)
 }
 

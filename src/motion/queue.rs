@@ -5,6 +5,7 @@
 //! full the planner waits ([`BlockQueue::free`]).
 
 use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
 
 use super::block::{Block, Body, Line};
 use super::float::{OCTAVE, greater, lesser, log, some};
@@ -101,7 +102,15 @@ struct Last {
 impl Last {
     /// Whether `line` brakes otherwise, so that keys before and after it do not compare.
     fn jerk_limits_change(&self, line: &Line, kappa: f32) -> bool {
-        self.limits != (line.accel, line.jerk) && (self.kappa > 0.0 || kappa > 0.0)
+        self.limits != (line.accel, line.jerk) && (some(self.kappa) || some(kappa))
+    }
+
+    /// Whether `line` has the same velocity, at its start as well.
+    fn as_fast(&self, line: &Line, entry: f32) -> bool {
+        let cruise = line.cruise.to_bits();
+        entry.to_bits() == cruise
+            && self.cruise.to_bits() == cruise
+            && self.high.to_bits() == cruise
     }
 }
 
@@ -127,7 +136,10 @@ impl BlockQueue {
     /// no room.
     pub fn push(&mut self, block: Block) -> bool {
         self.last = None;
-        self.put(block, None, |_| {})
+        let fill = |slot: &mut MaybeUninit<Block>| {
+            slot.write(block);
+        };
+        self.put(fill, None, |_| {})
     }
 
     /// Queues a move that may be entered at `entry`, mm/s; fills in what depends on the queue. False,
@@ -146,24 +158,32 @@ impl BlockQueue {
         let key = if self.goes_on(line, entry) { None } else { self.corner(line, entry) };
         self.end = line.start + line.gain();
         let end = self.end;
-        self.put(Block { body: Body::Line(*line), line: number }, key, |horizon| horizon.end = end)
+        let fill = |slot: &mut MaybeUninit<Block>| {
+            slot.write(Block { body: Body::Line(*line), line: number });
+        };
+        self.put(fill, key, |horizon| horizon.end = end)
     }
 
     /// Whether the line is as fast as the one before, and the corner between them no limit.
     fn goes_on(&self, line: &Line, entry: f32) -> bool {
-        let cruise = line.cruise.to_bits();
-        self.last.as_ref().is_some_and(|last| {
-            entry.to_bits() == cruise
-                && last.cruise.to_bits() == cruise
-                && last.high.to_bits() == cruise
-                && last.limits == (line.accel, line.jerk)
-        })
+        self.last
+            .as_ref()
+            .is_some_and(|last| last.limits == (line.accel, line.jerk) && last.as_fast(line, entry))
     }
 
     /// The key of a line that does not simply go on, if it needs one.
     #[inline(never)]
     fn corner(&mut self, line: &mut Line, entry: f32) -> Option<(f32, u8)> {
-        let kappa = kappa(line.accel.get(), line.jerk.get());
+        let limits = (line.accel, line.jerk);
+        let kappa =
+            if line.jerk == Short::ZERO { 0.0 } else { kappa(line.accel.get(), line.jerk.get()) };
+        if let Some(last) = &mut self.last {
+            // Only the acceleration changes.
+            if !last.jerk_limits_change(line, kappa) && last.as_fast(line, entry) {
+                (last.kappa, last.limits) = (kappa, limits);
+                return None;
+            }
+        }
         let entry = self.entry(line, entry, kappa);
         line.entry = Short::new(entry);
         let mut key = None;
@@ -183,7 +203,6 @@ impl BlockQueue {
             }
             None => key = Some((line.key(), 0)),
         }
-        let limits = (line.accel, line.jerk);
         self.last = Some(Last { cruise: line.cruise, high, kappa, limits });
         key
     }
@@ -234,16 +253,15 @@ impl BlockQueue {
         self.end = end;
     }
 
-    /// Puts a block into the ring and what follows from it into the horizon, all at once for exec.
+    /// Puts a block, which `fill` writes, into the ring and what follows from it into the horizon, all at once for exec.
     fn put(
         &mut self,
-        block: Block,
+        fill: impl FnOnce(&mut MaybeUninit<Block>),
         key: Option<(f32, u8)>,
         end: impl FnOnce(&mut Horizon),
     ) -> bool {
-        if self.ring.free() == 0 {
-            return false;
-        }
+        let Some(slot) = self.ring.vacant().first_mut() else { return false };
+        fill(slot);
         let seq = self.newest.wrapping_add(1) & SEQ;
         exec::lock(|ceiling| {
             self.store.with_horizon(ceiling, |horizon| {
@@ -257,8 +275,8 @@ impl BlockQueue {
                 end(horizon);
                 horizon.version = horizon.version.wrapping_add(1);
             });
-            // There is room.
-            let _ = self.ring.push(block);
+            // SAFETY: the first vacant slot has been filled.
+            unsafe { self.ring.publish(1) };
         });
         self.newest = seq;
         true

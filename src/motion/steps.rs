@@ -4,7 +4,7 @@
 //! rounded to the nearest step, half away from zero: what [`StepRatio::steps`] says. A short move starts
 //! from the position before and what rounding left there, which gives the same with small numbers.
 
-use super::divide::quotient_remainder;
+use super::divide::{product, quotient_remainder};
 use crate::config::StepRatio;
 use crate::units::Length;
 
@@ -54,7 +54,7 @@ impl Motor {
         let back = travel < 0;
         let half = den / 2;
         let more = (den + half).wrapping_add_signed(if back { -rest } else { rest });
-        let sum = u32::from(way as u16) * u32::from(num) + u32::from(more);
+        let sum = product(way as u16, num) + u32::from(more);
         if (sum >> 16) as u16 >= den {
             return false;
         }

@@ -47,7 +47,7 @@ fn highest(bed: &Bed, motors: usize) -> Result<Figure> {
             None => bad = middle,
         }
     }
-    Ok(held.floor().into())
+    Ok(held.round().into())
 }
 
 /// The lowest mean rate of the motors in a move at `rate`, if that was held.

@@ -20,7 +20,7 @@ pub const ROWS: [Row; 18] = [
         better: Higher,
         peers: ["42,100", "50,000", "43,500"],
         target: Some(100_000.0),
-        floor: Some(39_900.0),
+        floor: Some(100_000.0),
         measure: rates::one,
     },
     Row {
@@ -31,7 +31,7 @@ pub const ROWS: [Row; 18] = [
         better: Higher,
         peers: ["33,300", "50,000", "32,000, 4 % slow"],
         target: Some(66_000.0),
-        floor: Some(39_900.0),
+        floor: Some(66_600.0),
         measure: rates::three,
     },
     Row {
@@ -42,7 +42,7 @@ pub const ROWS: [Row; 18] = [
         better: Higher,
         peers: NONE,
         target: Some(50_000.0),
-        floor: Some(39_900.0),
+        floor: Some(50_000.0),
         measure: rates::four,
     },
     Row {
@@ -53,7 +53,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: ["2.0 us", "0.1 us", "0.5 us"],
         target: Some(2.0),
-        floor: Some(100.0),
+        floor: Some(2.0),
         measure: jitter::quiet,
     },
     Row {
@@ -64,7 +64,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: ["11.0 to 13.9 us", "0.1 us", "11.1 us"],
         target: Some(2.0),
-        floor: Some(106.0),
+        floor: Some(2.0),
         measure: jitter::busy,
     },
     Row {
@@ -75,7 +75,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: ["52", "-", "63"],
         target: Some(13.0),
-        floor: Some(33.0),
+        floor: Some(13.0),
         measure: jitter::minor,
     },
     Row {
@@ -86,7 +86,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: ["3.18", "-", "7.97"],
         target: Some(1.6),
-        floor: Some(8.2),
+        floor: Some(1.8),
         measure: spirals::tenth,
     },
     Row {
@@ -97,7 +97,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: ["1.97", "-", "5.80"],
         target: None,
-        floor: Some(5.1),
+        floor: Some(1.05),
         measure: spirals::fifth,
     },
     Row {
@@ -108,7 +108,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: ["1.01", "-", "3.75"],
         target: Some(1.01),
-        floor: Some(1.9),
+        floor: Some(1.01),
         measure: spirals::half,
     },
     Row {
@@ -119,7 +119,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: NONE,
         target: Some(1.2),
-        floor: Some(8.2),
+        floor: Some(1.78),
         measure: spirals::tenth_fast,
     },
     Row {
@@ -130,7 +130,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: NONE,
         target: None,
-        floor: Some(5.1),
+        floor: Some(1.05),
         measure: spirals::fifth_fast,
     },
     Row {
@@ -141,7 +141,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: NONE,
         target: Some(1.01),
-        floor: Some(1.9),
+        floor: Some(1.01),
         measure: spirals::half_fast,
     },
     Row {
@@ -152,7 +152,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: NONE,
         target: None,
-        floor: Some(31.0),
+        floor: Some(8.2),
         measure: spirals::tenth_jerk,
     },
     Row {
@@ -163,7 +163,7 @@ pub const ROWS: [Row; 18] = [
         better: Higher,
         peers: ["291 at 115,200", "-", "115 at 115,200"],
         target: Some(1_000.0),
-        floor: Some(118.0),
+        floor: Some(390.0),
         measure: costs::lines,
     },
     Row {
@@ -174,7 +174,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: ["8, 116 in ISRs", "-", "186, 622 in ISRs"],
         target: Some(64.0),
-        floor: Some(60.0),
+        floor: Some(32.0),
         measure: costs::interrupts_off,
     },
     Row {
@@ -185,7 +185,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: NONE,
         target: Some(8_000.0),
-        floor: Some(22_000.0),
+        floor: Some(8_000.0),
         measure: costs::segment,
     },
     Row {
@@ -196,7 +196,7 @@ pub const ROWS: [Row; 18] = [
         better: Lower,
         peers: NONE,
         target: Some(64_000.0),
-        floor: Some(205_000.0),
+        floor: Some(8_000.0),
         measure: costs::replan,
     },
     Row {
