@@ -1,0 +1,215 @@
+//! What limits a straight move: feed, velocities, acceleration and jerk of its axes, step rates of its motors.
+//!
+//! Called by the line builder. Units: mm, s.
+
+use super::divide::quotient;
+use super::dynamics::{Axis, Dynamics};
+use super::exec::BLOCK_S_MIN;
+use super::float::{OCTAVE, below, least, log, scaled, some};
+use super::governor::{ACCEL_MOST, effective_jerk};
+use super::junction::ONE;
+use super::path::{Path, composed};
+use super::short::Short;
+use crate::boards::MOTORS;
+use crate::gcode::command::Feed;
+use crate::math::sqrt;
+
+/// Velocities beyond all machines, mm/s.
+const CRUISE_MOST: f32 = 1e5;
+/// See [`CRUISE_MOST`].
+const CRUISE_LEAST: f32 = 1e-6;
+
+/// A feed and what it comes to: mostly that of the move before.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LastFeed {
+    /// mm/min.
+    feed: f32,
+    /// mm/s.
+    velocity: f32,
+}
+
+impl LastFeed {
+    /// `feed`, mm/min, in mm/s, times `stretch` if there is one. Cost: 30; 300 for another feed.
+    fn per_second(&mut self, feed: f32, stretch: f32) -> f32 {
+        if self.feed.to_bits() != feed.to_bits() {
+            *self = Self { feed, velocity: times(feed, 1.0 / 60.0) };
+        }
+        if some(stretch) { times(self.velocity, stretch) } else { self.velocity }
+    }
+}
+
+/// Not inlined: or it would be worked out where it is not asked for.
+#[inline(never)]
+fn times(a: f32, b: f32) -> f32 {
+    a * b
+}
+
+impl Path {
+    /// The axes that move, with the size of their part of the heading, or a little more: never less
+    /// than it is. Ends with the last that moves.
+    #[inline(always)]
+    fn axes<'a>(&'a self, dynamics: &'a Dynamics) -> impl Iterator<Item = (u16, &'a Axis)> {
+        let mut left = self.moved;
+        let mut all = self.heading.unit.iter().zip(&dynamics.axes);
+        core::iter::from_fn(move || {
+            while left != 0 {
+                let moves = left & 1 != 0;
+                left >>= 1;
+                let (u, axis) = all.next()?;
+                if moves {
+                    return Some(((u.unsigned_abs() + 2).min(ONE as u16), axis));
+                }
+            }
+            None
+        })
+    }
+
+    /// Applies the feed and the velocity limit of every axis that moves.
+    #[inline(never)]
+    pub(super) fn limit(&mut self, feed: Option<Feed>, last: &mut LastFeed, dynamics: &Dynamics) {
+        self.cruise = match feed {
+            Some(Feed::PerMinute(feed)) => last.per_second(feed, self.stretch),
+            Some(Feed::Minutes(time)) if some(time) => self.length / (time * 60.0),
+            _ => CRUISE_MOST,
+        };
+        let mut cruise = self.cruise;
+        for (u, axis) in self.axes(dynamics) {
+            let velocity = if feed.is_some() { axis.feed } else { axis.velocity };
+            // Most axes are slower than the path.
+            if some(velocity) && below(velocity, cruise) {
+                let u = float(u);
+                if below(velocity, u * cruise) {
+                    cruise = velocity / u;
+                }
+            }
+        }
+        // Within what no division goes wrong with.
+        self.cruise =
+            if below(cruise, CRUISE_LEAST) { CRUISE_LEAST } else { least(cruise, CRUISE_MOST) };
+    }
+
+    /// Acceleration and jerk.
+    #[inline(never)]
+    pub(super) fn limit_change(&mut self, dynamics: &Dynamics) {
+        let mut slowest = Slowest::default();
+        for (u, axis) in self.axes(dynamics) {
+            slowest.look(u, axis);
+        }
+        let jerk = slowest.jerk.get();
+        let least = slowest.least.get();
+        if some(least) {
+            // Plainly of no effect if it allows the acceleration within 2^-11 s.
+            let plain = log(least) + 11 * OCTAVE < log(jerk);
+            let jerk = if !some(jerk) || plain { 0.0 } else { effective_jerk(jerk, least) };
+            let accel = if some(jerk) { least } else { over(slowest.accel, slowest.unit) };
+            self.accel = Short::new(least_of(accel));
+            self.jerk = Short::new(jerk);
+        } else if some(jerk) {
+            // What a ramp to full speed comes to, so that the jerk alone limits it.
+            let accel = least_of(sqrt(jerk * power_of_two_above(self.cruise)));
+            self.accel = Short::new(accel);
+            self.jerk = Short::new(effective_jerk(jerk, accel));
+        } else {
+            self.accel = Short::new(ACCEL_MOST);
+        }
+    }
+
+    /// Keeps motors within the rate that so many can have together, and a block with steps long
+    /// enough for exec.
+    #[inline(never)]
+    pub(super) fn limit_steps(&mut self, rates: &[f32; MOTORS]) {
+        if self.moving == 0 {
+            return;
+        }
+        let rate = rates[usize::from(self.moving) - 1];
+        let most = f32::from(self.most);
+        // Two octaves: plainly below the limit, whatever the logarithms' error.
+        if log(self.cruise) + log(most) + 2 * OCTAVE > log(rate) + log(self.length) {
+            let way = rate * self.length;
+            if below(way, self.cruise * most) {
+                self.cruise = way / most;
+            }
+        }
+        if below(self.length, self.cruise * BLOCK_S_MIN) {
+            self.cruise = self.length * (1.0 / BLOCK_S_MIN);
+        }
+    }
+}
+
+fn least_of(accel: f32) -> f32 {
+    least(accel, ACCEL_MOST)
+}
+
+/// A limit along the path: that of an axis, not 0, over its part `u` of the heading, not 0. As exact as
+/// a [`Short`]. Cost: 350, where a division of floats takes 700.
+#[inline(never)]
+fn over(limit: Short, u: u16) -> f32 {
+    let (limit, u) = (limit.get().to_bits(), f32::from(u).to_bits());
+    // Their mantissas, the first of 9 bits, the other of 16.
+    let above = u32::from((limit >> 15) as u16 & 0xFF | 0x100) << 22;
+    let below = (u >> 8) as u16 | 0x8000;
+    let quotient = quotient(above, below);
+    let power = (limit >> 23) as i16 - (u >> 23) as i16 + 127 + 14;
+    composed(quotient, power)
+}
+
+/// A part of a heading as a float.
+fn float(u: u16) -> f32 {
+    scaled(f32::from(u), -14)
+}
+
+/// The axis that limits the acceleration, and the least limits of all axes.
+#[derive(Default)]
+struct Slowest {
+    /// Limit and unit of the axis that limits most.
+    accel: Short,
+    unit: u16,
+    least: Short,
+    jerk: Short,
+}
+
+impl Slowest {
+    fn look(&mut self, u: u16, axis: &Axis) {
+        if axis.accel != Short::ZERO {
+            if self.least == Short::ZERO || axis.accel < self.least {
+                self.least = axis.accel;
+            }
+            let slower = if self.accel == Short::ZERO {
+                true
+            } else if axis.accel == self.accel {
+                self.unit < u
+            } else {
+                below(axis.accel.get() * f32::from(self.unit), self.accel.get() * f32::from(u))
+            };
+            if slower {
+                self.accel = axis.accel;
+                self.unit = u;
+            }
+        }
+        if axis.jerk != Short::ZERO && (self.jerk == Short::ZERO || axis.jerk < self.jerk) {
+            self.jerk = axis.jerk;
+        }
+    }
+}
+
+/// The power of two that is not below `x`, as blocks of nearly the same velocity are to have the same
+/// limits. Cost: 20.
+fn power_of_two_above(x: f32) -> f32 {
+    let bits = x.to_bits();
+    f32::from_bits((bits + 0x007F_FFFF) & 0xFF80_0000)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn over_is_a_division(limit in 1e-3f32..1e7, u in 1..=ONE as u16) {
+            let limit = Short::new(limit);
+            let exact = limit.get() / float(u);
+            prop_assert_eq!(Short::new(over(limit, u)), Short::new(exact));
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! The way of a straight move: how long it is, and in which direction.
+//!
+//! Called by the line builder. In integers of 15 bits where these are exact enough, a third of the cycles of
+//! floats: the length of a long move, which decides how evenly its steps come, is a float's.
+//!
+//! Units: those of [`Length`] on the way in, mm (or degrees) on the way out.
+
+use super::divide::{product, quotient, root};
+use super::float::below;
+use super::junction::{Heading, ONE};
+use super::short::Short;
+use crate::math::sqrt;
+use crate::units::{FIRST_ROTARY, Length, PerAxis};
+
+/// Whether there is a way.
+pub(super) enum Way {
+    None,
+    Near,
+    /// More than [`Length`] holds.
+    Far,
+}
+
+/// The way from here to there, and what limits it. Filled in place: to move it costs as much as a
+/// multiplication of floats.
+#[derive(Default)]
+pub(super) struct Path {
+    /// Travel of each axis, in units of [`Length`].
+    pub(super) travel: PerAxis<i32>,
+    /// mm.
+    pub(super) length: f32,
+    /// Travel of each axis for a unit of length.
+    pub(super) heading: Heading,
+    /// How much longer the way of the rotary axes is than that of the linear ones, if it is; else 0.
+    pub(super) stretch: f32,
+    /// The axes that move: a bit for each, the first axis lowest.
+    pub(super) moved: u8,
+    /// Steps of the motor that makes most, and how many motors make any.
+    pub(super) most: u16,
+    pub(super) moving: u8,
+    pub(super) cruise: f32,
+    pub(super) accel: Short,
+    pub(super) jerk: Short,
+}
+
+impl Path {
+    /// Length and direction. 0.01 % exact, for a single axis exact.
+    ///
+    /// The length is that of the linear axes, or of the rotary ones (degrees) if these have the longer
+    /// way; the feed, which is that of the linear axes where they move, is more by as much.
+    #[inline(never)]
+    pub(super) fn measure(&mut self, from: &PerAxis<Length>, to: &PerAxis<Length>) -> Way {
+        let mut all = 0u32;
+        let mut bit = 1u8;
+        for ((travel, from), to) in self.travel.iter_mut().zip(from).zip(to) {
+            if from != to {
+                let Some(way) = to.0.checked_sub(from.0) else {
+                    return Way::Far;
+                };
+                *travel = way;
+                all |= way.unsigned_abs();
+                self.moved |= bit;
+            }
+            bit <<= 1;
+        }
+        if self.moved & self.moved.wrapping_sub(1) == 0 {
+            return self.measure_axis(all);
+        }
+        let shift = normalize(&mut self.heading.unit, &self.travel, all);
+        let (linear, rotary) = self.heading.unit.split_at(FIRST_ROTARY);
+        let mut length = norm(linear);
+        if self.moved >> FIRST_ROTARY != 0 {
+            let turn = norm(rotary);
+            if turn > length {
+                length = turn;
+                if self.moved & ((1 << FIRST_ROTARY) - 1) != 0 {
+                    self.stretch = stretch(&self.travel);
+                }
+            }
+        }
+        for u in &mut self.heading.unit {
+            if *u != 0 {
+                *u = share(*u, length);
+            }
+        }
+        // Long moves have the time to be measured exactly, and their steps come evenly.
+        self.length = if shift > 0 {
+            length_of(&self.travel)
+        } else {
+            composed(length, 127 + 15 + i16::from(shift)) * 1e-4
+        };
+        Way::Near
+    }
+
+    /// The same for a move of one axis, or of none.
+    #[inline(never)]
+    fn measure_axis(&mut self, way: u32) -> Way {
+        if self.moved == 0 {
+            return Way::None;
+        }
+        for (unit, &way) in self.heading.unit.iter_mut().zip(&self.travel) {
+            if way != 0 {
+                *unit = if way < 0 { -ONE } else { ONE };
+            }
+        }
+        self.length = way as f32 * 1e-4;
+        Way::Near
+    }
+}
+
+/// The travel in 15 bits and a sign, and the power of two that takes it back. `bits` is the union of
+/// the sizes.
+#[inline(never)]
+fn normalize(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, bits: u32) -> i8 {
+    const MOST: u32 = 1 << 14;
+    let mut shift = 0i8;
+    if bits < 2 * MOST {
+        // All 16 bits wide.
+        let mut bits = bits as u16;
+        while bits < MOST as u16 {
+            bits <<= 1;
+            shift += 1;
+        }
+        for (unit, &way) in unit.iter_mut().zip(travel) {
+            let mut way = way as i16;
+            if way != 0 {
+                for _ in 0..shift {
+                    way <<= 1;
+                }
+            }
+            *unit = way;
+        }
+        return -shift;
+    }
+    let mut bits = bits;
+    while bits >= 2 * MOST {
+        bits >>= 1;
+        shift += 1;
+    }
+    for (unit, &way) in unit.iter_mut().zip(travel) {
+        *unit = if way == 0 { 0 } else { (way >> shift) as i16 };
+    }
+    shift
+}
+
+/// The length of a vector.
+#[inline(never)]
+fn norm(vector: &[i16]) -> u16 {
+    let mut sum = 0u32;
+    for &term in vector {
+        let size = term.unsigned_abs();
+        if size != 0 {
+            sum += product(size, size);
+        }
+    }
+    root(sum)
+}
+
+/// The length of a move, mm: that of the linear axes or of the rotary ones, whichever is longer.
+#[inline(never)]
+fn length_of(travel: &PerAxis<i32>) -> f32 {
+    let (linear, rotary) = travel.split_at(FIRST_ROTARY);
+    let (linear, rotary) = (exact_norm(linear), exact_norm(rotary));
+    1e-4 * if below(linear, rotary) { rotary } else { linear }
+}
+
+/// How much longer the way of the rotary axes is than that of the linear ones.
+#[inline(never)]
+fn stretch(travel: &PerAxis<i32>) -> f32 {
+    let (linear, rotary) = travel.split_at(FIRST_ROTARY);
+    exact_norm(rotary) / exact_norm(linear)
+}
+
+#[inline(never)]
+fn exact_norm(travel: &[i32]) -> f32 {
+    let mut sum = 0.0;
+    for &way in travel {
+        sum += way as f32 * way as f32;
+    }
+    sqrt(sum)
+}
+
+/// `part / whole` in the units of a heading; no more than [`ONE`].
+#[inline(never)]
+fn share(part: i16, whole: u16) -> i16 {
+    let size = part.unsigned_abs();
+    let share = if size >= whole { ONE } else { quotient(u32::from(size) << 14, whole) as i16 };
+    if part < 0 { -share } else { share }
+}
+
+/// A float from its first 16 bits, the top one of which may be 0, but not the next one as well, and its
+/// exponent if it is not. Cost: 30.
+#[inline(never)]
+pub(super) fn composed(bits: u16, power: i16) -> f32 {
+    let (mantissa, power) =
+        if bits >= 0x8000 { (bits << 1, power) } else { (bits << 2, power - 1) };
+    f32::from_bits(u32::from(power as u16) << 23 | u32::from(mantissa) << 7)
+}
