@@ -13,7 +13,7 @@
 //! that is less than `J t^2` away (with t the time of a stretch) is gone to at once, as is the end of a move
 //! that is shorter than `2 J t^3`. Cost on AVR: about 5,000 cycles.
 
-use super::float::{greater, lesser};
+use super::float::{greater, lesser, some};
 use super::governor::{Governor, Stretch};
 use super::reach::{Ahead, NONE, Reach};
 use super::state::State;
@@ -47,6 +47,9 @@ impl Governor {
         ahead: &impl Ahead,
         nominal: f32,
     ) -> Stretch {
+        if let Some(stretch) = self.steady(left, cruise, nominal) {
+            return stretch;
+        }
         if self.brake.is_none() || self.look {
             self.look = false;
             if let Some(stretch) = self.go(left, cruise, ahead, nominal) {
@@ -61,6 +64,21 @@ impl Governor {
             return self.brake(left, ahead, nominal);
         }
         self.creep(left, cruise, nominal)
+    }
+
+    /// A stretch at the feed, if the machine has it and could still stop within the block: whatever is
+    /// ahead. Cost: 800, of a long move.
+    #[inline(never)]
+    fn steady(&self, left: f32, cruise: f32, nominal: f32) -> Option<Stretch> {
+        let State { velocity, alpha } = self.state;
+        if velocity.to_bits() != cruise.to_bits() || some(alpha) || self.brake.is_some() {
+            return None;
+        }
+        let distance = velocity * nominal;
+        let rest = left - distance;
+        let top = velocity + self.limits.kappa;
+        let enough = rest > distance && top * top < 2.0 * self.limits.accel * rest;
+        enough.then_some(Stretch { seconds: nominal, distance, ends: false })
     }
 
     /// A stretch without a brake, if that is safe.
