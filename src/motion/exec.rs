@@ -113,6 +113,8 @@ pub enum Program {
 struct Running {
     /// There is one.
     active: bool,
+    /// It takes long enough for fine ticks.
+    long: bool,
     /// Way to go, mm.
     left: f32,
     /// Velocity limit, mm/s.
@@ -159,6 +161,7 @@ impl Exec {
     pub const fn new() -> Self {
         let running = Running {
             active: false,
+            long: false,
             left: 0.0,
             cruise: 0.0,
             scale: 0.0,
@@ -277,8 +280,8 @@ impl Exec {
 
     #[inline(always)]
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
-        let fine = below(scaled(line.cruise, FINE_LOG2), line.length);
-        self.prep.begin(&line.steps, fine);
+        let long = below(scaled(line.cruise, FINE_LOG2), line.length);
+        self.prep.begin(&line.steps);
         for m in 0..MOTORS {
             if line.steps[m] != 0 {
                 out.target[m] = out.target[m].wrapping_add(line.steps[m].into());
@@ -292,6 +295,7 @@ impl Exec {
         // Field by field: in place. The others are set before they are read.
         let running = &mut self.running;
         running.active = true;
+        running.long = long;
         running.left = line.length;
         running.cruise = line.cruise;
         running.version = version;
@@ -334,6 +338,10 @@ impl Exec {
         running.left -= stretch.distance;
         out.left = running.left;
         let left = whole(running.left * running.scale);
+        // The mathematics of a ramp under a jerk limit leaves no time for fine ticks.
+        let steady =
+            !running.jerk || self.governor.velocity().to_bits() == running.cruise.to_bits();
+        self.prep.refine(running.long && steady);
         step(self.prep.segment(left, cycles, segment))
     }
 

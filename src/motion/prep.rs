@@ -141,10 +141,15 @@ impl Prep {
         true
     }
 
-    /// Starts a block, with fine ticks or not.
-    #[inline(never)]
-    pub fn begin(&mut self, steps: &[i16; MOTORS], fine: bool) {
+    /// Whether ticks are to be as fine as can be, from now on.
+    #[inline(always)]
+    pub fn refine(&mut self, fine: bool) {
         self.fine = fine;
+    }
+
+    /// Starts a block.
+    #[inline(never)]
+    pub fn begin(&mut self, steps: &[i16; MOTORS]) {
         self.shift = u8::MAX;
         let (mut most, mut moving, mut full, mut others) = (0, 0, 0, u8::MAX);
         let mut bit = 1;

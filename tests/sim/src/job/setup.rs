@@ -38,7 +38,8 @@ fn motor_of(group: &Value) -> Option<MotorSetup> {
         travel: number("tr")?,
         microsteps: u32::try_from(whole("mi")?).ok()?,
         inverted: whole("po")? != 0,
-        active_low: whole("sp")? != 0,
+        // Not every firmware has it.
+        active_low: whole("sp").unwrap_or(0) != 0,
     })
 }
 
