@@ -5,9 +5,9 @@
 
 /// `a / b`, rounded down, if that fits 16 bits: `a >> 16 < b`. Else something, without a panic.
 /// Cost: 230, 140 if it fits eight bits.
-#[inline(never)]
+#[inline]
 pub fn quotient(a: u32, b: u16) -> u16 {
-    divide(a, b).0
+    quotient_remainder(a, b).0
 }
 
 /// `a / b` and `a % b`, as [`quotient`].

@@ -92,8 +92,14 @@ impl Path {
     #[inline(never)]
     pub(super) fn limit_change(&mut self, dynamics: &Dynamics) {
         let mut slowest = Slowest::default();
+        // Of lengths and angles together each limit is measured along the way.
+        let mixed = some(self.stretch);
         for (u, axis) in self.axes(dynamics) {
-            slowest.look(u, axis);
+            let along = |limit: Short| {
+                if mixed && limit != Short::ZERO { Short::new(over(limit, u)) } else { limit }
+            };
+            let u = if mixed { ONE as u16 } else { u };
+            slowest.look(u, along(axis.accel), along(axis.jerk));
         }
         let jerk = slowest.jerk.get();
         let least = slowest.least.get();
@@ -169,25 +175,25 @@ struct Slowest {
 }
 
 impl Slowest {
-    fn look(&mut self, u: u16, axis: &Axis) {
-        if axis.accel != Short::ZERO {
-            if self.least == Short::ZERO || axis.accel < self.least {
-                self.least = axis.accel;
+    fn look(&mut self, u: u16, accel: Short, jerk: Short) {
+        if accel != Short::ZERO {
+            if self.least == Short::ZERO || accel < self.least {
+                self.least = accel;
             }
             let slower = if self.accel == Short::ZERO {
                 true
-            } else if axis.accel == self.accel {
+            } else if accel == self.accel {
                 self.unit < u
             } else {
-                below(axis.accel.get() * f32::from(self.unit), self.accel.get() * f32::from(u))
+                below(accel.get() * f32::from(self.unit), self.accel.get() * f32::from(u))
             };
             if slower {
-                self.accel = axis.accel;
+                self.accel = accel;
                 self.unit = u;
             }
         }
-        if axis.jerk != Short::ZERO && (self.jerk == Short::ZERO || axis.jerk < self.jerk) {
-            self.jerk = axis.jerk;
+        if jerk != Short::ZERO && (self.jerk == Short::ZERO || jerk < self.jerk) {
+            self.jerk = jerk;
         }
     }
 }

@@ -46,11 +46,15 @@ fn between(steps: &[u64], from: u64, to: u64) -> &[u64] {
 
 /// The mean interval is `cycles` to a part in a thousand, and none is longer than two of it.
 fn held(steps: &[u64], cycles: f64, motor: u8) {
+    held_within(1e-3, steps, cycles, motor);
+}
+
+fn held_within(part: f64, steps: &[u64], cycles: f64, motor: u8) {
     let gaps = || steps.windows(2).map(|w| w[1] - w[0]);
     let mean = (steps[steps.len() - 1] - steps[0]) as f64 / (steps.len() - 1) as f64;
     let (least, most) = (gaps().min().unwrap(), gaps().max().unwrap());
     let all = format!("motor {}: mean {mean:.2}, {least} to {most}, not {cycles}", motor + 1);
-    assert!((mean / cycles - 1.0).abs() < 1e-3, "{all}");
+    assert!((mean / cycles - 1.0).abs() < part, "{all}");
     assert!(most as f64 <= 2.0 * cycles, "{all}");
 }
 
@@ -87,9 +91,10 @@ fn mixed_rates_are_held_together() {
     carry_out(&mut machine, &mut host, "g0 x70 y10 z0.1", 70 * 1280 + 10 * 1280 + 128);
     let first = steps_of(&machine, 0);
     let middle = first[0].midpoint(first[first.len() - 1]);
-    for (motor, cycles) in [(0, 800.0), (1, 5_600.0), (2, 560_000.0)] {
+    // So long a move is three blocks, each of which ends on whole steps: Z makes 43, 42 and 43.
+    for (motor, cycles, part) in [(0, 800.0, 1e-3), (1, 5_600.0, 1e-3), (2, 560_000.0, 0.02)] {
         let steps = steps_of(&machine, motor);
-        held(between(&steps, middle - SECOND, middle + SECOND), cycles, motor);
+        held_within(part, between(&steps, middle - SECOND, middle + SECOND), cycles, motor);
     }
 }
 

@@ -10,7 +10,7 @@ use kerf_sim::job::{self, Options};
 /// Cycles in a microsecond.
 const US: u64 = 16;
 /// How much wider a pulse may be, cycles.
-const LOADING: u64 = 200;
+const LOADING: u64 = 240;
 
 /// Runs a job that must end on its steps, with these settings besides those of a fast machine.
 fn ran(board: &'static Board, setting: &str, job: &str) -> Machine {
