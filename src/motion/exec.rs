@@ -132,11 +132,13 @@ struct Running {
 
 /// The state of exec.
 #[derive(Debug, Default)]
+#[repr(C)]
 pub struct Exec {
-    prep: Prep,
-    governor: Governor,
+    // The largest is last: the CPU reaches 64 bytes from a pointer.
     running: Running,
     dwell_ms: u32,
+    governor: Governor,
+    prep: Prep,
 }
 
 /// What the governor sees of the queue.
@@ -278,12 +280,7 @@ impl Exec {
     #[inline(always)]
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
         let fine = below(scaled(line.cruise, FINE_LOG2), line.length);
-        self.prep.begin(&line.steps, fine);
-        for m in 0..MOTORS {
-            if line.steps[m] != 0 {
-                out.target[m] = out.target[m].wrapping_add(line.steps[m].into());
-            }
-        }
+        self.prep.begin(&line.steps, fine, &mut out.target);
         out.steps = line.steps;
         out.length = line.length;
         out.running = true;
