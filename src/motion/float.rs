@@ -58,3 +58,18 @@ pub fn whole(x: f32) -> u32 {
     // SAFETY: from 0 to below 2^31, as bits tell; not a NaN.
     unsafe { x.to_int_unchecked() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_are_rounded_down_and_kept_in_range() {
+        for (x, n) in [(0.0, 0), (0.99, 0), (1.0, 1), (32_000.7, 32_000), (1e9, 1_000_000_000)] {
+            assert_eq!(whole(x), n, "{x}");
+        }
+        for x in [2_147_483_648.0, 1e20, -1.0, f32::INFINITY, f32::NAN] {
+            assert_eq!(whole(x), 1 << 31, "{x}");
+        }
+    }
+}

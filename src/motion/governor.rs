@@ -113,7 +113,7 @@ impl Governor {
     }
 
     /// The next stretch, of about `seconds`, in a block with `left` mm to go at up to `cruise` mm/s.
-    #[inline(never)]
+    #[inline(always)]
     pub fn stretch(&mut self, left: f32, cruise: f32, ahead: &impl Ahead, seconds: f32) -> Stretch {
         if !some(self.limits.jerk) {
             return self.trapezoid(left, cruise, ahead.headroom(), seconds);
@@ -121,6 +121,7 @@ impl Governor {
         self.smooth(left, cruise, ahead, seconds)
     }
 
+    #[inline(never)]
     fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32, seconds: f32) -> Stretch {
         let v = self.state.velocity;
         // Rounding may put a stop before the end of the block.

@@ -36,6 +36,9 @@ pub const TICKS_MAX: u16 = 2000;
 /// Longest stretch, CPU cycles.
 pub const CYCLES_MAX: u32 = 1 << 20;
 
+/// Most time of moves without steps that is kept, CPU cycles: a minute.
+const KEPT_MAX: u32 = (1 << 30) - 1;
+
 /// Longest tick.
 const PERIOD_MAX: u32 = 0xFFFF;
 
@@ -65,16 +68,15 @@ struct Minor {
 
 /// The state of the preparation of one block.
 #[derive(Debug)]
+#[repr(C)]
 pub struct Prep {
+    // What is used most comes first: the CPU reaches 64 bytes from a pointer.
     /// Phase units of the dominant motor until the block's end.
     left: u32,
     /// Time that has not been used, CPU cycles.
     time: i32,
     /// Steps of the dominant motor.
     most: u16,
-    minors: [Minor; MOTORS],
-    /// Phase units that a motor is short of at the end of a block.
-    debt: [i16; MOTORS],
     /// The shift for which increments have been computed; none yet if above [`STEP_LOG2`].
     shift: u8,
     /// Motors that make as many steps as the dominant one.
@@ -88,10 +90,13 @@ pub struct Prep {
     fine: bool,
     /// A motor has turned round, and no segment tells of it yet.
     turned: bool,
-    /// By the number of motors that move, less one.
-    paces: [Pace; MOTORS],
     /// How long directions must stand before the first step, CPU cycles.
     setup: u16,
+    /// Phase units that a motor is short of at the end of a block.
+    debt: [i16; MOTORS],
+    minors: [Minor; MOTORS],
+    /// By the number of motors that move, less one.
+    paces: [Pace; MOTORS],
     /// A segment that comes behind one in which directions settle.
     held: Option<Segment>,
 }
@@ -147,9 +152,9 @@ impl Prep {
         self.fine = fine;
     }
 
-    /// Starts a block.
+    /// Starts a block. Its steps are added to `target`.
     #[inline(never)]
-    pub fn begin(&mut self, steps: &[i16; MOTORS]) {
+    pub fn begin(&mut self, steps: &[i16; MOTORS], target: &mut [i32; MOTORS]) {
         self.shift = u8::MAX;
         let (mut most, mut moving, mut full, mut others) = (0, 0, 0, u8::MAX);
         let mut bit = 1;
@@ -158,6 +163,7 @@ impl Prep {
             if signed != 0 {
                 others = others.wrapping_add(1);
                 moving |= bit;
+                target[m] = target[m].wrapping_add(signed.into());
                 let steps = signed.unsigned_abs();
                 self.minors[m].steps = steps;
                 if steps > most {
@@ -195,9 +201,12 @@ impl Prep {
         self.left
     }
 
-    /// Time from nowhere, to be used up by the next segment: that of moves without steps.
-    pub fn wait(&mut self, cycles: u32) {
-        self.time += cycles as i32;
+    /// `cycles` with what has been kept of the time before, at least 1.
+    #[inline(always)]
+    fn with_kept(&self, cycles: u32) -> u32 {
+        // What is kept is below 2^30.
+        let sum = self.time.wrapping_add(cycles as i32);
+        if sum > 0 { sum as u32 } else { 1 }
     }
 
     /// Forgets time that has not been used: the machine stands still.
@@ -209,7 +218,7 @@ impl Prep {
     /// about `left` phase units to go. False, and no segment, when that time is kept for the next stretch.
     pub fn segment(&mut self, left: u32, cycles: u32, out: &mut Segment) -> bool {
         let travel = self.left.saturating_sub(left);
-        let cycles = self.time.saturating_add(cycles as i32).max(1) as u32;
+        let cycles = self.with_kept(cycles);
         let limit = self.limit(cycles, self.pace());
         let (_, shift) = coarsen(travel, limit);
         // What is left must be whole ticks, now and at the end: of up to an eighth of this stretch.
@@ -235,7 +244,7 @@ impl Prep {
     /// The same as `last` for it, but short and simple. Cost: 700, and 400 for each motor but the dominant.
     #[inline(never)]
     pub fn whole(&mut self, cycles: u32, out: &mut Segment) -> bool {
-        let cycles = self.time.saturating_add(cycles as i32).max(1) as u32;
+        let cycles = self.with_kept(cycles);
         let most = self.most;
         if most == 0 || most > TICKS_MAX {
             return self.last_of(cycles, COARSEST, out);
@@ -257,16 +266,17 @@ impl Prep {
         out.backwards = self.backwards;
         out.settle = 0;
         out.moving = self.full | self.minor;
-        let mut bit = 1;
+        let (mut full, mut minor) = (self.full, self.minor);
         for m in 0..MOTORS {
-            out.increment[m] = if self.full & bit != 0 {
+            out.increment[m] = if full & 1 != 0 {
                 increment
-            } else if self.minor & bit != 0 {
+            } else if minor & 1 != 0 {
                 self.even(m, ticks)
             } else {
                 0
             };
-            bit <<= 1;
+            full >>= 1;
+            minor >>= 1;
         }
         out.seal(self.full, increment);
         if self.turned {
@@ -287,13 +297,13 @@ impl Prep {
     /// Prepares the last stretch of the block, everything that is left, in `cycles`. False,
     /// and no segment, when nothing is left; the time is kept then.
     pub fn last(&mut self, cycles: u32, out: &mut Segment) -> bool {
-        let cycles = self.time.saturating_add(cycles as i32).max(1) as u32;
+        let cycles = self.with_kept(cycles);
         self.last_of(cycles, self.pace(), out)
     }
 
     fn last_of(&mut self, cycles: u32, pace: u16, out: &mut Segment) -> bool {
         if self.left == 0 {
-            self.time = cycles as i32;
+            self.time = cycles.min(KEPT_MAX) as i32;
             return false;
         }
         let (_, shift) = coarsen(self.left, self.limit(cycles, pace));

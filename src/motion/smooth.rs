@@ -40,6 +40,7 @@ struct Span {
 
 impl Governor {
     /// The next stretch.
+    #[inline(never)]
     pub(super) fn smooth(
         &mut self,
         left: f32,
