@@ -259,30 +259,45 @@ impl Prep {
         let long = (cycles >> 16) as u16 >= ticks;
         let period = if long { u16::MAX } else { quotient(cycles + u32::from(ticks / 2), ticks) };
         let period = period.max(shortest);
-        self.time = (cycles as i32 - (u32::from(ticks) * u32::from(period)) as i32).max(-1000);
         self.left = 0;
         out.ticks = ticks;
         out.period = period;
-        out.backwards = self.backwards;
         out.settle = 0;
+        self.complete(cycles, increment, out, |prep, m| prep.even(m, ticks));
+        true
+    }
+
+    /// Completes a segment that has ticks and a period, in the `cycles` there are: `step` for the motors that
+    /// move as the dominant one, and what `minor` says for the others.
+    #[inline(always)]
+    fn complete(
+        &mut self,
+        cycles: u32,
+        step: u16,
+        out: &mut Segment,
+        minor: impl Fn(&mut Self, usize) -> u16,
+    ) {
+        let used = u32::from(out.ticks) * u32::from(out.period);
+        // Time that cannot be caught up is let go, or the machine would race to do so.
+        self.time = (cycles as i32 - used as i32).max(-1000);
+        out.backwards = self.backwards;
         out.moving = self.full | self.minor;
-        let (mut full, mut minor) = (self.full, self.minor);
+        let (mut full, mut others) = (self.full, self.minor);
         for m in 0..MOTORS {
             out.increment[m] = if full & 1 != 0 {
-                increment
-            } else if minor & 1 != 0 {
-                self.even(m, ticks)
+                step
+            } else if others & 1 != 0 {
+                minor(self, m)
             } else {
                 0
             };
             full >>= 1;
-            minor >>= 1;
+            others >>= 1;
         }
-        out.seal(self.full, increment);
+        out.seal(self.full, step);
         if self.turned {
             self.behind_turn(out);
         }
-        true
     }
 
     /// The increment that takes a motor over its block in `ticks`, and what it is short of then.
@@ -389,34 +404,14 @@ impl Prep {
             }
             self.scale(shift);
         }
-        let used = u32::from(ticks) * u32::from(period);
-        // Time that cannot be caught up is let go, or the machine would race to do so.
-        self.time = (cycles as i32 - used as i32).max(-1000);
-        let travel = u32::from(ticks) << shift;
-        self.left -= travel;
+        self.left -= u32::from(ticks) << shift;
         out.ticks = ticks;
         out.period = period;
-        out.backwards = self.backwards;
         let settles = period >= self.paces().settles;
         out.settle = if settles { SETTLE } else { 0 };
-        out.moving = self.full | self.minor;
-        let mut bit = 1;
-        for m in 0..MOTORS {
-            out.increment[m] = if self.full & bit != 0 {
-                1 << shift
-            } else if self.minor & bit != 0 {
-                self.minors[m].advance(ticks, self.most)
-            } else {
-                0
-            };
-            bit <<= 1;
-        }
+        self.complete(cycles, 1 << shift, out, |prep, m| prep.minors[m].advance(ticks, prep.most));
         if self.left == 0 {
             self.settle_debts();
-        }
-        out.seal(self.full, 1 << shift);
-        if self.turned {
-            self.behind_turn(out);
         }
     }
 

@@ -57,7 +57,7 @@ impl BlockStore {
     /// The planner's end and exec's. `None` after the first time.
     pub fn split(&'static self) -> Option<(BlockQueue, BlockSource)> {
         let (producer, consumer) = self.ring.split()?;
-        let queue = BlockQueue { ring: producer, store: self, newest: SEQ, last: None, end: 0.0 };
+        let queue = BlockQueue { ring: producer, store: self, newest: SEQ, last: None };
         Some((queue, BlockSource::new(consumer, self)))
     }
 
@@ -122,8 +122,6 @@ pub struct BlockQueue {
     newest: u8,
     /// The line that the next one may follow without a stop.
     last: Option<Last>,
-    /// Potential at the end of the queue.
-    end: f32,
 }
 
 impl BlockQueue {
@@ -153,15 +151,19 @@ impl BlockQueue {
             return false;
         }
         self.refine(line);
-        line.start = self.end;
+        line.start = self.end();
         line.entry = Short::new(entry);
         let key = if self.goes_on(line, entry) { None } else { self.corner(line, entry) };
-        self.end = line.start + line.gain();
-        let end = self.end;
+        let end = line.start + line.gain();
         let fill = |slot: &mut MaybeUninit<Block>| {
             slot.write(Block { body: Body::Line(*line), line: number });
         };
         self.put(fill, key, |horizon| horizon.end = end)
+    }
+
+    /// Potential at the end of the queue.
+    fn end(&self) -> f32 {
+        exec::lock(|ceiling| self.store.with_horizon(ceiling, |horizon| horizon.end))
     }
 
     /// Whether the line is as fast as the one before, and the corner between them no limit.
@@ -222,11 +224,12 @@ impl BlockQueue {
 
     /// Makes potentials small if they have become large for this line.
     fn refine(&mut self, line: &Line) {
+        let end = self.end();
         // Nothing is there, or it is plainly fine: no need to compare.
-        if !some(self.end) || log(self.end) < 2 * log(line.cruise) + FINE {
+        if !some(end) || log(end) < 2 * log(line.cruise) + FINE {
             return;
         }
-        if self.end > COARSE * line.cruise * line.cruise {
+        if end > COARSE * line.cruise * line.cruise {
             exec::lock(|ceiling| self.rebase(ceiling));
         }
     }
@@ -243,14 +246,11 @@ impl BlockQueue {
                 }
             });
         }
-        let mut end = 0.0;
         self.store.with_horizon(ceiling, |horizon| {
             let base = base.unwrap_or(horizon.end);
             horizon.end -= base;
-            end = horizon.end;
             horizon.version = horizon.version.wrapping_add(1);
         });
-        self.end = end;
     }
 
     /// Puts a block, which `fill` writes, into the ring and what follows from it into the horizon, all at once for exec.
