@@ -1,14 +1,14 @@
 //! The control task: real-time characters, which act at once and get no response.
 //!
 //! Reads what the receive interrupt picked off; waits on [`Event::Realtime`]. `^x` resets the machine.
-//! ENQ asks whether anybody is there. Hold, resume, flush and kill are taken out of the stream and
-//! otherwise without effect so far.
+//! ENQ asks whether anybody is there. Resume is cycle start: it ends a program stop that waits. Hold, flush
+//! and kill are taken out of the stream and otherwise without effect so far.
 
 use super::links::Links;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::{reset, uart};
 use crate::protocol::Out;
-use crate::realtime::{ENQUIRY, RESET};
+use crate::realtime::{ENQUIRY, RESET, RESUME};
 use crate::text;
 
 /// The task.
@@ -21,6 +21,9 @@ pub async fn run(links: &'static Links) -> ! {
         .await;
         if characters & RESET != 0 {
             reset();
+        }
+        if characters & RESUME != 0 {
+            links.cycle_start.signal();
         }
         if characters & ENQUIRY != 0 {
             acknowledge(links).await;
