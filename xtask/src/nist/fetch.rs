@@ -36,7 +36,10 @@ pub fn oracle() -> Result<Oracle> {
 /// Downloads and unpacks; gives the version.
 fn fetch(dir: &Path) -> Result<String> {
     for tool in ["apt-get", "dpkg-deb"] {
-        ensure!(which(tool).is_some(), "`{tool}` is missing: {MAIN} comes as a package of Debian 12");
+        ensure!(
+            which(tool).is_some(),
+            "`{tool}` is missing: {MAIN} comes as a package of Debian 12"
+        );
     }
     let packages = dir.join("packages");
     let _ = std::fs::remove_dir_all(&packages);

@@ -124,10 +124,8 @@ impl Motion {
         let (name, [first, second, third]) = self.plane;
         let mut end = [0.0, 0.0, 0.0, a, b, c];
         (end[first], end[second], end[third]) = (first_end, second_end, third_end);
-        let centre = [
-            self.frame.machine(first, first_centre),
-            self.frame.machine(second, second_centre),
-        ];
+        let centre =
+            [self.frame.machine(first, first_centre), self.frame.machine(second, second_centre)];
         self.place = self.written_place(end);
         let turns = canon.word(4)?;
         self.say(&format!("ARC {name}{}{} {turns}", self.place, written(&centre)));
