@@ -41,8 +41,9 @@ fn fetch(dir: &Path) -> Result<String> {
             "`{tool}` is missing: {MAIN} comes as a package of Debian 12"
         );
     }
+    // What an interrupted run left behind.
+    let _ = std::fs::remove_dir_all(dir);
     let packages = dir.join("packages");
-    let _ = std::fs::remove_dir_all(&packages);
     std::fs::create_dir_all(&packages)?;
     let mut download = Command::new("apt-get");
     download.arg("download").arg(MAIN).args(LIBRARIES).current_dir(&packages);

@@ -164,7 +164,7 @@ fn plane(name: &str) -> Result<Plane> {
 
 /// Commands that move nothing and that no motion tells of.
 fn is_silent(name: &str) -> bool {
-    const NAMES: [&str; 23] = [
+    const NAMES: [&str; 24] = [
         "CLEAR_AUX_OUTPUT_BIT",
         "COMMENT",
         "DISABLE_FEED_OVERRIDE",
@@ -174,6 +174,7 @@ fn is_silent(name: &str) -> bool {
         "FINISH",
         "MESSAGE",
         "ON_RESET",
+        "ORIENT_SPINDLE",
         "PALLET_SHUTTLE",
         "SELECT_TOOL",
         "SET_FEED_MODE",
