@@ -10,6 +10,7 @@
 //! | [`sim`] | runs the image on the simulated board |
 //! | [`checks`] | everything that must pass before a merge |
 //! | [`jobs`] | writes the example jobs |
+//! | [`nist`] | what another interpreter makes of G-code, to compare with |
 //! | `docs` | test: what the documents name exists |
 
 mod boards;
@@ -20,6 +21,7 @@ mod docs;
 mod elf;
 mod firmware;
 mod jobs;
+mod nist;
 mod process;
 mod setup;
 mod sim;
@@ -54,6 +56,8 @@ enum Command {
     Flash(firmware::FlashArgs),
     /// Write the example jobs again
     Jobs,
+    /// Write the motions of `tests/nist` again, by a NIST-derived interpreter (Debian 12)
+    Nist(nist::Args),
 }
 
 #[derive(clap::Args)]
@@ -84,6 +88,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
         Command::Jobs => jobs::write()?,
+        Command::Nist(args) => nist::run(&args)?,
     }
     Ok(ExitCode::SUCCESS)
 }
