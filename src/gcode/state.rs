@@ -169,6 +169,9 @@ impl State {
         if block.changes_tool() {
             self.tool = self.selected;
             out.tool = Some(self.tool);
+            // The change stops the spindle: S alone must not start it again.
+            self.modal.spindle = Turn::Off;
+            out.spindle = None;
         }
         Ok(())
     }
