@@ -245,6 +245,7 @@ impl State {
     }
 
     /// Motion, and what belongs to it.
+    #[inline(never)]
     fn finish(
         &mut self,
         block: &Block,
