@@ -30,9 +30,9 @@ pub struct Sticky {
 }
 
 impl Sticky {
-    /// No words.
+    /// No words. All zeros, so that it needs no memory.
     pub const NONE: Self = Self {
-        mode: MotionMode::None,
+        mode: MotionMode::Traverse,
         initial: Length::ZERO,
         retract: None,
         depth: None,
