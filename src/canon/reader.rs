@@ -119,6 +119,8 @@ impl<S: Setup> Reader<S> {
 
     fn spindle(&mut self, spindle: Spindle) {
         self.turn = spindle.turn;
+        // Off is off at any speed.
+        let spindle = if spindle.turn == Turn::Off { Spindle::default() } else { spindle };
         self.ready.push_back(Canon::Spindle(spindle));
     }
 
