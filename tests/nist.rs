@@ -18,6 +18,8 @@ use motion_text::MotionText;
 /// the program's unit, and they are sums.
 const MM: f64 = 0.000_101;
 const INCH: f64 = 0.002;
+/// Of many offsets, written in both units.
+const SUMS: f64 = 0.01;
 
 /// The machine of the other interpreter: as usual, but that it reads lines with a slash.
 struct Other;
@@ -39,35 +41,47 @@ impl Setup for Other {
 
 #[test]
 fn motions_agree() {
-    let programs = programs();
-    let faults: Vec<_> = programs.iter().filter_map(|program| fault(program)).collect();
-    assert!(faults.is_empty(), "{} differ:\n{}", faults.len(), faults.join("\n"));
+    let mut programs = programs("tests/nist");
+    programs.retain(|file| !file.file_name().unwrap().to_string_lossy().starts_with("own_"));
     assert!(programs.len() > 70);
+    check(&programs, |program| if program.contains("G20") { INCH } else { MM });
+}
+
+/// `cargo xtask nist --random N` makes the programs.
+#[test]
+#[ignore = "needs programs that are made at random"]
+fn random_motions_agree() {
+    let programs = programs("target/nist/random");
+    assert!(!programs.is_empty());
+    check(&programs, |_| SUMS);
+}
+
+fn check(programs: &[PathBuf], slack: impl Fn(&str) -> f64) {
+    let faults: Vec<_> = programs.iter().filter_map(|program| fault(program, &slack)).collect();
+    assert!(faults.is_empty(), "{} differ:\n{}", faults.len(), faults.join("\n"));
 }
 
 /// No difference is of a program that there is no more.
 #[test]
 fn differences_are_of_programs() {
-    let programs = programs();
+    let programs = programs("tests/nist");
     for Difference { name, .. } in DIFFERENCES {
         assert!(programs.iter().any(|program| program.ends_with(format!("{name}.ngc"))), "{name}");
     }
 }
 
-/// All but those that show the other interpreter's own ways.
-fn programs() -> Vec<PathBuf> {
-    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/nist");
+/// The programs in a folder of the repository.
+fn programs(folder: &str) -> Vec<PathBuf> {
+    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
     let files = fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path());
-    let mut programs: Vec<_> = files
-        .filter(|file| file.extension().is_some_and(|ending| ending == "ngc"))
-        .filter(|file| !file.file_name().unwrap().to_string_lossy().starts_with("own_"))
-        .collect();
+    let mut programs: Vec<_> =
+        files.filter(|file| file.extension().is_some_and(|ending| ending == "ngc")).collect();
     programs.sort();
     programs
 }
 
 /// In what the motions of a program differ, beyond what they are meant to.
-fn fault(file: &Path) -> Option<String> {
+fn fault(file: &Path, slack: impl Fn(&str) -> f64) -> Option<String> {
     let name = file.file_stem()?.to_str()?;
     let mut program = fs::read_to_string(file).unwrap();
     let mut theirs = fs::read_to_string(file.with_extension("motion")).unwrap();
@@ -79,8 +93,9 @@ fn fault(file: &Path) -> Option<String> {
         Ok(motion) => motion,
         Err(refusal) => return Some(format!("{name}: {refusal}")),
     };
-    let slack = if program.contains("G20") { INCH } else { MM };
-    let (mut ours, mut theirs) = (ours.lines(), theirs.lines());
+    let slack = slack(&program);
+    let (ours, theirs) = (moves(&ours, slack), moves(&theirs, slack));
+    let (mut ours, mut theirs) = (ours.into_iter(), theirs.into_iter());
     for number in 1.. {
         match (ours.next(), theirs.next()) {
             (None, None) => return None,
@@ -107,6 +122,30 @@ fn motion(program: &str) -> Result<String, String> {
         motion.check(reader.interpreter());
     }
     Ok(motion.text)
+}
+
+/// A motion without straight moves that rounding alone has made.
+fn moves(motion: &str, slack: f64) -> Vec<&str> {
+    let mut place = "0.0000 0.0000 0.0000 0.0000 0.0000 0.0000";
+    let mut moves = Vec::new();
+    for line in motion.lines() {
+        let straight = line.strip_prefix("TRAVERSE ").or(line.strip_prefix("FEED "));
+        if !straight.is_some_and(|to| agree(to, place, slack)) {
+            moves.push(line);
+        }
+        place = straight.or_else(|| end(line)).unwrap_or(place);
+    }
+    moves
+}
+
+/// The end of a probing or an arc, which has plane and centre beside it.
+fn end(line: &str) -> Option<&str> {
+    if let Some(end) = line.strip_prefix("PROBE ") {
+        return Some(end);
+    }
+    let arc = line.strip_prefix("ARC ")?.split_once(' ')?.1;
+    let (last, _) = arc.match_indices(' ').nth(5)?;
+    arc.get(..last)
 }
 
 /// Whether two lines say the same, their numbers within `slack`.
