@@ -85,10 +85,7 @@ impl Program {
         let [first, second, depth] = PLANES[self.plane];
         let code = self.dice.of(&["G2", "G3"]);
         let (i, j) = (self.units(1, 20), self.units(-20, 20));
-        let offsets = [(first, i), (second, j)].map(|(axis, at)| {
-            let letter = char::from(b'I' + (axis as u8 - b'X'));
-            format!("{letter}{}", self.number(at))
-        });
+        let offsets = [(first, i), (second, j)].map(|(axis, at)| offset(axis, &self.number(at)));
         let more = match self.dice.below(4) {
             0 => format!("{depth}{}", self.value(-5, 5)),
             1 => format!("A{}", self.value(-5, 5)),
@@ -96,8 +93,8 @@ impl Program {
         };
         let ends = format!("{first}{} {second}{}", self.number(2 * i), self.number(2 * j));
         let mut line = match self.dice.below(3) {
-            0 => format!("{code} {} {more}", offsets.join(" ")),
-            1 => format!("G91 {code} {ends} {} {more}", offsets.join(" ")),
+            0 => format!("{code} {} {more}", offsets.concat()),
+            1 => format!("G91 {code} {ends} {} {more}", offsets.concat()),
             _ => {
                 let radius = self.value(50, 200);
                 let sign = self.dice.of(&["", "-"]);
@@ -106,7 +103,7 @@ impl Program {
         };
         // A helix or a turn of A from nowhere to nowhere is a full circle.
         if !line.starts_with("G91") && !self.incremental {
-            line = format!("{code} {}", offsets.join(" "));
+            line = format!("{code} {}", offsets.concat());
         }
         self.incremental |= line.starts_with("G91");
         self.say(&line);
@@ -271,6 +268,12 @@ impl Program {
         self.text.push('\n');
         self.lines += 1;
     }
+}
+
+/// I, J or K, which go with X, Y and Z.
+fn offset(axis: char, number: &str) -> String {
+    let letter = char::from(b'I' + (axis as u8 - b'X'));
+    format!(" {letter}{number}")
 }
 
 #[cfg(test)]

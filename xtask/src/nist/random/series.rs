@@ -1,6 +1,6 @@
 //! Series of canned cycles.
 
-use super::{PLANES, Program};
+use super::{PLANES, Program, offset};
 
 impl Program {
     /// Canned cycles from above R, which falls from line to line.
@@ -28,14 +28,23 @@ impl Program {
     fn cycle(&mut self, retract: i32, incremental: bool, to_r: bool) {
         let [first, second, depth] = PLANES[self.plane];
         let codes: &[&str] = if to_r {
-            &["G73 Q", "G81", "G82 P1.5", "G83 Q", "G85", "G86 P1", "G89 P1"]
+            &["G73 Q", "G81", "G82 P1.5", "G83 Q", "G85", "G86 P1", "G87", "G89 P1"]
         } else {
-            &["G73 Q", "G81", "G82 P1.5", "G83 Q", "G86 P1", "G89 P1"]
+            &["G73 Q", "G81", "G82 P1.5", "G83 Q", "G86 P1", "G87", "G89 P1"]
         };
         let mut code = self.dice.of(codes).to_owned();
         if code.ends_with('Q') {
             // No part of a depth: the other interpreter's sum of them may just miss the bottom.
             code += self.dice.of(if self.inch { &["0.137", "0.171"] } else { &["3.37", "5.71"] });
+        }
+        if code == "G87" {
+            // Up to above the bottom and below R, wherever that is counted from.
+            let top = self.number(1_000);
+            code += &offset(depth, &top);
+            for axis in [first, second] {
+                let aside = self.value(-3, 3);
+                code += &offset(axis, &aside);
+            }
         }
         let plane = self.some(&format!("{first}{second}"));
         let (retract, bottom) = if incremental { (retract - 60, -20) } else { (retract, 5) };
