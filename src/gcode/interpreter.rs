@@ -80,9 +80,9 @@ impl Interpreter {
         self.state.usual(line, numbered, setup, out)
     }
 
-    /// The same as [`Self::interpret`] for a line of any kind.
+    /// The same as [`Self::interpret`], and to be used in its place if [`Self::usual`] has declined the line.
     #[inline(never)]
-    pub(super) fn general(
+    pub fn general(
         &mut self,
         line: &[u8],
         setup: &impl Setup,
