@@ -143,6 +143,17 @@ fn enquiry_and_reset_act_at_once() {
     assert!(kerf::hal::imp::was_reset());
 }
 
+/// A response that waits for room, an exception and an acknowledgement: each of the two that wait is told
+/// when it is its turn, and neither keeps waking the other until then.
+#[test]
+fn an_enquiry_and_an_exception_wait_for_a_response() {
+    let mut sender = Sender::boot();
+    let heard = sender.ask("{sys:n}\n{sys:n}\n\x01\n\x05g0 x1\n", 1_000);
+    assert_eq!(heard.matches("{\"ack\":true}\n").count(), 1, "{heard}");
+    assert_eq!(heard.matches("{\"er\":{").count(), 1, "{heard}");
+    assert_eq!(sender.answered(), 4, "{heard}");
+}
+
 #[test]
 fn new_steps_per_unit_never_make_the_machine_jump() {
     let mut sender = Sender::boot();

@@ -29,7 +29,7 @@ pub async fn run(links: &'static Links) -> ! {
 }
 
 async fn acknowledge(links: &Links) {
-    let mut tx = links.tx.lock().await;
+    let (mut tx, _turn) = links.speak().await;
     tx.room().await;
     for byte in text!("{\"ack\":true}\n").bytes() {
         tx.put(byte);

@@ -79,13 +79,13 @@ async fn send(links: &Links, tx: &mut Tx, mut step: impl FnMut(&mut View, &mut T
 }
 
 async fn greet(links: &Links) {
-    let mut tx = links.tx.lock().await;
+    let (mut tx, _turn) = links.speak().await;
     let mut banner = Banner::begin(&View::of(links));
     send(links, &mut tx, |view, tx| banner.step(view, tx)).await;
 }
 
 async fn report_status(links: &Links) {
-    let mut tx = links.tx.lock().await;
+    let (mut tx, _turn) = links.speak().await;
     let report = Report::begin(links.mode.get(), &mut View::of(links));
     if let Some(mut report) = report {
         send(links, &mut tx, |view, tx| report.step(view, tx)).await;
@@ -93,7 +93,7 @@ async fn report_status(links: &Links) {
 }
 
 async fn report_exception(links: &Links, status: Status) {
-    let mut tx = links.tx.lock().await;
+    let (mut tx, _turn) = links.speak().await;
     let mut exception = Exception::begin(status, &View::of(links));
     send(links, &mut tx, |view, tx| exception.step(view, tx)).await;
 }
@@ -101,7 +101,7 @@ async fn report_exception(links: &Links, status: Status) {
 /// Returns the number of free blocks as it was told, which may have changed during the wait for the
 /// transmitter.
 async fn report_queue(links: &Links) -> usize {
-    let mut tx = links.tx.lock().await;
+    let (mut tx, _turn) = links.speak().await;
     let mut told = 0;
     send(links, &mut tx, |view, tx| {
         told = view.value(Value::QueueFree) as usize;
