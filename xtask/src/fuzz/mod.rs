@@ -21,8 +21,10 @@ use session::Session;
 const FLAGS: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
                      -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
                      -Cllvm-args=-sanitizer-coverage-pc-table \
-                     -Cllvm-args=-sanitizer-coverage-trace-compares \
                      -Cllvm-args=-simplifycfg-branch-fold-threshold=0 -Ccodegen-units=1";
+
+/// What makes it tell what values are compared, too.
+const COMPARES: &str = "-Cllvm-args=-sanitizer-coverage-trace-compares";
 
 /// `cargo xtask fuzz`
 #[derive(Args)]
@@ -58,6 +60,14 @@ impl Target {
         }
     }
 
+    /// With the values compared a machine takes three times as long; it has the words to try instead.
+    fn flags(self) -> String {
+        match self {
+            Target::Lines => format!("{FLAGS} {COMPARES}"),
+            Target::Serial => FLAGS.to_owned(),
+        }
+    }
+
     /// What its inputs begin with.
     fn prefixes(self) -> &'static [&'static str] {
         match self {
@@ -82,32 +92,35 @@ fn home() -> PathBuf {
 pub fn run(args: &FuzzArgs) -> Result<ExitCode> {
     setup::ensure(Scope::Fuzzers)?;
     let targets = args.target.map_or_else(|| Target::value_variants().to_vec(), |one| vec![one]);
-    let programs = build()?;
     let mut sessions = Vec::new();
     for target in targets {
         seeds::write(target)?;
         println!("\n=== {} for {} min ===", target.name(), args.minutes);
-        let program = programs.join(target.name());
+        let program = build(target)?;
         let time = Duration::from_secs(args.minutes * 60);
-        sessions.push((target, Session::run(target, &program, time)?));
+        sessions.push((Session::run(target, &program, time)?, target, program));
     }
     println!();
-    sessions.iter().for_each(|(target, session)| session.tell(*target, &programs));
-    let clean = sessions.iter().all(|(_, session)| session.findings.is_empty());
+    sessions.iter().for_each(|(session, target, program)| session.tell(*target, program));
+    let clean = sessions.iter().all(|(session, ..)| session.findings.is_empty());
     Ok(if clean { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Builds the fuzzers; where they lie. The host is named, so that the flags are for them alone and not for
+/// Builds a fuzzer; where it lies. The host is named, so that the flags are for them alone and not for
 /// what is run to build them.
-fn build() -> Result<PathBuf> {
+fn build(target: Target) -> Result<PathBuf> {
     let host = host()?;
     let folder = home().join("build");
     let mut cargo = host_cargo();
-    cargo.current_dir(root()).env("RUSTFLAGS", FLAGS).env_remove("CARGO_ENCODED_RUSTFLAGS");
-    cargo.args(["build", "--package", "kerf-fuzz", "--bins", "--features", "libfuzzer"]);
+    cargo
+        .current_dir(root())
+        .env("RUSTFLAGS", target.flags())
+        .env_remove("CARGO_ENCODED_RUSTFLAGS");
+    cargo.args(["build", "--package", "kerf-fuzz", "--features", "libfuzzer"]);
+    cargo.args(["--bin", target.name()]);
     cargo.args(["--profile", "fuzz", "--target", &host, "--target-dir"]).arg(&folder);
     run_child(&mut cargo)?;
-    Ok(folder.join(host).join("fuzz"))
+    Ok(folder.join(host).join("fuzz").join(target.name()))
 }
 
 /// What Rust calls this machine.

@@ -90,7 +90,7 @@ impl Session {
     }
 
     /// Says it.
-    pub fn tell(&self, target: Target, programs: &Path) {
+    pub fn tell(&self, target: Target, program: &Path) {
         let Self { runs, coverage: (edges, features), corpus, findings } = self;
         let name = target.name();
         let found = findings.len();
@@ -98,7 +98,6 @@ impl Session {
             "fuzz {name}: {runs} runs, {edges} edges and {features} features covered, \
              {corpus} inputs in the corpus, {found} findings"
         );
-        let program = programs.join(name);
         for file in findings {
             println!("  to see it: {} {}", program.display(), file.display());
         }
@@ -114,7 +113,6 @@ fn command(target: Target, program: &Path, time: Duration) -> Command {
     fuzzer.arg(format!("-timeout={TIMEOUT}")).arg(format!("-rss_limit_mb={MEMORY}"));
     fuzzer.arg(format!("-dict={}", root().join("tests/fuzz/words.dict").display()));
     fuzzer.arg(format!("-artifact_prefix={}/", found.display()));
-    fuzzer.arg("-use_value_profile=1");
     fuzzer.args([corpus, seeds, found]);
     fuzzer
 }

@@ -10,7 +10,7 @@ use super::lines::{End, Lines};
 /// Bits a second.
 const BAUD: u32 = 115_200;
 /// Events (bytes, steps, milliseconds) that an input may take.
-const EVENTS_MAX: u32 = 300_000;
+const EVENTS_MAX: u32 = 100_000;
 /// How long a machine may be silent, or stand still, that has something to do.
 const PATIENCE_MS: u64 = 2_000;
 /// Time between two looks.
