@@ -10,11 +10,9 @@ use anyhow::{Context, Result, ensure};
 use super::{Target, make};
 use crate::process::{root, shown};
 
-/// A fuzzer begins anew after this time: each machine of the target `serial` leaves memory behind.
-const SLICE: Duration = Duration::from_secs(10 * 60);
 /// An input takes milliseconds. In seconds.
 const TIMEOUT: u64 = 20;
-/// Far more than a slice leaves behind. In MiB.
+/// Far more than a fuzzer leaves behind before it begins anew. In MiB.
 const MEMORY: u64 = 4_096;
 
 /// What stands before the name of a file that a fuzzer has written an input to.
@@ -41,11 +39,12 @@ impl Session {
             if left.as_secs() == 0 || !session.findings.is_empty() {
                 return Ok(session);
             }
-            session.slice(target, program, left.min(SLICE))?;
+            session.turn(target, program, left)?;
         }
     }
 
-    fn slice(&mut self, target: Target, program: &Path, time: Duration) -> Result<()> {
+    /// Until the fuzzer begins anew.
+    fn turn(&mut self, target: Target, program: &Path, time: Duration) -> Result<()> {
         make(&target.folder("corpus"))?;
         make(&target.folder("findings"))?;
         let mut fuzzer = command(target, program, time);
@@ -110,6 +109,7 @@ fn command(target: Target, program: &Path, time: Duration) -> Command {
     fuzzer.current_dir(root());
     fuzzer.arg(format!("-max_total_time={}", time.as_secs()));
     fuzzer.arg(format!("-max_len={}", target.longest()));
+    fuzzer.args(target.runs().map(|runs| format!("-runs={runs}")));
     fuzzer.arg(format!("-timeout={TIMEOUT}")).arg(format!("-rss_limit_mb={MEMORY}"));
     fuzzer.arg(format!("-dict={}", root().join("tests/fuzz/words.dict").display()));
     fuzzer.arg(format!("-artifact_prefix={}/", found.display()));
