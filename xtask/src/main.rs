@@ -50,7 +50,8 @@ enum Command {
     Bench(sim::BenchArgs),
     /// Offer the simulated board as a serial port
     Serve(sim::ServeArgs),
-    /// Look for inputs that break the interpreter or the machine; fail on a finding
+    /// Look for inputs that break the interpreter or the machine, by fuzzing; fail on a finding.
+    /// Corpus and findings are kept in target/fuzz, and the next run goes on from there
     Fuzz(fuzz::FuzzArgs),
     /// Run every check: format, lints, host tests, firmware, sizes, simulator
     Test,

@@ -16,7 +16,7 @@ use kerf::units::Length;
 pub fn check(input: &[u8]) {
     let (mut usual, mut odd) = (Interpreter::new(), Interpreter::new());
     for line in input.split(|byte| *byte == b'\n') {
-        let before = usual.clone();
+        let before = usual;
         let outcome = Outcome::of(&mut usual, line, &Usual);
         fast_path(&before, line, &usual, &outcome);
         arc(&before, &outcome.out);
@@ -34,7 +34,7 @@ struct Outcome {
 impl Outcome {
     /// Interprets a line and checks what holds for any.
     fn of(interpreter: &mut Interpreter, line: &[u8], axes: &impl Axes) -> Self {
-        let before = interpreter.clone();
+        let before = *interpreter;
         let mut out = Commands::default();
         let result = interpreter.interpret(line, axes, &mut out);
         match result {
@@ -57,7 +57,7 @@ impl Outcome {
 /// The fast path alone, from `before` on, and the general one alone, against what both together did.
 fn fast_path(before: &Interpreter, line: &[u8], after: &Interpreter, outcome: &Outcome) {
     for numbered in [false, true] {
-        let (mut fast, mut out) = (before.clone(), Commands::default());
+        let (mut fast, mut out) = (*before, Commands::default());
         if !fast.usual(line, numbered, &Usual, &mut out) {
             assert_eq!(fast, *before, "declined, changed all the same");
             assert_eq!(out, Commands::default(), "declined");
@@ -65,7 +65,7 @@ fn fast_path(before: &Interpreter, line: &[u8], after: &Interpreter, outcome: &O
         }
         assert_eq!(fast, *after, "numbered: {numbered}");
         assert_eq!(Outcome { result: Ok(Info::default()), out }, *outcome);
-        let mut general = before.clone();
+        let mut general = *before;
         assert_eq!(Outcome::of(&mut general, line, &Endless), *outcome, "the general path");
         assert_eq!(general, *after, "the general path");
     }

@@ -88,6 +88,8 @@ impl Talk {
             let heard = self.ears.answers;
             assert!(silent < PATIENCE_MS, "{heard} of {expected} lines are answered");
         }
+        let heard = self.ears.answers;
+        assert!(self.mute || heard == expected, "{heard} answers to {expected} lines");
         Ok(())
     }
 
