@@ -41,7 +41,7 @@ impl Links {
             mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),
             tx: Mutex::new(Tx::new(tx, rate)),
-            unasked: Mutex::new(()),
+            enquiry: Cell::new(false),
             // Their defaults come when they are in place: they would take as much of the stack.
             settings: RefCell::new(Settings::blank()),
             model: RefCell::new(Interpreter::new()),

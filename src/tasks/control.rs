@@ -1,15 +1,13 @@
 //! The control task: real-time characters, which act at once and get no response.
 //!
 //! Reads what the receive interrupt picked off; waits on [`Event::Realtime`]. `^x` resets the machine.
-//! ENQ asks whether anybody is there. Hold, resume, flush and kill are taken out of the stream and
-//! otherwise without effect so far.
+//! ENQ asks whether anybody is there, which the reporter answers. Hold, resume, flush and kill are taken
+//! out of the stream and otherwise without effect so far.
 
 use super::links::Links;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::{reset, uart};
-use crate::protocol::Out;
 use crate::realtime::{ENQUIRY, RESET};
-use crate::text;
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
@@ -23,16 +21,8 @@ pub async fn run(links: &'static Links) -> ! {
             reset();
         }
         if characters & ENQUIRY != 0 {
-            acknowledge(links).await;
+            links.enquiry.set(true);
+            links.reporter_wake.urge();
         }
     }
-}
-
-async fn acknowledge(links: &Links) {
-    let (mut tx, _turn) = links.speak().await;
-    tx.room().await;
-    for byte in text!("{\"ack\":true}\n").bytes() {
-        tx.put(byte);
-    }
-    tx.flush();
 }

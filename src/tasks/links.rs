@@ -21,7 +21,7 @@
 use core::cell::{Cell, RefCell, UnsafeCell};
 
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
-use embassy_sync::mutex::{Mutex, MutexGuard};
+use embassy_sync::mutex::Mutex;
 
 use super::lines::LinePool;
 use super::tx::Tx;
@@ -63,28 +63,17 @@ pub struct Links {
     pub mode: Cell<Mode>,
     /// What status reports hold.
     pub report: RefCell<StatusReport>,
-    /// The line to the sender. Two tasks use it, for a mutex knows of one that waits, and two would keep waking
-    /// each other: the parser, and whoever has `unasked`.
+    /// The line to the sender, for the parser and the reporter. The mutex knows of one task that waits: two
+    /// would keep waking each other.
     pub tx: Mutex<NoopRawMutex, Tx>,
-    /// Whose turn it is to say what nobody asked for: the reporter's or the control task's.
-    pub unasked: Mutex<NoopRawMutex, ()>,
+    /// The sender asks whether anybody is there: control sets it, the reporter answers.
+    pub enquiry: Cell<bool>,
     /// A setting has changed since the planner looked.
     pub settings_changed: Cell<bool>,
     /// Settings in force.
     pub settings: RefCell<Settings>,
     /// The G-code model. The parser advances it; reports read it.
     pub model: RefCell<Interpreter>,
-}
-
-/// A turn to say what nobody asked for.
-pub type Unasked<'a> = (MutexGuard<'a, NoopRawMutex, Tx>, MutexGuard<'a, NoopRawMutex, ()>);
-
-impl Links {
-    /// The line to the sender, for what nobody asked for.
-    pub async fn speak(&self) -> Unasked<'_> {
-        let turn = self.unasked.lock().await;
-        (self.tx.lock().await, turn)
-    }
 }
 
 /// Counts blocks through the queue, modulo 2^16.

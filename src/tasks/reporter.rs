@@ -1,4 +1,4 @@
-//! The reporter task: the greeting, then status and queue reports.
+//! The reporter task: the greeting, then status and queue reports, exceptions, and the answer to ENQ.
 //!
 //! Reads everything through [`View`], writes to the sender; waits for something to report, and polls
 //! every [`POLL_MS`] while the machine is busy; it is not woken besides then, unless queue reports are
@@ -15,8 +15,9 @@ use super::view::{RUN, View};
 use crate::hal::imp::time::millis;
 use crate::motion::queue;
 use crate::protocol::notice::{Banner, Exception};
-use crate::protocol::{Machine, Report, Value, queue_report};
+use crate::protocol::{Machine, Out, Report, Value, queue_report};
 use crate::status::Status;
+use crate::text;
 
 /// How often a busy machine is looked at, ms.
 const POLL_MS: u64 = 10;
@@ -34,6 +35,9 @@ pub async fn run(links: &'static Links) -> ! {
     let mut told = Told { state: 0, blocks_free: queue::free(), at: millis() };
     let mut due = true;
     loop {
+        if links.enquiry.take() {
+            acknowledge(links).await;
+        }
         let state = View::of(links).state();
         if let Some(status) = links.exception.take() {
             report_exception(links, status).await;
@@ -79,13 +83,20 @@ async fn send(links: &Links, tx: &mut Tx, mut step: impl FnMut(&mut View, &mut T
 }
 
 async fn greet(links: &Links) {
-    let (mut tx, _turn) = links.speak().await;
+    let mut tx = links.tx.lock().await;
     let mut banner = Banner::begin(&View::of(links));
     send(links, &mut tx, |view, tx| banner.step(view, tx)).await;
 }
 
+async fn acknowledge(links: &Links) {
+    let mut tx = links.tx.lock().await;
+    tx.room().await;
+    tx.put_text(text!("{\"ack\":true}\n"));
+    tx.flush();
+}
+
 async fn report_status(links: &Links) {
-    let (mut tx, _turn) = links.speak().await;
+    let mut tx = links.tx.lock().await;
     let report = Report::begin(links.mode.get(), &mut View::of(links));
     if let Some(mut report) = report {
         send(links, &mut tx, |view, tx| report.step(view, tx)).await;
@@ -93,7 +104,7 @@ async fn report_status(links: &Links) {
 }
 
 async fn report_exception(links: &Links, status: Status) {
-    let (mut tx, _turn) = links.speak().await;
+    let mut tx = links.tx.lock().await;
     let mut exception = Exception::begin(status, &View::of(links));
     send(links, &mut tx, |view, tx| exception.step(view, tx)).await;
 }
@@ -101,7 +112,7 @@ async fn report_exception(links: &Links, status: Status) {
 /// Returns the number of free blocks as it was told, which may have changed during the wait for the
 /// transmitter.
 async fn report_queue(links: &Links) -> usize {
-    let (mut tx, _turn) = links.speak().await;
+    let mut tx = links.tx.lock().await;
     let mut told = 0;
     send(links, &mut tx, |view, tx| {
         told = view.value(Value::QueueFree) as usize;
