@@ -82,6 +82,7 @@ impl Talk {
         let mut silent = 0;
         while !self.run(LOOK_MS, |ears| ears.answers >= expected)? {
             silent = if stepper::running() || self.ears.listening() { 0 } else { silent + LOOK_MS };
+            self.go_on();
             if self.mute && silent >= LAST_MS {
                 break;
             }
@@ -118,10 +119,18 @@ impl Talk {
             let quiet = said == self.ears.answers && !self.ears.listening();
             let busy = snapshot().running || queue::used() > 0;
             idle = if busy || stepper::running() || !quiet { 0 } else { idle + LOOK_MS };
+            self.go_on();
             still = if busy && !stepper::running() { still + LOOK_MS } else { 0 };
             assert!(still < PATIENCE_MS, "stands still with {} blocks to do", queue::used());
         }
         Ok(())
+    }
+
+    /// Cycle start, should a program have stopped.
+    fn go_on(&self) {
+        if !stepper::running() {
+            self.machine.send(b"~");
+        }
     }
 
     /// Runs until `done`, for `ms` at most. Whether it came to that.
