@@ -1,6 +1,6 @@
 //! Arduino Mega 2560 with a grbl-style shield: the pinout of grbl-Mega.
 
-use super::Port::{A, B, C, H};
+use super::Port::{A, B, C, E, H};
 use super::{Board, MotorPins, Timer, pin};
 
 /// Arduino Mega 2560 with a grbl-style shield.
@@ -13,8 +13,10 @@ pub const MEGA2560_GRBL: Board = Board {
         MotorPins { step: pin(A, 4), dir: pin(C, 5), enable: None }, // D26, D32
         MotorPins { step: pin(A, 5), dir: pin(C, 4), enable: None }, // D27, D33
     ],
-    enable_all: Some(pin(B, 7)),                            // D13
-    hazards: &[pin(H, 3), pin(H, 4), pin(H, 5), pin(H, 6)], // D6 to D9: spindle, coolant
+    enable_all: Some(pin(B, 7)), // D13
+    // D5 to D9: spindle direction, enable and PWM, flood, mist
+    hazards: &[pin(E, 3), pin(H, 3), pin(H, 4), pin(H, 5), pin(H, 6)],
+    outputs: [Some(pin(H, 3)), Some(pin(E, 3)), Some(pin(H, 6)), Some(pin(H, 5))],
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

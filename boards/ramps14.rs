@@ -1,6 +1,6 @@
 //! Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder.
 
-use super::Port::{A, B, D, F, H, K, L};
+use super::Port::{A, B, D, E, F, G, H, K, L};
 use super::{Board, MotorPins, Timer, pin};
 
 /// Arduino Mega 2560 with RAMPS 1.4.
@@ -14,7 +14,10 @@ pub const RAMPS14: Board = Board {
         MotorPins { step: pin(A, 4), dir: pin(A, 6), enable: Some(pin(A, 2)) }, // E0: D26, D28, D24
     ],
     enable_all: None,
-    hazards: &[pin(B, 4), pin(H, 5), pin(H, 6)], // D10, D8, D9: hot end, bed, fan
+    // D10, D8, D9: hot end, bed, fan; then the outputs
+    hazards: &[pin(B, 4), pin(H, 5), pin(H, 6), pin(G, 5), pin(E, 3), pin(H, 3), pin(B, 5)],
+    // D4, D5, D6, D11: the servo headers, for nobody wants M8 to heat
+    outputs: [Some(pin(G, 5)), Some(pin(E, 3)), Some(pin(H, 3)), Some(pin(B, 5))],
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

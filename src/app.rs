@@ -32,6 +32,8 @@ impl Links {
             commands: RefCell::new(Commands::default()),
             commands_taken: Cell::new(false),
             planner_wake: Wake::default(),
+            cycle_start: Wake::default(),
+            stopped: Cell::new(false),
             reporter_wake: News::default(),
             queue_count: QueueCount::default(),
             resync: Cell::new(false),
@@ -73,6 +75,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     let links = place(outgoing, rate);
     links.settings.borrow_mut().set_defaults();
     set_outputs(&links.settings.borrow());
+    links.model.borrow_mut().start(&*links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received).ok()?);
     main.spawn(planner_task(links, queue).ok()?);

@@ -106,6 +106,17 @@ pub enum Timer {
     T5,
 }
 
+/// Outputs that a program switches, as bits; of [`Board::outputs`] the index is the number of the bit.
+#[allow(missing_docs)]
+pub mod outputs {
+    pub const SPINDLE: u8 = 1;
+    pub const COUNTERCLOCKWISE: u8 = 2;
+    pub const MIST: u8 = 4;
+    pub const FLOOD: u8 = 8;
+    /// How many there are.
+    pub const COUNT: usize = 4;
+}
+
 /// A board.
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
@@ -119,6 +130,8 @@ pub struct Board {
     pub enable_all: Option<Pin>,
     /// Outputs that the panic handler drives low: spindles, heaters, fans.
     pub hazards: &'static [Pin],
+    /// What M3 to M9 switch, active high: see [`outputs`]. Hazards, all of them.
+    pub outputs: [Option<Pin>; outputs::COUNT],
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,
     /// Timer of the 1 kHz tick.
@@ -186,6 +199,31 @@ impl Board {
             self.step_timer as u8 != self.tick_timer as u8,
             "a timer of this board is used twice"
         );
+        self.check_outputs();
+    }
+
+    /// Panics if an output would stay on after a panic, or is switched by two codes.
+    const fn check_outputs(&self) {
+        let mut seen = 0u8;
+        let mut o = 0;
+        while o < outputs::COUNT {
+            let mut found = self.outputs[o].is_none();
+            let mut h = 0;
+            while h < self.hazards.len() {
+                let hazard = self.hazards[h];
+                if let Some(pin) = self.outputs[o]
+                    && pin.port as u8 == hazard.port as u8
+                    && pin.bit == hazard.bit
+                {
+                    assert!(seen & 1 << h == 0, "an output of this board is used twice");
+                    seen |= 1 << h;
+                    found = true;
+                }
+                h += 1;
+            }
+            assert!(found, "an output of this board is not among its hazards");
+            o += 1;
+        }
     }
 }
 
@@ -246,6 +284,20 @@ mod tests {
     fn the_serial_line_is_taken() {
         const TAKEN: &[Pin] = &[pin(Port::E, 1)];
         Board { hazards: TAKEN, ..MEGA2560_GRBL }.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "not among its hazards")]
+    fn outputs_are_hazards() {
+        Board { hazards: &[], ..MEGA2560_GRBL }.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "output of this board is used twice")]
+    fn an_output_that_is_used_twice_is_refused() {
+        let mut board = MEGA2560_GRBL;
+        board.outputs[1] = board.outputs[0];
+        board.check();
     }
 
     #[test]

@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 
 use kerf::gcode::Interpreter;
 use kerf::gcode::arc::Chords;
-use kerf::gcode::axes::Usual;
 use kerf::gcode::command::{Arc, Commands, Motion};
+use kerf::gcode::setup::Usual;
 use kerf::units::{Length, PerAxis};
 use proptest::prelude::*;
 

@@ -137,6 +137,11 @@ impl Settings {
         self.system_large(system::CT) as f32 * 1e-6
     }
 
+    /// Whether M0, M1 and M60 wait for cycle start.
+    pub fn waits_at_stop(&self) -> bool {
+        self.system(system::PSW) != 0
+    }
+
     /// Whether moves beyond the travel are refused.
     pub fn soft_limits(&self) -> bool {
         self.system(system::SL) != 0

@@ -168,7 +168,7 @@ impl Settings {
         if axis <= FIRST_ROTARY { self.axis(axis, slot) } else { 0 }
     }
 
-    fn system(&self, slot: u8) -> u8 {
+    pub(crate) fn system(&self, slot: u8) -> u8 {
         self.small(small_of(AXES as u8) + slot)
     }
 

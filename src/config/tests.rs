@@ -160,7 +160,7 @@ fn getters_have_their_units() {
 
 #[test]
 fn ram_is_accounted_for() {
-    assert_eq!(size_of::<Settings>(), 408);
+    assert_eq!(size_of::<Settings>(), 412);
     assert!(size_of::<Row>() * 51 + (28 + 7 * 4 + 16 * 6) * 4 < 2048);
 }
 

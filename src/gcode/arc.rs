@@ -1,6 +1,6 @@
 //! Arcs as chords.
 //!
-//! [`Chords`] turns the vector from the centre to the start (the spoke) by an angle that grows evenly,
+//! A [`Walk`] turns the vector from the centre to the start (the spoke) by an angle that grows evenly,
 //! and adds the centre. The angle is a binary fraction of a turn in a `u32`, so whole turns wrap and
 //! nothing drifts; sine and cosine are evaluated anew for every chord, so no error grows along the
 //! arc: a point is within 1 um of the circle up to a radius of a few metres, and the last point is
@@ -10,7 +10,7 @@
 //! Where the radius at the end differs from that at the start (by what the interpreter tolerates),
 //! the radius changes evenly along the arc.
 //!
-//! Cost on AVR: [`Chords::new`] 13,000 cycles; a chord 8,700, and 600 for each other axis that moves.
+//! Cost on AVR: [`Walk::new`] 13,000 cycles; a chord 8,700, and 600 for each other axis that moves.
 
 use core::f32::consts::TAU;
 
@@ -25,11 +25,10 @@ const SAME_RADIUS: f32 = 2.0;
 /// Binary fractions in a turn.
 const TURN: f32 = 4_294_967_296.0;
 
-/// The ends of the chords of an arc, in order; the last one is the target.
-pub struct Chords<'a> {
-    arc: &'a Arc,
+/// How far the chords of an arc have come. The arc and its target stay where they are: see [`Chords`].
+#[derive(Clone, Copy, Debug)]
+pub struct Walk {
     start: PerAxis<Length>,
-    target: &'a PerAxis<Length>,
     /// From the centre to the start.
     spoke: [f32; 2],
     /// By what part of itself the radius grows along the arc.
@@ -45,12 +44,12 @@ pub struct Chords<'a> {
     part: f32,
 }
 
-impl<'a> Chords<'a> {
+impl Walk {
     /// The arc from `start` to `target`; the chords leave it by `tolerance` mm at most.
     pub fn new(
         start: &PerAxis<Length>,
-        target: &'a PerAxis<Length>,
-        arc: &'a Arc,
+        target: &PerAxis<Length>,
+        arc: &Arc,
         tolerance: f32,
     ) -> Self {
         let (spoke, end) = (spoke(start, arc), spoke(target, arc));
@@ -63,9 +62,7 @@ impl<'a> Chords<'a> {
         let turned = u64::from(arc.extra_turns) << 32 | u64::from((part * TURN) as u32);
         let step = (turned / u64::from(count)) as u32;
         Self {
-            arc,
             start: *start,
-            target,
             spoke,
             growth: if grows { end_radius / radius - 1.0 } else { 0.0 },
             length: norm([planar, way(start, target, arc.linear)]),
@@ -82,15 +79,31 @@ impl<'a> Chords<'a> {
         self.length * 1e-4
     }
 
-    /// Number of chords in all.
-    pub fn total(&self) -> u32 {
-        self.count
+    /// The end of the next chord; `None` when there is none.
+    pub fn next(&mut self, arc: &Arc, target: &PerAxis<Length>) -> Option<PerAxis<Length>> {
+        if self.done >= self.count {
+            return None;
+        }
+        self.done += 1;
+        if self.done == self.count {
+            return Some(*target);
+        }
+        self.angle = self.angle.wrapping_add(self.step);
+        let done = self.done as f32 * self.part;
+        let mut point = self.others(target, done);
+        let axes = [arc.first, arc.second];
+        for (axis, length) in axes.into_iter().zip(self.in_plane(arc, done)) {
+            if let Some(at) = point.get_mut(usize::from(axis)) {
+                *at = length;
+            }
+        }
+        Some(point)
     }
 
     /// The axes outside the plane, `done` being the part of the way that is behind.
-    fn others(&self, done: f32) -> PerAxis<Length> {
+    fn others(&self, target: &PerAxis<Length>, done: f32) -> PerAxis<Length> {
         let mut point = self.start;
-        for (at, target) in point.iter_mut().zip(self.target) {
+        for (at, target) in point.iter_mut().zip(target) {
             if at != target {
                 let way = target.0.saturating_sub(at.0);
                 at.0 = at.0.saturating_add(round(way as f32 * done));
@@ -100,7 +113,7 @@ impl<'a> Chords<'a> {
     }
 
     /// The two coordinates in the plane.
-    fn in_plane(&self, done: f32) -> [Length; 2] {
+    fn in_plane(&self, arc: &Arc, done: f32) -> [Length; 2] {
         // Signed: a float is the more precise the smaller it is.
         let angle = self.angle as i32 as f32 * (TAU / TURN);
         let (sin, cos) = (math::sin(angle), math::cos(angle));
@@ -110,9 +123,38 @@ impl<'a> Chords<'a> {
             let scale = 1.0 + self.growth * done;
             offset = offset.map(|component| component * scale);
         }
-        let [first, second] = self.arc.center;
+        let [first, second] = arc.center;
         [(first, offset[0]), (second, offset[1])]
             .map(|(center, offset)| Length(center.0.saturating_add(round(offset))))
+    }
+}
+
+/// The ends of the chords of an arc, in order; the last one is the target.
+pub struct Chords<'a> {
+    arc: &'a Arc,
+    target: &'a PerAxis<Length>,
+    walk: Walk,
+}
+
+impl<'a> Chords<'a> {
+    /// The arc from `start` to `target`; the chords leave it by `tolerance` mm at most.
+    pub fn new(
+        start: &PerAxis<Length>,
+        target: &'a PerAxis<Length>,
+        arc: &'a Arc,
+        tolerance: f32,
+    ) -> Self {
+        Self { arc, target, walk: Walk::new(start, target, arc, tolerance) }
+    }
+
+    /// Length of the whole path (arc, or helix), in mm.
+    pub fn length(&self) -> f32 {
+        self.walk.length()
+    }
+
+    /// Number of chords in all.
+    pub fn total(&self) -> u32 {
+        self.walk.count
     }
 }
 
@@ -120,27 +162,11 @@ impl Iterator for Chords<'_> {
     type Item = PerAxis<Length>;
 
     fn next(&mut self) -> Option<PerAxis<Length>> {
-        if self.done >= self.count {
-            return None;
-        }
-        self.done += 1;
-        if self.done == self.count {
-            return Some(*self.target);
-        }
-        self.angle = self.angle.wrapping_add(self.step);
-        let done = self.done as f32 * self.part;
-        let mut point = self.others(done);
-        let axes = [self.arc.first, self.arc.second];
-        for (axis, length) in axes.into_iter().zip(self.in_plane(done)) {
-            if let Some(at) = point.get_mut(usize::from(axis)) {
-                *at = length;
-            }
-        }
-        Some(point)
+        self.walk.next(self.arc, self.target)
     }
 
     fn size_hint(&self) -> (usize, Option<usize>) {
-        let left = usize::try_from(self.count - self.done);
+        let left = usize::try_from(self.walk.count - self.walk.done);
         (left.unwrap_or(usize::MAX), left.ok())
     }
 }
@@ -272,7 +298,7 @@ mod tests {
             [(start, start, 1.0), (start, far, 0.01), (far, far, 0.0), (far, start, f32::NAN)]
         {
             let mut chords = Chords::new(&start, &target, const { &ARC }, tolerance);
-            chords.count = chords.count.min(100);
+            chords.walk.count = chords.walk.count.min(100);
             assert_eq!(chords.last(), Some(target));
         }
         const ARC: Arc = Arc {

@@ -1,52 +1,12 @@
 //! What the words of an axis mean: its mode, and lengths as angles.
-//!
-//! Who interprets lines says so by an [`Axes`], which the settings are (`tasks::axes`).
 
-use super::block::Block;
 use super::modal::Units;
-use super::number::{Decimal, Exact};
+use super::number::Decimal;
+pub(super) use super::number::Exact as Value;
+use super::number::Exact;
+use super::setup::{AxisMode, Setup};
 use crate::status::Status;
 use crate::units::{FIRST_ROTARY, Length};
-
-/// How an axis takes its words. The discriminants are TinyG's numbers.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(u8)]
-pub enum AxisMode {
-    /// Words are accepted and mean nothing: the axis stays where it is.
-    Disabled = 0,
-    /// Lengths, or degrees of an axis that turns.
-    Standard = 1,
-    /// As standard; the position goes on, the motors stand still.
-    Inhibited = 2,
-    /// Of an axis that turns: lengths along a circumference.
-    Radius = 3,
-}
-
-/// What the interpreter asks about the axes, X Y Z A B C from 0.
-pub trait Axes {
-    /// How an axis takes its words.
-    fn mode(&self, axis: u8) -> AxisMode;
-    /// The radius that turns a length into an angle, nm; more than 0.
-    fn radius(&self, axis: u8) -> u32;
-    /// The ends of its travel in machine coordinates, if moves beyond them are to be refused.
-    fn travel(&self, axis: u8) -> Option<(Length, Length)>;
-}
-
-/// All axes as usual.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Usual;
-
-impl Axes for Usual {
-    fn mode(&self, _axis: u8) -> AxisMode {
-        AxisMode::Standard
-    }
-    fn radius(&self, _axis: u8) -> u32 {
-        1
-    }
-    fn travel(&self, _axis: u8) -> Option<(Length, Length)> {
-        None
-    }
-}
 
 /// The length that a word gives, whatever the axis.
 pub(super) fn length(word: &Decimal, units: Units) -> Result<Exact, Status> {
@@ -61,25 +21,15 @@ pub(super) fn value(
     word: &Decimal,
     axis: u8,
     units: Units,
-    axes: &impl Axes,
+    setup: &impl Setup,
 ) -> Result<Option<Exact>, Status> {
-    match axes.mode(axis) {
+    match setup.mode(axis) {
         AxisMode::Disabled => Ok(None),
-        AxisMode::Radius => angle(length(word, units)?, axes.radius(axis)).map(Some),
+        AxisMode::Radius => angle(length(word, units)?, setup.radius(axis)).map(Some),
         // Degrees are degrees in all units.
         _ if usize::from(axis) >= FIRST_ROTARY => word.mm().map(Some),
         _ => length(word, units).map(Some),
     }
-}
-
-/// Takes the word of an axis from the line.
-pub(super) fn take(
-    block: &mut Block,
-    axis: u8,
-    units: Units,
-    axes: &impl Axes,
-) -> Result<Option<Exact>, Status> {
-    block.take(axis).map_or(Ok(None), |word| value(&word, axis, units, axes))
 }
 
 /// Units of angle for a unit of length at a radius of 1 nm (10^6 * 180 / pi), times [`SCALE`].

@@ -1,80 +1,51 @@
 //! One line, read but not yet carried out: its codes by modal group, its numbers by letter.
 //!
-//! The interpreter takes the numbers out as it uses them; whatever is left at the end belongs to
-//! nothing on the line, which is refused. Lives on the stack for the time of one line.
+//! While it is read it collects what its codes take and need, so that [`Block::check`] can refuse it
+//! before anything is done. Lives on the stack for the time of one line.
 
 use heapless::Vec;
 use nom::Offset;
 
-use super::codes::{self, Action, NonModal};
-use super::command::Stop;
+use super::codes::{self, Action, Code, NonModal, OverrideCode, StopCode, ToolLength};
 use super::lexer::{self, Item};
-use super::modal::{Distance, FeedMode, MotionMode, PathMode, Plane, Units};
+use super::modal::{
+    ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, Turn, Units,
+};
 use super::number::Decimal;
+use super::words::{self, AXES};
 use crate::status::Status;
-use crate::units::AXES;
-
-/// The words with a number that counts, axes first.
-pub mod slot {
-    /// I, of I J K.
-    pub const I: u8 = 6;
-    pub const R: u8 = 9;
-    pub const P: u8 = 10;
-    pub const F: u8 = 11;
-    pub const N: u8 = 12;
-    /// How many there are.
-    pub const COUNT: usize = 13;
-    /// No such word.
-    pub const NONE: u8 = 255;
-
-    /// X Y Z A B C, as bits.
-    pub const AXES: u16 = 0x3F;
-    /// I J K, as bits.
-    pub const OFFSETS: u16 = 7 << I;
-}
-
-crate::progmem! {
-    /// The slot of each letter, A to Z.
-    static SLOT: [u8; 26] = {
-        let mut table = [slot::NONE; 26];
-        let letters = *b"XYZABCIJKRPFN";
-        let mut i = 0;
-        while i < slot::COUNT {
-            table[(letters[i] - b'A') as usize] = i as u8;
-            i += 1;
-        }
-        table
-    };
-    /// The bit of each slot: quicker than to shift one there.
-    static BIT: [u16; slot::COUNT] = {
-        let mut table = [0; slot::COUNT];
-        let mut i = 0;
-        while i < slot::COUNT {
-            table[i] = 1 << i;
-            i += 1;
-        }
-        table
-    };
-}
+use crate::units;
 
 /// The parts of a line.
+#[derive(Default)]
 pub struct Block {
     pub non_modal: Option<NonModal>,
     pub motion: Option<MotionMode>,
     pub plane: Option<Plane>,
     pub distance: Option<Distance>,
+    pub arc_distance: Option<ArcDistance>,
     pub feed_mode: Option<FeedMode>,
     pub units: Option<Units>,
+    cutter: Option<()>,
+    pub tool_length: Option<ToolLength>,
+    pub retract: Option<Retract>,
+    pub system: Option<u8>,
     pub path: Option<PathMode>,
-    pub stop: Option<Stop>,
-    /// `OnlyMode` bits.
-    only: u8,
-    /// Slots that are filled and not taken.
-    present: u16,
-    /// What was in them, in the order of the line.
-    values: Vec<(u8, Decimal), { slot::COUNT }>,
-    /// Begins with a slash: the rest was not looked at.
-    pub deleted: bool,
+    pub stop: Option<StopCode>,
+    tool_change: Option<()>,
+    pub spindle: Option<Turn>,
+    pub coolant: Option<Coolant>,
+    pub overrides: Option<OverrideCode>,
+    /// The words that its codes take, those that two of them take, and those that they need, as sets.
+    taken: u32,
+    taken_twice: u32,
+    needed: u32,
+    /// The words it has, as a set.
+    present: u32,
+    /// Their numbers, in the order of the line.
+    values: Vec<(u8, Decimal), { words::COUNT }>,
+    /// Begins with a slash: block delete.
+    pub slashed: bool,
     /// Where in the line the text of a message lies.
     pub message: Option<(u8, u8)>,
     /// Has a comment.
@@ -82,37 +53,19 @@ pub struct Block {
 }
 
 impl Block {
-    /// An empty line.
-    #[inline(always)]
-    pub fn new() -> Self {
-        Self {
-            non_modal: None,
-            motion: None,
-            plane: None,
-            distance: None,
-            feed_mode: None,
-            units: None,
-            path: None,
-            stop: None,
-            only: 0,
-            present: 0,
-            values: Vec::new(),
-            deleted: false,
-            message: None,
-            commented: false,
-        }
-    }
-
-    /// Reads a line.
-    pub fn read(&mut self, line: &[u8]) -> Result<(), Status> {
+    /// Reads a line into an empty block. One that begins with a slash is read no further if `deletes`.
+    pub fn read(&mut self, line: &[u8], deletes: bool) -> Result<(), Status> {
         if line.len() > u8::MAX as usize {
             return Err(Status::InputTooLong);
         }
-        let (rest, _) = lexer::blanks(line).map_err(status)?;
+        let (mut rest, _) = lexer::blanks(line).map_err(status)?;
         match rest.split_first() {
-            Some((b'/', _)) => {
-                self.deleted = true;
-                return Ok(());
+            Some((b'/', after)) => {
+                self.slashed = true;
+                if deletes {
+                    return Ok(());
+                }
+                (rest, _) = lexer::blanks(after).map_err(status)?;
             }
             // The ends of a program file.
             Some((b'%', after)) if after.iter().all(|&byte| lexer::is_blank(byte)) => return Ok(()),
@@ -141,39 +94,49 @@ impl Block {
         match letter {
             b'G' => {
                 let code = value.code().and_then(|(whole, tenth)| codes::g(whole, tenth));
-                self.code(code.ok_or(Status::GcodeUnsupported)?)
+                self.code(&code.ok_or(Status::GcodeUnsupported)?)
             }
             b'M' => {
                 let code = value.code().and_then(|(whole, tenth)| codes::m(whole, tenth));
-                self.code(code.ok_or(Status::McodeUnsupported)?)
+                self.code(&code.ok_or(Status::McodeUnsupported)?)
             }
             _ => self.value(letter, value),
         }
     }
 
-    fn code(&mut self, action: Action) -> Result<(), Status> {
-        match action {
+    #[inline(never)]
+    fn code(&mut self, code: &Code) -> Result<(), Status> {
+        self.taken_twice |= self.taken & code.takes;
+        self.taken |= code.takes;
+        self.needed |= code.needs;
+        let is_first = match code.action {
             Action::NonModal(code) => first(&mut self.non_modal, code),
             Action::Motion(mode) => first(&mut self.motion, mode),
             Action::Plane(plane) => first(&mut self.plane, plane),
             Action::Distance(mode) => first(&mut self.distance, mode),
+            Action::ArcDistance(mode) => first(&mut self.arc_distance, mode),
             Action::FeedMode(mode) => first(&mut self.feed_mode, mode),
             Action::Units(units) => first(&mut self.units, units),
+            Action::CutterOff => first(&mut self.cutter, ()),
+            Action::CutterOn => return Err(Status::CutterCompensation),
+            Action::ToolLength(code) => first(&mut self.tool_length, code),
+            Action::Retract(mode) => first(&mut self.retract, mode),
+            Action::System(number) => first(&mut self.system, number),
             Action::Path(mode) => first(&mut self.path, mode),
             Action::Stop(stop) => first(&mut self.stop, stop),
-            Action::Only(mode) => {
-                let seen = self.only & mode as u8 != 0;
-                self.only |= mode as u8;
-                if seen { Err(Status::ModalGroupViolation) } else { Ok(()) }
-            }
-        }
+            Action::ToolChange => first(&mut self.tool_change, ()),
+            Action::Spindle(turn) => first(&mut self.spindle, turn),
+            Action::Coolant(coolant) => first(&mut self.coolant, coolant),
+            Action::Override(code) => first(&mut self.overrides, code),
+        };
+        if is_first { Ok(()) } else { Err(Status::ModalGroupViolation) }
     }
 
     fn value(&mut self, letter: u8, value: Decimal) -> Result<(), Status> {
-        let slot = SLOT.at(usize::from(letter.wrapping_sub(b'A'))).unwrap_or(slot::NONE);
-        let bit = BIT.at(slot.into()).ok_or(Status::GcodeUnsupported)?;
+        let slot = words::slot_of(letter).ok_or(Status::GcodeUnsupported)?;
+        let bit = words::bit_of(slot);
         if self.present & bit != 0 {
-            return Err(Status::GcodeGeneric);
+            return Err(Status::WordRepeated);
         }
         self.present |= bit;
         // No slot twice, so there is room for all.
@@ -189,49 +152,72 @@ impl Block {
         }
     }
 
-    /// Whether any of these slots (bits) is filled.
-    pub fn has(&self, slots: u16) -> bool {
-        self.present & slots != 0
+    /// Whether any word of a set is there.
+    pub fn has(&self, set: u32) -> bool {
+        self.present & set != 0
     }
 
-    /// The number in a slot, which is then used.
-    pub fn take(&mut self, slot: u8) -> Option<Decimal> {
-        let bit = BIT.at(slot.into())?;
-        if self.present & bit == 0 {
-            return None;
-        }
-        self.present &= !bit;
-        self.values.iter().find(|word| word.0 == slot).map(|word| word.1)
+    /// The number in a slot.
+    pub fn get(&self, slot: u8) -> Option<&Decimal> {
+        self.values.iter().find(|word| word.0 == slot).map(|word| &word.1)
     }
 
-    /// The axes that the line names.
-    pub fn axes(&self) -> impl Iterator<Item = u8> {
-        self.values.iter().map(|word| word.0).filter(|slot| usize::from(*slot) < AXES)
-    }
-
-    /// All axis words, which are then used. Not for a line whose axes went to [`Self::take`].
-    pub fn take_axes(&mut self) -> impl Iterator<Item = (u8, &Decimal)> {
-        self.present &= !slot::AXES;
+    /// The axis words, in the order of the line.
+    pub fn axes(&self) -> impl Iterator<Item = (u8, &Decimal)> {
         let words = self.values.iter().map(|(slot, value)| (*slot, value));
-        words.filter(|(slot, _)| usize::from(*slot) < AXES)
+        words.filter(|(slot, _)| usize::from(*slot) < units::AXES)
     }
 
-    /// Refuses words that nothing on the line has used.
-    pub fn finish(&self) -> Result<(), Status> {
-        match self.present {
-            0 => Ok(()),
-            left if left & slot::AXES != 0 => Err(Status::AxisNotAllowed),
-            _ => Err(Status::GcodeGeneric),
+    /// M6.
+    pub fn changes_tool(&self) -> bool {
+        self.tool_change.is_some()
+    }
+
+    /// Whether it may change more than modes, the feed, and the position of the axes that it names.
+    pub fn is_rare(&self) -> bool {
+        self.non_modal.is_some()
+            || self.tool_length.is_some()
+            || self.system.is_some()
+            || self.stop.is_some()
+            || self.overrides.is_some()
+            || self.tool_change.is_some()
+            || self.has(words::bit(words::S) | words::bit(words::T))
+    }
+
+    /// The motion that the line asks for while `modal` is in force: that of its code, else the one in
+    /// force if words are left for it.
+    pub fn motion_from(&self, modal: MotionMode) -> Option<MotionMode> {
+        let left = self.present & !self.taken;
+        self.motion.or_else(|| (left & self.taken_by(modal) != 0).then_some(modal))
+    }
+
+    /// The words that are for the motion in force: none if the line has another or its axes are for another
+    /// code.
+    fn taken_by(&self, modal: MotionMode) -> u32 {
+        if self.motion.is_some() || self.taken & AXES != 0 { 0 } else { codes::taken_by(modal) }
+    }
+
+    /// Refuses words that no code takes or that two codes want, and codes without their words.
+    #[inline(never)]
+    pub fn check(&self, modal: MotionMode) -> Result<(), Status> {
+        let unused = self.present & !(self.taken | self.taken_by(modal) | words::ALWAYS);
+        let twice = self.present & self.taken_twice;
+        let missing = self.needed & !self.present;
+        match () {
+            () if twice & AXES != 0 => Err(Status::AxisConflict),
+            () if twice != 0 => Err(Status::WordConflict),
+            () if unused & AXES != 0 => Err(Status::AxisNotAllowed),
+            () if unused != 0 => Err(Status::WordUnused),
+            () if missing & !AXES != 0 => Err(words::missing(missing & !AXES)),
+            () if missing != 0 && !self.has(AXES) => Err(Status::AxisWordMissing),
+            () => Ok(()),
         }
     }
 }
 
-/// Fills a modal group, which takes one code per line.
-fn first<T>(group: &mut Option<T>, code: T) -> Result<(), Status> {
-    match group.replace(code) {
-        None => Ok(()),
-        Some(_) => Err(Status::ModalGroupViolation),
-    }
+/// Fills a modal group, which takes one code a line: false if it had one.
+fn first<T>(group: &mut Option<T>, code: T) -> bool {
+    group.replace(code).is_none()
 }
 
 fn status(error: nom::Err<lexer::Fault>) -> Status {
@@ -246,47 +232,85 @@ mod tests {
     use super::*;
 
     fn read(line: &str) -> Result<Block, Status> {
-        let mut block = Block::new();
-        block.read(line.as_bytes()).map(|()| block)
+        let mut block = Block::default();
+        block.read(line.as_bytes(), true).map(|()| block)
     }
 
     fn refusal(line: &str) -> Status {
         read(line).err().expect(line)
     }
 
+    fn check(line: &str, modal: MotionMode) -> Result<(), Status> {
+        read(line)?.check(modal)
+    }
+
     #[test]
     fn codes_go_to_their_groups() {
-        let block = read("N5 G1 G17 G21 G40 G49 G54 G64 G90 G94 M2 X1").unwrap();
+        let block = read("N5 G1 G17 G21 G40 G49 G54 G64 G90 G94 G98 M2 M3 M6 M7 M48 X1").unwrap();
         assert_eq!(block.motion, Some(MotionMode::Feed));
-        assert_eq!(block.stop, Some(Stop::End));
-        assert!(block.has(slot::AXES) && !block.has(slot::OFFSETS));
+        assert_eq!(block.stop, Some(StopCode::End));
+        assert!(block.has(AXES) && !block.has(words::OFFSETS) && block.changes_tool());
     }
 
     #[test]
     fn one_code_of_each_group() {
         let twice = ["G0 G1", "G17 G19", "G20 G21", "G90 G91", "G93 G94", "G61 G61.1", "G4 G92"];
-        for line in twice.iter().chain(&["M0 M30", "G40 G40", "G1 G1", "G80 G0"]) {
+        let more = ["M0 M30", "G40 G40", "G1 G1", "G80 G0", "G54 G59.3", "G98 G99", "M3 M5"];
+        let last = ["M7 M9", "M6 M6", "M48 M50", "G43 G49", "G90.1 G91.1", "G38.2 G81", "G53 G10"];
+        for line in twice.iter().chain(&more).chain(&last) {
             assert_eq!(refusal(line), Status::ModalGroupViolation, "{line}");
         }
-        assert_eq!(refusal("X1 Y2 X3"), Status::GcodeGeneric);
+        assert_eq!(refusal("X1 Y2 X3"), Status::WordRepeated);
     }
 
     #[test]
     fn what_the_machine_does_not_have() {
-        for line in ["G5", "G256", "G28", "G28.35", "G61.2", "G55", "G-1", "G41", "S100", "T1"] {
+        for line in ["G5", "G256", "G28.35", "G61.2", "G59.4", "G-1", "D1", "E1", "O1", "U1", "V1"]
+        {
             assert_eq!(refusal(line), Status::GcodeUnsupported, "{line}");
         }
-        for line in ["D1", "E1", "H1", "L1", "O1", "Q1", "U1", "V1", "W1"] {
-            assert_eq!(refusal(line), Status::GcodeUnsupported, "{line}");
-        }
-        for line in ["M3", "M256", "M30.1", "M6"] {
+        for line in ["M10", "M256", "M30.1", "M3.1"] {
             assert_eq!(refusal(line), Status::McodeUnsupported, "{line}");
         }
+        assert_eq!(refusal("G41 D1"), Status::CutterCompensation);
+    }
+
+    #[test]
+    fn words_belong_to_codes() {
+        use MotionMode::{ClockwiseArc, Feed, None};
+        for (line, modal, status) in [
+            ("X1", None, Status::AxisNotAllowed),
+            ("G80 X1", Feed, Status::AxisNotAllowed),
+            ("G0 I1", Feed, Status::WordUnused),
+            ("P1", Feed, Status::WordUnused),
+            ("G92 X1 G1", Feed, Status::AxisConflict),
+            ("G4 P1 G82 R1", Feed, Status::WordConflict),
+            ("G4", Feed, Status::PWordMissing),
+            ("G10 P1 X1", Feed, Status::LWordMissing),
+            ("G10 L2 X1", Feed, Status::PWordMissing),
+            ("G10 L2 P1", Feed, Status::AxisWordMissing),
+            ("G43.2", Feed, Status::HWordMissing),
+            ("M48.1", Feed, Status::PWordMissing),
+        ] {
+            assert_eq!(check(line, modal), Err(status), "{line}");
+        }
+        for (line, modal) in [("I1", ClockwiseArc), ("G92 X1", Feed), ("G4 P1 X1", Feed)] {
+            assert_eq!(check(line, modal), Ok(()), "{line}");
+        }
+        let moves = |line, modal| read(line).unwrap().motion_from(modal);
+        assert_eq!(moves("G4 P1", ClockwiseArc), Option::None);
+        assert_eq!(moves("G4 P1 X1", ClockwiseArc), Some(ClockwiseArc));
+        assert_eq!(moves("G92 X1", Feed), Option::None);
+        assert_eq!(moves("F100", Feed), Option::None);
+        assert_eq!(moves("G0", Feed), Some(MotionMode::Traverse));
     }
 
     #[test]
     fn slash_percent_and_message() {
-        assert!(read(" /G99 rubbish").unwrap().deleted);
+        assert!(read(" /G99 rubbish").unwrap().slashed);
+        let mut block = Block::default();
+        assert_eq!(block.read(b" / G1 X1", false), Ok(()));
+        assert!(block.slashed && block.has(AXES));
         assert!(read(" % ").is_ok());
         assert_eq!(refusal("% G1"), Status::MalformedCommand);
         assert_eq!(read("G0 (MSG Hello) X1").unwrap().message, Some((7, 13)));

@@ -1,11 +1,14 @@
 //! Which circle the words of a G2 or G3 line describe, and whether they describe one.
 
 use super::arc;
-use super::axes::{self, Axes, AxisMode};
-use super::block::{Block, slot};
+use super::axes;
+use super::block::Block;
 use super::command::{Arc, Commands, Motion};
-use super::interpreter::Interpreter;
+use super::modal::ArcDistance;
 use super::number::Decimal;
+use super::setup::{AxisMode, Setup};
+use super::state::State;
+use super::words::{self, I, OFFSETS, P, R, bit, bit_of};
 use crate::math;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
@@ -22,15 +25,16 @@ const SLACK_PART: f32 = 0.001;
 const MAX_SLACK: f32 = 10_000.0;
 
 /// Words that make a line an arc.
-const ARC_WORDS: u16 = slot::AXES | slot::OFFSETS | 1 << slot::R | 1 << slot::P;
+const ARC_WORDS: u32 = words::AXES | OFFSETS | bit(R) | bit(P);
 
-impl Interpreter {
+impl State {
     /// G2 and G3.
+    #[inline(never)]
     pub(super) fn arc(
         &mut self,
-        block: &mut Block,
+        block: &Block,
         clockwise: bool,
-        axes: &impl Axes,
+        setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
         if !block.has(ARC_WORDS) {
@@ -38,13 +42,13 @@ impl Interpreter {
         }
         let feed = self.rate(block, false)?;
         let [first, second, linear] = self.modal.plane.axes();
-        if [first, second].iter().any(|axis| axes.mode(*axis) == AxisMode::Disabled) {
+        if [first, second].iter().any(|axis| setup.mode(*axis) == AxisMode::Disabled) {
             return Err(Status::AxisDisabled);
         }
         let radius = self.radius(block, first, second)?;
         let turns = turns(block)?;
         let start = self.position;
-        self.advance(block, axes)?;
+        self.advance(block, false, setup)?;
         let target = self.position;
         let mut arc =
             Arc { first, second, linear, center: [Length::ZERO; 2], clockwise, extra_turns: turns };
@@ -60,15 +64,15 @@ impl Interpreter {
     }
 
     /// R, in units; negative for the long way round.
-    fn radius(&self, block: &mut Block, first: u8, second: u8) -> Result<Option<Length>, Status> {
-        let Some(word) = block.take(slot::R) else { return Ok(None) };
-        if block.has(slot::OFFSETS) {
+    fn radius(&self, block: &Block, first: u8, second: u8) -> Result<Option<Length>, Status> {
+        let Some(word) = block.get(R) else { return Ok(None) };
+        if block.has(OFFSETS) {
             return Err(Status::ArcSpecification);
         }
-        if !block.has(1 << first | 1 << second) {
+        if !block.has(bit_of(first) | bit_of(second)) {
             return Err(Status::ArcAxisMissing);
         }
-        let radius = axes::length(&word, self.modal.units)?.units;
+        let radius = axes::length(word, self.modal.units)?.units;
         match radius.0.abs() {
             ..MIN_RADIUS => Err(Status::ArcRadiusTolerance),
             MIN_RADIUS..=MAX_RADIUS => Ok(Some(radius)),
@@ -76,35 +80,47 @@ impl Interpreter {
         }
     }
 
-    /// The centre from I, J, K, which count from the start in every distance mode.
+    /// The centre from I, J, K, which count from the start with G91.1, from the origin with G90.1, in every
+    /// distance mode.
     fn center_form(
         &self,
-        block: &mut Block,
+        block: &Block,
         start: &PerAxis<Length>,
         target: &PerAxis<Length>,
         arc: &Arc,
     ) -> Result<[Length; 2], Status> {
-        if block.has(1 << (slot::I + arc.linear)) {
+        if block.has(bit_of(I + arc.linear)) {
             return Err(Status::ArcSpecification);
         }
-        let mut offset = |axis: u8| match block.take(slot::I + axis) {
-            Some(word) => Ok(axes::length(&word, self.modal.units)?.units),
-            None => Ok(Length::ZERO),
+        let from = match self.modal.arc_distance {
+            ArcDistance::Absolute => in_plane(&self.origin, arc),
+            ArcDistance::Incremental => in_plane(start, arc),
         };
-        let (first, second) = (offset(arc.first)?, offset(arc.second)?);
-        if first == Length::ZERO && second == Length::ZERO {
+        let words = [arc.first, arc.second].map(|axis| block.get(I + axis));
+        let missing = match self.modal.arc_distance {
+            ArcDistance::Absolute => words.contains(&None),
+            ArcDistance::Incremental => words == [None; 2],
+        };
+        if missing {
             return Err(Status::ArcOffsetsMissing);
         }
-        let from = in_plane(start, arc);
-        let center = [sum(from[0], first.0)?, sum(from[1], second.0)?];
+        let mut center = from;
+        for (center, word) in center.iter_mut().zip(words) {
+            if let Some(word) = word {
+                *center = sum(*center, axes::length(word, self.modal.units)?.units.0)?;
+            }
+        }
+        if center == in_plane(start, arc) {
+            return Err(Status::ArcOffsetsMissing);
+        }
         check_radii(&Arc { center, ..*arc }, start, target)?;
         Ok(center)
     }
 }
 
 /// P: full turns.
-fn turns(block: &mut Block) -> Result<u16, Status> {
-    match block.take(slot::P) {
+fn turns(block: &Block) -> Result<u16, Status> {
+    match block.get(P) {
         None => Ok(0),
         Some(Decimal { negative: true, .. }) => Err(Status::PWordNegative),
         Some(word) => {

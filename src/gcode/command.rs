@@ -1,9 +1,11 @@
-//! What one line of G-code asks of the machine: canonical commands, in units and machine coordinates.
+//! What one line of G-code asks of the machine: canonical commands, in millimetres and machine coordinates.
 //!
-//! The interpreter fills one [`Commands`] for a line; the planner carries its parts out in the order
+//! The interpreter fills one [`Commands`] for a line; [`steps`](super::steps) takes them apart in the order
 //! of the fields, which is the RS274 order of execution. Everything modal (units, distance mode,
 //! offsets, planes) has been resolved.
 
+use super::modal::{MotionMode, Plane, Turn};
+use super::number::Exact;
 use crate::units::{Length, PerAxis};
 
 /// The canonical commands of one line, in order of execution.
@@ -11,13 +13,19 @@ use crate::units::{Length, PerAxis};
 pub struct Commands {
     /// The N word, 0 if the line has none.
     pub line: u32,
+    /// M6: this tool is in the spindle.
+    pub tool: Option<u8>,
+    /// M3, M4, M5, or S while it turns.
+    pub spindle: Option<Spindle>,
+    /// M7, M8, M9: the coolants that run, bits of [`Coolant`](super::modal::Coolant).
+    pub coolant: Option<u8>,
+    /// M48 to M51.
+    pub overrides: Option<Overrides>,
     /// G4: stand still for this many milliseconds.
     pub dwell_ms: Option<u32>,
-    /// G28.3: call the present position this, on the axes that are `Some`.
-    pub set_position: Option<PerAxis<Option<Length>>>,
-    /// The move, if any.
+    /// What its axes do, if anything.
     pub motion: Motion,
-    /// G61.1 is in force: the move ends at rest. By itself it is nothing to carry out.
+    /// G61.1 is in force: moves end at rest. By itself it is nothing to carry out.
     pub exact_stop: bool,
     /// M0, M1, M2, M30, M60.
     pub stop: Stop,
@@ -26,19 +34,74 @@ pub struct Commands {
 impl Commands {
     /// Whether the machine has nothing to do.
     pub fn is_empty(&self) -> bool {
+        matches!(self.motion, Motion::None) && self.is_motion_alone()
+    }
+
+    /// Whether it has nothing to do but to move.
+    pub fn is_motion_alone(&self) -> bool {
         // In full, so that a new part is not forgotten here.
-        let Commands { line: _, dwell_ms, set_position, motion, exact_stop: _, stop } = self;
-        matches!(motion, Motion::None)
-            && *stop == Stop::None
+        let Commands {
+            line: _,
+            tool,
+            spindle,
+            coolant,
+            overrides,
+            dwell_ms,
+            motion: _,
+            exact_stop: _,
+            stop,
+        } = self;
+        tool.is_none()
+            && spindle.is_none()
+            && coolant.is_none()
+            && overrides.is_none()
             && dwell_ms.is_none()
-            && set_position.is_none()
+            && *stop == Stop::None
+    }
+
+    /// Empties it, touching nothing but the tags: it is large.
+    pub(super) fn clear(&mut self) {
+        self.line = 0;
+        self.tool = None;
+        self.spindle = None;
+        self.coolant = None;
+        self.overrides = None;
+        self.dwell_ms = None;
+        self.motion = Motion::None;
+        self.exact_stop = false;
+        self.stop = Stop::None;
     }
 }
 
-/// A move to `target`, which is in machine coordinates.
+/// How the spindle is to turn.
+#[derive(Clone, Copy, Default, Debug, PartialEq)]
+pub struct Spindle {
+    /// Which way.
+    pub turn: Turn,
+    /// S, in turns per minute.
+    pub speed: f32,
+}
+
+/// By what rates and speeds are multiplied, in thousandths; by 1000 where an override is off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Overrides {
+    /// Feed rates.
+    pub feed: u16,
+    /// Traverse rates.
+    pub traverse: u16,
+    /// The speed of the spindle.
+    pub spindle: u16,
+}
+
+impl Overrides {
+    /// Nothing is overridden.
+    pub const NONE: Self = Self { feed: 1000, traverse: 1000, spindle: 1000 };
+}
+
+/// What axes do. Targets are machine coordinates.
 #[derive(Clone, Copy, Default, Debug, PartialEq)]
 pub enum Motion {
-    /// None.
+    /// Nothing.
     #[default]
     None,
     /// G0: straight, each axis within its traverse limit.
@@ -62,6 +125,36 @@ pub enum Motion {
         /// Which circle.
         arc: Arc,
     },
+    /// G28 and G30 with axis words: a traverse in two parts.
+    Through {
+        /// Where to first.
+        via: PerAxis<Length>,
+        /// Where to in the end.
+        target: PerAxis<Length>,
+    },
+    /// G38.2 to G38.5: straight at the feed rate, until the probe says stop.
+    Probe {
+        /// Where to at most.
+        target: PerAxis<Length>,
+        /// How fast.
+        feed: Feed,
+        /// Which of them.
+        mode: MotionMode,
+    },
+    /// G73, G81 to G89.
+    Cycle(Cycle),
+    /// G28.2, G28.4: the homing cycle.
+    Home {
+        /// The axes, as bits.
+        axes: u8,
+        /// Whether the position is set to what the switches say.
+        set: bool,
+    },
+    /// G28.3: no motor moves; the present position is called this.
+    SetPosition {
+        /// All axes; those that the line does not name are where they were.
+        position: PerAxis<Length>,
+    },
 }
 
 /// How fast a feed move goes.
@@ -71,6 +164,16 @@ pub enum Feed {
     PerMinute(f32),
     /// G93: the whole move takes this many minutes.
     Minutes(f32),
+}
+
+impl Feed {
+    /// So many times as fast.
+    pub fn times(self, factor: f32) -> Self {
+        match self {
+            Feed::PerMinute(rate) => Feed::PerMinute(rate * factor),
+            Feed::Minutes(minutes) => Feed::Minutes(minutes / factor),
+        }
+    }
 }
 
 /// The circle of an arc. Axes are indices in X Y Z A B C order.
@@ -89,6 +192,39 @@ pub struct Arc {
     pub clockwise: bool,
     /// Full turns beyond the arc itself; for a full circle (endpoint = start) 0 means one turn.
     pub extra_turns: u16,
+}
+
+/// A canned cycle: one or more holes along the axis across the plane. Machine coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cycle {
+    /// Which one.
+    pub mode: MotionMode,
+    /// The holes lie in this plane.
+    pub plane: Plane,
+    /// Where the holes are counted from, along the first and second axis of the plane.
+    pub from: [Exact; 2],
+    /// From there to the first hole, and from one hole to the next.
+    pub pitch: [Exact; 2],
+    /// How many holes; at least 1.
+    pub holes: u16,
+    /// R: feeding begins here.
+    pub retract: Length,
+    /// The bottom of the hole.
+    pub bottom: Length,
+    /// Where the axis is left: at `retract`, or above it.
+    pub clear: Length,
+    /// Q: the depth of a peck; more than 0 for cycles that peck.
+    pub peck: Length,
+    /// P: how long to dwell at the bottom.
+    pub dwell_ms: u32,
+    /// G87: how far beside the hole the tool goes in and out.
+    pub aside: [Length; 2],
+    /// G87: where the bore ends.
+    pub top: Length,
+    /// How fast to feed.
+    pub feed: Feed,
+    /// How the spindle turns.
+    pub spindle: Spindle,
 }
 
 /// What ends or interrupts a program.

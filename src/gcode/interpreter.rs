@@ -3,10 +3,11 @@
 //! Called by the task that reads lines; never waits. A line that is refused changes nothing. The
 //! position is the programmed one, ahead of the machine by whatever is queued.
 //!
-//! Order of execution (RS274/NGC section 3.8): feed mode, F, dwell, plane, units, distance mode,
-//! position and offsets, motion, stop. One departure: the units come first, so that F is in the units
-//! of its own line. LinuxCNC and TinyG read `G20 F10` in the units of the line before, which is 25.4
-//! times too fast or too slow, and which their users keep reporting.
+//! Order of execution (RS274/NGC section 3.8): feed mode, F, S, T, M6, spindle, coolant, overrides, dwell,
+//! plane, units, tool length, coordinate system, path, distance, retract, group 0, motion, stop. One
+//! departure: the units come first, so that F is in the units of its own line. LinuxCNC and TinyG read
+//! `G20 F10` in the units of the line before, which is 25.4 times too fast or too slow, and which their
+//! users keep reporting.
 //!
 //! Cost on AVR: of a usual line see `usual`; else, words and comments included: `X12.345 Y67.890` 3,600 cycles, with `G1` and `F1500`
 //! 4,800; in inches 1,800 more for each axis; an arc 11,000, with R 14,000. Stack: 450 bytes, for an
@@ -14,12 +15,12 @@
 
 use heapless::Vec;
 
-use super::axes::{self, Axes};
-use super::block::{Block, slot};
-use super::codes::NonModal;
-use super::command::{Commands, Motion, Stop};
-use super::limits;
-use super::modal::{FeedMode, Modal, PathMode, Units};
+use super::block::Block;
+use super::command::Commands;
+use super::modal::{Defaults, Modal, Units};
+use super::setup::Setup;
+use super::state::State;
+use super::tables::{Edit, Tables};
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -37,226 +38,120 @@ pub struct Info {
 /// The state of the G-code interpreter.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Interpreter {
-    pub(super) modal: Modal,
-    /// F as written, with G94 in force; 0 if none.
-    pub(super) feed: f32,
-    /// The units of `feed`.
-    pub(super) feed_units: Units,
-    /// End of the last move, machine coordinates.
-    pub(super) position: PerAxis<Length>,
-    /// What rounding took from `position`: ten-thousandths of a unit. Incremental moves carry it on.
-    pub(super) residue: PerAxis<i16>,
-    /// Machine coordinates of the work origin (G92).
-    pub(super) offset: PerAxis<Length>,
-    /// The axes whose position has been set to what it is (G28.3), as bits.
-    homed: u8,
-    pub(super) line: u32,
+    pub(super) state: State,
+    pub(super) tables: Tables,
 }
 
 impl Interpreter {
-    /// At power-up: everything 0; G80 G17 G21 G90 G94 G64.
+    /// At power-up: everything 0; G80 and the usual modes.
     pub const fn new() -> Self {
-        Self {
-            modal: Modal::new(),
-            feed: 0.0,
-            feed_units: Units::Mm,
-            position: [Length::ZERO; AXES],
-            residue: [0; AXES],
-            offset: [Length::ZERO; AXES],
-            homed: 0,
-            line: 0,
-        }
+        Self { state: State::new(&Defaults::USUAL), tables: Tables::new() }
     }
 
-    /// Interprets one line without its terminator, for a machine with these `axes`.
+    /// Starts in the modes that the machine starts in.
+    pub fn start(&mut self, setup: &impl Setup) {
+        self.state.modal = Modal::new(&setup.defaults());
+    }
+
+    /// Interprets one line without its terminator, for a machine that is `setup` so.
     ///
     /// `Ok`: `out` is what the machine has to do, and the state has advanced as if it had done so.
     /// `Err`: the state is what it was, and `out` empty.
     pub fn interpret(
         &mut self,
         line: &[u8],
-        axes: &impl Axes,
+        setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<Info, Status> {
-        if self.usual(line, true, axes, out) {
+        if self.usual(line, true, setup, out) {
             return Ok(Info::default());
         }
-        self.general(line, axes, out)
+        self.general(line, setup, out)
     }
 
-    /// The same for a line of any kind.
+    /// Carries a usual line out: see [`State::usual`].
+    pub fn usual(
+        &mut self,
+        line: &[u8],
+        numbered: bool,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> bool {
+        self.state.usual(line, numbered, setup, out)
+    }
+
+    /// The same as [`Self::interpret`] for a line of any kind.
     #[inline(never)]
     pub(super) fn general(
         &mut self,
         line: &[u8],
-        axes: &impl Axes,
+        setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<Info, Status> {
-        clear(out);
-        let mut block = Block::new();
-        block.read(line)?;
-        self.execute_or_undo(&mut block, axes, out)?;
-        let Block { message, deleted, commented, .. } = block;
-        Ok(Info { message, deleted, commented })
+        out.clear();
+        let mut block = Block::default();
+        let deletes = setup.deletes_blocks();
+        block.read(line, deletes)?;
+        self.execute_or_undo(&block, setup, out)?;
+        let Block { message, slashed, commented, .. } = block;
+        Ok(Info { message, deleted: slashed && deletes, commented })
     }
 
     #[inline(never)]
     fn execute_or_undo(
         &mut self,
-        block: &mut Block,
-        axes: &impl Axes,
+        block: &Block,
+        setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        if block.non_modal.is_some() {
-            return self.execute_rarity(block, axes, out);
+        block.check(self.state.modal.motion)?;
+        if block.is_rare() || self.state.is_in_cycle(block) {
+            return self.execute_rarity(block, setup, out);
         }
-        let mut before = Before::of(self);
-        before.save_axes(self, block);
-        let done = self.execute(block, axes, out);
+        self.execute_usual(block, setup, out)
+    }
+
+    /// Executes a block of modes, the feed, and the position of the axes that it names, or nothing of it.
+    #[inline(never)]
+    fn execute_usual(
+        &mut self,
+        block: &Block,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        let mut before = Before::of(&self.state);
+        before.save_axes(&self.state, block);
+        let done = self.state.execute(block, &self.tables, setup, out);
         if done.is_err() {
-            before.restore(self);
-            clear(out);
+            before.restore(&mut self.state);
+            out.clear();
         }
         done
     }
 
-    /// The same for a block that may change more than modes and the position of its axes.
+    /// The same for a block that may change more than modes, the feed and the position of its axes.
     #[inline(never)]
     fn execute_rarity(
         &mut self,
-        block: &mut Block,
-        axes: &impl Axes,
+        block: &Block,
+        setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        let before = *self;
-        let done = self.execute(block, axes, out);
-        if done.is_err() {
-            *self = before;
-            clear(out);
+        let before = self.state;
+        let mut edit = Edit::None;
+        let done = self.state.execute_rarity(block, &self.tables, setup, out, &mut edit);
+        match done {
+            Ok(()) => self.tables.apply(&edit),
+            Err(_) => {
+                self.state = before;
+                out.clear();
+            }
         }
         done
     }
-
-    /// The order of execution.
-    #[inline(never)]
-    fn execute(
-        &mut self,
-        block: &mut Block,
-        axes: &impl Axes,
-        out: &mut Commands,
-    ) -> Result<(), Status> {
-        if block.deleted {
-            return Ok(());
-        }
-        self.number(block, out)?;
-        self.modes(block);
-        self.feed(block)?;
-        self.non_modal(block, axes, out)?;
-        // Limits are for homed axes alone; most machines are spared the copy.
-        let start = if self.homed == 0 { None } else { Some(self.position) };
-        self.motion(block, axes, out)?;
-        if let Some(start) = &start {
-            limits::check(start, &out.motion, self.homed, axes)?;
-        }
-        out.exact_stop = self.modal.path == PathMode::ExactStop;
-        block.finish()?;
-        self.stop(block, out);
-        Ok(())
-    }
-
-    fn number(&mut self, block: &mut Block, out: &mut Commands) -> Result<(), Status> {
-        self.line = block.take(slot::N).map_or(Ok(0), |value| value.integer())?;
-        out.line = self.line;
-        Ok(())
-    }
-
-    fn modes(&mut self, block: &Block) {
-        let modal = &mut self.modal;
-        set(&mut modal.feed_mode, block.feed_mode);
-        set(&mut modal.plane, block.plane);
-        set(&mut modal.units, block.units);
-        set(&mut modal.distance, block.distance);
-        set(&mut modal.path, block.path);
-    }
-
-    /// F with G94. With G93 it is for the move of its line alone, which takes it; afterwards G94
-    /// needs an F of its own.
-    fn feed(&mut self, block: &mut Block) -> Result<(), Status> {
-        if self.modal.feed_mode == FeedMode::InverseTime {
-            self.feed = 0.0;
-        } else if let Some(value) = block.take(slot::F) {
-            if value.negative {
-                return Err(Status::OutOfRange);
-            }
-            self.feed = value.to_f32();
-            self.feed_units = self.modal.units;
-        }
-        Ok(())
-    }
-
-    fn non_modal(
-        &mut self,
-        block: &mut Block,
-        axes: &impl Axes,
-        out: &mut Commands,
-    ) -> Result<(), Status> {
-        let Some(code) = block.non_modal else { return Ok(()) };
-        if code.uses_axes() && !block.has(slot::AXES) {
-            return Err(Status::AxisWordMissing);
-        }
-        match code {
-            NonModal::Dwell => {
-                let seconds = block.take(slot::P).ok_or(Status::PWordMissing)?;
-                out.dwell_ms = Some(seconds.milliseconds()?);
-            }
-            NonModal::SetPosition => {
-                out.set_position = Some(self.redefine_position(block, axes)?);
-            }
-            NonModal::SetOffset => self.redefine_offset(block, axes)?,
-            NonModal::ClearOffset => self.offset = [Length::ZERO; AXES],
-        }
-        Ok(())
-    }
-
-    /// G28.3: the position is called the axis words, in machine coordinates.
-    fn redefine_position(
-        &mut self,
-        block: &mut Block,
-        axes: &impl Axes,
-    ) -> Result<PerAxis<Option<Length>>, Status> {
-        let mut named = [None; AXES];
-        let all = self.position.iter_mut().zip(&mut self.residue).zip(&mut named);
-        for (axis, ((position, residue), named)) in (0..).zip(all) {
-            let value = axes::take(block, axis, self.modal.units, axes)?;
-            let Some(value) = value else { continue };
-            (*position, *residue, *named) = (value.units, value.rest, Some(value.units));
-            self.homed |= 1 << axis;
-        }
-        Ok(named)
-    }
-
-    /// G92: the position is called the axis words, in work coordinates.
-    fn redefine_offset(&mut self, block: &mut Block, axes: &impl Axes) -> Result<(), Status> {
-        let all = self.position.iter().zip(&mut self.residue).zip(&mut self.offset);
-        for (axis, ((position, residue), offset)) in (0..).zip(all) {
-            let value = axes::take(block, axis, self.modal.units, axes)?;
-            let Some(value) = value else { continue };
-            *offset = position.checked_sub(value.units).ok_or(Status::OutOfRange)?;
-            *residue = value.rest;
-        }
-        Ok(())
-    }
-
-    fn stop(&mut self, block: &Block, out: &mut Commands) {
-        set(&mut out.stop, block.stop);
-        if out.stop == Stop::End {
-            self.modal.end_program();
-            self.offset = [Length::ZERO; AXES];
-        }
-    }
 }
 
-/// What a block of moves and modes may change of the state, as it was: all of it would take 600 cycles
+/// What a block of moves and modes may change of the state, as it was: all of it would take 1,500 cycles
 /// to copy.
 struct Before {
     modal: Modal,
@@ -269,14 +164,14 @@ struct Before {
 
 impl Before {
     #[inline(always)]
-    fn of(state: &Interpreter) -> Self {
-        let Interpreter { modal, feed, feed_units, line, .. } = *state;
+    fn of(state: &State) -> Self {
+        let State { modal, feed, feed_units, line, .. } = *state;
         Self { modal, feed, feed_units, line, axes: Vec::new() }
     }
 
     #[inline(always)]
-    fn save_axes(&mut self, state: &Interpreter, block: &Block) {
-        for axis in block.axes() {
+    fn save_axes(&mut self, state: &State, block: &Block) {
+        for (axis, _) in block.axes() {
             let i = usize::from(axis);
             if let (Some(position), Some(residue)) = (state.position.get(i), state.residue.get(i)) {
                 // There is room for all axes.
@@ -286,7 +181,7 @@ impl Before {
     }
 
     #[inline(never)]
-    fn restore(&self, state: &mut Interpreter) {
+    fn restore(&self, state: &mut State) {
         state.modal = self.modal;
         state.feed = self.feed;
         state.feed_units = self.feed_units;
@@ -304,67 +199,66 @@ impl Before {
 impl Interpreter {
     /// The modes in force.
     pub fn modal(&self) -> &Modal {
-        &self.modal
+        &self.state.modal
+    }
+
+    /// The tables.
+    pub fn tables(&self) -> &Tables {
+        &self.tables
     }
 
     /// End of the last move, machine coordinates.
     pub fn position(&self) -> &PerAxis<Length> {
-        &self.position
+        &self.state.position
     }
 
     /// Machine coordinates of the work origin: work position = machine position - this.
     pub fn work_offset(&self) -> &PerAxis<Length> {
-        &self.offset
+        &self.state.origin
     }
 
-    /// F in mm/min; 0 if none is in force, as always with G93.
+    /// F in mm/min (or mm a turn); 0 if none is in force, as always with G93.
     pub fn feed_rate(&self) -> f32 {
-        match self.feed_units {
-            Units::Inch => self.feed * 25.4,
-            Units::Mm => self.feed,
+        match self.state.feed_units {
+            Units::Inch => self.state.feed * 25.4,
+            Units::Mm => self.state.feed,
         }
     }
 
-    /// The coordinate system: 1, which is G54.
+    /// S, in turns per minute.
+    pub fn spindle_speed(&self) -> f32 {
+        self.state.speed
+    }
+
+    /// The coordinate system: 1, which is G54, to 9, which is G59.3.
     pub fn coordinate_system(&self) -> u8 {
-        1
+        self.state.modal.system + 1
+    }
+
+    /// The tool in the spindle; 0 for none.
+    pub fn tool(&self) -> u8 {
+        self.state.tool
     }
 
     /// Whether an axis is homed: soft limits are for such axes alone.
     pub fn is_homed(&self, axis: u8) -> bool {
-        self.homed & 1 << axis != 0
+        self.state.homed & 1 << axis != 0
     }
 
     /// The N word of the last line, 0 if it had none.
     pub fn line(&self) -> u32 {
-        self.line
+        self.state.line
     }
 
     /// Moves the model to where the machine is: after homing, and after the queue was dropped.
     pub fn set_position(&mut self, machine: &PerAxis<Length>) {
-        self.position = *machine;
-        self.residue = [0; AXES];
+        self.state.position = *machine;
+        self.state.residue = [0; AXES];
     }
 }
 
 impl Default for Interpreter {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-/// Empties `out`, touching nothing but the tags: it is large.
-fn clear(out: &mut Commands) {
-    out.line = 0;
-    out.dwell_ms = None;
-    out.set_position = None;
-    out.motion = Motion::None;
-    out.exact_stop = false;
-    out.stop = Stop::None;
-}
-
-fn set<T>(mode: &mut T, new: Option<T>) {
-    if let Some(new) = new {
-        *mode = new;
     }
 }

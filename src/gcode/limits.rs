@@ -5,8 +5,8 @@
 //! AVR: 200 cycles for each axis that moves; an arc 25,000 more.
 
 use super::arc::{norm, part, round, spoke, turned};
-use super::axes::Axes;
-use super::command::{Arc, Motion};
+use super::command::{Arc, Cycle, Motion};
+use super::setup::Setup;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
 
@@ -15,16 +15,24 @@ const SLACK: f32 = 10.0;
 const SLACK_PART: f32 = 2e-7;
 
 /// Refuses (220) a move from `start` that leaves the travel of an axis whose bit in `homed` is set.
+#[inline(never)]
 pub(super) fn check(
     start: &PerAxis<Length>,
     motion: &Motion,
     homed: u8,
-    axes: &impl Axes,
+    setup: &impl Setup,
 ) -> Result<(), Status> {
-    let limits = |axis: u8| if homed & 1 << axis != 0 { axes.travel(axis) } else { None };
+    let limits = |axis: u8| if homed & 1 << axis != 0 { setup.travel(axis) } else { None };
     let target = match motion {
-        Motion::None => return Ok(()),
-        Motion::Traverse { target } | Motion::Feed { target, .. } => target,
+        Motion::None | Motion::Home { .. } | Motion::SetPosition { .. } => return Ok(()),
+        Motion::Cycle(cycle) => return check_cycle(start, cycle, limits),
+        Motion::Through { via, target } => {
+            check_straight(start, via, limits)?;
+            return check_straight(via, target, limits);
+        }
+        Motion::Traverse { target }
+        | Motion::Feed { target, .. }
+        | Motion::Probe { target, .. } => target,
         Motion::Arc { target, arc, .. } => {
             if !arc_is_within(start, target, arc, limits) {
                 return Err(Status::SoftLimit);
@@ -32,6 +40,14 @@ pub(super) fn check(
             target
         }
     };
+    check_straight(start, target, limits)
+}
+
+fn check_straight(
+    start: &PerAxis<Length>,
+    target: &PerAxis<Length>,
+    limits: impl Fn(u8) -> Option<(Length, Length)>,
+) -> Result<(), Status> {
     for (axis, (from, to)) in (0..).zip(start.iter().zip(target)) {
         if from != to
             && let Some((low, high)) = limits(axis)
@@ -41,6 +57,29 @@ pub(super) fn check(
         }
     }
     Ok(())
+}
+
+/// The first and the last hole, with what is done beside them, from the highest to the lowest point.
+#[inline(never)]
+fn check_cycle(
+    start: &PerAxis<Length>,
+    cycle: &Cycle,
+    limits: impl Fn(u8) -> Option<(Length, Length)>,
+) -> Result<(), Status> {
+    let [first, second, across] = cycle.plane.axes();
+    let inside = |axis: u8, at: Length| {
+        let here = start.get(usize::from(axis)).is_some_and(|start| *start == at);
+        here || limits(axis).is_none_or(|(low, high)| (low..=high).contains(&at))
+    };
+    let mut all = [cycle.retract, cycle.bottom, cycle.clear].iter().all(|at| inside(across, *at));
+    for number in [1, cycle.holes] {
+        let hole = cycle.hole(number).ok_or(Status::OutOfRange)?;
+        for ((axis, at), aside) in [first, second].into_iter().zip(hole).zip(cycle.aside) {
+            let beside = at.units.checked_add(aside).ok_or(Status::OutOfRange)?;
+            all = all && inside(axis, at.units) && inside(axis, beside);
+        }
+    }
+    if all { Ok(()) } else { Err(Status::SoftLimit) }
 }
 
 /// Whether the points of an arc that lie farthest out in its plane are within the limits; its end is
@@ -82,9 +121,9 @@ fn arc_is_within(
 mod tests {
     use super::*;
     use crate::gcode::arc::Chords;
-    use crate::gcode::axes::AxisMode;
     use crate::gcode::command::Commands;
     use crate::gcode::interpreter::Interpreter;
+    use crate::gcode::setup::AxisMode;
     use crate::units::AXES;
     use core::f32::consts::PI;
     use proptest::prelude::*;
@@ -93,7 +132,7 @@ mod tests {
     /// X, Y, Z from 0 to 100 mm; A from -10 degrees on.
     struct Cube;
 
-    impl Axes for Cube {
+    impl Setup for Cube {
         fn mode(&self, _axis: u8) -> AxisMode {
             AxisMode::Standard
         }
@@ -129,6 +168,29 @@ mod tests {
         }
         assert_eq!(run(&["G92 X0", "G0 X51"]), Err(Status::SoftLimit), "machine coordinates count");
         assert_eq!(run(&["G92 X0", "G0 X50"]), Ok(()));
+    }
+
+    #[test]
+    fn cycles_and_ways_home() {
+        for line in [
+            "G81 X10 Y10 R60 Z0 F9",
+            "G91 G81 X10 R1 Z-2 L5 F9",
+            "M3 G87 X1 Y1 I-1 J2 Z0 R60 K5 F9",
+            "G28 X100",
+            "G38.2 X0 F9",
+        ] {
+            assert_eq!(run(&[line]), Ok(()), "{line}");
+        }
+        for line in [
+            "G81 X10 Y10 R60 Z-0.1 F9",
+            "G81 X10 Y10 R101 Z0 F9",
+            "G91 G81 X10 R1 Z-2 L6 F9",
+            "M3 G87 X1 Y1 I-1.1 J2 Z0 R60 K5 F9",
+            "G28 X101",
+            "G38.2 X-1 F9",
+        ] {
+            assert_eq!(run(&[line]), Err(Status::SoftLimit), "{line}");
+        }
     }
 
     #[test]

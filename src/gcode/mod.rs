@@ -9,11 +9,12 @@
 //! [`codes`] is the language: one table row per code. Everything here is pure and never waits.
 
 pub mod arc;
-pub mod axes;
+mod axes;
 mod block;
 mod circle;
 pub mod codes;
 pub mod command;
+mod cycle;
 mod digits;
 pub mod interpreter;
 mod lexer;
@@ -21,8 +22,15 @@ mod limits;
 pub mod modal;
 mod motion;
 pub mod number;
+mod offsets;
+pub mod setup;
+mod state;
+pub mod steps;
+mod sticky;
+pub mod tables;
 #[cfg(test)]
 mod tests;
 mod usual;
+pub mod words;
 
 pub use interpreter::{Info, Interpreter};

@@ -16,6 +16,44 @@ pub enum MotionMode {
     CounterclockwiseArc = 3,
     /// G80.
     None = 4,
+    /// G38.2: until the probe touches; it must.
+    ProbeTowards = 5,
+    /// G81.
+    Drill = 6,
+    /// G82.
+    DrillDwell = 7,
+    /// G83.
+    PeckDrill = 8,
+    /// G84.
+    Tap = 9,
+    /// G85.
+    Bore = 10,
+    /// G86.
+    BoreStop = 11,
+    /// G87.
+    BackBore = 12,
+    /// G88.
+    BoreByHand = 13,
+    /// G89.
+    BoreDwell = 14,
+    /// G73.
+    ChipBreak = 15,
+    /// G38.3: until the probe touches; it may not.
+    ProbeTowardsQuietly = 16,
+    /// G38.4: until the probe lets go; it must.
+    ProbeAway = 17,
+    /// G38.5: until the probe lets go; it may not.
+    ProbeAwayQuietly = 18,
+}
+
+impl MotionMode {
+    /// How many there are.
+    pub const COUNT: usize = 19;
+
+    /// G73, G81 to G89.
+    pub fn is_cycle(self) -> bool {
+        matches!(self as u8, 6..=15)
+    }
 }
 
 /// Group 2: where arcs lie.
@@ -51,6 +89,16 @@ pub enum Distance {
     Incremental = 1,
 }
 
+/// Group 4: what I, J and K of an arc are measured from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum ArcDistance {
+    /// G90.1: from where X, Y and Z are.
+    Absolute = 0,
+    /// G91.1: from the start of the arc.
+    Incremental = 1,
+}
+
 /// Group 5: what F means.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
@@ -59,6 +107,8 @@ pub enum FeedMode {
     InverseTime = 0,
     /// G94.
     PerMinute = 1,
+    /// G95: for each turn of the spindle.
+    PerTurn = 2,
 }
 
 /// Group 6: the length of 1.
@@ -84,6 +134,41 @@ pub enum PathMode {
     Continuous = 2,
 }
 
+/// Group 7 of the M codes: how the spindle turns.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[repr(u8)]
+pub enum Turn {
+    /// M5.
+    #[default]
+    Off = 0,
+    /// M3.
+    Clockwise = 1,
+    /// M4.
+    Counterclockwise = 2,
+}
+
+/// Group 8 of the M codes: what each of them adds to the coolants that run, as bits; M9 takes all.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Coolant {
+    /// M9.
+    Off = 0,
+    /// M7.
+    Mist = 1,
+    /// M8.
+    Flood = 2,
+}
+
+/// Group 10: where a canned cycle ends along its axis.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Retract {
+    /// G98: where the axis was before the first cycle, if that is above R.
+    Initial = 0,
+    /// G99: at R.
+    ToR = 1,
+}
+
 /// All of them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Modal {
@@ -93,35 +178,66 @@ pub struct Modal {
     pub plane: Plane,
     /// Group 3.
     pub distance: Distance,
+    /// Group 4.
+    pub arc_distance: ArcDistance,
     /// Group 5.
     pub feed_mode: FeedMode,
     /// Group 6.
     pub units: Units,
+    /// Group 10.
+    pub retract: Retract,
+    /// Group 12: 0 to 8 for G54 to G59.3.
+    pub system: u8,
     /// Group 13.
     pub path: PathMode,
+    /// Group 7 of the M codes.
+    pub spindle: Turn,
+    /// The coolants that run, bits of [`Coolant`].
+    pub coolant: u8,
+}
+
+/// The modes in which the machine starts, and to which M2 and M30 return: settings.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Defaults {
+    /// `gpl`.
+    pub plane: Plane,
+    /// `gun`.
+    pub units: Units,
+    /// `gco`: 0 to 8 for G54 to G59.3.
+    pub system: u8,
+    /// `gpa`.
+    pub path: PathMode,
+    /// `gdi`.
+    pub distance: Distance,
+}
+
+impl Defaults {
+    /// G17 G21 G54 G64 G90.
+    pub const USUAL: Self = Self {
+        plane: Plane::Xy,
+        units: Units::Mm,
+        system: 0,
+        path: PathMode::Continuous,
+        distance: Distance::Absolute,
+    };
 }
 
 impl Modal {
-    /// At power-up: G80 G17 G90 G94 G21 G64.
-    pub const fn new() -> Self {
+    /// At power-up: the defaults, and G80 G91.1 G94 G98 M5 M9.
+    pub const fn new(defaults: &Defaults) -> Self {
+        let Defaults { plane, units, system, path, distance } = *defaults;
         Self {
             motion: MotionMode::None,
-            plane: Plane::Xy,
-            distance: Distance::Absolute,
+            plane,
+            distance,
+            arc_distance: ArcDistance::Incremental,
             feed_mode: FeedMode::PerMinute,
-            units: Units::Mm,
-            path: PathMode::Continuous,
+            units,
+            retract: Retract::Initial,
+            system,
+            path,
+            spindle: Turn::Off,
+            coolant: 0,
         }
-    }
-
-    /// M2 and M30, which leave the units and the path mode alone.
-    pub fn end_program(&mut self) {
-        *self = Self { units: self.units, path: self.path, ..Self::new() };
-    }
-}
-
-impl Default for Modal {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -1,89 +1,138 @@
 //! Group 1: from axis words to a target, and from F to a feed.
 
-use super::axes::{self, Axes};
-use super::block::{Block, slot};
+use super::axes;
+use super::block::Block;
+use super::codes::NonModal;
 use super::command::{Commands, Feed, Motion};
-use super::interpreter::Interpreter;
-use super::modal::{Distance, FeedMode, MotionMode, Units};
+use super::modal::{Distance, FeedMode, MotionMode, Turn, Units};
+use super::setup::{Cycle, Setup};
+use super::state::State;
+use super::words::{AXES, F, ROTARY};
 use crate::status::Status;
-use crate::units::FIRST_ROTARY;
+use crate::units::{FIRST_ROTARY, Length};
 
-impl Interpreter {
-    /// The move of a line, if it has one: axis words move in the mode in force, unless a non-modal
-    /// code has taken them.
+/// A probing move has to be this long: 0.254 mm, in units (RS274/NGC 3.5.9).
+const PROBE_MIN: u32 = 2_540;
+
+impl State {
+    /// The move of a line, if it has one: axis words move in the mode in force, unless another code
+    /// has taken them.
+    #[inline(never)]
     pub(super) fn motion(
         &mut self,
-        block: &mut Block,
-        axes: &impl Axes,
+        block: &Block,
+        setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        let mode = block.motion.unwrap_or(self.modal.motion);
+        let absolute = block.non_modal == Some(NonModal::MachineCoordinates);
+        let Some(mode) = block.motion_from(self.modal.motion) else {
+            return if absolute { Err(Status::MachineCoordinatesMotion) } else { Ok(()) };
+        };
+        if absolute && !matches!(mode, MotionMode::Traverse | MotionMode::Feed) {
+            return Err(Status::MachineCoordinatesMotion);
+        }
+        let before = self.modal.motion;
         self.modal.motion = mode;
-        if block.non_modal.is_some_and(|code| code.uses_axes()) {
-            return match block.motion {
-                None | Some(MotionMode::None) => Ok(()),
-                Some(_) => Err(Status::ModalGroupViolation),
-            };
-        }
         match mode {
-            MotionMode::None => {}
-            MotionMode::Traverse => self.traverse(block, axes, out)?,
-            MotionMode::Feed => self.straight_feed(block, axes, out)?,
-            MotionMode::ClockwiseArc => self.arc(block, true, axes, out)?,
-            MotionMode::CounterclockwiseArc => self.arc(block, false, axes, out)?,
+            MotionMode::None => Ok(()),
+            MotionMode::Traverse => self.traverse(block, absolute, setup, out),
+            MotionMode::Feed => self.straight_feed(block, absolute, setup, out),
+            MotionMode::ClockwiseArc => self.arc(block, true, setup, out),
+            MotionMode::CounterclockwiseArc => self.arc(block, false, setup, out),
+            MotionMode::ProbeTowards
+            | MotionMode::ProbeTowardsQuietly
+            | MotionMode::ProbeAway
+            | MotionMode::ProbeAwayQuietly => self.probe(block, mode, setup, out),
+            cycle => self.cycle(block, cycle, before, setup, out),
         }
-        if self.modal.feed_mode == FeedMode::InverseTime {
-            // An F that no feed move took means nothing with G93.
-            block.take(slot::F);
-        }
-        Ok(())
     }
 
+    #[inline(never)]
     fn traverse(
         &mut self,
-        block: &mut Block,
-        axes: &impl Axes,
+        block: &Block,
+        absolute: bool,
+        setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        if block.has(slot::AXES) {
-            self.advance(block, axes)?;
+        if block.has(AXES) {
+            self.advance(block, absolute, setup)?;
             out.motion = Motion::Traverse { target: self.position };
         }
         Ok(())
     }
 
+    #[inline(never)]
     fn straight_feed(
         &mut self,
-        block: &mut Block,
-        axes: &impl Axes,
+        block: &Block,
+        absolute: bool,
+        setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        let moves = block.has(slot::AXES);
-        if !moves && block.motion.is_none() {
-            return Ok(());
-        }
-        let moved = self.advance(block, axes)?;
+        let moved = self.advance(block, absolute, setup)?;
         // Of rotary axes alone, F is the degrees per minute, in all units.
         let feed = self.rate(block, moved.rotary && !moved.linear)?;
-        if moves {
+        if block.has(AXES) {
             out.motion = Motion::Feed { target: self.position, feed };
         }
         Ok(())
     }
 
-    /// Moves the model by the axis words.
-    pub(super) fn advance(&mut self, block: &mut Block, axes: &impl Axes) -> Result<Moved, Status> {
+    /// G38.2 to G38.5 (RS274/NGC 3.5.9).
+    #[inline(never)]
+    fn probe(
+        &mut self,
+        block: &Block,
+        mode: MotionMode,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        if !setup.can(Cycle::Probing) {
+            return Err(Status::ProbeFailed);
+        }
+        if block.has(ROTARY) {
+            return Err(Status::RotaryNotAllowed);
+        }
+        if !block.has(AXES) {
+            return Err(Status::AxisWordMissing);
+        }
+        if self.modal.feed_mode == FeedMode::InverseTime {
+            return Err(Status::InverseTimeNotAllowed);
+        }
+        let feed = self.rate(block, false)?;
+        let start = self.position;
+        self.advance(block, false, setup)?;
+        let target = self.position;
+        // The longest axis stands for the way: within a factor of 1.7.
+        let way = |(a, b): (&Length, &Length)| a.0.abs_diff(b.0);
+        if start.iter().zip(&target).map(way).max().unwrap_or(0) < PROBE_MIN {
+            return Err(Status::ProbeTooShort);
+        }
+        out.motion = Motion::Probe { target, feed, mode };
+        Ok(())
+    }
+
+    /// Moves the model by the axis words; `absolute`: to machine coordinates.
+    #[inline(never)]
+    pub(super) fn advance(
+        &mut self,
+        block: &Block,
+        absolute: bool,
+        setup: &impl Setup,
+    ) -> Result<Moved, Status> {
         let mut moved = Moved::default();
-        for (axis, word) in block.take_axes() {
+        for (axis, word) in block.axes() {
             let i = usize::from(axis);
             let (Some(position), Some(residue)) =
                 (self.position.get_mut(i), self.residue.get_mut(i))
             else {
                 break;
             };
-            let Some(mut by) = axes::value(word, axis, self.modal.units, axes)? else { continue };
+            let Some(mut by) = axes::value(word, axis, self.modal.units, setup)? else { continue };
             let from = match self.modal.distance {
-                Distance::Absolute => self.offset.get(i).copied().unwrap_or_default(),
+                _ if absolute => Length::ZERO,
+                Distance::Absolute => self.origin.get(i).copied().unwrap_or_default(),
                 Distance::Incremental => {
                     by = by.carry(*residue).ok_or(Status::OutOfRange)?;
                     *position
@@ -102,26 +151,38 @@ impl Interpreter {
     }
 
     /// The feed of a move; 142 if there is none.
-    pub(super) fn rate(&self, block: &mut Block, rotary: bool) -> Result<Feed, Status> {
-        let per_minute = match self.modal.feed_mode {
-            FeedMode::PerMinute => self.feed,
-            FeedMode::InverseTime => match block.take(slot::F) {
-                Some(value) if value.negative => return Err(Status::OutOfRange),
-                Some(value) => value.to_f32(),
-                None => 0.0,
-            },
+    pub(super) fn rate(&self, block: &Block, rotary: bool) -> Result<Feed, Status> {
+        let rate = match self.modal.feed_mode {
+            FeedMode::InverseTime => block.get(F).map_or(0.0, |value| value.to_f32()),
+            _ => self.feed,
         };
         // Neither negative nor NaN, so the bits tell as much as a comparison, and cost less.
-        if per_minute.to_bits() == 0 {
+        if rate.to_bits() == 0 {
             return Err(Status::FeedrateMissing);
         }
-        Ok(match self.modal.feed_mode {
-            FeedMode::InverseTime => Feed::Minutes(1.0 / per_minute),
-            FeedMode::PerMinute => Feed::PerMinute(match self.feed_units {
-                Units::Inch if !rotary => per_minute * 25.4,
-                _ => per_minute,
-            }),
-        })
+        let rate = match self.feed_units {
+            _ if self.modal.feed_mode == FeedMode::InverseTime => {
+                return Ok(Feed::Minutes(1.0 / rate));
+            }
+            Units::Inch if !rotary => rate * 25.4,
+            _ => rate,
+        };
+        match self.modal.feed_mode {
+            FeedMode::PerTurn => self.per_turn(rate),
+            _ => Ok(Feed::PerMinute(rate)),
+        }
+    }
+
+    /// G95: at the speed that the spindle has been told.
+    #[inline(never)]
+    fn per_turn(&self, rate: f32) -> Result<Feed, Status> {
+        if self.modal.spindle == Turn::Off {
+            return Err(Status::SpindleMustTurn);
+        }
+        if self.speed.to_bits() == 0 {
+            return Err(Status::SWordMissing);
+        }
+        Ok(Feed::PerMinute(rate * self.speed))
     }
 }
 

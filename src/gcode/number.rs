@@ -100,6 +100,11 @@ impl Decimal {
         })
     }
 
+    /// Whether it is 0.
+    pub fn is_zero(&self) -> bool {
+        self.whole == 0 && self.frac == 0 && self.tail == 0
+    }
+
     /// As a whole number: 110 if negative, 102 with decimals.
     pub fn integer(&self) -> Result<u32, Status> {
         match self {
@@ -226,8 +231,7 @@ fn any(input: &[u8]) -> Lexed<'_, Decimal> {
     if digits == 0 {
         return Err(failure(Status::BadNumber));
     }
-    let zero = value.whole == 0 && value.frac == 0 && value.tail == 0;
-    value.negative = sign == Some(b'-') && !zero;
+    value.negative = sign == Some(b'-') && !value.is_zero();
     Ok((rest, value))
 }
 

@@ -1,18 +1,18 @@
 //! The usual line, read and carried out in one pass: axis words, with G0 or G1, F and N, while lengths
 //! are absolute and in millimetres.
 //!
-//! [`Interpreter::interpret`] asks here first. Any other line is declined before anything has changed,
+//! [`Interpreter::interpret`](super::Interpreter::interpret) asks here first. Any other line is declined before anything has changed,
 //! and goes through `lexer`, `block` and `motion`, which say what is wrong with it, too. The result is
 //! theirs to the bit: a property of `tests` holds the two against each other.
 //!
 //! Cost on AVR: `G1X12.345Y-3.21` 1,950 cycles, where the others take 4,100.
 
-use super::axes::{Axes, AxisMode};
-use super::command::{Commands, Feed, Motion, Stop};
+use super::command::{Commands, Feed, Motion};
 use super::digits::{Digits, ten_thousand_times};
-use super::interpreter::Interpreter;
 use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units};
 use super::number::Decimal;
+use super::setup::{AxisMode, Setup};
+use super::state::State;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
 /// What tells upper from lower case.
@@ -39,15 +39,15 @@ struct Words<'a> {
     target: PerAxis<Length>,
 }
 
-impl Interpreter {
-    /// Carries a usual line out: with [`Interpreter::interpret`] it would be `Ok`, without a comment, and
-    /// a move. False, and nothing done, if it is none; `numbered` says whether it may have an N word.
+impl State {
+    /// Carries a usual line out: with [`Interpreter::interpret`](super::Interpreter::interpret) it would be `Ok`,
+    /// without a comment, and a move. False, and nothing done, if it is none; `numbered` says whether it may have an N word.
     #[inline(never)]
     pub fn usual(
         &mut self,
         line: &[u8],
         numbered: bool,
-        axes: &impl Axes,
+        setup: &impl Setup,
         out: &mut Commands,
     ) -> bool {
         let modal = &self.modal;
@@ -59,8 +59,8 @@ impl Interpreter {
             return false;
         }
         let mut words = Words::new(line, numbered);
-        words.read(&self.offset)
-            && are_usual(words.seen & AXES_SEEN, axes)
+        words.read(&self.origin)
+            && are_usual(words.seen & AXES_SEEN, setup)
             && self.carry_out(&words, out)
     }
 
@@ -81,10 +81,8 @@ impl Interpreter {
         (self.feed, self.feed_units) = (feed, units);
         self.line = words.line;
         self.go(words.seen & AXES_SEEN, &words.target);
+        out.clear();
         out.line = words.line;
-        out.dwell_ms = None;
-        out.set_position = None;
-        out.stop = Stop::None;
         out.exact_stop = self.modal.path == PathMode::ExactStop;
         match mode {
             MotionMode::Traverse => out.motion = Motion::Traverse { target: self.position },
@@ -110,12 +108,12 @@ impl Interpreter {
 }
 
 /// Whether words of the `named` axes are positions, anywhere.
-fn are_usual(mut named: u8, axes: &impl Axes) -> bool {
+fn are_usual(mut named: u8, setup: &impl Setup) -> bool {
     let mut axis = 0;
     while named != 0 {
         let positions = named & 1 == 0
-            || (matches!(axes.mode(axis), AxisMode::Standard | AxisMode::Inhibited)
-                && axes.travel(axis).is_none());
+            || (matches!(setup.mode(axis), AxisMode::Standard | AxisMode::Inhibited)
+                && setup.travel(axis).is_none());
         if !positions {
             return false;
         }

@@ -30,6 +30,8 @@ pub enum Body {
     SetPosition([i32; MOTORS]),
     /// The drivers ask for something else from here on.
     Drivers(Drivers),
+    /// M3 to M9: the outputs are so from here on, bits of [`outputs`](crate::boards::outputs).
+    Outputs(u8),
     /// M0, M1, M60.
     ProgramStop,
     /// M2, M30.

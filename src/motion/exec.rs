@@ -45,7 +45,7 @@ pub enum Step {
     Segment,
     /// Nothing to queue, but something was done: ask again.
     Again,
-    /// A program stop or end is due: ask again when the steppers stand still.
+    /// A program stop, end or change of outputs is due: ask again when the steppers stand still.
     Standstill,
     /// No block.
     Idle,
@@ -70,6 +70,8 @@ pub struct Snapshot {
     pub running: bool,
     /// What the program came to last.
     pub program: Program,
+    /// What the outputs are to be, bits of [`outputs`](crate::boards::outputs).
+    pub outputs: u8,
 }
 
 impl Snapshot {
@@ -84,6 +86,7 @@ impl Snapshot {
             line: 0,
             running: false,
             program: Program::Ready,
+            outputs: 0,
         }
     }
 
@@ -224,6 +227,13 @@ impl Exec {
             Body::SetPosition(steps) => {
                 out.target = *steps;
                 out.left = 0.0;
+            }
+            Body::Outputs(outputs) => {
+                self.halt(out);
+                if !standstill {
+                    return Step::Standstill;
+                }
+                out.outputs = *outputs;
             }
             Body::ProgramStop | Body::ProgramEnd => {
                 self.halt(out);

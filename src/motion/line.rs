@@ -63,6 +63,8 @@ pub struct Builder {
     cruise: f32,
     /// The feed of the last move.
     feed: LastFeed,
+    /// By how much traverses are slowed down, if at all: 0 to 1.
+    traverse_factor: Option<f32>,
     /// Motors at the end of the last block.
     motors: [Motor; MOTORS],
 }
@@ -92,6 +94,9 @@ impl Builder {
             return Built::Parts(parts);
         }
         path.limit(line.feed, &mut self.feed, dynamics);
+        if let (None, Some(factor)) = (line.feed, self.traverse_factor) {
+            path.cruise *= factor;
+        }
         path.limit_change(dynamics);
         path.limit_steps(&dynamics.rates);
         path.heading.deviation = junction::deviation(&path.heading.unit, dynamics);
@@ -117,6 +122,11 @@ impl Builder {
                 *motor = Motor::at(machine.ratio(m), position);
             }
         }
+    }
+
+    /// Slows the traverses down that come from here on.
+    pub fn set_traverse_factor(&mut self, factor: Option<f32>) {
+        self.traverse_factor = factor;
     }
 
     /// The next move starts from rest.

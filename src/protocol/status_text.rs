@@ -10,7 +10,7 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 44;
+const ENTRIES: usize = 69;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
@@ -49,7 +49,13 @@ progmem! {
             Status::InverseTimeNotAllowed,
             text!("Inverse time mode cannot be used with this command"),
         ),
+        (Status::RotaryNotAllowed, text!("Rotary axes cannot be used with this command")),
+        (Status::MachineCoordinatesMotion, text!("G0 or G1 must be active for G53")),
         (Status::VelocityExceeded, text!("Requested velocity exceeds limits")),
+        (Status::CutterCompensation, text!("Cutter compensation cannot be enabled")),
+        (Status::SWordMissing, text!("Spindle S word is missing")),
+        (Status::SWordInvalid, text!("Spindle S word is invalid")),
+        (Status::SpindleMustTurn, text!("Spindle must be turning for this command")),
         (Status::ArcSpecification, text!("Arc specification error")),
         (Status::ArcAxisMissing, text!("Arc specification error - missing axis(es)")),
         (Status::ArcOffsetsMissing, text!("Arc specification error - missing offset(s)")),
@@ -64,8 +70,27 @@ progmem! {
         (Status::PWordMissing, text!("P word is missing")),
         (Status::PWordInvalid, text!("P word is invalid")),
         (Status::PWordNegative, text!("P word is negative")),
+        (Status::ToolInvalid, text!("P word is not a valid tool number")),
+        (Status::HWordMissing, text!("H word is missing")),
+        (Status::HWordInvalid, text!("H word is invalid")),
+        (Status::LWordMissing, text!("L word is missing")),
+        (Status::LWordInvalid, text!("L word is invalid")),
+        (Status::QWordMissing, text!("Q word is missing")),
+        (Status::QWordInvalid, text!("Q word is invalid")),
+        (Status::RWordMissing, text!("R word is missing")),
+        (Status::RWordInvalid, text!("R word is invalid")),
+        (Status::TWordMissing, text!("T word is missing")),
+        (Status::TWordInvalid, text!("T word is invalid")),
+        (Status::WordUnused, text!("Word belongs to no code of the line")),
+        (Status::WordRepeated, text!("Word repeated")),
+        (Status::AxisConflict, text!("Two codes of the line use axis words")),
+        (Status::WordConflict, text!("Two codes of the line use the same word")),
         (Status::Alarmed, text!("Machine is alarmed - Command not processed")),
         (Status::LimitHit, text!("Limit switch hit - Shutdown occurred")),
         (Status::SoftLimit, text!("Soft limit exceeded")),
+        (Status::HomingAxis, text!("Homing Error - Bad or no axis specified")),
+        (Status::HomingSwitches, text!("Homing Error - Homing switches misconfigured")),
+        (Status::ProbeFailed, text!("Probe cycle failed")),
+        (Status::ProbeTooShort, text!("Probe endpoint is starting point")),
     ];
 }

@@ -272,7 +272,7 @@ mod tests {
             assert_eq!(Token::find(&token.name()), Some(token), "{}", text(token));
             count += 1;
         }
-        assert_eq!(count, 28 + 28 + 3 * 15 + 16 + 2 * 9 + 22 + 28);
+        assert_eq!(count, 31 + 28 + 3 * 15 + 16 + 2 * 9 + 22 + 28);
         for bad in ["posd", "pwr5", "pwr0", "pos", "homd", "pwra", "velo", ""] {
             assert_eq!(Token::find(&name(bad)), None, "{bad}");
         }

@@ -7,7 +7,7 @@
 use super::links::Links;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::{reset, uart};
-use crate::realtime::{ENQUIRY, RESET};
+use crate::realtime::{ENQUIRY, RESET, RESUME};
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
@@ -19,6 +19,9 @@ pub async fn run(links: &'static Links) -> ! {
         .await;
         if characters & RESET != 0 {
             reset();
+        }
+        if characters & RESUME != 0 {
+            links.cycle_start.signal();
         }
         if characters & ENQUIRY != 0 {
             links.enquiry.set(true);

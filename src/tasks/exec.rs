@@ -6,7 +6,7 @@
 
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
-use crate::hal::imp::{exec, flags, stepper};
+use crate::hal::imp::{exec, flags, gpio, stepper};
 use crate::hal::ring::Producer;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
@@ -24,6 +24,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
     let mut machine = Exec::new();
     let mut segment = Segment::default();
     let mut most = LONG_QUEUED;
+    let mut outputs = 0;
     loop {
         exec::wait(|| (segments.used() < most).then_some(())).await;
         let waiting = blocks.len();
@@ -32,6 +33,9 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             let step = machine.step(&mut blocks, standstill, out, &mut segment);
             if step == Step::Segment {
                 power::segment(segment.moving);
+            } else if out.outputs != outputs {
+                outputs = out.outputs;
+                gpio::set_outputs(outputs);
             }
             step
         });

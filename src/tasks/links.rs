@@ -49,6 +49,10 @@ pub struct Links {
     pub commands_taken: Cell<bool>,
     /// `commands` was filled.
     pub planner_wake: Wake,
+    /// A tilde: what has stopped goes on.
+    pub cycle_start: Wake,
+    /// The machine has come to a program stop and waits for cycle start.
+    pub stopped: Cell<bool>,
     /// Something that reports show may have changed.
     pub reporter_wake: News,
     /// Blocks that came and went, for queue reports.

@@ -1,7 +1,6 @@
 //! The tasks. Each is a thin `async fn` around a part that knows nothing of tasks; `links` lists
 //! everything that connects them.
 
-mod axes;
 pub mod control;
 pub mod exec;
 pub mod lines;
@@ -12,6 +11,7 @@ pub mod power;
 mod printing;
 pub mod reader;
 pub mod reporter;
+mod setup;
 pub mod tx;
 pub mod view;
 pub mod wake;

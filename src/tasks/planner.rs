@@ -1,21 +1,24 @@
 //! The planner task: canonical commands into blocks.
 //!
-//! Reads `Links::commands` and the settings, writes the block queue, waits for commands and for room in
-//! the queue. One turn builds one block.
+//! Reads `Links::commands` and the settings, writes the block queue, waits for commands, for room in
+//! the queue, and at a program stop for cycle start if the settings say so. One turn builds one block.
 
 use embassy_futures::yield_now;
 
-use super::axes::moved_by;
 use super::links::{self, Links};
+use super::setup::moved_by;
+use crate::boards::outputs;
 use crate::config::{Settings, StepRatio};
-use crate::gcode::arc::Chords;
-use crate::gcode::command::{Commands, Feed, Motion, Stop};
+use crate::gcode::arc::Walk;
+use crate::gcode::command::{Commands, Feed, Motion, Overrides, Stop};
+use crate::gcode::modal::{self, Coolant};
+use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, wait};
 use crate::motion::block::{Block, Body, Line as Move};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line, Motors};
 use crate::motion::pace::Drivers;
-use crate::motion::queue::BlockQueue;
+use crate::motion::queue::{self, BlockQueue};
 use crate::units::{AXES, Length, PerAxis};
 
 /// The planner's own state.
@@ -30,6 +33,51 @@ struct Planner {
     line: u32,
     /// What exec has been told that drivers ask for.
     drivers: Drivers,
+    /// By how much feeds are multiplied, if at all.
+    feed_factor: Option<f32>,
+    /// What exec has been told to switch, bits of [`outputs`].
+    outputs: u8,
+    /// How far the line has been carried out.
+    steps: Steps,
+    walk: Option<ArcWalk>,
+    parts: Option<Parts>,
+    /// What is told before anything else of the line.
+    news: News,
+}
+
+/// An arc under way.
+struct ArcWalk {
+    walk: Walk,
+    feed: Feed,
+}
+
+/// A move under way that is too long for one block.
+struct Parts {
+    target: PerAxis<Length>,
+    feed: Option<Feed>,
+    left: u16,
+}
+
+/// What has changed beside the line.
+#[derive(Clone, Copy, PartialEq)]
+enum News {
+    /// Nothing.
+    None,
+    /// What steps mean: they are counted anew.
+    Position,
+    /// What the drivers ask for, perhaps.
+    Drivers,
+}
+
+/// What a turn of the planner led to.
+#[derive(Clone, Copy, PartialEq)]
+enum Turn {
+    /// There is more to do.
+    More,
+    /// The machine is to stop until somebody starts it.
+    Pause,
+    /// The line is done.
+    Done,
 }
 
 /// The task.
@@ -42,12 +90,25 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         position: [Length::ZERO; AXES],
         line: 0,
         drivers: Drivers::USUAL,
+        feed_factor: None,
+        outputs: 0,
+        steps: Steps::default(),
+        walk: None,
+        parts: None,
+        news: News::None,
     };
     loop {
         links.planner_wake.wait().await;
         if !planner.carry_out_at_once() {
-            let commands = *links.commands.borrow();
-            planner.carry_out(&commands).await;
+            planner.begin();
+            loop {
+                planner.room().await;
+                match planner.turn() {
+                    Turn::Done => break,
+                    Turn::More => yield_now().await,
+                    Turn::Pause => planner.cycle_start().await,
+                }
+            }
         }
         links.commands_taken.set(false);
         links.parser_wake.signal();
@@ -55,8 +116,8 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
 }
 
 impl Planner {
-    /// Most lines are a straight move for which there is room: no need to copy what they ask for, nor
-    /// to be prepared for a wait. False, and nothing done, for all others.
+    /// Most lines are a straight move for which there is room: no need to be prepared for a wait. False,
+    /// and nothing done, for all others.
     #[inline(never)]
     fn carry_out_at_once(&mut self) -> bool {
         let commands = self.links.commands.borrow();
@@ -65,11 +126,8 @@ impl Planner {
             Motion::Feed { target, feed } => (target, Some(*feed)),
             _ => return false,
         };
-        let alone = commands.dwell_ms.is_none()
-            && commands.set_position.is_none()
-            && commands.stop == Stop::None;
         let quiet = !self.links.settings_changed.get() && !self.links.resync.get();
-        if !alone || !quiet || self.queue.free() == 0 {
+        if !commands.is_motion_alone() || !quiet || self.queue.free() == 0 {
             return false;
         }
         self.line = commands.line;
@@ -84,64 +142,123 @@ impl Planner {
         true
     }
 
-    /// Does everything a line asks for, in order.
-    async fn carry_out(&mut self, commands: &Commands) {
-        self.line = commands.line;
+    /// Begins with a line.
+    #[inline(never)]
+    fn begin(&mut self) {
+        self.line = self.links.commands.borrow().line;
+        self.steps = Steps::default();
         if self.links.settings_changed.replace(false) {
             self.dynamics = Dynamics::new(&*self.links.settings.borrow());
         }
         if self.links.resync.get() {
-            self.set_position(&[None; AXES]).await;
-            self.set_drivers().await;
-            self.links.resync.set(false);
-        }
-        if let Some(ms) = commands.dwell_ms {
-            self.pause(Body::Dwell(ms)).await;
-        }
-        if let Some(position) = &commands.set_position {
-            self.set_position(position).await;
-        }
-        match &commands.motion {
-            Motion::None => {}
-            Motion::Traverse { target } => self.straight(target, None).await,
-            Motion::Feed { target, feed } => self.straight(target, Some(*feed)).await,
-            Motion::Arc { target, feed, arc } => {
-                let tolerance = self.links.settings.borrow().chordal_tolerance();
-                let start = self.position;
-                let chords = Chords::new(&start, target, arc, tolerance);
-                // The time of an inverse-time arc is that of all its chords together.
-                let feed = match *feed {
-                    Feed::Minutes(minutes) if minutes > 0.0 => chords.length() / minutes,
-                    Feed::Minutes(_) => f32::MAX,
-                    Feed::PerMinute(rate) => rate,
-                };
-                for end in chords {
-                    self.straight(&end, Some(Feed::PerMinute(feed))).await;
-                }
-            }
-        }
-        if commands.exact_stop {
-            self.builder.stopped();
-        }
-        match commands.stop {
-            Stop::None => {}
-            Stop::Program => self.pause(Body::ProgramStop).await,
-            Stop::End => self.pause(Body::ProgramEnd).await,
+            self.news = News::Position;
         }
     }
 
-    async fn straight(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) {
-        self.room().await;
-        if let Some(parts) = self.line(target, feed) {
-            self.parts(target, feed, parts).await;
+    /// Carries out a part of the line that takes one block at most, for which there is room.
+    #[inline(never)]
+    fn turn(&mut self) -> Turn {
+        if self.news != News::None {
+            self.tell();
+            return Turn::More;
         }
-        self.position = *target;
-        self.pushed().await;
+        if let Some(parts) = &mut self.parts {
+            let (end, feed) = (parts.next(&self.position), parts.feed);
+            if parts.left == 0 {
+                self.parts = None;
+            }
+            // Not longer than a block: the steps have been counted.
+            let _ = self.line(&end, feed);
+            self.position = end;
+            self.announce();
+            return Turn::More;
+        }
+        let links = self.links;
+        let commands = links.commands.borrow();
+        if let Some(arc) = &mut self.walk
+            && let Motion::Arc { target, arc: circle, .. } = &commands.motion
+        {
+            match arc.walk.next(circle, target) {
+                Some(end) => {
+                    let feed = arc.feed;
+                    self.straight(&end, Some(feed));
+                }
+                None => {
+                    self.walk = None;
+                    self.moved(&commands);
+                }
+            }
+            return Turn::More;
+        }
+        match self.steps.next(&commands, &self.position) {
+            Some(step) => self.step(&step, &commands),
+            None => Turn::Done,
+        }
+    }
+
+    fn step(&mut self, step: &Step, commands: &Commands) -> Turn {
+        match step {
+            Step::Line(target, feed) => {
+                self.straight(target, *feed);
+                self.moved(commands);
+            }
+            Step::Arc => self.begin_arc(&commands.motion),
+            Step::Dwell(ms) => self.pause(Body::Dwell(*ms)),
+            Step::SetPosition(position) => self.set_position(position),
+            Step::Overrides(factors) => self.set_overrides(*factors),
+            Step::Spindle(spindle) => {
+                let turn = match spindle.turn {
+                    modal::Turn::Off => 0,
+                    modal::Turn::Clockwise => outputs::SPINDLE,
+                    modal::Turn::Counterclockwise => outputs::SPINDLE | outputs::COUNTERCLOCKWISE,
+                };
+                self.switch(outputs::SPINDLE | outputs::COUNTERCLOCKWISE, turn);
+            }
+            Step::Coolant(coolant) => {
+                let bit =
+                    |which: Coolant, output| if coolant & which as u8 != 0 { output } else { 0 };
+                let on = bit(Coolant::Mist, outputs::MIST) | bit(Coolant::Flood, outputs::FLOOD);
+                self.switch(outputs::MIST | outputs::FLOOD, on);
+            }
+            Step::Stop(Stop::End) if self.outputs != 0 => {
+                // Another turn ends the program.
+                self.switch(u8::MAX, 0);
+                self.steps.repeat();
+            }
+            Step::Stop(Stop::End) => {
+                self.set_overrides(Overrides::NONE);
+                self.pause(Body::ProgramEnd);
+            }
+            Step::Stop(_) => {
+                self.pause(Body::ProgramStop);
+                if self.links.settings.borrow().waits_at_stop() {
+                    return Turn::Pause;
+                }
+            }
+            // The tool is reported, but nothing moves; the others are refused where there are no switches.
+            Step::Tool(_) | Step::Probe | Step::Home => {}
+        }
+        Turn::More
+    }
+
+    /// Queues a straight move, or begins with its parts.
+    fn straight(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) {
+        match self.line(target, feed) {
+            Some(of) => self.parts = Some(Parts::new(target, feed, of)),
+            None => {
+                self.position = *target;
+                self.announce();
+            }
+        }
     }
 
     /// Queues a straight move, for which there is room, or says in how many parts it is to be made.
     fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) -> Option<u16> {
         let settings = self.links.settings.borrow();
+        let feed = match self.feed_factor {
+            None => feed,
+            Some(factor) => feed.map(|feed| feed.times(factor)),
+        };
         let line = Line { from: &self.position, to: target, feed };
         let mut block = Move::default();
         match self.builder.line(&line, &self.dynamics, &*settings, &mut block) {
@@ -154,83 +271,129 @@ impl Planner {
         }
     }
 
-    /// A move that is too long for one block.
-    #[inline(never)]
-    fn part(start: &PerAxis<Length>, target: &PerAxis<Length>, n: u16, of: u16) -> PerAxis<Length> {
-        let mut end = *target;
-        for axis in 0..AXES {
-            let way = i64::from(target[axis].0) - i64::from(start[axis].0);
-            let part = way * i64::from(n) / i64::from(of);
-            end[axis] = Length((i64::from(start[axis].0) + part) as i32);
+    /// A move of the line has been queued, or its parts will be.
+    fn moved(&mut self, commands: &Commands) {
+        if commands.exact_stop {
+            self.builder.stopped();
         }
-        end
     }
 
-    async fn parts(&mut self, target: &PerAxis<Length>, feed: Option<Feed>, of: u16) {
-        let start = self.position;
-        // Inverse time is that of the whole.
-        let feed = match feed {
-            Some(Feed::Minutes(minutes)) => Some(Feed::Minutes(minutes / f32::from(of))),
-            other => other,
+    #[inline(never)]
+    fn begin_arc(&mut self, motion: &Motion) {
+        let Motion::Arc { target, feed, arc } = motion else { return };
+        let tolerance = self.links.settings.borrow().chordal_tolerance();
+        let walk = Walk::new(&self.position, target, arc, tolerance);
+        // The time of an inverse-time arc is that of all its chords together.
+        let feed = match *feed {
+            Feed::Minutes(minutes) if minutes > 0.0 => walk.length() / minutes,
+            Feed::Minutes(_) => f32::MAX,
+            Feed::PerMinute(rate) => rate,
         };
-        for n in 1..=of {
-            let end = Self::part(&start, target, n, of);
-            self.room().await;
-            // Not longer than a block: the steps have been counted.
-            let _ = self.line(&end, feed);
-            self.position = end;
-            self.pushed().await;
+        self.walk = Some(ArcWalk { walk, feed: Feed::PerMinute(feed) });
+    }
+
+    /// Tells exec what has changed beside the line, one thing at a time.
+    fn tell(&mut self) {
+        match self.news {
+            News::Position => {
+                let position = self.position;
+                self.set_position(&position);
+                self.news = News::Drivers;
+            }
+            _ => {
+                self.set_drivers();
+                self.links.resync.set(false);
+                self.news = News::None;
+            }
+        }
+    }
+
+    /// G28.3: the position is called something else; no motor moves.
+    fn set_position(&mut self, position: &PerAxis<Length>) {
+        self.position = *position;
+        let body = self.builder.set_position(position, &*self.links.settings.borrow());
+        self.push(Block { body, line: self.line });
+    }
+
+    /// Tells exec what the drivers ask for, if that has changed.
+    fn set_drivers(&mut self) {
+        let drivers = Machine::drivers(&*self.links.settings.borrow());
+        if drivers != self.drivers {
+            self.drivers = drivers;
+            self.push(Block { body: Body::Drivers(drivers), line: self.line });
+        }
+    }
+
+    fn set_overrides(&mut self, factors: Overrides) {
+        let part = |thousandths: u16| (thousandths != 1_000).then(|| f32::from(thousandths) * 1e-3);
+        self.feed_factor = part(factors.feed);
+        self.builder.set_traverse_factor(part(factors.traverse));
+    }
+
+    /// Switches those of `which` on that are in `on`, the others of `which` off.
+    fn switch(&mut self, which: u8, on: u8) {
+        let outputs = self.outputs & !which | on;
+        if outputs != self.outputs {
+            self.outputs = outputs;
+            self.pause(Body::Outputs(outputs));
         }
     }
 
     /// Something that is done at rest.
-    async fn pause(&mut self, body: Body) {
+    fn pause(&mut self, body: Body) {
         let block = self.builder.pause(body, self.line);
-        self.push(block).await;
+        self.push(block);
     }
 
-    /// G28.3: the position is called something else; no motor moves.
-    async fn set_position(&mut self, position: &PerAxis<Option<Length>>) {
-        for (mine, new) in self.position.iter_mut().zip(position) {
-            *mine = new.unwrap_or(*mine);
-        }
-        let body = {
-            let settings = self.links.settings.borrow();
-            self.builder.set_position(&self.position, &*settings)
-        };
-        self.push(Block { body, line: self.line }).await;
-    }
-
-    /// Tells exec what the drivers ask for, if that has changed.
-    async fn set_drivers(&mut self) {
-        let drivers = Machine::drivers(&*self.links.settings.borrow());
-        if drivers != self.drivers {
-            self.drivers = drivers;
-            self.push(Block { body: Body::Drivers(drivers), line: self.line }).await;
-        }
-    }
-
-    async fn push(&mut self, block: Block) {
-        self.room().await;
-        // There is room: this task alone fills the queue.
+    fn push(&mut self, block: Block) {
+        // There is room: this task alone fills the queue, and asks before each turn.
         let _ = self.queue.push(block);
-        self.pushed().await;
+        self.announce();
     }
 
     async fn room(&self) {
         wait(Event::BlockDone, || (self.queue.free() > 0).then_some(())).await;
     }
 
-    /// Tells the others, and lets them run.
-    async fn pushed(&self) {
-        self.announce();
-        yield_now().await;
+    /// Waits until the machine has come to the stop, and then for the next cycle start.
+    async fn cycle_start(&self) {
+        wait(Event::BlockDone, || (queue::used() == 0).then_some(())).await;
+        self.links.stopped.set(true);
+        self.links.reporter_wake.signal();
+        self.links.cycle_start.take();
+        self.links.cycle_start.wait().await;
+        self.links.stopped.set(false);
     }
 
+    /// Tells the others that a block has been queued.
     fn announce(&self) {
         links::feed();
         self.links.queue_count.add();
         self.links.reporter_wake.signal();
+    }
+}
+
+impl Parts {
+    #[inline(never)]
+    fn new(target: &PerAxis<Length>, feed: Option<Feed>, of: u16) -> Self {
+        // Inverse time is that of the whole.
+        let feed = match feed {
+            Some(Feed::Minutes(minutes)) => Some(Feed::Minutes(minutes / f32::from(of))),
+            other => other,
+        };
+        Self { target: *target, feed, left: of }
+    }
+
+    /// The end of the next part, the machine being at `position`.
+    #[inline(never)]
+    fn next(&mut self, position: &PerAxis<Length>) -> PerAxis<Length> {
+        let mut end = self.target;
+        for (end, start) in end.iter_mut().zip(position) {
+            let way = i64::from(end.0) - i64::from(start.0);
+            *end = Length((i64::from(start.0) + way / i64::from(self.left)) as i32);
+        }
+        self.left -= 1;
+        end
     }
 }
 

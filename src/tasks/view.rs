@@ -5,9 +5,9 @@
 
 use core::cell::{OnceCell, RefMut};
 
-use super::axes::moved_by;
 use super::links::{Links, snapshot};
 use super::power;
+use super::setup::moved_by;
 use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
@@ -52,7 +52,7 @@ impl<'a> View<'a> {
 
     /// `stat`.
     pub fn state(&self) -> i32 {
-        if self.busy() {
+        if self.busy() && !self.links.stopped.get() {
             return RUN;
         }
         match self.motion().program {
@@ -144,7 +144,8 @@ impl Machine for View<'_> {
             Value::Offset(axis) => self.offset(axis.into()).0,
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
-            Value::Hold | Value::Tool | Value::Home => 0,
+            Value::Tool => self.links.model.borrow().tool().into(),
+            Value::Hold | Value::Home => 0,
             modal => self.modal(modal),
         }
     }

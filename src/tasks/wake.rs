@@ -25,6 +25,11 @@ impl Wake {
         }
     }
 
+    /// Forgets a signal that nobody has waited for.
+    pub fn take(&self) {
+        self.signalled.set(false);
+    }
+
     /// Waits for a signal, and uses it up.
     pub async fn wait(&self) {
         poll_fn(|cx| {

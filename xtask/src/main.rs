@@ -11,6 +11,7 @@
 //! | [`fuzz`] | runs the fuzzers |
 //! | [`checks`] | everything that must pass before a merge |
 //! | [`jobs`] | writes the example jobs |
+//! | [`nist`] | what another interpreter makes of G-code, to compare with |
 //! | `docs` | test: what the documents name exists |
 
 mod boards;
@@ -22,6 +23,7 @@ mod elf;
 mod firmware;
 mod fuzz;
 mod jobs;
+mod nist;
 mod process;
 mod setup;
 mod sim;
@@ -59,6 +61,8 @@ enum Command {
     Flash(firmware::FlashArgs),
     /// Write the example jobs again
     Jobs,
+    /// Write the motions of `tests/nist` again, by a NIST-derived interpreter (Debian 12)
+    Nist(nist::Args),
 }
 
 #[derive(clap::Args)]
@@ -90,6 +94,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
         Command::Jobs => jobs::write()?,
+        Command::Nist(args) => nist::run(&args)?,
     }
     Ok(ExitCode::SUCCESS)
 }

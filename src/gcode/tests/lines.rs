@@ -1,10 +1,13 @@
 //! Modes, feeds, offsets, refusals.
 
 use super::{feed, position, refusal, run};
-use crate::gcode::axes::{Axes, AxisMode, Usual};
 use crate::gcode::command::{Commands, Feed, Motion, Stop};
 use crate::gcode::interpreter::Interpreter;
-use crate::gcode::modal::{Distance, FeedMode, Modal, MotionMode, PathMode, Plane, Units};
+use crate::gcode::modal::{
+    ArcDistance, Defaults, Distance, FeedMode, Modal, MotionMode, PathMode, Plane, Retract, Turn,
+    Units,
+};
+use crate::gcode::setup::{AxisMode, Setup, Usual};
 use crate::status::Status;
 use crate::units::Length;
 use std::vec;
@@ -36,14 +39,19 @@ fn lines_that_do_nothing() {
 #[test]
 fn modes_stay_in_force() {
     let set = Modal {
-        motion: MotionMode::Feed,
+        motion: MotionMode::Traverse,
         plane: Plane::Zx,
         distance: Distance::Incremental,
+        arc_distance: ArcDistance::Absolute,
         feed_mode: FeedMode::InverseTime,
         units: Units::Inch,
+        retract: Retract::ToR,
+        system: 8,
         path: PathMode::Exact,
+        spindle: Turn::Counterclockwise,
+        coolant: 3,
     };
-    let (state, _) = run(&["G1 G18 G20 G91 G93 G61 F1"]);
+    let (state, _) = run(&["M7", "G0 G18 G20 G91 G90.1 G93 G99 G59.3 G61 M4 M8"]);
     assert_eq!(state.modal(), &set);
 }
 
@@ -53,7 +61,7 @@ fn exact_stop_is_modal_and_asks_for_nothing_itself() {
     assert_eq!(state.modal().path, PathMode::ExactStop);
     assert_eq!(out, Commands { exact_stop: true, ..Commands::default() });
     assert!(run(&["G61.1", "G0 X1"]).1.exact_stop);
-    assert!(run(&["G61.1", "M30", "G0 X1"]).1.exact_stop);
+    assert!(!run(&["G61.1", "M30", "G0 X1"]).1.exact_stop);
     for line in ["G61", "G64"] {
         assert!(!run(&["G61.1", line, "G0 X1"]).1.exact_stop, "{line}");
     }
@@ -62,7 +70,7 @@ fn exact_stop_is_modal_and_asks_for_nothing_itself() {
 /// X disabled, A by a radius of 1 mm.
 struct Odd;
 
-impl Axes for Odd {
+impl Setup for Odd {
     fn mode(&self, axis: u8) -> AxisMode {
         match axis {
             0 => AxisMode::Disabled,
@@ -109,14 +117,18 @@ fn words_of_a_radius_axis_are_lengths() {
 }
 
 #[test]
-fn program_end_resets_all_but_units_and_path() {
-    let lines = ["G20 G61 G19 G91 G93 F1 G1 X1", "G92 X5", "M30"];
-    let (state, out) = run(&lines);
+fn program_end_resets() {
+    let modes = "G20 G61 G19 G91 G90.1 G99 G93 G55 M3 S9 M8 M49";
+    let (state, out) = run(&[modes, "F1 G1 X1", "G92 X5", "M30"]);
     assert_eq!(out.stop, Stop::End);
-    let kept = Modal { units: Units::Inch, path: PathMode::Exact, ..Modal::new() };
-    assert_eq!(state.modal(), &kept);
+    let reset = Modal { motion: MotionMode::Feed, ..Modal::new(&Defaults::USUAL) };
+    assert_eq!(state.modal(), &reset);
     assert_eq!(state.work_offset()[0], Length::ZERO);
     assert_eq!(state.position()[0], Length(254_000));
+    assert_eq!(state.feed_rate(), 0.0);
+    assert_eq!(run(&["G92 X5", "M2", "G92.3"]).0.work_offset()[0], Length::ZERO);
+    assert_eq!(run(&["M50 P.5 M2", "M49", "M2", "M48"]).1.overrides.unwrap().feed, 500);
+    assert_eq!(refusal(&["G1 F9", "M2", "X1"]), Status::FeedrateMissing);
     assert_eq!(run(&["M2"]).1.stop, Stop::End);
     for line in ["M0", "M1", "M60"] {
         assert_eq!(run(&[line]).1.stop, Stop::Program, "{line}");
@@ -166,16 +178,15 @@ fn dwell() {
     let (_, out) = run(&["G4 P.001 G0 X1"]);
     assert!(out.dwell_ms == Some(1) && out.motion != Motion::None);
     assert_eq!(refusal(&["G4"]), Status::PWordMissing);
-    assert_eq!(refusal(&["G4 X1"]), Status::PWordMissing);
+    assert_eq!(refusal(&["G0", "G4 X1"]), Status::PWordMissing);
     assert_eq!(refusal(&["G4 P-1"]), Status::PWordNegative);
 }
 
 #[test]
 fn set_position_in_machine_coordinates() {
     let (state, out) = run(&["G92 X1", "G0 X5", "G20 G28.3 X1 A1"]);
-    let named = out.set_position.unwrap();
-    assert_eq!((named[0], named[1], named[3]), (Some(Length(254_000)), None, Some(Length(10_000))));
-    assert_eq!(out.motion, Motion::None);
+    let named = Motion::SetPosition { position: [254_000, 0, 0, 10_000, 0, 0].map(Length) };
+    assert_eq!(out.motion, named);
     assert_eq!(state.position()[0], Length(254_000));
     assert_eq!(state.work_offset()[0], Length(-10_000));
     assert_eq!(refusal(&["G28.3"]), Status::AxisWordMissing);
@@ -208,19 +219,21 @@ fn inches_and_increments_do_not_drift() {
 #[test]
 fn axis_words_belong_to_one_code() {
     for line in ["G92 X1 G1 F1", "G0 G28.3 X1", "G2 G92 X1"] {
-        assert_eq!(refusal(&[line]), Status::ModalGroupViolation, "{line}");
+        assert_eq!(refusal(&[line]), Status::AxisConflict, "{line}");
     }
     run(&["G80 G92 X1"]);
     run(&["G0", "G92 X1"]);
-    for lines in [&["X1"][..], &["G0", "G80 X1"], &["G4 P1 X1"], &["G0", "M2", "X1"]] {
+    for lines in [&["X1"][..], &["G0", "G80 X1"], &["G4 P1 X1"]] {
         assert_eq!(refusal(lines), Status::AxisNotAllowed, "{lines:?}");
     }
 }
 
 #[test]
 fn words_that_nothing_uses() {
-    for line in ["P1", "G0 X1 P1", "R1", "I1", "G0 X1 J1", "G1 F1 X1 R2", "G92 X1 K1"] {
-        assert_eq!(refusal(&[line]), Status::GcodeGeneric, "{line}");
+    for line in
+        ["P1", "G0 X1 P1", "R1", "I1", "G0 X1 J1", "G1 F1 X1 R2", "G92 X1 K1", "H1", "L1", "Q1"]
+    {
+        assert_eq!(refusal(&[line]), Status::WordUnused, "{line}");
     }
 }
 

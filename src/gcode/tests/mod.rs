@@ -4,9 +4,9 @@ mod arcs;
 mod lines;
 mod usual;
 
-use super::axes::Usual;
 use super::command::{Commands, Feed, Motion};
 use super::interpreter::Interpreter;
+use super::setup::Usual;
 use crate::status::Status;
 
 /// An interpreter that has read these lines, and the commands of the last one.

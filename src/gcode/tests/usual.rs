@@ -4,9 +4,9 @@ use std::string::String;
 
 use proptest::prelude::*;
 
-use crate::gcode::axes::Usual;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
+use crate::gcode::setup::Usual;
 
 /// Lines that are usual, or almost.
 fn line() -> impl Strategy<Value = String> {

@@ -102,6 +102,18 @@ pub fn power(motors: u8) {
     }
 }
 
+/// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). Exec.
+pub fn set_outputs(on: u8) {
+    macro_rules! each {
+        ($($o:literal)+) => {$(
+            if let Some(pin) = ACTIVE.outputs[$o] {
+                set_active_low(pin, on & (1 << $o) == 0);
+            }
+        )+};
+    }
+    each!(0 1 2 3);
+}
+
 /// The compiler makes one read-modify-write of the two cases, and the port may be shared with pins of the
 /// step interrupt, which must not come in between: 8 cycles.
 #[inline(always)]

@@ -7,6 +7,20 @@ machine_static! {
     fn wanted() -> Local<u8> = Local::new(0);
 }
 
+machine_static! {
+    fn switched() -> Local<u8> = Local::new(0);
+}
+
+/// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs).
+pub fn set_outputs(on: u8) {
+    switched().set(on);
+}
+
+/// What [`set_outputs`] was told last.
+pub fn outputs() -> u8 {
+    switched().get()
+}
+
 /// Switches the drivers of these motors (bits) on, and the others off as far as the board can.
 pub fn power(motors: u8) {
     wanted().set(motors);

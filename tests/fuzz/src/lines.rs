@@ -6,8 +6,8 @@
 
 mod chords;
 
-use kerf::gcode::axes::{Axes, AxisMode, Usual};
 use kerf::gcode::command::{Commands, Motion};
+use kerf::gcode::setup::{AxisMode, Setup, Usual};
 use kerf::gcode::{Info, Interpreter};
 use kerf::status::Status;
 use kerf::units::Length;
@@ -33,7 +33,7 @@ struct Outcome {
 
 impl Outcome {
     /// Interprets a line and checks what holds for any.
-    fn of(interpreter: &mut Interpreter, line: &[u8], axes: &impl Axes) -> Self {
+    fn of(interpreter: &mut Interpreter, line: &[u8], axes: &impl Setup) -> Self {
         let before = *interpreter;
         let mut out = Commands::default();
         let result = interpreter.interpret(line, axes, &mut out);
@@ -82,7 +82,7 @@ fn arc(before: &Interpreter, out: &Commands) {
 /// As usual, but with limits, which nothing can be beyond: the fast path leaves such axes alone.
 struct Endless;
 
-impl Axes for Endless {
+impl Setup for Endless {
     fn mode(&self, axis: u8) -> AxisMode {
         Usual.mode(axis)
     }
@@ -97,7 +97,7 @@ impl Axes for Endless {
 /// X has limits, Y is inhibited, Z disabled; A turns by a radius of 1 mm, B of 10 m.
 struct Odd;
 
-impl Axes for Odd {
+impl Setup for Odd {
     fn mode(&self, axis: u8) -> AxisMode {
         match axis {
             1 => AxisMode::Inhibited,

@@ -1,0 +1,207 @@
+//! The rows of the language.
+
+use super::{Action, Code, NonModal, Override, OverrideCode, StopCode, Switch, ToolLength};
+use crate::gcode::modal::{
+    ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, Turn, Units,
+};
+use crate::gcode::words::{self, AXES, H, L, OFFSETS, P, Q, R, bit};
+
+/// A code without words of its own.
+const fn code(number: u16, action: Action) -> Code {
+    Code { number, action, takes: 0, needs: 0 }
+}
+
+/// A code that may have some.
+const fn with(number: u16, action: Action, takes: u32) -> Code {
+    Code { number, action, takes, needs: 0 }
+}
+
+/// A code that cannot be without some.
+const fn needing(number: u16, action: Action, needs: u32, also: u32) -> Code {
+    Code { number, action, takes: needs | also, needs }
+}
+
+/// A canned cycle. Its words stay in force from line to line, so that it needs none here.
+const fn cycle(number: u16, mode: MotionMode, also: u32) -> Code {
+    with(number, Action::Motion(mode), AXES | bit(R) | bit(L) | also)
+}
+
+const fn probe(number: u16, mode: MotionMode) -> Code {
+    needing(number, Action::Motion(mode), AXES, 0)
+}
+
+const ARC: u32 = AXES | OFFSETS | bit(R) | bit(P);
+
+/// Rows of G codes.
+pub const G_ROWS: usize = 66;
+/// Rows of M codes.
+pub const M_ROWS: usize = 21;
+
+crate::progmem! {
+    /// G codes, by number.
+    pub static G: [Code; G_ROWS] = G_TABLE;
+    /// M codes, by number.
+    pub static M: [Code; M_ROWS] = M_TABLE;
+    /// For each whole number, the first row of that number or a greater one.
+    pub static G_START: [u8; 101] = starts(&G_TABLE);
+    /// The same for M codes.
+    pub static M_START: [u8; 101] = starts(&M_TABLE);
+    /// The words that the code of each motion mode takes.
+    pub static MOTION: [u32; MotionMode::COUNT] = motions();
+}
+
+const G_TABLE: [Code; G_ROWS] = [
+    with(0, Action::Motion(MotionMode::Traverse), AXES),
+    with(10, Action::Motion(MotionMode::Feed), AXES),
+    with(20, Action::Motion(MotionMode::ClockwiseArc), ARC),
+    with(30, Action::Motion(MotionMode::CounterclockwiseArc), ARC),
+    needing(40, Action::NonModal(NonModal::Dwell), bit(P), 0),
+    needing(100, Action::NonModal(NonModal::SetData), bit(L) | bit(P) | AXES, 0),
+    code(170, Action::Plane(Plane::Xy)),
+    code(180, Action::Plane(Plane::Zx)),
+    code(190, Action::Plane(Plane::Yz)),
+    code(200, Action::Units(Units::Inch)),
+    code(210, Action::Units(Units::Mm)),
+    with(280, Action::NonModal(NonModal::GoStored(0)), AXES),
+    code(281, Action::NonModal(NonModal::Store(0))),
+    needing(282, Action::NonModal(NonModal::Home { set: true }), AXES, 0),
+    needing(283, Action::NonModal(NonModal::SetPosition), AXES, 0),
+    needing(284, Action::NonModal(NonModal::Home { set: false }), AXES, 0),
+    with(300, Action::NonModal(NonModal::GoStored(1)), AXES),
+    code(301, Action::NonModal(NonModal::Store(1))),
+    probe(382, MotionMode::ProbeTowards),
+    probe(383, MotionMode::ProbeTowardsQuietly),
+    probe(384, MotionMode::ProbeAway),
+    probe(385, MotionMode::ProbeAwayQuietly),
+    code(400, Action::CutterOff),
+    code(410, Action::CutterOn),
+    code(420, Action::CutterOn),
+    with(430, Action::ToolLength(ToolLength::Table), bit(H)),
+    needing(431, Action::ToolLength(ToolLength::Words), AXES, 0),
+    needing(432, Action::ToolLength(ToolLength::Add), bit(H), 0),
+    code(490, Action::ToolLength(ToolLength::Off)),
+    code(530, Action::NonModal(NonModal::MachineCoordinates)),
+    code(540, Action::System(0)),
+    code(550, Action::System(1)),
+    code(560, Action::System(2)),
+    code(570, Action::System(3)),
+    code(580, Action::System(4)),
+    code(590, Action::System(5)),
+    code(591, Action::System(6)),
+    code(592, Action::System(7)),
+    code(593, Action::System(8)),
+    code(610, Action::Path(PathMode::Exact)),
+    code(611, Action::Path(PathMode::ExactStop)),
+    with(640, Action::Path(PathMode::Continuous), bit(P)),
+    cycle(730, MotionMode::ChipBreak, bit(Q)),
+    code(800, Action::Motion(MotionMode::None)),
+    cycle(810, MotionMode::Drill, 0),
+    cycle(820, MotionMode::DrillDwell, bit(P)),
+    cycle(830, MotionMode::PeckDrill, bit(Q)),
+    cycle(840, MotionMode::Tap, 0),
+    cycle(850, MotionMode::Bore, 0),
+    cycle(860, MotionMode::BoreStop, bit(P)),
+    cycle(870, MotionMode::BackBore, OFFSETS),
+    cycle(880, MotionMode::BoreByHand, bit(P)),
+    cycle(890, MotionMode::BoreDwell, bit(P)),
+    code(900, Action::Distance(Distance::Absolute)),
+    code(901, Action::ArcDistance(ArcDistance::Absolute)),
+    code(910, Action::Distance(Distance::Incremental)),
+    code(911, Action::ArcDistance(ArcDistance::Incremental)),
+    needing(920, Action::NonModal(NonModal::SetOffset), AXES, 0),
+    code(921, Action::NonModal(NonModal::ClearOffset)),
+    code(922, Action::NonModal(NonModal::SuspendOffset)),
+    code(923, Action::NonModal(NonModal::ResumeOffset)),
+    code(930, Action::FeedMode(FeedMode::InverseTime)),
+    code(940, Action::FeedMode(FeedMode::PerMinute)),
+    code(950, Action::FeedMode(FeedMode::PerTurn)),
+    code(980, Action::Retract(Retract::Initial)),
+    code(990, Action::Retract(Retract::ToR)),
+];
+
+const fn set(what: Override, how: Switch) -> Action {
+    Action::Override(OverrideCode::One(what, how))
+}
+
+const M_TABLE: [Code; M_ROWS] = [
+    code(0, Action::Stop(StopCode::Program)),
+    code(10, Action::Stop(StopCode::Optional)),
+    code(20, Action::Stop(StopCode::End)),
+    code(30, Action::Spindle(Turn::Clockwise)),
+    code(40, Action::Spindle(Turn::Counterclockwise)),
+    code(50, Action::Spindle(Turn::Off)),
+    code(60, Action::ToolChange),
+    code(70, Action::Coolant(Coolant::Mist)),
+    code(80, Action::Coolant(Coolant::Flood)),
+    code(90, Action::Coolant(Coolant::Off)),
+    code(300, Action::Stop(StopCode::End)),
+    code(480, Action::Override(OverrideCode::All(true))),
+    needing(481, set(Override::Feed, Switch::To), bit(P), 0),
+    needing(482, set(Override::Traverse, Switch::To), bit(P), 0),
+    code(490, Action::Override(OverrideCode::All(false))),
+    code(491, set(Override::Feed, Switch::Off)),
+    code(492, set(Override::Traverse, Switch::Off)),
+    with(500, set(Override::Feed, Switch::Maybe), bit(P)),
+    with(501, set(Override::Traverse, Switch::Maybe), bit(P)),
+    with(510, set(Override::Spindle, Switch::Maybe), bit(P)),
+    code(600, Action::Stop(StopCode::Program)),
+];
+
+const fn starts<const N: usize>(rows: &[Code; N]) -> [u8; 101] {
+    let mut starts = [0; 101];
+    let mut whole = 0;
+    while whole <= 100 {
+        let mut row = 0;
+        while row < N && rows[row].number < 10 * whole {
+            row += 1;
+        }
+        starts[whole as usize] = row as u8;
+        whole += 1;
+    }
+    starts
+}
+
+const fn motions() -> [u32; MotionMode::COUNT] {
+    let mut taken = [0; MotionMode::COUNT];
+    let mut row = 0;
+    while row < G_ROWS {
+        if let Action::Motion(mode) = G_TABLE[row].action {
+            taken[mode as usize] = G_TABLE[row].takes;
+        }
+        row += 1;
+    }
+    taken
+}
+
+/// Words that no code takes would be refused on every line.
+const _: () = {
+    let mut taken = words::ALWAYS;
+    let mut row = 0;
+    while row < G_ROWS {
+        taken |= G_TABLE[row].takes;
+        row += 1;
+    }
+    assert!(taken == (1 << words::COUNT) - 1);
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gcode::codes::{g, m};
+
+    #[test]
+    fn tables_are_sorted() {
+        assert!(G.get().is_sorted_by_key(|row| row.number));
+        assert!(M.get().is_sorted_by_key(|row| row.number));
+    }
+
+    #[test]
+    fn every_row_is_found_and_nothing_else() {
+        for number in 0..2_560u16 {
+            let (whole, tenth) = ((number / 10) as u8, (number % 10) as u8);
+            let of = |rows: &[Code]| rows.iter().find(|row| row.number == number).copied();
+            assert_eq!(g(whole, tenth), of(&G.get()), "G{whole}.{tenth}");
+            assert_eq!(m(whole, tenth), of(&M.get()), "M{whole}.{tenth}");
+        }
+    }
+}

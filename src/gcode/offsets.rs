@@ -1,0 +1,309 @@
+//! Where the work origin is: coordinate systems (G54 to G59.3, G10), G92 and its kin, tool lengths.
+//!
+//! Machine coordinates of the origin = coordinate system + G92, if that is in force + tool length. The sum is
+//! kept in [`State::origin`], so that moves add one number.
+
+use super::axes;
+use super::block::Block;
+use super::codes::{NonModal, ToolLength};
+use super::command::{Commands, Motion};
+use super::setup::{AxisMode, Cycle, Setup};
+use super::state::State;
+use super::tables::{Edit, SYSTEMS, TOOLS, Tables, Tool};
+use super::words::{AXES, H, L, P};
+use crate::status::Status;
+use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
+
+/// The axes whose lengths a tool has.
+const TOOL_AXES: [u8; 2] = [0, 2];
+
+impl State {
+    /// Adds the origin up anew, of a coordinate system and what is in the state.
+    pub(super) fn update_origin(&mut self, system: &PerAxis<Length>) -> Result<(), Status> {
+        let parts = system.iter().zip(&self.shift).zip(&self.tool_length);
+        for (origin, ((system, shift), tool)) in self.origin.iter_mut().zip(parts) {
+            let shift = if self.shifted { *shift } else { Length::ZERO };
+            let sum = system.checked_add(shift).and_then(|sum| sum.checked_add(*tool));
+            *origin = sum.ok_or(Status::OutOfRange)?;
+        }
+        Ok(())
+    }
+
+    /// Tool length and coordinate system.
+    pub(super) fn offsets(
+        &mut self,
+        block: &Block,
+        tables: &Tables,
+        setup: &impl Setup,
+    ) -> Result<(), Status> {
+        if block.tool_length.is_none() && block.system.is_none() {
+            return Ok(());
+        }
+        match block.tool_length {
+            None => {}
+            Some(ToolLength::Off) => self.tool_length = [Length::ZERO; units::AXES],
+            Some(ToolLength::Words) => {
+                self.each_word(block, setup, |state, axis, value| {
+                    put(&mut state.tool_length, axis, value.units);
+                    Ok(())
+                })?;
+            }
+            Some(ToolLength::Table) => {
+                let tool = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
+                self.tool_length = tables.tool(tool.map_err(|_| Status::HWordInvalid)?)?.offsets();
+            }
+            Some(ToolLength::Add) => {
+                let tool = block.get(H).ok_or(Status::HWordMissing)?.integer();
+                let more = tables.tool(tool.map_err(|_| Status::HWordInvalid)?)?.offsets();
+                for (length, more) in self.tool_length.iter_mut().zip(&more) {
+                    *length = length.checked_add(*more).ok_or(Status::OutOfRange)?;
+                }
+            }
+        }
+        if let Some(system) = block.system {
+            self.modal.system = system;
+        }
+        self.update_origin(tables.system(self.modal.system))
+    }
+
+    /// Group 0, but for the moves to stored positions.
+    pub(super) fn non_modal(
+        &mut self,
+        block: &Block,
+        tables: &Tables,
+        setup: &impl Setup,
+        out: &mut Commands,
+        edit: &mut Edit,
+    ) -> Result<(), Status> {
+        match block.non_modal {
+            None | Some(NonModal::GoStored(_) | NonModal::MachineCoordinates) => {}
+            Some(NonModal::Dwell) => out.dwell_ms = Some(dwell_ms(block)?),
+            Some(NonModal::SetData) => self.set_data(block, tables, setup, edit)?,
+            Some(NonModal::Store(which)) => {
+                if block.has(AXES) {
+                    return Err(Status::AxisInvalid);
+                }
+                *edit = Edit::Stored(which, self.position);
+            }
+            Some(NonModal::Home { set }) => out.motion = home(block, set, setup)?,
+            Some(NonModal::SetPosition) => self.redefine_position(block, setup, out)?,
+            Some(NonModal::SetOffset) => self.shift_here(block, tables, setup)?,
+            Some(NonModal::ClearOffset) => {
+                self.shift = [Length::ZERO; units::AXES];
+                self.shift_is(false, tables)?;
+            }
+            Some(NonModal::SuspendOffset) => self.shift_is(false, tables)?,
+            Some(NonModal::ResumeOffset) => self.shift_is(true, tables)?,
+        }
+        Ok(())
+    }
+
+    fn shift_is(&mut self, on: bool, tables: &Tables) -> Result<(), Status> {
+        self.shifted = on;
+        self.update_origin(tables.system(self.modal.system))
+    }
+
+    /// G92: the position is called the axis words, in work coordinates.
+    fn shift_here(
+        &mut self,
+        block: &Block,
+        tables: &Tables,
+        setup: &impl Setup,
+    ) -> Result<(), Status> {
+        if !self.shifted {
+            self.shift = [Length::ZERO; units::AXES];
+        }
+        self.shifted = true;
+        let system = tables.system(self.modal.system);
+        self.each_word(block, setup, |state, axis, value| {
+            let others = at(system, axis).checked_add(at(&state.tool_length, axis));
+            let here = at(&state.position, axis);
+            let shift = others.and_then(|others| here.checked_sub(others));
+            let shift = shift.and_then(|shift| shift.checked_sub(value.units));
+            put(&mut state.shift, axis, shift.ok_or(Status::OutOfRange)?);
+            put(&mut state.residue, axis, value.rest);
+            Ok(())
+        })?;
+        self.update_origin(system)
+    }
+
+    /// G28.3: the position is called the axis words, in machine coordinates.
+    fn redefine_position(
+        &mut self,
+        block: &Block,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        self.each_word(block, setup, |state, axis, value| {
+            put(&mut state.position, axis, value.units);
+            put(&mut state.residue, axis, value.rest);
+            state.homed |= 1 << axis;
+            Ok(())
+        })?;
+        out.motion = Motion::SetPosition { position: self.position };
+        Ok(())
+    }
+
+    /// G10.
+    fn set_data(
+        &mut self,
+        block: &Block,
+        tables: &Tables,
+        setup: &impl Setup,
+        edit: &mut Edit,
+    ) -> Result<(), Status> {
+        let integer = |slot| block.get(slot).and_then(|word| word.integer().ok());
+        let number = integer(P).and_then(|number| u8::try_from(number).ok());
+        match (integer(L), number) {
+            (Some(l @ (2 | 20)), Some(number)) if usize::from(number) <= SYSTEMS => {
+                // 0 is the system in force.
+                let system = number.checked_sub(1).unwrap_or(self.modal.system);
+                self.set_system(block, system, l == 20, tables, setup, edit)
+            }
+            (Some(2 | 20), _) => Err(Status::PWordInvalid),
+            (Some(l @ (1 | 10)), Some(number @ 1..)) if usize::from(number) <= TOOLS => {
+                self.set_tool(block, number, l == 10, tables, setup, edit)
+            }
+            (Some(1 | 10), _) => Err(Status::ToolInvalid),
+            _ => Err(Status::LWordInvalid),
+        }
+    }
+
+    /// G10 L2: a coordinate system has its origin at the axis words; L20: where the position, in
+    /// it, is called the axis words.
+    fn set_system(
+        &mut self,
+        block: &Block,
+        number: u8,
+        here: bool,
+        tables: &Tables,
+        setup: &impl Setup,
+        edit: &mut Edit,
+    ) -> Result<(), Status> {
+        let mut system = *tables.system(number);
+        self.each_word(block, setup, |state, axis, value| {
+            let origin = if here {
+                let shift = if state.shifted { at(&state.shift, axis) } else { Length::ZERO };
+                let others = shift.checked_add(at(&state.tool_length, axis));
+                let origin =
+                    others.and_then(|others| at(&state.position, axis).checked_sub(others));
+                origin.and_then(|origin| origin.checked_sub(value.units))
+            } else {
+                Some(value.units)
+            };
+            put(&mut system, axis, origin.ok_or(Status::OutOfRange)?);
+            Ok(())
+        })?;
+        if number == self.modal.system {
+            self.update_origin(&system)?;
+        }
+        *edit = Edit::System(number, system);
+        Ok(())
+    }
+
+    /// G10 L1: a tool is as long as the axis words; L10: as long as makes the position be called the axis
+    /// words once it is in force.
+    fn set_tool(
+        &mut self,
+        block: &Block,
+        number: u8,
+        here: bool,
+        tables: &Tables,
+        setup: &impl Setup,
+        edit: &mut Edit,
+    ) -> Result<(), Status> {
+        let mut lengths = tables.tool(number.into())?.offsets();
+        self.each_word(block, setup, |state, axis, value| {
+            if !TOOL_AXES.contains(&axis) {
+                return Err(Status::AxisInvalid);
+            }
+            let length = if here {
+                let others = at(&state.origin, axis).checked_sub(at(&state.tool_length, axis));
+                let length =
+                    others.and_then(|others| at(&state.position, axis).checked_sub(others));
+                length.and_then(|length| length.checked_sub(value.units))
+            } else {
+                Some(value.units)
+            };
+            put(&mut lengths, axis, length.ok_or(Status::OutOfRange)?);
+            Ok(())
+        })?;
+        *edit = Edit::Tool(number, Tool { x: lengths[0], z: lengths[2] });
+        Ok(())
+    }
+
+    /// Does something for each axis word, but those of disabled axes.
+    fn each_word(
+        &mut self,
+        block: &Block,
+        setup: &impl Setup,
+        mut each: impl FnMut(&mut Self, u8, axes::Value) -> Result<(), Status>,
+    ) -> Result<(), Status> {
+        for (axis, word) in block.axes() {
+            if let Some(value) = axes::value(word, axis, self.modal.units, setup)? {
+                each(self, axis, value)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// G28 and G30: a traverse to the stored position, of the named axes and by way of where the words
+    /// say; of all axes without words.
+    #[inline(never)]
+    pub(super) fn go_stored(
+        &mut self,
+        block: &Block,
+        stored: &PerAxis<Length>,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        if let Some(mode) = block.motion {
+            self.modal.motion = mode;
+        }
+        self.advance(block, false, setup)?;
+        let via = self.position;
+        for axis in 0..units::AXES as u8 {
+            let named = !block.has(AXES) || block.get(axis).is_some();
+            if named && setup.mode(axis) != AxisMode::Disabled {
+                put(&mut self.position, axis, at(stored, axis));
+                put(&mut self.residue, axis, 0);
+            }
+        }
+        let target = self.position;
+        out.motion = match block.has(AXES) {
+            true => Motion::Through { via, target },
+            false => Motion::Traverse { target },
+        };
+        Ok(())
+    }
+}
+
+/// G4: P seconds.
+pub(super) fn dwell_ms(block: &Block) -> Result<u32, Status> {
+    block.get(P).ok_or(Status::PWordMissing)?.milliseconds()
+}
+
+fn home(block: &Block, set: bool, setup: &impl Setup) -> Result<Motion, Status> {
+    if !setup.can(Cycle::Homing) {
+        return Err(Status::HomingSwitches);
+    }
+    let mut axes = 0;
+    for (axis, _) in block.axes() {
+        // B and C have no switches.
+        if usize::from(axis) > FIRST_ROTARY || setup.mode(axis) == AxisMode::Disabled {
+            return Err(Status::HomingAxis);
+        }
+        axes |= 1 << axis;
+    }
+    Ok(Motion::Home { axes, set })
+}
+
+fn at(values: &PerAxis<Length>, axis: u8) -> Length {
+    values.get(usize::from(axis)).copied().unwrap_or_default()
+}
+
+fn put<T>(values: &mut PerAxis<T>, axis: u8, value: T) {
+    if let Some(place) = values.get_mut(usize::from(axis)) {
+        *place = value;
+    }
+}

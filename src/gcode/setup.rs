@@ -1,0 +1,71 @@
+//! What the interpreter asks about the machine that a program is for. The settings answer
+//! (`tasks::setup`).
+
+use super::modal::Defaults;
+use crate::units::Length;
+
+/// How an axis takes its words. The discriminants are TinyG's numbers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum AxisMode {
+    /// Words are accepted and mean nothing: the axis stays where it is.
+    Disabled = 0,
+    /// Lengths, or degrees of an axis that turns.
+    Standard = 1,
+    /// As standard; the position goes on, the motors stand still.
+    Inhibited = 2,
+    /// Of an axis that turns: lengths along a circumference.
+    Radius = 3,
+}
+
+/// A machine cycle that needs more than motors.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Cycle {
+    /// G28.2, G28.4.
+    Homing,
+    /// G38.2 to G38.5.
+    Probing,
+}
+
+/// The machine, as far as the language depends on it. Axes are X Y Z A B C from 0.
+pub trait Setup {
+    /// How an axis takes its words.
+    fn mode(&self, axis: u8) -> AxisMode;
+    /// The radius that turns a length into an angle, nm; more than 0.
+    fn radius(&self, axis: u8) -> u32;
+    /// The ends of its travel in machine coordinates, if moves beyond them are to be refused.
+    fn travel(&self, axis: u8) -> Option<(Length, Length)>;
+
+    /// The modes at start-up and after M2 and M30.
+    fn defaults(&self) -> Defaults {
+        Defaults::USUAL
+    }
+    /// Whether lines that begin with a slash are left out.
+    fn deletes_blocks(&self) -> bool {
+        true
+    }
+    /// Whether M1 stops.
+    fn stops_at_m1(&self) -> bool {
+        true
+    }
+    /// Whether there are switches for it.
+    fn can(&self, _cycle: Cycle) -> bool {
+        true
+    }
+}
+
+/// A machine with all axes as usual, and everything else too.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Usual;
+
+impl Setup for Usual {
+    fn mode(&self, _axis: u8) -> AxisMode {
+        AxisMode::Standard
+    }
+    fn radius(&self, _axis: u8) -> u32 {
+        1
+    }
+    fn travel(&self, _axis: u8) -> Option<(Length, Length)> {
+        None
+    }
+}

@@ -1,0 +1,304 @@
+//! What one line leaves to the next, and the order in which a line changes it.
+//!
+//! A refused line changes nothing: [`Interpreter`](super::interpreter) sees to that, so here things may
+//! be left half done.
+
+use super::block::Block;
+use super::codes::{NonModal, Override, OverrideCode, StopCode, Switch};
+use super::command::{Commands, Overrides, Spindle, Stop};
+use super::limits;
+use super::modal::{Coolant, Defaults, FeedMode, Modal, MotionMode, PathMode, Turn, Units};
+use super::setup::Setup;
+use super::sticky::Sticky;
+use super::tables::{Edit, Tables};
+use super::words::{F, N, P, S, T};
+use crate::status::Status;
+use crate::units::{AXES, Length, PerAxis};
+
+/// Everything a line may change, but for the tables.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct State {
+    pub modal: Modal,
+    /// F as written, with G94 or G95 in force; 0 if none.
+    pub feed: f32,
+    /// The units of `feed`.
+    pub feed_units: Units,
+    /// End of the last move, machine coordinates.
+    pub position: PerAxis<Length>,
+    /// What rounding took from `position`: ten-thousandths of a unit. Incremental moves carry it on.
+    pub residue: PerAxis<i16>,
+    /// Machine coordinates of the work origin: coordinate system, G92 and tool length together.
+    pub origin: PerAxis<Length>,
+    /// The axes whose position has been set to what it is (G28.3), as bits.
+    pub homed: u8,
+    pub line: u32,
+    /// G92, whether or not it is in force.
+    pub shift: PerAxis<Length>,
+    pub shifted: bool,
+    /// G43.
+    pub tool_length: PerAxis<Length>,
+    /// S.
+    pub speed: f32,
+    /// T, and the tool of the last M6.
+    pub selected: u8,
+    pub tool: u8,
+    /// The overrides, and which of them are on, as bits.
+    factors: Overrides,
+    overridden: u8,
+    /// The words of canned cycles.
+    pub sticky: Sticky,
+}
+
+/// All overrides on.
+const ALL: u8 = 7;
+
+impl State {
+    /// At power-up: everything 0.
+    pub const fn new(defaults: &Defaults) -> Self {
+        Self {
+            modal: Modal::new(defaults),
+            feed: 0.0,
+            feed_units: Units::Mm,
+            position: [Length::ZERO; AXES],
+            residue: [0; AXES],
+            origin: [Length::ZERO; AXES],
+            homed: 0,
+            line: 0,
+            shift: [Length::ZERO; AXES],
+            shifted: false,
+            tool_length: [Length::ZERO; AXES],
+            speed: 0.0,
+            selected: 0,
+            tool: 0,
+            factors: Overrides::NONE,
+            overridden: ALL,
+            sticky: Sticky::NONE,
+        }
+    }
+
+    /// Whether a block, after it has been checked, is one of a canned cycle.
+    pub fn is_in_cycle(&self, block: &Block) -> bool {
+        block.motion_from(self.modal.motion).is_some_and(MotionMode::is_cycle)
+    }
+
+    /// Carries out a block of modes and moves.
+    #[inline(never)]
+    pub fn execute(
+        &mut self,
+        block: &Block,
+        tables: &Tables,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        self.begin(block, out)?;
+        self.machine_modes(block, out);
+        self.finish(block, tables, setup, out)
+    }
+
+    /// Carries out a block with whatever it has.
+    #[inline(never)]
+    pub fn execute_rarity(
+        &mut self,
+        block: &Block,
+        tables: &Tables,
+        setup: &impl Setup,
+        out: &mut Commands,
+        edit: &mut Edit,
+    ) -> Result<(), Status> {
+        self.begin(block, out)?;
+        self.tools(block, out)?;
+        self.machine_modes(block, out);
+        self.overrides(block, out)?;
+        self.offsets(block, tables, setup)?;
+        self.non_modal(block, tables, setup, out, edit)?;
+        self.finish(block, tables, setup, out)?;
+        self.stop(block, tables, setup, out)
+    }
+
+    /// N, the modes, and F.
+    fn begin(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
+        self.line = block.get(N).map_or(Ok(0), |value| value.integer())?;
+        out.line = self.line;
+        self.modes(block);
+        self.feed(block)
+    }
+
+    fn modes(&mut self, block: &Block) {
+        let modal = &mut self.modal;
+        if block.feed_mode.is_some_and(|mode| mode != modal.feed_mode) {
+            // The rate of one mode means nothing in another.
+            self.feed = 0.0;
+        }
+        set(&mut modal.feed_mode, block.feed_mode);
+        set(&mut modal.plane, block.plane);
+        set(&mut modal.units, block.units);
+        set(&mut modal.distance, block.distance);
+        set(&mut modal.arc_distance, block.arc_distance);
+        set(&mut modal.retract, block.retract);
+        set(&mut modal.path, block.path);
+    }
+
+    /// F, but with G93: there it is for the move of its line alone, which takes it.
+    fn feed(&mut self, block: &Block) -> Result<(), Status> {
+        let Some(value) = block.get(F) else { return Ok(()) };
+        if value.negative {
+            return Err(Status::OutOfRange);
+        }
+        if self.modal.feed_mode != FeedMode::InverseTime {
+            self.feed = value.to_f32();
+            self.feed_units = self.modal.units;
+        }
+        Ok(())
+    }
+
+    /// S, T and M6.
+    fn tools(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
+        if let Some(value) = block.get(S) {
+            if value.negative {
+                return Err(Status::SWordInvalid);
+            }
+            self.speed = value.to_f32();
+            if self.modal.spindle != Turn::Off {
+                out.spindle = Some(self.spindle());
+            }
+        }
+        if let Some(value) = block.get(T) {
+            let number = value.integer().ok().and_then(|number| number.try_into().ok());
+            self.selected = number.ok_or(Status::TWordInvalid)?;
+        }
+        if block.changes_tool() {
+            self.tool = self.selected;
+            out.tool = Some(self.tool);
+        }
+        Ok(())
+    }
+
+    /// Spindle and coolant.
+    fn machine_modes(&mut self, block: &Block, out: &mut Commands) {
+        if let Some(turn) = block.spindle {
+            self.modal.spindle = turn;
+            out.spindle = Some(self.spindle());
+        }
+        if let Some(coolant) = block.coolant {
+            self.modal.coolant = match coolant {
+                Coolant::Off => 0,
+                more => self.modal.coolant | more as u8,
+            };
+            out.coolant = Some(self.modal.coolant);
+        }
+    }
+
+    /// What the spindle does.
+    pub fn spindle(&self) -> Spindle {
+        Spindle { turn: self.modal.spindle, speed: self.speed }
+    }
+
+    fn overrides(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
+        match block.overrides {
+            None => return Ok(()),
+            Some(OverrideCode::All(on)) => self.overridden = if on { ALL } else { 0 },
+            Some(OverrideCode::One(which, how)) => self.override_one(block, which, how)?,
+        }
+        out.overrides = Some(self.overrides_now());
+        Ok(())
+    }
+
+    fn override_one(&mut self, block: &Block, which: Override, how: Switch) -> Result<(), Status> {
+        let bit = 1 << which as u8;
+        let word = block.get(P);
+        let off = match how {
+            Switch::Off => true,
+            Switch::To => false,
+            Switch::Maybe => word.is_some_and(|p| p.is_zero()),
+        };
+        if off {
+            self.overridden &= !bit;
+            return Ok(());
+        }
+        if let Some(word) = word {
+            let most = if which == Override::Traverse { 1_000 } else { 2_000 };
+            let factor = word.milliseconds().map_err(|_| Status::PWordInvalid)?;
+            if !(50..=most).contains(&factor) {
+                return Err(Status::PWordInvalid);
+            }
+            let factor = factor as u16;
+            match which {
+                Override::Feed => self.factors.feed = factor,
+                Override::Traverse => self.factors.traverse = factor,
+                Override::Spindle => self.factors.spindle = factor,
+            }
+        }
+        self.overridden |= bit;
+        Ok(())
+    }
+
+    /// By what rates and speeds are multiplied.
+    pub fn overrides_now(&self) -> Overrides {
+        let on = |which: Override, factor| {
+            if self.overridden & 1 << which as u8 != 0 { factor } else { 1_000 }
+        };
+        Overrides {
+            feed: on(Override::Feed, self.factors.feed),
+            traverse: on(Override::Traverse, self.factors.traverse),
+            spindle: on(Override::Spindle, self.factors.spindle),
+        }
+    }
+
+    /// Motion, and what belongs to it.
+    #[inline(never)]
+    fn finish(
+        &mut self,
+        block: &Block,
+        tables: &Tables,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        // Limits are for homed axes alone; most machines are spared the copy.
+        let start = if self.homed == 0 { None } else { Some(self.position) };
+        match block.non_modal {
+            Some(NonModal::GoStored(which)) => {
+                self.go_stored(block, tables.stored(which), setup, out)?
+            }
+            _ => self.motion(block, setup, out)?,
+        }
+        if let Some(start) = &start {
+            limits::check(start, &out.motion, self.homed, setup)?;
+        }
+        out.exact_stop = self.modal.path == PathMode::ExactStop;
+        Ok(())
+    }
+
+    fn stop(
+        &mut self,
+        block: &Block,
+        tables: &Tables,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        out.stop = match block.stop {
+            None => Stop::None,
+            Some(StopCode::Optional) if !setup.stops_at_m1() => Stop::None,
+            Some(StopCode::Program | StopCode::Optional) => Stop::Program,
+            Some(StopCode::End) => {
+                self.end_program(tables, setup)?;
+                Stop::End
+            }
+        };
+        Ok(())
+    }
+
+    /// M2 and M30: modes as at power-up, but G1 with F0; no G92; the overrides on.
+    fn end_program(&mut self, tables: &Tables, setup: &impl Setup) -> Result<(), Status> {
+        self.modal = Modal { motion: MotionMode::Feed, ..Modal::new(&setup.defaults()) };
+        self.feed = 0.0;
+        (self.shift, self.shifted) = ([Length::ZERO; AXES], false);
+        self.overridden = ALL;
+        self.update_origin(tables.system(self.modal.system))
+    }
+}
+
+fn set<T>(mode: &mut T, new: Option<T>) {
+    if let Some(new) = new {
+        *mode = new;
+    }
+}

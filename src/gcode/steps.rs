@@ -1,0 +1,321 @@
+//! The commands of a line, taken apart: one step after the other, in the order of execution.
+//!
+//! The planner carries the steps out, `kerf canon` prints them. A canned cycle is a table of what is done
+//! at a hole; it is spelled out here step by step, so that it needs no memory but where it is.
+//!
+//! Who asks for a step has carried out the one before and says where that has led to.
+
+use super::command::{Commands, Cycle, Feed, Motion, Overrides, Spindle, Stop};
+use super::modal::{MotionMode, Turn};
+use crate::progmem;
+use crate::units::{Length, PerAxis};
+
+/// One step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// This tool is in the spindle.
+    Tool(u8),
+    /// The spindle turns so.
+    Spindle(Spindle),
+    /// These coolants run, bits of [`Coolant`](super::modal::Coolant).
+    Coolant(u8),
+    /// Rates and speeds are multiplied so.
+    Overrides(Overrides),
+    /// Stand still for so many milliseconds.
+    Dwell(u32),
+    /// A straight move to a place in machine coordinates; a traverse without a feed.
+    Line(PerAxis<Length>, Option<Feed>),
+    /// The arc of the commands' motion.
+    Arc,
+    /// The probing move of the commands' motion.
+    Probe,
+    /// The homing cycle of the commands' motion.
+    Home,
+    /// The position is called this.
+    SetPosition(PerAxis<Length>),
+    /// The program stops or ends.
+    Stop(Stop),
+}
+
+/// How far a line has been carried out.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Steps {
+    stage: Stage,
+    /// In a motion of several steps: the number of the next one.
+    part: u8,
+    /// In a cycle: the hole, from 1, and how deep it is.
+    hole: u16,
+    depth: Length,
+    peck: Peck,
+}
+
+#[derive(Clone, Copy, Default, PartialEq, Debug)]
+enum Stage {
+    #[default]
+    OldSpindle,
+    Tool,
+    Spindle,
+    Coolant,
+    Overrides,
+    Dwell,
+    Motion,
+    Stop,
+    Done,
+}
+
+/// What comes next in a hole that is drilled bit by bit.
+#[derive(Clone, Copy, Default, PartialEq, Debug)]
+enum Peck {
+    #[default]
+    Deeper,
+    Up,
+    Down,
+}
+
+/// So far above the last depth feeding begins again, or chips are broken: 0.254 mm.
+const PECK_CLEARANCE: i32 = 2_540;
+
+/// One thing that is done at a hole.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Op {
+    /// The hole is done.
+    End,
+    /// Before the first hole: up to R if the tool is below it.
+    Rise,
+    /// To the hole, across the plane.
+    Over,
+    /// To one side of the hole.
+    Aside,
+    Rapid(Level),
+    Feed(Level),
+    /// To the bottom, bit by bit.
+    Peck,
+    Dwell,
+    SpindleOff,
+    SpindleOn,
+    SpindleBack,
+    Stop,
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Level {
+    R,
+    Bottom,
+    Clear,
+    Top,
+}
+
+/// What all cycles begin with.
+const APPROACH: [Op; 3] = [Op::Rise, Op::Over, Op::Rapid(Level::R)];
+/// The most that one does after that.
+const OPS: usize = 12;
+/// The first cycle's motion mode.
+const FIRST: usize = MotionMode::Drill as usize;
+
+progmem! {
+    /// What each cycle does at a hole, by motion mode from G81 on.
+    static CYCLES: [[Op; OPS]; 10] = [
+        ops(&[Op::Feed(Level::Bottom), Op::Rapid(Level::Clear)]),
+        ops(&[Op::Feed(Level::Bottom), Op::Dwell, Op::Rapid(Level::Clear)]),
+        ops(&[Op::Peck, Op::Rapid(Level::Clear)]),
+        ops(&[
+            Op::Feed(Level::Bottom), Op::SpindleOff, Op::SpindleBack, Op::Dwell,
+            Op::Feed(Level::Clear), Op::SpindleOff, Op::SpindleOn,
+        ]),
+        ops(&[Op::Feed(Level::Bottom), Op::Feed(Level::Clear)]),
+        ops(&[
+            Op::Feed(Level::Bottom), Op::Dwell, Op::SpindleOff, Op::Rapid(Level::Clear),
+            Op::SpindleOn,
+        ]),
+        ops(&[
+            Op::Aside, Op::SpindleOff, Op::Rapid(Level::Bottom), Op::Over, Op::SpindleOn,
+            Op::Feed(Level::Top), Op::Feed(Level::Bottom), Op::SpindleOff, Op::Aside,
+            Op::Rapid(Level::Clear), Op::Over, Op::SpindleOn,
+        ]),
+        ops(&[
+            Op::Feed(Level::Bottom), Op::Dwell, Op::SpindleOff, Op::Stop,
+            Op::Rapid(Level::Clear), Op::SpindleOn,
+        ]),
+        ops(&[Op::Feed(Level::Bottom), Op::Dwell, Op::Feed(Level::Clear)]),
+        ops(&[Op::Peck, Op::Rapid(Level::Clear)]),
+    ];
+}
+
+const fn ops(some: &[Op]) -> [Op; OPS] {
+    let mut all = [Op::End; OPS];
+    let mut i = 0;
+    while i < some.len() {
+        all[i] = some[i];
+        i += 1;
+    }
+    all
+}
+
+impl Steps {
+    /// The next step of a line, the machine being at `position`; `None` when there is none left.
+    #[inline(never)]
+    pub fn next(&mut self, commands: &Commands, position: &PerAxis<Length>) -> Option<Step> {
+        loop {
+            let stage = self.stage;
+            let (step, next) = match stage {
+                // A tool is changed at rest.
+                Stage::OldSpindle => {
+                    let off = Step::Spindle(Spindle { turn: Turn::Off, speed: 0.0 });
+                    (commands.tool.map(|_| off), Stage::Tool)
+                }
+                Stage::Tool => (commands.tool.map(Step::Tool), Stage::Spindle),
+                Stage::Spindle => (commands.spindle.map(Step::Spindle), Stage::Coolant),
+                Stage::Coolant => (commands.coolant.map(Step::Coolant), Stage::Overrides),
+                Stage::Overrides => (commands.overrides.map(Step::Overrides), Stage::Dwell),
+                Stage::Dwell => (commands.dwell_ms.map(Step::Dwell), Stage::Motion),
+                Stage::Motion => match self.motion(&commands.motion, position) {
+                    None => (None, Stage::Stop),
+                    more => return more,
+                },
+                Stage::Stop => {
+                    let stop = (commands.stop != Stop::None).then_some(Step::Stop(commands.stop));
+                    (stop, Stage::Done)
+                }
+                Stage::Done => return None,
+            };
+            self.stage = next;
+            if step.is_some() {
+                return step;
+            }
+        }
+    }
+
+    /// Asks for the stop at the end of the line once more.
+    pub fn repeat(&mut self) {
+        self.stage = Stage::Stop;
+    }
+
+    fn motion(&mut self, motion: &Motion, position: &PerAxis<Length>) -> Option<Step> {
+        if let Motion::Cycle(cycle) = motion {
+            return self.cycle(cycle, position);
+        }
+        self.part += 1;
+        match (motion, self.part) {
+            (Motion::Through { via, .. }, 1) => Some(Step::Line(*via, None)),
+            (Motion::Through { target, .. }, 2) => Some(Step::Line(*target, None)),
+            (Motion::None, _) | (_, 2..) => None,
+            (Motion::Traverse { target }, _) => Some(Step::Line(*target, None)),
+            (Motion::Feed { target, feed }, _) => Some(Step::Line(*target, Some(*feed))),
+            (Motion::Arc { .. }, _) => Some(Step::Arc),
+            (Motion::Probe { .. }, _) => Some(Step::Probe),
+            (Motion::Home { .. }, _) => Some(Step::Home),
+            (Motion::SetPosition { position }, _) => Some(Step::SetPosition(*position)),
+            (Motion::Through { .. } | Motion::Cycle(_), _) => None,
+        }
+    }
+
+    #[inline(never)]
+    fn cycle(&mut self, cycle: &Cycle, position: &PerAxis<Length>) -> Option<Step> {
+        if self.hole == 0 {
+            self.hole = 1;
+        }
+        loop {
+            let part = usize::from(self.part);
+            let op = APPROACH.get(part).copied().unwrap_or_else(|| {
+                let ops = CYCLES.at((cycle.mode as usize).wrapping_sub(FIRST));
+                ops.and_then(|ops| ops.get(part - APPROACH.len()).copied()).unwrap_or(Op::End)
+            });
+            if op == Op::End {
+                if self.hole >= cycle.holes {
+                    return None;
+                }
+                self.hole += 1;
+                self.part = 1;
+                continue;
+            }
+            let step = self.op(op, cycle, position);
+            if self.peck == Peck::Deeper {
+                self.part += 1;
+            }
+            match step {
+                // Nowhere to go.
+                Some(Step::Line(target, _)) if target == *position => {}
+                None => {}
+                step => return step,
+            }
+        }
+    }
+
+    fn op(&mut self, op: Op, cycle: &Cycle, position: &PerAxis<Length>) -> Option<Step> {
+        let across = usize::from(cycle.plane.axes()[2]);
+        let spindle = |turn| Some(Step::Spindle(Spindle { turn, ..cycle.spindle }));
+        match op {
+            Op::Rise if position.get(across)? < &cycle.retract => {
+                level(position, across, cycle.retract, None)
+            }
+            Op::Rise | Op::End => None,
+            Op::Over => self.over(cycle, position, [Length::ZERO; 2]),
+            Op::Aside => self.over(cycle, position, cycle.aside),
+            Op::Rapid(to) => level(position, across, cycle.level(to), None),
+            Op::Feed(to) => level(position, across, cycle.level(to), Some(cycle.feed)),
+            Op::Peck => self.peck(cycle, position, across),
+            Op::Dwell => (cycle.dwell_ms > 0).then_some(Step::Dwell(cycle.dwell_ms)),
+            Op::SpindleOff => spindle(Turn::Off),
+            Op::SpindleOn => spindle(cycle.spindle.turn),
+            Op::SpindleBack => spindle(match cycle.spindle.turn {
+                Turn::Clockwise => Turn::Counterclockwise,
+                _ => Turn::Clockwise,
+            }),
+            Op::Stop => Some(Step::Stop(Stop::Program)),
+        }
+    }
+
+    /// To the hole, or so far beside it.
+    fn over(&self, cycle: &Cycle, position: &PerAxis<Length>, by: [Length; 2]) -> Option<Step> {
+        let mut target = *position;
+        let hole = cycle.hole(self.hole)?;
+        for ((axis, hole), by) in cycle.plane.axes().into_iter().zip(hole).zip(by) {
+            *target.get_mut(usize::from(axis))? = hole.units.checked_add(by)?;
+        }
+        Some(Step::Line(target, None))
+    }
+
+    /// G73 and G83: to the bottom in feeds no longer than Q.
+    fn peck(&mut self, cycle: &Cycle, position: &PerAxis<Length>, across: usize) -> Option<Step> {
+        let again = Length(self.depth.0.saturating_add(PECK_CLEARANCE)).min(cycle.retract);
+        let (to, feed, next) = match self.peck {
+            Peck::Up if cycle.mode == MotionMode::ChipBreak => (again, None, Peck::Down),
+            Peck::Up => (cycle.retract, None, Peck::Down),
+            Peck::Down | Peck::Deeper => {
+                if self.peck == Peck::Deeper {
+                    self.depth = cycle.retract;
+                } else if *position.get(across)? > again {
+                    return level(position, across, again, None);
+                }
+                self.depth = Length(self.depth.0.saturating_sub(cycle.peck.0)).max(cycle.bottom);
+                let done = self.depth == cycle.bottom;
+                (self.depth, Some(cycle.feed), if done { Peck::Deeper } else { Peck::Up })
+            }
+        };
+        self.peck = next;
+        level(position, across, to, feed)
+    }
+}
+
+/// Along the axis across the plane.
+fn level(
+    position: &PerAxis<Length>,
+    across: usize,
+    to: Length,
+    feed: Option<Feed>,
+) -> Option<Step> {
+    let mut target = *position;
+    *target.get_mut(across)? = to;
+    Some(Step::Line(target, feed))
+}
+
+impl Cycle {
+    fn level(&self, level: Level) -> Length {
+        match level {
+            Level::R => self.retract,
+            Level::Bottom => self.bottom,
+            Level::Clear => self.clear,
+            Level::Top => self.top,
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The words of canned cycles that stay in force from line to line (RS274/NGC 3.5.16).
+//!
+//! Numbers are kept as written, in units of a length: R and Z mean something else with G90 than with G91.
+//! They hold for as long as the same cycle goes on.
+
+use super::axes;
+use super::block::Block;
+use super::modal::{MotionMode, Plane, Units};
+use super::words::{I, P, Q, R};
+use crate::status::Status;
+use crate::units::Length;
+
+/// The words of the cycle in force.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Sticky {
+    /// Whose they are: none of another mode counts.
+    mode: MotionMode,
+    /// Where the axis stood before the first cycle of the series, machine coordinates.
+    pub initial: Length,
+    /// R.
+    pub retract: Option<Length>,
+    /// The word of the axis across the plane.
+    pub depth: Option<Length>,
+    /// Q.
+    pub peck: Option<Length>,
+    /// P.
+    pub dwell_ms: Option<u32>,
+    /// I, J and K of G87.
+    pub offsets: [Option<Length>; 3],
+}
+
+impl Sticky {
+    /// No words. All zeros, so that it needs no memory.
+    pub const NONE: Self = Self {
+        mode: MotionMode::Traverse,
+        initial: Length::ZERO,
+        retract: None,
+        depth: None,
+        peck: None,
+        dwell_ms: None,
+        offsets: [None; 3],
+    };
+
+    /// What is in force on a line of `mode`, after `before` was: its words, and the others of the series.
+    /// `here`: where the axis across the plane is.
+    pub fn on(
+        &self,
+        block: &Block,
+        mode: MotionMode,
+        before: MotionMode,
+        plane: Plane,
+        units: Units,
+        here: Length,
+    ) -> Result<Self, Status> {
+        let mut now = match () {
+            () if before == mode && self.mode == mode => *self,
+            () if before.is_cycle() => Self { initial: self.initial, ..Self::NONE },
+            () => Self { initial: here, ..Self::NONE },
+        };
+        now.mode = mode;
+        let length = |slot: u8, kept: &mut Option<Length>| {
+            if let Some(word) = block.get(slot) {
+                *kept = Some(axes::length(word, units)?.units);
+            }
+            Ok(())
+        };
+        length(R, &mut now.retract)?;
+        length(plane.axes()[2], &mut now.depth)?;
+        length(Q, &mut now.peck)?;
+        for (slot, offset) in (I..).zip(&mut now.offsets) {
+            length(slot, offset)?;
+        }
+        if let Some(word) = block.get(P) {
+            now.dwell_ms = Some(word.milliseconds()?);
+        }
+        Ok(now)
+    }
+}

@@ -1,0 +1,93 @@
+//! The letters of a line that carry a number, as slots and as sets of bits.
+//!
+//! A set is a `u32` with the bit of each slot. The tables of `codes` say with them which words a code
+//! takes and which it needs.
+
+use crate::progmem;
+use crate::status::Status;
+
+/// The letter of each slot, axes first.
+pub const LETTERS: [u8; COUNT] = *b"XYZABCIJKRPQLHFSTN";
+/// How many slots there are.
+pub const COUNT: usize = 18;
+
+/// The slot of I, of I J K.
+pub const I: u8 = 6;
+#[allow(missing_docs)]
+mod names {
+    pub const R: u8 = 9;
+    pub const P: u8 = 10;
+    pub const Q: u8 = 11;
+    pub const L: u8 = 12;
+    pub const H: u8 = 13;
+    pub const F: u8 = 14;
+    pub const S: u8 = 15;
+    pub const T: u8 = 16;
+    pub const N: u8 = 17;
+}
+pub use names::{F, H, L, N, P, Q, R, S, T};
+
+/// X Y Z A B C.
+pub const AXES: u32 = 0x3F;
+/// A B C.
+pub const ROTARY: u32 = 0x38;
+/// I J K.
+pub const OFFSETS: u32 = 7 << I;
+/// Words that mean something by themselves, on any line.
+pub const ALWAYS: u32 = bit(F) | bit(S) | bit(T) | bit(N);
+
+/// No such slot.
+const NONE: u8 = 255;
+
+progmem! {
+    /// The slot of each letter, A to Z.
+    static SLOT: [u8; 26] = {
+        let mut table = [NONE; 26];
+        let mut i = 0;
+        while i < COUNT {
+            table[(LETTERS[i] - b'A') as usize] = i as u8;
+            i += 1;
+        }
+        table
+    };
+    /// The bit of each slot: quicker than to shift one there.
+    static BIT: [u32; COUNT] = {
+        let mut table = [0; COUNT];
+        let mut i = 0;
+        while i < COUNT {
+            table[i] = 1 << i;
+            i += 1;
+        }
+        table
+    };
+    /// What a code is refused with that lacks a word it needs, by slot.
+    static MISSING: [Status; COUNT] = [
+        Status::AxisWordMissing, Status::AxisWordMissing, Status::AxisWordMissing,
+        Status::AxisWordMissing, Status::AxisWordMissing, Status::AxisWordMissing,
+        Status::ArcOffsetsMissing, Status::ArcOffsetsMissing, Status::ArcOffsetsMissing,
+        Status::RWordMissing, Status::PWordMissing, Status::QWordMissing, Status::LWordMissing,
+        Status::HWordMissing, Status::FeedrateMissing, Status::SWordMissing, Status::TWordMissing,
+        Status::InternalError,
+    ];
+}
+
+/// The set of one slot.
+pub const fn bit(slot: u8) -> u32 {
+    1 << slot
+}
+
+/// The same, for a slot that is not known beforehand; empty beyond the last.
+pub fn bit_of(slot: u8) -> u32 {
+    BIT.at(slot.into()).unwrap_or(0)
+}
+
+/// The slot of a letter in upper case.
+pub fn slot_of(letter: u8) -> Option<u8> {
+    SLOT.at(usize::from(letter.wrapping_sub(b'A'))).filter(|slot| *slot != NONE)
+}
+
+/// What a line is refused with that lacks the first word of a set.
+pub fn missing(set: u32) -> Status {
+    let first = (0..COUNT as u8).find(|slot| set & bit_of(*slot) != 0);
+    first.and_then(|slot| MISSING.at(slot.into())).unwrap_or(Status::InternalError)
+}

@@ -1,0 +1,77 @@
+//! What the settings say of the machine to those who interpret lines and those who plan moves.
+
+use crate::config::Settings;
+use crate::config::getters::TRAVEL_NONE;
+use crate::config::table::system;
+use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
+use crate::gcode::setup::{AxisMode, Cycle, Setup};
+use crate::units::Length;
+
+impl Setup for Settings {
+    fn mode(&self, axis: u8) -> AxisMode {
+        match self.axis_mode(axis.into()) {
+            0 => AxisMode::Disabled,
+            2 => AxisMode::Inhibited,
+            3 => AxisMode::Radius,
+            _ => AxisMode::Standard,
+        }
+    }
+
+    fn radius(&self, axis: u8) -> u32 {
+        self.radius_nm(axis.into())
+    }
+
+    fn travel(&self, axis: u8) -> Option<(Length, Length)> {
+        if !self.soft_limits() {
+            return None;
+        }
+        let (low, high) = (self.travel_min(axis.into()), self.travel_max(axis.into()));
+        if low == high {
+            return None;
+        }
+        // The lowest that can be set, and anything below it, means no limit, at either end.
+        let end = |end, far| if end == TRAVEL_NONE { Length(far) } else { end };
+        Some((end(low, i32::MIN), end(high, i32::MAX)))
+    }
+
+    #[inline(never)]
+    fn defaults(&self) -> Defaults {
+        Defaults {
+            plane: match self.system(system::GPL) {
+                0 => Plane::Xy,
+                1 => Plane::Zx,
+                _ => Plane::Yz,
+            },
+            units: if self.system(system::GUN) == 0 { Units::Inch } else { Units::Mm },
+            system: self.system(system::GCO).saturating_sub(1),
+            path: match self.system(system::GPA) {
+                0 => PathMode::Exact,
+                1 => PathMode::ExactStop,
+                _ => PathMode::Continuous,
+            },
+            distance: match self.system(system::GDI) {
+                0 => Distance::Absolute,
+                _ => Distance::Incremental,
+            },
+        }
+    }
+
+    fn deletes_blocks(&self) -> bool {
+        self.system(system::BD) != 0
+    }
+
+    fn stops_at_m1(&self) -> bool {
+        self.system(system::OST) != 0
+    }
+
+    /// No switch is read so far.
+    fn can(&self, _cycle: Cycle) -> bool {
+        false
+    }
+}
+
+/// The axis whose position moves a motor; none above 5: that of an inhibited axis stands still.
+pub fn moved_by(settings: &Settings, motor: usize) -> u8 {
+    let axis = settings.motor_axis(motor);
+    if settings.mode(axis) == AxisMode::Inhibited { u8::MAX } else { axis }
+}

@@ -1,0 +1,117 @@
+//! An independent word on G-code: runs a NIST-derived interpreter over `tests/nist/*.ngc` and writes
+//! beside each program the motion that it makes of it.
+//!
+//! | module | for |
+//! |---|---|
+//! | [`fetch`] | gets the interpreter from the distribution's packages |
+//! | [`oracle`] | runs it over a program |
+//! | [`canon`] | reads a line of its output |
+//! | [`place`] | where the machine is: units, systems, lengths |
+//! | [`motion`] | the normalised motion |
+//!
+//! The files and their format: `tests/nist/README.md`. Neither the tests nor the checks come here: they
+//! use the motions that lie in the repository.
+
+mod canon;
+mod fetch;
+mod motion;
+mod oracle;
+mod place;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+use crate::process::root;
+
+/// What `cargo xtask nist` takes.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Write nothing: fail where a motion differs from what the interpreter makes now
+    #[arg(long)]
+    check: bool,
+}
+
+/// Writes or checks the motion of every program.
+pub fn run(args: &Args) -> Result<()> {
+    let oracle = fetch::oracle()?;
+    let programs = programs()?;
+    let (mut refused, mut differ) = (0, 0);
+    for program in &programs {
+        match oracle.motion(program) {
+            Ok(motion) => differ += usize::from(!store(program, &motion, args.check)?),
+            Err(error) => {
+                refused += 1;
+                println!("{}: {error:#}", name(program));
+            }
+        }
+    }
+    println!("{} programs, {differ} motions differ, {}", programs.len(), oracle.version);
+    ensure!(refused == 0, "{refused} programs are refused");
+    ensure!(!args.check || differ == 0, "{differ} motions differ");
+    Ok(())
+}
+
+/// The programs, in the order of their names.
+fn programs() -> Result<Vec<PathBuf>> {
+    let dir = root().join("tests/nist");
+    let entries = std::fs::read_dir(&dir).with_context(|| dir.display().to_string())?;
+    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|ending| ending == "ngc"));
+    files.sort();
+    Ok(files)
+}
+
+/// Writes a program's motion unless it is to be checked; says whether it was there as it should be.
+fn store(program: &Path, motion: &str, check: bool) -> Result<bool> {
+    let file = program.with_extension("motion");
+    let old = std::fs::read_to_string(&file).unwrap_or_default();
+    if old == motion {
+        return Ok(true);
+    }
+    println!("{}: {}", name(&file), difference(&old, motion));
+    if !check {
+        std::fs::write(&file, motion).with_context(|| file.display().to_string())?;
+    }
+    Ok(false)
+}
+
+fn name(file: &Path) -> String {
+    file.strip_prefix(root()).unwrap_or(file).display().to_string()
+}
+
+/// Where two motions begin to differ.
+fn difference(old: &str, new: &str) -> String {
+    let (mut old, mut new) = (old.lines(), new.lines());
+    let mut number = 0;
+    loop {
+        number += 1;
+        match (old.next(), new.next()) {
+            (None, None) => return "no line differs".to_owned(),
+            (old, new) if old == new => {}
+            (old, new) => {
+                let shown = |line: Option<&str>| line.unwrap_or("nothing").to_owned();
+                return format!("line {number} was {}, is {}", shown(old), shown(new));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_program_has_its_motion() {
+        let programs = programs().unwrap();
+        assert!(!programs.is_empty());
+        let bare = programs.iter().filter(|file| !file.with_extension("motion").is_file());
+        assert_eq!(bare.collect::<Vec<_>>(), Vec::<&PathBuf>::new());
+    }
+
+    #[test]
+    fn the_first_difference_is_told() {
+        assert_eq!(difference("a\nb\n", "a\nc\n"), "line 2 was b, is c");
+        assert_eq!(difference("a\n", "a\nc\n"), "line 2 was nothing, is c");
+    }
+}
