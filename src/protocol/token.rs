@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(resolved("x"), Target::Group(Group::Settings(Owner::Axis(0))));
         assert_eq!(resolved("N"), Target::Token(Token::single(0)));
         assert_eq!(resolved("4"), Target::Group(Group::Settings(Owner::Motor(3))));
-        assert_eq!(resolved("pwr"), Target::Group(Group::Vector(4)));
+        assert_eq!(resolved("pwr"), Target::Group(Group::Vector(5)));
         assert_eq!(resolved("CLEAR"), Target::Action(Action::Clear));
         assert_eq!(resolved("sr"), Target::Group(Group::Report));
         assert_eq!(resolved("toolong"), Target::Unknown);
