@@ -175,7 +175,7 @@ const FEED: Text = text!(
 );
 const DISTANCE: Text = text!("G90 - absolute distance mode|G91 - incremental distance mode");
 const ARC_DISTANCE: Text =
-    text!("G90.1 - absolute distance mode|G91.1 - incremental distance mode");
+    text!("G90.1 - absolute distance mode|G91.1 - incremental distance mode (default mode)");
 const ON: Text = text!("Off|On");
 const PATH: Text = text!("G61 - exact path mode|G61.1 - exact stop mode|G64 - continuous mode");
 
@@ -216,7 +216,7 @@ progmem! {
         count("qi", Value::QueueAdded, NONE, NONE),
         count("qo", Value::QueueRemoved, NONE, NONE),
         count("rx", Value::SlotsFree, NONE, NONE),
-        count("admo", Value::ArcDistance, text!("Arc distance mode:"), ARC_DISTANCE),
+        count("admo", Value::ArcDistance, text!("Arc Distance mode:"), ARC_DISTANCE),
         count("spe", Value::SpindleOn, text!("Spindle:"), ON),
         count("spd", Value::SpindleDirection, text!("Spindle direction:"), text!("CW|CCW")),
         count("sps", Value::SpindleSpeed, text!("Spindle speed:"), NONE),
