@@ -169,6 +169,9 @@ impl State {
         if block.changes_tool() {
             self.tool = self.selected;
             out.tool = Some(self.tool);
+            // It stops, and an S of this line or a later one must not turn it on again.
+            self.modal.spindle = Turn::Off;
+            out.spindle = None;
         }
         Ok(())
     }

@@ -137,6 +137,16 @@ fn program_end_resets() {
 }
 
 #[test]
+fn a_tool_change_stops_the_spindle() {
+    let (state, out) = run(&["M3 S900", "T1 M6 S800"]);
+    assert_eq!((state.tool(), state.modal().spindle, out.spindle), (1, Turn::Off, None));
+    assert_eq!(run(&["M3 S900", "T1 M6", "S800"]).1.spindle, None);
+    assert_eq!(refusal(&["M3 S900", "T1 M6", "G95 G1 X1 F1"]), Status::SpindleMustTurn);
+    let turns = |lines| run(lines).1.spindle.map(|spindle| (spindle.turn, spindle.speed));
+    assert_eq!(turns(&["M4", "T1 M6 M3 S800"]), Some((Turn::Clockwise, 800.0)));
+}
+
+#[test]
 fn feed_is_in_the_units_of_its_line() {
     assert_eq!(feed(&["G20 F10 G1 X1"]), Feed::PerMinute(254.0));
     assert_eq!(feed(&["G20", "G21 F10 G1 X1"]), Feed::PerMinute(10.0));
