@@ -27,8 +27,8 @@ otherwise it goes on at once.",
         m(
             20,
             "End",
-            "The machine comes to rest and says so (`stat` 4). Spindle and coolant are off, overrides on and at 100 \
-percent. In force: G1 with no feed, G91.1, G94, G98, no G92; plane, units, coordinate system, path and distance mode \
+            "The machine comes to rest and says so (`stat` 4). Spindle and coolant are off, overrides on with the factors \
+they had. In force: G1 with no feed, G91.1, G94, G98, no G92; plane, units, coordinate system, path and distance mode \
 as the settings `gpl`, `gun`, `gco`, `gpa` and `gdi` say. Tool, tool length, tables and position stay.",
             &[],
         ),
