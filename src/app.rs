@@ -43,6 +43,7 @@ impl Links {
             mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),
             tx: Mutex::new(Tx::new(tx, rate)),
+            enquiry: Cell::new(false),
             // Their defaults come when they are in place: they would take as much of the stack.
             settings: RefCell::new(Settings::blank()),
             model: RefCell::new(Interpreter::new()),
@@ -85,13 +86,21 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     Some(())
 }
 
-/// Declares tasks: one of each on AVR; on the host one for each machine that tests make.
+/// Declares tasks: one of each on AVR; on the host each machine that is made gets its own.
 macro_rules! tasks {
     ($(fn $name:ident($($arg:ident: $type:ty),*) = $run:path;)+) => {$(
-        #[cfg_attr(target_arch = "avr", embassy_executor::task)]
-        #[cfg_attr(not(target_arch = "avr"), embassy_executor::task(pool_size = 200))]
+        #[cfg(target_arch = "avr")]
+        #[embassy_executor::task]
         async fn $name($($arg: $type),*) -> ! {
             $run($($arg),*).await
+        }
+
+        #[cfg(not(target_arch = "avr"))]
+        fn $name(
+            $($arg: $type),*
+        ) -> Result<embassy_executor::SpawnToken<impl Sized>, embassy_executor::SpawnError> {
+            let storage = std::boxed::Box::new(embassy_executor::raw::TaskStorage::new());
+            std::boxed::Box::leak(storage).spawn(move || $run($($arg),*))
         }
     )+};
 }

@@ -29,6 +29,7 @@ const ARC_WORDS: u32 = words::AXES | OFFSETS | bit(R) | bit(P);
 
 impl State {
     /// G2 and G3.
+    #[inline(never)]
     pub(super) fn arc(
         &mut self,
         block: &Block,

@@ -36,8 +36,9 @@ impl State {
             Retract::Initial => retract.max(words.initial),
         };
         let holes = holes(block)?;
-        let rows = [self.row(block, first, setup)?, self.row(block, second, setup)?];
-        let mut cycle = Cycle {
+        let rows = [self.row(block, first)?, self.row(block, second)?];
+        let feed = self.rate(block, false)?;
+        out.motion = Motion::Cycle(Cycle {
             mode,
             plane,
             from: rows.map(|row| row.0),
@@ -50,11 +51,12 @@ impl State {
             dwell_ms: dwell_ms(mode, &words)?,
             aside: [Length::ZERO; 2],
             top: Length::ZERO,
-            feed: self.rate(block, false)?,
+            feed,
             spindle: self.spindle(),
-        };
+        });
+        let Motion::Cycle(cycle) = &mut out.motion else { return Err(Status::InternalError) };
         if mode == MotionMode::BackBore {
-            self.back_bore(&words, &mut cycle)?;
+            self.back_bore(&words, cycle)?;
         }
         let last = cycle.hole(holes).ok_or(Status::OutOfRange)?;
         for (axis, hole) in [first, second].into_iter().zip(last) {
@@ -62,7 +64,6 @@ impl State {
         }
         self.move_to(across, Value { units: clear, rest: 0 });
         self.sticky = words;
-        out.motion = Motion::Cycle(cycle);
         Ok(())
     }
 
@@ -112,18 +113,16 @@ impl State {
 
     /// Where holes are counted from along an axis, and from one to the next: nothing with G90, where all of
     /// them are at the word.
-    fn row(&self, block: &Block, axis: u8, setup: &impl Setup) -> Result<(Value, Value), Status> {
+    #[inline(never)]
+    fn row(&self, block: &Block, axis: u8) -> Result<(Value, Value), Status> {
         let i = usize::from(axis);
         let rest = self.residue.get(i).copied().unwrap_or_default();
         let here = Value { units: self.at(axis), rest };
-        let word = match block.get(axis) {
-            Some(word) => axes::value(word, axis, self.modal.units, setup)?,
-            None => None,
-        };
-        match (word, self.modal.distance) {
-            (None, _) => Ok((here, Value::default())),
-            (Some(pitch), Distance::Incremental) => Ok((here, pitch)),
-            (Some(value), Distance::Absolute) => {
+        let Some(word) = block.get(axis) else { return Ok((here, Value::default())) };
+        let value = axes::length(word, self.modal.units)?;
+        match self.modal.distance {
+            Distance::Incremental => Ok((here, value)),
+            Distance::Absolute => {
                 let origin = self.origin.get(i).copied().unwrap_or_default();
                 let units = origin.checked_add(value.units).ok_or(Status::OutOfRange)?;
                 Ok((Value { units, ..value }, Value::default()))

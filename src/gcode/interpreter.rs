@@ -80,9 +80,9 @@ impl Interpreter {
         self.state.usual(line, numbered, setup, out)
     }
 
-    /// The same as [`Self::interpret`] for a line of any kind.
+    /// The same as [`Self::interpret`], and to be used in its place if [`Self::usual`] has declined the line.
     #[inline(never)]
-    pub(super) fn general(
+    pub fn general(
         &mut self,
         line: &[u8],
         setup: &impl Setup,
@@ -108,6 +108,17 @@ impl Interpreter {
         if block.is_rare() || self.state.is_in_cycle(block) {
             return self.execute_rarity(block, setup, out);
         }
+        self.execute_usual(block, setup, out)
+    }
+
+    /// Executes a block of modes, the feed, and the position of the axes that it names, or nothing of it.
+    #[inline(never)]
+    fn execute_usual(
+        &mut self,
+        block: &Block,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         let mut before = Before::of(&self.state);
         before.save_axes(&self.state, block);
         let done = self.state.execute(block, &self.tables, setup, out);

@@ -15,6 +15,7 @@ const SLACK: f32 = 10.0;
 const SLACK_PART: f32 = 2e-7;
 
 /// Refuses (220) a move from `start` that leaves the travel of an axis whose bit in `homed` is set.
+#[inline(never)]
 pub(super) fn check(
     start: &PerAxis<Length>,
     motion: &Motion,

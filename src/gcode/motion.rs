@@ -17,6 +17,7 @@ const PROBE_MIN: u32 = 2_540;
 impl State {
     /// The move of a line, if it has one: axis words move in the mode in force, unless another code
     /// has taken them.
+    #[inline(never)]
     pub(super) fn motion(
         &mut self,
         block: &Block,
@@ -46,6 +47,7 @@ impl State {
         }
     }
 
+    #[inline(never)]
     fn traverse(
         &mut self,
         block: &Block,
@@ -60,6 +62,7 @@ impl State {
         Ok(())
     }
 
+    #[inline(never)]
     fn straight_feed(
         &mut self,
         block: &Block,
@@ -111,6 +114,7 @@ impl State {
     }
 
     /// Moves the model by the axis words; `absolute`: to machine coordinates.
+    #[inline(never)]
     pub(super) fn advance(
         &mut self,
         block: &Block,

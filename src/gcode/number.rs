@@ -75,17 +75,24 @@ impl Decimal {
 
     /// As inches, exact to seven decimals.
     ///
-    /// 254,000 units per inch, piece by piece in 32 bits: a fourth decimal is 25.4 units, a seventh
-    /// 0.0254. Cost on AVR: two 32-bit divisions, 1,800 cycles.
+    /// 254,000 units per inch, piece by piece: a fourth decimal is 25.4 units, a seventh 0.0254. Cost on AVR: 400 cycles;
+    /// with more than four decimals two 32-bit divisions more, 1,200.
     #[inline(never)]
     pub fn inch(&self) -> Result<Exact, Status> {
         if self.whole > (i32::MAX / Length::PER_INCH) as u32 {
             return Err(Status::OutOfRange);
         }
-        let tenths = u32::from(self.frac) * 254;
-        let rest = tenths % 10 * 1_000 + u32::from(self.tail / 10) * 254;
-        let units = self.whole * Length::PER_INCH as u32 + tenths / 10 + rest / REST as u32;
-        self.exact(units, (rest % REST as u32) as u16)
+        // 0.4 units for each: 16 bits.
+        let tenths = self.frac * 4;
+        let (parts, left) = (tenths / 10, tenths % 10);
+        let units = self.whole * Length::PER_INCH as u32 + u32::from(self.frac) * 25;
+        let (mut units, mut rest) = (units + u32::from(parts), left * 1_000);
+        if self.tail != 0 {
+            let more = u32::from(rest) + u32::from(self.tail / 10) * 254;
+            units += more / REST as u32;
+            rest = (more % REST as u32) as u16;
+        }
+        self.exact(units, rest)
     }
 
     /// Rounds and signs a magnitude of `units` + `rest` / 10,000.

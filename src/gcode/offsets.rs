@@ -249,6 +249,7 @@ impl State {
 
     /// G28 and G30: a traverse to the stored position, of the named axes and by way of where the words
     /// say; of all axes without words.
+    #[inline(never)]
     pub(super) fn go_stored(
         &mut self,
         block: &Block,

@@ -248,6 +248,7 @@ impl State {
     }
 
     /// Motion, and what belongs to it.
+    #[inline(never)]
     fn finish(
         &mut self,
         block: &Block,

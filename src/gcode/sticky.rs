@@ -32,9 +32,9 @@ pub struct Sticky {
 }
 
 impl Sticky {
-    /// No words.
+    /// No words. All zeros, so that it needs no memory.
     pub const NONE: Self = Self {
-        mode: MotionMode::None,
+        mode: MotionMode::Traverse,
         plane: Plane::Xy,
         initial: Length::ZERO,
         retract: None,

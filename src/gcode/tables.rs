@@ -1,7 +1,7 @@
 //! What stays from program to program: coordinate systems, stored positions, tools.
 //!
 //! A line changes one entry at most, and only after nothing on it can fail any more: an [`Edit`] says which.
-//! RAM: 400 bytes.
+//! RAM: 344 bytes.
 
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
@@ -9,7 +9,7 @@ use crate::units::{AXES, Length, PerAxis};
 /// Coordinate systems, G54 to G59.3.
 pub const SYSTEMS: usize = 9;
 /// Tools with offsets, from number 1.
-pub const TOOLS: usize = 16;
+pub const TOOLS: usize = 10;
 
 /// The offsets of a tool: those of a mill are along Z, those of a lathe along X and Z.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -68,12 +68,12 @@ impl Tables {
 
     /// The origin of a coordinate system, from 0.
     pub fn system(&self, number: u8) -> &PerAxis<Length> {
-        self.systems.get(usize::from(number)).unwrap_or(const { &[Length::ZERO; AXES] })
+        self.systems.get(usize::from(number)).unwrap_or(&self.systems[0])
     }
 
     /// The position of G28 (0) or G30 (1).
     pub fn stored(&self, which: u8) -> &PerAxis<Length> {
-        self.stored.get(usize::from(which)).unwrap_or(const { &[Length::ZERO; AXES] })
+        self.stored.get(usize::from(which)).unwrap_or(&self.stored[0])
     }
 
     /// A tool; number 0 is an empty spindle, which has no offsets. 171 for one that is not in the table.

@@ -1,5 +1,5 @@
 //! The usual line, read and carried out in one pass: axis words, with G0 or G1, F and N, while lengths
-//! are absolute and in millimetres.
+//! are in millimetres.
 //!
 //! [`Interpreter::interpret`](super::Interpreter::interpret) asks here first. Any other line is declined before anything has changed,
 //! and goes through `lexer`, `block` and `motion`, which say what is wrong with it, too. The result is
@@ -52,16 +52,19 @@ impl State {
     ) -> bool {
         let modal = &self.modal;
         if modal.units != Units::Mm
-            || modal.distance != Distance::Absolute
             || modal.feed_mode != FeedMode::PerMinute
             || line.len() > usize::from(u8::MAX)
         {
             return false;
         }
         let mut words = Words::new(line, numbered);
-        words.read(&self.origin)
-            && are_usual(words.seen & AXES_SEEN, setup)
-            && self.carry_out(&words, out)
+        let from = match modal.distance {
+            Distance::Absolute => &self.origin,
+            Distance::Incremental if self.residue == [0; AXES] => &self.position,
+            // What rounding has taken would have to be carried on.
+            Distance::Incremental => return false,
+        };
+        words.read(from) && are_usual(words.seen & AXES_SEEN, setup) && self.carry_out(&words, out)
     }
 
     #[inline(never)]
@@ -139,9 +142,9 @@ impl<'a> Words<'a> {
         Words { byte, text, next: 0, seen, mode: None, feed: 0.0, line: 0, target }
     }
 
-    /// Reads the line. False if it is not usual.
+    /// Reads the line, whose lengths count from `from`. False if it is not usual.
     #[inline(never)]
-    fn read(&mut self, offset: &PerAxis<Length>) -> bool {
+    fn read(&mut self, from: &PerAxis<Length>) -> bool {
         loop {
             let letter = self.byte & !CASE;
             let axis = match letter {
@@ -166,7 +169,7 @@ impl<'a> Words<'a> {
             self.step();
             let value = Length(self.number());
             let i = usize::from(axis);
-            let (Some(target), Some(origin)) = (self.target.get_mut(i), offset.get(i)) else {
+            let (Some(target), Some(origin)) = (self.target.get_mut(i), from.get(i)) else {
                 return false;
             };
             match origin.checked_add(value) {

@@ -34,7 +34,7 @@ impl Drivers {
     /// Highest step rate of each of so many motors that move together, steps per second: a step on every
     /// tick.
     pub const fn step_rate_max(self, motors: usize) -> f32 {
-        let usual = &USUAL[if motors == 0 { 0 } else { motors - 1 }];
+        let usual = usual(if motors == 0 { 0 } else { motors - 1 });
         ACTIVE.clock_hz as f32 / (usual.shortest + self.extra()) as f32
     }
 }
@@ -47,13 +47,16 @@ struct Usual {
     settles: u16,
 }
 
-/// By the number of motors that move, less one.
-const USUAL: [Usual; MOTORS] = [
-    Usual { shortest: 160, fine: 200, coarse: 400, settles: 200 },
-    Usual { shortest: 200, fine: 200, coarse: 400, settles: 200 },
-    Usual { shortest: 240, fine: 320, coarse: 480, settles: 300 },
-    Usual { shortest: 319, fine: 400, coarse: 560, settles: 320 },
-];
+/// By the number of motors that move, less one. No table: that would be in RAM.
+const fn usual(motors: usize) -> Usual {
+    let (shortest, fine, coarse, settles) = match motors {
+        0 => (160, 200, 400, 200),
+        1 => (200, 200, 400, 200),
+        2 => (240, 320, 480, 300),
+        _ => (319, 400, 560, 320),
+    };
+    Usual { shortest, fine, coarse, settles }
+}
 
 /// Ticks of blocks so short that they are a single segment: 2^22 / the tick period.
 pub const COARSEST: u16 = per(640);
@@ -78,11 +81,12 @@ pub const fn paces(drivers: Drivers) -> [Pace; MOTORS] {
     let mut paces = [Pace { shortest: 0, fine: 0, coarse: 0, settles: 0 }; MOTORS];
     let mut m = 0;
     while m < MOTORS {
+        let usual = usual(m);
         paces[m] = Pace {
-            shortest: USUAL[m].shortest + extra,
-            fine: per(USUAL[m].fine + extra),
-            coarse: per(USUAL[m].coarse + extra),
-            settles: USUAL[m].settles + extra,
+            shortest: usual.shortest + extra,
+            fine: per(usual.fine + extra),
+            coarse: per(usual.coarse + extra),
+            settles: usual.settles + extra,
         };
         m += 1;
     }

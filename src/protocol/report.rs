@@ -14,7 +14,7 @@ use crate::progmem::Text;
 use crate::text;
 
 /// Entries a report may have.
-pub const LONGEST_REPORT: usize = 40;
+pub const LONGEST_REPORT: usize = 38;
 
 /// The status report: its tokens, in order, and the value of each as last sent.
 pub struct StatusReport {

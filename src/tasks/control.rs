@@ -1,15 +1,13 @@
 //! The control task: real-time characters, which act at once and get no response.
 //!
 //! Reads what the receive interrupt picked off; waits on [`Event::Realtime`]. `^x` resets the machine.
-//! ENQ asks whether anybody is there. Resume is cycle start: it ends a program stop that waits. Hold, flush
-//! and kill are taken out of the stream and otherwise without effect so far.
+//! ENQ asks whether anybody is there, which the reporter answers. Hold, resume, flush and kill are taken
+//! out of the stream and otherwise without effect so far.
 
 use super::links::Links;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::{reset, uart};
-use crate::protocol::Out;
 use crate::realtime::{ENQUIRY, RESET, RESUME};
-use crate::text;
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
@@ -26,16 +24,8 @@ pub async fn run(links: &'static Links) -> ! {
             links.cycle_start.signal();
         }
         if characters & ENQUIRY != 0 {
-            acknowledge(links).await;
+            links.enquiry.set(true);
+            links.reporter_wake.urge();
         }
     }
-}
-
-async fn acknowledge(links: &Links) {
-    let mut tx = links.tx.lock().await;
-    tx.room().await;
-    for byte in text!("{\"ack\":true}\n").bytes() {
-        tx.put(byte);
-    }
-    tx.flush();
 }

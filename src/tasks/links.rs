@@ -67,8 +67,11 @@ pub struct Links {
     pub mode: Cell<Mode>,
     /// What status reports hold.
     pub report: RefCell<StatusReport>,
-    /// The line to the sender.
+    /// The line to the sender, for the parser and the reporter. The mutex knows of one task that waits: two
+    /// would keep waking each other.
     pub tx: Mutex<NoopRawMutex, Tx>,
+    /// The sender asks whether anybody is there: control sets it, the reporter answers.
+    pub enquiry: Cell<bool>,
     /// A setting has changed since the planner looked.
     pub settings_changed: Cell<bool>,
     /// Settings in force.

@@ -16,7 +16,8 @@ use crate::status::Status;
 pub async fn run(links: &'static Links) -> ! {
     loop {
         let data = !links.commands_taken.get();
-        if data && usual(links) {
+        let tried = if data { usual(links) } else { Usual::NotTried };
+        if tried == Usual::Done {
             continue;
         }
         let next = links.lines.borrow().next(data);
@@ -24,7 +25,7 @@ pub async fn run(links: &'static Links) -> ! {
             links.parser_wake.wait().await;
             continue;
         };
-        if let Some(mut request) = begin(links, id, class)
+        if let Some(mut request) = begin(links, id, class, tried)
             && !answer_at_once(links, id, &mut request)
         {
             answer(links, id, &mut request).await;
@@ -33,25 +34,36 @@ pub async fn run(links: &'static Links) -> ! {
     }
 }
 
-/// Does all there is to do for a usual line: a move that is answered with a brief response. False, and
-/// nothing done, if the next line is none, or if it has to wait for room to transmit. What the others do in
+/// Whether the next line was a usual one.
+#[derive(Clone, Copy, PartialEq)]
+enum Usual {
+    /// It was, and is done with.
+    Done,
+    /// It is none.
+    No,
+    /// Nobody has looked.
+    NotTried,
+}
+
+/// Does all there is to do for a usual line: a move that is answered with a brief response. Nothing is
+/// done if the next line is none, or if it has to wait for room to transmit. What the others do in
 /// four steps and with a [`Request`], in half the time.
 #[inline(never)]
-fn usual(links: &Links) -> bool {
+fn usual(links: &Links) -> Usual {
     if links.mode.get() != Mode::Json {
-        return false;
+        return Usual::NotTried;
     }
-    let Ok(mut tx) = links.tx.try_lock() else { return false };
+    let Ok(mut tx) = links.tx.try_lock() else { return Usual::NotTried };
     let mut lines = links.lines.borrow_mut();
-    let Some(line) = lines.oldest() else { return false };
+    let Some(line) = lines.oldest() else { return Usual::NotTried };
     let settings = links.settings.borrow();
     let numbered = is_brief(&settings, true);
     if !tx.has_room() || !(numbered || is_brief(&settings, false)) {
-        return false;
+        return Usual::NotTried;
     }
     let mut commands = links.commands.borrow_mut();
     if !links.model.borrow_mut().usual(line, numbered, &*settings, &mut commands) {
-        return false;
+        return Usual::No;
     }
     links.commands_taken.set(true);
     links.planner_wake.signal();
@@ -60,7 +72,7 @@ fn usual(links: &Links) -> bool {
     lines.remove_oldest();
     links.pool_space.signal();
     links.reporter_wake.signal();
-    true
+    Usual::Done
 }
 
 /// Answers a line as far as that goes without waiting: most of them to the end. Returns whether it was
@@ -79,7 +91,7 @@ fn answer_at_once(links: &Links, id: LineId, request: &mut Request) -> bool {
 /// Begins with a line. One of G-code has run after that, for data lines are taken only while the
 /// planner is free.
 #[inline(never)]
-fn begin(links: &Links, id: LineId, class: Class) -> Option<Request> {
+fn begin(links: &Links, id: LineId, class: Class, tried: Usual) -> Option<Request> {
     let lines = links.lines.borrow();
     let line = lines.text(id);
     let mut mode = links.mode.get();
@@ -89,7 +101,7 @@ fn begin(links: &Links, id: LineId, class: Class) -> Option<Request> {
     };
     links.mode.set(mode);
     if let Some(block) = request.gcode() {
-        let (status, commented) = interpret(links, block.of(line));
+        let (status, commented) = interpret(links, block.of(line), tried);
         request.ran(status, commented);
     }
     Some(request)
@@ -113,7 +125,8 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
                 }
                 let lines = links.lines.borrow();
                 let block = Span { start, end };
-                let (status, commented) = interpret(links, block.of(lines.text(id)));
+                let (status, commented) =
+                    interpret(links, block.of(lines.text(id)), Usual::NotTried);
                 request.ran(status, commented);
             }
             Next::Done(_) => break,
@@ -143,10 +156,16 @@ fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
 /// Interprets a block and hands its commands to the planner. Returns also whether it may have a
 /// comment.
 #[inline(never)]
-fn interpret(links: &Links, block: &[u8]) -> (Status, bool) {
+fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
     let mut commands = links.commands.borrow_mut();
     let settings = links.settings.borrow();
-    match links.model.borrow_mut().interpret(block, &*settings, &mut commands) {
+    let mut model = links.model.borrow_mut();
+    let done = match tried {
+        // No need to look twice.
+        Usual::No => model.general(block, &*settings, &mut commands),
+        _ => model.interpret(block, &*settings, &mut commands),
+    };
+    match done {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
             if !commands.is_empty() {

@@ -53,11 +53,9 @@ struct ArcWalk {
 
 /// A move under way that is too long for one block.
 struct Parts {
-    start: PerAxis<Length>,
     target: PerAxis<Length>,
     feed: Option<Feed>,
-    done: u16,
-    of: u16,
+    left: u16,
 }
 
 /// What has changed beside the line.
@@ -165,8 +163,8 @@ impl Planner {
             return Turn::More;
         }
         if let Some(parts) = &mut self.parts {
-            let (end, feed) = (parts.next(), parts.feed);
-            if parts.done == parts.of {
+            let (end, feed) = (parts.next(&self.position), parts.feed);
+            if parts.left == 0 {
                 self.parts = None;
             }
             // Not longer than a block: the steps have been counted.
@@ -248,7 +246,7 @@ impl Planner {
     /// Queues a straight move, or begins with its parts.
     fn straight(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) {
         match self.line(target, feed) {
-            Some(of) => self.parts = Some(Parts::new(&self.position, target, feed, of)),
+            Some(of) => self.parts = Some(Parts::new(target, feed, of)),
             None => {
                 self.position = *target;
                 self.announce();
@@ -379,25 +377,24 @@ impl Planner {
 
 impl Parts {
     #[inline(never)]
-    fn new(start: &PerAxis<Length>, target: &PerAxis<Length>, feed: Option<Feed>, of: u16) -> Self {
+    fn new(target: &PerAxis<Length>, feed: Option<Feed>, of: u16) -> Self {
         // Inverse time is that of the whole.
         let feed = match feed {
             Some(Feed::Minutes(minutes)) => Some(Feed::Minutes(minutes / f32::from(of))),
             other => other,
         };
-        Self { start: *start, target: *target, feed, done: 0, of }
+        Self { target: *target, feed, left: of }
     }
 
-    /// The end of the next part.
+    /// The end of the next part, the machine being at `position`.
     #[inline(never)]
-    fn next(&mut self) -> PerAxis<Length> {
-        self.done += 1;
+    fn next(&mut self, position: &PerAxis<Length>) -> PerAxis<Length> {
         let mut end = self.target;
-        for (end, start) in end.iter_mut().zip(&self.start) {
+        for (end, start) in end.iter_mut().zip(position) {
             let way = i64::from(end.0) - i64::from(start.0);
-            let part = way * i64::from(self.done) / i64::from(self.of);
-            *end = Length((i64::from(start.0) + part) as i32);
+            *end = Length((i64::from(start.0) + way / i64::from(self.left)) as i32);
         }
+        self.left -= 1;
         end
     }
 }

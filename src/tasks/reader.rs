@@ -125,7 +125,7 @@ impl Intake {
             pool.spoil(Status::BufferFull);
         } else {
             pool.forget();
-            pool.follow(self.then & RETURNED != 0);
         }
+        pool.follow(self.then & RETURNED != 0);
     }
 }

@@ -1,4 +1,4 @@
-//! The reporter task: the greeting, then status and queue reports.
+//! The reporter task: the greeting, then status and queue reports, exceptions, and the answer to ENQ.
 //!
 //! Reads everything through [`View`], writes to the sender; waits for something to report, and polls
 //! every [`POLL_MS`] while the machine is busy; it is not woken besides then, unless queue reports are
@@ -15,8 +15,9 @@ use super::view::{RUN, View};
 use crate::hal::imp::time::millis;
 use crate::motion::queue;
 use crate::protocol::notice::{Banner, Exception};
-use crate::protocol::{Machine, Report, Value, queue_report};
+use crate::protocol::{Machine, Out, Report, Value, queue_report};
 use crate::status::Status;
+use crate::text;
 
 /// How often a busy machine is looked at, ms.
 const POLL_MS: u64 = 10;
@@ -34,6 +35,9 @@ pub async fn run(links: &'static Links) -> ! {
     let mut told = Told { state: 0, blocks_free: queue::free(), at: millis() };
     let mut due = true;
     loop {
+        if links.enquiry.take() {
+            acknowledge(links).await;
+        }
         let state = View::of(links).state();
         if let Some(status) = links.exception.take() {
             report_exception(links, status).await;
@@ -82,6 +86,13 @@ async fn greet(links: &Links) {
     let mut tx = links.tx.lock().await;
     let mut banner = Banner::begin(&View::of(links));
     send(links, &mut tx, |view, tx| banner.step(view, tx)).await;
+}
+
+async fn acknowledge(links: &Links) {
+    let mut tx = links.tx.lock().await;
+    tx.room().await;
+    tx.put_text(text!("{\"ack\":true}\n"));
+    tx.flush();
 }
 
 async fn report_status(links: &Links) {

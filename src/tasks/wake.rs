@@ -58,6 +58,11 @@ impl News {
         }
     }
 
+    /// Something that must not wait.
+    pub fn urge(&self) {
+        self.wake.signal();
+    }
+
     /// Waits for a signal.
     pub async fn wait(&self) {
         self.wake.wait().await;
@@ -96,6 +101,8 @@ mod tests {
         news.set_polling(true);
         news.signal();
         assert!(!is_ready(&news.wake));
+        news.urge();
+        assert!(is_ready(&news.wake));
         news.set_polling(false);
         news.signal();
         assert!(is_ready(&news.wake));

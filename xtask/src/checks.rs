@@ -18,10 +18,10 @@ struct Stage {
 }
 
 const STAGES: [Stage; 7] = [
-    Stage { name: "tools", run: || setup::ensure(Scope::Everything) },
+    Stage { name: "tools", run: || setup::ensure(Scope::Simulator) },
     Stage { name: "format", run: format },
     Stage { name: "lints", run: lints },
-    Stage { name: "host tests", run: || cargo(&["test"]) },
+    Stage { name: "host tests", run: host_tests },
     Stage { name: "firmware of every board", run: build_all },
     Stage { name: "sizes and stack of every board", run: size_all },
     Stage { name: "simulator tests", run: simulator_tests },
@@ -68,6 +68,12 @@ fn has_component(subcommand: &str, component: &str) -> bool {
         println!("SKIPPED: this Rust has no {component}, and none could be installed");
     }
     found
+}
+
+/// With what the fuzzers do, done once.
+fn host_tests() -> Result<()> {
+    cargo(&["test"])?;
+    cargo(&["test", "--package", "kerf-fuzz"])
 }
 
 fn build_all() -> Result<()> {

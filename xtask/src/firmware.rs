@@ -11,7 +11,7 @@ use crate::process::{self, root, run};
 use crate::setup::{self, Scope};
 use crate::toolchain::Toolchain;
 
-const FLAGS: &str = "-C target-cpu=atmega2560 -C llvm-args=-inline-threshold=30 -C linker=avr-gcc -C link-arg=-mmcu=atmega2560 \
+const FLAGS: &str = "-C target-cpu=atmega2560 -C llvm-args=-inline-threshold=30 -C jump-tables=no -C linker=avr-gcc -C link-arg=-mmcu=atmega2560 \
                      -C link-arg=-Wl,--gc-sections";
 
 /// Where the images lie, one `BOARD.elf` each.

@@ -8,6 +8,7 @@
 //! | [`elf`] | what is in an image: sizes, stack, what must not be in it |
 //! | [`size`], [`caps`] | prints and limits what an image takes |
 //! | [`sim`] | runs the image on the simulated board |
+//! | [`fuzz`] | runs the fuzzers |
 //! | [`checks`] | everything that must pass before a merge |
 //! | [`jobs`] | writes the example jobs |
 //! | [`nist`] | what another interpreter makes of G-code, to compare with |
@@ -20,6 +21,7 @@ mod checks;
 mod docs;
 mod elf;
 mod firmware;
+mod fuzz;
 mod jobs;
 mod nist;
 mod process;
@@ -51,6 +53,9 @@ enum Command {
     Bench(sim::BenchArgs),
     /// Offer the simulated board as a serial port
     Serve(sim::ServeArgs),
+    /// Look for inputs that break the interpreter or the machine, by fuzzing; fail on a finding.
+    /// Corpus and findings are kept in target/fuzz, and the next run goes on from there
+    Fuzz(fuzz::FuzzArgs),
     /// Run every check: format, lints, host tests, firmware, sizes, simulator
     Test,
     /// Write the firmware to a board
@@ -88,6 +93,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Sim(args) => return sim::run(&args),
         Command::Bench(args) => return sim::bench(&args),
         Command::Serve(args) => return sim::serve(&args),
+        Command::Fuzz(args) => return fuzz::run(&args),
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
         Command::Jobs => jobs::write()?,

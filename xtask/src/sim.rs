@@ -85,7 +85,7 @@ pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
 }
 
 fn prepare(board: Board) -> Result<PathBuf> {
-    setup::ensure(Scope::Everything)?;
+    setup::ensure(Scope::Simulator)?;
     let elf = firmware::build(board)?;
     if !root().join("target/sim/kerf-sim").exists() {
         eprintln!("building the simulator: some minutes, this once");

@@ -56,7 +56,11 @@ fn what_is_usual() {
         assert!(!both_ways(&mut interpreter, line.as_bytes()), "{line}");
     }
     assert!(!interpreter.usual(b"N1X1", false, &Usual, &mut Commands::default()));
-    for mode in ["G20", "G91", "G93"] {
+    for (line, usual) in [("G91", false), ("G0X.5", true), ("X.00001", false), ("X1", false)] {
+        assert_eq!(both_ways(&mut interpreter, line.as_bytes()), usual, "{line}");
+    }
+    both_ways(&mut interpreter, b"G90");
+    for mode in ["G20", "G93"] {
         let mut interpreter = interpreter;
         both_ways(&mut interpreter, mode.as_bytes());
         assert!(!both_ways(&mut interpreter, b"G0X1"), "{mode}");

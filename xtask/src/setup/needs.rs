@@ -12,7 +12,21 @@ pub enum Scope {
     /// Building the firmware.
     Firmware,
     /// Building the simulator as well.
+    Simulator,
+    /// Building the fuzzers, and nothing else.
+    Fuzzers,
+    /// All of it.
     Everything,
+}
+
+impl Scope {
+    fn covers(self, need: Scope) -> bool {
+        match self {
+            Scope::Everything => true,
+            Scope::Fuzzers => need == Scope::Fuzzers,
+            Scope::Firmware | Scope::Simulator => need <= self,
+        }
+    }
 }
 
 /// One thing that must be there.
@@ -28,7 +42,7 @@ pub struct Need {
 }
 
 /// Everything, in the order in which it is reported.
-pub static NEEDS: [Need; 7] = [
+pub static NEEDS: [Need; 8] = [
     Need {
         what: "Rust with its library sources (rustup nightly with rust-src, or Debian's)",
         packages: &["rustc-web", "cargo-web", "rust-web-src"],
@@ -49,9 +63,10 @@ pub static NEEDS: [Need; 7] = [
         let libraries = ["--exists", "libelf", "zlib", "libzstd"];
         probe(Command::new("pkg-config").args(libraries)).is_some()
     }),
+    tool("a C++ compiler, for libFuzzer", &["g++"], Scope::Fuzzers, || has("c++")),
 ];
 
-const SIM: Scope = Scope::Everything;
+const SIM: Scope = Scope::Simulator;
 const ELF_PACKAGES: &[&str] = &["pkg-config", "libelf-dev", "zlib1g-dev", "libzstd-dev"];
 
 const fn tool(
@@ -65,7 +80,7 @@ const fn tool(
 
 /// What is not there.
 pub fn missing(scope: Scope) -> Vec<&'static Need> {
-    NEEDS.iter().filter(|need| need.scope <= scope && !(need.present)()).collect()
+    NEEDS.iter().filter(|need| scope.covers(need.scope) && !(need.present)()).collect()
 }
 
 fn has(program: &str) -> bool {
@@ -107,9 +122,11 @@ mod tests {
 
     #[test]
     fn the_firmware_needs_a_part_of_everything() {
-        let firmware = NEEDS.iter().filter(|n| n.scope <= Scope::Firmware).count();
-        assert_eq!(firmware, 4);
-        assert!(NEEDS.iter().all(|n| n.scope <= Scope::Everything));
+        let needs = |scope: Scope| NEEDS.iter().filter(|n| scope.covers(n.scope)).count();
+        assert_eq!(needs(Scope::Firmware), 4);
+        assert_eq!(needs(Scope::Simulator), 7);
+        assert_eq!(needs(Scope::Fuzzers), 1);
+        assert_eq!(needs(Scope::Everything), NEEDS.len());
     }
 
     #[test]

@@ -1,0 +1,115 @@
+//! Target `lines`: an input is lines, parted by line feeds, for one interpreter.
+//!
+//! After each line: a refused one has left the interpreter as it was and asks for nothing; the fast path
+//! for usual lines has either done nothing, or what the general path does; the chords of an arc stay on
+//! their circle and end at its end. A second interpreter gets the same lines for a machine of odd axes.
+
+mod chords;
+
+use kerf::gcode::command::{Commands, Motion};
+use kerf::gcode::setup::{AxisMode, Setup, Usual};
+use kerf::gcode::{Info, Interpreter};
+use kerf::status::Status;
+use kerf::units::Length;
+
+/// Interprets the lines of an input; panics where something does not hold.
+pub fn check(input: &[u8]) {
+    let (mut usual, mut odd) = (Interpreter::new(), Interpreter::new());
+    for line in input.split(|byte| *byte == b'\n') {
+        let before = usual;
+        let outcome = Outcome::of(&mut usual, line, &Usual);
+        fast_path(&before, line, &usual, &outcome);
+        arc(&before, &outcome.out);
+        Outcome::of(&mut odd, line, &Odd);
+    }
+}
+
+/// What a line came to.
+#[derive(PartialEq, Debug)]
+struct Outcome {
+    result: Result<Info, Status>,
+    out: Commands,
+}
+
+impl Outcome {
+    /// Interprets a line and checks what holds for any.
+    fn of(interpreter: &mut Interpreter, line: &[u8], axes: &impl Setup) -> Self {
+        let before = *interpreter;
+        let mut out = Commands::default();
+        let result = interpreter.interpret(line, axes, &mut out);
+        match result {
+            Ok(Info { message: Some((start, end)), .. }) => {
+                assert!(
+                    line.get(start.into()..end.into()).is_some(),
+                    "a message of {start}..{end}"
+                );
+            }
+            Ok(_) => {}
+            Err(status) => {
+                assert_eq!(*interpreter, before, "refused with {status:?}, changed all the same");
+                assert_eq!(out, Commands::default(), "refused with {status:?}");
+            }
+        }
+        Self { result, out }
+    }
+}
+
+/// The fast path alone, from `before` on, and the general one alone, against what both together did.
+fn fast_path(before: &Interpreter, line: &[u8], after: &Interpreter, outcome: &Outcome) {
+    for numbered in [false, true] {
+        let (mut fast, mut out) = (*before, Commands::default());
+        if !fast.usual(line, numbered, &Usual, &mut out) {
+            assert_eq!(fast, *before, "declined, changed all the same");
+            assert_eq!(out, Commands::default(), "declined");
+            continue;
+        }
+        assert_eq!(fast, *after, "numbered: {numbered}");
+        assert_eq!(Outcome { result: Ok(Info::default()), out }, *outcome);
+        let mut general = *before;
+        assert_eq!(Outcome::of(&mut general, line, &Endless), *outcome, "the general path");
+        assert_eq!(general, *after, "the general path");
+    }
+}
+
+fn arc(before: &Interpreter, out: &Commands) {
+    if let Motion::Arc { target, arc, .. } = &out.motion {
+        for tolerance in [0.01, 0.5] {
+            chords::check(before.position(), target, arc, tolerance);
+        }
+    }
+}
+
+/// As usual, but with limits, which nothing can be beyond: the fast path leaves such axes alone.
+struct Endless;
+
+impl Setup for Endless {
+    fn mode(&self, axis: u8) -> AxisMode {
+        Usual.mode(axis)
+    }
+    fn radius(&self, axis: u8) -> u32 {
+        Usual.radius(axis)
+    }
+    fn travel(&self, _axis: u8) -> Option<(Length, Length)> {
+        Some((Length(i32::MIN), Length(i32::MAX)))
+    }
+}
+
+/// X has limits, Y is inhibited, Z disabled; A turns by a radius of 1 mm, B of 10 m.
+struct Odd;
+
+impl Setup for Odd {
+    fn mode(&self, axis: u8) -> AxisMode {
+        match axis {
+            1 => AxisMode::Inhibited,
+            2 => AxisMode::Disabled,
+            3 | 4 => AxisMode::Radius,
+            _ => AxisMode::Standard,
+        }
+    }
+    fn radius(&self, axis: u8) -> u32 {
+        if axis == 3 { 1_000_000 } else { u32::MAX }
+    }
+    fn travel(&self, axis: u8) -> Option<(Length, Length)> {
+        (axis == 0).then_some((Length(-1_000_000), Length(2_000_000)))
+    }
+}

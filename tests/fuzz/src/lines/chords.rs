@@ -1,0 +1,50 @@
+//! What holds for the chords of any arc.
+
+use kerf::gcode::arc::Chords;
+use kerf::gcode::command::Arc;
+use kerf::units::{Length, PerAxis};
+
+/// An arc may have thousands of millions of chords: so many are looked at.
+const LOOKED_AT: u32 = 2_000;
+
+/// Walks along an arc: its chords lie on the circle, are as many as was said, and end at the end.
+pub fn check(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc, tolerance: f32) {
+    let chords = Chords::new(start, target, arc, tolerance);
+    let total = chords.total();
+    assert!(total > 0);
+    assert!(chords.length() >= 0.0, "{} mm of {arc:?}", chords.length());
+    let (inner, outer) = radii(start, target, arc);
+    let fits = is_within_reach(outer, arc);
+    let mut last = (0, *start);
+    for (n, point) in (1..=LOOKED_AT).zip(chords) {
+        let radius = radius(&point, arc);
+        assert!(
+            !fits || (inner..=outer).contains(&radius),
+            "{radius} of {inner}..{outer} in {arc:?}"
+        );
+        last = (n, point);
+    }
+    assert_eq!(last.0, total.min(LOOKED_AT));
+    assert!(last.0 < total || last.1 == *target, "{:?} is not the end {target:?}", last.1);
+}
+
+/// Between what radii the points lie: 2 um, or a millionth, are what floats may be wrong by.
+fn radii(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> (f64, f64) {
+    let (from, to) = (radius(start, arc), radius(target, arc));
+    let (inner, outer) = (from.min(to), from.max(to));
+    let slack = 20.0 + outer * 1e-6;
+    (inner - slack, outer + slack)
+}
+
+/// Whether the whole circle can be told in lengths: of one that cannot, the rest is cut off.
+fn is_within_reach(outer: f64, arc: &Arc) -> bool {
+    let reach = f64::from(i32::MAX);
+    arc.center.iter().all(|center| f64::from(center.0).abs() + outer <= reach)
+}
+
+fn radius(point: &PerAxis<Length>, arc: &Arc) -> f64 {
+    let [first, second] = arc.center;
+    let way =
+        |axis: u8, center: Length| f64::from(point[usize::from(axis)].0) - f64::from(center.0);
+    way(arc.first, first).hypot(way(arc.second, second))
+}

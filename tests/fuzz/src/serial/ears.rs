@@ -1,0 +1,45 @@
+//! What the machine says.
+
+/// How a line begins that answers one.
+const ANSWERS: [&[u8]; 3] = [b"{\"r\":{", b"{r:{", b"tinyg ["];
+
+/// Hears, and counts the answers.
+#[derive(Default)]
+pub struct Ears {
+    /// Lines that answer one.
+    pub answers: usize,
+    /// The last of them.
+    pub last: Vec<u8>,
+    /// What is heard need not be text: the two ends may speak at different rates.
+    pub deaf: bool,
+    partial: Vec<u8>,
+}
+
+impl Ears {
+    /// Takes what was heard.
+    pub fn hear(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            if *byte == b'\n' {
+                self.line();
+            } else {
+                assert!(self.deaf || (b' '..=b'~').contains(byte), "says the byte {byte}");
+                self.partial.push(*byte);
+            }
+        }
+    }
+
+    /// Whether the machine is in the middle of a line.
+    pub fn listening(&self) -> bool {
+        !self.partial.is_empty()
+    }
+
+    fn line(&mut self) {
+        let line = std::mem::take(&mut self.partial);
+        let text = String::from_utf8_lossy(&line);
+        assert!(self.deaf || !line.starts_with(b"{") || line.ends_with(b"}"), "says {text}");
+        if ANSWERS.iter().any(|answer| line.starts_with(answer)) {
+            self.answers += 1;
+            self.last = line;
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Which bytes make a line that is to be answered, worked out anew.
+
+use kerf::hal::serial::MARKS;
+use kerf::realtime;
+use kerf::tasks::lines::LINE_MAX;
+
+/// What a byte ends.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum End {
+    /// A line that holds nothing, or blanks.
+    Empty,
+    /// A line.
+    Line,
+}
+
+/// Follows the bytes that are sent.
+#[derive(Default)]
+pub struct Lines {
+    /// The sender was in text mode at the last line's end.
+    pub is_text: bool,
+    first: Option<u8>,
+    len: usize,
+    damaged: bool,
+    returned: bool,
+}
+
+impl Lines {
+    /// Takes a byte; what it ends, if it ends something.
+    pub fn take(&mut self, byte: u8) -> Option<End> {
+        if realtime::bit(byte) != 0 {
+            return None;
+        }
+        let returned = std::mem::replace(&mut self.returned, byte == b'\r');
+        match byte {
+            b'\n' if returned => None,
+            b'\n' | b'\r' => Some(self.end()),
+            b' ' | b'\t' if self.first.is_none() => None,
+            _ if byte < MARKS => {
+                self.damaged = true;
+                None
+            }
+            _ => {
+                self.first = self.first.or(Some(byte));
+                self.len += 1;
+                None
+            }
+        }
+    }
+
+    fn end(&mut self) -> End {
+        let whole = !self.damaged && self.len <= LINE_MAX;
+        match self.first {
+            Some(b'{') if whole => self.is_text = false,
+            Some(b'?') if whole => self.is_text = true,
+            _ => {}
+        }
+        let is_empty = self.first.is_none() && !self.damaged;
+        (self.first, self.len, self.damaged) = (None, 0, false);
+        if is_empty { End::Empty } else { End::Line }
+    }
+}

@@ -1,0 +1,153 @@
+//! A sender and a machine.
+
+use kerf::hal::imp::{Machine, stepper};
+use kerf::motion::queue;
+use kerf::tasks::links::snapshot;
+
+use super::ears::Ears;
+use super::lines::{End, Lines};
+
+/// Bits a second.
+const BAUD: u32 = 115_200;
+/// Events (bytes, steps, milliseconds) that an input may take.
+const EVENTS_MAX: u32 = 100_000;
+/// How long a machine may be silent, or stand still, that has something to do.
+const PATIENCE_MS: u64 = 2_000;
+/// Time between two looks.
+const LOOK_MS: u64 = 20;
+/// The longest answer has left in this time.
+const LAST_MS: u64 = 300;
+/// Settings after which the machine may say nothing, or say it at another rate.
+const MUTING: [&[u8]; 3] = [b"jv", b"tv", b"baud"];
+
+/// The job takes too long to wait for its end.
+struct TooLong;
+
+/// A machine, and what it has said.
+pub struct Talk {
+    machine: Machine,
+    ears: Ears,
+    events: u32,
+    /// Some lines may not be answered.
+    mute: bool,
+}
+
+impl Talk {
+    /// Boots a machine that is going to be sent `text`.
+    pub fn begin(text: &[u8]) -> Self {
+        let machine = Machine::boot(BAUD).expect("one machine in each thread");
+        let mut talk = Self { machine, ears: Ears::default(), events: 0, mute: is_muting(text) };
+        let greeted = talk.run(LAST_MS, |ears| ears.answers == 1);
+        assert!(matches!(greeted, Ok(true)), "no greeting");
+        talk.ears.answers = 0;
+        talk.ears.deaf = talk.mute;
+        talk
+    }
+
+    /// Sends `text` and checks what comes of it.
+    pub fn hold(mut self, text: &[u8], all_at_once: bool) {
+        let sent = if all_at_once { self.flood(text) } else { self.converse(text) };
+        // One that takes too long has been looked at for as long as it may.
+        let _ = sent.and_then(|expected| self.end(expected));
+    }
+
+    /// Sends all at once. How many answers are to be expected at least, and at most.
+    fn flood(&mut self, text: &[u8]) -> Result<(usize, usize), TooLong> {
+        let mut lines = Lines::default();
+        let text = [text, b"\n"].concat();
+        let ends: Vec<_> = text.iter().filter_map(|byte| lines.take(*byte)).collect();
+        let least = ends.iter().filter(|end| **end == End::Line).count();
+        self.machine.send(&text);
+        // An empty line is answered if it is lost, or in text mode.
+        Ok((least, ends.len()))
+    }
+
+    /// Sends line after line, each when the one before has been answered.
+    fn converse(&mut self, text: &[u8]) -> Result<(usize, usize), TooLong> {
+        let (mut lines, mut expected) = (Lines::default(), 0);
+        let text = [text, b"\n"].concat();
+        for piece in text.split_inclusive(|byte| matches!(byte, b'\n' | b'\r')) {
+            self.machine.send(piece);
+            for byte in piece {
+                let was_text = lines.is_text;
+                let end = lines.take(*byte);
+                expected += usize::from(end == Some(End::Line) || (end.is_some() && was_text));
+            }
+            self.wait_for_answers(expected)?;
+        }
+        Ok((expected, expected))
+    }
+
+    fn wait_for_answers(&mut self, expected: usize) -> Result<(), TooLong> {
+        let mut silent = 0;
+        while !self.run(LOOK_MS, |ears| ears.answers >= expected)? {
+            silent = if stepper::running() || self.ears.listening() { 0 } else { silent + LOOK_MS };
+            self.go_on();
+            if self.mute && silent >= LAST_MS {
+                break;
+            }
+            let heard = self.ears.answers;
+            assert!(silent < PATIENCE_MS, "{heard} of {expected} lines are answered");
+        }
+        let heard = self.ears.answers;
+        assert!(self.mute || heard == expected, "{heard} answers to {expected} lines");
+        Ok(())
+    }
+
+    /// Waits for rest, and checks that everything was answered and that anything would be.
+    fn end(&mut self, (least, most): (usize, usize)) -> Result<(), TooLong> {
+        self.rest()?;
+        if self.mute {
+            return Ok(());
+        }
+        let heard = self.ears.answers;
+        assert!((least..=most).contains(&heard), "{heard} answers to {least}..={most} lines");
+        self.machine.send(b"{fb:n}\n");
+        self.run(LAST_MS, |_| false)?;
+        assert_eq!(self.ears.answers, heard + 1, "and another line");
+        let last = String::from_utf8_lossy(&self.ears.last);
+        assert!(last.contains("440.20"), "the build is {last}");
+        Ok(())
+    }
+
+    /// Waits until all that was sent has arrived, been carried out and been answered.
+    fn rest(&mut self) -> Result<(), TooLong> {
+        let (mut idle, mut still) = (0, 0);
+        while idle < LAST_MS {
+            let said = self.ears.answers;
+            self.run(LOOK_MS, |_| false)?;
+            let quiet = said == self.ears.answers && !self.ears.listening();
+            let busy = snapshot().running || queue::used() > 0;
+            idle = if busy || stepper::running() || !quiet { 0 } else { idle + LOOK_MS };
+            self.go_on();
+            still = if busy && !stepper::running() { still + LOOK_MS } else { 0 };
+            assert!(still < PATIENCE_MS, "stands still with {} blocks to do", queue::used());
+        }
+        Ok(())
+    }
+
+    /// Cycle start, should a program have stopped.
+    fn go_on(&self) {
+        if !stepper::running() {
+            self.machine.send(b"~");
+        }
+    }
+
+    /// Runs until `done`, for `ms` at most. Whether it came to that.
+    fn run(&mut self, ms: u64, done: impl Fn(&Ears) -> bool) -> Result<bool, TooLong> {
+        let Self { machine, ears, events, .. } = self;
+        let came = machine.run_until(ms, || {
+            *events += 1;
+            ears.hear(&machine.received());
+            done(ears) || *events > EVENTS_MAX
+        });
+        if *events > EVENTS_MAX { Err(TooLong) } else { Ok(came) }
+    }
+}
+
+/// Whether `text` may contain a setting that makes the machine mute.
+fn is_muting(text: &[u8]) -> bool {
+    let letters = text.iter().filter(|byte| byte.is_ascii_alphanumeric());
+    let letters: Vec<_> = letters.map(u8::to_ascii_lowercase).collect();
+    MUTING.iter().any(|name| letters.windows(name.len()).any(|part| part == *name))
+}
