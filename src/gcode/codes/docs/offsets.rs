@@ -16,7 +16,7 @@ power goes, and kept by M2.",
             100,
             "Set an offset",
             "L2: system P (1 is G54, 9 is G59.3, 0 the one in force) has its origin at the axis words, in machine \
-coordinates. L20: it has its origin where the present position is called the axis words. L1: tool P (1 to 16) is as \
+coordinates. L20: it has its origin where the present position is called the axis words. L1: tool P (1 to 10) is as \
 long as the words of X and Z. L10: it is so long that the present position is called the words once it is in \
 force. Axes without a word keep what they have. A tool length in force stays as it is until the next G43.",
             &[
@@ -26,7 +26,7 @@ force. Axes without a word keep what they have. A tool length in force stays as 
                 no(PWordInvalid, &["G10 L2 P10 X1"]),
                 no(PWordInvalid, &["G10 L20 P1.5 X1"]),
                 no(ToolInvalid, &["G10 L1 P0 Z1"]),
-                no(ToolInvalid, &["G10 L10 P17 Z1"]),
+                no(ToolInvalid, &["G10 L10 P11 Z1"]),
                 no(AxisWordMissing, &["G10 L2 P1"]),
                 no(AxisInvalid, &["G10 L1 P1 Y1"]),
             ],
@@ -72,7 +72,7 @@ without a word keep theirs, if it is in force. Until G92.1, G92.2 or M2.",
 
 pub const TOOLS: Section = Section {
     title: "Tools",
-    intro: "A tool shifts the origin along X and Z by its lengths, which are 0 until G10 sets them. Tools 1 to 16 \
+    intro: "A tool shifts the origin along X and Z by its lengths, which are 0 until G10 sets them. Tools 1 to 10 \
 have some; tool 0 is an empty spindle.",
     docs: &[
         g(
@@ -80,7 +80,7 @@ have some; tool 0 is an empty spindle.",
             "Tool length",
             "The lengths of tool H are in force, without H those of the tool in the spindle; H0 is none. Stays \
 in force, after M2 too, whatever tool is changed.",
-            &[no(HWordInvalid, &["G43 H17"]), no(HWordInvalid, &["T20 M6", "G43"])],
+            &[no(HWordInvalid, &["G43 H11"]), no(HWordInvalid, &["T20 M6", "G43"])],
         ),
         g(
             431,
@@ -92,7 +92,7 @@ in force, after M2 too, whatever tool is changed.",
             432,
             "Another tool length",
             "The lengths of tool H are added to those in force.",
-            &[no(HWordMissing, &["G43.2"]), no(HWordInvalid, &["G43.2 H17"])],
+            &[no(HWordMissing, &["G43.2"]), no(HWordInvalid, &["G43.2 H11"])],
         ),
         g(490, "No tool length", "In force at power-up.", &[]),
         super::machine::CHANGE,
