@@ -63,7 +63,7 @@ fn a_move_ends_on_its_step() {
 fn refused_lines_move_nothing() {
     let mut sender = Sender::boot();
     for (line, status) in
-        [("g1x10", 142), ("g99", 131), ("m77", 132), ("g1x", 102), ("g2x1f100", 157)]
+        [("g1x10", 142), ("g5", 131), ("m77", 132), ("g1x", 102), ("g2x1f100", 157)]
     {
         let answer = sender.ask(&format!("{line}\n"), 300);
         assert_eq!(answer.lines().next(), Some(&*format!("{{\"r\":{{}},\"f\":[1,{status},7]}}")));

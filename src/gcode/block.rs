@@ -235,11 +235,17 @@ impl Block {
         if self.motion.is_some() || self.taken & AXES != 0 { 0 } else { codes::taken_by(modal) }
     }
 
+    /// The words that both a code of the line and the motion in force take, if that is to move.
+    fn taken_with(&self, modal: MotionMode) -> u32 {
+        let alone = self.taken == 0 || self.motion.is_some() || self.motion_from(modal).is_none();
+        if alone { 0 } else { self.taken & codes::taken_by(modal) }
+    }
+
     /// Refuses words that no code takes or that two codes want, and codes without their words.
     #[inline(never)]
     pub fn check(&self, modal: MotionMode) -> Result<(), Status> {
         let unused = self.present & !(self.taken | self.taken_by(modal) | words::ALWAYS);
-        let twice = self.present & self.taken_twice;
+        let twice = self.present & (self.taken_twice | self.taken_with(modal));
         let missing = self.needed & !self.present;
         match () {
             () if twice & AXES != 0 => Err(Status::AxisConflict),
@@ -323,6 +329,8 @@ mod tests {
             ("P1", Feed, Status::WordUnused),
             ("G92 X1 G1", Feed, Status::AxisConflict),
             ("G4 P1 G82 R1", Feed, Status::WordConflict),
+            ("G4 P1 X1 R1", ClockwiseArc, Status::WordConflict),
+            ("M50 P1 X1", MotionMode::DrillDwell, Status::WordConflict),
             ("G4", Feed, Status::PWordMissing),
             ("G10 P1 X1", Feed, Status::LWordMissing),
             ("G10 L2 X1", Feed, Status::PWordMissing),
@@ -335,9 +343,12 @@ mod tests {
         for (line, modal) in [("I1", ClockwiseArc), ("G92 X1", Feed), ("G4 P1 X1", Feed)] {
             assert_eq!(check(line, modal), Ok(()), "{line}");
         }
+        for line in ["G4 P1", "G4 P1 G0 X1", "G64 P1 G92 X1", "G64 X1 R1"] {
+            assert_eq!(check(line, ClockwiseArc), Ok(()), "{line}");
+        }
         let moves = |line, modal| read(line).unwrap().motion_from(modal);
         assert_eq!(moves("G4 P1", ClockwiseArc), Option::None);
-        assert_eq!(moves("G4 P1 X1", ClockwiseArc), Some(ClockwiseArc));
+        assert_eq!(moves("G4 P1 X1", Feed), Some(Feed));
         assert_eq!(moves("G92 X1", Feed), Option::None);
         assert_eq!(moves("F100", Feed), Option::None);
         assert_eq!(moves("G0", Feed), Some(MotionMode::Traverse));

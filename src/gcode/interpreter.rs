@@ -14,7 +14,7 @@
 //! arc 600.
 
 use super::block::Block;
-use super::command::Commands;
+use super::command::{Commands, Overrides};
 use super::modal::{Defaults, Modal, Units};
 use super::setup::Setup;
 use super::state::State;
@@ -230,6 +230,11 @@ impl Interpreter {
     /// Whether an axis is homed: soft limits are for such axes alone.
     pub fn is_homed(&self, axis: u8) -> bool {
         self.state.homed & 1 << axis != 0
+    }
+
+    /// By what rates and speeds are multiplied.
+    pub fn overrides(&self) -> Overrides {
+        self.state.overrides_now()
     }
 
     /// The N word of the last line, 0 if it had none.

@@ -1,7 +1,7 @@
 //! The words of canned cycles that stay in force from line to line (RS274/NGC 3.5.16).
 //!
 //! Numbers are kept as written, in units of a length: R and Z mean something else with G90 than with G91.
-//! They hold for as long as the same cycle goes on.
+//! They hold for as long as the same cycle goes on, in the same plane.
 
 use super::axes;
 use super::block::Block;
@@ -15,6 +15,8 @@ use crate::units::Length;
 pub struct Sticky {
     /// Whose they are: none of another mode counts.
     mode: MotionMode,
+    /// And in which plane.
+    plane: Plane,
     /// Where the axis stood before the first cycle of the series, machine coordinates.
     pub initial: Length,
     /// R.
@@ -33,6 +35,7 @@ impl Sticky {
     /// No words. All zeros, so that it needs no memory.
     pub const NONE: Self = Self {
         mode: MotionMode::Traverse,
+        plane: Plane::Xy,
         initial: Length::ZERO,
         retract: None,
         depth: None,
@@ -53,11 +56,13 @@ impl Sticky {
         here: Length,
     ) -> Result<Self, Status> {
         let mut now = match () {
+            // Along another axis, heights mean nothing.
+            () if self.plane != plane => Self { initial: here, ..Self::NONE },
             () if before == mode && self.mode == mode => *self,
             () if before.is_cycle() => Self { initial: self.initial, ..Self::NONE },
             () => Self { initial: here, ..Self::NONE },
         };
-        now.mode = mode;
+        (now.mode, now.plane) = (mode, plane);
         let length = |slot: u8, kept: &mut Option<Length>| {
             if let Some(word) = block.get(slot) {
                 *kept = Some(axes::length(word, units)?.units);

@@ -56,6 +56,12 @@ pub enum Edit {
     Tool(u8, Tool),
 }
 
+impl Default for Tables {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Tables {
     /// All zeros.
     pub const fn new() -> Self {

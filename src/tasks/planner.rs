@@ -226,7 +226,9 @@ impl Planner {
                 self.steps.repeat();
             }
             Step::Stop(Stop::End) => {
-                self.set_overrides(Overrides::NONE);
+                // On again, with the factors they had.
+                let factors = self.links.model.borrow().overrides();
+                self.set_overrides(factors);
                 self.pause(Body::ProgramEnd);
             }
             Step::Stop(_) => {

@@ -148,6 +148,17 @@ fn matches(pattern: &str, text: &str) -> bool {
 }
 
 impl Transcript {
+    /// The lines that are sent, without their ends, each with the line that is heard next.
+    #[allow(dead_code)]
+    pub fn exchanges(&self) -> impl Iterator<Item = (String, &str)> {
+        self.events.windows(2).filter_map(|pair| match pair {
+            [(_, Event::Send(sent)), (_, Event::Hear(heard))] => {
+                Some((String::from_utf8_lossy(sent).trim_end().to_string(), heard.as_str()))
+            }
+            _ => None,
+        })
+    }
+
     /// Plays it; the error says where it fails and how.
     pub fn play(&self, side: &mut impl Side) -> Result<(), String> {
         let mut player =

@@ -35,6 +35,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use boards::Board;
+use process::host_cargo;
 use setup::Scope;
 
 #[derive(Parser)]
@@ -61,6 +62,8 @@ enum Command {
     Flash(firmware::FlashArgs),
     /// Write the example jobs again
     Jobs,
+    /// Write `docs/gcode.md` again, from the tables of the language
+    Docs,
     /// Write the motions of `tests/nist` again, by a NIST-derived interpreter (Debian 12)
     Nist(nist::Args),
 }
@@ -94,10 +97,15 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
         Command::Jobs => jobs::write()?,
+        Command::Docs => process::run(host_cargo().args(DESCRIBE))?,
         Command::Nist(args) => nist::run(&args)?,
     }
     Ok(ExitCode::SUCCESS)
 }
+
+/// Kerf's tests write it, so that this program need not be built with Kerf in it.
+const DESCRIBE: [&str; 8] =
+    ["test", "--quiet", "--package", "kerf", "--test", "docs", "--", "--ignored"];
 
 fn build(board: Board) -> anyhow::Result<()> {
     setup::ensure(Scope::Firmware)?;

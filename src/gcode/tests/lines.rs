@@ -149,6 +149,16 @@ fn a_tool_change_stops_the_spindle() {
 }
 
 #[test]
+fn heights_of_a_cycle_are_those_of_its_plane() {
+    let before = ["G0 X5 Y9 Z7", "F9 G18 G81 Y0 R1"];
+    let after = |line| position(&[&before[..], &[line]].concat())[..3].to_vec();
+    assert_eq!(after("G17 G81 Z0 R1"), [50_000, 90_000, 70_000]);
+    assert_eq!(after("G19 G81 X0 R1"), [50_000, 90_000, 70_000]);
+    assert_eq!(after("G19 G82 X0 R1 P0"), [50_000, 90_000, 70_000]);
+    assert_eq!(refusal(&[before[0], before[1], "G17 X1"]), Status::RWordMissing);
+}
+
+#[test]
 fn feed_is_in_the_units_of_its_line() {
     assert_eq!(feed(&["G20 F10 G1 X1"]), Feed::PerMinute(254.0));
     assert_eq!(feed(&["G20", "G21 F10 G1 X1"]), Feed::PerMinute(10.0));

@@ -1,0 +1,182 @@
+//! What is said of every code, for people. `docs/gcode.md` is made from it, and tests hold it to the
+//! truth: every row of the tables has an entry, and every example is refused as it says.
+
+mod bores;
+mod cycles;
+mod lines;
+mod machine;
+mod markdown;
+mod modes;
+mod motion;
+mod offsets;
+mod stored;
+#[cfg(test)]
+mod tests;
+
+pub use markdown::markdown;
+
+use super::super::command::Commands;
+use super::super::interpreter::Interpreter;
+use super::super::setup::{AxisMode, Cycle, Setup};
+use super::Code;
+use crate::status::Status;
+use crate::units::Length;
+
+/// What belongs together.
+pub struct Section {
+    /// Its heading.
+    pub title: &'static str,
+    /// What holds for all of it; may be empty.
+    pub intro: &'static str,
+    /// Its codes.
+    pub docs: &'static [Doc],
+}
+
+/// What is said of one code.
+pub struct Doc {
+    /// `G` or `M`.
+    pub letter: char,
+    /// Its number in tenths.
+    pub number: u16,
+    /// What it is called.
+    pub title: &'static str,
+    /// What it does.
+    pub text: &'static str,
+    /// What it is refused with, beside what may be wrong with any line.
+    pub refusals: &'static [Refusal],
+}
+
+/// What is said of something that may stand on any line.
+pub struct Rule {
+    /// What it is.
+    pub title: &'static str,
+    /// What it means.
+    pub text: &'static str,
+    /// What is refused.
+    pub refusals: &'static [Refusal],
+}
+
+/// Why a line is refused.
+pub struct Refusal {
+    /// With this.
+    pub status: Status,
+    /// An example: on a machine that has just been started the last of these lines is refused.
+    pub lines: &'static [&'static str],
+    /// Which machine.
+    pub on: On,
+}
+
+/// The machine of an example.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum On {
+    /// One that has everything, all axes standard.
+    Usual,
+    /// The same without switches and probe.
+    NoSwitches,
+    /// The same with X disabled.
+    DisabledX,
+    /// The same with soft limits, X from 0 to 150.
+    SoftLimits,
+}
+
+impl Setup for On {
+    fn mode(&self, axis: u8) -> AxisMode {
+        match self {
+            On::DisabledX if axis == 0 => AxisMode::Disabled,
+            _ => AxisMode::Standard,
+        }
+    }
+
+    fn radius(&self, _axis: u8) -> u32 {
+        1
+    }
+
+    fn travel(&self, axis: u8) -> Option<(Length, Length)> {
+        let limited = *self == On::SoftLimits && axis == 0;
+        limited.then_some((Length::ZERO, Length(1_500_000)))
+    }
+
+    fn can(&self, _cycle: Cycle) -> bool {
+        *self != On::NoSwitches
+    }
+}
+
+impl Refusal {
+    /// What the last line of the example is refused with by a machine; `None` if it is not.
+    pub fn on(&self, setup: &impl Setup) -> Option<Status> {
+        let (mut interpreter, mut out) = (Interpreter::new(), Commands::default());
+        let mut last = None;
+        for line in self.lines {
+            last = interpreter.interpret(line.as_bytes(), setup, &mut out).err();
+        }
+        last
+    }
+}
+
+impl Doc {
+    /// Its name: `G28.3`.
+    pub fn name(&self) -> std::string::String {
+        match (self.number / 10, self.number % 10) {
+            (whole, 0) => std::format!("{}{whole}", self.letter),
+            (whole, tenth) => std::format!("{}{whole}.{tenth}", self.letter),
+        }
+    }
+
+    /// Its row of the tables.
+    pub fn row(&self) -> Option<Code> {
+        let (whole, tenth) = (u8::try_from(self.number / 10).ok()?, (self.number % 10) as u8);
+        if self.letter == 'G' { super::g(whole, tenth) } else { super::m(whole, tenth) }
+    }
+}
+
+/// Everything that is said of codes.
+pub const SECTIONS: &[Section] = &[
+    motion::MOVES,
+    motion::PROBES,
+    cycles::CYCLES,
+    bores::BORES,
+    modes::MODES,
+    modes::FEEDS,
+    offsets::SYSTEMS,
+    offsets::TOOLS,
+    stored::PLACES,
+    machine::PROGRAM,
+    machine::SPINDLE,
+    machine::OVERRIDES,
+];
+
+/// Everything that is said of lines.
+pub const RULES: &[Rule] = lines::RULES;
+
+/// All entries.
+pub fn docs() -> impl Iterator<Item = &'static Doc> {
+    SECTIONS.iter().flat_map(|section| section.docs)
+}
+
+const fn g(
+    number: u16,
+    title: &'static str,
+    text: &'static str,
+    refusals: &'static [Refusal],
+) -> Doc {
+    Doc { letter: 'G', number, title, text, refusals }
+}
+
+const fn m(
+    number: u16,
+    title: &'static str,
+    text: &'static str,
+    refusals: &'static [Refusal],
+) -> Doc {
+    Doc { letter: 'M', number, title, text, refusals }
+}
+
+/// Refused by every machine.
+const fn no(status: Status, lines: &'static [&'static str]) -> Refusal {
+    Refusal { status, lines, on: On::Usual }
+}
+
+/// Refused by some.
+const fn no_on(on: On, status: Status, lines: &'static [&'static str]) -> Refusal {
+    Refusal { status, lines, on }
+}

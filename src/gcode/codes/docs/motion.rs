@@ -1,0 +1,118 @@
+//! Moves, arcs, probing.
+
+use super::{On, Section, g, no, no_on};
+use crate::status::Status::{
+    ArcAxisMissing, ArcEndpointIsStart, ArcOffsetsMissing, ArcRadiusTolerance, ArcSpecification,
+    AxisDisabled, AxisNotAllowed, AxisWordMissing, FeedrateMissing, InverseTimeNotAllowed,
+    OutOfRange, PWordInvalid, PWordMissing, PWordNegative, ProbeFailed, ProbeTooShort,
+    RotaryNotAllowed, SWordMissing, SpindleMustTurn,
+};
+
+/// Refusals of an arc.
+macro_rules! arc {
+    ($code:literal) => {
+        &[
+            no(FeedrateMissing, &[concat!($code, " X1 I1")]),
+            no(SpindleMustTurn, &["G95 F0.1", concat!($code, " X2 I1")]),
+            no(SWordMissing, &["M3 G95 F0.1", concat!($code, " X2 I1")]),
+            no_on(On::DisabledX, AxisDisabled, &[concat!($code, " Y2 J1 F100")]),
+            no(ArcSpecification, &[concat!($code, " X2 R1 I1 F100")]),
+            no(ArcSpecification, &[concat!($code, " X2 I1 K0 F100")]),
+            no(ArcSpecification, &[concat!($code, " X5 I1 F100")]),
+            no(ArcAxisMissing, &[concat!($code, " Z1 R5 F100")]),
+            no(ArcOffsetsMissing, &[concat!($code, " X1 F100")]),
+            no(ArcOffsetsMissing, &[concat!($code, " X1 I0 J0 F100")]),
+            no(ArcOffsetsMissing, &["G90.1", concat!($code, " X2 I1 F100")]),
+            no(ArcRadiusTolerance, &[concat!($code, " X5 R1 F100")]),
+            no(ArcRadiusTolerance, &[concat!($code, " X0.1 R0.09 F100")]),
+            no(ArcEndpointIsStart, &[concat!($code, " X0 R5 F100")]),
+            no(PWordNegative, &[concat!($code, " I1 P-1 F100")]),
+            no(PWordInvalid, &[concat!($code, " I1 P1.5 F100")]),
+        ]
+    };
+}
+
+/// Refusals of a probing move.
+macro_rules! probe {
+    ($code:literal) => {
+        &[
+            no(AxisWordMissing, &[concat!($code, " F100")]),
+            no_on(On::NoSwitches, ProbeFailed, &[concat!($code, " Z-5 F100")]),
+            no(RotaryNotAllowed, &[concat!($code, " A5 F100")]),
+            no(InverseTimeNotAllowed, &["G93", concat!($code, " Z-5 F1")]),
+            no(FeedrateMissing, &[concat!($code, " Z-5")]),
+            no(SpindleMustTurn, &["G95 F0.1", concat!($code, " Z-5")]),
+            no(SWordMissing, &["M3 G95 F0.1", concat!($code, " Z-5")]),
+            no(ProbeTooShort, &[concat!($code, " Z-0.25 F100")]),
+        ]
+    };
+}
+
+pub const MOVES: Section = Section {
+    title: "Moves",
+    intro: "Axis words on a line without a code of this group move in the mode that is in force. X, Y and \
+Z are in the units in force, A, B and C in degrees (an axis in radius mode: a length along its \
+circumference).",
+    docs: &[
+        g(
+            0,
+            "Traverse",
+            "Straight to the axis words, as fast as the axes may. Stays in force. Without axis words \
+nothing moves.",
+            &[],
+        ),
+        g(
+            10,
+            "Feed",
+            "Straight to the axis words at the feed rate F. If only A, B and C move, F is in degrees. Stays in \
+force, and needs a feed even without axis words.",
+            &[
+                no(FeedrateMissing, &["G1 X1"]),
+                no(SpindleMustTurn, &["G95 F0.1", "G1 X1"]),
+                no(SWordMissing, &["M3 G95 F0.1", "G1 X1"]),
+            ],
+        ),
+        g(20, "Arc, clockwise", ARC, arc!("G2")),
+        g(30, "Arc, counter-clockwise", ARC, arc!("G3")),
+        g(
+            40,
+            "Dwell",
+            "Stands still for P seconds, to the millisecond, after the moves before it and before a move on \
+the same line.",
+            &[
+                no(PWordMissing, &["G4"]),
+                no(PWordNegative, &["G4 P-1"]),
+                no(OutOfRange, &["G4 P4294967"]),
+            ],
+        ),
+        g(
+            800,
+            "No motion mode",
+            "Ends canned cycles. Until another code of the group comes, axis words move nothing and are \
+refused. In force at power-up.",
+            &[no(AxisNotAllowed, &["G80 X1"])],
+        ),
+    ],
+};
+
+const ARC: &str = "From here to the axis words around a centre, in the plane in force, seen from the \
+positive end of the third axis, along which a helix advances. The centre is at I, J, K (with G91.1 from the \
+start, where one of two may be left out, with G90.1 from the origin), or R is the radius, negative for the \
+long way round. Without an end point in the plane: a full circle. P full turns more; of a full circle, P \
+turns in all. Radii at start and end may differ by 5 um, or by a thousandth, but never by 1 mm; the smallest \
+R is 0.1 mm. Stays in force.";
+
+pub const PROBES: Section = Section {
+    title: "Probing",
+    intro: "",
+    docs: &[
+        g(382, "Probe until it touches", PROBE, probe!("G38.2")),
+        g(383, "Probe until it touches, if it does", QUIET, probe!("G38.3")),
+        g(384, "Probe until it lets go", PROBE, probe!("G38.4")),
+        g(385, "Probe until it lets go, if it does", QUIET, probe!("G38.5")),
+    ],
+};
+
+const PROBE: &str = "Straight towards the axis words at the feed rate, until the probe says stop. X, Y and Z \
+only, at least 0.254 mm. To come to the end without that is an error. Refused on machines without a probe.";
+const QUIET: &str = "The same, but to come to the end without that is no error.";
