@@ -14,6 +14,8 @@ pub mod hal;
 pub mod app;
 pub mod baud;
 pub mod boards;
+#[cfg(not(target_arch = "avr"))]
+pub mod canon;
 pub mod config;
 pub mod gcode;
 pub mod math;

@@ -1,4 +1,4 @@
-//! The AVR image. On the host it only says what it is.
+//! The AVR image. On the host, the command line.
 #![cfg_attr(target_arch = "avr", no_std, no_main)]
 
 #[cfg(target_arch = "avr")]
@@ -34,6 +34,9 @@ mod image {
 }
 
 #[cfg(not(target_arch = "avr"))]
-fn main() {
-    println!("kerf {}: build the firmware with `cargo xtask build`", env!("CARGO_PKG_VERSION"));
+mod cli;
+
+#[cfg(not(target_arch = "avr"))]
+fn main() -> std::process::ExitCode {
+    cli::run()
 }

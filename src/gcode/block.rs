@@ -17,7 +17,6 @@ use crate::status::Status;
 use crate::units;
 
 /// The parts of a line.
-#[derive(Default)]
 pub struct Block {
     pub non_modal: Option<NonModal>,
     pub motion: Option<MotionMode>,
@@ -53,6 +52,39 @@ pub struct Block {
 }
 
 impl Block {
+    /// An empty line.
+    // Where it is to be, or it would be copied there.
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self {
+            non_modal: None,
+            motion: None,
+            plane: None,
+            distance: None,
+            arc_distance: None,
+            feed_mode: None,
+            units: None,
+            cutter: None,
+            tool_length: None,
+            retract: None,
+            system: None,
+            path: None,
+            stop: None,
+            tool_change: None,
+            spindle: None,
+            coolant: None,
+            overrides: None,
+            taken: 0,
+            taken_twice: 0,
+            needed: 0,
+            present: 0,
+            values: Vec::new(),
+            slashed: false,
+            message: None,
+            commented: false,
+        }
+    }
+
     /// Reads a line into an empty block. One that begins with a slash is read no further if `deletes`.
     pub fn read(&mut self, line: &[u8], deletes: bool) -> Result<(), Status> {
         if line.len() > u8::MAX as usize {
@@ -157,6 +189,12 @@ impl Block {
         self.present & set != 0
     }
 
+    /// The number in a slot that most lines have not: quick, if the slot is a constant.
+    #[inline(always)]
+    pub fn rare(&self, slot: u8) -> Option<&Decimal> {
+        if self.has(words::bit(slot)) { self.get(slot) } else { None }
+    }
+
     /// The number in a slot.
     pub fn get(&self, slot: u8) -> Option<&Decimal> {
         self.values.iter().find(|word| word.0 == slot).map(|word| &word.1)
@@ -238,7 +276,7 @@ mod tests {
     use super::*;
 
     fn read(line: &str) -> Result<Block, Status> {
-        let mut block = Block::default();
+        let mut block = Block::new();
         block.read(line.as_bytes(), true).map(|()| block)
     }
 
@@ -319,7 +357,7 @@ mod tests {
     #[test]
     fn slash_percent_and_message() {
         assert!(read(" /G99 rubbish").unwrap().slashed);
-        let mut block = Block::default();
+        let mut block = Block::new();
         assert_eq!(block.read(b" / G1 X1", false), Ok(()));
         assert!(block.slashed && block.has(AXES));
         assert!(read(" % ").is_ok());

@@ -4,6 +4,7 @@ use super::arc;
 use super::axes;
 use super::block::Block;
 use super::command::{Arc, Commands, Motion};
+use super::limits;
 use super::modal::ArcDistance;
 use super::number::Decimal;
 use super::setup::{AxisMode, Setup};
@@ -56,6 +57,10 @@ impl State {
             Some(radius) => radius_form(&start, &target, &arc, radius)?,
             None => self.center_form(block, &start, &target, &arc)?,
         };
+        if may_be_too_far(&start, &arc) && !limits::arc_is_within(&start, &target, &arc, |_| RANGE)
+        {
+            return Err(Status::OutOfRange);
+        }
         if arc::closes(&start, &target, &arc) {
             arc.extra_turns = turns.saturating_sub(1);
         }
@@ -116,6 +121,19 @@ impl State {
         check_radii(&Arc { center, ..*arc }, start, target)?;
         Ok(center)
     }
+}
+
+/// How far a point may be from the origin, in units: 1 um short of what a length can hold.
+const RANGE: Option<(Length, Length)> = Some((Length(10 - i32::MAX), Length(i32::MAX - 10)));
+
+/// Whether some point of the circle may be beyond the range of lengths: it is not, if the sides of the
+/// radius' triangle are not.
+fn may_be_too_far(start: &PerAxis<Length>, arc: &Arc) -> bool {
+    let from = in_plane(start, arc);
+    let way = |a: Length, b: Length| a.0.saturating_sub(b.0).saturating_abs();
+    let [first, second] = arc.center;
+    let radius = way(from[0], first).saturating_add(way(from[1], second));
+    [first, second].iter().any(|at| at.0.saturating_abs().saturating_add(radius) == i32::MAX)
 }
 
 /// P: full turns.

@@ -13,8 +13,6 @@
 //! 4,800; in inches 1,800 more for each axis; an arc 11,000, with R 14,000. Stack: 450 bytes, for an
 //! arc 600.
 
-use heapless::Vec;
-
 use super::block::Block;
 use super::command::{Commands, Overrides};
 use super::modal::{Defaults, Modal, Units};
@@ -89,7 +87,7 @@ impl Interpreter {
         out: &mut Commands,
     ) -> Result<Info, Status> {
         out.clear();
-        let mut block = Block::default();
+        let mut block = Block::new();
         let deletes = setup.deletes_blocks();
         block.read(line, deletes)?;
         self.execute_or_undo(&block, setup, out)?;
@@ -119,8 +117,7 @@ impl Interpreter {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        let mut before = Before::of(&self.state);
-        before.save_axes(&self.state, block);
+        let before = Before::of(&self.state);
         let done = self.state.execute(block, &self.tables, setup, out);
         if done.is_err() {
             before.restore(&mut self.state);
@@ -158,26 +155,15 @@ struct Before {
     feed: f32,
     feed_units: Units,
     line: u32,
-    /// Position and residue of the axes that the block names.
-    axes: Vec<(u8, Length, i16), AXES>,
+    position: PerAxis<Length>,
+    residue: PerAxis<i16>,
 }
 
 impl Before {
     #[inline(always)]
     fn of(state: &State) -> Self {
-        let State { modal, feed, feed_units, line, .. } = *state;
-        Self { modal, feed, feed_units, line, axes: Vec::new() }
-    }
-
-    #[inline(always)]
-    fn save_axes(&mut self, state: &State, block: &Block) {
-        for (axis, _) in block.axes() {
-            let i = usize::from(axis);
-            if let (Some(position), Some(residue)) = (state.position.get(i), state.residue.get(i)) {
-                // There is room for all axes.
-                let _ = self.axes.push((axis, *position, *residue));
-            }
-        }
+        let State { modal, feed, feed_units, line, position, residue, .. } = *state;
+        Self { modal, feed, feed_units, line, position, residue }
     }
 
     #[inline(never)]
@@ -186,12 +172,8 @@ impl Before {
         state.feed = self.feed;
         state.feed_units = self.feed_units;
         state.line = self.line;
-        for (axis, position, residue) in &self.axes {
-            let i = usize::from(*axis);
-            if let (Some(p), Some(r)) = (state.position.get_mut(i), state.residue.get_mut(i)) {
-                (*p, *r) = (*position, *residue);
-            }
-        }
+        state.position = self.position;
+        state.residue = self.residue;
     }
 }
 
@@ -215,6 +197,11 @@ impl Interpreter {
     /// Machine coordinates of the work origin: work position = machine position - this.
     pub fn work_offset(&self) -> &PerAxis<Length> {
         &self.state.origin
+    }
+
+    /// The tool length in force, on each axis; a part of the work offset.
+    pub fn tool_length(&self) -> &PerAxis<Length> {
+        &self.state.tool_length
     }
 
     /// F in mm/min (or mm a turn); 0 if none is in force, as always with G93.

@@ -4,7 +4,7 @@
 //! one after the other, not trees of combinators: on AVR every level would copy what it returns.
 
 use nom::branch::alt;
-use nom::bytes::complete::{take_till, take_while};
+use nom::bytes::complete::take_till;
 use nom::character::complete::char;
 use nom::combinator::{fail, map, opt, rest};
 use nom::error::{ErrorKind, ParseError};
@@ -49,9 +49,15 @@ pub fn is_blank(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b'\r')
 }
 
-/// Skips white space.
-pub fn blanks(input: &[u8]) -> Lexed<'_, &[u8]> {
-    take_while(is_blank).parse(input)
+/// Skips white space. `nom`'s `take_while` takes three times as long to find that there is none.
+pub fn blanks(input: &[u8]) -> Lexed<'_, ()> {
+    let mut rest = input;
+    while let Some((&byte, after)) = rest.split_first()
+        && is_blank(byte)
+    {
+        rest = after;
+    }
+    Ok((rest, ()))
 }
 
 /// The next item, and the blanks behind it.

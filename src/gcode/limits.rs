@@ -84,7 +84,7 @@ fn check_cycle(
 
 /// Whether the points of an arc that lie farthest out in its plane are within the limits; its end is
 /// not looked at. A helix advances evenly, so that its end is the farthest point along its axis.
-fn arc_is_within(
+pub(super) fn arc_is_within(
     start: &PerAxis<Length>,
     target: &PerAxis<Length>,
     arc: &Arc,

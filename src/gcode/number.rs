@@ -96,6 +96,7 @@ impl Decimal {
     }
 
     /// Rounds and signs a magnitude of `units` + `rest` / 10,000.
+    #[inline(always)]
     fn exact(&self, units: u32, rest: u16) -> Result<Exact, Status> {
         let up = rest >= 5_000;
         let rest = if up { rest as i16 - REST } else { rest as i16 };

@@ -117,7 +117,7 @@ impl State {
 
     /// N, the modes, and F.
     fn begin(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
-        self.line = block.get(N).map_or(Ok(0), |value| value.integer())?;
+        self.line = block.rare(N).map_or(Ok(0), |value| value.integer())?;
         out.line = self.line;
         self.modes(block);
         self.feed(block)
@@ -140,7 +140,7 @@ impl State {
 
     /// F, but with G93: there it is for the move of its line alone, which takes it.
     fn feed(&mut self, block: &Block) -> Result<(), Status> {
-        let Some(value) = block.get(F) else { return Ok(()) };
+        let Some(value) = block.rare(F) else { return Ok(()) };
         if value.negative {
             return Err(Status::OutOfRange);
         }
@@ -169,7 +169,7 @@ impl State {
         if block.changes_tool() {
             self.tool = self.selected;
             out.tool = Some(self.tool);
-            // It stops, and an S of this line or a later one must not turn it on again.
+            // The change stops the spindle: S alone must not start it again.
             self.modal.spindle = Turn::Off;
             out.spindle = None;
         }

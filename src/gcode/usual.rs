@@ -51,6 +51,10 @@ impl State {
         out: &mut Commands,
     ) -> bool {
         let modal = &self.modal;
+        // Most of the others end in a comment.
+        if line.last() == Some(&b')') {
+            return false;
+        }
         if modal.units != Units::Mm
             || modal.feed_mode != FeedMode::PerMinute
             || line.len() > usize::from(u8::MAX)

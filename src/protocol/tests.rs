@@ -146,8 +146,8 @@ fn cncjs_connects() {
     assert!(request.len() <= 254, "{}", request.len());
     let answer = fake.ask(request);
     assert!(answer.starts_with(r#"{"r":{"sr":{"stat":1,"line":0,"vel":0.00,"#), "{answer}");
-    assert!(answer.ends_with(r#""mpoc":-214748.365}},"f":[1,0,7]}"#), "{answer}");
-    assert!(!answer.contains("admo"));
+    assert!(answer.ends_with(r#""tofa":0.000}},"f":[1,0,7]}"#), "{answer}");
+    assert!(answer.contains("admo"));
     assert!(fake.ask("{sys:n}").starts_with(
         r#"{"r":{"sys":{"fb":440.20,"fv":0.970,"hp":1,"hv":8,"id":"0000-KERF","ja":100000,"#
     ));

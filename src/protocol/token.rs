@@ -266,13 +266,13 @@ mod tests {
         let mut count = 0;
         for number in 0..=u8::MAX {
             let token = Token(number);
-            if token.subject().is_none() || (number >= FIRST_VECTOR + 28) {
+            if token.subject().is_none() || (number >= FIRST_VECTOR + 34) {
                 continue;
             }
             assert_eq!(Token::find(&token.name()), Some(token), "{}", text(token));
             count += 1;
         }
-        assert_eq!(count, 31 + 28 + 3 * 15 + 16 + 2 * 9 + 22 + 28);
+        assert_eq!(count, 31 + 28 + 3 * 15 + 16 + 2 * 9 + 28 + 34);
         for bad in ["posd", "pwr5", "pwr0", "pos", "homd", "pwra", "velo", ""] {
             assert_eq!(Token::find(&name(bad)), None, "{bad}");
         }
@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(resolved("x"), Target::Group(Group::Settings(Owner::Axis(0))));
         assert_eq!(resolved("N"), Target::Token(Token::single(0)));
         assert_eq!(resolved("4"), Target::Group(Group::Settings(Owner::Motor(3))));
-        assert_eq!(resolved("pwr"), Target::Group(Group::Vector(4)));
+        assert_eq!(resolved("pwr"), Target::Group(Group::Vector(5)));
         assert_eq!(resolved("CLEAR"), Target::Action(Action::Clear));
         assert_eq!(resolved("sr"), Target::Group(Group::Report));
         assert_eq!(resolved("toolong"), Target::Unknown);

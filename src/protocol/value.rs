@@ -30,9 +30,9 @@ pub enum Value {
     Hold,
     /// `unit`: 0 inch, 1 mm.
     Units,
-    /// `coor`: 0 G53, 1 to 6 G54 to G59.
+    /// `coor`: 0 G53, 1 to 9 G54 to G59.3.
     Coordinates,
-    /// `momo`: 0 to 3 G0 to G3, 4 G80.
+    /// `momo`: see [`MotionMode`](crate::gcode::modal::MotionMode).
     MotionMode,
     /// `plan`: 0 to 2 G17 to G19.
     Plane,
@@ -40,8 +40,20 @@ pub enum Value {
     Path,
     /// `dist`: 0 G90, 1 G91.
     Distance,
-    /// `frmo`: 0 G93, 1 G94.
+    /// `admo`: 0 G90.1, 1 G91.1.
+    ArcDistance,
+    /// `frmo`: 0 G93, 1 G94, 2 G95.
     FeedMode,
+    /// `spe`: 1 if the spindle turns.
+    SpindleOn,
+    /// `spd`: 1 if it turns counter-clockwise.
+    SpindleDirection,
+    /// `sps`: S, in turns per minute.
+    SpindleSpeed,
+    /// `com`: 1 after M7.
+    Mist,
+    /// `cof`: 1 after M8.
+    Flood,
     /// `tool`: tool number.
     Tool,
     /// `home`: 0 not homed, 1 homed, 2 homing.
@@ -60,6 +72,8 @@ pub enum Value {
     Position(u8),
     /// `ofsx` and so on: work offset, in units of a `Length`.
     Offset(u8),
+    /// `tofx` and so on: tool length, in units of a `Length`.
+    ToolOffset(u8),
     /// `homx` and so on: 1 if the axis is homed.
     Homed(u8),
     /// `pwr1` and so on: 1 if the motor is powered.
@@ -135,9 +149,9 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 22;
+pub const SINGLE_COUNT: usize = 28;
 /// Entries of [`VECTORS`].
-pub const VECTOR_COUNT: usize = 5;
+pub const VECTOR_COUNT: usize = 6;
 
 const NONE: Text = text!("");
 const LINE: Text = text!("Line number:");
@@ -148,17 +162,21 @@ const MACHINE: Text = text!("Initializing|Ready|Alarm|Stop|End|Cycle|Interlock|S
 const COORDINATES: Text = text!(
     "G53 - machine coordinate system|G54 - coordinate system 1|G55 - coordinate system 2|\
      G56 - coordinate system 3|G57 - coordinate system 4|G58 - coordinate system 5|\
-     G59 - coordinate system 6"
+     G59 - coordinate system 6|G59.1|G59.2|G59.3"
 );
 const MOTION: Text = text!(
     "G0  - linear traverse|G1  - linear feed|G2  - clockwise arc feed|\
-     G3  - counter clockwise arc feed|G80 - cancel motion mode (none active)"
+     G3  - counter clockwise arc feed|G80 - cancel motion mode (none active)|\
+     G38.2 - probe|G81|G82|G83|G84|G85|G86|G87|G88|G89|G73|G38.3|G38.4|G38.5"
 );
 const FEED: Text = text!(
     "G93 - inverse time mode|G94 - units-per-minute mode (i.e. feedrate mode)|\
      G95 - units-per-revolution mode"
 );
 const DISTANCE: Text = text!("G90 - absolute distance mode|G91 - incremental distance mode");
+const ARC_DISTANCE: Text =
+    text!("G90.1 - absolute distance mode|G91.1 - incremental distance mode (default mode)");
+const ON: Text = text!("Off|On");
 const PATH: Text = text!("G61 - exact path mode|G61.1 - exact stop mode|G64 - continuous mode");
 
 const fn count(name: &str, value: Value, label: Text, choices: Text) -> Single {
@@ -198,6 +216,12 @@ progmem! {
         count("qi", Value::QueueAdded, NONE, NONE),
         count("qo", Value::QueueRemoved, NONE, NONE),
         count("rx", Value::SlotsFree, NONE, NONE),
+        count("admo", Value::ArcDistance, text!("Arc Distance mode:"), ARC_DISTANCE),
+        count("spe", Value::SpindleOn, text!("Spindle:"), ON),
+        count("spd", Value::SpindleDirection, text!("Spindle direction:"), text!("CW|CCW")),
+        count("sps", Value::SpindleSpeed, text!("Spindle speed:"), NONE),
+        count("com", Value::Mist, text!("Mist coolant:"), ON),
+        count("cof", Value::Flood, text!("Flood coolant:"), ON),
     ];
 
     /// Values of each axis or motor; [`vector_value`] gives the order.
@@ -206,6 +230,7 @@ progmem! {
         vector("pos", Form::Length, 6, text!(" position:")),
         vector("ofs", Form::Length, 6, text!(" work offset:")),
         vector("hom", Form::Count, 6, text!(" axis homing state:")),
+        vector("tof", Form::Length, 6, text!(" tool length:")),
         vector("pwr", Form::Count, 4, NONE),
     ];
 }
@@ -217,6 +242,7 @@ pub fn vector_value(vector: u8, index: u8) -> Value {
         1 => Value::Position(index),
         2 => Value::Offset(index),
         3 => Value::Homed(index),
+        4 => Value::ToolOffset(index),
         _ => Value::Powered(index),
     }
 }

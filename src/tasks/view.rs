@@ -11,6 +11,7 @@ use super::setup::moved_by;
 use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
+use crate::gcode::modal::{Coolant, Turn};
 use crate::hal::imp::{gpio, stepper};
 use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
@@ -89,6 +90,15 @@ impl<'a> View<'a> {
             Value::Plane => modal.plane as i32,
             Value::Path => modal.path as i32,
             Value::Distance => modal.distance as i32,
+            Value::ArcDistance => modal.arc_distance as i32,
+            Value::SpindleOn => i32::from(modal.spindle != Turn::Off),
+            Value::SpindleDirection => i32::from(modal.spindle == Turn::Counterclockwise),
+            Value::SpindleSpeed => model.spindle_speed() as i32,
+            Value::Mist => i32::from(modal.coolant & Coolant::Mist as u8 != 0),
+            Value::Flood => i32::from(modal.coolant & Coolant::Flood as u8 != 0),
+            Value::ToolOffset(axis) => {
+                model.tool_length().get(usize::from(axis)).map_or(0, |length| length.0)
+            }
             Value::FeedMode => modal.feed_mode as i32,
             Value::MotionMode => modal.motion as i32,
             Value::Coordinates => model.coordinate_system().into(),

@@ -98,7 +98,7 @@ const G_TABLE: [Code; G_ROWS] = [
     cycle(810, MotionMode::Drill, 0),
     cycle(820, MotionMode::DrillDwell, bit(P)),
     cycle(830, MotionMode::PeckDrill, bit(Q)),
-    cycle(840, MotionMode::Tap, 0),
+    cycle(840, MotionMode::Tap, bit(P)),
     cycle(850, MotionMode::Bore, 0),
     cycle(860, MotionMode::BoreStop, bit(P)),
     cycle(870, MotionMode::BackBore, OFFSETS),

@@ -112,3 +112,12 @@ fn a_refused_arc_leaves_no_trace() {
     refusal(&["G0 X1", "G18 F5 G2 X5 Z5 R1"]);
     refusal(&["F5 G2 X2 I1", "G91 G92.1 X5 I1"]);
 }
+
+#[test]
+fn circles_stay_within_the_range_of_lengths() {
+    assert_eq!(refusal(&["F800", "G3 Y3 I131515.5"]), Status::OutOfRange);
+    assert_eq!(refusal(&["F800 G0 X200000", "G3 J15000"]), Status::OutOfRange);
+    // The far side of a circle counts only if it is reached.
+    run(&["F800", "G2 Y3 I131515.5"]);
+    run(&["F800 G0 X200000", "G3 J14000"]);
+}

@@ -1,7 +1,7 @@
 //! Modes, feeds, offsets, refusals.
 
 use super::{feed, position, refusal, run};
-use crate::gcode::command::{Commands, Feed, Motion, Stop};
+use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
 use crate::gcode::interpreter::Interpreter;
 use crate::gcode::modal::{
     ArcDistance, Defaults, Distance, FeedMode, Modal, MotionMode, PathMode, Plane, Retract, Turn,
@@ -138,12 +138,14 @@ fn program_end_resets() {
 
 #[test]
 fn a_tool_change_stops_the_spindle() {
-    let (state, out) = run(&["M3 S900", "T1 M6 S800"]);
-    assert_eq!((state.tool(), state.modal().spindle, out.spindle), (1, Turn::Off, None));
-    assert_eq!(run(&["M3 S900", "T1 M6", "S800"]).1.spindle, None);
-    assert_eq!(refusal(&["M3 S900", "T1 M6", "G95 G1 X1 F1"]), Status::SpindleMustTurn);
-    let turns = |lines| run(lines).1.spindle.map(|spindle| (spindle.turn, spindle.speed));
-    assert_eq!(turns(&["M4", "T1 M6 M3 S800"]), Some((Turn::Clockwise, 800.0)));
+    let (state, out) = run(&["M3 S100", "T2 M6 S200"]);
+    assert_eq!((state.tool(), state.modal().spindle), (2, Turn::Off));
+    assert_eq!((out.tool, out.spindle), (Some(2), None));
+    let (_, out) = run(&["M3 S100", "M6", "S300"]);
+    assert!(out.is_empty());
+    let (_, out) = run(&["M3 S100", "M6 M4"]);
+    assert_eq!(out.spindle, Some(Spindle { turn: Turn::Counterclockwise, speed: 100.0 }));
+    assert_eq!(refusal(&["M3", "M6", "F9 G86 X1 Z-1 R1 P0"]), Status::SpindleMustTurn);
 }
 
 #[test]

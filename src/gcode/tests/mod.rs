@@ -1,6 +1,7 @@
 //! Whole lines through the interpreter.
 
 mod arcs;
+mod cycles;
 mod lines;
 mod usual;
 

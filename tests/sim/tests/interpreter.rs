@@ -41,7 +41,6 @@ fn typical_g1_lines_keep_to_the_budget() {
         (&["F800", "G1"], "X10.375"),
         (&["F800"], "G1 X1.25 Y2.5 (roughing)"),
         (&["G91", "F800"], "G1 X.25 Y-.125"),
-        (&["G93"], "G1 X1.5 Y2.5 F60"),
         (&["G20", "F30"], "G1 X0.5 Y0.25"),
     ] {
         let cycles = cost(before, line);

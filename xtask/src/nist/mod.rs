@@ -8,21 +8,29 @@
 //! | [`canon`] | reads a line of its output |
 //! | [`place`] | where the machine is: units, systems, lengths |
 //! | [`motion`] | the normalised motion |
+//! | [`random`] | programs made at random, of [`dice`] |
 //!
 //! The files and their format: `tests/nist/README.md`. Neither the tests nor the checks come here: they
 //! use the motions that lie in the repository.
 
 mod canon;
+mod dice;
 mod fetch;
 mod motion;
 mod oracle;
 mod place;
+mod random;
 
+use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::process::root;
+use oracle::Oracle;
+use random::Program;
+
+use crate::process::{root, run as run_command};
 
 /// What `cargo xtask nist` takes.
 #[derive(clap::Args)]
@@ -30,11 +38,20 @@ pub struct Args {
     /// Write nothing: fail where a motion differs from what the interpreter makes now
     #[arg(long)]
     check: bool,
+    /// Instead, make N programs at random and check that Kerf agrees with the interpreter about them
+    #[arg(long, value_name = "N", conflicts_with = "check")]
+    random: Option<u64>,
+    /// The first program's seed
+    #[arg(long, default_value_t = 1, requires = "random")]
+    seed: u64,
 }
 
 /// Writes or checks the motion of every program.
 pub fn run(args: &Args) -> Result<()> {
     let oracle = fetch::oracle()?;
+    if let Some(count) = args.random {
+        return random(&oracle, args.seed..args.seed + count);
+    }
     let programs = programs()?;
     let (mut refused, mut differ) = (0, 0);
     for program in &programs {
@@ -52,10 +69,32 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
+/// Makes programs, with what the interpreter makes of them, and leaves it to Kerf's tests to compare.
+fn random(oracle: &Oracle, seeds: std::ops::Range<u64>) -> Result<()> {
+    let dir = root().join("target/nist/random");
+    let _ = fs::remove_dir_all(&dir);
+    fs::create_dir_all(&dir)?;
+    let mut refused = 0;
+    for seed in seeds {
+        let program = dir.join(format!("{seed}.ngc"));
+        fs::write(&program, Program::of(seed))?;
+        match oracle.motion(&program) {
+            Ok(motion) => fs::write(program.with_extension("motion"), motion)?,
+            Err(error) => {
+                refused += 1;
+                println!("{}: {error:#}", name(&program));
+            }
+        }
+    }
+    ensure!(refused == 0, "{refused} programs are refused");
+    let test = ["test", "--package", "kerf", "--test", "nist", "--", "--ignored"];
+    run_command(Command::new("cargo").args(test).current_dir(root()))
+}
+
 /// The programs, in the order of their names.
 fn programs() -> Result<Vec<PathBuf>> {
     let dir = root().join("tests/nist");
-    let entries = std::fs::read_dir(&dir).with_context(|| dir.display().to_string())?;
+    let entries = fs::read_dir(&dir).with_context(|| dir.display().to_string())?;
     let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
     files.retain(|file| file.extension().is_some_and(|ending| ending == "ngc"));
     files.sort();
@@ -65,13 +104,13 @@ fn programs() -> Result<Vec<PathBuf>> {
 /// Writes a program's motion unless it is to be checked; says whether it was there as it should be.
 fn store(program: &Path, motion: &str, check: bool) -> Result<bool> {
     let file = program.with_extension("motion");
-    let old = std::fs::read_to_string(&file).unwrap_or_default();
+    let old = fs::read_to_string(&file).unwrap_or_default();
     if old == motion {
         return Ok(true);
     }
     println!("{}: {}", name(&file), difference(&old, motion));
     if !check {
-        std::fs::write(&file, motion).with_context(|| file.display().to_string())?;
+        fs::write(&file, motion).with_context(|| file.display().to_string())?;
     }
     Ok(false)
 }

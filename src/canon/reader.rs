@@ -1,0 +1,177 @@
+//! From lines to canonical commands.
+
+use std::collections::VecDeque;
+use std::string::String;
+
+use super::command::{Canon, Turns};
+use crate::gcode::Interpreter;
+use crate::gcode::command::{Arc, Commands, Feed, Motion, Overrides, Spindle, Stop};
+use crate::gcode::modal::{Coolant, Turn};
+use crate::gcode::setup::Setup;
+use crate::gcode::steps::{Step, Steps};
+use crate::status::Status;
+use crate::units::{AXES, Length, PerAxis};
+
+/// Reads a program line by line; as an iterator it gives the commands of the line that was read last.
+pub struct Reader<S> {
+    setup: S,
+    interpreter: Interpreter,
+    commands: Commands,
+    steps: Steps,
+    /// Where the machine is.
+    place: PerAxis<Length>,
+    /// What the moves before had.
+    rate: Option<Feed>,
+    exact_stop: bool,
+    /// What runs.
+    turn: Turn,
+    coolant: u8,
+    overrides: Overrides,
+    /// Commands of a step that has been taken.
+    ready: VecDeque<Canon>,
+}
+
+impl<S: Setup> Reader<S> {
+    /// At start-up.
+    pub fn new(setup: S) -> Self {
+        let mut interpreter = Interpreter::new();
+        interpreter.start(&setup);
+        Self {
+            setup,
+            interpreter,
+            commands: Commands::default(),
+            steps: Steps::default(),
+            place: [Length::ZERO; AXES],
+            rate: None,
+            exact_stop: false,
+            turn: Turn::Off,
+            coolant: 0,
+            overrides: Overrides::NONE,
+            ready: VecDeque::new(),
+        }
+    }
+
+    /// The interpreter, as the last line has left it.
+    pub fn interpreter(&self) -> &Interpreter {
+        &self.interpreter
+    }
+
+    /// Reads a line without its terminator. The commands of the line before are to have been taken.
+    pub fn read(&mut self, line: &[u8]) -> Result<(), Status> {
+        self.steps = Steps::default();
+        self.ready.clear();
+        let info = self.interpreter.interpret(line, &self.setup, &mut self.commands)?;
+        if let Some((start, end)) = info.message {
+            let text = line.get(start.into()..end.into()).unwrap_or_default();
+            self.ready.push_back(Canon::Message(String::from_utf8_lossy(text).trim().into()));
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, step: Step) {
+        match step {
+            Step::Tool(number) => self.ready.push_back(Canon::Tool(number)),
+            Step::Spindle(spindle) => self.spindle(spindle),
+            Step::Coolant(coolant) => self.coolant(coolant),
+            Step::Overrides(factors) => self.overrides(factors),
+            Step::Dwell(ms) => self.ready.push_back(Canon::Dwell(ms)),
+            Step::Line(target, None) => self.go(Canon::Traverse(target), target, None),
+            Step::Line(target, feed) => self.go(Canon::Feed(target), target, feed),
+            Step::Arc | Step::Probe | Step::Home => self.motion(),
+            Step::SetPosition(position) => {
+                self.place = position;
+                self.ready.push_back(Canon::SetPosition(position));
+            }
+            Step::Stop(Stop::End) => self.end(),
+            Step::Stop(_) => self.ready.push_back(Canon::Stop),
+        }
+    }
+
+    fn motion(&mut self) {
+        match self.commands.motion {
+            Motion::Arc { target, feed, arc } => {
+                let turns = turns(&arc);
+                self.go(Canon::Arc(target, arc, turns), target, Some(feed));
+            }
+            Motion::Probe { target, feed, mode } => {
+                self.go(Canon::Probe(target, mode), target, Some(feed));
+            }
+            Motion::Home { axes, set } => self.ready.push_back(Canon::Home(axes, set)),
+            _ => {}
+        }
+    }
+
+    /// A move, and before it what it is to be like.
+    fn go(&mut self, command: Canon, target: PerAxis<Length>, feed: Option<Feed>) {
+        if self.exact_stop != self.commands.exact_stop {
+            self.exact_stop = self.commands.exact_stop;
+            self.ready.push_back(Canon::ExactStop(self.exact_stop));
+        }
+        if let Some(feed) = feed
+            && self.rate != Some(feed)
+        {
+            self.rate = Some(feed);
+            self.ready.push_back(Canon::Rate(feed));
+        }
+        self.ready.push_back(command);
+        self.place = target;
+    }
+
+    fn spindle(&mut self, spindle: Spindle) {
+        self.turn = spindle.turn;
+        // Off is off at any speed.
+        let spindle = if spindle.turn == Turn::Off { Spindle::default() } else { spindle };
+        self.ready.push_back(Canon::Spindle(spindle));
+    }
+
+    fn coolant(&mut self, coolant: u8) {
+        let changed = self.coolant ^ coolant;
+        self.coolant = coolant;
+        for (which, command) in [
+            (Coolant::Mist, Canon::Mist as fn(bool) -> Canon),
+            (Coolant::Flood, Canon::Flood as fn(bool) -> Canon),
+        ] {
+            let bit = which as u8;
+            if changed & bit != 0 {
+                self.ready.push_back(command(coolant & bit != 0));
+            }
+        }
+    }
+
+    fn overrides(&mut self, factors: Overrides) {
+        self.overrides = factors;
+        self.ready.push_back(Canon::Overrides(factors));
+    }
+
+    /// The machine is left with everything off.
+    fn end(&mut self) {
+        if self.turn != Turn::Off {
+            self.spindle(Spindle::default());
+        }
+        self.coolant(0);
+        if self.overrides != Overrides::NONE {
+            self.overrides(Overrides::NONE);
+        }
+        self.ready.push_back(Canon::End);
+    }
+}
+
+/// A turn that is begun counts: an arc has one and those beyond it, as has a full circle.
+fn turns(arc: &Arc) -> Turns {
+    let turns = 1 + Turns::from(arc.extra_turns);
+    if arc.clockwise { -turns } else { turns }
+}
+
+impl<S: Setup> Iterator for Reader<S> {
+    type Item = Canon;
+
+    fn next(&mut self) -> Option<Canon> {
+        loop {
+            if let Some(command) = self.ready.pop_front() {
+                return Some(command);
+            }
+            let step = self.steps.next(&self.commands, &self.place)?;
+            self.step(step);
+        }
+    }
+}

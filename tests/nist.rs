@@ -1,0 +1,167 @@
+//! Kerf's motions against those of another interpreter: `tests/nist`.
+
+#[path = "support/differences.rs"]
+mod differences;
+#[path = "support/motion_text.rs"]
+mod motion_text;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use differences::{DIFFERENCES, Difference, edited};
+use kerf::canon::Reader;
+use kerf::gcode::setup::{AxisMode, Setup};
+use kerf::units::Length;
+use motion_text::MotionText;
+
+/// How far coordinates may be apart, mm: the other interpreter's are exact to half of its last decimal in
+/// the program's unit, and they are sums.
+const MM: f64 = 0.000_101;
+const INCH: f64 = 0.002;
+/// Of many offsets, written in both units.
+const SUMS: f64 = 0.01;
+
+/// The machine of the other interpreter: as usual, but that it reads lines with a slash.
+struct Other;
+
+impl Setup for Other {
+    fn mode(&self, _axis: u8) -> AxisMode {
+        AxisMode::Standard
+    }
+    fn radius(&self, _axis: u8) -> u32 {
+        1
+    }
+    fn travel(&self, _axis: u8) -> Option<(Length, Length)> {
+        None
+    }
+    fn deletes_blocks(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn motions_agree() {
+    let mut programs = programs("tests/nist");
+    programs.retain(|file| !file.file_name().unwrap().to_string_lossy().starts_with("own_"));
+    assert!(programs.len() > 70);
+    check(&programs, |program| if program.contains("G20") { INCH } else { MM });
+}
+
+/// `cargo xtask nist --random N` makes the programs.
+#[test]
+#[ignore = "needs programs that are made at random"]
+fn random_motions_agree() {
+    let programs = programs("target/nist/random");
+    assert!(!programs.is_empty());
+    check(&programs, |_| SUMS);
+}
+
+fn check(programs: &[PathBuf], slack: impl Fn(&str) -> f64) {
+    let faults: Vec<_> = programs.iter().filter_map(|program| fault(program, &slack)).collect();
+    assert!(faults.is_empty(), "{} differ:\n{}", faults.len(), faults.join("\n"));
+}
+
+/// No difference is of a program that there is no more.
+#[test]
+fn differences_are_of_programs() {
+    let programs = programs("tests/nist");
+    for Difference { name, .. } in DIFFERENCES {
+        assert!(programs.iter().any(|program| program.ends_with(format!("{name}.ngc"))), "{name}");
+    }
+}
+
+/// The programs in a folder of the repository.
+fn programs(folder: &str) -> Vec<PathBuf> {
+    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let files = fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path());
+    let mut programs: Vec<_> =
+        files.filter(|file| file.extension().is_some_and(|ending| ending == "ngc")).collect();
+    programs.sort();
+    programs
+}
+
+/// In what the motions of a program differ, beyond what they are meant to.
+fn fault(file: &Path, slack: impl Fn(&str) -> f64) -> Option<String> {
+    let name = file.file_stem()?.to_str()?;
+    let mut program = fs::read_to_string(file).unwrap();
+    let mut theirs = fs::read_to_string(file.with_extension("motion")).unwrap();
+    if let Some(Difference { why, program: lines, motion, .. }) = Difference::of(name) {
+        program = edited(program, lines, why);
+        theirs = edited(theirs, motion, why);
+    }
+    let ours = match motion(&program) {
+        Ok(motion) => motion,
+        Err(refusal) => return Some(format!("{name}: {refusal}")),
+    };
+    let slack = slack(&program);
+    let (ours, theirs) = (moves(&ours, slack), moves(&theirs, slack));
+    let (mut ours, mut theirs) = (ours.into_iter(), theirs.into_iter());
+    for number in 1.. {
+        match (ours.next(), theirs.next()) {
+            (None, None) => return None,
+            (Some(our), Some(their)) if agree(our, their, slack) => {}
+            (our, their) => {
+                let [our, their] = [our, their].map(|line| line.unwrap_or("nothing"));
+                return Some(format!("{name}: motion {number}\n    is {our}\n    of {their}"));
+            }
+        }
+    }
+    None
+}
+
+/// The motion that Kerf makes of a program. After each line its state is what the motion has led to.
+fn motion(program: &str) -> Result<String, String> {
+    let mut reader = Reader::new(Other);
+    let mut motion = MotionText::default();
+    for (number, line) in (1..).zip(program.lines()) {
+        let read = reader.read(line.as_bytes());
+        read.map_err(|status| format!("line {number}: {status:?}: {line}"))?;
+        for command in &mut reader {
+            motion.take(&command);
+        }
+        motion.check(reader.interpreter());
+    }
+    Ok(motion.text)
+}
+
+/// A motion without straight moves that rounding alone has made.
+fn moves(motion: &str, slack: f64) -> Vec<&str> {
+    let mut place = "0.0000 0.0000 0.0000 0.0000 0.0000 0.0000";
+    let mut moves = Vec::new();
+    for line in motion.lines() {
+        let straight = line.strip_prefix("TRAVERSE ").or(line.strip_prefix("FEED "));
+        if !straight.is_some_and(|to| agree(to, place, slack)) {
+            moves.push(line);
+        }
+        place = straight.or_else(|| end(line)).unwrap_or(place);
+    }
+    moves
+}
+
+/// The end of a probing or an arc, which has plane and centre beside it.
+fn end(line: &str) -> Option<&str> {
+    if let Some(end) = line.strip_prefix("PROBE ") {
+        return Some(end);
+    }
+    let arc = line.strip_prefix("ARC ")?.split_once(' ')?.1;
+    let (last, _) = arc.match_indices(' ').nth(5)?;
+    arc.get(..last)
+}
+
+/// Whether two lines say the same, their numbers within `slack`.
+fn agree(our: &str, their: &str, slack: f64) -> bool {
+    let (mut our, mut their) = (our.split(' '), their.split(' '));
+    loop {
+        match (our.next(), their.next()) {
+            (None, None) => return true,
+            (Some(our), Some(their)) if our == their => {}
+            (Some(our), Some(their)) if our.contains('.') => {
+                match (our.parse::<f64>(), their.parse::<f64>()) {
+                    (Ok(our), Ok(their)) if (our - their).abs() <= slack => {}
+                    _ => return false,
+                }
+            }
+            _ => return false,
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Where Kerf makes something else of a program in `tests/nist` on purpose: what, and why.
+
+/// What is to be replaced, and by what; it must be there once.
+type Edit = [&'static str; 2];
+
+/// A program that Kerf takes otherwise.
+pub struct Difference {
+    pub name: &'static str,
+    pub why: &'static str,
+    /// The program, as Kerf takes it.
+    pub program: &'static [Edit],
+    /// The motion that Kerf makes of it.
+    pub motion: &'static [Edit],
+}
+
+/// All of them.
+pub const DIFFERENCES: &[Difference] = &[
+    Difference {
+        name: "cycle_73",
+        why: SLANT,
+        program: &[],
+        motion: &[[
+            "TRAVERSE 20.0000 5.0000 10.0000 0.0000 0.0000 0.0000\nTRAVERSE 20",
+            "TRAVERSE 20",
+        ]],
+    },
+    Difference {
+        name: "cycle_83",
+        why: SLANT,
+        program: &[],
+        motion: &[[
+            "TRAVERSE 20.0000 5.0000 10.0000 0.0000 0.0000 0.0000\nTRAVERSE 20",
+            "TRAVERSE 20",
+        ]],
+    },
+    Difference {
+        name: "cycle_repeat",
+        why: SLANT,
+        program: &[],
+        motion: &[[
+            "TRAVERSE 15.0000 5.0000 3.0000 0.0000 0.0000 0.0000\nTRAVERSE 20.",
+            "TRAVERSE 15.0000 5.0000 3.0000 0.0000 0.0000 0.0000\n\
+             TRAVERSE 15.0000 5.0000 4.0000 0.0000 0.0000 0.0000\n\
+             TRAVERSE 20.",
+        ]],
+    },
+    Difference {
+        name: "cycle_repeat_incremental",
+        why: "RS274/NGC: with G91, R is counted from the present place, not from where the series \
+              began",
+        program: &[],
+        motion: &[[
+            "FEED 6.0000 2.0000 2.0000 0.0000 0.0000 0.0000\n\
+             TRAVERSE 6.0000 2.0000 4.0000 0.0000 0.0000 0.0000\n",
+            "TRAVERSE 6.0000 2.0000 3.0000 0.0000 0.0000 0.0000\n\
+             FEED 6.0000 2.0000 1.0000 0.0000 0.0000 0.0000\n\
+             TRAVERSE 6.0000 2.0000 3.0000 0.0000 0.0000 0.0000\n",
+        ]],
+    },
+    Difference {
+        name: "end_lines",
+        why: "a sender's lines are a stream: those after the end of a program are those of the next",
+        program: &[],
+        motion: &[["END\n", "END\nTRAVERSE 2.0000 0.0000 0.0000 0.0000 0.0000 0.0000\n"]],
+    },
+    Difference {
+        name: "end_percent",
+        why: "a sender's lines are a stream: `%` ends nothing",
+        program: &[],
+        motion: &[[
+            "TRAVERSE 2.0000 0.0000 0.0000 0.0000 0.0000 0.0000\n",
+            "TRAVERSE 2.0000 0.0000 0.0000 0.0000 0.0000 0.0000\n\
+             TRAVERSE 3.0000 0.0000 0.0000 0.0000 0.0000 0.0000\nEND\n",
+        ]],
+    },
+    Difference {
+        name: "motion_modal",
+        why: "RS274/NGC: G80 and G0 are of one modal group, of which a line has one (133)",
+        program: &[["G80 G0 X5", "G80\nG0 X5"]],
+        motion: &[],
+    },
+    Difference {
+        name: "tool_offset_axes",
+        why: "tools have lengths along X and Z alone, for mills and lathes: memory (136)",
+        program: &[["X1 Y2 Z3", "X1 Z3"]],
+        motion: &[[
+            "TRAVERSE 2.0000 3.0000 1.0000 0.0000 0.0000 0.0000\n\
+             TRAVERSE 2.0000 3.0000 4.0000 0.0000 0.0000 0.0000\n\
+             TRAVERSE 5.0000 3.0000 4.0000",
+            "TRAVERSE 2.0000 1.0000 4.0000 0.0000 0.0000 0.0000\n\
+             TRAVERSE 5.0000 1.0000 4.0000",
+        ]],
+    },
+    Difference {
+        name: "turns",
+        why: "RS274/NGC has no P with arcs: as in TinyG, it is the full turns beyond a part of one; \
+              with the other interpreter, the turns begun. Of full circles it is the same",
+        program: &[],
+        motion: &[
+            [
+                "6.0000 0.0000 0.0000 0.0000 0.0000 0.0000 2\n",
+                "6.0000 0.0000 0.0000 0.0000 0.0000 0.0000 3\n",
+            ],
+            [" -1\n", " -2\n"],
+            [" -3\n", " -4\n"],
+            ["5.0000 -2\n", "5.0000 -3\n"],
+            [" 4\n", " 5\n"],
+        ],
+    },
+];
+
+const SLANT: &str = "RS274/NGC: up to R at the old place, if it is below; across the plane; to R. \
+                     Here the other interpreter goes over and up at once (`own_cycle_series`, \
+                     `own_cycle_rise`)";
+
+impl Difference {
+    /// That of a program.
+    pub fn of(name: &str) -> Option<&'static Self> {
+        DIFFERENCES.iter().find(|difference| difference.name == name)
+    }
+}
+
+/// A text with its edits.
+pub fn edited(mut text: String, edits: &[Edit], why: &str) -> String {
+    for [old, new] in edits {
+        assert_eq!(text.matches(old).count(), 1, "{old:?} to {new:?}: {why}");
+        text = text.replacen(old, new, 1);
+    }
+    text
+}
