@@ -197,8 +197,10 @@ impl Cycle {
             // 16 by 15 bits, and 15.
             let rest = i32::from(from.rest) + number * i32::from(pitch.rest);
             let carry = (rest + HALF).div_euclid(2 * HALF);
-            let way = pitch.units.0.checked_mul(number)?.checked_add(carry)?;
-            let units = from.units.checked_add(Length(way))?;
+            // In 64 bits: on AVR `checked_mul` of an `i32` calls a routine that writes 32 bits where the
+            // compiler has left 16 for it.
+            let way = i64::from(pitch.units.0) * i64::from(number) + i64::from(carry);
+            let units = from.units.checked_add(Length(i32::try_from(way).ok()?))?;
             Some(Value { units, rest: (rest - carry * 2 * HALF) as i16 })
         };
         let [first, second] = [0, 1].map(|i| along(*self.from.get(i)?, *self.pitch.get(i)?));

@@ -1,13 +1,17 @@
-//! Refuses an image with slow arithmetic in it.
+//! Refuses an image with slow or wrong arithmetic in it.
 //!
 //! avr-libc's and libgcc's hand-written routines win only while they come before
 //! `compiler_builtins` in link order. When that is lost everything still works, five times slower.
+//! `i32::checked_mul` and its like call `__mulosi4`, to which the compiler passes the place of a C `int` for the
+//! overflow. That has 16 bits on AVR, and `compiler_builtins` writes 32: over whatever lies behind it on
+//! the stack, such as the caller's frame pointer.
 
 use anyhow::{Result, ensure};
 
 use super::Image;
 
-/// Fails when the image contains Rust's soft float, or any `f64` or 128-bit arithmetic.
+/// Fails when the image contains Rust's soft float, any `f64` or 128-bit arithmetic, or what overwrites the
+/// stack.
 pub fn check(image: &Image) -> Result<()> {
     let found: Vec<_> = image.named(is_forbidden).map(|s| format!("  {}", s.name)).collect();
     ensure!(
@@ -15,7 +19,8 @@ pub fn check(image: &Image) -> Result<()> {
         "{} contains arithmetic that must not be in firmware:\n{}\n\
          `compiler_builtins::float` means that the link order was lost which puts avr-libc's and \
          libgcc's routines first;\n`df` and `ti` routines mean that something computes in \
-         `f64` or 128 bits.",
+         `f64` or 128 bits.\n`__mulosi4` and `__mulodi4` overwrite the stack: nothing may check \
+         whether a signed product of 32 or 64 bits overflows.",
         image.path.display(),
         found.join("\n")
     );
@@ -24,7 +29,7 @@ pub fn check(image: &Image) -> Result<()> {
 
 fn is_forbidden(name: &str) -> bool {
     let routine = name.rsplit("::").next().unwrap_or(name);
-    is_rust_float(name) || is_double(routine) || is_wide(routine)
+    is_rust_float(name) || is_double(routine) || is_wide(routine) || is_wrong(routine)
 }
 
 fn is_rust_float(name: &str) -> bool {
@@ -46,6 +51,10 @@ fn is_double(routine: &str) -> bool {
 fn is_wide(routine: &str) -> bool {
     let body = routine.strip_prefix("__").map(|body| body.trim_end_matches(['2', '3', '4', 'o']));
     body.is_some_and(|stem| stem.ends_with("ti")) || routine.starts_with("u128_div_rem")
+}
+
+fn is_wrong(routine: &str) -> bool {
+    matches!(routine, "__mulosi4" | "__mulodi4")
 }
 
 #[cfg(test)]
@@ -76,6 +85,13 @@ mod tests {
             assert!(is_forbidden(name), "{name}");
         }
         assert!(is_forbidden("compiler_builtins::int::specialized_div_rem::u128_div_rem"));
+    }
+
+    #[test]
+    fn what_overwrites_the_stack_is_forbidden() {
+        for name in ["__mulosi4", "compiler_builtins::int::mul::__mulodi4"] {
+            assert!(is_forbidden(name), "{name}");
+        }
     }
 
     #[test]
