@@ -10,18 +10,22 @@ use embassy_sync::mutex::Mutex;
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
+use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{stepper, uart};
 use crate::hal::ring::Producer;
 use crate::hal::serial::{Outgoing, Received};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Mode, StatusReport};
+use crate::store::Log;
+use crate::store::kept::{self, Kept};
 use crate::tasks::lines::LinePool;
 use crate::tasks::links::{Links, QueueCount};
+use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_outputs;
 use crate::tasks::wake::{News, Wake};
-use crate::tasks::{control, exec, parser, planner, power, reader, reporter};
+use crate::tasks::{control, exec, parser, planner, power, reader, reporter, storage};
 
 impl Links {
     fn new(tx: Outgoing, rate: u32) -> Self {
@@ -40,6 +44,7 @@ impl Links {
             settings_changed: Cell::new(true),
             rate: Cell::new(None),
             exception: Cell::new(None),
+            storage: Storage::new(),
             mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),
             tx: Mutex::new(Tx::new(tx, rate)),
@@ -74,6 +79,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     let (queue, source) = queue::store().split()?;
     let links = place(outgoing, rate);
     links.settings.borrow_mut().set_defaults();
+    let log = recall(links);
     set_outputs(&links.settings.borrow());
     links.model.borrow_mut().start(&*links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);
@@ -83,7 +89,19 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     main.spawn(power_task(links).ok()?);
     main.spawn(parser_task(links).ok()?);
     main.spawn(control_task(links).ok()?);
+    main.spawn(storage_task(links, log).ok()?);
     Some(())
+}
+
+/// Takes over what was put away before the reset.
+#[inline(never)]
+fn recall(links: &Links) -> Log {
+    let memory = Eeprom::take();
+    let log = Log::open(&memory);
+    let (mut settings, mut model) = (links.settings.borrow_mut(), links.model.borrow_mut());
+    let mut kept = Kept { settings: &mut settings, tables: model.tables_mut() };
+    kept::load(&log, &memory, &mut kept);
+    log
 }
 
 /// Declares tasks: one of each on AVR; on the host each machine that is made gets its own.
@@ -113,4 +131,5 @@ tasks! {
     fn control_task(links: &'static Links) = control::run;
     fn power_task(links: &'static Links) = power::run;
     fn parser_task(links: &'static Links) = parser::run;
+    fn storage_task(links: &'static Links, log: Log) = storage::run;
 }

@@ -25,5 +25,6 @@ pub mod progmem;
 pub mod protocol;
 pub mod realtime;
 pub mod status;
+pub mod store;
 pub mod tasks;
 pub mod units;

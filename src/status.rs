@@ -15,6 +15,7 @@ pub enum Status {
     Initializing = 15,
     InternalError = 20,
     ExceptionReport = 29,
+    PersistenceError = 34,
     UnrecognizedName = 100,
     MalformedCommand = 101,
     BadNumber = 102,

@@ -223,3 +223,26 @@ fn the_steppers_are_told_what_the_drivers_want() {
     sender.ask("g1 f500 x1\n{spw:7}\n", 50);
     assert_eq!(kerf::hal::imp::stepper::step_output(), (5, 0b0010));
 }
+
+#[test]
+fn settings_and_offsets_survive_a_reset() {
+    // The whole machine: what one boot leaves, the next finds.
+    let contents = {
+        let mut sender = Sender::boot();
+        for line in ["{xvm:1234}", "{1mi:16}", "{gun:0}", "g10 l2 p1 x1.5", "g28.1", "{si:200}"] {
+            sender.ask(&format!("{line}\n"), 300);
+        }
+        sender.machine.run_ms(3_000);
+        kerf::hal::imp::eeprom::contents()
+    };
+    std::thread::spawn(move || {
+        kerf::hal::imp::eeprom::put(&contents);
+        let mut sender = Sender::boot();
+        let answer = sender.ask("{xvm:n,1mi:n,gun:n,si:n,unit:n,ofsx:n,posx:n}\n", 300);
+        let expected = "{\"r\":{\"xvm\":49,\"1mi\":16,\"gun\":0,\"si\":200,\"unit\":0,\"ofsx\":1.500,\
+                        \"posx\":-0.059},\"f\":[1,0,7]}";
+        assert_eq!(answer.lines().next(), Some(expected));
+    })
+    .join()
+    .unwrap();
+}

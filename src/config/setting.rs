@@ -2,8 +2,8 @@
 
 use super::name::{Name, axis_letter, axis_of};
 use super::table::{
-    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, HOMING, IDLE, Kind, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS,
-    RADIUS, Row, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS,
+    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, HOMING, IDLE, Kind, MODE, MOTOR, MOTOR_DEFAULTS,
+    MOTOR_ROWS, RADIUS, Row, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS,
 };
 use crate::boards::MOTORS;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -166,6 +166,19 @@ impl Setting {
         let row = self.row();
         let large = self.owner() == Owner::System && row.kind == Kind::Large;
         large && row.slot == table::system::BAUD
+    }
+
+    /// Whether it is to survive a power cut: all but constants, and the rate of the line, which one could be
+    /// locked out with.
+    pub fn is_kept(self) -> bool {
+        matches!(self.row().kind, Kind::Small | Kind::Large) && !self.is_baud()
+    }
+
+    /// Whether it can have this value, scaled as kept.
+    pub fn accepts(self, value: i32) -> bool {
+        let row = self.row();
+        let linear_mode = row.is(MODE) && !self.owner().is_rotary();
+        (row.min..=row.max - i32::from(linear_mode)).contains(&value)
     }
 
     /// Whether it is the width of step pulses.

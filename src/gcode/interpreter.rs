@@ -31,6 +31,8 @@ pub struct Info {
     pub deleted: bool,
     /// There was a comment.
     pub commented: bool,
+    /// The values of the tables that it has changed: the first, and how many ([`Edit::values`]).
+    pub edited: Option<(u8, u8)>,
 }
 
 /// The state of the G-code interpreter.
@@ -49,6 +51,13 @@ impl Interpreter {
     /// Starts in the modes that the machine starts in.
     pub fn start(&mut self, setup: &impl Setup) {
         self.state.modal = Modal::new(&setup.defaults());
+        // Nothing else shifts the origin yet, so that the sum is within the range.
+        let _ = self.state.update_origin(self.tables.system(self.state.modal.system));
+    }
+
+    /// The tables, to be filled before it starts.
+    pub fn tables_mut(&mut self) -> &mut Tables {
+        &mut self.tables
     }
 
     /// Interprets one line without its terminator, for a machine that is `setup` so.
@@ -90,9 +99,9 @@ impl Interpreter {
         let mut block = Block::new();
         let deletes = setup.deletes_blocks();
         block.read(line, deletes)?;
-        self.execute_or_undo(&block, setup, out)?;
+        let edited = self.execute_or_undo(&block, setup, out)?;
         let Block { message, slashed, commented, .. } = block;
-        Ok(Info { message, deleted: slashed && deletes, commented })
+        Ok(Info { message, deleted: slashed && deletes, commented, edited })
     }
 
     #[inline(never)]
@@ -101,12 +110,12 @@ impl Interpreter {
         block: &Block,
         setup: &impl Setup,
         out: &mut Commands,
-    ) -> Result<(), Status> {
+    ) -> Result<Option<(u8, u8)>, Status> {
         block.check(self.state.modal.motion)?;
         if block.is_rare() || self.state.is_in_cycle(block) {
             return self.execute_rarity(block, setup, out);
         }
-        self.execute_usual(block, setup, out)
+        self.execute_usual(block, setup, out).map(|()| None)
     }
 
     /// Executes a block of modes, the feed, and the position of the axes that it names, or nothing of it.
@@ -133,18 +142,21 @@ impl Interpreter {
         block: &Block,
         setup: &impl Setup,
         out: &mut Commands,
-    ) -> Result<(), Status> {
+    ) -> Result<Option<(u8, u8)>, Status> {
         let before = self.state;
         let mut edit = Edit::None;
         let done = self.state.execute_rarity(block, &self.tables, setup, out, &mut edit);
         match done {
-            Ok(()) => self.tables.apply(&edit),
-            Err(_) => {
+            Ok(()) => {
+                self.tables.apply(&edit);
+                Ok(edit.values())
+            }
+            Err(status) => {
                 self.state = before;
                 out.clear();
+                Err(status)
             }
         }
-        done
     }
 }
 

@@ -8,6 +8,8 @@ use crate::units::{AXES, Length, PerAxis};
 
 /// Coordinate systems, G54 to G59.3.
 pub const SYSTEMS: usize = 9;
+/// Stored positions, of G28 and G30.
+pub const STORED: usize = 2;
 /// Tools with offsets, from number 1.
 pub const TOOLS: usize = 10;
 
@@ -38,9 +40,12 @@ pub struct Tables {
     /// Machine coordinates of the origins of G54 to G59.3.
     systems: [PerAxis<Length>; SYSTEMS],
     /// The positions of G28 and G30, machine coordinates.
-    stored: [PerAxis<Length>; 2],
+    stored: [PerAxis<Length>; STORED],
     tools: [Tool; TOOLS],
 }
+
+/// Numbers in all tables: systems, stored positions, tools; axis by axis.
+pub const VALUES: usize = (SYSTEMS + STORED) * AXES + 2 * TOOLS;
 
 /// A change of one entry.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -62,12 +67,28 @@ impl Default for Tables {
     }
 }
 
+impl Edit {
+    /// The first of the [`VALUES`] that it changes, and how many.
+    pub fn values(&self) -> Option<(u8, u8)> {
+        let axes = AXES as u8;
+        match *self {
+            Edit::None => None,
+            Edit::System(number, _) => Some((number * axes, axes)),
+            Edit::Stored(which, _) => Some(((SYSTEMS as u8 + which) * axes, axes)),
+            Edit::Tool(number, _) => {
+                let first = (SYSTEMS + STORED) as u8 * axes;
+                Some((first + number.wrapping_sub(1) * 2, 2))
+            }
+        }
+    }
+}
+
 impl Tables {
     /// All zeros.
     pub const fn new() -> Self {
         Self {
             systems: [[Length::ZERO; AXES]; SYSTEMS],
-            stored: [[Length::ZERO; AXES]; 2],
+            stored: [[Length::ZERO; AXES]; STORED],
             tools: [Tool::NONE; TOOLS],
         }
     }
@@ -87,6 +108,40 @@ impl Tables {
         let Some(index) = number.checked_sub(1) else { return Ok(Tool::NONE) };
         let tool = usize::try_from(index).ok().and_then(|index| self.tools.get(index));
         tool.copied().ok_or(Status::HWordInvalid)
+    }
+
+    /// Value `index` of [`VALUES`].
+    pub fn value(&self, index: u8) -> Length {
+        let index = usize::from(index);
+        let (row, axis) = (index / AXES, index % AXES);
+        let mut vectors = self.systems.iter().chain(&self.stored);
+        if row < SYSTEMS + STORED {
+            return vectors.nth(row).and_then(|all| all.get(axis)).copied().unwrap_or_default();
+        }
+        let index = index - (SYSTEMS + STORED) * AXES;
+        let tool = self.tools.get(index / 2).copied().unwrap_or(Tool::NONE);
+        if index % 2 == 0 { tool.x } else { tool.z }
+    }
+
+    /// Sets value `index` of [`VALUES`].
+    pub fn set(&mut self, index: u8, value: Length) {
+        if let Some(place) = self.place(index) {
+            *place = value;
+        }
+    }
+
+    fn place(&mut self, index: u8) -> Option<&mut Length> {
+        let index = usize::from(index);
+        let (row, axis) = (index / AXES, index % AXES);
+        if row < SYSTEMS {
+            return self.systems.get_mut(row)?.get_mut(axis);
+        }
+        if row < SYSTEMS + STORED {
+            return self.stored.get_mut(row - SYSTEMS)?.get_mut(axis);
+        }
+        let index = index - (SYSTEMS + STORED) * AXES;
+        let tool = self.tools.get_mut(index / 2)?;
+        Some(if index % 2 == 0 { &mut tool.x } else { &mut tool.z })
     }
 
     /// Changes an entry.

@@ -10,7 +10,7 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 69;
+const ENTRIES: usize = 70;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
@@ -21,6 +21,7 @@ progmem! {
         (Status::Initializing, text!("Initializing")),
         (Status::InternalError, text!("Internal error")),
         (Status::ExceptionReport, text!("Generic exception report")),
+        (Status::PersistenceError, text!("Persistence error")),
         (Status::UnrecognizedName, text!("Unrecognized command or config name")),
         (Status::MalformedCommand, text!("Invalid or malformed command")),
         (Status::BadNumber, text!("Bad number format")),

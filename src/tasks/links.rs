@@ -24,6 +24,7 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::Mutex;
 
 use super::lines::LinePool;
+use super::storage::Storage;
 use super::tx::Tx;
 use super::wake::{News, Wake};
 use crate::config::Settings;
@@ -72,6 +73,8 @@ pub struct Links {
     pub tx: Mutex<NoopRawMutex, Tx>,
     /// The sender asks whether anybody is there: control sets it, the reporter answers.
     pub enquiry: Cell<bool>,
+    /// What has to be put away.
+    pub storage: Storage,
     /// A setting has changed since the planner looked.
     pub settings_changed: Cell<bool>,
     /// Settings in force.

@@ -12,6 +12,7 @@ mod printing;
 pub mod reader;
 pub mod reporter;
 mod setup;
+pub mod storage;
 pub mod tx;
 pub mod view;
 pub mod wake;

@@ -11,6 +11,7 @@ use super::tx::Tx;
 use super::view::View;
 use crate::protocol::{Mode, Next, Request, Span, is_brief, put_brief};
 use crate::status::Status;
+use crate::store::kept::Item;
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
@@ -168,6 +169,9 @@ fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
     match done {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
+            if let Some((first, count)) = info.edited {
+                links.storage.note(Item::of_table(first), count.into());
+            }
             if !commands.is_empty() {
                 links.commands_taken.set(true);
                 links.planner_wake.signal();

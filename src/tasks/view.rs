@@ -18,6 +18,7 @@ use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
 use crate::protocol::{Machine, StatusReport, Value, Warning, thousandths};
 use crate::status::Status;
+use crate::store::kept::Item;
 use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
@@ -78,6 +79,14 @@ impl<'a> View<'a> {
             .unwrap_or(programmed)
     }
 
+    /// A setting is to be put away; if it has `lowered` others, all of them.
+    fn note(&self, setting: Setting, lowered: bool) {
+        match lowered {
+            true => self.links.storage.note(0, Setting::NUMBERS.into()),
+            false => self.links.storage.note(Item::of_setting(setting), 1),
+        }
+    }
+
     fn offset(&self, axis: usize) -> Length {
         self.links.model.borrow().work_offset().get(axis).copied().unwrap_or(Length::ZERO)
     }
@@ -129,6 +138,7 @@ impl Machine for View<'_> {
         let rate = |motors| drivers.step_rate_max(motors) as u32;
         let lowered = self.settings.limit_velocity(setting, rate);
         self.links.settings_changed.set(true);
+        self.note(setting, lowered);
         set_outputs(&self.settings);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
     }

@@ -9,6 +9,7 @@
 //!
 //! Everything else runs in thread mode, from `executor::run`.
 
+pub mod eeprom;
 pub mod exec;
 pub mod executor;
 pub mod gpio;

@@ -5,6 +5,7 @@
 //! [`Machine`] moves the clock from one such event to the next and runs the same tasks, rings and step
 //! generator as the image.
 
+pub mod eeprom;
 pub mod exec;
 pub mod gpio;
 mod machine;

@@ -1,0 +1,63 @@
+//! The EEPROM of a machine: bytes, of which a write takes 3.4 ms.
+
+use core::cell::{Cell, RefCell};
+use std::vec::Vec;
+
+use super::now;
+use crate::store::Memory;
+
+/// Cycles that a write takes.
+const WRITE_CYCLES: u64 = 54_400;
+
+/// What a machine of this thread finds in its EEPROM, and leaves there.
+struct Cells {
+    bytes: RefCell<Vec<u8>>,
+    busy_until: Cell<u64>,
+}
+
+machine_static! {
+    fn cells() -> Cells = Cells { bytes: RefCell::new(Vec::new()), busy_until: Cell::new(0) };
+}
+
+/// What is in the EEPROM of this thread's machine.
+pub fn contents() -> Vec<u8> {
+    let mut bytes = cells().bytes.borrow().clone();
+    bytes.resize(usize::from(Eeprom::SIZE), 0xFF);
+    bytes
+}
+
+/// Puts something there before the machine boots.
+pub fn put(contents: &[u8]) {
+    *cells().bytes.borrow_mut() = contents.to_vec();
+}
+
+/// The EEPROM.
+pub struct Eeprom(());
+
+impl Eeprom {
+    /// The EEPROM of this thread's machine.
+    pub fn take() -> Self {
+        Self(())
+    }
+}
+
+impl Memory for Eeprom {
+    const SIZE: u16 = 4_096;
+
+    fn read(&self, at: u16) -> u8 {
+        cells().bytes.borrow().get(usize::from(at)).copied().unwrap_or(0xFF)
+    }
+
+    fn is_busy(&self) -> bool {
+        now() < cells().busy_until.get()
+    }
+
+    fn write(&mut self, at: u16, byte: u8) {
+        let mut bytes = cells().bytes.borrow_mut();
+        bytes.resize(usize::from(Self::SIZE), 0xFF);
+        if let Some(cell) = bytes.get_mut(usize::from(at)) {
+            *cell = byte;
+        }
+        cells().busy_until.set(now() + WRITE_CYCLES);
+    }
+}

@@ -1,0 +1,203 @@
+//! The ring of records.
+//!
+//! Between writes one invariant holds: the slot behind the newest record, the gap, holds nothing of worth. A record
+//! goes into the gap. Before that the slot behind the gap, which becomes the next gap, is cleared: if
+//! its record is the newest of its item, it is written anew, into the gap. So each write of an item takes one
+//! record and as many others as have to make room: one and a half on average while half of the slots count.
+//!
+//! Cost on AVR: 40 cycles for each slot looked at, of 372: up to 15,000 for the newest record of an item.
+
+use super::Memory;
+use super::record::{self, BEGUN, Record, SIZE};
+
+/// Where the next record goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Log {
+    /// The gap.
+    gap: u16,
+    /// The number of the next record.
+    next: u16,
+}
+
+/// A record on its way to memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Write {
+    slot: u16,
+    bytes: [u8; SIZE as usize],
+    /// Bytes written, with that which clears the mark.
+    done: u8,
+}
+
+/// What is needed to put an item away.
+#[derive(Clone, Copy, Debug)]
+pub enum Put {
+    /// This record makes room; then ask again.
+    Room(Write),
+    /// This one is the item's.
+    Last(Write),
+    /// Every slot holds the newest record of some item.
+    Full,
+}
+
+impl Log {
+    /// Finds the end of the log.
+    pub fn open<M: Memory>(memory: &M) -> Self {
+        let mut newest: Option<(u16, u16)> = None;
+        for slot in 0..slots::<M>() {
+            if let Some(record) = read(memory, slot)
+                && newest.is_none_or(|(_, number)| is_after(record.number, number))
+            {
+                newest = Some((slot, record.number));
+            }
+        }
+        match newest {
+            Some((slot, number)) => Self { gap: behind::<M>(slot), next: number.wrapping_add(1) },
+            None => Self { gap: 0, next: 0 },
+        }
+    }
+
+    /// Whether memory holds something, but no record: another program's data, or rubbish.
+    pub fn is_rubbish<M: Memory>(memory: &M) -> bool {
+        let records = (0..slots::<M>()).any(|slot| read(memory, slot).is_some());
+        !records && (0..M::SIZE).any(|at| memory.read(at) != 0xFF)
+    }
+
+    /// The value of an item, if it was ever put away.
+    pub fn newest<M: Memory>(&self, memory: &M, key: u16) -> Option<i32> {
+        // Backwards from the newest; the slot before the first is the gap itself.
+        let mut slot = self.gap;
+        for _ in 0..slots::<M>() {
+            slot = before::<M>(slot);
+            if has_key(memory, slot, key)
+                && let Some(record) = read(memory, slot)
+            {
+                return Some(record.value);
+            }
+        }
+        None
+    }
+
+    /// Whether nothing was ever put away.
+    pub fn is_empty(&self) -> bool {
+        *self == Self { gap: 0, next: 0 }
+    }
+
+    /// All records from the oldest to the newest.
+    pub fn replay<M: Memory>(&self, memory: &M, mut each: impl FnMut(&Record)) {
+        // What the gap holds is older than all others.
+        let mut slot = self.gap;
+        for _ in 0..slots::<M>() {
+            if let Some(record) = read(memory, slot) {
+                each(&record);
+            }
+            slot = behind::<M>(slot);
+        }
+    }
+
+    /// What to write next to put an item away.
+    pub fn put<M: Memory>(&mut self, memory: &M, key: u16, value: i32) -> Put {
+        let next_gap = behind::<M>(self.gap);
+        let last = Record { key, number: self.next, value };
+        match read(memory, next_gap) {
+            Some(record) if record.key != key && self.counts(memory, next_gap, record.key) => {
+                if self.is_full(memory, key) {
+                    return Put::Full;
+                }
+                Put::Room(self.append::<M>(Record { number: self.next, ..record }))
+            }
+            _ => Put::Last(self.append::<M>(last)),
+        }
+    }
+
+    fn append<M: Memory>(&mut self, record: Record) -> Write {
+        let slot = self.gap;
+        self.gap = behind::<M>(slot);
+        self.next = self.next.wrapping_add(1);
+        Write { slot, bytes: record.bytes(), done: 0 }
+    }
+
+    /// Whether the record in a slot is the newest of its item.
+    fn counts<M: Memory>(&self, memory: &M, slot: u16, key: u16) -> bool {
+        let mut at = behind::<M>(slot);
+        // Up to the gap are the newer ones.
+        while at != self.gap {
+            if has_key(memory, at, key) && read(memory, at).is_some() {
+                return false;
+            }
+            at = behind::<M>(at);
+        }
+        true
+    }
+
+    /// Whether there is no slot to be had: each but the gap holds a record that counts, and of another item.
+    fn is_full<M: Memory>(&self, memory: &M, key: u16) -> bool {
+        let mut at = behind::<M>(self.gap);
+        while at != self.gap {
+            match read(memory, at) {
+                Some(record) if record.key != key && self.counts(memory, at, record.key) => {}
+                _ => return false,
+            }
+            at = behind::<M>(at);
+        }
+        true
+    }
+}
+
+impl Write {
+    /// Begins to write the next byte; false if there is none left. Not while memory is busy.
+    pub fn step<M: Memory>(&mut self, memory: &mut M) -> bool {
+        let start = self.slot * SIZE;
+        let (at, byte) = match self.done {
+            0 => (start, BEGUN),
+            i if u16::from(i) < SIZE => {
+                (start + u16::from(i), self.bytes.get(usize::from(i)).copied().unwrap_or(0))
+            }
+            i if u16::from(i) == SIZE => (start, record::VALID),
+            _ => return false,
+        };
+        self.done += 1;
+        // A byte that is right already is spared.
+        if memory.read(at) != byte {
+            memory.write(at, byte);
+        }
+        true
+    }
+}
+
+fn slots<M: Memory>() -> u16 {
+    M::SIZE / SIZE
+}
+
+fn behind<M: Memory>(slot: u16) -> u16 {
+    if slot + 1 == slots::<M>() { 0 } else { slot + 1 }
+}
+
+fn before<M: Memory>(slot: u16) -> u16 {
+    if slot == 0 { slots::<M>() - 1 } else { slot - 1 }
+}
+
+/// Whether one number was given after another, less than 32,768 records apart.
+fn is_after(number: u16, other: u16) -> bool {
+    number.wrapping_sub(other) as i16 > 0
+}
+
+fn has_key<M: Memory>(memory: &M, slot: u16, key: u16) -> bool {
+    let at = slot * SIZE + 1;
+    let [low, high] = key.to_le_bytes();
+    memory.read(at) == low && memory.read(at + 1) == high
+}
+
+fn read<M: Memory>(memory: &M, slot: u16) -> Option<Record> {
+    let start = slot * SIZE;
+    if memory.read(start) != record::VALID {
+        return None;
+    }
+    let mut bytes = [0; SIZE as usize];
+    for (at, byte) in (start..).zip(&mut bytes) {
+        *byte = memory.read(at);
+    }
+    Record::of(&bytes)
+}
+
+#[cfg(test)]
+mod tests;

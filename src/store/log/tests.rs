@@ -1,0 +1,162 @@
+//! The log on a small memory whose power fails.
+
+use std::collections::HashMap;
+use std::vec::Vec;
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// Eight slots and a rest.
+const BYTES: usize = 8 * SIZE as usize + 3;
+
+/// A memory that loses power after so many bytes; the last one is then `torn`.
+#[derive(Clone)]
+struct Cells {
+    bytes: [u8; BYTES],
+    left: usize,
+    torn: u8,
+    written: Vec<u32>,
+}
+
+impl Cells {
+    fn new() -> Self {
+        Self { bytes: [0xFF; BYTES], left: usize::MAX, torn: 0, written: std::vec![0; BYTES] }
+    }
+}
+
+impl Memory for Cells {
+    const SIZE: u16 = BYTES as u16;
+
+    fn read(&self, at: u16) -> u8 {
+        self.bytes[usize::from(at)]
+    }
+    fn is_busy(&self) -> bool {
+        false
+    }
+    fn write(&mut self, at: u16, byte: u8) {
+        let at = usize::from(at);
+        match self.left {
+            0 => {}
+            1 => self.bytes[at] = self.torn,
+            _ => self.bytes[at] = byte,
+        }
+        self.left = self.left.saturating_sub(1);
+        self.written[at] += 1;
+    }
+}
+
+/// Puts an item away. False if there is no room.
+fn put(log: &mut Log, cells: &mut Cells, key: u16, value: i32) -> bool {
+    loop {
+        let (mut write, last) = match log.put(cells, key, value) {
+            Put::Room(write) => (write, false),
+            Put::Last(write) => (write, true),
+            Put::Full => return false,
+        };
+        while write.step(cells) {}
+        if last {
+            return true;
+        }
+    }
+}
+
+#[test]
+fn the_newest_value_counts() {
+    let mut cells = Cells::new();
+    let mut log = Log::open(&cells);
+    assert_eq!(log.newest(&cells, 5), None);
+    for value in 0..100 {
+        assert!(put(&mut log, &mut cells, 5, value));
+        assert!(put(&mut log, &mut cells, 6, -value));
+        assert_eq!((log.newest(&cells, 5), log.newest(&cells, 6)), (Some(value), Some(-value)));
+        assert_eq!(Log::open(&cells), log);
+    }
+}
+
+#[test]
+fn all_cells_wear_alike() {
+    let mut cells = Cells::new();
+    let mut log = Log::open(&cells);
+    put(&mut log, &mut cells, 1, 1);
+    for value in 0..8_000 {
+        put(&mut log, &mut cells, 2, value);
+    }
+    let marks: Vec<u32> = (0..8).map(|slot| cells.written[slot * usize::from(SIZE)]).collect();
+    let (least, most) = (marks.iter().min().unwrap(), marks.iter().max().unwrap());
+    assert!(most - least <= 4, "{marks:?}");
+    assert_eq!(log.newest(&cells, 1), Some(1));
+}
+
+#[test]
+fn a_full_log_says_so_and_loses_nothing() {
+    let mut cells = Cells::new();
+    let mut log = Log::open(&cells);
+    let stored = (0..20).filter(|key| put(&mut log, &mut cells, *key, 7)).count();
+    assert_eq!(stored, 7, "one slot is the gap");
+    for key in 0..7 {
+        assert_eq!(log.newest(&cells, key), Some(7));
+    }
+    assert!(put(&mut log, &mut cells, 3, 9));
+    assert_eq!(log.newest(&cells, 3), Some(9));
+}
+
+#[test]
+fn rubbish_is_known() {
+    let mut cells = Cells::new();
+    assert!(!Log::is_rubbish(&cells));
+    cells.bytes[4] = 0;
+    assert!(Log::is_rubbish(&cells));
+    let mut log = Log::open(&cells);
+    assert!(put(&mut log, &mut cells, 3, 9));
+    assert!(!Log::is_rubbish(&cells));
+}
+
+proptest! {
+    /// Whatever is put away, and at whatever byte power fails: each item is what it was or what it was to be.
+    #[test]
+    fn a_power_cut_leaves_old_or_new(
+        before in prop::collection::vec((0u16..6, any::<i32>()), 0..40),
+        key in 0u16..6, value: i32, torn: u8, garbage in prop::collection::vec(any::<u8>(), BYTES),
+        dirty: bool,
+    ) {
+        let mut cells = Cells::new();
+        if dirty {
+            cells.bytes.copy_from_slice(&garbage);
+        }
+        let mut log = Log::open(&cells);
+        let mut kept = HashMap::new();
+        for key in 0..6 {
+            if let Some(value) = log.newest(&cells, key) {
+                kept.insert(key, value);
+            }
+        }
+        for (key, value) in before {
+            prop_assert!(put(&mut log, &mut cells, key, value));
+            kept.insert(key, value);
+        }
+        for cut in 1..100 {
+            let (mut log, mut cells) = (log, cells.clone());
+            (cells.left, cells.torn) = (cut, torn);
+            put(&mut log, &mut cells, key, value);
+            let finished = cells.left > 0;
+            // Power is back.
+            cells.left = usize::MAX;
+            let mut log = Log::open(&cells);
+            for item in 0..6 {
+                let found = log.newest(&cells, item);
+                let new = item == key && found == Some(value);
+                prop_assert!(new || found == kept.get(&item).copied(), "{item} {found:?}");
+            }
+            // And the log goes on.
+            prop_assert!(put(&mut log, &mut cells, key, 1));
+            prop_assert_eq!(log.newest(&cells, key), Some(1));
+            for (item, value) in &kept {
+                prop_assert!(*item == key || log.newest(&cells, *item) == Some(*value));
+            }
+            if finished {
+                break;
+            }
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! What survives a power cut: settings, coordinate systems, stored positions and tools, in EEPROM.
+//!
+//! ```text
+//! a setting is stored -> Links::storage (which items to look at) -> storage task
+//!     -> kept (item -> key, value) -> Log (which slot next) -> Memory, a byte each 3.4 ms
+//! reset -> Log::open -> Log::newest of each item -> Settings, Tables
+//! ```
+//! The EEPROM is a ring of records, each of which says what one item is ([`record`]); the newest record of an
+//! item counts. A new record goes into a slot that holds nothing of worth, and counts only when its last byte has
+//! been written: whenever power fails, an item is what it was or what it was to be. Writing goes round
+//! the ring, so that all cells wear alike; records that still count are moved out of the way.
+//!
+//! Items are known by their names, not by their places in a table: firmware with more settings, or others,
+//! finds those that it knows and takes its defaults for the rest. An item that has its default and never had
+//! another takes no room. Values are checked when they are read, as if they had been sent.
+
+pub mod kept;
+pub mod log;
+pub mod record;
+
+pub use log::Log;
+
+/// A memory of bytes that keeps them without power, slowly written.
+pub trait Memory {
+    /// How many bytes it has.
+    const SIZE: u16;
+    /// The byte at an address; waits for a write under way.
+    fn read(&self, at: u16) -> u8;
+    /// Whether a byte is being written.
+    fn is_busy(&self) -> bool;
+    /// Begins to write a byte. Not while busy.
+    fn write(&mut self, at: u16, byte: u8);
+}
