@@ -26,6 +26,7 @@ macro_rules! arc {
             no(ArcRadiusTolerance, &[concat!($code, " X5 R1 F100")]),
             no(ArcRadiusTolerance, &[concat!($code, " X0.1 R0.09 F100")]),
             no(ArcEndpointIsStart, &[concat!($code, " X0 R5 F100")]),
+            no(OutOfRange, &["G28.3 X214000", concat!($code, " I500 F100")]),
             no(PWordNegative, &[concat!($code, " I1 P-1 F100")]),
             no(PWordInvalid, &[concat!($code, " I1 P1.5 F100")]),
         ]
@@ -73,7 +74,7 @@ force, and needs a feed even without axis words.",
             ],
         ),
         g(20, "Arc, clockwise", ARC, arc!("G2")),
-        g(30, "Arc, counter-clockwise", ARC, arc!("G3")),
+        g(30, "Arc, counter-clockwise", "As G2, the other way round.", arc!("G3")),
         g(
             40,
             "Dwell",
