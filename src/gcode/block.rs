@@ -19,7 +19,9 @@ use crate::units;
 /// The parts of a line.
 pub struct Block {
     pub non_modal: Option<NonModal>,
-    pub motion: Option<MotionMode>,
+    motion: Option<MotionMode>,
+    /// G80, which may stand beside another code of its group: `G0 G80 G90` is how many programs begin.
+    cancel: Option<()>,
     pub plane: Option<Plane>,
     pub distance: Option<Distance>,
     pub arc_distance: Option<ArcDistance>,
@@ -59,6 +61,7 @@ impl Block {
         Self {
             non_modal: None,
             motion: None,
+            cancel: None,
             plane: None,
             distance: None,
             arc_distance: None,
@@ -143,6 +146,7 @@ impl Block {
         self.needed |= code.needs;
         let is_first = match code.action {
             Action::NonModal(code) => first(&mut self.non_modal, code),
+            Action::Motion(MotionMode::None) => first(&mut self.cancel, ()),
             Action::Motion(mode) => first(&mut self.motion, mode),
             Action::Plane(plane) => first(&mut self.plane, plane),
             Action::Distance(mode) => first(&mut self.distance, mode),
@@ -222,22 +226,37 @@ impl Block {
             || self.has(words::bit(words::S) | words::bit(words::T))
     }
 
+    /// G80.
+    pub fn cancels(&self) -> bool {
+        self.cancel.is_some()
+    }
+
+    /// The motion of its codes: G80 gives way to any other.
+    pub fn own_motion(&self) -> Option<MotionMode> {
+        self.motion.or(self.cancel.map(|()| MotionMode::None))
+    }
+
     /// The motion that the line asks for while `modal` is in force: that of its code, else the one in
     /// force if words are left for it.
     pub fn motion_from(&self, modal: MotionMode) -> Option<MotionMode> {
         let left = self.present & !self.taken;
-        self.motion.or_else(|| (left & self.taken_by(modal) != 0).then_some(modal))
+        self.own_motion().or_else(|| (left & self.taken_by(modal) != 0).then_some(modal))
     }
 
     /// The words that are for the motion in force: none if the line has another or its axes are for another
     /// code.
     fn taken_by(&self, modal: MotionMode) -> u32 {
-        if self.motion.is_some() || self.taken & AXES != 0 { 0 } else { codes::taken_by(modal) }
+        if self.own_motion().is_some() || self.taken & AXES != 0 {
+            0
+        } else {
+            codes::taken_by(modal)
+        }
     }
 
     /// The words that both a code of the line and the motion in force take, if that is to move.
     fn taken_with(&self, modal: MotionMode) -> u32 {
-        let alone = self.taken == 0 || self.motion.is_some() || self.motion_from(modal).is_none();
+        let alone =
+            self.taken == 0 || self.own_motion().is_some() || self.motion_from(modal).is_none();
         if alone { 0 } else { self.taken & codes::taken_by(modal) }
     }
 
@@ -298,8 +317,9 @@ mod tests {
 
     #[test]
     fn one_code_of_each_group() {
-        let twice = ["G0 G1", "G17 G19", "G20 G21", "G90 G91", "G93 G94", "G61 G61.1", "G4 G92"];
-        let more = ["M0 M30", "G40 G40", "G1 G1", "G80 G0", "G54 G59.3", "G98 G99", "M3 M5"];
+        let twice =
+            ["G0 G1", "G80 G80", "G17 G19", "G20 G21", "G90 G91", "G93 G94", "G61 G61.1", "G4 G92"];
+        let more = ["M0 M30", "G40 G40", "G1 G1", "G54 G59.3", "G98 G99", "M3 M5"];
         let last = ["M7 M9", "M6 M6", "M48 M50", "G43 G49", "G90.1 G91.1", "G38.2 G81", "G53 G10"];
         for line in twice.iter().chain(&more).chain(&last) {
             assert_eq!(refusal(line), Status::ModalGroupViolation, "{line}");
@@ -352,6 +372,8 @@ mod tests {
         assert_eq!(moves("G92 X1", Feed), Option::None);
         assert_eq!(moves("F100", Feed), Option::None);
         assert_eq!(moves("G0", Feed), Some(MotionMode::Traverse));
+        assert_eq!(moves("G80", Feed), Some(None));
+        assert_eq!(moves("G80 G0 X1", Feed), Some(MotionMode::Traverse));
     }
 
     #[test]

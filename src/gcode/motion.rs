@@ -31,7 +31,7 @@ impl State {
         if absolute && !matches!(mode, MotionMode::Traverse | MotionMode::Feed) {
             return Err(Status::MachineCoordinatesMotion);
         }
-        let before = self.modal.motion;
+        let before = if block.cancels() { MotionMode::None } else { self.modal.motion };
         self.modal.motion = mode;
         match mode {
             MotionMode::None => Ok(()),

@@ -257,7 +257,7 @@ impl State {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        if let Some(mode) = block.motion {
+        if let Some(mode) = block.own_motion() {
             self.modal.motion = mode;
         }
         self.advance(block, false, setup)?;

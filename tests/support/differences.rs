@@ -74,12 +74,6 @@ pub const DIFFERENCES: &[Difference] = &[
         ]],
     },
     Difference {
-        name: "motion_modal",
-        why: "RS274/NGC: G80 and G0 are of one modal group, of which a line has one (133)",
-        program: &[["G80 G0 X5", "G80\nG0 X5"]],
-        motion: &[],
-    },
-    Difference {
         name: "tool_offset_axes",
         why: "tools have lengths along X and Z alone, for mills and lathes: memory (136)",
         program: &[["X1 Y2 Z3", "X1 Z3"]],

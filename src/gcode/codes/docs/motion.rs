@@ -90,7 +90,7 @@ the same line.",
             800,
             "No motion mode",
             "Ends canned cycles. Until another code of the group comes, axis words move nothing and are \
-refused. In force at power-up.",
+refused. Beside another code of the group it only ends them, as in `G0 G80 G90`. In force at power-up.",
             &[no(AxisNotAllowed, &["G80 X1"])],
         ),
     ],
