@@ -70,7 +70,7 @@ pub enum Value {
     MachinePosition(u8),
     /// `posx` and so on: position in work coordinates, in units of a `Length`.
     Position(u8),
-    /// `ofsx` and so on: work offset, in units of a `Length`.
+    /// `ofsx` and so on: work offset, in units of a `Length`; shown in millimetres in any units.
     Offset(u8),
     /// `tofx` and so on: tool length, in units of a `Length`.
     ToolOffset(u8),
@@ -228,9 +228,9 @@ progmem! {
     pub static VECTORS: [Vector; VECTOR_COUNT] = [
         vector("mpo", Form::Millimetres, 6, text!(" machine posn:")),
         vector("pos", Form::Length, 6, text!(" position:")),
-        vector("ofs", Form::Length, 6, text!(" work offset:")),
+        vector("ofs", Form::Millimetres, 6, text!(" work offset:")),
         vector("hom", Form::Count, 6, text!(" axis homing state:")),
-        vector("tof", Form::Length, 6, text!(" tool length:")),
+        vector("tof", Form::Millimetres, 6, text!(" tool length:")),
         vector("pwr", Form::Count, 4, NONE),
     ];
 }

@@ -15,8 +15,8 @@ pub const BORES: Section = Section {
         g(
             840,
             "Tap",
-            "Feeds to Z, turns the spindle the other way round, feeds up, and turns it as before. The spindle has \
-to turn clockwise. Feed and spindle are not synchronised: the tap needs a floating holder, and F is S times the \
+            "Feeds to Z, turns the spindle the other way round, dwells for P if there is one, feeds up, and turns it \
+as before. The spindle has to turn clockwise. Feed and spindle are not synchronised: the tap needs a floating holder, and F is S times the \
 pitch (or with G95 the pitch).",
             cycle!(
                 "G84",
@@ -24,7 +24,8 @@ pitch (or with G95 the pitch).",
                 "",
                 speed!("G84", ""),
                 no(SpindleMustTurn, &["G84 Z-1 R1 F100"]),
-                no(SpindleMustTurn, &["M4", "G84 Z-1 R1 F100"])
+                no(SpindleMustTurn, &["M4", "G84 Z-1 R1 F100"]),
+                no(PWordNegative, &["M3", "G84 Z-1 R1 P-1 F100"])
             ),
         ),
         g(

@@ -44,7 +44,8 @@ pub const SPINDLE: Section = Section {
         m(
             30,
             "Spindle clockwise",
-            "Turns until M4, M5, M6 or the end of the program, at S turns a minute.",
+            "Turns until M4, M5, M6 or the end of the program. The outputs switch it on and off and say which way; \
+the speed S is reported, and G95 goes by it.",
             &[],
         ),
         m(40, "Spindle counter-clockwise", "The same the other way round.", &[]),
@@ -110,8 +111,7 @@ factors are 1.",
         m(
             510,
             "Spindle override",
-            "The speed of the spindle is multiplied by P, 0.05 to 2; P0: off; without P: on, with the factor it \
-has.",
+            "As M50, of the speed of the spindle, 0.05 to 2. The outputs have no speed, so that nothing changes so far.",
             &[no(PWordInvalid, &["M51 P2.001"])],
         ),
     ],

@@ -38,14 +38,14 @@ force at power-up and after M2, unless `gun` says otherwise.",
         g(
             610,
             "Exact path",
-            "The path is followed, and corners are rounded as little as the machine needs: the same as G64.",
+            "The path is followed exactly, without a stop where none is needed: the same as G64.",
             &[],
         ),
         g(611, "Exact stop", "Each move ends at rest; the chords of an arc do not.", &[]),
         g(
             640,
             "Continuous path",
-            "The path is followed without stopping. P, a tolerance, is taken and not needed: the path is \
+            "The path is followed without a stop where none is needed. P, a tolerance, is taken and not needed: the path is \
 never left. In force at power-up and after M2, unless `gpa` says otherwise.",
             &[],
         ),
