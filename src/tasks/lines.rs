@@ -15,7 +15,7 @@ use crate::status::Status;
 /// Line slots. Senders count on eight.
 pub const SLOTS: usize = 8;
 /// Bytes for all lines together.
-pub const POOL: usize = 640;
+pub const POOL: usize = 560;
 /// Longest line, in bytes without its end.
 pub const LINE_MAX: usize = 254;
 

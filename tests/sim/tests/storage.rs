@@ -1,0 +1,114 @@
+//! Settings and offsets in EEPROM: they survive, whenever power fails, and writing them delays no step.
+
+mod common;
+
+use common::{booted, firmware, set};
+use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
+
+/// A machine that finds this in its EEPROM.
+fn booted_with(eeprom: &[u8; 4096]) -> (Machine, Host) {
+    let (mut machine, mut host) = (firmware(&MEGA2560_GRBL), Host::new(LINES_IN_FLIGHT));
+    machine.set_eeprom(eeprom);
+    host.boot(&mut machine, 1_000).unwrap();
+    (machine, host)
+}
+
+/// The value of a token.
+fn value(machine: &mut Machine, host: &mut Host, token: &str) -> f64 {
+    let response = host.ask(machine, &format!("{{{token}:n}}"), 5_000).unwrap();
+    response.body[token].as_f64().unwrap_or_else(|| panic!("{}", response.raw))
+}
+
+#[test]
+fn what_was_set_is_there_after_a_reset() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    let writes = machine.eeprom_writes();
+    assert_eq!(writes, 0, "defaults take no room");
+    for line in
+        ["{xvm:1234}", "{4mi:32}", "{gco:3}", "g10 l2 p3 x1.5 y-2", "g10 l1 p10 z4", "g28.1"]
+    {
+        set(&mut machine, &mut host, line);
+    }
+    host.run_for_ms(&mut machine, 2_000).unwrap();
+    let left = *machine.eeprom();
+    let (mut machine, mut host) = booted_with(&left);
+    let mut is = |token, expected| {
+        assert_eq!(value(&mut machine, &mut host, token), expected, "{token}");
+    };
+    is("xvm", 1_234.0);
+    is("4mi", 32.0);
+    is("coor", 3.0);
+    is("ofsx", 1.5);
+    is("ofsy", -2.0);
+    set(&mut machine, &mut host, "g43 h10");
+    assert_eq!(value(&mut machine, &mut host, "tofz"), 4.0);
+    // Nothing is written again that is there.
+    set(&mut machine, &mut host, "{xvm:1234}");
+    host.run_for_ms(&mut machine, 500).unwrap();
+    assert_eq!(machine.eeprom_writes(), 0);
+}
+
+#[test]
+fn a_power_cut_leaves_the_old_value_or_the_new() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    set(&mut machine, &mut host, "{si:200}");
+    host.run_for_ms(&mut machine, 500).unwrap();
+    set(&mut machine, &mut host, "{si:300}");
+    let mut seen = [0; 2];
+    for _ in 0..20 {
+        let left = *machine.eeprom();
+        let (mut other, mut sender) = booted_with(&left);
+        match value(&mut other, &mut sender, "si") {
+            200.0 => seen[0] += 1,
+            300.0 => seen[1] += 1,
+            other => panic!("si is {other}"),
+        }
+        host.run_for_ms(&mut machine, 3).unwrap();
+    }
+    assert!(seen[0] > 5 && seen[1] > 2, "{seen:?}");
+}
+
+#[test]
+fn rubbish_is_no_setting() {
+    let mut cells = [0u8; 4096];
+    for (i, cell) in cells.iter_mut().enumerate() {
+        *cell = (i * 7919 >> 3) as u8;
+    }
+    let (mut machine, mut host) = booted_with(&cells);
+    assert_eq!(value(&mut machine, &mut host, "xvm"), 800.0);
+    set(&mut machine, &mut host, "{xvm:900}");
+    host.run_for_ms(&mut machine, 500).unwrap();
+    let left = *machine.eeprom();
+    let (mut machine, mut host) = booted_with(&left);
+    assert_eq!(value(&mut machine, &mut host, "xvm"), 900.0);
+}
+
+#[test]
+fn no_step_is_late_while_settings_are_written() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    for line in ["{xvm:2000}", "{xfr:2000}", "{xjm:1000}", "{xtm:1000}"] {
+        set(&mut machine, &mut host, line);
+    }
+    host.run_for_ms(&mut machine, 1_000).unwrap();
+    machine.recorder_mut().keep_log();
+    let before = machine.eeprom_writes();
+    // 20,000 steps a second for three seconds.
+    set(&mut machine, &mut host, "g1 f937.5 x47");
+    host.run_for_ms(&mut machine, 300).unwrap();
+    let from = machine.cycle();
+    for round in 0..20 {
+        set(&mut machine, &mut host, &format!("{{yvm:{}}}", 500 + round));
+        host.run_for_ms(&mut machine, 100).unwrap();
+    }
+    let to = machine.cycle();
+    assert!(machine.eeprom_writes() - before > 150, "{}", machine.eeprom_writes() - before);
+    let log = machine.recorder().log();
+    let steps: Vec<u64> =
+        log.iter().map(|s| s.cycle).filter(|at| (from..to).contains(at)).collect();
+    let gaps: Vec<u64> = steps.windows(2).map(|w| w[1] - w[0]).collect();
+    assert!(gaps.len() > 30_000, "{}", gaps.len());
+    let (least, most) = (gaps.iter().min().unwrap(), gaps.iter().max().unwrap());
+    println!("{} intervals of {least} to {most} cycles", gaps.len());
+    assert!(most - least <= 2, "{least} to {most}");
+}
