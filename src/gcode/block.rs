@@ -41,6 +41,8 @@ pub struct Block {
     taken: u32,
     taken_twice: u32,
     needed: u32,
+    /// The motion it asks for, once it has been checked.
+    does: Option<MotionMode>,
     /// The words it has, as a set.
     present: u32,
     /// Their numbers, in the order of the line.
@@ -80,6 +82,7 @@ impl Block {
             taken: 0,
             taken_twice: 0,
             needed: 0,
+            does: None,
             present: 0,
             values: Vec::new(),
             slashed: false,
@@ -236,44 +239,45 @@ impl Block {
         self.motion.or(self.cancel.map(|()| MotionMode::None))
     }
 
-    /// The motion that the line asks for while `modal` is in force: that of its code, else the one in
-    /// force if words are left for it.
-    pub fn motion_from(&self, modal: MotionMode) -> Option<MotionMode> {
-        let left = self.present & !self.taken;
-        self.own_motion().or_else(|| (left & self.taken_by(modal) != 0).then_some(modal))
+    /// The motion that the line asks for, once it has been checked: that of its code, else the one in force if
+    /// words are left for it.
+    pub fn does(&self) -> Option<MotionMode> {
+        self.does
     }
 
-    /// The words that are for the motion in force: none if the line has another or its axes are for another
-    /// code.
-    fn taken_by(&self, modal: MotionMode) -> u32 {
-        if self.own_motion().is_some() || self.taken & AXES != 0 {
-            0
-        } else {
-            codes::taken_by(modal)
+    /// Refuses words that no code takes or that two codes want, and codes without their words; `modal` is the
+    /// motion in force.
+    #[inline(never)]
+    pub fn check(&mut self, modal: MotionMode) -> Result<(), Status> {
+        self.does = self.own_motion();
+        let mut twice = self.present & self.taken_twice;
+        let mut unused = self.present & !(self.taken | words::ALWAYS);
+        // Words are for the motion in force, unless the line has another or its axes are for another code.
+        if self.does.is_none() && self.taken & AXES == 0 {
+            let takes = codes::taken_by(modal);
+            if unused & takes != 0 {
+                self.does = Some(modal);
+                twice |= self.present & self.taken & takes;
+            }
+            unused &= !takes;
+        }
+        match self.needed & !self.present {
+            0 if twice | unused == 0 => Ok(()),
+            missing => self.refusal(twice, unused, missing).map_or(Ok(()), Err),
         }
     }
 
-    /// The words that both a code of the line and the motion in force take, if that is to move.
-    fn taken_with(&self, modal: MotionMode) -> u32 {
-        let alone =
-            self.taken == 0 || self.own_motion().is_some() || self.motion_from(modal).is_none();
-        if alone { 0 } else { self.taken & codes::taken_by(modal) }
-    }
-
-    /// Refuses words that no code takes or that two codes want, and codes without their words.
+    /// Why the line is refused for these words, or that it is not.
     #[inline(never)]
-    pub fn check(&self, modal: MotionMode) -> Result<(), Status> {
-        let unused = self.present & !(self.taken | self.taken_by(modal) | words::ALWAYS);
-        let twice = self.present & (self.taken_twice | self.taken_with(modal));
-        let missing = self.needed & !self.present;
+    fn refusal(&self, twice: u32, unused: u32, missing: u32) -> Option<Status> {
         match () {
-            () if twice & AXES != 0 => Err(Status::AxisConflict),
-            () if twice != 0 => Err(Status::WordConflict),
-            () if unused & AXES != 0 => Err(Status::AxisNotAllowed),
-            () if unused != 0 => Err(Status::WordUnused),
-            () if missing & !AXES != 0 => Err(words::missing(missing & !AXES)),
-            () if missing != 0 && !self.has(AXES) => Err(Status::AxisWordMissing),
-            () => Ok(()),
+            () if twice & AXES != 0 => Some(Status::AxisConflict),
+            () if twice != 0 => Some(Status::WordConflict),
+            () if unused & AXES != 0 => Some(Status::AxisNotAllowed),
+            () if unused != 0 => Some(Status::WordUnused),
+            () if missing & !AXES != 0 => Some(words::missing(missing & !AXES)),
+            () if missing != 0 && !self.has(AXES) => Some(Status::AxisWordMissing),
+            () => None,
         }
     }
 }
@@ -304,7 +308,7 @@ mod tests {
     }
 
     fn check(line: &str, modal: MotionMode) -> Result<(), Status> {
-        read(line)?.check(modal)
+        read(line).and_then(|mut block| block.check(modal))
     }
 
     #[test]
@@ -366,7 +370,11 @@ mod tests {
         for line in ["G4 P1", "G4 P1 G0 X1", "G64 P1 G92 X1", "G64 X1 R1"] {
             assert_eq!(check(line, ClockwiseArc), Ok(()), "{line}");
         }
-        let moves = |line, modal| read(line).unwrap().motion_from(modal);
+        let moves = |line, modal| {
+            let mut block = read(line).unwrap();
+            block.check(modal).unwrap();
+            block.does()
+        };
         assert_eq!(moves("G4 P1", ClockwiseArc), Option::None);
         assert_eq!(moves("G4 P1 X1", Feed), Some(Feed));
         assert_eq!(moves("G92 X1", Feed), Option::None);

@@ -15,7 +15,7 @@
 
 use super::block::Block;
 use super::command::{Commands, Overrides};
-use super::modal::{Defaults, Modal, Units};
+use super::modal::{Defaults, Modal, MotionMode, Units};
 use super::setup::Setup;
 use super::state::State;
 use super::tables::{Edit, Tables};
@@ -99,6 +99,7 @@ impl Interpreter {
         let mut block = Block::new();
         let deletes = setup.deletes_blocks();
         block.read(line, deletes)?;
+        block.check(self.state.modal.motion)?;
         let edited = self.execute_or_undo(&block, setup, out)?;
         let Block { message, slashed, commented, .. } = block;
         Ok(Info { message, deleted: slashed && deletes, commented, edited })
@@ -111,8 +112,7 @@ impl Interpreter {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<Option<(u8, u8)>, Status> {
-        block.check(self.state.modal.motion)?;
-        if block.is_rare() || self.state.is_in_cycle(block) {
+        if block.is_rare() || block.does().is_some_and(MotionMode::is_cycle) {
             return self.execute_rarity(block, setup, out);
         }
         self.execute_usual(block, setup, out).map(|()| None)

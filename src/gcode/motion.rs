@@ -25,7 +25,7 @@ impl State {
         out: &mut Commands,
     ) -> Result<(), Status> {
         let absolute = block.non_modal == Some(NonModal::MachineCoordinates);
-        let Some(mode) = block.motion_from(self.modal.motion) else {
+        let Some(mode) = block.does() else {
             return if absolute { Err(Status::MachineCoordinatesMotion) } else { Ok(()) };
         };
         if absolute && !matches!(mode, MotionMode::Traverse | MotionMode::Feed) {

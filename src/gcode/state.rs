@@ -76,11 +76,6 @@ impl State {
         }
     }
 
-    /// Whether a block, after it has been checked, is one of a canned cycle.
-    pub fn is_in_cycle(&self, block: &Block) -> bool {
-        block.motion_from(self.modal.motion).is_some_and(MotionMode::is_cycle)
-    }
-
     /// Carries out a block of modes and moves.
     #[inline(never)]
     pub fn execute(

@@ -4,11 +4,12 @@
 //! | link | carries | depth | RAM | from | to | when full |
 //! |---|---|---|---|---|---|---|
 //! | `uart` receive ring | bytes | 255 | 260 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
-//! | [`Links::lines`] | lines | 8 lines, 640 B | 670 B | reader | parser | bytes stay in the receive ring |
-//! | [`Links::commands`] | canonical commands | 1 | 70 B | parser | planner | the parser takes control lines only |
-//! | block ring | blocks | 40 | 1,900 B | planner | exec | the planner waits; `commands` stays taken |
-//! | segment ring | segments | 4 | 68 B | exec | step interrupt | exec waits for its next run |
+//! | [`Links::lines`] | lines | 8 lines, 560 B | 590 B | reader | parser | bytes stay in the receive ring |
+//! | [`Links::commands`] | canonical commands | 1 | 98 B | parser | planner | the parser takes control lines only |
+//! | block ring | blocks | 64 | 2,090 B | planner | exec | the planner waits; `commands` stays taken |
+//! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |
 //! | `uart` transmit ring | bytes | 255 | 260 B | parser, reporter | TX interrupt | the writer waits, response half sent |
+//! | [`Links::storage`] | which items to look at | a range | 7 B | parser | storage | the range grows |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
