@@ -120,7 +120,7 @@ impl Tables {
         }
         let index = index - (SYSTEMS + STORED) * AXES;
         let tool = self.tools.get(index / 2).copied().unwrap_or(Tool::NONE);
-        if index % 2 == 0 { tool.x } else { tool.z }
+        if index.is_multiple_of(2) { tool.x } else { tool.z }
     }
 
     /// Sets value `index` of [`VALUES`].
@@ -141,7 +141,7 @@ impl Tables {
         }
         let index = index - (SYSTEMS + STORED) * AXES;
         let tool = self.tools.get_mut(index / 2)?;
-        Some(if index % 2 == 0 { &mut tool.x } else { &mut tool.z })
+        Some(if index.is_multiple_of(2) { &mut tool.x } else { &mut tool.z })
     }
 
     /// Changes an entry.

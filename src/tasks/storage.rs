@@ -50,6 +50,12 @@ impl Storage {
     }
 }
 
+impl Default for Storage {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 /// The task.
 pub async fn run(links: &'static Links, mut log: Log) -> ! {
     let mut memory = Eeprom::take();
