@@ -2,12 +2,13 @@
 //!
 //! After each line: a refused one has left the interpreter as it was and asks for nothing; the fast path
 //! for usual lines has either done nothing, or what the general path does; the chords of an arc stay on
-//! their circle and end at its end. A second interpreter gets the same lines for a machine of odd axes.
+//! their circle and end at its end; the steps of a line lead to where the interpreter is. A second interpreter gets the same lines for a machine of odd axes.
 
 mod chords;
 
 use kerf::gcode::command::{Commands, Motion};
 use kerf::gcode::setup::{AxisMode, Setup, Usual};
+use kerf::gcode::steps::{Step, Steps};
 use kerf::gcode::{Info, Interpreter};
 use kerf::status::Status;
 use kerf::units::Length;
@@ -20,6 +21,7 @@ pub fn check(input: &[u8]) {
         let outcome = Outcome::of(&mut usual, line, &Usual);
         fast_path(&before, line, &usual, &outcome);
         arc(&before, &outcome.out);
+        steps(&before, &usual, &outcome.out);
         Outcome::of(&mut odd, line, &Odd);
     }
 }
@@ -75,6 +77,21 @@ fn arc(before: &Interpreter, out: &Commands) {
     if let Motion::Arc { target, arc, .. } = &out.motion {
         for tolerance in [0.01, 0.5] {
             chords::check(before.position(), target, arc, tolerance);
+        }
+    }
+}
+
+/// Carries a line out. Some holes are drilled in a million pecks: those are not followed to the end.
+fn steps(before: &Interpreter, after: &Interpreter, out: &Commands) {
+    let (mut steps, mut at) = (Steps::default(), *before.position());
+    for _ in 0..2_000 {
+        match (steps.next(out, &at), &out.motion) {
+            (None, Motion::Home { .. }) => return,
+            (None, _) => return assert_eq!(at, *after.position(), "where the steps lead"),
+            (Some(Step::Line(target, _) | Step::SetPosition(target)), _) => at = target,
+            (Some(Step::Arc), Motion::Arc { target, .. })
+            | (Some(Step::Probe), Motion::Probe { target, .. }) => at = *target,
+            _ => {}
         }
     }
 }
