@@ -73,7 +73,7 @@ fn a_power_cut_leaves_the_old_value_or_the_new() {
 fn rubbish_is_no_setting() {
     let mut cells = [0u8; 4096];
     for (i, cell) in cells.iter_mut().enumerate() {
-        *cell = (i * 7919 >> 3) as u8;
+        *cell = ((i * 7919) >> 3) as u8;
     }
     let (mut machine, mut host) = booted_with(&cells);
     assert_eq!(value(&mut machine, &mut host, "xvm"), 800.0);
