@@ -183,10 +183,10 @@ impl Machine for View<'_> {
     }
 
     fn start_job(&mut self, number: u8) -> Status {
-        if number != 0 && self.busy() {
+        let Some(job) = Job::new(number) else { return Status::Error };
+        if !job.is_none() && self.busy() {
             return Status::NotAccepted;
         }
-        let Some(job) = Job::new(number) else { return Status::Error };
         self.links.job.set(job);
         self.links.parser_wake.signal();
         Status::Ok
