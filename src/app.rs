@@ -44,6 +44,7 @@ impl Links {
             settings_changed: Cell::new(true),
             rate: Cell::new(None),
             exception: Cell::new(None),
+            job: Cell::default(),
             storage: Storage::new(),
             mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),

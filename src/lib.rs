@@ -18,6 +18,7 @@ pub mod boards;
 pub mod canon;
 pub mod config;
 pub mod gcode;
+pub mod jobs;
 pub mod math;
 pub mod motion;
 pub mod motors;

@@ -11,6 +11,7 @@ pub enum Status {
     Ok = 0,
     Error = 1,
     Noop = 3,
+    EndOfFile = 8,
     BufferFull = 13,
     Initializing = 15,
     InternalError = 20,

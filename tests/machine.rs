@@ -246,3 +246,43 @@ fn settings_and_offsets_survive_a_reset() {
     .join()
     .unwrap();
 }
+
+#[test]
+fn xoff_stops_a_sender_that_heeds_it_before_anything_is_lost() {
+    let mut sender = Sender::boot();
+    // Slow moves keep the planner busy: lines pile up.
+    let lines: String = (0..120).map(|i| format!("N{i} g1 f100 x{}.25\n", i % 7)).collect();
+    let mut bytes = lines.as_bytes().chunks(1);
+    let (mut stopped, mut stops) = (false, 0);
+    for _ in 0..2_000_000 {
+        if !stopped {
+            match bytes.next() {
+                Some(byte) => sender.machine.send(byte),
+                None => break,
+            }
+        }
+        sender.machine.run_ms(if stopped { 20 } else { 0 });
+        sender.machine.run_until(1, || false);
+        for byte in sender.machine.received() {
+            match byte {
+                0x13 => (stopped, stops) = (true, stops + 1),
+                0x11 => stopped = false,
+                _ => sender.heard.push(byte.into()),
+            }
+        }
+    }
+    sender.ask("", 200_000);
+    assert!(stops > 2, "{stops}");
+    assert_eq!(sender.answered(), 120);
+    assert!(!sender.heard.contains("\"er\""), "{}", sender.heard);
+}
+
+#[test]
+fn xoff_from_the_sender_holds_answers_back() {
+    let mut sender = Sender::boot();
+    assert_eq!(sender.ask("\u{13}{fb:n}\n", 500), "");
+    assert!(sender.ask("\u{11}", 500).starts_with("{\"r\":{\"fb\":440.20}"));
+    // Without flow control they are like other bytes that do not print.
+    sender.ask("{ex:0}\n", 100);
+    assert_ne!(sender.ask("\u{13}{fb:n}\n", 500), "");
+}

@@ -23,6 +23,15 @@ pub const RETURNED: u8 = 4;
 /// The reader is woken at the end of a line, and when this many bytes have come since: a power of two.
 pub const BATCH: u8 = 32;
 
+/// What stops the other side of a line, and lets it go on.
+pub const XOFF: u8 = 0x13;
+/// See [`XOFF`].
+pub const XON: u8 = 0x11;
+/// The sender is stopped when the receive ring holds more: most senders say 100 bytes more before they heed it.
+pub const HIGH_WATER: usize = 128;
+/// And goes on when it holds less.
+pub const LOW_WATER: usize = 32;
+
 /// Bytes received.
 pub type Received = Consumer<u8, RING>;
 /// Bytes to send. Call `imp::uart::kick` after filling it.

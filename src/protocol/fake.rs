@@ -114,6 +114,10 @@ impl Machine for Fake {
         Status::Ok
     }
 
+    fn start_job(&mut self, number: u8) -> Status {
+        if number < 20 { Status::Ok } else { Status::Error }
+    }
+
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {
         match motor {
             Some(motor) => self.powered[usize::from(motor)] = on,

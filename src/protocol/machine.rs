@@ -29,6 +29,8 @@ pub trait Machine {
     fn report(&mut self) -> &mut StatusReport;
     /// Ends an alarm, if there is one.
     fn clear(&mut self) -> Status;
+    /// Starts a built-in job, or ends the one that runs: 0.
+    fn start_job(&mut self, number: u8) -> Status;
     /// Powers a motor, or takes its power; all of them for `None`.
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status;
 

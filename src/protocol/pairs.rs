@@ -221,6 +221,17 @@ fn done(status: Status) -> Result<(), Status> {
     if status == Status::Ok { Ok(()) } else { Err(status) }
 }
 
+/// The value of a pair as a whole number.
+fn whole<M, O>(pair: &Pair, c: &Context<'_, M, O>) -> Result<i32, Status> {
+    if pair.kind != Kind::Number {
+        return Err(Status::UnsupportedType);
+    }
+    Number::parse(pair.value.of(c.line))
+        .filter(|number| number.is_integer())
+        .and_then(|number| number.fixed(0, false))
+        .ok_or(Status::BadNumber)
+}
+
 fn act<M: Machine, O>(
     action: Action,
     pair: &Pair,
@@ -232,16 +243,18 @@ fn act<M: Machine, O>(
         Action::Block if pair.kind == Kind::Text => return Err(Status::NotAccepted),
         Action::Block => return Err(Status::UnsupportedType),
         Action::Clear => return done(c.machine.clear()),
+        Action::Test if pair.kind == Kind::Null => return Ok(()),
+        Action::Test => {
+            let number = whole(pair, c)?;
+            let number = u8::try_from(number).map_err(|_| Status::OutOfRange)?;
+            return done(c.machine.start_job(number));
+        }
         Action::Energize => true,
         Action::Release => false,
     };
     let motor = match pair.kind {
         Kind::Null | Kind::True => 0,
-        Kind::Number => Number::parse(pair.value.of(c.line))
-            .filter(|number| number.is_integer())
-            .and_then(|number| number.fixed(0, false))
-            .ok_or(Status::BadNumber)?,
-        _ => return Err(Status::UnsupportedType),
+        _ => whole(pair, c)?,
     };
     match motor {
         0 => done(c.machine.energize(None, on)),

@@ -10,13 +10,14 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 70;
+const ENTRIES: usize = 71;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
         (Status::Ok, text!("OK")),
         (Status::Error, text!("Error")),
         (Status::Noop, text!("Noop")),
+        (Status::EndOfFile, text!("End of file")),
         (Status::BufferFull, text!("Buffer full")),
         (Status::Initializing, text!("Initializing")),
         (Status::InternalError, text!("Internal error")),

@@ -148,12 +148,13 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [(Text, Action); 5] = [
+    static ACTIONS: [(Text, Action); 6] = [
         (text!("gc"), Action::Block),
         (text!("clear"), Action::Clear),
         (text!("clr"), Action::Clear),
         (text!("me"), Action::Energize),
         (text!("md"), Action::Release),
+        (text!("test"), Action::Test),
     ];
 }
 
@@ -169,6 +170,8 @@ pub enum Action {
     Energize,
     /// `md`: take power from motors.
     Release,
+    /// `test`: run a built-in job.
+    Test,
 }
 
 /// Names that stand for several.

@@ -32,6 +32,7 @@ use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 use crate::hal::byte::SharedByte;
+use crate::jobs::Job;
 use crate::motion::exec::Snapshot;
 use crate::motion::queue;
 use crate::protocol::{Mode, StatusReport};
@@ -74,6 +75,8 @@ pub struct Links {
     pub tx: Mutex<NoopRawMutex, Tx>,
     /// The sender asks whether anybody is there: control sets it, the reporter answers.
     pub enquiry: Cell<bool>,
+    /// The built-in job that runs.
+    pub job: Cell<Job>,
     /// What has to be put away.
     pub storage: Storage,
     /// A setting has changed since the planner looked.

@@ -2,13 +2,14 @@
 //!
 //! Reads the line pool, writes `Links::commands`, the G-code model, the settings and the response;
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
-//! data lines only while the planner is free, so that a long job never locks the sender out. A line
+//! data lines only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
 //! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`].
 
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::View;
+use crate::jobs::Job;
 use crate::protocol::{Mode, Next, Request, Span, is_brief, put_brief};
 use crate::status::Status;
 use crate::store::kept::Item;
@@ -16,14 +17,19 @@ use crate::store::kept::Item;
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
-        let data = !links.commands_taken.get();
+        let free = !links.commands_taken.get();
+        let runs_job = !links.job.get().is_none();
+        let data = free && !runs_job;
         let tried = if data { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
             continue;
         }
         let next = links.lines.borrow().next(data);
         let Some((id, class)) = next else {
-            links.parser_wake.wait().await;
+            match free && runs_job {
+                true => job_line(links),
+                false => links.parser_wake.wait().await,
+            }
             continue;
         };
         if let Some(mut request) = begin(links, id, class, tried)
@@ -33,6 +39,23 @@ pub async fn run(links: &'static Links) -> ! {
         }
         finish(links, id);
     }
+}
+
+/// Carries out the next line of a built-in job. Its end, and a line that is refused, are told by an exception
+/// report.
+#[inline(never)]
+fn job_line(links: &Links) {
+    let mut job = links.job.get();
+    let status = match job.next_line() {
+        Some(line) => interpret(links, &line, Usual::NotTried).0,
+        None => Status::EndOfFile,
+    };
+    if !matches!(status, Status::Ok | Status::Noop) {
+        job = Job::default();
+        links.exception.set(Some(status));
+        links.reporter_wake.signal();
+    }
+    links.job.set(job);
 }
 
 /// Whether the next line was a usual one.

@@ -3,15 +3,19 @@
 //! Reads the receive ring, writes the line pool, waits on [`Event::Received`] or for pool space; never
 //! runs longer than the ring is full (255 bytes, about 6,000 cycles). When the pool is full the bytes
 //! stay in the ring, and when that is full too bytes are lost: the line that is damaged thereby is
-//! refused, and so is each line that is lost whole.
+//! refused, and so is each line that is lost whole. With `ex` 1 the sender is stopped before that by XOFF, and
+//! stops the machine's answers so.
 
+use embassy_futures::select::select;
 use embassy_futures::yield_now;
 
 use super::lines::LinePool;
 use super::links::Links;
 use crate::hal::event::{Event, next};
-use crate::hal::imp::uart::lost_ends;
-use crate::hal::serial::{BEHIND_END, CLEAN, MARKS, RETURNED, Received};
+use crate::hal::imp::uart::{self, lost_ends};
+use crate::hal::serial::{
+    BEHIND_END, CLEAN, HIGH_WATER, LOW_WATER, MARKS, RETURNED, Received, XOFF, XON,
+};
 use crate::protocol::Mode;
 use crate::status::Status;
 
@@ -29,12 +33,18 @@ enum Left {
 
 /// The task.
 pub async fn run(links: &'static Links, received: Received) -> ! {
-    let mut intake = Intake { received, seen: lost_ends(), refused: 0, then: 0 };
+    let mut intake =
+        Intake { received, seen: lost_ends(), refused: 0, then: 0, sender_stopped: false };
     loop {
-        match intake.turn(links) {
+        let left = intake.turn(links);
+        intake.control_flow(links);
+        match left {
             Left::Nothing => next(Event::Received).await,
             Left::Bytes => yield_now().await,
-            Left::Full => links.pool_space.wait().await,
+            Left::Full => {
+                // The ring goes on filling.
+                select(links.pool_space.wait(), next(Event::Received)).await;
+            }
         }
     }
 }
@@ -47,6 +57,8 @@ struct Intake {
     refused: u16,
     /// The mark that told of them.
     then: u8,
+    /// It has been sent XOFF.
+    sender_stopped: bool,
 }
 
 impl Intake {
@@ -73,6 +85,10 @@ impl Intake {
             };
             let is_line = match byte {
                 ..MARKS => self.loss(pool, byte, links),
+                XON | XOFF if links.settings.borrow().has_xon_xoff() => {
+                    uart::hold(byte == XOFF);
+                    false
+                }
                 _ => pool.put(byte),
             };
             if is_line {
@@ -80,6 +96,22 @@ impl Intake {
             }
         }
         Left::Bytes
+    }
+
+    /// Stops the sender, or lets it go on.
+    #[inline(never)]
+    fn control_flow(&mut self, links: &Links) {
+        let waiting = self.received.len();
+        let stop = match self.sender_stopped {
+            true => waiting >= LOW_WATER,
+            false => waiting > HIGH_WATER,
+        };
+        // One that was stopped must not stay so when the setting changes.
+        let stop = stop && links.settings.borrow().has_xon_xoff();
+        if stop != self.sender_stopped {
+            self.sender_stopped = stop;
+            uart::send_ahead(if stop { XOFF } else { XON });
+        }
     }
 
     /// Bytes were lost here. Returns whether the mark stands for the end of a whole line.

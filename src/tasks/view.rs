@@ -13,6 +13,7 @@ use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
 use crate::hal::imp::{gpio, stepper};
+use crate::jobs::Job;
 use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
@@ -49,7 +50,10 @@ impl<'a> View<'a> {
 
     /// Whether anything is queued or runs.
     fn busy(&self) -> bool {
-        self.motion().running || queue::used() > 0 || self.links.commands_taken.get()
+        self.motion().running
+            || queue::used() > 0
+            || self.links.commands_taken.get()
+            || !self.links.job.get().is_none()
     }
 
     /// `stat`.
@@ -175,6 +179,16 @@ impl Machine for View<'_> {
     }
 
     fn clear(&mut self) -> Status {
+        Status::Ok
+    }
+
+    fn start_job(&mut self, number: u8) -> Status {
+        let Some(job) = Job::new(number) else { return Status::Error };
+        if !job.is_none() && self.busy() {
+            return Status::NotAccepted;
+        }
+        self.links.job.set(job);
+        self.links.parser_wake.signal();
         Status::Ok
     }
 

@@ -27,6 +27,10 @@ static TX: ByteRing = Ring::new();
 static LOST_ENDS: [SharedByte; 2] = [const { SharedByte::new(0) }; 2];
 static REALTIME: SharedByte = SharedByte::new(0);
 
+/// A byte to send before all others, and whether these are held back.
+static AHEAD: SharedByte = SharedByte::new(0);
+static HELD: SharedByte = SharedByte::new(0);
+
 const UCSR0B: *mut u8 = 0xC1 as *mut u8;
 const RXCIE: u8 = 1 << 7;
 const UDRIE: u8 = 1 << 5;
@@ -57,6 +61,18 @@ pub fn set_rate(rate: u32) {
 pub fn kick() {
     // SAFETY: the register has two values after start-up, written whole.
     unsafe { UCSR0B.write_volatile(RXCIE | UDRIE | RXEN | TXEN) };
+}
+
+/// Sends a byte, not 0, before what the ring holds, even while the line is held. Thread mode.
+pub fn send_ahead(byte: u8) {
+    AHEAD.set(byte);
+    kick();
+}
+
+/// Holds what the ring holds back, or lets it go. Thread mode.
+pub fn hold(held: bool) {
+    HELD.set(held.into());
+    kick();
 }
 
 /// Line ends lost since start-up, modulo 2^16.
@@ -298,7 +314,7 @@ extern "C" fn __vector_25() -> ! {
     }
 }
 
-/// USART0_UDRE: sends a byte, in 60 cycles, or stops asking when there is none.
+/// USART0_UDRE: sends a byte, in 68 cycles, or stops asking when there is none.
 ///
 /// Interrupts are off for 19 cycles on the way in and 16 on the way out.
 #[unsafe(no_mangle)]
@@ -317,6 +333,12 @@ extern "C" fn __vector_26() -> ! {
             "sei",
             "push r30",
             "push r31",
+            "lds  r24, {ahead}",
+            "tst  r24",
+            "brne 3f",
+            "lds  r24, {held}",
+            "tst  r24",
+            "brne 2f",
             "lds  r30, {tx} + {tail}",
             "lds  r31, {tx} + {head}",
             "cp   r30, r31",
@@ -327,6 +349,7 @@ extern "C" fn __vector_26() -> ! {
             "subi r30, lo8(-({tx} + {slots}))",
             "sbci r31, hi8(-({tx} + {slots}))",
             "ld   r24, Z",
+            "4:",
             "sts  0xC6, r24",
             "sbi  0x1E, {transmitted}",
             "pop  r31",
@@ -346,6 +369,13 @@ extern "C" fn __vector_26() -> ! {
             "pop  r30",
             "cli",
             "rjmp 1b",
+            // A byte that goes before all others.
+            "3:",
+            "ldi  r30, 0",
+            "sts  {ahead}, r30",
+            "rjmp 4b",
+            ahead = sym AHEAD,
+            held = sym HELD,
             tx = sym TX,
             head = const ByteRing::HEAD,
             tail = const ByteRing::TAIL,

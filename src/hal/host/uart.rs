@@ -21,6 +21,9 @@ struct Line {
     sent: Vec<u8>,
     /// The byte that is leaving.
     leaving: Option<u8>,
+    /// A byte to send before all others, and whether these are held back.
+    ahead: Option<u8>,
+    held: bool,
     lost_ends: u16,
     /// Bytes queued, modulo 256.
     queued: u8,
@@ -87,6 +90,18 @@ pub fn kick() {
     }
 }
 
+/// Sends a byte, not 0, before what the ring holds, even while the line is held.
+pub fn send_ahead(byte: u8) {
+    uart().line.borrow_mut().ahead = Some(byte);
+    kick();
+}
+
+/// Holds what the ring holds back, or lets it go.
+pub fn hold(held: bool) {
+    uart().line.borrow_mut().held = held;
+    kick();
+}
+
 /// Line ends lost since start-up, modulo 2^16.
 pub fn lost_ends() -> u16 {
     uart().line.borrow().lost_ends
@@ -136,7 +151,11 @@ pub(super) fn advance() {
 }
 
 fn load_tx(line: &mut Line) {
-    line.leaving = line.tx_out.as_mut().and_then(Consumer::pop);
+    line.leaving = match line.ahead.take() {
+        None if line.held => None,
+        None => line.tx_out.as_mut().and_then(Consumer::pop),
+        ahead => ahead,
+    };
     let busy = line.leaving.is_some();
     uart().next_tx.set(if busy { now() + uart().byte_cycles.get() } else { NEVER });
 }

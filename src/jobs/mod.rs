@@ -1,0 +1,103 @@
+//! Jobs in program memory, started by `{test:n}`: to try a machine out without a sender's file.
+//!
+//! The parser task takes their lines in turn with those of the sender (`tasks::parser`): data lines wait until the job
+//! is over, control lines do not. A line that is refused ends the job. A job is a row of pieces of text, each
+//! of some lines and carried out so many times, so that a thousand moves need no more memory than one.
+
+mod texts;
+
+use heapless::Vec;
+
+use crate::progmem::Text;
+
+/// The longest line of a job, in bytes.
+pub const LINE_MAX: usize = 48;
+
+/// A piece of a job.
+#[derive(Clone, Copy)]
+pub struct Piece {
+    /// Lines, parted by line feeds.
+    text: Text,
+    /// How many times they are carried out.
+    times: u8,
+}
+
+/// Where a job has come to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Job {
+    /// Its number; 0 is none.
+    number: u8,
+    piece: u8,
+    round: u8,
+    at: u8,
+}
+
+impl Job {
+    /// The job of that number, from its start; number 0 is none. `None` for one that does not exist.
+    pub fn new(number: u8) -> Option<Self> {
+        let exists = number == 0 || texts::piece(number, 0).is_some();
+        exists.then_some(Self { number, ..Self::default() })
+    }
+
+    /// Whether there is none.
+    pub fn is_none(&self) -> bool {
+        self.number == 0
+    }
+
+    /// Its number.
+    pub fn number(&self) -> u8 {
+        self.number
+    }
+
+    /// The next line; `None` at the end.
+    pub fn next_line(&mut self) -> Option<Vec<u8, LINE_MAX>> {
+        loop {
+            let piece = texts::piece(self.number, self.piece)?;
+            let mut line = Vec::new();
+            while let Some(byte) = piece.text.at(self.at.into()) {
+                self.at += 1;
+                if byte == b'\n' {
+                    return Some(line);
+                }
+                // A test holds the lines to their length.
+                let _ = line.push(byte);
+            }
+            self.at = 0;
+            self.round += 1;
+            if self.round >= piece.times {
+                self.round = 0;
+                self.piece += 1;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gcode::Interpreter;
+    use crate::gcode::command::Commands;
+    use crate::gcode::setup::Usual;
+    use std::string::String;
+
+    #[test]
+    fn all_jobs_are_good_programs_but_for_what_they_show() {
+        let mut lines = 0;
+        for number in 1..=u8::MAX {
+            let Some(mut job) = Job::new(number) else { continue };
+            let (mut state, mut out) = (Interpreter::new(), Commands::default());
+            let mut last = String::new();
+            while let Some(line) = job.next_line() {
+                assert!(line.len() < LINE_MAX, "{number}");
+                let done = state.interpret(&line, &Usual, &mut out);
+                last = String::from_utf8(line.to_vec()).unwrap();
+                assert!(done.is_ok(), "job {number}: {last}");
+                lines += 1;
+            }
+            assert!(last.starts_with("M2") || last.starts_with("M30"), "{number}: {last}");
+        }
+        assert!(lines > 2_000, "{lines}");
+        assert_eq!(Job::new(200), None);
+        assert_eq!(Job::new(0), Some(Job::default()));
+    }
+}
