@@ -38,12 +38,15 @@ struct Server {
     boots: u64,
 }
 
-/// Serves until interrupted. True when the firmware was still alive then, and where it was expected.
+/// Serves until interrupted, or until the standard input ends if a job is expected. True when the firmware was still alive then, and where it was expected.
 pub fn serve(args: &ServeArgs) -> Result<bool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
         .context("cannot handle interrupts")?;
+    if args.expect.is_some() {
+        stop_with_input(Arc::clone(&stop));
+    }
     let mut server = Server::new(args)?;
     println!("{}", server.pty.path().display());
     let mut end = Ok(());
@@ -59,6 +62,14 @@ pub fn serve(args: &ServeArgs) -> Result<bool> {
         _ => true,
     };
     Ok(end.is_ok() && arrived)
+}
+
+/// Stops when the standard input ends: when whoever started this wants the verdict, or is gone.
+fn stop_with_input(stop: Arc<AtomicBool>) {
+    std::thread::spawn(move || {
+        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        stop.store(true, Ordering::Relaxed);
+    });
 }
 
 impl Server {

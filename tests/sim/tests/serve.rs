@@ -28,7 +28,8 @@ fn next(lines: &mut Lines<BufReader<File>>) -> String {
 /// Starts a server; its first line is the port.
 fn serve(more: &[&str]) -> (Server, File) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kerf-sim"));
-    command.arg("serve").arg("--elf").arg(image(&MEGA2560_GRBL)).args(more).stdout(Stdio::piped());
+    command.arg("serve").arg("--elf").arg(image(&MEGA2560_GRBL)).args(more);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut server = Server(command.spawn().unwrap());
     let mut path = String::new();
     BufReader::new(server.0.stdout.as_mut().unwrap()).read_line(&mut path).unwrap();
@@ -36,10 +37,9 @@ fn serve(more: &[&str]) -> (Server, File) {
     (server, port)
 }
 
-/// Interrupts a server; what it says then, and whether it is content.
-fn interrupt(server: &mut Server) -> (String, bool) {
-    let interrupt = format!("kill -INT {}", server.0.id());
-    assert!(Command::new("sh").args(["-c", &interrupt]).status().unwrap().success());
+/// Ends a server's standard input; what it says then, and whether it is content.
+fn end(server: &mut Server) -> (String, bool) {
+    drop(server.0.stdin.take());
     let mut text = String::new();
     server.0.stdout.as_mut().unwrap().read_to_string(&mut text).unwrap();
     (text, server.0.wait().unwrap().success())
@@ -55,7 +55,7 @@ fn it_is_told_whether_the_machine_is_where_the_job_ends() {
         assert!(next(&mut lines).contains("SYSTEM READY"));
         port.write_all(sent.as_bytes()).unwrap();
         while !lines.next().unwrap().unwrap().contains("\"stat\":3") {}
-        let (text, ok) = interrupt(&mut server);
+        let (text, ok) = end(&mut server);
         assert_eq!((ok, text.contains("result: OK")), (content, content), "{text}");
     }
     std::fs::remove_file(job).unwrap();
