@@ -97,7 +97,10 @@ module.exports = class Server {
     on('serialport:read', (line) => this.lines.push(line));
     on('controller:state', (_, state) => (this.controller = state));
     on('controller:settings', (_, settings) => (this.settings = settings));
-    on('sender:status', (status) => (this.sender = status));
+    on('sender:status', (status) => {
+      this.sender = status;
+      this.answered = Math.max(this.answered, status.received);
+    });
     on('workflow:state', (state) => (this.workflow = state));
   }
 
@@ -122,6 +125,8 @@ module.exports = class Server {
   }
 
   async load(name, gcode) {
+    /// Lines of the program that have been answered, also when it has ended and is wound back.
+    this.answered = 0;
     await this.call('command', this.port, 'gcode:load', name, gcode, {});
   }
 

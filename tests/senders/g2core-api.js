@@ -3,11 +3,14 @@
 'use strict';
 
 require('./serialport4');
+const fs = require('fs');
 const installed = require('./installed');
 const { step, NotYet, sleep, until, within, ensure, main } = require('./steps');
 
 const G2coreAPI = installed('g2core-api');
 const [port, job] = process.argv.slice(2);
+
+const lines = fs.readFileSync(job, 'utf8').split('\n').length;
 
 const HOLD = 6;
 const SETTING = 'xvm';
@@ -37,6 +40,7 @@ async function close() {
   const closed = new Promise((resolve) => g2.once('close', resolve));
   g2.close();
   await closed;
+  await sleep(300); // The simulated board looks now and then whether somebody has the port open.
   return 'port closed';
 }
 
@@ -44,9 +48,11 @@ async function settings() {
   const before = await g2.get(SETTING);
   const other = before === 700 ? 600 : 700;
   ensure((await g2.set(SETTING, other)) === other, 'the new value is not taken');
+  await close();
+  await connect();
   ensure((await g2.get(SETTING)) === other, 'the new value is not kept');
   ensure((await g2.set(SETTING, before)) === before, 'the old value is not taken');
-  return `${SETTING} ${before}, written and read ${other}, written ${before}`;
+  return `${SETTING} ${before}, written ${other}, kept over a reset, written ${before}`;
 }
 
 let sent;
@@ -62,7 +68,7 @@ async function stream() {
 }
 
 async function hold() {
-  await until(() => sent > 40 && sr.vel > 0);
+  await until(() => sent > lines / 10 && sr.vel > 0);
   g2.write('!');
   const held = await within(5000, () => sr.stat === HOLD);
   if (!held) {

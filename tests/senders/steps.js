@@ -62,17 +62,25 @@ function ensure(condition, text) {
   if (!condition) throw new Error(text);
 }
 
-/// Runs the test, and ends the process with what came of it.
+/// Runs the test, and ends the process with what came of it. The test is given up when nobody waits for
+/// it any more: then the standard input ends.
 async function main(test, end) {
-  let code = 0;
+  const leave = async (code) => {
+    await end();
+    process.exit(code);
+  };
+  const fail = (error) => {
+    if (!(error instanceof Failed)) tell('failed', 'test', String(error.stack).replace(/\s+/g, ' '));
+    return leave(1);
+  };
+  process.on('uncaughtException', fail);
+  process.stdin.on('end', () => leave(1)).resume();
   try {
     await test();
   } catch (error) {
-    if (!(error instanceof Failed)) tell('failed', 'test', error.stack.replace(/\s+/g, ' '));
-    code = 1;
+    return fail(error);
   }
-  await end();
-  process.exit(code);
+  return leave(0);
 }
 
 module.exports = { step, NotYet, sleep, until, within, ensure, main };

@@ -19,7 +19,7 @@ impl Board {
     pub fn start(program: &Path, elf: &Path, job: &Path) -> Result<Board> {
         let mut command = Command::new(program);
         command.args(["serve", "--speed", "max", "--elf"]).arg(elf).arg("--expect").arg(job);
-        command.stdin(Stdio::null()).stdout(Stdio::piped());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.spawn().context("cannot start the simulator")?;
         let mut output = BufReader::new(child.stdout.take().context("no output")?);
         let mut port = String::new();
@@ -30,10 +30,9 @@ impl Board {
         Ok(board)
     }
 
-    /// Interrupts it; tells where its motors are, and whether that is where the job ends.
+    /// Ends its standard input and thereby it; tells where its motors are, and whether that is where the job ends.
     pub fn end(mut self) -> Result<(bool, String)> {
-        let interrupt = format!("kill -INT {}", self.child.id());
-        ensure!(Command::new("sh").args(["-c", &interrupt]).status()?.success(), "{interrupt}");
+        drop(self.child.stdin.take());
         let mut text = String::new();
         self.output.read_to_string(&mut text)?;
         let exact = self.child.wait()?.success() && text.contains("\nresult: OK");
@@ -60,7 +59,11 @@ fn motors(text: &str) -> String {
             .then(|| format!("motor {motor} at {steps}, right is {expected}, {total} steps"))
     };
     let motors: Vec<_> = text.lines().filter_map(shown).collect();
-    if motors.is_empty() { "no motor has moved".to_owned() } else { motors.join("; ") }
+    match motors.is_empty() {
+        true if text.contains("arrival ") => "no motor has moved".to_owned(),
+        true => "the simulator does not tell where the motors are".to_owned(),
+        false => motors.join("; "),
+    }
 }
 
 #[cfg(test)]
@@ -72,6 +75,7 @@ mod tests {
         let text = "free stack 9 bytes\narrival 1  steps -5  expected -5  total 15\n\
                     arrival 2  steps 0  expected 0  total 0\nresult: OK\n";
         assert_eq!(motors(text), "motor 1 at -5, right is -5, 15 steps");
-        assert_eq!(motors("nothing"), "no motor has moved");
+        assert_eq!(motors("arrival 1  steps 0  expected 0  total 0\n"), "no motor has moved");
+        assert!(motors("").contains("not tell"));
     }
 }

@@ -85,7 +85,8 @@ impl Driver {
         let script = install::drivers().join(session.sender.name()).with_extension("js");
         let mut command = Command::new("node");
         command.arg(script).arg(port).arg(session.job).current_dir(session.folder);
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
+        // A driver gives up when its standard input ends, which it does with us, however that comes.
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
         let mut child = command.spawn().context("cannot start node")?;
         let output = BufReader::new(child.stdout.take().context("no output")?);
         let (sender, lines) = channel();

@@ -67,9 +67,12 @@ pub static NEEDS: [Need; 9] = [
         probe(Command::new("pkg-config").args(libraries)).is_some()
     }),
     tool("a C++ compiler, for libFuzzer", &["g++"], Scope::Fuzzers, || has("c++")),
-    tool("node and npm, for senders", &["nodejs", "npm"], Scope::Senders, || {
-        has("node") && has("npm")
-    }),
+    tool(
+        "node and npm, for senders",
+        &["nodejs", "npm", "ca-certificates"],
+        Scope::Senders,
+        || has("node") && has("npm"),
+    ),
 ];
 
 const SIM: Scope = Scope::Simulator;
