@@ -64,6 +64,12 @@ async function settings() {
   return `${SETTING} ${before}, written ${other}, kept over a reset, written ${before}`;
 }
 
+/// Fails if it has paused of its own accord, which it does when a line is refused.
+function notRefused() {
+  const why = () => JSON.stringify(server.sender.holdReason || server.lines.at(-1));
+  ensure(server.workflow !== 'paused', `it has paused: ${why()}`);
+}
+
 /// Complaints there were before the job: numbers that are missing while it could not ask for them.
 let before;
 
@@ -71,13 +77,19 @@ async function start() {
   before = server.complaints().length;
   await server.load(job, gcode);
   server.command('gcode:start');
-  await until(() => server.workflow === 'running' && server.sender.total > 0);
+  await until(() => {
+    notRefused();
+    return server.workflow === 'running' && server.sender.total > 0;
+  });
   return `${server.sender.total} lines, with its own wait at the end`;
 }
 
 /// Holds in the middle of a move: the machine says so, stands, and is where it was until it goes on.
 async function hold() {
-  await until(() => server.sender.received > server.sender.total / 10 && server.sr.velocity > 0);
+  await until(() => {
+    notRefused();
+    return server.answered > server.sender.total / 10 && server.sr.velocity > 0;
+  });
   server.command('gcode:pause');
   const held = await within(5000, () => server.sr.machineState === HOLD);
   const place = () => JSON.stringify(server.sr.mpos);
@@ -96,7 +108,7 @@ async function hold() {
 
 async function finish() {
   await until(() => {
-    ensure(server.workflow !== 'paused', `it has paused: ${JSON.stringify(server.sender.holdReason)}`);
+    notRefused();
     return server.workflow === 'idle';
   });
   const { total } = server.sender;
