@@ -17,7 +17,7 @@ struct Stage {
     run: fn() -> Result<()>,
 }
 
-const STAGES: [Stage; 7] = [
+const STAGES: &[Stage] = &[
     Stage { name: "tools", run: || setup::ensure(Scope::Simulator) },
     Stage { name: "format", run: format },
     Stage { name: "lints", run: lints },

@@ -9,6 +9,7 @@
 //! | [`size`], [`caps`] | prints and limits what an image takes |
 //! | [`sim`] | runs the image on the simulated board |
 //! | [`fuzz`] | runs the fuzzers |
+//! | [`senders`] | runs real senders against the simulated board |
 //! | [`checks`] | everything that must pass before a merge |
 //! | [`jobs`] | writes the example jobs |
 //! | [`nist`] | what another interpreter makes of G-code, to compare with |
@@ -25,6 +26,7 @@ mod fuzz;
 mod jobs;
 mod nist;
 mod process;
+mod senders;
 mod setup;
 mod sim;
 mod size;
@@ -56,6 +58,8 @@ enum Command {
     /// Look for inputs that break the interpreter or the machine, by fuzzing; fail on a finding.
     /// Corpus and findings are kept in target/fuzz, and the next run goes on from there
     Fuzz(fuzz::FuzzArgs),
+    /// Run real senders of G-code, CNCjs and g2core-api, against the simulated board
+    Senders(senders::SendersArgs),
     /// Run every check: format, lints, host tests, firmware, sizes, simulator
     Test,
     /// Write the firmware to a board
@@ -94,6 +98,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Bench(args) => return sim::bench(&args),
         Command::Serve(args) => return sim::serve(&args),
         Command::Fuzz(args) => return fuzz::run(&args),
+        Command::Senders(args) => senders::run(&args)?,
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
         Command::Jobs => jobs::write()?,

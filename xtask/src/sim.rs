@@ -9,7 +9,7 @@ use clap::Args;
 
 use crate::boards::Board;
 use crate::firmware;
-use crate::process::{host_cargo, pass_through, root};
+use crate::process::{host_cargo, pass_through, root, run as run_child};
 use crate::setup::{self, Scope};
 
 /// `cargo xtask sim`
@@ -84,7 +84,8 @@ pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
     pass_through(&mut bench_command(args, &elf))
 }
 
-fn prepare(board: Board) -> Result<PathBuf> {
+/// Gets everything that the simulator needs, and builds the firmware; where that lies.
+pub fn prepare(board: Board) -> Result<PathBuf> {
     setup::ensure(Scope::Simulator)?;
     let elf = firmware::build(board)?;
     if !root().join("target/sim/kerf-sim").exists() {
@@ -123,11 +124,22 @@ fn bench_command(args: &BenchArgs, elf: &Path) -> Command {
     command
 }
 
+/// Builds the simulator; where it lies.
+pub fn build() -> Result<PathBuf> {
+    run_child(&mut cargo("build"))?;
+    Ok(root().join("target/sim/kerf-sim"))
+}
+
 fn simulator(verb: &str, elf: &Path, board: Board) -> Command {
-    let mut cargo = host_cargo();
-    cargo.args(["run", "--quiet", "--profile", "sim", "--package", "kerf-sim"]);
-    cargo.args(["--bin", "kerf-sim", "--manifest-path"]).arg(root().join("Cargo.toml"));
+    let mut cargo = cargo("run");
     cargo.args(["--", verb, "--elf"]).arg(elf).args(["--board", board.name()]);
+    cargo
+}
+
+fn cargo(verb: &str) -> Command {
+    let mut cargo = host_cargo();
+    cargo.args([verb, "--quiet", "--profile", "sim", "--package", "kerf-sim"]);
+    cargo.args(["--bin", "kerf-sim", "--manifest-path"]).arg(root().join("Cargo.toml"));
     cargo
 }
 

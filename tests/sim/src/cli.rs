@@ -89,6 +89,10 @@ pub struct ServeArgs {
     /// Make a symbolic link to the pseudo-terminal.
     #[arg(long, value_name = "PATH")]
     pub link: Option<PathBuf>,
+    /// The job that senders send: at the end, which is that of the standard input, each motor must be
+    /// where this ends, to the step.
+    #[arg(long, value_name = "JOB")]
+    pub expect: Option<PathBuf>,
     /// Speed of the serial line at power-up; it goes along when the firmware changes its own.
     #[arg(long, default_value_t = 115_200, value_parser = baud())]
     pub baud: u32,

@@ -1,5 +1,6 @@
 //! `kerf-sim`: runs the firmware on a simulated board.
 
+mod arrival;
 mod cli;
 mod measure;
 mod pty;

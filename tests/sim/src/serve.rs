@@ -1,5 +1,6 @@
 //! `kerf-sim serve`: the machine behind a pseudo-terminal, at the pace of real time.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -7,6 +8,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use kerf_sim::{Image, Machine};
 
+use crate::arrival::Arrival;
 use crate::cli::{ServeArgs, Speed};
 use crate::pty::{Peer, Pty};
 use crate::run::board;
@@ -36,12 +38,15 @@ struct Server {
     boots: u64,
 }
 
-/// Serves until interrupted. True when the firmware was still alive then.
+/// Serves until interrupted, or until the standard input ends if a job is expected. True when the firmware was still alive then, and where it was expected.
 pub fn serve(args: &ServeArgs) -> Result<bool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
         .context("cannot handle interrupts")?;
+    if args.expect.is_some() {
+        stop_with_input(Arc::clone(&stop));
+    }
     let mut server = Server::new(args)?;
     println!("{}", server.pty.path().display());
     let mut end = Ok(());
@@ -52,7 +57,19 @@ pub fn serve(args: &ServeArgs) -> Result<bool> {
     if let Err(error) = &end {
         eprintln!("kerf-sim: {error:#}");
     }
-    Ok(end.is_ok())
+    let arrived = match &args.expect {
+        Some(job) if end.is_ok() => server.has_arrived(job)?,
+        _ => true,
+    };
+    Ok(end.is_ok() && arrived)
+}
+
+/// Stops when the standard input ends: when whoever started this wants the verdict, or is gone.
+fn stop_with_input(stop: Arc<AtomicBool>) {
+    std::thread::spawn(move || {
+        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        stop.store(true, Ordering::Relaxed);
+    });
 }
 
 impl Server {
@@ -139,6 +156,13 @@ impl Server {
         if self.speed != Speed::Max {
             std::thread::sleep(TICK);
         }
+    }
+
+    /// Prints where the last sender's job has brought the motors.
+    fn has_arrived(&mut self, job: &Path) -> Result<bool> {
+        let arrival = Arrival::of(&mut self.machine, job)?;
+        print!("{arrival}");
+        Ok(arrival.is_exact())
     }
 
     fn summary(&self) -> String {

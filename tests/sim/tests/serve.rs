@@ -3,7 +3,7 @@
 mod common;
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Lines, Write};
+use std::io::{BufRead, BufReader, Lines, Read, Write};
 use std::process::{Child, Command, Stdio};
 
 use common::image;
@@ -25,15 +25,45 @@ fn next(lines: &mut Lines<BufReader<File>>) -> String {
     lines.map(Result::unwrap).find(|line| !is_report(line)).unwrap()
 }
 
-#[test]
-fn a_sender_opens_the_port_and_moves_the_machine() {
+/// Starts a server; its first line is the port.
+fn serve(more: &[&str]) -> (Server, File) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kerf-sim"));
-    command.arg("serve").arg("--elf").arg(image(&MEGA2560_GRBL)).stdout(Stdio::piped());
+    command.arg("serve").arg("--elf").arg(image(&MEGA2560_GRBL)).args(more);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut server = Server(command.spawn().unwrap());
     let mut path = String::new();
     BufReader::new(server.0.stdout.as_mut().unwrap()).read_line(&mut path).unwrap();
+    let port = OpenOptions::new().read(true).write(true).open(path.trim()).unwrap();
+    (server, port)
+}
 
-    let mut port = OpenOptions::new().read(true).write(true).open(path.trim()).unwrap();
+/// Ends a server's standard input; what it says then, and whether it is content.
+fn end(server: &mut Server) -> (String, bool) {
+    drop(server.0.stdin.take());
+    let mut text = String::new();
+    server.0.stdout.as_mut().unwrap().read_to_string(&mut text).unwrap();
+    (text, server.0.wait().unwrap().success())
+}
+
+#[test]
+fn it_is_told_whether_the_machine_is_where_the_job_ends() {
+    let job = std::env::temp_dir().join(format!("kerf-serve-{}.gcode", std::process::id()));
+    std::fs::write(&job, "G1 X10 F500\n").unwrap();
+    for (sent, content) in [("g1x10f800\n", true), ("g1x9.99f800\n", false)] {
+        let (mut server, mut port) = serve(&["--speed", "max", "--expect", job.to_str().unwrap()]);
+        let mut lines = BufReader::new(port.try_clone().unwrap()).lines();
+        assert!(next(&mut lines).contains("SYSTEM READY"));
+        port.write_all(sent.as_bytes()).unwrap();
+        while !lines.next().unwrap().unwrap().contains("\"stat\":3") {}
+        let (text, ok) = end(&mut server);
+        assert_eq!((ok, text.contains("result: OK")), (content, content), "{text}");
+    }
+    std::fs::remove_file(job).unwrap();
+}
+
+#[test]
+fn a_sender_opens_the_port_and_moves_the_machine() {
+    let (_server, mut port) = serve(&[]);
     let mut lines = BufReader::new(port.try_clone().unwrap()).lines();
     assert!(next(&mut lines).ends_with(r#""msg":"SYSTEM READY"},"f":[1,0,0]}"#));
     port.write_all(b"{fb:n}\n").unwrap();

@@ -15,6 +15,8 @@ pub enum Scope {
     Simulator,
     /// Building the fuzzers, and nothing else.
     Fuzzers,
+    /// Running senders at the simulator.
+    Senders,
     /// All of it.
     Everything,
 }
@@ -24,6 +26,7 @@ impl Scope {
         match self {
             Scope::Everything => true,
             Scope::Fuzzers => need == Scope::Fuzzers,
+            Scope::Senders => need == Scope::Senders || Scope::Simulator.covers(need),
             Scope::Firmware | Scope::Simulator => need <= self,
         }
     }
@@ -42,7 +45,7 @@ pub struct Need {
 }
 
 /// Everything, in the order in which it is reported.
-pub static NEEDS: [Need; 8] = [
+pub static NEEDS: [Need; 9] = [
     Need {
         what: "Rust with its library sources (rustup nightly with rust-src, or Debian's)",
         packages: &["rustc-web", "cargo-web", "rust-web-src"],
@@ -64,6 +67,12 @@ pub static NEEDS: [Need; 8] = [
         probe(Command::new("pkg-config").args(libraries)).is_some()
     }),
     tool("a C++ compiler, for libFuzzer", &["g++"], Scope::Fuzzers, || has("c++")),
+    tool(
+        "node and npm, for senders",
+        &["nodejs", "npm", "ca-certificates"],
+        Scope::Senders,
+        || has("node") && has("npm"),
+    ),
 ];
 
 const SIM: Scope = Scope::Simulator;
@@ -126,6 +135,7 @@ mod tests {
         assert_eq!(needs(Scope::Firmware), 4);
         assert_eq!(needs(Scope::Simulator), 7);
         assert_eq!(needs(Scope::Fuzzers), 1);
+        assert_eq!(needs(Scope::Senders), 8);
         assert_eq!(needs(Scope::Everything), NEEDS.len());
     }
 

@@ -1,0 +1,57 @@
+//! Where a job that somebody else sent has to have brought the machine.
+
+use std::fmt::{self, Display, Formatter};
+use std::path::Path;
+
+use anyhow::Result;
+use kerf_sim::job::{read_lines, read_setup};
+use kerf_sim::{Host, Machine, oracle};
+
+/// For what is under way when the sender has left, ms of AVR time.
+const SETTLE_MS: u64 = 1_000;
+
+/// A motor at the end of a job.
+struct Motor {
+    /// Steps on balance.
+    steps: i64,
+    /// The oracle's.
+    expected: i64,
+    /// Steps in both directions.
+    total: u64,
+}
+
+/// The motors at the end of a job.
+pub struct Arrival(Vec<Motor>);
+
+impl Arrival {
+    /// Asks the firmware for its motors, and an independent reading of the job for the steps.
+    pub fn of(machine: &mut Machine, job: &Path) -> Result<Arrival> {
+        let lines = read_lines(job)?;
+        let mut host = Host::new(1);
+        host.run_for_ms(machine, SETTLE_MS)?;
+        let setup = read_setup(machine, &mut host)?;
+        let expected = oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup)?;
+        let motors = setup.motors.iter().zip(machine.recorder().motors());
+        let motors = motors.zip(expected.steps).map(|((setup, motor), expected)| Motor {
+            steps: if setup.inverted { -motor.position } else { motor.position },
+            expected,
+            total: motor.steps,
+        });
+        Ok(Arrival(motors.collect()))
+    }
+
+    /// Whether every motor is where it should be, to the step.
+    pub fn is_exact(&self) -> bool {
+        self.0.iter().all(|motor| motor.steps == motor.expected)
+    }
+}
+
+impl Display for Arrival {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        for (i, Motor { steps, expected, total }) in self.0.iter().enumerate() {
+            let motor = i + 1;
+            writeln!(f, "arrival {motor}  steps {steps}  expected {expected}  total {total}")?;
+        }
+        writeln!(f, "result: {}", if self.is_exact() { "OK" } else { "FAILED" })
+    }
+}

@@ -1,0 +1,78 @@
+//! `cargo xtask senders`: real senders of G-code against the simulated board.
+//!
+//! | module | for |
+//! |---|---|
+//! | [`install`] | gets the senders by npm |
+//! | [`board`] | the simulated board behind a serial port, and where its motors end |
+//! | [`session`] | one sender at one board |
+//! | [`step`] | what a sender's driver tells of its steps |
+//! | [`table`] | what came of it all |
+//!
+//! The drivers are `tests/senders/*.js`. Each has a board of its own, as fast as the computer can make
+//! it, and sends the whole job; then every motor has to be where the job ends, to the step.
+
+mod board;
+mod install;
+mod session;
+mod step;
+mod table;
+
+use std::path::PathBuf;
+
+use anyhow::{Result, ensure};
+use clap::{Args, ValueEnum};
+
+use crate::boards::Board;
+use crate::process::root;
+use crate::setup::{self, Scope};
+use crate::sim;
+use session::Session;
+
+/// `cargo xtask senders`
+#[derive(Args, Default)]
+pub struct SendersArgs {
+    /// This sender only
+    #[arg(long, value_enum)]
+    sender: Option<Sender>,
+    /// The job that they send, a file of G-code
+    #[arg(long, value_name = "JOB")]
+    job: Option<PathBuf>,
+}
+
+/// A sender that there is a driver for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Sender {
+    Cncjs,
+    G2coreApi,
+}
+
+impl Sender {
+    /// Its name, that of its npm package, and of its driver.
+    fn name(self) -> &'static str {
+        match self {
+            Sender::Cncjs => "cncjs",
+            Sender::G2coreApi => "g2core-api",
+        }
+    }
+}
+
+/// Runs the senders, all at once, and shows what came of it. Fails if anything did.
+pub fn run(args: &SendersArgs) -> Result<()> {
+    let job = args.job.clone().unwrap_or_else(|| root().join("examples/bracket.gcode"));
+    ensure!(job.is_file(), "there is no job {}", job.display());
+    let job = job.canonicalize()?;
+    setup::ensure(Scope::Senders)?;
+    let folder = install::senders()?;
+    let elf = sim::prepare(Board::default())?;
+    let program = sim::build()?;
+    let senders = args.sender.map_or_else(|| Sender::value_variants().to_vec(), |one| vec![one]);
+    let session =
+        |sender| Session { sender, program: &program, elf: &elf, job: &job, folder: &folder };
+    let results: Vec<_> = std::thread::scope(|scope| {
+        let runs = senders.iter().map(|&sender| scope.spawn(move || session(sender).run()));
+        let runs: Vec<_> = runs.collect();
+        runs.into_iter().map(|run| run.join().expect("a session does not panic")).collect()
+    });
+    ensure!(table::show(&results), "a sender cannot work with the firmware");
+    Ok(())
+}

@@ -1,0 +1,119 @@
+//! One sender at one board.
+
+use std::io::{BufRead, BufReader};
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+
+use super::Sender;
+use super::board::Board;
+use super::install;
+use super::step::{Outcome, Step};
+
+/// The step that every session ends with.
+pub const ARRIVAL: &str = "exact final step";
+/// A driver limits its steps itself; one that has not ended after this long never will.
+const LIMIT: Duration = Duration::from_secs(40 * 60);
+
+/// What a session needs.
+pub struct Session<'a> {
+    pub sender: Sender,
+    /// The simulator.
+    pub program: &'a Path,
+    pub elf: &'a Path,
+    pub job: &'a Path,
+    /// Where the senders are installed.
+    pub folder: &'a Path,
+}
+
+/// What came of a session.
+pub struct Done {
+    pub sender: &'static str,
+    pub steps: Vec<Step>,
+    pub seconds: u64,
+}
+
+impl Session<'_> {
+    /// Runs it and shows its steps as they come. Whatever goes wrong is a step that has failed.
+    pub fn run(&self) -> Done {
+        let began = Instant::now();
+        let sender = self.sender.name();
+        let mut steps = Vec::new();
+        let mut tell = |step: Step| {
+            println!("{sender}: {}: {}: {}", step.name, step.outcome.name(), step.details);
+            steps.push(step);
+        };
+        if let Err(error) = self.attempt(&mut tell) {
+            tell(Step::failed("session", format!("{error:#}")));
+        }
+        Done { sender, steps, seconds: began.elapsed().as_secs() }
+    }
+
+    fn attempt(&self, tell: &mut impl FnMut(Step)) -> Result<()> {
+        let board = Board::start(self.program, self.elf, self.job)?;
+        let mut driver = Driver::start(self, &board.port)?;
+        let end = Instant::now() + LIMIT;
+        while let Some(line) = driver.line(end)? {
+            match Step::parse(&line) {
+                Some(step) => tell(step),
+                None => println!("{}: {line}", self.sender.name()),
+            }
+        }
+        let status = driver.child.wait()?;
+        let (exact, details) = board.end()?;
+        let outcome = if exact { Outcome::Passed } else { Outcome::Failed };
+        tell(Step { name: ARRIVAL.to_owned(), outcome, details });
+        if !status.success() {
+            bail!("the driver ends with {status}");
+        }
+        Ok(())
+    }
+}
+
+/// A sender's driver, with all that it starts in a process group of its own.
+struct Driver {
+    child: Child,
+    lines: Receiver<String>,
+}
+
+impl Driver {
+    fn start(session: &Session, port: &str) -> Result<Driver> {
+        let script = install::drivers().join(session.sender.name()).with_extension("js");
+        let mut command = Command::new("node");
+        command.arg(script).arg(port).arg(session.job).current_dir(session.folder);
+        // A driver gives up when its standard input ends, which it does with us, however that comes.
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
+        let mut child = command.spawn().context("cannot start node")?;
+        let output = BufReader::new(child.stdout.take().context("no output")?);
+        let (sender, lines) = channel();
+        std::thread::spawn(move || {
+            output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line))
+        });
+        Ok(Driver { child, lines })
+    }
+
+    /// Its next line; none when it has ended.
+    fn line(&mut self, end: Instant) -> Result<Option<String>> {
+        use std::sync::mpsc::RecvTimeoutError::{Disconnected, Timeout};
+        match self.lines.recv_timeout(end.saturating_duration_since(Instant::now())) {
+            Ok(line) => Ok(Some(line)),
+            Err(Disconnected) => Ok(None),
+            Err(Timeout) => bail!("the driver has not ended within {} min", LIMIT.as_secs() / 60),
+        }
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        // Most often they have ended; then there is nothing to do.
+        if !matches!(self.child.try_wait(), Ok(Some(_))) {
+            let kill = format!("kill -KILL -{}", self.child.id());
+            let _ = Command::new("sh").args(["-c", &kill]).status();
+            let _ = self.child.wait();
+        }
+    }
+}
