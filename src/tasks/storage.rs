@@ -62,7 +62,9 @@ pub async fn run(links: &'static Links, mut log: Log) -> ! {
     loop {
         links.storage.wake.wait().await;
         while let Some(number) = links.storage.take() {
-            while let Some(mut write) = next(links, &mut log, &memory, number) {
+            let mut moved = 0;
+            while let Some(mut write) = next(links, &mut log, &memory, number, moved) {
+                moved += 1;
                 while write.step(&mut memory) {
                     while memory.is_busy() {
                         Timer::after_ticks(1).await;
@@ -77,7 +79,7 @@ pub async fn run(links: &'static Links, mut log: Log) -> ! {
 
 /// The next record to write on behalf of an item; `None` when it is put away.
 #[inline(never)]
-fn next(links: &Links, log: &mut Log, memory: &Eeprom, number: u16) -> Option<Write> {
+fn next(links: &Links, log: &mut Log, memory: &Eeprom, number: u16, moved: u16) -> Option<Write> {
     let item = Item::from_number(number)?;
     let key = item.key();
     let model = links.model.borrow();
@@ -85,7 +87,7 @@ fn next(links: &Links, log: &mut Log, memory: &Eeprom, number: u16) -> Option<Wr
     if log.newest(memory, key).unwrap_or(default) == value {
         return None;
     }
-    match log.put(memory, key, value) {
+    match log.put(memory, key, value, moved) {
         Put::Room(write) | Put::Last(write) => Some(write),
         Put::Full => {
             links.exception.set(Some(Status::PersistenceError));

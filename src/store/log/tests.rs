@@ -48,8 +48,8 @@ impl Memory for Cells {
 
 /// Puts an item away. False if there is no room.
 fn put(log: &mut Log, cells: &mut Cells, key: u16, value: i32) -> bool {
-    loop {
-        let (mut write, last) = match log.put(cells, key, value) {
+    for moved in 0.. {
+        let (mut write, last) = match log.put(cells, key, value, moved) {
             Put::Room(write) => (write, false),
             Put::Last(write) => (write, true),
             Put::Full => return false,
@@ -59,6 +59,7 @@ fn put(log: &mut Log, cells: &mut Cells, key: u16, value: i32) -> bool {
             return true;
         }
     }
+    false
 }
 
 #[test]
