@@ -4,6 +4,8 @@
 //! [`Settings`], which cost a load. Values are integers scaled by a power of ten, so text goes in
 //! and out exactly. They live in RAM only.
 
+#[cfg(not(target_arch = "avr"))]
+pub mod docs;
 pub mod name;
 pub mod number;
 pub mod ratio;

@@ -50,10 +50,10 @@ impl Fixed {
         Fixed { value: signed(inches, self.value < 0), decimals }
     }
 
-    /// With at least `decimals` decimals.
+    /// With at least `decimals` decimals; there must be room for them.
     pub fn padded(mut self, decimals: u8) -> Fixed {
         while self.decimals < decimals {
-            self.value = self.value.saturating_mul(10);
+            self.value = self.value.wrapping_mul(10);
             self.decimals += 1;
         }
         self
