@@ -32,6 +32,7 @@ impl Request {
             // Neither groups nor blocks can be given a value here.
             Target::Group(_) | Target::Action(Action::Block) => self.refuse(),
             Target::Action(Action::Help) => self.help(help::SETTINGS),
+            Target::Action(Action::Test) if null => self.help(help::TESTS),
             Target::Action(Action::Defaults) if null => self.help(help::DEFAULTS),
             _ => self.execute(&pair, target, c),
         }

@@ -9,13 +9,15 @@ use crate::progmem::Text;
 use crate::text;
 
 /// Lines of [`SCREENS`]; a screen is some of them.
-const LINES: usize = 36;
+const LINES: usize = 53;
 /// What `h` shows.
-pub const GENERAL: Span = Span { start: 0, end: 16 };
+pub const GENERAL: Span = Span { start: 0, end: 17 };
 /// What `$h` shows.
-pub const SETTINGS: Span = Span { start: 16, end: 31 };
+pub const SETTINGS: Span = Span { start: 17, end: 32 };
 /// What `$defa` shows.
-pub const DEFAULTS: Span = Span { start: 31, end: LINES as u8 };
+pub const DEFAULTS: Span = Span { start: 32, end: 37 };
+/// What `$test` shows.
+pub const TESTS: Span = Span { start: 37, end: LINES as u8 };
 
 progmem! {
     static SCREENS: [Text; LINES] = [
@@ -27,6 +29,7 @@ progmem! {
         text!("  $$        all settings\n"),
         text!("  $h        help with settings\n"),
         text!("  $defa=1   all settings back to their defaults\n"),
+        text!("  $test     list of built-in jobs; $test=3 runs one\n"),
         text!("  $me $md   motors on, motors off\n"),
         text!("  h         this help\n"),
         text!("  ~         go on after a program stop\n"),
@@ -57,6 +60,23 @@ progmem! {
         text!("Your own values are gone then: note them first ($$).\n"),
         text!("Offsets of G54 to G59.3 and tools are kept.\n"),
         text!("It is refused while the machine moves.\n"),
+
+        text!("\n\n\n### Kerf Test Jobs Help ###\n"),
+        text!("Start at zero; leave 80 mm free in X and Y, 40 mm in Z.\n"),
+        text!("  $test=1   smoke test: outputs, all axes\n"),
+        text!("  $test=2   homing\n"),
+        text!("  $test=3   squares\n"),
+        text!("  $test=4   arcs\n"),
+        text!("  $test=5   dwells\n"),
+        text!("  $test=6   a long move, to try hold and resume\n"),
+        text!("  $test=7   spindle and coolant\n"),
+        text!("  $test=9   inverse time\n"),
+        text!("  $test=10  rotary axes\n"),
+        text!("  $test=11  small moves\n"),
+        text!("  $test=12  slow moves\n"),
+        text!("  $test=13  offsets\n"),
+        text!("  $test=51  braid: 2,500 short moves\n"),
+        text!("  $test=0   ends the job that runs\n"),
     ];
 }
 

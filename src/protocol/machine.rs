@@ -3,6 +3,7 @@
 use super::report::StatusReport;
 use super::value::Value;
 use crate::config::{Setting, Settings};
+use crate::progmem;
 use crate::progmem::Text;
 use crate::status::Status;
 use crate::text;
@@ -28,15 +29,20 @@ pub enum Warning {
 impl Warning {
     /// What it says.
     pub(super) fn text(self) -> Text {
-        match self {
-            Warning::None => text!(""),
-            Warning::Microsteps => text!("*** WARNING *** Setting non-standard microstep value"),
-            Warning::Velocity => text!("*** WARNING *** Velocity limited by the step rate"),
-            Warning::Help => text!("Send $h for help, {sys:n} for the settings"),
-            Warning::AskDefaults => text!("Send {defa:true} to reset to default settings"),
-            Warning::Defaults => text!("Initializing configs to default settings"),
-        }
+        WARNINGS.at(self as usize).unwrap_or(text!(""))
     }
+}
+
+progmem! {
+    // A table, for what the compiler makes of a `match` would be in RAM.
+    static WARNINGS: [Text; 6] = [
+        text!(""),
+        text!("*** WARNING *** Setting non-standard microstep value"),
+        text!("*** WARNING *** Velocity limited by the step rate"),
+        text!("Send $h for help, {sys:n} for the settings"),
+        text!("Send {defa:true} to reset to default settings"),
+        text!("Initializing configs to default settings"),
+    ];
 }
 
 /// The machine behind the protocol. Nothing here waits.

@@ -156,11 +156,12 @@ fn prompts_can_be_silenced() {
 }
 
 #[test]
-fn motors_are_powered() {
+fn actions_are_done() {
     let mut fake = Fake::new();
     assert_eq!(fake.ask("$me=2"), OK);
     assert_eq!(fake.powered, [false, true, false, false]);
     assert_eq!(fake.ask("$md"), OK);
+    assert_eq!(fake.ask("$test=3"), OK);
     assert_eq!(fake.powered, [false; 4]);
 }
 
@@ -172,11 +173,12 @@ fn help_is_lines_that_fit() {
         ("$h", "Kerf Settings Help"),
         ("$HELP", "Kerf Settings Help"),
         ("$defa", "Kerf Defaults Help"),
+        ("$test", "Kerf Test Jobs Help"),
     ] {
         let help = listed(line);
         assert!(help.starts_with(&std::format!("\n\n\n### {title} ###\n")), "{line}: {help}");
         assert_eq!(help.matches("###").count(), 2);
-        assert!(help.lines().count() < 20);
+        assert!(help.lines().count() <= 22);
     }
     let mut fake = Fake::new();
     assert_eq!(fake.ask("h1"), r#"{"r":{},"f":[1,0,7]}"#);

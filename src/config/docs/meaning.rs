@@ -29,7 +29,10 @@ includes what is before it.",
     ("si", "Time between status reports."),
     ("ec", "Lines end in LF CR. No effect yet."),
     ("ee", "What is received is sent back. No effect yet."),
-    ("ex", "Flow control by characters or lines. No effect yet."),
+    (
+        "ex",
+        "Flow control. With 1 XOFF holds answers back until XON, and Kerf sends them likewise; 2 is as 0 so far.",
+    ),
     (
         "baud",
         "Rate of the serial line: a code, or bits a second from 9600 to 1000000. In force when the response has \
