@@ -50,8 +50,11 @@ impl Request {
                 self.item = 0;
                 self.phase = Phase::One;
             }
-            Ok(None) if self.phase == Phase::Greeting => self.open(c),
-            Ok(None) => self.phase = Phase::Prompt,
+            Ok(None) => {
+                // The defaults have a status of their own, which is for JSON.
+                self.status = Status::Ok;
+                self.phase = Phase::Prompt;
+            }
             Err(status) => self.fail(status, Mode::Text),
         }
     }

@@ -52,7 +52,7 @@ impl Request {
         self.item += 1;
         if self.item == BANNER_ROWS {
             self.item = 0;
-            self.phase = if self.is_json { Phase::Pair } else { Phase::Warning };
+            self.phase = Phase::Pair;
         }
     }
 }

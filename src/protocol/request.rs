@@ -15,7 +15,7 @@
 //!                  \  text mode
 //!   ? -> Listing ---+-> Prompt -> (Failure -> Complaint) -> Message
 //!   $ -> Command -> Listing, One or Help -> Prompt
-//!   defa: Pair or Command -> Greeting -> Pair or Warning -> Footer (-> Prompt)
+//!   defa: Pair -> Greeting -> Pair
 //! ```
 
 use super::block::byte_of;
@@ -147,7 +147,6 @@ impl Request {
             }
             Some(b'$') => {
                 *mode = Mode::Text;
-                request.is_text = true;
                 request.at = start + 1;
                 request.phase = Phase::Command;
             }
@@ -270,13 +269,6 @@ impl Request {
         writer.close();
         writer.footer(self.status as u8, free);
         self.phase = Phase::Done;
-        if self.is_text {
-            // Where the response has been told in JSON, the prompt follows.
-            self.format = Format::plain();
-            self.status = Status::Ok;
-            self.warning = Warning::None;
-            self.phase = Phase::Prompt;
-        }
     }
 
     fn echo<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {

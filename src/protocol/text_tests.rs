@@ -193,8 +193,8 @@ fn defaults_are_restored() {
         let mut fake = Fake::new();
         fake.ask("{xvm:900,sr:{vel:t},jv:5,js:0}");
         let answer = fake.ask(line);
-        let prompt = if line.starts_with('$') { "\ntinyg [mm] ok> " } else { "" };
-        assert_eq!(answer, [RESTORED, prompt].concat());
+        let text = "tinyg [mm] ok> Initializing configs to default settings";
+        assert_eq!(answer, if line.starts_with('$') { text } else { RESTORED });
         assert_eq!(fake.settings.velocity_max(0) as i32, 800);
         assert_eq!(fake.report.token(0).unwrap().name().bytes(), b"posx");
     }

@@ -33,7 +33,7 @@ with status 108 (too little), 109 (too much) or 110 (no such choice); what is fi
 has a fraction where an integer is due with 102, a string with 103, and what has to wait until the machine is at
 rest with 106. `Decimals` are those that are kept; more are rounded, and fewer may be shown.
 
-`{defa:1}` needs the machine at rest, and is answered with status 15. Offsets, stored positions and tools are kept.
+`{defa:1}` needs the machine at rest, and is answered with status 15, the build and a message. Offsets, stored positions and tools are kept.
 
 ";
 
