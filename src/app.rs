@@ -81,6 +81,9 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     let links = place(outgoing, rate);
     links.settings.borrow_mut().set_defaults();
     let log = recall(links);
+    if !links.settings.borrow().starts_in_json() {
+        links.mode.set(Mode::Text);
+    }
     set_outputs(&links.settings.borrow());
     links.model.borrow_mut().start(&*links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);

@@ -3,21 +3,31 @@
 use std::fs;
 use std::path::PathBuf;
 
-use kerf::gcode::codes::docs;
+use kerf::config::docs as settings;
+use kerf::gcode::codes::docs as gcode;
 
-fn file() -> PathBuf {
-    [env!("CARGO_MANIFEST_DIR"), "docs", "gcode.md"].iter().collect()
+/// The documents, and what they should be.
+fn documents() -> [(&'static str, String); 2] {
+    [("gcode.md", gcode::markdown()), ("settings.md", settings::markdown())]
+}
+
+fn file(name: &str) -> PathBuf {
+    [env!("CARGO_MANIFEST_DIR"), "docs", name].iter().collect()
 }
 
 #[test]
-fn the_description_of_the_language_is_up_to_date() {
-    let text = fs::read_to_string(file()).unwrap_or_default();
-    assert!(text == docs::markdown(), "docs/gcode.md is not: `cargo xtask docs` writes it anew");
+fn the_documents_are_up_to_date() {
+    for (name, text) in documents() {
+        let found = fs::read_to_string(file(name)).unwrap_or_default();
+        assert!(found == text, "docs/{name} is not: `cargo xtask docs` writes it anew");
+    }
 }
 
 /// What `cargo xtask docs` runs.
 #[test]
-#[ignore = "writes docs/gcode.md"]
+#[ignore = "writes the documents"]
 fn write() {
-    fs::write(file(), docs::markdown()).expect("docs/gcode.md can be written");
+    for (name, text) in documents() {
+        fs::write(file(name), text).expect("docs can be written");
+    }
 }

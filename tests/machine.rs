@@ -248,6 +248,27 @@ fn settings_and_offsets_survive_a_reset() {
 }
 
 #[test]
+fn defaults_and_the_mode_survive_a_reset() {
+    let contents = {
+        let mut sender = Sender::boot();
+        for line in ["{xvm:1234,1mi:16}", "{defa:1}", "{ej:0}"] {
+            sender.ask(&format!("{line}\n"), 300);
+        }
+        sender.machine.run_ms(3_000);
+        kerf::hal::imp::eeprom::contents()
+    };
+    std::thread::spawn(move || {
+        kerf::hal::imp::eeprom::put(&contents);
+        let mut sender = Sender::boot();
+        assert!(sender.ask("g21\n", 300).contains("tinyg [mm] ok> "));
+        let answer = sender.ask("{xvm:n,1mi:n,ej:n}\n", 300);
+        assert!(answer.contains("{\"r\":{\"xvm\":800,\"1mi\":8,\"ej\":0},\"f\":[1,0,7]}"));
+    })
+    .join()
+    .unwrap();
+}
+
+#[test]
 fn xoff_stops_a_sender_that_heeds_it_before_anything_is_lost() {
     let mut sender = Sender::boot();
     // Slow moves keep the planner busy: lines pile up.

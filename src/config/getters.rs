@@ -207,6 +207,11 @@ impl Settings {
         self.system_large(system::SI) as u16
     }
 
+    /// The rate of the serial line, as it was set: a code or bits a second.
+    pub fn baud(&self) -> i32 {
+        self.system_large(system::BAUD)
+    }
+
     /// Whether lines end in LF CR.
     pub fn expand_line_feeds(&self) -> bool {
         self.system(system::EC) != 0

@@ -4,16 +4,20 @@
 //! [`Settings`], which cost a load. Values are integers scaled by a power of ten, so text goes in
 //! and out exactly. They live in RAM only.
 
+#[cfg(not(target_arch = "avr"))]
+pub mod docs;
 pub mod name;
 pub mod number;
 pub mod ratio;
 pub mod setting;
 pub mod table;
+pub mod words;
 
 pub use name::Name;
 pub use number::{Digits, Fixed, Number};
 pub use ratio::StepRatio;
 pub use setting::{Owner, Place, Setting};
+pub use words::Words;
 
 use crate::baud;
 use crate::boards::MOTORS;
@@ -100,13 +104,23 @@ impl Settings {
 
     /// The value of a setting as shown.
     pub fn show(&self, setting: Setting, inches: bool) -> Fixed {
+        self.show_as(setting, inches, setting.row().shown)
+    }
+
+    /// The same with at most so many decimals.
+    pub fn show_as(&self, setting: Setting, inches: bool, decimals: u8) -> Fixed {
         let row = setting.row();
         let value = Fixed { value: self.get(setting), decimals: row.stored };
         if inches && self.is_length(setting, &row) {
-            value.inches(row.shown)
+            value.inches(decimals)
         } else {
-            value.rounded(row.shown)
+            value.rounded(decimals)
         }
+    }
+
+    /// Whether it is a length, and no angle: shown in inches with G20.
+    pub fn shows_length(&self, setting: Setting) -> bool {
+        self.is_length(setting, &setting.row())
     }
 
     fn is_length(&self, setting: Setting, row: &Row) -> bool {

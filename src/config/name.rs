@@ -27,6 +27,15 @@ impl Name {
         Some(self)
     }
 
+    /// The name that `text` begins with in lower case: as much of it as fits, without commas.
+    pub fn beginning(text: &[u8]) -> Name {
+        let mut name = Name::new();
+        for byte in text.iter().filter(|byte| **byte != b',') {
+            name = name.with(core::slice::from_ref(byte)).unwrap_or(name);
+        }
+        name
+    }
+
     /// This name with the bytes of a table's `token`, up to its zeros.
     pub fn with_token(self, token: [u8; 4]) -> Name {
         let len = token.iter().position(|&b| b == 0).unwrap_or(token.len());
@@ -100,6 +109,7 @@ mod tests {
         assert!(!name.matches(0, token("xv")));
         assert!(Name::new().with(b"posxyz").is_none());
         assert!(Name::new().with(b"abaud").unwrap().matches(1, token("baud")));
+        assert_eq!(Name::beginning(b"X,velocity").bytes(), b"xvelo");
         assert!(!Name::new().with(b"bauds").unwrap().matches(0, token("baud")));
     }
 

@@ -50,6 +50,15 @@ impl Fixed {
         Fixed { value: signed(inches, self.value < 0), decimals }
     }
 
+    /// With at least `decimals` decimals; there must be room for them.
+    pub fn padded(mut self, decimals: u8) -> Fixed {
+        while self.decimals < decimals {
+            self.value = self.value.wrapping_mul(10);
+            self.decimals += 1;
+        }
+        self
+    }
+
     /// As text, every decimal shown.
     pub fn render(self, buffer: &mut Digits) -> &[u8] {
         let decimals = self.decimals.min(9);
@@ -98,10 +107,11 @@ impl Number {
         Number { digits: value.into(), exponent: 0, negative: false }
     }
 
-    /// Reads `-12.5e3`: digits with an optional sign, decimals and exponent, and nothing else.
+    /// Reads `-12.5e3`: digits with an optional sign, decimals and exponent, and nothing else but
+    /// commas, which mean nothing.
     pub fn parse(text: &[u8]) -> Option<Number> {
         let mut number = Number::int(0);
-        let mut bytes = text.iter().copied().peekable();
+        let mut bytes = text.iter().copied().filter(|byte| *byte != b',').peekable();
         number.negative = bytes.next_if_eq(&b'-').is_some();
         let mut any = false;
         while let Some(digit) = bytes.next_if(u8::is_ascii_digit) {
@@ -111,6 +121,7 @@ impl Number {
         if bytes.next_if_eq(&b'.').is_some() {
             while let Some(digit) = bytes.next_if(u8::is_ascii_digit) {
                 number.push(digit, true);
+                any = true;
             }
         }
         if bytes.next_if(|b| b.eq_ignore_ascii_case(&b'e')).is_some() {
@@ -217,6 +228,12 @@ mod tests {
     }
 
     #[test]
+    fn pads() {
+        assert_eq!(Fixed::int(8).padded(2), Fixed { value: 800, decimals: 2 });
+        assert_eq!(Fixed { value: 970, decimals: 3 }.padded(2).decimals, 3);
+    }
+
+    #[test]
     fn reads() {
         assert_eq!(read("1.0005", 3, false), Some(1001));
         assert_eq!(read("-0.0005", 3, false), Some(-1));
@@ -225,7 +242,12 @@ mod tests {
         assert_eq!(read("10", 3, true), Some(254_000));
         assert_eq!(read("2147483.648", 3, false), None);
         assert_eq!(read("0.000000000000000000000001", 6, false), Some(0));
+        assert_eq!(
+            [read(".5", 1, false), read("-.5", 1, false), read("5.", 1, false)],
+            [Some(5), Some(-5), Some(50)]
+        );
         assert_eq!(read("0e999", 6, true), Some(0));
+        assert_eq!(read("1,200.5", 1, false), Some(12_005));
         for bad in ["", "-", ".", "1.2.3", "1e", "1e-", "+1", "0x10", "nan", "e5"] {
             assert_eq!(read(bad, 3, false), None, "{bad}");
         }

@@ -205,7 +205,7 @@ impl Setting {
     }
 
     /// The number of its row.
-    fn index(self) -> u8 {
+    pub(super) fn index(self) -> u8 {
         match self.owner() {
             Owner::System => self.0,
             Owner::Motor(_) => (self.0 - FIRST_MOTOR) % MOTOR_ROWS as u8,

@@ -120,7 +120,9 @@ impl Request {
 
     pub(super) fn number<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         if self.format.is_plain() {
-            Writer::body(c.out, &mut self.format).byte(b'\n');
+            let mut writer = Writer::body(c.out, &mut self.format);
+            writer.text(self.warning.text());
+            writer.byte(b'\n');
             self.phase = Phase::Done;
             return;
         }

@@ -110,6 +110,15 @@ impl Machine for Fake {
         &mut self.report
     }
 
+    fn restore(&mut self) -> Status {
+        if self.state == 5 {
+            return Status::NotAccepted;
+        }
+        self.settings.set_defaults();
+        self.report.restore();
+        Status::Ok
+    }
+
     fn clear(&mut self) -> Status {
         Status::Ok
     }

@@ -3,9 +3,12 @@
 use super::report::StatusReport;
 use super::value::Value;
 use crate::config::{Setting, Settings};
+use crate::progmem;
+use crate::progmem::Text;
 use crate::status::Status;
+use crate::text;
 
-/// What is told beside a setting that has been stored; the last one counts most.
+/// What is told beside what has been done; the last one counts most.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
 pub enum Warning {
     /// Nothing.
@@ -15,6 +18,31 @@ pub enum Warning {
     Microsteps,
     /// The velocity limits of an axis were lowered to what its motors can follow.
     Velocity,
+    /// Where help is.
+    Help,
+    /// How to restore the defaults.
+    AskDefaults,
+    /// The defaults have been restored.
+    Defaults,
+}
+
+impl Warning {
+    /// What it says.
+    pub(super) fn text(self) -> Text {
+        WARNINGS.at(self as usize).unwrap_or(text!(""))
+    }
+}
+
+progmem! {
+    // A table, for what the compiler makes of a `match` would be in RAM.
+    static WARNINGS: [Text; 6] = [
+        text!(""),
+        text!("*** WARNING *** Setting non-standard microstep value"),
+        text!("*** WARNING *** Velocity limited by the step rate"),
+        text!("Send $h for help, {sys:n} for the settings"),
+        text!("Send {defa:true} to reset to default settings"),
+        text!("Initializing configs to default settings"),
+    ];
 }
 
 /// The machine behind the protocol. Nothing here waits.
@@ -27,6 +55,8 @@ pub trait Machine {
     fn value(&mut self, value: Value) -> i32;
     /// What status reports hold.
     fn report(&mut self) -> &mut StatusReport;
+    /// Restores the defaults of all settings and of the status report, or refuses to.
+    fn restore(&mut self) -> Status;
     /// Ends an alarm, if there is one.
     fn clear(&mut self) -> Status;
     /// Starts a built-in job, or ends the one that runs: 0.

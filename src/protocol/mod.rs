@@ -11,7 +11,11 @@
 pub const CHUNK: usize = 64;
 
 mod block;
+mod command;
+mod defaults;
+mod help;
 mod json;
+mod listing;
 mod machine;
 pub mod notice;
 mod pairs;
@@ -28,7 +32,7 @@ pub use block::{is_brief, put_brief};
 pub use json::Span;
 pub use machine::{Machine, Warning};
 pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report};
-pub use request::{Next, Request};
+pub use request::{Next, Request, asks_help};
 pub use status_text::status_text;
 pub use token::Token;
 pub use value::{Value, thousandths};
@@ -59,3 +63,5 @@ mod any_line;
 mod fake;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod text_tests;

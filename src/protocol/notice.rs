@@ -16,7 +16,7 @@ pub struct Banner {
 }
 
 /// The rows of `sys` that the greeting tells, in its order.
-const BANNER_ROWS: u8 = 5;
+pub(super) const BANNER_ROWS: u8 = 5;
 
 impl Banner {
     /// Begins. It is whole whatever the verbosity, unless that is 0.
@@ -36,11 +36,7 @@ impl Banner {
         }
         match self.stage {
             0..BANNER_ROWS => {
-                // The version comes before the build.
-                let row = if self.stage < 2 { 1 - self.stage } else { self.stage };
-                let token = Token::system(row);
-                writer.key(token.name().bytes());
-                writer.shown(token.read(machine));
+                put_row(self.stage, machine, &mut writer);
             }
             BANNER_ROWS => {
                 writer.key_text(text!("msg"));
@@ -55,6 +51,14 @@ impl Banner {
         self.stage += 1;
         true
     }
+}
+
+/// One of the rows that tell who we are.
+pub(super) fn put_row<O: Out>(row: u8, machine: &mut impl Machine, writer: &mut Writer<'_, O>) {
+    // The version comes before the build.
+    let token = Token::system(if row < 2 { 1 - row } else { row });
+    writer.key(token.name().bytes());
+    writer.shown(token.read(machine));
 }
 
 /// An exception report, `{"er":{"fb":440.20,"st":13,"msg":"Buffer full"}}`; sent whatever the

@@ -11,7 +11,7 @@ use crate::status::Status;
 use crate::text;
 
 /// What to tell of a pair that was carried out.
-type Outcome = Result<Option<Token>, Status>;
+pub(super) type Outcome = Result<Option<Token>, Status>;
 
 impl Request {
     pub(super) fn pair<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
@@ -57,7 +57,8 @@ impl Request {
         if self.group.take().is_some() {
             Writer::body(c.out, &mut self.format).close();
         }
-        self.phase = if self.status == Status::Ok { Phase::Pair } else { Phase::Warning };
+        let on = matches!(self.status, Status::Ok | Status::Initializing);
+        self.phase = if on { Phase::Pair } else { Phase::Warning };
     }
 
     pub(super) fn member<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
@@ -142,6 +143,7 @@ impl Request {
                 writer.key(pair.name.of(c.line));
                 writer.shown(shown);
             }
+            Ok(None) if self.phase == Phase::Greeting => {}
             Ok(None) => self.tell_sent(pair, true, c),
             Err(status) => {
                 self.status = status;
@@ -151,7 +153,7 @@ impl Request {
         }
     }
 
-    fn apply<M: Machine, O: Out>(
+    pub(super) fn apply<M: Machine, O: Out>(
         &mut self,
         pair: &Pair,
         target: Target,
@@ -165,6 +167,8 @@ impl Request {
                 self.set(token.setting().ok_or(Status::ReadOnly)?, pair, c)?;
                 Ok(Some(token))
             }
+            (Target::Action(Action::Help), _) => self.advise(Warning::Help),
+            (Target::Action(Action::Defaults), _) => self.restore(pair, c),
             (Target::Action(action), _) => act(action, pair, c).map(|()| None),
         }
     }
@@ -251,6 +255,7 @@ fn act<M: Machine, O>(
         }
         Action::Energize => true,
         Action::Release => false,
+        Action::Defaults | Action::Help => return Ok(()),
     };
     let motor = match pair.kind {
         Kind::Null | Kind::True => 0,

@@ -34,15 +34,22 @@ impl Default for StatusReport {
 impl StatusReport {
     /// The default list.
     pub fn new() -> StatusReport {
-        let first = DEFAULT_TOKENS.get();
         let mut report = StatusReport {
-            tokens: [first[0]; LONGEST_REPORT],
+            tokens: [Token::system(0); LONGEST_REPORT],
             sent: [0; LONGEST_REPORT],
-            len: DEFAULT_REPORT as u8,
+            len: 0,
             fresh: true,
         };
-        report.tokens.iter_mut().zip(first).for_each(|(to, token)| *to = token);
+        report.restore();
         report
+    }
+
+    /// Makes it the default list again.
+    pub fn restore(&mut self) {
+        let first = DEFAULT_TOKENS.get();
+        self.tokens.iter_mut().zip(first).for_each(|(to, token)| *to = token);
+        self.len = DEFAULT_REPORT as u8;
+        self.fresh = true;
     }
 
     /// Entry `index`.

@@ -13,7 +13,9 @@
 //!      gc        v |                                                   |
 //!   G-code ---> Gcode -> Block -> Message -> Number -------------------+
 //!                  \  text mode
-//!   ? -> Screen ----+-> Prompt -> (Failure -> Complaint) -> Message
+//!   ? -> Listing ---+-> Prompt -> (Failure -> Complaint) -> Message
+//!   $ -> Command -> Listing, One or Help -> Prompt
+//!   defa: Pair -> Greeting -> Pair
 //! ```
 
 use super::block::byte_of;
@@ -21,7 +23,7 @@ use super::json::{self, Span};
 use super::machine::{Machine, Warning};
 use super::token::Group;
 use super::write::{Format, Out, Writer};
-use super::{Mode, value::Value};
+use super::{Mode, help, value::Value};
 use crate::status::Status;
 use crate::text;
 
@@ -65,8 +67,16 @@ pub(super) enum Phase {
     Number,
     Warning,
     Footer,
-    /// The status report in text.
-    Screen,
+    /// A line that begins with `$`.
+    Command,
+    /// Groups in text.
+    Listing,
+    /// One setting or value in text.
+    One,
+    /// Help in text.
+    Help,
+    /// The defaults have been restored: tell who we are.
+    Greeting,
     /// The prompt, a status, the line that caused it.
     Prompt,
     Failure,
@@ -133,9 +143,17 @@ impl Request {
             }
             Some(b'?') => {
                 *mode = Mode::Text;
-                request.phase = Phase::Screen;
+                request.enlist(Some(Group::Report), None);
             }
-            Some(b'$') => request.fail(Status::UnrecognizedName, *mode),
+            Some(b'$') => {
+                *mode = Mode::Text;
+                request.at = start + 1;
+                request.phase = Phase::Command;
+            }
+            Some(b'h' | b'H') if asks_help(line) => {
+                *mode = Mode::Text;
+                request.help(help::GENERAL);
+            }
             Some(_) => {
                 request.block = Span { start, end };
                 request.is_text = *mode == Mode::Text;
@@ -170,7 +188,7 @@ impl Request {
         }
     }
 
-    fn fail(&mut self, status: Status, mode: Mode) {
+    pub(super) fn fail(&mut self, status: Status, mode: Mode) {
         self.status = status;
         self.phase = if mode == Mode::Text { Phase::Prompt } else { Phase::Warning };
     }
@@ -207,7 +225,11 @@ impl Request {
             Phase::Number => self.number(context),
             Phase::Warning => self.warning(context),
             Phase::Footer => self.footer(context),
-            Phase::Screen => self.screen(context),
+            Phase::Command => self.command(context),
+            Phase::Listing => self.listing(context),
+            Phase::One => self.one(context),
+            Phase::Help => self.help_line(context),
+            Phase::Greeting => self.greeting(context),
             Phase::Prompt => self.prompt(context),
             Phase::Failure => self.failure(context),
             Phase::Complaint => self.complaint(context),
@@ -232,11 +254,7 @@ impl Request {
 
     fn warning<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         self.open(c);
-        let text = match self.warning {
-            Warning::None => text!(""),
-            Warning::Microsteps => text!("*** WARNING *** Setting non-standard microstep value"),
-            Warning::Velocity => text!("*** WARNING *** Velocity limited by the step rate"),
-        };
+        let text = self.warning.text();
         if !text.is_empty() {
             let mut writer = Writer::body(c.out, &mut self.format);
             writer.key_text(text!("msg"));
@@ -274,4 +292,10 @@ impl Request {
             self.item = self.item.saturating_add(1);
         }
     }
+}
+
+/// Whether a line is the letter H alone.
+pub fn asks_help(line: &[u8]) -> bool {
+    let mut bytes = line.iter().filter(|byte| !matches!(byte, b' ' | b'\t'));
+    matches!((bytes.next(), bytes.next()), (Some(b'h' | b'H'), None))
 }

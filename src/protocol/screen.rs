@@ -1,10 +1,9 @@
-//! Text mode: the status report that answers `?`, one line for each entry.
+//! Text mode: a line of the status report that answers `?`, and of any value that is no setting.
 //!
 //! Numbers end in column 22 if they are counts, in column 26 if they have decimals; texts begin in
 //! column 22.
 
 use super::machine::Machine;
-use super::request::{Context, Phase, Request};
 use super::token::{Shown, Subject, Token};
 use super::value::Form;
 use super::write::{Out, Writer};
@@ -18,29 +17,14 @@ const COUNT_END: usize = 22;
 const DECIMALS_END: usize = 26;
 const TEXT_START: usize = 21;
 
-impl Request {
-    /// Half a line: its label, then its value.
-    pub(super) fn screen<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        let Some(token) = c.machine.report().token(self.item / 2) else {
-            self.phase = Phase::Prompt;
-            return;
-        };
-        let value = self.item % 2 == 1;
-        self.item += 1;
-        let writer = &mut Writer::body(c.out, &mut self.format);
-        let label = Label::of(token);
-        if value { label.value(token, c.machine, writer) } else { label.write(token, writer) }
-    }
-}
-
 /// What stands before a value.
-struct Label {
+pub(super) struct Label {
     letter: Option<u8>,
     text: Text,
 }
 
 impl Label {
-    fn of(token: Token) -> Label {
+    pub fn of(token: Token) -> Label {
         match token.subject() {
             Some(Subject::Single(single)) => Label { letter: None, text: single.label },
             Some(Subject::Member(_, vector, index)) if !vector.label.is_empty() => {
@@ -51,7 +35,7 @@ impl Label {
         }
     }
 
-    fn write<O: Out>(&self, token: Token, writer: &mut Writer<'_, O>) {
+    pub fn write<O: Out>(&self, token: Token, writer: &mut Writer<'_, O>) {
         if self.text.is_empty() {
             writer.lower(token.name().bytes());
             writer.byte(b':');
@@ -69,7 +53,12 @@ impl Label {
         }
     }
 
-    fn value<M: Machine, O: Out>(&self, token: Token, machine: &mut M, writer: &mut Writer<'_, O>) {
+    pub fn value<M: Machine, O: Out>(
+        &self,
+        token: Token,
+        machine: &mut M,
+        writer: &mut Writer<'_, O>,
+    ) {
         let len = self.len(token);
         match (choice(token, machine), read(token, machine)) {
             (Some((choices, index)), _) => {

@@ -44,6 +44,16 @@ impl Token {
         Token(row)
     }
 
+    /// Its number.
+    pub const fn number(self) -> u8 {
+        self.0
+    }
+
+    /// The token of a number that [`Token::number`] returned.
+    pub const fn of_number(number: u8) -> Token {
+        Token(number)
+    }
+
     /// The token of a value in the table of [`SINGLES`].
     const fn single(index: u8) -> Token {
         Token(FIRST_SINGLE + index)
@@ -148,13 +158,16 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [(Text, Action); 6] = [
+    static ACTIONS: [(Text, Action); 9] = [
         (text!("gc"), Action::Block),
         (text!("clear"), Action::Clear),
         (text!("clr"), Action::Clear),
         (text!("me"), Action::Energize),
         (text!("md"), Action::Release),
         (text!("test"), Action::Test),
+        (text!("defa"), Action::Defaults),
+        (text!("h"), Action::Help),
+        (text!("help"), Action::Help),
     ];
 }
 
@@ -172,6 +185,10 @@ pub enum Action {
     Release,
     /// `test`: run a built-in job.
     Test,
+    /// `defa`: restore the defaults.
+    Defaults,
+    /// `h`, `help`: tell about settings.
+    Help,
 }
 
 /// Names that stand for several.
@@ -186,6 +203,11 @@ pub enum Group {
 }
 
 impl Group {
+    /// `ofs`.
+    pub const OFFSETS: Group = Group::Vector(2);
+    /// `tof`.
+    pub const TOOL_OFFSETS: Group = Group::Vector(4);
+
     fn find(name: &Name) -> Option<Group> {
         if name.is(text!("sys")) {
             return Some(Group::Settings(Owner::System));

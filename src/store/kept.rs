@@ -4,10 +4,10 @@
 //! this firmware alone.
 
 use super::{Log, Memory, record};
-use crate::config::name::Name;
+use crate::config::name::{Name, axis_letter};
 use crate::config::{Setting, Settings};
 use crate::gcode::tables::{self, Tables};
-use crate::units::{AXES, AXIS_LETTERS, Length};
+use crate::units::{AXES, Length};
 
 /// One thing that is kept, by its number: settings first.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -87,7 +87,7 @@ fn table_name(value: u8) -> Name {
     let (row, axis) = (value / axes, value % axes);
     let vectors = (tables::SYSTEMS + tables::STORED) as u8;
     let named = |bytes: &[u8]| Name::new().with(bytes).unwrap_or_default();
-    let letter = |axis: u8| AXIS_LETTERS.get(usize::from(axis)).copied().unwrap_or(b'x');
+    let letter = axis_letter;
     match row {
         0..6 => named(&[b'g', b'5', b'4' + row, letter(axis)]),
         6..9 => named(&[b'g', b'5', b'9', b'1' + row - 6, letter(axis)]),

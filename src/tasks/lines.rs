@@ -10,6 +10,7 @@
 use heapless::Vec;
 
 use super::printing::copy_printing;
+use crate::protocol::asks_help;
 use crate::status::Status;
 
 /// Line slots. Senders count on eight.
@@ -284,6 +285,7 @@ fn classify(line: &[u8]) -> Class {
     match line.first() {
         Some(b'$' | b'?') => Class::Control,
         Some(b'{') if !wraps_gcode(line) => Class::Control,
+        Some(b'h' | b'H') if asks_help(line) => Class::Control,
         _ => Class::Data,
     }
 }

@@ -178,6 +178,23 @@ impl Machine for View<'_> {
         &mut self.report
     }
 
+    fn restore(&mut self) -> Status {
+        if self.busy() {
+            return Status::NotAccepted;
+        }
+        let rate = self.settings.baud();
+        self.settings.set_defaults();
+        if self.settings.baud() != rate {
+            self.links.rate.set(baud::rate(self.settings.baud()));
+        }
+        self.report.restore();
+        self.links.resync.set(true);
+        self.links.settings_changed.set(true);
+        self.links.storage.note(0, Setting::NUMBERS.into());
+        set_outputs(&self.settings);
+        Status::Ok
+    }
+
     fn clear(&mut self) -> Status {
         Status::Ok
     }

@@ -66,7 +66,7 @@ enum Command {
     Flash(firmware::FlashArgs),
     /// Write the example jobs again
     Jobs,
-    /// Write `docs/gcode.md` again, from the tables of the language
+    /// Write `docs/gcode.md` and `docs/settings.md` again, from the tables
     Docs,
     /// Write the motions of `tests/nist` again, by a NIST-derived interpreter (Debian 12)
     Nist(nist::Args),

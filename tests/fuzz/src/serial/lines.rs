@@ -19,6 +19,8 @@ pub struct Lines {
     /// The sender was in text mode at the last line's end.
     pub is_text: bool,
     first: Option<u8>,
+    /// There is more than one byte that is no blank.
+    more: bool,
     len: usize,
     damaged: bool,
     returned: bool,
@@ -40,6 +42,7 @@ impl Lines {
                 None
             }
             _ => {
+                self.more |= self.first.is_some() && !matches!(byte, b' ' | b'\t');
                 self.first = self.first.or(Some(byte));
                 self.len += 1;
                 None
@@ -51,11 +54,12 @@ impl Lines {
         let whole = !self.damaged && self.len <= LINE_MAX;
         match self.first {
             Some(b'{') if whole => self.is_text = false,
-            Some(b'?') if whole => self.is_text = true,
+            Some(b'?' | b'$') if whole => self.is_text = true,
+            Some(b'h' | b'H') if whole && !self.more => self.is_text = true,
             _ => {}
         }
         let is_empty = self.first.is_none() && !self.damaged;
-        (self.first, self.len, self.damaged) = (None, 0, false);
+        (self.first, self.more, self.len, self.damaged) = (None, false, 0, false);
         if is_empty { End::Empty } else { End::Line }
     }
 }

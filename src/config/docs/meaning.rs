@@ -1,0 +1,89 @@
+//! What each setting means, in the order of its table.
+
+use crate::config::table::{AXIS_ROWS, MOTOR_ROWS, SYSTEM_ROWS};
+
+/// A name without its group, and what it means.
+pub type Meaning = (&'static str, &'static str);
+
+pub const SYSTEM: [Meaning; SYSTEM_ROWS] = [
+    ("fb", "Build that the protocol is compatible with."),
+    ("fv", "Version that the protocol is compatible with."),
+    ("hp", "Kind of hardware."),
+    ("hv", "Revision of the hardware."),
+    ("id", "Name of the board."),
+    ("ja", "Acceleration towards the centre of a corner; more makes corners faster."),
+    ("ct", "How far the chords of an arc may leave it."),
+    ("sl", "Moves of homed axes beyond `tn` and `tm` are refused (220)."),
+    ("st", "Kind of switches. No effect yet."),
+    ("mt", "How long motors with `pm` 2 stay powered after a move."),
+    ("ej", "Mode at power-up; after that answers are in the mode of the last line."),
+    (
+        "jv",
+        "What JSON responses show: nothing, the footer, messages, settings, line numbers, blocks of G-code; each \
+includes what is before it.",
+    ),
+    ("js", "Whether keys are quoted."),
+    ("tv", "Whether lines are answered with a prompt in text mode."),
+    ("qv", "Queue reports: none, free blocks, or also those added and removed (3 is 2)."),
+    ("sv", "Status reports: none, what has changed, or all of it."),
+    ("si", "Time between status reports."),
+    ("ec", "Lines end in LF CR. No effect yet."),
+    ("ee", "What is received is sent back. No effect yet."),
+    (
+        "ex",
+        "Flow control. With 1 XOFF holds answers back until XON, and Kerf sends them likewise; 2 is as 0 so far.",
+    ),
+    (
+        "baud",
+        "Rate of the serial line: a code, or bits a second from 9600 to 1000000. In force when the response has \
+left; 115200 after a reset.",
+    ),
+    ("gpl", "Plane at power-up and after M2."),
+    ("gun", "Units at power-up and after M2."),
+    ("gco", "Coordinate system at power-up and after M2."),
+    ("gpa", "Path mode at power-up and after M2."),
+    ("gdi", "Distance mode at power-up and after M2."),
+    ("bd", "Lines that begin with a slash are passed over."),
+    ("ost", "M1 stops."),
+    ("psw", "M0, M1, M60 and G88 wait for `~`."),
+    ("spw", "How long a step pulse lasts. Longer pulses may lower `vm` and `fr`."),
+    ("dsu", "How long a direction pin stands before a step."),
+];
+
+pub const MOTOR: [Meaning; MOTOR_ROWS] = [
+    (
+        "ma",
+        "Axis that it moves: 0 X, 1 Y, 2 Z, 3 A, 4 B, 5 C; above that none. Several may move one axis.",
+    ),
+    ("sa", "Angle of a full step."),
+    ("tr", "Travel of the axis in a turn."),
+    ("mi", "Microsteps of the driver. Usual are 1, 2, 4 and 8; others are taken with a warning."),
+    ("po", "Direction."),
+    ("pm", "When it is powered; see `mt`."),
+    ("sp", "Whether the driver steps on a falling edge."),
+];
+
+pub const AXIS: [Meaning; AXIS_ROWS] = [
+    (
+        "am",
+        "0 disabled, 1 standard, 2 inhibited: counts and does not move, 3 radius: words are lengths along `ra`.",
+    ),
+    ("vm", "Speed of traverses at most. Lowered, with a message, if the motors cannot follow."),
+    ("fr", "Speed of feeds at most. Lowered likewise."),
+    ("tn", "Lower end of travel, for `sl`. The lowest that can be set is none."),
+    (
+        "tm",
+        "Upper end of travel, for `sl`. The lowest that can be set is none; an axis whose ends are the same has neither.",
+    ),
+    ("jm", "Jerk at most. A value above 1000000 is divided by a million."),
+    ("jh", "Jerk while homing and probing, likewise. No effect yet."),
+    ("jd", "How far a corner may be cut, as far as its speed goes; more makes corners faster."),
+    ("ra", "Radius that turns a length into an angle with `am` 3."),
+    ("sn", "Switch at the lower end. No effect yet."),
+    ("sx", "Switch at the upper end. No effect yet."),
+    ("sv", "Speed towards a homing switch. No effect yet."),
+    ("lv", "Speed off a homing switch. No effect yet."),
+    ("lb", "Way off a homing switch. No effect yet."),
+    ("zb", "Way from the switch to zero. No effect yet."),
+    ("ac", "Acceleration at most, beside the jerk; 0 is none."),
+];

@@ -1,0 +1,241 @@
+//! `docs/settings.md`, from the tables of settings and what is said of each.
+
+mod meaning;
+
+use std::format;
+use std::string::{String, ToString};
+use std::vec::Vec;
+
+use super::name::token;
+use super::table::{CLAMP, HOMING, IDLE, JERK, Kind, MODE, RADIUS, Row};
+use super::{Digits, Fixed, Owner, Setting, Words};
+use crate::progmem::Text;
+use meaning::Meaning;
+
+const PREFACE: &str = "\
+# Settings
+
+<!-- Made from `src/config` by `cargo xtask docs`: change it there. -->
+
+To read and to write:
+
+| | JSON | Text |
+|---|---|---|
+| one | `{xvm:n}` | `$xvm` |
+| a group | `{x:n}` | `$x` |
+| several | `{xvm:n,x:{fr:n}}` | `$m` motors, `$q` axes, `$$` all |
+| write | `{xvm:1200}` | `$xvm=1200` |
+| restore all of these | `{defa:1}` | `$defa=1` |
+
+A setting is in force when its response comes, and survives a power cut unless it is said below that it does not.
+With G20 lengths are in inches, both ways; those of axes that turn are degrees. What is out of range is refused
+with status 108 (too little), 109 (too much) or 110 (no such choice); what is fixed with 104, what is no number or
+has a fraction where an integer is due with 102, a string with 103, and what has to wait until the machine is at
+rest with 106. `Decimals` are those that are kept; more are rounded, and fewer may be shown.
+
+`{defa:1}` needs the machine at rest, and is answered with status 15, the build and a message. Offsets, stored positions and tools are kept.
+
+";
+
+/// All of it.
+pub fn markdown() -> String {
+    let groups: [(&str, &str, &[Owner], &[Meaning]); 3] = [
+        (
+            "The machine",
+            "The group `sys`; names have no prefix.",
+            &[Owner::System],
+            &meaning::SYSTEM,
+        ),
+        (
+            "Motors",
+            "The groups `1` to `4`: `1tr`, `2tr`. Written at rest only.",
+            &[0, 1, 2, 3].map(Owner::Motor),
+            &meaning::MOTOR,
+        ),
+        (
+            "Axes",
+            "The groups `x` `y` `z` `a` `b` `c`: `xvm`, `yvm`.",
+            &[0, 1, 2, 3, 4, 5].map(Owner::Axis),
+            &meaning::AXIS,
+        ),
+    ];
+    let mut text = PREFACE.to_string();
+    for (title, intro, owners, meanings) in groups {
+        text += &format!("## {title}\n\n{intro}\n\n");
+        text += "| Name | Type | Unit | Range | Default | Decimals | Meaning |\n|---|---|---|---|---|---|---|\n";
+        for (row, meaning) in (0..).zip(meanings) {
+            text += &line(owners, row, meaning);
+        }
+        text += "\n";
+    }
+    text.trim_end().to_string() + "\n"
+}
+
+/// One setting, of all its owners.
+fn line(owners: &[Owner], row: u8, meaning: &Meaning) -> String {
+    let settings: Vec<_> = owners.iter().filter_map(|o| Setting::of(*o, row)).collect();
+    let Some(first) = settings.first() else { return String::new() };
+    let (row, Some(words)) = (first.row(), first.words()) else { return String::new() };
+    let fields = [
+        format!("`{}`", meaning.0),
+        kind(&row).to_string(),
+        unit(owners, &row, &words),
+        range(*first, &row),
+        defaults(&settings),
+        if row.stored > 0 { row.stored.to_string() } else { String::new() },
+        format!("{}{}{}", meaning.1, choices(&words), remarks(&row)),
+    ];
+    format!("| {} |\n", fields.join(" | "))
+}
+
+fn kind(row: &Row) -> &'static str {
+    match row.kind {
+        Kind::Constant => "fixed",
+        Kind::Text => "fixed text",
+        Kind::Small | Kind::Large if row.stored == 0 => "integer",
+        Kind::Small | Kind::Large => "number",
+    }
+}
+
+fn string(text: Text) -> String {
+    text.bytes().map(char::from).collect()
+}
+
+/// What comes behind the value in text mode, in two: the unit, and the choices in brackets.
+fn tail(words: &Words) -> (String, String) {
+    let tail = string(words.tail);
+    let split = tail.find(" [").or(tail.find(" (")).unwrap_or(tail.len());
+    (tail[..split].to_string(), tail[split..].to_string())
+}
+
+fn unit(owners: &[Owner], row: &Row, words: &Words) -> String {
+    // Text mode shows them as TinyG does.
+    if row.is(RADIUS) {
+        return "mm".to_string();
+    }
+    if row.token == token("ja") {
+        return "mm/min^2".to_string();
+    }
+    let unit = tail(words).0.replace(" * 1 million", ", in millions").replace(" Sec", " s");
+    let length = match (words.length, owners.len()) {
+        (false, _) => "",
+        (true, 1) => "mm",
+        (true, _) => "mm or deg",
+    };
+    format!("{length}{}", unit.trim())
+}
+
+/// The choices of a number, as text mode lists them.
+fn choices(words: &Words) -> String {
+    let choices = tail(words).1;
+    let inner = choices.strip_prefix(" [").and_then(|rest| rest.strip_suffix(']'));
+    match inner {
+        Some(inner) if inner.contains('=') && !inner.ends_with("...") => {
+            format!(" {}.", inner.replace(',', ", ").replace('=', " "))
+        }
+        _ => String::new(),
+    }
+}
+
+/// What holds beside the range.
+fn remarks(row: &Row) -> String {
+    let mut text = String::new();
+    for (flag, remark) in [
+        (CLAMP, "Out of range is the nearest that is not."),
+        (IDLE, "Written at rest only."),
+        (HOMING, "X Y Z A only."),
+        (RADIUS, "A B C only; a length."),
+    ] {
+        if row.is(flag) {
+            text += &format!(" {remark}");
+        }
+    }
+    text
+}
+
+/// A value as it is kept, without zeros at its end.
+fn number(value: i32, decimals: u8) -> String {
+    let mut digits = Digits::default();
+    let text = Fixed { value, decimals }.render(&mut digits);
+    let text: String = text.iter().copied().map(char::from).collect();
+    if decimals == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_string() }
+}
+
+fn range(setting: Setting, row: &Row) -> String {
+    let shown = |value| number(value, row.stored);
+    match row.kind {
+        Kind::Constant | Kind::Text => String::new(),
+        _ if setting.is_baud() => "1 to 6, or a rate".to_string(),
+        _ if row.is(MODE) => "0 to 2; A B C to 3".to_string(),
+        _ if row.min == -i32::MAX => format!("±{}", shown(row.max)),
+        _ => format!("{} to {}", shown(row.min), shown(row.max)),
+    }
+}
+
+/// The defaults of all that have the setting, those that are alike together.
+fn defaults(settings: &[Setting]) -> String {
+    let shown = |setting: Setting| {
+        let row = setting.row();
+        match row.kind {
+            Kind::Text => "`0000-KERF`".to_string(),
+            _ if row.is(JERK) || row.stored > 0 => number(setting.default_value(), row.stored),
+            _ => setting.default_value().to_string(),
+        }
+    };
+    let mut runs: Vec<(String, String)> = Vec::new();
+    for setting in settings {
+        let value = shown(*setting);
+        let owner = String::from_utf8_lossy(setting.owner().prefix().bytes()).to_uppercase();
+        match runs.last_mut() {
+            Some((owners, last)) if *last == value => *owners += &format!(" {owner}"),
+            _ => runs.push((owner, value)),
+        }
+    }
+    match runs.as_slice() {
+        [(_, value)] => value.clone(),
+        _ => runs.iter().map(|(o, v)| format!("{o}: {v}")).collect::<Vec<_>>().join(", "),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(owner: Owner) -> Vec<String> {
+        let owners = match owner {
+            // One of each has all rows between them.
+            Owner::Axis(_) => [Owner::Axis(0), Owner::Axis(3)],
+            _ => [owner, owner],
+        };
+        let row = |row| owners.iter().find_map(|o| Setting::of(*o, row));
+        let name = |s: Setting| {
+            let skip = s.owner().prefix().bytes().len();
+            String::from_utf8(s.name().bytes()[skip..].to_vec()).unwrap()
+        };
+        (0..owner.rows()).filter_map(row).map(name).collect()
+    }
+
+    #[test]
+    fn every_setting_has_its_meaning() {
+        for (owner, meanings) in [
+            (Owner::System, &meaning::SYSTEM[..]),
+            (Owner::Motor(0), &meaning::MOTOR),
+            (Owner::Axis(0), &meaning::AXIS),
+        ] {
+            let described: Vec<_> = meanings.iter().map(|(name, _)| name.to_string()).collect();
+            assert_eq!(names(owner), described);
+            assert!(meanings.iter().all(|(_, text)| text.len() > 5));
+        }
+    }
+
+    #[test]
+    fn rows_tell_what_the_tables_say() {
+        let text = markdown();
+        for row in [
+            "| `mt` | number | s | 0.1 to 4294967 | 2 | 2 |",
+            "| `vm` | number | mm or deg/min | 0.001 to 2147483.647 | X Y Z: 800, A: 230400, B C: 3600 | 3 |",
+        ] {
+            assert!(text.contains(row), "{row}");
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Text mode: what a line that begins with `$` asks for.
+
+use super::json::{Kind, Pair, Span};
+use super::listing::Series;
+use super::machine::Machine;
+use super::request::{Context, Phase, Request};
+use super::token::{Action, Group, Target, resolve};
+use super::write::Out;
+use super::{Mode, help};
+use crate::config::{Name, Owner};
+use crate::status::Status;
+
+impl Request {
+    /// Shows, sets or does what the line says; `at` is behind its `$`.
+    pub(super) fn command<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let pair = split(c.line, self.at);
+        let name = Name::beginning(pair.name.of(c.line));
+        let null = pair.kind == Kind::Null;
+        let series = match name.bytes() {
+            [letter] if null => Series::of_letter(*letter),
+            _ => None,
+        };
+        if series.is_some() {
+            return self.enlist(None, series);
+        }
+        if name.bytes().is_empty() && null {
+            return self.enlist(Some(Group::Settings(Owner::System)), None);
+        }
+        let target = resolve(Name::new(), name.bytes());
+        match target {
+            Target::Group(group) if null => self.enlist(Some(group), None),
+            // Neither groups nor blocks can be given a value here.
+            Target::Group(_) | Target::Action(Action::Block) => self.refuse(),
+            Target::Action(Action::Help) => self.help(help::SETTINGS),
+            Target::Action(Action::Test) if null => self.help(help::TESTS),
+            Target::Action(Action::Defaults) if null => self.help(help::DEFAULTS),
+            _ => self.execute(&pair, target, c),
+        }
+    }
+
+    fn execute<M: Machine, O: Out>(
+        &mut self,
+        pair: &Pair,
+        target: Target,
+        c: &mut Context<'_, M, O>,
+    ) {
+        match self.apply(pair, target, c) {
+            Ok(Some(token)) => {
+                self.at = token.number();
+                self.item = 0;
+                self.phase = Phase::One;
+            }
+            Ok(None) => {
+                // The defaults have a status of their own, which is for JSON.
+                self.status = Status::Ok;
+                self.phase = Phase::Prompt;
+            }
+            Err(status) => self.fail(status, Mode::Text),
+        }
+    }
+
+    fn refuse(&mut self) {
+        self.fail(Status::UnrecognizedName, Mode::Text);
+    }
+}
+
+fn is_separator(byte: u8) -> bool {
+    matches!(byte, b'=' | b':' | b'|') || is_blank(byte)
+}
+
+fn is_blank(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t')
+}
+
+/// The name at `at` and what stands behind it, a number if anything does.
+fn split(line: &[u8], at: u8) -> Pair {
+    let byte = |at: u8| line.get(usize::from(at)).copied();
+    let skip = |mut at: u8, wanted: fn(u8) -> bool| {
+        while byte(at).is_some_and(wanted) {
+            at = at.saturating_add(1);
+        }
+        at
+    };
+    let start = skip(at, is_blank);
+    let end = skip(start, |byte| !is_separator(byte));
+    let value = skip(end, is_separator);
+    let mut next = line.len() as u8;
+    while next > value && byte(next - 1).is_some_and(is_blank) {
+        next -= 1;
+    }
+    let kind = if value < next { Kind::Number } else { Kind::Null };
+    Pair { name: Span { start, end }, kind, value: Span { start: value, end: next }, next }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_values_are_told_apart() {
+        for (line, name, value) in [
+            ("$xvm", "xvm", None),
+            ("$ xvm ", "xvm", None),
+            ("$xvm=1200", "xvm", Some("1200")),
+            ("$xvm 1200 \t", "xvm", Some("1200")),
+            ("$xvm : 1,200", "xvm", Some("1,200")),
+            ("$xvm|\t-1", "xvm", Some("-1")),
+            ("$xvm=", "xvm", None),
+            ("$", "", None),
+            ("$=5", "", Some("5")),
+            ("$$", "$", None),
+        ] {
+            let pair = split(line.as_bytes(), 1);
+            assert_eq!(pair.name.of(line.as_bytes()), name.as_bytes(), "{line}");
+            let kind = if value.is_some() { Kind::Number } else { Kind::Null };
+            assert_eq!(pair.kind, kind, "{line}");
+            assert_eq!(pair.value.of(line.as_bytes()), value.unwrap_or("").as_bytes(), "{line}");
+        }
+    }
+
+    #[test]
+    fn a_line_may_fill_the_index() {
+        let mut line = [b' '; 255];
+        line[0] = b'$';
+        line[254] = b'x';
+        assert_eq!(split(&line, 1).name, Span { start: 254, end: 255 });
+        line[1..].fill(b'x');
+        assert_eq!(split(&line, 1).kind, Kind::Null);
+    }
+}

@@ -1,0 +1,58 @@
+//! Restoring the defaults, and what is told of it: who we are, status 15 and a message.
+
+use super::json::{Kind, Pair};
+use super::machine::{Machine, Warning};
+use super::notice::{BANNER_ROWS, put_row};
+use super::pairs::Outcome;
+use super::request::{Context, Phase, Request};
+use super::write::{Out, Writer};
+use crate::config::Number;
+use crate::status::Status;
+
+impl Request {
+    /// Restores the defaults if the value of `pair` says so; else tells how to.
+    pub(super) fn restore<M: Machine, O>(
+        &mut self,
+        pair: &Pair,
+        c: &mut Context<'_, M, O>,
+    ) -> Outcome {
+        let sure = match pair.kind {
+            Kind::True => true,
+            Kind::Number => {
+                let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
+                number.fixed(0, false) != Some(0)
+            }
+            Kind::Null | Kind::False => false,
+            Kind::Text | Kind::Object => return Err(Status::UnsupportedType),
+        };
+        if !sure {
+            return self.advise(Warning::AskDefaults);
+        }
+        // It is the answer: nothing may have been told before.
+        let status = if self.begun { Status::NotAccepted } else { c.machine.restore() };
+        if status != Status::Ok {
+            return Err(status);
+        }
+        self.status = Status::Initializing;
+        self.warning = Warning::Defaults;
+        self.item = 0;
+        self.phase = Phase::Greeting;
+        Ok(None)
+    }
+
+    /// Tells where to go on.
+    pub(super) fn advise(&mut self, warning: Warning) -> Outcome {
+        self.warning = self.warning.max(warning);
+        Ok(None)
+    }
+
+    /// A row of who we are.
+    pub(super) fn greeting<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        put_row(self.item, c.machine, &mut Writer::body(c.out, &mut self.format));
+        self.item += 1;
+        if self.item == BANNER_ROWS {
+            self.item = 0;
+            self.phase = Phase::Pair;
+        }
+    }
+}
