@@ -1,5 +1,7 @@
 //! What the machine says.
 
+use kerf::hal::serial::{XOFF, XON};
+
 /// How a line begins that answers one.
 const ANSWERS: [&[u8]; 3] = [b"{\"r\":{", b"{r:{", b"tinyg ["];
 
@@ -19,6 +21,9 @@ impl Ears {
     /// Takes what was heard.
     pub fn hear(&mut self, bytes: &[u8]) {
         for byte in bytes {
+            if matches!(*byte, XON | XOFF) {
+                continue;
+            }
             if *byte == b'\n' {
                 self.line();
             } else {
