@@ -99,3 +99,9 @@ impl Request {
         }
     }
 }
+
+/// Whether a line is the letter H alone.
+pub fn asks_help(line: &[u8]) -> bool {
+    let mut bytes = line.iter().filter(|byte| !matches!(byte, b' ' | b'\t'));
+    matches!((bytes.next(), bytes.next()), (Some(b'h' | b'H'), None))
+}

@@ -55,7 +55,7 @@ pub trait Machine {
     fn value(&mut self, value: Value) -> i32;
     /// What status reports hold.
     fn report(&mut self) -> &mut StatusReport;
-    /// Restores the defaults of all settings and of the status report, or refuses to.
+    /// Restores the defaults of all settings and of the status report, or refuses to: 10 ms on AVR.
     fn restore(&mut self) -> Status;
     /// Ends an alarm, if there is one.
     fn clear(&mut self) -> Status;

@@ -150,7 +150,7 @@ impl Request {
                 request.at = start + 1;
                 request.phase = Phase::Command;
             }
-            Some(b'h' | b'H') if asks_help(line) => {
+            Some(b'h' | b'H') if help::asks_help(line) => {
                 *mode = Mode::Text;
                 request.help(help::GENERAL);
             }
@@ -292,10 +292,4 @@ impl Request {
             self.item = self.item.saturating_add(1);
         }
     }
-}
-
-/// Whether a line is the letter H alone.
-pub fn asks_help(line: &[u8]) -> bool {
-    let mut bytes = line.iter().filter(|byte| !matches!(byte, b' ' | b'\t'));
-    matches!((bytes.next(), bytes.next()), (Some(b'h' | b'H'), None))
 }
