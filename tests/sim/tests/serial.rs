@@ -89,7 +89,7 @@ fn a_flood_without_flow_control_loses_lines_and_corrupts_none() {
 
 fn flood(end: &str) {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
-    for line in ["{jv:4}", "g91 f800"] {
+    for line in ["{ex:0}", "{jv:4}", "g91 f800"] {
         set(&mut machine, &mut host, line);
     }
     // Of different lengths, so that a line torn or joined would move elsewhere.
