@@ -45,7 +45,7 @@ impl Links {
             rate: Cell::new(None),
             exception: Cell::new(None),
             job: Cell::default(),
-            storage: Storage::new(),
+            storage: Storage::default(),
             mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),
             tx: Mutex::new(Tx::new(tx, rate)),

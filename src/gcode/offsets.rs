@@ -48,13 +48,9 @@ impl State {
                     Ok(())
                 })?;
             }
-            Some(ToolLength::Table) => {
-                let tool = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
-                self.tool_length = tables.tool(tool.map_err(|_| Status::HWordInvalid)?)?.offsets();
-            }
+            Some(ToolLength::Table) => self.tool_length = self.tool_named(block, tables)?,
             Some(ToolLength::Add) => {
-                let tool = block.get(H).ok_or(Status::HWordMissing)?.integer();
-                let more = tables.tool(tool.map_err(|_| Status::HWordInvalid)?)?.offsets();
+                let more = self.tool_named(block, tables)?;
                 for (length, more) in self.tool_length.iter_mut().zip(&more) {
                     *length = length.checked_add(*more).ok_or(Status::OutOfRange)?;
                 }
@@ -64,6 +60,12 @@ impl State {
             self.modal.system = system;
         }
         self.update_origin(tables.system(self.modal.system))
+    }
+
+    /// The lengths of tool H; without H, of the tool in the spindle.
+    fn tool_named(&self, block: &Block, tables: &Tables) -> Result<PerAxis<Length>, Status> {
+        let tool = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
+        Ok(tables.tool(tool.map_err(|_| Status::HWordInvalid)?)?.offsets())
     }
 
     /// Group 0, but for the moves to stored positions.
@@ -117,10 +119,8 @@ impl State {
         let system = tables.system(self.modal.system);
         self.each_word(block, setup, |state, axis, value| {
             let others = at(system, axis).checked_add(at(&state.tool_length, axis));
-            let here = at(&state.position, axis);
-            let shift = others.and_then(|others| here.checked_sub(others));
-            let shift = shift.and_then(|shift| shift.checked_sub(value.units));
-            put(&mut state.shift, axis, shift.ok_or(Status::OutOfRange)?);
+            let shift = state.offset_here(axis, others, value.units)?;
+            put(&mut state.shift, axis, shift);
             put(&mut state.residue, axis, value.rest);
             Ok(())
         })?;
@@ -185,13 +185,11 @@ impl State {
             let origin = if here {
                 let shift = if state.shifted { at(&state.shift, axis) } else { Length::ZERO };
                 let others = shift.checked_add(at(&state.tool_length, axis));
-                let origin =
-                    others.and_then(|others| at(&state.position, axis).checked_sub(others));
-                origin.and_then(|origin| origin.checked_sub(value.units))
+                state.offset_here(axis, others, value.units)?
             } else {
-                Some(value.units)
+                value.units
             };
-            put(&mut system, axis, origin.ok_or(Status::OutOfRange)?);
+            put(&mut system, axis, origin);
             Ok(())
         })?;
         if number == self.modal.system {
@@ -219,17 +217,27 @@ impl State {
             }
             let length = if here {
                 let others = at(&state.origin, axis).checked_sub(at(&state.tool_length, axis));
-                let length =
-                    others.and_then(|others| at(&state.position, axis).checked_sub(others));
-                length.and_then(|length| length.checked_sub(value.units))
+                state.offset_here(axis, others, value.units)?
             } else {
-                Some(value.units)
+                value.units
             };
-            put(&mut lengths, axis, length.ok_or(Status::OutOfRange)?);
+            put(&mut lengths, axis, length);
             Ok(())
         })?;
         *edit = Edit::Tool(number, Tool { x: lengths[0], z: lengths[2] });
         Ok(())
+    }
+
+    /// The offset that, beside the `others` along an axis, makes the position be called `value`. No `others` are
+    /// a sum beyond the range.
+    fn offset_here(
+        &self,
+        axis: u8,
+        others: Option<Length>,
+        value: Length,
+    ) -> Result<Length, Status> {
+        let left = others.and_then(|others| at(&self.position, axis).checked_sub(others));
+        left.and_then(|left| left.checked_sub(value)).ok_or(Status::OutOfRange)
     }
 
     /// Does something for each axis word, but those of disabled axes.

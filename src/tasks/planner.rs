@@ -134,9 +134,7 @@ impl Planner {
         if self.line(target, feed).is_some() {
             return false;
         }
-        if commands.exact_stop {
-            self.builder.stopped();
-        }
+        self.moved(&commands);
         self.position = *target;
         self.announce();
         true

@@ -25,11 +25,6 @@ pub struct Storage {
 }
 
 impl Storage {
-    /// None.
-    pub const fn new() -> Self {
-        Self { from: Cell::new(ITEMS), to: Cell::new(0), wake: Wake::new() }
-    }
-
     /// These may have changed.
     pub fn note(&self, from: u16, count: u16) {
         self.from.set(self.from.get().min(from));
@@ -51,8 +46,9 @@ impl Storage {
 }
 
 impl Default for Storage {
+    /// None.
     fn default() -> Self {
-        Self::new()
+        Self { from: Cell::new(ITEMS), to: Cell::new(0), wake: Wake::default() }
     }
 }
 

@@ -15,11 +15,6 @@ pub struct Wake {
 }
 
 impl Wake {
-    /// Nobody has signalled.
-    pub const fn new() -> Self {
-        Self { signalled: Cell::new(false), waiter: Cell::new(None) }
-    }
-
     /// Wakes the task that waits, or the next that will.
     #[inline(never)]
     pub fn signal(&self) {

@@ -95,10 +95,10 @@ pub fn powered() -> u8 {
 pub fn power(motors: u8) {
     WANTED.set(motors);
     each_motor!(M => if let Some(enable) = ACTIVE.motors[M].enable {
-        set_active_low(enable, motors & (1 << M) != 0);
+        set(enable, motors & (1 << M) == 0);
     });
     if let Some(enable) = ACTIVE.enable_all {
-        set_active_low(enable, motors != 0);
+        set(enable, motors == 0);
     }
 }
 
@@ -107,7 +107,7 @@ pub fn set_outputs(on: u8) {
     macro_rules! each {
         ($($o:literal)+) => {$(
             if let Some(pin) = ACTIVE.outputs[$o] {
-                set_active_low(pin, on & (1 << $o) == 0);
+                set(pin, on & (1 << $o) != 0);
             }
         )+};
     }
@@ -117,6 +117,6 @@ pub fn set_outputs(on: u8) {
 /// The compiler makes one read-modify-write of the two cases, and the port may be shared with pins of the
 /// step interrupt, which must not come in between: 8 cycles.
 #[inline(always)]
-fn set_active_low(pin: Pin, on: bool) {
-    avr_device::interrupt::free(|_| if on { low(pin) } else { high(pin) });
+fn set(pin: Pin, level: bool) {
+    avr_device::interrupt::free(|_| if level { high(pin) } else { low(pin) });
 }
