@@ -1,7 +1,8 @@
 //! Where the work origin is: coordinate systems (G54 to G59.3, G10), G92 and its kin, tool lengths.
 //!
 //! Machine coordinates of the origin = coordinate system + G92, if that is in force + tool length. The sum is
-//! kept in [`State::origin`], so that moves add one number.
+//! kept in [`State::origin`], so that moves add one number; the coordinate system in force is that sum without the
+//! other two, so that the tables are asked for other systems only.
 
 use super::axes;
 use super::block::Block;
@@ -18,6 +19,27 @@ use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
 const TOOL_AXES: [u8; 2] = [0, 2];
 
 impl State {
+    /// The coordinate system in force.
+    fn system_in_force(&self) -> PerAxis<Length> {
+        let mut system = self.origin;
+        for (system, (shift, tool)) in
+            system.iter_mut().zip(self.shift.iter().zip(&self.tool_length))
+        {
+            let shift = if self.shifted { shift.0 } else { 0 };
+            // The sum was within the range, so that this is where it began.
+            system.0 = system.0.wrapping_sub(tool.0).wrapping_sub(shift);
+        }
+        system
+    }
+
+    /// A coordinate system, from 0.
+    pub(super) fn system(&self, number: u8, tables: &Tables) -> PerAxis<Length> {
+        match number == self.modal.system {
+            true => self.system_in_force(),
+            false => *tables.system(number),
+        }
+    }
+
     /// Adds the origin up anew, of a coordinate system and what is in the state.
     pub(super) fn update_origin(&mut self, system: &PerAxis<Length>) -> Result<(), Status> {
         let parts = system.iter().zip(&self.shift).zip(&self.tool_length);
@@ -39,6 +61,8 @@ impl State {
         if block.tool_length.is_none() && block.system.is_none() {
             return Ok(());
         }
+        let number = block.system.unwrap_or(self.modal.system);
+        let system = self.system(number, tables);
         match block.tool_length {
             None => {}
             Some(ToolLength::Off) => self.tool_length = [Length::ZERO; units::AXES],
@@ -56,10 +80,8 @@ impl State {
                 }
             }
         }
-        if let Some(system) = block.system {
-            self.modal.system = system;
-        }
-        self.update_origin(tables.system(self.modal.system))
+        self.modal.system = number;
+        self.update_origin(&system)
     }
 
     /// The lengths of tool H; without H, of the tool in the spindle.
@@ -89,42 +111,38 @@ impl State {
             }
             Some(NonModal::Home { set }) => out.motion = home(block, set, setup)?,
             Some(NonModal::SetPosition) => self.redefine_position(block, setup, out)?,
-            Some(NonModal::SetOffset) => self.shift_here(block, tables, setup)?,
+            Some(NonModal::SetOffset) => self.shift_here(block, setup)?,
             Some(NonModal::ClearOffset) => {
+                self.shift_is(false)?;
                 self.shift = [Length::ZERO; units::AXES];
-                self.shift_is(false, tables)?;
             }
-            Some(NonModal::SuspendOffset) => self.shift_is(false, tables)?,
-            Some(NonModal::ResumeOffset) => self.shift_is(true, tables)?,
+            Some(NonModal::SuspendOffset) => self.shift_is(false)?,
+            Some(NonModal::ResumeOffset) => self.shift_is(true)?,
         }
         Ok(())
     }
 
-    fn shift_is(&mut self, on: bool, tables: &Tables) -> Result<(), Status> {
+    fn shift_is(&mut self, on: bool) -> Result<(), Status> {
+        let system = self.system_in_force();
         self.shifted = on;
-        self.update_origin(tables.system(self.modal.system))
+        self.update_origin(&system)
     }
 
     /// G92: the position is called the axis words, in work coordinates.
-    fn shift_here(
-        &mut self,
-        block: &Block,
-        tables: &Tables,
-        setup: &impl Setup,
-    ) -> Result<(), Status> {
+    fn shift_here(&mut self, block: &Block, setup: &impl Setup) -> Result<(), Status> {
+        let system = self.system_in_force();
         if !self.shifted {
             self.shift = [Length::ZERO; units::AXES];
         }
         self.shifted = true;
-        let system = tables.system(self.modal.system);
         self.each_word(block, setup, |state, axis, value| {
-            let others = at(system, axis).checked_add(at(&state.tool_length, axis));
+            let others = at(&system, axis).checked_add(at(&state.tool_length, axis));
             let shift = state.offset_here(axis, others, value.units)?;
             put(&mut state.shift, axis, shift);
             put(&mut state.residue, axis, value.rest);
             Ok(())
         })?;
-        self.update_origin(system)
+        self.update_origin(&system)
     }
 
     /// G28.3: the position is called the axis words, in machine coordinates.
@@ -180,7 +198,7 @@ impl State {
         setup: &impl Setup,
         edit: &mut Edit,
     ) -> Result<(), Status> {
-        let mut system = *tables.system(number);
+        let mut system = self.system(number, tables);
         self.each_word(block, setup, |state, axis, value| {
             let origin = if here {
                 let shift = if state.shifted { at(&state.shift, axis) } else { Length::ZERO };

@@ -107,7 +107,7 @@ impl State {
         self.offsets(block, tables, setup)?;
         self.non_modal(block, tables, setup, out, edit)?;
         self.finish(block, tables, setup, out)?;
-        self.stop(block, tables, setup, out)
+        self.stop(block, tables, edit, setup, out)
     }
 
     /// N, the modes, and F.
@@ -270,6 +270,7 @@ impl State {
         &mut self,
         block: &Block,
         tables: &Tables,
+        edit: &Edit,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
@@ -278,20 +279,31 @@ impl State {
             Some(StopCode::Optional) if !setup.stops_at_m1() => Stop::None,
             Some(StopCode::Program | StopCode::Optional) => Stop::Program,
             Some(StopCode::End) => {
-                self.end_program(tables, setup)?;
+                self.end_program(tables, edit, setup)?;
                 Stop::End
             }
         };
         Ok(())
     }
 
-    /// M2 and M30: modes as at power-up, but G1 with F0; no G92; the overrides on.
-    fn end_program(&mut self, tables: &Tables, setup: &impl Setup) -> Result<(), Status> {
-        self.modal = Modal { motion: MotionMode::Feed, ..Modal::new(&setup.defaults()) };
+    /// M2 and M30: modes as at power-up, but G1 with F0; no G92; the overrides on. The line's own change of the
+    /// tables counts.
+    fn end_program(
+        &mut self,
+        tables: &Tables,
+        edit: &Edit,
+        setup: &impl Setup,
+    ) -> Result<(), Status> {
+        let defaults = setup.defaults();
+        let system = match edit {
+            Edit::System(number, system) if *number == defaults.system => *system,
+            _ => self.system(defaults.system, tables),
+        };
+        self.modal = Modal { motion: MotionMode::Feed, ..Modal::new(&defaults) };
         self.feed = 0.0;
         (self.shift, self.shifted) = ([Length::ZERO; AXES], false);
         self.overridden = ALL;
-        self.update_origin(tables.system(self.modal.system))
+        self.update_origin(&system)
     }
 }
 
