@@ -10,13 +10,10 @@ use super::codes::{NonModal, ToolLength};
 use super::command::{Commands, Motion};
 use super::setup::{AxisMode, Cycle, Setup};
 use super::state::State;
-use super::tables::{Edit, SYSTEMS, TOOLS, Tables, Tool};
+use super::tables::{Edit, Row, SYSTEMS, TOOL_AXES, Tables};
 use super::words::{AXES, H, L, P};
 use crate::status::Status;
 use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
-
-/// The axes whose lengths a tool has.
-const TOOL_AXES: [u8; 2] = [0, 2];
 
 impl State {
     /// The coordinate system in force.
@@ -33,10 +30,10 @@ impl State {
     }
 
     /// A coordinate system, from 0.
-    pub(super) fn system(&self, number: u8, tables: &Tables) -> PerAxis<Length> {
+    pub(super) fn system(&self, number: u8, tables: &impl Tables) -> PerAxis<Length> {
         match number == self.modal.system {
             true => self.system_in_force(),
-            false => *tables.system(number),
+            false => tables.row(Row::system(number)),
         }
     }
 
@@ -52,10 +49,11 @@ impl State {
     }
 
     /// Tool length and coordinate system.
+    #[inline(never)]
     pub(super) fn offsets(
         &mut self,
         block: &Block,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
     ) -> Result<(), Status> {
         if block.tool_length.is_none() && block.system.is_none() {
@@ -84,20 +82,25 @@ impl State {
         self.update_origin(&system)
     }
 
-    /// The lengths of tool H; without H, of the tool in the spindle.
-    fn tool_named(&self, block: &Block, tables: &Tables) -> Result<PerAxis<Length>, Status> {
-        let tool = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
-        Ok(tables.tool(tool.map_err(|_| Status::HWordInvalid)?)?.offsets())
+    /// The lengths of tool H; without H, of the tool in the spindle. None are those of an empty spindle, 0.
+    fn tool_named(&self, block: &Block, tables: &impl Tables) -> Result<PerAxis<Length>, Status> {
+        let number = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
+        let number = number.ok().and_then(|number| u8::try_from(number).ok());
+        match number.ok_or(Status::HWordInvalid)? {
+            0 => Ok([Length::ZERO; units::AXES]),
+            number => Ok(tables.row(Row::tool(number).ok_or(Status::HWordInvalid)?)),
+        }
     }
 
     /// Group 0, but for the moves to stored positions.
+    #[inline(never)]
     pub(super) fn non_modal(
         &mut self,
         block: &Block,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
         out: &mut Commands,
-        edit: &mut Edit,
+        edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
         match block.non_modal {
             None | Some(NonModal::GoStored(_) | NonModal::MachineCoordinates) => {}
@@ -107,7 +110,7 @@ impl State {
                 if block.has(AXES) {
                     return Err(Status::AxisInvalid);
                 }
-                *edit = Edit::Stored(which, self.position);
+                *edit = Some(Edit::new(Row::stored(which), self.position, tables)?);
             }
             Some(NonModal::Home { set }) => out.motion = home(block, set, setup)?,
             Some(NonModal::SetPosition) => self.redefine_position(block, setup, out)?,
@@ -166,23 +169,23 @@ impl State {
     fn set_data(
         &mut self,
         block: &Block,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
-        edit: &mut Edit,
+        edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
         let integer = |slot| block.get(slot).and_then(|word| word.integer().ok());
         let number = integer(P).and_then(|number| u8::try_from(number).ok());
         match (integer(L), number) {
-            (Some(l @ (2 | 20)), Some(number)) if usize::from(number) <= SYSTEMS => {
+            (Some(l @ (2 | 20)), Some(number)) if number <= SYSTEMS => {
                 // 0 is the system in force.
                 let system = number.checked_sub(1).unwrap_or(self.modal.system);
                 self.set_system(block, system, l == 20, tables, setup, edit)
             }
             (Some(2 | 20), _) => Err(Status::PWordInvalid),
-            (Some(l @ (1 | 10)), Some(number @ 1..)) if usize::from(number) <= TOOLS => {
-                self.set_tool(block, number, l == 10, tables, setup, edit)
+            (Some(l @ (1 | 10)), number) => {
+                let row = number.and_then(Row::tool).ok_or(Status::ToolInvalid)?;
+                self.set_tool(block, row, l == 10, tables, setup, edit)
             }
-            (Some(1 | 10), _) => Err(Status::ToolInvalid),
             _ => Err(Status::LWordInvalid),
         }
     }
@@ -194,9 +197,9 @@ impl State {
         block: &Block,
         number: u8,
         here: bool,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
-        edit: &mut Edit,
+        edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
         let mut system = self.system(number, tables);
         self.each_word(block, setup, |state, axis, value| {
@@ -213,7 +216,7 @@ impl State {
         if number == self.modal.system {
             self.update_origin(&system)?;
         }
-        *edit = Edit::System(number, system);
+        *edit = Some(Edit::new(Row::system(number), system, tables)?);
         Ok(())
     }
 
@@ -222,13 +225,13 @@ impl State {
     fn set_tool(
         &mut self,
         block: &Block,
-        number: u8,
+        row: Row,
         here: bool,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
-        edit: &mut Edit,
+        edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
-        let mut lengths = tables.tool(number.into())?.offsets();
+        let mut lengths = tables.row(row);
         self.each_word(block, setup, |state, axis, value| {
             if !TOOL_AXES.contains(&axis) {
                 return Err(Status::AxisInvalid);
@@ -242,7 +245,7 @@ impl State {
             put(&mut lengths, axis, length);
             Ok(())
         })?;
-        *edit = Edit::Tool(number, Tool { x: lengths[0], z: lengths[2] });
+        *edit = Some(Edit::new(row, lengths, tables)?);
         Ok(())
     }
 
@@ -279,7 +282,8 @@ impl State {
     pub(super) fn go_stored(
         &mut self,
         block: &Block,
-        stored: &PerAxis<Length>,
+        tables: &impl Tables,
+        stored: Row,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
@@ -288,10 +292,11 @@ impl State {
         }
         self.advance(block, false, setup)?;
         let via = self.position;
+        let stored = tables.row(stored);
         for axis in 0..units::AXES as u8 {
             let named = !block.has(AXES) || block.get(axis).is_some();
             if named && setup.mode(axis) != AxisMode::Disabled {
-                put(&mut self.position, axis, at(stored, axis));
+                put(&mut self.position, axis, at(&stored, axis));
                 put(&mut self.residue, axis, 0);
             }
         }
