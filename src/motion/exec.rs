@@ -66,6 +66,8 @@ pub struct Snapshot {
     pub velocity: f32,
     /// The N word of the block being run.
     pub line: u32,
+    /// The N word of the line finished last, to its last step.
+    pub finished: u32,
     /// Something moves, or dwells.
     pub running: bool,
     /// What the program came to last.
@@ -84,6 +86,7 @@ impl Snapshot {
             length: 0.0,
             velocity: 0.0,
             line: 0,
+            finished: 0,
             running: false,
             program: Program::Ready,
             outputs: 0,

@@ -10,6 +10,7 @@ use crate::hal::imp::{exec, flags, gpio, stepper};
 use crate::hal::ring::Producer;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
+use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
 use crate::tasks::{links, power};
 
@@ -23,16 +24,28 @@ const LONG_QUEUED: usize = 4;
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
     let mut machine = Exec::new();
     let mut segment = Segment::default();
-    let mut most = LONG_QUEUED;
+    let mut most = LONG_QUEUED as u8;
     let mut outputs = 0;
+    let mut finished = Finished::new();
     loop {
-        exec::wait(|| (segments.used() < most).then_some(())).await;
+        exec::wait(|| (segments.used() < most.into()).then_some(())).await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
         let step = links::update(|out| {
+            if let Some(line) = finished.take(segments.used()) {
+                out.finished = line;
+            }
+            let line = out.line;
             let step = machine.step(&mut blocks, standstill, out, &mut segment);
+            if out.line != line {
+                finished.end(line);
+            }
             if step == Step::Segment {
+                finished.queue();
                 power::segment(segment.moving);
+            } else if step == Step::Idle && standstill {
+                finished.rest();
+                out.finished = out.line;
             } else if out.outputs != outputs {
                 outputs = out.outputs;
                 gpio::set_outputs(outputs);
@@ -44,7 +57,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             let _ = segments.push_copy(&segment);
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
-            most = if cycles < SHORT { SEGMENTS - 1 } else { LONG_QUEUED };
+            most = if cycles < SHORT { SEGMENTS as u8 - 1 } else { LONG_QUEUED as u8 };
         }
         if blocks.len() != waiting {
             flags::set(Event::BlockDone);

@@ -154,6 +154,9 @@ impl Machine for View<'_> {
             Value::Machine => self.state(),
             Value::Cycle => i32::from(self.busy()),
             Value::Motion => i32::from(self.motion().running),
+            // Lines that move nothing are finished when all before them are.
+            Value::FinishedLine if !self.busy() => self.modal(Value::BlockLine),
+            Value::FinishedLine => self.motion().finished as i32,
             Value::MotionLine => self.motion().line as i32,
             Value::Velocity => thousandths(self.motion().velocity * 60.0),
             Value::QueueFree => queue::free() as i32,
