@@ -19,7 +19,7 @@ use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
 use crate::protocol::{Machine, StatusReport, Value, Warning, thousandths};
 use crate::status::Status;
-use crate::store::kept::Item;
+use crate::store::kept::ITEMS;
 use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
@@ -86,8 +86,8 @@ impl<'a> View<'a> {
     /// A setting is to be put away; if it has `lowered` others, all of them.
     fn note(&self, setting: Setting, lowered: bool) {
         match lowered {
-            true => self.links.storage.note(0, Setting::NUMBERS.into()),
-            false => self.links.storage.note(Item::of_setting(setting), 1),
+            true => self.links.storage.note(0, ITEMS),
+            false => self.links.storage.note(setting.number(), 1),
         }
     }
 
@@ -193,7 +193,7 @@ impl Machine for View<'_> {
         self.report.restore();
         self.links.resync.set(true);
         self.links.settings_changed.set(true);
-        self.links.storage.note(0, Setting::NUMBERS.into());
+        self.links.storage.note(0, ITEMS);
         set_outputs(&self.settings);
         Status::Ok
     }
