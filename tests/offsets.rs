@@ -163,3 +163,22 @@ fn a_power_cut_leaves_each_offset_old_or_new() {
     }
     assert_eq!(arrived, 6);
 }
+
+#[test]
+fn offsets_set_as_settings_survive_a_reset_and_wait_for_each_other() {
+    let left = with(Vec::new(), |sender| {
+        // Two rows in one line: the second waits for the first, and nothing is refused.
+        let heard = sender.ask("{g54:{x:1,y:2},g55x:3}\n$g56z=4\n{fb:n}\n", 2_000);
+        assert!(
+            heard.contains("{\"r\":{\"g54\":{\"x\":1.000,\"y\":2.000},\"g55x\":3.000},\"f\":[1,0,")
+        );
+        assert!(heard.contains("[g56z] g56 z offset               4.000 mm\ntinyg [mm] ok> "));
+        assert!(heard.contains("440.20"), "{heard}");
+        eeprom::contents()
+    });
+    with(left, |sender| {
+        assert_eq!(sender.origin()[..2], [1.0, 2.0]);
+        let heard = sender.ask("{g55x:n,g56z:n}\n", 20);
+        assert!(heard.contains("{\"g55x\":3.000,\"g56z\":4.000}"), "{heard}");
+    });
+}

@@ -9,6 +9,7 @@ pub mod docs;
 pub mod name;
 pub mod number;
 pub mod ratio;
+pub mod rows;
 pub mod setting;
 pub mod table;
 pub mod words;

@@ -46,15 +46,14 @@ impl Request {
     ) {
         match self.apply(pair, target, c) {
             Ok(Some(token)) => {
-                self.at = token.number();
-                self.item = 0;
-                self.phase = Phase::One;
+                self.enlist(Some(Group::One(token)), None);
             }
             Ok(None) => {
                 // The defaults have a status of their own, which is for JSON.
                 self.status = Status::Ok;
                 self.phase = Phase::Prompt;
             }
+            Err(Status::Again) => self.waits = true,
             Err(status) => self.fail(status, Mode::Text),
         }
     }

@@ -2,7 +2,10 @@
 
 use super::{CHUNK, Machine, Mode, Next, Out, Request, StatusReport, Value, Warning};
 use crate::config::{Setting, Settings};
+use crate::gcode::tables::Row;
 use crate::status::Status;
+use crate::units::Length;
+use std::collections::HashMap;
 use std::string::String;
 use std::vec::Vec;
 
@@ -15,6 +18,9 @@ pub struct Fake {
     pub line: i32,
     pub powered: [bool; 4],
     pub state: i32,
+    /// Values of the interpreter's tables.
+    pub rows: HashMap<(u8, u8), i32>,
+    waits: bool,
     /// What a block of G-code is answered with, and the blocks that were run.
     pub outcome: Status,
     pub blocks: Vec<String>,
@@ -31,6 +37,8 @@ impl Fake {
             line: 0,
             powered: [false; 4],
             state: 1,
+            rows: HashMap::new(),
+            waits: false,
             outcome: Status::Ok,
             blocks: Vec::new(),
         }
@@ -49,6 +57,7 @@ impl Fake {
             answer.extend(chunk.0);
             match next {
                 Next::More => {}
+                Next::Wait => assert!(self.waits),
                 Next::Gcode { start, end } => {
                     assert!(answer.is_empty(), "a response has begun before its block has run");
                     let block = &line[usize::from(start)..usize::from(end)];
@@ -90,8 +99,21 @@ impl Machine for Fake {
         Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 
+    fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {
+        // Every other time, as if another row were on its way.
+        self.waits = !self.waits;
+        if self.waits {
+            return Err(Status::Again);
+        }
+        self.rows.insert((row.number(), axis), value.0);
+        Ok(())
+    }
+
     fn value(&mut self, value: Value) -> i32 {
         match value {
+            Value::Row(row, axis) => {
+                self.rows.get(&(row.number(), axis)).copied().unwrap_or_default()
+            }
             Value::Units => i32::from(!self.inches),
             Value::State => self.state,
             Value::Coordinates | Value::FeedMode => 1,

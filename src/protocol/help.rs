@@ -45,7 +45,7 @@ progmem! {
         text!("  $1        settings of a motor: 1 2 3 4\n"),
         text!("  $sys      settings of the machine; $ does so too\n"),
         text!("  $m $q     all motors, all axes\n"),
-        text!("  $o        offsets in force\n"),
+        text!("  $o        offsets, stored positions; $tt1 a tool\n"),
         text!("  $$        everything\n"),
         text!("  $xvm      one setting, here: x velocity maximum\n"),
         text!("  $posx     one value, here: where x is\n"),

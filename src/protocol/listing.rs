@@ -10,12 +10,14 @@
 
 use super::json::Span;
 use super::machine::Machine;
+use super::place::Place;
 use super::request::{Context, Phase, Request};
 use super::screen::Label;
 use super::token::{Group, Shown, Token};
 use super::write::{Out, Writer};
 use crate::config::table::{MODE, RADIUS};
 use crate::config::{Fixed, Owner, Setting, Words};
+use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::text;
@@ -44,13 +46,13 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// What a letter stands for: `$` all settings, `m` motors, `q` axes, `o` offsets.
+    /// What a letter stands for: `$` all but tools, `m` motors, `q` axes, `o` offsets.
     pub fn of_letter(letter: u8) -> Option<Series> {
         let (first, end) = match letter {
-            b'$' => (0, 11),
+            b'$' => (0, 23),
             b'm' => (1, 5),
             b'q' => (5, 11),
-            b'o' => (11, 13),
+            b'o' => (11, 25),
             _ => return None,
         };
         Some(Series { first, end })
@@ -62,7 +64,10 @@ impl Series {
             0 => Group::Settings(Owner::System),
             1..5 => Group::Settings(Owner::Motor(number - 1)),
             5..11 => Group::Settings(Owner::Axis(number - 5)),
-            11 => Group::OFFSETS,
+            11..20 => Group::Row(Row::system(number - 11)),
+            20 => Group::SHIFT,
+            21 | 22 => Group::Row(Row::stored(number - 21)),
+            23 => Group::OFFSETS,
             _ => Group::TOOL_OFFSETS,
         }
     }
@@ -97,17 +102,6 @@ impl Request {
             self.phase = Phase::Prompt;
         }
     }
-
-    /// A part of the line of one token, the one whose number is in `at`.
-    pub(super) fn one<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        let token = Token::of_number(self.at);
-        put_part(token, self.item, c.machine, &mut Writer::body(c.out, &mut self.format));
-        self.item += 1;
-        if self.item == PARTS {
-            self.item = 0;
-            self.phase = Phase::Prompt;
-        }
-    }
 }
 
 /// What `token` is, its value, and what comes behind that.
@@ -118,6 +112,13 @@ fn put_part<M: Machine, O: Out>(
     machine: &mut M,
     writer: &mut Writer<'_, O>,
 ) {
+    if let Some(place) = Place::of(token) {
+        return match part {
+            0 => place.title(writer),
+            1 => put_number(place.value(machine), UNITS_END - place.title_end(), writer),
+            _ => place.unit(machine, writer),
+        };
+    }
     let setting = token.setting();
     match (setting.and_then(|setting| Some((setting, setting.words()?))), part) {
         (None, 0) => Label::of(token).write(token, writer),

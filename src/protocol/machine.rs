@@ -3,10 +3,12 @@
 use super::report::StatusReport;
 use super::value::Value;
 use crate::config::{Setting, Settings};
+use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::status::Status;
 use crate::text;
+use crate::units::Length;
 
 /// What is told beside what has been done; the last one counts most.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
@@ -51,6 +53,9 @@ pub trait Machine {
     fn settings(&self) -> &Settings;
     /// Stores a value that [`Settings::check`] returned and lets it take effect, or refuses it.
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status>;
+    /// Sets a value of the interpreter's tables. [`Status::Again`]: nothing is done, and it is to be tried again when
+    /// the tables are ready.
+    fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status>;
     /// A value now, in the unit that [`Value`] states.
     fn value(&mut self, value: Value) -> i32;
     /// What status reports hold.

@@ -19,6 +19,7 @@ mod listing;
 mod machine;
 pub mod notice;
 mod pairs;
+mod place;
 mod prompt;
 mod report;
 mod request;

@@ -3,12 +3,15 @@
 use super::json::{self, Kind, Pair};
 use super::machine::{Machine, Warning};
 use super::request::{Context, Phase, Request};
-use super::token::{Action, Group, Target, Token, resolve};
+use super::token::{Action, Group, Subject, Target, Token, resolve};
+use super::value::{Form, place_form};
 use super::write::{Out, Writer};
 use crate::config::table;
 use crate::config::{Name, Number, Setting};
+use crate::gcode::tables::Row;
 use crate::status::Status;
 use crate::text;
+use crate::units::Length;
 
 /// What to tell of a pair that was carried out.
 pub(super) type Outcome = Result<Option<Token>, Status>;
@@ -19,7 +22,6 @@ impl Request {
             self.phase = Phase::Warning;
             return;
         };
-        self.at = pair.next;
         let target = resolve(Name::new(), pair.name.of(c.line));
         match (target, pair.kind) {
             (Target::Group(group), Kind::Null) => self.enter(group, &pair, Phase::List, c),
@@ -30,6 +32,7 @@ impl Request {
             }
             (Target::Group(group), Kind::Object) => self.enter(group, &pair, Phase::Member, c),
             (Target::Action(Action::Block), Kind::Text) if !self.begun => {
+                self.at = pair.next;
                 self.block = pair.value;
                 self.phase = Phase::Gcode;
             }
@@ -48,6 +51,7 @@ impl Request {
         let mut writer = Writer::body(c.out, &mut self.format);
         writer.key(pair.name.of(c.line));
         writer.open();
+        self.at = pair.next;
         self.group = Some(group);
         self.item = 0;
         self.phase = phase;
@@ -66,7 +70,6 @@ impl Request {
             self.at = json::behind_object(c.line, self.at);
             return self.leave(c);
         };
-        self.at = pair.next;
         let prefix = self.group.map_or(Name::new(), Group::prefix);
         let target = match resolve(prefix, pair.name.of(c.line)) {
             // A group has no groups, and no G-code, in it.
@@ -100,14 +103,13 @@ impl Request {
         };
         self.at = pair.next;
         let Target::Token(token) = resolve(Name::new(), pair.name.of(c.line)) else { return };
-        if pair.kind != Kind::True {
-            return;
-        }
+        // What is in EEPROM alone is too far away to be told all the time.
+        let (Some(number), Kind::True) = (token.small(), pair.kind) else { return };
         let report = c.machine.report();
         if !core::mem::replace(&mut self.selected, true) {
             report.clear();
         }
-        if !report.add(token) {
+        if !report.add(number) {
             self.status = Status::JsonTooManyPairs;
         }
     }
@@ -135,6 +137,12 @@ impl Request {
         c: &mut Context<'_, M, O>,
     ) {
         let outcome = self.apply(pair, target, c);
+        if outcome == Err(Status::Again) {
+            // From its beginning, later.
+            self.waits = true;
+            return;
+        }
+        self.at = pair.next;
         self.open(c);
         match outcome {
             Ok(Some(token)) => {
@@ -164,7 +172,13 @@ impl Request {
             (_, Kind::Object) | (Target::Group(_), _) => Err(Status::UnsupportedType),
             (Target::Token(token), Kind::Null) => Ok(Some(token)),
             (Target::Token(token), _) => {
-                self.set(token.setting().ok_or(Status::ReadOnly)?, pair, c)?;
+                match token.subject() {
+                    Some(Subject::Setting(setting)) => self.set(setting, pair, c)?,
+                    Some(Subject::Row(row, axis)) if !row.is_stored() => {
+                        set_row(row, axis, pair, c)?
+                    }
+                    _ => return Err(Status::ReadOnly),
+                }
                 Ok(Some(token))
             }
             (Target::Action(Action::Help), _) => self.advise(Warning::Help),
@@ -209,6 +223,22 @@ impl Request {
             _ => writer.text(text!("null")),
         }
     }
+}
+
+/// Sets a value of the interpreter's tables.
+fn set_row<M: Machine, O>(
+    row: Row,
+    axis: u8,
+    pair: &Pair,
+    c: &mut Context<'_, M, O>,
+) -> Result<(), Status> {
+    if pair.kind != Kind::Number {
+        return Err(Status::UnsupportedType);
+    }
+    let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
+    let inches = c.machine.inches() && place_form(axis) == Form::Length;
+    let value = number.fixed(Length::DECIMALS, inches).ok_or(Status::OutOfRange)?;
+    c.machine.set_row(row, axis, Length(value))
 }
 
 /// A number without the leading zeros that JSON does not allow.

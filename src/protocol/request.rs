@@ -14,7 +14,7 @@
 //!   G-code ---> Gcode -> Block -> Message -> Number -------------------+
 //!                  \  text mode
 //!   ? -> Listing ---+-> Prompt -> (Failure -> Complaint) -> Message
-//!   $ -> Command -> Listing, One or Help -> Prompt
+//!   $ -> Command -> Listing or Help -> Prompt
 //!   defa: Pair -> Greeting -> Pair
 //! ```
 
@@ -39,6 +39,8 @@ pub enum Next {
         /// The byte behind it.
         end: u8,
     },
+    /// What is to be changed is still on its way to memory: step again later.
+    Wait,
     /// The response is complete.
     Done(Status),
 }
@@ -71,8 +73,6 @@ pub(super) enum Phase {
     Command,
     /// Groups in text.
     Listing,
-    /// One setting or value in text.
-    One,
     /// Help in text.
     Help,
     /// The defaults have been restored: tell who we are.
@@ -111,6 +111,8 @@ pub struct Request {
     pub(super) warning: Warning,
     /// Of the phase `Select`: something has been selected.
     pub(super) selected: bool,
+    /// What the last step was to do has to wait.
+    pub(super) waits: bool,
 }
 
 /// What a step works with.
@@ -185,6 +187,7 @@ impl Request {
             commented: true,
             warning: Warning::None,
             selected: false,
+            waits: false,
         }
     }
 
@@ -227,7 +230,6 @@ impl Request {
             Phase::Footer => self.footer(context),
             Phase::Command => self.command(context),
             Phase::Listing => self.listing(context),
-            Phase::One => self.one(context),
             Phase::Help => self.help_line(context),
             Phase::Greeting => self.greeting(context),
             Phase::Prompt => self.prompt(context),
@@ -235,7 +237,16 @@ impl Request {
             Phase::Complaint => self.complaint(context),
             Phase::Done => return Next::Done(self.status),
         }
-        if self.phase == Phase::Done { Next::Done(self.status) } else { Next::More }
+        match self.phase {
+            _ if core::mem::take(&mut self.waits) => Next::Wait,
+            Phase::Done => Next::Done(self.status),
+            _ => Next::More,
+        }
+    }
+
+    /// Whether something of the response has been put.
+    pub fn has_begun(&self) -> bool {
+        self.begun
     }
 
     /// Begins the response, if it has not begun.

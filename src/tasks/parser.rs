@@ -169,6 +169,13 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
         tx.room().await;
         match step(links, id, request, &mut tx) {
             Next::More => {}
+            // Of a response that has begun the rest is due.
+            Next::Wait if request.has_begun() => tables_ready(links).await,
+            Next::Wait => {
+                drop(tx);
+                tables_ready(links).await;
+                tx = links.tx.lock().await;
+            }
             Next::Gcode { start, end } => {
                 let block = Span { start, end };
                 while !ran(links, id, block, request) {
@@ -185,6 +192,13 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
     }
     if let Some(rate) = links.rate.take() {
         tx.set_rate(rate).await;
+    }
+}
+
+/// Waits until the tables take another change.
+async fn tables_ready(links: &Links) {
+    while links.storage.is_awaited() {
+        links.parser_wake.wait().await;
     }
 }
 

@@ -75,6 +75,17 @@ impl Storage {
         self.awaited.get()
     }
 
+    /// A value of a row. Cost as of [`Tables::row`].
+    #[inline(never)]
+    pub fn value(&self, row: Row, axis: u8) -> Length {
+        match self.edit.get() {
+            Some(edit) if edit.row == row => {
+                edit.values.get(usize::from(axis)).copied().unwrap_or_default()
+            }
+            _ => tables::value(&self.log.get(), &Eeprom::take(), row, axis),
+        }
+    }
+
     /// What comes next.
     fn take(&self) -> Option<Work> {
         if self.edit.get().is_some() {

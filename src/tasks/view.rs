@@ -12,6 +12,7 @@ use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
+use crate::gcode::tables::Row;
 use crate::hal::imp::{gpio, stepper};
 use crate::jobs::Job;
 use crate::motion::dynamics;
@@ -147,6 +148,10 @@ impl Machine for View<'_> {
         Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 
+    fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {
+        self.links.model.borrow_mut().set(row, axis, value)
+    }
+
     fn value(&mut self, value: Value) -> i32 {
         match value {
             Value::State => self.state(),
@@ -169,6 +174,10 @@ impl Machine for View<'_> {
                 self.position(axis).0.wrapping_sub(self.offset(axis).0)
             }
             Value::Offset(axis) => self.offset(axis.into()).0,
+            Value::Shift(axis) => {
+                self.links.model.borrow().shift().get(usize::from(axis)).map_or(0, |shift| shift.0)
+            }
+            Value::Row(row, axis) => self.links.storage.value(row, axis).0,
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),

@@ -37,6 +37,23 @@ rest with 106. `Decimals` are those that are kept; more are rounded, and fewer m
 
 ";
 
+const PLACES: &str = "\
+## Offsets
+
+Coordinate systems, positions and tools are groups as well; each value is read and set alone (`g54x`) or with others
+(`{g54:{x:1,y:2}}`). Lengths have four decimals, angles too.
+
+| Group | Members | What | Set by | Survives a power cut |
+|---|---|---|---|---|
+| `g54` to `g59`, `g591` to `g593` | `x` to `c` | origin of a coordinate system, G54 to G59.3 | itself, G10 L2, G10 L20 | yes |
+| `tt1` to `tt10` | `x` `z` | length of a tool | itself, G10 L1, G10 L10 | yes |
+| `g28`, `g30` | `x` to `c` | stored position | G28.1, G30.1 | yes |
+| `g92` | `x` to `c` | offset of G92, in force or not | G92 | no |
+
+They are in force when the response comes, those of a tool with the next G43. All are 0 at first. `$o` and `$$` show
+them, but for tools. Those that survive a power cut cannot be in status reports.
+";
+
 /// All of it.
 pub fn markdown() -> String {
     let groups: [(&str, &str, &[Owner], &[Meaning]); 3] = [
@@ -68,7 +85,7 @@ pub fn markdown() -> String {
         }
         text += "\n";
     }
-    text.trim_end().to_string() + "\n"
+    text + PLACES
 }
 
 /// One setting, of all its owners.
