@@ -182,3 +182,27 @@ fn offsets_set_as_settings_survive_a_reset_and_wait_for_each_other() {
         assert!(heard.contains("{\"g55x\":3.000,\"g56z\":4.000}"), "{heard}");
     });
 }
+
+#[test]
+fn a_power_cut_leaves_each_cold_setting_old_or_new() {
+    let cuts = with(Vec::new(), |sender| {
+        sender.ask("{p1frq:200}\n{uda0:\"0x1\",uda1:\"0x1\"}\n", 2_000);
+        sender.0.send(b"{p1frq:300}\n{uda0:\"0x2\"}\n");
+        let mut cuts = Vec::new();
+        for _ in 0..40 {
+            sender.0.run_ms(3);
+            cuts.push(eeprom::contents());
+        }
+        cuts
+    });
+    let mut seen = Vec::new();
+    for cut in cuts {
+        let heard = with(cut, |sender| sender.ask("{p1frq:n,uda0:n,uda1:n}\n", 20));
+        let now = [(200, 1), (300, 1), (300, 2)].iter().position(|(frequency, data)| {
+            let body = format!("{{\"p1frq\":{frequency},\"uda0\":\"0x{data}\",\"uda1\":\"0x1\"}}");
+            heard.contains(&body)
+        });
+        seen.push(now.unwrap_or_else(|| panic!("{heard}")));
+    }
+    assert!(seen.is_sorted() && seen.contains(&1) && seen.last() == Some(&2), "{seen:?}");
+}

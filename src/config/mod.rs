@@ -2,7 +2,7 @@
 //!
 //! `protocol` reads and writes them by name through [`Setting`]; everything else uses the getters of
 //! [`Settings`], which cost a load. Values are integers scaled by a power of ten, so text goes in
-//! and out exactly. They live in RAM only.
+//! and out exactly. Those that are seldom asked for are in EEPROM alone, and `tasks::storage` has them.
 
 #[cfg(not(target_arch = "avr"))]
 pub mod docs;
@@ -71,7 +71,8 @@ impl Settings {
         match setting.place() {
             Place::Small(slot) => self.small(slot).into(),
             Place::Large(slot) => self.large(slot),
-            Place::Constant => setting.default_value(),
+            // One that is in EEPROM is asked for elsewhere.
+            Place::Constant | Place::Log => setting.default_value(),
         }
     }
 
@@ -103,15 +104,15 @@ impl Settings {
         Ok(value)
     }
 
-    /// The value of a setting as shown.
-    pub fn show(&self, setting: Setting, inches: bool) -> Fixed {
-        self.show_as(setting, inches, setting.row().shown)
+    /// A value of a setting as shown.
+    pub fn show(&self, setting: Setting, value: i32, inches: bool) -> Fixed {
+        self.show_as(setting, value, inches, setting.row().shown)
     }
 
     /// The same with at most so many decimals.
-    pub fn show_as(&self, setting: Setting, inches: bool, decimals: u8) -> Fixed {
+    pub fn show_as(&self, setting: Setting, value: i32, inches: bool, decimals: u8) -> Fixed {
         let row = setting.row();
-        let value = Fixed { value: self.get(setting), decimals: row.stored };
+        let value = Fixed { value, decimals: row.stored };
         if inches && self.is_length(setting, &row) {
             value.inches(decimals)
         } else {
@@ -146,7 +147,7 @@ impl Settings {
                     *place = value;
                 }
             }
-            Place::Constant => {}
+            Place::Constant | Place::Log => {}
         }
     }
 

@@ -20,6 +20,8 @@ pub struct Fake {
     pub state: i32,
     /// Values of the interpreter's tables.
     pub rows: HashMap<(u8, u8), i32>,
+    /// Settings that are in EEPROM.
+    pub cold: HashMap<u8, i32>,
     waits: bool,
     /// What a block of G-code is answered with, and the blocks that were run.
     pub outcome: Status,
@@ -38,6 +40,7 @@ impl Fake {
             powered: [false; 4],
             state: 1,
             rows: HashMap::new(),
+            cold: HashMap::new(),
             waits: false,
             outcome: Status::Ok,
             blocks: Vec::new(),
@@ -93,7 +96,14 @@ impl Machine for Fake {
         &self.settings
     }
 
+    fn cold(&mut self, setting: Setting) -> i32 {
+        self.cold.get(&setting.number()).copied().unwrap_or_else(|| setting.default_value())
+    }
+
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
+        if setting.is_cold() {
+            self.cold.insert(setting.number(), value);
+        }
         self.settings.store(setting, value);
         let lowered = self.settings.limit_velocity(setting, |_| 40_000);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
@@ -137,6 +147,7 @@ impl Machine for Fake {
             return Status::NotAccepted;
         }
         self.settings.set_defaults();
+        self.cold.clear();
         self.report.restore();
         Status::Ok
     }

@@ -28,6 +28,8 @@ const PARTS: u8 = 3;
 const TITLE_START: usize = 6;
 /// Where the integer part of a number ends.
 const UNITS_END: usize = 35;
+/// Counts of the group `p1` end so much behind that, below the decimals of the others.
+const PWM_SHIFT: usize = 4;
 
 progmem! {
     static MODES: [Text; 4] = [
@@ -49,10 +51,10 @@ impl Series {
     /// What a letter stands for: `$` all but tools, `m` motors, `q` axes, `o` offsets.
     pub fn of_letter(letter: u8) -> Option<Series> {
         let (first, end) = match letter {
-            b'$' => (0, 23),
+            b'$' => (0, 24),
             b'm' => (1, 5),
             b'q' => (5, 11),
-            b'o' => (11, 25),
+            b'o' => (12, 26),
             _ => return None,
         };
         Some(Series { first, end })
@@ -64,10 +66,11 @@ impl Series {
             0 => Group::Settings(Owner::System),
             1..5 => Group::Settings(Owner::Motor(number - 1)),
             5..11 => Group::Settings(Owner::Axis(number - 5)),
-            11..20 => Group::Row(Row::system(number - 11)),
-            20 => Group::SHIFT,
-            21 | 22 => Group::Row(Row::stored(number - 21)),
-            23 => Group::OFFSETS,
+            11 => Group::Settings(Owner::Pwm),
+            12..21 => Group::Row(Row::system(number - 12)),
+            21 => Group::SHIFT,
+            22 | 23 => Group::Row(Row::stored(number - 22)),
+            24 => Group::OFFSETS,
             _ => Group::TOOL_OFFSETS,
         }
     }
@@ -140,7 +143,7 @@ fn title_start(setting: Setting) -> usize {
 /// The length of what tells whose a setting is: `m1 `, `x `.
 fn owner_len(setting: Setting) -> usize {
     match setting.owner() {
-        Owner::System => 0,
+        Owner::System | Owner::Pwm | Owner::User(_) | Owner::Job => 0,
         Owner::Motor(_) => 3,
         Owner::Axis(_) => 2,
     }
@@ -155,7 +158,7 @@ fn put_title<O: Out>(setting: Setting, words: &Words, writer: &mut Writer<'_, O>
     if let Owner::Motor(_) = setting.owner() {
         writer.byte(b'm');
     }
-    if setting.owner() != Owner::System {
+    if matches!(setting.owner(), Owner::Motor(_) | Owner::Axis(_)) {
         writer.byte(name.first());
         writer.byte(b' ');
     }
@@ -177,10 +180,17 @@ fn put_value<M: Machine, O: Out>(
             writer.blanks(width.saturating_sub(1));
             writer.text(text);
         }
+        (Shown::Data(bits), _) => {
+            writer.blanks(width.saturating_sub(1));
+            writer.bits(bits);
+        }
+        (Shown::Number(fixed), None) if setting.owner() == Owner::Pwm && fixed.decimals == 0 => {
+            put_number(fixed, width + PWM_SHIFT, writer);
+        }
         (Shown::Number(fixed), None) => put_number(fixed, width, writer),
         (Shown::Number(_), Some(decimals)) => {
-            let inches = machine.inches();
-            let fixed = machine.settings().show_as(setting, inches, decimals);
+            let (inches, value) = (machine.inches(), machine.setting(setting));
+            let fixed = machine.settings().show_as(setting, value, inches, decimals);
             put_number(fixed.padded(decimals), width, writer);
         }
     }

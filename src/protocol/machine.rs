@@ -51,7 +51,14 @@ progmem! {
 pub trait Machine {
     /// The settings in force.
     fn settings(&self) -> &Settings;
-    /// Stores a value that [`Settings::check`] returned and lets it take effect, or refuses it.
+    /// The value of a setting that is in EEPROM alone: up to 2 ms.
+    fn cold(&mut self, setting: Setting) -> i32;
+    /// The value of any setting.
+    fn setting(&mut self, setting: Setting) -> i32 {
+        if setting.is_cold() { self.cold(setting) } else { self.settings().get(setting) }
+    }
+    /// Stores a value that [`Settings::check`] returned and lets it take effect, or refuses it. [`Status::Again`] as of
+    /// [`Self::set_row`].
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status>;
     /// Sets a value of the interpreter's tables. [`Status::Again`]: nothing is done, and it is to be tried again when
     /// the tables are ready.

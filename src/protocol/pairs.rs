@@ -103,8 +103,10 @@ impl Request {
         };
         self.at = pair.next;
         let Target::Token(token) = resolve(Name::new(), pair.name.of(c.line)) else { return };
-        // What is in EEPROM alone is too far away to be told all the time.
         let (Some(number), Kind::True) = (token.small(), pair.kind) else { return };
+        if token.is_far() {
+            return;
+        }
         let report = c.machine.report();
         if !core::mem::replace(&mut self.selected, true) {
             report.clear();
@@ -195,7 +197,11 @@ impl Request {
     ) -> Result<(), Status> {
         let small = match setting.row().kind {
             table::Kind::Small => true,
-            table::Kind::Large => false,
+            table::Kind::Large | table::Kind::Cold => false,
+            table::Kind::Data | table::Kind::Job => {
+                let value = bits(pair, c.line)?;
+                return c.machine.set(setting, value).map(|_| ());
+            }
             table::Kind::Constant | table::Kind::Text => return Err(Status::ReadOnly),
         };
         let number = match pair.kind {
@@ -223,6 +229,20 @@ impl Request {
             _ => writer.text(text!("null")),
         }
     }
+}
+
+/// The value of a pair as 32 bits: `"0x2a"`.
+fn bits(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
+    if !matches!(pair.kind, Kind::Text | Kind::Number) {
+        return Err(Status::UnsupportedType);
+    }
+    let digits = match pair.value.of(line) {
+        [b'0', b'x' | b'X', digits @ ..] if (1..=8).contains(&digits.len()) => digits,
+        _ => return Err(Status::BadNumber),
+    };
+    let digit = |bits: u32, byte: &u8| Some(bits << 4 | char::from(*byte).to_digit(16)?);
+    let bits = digits.iter().try_fold(0, digit).ok_or(Status::BadNumber)?;
+    Ok(bits.cast_signed())
 }
 
 /// Sets a value of the interpreter's tables.

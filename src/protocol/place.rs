@@ -57,7 +57,7 @@ impl Place {
     pub fn value(&self, machine: &mut impl Machine) -> Fixed {
         match self.token.read(machine) {
             Shown::Number(fixed) => fixed,
-            Shown::Text(_) => Fixed::int(0),
+            Shown::Text(_) | Shown::Data(_) => Fixed::int(0),
         }
     }
 

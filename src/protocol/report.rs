@@ -125,6 +125,7 @@ impl Report {
         let shown = token.read(machine);
         let value = match shown {
             Shown::Number(fixed) => fixed.value,
+            Shown::Data(bits) => bits,
             Shown::Text(_) => 0,
         };
         let changed = machine.report().note(self.index, value);

@@ -107,7 +107,10 @@ fn groups_list_what_they_have() {
     let systems = ["g54", "g55", "g56", "g57", "g58", "g59", "g591", "g592", "g593"];
     let places = systems.iter().chain(&["g92", "g28", "g30"]);
     let places: Vec<String> = places.map(|group| names(&std::format!("${group}"))).collect();
-    assert_eq!(names("$$"), [sys, names("$m"), names("$q"), places.join(" ")].join(" "));
+    assert_eq!(
+        names("$$"),
+        [sys, names("$m"), names("$q"), names("$p1"), places.join(" ")].join(" ")
+    );
     assert_eq!(listed("$o").lines().count(), places.len() * 6 + 12);
 }
 

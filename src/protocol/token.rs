@@ -44,6 +44,8 @@ pub enum Shown {
     Number(Fixed),
     /// A string.
     Text(Text),
+    /// 32 bits.
+    Data(i32),
 }
 
 impl Token {
@@ -52,7 +54,12 @@ impl Token {
         Token(row as u16)
     }
 
-    /// Its number, if it fits: of all that is in RAM.
+    /// Whether it is in EEPROM alone, too far away to be told all the time.
+    pub fn is_far(self) -> bool {
+        self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
+    }
+
+    /// Its number, if it fits.
     pub fn small(self) -> Option<u8> {
         self.0.try_into().ok()
     }
@@ -154,7 +161,11 @@ impl Token {
             Some(Subject::Setting(setting)) => {
                 return match setting.row().kind {
                     Kind::Text => Shown::Text(text!("0000-KERF")),
-                    _ => Shown::Number(machine.settings().show(setting, inches)),
+                    Kind::Data | Kind::Job => Shown::Data(machine.setting(setting)),
+                    _ => {
+                        let value = machine.setting(setting);
+                        Shown::Number(machine.settings().show(setting, value, inches))
+                    }
                 };
             }
             Some(Subject::Single(single)) => (single.value, single.form),
@@ -224,7 +235,7 @@ pub enum Action {
 /// Names that stand for several.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Group {
-    /// `sys`, `1` to `4`, `x` to `c`.
+    /// `sys`, `1` to `4`, `x` to `c`, `p1`, `uda` to `udd`, `jid`.
     Settings(Owner),
     /// `pos` and its like, by their number in [`VECTORS`].
     Vector(u8),
@@ -251,8 +262,8 @@ impl Group {
         if name.is(text!("sr")) {
             return Some(Group::Report);
         }
-        if name.bytes().len() == 1 {
-            return Owner::of_letter(name.first()).map(Group::Settings);
+        if let Some(owner) = Owner::called(name) {
+            return Some(Group::Settings(owner));
         }
         let vector = (0..VECTOR_COUNT as u8).find(|&v| is_vector(name, v)).map(Group::Vector);
         vector.or_else(|| find_row(name).map(Group::Row))
@@ -344,7 +355,7 @@ mod tests {
             assert_eq!(Token::find(&token.name()), Some(token), "{}", text(token));
             count += 1;
         }
-        assert_eq!(count, 31 + 28 + 3 * 15 + 16 + 2 * 9 + 28 + 40 + 11 * 6 + 10 * 2);
+        assert_eq!(count, 31 + 28 + 3 * 15 + 16 + 2 * 9 + 28 + 40 + 11 * 6 + 10 * 2 + 10 + 16 + 4);
         for bad in [
             "g53x", "g54d", "tt1y", "tt11z", "posd", "pwr5", "pwr0", "pos", "homd", "pwra", "velo",
             "",

@@ -7,7 +7,7 @@
 //! reset -> Log::open -> kept::load -> Settings
 //! a line that asks for a row -> Storage, else tables::row -> Log::find
 //! ```
-//! Settings are in RAM, too; the tables of the interpreter are here alone.
+//! Most settings are in RAM, too; the others (PWM, user data) and the tables of the interpreter are here alone.
 //!
 //! The EEPROM is a ring of records, each of which says what one item is ([`record`]); the newest record of an
 //! item counts. A new record goes into a slot that holds nothing of worth, and counts only when its last byte has

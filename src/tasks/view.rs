@@ -128,7 +128,15 @@ impl Machine for View<'_> {
         &self.settings
     }
 
+    fn cold(&mut self, setting: Setting) -> i32 {
+        self.links.storage.cold(setting)
+    }
+
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
+        if setting.is_cold() {
+            self.links.storage.set_cold(setting, value)?;
+            return Ok(Warning::None);
+        }
         if setting.needs_rest() {
             if self.busy() {
                 return Err(Status::NotAccepted);
@@ -202,6 +210,7 @@ impl Machine for View<'_> {
         self.report.restore();
         self.links.resync.set(true);
         self.links.settings_changed.set(true);
+        self.links.storage.forget_cold();
         self.links.storage.note(0, ITEMS);
         set_outputs(&self.settings);
         Status::Ok

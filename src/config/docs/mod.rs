@@ -56,7 +56,7 @@ them, but for tools. Those that survive a power cut cannot be in status reports.
 
 /// All of it.
 pub fn markdown() -> String {
-    let groups: [(&str, &str, &[Owner], &[Meaning]); 3] = [
+    let groups: [(&str, &str, &[Owner], &[Meaning]); 6] = [
         (
             "The machine",
             "The group `sys`; names have no prefix.",
@@ -74,6 +74,19 @@ pub fn markdown() -> String {
             "The groups `x` `y` `z` `a` `b` `c`: `xvm`, `yvm`.",
             &[0, 1, 2, 3, 4, 5].map(Owner::Axis),
             &meaning::AXIS,
+        ),
+        ("PWM of the spindle", "The group `p1`: `p1frq`.", &[Owner::Pwm], &meaning::PWM),
+        (
+            "User data",
+            "The groups `uda` `udb` `udc` `udd`: `uda0`, `udd3`. For a sender's own use: `{uda0:\"0x2a\"}`, `$uda0=0x2a`.",
+            &[0, 1, 2, 3].map(Owner::User),
+            &meaning::USER,
+        ),
+        (
+            "Job",
+            "The group `jid`: `jida`. Who runs what, for senders, in the same form; 0 after a reset.",
+            &[Owner::Job],
+            &meaning::JOB,
         ),
     ];
     let mut text = PREFACE.to_string();
@@ -109,6 +122,8 @@ fn kind(row: &Row) -> &'static str {
     match row.kind {
         Kind::Constant => "fixed",
         Kind::Text => "fixed text",
+        Kind::Data | Kind::Job => "32 bits",
+        Kind::Cold => "number",
         Kind::Small | Kind::Large if row.stored == 0 => "integer",
         Kind::Small | Kind::Large => "number",
     }
@@ -182,6 +197,7 @@ fn range(setting: Setting, row: &Row) -> String {
     let shown = |value| number(value, row.stored);
     match row.kind {
         Kind::Constant | Kind::Text => String::new(),
+        Kind::Data | Kind::Job => "`\"0x0\"` to `\"0xffffffff\"`".to_string(),
         _ if setting.is_baud() => "1 to 6, or a rate".to_string(),
         _ if row.is(MODE) => "0 to 2; A B C to 3".to_string(),
         _ if row.min == -i32::MAX => format!("±{}", shown(row.max)),
@@ -195,6 +211,7 @@ fn defaults(settings: &[Setting]) -> String {
         let row = setting.row();
         match row.kind {
             Kind::Text => "`0000-KERF`".to_string(),
+            Kind::Data | Kind::Job => "`\"0x0\"`".to_string(),
             _ if row.is(JERK) || row.stored > 0 => number(setting.default_value(), row.stored),
             _ => setting.default_value().to_string(),
         }
@@ -238,6 +255,9 @@ mod tests {
             (Owner::System, &meaning::SYSTEM[..]),
             (Owner::Motor(0), &meaning::MOTOR),
             (Owner::Axis(0), &meaning::AXIS),
+            (Owner::Pwm, &meaning::PWM),
+            (Owner::User(0), &meaning::USER),
+            (Owner::Job, &meaning::JOB),
         ] {
             let described: Vec<_> = meanings.iter().map(|(name, _)| name.to_string()).collect();
             assert_eq!(names(owner), described);
