@@ -26,6 +26,10 @@ use crate::units::Length;
 /// `stat` while the machine is in a machining cycle.
 pub const RUN: i32 = 5;
 
+/// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
+/// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
+const QUEUE_FREE_MIN: usize = 6;
+
 /// A look at the machine.
 pub struct View<'a> {
     links: &'a Links,
@@ -172,7 +176,7 @@ impl Machine for View<'_> {
             Value::FinishedLine => self.motion().finished as i32,
             Value::MotionLine => self.motion().line as i32,
             Value::Velocity => thousandths(self.motion().velocity * 60.0),
-            Value::QueueFree => queue::free() as i32,
+            Value::QueueFree => queue_free() as i32,
             Value::QueueAdded => self.links.queue_count.take_added(),
             Value::QueueRemoved => self.links.queue_count.take_removed(),
             Value::SlotsFree => self.links.lines.borrow().free().into(),
@@ -243,6 +247,11 @@ impl Machine for View<'_> {
         }
         Status::Ok
     }
+}
+
+/// Free blocks of the planner, as they are told.
+pub fn queue_free() -> usize {
+    queue::free().max(QUEUE_FREE_MIN)
 }
 
 /// Tells the outputs what the settings say of them. Thread mode, or before interrupts are on.
