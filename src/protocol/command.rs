@@ -33,6 +33,10 @@ impl Request {
             Target::Group(_) | Target::Action(Action::Block) => self.refuse(),
             Target::Action(Action::Help) => self.help(help::SETTINGS),
             Target::Action(Action::Test) if null => self.help(help::TESTS),
+            Target::Action(Action::Program) if null => {
+                self.item = 0;
+                self.phase = Phase::Program;
+            }
             Target::Action(Action::Defaults) if null => self.help(help::DEFAULTS),
             _ => self.execute(&pair, target, c),
         }

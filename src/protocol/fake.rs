@@ -1,6 +1,6 @@
 //! A machine for tests, and the caller that steps requests for it.
 
-use super::{CHUNK, Machine, Mode, Next, Out, Request, StatusReport, Value, Warning};
+use super::{CHUNK, Machine, Mode, Next, Out, Request, StatusReport, Store, Value, Warning};
 use crate::config::{Setting, Settings};
 use crate::gcode::tables::Row;
 use crate::status::Status;
@@ -22,6 +22,8 @@ pub struct Fake {
     pub rows: HashMap<(u8, u8), i32>,
     /// Settings that are in EEPROM.
     pub cold: HashMap<u8, i32>,
+    /// The program that is kept.
+    pub program: Vec<u8>,
     waits: bool,
     /// What a block of G-code is answered with, and the blocks that were run.
     pub outcome: Status,
@@ -41,6 +43,7 @@ impl Fake {
             state: 1,
             rows: HashMap::new(),
             cold: HashMap::new(),
+            program: Vec::new(),
             waits: false,
             outcome: Status::Ok,
             blocks: Vec::new(),
@@ -158,6 +161,21 @@ impl Machine for Fake {
 
     fn start_job(&mut self, number: u8) -> Status {
         if number < 20 { Status::Ok } else { Status::Error }
+    }
+
+    fn store(&mut self, what: Store<'_>) -> Result<(), Status> {
+        self.waits = !self.waits;
+        match what {
+            _ if self.waits => return Err(Status::Again),
+            Store::Begin => self.program.clear(),
+            Store::Line(line) => self.program.extend([line, b"\n"].concat()),
+            Store::End => {}
+        }
+        Ok(())
+    }
+
+    fn program(&mut self, at: u16) -> Option<u8> {
+        self.program.get(usize::from(at)).copied()
     }
 
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {

@@ -9,7 +9,7 @@ use crate::progmem::Text;
 use crate::text;
 
 /// Lines of [`SCREENS`]; a screen is some of them.
-const LINES: usize = 53;
+const LINES: usize = 54;
 /// What `h` shows.
 pub const GENERAL: Span = Span { start: 0, end: 17 };
 /// What `$h` shows.
@@ -77,6 +77,7 @@ progmem! {
         text!("  $test=13  offsets\n"),
         text!("  $test=51  braid: 2,500 short moves\n"),
         text!("  $test=0   ends the job that runs\n"),
+        text!("  $test=100 your own: $prog=f, $prog=G0 X1, ..., $prog=t\n"),
     ];
 }
 

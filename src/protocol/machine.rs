@@ -47,6 +47,17 @@ progmem! {
     ];
 }
 
+/// What is done to the program that is kept.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Store<'a> {
+    /// A new one begins; the old one is gone.
+    Begin,
+    /// A line of it.
+    Line(&'a [u8]),
+    /// It is complete.
+    End,
+}
+
 /// The machine behind the protocol. Nothing here waits.
 pub trait Machine {
     /// The settings in force.
@@ -73,6 +84,10 @@ pub trait Machine {
     fn clear(&mut self) -> Status;
     /// Starts a built-in job, or ends the one that runs: 0.
     fn start_job(&mut self, number: u8) -> Status;
+    /// Does something to the program that is kept. [`Status::Again`]: it is not done yet, and is to be asked for again.
+    fn store(&mut self, what: Store<'_>) -> Result<(), Status>;
+    /// A byte of the program that is kept.
+    fn program(&mut self, at: u16) -> Option<u8>;
     /// Powers a motor, or takes its power; all of them for `None`.
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status;
 

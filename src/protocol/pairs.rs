@@ -2,6 +2,7 @@
 
 use super::json::{self, Kind, Pair};
 use super::machine::{Machine, Warning};
+use super::program;
 use super::request::{Context, Phase, Request};
 use super::token::{Action, Group, Subject, Target, Token, resolve};
 use super::value::{Form, place_form};
@@ -36,6 +37,7 @@ impl Request {
                 self.block = pair.value;
                 self.phase = Phase::Gcode;
             }
+            (Target::Action(Action::Program), Kind::Null) => self.show_program(&pair, c),
             _ => self.carry_out(&pair, target, c),
         }
     }
@@ -303,6 +305,7 @@ fn act<M: Machine, O>(
             let number = u8::try_from(number).map_err(|_| Status::OutOfRange)?;
             return done(c.machine.start_job(number));
         }
+        Action::Program => return program::store(pair, c),
         Action::Energize => true,
         Action::Release => false,
         Action::Defaults | Action::Help => return Ok(()),

@@ -15,7 +15,7 @@
 //!                  \  text mode
 //!   ? -> Listing ---+-> Prompt -> (Failure -> Complaint) -> Message
 //!   $ -> Command -> Listing or Help -> Prompt
-//!   defa: Pair -> Greeting -> Pair
+//!   defa: Pair -> Greeting -> Pair       prog: Pair -> Program -> Pair, Command -> Program -> Prompt
 //! ```
 
 use super::block::byte_of;
@@ -75,6 +75,8 @@ pub(super) enum Phase {
     Listing,
     /// Help in text.
     Help,
+    /// The program that is kept.
+    Program,
     /// The defaults have been restored: tell who we are.
     Greeting,
     /// The prompt, a status, the line that caused it.
@@ -230,6 +232,7 @@ impl Request {
             Phase::Footer => self.footer(context),
             Phase::Command => self.command(context),
             Phase::Listing => self.listing(context),
+            Phase::Program => self.program(context),
             Phase::Help => self.help_line(context),
             Phase::Greeting => self.greeting(context),
             Phase::Prompt => self.prompt(context),

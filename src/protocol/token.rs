@@ -199,13 +199,14 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [(Text, Action); 9] = [
+    static ACTIONS: [(Text, Action); 10] = [
         (text!("gc"), Action::Block),
         (text!("clear"), Action::Clear),
         (text!("clr"), Action::Clear),
         (text!("me"), Action::Energize),
         (text!("md"), Action::Release),
         (text!("test"), Action::Test),
+        (text!("prog"), Action::Program),
         (text!("defa"), Action::Defaults),
         (text!("h"), Action::Help),
         (text!("help"), Action::Help),
@@ -226,6 +227,8 @@ pub enum Action {
     Release,
     /// `test`: run a built-in job.
     Test,
+    /// `prog`: the program in EEPROM.
+    Program,
     /// `defa`: restore the defaults.
     Defaults,
     /// `h`, `help`: tell about settings.

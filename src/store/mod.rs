@@ -14,12 +14,15 @@
 //! been written: whenever power fails, an item is what it was or what it was to be. Writing goes round
 //! the ring, so that all cells wear alike; records that still count are moved out of the way.
 //!
+//! Behind the log is a program of the user's ([`program`]).
+//!
 //! Items are known by their names, not by their places in a table: firmware with more settings, or others,
 //! finds those that it knows and takes its defaults for the rest. An item that has its default and never had
 //! another takes no room. Values are checked when they are read, as if they had been sent.
 
 pub mod kept;
 pub mod log;
+pub mod program;
 pub mod record;
 pub mod tables;
 
@@ -29,6 +32,8 @@ pub use log::Log;
 pub trait Memory {
     /// How many bytes it has.
     const SIZE: u16;
+    /// How many of them, from the first, are the log's; the rest is for a program.
+    const LOG: u16 = Self::SIZE;
     /// The byte at an address; waits for a write under way.
     fn read(&self, at: u16) -> u8;
     /// Whether a byte is being written.

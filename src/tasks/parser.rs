@@ -6,12 +6,14 @@
 //! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
 //! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`].
 
+use embassy_time::Timer;
 use heapless::Vec;
 
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::View;
+use crate::hal::imp::eeprom::Eeprom;
 use crate::jobs::Job;
 use crate::protocol::{Mode, Next, Request, Span, is_brief, put_brief};
 use crate::status::Status;
@@ -58,7 +60,7 @@ fn is_free(links: &Links) -> bool {
 fn job_line(links: &Links) {
     let mut job = links.job.get();
     let mut line = Vec::new();
-    let status = match job.next_line(&mut line) {
+    let status = match job.next_line(&Eeprom::take(), &mut line) {
         true => interpret(links, &line, Usual::NotTried).0,
         false => Status::EndOfFile,
     };
@@ -195,8 +197,9 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
     }
 }
 
-/// Waits until the tables take another change.
+/// Waits until the tables take another change. A program that is being stored has only to be asked again.
 async fn tables_ready(links: &Links) {
+    Timer::after_ticks(1).await;
     while links.storage.is_awaited() {
         links.parser_wake.wait().await;
     }

@@ -19,9 +19,11 @@ use super::wake::Wake;
 use crate::config::Setting;
 use crate::gcode::tables::{Edit, Row, Tables};
 use crate::hal::imp::eeprom::Eeprom;
+use crate::protocol::Store;
 use crate::status::Status;
 use crate::store::kept::{self, ITEMS, Item};
 use crate::store::log::Put;
+use crate::store::program::{self, Stored};
 use crate::store::{Log, Memory, tables};
 use crate::units::{Length, PerAxis};
 
@@ -37,6 +39,8 @@ pub struct Storage {
     cold: Cell<Option<(u8, i32)>>,
     /// Such settings from this number on are to have their defaults.
     forgotten: Cell<u8>,
+    /// How long the program is that is being stored, if one is.
+    program: Cell<Option<u16>>,
     /// A line waits until it has arrived.
     awaited: Cell<bool>,
     wake: Wake,
@@ -63,6 +67,7 @@ impl Storage {
             edit: Cell::new(None),
             cold: Cell::new(None),
             forgotten: Cell::new(Setting::COLD),
+            program: Cell::new(None),
             awaited: Cell::new(false),
             wake: Wake::default(),
         }
@@ -137,6 +142,26 @@ impl Storage {
             self.forgotten.set(number + 1);
         }
         self.cold.get().map(|_| Work::Cold)
+    }
+
+    /// Does something to the program, a byte at most: [`Status::Again`] until it is done.
+    #[inline(never)]
+    pub fn store(&self, what: Store<'_>) -> Result<(), Status> {
+        let mut memory = Eeprom::take();
+        let len = self.program.get().ok_or(Status::NotAccepted);
+        let stored = match what {
+            _ if self.log.get().is_wide() => Stored::Full,
+            Store::Begin => program::begin(&mut memory),
+            Store::Line(line) => program::line(&mut memory, len?, line),
+            Store::End => program::end(&mut memory, len?),
+        };
+        match stored {
+            Stored::Again => return Err(Status::Again),
+            Stored::Full => return Err(Status::PersistenceError),
+            Stored::Done(_) if what == Store::End => self.program.set(None),
+            Stored::Done(len) => self.program.set(Some(len)),
+        }
+        Ok(())
     }
 
     /// What comes next.

@@ -13,14 +13,16 @@ use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::tables::Row;
+use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{gpio, stepper};
-use crate::jobs::Job;
+use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
-use crate::protocol::{Machine, StatusReport, Value, Warning, thousandths};
+use crate::protocol::{Machine, StatusReport, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
+use crate::store::program;
 use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
@@ -229,9 +231,27 @@ impl Machine for View<'_> {
         if !job.is_none() && self.busy() {
             return Status::NotAccepted;
         }
+        if number == STORED && program::check(&Eeprom::take()).is_none() {
+            return Status::Error;
+        }
         self.links.job.set(job);
         self.links.parser_wake.signal();
         Status::Ok
+    }
+
+    fn store(&mut self, what: Store<'_>) -> Result<(), Status> {
+        if self.busy() {
+            return Err(Status::NotAccepted);
+        }
+        if matches!(what, Store::Line(line) if line.len() > LINE_MAX) {
+            return Err(Status::InputTooLong);
+        }
+        self.links.storage.store(what)
+    }
+
+    fn program(&mut self, at: u16) -> Option<u8> {
+        let memory = Eeprom::take();
+        program::byte(&memory, program::len(&memory)?, at)
     }
 
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {

@@ -52,6 +52,24 @@ Coordinate systems, positions and tools are groups as well; each value is read a
 
 They are in force when the response comes, those of a tool with the next G43. All are 0 at first. `$o` and `$$` show
 them, but for tools. Those that survive a power cut cannot be in status reports.
+
+## A program of your own
+
+One program of G-code, of up to 890 bytes and lines of up to 48, is kept as well, for example to measure a tool or to
+go to a place:
+
+| | JSON | Text |
+|---|---|---|
+| begin a new one | `{prog:f}` | `$prog=f` |
+| add a line | `{prog:\"G0 X1\"}` | `$prog=G0 X1` |
+| it is complete | `{prog:t}` | `$prog=t` |
+| show it | `{prog:n}` | `$prog` |
+| carry it out | `{test:100}` | `$test=100` |
+| end that | `{test:0}` | `$test=0` |
+
+It is there when `{prog:t}` is answered with status 0; until then there is none, and a power cut leaves none. It
+is written at rest (else 106). 34 means that it has no room. Like a built-in job it ends with an exception report: 8 at its end, or why a line was
+refused. A line is looked at when it is carried out, not before.
 ";
 
 /// All of it.
