@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn all_jobs_are_good_programs_but_for_what_they_show() {
         let mut lines = 0;
-        for number in 1..=u8::MAX {
+        for number in (1..=u8::MAX).filter(|number| *number != STORED) {
             let Some(mut job) = Job::new(number) else { continue };
             let (mut state, mut out) = (Interpreter::new(), Commands::default());
             let (mut last, mut line) = (String::new(), Vec::new());
