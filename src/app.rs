@@ -5,7 +5,8 @@
 use core::cell::{Cell, RefCell};
 
 use embassy_executor::Spawner;
-use embassy_sync::mutex::Mutex;
+#[cfg(target_arch = "avr")]
+use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::config::Settings;
 use crate::gcode::command::Commands;
@@ -13,24 +14,28 @@ use crate::gcode::interpreter::Interpreter;
 use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{stepper, uart};
 use crate::hal::ring::Producer;
-use crate::hal::serial::{Outgoing, Received};
+use crate::hal::serial::{Outgoing, PORTS, Received, USB};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
 use crate::store::kept::{self, Kept};
-use crate::tasks::lines::LinePool;
 use crate::tasks::links::{Links, QueueCount};
+use crate::tasks::ports::Port;
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_outputs;
 use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, power, reader, reporter, storage};
 
+/// Bytes for all lines of USB together.
+const LINES_USB: usize = 560;
+
 impl Links {
-    fn new(tx: Outgoing, rate: u32) -> Self {
+    fn new(ports: [Port; PORTS]) -> Self {
         Self {
-            lines: RefCell::new(LinePool::new()),
+            ports,
+            feeder: Cell::new(USB),
             pool_space: Wake::default(),
             parser_wake: Wake::default(),
             commands: RefCell::new(Commands::default()),
@@ -43,13 +48,9 @@ impl Links {
             resync: Cell::new(false),
             settings_changed: Cell::new(true),
             rate: Cell::new(None),
-            exception: Cell::new(None),
             job: Cell::default(),
             storage: Storage::default(),
-            mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),
-            tx: Mutex::new(Tx::new(tx, rate)),
-            enquiry: Cell::new(false),
             // Their defaults come when they are in place: they would take as much of the stack.
             settings: RefCell::new(Settings::blank()),
             model: RefCell::new(Interpreter::new()),
@@ -61,13 +62,17 @@ impl Links {
 #[cfg(target_arch = "avr")]
 #[inline(never)]
 fn place(tx: Outgoing, rate: u32) -> &'static Links {
-    static LINKS: static_cell::StaticCell<Links> = static_cell::StaticCell::new();
-    LINKS.init_with(|| Links::new(tx, rate))
+    static LINKS: StaticCell<Links> = StaticCell::new();
+    static LINES: ConstStaticCell<[u8; LINES_USB]> = ConstStaticCell::new([0; LINES_USB]);
+    let lines = LINES.take();
+    LINKS.init_with(|| Links::new([Port::new(USB, lines, Tx::new(tx, USB, rate))]))
 }
 
 #[cfg(not(target_arch = "avr"))]
 fn place(tx: Outgoing, rate: u32) -> &'static Links {
-    std::boxed::Box::leak(std::boxed::Box::new(Links::new(tx, rate)))
+    use std::boxed::Box;
+    let lines = Box::leak(Box::new([0; LINES_USB]));
+    Box::leak(Box::new(Links::new([Port::new(USB, lines, Tx::new(tx, USB, rate))])))
 }
 
 /// Starts the firmware: `main` is the thread-mode executor, `exec_level` the interrupt-mode one.
@@ -82,7 +87,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     links.settings.borrow_mut().set_defaults();
     let log = recall(links);
     if !links.settings.borrow().starts_in_json() {
-        links.mode.set(Mode::Text);
+        links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
     }
     set_outputs(&links.settings.borrow());
     links.model.borrow_mut().start(&*links.settings.borrow());

@@ -30,6 +30,7 @@ pub enum Status {
     OutOfRange = 110,
     JsonSyntax = 111,
     JsonTooManyPairs = 112,
+    Muted = 117,
     GcodeGeneric = 130,
     GcodeUnsupported = 131,
     McodeUnsupported = 132,

@@ -7,8 +7,15 @@
 
 use super::ring::{Consumer, Producer};
 
-/// Size of each ring.
-pub const RING: usize = 256;
+/// How many ports there are.
+pub const PORTS: usize = 1;
+/// The port every board has.
+pub const USB: u8 = 0;
+
+/// Size of the receive ring.
+pub const RX_RING: usize = 256;
+/// Size of each transmit ring.
+pub const TX_RING: usize = 128;
 
 /// Bytes below this are marks. None of them is in a line of text; what comes of them from outside
 /// counts as damaged.
@@ -33,9 +40,14 @@ pub const HIGH_WATER: usize = 128;
 pub const LOW_WATER: usize = 32;
 
 /// Bytes received.
-pub type Received = Consumer<u8, RING>;
+pub type Received = Consumer<u8, RX_RING>;
 /// Bytes to send. Call `imp::uart::kick` after filling it.
-pub type Outgoing = Producer<u8, RING>;
+pub type Outgoing = Producer<u8, TX_RING>;
+
+/// Whether others share the line of a port, so that it must not speak unasked.
+pub fn is_shared(_port: u8) -> bool {
+    false
+}
 
 /// The mark that replaces `newest`, if it is none yet. The receive interrupt of the AVR has the twins of
 /// these two in assembly.

@@ -10,7 +10,7 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 71;
+const ENTRIES: usize = 72;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
@@ -36,6 +36,7 @@ progmem! {
         (Status::OutOfRange, text!("Input value range error")),
         (Status::JsonSyntax, text!("JSON syntax error")),
         (Status::JsonTooManyPairs, text!("JSON input has too many pairs")),
+        (Status::Muted, text!("Another port feeds the machine")),
         (Status::GcodeGeneric, text!("Generic Gcode input error")),
         (Status::GcodeUnsupported, text!("Gcode command unsupported")),
         (Status::McodeUnsupported, text!("M code unsupported")),

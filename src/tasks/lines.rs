@@ -1,7 +1,7 @@
 //! The line pool: received lines that wait for the parser.
 //!
-//! Filled by the reader, emptied by the parser, both in thread mode. Lines lie end to end in one buffer
-//! in order of arrival, so that eight short lines of G-code and one long line of JSON fit the same
+//! One for each port, filled by the reader, emptied by the parser, both in thread mode. Lines lie end to
+//! end in one buffer in order of arrival, so that eight short lines of G-code and one long line of JSON fit the same
 //! memory. Control lines (JSON, `$`, `?`) are taken before data lines, each kind in order.
 //!
 //! A line that cannot be kept whole is kept as a fault instead: the sender gets exactly one
@@ -15,9 +15,7 @@ use crate::status::Status;
 
 /// Line slots. Senders count on eight.
 pub const SLOTS: usize = 8;
-/// Bytes for all lines together.
-pub const POOL: usize = 560;
-/// Longest line, in bytes without its end.
+/// Longest line, in bytes without its end, where the pool has as many.
 pub const LINE_MAX: usize = 254;
 
 /// What to do with a line.
@@ -41,8 +39,7 @@ struct Entry {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LineId(u8);
 
-/// The pool. The buffer is last: what lies before it, AVR reaches in one instruction.
-#[repr(C)]
+/// The pool.
 pub struct LinePool {
     /// Complete lines, in order; their bytes lie end to end.
     entries: Vec<Entry, SLOTS>,
@@ -60,12 +57,12 @@ pub struct LinePool {
     returned: bool,
     /// Empty lines are kept: in text mode they are answered by a prompt.
     keep_empty: bool,
-    bytes: [u8; POOL],
+    bytes: &'static mut [u8],
 }
 
 impl LinePool {
-    /// An empty pool.
-    pub const fn new() -> Self {
+    /// An empty pool that keeps its lines in `bytes`.
+    pub const fn new(bytes: &'static mut [u8]) -> Self {
         Self {
             entries: Vec::new(),
             controls: 0,
@@ -75,7 +72,7 @@ impl LinePool {
             fault: None,
             returned: false,
             keep_empty: false,
-            bytes: [0; POOL],
+            bytes,
         }
     }
 
@@ -93,7 +90,7 @@ impl LinePool {
     #[inline(never)]
     pub fn ready(&self) -> bool {
         let used = self.end - self.start + u16::from(self.partial);
-        self.entries.len() < SLOTS && used < POOL as u16
+        self.entries.len() < SLOTS && usize::from(used) < self.bytes.len()
     }
 
     /// Takes the printing bytes that `bytes` begins with, as far as they fit and are no matter for
@@ -143,7 +140,7 @@ impl LinePool {
     #[inline(always)]
     fn room_at(&mut self) -> usize {
         let at = usize::from(self.end) + usize::from(self.partial);
-        if at < POOL || self.start == 0 {
+        if at < self.bytes.len() || self.start == 0 {
             return at;
         }
         self.move_down(at)
@@ -263,16 +260,10 @@ impl LinePool {
     fn close_gap(&mut self, start: usize, len: u8) {
         let behind = start + usize::from(len);
         let end = usize::from(self.end) + usize::from(self.partial);
-        if behind <= end && end <= POOL {
+        if behind <= end && end <= self.bytes.len() {
             self.bytes.copy_within(behind..end, start);
         }
         self.end -= u16::from(len);
-    }
-}
-
-impl Default for LinePool {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -299,6 +290,11 @@ fn wraps_gcode(line: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::boxed::Box;
+
+    fn pool() -> LinePool {
+        LinePool::new(Box::leak(Box::new([0; 560])))
+    }
 
     fn feed(pool: &mut LinePool, text: &[u8]) {
         for &byte in text {
@@ -316,7 +312,7 @@ mod tests {
 
     #[test]
     fn control_overtakes_data_and_order_holds_within_each() {
-        let mut pool = LinePool::new();
+        let mut pool = pool();
         feed(&mut pool, b"g1x1\r\n  {a:n}\n\ng1x2\n{\"gc\":\"g0\"}\n?\n");
         assert_eq!(pool.free(), 3);
         assert_eq!(take(&mut pool, false), Some((b"{a:n}".to_vec(), Class::Control)));
@@ -330,7 +326,7 @@ mod tests {
 
     #[test]
     fn a_line_that_is_coming_in_survives_removals() {
-        let mut pool = LinePool::new();
+        let mut pool = pool();
         feed(&mut pool, b"first\nsecond\nthi");
         take(&mut pool, true);
         feed(&mut pool, b"rd\n");
@@ -340,7 +336,7 @@ mod tests {
 
     #[test]
     fn long_and_damaged_lines_become_one_fault_each() {
-        let mut pool = LinePool::new();
+        let mut pool = pool();
         feed(&mut pool, &[b'x'; 300]);
         feed(&mut pool, b"\ngood\nbad");
         pool.spoil(Status::BufferFull);
@@ -353,7 +349,7 @@ mod tests {
 
     #[test]
     fn empty_lines_count_where_they_are_wanted() {
-        let mut pool = LinePool::new();
+        let mut pool = pool();
         feed(&mut pool, b"\r\n\n");
         assert_eq!(pool.free(), 8);
         pool.keep_empty(true);
@@ -365,7 +361,7 @@ mod tests {
 
     #[test]
     fn text_in_pieces_is_text_byte_by_byte() {
-        let (mut pieces, mut bytes) = (LinePool::new(), LinePool::new());
+        let (mut pieces, mut bytes) = (pool(), pool());
         for round in 0..200 {
             let long = "(".repeat(round * 7 % 300);
             let line = std::format!("  N{round} X1.5\tY2{long}\r\n\n \x01x\ny\r");
@@ -388,7 +384,7 @@ mod tests {
 
     #[test]
     fn a_full_pool_is_not_ready() {
-        let mut pool = LinePool::new();
+        let mut pool = pool();
         feed(&mut pool, b"1\n2\n3\n4\n5\n6\n7\n8\n");
         assert!(!pool.ready());
         take(&mut pool, true);

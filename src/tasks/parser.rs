@@ -1,14 +1,16 @@
 //! The parser task: takes lines, answers them, and hands what they ask for to the planner.
 //!
-//! Reads the line pool, writes `Links::commands`, the G-code model, the settings and the response;
+//! Reads the line pools, writes `Links::commands`, the G-code model, the settings and the response;
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
-//! data lines only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
+//! data lines of the port that feeds the machine only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
 //! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`].
 
 use super::lines::{Class, LineId};
 use super::links::Links;
+use super::ports::{Chosen, Port};
 use super::tx::Tx;
 use super::view::View;
+use crate::hal::serial::USB;
 use crate::jobs::Job;
 use crate::protocol::{Mode, Next, Request, Span, is_brief, put_brief};
 use crate::status::Status;
@@ -24,20 +26,19 @@ pub async fn run(links: &'static Links) -> ! {
         if tried == Usual::Done {
             continue;
         }
-        let next = links.lines.borrow().next(data);
-        let Some((id, class)) = next else {
+        let Some(Chosen { port, id, class }) = links.next_line(data) else {
             match free && runs_job {
                 true => job_line(links),
                 false => links.parser_wake.wait().await,
             }
             continue;
         };
-        if let Some(mut request) = begin(links, id, class, tried)
-            && !answer_at_once(links, id, &mut request)
+        if let Some(mut request) = begin(links, port, id, class, tried)
+            && !answer_at_once(links, port, id, &mut request)
         {
-            answer(links, id, &mut request).await;
+            answer(links, port, id, &mut request).await;
         }
-        finish(links, id);
+        finish(links, port, id);
     }
 }
 
@@ -52,8 +53,7 @@ fn job_line(links: &Links) {
     };
     if !matches!(status, Status::Ok | Status::Noop) {
         job = Job::default();
-        links.exception.set(Some(status));
-        links.reporter_wake.signal();
+        links.except(status);
     }
     links.job.set(job);
 }
@@ -74,11 +74,12 @@ enum Usual {
 /// four steps and with a [`Request`], in half the time.
 #[inline(never)]
 fn usual(links: &Links) -> Usual {
-    if links.mode.get() != Mode::Json {
+    let port = links.feeder();
+    if port.mode.get() != Mode::Json {
         return Usual::NotTried;
     }
-    let Ok(mut tx) = links.tx.try_lock() else { return Usual::NotTried };
-    let mut lines = links.lines.borrow_mut();
+    let Ok(mut tx) = port.tx.try_lock() else { return Usual::NotTried };
+    let mut lines = port.lines.borrow_mut();
     let Some(line) = lines.oldest() else { return Usual::NotTried };
     let settings = links.settings.borrow();
     let numbered = is_brief(&settings, true);
@@ -102,11 +103,11 @@ fn usual(links: &Links) -> Usual {
 /// Answers a line as far as that goes without waiting: most of them to the end. Returns whether it was
 /// this one.
 #[inline(never)]
-fn answer_at_once(links: &Links, id: LineId, request: &mut Request) -> bool {
-    match links.tx.try_lock() {
+fn answer_at_once(links: &Links, port: &Port, id: LineId, request: &mut Request) -> bool {
+    match port.tx.try_lock() {
         // What waits for the planner is left to `answer`.
         Ok(mut tx) if tx.has_room() && request.gcode().is_none() => {
-            matches!(step(links, id, request, &mut tx), Next::Done(_))
+            matches!(step(links, port, id, request, &mut tx), Next::Done(_))
         }
         _ => false,
     }
@@ -115,28 +116,28 @@ fn answer_at_once(links: &Links, id: LineId, request: &mut Request) -> bool {
 /// Begins with a line. One of G-code has run after that, for data lines are taken only while the
 /// planner is free.
 #[inline(never)]
-fn begin(links: &Links, id: LineId, class: Class, tried: Usual) -> Option<Request> {
-    let lines = links.lines.borrow();
+fn begin(links: &Links, port: &Port, id: LineId, class: Class, tried: Usual) -> Option<Request> {
+    let lines = port.lines.borrow();
     let line = lines.text(id);
-    let mut mode = links.mode.get();
+    let mut mode = port.mode.get();
     let mut request = match class {
         Class::Fault(status) => Request::refused(status, mode),
         _ => Request::begin(line, &mut mode)?,
     };
-    links.mode.set(mode);
+    port.mode.set(mode);
     if let Some(block) = request.gcode() {
-        let (status, commented) = interpret(links, block.of(line), tried);
+        let (status, commented) = run_block(links, port, block.of(line), tried);
         request.ran(status, commented);
     }
     Some(request)
 }
 
 /// Writes the response to a line.
-async fn answer(links: &Links, id: LineId, request: &mut Request) {
-    let mut tx = links.tx.lock().await;
+async fn answer(links: &Links, port: &Port, id: LineId, request: &mut Request) {
+    let mut tx = port.tx.lock().await;
     loop {
         tx.room().await;
-        match step(links, id, request, &mut tx) {
+        match step(links, port, id, request, &mut tx) {
             Next::More => {}
             Next::Gcode { start, end } => {
                 if links.commands_taken.get() {
@@ -145,36 +146,46 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
                     while links.commands_taken.get() {
                         links.parser_wake.wait().await;
                     }
-                    tx = links.tx.lock().await;
+                    tx = port.tx.lock().await;
                 }
-                let lines = links.lines.borrow();
+                let lines = port.lines.borrow();
                 let block = Span { start, end };
                 let (status, commented) =
-                    interpret(links, block.of(lines.text(id)), Usual::NotTried);
+                    run_block(links, port, block.of(lines.text(id)), Usual::NotTried);
                 request.ran(status, commented);
             }
             Next::Done(_) => break,
         }
     }
+    drop(tx);
     if let Some(rate) = links.rate.take() {
-        tx.set_rate(rate).await;
+        links.port(USB).tx.lock().await.set_rate(rate).await;
     }
 }
 
 /// The line's slot is free again.
 #[inline(never)]
-fn finish(links: &Links, id: LineId) {
-    links.lines.borrow_mut().remove(id);
+fn finish(links: &Links, port: &Port, id: LineId) {
+    port.lines.borrow_mut().remove(id);
     links.pool_space.signal();
     links.reporter_wake.signal();
 }
 
 #[inline(never)]
-fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
-    let lines = links.lines.borrow();
-    let next = request.step(lines.text(id), &mut View::of(links), tx);
+fn step(links: &Links, port: &Port, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
+    let lines = port.lines.borrow();
+    let next = request.step(lines.text(id), &mut View::of(links, port), tx);
     tx.flush();
     next
+}
+
+/// Interprets a block of a port's, if that feeds the machine.
+#[inline(never)]
+fn run_block(links: &Links, port: &Port, block: &[u8], tried: Usual) -> (Status, bool) {
+    match links.may_feed(port) {
+        true => interpret(links, block, tried),
+        false => (Status::Muted, true),
+    }
 }
 
 /// Interprets a block and hands its commands to the planner. Returns also whether it may have a

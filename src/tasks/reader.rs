@@ -1,6 +1,6 @@
-//! The reader task: bytes from the receive ring into the line pool.
+//! The reader task: bytes from the receive ring of each port into its line pool.
 //!
-//! Reads the receive ring, writes the line pool, waits on [`Event::Received`] or for pool space; never
+//! Reads the receive rings, writes the line pools, waits on [`Event::Received`] or for pool space; never
 //! runs longer than the ring is full (255 bytes, about 6,000 cycles). When the pool is full the bytes
 //! stay in the ring, and when that is full too bytes are lost: the line that is damaged thereby is
 //! refused, and so is each line that is lost whole. With `ex` 1 the sender is stopped before that by XOFF, and
@@ -11,10 +11,11 @@ use embassy_futures::yield_now;
 
 use super::lines::LinePool;
 use super::links::Links;
+use super::ports::Port;
 use crate::hal::event::{Event, next};
 use crate::hal::imp::uart::{self, lost_ends};
 use crate::hal::serial::{
-    BEHIND_END, CLEAN, HIGH_WATER, LOW_WATER, MARKS, RETURNED, Received, XOFF, XON,
+    BEHIND_END, CLEAN, HIGH_WATER, LOW_WATER, MARKS, RETURNED, Received, USB, XOFF, XON,
 };
 use crate::protocol::Mode;
 use crate::status::Status;
@@ -23,21 +24,19 @@ use crate::status::Status;
 const TURN: usize = 16;
 
 /// What a turn came to.
-#[derive(PartialEq, Eq)]
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Left {
     Nothing,
-    Bytes,
     /// Bytes, and no room in the pool.
     Full,
+    Bytes,
 }
 
 /// The task.
 pub async fn run(links: &'static Links, received: Received) -> ! {
-    let mut intake =
-        Intake { received, seen: lost_ends(), refused: 0, then: 0, sender_stopped: false };
+    let mut usb = Intake::new(links.port(USB), received);
     loop {
-        let left = intake.turn(links);
-        intake.control_flow(links);
+        let left = usb.take(links);
         match left {
             Left::Nothing => next(Event::Received).await,
             Left::Bytes => yield_now().await,
@@ -49,7 +48,9 @@ pub async fn run(links: &'static Links, received: Received) -> ! {
     }
 }
 
+/// The receiving end of a port.
 struct Intake {
+    port: &'static Port,
     received: Received,
     /// Lost line ends that have been seen to, of `lost_ends`.
     seen: u16,
@@ -62,12 +63,24 @@ struct Intake {
 }
 
 impl Intake {
+    fn new(port: &'static Port, received: Received) -> Self {
+        let seen = lost_ends(port.number);
+        Self { port, received, seen, refused: 0, then: 0, sender_stopped: false }
+    }
+
+    /// Takes a turn's bytes, and stops the sender or lets it go on.
+    fn take(&mut self, links: &Links) -> Left {
+        let left = self.turn(links);
+        self.control_flow(links);
+        left
+    }
+
     /// Takes a turn's bytes.
     #[inline(never)]
     fn turn(&mut self, links: &Links) -> Left {
-        let mut pool = links.lines.borrow_mut();
+        let mut pool = self.port.lines.borrow_mut();
         let pool = &mut *pool;
-        pool.keep_empty(links.mode.get() == Mode::Text);
+        pool.keep_empty(self.port.mode.get() == Mode::Text);
         for _ in 0..TURN {
             if self.refused > 0 && !self.refuse(pool, links) {
                 return Left::Full;
@@ -86,7 +99,7 @@ impl Intake {
             let is_line = match byte {
                 ..MARKS => self.loss(pool, byte, links),
                 XON | XOFF if links.settings.borrow().has_xon_xoff() => {
-                    uart::hold(byte == XOFF);
+                    uart::hold(self.port.number, byte == XOFF);
                     false
                 }
                 _ => pool.put(byte),
@@ -110,7 +123,7 @@ impl Intake {
         let stop = stop && links.settings.borrow().has_xon_xoff();
         if stop != self.sender_stopped {
             self.sender_stopped = stop;
-            uart::send_ahead(if stop { XOFF } else { XON });
+            uart::send_ahead(self.port.number, if stop { XOFF } else { XON });
         }
     }
 
@@ -118,7 +131,7 @@ impl Intake {
     #[cold]
     #[inline(never)]
     fn loss(&mut self, pool: &mut LinePool, mark: u8, links: &Links) -> bool {
-        let ends = lost_ends();
+        let ends = lost_ends(self.port.number);
         self.refused = ends.wrapping_sub(core::mem::replace(&mut self.seen, ends));
         self.then = mark;
         let is_line = mark & BEHIND_END != 0 && pool.end(mark & RETURNED != 0);
@@ -129,7 +142,7 @@ impl Intake {
             self.after(pool);
         }
         if self.refused > 0 || mark & CLEAN == 0 {
-            links.exception.set(Some(Status::BufferFull));
+            self.port.exception.set(Some(Status::BufferFull));
             links.reporter_wake.signal();
         }
         is_line

@@ -1,6 +1,6 @@
 //! The reporter task: the greeting, then status and queue reports, exceptions, and the answer to ENQ.
 //!
-//! Reads everything through [`View`], writes to the sender; waits for something to report, and polls
+//! Reads everything through [`View`], writes to the port that is told, and answers ENQ and losses on their own; waits for something to report, and polls
 //! every [`POLL_MS`] while the machine is busy; it is not woken besides then, unless queue reports are
 //! wanted. A change of `stat` is told at once, anything else every
 //! `si` milliseconds. While the sender is slow it waits, and then reports what is so by then: it never
@@ -10,9 +10,11 @@ use embassy_futures::select::select;
 use embassy_time::Timer;
 
 use super::links::Links;
+use super::ports::Port;
 use super::tx::Tx;
 use super::view::{RUN, View};
 use crate::hal::imp::time::millis;
+use crate::hal::serial::is_shared;
 use crate::motion::queue;
 use crate::protocol::notice::{Banner, Exception};
 use crate::protocol::{Machine, Out, Report, Value, queue_report};
@@ -35,18 +37,20 @@ pub async fn run(links: &'static Links) -> ! {
     let mut told = Told { state: 0, blocks_free: queue::free(), at: millis() };
     let mut due = true;
     loop {
-        if links.enquiry.take() {
-            acknowledge(links).await;
+        for port in &links.ports {
+            if port.enquiry.take() {
+                acknowledge(port).await;
+            }
+            if let Some(status) = port.exception.take() {
+                report_exception(links, port, status).await;
+            }
         }
-        let state = View::of(links).state();
-        if let Some(status) = links.exception.take() {
-            report_exception(links, status).await;
-        }
+        let state = View::of(links, links.told()).state();
         if queue::free() != told.blocks_free && reports_queue(links) {
             told.blocks_free = report_queue(links).await;
         }
         let elapsed = millis().wrapping_sub(told.at);
-        let interval = u32::from(View::of(links).settings().status_interval_ms());
+        let interval = u32::from(links.settings.borrow().status_interval_ms());
         due |= state == RUN;
         if state != told.state || (due && elapsed >= interval) {
             told.state = state;
@@ -71,10 +75,15 @@ fn reports_queue(links: &Links) -> bool {
 }
 
 /// Sends something that is put in steps: `step` says whether there is more.
-async fn send(links: &Links, tx: &mut Tx, mut step: impl FnMut(&mut View, &mut Tx) -> bool) {
+async fn send(
+    links: &Links,
+    port: &Port,
+    tx: &mut Tx,
+    mut step: impl FnMut(&mut View, &mut Tx) -> bool,
+) {
     loop {
         tx.room().await;
-        let more = step(&mut View::of(links), tx);
+        let more = step(&mut View::of(links, port), tx);
         tx.flush();
         if !more {
             break;
@@ -83,40 +92,44 @@ async fn send(links: &Links, tx: &mut Tx, mut step: impl FnMut(&mut View, &mut T
 }
 
 async fn greet(links: &Links) {
-    let mut tx = links.tx.lock().await;
-    let mut banner = Banner::begin(&View::of(links));
-    send(links, &mut tx, |view, tx| banner.step(view, tx)).await;
+    for port in links.ports.iter().filter(|port| !is_shared(port.number)) {
+        let mut tx = port.tx.lock().await;
+        let mut banner = Banner::begin(&View::of(links, port));
+        send(links, port, &mut tx, |view, tx| banner.step(view, tx)).await;
+    }
 }
 
-async fn acknowledge(links: &Links) {
-    let mut tx = links.tx.lock().await;
+async fn acknowledge(port: &Port) {
+    let mut tx = port.tx.lock().await;
     tx.room().await;
     tx.put_text(text!("{\"ack\":true}\n"));
     tx.flush();
 }
 
 async fn report_status(links: &Links) {
-    let mut tx = links.tx.lock().await;
-    let report = Report::begin(links.mode.get(), &mut View::of(links));
+    let port = links.told();
+    let mut tx = port.tx.lock().await;
+    let report = Report::begin(port.mode.get(), &mut View::of(links, port));
     if let Some(mut report) = report {
-        send(links, &mut tx, |view, tx| report.step(view, tx)).await;
+        send(links, port, &mut tx, |view, tx| report.step(view, tx)).await;
     }
 }
 
-async fn report_exception(links: &Links, status: Status) {
-    let mut tx = links.tx.lock().await;
-    let mut exception = Exception::begin(status, &View::of(links));
-    send(links, &mut tx, |view, tx| exception.step(view, tx)).await;
+async fn report_exception(links: &Links, port: &Port, status: Status) {
+    let mut tx = port.tx.lock().await;
+    let mut exception = Exception::begin(status, &View::of(links, port));
+    send(links, port, &mut tx, |view, tx| exception.step(view, tx)).await;
 }
 
 /// Returns the number of free blocks as it was told, which may have changed during the wait for the
 /// transmitter.
 async fn report_queue(links: &Links) -> usize {
-    let mut tx = links.tx.lock().await;
+    let port = links.told();
+    let mut tx = port.tx.lock().await;
     let mut told = 0;
-    send(links, &mut tx, |view, tx| {
+    send(links, port, &mut tx, |view, tx| {
         told = view.value(Value::QueueFree) as usize;
-        queue_report(links.mode.get(), view, tx);
+        queue_report(port.mode.get(), view, tx);
         false
     })
     .await;

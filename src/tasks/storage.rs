@@ -86,8 +86,7 @@ fn next(links: &Links, log: &mut Log, memory: &Eeprom, number: u16, moved: u16) 
     match log.put(memory, key, value, moved) {
         Put::Room(write) | Put::Last(write) => Some(write),
         Put::Full => {
-            links.exception.set(Some(Status::PersistenceError));
-            links.reporter_wake.signal();
+            links.except(Status::PersistenceError);
             None
         }
     }

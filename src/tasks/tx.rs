@@ -1,13 +1,13 @@
 //! The line to the sender: whole responses and reports, one after the other.
 //!
-//! Owned by whoever holds `Links::tx`, for as long as one line takes, so lines never mix. Call
+//! Owned by whoever holds `Port::tx`, for as long as one line takes, so lines never mix. Call
 //! [`Tx::room`] before each piece of at most [`PIECE`] bytes; it waits until the transmit ring has room.
 
 use embassy_time::Timer;
 
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::uart;
-use crate::hal::serial::{Outgoing, RING};
+use crate::hal::serial::{Outgoing, TX_RING};
 use crate::progmem::Text;
 
 /// Most bytes written between two calls of [`Tx::room`].
@@ -18,14 +18,15 @@ const TWO_BYTES_MS: u32 = 20 * 1_000;
 /// The transmit ring's filling end.
 pub struct Tx {
     ring: Outgoing,
+    port: u8,
     /// Bits a second.
     rate: u32,
 }
 
 impl Tx {
-    /// Takes over the ring of a line that runs at `rate` bits a second.
-    pub fn new(ring: Outgoing, rate: u32) -> Self {
-        Self { ring, rate }
+    /// Takes over the ring of a port whose line runs at `rate` bits a second.
+    pub fn new(ring: Outgoing, port: u8, rate: u32) -> Self {
+        Self { ring, port, rate }
     }
 
     /// Waits until a piece fits.
@@ -40,17 +41,17 @@ impl Tx {
 
     /// Sends what has been put.
     pub fn flush(&mut self) {
-        uart::kick();
+        uart::kick(self.port);
     }
 
     /// Goes on at `rate` bits a second, when what has been put has left at the old rate: 1 to 4 ms after
     /// its last byte. What the sender says meanwhile may be spoilt.
     pub async fn set_rate(&mut self, rate: u32) {
-        wait(Event::Transmitted, || (self.ring.free() == RING - 1).then_some(())).await;
+        wait(Event::Transmitted, || (self.ring.free() == TX_RING - 1).then_some(())).await;
         // The transmitter holds two bytes more. It has a flag for their end, but the flag may be left
         // from a pause in the middle of the line; their time is certain.
         Timer::after_ticks(u64::from(TWO_BYTES_MS / self.rate) + 2).await;
-        uart::set_rate(rate);
+        uart::set_rate(self.port, rate);
         self.rate = rate;
     }
 }

@@ -6,6 +6,7 @@
 use core::cell::{OnceCell, RefMut};
 
 use super::links::{Links, snapshot};
+use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
 use crate::baud;
@@ -28,16 +29,18 @@ pub const RUN: i32 = 5;
 /// A look at the machine.
 pub struct View<'a> {
     links: &'a Links,
+    port: &'a Port,
     settings: RefMut<'a, Settings>,
     report: RefMut<'a, StatusReport>,
     motion: OnceCell<Snapshot>,
 }
 
 impl<'a> View<'a> {
-    /// Looks at the machine now.
-    pub fn of(links: &'a Links) -> Self {
+    /// Looks at the machine now, as the sender on this port sees it.
+    pub fn of(links: &'a Links, port: &'a Port) -> Self {
         Self {
             links,
+            port,
             settings: links.settings.borrow_mut(),
             report: links.report.borrow_mut(),
             motion: OnceCell::new(),
@@ -49,7 +52,7 @@ impl<'a> View<'a> {
     }
 
     /// Whether anything is queued or runs.
-    fn busy(&self) -> bool {
+    pub fn is_busy(&self) -> bool {
         self.motion().running
             || queue::used() > 0
             || self.links.commands_taken.get()
@@ -58,7 +61,7 @@ impl<'a> View<'a> {
 
     /// `stat`.
     pub fn state(&self) -> i32 {
-        if self.busy() && !self.links.stopped.get() {
+        if self.is_busy() && !self.links.stopped.get() {
             return RUN;
         }
         match self.motion().program {
@@ -73,7 +76,7 @@ impl<'a> View<'a> {
         let programmed = self.links.model.borrow().position().get(axis).copied();
         let programmed = programmed.unwrap_or(Length::ZERO);
         // Until the planner has counted anew, steps mean what they meant before a setting changed.
-        if !self.busy() || self.links.resync.get() {
+        if !self.is_busy() || self.links.resync.get() {
             return programmed;
         }
         // Of several motors on an axis the first tells; an axis that moves none is where it should be.
@@ -129,7 +132,7 @@ impl Machine for View<'_> {
 
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
         if setting.needs_rest() {
-            if self.busy() {
+            if self.is_busy() {
                 return Err(Status::NotAccepted);
             }
             self.links.resync.set(true);
@@ -152,17 +155,17 @@ impl Machine for View<'_> {
             Value::State => self.state(),
             // They differ only where there are alarms and cycles.
             Value::Machine => self.state(),
-            Value::Cycle => i32::from(self.busy()),
+            Value::Cycle => i32::from(self.is_busy()),
             Value::Motion => i32::from(self.motion().running),
             // Lines that move nothing are finished when all before them are.
-            Value::FinishedLine if !self.busy() => self.modal(Value::BlockLine),
+            Value::FinishedLine if !self.is_busy() => self.modal(Value::BlockLine),
             Value::FinishedLine => self.motion().finished as i32,
             Value::MotionLine => self.motion().line as i32,
             Value::Velocity => thousandths(self.motion().velocity * 60.0),
             Value::QueueFree => queue::free() as i32,
             Value::QueueAdded => self.links.queue_count.take_added(),
             Value::QueueRemoved => self.links.queue_count.take_removed(),
-            Value::SlotsFree => self.links.lines.borrow().free().into(),
+            Value::SlotsFree => self.port.lines.borrow().free().into(),
             Value::MachinePosition(axis) => self.position(axis.into()).0,
             Value::Position(axis) => {
                 let axis = axis.into();
@@ -182,7 +185,7 @@ impl Machine for View<'_> {
     }
 
     fn restore(&mut self) -> Status {
-        if self.busy() {
+        if self.is_busy() {
             return Status::NotAccepted;
         }
         let rate = self.settings.baud();
@@ -204,7 +207,7 @@ impl Machine for View<'_> {
 
     fn start_job(&mut self, number: u8) -> Status {
         let Some(job) = Job::new(number) else { return Status::Error };
-        if !job.is_none() && self.busy() {
+        if !job.is_none() && self.is_busy() {
             return Status::NotAccepted;
         }
         self.links.job.set(job);
@@ -214,7 +217,7 @@ impl Machine for View<'_> {
 
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {
         // Without power a motor that moves would lose its position.
-        if self.busy() && !on {
+        if self.is_busy() && !on {
             return Status::NotAccepted;
         }
         let motors = motor.map_or(u8::MAX, |motor| 1 << motor);

@@ -16,13 +16,16 @@ use crate::baud;
 use crate::hal::byte::SharedByte;
 use crate::hal::event::Event;
 use crate::hal::ring::Ring;
-use crate::hal::serial::{BATCH, BEHIND_END, CLEAN, MARKS, Outgoing, RETURNED, RING, Received};
+use crate::hal::serial::{
+    BATCH, BEHIND_END, CLEAN, MARKS, Outgoing, RETURNED, RX_RING, Received, TX_RING, USB,
+};
 use crate::realtime;
 
-type ByteRing = Ring<u8, RING>;
+type RxRing = Ring<u8, RX_RING>;
+type TxRing = Ring<u8, TX_RING>;
 
-static RX: ByteRing = Ring::new();
-static TX: ByteRing = Ring::new();
+static RX: RxRing = Ring::new();
+static TX: TxRing = Ring::new();
 /// Counts line ends that were lost, low byte first. The receive interrupt writes it.
 static LOST_ENDS: [SharedByte; 2] = [const { SharedByte::new(0) }; 2];
 static REALTIME: SharedByte = SharedByte::new(0);
@@ -53,30 +56,30 @@ pub fn start(rate: u32) -> Option<(Received, Outgoing)> {
 
 /// Goes on at `rate` bits a second. A byte on the line meanwhile, in either direction, is spoilt. Thread
 /// mode.
-pub fn set_rate(rate: u32) {
+pub fn set_rate(_port: u8, rate: u32) {
     super::peripherals().USART0.ubrr0().write(|w| w.set(baud::divisor(rate)));
 }
 
 /// Sends what the ring holds.
-pub fn kick() {
+pub fn kick(_port: u8) {
     // SAFETY: the register has two values after start-up, written whole.
     unsafe { UCSR0B.write_volatile(RXCIE | UDRIE | RXEN | TXEN) };
 }
 
 /// Sends a byte, not 0, before what the ring holds, even while the line is held. Thread mode.
-pub fn send_ahead(byte: u8) {
+pub fn send_ahead(_port: u8, byte: u8) {
     AHEAD.set(byte);
-    kick();
+    kick(USB);
 }
 
 /// Holds what the ring holds back, or lets it go. Thread mode.
-pub fn hold(held: bool) {
+pub fn hold(_port: u8, held: bool) {
     HELD.set(held.into());
-    kick();
+    kick(USB);
 }
 
 /// Line ends lost since start-up, modulo 2^16.
-pub fn lost_ends() -> u16 {
+pub fn lost_ends(_port: u8) -> u16 {
     let [low, high] = &LOST_ENDS;
     loop {
         let before = high.get();
@@ -88,7 +91,7 @@ pub fn lost_ends() -> u16 {
 }
 
 /// The real-time characters since the last call, as bits (see [`realtime`]).
-pub fn take_realtime() -> u8 {
+pub fn take_realtime(_port: u8) -> u8 {
     avr_device::interrupt::free(|_| {
         let bits = REALTIME.get();
         REALTIME.set(0);
@@ -284,9 +287,9 @@ extern "C" fn __vector_25() -> ! {
             "sbci r31, hi8(-({rx} + {slots}))",
             "ret",
             rx = sym RX,
-            head = const ByteRing::HEAD,
-            tail = const ByteRing::TAIL,
-            slots = const ByteRing::SLOTS,
+            head = const RxRing::HEAD,
+            tail = const RxRing::TAIL,
+            slots = const RxRing::SLOTS,
             mask = const !RXCIE,
             hold_exec = const exec::HOLD,
             held_exec = const exec::HELD,
@@ -314,7 +317,7 @@ extern "C" fn __vector_25() -> ! {
     }
 }
 
-/// USART0_UDRE: sends a byte, in 68 cycles, or stops asking when there is none.
+/// USART0_UDRE: sends a byte, in 69 cycles, or stops asking when there is none.
 ///
 /// Interrupts are off for 19 cycles on the way in and 16 on the way out.
 #[unsafe(no_mangle)]
@@ -344,6 +347,7 @@ extern "C" fn __vector_26() -> ! {
             "cp   r30, r31",
             "breq 2f",
             "inc  r30",
+            "andi r30, {last}",
             "sts  {tx} + {tail}, r30",
             "ldi  r31, 0",
             "subi r30, lo8(-({tx} + {slots}))",
@@ -377,9 +381,10 @@ extern "C" fn __vector_26() -> ! {
             ahead = sym AHEAD,
             held = sym HELD,
             tx = sym TX,
-            head = const ByteRing::HEAD,
-            tail = const ByteRing::TAIL,
-            slots = const ByteRing::SLOTS,
+            last = const TX_RING - 1,
+            head = const TxRing::HEAD,
+            tail = const TxRing::TAIL,
+            slots = const TxRing::SLOTS,
             mask = const !UDRIE,
             unmask = const UDRIE,
             transmitted = const Event::Transmitted as u8,

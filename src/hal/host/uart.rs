@@ -8,13 +8,13 @@ use super::{NEVER, flags, now};
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
-use crate::hal::serial::{BATCH, MARKS, Outgoing, RING, Received, lose, mark};
+use crate::hal::serial::{BATCH, MARKS, Outgoing, RX_RING, Received, TX_RING, lose, mark};
 use crate::realtime;
 
 #[derive(Default)]
 struct Line {
-    rx_in: Option<Producer<u8, RING>>,
-    tx_out: Option<Consumer<u8, RING>>,
+    rx_in: Option<Producer<u8, RX_RING>>,
+    tx_out: Option<Consumer<u8, TX_RING>>,
     /// Bytes the sender has yet to put on the line.
     arriving: VecDeque<u8>,
     /// What the firmware has sent.
@@ -40,8 +40,8 @@ struct Uart {
 }
 
 machine_static! {
-    fn rx() -> Ring<u8, RING> = Ring::new();
-    fn tx() -> Ring<u8, RING> = Ring::new();
+    fn rx() -> Ring<u8, RX_RING> = Ring::new();
+    fn tx() -> Ring<u8, TX_RING> = Ring::new();
     fn uart() -> Uart = Uart {
         line: RefCell::new(Line::default()),
         byte_cycles: Cell::new(1),
@@ -58,13 +58,13 @@ pub fn start(rate: u32) -> Option<(Received, Outgoing)> {
     let mut line = uart().line.borrow_mut();
     line.rx_in = Some(rx_in);
     line.tx_out = Some(tx_out);
-    set_rate(rate);
+    set_rate(0, rate);
     set_sender_rate(rate);
     Some((rx_out, tx_in))
 }
 
 /// Goes on at `rate` bits a second.
-pub fn set_rate(rate: u32) {
+pub fn set_rate(_port: u8, rate: u32) {
     uart().byte_cycles.set(byte_cycles(rate));
 }
 
@@ -84,31 +84,31 @@ fn garbles() -> bool {
 }
 
 /// Sends what the ring holds.
-pub fn kick() {
+pub fn kick(_port: u8) {
     if uart().next_tx.get() == NEVER {
         load_tx(&mut uart().line.borrow_mut());
     }
 }
 
 /// Sends a byte, not 0, before what the ring holds, even while the line is held.
-pub fn send_ahead(byte: u8) {
+pub fn send_ahead(_port: u8, byte: u8) {
     uart().line.borrow_mut().ahead = Some(byte);
-    kick();
+    kick(0);
 }
 
 /// Holds what the ring holds back, or lets it go.
-pub fn hold(held: bool) {
+pub fn hold(_port: u8, held: bool) {
     uart().line.borrow_mut().held = held;
-    kick();
+    kick(0);
 }
 
 /// Line ends lost since start-up, modulo 2^16.
-pub fn lost_ends() -> u16 {
+pub fn lost_ends(_port: u8) -> u16 {
     uart().line.borrow().lost_ends
 }
 
 /// The real-time characters since the last call, as bits (see [`realtime`]).
-pub fn take_realtime() -> u8 {
+pub fn take_realtime(_port: u8) -> u8 {
     core::mem::take(&mut uart().line.borrow_mut().realtime)
 }
 
@@ -184,7 +184,7 @@ fn arrive(line: &mut Line, byte: u8) {
 }
 
 /// Puts a mark where there is room, else over the newest byte. Returns the line ends that it counts.
-fn queue_mark(ring: &mut Producer<u8, RING>, begun: u8, byte: u8) -> u16 {
+fn queue_mark(ring: &mut Producer<u8, RX_RING>, begun: u8, byte: u8) -> u16 {
     let (mark, is_end) = lose(begun, byte);
     if ring.push(mark).is_err() {
         // The reader is not running: everything here is one thread.
