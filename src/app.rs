@@ -5,8 +5,7 @@
 use core::cell::{Cell, RefCell};
 
 use embassy_executor::Spawner;
-#[cfg(target_arch = "avr")]
-use static_cell::{ConstStaticCell, StaticCell};
+use heapless::Vec;
 
 use crate::config::Settings;
 use crate::gcode::command::Commands;
@@ -14,7 +13,7 @@ use crate::gcode::interpreter::Interpreter;
 use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{stepper, uart};
 use crate::hal::ring::Producer;
-use crate::hal::serial::{Outgoing, PORTS, Received, USB};
+use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Mode, StatusReport};
@@ -29,7 +28,9 @@ use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, power, reader, reporter, storage};
 
 /// Bytes for all lines of USB together.
-const LINES_USB: usize = 560;
+const LINES_USB: usize = 480;
+/// The same of the other port.
+const LINES_AUX: usize = 80;
 
 impl Links {
     fn new(ports: [Port; PORTS]) -> Self {
@@ -59,20 +60,29 @@ impl Links {
 }
 
 /// Makes the links where they stay. Not inlined: what it needs of the stack is free again after it.
-#[cfg(target_arch = "avr")]
 #[inline(never)]
-fn place(tx: Outgoing, rate: u32) -> &'static Links {
-    static LINKS: StaticCell<Links> = StaticCell::new();
-    static LINES: ConstStaticCell<[u8; LINES_USB]> = ConstStaticCell::new([0; LINES_USB]);
-    let lines = LINES.take();
-    LINKS.init_with(|| Links::new([Port::new(USB, lines, Tx::new(tx, USB, rate))]))
+fn place(ports: [Port; PORTS]) -> &'static Links {
+    #[cfg(target_arch = "avr")]
+    {
+        static LINKS: static_cell::StaticCell<Links> = static_cell::StaticCell::new();
+        LINKS.init_with(|| Links::new(ports))
+    }
+    #[cfg(not(target_arch = "avr"))]
+    std::boxed::Box::leak(std::boxed::Box::new(Links::new(ports)))
 }
 
-#[cfg(not(target_arch = "avr"))]
-fn place(tx: Outgoing, rate: u32) -> &'static Links {
-    use std::boxed::Box;
-    let lines = Box::leak(Box::new([0; LINES_USB]));
-    Box::leak(Box::new(Links::new([Port::new(USB, lines, Tx::new(tx, USB, rate))])))
+/// Memory for lines, once on AVR; on the host each machine that is made gets its own.
+macro_rules! line_bytes {
+    ($len:expr) => {{
+        #[cfg(target_arch = "avr")]
+        {
+            static BYTES: static_cell::ConstStaticCell<[u8; $len]> =
+                static_cell::ConstStaticCell::new([0; $len]);
+            BYTES.take()
+        }
+        #[cfg(not(target_arch = "avr"))]
+        std::boxed::Box::leak(std::boxed::Box::new([0; $len]))
+    }};
 }
 
 /// Starts the firmware: `main` is the thread-mode executor, `exec_level` the interrupt-mode one.
@@ -80,10 +90,20 @@ fn place(tx: Outgoing, rate: u32) -> &'static Links {
 /// Interrupts are off. `None` if it has been started before.
 #[inline(never)]
 pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
-    let (received, outgoing) = uart::start(rate)?;
+    let AllEnds { usb: (received, outgoing), aux } = uart::start(rate)?;
     let segments = stepper::start()?;
     let (queue, source) = queue::store().split()?;
-    let links = place(outgoing, rate);
+    let mut ports = Vec::<Port, PORTS>::new();
+    ports.push(Port::new(USB, line_bytes!(LINES_USB), Tx::new(outgoing, USB, rate))).ok()?;
+    let aux = match (aux, hardware(AUX)) {
+        (Some((received, outgoing)), Some(board)) => {
+            let tx = Tx::new(outgoing, AUX, board.rate);
+            ports.push(Port::new(AUX, line_bytes!(LINES_AUX), tx)).ok()?;
+            Some(received)
+        }
+        _ => None,
+    };
+    let links = place(ports.into_array().ok()?);
     links.settings.borrow_mut().set_defaults();
     let log = recall(links);
     if !links.settings.borrow().starts_in_json() {
@@ -92,7 +112,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     set_outputs(&links.settings.borrow());
     links.model.borrow_mut().start(&*links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);
-    main.spawn(reader_task(links, received).ok()?);
+    main.spawn(reader_task(links, received, aux).ok()?);
     main.spawn(planner_task(links, queue).ok()?);
     main.spawn(reporter_task(links).ok()?);
     main.spawn(power_task(links).ok()?);
@@ -134,7 +154,11 @@ macro_rules! tasks {
 
 tasks! {
     fn exec_task(blocks: BlockSource, segments: Producer<Segment, SEGMENTS>) = exec::run;
-    fn reader_task(links: &'static Links, received: Received) = reader::run;
+    fn reader_task(
+        links: &'static Links,
+        usb: Received<RX_RING>,
+        aux: Option<Received<AUX_RING>>
+    ) = reader::run;
     fn planner_task(links: &'static Links, queue: BlockQueue) = planner::run;
     fn reporter_task(links: &'static Links) = reporter::run;
     fn control_task(links: &'static Links) = control::run;

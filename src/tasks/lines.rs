@@ -15,7 +15,7 @@ use crate::status::Status;
 
 /// Line slots. Senders count on eight.
 pub const SLOTS: usize = 8;
-/// Longest line, in bytes without its end, where the pool has as many.
+/// Longest line, in bytes without its end; less in a pool that has no more.
 pub const LINE_MAX: usize = 254;
 
 /// What to do with a line.
@@ -57,6 +57,8 @@ pub struct LinePool {
     returned: bool,
     /// Empty lines are kept: in text mode they are answered by a prompt.
     keep_empty: bool,
+    /// Longest line.
+    longest: u8,
     bytes: &'static mut [u8],
 }
 
@@ -72,6 +74,7 @@ impl LinePool {
             fault: None,
             returned: false,
             keep_empty: false,
+            longest: if bytes.len() > LINE_MAX { LINE_MAX } else { bytes.len() - 1 } as u8,
             bytes,
         }
     }
@@ -101,7 +104,7 @@ impl LinePool {
         {
             return 0;
         }
-        let room = LINE_MAX - usize::from(self.partial);
+        let room = usize::from(self.longest - self.partial);
         let at = self.room_at();
         let slots = self.bytes.get_mut(at..).unwrap_or(&mut []);
         let slots = slots.get_mut(..room.min(slots.len())).unwrap_or(&mut []);
@@ -126,7 +129,7 @@ impl LinePool {
         }
         let at = self.room_at();
         match self.bytes.get_mut(at) {
-            Some(slot) if usize::from(self.partial) < LINE_MAX => {
+            Some(slot) if self.partial < self.longest => {
                 *slot = byte;
                 self.partial += 1;
             }
@@ -345,6 +348,20 @@ mod tests {
         assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"good".to_vec()));
         assert_eq!(take(&mut pool, true).map(|l| l.1), Some(Class::Fault(Status::BufferFull)));
         assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"ok".to_vec()));
+    }
+
+    #[test]
+    fn a_line_longer_than_the_pool_is_one_fault() {
+        let mut pool = LinePool::new(Box::leak(Box::new([0; 20])));
+        feed(&mut pool, b"g1 x2 (0123456789)  \r\n(0123456789abcdefghi)\n?\n");
+        assert_eq!(take(&mut pool, true), Some((b"?".to_vec(), Class::Control)));
+        for _ in 0..2 {
+            assert_eq!(
+                take(&mut pool, true).map(|l| l.1),
+                Some(Class::Fault(Status::InputTooLong))
+            );
+        }
+        assert_eq!(take(&mut pool, true), None);
     }
 
     #[test]

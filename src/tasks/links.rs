@@ -3,12 +3,12 @@
 //!
 //! | link | carries | depth | RAM | from | to | when full |
 //! |---|---|---|---|---|---|---|
-//! | `uart` receive ring | bytes | 255 | 260 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
-//! | [`Port::lines`] | lines | 8 lines, 560 B | 590 B | reader | parser | bytes stay in the receive ring |
+//! | `uart` receive ring | bytes | 255; 63 | 259 B, 67 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
+//! | [`Port::lines`] | lines | 8 lines; 480 B, 80 B | 511 B, 111 B | reader | parser | bytes stay in the receive ring |
 //! | [`Links::commands`] | canonical commands | 1 | 98 B | parser | planner | the parser takes control lines only |
 //! | block ring | blocks | 64 | 2,090 B | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |
-//! | `uart` transmit ring | bytes | 127 | 131 B | parser, reporter | TX interrupt | the writer waits, response half sent |
+//! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | the writer waits, response half sent |
 //! | [`Links::storage`] | which items to look at | a range | 7 B | parser | storage | the range grows |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
 //!

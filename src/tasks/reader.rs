@@ -4,7 +4,7 @@
 //! runs longer than the ring is full (255 bytes, about 6,000 cycles). When the pool is full the bytes
 //! stay in the ring, and when that is full too bytes are lost: the line that is damaged thereby is
 //! refused, and so is each line that is lost whole. With `ex` 1 the sender is stopped before that by XOFF, and
-//! stops the machine's answers so.
+//! stops the machine's answers so; with `ex` 2 both are done by pins.
 
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
@@ -15,7 +15,8 @@ use super::ports::Port;
 use crate::hal::event::{Event, next};
 use crate::hal::imp::uart::{self, lost_ends};
 use crate::hal::serial::{
-    BEHIND_END, CLEAN, HIGH_WATER, LOW_WATER, MARKS, RETURNED, Received, USB, XOFF, XON,
+    AUX, AUX_RING, BEHIND_END, CLEAN, Flow, MARKS, RETURNED, RX_RING, Received, USB, XOFF, XON,
+    high_water, is_shared, low_water,
 };
 use crate::protocol::Mode;
 use crate::status::Status;
@@ -33,11 +34,20 @@ enum Left {
 }
 
 /// The task.
-pub async fn run(links: &'static Links, received: Received) -> ! {
-    let mut usb = Intake::new(links.port(USB), received);
+pub async fn run(
+    links: &'static Links,
+    usb: Received<RX_RING>,
+    aux: Option<Received<AUX_RING>>,
+) -> ! {
+    let mut usb = Intake::new(links.port(USB), usb);
+    let mut aux = aux.map(|received| Intake::new(links.port(AUX), received));
     loop {
         let left = usb.take(links);
-        match left {
+        let aux_left = match &mut aux {
+            Some(aux) if !aux.is_idle() => aux.take(links),
+            _ => Left::Nothing,
+        };
+        match left.max(aux_left) {
             Left::Nothing => next(Event::Received).await,
             Left::Bytes => yield_now().await,
             Left::Full => {
@@ -49,23 +59,31 @@ pub async fn run(links: &'static Links, received: Received) -> ! {
 }
 
 /// The receiving end of a port.
-struct Intake {
+struct Intake<const N: usize> {
     port: &'static Port,
-    received: Received,
+    received: Received<N>,
     /// Lost line ends that have been seen to, of `lost_ends`.
     seen: u16,
     /// Lines that are still to be refused.
     refused: u16,
     /// The mark that told of them.
     then: u8,
-    /// It has been sent XOFF.
-    sender_stopped: bool,
+    /// How the sender has been stopped.
+    stopped: Flow,
+    /// The receive interrupt may have stopped it too, by a pin.
+    has_pins: bool,
 }
 
-impl Intake {
-    fn new(port: &'static Port, received: Received) -> Self {
+impl<const N: usize> Intake<N> {
+    fn new(port: &'static Port, received: Received<N>) -> Self {
         let seen = lost_ends(port.number);
-        Self { port, received, seen, refused: 0, then: 0, sender_stopped: false }
+        let has_pins = Flow::of(port.number, 2) == Flow::Pins;
+        Self { port, received, seen, refused: 0, then: 0, stopped: Flow::None, has_pins }
+    }
+
+    /// Whether there is nothing to do: most of the time, on a port that nobody uses.
+    fn is_idle(&self) -> bool {
+        self.received.is_empty() && self.refused == 0 && self.stopped == Flow::None
     }
 
     /// Takes a turn's bytes, and stops the sender or lets it go on.
@@ -98,7 +116,7 @@ impl Intake {
             };
             let is_line = match byte {
                 ..MARKS => self.loss(pool, byte, links),
-                XON | XOFF if links.settings.borrow().has_xon_xoff() => {
+                XON | XOFF if self.flow(links) == Flow::Characters => {
                     uart::hold(self.port.number, byte == XOFF);
                     false
                 }
@@ -115,16 +133,24 @@ impl Intake {
     #[inline(never)]
     fn control_flow(&mut self, links: &Links) {
         let waiting = self.received.len();
-        let stop = match self.sender_stopped {
-            true => waiting >= LOW_WATER,
-            false => waiting > HIGH_WATER,
+        let stop = match self.stopped {
+            Flow::None => waiting > high_water(N),
+            _ => waiting >= low_water(N),
         };
         // One that was stopped must not stay so when the setting changes.
-        let stop = stop && links.settings.borrow().has_xon_xoff();
-        if stop != self.sender_stopped {
-            self.sender_stopped = stop;
-            uart::send_ahead(self.port.number, if stop { XOFF } else { XON });
+        let flow = if stop { self.flow(links) } else { Flow::None };
+        if flow != self.stopped {
+            let port = self.port.number;
+            uart::stop_sender(port, self.stopped, false);
+            uart::stop_sender(port, flow, true);
+            self.stopped = flow;
+        } else if self.has_pins && flow == Flow::None {
+            uart::stop_sender(self.port.number, Flow::Pins, false);
         }
+    }
+
+    fn flow(&self, links: &Links) -> Flow {
+        Flow::of(self.port.number, links.settings.borrow().flow_control())
     }
 
     /// Bytes were lost here. Returns whether the mark stands for the end of a whole line.
@@ -141,7 +167,8 @@ impl Intake {
         if self.refused == 0 {
             self.after(pool);
         }
-        if self.refused > 0 || mark & CLEAN == 0 {
+        // A bus is not told: the line is refused anyway.
+        if (self.refused > 0 || mark & CLEAN == 0) && !is_shared(self.port.number) {
             self.port.exception.set(Some(Status::BufferFull));
             links.reporter_wake.signal();
         }

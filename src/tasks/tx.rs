@@ -5,7 +5,7 @@
 
 use embassy_time::Timer;
 
-use crate::hal::event::{Event, wait};
+use crate::hal::event::wait_transmitted;
 use crate::hal::imp::uart;
 use crate::hal::serial::{Outgoing, TX_RING};
 use crate::progmem::Text;
@@ -31,7 +31,7 @@ impl Tx {
 
     /// Waits until a piece fits.
     pub async fn room(&mut self) {
-        wait(Event::Transmitted, || self.has_room().then_some(())).await;
+        wait_transmitted(self.port, || self.has_room().then_some(())).await;
     }
 
     /// Whether a piece fits now.
@@ -47,7 +47,7 @@ impl Tx {
     /// Goes on at `rate` bits a second, when what has been put has left at the old rate: 1 to 4 ms after
     /// its last byte. What the sender says meanwhile may be spoilt.
     pub async fn set_rate(&mut self, rate: u32) {
-        wait(Event::Transmitted, || (self.ring.free() == TX_RING - 1).then_some(())).await;
+        wait_transmitted(self.port, || (self.ring.free() == TX_RING - 1).then_some(())).await;
         // The transmitter holds two bytes more. It has a flag for their end, but the flag may be left
         // from a pause in the middle of the line; their time is certain.
         Timer::after_ticks(u64::from(TWO_BYTES_MS / self.rate) + 2).await;
@@ -65,13 +65,17 @@ impl crate::protocol::Out for Tx {
     // By itself, for it is called in many places.
     #[inline(never)]
     fn put_text(&mut self, text: Text) {
-        let slots = self.ring.vacant();
-        if slots.len() < text.len() {
-            return self.put_all(text.bytes());
+        let mut left = text;
+        // The ring's end may come in between; there is room beyond it.
+        for _ in 0..2 {
+            let count = left.copy(self.ring.vacant());
+            // SAFETY: so many have been copied there.
+            unsafe { self.ring.publish(count) };
+            left = left.behind(count);
+            if left.is_empty() {
+                break;
+            }
         }
-        text.copy(slots);
-        // SAFETY: so many have been copied there.
-        unsafe { self.ring.publish(text.len() as u8) };
     }
 
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {

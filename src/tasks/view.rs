@@ -13,7 +13,8 @@ use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
-use crate::hal::imp::{gpio, stepper};
+use crate::hal::imp::{gpio, stepper, uart};
+use crate::hal::serial::{Flow, PORTS};
 use crate::jobs::Job;
 use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
@@ -233,6 +234,9 @@ impl Machine for View<'_> {
 /// Tells the outputs what the settings say of them. Thread mode, or before interrupts are on.
 pub fn set_outputs(settings: &Settings) {
     power::set_modes(settings);
+    for port in 0..PORTS as u8 {
+        uart::set_flow(port, Flow::of(port, settings.flow_control()));
+    }
     stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
     stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));
 }
