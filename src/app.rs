@@ -18,7 +18,7 @@ use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
-use crate::store::kept::{self, Kept};
+use crate::store::kept;
 use crate::tasks::links::{Links, QueueCount};
 use crate::tasks::ports::Port;
 use crate::tasks::storage::Storage;
@@ -33,7 +33,7 @@ const LINES_USB: usize = 480;
 const LINES_AUX: usize = 80;
 
 impl Links {
-    fn new(ports: [Port; PORTS]) -> Self {
+    fn new(ports: [Port; PORTS], storage: &'static Storage) -> Self {
         Self {
             ports,
             feeder: Cell::new(USB),
@@ -50,25 +50,13 @@ impl Links {
             settings_changed: Cell::new(true),
             rate: Cell::new(None),
             job: Cell::default(),
-            storage: Storage::default(),
+            storage,
             report: RefCell::new(StatusReport::new()),
             // Their defaults come when they are in place: they would take as much of the stack.
             settings: RefCell::new(Settings::blank()),
-            model: RefCell::new(Interpreter::new()),
+            model: RefCell::new(Interpreter::with(storage)),
         }
     }
-}
-
-/// Makes the links where they stay. Not inlined: what it needs of the stack is free again after it.
-#[inline(never)]
-fn place(ports: [Port; PORTS]) -> &'static Links {
-    #[cfg(target_arch = "avr")]
-    {
-        static LINKS: static_cell::StaticCell<Links> = static_cell::StaticCell::new();
-        LINKS.init_with(|| Links::new(ports))
-    }
-    #[cfg(not(target_arch = "avr"))]
-    std::boxed::Box::leak(std::boxed::Box::new(Links::new(ports)))
 }
 
 /// Memory for lines, once on AVR; on the host each machine that is made gets its own.
@@ -83,6 +71,26 @@ macro_rules! line_bytes {
         #[cfg(not(target_arch = "avr"))]
         std::boxed::Box::leak(std::boxed::Box::new([0; $len]))
     }};
+}
+
+/// Puts something where it stays.
+macro_rules! place {
+    ($type:ty, $value:expr) => {{
+        #[cfg(target_arch = "avr")]
+        {
+            static PLACE: static_cell::StaticCell<$type> = static_cell::StaticCell::new();
+            PLACE.init_with(|| $value)
+        }
+        #[cfg(not(target_arch = "avr"))]
+        std::boxed::Box::leak(std::boxed::Box::new($value))
+    }};
+}
+
+/// Makes the links. Not inlined: what it needs of the stack is free again after it.
+#[inline(never)]
+fn place(ports: [Port; PORTS]) -> &'static Links {
+    let storage: &'static Storage = place!(Storage, Storage::new(Log::open(&Eeprom::take())));
+    place!(Links, Links::new(ports, storage))
 }
 
 /// Starts the firmware: `main` is the thread-mode executor, `exec_level` the interrupt-mode one.
@@ -104,8 +112,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
         _ => None,
     };
     let links = place(ports.into_array().ok()?);
-    links.settings.borrow_mut().set_defaults();
-    let log = recall(links);
+    recall(&mut links.settings.borrow_mut(), links.storage);
     if !links.settings.borrow().starts_in_json() {
         links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
     }
@@ -118,19 +125,15 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     main.spawn(power_task(links).ok()?);
     main.spawn(parser_task(links).ok()?);
     main.spawn(control_task(links).ok()?);
-    main.spawn(storage_task(links, log).ok()?);
+    main.spawn(storage_task(links).ok()?);
     Some(())
 }
 
-/// Takes over what was put away before the reset.
+/// The defaults, and over them what was put away before the reset.
 #[inline(never)]
-fn recall(links: &Links) -> Log {
-    let memory = Eeprom::take();
-    let log = Log::open(&memory);
-    let (mut settings, mut model) = (links.settings.borrow_mut(), links.model.borrow_mut());
-    let mut kept = Kept { settings: &mut settings, tables: model.tables_mut() };
-    kept::load(&log, &memory, &mut kept);
-    log
+fn recall(settings: &mut Settings, storage: &Storage) {
+    settings.set_defaults();
+    kept::load(&storage.log(), &Eeprom::take(), settings);
 }
 
 /// Declares tasks: one of each on AVR; on the host each machine that is made gets its own.
@@ -164,5 +167,5 @@ tasks! {
     fn control_task(links: &'static Links) = control::run;
     fn power_task(links: &'static Links) = power::run;
     fn parser_task(links: &'static Links) = parser::run;
-    fn storage_task(links: &'static Links, log: Log) = storage::run;
+    fn storage_task(links: &'static Links) = storage::run;
 }
