@@ -3,7 +3,7 @@
 //! ```text
 //! target -> line -> block queue -> exec -> segment ring -> dda -> pins
 //!           junction   |   ^        governor, prep
-//!                      horizon      smooth, brake, reach
+//!                      horizon      smooth, brake, reach, halt
 //! ```
 
 pub mod block;
@@ -14,6 +14,7 @@ pub mod dynamics;
 pub mod exec;
 pub mod float;
 pub mod governor;
+mod halt;
 pub mod horizon;
 pub mod junction;
 mod limits;
