@@ -11,28 +11,33 @@ use crate::hal::ring::Producer;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::queue::BlockSource;
-use crate::tasks::{links, power};
+use crate::tasks::{hold, links, power};
 
-/// Segments shorter than this, CPU cycles, may fill the ring.
-const SHORT: u32 = ACTIVE.clock_hz / 800;
-
-/// Longer ones are queued so many at a time: what is queued cannot be slowed down any more.
-const LONG_QUEUED: usize = 4;
+/// CPU cycles in so many tenths of a millisecond.
+const fn tenths(of_ms: u32) -> u32 {
+    ACTIVE.clock_hz / 10_000 * of_ms
+}
 
 /// The task.
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
     let mut machine = Exec::new();
     let mut segment = Segment::default();
-    let mut most = LONG_QUEUED;
+    let mut most = 1;
     let mut outputs = 0;
     loop {
         exec::wait(|| (segments.used() < most).then_some(())).await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
         let step = links::update(|out| {
+            machine.set_hold(hold::is_on(), out);
             let step = machine.step(&mut blocks, standstill, out, &mut segment);
             if step == Step::Segment {
                 power::segment(segment.moving);
+            } else if step == Step::Held {
+                hold::dropped(|| {
+                    machine.drop_all(&mut blocks, out);
+                    stepper::settle();
+                });
             } else if out.outputs != outputs {
                 outputs = out.outputs;
                 gpio::set_outputs(outputs);
@@ -44,16 +49,32 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             let _ = segments.push_copy(&segment);
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
-            most = if cycles < SHORT { SEGMENTS - 1 } else { LONG_QUEUED };
+            most = queued(cycles);
         }
         if blocks.len() != waiting {
             flags::set(Event::BlockDone);
         }
-        if matches!(step, Step::Idle | Step::Standstill) {
+        if step == Step::Held && hold::passes() {
+            continue;
+        }
+        if matches!(step, Step::Idle | Step::Standstill | Step::Held) {
             links::hungry(true);
             exec_asked_again().await;
             links::hungry(false);
         }
+    }
+}
+
+/// How many segments are queued at a time if the last took so many CPU cycles: what is queued cannot be
+/// slowed down any more. With the one that runs they take 9 ms at most.
+#[inline(always)]
+fn queued(cycles: u32) -> usize {
+    match cycles {
+        _ if cycles <= tenths(9) => SEGMENTS - 1,
+        _ if cycles <= tenths(12) => 6,
+        _ if cycles <= tenths(21) => 3,
+        _ if cycles <= tenths(29) => 2,
+        _ => 1,
     }
 }
 

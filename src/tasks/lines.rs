@@ -169,6 +169,30 @@ impl LinePool {
         self.fault = None;
     }
 
+    /// Whether a data line waits, or a fault.
+    pub fn has_data(&self) -> bool {
+        self.entries.len() > usize::from(self.controls)
+    }
+
+    /// Drops all data lines: they will be answered with [`Status::Terminated`].
+    #[inline(never)]
+    pub fn terminate(&mut self) {
+        for entry in &mut self.entries {
+            if entry.class == Class::Data {
+                entry.class = Class::Fault(Status::Terminated);
+            }
+        }
+    }
+
+    /// The same for the line that is coming in.
+    #[inline(never)]
+    pub fn terminate_partial(&mut self) {
+        let text = self.slice(usize::from(self.end), self.partial);
+        if !text.is_empty() && classify(text) == Class::Data {
+            self.spoil(Status::Terminated);
+        }
+    }
+
     /// The next byte follows a carriage return, or does not.
     pub fn follow(&mut self, returned: bool) {
         self.returned = returned;

@@ -5,6 +5,7 @@
 //! data lines only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
 //! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`].
 
+use super::hold::Flush;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::tx::Tx;
@@ -17,14 +18,18 @@ use crate::store::kept::Item;
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
-        let free = !links.commands_taken.get();
+        let flush = links.flush.get();
+        let free = !links.commands_taken.get() && flush == Flush::None;
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
         let tried = if data { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
             continue;
         }
-        let next = links.lines.borrow().next(data);
+        let next = match flush {
+            Flush::None => links.lines.borrow().next(data),
+            _ => dropped(links, flush),
+        };
         let Some((id, class)) = next else {
             match free && runs_job {
                 true => job_line(links),
@@ -38,6 +43,17 @@ pub async fn run(links: &'static Links) -> ! {
             answer(links, id, &mut request).await;
         }
         finish(links, id);
+    }
+}
+
+/// The next line during a queue flush: control lines are carried out, those of data dropped.
+#[inline(never)]
+fn dropped(links: &Links, flush: Flush) -> Option<(LineId, Class)> {
+    let next = links.lines.borrow().next(true);
+    match next {
+        Some((_, Class::Data)) if flush == Flush::Rest => None,
+        Some((id, Class::Data)) => Some((id, Class::Fault(Status::Terminated))),
+        next => next,
     }
 }
 
@@ -142,10 +158,14 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
                 if links.commands_taken.get() {
                     // Nothing of the response has been put yet: others may talk meanwhile.
                     drop(tx);
-                    while links.commands_taken.get() {
+                    while links.commands_taken.get() && links.flush.get() == Flush::None {
                         links.parser_wake.wait().await;
                     }
                     tx = links.tx.lock().await;
+                }
+                if links.flush.get() != Flush::None {
+                    request.ran(Status::Terminated, false);
+                    continue;
                 }
                 let lines = links.lines.borrow();
                 let block = Span { start, end };
@@ -175,6 +195,12 @@ fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
     let next = request.step(lines.text(id), &mut View::of(links), tx);
     tx.flush();
     next
+}
+
+/// Ends the program, as M2 does, for one that has been killed.
+pub fn end_program(links: &Links) {
+    // It is never refused.
+    let _ = interpret(links, b"M2", Usual::NotTried);
 }
 
 /// Interprets a block and hands its commands to the planner. Returns also whether it may have a

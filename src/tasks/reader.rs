@@ -9,12 +9,13 @@
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
 
+use super::hold::{self, Flush};
 use super::lines::LinePool;
 use super::links::Links;
 use crate::hal::event::{Event, next};
 use crate::hal::imp::uart::{self, lost_ends};
 use crate::hal::serial::{
-    BEHIND_END, CLEAN, HIGH_WATER, LOW_WATER, MARKS, RETURNED, Received, XOFF, XON,
+    BEHIND_END, CLEAN, CUT, HIGH_WATER, LOW_WATER, MARKS, RETURNED, Received, XOFF, XON,
 };
 use crate::protocol::Mode;
 use crate::status::Status;
@@ -29,6 +30,8 @@ enum Left {
     Bytes,
     /// Bytes, and no room in the pool.
     Full,
+    /// Bytes, perhaps, behind the place of a `%` or `^d`.
+    Cut,
 }
 
 /// The task.
@@ -38,7 +41,11 @@ pub async fn run(links: &'static Links, received: Received) -> ! {
     loop {
         let left = intake.turn(links);
         intake.control_flow(links);
+        if left == Left::Cut || links.flush.get() == Flush::Here {
+            hold::marked(links);
+        }
         match left {
+            Left::Cut => {}
             Left::Nothing => next(Event::Received).await,
             Left::Bytes => yield_now().await,
             Left::Full => {
@@ -84,7 +91,15 @@ impl Intake {
                 return Left::Nothing;
             };
             let is_line = match byte {
-                ..MARKS => self.loss(pool, byte, links),
+                CUT => return Left::Cut,
+                ..MARKS => {
+                    let is_line = self.loss(pool, byte, links);
+                    if links.flush.get() == Flush::Input {
+                        // It may stand for the cut.
+                        return Left::Cut;
+                    }
+                    is_line
+                }
                 XON | XOFF if links.settings.borrow().has_xon_xoff() => {
                     uart::hold(byte == XOFF);
                     false
