@@ -10,7 +10,7 @@ const CLOCK: f64 = 16e6;
 /// Steps in a mm, as axes are set up by default.
 const STEPS: f64 = 1280.0;
 /// mm/s^2, as the setting says.
-const ACCEL: f64 = 500.0;
+const ACCEL: f64 = 1_000.0;
 /// mm/s.
 const VELOCITY: f64 = 25.0;
 /// Millions of mm/min^3: a jerk that no acceleration limit knows of.
@@ -52,17 +52,19 @@ fn positions(machine: &Machine) -> [i64; 2] {
 fn first_slower(machine: &Machine, from: u64) -> u64 {
     let steady = (CLOCK / VELOCITY / STEPS) as u64;
     let steps = machine.recorder().steps_of(0);
-    let slower = |pair: &&[u64]| pair[1] > from && pair[1] - pair[0] > steady + steady / 200;
+    let slower = |pair: &&[u64]| pair[1] > from && pair[1] - pair[0] > steady + steady / 40;
     steps.windows(2).find(slower).expect("it slows down")[1]
 }
 
 #[test]
 fn it_slows_down_within_10_ms() {
     let one = vec!["g1 x100 f1500".to_string()];
-    // Blocks that take 4 ms each, sent meanwhile, keep everybody busy.
-    let many =
-        |way: f64| (1..300).map(|n| format!("g1 f1500 x{:.4}", f64::from(n) * way)).collect();
-    for job in [one, many(0.1), many(0.065), many(0.03)] {
+    // Blocks that take 4 and 2 ms, sent meanwhile, keep everybody busy.
+    let many = |way: f64| {
+        let first = std::iter::once("g1 f1500".to_string());
+        first.chain((1..400).map(|n| format!("x{:.2}", f64::from(n) * way))).collect()
+    };
+    for job in [one, many(0.1), many(0.05)] {
         let mut worst = 0;
         for n in 0..30 {
             let (mut machine, mut host) = board(SHARP);
@@ -73,8 +75,8 @@ fn it_slows_down_within_10_ms() {
             worst = worst.max(first_slower(&machine, from) - from);
         }
         let ms = worst as f64 / CLOCK * 1e3;
-        println!("{}: slower after {ms:.2} ms at most", job[0]);
-        assert!(ms <= 10.0, "{ms} ms in {}", job[0]);
+        println!("{} lines: slower after {ms:.2} ms at most", job.len());
+        assert!(ms > 1.0 && ms <= 10.0, "{ms} ms");
     }
 }
 
@@ -106,17 +108,21 @@ fn it_stops_as_soon_as_the_limits_allow_and_ends_exactly() {
 #[test]
 fn what_is_dropped_leaves_no_step_behind() {
     let (mut machine, mut host) = board(5_000.0);
-    for n in 0..25 {
+    for n in 0..15 {
         // In the middle of something, at some phase of the steps of both axes.
         set(&mut machine, &mut host, "g91 g1 x30.123 y17.0071 f1500");
-        set(&mut machine, &mut host, "g2 x1.1 y0 i3 j4");
-        set(&mut machine, &mut host, "x-7.3 y3.3337");
+        set(&mut machine, &mut host, "g2 x6 y0 i3");
+        set(&mut machine, &mut host, "g1 x-7.3 y3.3337");
         host.run_for_ms(&mut machine, 40 + 97 * n % 1_900).unwrap();
         machine.send(b"!%\n");
         let (x, y) = (n as i64 % 7 - 3, n as i64 % 5);
         set(&mut machine, &mut host, &format!("g90 g1 x{x} y{y} f1500"));
-        until_stat(&mut machine, &mut host, 3);
-        host.run_for_ms(&mut machine, 20).unwrap();
+        // Until no motor has moved for a while.
+        let mut before = [0; 2];
+        while before != positions(&machine) {
+            before = positions(&machine);
+            host.run_for_ms(&mut machine, 200).unwrap();
+        }
         assert_eq!(positions(&machine), [x * 1280, y * 1280], "round {n}");
     }
 }
