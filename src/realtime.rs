@@ -16,8 +16,8 @@ pub const KILL: u8 = 1 << 4;
 pub const ENQUIRY: u8 = 1 << 5;
 
 /// Those of which the place in the stream counts: there the receive ring gets a
-/// [`CUT`](crate::hal::serial::CUT).
-pub const PLACED: u8 = FLUSH | KILL;
+/// [`CUT`](crate::hal::serial::CUT) or [`GO`](crate::hal::serial::GO).
+pub const PLACED: u8 = FLUSH | KILL | RESUME;
 
 /// The characters that are pending when one more comes: who says hold does not say resume any more.
 #[inline(always)]

@@ -1,13 +1,13 @@
 //! Feedhold, resume, queue flush and kill: what real-time characters, and `{qf:1}`, lead to.
 //!
-//! Called by the control task, and by the reader where a `%` or `^d` stands in the stream; exec asks whether
-//! a hold is on. Thread mode decides, exec comes to rest, the planner drops what is queued:
+//! Called by the control task, and by the reader where a tilde, `%` or `^d` stands in the stream; exec asks
+//! whether a hold is on. Thread mode decides, exec comes to rest, the planner drops what is queued:
 //!
 //! ```text
 //!  !   begin: exec slows down; Held               ~   pass: exec goes on, once it is at rest
 //!  %   in a hold, and ^d:
-//!      serve    Flush::Input   the parser refuses data lines; nothing is interpreted any more
-//!      marked   Flush::Rest    the reader has come to the `%`: lines from here on are kept, and wait
+//!      flush    Flush::Input   the parser refuses data lines; nothing is interpreted any more
+//!      placed   Flush::Rest    the reader has come to the `%`: lines from here on are kept, and wait
 //!      planner  drop_blocks    exec, at rest, drops its blocks and has the position, to the step
 //!               end            planner and model start from there; the hold is over
 //! ```
@@ -15,9 +15,12 @@
 //! A hold is on from the character on, whatever the machine does, as long as there is anything to do: also
 //! between two blocks, in a dwell, or while M0 waits. An idle machine has nothing to hold and takes no notice.
 //! A `%` without a hold is none, unless an exclamation mark comes right behind it: programs begin and end
-//! with one. A tilde while the machine slows down
-//! waits until it stands; before an exclamation mark it is forgotten, and after a `%` as well, so that the
-//! machine moves in no case.
+//! with one. A tilde while the machine slows down waits until it stands. The machine does not go on if an
+//! exclamation mark comes behind the tilde, nor if there is a `%` on either side.
+//!
+//! In a comment, tilde and `%` are text: the receive interrupt leaves marks where they stand (`serial::GO`,
+//! `serial::CUT`), and the reader knows what a comment is. The exclamation mark stops the machine wherever
+//! it stands, and at once.
 //!
 //! A line that is dropped is answered all the same, by [`Status::Terminated`](crate::status::Status): senders
 //! count responses. Nothing here waits, and nothing can be full: all of it is states.
@@ -28,6 +31,7 @@ use crate::hal::byte::SharedByte;
 use crate::hal::event::Event;
 use crate::hal::imp::time::millis;
 use crate::hal::imp::{exec, flags, reset, uart};
+use crate::hal::serial::{CUT, GO};
 use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, RESET, RESUME};
 
 /// How far a queue flush has come.
@@ -128,24 +132,28 @@ pub fn serve(links: &Links) {
     if characters & RESET != 0 {
         reset();
     }
-    let kills = characters & KILL != 0;
-    let holds = characters & HOLD != 0 && is_busy(links);
-    if kills || holds {
+    let (holds, cuts) = (characters & HOLD != 0, characters & FLUSH != 0);
+    let (kills, busy) = (characters & KILL != 0, holds && is_busy(links));
+    if holds {
+        links.resume.set(false);
+        links.percent.set(false);
+    }
+    if kills || busy {
         begin();
     }
     if kills {
         links.killed.set(true);
-    }
-    if kills || (characters & FLUSH != 0 && is_on()) {
         flush(links, Flush::Input);
-    } else if characters & FLUSH != 0 {
-        links.percent.set(millis());
-    } else if holds && millis().wrapping_sub(links.percent.get()) < TOGETHER_MS {
+    }
+    if cuts && is_on() {
+        links.percent.set(true);
+    } else if cuts {
+        links.percent_at.set(millis());
+    } else if busy && millis().wrapping_sub(links.percent_at.get()) < TOGETHER_MS {
         flush_here(links, true);
     }
-    if characters & RESUME != 0 && links.flush.get() == Flush::None {
-        pass();
-        links.cycle_start.signal();
+    if characters & RESUME != 0 {
+        links.resume.set(true);
     }
     if characters & ENQUIRY != 0 {
         links.enquiry.set(true);
@@ -169,22 +177,49 @@ pub fn flush_here(links: &Links, busy: bool) -> bool {
 fn flush(links: &Links, from: Flush) {
     if links.flush.get() == Flush::None {
         begin();
+        links.percent.set(false);
         links.flush.set(from);
         links.parser_wake.signal();
     }
 }
 
-/// The reader has come to the place of a `%` or `^d`: what it has got so far is what is dropped.
-pub fn marked(links: &Links) {
+/// The reader has come to the place of a real-time character, outside of comments. What it has got before a
+/// `%` in a hold, or a `^d`, is what is dropped.
+pub fn placed(links: &Links, mark: u8) {
     serve(links);
-    if links.flush.get() != Flush::None {
-        links.lines.borrow_mut().terminate_partial();
+    if mark == GO {
+        go_on(links);
+    } else if is_on() {
+        flush(links, Flush::Input);
+        if links.flush.get() != Flush::Here {
+            links.lines.borrow_mut().terminate_partial();
+        }
         rest(links);
     }
 }
 
-/// All lines in the pool are dropped, and the queue next. For the reader.
-pub fn rest(links: &Links) {
+/// The same for one that waits in the receive ring, because the pool is full. One that is not there any more
+/// has left the mark of a loss.
+pub fn ahead(links: &Links, mark: u8) {
+    serve(links);
+    if mark != CUT {
+        go_on(links);
+    }
+    if is_on() && mark != GO && (mark == CUT || links.percent.get()) {
+        flush(links, Flush::Input);
+    }
+}
+
+/// What is held goes on; and what waits at a program stop.
+fn go_on(links: &Links) {
+    if links.resume.take() && links.flush.get() == Flush::None {
+        pass();
+        links.cycle_start.signal();
+    }
+}
+
+/// All lines in the pool are dropped, and the queue next.
+fn rest(links: &Links) {
     links.lines.borrow_mut().terminate();
     links.flush.set(Flush::Rest);
     links.parser_wake.signal();

@@ -41,6 +41,30 @@ struct Entry {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LineId(u8);
 
+/// Whether a place in a line is in a comment.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Aside {
+    /// It is not.
+    None,
+    /// In parentheses.
+    Parentheses,
+    /// Behind a semicolon.
+    Rest,
+}
+
+impl Aside {
+    /// The same behind one more byte.
+    pub fn after(self, byte: u8) -> Self {
+        match (self, byte) {
+            (_, b'\n' | b'\r') => Self::None,
+            (Self::Rest, _) | (Self::None, b';') => Self::Rest,
+            (_, b'(') => Self::Parentheses,
+            (_, b')') => Self::None,
+            (aside, _) => aside,
+        }
+    }
+}
+
 /// The pool. The buffer is last: what lies before it, AVR reaches in one instruction.
 #[repr(C)]
 pub struct LinePool {
@@ -167,6 +191,12 @@ impl LinePool {
     pub fn forget(&mut self) {
         self.partial = 0;
         self.fault = None;
+    }
+
+    /// Whether what comes next is in a comment.
+    pub fn aside(&self) -> Aside {
+        let text = self.slice(usize::from(self.end), self.partial);
+        text.iter().fold(Aside::None, |aside, byte| aside.after(*byte))
     }
 
     /// Whether a data line waits, or a fault.

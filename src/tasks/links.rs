@@ -78,8 +78,12 @@ pub struct Links {
     pub enquiry: Cell<bool>,
     /// How far a queue flush has come.
     pub flush: Cell<Flush>,
+    /// A tilde has come, and no exclamation mark since: where it stands, what is held goes on.
+    pub resume: Cell<bool>,
+    /// A percent sign has come in the hold.
+    pub percent: Cell<bool>,
     /// When a percent sign came that was none, ms: an exclamation mark right after it makes it one.
-    pub percent: Cell<u32>,
+    pub percent_at: Cell<u32>,
     /// The job has been killed: when its queue has been flushed, the program ends.
     pub killed: Cell<bool>,
     /// The queue has been flushed, which is to be told.

@@ -17,7 +17,7 @@ use crate::hal::byte::SharedByte;
 use crate::hal::event::Event;
 use crate::hal::ring::Ring;
 use crate::hal::serial::{
-    BATCH, BEHIND_END, CLEAN, CUT, MARKS, Outgoing, RETURNED, RING, Received,
+    BATCH, BEHIND_END, CLEAN, CUT, GO, MARKS, Outgoing, RETURNED, RING, Received,
 };
 use crate::realtime;
 
@@ -220,8 +220,10 @@ extern "C" fn __vector_25() -> ! {
             "or   r24, r30",
             "sts  {realtime}, r24",
             "sbi  0x1E, {special}",
-            // Where the stream is cut counts: queue a mark.
+            // Where it stands counts, of some: queue a mark.
             "ldi  r24, {cut}",
+            "sbrc r30, {resume_bit}",
+            "ldi  r24, {go}",
             "andi r30, {placed}",
             "breq 24f",
             "sbi  0x1E, {received}",
@@ -321,6 +323,8 @@ extern "C" fn __vector_25() -> ! {
             not_resume = const !realtime::RESUME,
             placed = const realtime::PLACED,
             cut = const CUT,
+            go = const GO,
+            resume_bit = const realtime::RESUME.trailing_zeros(),
             resume = const realtime::RESUME,
             flush = const realtime::FLUSH,
             reset = const realtime::RESET,

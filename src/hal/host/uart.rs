@@ -8,7 +8,7 @@ use super::{NEVER, flags, now};
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
-use crate::hal::serial::{BATCH, CUT, MARKS, Outgoing, RING, Received, lose, mark};
+use crate::hal::serial::{BATCH, CUT, GO, MARKS, Outgoing, RING, Received, lose, mark};
 use crate::realtime;
 
 #[derive(Default)]
@@ -166,7 +166,7 @@ fn arrive(line: &mut Line, byte: u8) {
         line.realtime = realtime::with(line.realtime, special);
         flags::set(Event::Realtime);
         if special & realtime::PLACED != 0 {
-            cut(line);
+            place(line, if special == realtime::RESUME { GO } else { CUT });
         }
         return;
     }
@@ -186,12 +186,12 @@ fn arrive(line: &mut Line, byte: u8) {
     }
 }
 
-/// Marks where the stream is cut: by the mark of a loss if there is no room.
-fn cut(line: &mut Line) {
+/// Queues the mark of a real-time character: that of a loss if there is no room.
+fn place(line: &mut Line, character: u8) {
     let Some(ring) = line.rx_in.as_mut() else { return };
-    if ring.push(CUT).is_err() {
+    if ring.push(character).is_err() {
         let newest = mark(ring.pushed(0).copied().unwrap_or(0));
-        line.lost_ends = line.lost_ends.wrapping_add(queue_mark(ring, newest, CUT));
+        line.lost_ends = line.lost_ends.wrapping_add(queue_mark(ring, newest, character));
     }
     line.queued = line.queued.wrapping_add(1);
     flags::set(Event::Received);
