@@ -22,7 +22,7 @@ const fn tenths(of_ms: u32) -> u32 {
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
     let mut machine = Exec::new();
     let mut segment = Segment::default();
-    let mut most = 1;
+    let (mut most, mut rests) = (1, true);
     let mut outputs = 0;
     loop {
         exec::wait(|| (segments.used() < most).then_some(())).await;
@@ -32,6 +32,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             machine.set_hold(hold::is_on(), out);
             let step = machine.step(&mut blocks, standstill, out, &mut segment);
             if step == Step::Segment {
+                rests = out.velocity.to_bits() == 0;
                 power::segment(segment.moving);
             } else if step == Step::Held {
                 hold::dropped(|| {
@@ -49,7 +50,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             let _ = segments.push_copy(&segment);
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
-            most = queued(cycles);
+            most = queued(cycles, rests);
         }
         if blocks.len() != waiting {
             flags::set(Event::BlockDone);
@@ -66,12 +67,14 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
 }
 
 /// How many segments are queued at a time if the last took so many CPU cycles: what is queued cannot be
-/// slowed down any more. With the one that runs they take 9 ms at most.
+/// slowed down any more. With the one that runs they take 9 ms at most; unless it `rests` at the end of each,
+/// as blocks do that come late: then a hold has no speed to take away.
 #[inline(always)]
-fn queued(cycles: u32) -> usize {
+fn queued(cycles: u32, rests: bool) -> usize {
     match cycles {
         _ if cycles <= tenths(9) => SEGMENTS - 1,
         _ if cycles <= tenths(12) => 6,
+        _ if rests => 4,
         _ if cycles <= tenths(21) => 3,
         _ if cycles <= tenths(29) => 2,
         _ => 1,
