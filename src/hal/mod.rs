@@ -35,6 +35,7 @@ pub mod event;
 pub mod pender;
 pub mod ring;
 pub mod serial;
+pub mod timers;
 
 #[cfg(target_arch = "avr")]
 #[path = "avr/mod.rs"]

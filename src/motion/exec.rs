@@ -73,6 +73,8 @@ pub struct Snapshot {
     pub velocity: f32,
     /// The N word of the block being run.
     pub line: u32,
+    /// The N word of the line finished last, to its last step.
+    pub finished: u32,
     /// Something moves, or dwells.
     pub running: bool,
     /// A feedhold has brought it to rest.
@@ -93,6 +95,7 @@ impl Snapshot {
             length: 0.0,
             velocity: 0.0,
             line: 0,
+            finished: 0,
             running: false,
             held: false,
             program: Program::Ready,

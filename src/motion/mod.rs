@@ -12,6 +12,7 @@ pub mod dda;
 pub mod divide;
 pub mod dynamics;
 pub mod exec;
+pub mod finished;
 pub mod float;
 pub mod governor;
 mod halt;

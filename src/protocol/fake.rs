@@ -98,7 +98,7 @@ impl Machine for Fake {
             Value::MotionMode => 4,
             Value::QueueFree => 32,
             Value::SlotsFree => 7,
-            Value::BlockLine => self.line,
+            Value::BlockLine | Value::FinishedLine => self.line,
             Value::Position(0) => self.position,
             Value::MachinePosition(_) => i32::MIN,
             Value::Powered(motor) => self.powered[usize::from(motor)].into(),

@@ -10,8 +10,10 @@ use crate::units::FIRST_ROTARY;
 /// A value of the machine, and what [`Machine::value`](super::Machine::value) returns for it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Value {
-    /// `n`: line number of the block read last.
+    /// Line number of the block read last, which responses tell as `n`.
     BlockLine,
+    /// `n`: line number of the block finished last, to its last step.
+    FinishedLine,
     /// `line`: line number of the block that moves.
     MotionLine,
     /// `vel`: speed now, in 0.001 mm/min.
@@ -194,7 +196,7 @@ const fn vector(name: &str, form: Form, members: u8, label: Text) -> Vector {
 progmem! {
     /// Values with names of their own.
     pub static SINGLES: [Single; SINGLE_COUNT] = [
-        count("n", Value::BlockLine, LINE, NONE),
+        count("n", Value::FinishedLine, text!("Line finished:"), NONE),
         count("line", Value::MotionLine, LINE, NONE),
         speed("vel", Value::Velocity, text!("Velocity:")),
         speed("feed", Value::Feed, text!("Feed rate:")),

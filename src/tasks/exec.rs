@@ -10,6 +10,7 @@ use crate::hal::imp::{exec, flags, gpio, stepper};
 use crate::hal::ring::Producer;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
+use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
 use crate::tasks::{hold, links, power};
 
@@ -22,22 +23,35 @@ const fn tenths(of_ms: u32) -> u32 {
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
     let mut machine = Exec::new();
     let mut segment = Segment::default();
-    let (mut most, mut rests) = (1, true);
+    let (mut most, mut rests) = (1u8, true);
     let mut outputs = 0;
+    let mut finished = Finished::new();
     loop {
-        exec::wait(|| (segments.used() < most).then_some(())).await;
+        exec::wait(|| (segments.used() < most.into()).then_some(())).await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
         let step = links::update(|out| {
             machine.set_hold(hold::is_on(), out);
+            if let Some(line) = finished.take(segments.used()) {
+                out.finished = line;
+            }
+            let line = out.line;
             let step = machine.step(&mut blocks, standstill, out, &mut segment);
+            if out.line != line {
+                finished.end(line);
+            }
             if step == Step::Segment {
                 rests = out.velocity.to_bits() == 0;
+                finished.queue();
                 power::segment(segment.moving);
+            } else if step == Step::Idle && standstill {
+                finished.rest();
+                out.finished = out.line;
             } else if step == Step::Held {
                 hold::dropped(|| {
                     machine.drop_all(&mut blocks, out);
                     stepper::settle();
+                    finished.rest();
                 });
             } else if out.outputs != outputs {
                 outputs = out.outputs;
@@ -70,9 +84,9 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
 /// slowed down any more. With the one that runs they take 9 ms at most; unless it `rests` at the end of each,
 /// as blocks do that come late: then a hold has no speed to take away.
 #[inline(always)]
-fn queued(cycles: u32, rests: bool) -> usize {
+fn queued(cycles: u32, rests: bool) -> u8 {
     match cycles {
-        _ if cycles <= tenths(9) => SEGMENTS - 1,
+        _ if cycles <= tenths(9) => SEGMENTS as u8 - 1,
         _ if cycles <= tenths(12) => 6,
         _ if rests => 4,
         _ if cycles <= tenths(21) => 3,

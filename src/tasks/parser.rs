@@ -3,7 +3,10 @@
 //! Reads the line pool, writes `Links::commands`, the G-code model, the settings and the response;
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
 //! data lines only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
+//! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
 //! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`].
+
+use heapless::Vec;
 
 use super::hold::Flush;
 use super::lines::{Class, LineId};
@@ -13,22 +16,20 @@ use super::view::View;
 use crate::jobs::Job;
 use crate::protocol::{Mode, Next, Request, Span, is_brief, put_brief};
 use crate::status::Status;
-use crate::store::kept::Item;
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
-        let flush = links.flush.get();
-        let free = !links.commands_taken.get() && flush == Flush::None;
+        let free = is_free(links);
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
         let tried = if data { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
             continue;
         }
-        let next = match flush {
+        let next = match links.flush.get() {
             Flush::None => links.lines.borrow().next(data),
-            _ => dropped(links, flush),
+            flush => dropped(links, flush),
         };
         let Some((id, class)) = next else {
             match free && runs_job {
@@ -37,10 +38,14 @@ pub async fn run(links: &'static Links) -> ! {
             }
             continue;
         };
-        if let Some(mut request) = begin(links, id, class, tried)
-            && !answer_at_once(links, id, &mut request)
-        {
-            answer(links, id, &mut request).await;
+        match begin(links, id, class, tried) {
+            Begun::Answer(mut request) => {
+                if !answer_at_once(links, id, &mut request) {
+                    answer(links, id, &mut request).await;
+                }
+            }
+            Begun::Silent => {}
+            Begun::Again => continue,
         }
         finish(links, id);
     }
@@ -57,15 +62,25 @@ fn dropped(links: &Links, flush: Flush) -> Option<(LineId, Class)> {
     }
 }
 
+/// Whether a block can be carried out now: neither has the planner to be waited for, nor the tables, and
+/// nothing is being dropped.
+fn is_free(links: &Links) -> bool {
+    !links.commands_taken.get() && !links.storage.is_awaited() && links.flush.get() == Flush::None
+}
+
 /// Carries out the next line of a built-in job. Its end, and a line that is refused, are told by an exception
 /// report.
 #[inline(never)]
 fn job_line(links: &Links) {
     let mut job = links.job.get();
-    let status = match job.next_line() {
-        Some(line) => interpret(links, &line, Usual::NotTried).0,
-        None => Status::EndOfFile,
+    let mut line = Vec::new();
+    let status = match job.next_line(&mut line) {
+        true => interpret(links, &line, Usual::NotTried).0,
+        false => Status::EndOfFile,
     };
+    if status == Status::Again {
+        return;
+    }
     if !matches!(status, Status::Ok | Status::Noop) {
         job = Job::default();
         links.exception.set(Some(status));
@@ -128,23 +143,39 @@ fn answer_at_once(links: &Links, id: LineId, request: &mut Request) -> bool {
     }
 }
 
+/// How it goes on with a line.
+enum Begun {
+    /// It is to be answered.
+    Answer(Request),
+    /// It gets no answer.
+    Silent,
+    /// It has to wait.
+    Again,
+}
+
 /// Begins with a line. One of G-code has run after that, for data lines are taken only while the
 /// planner is free.
 #[inline(never)]
-fn begin(links: &Links, id: LineId, class: Class, tried: Usual) -> Option<Request> {
+fn begin(links: &Links, id: LineId, class: Class, tried: Usual) -> Begun {
     let lines = links.lines.borrow();
     let line = lines.text(id);
     let mut mode = links.mode.get();
     let mut request = match class {
         Class::Fault(status) => Request::refused(status, mode),
-        _ => Request::begin(line, &mut mode)?,
+        _ => match Request::begin(line, &mut mode) {
+            Some(request) => request,
+            None => return Begun::Silent,
+        },
     };
     links.mode.set(mode);
     if let Some(block) = request.gcode() {
         let (status, commented) = interpret(links, block.of(line), tried);
+        if status == Status::Again {
+            return Begun::Again;
+        }
         request.ran(status, commented);
     }
-    Some(request)
+    Begun::Answer(request)
 }
 
 /// Writes the response to a line.
@@ -155,23 +186,15 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
         match step(links, id, request, &mut tx) {
             Next::More => {}
             Next::Gcode { start, end } => {
-                if links.commands_taken.get() {
+                let block = Span { start, end };
+                while !ran(links, id, block, request) {
                     // Nothing of the response has been put yet: others may talk meanwhile.
                     drop(tx);
-                    while links.commands_taken.get() && links.flush.get() == Flush::None {
+                    while !is_free(links) && links.flush.get() == Flush::None {
                         links.parser_wake.wait().await;
                     }
                     tx = links.tx.lock().await;
                 }
-                if links.flush.get() != Flush::None {
-                    request.ran(Status::Terminated, false);
-                    continue;
-                }
-                let lines = links.lines.borrow();
-                let block = Span { start, end };
-                let (status, commented) =
-                    interpret(links, block.of(lines.text(id)), Usual::NotTried);
-                request.ran(status, commented);
             }
             Next::Done(_) => break,
         }
@@ -179,6 +202,25 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
     if let Some(rate) = links.rate.take() {
         tx.set_rate(rate).await;
     }
+}
+
+/// Carries out the block of a request, if that can be done now; or drops it in a queue flush.
+#[inline(never)]
+fn ran(links: &Links, id: LineId, block: Span, request: &mut Request) -> bool {
+    if links.flush.get() != Flush::None {
+        request.ran(Status::Terminated, false);
+        return true;
+    }
+    if !is_free(links) {
+        return false;
+    }
+    let lines = links.lines.borrow();
+    let (status, commented) = interpret(links, block.of(lines.text(id)), Usual::NotTried);
+    if status == Status::Again {
+        return false;
+    }
+    request.ran(status, commented);
+    true
 }
 
 /// The line's slot is free again.
@@ -197,9 +239,9 @@ fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
     next
 }
 
-/// Ends the program, as M2 does, for one that has been killed.
+/// Ends the program, as M2 does, for one that has been killed. The planner is free.
 pub fn end_program(links: &Links) {
-    // It is never refused.
+    // It is never refused, and changes no table.
     let _ = interpret(links, b"M2", Usual::NotTried);
 }
 
@@ -218,9 +260,6 @@ fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
     match done {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
-            if let Some((first, count)) = info.edited {
-                links.storage.note(Item::of_table(first), count.into());
-            }
             if !commands.is_empty() {
                 links.commands_taken.set(true);
                 links.planner_wake.signal();

@@ -120,6 +120,9 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
             hold::drop_blocks();
             wait(Event::BlockDone, || hold::has_dropped().then_some(())).await;
             planner.restart();
+            if links.killed.take() {
+                parser::end_program(links);
+            }
         }
         links.parser_wake.signal();
     }
@@ -407,9 +410,8 @@ impl Planner {
         links.job.set(Job::default());
         links.flush.set(Flush::None);
         hold::end();
-        if links.killed.take() {
+        if links.killed.get() {
             links.exception.set(Some(Status::KillJob));
-            parser::end_program(links);
         }
         links.flushed.set(true);
         links.reporter_wake.urge();

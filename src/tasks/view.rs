@@ -20,7 +20,7 @@ use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
 use crate::protocol::{Machine, StatusReport, Value, Warning, thousandths};
 use crate::status::Status;
-use crate::store::kept::Item;
+use crate::store::kept::ITEMS;
 use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
@@ -107,8 +107,8 @@ impl<'a> View<'a> {
     /// A setting is to be put away; if it has `lowered` others, all of them.
     fn note(&self, setting: Setting, lowered: bool) {
         match lowered {
-            true => self.links.storage.note(0, Setting::NUMBERS.into()),
-            false => self.links.storage.note(Item::of_setting(setting), 1),
+            true => self.links.storage.note(0, ITEMS),
+            false => self.links.storage.note(setting.number(), 1),
         }
     }
 
@@ -182,6 +182,9 @@ impl Machine for View<'_> {
             Value::Cycle => i32::from(self.is_busy()),
             Value::Motion if hold::is_on() => 2,
             Value::Motion => i32::from(self.motion().running),
+            // Lines that move nothing are finished when all before them are.
+            Value::FinishedLine if !self.is_busy() => self.modal(Value::BlockLine),
+            Value::FinishedLine => self.motion().finished as i32,
             Value::MotionLine => self.motion().line as i32,
             Value::Velocity => thousandths(self.motion().velocity * 60.0),
             Value::QueueFree => queue::free() as i32,
@@ -219,7 +222,7 @@ impl Machine for View<'_> {
         self.report.restore();
         self.links.resync.set(true);
         self.links.settings_changed.set(true);
-        self.links.storage.note(0, Setting::NUMBERS.into());
+        self.links.storage.note(0, ITEMS);
         set_outputs(&self.settings);
         Status::Ok
     }

@@ -5,14 +5,13 @@
 //! millisecond.
 
 use core::arch::asm;
-use core::cell::{Cell, RefCell};
 use core::task::Waker;
 
 use embassy_time_driver::{Driver, time_driver_impl};
-use embassy_time_queue_utils::Queue;
 
 use crate::boards::{ACTIVE, Timer};
 use crate::hal::event::Event;
+use crate::hal::timers::Timers;
 
 const _: () = assert!(matches!(ACTIVE.tick_timer, Timer::T0), "the tick is on timer 0");
 
@@ -66,19 +65,9 @@ pub fn millis() -> u32 {
     avr_device::interrupt::free(|_| unsafe { MILLIS })
 }
 
-struct Millis {
-    queue: RefCell<Queue>,
-    /// When the first timer expires, or earlier; far off if there is none.
-    next: Cell<u32>,
-}
+struct Millis(Timers);
 
-// SAFETY: the queue is touched in thread mode only.
-unsafe impl Sync for Millis {}
-
-time_driver_impl!(static DRIVER: Millis = Millis {
-    queue: RefCell::new(Queue::new()),
-    next: Cell::new(u32::MAX),
-});
+time_driver_impl!(static DRIVER: Millis = Millis(Timers::new()));
 
 impl Driver for Millis {
     fn now(&self) -> u64 {
@@ -87,24 +76,13 @@ impl Driver for Millis {
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
-        if let Ok(mut queue) = self.queue.try_borrow_mut() {
-            queue.schedule_wake(at, waker);
-            let at = u32::try_from(at).unwrap_or(u32::MAX);
-            self.next.set(self.next.get().min(at));
-        }
+        self.0.schedule(at, waker);
     }
 }
 
 /// Wakes the tasks whose time has come. Thread mode, after a tick.
 pub fn wake_expired() {
-    let now = millis();
-    if now < DRIVER.next.get() {
-        return;
-    }
-    if let Ok(mut queue) = DRIVER.queue.try_borrow_mut() {
-        let next = queue.next_expiration(now.into());
-        DRIVER.next.set(u32::try_from(next).unwrap_or(u32::MAX));
-    }
+    DRIVER.0.wake_expired(millis());
 }
 
 /// Starts the tick: CTC, clock / 64, 250 counts.

@@ -1,22 +1,19 @@
 //! embassy-time's driver over the machine's clock.
 
-use core::cell::RefCell;
 use core::task::Waker;
 
 use embassy_time_driver::{Driver, time_driver_impl};
-use embassy_time_queue_utils::Queue;
 
 use super::{flags, now};
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
+use crate::hal::timers::Timers;
 
 /// CPU cycles in a millisecond.
 pub(super) const CYCLES_PER_MS: u64 = ACTIVE.clock_hz as u64 / 1000;
 
-struct Timers(RefCell<Queue>);
-
 machine_static! {
-    fn timers() -> Timers = Timers(RefCell::new(Queue::new()));
+    fn timers() -> Timers = Timers::new();
 }
 
 struct Millis;
@@ -29,7 +26,7 @@ impl Driver for Millis {
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
-        timers().0.borrow_mut().schedule_wake(at, waker);
+        timers().schedule(at, waker);
     }
 }
 
@@ -40,7 +37,7 @@ pub fn millis() -> u32 {
 
 /// Wakes the tasks whose time has come.
 pub fn wake_expired() {
-    timers().0.borrow_mut().next_expiration(DRIVER.now());
+    timers().wake_expired(millis());
 }
 
 /// When the next millisecond is due.
