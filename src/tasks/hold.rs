@@ -215,6 +215,8 @@ fn go_on(links: &Links) {
     if links.resume.take() && links.flush.get() == Flush::None {
         pass();
         links.cycle_start.signal();
+        // It may have looked already, when the character came, and sleep again.
+        links.reporter_wake.urge();
     }
 }
 
