@@ -13,6 +13,7 @@ pub enum Status {
     /// Not now: the line is tried again. No sender gets to see it.
     Again = 2,
     Noop = 3,
+    Terminated = 5,
     EndOfFile = 8,
     BufferFull = 13,
     Initializing = 15,
@@ -76,6 +77,7 @@ pub enum Status {
     WordConflict = 185,
     Alarmed = 203,
     LimitHit = 204,
+    KillJob = 207,
     SoftLimit = 220,
     HomingAxis = 241,
     HomingSwitches = 246,

@@ -123,6 +123,10 @@ impl Machine for Fake {
         Status::Ok
     }
 
+    fn flush(&mut self) -> Status {
+        if self.state == 5 { Status::NotAccepted } else { Status::Ok }
+    }
+
     fn start_job(&mut self, number: u8) -> Status {
         if number < 20 { Status::Ok } else { Status::Error }
     }

@@ -59,6 +59,8 @@ pub trait Machine {
     fn restore(&mut self) -> Status;
     /// Ends an alarm, if there is one.
     fn clear(&mut self) -> Status;
+    /// Drops what is queued, or refuses to.
+    fn flush(&mut self) -> Status;
     /// Starts a built-in job, or ends the one that runs: 0.
     fn start_job(&mut self, number: u8) -> Status;
     /// Powers a motor, or takes its power; all of them for `None`.

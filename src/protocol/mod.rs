@@ -32,7 +32,7 @@ pub use block::{is_brief, put_brief};
 pub use help::asks_help;
 pub use json::Span;
 pub use machine::{Machine, Warning};
-pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report};
+pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report, receive_report};
 pub use request::{Next, Request};
 pub use status_text::status_text;
 pub use token::Token;

@@ -253,6 +253,14 @@ fn act<M: Machine, O>(
             let number = u8::try_from(number).map_err(|_| Status::OutOfRange)?;
             return done(c.machine.start_job(number));
         }
+        Action::Flush => {
+            let wanted = match pair.kind {
+                Kind::Null | Kind::False => false,
+                Kind::True => true,
+                _ => whole(pair, c)? != 0,
+            };
+            return if wanted { done(c.machine.flush()) } else { Ok(()) };
+        }
         Action::Energize => true,
         Action::Release => false,
         Action::Defaults | Action::Help => return Ok(()),

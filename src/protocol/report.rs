@@ -159,6 +159,15 @@ pub fn queue_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) 
     writer.end_object();
 }
 
+/// Sends what is free for lines, after a queue flush, whatever the verbosity.
+pub fn receive_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) {
+    let mut format = mode.format(machine);
+    let mut writer = Writer::body(out, &mut format);
+    writer.begin_object();
+    writer.count(text!("rx"), machine.value(Value::SlotsFree));
+    writer.end_object();
+}
+
 impl<O: Out> Writer<'_, O> {
     /// Begins a report: nothing in text, else `{"name":{`.
     fn head(&mut self, name: Text) {

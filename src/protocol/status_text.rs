@@ -10,13 +10,14 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 71;
+const ENTRIES: usize = 73;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
         (Status::Ok, text!("OK")),
         (Status::Error, text!("Error")),
         (Status::Noop, text!("Noop")),
+        (Status::Terminated, text!("Terminated")),
         (Status::EndOfFile, text!("End of file")),
         (Status::BufferFull, text!("Buffer full")),
         (Status::Initializing, text!("Initializing")),
@@ -89,6 +90,7 @@ progmem! {
         (Status::WordConflict, text!("Two codes of the line use the same word")),
         (Status::Alarmed, text!("Machine is alarmed - Command not processed")),
         (Status::LimitHit, text!("Limit switch hit - Shutdown occurred")),
+        (Status::KillJob, text!("Kill job")),
         (Status::SoftLimit, text!("Soft limit exceeded")),
         (Status::HomingAxis, text!("Homing Error - Bad or no axis specified")),
         (Status::HomingSwitches, text!("Homing Error - Homing switches misconfigured")),

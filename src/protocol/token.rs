@@ -158,13 +158,14 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [(Text, Action); 9] = [
+    static ACTIONS: [(Text, Action); 10] = [
         (text!("gc"), Action::Block),
         (text!("clear"), Action::Clear),
         (text!("clr"), Action::Clear),
         (text!("me"), Action::Energize),
         (text!("md"), Action::Release),
         (text!("test"), Action::Test),
+        (text!("qf"), Action::Flush),
         (text!("defa"), Action::Defaults),
         (text!("h"), Action::Help),
         (text!("help"), Action::Help),
@@ -185,6 +186,8 @@ pub enum Action {
     Release,
     /// `test`: run a built-in job.
     Test,
+    /// `qf`: drop what is queued.
+    Flush,
     /// `defa`: restore the defaults.
     Defaults,
     /// `h`, `help`: tell about settings.

@@ -41,6 +41,30 @@ struct Entry {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LineId(u8);
 
+/// Whether a place in a line is in a comment.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Aside {
+    /// It is not.
+    None,
+    /// In parentheses.
+    Parentheses,
+    /// Behind a semicolon.
+    Rest,
+}
+
+impl Aside {
+    /// The same behind one more byte.
+    pub fn after(self, byte: u8) -> Self {
+        match (self, byte) {
+            (_, b'\n' | b'\r') => Self::None,
+            (Self::Rest, _) | (Self::None, b';') => Self::Rest,
+            (_, b'(') => Self::Parentheses,
+            (_, b')') => Self::None,
+            (aside, _) => aside,
+        }
+    }
+}
+
 /// The pool. The buffer is last: what lies before it, AVR reaches in one instruction.
 #[repr(C)]
 pub struct LinePool {
@@ -167,6 +191,36 @@ impl LinePool {
     pub fn forget(&mut self) {
         self.partial = 0;
         self.fault = None;
+    }
+
+    /// Whether what comes next is in a comment.
+    pub fn aside(&self) -> Aside {
+        let text = self.slice(usize::from(self.end), self.partial);
+        text.iter().fold(Aside::None, |aside, byte| aside.after(*byte))
+    }
+
+    /// Whether a data line waits, or a fault.
+    pub fn has_data(&self) -> bool {
+        self.entries.len() > usize::from(self.controls)
+    }
+
+    /// Drops all data lines: they will be answered with [`Status::Terminated`].
+    #[inline(never)]
+    pub fn terminate(&mut self) {
+        for entry in &mut self.entries {
+            if entry.class == Class::Data {
+                entry.class = Class::Fault(Status::Terminated);
+            }
+        }
+    }
+
+    /// The same for the line that is coming in.
+    #[inline(never)]
+    pub fn terminate_partial(&mut self) {
+        let text = self.slice(usize::from(self.end), self.partial);
+        if !text.is_empty() && classify(text) == Class::Data {
+            self.spoil(Status::Terminated);
+        }
     }
 
     /// The next byte follows a carriage return, or does not.

@@ -24,6 +24,7 @@ use core::cell::{Cell, RefCell, UnsafeCell};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::Mutex;
 
+use super::hold::Flush;
 use super::lines::LinePool;
 use super::storage::Storage;
 use super::tx::Tx;
@@ -75,6 +76,18 @@ pub struct Links {
     pub tx: Mutex<NoopRawMutex, Tx>,
     /// The sender asks whether anybody is there: control sets it, the reporter answers.
     pub enquiry: Cell<bool>,
+    /// How far a queue flush has come.
+    pub flush: Cell<Flush>,
+    /// A tilde has come, and no exclamation mark since: where it stands, what is held goes on.
+    pub resume: Cell<bool>,
+    /// A percent sign has come in the hold.
+    pub percent: Cell<bool>,
+    /// When a percent sign came that was none, ms: an exclamation mark right after it makes it one.
+    pub percent_at: Cell<u32>,
+    /// The job has been killed: when its queue has been flushed, the program ends.
+    pub killed: Cell<bool>,
+    /// The queue has been flushed, which is to be told.
+    pub flushed: Cell<bool>,
     /// The built-in job that runs.
     pub job: Cell<Job>,
     /// What has to be put away, and where the rest is.

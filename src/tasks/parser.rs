@@ -8,6 +8,7 @@
 
 use heapless::Vec;
 
+use super::hold::Flush;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::tx::Tx;
@@ -26,7 +27,10 @@ pub async fn run(links: &'static Links) -> ! {
         if tried == Usual::Done {
             continue;
         }
-        let next = links.lines.borrow().next(data);
+        let next = match links.flush.get() {
+            Flush::None => links.lines.borrow().next(data),
+            flush => dropped(links, flush),
+        };
         let Some((id, class)) = next else {
             match free && runs_job {
                 true => job_line(links),
@@ -47,9 +51,21 @@ pub async fn run(links: &'static Links) -> ! {
     }
 }
 
-/// Whether a block can be carried out now: neither has the planner to be waited for, nor the tables.
+/// The next line during a queue flush: control lines are carried out, those of data dropped.
+#[inline(never)]
+fn dropped(links: &Links, flush: Flush) -> Option<(LineId, Class)> {
+    let next = links.lines.borrow().next(true);
+    match next {
+        Some((_, Class::Data)) if flush == Flush::Rest => None,
+        Some((id, Class::Data)) => Some((id, Class::Fault(Status::Terminated))),
+        next => next,
+    }
+}
+
+/// Whether a block can be carried out now: neither has the planner to be waited for, nor the tables, and
+/// nothing is being dropped.
 fn is_free(links: &Links) -> bool {
-    !links.commands_taken.get() && !links.storage.is_awaited()
+    !links.commands_taken.get() && !links.storage.is_awaited() && links.flush.get() == Flush::None
 }
 
 /// Carries out the next line of a built-in job. Its end, and a line that is refused, are told by an exception
@@ -174,7 +190,7 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
                 while !ran(links, id, block, request) {
                     // Nothing of the response has been put yet: others may talk meanwhile.
                     drop(tx);
-                    while !is_free(links) {
+                    while !is_free(links) && links.flush.get() == Flush::None {
                         links.parser_wake.wait().await;
                     }
                     tx = links.tx.lock().await;
@@ -188,9 +204,13 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
     }
 }
 
-/// Carries out the block of a request, if that can be done now.
+/// Carries out the block of a request, if that can be done now; or drops it in a queue flush.
 #[inline(never)]
 fn ran(links: &Links, id: LineId, block: Span, request: &mut Request) -> bool {
+    if links.flush.get() != Flush::None {
+        request.ran(Status::Terminated, false);
+        return true;
+    }
     if !is_free(links) {
         return false;
     }
@@ -217,6 +237,12 @@ fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
     let next = request.step(lines.text(id), &mut View::of(links), tx);
     tx.flush();
     next
+}
+
+/// Ends the program, as M2 does, for one that has been killed. The planner is free.
+pub fn end_program(links: &Links) {
+    // It is never refused, and changes no table.
+    let _ = interpret(links, b"M2", Usual::NotTried);
 }
 
 /// Interprets a block and hands its commands to the planner. Returns also whether it may have a

@@ -9,12 +9,13 @@
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
 
-use super::lines::LinePool;
+use super::hold::{self, Flush};
+use super::lines::{Aside, LinePool};
 use super::links::Links;
 use crate::hal::event::{Event, next};
 use crate::hal::imp::uart::{self, lost_ends};
 use crate::hal::serial::{
-    BEHIND_END, CLEAN, HIGH_WATER, LOW_WATER, MARKS, RETURNED, Received, XOFF, XON,
+    BEHIND_END, CLEAN, CUT, GO, HIGH_WATER, LOW_WATER, MARKS, RETURNED, Received, XOFF, XON,
 };
 use crate::protocol::Mode;
 use crate::status::Status;
@@ -29,6 +30,8 @@ enum Left {
     Bytes,
     /// Bytes, and no room in the pool.
     Full,
+    /// Bytes, perhaps, behind this mark: the place of a real-time character.
+    Placed(u8),
 }
 
 /// The task.
@@ -38,10 +41,15 @@ pub async fn run(links: &'static Links, received: Received) -> ! {
     loop {
         let left = intake.turn(links);
         intake.control_flow(links);
+        if links.flush.get() == Flush::Here {
+            hold::placed(links, CUT);
+        }
         match left {
+            Left::Placed(mark) => hold::placed(links, mark),
             Left::Nothing => next(Event::Received).await,
             Left::Bytes => yield_now().await,
             Left::Full => {
+                intake.look_ahead(links);
                 // The ring goes on filling.
                 select(links.pool_space.wait(), next(Event::Received)).await;
             }
@@ -84,7 +92,19 @@ impl Intake {
                 return Left::Nothing;
             };
             let is_line = match byte {
-                ..MARKS => self.loss(pool, byte, links),
+                // In a comment it is text; but nothing else is cut then.
+                CUT | GO if pool.aside() != Aside::None && links.flush.get() == Flush::None => {
+                    false
+                }
+                CUT | GO => return Left::Placed(byte),
+                ..MARKS => {
+                    let is_line = self.loss(pool, byte, links);
+                    if links.flush.get() == Flush::Input {
+                        // It may stand for the cut.
+                        return Left::Placed(CUT);
+                    }
+                    is_line
+                }
                 XON | XOFF if links.settings.borrow().has_xon_xoff() => {
                     uart::hold(byte == XOFF);
                     false
@@ -96,6 +116,23 @@ impl Intake {
             }
         }
         Left::Bytes
+    }
+
+    /// No line can be taken before the machine goes on: looks for real-time characters in the ring that have
+    /// it do so. Cost: 30 cycles a byte.
+    #[inline(never)]
+    fn look_ahead(&self, links: &Links) {
+        if !hold::is_on() && !links.stopped.get() {
+            return;
+        }
+        let mut aside = links.lines.borrow().aside();
+        for n in 0..self.received.len() {
+            let Some(byte) = self.received.peek(n, |byte| *byte) else { return };
+            if byte < MARKS && aside == Aside::None {
+                hold::ahead(links, byte);
+            }
+            aside = aside.after(byte);
+        }
     }
 
     /// Stops the sender, or lets it go on.

@@ -1,8 +1,8 @@
 //! The reporter task: the greeting, then status and queue reports, exceptions, and the answer to ENQ.
 //!
 //! Reads everything through [`View`], writes to the sender; waits for something to report, and polls
-//! every [`POLL_MS`] while the machine is busy; it is not woken besides then, unless queue reports are
-//! wanted. A change of `stat` is told at once, anything else every
+//! every [`POLL_MS`] while the machine moves; it is not woken besides then, unless queue reports are
+//! wanted. A change of `stat` or `hold` is told at once, anything else every
 //! `si` milliseconds. While the sender is slow it waits, and then reports what is so by then: it never
 //! holds up anything else.
 
@@ -11,10 +11,10 @@ use embassy_time::Timer;
 
 use super::links::Links;
 use super::tx::Tx;
-use super::view::{RUN, View, queue_free};
+use super::view::{HELD, HOLD, RUN, View, queue_free};
 use crate::hal::imp::time::millis;
 use crate::protocol::notice::{Banner, Exception};
-use crate::protocol::{Machine, Out, Report, Value, queue_report};
+use crate::protocol::{Machine, Out, Report, Value, queue_report, receive_report};
 use crate::status::Status;
 use crate::text;
 
@@ -24,6 +24,7 @@ const POLL_MS: u64 = 10;
 /// What was told last.
 struct Told {
     state: i32,
+    hold: i32,
     blocks_free: usize,
     at: u32,
 }
@@ -31,30 +32,34 @@ struct Told {
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     greet(links).await;
-    let mut told = Told { state: 0, blocks_free: queue_free(), at: millis() };
+    let mut told = Told { state: 0, hold: 0, blocks_free: queue_free(), at: millis() };
     let mut due = true;
     loop {
         if links.enquiry.take() {
             acknowledge(links).await;
         }
-        let state = View::of(links).state();
+        let (state, hold) = state_of(links);
         if let Some(status) = links.exception.take() {
             report_exception(links, status).await;
+        }
+        if links.flushed.take() {
+            report_flush(links).await;
         }
         if queue_free() != told.blocks_free && reports_queue(links) {
             told.blocks_free = report_queue(links).await;
         }
         let elapsed = millis().wrapping_sub(told.at);
         let interval = u32::from(View::of(links).settings().status_interval_ms());
-        due |= state == RUN;
-        if state != told.state || (due && elapsed >= interval) {
-            told.state = state;
+        let moves = state == RUN || state == HOLD && hold != HELD;
+        due |= moves;
+        if (state, hold) != (told.state, told.hold) || (due && elapsed >= interval) {
+            (told.state, told.hold) = (state, hold);
             told.at = millis();
             due = false;
             report_status(links).await;
         }
-        links.reporter_wake.set_polling(state == RUN && !reports_queue(links));
-        if due || state == RUN {
+        links.reporter_wake.set_polling(moves && !reports_queue(links));
+        if due || moves {
             let pause = Timer::after_ticks(POLL_MS);
             select(pause, links.reporter_wake.wait()).await;
         } else {
@@ -62,6 +67,12 @@ pub async fn run(links: &'static Links) -> ! {
             due = true;
         }
     }
+}
+
+/// `stat` and `hold`.
+fn state_of(links: &Links) -> (i32, i32) {
+    let view = View::of(links);
+    (view.state(), view.hold())
 }
 
 /// Whether the sender wants to know of each block that comes or goes.
@@ -100,6 +111,16 @@ async fn report_status(links: &Links) {
     if let Some(mut report) = report {
         send(links, &mut tx, |view, tx| report.step(view, tx)).await;
     }
+}
+
+async fn report_flush(links: &Links) {
+    let mut tx = links.tx.lock().await;
+    send(links, &mut tx, |view, tx| {
+        queue_report(links.mode.get(), view, tx);
+        receive_report(links.mode.get(), view, tx);
+        false
+    })
+    .await;
 }
 
 async fn report_exception(links: &Links, status: Status) {

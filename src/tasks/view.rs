@@ -5,6 +5,7 @@
 
 use core::cell::{OnceCell, RefMut};
 
+use super::hold;
 use super::links::{Links, snapshot};
 use super::power;
 use super::setup::moved_by;
@@ -29,6 +30,13 @@ pub const RUN: i32 = 5;
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
 const QUEUE_FREE_MIN: usize = 6;
 
+/// `stat` in a feedhold, from its first moment on.
+pub const HOLD: i32 = 6;
+/// `hold` while the machine slows down, and when it stands still.
+const SLOWING: i32 = 3;
+/// See [`SLOWING`].
+pub const HELD: i32 = 4;
+
 /// A look at the machine.
 pub struct View<'a> {
     links: &'a Links,
@@ -52,9 +60,10 @@ impl<'a> View<'a> {
         self.motion.get_or_init(snapshot)
     }
 
-    /// Whether anything is queued or runs.
-    fn busy(&self) -> bool {
-        self.motion().running
+    /// Whether anything is queued or runs, or a hold is on.
+    pub fn is_busy(&self) -> bool {
+        hold::is_on()
+            || self.motion().running
             || queue::used() > 0
             || self.links.commands_taken.get()
             || !self.links.job.get().is_none()
@@ -62,7 +71,10 @@ impl<'a> View<'a> {
 
     /// `stat`.
     pub fn state(&self) -> i32 {
-        if self.busy() && !self.links.stopped.get() {
+        if hold::is_on() {
+            return HOLD;
+        }
+        if self.is_busy() && !self.links.stopped.get() {
             return RUN;
         }
         match self.motion().program {
@@ -72,12 +84,21 @@ impl<'a> View<'a> {
         }
     }
 
+    /// `hold`.
+    pub fn hold(&self) -> i32 {
+        match hold::is_on() {
+            false => 0,
+            true if self.motion().held && !hold::is_passing() => HELD,
+            true => SLOWING,
+        }
+    }
+
     /// The machine position of an axis.
     fn position(&self, axis: usize) -> Length {
         let programmed = self.links.model.borrow().position().get(axis).copied();
         let programmed = programmed.unwrap_or(Length::ZERO);
         // Until the planner has counted anew, steps mean what they meant before a setting changed.
-        if !self.busy() || self.links.resync.get() {
+        if !self.is_busy() || self.links.resync.get() {
             return programmed;
         }
         // Of several motors on an axis the first tells; an axis that moves none is where it should be.
@@ -133,7 +154,7 @@ impl Machine for View<'_> {
 
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
         if setting.needs_rest() {
-            if self.busy() {
+            if self.is_busy() {
                 return Err(Status::NotAccepted);
             }
             self.links.resync.set(true);
@@ -154,12 +175,19 @@ impl Machine for View<'_> {
     fn value(&mut self, value: Value) -> i32 {
         match value {
             Value::State => self.state(),
-            // They differ only where there are alarms and cycles.
-            Value::Machine => self.state(),
-            Value::Cycle => i32::from(self.busy()),
+            // They differ only in a hold, and where there are alarms and cycles.
+            Value::Machine => {
+                if hold::is_on() {
+                    RUN
+                } else {
+                    self.state()
+                }
+            }
+            Value::Cycle => i32::from(self.is_busy()),
+            Value::Motion if hold::is_on() => 2,
             Value::Motion => i32::from(self.motion().running),
             // Lines that move nothing are finished when all before them are.
-            Value::FinishedLine if !self.busy() => self.modal(Value::BlockLine),
+            Value::FinishedLine if !self.is_busy() => self.modal(Value::BlockLine),
             Value::FinishedLine => self.motion().finished as i32,
             Value::MotionLine => self.motion().line as i32,
             Value::Velocity => thousandths(self.motion().velocity * 60.0),
@@ -176,7 +204,8 @@ impl Machine for View<'_> {
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
-            Value::Hold | Value::Home => 0,
+            Value::Hold => self.hold(),
+            Value::Home => 0,
             modal => self.modal(modal),
         }
     }
@@ -186,7 +215,7 @@ impl Machine for View<'_> {
     }
 
     fn restore(&mut self) -> Status {
-        if self.busy() {
+        if self.is_busy() {
             return Status::NotAccepted;
         }
         let rate = self.settings.baud();
@@ -206,9 +235,14 @@ impl Machine for View<'_> {
         Status::Ok
     }
 
+    fn flush(&mut self) -> Status {
+        let busy = self.is_busy() || self.links.lines.borrow().has_data();
+        if hold::flush_here(self.links, busy) { Status::Ok } else { Status::NotAccepted }
+    }
+
     fn start_job(&mut self, number: u8) -> Status {
         let Some(job) = Job::new(number) else { return Status::Error };
-        if !job.is_none() && self.busy() {
+        if !job.is_none() && self.is_busy() {
             return Status::NotAccepted;
         }
         self.links.job.set(job);
@@ -218,7 +252,7 @@ impl Machine for View<'_> {
 
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {
         // Without power a motor that moves would lose its position.
-        if self.busy() && !on {
+        if self.is_busy() && !on {
             return Status::NotAccepted;
         }
         let motors = motor.map_or(u8::MAX, |motor| 1 << motor);

@@ -16,7 +16,9 @@ use crate::baud;
 use crate::hal::byte::SharedByte;
 use crate::hal::event::Event;
 use crate::hal::ring::Ring;
-use crate::hal::serial::{BATCH, BEHIND_END, CLEAN, MARKS, Outgoing, RETURNED, RING, Received};
+use crate::hal::serial::{
+    BATCH, BEHIND_END, CLEAN, CUT, GO, MARKS, Outgoing, RETURNED, RING, Received,
+};
 use crate::realtime;
 
 type ByteRing = Ring<u8, RING>;
@@ -212,12 +214,25 @@ extern "C" fn __vector_25() -> ! {
             // A real-time character. What was lost before it is still to be marked.
             "16:",
             "lds  r24, {realtime}",
+            // Who says hold does not say resume any more (`realtime::with`).
+            "sbrc r30, {hold_bit}",
+            "andi r24, {not_resume}",
             "or   r24, r30",
             "sts  {realtime}, r24",
             "sbi  0x1E, {special}",
+            // Where it stands counts, of some: queue a mark.
+            "ldi  r24, {cut}",
+            "sbrc r30, {resume_bit}",
+            "ldi  r24, {go}",
+            "andi r30, {placed}",
+            "breq 24f",
+            "sbi  0x1E, {received}",
+            "rjmp 1b",
+            "24:",
             "ldi  r24, 0",
             "andi r31, 0x18",
-            "breq 3b",
+            "brne 7f",
+            "rjmp 3b",
             // Something was lost: a mark for it, if there is room.
             "7:",
             "push r26",
@@ -304,6 +319,12 @@ extern "C" fn __vector_25() -> ! {
             received = const Event::Received as u8,
             special = const Event::Realtime as u8,
             hold = const realtime::HOLD,
+            hold_bit = const realtime::HOLD.trailing_zeros(),
+            not_resume = const !realtime::RESUME,
+            placed = const realtime::PLACED,
+            cut = const CUT,
+            go = const GO,
+            resume_bit = const realtime::RESUME.trailing_zeros(),
             resume = const realtime::RESUME,
             flush = const realtime::FLUSH,
             reset = const realtime::RESET,

@@ -8,7 +8,7 @@ use super::{NEVER, flags, now};
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
-use crate::hal::serial::{BATCH, MARKS, Outgoing, RING, Received, lose, mark};
+use crate::hal::serial::{BATCH, CUT, GO, MARKS, Outgoing, RING, Received, lose, mark};
 use crate::realtime;
 
 #[derive(Default)]
@@ -163,8 +163,11 @@ fn load_tx(line: &mut Line) {
 fn arrive(line: &mut Line, byte: u8) {
     let special = realtime::bit(byte);
     if special != 0 {
-        line.realtime |= special;
+        line.realtime = realtime::with(line.realtime, special);
         flags::set(Event::Realtime);
+        if special & realtime::PLACED != 0 {
+            place(line, if special == realtime::RESUME { GO } else { CUT });
+        }
         return;
     }
     let Some(ring) = line.rx_in.as_mut() else { return };
@@ -181,6 +184,17 @@ fn arrive(line: &mut Line, byte: u8) {
     if full || byte < b' ' || line.queued.is_multiple_of(BATCH) {
         flags::set(Event::Received);
     }
+}
+
+/// Queues the mark of a real-time character: that of a loss if there is no room.
+fn place(line: &mut Line, character: u8) {
+    let Some(ring) = line.rx_in.as_mut() else { return };
+    if ring.push(character).is_err() {
+        let newest = mark(ring.pushed(0).copied().unwrap_or(0));
+        line.lost_ends = line.lost_ends.wrapping_add(queue_mark(ring, newest, character));
+    }
+    line.queued = line.queued.wrapping_add(1);
+    flags::set(Event::Received);
 }
 
 /// Puts a mark where there is room, else over the newest byte. Returns the line ends that it counts.
