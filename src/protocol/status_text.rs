@@ -10,7 +10,7 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 73;
+const ENTRIES: usize = 76;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
@@ -21,6 +21,7 @@ progmem! {
         (Status::EndOfFile, text!("End of file")),
         (Status::BufferFull, text!("Buffer full")),
         (Status::Initializing, text!("Initializing")),
+        (Status::BootLoader, text!("Entering boot loader")),
         (Status::InternalError, text!("Internal error")),
         (Status::ExceptionReport, text!("Generic exception report")),
         (Status::PersistenceError, text!("Persistence error")),
@@ -37,6 +38,8 @@ progmem! {
         (Status::OutOfRange, text!("Input value range error")),
         (Status::JsonSyntax, text!("JSON syntax error")),
         (Status::JsonTooManyPairs, text!("JSON input has too many pairs")),
+        (Status::TextNested, text!("JSON txt fields cannot be nested")),
+        (Status::JsonTooDeep, text!("JSON maximum nesting depth exceeded")),
         (Status::GcodeGeneric, text!("Generic Gcode input error")),
         (Status::GcodeUnsupported, text!("Gcode command unsupported")),
         (Status::McodeUnsupported, text!("M code unsupported")),

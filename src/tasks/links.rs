@@ -11,6 +11,7 @@
 //! | `uart` transmit ring | bytes | 255 | 260 B | parser, reporter | TX interrupt | the writer waits, response half sent |
 //! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
+//! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
 //! lines wait in the pool, and their responses wait with them. The sender has at most its lines in
@@ -65,6 +66,8 @@ pub struct Links {
     pub resync: Cell<bool>,
     /// A new rate of the line, in bits a second: the parser sets it when its response has left.
     pub rate: Cell<Option<u32>>,
+    /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.
+    pub restart: Cell<Option<bool>>,
     /// An exception to report.
     pub exception: Cell<Option<Status>>,
     /// How the sender wants to be answered.

@@ -13,9 +13,13 @@ use super::lines::{Class, LineId};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::View;
+use crate::hal::imp;
 use crate::jobs::Job;
-use crate::protocol::{Mode, Next, Request, Span, is_brief, put_brief};
+use crate::protocol::{Ending, Mode, Next, Out, Request, Span, is_brief, put_brief, put_line_end};
 use crate::status::Status;
+
+/// Bytes of an echo that are put at once.
+const ECHO: usize = 62;
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
@@ -38,10 +42,11 @@ pub async fn run(links: &'static Links) -> ! {
             }
             continue;
         };
+        let echoes = links.settings.borrow().echo();
         match begin(links, id, class, tried) {
             Begun::Answer(mut request) => {
-                if !answer_at_once(links, id, &mut request) {
-                    answer(links, id, &mut request).await;
+                if echoes || !answer_at_once(links, id, &mut request) {
+                    answer(links, id, &mut request, echoes).await;
                 }
             }
             Begun::Silent => {}
@@ -113,7 +118,7 @@ fn usual(links: &Links) -> Usual {
     let Some(line) = lines.oldest() else { return Usual::NotTried };
     let settings = links.settings.borrow();
     let numbered = is_brief(&settings, true);
-    if !tx.has_room() || !(numbered || is_brief(&settings, false)) {
+    if !tx.has_room() || settings.echo() || !(numbered || is_brief(&settings, false)) {
         return Usual::NotTried;
     }
     let mut commands = links.commands.borrow_mut();
@@ -122,7 +127,8 @@ fn usual(links: &Links) -> Usual {
     }
     links.commands_taken.set(true);
     links.planner_wake.signal();
-    put_brief(&settings, lines.free(), &mut *tx);
+    let ending = Ending { free: lines.free(), length: lines.oldest_length() };
+    put_brief(&settings, ending, &mut *tx);
     tx.flush();
     lines.remove_oldest();
     links.pool_space.signal();
@@ -158,15 +164,17 @@ enum Begun {
 #[inline(never)]
 fn begin(links: &Links, id: LineId, class: Class, tried: Usual) -> Begun {
     let lines = links.lines.borrow();
-    let line = lines.text(id);
+    let (line, length) = (lines.text(id), lines.length(id));
     let mut mode = links.mode.get();
+    let settings = links.settings.borrow();
     let mut request = match class {
-        Class::Fault(status) => Request::refused(status, mode),
-        _ => match Request::begin(line, &mut mode) {
+        Class::Fault(status) => Request::refused(status, line, length, mode, &settings),
+        _ => match Request::begin(line, length, &mut mode, &settings) {
             Some(request) => request,
             None => return Begun::Silent,
         },
     };
+    drop(settings);
     links.mode.set(mode);
     if let Some(block) = request.gcode() {
         let (status, commented) = interpret(links, block.of(line), tried);
@@ -178,9 +186,15 @@ fn begin(links: &Links, id: LineId, class: Class, tried: Usual) -> Begun {
     Begun::Answer(request)
 }
 
-/// Writes the response to a line.
-async fn answer(links: &Links, id: LineId, request: &mut Request) {
+/// Writes the response to a line, and before that the line if it `echoes`.
+async fn answer(links: &Links, id: LineId, request: &mut Request, echoes: bool) {
     let mut tx = links.tx.lock().await;
+    let mut at = 0;
+    let mut echoes = echoes;
+    while echoes {
+        tx.room().await;
+        echoes = echo(links, id, &mut at, &mut tx);
+    }
     loop {
         tx.room().await;
         match step(links, id, request, &mut tx) {
@@ -202,6 +216,31 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
     if let Some(rate) = links.rate.take() {
         tx.set_rate(rate).await;
     }
+    if let Some(boot) = links.restart.take() {
+        tx.drain().await;
+        if boot {
+            imp::boot()
+        } else {
+            imp::reset()
+        };
+    }
+}
+
+/// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so
+/// that it never stands in the midst of a response or a report, and never loses anything.
+#[inline(never)]
+fn echo(links: &Links, id: LineId, at: &mut u8, tx: &mut Tx) -> bool {
+    let lines = links.lines.borrow();
+    let rest = lines.text(id).get(usize::from(*at)..).unwrap_or(&[]);
+    let part = rest.get(..ECHO).unwrap_or(rest);
+    tx.put_all(part.iter().copied());
+    *at += part.len() as u8;
+    let more = part.len() == ECHO;
+    if !more {
+        put_line_end(&links.settings.borrow(), tx);
+    }
+    tx.flush();
+    more
 }
 
 /// Carries out the block of a request, if that can be done now; or drops it in a queue flush.

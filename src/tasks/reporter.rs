@@ -13,10 +13,11 @@ use super::links::Links;
 use super::tx::Tx;
 use super::view::{HELD, HOLD, RUN, View, queue_free};
 use crate::hal::imp::time::millis;
-use crate::protocol::notice::{Banner, Exception};
-use crate::protocol::{Machine, Out, Report, Value, queue_report, receive_report};
+use crate::protocol::notice::{Banner, Exception, Occasion, acknowledge};
+use crate::protocol::{
+    Machine, Mode, Report, Value, put_ready_prompt, queue_report, receive_report,
+};
 use crate::status::Status;
-use crate::text;
 
 /// How often a busy machine is looked at, ms.
 const POLL_MS: u64 = 10;
@@ -29,14 +30,17 @@ struct Told {
     at: u32,
 }
 
-/// The task.
-pub async fn run(links: &'static Links) -> ! {
-    greet(links).await;
+/// The task; `occasion` is what has come of the start.
+pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
+    if occasion != Occasion::Ready {
+        greet(links, occasion).await;
+    }
+    greet(links, Occasion::Ready).await;
     let mut told = Told { state: 0, hold: 0, blocks_free: queue_free(), at: millis() };
     let mut due = true;
     loop {
         if links.enquiry.take() {
-            acknowledge(links).await;
+            answer_enquiry(links).await;
         }
         let (state, hold) = state_of(links);
         if let Some(status) = links.exception.take() {
@@ -92,17 +96,27 @@ async fn send(links: &Links, tx: &mut Tx, mut step: impl FnMut(&mut View, &mut T
     }
 }
 
-async fn greet(links: &Links) {
+/// Says who the machine is; in text mode with the first prompt.
+async fn greet(links: &Links, occasion: Occasion) {
     let mut tx = links.tx.lock().await;
-    let mut banner = Banner::begin(&View::of(links));
-    send(links, &mut tx, |view, tx| banner.step(view, tx)).await;
+    let mut banner = Banner::begin(occasion, &links.settings.borrow());
+    send(links, &mut tx, |view, tx| {
+        let more = banner.step(view, tx);
+        if !more && occasion == Occasion::Ready && links.mode.get() == Mode::Text {
+            put_ready_prompt(view, tx);
+        }
+        more
+    })
+    .await;
 }
 
-async fn acknowledge(links: &Links) {
+async fn answer_enquiry(links: &Links) {
     let mut tx = links.tx.lock().await;
-    tx.room().await;
-    tx.put_text(text!("{\"ack\":true}\n"));
-    tx.flush();
+    send(links, &mut tx, |view, tx| {
+        acknowledge(view.settings(), tx);
+        false
+    })
+    .await;
 }
 
 async fn report_status(links: &Links) {
@@ -125,7 +139,7 @@ async fn report_flush(links: &Links) {
 
 async fn report_exception(links: &Links, status: Status) {
     let mut tx = links.tx.lock().await;
-    let mut exception = Exception::begin(status, &View::of(links));
+    let mut exception = Exception::begin(status, &links.settings.borrow());
     send(links, &mut tx, |view, tx| exception.step(view, tx)).await;
 }
 

@@ -13,12 +13,12 @@ use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
-use crate::hal::imp::{gpio, stepper};
+use crate::hal::imp::{gpio, stepper, uart};
 use crate::jobs::Job;
 use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
-use crate::protocol::{Machine, StatusReport, Value, Warning, thousandths};
+use crate::protocol::{Dialect, Machine, StatusReport, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
 use crate::units::Length;
@@ -195,6 +195,10 @@ impl Machine for View<'_> {
             Value::QueueAdded => self.links.queue_count.take_added(),
             Value::QueueRemoved => self.links.queue_count.take_removed(),
             Value::SlotsFree => self.links.lines.borrow().free().into(),
+            Value::Room => match Dialect::of(&self.settings) {
+                Dialect::Characters => uart::room().into(),
+                _ => self.links.lines.borrow().free().into(),
+            },
             Value::MachinePosition(axis) => self.position(axis.into()).0,
             Value::Position(axis) => {
                 let axis = axis.into();
@@ -247,6 +251,14 @@ impl Machine for View<'_> {
         }
         self.links.job.set(job);
         self.links.parser_wake.signal();
+        Status::Ok
+    }
+
+    fn restart(&mut self, boot: bool) -> Status {
+        if boot && self.is_busy() {
+            return Status::NotAccepted;
+        }
+        self.links.restart.set(Some(boot));
         Status::Ok
     }
 

@@ -5,7 +5,7 @@
 //! ```text
 //! # what follows is for people
 //! -> g1 x10 f500              a line is sent; \x05 is the byte 5
-//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this
+//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this; \x0d is a carriage return
 //! <~ {"qr":*}                 from here on such lines may come, any number of them; * is anything
 //! @ +50ms                     time passes
 //! baud 500000                 from here on the sender speaks and hears at this rate
@@ -105,7 +105,7 @@ fn parse(line: &str) -> Option<Event> {
     let (mark, rest) = line.split_once(' ').unwrap_or((line, ""));
     match mark {
         "->" => unescape(rest).map(Event::Send),
-        "<-" => Some(Event::Hear(rest.to_string())),
+        "<-" => Some(Event::Hear(rest.replace("\\x0d", "\r"))),
         "<~" => Some(Event::Allow(rest.to_string())),
         "@" => rest.strip_prefix('+')?.strip_suffix("ms")?.parse().ok().map(Event::Pass),
         "baud" => rest.parse().ok().map(Event::Baud),
@@ -211,6 +211,7 @@ impl<S: Side> Player<'_, S> {
     }
 
     fn may_come(&self, line: &str) -> bool {
+        let line = line.trim_start_matches('\r');
         let report = line.starts_with("{\"sr\":") || line.starts_with("{\"qr\":");
         report || self.allowed.iter().any(|pattern| matches(pattern, line))
     }

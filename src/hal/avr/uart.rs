@@ -59,6 +59,15 @@ pub fn set_rate(rate: u32) {
     super::peripherals().USART0.ubrr0().write(|w| w.set(baud::divisor(rate)));
 }
 
+/// Leaves the line to others, for good.
+///
+/// # Safety
+/// Interrupts are off, and stay so.
+pub unsafe fn stop() {
+    // SAFETY: the caller's.
+    unsafe { UCSR0B.write_volatile(0) };
+}
+
 /// Sends what the ring holds.
 pub fn kick() {
     // SAFETY: the register has two values after start-up, written whole.
@@ -87,6 +96,11 @@ pub fn lost_ends() -> u16 {
             return count;
         }
     }
+}
+
+/// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for.
+pub fn room() -> u8 {
+    (RING - 2).saturating_sub(RX.used()) as u8
 }
 
 /// The real-time characters since the last call, as bits (see [`realtime`]).

@@ -107,6 +107,11 @@ pub fn lost_ends() -> u16 {
     uart().line.borrow().lost_ends
 }
 
+/// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for.
+pub fn room() -> u8 {
+    (RING - 2).saturating_sub(rx().used()) as u8
+}
+
 /// The real-time characters since the last call, as bits (see [`realtime`]).
 pub fn take_realtime() -> u8 {
     core::mem::take(&mut uart().line.borrow_mut().realtime)
