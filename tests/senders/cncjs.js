@@ -85,10 +85,12 @@ async function start() {
 }
 
 /// Holds in the middle of a move: the machine says so, stands, and is where it was until it goes on.
+/// Early, for while the machine's queue is all but full it puts an acknowledgement off, and if it goes on
+/// after a pause then it takes that and the next for one: it would never come to the end.
 async function hold() {
   await until(() => {
     notRefused();
-    return server.answered > server.sender.total / 10 && server.sr.velocity > 0;
+    return server.answered > server.sender.total / 20 && server.sr.velocity > 0;
   });
   server.command('gcode:pause');
   const held = await within(5000, () => server.sr.machineState === HOLD);
