@@ -87,6 +87,44 @@ fn text_in_pieces_is_text_byte_by_byte() {
 }
 
 #[test]
+fn dropped_lines_keep_their_place_and_control_lines_are_none_of_them() {
+    let mut pool = LinePool::new();
+    feed(&mut pool, b"g1x1\n{a:n}\ng1x2\ng1x");
+    pool.terminate_partial();
+    pool.terminate();
+    feed(&mut pool, b"3\ng1x4\n{b:");
+    pool.terminate_partial();
+    feed(&mut pool, b"n}\n");
+    let dropped = Class::Fault(Status::Terminated);
+    let classes = [Class::Control, Class::Control, dropped, dropped, dropped, Class::Data];
+    for class in classes {
+        assert_eq!(take(&mut pool, true).map(|line| line.1), Some(class));
+    }
+    assert!(!pool.has_data());
+    // Between two lines there is none to drop.
+    pool.terminate_partial();
+    feed(&mut pool, b"\n");
+    assert_eq!(pool.free(), 8);
+}
+
+#[test]
+fn comments_are_known() {
+    for (text, aside) in [
+        ("g1 (x", Aside::Parentheses),
+        ("g1 (x; (", Aside::Parentheses),
+        ("g1 (x) y", Aside::None),
+        ("g1 ; (x)", Aside::Rest),
+        ("(x)\n;y\ng1", Aside::None),
+    ] {
+        let mut pool = LinePool::new();
+        feed(&mut pool, text.as_bytes());
+        assert_eq!(pool.aside(), aside, "{text}");
+        let ahead = text.bytes().fold(Aside::None, Aside::after);
+        assert_eq!(ahead, aside, "{text}");
+    }
+}
+
+#[test]
 fn a_full_pool_is_not_ready() {
     let mut pool = LinePool::new();
     feed(&mut pool, b"1\n2\n3\n4\n5\n6\n7\n8\n");
