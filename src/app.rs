@@ -16,6 +16,7 @@ use crate::hal::ring::Producer;
 use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
+use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
 use crate::store::kept;
@@ -49,6 +50,13 @@ impl Links {
             resync: Cell::new(false),
             settings_changed: Cell::new(true),
             rate: Cell::new(None),
+            restart: Cell::new(None),
+            flush: Cell::default(),
+            resume: Cell::new(false),
+            percent: Cell::new(false),
+            percent_at: Cell::new(0),
+            killed: Cell::new(false),
+            flushed: Cell::new(false),
             job: Cell::default(),
             storage,
             report: RefCell::new(StatusReport::new()),
@@ -112,7 +120,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
         _ => None,
     };
     let links = place(ports.into_array().ok()?);
-    recall(&mut links.settings.borrow_mut(), links.storage);
+    let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
     if !links.settings.borrow().starts_in_json() {
         links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
     }
@@ -121,7 +129,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received, aux).ok()?);
     main.spawn(planner_task(links, queue).ok()?);
-    main.spawn(reporter_task(links).ok()?);
+    main.spawn(reporter_task(links, occasion).ok()?);
     main.spawn(power_task(links).ok()?);
     main.spawn(parser_task(links).ok()?);
     main.spawn(control_task(links).ok()?);
@@ -129,11 +137,16 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     Some(())
 }
 
-/// The defaults, and over them what was put away before the reset.
+/// The defaults, and over them what was put away before the reset. Says also what has come of it.
 #[inline(never)]
-fn recall(settings: &mut Settings, storage: &Storage) {
+fn recall(settings: &mut Settings, storage: &Storage) -> Occasion {
+    let (log, memory) = (storage.log(), Eeprom::take());
     settings.set_defaults();
-    kept::load(&storage.log(), &Eeprom::take(), settings);
+    kept::load(&log, &memory, settings);
+    match log.is_rubbish(&memory) {
+        true => Occasion::Defaults,
+        false => Occasion::Ready,
+    }
 }
 
 /// Declares tasks: one of each on AVR; on the host each machine that is made gets its own.
@@ -163,7 +176,7 @@ tasks! {
         aux: Option<Received<AUX_RING>>
     ) = reader::run;
     fn planner_task(links: &'static Links, queue: BlockQueue) = planner::run;
-    fn reporter_task(links: &'static Links) = reporter::run;
+    fn reporter_task(links: &'static Links, occasion: Occasion) = reporter::run;
     fn control_task(links: &'static Links) = control::run;
     fn power_task(links: &'static Links) = power::run;
     fn parser_task(links: &'static Links) = parser::run;

@@ -222,6 +222,16 @@ impl Settings {
         self.system(system::EX)
     }
 
+    /// Whether the sender counts characters, not lines.
+    pub fn counts_characters(&self) -> bool {
+        self.system(system::RXM) == 0
+    }
+
+    /// Whether the machine passes for a g2core.
+    pub fn is_g2core(&self) -> bool {
+        self.system(system::DIA) != 0
+    }
+
     /// Plane at power-up and program end: 0 G17, 1 G18, 2 G19.
     pub fn default_plane(&self) -> u8 {
         self.system(system::GPL)

@@ -70,8 +70,14 @@ impl Settings {
         match setting.place() {
             Place::Small(slot) => self.small(slot).into(),
             Place::Large(slot) => self.large(slot),
-            Place::Constant => setting.default_value(),
+            Place::Constant => self.constant(setting),
         }
+    }
+
+    /// Who we are depends on whom the sender takes us for.
+    fn constant(&self, setting: Setting) -> i32 {
+        let other = if self.is_g2core() { table::G2CORE.at(setting.number().into()) } else { None };
+        other.unwrap_or_else(|| setting.default_value())
     }
 
     /// Sets a value that [`Settings::check`] returned.

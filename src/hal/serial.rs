@@ -32,6 +32,11 @@ pub const CLEAN: u8 = 2;
 /// Of a mark: that was a carriage return, which a line feed may follow.
 pub const RETURNED: u8 = 4;
 
+/// No mark of a loss (none has this bit without [`CLEAN`]): here a `%` or `^d` stood in the stream.
+pub const CUT: u8 = RETURNED;
+/// The same: here a `~` stood.
+pub const GO: u8 = RETURNED | BEHIND_END;
+
 /// The reader is woken at the end of a line, and when this many bytes have come since: a power of two.
 pub const fn batch(ring: usize) -> u8 {
     (ring / 8) as u8

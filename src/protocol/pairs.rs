@@ -1,12 +1,13 @@
-//! Names and values of a JSON line: reading, setting, doing, and telling the result.
+//! Names and values of a JSON line: walking through them, and telling what has come of each.
 
+use super::Format;
 use super::json::{self, Kind, Pair};
-use super::machine::{Machine, Warning};
+use super::machine::Machine;
+use super::notice::put_exception;
 use super::request::{Context, Phase, Request};
 use super::token::{Action, Group, Target, Token, resolve};
 use super::write::{Out, Writer};
-use crate::config::table;
-use crate::config::{Name, Number, Setting};
+use crate::config::Name;
 use crate::status::Status;
 use crate::text;
 
@@ -33,7 +34,41 @@ impl Request {
                 self.block = pair.value;
                 self.phase = Phase::Gcode;
             }
+            (Target::Action(Action::Text), Kind::Text) => {
+                if let Err(status) = self.wrap(&pair, c) {
+                    self.open(c);
+                    self.refuse_pair(&pair, target, status, c);
+                }
+            }
+            (Target::Action(Action::Message), Kind::Text) => self.give_string(&pair, c),
+            // It is told when everything else has been, so that a block may still be run.
+            (Target::Action(Action::Id), Kind::Number | Kind::Null) => self.identified = true,
+            (Target::Action(Action::Id), _) => {
+                self.status = Status::UnsupportedType;
+                self.phase = Phase::Warning;
+            }
+            (Target::Action(Action::Exception), _) if !self.begun => {
+                self.format = Format::json(c.machine.settings());
+                self.block = pair.name;
+                self.item = 0;
+                self.phase = Phase::Raise;
+            }
             _ => self.carry_out(&pair, target, c),
+        }
+    }
+
+    /// A part of an exception report that was asked for; then the response.
+    pub(super) fn raise<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let (stage, status) = (self.item, Status::ExceptionReport);
+        self.item += 1;
+        let mut writer = Writer::body(c.out, &mut self.format);
+        if !put_exception(stage, status, c.machine, &mut writer) {
+            self.open(c);
+            let mut writer = Writer::body(c.out, &mut self.format);
+            writer.key(self.block.of(c.line));
+            writer.text(text!("null"));
+            self.status = status;
+            self.phase = Phase::Warning;
         }
     }
 
@@ -69,8 +104,11 @@ impl Request {
         self.at = pair.next;
         let prefix = self.group.map_or(Name::new(), Group::prefix);
         let target = match resolve(prefix, pair.name.of(c.line)) {
-            // A group has no groups, and no G-code, in it.
-            Target::Group(_) | Target::Action(Action::Block) => Target::Unknown,
+            // A group has no groups, and no strings, in it.
+            Target::Group(_) => Target::Unknown,
+            Target::Action(Action::Block | Action::Text | Action::Message | Action::Id) => {
+                Target::Unknown
+            }
             target => target,
         };
         self.carry_out(&pair, target, c);
@@ -145,61 +183,29 @@ impl Request {
             }
             Ok(None) if self.phase == Phase::Greeting => {}
             Ok(None) => self.tell_sent(pair, true, c),
-            Err(status) => {
-                self.status = status;
-                self.tell_sent(pair, target != Target::Unknown, c);
-                self.leave(c);
-            }
+            Err(status) => self.refuse_pair(pair, target, status, c),
         }
     }
 
-    pub(super) fn apply<M: Machine, O: Out>(
+    fn refuse_pair<M: Machine, O: Out>(
         &mut self,
         pair: &Pair,
         target: Target,
+        status: Status,
         c: &mut Context<'_, M, O>,
-    ) -> Outcome {
-        match (target, pair.kind) {
-            (Target::Unknown, _) => Err(Status::UnrecognizedName),
-            (_, Kind::Object) | (Target::Group(_), _) => Err(Status::UnsupportedType),
-            (Target::Token(token), Kind::Null) => Ok(Some(token)),
-            (Target::Token(token), _) => {
-                self.set(token.setting().ok_or(Status::ReadOnly)?, pair, c)?;
-                Ok(Some(token))
-            }
-            (Target::Action(Action::Help), _) => self.advise(Warning::Help),
-            (Target::Action(Action::Defaults), _) => self.restore(pair, c),
-            (Target::Action(action), _) => act(action, pair, c).map(|()| None),
-        }
-    }
-
-    fn set<M: Machine, O: Out>(
-        &mut self,
-        setting: Setting,
-        pair: &Pair,
-        c: &mut Context<'_, M, O>,
-    ) -> Result<(), Status> {
-        let small = match setting.row().kind {
-            table::Kind::Small => true,
-            table::Kind::Large => false,
-            table::Kind::Constant | table::Kind::Text => return Err(Status::ReadOnly),
-        };
-        let number = match pair.kind {
-            Kind::Number => Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?,
-            Kind::True | Kind::False if small => Number::int((pair.kind == Kind::True).into()),
-            _ => return Err(Status::UnsupportedType),
-        };
-        let inches = c.machine.inches();
-        let value = c.machine.settings().check(setting, number, inches)?;
-        let warning = c.machine.set(setting, value)?;
-        let unusual = setting.is_microsteps() && !matches!(value, 1 | 2 | 4 | 8);
-        let unusual = if unusual { Warning::Microsteps } else { Warning::None };
-        self.warning = self.warning.max(warning).max(unusual);
-        Ok(())
+    ) {
+        self.status = status;
+        self.tell_sent(pair, target != Target::Unknown, c);
+        self.leave(c);
     }
 
     /// Tells a pair as it was sent; null if its name means nothing, or for a string.
-    fn tell_sent<M, O: Out>(&mut self, pair: &Pair, known: bool, c: &mut Context<'_, M, O>) {
+    pub(super) fn tell_sent<M, O: Out>(
+        &mut self,
+        pair: &Pair,
+        known: bool,
+        c: &mut Context<'_, M, O>,
+    ) {
         let mut writer = Writer::body(c.out, &mut self.format);
         writer.key(pair.name.of(c.line));
         match pair.kind {
@@ -219,51 +225,4 @@ fn plain_number(mut text: &[u8]) -> &[u8] {
         text = rest;
     }
     text
-}
-
-fn done(status: Status) -> Result<(), Status> {
-    if status == Status::Ok { Ok(()) } else { Err(status) }
-}
-
-/// The value of a pair as a whole number.
-fn whole<M, O>(pair: &Pair, c: &Context<'_, M, O>) -> Result<i32, Status> {
-    if pair.kind != Kind::Number {
-        return Err(Status::UnsupportedType);
-    }
-    Number::parse(pair.value.of(c.line))
-        .filter(|number| number.is_integer())
-        .and_then(|number| number.fixed(0, false))
-        .ok_or(Status::BadNumber)
-}
-
-fn act<M: Machine, O>(
-    action: Action,
-    pair: &Pair,
-    c: &mut Context<'_, M, O>,
-) -> Result<(), Status> {
-    let on = match action {
-        // A block is run only where nothing of the response is out yet.
-        Action::Block if pair.kind == Kind::Null => return Ok(()),
-        Action::Block if pair.kind == Kind::Text => return Err(Status::NotAccepted),
-        Action::Block => return Err(Status::UnsupportedType),
-        Action::Clear => return done(c.machine.clear()),
-        Action::Test if pair.kind == Kind::Null => return Ok(()),
-        Action::Test => {
-            let number = whole(pair, c)?;
-            let number = u8::try_from(number).map_err(|_| Status::OutOfRange)?;
-            return done(c.machine.start_job(number));
-        }
-        Action::Energize => true,
-        Action::Release => false,
-        Action::Defaults | Action::Help => return Ok(()),
-    };
-    let motor = match pair.kind {
-        Kind::Null | Kind::True => 0,
-        _ => whole(pair, c)?,
-    };
-    match motor {
-        0 => done(c.machine.energize(None, on)),
-        1..=4 => done(c.machine.energize(Some(motor as u8 - 1), on)),
-        _ => Err(Status::OutOfRange),
-    }
 }

@@ -158,16 +158,23 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [(Text, Action); 9] = [
+    static ACTIONS: [(Text, Action); 16] = [
         (text!("gc"), Action::Block),
         (text!("clear"), Action::Clear),
         (text!("clr"), Action::Clear),
         (text!("me"), Action::Energize),
         (text!("md"), Action::Release),
         (text!("test"), Action::Test),
+        (text!("qf"), Action::Flush),
         (text!("defa"), Action::Defaults),
         (text!("h"), Action::Help),
         (text!("help"), Action::Help),
+        (text!("txt"), Action::Text),
+        (text!("tid"), Action::Id),
+        (text!("msg"), Action::Message),
+        (text!("er"), Action::Exception),
+        (text!("boot"), Action::Boot),
+        (text!("reset"), Action::Reset),
     ];
 }
 
@@ -185,10 +192,24 @@ pub enum Action {
     Release,
     /// `test`: run a built-in job.
     Test,
+    /// `qf`: drop what is queued.
+    Flush,
     /// `defa`: restore the defaults.
     Defaults,
     /// `h`, `help`: tell about settings.
     Help,
+    /// `txt`: do what a line of text mode says.
+    Text,
+    /// `tid`: nothing; it comes back.
+    Id,
+    /// `msg`: nothing; it comes back.
+    Message,
+    /// `er`: send an exception report.
+    Exception,
+    /// `boot`: start the boot loader.
+    Boot,
+    /// `reset`: start anew.
+    Reset,
 }
 
 /// Names that stand for several.
@@ -246,6 +267,17 @@ impl Group {
     }
 }
 
+/// Every name that means something at the top of a request, for tests and documents: settings and values by their
+/// full names, and actions.
+#[cfg(not(target_arch = "avr"))]
+pub fn names() -> std::vec::Vec<std::string::String> {
+    let text = |bytes: &[u8]| std::string::String::from_utf8_lossy(bytes).into_owned();
+    let tokens =
+        (0..=u8::MAX).map(Token).filter(|token| Token::find(&token.name()) == Some(*token));
+    let actions = ACTIONS.get().map(|(name, _)| name.bytes().map(char::from).collect());
+    tokens.map(|token| text(token.name().bytes())).chain(actions).collect()
+}
+
 /// What a name in a request means.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Target {
@@ -273,54 +305,4 @@ pub fn resolve(prefix: Name, name: &[u8]) -> Target {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::string::{String, ToString};
-    use std::vec::Vec;
-
-    fn name(text: &str) -> Name {
-        Name::new().with(text.as_bytes()).unwrap()
-    }
-
-    fn text(token: Token) -> String {
-        String::from_utf8(token.name().bytes().to_vec()).unwrap()
-    }
-
-    #[test]
-    fn every_token_has_a_name_that_finds_it() {
-        let mut count = 0;
-        for number in 0..=u8::MAX {
-            let token = Token(number);
-            if token.subject().is_none() || (number >= FIRST_VECTOR + 34) {
-                continue;
-            }
-            assert_eq!(Token::find(&token.name()), Some(token), "{}", text(token));
-            count += 1;
-        }
-        assert_eq!(count, 31 + 28 + 3 * 15 + 16 + 2 * 9 + 28 + 34);
-        for bad in ["posd", "pwr5", "pwr0", "pos", "homd", "pwra", "velo", ""] {
-            assert_eq!(Token::find(&name(bad)), None, "{bad}");
-        }
-    }
-
-    #[test]
-    fn the_default_report_is_as_documented() {
-        let names: Vec<String> = DEFAULT_TOKENS.get().into_iter().map(text).collect();
-        assert_eq!(names.join(" "), "posx posy posz posa feed vel unit coor dist frmo stat");
-    }
-
-    #[test]
-    fn names_mean_what_they_should() {
-        let resolved = |text: &str| resolve(Name::new(), text.as_bytes());
-        assert_eq!(resolved("x"), Target::Group(Group::Settings(Owner::Axis(0))));
-        assert_eq!(resolved("N"), Target::Token(Token::single(0)));
-        assert_eq!(resolved("4"), Target::Group(Group::Settings(Owner::Motor(3))));
-        assert_eq!(resolved("pwr"), Target::Group(Group::Vector(5)));
-        assert_eq!(resolved("CLEAR"), Target::Action(Action::Clear));
-        assert_eq!(resolved("sr"), Target::Group(Group::Report));
-        assert_eq!(resolved("toolong"), Target::Unknown);
-        assert_eq!(resolved("5"), Target::Unknown);
-        assert_eq!(resolve(name("x"), b"vm"), resolved("xvm"));
-        assert_eq!(resolve(name("x"), "".to_string().as_bytes()), resolved("x"));
-    }
-}
+mod tests;

@@ -74,11 +74,11 @@ mod tests {
             assert_eq!(keys.insert(item.key(), item), None, "{item:?}");
             assert_ne!(item.key(), NO_KEY, "{item:?}");
         }
-        assert_eq!(keys.len(), 132);
+        assert_eq!(keys.len(), 134);
         for key in tables::tests::keys() {
             assert_eq!(keys.insert(key, Item(Setting::from_number(0).unwrap())), None);
             assert_ne!(key, NO_KEY);
         }
-        assert_eq!(keys.len(), 132 + usize::from(ROWS) * AXES);
+        assert_eq!(keys.len(), 134 + usize::from(ROWS) * AXES);
     }
 }

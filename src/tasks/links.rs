@@ -11,6 +11,7 @@
 //! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | the writer waits, response half sent |
 //! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
+//! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
 //! lines wait in the pool, and their responses wait with them. The sender has at most its lines in
@@ -21,6 +22,7 @@
 
 use core::cell::{Cell, RefCell, UnsafeCell};
 
+use super::hold::Flush;
 use super::ports::Port;
 use super::storage::Storage;
 use super::wake::{News, Wake};
@@ -64,6 +66,20 @@ pub struct Links {
     pub rate: Cell<Option<u32>>,
     /// What status reports hold.
     pub report: RefCell<StatusReport>,
+    /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.
+    pub restart: Cell<Option<bool>>,
+    /// How far a queue flush has come.
+    pub flush: Cell<Flush>,
+    /// A tilde has come, and no exclamation mark since: where it stands, what is held goes on.
+    pub resume: Cell<bool>,
+    /// A percent sign has come in the hold.
+    pub percent: Cell<bool>,
+    /// When a percent sign came that was none, ms: an exclamation mark right after it makes it one.
+    pub percent_at: Cell<u32>,
+    /// The job has been killed: when its queue has been flushed, the program ends.
+    pub killed: Cell<bool>,
+    /// The queue has been flushed, which is to be told.
+    pub flushed: Cell<bool>,
     /// The built-in job that runs.
     pub job: Cell<Job>,
     /// What has to be put away, and where the rest is.

@@ -3,6 +3,7 @@
 
 pub mod control;
 pub mod exec;
+pub mod hold;
 pub mod lines;
 pub mod links;
 pub mod parser;

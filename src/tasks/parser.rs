@@ -8,15 +8,20 @@
 
 use heapless::Vec;
 
+use super::hold::Flush;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::ports::{Chosen, Port};
 use super::tx::Tx;
 use super::view::View;
+use crate::hal::imp;
 use crate::hal::serial::USB;
 use crate::jobs::Job;
-use crate::protocol::{Mode, Next, Request, Span, is_brief, put_brief};
+use crate::protocol::{Ending, Mode, Next, Out, Request, Span, is_brief, put_brief, put_line_end};
 use crate::status::Status;
+
+/// Bytes of an echo that are put at once.
+const ECHO: usize = 62;
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
@@ -28,17 +33,22 @@ pub async fn run(links: &'static Links) -> ! {
         if tried == Usual::Done {
             continue;
         }
-        let Some(Chosen { port, id, class }) = links.next_line(data) else {
+        let next = match links.flush.get() {
+            Flush::None => links.next_line(data),
+            flush => dropped(links, flush),
+        };
+        let Some(Chosen { port, id, class }) = next else {
             match free && runs_job {
                 true => job_line(links),
                 false => links.parser_wake.wait().await,
             }
             continue;
         };
+        let echoes = links.settings.borrow().echo();
         match begin(links, port, id, class, tried) {
             Begun::Answer(mut request) => {
-                if !answer_at_once(links, port, id, &mut request) {
-                    answer(links, port, id, &mut request).await;
+                if echoes || !answer_at_once(links, port, id, &mut request) {
+                    answer(links, port, id, &mut request, echoes).await;
                 }
             }
             Begun::Silent => {}
@@ -48,9 +58,23 @@ pub async fn run(links: &'static Links) -> ! {
     }
 }
 
-/// Whether a block can be carried out now: neither has the planner to be waited for, nor the tables.
+/// The next line during a queue flush: control lines are carried out, those of data dropped.
+#[inline(never)]
+fn dropped(links: &Links, flush: Flush) -> Option<Chosen<'_>> {
+    links.ports.iter().find_map(|port| {
+        let (id, class) = port.lines.borrow().next(true)?;
+        match class {
+            Class::Data if flush == Flush::Rest => None,
+            Class::Data => Some(Chosen { port, id, class: Class::Fault(Status::Terminated) }),
+            class => Some(Chosen { port, id, class }),
+        }
+    })
+}
+
+/// Whether a block can be carried out now: neither has the planner to be waited for, nor the tables, and
+/// nothing is being dropped.
 fn is_free(links: &Links) -> bool {
-    !links.commands_taken.get() && !links.storage.is_awaited()
+    !links.commands_taken.get() && !links.storage.is_awaited() && links.flush.get() == Flush::None
 }
 
 /// Carries out the next line of a built-in job. Its end, and a line that is refused, are told by an exception
@@ -98,7 +122,7 @@ fn usual(links: &Links) -> Usual {
     let Some(line) = lines.oldest() else { return Usual::NotTried };
     let settings = links.settings.borrow();
     let numbered = is_brief(&settings, true);
-    if !tx.has_room() || !(numbered || is_brief(&settings, false)) {
+    if !tx.has_room() || settings.echo() || !(numbered || is_brief(&settings, false)) {
         return Usual::NotTried;
     }
     let mut commands = links.commands.borrow_mut();
@@ -107,7 +131,8 @@ fn usual(links: &Links) -> Usual {
     }
     links.commands_taken.set(true);
     links.planner_wake.signal();
-    put_brief(&settings, lines.free(), &mut *tx);
+    let ending = Ending { free: lines.free(), length: lines.oldest_length() };
+    put_brief(&settings, ending, &mut *tx);
     tx.flush();
     lines.remove_oldest();
     links.pool_space.signal();
@@ -143,15 +168,17 @@ enum Begun {
 #[inline(never)]
 fn begin(links: &Links, port: &Port, id: LineId, class: Class, tried: Usual) -> Begun {
     let lines = port.lines.borrow();
-    let line = lines.text(id);
+    let (line, length) = (lines.text(id), lines.length(id));
     let mut mode = port.mode.get();
+    let settings = links.settings.borrow();
     let mut request = match class {
-        Class::Fault(status) => Request::refused(status, mode),
-        _ => match Request::begin(line, &mut mode) {
+        Class::Fault(status) => Request::refused(status, line, length, mode, &settings),
+        _ => match Request::begin(line, length, &mut mode, &settings) {
             Some(request) => request,
             None => return Begun::Silent,
         },
     };
+    drop(settings);
     port.mode.set(mode);
     if let Some(block) = request.gcode() {
         let (status, commented) = run_block(links, port, block.of(line), tried);
@@ -163,9 +190,15 @@ fn begin(links: &Links, port: &Port, id: LineId, class: Class, tried: Usual) -> 
     Begun::Answer(request)
 }
 
-/// Writes the response to a line.
-async fn answer(links: &Links, port: &Port, id: LineId, request: &mut Request) {
+/// Writes the response to a line, and before that the line if it `echoes`.
+async fn answer(links: &Links, port: &Port, id: LineId, request: &mut Request, echoes: bool) {
     let mut tx = port.tx.lock().await;
+    let mut at = 0;
+    let mut echoes = echoes;
+    while echoes {
+        tx.room().await;
+        echoes = echo(links, port, id, &mut at, &mut tx);
+    }
     loop {
         tx.room().await;
         match step(links, port, id, request, &mut tx) {
@@ -175,7 +208,7 @@ async fn answer(links: &Links, port: &Port, id: LineId, request: &mut Request) {
                 while !ran(links, port, id, block, request) {
                     // Nothing of the response has been put yet: others may talk meanwhile.
                     drop(tx);
-                    while !is_free(links) {
+                    while !is_free(links) && links.flush.get() == Flush::None {
                         links.parser_wake.wait().await;
                     }
                     tx = port.tx.lock().await;
@@ -184,15 +217,44 @@ async fn answer(links: &Links, port: &Port, id: LineId, request: &mut Request) {
             Next::Done(_) => break,
         }
     }
+    if let Some(boot) = links.restart.take() {
+        tx.drain().await;
+        if boot {
+            imp::boot()
+        } else {
+            imp::reset()
+        };
+    }
     drop(tx);
     if let Some(rate) = links.rate.take() {
         links.port(USB).tx.lock().await.set_rate(rate).await;
     }
 }
 
-/// Carries out the block of a request, if that can be done now.
+/// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so
+/// that it never stands in the midst of a response or a report, and never loses anything.
+#[inline(never)]
+fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> bool {
+    let lines = port.lines.borrow();
+    let rest = lines.text(id).get(usize::from(*at)..).unwrap_or(&[]);
+    let part = rest.get(..ECHO).unwrap_or(rest);
+    tx.put_all(part.iter().copied());
+    *at += part.len() as u8;
+    let more = part.len() == ECHO;
+    if !more {
+        put_line_end(&links.settings.borrow(), tx);
+    }
+    tx.flush();
+    more
+}
+
+/// Carries out the block of a request, if that can be done now; or drops it in a queue flush.
 #[inline(never)]
 fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Request) -> bool {
+    if links.flush.get() != Flush::None {
+        request.ran(Status::Terminated, false);
+        return true;
+    }
     if links.may_feed(port) && !is_free(links) {
         return false;
     }
@@ -228,6 +290,12 @@ fn run_block(links: &Links, port: &Port, block: &[u8], tried: Usual) -> (Status,
         true => interpret(links, block, tried),
         false => (Status::Muted, true),
     }
+}
+
+/// Ends the program, as M2 does, for one that has been killed. The planner is free.
+pub fn end_program(links: &Links) {
+    // It is never refused, and changes no table.
+    let _ = interpret(links, b"M2", Usual::NotTried);
 }
 
 /// Interprets a block and hands its commands to the planner. Returns also whether it may have a

@@ -97,6 +97,11 @@ impl Links {
         })
     }
 
+    /// Whether lines of G-code wait, on any port.
+    pub fn has_data(&self) -> bool {
+        self.ports.iter().any(|port| port.lines.borrow().has_data())
+    }
+
     /// Whether G-code of this port is taken. It feeds the machine from now on, if that is at rest.
     pub fn may_feed(&self, port: &Port) -> bool {
         if port.number == self.feeder.get() {

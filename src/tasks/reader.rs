@@ -9,14 +9,15 @@
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
 
-use super::lines::LinePool;
+use super::hold::{self, Flush};
+use super::lines::{Aside, LinePool};
 use super::links::Links;
 use super::ports::Port;
 use crate::hal::event::{Event, next};
 use crate::hal::imp::uart::{self, lost_ends};
 use crate::hal::serial::{
-    AUX, AUX_RING, BEHIND_END, CLEAN, Flow, MARKS, RETURNED, RX_RING, Received, USB, XOFF, XON,
-    high_water, is_shared, low_water,
+    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, RETURNED, RX_RING, Received, USB, XOFF,
+    XON, high_water, is_shared, low_water,
 };
 use crate::protocol::Mode;
 use crate::status::Status;
@@ -31,6 +32,8 @@ enum Left {
     /// Bytes, and no room in the pool.
     Full,
     Bytes,
+    /// Bytes, perhaps, behind this mark: the place of a real-time character.
+    Placed(u8),
 }
 
 /// The task.
@@ -47,9 +50,12 @@ pub async fn run(
             Some(aux) if !aux.is_idle() => aux.take(links),
             _ => Left::Nothing,
         };
+        if links.flush.get() == Flush::Here {
+            hold::placed(links, links.port(USB), CUT);
+        }
         match left.max(aux_left) {
             Left::Nothing => next(Event::Received).await,
-            Left::Bytes => yield_now().await,
+            Left::Bytes | Left::Placed(_) => yield_now().await,
             Left::Full => {
                 // The ring goes on filling.
                 select(links.pool_space.wait(), next(Event::Received)).await;
@@ -86,10 +92,15 @@ impl<const N: usize> Intake<N> {
         self.received.is_empty() && self.refused == 0 && self.stopped == Flow::None
     }
 
-    /// Takes a turn's bytes, and stops the sender or lets it go on.
+    /// Takes a turn's bytes, stops the sender or lets it go on, and sees to real-time characters where they stand.
     fn take(&mut self, links: &Links) -> Left {
         let left = self.turn(links);
         self.control_flow(links);
+        match left {
+            Left::Placed(mark) => hold::placed(links, self.port, mark),
+            Left::Full => self.look_ahead(links),
+            _ => {}
+        }
         left
     }
 
@@ -115,7 +126,19 @@ impl<const N: usize> Intake<N> {
                 return Left::Nothing;
             };
             let is_line = match byte {
-                ..MARKS => self.loss(pool, byte, links),
+                // In a comment it is text; but nothing else is cut then.
+                CUT | GO if pool.aside() != Aside::None && links.flush.get() == Flush::None => {
+                    false
+                }
+                CUT | GO => return Left::Placed(byte),
+                ..MARKS => {
+                    let is_line = self.loss(pool, byte, links);
+                    if links.flush.get() == Flush::Input {
+                        // It may stand for the cut.
+                        return Left::Placed(CUT);
+                    }
+                    is_line
+                }
                 XON | XOFF if self.flow(links) == Flow::Characters => {
                     uart::hold(self.port.number, byte == XOFF);
                     false
@@ -127,6 +150,23 @@ impl<const N: usize> Intake<N> {
             }
         }
         Left::Bytes
+    }
+
+    /// No line can be taken before the machine goes on: looks for real-time characters in the ring that have
+    /// it do so. Cost: 30 cycles a byte.
+    #[inline(never)]
+    fn look_ahead(&self, links: &Links) {
+        if !hold::is_on() && !links.stopped.get() {
+            return;
+        }
+        let mut aside = self.port.lines.borrow().aside();
+        for n in 0..self.received.len() {
+            let Some(byte) = self.received.peek(n, |byte| *byte) else { return };
+            if byte < MARKS && aside == Aside::None {
+                hold::ahead(links, byte);
+            }
+            aside = aside.after(byte);
+        }
     }
 
     /// Stops the sender, or lets it go on.

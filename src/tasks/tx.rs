@@ -9,6 +9,7 @@ use crate::hal::event::wait_transmitted;
 use crate::hal::imp::uart;
 use crate::hal::serial::{Outgoing, TX_RING};
 use crate::progmem::Text;
+use crate::protocol::Checksum;
 
 /// Most bytes written between two calls of [`Tx::room`].
 pub const PIECE: usize = 64;
@@ -21,12 +22,14 @@ pub struct Tx {
     port: u8,
     /// Bits a second.
     rate: u32,
+    /// Of the response under way, if it ends with one.
+    sum: Option<Checksum>,
 }
 
 impl Tx {
     /// Takes over the ring of a port whose line runs at `rate` bits a second.
     pub fn new(ring: Outgoing, port: u8, rate: u32) -> Self {
-        Self { ring, port, rate }
+        Self { ring, port, rate, sum: None }
     }
 
     /// Waits until a piece fits.
@@ -47,17 +50,36 @@ impl Tx {
     /// Goes on at `rate` bits a second, when what has been put has left at the old rate: 1 to 4 ms after
     /// its last byte. What the sender says meanwhile may be spoilt.
     pub async fn set_rate(&mut self, rate: u32) {
+        self.drain().await;
+        uart::set_rate(self.port, rate);
+        self.rate = rate;
+    }
+
+    /// Waits until what has been put has left: 1 to 4 ms after its last byte.
+    pub async fn drain(&mut self) {
         wait_transmitted(self.port, || (self.ring.free() == TX_RING - 1).then_some(())).await;
         // The transmitter holds two bytes more. It has a flag for their end, but the flag may be left
         // from a pause in the middle of the line; their time is certain.
         Timer::after_ticks(u64::from(TWO_BYTES_MS / self.rate) + 2).await;
-        uart::set_rate(self.port, rate);
-        self.rate = rate;
+    }
+
+    /// The response under way ends with a checksum: it takes bytes one by one.
+    #[inline(never)]
+    fn put_summed(&mut self, bytes: impl Iterator<Item = u8>) {
+        for byte in bytes {
+            if let Some(sum) = &mut self.sum {
+                sum.add(byte);
+            }
+            let _ = self.ring.push(byte);
+        }
     }
 }
 
 impl crate::protocol::Out for Tx {
     fn put(&mut self, byte: u8) {
+        if self.sum.is_some() {
+            return self.put_summed(core::iter::once(byte));
+        }
         // Room was made by `room`; a byte beyond it is a defect that tests of `protocol` exclude.
         let _ = self.ring.push(byte);
     }
@@ -65,6 +87,9 @@ impl crate::protocol::Out for Tx {
     // By itself, for it is called in many places.
     #[inline(never)]
     fn put_text(&mut self, text: Text) {
+        if self.sum.is_some() {
+            return self.put_summed(text.bytes());
+        }
         let mut left = text;
         // The ring's end may come in between; there is room beyond it.
         for _ in 0..2 {
@@ -79,6 +104,17 @@ impl crate::protocol::Out for Tx {
     }
 
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
+        if self.sum.is_some() {
+            return self.put_summed(bytes);
+        }
         self.ring.push_all(bytes);
+    }
+
+    fn begin_sum(&mut self) {
+        self.sum = Some(Checksum::default());
+    }
+
+    fn take_sum(&mut self) -> u16 {
+        self.sum.take().unwrap_or_default().value()
     }
 }

@@ -5,6 +5,7 @@
 
 use core::cell::{OnceCell, RefMut};
 
+use super::hold;
 use super::links::{Links, snapshot};
 use super::ports::Port;
 use super::power;
@@ -19,7 +20,7 @@ use crate::jobs::Job;
 use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
-use crate::protocol::{Machine, StatusReport, Value, Warning, thousandths};
+use crate::protocol::{Dialect, Machine, StatusReport, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
 use crate::units::Length;
@@ -30,6 +31,13 @@ pub const RUN: i32 = 5;
 /// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
 const QUEUE_FREE_MIN: usize = 6;
+
+/// `stat` in a feedhold, from its first moment on.
+pub const HOLD: i32 = 6;
+/// `hold` while the machine slows down, and when it stands still.
+const SLOWING: i32 = 3;
+/// See [`SLOWING`].
+pub const HELD: i32 = 4;
 
 /// A look at the machine.
 pub struct View<'a> {
@@ -56,9 +64,10 @@ impl<'a> View<'a> {
         self.motion.get_or_init(snapshot)
     }
 
-    /// Whether anything is queued or runs.
+    /// Whether anything is queued or runs, or a hold is on.
     pub fn is_busy(&self) -> bool {
-        self.motion().running
+        hold::is_on()
+            || self.motion().running
             || queue::used() > 0
             || self.links.commands_taken.get()
             || !self.links.job.get().is_none()
@@ -66,6 +75,9 @@ impl<'a> View<'a> {
 
     /// `stat`.
     pub fn state(&self) -> i32 {
+        if hold::is_on() {
+            return HOLD;
+        }
         if self.is_busy() && !self.links.stopped.get() {
             return RUN;
         }
@@ -73,6 +85,15 @@ impl<'a> View<'a> {
             Program::Ready => 1,
             Program::Stopped => 3,
             Program::Ended => 4,
+        }
+    }
+
+    /// `hold`.
+    pub fn hold(&self) -> i32 {
+        match hold::is_on() {
+            false => 0,
+            true if self.motion().held && !hold::is_passing() => HELD,
+            true => SLOWING,
         }
     }
 
@@ -158,9 +179,16 @@ impl Machine for View<'_> {
     fn value(&mut self, value: Value) -> i32 {
         match value {
             Value::State => self.state(),
-            // They differ only where there are alarms and cycles.
-            Value::Machine => self.state(),
+            // They differ only in a hold, and where there are alarms and cycles.
+            Value::Machine => {
+                if hold::is_on() {
+                    RUN
+                } else {
+                    self.state()
+                }
+            }
             Value::Cycle => i32::from(self.is_busy()),
+            Value::Motion if hold::is_on() => 2,
             Value::Motion => i32::from(self.motion().running),
             // Lines that move nothing are finished when all before them are.
             Value::FinishedLine if !self.is_busy() => self.modal(Value::BlockLine),
@@ -171,6 +199,10 @@ impl Machine for View<'_> {
             Value::QueueAdded => self.links.queue_count.take_added(),
             Value::QueueRemoved => self.links.queue_count.take_removed(),
             Value::SlotsFree => self.port.lines.borrow().free().into(),
+            Value::Room => match Dialect::of(&self.settings) {
+                Dialect::Characters => uart::room(self.port.number).into(),
+                _ => self.port.lines.borrow().free().into(),
+            },
             Value::MachinePosition(axis) => self.position(axis.into()).0,
             Value::Position(axis) => {
                 let axis = axis.into();
@@ -180,7 +212,8 @@ impl Machine for View<'_> {
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
-            Value::Hold | Value::Home => 0,
+            Value::Hold => self.hold(),
+            Value::Home => 0,
             modal => self.modal(modal),
         }
     }
@@ -210,6 +243,11 @@ impl Machine for View<'_> {
         Status::Ok
     }
 
+    fn flush(&mut self) -> Status {
+        let busy = self.is_busy() || self.links.has_data();
+        if hold::flush_here(self.links, busy) { Status::Ok } else { Status::NotAccepted }
+    }
+
     fn start_job(&mut self, number: u8) -> Status {
         let Some(job) = Job::new(number) else { return Status::Error };
         if !job.is_none() && self.is_busy() {
@@ -217,6 +255,14 @@ impl Machine for View<'_> {
         }
         self.links.job.set(job);
         self.links.parser_wake.signal();
+        Status::Ok
+    }
+
+    fn restart(&mut self, boot: bool) -> Status {
+        if boot && self.is_busy() {
+            return Status::NotAccepted;
+        }
+        self.links.restart.set(Some(boot));
         Status::Ok
     }
 

@@ -5,7 +5,7 @@
 //! ```text
 //! # what follows is for people
 //! -> g1 x10 f500              a line is sent; \x05 is the byte 5
-//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this
+//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this; \x0d is a carriage return
 //! <~ {"qr":*}                 from here on such lines may come, any number of them; * is anything
 //! @ +50ms                     time passes
 //! baud 500000                 from here on the sender speaks and hears at this rate
@@ -118,7 +118,7 @@ fn parse(line: &str) -> Option<Event> {
         "->" => unescape(rest).map(Event::Send),
         "2->" => unescape(rest).map(Event::SendAux),
         "2cts" => rest.parse().ok().map(|level: u8| Event::AuxCts(level != 0)),
-        "<-" => Some(Event::Hear(rest.to_string())),
+        "<-" => Some(Event::Hear(rest.replace("\\x0d", "\r"))),
         "2<-" => Some(Event::HearAux(rest.to_string())),
         "<~" => Some(Event::Allow(rest.to_string())),
         "@" => rest.strip_prefix('+')?.strip_suffix("ms")?.parse().ok().map(Event::Pass),
@@ -248,6 +248,7 @@ impl<S: Side> Player<'_, S> {
     }
 
     fn may_come(&self, port: usize, line: &str) -> bool {
+        let line = line.trim_start_matches('\r');
         if port == 1 && matches(GREETING, line) {
             return true;
         }

@@ -253,6 +253,27 @@ pub fn lost_ends(port: u8) -> u16 {
     }
 }
 
+/// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for.
+pub fn room(port: u8) -> u8 {
+    let (size, used) = if PORTS > 1 && port == AUX {
+        (AUX_RING, AUX_SHARED.rx.used())
+    } else {
+        (RX_RING, USB_SHARED.rx.used())
+    };
+    (size - 2).saturating_sub(used) as u8
+}
+
+/// Leaves the lines to others, for good.
+///
+/// # Safety
+/// Interrupts are off, and stay so.
+pub unsafe fn stop() {
+    for port in 0..PORTS as u8 {
+        // SAFETY: the caller's.
+        unsafe { register(port, 1).write_volatile(0) };
+    }
+}
+
 /// The real-time characters since the last call, as bits (see [`realtime`](crate::realtime)).
 pub fn take_realtime(port: u8) -> u8 {
     let realtime = &flags(port).realtime;

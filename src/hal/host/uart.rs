@@ -10,8 +10,8 @@ use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
 use crate::hal::serial::{
-    AUX, AUX_RING, AllEnds, Ends, Flow, MARKS, PORTS, RX_RING, TX_RING, USB, XOFF, XON, batch,
-    hardware, high_water, lose, mark,
+    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, MARKS, PORTS, RX_RING, TX_RING, USB, XOFF, XON,
+    batch, hardware, high_water, lose, mark,
 };
 use crate::realtime;
 
@@ -211,6 +211,15 @@ pub fn lost_ends(port: u8) -> u16 {
     with(port, |line| line.lost_ends)
 }
 
+/// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for.
+pub fn room(port: u8) -> u8 {
+    let (size, used) = match port {
+        AUX => (AUX_RING, aux_rx().used()),
+        _ => (RX_RING, usb_rx().used()),
+    };
+    (size - 2).saturating_sub(used) as u8
+}
+
 /// The real-time characters since the last call, as bits (see [`realtime`]).
 pub fn take_realtime(port: u8) -> u8 {
     with(port, |line| core::mem::take(&mut line.realtime))
@@ -293,21 +302,33 @@ impl Line {
         self.next_tx = if self.leaving.is_some() { now() + self.byte_cycles } else { NEVER };
     }
 
+    /// Queues the mark of a real-time character: that of a loss if there is no room.
+    fn place(&mut self, character: u8) {
+        let Some(ring) = self.rx_in.as_mut() else { return };
+        if ring.is_full() {
+            self.lost_ends = self.lost_ends.wrapping_add(lost(ring.as_mut(), character));
+        } else {
+            ring.push(character);
+        }
+        self.queued = self.queued.wrapping_add(1);
+        flags::set(Event::Received);
+    }
+
     fn arrive(&mut self, byte: u8) {
         let special = realtime::bit(byte);
         if special != 0 {
-            self.realtime |= special;
+            self.realtime = realtime::with(self.realtime, special);
             flags::set(Event::Realtime);
+            if special & realtime::PLACED != 0 {
+                self.place(if special == realtime::RESUME { GO } else { CUT });
+            }
             return;
         }
         let garbles = self.garbles();
         let Some(ring) = self.rx_in.as_mut() else { return };
         let full = ring.is_full();
         if full || byte < MARKS || garbles {
-            let begun = if full { mark(ring.newest()) } else { 0 };
-            let (mark, is_end) = lose(begun, byte);
-            ring.mark(mark);
-            self.lost_ends = self.lost_ends.wrapping_add(is_end.into());
+            self.lost_ends = self.lost_ends.wrapping_add(lost(ring.as_mut(), byte));
         } else {
             ring.push(byte);
         }
@@ -319,4 +340,12 @@ impl Line {
             flags::set(Event::Received);
         }
     }
+}
+
+/// Marks the loss of a byte. Returns the line ends that it counts.
+fn lost(ring: &mut dyn Fill, byte: u8) -> u16 {
+    let begun = if ring.is_full() { mark(ring.newest()) } else { 0 };
+    let (mark, is_end) = lose(begun, byte);
+    ring.mark(mark);
+    is_end.into()
 }

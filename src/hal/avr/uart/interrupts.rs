@@ -18,8 +18,8 @@ use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::event::Event;
 use crate::hal::ring::Ring;
 use crate::hal::serial::{
-    AUX, AUX_RING, BEHIND_END, CLEAN, MARKS, PORTS, RETURNED, RX_RING, TX_RING, USB, batch,
-    hardware, high_water, is_shared,
+    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, GO, MARKS, PORTS, RETURNED, RX_RING, TX_RING, USB,
+    batch, hardware, high_water, is_shared,
 };
 use crate::realtime;
 
@@ -205,9 +205,21 @@ macro_rules! interrupts {
                     // A real-time character. What was lost before it is still to be marked.
                     "16:",
                     "lds  r24, {shared} + {realtime}",
+                    // Who says hold does not say resume any more (`realtime::with`).
+                    "sbrc r30, {hold_bit}",
+                    "andi r24, {not_resume}",
                     "or   r24, r30",
                     "sts  {shared} + {realtime}, r24",
                     "sbi  0x1E, {special}",
+                    // Where it stands counts, of some: queue a mark.
+                    "ldi  r24, {cut}",
+                    "sbrc r30, {resume_bit}",
+                    "ldi  r24, {go}",
+                    "andi r30, {placed}",
+                    "breq 24f",
+                    "sbi  0x1E, {received}",
+                    "rjmp 1b",
+                    "24:",
                     "ldi  r24, 0",
                     "andi r31, 0x18",
                     "brne 7f",
@@ -333,6 +345,12 @@ macro_rules! interrupts {
                     received = const Event::Received as u8,
                     special = const Event::Realtime as u8,
                     hold = const realtime::HOLD,
+                    hold_bit = const realtime::HOLD.trailing_zeros(),
+                    not_resume = const !realtime::RESUME,
+                    placed = const realtime::PLACED,
+                    cut = const CUT,
+                    go = const GO,
+                    resume_bit = const realtime::RESUME.trailing_zeros(),
                     resume = const realtime::RESUME,
                     flush = const realtime::FLUSH,
                     reset = const realtime::RESET,
