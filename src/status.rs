@@ -36,6 +36,7 @@ pub enum Status {
     JsonTooManyPairs = 112,
     TextNested = 114,
     JsonTooDeep = 115,
+    Muted = 117,
     GcodeGeneric = 130,
     GcodeUnsupported = 131,
     McodeUnsupported = 132,

@@ -23,6 +23,18 @@ impl Side for Machine {
         Machine::send(self, bytes);
     }
 
+    fn send_aux(&mut self, bytes: &[u8]) {
+        Machine::send_aux(self, bytes);
+    }
+
+    fn set_aux_cts(&mut self, stop: bool) {
+        Machine::set_aux_cts(self, stop);
+    }
+
+    fn heard_aux(&mut self) -> Vec<u8> {
+        self.received_aux()
+    }
+
     fn set_baud(&mut self, baud: u32) {
         Machine::set_baud(self, baud);
     }

@@ -137,11 +137,6 @@ impl Settings {
         self.system_large(system::CT) as f32 * 1e-6
     }
 
-    /// Whether sender and machine stop each other by XOFF.
-    pub fn has_xon_xoff(&self) -> bool {
-        self.system(system::EX) == 1
-    }
-
     /// Whether M0, M1 and M60 wait for cycle start.
     pub fn waits_at_stop(&self) -> bool {
         self.system(system::PSW) != 0

@@ -5,6 +5,7 @@
 //! bytes of defaults. TinyG's settings come first in each group, then those of Kerf alone.
 
 use super::name::token;
+use crate::boards::ACTIVE;
 use crate::progmem;
 
 /// How a setting is kept.
@@ -213,7 +214,7 @@ progmem! {
         up_to(fixed("si", system::SI, 0, 0, 100), 65_535).with(CLAMP),
         int("ec", system::EC, 0, 1),
         int("ee", system::EE, 0, 1),
-        int("ex", system::EX, 0, 2),
+        int("ex", system::EX, 0, if ACTIVE.has_handshake() { 2 } else { 1 }),
         int("rxm", system::RXM, 0, 1),
         up_to(fixed("baud", system::BAUD, 0, 0, 1), 1_000_000).with(RANGE),
         int("gpl", system::GPL, 0, 2),

@@ -10,7 +10,7 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 76;
+const ENTRIES: usize = 77;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
@@ -40,6 +40,7 @@ progmem! {
         (Status::JsonTooManyPairs, text!("JSON input has too many pairs")),
         (Status::TextNested, text!("JSON txt fields cannot be nested")),
         (Status::JsonTooDeep, text!("JSON maximum nesting depth exceeded")),
+        (Status::Muted, text!("Another port feeds the machine")),
         (Status::GcodeGeneric, text!("Generic Gcode input error")),
         (Status::GcodeUnsupported, text!("Gcode command unsupported")),
         (Status::McodeUnsupported, text!("M code unsupported")),

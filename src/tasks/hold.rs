@@ -26,6 +26,7 @@
 //! count responses. Nothing here waits, and nothing can be full: all of it is states.
 
 use super::links::Links;
+use super::ports::Port;
 use super::view::View;
 use crate::hal::byte::SharedByte;
 use crate::hal::event::Event;
@@ -126,9 +127,17 @@ pub fn dropped(drop_all: impl FnOnce()) {
     }
 }
 
-/// Acts upon the real-time characters that have come.
+/// Acts upon the real-time characters that have come, on any port.
 pub fn serve(links: &Links) {
-    let characters = uart::take_realtime();
+    for port in &links.ports {
+        let characters = uart::take_realtime(port.number);
+        if characters != 0 {
+            act(links, port, characters);
+        }
+    }
+}
+
+fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
         reset();
     }
@@ -156,11 +165,9 @@ pub fn serve(links: &Links) {
         links.resume.set(true);
     }
     if characters & ENQUIRY != 0 {
-        links.enquiry.set(true);
+        port.enquiry.set(true);
     }
-    if characters != 0 {
-        links.reporter_wake.urge();
-    }
+    links.reporter_wake.urge();
 }
 
 /// `{qf:1}`: drops what is queued, as a `%` does. False, and nothing done, while the machine is busy without
@@ -183,16 +190,16 @@ fn flush(links: &Links, from: Flush) {
     }
 }
 
-/// The reader has come to the place of a real-time character, outside of comments. What it has got before a
-/// `%` in a hold, or a `^d`, is what is dropped.
-pub fn placed(links: &Links, mark: u8) {
+/// The reader has come to the place of a real-time character on a port, outside of comments. What it has got before a
+/// `%` in a hold, or a `^d`, is what is dropped; of other ports, the lines that it has got by then.
+pub fn placed(links: &Links, port: &Port, mark: u8) {
     serve(links);
     if mark == GO {
         go_on(links);
     } else if is_on() {
         flush(links, Flush::Input);
         if links.flush.get() != Flush::Here {
-            links.lines.borrow_mut().terminate_partial();
+            port.lines.borrow_mut().terminate_partial();
         }
         rest(links);
     }
@@ -222,7 +229,7 @@ fn go_on(links: &Links) {
 
 /// All lines in the pool are dropped, and the queue next.
 fn rest(links: &Links) {
-    links.lines.borrow_mut().terminate();
+    links.ports.iter().for_each(|port| port.lines.borrow_mut().terminate());
     links.flush.set(Flush::Rest);
     links.parser_wake.signal();
     // Wherever the planner waits.
@@ -233,5 +240,5 @@ fn rest(links: &Links) {
 
 /// Whether there is anything to hold.
 fn is_busy(links: &Links) -> bool {
-    links.lines.borrow().has_data() || View::of(links).is_busy()
+    links.has_data() || View::of(links, links.feeder()).is_busy()
 }

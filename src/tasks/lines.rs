@@ -1,7 +1,7 @@
 //! The line pool: received lines that wait for the parser.
 //!
-//! Filled by the reader, emptied by the parser, both in thread mode. Lines lie end to end in one buffer
-//! in order of arrival, so that eight short lines of G-code and one long line of JSON fit the same
+//! One for each port, filled by the reader, emptied by the parser, both in thread mode. Lines lie end to
+//! end in one buffer in order of arrival, so that eight short lines of G-code and one long line of JSON fit the same
 //! memory. Control lines (JSON, `$`, `?`) are taken before data lines, each kind in order.
 //!
 //! A line that cannot be kept whole is kept as a fault instead, with as much of it as is given back: the sender gets
@@ -16,9 +16,7 @@ use crate::status::Status;
 
 /// Line slots. Senders count on eight.
 pub const SLOTS: usize = 8;
-/// Bytes for all lines together.
-pub const POOL: usize = 560;
-/// Longest line, in bytes without its end.
+/// Longest line, in bytes without its end; less in a pool that has no more.
 pub const LINE_MAX: usize = 254;
 /// What is kept of a longer one.
 const REST_MAX: u8 = 32;
@@ -70,8 +68,7 @@ impl Aside {
     }
 }
 
-/// The pool. The buffer is last: what lies before it, AVR reaches in one instruction.
-#[repr(C)]
+/// The pool.
 pub struct LinePool {
     /// Complete lines, in order; their bytes lie end to end.
     entries: Vec<Entry, SLOTS>,
@@ -91,12 +88,14 @@ pub struct LinePool {
     returned: bool,
     /// Empty lines are kept: in text mode they are answered by a prompt.
     keep_empty: bool,
-    bytes: [u8; POOL],
+    /// Longest line.
+    longest: u8,
+    bytes: &'static mut [u8],
 }
 
 impl LinePool {
-    /// An empty pool.
-    pub const fn new() -> Self {
+    /// An empty pool that keeps its lines in `bytes`.
+    pub const fn new(bytes: &'static mut [u8]) -> Self {
         Self {
             entries: Vec::new(),
             controls: 0,
@@ -107,7 +106,8 @@ impl LinePool {
             fault: None,
             returned: false,
             keep_empty: false,
-            bytes: [0; POOL],
+            longest: if bytes.len() > LINE_MAX { LINE_MAX } else { bytes.len() - 1 } as u8,
+            bytes,
         }
     }
 
@@ -125,7 +125,7 @@ impl LinePool {
     #[inline(never)]
     pub fn ready(&self) -> bool {
         let used = self.end - self.start + u16::from(self.partial);
-        self.entries.len() < SLOTS && used < POOL as u16
+        self.entries.len() < SLOTS && usize::from(used) < self.bytes.len()
     }
 
     /// Takes the printing bytes that `bytes` begins with, as far as they fit and are no matter for
@@ -136,7 +136,7 @@ impl LinePool {
         {
             return 0;
         }
-        let room = LINE_MAX - usize::from(self.partial);
+        let room = usize::from(self.longest - self.partial);
         let at = self.room_at();
         let slots = self.bytes.get_mut(at..).unwrap_or(&mut []);
         let slots = slots.get_mut(..room.min(slots.len())).unwrap_or(&mut []);
@@ -163,7 +163,7 @@ impl LinePool {
         }
         let at = self.room_at();
         match self.bytes.get_mut(at) {
-            Some(slot) if usize::from(self.partial) < LINE_MAX => {
+            Some(slot) if self.partial < self.longest => {
                 *slot = byte;
                 self.partial += 1;
             }
@@ -185,7 +185,7 @@ impl LinePool {
     #[inline(always)]
     fn room_at(&mut self) -> usize {
         let at = usize::from(self.end) + usize::from(self.partial);
-        if at < POOL || self.start == 0 {
+        if at < self.bytes.len() || self.start == 0 {
             return at;
         }
         self.move_down(at)
@@ -201,7 +201,9 @@ impl LinePool {
 
     /// Gives up the line that is coming in: it will be answered with `status`.
     pub fn spoil(&mut self, status: Status) {
-        let kept = if status == Status::InputTooLong { self.partial.min(REST_MAX) } else { 0 };
+        // In a small pool less, to leave room for control lines.
+        let most = REST_MAX.min(self.longest / 4);
+        let kept = if status == Status::InputTooLong { self.partial.min(most) } else { 0 };
         self.pass(self.partial - kept);
         self.partial = kept;
         self.fault = Some(status);
@@ -353,16 +355,10 @@ impl LinePool {
     fn close_gap(&mut self, start: usize, len: u8) {
         let behind = start + usize::from(len);
         let end = usize::from(self.end) + usize::from(self.partial);
-        if behind <= end && end <= POOL {
+        if behind <= end && end <= self.bytes.len() {
             self.bytes.copy_within(behind..end, start);
         }
         self.end -= u16::from(len);
-    }
-}
-
-impl Default for LinePool {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

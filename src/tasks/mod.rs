@@ -8,6 +8,7 @@ pub mod lines;
 pub mod links;
 pub mod parser;
 pub mod planner;
+pub mod ports;
 pub mod power;
 mod printing;
 pub mod reader;

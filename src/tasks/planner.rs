@@ -411,7 +411,7 @@ impl Planner {
         links.flush.set(Flush::None);
         hold::end();
         if links.killed.get() {
-            links.exception.set(Some(Status::KillJob));
+            links.except(Status::KillJob);
         }
         links.flushed.set(true);
         links.reporter_wake.urge();

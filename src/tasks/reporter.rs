@@ -1,6 +1,6 @@
 //! The reporter task: the greeting, then status and queue reports, exceptions, and the answer to ENQ.
 //!
-//! Reads everything through [`View`], writes to the sender; waits for something to report, and polls
+//! Reads everything through [`View`], writes to the port that is told, and answers ENQ and losses on their own; waits for something to report, and polls
 //! every [`POLL_MS`] while the machine moves; it is not woken besides then, unless queue reports are
 //! wanted. A change of `stat` or `hold` is told at once, anything else every
 //! `si` milliseconds. While the sender is slow it waits, and then reports what is so by then: it never
@@ -10,9 +10,11 @@ use embassy_futures::select::select;
 use embassy_time::Timer;
 
 use super::links::Links;
+use super::ports::Port;
 use super::tx::Tx;
 use super::view::{HELD, HOLD, RUN, View, queue_free};
 use crate::hal::imp::time::millis;
+use crate::hal::serial::is_shared;
 use crate::protocol::notice::{Banner, Exception, Occasion, acknowledge};
 use crate::protocol::{
     Machine, Mode, Report, Value, put_ready_prompt, queue_report, receive_report,
@@ -39,13 +41,15 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
     let mut told = Told { state: 0, hold: 0, blocks_free: queue_free(), at: millis() };
     let mut due = true;
     loop {
-        if links.enquiry.take() {
-            answer_enquiry(links).await;
+        for port in &links.ports {
+            if port.enquiry.take() {
+                answer_enquiry(links, port).await;
+            }
+            if let Some(status) = port.exception.take() {
+                report_exception(links, port, status).await;
+            }
         }
         let (state, hold) = state_of(links);
-        if let Some(status) = links.exception.take() {
-            report_exception(links, status).await;
-        }
         if links.flushed.take() {
             report_flush(links).await;
         }
@@ -53,7 +57,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             told.blocks_free = report_queue(links).await;
         }
         let elapsed = millis().wrapping_sub(told.at);
-        let interval = u32::from(View::of(links).settings().status_interval_ms());
+        let interval = u32::from(links.settings.borrow().status_interval_ms());
         let moves = state == RUN || state == HOLD && hold != HELD;
         due |= moves;
         if (state, hold) != (told.state, told.hold) || (due && elapsed >= interval) {
@@ -75,7 +79,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
 
 /// `stat` and `hold`.
 fn state_of(links: &Links) -> (i32, i32) {
-    let view = View::of(links);
+    let view = View::of(links, links.told());
     (view.state(), view.hold())
 }
 
@@ -85,10 +89,15 @@ fn reports_queue(links: &Links) -> bool {
 }
 
 /// Sends something that is put in steps: `step` says whether there is more.
-async fn send(links: &Links, tx: &mut Tx, mut step: impl FnMut(&mut View, &mut Tx) -> bool) {
+async fn send(
+    links: &Links,
+    port: &Port,
+    tx: &mut Tx,
+    mut step: impl FnMut(&mut View, &mut Tx) -> bool,
+) {
     loop {
         tx.room().await;
-        let more = step(&mut View::of(links), tx);
+        let more = step(&mut View::of(links, port), tx);
         tx.flush();
         if !more {
             break;
@@ -98,21 +107,23 @@ async fn send(links: &Links, tx: &mut Tx, mut step: impl FnMut(&mut View, &mut T
 
 /// Says who the machine is; in text mode with the first prompt.
 async fn greet(links: &Links, occasion: Occasion) {
-    let mut tx = links.tx.lock().await;
-    let mut banner = Banner::begin(occasion, &links.settings.borrow());
-    send(links, &mut tx, |view, tx| {
-        let more = banner.step(view, tx);
-        if !more && occasion == Occasion::Ready && links.mode.get() == Mode::Text {
-            put_ready_prompt(view, tx);
-        }
-        more
-    })
-    .await;
+    for port in links.ports.iter().filter(|port| !is_shared(port.number)) {
+        let mut tx = port.tx.lock().await;
+        let mut banner = Banner::begin(occasion, &links.settings.borrow());
+        send(links, port, &mut tx, |view, tx| {
+            let more = banner.step(view, tx);
+            if !more && occasion == Occasion::Ready && port.mode.get() == Mode::Text {
+                put_ready_prompt(view, tx);
+            }
+            more
+        })
+        .await;
+    }
 }
 
-async fn answer_enquiry(links: &Links) {
-    let mut tx = links.tx.lock().await;
-    send(links, &mut tx, |view, tx| {
+async fn answer_enquiry(links: &Links, port: &Port) {
+    let mut tx = port.tx.lock().await;
+    send(links, port, &mut tx, |view, tx| {
         acknowledge(view.settings(), tx);
         false
     })
@@ -120,37 +131,40 @@ async fn answer_enquiry(links: &Links) {
 }
 
 async fn report_status(links: &Links) {
-    let mut tx = links.tx.lock().await;
-    let report = Report::begin(links.mode.get(), &mut View::of(links));
+    let port = links.told();
+    let mut tx = port.tx.lock().await;
+    let report = Report::begin(port.mode.get(), &mut View::of(links, port));
     if let Some(mut report) = report {
-        send(links, &mut tx, |view, tx| report.step(view, tx)).await;
+        send(links, port, &mut tx, |view, tx| report.step(view, tx)).await;
     }
 }
 
 async fn report_flush(links: &Links) {
-    let mut tx = links.tx.lock().await;
-    send(links, &mut tx, |view, tx| {
-        queue_report(links.mode.get(), view, tx);
-        receive_report(links.mode.get(), view, tx);
+    let port = links.told();
+    let mut tx = port.tx.lock().await;
+    send(links, port, &mut tx, |view, tx| {
+        queue_report(port.mode.get(), view, tx);
+        receive_report(port.mode.get(), view, tx);
         false
     })
     .await;
 }
 
-async fn report_exception(links: &Links, status: Status) {
-    let mut tx = links.tx.lock().await;
+async fn report_exception(links: &Links, port: &Port, status: Status) {
+    let mut tx = port.tx.lock().await;
     let mut exception = Exception::begin(status, &links.settings.borrow());
-    send(links, &mut tx, |view, tx| exception.step(view, tx)).await;
+    send(links, port, &mut tx, |view, tx| exception.step(view, tx)).await;
 }
 
 /// Returns the number of free blocks as it was told, which may have changed during the wait for the
 /// transmitter.
 async fn report_queue(links: &Links) -> usize {
-    let mut tx = links.tx.lock().await;
+    let port = links.told();
+    let mut tx = port.tx.lock().await;
     let mut told = 0;
-    send(links, &mut tx, |view, tx| {
+    send(links, port, &mut tx, |view, tx| {
         told = view.value(Value::QueueFree) as usize;
-        queue_report(links.mode.get(), view, tx);
+        queue_report(port.mode.get(), view, tx);
         false
     })
     .await;

@@ -1,13 +1,13 @@
 //! The line to the sender: whole responses and reports, one after the other.
 //!
-//! Owned by whoever holds `Links::tx`, for as long as one line takes, so lines never mix. Call
+//! Owned by whoever holds `Port::tx`, for as long as one line takes, so lines never mix. Call
 //! [`Tx::room`] before each piece of at most [`PIECE`] bytes; it waits until the transmit ring has room.
 
 use embassy_time::Timer;
 
-use crate::hal::event::{Event, wait};
+use crate::hal::event::wait_transmitted;
 use crate::hal::imp::uart;
-use crate::hal::serial::{Outgoing, RING};
+use crate::hal::serial::{Outgoing, TX_RING};
 use crate::progmem::Text;
 use crate::protocol::Checksum;
 
@@ -19,6 +19,7 @@ const TWO_BYTES_MS: u32 = 20 * 1_000;
 /// The transmit ring's filling end.
 pub struct Tx {
     ring: Outgoing,
+    port: u8,
     /// Bits a second.
     rate: u32,
     /// Of the response under way, if it ends with one.
@@ -26,14 +27,14 @@ pub struct Tx {
 }
 
 impl Tx {
-    /// Takes over the ring of a line that runs at `rate` bits a second.
-    pub fn new(ring: Outgoing, rate: u32) -> Self {
-        Self { ring, rate, sum: None }
+    /// Takes over the ring of a port whose line runs at `rate` bits a second.
+    pub fn new(ring: Outgoing, port: u8, rate: u32) -> Self {
+        Self { ring, port, rate, sum: None }
     }
 
     /// Waits until a piece fits.
     pub async fn room(&mut self) {
-        wait(Event::Transmitted, || self.has_room().then_some(())).await;
+        wait_transmitted(self.port, || self.has_room().then_some(())).await;
     }
 
     /// Whether a piece fits now.
@@ -43,20 +44,20 @@ impl Tx {
 
     /// Sends what has been put.
     pub fn flush(&mut self) {
-        uart::kick();
+        uart::kick(self.port);
     }
 
     /// Goes on at `rate` bits a second, when what has been put has left at the old rate: 1 to 4 ms after
     /// its last byte. What the sender says meanwhile may be spoilt.
     pub async fn set_rate(&mut self, rate: u32) {
         self.drain().await;
-        uart::set_rate(rate);
+        uart::set_rate(self.port, rate);
         self.rate = rate;
     }
 
     /// Waits until what has been put has left: 1 to 4 ms after its last byte.
     pub async fn drain(&mut self) {
-        wait(Event::Transmitted, || (self.ring.free() == RING - 1).then_some(())).await;
+        wait_transmitted(self.port, || (self.ring.free() == TX_RING - 1).then_some(())).await;
         // The transmitter holds two bytes more. It has a flag for their end, but the flag may be left
         // from a pause in the middle of the line; their time is certain.
         Timer::after_ticks(u64::from(TWO_BYTES_MS / self.rate) + 2).await;
@@ -89,13 +90,17 @@ impl crate::protocol::Out for Tx {
         if self.sum.is_some() {
             return self.put_summed(text.bytes());
         }
-        let slots = self.ring.vacant();
-        if slots.len() < text.len() {
-            return self.put_all(text.bytes());
+        let mut left = text;
+        // The ring's end may come in between; there is room beyond it.
+        for _ in 0..2 {
+            let count = left.copy(self.ring.vacant());
+            // SAFETY: so many have been copied there.
+            unsafe { self.ring.publish(count) };
+            left = left.behind(count);
+            if left.is_empty() {
+                break;
+            }
         }
-        text.copy(slots);
-        // SAFETY: so many have been copied there.
-        unsafe { self.ring.publish(text.len() as u8) };
     }
 
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {

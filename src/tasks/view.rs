@@ -7,6 +7,7 @@ use core::cell::{OnceCell, RefMut};
 
 use super::hold;
 use super::links::{Links, snapshot};
+use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
 use crate::baud;
@@ -14,6 +15,7 @@ use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
 use crate::hal::imp::{gpio, stepper, uart};
+use crate::hal::serial::{Flow, PORTS};
 use crate::jobs::Job;
 use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
@@ -40,16 +42,18 @@ pub const HELD: i32 = 4;
 /// A look at the machine.
 pub struct View<'a> {
     links: &'a Links,
+    port: &'a Port,
     settings: RefMut<'a, Settings>,
     report: RefMut<'a, StatusReport>,
     motion: OnceCell<Snapshot>,
 }
 
 impl<'a> View<'a> {
-    /// Looks at the machine now.
-    pub fn of(links: &'a Links) -> Self {
+    /// Looks at the machine now, as the sender on this port sees it.
+    pub fn of(links: &'a Links, port: &'a Port) -> Self {
         Self {
             links,
+            port,
             settings: links.settings.borrow_mut(),
             report: links.report.borrow_mut(),
             motion: OnceCell::new(),
@@ -194,10 +198,10 @@ impl Machine for View<'_> {
             Value::QueueFree => queue_free() as i32,
             Value::QueueAdded => self.links.queue_count.take_added(),
             Value::QueueRemoved => self.links.queue_count.take_removed(),
-            Value::SlotsFree => self.links.lines.borrow().free().into(),
+            Value::SlotsFree => self.port.lines.borrow().free().into(),
             Value::Room => match Dialect::of(&self.settings) {
-                Dialect::Characters => uart::room().into(),
-                _ => self.links.lines.borrow().free().into(),
+                Dialect::Characters => uart::room(self.port.number).into(),
+                _ => self.port.lines.borrow().free().into(),
             },
             Value::MachinePosition(axis) => self.position(axis.into()).0,
             Value::Position(axis) => {
@@ -240,7 +244,7 @@ impl Machine for View<'_> {
     }
 
     fn flush(&mut self) -> Status {
-        let busy = self.is_busy() || self.links.lines.borrow().has_data();
+        let busy = self.is_busy() || self.links.has_data();
         if hold::flush_here(self.links, busy) { Status::Ok } else { Status::NotAccepted }
     }
 
@@ -285,6 +289,9 @@ pub fn queue_free() -> usize {
 /// Tells the outputs what the settings say of them. Thread mode, or before interrupts are on.
 pub fn set_outputs(settings: &Settings) {
     power::set_modes(settings);
+    for port in 0..PORTS as u8 {
+        uart::set_flow(port, Flow::of(port, settings.flow_control()));
+    }
     stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
     stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));
 }

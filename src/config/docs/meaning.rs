@@ -31,7 +31,8 @@ includes what is before it.",
     ("ee", "Whether each line is sent back before it is answered, as a line of its own."),
     (
         "ex",
-        "Flow control. With 1 XOFF holds answers back until XON, and Kerf sends them likewise; 2 is as 0 so far.",
+        "Flow control. With 1 XOFF holds answers back until XON, and Kerf sends them likewise; 2 does the same with \
+pins, on ports that have them, and is refused by boards without.",
     ),
     (
         "rxm",
@@ -40,7 +41,7 @@ unanswered, `[1,status,length,checksum]`. `rx` counts likewise.",
     ),
     (
         "baud",
-        "Rate of the serial line: a code, or bits a second from 9600 to 1000000. In force when the response has \
+        "Rate of the USB line: a code, or bits a second from 9600 to 1000000. In force when the response has \
 left; 115200 after a reset.",
     ),
     ("gpl", "Plane at power-up and after M2."),

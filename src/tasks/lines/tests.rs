@@ -1,4 +1,9 @@
 use super::*;
+use std::boxed::Box;
+
+fn pool() -> LinePool {
+    LinePool::new(Box::leak(Box::new([0; 560])))
+}
 
 fn feed(pool: &mut LinePool, text: &[u8]) {
     for &byte in text {
@@ -16,7 +21,7 @@ fn take(pool: &mut LinePool, data: bool) -> Option<(std::vec::Vec<u8>, Class)> {
 
 #[test]
 fn control_overtakes_data_and_order_holds_within_each() {
-    let mut pool = LinePool::new();
+    let mut pool = pool();
     feed(&mut pool, b"g1x1\r\n  {a:n}\n\ng1x2\n{\"gc\":\"g0\"}\n?\n");
     assert_eq!(pool.free(), 3);
     assert_eq!(take(&mut pool, false), Some((b"{a:n}".to_vec(), Class::Control)));
@@ -30,7 +35,7 @@ fn control_overtakes_data_and_order_holds_within_each() {
 
 #[test]
 fn a_line_that_is_coming_in_survives_removals() {
-    let mut pool = LinePool::new();
+    let mut pool = pool();
     feed(&mut pool, b"first\nsecond\nthi");
     take(&mut pool, true);
     feed(&mut pool, b"rd\n");
@@ -40,7 +45,7 @@ fn a_line_that_is_coming_in_survives_removals() {
 
 #[test]
 fn long_and_damaged_lines_become_one_fault_each() {
-    let mut pool = LinePool::new();
+    let mut pool = pool();
     feed(&mut pool, &[b'x'; 300]);
     feed(&mut pool, b"\ngood\nbad");
     pool.spoil(Status::BufferFull);
@@ -52,8 +57,22 @@ fn long_and_damaged_lines_become_one_fault_each() {
 }
 
 #[test]
+fn a_line_longer_than_the_pool_is_one_fault() {
+    let mut pool = LinePool::new(Box::leak(Box::new([0; 20])));
+    for line in ["g1 x2 (0123456789)  \r\n", "(0123456789abcdefghi)\n"] {
+        feed(&mut pool, line.as_bytes());
+        // What is given back of it leaves room for a control line.
+        feed(&mut pool, b"?\n");
+        assert_eq!(take(&mut pool, true), Some((b"?".to_vec(), Class::Control)));
+        let fault = take(&mut pool, true);
+        assert_eq!(fault.map(|line| line.1), Some(Class::Fault(Status::InputTooLong)));
+    }
+    assert_eq!(take(&mut pool, true), None);
+}
+
+#[test]
 fn empty_lines_count_where_they_are_wanted() {
-    let mut pool = LinePool::new();
+    let mut pool = pool();
     feed(&mut pool, b"\r\n\n");
     assert_eq!(pool.free(), 8);
     pool.keep_empty(true);
@@ -65,7 +84,7 @@ fn empty_lines_count_where_they_are_wanted() {
 
 #[test]
 fn text_in_pieces_is_text_byte_by_byte() {
-    let (mut pieces, mut bytes) = (LinePool::new(), LinePool::new());
+    let (mut pieces, mut bytes) = (pool(), pool());
     for round in 0..200 {
         let long = "(".repeat(round * 7 % 300);
         let line = std::format!("  N{round} X1.5\tY2{long}\r\n\n \x01x\ny\r");
@@ -88,7 +107,7 @@ fn text_in_pieces_is_text_byte_by_byte() {
 
 #[test]
 fn dropped_lines_keep_their_place_and_control_lines_are_none_of_them() {
-    let mut pool = LinePool::new();
+    let mut pool = pool();
     feed(&mut pool, b"g1x1\n{a:n}\ng1x2\ng1x");
     pool.terminate_partial();
     pool.terminate();
@@ -116,7 +135,7 @@ fn comments_are_known() {
         ("g1 ; (x)", Aside::Rest),
         ("(x)\n;y\ng1", Aside::None),
     ] {
-        let mut pool = LinePool::new();
+        let mut pool = pool();
         feed(&mut pool, text.as_bytes());
         assert_eq!(pool.aside(), aside, "{text}");
         let ahead = text.bytes().fold(Aside::None, Aside::after);
@@ -126,7 +145,7 @@ fn comments_are_known() {
 
 #[test]
 fn a_full_pool_is_not_ready() {
-    let mut pool = LinePool::new();
+    let mut pool = pool();
     feed(&mut pool, b"1\n2\n3\n4\n5\n6\n7\n8\n");
     assert!(!pool.ready());
     take(&mut pool, true);
@@ -135,7 +154,7 @@ fn a_full_pool_is_not_ready() {
 
 #[test]
 fn every_byte_is_counted_with_some_line() {
-    let mut pool = LinePool::new();
+    let mut pool = pool();
     let long = [b'x'; 300];
     let mut counted = 0;
     let mut sent = 0;
@@ -166,7 +185,7 @@ fn every_byte_is_counted_with_some_line() {
 
 #[test]
 fn an_over_long_line_is_known_by_its_beginning() {
-    let mut pool = LinePool::new();
+    let mut pool = pool();
     feed(&mut pool, b"{");
     (0..300).for_each(|_| feed(&mut pool, b"x"));
     feed(&mut pool, b"\n");
