@@ -5,7 +5,7 @@
 use core::cell::{Cell, RefCell};
 
 use embassy_executor::Spawner;
-use embassy_sync::mutex::Mutex;
+use heapless::Vec;
 
 use crate::config::Settings;
 use crate::gcode::command::Commands;
@@ -13,24 +13,31 @@ use crate::gcode::interpreter::Interpreter;
 use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{stepper, uart};
 use crate::hal::ring::Producer;
-use crate::hal::serial::{Outgoing, Received};
+use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
+use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
 use crate::store::kept;
-use crate::tasks::lines::LinePool;
 use crate::tasks::links::{Links, QueueCount};
+use crate::tasks::ports::Port;
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_outputs;
 use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, power, reader, reporter, storage};
 
+/// Bytes for all lines of USB together.
+const LINES_USB: usize = 480;
+/// The same of the other port.
+const LINES_AUX: usize = 80;
+
 impl Links {
-    fn new(tx: Outgoing, rate: u32, storage: &'static Storage) -> Self {
+    fn new(ports: [Port; PORTS], storage: &'static Storage) -> Self {
         Self {
-            lines: RefCell::new(LinePool::new()),
+            ports,
+            feeder: Cell::new(USB),
             pool_space: Wake::default(),
             parser_wake: Wake::default(),
             commands: RefCell::new(Commands::default()),
@@ -43,18 +50,35 @@ impl Links {
             resync: Cell::new(false),
             settings_changed: Cell::new(true),
             rate: Cell::new(None),
-            exception: Cell::new(None),
+            restart: Cell::new(None),
+            flush: Cell::default(),
+            resume: Cell::new(false),
+            percent: Cell::new(false),
+            percent_at: Cell::new(0),
+            killed: Cell::new(false),
+            flushed: Cell::new(false),
             job: Cell::default(),
             storage,
-            mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),
-            tx: Mutex::new(Tx::new(tx, rate)),
-            enquiry: Cell::new(false),
             // Their defaults come when they are in place: they would take as much of the stack.
             settings: RefCell::new(Settings::blank()),
             model: RefCell::new(Interpreter::with(storage)),
         }
     }
+}
+
+/// Memory for lines, once on AVR; on the host each machine that is made gets its own.
+macro_rules! line_bytes {
+    ($len:expr) => {{
+        #[cfg(target_arch = "avr")]
+        {
+            static BYTES: static_cell::ConstStaticCell<[u8; $len]> =
+                static_cell::ConstStaticCell::new([0; $len]);
+            BYTES.take()
+        }
+        #[cfg(not(target_arch = "avr"))]
+        std::boxed::Box::leak(std::boxed::Box::new([0; $len]))
+    }};
 }
 
 /// Puts something where it stays.
@@ -72,9 +96,9 @@ macro_rules! place {
 
 /// Makes the links. Not inlined: what it needs of the stack is free again after it.
 #[inline(never)]
-fn place(tx: Outgoing, rate: u32) -> &'static Links {
+fn place(ports: [Port; PORTS]) -> &'static Links {
     let storage: &'static Storage = place!(Storage, Storage::new(Log::open(&Eeprom::take())));
-    place!(Links, Links::new(tx, rate, storage))
+    place!(Links, Links::new(ports, storage))
 }
 
 /// Starts the firmware: `main` is the thread-mode executor, `exec_level` the interrupt-mode one.
@@ -82,20 +106,30 @@ fn place(tx: Outgoing, rate: u32) -> &'static Links {
 /// Interrupts are off. `None` if it has been started before.
 #[inline(never)]
 pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
-    let (received, outgoing) = uart::start(rate)?;
+    let AllEnds { usb: (received, outgoing), aux } = uart::start(rate)?;
     let segments = stepper::start()?;
     let (queue, source) = queue::store().split()?;
-    let links = place(outgoing, rate);
-    recall(&mut links.settings.borrow_mut(), links.storage);
+    let mut ports = Vec::<Port, PORTS>::new();
+    ports.push(Port::new(USB, line_bytes!(LINES_USB), Tx::new(outgoing, USB, rate))).ok()?;
+    let aux = match (aux, hardware(AUX)) {
+        (Some((received, outgoing)), Some(board)) => {
+            let tx = Tx::new(outgoing, AUX, board.rate);
+            ports.push(Port::new(AUX, line_bytes!(LINES_AUX), tx)).ok()?;
+            Some(received)
+        }
+        _ => None,
+    };
+    let links = place(ports.into_array().ok()?);
+    let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
     if !links.settings.borrow().starts_in_json() {
-        links.mode.set(Mode::Text);
+        links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
     }
     set_outputs(&links.settings.borrow());
     links.model.borrow_mut().start(&*links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);
-    main.spawn(reader_task(links, received).ok()?);
+    main.spawn(reader_task(links, received, aux).ok()?);
     main.spawn(planner_task(links, queue).ok()?);
-    main.spawn(reporter_task(links).ok()?);
+    main.spawn(reporter_task(links, occasion).ok()?);
     main.spawn(power_task(links).ok()?);
     main.spawn(parser_task(links).ok()?);
     main.spawn(control_task(links).ok()?);
@@ -103,11 +137,16 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     Some(())
 }
 
-/// The defaults, and over them what was put away before the reset.
+/// The defaults, and over them what was put away before the reset. Says also what has come of it.
 #[inline(never)]
-fn recall(settings: &mut Settings, storage: &Storage) {
+fn recall(settings: &mut Settings, storage: &Storage) -> Occasion {
+    let (log, memory) = (storage.log(), Eeprom::take());
     settings.set_defaults();
-    kept::load(&storage.log(), &Eeprom::take(), settings);
+    kept::load(&log, &memory, settings);
+    match log.is_rubbish(&memory) {
+        true => Occasion::Defaults,
+        false => Occasion::Ready,
+    }
 }
 
 /// Declares tasks: one of each on AVR; on the host each machine that is made gets its own.
@@ -131,9 +170,13 @@ macro_rules! tasks {
 
 tasks! {
     fn exec_task(blocks: BlockSource, segments: Producer<Segment, SEGMENTS>) = exec::run;
-    fn reader_task(links: &'static Links, received: Received) = reader::run;
+    fn reader_task(
+        links: &'static Links,
+        usb: Received<RX_RING>,
+        aux: Option<Received<AUX_RING>>
+    ) = reader::run;
     fn planner_task(links: &'static Links, queue: BlockQueue) = planner::run;
-    fn reporter_task(links: &'static Links) = reporter::run;
+    fn reporter_task(links: &'static Links, occasion: Occasion) = reporter::run;
     fn control_task(links: &'static Links) = control::run;
     fn power_task(links: &'static Links) = power::run;
     fn parser_task(links: &'static Links) = parser::run;

@@ -106,6 +106,62 @@ pub enum Timer {
     T5,
 }
 
+/// A USART of the ATmega2560. The third, USART2, is the firmware's own (`hal::avr::exec`).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs)]
+pub enum Usart {
+    U0,
+    U1,
+    U3,
+}
+
+impl Usart {
+    /// Data-space address of its first register, UCSRnA (ATmega2560 data sheet, register summary).
+    pub const fn address(self) -> usize {
+        match self {
+            Usart::U0 => 0xC0,
+            Usart::U1 => 0xC8,
+            Usart::U3 => 0x130,
+        }
+    }
+
+    /// Its receiver's and its transmitter's pin.
+    pub const fn pins(self) -> [Pin; 2] {
+        match self {
+            Usart::U0 => [pin(Port::E, 0), pin(Port::E, 1)],
+            Usart::U1 => [pin(Port::D, 2), pin(Port::D, 3)],
+            Usart::U3 => [pin(Port::J, 0), pin(Port::J, 1)],
+        }
+    }
+}
+
+/// Flow control by pins, for `{ex:2}`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Handshake {
+    /// Driven high when the sender is to stop; to its CTS.
+    pub rts: Pin,
+    /// High when Kerf is to stop; from the other side's RTS.
+    pub cts: Pin,
+}
+
+/// A serial port. Its pins beside the USART's are on ports A to G, where they are one instruction each.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Serial {
+    /// The USART behind it.
+    pub usart: Usart,
+    /// Its rate at power-up, bits a second. That of USB can be changed (`{baud:n}`).
+    pub rate: u32,
+    /// Its pins for flow control.
+    pub handshake: Option<Handshake>,
+    /// High while Kerf sends, for a transceiver of RS-485 (tie its /RE to this pin too). On a port that has
+    /// it Kerf only answers, for others share the line.
+    pub driver_enable: Option<Pin>,
+}
+
+/// The first port of every board: USART0, which is USB on most.
+pub const USB: Serial =
+    Serial { usart: Usart::U0, rate: 115_200, handshake: None, driver_enable: None };
+
 /// Outputs that a program switches, as bits; of [`Board::outputs`] the index is the number of the bit.
 #[allow(missing_docs)]
 pub mod outputs {
@@ -132,17 +188,46 @@ pub struct Board {
     pub hazards: &'static [Pin],
     /// What M3 to M9 switch, active high: see [`outputs`]. Hazards, all of them.
     pub outputs: [Option<Pin>; outputs::COUNT],
+    /// Its serial ports: [`USB`], and a second one if there is room for it.
+    pub serial: &'static [Serial],
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,
     /// Timer of the 1 kHz tick.
     pub tick_timer: Timer,
 }
 
-/// Pins that the firmware itself uses on every board: the serial line, and the transmitter of USART2,
-/// which is driven high for the sake of its interrupt (`hal::avr::exec`).
-const OWN_PINS: [Pin; 3] = [pin(Port::E, 0), pin(Port::E, 1), pin(Port::H, 1)];
+/// A pin that the firmware itself uses on every board: the transmitter of USART2, which is driven high for
+/// the sake of its interrupt (`hal::avr::exec`).
+const OWN_PIN: Pin = pin(Port::H, 1);
 
-const MAX_PINS: usize = 3 * MOTORS + 1 + 8 + OWN_PINS.len();
+/// Ports a board may have, and pins of a port.
+const MAX_PORTS: usize = 2;
+const SERIAL_PINS: usize = 5;
+
+const MAX_PINS: usize = 3 * MOTORS + 1 + 8 + MAX_PORTS * SERIAL_PINS + 1;
+
+impl Serial {
+    const fn pins(&self) -> [Option<Pin>; SERIAL_PINS] {
+        let [rx, tx] = self.usart.pins();
+        let (rts, cts) = match self.handshake {
+            Some(Handshake { rts, cts }) => (Some(rts), Some(cts)),
+            None => (None, None),
+        };
+        [Some(rx), Some(tx), self.driver_enable, rts, cts]
+    }
+
+    /// Panics if one of its own pins is not where one instruction reaches it.
+    const fn check(&self) {
+        let pins = self.pins();
+        let mut i = 2;
+        while i < SERIAL_PINS {
+            if let Some(pin) = pins[i] {
+                assert!(pin.port as u8 <= Port::G as u8, "a pin of a serial port is beyond port G");
+            }
+            i += 1;
+        }
+    }
+}
 
 impl Board {
     /// The motors whose drivers are on (bits) when those of `wanted` are to be: all of them where they
@@ -175,11 +260,19 @@ impl Board {
             n += 1;
             h += 1;
         }
-        let mut o = 0;
-        while o < OWN_PINS.len() {
-            pins[n] = Some(OWN_PINS[o]);
-            n += 1;
-            o += 1;
+        pins[n] = Some(OWN_PIN);
+        n += 1;
+        let mut s = 0;
+        while s < self.serial.len() {
+            self.serial[s].check();
+            let own = self.serial[s].pins();
+            let mut o = 0;
+            while o < SERIAL_PINS {
+                pins[n] = own[o];
+                n += 1;
+                o += 1;
+            }
+            s += 1;
         }
         let mut i = 0;
         while i < n {
@@ -199,7 +292,20 @@ impl Board {
             self.step_timer as u8 != self.tick_timer as u8,
             "a timer of this board is used twice"
         );
+        let first = !self.serial.is_empty() && matches!(self.serial[0].usart, Usart::U0);
+        assert!(first, "the first serial port of this board is not USART0");
         self.check_outputs();
+    }
+
+    /// Whether some port has the pins that `{ex:2}` needs.
+    pub const fn has_handshake(&self) -> bool {
+        let mut any = false;
+        let mut s = 0;
+        while s < self.serial.len() {
+            any |= self.serial[s].handshake.is_some();
+            s += 1;
+        }
+        any
     }
 
     /// Panics if an output would stay on after a panic, or is switched by two codes.
@@ -284,6 +390,19 @@ mod tests {
     fn the_serial_line_is_taken() {
         const TAKEN: &[Pin] = &[pin(Port::E, 1)];
         Board { hazards: TAKEN, ..MEGA2560_GRBL }.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "pin of this board is used twice")]
+    fn two_ports_on_one_usart_are_refused() {
+        Board { serial: &[USB, USB], ..MEGA2560_GRBL }.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "beyond port G")]
+    fn pins_of_ports_are_within_reach() {
+        const FAR: Serial = Serial { driver_enable: Some(pin(Port::K, 7)), ..USB };
+        Board { serial: &[FAR], ..MEGA2560_GRBL }.check();
     }
 
     #[test]

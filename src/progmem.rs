@@ -138,14 +138,23 @@ impl Text {
         (index < self.len()).then(|| load(self.start.wrapping_add(index)))
     }
 
-    /// Copies it to the beginning of `to`, or does nothing if that is too short. Cost on AVR: 8 cycles a
-    /// byte.
+    /// Copies it to the beginning of `to`, as far as there is room. Returns how many bytes those are. Cost on AVR:
+    /// 8 cycles a byte.
     #[inline(always)]
-    pub fn copy(self, to: &mut [MaybeUninit<u8>]) {
-        if !self.is_empty() && self.len() <= to.len() {
-            // SAFETY: `to` has room for as many bytes, and there is at least one.
-            unsafe { copy(self.start, to.as_mut_ptr().cast(), self.len) }
+    pub fn copy(self, to: &mut [MaybeUninit<u8>]) -> u8 {
+        let count = self.len().min(to.len()) as u8;
+        if count > 0 {
+            // SAFETY: both have as many bytes, and there is at least one.
+            unsafe { copy(self.start, to.as_mut_ptr().cast(), count) }
         }
+        count
+    }
+
+    /// What is behind its first `count` bytes.
+    #[inline(always)]
+    pub fn behind(self, count: u8) -> Self {
+        let count = count.min(self.len);
+        Self { start: self.start.wrapping_add(usize::from(count)), len: self.len - count }
     }
 
     /// Its bytes, one by one.

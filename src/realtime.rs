@@ -15,6 +15,17 @@ pub const KILL: u8 = 1 << 4;
 /// ENQ: asks for `{"ack":true}`.
 pub const ENQUIRY: u8 = 1 << 5;
 
+/// Those of which the place in the stream counts: there the receive ring gets a
+/// [`CUT`](crate::hal::serial::CUT) or [`GO`](crate::hal::serial::GO).
+pub const PLACED: u8 = FLUSH | KILL | RESUME;
+
+/// The characters that are pending when one more comes: who says hold does not say resume any more.
+#[inline(always)]
+pub const fn with(pending: u8, character: u8) -> u8 {
+    let pending = if character & HOLD != 0 { pending & !RESUME } else { pending };
+    pending | character
+}
+
 /// The bit of a real-time character, 0 for any other byte.
 ///
 /// The receive interrupt of the AVR has its twin in assembly (`hal/avr/uart.rs`); the transcripts, which

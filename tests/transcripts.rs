@@ -1,19 +1,38 @@
 //! The transcripts, played to the firmware on the host: each on a machine of its own.
 
+#[path = "support/requests.rs"]
+mod requests;
 #[path = "support/transcript.rs"]
 mod transcript;
 
+use std::collections::HashSet;
 use std::path::Path;
 
+use kerf::config::table::Kind;
+use kerf::config::{Name, Owner, Setting};
 use kerf::gcode::codes::docs::{self, Doc, On, Refusal};
 use kerf::gcode::setup::{AxisMode, Cycle, Setup};
 use kerf::hal::imp::Machine;
+use kerf::protocol;
 use kerf::units::Length;
+use requests::{Asked, pairs};
 use transcript::{Side, Transcript};
 
 impl Side for Machine {
     fn send(&mut self, bytes: &[u8]) {
         Machine::send(self, bytes);
+    }
+
+    fn send_aux(&mut self, bytes: &[u8]) {
+        Machine::send_aux(self, bytes);
+    }
+
+    fn set_aux_cts(&mut self, stop: bool) {
+        Machine::set_aux_cts(self, stop);
+    }
+
+    fn heard_aux(&mut self) -> Vec<u8> {
+        self.received_aux()
     }
 
     fn set_baud(&mut self, baud: u32) {
@@ -118,4 +137,57 @@ fn every_code_and_every_refusal_is_in_some_transcript() {
 fn is_always_refused(doc: &Doc) -> bool {
     doc.refusals.iter().any(|refusal| refusal.on == On::NoSwitches)
         || matches!(doc.number, 410 | 420)
+}
+
+/// A setting of one motor or axis stands for that of the others.
+fn without_owner(name: &str) -> String {
+    match Setting::find(&Name::new().with(name.as_bytes()).expect("short")) {
+        Some(setting) if setting.owner() != Owner::System => format!("?{}", &name[1..]),
+        _ => name.to_string(),
+    }
+}
+
+/// What the settings and values of the machine are asked for: read, or set and taken, or set and refused for they are
+/// read-only.
+fn asked_for(transcripts: &[Transcript]) -> HashSet<(String, &'static str)> {
+    let mut asked = HashSet::new();
+    for (sent, heard) in transcripts.iter().flat_map(Transcript::exchanges) {
+        let (ok, fixed) = (heard.contains("\"f\":[1,0,"), heard.contains("\"f\":[1,104,"));
+        let pairs = pairs(&sent);
+        for pair in pairs.iter().filter(|pair| pair.name.len() <= 5) {
+            let name = without_owner(&pair.name);
+            asked.insert((name.clone(), "asked for"));
+            match (pair.reads(), &*pairs) {
+                (true, _) if ok => asked.insert((name, "read")),
+                (false, _) if ok => asked.insert((name, "set")),
+                // Of one pair it is certain that it is the one that was refused.
+                (false, [Asked { .. }]) if fixed => asked.insert((name, "refused")),
+                _ => false,
+            };
+        }
+    }
+    asked
+}
+
+#[test]
+fn every_name_is_in_some_transcript() {
+    let asked = asked_for(&read_all());
+    let was = |name: &str, how| asked.contains(&(name.to_string(), how));
+    let mut missing = Vec::new();
+    for name in protocol::names() {
+        let short = without_owner(&name);
+        let (group, _) = name.split_at(name.len() - 1);
+        let setting = Setting::find(&Name::new().with(name.as_bytes()).expect("short"));
+        let wants: &[&str] = match setting.map(|setting| setting.row().kind) {
+            Some(Kind::Constant | Kind::Text) => &["read", "refused"],
+            Some(_) => &["read", "set"],
+            None => &["asked for"],
+        };
+        for want in wants {
+            if !(was(&short, want) || setting.is_none() && was(group, "read")) {
+                missing.push(format!("{name}, {want}"));
+            }
+        }
+    }
+    assert!(missing.is_empty(), "in no transcript:\n{}", missing.join("\n"));
 }

@@ -137,11 +137,6 @@ impl Settings {
         self.system_large(system::CT) as f32 * 1e-6
     }
 
-    /// Whether sender and machine stop each other by XOFF.
-    pub fn has_xon_xoff(&self) -> bool {
-        self.system(system::EX) == 1
-    }
-
     /// Whether M0, M1 and M60 wait for cycle start.
     pub fn waits_at_stop(&self) -> bool {
         self.system(system::PSW) != 0
@@ -225,6 +220,16 @@ impl Settings {
     /// 0 none, 1 XON/XOFF, 2 RTS/CTS.
     pub fn flow_control(&self) -> u8 {
         self.system(system::EX)
+    }
+
+    /// Whether the sender counts characters, not lines.
+    pub fn counts_characters(&self) -> bool {
+        self.system(system::RXM) == 0
+    }
+
+    /// Whether the machine passes for a g2core.
+    pub fn is_g2core(&self) -> bool {
+        self.system(system::DIA) != 0
     }
 
     /// Plane at power-up and program end: 0 G17, 1 G18, 2 G19.

@@ -71,9 +71,16 @@ impl Settings {
         match setting.place() {
             Place::Small(slot) => self.small(slot).into(),
             Place::Large(slot) => self.large(slot),
+            Place::Constant => self.constant(setting),
             // One that is in EEPROM is asked for elsewhere.
-            Place::Constant | Place::Log => setting.default_value(),
+            Place::Log => setting.default_value(),
         }
+    }
+
+    /// Who we are depends on whom the sender takes us for.
+    fn constant(&self, setting: Setting) -> i32 {
+        let other = if self.is_g2core() { table::G2CORE.at(setting.number().into()) } else { None };
+        other.unwrap_or_else(|| setting.default_value())
     }
 
     /// Sets a value that [`Settings::check`] returned.

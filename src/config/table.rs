@@ -1,10 +1,11 @@
 //! The settings, as data in program memory: the one truth about names, storage, limits, defaults.
 //!
 //! Rows stand in the order that groups are listed in. A motor or axis setting has one row for all
-//! motors or axes; its defaults are a row of the table behind. Sizes: 54 rows of 17 bytes and 636
+//! motors or axes; its defaults are a row of the table behind. Sizes: 56 rows of 17 bytes and 644
 //! bytes of defaults; and those that are in EEPROM alone. TinyG's settings come first in each group, then those of Kerf alone.
 
 use super::name::token;
+use crate::boards::ACTIVE;
 use crate::progmem;
 
 /// How a setting is kept.
@@ -123,7 +124,7 @@ const fn up_to(mut row: Row, max: i32) -> Row {
 }
 
 /// Rows of [`SYSTEM`].
-pub const SYSTEM_ROWS: usize = 31;
+pub const SYSTEM_ROWS: usize = 33;
 /// Rows of [`MOTOR`].
 pub const MOTOR_ROWS: usize = 7;
 /// Rows of [`AXIS`].
@@ -159,7 +160,9 @@ pub mod system {
     pub const BD: u8 = 18;
     pub const OST: u8 = 19;
     pub const PSW: u8 = 20;
-    pub const SMALL: usize = 21;
+    pub const RXM: u8 = 21;
+    pub const DIA: u8 = 22;
+    pub const SMALL: usize = 23;
 
     pub const JA: u8 = 0;
     pub const CT: u8 = 1;
@@ -236,7 +239,8 @@ progmem! {
         up_to(fixed("si", system::SI, 0, 0, 100), 65_535).with(CLAMP),
         int("ec", system::EC, 0, 1),
         int("ee", system::EE, 0, 1),
-        int("ex", system::EX, 0, 2),
+        int("ex", system::EX, 0, if ACTIVE.has_handshake() { 2 } else { 1 }),
+        int("rxm", system::RXM, 0, 1),
         up_to(fixed("baud", system::BAUD, 0, 0, 1), 1_000_000).with(RANGE),
         int("gpl", system::GPL, 0, 2),
         int("gun", system::GUN, 0, 1),
@@ -246,15 +250,19 @@ progmem! {
         int("bd", system::BD, 0, 1),
         int("ost", system::OST, 0, 1),
         int("psw", system::PSW, 0, 1),
+        int("dia", system::DIA, 0, 1),
         int("spw", system::SPW, 1, 10).with(IDLE),
         int("dsu", system::DSU, 0, 100).with(IDLE),
     ];
 
     /// Their defaults, scaled as kept.
     pub static SYSTEM_DEFAULTS: [i32; SYSTEM_ROWS] = [
-        44_020, 970, 1, 8, 0, 10_000_000, 10_000, 0, 0, 200, 1, 2, 1, 1, 0, 1, 500, 0, 0, 1, 5,
-        0, 1, 1, 2, 0, 1, 1, 0, 2, 1,
+        44_020, 970, 1, 8, 0, 10_000_000, 10_000, 0, 0, 200, 1, 3, 1, 1, 0, 1, 500, 0, 0, 1, 1, 5,
+        0, 1, 1, 2, 0, 1, 1, 0, 0, 2, 1,
     ];
+
+    /// What the constants at the head of [`SYSTEM`] are while the machine passes for a g2core.
+    pub static G2CORE: [i32; 4] = [10_103, 990, 3, 0];
 
     /// The groups `1` to `4`.
     pub static MOTOR: [Row; MOTOR_ROWS] = [

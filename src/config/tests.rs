@@ -151,7 +151,7 @@ fn getters_have_their_units() {
     assert_eq!((settings.axis_mode(0), settings.axis_mode(3), settings.axis_mode(5)), (1, 3, 0));
     assert_eq!((settings.switch_min(0), settings.switch_max(2), settings.switch_max(5)), (1, 1, 0));
     assert_eq!(settings.status_interval_ms(), 500);
-    assert_eq!((settings.json_verbosity(), settings.motor_axis(3)), (2, 3));
+    assert_eq!((settings.json_verbosity(), settings.motor_axis(3)), (3, 3));
     assert_eq!(settings.step_ratio(0), StepRatio { num: 16, den: 125 });
     set(&mut settings, "1mi", "16", false).unwrap();
     assert_eq!(settings.step_ratio(0), StepRatio { num: 32, den: 125 });
@@ -163,7 +163,7 @@ fn getters_have_their_units() {
 
 #[test]
 fn ram_is_accounted_for() {
-    assert_eq!(size_of::<Settings>(), 428);
+    assert_eq!(size_of::<Settings>(), 432);
     assert!(size_of::<Row>() * 51 + (28 + 7 * 4 + 16 * 6) * 4 < 2048);
 }
 

@@ -73,6 +73,7 @@ progmem! {
         words(text!("expand LF to CRLF on TX"), OFF_ON),
         words(text!("enable echo"), OFF_ON),
         words(text!("enable flow control"), text!(" [0=off,1=XON/XOFF,2=RTS/CTS]")),
+        words(text!("serial RX mode"), text!(" [0=char_mode,1=line_mode]")),
         words(
             text!("USB baud rate"),
             text!(" [1=9600,2=19200,3=38400,4=57600,5=115200,6=230400]"),
@@ -85,6 +86,7 @@ progmem! {
         words(text!("block delete"), OFF_ON),
         words(text!("optional stop"), OFF_ON),
         words(text!("program stop waits"), OFF_ON),
+        words(text!("protocol dialect"), text!(" [0=TinyG,1=g2core]")),
         words(text!("step pulse width"), text!(" us")),
         words(text!("direction setup time"), text!(" us")),
     ];

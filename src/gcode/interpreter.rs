@@ -14,7 +14,7 @@
 
 use super::block::Block;
 use super::command::{Commands, Overrides};
-use super::modal::{Defaults, Modal, MotionMode, Units};
+use super::modal::{Defaults, Modal, MotionMode, Turn, Units};
 use super::setup::Setup;
 use super::state::State;
 use super::tables::{Edit, Ram, Row, Tables};
@@ -267,6 +267,12 @@ impl<T> Interpreter<T> {
     /// The N word of the last line, 0 if it had none.
     pub fn line(&self) -> u32 {
         self.state.line
+    }
+
+    /// Spindle and coolant are so: commands to switch them have been dropped.
+    pub fn set_outputs(&mut self, spindle: Turn, coolant: u8) {
+        self.state.modal.spindle = spindle;
+        self.state.modal.coolant = coolant;
     }
 
     /// Moves the model to where the machine is: after homing, and after the queue was dropped.

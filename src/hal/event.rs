@@ -3,13 +3,14 @@
 //! An interrupt never calls a `Waker`: it sets one bit of [`imp::flags`](super::imp::flags), which
 //! costs two cycles. The main loop turns bits into wake-ups between polls, in thread mode. A bit stays
 //! set until then, so no event is lost; events that repeat before the loop looks merge into one.
-//! Each event has one waiting task at most.
+//! Each event has one waiting task at most, but for the transmitters.
 
 use core::cell::Cell;
 use core::future::poll_fn;
 use core::task::{Poll, Waker};
 
 use super::imp;
+use super::serial::{PORTS, USB};
 
 /// What happened. The discriminant is the bit. Bits 5 and 6 are left to interrupts among themselves.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -31,9 +32,11 @@ pub enum Event {
 
 /// Events that tasks wait for: those below this bit.
 const WAITABLE: usize = 5;
+/// For each a task may wait, and for [`Event::Transmitted`] one on each port.
+const SLOTS: usize = WAITABLE + PORTS - 1;
 
 /// The waiting tasks. Thread mode only.
-pub struct Waiters([Cell<Option<Waker>>; WAITABLE]);
+pub struct Waiters([Cell<Option<Waker>>; SLOTS]);
 
 // SAFETY: touched in thread mode only, by `wait` and `dispatch`, neither of which preempts the other.
 unsafe impl Sync for Waiters {}
@@ -41,7 +44,7 @@ unsafe impl Sync for Waiters {}
 impl Waiters {
     /// Nobody waits.
     pub const fn new() -> Self {
-        Self([const { Cell::new(None) }; WAITABLE])
+        Self([const { Cell::new(None) }; SLOTS])
     }
 }
 
@@ -56,14 +59,24 @@ machine_static! {
 }
 
 /// Waits until `ready` gives a value, asking again after each `event`. Thread mode only.
-pub async fn wait<R>(event: Event, mut ready: impl FnMut() -> Option<R>) -> R {
+pub async fn wait<R>(event: Event, ready: impl FnMut() -> Option<R>) -> R {
+    wait_in(event as usize, ready).await
+}
+
+/// The same after each byte that any port has sent, for the task that waits for this one.
+pub async fn wait_transmitted<R>(port: u8, ready: impl FnMut() -> Option<R>) -> R {
+    let slot = if port == USB { Event::Transmitted as usize } else { WAITABLE };
+    wait_in(slot, ready).await
+}
+
+async fn wait_in<R>(slot: usize, mut ready: impl FnMut() -> Option<R>) -> R {
     poll_fn(|cx| {
         // An event between the question and the registration sets its bit, which the main loop
         // sees after this poll: nothing is missed.
         if let Some(value) = ready() {
             return Poll::Ready(value);
         }
-        if let Some(slot) = waiters().0.get(event as usize) {
+        if let Some(slot) = waiters().0.get(slot) {
             slot.set(Some(cx.waker().clone()));
         }
         Poll::Pending
@@ -80,7 +93,7 @@ pub async fn next(event: Event) {
 /// Wakes who waits for the events in `bits`. The main loop calls it, in thread mode.
 pub fn dispatch(bits: u8) {
     let mut left = bits & ((1 << WAITABLE) - 1);
-    for slot in &waiters().0 {
+    for slot in waiters().0.iter().take(WAITABLE) {
         if left == 0 {
             break;
         }
@@ -91,7 +104,14 @@ pub fn dispatch(bits: u8) {
         }
         left >>= 1;
     }
+    if PORTS > 1
+        && bits & (1 << Event::Transmitted as u8) != 0
+        && let Some(waker) = waiters().0.get(WAITABLE).and_then(Cell::take)
+    {
+        waker.wake();
+    }
     if bits & (1 << Event::Tick as u8) != 0 {
+        imp::uart::look();
         imp::time::wake_expired();
     }
 }

@@ -6,9 +6,21 @@
 //! so that each lost line is answered.
 
 use super::ring::{Consumer, Producer};
+use crate::boards::{ACTIVE, Serial};
 
-/// Size of each ring.
-pub const RING: usize = 256;
+/// How many ports there are, and the numbers of the one that every board has and of the other.
+pub const PORTS: usize = ACTIVE.serial.len();
+/// See [`PORTS`].
+pub const USB: u8 = 0;
+/// See [`PORTS`].
+pub const AUX: u8 = 1;
+
+/// Size of the receive ring of USB, a power of two.
+pub const RX_RING: usize = 256;
+/// The same of the other port.
+pub const AUX_RING: usize = 64;
+/// Size of each transmit ring, a power of two.
+pub const TX_RING: usize = 128;
 
 /// Bytes below this are marks. None of them is in a line of text; what comes of them from outside
 /// counts as damaged.
@@ -20,22 +32,79 @@ pub const CLEAN: u8 = 2;
 /// Of a mark: that was a carriage return, which a line feed may follow.
 pub const RETURNED: u8 = 4;
 
+/// No mark of a loss (none has this bit without [`CLEAN`]): here a `%` or `^d` stood in the stream.
+pub const CUT: u8 = RETURNED;
+/// The same: here a `~` stood.
+pub const GO: u8 = RETURNED | BEHIND_END;
+
 /// The reader is woken at the end of a line, and when this many bytes have come since: a power of two.
-pub const BATCH: u8 = 32;
+pub const fn batch(ring: usize) -> u8 {
+    (ring / 8) as u8
+}
 
 /// What stops the other side of a line, and lets it go on.
 pub const XOFF: u8 = 0x13;
 /// See [`XOFF`].
 pub const XON: u8 = 0x11;
-/// The sender is stopped when the receive ring holds more: most senders say 100 bytes more before they heed it.
-pub const HIGH_WATER: usize = 128;
+/// The sender is stopped when the receive ring holds more. Most say 100 bytes more before they heed XOFF.
+pub const fn high_water(ring: usize) -> usize {
+    ring / 2
+}
 /// And goes on when it holds less.
-pub const LOW_WATER: usize = 32;
+pub const fn low_water(ring: usize) -> usize {
+    ring / 8
+}
+
+/// How the two sides of a line stop each other.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Flow {
+    /// Not at all.
+    None,
+    /// By XOFF and XON.
+    Characters,
+    /// By RTS and CTS.
+    Pins,
+}
+
+impl Flow {
+    /// That of a port by the setting `ex`.
+    pub const fn of(port: u8, ex: u8) -> Flow {
+        let has_pins = matches!(hardware(port), Some(Serial { handshake: Some(_), .. }));
+        match ex {
+            // A bus belongs to others too, who would heed it.
+            1 if !is_shared(port) => Flow::Characters,
+            2 if has_pins => Flow::Pins,
+            _ => Flow::None,
+        }
+    }
+}
+
+/// What the board says of a port.
+pub const fn hardware(port: u8) -> Option<Serial> {
+    let port = port as usize;
+    if port < ACTIVE.serial.len() { Some(ACTIVE.serial[port]) } else { None }
+}
 
 /// Bytes received.
-pub type Received = Consumer<u8, RING>;
+pub type Received<const N: usize> = Consumer<u8, N>;
 /// Bytes to send. Call `imp::uart::kick` after filling it.
-pub type Outgoing = Producer<u8, RING>;
+pub type Outgoing = Producer<u8, TX_RING>;
+
+/// The ends of a port's rings that tasks have.
+pub type Ends<const N: usize> = (Received<N>, Outgoing);
+
+/// Those of all ports.
+pub struct AllEnds {
+    /// Of USB.
+    pub usb: Ends<RX_RING>,
+    /// Of the other port, if the board has one.
+    pub aux: Option<Ends<AUX_RING>>,
+}
+
+/// Whether others share the line of a port, so that it must not speak unasked.
+pub const fn is_shared(port: u8) -> bool {
+    matches!(hardware(port), Some(Serial { driver_enable: Some(_), .. }))
+}
 
 /// The mark that replaces `newest`, if it is none yet. The receive interrupt of the AVR has the twins of
 /// these two in assembly.

@@ -181,7 +181,7 @@ impl Governor {
 
     /// Brakes as hard as it may, for a stretch.
     #[inline(never)]
-    fn hard(&mut self, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
+    pub(super) fn hard(&mut self, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
         self.brake = Some(self.hardest());
         let stretch = self.run(left, ahead, nominal);
         self.brake = None;

@@ -47,6 +47,11 @@ pub const PHASE_START: u16 = STEP / 2 + PHASE_MARGIN;
 /// See [`PHASE_START`].
 pub const PHASE_MARGIN: u16 = 1024;
 
+/// The phase of a motor that is at a whole step, in the direction in which it counts.
+pub const fn start(backwards: bool) -> u16 {
+    if backwards { STEP - 1 - PHASE_START } else { PHASE_START }
+}
+
 /// Segments prepared ahead, plus one slot that stays empty. A power of two, for the assembly.
 pub const SEGMENTS: usize = 8;
 
@@ -139,6 +144,14 @@ impl Dda {
             backwards: 0,
             settle: 0,
             mode: NARROW,
+        }
+    }
+
+    /// Every motor is where its last pulse has put it, and no fraction of a step is on the way. For exec,
+    /// while no ticks come.
+    pub fn settle(&mut self) {
+        for (m, phase) in self.phase.iter_mut().enumerate() {
+            *phase = start(self.backwards & 1 << m != 0);
         }
     }
 

@@ -12,6 +12,11 @@
 //! A move without steps (shorter than a step, or of axes without motors) takes its time all the same:
 //! many of them in a row are no faster than a long one.
 //!
+//! In a feedhold the governor comes to rest instead ([`Governor::halt`]), over any number of lines, and then
+//! nothing begins: no line, dwell, output or stop. When the hold ends, the line goes on from where it is, and
+//! a dwell takes what is left of its time; or [`Exec::drop_all`] forgets all that is queued, and the last
+//! steps made are the position.
+//!
 //! Cost on AVR: 6,300 cycles for a short block without a jerk limit, with [`Prep`], the task and its
 //! interrupt; a third of them are the governor's floats.
 
@@ -49,6 +54,8 @@ pub enum Step {
     Standstill,
     /// No block.
     Idle,
+    /// A feedhold is on, and the steppers stand still.
+    Held,
 }
 
 /// What reports show of the motion that is being prepared.
@@ -70,6 +77,8 @@ pub struct Snapshot {
     pub finished: u32,
     /// Something moves, or dwells.
     pub running: bool,
+    /// A feedhold has brought it to rest.
+    pub held: bool,
     /// What the program came to last.
     pub program: Program,
     /// What the outputs are to be, bits of [`outputs`](crate::boards::outputs).
@@ -88,6 +97,7 @@ impl Snapshot {
             line: 0,
             finished: 0,
             running: false,
+            held: false,
             program: Program::Ready,
             outputs: 0,
         }
@@ -145,6 +155,8 @@ struct Running {
 pub struct Exec {
     // The largest is last: the CPU reaches 64 bytes from a pointer.
     running: Running,
+    /// A feedhold is on.
+    hold: bool,
     dwell_ms: u32,
     governor: Governor,
     prep: Prep,
@@ -180,7 +192,7 @@ impl Exec {
             done: false,
             jerk: false,
         };
-        Self { prep: Prep::new(), governor: Governor::new(), running, dwell_ms: 0 }
+        Self { prep: Prep::new(), governor: Governor::new(), running, hold: false, dwell_ms: 0 }
     }
 
     /// Does the next thing there is to do; puts a segment into `segment` if it says so. `standstill` says
@@ -194,6 +206,10 @@ impl Exec {
     ) -> Step {
         if self.prep.held(segment) {
             return Step::Segment;
+        }
+        if self.hold && self.rests(blocks, out) {
+            out.held = standstill;
+            return if standstill { Step::Held } else { Step::Standstill };
         }
         if self.dwell_ms > 0 {
             self.dwell(segment);
@@ -210,6 +226,58 @@ impl Exec {
             }
         }
         self.run(blocks, out, segment)
+    }
+
+    /// Begins a feedhold, or ends one. Cost: 15 if nothing changes.
+    #[inline(always)]
+    pub fn set_hold(&mut self, hold: bool, out: &mut Snapshot) {
+        if hold != self.hold {
+            self.hold = hold;
+            out.held = false;
+        }
+    }
+
+    /// In a hold: whether there is nothing more to prepare.
+    #[inline(never)]
+    fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
+        let running = &self.running;
+        let is_line = |block: &Block| matches!(block.body, Body::Line(_));
+        let goes_on = if running.active {
+            // What the end of a block has been planned as is handed out.
+            running.done || !self.governor.is_at_rest()
+        } else {
+            !self.governor.is_at_rest() && blocks.look(is_line) == Some(true)
+        };
+        if !goes_on {
+            self.halt(out);
+            self.prep.rest();
+        }
+        !goes_on
+    }
+
+    /// Forgets all that is queued. The steppers stand still, held; their last steps are the position from
+    /// now on. What has been said of positions before anything moves, and of drivers, holds.
+    ///
+    /// Cost: 600 a block.
+    #[inline(never)]
+    pub fn drop_all(&mut self, blocks: &mut BlockSource, out: &mut Snapshot) {
+        let mut moved = self.running.active || self.dwell_ms > 0;
+        self.prep.cut(&mut out.target);
+        self.running.active = false;
+        self.dwell_ms = 0;
+        out.left = 0.0;
+        out.running = false;
+        out.program = Program::Stopped;
+        while let Some(block) = blocks.oldest() {
+            match &block.body {
+                Body::Drivers(drivers) => self.prep.set_drivers(*drivers),
+                Body::SetPosition(steps) if !moved => out.target = *steps,
+                Body::Nothing | Body::SetPosition(_) => {}
+                _ => moved = true,
+            }
+            blocks.enter();
+            blocks.release();
+        }
     }
 
     /// Does what the oldest block asks for, which is no line.
@@ -333,7 +401,11 @@ impl Exec {
             }
         }
         let ahead = View { headroom: running.headroom, blocks };
-        let stretch = self.governor.stretch(running.left, running.cruise, &ahead, SEGMENT_S);
+        let stretch = if self.hold {
+            self.governor.halt(running.left, &ahead, SEGMENT_S)
+        } else {
+            self.governor.stretch(running.left, running.cruise, &ahead, SEGMENT_S)
+        };
         out.velocity = self.governor.velocity();
         let cycles = cycles_of(stretch.seconds);
         if stretch.ends {

@@ -145,6 +145,12 @@ impl Builder {
         Body::SetPosition(self.motors.map(|motor| motor.steps))
     }
 
+    /// The machine stands still, and its motors are at these steps.
+    pub fn place(&mut self, steps: &[i32; MOTORS]) {
+        self.motors = steps.map(Motor::counted);
+        self.stopped();
+    }
+
     /// The block for something that is done at rest.
     pub fn pause(&mut self, body: Body, line: u32) -> Block {
         self.stopped();

@@ -3,7 +3,7 @@
 //! ```text
 //! target -> line -> block queue -> exec -> segment ring -> dda -> pins
 //!           junction   |   ^        governor, prep
-//!                      horizon      smooth, brake, reach
+//!                      horizon      smooth, brake, reach, halt
 //! ```
 
 pub mod block;
@@ -15,6 +15,7 @@ pub mod exec;
 pub mod finished;
 pub mod float;
 pub mod governor;
+mod halt;
 pub mod horizon;
 pub mod junction;
 mod limits;

@@ -130,6 +130,11 @@ impl BlockQueue {
         self.ring.free()
     }
 
+    /// Exec has dropped all blocks: what comes next begins at rest.
+    pub fn restart(&mut self) {
+        self.last = None;
+    }
+
     /// Queues a block at whose start the machine stands still. False, and nothing done, when there is
     /// no room.
     pub fn push(&mut self, block: Block) -> bool {

@@ -31,6 +31,11 @@ impl Motor {
         Self { steps, rest: if saturated { i32::MIN } else { rest as i32 } }
     }
 
+    /// A motor that is at this step, wherever between two its axis may be.
+    pub fn counted(steps: i32) -> Self {
+        Self { steps, rest: i32::MIN }
+    }
+
     /// Its axis has gone `travel` to `position`. Cost: 400 for short moves.
     #[inline(never)]
     pub fn go(&mut self, ratio: StepRatio, travel: i32, position: Length) {

@@ -2,6 +2,7 @@
 
 use super::Mode;
 use super::fake::Fake;
+use crate::config::{Name, Setting};
 use crate::status::Status;
 use proptest::prelude::*;
 use std::string::String;
@@ -14,7 +15,10 @@ fn is_json(answer: &[u8]) -> bool {
     let mut separated = true;
     for &byte in answer {
         match byte {
-            _ if escaped => escaped = false,
+            _ if escaped => {
+                escaped = false;
+                separated &= matches!(byte, b'"' | b'\\' | b'n');
+            }
             b'\\' => escaped = true,
             b'"' => quoted = !quoted,
             _ if quoted => {}
@@ -59,6 +63,11 @@ fn lines() -> impl Strategy<Value = Vec<u8>> {
             "fb",
             "defa",
             "help",
+            "txt",
+            "tid",
+            "msg",
+            "rxm",
+            "boot",
             "aReallyVeryLongNameThatNobodyHas",
         ]),
         prop::sample::select(vec![
@@ -70,6 +79,11 @@ fn lines() -> impl Strategy<Value = Vec<u8>> {
             "-0012345678.123456789e-1",
             "3.5",
             "\"g0x1 (msg \\\"a)\"",
+            "\"g0 (msg a\\\\\\q)\"",
+            "\"$x\"",
+            "\"?\"",
+            "\"{fb:n}\"",
+            "\"$foo=\\\"\"",
             "{}",
             "{vm:1,fr:n}",
             "{posx:t,foo:t}",
@@ -91,8 +105,14 @@ fn sets_style(line: &[u8]) -> bool {
 
 proptest! {
     #[test]
-    fn every_line_gets_one_response(line in lines(), mode in 0..2u8, status in 0..3usize) {
+    fn every_line_gets_one_response(
+        line in lines(), mode in 0..2u8, status in 0..3usize, dialect in 0..3u8,
+    ) {
         let mut fake = Fake::new();
+        for (name, value) in [("rxm", dialect != 1), ("dia", dialect == 2)] {
+            let setting = Setting::find(&Name::new().with(name.as_bytes()).unwrap()).unwrap();
+            fake.settings.store(setting, value.into());
+        }
         fake.mode = if mode == 0 { Mode::Json } else { Mode::Text };
         fake.outcome = [Status::Ok, Status::InverseTimeNotAllowed, Status::Noop][status];
         let answer = fake.send(&line);
@@ -113,7 +133,8 @@ proptest! {
             }
             Mode::Text => {
                 let last = answer.trim_ascii_end().rsplit(|&b| b == b'\n').next();
-                prop_assert!(last.is_some_and(|last| last.starts_with(b"tinyg [")));
+                let prompts: [&[u8]; 2] = [b"tinyg [", b"g2core["];
+                prop_assert!(last.is_some_and(|last| prompts.iter().any(|p| last.starts_with(p))));
                 prop_assert!(lines < 200);
             }
         }

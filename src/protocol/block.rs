@@ -1,9 +1,12 @@
 //! What a response tells of its G-code block: the block itself, its message, its line number.
 
+use super::Format;
+use super::dialect::Dialect;
 use super::machine::Machine;
 use super::request::{Context, Phase, Request};
 use super::value::Value;
-use super::write::{Format, Out, Writer};
+use super::wrapped::pass_on;
+use super::write::{Ending, Out, Writer};
 use crate::config::{Fixed, Settings};
 use crate::status::Status;
 use crate::text;
@@ -23,13 +26,22 @@ pub fn is_brief(settings: &Settings, numbered: bool) -> bool {
     }
 }
 
-/// The response to a block that has run, of which nothing is to be shown; `free` line slots.
-pub fn put_brief(settings: &Settings, free: u8, out: &mut impl Out) {
+/// The response to a block that has run, of which nothing is to be shown.
+pub fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out) {
+    if Dialect::of(settings) != Dialect::Lines || settings.expand_line_feeds() {
+        return put_other(settings, ending, out);
+    }
     let strict = settings.json_strict();
     out.put_text(if strict { text!("{\"r\":{},\"f\":[1,0,") } else { text!("{r:{},f:[1,0,") });
     // There are fewer than ten.
-    out.put(b'0' + free % 10);
+    out.put(b'0' + ending.free % 10);
     out.put_text(text!("]}\n"));
+}
+
+/// The same in another dialect.
+#[inline(never)]
+fn put_other(settings: &Settings, ending: Ending, out: &mut impl Out) {
+    Writer::frame(out, &mut Format::json(settings)).empty_response(Status::Ok, ending);
 }
 
 impl Request {
@@ -43,9 +55,9 @@ impl Request {
     pub(super) fn brief<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) -> bool {
         let brief = self.is_brief(c.machine);
         if brief {
-            let free = c.machine.value(Value::SlotsFree);
-            let mut format = Format::json(c.machine.settings().json_strict());
-            Writer::frame(c.out, &mut format).empty_response(self.status as u8, free);
+            let ending = self.ending(c.machine);
+            let mut format = Format::json(c.machine.settings());
+            Writer::frame(c.out, &mut format).empty_response(self.status, ending);
             self.phase = Phase::Done;
         }
         brief
@@ -56,9 +68,10 @@ impl Request {
             return;
         }
         self.open(c);
+        self.unwrap_block(c);
         self.phase = Phase::Message;
         if self.verbosity >= BLOCKS {
-            let mut writer = Writer::body(c.out, &mut self.format);
+            let mut writer = Writer::message(c.out, &mut self.format);
             writer.key_text(text!("gc"));
             writer.byte(b'"');
             self.item = self.block.start;
@@ -68,7 +81,7 @@ impl Request {
 
     /// The block as it is read: upper case, without blanks and comments.
     pub(super) fn block_text<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        let mut writer = Writer::body(c.out, &mut self.format);
+        let mut writer = Writer::message(c.out, &mut self.format);
         for _ in 0..super::CHUNK / 2 {
             match byte_of(c.line, self.item, self.block.end) {
                 None | Some(b'(' | b';') => {
@@ -93,7 +106,7 @@ impl Request {
         self.item = start;
         self.phase = Phase::MessageText;
         if !self.format.is_plain() {
-            let mut writer = Writer::body(c.out, &mut self.format);
+            let mut writer = Writer::message(c.out, &mut self.format);
             writer.key_text(text!("msg"));
             writer.byte(b'"');
         }
@@ -101,7 +114,7 @@ impl Request {
 
     pub(super) fn message_text<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let plain = self.format.is_plain();
-        let mut writer = Writer::body(c.out, &mut self.format);
+        let mut writer = Writer::message(c.out, &mut self.format);
         for _ in 0..super::CHUNK / 2 {
             match byte_of(c.line, self.item, self.block.end) {
                 None | Some(b')') => {
@@ -112,6 +125,10 @@ impl Request {
                     return;
                 }
                 Some(byte) if plain => writer.printable(byte),
+                Some(_) if self.is_json => {
+                    self.item += pass_on(c.line, self.item, self.block.end, &mut writer);
+                    continue;
+                }
                 Some(byte) => writer.escaped(byte),
             }
             self.item = self.item.saturating_add(1);
@@ -120,15 +137,15 @@ impl Request {
 
     pub(super) fn number<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         if self.format.is_plain() {
-            let mut writer = Writer::body(c.out, &mut self.format);
+            let mut writer = Writer::message(c.out, &mut self.format);
             writer.text(self.warning.text());
-            writer.byte(b'\n');
+            writer.end_line();
             self.phase = Phase::Done;
             return;
         }
         let line = c.machine.value(Value::BlockLine);
         if self.verbosity >= LINE_NUMBERS && line != 0 {
-            let mut writer = Writer::body(c.out, &mut self.format);
+            let mut writer = Writer::message(c.out, &mut self.format);
             writer.key_text(text!("n"));
             writer.fixed(Fixed::int(line));
         }

@@ -30,7 +30,11 @@ impl Request {
         match target {
             Target::Group(group) if null => self.enlist(Some(group), None),
             // Neither groups nor blocks can be given a value here.
-            Target::Group(_) | Target::Action(Action::Block) => self.refuse(),
+            Target::Group(_)
+            | Target::Action(Action::Block | Action::Text | Action::Message | Action::Id) => {
+                self.refuse();
+            }
+            Target::Action(Action::Exception) => self.fail(Status::ExceptionReport, Mode::Text),
             Target::Action(Action::Help) => self.help(help::SETTINGS),
             Target::Action(Action::Test) if null => self.help(help::TESTS),
             Target::Action(Action::Program) if null => {
@@ -38,6 +42,7 @@ impl Request {
                 self.phase = Phase::Program;
             }
             Target::Action(Action::Defaults) if null => self.help(help::DEFAULTS),
+            Target::Action(Action::Boot) if null => self.help(help::BOOT),
             _ => self.execute(&pair, target, c),
         }
     }

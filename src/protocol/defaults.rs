@@ -1,4 +1,5 @@
-//! Restoring the defaults, and what is told of it: who we are, status 15 and a message.
+//! What wants to be sure: restoring the defaults, of which is told who we are, status 15 and a message; and the boot
+//! loader, status 16.
 
 use super::json::{Kind, Pair};
 use super::machine::{Machine, Warning};
@@ -16,16 +17,7 @@ impl Request {
         pair: &Pair,
         c: &mut Context<'_, M, O>,
     ) -> Outcome {
-        let sure = match pair.kind {
-            Kind::True => true,
-            Kind::Number => {
-                let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
-                number.fixed(0, false) != Some(0)
-            }
-            Kind::Null | Kind::False => false,
-            Kind::Text | Kind::Object => return Err(Status::UnsupportedType),
-        };
-        if !sure {
+        if !is_sure(pair, c)? {
             return self.advise(Warning::AskDefaults);
         }
         // It is the answer: nothing may have been told before.
@@ -38,6 +30,24 @@ impl Request {
         self.item = 0;
         self.phase = Phase::Greeting;
         Ok(None)
+    }
+
+    /// Has the machine start anew, in its boot loader, if the value of `pair` says so; else tells how to.
+    pub(super) fn boot<M: Machine, O>(
+        &mut self,
+        pair: &Pair,
+        c: &mut Context<'_, M, O>,
+    ) -> Outcome {
+        if !is_sure(pair, c)? {
+            return self.advise(Warning::AskBoot);
+        }
+        match c.machine.restart(true) {
+            Status::Ok => {
+                self.warning = Warning::Boot;
+                Err(Status::BootLoader)
+            }
+            status => Err(status),
+        }
     }
 
     /// Tells where to go on.
@@ -54,5 +64,18 @@ impl Request {
             self.item = 0;
             self.phase = Phase::Pair;
         }
+    }
+}
+
+/// Whether the value of a pair says that something is to be done.
+pub(super) fn is_sure<M, O>(pair: &Pair, c: &Context<'_, M, O>) -> Result<bool, Status> {
+    match pair.kind {
+        Kind::True => Ok(true),
+        Kind::Number => {
+            let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
+            Ok(number.fixed(0, false) != Some(0))
+        }
+        Kind::Null | Kind::False => Ok(false),
+        Kind::Text | Kind::Object => Err(Status::UnsupportedType),
     }
 }

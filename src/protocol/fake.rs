@@ -1,6 +1,8 @@
 //! A machine for tests, and the caller that steps requests for it.
 
-use super::{CHUNK, Machine, Mode, Next, Out, Request, StatusReport, Store, Value, Warning};
+use super::{
+    CHUNK, Checksum, Machine, Mode, Next, Out, Request, StatusReport, Store, Value, Warning,
+};
 use crate::config::{Setting, Settings};
 use crate::gcode::tables::Row;
 use crate::status::Status;
@@ -53,14 +55,17 @@ impl Fake {
     /// What the machine answers to a line.
     pub fn send(&mut self, line: &[u8]) -> Vec<u8> {
         let mut mode = self.mode;
-        let request = Request::begin(line, &mut mode);
+        let length = line.len() as u16 + 1;
+        let request = Request::begin(line, length, &mut mode, &self.settings);
         self.mode = mode;
         let Some(mut request) = request else { return Vec::new() };
         let mut answer = Vec::new();
+        let mut sum = None;
         for _ in 0..1000 {
-            let mut chunk = Chunk::default();
+            let mut chunk = Chunk { bytes: Vec::new(), sum };
             let next = request.step(line, self, &mut chunk);
-            answer.extend(chunk.0);
+            sum = chunk.sum;
+            answer.extend(chunk.bytes);
             match next {
                 Next::More => {}
                 Next::Wait => assert!(self.waits),
@@ -85,12 +90,26 @@ impl Fake {
 
 /// Output that insists on the limit of a step.
 #[derive(Default)]
-pub struct Chunk(pub Vec<u8>);
+pub struct Chunk {
+    pub bytes: Vec<u8>,
+    pub sum: Option<Checksum>,
+}
 
 impl Out for Chunk {
     fn put(&mut self, byte: u8) {
-        self.0.push(byte);
-        assert!(self.0.len() <= CHUNK, "a step puts too much");
+        self.bytes.push(byte);
+        assert!(self.bytes.len() <= CHUNK, "a step puts too much");
+        if let Some(sum) = &mut self.sum {
+            sum.add(byte);
+        }
+    }
+
+    fn begin_sum(&mut self) {
+        self.sum = Some(Checksum::default());
+    }
+
+    fn take_sum(&mut self) -> u16 {
+        self.sum.take().unwrap_or_default().value()
     }
 }
 
@@ -132,7 +151,7 @@ impl Machine for Fake {
             Value::Coordinates | Value::FeedMode => 1,
             Value::MotionMode => 4,
             Value::QueueFree => 32,
-            Value::SlotsFree => 7,
+            Value::SlotsFree | Value::Room => 7,
             Value::BlockLine | Value::FinishedLine => self.line,
             Value::Position(0) => self.position,
             Value::MachinePosition(_) => i32::MIN,
@@ -159,6 +178,10 @@ impl Machine for Fake {
         Status::Ok
     }
 
+    fn flush(&mut self) -> Status {
+        if self.state == 5 { Status::NotAccepted } else { Status::Ok }
+    }
+
     fn start_job(&mut self, number: u8) -> Status {
         if number < 20 { Status::Ok } else { Status::Error }
     }
@@ -176,6 +199,10 @@ impl Machine for Fake {
 
     fn program(&mut self, at: u16) -> Option<u8> {
         self.program.get(usize::from(at)).copied()
+    }
+
+    fn restart(&mut self, boot: bool) -> Status {
+        if boot && self.state == 5 { Status::NotAccepted } else { Status::Ok }
     }
 
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {

@@ -223,5 +223,5 @@ fn put_tail<M: Machine, O: Out>(
         writer.text(MODES.at(mode).unwrap_or(text!("")));
     }
     writer.text(words.tail);
-    writer.byte(b'\n');
+    writer.end_line();
 }

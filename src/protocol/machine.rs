@@ -20,8 +20,16 @@ pub enum Warning {
     Microsteps,
     /// The velocity limits of an axis were lowered to what its motors can follow.
     Velocity,
+    /// The line has no such rate.
+    Baud,
+    /// There is no such built-in job.
+    Test,
     /// Where help is.
     Help,
+    /// How to get into the boot loader.
+    AskBoot,
+    /// The boot loader is next.
+    Boot,
     /// How to restore the defaults.
     AskDefaults,
     /// The defaults have been restored.
@@ -37,11 +45,15 @@ impl Warning {
 
 progmem! {
     // A table, for what the compiler makes of a `match` would be in RAM.
-    static WARNINGS: [Text; 6] = [
+    static WARNINGS: [Text; 10] = [
         text!(""),
         text!("*** WARNING *** Setting non-standard microstep value"),
         text!("*** WARNING *** Velocity limited by the step rate"),
+        text!("*** WARNING *** Unsupported baud rate specified"),
+        text!("Test not found"),
         text!("Send $h for help, {sys:n} for the settings"),
+        text!("Send {boot:true} to enter boot loader"),
+        text!("Entering boot loader"),
         text!("Send {defa:true} to reset to default settings"),
         text!("Initializing configs to default settings"),
     ];
@@ -82,12 +94,17 @@ pub trait Machine {
     fn restore(&mut self) -> Status;
     /// Ends an alarm, if there is one.
     fn clear(&mut self) -> Status;
+    /// Drops what is queued, or refuses to.
+    fn flush(&mut self) -> Status;
     /// Starts a built-in job, or ends the one that runs: 0.
     fn start_job(&mut self, number: u8) -> Status;
     /// Does something to the program that is kept. [`Status::Again`]: it is not done yet, and is to be asked for again.
     fn store(&mut self, what: Store<'_>) -> Result<(), Status>;
     /// A byte of the program that is kept.
     fn program(&mut self, at: u16) -> Option<u8>;
+    /// Starts the machine anew when the response has left, in its boot loader if `boot`, for which it has to be at
+    /// rest.
+    fn restart(&mut self, boot: bool) -> Status;
     /// Powers a motor, or takes its power; all of them for `None`.
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status;
 

@@ -5,14 +5,20 @@
 //! No step puts more than [`CHUNK`] bytes, keeps a reference, allocates or recurses. Tables and
 //! texts are in program memory.
 //!
-//! Wire format: TinyG 0.97 build 440.20 with the three-element footer `[1,status,free line slots]`.
+//! Wire format: TinyG 0.97 build 440.20, by default with the three-element footer `[1,status,free line slots]`;
+//! [`dialect`] has what can be chosen instead.
 
 /// Bytes that one step puts at most.
 pub const CHUNK: usize = 64;
 
+mod apply;
 mod block;
+mod checksum;
 mod command;
 mod defaults;
+pub mod dialect;
+mod ending;
+mod format;
 mod help;
 mod json;
 mod listing;
@@ -28,18 +34,25 @@ mod screen;
 mod status_text;
 mod token;
 mod value;
+mod wrapped;
 mod write;
 
 pub use block::{is_brief, put_brief};
+pub use checksum::Checksum;
+pub use dialect::Dialect;
+pub use format::Format;
 pub use help::asks_help;
 pub use json::Span;
 pub use machine::{Machine, Store, Warning};
-pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report};
+pub use prompt::put_ready_prompt;
+pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report, receive_report};
 pub use request::{Next, Request};
 pub use status_text::status_text;
 pub use token::Token;
+#[cfg(not(target_arch = "avr"))]
+pub use token::names;
 pub use value::{Value, thousandths};
-pub use write::{Format, Out};
+pub use write::{Ending, Out, put_line_end};
 
 /// How the host wants to be spoken to: as it spoke last.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -54,8 +67,8 @@ impl Mode {
     /// The format of unasked reports.
     fn format(self, machine: &impl Machine) -> Format {
         match self {
-            Mode::Json => Format::json(machine.settings().json_strict()),
-            Mode::Text => Format::plain(),
+            Mode::Json => Format::json(machine.settings()),
+            Mode::Text => Format::plain(machine.settings()),
         }
     }
 }

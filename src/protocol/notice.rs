@@ -1,10 +1,10 @@
 //! What the machine tells once: that it is ready, and that something has gone wrong.
 
+use super::Format;
 use super::machine::Machine;
-use super::status_text::status_text;
 use super::token::Token;
-use super::write::{Format, Out, Writer};
-use crate::config::Fixed;
+use super::write::{Ending, Out, Writer};
+use crate::config::{Fixed, Settings};
 use crate::status::Status;
 use crate::text;
 
@@ -12,7 +12,17 @@ use crate::text;
 /// `{"r":{"fv":0.970,"fb":440.20,"hp":1,"hv":8,"id":"...","msg":"SYSTEM READY"},"f":[1,0,0]}`.
 pub struct Banner {
     stage: u8,
+    occasion: Occasion,
     format: Format,
+}
+
+/// Why the machine says who it is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Occasion {
+    /// Nobody can read its memory of settings: it has taken the defaults.
+    Defaults,
+    /// It is ready.
+    Ready,
 }
 
 /// The rows of `sys` that the greeting tells, in its order.
@@ -20,19 +30,15 @@ pub(super) const BANNER_ROWS: u8 = 5;
 
 impl Banner {
     /// Begins. It is whole whatever the verbosity, unless that is 0.
-    pub fn begin(machine: &impl Machine) -> Banner {
-        let settings = machine.settings();
-        let verbosity = if settings.json_verbosity() == 0 { 0 } else { u8::MAX };
-        Banner { stage: 0, format: Format::response(settings.json_strict(), verbosity) }
+    pub fn begin(occasion: Occasion, settings: &Settings) -> Banner {
+        Banner { stage: 0, occasion, format: Format::announcement(settings) }
     }
 
     /// Does the next part. Whether there is more to do.
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
-        let mut writer = Writer::body(out, &mut self.format);
+        let mut writer = Writer::frame(out, &mut self.format);
         if self.stage == 0 {
-            writer.open();
-            writer.key_text(text!("r"));
-            writer.open();
+            writer.begin_response();
         }
         match self.stage {
             0..BANNER_ROWS => {
@@ -40,11 +46,17 @@ impl Banner {
             }
             BANNER_ROWS => {
                 writer.key_text(text!("msg"));
-                writer.string(text!("SYSTEM READY"));
+                writer.string(match self.occasion {
+                    Occasion::Ready => text!("SYSTEM READY"),
+                    Occasion::Defaults => text!("Initializing configs to default settings"),
+                });
             }
             _ => {
-                writer.close();
-                writer.footer(Status::Ok as u8, 0);
+                let status = match self.occasion {
+                    Occasion::Ready => Status::Ok,
+                    Occasion::Defaults => Status::Initializing,
+                };
+                writer.end_response(status, Ending::default());
                 return false;
             }
         }
@@ -71,36 +83,56 @@ pub struct Exception {
 
 impl Exception {
     /// Begins.
-    pub fn begin(status: Status, machine: &impl Machine) -> Exception {
-        Exception { stage: 0, status, format: Format::json(machine.settings().json_strict()) }
+    pub fn begin(status: Status, settings: &Settings) -> Exception {
+        Exception { stage: 0, status, format: Format::json(settings) }
     }
 
     /// Does the next part. Whether there is more to do.
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         let mut writer = Writer::body(out, &mut self.format);
-        match self.stage {
-            0 => {
-                writer.open();
-                writer.key_text(text!("er"));
-                writer.open();
-                let build = Token::system(0);
-                writer.key(build.name().bytes());
-                writer.shown(build.read(machine));
-                writer.key_text(text!("st"));
-                writer.fixed(Fixed::int((self.status as u8).into()));
-            }
-            1 => {
-                if let Some(text) = status_text(self.status) {
-                    writer.key_text(text!("msg"));
-                    writer.string(text);
-                }
-            }
-            _ => {
-                writer.text(text!("}}\n"));
-                return false;
+        let more = put_exception(self.stage, self.status, machine, &mut writer);
+        self.stage += 1;
+        more
+    }
+}
+
+/// A part of an exception report. Whether there is more to do.
+pub(super) fn put_exception<O: Out>(
+    stage: u8,
+    status: Status,
+    machine: &mut impl Machine,
+    writer: &mut Writer<'_, O>,
+) -> bool {
+    match stage {
+        0 => {
+            writer.open();
+            writer.key_text(text!("er"));
+            writer.open();
+            let build = Token::system(0);
+            writer.key(build.name().bytes());
+            writer.shown(build.read(machine));
+            writer.key_text(text!("st"));
+            writer.fixed(Fixed::int(writer.dialect().code(status).into()));
+        }
+        1 => {
+            if let Some(text) = writer.dialect().status_text(status) {
+                writer.key_text(text!("msg"));
+                writer.string(text);
             }
         }
-        self.stage += 1;
-        true
+        _ => {
+            writer.text(text!("}}"));
+            writer.end_line();
+            return false;
+        }
     }
+    true
+}
+
+/// Answers the question whether anybody is there.
+pub fn acknowledge(settings: &Settings, out: &mut impl Out) {
+    let mut format = Format::json(settings);
+    let mut writer = Writer::body(out, &mut format);
+    writer.text(text!("{\"ack\":true}"));
+    writer.end_line();
 }

@@ -1,18 +1,15 @@
-//! Names and values of a JSON line: reading, setting, doing, and telling the result.
+//! Names and values of a JSON line: walking through them, and telling what has come of each.
 
+use super::Format;
 use super::json::{self, Kind, Pair};
-use super::machine::{Machine, Warning};
-use super::program;
+use super::machine::Machine;
+use super::notice::put_exception;
 use super::request::{Context, Phase, Request};
-use super::token::{Action, Group, Subject, Target, Token, resolve};
-use super::value::{Form, place_form};
+use super::token::{Action, Group, Target, Token, resolve};
 use super::write::{Out, Writer};
-use crate::config::table;
-use crate::config::{Name, Number, Setting};
-use crate::gcode::tables::Row;
+use crate::config::Name;
 use crate::status::Status;
 use crate::text;
-use crate::units::Length;
 
 /// What to tell of a pair that was carried out.
 pub(super) type Outcome = Result<Option<Token>, Status>;
@@ -33,12 +30,47 @@ impl Request {
             }
             (Target::Group(group), Kind::Object) => self.enter(group, &pair, Phase::Member, c),
             (Target::Action(Action::Block), Kind::Text) if !self.begun => {
-                self.at = pair.next;
                 self.block = pair.value;
                 self.phase = Phase::Gcode;
             }
             (Target::Action(Action::Program), Kind::Null) => self.show_program(&pair, c),
-            _ => self.carry_out(&pair, target, c),
+            (Target::Action(Action::Text), Kind::Text) => {
+                self.at = pair.next;
+                let Err(status) = self.wrap(&pair, c) else { return };
+                self.open(c);
+                self.refuse_pair(&pair, target, status, c);
+            }
+            (Target::Action(Action::Message), Kind::Text) => self.give_string(&pair, c),
+            // It is told when everything else has been, so that a block may still be run.
+            (Target::Action(Action::Id), Kind::Number | Kind::Null) => self.identified = true,
+            (Target::Action(Action::Id), _) => {
+                self.status = Status::UnsupportedType;
+                self.phase = Phase::Warning;
+            }
+            (Target::Action(Action::Exception), _) if !self.begun => {
+                self.format = Format::json(c.machine.settings());
+                self.block = pair.name;
+                self.item = 0;
+                self.phase = Phase::Raise;
+            }
+            // It goes on by itself: a pair may have to wait.
+            _ => return self.carry_out(&pair, target, c),
+        }
+        self.at = pair.next;
+    }
+
+    /// A part of an exception report that was asked for; then the response.
+    pub(super) fn raise<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let (stage, status) = (self.item, Status::ExceptionReport);
+        self.item += 1;
+        let mut writer = Writer::body(c.out, &mut self.format);
+        if !put_exception(stage, status, c.machine, &mut writer) {
+            self.open(c);
+            let mut writer = Writer::body(c.out, &mut self.format);
+            writer.key(self.block.of(c.line));
+            writer.text(text!("null"));
+            self.status = status;
+            self.phase = Phase::Warning;
         }
     }
 
@@ -74,8 +106,11 @@ impl Request {
         };
         let prefix = self.group.map_or(Name::new(), Group::prefix);
         let target = match resolve(prefix, pair.name.of(c.line)) {
-            // A group has no groups, and no G-code, in it.
-            Target::Group(_) | Target::Action(Action::Block) => Target::Unknown,
+            // A group has no groups, and no strings, in it.
+            Target::Group(_) => Target::Unknown,
+            Target::Action(Action::Block | Action::Text | Action::Message | Action::Id) => {
+                Target::Unknown
+            }
             target => target,
         };
         self.carry_out(&pair, target, c);
@@ -157,71 +192,29 @@ impl Request {
             }
             Ok(None) if self.phase == Phase::Greeting => {}
             Ok(None) => self.tell_sent(pair, true, c),
-            Err(status) => {
-                self.status = status;
-                self.tell_sent(pair, target != Target::Unknown, c);
-                self.leave(c);
-            }
+            Err(status) => self.refuse_pair(pair, target, status, c),
         }
     }
 
-    pub(super) fn apply<M: Machine, O: Out>(
+    fn refuse_pair<M: Machine, O: Out>(
         &mut self,
         pair: &Pair,
         target: Target,
+        status: Status,
         c: &mut Context<'_, M, O>,
-    ) -> Outcome {
-        match (target, pair.kind) {
-            (Target::Unknown, _) => Err(Status::UnrecognizedName),
-            (_, Kind::Object) | (Target::Group(_), _) => Err(Status::UnsupportedType),
-            (Target::Token(token), Kind::Null) => Ok(Some(token)),
-            (Target::Token(token), _) => {
-                match token.subject() {
-                    Some(Subject::Setting(setting)) => self.set(setting, pair, c)?,
-                    Some(Subject::Row(row, axis)) if !row.is_stored() => {
-                        set_row(row, axis, pair, c)?
-                    }
-                    _ => return Err(Status::ReadOnly),
-                }
-                Ok(Some(token))
-            }
-            (Target::Action(Action::Help), _) => self.advise(Warning::Help),
-            (Target::Action(Action::Defaults), _) => self.restore(pair, c),
-            (Target::Action(action), _) => act(action, pair, c).map(|()| None),
-        }
-    }
-
-    fn set<M: Machine, O: Out>(
-        &mut self,
-        setting: Setting,
-        pair: &Pair,
-        c: &mut Context<'_, M, O>,
-    ) -> Result<(), Status> {
-        let small = match setting.row().kind {
-            table::Kind::Small => true,
-            table::Kind::Large | table::Kind::Cold => false,
-            table::Kind::Data | table::Kind::Job => {
-                let value = bits(pair, c.line)?;
-                return c.machine.set(setting, value).map(|_| ());
-            }
-            table::Kind::Constant | table::Kind::Text => return Err(Status::ReadOnly),
-        };
-        let number = match pair.kind {
-            Kind::Number => Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?,
-            Kind::True | Kind::False if small => Number::int((pair.kind == Kind::True).into()),
-            _ => return Err(Status::UnsupportedType),
-        };
-        let inches = c.machine.inches();
-        let value = c.machine.settings().check(setting, number, inches)?;
-        let warning = c.machine.set(setting, value)?;
-        let unusual = setting.is_microsteps() && !matches!(value, 1 | 2 | 4 | 8);
-        let unusual = if unusual { Warning::Microsteps } else { Warning::None };
-        self.warning = self.warning.max(warning).max(unusual);
-        Ok(())
+    ) {
+        self.status = status;
+        self.tell_sent(pair, target != Target::Unknown, c);
+        self.leave(c);
     }
 
     /// Tells a pair as it was sent; null if its name means nothing, or for a string.
-    fn tell_sent<M, O: Out>(&mut self, pair: &Pair, known: bool, c: &mut Context<'_, M, O>) {
+    pub(super) fn tell_sent<M, O: Out>(
+        &mut self,
+        pair: &Pair,
+        known: bool,
+        c: &mut Context<'_, M, O>,
+    ) {
         let mut writer = Writer::body(c.out, &mut self.format);
         writer.key(pair.name.of(c.line));
         match pair.kind {
@@ -233,36 +226,6 @@ impl Request {
     }
 }
 
-/// The value of a pair as 32 bits: `"0x2a"`.
-fn bits(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
-    if !matches!(pair.kind, Kind::Text | Kind::Number) {
-        return Err(Status::UnsupportedType);
-    }
-    let digits = match pair.value.of(line) {
-        [b'0', b'x' | b'X', digits @ ..] if (1..=8).contains(&digits.len()) => digits,
-        _ => return Err(Status::BadNumber),
-    };
-    let digit = |bits: u32, byte: &u8| Some(bits << 4 | char::from(*byte).to_digit(16)?);
-    let bits = digits.iter().try_fold(0, digit).ok_or(Status::BadNumber)?;
-    Ok(bits.cast_signed())
-}
-
-/// Sets a value of the interpreter's tables.
-fn set_row<M: Machine, O>(
-    row: Row,
-    axis: u8,
-    pair: &Pair,
-    c: &mut Context<'_, M, O>,
-) -> Result<(), Status> {
-    if pair.kind != Kind::Number {
-        return Err(Status::UnsupportedType);
-    }
-    let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
-    let inches = c.machine.inches() && place_form(axis) == Form::Length;
-    let value = number.fixed(Length::DECIMALS, inches).ok_or(Status::OutOfRange)?;
-    c.machine.set_row(row, axis, Length(value))
-}
-
 /// A number without the leading zeros that JSON does not allow.
 fn plain_number(mut text: &[u8]) -> &[u8] {
     while let [b'0', rest @ ..] = text
@@ -271,52 +234,4 @@ fn plain_number(mut text: &[u8]) -> &[u8] {
         text = rest;
     }
     text
-}
-
-fn done(status: Status) -> Result<(), Status> {
-    if status == Status::Ok { Ok(()) } else { Err(status) }
-}
-
-/// The value of a pair as a whole number.
-fn whole<M, O>(pair: &Pair, c: &Context<'_, M, O>) -> Result<i32, Status> {
-    if pair.kind != Kind::Number {
-        return Err(Status::UnsupportedType);
-    }
-    Number::parse(pair.value.of(c.line))
-        .filter(|number| number.is_integer())
-        .and_then(|number| number.fixed(0, false))
-        .ok_or(Status::BadNumber)
-}
-
-fn act<M: Machine, O>(
-    action: Action,
-    pair: &Pair,
-    c: &mut Context<'_, M, O>,
-) -> Result<(), Status> {
-    let on = match action {
-        // A block is run only where nothing of the response is out yet.
-        Action::Block if pair.kind == Kind::Null => return Ok(()),
-        Action::Block if pair.kind == Kind::Text => return Err(Status::NotAccepted),
-        Action::Block => return Err(Status::UnsupportedType),
-        Action::Clear => return done(c.machine.clear()),
-        Action::Test if pair.kind == Kind::Null => return Ok(()),
-        Action::Test => {
-            let number = whole(pair, c)?;
-            let number = u8::try_from(number).map_err(|_| Status::OutOfRange)?;
-            return done(c.machine.start_job(number));
-        }
-        Action::Program => return program::store(pair, c),
-        Action::Energize => true,
-        Action::Release => false,
-        Action::Defaults | Action::Help => return Ok(()),
-    };
-    let motor = match pair.kind {
-        Kind::Null | Kind::True => 0,
-        _ => whole(pair, c)?,
-    };
-    match motor {
-        0 => done(c.machine.energize(None, on)),
-        1..=4 => done(c.machine.energize(Some(motor as u8 - 1), on)),
-        _ => Err(Status::OutOfRange),
-    }
 }

@@ -1,9 +1,9 @@
 //! Text mode: the prompt that answers a line.
 
+use super::Format;
 use super::block::byte_of;
 use super::machine::Machine;
 use super::request::{Context, Phase, Request};
-use super::status_text::status_text;
 use super::write::{Out, Writer};
 use crate::config::Fixed;
 use crate::status::Status;
@@ -12,24 +12,29 @@ use crate::text;
 impl Request {
     /// `tinyg [mm] ok> `, or the beginning of `tinyg [mm] err: <text>: <line> `.
     pub(super) fn prompt<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        if self.resume != 0 {
+            return self.unwrap_text(c);
+        }
         if c.machine.settings().text_verbosity() == 0 {
             self.phase = Phase::Done;
             return;
         }
-        let ok = matches!(self.status, Status::Ok | Status::Noop);
-        let units = if c.machine.inches() { text!("inch") } else { text!("mm") };
-        let mut writer = Writer::body(c.out, &mut self.format);
-        writer.text(text!("tinyg ["));
-        writer.text(units);
-        writer.text(if ok { text!("] ok> ") } else { text!("] err: ") });
+        let ok = matches!(self.status, Status::Ok | Status::Noop | Status::BootLoader);
+        put_prompt(ok, c.machine, &mut Writer::body(c.out, &mut self.format));
         self.phase = if ok { Phase::Message } else { Phase::Failure };
     }
 
     pub(super) fn failure<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let mut writer = Writer::body(c.out, &mut self.format);
-        match status_text(self.status) {
+        let dialect = writer.dialect();
+        let (phrases, code) = (dialect.phrases(), Fixed::int(dialect.code(self.status).into()));
+        if !phrases.code.is_empty() {
+            writer.fixed(code);
+            writer.text(phrases.code);
+        }
+        match dialect.status_text(self.status) {
             Some(text) => writer.text(text),
-            None => writer.fixed(Fixed::int((self.status as u8).into())),
+            None => writer.fixed(code),
         }
         writer.text(text!(": "));
         self.item = 0;
@@ -47,5 +52,22 @@ impl Request {
             writer.printable(byte);
             self.item = self.item.saturating_add(1);
         }
+    }
+}
+
+fn put_prompt<O: Out>(ok: bool, machine: &mut impl Machine, writer: &mut Writer<'_, O>) {
+    let phrases = writer.dialect().phrases();
+    writer.text(phrases.prompt);
+    writer.text(if machine.inches() { text!("inch") } else { text!("mm") });
+    writer.text(if ok { phrases.ok } else { phrases.err });
+}
+
+/// The prompt of a machine that has started in text mode.
+pub fn put_ready_prompt(machine: &mut impl Machine, out: &mut impl Out) {
+    if machine.settings().text_verbosity() != 0 {
+        let mut format = Format::plain(machine.settings());
+        let mut writer = Writer::body(out, &mut format);
+        put_prompt(true, machine, &mut writer);
+        writer.end_line();
     }
 }

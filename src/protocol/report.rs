@@ -4,11 +4,12 @@
 //! in steps, [`queue_report`] one queue report at once. The reporting task holds the transmitter
 //! from the first step of a report to its last.
 
+use super::Format;
 use super::Mode;
 use super::machine::Machine;
 use super::token::{DEFAULT_REPORT, DEFAULT_TOKENS, Shown, Token};
 use super::value::Value;
-use super::write::{Format, Out, Writer};
+use super::write::{Out, Writer};
 use crate::config::Fixed;
 use crate::progmem::Text;
 use crate::text;
@@ -166,6 +167,15 @@ pub fn queue_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) 
     writer.end_object();
 }
 
+/// Sends what is free for lines, after a queue flush, whatever the verbosity.
+pub fn receive_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) {
+    let mut format = mode.format(machine);
+    let mut writer = Writer::body(out, &mut format);
+    writer.begin_object();
+    writer.count(text!("rx"), machine.value(Value::Room));
+    writer.end_object();
+}
+
 impl<O: Out> Writer<'_, O> {
     /// Begins a report: nothing in text, else `{"name":{`.
     fn head(&mut self, name: Text) {
@@ -193,7 +203,7 @@ impl<O: Out> Writer<'_, O> {
         if !self.is_plain() {
             self.close();
         }
-        self.byte(b'\n');
+        self.end_line();
     }
 
     fn count(&mut self, name: Text, value: i32) {

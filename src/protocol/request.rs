@@ -5,7 +5,7 @@
 //! before its G-code has run, so a wait for the planner never holds up the transmitter.
 //!
 //! ```text
-//!   line --{--> check --bad--> Echo ------------------------------> Warning -> Footer
+//!   line --{--> check --bad--> Echo ------------------------------> Warning -> Advice -> Footer
 //!                 | ok                                                 ^
 //!                 v   group GET                                        | end, or error
 //!               Pair <--------> List <- Select                         |
@@ -14,18 +14,19 @@
 //!   G-code ---> Gcode -> Block -> Message -> Number -------------------+
 //!                  \  text mode
 //!   ? -> Listing ---+-> Prompt -> (Failure -> Complaint) -> Message
-//!   $ -> Command -> Listing or Help -> Prompt
-//!   defa: Pair -> Greeting -> Pair       prog: Pair -> Program -> Pair, Command -> Program -> Prompt
+//!   $ -> Command -> Listing, One or Help -> Prompt
+//!   defa: Pair -> Greeting -> Pair      er: Pair -> Raise -> Warning      msg: Pair -> Quote -> Pair
+//!   prog: Pair -> Program -> Pair, Command -> Program -> Prompt
+//!   txt: Pair -> as ? and $ -> Prompt -> Pair, or Pair -> Gcode
 //! ```
 
-use super::block::byte_of;
 use super::json::{self, Span};
 use super::machine::{Machine, Warning};
 use super::token::Group;
-use super::write::{Format, Out, Writer};
-use super::{Mode, help, value::Value};
+use super::write::{Out, Writer};
+use super::{Format, Mode, help};
+use crate::config::Settings;
 use crate::status::Status;
-use crate::text;
 
 /// What the caller does next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -67,8 +68,12 @@ pub(super) enum Phase {
     Message,
     MessageText,
     Number,
+    /// All is carried out, or something has failed: what has to be told yet.
     Warning,
+    Advice,
     Footer,
+    /// A line of text mode that is answered in a string.
+    Wrap,
     /// A line that begins with `$`.
     Command,
     /// Groups in text.
@@ -79,6 +84,10 @@ pub(super) enum Phase {
     Program,
     /// The defaults have been restored: tell who we are.
     Greeting,
+    /// An exception report that was asked for.
+    Raise,
+    /// Giving a string back.
+    Quote,
     /// The prompt, a status, the line that caused it.
     Prompt,
     Failure,
@@ -97,6 +106,10 @@ pub struct Request {
     pub(super) group: Option<Group>,
     /// The G-code in the line.
     pub(super) block: Span,
+    /// The length of the line with its end, as its sender counts it.
+    pub(super) length: u16,
+    /// In a `txt`: where to read on behind it. Else 0.
+    pub(super) resume: u8,
     /// Where to read on in the line.
     pub(super) at: u8,
     /// Where a phase that takes several steps has got to.
@@ -115,6 +128,8 @@ pub struct Request {
     pub(super) selected: bool,
     /// What the last step was to do has to wait.
     pub(super) waits: bool,
+    /// The line has a `tid`, which is told at the end.
+    pub(super) identified: bool,
 }
 
 /// What a step works with.
@@ -125,15 +140,20 @@ pub(super) struct Context<'a, M, O> {
 }
 
 impl Request {
-    /// Begins with a line, without its terminator; `None` if there is nothing to answer. The line
-    /// decides the `mode` from now on.
+    /// Begins with a line, without its terminator; its sender counts `length` bytes for it. `None` if there is
+    /// nothing to answer. The line decides the `mode` from now on.
     ///
     /// A JSON line is checked as a whole here: up to 20,000 cycles on AVR.
-    pub fn begin(line: &[u8], mode: &mut Mode) -> Option<Request> {
+    pub fn begin(
+        line: &[u8],
+        length: u16,
+        mode: &mut Mode,
+        settings: &Settings,
+    ) -> Option<Request> {
         if line.len() > usize::from(u8::MAX) {
-            return Some(Request::refused(Status::InputTooLong, *mode));
+            return Some(Request::refused(Status::InputTooLong, &[], length, *mode, settings));
         }
-        let mut request = Request::new();
+        let mut request = Request::new(length, settings);
         let start = json::skip_blanks(line);
         let end = line.len() as u8;
         match line.get(usize::from(start)) {
@@ -141,9 +161,20 @@ impl Request {
             None => request.phase = Phase::Prompt,
             Some(b'{') => {
                 *mode = Mode::Json;
-                request.is_json = true;
                 request.at = start + 1;
-                request.phase = if json::check(line) { Phase::Pair } else { Phase::Echo };
+                match json::check(line) {
+                    Ok(()) => {
+                        request.is_json = true;
+                        request.phase = Phase::Pair;
+                    }
+                    Err(status) => request.give_back(status),
+                }
+            }
+            Some(_)
+                if *mode == Mode::Json && settings.is_g2core() && help::is_text_command(line) =>
+            {
+                request.block = Span { start, end };
+                request.phase = Phase::Wrap;
             }
             Some(b'?') => {
                 *mode = Mode::Text;
@@ -166,21 +197,39 @@ impl Request {
         Some(request)
     }
 
-    /// Answers a line that could not be kept with a status.
-    pub fn refused(status: Status, mode: Mode) -> Request {
-        let mut request = Request::new();
-        request.fail(status, mode);
+    /// Answers a line that could not be kept with a status; `line` is what is left of it. It leaves the mode as it is.
+    pub fn refused(
+        status: Status,
+        line: &[u8],
+        length: u16,
+        mode: Mode,
+        settings: &Settings,
+    ) -> Request {
+        let mut request = Request::new(length, settings);
+        if mode == Mode::Json && line.first() == Some(&b'{') {
+            request.give_back(status);
+        } else {
+            request.fail(status, mode);
+        }
         request
     }
 
-    fn new() -> Request {
+    /// Gives the line back, for it makes no sense.
+    fn give_back(&mut self, status: Status) {
+        self.status = status;
+        self.phase = Phase::Echo;
+    }
+
+    fn new(length: u16, settings: &Settings) -> Request {
         Request {
             phase: Phase::Gcode,
             status: Status::Ok,
-            format: Format::plain(),
+            format: Format::plain(settings),
             verbosity: 0,
             group: None,
             block: Span::default(),
+            length,
+            resume: 0,
             at: 0,
             item: 0,
             begun: false,
@@ -190,6 +239,7 @@ impl Request {
             warning: Warning::None,
             selected: false,
             waits: false,
+            identified: false,
         }
     }
 
@@ -214,6 +264,12 @@ impl Request {
 
     /// Does the next bit of work and puts at most [`CHUNK`](super::CHUNK) bytes.
     pub fn step(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Next {
+        // Within a `txt` the line ends where that does, before its quote.
+        let end = match self.resume {
+            0 => line.len(),
+            resume => usize::from(resume - 1),
+        };
+        let line = line.get(..end).unwrap_or(&[]);
         let context = &mut Context { line, machine, out };
         match self.phase {
             Phase::Echo => self.echo(context),
@@ -229,12 +285,16 @@ impl Request {
             Phase::MessageText => self.message_text(context),
             Phase::Number => self.number(context),
             Phase::Warning => self.warning(context),
+            Phase::Advice => self.advice(context),
             Phase::Footer => self.footer(context),
+            Phase::Wrap => self.wrap_line(context),
             Phase::Command => self.command(context),
             Phase::Listing => self.listing(context),
             Phase::Program => self.program(context),
             Phase::Help => self.help_line(context),
             Phase::Greeting => self.greeting(context),
+            Phase::Raise => self.raise(context),
+            Phase::Quote => self.quote(context),
             Phase::Prompt => self.prompt(context),
             Phase::Failure => self.failure(context),
             Phase::Complaint => self.complaint(context),
@@ -259,51 +319,7 @@ impl Request {
         }
         let settings = c.machine.settings();
         self.verbosity = settings.json_verbosity();
-        self.format = Format::response(settings.json_strict(), self.verbosity);
-        let mut writer = Writer::frame(c.out, &mut self.format);
-        writer.open();
-        writer.key_text(text!("r"));
-        writer.open();
-    }
-
-    fn warning<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        self.open(c);
-        let text = self.warning.text();
-        if !text.is_empty() {
-            let mut writer = Writer::body(c.out, &mut self.format);
-            writer.key_text(text!("msg"));
-            writer.string(text);
-        }
-        self.phase = Phase::Footer;
-    }
-
-    fn footer<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        let free = c.machine.value(Value::SlotsFree);
-        let mut writer = Writer::frame(c.out, &mut self.format);
-        writer.close();
-        writer.footer(self.status as u8, free);
-        self.phase = Phase::Done;
-    }
-
-    fn echo<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        self.status = Status::JsonSyntax;
-        self.open(c);
-        let mut writer = Writer::body(c.out, &mut self.format);
-        writer.key_text(text!("err"));
-        writer.byte(b'"');
-        self.phase = Phase::EchoText;
-    }
-
-    fn echo_text<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        let mut writer = Writer::body(c.out, &mut self.format);
-        for _ in 0..super::CHUNK / 2 {
-            let Some(byte) = byte_of(c.line, self.item, u8::MAX) else {
-                writer.byte(b'"');
-                self.phase = Phase::Warning;
-                return;
-            };
-            writer.escaped(byte);
-            self.item = self.item.saturating_add(1);
-        }
+        self.format = Format::response(settings);
+        Writer::frame(c.out, &mut self.format).begin_response();
     }
 }

@@ -79,7 +79,7 @@ impl Label {
             }
         }
         write_unit(token, machine.inches(), writer);
-        writer.byte(b'\n');
+        writer.end_line();
     }
 }
 

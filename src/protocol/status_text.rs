@@ -10,16 +10,18 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 71;
+const ENTRIES: usize = 77;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
         (Status::Ok, text!("OK")),
         (Status::Error, text!("Error")),
         (Status::Noop, text!("Noop")),
+        (Status::Terminated, text!("Terminated")),
         (Status::EndOfFile, text!("End of file")),
         (Status::BufferFull, text!("Buffer full")),
         (Status::Initializing, text!("Initializing")),
+        (Status::BootLoader, text!("Entering boot loader")),
         (Status::InternalError, text!("Internal error")),
         (Status::ExceptionReport, text!("Generic exception report")),
         (Status::PersistenceError, text!("Persistence error")),
@@ -36,6 +38,9 @@ progmem! {
         (Status::OutOfRange, text!("Input value range error")),
         (Status::JsonSyntax, text!("JSON syntax error")),
         (Status::JsonTooManyPairs, text!("JSON input has too many pairs")),
+        (Status::TextNested, text!("JSON txt fields cannot be nested")),
+        (Status::JsonTooDeep, text!("JSON maximum nesting depth exceeded")),
+        (Status::Muted, text!("Another port feeds the machine")),
         (Status::GcodeGeneric, text!("Generic Gcode input error")),
         (Status::GcodeUnsupported, text!("Gcode command unsupported")),
         (Status::McodeUnsupported, text!("M code unsupported")),
@@ -89,6 +94,7 @@ progmem! {
         (Status::WordConflict, text!("Two codes of the line use the same word")),
         (Status::Alarmed, text!("Machine is alarmed - Command not processed")),
         (Status::LimitHit, text!("Limit switch hit - Shutdown occurred")),
+        (Status::KillJob, text!("Kill job")),
         (Status::SoftLimit, text!("Soft limit exceeded")),
         (Status::HomingAxis, text!("Homing Error - Bad or no axis specified")),
         (Status::HomingSwitches, text!("Homing Error - Homing switches misconfigured")),

@@ -1,7 +1,7 @@
 //! Exchanges byte for byte.
 
 use super::fake::{Chunk, Fake};
-use super::notice::{Banner, Exception};
+use super::notice::{Banner, Exception, Occasion};
 use super::*;
 use crate::config::Settings;
 use crate::status::Status;
@@ -55,7 +55,7 @@ fn answers_as_senders_expect() {
         ("  ", ""),
         (r#"{"QR":""}"#, r#"{"r":{"qr":32},"f":[1,0,7]}"#),
         ("{xvm:n,xfr:900,2po:t}", r#"{"r":{"xvm":800,"xfr":900,"2po":1},"f":[1,0,7]}"#),
-        ("{x:{vm:n},y:{vm:n},jv:n}", r#"{"r":{"x":{"vm":800},"y":{"vm":800},"jv":2},"f":[1,0,7]}"#),
+        ("{x:{vm:n},y:{vm:n},jv:n}", r#"{"r":{"x":{"vm":800},"y":{"vm":800},"jv":3},"f":[1,0,7]}"#),
         ("{xvm:900,foo:1,xfr:900}", r#"{"r":{"xvm":900,"foo":null},"f":[1,100,7]}"#),
         ("{x:{foo:1,vm:2},y:n}", r#"{"r":{"x":{"foo":null}},"f":[1,100,7]}"#),
         ("{foo:{a:1}}", r#"{"r":{"foo":null},"f":[1,100,7]}"#),
@@ -68,7 +68,7 @@ fn answers_as_senders_expect() {
         ("{sr:{}}", r#"{"r":{"sr":{}},"f":[1,101,7]}"#),
         ("{sr:{foo:t}}", r#"{"r":{"sr":{"foo":null}},"f":[1,100,7]}"#),
         ("{sr:{foo:t,vel:t,x:t,vel:t},qr:n}", r#"{"r":{"sr":{"vel":0.00},"qr":32},"f":[1,0,7]}"#),
-        ("{sys:{jv:n,xvm:n}}", r#"{"r":{"sys":{"jv":2,"xvm":800}},"f":[1,0,7]}"#),
+        ("{sys:{jv:n,xvm:n}}", r#"{"r":{"sys":{"jv":3,"xvm":800}},"f":[1,0,7]}"#),
         ("{4:{tr:n}}", r#"{"r":{"4":{"tr":360.0000}},"f":[1,0,7]}"#),
         ("{pos:{x:n}}", r#"{"r":{"pos":{"x":0.000}},"f":[1,0,7]}"#),
         (
@@ -119,7 +119,7 @@ fn verbosity_shows_more_and_more() {
     for (jv, setting, answer) in [
         (0, "", ""),
         (1, r#"{"r":{},"f":[1,0,7]}"#, r#"{"r":{},"f":[1,0,7]}"#),
-        (2, r#"{"r":{"jv":2},"f":[1,0,7]}"#, r#"{"r":{"msg":" \"hi\""},"f":[1,0,7]}"#),
+        (2, r#"{"r":{},"f":[1,0,7]}"#, r#"{"r":{"msg":" \"hi\""},"f":[1,0,7]}"#),
         (3, r#"{"r":{"jv":3},"f":[1,0,7]}"#, r#"{"r":{"msg":" \"hi\""},"f":[1,0,7]}"#),
         (4, r#"{"r":{"jv":4},"f":[1,0,7]}"#, r#"{"r":{"msg":" \"hi\"","n":20},"f":[1,0,7]}"#),
         (
@@ -246,7 +246,7 @@ fn all(mut step: impl FnMut(&mut Chunk) -> bool) -> String {
     loop {
         let mut chunk = Chunk::default();
         let more = step(&mut chunk);
-        all.extend(chunk.0);
+        all.extend(chunk.bytes);
         if !more {
             return String::from_utf8(all).unwrap();
         }
@@ -293,13 +293,13 @@ fn queue_reports_tell_as_much_as_wanted() {
         fake.ask(&format!("{{qv:{qv}}}"));
         let mut chunk = Chunk::default();
         queue_report(mode, &mut fake, &mut chunk);
-        assert_eq!(chunk.0, expected.as_bytes());
+        assert_eq!(chunk.bytes, expected.as_bytes());
     }
 }
 
 #[test]
 fn notices_are_as_documented() {
-    let mut banner = Banner::begin(&Fake::new());
+    let mut banner = Banner::begin(Occasion::Ready, &Settings::new());
     assert_eq!(
         all(|out| banner.step(&mut Fake::new(), out)),
         "{\"r\":{\"fv\":0.970,\"fb\":440.20,\"hp\":1,\"hv\":8,\"id\":\"0000-KERF\",\
@@ -313,15 +313,15 @@ fn notices_are_as_documented() {
              \"msg\":\"Arc specification error - radius arc out of tolerance\"}}\n",
         ),
     ] {
-        let mut exception = Exception::begin(status, &Fake::new());
+        let mut exception = Exception::begin(status, &Settings::new());
         assert_eq!(all(|out| exception.step(&mut Fake::new(), out)), text);
     }
 }
 
 #[test]
 fn ram_is_accounted_for() {
-    assert_eq!(size_of::<Request>(), 20);
+    assert_eq!(size_of::<Request>(), 24);
     assert_eq!(size_of::<StatusReport>(), 192);
-    assert_eq!(size_of::<Report>(), 4);
-    assert_eq!((size_of::<Banner>(), size_of::<Exception>()), (2, 3));
+    assert_eq!(size_of::<Report>(), 5);
+    assert_eq!((size_of::<Banner>(), size_of::<Exception>()), (4, 4));
 }

@@ -29,7 +29,7 @@ fn one_setting_is_a_line() {
         "[st]  switch type                 0 [0=NO,1=NC]",
         "[mt]  motor idle timeout          2.00 Sec",
         "[ej]  enable json mode            1 [0=text,1=JSON]",
-        "[jv]  json verbosity              2 [0=silent,1=footer,2=messages,3=configs,4=linenum,5=verbose]",
+        "[jv]  json verbosity              3 [0=silent,1=footer,2=messages,3=configs,4=linenum,5=verbose]",
         "[js]  json serialize style        1 [0=relaxed,1=strict]",
         "[tv]  text verbosity              1 [0=silent,1=verbose]",
         "[qv]  queue report verbosity      0 [0=off,1=single,2=triple]",
@@ -97,7 +97,7 @@ fn groups_list_what_they_have() {
     };
     let (sys, axis) = (names("$sys"), names("$b"));
     assert!(
-        sys.starts_with("fb fv hp hv id ja ct sl st mt ej jv js tv qv sv si ec ee ex baud gpl")
+        sys.starts_with("fb fv hp hv id ja ct sl st mt ej jv js tv qv sv si ec ee ex rxm baud gpl")
     );
     assert_eq!(names("$"), sys);
     assert_eq!(axis, "bam bvm bfr btn btm bjm bjd bra bac");
@@ -219,7 +219,7 @@ fn defaults_are_restored_on_demand_alone() {
             r#"{"r":{"defa":0,"msg":"Send {defa:true} to reset to default settings"},"f":[1,0,7]}"#,
         ),
         ("{defa:\"1\"}", r#"{"r":{"defa":null},"f":[1,103,7]}"#),
-        ("{jv:n,defa:1}", r#"{"r":{"jv":2,"defa":1},"f":[1,106,7]}"#),
+        ("{jv:n,defa:1}", r#"{"r":{"jv":3,"defa":1},"f":[1,106,7]}"#),
         ("{sys:{defa:1}}", r#"{"r":{"sys":{"defa":1}},"f":[1,106,7]}"#),
         (
             "{h:n}",

@@ -199,7 +199,7 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [(Text, Action); 10] = [
+    static ACTIONS: [(Text, Action); 17] = [
         (text!("gc"), Action::Block),
         (text!("clear"), Action::Clear),
         (text!("clr"), Action::Clear),
@@ -207,9 +207,16 @@ progmem! {
         (text!("md"), Action::Release),
         (text!("test"), Action::Test),
         (text!("prog"), Action::Program),
+        (text!("qf"), Action::Flush),
         (text!("defa"), Action::Defaults),
         (text!("h"), Action::Help),
         (text!("help"), Action::Help),
+        (text!("txt"), Action::Text),
+        (text!("tid"), Action::Id),
+        (text!("msg"), Action::Message),
+        (text!("er"), Action::Exception),
+        (text!("boot"), Action::Boot),
+        (text!("reset"), Action::Reset),
     ];
 }
 
@@ -229,10 +236,24 @@ pub enum Action {
     Test,
     /// `prog`: the program in EEPROM.
     Program,
+    /// `qf`: drop what is queued.
+    Flush,
     /// `defa`: restore the defaults.
     Defaults,
     /// `h`, `help`: tell about settings.
     Help,
+    /// `txt`: do what a line of text mode says.
+    Text,
+    /// `tid`: nothing; it comes back.
+    Id,
+    /// `msg`: nothing; it comes back.
+    Message,
+    /// `er`: send an exception report.
+    Exception,
+    /// `boot`: start the boot loader.
+    Boot,
+    /// `reset`: start anew.
+    Reset,
 }
 
 /// Names that stand for several.
@@ -303,6 +324,17 @@ impl Group {
     }
 }
 
+/// Every name that means something at the top of a request, for tests and documents: settings and values by their
+/// full names, and actions.
+#[cfg(not(target_arch = "avr"))]
+pub fn names() -> std::vec::Vec<std::string::String> {
+    let text = |bytes: &[u8]| std::string::String::from_utf8_lossy(bytes).into_owned();
+    let tokens = (0..FIRST_ROW + u16::from(crate::gcode::tables::ROWS) * AXES as u16).map(Token);
+    let tokens = tokens.filter(|token| Token::find(&token.name()) == Some(*token));
+    let actions = ACTIONS.get().map(|(name, _)| name.bytes().map(char::from).collect());
+    tokens.map(|token| text(token.name().bytes())).chain(actions).collect()
+}
+
 /// What a name in a request means.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Target {
@@ -330,63 +362,4 @@ pub fn resolve(prefix: Name, name: &[u8]) -> Target {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gcode::tables::ROWS;
-    use std::string::{String, ToString};
-    use std::vec::Vec;
-
-    fn name(text: &str) -> Name {
-        Name::new().with(text.as_bytes()).unwrap()
-    }
-
-    fn text(token: Token) -> String {
-        String::from_utf8(token.name().bytes().to_vec()).unwrap()
-    }
-
-    #[test]
-    fn every_token_has_a_name_that_finds_it() {
-        let mut count = 0;
-        let small = u16::from(FIRST_VECTOR) + 40;
-        let rows = FIRST_ROW..FIRST_ROW + u16::from(ROWS) * 6;
-        for token in (0..small).chain(rows).map(Token) {
-            match token.subject() {
-                None => continue,
-                Some(Subject::Row(row, axis)) if !row.has(axis) => continue,
-                Some(_) => {}
-            }
-            assert_eq!(Token::find(&token.name()), Some(token), "{}", text(token));
-            count += 1;
-        }
-        assert_eq!(count, 31 + 28 + 3 * 15 + 16 + 2 * 9 + 28 + 40 + 11 * 6 + 10 * 2 + 10 + 16 + 4);
-        for bad in [
-            "g53x", "g54d", "tt1y", "tt11z", "posd", "pwr5", "pwr0", "pos", "homd", "pwra", "velo",
-            "",
-        ] {
-            assert_eq!(Token::find(&name(bad)), None, "{bad}");
-        }
-    }
-
-    #[test]
-    fn the_default_report_is_as_documented() {
-        let names: Vec<String> = DEFAULT_TOKENS.get().into_iter().map(text).collect();
-        assert_eq!(names.join(" "), "posx posy posz posa feed vel unit coor dist frmo stat");
-    }
-
-    #[test]
-    fn names_mean_what_they_should() {
-        let resolved = |text: &str| resolve(Name::new(), text.as_bytes());
-        assert_eq!(resolved("x"), Target::Group(Group::Settings(Owner::Axis(0))));
-        assert_eq!(resolved("N"), Target::Token(Token::single(0)));
-        assert_eq!(resolved("4"), Target::Group(Group::Settings(Owner::Motor(3))));
-        assert_eq!(resolved("pwr"), Target::Group(Group::Vector(6)));
-        assert_eq!(resolved("G59"), Target::Group(Group::Row(Row::system(5))));
-        assert_eq!(resolve(name("g59"), b"1x"), resolved("g591x"));
-        assert_eq!(resolved("CLEAR"), Target::Action(Action::Clear));
-        assert_eq!(resolved("sr"), Target::Group(Group::Report));
-        assert_eq!(resolved("toolong"), Target::Unknown);
-        assert_eq!(resolved("5"), Target::Unknown);
-        assert_eq!(resolve(name("x"), b"vm"), resolved("xvm"));
-        assert_eq!(resolve(name("x"), "".to_string().as_bytes()), resolved("x"));
-    }
-}
+mod tests;

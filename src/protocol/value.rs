@@ -67,8 +67,10 @@ pub enum Value {
     QueueAdded,
     /// `qo`: blocks removed since this was last read.
     QueueRemoved,
-    /// `rx`: free line slots. Also the third element of every footer.
+    /// Free line slots, as footers tell them.
     SlotsFree,
+    /// `rx`: what the sender may send: lines, or characters if it counts those.
+    Room,
     /// `mpox` and so on: position in machine coordinates, in units of a `Length`.
     MachinePosition(u8),
     /// `posx` and so on: position in work coordinates, in units of a `Length`.
@@ -228,7 +230,7 @@ progmem! {
         count("qr", Value::QueueFree, NONE, NONE),
         count("qi", Value::QueueAdded, NONE, NONE),
         count("qo", Value::QueueRemoved, NONE, NONE),
-        count("rx", Value::SlotsFree, NONE, NONE),
+        count("rx", Value::Room, NONE, NONE),
         count("admo", Value::ArcDistance, text!("Arc Distance mode:"), ARC_DISTANCE),
         count("spe", Value::SpindleOn, text!("Spindle:"), ON),
         count("spd", Value::SpindleDirection, text!("Spindle direction:"), text!("CW|CCW")),

@@ -1,9 +1,21 @@
 //! Writing JSON and plain text, byte by byte, into an [`Out`].
 
+use super::dialect::Dialect;
+use super::format::{COMMA, EXPAND, Format, HUSHED, MUTE, SILENT, STRICT, WRAPPED};
 use super::token::Shown;
-use crate::config::{Digits, Fixed};
+use crate::config::{Digits, Fixed, Settings};
 use crate::progmem::Text;
+use crate::status::Status;
 use crate::text;
+
+/// What a footer says beside the status, as the dialect wants.
+#[derive(Clone, Copy, Default)]
+pub struct Ending {
+    /// Free line slots.
+    pub free: u8,
+    /// The length of the line that is answered, with its end; 0 if none is.
+    pub length: u16,
+}
 
 /// Where output goes. One step of a [`Request`](super::Request) or a report puts at most
 /// [`CHUNK`](super::CHUNK) bytes.
@@ -20,61 +32,50 @@ pub trait Out {
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
         bytes.for_each(|byte| self.put(byte));
     }
+
+    /// Begins to sum up what is put from here on.
+    fn begin_sum(&mut self);
+
+    /// The [`Checksum`](super::Checksum) of what has been put since, and the end of it.
+    fn take_sum(&mut self) -> u16;
 }
 
-/// How to write, and where in an object we are. Kept from step to step.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Format(u8);
-
-const STRICT: u8 = 1;
-const COMMA: u8 = 2;
-const PLAIN: u8 = 4;
-const HUSHED: u8 = 8;
-const SILENT: u8 = 16;
-
-impl Format {
-    /// JSON, with quoted keys if `strict`.
-    pub fn json(strict: bool) -> Format {
-        Format(if strict { STRICT } else { 0 })
-    }
-
-    /// JSON of which the verbosity `jv` lets through: 0 nothing, 1 no bodies, else all.
-    pub fn response(strict: bool, jv: u8) -> Format {
-        let hidden = match jv {
-            0 => SILENT | HUSHED,
-            1 => HUSHED,
-            _ => 0,
-        };
-        Format(Format::json(strict).0 | hidden)
-    }
-
-    /// Text: `key:value,key:value`.
-    pub fn plain() -> Format {
-        Format(PLAIN)
-    }
-
-    /// Whether it is text.
-    pub fn is_plain(self) -> bool {
-        self.0 & PLAIN != 0
-    }
+/// Puts the end of a line.
+pub fn put_line_end(settings: &Settings, out: &mut impl Out) {
+    Writer::body(out, &mut Format::plain(settings)).end_line();
 }
 
 /// A writer for the time of one step.
 pub struct Writer<'a, O> {
     out: &'a mut O,
     format: &'a mut Format,
-    hidden: u8,
+    shown: bool,
 }
 
 impl<'a, O: Out> Writer<'a, O> {
-    /// Writes what belongs to the body of a response, or a report.
+    /// Writes names and values, or a report.
     pub fn body(out: &'a mut O, format: &'a mut Format) -> Self {
-        Writer { out, format, hidden: HUSHED }
+        Self::unless(HUSHED, out, format)
     }
 
-    /// Writes the frame of a response, which shows while bodies do not.
+    /// Writes messages, and what a response says of its line.
+    pub fn message(out: &'a mut O, format: &'a mut Format) -> Self {
+        Self::unless(MUTE, out, format)
+    }
+
+    /// Writes the frame of a response.
     pub fn frame(out: &'a mut O, format: &'a mut Format) -> Self {
-        Writer { out, format, hidden: SILENT }
+        Self::unless(SILENT, out, format)
+    }
+
+    fn unless(hidden: u8, out: &'a mut O, format: &'a mut Format) -> Self {
+        let shown = format.flags & hidden == 0;
+        Writer { out, format, shown }
+    }
+
+    /// Whose words are used.
+    pub fn dialect(&self) -> Dialect {
+        self.format.dialect
     }
 
     /// Whether this is text.
@@ -84,9 +85,25 @@ impl<'a, O: Out> Writer<'a, O> {
 
     /// One byte.
     pub fn byte(&mut self, byte: u8) {
-        if self.format.0 & self.hidden == 0 {
-            self.out.put(byte);
+        if !self.shown {
+            return;
         }
+        if self.format.flags & WRAPPED != 0 && matches!(byte, b'"' | b'\\') {
+            self.out.put(b'\\');
+        }
+        self.out.put(byte);
+    }
+
+    /// The end of a line.
+    pub fn end_line(&mut self) {
+        if !self.shown {
+            return;
+        }
+        if self.format.flags & WRAPPED != 0 {
+            return self.out.put_text(text!("\\n"));
+        }
+        let expand = self.format.flags & EXPAND != 0;
+        self.out.put_text(if expand { text!("\n\r") } else { text!("\n") });
     }
 
     /// One byte of somebody else's text; what does not print becomes `?`.
@@ -104,8 +121,10 @@ impl<'a, O: Out> Writer<'a, O> {
 
     /// A text.
     pub fn text(&mut self, text: Text) {
-        if self.format.0 & self.hidden == 0 {
-            self.out.put_text(text);
+        match self.format.flags & WRAPPED {
+            _ if !self.shown => {}
+            0 => self.out.put_text(text),
+            _ => text.bytes().for_each(|byte| self.byte(byte)),
         }
     }
 
@@ -148,10 +167,13 @@ impl<'a, O: Out> Writer<'a, O> {
     }
 
     fn before_key(&mut self) {
-        if self.format.0 & COMMA != 0 {
+        if !self.shown {
+            return;
+        }
+        if self.format.flags & COMMA != 0 {
             self.byte(b',');
         }
-        self.format.0 |= COMMA;
+        self.format.flags |= COMMA;
         self.key_quote();
     }
 
@@ -161,7 +183,7 @@ impl<'a, O: Out> Writer<'a, O> {
     }
 
     fn key_quote(&mut self) {
-        if self.format.0 & STRICT != 0 {
+        if self.format.flags & STRICT != 0 {
             self.byte(b'"');
         }
     }
@@ -201,116 +223,75 @@ impl<'a, O: Out> Writer<'a, O> {
 
     /// Opens an object.
     pub fn open(&mut self) {
-        self.byte(b'{');
-        self.format.0 &= !COMMA;
+        if self.shown {
+            self.byte(b'{');
+            self.format.flags &= !COMMA;
+        }
     }
 
     /// Closes an object.
     pub fn close(&mut self) {
-        self.byte(b'}');
-        self.format.0 |= COMMA;
+        if self.shown {
+            self.byte(b'}');
+            self.format.flags |= COMMA;
+        }
     }
 
-    /// The footer of a response and its end: `,"f":[1,status,free]}`.
-    pub fn footer(&mut self, status: u8, free: i32) {
+    /// Opens a response, and its body.
+    pub fn begin_response(&mut self) {
+        self.begin_sum();
+        self.open();
+        self.key_text(text!("r"));
+        self.open();
+    }
+
+    /// Closes the body of a response, and the response with its footer: `},"f":[1,status,free]}`. See [`Ending`].
+    pub fn end_response(&mut self, status: Status, ending: Ending) {
+        self.close();
         self.key_text(text!("f"));
         self.text(text!("[1,"));
-        self.footer_values(status, free);
+        self.footer_values(status, ending);
     }
 
     /// A whole response of which nothing but the frame shows.
-    pub fn empty_response(&mut self, status: u8, free: i32) {
-        let strict = self.format.0 & STRICT != 0;
+    pub fn empty_response(&mut self, status: Status, ending: Ending) {
+        self.begin_sum();
+        let strict = self.format.flags & STRICT != 0;
         self.text(if strict { text!("{\"r\":{},\"f\":[1,") } else { text!("{r:{},f:[1,") });
-        self.footer_values(status, free);
+        self.footer_values(status, ending);
     }
 
-    fn footer_values(&mut self, status: u8, free: i32) {
-        self.small(status);
+    fn begin_sum(&mut self) {
+        if self.format.dialect == Dialect::Characters {
+            self.out.begin_sum();
+        }
+    }
+
+    fn footer_values(&mut self, status: Status, ending: Ending) {
+        let dialect = self.format.dialect;
+        self.small(dialect.code(status).into());
         self.byte(b',');
-        self.small(free as u8);
-        self.text(text!("]}\n"));
+        self.small(match dialect {
+            Dialect::Lines => ending.free.into(),
+            _ => ending.length.max(dialect.phrases().no_line.into()),
+        });
+        if dialect == Dialect::Characters {
+            let sum = self.out.take_sum();
+            self.byte(b',');
+            self.fixed(Fixed::int(sum.into()));
+        }
+        self.text(text!("]}"));
+        self.end_line();
     }
 
     /// A number, which most often has one digit.
-    fn small(&mut self, value: u8) {
+    fn small(&mut self, value: u16) {
         match value {
-            ..10 => self.byte(b'0' + value),
+            ..10 => self.byte(b'0' + value as u8),
             _ => self.fixed(Fixed::int(value.into())),
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::vec::Vec;
-
-    impl Out for Vec<u8> {
-        fn put(&mut self, byte: u8) {
-            self.push(byte);
-        }
-    }
-
-    fn written(mut format: Format, body: bool) -> Vec<u8> {
-        let mut out = Vec::new();
-        let mut writer = if body {
-            Writer::body(&mut out, &mut format)
-        } else {
-            Writer::frame(&mut out, &mut format)
-        };
-        writer.open();
-        writer.key(b"R");
-        writer.open();
-        writer.key_text(text!("a"));
-        writer.fixed(Fixed { value: -1500, decimals: 3 });
-        writer.key(b"b");
-        writer.string(text!("c"));
-        writer.close();
-        writer.footer(3, 7);
-        out
-    }
-
-    #[test]
-    fn writes_json() {
-        let expected = br#"{"r":{"a":-1.500,"b":"c"},"f":[1,3,7]}"#;
-        assert_eq!(written(Format::json(true), true), [&expected[..], b"\n"].concat());
-        let relaxed = br#"{r:{a:-1.500,b:"c"},f:[1,3,7]}"#;
-        assert_eq!(written(Format::json(false), true), [&relaxed[..], b"\n"].concat());
-    }
-
-    #[test]
-    fn an_empty_response_is_what_its_parts_are() {
-        for (strict, status, free) in [(true, 0, 8), (false, 255, 0), (true, 13, 7), (true, 101, 3)]
-        {
-            let (mut parts, mut whole) = (Vec::new(), Vec::new());
-            let mut format = Format::response(strict, 1);
-            let mut writer = Writer::frame(&mut parts, &mut format);
-            writer.open();
-            writer.key_text(text!("r"));
-            writer.open();
-            writer.close();
-            writer.footer(status, free);
-            let mut format = Format::response(strict, 1);
-            Writer::frame(&mut whole, &mut format).empty_response(status, free);
-            assert_eq!(parts, whole);
-        }
-    }
-
-    #[test]
-    fn verbosity_hides() {
-        assert_eq!(written(Format::response(true, 0), false), b"");
-        assert_eq!(written(Format::response(true, 1), true), b"");
-        assert!(!written(Format::response(true, 1), false).is_empty());
-        assert!(!written(Format::response(true, 2), true).is_empty());
-    }
-
-    #[test]
-    fn foreign_text_is_escaped() {
-        let mut out = Vec::new();
-        let mut format = Format::json(true);
-        let mut writer = Writer::body(&mut out, &mut format);
-        b"a\"\\\n\xff".iter().for_each(|&b| writer.escaped(b));
-        assert_eq!(out, br#"a\"\\??"#);
-    }
-}
+mod tests;

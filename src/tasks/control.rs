@@ -1,31 +1,17 @@
 //! The control task: real-time characters, which act at once and get no response.
 //!
-//! Reads what the receive interrupt picked off; waits on [`Event::Realtime`]. `^x` resets the machine.
-//! ENQ asks whether anybody is there, which the reporter answers. Hold, resume, flush and kill are taken
-//! out of the stream and otherwise without effect so far.
+//! Reads what the receive interrupt picked off; waits on [`Event::Realtime`]. What they lead to is in
+//! [`hold`](super::hold); besides, `^x` resets the machine, and ENQ asks whether anybody is there, which the
+//! reporter answers.
 
+use super::hold;
 use super::links::Links;
-use crate::hal::event::{Event, wait};
-use crate::hal::imp::{reset, uart};
-use crate::realtime::{ENQUIRY, RESET, RESUME};
+use crate::hal::event::{Event, next};
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
-        let characters = wait(Event::Realtime, || {
-            let characters = uart::take_realtime();
-            (characters != 0).then_some(characters)
-        })
-        .await;
-        if characters & RESET != 0 {
-            reset();
-        }
-        if characters & RESUME != 0 {
-            links.cycle_start.signal();
-        }
-        if characters & ENQUIRY != 0 {
-            links.enquiry.set(true);
-            links.reporter_wake.urge();
-        }
+        hold::serve(links);
+        next(Event::Realtime).await;
     }
 }

@@ -12,19 +12,18 @@ use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
-use crate::tasks::{links, power};
+use crate::tasks::{hold, links, power};
 
-/// Segments shorter than this, CPU cycles, may fill the ring.
-const SHORT: u32 = ACTIVE.clock_hz / 800;
-
-/// Longer ones are queued so many at a time: what is queued cannot be slowed down any more.
-const LONG_QUEUED: usize = 4;
+/// CPU cycles in so many tenths of a millisecond.
+const fn tenths(of_ms: u32) -> u32 {
+    ACTIVE.clock_hz / 10_000 * of_ms
+}
 
 /// The task.
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
     let mut machine = Exec::new();
     let mut segment = Segment::default();
-    let mut most = LONG_QUEUED as u8;
+    let (mut most, mut rests) = (1u8, true);
     let mut outputs = 0;
     let mut finished = Finished::new();
     loop {
@@ -32,6 +31,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         let waiting = blocks.len();
         let standstill = !stepper::running();
         let step = links::update(|out| {
+            machine.set_hold(hold::is_on(), out);
             if let Some(line) = finished.take(segments.used()) {
                 out.finished = line;
             }
@@ -41,11 +41,18 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
                 finished.end(line);
             }
             if step == Step::Segment {
+                rests = out.velocity.to_bits() == 0;
                 finished.queue();
                 power::segment(segment.moving);
             } else if step == Step::Idle && standstill {
                 finished.rest();
                 out.finished = out.line;
+            } else if step == Step::Held {
+                hold::dropped(|| {
+                    machine.drop_all(&mut blocks, out);
+                    stepper::settle();
+                    finished.rest();
+                });
             } else if out.outputs != outputs {
                 outputs = out.outputs;
                 gpio::set_outputs(outputs);
@@ -57,16 +64,34 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             let _ = segments.push_copy(&segment);
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
-            most = if cycles < SHORT { SEGMENTS as u8 - 1 } else { LONG_QUEUED as u8 };
+            most = queued(cycles, rests);
         }
         if blocks.len() != waiting {
             flags::set(Event::BlockDone);
         }
-        if matches!(step, Step::Idle | Step::Standstill) {
+        if step == Step::Held && hold::passes() {
+            continue;
+        }
+        if matches!(step, Step::Idle | Step::Standstill | Step::Held) {
             links::hungry(true);
             exec_asked_again().await;
             links::hungry(false);
         }
+    }
+}
+
+/// How many segments are queued at a time if the last took so many CPU cycles: what is queued cannot be
+/// slowed down any more. With the one that runs they take 9 ms at most; unless it `rests` at the end of each,
+/// as blocks do that come late: then a hold has no speed to take away.
+#[inline(always)]
+fn queued(cycles: u32, rests: bool) -> u8 {
+    match cycles {
+        _ if cycles <= tenths(9) => SEGMENTS as u8 - 1,
+        _ if cycles <= tenths(12) => 6,
+        _ if rests => 4,
+        _ if cycles <= tenths(21) => 3,
+        _ if cycles <= tenths(29) => 2,
+        _ => 1,
     }
 }
 

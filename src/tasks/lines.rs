@@ -1,11 +1,12 @@
 //! The line pool: received lines that wait for the parser.
 //!
-//! Filled by the reader, emptied by the parser, both in thread mode. Lines lie end to end in one buffer
-//! in order of arrival, so that eight short lines of G-code and one long line of JSON fit the same
+//! One for each port, filled by the reader, emptied by the parser, both in thread mode. Lines lie end to
+//! end in one buffer in order of arrival, so that eight short lines of G-code and one long line of JSON fit the same
 //! memory. Control lines (JSON, `$`, `?`) are taken before data lines, each kind in order.
 //!
-//! A line that cannot be kept whole is kept as a fault instead: the sender gets exactly one
-//! response for it either way. When the pool is full the reader leaves bytes in the receive ring.
+//! A line that cannot be kept whole is kept as a fault instead, with as much of it as is given back: the sender gets
+//! exactly one response for it either way. Senders may count characters, so every byte that comes belongs to a line:
+//! blanks before it, and what came between it and the line before, count with it. When the pool is full the reader leaves bytes in the receive ring.
 
 use heapless::Vec;
 
@@ -15,10 +16,10 @@ use crate::status::Status;
 
 /// Line slots. Senders count on eight.
 pub const SLOTS: usize = 8;
-/// Bytes for all lines together.
-pub const POOL: usize = 560;
-/// Longest line, in bytes without its end.
+/// Longest line, in bytes without its end; less in a pool that has no more.
 pub const LINE_MAX: usize = 254;
+/// What is kept of a longer one.
+const REST_MAX: u8 = 32;
 
 /// What to do with a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -35,14 +36,39 @@ pub enum Class {
 struct Entry {
     len: u8,
     class: Class,
+    /// Bytes that came with it and are not kept, but for its end.
+    besides: u16,
 }
 
 /// Names a line in the pool until it is removed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LineId(u8);
 
-/// The pool. The buffer is last: what lies before it, AVR reaches in one instruction.
-#[repr(C)]
+/// Whether a place in a line is in a comment.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Aside {
+    /// It is not.
+    None,
+    /// In parentheses.
+    Parentheses,
+    /// Behind a semicolon.
+    Rest,
+}
+
+impl Aside {
+    /// The same behind one more byte.
+    pub fn after(self, byte: u8) -> Self {
+        match (self, byte) {
+            (_, b'\n' | b'\r') => Self::None,
+            (Self::Rest, _) | (Self::None, b';') => Self::Rest,
+            (_, b'(') => Self::Parentheses,
+            (_, b')') => Self::None,
+            (aside, _) => aside,
+        }
+    }
+}
+
+/// The pool.
 pub struct LinePool {
     /// Complete lines, in order; their bytes lie end to end.
     entries: Vec<Entry, SLOTS>,
@@ -54,28 +80,34 @@ pub struct LinePool {
     end: u16,
     /// Bytes of the line that is coming in, from `end` on.
     partial: u8,
+    /// Bytes since the last line that are not kept.
+    besides: u16,
     /// Why the line that is coming in cannot be kept.
     fault: Option<Status>,
     /// The last byte was a carriage return: a line feed right behind it ends the same line.
     returned: bool,
     /// Empty lines are kept: in text mode they are answered by a prompt.
     keep_empty: bool,
-    bytes: [u8; POOL],
+    /// Longest line.
+    longest: u8,
+    bytes: &'static mut [u8],
 }
 
 impl LinePool {
-    /// An empty pool.
-    pub const fn new() -> Self {
+    /// An empty pool that keeps its lines in `bytes`.
+    pub const fn new(bytes: &'static mut [u8]) -> Self {
         Self {
             entries: Vec::new(),
             controls: 0,
             start: 0,
             end: 0,
             partial: 0,
+            besides: 0,
             fault: None,
             returned: false,
             keep_empty: false,
-            bytes: [0; POOL],
+            longest: if bytes.len() > LINE_MAX { LINE_MAX } else { bytes.len() - 1 } as u8,
+            bytes,
         }
     }
 
@@ -93,7 +125,7 @@ impl LinePool {
     #[inline(never)]
     pub fn ready(&self) -> bool {
         let used = self.end - self.start + u16::from(self.partial);
-        self.entries.len() < SLOTS && used < POOL as u16
+        self.entries.len() < SLOTS && usize::from(used) < self.bytes.len()
     }
 
     /// Takes the printing bytes that `bytes` begins with, as far as they fit and are no matter for
@@ -104,7 +136,7 @@ impl LinePool {
         {
             return 0;
         }
-        let room = LINE_MAX - usize::from(self.partial);
+        let room = usize::from(self.longest - self.partial);
         let at = self.room_at();
         let slots = self.bytes.get_mut(at..).unwrap_or(&mut []);
         let slots = slots.get_mut(..room.min(slots.len())).unwrap_or(&mut []);
@@ -119,23 +151,33 @@ impl LinePool {
     pub fn put(&mut self, byte: u8) -> bool {
         let returned = core::mem::replace(&mut self.returned, byte == b'\r');
         if byte == b'\n' && returned {
+            self.pass(1);
             return false;
         }
         if byte == b'\n' || byte == b'\r' {
             return self.end_line();
         }
         if self.fault.is_some() || (self.partial == 0 && is_blank(byte)) {
+            self.pass(1);
             return false;
         }
         let at = self.room_at();
         match self.bytes.get_mut(at) {
-            Some(slot) if usize::from(self.partial) < LINE_MAX => {
+            Some(slot) if self.partial < self.longest => {
                 *slot = byte;
                 self.partial += 1;
             }
-            _ => self.spoil(Status::InputTooLong),
+            _ => {
+                self.spoil(Status::InputTooLong);
+                self.pass(1);
+            }
         }
         false
+    }
+
+    /// Bytes have come that are not kept.
+    fn pass(&mut self, count: u8) {
+        self.besides = self.besides.saturating_add(count.into());
     }
 
     /// Where the next byte goes. When the lines have reached the end of the buffer they all move to its
@@ -143,7 +185,7 @@ impl LinePool {
     #[inline(always)]
     fn room_at(&mut self) -> usize {
         let at = usize::from(self.end) + usize::from(self.partial);
-        if at < POOL || self.start == 0 {
+        if at < self.bytes.len() || self.start == 0 {
             return at;
         }
         self.move_down(at)
@@ -159,14 +201,49 @@ impl LinePool {
 
     /// Gives up the line that is coming in: it will be answered with `status`.
     pub fn spoil(&mut self, status: Status) {
-        self.partial = 0;
+        // In a small pool less, to leave room for control lines.
+        let most = REST_MAX.min(self.longest / 4);
+        let kept = if status == Status::InputTooLong { self.partial.min(most) } else { 0 };
+        self.pass(self.partial - kept);
+        self.partial = kept;
         self.fault = Some(status);
     }
 
     /// Forgets the line that is coming in.
     pub fn forget(&mut self) {
+        self.pass(self.partial);
         self.partial = 0;
         self.fault = None;
+    }
+
+    /// Whether what comes next is in a comment.
+    pub fn aside(&self) -> Aside {
+        let text = self.slice(usize::from(self.end), self.partial);
+        text.iter().fold(Aside::None, |aside, byte| aside.after(*byte))
+    }
+
+    /// Whether a data line waits, or a fault.
+    pub fn has_data(&self) -> bool {
+        self.entries.len() > usize::from(self.controls)
+    }
+
+    /// Drops all data lines: they will be answered with [`Status::Terminated`].
+    #[inline(never)]
+    pub fn terminate(&mut self) {
+        for entry in &mut self.entries {
+            if entry.class == Class::Data {
+                entry.class = Class::Fault(Status::Terminated);
+            }
+        }
+    }
+
+    /// The same for the line that is coming in.
+    #[inline(never)]
+    pub fn terminate_partial(&mut self) {
+        let text = self.slice(usize::from(self.end), self.partial);
+        if !text.is_empty() && classify(text) == Class::Data {
+            self.spoil(Status::Terminated);
+        }
     }
 
     /// The next byte follows a carriage return, or does not.
@@ -184,11 +261,15 @@ impl LinePool {
         let len = self.partial;
         let class = match self.fault.take() {
             Some(status) => Class::Fault(status),
-            None if len == 0 && !self.keep_empty => return false,
+            None if len == 0 && !self.keep_empty => {
+                self.pass(1);
+                return false;
+            }
             None => classify(self.slice(usize::from(self.end), len)),
         };
         self.partial = 0;
-        if self.entries.push(Entry { len, class }).is_ok() {
+        let besides = core::mem::take(&mut self.besides);
+        if self.entries.push(Entry { len, class, besides }).is_ok() {
             self.end += u16::from(len);
             self.controls += u8::from(class == Class::Control);
         }
@@ -213,7 +294,7 @@ impl LinePool {
     /// The text of the oldest line, if that is next, and data.
     pub fn oldest(&self) -> Option<&[u8]> {
         match self.entries.first() {
-            Some(Entry { len, class: Class::Data }) if self.controls == 0 => {
+            Some(Entry { len, class: Class::Data, .. }) if self.controls == 0 => {
                 Some(self.slice(self.start.into(), *len))
             }
             _ => None,
@@ -234,6 +315,17 @@ impl LinePool {
         }
     }
 
+    /// How many bytes its sender counts for a line, with its end.
+    pub fn length(&self, id: LineId) -> u16 {
+        let length = |entry: &Entry| entry.besides.saturating_add(u16::from(entry.len) + 1);
+        self.entries.get(usize::from(id.0)).map_or(0, length)
+    }
+
+    /// The same of the oldest line.
+    pub fn oldest_length(&self) -> u16 {
+        self.length(LineId(0))
+    }
+
     fn start_of(&self, index: usize) -> usize {
         if index == 0 {
             return self.start.into();
@@ -245,7 +337,7 @@ impl LinePool {
     /// Removes a line. The oldest costs next to nothing, any other about 8 cycles for each byte behind it.
     pub fn remove(&mut self, id: LineId) {
         let index = usize::from(id.0);
-        let Some(Entry { len, class }) = self.entries.get(index).copied() else {
+        let Some(Entry { len, class, .. }) = self.entries.get(index).copied() else {
             return;
         };
         if index == 0 {
@@ -263,16 +355,10 @@ impl LinePool {
     fn close_gap(&mut self, start: usize, len: u8) {
         let behind = start + usize::from(len);
         let end = usize::from(self.end) + usize::from(self.partial);
-        if behind <= end && end <= POOL {
+        if behind <= end && end <= self.bytes.len() {
             self.bytes.copy_within(behind..end, start);
         }
         self.end -= u16::from(len);
-    }
-}
-
-impl Default for LinePool {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -297,101 +383,4 @@ fn wraps_gcode(line: &[u8]) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn feed(pool: &mut LinePool, text: &[u8]) {
-        for &byte in text {
-            assert!(pool.ready());
-            pool.put(byte);
-        }
-    }
-
-    fn take(pool: &mut LinePool, data: bool) -> Option<(std::vec::Vec<u8>, Class)> {
-        let (id, class) = pool.next(data)?;
-        let text = pool.text(id).to_vec();
-        pool.remove(id);
-        Some((text, class))
-    }
-
-    #[test]
-    fn control_overtakes_data_and_order_holds_within_each() {
-        let mut pool = LinePool::new();
-        feed(&mut pool, b"g1x1\r\n  {a:n}\n\ng1x2\n{\"gc\":\"g0\"}\n?\n");
-        assert_eq!(pool.free(), 3);
-        assert_eq!(take(&mut pool, false), Some((b"{a:n}".to_vec(), Class::Control)));
-        assert_eq!(take(&mut pool, true), Some((b"?".to_vec(), Class::Control)));
-        assert_eq!(take(&mut pool, false), None);
-        for line in [&b"g1x1"[..], b"g1x2", b"{\"gc\":\"g0\"}"] {
-            assert_eq!(take(&mut pool, true), Some((line.to_vec(), Class::Data)));
-        }
-        assert_eq!(pool.free(), 8);
-    }
-
-    #[test]
-    fn a_line_that_is_coming_in_survives_removals() {
-        let mut pool = LinePool::new();
-        feed(&mut pool, b"first\nsecond\nthi");
-        take(&mut pool, true);
-        feed(&mut pool, b"rd\n");
-        assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"second".to_vec()));
-        assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"third".to_vec()));
-    }
-
-    #[test]
-    fn long_and_damaged_lines_become_one_fault_each() {
-        let mut pool = LinePool::new();
-        feed(&mut pool, &[b'x'; 300]);
-        feed(&mut pool, b"\ngood\nbad");
-        pool.spoil(Status::BufferFull);
-        feed(&mut pool, b"more\nok\n");
-        assert_eq!(take(&mut pool, true).map(|l| l.1), Some(Class::Fault(Status::InputTooLong)));
-        assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"good".to_vec()));
-        assert_eq!(take(&mut pool, true).map(|l| l.1), Some(Class::Fault(Status::BufferFull)));
-        assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"ok".to_vec()));
-    }
-
-    #[test]
-    fn empty_lines_count_where_they_are_wanted() {
-        let mut pool = LinePool::new();
-        feed(&mut pool, b"\r\n\n");
-        assert_eq!(pool.free(), 8);
-        pool.keep_empty(true);
-        feed(&mut pool, b"?\r\n\r\n\n");
-        assert_eq!(pool.free(), 5);
-        assert_eq!(take(&mut pool, true), Some((b"?".to_vec(), Class::Control)));
-        assert_eq!(take(&mut pool, true), Some((b"".to_vec(), Class::Data)));
-    }
-
-    #[test]
-    fn text_in_pieces_is_text_byte_by_byte() {
-        let (mut pieces, mut bytes) = (LinePool::new(), LinePool::new());
-        for round in 0..200 {
-            let long = "(".repeat(round * 7 % 300);
-            let line = std::format!("  N{round} X1.5\tY2{long}\r\n\n \x01x\ny\r");
-            let mut rest = line.as_bytes();
-            while !rest.is_empty() {
-                assert!(pieces.ready());
-                let count = usize::from(pieces.put_text(&rest[..rest.len().min(round % 9 + 1)]));
-                rest = &rest[count..];
-                if count == 0 {
-                    pieces.put(rest[0]);
-                    rest = &rest[1..];
-                }
-            }
-            feed(&mut bytes, line.as_bytes());
-            for _ in 0..4 {
-                assert_eq!(take(&mut pieces, true), take(&mut bytes, true));
-            }
-        }
-    }
-
-    #[test]
-    fn a_full_pool_is_not_ready() {
-        let mut pool = LinePool::new();
-        feed(&mut pool, b"1\n2\n3\n4\n5\n6\n7\n8\n");
-        assert!(!pool.ready());
-        take(&mut pool, true);
-        assert!(pool.ready());
-    }
-}
+mod tests;

@@ -3,14 +3,15 @@
 //!
 //! | link | carries | depth | RAM | from | to | when full |
 //! |---|---|---|---|---|---|---|
-//! | `uart` receive ring | bytes | 255 | 260 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
-//! | [`Links::lines`] | lines | 8 lines, 560 B | 590 B | reader | parser | bytes stay in the receive ring |
+//! | `uart` receive ring | bytes | 255; 63 | 259 B, 67 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
+//! | [`Port::lines`] | lines | 8 lines; 480 B, 80 B | 511 B, 111 B | reader | parser | bytes stay in the receive ring |
 //! | [`Links::commands`] | canonical commands | 1 | 98 B | parser | planner | the parser takes control lines only |
 //! | block ring | blocks | 64 | 2,090 B | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |
-//! | `uart` transmit ring | bytes | 255 | 260 B | parser, reporter | TX interrupt | the writer waits, response half sent |
+//! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | the writer waits, response half sent |
 //! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
+//! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
 //! lines wait in the pool, and their responses wait with them. The sender has at most its lines in
@@ -21,28 +22,27 @@
 
 use core::cell::{Cell, RefCell, UnsafeCell};
 
-use embassy_sync::blocking_mutex::raw::NoopRawMutex;
-use embassy_sync::mutex::Mutex;
-
-use super::lines::LinePool;
+use super::hold::Flush;
+use super::ports::Port;
 use super::storage::Storage;
-use super::tx::Tx;
 use super::wake::{News, Wake};
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 use crate::hal::byte::SharedByte;
+use crate::hal::serial::PORTS;
 use crate::jobs::Job;
 use crate::motion::exec::Snapshot;
 use crate::motion::queue;
-use crate::protocol::{Mode, StatusReport};
-use crate::status::Status;
+use crate::protocol::StatusReport;
 
 /// The links. One for the machine, made at start-up.
 pub struct Links {
-    /// Received lines.
-    pub lines: RefCell<LinePool>,
-    /// The reader waits for it when the pool is full.
+    /// The serial ports.
+    pub ports: [Port; PORTS],
+    /// The number of the port that feeds the machine.
+    pub feeder: Cell<u8>,
+    /// The reader waits for it when a pool is full.
     pub pool_space: Wake,
     /// There is a line, or the planner is ready: the parser looks again.
     pub parser_wake: Wake,
@@ -62,19 +62,24 @@ pub struct Links {
     pub queue_count: QueueCount,
     /// A setting has changed what steps mean: the planner counts them anew.
     pub resync: Cell<bool>,
-    /// A new rate of the line, in bits a second: the parser sets it when its response has left.
+    /// A new rate of USB, in bits a second: the parser sets it when its response has left.
     pub rate: Cell<Option<u32>>,
-    /// An exception to report.
-    pub exception: Cell<Option<Status>>,
-    /// How the sender wants to be answered.
-    pub mode: Cell<Mode>,
     /// What status reports hold.
     pub report: RefCell<StatusReport>,
-    /// The line to the sender, for the parser and the reporter. The mutex knows of one task that waits: two
-    /// would keep waking each other.
-    pub tx: Mutex<NoopRawMutex, Tx>,
-    /// The sender asks whether anybody is there: control sets it, the reporter answers.
-    pub enquiry: Cell<bool>,
+    /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.
+    pub restart: Cell<Option<bool>>,
+    /// How far a queue flush has come.
+    pub flush: Cell<Flush>,
+    /// A tilde has come, and no exclamation mark since: where it stands, what is held goes on.
+    pub resume: Cell<bool>,
+    /// A percent sign has come in the hold.
+    pub percent: Cell<bool>,
+    /// When a percent sign came that was none, ms: an exclamation mark right after it makes it one.
+    pub percent_at: Cell<u32>,
+    /// The job has been killed: when its queue has been flushed, the program ends.
+    pub killed: Cell<bool>,
+    /// The queue has been flushed, which is to be told.
+    pub flushed: Cell<bool>,
     /// The built-in job that runs.
     pub job: Cell<Job>,
     /// What has to be put away, and where the rest is.

@@ -3,10 +3,12 @@
 
 pub mod control;
 pub mod exec;
+pub mod hold;
 pub mod lines;
 pub mod links;
 pub mod parser;
 pub mod planner;
+pub mod ports;
 pub mod power;
 mod printing;
 pub mod reader;

@@ -1,22 +1,29 @@
 //! The parser task: takes lines, answers them, and hands what they ask for to the planner.
 //!
-//! Reads the line pool, writes `Links::commands`, the G-code model, the settings and the response;
+//! Reads the line pools, writes `Links::commands`, the G-code model, the settings and the response;
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
-//! data lines only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
+//! data lines of the port that feeds the machine only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
 //! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
 //! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`].
 
 use embassy_time::Timer;
 use heapless::Vec;
 
+use super::hold::Flush;
 use super::lines::{Class, LineId};
 use super::links::Links;
+use super::ports::{Chosen, Port};
 use super::tx::Tx;
 use super::view::View;
+use crate::hal::imp;
 use crate::hal::imp::eeprom::Eeprom;
+use crate::hal::serial::USB;
 use crate::jobs::Job;
-use crate::protocol::{Mode, Next, Request, Span, is_brief, put_brief};
+use crate::protocol::{Ending, Mode, Next, Out, Request, Span, is_brief, put_brief, put_line_end};
 use crate::status::Status;
+
+/// Bytes of an echo that are put at once.
+const ECHO: usize = 62;
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
@@ -28,30 +35,48 @@ pub async fn run(links: &'static Links) -> ! {
         if tried == Usual::Done {
             continue;
         }
-        let next = links.lines.borrow().next(data);
-        let Some((id, class)) = next else {
+        let next = match links.flush.get() {
+            Flush::None => links.next_line(data),
+            flush => dropped(links, flush),
+        };
+        let Some(Chosen { port, id, class }) = next else {
             match free && runs_job {
                 true => job_line(links),
                 false => links.parser_wake.wait().await,
             }
             continue;
         };
-        match begin(links, id, class, tried) {
+        let echoes = links.settings.borrow().echo();
+        match begin(links, port, id, class, tried) {
             Begun::Answer(mut request) => {
-                if !answer_at_once(links, id, &mut request) {
-                    answer(links, id, &mut request).await;
+                if echoes || !answer_at_once(links, port, id, &mut request) {
+                    answer(links, port, id, &mut request, echoes).await;
                 }
             }
             Begun::Silent => {}
             Begun::Again => continue,
         }
-        finish(links, id);
+        finish(links, port, id);
     }
 }
 
-/// Whether a block can be carried out now: neither has the planner to be waited for, nor the tables.
+/// The next line during a queue flush: control lines are carried out, those of data dropped.
+#[inline(never)]
+fn dropped(links: &Links, flush: Flush) -> Option<Chosen<'_>> {
+    links.ports.iter().find_map(|port| {
+        let (id, class) = port.lines.borrow().next(true)?;
+        match class {
+            Class::Data if flush == Flush::Rest => None,
+            Class::Data => Some(Chosen { port, id, class: Class::Fault(Status::Terminated) }),
+            class => Some(Chosen { port, id, class }),
+        }
+    })
+}
+
+/// Whether a block can be carried out now: neither has the planner to be waited for, nor the tables, and
+/// nothing is being dropped.
 fn is_free(links: &Links) -> bool {
-    !links.commands_taken.get() && !links.storage.is_awaited()
+    !links.commands_taken.get() && !links.storage.is_awaited() && links.flush.get() == Flush::None
 }
 
 /// Carries out the next line of a built-in job. Its end, and a line that is refused, are told by an exception
@@ -69,8 +94,7 @@ fn job_line(links: &Links) {
     }
     if !matches!(status, Status::Ok | Status::Noop) {
         job = Job::default();
-        links.exception.set(Some(status));
-        links.reporter_wake.signal();
+        links.except(status);
     }
     links.job.set(job);
 }
@@ -91,15 +115,16 @@ enum Usual {
 /// four steps and with a [`Request`], in half the time.
 #[inline(never)]
 fn usual(links: &Links) -> Usual {
-    if links.mode.get() != Mode::Json {
+    let port = links.feeder();
+    if port.mode.get() != Mode::Json {
         return Usual::NotTried;
     }
-    let Ok(mut tx) = links.tx.try_lock() else { return Usual::NotTried };
-    let mut lines = links.lines.borrow_mut();
+    let Ok(mut tx) = port.tx.try_lock() else { return Usual::NotTried };
+    let mut lines = port.lines.borrow_mut();
     let Some(line) = lines.oldest() else { return Usual::NotTried };
     let settings = links.settings.borrow();
     let numbered = is_brief(&settings, true);
-    if !tx.has_room() || !(numbered || is_brief(&settings, false)) {
+    if !tx.has_room() || settings.echo() || !(numbered || is_brief(&settings, false)) {
         return Usual::NotTried;
     }
     let mut commands = links.commands.borrow_mut();
@@ -108,7 +133,8 @@ fn usual(links: &Links) -> Usual {
     }
     links.commands_taken.set(true);
     links.planner_wake.signal();
-    put_brief(&settings, lines.free(), &mut *tx);
+    let ending = Ending { free: lines.free(), length: lines.oldest_length() };
+    put_brief(&settings, ending, &mut *tx);
     tx.flush();
     lines.remove_oldest();
     links.pool_space.signal();
@@ -119,11 +145,11 @@ fn usual(links: &Links) -> Usual {
 /// Answers a line as far as that goes without waiting: most of them to the end. Returns whether it was
 /// this one.
 #[inline(never)]
-fn answer_at_once(links: &Links, id: LineId, request: &mut Request) -> bool {
-    match links.tx.try_lock() {
+fn answer_at_once(links: &Links, port: &Port, id: LineId, request: &mut Request) -> bool {
+    match port.tx.try_lock() {
         // What waits for the planner is left to `answer`.
         Ok(mut tx) if tx.has_room() && request.gcode().is_none() => {
-            matches!(step(links, id, request, &mut tx), Next::Done(_))
+            matches!(step(links, port, id, request, &mut tx), Next::Done(_))
         }
         _ => false,
     }
@@ -142,20 +168,22 @@ enum Begun {
 /// Begins with a line. One of G-code has run after that, for data lines are taken only while the
 /// planner is free.
 #[inline(never)]
-fn begin(links: &Links, id: LineId, class: Class, tried: Usual) -> Begun {
-    let lines = links.lines.borrow();
-    let line = lines.text(id);
-    let mut mode = links.mode.get();
+fn begin(links: &Links, port: &Port, id: LineId, class: Class, tried: Usual) -> Begun {
+    let lines = port.lines.borrow();
+    let (line, length) = (lines.text(id), lines.length(id));
+    let mut mode = port.mode.get();
+    let settings = links.settings.borrow();
     let mut request = match class {
-        Class::Fault(status) => Request::refused(status, mode),
-        _ => match Request::begin(line, &mut mode) {
+        Class::Fault(status) => Request::refused(status, line, length, mode, &settings),
+        _ => match Request::begin(line, length, &mut mode, &settings) {
             Some(request) => request,
             None => return Begun::Silent,
         },
     };
-    links.mode.set(mode);
+    drop(settings);
+    port.mode.set(mode);
     if let Some(block) = request.gcode() {
-        let (status, commented) = interpret(links, block.of(line), tried);
+        let (status, commented) = run_block(links, port, block.of(line), tried);
         if status == Status::Again {
             return Begun::Again;
         }
@@ -164,36 +192,51 @@ fn begin(links: &Links, id: LineId, class: Class, tried: Usual) -> Begun {
     Begun::Answer(request)
 }
 
-/// Writes the response to a line.
-async fn answer(links: &Links, id: LineId, request: &mut Request) {
-    let mut tx = links.tx.lock().await;
+/// Writes the response to a line, and before that the line if it `echoes`.
+async fn answer(links: &Links, port: &Port, id: LineId, request: &mut Request, echoes: bool) {
+    let mut tx = port.tx.lock().await;
+    let mut at = 0;
+    let mut echoes = echoes;
+    while echoes {
+        tx.room().await;
+        echoes = echo(links, port, id, &mut at, &mut tx);
+    }
     loop {
         tx.room().await;
-        match step(links, id, request, &mut tx) {
+        match step(links, port, id, request, &mut tx) {
             Next::More => {}
             // Of a response that has begun the rest is due.
             Next::Wait if request.has_begun() => tables_ready(links).await,
             Next::Wait => {
                 drop(tx);
                 tables_ready(links).await;
-                tx = links.tx.lock().await;
+                tx = port.tx.lock().await;
             }
             Next::Gcode { start, end } => {
                 let block = Span { start, end };
-                while !ran(links, id, block, request) {
+                while !ran(links, port, id, block, request) {
                     // Nothing of the response has been put yet: others may talk meanwhile.
                     drop(tx);
-                    while !is_free(links) {
+                    while !is_free(links) && links.flush.get() == Flush::None {
                         links.parser_wake.wait().await;
                     }
-                    tx = links.tx.lock().await;
+                    tx = port.tx.lock().await;
                 }
             }
             Next::Done(_) => break,
         }
     }
+    if let Some(boot) = links.restart.take() {
+        tx.drain().await;
+        if boot {
+            imp::boot()
+        } else {
+            imp::reset()
+        };
+    }
+    drop(tx);
     if let Some(rate) = links.rate.take() {
-        tx.set_rate(rate).await;
+        links.port(USB).tx.lock().await.set_rate(rate).await;
     }
 }
 
@@ -205,14 +248,35 @@ async fn tables_ready(links: &Links) {
     }
 }
 
-/// Carries out the block of a request, if that can be done now.
+/// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so
+/// that it never stands in the midst of a response or a report, and never loses anything.
 #[inline(never)]
-fn ran(links: &Links, id: LineId, block: Span, request: &mut Request) -> bool {
-    if !is_free(links) {
+fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> bool {
+    let lines = port.lines.borrow();
+    let rest = lines.text(id).get(usize::from(*at)..).unwrap_or(&[]);
+    let part = rest.get(..ECHO).unwrap_or(rest);
+    tx.put_all(part.iter().copied());
+    *at += part.len() as u8;
+    let more = part.len() == ECHO;
+    if !more {
+        put_line_end(&links.settings.borrow(), tx);
+    }
+    tx.flush();
+    more
+}
+
+/// Carries out the block of a request, if that can be done now; or drops it in a queue flush.
+#[inline(never)]
+fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Request) -> bool {
+    if links.flush.get() != Flush::None {
+        request.ran(Status::Terminated, false);
+        return true;
+    }
+    if links.may_feed(port) && !is_free(links) {
         return false;
     }
-    let lines = links.lines.borrow();
-    let (status, commented) = interpret(links, block.of(lines.text(id)), Usual::NotTried);
+    let lines = port.lines.borrow();
+    let (status, commented) = run_block(links, port, block.of(lines.text(id)), Usual::NotTried);
     if status == Status::Again {
         return false;
     }
@@ -222,18 +286,33 @@ fn ran(links: &Links, id: LineId, block: Span, request: &mut Request) -> bool {
 
 /// The line's slot is free again.
 #[inline(never)]
-fn finish(links: &Links, id: LineId) {
-    links.lines.borrow_mut().remove(id);
+fn finish(links: &Links, port: &Port, id: LineId) {
+    port.lines.borrow_mut().remove(id);
     links.pool_space.signal();
     links.reporter_wake.signal();
 }
 
 #[inline(never)]
-fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
-    let lines = links.lines.borrow();
-    let next = request.step(lines.text(id), &mut View::of(links), tx);
+fn step(links: &Links, port: &Port, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
+    let lines = port.lines.borrow();
+    let next = request.step(lines.text(id), &mut View::of(links, port), tx);
     tx.flush();
     next
+}
+
+/// Interprets a block of a port's, if that feeds the machine.
+#[inline(never)]
+fn run_block(links: &Links, port: &Port, block: &[u8], tried: Usual) -> (Status, bool) {
+    match links.may_feed(port) {
+        true => interpret(links, block, tried),
+        false => (Status::Muted, true),
+    }
+}
+
+/// Ends the program, as M2 does, for one that has been killed. The planner is free.
+pub fn end_program(links: &Links) {
+    // It is never refused, and changes no table.
+    let _ = interpret(links, b"M2", Usual::NotTried);
 }
 
 /// Interprets a block and hands its commands to the planner. Returns also whether it may have a

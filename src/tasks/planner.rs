@@ -2,23 +2,28 @@
 //!
 //! Reads `Links::commands` and the settings, writes the block queue, waits for commands, for room in
 //! the queue, and at a program stop for cycle start if the settings say so. One turn builds one block.
+//! In a queue flush it forgets the line, has exec drop the blocks, and starts from where the motors are.
 
 use embassy_futures::yield_now;
 
+use super::hold::{self, Flush};
 use super::links::{self, Links};
+use super::parser;
 use super::setup::moved_by;
-use crate::boards::outputs;
+use crate::boards::{MOTORS, outputs};
 use crate::config::{Settings, StepRatio};
 use crate::gcode::arc::Walk;
 use crate::gcode::command::{Commands, Feed, Motion, Overrides, Stop};
 use crate::gcode::modal::{self, Coolant};
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, wait};
+use crate::jobs::Job;
 use crate::motion::block::{Block, Body, Line as Move};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line, Motors};
 use crate::motion::pace::Drivers;
 use crate::motion::queue::{self, BlockQueue};
+use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
 /// The planner's own state.
@@ -99,7 +104,7 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
     };
     loop {
         links.planner_wake.wait().await;
-        if !planner.carry_out_at_once() {
+        if links.commands_taken.get() && !planner.carry_out_at_once() {
             planner.begin();
             loop {
                 planner.room().await;
@@ -111,6 +116,14 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
             }
         }
         links.commands_taken.set(false);
+        if planner.is_flushed() {
+            hold::drop_blocks();
+            wait(Event::BlockDone, || hold::has_dropped().then_some(())).await;
+            planner.restart();
+            if links.killed.take() {
+                parser::end_program(links);
+            }
+        }
         links.parser_wake.signal();
     }
 }
@@ -156,6 +169,9 @@ impl Planner {
     /// Carries out a part of the line that takes one block at most, for which there is room.
     #[inline(never)]
     fn turn(&mut self) -> Turn {
+        if self.is_flushed() {
+            return Turn::Done;
+        }
         if self.news != News::None {
             self.tell();
             return Turn::More;
@@ -352,17 +368,67 @@ impl Planner {
     }
 
     async fn room(&self) {
-        wait(Event::BlockDone, || (self.queue.free() > 0).then_some(())).await;
+        wait(Event::BlockDone, || (self.queue.free() > 0 || self.is_flushed()).then_some(())).await;
     }
 
     /// Waits until the machine has come to the stop, and then for the next cycle start.
     async fn cycle_start(&self) {
-        wait(Event::BlockDone, || (queue::used() == 0).then_some(())).await;
+        wait(Event::BlockDone, || (queue::used() == 0 || self.is_flushed()).then_some(())).await;
+        if self.is_flushed() {
+            return;
+        }
         self.links.stopped.set(true);
         self.links.reporter_wake.signal();
         self.links.cycle_start.take();
         self.links.cycle_start.wait().await;
         self.links.stopped.set(false);
+    }
+
+    /// Whether all that is queued is to be dropped.
+    fn is_flushed(&self) -> bool {
+        self.links.flush.get() == Flush::Rest
+    }
+
+    /// Exec has dropped its blocks: planner and model start from where the motors are.
+    #[inline(never)]
+    fn restart(&mut self) {
+        let links = self.links;
+        let motion = links::snapshot();
+        // Until steps have been counted anew they mean what they meant before; nothing has moved since.
+        if !links.resync.get() {
+            self.locate(&motion.target);
+        }
+        self.builder.place(&motion.target);
+        self.queue.restart();
+        (self.walk, self.parts, self.news) = (None, None, News::None);
+        self.outputs = motion.outputs;
+        let mut model = links.model.borrow_mut();
+        self.set_overrides(model.overrides());
+        model.set_position(&self.position);
+        model.set_outputs(spindle_of(motion.outputs), coolant_of(motion.outputs));
+        drop(model);
+        links.job.set(Job::default());
+        links.flush.set(Flush::None);
+        hold::end();
+        if links.killed.get() {
+            links.except(Status::KillJob);
+        }
+        links.flushed.set(true);
+        links.reporter_wake.urge();
+    }
+
+    /// The position of every axis that a motor moves, unless the step is that at which it was to end.
+    fn locate(&mut self, steps: &[i32; MOTORS]) {
+        let settings = self.links.settings.borrow();
+        // Of several motors on an axis the first tells.
+        for (m, steps) in steps.iter().enumerate().rev() {
+            let ratio = settings.step_ratio(m);
+            if let Some(position) = self.position.get_mut(usize::from(moved_by(&settings, m)))
+                && ratio.steps(*position) != *steps
+            {
+                *position = ratio.length(*steps).unwrap_or(*position);
+            }
+        }
     }
 
     /// Tells the others that a block has been queued.
@@ -371,6 +437,21 @@ impl Planner {
         self.links.queue_count.add();
         self.links.reporter_wake.signal();
     }
+}
+
+/// How the spindle turns, by the outputs.
+fn spindle_of(on: u8) -> modal::Turn {
+    match on & (outputs::SPINDLE | outputs::COUNTERCLOCKWISE) {
+        0 => modal::Turn::Off,
+        outputs::SPINDLE => modal::Turn::Clockwise,
+        _ => modal::Turn::Counterclockwise,
+    }
+}
+
+/// The coolant, by the outputs.
+fn coolant_of(on: u8) -> u8 {
+    let bit = |output, which: Coolant| if on & output != 0 { which as u8 } else { 0 };
+    bit(outputs::MIST, Coolant::Mist) | bit(outputs::FLOOD, Coolant::Flood)
 }
 
 impl Parts {

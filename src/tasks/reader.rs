@@ -1,20 +1,23 @@
-//! The reader task: bytes from the receive ring into the line pool.
+//! The reader task: bytes from the receive ring of each port into its line pool.
 //!
-//! Reads the receive ring, writes the line pool, waits on [`Event::Received`] or for pool space; never
+//! Reads the receive rings, writes the line pools, waits on [`Event::Received`] or for pool space; never
 //! runs longer than the ring is full (255 bytes, about 6,000 cycles). When the pool is full the bytes
 //! stay in the ring, and when that is full too bytes are lost: the line that is damaged thereby is
 //! refused, and so is each line that is lost whole. With `ex` 1 the sender is stopped before that by XOFF, and
-//! stops the machine's answers so.
+//! stops the machine's answers so; with `ex` 2 both are done by pins.
 
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
 
-use super::lines::LinePool;
+use super::hold::{self, Flush};
+use super::lines::{Aside, LinePool};
 use super::links::Links;
+use super::ports::Port;
 use crate::hal::event::{Event, next};
 use crate::hal::imp::uart::{self, lost_ends};
 use crate::hal::serial::{
-    BEHIND_END, CLEAN, HIGH_WATER, LOW_WATER, MARKS, RETURNED, Received, XOFF, XON,
+    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, RETURNED, RX_RING, Received, USB, XOFF,
+    XON, high_water, is_shared, low_water,
 };
 use crate::protocol::Mode;
 use crate::status::Status;
@@ -23,24 +26,36 @@ use crate::status::Status;
 const TURN: usize = 16;
 
 /// What a turn came to.
-#[derive(PartialEq, Eq)]
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Left {
     Nothing,
-    Bytes,
     /// Bytes, and no room in the pool.
     Full,
+    Bytes,
+    /// Bytes, perhaps, behind this mark: the place of a real-time character.
+    Placed(u8),
 }
 
 /// The task.
-pub async fn run(links: &'static Links, received: Received) -> ! {
-    let mut intake =
-        Intake { received, seen: lost_ends(), refused: 0, then: 0, sender_stopped: false };
+pub async fn run(
+    links: &'static Links,
+    usb: Received<RX_RING>,
+    aux: Option<Received<AUX_RING>>,
+) -> ! {
+    let mut usb = Intake::new(links.port(USB), usb);
+    let mut aux = aux.map(|received| Intake::new(links.port(AUX), received));
     loop {
-        let left = intake.turn(links);
-        intake.control_flow(links);
-        match left {
+        let left = usb.take(links);
+        let aux_left = match &mut aux {
+            Some(aux) if !aux.is_idle() => aux.take(links),
+            _ => Left::Nothing,
+        };
+        if links.flush.get() == Flush::Here {
+            hold::placed(links, links.port(USB), CUT);
+        }
+        match left.max(aux_left) {
             Left::Nothing => next(Event::Received).await,
-            Left::Bytes => yield_now().await,
+            Left::Bytes | Left::Placed(_) => yield_now().await,
             Left::Full => {
                 // The ring goes on filling.
                 select(links.pool_space.wait(), next(Event::Received)).await;
@@ -49,25 +64,52 @@ pub async fn run(links: &'static Links, received: Received) -> ! {
     }
 }
 
-struct Intake {
-    received: Received,
+/// The receiving end of a port.
+struct Intake<const N: usize> {
+    port: &'static Port,
+    received: Received<N>,
     /// Lost line ends that have been seen to, of `lost_ends`.
     seen: u16,
     /// Lines that are still to be refused.
     refused: u16,
     /// The mark that told of them.
     then: u8,
-    /// It has been sent XOFF.
-    sender_stopped: bool,
+    /// How the sender has been stopped.
+    stopped: Flow,
+    /// The receive interrupt may have stopped it too, by a pin.
+    has_pins: bool,
 }
 
-impl Intake {
+impl<const N: usize> Intake<N> {
+    fn new(port: &'static Port, received: Received<N>) -> Self {
+        let seen = lost_ends(port.number);
+        let has_pins = Flow::of(port.number, 2) == Flow::Pins;
+        Self { port, received, seen, refused: 0, then: 0, stopped: Flow::None, has_pins }
+    }
+
+    /// Whether there is nothing to do: most of the time, on a port that nobody uses.
+    fn is_idle(&self) -> bool {
+        self.received.is_empty() && self.refused == 0 && self.stopped == Flow::None
+    }
+
+    /// Takes a turn's bytes, stops the sender or lets it go on, and sees to real-time characters where they stand.
+    fn take(&mut self, links: &Links) -> Left {
+        let left = self.turn(links);
+        self.control_flow(links);
+        match left {
+            Left::Placed(mark) => hold::placed(links, self.port, mark),
+            Left::Full => self.look_ahead(links),
+            _ => {}
+        }
+        left
+    }
+
     /// Takes a turn's bytes.
     #[inline(never)]
     fn turn(&mut self, links: &Links) -> Left {
-        let mut pool = links.lines.borrow_mut();
+        let mut pool = self.port.lines.borrow_mut();
         let pool = &mut *pool;
-        pool.keep_empty(links.mode.get() == Mode::Text);
+        pool.keep_empty(self.port.mode.get() == Mode::Text);
         for _ in 0..TURN {
             if self.refused > 0 && !self.refuse(pool, links) {
                 return Left::Full;
@@ -84,9 +126,21 @@ impl Intake {
                 return Left::Nothing;
             };
             let is_line = match byte {
-                ..MARKS => self.loss(pool, byte, links),
-                XON | XOFF if links.settings.borrow().has_xon_xoff() => {
-                    uart::hold(byte == XOFF);
+                // In a comment it is text; but nothing else is cut then.
+                CUT | GO if pool.aside() != Aside::None && links.flush.get() == Flush::None => {
+                    false
+                }
+                CUT | GO => return Left::Placed(byte),
+                ..MARKS => {
+                    let is_line = self.loss(pool, byte, links);
+                    if links.flush.get() == Flush::Input {
+                        // It may stand for the cut.
+                        return Left::Placed(CUT);
+                    }
+                    is_line
+                }
+                XON | XOFF if self.flow(links) == Flow::Characters => {
+                    uart::hold(self.port.number, byte == XOFF);
                     false
                 }
                 _ => pool.put(byte),
@@ -98,27 +152,52 @@ impl Intake {
         Left::Bytes
     }
 
+    /// No line can be taken before the machine goes on: looks for real-time characters in the ring that have
+    /// it do so. Cost: 30 cycles a byte.
+    #[inline(never)]
+    fn look_ahead(&self, links: &Links) {
+        if !hold::is_on() && !links.stopped.get() {
+            return;
+        }
+        let mut aside = self.port.lines.borrow().aside();
+        for n in 0..self.received.len() {
+            let Some(byte) = self.received.peek(n, |byte| *byte) else { return };
+            if byte < MARKS && aside == Aside::None {
+                hold::ahead(links, byte);
+            }
+            aside = aside.after(byte);
+        }
+    }
+
     /// Stops the sender, or lets it go on.
     #[inline(never)]
     fn control_flow(&mut self, links: &Links) {
         let waiting = self.received.len();
-        let stop = match self.sender_stopped {
-            true => waiting >= LOW_WATER,
-            false => waiting > HIGH_WATER,
+        let stop = match self.stopped {
+            Flow::None => waiting > high_water(N),
+            _ => waiting >= low_water(N),
         };
         // One that was stopped must not stay so when the setting changes.
-        let stop = stop && links.settings.borrow().has_xon_xoff();
-        if stop != self.sender_stopped {
-            self.sender_stopped = stop;
-            uart::send_ahead(if stop { XOFF } else { XON });
+        let flow = if stop { self.flow(links) } else { Flow::None };
+        if flow != self.stopped {
+            let port = self.port.number;
+            uart::stop_sender(port, self.stopped, false);
+            uart::stop_sender(port, flow, true);
+            self.stopped = flow;
+        } else if self.has_pins && flow == Flow::None {
+            uart::stop_sender(self.port.number, Flow::Pins, false);
         }
+    }
+
+    fn flow(&self, links: &Links) -> Flow {
+        Flow::of(self.port.number, links.settings.borrow().flow_control())
     }
 
     /// Bytes were lost here. Returns whether the mark stands for the end of a whole line.
     #[cold]
     #[inline(never)]
     fn loss(&mut self, pool: &mut LinePool, mark: u8, links: &Links) -> bool {
-        let ends = lost_ends();
+        let ends = lost_ends(self.port.number);
         self.refused = ends.wrapping_sub(core::mem::replace(&mut self.seen, ends));
         self.then = mark;
         let is_line = mark & BEHIND_END != 0 && pool.end(mark & RETURNED != 0);
@@ -128,8 +207,9 @@ impl Intake {
         if self.refused == 0 {
             self.after(pool);
         }
-        if self.refused > 0 || mark & CLEAN == 0 {
-            links.exception.set(Some(Status::BufferFull));
+        // A bus is not told: the line is refused anyway.
+        if (self.refused > 0 || mark & CLEAN == 0) && !is_shared(self.port.number) {
+            self.port.exception.set(Some(Status::BufferFull));
             links.reporter_wake.signal();
         }
         is_line

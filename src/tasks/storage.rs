@@ -257,8 +257,7 @@ fn next(links: &Links, memory: &Eeprom, work: Work, moved: u16) -> Option<Put> {
     let put = log.put(memory, key, value, moved);
     links.storage.log.set(log);
     if matches!(put, Put::Full) {
-        links.exception.set(Some(Status::PersistenceError));
-        links.reporter_wake.signal();
+        links.except(Status::PersistenceError);
     }
     Some(put)
 }

@@ -1,14 +1,15 @@
 //! The line to the sender: whole responses and reports, one after the other.
 //!
-//! Owned by whoever holds `Links::tx`, for as long as one line takes, so lines never mix. Call
+//! Owned by whoever holds `Port::tx`, for as long as one line takes, so lines never mix. Call
 //! [`Tx::room`] before each piece of at most [`PIECE`] bytes; it waits until the transmit ring has room.
 
 use embassy_time::Timer;
 
-use crate::hal::event::{Event, wait};
+use crate::hal::event::wait_transmitted;
 use crate::hal::imp::uart;
-use crate::hal::serial::{Outgoing, RING};
+use crate::hal::serial::{Outgoing, TX_RING};
 use crate::progmem::Text;
+use crate::protocol::Checksum;
 
 /// Most bytes written between two calls of [`Tx::room`].
 pub const PIECE: usize = 64;
@@ -18,19 +19,22 @@ const TWO_BYTES_MS: u32 = 20 * 1_000;
 /// The transmit ring's filling end.
 pub struct Tx {
     ring: Outgoing,
+    port: u8,
     /// Bits a second.
     rate: u32,
+    /// Of the response under way, if it ends with one.
+    sum: Option<Checksum>,
 }
 
 impl Tx {
-    /// Takes over the ring of a line that runs at `rate` bits a second.
-    pub fn new(ring: Outgoing, rate: u32) -> Self {
-        Self { ring, rate }
+    /// Takes over the ring of a port whose line runs at `rate` bits a second.
+    pub fn new(ring: Outgoing, port: u8, rate: u32) -> Self {
+        Self { ring, port, rate, sum: None }
     }
 
     /// Waits until a piece fits.
     pub async fn room(&mut self) {
-        wait(Event::Transmitted, || self.has_room().then_some(())).await;
+        wait_transmitted(self.port, || self.has_room().then_some(())).await;
     }
 
     /// Whether a piece fits now.
@@ -40,23 +44,42 @@ impl Tx {
 
     /// Sends what has been put.
     pub fn flush(&mut self) {
-        uart::kick();
+        uart::kick(self.port);
     }
 
     /// Goes on at `rate` bits a second, when what has been put has left at the old rate: 1 to 4 ms after
     /// its last byte. What the sender says meanwhile may be spoilt.
     pub async fn set_rate(&mut self, rate: u32) {
-        wait(Event::Transmitted, || (self.ring.free() == RING - 1).then_some(())).await;
+        self.drain().await;
+        uart::set_rate(self.port, rate);
+        self.rate = rate;
+    }
+
+    /// Waits until what has been put has left: 1 to 4 ms after its last byte.
+    pub async fn drain(&mut self) {
+        wait_transmitted(self.port, || (self.ring.free() == TX_RING - 1).then_some(())).await;
         // The transmitter holds two bytes more. It has a flag for their end, but the flag may be left
         // from a pause in the middle of the line; their time is certain.
         Timer::after_ticks(u64::from(TWO_BYTES_MS / self.rate) + 2).await;
-        uart::set_rate(rate);
-        self.rate = rate;
+    }
+
+    /// The response under way ends with a checksum: it takes bytes one by one.
+    #[inline(never)]
+    fn put_summed(&mut self, bytes: impl Iterator<Item = u8>) {
+        for byte in bytes {
+            if let Some(sum) = &mut self.sum {
+                sum.add(byte);
+            }
+            let _ = self.ring.push(byte);
+        }
     }
 }
 
 impl crate::protocol::Out for Tx {
     fn put(&mut self, byte: u8) {
+        if self.sum.is_some() {
+            return self.put_summed(core::iter::once(byte));
+        }
         // Room was made by `room`; a byte beyond it is a defect that tests of `protocol` exclude.
         let _ = self.ring.push(byte);
     }
@@ -64,16 +87,34 @@ impl crate::protocol::Out for Tx {
     // By itself, for it is called in many places.
     #[inline(never)]
     fn put_text(&mut self, text: Text) {
-        let slots = self.ring.vacant();
-        if slots.len() < text.len() {
-            return self.put_all(text.bytes());
+        if self.sum.is_some() {
+            return self.put_summed(text.bytes());
         }
-        text.copy(slots);
-        // SAFETY: so many have been copied there.
-        unsafe { self.ring.publish(text.len() as u8) };
+        let mut left = text;
+        // The ring's end may come in between; there is room beyond it.
+        for _ in 0..2 {
+            let count = left.copy(self.ring.vacant());
+            // SAFETY: so many have been copied there.
+            unsafe { self.ring.publish(count) };
+            left = left.behind(count);
+            if left.is_empty() {
+                break;
+            }
+        }
     }
 
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
+        if self.sum.is_some() {
+            return self.put_summed(bytes);
+        }
         self.ring.push_all(bytes);
+    }
+
+    fn begin_sum(&mut self) {
+        self.sum = Some(Checksum::default());
+    }
+
+    fn take_sum(&mut self) -> u16 {
+        self.sum.take().unwrap_or_default().value()
     }
 }

@@ -5,7 +5,9 @@
 
 use core::cell::{OnceCell, RefMut};
 
+use super::hold;
 use super::links::{Links, snapshot};
+use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
 use crate::baud;
@@ -14,12 +16,13 @@ use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::tables::Row;
 use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::imp::{gpio, stepper};
+use crate::hal::imp::{gpio, stepper, uart};
+use crate::hal::serial::{Flow, PORTS};
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
-use crate::protocol::{Machine, StatusReport, Store, Value, Warning, thousandths};
+use crate::protocol::{Dialect, Machine, StatusReport, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
 use crate::store::program;
@@ -32,19 +35,28 @@ pub const RUN: i32 = 5;
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
 const QUEUE_FREE_MIN: usize = 6;
 
+/// `stat` in a feedhold, from its first moment on.
+pub const HOLD: i32 = 6;
+/// `hold` while the machine slows down, and when it stands still.
+const SLOWING: i32 = 3;
+/// See [`SLOWING`].
+pub const HELD: i32 = 4;
+
 /// A look at the machine.
 pub struct View<'a> {
     links: &'a Links,
+    port: &'a Port,
     settings: RefMut<'a, Settings>,
     report: RefMut<'a, StatusReport>,
     motion: OnceCell<Snapshot>,
 }
 
 impl<'a> View<'a> {
-    /// Looks at the machine now.
-    pub fn of(links: &'a Links) -> Self {
+    /// Looks at the machine now, as the sender on this port sees it.
+    pub fn of(links: &'a Links, port: &'a Port) -> Self {
         Self {
             links,
+            port,
             settings: links.settings.borrow_mut(),
             report: links.report.borrow_mut(),
             motion: OnceCell::new(),
@@ -55,9 +67,10 @@ impl<'a> View<'a> {
         self.motion.get_or_init(snapshot)
     }
 
-    /// Whether anything is queued or runs.
-    fn busy(&self) -> bool {
-        self.motion().running
+    /// Whether anything is queued or runs, or a hold is on.
+    pub fn is_busy(&self) -> bool {
+        hold::is_on()
+            || self.motion().running
             || queue::used() > 0
             || self.links.commands_taken.get()
             || !self.links.job.get().is_none()
@@ -65,7 +78,10 @@ impl<'a> View<'a> {
 
     /// `stat`.
     pub fn state(&self) -> i32 {
-        if self.busy() && !self.links.stopped.get() {
+        if hold::is_on() {
+            return HOLD;
+        }
+        if self.is_busy() && !self.links.stopped.get() {
             return RUN;
         }
         match self.motion().program {
@@ -75,12 +91,21 @@ impl<'a> View<'a> {
         }
     }
 
+    /// `hold`.
+    pub fn hold(&self) -> i32 {
+        match hold::is_on() {
+            false => 0,
+            true if self.motion().held && !hold::is_passing() => HELD,
+            true => SLOWING,
+        }
+    }
+
     /// The machine position of an axis.
     fn position(&self, axis: usize) -> Length {
         let programmed = self.links.model.borrow().position().get(axis).copied();
         let programmed = programmed.unwrap_or(Length::ZERO);
         // Until the planner has counted anew, steps mean what they meant before a setting changed.
-        if !self.busy() || self.links.resync.get() {
+        if !self.is_busy() || self.links.resync.get() {
             return programmed;
         }
         // Of several motors on an axis the first tells; an axis that moves none is where it should be.
@@ -144,7 +169,7 @@ impl Machine for View<'_> {
             return Ok(Warning::None);
         }
         if setting.needs_rest() {
-            if self.busy() {
+            if self.is_busy() {
                 return Err(Status::NotAccepted);
             }
             self.links.resync.set(true);
@@ -169,19 +194,30 @@ impl Machine for View<'_> {
     fn value(&mut self, value: Value) -> i32 {
         match value {
             Value::State => self.state(),
-            // They differ only where there are alarms and cycles.
-            Value::Machine => self.state(),
-            Value::Cycle => i32::from(self.busy()),
+            // They differ only in a hold, and where there are alarms and cycles.
+            Value::Machine => {
+                if hold::is_on() {
+                    RUN
+                } else {
+                    self.state()
+                }
+            }
+            Value::Cycle => i32::from(self.is_busy()),
+            Value::Motion if hold::is_on() => 2,
             Value::Motion => i32::from(self.motion().running),
             // Lines that move nothing are finished when all before them are.
-            Value::FinishedLine if !self.busy() => self.modal(Value::BlockLine),
+            Value::FinishedLine if !self.is_busy() => self.modal(Value::BlockLine),
             Value::FinishedLine => self.motion().finished as i32,
             Value::MotionLine => self.motion().line as i32,
             Value::Velocity => thousandths(self.motion().velocity * 60.0),
             Value::QueueFree => queue_free() as i32,
             Value::QueueAdded => self.links.queue_count.take_added(),
             Value::QueueRemoved => self.links.queue_count.take_removed(),
-            Value::SlotsFree => self.links.lines.borrow().free().into(),
+            Value::SlotsFree => self.port.lines.borrow().free().into(),
+            Value::Room => match Dialect::of(&self.settings) {
+                Dialect::Characters => uart::room(self.port.number).into(),
+                _ => self.port.lines.borrow().free().into(),
+            },
             Value::MachinePosition(axis) => self.position(axis.into()).0,
             Value::Position(axis) => {
                 let axis = axis.into();
@@ -195,7 +231,8 @@ impl Machine for View<'_> {
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
-            Value::Hold | Value::Home => 0,
+            Value::Hold => self.hold(),
+            Value::Home => 0,
             modal => self.modal(modal),
         }
     }
@@ -205,7 +242,7 @@ impl Machine for View<'_> {
     }
 
     fn restore(&mut self) -> Status {
-        if self.busy() {
+        if self.is_busy() {
             return Status::NotAccepted;
         }
         let rate = self.settings.baud();
@@ -226,9 +263,14 @@ impl Machine for View<'_> {
         Status::Ok
     }
 
+    fn flush(&mut self) -> Status {
+        let busy = self.is_busy() || self.links.has_data();
+        if hold::flush_here(self.links, busy) { Status::Ok } else { Status::NotAccepted }
+    }
+
     fn start_job(&mut self, number: u8) -> Status {
         let Some(job) = Job::new(number) else { return Status::Error };
-        if !job.is_none() && self.busy() {
+        if !job.is_none() && self.is_busy() {
             return Status::NotAccepted;
         }
         if number == STORED && program::check(&Eeprom::take()).is_none() {
@@ -240,7 +282,7 @@ impl Machine for View<'_> {
     }
 
     fn store(&mut self, what: Store<'_>) -> Result<(), Status> {
-        if self.busy() {
+        if self.is_busy() {
             return Err(Status::NotAccepted);
         }
         if matches!(what, Store::Line(line) if line.len() > LINE_MAX) {
@@ -254,9 +296,17 @@ impl Machine for View<'_> {
         program::byte(&memory, program::len(&memory)?, at)
     }
 
+    fn restart(&mut self, boot: bool) -> Status {
+        if boot && self.is_busy() {
+            return Status::NotAccepted;
+        }
+        self.links.restart.set(Some(boot));
+        Status::Ok
+    }
+
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {
         // Without power a motor that moves would lose its position.
-        if self.busy() && !on {
+        if self.is_busy() && !on {
             return Status::NotAccepted;
         }
         let motors = motor.map_or(u8::MAX, |motor| 1 << motor);
@@ -277,6 +327,9 @@ pub fn queue_free() -> usize {
 /// Tells the outputs what the settings say of them. Thread mode, or before interrupts are on.
 pub fn set_outputs(settings: &Settings) {
     power::set_modes(settings);
+    for port in 0..PORTS as u8 {
+        uart::set_flow(port, Flow::of(port, settings.flow_control()));
+    }
     stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
     stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));
 }

@@ -133,6 +133,12 @@ pub struct Planned {
 
 /// Runs a job through queue and governor alone.
 pub fn plan(job: &Job) -> Vec<Planned> {
+    plan_held(job, |_, _| false)
+}
+
+/// The same, with feedholds: `held` tells before each stretch whether there is one, asked with the number of
+/// stretches so far and whether the machine stands still. At rest it is asked until there is none.
+pub fn plan_held(job: &Job, mut held: impl FnMut(usize, bool) -> bool) -> Vec<Planned> {
     let mut rig = Rig::new(job.config.clone());
     let mut governor = Governor::new();
     let mut running: Option<(Line, u32, f32)> = None;
@@ -167,7 +173,15 @@ pub fn plan(job: &Job) -> Vec<Planned> {
         }
         let view = View(rig.source.headroom(), &rig.source);
         let before = governor.velocity().into();
-        let stretch = governor.stretch(left, line.cruise, &view, SEGMENT_S);
+        let mut hold = held(planned.len(), governor.is_at_rest());
+        while hold && governor.is_at_rest() {
+            hold = held(planned.len(), true);
+        }
+        let stretch = if hold {
+            governor.halt(left, &view, SEGMENT_S)
+        } else {
+            governor.stretch(left, line.cruise, &view, SEGMENT_S)
+        };
         planned.push(Planned {
             line: number,
             length: line.length.into(),

@@ -189,6 +189,27 @@ impl Rig {
         assert!(self.queue.push(block));
     }
 
+    /// Begins a feedhold, or ends one.
+    pub fn hold(&mut self, hold: bool) {
+        self.exec.set_hold(hold, &mut self.snapshot);
+    }
+
+    /// Forgets all that is queued; it has been held. The moves that follow begin where the motors are.
+    pub fn drop_all(&mut self) {
+        assert!(self.snapshot.held);
+        self.exec.drop_all(&mut self.source, &mut self.snapshot);
+        self.dda.settle();
+        let steps = self.snapshot.target;
+        self.travel = steps.map(|steps| i64::from(steps) * i64::from(STEP));
+        self.builder.place(&steps);
+        self.queue.restart();
+        for (m, steps) in steps.into_iter().enumerate() {
+            if let Some(length) = self.config.ratio[m].length(steps) {
+                self.position[m] = length;
+            }
+        }
+    }
+
     /// Runs exec once and the steppers as long as segments are queued.
     pub fn turn(&mut self) -> Step {
         let blocks = self.source.len();
@@ -214,7 +235,7 @@ impl Rig {
         while !self.drain.is_empty() {
             self.tick();
         }
-        if matches!(step, Step::Idle | Step::Standstill) {
+        if matches!(step, Step::Idle | Step::Standstill | Step::Held) {
             while !self.pins.stopped {
                 self.tick();
             }

@@ -5,11 +5,13 @@
 //! ```text
 //! # what follows is for people
 //! -> g1 x10 f500              a line is sent; \x05 is the byte 5
-//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this
+//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this; \x0d is a carriage return
 //! <~ {"qr":*}                 from here on such lines may come, any number of them; * is anything
 //! @ +50ms                     time passes
 //! baud 500000                 from here on the sender speaks and hears at this rate
 //! steps X=12800 Y=0           the motors come to rest there; those not named are at 0
+//! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
+//! 2cts 1                      the sender on the second port holds the machine back by that pin (0: no more)
 //! ```
 //!
 //! Automatic reports (`sr`, `qr`) are passed over unless they are the line expected next. Any other line
@@ -32,12 +34,18 @@ const LAST_MS: u64 = 100;
 pub trait Side {
     /// Puts bytes on the line.
     fn send(&mut self, bytes: &[u8]);
+    /// Puts bytes on the line of the second port.
+    fn send_aux(&mut self, bytes: &[u8]);
+    /// Drives the pin with which its sender holds the machine back.
+    fn set_aux_cts(&mut self, stop: bool);
     /// The sender's end changes its rate.
     fn set_baud(&mut self, baud: u32);
     /// Lets time pass.
     fn run_ms(&mut self, ms: u64);
     /// The bytes heard since the last call.
     fn heard(&mut self) -> Vec<u8>;
+    /// The same on the second port.
+    fn heard_aux(&mut self) -> Vec<u8>;
     /// Where the motors are, in steps.
     fn steps(&self) -> [i64; 4];
 }
@@ -46,7 +54,10 @@ pub trait Side {
 #[derive(Clone, PartialEq, Debug)]
 enum Event {
     Send(Vec<u8>),
+    SendAux(Vec<u8>),
+    AuxCts(bool),
     Hear(String),
+    HearAux(String),
     Allow(String),
     Pass(u64),
     Baud(u32),
@@ -105,7 +116,10 @@ fn parse(line: &str) -> Option<Event> {
     let (mark, rest) = line.split_once(' ').unwrap_or((line, ""));
     match mark {
         "->" => unescape(rest).map(Event::Send),
-        "<-" => Some(Event::Hear(rest.to_string())),
+        "2->" => unescape(rest).map(Event::SendAux),
+        "2cts" => rest.parse().ok().map(|level: u8| Event::AuxCts(level != 0)),
+        "<-" => Some(Event::Hear(rest.replace("\\x0d", "\r"))),
+        "2<-" => Some(Event::HearAux(rest.to_string())),
         "<~" => Some(Event::Allow(rest.to_string())),
         "@" => rest.strip_prefix('+')?.strip_suffix("ms")?.parse().ok().map(Event::Pass),
         "baud" => rest.parse().ok().map(Event::Baud),
@@ -161,8 +175,7 @@ impl Transcript {
 
     /// Plays it; the error says where it fails and how.
     pub fn play(&self, side: &mut impl Side) -> Result<(), String> {
-        let mut player =
-            Player { side, partial: String::new(), lines: VecDeque::new(), allowed: Vec::new() };
+        let mut player = Player { side, ears: Default::default(), allowed: Vec::new() };
         for (line, event) in &self.events {
             player.play(event).map_err(|what| format!("{}:{line}: {what}", self.name))?;
         }
@@ -174,16 +187,40 @@ impl Transcript {
 /// A transcript being played.
 struct Player<'a, S> {
     side: &'a mut S,
-    partial: String,
-    lines: VecDeque<String>,
+    /// What has been heard on each port.
+    ears: [Ear; 2],
     allowed: Vec<String>,
 }
+
+/// What has been heard on a port.
+#[derive(Default)]
+struct Ear {
+    partial: String,
+    lines: VecDeque<String>,
+}
+
+impl Ear {
+    fn next_line(&mut self, heard: &[u8]) -> Option<String> {
+        self.partial += &String::from_utf8_lossy(heard);
+        while let Some((line, rest)) = self.partial.split_once('\n') {
+            self.lines.push_back(line.to_string());
+            self.partial = rest.to_string();
+        }
+        self.lines.pop_front()
+    }
+}
+
+/// The greeting on the second port, which transcripts that do not use it pass over.
+const GREETING: &str = "{\"r\":{\"fv\":*\"SYSTEM READY\"},\"f\":[1,0,0]}";
 
 impl<S: Side> Player<'_, S> {
     fn play(&mut self, event: &Event) -> Result<(), String> {
         match event {
             Event::Send(bytes) => self.side.send(bytes),
-            Event::Hear(line) => return self.hear(line),
+            Event::SendAux(bytes) => self.side.send_aux(bytes),
+            Event::AuxCts(stop) => self.side.set_aux_cts(*stop),
+            Event::Hear(line) => return self.hear(0, line),
+            Event::HearAux(line) => return self.hear(1, line),
             Event::Allow(pattern) => self.allowed.push(pattern.clone()),
             Event::Pass(ms) => self.side.run_ms(*ms),
             Event::Baud(baud) => self.side.set_baud(*baud),
@@ -192,12 +229,12 @@ impl<S: Side> Player<'_, S> {
         Ok(())
     }
 
-    fn hear(&mut self, wanted: &str) -> Result<(), String> {
+    fn hear(&mut self, port: usize, wanted: &str) -> Result<(), String> {
         let mut waited = 0;
         loop {
-            match self.next_line() {
+            match self.next_line(port) {
                 Some(line) if line == wanted => return Ok(()),
-                Some(line) if self.may_come(&line) => {}
+                Some(line) if self.may_come(port, &line) => {}
                 Some(line) => return Err(format!("heard    {line}\ninstead of {wanted}")),
                 None if waited == HEAR_MS => {
                     return Err(format!("heard nothing instead of {wanted}"));
@@ -210,24 +247,26 @@ impl<S: Side> Player<'_, S> {
         }
     }
 
-    fn may_come(&self, line: &str) -> bool {
+    fn may_come(&self, port: usize, line: &str) -> bool {
+        let line = line.trim_start_matches('\r');
+        if port == 1 && matches(GREETING, line) {
+            return true;
+        }
         let report = line.starts_with("{\"sr\":") || line.starts_with("{\"qr\":");
         report || self.allowed.iter().any(|pattern| matches(pattern, line))
     }
 
-    fn next_line(&mut self) -> Option<String> {
-        self.partial += &String::from_utf8_lossy(&self.side.heard());
-        while let Some((line, rest)) = self.partial.split_once('\n') {
-            self.lines.push_back(line.to_string());
-            self.partial = rest.to_string();
-        }
-        self.lines.pop_front()
+    fn next_line(&mut self, port: usize) -> Option<String> {
+        let heard = if port == 0 { self.side.heard() } else { self.side.heard_aux() };
+        self.ears[port].next_line(&heard)
     }
 
     fn silence(&mut self) -> Result<(), String> {
-        while let Some(line) = self.next_line() {
-            if !self.may_come(&line) {
-                return Err(format!("heard {line}, which nothing expects"));
+        for port in 0..self.ears.len() {
+            while let Some(line) = self.next_line(port) {
+                if !self.may_come(port, &line) {
+                    return Err(format!("port {}: heard {line}, which nothing expects", port + 1));
+                }
             }
         }
         Ok(())

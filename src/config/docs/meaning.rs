@@ -27,15 +27,21 @@ includes what is before it.",
     ("qv", "Queue reports: none, free blocks, or also those added and removed (3 is 2)."),
     ("sv", "Status reports: none, what has changed, or all of it."),
     ("si", "Time between status reports."),
-    ("ec", "Lines end in LF CR. No effect yet."),
-    ("ee", "What is received is sent back. No effect yet."),
+    ("ec", "Whether lines end in LF CR."),
+    ("ee", "Whether each line is sent back before it is answered, as a line of its own."),
     (
         "ex",
-        "Flow control. With 1 XOFF holds answers back until XON, and Kerf sends them likewise; 2 is as 0 so far.",
+        "Flow control. With 1 XOFF holds answers back until XON, and Kerf sends them likewise; 2 does the same with \
+pins, on ports that have them, and is refused by boards without.",
+    ),
+    (
+        "rxm",
+        "What the sender counts, and footers say: 1 lines, `[1,status,free line slots]`; 0 characters, at most 254 \
+unanswered, `[1,status,length,checksum]`. `rx` counts likewise.",
     ),
     (
         "baud",
-        "Rate of the serial line: a code, or bits a second from 9600 to 1000000. In force when the response has \
+        "Rate of the USB line: a code, or bits a second from 9600 to 1000000. In force when the response has \
 left; 115200 after a reset.",
     ),
     ("gpl", "Plane at power-up and after M2."),
@@ -46,6 +52,11 @@ left; 115200 after a reset.",
     ("bd", "Lines that begin with a slash are passed over."),
     ("ost", "M1 stops."),
     ("psw", "M0, M1, M60 and G88 wait for `~`."),
+    (
+        "dia",
+        "Whom the sender takes the machine for. As a g2core it ends responses with `[1,status,length]` and has that one's \
+`fb`, `fv`, `hp`, `hv`, prompts, and some status codes and texts.",
+    ),
     ("spw", "How long a step pulse lasts. Longer pulses may lower `vm` and `fr`."),
     ("dsu", "How long a direction pin stands before a step."),
 ];

@@ -4,7 +4,7 @@
 //! Otherwise, and on ports H to L, it is a read-modify-write, so the pin must share its port with no pin
 //! that another level writes meanwhile. Enables see to that themselves.
 
-use crate::boards::{ACTIVE, Pin};
+use crate::boards::{ACTIVE, Handshake, Pin};
 use crate::hal::byte::SharedByte;
 
 /// Drives a pin high.
@@ -37,7 +37,7 @@ fn output(pin: Pin) {
     unsafe { direction.write_volatile(direction.read_volatile() | 1 << pin.bit) };
 }
 
-/// Makes outputs of the board's outputs: steps low, drivers off, hazards off.
+/// Makes outputs of the board's outputs: steps low, drivers off, hazards off, senders welcome, no bus driven.
 pub fn start() {
     for motor in ACTIVE.motors {
         low(motor.step);
@@ -55,6 +55,18 @@ pub fn start() {
     for &hazard in ACTIVE.hazards {
         low(hazard);
         output(hazard);
+    }
+    for serial in ACTIVE.serial {
+        if let Some(Handshake { rts, cts }) = serial.handshake {
+            low(rts);
+            output(rts);
+            // Pulled up: of a wire that is not there nothing is sent.
+            high(cts);
+        }
+        if let Some(driver) = serial.driver_enable {
+            low(driver);
+            output(driver);
+        }
     }
 }
 
@@ -117,6 +129,6 @@ pub fn set_outputs(on: u8) {
 /// The compiler makes one read-modify-write of the two cases, and the port may be shared with pins of the
 /// step interrupt, which must not come in between: 8 cycles.
 #[inline(always)]
-fn set(pin: Pin, level: bool) {
+pub(super) fn set(pin: Pin, level: bool) {
     avr_device::interrupt::free(|_| if level { high(pin) } else { low(pin) });
 }

@@ -51,6 +51,53 @@ pub fn reset() -> ! {
     }
 }
 
+/// Starts the boot loader, if the board has one; else starts the firmware anew.
+///
+/// A jump, not a reset: loaders of common boards pass a reset by the watchdog on to the firmware at once. They find
+/// the chip as after a reset by the button as far as they look: no cause of reset noted, interrupts off, the timers
+/// still. Outputs are off as after a panic. The loader is where the fuses of these boards have it, in the last 8 KiB.
+pub fn boot() -> ! {
+    avr_device::interrupt::disable();
+    if !has_boot_loader() {
+        reset();
+    }
+    panic::make_safe();
+    // SAFETY: nothing of the firmware runs after this; the loader makes a stack of its own.
+    unsafe {
+        uart::stop();
+        core::arch::asm!(
+            "ldi  r24, 1",
+            "out  0x3C, r24",
+            "ldi  r30, 0x00",
+            "ldi  r31, 0xF0",
+            "clr  r1",
+            "eijmp",
+            options(noreturn),
+        );
+    }
+}
+
+/// Whether the boot section, from 0x3E000 on, holds anything.
+fn has_boot_loader() -> bool {
+    let (low, high): (u8, u8);
+    // SAFETY: reads two bytes of flash. RAMPZ is nobody's else: interrupts are off.
+    unsafe {
+        core::arch::asm!(
+            "ldi  r24, 3",
+            "out  0x3B, r24",
+            "elpm {low}, Z+",
+            "elpm {high}, Z",
+            "out  0x3B, r1",
+            low = out(reg) low,
+            high = out(reg) high,
+            inout("Z") 0xE000u16 => _,
+            out("r24") _,
+            options(nostack),
+        );
+    }
+    !matches!((low, high), (0xFF, 0xFF) | (0, 0))
+}
+
 /// Takes the watchdog off, which stays on over the reset it causes. First thing at start-up.
 pub fn watchdog_off() {
     const MCUSR: *mut u8 = 0x54 as *mut u8;

@@ -6,14 +6,19 @@ use crate::boards::ACTIVE;
 /// Stops the step timer, switches drivers and hazardous outputs off, and stays.
 pub fn halt() -> ! {
     avr_device::interrupt::disable();
+    make_safe();
+    loop {
+        avr_device::asm::nop();
+    }
+}
+
+/// Stops the step timer, switches drivers and hazardous outputs off. Interrupts are off.
+pub fn make_safe() {
     super::stepper::kill();
     for &hazard in ACTIVE.hazards {
         super::gpio::low(hazard);
     }
     super::gpio::power(0);
-    loop {
-        avr_device::asm::nop();
-    }
 }
 
 #[panic_handler]

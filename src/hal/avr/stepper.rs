@@ -59,7 +59,7 @@ static STEP_INVERTED: SharedByte = SharedByte::new(0);
 #[repr(transparent)]
 pub(super) struct Owned(UnsafeCell<Dda>);
 
-// SAFETY: touched by the step interrupt only.
+// SAFETY: touched by the step interrupt only, and by exec while that is stopped.
 unsafe impl Sync for Owned {}
 
 pub(super) static STATE: Owned = Owned(UnsafeCell::new(Dda::new()));
@@ -97,6 +97,14 @@ pub fn go() {
 /// Whether ticks are coming.
 pub fn running() -> bool {
     RUNNING.get() != 0
+}
+
+/// Every motor is where its last pulse has put it. For exec, while no ticks come.
+pub fn settle() {
+    if RUNNING.get() == 0 {
+        // SAFETY: the timer stands still, so its interrupt does not run; exec alone starts it.
+        unsafe { &mut *STATE.0.get() }.settle();
+    }
 }
 
 /// Which direction pins are inverted: bit m for motor m. For thread mode, while nothing runs.

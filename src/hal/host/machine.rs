@@ -6,6 +6,7 @@ use std::vec::Vec;
 use embassy_executor::raw::Executor;
 
 use super::{clock, exec, flags, now, stepper, time, uart};
+use crate::hal::serial::{AUX, USB};
 use crate::hal::{event, pender};
 
 /// The machine of this thread.
@@ -27,17 +28,32 @@ impl Machine {
 
     /// The sender goes on at `baud`.
     pub fn set_baud(&self, baud: u32) {
-        uart::set_sender_rate(baud);
+        uart::set_sender_rate(USB, baud);
     }
 
     /// The sender puts bytes on the line; they take their time.
     pub fn send(&self, bytes: &[u8]) {
-        uart::send(bytes);
+        uart::send(USB, bytes);
+    }
+
+    /// The sender on the second port does.
+    pub fn send_aux(&self, bytes: &[u8]) {
+        uart::send(AUX, bytes);
+    }
+
+    /// The sender on the second port holds the machine back by the pin, or lets it go on.
+    pub fn set_aux_cts(&self, stop: bool) {
+        uart::set_cts(AUX, stop);
     }
 
     /// What the firmware has sent since the last call.
     pub fn received(&self) -> Vec<u8> {
-        uart::received()
+        uart::received(USB)
+    }
+
+    /// The same to the second port.
+    pub fn received_aux(&self) -> Vec<u8> {
+        uart::received(AUX)
     }
 
     /// What the step pins have done so far.

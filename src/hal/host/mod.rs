@@ -53,6 +53,11 @@ pub fn reset() {
     resets().set(true);
 }
 
+/// Starts the boot loader. On the host it is as [`reset`].
+pub fn boot() {
+    reset();
+}
+
 /// Whether the firmware has asked for a reset.
 pub fn was_reset() -> bool {
     resets().get()

@@ -102,6 +102,11 @@ pub fn running() -> bool {
     stepper().next_tick.get() != NEVER
 }
 
+/// Every motor is where its last pulse has put it. For exec, while no ticks come.
+pub fn settle() {
+    stepper().dda.borrow_mut().settle();
+}
+
 /// Which direction pins are inverted: of no account here, where positions are counted before the pins.
 pub fn set_inverted(_motors: u8) {}
 

@@ -1,6 +1,7 @@
-//! The serial line on the host: bytes arrive and leave one after the other at the baud rate.
+//! The serial ports on the host: bytes arrive and leave one after the other at the baud rate.
 
-use core::cell::{Cell, RefCell};
+use core::cell::RefCell;
+use std::boxed::Box;
 use std::collections::VecDeque;
 use std::vec::Vec;
 
@@ -8,13 +9,56 @@ use super::{NEVER, flags, now};
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
-use crate::hal::serial::{BATCH, MARKS, Outgoing, RING, Received, lose, mark};
+use crate::hal::serial::{
+    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, MARKS, PORTS, RX_RING, TX_RING, USB, XOFF, XON,
+    batch, hardware, high_water, lose, mark,
+};
 use crate::realtime;
 
-#[derive(Default)]
+/// The filling end of a receive ring, whatever its size.
+trait Fill {
+    fn is_full(&self) -> bool;
+    fn is_high(&self) -> bool;
+    fn push(&mut self, byte: u8);
+    fn newest(&self) -> u8;
+    /// Puts a mark where there is room, else over the newest byte.
+    fn mark(&mut self, mark: u8);
+    fn batch(&self) -> u8;
+}
+
+impl<const N: usize> Fill for Producer<u8, N> {
+    fn is_full(&self) -> bool {
+        self.free() == 0
+    }
+
+    fn is_high(&self) -> bool {
+        self.used() > high_water(N)
+    }
+
+    fn push(&mut self, byte: u8) {
+        let _ = Producer::push(self, byte);
+    }
+
+    fn newest(&self) -> u8 {
+        self.pushed(0).copied().unwrap_or(0)
+    }
+
+    fn mark(&mut self, mark: u8) {
+        if Producer::push(self, mark).is_err() {
+            // The reader is not running: everything here is one thread.
+            self.amend(&Ceiling(()), 0, |newest| *newest = mark);
+        }
+    }
+
+    fn batch(&self) -> u8 {
+        batch(N)
+    }
+}
+
+/// A port and its sender.
 struct Line {
-    rx_in: Option<Producer<u8, RING>>,
-    tx_out: Option<Consumer<u8, RING>>,
+    rx_in: Option<Box<dyn Fill>>,
+    tx_out: Option<Consumer<u8, TX_RING>>,
     /// Bytes the sender has yet to put on the line.
     arriving: VecDeque<u8>,
     /// What the firmware has sent.
@@ -24,171 +68,284 @@ struct Line {
     /// A byte to send before all others, and whether these are held back.
     ahead: Option<u8>,
     held: bool,
+    /// Whether CTS counts, and holds them back.
+    heeds_cts: bool,
+    cts: bool,
+    /// The sender is held back by RTS.
+    rts: bool,
     lost_ends: u16,
     /// Bytes queued, modulo 256.
     queued: u8,
     realtime: u8,
+    /// A byte's time at this end of the line and at the sender's.
+    byte_cycles: u64,
+    sender_cycles: u64,
+    next_rx: u64,
+    next_tx: u64,
 }
 
-struct Uart {
-    line: RefCell<Line>,
-    /// A byte's time at this end of the line and at the sender's.
-    byte_cycles: Cell<u64>,
-    sender_cycles: Cell<u64>,
-    next_rx: Cell<u64>,
-    next_tx: Cell<u64>,
+impl Line {
+    fn new() -> Self {
+        Self {
+            rx_in: None,
+            tx_out: None,
+            arriving: VecDeque::new(),
+            sent: Vec::new(),
+            leaving: None,
+            ahead: None,
+            held: false,
+            heeds_cts: false,
+            cts: false,
+            rts: false,
+            lost_ends: 0,
+            queued: 0,
+            realtime: 0,
+            byte_cycles: 1,
+            sender_cycles: 1,
+            next_rx: NEVER,
+            next_tx: NEVER,
+        }
+    }
 }
 
 machine_static! {
-    fn rx() -> Ring<u8, RING> = Ring::new();
-    fn tx() -> Ring<u8, RING> = Ring::new();
-    fn uart() -> Uart = Uart {
-        line: RefCell::new(Line::default()),
-        byte_cycles: Cell::new(1),
-        sender_cycles: Cell::new(1),
-        next_rx: Cell::new(NEVER),
-        next_tx: Cell::new(NEVER),
-    };
+    fn usb_rx() -> Ring<u8, RX_RING> = Ring::new();
+    fn usb_tx() -> Ring<u8, TX_RING> = Ring::new();
+    fn aux_rx() -> Ring<u8, AUX_RING> = Ring::new();
+    fn aux_tx() -> Ring<u8, TX_RING> = Ring::new();
+    fn lines() -> [RefCell<Line>; PORTS] = core::array::from_fn(|_| RefCell::new(Line::new()));
 }
 
-/// Starts the line at `rate` bits a second, the sender's end too; `None` after the first time.
-pub fn start(rate: u32) -> Option<(Received, Outgoing)> {
-    let (rx_in, rx_out) = rx().split()?;
-    let (tx_in, tx_out) = tx().split()?;
-    let mut line = uart().line.borrow_mut();
-    line.rx_in = Some(rx_in);
-    line.tx_out = Some(tx_out);
-    set_rate(rate);
-    set_sender_rate(rate);
+fn with<R>(port: u8, act: impl FnOnce(&mut Line) -> R) -> R {
+    act(&mut lines()[usize::from(port)].borrow_mut())
+}
+
+/// Starts the lines, the senders' ends too: USB at `rate` bits a second, the other at the board's; `None` after
+/// the first time.
+pub fn start(rate: u32) -> Option<AllEnds> {
+    let usb = split(USB, usb_rx(), usb_tx(), rate)?;
+    let aux = match hardware(AUX) {
+        Some(board) => Some(split(AUX, aux_rx(), aux_tx(), board.rate)?),
+        None => None,
+    };
+    Some(AllEnds { usb, aux })
+}
+
+fn split<const N: usize>(
+    port: u8,
+    rx: &'static Ring<u8, N>,
+    tx: &'static Ring<u8, TX_RING>,
+    rate: u32,
+) -> Option<Ends<N>> {
+    let (rx_in, rx_out) = rx.split()?;
+    let (tx_in, tx_out) = tx.split()?;
+    with(port, |line| {
+        line.rx_in = Some(Box::new(rx_in));
+        line.tx_out = Some(tx_out);
+    });
+    set_rate(port, rate);
+    set_sender_rate(port, rate);
     Some((rx_out, tx_in))
 }
 
 /// Goes on at `rate` bits a second.
-pub fn set_rate(rate: u32) {
-    uart().byte_cycles.set(byte_cycles(rate));
+pub fn set_rate(port: u8, rate: u32) {
+    with(port, |line| line.byte_cycles = byte_cycles(rate));
 }
 
 /// The sender goes on at `rate` bits a second.
-pub(super) fn set_sender_rate(rate: u32) {
-    uart().sender_cycles.set(byte_cycles(rate));
+pub(super) fn set_sender_rate(port: u8, rate: u32) {
+    with(port, |line| line.sender_cycles = byte_cycles(rate));
 }
 
 fn byte_cycles(rate: u32) -> u64 {
     u64::from(ACTIVE.clock_hz) * 10 / u64::from(rate)
 }
 
-/// Whether the two ends differ too much to understand each other: by more than 4.5 %.
-fn garbles() -> bool {
-    let (own, sender) = (uart().byte_cycles.get(), uart().sender_cycles.get());
-    own.abs_diff(sender) * 1_000 > sender * 45
-}
-
 /// Sends what the ring holds.
-pub fn kick() {
-    if uart().next_tx.get() == NEVER {
-        load_tx(&mut uart().line.borrow_mut());
-    }
+pub fn kick(port: u8) {
+    with(port, Line::kick);
 }
 
-/// Sends a byte, not 0, before what the ring holds, even while the line is held.
-pub fn send_ahead(byte: u8) {
-    uart().line.borrow_mut().ahead = Some(byte);
-    kick();
+/// Stops the sender, or lets it go on, in the way they have agreed upon.
+pub fn stop_sender(port: u8, flow: Flow, stop: bool) {
+    with(port, |line| match flow {
+        Flow::None => {}
+        Flow::Characters => {
+            line.ahead = Some(if stop { XOFF } else { XON });
+            line.kick();
+        }
+        Flow::Pins => {
+            line.rts = stop;
+            line.let_arrive();
+        }
+    });
 }
 
-/// Holds what the ring holds back, or lets it go.
-pub fn hold(held: bool) {
-    uart().line.borrow_mut().held = held;
-    kick();
+/// Holds what the ring holds back, or lets it go: the other side has sent XOFF, or XON.
+pub fn hold(port: u8, held: bool) {
+    with(port, |line| {
+        line.held = held;
+        line.kick();
+    });
+}
+
+/// How the other side may hold it back from now on.
+pub fn set_flow(port: u8, flow: Flow) {
+    with(port, |line| {
+        line.held &= flow == Flow::Characters;
+        line.heeds_cts = flow == Flow::Pins;
+        line.rts &= line.heeds_cts;
+        line.let_arrive();
+        line.kick();
+    });
+}
+
+/// Sends on what CTS has held back. Each millisecond.
+pub fn look() {
+    (0..PORTS as u8).for_each(kick);
 }
 
 /// Line ends lost since start-up, modulo 2^16.
-pub fn lost_ends() -> u16 {
-    uart().line.borrow().lost_ends
+pub fn lost_ends(port: u8) -> u16 {
+    with(port, |line| line.lost_ends)
+}
+
+/// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for.
+pub fn room(port: u8) -> u8 {
+    let (size, used) = match port {
+        AUX => (AUX_RING, aux_rx().used()),
+        _ => (RX_RING, usb_rx().used()),
+    };
+    (size - 2).saturating_sub(used) as u8
 }
 
 /// The real-time characters since the last call, as bits (see [`realtime`]).
-pub fn take_realtime() -> u8 {
-    core::mem::take(&mut uart().line.borrow_mut().realtime)
+pub fn take_realtime(port: u8) -> u8 {
+    with(port, |line| core::mem::take(&mut line.realtime))
 }
 
 /// The sender puts bytes on the line.
-pub(super) fn send(bytes: &[u8]) {
-    uart().line.borrow_mut().arriving.extend(bytes);
-    if uart().next_rx.get() == NEVER {
-        uart().next_rx.set(now() + uart().sender_cycles.get());
-    }
+pub(super) fn send(port: u8, bytes: &[u8]) {
+    with(port, |line| {
+        line.arriving.extend(bytes);
+        line.let_arrive();
+    });
+}
+
+/// The sender holds the machine back by its RTS, which is our CTS, or lets it go on.
+pub(super) fn set_cts(port: u8, stop: bool) {
+    with(port, |line| line.cts = stop);
 }
 
 /// Takes what the firmware has sent.
-pub(super) fn received() -> Vec<u8> {
-    core::mem::take(&mut uart().line.borrow_mut().sent)
+pub(super) fn received(port: u8) -> Vec<u8> {
+    with(port, |line| core::mem::take(&mut line.sent))
 }
 
 /// When the next byte is through, in either direction.
 pub(super) fn next_event() -> u64 {
-    uart().next_rx.get().min(uart().next_tx.get())
+    let due = |line: &RefCell<Line>| line.borrow().next_rx.min(line.borrow().next_tx);
+    lines().iter().map(due).min().unwrap_or(NEVER)
 }
 
 /// The bytes that are through by now.
 pub(super) fn advance() {
-    let u = uart();
-    let mut line = u.line.borrow_mut();
-    if u.next_rx.get() <= now() {
-        if let Some(byte) = line.arriving.pop_front() {
-            arrive(&mut line, byte);
-        }
-        let more = !line.arriving.is_empty();
-        u.next_rx.set(if more { now() + u.sender_cycles.get() } else { NEVER });
-    }
-    if u.next_tx.get() <= now() {
-        if let Some(byte) = line.leaving.take() {
-            line.sent.push(if garbles() { !byte } else { byte });
-        }
-        flags::set(Event::Transmitted);
-        load_tx(&mut line);
+    for line in lines() {
+        line.borrow_mut().advance();
     }
 }
 
-fn load_tx(line: &mut Line) {
-    line.leaving = match line.ahead.take() {
-        None if line.held => None,
-        None => line.tx_out.as_mut().and_then(Consumer::pop),
-        ahead => ahead,
-    };
-    let busy = line.leaving.is_some();
-    uart().next_tx.set(if busy { now() + uart().byte_cycles.get() } else { NEVER });
-}
+impl Line {
+    /// Whether the two ends differ too much to understand each other: by more than 4.5 %.
+    fn garbles(&self) -> bool {
+        self.byte_cycles.abs_diff(self.sender_cycles) * 1_000 > self.sender_cycles * 45
+    }
 
-fn arrive(line: &mut Line, byte: u8) {
-    let special = realtime::bit(byte);
-    if special != 0 {
-        line.realtime |= special;
-        flags::set(Event::Realtime);
-        return;
+    fn kick(&mut self) {
+        if self.next_tx == NEVER {
+            self.load_tx();
+        }
     }
-    let Some(ring) = line.rx_in.as_mut() else { return };
-    let full = ring.free() == 0;
-    if (byte < MARKS || garbles()) && !full {
-        line.lost_ends = line.lost_ends.wrapping_add(queue_mark(ring, 0, byte));
-    } else if full {
-        let newest = mark(ring.pushed(0).copied().unwrap_or(0));
-        line.lost_ends = line.lost_ends.wrapping_add(queue_mark(ring, newest, byte));
-    } else {
-        let _ = ring.push(byte);
+
+    fn let_arrive(&mut self) {
+        if self.next_rx == NEVER && !self.rts && !self.arriving.is_empty() {
+            self.next_rx = now() + self.sender_cycles;
+        }
     }
-    line.queued = line.queued.wrapping_add(1);
-    if full || byte < b' ' || line.queued.is_multiple_of(BATCH) {
+
+    fn advance(&mut self) {
+        if self.next_rx <= now() {
+            if let Some(byte) = self.arriving.pop_front() {
+                self.arrive(byte);
+            }
+            self.next_rx = NEVER;
+            self.let_arrive();
+        }
+        if self.next_tx <= now() {
+            if let Some(byte) = self.leaving.take() {
+                let heard = if self.garbles() { !byte } else { byte };
+                self.sent.push(heard);
+            }
+            flags::set(Event::Transmitted);
+            self.load_tx();
+        }
+    }
+
+    fn load_tx(&mut self) {
+        let held = self.held || (self.heeds_cts && self.cts);
+        self.leaving = match self.ahead.take() {
+            None if held => None,
+            None => self.tx_out.as_mut().and_then(Consumer::pop),
+            ahead => ahead,
+        };
+        self.next_tx = if self.leaving.is_some() { now() + self.byte_cycles } else { NEVER };
+    }
+
+    /// Queues the mark of a real-time character: that of a loss if there is no room.
+    fn place(&mut self, character: u8) {
+        let Some(ring) = self.rx_in.as_mut() else { return };
+        if ring.is_full() {
+            self.lost_ends = self.lost_ends.wrapping_add(lost(ring.as_mut(), character));
+        } else {
+            ring.push(character);
+        }
+        self.queued = self.queued.wrapping_add(1);
         flags::set(Event::Received);
     }
+
+    fn arrive(&mut self, byte: u8) {
+        let special = realtime::bit(byte);
+        if special != 0 {
+            self.realtime = realtime::with(self.realtime, special);
+            flags::set(Event::Realtime);
+            if special & realtime::PLACED != 0 {
+                self.place(if special == realtime::RESUME { GO } else { CUT });
+            }
+            return;
+        }
+        let garbles = self.garbles();
+        let Some(ring) = self.rx_in.as_mut() else { return };
+        let full = ring.is_full();
+        if full || byte < MARKS || garbles {
+            self.lost_ends = self.lost_ends.wrapping_add(lost(ring.as_mut(), byte));
+        } else {
+            ring.push(byte);
+        }
+        self.queued = self.queued.wrapping_add(1);
+        let batch = self.queued.is_multiple_of(ring.batch());
+        // The reader may come too late to stop the sender.
+        self.rts |= batch && self.heeds_cts && ring.is_high();
+        if full || byte < b' ' || batch {
+            flags::set(Event::Received);
+        }
+    }
 }
 
-/// Puts a mark where there is room, else over the newest byte. Returns the line ends that it counts.
-fn queue_mark(ring: &mut Producer<u8, RING>, begun: u8, byte: u8) -> u16 {
+/// Marks the loss of a byte. Returns the line ends that it counts.
+fn lost(ring: &mut dyn Fill, byte: u8) -> u16 {
+    let begun = if ring.is_full() { mark(ring.newest()) } else { 0 };
     let (mark, is_end) = lose(begun, byte);
-    if ring.push(mark).is_err() {
-        // The reader is not running: everything here is one thread.
-        ring.amend(&Ceiling(()), 0, |newest| *newest = mark);
-    }
+    ring.mark(mark);
     is_end.into()
 }

@@ -32,7 +32,8 @@ pub struct Bus {
     pub(crate) timers: [Timer; 6],
     pub(crate) uarts: [Uart; 4],
     pub(crate) eeprom: Eeprom,
-    pub(crate) wire: Wire,
+    /// A line for each serial port of the board, and the USART it leads to.
+    pub(crate) wires: Vec<(usize, Wire)>,
     pub(crate) recorder: Recorder,
     pub(crate) sums: Sums,
     /// Interrupts that ask for service, by vector.
@@ -45,14 +46,14 @@ pub struct Bus {
 
 impl Bus {
     /// Puts the peripherals around a CPU, which keeps the pointer returned.
-    pub fn install(cpu: Cpu, wire: Wire) -> NonNull<Bus> {
+    pub fn install(cpu: Cpu, wires: Vec<(usize, Wire)>) -> NonNull<Bus> {
         let bus = Box::new(Bus {
             cpu,
             owners: owners(),
             timers: std::array::from_fn(|i| Timer::new(&LAYOUTS[i])),
             uarts: std::array::from_fn(Uart::new),
             eeprom: Eeprom::new(),
-            wire,
+            wires,
             recorder: Recorder::new(),
             sums: Sums::default(),
             pending: 0,
@@ -85,8 +86,10 @@ impl Bus {
     /// Does everything that is due by `now`.
     pub fn run(&mut self, now: u64) {
         while self.due <= now {
-            if self.wire.due() <= now {
-                self.wire.pump(&mut self.uarts[0]);
+            for (usart, wire) in &mut self.wires {
+                if wire.due() <= now {
+                    wire.pump(&mut self.uarts[*usart]);
+                }
             }
             for i in 0..self.timers.len() {
                 if self.timers[i].due() <= now {
@@ -105,7 +108,9 @@ impl Bus {
                 self.eeprom.advance(now);
                 self.update_eeprom(now);
             }
-            self.wire.listen(&mut self.uarts[0]);
+            for (usart, wire) in &mut self.wires {
+                wire.listen(&mut self.uarts[*usart]);
+            }
             self.refresh_due();
         }
     }
@@ -128,23 +133,24 @@ impl Bus {
         self.raised_at[usize::from(vector)]
     }
 
-    /// Begins sending bytes to USART0.
-    pub fn send(&mut self, bytes: &[u8]) {
-        self.wire.send(bytes, self.cpu.cycle());
+    /// Begins sending bytes to a port.
+    pub fn send(&mut self, port: usize, bytes: &[u8]) {
+        self.wires[port].1.send(bytes, self.cpu.cycle());
         self.refresh_due();
     }
 
-    /// Sends a byte to USART0 ahead of what still waits.
-    pub fn send_first(&mut self, byte: u8) {
-        self.wire.send_first(byte, self.cpu.cycle());
+    /// Sends a byte to a port ahead of what still waits.
+    pub fn send_first(&mut self, port: usize, byte: u8) {
+        self.wires[port].1.send_first(byte, self.cpu.cycle());
         self.refresh_due();
     }
 
     fn refresh_due(&mut self) {
         let timers = self.timers.iter().map(Timer::due);
         let uarts = self.uarts.iter().map(Uart::due);
-        let others = [self.wire.due(), self.eeprom.due()];
-        self.due = timers.chain(uarts).chain(others).min().unwrap_or(u64::MAX);
+        let wires = self.wires.iter().map(|(_, wire)| wire.due());
+        self.due =
+            timers.chain(uarts).chain(wires).chain([self.eeprom.due()]).min().unwrap_or(u64::MAX);
     }
 
     fn update_timer(&mut self, i: usize, at: u64) {

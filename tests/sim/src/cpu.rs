@@ -366,6 +366,22 @@ impl Cpu {
         unsafe { ffi::avr_raise_irq(self.pin(port, bit), u32::from(high)) }
     }
 
+    /// Drives an input pin and goes on driving it against the pull-up, with which simavr overrides
+    /// [`Cpu::drive_pin`] at the next store to the port. One pin of each port.
+    pub fn hold_pin(self, port: char, bit: u8, high: bool) {
+        let ctl = u32::from_be_bytes([b'i', b'o', b'p', port as u8]);
+        let mut external = ffi::avr_ioport_external_t {
+            _bitfield_align_1: [],
+            _bitfield_1: Default::default(),
+            __bindgen_padding_0: [0; 5],
+        };
+        external.set_mask(1 << bit);
+        external.set_value(u64::from(high) << bit);
+        // SAFETY: the request takes such a structure, and copies it.
+        unsafe { ffi::avr_ioctl(self.p(), ctl, (&raw mut external).cast()) };
+        self.drive_pin(port, bit, high);
+    }
+
     fn pin(self, port: char, bit: u8) -> *mut ffi::avr_irq_t {
         let ctl = u32::from_be_bytes([b'i', b'o', b'g', port as u8]);
         // SAFETY: simavr checks the request and returns null for what it does not know; null is

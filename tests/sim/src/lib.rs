@@ -32,7 +32,7 @@ mod wire;
 
 pub use host::{Answered, Host, LINES_IN_FLIGHT};
 pub use image::Image;
-pub use machine::{Fault, Machine};
+pub use machine::{AUX, Fault, Machine, USB};
 pub use meters::{Meters, Service, Window};
 pub use recorder::{Motor, Recorder, Step, Sums};
 pub use stopwatch::{Cost, Stopwatch};

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::ptr::NonNull;
 
 use anyhow::Result;
-use kerf::boards::Board;
+use kerf::boards::{Board, Pin, Usart};
 
 use crate::bus::Bus;
 use crate::cpu::{Cpu, Mode};
@@ -23,6 +23,11 @@ use crate::wire::Wire;
 const ENTRY_CYCLES: u64 = 5;
 /// Cycles more when it ends a sleep.
 const WAKE_CYCLES: u64 = 4;
+
+/// The ports of a board, as [`Machine::send_to`] counts them.
+pub const USB: usize = 0;
+/// See [`USB`].
+pub const AUX: usize = 1;
 
 /// Why a machine cannot go on.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -82,7 +87,15 @@ impl Machine {
     /// A machine with this image in its flash, at cycle 0. Its serial line runs at 115200 baud.
     pub fn new(image: Image, board: &'static Board) -> Result<Self> {
         let cpu = Cpu::power_up(&image, board.clock_hz)?;
-        let bus = Bus::install(cpu, Wire::new(board.clock_hz, 115_200));
+        let wires = board.serial.iter().map(|serial| {
+            let usart = match serial.usart {
+                Usart::U0 => 0,
+                Usart::U1 => 1,
+                Usart::U3 => 3,
+            };
+            (usart, Wire::new(board.clock_hz, serial.rate))
+        });
+        let bus = Bus::install(cpu, wires.collect());
         let probes = recorder::attach(bus, cpu, board);
         let meters = Meters::new(vectors::compare_a(board.step_timer));
         Ok(Machine {
@@ -202,7 +215,7 @@ impl Machine {
 
     /// Runs to a cycle, or until a whole line has come over the serial line.
     pub fn run_until_line(&mut self, cycle: u64) -> Result<(), Fault> {
-        while self.cpu.cycle() < cycle && !self.bus().wire.has_line() {
+        while self.cpu.cycle() < cycle && !self.bus().wires[USB].1.has_line() {
             self.step(cycle)?;
         }
         self.check_stack()
@@ -379,32 +392,53 @@ impl Machine {
     /// Sets the speed of the host's side of the serial line.
     pub fn set_baud(&mut self, baud: u32) {
         let clock_hz = self.board.clock_hz;
-        self.bus_mut().wire.set_baud(clock_hz, baud);
+        self.bus_mut().wires[USB].1.set_baud(clock_hz, baud);
     }
 
     /// Has the host's side of the serial line change its speed whenever the firmware does.
     pub fn follow_speed(&mut self) {
-        self.bus_mut().wire.follow();
+        self.bus_mut().wires[USB].1.follow();
     }
 
     /// Queues bytes on the serial line; they travel at its speed.
     pub fn send(&mut self, bytes: &[u8]) {
-        self.bus_mut().send(bytes);
+        self.send_to(USB, bytes);
+    }
+
+    /// Queues bytes on the line of a port.
+    pub fn send_to(&mut self, port: usize, bytes: &[u8]) {
+        self.bus_mut().send(port, bytes);
+    }
+
+    /// Drives the pin with which the other side of a port holds the firmware back.
+    pub fn set_cts(&mut self, port: usize, stop: bool) {
+        let handshake = self.board.serial[port].handshake.expect("a port with the pins");
+        self.cpu.hold_pin(handshake.cts.port.letter(), handshake.cts.bit, stop);
+    }
+
+    /// Whether the firmware drives a pin high, or would if it were an output.
+    pub fn is_high(&self, pin: Pin) -> bool {
+        self.peek(pin.port.address() as u16) & 1 << pin.bit != 0
     }
 
     /// Queues a real-time character ahead of the bytes that still wait.
     pub fn send_now(&mut self, byte: u8) {
-        self.bus_mut().send_first(byte);
+        self.bus_mut().send_first(USB, byte);
     }
 
     /// Bytes that have come from the machine since the last call.
     pub fn receive(&mut self) -> Vec<u8> {
-        self.bus_mut().wire.take_received()
+        self.receive_from(USB)
+    }
+
+    /// Bytes that have come from a port since the last call.
+    pub fn receive_from(&mut self, port: usize) -> Vec<u8> {
+        self.bus_mut().wires[port].1.take_received()
     }
 
     /// The host's side of the serial line.
     pub fn wire(&self) -> &Wire {
-        &self.bus().wire
+        &self.bus().wires[USB].1
     }
 
     /// A function name for a flash address; vectors by their own names.

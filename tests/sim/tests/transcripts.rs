@@ -8,12 +8,24 @@ use std::path::Path;
 
 use common::firmware;
 use kerf::boards::MEGA2560_GRBL;
-use kerf_sim::Machine;
+use kerf_sim::{AUX, Machine};
 use transcript::Side;
 
 impl Side for Machine {
     fn send(&mut self, bytes: &[u8]) {
         Machine::send(self, bytes);
+    }
+
+    fn send_aux(&mut self, bytes: &[u8]) {
+        Machine::send_to(self, AUX, bytes);
+    }
+
+    fn set_aux_cts(&mut self, stop: bool) {
+        self.set_cts(AUX, stop);
+    }
+
+    fn heard_aux(&mut self) -> Vec<u8> {
+        self.receive_from(AUX)
     }
 
     fn set_baud(&mut self, baud: u32) {

@@ -12,7 +12,8 @@ pub const RULES: &[Rule] = &[
         title: "Lines",
         text: "A line is words and comments, at most 254 bytes. Upper and lower case are the same, blanks may stand \
 anywhere, inside numbers too, and words in any order. An empty line does nothing, and so does `%` alone. The \
-bytes `!`, `%`, `~`, 4, 5 and 24 act wherever they stand, in comments too, and are no part of any line.",
+bytes `!`, 4, 5 and 24 act wherever they stand, in comments too, and `%` and `~` anywhere but in comments; none of \
+them is part of any line.",
         refusals: &[no(InputTooLong, &[LONG]), no(MalformedCommand, &["G0 *X1"])],
     },
     Rule {

@@ -26,7 +26,8 @@ impl Ears {
             }
             if *byte == b'\n' {
                 self.line();
-            } else {
+            } else if *byte != b'\r' || !self.partial.is_empty() {
+                // A return may stand behind a line feed.
                 assert!(self.deaf || (b' '..=b'~').contains(byte), "says the byte {byte}");
                 self.partial.push(*byte);
             }

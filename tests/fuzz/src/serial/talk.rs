@@ -17,8 +17,9 @@ const PATIENCE_MS: u64 = 2_000;
 const LOOK_MS: u64 = 20;
 /// The longest answer has left in this time.
 const LAST_MS: u64 = 300;
-/// Settings after which the machine may say nothing, or say it at another rate.
-const MUTING: [&[u8]; 3] = [b"jv", b"tv", b"baud"];
+/// Settings after which the machine may say nothing, or say it at another rate, or says what it hears, or passes for
+/// another.
+const MUTING: [&[u8]; 7] = [b"jv", b"tv", b"baud", b"ee0", b"ee1", b"eet", b"dia"];
 
 /// The job takes too long to wait for its end.
 struct TooLong;

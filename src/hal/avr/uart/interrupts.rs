@@ -1,0 +1,500 @@
+//! The interrupts of a serial port, in assembly; each port has its own, made from the same text.
+//!
+//! The receive interrupt picks real-time characters off wherever they stand and never queues them.
+//! Both it and the transmit interrupt mask their own source and then let all others in: they do not nest in
+//! themselves, so bytes keep their order, and the step interrupt waits for no more than their first and last
+//! cycles. Exec would run far too long inside the receive interrupt, so that holds it off (`exec::HOLD`); inside
+//! the transmit interrupt it only makes bytes wait. The receive interrupts of two ports may nest in each other; the
+//! outer one lets exec in.
+//!
+//! A USART that the board does not use has interrupts that return at once, and nothing enables them.
+
+use core::arch::asm;
+use core::mem::offset_of;
+
+use super::super::exec;
+use super::{AUX_SHARED, Flags, RXCIE, Shared, TXC, TXCIE, U2X, UDRIE, USB_SHARED};
+use crate::boards::{Handshake, Pin, Serial, Usart};
+use crate::hal::event::Event;
+use crate::hal::ring::Ring;
+use crate::hal::serial::{
+    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, GO, MARKS, PORTS, RETURNED, RX_RING, TX_RING, USB,
+    batch, hardware, high_water, is_shared,
+};
+use crate::realtime;
+
+/// Whether the port is on this USART.
+const fn is_on(port: u8, usart: Usart) -> bool {
+    matches!(hardware(port), Some(serial) if serial.usart as u8 == usart as u8)
+}
+
+/// The first register of the USART of the other port.
+const fn other(port: u8) -> usize {
+    match hardware(USB + AUX - port) {
+        Some(serial) => serial.usart.address(),
+        None => 0,
+    }
+}
+
+/// The pin that the other side holds us back with.
+const fn cts(port: u8) -> Option<Pin> {
+    match hardware(port) {
+        Some(Serial { handshake: Some(Handshake { cts, .. }), .. }) => Some(cts),
+        _ => None,
+    }
+}
+
+/// The pin that we hold the other side back with.
+const fn rts(port: u8) -> Option<Pin> {
+    match hardware(port) {
+        Some(Serial { handshake: Some(Handshake { rts, .. }), .. }) => Some(rts),
+        _ => None,
+    }
+}
+
+/// Where a pin of the board is: a PIN register (0), or a PORT register (2), in the I/O space, and the bit.
+const fn place(pin: Option<Pin>, register: usize) -> (usize, u8) {
+    match pin {
+        Some(pin) => (pin.port.address() - 0x22 + register, pin.bit),
+        None => (0, 0),
+    }
+}
+
+/// The pin that enables the driver of a port.
+const fn driver(port: u8) -> Option<Pin> {
+    match hardware(port) {
+        Some(serial) => serial.driver_enable,
+        None => None,
+    }
+}
+
+macro_rules! interrupts {
+    (
+        $port:ident on $usart:ident: $shared:ident, $ring:ident,
+        $rx:ident, $empty:ident, $complete:ident
+    ) => {
+        /// USARTn_RX: takes a byte, in 79 cycles.
+        ///
+        /// Interrupts are off for 25 cycles on the way in and 24 on the way out, or 30 if exec has been held
+        /// off. The reader is told at the ends of lines and every `batch` bytes.
+        #[unsafe(no_mangle)]
+        extern "C" fn $rx() -> ! {
+            // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only producer
+            // of the receive ring and the only one to write `lost_ends` and to set bits of `realtime`; its
+            // own source is off, so it does not nest in itself. UCSRnB is changed with interrupts off.
+            unsafe {
+                asm!(
+                    ".if {here}",
+                    "push r24",
+                    "push r25",
+                    "in   r25, 0x3F",
+                    "lds  r24, {control}",
+                    "andi r24, {mask}",
+                    "sts  {control}, r24",
+                    "sbi  0x1E, {hold_exec}",
+                    "push r31",
+                    // The status goes with the byte that is read after it: nothing comes in between, for an
+                    // instruction behind `sei` is executed first.
+                    "lds  r31, {status}",
+                    "sei",
+                    "lds  r24, {data}",
+                    "push r30",
+                    // Letters, digits and dots, the most of it, are no real-time characters.
+                    "cpi  r24, 0x26",
+                    "brlo 5f",
+                    "cpi  r24, 0x7E",
+                    "breq 12f",
+                    // Queue it, unless a frame error or an overrun says that something was lost.
+                    "1:",
+                    "andi r31, 0x18",
+                    "brne 70f",
+                    "lds  r30, {shared} + {head}",
+                    "inc  r30",
+                    ".if {last} < 255",
+                    "andi r30, {last}",
+                    ".endif",
+                    "lds  r31, {shared} + {tail}",
+                    "cp   r30, r31",
+                    "breq 80f",
+                    "sts  {shared} + {head}, r30",
+                    "mov  r31, r30",
+                    "andi r31, {batch}",
+                    "breq 4f",
+                    "2:",
+                    "ldi  r31, 0",
+                    "subi r30, lo8(-({shared} + {slots}))",
+                    "sbci r31, hi8(-({shared} + {slots}))",
+                    "st   Z, r24",
+                    "3:",
+                    "pop  r30",
+                    "pop  r31",
+                    "cli",
+                    "lds  r24, {control}",
+                    "ori  r24, {unmask}",
+                    "sts  {control}, r24",
+                    // Exec is held off still if this came within the receive interrupt of the other port, which has
+                    // masked its source.
+                    ".if {others}",
+                    "lds  r24, {other_control}",
+                    "sbrs r24, 7",
+                    "rjmp 23f",
+                    ".endif",
+                    "cbi  0x1E, {hold_exec}",
+                    "sbic 0x1E, {held_exec}",
+                    "rjmp 22f",
+                    "23:",
+                    "out  0x3F, r25",
+                    "pop  r25",
+                    "pop  r24",
+                    "reti",
+                    // Exec has been asked for meanwhile.
+                    "22:",
+                    "cbi  0x1E, {held_exec}",
+                    "ldi  r24, {pended}",
+                    "sts  0xD1, r24",
+                    "out  0x3F, r25",
+                    "pop  r25",
+                    "pop  r24",
+                    "reti",
+                    "4:",
+                    "sbi  0x1E, {received}",
+                    ".if {rts_there}",
+                    "rjmp 30f",
+                    ".endif",
+                    "rjmp 2b",
+                    "70:",
+                    "rjmp 7f",
+                    "80:",
+                    "rjmp 8f",
+                    "12:",
+                    "ldi  r30, {resume}",
+                    "rjmp 16f",
+                    // Up to a percent sign.
+                    "5:",
+                    "cpi  r24, 0x20",
+                    "brsh 6f",
+                    "cpi  r24, 0x18",
+                    "breq 13f",
+                    "cpi  r24, 0x05",
+                    "breq 14f",
+                    "cpi  r24, 0x04",
+                    "breq 15f",
+                    // A line end, or nearly: the reader is to look.
+                    "sbi  0x1E, {received}",
+                    "cpi  r24, {marks}",
+                    "brsh 1b",
+                    "rjmp 7f",
+                    // From blank to percent: special are 0x21 and 0x25, those of odd number with bit 1 clear.
+                    "6:",
+                    "sbrs r24, 0",
+                    "rjmp 1b",
+                    "sbrc r24, 1",
+                    "rjmp 1b",
+                    "ldi  r30, {hold}",
+                    "sbrc r24, 2",
+                    "ldi  r30, {flush}",
+                    "rjmp 16f",
+                    "13:",
+                    "ldi  r30, {reset}",
+                    "rjmp 16f",
+                    "14:",
+                    "ldi  r30, {enquiry}",
+                    "rjmp 16f",
+                    "15:",
+                    "ldi  r30, {kill}",
+                    // A real-time character. What was lost before it is still to be marked.
+                    "16:",
+                    "lds  r24, {shared} + {realtime}",
+                    // Who says hold does not say resume any more (`realtime::with`).
+                    "sbrc r30, {hold_bit}",
+                    "andi r24, {not_resume}",
+                    "or   r24, r30",
+                    "sts  {shared} + {realtime}, r24",
+                    "sbi  0x1E, {special}",
+                    // Where it stands counts, of some: queue a mark.
+                    "ldi  r24, {cut}",
+                    "sbrc r30, {resume_bit}",
+                    "ldi  r24, {go}",
+                    "andi r30, {placed}",
+                    "breq 24f",
+                    "sbi  0x1E, {received}",
+                    "rjmp 1b",
+                    "24:",
+                    "ldi  r24, 0",
+                    "andi r31, 0x18",
+                    "brne 7f",
+                    "rjmp 3b",
+                    // Something was lost: a mark for it, if there is room.
+                    "7:",
+                    "push r26",
+                    "ldi  r26, 0",
+                    "lds  r30, {shared} + {head}",
+                    "inc  r30",
+                    ".if {last} < 255",
+                    "andi r30, {last}",
+                    ".endif",
+                    "lds  r31, {shared} + {tail}",
+                    "cp   r30, r31",
+                    "breq 9f",
+                    "sts  {shared} + {head}, r30",
+                    "rcall 20f",
+                    "rjmp 10f",
+                    // The ring is full: the newest byte becomes a mark (`serial::mark`).
+                    "8:",
+                    "push r26",
+                    "9:",
+                    "lds  r30, {shared} + {head}",
+                    "rcall 20f",
+                    "ld   r26, Z",
+                    "cpi  r26, {marks}",
+                    "brlo 10f",
+                    "cpi  r26, 0x0A",
+                    "ldi  r26, {behind_lf}",
+                    "breq 10f",
+                    "ld   r26, Z",
+                    "cpi  r26, 0x0D",
+                    "ldi  r26, {behind_cr}",
+                    "breq 10f",
+                    "ldi  r26, 0",
+                    // One more byte is lost (`serial::lose`).
+                    "10:",
+                    "sbi  0x1E, {received}",
+                    "cpi  r24, 0x0D",
+                    "breq 17f",
+                    "cpi  r24, 0x0A",
+                    "breq 18f",
+                    "andi r26, {behind_end}",
+                    "rjmp 19f",
+                    "17:",
+                    "andi r26, {behind_end}",
+                    "ori  r26, {clean} | {returned}",
+                    "rjmp 21f",
+                    "18:",
+                    "mov  r24, r26",
+                    "andi r26, {behind_end}",
+                    "ori  r26, {clean}",
+                    "sbrc r24, 2",
+                    "rjmp 19f",
+                    "21:",
+                    "lds  r24, {shared} + {lost_ends}",
+                    "inc  r24",
+                    "sts  {shared} + {lost_ends}, r24",
+                    "brne 19f",
+                    "lds  r24, {shared} + {lost_ends} + 1",
+                    "inc  r24",
+                    "sts  {shared} + {lost_ends} + 1, r24",
+                    "19:",
+                    "st   Z, r26",
+                    "pop  r26",
+                    "rjmp 3b",
+                    // Z to the slot of index r30.
+                    "20:",
+                    "ldi  r31, 0",
+                    "subi r30, lo8(-({shared} + {slots}))",
+                    "sbci r31, hi8(-({shared} + {slots}))",
+                    "ret",
+                    // The reader may come too late to stop the sender, where the ring is short.
+                    ".if {rts_there}",
+                    "30:",
+                    "lds  r31, {shared} + {held}",
+                    "sbrs r31, 1",
+                    "rjmp 2b",
+                    "lds  r31, {shared} + {tail}",
+                    "sub  r31, r30",
+                    "neg  r31",
+                    "andi r31, {last}",
+                    "cpi  r31, {high}",
+                    "brlo 31f",
+                    "sbi  {rts_register}, {rts_bit}",
+                    "31:",
+                    "rjmp 2b",
+                    ".endif",
+                    ".else",
+                    "reti",
+                    ".endif",
+                    here = const is_on($port, Usart::$usart) as u8,
+                    others = const (PORTS > 1) as u8,
+                    other_control = const other($port) + 1,
+                    status = const Usart::$usart.address(),
+                    control = const Usart::$usart.address() + 1,
+                    data = const Usart::$usart.address() + 6,
+                    shared = sym $shared,
+                    last = const $ring - 1,
+                    head = const offset_of!(Shared<$ring>, rx) + Ring::<u8, $ring>::HEAD,
+                    tail = const offset_of!(Shared<$ring>, rx) + Ring::<u8, $ring>::TAIL,
+                    slots = const offset_of!(Shared<$ring>, rx) + Ring::<u8, $ring>::SLOTS,
+                    lost_ends = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, lost_ends),
+                    realtime = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, realtime),
+                    rts_there = const rts($port).is_some() as u8,
+                    rts_register = const place(rts($port), 2).0,
+                    rts_bit = const place(rts($port), 2).1,
+                    high = const high_water($ring),
+                    held = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, held),
+                    mask = const !RXCIE,
+                    hold_exec = const exec::HOLD,
+                    held_exec = const exec::HELD,
+                    pended = const exec::PENDED,
+                    unmask = const RXCIE,
+                    batch = const batch($ring) - 1,
+                    marks = const MARKS,
+                    behind_end = const BEHIND_END,
+                    behind_lf = const BEHIND_END | CLEAN,
+                    behind_cr = const BEHIND_END | CLEAN | RETURNED,
+                    clean = const CLEAN,
+                    returned = const RETURNED,
+                    received = const Event::Received as u8,
+                    special = const Event::Realtime as u8,
+                    hold = const realtime::HOLD,
+                    hold_bit = const realtime::HOLD.trailing_zeros(),
+                    not_resume = const !realtime::RESUME,
+                    placed = const realtime::PLACED,
+                    cut = const CUT,
+                    go = const GO,
+                    resume_bit = const realtime::RESUME.trailing_zeros(),
+                    resume = const realtime::RESUME,
+                    flush = const realtime::FLUSH,
+                    reset = const realtime::RESET,
+                    kill = const realtime::KILL,
+                    enquiry = const realtime::ENQUIRY,
+                    options(noreturn),
+                );
+            }
+        }
+
+        /// USARTn_UDRE: sends a byte, in 69 cycles, or stops asking when there is none.
+        ///
+        /// Interrupts are off for 19 cycles on the way in and 16 on the way out, 21 on a bus.
+        #[unsafe(no_mangle)]
+        extern "C" fn $empty() -> ! {
+            // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only consumer
+            // of the transmit ring; its own source is off, so it does not nest in itself. UCSRnB is changed
+            // with interrupts off.
+            unsafe {
+                asm!(
+                    ".if {here}",
+                    "push r24",
+                    "push r25",
+                    "in   r25, 0x3F",
+                    "lds  r24, {control}",
+                    "andi r24, {mask}",
+                    "sts  {control}, r24",
+                    "sei",
+                    "push r30",
+                    "push r31",
+                    "lds  r24, {shared} + {ahead}",
+                    "tst  r24",
+                    "brne 3f",
+                    "lds  r24, {shared} + {held}",
+                    "tst  r24",
+                    "brne 5f",
+                    "6:",
+                    "lds  r30, {shared} + {tail}",
+                    "lds  r31, {shared} + {head}",
+                    "cp   r30, r31",
+                    "breq 2f",
+                    "inc  r30",
+                    "andi r30, {last}",
+                    "sts  {shared} + {tail}, r30",
+                    "ldi  r31, 0",
+                    "subi r30, lo8(-({shared} + {slots}))",
+                    "sbci r31, hi8(-({shared} + {slots}))",
+                    "ld   r24, Z",
+                    "4:",
+                    ".if !{bus}",
+                    "sts  {data}, r24",
+                    ".endif",
+                    "sbi  0x1E, {transmitted}",
+                    "pop  r31",
+                    "pop  r30",
+                    "cli",
+                    ".if {bus}",
+                    // Complete is this byte, not one before it: no time may pass between the two.
+                    "sts  {data}, r24",
+                    "ldi  r24, {complete}",
+                    "sts  {status}, r24",
+                    ".endif",
+                    "lds  r24, {control}",
+                    "ori  r24, {unmask}",
+                    "sts  {control}, r24",
+                    "1:",
+                    "out  0x3F, r25",
+                    "pop  r25",
+                    "pop  r24",
+                    "reti",
+                    // It stays masked until there is something to send.
+                    "2:",
+                    "pop  r31",
+                    "pop  r30",
+                    "cli",
+                    ".if {bus}",
+                    "lds  r24, {control}",
+                    "ori  r24, {when_complete}",
+                    "sts  {control}, r24",
+                    ".endif",
+                    "rjmp 1b",
+                    // A byte that goes before all others.
+                    "3:",
+                    "ldi  r30, 0",
+                    "sts  {shared} + {ahead}, r30",
+                    "rjmp 4b",
+                    // The other side has said that it holds us back, or may say so by a pin.
+                    "5:",
+                    ".if {cts_mask}",
+                    "sbrc r24, 0",
+                    "rjmp 2b",
+                    "sbis {cts_register}, {cts_bit}",
+                    "rjmp 6b",
+                    ".endif",
+                    "rjmp 2b",
+                    ".else",
+                    "reti",
+                    ".endif",
+                    here = const is_on($port, Usart::$usart) as u8,
+                    bus = const is_shared($port) as u8,
+                    cts_mask = const cts($port).is_some() as u8,
+                    cts_register = const place(cts($port), 0).0,
+                    cts_bit = const place(cts($port), 0).1,
+                    status = const Usart::$usart.address(),
+                    control = const Usart::$usart.address() + 1,
+                    data = const Usart::$usart.address() + 6,
+                    shared = sym $shared,
+                    last = const TX_RING - 1,
+                    head = const offset_of!(Shared<$ring>, tx) + Ring::<u8, TX_RING>::HEAD,
+                    tail = const offset_of!(Shared<$ring>, tx) + Ring::<u8, TX_RING>::TAIL,
+                    slots = const offset_of!(Shared<$ring>, tx) + Ring::<u8, TX_RING>::SLOTS,
+                    ahead = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, ahead),
+                    held = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, held),
+                    mask = const !UDRIE,
+                    unmask = const UDRIE,
+                    when_complete = const TXCIE,
+                    complete = const U2X | TXC,
+                    transmitted = const Event::Transmitted as u8,
+                    options(noreturn),
+                );
+            }
+        }
+
+        /// USARTn_TX: the last byte has left; lets go of the bus. Interrupts are off for 15 cycles.
+        #[unsafe(no_mangle)]
+        extern "C" fn $complete() -> ! {
+            // SAFETY: it changes no register, and returns by `reti`. The bit of the pin is changed in one
+            // instruction; `uart::kick` keeps this away while it sets it.
+            unsafe {
+                asm!(
+                    ".if {bus}",
+                    "cbi  {register}, {bit}",
+                    ".endif",
+                    "reti",
+                    bus = const (is_on($port, Usart::$usart) && is_shared($port)) as u8,
+                    register = const place(driver($port), 2).0,
+                    bit = const place(driver($port), 2).1,
+                    options(noreturn),
+                );
+            }
+        }
+    };
+}
+
+interrupts! { USB on U0: USB_SHARED, RX_RING, __vector_25, __vector_26, __vector_27 }
+interrupts! { AUX on U1: AUX_SHARED, AUX_RING, __vector_36, __vector_37, __vector_38 }
+interrupts! { AUX on U3: AUX_SHARED, AUX_RING, __vector_54, __vector_55, __vector_56 }

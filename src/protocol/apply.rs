@@ -1,0 +1,174 @@
+//! What a pair of a request does: reading, setting, acting.
+
+use super::defaults::is_sure;
+use super::json::{Kind, Pair};
+use super::machine::{Machine, Warning};
+use super::pairs::Outcome;
+use super::program;
+use super::request::{Context, Request};
+use super::token::{Action, Subject, Target};
+use super::value::{Form, place_form};
+use super::write::Out;
+use crate::config::table;
+use crate::config::{Number, Setting};
+use crate::gcode::tables::Row;
+use crate::status::Status;
+use crate::units::Length;
+
+impl Request {
+    pub(super) fn apply<M: Machine, O: Out>(
+        &mut self,
+        pair: &Pair,
+        target: Target,
+        c: &mut Context<'_, M, O>,
+    ) -> Outcome {
+        match (target, pair.kind) {
+            (Target::Unknown, _) => Err(Status::UnrecognizedName),
+            (_, Kind::Object) | (Target::Group(_), _) => Err(Status::UnsupportedType),
+            (Target::Token(token), Kind::Null) => Ok(Some(token)),
+            (Target::Token(token), _) => {
+                match token.subject() {
+                    Some(Subject::Setting(setting)) => self.set(setting, pair, c)?,
+                    Some(Subject::Row(row, axis)) if !row.is_stored() => {
+                        set_row(row, axis, pair, c)?
+                    }
+                    _ => return Err(Status::ReadOnly),
+                }
+                Ok(Some(token))
+            }
+            (Target::Action(Action::Help), _) => self.advise(Warning::Help),
+            (Target::Action(Action::Defaults), _) => self.restore(pair, c),
+            (Target::Action(Action::Boot), _) => self.boot(pair, c),
+            (Target::Action(action), _) => {
+                let done = act(action, pair, c);
+                if action == Action::Test && done == Err(Status::Error) {
+                    self.warning = self.warning.max(Warning::Test);
+                }
+                done.map(|()| None)
+            }
+        }
+    }
+
+    fn set<M: Machine, O: Out>(
+        &mut self,
+        setting: Setting,
+        pair: &Pair,
+        c: &mut Context<'_, M, O>,
+    ) -> Result<(), Status> {
+        let small = match setting.row().kind {
+            table::Kind::Small => true,
+            table::Kind::Large | table::Kind::Cold => false,
+            table::Kind::Data | table::Kind::Job => {
+                let value = bits(pair, c.line)?;
+                return c.machine.set(setting, value).map(|_| ());
+            }
+            table::Kind::Constant | table::Kind::Text => return Err(Status::ReadOnly),
+        };
+        let number = match pair.kind {
+            Kind::Number => Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?,
+            Kind::True | Kind::False if small => Number::int((pair.kind == Kind::True).into()),
+            _ => return Err(Status::UnsupportedType),
+        };
+        let inches = c.machine.inches();
+        let checked = c.machine.settings().check(setting, number, inches);
+        if checked.is_err() && setting.is_baud() {
+            self.warning = self.warning.max(Warning::Baud);
+        }
+        let value = checked?;
+        let warning = c.machine.set(setting, value)?;
+        let unusual = setting.is_microsteps() && !matches!(value, 1 | 2 | 4 | 8);
+        let unusual = if unusual { Warning::Microsteps } else { Warning::None };
+        self.warning = self.warning.max(warning).max(unusual);
+        Ok(())
+    }
+}
+
+/// The value of a pair as 32 bits: `"0x2a"`.
+fn bits(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
+    if !matches!(pair.kind, Kind::Text | Kind::Number) {
+        return Err(Status::UnsupportedType);
+    }
+    let digits = match pair.value.of(line) {
+        [b'0', b'x' | b'X', digits @ ..] if (1..=8).contains(&digits.len()) => digits,
+        _ => return Err(Status::BadNumber),
+    };
+    let digit = |bits: u32, byte: &u8| Some(bits << 4 | char::from(*byte).to_digit(16)?);
+    let bits = digits.iter().try_fold(0, digit).ok_or(Status::BadNumber)?;
+    Ok(bits.cast_signed())
+}
+
+/// Sets a value of the interpreter's tables.
+fn set_row<M: Machine, O>(
+    row: Row,
+    axis: u8,
+    pair: &Pair,
+    c: &mut Context<'_, M, O>,
+) -> Result<(), Status> {
+    if pair.kind != Kind::Number {
+        return Err(Status::UnsupportedType);
+    }
+    let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
+    let inches = c.machine.inches() && place_form(axis) == Form::Length;
+    let value = number.fixed(Length::DECIMALS, inches).ok_or(Status::OutOfRange)?;
+    c.machine.set_row(row, axis, Length(value))
+}
+
+fn done(status: Status) -> Result<(), Status> {
+    if status == Status::Ok { Ok(()) } else { Err(status) }
+}
+
+/// The value of a pair as a whole number.
+fn whole<M, O>(pair: &Pair, c: &Context<'_, M, O>) -> Result<i32, Status> {
+    if pair.kind != Kind::Number {
+        return Err(Status::UnsupportedType);
+    }
+    Number::parse(pair.value.of(c.line))
+        .filter(|number| number.is_integer())
+        .and_then(|number| number.fixed(0, false))
+        .ok_or(Status::BadNumber)
+}
+
+fn act<M: Machine, O>(
+    action: Action,
+    pair: &Pair,
+    c: &mut Context<'_, M, O>,
+) -> Result<(), Status> {
+    let on = match action {
+        // A block is run only where nothing of the response is out yet.
+        Action::Block if pair.kind == Kind::Null => return Ok(()),
+        Action::Block if pair.kind == Kind::Text => return Err(Status::NotAccepted),
+        Action::Block => return Err(Status::UnsupportedType),
+        Action::Clear => return done(c.machine.clear()),
+        Action::Test if pair.kind == Kind::Null => return Ok(()),
+        Action::Test => {
+            let number = whole(pair, c)?;
+            let number = u8::try_from(number).map_err(|_| Status::OutOfRange)?;
+            return done(c.machine.start_job(number));
+        }
+        Action::Text if pair.kind != Kind::Null => return Err(Status::UnsupportedType),
+        Action::Program => return program::store(pair, c),
+        Action::Flush => {
+            let sure = is_sure(pair, c)?;
+            return if sure { done(c.machine.flush()) } else { Ok(()) };
+        }
+        Action::Reset => {
+            let sure = is_sure(pair, c)?;
+            return if sure { done(c.machine.restart(false)) } else { Ok(()) };
+        }
+        // Its report would stand in the midst of the response.
+        Action::Exception => return Err(Status::NotAccepted),
+        Action::Energize => true,
+        Action::Release => false,
+        Action::Defaults | Action::Help | Action::Boot => return Ok(()),
+        Action::Text | Action::Message | Action::Id => return Ok(()),
+    };
+    let motor = match pair.kind {
+        Kind::Null | Kind::True => 0,
+        _ => whole(pair, c)?,
+    };
+    match motor {
+        0 => done(c.machine.energize(None, on)),
+        1..=4 => done(c.machine.energize(Some(motor as u8 - 1), on)),
+        _ => Err(Status::OutOfRange),
+    }
+}

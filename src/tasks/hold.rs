@@ -1,0 +1,244 @@
+//! Feedhold, resume, queue flush and kill: what real-time characters, and `{qf:1}`, lead to.
+//!
+//! Called by the control task, and by the reader where a tilde, `%` or `^d` stands in the stream; exec asks
+//! whether a hold is on. Thread mode decides, exec comes to rest, the planner drops what is queued:
+//!
+//! ```text
+//!  !   begin: exec slows down; Held               ~   pass: exec goes on, once it is at rest
+//!  %   in a hold, and ^d:
+//!      flush    Flush::Input   the parser refuses data lines; nothing is interpreted any more
+//!      placed   Flush::Rest    the reader has come to the `%`: lines from here on are kept, and wait
+//!      planner  drop_blocks    exec, at rest, drops its blocks and has the position, to the step
+//!               end            planner and model start from there; the hold is over
+//! ```
+//!
+//! A hold is on from the character on, whatever the machine does, as long as there is anything to do: also
+//! between two blocks, in a dwell, or while M0 waits. An idle machine has nothing to hold and takes no notice.
+//! A `%` without a hold is none, unless an exclamation mark comes right behind it: programs begin and end
+//! with one. A tilde while the machine slows down waits until it stands. The machine does not go on if an
+//! exclamation mark comes behind the tilde, nor if there is a `%` on either side.
+//!
+//! In a comment, tilde and `%` are text: the receive interrupt leaves marks where they stand (`serial::GO`,
+//! `serial::CUT`), and the reader knows what a comment is. The exclamation mark stops the machine wherever
+//! it stands, and at once.
+//!
+//! A line that is dropped is answered all the same, by [`Status::Terminated`](crate::status::Status): senders
+//! count responses. Nothing here waits, and nothing can be full: all of it is states.
+
+use super::links::Links;
+use super::ports::Port;
+use super::view::View;
+use crate::hal::byte::SharedByte;
+use crate::hal::event::Event;
+use crate::hal::imp::time::millis;
+use crate::hal::imp::{exec, flags, reset, uart};
+use crate::hal::serial::{CUT, GO};
+use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, RESET, RESUME};
+
+/// How far a queue flush has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Flush {
+    /// There is none.
+    #[default]
+    None,
+    /// What the reader gets is dropped, as far as the mark.
+    Input,
+    /// The same, and the mark is here: `{qf:1}`.
+    Here,
+    /// The queue is to be dropped.
+    Rest,
+}
+
+/// Characters of one write may come so far apart, ms.
+const TOGETHER_MS: u32 = 20;
+
+/// No hold.
+const OFF: u8 = 0;
+/// There is one.
+const ON: u8 = 1;
+/// There is one, that ends when the machine stands still.
+const PASSING: u8 = 2;
+
+machine_static! {
+    // Thread mode writes it, and exec if it is `PASSING`.
+    fn wanted() -> SharedByte = SharedByte::new(OFF);
+    // Thread mode sets it, exec clears it.
+    fn dropping() -> SharedByte = SharedByte::new(0);
+}
+
+/// Whether a hold is on. Any level.
+#[inline(always)]
+pub fn is_on() -> bool {
+    wanted().get() != OFF
+}
+
+/// Whether the machine is to go on when it has come to rest.
+pub fn is_passing() -> bool {
+    wanted().get() == PASSING
+}
+
+/// Begins a hold.
+fn begin() {
+    wanted().set(ON);
+    exec::pend();
+}
+
+/// Ends a hold at once.
+pub fn end() {
+    wanted().set(OFF);
+    exec::pend();
+}
+
+/// Ends a hold when the machine has come to rest.
+fn pass() {
+    // Exec changes it only if it is `PASSING`.
+    if wanted().get() == ON {
+        wanted().set(PASSING);
+        exec::pend();
+    }
+}
+
+/// The machine has come to rest: whether it goes on. Exec only.
+pub fn passes() -> bool {
+    let passes = is_passing();
+    if passes {
+        wanted().set(OFF);
+    }
+    passes
+}
+
+/// Has exec drop its blocks; it sets [`Event::BlockDone`] when it [has](has_dropped).
+pub fn drop_blocks() {
+    dropping().set(1);
+    exec::pend();
+}
+
+/// Whether exec has dropped its blocks.
+pub fn has_dropped() -> bool {
+    dropping().get() == 0
+}
+
+/// Exec, at rest, drops its blocks if that is wanted, by `drop_all`.
+pub fn dropped(drop_all: impl FnOnce()) {
+    if dropping().get() != 0 {
+        drop_all();
+        dropping().set(0);
+        flags::set(Event::BlockDone);
+    }
+}
+
+/// Acts upon the real-time characters that have come, on any port.
+pub fn serve(links: &Links) {
+    for port in &links.ports {
+        let characters = uart::take_realtime(port.number);
+        if characters != 0 {
+            act(links, port, characters);
+        }
+    }
+}
+
+fn act(links: &Links, port: &Port, characters: u8) {
+    if characters & RESET != 0 {
+        reset();
+    }
+    let (holds, cuts) = (characters & HOLD != 0, characters & FLUSH != 0);
+    let (kills, busy) = (characters & KILL != 0, holds && is_busy(links));
+    if holds {
+        links.resume.set(false);
+        links.percent.set(false);
+    }
+    if kills || busy {
+        begin();
+    }
+    if kills {
+        links.killed.set(true);
+        flush(links, Flush::Input);
+    }
+    if cuts && is_on() {
+        links.percent.set(true);
+    } else if cuts {
+        links.percent_at.set(millis());
+    } else if busy && millis().wrapping_sub(links.percent_at.get()) < TOGETHER_MS {
+        flush_here(links, true);
+    }
+    if characters & RESUME != 0 {
+        links.resume.set(true);
+    }
+    if characters & ENQUIRY != 0 {
+        port.enquiry.set(true);
+    }
+    links.reporter_wake.urge();
+}
+
+/// `{qf:1}`: drops what is queued, as a `%` does. False, and nothing done, while the machine is busy without
+/// a hold.
+pub fn flush_here(links: &Links, busy: bool) -> bool {
+    if busy && !is_on() {
+        return false;
+    }
+    flush(links, Flush::Here);
+    flags::set(Event::Received);
+    true
+}
+
+fn flush(links: &Links, from: Flush) {
+    if links.flush.get() == Flush::None {
+        begin();
+        links.percent.set(false);
+        links.flush.set(from);
+        links.parser_wake.signal();
+    }
+}
+
+/// The reader has come to the place of a real-time character on a port, outside of comments. What it has got before a
+/// `%` in a hold, or a `^d`, is what is dropped; of other ports, the lines that it has got by then.
+pub fn placed(links: &Links, port: &Port, mark: u8) {
+    serve(links);
+    if mark == GO {
+        go_on(links);
+    } else if is_on() {
+        flush(links, Flush::Input);
+        if links.flush.get() != Flush::Here {
+            port.lines.borrow_mut().terminate_partial();
+        }
+        rest(links);
+    }
+}
+
+/// The same for one that waits in the receive ring, because the pool is full. One that is not there any more
+/// has left the mark of a loss.
+pub fn ahead(links: &Links, mark: u8) {
+    serve(links);
+    if mark != CUT {
+        go_on(links);
+    }
+    if is_on() && mark != GO && (mark == CUT || links.percent.get()) {
+        flush(links, Flush::Input);
+    }
+}
+
+/// What is held goes on; and what waits at a program stop.
+fn go_on(links: &Links) {
+    if links.resume.take() && links.flush.get() == Flush::None {
+        pass();
+        links.cycle_start.signal();
+        // It may have looked already, when the character came, and sleep again.
+        links.reporter_wake.urge();
+    }
+}
+
+/// All lines in the pool are dropped, and the queue next.
+fn rest(links: &Links) {
+    links.ports.iter().for_each(|port| port.lines.borrow_mut().terminate());
+    links.flush.set(Flush::Rest);
+    links.parser_wake.signal();
+    // Wherever the planner waits.
+    links.planner_wake.signal();
+    links.cycle_start.signal();
+    flags::set(Event::BlockDone);
+}
+
+/// Whether there is anything to hold.
+fn is_busy(links: &Links) -> bool {
+    links.has_data() || View::of(links, links.feeder()).is_busy()
+}

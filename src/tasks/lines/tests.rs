@@ -1,0 +1,196 @@
+use super::*;
+use std::boxed::Box;
+
+fn pool() -> LinePool {
+    LinePool::new(Box::leak(Box::new([0; 560])))
+}
+
+fn feed(pool: &mut LinePool, text: &[u8]) {
+    for &byte in text {
+        assert!(pool.ready());
+        pool.put(byte);
+    }
+}
+
+fn take(pool: &mut LinePool, data: bool) -> Option<(std::vec::Vec<u8>, Class)> {
+    let (id, class) = pool.next(data)?;
+    let text = pool.text(id).to_vec();
+    pool.remove(id);
+    Some((text, class))
+}
+
+#[test]
+fn control_overtakes_data_and_order_holds_within_each() {
+    let mut pool = pool();
+    feed(&mut pool, b"g1x1\r\n  {a:n}\n\ng1x2\n{\"gc\":\"g0\"}\n?\n");
+    assert_eq!(pool.free(), 3);
+    assert_eq!(take(&mut pool, false), Some((b"{a:n}".to_vec(), Class::Control)));
+    assert_eq!(take(&mut pool, true), Some((b"?".to_vec(), Class::Control)));
+    assert_eq!(take(&mut pool, false), None);
+    for line in [&b"g1x1"[..], b"g1x2", b"{\"gc\":\"g0\"}"] {
+        assert_eq!(take(&mut pool, true), Some((line.to_vec(), Class::Data)));
+    }
+    assert_eq!(pool.free(), 8);
+}
+
+#[test]
+fn a_line_that_is_coming_in_survives_removals() {
+    let mut pool = pool();
+    feed(&mut pool, b"first\nsecond\nthi");
+    take(&mut pool, true);
+    feed(&mut pool, b"rd\n");
+    assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"second".to_vec()));
+    assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"third".to_vec()));
+}
+
+#[test]
+fn long_and_damaged_lines_become_one_fault_each() {
+    let mut pool = pool();
+    feed(&mut pool, &[b'x'; 300]);
+    feed(&mut pool, b"\ngood\nbad");
+    pool.spoil(Status::BufferFull);
+    feed(&mut pool, b"more\nok\n");
+    assert_eq!(take(&mut pool, true).map(|l| l.1), Some(Class::Fault(Status::InputTooLong)));
+    assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"good".to_vec()));
+    assert_eq!(take(&mut pool, true).map(|l| l.1), Some(Class::Fault(Status::BufferFull)));
+    assert_eq!(take(&mut pool, true).map(|l| l.0), Some(b"ok".to_vec()));
+}
+
+#[test]
+fn a_line_longer_than_the_pool_is_one_fault() {
+    let mut pool = LinePool::new(Box::leak(Box::new([0; 20])));
+    for line in ["g1 x2 (0123456789)  \r\n", "(0123456789abcdefghi)\n"] {
+        feed(&mut pool, line.as_bytes());
+        // What is given back of it leaves room for a control line.
+        feed(&mut pool, b"?\n");
+        assert_eq!(take(&mut pool, true), Some((b"?".to_vec(), Class::Control)));
+        let fault = take(&mut pool, true);
+        assert_eq!(fault.map(|line| line.1), Some(Class::Fault(Status::InputTooLong)));
+    }
+    assert_eq!(take(&mut pool, true), None);
+}
+
+#[test]
+fn empty_lines_count_where_they_are_wanted() {
+    let mut pool = pool();
+    feed(&mut pool, b"\r\n\n");
+    assert_eq!(pool.free(), 8);
+    pool.keep_empty(true);
+    feed(&mut pool, b"?\r\n\r\n\n");
+    assert_eq!(pool.free(), 5);
+    assert_eq!(take(&mut pool, true), Some((b"?".to_vec(), Class::Control)));
+    assert_eq!(take(&mut pool, true), Some((b"".to_vec(), Class::Data)));
+}
+
+#[test]
+fn text_in_pieces_is_text_byte_by_byte() {
+    let (mut pieces, mut bytes) = (pool(), pool());
+    for round in 0..200 {
+        let long = "(".repeat(round * 7 % 300);
+        let line = std::format!("  N{round} X1.5\tY2{long}\r\n\n \x01x\ny\r");
+        let mut rest = line.as_bytes();
+        while !rest.is_empty() {
+            assert!(pieces.ready());
+            let count = usize::from(pieces.put_text(&rest[..rest.len().min(round % 9 + 1)]));
+            rest = &rest[count..];
+            if count == 0 {
+                pieces.put(rest[0]);
+                rest = &rest[1..];
+            }
+        }
+        feed(&mut bytes, line.as_bytes());
+        for _ in 0..4 {
+            assert_eq!(take(&mut pieces, true), take(&mut bytes, true));
+        }
+    }
+}
+
+#[test]
+fn dropped_lines_keep_their_place_and_control_lines_are_none_of_them() {
+    let mut pool = pool();
+    feed(&mut pool, b"g1x1\n{a:n}\ng1x2\ng1x");
+    pool.terminate_partial();
+    pool.terminate();
+    feed(&mut pool, b"3\ng1x4\n{b:");
+    pool.terminate_partial();
+    feed(&mut pool, b"n}\n");
+    let dropped = Class::Fault(Status::Terminated);
+    let classes = [Class::Control, Class::Control, dropped, dropped, dropped, Class::Data];
+    for class in classes {
+        assert_eq!(take(&mut pool, true).map(|line| line.1), Some(class));
+    }
+    assert!(!pool.has_data());
+    // Between two lines there is none to drop.
+    pool.terminate_partial();
+    feed(&mut pool, b"\n");
+    assert_eq!(pool.free(), 8);
+}
+
+#[test]
+fn comments_are_known() {
+    for (text, aside) in [
+        ("g1 (x", Aside::Parentheses),
+        ("g1 (x; (", Aside::Parentheses),
+        ("g1 (x) y", Aside::None),
+        ("g1 ; (x)", Aside::Rest),
+        ("(x)\n;y\ng1", Aside::None),
+    ] {
+        let mut pool = pool();
+        feed(&mut pool, text.as_bytes());
+        assert_eq!(pool.aside(), aside, "{text}");
+        let ahead = text.bytes().fold(Aside::None, Aside::after);
+        assert_eq!(ahead, aside, "{text}");
+    }
+}
+
+#[test]
+fn a_full_pool_is_not_ready() {
+    let mut pool = pool();
+    feed(&mut pool, b"1\n2\n3\n4\n5\n6\n7\n8\n");
+    assert!(!pool.ready());
+    take(&mut pool, true);
+    assert!(pool.ready());
+}
+
+#[test]
+fn every_byte_is_counted_with_some_line() {
+    let mut pool = pool();
+    let long = [b'x'; 300];
+    let mut counted = 0;
+    let mut sent = 0;
+    for line in [
+        &b"g0 x1"[..],
+        b"  g0",
+        b"\ng0",
+        b"\r\n\r\ng0",
+        b"\t\n  \n{fb:n}",
+        b"g0\r",
+        b"g0",
+        &long,
+        b"",
+    ] {
+        let line = [line, b"\n"].concat();
+        feed(&mut pool, &line);
+        sent += line.len();
+        while let Some((id, _)) = pool.next(true) {
+            counted += usize::from(pool.length(id));
+            pool.remove(id);
+        }
+    }
+    // The last line is empty: it is counted with the next.
+    assert_eq!((sent - counted, pool.besides), (1, 1));
+    feed(&mut pool, b"g1\r\ng2\n");
+    assert_eq!([pool.length(LineId(0)), pool.length(LineId(1))], [4, 4]);
+}
+
+#[test]
+fn an_over_long_line_is_known_by_its_beginning() {
+    let mut pool = pool();
+    feed(&mut pool, b"{");
+    (0..300).for_each(|_| feed(&mut pool, b"x"));
+    feed(&mut pool, b"\n");
+    assert_eq!(pool.length(LineId(0)), 302);
+    let (text, class) = take(&mut pool, true).unwrap();
+    assert_eq!(class, Class::Fault(Status::InputTooLong));
+    assert!(text.starts_with(b"{xxx") && text.len() == usize::from(REST_MAX));
+}

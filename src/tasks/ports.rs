@@ -1,0 +1,119 @@
+//! The serial ports as tasks see them: what each has to itself, and which of them feeds the machine.
+//!
+//! Each port is answered on itself, in the mode that it was spoken to last. Control lines of every port are taken
+//! at any time. G-code comes from one port at a time, the *feeder*: the first to send some while the machine is
+//! at rest, until it is at rest again. From any other it is refused meanwhile, with status 117: to let it wait
+//! would mean to move later, when nobody expects it.
+//!
+//! Reports that nobody asked for go to the feeder, or to USB while that is on a bus that others share.
+
+use core::cell::{Cell, RefCell};
+
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::mutex::Mutex;
+
+use super::lines::{Class, LineId, LinePool};
+use super::links::Links;
+use super::tx::Tx;
+use super::view::View;
+use crate::hal::serial::{USB, is_shared};
+use crate::protocol::Mode;
+use crate::status::Status;
+
+/// What a port has to itself.
+pub struct Port {
+    /// Which one it is.
+    pub number: u8,
+    /// Received lines.
+    pub lines: RefCell<LinePool>,
+    /// The line to the sender, for the parser and the reporter. The mutex knows of one task that waits: two
+    /// would keep waking each other.
+    pub tx: Mutex<NoopRawMutex, Tx>,
+    /// How the sender wants to be answered.
+    pub mode: Cell<Mode>,
+    /// The sender asks whether anybody is there: control sets it, the reporter answers.
+    pub enquiry: Cell<bool>,
+    /// An exception to report.
+    pub exception: Cell<Option<Status>>,
+}
+
+impl Port {
+    /// A port that keeps its lines in `bytes`.
+    pub fn new(number: u8, bytes: &'static mut [u8], tx: Tx) -> Self {
+        Self {
+            number,
+            lines: RefCell::new(LinePool::new(bytes)),
+            tx: Mutex::new(tx),
+            mode: Cell::new(Mode::Json),
+            enquiry: Cell::new(false),
+            exception: Cell::new(None),
+        }
+    }
+}
+
+/// A line that is next.
+pub struct Chosen<'a> {
+    /// Where it came from, and where the answer goes.
+    pub port: &'a Port,
+    /// It, in the port's pool.
+    pub id: LineId,
+    /// What to do with it.
+    pub class: Class,
+}
+
+impl Links {
+    /// The port of a number.
+    #[inline(always)]
+    pub fn port(&self, number: u8) -> &Port {
+        // There is always USB.
+        self.ports.get(usize::from(number)).unwrap_or(&self.ports[usize::from(USB)])
+    }
+
+    /// The port whose G-code is taken.
+    #[inline(always)]
+    pub fn feeder(&self) -> &Port {
+        self.port(self.feeder.get())
+    }
+
+    /// The port that is told what nobody asked for.
+    pub fn told(&self) -> &Port {
+        let feeder = self.feeder.get();
+        self.port(if is_shared(feeder) { USB } else { feeder })
+    }
+
+    /// Reports an exception to whoever feeds the machine.
+    pub fn except(&self, status: Status) {
+        self.told().exception.set(Some(status));
+        self.reporter_wake.signal();
+    }
+
+    /// The line to process next; G-code of the feeder only if `data` is wanted. That of others does not wait.
+    pub fn next_line(&self, data: bool) -> Option<Chosen<'_>> {
+        let feeder = self.feeder.get();
+        self.ports.iter().find_map(|port| {
+            let any = data || port.number != feeder;
+            let (id, class) = port.lines.borrow().next(any)?;
+            Some(Chosen { port, id, class })
+        })
+    }
+
+    /// Whether lines of G-code wait, on any port.
+    pub fn has_data(&self) -> bool {
+        self.ports.iter().any(|port| port.lines.borrow().has_data())
+    }
+
+    /// Whether G-code of this port is taken. It feeds the machine from now on, if that is at rest.
+    pub fn may_feed(&self, port: &Port) -> bool {
+        if port.number == self.feeder.get() {
+            return true;
+        }
+        let waits = self.feeder().lines.borrow().next(true).is_some();
+        let free = !waits && !View::of(self, port).is_busy();
+        if free {
+            self.feeder.set(port.number);
+            // It has been told nothing so far.
+            self.report.borrow_mut().refresh();
+        }
+        free
+    }
+}

@@ -1,0 +1,250 @@
+//! The serial line on the host machine: how it starts, senders that count characters, and noise.
+
+use std::collections::BTreeMap;
+
+use kerf::hal::imp::{Machine, eeprom};
+
+/// What a machine says within some milliseconds of being sent something.
+fn ask(machine: &Machine, text: &str, ms: u64) -> String {
+    machine.send(text.as_bytes());
+    machine.run_ms(ms);
+    String::from_utf8(machine.received()).expect("ASCII")
+}
+
+/// What is in memory after a machine was told some lines.
+fn kept_after(lines: &'static str) -> Vec<u8> {
+    let told = std::thread::spawn(move || {
+        let machine = Machine::boot(115_200).expect("one machine for each thread");
+        ask(&machine, lines, 3_000);
+        eeprom::contents()
+    });
+    told.join().expect("no panic")
+}
+
+/// What a machine says that finds this in its memory, before its first report.
+fn greeting_with(contents: Vec<u8>) -> String {
+    let greeted = std::thread::spawn(move || {
+        eeprom::put(&contents);
+        let machine = Machine::boot(115_200).expect("one machine for each thread");
+        let mut greeting = ask(&machine, "", 300);
+        let report = greeting.find("{\"sr\"").or(greeting.find("posx:")).expect("a report");
+        greeting.truncate(report);
+        greeting
+    });
+    greeted.join().expect("no panic")
+}
+
+const WHO: &str = "{\"r\":{\"fv\":0.970,\"fb\":440.20,\"hp\":1,\"hv\":8,\"id\":\"0000-KERF\"";
+
+#[test]
+fn the_machine_says_who_it_is_as_the_settings_want() {
+    for (lines, rest) in [
+        ("", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"),
+        ("{ej:0}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\ntinyg [mm] ok> \n"),
+        ("{ej:0,gun:0}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\ntinyg [inch] ok> \n"),
+        ("{ej:0,tv:0}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"),
+        ("{jv:1}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"),
+        ("{ec:1}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n\r"),
+        ("{rxm:0}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0,6953]}\n"),
+    ] {
+        assert_eq!(greeting_with(kept_after(lines)), format!("{WHO}{rest}"), "{lines}");
+    }
+    assert_eq!(greeting_with(kept_after("{jv:0}\n")), "");
+    let g2core = "{\"r\":{\"fv\":0.990,\"fb\":101.03,\"hp\":3,\"hv\":0,\"id\":\"0000-KERF\",\
+                  \"msg\":\"SYSTEM READY\"},\"f\":[1,0,1]}\n";
+    assert_eq!(greeting_with(kept_after("{dia:1}\n")), g2core);
+    assert_eq!(greeting_with(kept_after("{dia:1,ej:0}\n")), format!("{g2core}g2core[mm] ok> \n"));
+}
+
+#[test]
+fn a_memory_full_of_rubbish_is_told() {
+    let initializing = ",\"msg\":\"Initializing configs to default settings\"},\"f\":[1,15,0]}\n";
+    let ready = ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n";
+    for rubbish in [vec![0; 4_096], b"something else".repeat(100)] {
+        assert_eq!(greeting_with(rubbish), format!("{WHO}{initializing}{WHO}{ready}"));
+    }
+    assert_eq!(greeting_with(vec![0xFF; 4_096]), format!("{WHO}{ready}"));
+}
+
+/// Random numbers, the same everywhere: xorshift64*.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) as usize % end
+    }
+}
+
+/// The length that the footer of a response tells, if it is one.
+fn length(response: &str) -> Option<usize> {
+    response.starts_with("{\"r\":").then(|| {
+        let footer = response.rsplit_once("\"f\":[").expect("a footer").1;
+        footer.split(',').nth(2).expect("a length").parse().expect("a number")
+    })
+}
+
+/// A sender that counts characters, fills the window of 254 as far as it can and never waits for anything else loses
+/// nothing, whatever its lines look like; and `rx` never promises more than there is.
+#[test]
+fn a_sender_that_counts_characters_never_overruns_the_machine() {
+    let machine = Machine::boot(115_200).expect("one machine for each thread");
+    // Without XON/XOFF: counting has to do.
+    ask(&machine, "{ex:0}\n{rxm:0}\n{sv:0}\n", 200);
+    let mut dice = Dice(1);
+    let (mut sent, mut told, mut answered) = (0, 0, 0);
+    let (mut heard, mut most) = (String::new(), 0);
+    const LINES: usize = 1_500;
+    for number in 0..LINES {
+        let line = match dice.below(8) {
+            0 => "g0\n".to_string(),
+            1 => "\n  \n g1f800x0\n".to_string(),
+            2 => format!("g1 f800 x{} (a comment of some length)\r\n", dice.below(3)),
+            3 => "{rx:n}\n".to_string(),
+            4 => format!("({})\n", "x".repeat(dice.below(250))),
+            5 => "nonsense\r\n".to_string(),
+            _ => format!("g1f800x{}.{}\n", number % 2, dice.below(10)),
+        };
+        while sent - told + line.len() > 254 {
+            machine.run_ms(1);
+            heard += &String::from_utf8(machine.received()).expect("ASCII");
+            while let Some((response, rest)) = heard.split_once('\n') {
+                if let Some(room) = response.strip_prefix("{\"r\":{\"rx\":") {
+                    let room: usize = room.split('}').next().unwrap().parse().unwrap();
+                    assert!(room + (sent - told) >= 254, "{response}");
+                }
+                assert!(!response.starts_with("{\"er\""), "{response}");
+                answered += usize::from(length(response).is_some());
+                told += length(response).unwrap_or(0);
+                heard = rest.to_string();
+            }
+            assert!(told <= sent);
+        }
+        machine.send(line.as_bytes());
+        sent += line.len();
+        most = most.max(sent - told);
+    }
+    let rest = heard + &ask(&machine, "", 300_000);
+    told += rest.lines().filter_map(length).sum::<usize>();
+    answered += rest.lines().filter_map(length).count();
+    assert!(!rest.contains("\"er\""), "{rest}");
+    assert_eq!(answered, LINES);
+    // A line feed behind the last return is told with the next line.
+    assert!(sent - told <= 1, "{sent} bytes were sent and {told} told");
+    assert!(most > 250, "{most} bytes at once");
+}
+
+/// Every setting, as groups tell them.
+fn all_settings(machine: &Machine) -> BTreeMap<&'static str, String> {
+    let groups = ["sys", "1", "2", "3", "4", "x", "y", "z", "a", "b", "c", "ofs", "tof"];
+    groups.map(|group| (group, ask(machine, &format!("{{{group}:n}}\n"), 200))).into()
+}
+
+/// Bytes of noise: as many of any value as of the kind that requests are made of.
+///
+/// What may mean something on purpose is changed, so that none of it is asked for by chance: without the letter G no
+/// line moves anything, for no motion is modal at first; M is left out for outputs; nothing that reads as a value
+/// follows a separator in a line that begins with a brace or a dollar sign, so that nothing is set; and what acts at
+/// once (`!`, `~`, `%`, ^d, ^x, XOFF) is tested on its own. No line is empty, so that each is to be answered, in either
+/// mode: the second end of a line, or one behind nothing but blanks, is left out.
+struct Noise {
+    dice: Dice,
+    /// The line so far: how it began, and its last byte that was no blank.
+    first: Option<u8>,
+    last: u8,
+    /// The last byte of all.
+    before: u8,
+}
+
+impl Noise {
+    fn byte(&mut self) -> u8 {
+        loop {
+            const REQUESTS: &[u8] =
+                b"{}{}\"\":,,[]$$??hHnntfNxyzabc0123456789.-+ \t=|/()*;smjvqrpioue\\\r\n";
+            let byte = match self.dice.below(2) {
+                0 => self.dice.below(256) as u8,
+                _ => REQUESTS[self.dice.below(REQUESTS.len())],
+            };
+            if !self.may_come(byte) {
+                continue;
+            }
+            match byte {
+                b'\r' | b'\n' => (self.first, self.last) = (None, 0),
+                // Blanks, and what never comes to be part of a line.
+                b' ' | b'\t' | 0x05 | 0x11 => {}
+                _ => {
+                    self.first = self.first.or(Some(byte));
+                    self.last = byte;
+                }
+            }
+            self.before = byte;
+            return byte;
+        }
+    }
+
+    fn may_come(&self, byte: u8) -> bool {
+        let request = matches!(self.first, Some(b'{' | b'$'));
+        let blank = matches!(self.before, b' ' | b'\t');
+        let dollar = self.first == Some(b'$') && blank;
+        let separator = matches!(self.last, b':' | b'=' | b'|' | b'"' | b'-' | b',') || dollar;
+        match byte {
+            b'!' | b'~' | b'%' | 0x04 | 0x13 | 0x18 => false,
+            b'g' | b'G' | b'm' | b'M' => self.first == Some(b'{') || self.first == Some(b'$'),
+            b'\n' | b'\r' => self.first.is_some(),
+            b'0'..=b'9' | b'-' | b'.' | b't' | b'T' | b'f' | b'F' => !(request && separator),
+            _ => true,
+        }
+    }
+}
+
+/// A megabyte of noise. `KERF_NOISE` is another seed.
+#[test]
+fn noise_is_answered_and_changes_nothing() {
+    const BYTES: usize = 1 << 20;
+    let seed = std::env::var("KERF_NOISE").map_or(7, |seed| seed.parse().expect("a number"));
+    println!("KERF_NOISE={seed}");
+    let machine = Machine::boot(115_200).expect("one machine for each thread");
+    let before = {
+        ask(&machine, "", 100);
+        all_settings(&machine)
+    };
+    let mut noise = Noise { dice: Dice(seed), first: None, last: 0, before: 0 };
+    let (mut bytes, mut lines, mut answers, mut enquiries) = (0, 0, 0, 0);
+    let mut heard = Vec::new();
+    while bytes < BYTES || noise.first.is_some() {
+        // A line at a time, which is never lost; marks of bytes that would be are among the noise.
+        let mut line = Vec::new();
+        loop {
+            line.push(noise.byte());
+            if matches!(line.last(), Some(b'\r' | b'\n')) {
+                break;
+            }
+        }
+        let acks = line.iter().filter(|byte| **byte == 0x05).count();
+        machine.send(&line);
+        bytes += line.len();
+        lines += 1;
+        enquiries += usize::from(acks > 0);
+        // As long as the bytes take, and the answer.
+        let mut left = 3_000;
+        while answers < lines && left > 0 {
+            machine.run_ms(2);
+            heard.extend(machine.received());
+            while let Some(end) = heard.iter().position(|byte| *byte == b'\n') {
+                let answer: Vec<u8> = heard.drain(..=end).collect();
+                let prompt = answer.starts_with(b"tinyg [");
+                answers += usize::from(prompt || answer.starts_with(b"{\"r\":"));
+            }
+            left -= 2;
+        }
+        let shown = String::from_utf8_lossy(&line).into_owned();
+        assert_eq!(answers, lines, "seed {seed}, byte {bytes}: {shown:?}");
+    }
+    ask(&machine, "{}\n", 500);
+    assert_eq!(all_settings(&machine), before, "seed {seed}");
+    assert_eq!(machine.emitted().steps, [0; 4], "seed {seed}");
+    assert!(!kerf::hal::imp::was_reset());
+    assert!(lines > 5_000 && enquiries > 100, "{lines} lines, {enquiries} enquiries");
+}

@@ -1,0 +1,128 @@
+//! Feedhold on the image: how soon it slows down, how far it goes on, and where it ends.
+
+mod common;
+
+use common::{booted, set};
+use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::{Host, Machine};
+
+const CLOCK: f64 = 16e6;
+/// Steps in a mm, as axes are set up by default.
+const STEPS: f64 = 1280.0;
+/// mm/s^2, as the setting says.
+const ACCEL: f64 = 1_000.0;
+/// mm/s.
+const VELOCITY: f64 = 25.0;
+/// Millions of mm/min^3: a jerk that no acceleration limit knows of.
+const SHARP: f64 = 1e6;
+
+/// A board with this jerk limit, and its sender.
+fn board(jerk: f64) -> (Machine, Host) {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    for axis in ["x", "y"] {
+        let limits = format!("{{{axis}:{{vm:3000,fr:3000,ac:{ACCEL},jm:{jerk}}}}}");
+        set(&mut machine, &mut host, &limits);
+    }
+    machine.recorder_mut().keep_log();
+    (machine, host)
+}
+
+/// Runs for so many microseconds and says `!`: the cycle at which it does.
+fn hold_after(machine: &mut Machine, host: &mut Host, us: u64) -> u64 {
+    let end = machine.cycle() + us * 16;
+    host.run_until(machine, end).unwrap();
+    machine.send_now(b'!');
+    machine.cycle()
+}
+
+/// Runs until the machine says that it is so.
+fn until_stat(machine: &mut Machine, host: &mut Host, stat: i64) {
+    let end = machine.cycle() + machine.cycles(20_000);
+    while host.stat() != Some(stat) {
+        assert!(machine.cycle() < end, "it never comes to stat {stat}");
+        host.run_until_line(machine, end).unwrap();
+    }
+}
+
+fn positions(machine: &Machine) -> [i64; 2] {
+    [0, 1].map(|m| machine.recorder().motors()[m].position)
+}
+
+/// The first step of X after `from` that comes later than all at the feed do, and how long before that it is.
+fn first_slower(machine: &Machine, from: u64) -> u64 {
+    let steady = (CLOCK / VELOCITY / STEPS) as u64;
+    let steps = machine.recorder().steps_of(0);
+    let slower = |pair: &&[u64]| pair[1] > from && pair[1] - pair[0] > steady + steady / 40;
+    steps.windows(2).find(slower).expect("it slows down")[1]
+}
+
+#[test]
+fn it_slows_down_within_10_ms() {
+    let one = vec!["g1 x100 f1500".to_string()];
+    // Blocks that take 4 and 2 ms, sent meanwhile, keep everybody busy.
+    let many = |way: f64| {
+        let first = std::iter::once("g1 f1500".to_string());
+        first.chain((1..400).map(|n| format!("x{:.2}", f64::from(n) * way))).collect()
+    };
+    for job in [one, many(0.1), many(0.05)] {
+        let mut worst = 0;
+        for n in 0..30 {
+            let (mut machine, mut host) = board(SHARP);
+            (0..).zip(&job).for_each(|(n, line)| host.queue(n, line));
+            // At all phases of a segment.
+            let from = hold_after(&mut machine, &mut host, 300_000 + n * 137);
+            host.run_for_ms(&mut machine, 100).unwrap();
+            worst = worst.max(first_slower(&machine, from) - from);
+        }
+        let ms = worst as f64 / CLOCK * 1e3;
+        println!("{} lines: slower after {ms:.2} ms at most", job.len());
+        assert!(ms > 1.0 && ms <= 10.0, "{ms} ms");
+    }
+}
+
+#[test]
+fn it_stops_as_soon_as_the_limits_allow_and_ends_exactly() {
+    // A jerk limit that tells: the acceleration takes 22 ms to build up.
+    for jerk in [SHARP, 5_000.0] {
+        let (mut machine, mut host) = board(jerk);
+        set(&mut machine, &mut host, "g1 x100 y10 f1500");
+        let from = hold_after(&mut machine, &mut host, 500_000);
+        until_stat(&mut machine, &mut host, 6);
+        host.run_for_ms(&mut machine, 500).unwrap();
+        let steps = machine.recorder().steps_of(0);
+        let after = steps.iter().filter(|step| **step > from).count() as f64;
+        let way = after / STEPS * 101f64.sqrt() / 10.0;
+        let build_up = if jerk == SHARP { 0.0 } else { ACCEL / (jerk * 1e6 / 216e3) };
+        let best = 0.5 * VELOCITY * (VELOCITY / ACCEL + build_up);
+        // Beside what is queued when it is told.
+        let queued = 0.010 * VELOCITY;
+        println!("stops in {way:.3} mm, {best:.3} at best, {queued:.3} queued");
+        assert!(way >= best * 0.98 && way <= best * 1.02 + queued, "{way} mm, {best} at best");
+        assert!(machine.recorder().last_step().unwrap() < machine.cycle() - machine.cycles(100));
+        machine.send_now(b'~');
+        until_stat(&mut machine, &mut host, 3);
+        assert_eq!(positions(&machine), [128_000, 12_800]);
+    }
+}
+
+#[test]
+fn what_is_dropped_leaves_no_step_behind() {
+    let (mut machine, mut host) = board(5_000.0);
+    for n in 0..15 {
+        // In the middle of something, at some phase of the steps of both axes.
+        set(&mut machine, &mut host, "g91 g1 x30.123 y17.0071 f1500");
+        set(&mut machine, &mut host, "g2 x6 y0 i3");
+        set(&mut machine, &mut host, "g1 x-7.3 y3.3337");
+        host.run_for_ms(&mut machine, 40 + 97 * n % 1_900).unwrap();
+        machine.send(b"!%\n");
+        let (x, y) = (n as i64 % 7 - 3, n as i64 % 5);
+        set(&mut machine, &mut host, &format!("g90 g1 x{x} y{y} f1500"));
+        // Until no motor has moved for a while.
+        let mut before = [0; 2];
+        while before != positions(&machine) {
+            before = positions(&machine);
+            host.run_for_ms(&mut machine, 200).unwrap();
+        }
+        assert_eq!(positions(&machine), [x * 1280, y * 1280], "round {n}");
+    }
+}
