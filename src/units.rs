@@ -12,6 +12,8 @@ impl Length {
     pub const ZERO: Length = Length(0);
     /// Units in a millimetre or a degree.
     pub const PER_MM: i32 = 10_000;
+    /// Decimals of a millimetre that it has.
+    pub const DECIMALS: u8 = 4;
     /// Units in an inch.
     pub const PER_INCH: i32 = 254_000;
 

@@ -163,3 +163,46 @@ fn a_power_cut_leaves_each_offset_old_or_new() {
     }
     assert_eq!(arrived, 6);
 }
+
+#[test]
+fn offsets_set_as_settings_survive_a_reset_and_wait_for_each_other() {
+    let left = with(Vec::new(), |sender| {
+        // Two rows in one line: the second waits for the first, and nothing is refused.
+        let heard = sender.ask("{g54:{x:1,y:2},g55x:3}\n$g56z=4\n{fb:n}\n", 2_000);
+        assert!(
+            heard.contains("{\"r\":{\"g54\":{\"x\":1.000,\"y\":2.000},\"g55x\":3.000},\"f\":[1,0,")
+        );
+        assert!(heard.contains("[g56z] g56 z offset               4.000 mm\ntinyg [mm] ok> "));
+        assert!(heard.contains("440.20"), "{heard}");
+        eeprom::contents()
+    });
+    with(left, |sender| {
+        assert_eq!(sender.origin()[..2], [1.0, 2.0]);
+        let heard = sender.ask("{g55x:n,g56z:n}\n", 20);
+        assert!(heard.contains("{\"g55x\":3.000,\"g56z\":4.000}"), "{heard}");
+    });
+}
+
+#[test]
+fn a_power_cut_leaves_each_cold_setting_old_or_new() {
+    let cuts = with(Vec::new(), |sender| {
+        sender.ask("{p1frq:200}\n{uda0:\"0x1\",uda1:\"0x1\"}\n", 2_000);
+        sender.0.send(b"{p1frq:300}\n{uda0:\"0x2\"}\n");
+        let mut cuts = Vec::new();
+        for _ in 0..40 {
+            sender.0.run_ms(3);
+            cuts.push(eeprom::contents());
+        }
+        cuts
+    });
+    let mut seen = Vec::new();
+    for cut in cuts {
+        let heard = with(cut, |sender| sender.ask("{p1frq:n,uda0:n,uda1:n}\n", 20));
+        let now = [(200, 1), (300, 1), (300, 2)].iter().position(|(frequency, data)| {
+            let body = format!("{{\"p1frq\":{frequency},\"uda0\":\"0x{data}\",\"uda1\":\"0x1\"}}");
+            heard.contains(&body)
+        });
+        seen.push(now.unwrap_or_else(|| panic!("{heard}")));
+    }
+    assert!(seen.is_sorted() && seen.contains(&1) && seen.last() == Some(&2), "{seen:?}");
+}

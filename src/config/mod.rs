@@ -2,13 +2,14 @@
 //!
 //! `protocol` reads and writes them by name through [`Setting`]; everything else uses the getters of
 //! [`Settings`], which cost a load. Values are integers scaled by a power of ten, so text goes in
-//! and out exactly. They live in RAM only.
+//! and out exactly. Those that are seldom asked for are in EEPROM alone, and `tasks::storage` has them.
 
 #[cfg(not(target_arch = "avr"))]
 pub mod docs;
 pub mod name;
 pub mod number;
 pub mod ratio;
+pub mod rows;
 pub mod setting;
 pub mod table;
 pub mod words;
@@ -71,6 +72,8 @@ impl Settings {
             Place::Small(slot) => self.small(slot).into(),
             Place::Large(slot) => self.large(slot),
             Place::Constant => self.constant(setting),
+            // One that is in EEPROM is asked for elsewhere.
+            Place::Log => setting.default_value(),
         }
     }
 
@@ -108,15 +111,15 @@ impl Settings {
         Ok(value)
     }
 
-    /// The value of a setting as shown.
-    pub fn show(&self, setting: Setting, inches: bool) -> Fixed {
-        self.show_as(setting, inches, setting.row().shown)
+    /// A value of a setting as shown.
+    pub fn show(&self, setting: Setting, value: i32, inches: bool) -> Fixed {
+        self.show_as(setting, value, inches, setting.row().shown)
     }
 
     /// The same with at most so many decimals.
-    pub fn show_as(&self, setting: Setting, inches: bool, decimals: u8) -> Fixed {
+    pub fn show_as(&self, setting: Setting, value: i32, inches: bool, decimals: u8) -> Fixed {
         let row = setting.row();
-        let value = Fixed { value: self.get(setting), decimals: row.stored };
+        let value = Fixed { value, decimals: row.stored };
         if inches && self.is_length(setting, &row) {
             value.inches(decimals)
         } else {
@@ -151,7 +154,7 @@ impl Settings {
                     *place = value;
                 }
             }
-            Place::Constant => {}
+            Place::Constant | Place::Log => {}
         }
     }
 

@@ -2,14 +2,21 @@
 
 use super::name::{Name, axis_letter, axis_of};
 use super::table::{
-    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, HOMING, IDLE, Kind, MODE, MOTOR, MOTOR_DEFAULTS,
-    MOTOR_ROWS, RADIUS, Row, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS,
+    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, HOMING, IDLE, JOB, JOB_ROWS, Kind, MODE, MOTOR,
+    MOTOR_DEFAULTS, MOTOR_ROWS, PWM, PWM_DEFAULTS, PWM_ROWS, RADIUS, Row, SYSTEM, SYSTEM_DEFAULTS,
+    SYSTEM_ROWS, USER, USER_ROWS,
 };
 use crate::boards::MOTORS;
 use crate::units::{AXES, FIRST_ROTARY};
 
 const FIRST_MOTOR: u8 = SYSTEM_ROWS as u8;
 const FIRST_AXIS: u8 = FIRST_MOTOR + (MOTORS * MOTOR_ROWS) as u8;
+const FIRST_PWM: u8 = FIRST_AXIS + (AXES * AXIS_ROWS) as u8;
+const FIRST_USER: u8 = FIRST_PWM + PWM_ROWS as u8;
+const FIRST_JOB: u8 = FIRST_USER + USERS * USER_ROWS as u8;
+
+/// The groups of user data, `uda` to `udd`.
+pub const USERS: u8 = 4;
 
 /// Whose a setting is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -20,6 +27,12 @@ pub enum Owner {
     Motor(u8),
     /// An axis's, 0 to 5.
     Axis(u8),
+    /// The spindle's output.
+    Pwm,
+    /// A sender's own, 0 to 3.
+    User(u8),
+    /// A job's.
+    Job,
 }
 
 impl Owner {
@@ -29,25 +42,40 @@ impl Owner {
             Owner::System => SYSTEM_ROWS as u8,
             Owner::Motor(_) => MOTOR_ROWS as u8,
             Owner::Axis(_) => AXIS_ROWS as u8,
+            Owner::Pwm => PWM_ROWS as u8,
+            Owner::User(_) => USER_ROWS as u8,
+            Owner::Job => JOB_ROWS as u8,
         }
     }
 
     /// The group's name, which is the prefix of its settings' names; none for the system.
     pub fn prefix(self) -> Name {
-        let letter = match self {
-            Owner::System => return Name::new(),
-            Owner::Motor(motor) => b'1' + motor,
-            Owner::Axis(axis) => axis_letter(axis),
-        };
-        Name::new().with(&[letter]).unwrap_or_default()
+        let named = |bytes: &[u8]| Name::new().with(bytes).unwrap_or_default();
+        match self {
+            Owner::System => Name::new(),
+            Owner::Motor(motor) => named(&[b'1' + motor]),
+            Owner::Axis(axis) => named(&[axis_letter(axis)]),
+            Owner::Pwm => named(b"p1"),
+            Owner::User(group) => named(&[b'u', b'd', b'a' + group]),
+            Owner::Job => named(b"jid"),
+        }
     }
 
-    /// The motor or axis that names beginning with `letter` belong to.
-    pub fn of_letter(letter: u8) -> Option<Owner> {
-        match letter {
-            b'1'..=b'4' => Some(Owner::Motor(letter - b'1')),
-            _ => axis_of(letter).map(Owner::Axis),
+    /// Whose prefix `name` begins with, but for the system's.
+    pub fn of_name(name: &Name) -> Option<Owner> {
+        match *name.bytes() {
+            [motor @ b'1'..=b'4', ..] => Some(Owner::Motor(motor - b'1')),
+            [b'p', b'1', ..] => Some(Owner::Pwm),
+            [b'u', b'd', group @ b'a'..=b'd', ..] => Some(Owner::User(group - b'a')),
+            [b'j', b'i', b'd', ..] => Some(Owner::Job),
+            [letter, ..] => axis_of(letter).map(Owner::Axis),
+            [] => None,
         }
+    }
+
+    /// Whose prefix `name` is.
+    pub fn called(name: &Name) -> Option<Owner> {
+        Owner::of_name(name).filter(|owner| owner.prefix() == *name)
     }
 
     /// Whether it is an axis that turns.
@@ -70,6 +98,9 @@ impl Owner {
             Owner::System => SYSTEM.at(row),
             Owner::Motor(motor) if usize::from(motor) < MOTORS => MOTOR.at(row),
             Owner::Axis(axis) if usize::from(axis) < AXES => AXIS.at(row),
+            Owner::Pwm => PWM.at(row),
+            Owner::User(group) if group < USERS => USER.at(row),
+            Owner::Job => JOB.at(row),
             _ => None,
         };
         row.filter(|row| self.has(row))
@@ -85,6 +116,8 @@ pub enum Place {
     Large(u8),
     /// In the table, as its default.
     Constant,
+    /// In EEPROM alone.
+    Log,
 }
 
 /// Bytes that the settings take.
@@ -114,7 +147,11 @@ pub struct Setting(u8);
 
 impl Setting {
     /// Numbers below this may be settings.
-    pub const NUMBERS: u8 = FIRST_AXIS + (AXES * AXIS_ROWS) as u8;
+    pub const NUMBERS: u8 = FIRST_JOB + JOB_ROWS as u8;
+    /// Numbers below this may be settings that are in RAM and are kept.
+    pub const WARM: u8 = FIRST_PWM;
+    /// From [`Self::WARM`] to before this are those that are in EEPROM alone.
+    pub const COLD: u8 = FIRST_JOB;
 
     /// Its number.
     pub fn number(self) -> u8 {
@@ -133,6 +170,9 @@ impl Setting {
             Owner::System => 0,
             Owner::Motor(motor) => FIRST_MOTOR + motor * MOTOR_ROWS as u8,
             Owner::Axis(axis) => FIRST_AXIS + axis * AXIS_ROWS as u8,
+            Owner::Pwm => FIRST_PWM,
+            Owner::User(group) => FIRST_USER + group * USER_ROWS as u8,
+            Owner::Job => FIRST_JOB,
         };
         owner.load(row).map(|_| Setting(base + row))
     }
@@ -144,7 +184,7 @@ impl Setting {
             let called = |row: &u8| owner.load(*row).is_some_and(|r| name.matches(skip, r.token));
             (0..owner.rows()).find(called).and_then(|row| Setting::of(owner, row))
         };
-        let owner = Owner::of_letter(name.first());
+        let owner = Owner::of_name(name);
         owner.and_then(search).or_else(|| search(Owner::System))
     }
 
@@ -168,8 +208,18 @@ impl Setting {
         large && row.slot == table::system::BAUD
     }
 
-    /// Whether it is to survive a power cut: all but constants, and the rate of the line, which one could be
-    /// locked out with.
+    /// Whether it is in EEPROM alone.
+    pub fn is_cold(self) -> bool {
+        (Self::WARM..Self::COLD).contains(&self.0)
+    }
+
+    /// Whether it is written as hexadecimal.
+    pub fn is_data(self) -> bool {
+        matches!(self.row().kind, Kind::Data | Kind::Job)
+    }
+
+    /// Whether it is in RAM and is to survive a power cut: all but constants, and the rate of the line, which one
+    /// could be locked out with.
     pub fn is_kept(self) -> bool {
         matches!(self.row().kind, Kind::Small | Kind::Large) && !self.is_baud()
     }
@@ -194,8 +244,14 @@ impl Setting {
             Owner::System
         } else if self.0 < FIRST_AXIS {
             Owner::Motor((self.0 - FIRST_MOTOR) / MOTOR_ROWS as u8)
-        } else {
+        } else if self.0 < FIRST_PWM {
             Owner::Axis((self.0 - FIRST_AXIS) / AXIS_ROWS as u8)
+        } else if self.0 < FIRST_USER {
+            Owner::Pwm
+        } else if self.0 < FIRST_JOB {
+            Owner::User((self.0 - FIRST_USER) / USER_ROWS as u8)
+        } else {
+            Owner::Job
         }
     }
 
@@ -210,6 +266,9 @@ impl Setting {
             Owner::System => self.0,
             Owner::Motor(_) => (self.0 - FIRST_MOTOR) % MOTOR_ROWS as u8,
             Owner::Axis(_) => (self.0 - FIRST_AXIS) % AXIS_ROWS as u8,
+            Owner::Pwm => self.0 - FIRST_PWM,
+            Owner::User(_) => (self.0 - FIRST_USER) % USER_ROWS as u8,
+            Owner::Job => self.0 - FIRST_JOB,
         }
     }
 
@@ -230,6 +289,8 @@ impl Setting {
             Owner::Axis(axis) => {
                 AXIS_DEFAULTS.at(index).and_then(|d| d.get(usize::from(axis)).copied())
             }
+            Owner::Pwm => PWM_DEFAULTS.at(index),
+            Owner::User(_) | Owner::Job => None,
         };
         value.unwrap_or(0)
     }
@@ -238,7 +299,9 @@ impl Setting {
     pub fn place(self) -> Place {
         let row = self.row();
         let (small, large) = match self.owner() {
-            Owner::System => (small_of(AXES as u8), large_of(AXES as u8)),
+            Owner::System | Owner::Pwm | Owner::User(_) | Owner::Job => {
+                (small_of(AXES as u8), large_of(AXES as u8))
+            }
             Owner::Motor(motor) => {
                 (motor * table::motor::SMALL as u8, motor * table::motor::LARGE as u8)
             }
@@ -246,7 +309,8 @@ impl Setting {
         };
         match row.kind {
             Kind::Small => Place::Small(small + row.slot),
-            Kind::Large => Place::Large(large + row.slot),
+            Kind::Large | Kind::Job => Place::Large(large + row.slot),
+            Kind::Cold | Kind::Data => Place::Log,
             Kind::Constant | Kind::Text => Place::Constant,
         }
     }
@@ -269,7 +333,10 @@ mod tests {
             assert_eq!(Setting::find(&setting.name()), Some(setting), "{:?}", setting.name());
             assert!(setting.number() < Setting::NUMBERS);
         }
-        for bad in ["", "x", "xra", "bsn", "5ma", "foo", "bauds", "xvmm"] {
+        for bad in [
+            "", "x", "p1", "p1f", "uda", "uda4", "jid", "jide", "xra", "bsn", "5ma", "foo",
+            "bauds", "xvmm",
+        ] {
             assert_eq!(Setting::find(&Name::new().with(bad.as_bytes()).unwrap()), None, "{bad}");
         }
     }
@@ -279,11 +346,13 @@ mod tests {
         let mut places = HashSet::new();
         for setting in all() {
             let place = setting.place();
-            assert!(place == Place::Constant || places.insert(std::format!("{place:?}")));
+            let nowhere = matches!(place, Place::Constant | Place::Log);
+            assert!(nowhere || places.insert(std::format!("{place:?}")));
             match place {
                 Place::Small(slot) => assert!(usize::from(slot) < SMALLS),
                 Place::Large(slot) => assert!(usize::from(slot) < LARGES),
                 Place::Constant => {}
+                Place::Log => assert!(setting.is_cold()),
             }
         }
         // X Y Z do without a radius.
@@ -311,5 +380,6 @@ mod tests {
         );
         assert_eq!(list(Owner::Axis(5)).join(" "), "am vm fr tn tm jm jd ra ac");
         assert_eq!(list(Owner::Motor(2)).join(" "), "ma sa tr mi po pm sp");
+        assert_eq!(list(Owner::User(3)).join(" "), "dd0 dd1 dd2 dd3");
     }
 }

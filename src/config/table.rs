@@ -2,7 +2,7 @@
 //!
 //! Rows stand in the order that groups are listed in. A motor or axis setting has one row for all
 //! motors or axes; its defaults are a row of the table behind. Sizes: 56 rows of 17 bytes and 644
-//! bytes of defaults. TinyG's settings come first in each group, then those of Kerf alone.
+//! bytes of defaults; and those that are in EEPROM alone. TinyG's settings come first in each group, then those of Kerf alone.
 
 use super::name::token;
 use crate::boards::ACTIVE;
@@ -20,6 +20,12 @@ pub enum Kind {
     Large,
     /// Nowhere: it is the board's name.
     Text,
+    /// In EEPROM alone, fixed point: seldom asked for.
+    Cold,
+    /// In EEPROM alone; 32 bits, written as hexadecimal.
+    Data,
+    /// In 32 bits until the next reset, written as hexadecimal.
+    Job,
 }
 
 /// Converted from and to inches in G20 (on an axis that turns: never).
@@ -87,6 +93,18 @@ const fn fixed(name: &str, slot: u8, stored: u8, shown: u8, min: i32) -> Row {
     Row { token: token(name), slot, kind, flags, stored, shown, min, max }
 }
 
+/// A number from 0 on of which three decimals are kept, in EEPROM.
+const fn cold(name: &str, shown: u8) -> Row {
+    let (kind, slot, flags, stored, min, max) = (Kind::Cold, 0, 0, 3, 0, i32::MAX);
+    Row { token: token(name), slot, kind, flags, stored, shown, min, max }
+}
+
+/// 32 bits.
+const fn bits(name: &str, kind: Kind, slot: u8) -> Row {
+    let (flags, stored, shown, min, max) = (0, 0, 0, i32::MIN, i32::MAX);
+    Row { token: token(name), slot, kind, flags, stored, shown, min, max }
+}
+
 /// A number that never changes.
 const fn constant(name: &str, decimals: u8) -> Row {
     let (kind, slot, flags) = (Kind::Constant, 0, 0);
@@ -111,6 +129,12 @@ pub const SYSTEM_ROWS: usize = 33;
 pub const MOTOR_ROWS: usize = 7;
 /// Rows of [`AXIS`].
 pub const AXIS_ROWS: usize = 16;
+/// Rows of [`PWM`].
+pub const PWM_ROWS: usize = 10;
+/// Rows of [`USER`].
+pub const USER_ROWS: usize = 4;
+/// Rows of [`JOB`].
+pub const JOB_ROWS: usize = 4;
 
 /// Slots of the system, small and large.
 #[allow(missing_docs)]
@@ -145,7 +169,8 @@ pub mod system {
     pub const MT: u8 = 2;
     pub const SI: u8 = 3;
     pub const BAUD: u8 = 4;
-    pub const LARGE: usize = 5;
+    pub const JOB: u8 = 5;
+    pub const LARGE: usize = 9;
 }
 
 /// Slots of a motor, small and large.
@@ -299,5 +324,39 @@ progmem! {
         [5_0000, 5_0000, 5_0000, 5_0000, 0, 0],
         [1_0000, 1_0000, 1_0000, 2_0000, 0, 0],
         [0; 6],
+    ];
+
+    /// The group `p1`.
+    pub static PWM: [Row; PWM_ROWS] = [
+        cold("frq", 0),
+        cold("csl", 0),
+        cold("csh", 0),
+        up_to(cold("cpl", 3), 1_000),
+        up_to(cold("cph", 3), 1_000),
+        cold("wsl", 0),
+        cold("wsh", 0),
+        up_to(cold("wpl", 3), 1_000),
+        up_to(cold("wph", 3), 1_000),
+        up_to(cold("pof", 3), 1_000),
+    ];
+
+    /// Their defaults.
+    pub static PWM_DEFAULTS: [i32; PWM_ROWS] =
+        [100_000, 1_000_000, 2_000_000, 125, 200, 1_000_000, 2_000_000, 125, 200, 100];
+
+    /// The groups `uda` to `udd`. All are 0 at first.
+    pub static USER: [Row; USER_ROWS] = [
+        bits("0", Kind::Data, 0),
+        bits("1", Kind::Data, 0),
+        bits("2", Kind::Data, 0),
+        bits("3", Kind::Data, 0),
+    ];
+
+    /// The group `jid`. All are 0 at first.
+    pub static JOB: [Row; JOB_ROWS] = [
+        bits("a", Kind::Job, system::JOB),
+        bits("b", Kind::Job, system::JOB + 1),
+        bits("c", Kind::Job, system::JOB + 2),
+        bits("d", Kind::Job, system::JOB + 3),
     ];
 }

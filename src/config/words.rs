@@ -1,7 +1,7 @@
 //! What text mode calls the settings: a row beside each row of [`table`](super::table), in program
 //! memory.
 
-use super::table::{AXIS_ROWS, MOTOR_ROWS, SYSTEM_ROWS};
+use super::table::{AXIS_ROWS, MOTOR_ROWS, PWM_ROWS, SYSTEM_ROWS};
 use super::{Owner, Setting};
 use crate::progmem;
 use crate::progmem::Text;
@@ -44,6 +44,8 @@ const POLARITY: Text = text!(" [0=normal,1=reverse]");
 const SWITCHES: Text = text!(" [0=off,1=homing,2=limit,3=limit+homing]");
 const SPEED: Text = text!("/min");
 const JERK: Text = text!("/min^3 * 1 million");
+const TURNS: Text = text!(" RPM");
+const PHASE: Text = text!(" [0..1]");
 const NONE: Text = text!("");
 
 progmem! {
@@ -120,6 +122,19 @@ progmem! {
         length(text!("zero backoff"), NONE),
         length(text!("acceleration maximum"), text!("/s^2 (0 is none)")),
     ];
+
+    static PWM: [Words; PWM_ROWS] = [
+        words(text!("pwm frequency"), text!(" Hz")),
+        words(text!("pwm cw speed lo"), TURNS),
+        words(text!("pwm cw speed hi"), TURNS),
+        words(text!("pwm cw phase lo"), PHASE),
+        words(text!("pwm cw phase hi"), PHASE),
+        words(text!("pwm ccw speed lo"), TURNS),
+        words(text!("pwm ccw speed hi"), TURNS),
+        words(text!("pwm ccw phase lo"), PHASE),
+        words(text!("pwm ccw phase hi"), PHASE),
+        words(text!("pwm phase off"), PHASE),
+    ];
 }
 
 impl Setting {
@@ -130,6 +145,9 @@ impl Setting {
             Owner::System => SYSTEM.at(index),
             Owner::Motor(_) => MOTOR.at(index),
             Owner::Axis(_) => AXIS.at(index),
+            Owner::Pwm => PWM.at(index),
+            Owner::User(_) => Some(bare(text!("user data"))),
+            Owner::Job => Some(bare(text!("job id"))),
         }
     }
 }

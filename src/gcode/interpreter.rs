@@ -17,7 +17,7 @@ use super::command::{Commands, Overrides};
 use super::modal::{Defaults, Modal, MotionMode, Turn, Units};
 use super::setup::Setup;
 use super::state::State;
-use super::tables::{Ram, Row, Tables};
+use super::tables::{Edit, Ram, Row, Tables};
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -59,6 +59,21 @@ impl<T: Tables> Interpreter<T> {
         self.state.modal = Modal::new(&setup.defaults());
         // Nothing else shifts the origin yet, so that the sum is within the range.
         let _ = self.state.update_origin(&self.tables.row(Row::system(self.state.modal.system)));
+    }
+
+    /// Sets a value of a row as G10 does: it is in force when this returns. [`Status::Again`] as of
+    /// [`Self::interpret`]; after an error everything is what it was.
+    #[inline(never)]
+    pub fn set(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {
+        let mut values = self.tables.row(row);
+        *values.get_mut(usize::from(axis)).ok_or(Status::AxisInvalid)? = value;
+        let edit = Edit::new(row, values, &self.tables)?;
+        if row == Row::system(self.state.modal.system) {
+            let before = self.state.origin;
+            self.state.update_origin(&values).inspect_err(|_| self.state.origin = before)?;
+        }
+        self.tables.apply(&edit);
+        Ok(())
     }
 
     /// Interprets one line without its terminator, for a machine that is `setup` so.
@@ -204,6 +219,11 @@ impl<T> Interpreter<T> {
     /// Machine coordinates of the work origin: work position = machine position - this.
     pub fn work_offset(&self) -> &PerAxis<Length> {
         &self.state.origin
+    }
+
+    /// G92, whether or not it is in force.
+    pub fn shift(&self) -> &PerAxis<Length> {
+        &self.state.shift
     }
 
     /// The tool length in force, on each axis; a part of the work offset.

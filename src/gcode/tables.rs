@@ -46,6 +46,26 @@ impl Row {
     pub const fn number(self) -> u8 {
         self.0
     }
+
+    /// The row of that number.
+    pub const fn from_number(number: u8) -> Option<Self> {
+        if number < ROWS { Some(Self(number)) } else { None }
+    }
+
+    /// Whether it is a stored position, which is set by being there.
+    pub const fn is_stored(self) -> bool {
+        self.0 >= SYSTEMS && self.0 < SYSTEMS + STORED
+    }
+
+    /// Whether it is of a tool.
+    pub const fn is_tool(self) -> bool {
+        self.0 >= SYSTEMS + STORED
+    }
+
+    /// Whether it has a value for an axis.
+    pub fn has(self, axis: u8) -> bool {
+        usize::from(axis) < AXES && (!self.is_tool() || TOOL_AXES.contains(&axis))
+    }
 }
 
 /// A change of one row.

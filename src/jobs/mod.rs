@@ -1,4 +1,5 @@
-//! Jobs in program memory, started by `{test:n}`: to try a machine out without a sender's file.
+//! Jobs in program memory, started by `{test:n}`: to try a machine out without a sender's file; and, as number
+//! [`STORED`], the program that the user keeps in EEPROM.
 //!
 //! The parser task takes their lines in turn with those of the sender (`tasks::parser`): data lines wait until the job
 //! is over, control lines do not. A line that is refused ends the job. A job is a row of pieces of text, each
@@ -9,9 +10,13 @@ mod texts;
 use heapless::Vec;
 
 use crate::progmem::Text;
+use crate::store::{Memory, program};
 
 /// The longest line of a job, in bytes.
 pub const LINE_MAX: usize = 48;
+
+/// The number of the program in EEPROM.
+pub const STORED: u8 = 100;
 
 /// A piece of a job.
 #[derive(Clone, Copy)]
@@ -27,15 +32,17 @@ pub struct Piece {
 pub struct Job {
     /// Its number; 0 is none.
     number: u8,
+    /// Of the program in EEPROM: the higher byte of `at`.
     piece: u8,
     round: u8,
     at: u8,
 }
 
 impl Job {
-    /// The job of that number, from its start; number 0 is none. `None` for one that does not exist.
+    /// The job of that number, from its start; number 0 is none. `None` for one that does not exist; whether there is a
+    /// program in EEPROM is for the caller to see.
     pub fn new(number: u8) -> Option<Self> {
-        let exists = number == 0 || texts::piece(number, 0).is_some();
+        let exists = matches!(number, 0 | STORED) || texts::piece(number, 0).is_some();
         exists.then_some(Self { number, ..Self::default() })
     }
 
@@ -50,7 +57,10 @@ impl Job {
     }
 
     /// Reads the next line; false at the end. Not by value: a line moved is twice its size of stack.
-    pub fn next_line(&mut self, line: &mut Vec<u8, LINE_MAX>) -> bool {
+    pub fn next_line(&mut self, memory: &impl Memory, line: &mut Vec<u8, LINE_MAX>) -> bool {
+        if self.number == STORED {
+            return self.stored_line(memory, line);
+        }
         loop {
             let Some(piece) = texts::piece(self.number, self.piece) else { return false };
             line.clear();
@@ -72,22 +82,43 @@ impl Job {
     }
 }
 
+impl Job {
+    fn stored_line(&mut self, memory: &impl Memory, line: &mut Vec<u8, LINE_MAX>) -> bool {
+        line.clear();
+        let len = program::len(memory).unwrap_or(0);
+        let mut at = u16::from_le_bytes([self.at, self.piece]);
+        let mut found = false;
+        while let Some(byte) = program::byte(memory, len, at) {
+            at += 1;
+            found = true;
+            if byte == b'\n' {
+                break;
+            }
+            // Longer lines are not stored.
+            let _ = line.push(byte);
+        }
+        [self.at, self.piece] = at.to_le_bytes();
+        found
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::gcode::Interpreter;
     use crate::gcode::command::Commands;
     use crate::gcode::setup::Usual;
+    use crate::hal::imp::eeprom::Eeprom;
     use std::string::String;
 
     #[test]
     fn all_jobs_are_good_programs_but_for_what_they_show() {
         let mut lines = 0;
-        for number in 1..=u8::MAX {
+        for number in (1..=u8::MAX).filter(|number| *number != STORED) {
             let Some(mut job) = Job::new(number) else { continue };
             let (mut state, mut out) = (Interpreter::new(), Commands::default());
             let (mut last, mut line) = (String::new(), Vec::new());
-            while job.next_line(&mut line) {
+            while job.next_line(&Eeprom::take(), &mut line) {
                 assert!(line.len() < LINE_MAX, "{number}");
                 let done = state.interpret(&line, &Usual, &mut out);
                 last = String::from_utf8(line.to_vec()).unwrap();

@@ -4,12 +4,16 @@ use super::defaults::is_sure;
 use super::json::{Kind, Pair};
 use super::machine::{Machine, Warning};
 use super::pairs::Outcome;
+use super::program;
 use super::request::{Context, Request};
-use super::token::{Action, Target};
+use super::token::{Action, Subject, Target};
+use super::value::{Form, place_form};
 use super::write::Out;
 use crate::config::table;
 use crate::config::{Number, Setting};
+use crate::gcode::tables::Row;
 use crate::status::Status;
+use crate::units::Length;
 
 impl Request {
     pub(super) fn apply<M: Machine, O: Out>(
@@ -23,7 +27,13 @@ impl Request {
             (_, Kind::Object) | (Target::Group(_), _) => Err(Status::UnsupportedType),
             (Target::Token(token), Kind::Null) => Ok(Some(token)),
             (Target::Token(token), _) => {
-                self.set(token.setting().ok_or(Status::ReadOnly)?, pair, c)?;
+                match token.subject() {
+                    Some(Subject::Setting(setting)) => self.set(setting, pair, c)?,
+                    Some(Subject::Row(row, axis)) if !row.is_stored() => {
+                        set_row(row, axis, pair, c)?
+                    }
+                    _ => return Err(Status::ReadOnly),
+                }
                 Ok(Some(token))
             }
             (Target::Action(Action::Help), _) => self.advise(Warning::Help),
@@ -47,7 +57,11 @@ impl Request {
     ) -> Result<(), Status> {
         let small = match setting.row().kind {
             table::Kind::Small => true,
-            table::Kind::Large => false,
+            table::Kind::Large | table::Kind::Cold => false,
+            table::Kind::Data | table::Kind::Job => {
+                let value = bits(pair, c.line)?;
+                return c.machine.set(setting, value).map(|_| ());
+            }
             table::Kind::Constant | table::Kind::Text => return Err(Status::ReadOnly),
         };
         let number = match pair.kind {
@@ -67,6 +81,36 @@ impl Request {
         self.warning = self.warning.max(warning).max(unusual);
         Ok(())
     }
+}
+
+/// The value of a pair as 32 bits: `"0x2a"`.
+fn bits(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
+    if !matches!(pair.kind, Kind::Text | Kind::Number) {
+        return Err(Status::UnsupportedType);
+    }
+    let digits = match pair.value.of(line) {
+        [b'0', b'x' | b'X', digits @ ..] if (1..=8).contains(&digits.len()) => digits,
+        _ => return Err(Status::BadNumber),
+    };
+    let digit = |bits: u32, byte: &u8| Some(bits << 4 | char::from(*byte).to_digit(16)?);
+    let bits = digits.iter().try_fold(0, digit).ok_or(Status::BadNumber)?;
+    Ok(bits.cast_signed())
+}
+
+/// Sets a value of the interpreter's tables.
+fn set_row<M: Machine, O>(
+    row: Row,
+    axis: u8,
+    pair: &Pair,
+    c: &mut Context<'_, M, O>,
+) -> Result<(), Status> {
+    if pair.kind != Kind::Number {
+        return Err(Status::UnsupportedType);
+    }
+    let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
+    let inches = c.machine.inches() && place_form(axis) == Form::Length;
+    let value = number.fixed(Length::DECIMALS, inches).ok_or(Status::OutOfRange)?;
+    c.machine.set_row(row, axis, Length(value))
 }
 
 fn done(status: Status) -> Result<(), Status> {
@@ -102,6 +146,7 @@ fn act<M: Machine, O>(
             return done(c.machine.start_job(number));
         }
         Action::Text if pair.kind != Kind::Null => return Err(Status::UnsupportedType),
+        Action::Program => return program::store(pair, c),
         Action::Flush => {
             let sure = is_sure(pair, c)?;
             return if sure { done(c.machine.flush()) } else { Ok(()) };

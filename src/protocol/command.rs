@@ -37,6 +37,10 @@ impl Request {
             Target::Action(Action::Exception) => self.fail(Status::ExceptionReport, Mode::Text),
             Target::Action(Action::Help) => self.help(help::SETTINGS),
             Target::Action(Action::Test) if null => self.help(help::TESTS),
+            Target::Action(Action::Program) if null => {
+                self.item = 0;
+                self.phase = Phase::Program;
+            }
             Target::Action(Action::Defaults) if null => self.help(help::DEFAULTS),
             Target::Action(Action::Boot) if null => self.help(help::BOOT),
             _ => self.execute(&pair, target, c),
@@ -51,15 +55,14 @@ impl Request {
     ) {
         match self.apply(pair, target, c) {
             Ok(Some(token)) => {
-                self.at = token.number();
-                self.item = 0;
-                self.phase = Phase::One;
+                self.enlist(Some(Group::One(token)), None);
             }
             Ok(None) => {
                 // The defaults have a status of their own, which is for JSON.
                 self.status = Status::Ok;
                 self.phase = Phase::Prompt;
             }
+            Err(Status::Again) => self.waits = true,
             Err(status) => self.fail(status, Mode::Text),
         }
     }

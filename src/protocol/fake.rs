@@ -1,8 +1,13 @@
 //! A machine for tests, and the caller that steps requests for it.
 
-use super::{CHUNK, Checksum, Machine, Mode, Next, Out, Request, StatusReport, Value, Warning};
+use super::{
+    CHUNK, Checksum, Machine, Mode, Next, Out, Request, StatusReport, Store, Value, Warning,
+};
 use crate::config::{Setting, Settings};
+use crate::gcode::tables::Row;
 use crate::status::Status;
+use crate::units::Length;
+use std::collections::HashMap;
 use std::string::String;
 use std::vec::Vec;
 
@@ -15,6 +20,13 @@ pub struct Fake {
     pub line: i32,
     pub powered: [bool; 4],
     pub state: i32,
+    /// Values of the interpreter's tables.
+    pub rows: HashMap<(u8, u8), i32>,
+    /// Settings that are in EEPROM.
+    pub cold: HashMap<u8, i32>,
+    /// The program that is kept.
+    pub program: Vec<u8>,
+    waits: bool,
     /// What a block of G-code is answered with, and the blocks that were run.
     pub outcome: Status,
     pub blocks: Vec<String>,
@@ -31,6 +43,10 @@ impl Fake {
             line: 0,
             powered: [false; 4],
             state: 1,
+            rows: HashMap::new(),
+            cold: HashMap::new(),
+            program: Vec::new(),
+            waits: false,
             outcome: Status::Ok,
             blocks: Vec::new(),
         }
@@ -52,6 +68,7 @@ impl Fake {
             answer.extend(chunk.bytes);
             match next {
                 Next::More => {}
+                Next::Wait => assert!(self.waits),
                 Next::Gcode { start, end } => {
                     assert!(answer.is_empty(), "a response has begun before its block has run");
                     let block = &line[usize::from(start)..usize::from(end)];
@@ -101,14 +118,34 @@ impl Machine for Fake {
         &self.settings
     }
 
+    fn cold(&mut self, setting: Setting) -> i32 {
+        self.cold.get(&setting.number()).copied().unwrap_or_else(|| setting.default_value())
+    }
+
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
+        if setting.is_cold() {
+            self.cold.insert(setting.number(), value);
+        }
         self.settings.store(setting, value);
         let lowered = self.settings.limit_velocity(setting, |_| 40_000);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 
+    fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {
+        // Every other time, as if another row were on its way.
+        self.waits = !self.waits;
+        if self.waits {
+            return Err(Status::Again);
+        }
+        self.rows.insert((row.number(), axis), value.0);
+        Ok(())
+    }
+
     fn value(&mut self, value: Value) -> i32 {
         match value {
+            Value::Row(row, axis) => {
+                self.rows.get(&(row.number(), axis)).copied().unwrap_or_default()
+            }
             Value::Units => i32::from(!self.inches),
             Value::State => self.state,
             Value::Coordinates | Value::FeedMode => 1,
@@ -132,6 +169,7 @@ impl Machine for Fake {
             return Status::NotAccepted;
         }
         self.settings.set_defaults();
+        self.cold.clear();
         self.report.restore();
         Status::Ok
     }
@@ -146,6 +184,21 @@ impl Machine for Fake {
 
     fn start_job(&mut self, number: u8) -> Status {
         if number < 20 { Status::Ok } else { Status::Error }
+    }
+
+    fn store(&mut self, what: Store<'_>) -> Result<(), Status> {
+        self.waits = !self.waits;
+        match what {
+            _ if self.waits => return Err(Status::Again),
+            Store::Begin => self.program.clear(),
+            Store::Line(line) => self.program.extend([line, b"\n"].concat()),
+            Store::End => {}
+        }
+        Ok(())
+    }
+
+    fn program(&mut self, at: u16) -> Option<u8> {
+        self.program.get(usize::from(at)).copied()
     }
 
     fn restart(&mut self, boot: bool) -> Status {

@@ -9,7 +9,7 @@ use crate::progmem::Text;
 use crate::text;
 
 /// Lines of [`SCREENS`]; a screen is some of them.
-const LINES: usize = 58;
+const LINES: usize = 59;
 /// What `h` shows.
 pub const GENERAL: Span = Span { start: 0, end: 17 };
 /// What `$h` shows.
@@ -17,9 +17,9 @@ pub const SETTINGS: Span = Span { start: 17, end: 32 };
 /// What `$defa` shows.
 pub const DEFAULTS: Span = Span { start: 32, end: 37 };
 /// What `$test` shows.
-pub const TESTS: Span = Span { start: 37, end: 53 };
+pub const TESTS: Span = Span { start: 37, end: 54 };
 /// What `$boot` shows.
-pub const BOOT: Span = Span { start: 53, end: LINES as u8 };
+pub const BOOT: Span = Span { start: 54, end: LINES as u8 };
 
 progmem! {
     static SCREENS: [Text; LINES] = [
@@ -47,7 +47,7 @@ progmem! {
         text!("  $1        settings of a motor: 1 2 3 4"),
         text!("  $sys      settings of the machine; $ does so too"),
         text!("  $m $q     all motors, all axes"),
-        text!("  $o        offsets in force"),
+        text!("  $o        offsets, stored positions; $tt1 a tool"),
         text!("  $$        everything"),
         text!("  $xvm      one setting, here: x velocity maximum"),
         text!("  $posx     one value, here: where x is"),
@@ -79,6 +79,7 @@ progmem! {
         text!("  $test=13  offsets"),
         text!("  $test=51  braid: 2,500 short moves"),
         text!("  $test=0   ends the job that runs"),
+        text!("  $test=100 your own: $prog=f, $prog=G0 X1, ..., $prog=t"),
 
         text!("### Kerf Boot Loader Help ###"),
         text!("  $boot=1   starts the boot loader of the board"),

@@ -10,12 +10,14 @@
 
 use super::json::Span;
 use super::machine::Machine;
+use super::place::Place;
 use super::request::{Context, Phase, Request};
 use super::screen::Label;
 use super::token::{Group, Shown, Token};
 use super::write::{Out, Writer};
 use crate::config::table::{MODE, RADIUS};
 use crate::config::{Fixed, Owner, Setting, Words};
+use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::text;
@@ -26,6 +28,8 @@ const PARTS: u8 = 3;
 const TITLE_START: usize = 6;
 /// Where the integer part of a number ends.
 const UNITS_END: usize = 35;
+/// Counts of the group `p1` end so much behind that, below the decimals of the others.
+const PWM_SHIFT: usize = 4;
 
 progmem! {
     static MODES: [Text; 4] = [
@@ -44,13 +48,13 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// What a letter stands for: `$` all settings, `m` motors, `q` axes, `o` offsets.
+    /// What a letter stands for: `$` all but tools, `m` motors, `q` axes, `o` offsets.
     pub fn of_letter(letter: u8) -> Option<Series> {
         let (first, end) = match letter {
-            b'$' => (0, 11),
+            b'$' => (0, 24),
             b'm' => (1, 5),
             b'q' => (5, 11),
-            b'o' => (11, 13),
+            b'o' => (12, 26),
             _ => return None,
         };
         Some(Series { first, end })
@@ -62,7 +66,11 @@ impl Series {
             0 => Group::Settings(Owner::System),
             1..5 => Group::Settings(Owner::Motor(number - 1)),
             5..11 => Group::Settings(Owner::Axis(number - 5)),
-            11 => Group::OFFSETS,
+            11 => Group::Settings(Owner::Pwm),
+            12..21 => Group::Row(Row::system(number - 12)),
+            21 => Group::SHIFT,
+            22 | 23 => Group::Row(Row::stored(number - 22)),
+            24 => Group::OFFSETS,
             _ => Group::TOOL_OFFSETS,
         }
     }
@@ -97,17 +105,6 @@ impl Request {
             self.phase = Phase::Prompt;
         }
     }
-
-    /// A part of the line of one token, the one whose number is in `at`.
-    pub(super) fn one<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        let token = Token::of_number(self.at);
-        put_part(token, self.item, c.machine, &mut Writer::body(c.out, &mut self.format));
-        self.item += 1;
-        if self.item == PARTS {
-            self.item = 0;
-            self.phase = Phase::Prompt;
-        }
-    }
 }
 
 /// What `token` is, its value, and what comes behind that.
@@ -118,6 +115,13 @@ fn put_part<M: Machine, O: Out>(
     machine: &mut M,
     writer: &mut Writer<'_, O>,
 ) {
+    if let Some(place) = Place::of(token) {
+        return match part {
+            0 => place.title(writer),
+            1 => put_number(place.value(machine), UNITS_END - place.title_end(), writer),
+            _ => place.unit(machine, writer),
+        };
+    }
     let setting = token.setting();
     match (setting.and_then(|setting| Some((setting, setting.words()?))), part) {
         (None, 0) => Label::of(token).write(token, writer),
@@ -139,7 +143,7 @@ fn title_start(setting: Setting) -> usize {
 /// The length of what tells whose a setting is: `m1 `, `x `.
 fn owner_len(setting: Setting) -> usize {
     match setting.owner() {
-        Owner::System => 0,
+        Owner::System | Owner::Pwm | Owner::User(_) | Owner::Job => 0,
         Owner::Motor(_) => 3,
         Owner::Axis(_) => 2,
     }
@@ -154,7 +158,7 @@ fn put_title<O: Out>(setting: Setting, words: &Words, writer: &mut Writer<'_, O>
     if let Owner::Motor(_) = setting.owner() {
         writer.byte(b'm');
     }
-    if setting.owner() != Owner::System {
+    if matches!(setting.owner(), Owner::Motor(_) | Owner::Axis(_)) {
         writer.byte(name.first());
         writer.byte(b' ');
     }
@@ -176,10 +180,17 @@ fn put_value<M: Machine, O: Out>(
             writer.blanks(width.saturating_sub(1));
             writer.text(text);
         }
+        (Shown::Data(bits), _) => {
+            writer.blanks(width.saturating_sub(1));
+            writer.bits(bits);
+        }
+        (Shown::Number(fixed), None) if setting.owner() == Owner::Pwm && fixed.decimals == 0 => {
+            put_number(fixed, width + PWM_SHIFT, writer);
+        }
         (Shown::Number(fixed), None) => put_number(fixed, width, writer),
         (Shown::Number(_), Some(decimals)) => {
-            let inches = machine.inches();
-            let fixed = machine.settings().show_as(setting, inches, decimals);
+            let (inches, value) = (machine.inches(), machine.setting(setting));
+            let fixed = machine.settings().show_as(setting, value, inches, decimals);
             put_number(fixed.padded(decimals), width, writer);
         }
     }

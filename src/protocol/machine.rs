@@ -3,10 +3,12 @@
 use super::report::StatusReport;
 use super::value::Value;
 use crate::config::{Setting, Settings};
+use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::status::Status;
 use crate::text;
+use crate::units::Length;
 
 /// What is told beside what has been done; the last one counts most.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
@@ -57,12 +59,33 @@ progmem! {
     ];
 }
 
+/// What is done to the program that is kept.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Store<'a> {
+    /// A new one begins; the old one is gone.
+    Begin,
+    /// A line of it.
+    Line(&'a [u8]),
+    /// It is complete.
+    End,
+}
+
 /// The machine behind the protocol. Nothing here waits.
 pub trait Machine {
     /// The settings in force.
     fn settings(&self) -> &Settings;
-    /// Stores a value that [`Settings::check`] returned and lets it take effect, or refuses it.
+    /// The value of a setting that is in EEPROM alone: up to 2 ms.
+    fn cold(&mut self, setting: Setting) -> i32;
+    /// The value of any setting.
+    fn setting(&mut self, setting: Setting) -> i32 {
+        if setting.is_cold() { self.cold(setting) } else { self.settings().get(setting) }
+    }
+    /// Stores a value that [`Settings::check`] returned and lets it take effect, or refuses it. [`Status::Again`] as of
+    /// [`Self::set_row`].
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status>;
+    /// Sets a value of the interpreter's tables. [`Status::Again`]: nothing is done, and it is to be tried again when
+    /// the tables are ready.
+    fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status>;
     /// A value now, in the unit that [`Value`] states.
     fn value(&mut self, value: Value) -> i32;
     /// What status reports hold.
@@ -75,6 +98,10 @@ pub trait Machine {
     fn flush(&mut self) -> Status;
     /// Starts a built-in job, or ends the one that runs: 0.
     fn start_job(&mut self, number: u8) -> Status;
+    /// Does something to the program that is kept. [`Status::Again`]: it is not done yet, and is to be asked for again.
+    fn store(&mut self, what: Store<'_>) -> Result<(), Status>;
+    /// A byte of the program that is kept.
+    fn program(&mut self, at: u16) -> Option<u8>;
     /// Starts the machine anew when the response has left, in its boot loader if `boot`, for which it has to be at
     /// rest.
     fn restart(&mut self, boot: bool) -> Status;

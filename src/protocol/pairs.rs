@@ -20,7 +20,6 @@ impl Request {
             self.phase = Phase::Warning;
             return;
         };
-        self.at = pair.next;
         let target = resolve(Name::new(), pair.name.of(c.line));
         match (target, pair.kind) {
             (Target::Group(group), Kind::Null) => self.enter(group, &pair, Phase::List, c),
@@ -34,11 +33,12 @@ impl Request {
                 self.block = pair.value;
                 self.phase = Phase::Gcode;
             }
+            (Target::Action(Action::Program), Kind::Null) => self.show_program(&pair, c),
             (Target::Action(Action::Text), Kind::Text) => {
-                if let Err(status) = self.wrap(&pair, c) {
-                    self.open(c);
-                    self.refuse_pair(&pair, target, status, c);
-                }
+                self.at = pair.next;
+                let Err(status) = self.wrap(&pair, c) else { return };
+                self.open(c);
+                self.refuse_pair(&pair, target, status, c);
             }
             (Target::Action(Action::Message), Kind::Text) => self.give_string(&pair, c),
             // It is told when everything else has been, so that a block may still be run.
@@ -53,8 +53,10 @@ impl Request {
                 self.item = 0;
                 self.phase = Phase::Raise;
             }
-            _ => self.carry_out(&pair, target, c),
+            // It goes on by itself: a pair may have to wait.
+            _ => return self.carry_out(&pair, target, c),
         }
+        self.at = pair.next;
     }
 
     /// A part of an exception report that was asked for; then the response.
@@ -83,6 +85,7 @@ impl Request {
         let mut writer = Writer::body(c.out, &mut self.format);
         writer.key(pair.name.of(c.line));
         writer.open();
+        self.at = pair.next;
         self.group = Some(group);
         self.item = 0;
         self.phase = phase;
@@ -101,7 +104,6 @@ impl Request {
             self.at = json::behind_object(c.line, self.at);
             return self.leave(c);
         };
-        self.at = pair.next;
         let prefix = self.group.map_or(Name::new(), Group::prefix);
         let target = match resolve(prefix, pair.name.of(c.line)) {
             // A group has no groups, and no strings, in it.
@@ -138,14 +140,15 @@ impl Request {
         };
         self.at = pair.next;
         let Target::Token(token) = resolve(Name::new(), pair.name.of(c.line)) else { return };
-        if pair.kind != Kind::True {
+        let (Some(number), Kind::True) = (token.small(), pair.kind) else { return };
+        if token.is_far() {
             return;
         }
         let report = c.machine.report();
         if !core::mem::replace(&mut self.selected, true) {
             report.clear();
         }
-        if !report.add(token) {
+        if !report.add(number) {
             self.status = Status::JsonTooManyPairs;
         }
     }
@@ -173,6 +176,12 @@ impl Request {
         c: &mut Context<'_, M, O>,
     ) {
         let outcome = self.apply(pair, target, c);
+        if outcome == Err(Status::Again) {
+            // From its beginning, later.
+            self.waits = true;
+            return;
+        }
+        self.at = pair.next;
         self.open(c);
         match outcome {
             Ok(Some(token)) => {

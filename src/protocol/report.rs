@@ -19,7 +19,8 @@ pub const LONGEST_REPORT: usize = 38;
 
 /// The status report: its tokens, in order, and the value of each as last sent.
 pub struct StatusReport {
-    tokens: [Token; LONGEST_REPORT],
+    /// By their small numbers.
+    tokens: [u8; LONGEST_REPORT],
     sent: [i32; LONGEST_REPORT],
     len: u8,
     /// The list is new: what was sent means nothing.
@@ -36,7 +37,7 @@ impl StatusReport {
     /// The default list.
     pub fn new() -> StatusReport {
         let mut report = StatusReport {
-            tokens: [Token::system(0); LONGEST_REPORT],
+            tokens: [0; LONGEST_REPORT],
             sent: [0; LONGEST_REPORT],
             len: 0,
             fresh: true,
@@ -48,14 +49,19 @@ impl StatusReport {
     /// Makes it the default list again.
     pub fn restore(&mut self) {
         let first = DEFAULT_TOKENS.get();
-        self.tokens.iter_mut().zip(first).for_each(|(to, token)| *to = token);
+        let numbers = first.iter().filter_map(|token| token.small());
+        self.tokens.iter_mut().zip(numbers).for_each(|(to, number)| *to = number);
         self.len = DEFAULT_REPORT as u8;
         self.fresh = true;
     }
 
     /// Entry `index`.
     pub fn token(&self, index: u8) -> Option<Token> {
-        self.tokens.get(..usize::from(self.len))?.get(usize::from(index)).copied()
+        self.tokens
+            .get(..usize::from(self.len))?
+            .get(usize::from(index))
+            .copied()
+            .map(Token::of_small)
     }
 
     /// Empties the list.
@@ -64,13 +70,13 @@ impl StatusReport {
         self.fresh = true;
     }
 
-    /// Adds a token behind the others, once. Whether there was room.
-    pub fn add(&mut self, token: Token) -> bool {
-        if self.tokens.iter().take(usize::from(self.len)).any(|&t| t == token) {
+    /// Adds a token behind the others, once, by its small number. Whether there was room.
+    pub fn add(&mut self, number: u8) -> bool {
+        if self.tokens.iter().take(usize::from(self.len)).any(|&t| t == number) {
             return true;
         }
         match self.tokens.get_mut(usize::from(self.len)) {
-            Some(place) => *place = token,
+            Some(place) => *place = number,
             None => return false,
         }
         self.len += 1;
@@ -120,6 +126,7 @@ impl Report {
         let shown = token.read(machine);
         let value = match shown {
             Shown::Number(fixed) => fixed.value,
+            Shown::Data(bits) => bits,
             Shown::Text(_) => 0,
         };
         let changed = machine.report().note(self.index, value);

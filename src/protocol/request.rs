@@ -16,6 +16,7 @@
 //!   ? -> Listing ---+-> Prompt -> (Failure -> Complaint) -> Message
 //!   $ -> Command -> Listing, One or Help -> Prompt
 //!   defa: Pair -> Greeting -> Pair      er: Pair -> Raise -> Warning      msg: Pair -> Quote -> Pair
+//!   prog: Pair -> Program -> Pair, Command -> Program -> Prompt
 //!   txt: Pair -> as ? and $ -> Prompt -> Pair, or Pair -> Gcode
 //! ```
 
@@ -39,6 +40,8 @@ pub enum Next {
         /// The byte behind it.
         end: u8,
     },
+    /// What is to be changed is still on its way to memory: step again later.
+    Wait,
     /// The response is complete.
     Done(Status),
 }
@@ -75,10 +78,10 @@ pub(super) enum Phase {
     Command,
     /// Groups in text.
     Listing,
-    /// One setting or value in text.
-    One,
     /// Help in text.
     Help,
+    /// The program that is kept.
+    Program,
     /// The defaults have been restored: tell who we are.
     Greeting,
     /// An exception report that was asked for.
@@ -123,6 +126,8 @@ pub struct Request {
     pub(super) warning: Warning,
     /// Of the phase `Select`: something has been selected.
     pub(super) selected: bool,
+    /// What the last step was to do has to wait.
+    pub(super) waits: bool,
     /// The line has a `tid`, which is told at the end.
     pub(super) identified: bool,
 }
@@ -233,6 +238,7 @@ impl Request {
             commented: true,
             warning: Warning::None,
             selected: false,
+            waits: false,
             identified: false,
         }
     }
@@ -284,7 +290,7 @@ impl Request {
             Phase::Wrap => self.wrap_line(context),
             Phase::Command => self.command(context),
             Phase::Listing => self.listing(context),
-            Phase::One => self.one(context),
+            Phase::Program => self.program(context),
             Phase::Help => self.help_line(context),
             Phase::Greeting => self.greeting(context),
             Phase::Raise => self.raise(context),
@@ -294,7 +300,16 @@ impl Request {
             Phase::Complaint => self.complaint(context),
             Phase::Done => return Next::Done(self.status),
         }
-        if self.phase == Phase::Done { Next::Done(self.status) } else { Next::More }
+        match self.phase {
+            _ if core::mem::take(&mut self.waits) => Next::Wait,
+            Phase::Done => Next::Done(self.status),
+            _ => Next::More,
+        }
+    }
+
+    /// Whether something of the response has been put.
+    pub fn has_begun(&self) -> bool {
+        self.begun
     }
 
     /// Begins the response, if it has not begun.

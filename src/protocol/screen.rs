@@ -69,6 +69,10 @@ impl Label {
                 let end = if fixed.decimals == 0 { COUNT_END } else { DECIMALS_END };
                 writer.aligned(fixed, end.saturating_sub(len));
             }
+            (None, Shown::Data(bits)) => {
+                writer.blanks(TEXT_START.saturating_sub(len));
+                writer.bits(bits);
+            }
             (None, Shown::Text(text)) => {
                 writer.blanks(TEXT_START.saturating_sub(len));
                 writer.text(text);

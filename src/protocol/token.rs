@@ -2,11 +2,14 @@
 
 use super::machine::Machine;
 use super::value::{
-    Form, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value, Vector, vector_value,
+    Form, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value, Vector, place_form,
+    vector_value,
 };
 use crate::config::name::{Name, axis_letter, axis_of};
+use crate::config::rows::{find_row, row_name, value_name};
 use crate::config::table::Kind;
 use crate::config::{Fixed, Owner, Setting};
+use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::text;
@@ -15,9 +18,12 @@ use crate::units::AXES;
 const FIRST_SINGLE: u8 = Setting::NUMBERS;
 const FIRST_VECTOR: u8 = FIRST_SINGLE + SINGLE_COUNT as u8;
 
-/// A setting or a value, in one byte.
+/// The first value of the interpreter's tables. Those below it fit one byte.
+const FIRST_ROW: u16 = 256;
+
+/// A setting or a value, as a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Token(u8);
+pub struct Token(u16);
 
 /// What a token is.
 pub enum Subject {
@@ -27,6 +33,8 @@ pub enum Subject {
     Single(Single),
     /// A member of a vector: the vector's number, the vector, the member's number.
     Member(u8, Vector, u8),
+    /// A value of the interpreter's tables.
+    Row(Row, u8),
 }
 
 /// A token's value, ready to be written.
@@ -36,42 +44,57 @@ pub enum Shown {
     Number(Fixed),
     /// A string.
     Text(Text),
+    /// 32 bits.
+    Data(i32),
 }
 
 impl Token {
     /// The token of row `row` of the group `sys`.
     pub const fn system(row: u8) -> Token {
-        Token(row)
+        Token(row as u16)
     }
 
-    /// Its number.
-    pub const fn number(self) -> u8 {
-        self.0
+    /// Whether it is in EEPROM alone, too far away to be told all the time.
+    pub fn is_far(self) -> bool {
+        self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
     }
 
-    /// The token of a number that [`Token::number`] returned.
-    pub const fn of_number(number: u8) -> Token {
-        Token(number)
+    /// Its number, if it fits.
+    pub fn small(self) -> Option<u8> {
+        self.0.try_into().ok()
+    }
+
+    /// The token of a number that [`Token::small`] returned.
+    pub const fn of_small(number: u8) -> Token {
+        Token(number as u16)
     }
 
     /// The token of a value in the table of [`SINGLES`].
     const fn single(index: u8) -> Token {
-        Token(FIRST_SINGLE + index)
+        Token((FIRST_SINGLE + index) as u16)
     }
 
     /// The token of a vector's member.
     const fn member(vector: u8, index: u8) -> Token {
-        Token(FIRST_VECTOR + vector * AXES as u8 + index)
+        Token((FIRST_VECTOR + vector * AXES as u8 + index) as u16)
+    }
+
+    /// The token of a value of a row.
+    fn row(row: Row, axis: u8) -> Token {
+        Token(FIRST_ROW + u16::from(row.number()) * AXES as u16 + u16::from(axis))
     }
 
     /// The setting or value called `name`. Up to 20,000 cycles on AVR.
     pub fn find(name: &Name) -> Option<Token> {
-        let setting = || Setting::find(name).map(|s| Token(s.number()));
+        let setting = || Setting::find(name).map(|s| Token::of_small(s.number()));
         let single = || {
             let found = |i: &usize| SINGLES.at(*i).is_some_and(|s| name.matches(0, s.token));
             (0..SINGLE_COUNT).find(found).map(|i| Token::single(i as u8))
         };
-        single().or_else(|| Token::find_member(name)).or_else(setting)
+        single()
+            .or_else(|| Token::find_member(name))
+            .or_else(|| Token::find_row(name))
+            .or_else(setting)
     }
 
     fn find_member(name: &Name) -> Option<Token> {
@@ -86,26 +109,33 @@ impl Token {
         (index < vector.members).then(|| Token::member(number, index))
     }
 
-    /// What it is.
-    pub fn subject(self) -> Option<Subject> {
-        if self.0 < FIRST_SINGLE {
-            return Setting::from_number(self.0).map(Subject::Setting);
-        }
-        if self.0 < FIRST_VECTOR {
-            return SINGLES.at(usize::from(self.0 - FIRST_SINGLE)).map(Subject::Single);
-        }
-        let (number, index) = self.vector_index();
-        VECTORS.at(usize::from(number)).map(|vector| Subject::Member(number, vector, index))
+    #[inline(never)]
+    fn find_row(name: &Name) -> Option<Token> {
+        let (letter, row) = name.bytes().split_last()?;
+        let axis = axis_of(*letter)?;
+        let row = find_row(&Name::new().with(row)?)?;
+        row.has(axis).then(|| Token::row(row, axis))
     }
 
-    fn vector_index(self) -> (u8, u8) {
-        let offset = self.0 - FIRST_VECTOR;
-        (offset / AXES as u8, offset % AXES as u8)
+    /// What it is.
+    pub fn subject(self) -> Option<Subject> {
+        let Some(number) = self.small() else {
+            let (row, axis) = by_axis((self.0 - FIRST_ROW) as u8);
+            return Row::from_number(row).map(|row| Subject::Row(row, axis));
+        };
+        if number < FIRST_SINGLE {
+            return Setting::from_number(number).map(Subject::Setting);
+        }
+        if number < FIRST_VECTOR {
+            return SINGLES.at(usize::from(number - FIRST_SINGLE)).map(Subject::Single);
+        }
+        let (number, index) = by_axis(number - FIRST_VECTOR);
+        VECTORS.at(usize::from(number)).map(|vector| Subject::Member(number, vector, index))
     }
 
     /// The setting it is, if it is one.
     pub fn setting(self) -> Option<Setting> {
-        Setting::from_number(self.0)
+        self.small().and_then(Setting::from_number)
     }
 
     /// Its full name.
@@ -119,6 +149,7 @@ impl Token {
                 let group = Name::new().with_token(vector.token);
                 group.with(&[letter]).unwrap_or(group)
             }
+            Some(Subject::Row(row, axis)) => value_name(row, axis),
             None => Name::new(),
         }
     }
@@ -130,17 +161,27 @@ impl Token {
             Some(Subject::Setting(setting)) => {
                 return match setting.row().kind {
                     Kind::Text => Shown::Text(text!("0000-KERF")),
-                    _ => Shown::Number(machine.settings().show(setting, inches)),
+                    Kind::Data | Kind::Job => Shown::Data(machine.setting(setting)),
+                    _ => {
+                        let value = machine.setting(setting);
+                        Shown::Number(machine.settings().show(setting, value, inches))
+                    }
                 };
             }
             Some(Subject::Single(single)) => (single.value, single.form),
             Some(Subject::Member(number, vector, index)) => {
                 (vector_value(number, index), vector.form(index))
             }
+            Some(Subject::Row(row, axis)) => (Value::Row(row, axis), place_form(axis)),
             None => (Value::State, Form::Count),
         };
         Shown::Number(form.show(machine.value(value), inches))
     }
+}
+
+/// Which group of six, and which of it.
+fn by_axis(number: u8) -> (u8, u8) {
+    (number / AXES as u8, number % AXES as u8)
 }
 
 fn is_vector(name: &Name, vector: u8) -> bool {
@@ -158,13 +199,14 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [(Text, Action); 16] = [
+    static ACTIONS: [(Text, Action); 17] = [
         (text!("gc"), Action::Block),
         (text!("clear"), Action::Clear),
         (text!("clr"), Action::Clear),
         (text!("me"), Action::Energize),
         (text!("md"), Action::Release),
         (text!("test"), Action::Test),
+        (text!("prog"), Action::Program),
         (text!("qf"), Action::Flush),
         (text!("defa"), Action::Defaults),
         (text!("h"), Action::Help),
@@ -192,6 +234,8 @@ pub enum Action {
     Release,
     /// `test`: run a built-in job.
     Test,
+    /// `prog`: the program in EEPROM.
+    Program,
     /// `qf`: drop what is queued.
     Flush,
     /// `defa`: restore the defaults.
@@ -215,10 +259,14 @@ pub enum Action {
 /// Names that stand for several.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Group {
-    /// `sys`, `1` to `4`, `x` to `c`.
+    /// `sys`, `1` to `4`, `x` to `c`, `p1`, `uda` to `udd`, `jid`.
     Settings(Owner),
     /// `pos` and its like, by their number in [`VECTORS`].
     Vector(u8),
+    /// `g54`, `g28`, `tt1` and their like.
+    Row(Row),
+    /// A token alone.
+    One(Token),
     /// `sr`: the tokens of the status report.
     Report,
 }
@@ -228,6 +276,8 @@ impl Group {
     pub const OFFSETS: Group = Group::Vector(2);
     /// `tof`.
     pub const TOOL_OFFSETS: Group = Group::Vector(4);
+    /// `g92`.
+    pub const SHIFT: Group = Group::Vector(SHIFT);
 
     fn find(name: &Name) -> Option<Group> {
         if name.is(text!("sys")) {
@@ -236,10 +286,11 @@ impl Group {
         if name.is(text!("sr")) {
             return Some(Group::Report);
         }
-        if name.bytes().len() == 1 {
-            return Owner::of_letter(name.first()).map(Group::Settings);
+        if let Some(owner) = Owner::called(name) {
+            return Some(Group::Settings(owner));
         }
-        (0..VECTOR_COUNT as u8).find(|&v| is_vector(name, v)).map(Group::Vector)
+        let vector = (0..VECTOR_COUNT as u8).find(|&v| is_vector(name, v)).map(Group::Vector);
+        vector.or_else(|| find_row(name).map(Group::Row))
     }
 
     /// What comes before the names of its members.
@@ -249,7 +300,8 @@ impl Group {
             Group::Vector(number) => VECTORS
                 .at(usize::from(number))
                 .map_or(Name::new(), |vector| Name::new().with_token(vector.token)),
-            Group::Report => Name::new(),
+            Group::Row(row) => row_name(row),
+            Group::Report | Group::One(_) => Name::new(),
         }
     }
 
@@ -257,11 +309,16 @@ impl Group {
     pub fn member(self, from: u8, machine: &mut impl Machine) -> Option<(u8, Token)> {
         match self {
             Group::Settings(owner) => (from..owner.rows())
-                .find_map(|row| Some((row, Token(Setting::of(owner, row)?.number())))),
+                .find_map(|row| Some((row, Token::of_small(Setting::of(owner, row)?.number())))),
             Group::Vector(number) => {
                 let members = VECTORS.at(usize::from(number))?.members;
                 (from < members).then(|| (from, Token::member(number, from)))
             }
+            Group::Row(row) => {
+                let axis = (from..AXES as u8).find(|&axis| row.has(axis))?;
+                Some((axis, Token::row(row, axis)))
+            }
+            Group::One(token) => (from == 0).then_some((0, token)),
             Group::Report => machine.report().token(from).map(|token| (from, token)),
         }
     }
@@ -272,8 +329,8 @@ impl Group {
 #[cfg(not(target_arch = "avr"))]
 pub fn names() -> std::vec::Vec<std::string::String> {
     let text = |bytes: &[u8]| std::string::String::from_utf8_lossy(bytes).into_owned();
-    let tokens =
-        (0..=u8::MAX).map(Token).filter(|token| Token::find(&token.name()) == Some(*token));
+    let tokens = (0..FIRST_ROW + u16::from(crate::gcode::tables::ROWS) * AXES as u16).map(Token);
+    let tokens = tokens.filter(|token| Token::find(&token.name()) == Some(*token));
     let actions = ACTIONS.get().map(|(name, _)| name.bytes().map(char::from).collect());
     tokens.map(|token| text(token.name().bytes())).chain(actions).collect()
 }

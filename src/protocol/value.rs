@@ -2,6 +2,7 @@
 
 use crate::config::Fixed;
 use crate::config::name::token;
+use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::text;
@@ -80,6 +81,10 @@ pub enum Value {
     ToolOffset(u8),
     /// `homx` and so on: 1 if the axis is homed.
     Homed(u8),
+    /// `g92x` and so on: G92, in force or not, in units of a `Length`.
+    Shift(u8),
+    /// `g54x`, `g28x`, `tt1z` and so on: a value of the interpreter's tables, in units of a `Length`.
+    Row(Row, u8),
     /// `pwr1` and so on: 1 if the motor is powered.
     Powered(u8),
 }
@@ -116,6 +121,11 @@ impl Form {
     }
 }
 
+/// How a place on an axis is shown: an angle never in inches.
+pub fn place_form(axis: u8) -> Form {
+    if usize::from(axis) < FIRST_ROTARY { Form::Length } else { Form::Millimetres }
+}
+
 /// A value with a name of its own.
 #[derive(Clone, Copy)]
 pub struct Single {
@@ -147,15 +157,16 @@ pub struct Vector {
 impl Vector {
     /// How member `index` is shown: an angle never in inches.
     pub fn form(&self, index: u8) -> Form {
-        let rotary = usize::from(index) >= FIRST_ROTARY;
-        if rotary && self.form == Form::Length { Form::Millimetres } else { self.form }
+        if self.form == Form::Length { place_form(index) } else { self.form }
     }
 }
 
 /// Entries of [`SINGLES`].
 pub const SINGLE_COUNT: usize = 28;
 /// Entries of [`VECTORS`].
-pub const VECTOR_COUNT: usize = 6;
+pub const VECTOR_COUNT: usize = 7;
+/// The number of the vector `g92`.
+pub const SHIFT: u8 = 5;
 
 const NONE: Text = text!("");
 const LINE: Text = text!("Line number:");
@@ -235,6 +246,7 @@ progmem! {
         vector("ofs", Form::Millimetres, 6, text!(" work offset:")),
         vector("hom", Form::Count, 6, text!(" axis homing state:")),
         vector("tof", Form::Millimetres, 6, text!(" tool length:")),
+        vector("g92", Form::Length, 6, NONE),
         vector("pwr", Form::Count, 4, NONE),
     ];
 }
@@ -247,6 +259,7 @@ pub fn vector_value(vector: u8, index: u8) -> Value {
         2 => Value::Offset(index),
         3 => Value::Homed(index),
         4 => Value::ToolOffset(index),
+        SHIFT => Value::Shift(index),
         _ => Value::Powered(index),
     }
 }

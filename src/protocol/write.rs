@@ -200,6 +200,24 @@ impl<'a, O: Out> Writer<'a, O> {
         match shown {
             Shown::Number(fixed) => self.fixed(fixed),
             Shown::Text(text) => self.string(text),
+            Shown::Data(bits) => {
+                self.byte(b'"');
+                self.bits(bits);
+                self.byte(b'"');
+            }
+        }
+    }
+
+    /// 32 bits: `0x2a`.
+    pub fn bits(&mut self, bits: i32) {
+        self.text(text!("0x"));
+        let mut begun = false;
+        for place in (0..8).rev() {
+            let digit = (bits >> (4 * place)) as u8 & 15;
+            begun |= digit != 0 || place == 0;
+            if begun {
+                self.byte(if digit < 10 { b'0' + digit } else { b'a' - 10 + digit });
+            }
         }
     }
 

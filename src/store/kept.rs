@@ -1,16 +1,16 @@
-//! Which settings are kept: all but constants and the rate of the line.
+//! Which settings are kept: all but constants, the rate of the line, and what senders say of their job.
 //!
-//! An [`Item`] is one of them. In memory its name stands for it; the numbers of items are of this firmware alone.
+//! Most are in RAM, too; the rest, which are seldom asked for, are found here ([`value`]). An [`Item`] is one of them. In memory its name stands for it; the numbers of items are of this firmware alone.
 
 use super::{Log, Memory, record};
 use crate::config::{Setting, Settings};
 
-/// A setting that is kept.
+/// A setting that is kept and in RAM.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Item(Setting);
 
 /// How many numbers there are; some settings have no item.
-pub const ITEMS: u8 = Setting::NUMBERS;
+pub const ITEMS: u8 = Setting::WARM;
 
 impl Item {
     /// The item of that number, if there is one.
@@ -21,7 +21,7 @@ impl Item {
     /// The key of its records.
     #[inline(never)]
     pub fn key(self) -> u16 {
-        record::key(self.0.name().bytes())
+        key(self.0)
     }
 
     /// What it is now, and what it is if it was never put away.
@@ -35,6 +35,18 @@ impl Item {
             settings.store(self.0, value);
         }
     }
+}
+
+/// The key of a setting's records.
+pub fn key(setting: Setting) -> u16 {
+    record::key(setting.name().bytes())
+}
+
+/// The value of a setting that is here alone: that which was put away, unless it could not have it; or its default.
+#[inline(never)]
+pub fn value<M: Memory>(log: &Log, memory: &M, setting: Setting) -> i32 {
+    let kept = log.newest(memory, key(setting)).filter(|value| setting.accepts(*value));
+    kept.unwrap_or_else(|| setting.default_value())
 }
 
 /// What stands for no item among the keys.
@@ -75,10 +87,11 @@ mod tests {
             assert_ne!(item.key(), NO_KEY, "{item:?}");
         }
         assert_eq!(keys.len(), 134);
-        for key in tables::tests::keys() {
+        let cold = (Setting::WARM..Setting::COLD).filter_map(Setting::from_number).map(key);
+        for key in tables::tests::keys().chain(cold) {
             assert_eq!(keys.insert(key, Item(Setting::from_number(0).unwrap())), None);
             assert_ne!(key, NO_KEY);
         }
-        assert_eq!(keys.len(), 134 + usize::from(ROWS) * AXES);
+        assert_eq!(keys.len(), 134 + usize::from(ROWS) * AXES + 10 + 16);
     }
 }

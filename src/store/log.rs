@@ -5,7 +5,7 @@
 //! its record is the newest of its item, it is written anew, into the gap. So each write of an item takes one
 //! record and as many others as have to make room: one and a half on average while half of the slots count.
 //!
-//! Cost on AVR: 70 cycles for each slot that was ever used, of 372: up to 31,000 for the newest records of a row of the
+//! Cost on AVR: 70 cycles for each slot that was ever used, of 290: up to 31,000 for the newest records of a row of the
 //! tables (`tests/sim/tests/interpreter.rs`).
 
 use super::Memory;
@@ -20,6 +20,8 @@ pub struct Log {
     next: u16,
     /// Slots that were ever used: those before this one.
     used: u16,
+    /// It has all of the memory.
+    wide: bool,
 }
 
 /// A record on its way to memory.
@@ -47,19 +49,18 @@ impl Log {
     pub fn open<M: Memory>(memory: &M) -> Self {
         let mut newest: Option<(u16, u16)> = None;
         let mut used = 0;
-        for slot in 0..slots::<M>() {
+        for slot in 0..M::SIZE / SIZE {
             let Some(record) = read(memory, slot) else { continue };
             used = slot + 1;
             if newest.is_none_or(|(_, number)| is_after(record.number, number)) {
                 newest = Some((slot, record.number));
             }
         }
-        match newest {
-            Some((slot, number)) => {
-                Self { gap: behind::<M>(slot), next: number.wrapping_add(1), used }
-            }
-            None => Self { gap: 0, next: 0, used },
+        let mut log = Self { gap: 0, next: 0, used, wide: used > M::LOG / SIZE };
+        if let Some((slot, number)) = newest {
+            (log.gap, log.next) = (log.behind::<M>(slot), number.wrapping_add(1));
         }
+        log
     }
 
     /// Whether memory holds something, but no record: another program's data, or rubbish. Cost on AVR: up to
@@ -104,21 +105,21 @@ impl Log {
     pub fn replay<M: Memory>(&self, memory: &M, mut each: impl FnMut(&Record)) {
         // What the gap holds is older than all others.
         let mut slot = self.gap;
-        for _ in 0..slots::<M>() {
+        for _ in 0..self.slots::<M>() {
             if let Some(record) = read(memory, slot) {
                 each(&record);
             }
-            slot = behind::<M>(slot);
+            slot = self.behind::<M>(slot);
         }
     }
 
     /// What to write next to put an item away, after `moved` records have been written to make room for it.
     pub fn put<M: Memory>(&mut self, memory: &M, key: u16, value: i32, moved: u16) -> Put {
-        let next_gap = behind::<M>(self.gap);
+        let next_gap = self.behind::<M>(self.gap);
         let last = Record { key, number: self.next, value };
         match read(memory, next_gap) {
             Some(record) if record.key != key && self.counts(memory, next_gap, record.key) => {
-                if moved >= slots::<M>() {
+                if moved >= self.slots::<M>() {
                     return Put::Full;
                 }
                 Put::Room(self.append::<M>(Record { number: self.next, ..record }))
@@ -127,9 +128,22 @@ impl Log {
         }
     }
 
+    /// Whether it has all of the memory: that of firmware without programs that has come so far.
+    pub fn is_wide(&self) -> bool {
+        self.wide
+    }
+
+    fn slots<M: Memory>(&self) -> u16 {
+        if self.wide { M::SIZE / SIZE } else { M::LOG / SIZE }
+    }
+
+    fn behind<M: Memory>(&self, slot: u16) -> u16 {
+        if slot + 1 == self.slots::<M>() { 0 } else { slot + 1 }
+    }
+
     fn append<M: Memory>(&mut self, record: Record) -> Write {
         let slot = self.gap;
-        self.gap = behind::<M>(slot);
+        self.gap = self.behind::<M>(slot);
         self.used = self.used.max(slot + 1);
         self.next = self.next.wrapping_add(1);
         Write { slot, bytes: record.bytes(), done: 0 }
@@ -137,7 +151,7 @@ impl Log {
 
     /// Whether the record in a slot is the newest of its item.
     fn counts<M: Memory>(&self, memory: &M, slot: u16, key: u16) -> bool {
-        let mut at = behind::<M>(slot);
+        let mut at = self.behind::<M>(slot);
         // Up to the gap are the newer ones.
         while at != self.gap {
             if at >= self.used {
@@ -147,7 +161,7 @@ impl Log {
             if key_at(memory, at * SIZE) == key && read(memory, at).is_some() {
                 return false;
             }
-            at = behind::<M>(at);
+            at = self.behind::<M>(at);
         }
         true
     }
@@ -220,14 +234,6 @@ impl Common {
     fn may_have(self, key: u16) -> bool {
         key & self.mask == self.bits
     }
-}
-
-fn slots<M: Memory>() -> u16 {
-    M::SIZE / SIZE
-}
-
-fn behind<M: Memory>(slot: u16) -> u16 {
-    if slot + 1 == slots::<M>() { 0 } else { slot + 1 }
 }
 
 /// Whether one number was given after another, less than 32,768 records apart.

@@ -7,12 +7,14 @@
 //! reset -> Log::open -> kept::load -> Settings
 //! a line that asks for a row -> Storage, else tables::row -> Log::find
 //! ```
-//! Settings are in RAM, too; the tables of the interpreter are here alone.
+//! Most settings are in RAM, too; the others (PWM, user data) and the tables of the interpreter are here alone.
 //!
 //! The EEPROM is a ring of records, each of which says what one item is ([`record`]); the newest record of an
 //! item counts. A new record goes into a slot that holds nothing of worth, and counts only when its last byte has
 //! been written: whenever power fails, an item is what it was or what it was to be. Writing goes round
 //! the ring, so that all cells wear alike; records that still count are moved out of the way.
+//!
+//! Behind the log is a program of the user's ([`program`]).
 //!
 //! Items are known by their names, not by their places in a table: firmware with more settings, or others,
 //! finds those that it knows and takes its defaults for the rest. An item that has its default and never had
@@ -20,6 +22,7 @@
 
 pub mod kept;
 pub mod log;
+pub mod program;
 pub mod record;
 pub mod tables;
 
@@ -29,6 +32,8 @@ pub use log::Log;
 pub trait Memory {
     /// How many bytes it has.
     const SIZE: u16;
+    /// How many of them, from the first, are the log's; the rest is for a program.
+    const LOG: u16 = Self::SIZE;
     /// The byte at an address; waits for a write under way.
     fn read(&self, at: u16) -> u8;
     /// Whether a byte is being written.

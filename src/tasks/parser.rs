@@ -6,6 +6,7 @@
 //! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
 //! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`].
 
+use embassy_time::Timer;
 use heapless::Vec;
 
 use super::hold::Flush;
@@ -15,6 +16,7 @@ use super::ports::{Chosen, Port};
 use super::tx::Tx;
 use super::view::View;
 use crate::hal::imp;
+use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::serial::USB;
 use crate::jobs::Job;
 use crate::protocol::{Ending, Mode, Next, Out, Request, Span, is_brief, put_brief, put_line_end};
@@ -83,7 +85,7 @@ fn is_free(links: &Links) -> bool {
 fn job_line(links: &Links) {
     let mut job = links.job.get();
     let mut line = Vec::new();
-    let status = match job.next_line(&mut line) {
+    let status = match job.next_line(&Eeprom::take(), &mut line) {
         true => interpret(links, &line, Usual::NotTried).0,
         false => Status::EndOfFile,
     };
@@ -203,6 +205,13 @@ async fn answer(links: &Links, port: &Port, id: LineId, request: &mut Request, e
         tx.room().await;
         match step(links, port, id, request, &mut tx) {
             Next::More => {}
+            // Of a response that has begun the rest is due.
+            Next::Wait if request.has_begun() => tables_ready(links).await,
+            Next::Wait => {
+                drop(tx);
+                tables_ready(links).await;
+                tx = port.tx.lock().await;
+            }
             Next::Gcode { start, end } => {
                 let block = Span { start, end };
                 while !ran(links, port, id, block, request) {
@@ -228,6 +237,14 @@ async fn answer(links: &Links, port: &Port, id: LineId, request: &mut Request, e
     drop(tx);
     if let Some(rate) = links.rate.take() {
         links.port(USB).tx.lock().await.set_rate(rate).await;
+    }
+}
+
+/// Waits until the tables take another change. A program that is being stored has only to be asked again.
+async fn tables_ready(links: &Links) {
+    Timer::after_ticks(1).await;
+    while links.storage.is_awaited() {
+        links.parser_wake.wait().await;
     }
 }
 

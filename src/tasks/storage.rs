@@ -1,12 +1,13 @@
 //! The storage task: puts away what has changed of the settings and tables, in the background.
 //!
 //! [`Storage`] is what it shares with the others: which settings to look at; the row of the tables that is on its way
-//! ([`Edit`]); and where the log is, for the interpreter finds all other rows there. The task writes the
+//! ([`Edit`]), and so a setting that is in EEPROM alone; and where the log is, for all other rows and such settings
+//! are found there. The task writes the
 //! EEPROM, a byte each 3.4 ms, and waits for it by the millisecond. Whatever changes while it is written is written
 //! again. One look costs up to 3 ms of thread mode on AVR. If power fails meanwhile, the items that it has not come to
 //! are what they were. When the EEPROM is full: status 34, once, and a row is what it was.
 //!
-//! There is room for one row. A line that changes another meanwhile is refused with [`Status::Again`]; the parser keeps it
+//! There is room for one row and one such setting. A line that changes another meanwhile is refused with [`Status::Again`]; the parser keeps it
 //! and is woken when the row has been put away, 0.3 s later at most unless the log is nearly full.
 
 use core::cell::Cell;
@@ -15,11 +16,14 @@ use embassy_time::Timer;
 
 use super::links::Links;
 use super::wake::Wake;
+use crate::config::Setting;
 use crate::gcode::tables::{Edit, Row, Tables};
 use crate::hal::imp::eeprom::Eeprom;
+use crate::protocol::Store;
 use crate::status::Status;
-use crate::store::kept::{ITEMS, Item};
+use crate::store::kept::{self, ITEMS, Item};
 use crate::store::log::Put;
+use crate::store::program::{self, Stored};
 use crate::store::{Log, Memory, tables};
 use crate::units::{Length, PerAxis};
 
@@ -31,6 +35,12 @@ pub struct Storage {
     to: Cell<u8>,
     /// The row that is on its way.
     edit: Cell<Option<Edit>>,
+    /// The setting in EEPROM alone that is on its way: its number, and its value.
+    cold: Cell<Option<(u8, i32)>>,
+    /// Such settings from this number on are to have their defaults.
+    forgotten: Cell<u8>,
+    /// How long the program is that is being stored, if one is.
+    program: Cell<Option<u16>>,
     /// A line waits until it has arrived.
     awaited: Cell<bool>,
     wake: Wake,
@@ -41,6 +51,8 @@ pub struct Storage {
 enum Work {
     /// The row.
     Edit,
+    /// The setting in EEPROM alone.
+    Cold,
     /// A setting.
     Item(u8),
 }
@@ -53,6 +65,9 @@ impl Storage {
             from: Cell::new(ITEMS),
             to: Cell::new(0),
             edit: Cell::new(None),
+            cold: Cell::new(None),
+            forgotten: Cell::new(Setting::COLD),
+            program: Cell::new(None),
             awaited: Cell::new(false),
             wake: Wake::default(),
         }
@@ -75,10 +90,87 @@ impl Storage {
         self.awaited.get()
     }
 
+    /// A value of a row. Cost as of [`Tables::row`].
+    #[inline(never)]
+    pub fn value(&self, row: Row, axis: u8) -> Length {
+        match self.edit.get() {
+            Some(edit) if edit.row == row => {
+                edit.values.get(usize::from(axis)).copied().unwrap_or_default()
+            }
+            _ => tables::value(&self.log.get(), &Eeprom::take(), row, axis),
+        }
+    }
+
+    /// A setting that is in EEPROM alone.
+    #[inline(never)]
+    pub fn cold(&self, setting: Setting) -> i32 {
+        match self.cold.get() {
+            Some((number, value)) if number == setting.number() => value,
+            _ if setting.number() >= self.forgotten.get() => setting.default_value(),
+            _ => kept::value(&self.log.get(), &Eeprom::take(), setting),
+        }
+    }
+
+    /// Takes a new value of one, if there is room; else it is to be tried again.
+    pub fn set_cold(&self, setting: Setting, value: i32) -> Result<(), Status> {
+        let takes = match self.cold.get() {
+            Some((number, _)) => number == setting.number(),
+            None => setting.number() < self.forgotten.get(),
+        };
+        self.awaited.set(!takes);
+        if !takes {
+            return Err(Status::Again);
+        }
+        self.cold.set(Some((setting.number(), value)));
+        self.wake.signal();
+        Ok(())
+    }
+
+    /// All of them have their defaults from now on.
+    pub fn forget_cold(&self) {
+        self.cold.set(None);
+        self.forgotten.set(Setting::WARM);
+        self.wake.signal();
+    }
+
+    /// The next of them that is on its way.
+    fn take_cold(&self) -> Option<Work> {
+        let number = self.forgotten.get();
+        if self.cold.get().is_none() && number < Setting::COLD {
+            let default = Setting::from_number(number).map_or(0, Setting::default_value);
+            self.cold.set(Some((number, default)));
+            self.forgotten.set(number + 1);
+        }
+        self.cold.get().map(|_| Work::Cold)
+    }
+
+    /// Does something to the program, a byte at most: [`Status::Again`] until it is done.
+    #[inline(never)]
+    pub fn store(&self, what: Store<'_>) -> Result<(), Status> {
+        let mut memory = Eeprom::take();
+        let len = self.program.get().ok_or(Status::NotAccepted);
+        let stored = match what {
+            _ if self.log.get().is_wide() => Stored::Full,
+            Store::Begin => program::begin(&mut memory),
+            Store::Line(line) => program::line(&mut memory, len?, line),
+            Store::End => program::end(&mut memory, len?),
+        };
+        match stored {
+            Stored::Again => return Err(Status::Again),
+            Stored::Full => return Err(Status::PersistenceError),
+            Stored::Done(_) if what == Store::End => self.program.set(None),
+            Stored::Done(len) => self.program.set(Some(len)),
+        }
+        Ok(())
+    }
+
     /// What comes next.
     fn take(&self) -> Option<Work> {
         if self.edit.get().is_some() {
             return Some(Work::Edit);
+        }
+        if let Some(work) = self.take_cold() {
+            return Some(work);
         }
         let number = self.from.get();
         if number >= self.to.get() {
@@ -151,14 +243,15 @@ fn next(links: &Links, memory: &Eeprom, work: Work, moved: u16) -> Option<Put> {
     let mut log = links.storage.log.get();
     let (key, value) = match work {
         Work::Edit => changed(&log, memory, &links.storage.edit.get()?)?,
+        Work::Cold => {
+            let (number, value) = links.storage.cold.get()?;
+            let setting = Setting::from_number(number)?;
+            differs(&log, memory, kept::key(setting), value, setting.default_value())?
+        }
         Work::Item(number) => {
             let item = Item::from_number(number)?;
             let (value, default) = item.value(&links.settings.borrow());
-            let key = item.key();
-            if log.newest(memory, key).unwrap_or(default) == value {
-                return None;
-            }
-            (key, value)
+            differs(&log, memory, item.key(), value, default)?
         }
     };
     let put = log.put(memory, key, value, moved);
@@ -167,6 +260,11 @@ fn next(links: &Links, memory: &Eeprom, work: Work, moved: u16) -> Option<Put> {
         links.except(Status::PersistenceError);
     }
     Some(put)
+}
+
+/// A key and its value, if the log has another.
+fn differs(log: &Log, memory: &Eeprom, key: u16, value: i32, default: i32) -> Option<(u16, i32)> {
+    (log.newest(memory, key).unwrap_or(default) != value).then_some((key, value))
 }
 
 /// The key of a value of a row that the log does not have as it is to be, and that value.
@@ -181,11 +279,13 @@ fn changed(log: &Log, memory: &Eeprom, edit: &Edit) -> Option<(u16, i32)> {
     Some((tables::key(edit.row, axis), value.0))
 }
 
-/// A row has arrived: there is room for another.
+/// Something has arrived: there is room for another.
 fn done(links: &Links, work: Work) {
-    if matches!(work, Work::Edit) {
-        links.storage.edit.set(None);
-        links.storage.awaited.set(false);
-        links.parser_wake.signal();
+    match work {
+        Work::Edit => links.storage.edit.set(None),
+        Work::Cold => links.storage.cold.set(None),
+        Work::Item(_) => return,
     }
+    links.storage.awaited.set(false);
+    links.parser_wake.signal();
 }

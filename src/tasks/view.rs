@@ -14,15 +14,18 @@ use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
+use crate::gcode::tables::Row;
+use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{gpio, stepper, uart};
 use crate::hal::serial::{Flow, PORTS};
-use crate::jobs::Job;
+use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
-use crate::protocol::{Dialect, Machine, StatusReport, Value, Warning, thousandths};
+use crate::protocol::{Dialect, Machine, StatusReport, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
+use crate::store::program;
 use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
@@ -156,7 +159,15 @@ impl Machine for View<'_> {
         &self.settings
     }
 
+    fn cold(&mut self, setting: Setting) -> i32 {
+        self.links.storage.cold(setting)
+    }
+
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
+        if setting.is_cold() {
+            self.links.storage.set_cold(setting, value)?;
+            return Ok(Warning::None);
+        }
         if setting.needs_rest() {
             if self.is_busy() {
                 return Err(Status::NotAccepted);
@@ -174,6 +185,10 @@ impl Machine for View<'_> {
         self.note(setting, lowered);
         set_outputs(&self.settings);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
+    }
+
+    fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {
+        self.links.model.borrow_mut().set(row, axis, value)
     }
 
     fn value(&mut self, value: Value) -> i32 {
@@ -209,6 +224,10 @@ impl Machine for View<'_> {
                 self.position(axis).0.wrapping_sub(self.offset(axis).0)
             }
             Value::Offset(axis) => self.offset(axis.into()).0,
+            Value::Shift(axis) => {
+                self.links.model.borrow().shift().get(usize::from(axis)).map_or(0, |shift| shift.0)
+            }
+            Value::Row(row, axis) => self.links.storage.value(row, axis).0,
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
@@ -234,6 +253,7 @@ impl Machine for View<'_> {
         self.report.restore();
         self.links.resync.set(true);
         self.links.settings_changed.set(true);
+        self.links.storage.forget_cold();
         self.links.storage.note(0, ITEMS);
         set_outputs(&self.settings);
         Status::Ok
@@ -253,9 +273,27 @@ impl Machine for View<'_> {
         if !job.is_none() && self.is_busy() {
             return Status::NotAccepted;
         }
+        if number == STORED && program::check(&Eeprom::take()).is_none() {
+            return Status::Error;
+        }
         self.links.job.set(job);
         self.links.parser_wake.signal();
         Status::Ok
+    }
+
+    fn store(&mut self, what: Store<'_>) -> Result<(), Status> {
+        if self.is_busy() {
+            return Err(Status::NotAccepted);
+        }
+        if matches!(what, Store::Line(line) if line.len() > LINE_MAX) {
+            return Err(Status::InputTooLong);
+        }
+        self.links.storage.store(what)
+    }
+
+    fn program(&mut self, at: u16) -> Option<u8> {
+        let memory = Eeprom::take();
+        program::byte(&memory, program::len(&memory)?, at)
     }
 
     fn restart(&mut self, boot: bool) -> Status {

@@ -1,6 +1,6 @@
 //! What each setting means, in the order of its table.
 
-use crate::config::table::{AXIS_ROWS, MOTOR_ROWS, SYSTEM_ROWS};
+use crate::config::table::{AXIS_ROWS, JOB_ROWS, MOTOR_ROWS, PWM_ROWS, SYSTEM_ROWS, USER_ROWS};
 
 /// A name without its group, and what it means.
 pub type Meaning = (&'static str, &'static str);
@@ -98,3 +98,26 @@ pub const AXIS: [Meaning; AXIS_ROWS] = [
     ("zb", "Way from the switch to zero. No effect yet."),
     ("ac", "Acceleration at most, beside the jerk; 0 is none."),
 ];
+
+pub const PWM: [Meaning; PWM_ROWS] = [
+    ("frq", "Frequency. No effect yet, as all of this group."),
+    ("csl", "Lowest speed, clockwise."),
+    ("csh", "Highest speed, clockwise."),
+    ("cpl", "Share of the period at the lowest speed, clockwise."),
+    ("cph", "Share of the period at the highest speed, clockwise."),
+    ("wsl", "Lowest speed, counter-clockwise."),
+    ("wsh", "Highest speed, counter-clockwise."),
+    ("wpl", "Share of the period at the lowest speed, counter-clockwise."),
+    ("wph", "Share of the period at the highest speed, counter-clockwise."),
+    ("pof", "Share of the period while the spindle is off."),
+];
+
+pub const USER: [Meaning; USER_ROWS] = [
+    ("0", "First of the group."),
+    ("1", "Second of the group."),
+    ("2", "Third of the group."),
+    ("3", "Fourth of the group."),
+];
+
+pub const JOB: [Meaning; JOB_ROWS] =
+    [("a", "First part."), ("b", "Second part."), ("c", "Third part."), ("d", "Fourth part.")];

@@ -37,9 +37,44 @@ rest with 106. `Decimals` are those that are kept; more are rounded, and fewer m
 
 ";
 
+const PLACES: &str = "\
+## Offsets
+
+Coordinate systems, positions and tools are groups as well; each value is read and set alone (`g54x`) or with others
+(`{g54:{x:1,y:2}}`). Lengths have four decimals, angles too.
+
+| Group | Members | What | Set by | Survives a power cut |
+|---|---|---|---|---|
+| `g54` to `g59`, `g591` to `g593` | `x` to `c` | origin of a coordinate system, G54 to G59.3 | itself, G10 L2, G10 L20 | yes |
+| `tt1` to `tt10` | `x` `z` | length of a tool | itself, G10 L1, G10 L10 | yes |
+| `g28`, `g30` | `x` to `c` | stored position | G28.1, G30.1 | yes |
+| `g92` | `x` to `c` | offset of G92, in force or not | G92 | no |
+
+They are in force when the response comes, those of a tool with the next G43. All are 0 at first. `$o` and `$$` show
+them, but for tools. Those that survive a power cut cannot be in status reports.
+
+## A program of your own
+
+One program of G-code, of up to 890 bytes and lines of up to 48, is kept as well, for example to measure a tool or to
+go to a place:
+
+| | JSON | Text |
+|---|---|---|
+| begin a new one | `{prog:f}` | `$prog=f` |
+| add a line | `{prog:\"G0 X1\"}` | `$prog=G0 X1` |
+| it is complete | `{prog:t}` | `$prog=t` |
+| show it | `{prog:n}` | `$prog` |
+| carry it out | `{test:100}` | `$test=100` |
+| end that | `{test:0}` | `$test=0` |
+
+It is there when `{prog:t}` is answered with status 0; until then there is none, and a power cut leaves none. It
+is written at rest (else 106). 34 means that it has no room. Like a built-in job it ends with an exception report: 8 at its end, or why a line was
+refused. A line is looked at when it is carried out, not before.
+";
+
 /// All of it.
 pub fn markdown() -> String {
-    let groups: [(&str, &str, &[Owner], &[Meaning]); 3] = [
+    let groups: [(&str, &str, &[Owner], &[Meaning]); 6] = [
         (
             "The machine",
             "The group `sys`; names have no prefix.",
@@ -58,6 +93,19 @@ pub fn markdown() -> String {
             &[0, 1, 2, 3, 4, 5].map(Owner::Axis),
             &meaning::AXIS,
         ),
+        ("PWM of the spindle", "The group `p1`: `p1frq`.", &[Owner::Pwm], &meaning::PWM),
+        (
+            "User data",
+            "The groups `uda` `udb` `udc` `udd`: `uda0`, `udd3`. For a sender's own use: `{uda0:\"0x2a\"}`, `$uda0=0x2a`.",
+            &[0, 1, 2, 3].map(Owner::User),
+            &meaning::USER,
+        ),
+        (
+            "Job",
+            "The group `jid`: `jida`. Who runs what, for senders, in the same form; 0 after a reset.",
+            &[Owner::Job],
+            &meaning::JOB,
+        ),
     ];
     let mut text = PREFACE.to_string();
     for (title, intro, owners, meanings) in groups {
@@ -68,7 +116,7 @@ pub fn markdown() -> String {
         }
         text += "\n";
     }
-    text.trim_end().to_string() + "\n"
+    text + PLACES
 }
 
 /// One setting, of all its owners.
@@ -92,6 +140,8 @@ fn kind(row: &Row) -> &'static str {
     match row.kind {
         Kind::Constant => "fixed",
         Kind::Text => "fixed text",
+        Kind::Data | Kind::Job => "32 bits",
+        Kind::Cold => "number",
         Kind::Small | Kind::Large if row.stored == 0 => "integer",
         Kind::Small | Kind::Large => "number",
     }
@@ -165,6 +215,7 @@ fn range(setting: Setting, row: &Row) -> String {
     let shown = |value| number(value, row.stored);
     match row.kind {
         Kind::Constant | Kind::Text => String::new(),
+        Kind::Data | Kind::Job => "`\"0x0\"` to `\"0xffffffff\"`".to_string(),
         _ if setting.is_baud() => "1 to 6, or a rate".to_string(),
         _ if row.is(MODE) => "0 to 2; A B C to 3".to_string(),
         _ if row.min == -i32::MAX => format!("±{}", shown(row.max)),
@@ -178,6 +229,7 @@ fn defaults(settings: &[Setting]) -> String {
         let row = setting.row();
         match row.kind {
             Kind::Text => "`0000-KERF`".to_string(),
+            Kind::Data | Kind::Job => "`\"0x0\"`".to_string(),
             _ if row.is(JERK) || row.stored > 0 => number(setting.default_value(), row.stored),
             _ => setting.default_value().to_string(),
         }
@@ -221,6 +273,9 @@ mod tests {
             (Owner::System, &meaning::SYSTEM[..]),
             (Owner::Motor(0), &meaning::MOTOR),
             (Owner::Axis(0), &meaning::AXIS),
+            (Owner::Pwm, &meaning::PWM),
+            (Owner::User(0), &meaning::USER),
+            (Owner::Job, &meaning::JOB),
         ] {
             let described: Vec<_> = meanings.iter().map(|(name, _)| name.to_string()).collect();
             assert_eq!(names(owner), described);

@@ -1,9 +1,10 @@
 //! The EEPROM: 4,096 bytes, 3.4 ms to write one. Thread mode alone uses it, after start-up:
-//! the storage task writes, and whoever looks for something in the log reads. A read waits for a write under way.
+//! the storage task writes the log, the parser the program behind it, a byte each in turn; whoever looks for something reads. A read waits for a write under way.
 
 use core::arch::asm;
 
 use crate::store::Memory;
+use crate::store::program::AREA;
 
 const EECR: *mut u8 = 0x3F as *mut u8;
 const EEDR: *mut u8 = 0x40 as *mut u8;
@@ -15,7 +16,7 @@ const WRITE: u8 = 1 << 1;
 pub struct Eeprom(());
 
 impl Eeprom {
-    /// Access from thread mode. One task at most is to write.
+    /// Access from thread mode. One task at most is to write each part.
     pub fn take() -> Self {
         Self(())
     }
@@ -23,6 +24,7 @@ impl Eeprom {
 
 impl Memory for Eeprom {
     const SIZE: u16 = 4_096;
+    const LOG: u16 = Self::SIZE - AREA;
 
     /// Cost: 12 cycles.
     #[inline(always)]

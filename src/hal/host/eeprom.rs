@@ -5,6 +5,7 @@ use std::vec::Vec;
 
 use super::now;
 use crate::store::Memory;
+use crate::store::program::AREA;
 
 /// Cycles that a write takes.
 const WRITE_CYCLES: u64 = 54_400;
@@ -43,6 +44,7 @@ impl Eeprom {
 
 impl Memory for Eeprom {
     const SIZE: u16 = 4_096;
+    const LOG: u16 = Self::SIZE - AREA;
 
     fn read(&self, at: u16) -> u8 {
         cells().bytes.borrow().get(usize::from(at)).copied().unwrap_or(0xFF)

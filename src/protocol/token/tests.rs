@@ -1,4 +1,5 @@
 use super::*;
+use crate::gcode::tables::ROWS;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
@@ -13,16 +14,21 @@ fn text(token: Token) -> String {
 #[test]
 fn every_token_has_a_name_that_finds_it() {
     let mut count = 0;
-    for number in 0..=u8::MAX {
-        let token = Token(number);
-        if token.subject().is_none() || (number >= FIRST_VECTOR + 34) {
-            continue;
+    let small = u16::from(FIRST_VECTOR) + 40;
+    let rows = FIRST_ROW..FIRST_ROW + u16::from(ROWS) * 6;
+    for token in (0..small).chain(rows).map(Token) {
+        match token.subject() {
+            None => continue,
+            Some(Subject::Row(row, axis)) if !row.has(axis) => continue,
+            Some(_) => {}
         }
         assert_eq!(Token::find(&token.name()), Some(token), "{}", text(token));
         count += 1;
     }
-    assert_eq!(count, 33 + 28 + 3 * 15 + 16 + 2 * 9 + 28 + 34);
-    for bad in ["posd", "pwr5", "pwr0", "pos", "homd", "pwra", "velo", ""] {
+    assert_eq!(count, 33 + 28 + 3 * 15 + 16 + 2 * 9 + 28 + 40 + 11 * 6 + 10 * 2 + 10 + 16 + 4);
+    for bad in
+        ["g53x", "g54d", "tt1y", "tt11z", "posd", "pwr5", "pwr0", "pos", "homd", "pwra", "velo", ""]
+    {
         assert_eq!(Token::find(&name(bad)), None, "{bad}");
     }
 }
@@ -39,7 +45,9 @@ fn names_mean_what_they_should() {
     assert_eq!(resolved("x"), Target::Group(Group::Settings(Owner::Axis(0))));
     assert_eq!(resolved("N"), Target::Token(Token::single(0)));
     assert_eq!(resolved("4"), Target::Group(Group::Settings(Owner::Motor(3))));
-    assert_eq!(resolved("pwr"), Target::Group(Group::Vector(5)));
+    assert_eq!(resolved("pwr"), Target::Group(Group::Vector(6)));
+    assert_eq!(resolved("G59"), Target::Group(Group::Row(Row::system(5))));
+    assert_eq!(resolve(name("g59"), b"1x"), resolved("g591x"));
     assert_eq!(resolved("CLEAR"), Target::Action(Action::Clear));
     assert_eq!(resolved("sr"), Target::Group(Group::Report));
     assert_eq!(resolved("toolong"), Target::Unknown);

@@ -1,0 +1,72 @@
+//! What the rows of the interpreter's tables are called: `g54` to `g59`, `g591` to `g593` (G59.1 to G59.3), `g28`, `g30`,
+//! `tt1` to `tt10`; and their values: `g54x`, `tt10z`.
+
+use super::name::{Name, axis_letter};
+use crate::gcode::tables::{ROWS, Row, STORED, SYSTEMS};
+
+/// The name of a row. Spelled out, for text in a table would be in RAM.
+pub fn row_name(row: Row) -> Name {
+    const FIRST_TOOL: u8 = SYSTEMS + STORED;
+    let named = |bytes: &[u8]| Name::new().with(bytes).unwrap_or_default();
+    match row.number() {
+        row @ 0..6 => named(&[b'g', b'5', b'4' + row]),
+        row @ 6..9 => named(&[b'g', b'5', b'9', b'1' + row - 6]),
+        9 => named(b"g28"),
+        10 => named(b"g30"),
+        row @ FIRST_TOOL.. => match row - FIRST_TOOL + 1 {
+            tool @ ..10 => named(&[b't', b't', b'0' + tool]),
+            tool => named(&[b't', b't', b'0' + tool / 10, b'0' + tool % 10]),
+        },
+    }
+}
+
+/// The name of a value of a row.
+pub fn value_name(row: Row, axis: u8) -> Name {
+    let name = row_name(row);
+    name.with(&[axis_letter(axis)]).unwrap_or(name)
+}
+
+/// The row of that name. About 5,000 cycles on AVR for one that begins as they do.
+pub fn find_row(name: &Name) -> Option<Row> {
+    if !matches!(name.first(), b'g' | b't') {
+        return None;
+    }
+    (0..ROWS).filter_map(Row::from_number).find(|row| row_name(*row) == *name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_have_names() {
+        let name = |row, axis| {
+            std::string::String::from_utf8(value_name(row, axis).bytes().to_vec()).unwrap()
+        };
+        let tool = |number| Row::tool(number).unwrap();
+        for (row, axis, expected) in [
+            (Row::system(0), 0, "g54x"),
+            (Row::system(0), 5, "g54c"),
+            (Row::system(1), 0, "g55x"),
+            (Row::system(6), 0, "g591x"),
+            (Row::system(8), 5, "g593c"),
+            (Row::stored(0), 0, "g28x"),
+            (Row::stored(1), 5, "g30c"),
+            (tool(1), 0, "tt1x"),
+            (tool(2), 2, "tt2z"),
+            (tool(10), 2, "tt10z"),
+        ] {
+            assert_eq!(name(row, axis), expected);
+        }
+    }
+
+    #[test]
+    fn rows_are_found_by_their_names() {
+        for row in (0..ROWS).filter_map(Row::from_number) {
+            assert_eq!(find_row(&row_name(row)), Some(row));
+        }
+        for name in ["g53", "g594", "tt0", "tt11", "g", "tt", ""] {
+            assert_eq!(find_row(&Name::new().with(name.as_bytes()).unwrap()), None, "{name}");
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! A program of G-code that a user keeps in EEPROM: 896 bytes behind the log.
+//!
+//! ```text
+//! byte 0      VALID, written last; anything else: there is none
+//! 1, 2        bytes of the text
+//! 3, 4        checksum of the text
+//! 5 ...       the text; each line ends in a line feed
+//! ```
+//! It is written line by line, a byte at a call: whoever stores a line calls again until that says that it is there, so that
+//! nothing of it is in RAM. What is there already is not written again. [`begin`] makes the old program invalid, [`end`] the
+//! new one valid: when power fails, there is the old one, the new one or none. It is checked when it is started,
+//! 10 ms on AVR, and then read in place.
+//!
+//! A log of earlier firmware that has come as far as this area keeps it ([`Log::is_wide`](super::Log::is_wide)); then no program
+//! can be stored.
+
+use crc::{CRC_16_XMODEM, Crc, NoTable};
+
+use super::Memory;
+
+/// Bytes that it takes, with its head.
+pub const AREA: u16 = 896;
+/// What byte 0 is. Not what a record begins with.
+const VALID: u8 = 0x50;
+const ERASED: u8 = 0xFF;
+const HEAD: u16 = 5;
+
+const CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_XMODEM);
+
+/// How far a step of storing has come.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Stored {
+    /// To be called again.
+    Again,
+    /// There is no room.
+    Full,
+    /// It is there; this is how long the text is now.
+    Done(u16),
+}
+
+fn base<M: Memory>() -> u16 {
+    M::SIZE - AREA
+}
+
+/// The byte of the text at a place; none behind `len`.
+pub fn byte<M: Memory>(memory: &M, len: u16, at: u16) -> Option<u8> {
+    (at < len).then(|| memory.read(base::<M>() + HEAD + at))
+}
+
+/// The length of the program, if there is one: as its head says.
+pub fn len<M: Memory>(memory: &M) -> Option<u16> {
+    let head = |at| memory.read(base::<M>() + at);
+    let len = u16::from_le_bytes([head(1), head(2)]);
+    (head(0) == VALID && len <= AREA - HEAD).then_some(len)
+}
+
+/// The same, and whether the text is what was stored.
+#[inline(never)]
+pub fn check<M: Memory>(memory: &M) -> Option<u16> {
+    let head = |at| memory.read(base::<M>() + at);
+    len(memory).filter(|len| u16::from_le_bytes([head(3), head(4)]) == sum(memory, *len))
+}
+
+fn sum<M: Memory>(memory: &M, len: u16) -> u16 {
+    let mut digest = CRC.digest();
+    for at in 0..len {
+        digest.update(&[memory.read(base::<M>() + HEAD + at)]);
+    }
+    digest.finalize()
+}
+
+/// There is no program any more, and a new one is empty.
+pub fn begin<M: Memory>(memory: &mut M) -> Stored {
+    if put(memory, [(0, ERASED)].into_iter()) { Stored::Done(0) } else { Stored::Again }
+}
+
+/// Puts a line behind the first `len` bytes of the new program.
+#[inline(never)]
+pub fn line<M: Memory>(memory: &mut M, len: u16, text: &[u8]) -> Stored {
+    let end = usize::from(HEAD + len) + text.len() + 1;
+    if end > usize::from(AREA) {
+        return Stored::Full;
+    }
+    let bytes = text.iter().chain(b"\n").copied();
+    match put(memory, (HEAD + len..).zip(bytes)) {
+        true => Stored::Done(end as u16 - HEAD),
+        false => Stored::Again,
+    }
+}
+
+/// The new program of `len` bytes is the program.
+#[inline(never)]
+pub fn end<M: Memory>(memory: &mut M, len: u16) -> Stored {
+    if memory.is_busy() {
+        return Stored::Again;
+    }
+    let [len0, len1] = len.to_le_bytes();
+    let [sum0, sum1] = sum(memory, len).to_le_bytes();
+    let head = [(1, len0), (2, len1), (3, sum0), (4, sum1), (0, VALID)];
+    if put(memory, head.into_iter()) { Stored::Done(len) } else { Stored::Again }
+}
+
+/// Writes the first byte that is not as it is to be. Whether there is none, and nothing is being written.
+fn put<M: Memory>(memory: &mut M, bytes: impl Iterator<Item = (u16, u8)>) -> bool {
+    if memory.is_busy() {
+        return false;
+    }
+    for (at, byte) in bytes {
+        let at = base::<M>() + at;
+        if memory.read(at) != byte {
+            memory.write(at, byte);
+            return false;
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::String;
+    use std::vec::Vec;
+
+    const SIZE: usize = 1_000;
+
+    /// A memory that loses power after so many bytes; the last one is then `torn`.
+    #[derive(Clone)]
+    struct Cells {
+        bytes: Vec<u8>,
+        left: usize,
+        torn: u8,
+    }
+
+    impl Memory for Cells {
+        const SIZE: u16 = SIZE as u16;
+        const LOG: u16 = SIZE as u16 - AREA;
+        fn read(&self, at: u16) -> u8 {
+            self.bytes[usize::from(at)]
+        }
+        fn is_busy(&self) -> bool {
+            false
+        }
+        fn write(&mut self, at: u16, byte: u8) {
+            match self.left {
+                0 => {}
+                1 => self.bytes[usize::from(at)] = self.torn,
+                _ => self.bytes[usize::from(at)] = byte,
+            }
+            self.left = self.left.saturating_sub(1);
+        }
+    }
+
+    /// Calls until something is stored or power is gone.
+    fn wait(cells: &mut Cells, mut step: impl FnMut(&mut Cells) -> Stored) -> Stored {
+        loop {
+            match step(cells) {
+                Stored::Again if cells.left > 0 => {}
+                done => return done,
+            }
+        }
+    }
+
+    fn store(cells: &mut Cells, lines: &[&str]) {
+        let mut len = 0;
+        wait(cells, begin);
+        for text in lines {
+            match wait(cells, |cells| line(cells, len, text.as_bytes())) {
+                Stored::Done(now) => len = now,
+                _ => return,
+            }
+        }
+        wait(cells, |cells| end(cells, len));
+    }
+
+    fn stored(cells: &Cells) -> Option<String> {
+        let len = check(cells)?;
+        let bytes = (0..len).filter_map(|at| byte(cells, len, at)).collect();
+        String::from_utf8(bytes).ok()
+    }
+
+    #[test]
+    fn a_power_cut_leaves_the_old_program_the_new_or_none() {
+        let mut cells = Cells { bytes: std::vec![0xFF; SIZE], left: usize::MAX, torn: 0 };
+        assert_eq!(stored(&cells), None);
+        store(&mut cells, &["G0 X1", "G0 X2"]);
+        assert_eq!(stored(&cells).as_deref(), Some("G0 X1\nG0 X2\n"));
+        let mut seen = [0; 3];
+        for torn in 0..=u8::MAX {
+            for left in 1..40 {
+                let mut cut = Cells { left, torn, ..cells.clone() };
+                store(&mut cut, &["G0 X1", "G1 Y7 F100", "M2"]);
+                match stored(&cut).as_deref() {
+                    None => seen[0] += 1,
+                    Some("G0 X1\nG0 X2\n") => seen[1] += 1,
+                    Some("G0 X1\nG1 Y7 F100\nM2\n") => seen[2] += 1,
+                    Some(other) => panic!("{other}"),
+                }
+            }
+        }
+        assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
+    }
+
+    #[test]
+    fn it_has_its_room() {
+        let mut cells = Cells { bytes: std::vec![0xFF; SIZE], left: usize::MAX, torn: 0 };
+        let mut len = 0;
+        let mut lines = 0;
+        while let Stored::Done(now) = wait(&mut cells, |cells| line(cells, len, &[b'x'; 39])) {
+            (len, lines) = (now, lines + 1);
+        }
+        assert_eq!(lines, 22);
+        assert!(cells.bytes[..SIZE - usize::from(AREA)].iter().all(|byte| *byte == 0xFF));
+    }
+}
