@@ -59,6 +59,19 @@ pub fn set_rate(rate: u32) {
     super::peripherals().USART0.ubrr0().write(|w| w.set(baud::divisor(rate)));
 }
 
+/// Ends the line of which a part has been sent; what else the ring holds is never sent.
+///
+/// # Safety
+/// Thread mode; interrupts are off, and stay so.
+pub unsafe fn end_line() {
+    if TX.taken_last() == Some(b'\n') {
+        return;
+    }
+    let uart = super::peripherals().USART0;
+    while uart.ucsr0a().read().udre0().bit_is_clear() {}
+    uart.udr0().write(|w| w.set(b'\n'));
+}
+
 /// Leaves the line to others, for good.
 ///
 /// # Safety
