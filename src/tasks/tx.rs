@@ -3,7 +3,6 @@
 //! Owned by whoever holds `Links::tx`, for as long as one line takes, so lines never mix. Call
 //! [`Tx::room`] before each piece of at most [`PIECE`] bytes; it waits until the transmit ring has room.
 
-use embassy_futures::yield_now;
 use embassy_time::Timer;
 
 use crate::hal::event::{Event, wait};
@@ -32,10 +31,8 @@ impl Tx {
         Self { ring, rate, sum: None }
     }
 
-    /// Waits until a piece fits. The other tasks have a turn first, also if it does: a long report must not keep
-    /// a feedhold waiting.
+    /// Waits until a piece fits.
     pub async fn room(&mut self) {
-        yield_now().await;
         wait(Event::Transmitted, || self.has_room().then_some(())).await;
     }
 
