@@ -68,6 +68,13 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         if head >= tail { head - tail } else { N - (tail - head) }
     }
 
+    /// The value taken last. `None` if nobody knows: at first, and each time the ring has gone round.
+    pub fn taken_last(&self) -> Option<T> {
+        let tail = self.tail.get();
+        // SAFETY: slot 0 alone is ever read last without having been filled; no slot that `tail` is on is written.
+        (tail != 0).then(|| unsafe { self.slot(tail).read() })
+    }
+
     fn slot(&self, index: u8) -> *mut T {
         // Stays inside the array: indices are below N by construction.
         self.slots.get().cast::<T>().wrapping_add(index as usize)

@@ -7,6 +7,7 @@
 //! holds up anything else.
 
 use embassy_futures::select::select;
+use embassy_futures::yield_now;
 use embassy_time::Timer;
 
 use super::links::Links;
@@ -88,7 +89,8 @@ fn reports_queue(links: &Links) -> bool {
     links.settings.borrow().queue_verbosity() != 0
 }
 
-/// Sends something that is put in steps: `step` says whether there is more.
+/// Sends something that is put in steps: `step` says whether there is more. The other tasks have a turn between
+/// them: a long report must not keep a feedhold waiting.
 async fn send(
     links: &Links,
     port: &Port,
@@ -102,6 +104,7 @@ async fn send(
         if !more {
             break;
         }
+        yield_now().await;
     }
 }
 

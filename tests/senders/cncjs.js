@@ -73,6 +73,18 @@ function notRefused() {
 /// Complaints there were before the job: numbers that are missing while it could not ask for them.
 let before;
 
+function noComplaints(accept = () => false) {
+  const complaints = server.complaints().slice(before).filter((line) => !accept(line));
+  ensure(complaints.length === 0, `${complaints.length} complaints: ${complaints[0]}`);
+}
+
+/// Whether all that it minds is that it has sent more lines than this answer is for. It resumes with the next
+/// line whether or not the last is answered, which it cannot be while the queue is full, and stays ahead.
+function isAhead(complaint) {
+  const [, answered, sent] = complaint.match(/n \((\d+)\) === sent \((\d+)\)/) || [];
+  return Number(sent) > Number(answered);
+}
+
 async function start() {
   before = server.complaints().length;
   await server.load(job, gcode);
@@ -90,6 +102,7 @@ async function hold() {
     notRefused();
     return server.answered > server.sender.total / 10 && server.sr.velocity > 0;
   });
+  noComplaints();
   server.command('gcode:pause');
   const held = await within(5000, () => server.sr.machineState === HOLD);
   const place = () => JSON.stringify(server.sr.mpos);
@@ -113,8 +126,7 @@ async function finish() {
   });
   const { total } = server.sender;
   ensure(server.answered === total, `answered ${server.answered} of ${total}`);
-  const complaints = server.complaints().slice(before);
-  ensure(complaints.length === 0, `${complaints.length} complaints: ${complaints[0]}`);
+  noComplaints(isAhead);
   return `${total} of ${total} lines answered, state ${server.sr.machineState}`;
 }
 
@@ -134,7 +146,7 @@ main(async () => {
   await step('connect, no reset', 20, connectAwake);
   await step('stream', 20, start);
   await step('hold', 60, hold);
-  await step('finish', 1500, finish);
+  await step('finish', 600, finish);
   await step('positions', 20, positions);
   await step('close', 20, () => server.close());
 }, () => server.stop());

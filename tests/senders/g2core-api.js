@@ -106,7 +106,7 @@ main(async () => {
   await step('settings', 60, settings);
   await step('stream', 20, stream);
   await step('hold', 60, hold);
-  await step('finish', 1500, finish);
+  await step('finish', 600, finish);
   await step('positions', 20, positions);
   await step('close', 20, close);
 }, async () => {});

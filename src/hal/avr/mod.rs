@@ -34,10 +34,13 @@ pub(super) fn peripherals() -> Peripherals {
     unsafe { Peripherals::steal() }
 }
 
-/// Starts the firmware anew, as if the reset button had been pressed: by the watchdog.
+/// Starts the firmware anew, as if the reset button had been pressed: by the watchdog, in 15 ms. Meanwhile the line that is
+/// being sent ends, lest a sender read the greeting as the rest of it.
 pub fn reset() -> ! {
     avr_device::interrupt::disable();
     stepper::kill();
+    // SAFETY: tasks of thread mode alone ask for a reset, and interrupts are off for good.
+    unsafe { uart::end_lines() };
     const WDTCSR: *mut u8 = 0x60 as *mut u8;
     const CHANGE: u8 = 1 << 4 | 1 << 3;
     const SHORTEST: u8 = 1 << 3;

@@ -75,6 +75,7 @@ static AUX_SHARED: Shared<AUX_RING> = Shared::new();
 
 // UCSRnA
 const TXC: u8 = 1 << 6;
+const UDRE: u8 = 1 << 5;
 const U2X: u8 = 1 << 1;
 // UCSRnB
 const RXCIE: u8 = 1 << 7;
@@ -140,6 +141,24 @@ pub fn set_rate(port: u8, rate: u32) {
     unsafe {
         register(port, 5).write_volatile(high);
         register(port, 4).write_volatile(low);
+    }
+}
+
+/// Ends the lines of which a part has been sent; what else the rings hold is never sent.
+///
+/// # Safety
+/// Thread mode; interrupts are off, and stay so.
+pub unsafe fn end_lines() {
+    for port in (0..PORTS as u8).filter(|port| !is_shared(*port)) {
+        let tx = if PORTS > 1 && port == AUX { &AUX_SHARED.tx } else { &USB_SHARED.tx };
+        if tx.taken_last() == Some(b'\n') {
+            continue;
+        }
+        // SAFETY: the caller's.
+        unsafe {
+            while register(port, 0).read_volatile() & UDRE == 0 {}
+            register(port, 6).write_volatile(b'\n');
+        }
     }
 }
 

@@ -69,8 +69,8 @@ fn it_slows_down_within_10_ms() {
         for n in 0..30 {
             let (mut machine, mut host) = board(SHARP);
             (0..).zip(&job).for_each(|(n, line)| host.queue(n, line));
-            // At all phases of a segment.
-            let from = hold_after(&mut machine, &mut host, 300_000 + n * 137);
+            // At all phases of a segment, and of status reports.
+            let from = hold_after(&mut machine, &mut host, 300_000 + n * 5_137);
             host.run_for_ms(&mut machine, 100).unwrap();
             worst = worst.max(first_slower(&machine, from) - from);
         }

@@ -17,7 +17,7 @@ use super::step::{Outcome, Step};
 /// The step that every session ends with.
 pub const ARRIVAL: &str = "exact final step";
 /// A driver limits its steps itself; one that has not ended after this long never will.
-const LIMIT: Duration = Duration::from_secs(40 * 60);
+const LIMIT: Duration = Duration::from_secs(15 * 60);
 
 /// What a session needs.
 pub struct Session<'a> {
