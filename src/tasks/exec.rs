@@ -31,7 +31,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         let waiting = blocks.len();
         let standstill = !stepper::running();
         let step = links::update(|out| {
-            machine.set_hold(hold::is_on(), out);
+            machine.set_hold(hold::is_wanted(out.running), out);
             if let Some(line) = finished.take(segments.used()) {
                 out.finished = line;
             }

@@ -72,6 +72,13 @@ pub fn is_on() -> bool {
     wanted().get() != OFF
 }
 
+/// Whether a machine that is `running` is to come to rest: it does not wait for thread mode, which may have a report
+/// to put, to begin the hold. Exec only.
+#[inline(always)]
+pub fn is_wanted(running: bool) -> bool {
+    is_on() || (running && uart::asks_hold())
+}
+
 /// Whether the machine is to go on when it has come to rest.
 pub fn is_passing() -> bool {
     wanted().get() == PASSING
@@ -129,6 +136,10 @@ pub fn dropped(drop_all: impl FnOnce()) {
 
 /// Acts upon the real-time characters that have come, on any port.
 pub fn serve(links: &Links) {
+    // Before the character is taken: exec has begun, and is not to go on in between.
+    if uart::asks_hold() && is_busy(links) {
+        begin();
+    }
     for port in &links.ports {
         let characters = uart::take_realtime(port.number);
         if characters != 0 {

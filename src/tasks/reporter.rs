@@ -7,7 +7,6 @@
 //! holds up anything else.
 
 use embassy_futures::select::select;
-use embassy_futures::yield_now;
 use embassy_time::Timer;
 
 use super::links::Links;
@@ -89,8 +88,8 @@ fn reports_queue(links: &Links) -> bool {
     links.settings.borrow().queue_verbosity() != 0
 }
 
-/// Sends something that is put in steps: `step` says whether there is more. The other tasks have a turn between
-/// them: a long report must not keep a feedhold waiting.
+/// Sends something that is put in steps: `step` says whether there is more. All of it in one turn, if there is room,
+/// so that a report tells of one moment.
 async fn send(
     links: &Links,
     port: &Port,
@@ -104,7 +103,6 @@ async fn send(
         if !more {
             break;
         }
-        yield_now().await;
     }
 }
 

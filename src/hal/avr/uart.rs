@@ -21,6 +21,7 @@ use crate::hal::serial::{
     AUX, AUX_RING, AllEnds, Ends, Flow, PORTS, RX_RING, TX_RING, USB, XOFF, XON, hardware,
     is_shared,
 };
+use crate::realtime;
 
 /// What the interrupts of a port and thread mode share.
 #[repr(C)]
@@ -291,6 +292,12 @@ pub unsafe fn stop() {
         // SAFETY: the caller's.
         unsafe { register(port, 1).write_volatile(0) };
     }
+}
+
+/// Whether an exclamation mark has come that nobody has taken yet, on any port. Any level.
+#[inline(always)]
+pub fn asks_hold() -> bool {
+    (0..PORTS as u8).any(|port| flags(port).realtime.get() & realtime::HOLD != 0)
 }
 
 /// The real-time characters since the last call, as bits (see [`realtime`](crate::realtime)).

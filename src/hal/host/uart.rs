@@ -220,6 +220,11 @@ pub fn room(port: u8) -> u8 {
     (size - 2).saturating_sub(used) as u8
 }
 
+/// Whether an exclamation mark has come that nobody has taken yet, on any port.
+pub fn asks_hold() -> bool {
+    (0..PORTS as u8).any(|port| with(port, |line| line.realtime & realtime::HOLD != 0))
+}
+
 /// The real-time characters since the last call, as bits (see [`realtime`]).
 pub fn take_realtime(port: u8) -> u8 {
     with(port, |line| core::mem::take(&mut line.realtime))
