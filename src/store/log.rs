@@ -5,7 +5,7 @@
 //! its record is the newest of its item, it is written anew, into the gap. So each write of an item takes one
 //! record and as many others as have to make room: one and a half on average while half of the slots count.
 //!
-//! Cost on AVR: 70 cycles for each slot that was ever used, of 290: up to 31,000 for the newest records of a row of the
+//! Cost on AVR: 70 cycles for each slot that was ever used, of 290: up to 26,000 for the newest records of a row of the
 //! tables (`tests/sim/tests/interpreter.rs`).
 
 use super::Memory;

@@ -52,7 +52,7 @@ fn typical_g1_lines_keep_to_the_budget() {
 
 #[test]
 fn a_row_of_the_tables_is_found_in_time() {
-    // The log is full, and of nothing that is sought: no search is longer.
+    // The log is full, and of nothing that is sought, and has the room of the program: no search is longer.
     let mut eeprom = [0xFF; 4_096];
     for (number, slot) in (0u16..).zip(eeprom.chunks_exact_mut(record::SIZE.into())) {
         let key = number.wrapping_mul(40_503);
@@ -71,5 +71,5 @@ fn a_row_of_the_tables_is_found_in_time() {
     job::run(&mut machine, &lines, &Options::default(), |_| {}).unwrap();
     let cost = machine.stopwatches()[0].cost();
     println!("{} searches, {} cycles at most", cost.count, cost.max);
-    assert!(cost.count >= 2 && cost.max < 32_000, "{} cycles", cost.max);
+    assert!(cost.count >= 2 && cost.max < 33_500, "{} cycles", cost.max);
 }

@@ -25,7 +25,8 @@ fn fast() -> (Machine, Host) {
     for line in ["{xvm:2000}", "{xfr:2000}", "{sv:0}"] {
         set(&mut machine, &mut host, line);
     }
-    host.run_for_ms(&mut machine, 200).unwrap();
+    // Until they have been put away, which takes turns of its own.
+    host.run_for_ms(&mut machine, 1_000).unwrap();
     machine.receive_from(AUX);
     host.take_reports();
     machine.recorder_mut().keep_log();
@@ -85,7 +86,7 @@ fn the_second_port_asks_while_a_job_streams() {
     assert!(answers >= 60 && asked - answers <= 1, "{answers} answers to {asked} lines");
     assert!(asked - acks <= 1, "{acks} acks to {asked}");
     let done = host.take_answered();
-    assert!(done.len() > 850, "{} lines on USB meanwhile", done.len());
+    assert!(done.len() > 800, "{} lines on USB meanwhile", done.len());
     assert!(done.iter().zip(1..).all(|(a, n)| a.number == n && a.response.status == 0));
     assert!(host.strays().is_empty(), "{:?}", host.strays());
     is_steady_and_whole(&machine);
