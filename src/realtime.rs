@@ -15,6 +15,9 @@ pub const KILL: u8 = 1 << 4;
 /// ENQ: asks for `{"ack":true}`.
 pub const ENQUIRY: u8 = 1 << 5;
 
+/// Beside [`RESUME`]: its place in the stream is not known, for the receive ring was full.
+pub const UNPLACED: u8 = 1 << 6;
+
 /// Those of which the place in the stream counts: there the receive ring gets a
 /// [`CUT`](crate::hal::serial::CUT) or [`GO`](crate::hal::serial::GO).
 pub const PLACED: u8 = FLUSH | KILL | RESUME;

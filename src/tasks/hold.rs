@@ -33,7 +33,7 @@ use crate::hal::event::Event;
 use crate::hal::imp::time::millis;
 use crate::hal::imp::{exec, flags, reset, uart};
 use crate::hal::serial::{CUT, GO};
-use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, RESET, RESUME};
+use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, RESET, RESUME, UNPLACED};
 
 /// How far a queue flush has come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -174,6 +174,9 @@ fn act(links: &Links, port: &Port, characters: u8) {
     }
     if characters & RESUME != 0 {
         links.resume.set(true);
+    }
+    if characters & UNPLACED != 0 {
+        go_on(links);
     }
     if characters & ENQUIRY != 0 {
         port.enquiry.set(true);

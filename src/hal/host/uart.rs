@@ -307,13 +307,13 @@ impl Line {
         self.next_tx = if self.leaving.is_some() { now() + self.byte_cycles } else { NEVER };
     }
 
-    /// Queues the mark of a real-time character: that of a loss if there is no room.
+    /// Queues the mark of a real-time character: that of a loss if there is no room, but none for a resume.
     fn place(&mut self, character: u8) {
         let Some(ring) = self.rx_in.as_mut() else { return };
-        if ring.is_full() {
-            self.lost_ends = self.lost_ends.wrapping_add(lost(ring.as_mut(), character));
-        } else {
-            ring.push(character);
+        match ring.is_full() {
+            false => ring.push(character),
+            true if character == GO => self.realtime |= realtime::UNPLACED,
+            true => self.lost_ends = self.lost_ends.wrapping_add(lost(ring.as_mut(), character)),
         }
         self.queued = self.queued.wrapping_add(1);
         flags::set(Event::Received);

@@ -241,6 +241,14 @@ macro_rules! interrupts {
                     "rjmp 10f",
                     // The ring is full: the newest byte becomes a mark (`serial::mark`).
                     "8:",
+                    // A resume goes without its place: nothing is lost for it.
+                    "cpi  r24, {go}",
+                    "brne 81f",
+                    "lds  r24, {shared} + {realtime}",
+                    "ori  r24, {unplaced}",
+                    "sts  {shared} + {realtime}, r24",
+                    "rjmp 3b",
+                    "81:",
                     "push r26",
                     "9:",
                     "lds  r30, {shared} + {head}",
@@ -348,6 +356,7 @@ macro_rules! interrupts {
                     hold_bit = const realtime::HOLD.trailing_zeros(),
                     not_resume = const !realtime::RESUME,
                     placed = const realtime::PLACED,
+                    unplaced = const realtime::UNPLACED,
                     cut = const CUT,
                     go = const GO,
                     resume_bit = const realtime::RESUME.trailing_zeros(),
