@@ -31,7 +31,7 @@ pub const fn with(pending: u8, character: u8) -> u8 {
 
 /// The bit of a real-time character, 0 for any other byte.
 ///
-/// The receive interrupt of the AVR has its twin in assembly (`hal/avr/uart.rs`); the transcripts, which
+/// The receive interrupt of the AVR has its twin in assembly (`hal/avr/uart/interrupts.rs`); the transcripts, which
 /// run on both, hold the two together.
 #[inline(always)]
 pub const fn bit(byte: u8) -> u8 {

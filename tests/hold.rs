@@ -1,6 +1,8 @@
 //! Random jobs with feedholds at random times: they come to rest within the limits, go on, and end exactly;
 //! and what is dropped leaves the motors where they are.
 
+#[path = "support/cases.rs"]
+mod cases;
 #[allow(dead_code, reason = "each test uses a part")]
 #[path = "support/jobs.rs"]
 mod jobs;
@@ -10,13 +12,13 @@ mod keeps;
 #[path = "support/rig.rs"]
 mod rig;
 
+use cases::cases;
 use jobs::{Job, any_job, plan_held};
 use keeps::check_limits;
 use kerf::boards::MOTORS;
 use kerf::motion::block::{Block, Body};
 use kerf::motion::exec::Step;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use rig::{Config, Rig, at};
 
 /// A stop under any limits takes no more turns of exec: 300 mm/s at 20 mm/s^2, in stretches of 2 ms, and
@@ -109,17 +111,8 @@ fn run(job: &Job, holds: &Holds) -> Rig {
     player.rig
 }
 
-/// The same jobs each time, unless `PROPTEST_RNG_SEED` names others.
-fn config() -> ProptestConfig {
-    let mut config = ProptestConfig::with_cases(1_500);
-    if config.rng_seed == RngSeed::Random {
-        config.rng_seed = RngSeed::Fixed(2560);
-    }
-    config
-}
-
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(cases(1_500))]
 
     #[test]
     fn any_job_with_holds_ends_on_its_steps(job in any_job(), holds in any_holds(false)) {

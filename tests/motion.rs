@@ -1,6 +1,8 @@
 //! Random jobs through planner, exec and step generator, on the host: every block ends on its step, within
 //! the limits of every axis, and no later than need be.
 
+#[path = "support/cases.rs"]
+mod cases;
 #[allow(dead_code, reason = "each test uses a part")]
 #[path = "support/jobs.rs"]
 mod jobs;
@@ -12,11 +14,11 @@ mod optimum;
 #[path = "support/rig.rs"]
 mod rig;
 
+use cases::cases;
 use jobs::{Planned, any_job, plan, run};
 use keeps::{STRETCH, check_limits};
 use optimum::rest_to_rest;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 /// The time is no longer than with a stop at every corner.
 fn check_time(planned: &[Planned]) {
@@ -32,17 +34,8 @@ fn check_time(planned: &[Planned]) {
     );
 }
 
-/// The same 10,000 jobs each time, unless `PROPTEST_RNG_SEED` names others.
-fn config() -> ProptestConfig {
-    let mut config = ProptestConfig::with_cases(10_000);
-    if config.rng_seed == RngSeed::Random {
-        config.rng_seed = RngSeed::Fixed(2560);
-    }
-    config
-}
-
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(cases(10_000))]
 
     /// Each block, and the whole job.
     #[test]

@@ -1,10 +1,13 @@
 //! Real-time characters at random times, to the whole firmware on the host: it never freezes, every line is
 //! answered once, and motors are where positions are.
 
+#[path = "support/cases.rs"]
+mod cases;
+
+use cases::cases;
 use kerf::hal::imp::Machine;
 use kerf::motion::queue;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 
 /// What a sender does.
 #[derive(Clone, Debug)]
@@ -104,17 +107,8 @@ fn play(deeds: &[Deed]) {
     assert_eq!(sender.machine.emitted().position, [3_840, -5_120, 1_280, 0], "{}", sender.heard);
 }
 
-/// The same jobs each time, unless `PROPTEST_RNG_SEED` names others.
-fn config() -> ProptestConfig {
-    let mut config = ProptestConfig::with_cases(300);
-    if config.rng_seed == RngSeed::Random {
-        config.rng_seed = RngSeed::Fixed(2560);
-    }
-    config
-}
-
 proptest! {
-    #![proptest_config(config())]
+    #![proptest_config(cases(300))]
 
     #[test]
     fn any_conversation_ends_where_it_is_to(deeds in prop::collection::vec(any_deed(), 1..40)) {

@@ -149,14 +149,8 @@ impl Decimal {
 
 #[cfg(test)]
 mod tests {
-    use super::super::number::decimal;
+    use super::super::number::tests::read;
     use super::*;
-
-    fn read(text: &str) -> Decimal {
-        let (rest, value) = decimal(text.as_bytes()).expect(text);
-        assert!(rest.is_empty(), "{text}");
-        value
-    }
 
     fn mm(text: &str) -> Result<(i32, i16), Status> {
         read(text).mm().map(|exact| (exact.units.0, exact.rest))

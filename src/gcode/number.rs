@@ -175,10 +175,11 @@ fn next_if(rest: &mut &[u8], wanted: impl Fn(u8) -> bool) -> Option<u8> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn read(text: &str) -> Decimal {
+    /// The number that is all of a text.
+    pub fn read(text: &str) -> Decimal {
         let (rest, value) = decimal(text.as_bytes()).expect(text);
         assert!(rest.is_empty(), "{text}");
         value

@@ -85,7 +85,6 @@ impl Request {
         let mut writer = Writer::body(c.out, &mut self.format);
         writer.key(pair.name.of(c.line));
         writer.open();
-        self.at = pair.next;
         self.group = Some(group);
         self.item = 0;
         self.phase = phase;

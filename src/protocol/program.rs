@@ -43,11 +43,7 @@ impl Request {
         pair: &Pair,
         c: &mut Context<'_, M, O>,
     ) {
-        self.open(c);
-        let mut writer = Writer::body(c.out, &mut self.format);
-        writer.key(pair.name.of(c.line));
-        writer.byte(b'"');
-        self.at = pair.next;
+        self.open_string(pair, c);
         self.item = 0;
         self.phase = Phase::Program;
     }

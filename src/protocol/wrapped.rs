@@ -79,8 +79,8 @@ impl Request {
         }
     }
 
-    /// Gives the string of `pair` back.
-    pub(super) fn give_string<M: Machine, O: Out>(
+    /// Begins a string as the value of a pair.
+    pub(super) fn open_string<M: Machine, O: Out>(
         &mut self,
         pair: &Pair,
         c: &mut Context<'_, M, O>,
@@ -89,6 +89,15 @@ impl Request {
         let mut writer = Writer::body(c.out, &mut self.format);
         writer.key(pair.name.of(c.line));
         writer.byte(b'"');
+    }
+
+    /// Gives the string of `pair` back.
+    pub(super) fn give_string<M: Machine, O: Out>(
+        &mut self,
+        pair: &Pair,
+        c: &mut Context<'_, M, O>,
+    ) {
+        self.open_string(pair, c);
         self.block = pair.value;
         self.phase = Phase::Quote;
     }

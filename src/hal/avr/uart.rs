@@ -105,9 +105,8 @@ fn flags(port: u8) -> &'static Flags {
 }
 
 #[inline(always)]
-fn is_sending(port: u8) -> bool {
-    let tx = if PORTS > 1 && port == AUX { &AUX_SHARED.tx } else { &USB_SHARED.tx };
-    tx.used() > 0
+fn tx(port: u8) -> &'static Ring<u8, TX_RING> {
+    if PORTS > 1 && port == AUX { &AUX_SHARED.tx } else { &USB_SHARED.tx }
 }
 
 /// Starts the lines, 8N1: USB at `rate` bits a second, the other at the board's. Before interrupts are on;
@@ -151,8 +150,7 @@ pub fn set_rate(port: u8, rate: u32) {
 /// Thread mode; interrupts are off, and stay so.
 pub unsafe fn end_lines() {
     for port in (0..PORTS as u8).filter(|port| !is_shared(*port)) {
-        let tx = if PORTS > 1 && port == AUX { &AUX_SHARED.tx } else { &USB_SHARED.tx };
-        if tx.taken_last() == Some(b'\n') {
+        if tx(port).taken_last() == Some(b'\n') {
             continue;
         }
         // SAFETY: the caller's.
@@ -178,7 +176,7 @@ fn kick_bus(port: u8) {
     let control = register(port, 1);
     // SAFETY: written whole; thread mode does not run while an interrupt has masked its own bit.
     unsafe { control.write_volatile(IDLE) };
-    let next = if is_sending(port) {
+    let next = if tx(port).used() > 0 {
         each_driver(port, gpio::high);
         UDRIE
     } else {
