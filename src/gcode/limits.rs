@@ -16,6 +16,7 @@ const SLACK_PART: f32 = 2e-7;
 
 /// Refuses (220) a move from `start` that leaves the travel of an axis whose bit in `homed` is set.
 #[inline(never)]
+#[small]
 pub(super) fn check(
     start: &PerAxis<Length>,
     motion: &Motion,
@@ -43,6 +44,7 @@ pub(super) fn check(
     check_straight(start, target, limits)
 }
 
+#[small]
 fn check_straight(
     start: &PerAxis<Length>,
     target: &PerAxis<Length>,
@@ -61,6 +63,7 @@ fn check_straight(
 
 /// The first and the last hole, with what is done beside them, from the highest to the lowest point.
 #[inline(never)]
+#[small]
 fn check_cycle(
     start: &PerAxis<Length>,
     cycle: &Cycle,

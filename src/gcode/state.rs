@@ -92,6 +92,7 @@ impl State {
 
     /// Carries out a block with whatever it has.
     #[inline(never)]
+    #[small]
     pub fn execute_rarity(
         &mut self,
         block: &Block,

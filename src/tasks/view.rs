@@ -51,6 +51,7 @@ pub struct View<'a> {
     motion: OnceCell<Snapshot>,
 }
 
+#[small]
 impl<'a> View<'a> {
     /// Looks at the machine now, as the sender on this port sees it.
     pub fn of(links: &'a Links, port: &'a Port) -> Self {
@@ -154,6 +155,7 @@ impl<'a> View<'a> {
     }
 }
 
+#[small]
 impl Machine for View<'_> {
     fn settings(&self) -> &Settings {
         &self.settings
