@@ -21,7 +21,9 @@ pub const LONGEST_REPORT: usize = 38;
 pub struct StatusReport {
     /// By their small numbers.
     tokens: [u8; LONGEST_REPORT],
-    sent: [i32; LONGEST_REPORT],
+    /// Their low 24 bits, for RAM: a value may change by any less than 16.7 million between two reports, which is
+    /// 1.67 m, and be seen.
+    sent: [[u8; 3]; LONGEST_REPORT],
     len: u8,
     /// The list is new: what was sent means nothing.
     fresh: bool,
@@ -38,7 +40,7 @@ impl StatusReport {
     pub fn new() -> StatusReport {
         let mut report = StatusReport {
             tokens: [0; LONGEST_REPORT],
-            sent: [0; LONGEST_REPORT],
+            sent: [[0; 3]; LONGEST_REPORT],
             len: 0,
             fresh: true,
         };
@@ -90,8 +92,9 @@ impl StatusReport {
 
     /// Notes that `value` is being sent for an entry. Whether it differs from the last.
     fn note(&mut self, index: u8, value: i32) -> bool {
+        let [a, b, c, _] = value.to_le_bytes();
         match self.sent.get_mut(usize::from(index)) {
-            Some(sent) => core::mem::replace(sent, value) != value,
+            Some(sent) => core::mem::replace(sent, [a, b, c]) != [a, b, c],
             None => false,
         }
     }
