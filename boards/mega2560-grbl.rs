@@ -1,6 +1,6 @@
 //! Arduino Mega 2560 with a grbl-style shield: the pinout of grbl-Mega.
 
-use super::Port::{A, B, C, E, H};
+use super::Port::{A, B, C, E, H, K};
 use super::{Board, MotorPins, Timer, pin};
 
 /// Arduino Mega 2560 with a grbl-style shield.
@@ -17,6 +17,21 @@ pub const MEGA2560_GRBL: Board = Board {
     // D5 to D9: spindle direction, enable and PWM, flood, mist
     hazards: &[pin(E, 3), pin(H, 3), pin(H, 4), pin(H, 5), pin(H, 6)],
     outputs: [Some(pin(H, 3)), Some(pin(E, 3)), Some(pin(H, 6)), Some(pin(H, 5))],
+    inputs: [
+        // D10 to D12: one for both ends of an axis
+        Some(pin(B, 4)),
+        Some(pin(B, 4)),
+        Some(pin(B, 5)),
+        Some(pin(B, 5)),
+        Some(pin(B, 6)),
+        Some(pin(B, 6)),
+        None,
+        None,
+        // A15, A11, A8: probe, door, and what is the reset button of grbl
+        Some(pin(K, 7)),
+        Some(pin(K, 3)),
+        Some(pin(K, 0)),
+    ],
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };
