@@ -23,7 +23,7 @@ use crate::tasks::lines::LinePool;
 use crate::tasks::links::{Links, QueueCount};
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
-use crate::tasks::view::set_outputs;
+use crate::tasks::view::set_hardware;
 use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, power, reader, reporter, storage};
 
@@ -44,6 +44,7 @@ impl Links {
             settings_changed: Cell::new(true),
             rate: Cell::new(None),
             exception: Cell::new(None),
+            limits_hit: Cell::new(0),
             job: Cell::default(),
             storage: Storage::default(),
             mode: Cell::new(Mode::Json),
@@ -84,7 +85,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     if !links.settings.borrow().starts_in_json() {
         links.mode.set(Mode::Text);
     }
-    set_outputs(&links.settings.borrow());
+    set_hardware(&links.settings.borrow());
     links.model.borrow_mut().start(&*links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received).ok()?);

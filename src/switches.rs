@@ -4,7 +4,7 @@
 //! asks for a first look after [`SOON_US`]; two looks in a row that agree are believed. So
 //!
 //! - a pulse shorter than [`SOON_US`] is never believed, one longer than twice that always;
-//! - a switch is believed 24 us after its edge, if nothing else has happened in the last [`LATER_US`], and
+//! - a switch is believed 20 us after its edge, if nothing else has happened in the last [`LATER_US`], and
 //!   after 300 us in any case;
 //! - it is not asked again for [`LOCK_MS`] after that, so that its bouncing is one event, and then believed
 //!   as it stands.
@@ -14,7 +14,7 @@
 //! [`inputs`](crate::boards::inputs).
 
 /// From an edge to a look, and from there to the next, microseconds.
-pub const SOON_US: u32 = 12;
+pub const SOON_US: u32 = 10;
 /// Between looks while a switch is locked, and after one that found nothing.
 pub const LATER_US: u32 = 125;
 /// How long a switch that has changed is not asked again; up to twice that if others change meanwhile.
@@ -63,6 +63,16 @@ impl Switches {
         *self = Self { worked: now, last: now, ..Self::new() };
     }
 
+    /// Whether a look that finds the switches `now` worked wants another.
+    pub fn is_news(&self, now: u16) -> bool {
+        (now ^ self.worked) & !self.locked != 0
+    }
+
+    /// The first of two looks, of which the second decides.
+    pub fn note(&mut self, now: u16) {
+        self.last = now;
+    }
+
     /// A look finds the switches `now` worked. Returns those that have changed, and when to look again.
     pub fn look(&mut self, now: u16) -> (u16, Next) {
         let agreed = !(now ^ self.last);
@@ -77,7 +87,7 @@ impl Switches {
     }
 
     fn next(&mut self, now: u16) -> Next {
-        if (now ^ self.worked) & !self.locked != 0 {
+        if self.is_news(now) {
             return Next::Soon;
         }
         if self.locked != 0 {
@@ -135,14 +145,14 @@ mod tests {
 
     #[test]
     fn an_edge_is_believed_after_two_looks() {
-        assert_eq!(watched(&[1_000], 100_000), [(1_024, true)]);
-        assert_eq!(watched(&[1_000, 50_000], 100_000), [(1_024, true), (50_024, false)]);
+        assert_eq!(watched(&[1_000], 100_000), [(1_020, true)]);
+        assert_eq!(watched(&[1_000, 50_000], 100_000), [(1_020, true), (50_020, false)]);
     }
 
     #[test]
     fn a_contact_that_bounces_is_one_event() {
         let bounces: Vec<u32> = (0..21).map(|n| 1_000 + 130 * n).collect();
-        assert_eq!(watched(&bounces, 100_000), [(1_024, true)]);
+        assert_eq!(watched(&bounces, 100_000), [(1_020, true)]);
     }
 
     #[test]

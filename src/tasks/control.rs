@@ -1,10 +1,12 @@
 //! The control task: real-time characters, which act at once and get no response.
 //!
 //! Reads what the receive interrupt picked off; waits on [`Event::Realtime`]. `^x` resets the machine.
-//! ENQ asks whether anybody is there, which the reporter answers. Hold, resume, flush and kill are taken
+//! ENQ asks whether anybody is there, which the reporter answers. A switch that changes is seen to as well, by
+//! [`switches`]. Hold, resume, flush and kill are taken
 //! out of the stream and otherwise without effect so far.
 
 use super::links::Links;
+use super::switches;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::{reset, uart};
 use crate::realtime::{ENQUIRY, RESET, RESUME};
@@ -13,6 +15,7 @@ use crate::realtime::{ENQUIRY, RESET, RESUME};
 pub async fn run(links: &'static Links) -> ! {
     loop {
         let characters = wait(Event::Realtime, || {
+            switches::serve(links);
             let characters = uart::take_realtime();
             (characters != 0).then_some(characters)
         })

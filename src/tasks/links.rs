@@ -66,6 +66,8 @@ pub struct Links {
     pub rate: Cell<Option<u32>>,
     /// An exception to report.
     pub exception: Cell<Option<Status>>,
+    /// The limits that were hit first, as bits of the ends: nothing moves any more, until reset.
+    pub limits_hit: Cell<u8>,
     /// How the sender wants to be answered.
     pub mode: Cell<Mode>,
     /// What status reports hold.

@@ -3,7 +3,7 @@
 //! Reads the line pool, writes `Links::commands`, the G-code model, the settings and the response;
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
 //! data lines only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
-//! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`].
+//! keeps its slot until its response has been written. After a limit has been hit lines of G-code are refused. A usual move is done with at once, by [`usual`].
 
 use super::lines::{Class, LineId};
 use super::links::Links;
@@ -17,10 +17,11 @@ use crate::store::kept::Item;
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
-        let free = !links.commands_taken.get();
+        let alarmed = links.limits_hit.get() != 0;
+        let free = alarmed || !links.commands_taken.get();
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
-        let tried = if data { usual(links) } else { Usual::NotTried };
+        let tried = if data && !alarmed { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
             continue;
         }
@@ -142,7 +143,7 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
                 if links.commands_taken.get() {
                     // Nothing of the response has been put yet: others may talk meanwhile.
                     drop(tx);
-                    while links.commands_taken.get() {
+                    while links.commands_taken.get() && links.limits_hit.get() == 0 {
                         links.parser_wake.wait().await;
                     }
                     tx = links.tx.lock().await;
@@ -181,6 +182,9 @@ fn step(links: &Links, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
 /// comment.
 #[inline(never)]
 fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
+    if links.limits_hit.get() != 0 {
+        return (Status::LimitHit, true);
+    }
     let mut commands = links.commands.borrow_mut();
     let settings = links.settings.borrow();
     let mut model = links.model.borrow_mut();

@@ -8,11 +8,12 @@ use core::cell::{OnceCell, RefMut};
 use super::links::{Links, snapshot};
 use super::power;
 use super::setup::moved_by;
+use super::switches;
 use crate::baud;
-use crate::boards::MOTORS;
+use crate::boards::{MOTORS, inputs};
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
-use crate::hal::imp::{gpio, stepper};
+use crate::hal::imp::{gpio, inputs as pins, stepper};
 use crate::jobs::Job;
 use crate::motion::dynamics;
 use crate::motion::exec::{Program, Snapshot};
@@ -24,6 +25,8 @@ use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
 pub const RUN: i32 = 5;
+/// `stat` after a limit has been hit.
+const ALARM: i32 = 2;
 
 /// A look at the machine.
 pub struct View<'a> {
@@ -58,6 +61,9 @@ impl<'a> View<'a> {
 
     /// `stat`.
     pub fn state(&self) -> i32 {
+        if self.links.limits_hit.get() != 0 {
+            return ALARM;
+        }
         if self.busy() && !self.links.stopped.get() {
             return RUN;
         }
@@ -93,6 +99,15 @@ impl<'a> View<'a> {
 
     fn offset(&self, axis: usize) -> Length {
         self.links.model.borrow().work_offset().get(axis).copied().unwrap_or(Length::ZERO)
+    }
+
+    /// 1 if a switch is worked, 0 if not, -1 if there is none or it is off.
+    fn input(&self, input: u8) -> i32 {
+        let off = usize::from(input) < inputs::ENDS && switches::mode(&self.settings, input) == 0;
+        if off || switches::WIRED >> input & 1 == 0 {
+            return -1;
+        }
+        (pins::worked() >> input & 1).into()
     }
 
     fn modal(&self, value: Value) -> i32 {
@@ -143,7 +158,7 @@ impl Machine for View<'_> {
         let lowered = self.settings.limit_velocity(setting, rate);
         self.links.settings_changed.set(true);
         self.note(setting, lowered);
-        set_outputs(&self.settings);
+        set_hardware(&self.settings);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 
@@ -172,6 +187,11 @@ impl Machine for View<'_> {
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
+            Value::Input(input) => self.input(input),
+            Value::LimitHit => match self.links.limits_hit.get() {
+                0 => -1,
+                hit => hit.trailing_zeros() as i32,
+            },
             Value::Hold | Value::Home => 0,
             modal => self.modal(modal),
         }
@@ -194,12 +214,13 @@ impl Machine for View<'_> {
         self.links.resync.set(true);
         self.links.settings_changed.set(true);
         self.links.storage.note(0, Setting::NUMBERS.into());
-        set_outputs(&self.settings);
+        set_hardware(&self.settings);
         Status::Ok
     }
 
     fn clear(&mut self) -> Status {
-        Status::Ok
+        // Where the motors are is known after a reset only.
+        if self.links.limits_hit.get() != 0 { Status::LimitHit } else { Status::Ok }
     }
 
     fn start_job(&mut self, number: u8) -> Status {
@@ -227,8 +248,9 @@ impl Machine for View<'_> {
     }
 }
 
-/// Tells the outputs what the settings say of them. Thread mode, or before interrupts are on.
-pub fn set_outputs(settings: &Settings) {
+/// Tells outputs and inputs what the settings say of them. Thread mode, or before interrupts are on.
+pub fn set_hardware(settings: &Settings) {
+    switches::set_up(settings);
     power::set_modes(settings);
     stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
     stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));

@@ -66,10 +66,10 @@ impl Carriage {
         self.ends
     }
 
-    /// A motor steps. Whether it was this one's.
-    pub fn step(&mut self, motor: usize, positive: bool) -> bool {
+    /// A motor steps.
+    pub fn step(&mut self, motor: usize, positive: bool) {
         if motor != self.motor {
-            return false;
+            return;
         }
         let next = self.steps + if positive != self.reversed { 1 } else { -1 };
         match self.travel {
@@ -77,7 +77,6 @@ impl Carriage {
             _ => self.steps = next,
         }
         self.find_ends();
-        true
     }
 
     fn find_ends(&mut self) {

@@ -58,7 +58,7 @@ impl Mechanics {
         mechanics.wire(inputs::PROBE, Some(build.probe), board);
         mechanics.wire(inputs::DOOR, build.door, board);
         mechanics.wire(inputs::STOP, build.stop, board);
-        (0..MOTORS).for_each(|axis| mechanics.work_ends(axis, 0));
+        (0..MOTORS).for_each(|axis| mechanics.work_contacts(axis, [false; 3], 0));
         mechanics
     }
 
@@ -132,25 +132,25 @@ impl Mechanics {
     /// A motor has made a step.
     pub(crate) fn step(&mut self, motor: usize, positive: bool, now: u64) {
         for axis in 0..MOTORS {
-            if self.carriages[axis].step(motor, positive) {
-                self.work_ends(axis, now);
-            }
+            let before = self.contacts(axis);
+            self.carriages[axis].step(motor, positive);
+            self.work_contacts(axis, before, now);
         }
     }
 
-    fn work_ends(&mut self, axis: usize, now: u64) {
-        for (end, worked) in self.carriages[axis].ends().into_iter().enumerate() {
-            let input = 2 * axis + end;
-            if worked != self.is_worked(input) {
+    /// What the carriage of an axis works: the switches at its lower and upper end, and the probe.
+    fn contacts(&self, axis: usize) -> [bool; 3] {
+        let [min, max] = self.carriages[axis].ends();
+        let touches = axis == 2 && self.plate.is_some_and(|z| self.carriages[2].steps() <= z);
+        [min, max, touches]
+    }
+
+    fn work_contacts(&mut self, axis: usize, before: [bool; 3], now: u64) {
+        let inputs = [2 * axis, 2 * axis + 1, inputs::PROBE];
+        for ((input, worked), before) in inputs.into_iter().zip(self.contacts(axis)).zip(before) {
+            // What is worked by hand stays so.
+            if worked != before {
                 self.work(input, worked, now);
-            }
-        }
-        if axis == 2
-            && let Some(plate) = self.plate
-        {
-            let touches = self.carriages[2].steps() <= plate;
-            if touches != self.is_worked(inputs::PROBE) {
-                self.work(inputs::PROBE, touches, now);
             }
         }
     }
