@@ -18,7 +18,7 @@ use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
-use crate::store::kept::{self, Kept};
+use crate::store::kept;
 use crate::tasks::lines::LinePool;
 use crate::tasks::links::{Links, QueueCount};
 use crate::tasks::storage::Storage;
@@ -28,7 +28,7 @@ use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, power, reader, reporter, storage};
 
 impl Links {
-    fn new(tx: Outgoing, rate: u32) -> Self {
+    fn new(tx: Outgoing, rate: u32, storage: &'static Storage) -> Self {
         Self {
             lines: RefCell::new(LinePool::new()),
             pool_space: Wake::default(),
@@ -46,29 +46,36 @@ impl Links {
             exception: Cell::new(None),
             limits_hit: Cell::new(0),
             job: Cell::default(),
-            storage: Storage::default(),
+            storage,
             mode: Cell::new(Mode::Json),
             report: RefCell::new(StatusReport::new()),
             tx: Mutex::new(Tx::new(tx, rate)),
             enquiry: Cell::new(false),
             // Their defaults come when they are in place: they would take as much of the stack.
             settings: RefCell::new(Settings::blank()),
-            model: RefCell::new(Interpreter::new()),
+            model: RefCell::new(Interpreter::with(storage)),
         }
     }
 }
 
-/// Makes the links where they stay. Not inlined: what it needs of the stack is free again after it.
-#[cfg(target_arch = "avr")]
-#[inline(never)]
-fn place(tx: Outgoing, rate: u32) -> &'static Links {
-    static LINKS: static_cell::StaticCell<Links> = static_cell::StaticCell::new();
-    LINKS.init_with(|| Links::new(tx, rate))
+/// Puts something where it stays.
+macro_rules! place {
+    ($type:ty, $value:expr) => {{
+        #[cfg(target_arch = "avr")]
+        {
+            static PLACE: static_cell::StaticCell<$type> = static_cell::StaticCell::new();
+            PLACE.init_with(|| $value)
+        }
+        #[cfg(not(target_arch = "avr"))]
+        std::boxed::Box::leak(std::boxed::Box::new($value))
+    }};
 }
 
-#[cfg(not(target_arch = "avr"))]
+/// Makes the links. Not inlined: what it needs of the stack is free again after it.
+#[inline(never)]
 fn place(tx: Outgoing, rate: u32) -> &'static Links {
-    std::boxed::Box::leak(std::boxed::Box::new(Links::new(tx, rate)))
+    let storage: &'static Storage = place!(Storage, Storage::new(Log::open(&Eeprom::take())));
+    place!(Links, Links::new(tx, rate, storage))
 }
 
 /// Starts the firmware: `main` is the thread-mode executor, `exec_level` the interrupt-mode one.
@@ -80,8 +87,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     let segments = stepper::start()?;
     let (queue, source) = queue::store().split()?;
     let links = place(outgoing, rate);
-    links.settings.borrow_mut().set_defaults();
-    let log = recall(links);
+    recall(&mut links.settings.borrow_mut(), links.storage);
     if !links.settings.borrow().starts_in_json() {
         links.mode.set(Mode::Text);
     }
@@ -94,19 +100,15 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     main.spawn(power_task(links).ok()?);
     main.spawn(parser_task(links).ok()?);
     main.spawn(control_task(links).ok()?);
-    main.spawn(storage_task(links, log).ok()?);
+    main.spawn(storage_task(links).ok()?);
     Some(())
 }
 
-/// Takes over what was put away before the reset.
+/// The defaults, and over them what was put away before the reset.
 #[inline(never)]
-fn recall(links: &Links) -> Log {
-    let memory = Eeprom::take();
-    let log = Log::open(&memory);
-    let (mut settings, mut model) = (links.settings.borrow_mut(), links.model.borrow_mut());
-    let mut kept = Kept { settings: &mut settings, tables: model.tables_mut() };
-    kept::load(&log, &memory, &mut kept);
-    log
+fn recall(settings: &mut Settings, storage: &Storage) {
+    settings.set_defaults();
+    kept::load(&storage.log(), &Eeprom::take(), settings);
 }
 
 /// Declares tasks: one of each on AVR; on the host each machine that is made gets its own.
@@ -136,5 +138,5 @@ tasks! {
     fn control_task(links: &'static Links) = control::run;
     fn power_task(links: &'static Links) = power::run;
     fn parser_task(links: &'static Links) = parser::run;
-    fn storage_task(links: &'static Links, log: Log) = storage::run;
+    fn storage_task(links: &'static Links) = storage::run;
 }

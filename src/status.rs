@@ -10,6 +10,8 @@
 pub enum Status {
     Ok = 0,
     Error = 1,
+    /// Not now: the line is tried again. No sender gets to see it.
+    Again = 2,
     Noop = 3,
     EndOfFile = 8,
     BufferFull = 13,

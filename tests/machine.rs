@@ -84,7 +84,9 @@ fn back_pressure_reaches_the_sender() {
     assert!(sent >= CAPACITY, "it takes all blocks first");
     assert!(queue::used() >= CAPACITY - 1, "{} blocks", queue::used());
     // ...a control line is still answered...
-    assert!(sender.ask("{qr:n}\n", 50).contains("{\"r\":{\"qr\":"), "control lines overtake");
+    // CNCjs passes over the response to a line if it is paused while it knows of less than six.
+    let told = sender.ask("{qr:n}\n", 50);
+    assert!(told.contains("{\"r\":{\"qr\":6},"), "control lines overtake: {told}");
     // ...and every line is answered once in the end, and carried out.
     sender.ask("", 60_000);
     assert_eq!(sender.answered(), sent + 1);

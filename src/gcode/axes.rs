@@ -1,9 +1,9 @@
 //! What the words of an axis mean: its mode, and lengths as angles.
 
+use super::decimal::Decimal;
+pub(super) use super::decimal::Exact as Value;
+use super::decimal::Exact;
 use super::modal::Units;
-use super::number::Decimal;
-pub(super) use super::number::Exact as Value;
-use super::number::Exact;
 use super::setup::{AxisMode, Setup};
 use crate::status::Status;
 use crate::units::{FIRST_ROTARY, Length};

@@ -7,11 +7,11 @@ use heapless::Vec;
 use nom::Offset;
 
 use super::codes::{self, Action, Code, NonModal, OverrideCode, StopCode, ToolLength};
+use super::decimal::Decimal;
 use super::lexer::{self, Item};
 use super::modal::{
     ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, Turn, Units,
 };
-use super::number::Decimal;
 use super::words::{self, AXES};
 use crate::status::Status;
 use crate::units;

@@ -4,8 +4,8 @@
 //! of the fields, which is the RS274 order of execution. Everything modal (units, distance mode,
 //! offsets, planes) has been resolved.
 
+use super::decimal::Exact;
 use super::modal::{MotionMode, Plane, Turn};
-use super::number::Exact;
 use crate::units::{Length, PerAxis};
 
 /// The canonical commands of one line, in order of execution.

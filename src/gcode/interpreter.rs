@@ -17,7 +17,7 @@ use super::command::{Commands, Overrides};
 use super::modal::{Defaults, Modal, MotionMode, Units};
 use super::setup::Setup;
 use super::state::State;
-use super::tables::{Edit, Tables};
+use super::tables::{Ram, Row, Tables};
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -30,39 +30,42 @@ pub struct Info {
     pub deleted: bool,
     /// There was a comment.
     pub commented: bool,
-    /// The values of the tables that it has changed: the first, and how many ([`Edit::values`]).
-    pub edited: Option<(u8, u8)>,
 }
 
-/// The state of the G-code interpreter.
+/// The state of the G-code interpreter, and who keeps its tables.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Interpreter {
+pub struct Interpreter<T = Ram> {
     pub(super) state: State,
-    pub(super) tables: Tables,
+    tables: T,
 }
 
 impl Interpreter {
     /// At power-up: everything 0; G80 and the usual modes.
     pub const fn new() -> Self {
-        Self { state: State::new(&Defaults::USUAL), tables: Tables::new() }
+        Self::with(Ram::new())
     }
+}
 
+impl<T> Interpreter<T> {
+    /// The same, with tables that are kept elsewhere.
+    pub const fn with(tables: T) -> Self {
+        Self { state: State::new(&Defaults::USUAL), tables }
+    }
+}
+
+impl<T: Tables> Interpreter<T> {
     /// Starts in the modes that the machine starts in.
     pub fn start(&mut self, setup: &impl Setup) {
         self.state.modal = Modal::new(&setup.defaults());
         // Nothing else shifts the origin yet, so that the sum is within the range.
-        let _ = self.state.update_origin(self.tables.system(self.state.modal.system));
-    }
-
-    /// The tables, to be filled before it starts.
-    pub fn tables_mut(&mut self) -> &mut Tables {
-        &mut self.tables
+        let _ = self.state.update_origin(&self.tables.row(Row::system(self.state.modal.system)));
     }
 
     /// Interprets one line without its terminator, for a machine that is `setup` so.
     ///
     /// `Ok`: `out` is what the machine has to do, and the state has advanced as if it had done so.
-    /// `Err`: the state is what it was, and `out` empty.
+    /// `Err`: the state is what it was, and `out` empty. [`Status::Again`]: the tables are not ready for the line,
+    /// which is to be tried again.
     pub fn interpret(
         &mut self,
         line: &[u8],
@@ -99,9 +102,9 @@ impl Interpreter {
         let deletes = setup.deletes_blocks();
         block.read(line, deletes)?;
         block.check(self.state.modal.motion)?;
-        let edited = self.execute_or_undo(&block, setup, out)?;
+        self.execute_or_undo(&block, setup, out)?;
         let Block { message, slashed, commented, .. } = block;
-        Ok(Info { message, deleted: slashed && deletes, commented, edited })
+        Ok(Info { message, deleted: slashed && deletes, commented })
     }
 
     #[inline(never)]
@@ -110,11 +113,11 @@ impl Interpreter {
         block: &Block,
         setup: &impl Setup,
         out: &mut Commands,
-    ) -> Result<Option<(u8, u8)>, Status> {
+    ) -> Result<(), Status> {
         if block.is_rare() || block.does().is_some_and(MotionMode::is_cycle) {
             return self.execute_rarity(block, setup, out);
         }
-        self.execute_usual(block, setup, out).map(|()| None)
+        self.execute_usual(block, setup, out)
     }
 
     /// Executes a block of modes, the feed, and the position of the axes that it names, or nothing of it.
@@ -141,21 +144,19 @@ impl Interpreter {
         block: &Block,
         setup: &impl Setup,
         out: &mut Commands,
-    ) -> Result<Option<(u8, u8)>, Status> {
+    ) -> Result<(), Status> {
         let before = self.state;
-        let mut edit = Edit::None;
+        let mut edit = None;
         let done = self.state.execute_rarity(block, &self.tables, setup, out, &mut edit);
-        match done {
-            Ok(()) => {
-                self.tables.apply(&edit);
-                Ok(edit.values())
-            }
-            Err(status) => {
+        match (&done, &edit) {
+            (Ok(()), Some(edit)) => self.tables.apply(edit),
+            (Ok(()), None) => {}
+            (Err(_), _) => {
                 self.state = before;
                 out.clear();
-                Err(status)
             }
         }
+        done
     }
 }
 
@@ -189,15 +190,10 @@ impl Before {
 }
 
 /// What reports read, and what the machine corrects.
-impl Interpreter {
+impl<T> Interpreter<T> {
     /// The modes in force.
     pub fn modal(&self) -> &Modal {
         &self.state.modal
-    }
-
-    /// The tables.
-    pub fn tables(&self) -> &Tables {
-        &self.tables
     }
 
     /// End of the last move, machine coordinates.

@@ -11,7 +11,8 @@ use nom::error::{ErrorKind, ParseError};
 use nom::sequence::{delimited, preceded, terminated};
 use nom::{IResult, Parser};
 
-use super::number::{Decimal, decimal};
+use super::decimal::Decimal;
+use super::number::decimal;
 use crate::status::Status;
 
 /// Why bytes are no word.

@@ -15,6 +15,7 @@ mod circle;
 pub mod codes;
 pub mod command;
 mod cycle;
+pub mod decimal;
 mod digits;
 pub mod interpreter;
 mod lexer;

@@ -1,154 +1,10 @@
-//! Numbers of a G-code line: exact decimals, and their conversions.
-//!
-//! A number is kept as written, in three pieces that need no wide arithmetic: the whole part, four
-//! decimals (the resolution of [`Length`]) and four more (what rounding and the residue of
-//! incremental moves need). Decimals beyond the eighth are ignored: in inches that is 0.25 nm.
+//! The numbers of a G-code line, as they are written.
 
 use core::slice;
 
+use super::decimal::Decimal;
 use super::lexer::{Lexed, blanks, failure, is_blank};
 use crate::status::Status;
-use crate::units::Length;
-
-/// A decimal number, exact to eight decimals. Zero is never negative.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Decimal {
-    /// Left of the point.
-    pub whole: u32,
-    /// The first four decimals, 0 to 9999.
-    pub frac: u16,
-    /// The next four decimals, 0 to 9999.
-    pub tail: u16,
-    /// Less than zero.
-    pub negative: bool,
-}
-
-/// A length together with what rounding took from it: `units` + `rest` / 10,000 units.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Exact {
-    /// Rounded to the nearest unit, halves away from zero.
-    pub units: Length,
-    /// What is left, -5000 to 5000 ten-thousandths of a unit.
-    pub rest: i16,
-}
-
-/// Ten-thousandths in a unit: the scale of [`Exact::rest`].
-const REST: i16 = 10_000;
-
-impl Exact {
-    /// With `carried` added to the rest, as an incremental move does with what the last one left.
-    /// Both rests are at most half a unit, so their sum carries one unit at most.
-    pub fn carry(self, carried: i16) -> Option<Exact> {
-        let rest = self.rest + carried;
-        let (step, rest) = match rest {
-            5_000.. => (1, rest - REST),
-            ..=-5_000 => (-1, rest + REST),
-            _ => (0, rest),
-        };
-        Some(Exact { units: self.units.checked_add(Length(step))?, rest })
-    }
-}
-
-impl Decimal {
-    /// As millimetres or degrees.
-    #[inline(always)]
-    pub fn mm(&self) -> Result<Exact, Status> {
-        // Most lengths are below 65 m and have four decimals at most: nothing to round, and a product
-        // of 16 bits by 16.
-        match u16::try_from(self.whole) {
-            Ok(whole) if self.tail == 0 => {
-                let units = u32::from(whole) * Length::PER_MM as u32 + u32::from(self.frac);
-                let units = if self.negative { -(units as i32) } else { units as i32 };
-                Ok(Exact { units: Length(units), rest: 0 })
-            }
-            _ => self.long_mm(),
-        }
-    }
-
-    #[inline(never)]
-    fn long_mm(&self) -> Result<Exact, Status> {
-        if self.whole > (i32::MAX / Length::PER_MM) as u32 {
-            return Err(Status::OutOfRange);
-        }
-        self.exact(self.whole * Length::PER_MM as u32 + u32::from(self.frac), self.tail)
-    }
-
-    /// As inches, exact to seven decimals.
-    ///
-    /// 254,000 units per inch, piece by piece: a fourth decimal is 25.4 units, a seventh 0.0254. Cost on AVR: 400 cycles;
-    /// with more than four decimals two 32-bit divisions more, 1,200.
-    #[inline(never)]
-    pub fn inch(&self) -> Result<Exact, Status> {
-        if self.whole > (i32::MAX / Length::PER_INCH) as u32 {
-            return Err(Status::OutOfRange);
-        }
-        // 0.4 units for each: 16 bits.
-        let tenths = self.frac * 4;
-        let (parts, left) = (tenths / 10, tenths % 10);
-        let units = self.whole * Length::PER_INCH as u32 + u32::from(self.frac) * 25;
-        let (mut units, mut rest) = (units + u32::from(parts), left * 1_000);
-        if self.tail != 0 {
-            let more = u32::from(rest) + u32::from(self.tail / 10) * 254;
-            units += more / REST as u32;
-            rest = (more % REST as u32) as u16;
-        }
-        self.exact(units, rest)
-    }
-
-    /// Rounds and signs a magnitude of `units` + `rest` / 10,000.
-    #[inline(always)]
-    fn exact(&self, units: u32, rest: u16) -> Result<Exact, Status> {
-        let up = rest >= 5_000;
-        let rest = if up { rest as i16 - REST } else { rest as i16 };
-        let units = units + u32::from(up);
-        let units = i32::try_from(units).map_err(|_| Status::OutOfRange)?;
-        Ok(match self.negative {
-            true => Exact { units: Length(-units), rest: -rest },
-            false => Exact { units: Length(units), rest },
-        })
-    }
-
-    /// Whether it is 0.
-    pub fn is_zero(&self) -> bool {
-        self.whole == 0 && self.frac == 0 && self.tail == 0
-    }
-
-    /// As a whole number: 110 if negative, 102 with decimals.
-    pub fn integer(&self) -> Result<u32, Status> {
-        match self {
-            Decimal { negative: true, .. } => Err(Status::OutOfRange),
-            Decimal { frac: 0, tail: 0, whole, .. } => Ok(*whole),
-            _ => Err(Status::BadNumber),
-        }
-    }
-
-    /// As the number of a G or M code: 28 and 3 of `G28.3`. `None` if no code has such a number.
-    pub fn code(&self) -> Option<(u8, u8)> {
-        let whole = u8::try_from(self.whole).ok()?;
-        let tenth = if self.frac == 0 { 0 } else { (self.frac / 1_000) as u8 };
-        let exact = self.tail == 0 && u16::from(tenth) * 1_000 == self.frac;
-        (exact && !self.negative).then_some((whole, tenth))
-    }
-
-    /// As seconds, in milliseconds: 163 if negative, 110 beyond 32 bits.
-    pub fn milliseconds(&self) -> Result<u32, Status> {
-        if self.negative {
-            return Err(Status::PWordNegative);
-        }
-        let part = u32::from((self.frac + 5) / 10);
-        let whole = (self.whole < u32::MAX / 1_000).then(|| self.whole * 1_000);
-        whole.map(|whole| whole + part).ok_or(Status::OutOfRange)
-    }
-
-    /// Rounded to a float: for feeds, never for positions.
-    pub fn to_f32(self) -> f32 {
-        let mut value = self.whole as f32;
-        if self.frac != 0 || self.tail != 0 {
-            value += f32::from(self.frac) * 1e-4 + f32::from(self.tail) * 1e-8;
-        }
-        if self.negative { -value } else { value }
-    }
-}
 
 /// A number: sign, digits, point, digits; blanks anywhere, at least one digit, no exponent. Takes the
 /// blanks behind it too.
@@ -335,14 +191,6 @@ mod tests {
         }
     }
 
-    fn mm(text: &str) -> Result<(i32, i16), Status> {
-        read(text).mm().map(|exact| (exact.units.0, exact.rest))
-    }
-
-    fn inch(text: &str) -> Result<(i32, i16), Status> {
-        read(text).inch().map(|exact| (exact.units.0, exact.rest))
-    }
-
     #[test]
     fn every_way_to_write_a_number() {
         let quarter = Decimal { whole: 0, frac: 2_500, tail: 0, negative: false };
@@ -353,7 +201,7 @@ mod tests {
         assert_eq!(read("5."), Decimal { whole: 5, ..Decimal::default() });
         let long = Decimal { whole: 12, frac: 3_456, tail: 7_890, negative: true };
         assert_eq!(read("-12.3456789"), long);
-        assert_eq!(read("4294967295").integer(), Ok(u32::MAX));
+        assert_eq!(read("4294967295").whole, u32::MAX);
     }
 
     #[test]
@@ -364,52 +212,5 @@ mod tests {
         for text in ["4294967296", "42949672950", "99999999999999"] {
             assert_eq!(refusal(text), Status::OutOfRange, "{text}");
         }
-        assert_eq!(read("1.5").integer(), Err(Status::BadNumber));
-        assert_eq!(read("-1").integer(), Err(Status::OutOfRange));
-    }
-
-    #[test]
-    fn millimetres_round_halves_away_from_zero() {
-        assert_eq!(mm("12.3456"), Ok((123_456, 0)));
-        assert_eq!(mm("0.00004"), Ok((0, 4_000)));
-        assert_eq!(mm("0.00005"), Ok((1, -5_000)));
-        assert_eq!(mm("-0.00005"), Ok((-1, 5_000)));
-        assert_eq!(mm("0.99999"), Ok((10_000, -1_000)));
-        assert_eq!(mm("214748.3647"), Ok((i32::MAX, 0)));
-        assert_eq!(mm("-214748.3647"), Ok((-i32::MAX, 0)));
-        assert_eq!(mm("214748.36475"), Err(Status::OutOfRange));
-        assert_eq!(mm("214749"), Err(Status::OutOfRange));
-    }
-
-    #[test]
-    fn inches_are_exact() {
-        assert_eq!(inch("1"), Ok((254_000, 0)));
-        assert_eq!(inch("0.0001"), Ok((25, 4_000)));
-        assert_eq!(inch("-0.00001"), Ok((-3, 4_600)));
-        assert_eq!(inch("0.0000001"), Ok((0, 254)));
-        assert_eq!(inch("8454.6588"), Ok((2_147_483_335, 2_000)));
-        assert_eq!(inch("8454.7"), Err(Status::OutOfRange));
-        assert_eq!(inch("8455"), Err(Status::OutOfRange));
-    }
-
-    #[test]
-    fn codes_are_read_digit_by_digit() {
-        assert_eq!(read("28.3").code(), Some((28, 3)));
-        assert_eq!(read("1.00").code(), Some((1, 0)));
-        assert_eq!(read("028.30").code(), Some((28, 3)));
-        assert_eq!(read("255").code(), Some((255, 0)));
-        for text in ["28.35", "28.30001", "-1", "65537", "1000"] {
-            assert_eq!(read(text).code(), None, "{text}");
-        }
-    }
-
-    #[test]
-    fn seconds_and_feeds() {
-        assert_eq!(read("1.2345").milliseconds(), Ok(1_235));
-        assert_eq!(read("0.9999").milliseconds(), Ok(1_000));
-        assert_eq!(read("-1").milliseconds(), Err(Status::PWordNegative));
-        assert_eq!(read("4294968").milliseconds(), Err(Status::OutOfRange));
-        assert_eq!(read("1500").to_f32(), 1_500.0);
-        assert_eq!(read("-0.5").to_f32(), -0.5);
     }
 }

@@ -1,7 +1,8 @@
 //! Where the work origin is: coordinate systems (G54 to G59.3, G10), G92 and its kin, tool lengths.
 //!
 //! Machine coordinates of the origin = coordinate system + G92, if that is in force + tool length. The sum is
-//! kept in [`State::origin`], so that moves add one number.
+//! kept in [`State::origin`], so that moves add one number; the coordinate system in force is that sum without the
+//! other two, so that the tables are asked for other systems only.
 
 use super::axes;
 use super::block::Block;
@@ -9,15 +10,33 @@ use super::codes::{NonModal, ToolLength};
 use super::command::{Commands, Motion};
 use super::setup::{AxisMode, Cycle, Setup};
 use super::state::State;
-use super::tables::{Edit, SYSTEMS, TOOLS, Tables, Tool};
+use super::tables::{Edit, Row, SYSTEMS, TOOL_AXES, Tables};
 use super::words::{AXES, H, L, P};
 use crate::status::Status;
 use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
 
-/// The axes whose lengths a tool has.
-const TOOL_AXES: [u8; 2] = [0, 2];
-
 impl State {
+    /// The coordinate system in force.
+    fn system_in_force(&self) -> PerAxis<Length> {
+        let mut system = self.origin;
+        for (system, (shift, tool)) in
+            system.iter_mut().zip(self.shift.iter().zip(&self.tool_length))
+        {
+            let shift = if self.shifted { shift.0 } else { 0 };
+            // The sum was within the range, so that this is where it began.
+            system.0 = system.0.wrapping_sub(tool.0).wrapping_sub(shift);
+        }
+        system
+    }
+
+    /// A coordinate system, from 0.
+    pub(super) fn system(&self, number: u8, tables: &impl Tables) -> PerAxis<Length> {
+        match number == self.modal.system {
+            true => self.system_in_force(),
+            false => tables.row(Row::system(number)),
+        }
+    }
+
     /// Adds the origin up anew, of a coordinate system and what is in the state.
     pub(super) fn update_origin(&mut self, system: &PerAxis<Length>) -> Result<(), Status> {
         let parts = system.iter().zip(&self.shift).zip(&self.tool_length);
@@ -30,15 +49,18 @@ impl State {
     }
 
     /// Tool length and coordinate system.
+    #[inline(never)]
     pub(super) fn offsets(
         &mut self,
         block: &Block,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
     ) -> Result<(), Status> {
         if block.tool_length.is_none() && block.system.is_none() {
             return Ok(());
         }
+        let number = block.system.unwrap_or(self.modal.system);
+        let system = self.system(number, tables);
         match block.tool_length {
             None => {}
             Some(ToolLength::Off) => self.tool_length = [Length::ZERO; units::AXES],
@@ -56,26 +78,29 @@ impl State {
                 }
             }
         }
-        if let Some(system) = block.system {
-            self.modal.system = system;
-        }
-        self.update_origin(tables.system(self.modal.system))
+        self.modal.system = number;
+        self.update_origin(&system)
     }
 
-    /// The lengths of tool H; without H, of the tool in the spindle.
-    fn tool_named(&self, block: &Block, tables: &Tables) -> Result<PerAxis<Length>, Status> {
-        let tool = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
-        Ok(tables.tool(tool.map_err(|_| Status::HWordInvalid)?)?.offsets())
+    /// The lengths of tool H; without H, of the tool in the spindle. None are those of an empty spindle, 0.
+    fn tool_named(&self, block: &Block, tables: &impl Tables) -> Result<PerAxis<Length>, Status> {
+        let number = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
+        let number = number.ok().and_then(|number| u8::try_from(number).ok());
+        match number.ok_or(Status::HWordInvalid)? {
+            0 => Ok([Length::ZERO; units::AXES]),
+            number => Ok(tables.row(Row::tool(number).ok_or(Status::HWordInvalid)?)),
+        }
     }
 
     /// Group 0, but for the moves to stored positions.
+    #[inline(never)]
     pub(super) fn non_modal(
         &mut self,
         block: &Block,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
         out: &mut Commands,
-        edit: &mut Edit,
+        edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
         match block.non_modal {
             None | Some(NonModal::GoStored(_) | NonModal::MachineCoordinates) => {}
@@ -85,46 +110,42 @@ impl State {
                 if block.has(AXES) {
                     return Err(Status::AxisInvalid);
                 }
-                *edit = Edit::Stored(which, self.position);
+                *edit = Some(Edit::new(Row::stored(which), self.position, tables)?);
             }
             Some(NonModal::Home { set }) => out.motion = home(block, set, setup)?,
             Some(NonModal::SetPosition) => self.redefine_position(block, setup, out)?,
-            Some(NonModal::SetOffset) => self.shift_here(block, tables, setup)?,
+            Some(NonModal::SetOffset) => self.shift_here(block, setup)?,
             Some(NonModal::ClearOffset) => {
+                self.shift_is(false)?;
                 self.shift = [Length::ZERO; units::AXES];
-                self.shift_is(false, tables)?;
             }
-            Some(NonModal::SuspendOffset) => self.shift_is(false, tables)?,
-            Some(NonModal::ResumeOffset) => self.shift_is(true, tables)?,
+            Some(NonModal::SuspendOffset) => self.shift_is(false)?,
+            Some(NonModal::ResumeOffset) => self.shift_is(true)?,
         }
         Ok(())
     }
 
-    fn shift_is(&mut self, on: bool, tables: &Tables) -> Result<(), Status> {
+    fn shift_is(&mut self, on: bool) -> Result<(), Status> {
+        let system = self.system_in_force();
         self.shifted = on;
-        self.update_origin(tables.system(self.modal.system))
+        self.update_origin(&system)
     }
 
     /// G92: the position is called the axis words, in work coordinates.
-    fn shift_here(
-        &mut self,
-        block: &Block,
-        tables: &Tables,
-        setup: &impl Setup,
-    ) -> Result<(), Status> {
+    fn shift_here(&mut self, block: &Block, setup: &impl Setup) -> Result<(), Status> {
+        let system = self.system_in_force();
         if !self.shifted {
             self.shift = [Length::ZERO; units::AXES];
         }
         self.shifted = true;
-        let system = tables.system(self.modal.system);
         self.each_word(block, setup, |state, axis, value| {
-            let others = at(system, axis).checked_add(at(&state.tool_length, axis));
+            let others = at(&system, axis).checked_add(at(&state.tool_length, axis));
             let shift = state.offset_here(axis, others, value.units)?;
             put(&mut state.shift, axis, shift);
             put(&mut state.residue, axis, value.rest);
             Ok(())
         })?;
-        self.update_origin(system)
+        self.update_origin(&system)
     }
 
     /// G28.3: the position is called the axis words, in machine coordinates.
@@ -148,23 +169,23 @@ impl State {
     fn set_data(
         &mut self,
         block: &Block,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
-        edit: &mut Edit,
+        edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
         let integer = |slot| block.get(slot).and_then(|word| word.integer().ok());
         let number = integer(P).and_then(|number| u8::try_from(number).ok());
         match (integer(L), number) {
-            (Some(l @ (2 | 20)), Some(number)) if usize::from(number) <= SYSTEMS => {
+            (Some(l @ (2 | 20)), Some(number)) if number <= SYSTEMS => {
                 // 0 is the system in force.
                 let system = number.checked_sub(1).unwrap_or(self.modal.system);
                 self.set_system(block, system, l == 20, tables, setup, edit)
             }
             (Some(2 | 20), _) => Err(Status::PWordInvalid),
-            (Some(l @ (1 | 10)), Some(number @ 1..)) if usize::from(number) <= TOOLS => {
-                self.set_tool(block, number, l == 10, tables, setup, edit)
+            (Some(l @ (1 | 10)), number) => {
+                let row = number.and_then(Row::tool).ok_or(Status::ToolInvalid)?;
+                self.set_tool(block, row, l == 10, tables, setup, edit)
             }
-            (Some(1 | 10), _) => Err(Status::ToolInvalid),
             _ => Err(Status::LWordInvalid),
         }
     }
@@ -176,11 +197,11 @@ impl State {
         block: &Block,
         number: u8,
         here: bool,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
-        edit: &mut Edit,
+        edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
-        let mut system = *tables.system(number);
+        let mut system = self.system(number, tables);
         self.each_word(block, setup, |state, axis, value| {
             let origin = if here {
                 let shift = if state.shifted { at(&state.shift, axis) } else { Length::ZERO };
@@ -195,7 +216,7 @@ impl State {
         if number == self.modal.system {
             self.update_origin(&system)?;
         }
-        *edit = Edit::System(number, system);
+        *edit = Some(Edit::new(Row::system(number), system, tables)?);
         Ok(())
     }
 
@@ -204,13 +225,13 @@ impl State {
     fn set_tool(
         &mut self,
         block: &Block,
-        number: u8,
+        row: Row,
         here: bool,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
-        edit: &mut Edit,
+        edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
-        let mut lengths = tables.tool(number.into())?.offsets();
+        let mut lengths = tables.row(row);
         self.each_word(block, setup, |state, axis, value| {
             if !TOOL_AXES.contains(&axis) {
                 return Err(Status::AxisInvalid);
@@ -224,7 +245,7 @@ impl State {
             put(&mut lengths, axis, length);
             Ok(())
         })?;
-        *edit = Edit::Tool(number, Tool { x: lengths[0], z: lengths[2] });
+        *edit = Some(Edit::new(row, lengths, tables)?);
         Ok(())
     }
 
@@ -261,7 +282,8 @@ impl State {
     pub(super) fn go_stored(
         &mut self,
         block: &Block,
-        stored: &PerAxis<Length>,
+        tables: &impl Tables,
+        stored: Row,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
@@ -270,10 +292,11 @@ impl State {
         }
         self.advance(block, false, setup)?;
         let via = self.position;
+        let stored = tables.row(stored);
         for axis in 0..units::AXES as u8 {
             let named = !block.has(AXES) || block.get(axis).is_some();
             if named && setup.mode(axis) != AxisMode::Disabled {
-                put(&mut self.position, axis, at(stored, axis));
+                put(&mut self.position, axis, at(&stored, axis));
                 put(&mut self.residue, axis, 0);
             }
         }

@@ -10,7 +10,7 @@ use super::limits;
 use super::modal::{Coolant, Defaults, FeedMode, Modal, MotionMode, PathMode, Turn, Units};
 use super::setup::Setup;
 use super::sticky::Sticky;
-use super::tables::{Edit, Tables};
+use super::tables::{Edit, Row, Tables};
 use super::words::{F, N, P, S, T};
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
@@ -81,7 +81,7 @@ impl State {
     pub fn execute(
         &mut self,
         block: &Block,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
@@ -95,10 +95,10 @@ impl State {
     pub fn execute_rarity(
         &mut self,
         block: &Block,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
         out: &mut Commands,
-        edit: &mut Edit,
+        edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
         self.begin(block, out)?;
         self.tools(block, out)?;
@@ -107,7 +107,7 @@ impl State {
         self.offsets(block, tables, setup)?;
         self.non_modal(block, tables, setup, out, edit)?;
         self.finish(block, tables, setup, out)?;
-        self.stop(block, tables, setup, out)
+        self.stop(block, tables, edit, setup, out)
     }
 
     /// N, the modes, and F.
@@ -247,7 +247,7 @@ impl State {
     fn finish(
         &mut self,
         block: &Block,
-        tables: &Tables,
+        tables: &impl Tables,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
@@ -255,7 +255,7 @@ impl State {
         let start = if self.homed == 0 { None } else { Some(self.position) };
         match block.non_modal {
             Some(NonModal::GoStored(which)) => {
-                self.go_stored(block, tables.stored(which), setup, out)?
+                self.go_stored(block, tables, Row::stored(which), setup, out)?
             }
             _ => self.motion(block, setup, out)?,
         }
@@ -266,10 +266,12 @@ impl State {
         Ok(())
     }
 
+    #[inline(never)]
     fn stop(
         &mut self,
         block: &Block,
-        tables: &Tables,
+        tables: &impl Tables,
+        edit: &Option<Edit>,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
@@ -278,20 +280,31 @@ impl State {
             Some(StopCode::Optional) if !setup.stops_at_m1() => Stop::None,
             Some(StopCode::Program | StopCode::Optional) => Stop::Program,
             Some(StopCode::End) => {
-                self.end_program(tables, setup)?;
+                self.end_program(tables, edit, setup)?;
                 Stop::End
             }
         };
         Ok(())
     }
 
-    /// M2 and M30: modes as at power-up, but G1 with F0; no G92; the overrides on.
-    fn end_program(&mut self, tables: &Tables, setup: &impl Setup) -> Result<(), Status> {
-        self.modal = Modal { motion: MotionMode::Feed, ..Modal::new(&setup.defaults()) };
+    /// M2 and M30: modes as at power-up, but G1 with F0; no G92; the overrides on. The line's own change of the
+    /// tables counts.
+    fn end_program(
+        &mut self,
+        tables: &impl Tables,
+        edit: &Option<Edit>,
+        setup: &impl Setup,
+    ) -> Result<(), Status> {
+        let defaults = setup.defaults();
+        let system = match edit {
+            Some(edit) if edit.row == Row::system(defaults.system) => edit.values,
+            _ => self.system(defaults.system, tables),
+        };
+        self.modal = Modal { motion: MotionMode::Feed, ..Modal::new(&defaults) };
         self.feed = 0.0;
         (self.shift, self.shifted) = ([Length::ZERO; AXES], false);
         self.overridden = ALL;
-        self.update_origin(tables.system(self.modal.system))
+        self.update_origin(&system)
     }
 }
 

@@ -1,168 +1,114 @@
 //! What stays from program to program: coordinate systems, stored positions, tools.
 //!
-//! A line changes one entry at most, and only after nothing on it can fail any more: an [`Edit`] says which.
-//! RAM: 344 bytes.
+//! The interpreter has none of it: what is in force is in its state, and a line that needs another [`Row`] asks
+//! [`Tables`] for it. In the firmware that is the log in EEPROM (`tasks::storage`), elsewhere [`Ram`]. A line
+//! changes one row at most, and only after nothing on it can fail any more: an [`Edit`] says which.
 
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
 /// Coordinate systems, G54 to G59.3.
-pub const SYSTEMS: usize = 9;
+pub const SYSTEMS: u8 = 9;
 /// Stored positions, of G28 and G30.
-pub const STORED: usize = 2;
+pub const STORED: u8 = 2;
 /// Tools with offsets, from number 1.
-pub const TOOLS: usize = 10;
+pub const TOOLS: u8 = 10;
+/// All rows: systems, stored positions, tools.
+pub const ROWS: u8 = SYSTEMS + STORED + TOOLS;
 
-/// The offsets of a tool: those of a mill are along Z, those of a lathe along X and Z.
+/// The axes along which a tool has an offset: Z for a mill, X and Z for a lathe. Along the others its row is 0.
+pub const TOOL_AXES: [u8; 2] = [0, 2];
+
+/// The number of a row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Tool {
-    /// Along X.
-    pub x: Length,
-    /// Along Z.
-    pub z: Length,
-}
+pub struct Row(u8);
 
-impl Tool {
-    /// No offsets.
-    pub const NONE: Self = Self { x: Length::ZERO, z: Length::ZERO };
+impl Row {
+    /// The origin of a coordinate system, from 0; machine coordinates.
+    pub const fn system(number: u8) -> Self {
+        Self(if number < SYSTEMS { number } else { 0 })
+    }
 
-    /// The same for all axes.
-    pub fn offsets(self) -> PerAxis<Length> {
-        let mut all = [Length::ZERO; AXES];
-        [all[0], all[2]] = [self.x, self.z];
-        all
+    /// The position of G28 (0) or G30 (1), machine coordinates.
+    pub const fn stored(which: u8) -> Self {
+        Self(SYSTEMS + if which < STORED { which } else { 0 })
+    }
+
+    /// The offsets of a tool, from 1.
+    pub const fn tool(number: u8) -> Option<Self> {
+        match number {
+            1..=TOOLS => Some(Self(SYSTEMS + STORED + number - 1)),
+            _ => None,
+        }
+    }
+
+    /// Its number among all [`ROWS`].
+    pub const fn number(self) -> u8 {
+        self.0
     }
 }
 
-/// The tables.
+/// A change of one row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Tables {
-    /// Machine coordinates of the origins of G54 to G59.3.
-    systems: [PerAxis<Length>; SYSTEMS],
-    /// The positions of G28 and G30, machine coordinates.
-    stored: [PerAxis<Length>; STORED],
-    tools: [Tool; TOOLS],
+pub struct Edit {
+    /// Which one.
+    pub row: Row,
+    /// What it is to be.
+    pub values: PerAxis<Length>,
 }
 
-/// Numbers in all tables: systems, stored positions, tools; axis by axis.
-pub const VALUES: usize = (SYSTEMS + STORED) * AXES + 2 * TOOLS;
+/// Who keeps the rows.
+pub trait Tables {
+    /// What a row is. On AVR a search of the log: up to 2 ms, and 3.4 more while a byte is written.
+    fn row(&self, row: Row) -> PerAxis<Length>;
 
-/// A change of one entry.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Edit {
-    /// None.
-    #[default]
-    None,
-    /// The origin of a coordinate system, from 0.
-    System(u8, PerAxis<Length>),
-    /// The position of G28 (0) or G30 (1).
-    Stored(u8, PerAxis<Length>),
-    /// A tool, from 1.
-    Tool(u8, Tool),
+    /// Whether a change of a row can be taken now. If not, the line that makes it is refused with [`Status::Again`]
+    /// and is to be tried again later.
+    fn takes(&self, row: Row) -> bool;
+
+    /// Takes a change; [`Self::takes`] has been asked.
+    fn apply(&mut self, edit: &Edit);
 }
 
-impl Default for Tables {
+impl Edit {
+    /// A change that can be taken now.
+    pub fn new(row: Row, values: PerAxis<Length>, tables: &impl Tables) -> Result<Self, Status> {
+        if !tables.takes(row) {
+            return Err(Status::Again);
+        }
+        Ok(Self { row, values })
+    }
+}
+
+/// Tables in RAM, 504 bytes: for whatever is no firmware.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Ram([PerAxis<Length>; ROWS as usize]);
+
+impl Ram {
+    /// All zeros.
+    pub const fn new() -> Self {
+        Self([[Length::ZERO; AXES]; ROWS as usize])
+    }
+}
+
+impl Default for Ram {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl Edit {
-    /// The first of the [`VALUES`] that it changes, and how many.
-    pub fn values(&self) -> Option<(u8, u8)> {
-        let axes = AXES as u8;
-        match *self {
-            Edit::None => None,
-            Edit::System(number, _) => Some((number * axes, axes)),
-            Edit::Stored(which, _) => Some(((SYSTEMS as u8 + which) * axes, axes)),
-            Edit::Tool(number, _) => {
-                let first = (SYSTEMS + STORED) as u8 * axes;
-                Some((first + number.wrapping_sub(1) * 2, 2))
-            }
-        }
-    }
-}
-
-impl Tables {
-    /// All zeros.
-    pub const fn new() -> Self {
-        Self {
-            systems: [[Length::ZERO; AXES]; SYSTEMS],
-            stored: [[Length::ZERO; AXES]; STORED],
-            tools: [Tool::NONE; TOOLS],
-        }
+impl Tables for Ram {
+    fn row(&self, row: Row) -> PerAxis<Length> {
+        self.0.get(usize::from(row.number())).copied().unwrap_or_default()
     }
 
-    /// The origin of a coordinate system, from 0.
-    pub fn system(&self, number: u8) -> &PerAxis<Length> {
-        self.systems.get(usize::from(number)).unwrap_or(&self.systems[0])
+    fn takes(&self, _row: Row) -> bool {
+        true
     }
 
-    /// The position of G28 (0) or G30 (1).
-    pub fn stored(&self, which: u8) -> &PerAxis<Length> {
-        self.stored.get(usize::from(which)).unwrap_or(&self.stored[0])
-    }
-
-    /// A tool; number 0 is an empty spindle, which has no offsets. 171 for one that is not in the table.
-    pub fn tool(&self, number: u32) -> Result<Tool, Status> {
-        let Some(index) = number.checked_sub(1) else { return Ok(Tool::NONE) };
-        let tool = usize::try_from(index).ok().and_then(|index| self.tools.get(index));
-        tool.copied().ok_or(Status::HWordInvalid)
-    }
-
-    /// Value `index` of [`VALUES`].
-    pub fn value(&self, index: u8) -> Length {
-        let index = usize::from(index);
-        let (row, axis) = (index / AXES, index % AXES);
-        let mut vectors = self.systems.iter().chain(&self.stored);
-        if row < SYSTEMS + STORED {
-            return vectors.nth(row).and_then(|all| all.get(axis)).copied().unwrap_or_default();
-        }
-        let index = index - (SYSTEMS + STORED) * AXES;
-        let tool = self.tools.get(index / 2).copied().unwrap_or(Tool::NONE);
-        if index.is_multiple_of(2) { tool.x } else { tool.z }
-    }
-
-    /// Sets value `index` of [`VALUES`].
-    pub fn set(&mut self, index: u8, value: Length) {
-        if let Some(place) = self.place(index) {
-            *place = value;
-        }
-    }
-
-    fn place(&mut self, index: u8) -> Option<&mut Length> {
-        let index = usize::from(index);
-        let (row, axis) = (index / AXES, index % AXES);
-        if row < SYSTEMS {
-            return self.systems.get_mut(row)?.get_mut(axis);
-        }
-        if row < SYSTEMS + STORED {
-            return self.stored.get_mut(row - SYSTEMS)?.get_mut(axis);
-        }
-        let index = index - (SYSTEMS + STORED) * AXES;
-        let tool = self.tools.get_mut(index / 2)?;
-        Some(if index.is_multiple_of(2) { &mut tool.x } else { &mut tool.z })
-    }
-
-    /// Changes an entry.
-    pub fn apply(&mut self, edit: &Edit) {
-        match edit {
-            Edit::None => {}
-            Edit::System(number, origin) => {
-                if let Some(system) = self.systems.get_mut(usize::from(*number)) {
-                    *system = *origin;
-                }
-            }
-            Edit::Stored(which, position) => {
-                if let Some(stored) = self.stored.get_mut(usize::from(*which)) {
-                    *stored = *position;
-                }
-            }
-            Edit::Tool(number, offsets) => {
-                if let Some(tool) = self.tools.get_mut(usize::from(number.wrapping_sub(1))) {
-                    *tool = *offsets;
-                }
-            }
+    fn apply(&mut self, edit: &Edit) {
+        if let Some(row) = self.0.get_mut(usize::from(edit.row.number())) {
+            *row = edit.values;
         }
     }
 }

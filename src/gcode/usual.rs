@@ -8,9 +8,9 @@
 //! Cost on AVR: `X10.375` 1,250 cycles, `G1 X12.345 Y-3.21 F1500` 3,300 (`tests/sim/tests/interpreter.rs`).
 
 use super::command::{Commands, Feed, Motion};
+use super::decimal::Decimal;
 use super::digits::{Digits, ten_thousand_times};
 use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units};
-use super::number::Decimal;
 use super::setup::{AxisMode, Setup};
 use super::state::State;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};

@@ -49,15 +49,15 @@ impl Job {
         self.number
     }
 
-    /// The next line; `None` at the end.
-    pub fn next_line(&mut self) -> Option<Vec<u8, LINE_MAX>> {
+    /// Reads the next line; false at the end. Not by value: a line moved is twice its size of stack.
+    pub fn next_line(&mut self, line: &mut Vec<u8, LINE_MAX>) -> bool {
         loop {
-            let piece = texts::piece(self.number, self.piece)?;
-            let mut line = Vec::new();
+            let Some(piece) = texts::piece(self.number, self.piece) else { return false };
+            line.clear();
             while let Some(byte) = piece.text.at(self.at.into()) {
                 self.at += 1;
                 if byte == b'\n' {
-                    return Some(line);
+                    return true;
                 }
                 // A test holds the lines to their length.
                 let _ = line.push(byte);
@@ -86,8 +86,8 @@ mod tests {
         for number in 1..=u8::MAX {
             let Some(mut job) = Job::new(number) else { continue };
             let (mut state, mut out) = (Interpreter::new(), Commands::default());
-            let mut last = String::new();
-            while let Some(line) = job.next_line() {
+            let (mut last, mut line) = (String::new(), Vec::new());
+            while job.next_line(&mut line) {
                 assert!(line.len() < LINE_MAX, "{number}");
                 let done = state.interpret(&line, &Usual, &mut out);
                 last = String::from_utf8(line.to_vec()).unwrap();

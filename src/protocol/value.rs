@@ -61,7 +61,7 @@ pub enum Value {
     Tool,
     /// `home`: 0 not homed, 1 homed, 2 homing.
     Home,
-    /// `qr`: free blocks of the planner.
+    /// `qr`: free blocks of the planner; never told as less than six.
     QueueFree,
     /// `qi`: blocks added since this was last read.
     QueueAdded,

@@ -1,10 +1,14 @@
 //! What survives a power cut: settings, coordinate systems, stored positions and tools, in EEPROM.
 //!
 //! ```text
-//! a setting is stored -> Links::storage (which items to look at) -> storage task
-//!     -> kept (item -> key, value) -> Log (which slot next) -> Memory, a byte each 3.4 ms
-//! reset -> Log::open -> Log::newest of each item -> Settings, Tables
+//! a setting is stored -> Storage (which items to look at) -> storage task
+//! G10, G28.1          -> Storage (the row on its way)      -> storage task
+//!     -> kept, tables (key, value) -> Log (which slot next) -> Memory, a byte each 3.4 ms
+//! reset -> Log::open -> kept::load -> Settings
+//! a line that asks for a row -> Storage, else tables::row -> Log::find
 //! ```
+//! Settings are in RAM, too; the tables of the interpreter are here alone.
+//!
 //! The EEPROM is a ring of records, each of which says what one item is ([`record`]); the newest record of an
 //! item counts. A new record goes into a slot that holds nothing of worth, and counts only when its last byte has
 //! been written: whenever power fails, an item is what it was or what it was to be. Writing goes round
@@ -17,6 +21,7 @@
 pub mod kept;
 pub mod log;
 pub mod record;
+pub mod tables;
 
 pub use log::Log;
 

@@ -9,7 +9,7 @@
 //! | block ring | blocks | 64 | 2,090 B | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |
 //! | `uart` transmit ring | bytes | 255 | 260 B | parser, reporter | TX interrupt | the writer waits, response half sent |
-//! | [`Links::storage`] | which items to look at | a range | 7 B | parser | storage | the range grows |
+//! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
@@ -79,14 +79,14 @@ pub struct Links {
     pub enquiry: Cell<bool>,
     /// The built-in job that runs.
     pub job: Cell<Job>,
-    /// What has to be put away.
-    pub storage: Storage,
+    /// What has to be put away, and where the rest is.
+    pub storage: &'static Storage,
     /// A setting has changed since the planner looked.
     pub settings_changed: Cell<bool>,
     /// Settings in force.
     pub settings: RefCell<Settings>,
     /// The G-code model. The parser advances it; reports read it.
-    pub model: RefCell<Interpreter>,
+    pub model: RefCell<Interpreter<&'static Storage>>,
 }
 
 /// Counts blocks through the queue, modulo 2^16.

@@ -3,7 +3,11 @@
 //! Reads the line pool, writes `Links::commands`, the G-code model, the settings and the response;
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
 //! data lines only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
-//! keeps its slot until its response has been written. After a limit has been hit lines of G-code are refused. A usual move is done with at once, by [`usual`].
+//! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
+//! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`]. After a
+//! limit has been hit lines of G-code are refused.
+
+use heapless::Vec;
 
 use super::lines::{Class, LineId};
 use super::links::Links;
@@ -12,13 +16,12 @@ use super::view::View;
 use crate::jobs::Job;
 use crate::protocol::{Mode, Next, Request, Span, is_brief, put_brief};
 use crate::status::Status;
-use crate::store::kept::Item;
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
         let alarmed = links.limits_hit.get() != 0;
-        let free = alarmed || !links.commands_taken.get();
+        let free = is_free(links);
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
         let tried = if data && !alarmed { usual(links) } else { Usual::NotTried };
@@ -33,13 +36,23 @@ pub async fn run(links: &'static Links) -> ! {
             }
             continue;
         };
-        if let Some(mut request) = begin(links, id, class, tried)
-            && !answer_at_once(links, id, &mut request)
-        {
-            answer(links, id, &mut request).await;
+        match begin(links, id, class, tried) {
+            Begun::Answer(mut request) => {
+                if !answer_at_once(links, id, &mut request) {
+                    answer(links, id, &mut request).await;
+                }
+            }
+            Begun::Silent => {}
+            Begun::Again => continue,
         }
         finish(links, id);
     }
+}
+
+/// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the tables.
+fn is_free(links: &Links) -> bool {
+    let waits = links.commands_taken.get() || links.storage.is_awaited();
+    !waits || links.limits_hit.get() != 0
 }
 
 /// Carries out the next line of a built-in job. Its end, and a line that is refused, are told by an exception
@@ -47,10 +60,14 @@ pub async fn run(links: &'static Links) -> ! {
 #[inline(never)]
 fn job_line(links: &Links) {
     let mut job = links.job.get();
-    let status = match job.next_line() {
-        Some(line) => interpret(links, &line, Usual::NotTried).0,
-        None => Status::EndOfFile,
+    let mut line = Vec::new();
+    let status = match job.next_line(&mut line) {
+        true => interpret(links, &line, Usual::NotTried).0,
+        false => Status::EndOfFile,
     };
+    if status == Status::Again {
+        return;
+    }
     if !matches!(status, Status::Ok | Status::Noop) {
         job = Job::default();
         links.exception.set(Some(status));
@@ -113,23 +130,39 @@ fn answer_at_once(links: &Links, id: LineId, request: &mut Request) -> bool {
     }
 }
 
+/// How it goes on with a line.
+enum Begun {
+    /// It is to be answered.
+    Answer(Request),
+    /// It gets no answer.
+    Silent,
+    /// It has to wait.
+    Again,
+}
+
 /// Begins with a line. One of G-code has run after that, for data lines are taken only while the
 /// planner is free.
 #[inline(never)]
-fn begin(links: &Links, id: LineId, class: Class, tried: Usual) -> Option<Request> {
+fn begin(links: &Links, id: LineId, class: Class, tried: Usual) -> Begun {
     let lines = links.lines.borrow();
     let line = lines.text(id);
     let mut mode = links.mode.get();
     let mut request = match class {
         Class::Fault(status) => Request::refused(status, mode),
-        _ => Request::begin(line, &mut mode)?,
+        _ => match Request::begin(line, &mut mode) {
+            Some(request) => request,
+            None => return Begun::Silent,
+        },
     };
     links.mode.set(mode);
     if let Some(block) = request.gcode() {
         let (status, commented) = interpret(links, block.of(line), tried);
+        if status == Status::Again {
+            return Begun::Again;
+        }
         request.ran(status, commented);
     }
-    Some(request)
+    Begun::Answer(request)
 }
 
 /// Writes the response to a line.
@@ -140,19 +173,15 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
         match step(links, id, request, &mut tx) {
             Next::More => {}
             Next::Gcode { start, end } => {
-                if links.commands_taken.get() {
+                let block = Span { start, end };
+                while !ran(links, id, block, request) {
                     // Nothing of the response has been put yet: others may talk meanwhile.
                     drop(tx);
-                    while links.commands_taken.get() && links.limits_hit.get() == 0 {
+                    while !is_free(links) {
                         links.parser_wake.wait().await;
                     }
                     tx = links.tx.lock().await;
                 }
-                let lines = links.lines.borrow();
-                let block = Span { start, end };
-                let (status, commented) =
-                    interpret(links, block.of(lines.text(id)), Usual::NotTried);
-                request.ran(status, commented);
             }
             Next::Done(_) => break,
         }
@@ -160,6 +189,21 @@ async fn answer(links: &Links, id: LineId, request: &mut Request) {
     if let Some(rate) = links.rate.take() {
         tx.set_rate(rate).await;
     }
+}
+
+/// Carries out the block of a request, if that can be done now.
+#[inline(never)]
+fn ran(links: &Links, id: LineId, block: Span, request: &mut Request) -> bool {
+    if !is_free(links) {
+        return false;
+    }
+    let lines = links.lines.borrow();
+    let (status, commented) = interpret(links, block.of(lines.text(id)), Usual::NotTried);
+    if status == Status::Again {
+        return false;
+    }
+    request.ran(status, commented);
+    true
 }
 
 /// The line's slot is free again.
@@ -196,9 +240,6 @@ fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
     match done {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
-            if let Some((first, count)) = info.edited {
-                links.storage.note(Item::of_table(first), count.into());
-            }
             if !commands.is_empty() {
                 links.commands_taken.set(true);
                 links.planner_wake.signal();

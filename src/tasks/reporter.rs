@@ -11,9 +11,8 @@ use embassy_time::Timer;
 
 use super::links::Links;
 use super::tx::Tx;
-use super::view::{RUN, View};
+use super::view::{RUN, View, queue_free};
 use crate::hal::imp::time::millis;
-use crate::motion::queue;
 use crate::protocol::notice::{Banner, Exception};
 use crate::protocol::{Machine, Out, Report, Value, queue_report};
 use crate::status::Status;
@@ -32,7 +31,7 @@ struct Told {
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     greet(links).await;
-    let mut told = Told { state: 0, blocks_free: queue::free(), at: millis() };
+    let mut told = Told { state: 0, blocks_free: queue_free(), at: millis() };
     let mut due = true;
     loop {
         if links.enquiry.take() {
@@ -42,7 +41,7 @@ pub async fn run(links: &'static Links) -> ! {
         if let Some(status) = links.exception.take() {
             report_exception(links, status).await;
         }
-        if queue::free() != told.blocks_free && reports_queue(links) {
+        if queue_free() != told.blocks_free && reports_queue(links) {
             told.blocks_free = report_queue(links).await;
         }
         let elapsed = millis().wrapping_sub(told.at);

@@ -20,13 +20,17 @@ use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
 use crate::protocol::{Machine, StatusReport, Value, Warning, thousandths};
 use crate::status::Status;
-use crate::store::kept::Item;
+use crate::store::kept::ITEMS;
 use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
 pub const RUN: i32 = 5;
 /// `stat` after a limit has been hit.
 const ALARM: i32 = 2;
+
+/// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
+/// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
+const QUEUE_FREE_MIN: usize = 6;
 
 /// A look at the machine.
 pub struct View<'a> {
@@ -92,8 +96,8 @@ impl<'a> View<'a> {
     /// A setting is to be put away; if it has `lowered` others, all of them.
     fn note(&self, setting: Setting, lowered: bool) {
         match lowered {
-            true => self.links.storage.note(0, Setting::NUMBERS.into()),
-            false => self.links.storage.note(Item::of_setting(setting), 1),
+            true => self.links.storage.note(0, ITEMS),
+            false => self.links.storage.note(setting.number(), 1),
         }
     }
 
@@ -174,7 +178,7 @@ impl Machine for View<'_> {
             Value::FinishedLine => self.motion().finished as i32,
             Value::MotionLine => self.motion().line as i32,
             Value::Velocity => thousandths(self.motion().velocity * 60.0),
-            Value::QueueFree => queue::free() as i32,
+            Value::QueueFree => queue_free() as i32,
             Value::QueueAdded => self.links.queue_count.take_added(),
             Value::QueueRemoved => self.links.queue_count.take_removed(),
             Value::SlotsFree => self.links.lines.borrow().free().into(),
@@ -213,7 +217,7 @@ impl Machine for View<'_> {
         self.report.restore();
         self.links.resync.set(true);
         self.links.settings_changed.set(true);
-        self.links.storage.note(0, Setting::NUMBERS.into());
+        self.links.storage.note(0, ITEMS);
         set_hardware(&self.settings);
         Status::Ok
     }
@@ -246,6 +250,11 @@ impl Machine for View<'_> {
         }
         Status::Ok
     }
+}
+
+/// Free blocks of the planner, as they are told.
+pub fn queue_free() -> usize {
+    queue::free().max(QUEUE_FREE_MIN)
 }
 
 /// Tells outputs and inputs what the settings say of them. Thread mode, or before interrupts are on.

@@ -25,9 +25,11 @@ const STAGES: &[Stage] = &[
     Stage { name: "firmware of every board", run: build_all },
     Stage { name: "sizes and stack of every board", run: size_all },
     Stage { name: "simulator tests", run: simulator_tests },
+    Stage { name: "real senders", run: || crate::senders::run(&Default::default()) },
 ];
 
-/// Runs the stages; stops at the first that fails. The simulator comes last: it needs the images.
+/// Runs the stages; stops at the first that fails. The simulator and the senders that talk to it come last: they need the
+/// images.
 pub fn run() -> Result<()> {
     for (index, stage) in STAGES.iter().enumerate() {
         println!("\n=== {}/{} {} ===", index + 1, STAGES.len(), stage.name);

@@ -3,6 +3,7 @@
 mod arcs;
 mod cycles;
 mod lines;
+mod tables;
 mod usual;
 
 use super::command::{Commands, Feed, Motion};

@@ -1,4 +1,5 @@
-//! The EEPROM: 4,096 bytes, 3.4 ms to write one. The storage task alone uses it, in thread mode, after start-up.
+//! The EEPROM: 4,096 bytes, 3.4 ms to write one. Thread mode alone uses it, after start-up:
+//! the storage task writes, and whoever looks for something in the log reads. A read waits for a write under way.
 
 use core::arch::asm;
 
@@ -10,11 +11,11 @@ const EEAR: *mut u16 = 0x41 as *mut u16;
 const READ: u8 = 1;
 const WRITE: u8 = 1 << 1;
 
-/// The EEPROM. There is one.
+/// Access to the EEPROM.
 pub struct Eeprom(());
 
 impl Eeprom {
-    /// The EEPROM, for whoever asks first; the caller sees to that.
+    /// Access from thread mode. One task at most is to write.
     pub fn take() -> Self {
         Self(())
     }
@@ -27,7 +28,7 @@ impl Memory for Eeprom {
     #[inline(always)]
     fn read(&self, at: u16) -> u8 {
         while self.is_busy() {}
-        // SAFETY: registers of the EEPROM, which nobody else touches; it is idle.
+        // SAFETY: registers of the EEPROM, which thread mode alone touches; it is idle.
         unsafe {
             EEAR.write_volatile(at);
             EECR.write_volatile(READ);
@@ -42,7 +43,7 @@ impl Memory for Eeprom {
 
     fn write(&mut self, at: u16, byte: u8) {
         while self.is_busy() {}
-        // SAFETY: registers of the EEPROM, which nobody else touches; it is idle. The write has to be begun within
+        // SAFETY: registers of the EEPROM, which thread mode alone touches; it is idle. The write has to be begun within
         // four cycles: interrupts are off for 6.
         unsafe {
             EEAR.write_volatile(at);

@@ -103,6 +103,16 @@ fn a_full_log_says_so_and_loses_nothing() {
 }
 
 #[test]
+fn items_are_found_together_as_alone() {
+    let mut cells = Cells::new();
+    let mut log = Log::open(&cells);
+    for (key, value) in [(1, 10), (2, 20), (1, 11), (3, 30), (2, 21), (1, 12), (4, 40)] {
+        assert!(put(&mut log, &mut cells, key, value));
+    }
+    assert_eq!(log.find(&cells, &[3, 9, 1, 2]), [Some(30), None, Some(12), Some(21)]);
+}
+
+#[test]
 fn rubbish_is_known() {
     let mut cells = Cells::new();
     assert!(!Log::is_rubbish(&cells));
@@ -114,6 +124,38 @@ fn rubbish_is_known() {
 }
 
 proptest! {
+    /// Whoever reads while a record is written finds what the item was or is to be, and all others as they are.
+    #[test]
+    fn the_log_is_read_while_it_is_written(
+        puts in prop::collection::vec((0u16..6, any::<i32>()), 0..60),
+    ) {
+        const KEYS: [u16; 6] = [0, 1, 2, 3, 4, 5];
+        let mut cells = Cells::new();
+        let mut log = Log::open(&cells);
+        let mut kept = [None; 6];
+        for (key, value) in puts {
+            let place = usize::from(key);
+            let mut new = kept;
+            new[place] = Some(value);
+            for moved in 0.. {
+                let (mut write, last) = match log.put(&cells, key, value, moved) {
+                    Put::Room(write) => (write, false),
+                    Put::Last(write) => (write, true),
+                    Put::Full => return Err(TestCaseError::fail("full")),
+                };
+                while write.step(&mut cells) {
+                    let found = log.find(&cells, &KEYS);
+                    prop_assert!(found == kept || found == new, "{found:?}");
+                }
+                if last {
+                    break;
+                }
+            }
+            kept = new;
+            prop_assert_eq!(log.find(&cells, &KEYS), kept);
+        }
+    }
+
     /// Whatever is put away, and at whatever byte power fails: each item is what it was or what it was to be.
     #[test]
     fn a_power_cut_leaves_old_or_new(

@@ -1,9 +1,10 @@
-//! What it costs to interpret a line, lexing included, in cycles of the chip.
+//! What it costs to interpret a line, lexing included, and to find a row of the tables, in cycles of the chip.
 
 mod common;
 
 use common::image;
 use kerf::boards::MEGA2560_GRBL;
+use kerf::store::record::{self, Record};
 use kerf_sim::job::{self, Options};
 use kerf_sim::{Image, Machine, Stopwatch};
 
@@ -18,8 +19,7 @@ fn cost(before: &[&str], line: &str) -> f64 {
     let run = |repeats: usize| {
         let mut machine = Machine::load(&elf, &MEGA2560_GRBL).unwrap();
         for (entry, name) in image.functions() {
-            if ["State>::usual::", "Interpreter>::general::"].iter().any(|part| name.contains(part))
-            {
+            if ["State>::usual::", ">::general::"].iter().any(|part| name.contains(part)) {
                 machine.add_stopwatch(Stopwatch::calls(*entry));
             }
         }
@@ -48,4 +48,28 @@ fn typical_g1_lines_keep_to_the_budget() {
         worst = worst.max(cycles);
     }
     assert!(worst <= BUDGET, "{worst} cycles");
+}
+
+#[test]
+fn a_row_of_the_tables_is_found_in_time() {
+    // The log is full, and of nothing that is sought: no search is longer.
+    let mut eeprom = [0xFF; 4_096];
+    for (number, slot) in (0u16..).zip(eeprom.chunks_exact_mut(record::SIZE.into())) {
+        let key = number.wrapping_mul(40_503);
+        slot.copy_from_slice(&Record { key, number, value: 7 }.bytes());
+    }
+    let elf = image(&MEGA2560_GRBL);
+    let functions = Image::read(&elf).unwrap();
+    let mut machine = Machine::load(&elf, &MEGA2560_GRBL).unwrap();
+    machine.set_eeprom(&eeprom);
+    for (entry, name) in functions.functions() {
+        if name.contains("store::tables::row::") {
+            machine.add_stopwatch(Stopwatch::calls(*entry));
+        }
+    }
+    let lines = [(1, "G55".into()), (2, "G54".into())].into();
+    job::run(&mut machine, &lines, &Options::default(), |_| {}).unwrap();
+    let cost = machine.stopwatches()[0].cost();
+    println!("{} searches, {} cycles at most", cost.count, cost.max);
+    assert!(cost.count >= 2 && cost.max < 32_000, "{} cycles", cost.max);
 }
