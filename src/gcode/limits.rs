@@ -35,7 +35,8 @@ pub(super) fn check(
         | Motion::Feed { target, .. }
         | Motion::Probe { target, .. } => target,
         Motion::Arc { target, arc, .. } => {
-            if !arc_is_within(start, target, arc, limits) {
+            let limits = [arc.first, arc.second].map(limits);
+            if !arc_is_within(start, target, arc, &limits) {
                 return Err(Status::SoftLimit);
             }
             target
@@ -85,16 +86,16 @@ fn check_cycle(
     if all { Ok(()) } else { Err(Status::SoftLimit) }
 }
 
-/// Whether the points of an arc that lie farthest out in its plane are within the limits; its end is
-/// not looked at. A helix advances evenly, so that its end is the farthest point along its axis.
+/// Whether the points of an arc that lie farthest out in its plane are within the limits, `both` of its first and
+/// second axis; its end is not looked at. A helix advances evenly, so that its end is the farthest point along its axis.
+#[inline(never)]
 pub(super) fn arc_is_within(
     start: &PerAxis<Length>,
     target: &PerAxis<Length>,
     arc: &Arc,
-    limits: impl Fn(u8) -> Option<(Length, Length)>,
+    both: &[Option<(Length, Length)>; 2],
 ) -> bool {
-    let both = [arc.first, arc.second].map(&limits);
-    if both == [None, None] {
+    if *both == [None, None] {
         return true;
     }
     let (from, to) = (spoke(start, arc), spoke(target, arc));
