@@ -8,7 +8,6 @@ use crate::units::{AXES, Length, PerAxis};
 
 /// What a row is. Cost on AVR: see [`Log::find`].
 #[inline(never)]
-#[small]
 pub fn row<M: Memory>(log: &Log, memory: &M, row: Row) -> PerAxis<Length> {
     let mut keys = [0; AXES];
     for (axis, key) in (0..).zip(&mut keys) {
