@@ -122,6 +122,7 @@ impl Request {
         let Some((group, (index, token))) = member else {
             return self.leave(c);
         };
+        c.machine.moment(self.item == 0);
         self.item = index + 1;
         let shown = token.read(c.machine);
         let (name, prefix) = (token.name(), group.prefix().bytes().len());

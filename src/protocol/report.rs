@@ -2,7 +2,7 @@
 //!
 //! [`StatusReport`] is the list of what to tell and what was told last; [`Report`] sends one report
 //! in steps, [`queue_report`] one queue report at once. The reporting task holds the transmitter
-//! from the first step of a report to its last.
+//! from the first step of a report to its last; [`Machine::moment`] makes it tell of one moment.
 
 use super::Format;
 use super::Mode;
@@ -123,6 +123,7 @@ impl Report {
             self.end(out);
             return false;
         };
+        machine.moment(self.index == 0);
         let shown = token.read(machine);
         let value = match shown {
             Shown::Number(fixed) => fixed.value,
