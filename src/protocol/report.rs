@@ -80,7 +80,23 @@ impl StatusReport {
             None => return false,
         }
         self.len += 1;
+        self.fresh = true;
         true
+    }
+
+    /// Takes a token off the list, by its small number.
+    pub fn remove(&mut self, number: u8) {
+        let listed = self.tokens.iter().take(usize::from(self.len));
+        let Some(at) = listed.clone().position(|&token| token == number) else { return };
+        for (to, from) in (at..usize::from(self.len) - 1).zip(at + 1..) {
+            if let Some(&token) = self.tokens.get(from)
+                && let Some(place) = self.tokens.get_mut(to)
+            {
+                *place = token;
+            }
+        }
+        self.len -= 1;
+        self.fresh = true;
     }
 
     /// Has the next report tell everything, as after a reset.

@@ -2,24 +2,31 @@
 
 use super::machine::Machine;
 use super::value::{
-    Form, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value, Vector, place_form,
-    vector_value,
+    Form, NEAR, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value, Vector,
+    place_form, vector_value,
 };
 use crate::config::name::{Name, axis_letter, axis_of};
 use crate::config::rows::{find_row, row_name, value_name};
 use crate::config::table::Kind;
 use crate::config::{Fixed, Owner, Setting};
-use crate::gcode::tables::Row;
+use crate::gcode::tables::{ROWS, Row};
 use crate::progmem;
 use crate::progmem::Text;
 use crate::text;
 use crate::units::AXES;
 
-const FIRST_SINGLE: u8 = Setting::NUMBERS;
+const FIRST_SINGLE: u8 = Setting::WARM;
 const FIRST_VECTOR: u8 = FIRST_SINGLE + SINGLE_COUNT as u8;
 
-/// The first value of the interpreter's tables. Those below it fit one byte.
+/// The first value of the interpreter's tables. Those below it fit one byte, and status reports.
 const FIRST_ROW: u16 = 256;
+/// The first setting that is in EEPROM alone.
+const FIRST_COLD: u16 = FIRST_ROW + (ROWS as usize * AXES) as u16;
+/// The first of the vectors that are too many for one byte.
+const FIRST_FAR: u16 = FIRST_COLD + (Setting::NUMBERS - Setting::WARM) as u16;
+/// Behind the last.
+#[cfg(not(target_arch = "avr"))]
+const END: u16 = FIRST_FAR + ((VECTOR_COUNT - NEAR as usize) * AXES) as u16;
 
 /// A setting or a value, as a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -35,6 +42,12 @@ pub enum Subject {
     Member(u8, Vector, u8),
     /// A value of the interpreter's tables.
     Row(Row, u8),
+}
+
+impl Subject {
+    fn member(vector: u8, index: u8) -> Option<Subject> {
+        VECTORS.at(usize::from(vector)).map(|row| Subject::Member(vector, row, index))
+    }
 }
 
 /// A token's value, ready to be written.
@@ -54,12 +67,8 @@ impl Token {
         Token(row as u16)
     }
 
-    /// Whether it is in EEPROM alone, too far away to be told all the time.
-    pub fn is_far(self) -> bool {
-        self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
-    }
-
-    /// Its number, if it fits.
+    /// Its number, if it fits. Those that do not are in EEPROM alone, too far away to be told all the time, or for
+    /// a closer look.
     pub fn small(self) -> Option<u8> {
         self.0.try_into().ok()
     }
@@ -76,7 +85,21 @@ impl Token {
 
     /// The token of a vector's member.
     const fn member(vector: u8, index: u8) -> Token {
-        Token((FIRST_VECTOR + vector * AXES as u8 + index) as u16)
+        if vector < NEAR {
+            Token((FIRST_VECTOR + vector * AXES as u8 + index) as u16)
+        } else {
+            Token(FIRST_FAR + ((vector - NEAR) * AXES as u8 + index) as u16)
+        }
+    }
+
+    /// The token of a setting.
+    fn of_setting(setting: Setting) -> Token {
+        let number = u16::from(setting.number());
+        Token(if setting.is_cold() {
+            FIRST_COLD - u16::from(Setting::WARM) + number
+        } else {
+            number
+        })
     }
 
     /// The token of a value of a row.
@@ -86,7 +109,7 @@ impl Token {
 
     /// The setting or value called `name`. Up to 20,000 cycles on AVR.
     pub fn find(name: &Name) -> Option<Token> {
-        let setting = || Setting::find(name).map(|s| Token::of_small(s.number()));
+        let setting = || Setting::find(name).map(Token::of_setting);
         let single = || {
             let found = |i: &usize| SINGLES.at(*i).is_some_and(|s| name.matches(0, s.token));
             (0..SINGLE_COUNT).find(found).map(|i| Token::single(i as u8))
@@ -119,10 +142,7 @@ impl Token {
 
     /// What it is.
     pub fn subject(self) -> Option<Subject> {
-        let Some(number) = self.small() else {
-            let (row, axis) = by_axis((self.0 - FIRST_ROW) as u8);
-            return Row::from_number(row).map(|row| Subject::Row(row, axis));
-        };
+        let Some(number) = self.small() else { return self.far_subject() };
         if number < FIRST_SINGLE {
             return Setting::from_number(number).map(Subject::Setting);
         }
@@ -130,12 +150,28 @@ impl Token {
             return SINGLES.at(usize::from(number - FIRST_SINGLE)).map(Subject::Single);
         }
         let (number, index) = by_axis(number - FIRST_VECTOR);
-        VECTORS.at(usize::from(number)).map(|vector| Subject::Member(number, vector, index))
+        Subject::member(number, index)
+    }
+
+    fn far_subject(self) -> Option<Subject> {
+        if self.0 < FIRST_COLD {
+            let (row, axis) = by_axis((self.0 - FIRST_ROW) as u8);
+            return Row::from_number(row).map(|row| Subject::Row(row, axis));
+        }
+        if self.0 < FIRST_FAR {
+            let number = (self.0 - FIRST_COLD) as u8 + Setting::WARM;
+            return Setting::from_number(number).map(Subject::Setting);
+        }
+        let (number, index) = by_axis((self.0 - FIRST_FAR) as u8);
+        Subject::member(number + NEAR, index)
     }
 
     /// The setting it is, if it is one.
     pub fn setting(self) -> Option<Setting> {
-        self.small().and_then(Setting::from_number)
+        match self.subject() {
+            Some(Subject::Setting(setting)) => Some(setting),
+            _ => None,
+        }
     }
 
     /// Its full name.
@@ -267,7 +303,7 @@ pub enum Group {
     Row(Row),
     /// A token alone.
     One(Token),
-    /// `sr`: the tokens of the status report.
+    /// `sr`, `srs`: the tokens of the status report.
     Report,
 }
 
@@ -283,7 +319,7 @@ impl Group {
         if name.is(text!("sys")) {
             return Some(Group::Settings(Owner::System));
         }
-        if name.is(text!("sr")) {
+        if name.is(text!("sr")) || name.is(text!("srs")) {
             return Some(Group::Report);
         }
         if let Some(owner) = Owner::called(name) {
@@ -309,7 +345,7 @@ impl Group {
     pub fn member(self, from: u8, machine: &mut impl Machine) -> Option<(u8, Token)> {
         match self {
             Group::Settings(owner) => (from..owner.rows())
-                .find_map(|row| Some((row, Token::of_small(Setting::of(owner, row)?.number())))),
+                .find_map(|row| Some((row, Token::of_setting(Setting::of(owner, row)?)))),
             Group::Vector(number) => {
                 let members = VECTORS.at(usize::from(number))?.members;
                 (from < members).then(|| (from, Token::member(number, from)))
@@ -329,7 +365,7 @@ impl Group {
 #[cfg(not(target_arch = "avr"))]
 pub fn names() -> std::vec::Vec<std::string::String> {
     let text = |bytes: &[u8]| std::string::String::from_utf8_lossy(bytes).into_owned();
-    let tokens = (0..FIRST_ROW + u16::from(crate::gcode::tables::ROWS) * AXES as u16).map(Token);
+    let tokens = (0..END).map(Token);
     let tokens = tokens.filter(|token| Token::find(&token.name()) == Some(*token));
     let actions = ACTIONS.get().map(|(name, _)| name.bytes().map(char::from).collect());
     tokens.map(|token| text(token.name().bytes())).chain(actions).collect()

@@ -87,12 +87,21 @@ pub enum Value {
     Row(Row, u8),
     /// `pwr1` and so on: 1 if the motor is powered.
     Powered(u8),
+    /// `_tex` and so on: where the lines read so far end, in units of a `Length`.
+    Target(u8),
+    /// `_ts1` and so on: where exec has brought a motor, in steps.
+    Steps(u8),
+    /// What there is none of: `fd`, `ma`, `_xs1`, `_fe1`.
+    Zero,
 }
 
 /// A speed as [`Machine::value`](super::Machine::value) returns it: thousandths, saturating.
 pub fn thousandths(speed: f32) -> i32 {
     (speed * 1e3 + if speed < 0.0 { -0.5 } else { 0.5 }) as i32
 }
+
+/// Most steps that are shown: with two decimals they fit.
+const STEPS_MAX: i32 = i32::MAX / 100;
 
 /// What a value is measured in.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -106,6 +115,10 @@ pub enum Form {
     Length,
     /// A length in millimetres whatever the units, or an angle.
     Millimetres,
+    /// The same with two decimals.
+    Rough,
+    /// Steps, with two decimals.
+    Steps,
 }
 
 impl Form {
@@ -113,11 +126,20 @@ impl Form {
     pub fn show(self, value: i32, inches: bool) -> Fixed {
         let (stored, shown) = match self {
             Form::Count => return Fixed::int(value),
+            Form::Steps => {
+                let value = value.clamp(-STEPS_MAX, STEPS_MAX).wrapping_mul(100);
+                return Fixed { value, decimals: 2 };
+            }
             Form::Speed => (3, 2),
+            Form::Rough => (4, 2),
             Form::Length | Form::Millimetres => (4, 3),
         };
         let value = Fixed { value, decimals: stored };
-        if inches && self != Form::Millimetres { value.inches(shown) } else { value.rounded(shown) }
+        if inches && matches!(self, Form::Speed | Form::Length) {
+            value.inches(shown)
+        } else {
+            value.rounded(shown)
+        }
     }
 }
 
@@ -162,9 +184,11 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 28;
+pub const SINGLE_COUNT: usize = 30;
 /// Entries of [`VECTORS`].
-pub const VECTOR_COUNT: usize = 7;
+pub const VECTOR_COUNT: usize = 15;
+/// Those before this are for status reports, too.
+pub const NEAR: u8 = 7;
 /// The number of the vector `g92`.
 pub const SHIFT: u8 = 5;
 
@@ -202,6 +226,10 @@ const fn speed(name: &str, value: Value, label: Text) -> Single {
     Single { token: token(name), value, form: Form::Speed, label, choices: NONE }
 }
 
+const fn single(name: &str, value: Value, form: Form) -> Single {
+    Single { token: token(name), value, form, label: NONE, choices: NONE }
+}
+
 const fn vector(name: &str, form: Form, members: u8, label: Text) -> Vector {
     Vector { token: token(name), form, members, label }
 }
@@ -237,6 +265,8 @@ progmem! {
         count("sps", Value::SpindleSpeed, text!("Spindle speed:"), NONE),
         count("com", Value::Mist, text!("Mist coolant:"), ON),
         count("cof", Value::Flood, text!("Flood coolant:"), ON),
+        count("fd", Value::Zero, NONE, NONE),
+        single("ma", Value::Zero, Form::Length),
     ];
 
     /// Values of each axis or motor; [`vector_value`] gives the order.
@@ -248,6 +278,14 @@ progmem! {
         vector("tof", Form::Millimetres, 6, text!(" tool length:")),
         vector("g92", Form::Length, 6, NONE),
         vector("pwr", Form::Count, 4, NONE),
+        vector("_te", Form::Rough, 6, NONE),
+        vector("_tr", Form::Rough, 6, NONE),
+        vector("_ts", Form::Steps, 4, NONE),
+        vector("_ps", Form::Steps, 4, NONE),
+        vector("_cs", Form::Steps, 4, NONE),
+        vector("_es", Form::Steps, 4, NONE),
+        vector("_xs", Form::Steps, 4, NONE),
+        vector("_fe", Form::Steps, 4, NONE),
     ];
 }
 
@@ -260,7 +298,11 @@ pub fn vector_value(vector: u8, index: u8) -> Value {
         3 => Value::Homed(index),
         4 => Value::ToolOffset(index),
         SHIFT => Value::Shift(index),
-        _ => Value::Powered(index),
+        6 => Value::Powered(index),
+        7 => Value::Target(index),
+        8 => Value::MachinePosition(index),
+        9..13 => Value::Steps(index),
+        _ => Value::Zero,
     }
 }
 

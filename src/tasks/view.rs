@@ -230,6 +230,13 @@ impl Machine for View<'_> {
             }
             Value::Row(row, axis) => self.links.storage.value(row, axis).0,
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
+            Value::Target(axis) => {
+                self.links.model.borrow().position().get(usize::from(axis)).map_or(0, |at| at.0)
+            }
+            Value::Steps(motor) => {
+                self.motion().position.get(usize::from(motor)).map_or(0, |at| *at)
+            }
+            Value::Zero => 0,
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
             Value::Hold => self.hold(),
