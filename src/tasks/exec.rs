@@ -2,7 +2,7 @@
 //!
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
 //! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
-//! milliseconds ([`enough`]), 4,000 to 9,000 cycles each; the rest one by one, when thread mode has nothing
+//! milliseconds ([`enough`]), 4,000 to 14,000 cycles each; the rest one by one, when thread mode has nothing
 //! else to do: a line that has come is answered meanwhile.
 
 use crate::boards::ACTIVE;
@@ -24,11 +24,11 @@ const fn tenths(of_ms: u32) -> u32 {
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
     let mut machine = Exec::new();
     let mut segment = Segment::default();
-    let (mut most, mut rests) = (1u8, true);
+    let (mut few, mut most, mut rests) = (1u8, 1u8, true);
     let mut outputs = 0;
     let mut finished = Finished::new();
     loop {
-        exec::wait(|| (segments.used() < most.into()).then_some(())).await;
+        exec::wait(|| wants(segments.used() as u8, few, most).then_some(())).await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
         let step = links::update(|out| {
@@ -65,11 +65,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             let _ = segments.push_copy(&segment);
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
-            most = queued(cycles, rests);
-            if segments.used() >= enough(cycles).into() && segments.used() < most.into() {
-                exec::pend_when_idle();
-                exec_asked_again().await;
-            }
+            (few, most) = (enough(cycles), queued(cycles, rests));
         }
         if blocks.len() != waiting {
             flags::set(Event::BlockDone);
@@ -83,6 +79,11 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             links::hungry(false);
         }
     }
+}
+
+/// Whether one more segment is wanted now, when `used` are queued.
+fn wants(used: u8, few: u8, most: u8) -> bool {
+    used < few || used < most && exec::when_idle()
 }
 
 /// How many segments are queued at a time if the last took so many CPU cycles: what is queued cannot be
@@ -100,7 +101,7 @@ fn queued(cycles: u32, rests: bool) -> u8 {
     }
 }
 
-/// How many segments are queued in one go if the last took so many CPU cycles: 2 ms beside the one that runs, three
+/// How many segments are queued whatever else there is to do, if the last took so many CPU cycles: 2 ms beside the one that runs, three
 /// times what the next one takes.
 #[inline(always)]
 fn enough(cycles: u32) -> u8 {
