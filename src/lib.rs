@@ -27,5 +27,6 @@ pub mod protocol;
 pub mod realtime;
 pub mod status;
 pub mod store;
+pub mod switches;
 pub mod tasks;
 pub mod units;

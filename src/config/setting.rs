@@ -11,9 +11,9 @@ use crate::units::{AXES, FIRST_ROTARY};
 
 const FIRST_MOTOR: u8 = SYSTEM_ROWS as u8;
 const FIRST_AXIS: u8 = FIRST_MOTOR + (MOTORS * MOTOR_ROWS) as u8;
-const FIRST_JOB: u8 = FIRST_AXIS + (AXES * AXIS_ROWS) as u8;
-const FIRST_PWM: u8 = FIRST_JOB + JOB_ROWS as u8;
+const FIRST_PWM: u8 = FIRST_AXIS + (AXES * AXIS_ROWS) as u8;
 const FIRST_USER: u8 = FIRST_PWM + PWM_ROWS as u8;
+const FIRST_JOB: u8 = FIRST_USER + USERS * USER_ROWS as u8;
 
 /// The groups of user data, `uda` to `udd`.
 pub const USERS: u8 = 4;
@@ -147,9 +147,11 @@ pub struct Setting(u8);
 
 impl Setting {
     /// Numbers below this may be settings.
-    pub const NUMBERS: u8 = FIRST_USER + USERS * USER_ROWS as u8;
-    /// Numbers below this may be settings that are in RAM; from this on they are in EEPROM alone.
+    pub const NUMBERS: u8 = FIRST_JOB + JOB_ROWS as u8;
+    /// Numbers below this may be settings that are in RAM and are kept.
     pub const WARM: u8 = FIRST_PWM;
+    /// From [`Self::WARM`] to before this are those that are in EEPROM alone.
+    pub const COLD: u8 = FIRST_JOB;
 
     /// Its number.
     pub fn number(self) -> u8 {
@@ -215,7 +217,7 @@ impl Setting {
 
     /// Whether it is in EEPROM alone.
     pub fn is_cold(self) -> bool {
-        self.0 >= Self::WARM
+        (Self::WARM..Self::COLD).contains(&self.0)
     }
 
     /// Whether it is written as hexadecimal.
@@ -249,14 +251,14 @@ impl Setting {
             Owner::System
         } else if self.0 < FIRST_AXIS {
             Owner::Motor((self.0 - FIRST_MOTOR) / MOTOR_ROWS as u8)
-        } else if self.0 < FIRST_JOB {
-            Owner::Axis((self.0 - FIRST_AXIS) / AXIS_ROWS as u8)
         } else if self.0 < FIRST_PWM {
-            Owner::Job
+            Owner::Axis((self.0 - FIRST_AXIS) / AXIS_ROWS as u8)
         } else if self.0 < FIRST_USER {
             Owner::Pwm
-        } else {
+        } else if self.0 < FIRST_JOB {
             Owner::User((self.0 - FIRST_USER) / USER_ROWS as u8)
+        } else {
+            Owner::Job
         }
     }
 

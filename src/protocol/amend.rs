@@ -72,16 +72,15 @@ fn reset(name: &Name, pair: &Pair, machine: &mut impl Machine) -> Result<(), Sta
 
 /// A value to tell from now on, or no more.
 fn change<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
-    let number = match resolve(Name::new(), pair.name.of(c.line)) {
-        Target::Token(token) => token.small(),
-        _ => None,
+    let token = match resolve(Name::new(), pair.name.of(c.line)) {
+        Target::Token(token) if !token.is_far() => token,
+        _ => return Err(Status::UnrecognizedName),
     };
-    let number = number.ok_or(Status::UnrecognizedName)?;
     match pair.kind {
-        Kind::True if !c.machine.report().add(number) => Err(Status::JsonTooManyPairs),
+        Kind::True if !c.machine.report().add(token) => Err(Status::JsonTooManyPairs),
         Kind::True => Ok(()),
         Kind::False => {
-            c.machine.report().remove(number);
+            c.machine.report().remove(token);
             Ok(())
         }
         _ => Err(Status::UnsupportedType),

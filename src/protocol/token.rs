@@ -2,31 +2,24 @@
 
 use super::machine::Machine;
 use super::value::{
-    Form, NEAR, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value, Vector,
-    place_form, vector_value,
+    Form, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value, Vector, place_form,
+    vector_value,
 };
 use crate::config::name::{Name, axis_letter, axis_of};
 use crate::config::rows::{find_row, row_name, value_name};
 use crate::config::table::Kind;
 use crate::config::{Fixed, Owner, Setting};
-use crate::gcode::tables::{ROWS, Row};
+use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::text;
 use crate::units::AXES;
 
-const FIRST_SINGLE: u8 = Setting::WARM;
-const FIRST_VECTOR: u8 = FIRST_SINGLE + SINGLE_COUNT as u8;
+const FIRST_SINGLE: u16 = Setting::NUMBERS as u16;
+const FIRST_VECTOR: u16 = FIRST_SINGLE + SINGLE_COUNT as u16;
 
-/// The first value of the interpreter's tables. Those below it fit one byte, and status reports.
-const FIRST_ROW: u16 = 256;
-/// The first setting that is in EEPROM alone.
-const FIRST_COLD: u16 = FIRST_ROW + (ROWS as usize * AXES) as u16;
-/// The first of the vectors that are too many for one byte.
-const FIRST_FAR: u16 = FIRST_COLD + (Setting::NUMBERS - Setting::WARM) as u16;
-/// Behind the last.
-#[cfg(not(target_arch = "avr"))]
-const END: u16 = FIRST_FAR + ((VECTOR_COUNT - NEAR as usize) * AXES) as u16;
+/// The first value of the interpreter's tables. Those below it may be told all the time.
+const FIRST_ROW: u16 = 512;
 
 /// A setting or a value, as a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -42,12 +35,6 @@ pub enum Subject {
     Member(u8, Vector, u8),
     /// A value of the interpreter's tables.
     Row(Row, u8),
-}
-
-impl Subject {
-    fn member(vector: u8, index: u8) -> Option<Subject> {
-        VECTORS.at(usize::from(vector)).map(|row| Subject::Member(vector, row, index))
-    }
 }
 
 /// A token's value, ready to be written.
@@ -67,39 +54,34 @@ impl Token {
         Token(row as u16)
     }
 
-    /// Its number, if it fits. Those that do not are in EEPROM alone, too far away to be told all the time, or for
-    /// a closer look.
-    pub fn small(self) -> Option<u8> {
-        self.0.try_into().ok()
+    /// Whether it is in EEPROM alone, too far away to be told all the time.
+    pub fn is_far(self) -> bool {
+        self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
     }
 
-    /// The token of a number that [`Token::small`] returned.
-    pub const fn of_small(number: u8) -> Token {
-        Token(number as u16)
+    /// Its number; of those that are not [far](Self::is_far) below 512.
+    pub const fn number(self) -> u16 {
+        self.0
     }
 
-    /// The token of a value in the table of [`SINGLES`].
-    const fn single(index: u8) -> Token {
-        Token((FIRST_SINGLE + index) as u16)
-    }
-
-    /// The token of a vector's member.
-    const fn member(vector: u8, index: u8) -> Token {
-        if vector < NEAR {
-            Token((FIRST_VECTOR + vector * AXES as u8 + index) as u16)
-        } else {
-            Token(FIRST_FAR + ((vector - NEAR) * AXES as u8 + index) as u16)
-        }
+    /// The token of a number that [`Token::number`] returned.
+    pub const fn numbered(number: u16) -> Token {
+        Token(number)
     }
 
     /// The token of a setting.
     fn of_setting(setting: Setting) -> Token {
-        let number = u16::from(setting.number());
-        Token(if setting.is_cold() {
-            FIRST_COLD - u16::from(Setting::WARM) + number
-        } else {
-            number
-        })
+        Token(setting.number().into())
+    }
+
+    /// The token of a value in the table of [`SINGLES`].
+    const fn single(index: u8) -> Token {
+        Token(FIRST_SINGLE + index as u16)
+    }
+
+    /// The token of a vector's member.
+    const fn member(vector: u8, index: u8) -> Token {
+        Token(FIRST_VECTOR + (vector * AXES as u8 + index) as u16)
     }
 
     /// The token of a value of a row.
@@ -142,36 +124,28 @@ impl Token {
 
     /// What it is.
     pub fn subject(self) -> Option<Subject> {
-        let Some(number) = self.small() else { return self.far_subject() };
-        if number < FIRST_SINGLE {
-            return Setting::from_number(number).map(Subject::Setting);
+        let number = self.0;
+        if let Some(setting) = self.setting() {
+            return Some(Subject::Setting(setting));
         }
         if number < FIRST_VECTOR {
-            return SINGLES.at(usize::from(number - FIRST_SINGLE)).map(Subject::Single);
+            let index = number.checked_sub(FIRST_SINGLE)?;
+            return SINGLES.at(usize::from(index)).map(Subject::Single);
         }
-        let (number, index) = by_axis(number - FIRST_VECTOR);
-        Subject::member(number, index)
-    }
-
-    fn far_subject(self) -> Option<Subject> {
-        if self.0 < FIRST_COLD {
-            let (row, axis) = by_axis((self.0 - FIRST_ROW) as u8);
-            return Row::from_number(row).map(|row| Subject::Row(row, axis));
+        if number < FIRST_ROW {
+            let (number, index) = vector_index((number - FIRST_VECTOR) as u8);
+            return VECTORS
+                .at(usize::from(number))
+                .filter(|vector| index < vector.members)
+                .map(|vector| Subject::Member(number, vector, index));
         }
-        if self.0 < FIRST_FAR {
-            let number = (self.0 - FIRST_COLD) as u8 + Setting::WARM;
-            return Setting::from_number(number).map(Subject::Setting);
-        }
-        let (number, index) = by_axis((self.0 - FIRST_FAR) as u8);
-        Subject::member(number + NEAR, index)
+        let (row, axis) = by_axis((number - FIRST_ROW) as u8);
+        Row::from_number(row).map(|row| Subject::Row(row, axis))
     }
 
     /// The setting it is, if it is one.
     pub fn setting(self) -> Option<Setting> {
-        match self.subject() {
-            Some(Subject::Setting(setting)) => Some(setting),
-            _ => None,
-        }
+        u8::try_from(self.0).ok().and_then(Setting::from_number)
     }
 
     /// Its full name.
@@ -218,6 +192,12 @@ impl Token {
 /// Which group of six, and which of it.
 fn by_axis(number: u8) -> (u8, u8) {
     (number / AXES as u8, number % AXES as u8)
+}
+
+/// Which vector, and which member of it. The last one may have more members.
+fn vector_index(offset: u8) -> (u8, u8) {
+    let number = (offset / AXES as u8).min(VECTOR_COUNT as u8 - 1);
+    (number, offset - number * AXES as u8)
 }
 
 fn is_vector(name: &Name, vector: u8) -> bool {
@@ -365,7 +345,7 @@ impl Group {
 #[cfg(not(target_arch = "avr"))]
 pub fn names() -> std::vec::Vec<std::string::String> {
     let text = |bytes: &[u8]| std::string::String::from_utf8_lossy(bytes).into_owned();
-    let tokens = (0..END).map(Token);
+    let tokens = (0..FIRST_ROW + u16::from(crate::gcode::tables::ROWS) * AXES as u16).map(Token);
     let tokens = tokens.filter(|token| Token::find(&token.name()) == Some(*token));
     let actions = ACTIONS.get().map(|(name, _)| name.bytes().map(char::from).collect());
     tokens.map(|token| text(token.name().bytes())).chain(actions).collect()

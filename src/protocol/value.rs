@@ -1,5 +1,6 @@
 //! What can be read of the machine beside its settings: names, units and texts, as tables.
 
+use crate::boards::inputs;
 use crate::config::Fixed;
 use crate::config::name::token;
 use crate::gcode::tables::Row;
@@ -93,6 +94,11 @@ pub enum Value {
     Steps(u8),
     /// What there is none of: `fd`, `ma`, `_xs1`, `_fe1`.
     Zero,
+    /// `in1` to `in8`, `inp`, `ind`, `ine`, of [`inputs`](crate::boards::inputs): 1 if the switch is worked, 0 if
+    /// not, -1 if there is none or its setting is 0.
+    Input(u8),
+    /// The end whose limit has been hit, which exceptions tell; -1 for none.
+    LimitHit,
 }
 
 /// A speed as [`Machine::value`](super::Machine::value) returns it: thousandths, saturating.
@@ -130,8 +136,8 @@ impl Form {
                 let value = value.clamp(-STEPS_MAX, STEPS_MAX).wrapping_mul(100);
                 return Fixed { value, decimals: 2 };
             }
-            Form::Speed => (3, 2),
             Form::Rough => (4, 2),
+            Form::Speed => (3, 2),
             Form::Length | Form::Millimetres => (4, 3),
         };
         let value = Fixed { value, decimals: stored };
@@ -170,7 +176,7 @@ pub struct Vector {
     pub token: [u8; 4],
     /// What they are measured in.
     pub form: Form,
-    /// Members: axes, or motors.
+    /// Members: axes, motors, or inputs. More than axes only in the last row.
     pub members: u8,
     /// What text reports call it, behind the axis's letter.
     pub label: Text,
@@ -184,11 +190,9 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 30;
+pub const SINGLE_COUNT: usize = 33;
 /// Entries of [`VECTORS`].
-pub const VECTOR_COUNT: usize = 15;
-/// Those before this are for status reports, too.
-pub const NEAR: u8 = 7;
+pub const VECTOR_COUNT: usize = 16;
 /// The number of the vector `g92`.
 pub const SHIFT: u8 = 5;
 
@@ -217,6 +221,10 @@ const ARC_DISTANCE: Text =
     text!("G90.1 - absolute distance mode|G91.1 - incremental distance mode (default mode)");
 const ON: Text = text!("Off|On");
 const PATH: Text = text!("G61 - exact path mode|G61.1 - exact stop mode|G64 - continuous mode");
+
+const PROBE: Value = Value::Input(inputs::PROBE as u8);
+const DOOR: Value = Value::Input(inputs::DOOR as u8);
+const STOP: Value = Value::Input(inputs::STOP as u8);
 
 const fn count(name: &str, value: Value, label: Text, choices: Text) -> Single {
     Single { token: token(name), value, form: Form::Count, label, choices }
@@ -267,6 +275,9 @@ progmem! {
         count("cof", Value::Flood, text!("Flood coolant:"), ON),
         count("fd", Value::Zero, NONE, NONE),
         single("ma", Value::Zero, Form::Length),
+        count("inp", PROBE, text!("Probe:"), NONE),
+        count("ind", DOOR, text!("Door:"), NONE),
+        count("ine", STOP, text!("Emergency stop:"), NONE),
     ];
 
     /// Values of each axis or motor; [`vector_value`] gives the order.
@@ -286,6 +297,7 @@ progmem! {
         vector("_es", Form::Steps, 4, NONE),
         vector("_xs", Form::Steps, 4, NONE),
         vector("_fe", Form::Steps, 4, NONE),
+        vector("in", Form::Count, inputs::ENDS as u8, NONE),
     ];
 }
 
@@ -302,7 +314,8 @@ pub fn vector_value(vector: u8, index: u8) -> Value {
         7 => Value::Target(index),
         8 => Value::MachinePosition(index),
         9..13 => Value::Steps(index),
-        _ => Value::Zero,
+        13 | 14 => Value::Zero,
+        _ => Value::Input(index),
     }
 }
 

@@ -87,7 +87,7 @@ mod tests {
             assert_ne!(item.key(), NO_KEY, "{item:?}");
         }
         assert_eq!(keys.len(), 134);
-        let cold = (Setting::WARM..Setting::NUMBERS).filter_map(Setting::from_number).map(key);
+        let cold = (Setting::WARM..Setting::COLD).filter_map(Setting::from_number).map(key);
         for key in tables::tests::keys().chain(cold) {
             assert_eq!(keys.insert(key, Item(Setting::from_number(0).unwrap())), None);
             assert_ne!(key, NO_KEY);

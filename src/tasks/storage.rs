@@ -66,7 +66,7 @@ impl Storage {
             to: Cell::new(0),
             edit: Cell::new(None),
             cold: Cell::new(None),
-            forgotten: Cell::new(Setting::NUMBERS),
+            forgotten: Cell::new(Setting::COLD),
             program: Cell::new(None),
             awaited: Cell::new(false),
             wake: Wake::default(),
@@ -136,7 +136,7 @@ impl Storage {
     /// The next of them that is on its way.
     fn take_cold(&self) -> Option<Work> {
         let number = self.forgotten.get();
-        if self.cold.get().is_none() && number < Setting::NUMBERS {
+        if self.cold.get().is_none() && number < Setting::COLD {
             let default = Setting::from_number(number).map_or(0, Setting::default_value);
             self.cold.set(Some((number, default)));
             self.forgotten.set(number + 1);
