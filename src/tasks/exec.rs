@@ -2,8 +2,8 @@
 //!
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
 //! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
-//! milliseconds ([`enough`]), 4,000 to 14,000 cycles each; the rest one by one, when thread mode has nothing
-//! else to do: a line that has come is answered meanwhile.
+//! milliseconds ([`enough`]), 4,000 to 14,000 cycles each; the rest one by one, when one is used up or thread mode
+//! has nothing else to do: a line that has come is answered meanwhile.
 
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
@@ -24,11 +24,11 @@ const fn tenths(of_ms: u32) -> u32 {
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
     let mut machine = Exec::new();
     let mut segment = Segment::default();
-    let (mut few, mut most, mut rests) = (1u8, 1u8, true);
+    let (mut most, mut rests) = (1u8, true);
     let mut outputs = 0;
     let mut finished = Finished::new();
     loop {
-        exec::wait(|| wants(segments.used() as u8, few, most).then_some(())).await;
+        exec::wait(|| (segments.used() < most.into()).then_some(())).await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
         let step = links::update(|out| {
@@ -65,7 +65,11 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             let _ = segments.push_copy(&segment);
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
-            (few, most) = (enough(cycles), queued(cycles, rests));
+            most = queued(cycles, rests);
+            if segments.used() >= enough(cycles).into() {
+                exec::pend_when_idle();
+                exec_asked_again().await;
+            }
         }
         if blocks.len() != waiting {
             flags::set(Event::BlockDone);
@@ -79,11 +83,6 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             links::hungry(false);
         }
     }
-}
-
-/// Whether one more segment is wanted now, when `used` are queued.
-fn wants(used: u8, few: u8, most: u8) -> bool {
-    used < few || used < most && exec::when_idle()
 }
 
 /// How many segments are queued at a time if the last took so many CPU cycles: what is queued cannot be
@@ -101,8 +100,7 @@ fn queued(cycles: u32, rests: bool) -> u8 {
     }
 }
 
-/// How many segments are queued whatever else there is to do, if the last took so many CPU cycles: 2 ms beside the one that runs, three
-/// times what the next one takes.
+/// How many segments are queued in one go if the last took so many CPU cycles: 2 ms beside the one that runs.
 #[inline(always)]
 fn enough(cycles: u32) -> u8 {
     if cycles <= tenths(10) { 3 } else { 2 }

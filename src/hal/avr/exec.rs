@@ -33,10 +33,8 @@ pub(super) static CLOSED: SharedByte = SharedByte::new(1);
 /// Exec was asked for meanwhile.
 pub(super) static MISSED: SharedByte = SharedByte::new(0);
 
-/// Whether exec waits for thread mode to have nothing to do, or may run for that.
-static PATIENCE: SharedByte = SharedByte::new(0);
-const WAITS: u8 = 1;
-const MAY_RUN: u8 = 2;
+/// Exec would go on when nobody else has anything to do.
+static PATIENT: SharedByte = SharedByte::new(0);
 
 struct Context {
     executor: Cell<Option<&'static Executor>>,
@@ -56,19 +54,16 @@ pub fn pend() {
     unsafe { UCSR2B.write_volatile(PENDED) };
 }
 
-/// Whether thread mode has had nothing left to do since this was asked last; else exec is pended when that is so.
-/// Exec only.
-pub fn when_idle() -> bool {
-    let may_run = PATIENCE.get() == MAY_RUN;
-    PATIENCE.set(if may_run { 0 } else { WAITS });
-    may_run
+/// Asks for exec to run when thread mode has nothing left to do. Exec only.
+pub fn pend_when_idle() {
+    PATIENT.set(1);
 }
 
 /// Thread mode has nothing left to do; interrupts are off.
 #[inline(always)]
 pub(super) fn idle() {
-    if PATIENCE.get() == WAITS {
-        PATIENCE.set(MAY_RUN);
+    if PATIENT.get() != 0 {
+        PATIENT.set(0);
         pend();
     }
 }

@@ -11,8 +11,7 @@ struct Waiting(Cell<Option<Waker>>);
 
 machine_static! {
     fn pended() -> Local<bool> = Local::new(false);
-    fn waits() -> Local<bool> = Local::new(false);
-    fn may_run() -> Local<bool> = Local::new(false);
+    fn patient() -> Local<bool> = Local::new(false);
     fn waiting() -> Waiting = Waiting(Cell::new(None));
 }
 
@@ -21,21 +20,16 @@ pub fn pend() {
     pended().set(true);
 }
 
-/// Whether thread mode has had nothing left to do since this was asked last; else exec is pended when that is so.
-/// Exec only.
-pub fn when_idle() -> bool {
-    let done = may_run().get();
-    may_run().set(false);
-    waits().set(!done);
-    done
+/// Asks for exec to run when thread mode has nothing left to do. Exec only.
+pub fn pend_when_idle() {
+    patient().set(true);
 }
 
 /// Thread mode has nothing left to do. Whether exec runs then.
 pub(super) fn idle() -> bool {
-    let runs = waits().get();
+    let runs = patient().get();
     if runs {
-        waits().set(false);
-        may_run().set(true);
+        patient().set(false);
         pend();
     }
     runs
