@@ -66,7 +66,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
             most = queued(cycles, rests);
-            if segments.used() >= enough(cycles).into() {
+            if (enough(cycles)..most).contains(&(segments.used() as u8)) {
                 exec::pend_when_idle();
                 exec_asked_again().await;
             }
