@@ -26,7 +26,7 @@ use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_outputs;
 use crate::tasks::wake::{News, Wake};
-use crate::tasks::{control, exec, parser, planner, power, reader, reporter, storage};
+use crate::tasks::{control, exec, parser, planner, power, reader, reporter, spindle, storage};
 
 /// Bytes for all lines of USB together.
 const LINES_USB: usize = 480;
@@ -125,6 +125,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
         links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
     }
     set_outputs(&links.settings.borrow());
+    spindle::set_all(links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received, aux).ok()?);

@@ -9,17 +9,21 @@ use crate::config::name::{Name, axis_letter, axis_of};
 use crate::config::rows::{find_row, row_name, value_name};
 use crate::config::table::Kind;
 use crate::config::{Fixed, Owner, Setting};
-use crate::gcode::tables::Row;
+use crate::gcode::tables::{ROWS, Row};
 use crate::progmem;
 use crate::progmem::Text;
 use crate::text;
 use crate::units::AXES;
 
-const FIRST_SINGLE: u8 = Setting::NUMBERS;
+/// Numbers that fit one byte: settings in RAM, the job's behind the others; values; members of vectors.
+const FIRST_JOB: u8 = Setting::WARM;
+const FIRST_SINGLE: u8 = FIRST_JOB + (Setting::NUMBERS - Setting::COLD);
 const FIRST_VECTOR: u8 = FIRST_SINGLE + SINGLE_COUNT as u8;
 
 /// The first value of the interpreter's tables. Those below it fit one byte.
 const FIRST_ROW: u16 = 256;
+/// The first setting that is in EEPROM alone.
+const FIRST_COLD: u16 = FIRST_ROW + ROWS as u16 * AXES as u16;
 
 /// A setting or a value, as a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -56,7 +60,7 @@ impl Token {
 
     /// Whether it is in EEPROM alone, too far away to be told all the time.
     pub fn is_far(self) -> bool {
-        self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
+        self.0 >= FIRST_ROW
     }
 
     /// Its number, if it fits.
@@ -67,6 +71,15 @@ impl Token {
     /// The token of a number that [`Token::small`] returned.
     pub const fn of_small(number: u8) -> Token {
         Token(number as u16)
+    }
+
+    /// The token of a setting.
+    pub fn of(setting: Setting) -> Token {
+        Token(match setting.number() {
+            number @ ..Setting::WARM => number.into(),
+            number @ Setting::WARM..Setting::COLD => FIRST_COLD + u16::from(number - Setting::WARM),
+            job => u16::from(FIRST_JOB + (job - Setting::COLD)),
+        })
     }
 
     /// The token of a value in the table of [`SINGLES`].
@@ -86,7 +99,7 @@ impl Token {
 
     /// The setting or value called `name`. Up to 20,000 cycles on AVR.
     pub fn find(name: &Name) -> Option<Token> {
-        let setting = || Setting::find(name).map(|s| Token::of_small(s.number()));
+        let setting = || Setting::find(name).map(Token::of);
         let single = || {
             let found = |i: &usize| SINGLES.at(*i).is_some_and(|s| name.matches(0, s.token));
             (0..SINGLE_COUNT).find(found).map(|i| Token::single(i as u8))
@@ -119,12 +132,15 @@ impl Token {
 
     /// What it is.
     pub fn subject(self) -> Option<Subject> {
+        if let Some(setting) = self.setting() {
+            return Some(Subject::Setting(setting));
+        }
         let Some(number) = self.small() else {
             let (row, axis) = by_axis((self.0 - FIRST_ROW) as u8);
             return Row::from_number(row).map(|row| Subject::Row(row, axis));
         };
         if number < FIRST_SINGLE {
-            return Setting::from_number(number).map(Subject::Setting);
+            return None;
         }
         if number < FIRST_VECTOR {
             return SINGLES.at(usize::from(number - FIRST_SINGLE)).map(Subject::Single);
@@ -135,7 +151,12 @@ impl Token {
 
     /// The setting it is, if it is one.
     pub fn setting(self) -> Option<Setting> {
-        self.small().and_then(Setting::from_number)
+        Setting::from_number(match self.0 {
+            number if number < u16::from(FIRST_JOB) => number as u8,
+            job if job < u16::from(FIRST_SINGLE) => job as u8 - FIRST_JOB + Setting::COLD,
+            ..FIRST_COLD => return None,
+            cold => u8::try_from(cold - FIRST_COLD).ok()?.checked_add(Setting::WARM)?,
+        })
     }
 
     /// Its full name.
@@ -309,7 +330,7 @@ impl Group {
     pub fn member(self, from: u8, machine: &mut impl Machine) -> Option<(u8, Token)> {
         match self {
             Group::Settings(owner) => (from..owner.rows())
-                .find_map(|row| Some((row, Token::of_small(Setting::of(owner, row)?.number())))),
+                .find_map(|row| Some((row, Token::of(Setting::of(owner, row)?)))),
             Group::Vector(number) => {
                 let members = VECTORS.at(usize::from(number))?.members;
                 (from < members).then(|| (from, Token::member(number, from)))
@@ -329,7 +350,8 @@ impl Group {
 #[cfg(not(target_arch = "avr"))]
 pub fn names() -> std::vec::Vec<std::string::String> {
     let text = |bytes: &[u8]| std::string::String::from_utf8_lossy(bytes).into_owned();
-    let tokens = (0..FIRST_ROW + u16::from(crate::gcode::tables::ROWS) * AXES as u16).map(Token);
+    let colds = u16::from(Setting::COLD - Setting::WARM);
+    let tokens = (0..FIRST_COLD + colds).map(Token);
     let tokens = tokens.filter(|token| Token::find(&token.name()) == Some(*token));
     let actions = ACTIONS.get().map(|(name, _)| name.bytes().map(char::from).collect());
     tokens.map(|token| text(token.name().bytes())).chain(actions).collect()

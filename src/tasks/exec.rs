@@ -6,13 +6,13 @@
 
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
-use crate::hal::imp::{exec, flags, gpio, stepper};
+use crate::hal::imp::{exec, flags, stepper};
 use crate::hal::ring::Producer;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
-use crate::tasks::{hold, links, power};
+use crate::tasks::{hold, links, power, spindle};
 
 /// CPU cycles in so many tenths of a millisecond.
 const fn tenths(of_ms: u32) -> u32 {
@@ -24,7 +24,6 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
     let mut machine = Exec::new();
     let mut segment = Segment::default();
     let (mut most, mut rests) = (1u8, true);
-    let mut outputs = 0;
     let mut finished = Finished::new();
     loop {
         exec::wait(|| (segments.used() < most.into()).then_some(())).await;
@@ -32,6 +31,10 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         let standstill = !stepper::running();
         let step = links::update(|out| {
             machine.set_hold(hold::is_wanted(out.running), out);
+            // What has paused in a hold goes on before motion does.
+            if out.outputs != spindle::on() {
+                machine.wait(spindle::switch(out, false), out);
+            }
             if let Some(line) = finished.take(segments.used()) {
                 out.finished = line;
             }
@@ -48,14 +51,16 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
                 finished.rest();
                 out.finished = out.line;
             } else if step == Step::Held {
+                spindle::switch(out, false);
                 hold::dropped(|| {
+                    // What has paused stays off.
+                    out.outputs = spindle::on();
                     machine.drop_all(&mut blocks, out);
                     stepper::settle();
                     finished.rest();
                 });
-            } else if out.outputs != outputs {
-                outputs = out.outputs;
-                gpio::set_outputs(outputs);
+            } else if step == Step::Switched {
+                machine.wait(spindle::switch(out, true), out);
             }
             step
         });

@@ -14,6 +14,7 @@ mod printing;
 pub mod reader;
 pub mod reporter;
 mod setup;
+pub mod spindle;
 pub mod storage;
 pub mod tx;
 pub mod view;

@@ -10,6 +10,7 @@ use super::links::{Links, snapshot};
 use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
+use super::spindle;
 use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
@@ -166,6 +167,7 @@ impl Machine for View<'_> {
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
         if setting.is_cold() {
             self.links.storage.set_cold(setting, value)?;
+            spindle::set(setting, value);
             return Ok(Warning::None);
         }
         if setting.needs_rest() {
@@ -254,6 +256,7 @@ impl Machine for View<'_> {
         self.links.resync.set(true);
         self.links.settings_changed.set(true);
         self.links.storage.forget_cold();
+        spindle::set_all(self.links.storage);
         self.links.storage.note(0, ITEMS);
         set_outputs(&self.settings);
         Status::Ok

@@ -10,6 +10,7 @@
 //! @ +50ms                     time passes
 //! baud 500000                 from here on the sender speaks and hears at this rate
 //! steps X=12800 Y=0           the motors come to rest there; those not named are at 0
+//! outputs spindle ccw 12.50%  these are on, of `spindle ccw mist flood`, and the spindle's pulses that wide
 //! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
 //! 2cts 1                      the sender on the second port holds the machine back by that pin (0: no more)
 //! ```
@@ -48,6 +49,9 @@ pub trait Side {
     fn heard_aux(&mut self) -> Vec<u8>;
     /// Where the motors are, in steps.
     fn steps(&self) -> [i64; 4];
+    /// The outputs that are on, as bits of `kerf::boards::outputs`; and what part of its period the spindle's
+    /// pulse-width output is high.
+    fn outputs(&self) -> (u8, f64);
 }
 
 /// One line of a transcript.
@@ -62,6 +66,7 @@ enum Event {
     Pass(u64),
     Baud(u32),
     Steps([i64; 4]),
+    Outputs(String),
 }
 
 /// A transcript, read.
@@ -124,6 +129,7 @@ fn parse(line: &str) -> Option<Event> {
         "@" => rest.strip_prefix('+')?.strip_suffix("ms")?.parse().ok().map(Event::Pass),
         "baud" => rest.parse().ok().map(Event::Baud),
         "steps" => steps(rest).map(Event::Steps),
+        "outputs" => Some(Event::Outputs(rest.to_string())),
         _ => None,
     }
 }
@@ -149,6 +155,15 @@ fn steps(text: &str) -> Option<[i64; 4]> {
         *steps.get_mut(letter.or_else(number)?)? = value.parse().ok()?;
     }
     Some(steps)
+}
+
+/// What a transcript calls outputs; the direction of a spindle that is off is of no account.
+fn name_outputs((on, share): (u8, f64)) -> String {
+    let turns = on & 1 != 0;
+    let names = ["spindle", "ccw", "mist", "flood"].into_iter().enumerate();
+    let names = names.filter(|(bit, _)| on >> bit & 1 != 0 && (*bit != 1 || turns));
+    let share = format!("{:.2}%", share * 100.0);
+    names.map(|(_, name)| name).chain([&*share]).collect::<Vec<_>>().join(" ")
 }
 
 /// Whether `pattern`, in which `*` is anything, is all of `text`.
@@ -225,6 +240,10 @@ impl<S: Side> Player<'_, S> {
             Event::Pass(ms) => self.side.run_ms(*ms),
             Event::Baud(baud) => self.side.set_baud(*baud),
             Event::Steps(steps) => return self.rest_at(steps),
+            Event::Outputs(wanted) => {
+                let are = name_outputs(self.side.outputs());
+                return if are == *wanted { Ok(()) } else { Err(format!("outputs {are}")) };
+            }
         }
         Ok(())
     }

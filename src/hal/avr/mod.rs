@@ -15,6 +15,7 @@ pub mod executor;
 pub mod gpio;
 mod mem;
 pub mod panic;
+pub mod pwm;
 mod step_isr;
 pub mod stepper;
 pub mod time;

@@ -15,9 +15,11 @@ pub fn halt() -> ! {
 /// Stops the step timer, switches drivers and hazardous outputs off. Interrupts are off.
 pub fn make_safe() {
     super::stepper::kill();
+    super::pwm::kill();
     for &hazard in ACTIVE.hazards {
         super::gpio::low(hazard);
     }
+    super::gpio::stop_spindle();
     super::gpio::power(0);
 }
 

@@ -9,6 +9,7 @@ pub mod eeprom;
 pub mod exec;
 pub mod gpio;
 mod machine;
+pub mod pwm;
 pub mod stepper;
 pub mod time;
 pub mod uart;

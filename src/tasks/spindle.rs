@@ -1,0 +1,88 @@
+//! The outputs of M3 to M9 and the spindle's speed, carried out in step with motion.
+//!
+//! Exec says what the program has switched and S ([`Snapshot`]); here it becomes levels and the width of pulses
+//! ([`Spindle`]). Exec calls [`switch`] when something of it may have changed, at rest, and waits as long as that
+//! says: a spindle that has been started takes its time. In a feedhold those outputs pause that the settings say,
+//! and are on again before motion goes on. Thread mode tells what settings ([`set`]) and the override ([`set_factor`])
+//! have changed; it is in force at once. Cost of a change: 4,000 cycles.
+
+use core::cell::UnsafeCell;
+
+use super::links::snapshot;
+use super::storage::Storage;
+use crate::config::Setting;
+use crate::hal::byte::SharedByte;
+use crate::hal::imp::{exec, gpio, pwm};
+use crate::motion::exec::Snapshot;
+use crate::spindle::{Changed, Spindle};
+
+/// The state: exec's, and thread mode's while exec is locked out.
+struct Shared(UnsafeCell<Spindle>);
+
+// SAFETY: exec reads it, and thread mode changes it while exec cannot run.
+unsafe impl Sync for Shared {}
+
+machine_static! {
+    fn shared() -> Shared = Shared(UnsafeCell::new(Spindle::new()));
+    // What is on. Exec writes it.
+    fn now_on() -> SharedByte = SharedByte::new(0);
+}
+
+/// The outputs that are on, which in a feedhold may be less than what the program has switched.
+pub fn on() -> u8 {
+    now_on().get()
+}
+
+/// Switches the outputs as they are to be now; how long motion has to wait for that, ms. `changed` says that S may
+/// be another. Exec only.
+#[inline(never)]
+pub fn switch(out: &Snapshot, changed: bool) -> u16 {
+    // SAFETY: exec runs, and nobody else.
+    let spindle = unsafe { &*shared().0.get() };
+    let before = on();
+    let wanted = if out.held { spindle.held(out.outputs) } else { out.outputs };
+    if wanted == before && !changed {
+        return 0;
+    }
+    now_on().set(wanted);
+    // A spindle that starts finds the speed there.
+    pwm::set_share(spindle.share(wanted, out.speed));
+    gpio::set_outputs(wanted);
+    spindle.spin_up(before, wanted)
+}
+
+/// Takes over all settings that concern the outputs. Thread mode, or before interrupts are on.
+#[inline(never)]
+pub fn set_all(storage: &Storage) {
+    for setting in (Setting::WARM..Setting::COLD).filter_map(Setting::from_number) {
+        set(setting, storage.cold(setting));
+    }
+}
+
+/// Takes over the value of a setting, if it concerns the outputs. Thread mode, or before interrupts are on.
+#[inline(never)]
+pub fn set(setting: Setting, value: i32) {
+    change(|spindle| spindle.set(setting, value));
+}
+
+/// Multiplies S by so many thousandths from now on. Thread mode only.
+pub fn set_factor(thousandths: u16) {
+    change(|spindle| {
+        spindle.set_factor(thousandths);
+        Changed::Outputs
+    });
+}
+
+fn change(what: impl FnOnce(&mut Spindle) -> Changed) {
+    let speed = snapshot().speed;
+    exec::lock(|_| {
+        // SAFETY: exec cannot run, and `what` calls nothing of this module.
+        let spindle = unsafe { &mut *shared().0.get() };
+        match what(spindle) {
+            Changed::Nothing => return,
+            Changed::Outputs => gpio::set_low(spindle.low(), on()),
+            Changed::Frequency(millihertz) => pwm::set_frequency(millihertz),
+        }
+        pwm::set_share(spindle.share(on(), speed));
+    });
+}
