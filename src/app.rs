@@ -11,13 +11,14 @@ use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::imp::{stepper, uart};
+use crate::hal::imp::{stepper, uart, watchdog};
 use crate::hal::ring::Producer;
 use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
+use crate::status::Status;
 use crate::store::Log;
 use crate::store::kept;
 use crate::tasks::links::{Links, QueueCount};
@@ -127,6 +128,9 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     set_outputs(&links.settings.borrow());
     spindle::set_all(links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
+    if watchdog::cause().is_fault() {
+        links.except(Status::HardReset);
+    }
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received, aux).ok()?);
     main.spawn(planner_task(links, queue).ok()?);

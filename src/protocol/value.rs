@@ -57,6 +57,8 @@ pub enum Value {
     Mist,
     /// `cof`: 1 after M8.
     Flood,
+    /// `rst`: why the machine has started, see [`Cause`](crate::hal::resets::Cause).
+    Reset,
     /// `tool`: tool number.
     Tool,
     /// `home`: 0 not homed, 1 homed, 2 homing.
@@ -162,7 +164,7 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 28;
+pub const SINGLE_COUNT: usize = 29;
 /// Entries of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 7;
 /// The number of the vector `g92`.
@@ -237,6 +239,7 @@ progmem! {
         count("sps", Value::SpindleSpeed, text!("Spindle speed:"), NONE),
         count("com", Value::Mist, text!("Mist coolant:"), ON),
         count("cof", Value::Flood, text!("Flood coolant:"), ON),
+        count("rst", Value::Reset, text!("Last reset:"), text!("Power on|External|Brown-out|Watchdog|Asked for")),
     ];
 
     /// Values of each axis or motor; [`vector_value`] gives the order.

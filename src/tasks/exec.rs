@@ -12,6 +12,7 @@ use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
+use crate::tasks::health::{self, Sign};
 use crate::tasks::{hold, links, power, spindle};
 
 /// CPU cycles in so many tenths of a millisecond.
@@ -26,7 +27,11 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
     let (mut most, mut rests) = (1u8, true);
     let mut finished = Finished::new();
     loop {
-        exec::wait(|| (segments.used() < most.into()).then_some(())).await;
+        exec::wait(|| {
+            health::answer(Sign::Exec);
+            (segments.used() < most.into()).then_some(())
+        })
+        .await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
         let step = links::update(|out| {
@@ -67,6 +72,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         if step == Step::Segment {
             // There is room: this task alone fills the ring.
             let _ = segments.push_copy(&segment);
+            health::answer(Sign::Segment);
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
             most = queued(cycles, rests);

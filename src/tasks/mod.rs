@@ -3,6 +3,7 @@
 
 pub mod control;
 pub mod exec;
+pub mod health;
 pub mod hold;
 pub mod lines;
 pub mod links;

@@ -51,38 +51,47 @@ pub fn switch(out: &Snapshot, changed: bool) -> u16 {
     spindle.spin_up(before, wanted)
 }
 
-/// Takes over all settings that concern the outputs. Thread mode, or before interrupts are on.
+/// Takes over all settings that concern the outputs, and then tells these. Thread mode, or before interrupts are on.
 #[inline(never)]
 pub fn set_all(storage: &Storage) {
     for setting in (Setting::WARM..Setting::COLD).filter_map(Setting::from_number) {
-        set(setting, storage.cold(setting));
+        let value = storage.cold(setting);
+        with(|spindle| match spindle.set(setting, value) {
+            Changed::Frequency(millihertz) => pwm::set_frequency(millihertz),
+            Changed::Outputs | Changed::Nothing => {}
+        });
     }
+    tell();
 }
 
-/// Takes over the value of a setting, if it concerns the outputs. Thread mode, or before interrupts are on.
+/// Takes over the value of a setting, if it concerns the outputs. Thread mode only.
 #[inline(never)]
 pub fn set(setting: Setting, value: i32) {
-    change(|spindle| spindle.set(setting, value));
+    match with(|spindle| spindle.set(setting, value)) {
+        Changed::Nothing => return,
+        Changed::Outputs => {}
+        Changed::Frequency(millihertz) => exec::lock(|_| pwm::set_frequency(millihertz)),
+    }
+    tell();
 }
 
 /// Multiplies S by so many thousandths from now on. Thread mode only.
 pub fn set_factor(thousandths: u16) {
-    change(|spindle| {
-        spindle.set_factor(thousandths);
-        Changed::Outputs
-    });
+    with(|spindle| spindle.set_factor(thousandths));
+    tell();
 }
 
-fn change(what: impl FnOnce(&mut Spindle) -> Changed) {
+/// Changes the state while exec cannot run.
+fn with<R>(what: impl FnOnce(&mut Spindle) -> R) -> R {
+    // SAFETY: exec cannot run, and `what` calls nothing of this module.
+    exec::lock(|_| what(unsafe { &mut *shared().0.get() }))
+}
+
+/// Tells the outputs what they are to be by now.
+fn tell() {
     let speed = snapshot().speed;
-    exec::lock(|_| {
-        // SAFETY: exec cannot run, and `what` calls nothing of this module.
-        let spindle = unsafe { &mut *shared().0.get() };
-        match what(spindle) {
-            Changed::Nothing => return,
-            Changed::Outputs => gpio::set_low(spindle.low(), on()),
-            Changed::Frequency(millihertz) => pwm::set_frequency(millihertz),
-        }
+    with(|spindle| {
         pwm::set_share(spindle.share(on(), speed));
+        gpio::set_low(spindle.low(), on());
     });
 }

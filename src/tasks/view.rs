@@ -17,7 +17,7 @@ use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::tables::Row;
 use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::imp::{gpio, stepper, uart};
+use crate::hal::imp::{gpio, stepper, uart, watchdog};
 use crate::hal::serial::{Flow, PORTS};
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::motion::dynamics;
@@ -234,6 +234,7 @@ impl Machine for View<'_> {
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
             Value::Hold => self.hold(),
+            Value::Reset => watchdog::cause() as i32,
             Value::Home => 0,
             modal => self.modal(modal),
         }

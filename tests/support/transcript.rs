@@ -10,7 +10,7 @@
 //! @ +50ms                     time passes
 //! baud 500000                 from here on the sender speaks and hears at this rate
 //! steps X=12800 Y=0           the motors come to rest there; those not named are at 0
-//! outputs spindle ccw 12.50%  these are on, of `spindle ccw mist flood`, and the spindle's pulses that wide
+//! outputs spindle ccw 12.50%  these are on by now, of `spindle ccw mist flood`, and the spindle's pulses that wide
 //! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
 //! 2cts 1                      the sender on the second port holds the machine back by that pin (0: no more)
 //! ```
@@ -28,6 +28,8 @@ const HEAR_MS: u64 = 20_000;
 /// Longest wait for the motors to rest, and the time without a step that is called rest.
 const MOVE_MS: u64 = 120_000;
 const REST_MS: u64 = 200;
+/// Longest wait for outputs.
+const SWITCH_MS: u64 = 30;
 /// Time at the end in which nothing unexpected may come.
 const LAST_MS: u64 = 100;
 
@@ -241,8 +243,15 @@ impl<S: Side> Player<'_, S> {
             Event::Baud(baud) => self.side.set_baud(*baud),
             Event::Steps(steps) => return self.rest_at(steps),
             Event::Outputs(wanted) => {
-                let are = name_outputs(self.side.outputs());
-                return if are == *wanted { Ok(()) } else { Err(format!("outputs {are}")) };
+                let are = (0..SWITCH_MS).find(|_| {
+                    let are = name_outputs(self.side.outputs()) == *wanted;
+                    if !are {
+                        self.side.run_ms(1);
+                    }
+                    are
+                });
+                let are = are.ok_or_else(|| name_outputs(self.side.outputs()));
+                return are.map(|_| ()).map_err(|are| format!("outputs {are}"));
             }
         }
         Ok(())

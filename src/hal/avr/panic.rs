@@ -7,6 +7,7 @@ use crate::boards::ACTIVE;
 pub fn halt() -> ! {
     avr_device::interrupt::disable();
     make_safe();
+    super::watchdog::off();
     loop {
         avr_device::asm::nop();
     }

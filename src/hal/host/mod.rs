@@ -13,6 +13,7 @@ pub mod pwm;
 pub mod stepper;
 pub mod time;
 pub mod uart;
+pub mod watchdog;
 
 pub use machine::Machine;
 
