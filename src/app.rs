@@ -25,7 +25,7 @@ use crate::tasks::links::{Links, QueueCount};
 use crate::tasks::ports::Port;
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
-use crate::tasks::view::set_outputs;
+use crate::tasks::view::set_hardware;
 use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, power, reader, reporter, spindle, storage};
 
@@ -58,6 +58,7 @@ impl Links {
             percent_at: Cell::new(0),
             killed: Cell::new(false),
             flushed: Cell::new(false),
+            limits_hit: Cell::new(0),
             job: Cell::default(),
             storage,
             report: RefCell::new(StatusReport::new()),
@@ -125,7 +126,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     if !links.settings.borrow().starts_in_json() {
         links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
     }
-    set_outputs(&links.settings.borrow());
+    set_hardware(&links.settings.borrow());
     spindle::set_all(links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
     if watchdog::cause().is_fault() {

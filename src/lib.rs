@@ -28,5 +28,6 @@ pub mod realtime;
 pub mod spindle;
 pub mod status;
 pub mod store;
+pub mod switches;
 pub mod tasks;
 pub mod units;

@@ -47,6 +47,10 @@ impl Side for Machine {
         self.received()
     }
 
+    fn set_input(&mut self, input: usize, closed: bool) {
+        Machine::set_input(self, input, closed);
+    }
+
     fn steps(&self) -> [i64; 4] {
         self.emitted().position
     }

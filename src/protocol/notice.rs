@@ -3,8 +3,12 @@
 use super::Format;
 use super::machine::Machine;
 use super::token::Token;
+use super::value::Value;
 use super::write::{Ending, Out, Writer};
+use crate::boards::inputs;
 use crate::config::{Fixed, Settings};
+use crate::progmem;
+use crate::progmem::Text;
 use crate::status::Status;
 use crate::text;
 
@@ -73,8 +77,16 @@ pub(super) fn put_row<O: Out>(row: u8, machine: &mut impl Machine, writer: &mut 
     writer.shown(token.read(machine));
 }
 
+progmem! {
+    /// What the switches at the ends of axes are called.
+    static ENDS: [Text; inputs::ENDS] = [
+        text!("xmin"), text!("xmax"), text!("ymin"), text!("ymax"),
+        text!("zmin"), text!("zmax"), text!("amin"), text!("amax"),
+    ];
+}
+
 /// An exception report, `{"er":{"fb":440.20,"st":13,"msg":"Buffer full"}}`; sent whatever the
-/// verbosity, and always as JSON.
+/// verbosity, and always as JSON. Of a limit it also says which, `"sw":"xmin"`.
 pub struct Exception {
     stage: u8,
     status: Status,
@@ -118,6 +130,13 @@ pub(super) fn put_exception<O: Out>(
             if let Some(text) = writer.dialect().status_text(status) {
                 writer.key_text(text!("msg"));
                 writer.string(text);
+            }
+        }
+        2 => {
+            let hit = machine.value(Value::LimitHit) as usize;
+            if let Some(name) = ENDS.at(hit).filter(|_| status == Status::LimitHit) {
+                writer.key_text(text!("sw"));
+                writer.string(name);
             }
         }
         _ => {

@@ -9,21 +9,17 @@ use crate::config::name::{Name, axis_letter, axis_of};
 use crate::config::rows::{find_row, row_name, value_name};
 use crate::config::table::Kind;
 use crate::config::{Fixed, Owner, Setting};
-use crate::gcode::tables::{ROWS, Row};
+use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::text;
 use crate::units::AXES;
 
-/// Numbers that fit one byte: settings in RAM, the job's behind the others; values; members of vectors.
-const FIRST_JOB: u8 = Setting::WARM;
-const FIRST_SINGLE: u8 = FIRST_JOB + (Setting::NUMBERS - Setting::COLD);
-const FIRST_VECTOR: u8 = FIRST_SINGLE + SINGLE_COUNT as u8;
+const FIRST_SINGLE: u16 = Setting::NUMBERS as u16;
+const FIRST_VECTOR: u16 = FIRST_SINGLE + SINGLE_COUNT as u16;
 
-/// The first value of the interpreter's tables. Those below it fit one byte.
-const FIRST_ROW: u16 = 256;
-/// The first setting that is in EEPROM alone.
-const FIRST_COLD: u16 = FIRST_ROW + ROWS as u16 * AXES as u16;
+/// The first value of the interpreter's tables. Those below it may be told all the time.
+const FIRST_ROW: u16 = 512;
 
 /// A setting or a value, as a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -60,36 +56,32 @@ impl Token {
 
     /// Whether it is in EEPROM alone, too far away to be told all the time.
     pub fn is_far(self) -> bool {
-        self.0 >= FIRST_ROW
+        self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
     }
 
-    /// Its number, if it fits.
-    pub fn small(self) -> Option<u8> {
-        self.0.try_into().ok()
+    /// Its number; of those that are not [far](Self::is_far) below 512.
+    pub const fn number(self) -> u16 {
+        self.0
     }
 
-    /// The token of a number that [`Token::small`] returned.
-    pub const fn of_small(number: u8) -> Token {
-        Token(number as u16)
+    /// The token of a number that [`Token::number`] returned.
+    pub const fn numbered(number: u16) -> Token {
+        Token(number)
     }
 
     /// The token of a setting.
-    pub fn of(setting: Setting) -> Token {
-        Token(match setting.number() {
-            number @ ..Setting::WARM => number.into(),
-            number @ Setting::WARM..Setting::COLD => FIRST_COLD + u16::from(number - Setting::WARM),
-            job => u16::from(FIRST_JOB + (job - Setting::COLD)),
-        })
+    fn of_setting(setting: Setting) -> Token {
+        Token(setting.number().into())
     }
 
     /// The token of a value in the table of [`SINGLES`].
     const fn single(index: u8) -> Token {
-        Token((FIRST_SINGLE + index) as u16)
+        Token(FIRST_SINGLE + index as u16)
     }
 
     /// The token of a vector's member.
     const fn member(vector: u8, index: u8) -> Token {
-        Token((FIRST_VECTOR + vector * AXES as u8 + index) as u16)
+        Token(FIRST_VECTOR + (vector * AXES as u8 + index) as u16)
     }
 
     /// The token of a value of a row.
@@ -99,7 +91,7 @@ impl Token {
 
     /// The setting or value called `name`. Up to 20,000 cycles on AVR.
     pub fn find(name: &Name) -> Option<Token> {
-        let setting = || Setting::find(name).map(Token::of);
+        let setting = || Setting::find(name).map(Token::of_setting);
         let single = || {
             let found = |i: &usize| SINGLES.at(*i).is_some_and(|s| name.matches(0, s.token));
             (0..SINGLE_COUNT).find(found).map(|i| Token::single(i as u8))
@@ -132,31 +124,28 @@ impl Token {
 
     /// What it is.
     pub fn subject(self) -> Option<Subject> {
+        let number = self.0;
         if let Some(setting) = self.setting() {
             return Some(Subject::Setting(setting));
         }
-        let Some(number) = self.small() else {
-            let (row, axis) = by_axis((self.0 - FIRST_ROW) as u8);
-            return Row::from_number(row).map(|row| Subject::Row(row, axis));
-        };
-        if number < FIRST_SINGLE {
-            return None;
-        }
         if number < FIRST_VECTOR {
-            return SINGLES.at(usize::from(number - FIRST_SINGLE)).map(Subject::Single);
+            let index = number.checked_sub(FIRST_SINGLE)?;
+            return SINGLES.at(usize::from(index)).map(Subject::Single);
         }
-        let (number, index) = by_axis(number - FIRST_VECTOR);
-        VECTORS.at(usize::from(number)).map(|vector| Subject::Member(number, vector, index))
+        if number < FIRST_ROW {
+            let (number, index) = vector_index((number - FIRST_VECTOR) as u8);
+            return VECTORS
+                .at(usize::from(number))
+                .filter(|vector| index < vector.members)
+                .map(|vector| Subject::Member(number, vector, index));
+        }
+        let (row, axis) = by_axis((number - FIRST_ROW) as u8);
+        Row::from_number(row).map(|row| Subject::Row(row, axis))
     }
 
     /// The setting it is, if it is one.
     pub fn setting(self) -> Option<Setting> {
-        Setting::from_number(match self.0 {
-            number if number < u16::from(FIRST_JOB) => number as u8,
-            job if job < u16::from(FIRST_SINGLE) => job as u8 - FIRST_JOB + Setting::COLD,
-            ..FIRST_COLD => return None,
-            cold => u8::try_from(cold - FIRST_COLD).ok()?.checked_add(Setting::WARM)?,
-        })
+        u8::try_from(self.0).ok().and_then(Setting::from_number)
     }
 
     /// Its full name.
@@ -203,6 +192,12 @@ impl Token {
 /// Which group of six, and which of it.
 fn by_axis(number: u8) -> (u8, u8) {
     (number / AXES as u8, number % AXES as u8)
+}
+
+/// Which vector, and which member of it. The last one may have more members.
+fn vector_index(offset: u8) -> (u8, u8) {
+    let number = (offset / AXES as u8).min(VECTOR_COUNT as u8 - 1);
+    (number, offset - number * AXES as u8)
 }
 
 fn is_vector(name: &Name, vector: u8) -> bool {
@@ -330,7 +325,7 @@ impl Group {
     pub fn member(self, from: u8, machine: &mut impl Machine) -> Option<(u8, Token)> {
         match self {
             Group::Settings(owner) => (from..owner.rows())
-                .find_map(|row| Some((row, Token::of(Setting::of(owner, row)?)))),
+                .find_map(|row| Some((row, Token::of_setting(Setting::of(owner, row)?)))),
             Group::Vector(number) => {
                 let members = VECTORS.at(usize::from(number))?.members;
                 (from < members).then(|| (from, Token::member(number, from)))
@@ -350,8 +345,7 @@ impl Group {
 #[cfg(not(target_arch = "avr"))]
 pub fn names() -> std::vec::Vec<std::string::String> {
     let text = |bytes: &[u8]| std::string::String::from_utf8_lossy(bytes).into_owned();
-    let colds = u16::from(Setting::COLD - Setting::WARM);
-    let tokens = (0..FIRST_COLD + colds).map(Token);
+    let tokens = (0..FIRST_ROW + u16::from(crate::gcode::tables::ROWS) * AXES as u16).map(Token);
     let tokens = tokens.filter(|token| Token::find(&token.name()) == Some(*token));
     let actions = ACTIONS.get().map(|(name, _)| name.bytes().map(char::from).collect());
     tokens.map(|token| text(token.name().bytes())).chain(actions).collect()

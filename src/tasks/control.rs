@@ -2,16 +2,19 @@
 //!
 //! Reads what the receive interrupt picked off; waits on [`Event::Realtime`]. What they lead to is in
 //! [`hold`](super::hold); besides, `^x` resets the machine, and ENQ asks whether anybody is there, which the
-//! reporter answers.
+//! reporter answers. A switch that
+//! changes is seen to as well, by [`switches`].
 
 use super::hold;
 use super::links::Links;
+use super::switches;
 use crate::hal::event::{Event, next};
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
         hold::serve(links);
+        switches::serve(links);
         next(Event::Realtime).await;
     }
 }

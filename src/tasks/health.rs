@@ -35,7 +35,7 @@ pub fn answer(sign: Sign) {
 
 /// Feeds the watchdog if all is well, and asks for other signs. Thread mode.
 pub fn look() {
-    let rests = if stepper::running() { 0 } else { Sign::Segment as u8 };
+    let rests = if stepper::running() && !stepper::is_stopped() { 0 } else { Sign::Segment as u8 };
     if signs().get() | rests == ALL {
         signs().set(0);
         watchdog::feed();

@@ -64,6 +64,8 @@ pub struct Links {
     pub resync: Cell<bool>,
     /// A new rate of USB, in bits a second: the parser sets it when its response has left.
     pub rate: Cell<Option<u32>>,
+    /// The limits that were hit first, as bits of the ends: nothing moves any more, until reset.
+    pub limits_hit: Cell<u8>,
     /// What status reports hold.
     pub report: RefCell<StatusReport>,
     /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.

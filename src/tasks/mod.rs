@@ -17,6 +17,7 @@ pub mod reporter;
 mod setup;
 pub mod spindle;
 pub mod storage;
+pub mod switches;
 pub mod tx;
 pub mod view;
 pub mod wake;

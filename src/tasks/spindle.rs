@@ -8,11 +8,11 @@
 
 use core::cell::UnsafeCell;
 
-use super::links::snapshot;
+use super::links::{snapshot, update};
 use super::storage::Storage;
 use crate::config::Setting;
 use crate::hal::byte::SharedByte;
-use crate::hal::imp::{exec, gpio, pwm};
+use crate::hal::imp::{exec, gpio, pwm, stepper};
 use crate::motion::exec::Snapshot;
 use crate::spindle::{Changed, Spindle};
 
@@ -37,10 +37,14 @@ pub fn on() -> u8 {
 /// be another. Exec only.
 #[inline(never)]
 pub fn switch(out: &Snapshot, changed: bool) -> u16 {
-    // SAFETY: exec runs, and nobody else.
+    // SAFETY: exec runs, or cannot, and nobody else changes it.
     let spindle = unsafe { &*shared().0.get() };
     let before = on();
-    let wanted = if out.held { spindle.held(out.outputs) } else { out.outputs };
+    let wanted = match out.held {
+        _ if stepper::is_stopped() => 0,
+        true => spindle.held(out.outputs),
+        false => out.outputs,
+    };
     if wanted == before && !changed {
         return 0;
     }
@@ -49,6 +53,12 @@ pub fn switch(out: &Snapshot, changed: bool) -> u16 {
     pwm::set_share(spindle.share(wanted, out.speed));
     gpio::set_outputs(wanted);
     spindle.spin_up(before, wanted)
+}
+
+/// The steps have been stopped until reset: so are the outputs. Thread mode only.
+pub fn stop() {
+    // Exec, which alone may do so, cannot run.
+    exec::lock(|_| update(|out| switch(out, true)));
 }
 
 /// Takes over all settings that concern the outputs, and then tells these. Thread mode, or before interrupts are on.

@@ -11,13 +11,14 @@ use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
 use super::spindle;
+use super::switches;
 use crate::baud;
-use crate::boards::MOTORS;
+use crate::boards::{MOTORS, inputs};
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::tables::Row;
 use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::imp::{gpio, stepper, uart, watchdog};
+use crate::hal::imp::{gpio, inputs as pins, stepper, uart, watchdog};
 use crate::hal::serial::{Flow, PORTS};
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::motion::dynamics;
@@ -31,6 +32,8 @@ use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
 pub const RUN: i32 = 5;
+/// `stat` after a limit has been hit.
+const ALARM: i32 = 2;
 
 /// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
@@ -79,6 +82,9 @@ impl<'a> View<'a> {
 
     /// `stat`.
     pub fn state(&self) -> i32 {
+        if self.links.limits_hit.get() != 0 {
+            return ALARM;
+        }
         if hold::is_on() {
             return HOLD;
         }
@@ -126,6 +132,15 @@ impl<'a> View<'a> {
 
     fn offset(&self, axis: usize) -> Length {
         self.links.model.borrow().work_offset().get(axis).copied().unwrap_or(Length::ZERO)
+    }
+
+    /// 1 if a switch is worked, 0 if not, -1 if there is none or it is off.
+    fn input(&self, input: u8) -> i32 {
+        let off = usize::from(input) < inputs::ENDS && switches::mode(&self.settings, input) == 0;
+        if off || switches::WIRED >> input & 1 == 0 {
+            return -1;
+        }
+        (pins::worked() >> input & 1).into()
     }
 
     fn modal(&self, value: Value) -> i32 {
@@ -185,7 +200,7 @@ impl Machine for View<'_> {
         let lowered = self.settings.limit_velocity(setting, rate);
         self.links.settings_changed.set(true);
         self.note(setting, lowered);
-        set_outputs(&self.settings);
+        set_hardware(&self.settings);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 
@@ -233,6 +248,11 @@ impl Machine for View<'_> {
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
+            Value::Input(input) => self.input(input),
+            Value::LimitHit => match self.links.limits_hit.get() {
+                0 => -1,
+                hit => hit.trailing_zeros() as i32,
+            },
             Value::Hold => self.hold(),
             Value::Reset => watchdog::cause() as i32,
             Value::Home => 0,
@@ -259,12 +279,13 @@ impl Machine for View<'_> {
         self.links.storage.forget_cold();
         spindle::set_all(self.links.storage);
         self.links.storage.note(0, ITEMS);
-        set_outputs(&self.settings);
+        set_hardware(&self.settings);
         Status::Ok
     }
 
     fn clear(&mut self) -> Status {
-        Status::Ok
+        // Where the motors are is known after a reset only.
+        if self.links.limits_hit.get() != 0 { Status::LimitHit } else { Status::Ok }
     }
 
     fn flush(&mut self) -> Status {
@@ -328,8 +349,9 @@ pub fn queue_free() -> usize {
     queue::free().max(QUEUE_FREE_MIN)
 }
 
-/// Tells the outputs what the settings say of them. Thread mode, or before interrupts are on.
-pub fn set_outputs(settings: &Settings) {
+/// Tells outputs and inputs what the settings say of them. Thread mode, or before interrupts are on.
+pub fn set_hardware(settings: &Settings) {
+    switches::set_up(settings);
     power::set_modes(settings);
     for port in 0..PORTS as u8 {
         uart::set_flow(port, Flow::of(port, settings.flow_control()));

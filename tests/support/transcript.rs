@@ -9,6 +9,7 @@
 //! <~ {"qr":*}                 from here on such lines may come, any number of them; * is anything
 //! @ +50ms                     time passes
 //! baud 500000                 from here on the sender speaks and hears at this rate
+//! in xmin closed              the contact of a switch closes (or: open); others are probe, door, stop
 //! steps X=12800 Y=0           the motors come to rest there; those not named are at 0
 //! outputs spindle ccw 12.50%  these are on by now, of `spindle ccw mist flood`, and the spindle's pulses that wide
 //! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
@@ -49,6 +50,8 @@ pub trait Side {
     fn heard(&mut self) -> Vec<u8>;
     /// The same on the second port.
     fn heard_aux(&mut self) -> Vec<u8>;
+    /// The contact at an input closes or opens; see `kerf::boards::inputs`.
+    fn set_input(&mut self, input: usize, closed: bool);
     /// Where the motors are, in steps.
     fn steps(&self) -> [i64; 4];
     /// The outputs that are on, as bits of `kerf::boards::outputs`; and what part of its period the spindle's
@@ -67,6 +70,7 @@ enum Event {
     Allow(String),
     Pass(u64),
     Baud(u32),
+    Input(usize, bool),
     Steps([i64; 4]),
     Outputs(String),
 }
@@ -130,6 +134,7 @@ fn parse(line: &str) -> Option<Event> {
         "<~" => Some(Event::Allow(rest.to_string())),
         "@" => rest.strip_prefix('+')?.strip_suffix("ms")?.parse().ok().map(Event::Pass),
         "baud" => rest.parse().ok().map(Event::Baud),
+        "in" => input(rest),
         "steps" => steps(rest).map(Event::Steps),
         "outputs" => Some(Event::Outputs(rest.to_string())),
         _ => None,
@@ -146,6 +151,20 @@ fn unescape(text: &str) -> Option<Vec<u8>> {
     }
     bytes.push(b'\n');
     Some(bytes)
+}
+
+/// The inputs, in their order.
+const INPUTS: [&str; 11] =
+    ["xmin", "xmax", "ymin", "ymax", "zmin", "zmax", "amin", "amax", "probe", "door", "stop"];
+
+fn input(text: &str) -> Option<Event> {
+    let (name, state) = text.split_once(' ')?;
+    let closed = match state {
+        "closed" => true,
+        "open" => false,
+        _ => return None,
+    };
+    INPUTS.iter().position(|input| *input == name).map(|input| Event::Input(input, closed))
 }
 
 fn steps(text: &str) -> Option<[i64; 4]> {
@@ -241,6 +260,7 @@ impl<S: Side> Player<'_, S> {
             Event::Allow(pattern) => self.allowed.push(pattern.clone()),
             Event::Pass(ms) => self.side.run_ms(*ms),
             Event::Baud(baud) => self.side.set_baud(*baud),
+            Event::Input(input, closed) => self.side.set_input(*input, *closed),
             Event::Steps(steps) => return self.rest_at(steps),
             Event::Outputs(wanted) => {
                 let are = (0..SWITCH_MS).find(|_| {

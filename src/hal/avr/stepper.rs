@@ -31,6 +31,8 @@ const FIRST_TICK: u16 = 400;
 
 pub(super) static SEGMENT_RING: Ring<Segment, SEGMENTS> = Ring::new();
 pub(super) static RUNNING: SharedByte = SharedByte::new(0);
+/// Set for good by [`stop`].
+static STOPPED: SharedByte = SharedByte::new(0);
 
 /// How long pulses last, cycles, that no turn of a loop widens: in lockstep, and else.
 const LOCKSTEP_CYCLES: u16 = 21;
@@ -90,8 +92,25 @@ pub fn go() {
         TCNT1.write_volatile(0);
         OCR1A.write_volatile(FIRST_TICK);
         TIFR1.write_volatile(OCF1A);
-        TCCR1B.write_volatile(RUN);
     }
+    // A stop that comes in between would be undone.
+    avr_device::interrupt::free(|_| {
+        if STOPPED.get() == 0 {
+            // SAFETY: as above.
+            unsafe { TCCR1B.write_volatile(RUN) };
+        }
+    });
+}
+
+/// Stops the ticks at once and until reset, wherever the motors are. Any level.
+pub fn stop() {
+    STOPPED.set(1);
+    kill();
+}
+
+/// Whether the ticks have been [stopped](stop) until reset.
+pub fn is_stopped() -> bool {
+    STOPPED.get() != 0
 }
 
 /// Whether ticks are coming.
@@ -129,8 +148,11 @@ pub fn set_step_output(pulse_us: u8, inverted: u8) {
     });
 }
 
-/// Stops the ticks at once, wherever the motors are. For the panic handler.
+/// Stops the ticks at once, wherever the motors are. Also for the panic handler.
 pub fn kill() {
-    // SAFETY: a single store; the machine stops for good.
-    unsafe { TCCR1B.write_volatile(HALT) };
+    // SAFETY: two stores; the machine stops for good, and a tick that is due does not come.
+    unsafe {
+        TCCR1B.write_volatile(HALT);
+        TIFR1.write_volatile(OCF1A);
+    }
 }

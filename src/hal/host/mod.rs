@@ -8,6 +8,7 @@
 pub mod eeprom;
 pub mod exec;
 pub mod gpio;
+pub mod inputs;
 mod machine;
 pub mod pwm;
 pub mod stepper;

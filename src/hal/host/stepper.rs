@@ -31,6 +31,7 @@ struct Stepper {
     pins: RefCell<Pinned>,
     next_tick: Cell<u64>,
     output: Cell<(u8, u8)>,
+    halted: Cell<bool>,
 }
 
 machine_static! {
@@ -46,6 +47,7 @@ machine_static! {
         }),
         next_tick: Cell::new(NEVER),
         output: Cell::new((0, 0)),
+        halted: Cell::new(false),
     };
 }
 
@@ -89,12 +91,23 @@ pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
 
 /// Starts the ticks if they have stopped.
 pub fn go() {
-    if !running() {
+    if !running() && !stepper().halted.get() {
         let mut pins = stepper().pins.borrow_mut();
         pins.stopped = false;
         pins.period = FIRST_TICK;
         stepper().next_tick.set(now() + FIRST_TICK);
     }
+}
+
+/// Stops the ticks at once and until reset, wherever the motors are.
+pub fn stop() {
+    stepper().halted.set(true);
+    stepper().next_tick.set(NEVER);
+}
+
+/// Whether the ticks have been [stopped](stop) until reset.
+pub fn is_stopped() -> bool {
+    stepper().halted.get()
 }
 
 /// Whether ticks are coming.

@@ -40,6 +40,11 @@ impl Side for Machine {
         self.receive()
     }
 
+    fn set_input(&mut self, input: usize, closed: bool) {
+        let pin = self.board().inputs[input].expect("a pin");
+        self.drive_pin(pin.port.letter(), pin.bit, !closed);
+    }
+
     fn steps(&self) -> [i64; 4] {
         self.recorder().motors().each_ref().map(|motor| motor.position)
     }
