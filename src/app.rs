@@ -130,7 +130,8 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     spindle::set_all(links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
     if watchdog::cause().is_fault() {
-        links.except(Status::HardReset);
+        // The reporter looks before it waits.
+        links.told().exception.set(Some(Status::HardReset));
     }
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received, aux).ok()?);
