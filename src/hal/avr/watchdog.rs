@@ -34,6 +34,8 @@ fn set(value: u8) {
         asm!("wdr", options(nostack));
         WDTCSR.write_volatile(CHANGE);
         WDTCSR.write_volatile(value);
+        // From now on.
+        asm!("wdr", options(nostack));
     }
 }
 

@@ -4,6 +4,7 @@ mod common;
 
 use common::{booted, firmware, set};
 use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14};
+use kerf_sim::mechanics::Build;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
 /// The count at which the spindle's timer turns round.
@@ -111,4 +112,57 @@ fn a_reset_stops_the_spindle() {
         assert_eq!(drives(&machine, *pin), Some(false), "{pin:?}");
     }
     assert!((machine.pulses().share - 0.1).abs() < 1e-4);
+}
+
+/// Runs for so many milliseconds with a spindle that follows the pulses.
+fn run_spindle(machine: &mut Machine, ms: u64) {
+    for _ in 0..ms {
+        machine.run_for_ms(1).unwrap();
+        let share = machine.pulses().share;
+        machine.tamper(|mechanics, now| mechanics.drive_spindle(share, now));
+    }
+}
+
+/// The spindle's speed.
+fn rpm(machine: &Machine) -> f64 {
+    machine.mechanics().unwrap().spindle_rpm(machine.cycle())
+}
+
+#[test]
+fn a_spindle_is_up_to_speed_when_the_cut_begins() {
+    let mut machine = firmware(&MEGA2560_GRBL);
+    let mut build = Build::of(&MEGA2560_GRBL);
+    build.spindle.pwm = MEGA2560_GRBL.pwm.map(|pwm| pwm.pin());
+    machine.build(&build);
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut machine, 1_000).unwrap();
+    set(&mut machine, &mut host, "{p1:{csl:0,csh:12000,cpl:0,cph:1,wsl:0,wsh:12000}}");
+    set(&mut machine, &mut host, "{p1:{wpl:0,wph:1,pof:0},sp:{ph:1,de:2.5}}");
+    for (line, speed) in [("m3 s1000\n", 1_000.0), ("m4 s6000\n", -6_000.0)] {
+        // What moves comes to its end.
+        run_spindle(&mut machine, 2_000);
+        machine.send(line.as_bytes());
+        machine.send(format!("g91 g1 f600 x{}\n", speed / 1_000.0).as_bytes());
+        let steps = machine.recorder().steps();
+        let mut waited = 0;
+        while machine.recorder().steps() == steps {
+            run_spindle(&mut machine, 1);
+            waited += 1;
+            assert!(waited < 4_000, "no step");
+        }
+        assert!((2_500..2_650).contains(&waited), "{waited} ms");
+        // From the other way round it has 14,000 to go, of which a hundredth is left after 2.5 s.
+        assert!((rpm(&machine) - speed).abs() < 100.0, "{}", rpm(&machine));
+    }
+    // A hold stops it, and lets it start before motion goes on.
+    machine.send_now(b'!');
+    run_spindle(&mut machine, 3_500);
+    let steps = machine.recorder().steps();
+    assert!(rpm(&machine).abs() < 20.0, "{}", rpm(&machine));
+    machine.send_now(b'~');
+    run_spindle(&mut machine, 2_400);
+    assert_eq!(machine.recorder().steps(), steps);
+    assert!((rpm(&machine) + 6_000.0).abs() < 60.0, "{}", rpm(&machine));
+    run_spindle(&mut machine, 500);
+    assert!(machine.recorder().steps() > steps);
 }
