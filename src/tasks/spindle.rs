@@ -64,7 +64,8 @@ pub fn stop() {
 /// Takes over all settings that concern the outputs, and then tells these. Thread mode, or before interrupts are on.
 #[inline(never)]
 pub fn set_all(storage: &Storage) {
-    for setting in (Setting::WARM..Setting::COLD).filter_map(Setting::from_number) {
+    let settings = (Setting::WARM..Setting::COLD).filter_map(Setting::from_number);
+    for setting in settings.filter(|setting| !setting.is_data()) {
         let value = storage.cold(setting);
         with(|spindle| match spindle.set(setting, value) {
             Changed::Frequency(millihertz) => pwm::set_frequency(millihertz),
