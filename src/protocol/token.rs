@@ -365,6 +365,7 @@ pub enum Target {
 }
 
 /// What `name` means behind `prefix`, a group's.
+#[small]
 pub fn resolve(prefix: Name, name: &[u8]) -> Target {
     let Some(full) = prefix.with(name) else { return Target::Unknown };
     if let Some(token) = Token::find(&full) {

@@ -288,6 +288,7 @@ impl Planner {
     }
 
     #[inline(never)]
+    #[small]
     fn begin_arc(&mut self, motion: &Motion) {
         let Motion::Arc { target, feed, arc } = motion else { return };
         let tolerance = self.links.settings.borrow().chordal_tolerance();
@@ -318,6 +319,7 @@ impl Planner {
     }
 
     /// G28.3: the position is called something else; no motor moves.
+    #[small]
     fn set_position(&mut self, position: &PerAxis<Length>) {
         self.position = *position;
         let body = self.builder.set_position(position, &*self.links.settings.borrow());
@@ -333,6 +335,7 @@ impl Planner {
         }
     }
 
+    #[small]
     fn set_overrides(&mut self, factors: Overrides) {
         let part = |thousandths: u16| (thousandths != 1_000).then(|| f32::from(thousandths) * 1e-3);
         self.feed_factor = part(factors.feed);
@@ -395,6 +398,7 @@ impl Planner {
 
     /// Exec has dropped its blocks: planner and model start from where the motors are.
     #[inline(never)]
+    #[small]
     fn restart(&mut self) {
         let links = self.links;
         let motion = links::snapshot();
@@ -423,6 +427,7 @@ impl Planner {
     }
 
     /// The position of every axis that a motor moves, unless the step is that at which it was to end.
+    #[small]
     fn locate(&mut self, steps: &[i32; MOTORS]) {
         let settings = self.links.settings.borrow();
         // Of several motors on an axis the first tells.

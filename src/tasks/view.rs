@@ -55,6 +55,7 @@ pub struct View<'a> {
     motion: OnceCell<Snapshot>,
 }
 
+#[small]
 impl<'a> View<'a> {
     /// Looks at the machine now, as the sender on this port sees it.
     pub fn of(links: &'a Links, port: &'a Port) -> Self {
@@ -170,6 +171,7 @@ impl<'a> View<'a> {
     }
 }
 
+#[small]
 impl Machine for View<'_> {
     fn settings(&self) -> &Settings {
         &self.settings
