@@ -59,6 +59,7 @@ pub enum Changed {
     Frequency(u32),
 }
 
+#[small]
 impl Spindle {
     /// Nothing set. All zeros but for the factor.
     pub const fn new() -> Self {
@@ -156,6 +157,7 @@ fn choose(bits: &mut u8, which: u8, on: bool) {
 
 /// What a 16-bit timer that counts up and down again divides the clock by: the number of its prescaler, from 1 for
 /// none, and the count at which it turns round. What is too slow for it is as slow as it can be.
+#[small]
 pub fn divide(clock_hz: u32, millihertz: u32) -> (u8, u16) {
     let mut counts = clock_hz as f32 * 500.0 / millihertz as f32;
     let mut prescaler = 1;

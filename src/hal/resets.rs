@@ -77,6 +77,7 @@ const BROWN_OUT: u8 = 1 << 2;
 const WATCHDOG: u8 = 1 << 3;
 
 /// Why the machine has started, of what the chip says and the mark that was left.
+#[small]
 pub fn cause(chip: u8, mark: Mark) -> Cause {
     if chip & POWER_ON != 0 {
         Cause::PowerOn

@@ -24,7 +24,7 @@ const fn tenths(of_ms: u32) -> u32 {
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
     let mut machine = Exec::new();
     let mut segment = Segment::default();
-    let (mut most, mut rests) = (1u8, true);
+    let (mut most, mut rests, mut count) = (1u8, true, 0u8);
     let mut finished = Finished::new();
     loop {
         exec::wait(|| {
@@ -72,7 +72,8 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         if step == Step::Segment {
             // There is room: this task alone fills the ring.
             let _ = segments.push_copy(&segment);
-            health::answer(Sign::Segment);
+            count = count.wrapping_add(1);
+            health::moves(count);
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
             most = queued(cycles, rests);

@@ -62,6 +62,7 @@ pub fn stop() {
 }
 
 /// Takes over all settings that concern the outputs, and then tells these. Thread mode, or before interrupts are on.
+#[small]
 #[inline(never)]
 pub fn set_all(storage: &Storage) {
     let settings = (Setting::WARM..Setting::COLD).filter_map(Setting::from_number);
@@ -76,6 +77,7 @@ pub fn set_all(storage: &Storage) {
 }
 
 /// Takes over the value of a setting, if it concerns the outputs. Thread mode only.
+#[small]
 #[inline(never)]
 pub fn set(setting: Setting, value: i32) {
     match with(|spindle| spindle.set(setting, value)) {

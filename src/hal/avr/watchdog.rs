@@ -63,7 +63,7 @@ pub fn start() {
     set(TIME);
 }
 
-/// All is well. Thread mode.
+/// All is well. Thread mode, and exec.
 #[inline(always)]
 pub fn feed() {
     // SAFETY: it changes nothing but the watchdog's counter.

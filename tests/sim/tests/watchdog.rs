@@ -27,7 +27,7 @@ fn until_reset(machine: &mut Machine) -> (u64, String) {
     let resets = machine.resets();
     while machine.resets() == resets {
         machine.run_for_ms(1).unwrap();
-        assert!(machine.cycle() - from < machine.cycles(3_000), "no reset");
+        assert!(machine.cycle() - from < machine.cycles(12_000), "no reset");
     }
     let ms = (machine.cycle() - from) / machine.cycles(1);
     let _ = machine.receive();
@@ -69,7 +69,8 @@ fn without_ticks_of_the_clock_it_resets() {
     let (mut machine, _) = moving();
     machine.poke(TIMSK0, 0);
     let (ms, said) = until_reset(&mut machine);
-    assert!((450..600).contains(&ms), "{ms} ms");
+    // Not before the move is at its end: steps go on without thread mode.
+    assert!((2_500..5_000).contains(&ms), "{ms} ms");
     assert!(said.contains(READY) && said.contains(TOLD), "{said}");
     let is = cause(&mut machine);
     assert!(is.contains("{\"rst\":3}"), "{is}");
