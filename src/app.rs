@@ -21,7 +21,7 @@ use crate::protocol::{Mode, StatusReport};
 use crate::status::Status;
 use crate::store::Log;
 use crate::store::kept;
-use crate::tasks::links::{Links, QueueCount};
+use crate::tasks::links::{Links, Probe, QueueCount};
 use crate::tasks::ports::Port;
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
@@ -59,6 +59,8 @@ impl Links {
             killed: Cell::new(false),
             flushed: Cell::new(false),
             limits_hit: Cell::new(0),
+            cycle: Cell::default(),
+            probe: Probe::default(),
             job: Cell::default(),
             storage,
             report: RefCell::new(StatusReport::new()),

@@ -8,6 +8,7 @@ use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::imp::{exec, flags, stepper};
 use crate::hal::ring::Producer;
+use crate::motion::contact;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
@@ -34,8 +35,11 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         .await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
+        if contact::is_noted() {
+            contact::catch_up(&segments);
+        }
         let step = links::update(|out| {
-            machine.set_hold(hold::is_wanted(out.running), out);
+            machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
             // What has paused in a hold goes on before motion does.
             if out.outputs != spindle::on() {
                 machine.wait(spindle::switch(out, false), out);
@@ -74,6 +78,9 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
             let _ = segments.push_copy(&segment);
             count = count.wrapping_add(1);
             health::moves(count);
+            if contact::is_noted() {
+                contact::pushed(&segment);
+            }
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
             most = queued(cycles, rests);

@@ -8,6 +8,7 @@
 
 use core::cell::UnsafeCell;
 
+use super::hold;
 use super::links::{snapshot, update};
 use super::storage::Storage;
 use crate::config::Setting;
@@ -40,7 +41,8 @@ pub fn switch(out: &Snapshot, changed: bool) -> u16 {
     // SAFETY: exec runs, or cannot, and nobody else changes it.
     let spindle = unsafe { &*shared().0.get() };
     let before = on();
-    let wanted = match out.held {
+    // A probe that has made contact holds as well.
+    let wanted = match out.held && hold::is_on() {
         _ if stepper::is_stopped() => 0,
         true => spindle.held(out.outputs),
         false => out.outputs,

@@ -6,7 +6,7 @@
 use core::cell::{OnceCell, RefMut};
 
 use super::hold;
-use super::links::{Links, snapshot};
+use super::links::{Cycle, Links, snapshot};
 use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
@@ -34,6 +34,20 @@ use crate::units::Length;
 pub const RUN: i32 = 5;
 /// `stat` after a limit has been hit.
 const ALARM: i32 = 2;
+/// `stat` in the cycles of the machine.
+const PROBING: i32 = 7;
+/// See [`PROBING`].
+const HOMING: i32 = 9;
+/// See [`PROBING`].
+const JOGGING: i32 = 10;
+
+/// Whether something moves, by `stat` and `hold`.
+pub fn moves(state: i32, hold: i32) -> bool {
+    match state {
+        HOLD => hold != HELD,
+        state => matches!(state, RUN | PROBING | HOMING | JOGGING),
+    }
+}
 
 /// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
@@ -88,6 +102,12 @@ impl<'a> View<'a> {
         }
         if hold::is_on() {
             return HOLD;
+        }
+        match self.links.cycle.get() {
+            Cycle::Off => {}
+            Cycle::Probe => return PROBING,
+            Cycle::Homing => return HOMING,
+            Cycle::Jog => return JOGGING,
         }
         if self.is_busy() && !self.links.stopped.get() {
             return RUN;
@@ -213,15 +233,16 @@ impl Machine for View<'_> {
     fn value(&mut self, value: Value) -> i32 {
         match value {
             Value::State => self.state(),
-            // They differ only in a hold, and where there are alarms and cycles.
-            Value::Machine => {
-                if hold::is_on() {
-                    RUN
-                } else {
-                    self.state()
-                }
-            }
-            Value::Cycle => i32::from(self.is_busy()),
+            Value::Machine => match self.state() {
+                HOLD | PROBING | HOMING | JOGGING => RUN,
+                state => state,
+            },
+            Value::Cycle => match self.links.cycle.get() {
+                Cycle::Off => i32::from(self.is_busy()),
+                Cycle::Probe => 2,
+                Cycle::Homing => 3,
+                Cycle::Jog => 4,
+            },
             Value::Motion if hold::is_on() => 2,
             Value::Motion => i32::from(self.motion().running),
             // Lines that move nothing are finished when all before them are.
@@ -251,6 +272,10 @@ impl Machine for View<'_> {
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
             Value::Input(input) => self.input(input),
+            Value::ProbeState => self.links.probe.state() as i32,
+            Value::Probed(axis) => {
+                self.links.probe.at().get(usize::from(axis)).map_or(0, |at| at.0)
+            }
             Value::LimitHit => match self.links.limits_hit.get() {
                 0 => -1,
                 hit => hit.trailing_zeros() as i32,
