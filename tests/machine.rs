@@ -339,3 +339,55 @@ fn a_report_tells_of_one_moment() {
     }
     assert!(moved > 30, "{heard}");
 }
+
+#[test]
+fn the_watchdog_is_fed_whatever_the_machine_does() {
+    use kerf::hal::imp::{now, watchdog};
+    let mut sender = Sender::boot();
+    let mut late = 0;
+    for (line, ms) in [
+        ("g1 f600 x2\n", 1_500),
+        ("g4 p1\n", 1_200),
+        ("g1 f0.1 x2.005\n", 4_000),
+        ("{sys:n}\n{defa:1}\n{xsn:2,spph:1,spde:1}\n", 500),
+        ("m3 s1000 g1 f300 x9\n", 1_500),
+        ("!", 1_000),
+        ("~", 1_500),
+    ] {
+        sender.ask(line, 0);
+        for _ in 0..ms {
+            sender.ask("", 1);
+            late = late.max(now() - watchdog::fed());
+        }
+    }
+    // A limit stops the steps for good, and is no reason for a reset.
+    sender.machine.set_input(kerf::boards::inputs::X_MIN, true);
+    sender.ask("", 1_000);
+    assert!(sender.heard.contains("\"st\":204"), "{}", sender.heard);
+    late = late.max(now() - watchdog::fed());
+    assert!(late < 100 * 16_000, "{} ms", late / 16_000);
+}
+
+#[test]
+fn a_reset_that_nobody_wanted_is_told() {
+    use kerf::hal::imp::watchdog;
+    use kerf::hal::resets::Cause;
+    for (cause, told) in [
+        (Cause::PowerOn, false),
+        (Cause::External, false),
+        (Cause::BrownOut, true),
+        (Cause::Watchdog, true),
+        (Cause::Asked, false),
+    ] {
+        let heard = std::thread::spawn(move || {
+            watchdog::set_cause(cause);
+            let mut sender = Sender::boot();
+            sender.ask("{rst:n}\n", 100);
+            sender.heard
+        });
+        let heard = heard.join().expect("no panic");
+        assert!(heard.contains(&format!("{{\"rst\":{}}}", cause as u8)), "{heard}");
+        let er = "{\"er\":{\"fb\":440.20,\"st\":6,\"msg\":\"Hard reset\"}}";
+        assert_eq!(heard.contains(er), told, "{heard}");
+    }
+}

@@ -99,6 +99,13 @@ const fn cold(name: &str, shown: u8) -> Row {
     Row { token: token(name), slot, kind, flags, stored, shown, min, max }
 }
 
+/// Yes or no, in EEPROM.
+const fn choice(name: &str) -> Row {
+    let mut row = cold(name, 0).with(RANGE);
+    (row.stored, row.max) = (0, 1);
+    row
+}
+
 /// 32 bits.
 const fn bits(name: &str, kind: Kind, slot: u8) -> Row {
     let (flags, stored, shown, min, max) = (0, 0, 0, i32::MIN, i32::MAX);
@@ -131,6 +138,10 @@ pub const MOTOR_ROWS: usize = 7;
 pub const AXIS_ROWS: usize = 16;
 /// Rows of [`PWM`].
 pub const PWM_ROWS: usize = 10;
+/// Rows of [`SPINDLE`].
+pub const SPINDLE_ROWS: usize = 4;
+/// Rows of [`COOLANT`].
+pub const COOLANT_ROWS: usize = 1;
 /// Rows of [`USER`].
 pub const USER_ROWS: usize = 4;
 /// Rows of [`JOB`].
@@ -344,6 +355,20 @@ progmem! {
     /// Their defaults.
     pub static PWM_DEFAULTS: [i32; PWM_ROWS] =
         [100_000, 1_000_000, 2_000_000, 125, 200, 1_000_000, 2_000_000, 125, 200, 100];
+
+    /// The group `sp`.
+    pub static SPINDLE: [Row; SPINDLE_ROWS] = [
+        choice("ph"),
+        up_to(cold("de", 3), 60_000),
+        choice("ep"),
+        choice("dp"),
+    ];
+
+    /// Their defaults.
+    pub static SPINDLE_DEFAULTS: [i32; SPINDLE_ROWS] = [0, 0, 1, 0];
+
+    /// The group `co`. Its default is 0.
+    pub static COOLANT: [Row; COOLANT_ROWS] = [choice("ph")];
 
     /// The groups `uda` to `udd`. All are 0 at first.
     pub static USER: [Row; USER_ROWS] = [

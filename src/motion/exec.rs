@@ -50,6 +50,8 @@ pub enum Step {
     Segment,
     /// Nothing to queue, but something was done: ask again.
     Again,
+    /// The outputs or the speed of the spindle are others, at a standstill: ask again.
+    Switched,
     /// A program stop, end or change of outputs is due: ask again when the steppers stand still.
     Standstill,
     /// No block.
@@ -170,6 +172,14 @@ impl Exec {
         }
     }
 
+    /// Stands still for so many milliseconds, before anything else: at a standstill, perhaps in the midst of a line.
+    pub fn wait(&mut self, ms: u16, out: &mut Snapshot) {
+        if ms > 0 {
+            self.dwell_ms += u32::from(ms);
+            out.running = true;
+        }
+    }
+
     /// In a hold: whether there is nothing more to prepare.
     #[inline(never)]
     fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
@@ -237,7 +247,9 @@ impl Exec {
                 if !standstill {
                     return Step::Standstill;
                 }
-                out.outputs = *outputs;
+                (out.outputs, out.speed) = (outputs.on, outputs.speed);
+                blocks.release();
+                return Step::Switched;
             }
             Body::ProgramStop | Body::ProgramEnd => {
                 self.halt(out);

@@ -31,6 +31,8 @@ pub struct Snapshot {
     pub program: Program,
     /// What the outputs are to be, bits of [`outputs`](crate::boards::outputs).
     pub outputs: u8,
+    /// What the speed of the spindle is to be, turns per minute.
+    pub speed: f32,
 }
 
 impl Snapshot {
@@ -48,6 +50,7 @@ impl Snapshot {
             held: false,
             program: Program::Ready,
             outputs: 0,
+            speed: 0.0,
         }
     }
 

@@ -58,6 +58,8 @@ pub enum Value {
     Mist,
     /// `cof`: 1 after M8.
     Flood,
+    /// `rst`: why the machine has started, see [`Cause`](crate::hal::resets::Cause).
+    Reset,
     /// `tool`: tool number.
     Tool,
     /// `home`: 0 not homed, 1 homed, 2 homing.
@@ -194,7 +196,7 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 34;
+pub const SINGLE_COUNT: usize = 35;
 /// Entries of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
 /// The number of the vector `g92`.
@@ -283,6 +285,7 @@ progmem! {
         count("cof", Value::Flood, text!("Flood coolant:"), ON),
         count("fd", Value::Zero, NONE, NONE),
         single("ma", Value::Zero, Form::Length),
+        count("rst", Value::Reset, text!("Last reset:"), text!("Power on|External|Brown-out|Watchdog|Asked for")),
         count("inp", PROBE, text!("Probe:"), NONE),
         count("ind", DOOR, text!("Door:"), NONE),
         count("ine", STOP, text!("Emergency stop:"), NONE),

@@ -11,6 +11,7 @@ use super::links::{Cycle, Links, snapshot};
 use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
+use super::spindle;
 use super::switches;
 use crate::baud;
 use crate::boards::{MOTORS, inputs};
@@ -18,7 +19,7 @@ use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::tables::Row;
 use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::imp::{gpio, inputs as pins, stepper, uart};
+use crate::hal::imp::{gpio, inputs as pins, stepper, uart, watchdog};
 use crate::hal::serial::{Flow, PORTS};
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::motion::dynamics;
@@ -204,6 +205,7 @@ impl Machine for View<'_> {
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
         if setting.is_cold() {
             self.links.storage.set_cold(setting, value)?;
+            spindle::set(setting, value);
             return Ok(Warning::None);
         }
         if setting.needs_rest() {
@@ -287,6 +289,7 @@ impl Machine for View<'_> {
                 hit => hit.trailing_zeros() as i32,
             },
             Value::Hold => self.hold(),
+            Value::Reset => watchdog::cause() as i32,
             Value::Home => 0,
             modal => self.modal(modal),
         }
@@ -316,6 +319,7 @@ impl Machine for View<'_> {
         self.links.resync.set(true);
         self.links.settings_changed.set(true);
         self.links.storage.forget_cold();
+        spindle::set_all(self.links.storage);
         self.links.storage.note(0, ITEMS);
         set_hardware(&self.settings);
         Status::Ok

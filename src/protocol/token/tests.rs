@@ -27,7 +27,21 @@ fn every_token_has_a_name_that_finds_it() {
     }
     assert_eq!(
         count,
-        34 + 28 + 3 * 15 + 16 + 2 * 9 + 34 + 46 + 2 * 6 + 6 * 4 + 8 + 11 * 6 + 10 * 2 + 10 + 16 + 4
+        34 + 28
+            + 3 * 15
+            + 16
+            + 2 * 9
+            + 35
+            + 46
+            + 2 * 6
+            + 6 * 4
+            + 8
+            + 11 * 6
+            + 10 * 2
+            + 10
+            + 5
+            + 16
+            + 4
     );
     for bad in [
         "g53x", "g54d", "tt1y", "tt11z", "posd", "pwr5", "pwr0", "pos", "homd", "pwra", "velo",
