@@ -66,13 +66,16 @@ pub struct Governor {
     pub(super) brake: Option<Brake>,
     /// Something may be better than the brake.
     pub(super) look: bool,
+    /// An override has changed feeds since it stood still: a limit that a feed makes may be too near to be kept.
+    pub(super) late: bool,
 }
 
 impl Governor {
     /// At rest.
     pub const fn new() -> Self {
         let limits = Limits { accel: 0.0, jerk: 0.0, kappa: 0.0, pace: 0.0 };
-        Self { state: State { velocity: 0.0, alpha: 0.0 }, limits, brake: None, look: false }
+        let state = State { velocity: 0.0, alpha: 0.0 };
+        Self { state, limits, brake: None, look: false, late: false }
     }
 
     /// Velocity, mm/s.
@@ -84,6 +87,7 @@ impl Governor {
     pub fn stop(&mut self) {
         self.state = State::default();
         self.brake = None;
+        self.late = false;
     }
 
     /// A block with these limits begins, mm/s^2 and mm/s^3. If they are others than before, it goes on with
@@ -105,6 +109,12 @@ impl Governor {
         }
         self.state.alpha = alpha;
         self.limits = Limits { accel, jerk, kappa: kappa(accel, jerk), pace };
+    }
+
+    /// An override has changed feeds, of what runs and of what is ahead.
+    pub fn change_feed(&mut self) {
+        self.late = true;
+        self.look = true;
     }
 
     /// What is ahead has changed.
@@ -139,7 +149,8 @@ impl Governor {
         {
             let gain = self.limits.accel * seconds;
             let half = 0.5 * seconds;
-            let mut next = lesser(v + gain, cruise);
+            // An override may have taken the feed away from under it.
+            let mut next = greater(lesser(v + gain, cruise), v - gain);
             let mut distance = (v + next) * half;
             let twice = self.limits.accel + self.limits.accel;
             if next * next > headroom + twice * (left - distance) {
@@ -158,6 +169,15 @@ impl Governor {
         self.finish(left, cruise, headroom, seconds)
     }
 
+    /// `next`, or the least velocity that it can have at the end, from `v` and with so much to lose, if that
+    /// is more by what is not rounding: an override has lowered the limit too late.
+    #[inline(never)]
+    fn slowest(&self, v: f32, gain: f32, next: f32) -> f32 {
+        let square = v * v;
+        let least = square - gain;
+        if least > next * next + 1e-3 * square { sqrt(least) } else { next }
+    }
+
     /// All the rest of a block in one.
     #[inline(never)]
     fn finish(&mut self, left: f32, cruise: f32, headroom: f32, nominal: f32) -> Stretch {
@@ -165,10 +185,14 @@ impl Governor {
         let gain = scaled(self.limits.accel * left, 1);
         let square = v * v + gain;
         let next = least(sqrt(least(square, headroom)), cruise);
+        let next = if self.late && below(next, v) { self.slowest(v, gain, next) } else { next };
         self.state.velocity = next;
         let sum = v + next;
         let mut seconds = 2.0 * nominal;
-        if log(sum) + log(nominal) > log(left) + PLAIN || below(left, sum * nominal) {
+        if below(cruise, v)
+            || log(sum) + log(nominal) > log(left) + PLAIN
+            || below(left, sum * nominal)
+        {
             seconds = scaled(left, 1) / sum;
         } else if square > 0.0 {
             // From rest to rest or nearly so: there is a peak between.

@@ -78,7 +78,7 @@ mod tests {
             0.0
         }
         fn anchor(&self, n: u8) -> Option<Anchor> {
-            (n == 0).then_some(Anchor { velocity: 0.0, ahead: 0.0, firm: true })
+            (n == 0).then_some(Anchor { velocity: 0.0, ahead: 0.0, soft: false, firm: true })
         }
     }
 

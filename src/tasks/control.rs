@@ -6,12 +6,14 @@
 
 use super::hold;
 use super::links::Links;
+use super::overrides;
 use crate::hal::event::{Event, next};
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
         hold::serve(links);
+        overrides::tell(links);
         next(Event::Realtime).await;
     }
 }

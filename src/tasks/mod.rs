@@ -6,6 +6,7 @@ pub mod exec;
 pub mod hold;
 pub mod lines;
 pub mod links;
+pub mod overrides;
 pub mod parser;
 pub mod planner;
 pub mod ports;

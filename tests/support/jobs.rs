@@ -156,7 +156,7 @@ pub fn plan_held(job: &Job, mut held: impl FnMut(usize, bool) -> bool) -> Vec<Pl
             rig.source.enter();
             version = rig.source.version().wrapping_sub(1);
             governor.begin(line.accel.get(), line.jerk.get());
-            (line, block.line, line.length)
+            (line, block.line, line.length())
         });
         if rig.source.version() != version {
             version = rig.source.version();
@@ -184,7 +184,7 @@ pub fn plan_held(job: &Job, mut held: impl FnMut(usize, bool) -> bool) -> Vec<Pl
         };
         planned.push(Planned {
             line: number,
-            length: line.length.into(),
+            length: line.length().into(),
             cruise: line.cruise.into(),
             accel: line.accel.get().into(),
             jerk: line.jerk.get().into(),

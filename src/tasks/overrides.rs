@@ -1,0 +1,82 @@
+//! The overrides in force: one state for all who change it, and all who go by it.
+//!
+//! Changed by requests and real-time characters ([`change`], thread mode), and by M48 to M51 and the end of a
+//! program when exec comes to them ([`change_in_stream`]). Exec goes by the factors from its next stretch on: what is
+//! queued takes 9 ms at most. A factor that rises waits for the planner (`motion::replan`), which the
+//! control task wakes: [`Event::Realtime`]. Nothing here waits, and nothing can be full.
+//!
+//! [`spindle`] is what the speed of the spindle is to be multiplied by; whoever drives one asks.
+
+use core::cell::UnsafeCell;
+
+use super::links::Links;
+use crate::gcode::overrides::{Change, Override, Overrides};
+use crate::hal::event::Event;
+use crate::hal::imp::{exec, flags};
+use crate::motion::factors::Factors;
+use crate::motion::queue::{self, BlockSource};
+
+/// The state: exec's, and thread mode's while exec is locked out.
+struct Shared(UnsafeCell<Overrides>);
+
+// SAFETY: exec changes it, and thread mode does while exec cannot run.
+unsafe impl Sync for Shared {}
+
+machine_static! {
+    fn shared() -> Shared = Shared(UnsafeCell::new(Overrides::NONE));
+}
+
+/// The overrides as they are. Thread mode only.
+pub fn now() -> Overrides {
+    // SAFETY: exec does not run under the lock.
+    exec::lock(|_| unsafe { *shared().0.get() })
+}
+
+/// Thousandths that the speed of the spindle is to be multiplied by. Thread mode only.
+pub fn spindle() -> u16 {
+    now().in_force(Override::Spindle)
+}
+
+/// Changes them at once. Thread mode only.
+pub fn change(change: Change) {
+    exec::lock(|ceiling| {
+        // SAFETY: exec does not run under the lock.
+        let overrides = unsafe { &mut *shared().0.get() };
+        overrides.change(change);
+        queue::store().want(factors(overrides), ceiling);
+    });
+    flags::set(Event::Realtime);
+}
+
+/// The moves behind which the change stands have been prepared. Exec only.
+pub fn change_in_stream(change: Change, blocks: &mut BlockSource) {
+    // SAFETY: exec runs, so nobody holds the lock.
+    let overrides = unsafe { &mut *shared().0.get() };
+    overrides.change(change);
+    blocks.want(factors(overrides));
+    flags::set(Event::Realtime);
+}
+
+/// Tells the others that they may have changed. Control only.
+pub fn tell(links: &Links) {
+    links.planner_wake.signal();
+    flags::set(Event::BlockDone);
+    links.reporter_wake.signal();
+}
+
+/// What motion goes by. 1 is exact: velocities are as programmed, to the bit.
+#[inline(never)]
+fn factors(overrides: &Overrides) -> Factors {
+    let factor = |which| f32::from(overrides.in_force(which)) * 0.001;
+    Factors { feed: factor(Override::Feed), traverse: factor(Override::Traverse) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_overridden_is_as_programmed() {
+        assert!(factors(&Overrides::NONE).same(&Factors::ONE));
+    }
+}
