@@ -55,12 +55,17 @@ impl Change {
 
     /// On, or off, with the factor that it has.
     pub const fn switch(which: Override, on: bool) -> Self {
-        Self { which: 1 << which as u8, on, factor: 0 }
+        Self::new(which, on, 0)
+    }
+
+    /// On or not, with a factor that it [allows](Override::allows).
+    pub const fn new(which: Override, on: bool, factor: u16) -> Self {
+        Self { which: 1 << which as u8, on, factor }
     }
 
     /// On, with a factor that it [allows](Override::allows).
     pub const fn to(which: Override, factor: u16) -> Self {
-        Self { which: 1 << which as u8, on: true, factor }
+        Self::new(which, true, factor)
     }
 }
 
@@ -95,7 +100,7 @@ impl Overrides {
 
     /// The factor that has been set, whether or not it counts.
     pub fn factor(&self, which: Override) -> u16 {
-        self.factors[which as usize]
+        self.factors.get(which as usize).copied().unwrap_or(FULL)
     }
 
     /// Whether it counts.

@@ -66,7 +66,7 @@ pub struct Governor {
     pub(super) brake: Option<Brake>,
     /// Something may be better than the brake.
     pub(super) look: bool,
-    /// An override has changed feeds since it stood still: a limit that a feed makes may be too near to be kept.
+    /// An override has changed feeds, ever: a limit that a feed makes may be too near to be kept.
     pub(super) late: bool,
 }
 
@@ -87,7 +87,6 @@ impl Governor {
     pub fn stop(&mut self) {
         self.state = State::default();
         self.brake = None;
-        self.late = false;
     }
 
     /// A block with these limits begins, mm/s^2 and mm/s^3. If they are others than before, it goes on with
@@ -172,10 +171,9 @@ impl Governor {
     /// `next`, or the least velocity that it can have at the end, from `v` and with so much to lose, if that
     /// is more by what is not rounding: an override has lowered the limit too late.
     #[inline(never)]
-    fn slowest(&self, v: f32, gain: f32, next: f32) -> f32 {
-        let square = v * v;
-        let least = square - gain;
-        if least > next * next + 1e-3 * square { sqrt(least) } else { next }
+    pub(super) fn slowest(&self, v: f32, gain: f32, next: f32, nominal: f32) -> f32 {
+        let least = sqrt(greater(v * v - gain, 0.0));
+        if least > next + self.limits.accel * nominal { least } else { next }
     }
 
     /// All the rest of a block in one.
@@ -185,7 +183,8 @@ impl Governor {
         let gain = scaled(self.limits.accel * left, 1);
         let square = v * v + gain;
         let next = least(sqrt(least(square, headroom)), cruise);
-        let next = if self.late && below(next, v) { self.slowest(v, gain, next) } else { next };
+        let late = below(next, v) && (self.late || below(cruise, v));
+        let next = if late { self.slowest(v, gain, next, nominal) } else { next };
         self.state.velocity = next;
         let sum = v + next;
         let mut seconds = 2.0 * nominal;

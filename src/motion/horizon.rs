@@ -117,7 +117,7 @@ pub struct Horizon {
     pub version: u8,
     /// The overrides that are wanted.
     pub wanted: Factors,
-    /// Others were wanted when exec looked last.
+    /// Others were wanted, or planned for, when exec looked last.
     pub changed: bool,
     /// Those that the keys are for, or for more: faster than by these nothing may be run.
     pub planned: Factors,
@@ -126,7 +126,9 @@ pub struct Horizon {
 impl Horizon {
     /// Of an empty queue.
     pub const fn new() -> Self {
-        let (wanted, planned) = (Factors::ONE, Factors::ONE);
+        // All zero, so that it is not in flash as well: `begin` comes before anything else.
+        let none = Factors { feed: 0.0, traverse: 0.0 };
+        let (wanted, planned) = (none, none);
         Self {
             seqs: [0; BLOCKS],
             front: 0,
@@ -177,6 +179,11 @@ impl Horizon {
         self.wanted = factors;
         self.changed = true;
         self.version = self.version.wrapping_add(1);
+    }
+
+    /// Nothing is overridden so far.
+    pub fn begin(&mut self) {
+        (self.wanted, self.planned) = (Factors::ONE, Factors::ONE);
     }
 
     /// Drops all keys.

@@ -58,6 +58,8 @@ impl BlockStore {
     /// The planner's end and exec's. `None` after the first time.
     pub fn split(&'static self) -> Option<(BlockQueue, BlockSource)> {
         let (producer, consumer) = self.ring.split()?;
+        // SAFETY: these are the only ends, and nobody else has one yet.
+        unsafe { &mut *self.horizon.get() }.begin();
         let queue = BlockQueue {
             ring: producer,
             store: self,

@@ -110,6 +110,7 @@ impl BlockQueue {
                     horizon.add(if firm { seq | FIRM } else { seq });
                 }
                 horizon.planned = self.factors;
+                horizon.changed = true;
                 horizon.version = horizon.version.wrapping_add(1);
             });
         });

@@ -55,7 +55,8 @@ impl Governor {
         }
         if self.brake.is_none() || self.look {
             // Above the feed, which an override has lowered, it looks until it is not.
-            self.look = self.late && below(cruise, self.state.velocity);
+            let v = self.state.velocity;
+            self.look = below(cruise, v) && (self.late || below(cruise * 1.01, v));
             if let Some(stretch) = self.go(left, cruise, ahead, nominal) {
                 self.brake = None;
                 return stretch;

@@ -15,11 +15,14 @@ use crate::progmem::Text;
 use crate::text;
 use crate::units::AXES;
 
-const FIRST_SINGLE: u8 = Setting::NUMBERS;
-const FIRST_VECTOR: u8 = FIRST_SINGLE + SINGLE_COUNT as u8;
+const FIRST_VECTOR: u8 = Setting::NUMBERS;
+/// The last vector has a member for each motor.
+const FIRST_SINGLE: u16 = FIRST_VECTOR as u16 + (VECTOR_COUNT * AXES - 2) as u16;
 
-/// The first value of the interpreter's tables. Those below it fit one byte.
-const FIRST_ROW: u16 = 256;
+/// Tokens from here on do not fit a byte: reports cannot have them.
+const FAR: u16 = 256;
+/// The first value of the interpreter's tables.
+const FIRST_ROW: u16 = FIRST_SINGLE + SINGLE_COUNT as u16;
 
 /// A setting or a value, as a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -56,7 +59,7 @@ impl Token {
 
     /// Whether it is in EEPROM alone, too far away to be told all the time.
     pub fn is_far(self) -> bool {
-        self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
+        self.0 >= FAR || self.setting().is_some_and(Setting::is_cold)
     }
 
     /// Its number, if it fits.
@@ -71,7 +74,7 @@ impl Token {
 
     /// The token of a value in the table of [`SINGLES`].
     const fn single(index: u8) -> Token {
-        Token((FIRST_SINGLE + index) as u16)
+        Token(FIRST_SINGLE + index as u16)
     }
 
     /// The token of a vector's member.
@@ -119,15 +122,16 @@ impl Token {
 
     /// What it is.
     pub fn subject(self) -> Option<Subject> {
-        let Some(number) = self.small() else {
+        if self.0 >= FIRST_ROW {
             let (row, axis) = by_axis((self.0 - FIRST_ROW) as u8);
             return Row::from_number(row).map(|row| Subject::Row(row, axis));
-        };
-        if number < FIRST_SINGLE {
-            return Setting::from_number(number).map(Subject::Setting);
         }
+        if self.0 >= FIRST_SINGLE {
+            return SINGLES.at(usize::from(self.0 - FIRST_SINGLE)).map(Subject::Single);
+        }
+        let number = self.0 as u8;
         if number < FIRST_VECTOR {
-            return SINGLES.at(usize::from(number - FIRST_SINGLE)).map(Subject::Single);
+            return Setting::from_number(number).map(Subject::Setting);
         }
         let (number, index) = by_axis(number - FIRST_VECTOR);
         VECTORS.at(usize::from(number)).map(|vector| Subject::Member(number, vector, index))

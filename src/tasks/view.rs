@@ -7,6 +7,7 @@ use core::cell::{OnceCell, RefMut};
 
 use super::hold;
 use super::links::{Links, snapshot};
+use super::overrides;
 use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
@@ -14,6 +15,7 @@ use crate::baud;
 use crate::boards::MOTORS;
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
+use crate::gcode::overrides::Change;
 use crate::gcode::tables::Row;
 use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{gpio, stepper, uart};
@@ -191,6 +193,10 @@ impl Machine for View<'_> {
         self.links.model.borrow_mut().set(row, axis, value)
     }
 
+    fn change_override(&mut self, change: Change) {
+        overrides::change(change);
+    }
+
     fn value(&mut self, value: Value) -> i32 {
         match value {
             Value::State => self.state(),
@@ -230,6 +236,8 @@ impl Machine for View<'_> {
             Value::Row(row, axis) => self.links.storage.value(row, axis).0,
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
+            Value::Override(which) => overrides::now().factor(which).into(),
+            Value::OverrideOn(which) => overrides::now().is_on(which).into(),
             Value::Tool => self.links.model.borrow().tool().into(),
             Value::Hold => self.hold(),
             Value::Home => 0,
