@@ -13,6 +13,7 @@ use crate::hal::event::{Event, next};
 pub async fn run(links: &'static Links) -> ! {
     loop {
         hold::serve(links);
+        overrides::serve(links);
         overrides::tell(links);
         next(Event::Realtime).await;
     }

@@ -10,11 +10,12 @@
 use core::cell::UnsafeCell;
 
 use super::links::Links;
-use crate::gcode::overrides::{Change, Override, Overrides};
+use crate::gcode::overrides::{Change, FULL, LEAST, Override, Overrides};
 use crate::hal::event::Event;
-use crate::hal::imp::{exec, flags};
+use crate::hal::imp::{exec, flags, uart};
 use crate::motion::factors::Factors;
 use crate::motion::queue::{self, BlockSource};
+use crate::realtime::{Asked, TRAVERSE};
 
 /// The state: exec's, and thread mode's while exec is locked out.
 struct Shared(UnsafeCell<Overrides>);
@@ -55,6 +56,37 @@ pub fn change_in_stream(change: Change, blocks: &mut BlockSource) {
     overrides.change(change);
     blocks.want(factors(overrides));
     flags::set(Event::Realtime);
+}
+
+/// Does what real-time characters ask for. A step that would go too far goes as far as may be; whatever they ask for
+/// counts from then on. Control only.
+pub fn serve(links: &Links) {
+    for port in &links.ports {
+        let asked = uart::take_asked(port.number);
+        if asked == Asked::NOTHING {
+            continue;
+        }
+        for (n, which) in [(0, Override::Feed), (1, Override::Spindle)] {
+            step(which, asked.percent[n], asked.fixed & 1 << n != 0);
+        }
+        let traverse = match (asked.fixed & TRAVERSE) >> 2 {
+            0 => continue,
+            1 => FULL,
+            2 => FULL / 2,
+            _ => FULL / 4,
+        };
+        change(Change::to(Override::Traverse, traverse));
+    }
+}
+
+/// So many percent more, or less; from 100 % if `anew`.
+fn step(which: Override, percent: i8, anew: bool) {
+    if percent == 0 && !anew {
+        return;
+    }
+    let before = if anew { FULL } else { now().factor(which) };
+    let factor = (before.cast_signed() + 10 * i16::from(percent)).max(LEAST.cast_signed());
+    change(Change::to(which, factor.cast_unsigned().min(which.most())));
 }
 
 /// Tells the others that they may have changed. Control only.
