@@ -1,6 +1,6 @@
 //! Arduino Mega 2560 with a grbl-style shield: the pinout of grbl-Mega.
 
-use super::Port::{A, B, C, E, H};
+use super::Port::{A, B, C, E, H, K};
 use super::{Board, Handshake, MotorPins, Serial, Timer, USB, Usart, pin};
 
 /// Arduino Mega 2560 with a grbl-style shield.
@@ -26,6 +26,21 @@ pub const MEGA2560_GRBL: Board = Board {
             handshake: Some(Handshake { rts: pin(A, 0), cts: pin(A, 1) }),
             driver_enable: None,
         },
+    ],
+    inputs: [
+        // D10 to D12: one for both ends of an axis
+        Some(pin(B, 4)),
+        Some(pin(B, 4)),
+        Some(pin(B, 5)),
+        Some(pin(B, 5)),
+        Some(pin(B, 6)),
+        Some(pin(B, 6)),
+        None,
+        None,
+        // A15, A11, A8: probe, door, and what is the reset button of grbl
+        Some(pin(K, 7)),
+        Some(pin(K, 3)),
+        Some(pin(K, 0)),
     ],
     step_timer: Timer::T1,
     tick_timer: Timer::T0,

@@ -1,6 +1,6 @@
 //! Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder.
 
-use super::Port::{A, B, D, E, F, G, H, K, L};
+use super::Port::{A, B, D, E, F, G, H, J, K, L};
 use super::{Board, MotorPins, Timer, USB, pin};
 
 /// Arduino Mega 2560 with RAMPS 1.4.
@@ -20,6 +20,21 @@ pub const RAMPS14: Board = Board {
     outputs: [Some(pin(G, 5)), Some(pin(E, 3)), Some(pin(H, 3)), Some(pin(B, 5))],
     // The pins of USART1 and USART3 are those of the limit switches.
     serial: &[USB],
+    inputs: [
+        // D3, D2, D14, D15, D18, D19
+        Some(pin(E, 5)),
+        Some(pin(E, 4)),
+        Some(pin(J, 1)),
+        Some(pin(J, 0)),
+        Some(pin(D, 3)),
+        Some(pin(D, 2)),
+        None,
+        None,
+        // A10, A12, A9 of AUX-2: probe, door, emergency stop
+        Some(pin(K, 2)),
+        Some(pin(K, 4)),
+        Some(pin(K, 1)),
+    ],
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

@@ -20,11 +20,11 @@ use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
 use crate::store::kept;
-use crate::tasks::links::{Links, QueueCount};
+use crate::tasks::links::{Links, Probe, QueueCount};
 use crate::tasks::ports::Port;
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
-use crate::tasks::view::set_outputs;
+use crate::tasks::view::set_hardware;
 use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, power, reader, reporter, storage};
 
@@ -57,6 +57,9 @@ impl Links {
             percent_at: Cell::new(0),
             killed: Cell::new(false),
             flushed: Cell::new(false),
+            limits_hit: Cell::new(0),
+            cycle: Cell::default(),
+            probe: Probe::default(),
             job: Cell::default(),
             storage,
             report: RefCell::new(StatusReport::new()),
@@ -124,7 +127,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     if !links.settings.borrow().starts_in_json() {
         links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
     }
-    set_outputs(&links.settings.borrow());
+    set_hardware(&links.settings.borrow());
     links.model.borrow_mut().start(&*links.settings.borrow());
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received, aux).ok()?);

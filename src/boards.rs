@@ -83,6 +83,34 @@ pub const fn pin(port: Port, bit: u8) -> Pin {
     Pin { port, bit }
 }
 
+/// The interrupt that an edge on a pin raises.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Interrupt {
+    /// An external one by its number: INT0 to INT7, each with a vector of its own.
+    External(u8),
+    /// A pin change by its number: PCINT0 to PCINT23, of which eight share a vector.
+    PinChange(u8),
+}
+
+impl Pin {
+    /// Whether it is the same pin.
+    pub const fn is(self, other: Pin) -> bool {
+        self.port as u8 == other.port as u8 && self.bit == other.bit
+    }
+
+    /// The interrupt that an edge on it raises; `None` on ports A, C, F, G, H, L and some pins more.
+    pub const fn interrupt(self) -> Option<Interrupt> {
+        match (self.port, self.bit) {
+            (Port::B, bit) => Some(Interrupt::PinChange(bit)),
+            (Port::D, bit @ 0..4) | (Port::E, bit @ 4..8) => Some(Interrupt::External(bit)),
+            (Port::E, 0) => Some(Interrupt::PinChange(8)),
+            (Port::J, bit @ 0..7) => Some(Interrupt::PinChange(9 + bit)),
+            (Port::K, bit) => Some(Interrupt::PinChange(16 + bit)),
+            _ => None,
+        }
+    }
+}
+
 /// The pins of one stepper driver.
 #[derive(Clone, Copy, Debug)]
 pub struct MotorPins {
@@ -173,6 +201,26 @@ pub mod outputs {
     pub const COUNT: usize = 4;
 }
 
+/// Switches that the machine has, by their number in [`Board::inputs`] and as bits of a set.
+#[allow(missing_docs)]
+pub mod inputs {
+    pub const X_MIN: usize = 0;
+    pub const X_MAX: usize = 1;
+    pub const Y_MIN: usize = 2;
+    pub const Y_MAX: usize = 3;
+    pub const Z_MIN: usize = 4;
+    pub const Z_MAX: usize = 5;
+    pub const A_MIN: usize = 6;
+    pub const A_MAX: usize = 7;
+    /// Those below this are ends of axes: two for each, the lower one first.
+    pub const ENDS: usize = 8;
+    pub const PROBE: usize = 8;
+    pub const DOOR: usize = 9;
+    pub const STOP: usize = 10;
+    /// How many there are.
+    pub const COUNT: usize = 11;
+}
+
 /// A board.
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
@@ -190,6 +238,9 @@ pub struct Board {
     pub outputs: [Option<Pin>; outputs::COUNT],
     /// Its serial ports: [`USB`], and a second one if there is room for it.
     pub serial: &'static [Serial],
+    /// Switches between a pin and ground: see [`inputs`]. One pin may serve both ends of an axis. Each
+    /// must be able to interrupt: see [`Pin::interrupt`].
+    pub inputs: [Option<Pin>; inputs::COUNT],
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,
     /// Timer of the 1 kHz tick.
@@ -204,7 +255,7 @@ const OWN_PIN: Pin = pin(Port::H, 1);
 const MAX_PORTS: usize = 2;
 const SERIAL_PINS: usize = 5;
 
-const MAX_PINS: usize = 3 * MOTORS + 1 + 8 + MAX_PORTS * SERIAL_PINS + 1;
+const MAX_PINS: usize = 3 * MOTORS + 1 + 8 + MAX_PORTS * SERIAL_PINS + 1 + inputs::COUNT;
 
 impl Serial {
     const fn pins(&self) -> [Option<Pin>; SERIAL_PINS] {
@@ -274,15 +325,18 @@ impl Board {
             }
             s += 1;
         }
+        let mut s = 0;
+        while s < inputs::COUNT {
+            pins[n] = if self.is_shared_end(s) { None } else { self.inputs[s] };
+            n += 1;
+            s += 1;
+        }
         let mut i = 0;
         while i < n {
             let mut j = i + 1;
             while j < n {
                 if let (Some(a), Some(b)) = (pins[i], pins[j]) {
-                    assert!(
-                        a.port as u8 != b.port as u8 || a.bit != b.bit,
-                        "a pin of this board is used twice"
-                    );
+                    assert!(!a.is(b), "a pin of this board is used twice");
                 }
                 j += 1;
             }
@@ -295,6 +349,24 @@ impl Board {
         let first = !self.serial.is_empty() && matches!(self.serial[0].usart, Usart::U0);
         assert!(first, "the first serial port of this board is not USART0");
         self.check_outputs();
+        let mut s = 0;
+        while s < inputs::COUNT {
+            if let Some(pin) = self.inputs[s] {
+                assert!(pin.interrupt().is_some(), "a switch of this board cannot interrupt");
+            }
+            s += 1;
+        }
+    }
+
+    /// Whether this input is the upper end of an axis on the pin of the lower one.
+    const fn is_shared_end(&self, input: usize) -> bool {
+        if input >= inputs::ENDS || input.is_multiple_of(2) {
+            return false;
+        }
+        match (self.inputs[input - 1], self.inputs[input]) {
+            (Some(min), Some(max)) => min.is(max),
+            _ => false,
+        }
     }
 
     /// Whether some port has the pins that `{ex:2}` needs.
@@ -318,8 +390,7 @@ impl Board {
             while h < self.hazards.len() {
                 let hazard = self.hazards[h];
                 if let Some(pin) = self.outputs[o]
-                    && pin.port as u8 == hazard.port as u8
-                    && pin.bit == hazard.bit
+                    && pin.is(hazard)
                 {
                     assert!(seen & 1 << h == 0, "an output of this board is used twice");
                     seen |= 1 << h;
@@ -416,6 +487,29 @@ mod tests {
     fn an_output_that_is_used_twice_is_refused() {
         let mut board = MEGA2560_GRBL;
         board.outputs[1] = board.outputs[0];
+        board.check();
+    }
+
+    #[test]
+    fn both_ends_of_an_axis_may_share_a_pin() {
+        let mut board = RAMPS14;
+        board.inputs[inputs::Y_MAX] = board.inputs[inputs::Y_MIN];
+        board.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "pin of this board is used twice")]
+    fn ends_of_two_axes_may_not() {
+        let mut board = RAMPS14;
+        board.inputs[inputs::Y_MIN] = board.inputs[inputs::X_MAX];
+        board.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "switch of this board cannot interrupt")]
+    fn a_switch_must_interrupt() {
+        let mut board = RAMPS14;
+        board.inputs[inputs::A_MIN] = Some(pin(Port::C, 0));
         board.check();
     }
 

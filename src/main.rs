@@ -5,7 +5,7 @@
 mod image {
     use embassy_executor::raw::Executor;
     use kerf::baud;
-    use kerf::hal::imp::{self, exec, executor, gpio, panic, time};
+    use kerf::hal::imp::{self, exec, executor, gpio, inputs, panic, time};
     use kerf::hal::pender;
     use static_cell::StaticCell;
 
@@ -22,6 +22,7 @@ mod image {
         static EXEC: StaticCell<Executor> = StaticCell::new();
         imp::watchdog_off();
         gpio::start();
+        inputs::start();
         let main: &'static Executor = MAIN.init(Executor::new(pender::THREAD));
         let interrupt: &'static Executor = EXEC.init(Executor::new(pender::EXEC));
         if kerf::app::start(main.spawner(), interrupt.spawner(), baud::DEFAULT).is_none() {

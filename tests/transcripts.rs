@@ -47,6 +47,14 @@ impl Side for Machine {
         self.received()
     }
 
+    fn set_input(&mut self, input: usize, closed: bool) {
+        Machine::set_input(self, input, closed);
+    }
+
+    fn wire(&mut self, switches: &[(usize, i64)]) {
+        switches.iter().for_each(|(input, step)| self.set_near(*input, *step));
+    }
+
     fn steps(&self) -> [i64; 4] {
         self.emitted().position
     }
@@ -62,7 +70,7 @@ fn the_host_machine_keeps_to_the_transcripts() {
     transcript::play_all(read_all(), 16, boot);
 }
 
-/// The machine of an example as it is built so far: without switches.
+/// The machine of an example as it is built so far: without switches for homing.
 struct Built(On);
 
 impl Setup for Built {
@@ -75,8 +83,8 @@ impl Setup for Built {
     fn travel(&self, axis: u8) -> Option<(Length, Length)> {
         self.0.travel(axis)
     }
-    fn can(&self, _cycle: Cycle) -> bool {
-        false
+    fn can(&self, cycle: Cycle) -> bool {
+        cycle == Cycle::Probing
     }
 }
 

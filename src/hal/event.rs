@@ -24,7 +24,7 @@ pub enum Event {
     Tick = 2,
     /// Exec released a block.
     BlockDone = 3,
-    /// A real-time character arrived.
+    /// A real-time character arrived, or a switch has changed.
     Realtime = 4,
     /// A thread-mode task was woken: the executor has work.
     Thread = 7,

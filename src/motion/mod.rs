@@ -8,6 +8,7 @@
 
 pub mod block;
 pub mod brake;
+pub mod contact;
 pub mod dda;
 pub mod divide;
 pub mod dynamics;
@@ -15,6 +16,7 @@ pub mod exec;
 pub mod factors;
 pub mod finished;
 pub mod float;
+pub mod follow;
 pub mod governor;
 mod halt;
 pub mod horizon;

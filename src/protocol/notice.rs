@@ -2,9 +2,13 @@
 
 use super::Format;
 use super::machine::Machine;
-use super::token::Token;
+use super::token::{Group, Token};
+use super::value::{PROBED, Value};
 use super::write::{Ending, Out, Writer};
+use crate::boards::inputs;
 use crate::config::{Fixed, Settings};
+use crate::progmem;
+use crate::progmem::Text;
 use crate::status::Status;
 use crate::text;
 
@@ -73,8 +77,16 @@ pub(super) fn put_row<O: Out>(row: u8, machine: &mut impl Machine, writer: &mut 
     writer.shown(token.read(machine));
 }
 
+progmem! {
+    /// What the switches at the ends of axes are called.
+    static ENDS: [Text; inputs::ENDS] = [
+        text!("xmin"), text!("xmax"), text!("ymin"), text!("ymax"),
+        text!("zmin"), text!("zmax"), text!("amin"), text!("amax"),
+    ];
+}
+
 /// An exception report, `{"er":{"fb":440.20,"st":13,"msg":"Buffer full"}}`; sent whatever the
-/// verbosity, and always as JSON.
+/// verbosity, and always as JSON. Of a limit it also says which, `"sw":"xmin"`.
 pub struct Exception {
     stage: u8,
     status: Status,
@@ -120,6 +132,13 @@ pub(super) fn put_exception<O: Out>(
                 writer.string(text);
             }
         }
+        2 => {
+            let hit = machine.value(Value::LimitHit) as usize;
+            if let Some(name) = ENDS.at(hit).filter(|_| status == Status::LimitHit) {
+                writer.key_text(text!("sw"));
+                writer.string(name);
+            }
+        }
         _ => {
             writer.text(text!("}}"));
             writer.end_line();
@@ -127,6 +146,45 @@ pub(super) fn put_exception<O: Out>(
         }
     }
     true
+}
+
+/// What probing has come to, as if somebody had asked:
+/// `{"r":{"prb":{"e":1,"x":20.000,...,"c":0.000}},"f":[1,0,0]}`.
+pub struct Probing {
+    member: u8,
+    format: Format,
+}
+
+impl Probing {
+    /// Begins. It is whole whatever the verbosity, unless that is 0.
+    pub fn begin(settings: &Settings) -> Probing {
+        Probing { member: 0, format: Format::announcement(settings) }
+    }
+
+    /// Does the next part. Whether there is more to do.
+    pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+        let mut writer = Writer::frame(out, &mut self.format);
+        let group = Group::Vector(PROBED);
+        if self.member == 0 {
+            writer.begin_response();
+            writer.key(group.prefix().bytes());
+            writer.open();
+        }
+        match group.member(self.member, machine) {
+            Some((_, token)) => {
+                let name = token.name();
+                writer.key(name.bytes().get(group.prefix().bytes().len()..).unwrap_or_default());
+                writer.shown(token.read(machine));
+                self.member += 1;
+                true
+            }
+            None => {
+                writer.close();
+                writer.end_response(Status::Ok, Ending::default());
+                false
+            }
+        }
+    }
 }
 
 /// Answers the question whether anybody is there.

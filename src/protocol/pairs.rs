@@ -139,15 +139,14 @@ impl Request {
         };
         self.at = pair.next;
         let Target::Token(token) = resolve(Name::new(), pair.name.of(c.line)) else { return };
-        let (Some(number), Kind::True) = (token.small(), pair.kind) else { return };
-        if token.is_far() {
+        if pair.kind != Kind::True || token.is_far() {
             return;
         }
         let report = c.machine.report();
         if !core::mem::replace(&mut self.selected, true) {
             report.clear();
         }
-        if !report.add(number) {
+        if !report.add(token) {
             self.status = Status::JsonTooManyPairs;
         }
     }

@@ -7,7 +7,7 @@
 use super::Format;
 use super::Mode;
 use super::machine::Machine;
-use super::token::{DEFAULT_REPORT, DEFAULT_TOKENS, Shown, Token};
+use super::token::{DEFAULT_TOKENS, Shown, Token};
 use super::value::Value;
 use super::write::{Out, Writer};
 use crate::config::Fixed;
@@ -17,11 +17,17 @@ use crate::text;
 /// Entries a report may have.
 pub const LONGEST_REPORT: usize = 38;
 
+/// Bytes of a bit for each entry.
+const HIGH: usize = LONGEST_REPORT.div_ceil(8);
+
 /// The status report: its tokens, in order, and the value of each as last sent.
 pub struct StatusReport {
-    /// By their small numbers.
-    tokens: [u8; LONGEST_REPORT],
-    sent: [i32; LONGEST_REPORT],
+    /// The lower eight bits of their numbers, and the ninth.
+    low: [u8; LONGEST_REPORT],
+    high: [u8; HIGH],
+    /// Of each the low 24 bits, which saves 38 bytes: a change would have to be a multiple of 16,777,216, for
+    /// positions 1.6777216 m between two reports, to pass unseen.
+    sent: [[u8; 3]; LONGEST_REPORT],
     len: u8,
     /// The list is new: what was sent means nothing.
     fresh: bool,
@@ -37,8 +43,9 @@ impl StatusReport {
     /// The default list.
     pub fn new() -> StatusReport {
         let mut report = StatusReport {
-            tokens: [0; LONGEST_REPORT],
-            sent: [0; LONGEST_REPORT],
+            low: [0; LONGEST_REPORT],
+            high: [0; HIGH],
+            sent: [[0; 3]; LONGEST_REPORT],
             len: 0,
             fresh: true,
         };
@@ -48,20 +55,22 @@ impl StatusReport {
 
     /// Makes it the default list again.
     pub fn restore(&mut self) {
-        let first = DEFAULT_TOKENS.get();
-        let numbers = first.iter().filter_map(|token| token.small());
-        self.tokens.iter_mut().zip(numbers).for_each(|(to, number)| *to = number);
-        self.len = DEFAULT_REPORT as u8;
-        self.fresh = true;
+        self.clear();
+        for token in DEFAULT_TOKENS.get() {
+            self.add(token);
+        }
     }
 
     /// Entry `index`.
     pub fn token(&self, index: u8) -> Option<Token> {
-        self.tokens
-            .get(..usize::from(self.len))?
-            .get(usize::from(index))
-            .copied()
-            .map(Token::of_small)
+        (index < self.len).then(|| self.at(index))
+    }
+
+    fn at(&self, index: u8) -> Token {
+        let place = usize::from(index);
+        let low = self.low.get(place).copied().unwrap_or(0);
+        let high = self.high.get(place / 8).copied().unwrap_or(0) >> (index % 8) & 1;
+        Token::numbered(u16::from_le_bytes([low, high]))
     }
 
     /// Empties the list.
@@ -70,15 +79,20 @@ impl StatusReport {
         self.fresh = true;
     }
 
-    /// Adds a token behind the others, once, by its small number. Whether there was room.
-    pub fn add(&mut self, number: u8) -> bool {
-        if self.tokens.iter().take(usize::from(self.len)).any(|&t| t == number) {
+    /// Adds a token that is not [far](Token::is_far) behind the others, once. Whether there was room.
+    pub fn add(&mut self, token: Token) -> bool {
+        if (0..self.len).any(|index| self.at(index) == token) {
             return true;
         }
-        match self.tokens.get_mut(usize::from(self.len)) {
-            Some(place) => *place = number,
-            None => return false,
-        }
+        let place = usize::from(self.len);
+        let [number, ninth] = token.number().to_le_bytes();
+        let (Some(low), Some(high)) = (self.low.get_mut(place), self.high.get_mut(place / 8))
+        else {
+            return false;
+        };
+        *low = number;
+        let bit = 1 << (self.len % 8);
+        *high = if ninth != 0 { *high | bit } else { *high & !bit };
         self.len += 1;
         true
     }
@@ -90,8 +104,9 @@ impl StatusReport {
 
     /// Notes that `value` is being sent for an entry. Whether it differs from the last.
     fn note(&mut self, index: u8, value: i32) -> bool {
+        let [a, b, c, _] = value.to_le_bytes();
         match self.sent.get_mut(usize::from(index)) {
-            Some(sent) => core::mem::replace(sent, value) != value,
+            Some(sent) => core::mem::replace(sent, [a, b, c]) != [a, b, c],
             None => false,
         }
     }

@@ -166,11 +166,14 @@ fn a_report_has_room_for_what_senders_ask() {
     assert_eq!(fake.ask("{sr:n}").matches("vm").count(), 6);
     let mut report = StatusReport::new();
     report.clear();
+    let token = |number: u16| Token::numbered(number * 13);
     for number in 0..38 {
-        assert!(report.add(number));
+        assert!(report.add(token(number)));
     }
-    assert!(report.add(0));
-    assert!(!report.add(38));
+    assert!(report.add(token(0)));
+    assert!(!report.add(token(38)));
+    assert!((0..38).all(|index| report.token(index) == Some(token(index.into()))));
+    assert_eq!(report.token(38), None);
 }
 
 #[test]
@@ -321,7 +324,7 @@ fn notices_are_as_documented() {
 #[test]
 fn ram_is_accounted_for() {
     assert_eq!(size_of::<Request>(), 24);
-    assert_eq!(size_of::<StatusReport>(), 192);
+    assert_eq!(size_of::<StatusReport>(), 159);
     assert_eq!(size_of::<Report>(), 5);
     assert_eq!((size_of::<Banner>(), size_of::<Exception>()), (4, 4));
 }

@@ -2,8 +2,8 @@
 
 use super::machine::Machine;
 use super::value::{
-    Form, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value, Vector, place_form,
-    vector_value,
+    Form, PROBE_STATE, PROBED, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value,
+    Vector, place_form, vector_value,
 };
 use crate::config::name::{Name, axis_letter, axis_of};
 use crate::config::rows::{find_row, row_name, value_name};
@@ -15,14 +15,11 @@ use crate::progmem::Text;
 use crate::text;
 use crate::units::AXES;
 
-const FIRST_VECTOR: u8 = Setting::NUMBERS;
-/// The last vector has a member for each motor.
-const FIRST_SINGLE: u16 = FIRST_VECTOR as u16 + (VECTOR_COUNT * AXES - 2) as u16;
+const FIRST_SINGLE: u16 = Setting::NUMBERS as u16;
+const FIRST_VECTOR: u16 = FIRST_SINGLE + SINGLE_COUNT as u16;
 
-/// Tokens from here on do not fit a byte: reports cannot have them.
-const FAR: u16 = 256;
-/// The first value of the interpreter's tables.
-const FIRST_ROW: u16 = FIRST_SINGLE + SINGLE_COUNT as u16;
+/// The first value of the interpreter's tables. Those below it may be told all the time.
+const FIRST_ROW: u16 = 512;
 
 /// A setting or a value, as a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -59,17 +56,22 @@ impl Token {
 
     /// Whether it is in EEPROM alone, too far away to be told all the time.
     pub fn is_far(self) -> bool {
-        self.0 >= FAR || self.setting().is_some_and(Setting::is_cold)
+        self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
     }
 
-    /// Its number, if it fits.
-    pub fn small(self) -> Option<u8> {
-        self.0.try_into().ok()
+    /// Its number; of those that are not [far](Self::is_far) below 512.
+    pub const fn number(self) -> u16 {
+        self.0
     }
 
-    /// The token of a number that [`Token::small`] returned.
-    pub const fn of_small(number: u8) -> Token {
-        Token(number as u16)
+    /// The token of a number that [`Token::number`] returned.
+    pub const fn numbered(number: u16) -> Token {
+        Token(number)
+    }
+
+    /// The token of a setting.
+    fn of_setting(setting: Setting) -> Token {
+        Token(setting.number().into())
     }
 
     /// The token of a value in the table of [`SINGLES`].
@@ -79,7 +81,7 @@ impl Token {
 
     /// The token of a vector's member.
     const fn member(vector: u8, index: u8) -> Token {
-        Token((FIRST_VECTOR + vector * AXES as u8 + index) as u16)
+        Token(FIRST_VECTOR + (vector * AXES as u8 + index) as u16)
     }
 
     /// The token of a value of a row.
@@ -89,7 +91,7 @@ impl Token {
 
     /// The setting or value called `name`. Up to 20,000 cycles on AVR.
     pub fn find(name: &Name) -> Option<Token> {
-        let setting = || Setting::find(name).map(|s| Token::of_small(s.number()));
+        let setting = || Setting::find(name).map(Token::of_setting);
         let single = || {
             let found = |i: &usize| SINGLES.at(*i).is_some_and(|s| name.matches(0, s.token));
             (0..SINGLE_COUNT).find(found).map(|i| Token::single(i as u8))
@@ -122,24 +124,28 @@ impl Token {
 
     /// What it is.
     pub fn subject(self) -> Option<Subject> {
-        if self.0 >= FIRST_ROW {
-            let (row, axis) = by_axis((self.0 - FIRST_ROW) as u8);
-            return Row::from_number(row).map(|row| Subject::Row(row, axis));
+        let number = self.0;
+        if let Some(setting) = self.setting() {
+            return Some(Subject::Setting(setting));
         }
-        if self.0 >= FIRST_SINGLE {
-            return SINGLES.at(usize::from(self.0 - FIRST_SINGLE)).map(Subject::Single);
-        }
-        let number = self.0 as u8;
         if number < FIRST_VECTOR {
-            return Setting::from_number(number).map(Subject::Setting);
+            let index = number.checked_sub(FIRST_SINGLE)?;
+            return SINGLES.at(usize::from(index)).map(Subject::Single);
         }
-        let (number, index) = by_axis(number - FIRST_VECTOR);
-        VECTORS.at(usize::from(number)).map(|vector| Subject::Member(number, vector, index))
+        if number < FIRST_ROW {
+            let (number, index) = vector_index((number - FIRST_VECTOR) as u8);
+            return VECTORS
+                .at(usize::from(number))
+                .filter(|vector| index < vector.members)
+                .map(|vector| Subject::Member(number, vector, index));
+        }
+        let (row, axis) = by_axis((number - FIRST_ROW) as u8);
+        Row::from_number(row).map(|row| Subject::Row(row, axis))
     }
 
     /// The setting it is, if it is one.
     pub fn setting(self) -> Option<Setting> {
-        self.small().and_then(Setting::from_number)
+        u8::try_from(self.0).ok().and_then(Setting::from_number)
     }
 
     /// Its full name.
@@ -186,6 +192,12 @@ impl Token {
 /// Which group of six, and which of it.
 fn by_axis(number: u8) -> (u8, u8) {
     (number / AXES as u8, number % AXES as u8)
+}
+
+/// Which vector, and which member of it. The last one may have more members.
+fn vector_index(offset: u8) -> (u8, u8) {
+    let number = (offset / AXES as u8).min(VECTOR_COUNT as u8 - 1);
+    (number, offset - number * AXES as u8)
 }
 
 fn is_vector(name: &Name, vector: u8) -> bool {
@@ -313,10 +325,12 @@ impl Group {
     pub fn member(self, from: u8, machine: &mut impl Machine) -> Option<(u8, Token)> {
         match self {
             Group::Settings(owner) => (from..owner.rows())
-                .find_map(|row| Some((row, Token::of_small(Setting::of(owner, row)?.number())))),
+                .find_map(|row| Some((row, Token::of_setting(Setting::of(owner, row)?)))),
+            Group::Vector(PROBED) if from == 0 => Some((0, Token::single(PROBE_STATE))),
             Group::Vector(number) => {
+                let index = if number == PROBED { from - 1 } else { from };
                 let members = VECTORS.at(usize::from(number))?.members;
-                (from < members).then(|| (from, Token::member(number, from)))
+                (index < members).then(|| (from, Token::member(number, index)))
             }
             Group::Row(row) => {
                 let axis = (from..AXES as u8).find(|&axis| row.has(axis))?;
@@ -353,6 +367,7 @@ pub enum Target {
 }
 
 /// What `name` means behind `prefix`, a group's.
+#[small]
 pub fn resolve(prefix: Name, name: &[u8]) -> Target {
     let Some(full) = prefix.with(name) else { return Target::Unknown };
     if let Some(token) = Token::find(&full) {

@@ -1,5 +1,6 @@
 //! What can be read of the machine beside its settings: names, units and texts, as tables.
 
+use crate::boards::inputs;
 use crate::config::Fixed;
 use crate::config::name::token;
 use crate::gcode::overrides::Override;
@@ -92,6 +93,15 @@ pub enum Value {
     OverrideOn(Override),
     /// `pwr1` and so on: 1 if the motor is powered.
     Powered(u8),
+    /// `in1` to `in8`, `inp`, `ind`, `ine`, of [`inputs`](crate::boards::inputs): 1 if the switch is worked, 0 if
+    /// not, -1 if there is none or its setting is 0.
+    Input(u8),
+    /// `prbe`: 0 no contact, 1 contact, 2 probing.
+    ProbeState,
+    /// `prbx` and so on: where the contact was, in units of a `Length`.
+    Probed(u8),
+    /// The end whose limit has been hit, which exceptions tell; -1 for none.
+    LimitHit,
 }
 
 /// A speed as [`Machine::value`](super::Machine::value) returns it: thousandths, saturating.
@@ -156,7 +166,7 @@ pub struct Vector {
     pub token: [u8; 4],
     /// What they are measured in.
     pub form: Form,
-    /// Members: axes, or motors.
+    /// Members: axes, motors, or inputs. More than axes only in the last row.
     pub members: u8,
     /// What text reports call it, behind the axis's letter.
     pub label: Text,
@@ -170,11 +180,15 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 34;
+pub const SINGLE_COUNT: usize = 38;
 /// Entries of [`VECTORS`].
-pub const VECTOR_COUNT: usize = 7;
+pub const VECTOR_COUNT: usize = 9;
 /// The number of the vector `g92`.
 pub const SHIFT: u8 = 5;
+/// The number of the vector `prb`, whose group begins with `prbe`.
+pub const PROBED: u8 = 7;
+/// The number of `prbe`.
+pub const PROBE_STATE: u8 = SINGLE_COUNT as u8 - 1;
 
 const NONE: Text = text!("");
 const LINE: Text = text!("Line number:");
@@ -201,6 +215,10 @@ const ARC_DISTANCE: Text =
     text!("G90.1 - absolute distance mode|G91.1 - incremental distance mode (default mode)");
 const ON: Text = text!("Off|On");
 const PATH: Text = text!("G61 - exact path mode|G61.1 - exact stop mode|G64 - continuous mode");
+
+const PROBE: Value = Value::Input(inputs::PROBE as u8);
+const DOOR: Value = Value::Input(inputs::DOOR as u8);
+const STOP: Value = Value::Input(inputs::STOP as u8);
 
 const fn count(name: &str, value: Value, label: Text, choices: Text) -> Single {
     Single { token: token(name), value, form: Form::Count, label, choices }
@@ -256,6 +274,10 @@ progmem! {
         count("mfoe", Value::OverrideOn(Override::Feed), text!("Feed override enable:"), ON),
         count("mtoe", Value::OverrideOn(Override::Traverse), text!("Traverse override enable:"), ON),
         count("ssoe", Value::OverrideOn(Override::Spindle), text!("Spindle override enable:"), ON),
+        count("inp", PROBE, text!("Probe:"), NONE),
+        count("ind", DOOR, text!("Door:"), NONE),
+        count("ine", STOP, text!("Emergency stop:"), NONE),
+        count("prbe", Value::ProbeState, text!("Probe state:"), text!("Failed|Succeeded|Waiting")),
     ];
 
     /// Values of each axis or motor; [`vector_value`] gives the order.
@@ -267,6 +289,8 @@ progmem! {
         vector("tof", Form::Millimetres, 6, text!(" tool length:")),
         vector("g92", Form::Length, 6, NONE),
         vector("pwr", Form::Count, 4, NONE),
+        vector("prb", Form::Millimetres, 6, NONE),
+        vector("in", Form::Count, inputs::ENDS as u8, NONE),
     ];
 }
 
@@ -279,7 +303,9 @@ pub fn vector_value(vector: u8, index: u8) -> Value {
         3 => Value::Homed(index),
         4 => Value::ToolOffset(index),
         SHIFT => Value::Shift(index),
-        _ => Value::Powered(index),
+        6 => Value::Powered(index),
+        PROBED => Value::Probed(index),
+        _ => Value::Input(index),
     }
 }
 

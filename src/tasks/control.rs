@@ -2,11 +2,13 @@
 //!
 //! Reads what the receive interrupt picked off; waits on [`Event::Realtime`]. What they lead to is in
 //! [`hold`](super::hold); besides, `^x` resets the machine, and ENQ asks whether anybody is there, which the
-//! reporter answers.
+//! reporter answers. A switch that
+//! changes is seen to as well, by [`switches`].
 
 use super::hold;
 use super::links::Links;
 use super::overrides;
+use super::switches;
 use crate::hal::event::{Event, next};
 
 /// The task.
@@ -15,6 +17,7 @@ pub async fn run(links: &'static Links) -> ! {
         hold::serve(links);
         overrides::serve(links);
         overrides::tell(links);
+        switches::serve(links);
         next(Event::Realtime).await;
     }
 }

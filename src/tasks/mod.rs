@@ -16,6 +16,7 @@ pub mod reader;
 pub mod reporter;
 mod setup;
 pub mod storage;
+pub mod switches;
 pub mod tx;
 pub mod view;
 pub mod wake;

@@ -4,7 +4,8 @@
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
 //! data lines of the port that feeds the machine only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
 //! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
-//! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`].
+//! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`]. After a
+//! limit has been hit lines of G-code are refused.
 
 use embassy_time::Timer;
 use heapless::Vec;
@@ -28,10 +29,11 @@ const ECHO: usize = 62;
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
+        let alarmed = links.limits_hit.get() != 0;
         let free = is_free(links);
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
-        let tried = if data { usual(links) } else { Usual::NotTried };
+        let tried = if data && !alarmed { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
             continue;
         }
@@ -73,10 +75,11 @@ fn dropped(links: &Links, flush: Flush) -> Option<Chosen<'_>> {
     })
 }
 
-/// Whether a block can be carried out now: neither has the planner to be waited for, nor the tables, and
-/// nothing is being dropped.
+/// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the
+/// tables, and nothing is being dropped.
 fn is_free(links: &Links) -> bool {
-    !links.commands_taken.get() && !links.storage.is_awaited() && links.flush.get() == Flush::None
+    let waits = links.commands_taken.get() || links.storage.is_awaited();
+    (!waits && links.flush.get() == Flush::None) || links.limits_hit.get() != 0
 }
 
 /// Carries out the next line of a built-in job. Its end, and a line that is refused, are told by an exception
@@ -319,6 +322,9 @@ pub fn end_program(links: &Links) {
 /// comment.
 #[inline(never)]
 fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
+    if links.limits_hit.get() != 0 {
+        return (Status::LimitHit, true);
+    }
     let mut commands = links.commands.borrow_mut();
     let settings = links.settings.borrow();
     let mut model = links.model.borrow_mut();

@@ -6,19 +6,20 @@
 use core::cell::{OnceCell, RefMut};
 
 use super::hold;
-use super::links::{Links, snapshot};
+use super::links::{Cycle, Links, snapshot};
 use super::overrides;
 use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
+use super::switches;
 use crate::baud;
-use crate::boards::MOTORS;
+use crate::boards::{MOTORS, inputs};
 use crate::config::{Setting, Settings};
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::overrides::Change;
 use crate::gcode::tables::Row;
 use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::imp::{gpio, stepper, uart};
+use crate::hal::imp::{gpio, inputs as pins, stepper, uart};
 use crate::hal::serial::{Flow, PORTS};
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::motion::dynamics;
@@ -32,6 +33,22 @@ use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
 pub const RUN: i32 = 5;
+/// `stat` after a limit has been hit.
+const ALARM: i32 = 2;
+/// `stat` in the cycles of the machine.
+const PROBING: i32 = 7;
+/// See [`PROBING`].
+const HOMING: i32 = 9;
+/// See [`PROBING`].
+const JOGGING: i32 = 10;
+
+/// Whether something moves, by `stat` and `hold`.
+pub fn moves(state: i32, hold: i32) -> bool {
+    match state {
+        HOLD => hold != HELD,
+        state => matches!(state, RUN | PROBING | HOMING | JOGGING),
+    }
+}
 
 /// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
@@ -53,6 +70,7 @@ pub struct View<'a> {
     motion: OnceCell<Snapshot>,
 }
 
+#[small]
 impl<'a> View<'a> {
     /// Looks at the machine now, as the sender on this port sees it.
     pub fn of(links: &'a Links, port: &'a Port) -> Self {
@@ -80,8 +98,17 @@ impl<'a> View<'a> {
 
     /// `stat`.
     pub fn state(&self) -> i32 {
+        if self.links.limits_hit.get() != 0 {
+            return ALARM;
+        }
         if hold::is_on() {
             return HOLD;
+        }
+        match self.links.cycle.get() {
+            Cycle::Off => {}
+            Cycle::Probe => return PROBING,
+            Cycle::Homing => return HOMING,
+            Cycle::Jog => return JOGGING,
         }
         if self.is_busy() && !self.links.stopped.get() {
             return RUN;
@@ -129,6 +156,15 @@ impl<'a> View<'a> {
         self.links.model.borrow().work_offset().get(axis).copied().unwrap_or(Length::ZERO)
     }
 
+    /// 1 if a switch is worked, 0 if not, -1 if there is none or it is off.
+    fn input(&self, input: u8) -> i32 {
+        let off = usize::from(input) < inputs::ENDS && switches::mode(&self.settings, input) == 0;
+        if off || switches::WIRED >> input & 1 == 0 {
+            return -1;
+        }
+        (pins::worked() >> input & 1).into()
+    }
+
     fn modal(&self, value: Value) -> i32 {
         let model = self.links.model.borrow();
         let modal = model.modal();
@@ -156,6 +192,7 @@ impl<'a> View<'a> {
     }
 }
 
+#[small]
 impl Machine for View<'_> {
     fn settings(&self) -> &Settings {
         &self.settings
@@ -185,7 +222,7 @@ impl Machine for View<'_> {
         let lowered = self.settings.limit_velocity(setting, rate);
         self.links.settings_changed.set(true);
         self.note(setting, lowered);
-        set_outputs(&self.settings);
+        set_hardware(&self.settings);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
     }
 
@@ -200,15 +237,16 @@ impl Machine for View<'_> {
     fn value(&mut self, value: Value) -> i32 {
         match value {
             Value::State => self.state(),
-            // They differ only in a hold, and where there are alarms and cycles.
-            Value::Machine => {
-                if hold::is_on() {
-                    RUN
-                } else {
-                    self.state()
-                }
-            }
-            Value::Cycle => i32::from(self.is_busy()),
+            Value::Machine => match self.state() {
+                HOLD | PROBING | HOMING | JOGGING => RUN,
+                state => state,
+            },
+            Value::Cycle => match self.links.cycle.get() {
+                Cycle::Off => i32::from(self.is_busy()),
+                Cycle::Probe => 2,
+                Cycle::Homing => 3,
+                Cycle::Jog => 4,
+            },
             Value::Motion if hold::is_on() => 2,
             Value::Motion => i32::from(self.motion().running),
             // Lines that move nothing are finished when all before them are.
@@ -239,6 +277,15 @@ impl Machine for View<'_> {
             Value::Override(which) => overrides::now().factor(which).into(),
             Value::OverrideOn(which) => overrides::now().is_on(which).into(),
             Value::Tool => self.links.model.borrow().tool().into(),
+            Value::Input(input) => self.input(input),
+            Value::ProbeState => self.links.probe.state() as i32,
+            Value::Probed(axis) => {
+                self.links.probe.at().get(usize::from(axis)).map_or(0, |at| at.0)
+            }
+            Value::LimitHit => match self.links.limits_hit.get() {
+                0 => -1,
+                hit => hit.trailing_zeros() as i32,
+            },
             Value::Hold => self.hold(),
             Value::Home => 0,
             modal => self.modal(modal),
@@ -263,12 +310,13 @@ impl Machine for View<'_> {
         self.links.settings_changed.set(true);
         self.links.storage.forget_cold();
         self.links.storage.note(0, ITEMS);
-        set_outputs(&self.settings);
+        set_hardware(&self.settings);
         Status::Ok
     }
 
     fn clear(&mut self) -> Status {
-        Status::Ok
+        // Where the motors are is known after a reset only.
+        if self.links.limits_hit.get() != 0 { Status::LimitHit } else { Status::Ok }
     }
 
     fn flush(&mut self) -> Status {
@@ -332,8 +380,9 @@ pub fn queue_free() -> usize {
     queue::free().max(QUEUE_FREE_MIN)
 }
 
-/// Tells the outputs what the settings say of them. Thread mode, or before interrupts are on.
-pub fn set_outputs(settings: &Settings) {
+/// Tells outputs and inputs what the settings say of them. Thread mode, or before interrupts are on.
+pub fn set_hardware(settings: &Settings) {
+    switches::set_up(settings);
     power::set_modes(settings);
     for port in 0..PORTS as u8 {
         uart::set_flow(port, Flow::of(port, settings.flow_control()));

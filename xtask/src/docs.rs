@@ -123,7 +123,7 @@ fn what_the_documents_name_exists() {
 
 #[test]
 fn the_tour_stays_short() {
-    for (document, most) in [("ARCHITECTURE.md", 300), ("README.md", 120)] {
+    for (document, most) in [("ARCHITECTURE.md", 320), ("README.md", 120)] {
         let lines = std::fs::read_to_string(root().join(document)).expect(document).lines().count();
         assert!(lines <= most, "{document} has {lines} lines, more than {most}");
     }

@@ -14,7 +14,10 @@ pub const SYSTEM: [Meaning; SYSTEM_ROWS] = [
     ("ja", "Acceleration towards the centre of a corner; more makes corners faster."),
     ("ct", "How far the chords of an arc may leave it."),
     ("sl", "Moves of homed axes beyond `tn` and `tm` are refused (220)."),
-    ("st", "Kind of switches. No effect yet."),
+    (
+        "st",
+        "Kind of switches at the ends of axes: open or closed unless worked. Probe, door and emergency stop close.",
+    ),
     ("mt", "How long motors with `pm` 2 stay powered after a move."),
     ("ej", "Mode at power-up; after that answers are in the mode of the last line."),
     (
@@ -90,8 +93,11 @@ pub const AXIS: [Meaning; AXIS_ROWS] = [
     ("jh", "Jerk while homing and probing, likewise. No effect yet."),
     ("jd", "How far a corner may be cut, as far as its speed goes; more makes corners faster."),
     ("ra", "Radius that turns a length into an angle with `am` 3."),
-    ("sn", "Switch at the lower end. No effect yet."),
-    ("sx", "Switch at the upper end. No effect yet."),
+    (
+        "sn",
+        "Switch at the lower end. A limit that is hit stops everything, with exception 204, until a reset. No homing yet.",
+    ),
+    ("sx", "Switch at the upper end, likewise."),
     ("sv", "Speed towards a homing switch. No effect yet."),
     ("lv", "Speed off a homing switch. No effect yet."),
     ("lb", "Way off a homing switch. No effect yet."),

@@ -29,9 +29,9 @@ pub(super) const HOLD: u8 = 5;
 pub(super) const HELD: u8 = 6;
 
 /// Exec runs, or may not run.
-static CLOSED: SharedByte = SharedByte::new(1);
+pub(super) static CLOSED: SharedByte = SharedByte::new(1);
 /// Exec was asked for meanwhile.
-static MISSED: SharedByte = SharedByte::new(0);
+pub(super) static MISSED: SharedByte = SharedByte::new(0);
 
 struct Context {
     executor: Cell<Option<&'static Executor>>,

@@ -5,6 +5,7 @@
 //! | TIMER1_COMPA | `step_isr` | 0 | one tick of the step generator |
 //! | USART0_RX, USART0_UDRE | `uart` | 1 | bytes between the line and the rings |
 //! | TIMER0_COMPA | `time` | 1 | counts milliseconds |
+//! | INT, PCINT, TIMER2_COMPA | `inputs` | 1 | looks at the switches when one moves |
 //! | USART2_UDRE | `exec` | 2 | software interrupt: polls the exec executor, interrupts on |
 //!
 //! Everything else runs in thread mode, from `executor::run`.
@@ -13,6 +14,7 @@ pub mod eeprom;
 pub mod exec;
 pub mod executor;
 pub mod gpio;
+pub mod inputs;
 mod mem;
 pub mod panic;
 mod step_isr;

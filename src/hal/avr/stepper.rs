@@ -25,12 +25,16 @@ const RUN: u8 = 1 << 3 | 1;
 /// The same, stopped.
 pub(super) const HALT: u8 = 1 << 3;
 const OCF1A: u8 = 1 << 1;
+const GPIOR1: *const u8 = 0x4A as *const u8;
+const GPIOR2: *const u8 = 0x4B as *const u8;
 
 /// Cycles from starting the timer to the first tick.
 const FIRST_TICK: u16 = 400;
 
 pub(super) static SEGMENT_RING: Ring<Segment, SEGMENTS> = Ring::new();
 pub(super) static RUNNING: SharedByte = SharedByte::new(0);
+/// Set for good by [`stop`].
+static STOPPED: SharedByte = SharedByte::new(0);
 
 /// How long pulses last, cycles, that no turn of a loop widens: in lockstep, and else.
 const LOCKSTEP_CYCLES: u16 = 21;
@@ -90,8 +94,20 @@ pub fn go() {
         TCNT1.write_volatile(0);
         OCR1A.write_volatile(FIRST_TICK);
         TIFR1.write_volatile(OCF1A);
-        TCCR1B.write_volatile(RUN);
     }
+    // A stop that comes in between would be undone.
+    avr_device::interrupt::free(|_| {
+        if STOPPED.get() == 0 {
+            // SAFETY: as above.
+            unsafe { TCCR1B.write_volatile(RUN) };
+        }
+    });
+}
+
+/// Stops the ticks at once and until reset, wherever the motors are. Any level.
+pub fn stop() {
+    STOPPED.set(1);
+    kill();
 }
 
 /// Whether ticks are coming.
@@ -105,6 +121,28 @@ pub fn settle() {
         // SAFETY: the timer stands still, so its interrupt does not run; exec alone starts it.
         unsafe { &mut *STATE.0.get() }.settle();
     }
+}
+
+/// Where the generator is right now, between two ticks, and the slot of its segment. For the look interrupt, which
+/// holds exec off.
+pub fn moment() -> (Dda, u8) {
+    let mut dda = Dda::new();
+    let mut tail = 0;
+    avr_device::interrupt::free(|_| {
+        // SAFETY: the step interrupt cannot come in between.
+        let state = unsafe { &*STATE.0.get() };
+        (dda.phase, dda.due, dda.backwards) = (state.phase, state.due, state.backwards);
+        // SAFETY: reading has no effect. The count of ticks is in registers, not in the state.
+        dda.ticks = u16::from_le_bytes(unsafe { [GPIOR1.read_volatile(), GPIOR2.read_volatile()] });
+        tail = SEGMENT_RING.tail();
+    });
+    if dda.ticks > 0 {
+        // In lockstep the state has no increments, but the segment has.
+        // SAFETY: one has been taken. Another may have been since, but exec, which is held off, has not refilled
+        // the slot.
+        dda.increment = unsafe { SEGMENT_RING.at(tail) }.increment;
+    }
+    (dda, tail)
 }
 
 /// Which direction pins are inverted: bit m for motor m. For thread mode, while nothing runs.
@@ -129,8 +167,11 @@ pub fn set_step_output(pulse_us: u8, inverted: u8) {
     });
 }
 
-/// Stops the ticks at once, wherever the motors are. For the panic handler.
+/// Stops the ticks at once, wherever the motors are. Also for the panic handler.
 pub fn kill() {
-    // SAFETY: a single store; the machine stops for good.
-    unsafe { TCCR1B.write_volatile(HALT) };
+    // SAFETY: two stores; the machine stops for good, and a tick that is due does not come.
+    unsafe {
+        TCCR1B.write_volatile(HALT);
+        TIFR1.write_volatile(OCF1A);
+    }
 }

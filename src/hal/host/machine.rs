@@ -5,7 +5,7 @@ use std::vec::Vec;
 
 use embassy_executor::raw::Executor;
 
-use super::{clock, exec, flags, now, stepper, time, uart};
+use super::{clock, exec, flags, inputs, now, stepper, time, uart};
 use crate::hal::serial::{AUX, USB};
 use crate::hal::{event, pender};
 
@@ -61,6 +61,17 @@ impl Machine {
         stepper::emitted()
     }
 
+    /// The contact at an input, of [`inputs`](crate::boards::inputs), closes: its pin goes low. Or it opens.
+    pub fn set_input(&self, input: usize, closed: bool) {
+        inputs::set(input, !closed);
+    }
+
+    /// From now on the contact at an input is closed while the motor of its axis is at a step or beyond; that of the
+    /// probe while the third motor is, or below.
+    pub fn set_near(&self, input: usize, step: i64) {
+        stepper::set_near(input, step);
+    }
+
     /// Runs for a time.
     pub fn run_ms(&self, ms: u64) {
         let end = now() + ms * time::CYCLES_PER_MS;
@@ -83,7 +94,8 @@ impl Machine {
         let step = stepper::next_tick();
         let bytes = uart::next_event();
         let tick = time::next_tick();
-        let next = step.min(bytes).min(tick);
+        let look = inputs::next_look();
+        let next = step.min(bytes).min(tick).min(look);
         if next > end {
             clock().set(end);
             return false;
@@ -97,6 +109,9 @@ impl Machine {
         }
         if tick == next {
             time::tick();
+        }
+        if look == next {
+            inputs::look();
         }
         self.settle();
         true

@@ -8,6 +8,7 @@
 pub mod eeprom;
 pub mod exec;
 pub mod gpio;
+pub mod inputs;
 mod machine;
 pub mod stepper;
 pub mod time;

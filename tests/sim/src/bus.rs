@@ -3,10 +3,13 @@
 use std::ffi::{c_int, c_void};
 use std::ptr::NonNull;
 
+use kerf::boards::Pin;
 use simavr_ffi as ffi;
 
 use crate::cpu::Cpu;
 use crate::eeprom::Eeprom;
+use crate::mechanics::Mechanics;
+use crate::pins::PinInterrupts;
 use crate::recorder::{Recorder, Sums};
 use crate::timer::{LAYOUTS, Timer};
 use crate::uart::{OFFSETS, PLACES, Uart};
@@ -20,6 +23,7 @@ enum Owner {
     Timer(usize),
     Uart(usize),
     Eeprom,
+    Pins,
 }
 
 /// First address after the I/O registers.
@@ -34,7 +38,11 @@ pub struct Bus {
     pub(crate) eeprom: Eeprom,
     /// A line for each serial port of the board, and the USART it leads to.
     pub(crate) wires: Vec<(usize, Wire)>,
+    pins: PinInterrupts,
     pub(crate) recorder: Recorder,
+    pub(crate) mechanics: Option<Box<Mechanics>>,
+    /// Pins that the mechanics has changed; the machine drives them.
+    pub(crate) changed: Vec<(Pin, bool)>,
     pub(crate) sums: Sums,
     /// Interrupts that ask for service, by vector.
     pub(crate) pending: u64,
@@ -54,7 +62,10 @@ impl Bus {
             uarts: std::array::from_fn(Uart::new),
             eeprom: Eeprom::new(),
             wires,
+            pins: PinInterrupts::default(),
             recorder: Recorder::new(),
+            mechanics: None,
+            changed: Vec::new(),
             sums: Sums::default(),
             pending: 0,
             raised_at: [0; vectors::COUNT],
@@ -70,6 +81,9 @@ impl Bus {
         for (timer, layout) in LAYOUTS.iter().enumerate() {
             cpu.hook_bits(layout.tifr, TIFR_BITS[timer], param);
         }
+        for (register, write) in PinInterrupts::FLAGS.into_iter().zip(PIN_FLAG_BITS) {
+            cpu.hook_bits(register, write, param);
+        }
         bus
     }
 
@@ -78,6 +92,7 @@ impl Bus {
         self.timers = std::array::from_fn(|i| Timer::new(&LAYOUTS[i]));
         self.uarts = std::array::from_fn(Uart::new);
         self.eeprom.reset();
+        self.pins = PinInterrupts::default();
         self.recorder.pins_released();
         self.pending = 0;
         self.refresh_due();
@@ -111,6 +126,9 @@ impl Bus {
             for (usart, wire) in &mut self.wires {
                 wire.listen(&mut self.uarts[*usart]);
             }
+            if let Some(mechanics) = &mut self.mechanics {
+                mechanics.advance(now, &mut self.changed);
+            }
             self.refresh_due();
         }
     }
@@ -124,8 +142,17 @@ impl Bus {
         } else if let Some(i) = (0..4).find(|i| (7u64 << PLACES[*i].1) & bit != 0) {
             self.uarts[i].acknowledge(vector);
             self.update_uart(i, now);
+        } else if PinInterrupts::VECTORS & bit != 0 {
+            self.pins.acknowledge(vector);
+            self.update_pins(now);
         }
         self.refresh_due();
+    }
+
+    /// The level of an input has changed.
+    pub fn pin_edge(&mut self, port: char, bit: u8, high: bool) {
+        self.pins.edge(port, bit, high);
+        self.update_pins(self.cpu.cycle());
     }
 
     /// When a pending interrupt began to ask for service.
@@ -145,12 +172,14 @@ impl Bus {
         self.refresh_due();
     }
 
-    fn refresh_due(&mut self) {
+    /// Looks when there is something to do next.
+    pub(crate) fn refresh_due(&mut self) {
         let timers = self.timers.iter().map(Timer::due);
         let uarts = self.uarts.iter().map(Uart::due);
         let wires = self.wires.iter().map(|(_, wire)| wire.due());
-        self.due =
-            timers.chain(uarts).chain(wires).chain([self.eeprom.due()]).min().unwrap_or(u64::MAX);
+        let mechanics = self.mechanics.as_ref().map_or(u64::MAX, |m| m.due());
+        let others = [self.eeprom.due(), mechanics];
+        self.due = timers.chain(uarts).chain(wires).chain(others).min().unwrap_or(u64::MAX);
     }
 
     fn update_timer(&mut self, i: usize, at: u64) {
@@ -164,6 +193,10 @@ impl Bus {
 
     fn update_eeprom(&mut self, at: u64) {
         self.set_lines(1u64 << Eeprom::VECTOR, self.eeprom.lines(), at);
+    }
+
+    fn update_pins(&mut self, at: u64) {
+        self.set_lines(PinInterrupts::VECTORS, self.pins.lines(), at);
     }
 
     fn set_lines(&mut self, mask: u64, lines: u64, at: u64) {
@@ -192,6 +225,12 @@ impl Bus {
                 self.cpu.set_cycle(self.cpu.cycle() + hold);
                 self.update_eeprom(now);
             }
+            Owner::Pins => {
+                // simavr's own pin interrupts look there: let them see that all are off.
+                self.cpu.set_data(usize::from(addr), 0);
+                self.pins.write(addr, value);
+                self.update_pins(now);
+            }
             Owner::Nobody => {}
         }
         self.refresh_due();
@@ -212,6 +251,7 @@ impl Bus {
                 value
             }
             Owner::Eeprom => self.eeprom.read(addr, now),
+            Owner::Pins => Some(self.pins.read(addr)),
             Owner::Nobody => None,
         };
         self.refresh_due();
@@ -223,6 +263,11 @@ impl Bus {
         self.timers[timer].clear(1 << bit, now);
         self.update_timer(timer, now);
         self.refresh_due();
+    }
+
+    fn clear_pin_flag(&mut self, register: u16, bit: u8) {
+        self.pins.write(register, 1 << bit);
+        self.update_pins(self.cpu.write_cycle());
     }
 }
 
@@ -237,6 +282,9 @@ fn owners() -> [Owner; IO_END] {
         for offset in OFFSETS {
             owners[usize::from(base + offset)] = Owner::Uart(i);
         }
+    }
+    for addr in PinInterrupts::REGISTERS {
+        owners[usize::from(addr)] = Owner::Pins;
     }
     for addr in Eeprom::REGISTERS {
         owners[usize::from(addr)] = Owner::Eeprom;
@@ -277,6 +325,22 @@ unsafe extern "C" fn tifr_bit<const TIMER: usize>(
     }
     1
 }
+
+/// The same on a register of pin interrupts' flags.
+unsafe extern "C" fn pin_flag_bit<const REGISTER: usize>(
+    _: *mut ffi::avr_t,
+    bit: u8,
+    value: u8,
+    param: *mut c_void,
+) -> c_int {
+    if value != 0 {
+        // SAFETY: simavr calls this only while it executes an instruction.
+        unsafe { bus_of(param) }.clear_pin_flag(PinInterrupts::FLAGS[REGISTER], bit);
+    }
+    1
+}
+
+const PIN_FLAG_BITS: [crate::cpu::BitWrite; 2] = [pin_flag_bit::<0>, pin_flag_bit::<1>];
 
 const TIFR_BITS: [crate::cpu::BitWrite; 6] =
     [tifr_bit::<0>, tifr_bit::<1>, tifr_bit::<2>, tifr_bit::<3>, tifr_bit::<4>, tifr_bit::<5>];

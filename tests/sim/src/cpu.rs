@@ -360,26 +360,19 @@ impl Cpu {
         unsafe { ffi::avr_irq_register_notify(self.pin(port, bit), notify, param) }
     }
 
-    /// Drives an input pin from outside.
-    pub fn drive_pin(self, port: char, bit: u8, high: bool) {
-        // SAFETY: the IRQ belongs to this core.
-        unsafe { ffi::avr_raise_irq(self.pin(port, bit), u32::from(high)) }
-    }
-
-    /// Drives an input pin and goes on driving it against the pull-up, with which simavr overrides
-    /// [`Cpu::drive_pin`] at the next store to the port. One pin of each port.
-    pub fn hold_pin(self, port: char, bit: u8, high: bool) {
+    /// Drives an input pin from outside. `driven` are the pins of its port that are driven at all, and `levels` what
+    /// they are driven to: else simavr would have a pull-up win whenever the port is written.
+    pub fn drive_pin(self, port: char, bit: u8, driven: u8, levels: u8) {
+        // SAFETY: three numbers, for which 0 is a value.
+        let mut external: ffi::avr_ioport_external_t = unsafe { std::mem::zeroed() };
+        external.set_mask(driven.into());
+        external.set_value(levels.into());
         let ctl = u32::from_be_bytes([b'i', b'o', b'p', port as u8]);
-        let mut external = ffi::avr_ioport_external_t {
-            _bitfield_align_1: [],
-            _bitfield_1: Default::default(),
-            __bindgen_padding_0: [0; 5],
-        };
-        external.set_mask(1 << bit);
-        external.set_value(u64::from(high) << bit);
-        // SAFETY: the request takes such a structure, and copies it.
-        unsafe { ffi::avr_ioctl(self.p(), ctl, (&raw mut external).cast()) };
-        self.drive_pin(port, bit, high);
+        // SAFETY: simavr copies what it needs; the IRQ belongs to this core.
+        unsafe {
+            ffi::avr_ioctl(self.p(), ctl, (&raw mut external).cast());
+            ffi::avr_raise_irq(self.pin(port, bit), u32::from(levels >> bit & 1));
+        }
     }
 
     fn pin(self, port: char, bit: u8) -> *mut ffi::avr_irq_t {

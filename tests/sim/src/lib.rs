@@ -5,7 +5,7 @@
 //! the cost of entering an interrupt, software interrupts. Time is counted in CPU cycles and is
 //! exactly repeatable.
 //!
-//! [`Machine`] is the chip on its board, [`Host`] a sender on its serial line, [`oracle`] an
+//! [`Machine`] is the chip on its board, [`mechanics`] what is built around it, [`Host`] a sender on its serial line, [`oracle`] an
 //! independent reading of the same G-code, and [`job`] all of them together.
 
 pub mod bench;
@@ -16,8 +16,10 @@ mod host;
 mod image;
 pub mod job;
 mod machine;
+pub mod mechanics;
 mod meters;
 pub mod oracle;
+mod pins;
 pub mod plot;
 pub mod protocol;
 mod recorder;

@@ -11,6 +11,7 @@ use crate::bus::Bus;
 use crate::cpu::{Cpu, Mode};
 use crate::eeprom;
 use crate::image::Image;
+use crate::mechanics::{Build, Mechanics};
 use crate::meters::{Meters, Window};
 use crate::recorder::{self, Probe, Recorder};
 use crate::stopwatch::Stopwatch;
@@ -73,7 +74,9 @@ pub struct Machine {
     cpu: Cpu,
     bus: NonNull<Bus>,
     /// The pins' callbacks point into these.
-    _probes: Vec<Probe>,
+    probes: Vec<Vec<Probe>>,
+    /// The pins of each port that are driven from outside, and their levels, by the port's letter.
+    driven: [(u8, u8); 12],
     meters: Meters,
     image: Image,
     board: &'static Board,
@@ -101,7 +104,8 @@ impl Machine {
         Ok(Machine {
             cpu,
             bus,
-            _probes: probes,
+            probes: vec![probes],
+            driven: [(0, 0); 12],
             meters,
             image,
             board,
@@ -151,6 +155,7 @@ impl Machine {
         }
         if cpu.cycle() >= self.bus().due {
             self.bus_mut().run(cpu.cycle());
+            self.drive_changed();
         }
         if cpu.cycle() >= cpu.native_due() && cpu.run_native() {
             self.was_reset();
@@ -274,6 +279,22 @@ impl Machine {
         self.resets += 1;
         self.bus_mut().reset();
         self.meters.reset();
+        self.drive_again();
+    }
+
+    fn drive_changed(&mut self) {
+        while let Some((pin, high)) = self.bus_mut().changed.pop() {
+            self.drive_pin(pin.port.letter(), pin.bit, high);
+        }
+    }
+
+    /// The reset has made the core forget what the world outside does to its pins.
+    fn drive_again(&mut self) {
+        for (port, (driven, levels)) in ('A'..='L').zip(self.driven) {
+            for bit in (0..8).filter(|bit| driven & 1 << bit != 0) {
+                self.cpu.drive_pin(port, bit, driven, levels);
+            }
+        }
     }
 
     fn check_stack(&self) -> Result<(), Fault> {
@@ -369,9 +390,44 @@ impl Machine {
         u16::from_le_bytes([self.peek(addr), self.peek(addr + 1)])
     }
 
-    /// Drives an input pin, say of a limit switch.
+    /// Drives an input pin of a port from A to L.
     pub fn drive_pin(&mut self, port: char, bit: u8, high: bool) {
-        self.cpu.drive_pin(port, bit, high);
+        let (driven, levels) = &mut self.driven[usize::from(port as u8 - b'A')];
+        let changes = *driven & 1 << bit == 0 || (*levels >> bit & 1 != 0) != high;
+        *driven |= 1 << bit;
+        *levels = *levels & !(1 << bit) | u8::from(high) << bit;
+        self.cpu.drive_pin(port, bit, *driven, *levels);
+        if changes {
+            self.bus_mut().pin_edge(port, bit, high);
+        }
+    }
+
+    /// Builds a machine around the chip, best before the first instruction.
+    pub fn build(&mut self, build: &Build) {
+        let mechanics = Mechanics::new(build, self.board);
+        let spindle = recorder::attach_spindle(self.bus, self.cpu, self.board, build.spindle.pwm);
+        self.probes.push(spindle);
+        self.bus_mut().mechanics = Some(Box::new(mechanics));
+        self.bus_mut().refresh_due();
+    }
+
+    /// The machine around the chip, if there is one.
+    pub fn mechanics(&self) -> Option<&Mechanics> {
+        self.bus().mechanics.as_deref()
+    }
+
+    /// Changes something of the machine around the chip, if there is one; `change` gets the cycle as well.
+    pub fn tamper(&mut self, change: impl FnOnce(&mut Mechanics, u64)) {
+        let now = self.cycle();
+        if let Some(mechanics) = &mut self.bus_mut().mechanics {
+            change(mechanics, now);
+        }
+        self.bus_mut().refresh_due();
+    }
+
+    /// Has one byte of so many to the machine arrive with a bit turned over, on every port.
+    pub fn spoil_bytes(&mut self, one_in: Option<u64>, seed: u64) {
+        self.bus_mut().wires.iter_mut().for_each(|(_, wire)| wire.spoil(one_in, seed));
     }
 
     /// The EEPROM's contents.
@@ -413,7 +469,7 @@ impl Machine {
     /// Drives the pin with which the other side of a port holds the firmware back.
     pub fn set_cts(&mut self, port: usize, stop: bool) {
         let handshake = self.board.serial[port].handshake.expect("a port with the pins");
-        self.cpu.hold_pin(handshake.cts.port.letter(), handshake.cts.bit, stop);
+        self.drive_pin(handshake.cts.port.letter(), handshake.cts.bit, stop);
     }
 
     /// Whether the firmware drives a pin high, or would if it were an output.

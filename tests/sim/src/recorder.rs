@@ -3,11 +3,12 @@
 use std::ffi::c_void;
 use std::ptr::NonNull;
 
-use kerf::boards::{Board, MOTORS};
+use kerf::boards::{Board, MOTORS, Pin};
 use simavr_ffi as ffi;
 
 use crate::bus::Bus;
 use crate::cpu::Cpu;
+use crate::mechanics::SpindlePin;
 use crate::trace::Trace;
 
 /// A step: when, which motor (0 is motor 1), which way.
@@ -177,15 +178,17 @@ impl Recorder {
         }
     }
 
-    fn step_edge(&mut self, motor: usize, high: bool, now: u64, sums: Sums) {
+    /// An edge of a step pin. If it is a step, whether that is upwards.
+    fn step_edge(&mut self, motor: usize, high: bool, now: u64, sums: Sums) -> Option<bool> {
         let m = &mut self.motors[motor];
         if m.step_high == high {
-            return;
+            return None;
         }
         m.step_high = high;
-        if high != m.active_low {
+        let positive = !m.dir_high;
+        let steps = high != m.active_low;
+        if steps {
             m.begin_pulse(now);
-            let positive = !m.dir_high;
             self.first.get_or_insert((now, sums));
             self.last = Some((now, sums));
             if let Some(log) = &mut self.log {
@@ -195,8 +198,9 @@ impl Recorder {
             m.end_pulse(now);
         }
         if let Some(trace) = &mut self.trace {
-            trace.step(motor, high, !self.motors[motor].dir_high, now);
+            trace.step(motor, high, positive, now);
         }
+        steps.then_some(positive)
     }
 
     fn dir_edge(&mut self, motor: usize, high: bool, now: u64) {
@@ -215,17 +219,41 @@ impl Recorder {
 /// What a pin's callback needs to know.
 pub(crate) struct Probe {
     bus: NonNull<Bus>,
-    motor: usize,
-    is_step: bool,
+    what: What,
 }
 
-/// Listens to the pins of a board. The probes must live as long as the CPU.
+/// What an output does.
+#[derive(Clone, Copy)]
+enum What {
+    Step(usize),
+    Dir(usize),
+    Spindle(SpindlePin),
+}
+
+/// Listens to the motors' pins of a board. The probes must live as long as the CPU.
 pub(crate) fn attach(bus: NonNull<Bus>, cpu: Cpu, board: &Board) -> Vec<Probe> {
-    let of_motor = |motor| [true, false].map(|is_step| Probe { bus, motor, is_step });
-    let mut probes: Vec<Probe> = (0..MOTORS).flat_map(of_motor).collect();
-    for probe in &mut probes {
-        let pins = &board.motors[probe.motor];
-        let pin = if probe.is_step { pins.step } else { pins.dir };
+    let motors = board.motors.iter().enumerate();
+    let pins = motors.flat_map(|(m, pins)| [(pins.step, What::Step(m)), (pins.dir, What::Dir(m))]);
+    watch(bus, cpu, &pins.collect::<Vec<_>>())
+}
+
+/// Listens to the spindle's pins, of which one may be there for its pulses' width. As `attach`.
+pub(crate) fn attach_spindle(
+    bus: NonNull<Bus>,
+    cpu: Cpu,
+    board: &Board,
+    pulse: Option<Pin>,
+) -> Vec<Probe> {
+    let [enable, reverse, ..] = board.outputs;
+    let pins =
+        [(enable, SpindlePin::Enable), (reverse, SpindlePin::Reverse), (pulse, SpindlePin::Pulse)];
+    let pins = pins.into_iter().filter_map(|(pin, what)| Some((pin?, What::Spindle(what))));
+    watch(bus, cpu, &pins.collect::<Vec<_>>())
+}
+
+fn watch(bus: NonNull<Bus>, cpu: Cpu, pins: &[(Pin, What)]) -> Vec<Probe> {
+    let mut probes: Vec<Probe> = pins.iter().map(|(_, what)| Probe { bus, what: *what }).collect();
+    for (probe, (pin, _)) in probes.iter_mut().zip(pins) {
         let param = (&raw mut *probe).cast::<c_void>();
         cpu.watch_pin(pin.port.letter(), pin.bit, Some(pin_changed), param);
     }
@@ -233,7 +261,7 @@ pub(crate) fn attach(bus: NonNull<Bus>, cpu: Cpu, board: &Board) -> Vec<Probe> {
 }
 
 unsafe extern "C" fn pin_changed(_: *mut ffi::avr_irq_t, value: u32, param: *mut c_void) {
-    // SAFETY: `param` is a probe that `attach` made. The machine holds no reference to its bus
+    // SAFETY: `param` is a probe that `watch` made. The machine holds no reference to its bus
     // while instructions run or pins are driven, which is when simavr calls this.
     let (probe, bus) = unsafe {
         let probe = &*param.cast::<Probe>();
@@ -241,10 +269,20 @@ unsafe extern "C" fn pin_changed(_: *mut ffi::avr_irq_t, value: u32, param: *mut
     };
     let now = bus.cpu.write_cycle();
     let high = value & 1 != 0;
-    if probe.is_step {
-        let sums = bus.sums;
-        bus.recorder.step_edge(probe.motor, high, now, sums);
-    } else {
-        bus.recorder.dir_edge(probe.motor, high, now);
+    match probe.what {
+        What::Step(motor) => {
+            let stepped = bus.recorder.step_edge(motor, high, now, bus.sums);
+            if let (Some(positive), Some(mechanics)) = (stepped, &mut bus.mechanics) {
+                mechanics.step(motor, positive, now);
+                bus.due = bus.due.min(mechanics.due());
+            }
+        }
+        What::Dir(motor) => bus.recorder.dir_edge(motor, high, now),
+        What::Spindle(pin) => {
+            if let Some(mechanics) = &mut bus.mechanics {
+                mechanics.spindle(pin, high, now);
+                bus.due = bus.due.min(mechanics.due());
+            }
+        }
     }
 }

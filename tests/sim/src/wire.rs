@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use crate::mechanics::Random;
 use crate::uart::Uart;
 
 const NEVER: u64 = u64::MAX;
@@ -25,6 +26,8 @@ pub struct Wire {
     /// Goes along when the machine changes its speed; and the machine's cycles per bit before.
     follows: bool,
     own_before: f64,
+    /// One byte of so many has a bit turned over on its way to the machine.
+    spoils: Option<(u64, Random)>,
 }
 
 impl Wire {
@@ -41,6 +44,7 @@ impl Wire {
             sent: 0,
             follows: false,
             own_before: 0.0,
+            spoils: None,
         }
     }
 
@@ -91,9 +95,21 @@ impl Wire {
         self.due = self.free_at.max(now);
     }
 
+    /// From now on one byte of so many has a bit turned over on its way to the machine; `None` ends that.
+    pub fn spoil(&mut self, one_in: Option<u64>, seed: u64) {
+        self.spoils = one_in.map(|n| (n.max(1), Random::new(seed)));
+    }
+
+    fn spoilt(&mut self, byte: u8) -> u8 {
+        let Some((one_in, random)) = &mut self.spoils else { return byte };
+        let spoils = random.below(*one_in) == 0;
+        if spoils { byte ^ 1 << random.below(8) } else { byte }
+    }
+
     /// Begins the frame that is due.
     pub fn pump(&mut self, uart: &mut Uart) {
         if let Some(byte) = self.outgoing.pop_front() {
+            let byte = self.spoilt(byte);
             uart.start_bit(byte, self.bit_cycles, self.due);
             self.free_at = self.due + (self.bit_cycles * FRAME_BITS).round() as u64;
             self.sent += 1;

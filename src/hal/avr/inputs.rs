@@ -1,0 +1,341 @@
+//! Inputs: the switches' pins, with pull-ups.
+//!
+//! | interrupt | does | cycles |
+//! |---|---|---|
+//! | INT0 to INT7, PCINT0 to PCINT2 | starts timer 2: someone has to look | 20, interrupts off |
+//! | TIMER2_COMPA | looks at all pins, as [`Switches`] wants it | 300, interrupts off for 26 and 18 |
+//!
+//! While no switch moves none of them comes. The look lets all interrupts in but itself and exec, which would run
+//! far too long inside it. Where a limit is hit it stops the steps right there: 20 us after the edge and its own
+//! 300 cycles, for which it competes with the step interrupt. That is 50 us in all at 50,000 steps a second, and
+//! 120 at 85,000, which leave it a sixth of the CPU. A probe is latched at the same place, later by so much than
+//! its contact: at 1,000 mm/min less than 1 um.
+
+use core::arch::asm;
+use core::cell::UnsafeCell;
+
+use super::{exec, flags, stepper};
+use crate::boards::{ACTIVE, Interrupt, Timer, inputs};
+use crate::hal::event::Event;
+use crate::motion::contact;
+use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
+
+const _: () = assert!(
+    !matches!(ACTIVE.step_timer, Timer::T2) && !matches!(ACTIVE.tick_timer, Timer::T2),
+    "the looks at the switches are on timer 2"
+);
+
+const EICRA: *mut u8 = 0x69 as *mut u8;
+const EICRB: *mut u8 = 0x6A as *mut u8;
+const EIMSK: *mut u8 = 0x3D as *mut u8;
+const PCICR: *mut u8 = 0x68 as *mut u8;
+const PCMSK: [*mut u8; 3] = [0x6B as *mut u8, 0x6C as *mut u8, 0x6D as *mut u8];
+const TCCR2A: *mut u8 = 0xB0 as *mut u8;
+const TCCR2B: *mut u8 = 0xB1 as *mut u8;
+const TCNT2: *mut u8 = 0xB2 as *mut u8;
+const OCR2A: *mut u8 = 0xB3 as *mut u8;
+const TIMSK2: *mut u8 = 0x70 as *mut u8;
+/// Clear on compare match; a count each 8 cycles.
+const CTC: u8 = 1 << 1;
+const RUN: u8 = 1 << 1;
+const OCIE2A: u8 = 1 << 1;
+
+/// The last count of a period of `us` microseconds.
+const fn top(us: u32) -> u8 {
+    (us * (ACTIVE.clock_hz / 1_000_000) / 8 - 1) as u8
+}
+
+/// The interrupts to enable: EIMSK, and the PCMSKs.
+const MASKS: (u8, [u8; 3]) = {
+    let (mut external, mut change) = (0, [0; 3]);
+    let mut i = 0;
+    while i < inputs::COUNT {
+        if let Some(pin) = ACTIVE.inputs[i] {
+            match pin.interrupt() {
+                Some(Interrupt::External(n)) => external |= 1 << n,
+                Some(Interrupt::PinChange(n)) => change[n as usize / 8] |= 1 << (n % 8),
+                None => {}
+            }
+        }
+        i += 1;
+    }
+    (external, change)
+};
+
+/// Does the same for each input of the board, with its pin as a constant.
+macro_rules! each_input {
+    ($i:ident, $pin:ident => $body:expr) => {
+        each_input!(@ $i, $pin, $body, 0 1 2 3 4 5 6 7 8 9 10)
+    };
+    (@ $i:ident, $pin:ident, $body:expr, $($n:literal)+) => {$(
+        if let Some($pin) = const { ACTIVE.inputs[$n] } {
+            #[allow(dead_code)]
+            const $i: usize = $n;
+            $body
+        }
+    )+};
+}
+
+/// What the looks know and are told.
+struct State {
+    switches: Switches,
+    /// Low is worked.
+    low: u16,
+    /// Limits, of the ends.
+    limits: u8,
+    /// Limits that have been hit.
+    hits: u8,
+    /// Those that end a move, and what they must be for it.
+    armed: u16,
+    awaited: u16,
+    /// The next look is to believe what it finds.
+    fresh: bool,
+}
+
+struct Shared(UnsafeCell<State>);
+
+// SAFETY: the look, which does not nest, and thread mode with interrupts off, see `with`.
+unsafe impl Sync for Shared {}
+
+static STATE: Shared = Shared(UnsafeCell::new(State {
+    switches: Switches::new(),
+    low: 0,
+    limits: 0,
+    hits: 0,
+    armed: 0,
+    awaited: 0,
+    fresh: true,
+}));
+
+/// Thread mode's way to the state: a few cycles each.
+fn with<R>(what: impl FnOnce(&mut State) -> R) -> R {
+    // SAFETY: interrupts are off, and no look is under way in thread mode.
+    avr_device::interrupt::free(|_| what(unsafe { &mut *STATE.0.get() }))
+}
+
+/// Sets pins and interrupts up. Before interrupts are on.
+pub fn start() {
+    each_input!(I, pin => super::gpio::high(pin));
+    let (external, change) = MASKS;
+    // SAFETY: start-up; these registers are nobody else's.
+    unsafe {
+        // Any edge of any INT.
+        EICRA.write_volatile(0b0101_0101);
+        EICRB.write_volatile(0b0101_0101);
+        EIMSK.write_volatile(external);
+        for (register, mask) in PCMSK.into_iter().zip(change) {
+            register.write_volatile(mask);
+        }
+        PCICR.write_volatile(0b111);
+        TCCR2A.write_volatile(CTC);
+        OCR2A.write_volatile(top(LATER_US));
+        TIMSK2.write_volatile(OCIE2A);
+        TCCR2B.write_volatile(RUN);
+    }
+}
+
+/// Which inputs are worked when low, and which ends are limits. Thread mode.
+pub fn set_up(low: u16, limits: u8) {
+    with(|state| {
+        state.limits = limits;
+        if state.low != low {
+            (state.low, state.fresh) = (low, true);
+            // SAFETY: starts a look; one that is due does it all the same.
+            unsafe { TCCR2B.write_volatile(RUN) };
+        }
+    });
+}
+
+/// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
+/// ([`contact`](crate::motion::contact)); none if `armed` is 0. Thread mode.
+pub fn arm(armed: u16, awaited: u16) {
+    with(|state| (state.armed, state.awaited) = (armed, awaited));
+}
+
+/// The inputs that are worked. Thread mode.
+pub fn worked() -> u16 {
+    with(|state| state.switches.worked())
+}
+
+/// The limits that have been hit since the last call. Thread mode.
+pub fn take_hits() -> u8 {
+    with(|state| core::mem::take(&mut state.hits))
+}
+
+/// The inputs whose pins are high.
+#[inline(never)]
+fn levels() -> u16 {
+    // In bytes, for shifts of words are long.
+    let mut bytes = [0; 2];
+    each_input!(I, pin => {
+        let register = (pin.port.address() - 2) as *const u8;
+        // SAFETY: reading an input register has no effect.
+        if unsafe { register.read_volatile() } & 1 << pin.bit != 0 {
+            bytes[I / 8] |= 1 << (I % 8);
+        }
+    });
+    u16::from_le_bytes(bytes)
+}
+
+/// Waits until [`SOON_US`] after the interrupt was due. A look so soon is not worth another interrupt.
+fn wait() {
+    // SAFETY: the timer is this interrupt's; it counts from 0 since it was due.
+    unsafe {
+        OCR2A.write_volatile(u8::MAX);
+        while TCNT2.read_volatile() < top(SOON_US) {}
+    }
+}
+
+/// A look, or two.
+extern "C" fn look() {
+    // SAFETY: the look interrupt, which does not nest, runs this alone.
+    let state = unsafe { &mut *STATE.0.get() };
+    let mut now = levels() ^ state.low;
+    if core::mem::replace(&mut state.fresh, false) {
+        state.switches.adopt(now);
+        flags::set(Event::Realtime);
+    }
+    if state.switches.is_news(now) {
+        state.switches.note(now);
+        wait();
+        now = levels() ^ state.low;
+    }
+    let (changed, next) = state.switches.look(now);
+    if changed != 0 {
+        let hits = (changed & now) as u8 & state.limits;
+        if hits != 0 {
+            stepper::stop();
+            state.hits |= hits;
+        }
+        if changed & state.armed & !(now ^ state.awaited) != 0 {
+            let (dda, tail) = stepper::moment();
+            contact::note(&dda, tail);
+            flags::set(Event::BlockDone);
+        }
+        flags::set(Event::Realtime);
+    }
+    plan(next);
+    // An edge before the timer stood still has started nothing.
+    if next == Next::Edge && levels() ^ state.low != now {
+        // SAFETY: starts a look.
+        unsafe { TCCR2B.write_volatile(RUN) };
+    }
+}
+
+/// Sets the timer for the next look.
+fn plan(next: Next) {
+    // SAFETY: these registers are the look's, but for starts.
+    unsafe {
+        if next == Next::Edge {
+            TCCR2B.write_volatile(0);
+        }
+        // In this order: a count that is past its top already would go all the way round.
+        OCR2A.write_volatile(match next {
+            Next::Edge => top(FIRST_US),
+            Next::Soon => top(SOON_US),
+            Next::Later => top(LATER_US),
+        });
+        TCNT2.write_volatile(0);
+    }
+}
+
+/// The handlers of edges. They change no flags.
+macro_rules! edges {
+    ($($name:ident)+) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name() -> ! {
+            // SAFETY: it restores the one register it changes, and returns by `reti`.
+            unsafe {
+                asm!(
+                    "push r24",
+                    "ldi  r24, {run}",
+                    "sts  0xB1, r24",
+                    "pop  r24",
+                    "reti",
+                    run = const RUN,
+                    options(noreturn),
+                );
+            }
+        }
+    )+};
+}
+
+edges! {
+    __vector_1 __vector_2 __vector_3 __vector_4 __vector_5 __vector_6 __vector_7 __vector_8
+    __vector_9 __vector_10 __vector_11
+}
+
+/// TIMER2_COMPA: runs a look, with interrupts on and exec held off.
+#[unsafe(no_mangle)]
+extern "C" fn __vector_13() -> ! {
+    // SAFETY: it restores what it changes and what a called function may change, and returns by
+    // `reti`. Its own source is off, so it does not nest. What it does to `CLOSED` is what `exec::lock`
+    // does, and nothing where that is closed already.
+    unsafe {
+        asm!(
+            "push r24",
+            "push r25",
+            "in   r24, 0x3F",
+            "push r24",
+            "ldi  r24, 0",
+            "sts  0x70, r24",
+            "lds  r25, {closed}",
+            "ldi  r24, 1",
+            "sts  {closed}, r24",
+            "sei",
+            "push r25",
+            "push r0",
+            "push r1",
+            "push r18",
+            "push r19",
+            "push r20",
+            "push r21",
+            "push r22",
+            "push r23",
+            "push r26",
+            "push r27",
+            "push r30",
+            "push r31",
+            "clr  r1",
+            "call {look}",
+            "pop  r31",
+            "pop  r30",
+            "pop  r27",
+            "pop  r26",
+            "pop  r23",
+            "pop  r22",
+            "pop  r21",
+            "pop  r20",
+            "pop  r19",
+            "pop  r18",
+            "pop  r1",
+            "pop  r0",
+            "pop  r25",
+            // Lets exec in again if it was not closed before, as `exec::open`.
+            "tst  r25",
+            "brne 1f",
+            "sts  {closed}, r25",
+            "lds  r24, {missed}",
+            "tst  r24",
+            "breq 1f",
+            "sts  {missed}, r25",
+            "ldi  r24, {pended}",
+            "sts  0xD1, r24",
+            "1:",
+            "ldi  r24, {unmask}",
+            "cli",
+            "sts  0x70, r24",
+            "pop  r24",
+            "out  0x3F, r24",
+            "pop  r25",
+            "pop  r24",
+            "reti",
+            closed = sym exec::CLOSED,
+            missed = sym exec::MISSED,
+            pended = const exec::PENDED,
+            unmask = const OCIE2A,
+            look = sym look,
+            options(noreturn),
+        );
+    }
+}

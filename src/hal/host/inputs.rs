@@ -1,0 +1,118 @@
+//! Inputs on the host: levels that tests set, and the same looks at them as on the chip.
+
+use core::cell::{Cell, RefCell};
+
+use super::{NEVER, flags, now, stepper};
+use crate::boards::{ACTIVE, inputs};
+use crate::hal::event::Event;
+use crate::motion::contact;
+use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
+
+struct Inputs {
+    /// High ones.
+    levels: Cell<u16>,
+    switches: RefCell<Switches>,
+    low: Cell<u16>,
+    limits: Cell<u8>,
+    hits: Cell<u8>,
+    armed: Cell<(u16, u16)>,
+    fresh: Cell<bool>,
+    next_look: Cell<u64>,
+}
+
+machine_static! {
+    fn all() -> Inputs = Inputs {
+        levels: Cell::new(u16::MAX),
+        switches: RefCell::new(Switches::new()),
+        low: Cell::new(0),
+        limits: Cell::new(0),
+        hits: Cell::new(0),
+        armed: Cell::new((0, 0)),
+        fresh: Cell::new(true),
+        next_look: Cell::new(cycles(LATER_US)),
+    };
+}
+
+const fn cycles(us: u32) -> u64 {
+    (us * (ACTIVE.clock_hz / 1_000_000)) as u64
+}
+
+/// Which inputs are worked when low, and which ends are limits.
+pub fn set_up(low: u16, limits: u8) {
+    all().limits.set(limits);
+    if all().low.replace(low) != low {
+        all().fresh.set(true);
+        edge();
+    }
+}
+
+/// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
+/// ([`contact`](crate::motion::contact)); none if `armed` is 0.
+pub fn arm(armed: u16, awaited: u16) {
+    all().armed.set((armed, awaited));
+}
+
+/// The inputs that are worked.
+pub fn worked() -> u16 {
+    all().switches.borrow().worked()
+}
+
+/// The limits that have been hit since the last call.
+pub fn take_hits() -> u8 {
+    all().hits.take()
+}
+
+/// The pin of an input goes high, or low, from now on.
+pub(super) fn set(input: usize, high: bool) {
+    let pin = ACTIVE.inputs.get(input).copied().flatten();
+    let same = |i: &usize| pin.is_some() && ACTIVE.inputs[*i] == pin;
+    let bits = (0..inputs::COUNT).filter(same).fold(0, |bits, i| bits | 1 << i);
+    let before = all().levels.get();
+    all().levels.set(if high { before | bits } else { before & !bits });
+    edge();
+}
+
+/// An edge, or what is to be looked at like one.
+fn edge() {
+    if all().next_look.get() == NEVER {
+        all().next_look.set(now() + cycles(FIRST_US));
+    }
+}
+
+/// When the next look is due.
+pub(super) fn next_look() -> u64 {
+    all().next_look.get()
+}
+
+/// A look, at its time.
+pub(super) fn look() {
+    let wired = (0..inputs::COUNT).filter(|i| ACTIVE.inputs[*i].is_some());
+    let wired = wired.fold(0, |bits, i| bits | 1 << i);
+    let i = all();
+    let mut switches = i.switches.borrow_mut();
+    let found = (i.levels.get() & wired) ^ i.low.get();
+    if i.fresh.take() {
+        switches.adopt(found);
+        flags::set(Event::Realtime);
+    }
+    let (changed, next) = switches.look(found);
+    if changed != 0 {
+        let hits = (changed & found) as u8 & i.limits.get();
+        if hits != 0 {
+            stepper::stop();
+            i.hits.set(i.hits.get() | hits);
+        }
+        let (armed, awaited) = i.armed.get();
+        if changed & armed & !(found ^ awaited) != 0 {
+            let (dda, tail) = stepper::moment();
+            contact::note(&dda, tail);
+            flags::set(Event::BlockDone);
+        }
+        flags::set(Event::Realtime);
+    }
+    i.next_look.set(match next {
+        Next::Edge => NEVER,
+        Next::Soon => now() + cycles(SOON_US),
+        Next::Later => now() + cycles(LATER_US),
+    });
+}

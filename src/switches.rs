@@ -1,0 +1,221 @@
+//! Switches: from the levels of pins to what is believed of them, without any pin.
+//!
+//! The hardware has someone look at all pins at once, and each look says when the next one is due. An edge
+//! asks for a first look after [`FIRST_US`]; two looks in a row that agree, [`SOON_US`] apart, are believed. So
+//!
+//! - a pulse shorter than [`SOON_US`] is never believed, one longer than both times always;
+//! - a switch is believed 12 us after its edge, if nothing else has happened in the last [`LATER_US`], and
+//!   after 300 us in any case;
+//! - it is not asked again for [`LOCK_MS`] after that, so that its bouncing is one event, and then believed
+//!   as it stands.
+//!
+//! Where noise keeps coming, looks that found nothing are followed by a pause: it costs at most a fifth of
+//! the CPU. While no switch moves nobody looks. Sets of switches are bits, as in
+//! [`inputs`](crate::boards::inputs).
+
+/// From an edge to a look, microseconds.
+pub const FIRST_US: u32 = 2;
+/// From there to the next.
+pub const SOON_US: u32 = 10;
+/// Between looks while a switch is locked, and after one that found nothing.
+pub const LATER_US: u32 = 125;
+/// How long a switch that has changed is not asked again; up to twice that if others change meanwhile.
+pub const LOCK_MS: u32 = 10;
+
+const LOCK_LOOKS: u8 = (LOCK_MS * 1_000 / LATER_US) as u8;
+
+/// When the next look is due.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Next {
+    /// After an edge.
+    Edge,
+    /// In [`SOON_US`].
+    Soon,
+    /// In [`LATER_US`].
+    Later,
+}
+
+/// What is believed.
+#[derive(Clone, Debug)]
+pub struct Switches {
+    worked: u16,
+    /// What the last look found.
+    last: u16,
+    /// Changed lately.
+    locked: u16,
+    /// Looks until these are asked again.
+    left: u8,
+    /// The last look found nothing, and is not followed by a pause any more.
+    paused: bool,
+}
+
+impl Switches {
+    /// None is worked.
+    pub const fn new() -> Self {
+        Self { worked: 0, last: 0, locked: 0, left: 0, paused: false }
+    }
+
+    /// The switches that are worked.
+    pub fn worked(&self) -> u16 {
+        self.worked
+    }
+
+    /// Believes what a look finds, without more ado: at power-up, and when switches are told anew.
+    pub fn adopt(&mut self, now: u16) {
+        *self = Self { worked: now, last: now, ..Self::new() };
+    }
+
+    /// Whether a look that finds the switches `now` worked wants another.
+    pub fn is_news(&self, now: u16) -> bool {
+        (now ^ self.worked) & !self.locked != 0
+    }
+
+    /// The first of two looks, of which the second decides.
+    pub fn note(&mut self, now: u16) {
+        self.last = now;
+    }
+
+    /// A look finds the switches `now` worked. Returns those that have changed, and when to look again.
+    pub fn look(&mut self, now: u16) -> (u16, Next) {
+        let agreed = !(now ^ self.last);
+        self.last = now;
+        let changed = (now ^ self.worked) & agreed & !self.locked;
+        self.worked ^= changed;
+        if changed != 0 {
+            self.locked |= changed;
+            self.left = LOCK_LOOKS;
+        }
+        (changed, self.next(now))
+    }
+
+    fn next(&mut self, now: u16) -> Next {
+        if self.is_news(now) {
+            return Next::Soon;
+        }
+        if self.locked != 0 {
+            self.left = self.left.saturating_sub(1);
+            if self.left > 0 {
+                return Next::Later;
+            }
+            self.locked = 0;
+            return Next::Soon;
+        }
+        self.paused = !self.paused;
+        if self.paused { Next::Later } else { Next::Edge }
+    }
+}
+
+impl Default for Switches {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    /// Looks at a level of one switch, given as times of its edges (us), as often as it wants to be looked
+    /// at. Returns the events: when, and the level.
+    fn watched(edges: &[u32], until: u32) -> Vec<(u32, bool)> {
+        let level = |at| edges.iter().filter(|e| **e <= at).count() % 2 == 1;
+        let (mut switches, mut events) = (Switches::new(), Vec::new());
+        let mut edge = edges.iter().copied();
+        let (mut at, mut next) = (0, Next::Edge);
+        loop {
+            at = match next {
+                Next::Soon => at + SOON_US,
+                Next::Later => at + LATER_US,
+                // One that came since the last look asks for another.
+                Next::Edge => match edge.find(|e| *e > at) {
+                    Some(edge) => edge + FIRST_US,
+                    None => return events,
+                },
+            };
+            if at > until {
+                return events;
+            }
+            let (changed, then) = switches.look(level(at).into());
+            next = then;
+            if changed != 0 {
+                events.push((at, switches.worked() != 0));
+            }
+        }
+    }
+
+    #[test]
+    fn an_edge_is_believed_after_two_looks() {
+        assert_eq!(watched(&[1_000], 100_000), [(1_012, true)]);
+        assert_eq!(watched(&[1_000, 50_000], 100_000), [(1_012, true), (50_012, false)]);
+    }
+
+    #[test]
+    fn a_contact_that_bounces_is_one_event() {
+        let bounces: Vec<u32> = (0..21).map(|n| 1_000 + 130 * n).collect();
+        assert_eq!(watched(&bounces, 100_000), [(1_012, true)]);
+    }
+
+    #[test]
+    fn what_is_so_after_the_lock_counts() {
+        let events = watched(&[1_000, 5_000], 100_000);
+        assert_eq!(events.len(), 2);
+        assert!((10_800..11_400).contains(&events[1].0) && !events[1].1, "{events:?}");
+    }
+
+    #[test]
+    fn a_switch_need_not_wait_for_another() {
+        let mut switches = Switches::new();
+        for now in [1, 1] {
+            switches.look(now);
+        }
+        assert_eq!(switches.look(3), (0, Next::Soon));
+        assert_eq!(switches.look(3), (2, Next::Later));
+        assert_eq!(switches.worked(), 3);
+    }
+
+    #[test]
+    fn what_is_adopted_is_no_event() {
+        let mut switches = Switches::new();
+        switches.adopt(0b101);
+        assert_eq!(switches.worked(), 0b101);
+        assert_eq!(switches.look(0b101), (0, Next::Later));
+        assert_eq!(switches.look(0b101), (0, Next::Edge));
+    }
+
+    proptest! {
+        #[test]
+        fn short_pulses_are_never_believed(
+            pulses in prop::collection::vec((300u32..5_000, 1u32..SOON_US), 0..40)
+        ) {
+            let mut at = 0;
+            let edges: Vec<u32> = pulses.iter().flat_map(|(pause, width)| {
+                at += pause + width;
+                [at - width, at]
+            }).collect();
+            prop_assert_eq!(watched(&edges, at + 50_000), []);
+        }
+
+        #[test]
+        fn long_pulses_always_are(from in 500u32..5_000, width in SOON_US + FIRST_US + 1..5_000) {
+            let events = watched(&[from, from + width], 50_000);
+            prop_assert_eq!(events.len(), 2);
+            prop_assert_eq!(events[0], (from + FIRST_US + SOON_US, true));
+        }
+
+        #[test]
+        fn whatever_happens_the_end_is_known(
+            pauses in prop::collection::vec(1u32..3_000, 0..60)
+        ) {
+            let mut at = 0;
+            let edges: Vec<u32> = pauses.iter().map(|pause| { at += pause; at }).collect();
+            let events = watched(&edges, at + 100_000);
+            let level = events.last().is_some_and(|(_, level)| *level);
+            prop_assert_eq!(level, edges.len() % 2 == 1);
+            let apart = events.windows(2).all(|pair| pair[1].0 - pair[0].0 >= LOCK_MS * 1_000 - LATER_US);
+            prop_assert!(apart, "{:?}", events);
+            prop_assert!(events.windows(2).all(|pair| pair[0].1 != pair[1].1));
+        }
+    }
+}

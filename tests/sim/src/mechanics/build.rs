@@ -1,0 +1,119 @@
+//! How a machine is built: plain data, with defaults for each board.
+
+use kerf::boards::{Board, MOTORS, Pin};
+
+/// A machine around the chip. Lengths are in millimetres from the lower hard end of an axis.
+#[derive(Clone, Debug)]
+pub struct Build {
+    /// X, Y, Z and A.
+    pub axes: [Axis; MOTORS],
+    /// The height of a plate under the tool of Z, which closes the probe's contact.
+    pub plate: Option<f64>,
+    /// How the probe, the door and the emergency stop are wired.
+    pub probe: Wiring,
+    /// See `probe`; `None` where there is none.
+    pub door: Option<Wiring>,
+    /// See `probe`; `None` where there is none.
+    pub stop: Option<Wiring>,
+    /// The spindle.
+    pub spindle: Spindle,
+    /// Where the times of bounces come from.
+    pub seed: u64,
+}
+
+/// An axis and its carriage.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// The motor that moves it, counted from 0.
+    pub motor: usize,
+    /// Steps of that motor in a millimetre.
+    pub steps_per_mm: f64,
+    /// Whether a low direction pin moves it down.
+    pub reversed: bool,
+    /// Between the hard ends, at which the motor loses its steps; infinite if there are none.
+    pub travel: f64,
+    /// Where the carriage stands at power-up.
+    pub start: f64,
+    /// The switch at the lower end.
+    pub min: Option<Switch>,
+    /// The switch at the upper end.
+    pub max: Option<Switch>,
+}
+
+/// A switch that a carriage works.
+#[derive(Clone, Copy, Debug)]
+pub struct Switch {
+    /// Worked from here on outwards.
+    pub at: f64,
+    /// How far back the carriage must be for it to let go.
+    pub hysteresis: f64,
+    /// How it is wired.
+    pub wiring: Wiring,
+}
+
+/// How a switch is wired: to ground in any case, with a pull-up.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Wiring {
+    /// Low when worked. Several on one pin are in parallel.
+    NormallyOpen,
+    /// High when worked. Several on one pin are in series.
+    NormallyClosed,
+}
+
+/// A spindle: the board's outputs switch it.
+#[derive(Clone, Copy, Debug)]
+pub struct Spindle {
+    /// Turns a minute at full drive.
+    pub rpm: f64,
+    /// Seconds to 63 % of the way to another speed.
+    pub time_constant: f64,
+    /// The pin that drives it by its pulses' width; without one it turns at full drive.
+    pub pwm: Option<Pin>,
+    /// The pin that sees a pulse a turn, high for a hundredth of a turn.
+    pub index: Option<Pin>,
+}
+
+impl Build {
+    /// A machine of 200 by 200 by 100 mm that stands in the middle, with switches at both ends of X, Y and Z, and
+    /// motors as the firmware's defaults have them.
+    pub fn of(_: &Board) -> Build {
+        Build {
+            axes: [linear(0, 200.0), linear(1, 200.0), linear(2, 100.0), rotary(3)],
+            plate: None,
+            probe: Wiring::NormallyOpen,
+            door: Some(Wiring::NormallyOpen),
+            stop: Some(Wiring::NormallyOpen),
+            spindle: Spindle { rpm: 12_000.0, time_constant: 0.5, pwm: None, index: None },
+            seed: 1,
+        }
+    }
+
+    /// The same with all switches of axes wired so.
+    pub fn wired(mut self, wiring: Wiring) -> Build {
+        let ends = self.axes.iter_mut().flat_map(|axis| [&mut axis.min, &mut axis.max]);
+        ends.flatten().for_each(|switch| switch.wiring = wiring);
+        self
+    }
+}
+
+/// How far from a hard end its switch is.
+const BEFORE_END: f64 = 2.0;
+
+fn linear(motor: usize, travel: f64) -> Axis {
+    let switch = |at| Switch { at, hysteresis: 0.2, wiring: Wiring::NormallyOpen };
+    Axis {
+        motor,
+        steps_per_mm: 1_280.0,
+        reversed: false,
+        travel,
+        start: travel / 2.0,
+        min: Some(switch(BEFORE_END)),
+        max: Some(switch(travel - BEFORE_END)),
+    }
+}
+
+fn rotary(motor: usize) -> Axis {
+    let (min, max) = (None, None);
+    let travel = f64::INFINITY;
+    Axis { motor, steps_per_mm: 1_600.0 / 360.0, reversed: false, travel, start: 0.0, min, max }
+}

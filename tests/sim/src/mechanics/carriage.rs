@@ -1,0 +1,88 @@
+//! A carriage between two hard ends.
+
+use super::build::{Axis, Switch};
+
+/// Where it is, and what it works. In steps from the lower hard end.
+pub struct Carriage {
+    motor: usize,
+    reversed: bool,
+    steps_per_mm: f64,
+    /// `None` without ends.
+    travel: Option<i64>,
+    steps: i64,
+    lost: u64,
+    /// From where on the switch at each end is worked, and from where on no longer.
+    min: Option<(i64, i64)>,
+    max: Option<(i64, i64)>,
+    /// Whether they are.
+    ends: [bool; 2],
+}
+
+impl Axis {
+    /// A position in steps from the lower hard end.
+    pub(super) fn steps(&self, position: f64) -> i64 {
+        (position * self.steps_per_mm).round() as i64
+    }
+}
+
+impl Carriage {
+    /// At its start.
+    pub fn new(axis: &Axis) -> Self {
+        let place = |switch: &Switch, sign: f64| {
+            (axis.steps(switch.at), axis.steps(switch.at + sign * switch.hysteresis))
+        };
+        let mut carriage = Carriage {
+            motor: axis.motor,
+            reversed: axis.reversed,
+            steps_per_mm: axis.steps_per_mm,
+            travel: axis.travel.is_finite().then(|| axis.steps(axis.travel)),
+            steps: axis.steps(axis.start),
+            lost: 0,
+            min: axis.min.as_ref().map(|s| place(s, 1.0)),
+            max: axis.max.as_ref().map(|s| place(s, -1.0)),
+            ends: [false; 2],
+        };
+        carriage.find_ends();
+        carriage
+    }
+
+    /// Millimetres from the lower hard end.
+    pub fn position(&self) -> f64 {
+        self.steps as f64 / self.steps_per_mm
+    }
+
+    /// Steps from the lower hard end.
+    pub fn steps(&self) -> i64 {
+        self.steps
+    }
+
+    /// Steps lost at hard ends.
+    pub fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// Whether the switches at its lower and its upper end are worked.
+    pub fn ends(&self) -> [bool; 2] {
+        self.ends
+    }
+
+    /// A motor steps.
+    pub fn step(&mut self, motor: usize, positive: bool) {
+        if motor != self.motor {
+            return;
+        }
+        let next = self.steps + if positive != self.reversed { 1 } else { -1 };
+        match self.travel {
+            Some(travel) if !(0..=travel).contains(&next) => self.lost += 1,
+            _ => self.steps = next,
+        }
+        self.find_ends();
+    }
+
+    fn find_ends(&mut self) {
+        let at = self.steps;
+        let [min, max] = &mut self.ends;
+        *min = self.min.is_some_and(|(on, off)| at <= if *min { off } else { on });
+        *max = self.max.is_some_and(|(on, off)| at >= if *max { off } else { on });
+    }
+}

@@ -1,0 +1,129 @@
+//! A wire from contacts to a pin, with what may be wrong with it.
+
+use std::collections::VecDeque;
+
+use kerf::boards::Pin;
+
+use super::build::Wiring;
+use super::random::Random;
+
+const NEVER: u64 = u64::MAX;
+
+/// A contact that bounces whenever it changes.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounce {
+    /// How often it opens and closes again.
+    pub times: u32,
+    /// For how long, cycles.
+    pub cycles: u64,
+}
+
+/// A wire.
+pub struct Line {
+    pin: Pin,
+    wiring: Wiring,
+    /// Which inputs' contacts on it are worked, as bits.
+    worked: u16,
+    /// Whether it is worked, after bounces so far.
+    active: bool,
+    /// Changes to come, in their order.
+    flips: VecDeque<(u64, bool)>,
+    /// From when to when it is disturbed.
+    noise: Vec<(u64, u64)>,
+    bounce: Option<Bounce>,
+    stuck: Option<bool>,
+    /// The level that was told last.
+    told: Option<bool>,
+    /// When that was asked last.
+    now: u64,
+}
+
+impl Line {
+    /// A wire without contacts.
+    pub fn new(pin: Pin, wiring: Wiring) -> Self {
+        Line {
+            pin,
+            wiring,
+            worked: 0,
+            active: false,
+            flips: VecDeque::new(),
+            noise: Vec::new(),
+            bounce: None,
+            stuck: None,
+            told: None,
+            now: 0,
+        }
+    }
+
+    /// Its pin.
+    pub fn pin(&self) -> Pin {
+        self.pin
+    }
+
+    /// Whether the contact of an input on it is worked.
+    pub fn is_worked(&self, input: usize) -> bool {
+        self.worked & 1 << input != 0
+    }
+
+    /// From now on it bounces, or no longer.
+    pub fn set_bounce(&mut self, bounce: Option<Bounce>) {
+        self.bounce = bounce;
+    }
+
+    /// From now on it looks worked, or not, whatever happens; `None` mends it.
+    pub fn set_stuck(&mut self, stuck: Option<bool>) {
+        self.stuck = stuck;
+    }
+
+    /// Inverts the level for a time.
+    pub fn disturb(&mut self, from: u64, cycles: u64) {
+        self.noise.push((from, from + cycles));
+    }
+
+    /// A contact changes. The first edge is at once; bounces follow at random times and end as it is.
+    pub fn work(&mut self, input: usize, worked: bool, now: u64, random: &mut Random) {
+        let before = self.worked != 0;
+        self.worked = self.worked & !(1 << input) | u16::from(worked) << input;
+        let after = self.worked != 0;
+        if before == after {
+            return;
+        }
+        self.flips.clear();
+        self.flips.push_back((now, after));
+        let Some(bounce) = self.bounce else { return };
+        let count = 2 * bounce.times as usize;
+        let mut times: Vec<u64> =
+            (0..count).map(|_| now + 1 + random.below(bounce.cycles.max(1))).collect();
+        times.sort_unstable();
+        let bounces = times.into_iter().enumerate().map(|(i, at)| (at, (i % 2 == 1) == after));
+        self.flips.extend(bounces);
+    }
+
+    /// When its level may change next.
+    pub fn due(&self) -> u64 {
+        let flip = self.flips.front().map_or(NEVER, |(at, _)| *at);
+        let edges = self.noise.iter().map(|(from, to)| if *from > self.now { *from } else { *to });
+        let told = if self.told == Some(self.level()) { NEVER } else { 0 };
+        edges.fold(flip, u64::min).min(told)
+    }
+
+    /// What is so by `now`: the new level, if it is another.
+    pub fn advance(&mut self, now: u64) -> Option<bool> {
+        while let Some((at, active)) = self.flips.front().copied()
+            && at <= now
+        {
+            self.active = active;
+            self.flips.pop_front();
+        }
+        self.noise.retain(|(_, to)| *to > now);
+        self.now = now;
+        let level = self.level();
+        (self.told.replace(level) != Some(level)).then_some(level)
+    }
+
+    fn level(&self) -> bool {
+        let active = self.stuck.unwrap_or(self.active);
+        let disturbed = self.noise.iter().any(|(from, _)| *from <= self.now);
+        (active == (self.wiring == Wiring::NormallyClosed)) != disturbed
+    }
+}

@@ -1,0 +1,191 @@
+//! A machine around the chip: carriages, switches, a plate to probe, a spindle, a door, an emergency stop.
+//!
+//! It counts the step pulses, so it knows where each carriage is, and works the switches there; a pin changes in the
+//! cycle of the pulse that brings the carriage to its switch. [`Build`] says how the machine is made, and
+//! [`Mechanics`] can be tampered with while it runs: switches that bounce or stick, noise on a wire, index pulses
+//! that are missing. (Errors of the serial line are [`Wire`](crate::Wire)'s.)
+//!
+//! Nothing here happens at each cycle: `due` says when there is something to do. Inputs are numbered as in
+//! [`kerf::boards::inputs`].
+
+mod build;
+mod carriage;
+mod line;
+mod random;
+mod spindle;
+#[cfg(test)]
+mod tests;
+
+use kerf::boards::{Board, MOTORS, Pin, inputs};
+
+pub use build::{Axis, Build, Spindle as SpindleBuild, Switch, Wiring};
+pub use line::Bounce;
+pub(crate) use random::Random;
+
+use carriage::Carriage;
+use line::Line;
+use spindle::Spindle;
+
+/// A machine in motion.
+pub struct Mechanics {
+    carriages: [Carriage; MOTORS],
+    plate: Option<i64>,
+    lines: Vec<Line>,
+    /// The line of each input.
+    line_of: [Option<usize>; inputs::COUNT],
+    spindle: Spindle,
+    index: Option<Pin>,
+    random: Random,
+}
+
+impl Mechanics {
+    /// A machine built so, on the pins of a board.
+    pub fn new(build: &Build, board: &Board) -> Self {
+        let mut mechanics = Mechanics {
+            carriages: build.axes.each_ref().map(Carriage::new),
+            plate: build.plate.map(|height| build.axes[2].steps(height)),
+            lines: Vec::new(),
+            line_of: [None; inputs::COUNT],
+            spindle: Spindle::new(build.spindle, board.clock_hz),
+            index: build.spindle.index,
+            random: Random::new(build.seed),
+        };
+        for (a, axis) in build.axes.iter().enumerate() {
+            for (end, switch) in [axis.min, axis.max].into_iter().enumerate() {
+                mechanics.wire(2 * a + end, switch.map(|s| s.wiring), board);
+            }
+        }
+        mechanics.wire(inputs::PROBE, Some(build.probe), board);
+        mechanics.wire(inputs::DOOR, build.door, board);
+        mechanics.wire(inputs::STOP, build.stop, board);
+        (0..MOTORS).for_each(|axis| mechanics.work_contacts(axis, [false; 3], 0));
+        mechanics
+    }
+
+    fn wire(&mut self, input: usize, wiring: Option<Wiring>, board: &Board) {
+        let (Some(wiring), Some(pin)) = (wiring, board.inputs[input]) else { return };
+        let found = self.lines.iter().position(|line| line.pin() == pin);
+        self.line_of[input] = Some(found.unwrap_or(self.lines.len()));
+        if found.is_none() {
+            self.lines.push(Line::new(pin, wiring));
+        }
+    }
+
+    /// Where the carriage of an axis is, in millimetres from its lower hard end.
+    pub fn position(&self, axis: usize) -> f64 {
+        self.carriages[axis].position()
+    }
+
+    /// Steps that an axis has lost at its hard ends.
+    pub fn lost(&self, axis: usize) -> u64 {
+        self.carriages[axis].lost()
+    }
+
+    /// Whether the contact of an input is worked, whatever its wire says.
+    pub fn is_worked(&self, input: usize) -> bool {
+        self.line_of[input].is_some_and(|line| self.lines[line].is_worked(input))
+    }
+
+    /// The spindle's speed, turns a minute; negative counter-clockwise.
+    pub fn spindle_rpm(&self, now: u64) -> f64 {
+        self.spindle.rpm(now)
+    }
+
+    /// The spindle's turns so far.
+    pub fn spindle_turns(&self) -> f64 {
+        self.spindle.turns()
+    }
+
+    /// Leaves every so many index pulses out.
+    pub fn miss_index_every(&mut self, pulses: Option<u64>) {
+        self.spindle.miss_every(pulses);
+    }
+
+    /// Works the contact of an input by hand, or lets it go: the door, the emergency stop, any other.
+    pub fn work(&mut self, input: usize, worked: bool, now: u64) {
+        if let Some(line) = self.line_of[input] {
+            self.lines[line].work(input, worked, now, &mut self.random);
+        }
+    }
+
+    /// From now on the contacts on the wire of an input bounce.
+    pub fn bounce(&mut self, input: usize, bounce: Option<Bounce>) {
+        self.with(input, |line| line.set_bounce(bounce));
+    }
+
+    /// From now on the wire of an input looks worked, or not, whatever happens; `None` mends it.
+    pub fn stick(&mut self, input: usize, worked: Option<bool>) {
+        self.with(input, |line| line.set_stuck(worked));
+    }
+
+    /// Inverts the level of an input's wire for a time.
+    pub fn disturb(&mut self, input: usize, from: u64, cycles: u64) {
+        self.with(input, |line| line.disturb(from, cycles));
+    }
+
+    fn with(&mut self, input: usize, change: impl FnOnce(&mut Line)) {
+        if let Some(line) = self.line_of[input] {
+            change(&mut self.lines[line]);
+        }
+    }
+
+    /// A motor has made a step.
+    pub(crate) fn step(&mut self, motor: usize, positive: bool, now: u64) {
+        for axis in 0..MOTORS {
+            let before = self.contacts(axis);
+            self.carriages[axis].step(motor, positive);
+            self.work_contacts(axis, before, now);
+        }
+    }
+
+    /// What the carriage of an axis works: the switches at its lower and upper end, and the probe.
+    fn contacts(&self, axis: usize) -> [bool; 3] {
+        let [min, max] = self.carriages[axis].ends();
+        let touches = axis == 2 && self.plate.is_some_and(|z| self.carriages[2].steps() <= z);
+        [min, max, touches]
+    }
+
+    fn work_contacts(&mut self, axis: usize, before: [bool; 3], now: u64) {
+        let inputs = [2 * axis, 2 * axis + 1, inputs::PROBE];
+        for ((input, worked), before) in inputs.into_iter().zip(self.contacts(axis)).zip(before) {
+            // What is worked by hand stays so.
+            if worked != before {
+                self.work(input, worked, now);
+            }
+        }
+    }
+
+    /// What the firmware does with the spindle.
+    pub(crate) fn spindle(&mut self, pin: SpindlePin, high: bool, now: u64) {
+        match pin {
+            SpindlePin::Enable => self.spindle.enable(high, now),
+            SpindlePin::Reverse => self.spindle.reverse(high, now),
+            SpindlePin::Pulse => self.spindle.pulse(high, now),
+        }
+    }
+
+    /// When there is something to do.
+    pub(crate) fn due(&self) -> u64 {
+        self.lines.iter().map(Line::due).fold(self.spindle.due(), u64::min)
+    }
+
+    /// Does what is due by `now`: notes the pins that change.
+    pub(crate) fn advance(&mut self, now: u64, changed: &mut Vec<(Pin, bool)>) {
+        for line in &mut self.lines {
+            if let Some(high) = line.advance(now) {
+                changed.push((line.pin(), high));
+            }
+        }
+        if let (Some(high), Some(pin)) = (self.spindle.advance(now), self.index) {
+            changed.push((pin, high));
+        }
+    }
+}
+
+/// A pin that drives the spindle.
+#[derive(Clone, Copy)]
+pub(crate) enum SpindlePin {
+    Enable,
+    Reverse,
+    Pulse,
+}

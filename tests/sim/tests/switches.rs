@@ -1,0 +1,148 @@
+//! Switches on the image: how fast a limit stops it, and what it takes for one.
+
+mod common;
+
+use common::{booted, set};
+use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14, inputs};
+use kerf_sim::mechanics::{Bounce, Build, Wiring};
+use kerf_sim::{Host, Machine};
+
+/// Cycles in a microsecond.
+const US: u64 = 16;
+/// From the edge to the last step, at 50,000 steps a second.
+const STOP_US: u64 = 66;
+/// The same where the step interrupt leaves a fifth of the CPU, at 85,000.
+const STOP_FAST_US: u64 = 120;
+/// The longest time with interrupts off outside the step interrupt.
+const WINDOW: u64 = 29;
+
+/// A machine with switches that moves X and Y, and these settings.
+fn running(board: &'static Board, build: &Build, settings: &[&str]) -> (Machine, Host) {
+    let (mut machine, mut host) = booted(board);
+    machine.build(build);
+    host.run_for_ms(&mut machine, 50).unwrap();
+    let fast = "{x:{vm:2340,jm:1e5,ac:2000},y:{vm:2340,jm:1e5,ac:2000},sv:0}";
+    for line in [fast].iter().chain(settings).chain([&"g0 x60 y40"]) {
+        set(&mut machine, &mut host, line);
+    }
+    host.run_for_ms(&mut machine, 200).unwrap();
+    assert!(machine.recorder().steps() > 1_000);
+    machine.meters_mut().clear();
+    (machine, host)
+}
+
+/// What is said within some milliseconds of the exceptions' kind.
+fn exceptions(machine: &mut Machine, host: &mut Host, ms: u64) -> Vec<String> {
+    host.take_reports();
+    host.run_for_ms(machine, ms).unwrap();
+    let told = host.take_reports().into_iter().map(|report| report.to_string());
+    told.chain(host.strays().iter().cloned()).filter(|line| line.contains("\"er\"")).collect()
+}
+
+/// The cycle of the last step.
+fn last_step(machine: &Machine) -> u64 {
+    machine.recorder().last_step().expect("steps")
+}
+
+fn check_windows(machine: &Machine) {
+    let window = machine.meters().window_outside();
+    assert!(window.cycles <= WINDOW, "{} cycles at {}", window.cycles, machine.describe(&window));
+}
+
+#[test]
+fn a_limit_stops_at_once() {
+    for board in [&MEGA2560_GRBL, &RAMPS14] {
+        for (input, name) in
+            [(inputs::X_MIN, "xmin"), (inputs::Y_MIN, "ymin"), (inputs::Z_MIN, "zmin")]
+        {
+            for wiring in [Wiring::NormallyOpen, Wiring::NormallyClosed] {
+                let build = Build::of(board).wired(wiring);
+                let kind = if wiring == Wiring::NormallyClosed { "{st:1}" } else { "{st:0}" };
+                let (mut machine, mut host) =
+                    running(board, &build, &[kind, "{xsn:2,ysn:2,zsn:3,zsx:0}"]);
+                let mut edge = 0;
+                machine.tamper(|mechanics, now| {
+                    mechanics.work(input, true, now);
+                    edge = now;
+                });
+                let told = exceptions(&mut machine, &mut host, 100);
+                assert_eq!(told.len(), 1, "{name} on {}: {told:?}", board.name);
+                assert!(told[0].contains("204") && told[0].contains(name), "{}", told[0]);
+                let after = last_step(&machine).saturating_sub(edge);
+                println!("{name} {wiring:?} {}: {after}", board.name);
+                assert!(after <= STOP_US * US, "{name} on {}: {after} cycles", board.name);
+                assert_eq!(host.ask(&mut machine, "g0 x0", 1_000).unwrap().status, 204);
+                check_windows(&machine);
+            }
+        }
+    }
+}
+
+#[test]
+fn at_full_speed_it_takes_longer() {
+    let fast = "{x:{vm:4000},y:{vm:4000},xsn:2}";
+    let (mut machine, mut host) = running(&MEGA2560_GRBL, &Build::of(&MEGA2560_GRBL), &[fast]);
+    let edge = machine.cycle();
+    machine.tamper(|mechanics, now| mechanics.work(inputs::X_MIN, true, now));
+    assert_eq!(exceptions(&mut machine, &mut host, 100).len(), 1);
+    let after = last_step(&machine).saturating_sub(edge);
+    println!("fast {after}");
+    assert!(after <= STOP_FAST_US * US, "{after} cycles");
+}
+
+#[test]
+fn a_carriage_that_runs_into_its_switch_stops_before_the_hard_end() {
+    let mut build = Build::of(&RAMPS14);
+    build.axes[0].start = 150.0;
+    let (mut machine, mut host) = running(&RAMPS14, &build, &["{xsx:2,xvm:4000,yvm:4000}"]);
+    machine.tamper(|m, _| m.bounce(inputs::X_MAX, Some(Bounce { times: 20, cycles: 3_000 * US })));
+    let told = exceptions(&mut machine, &mut host, 3_000);
+    assert!(told.len() == 1 && told[0].contains("xmax"), "{told:?}");
+    let mechanics = machine.mechanics().unwrap();
+    // 4,000 mm/min for the 3 ms that it bounces, and a little more.
+    assert!((198.0..198.3).contains(&mechanics.position(0)), "{}", mechanics.position(0));
+    assert_eq!(mechanics.lost(0), 0);
+    check_windows(&machine);
+}
+
+#[test]
+fn noise_stops_nothing_and_costs_no_step() {
+    let (mut machine, mut host) =
+        running(&MEGA2560_GRBL, &Build::of(&MEGA2560_GRBL), &["{xsn:2,ysn:2,zsx:2}"]);
+    machine.tamper(|mechanics, now| {
+        for n in 0..400u64 {
+            let (input, at) = (2 * (n % 3) as usize, now + n * (300 + 7 * (n % 50)) * US);
+            mechanics.disturb(input, at, (1 + n % 9) * US);
+        }
+    });
+    assert_eq!(exceptions(&mut machine, &mut host, 2_000), Vec::<String>::new());
+    let motors = machine.recorder().motors();
+    assert_eq!((motors[0].position, motors[1].position), (60 * 1_280, 40 * 1_280));
+    check_windows(&machine);
+}
+
+#[test]
+fn a_storm_of_noise_leaves_time_for_the_rest() {
+    let (mut machine, mut host) = running(&MEGA2560_GRBL, &Build::of(&MEGA2560_GRBL), &["{xsn:2}"]);
+    machine.tamper(|mechanics, now| {
+        (0..20_000).for_each(|n| mechanics.disturb(inputs::X_MIN, now + n * 50 * US, 2 * US));
+    });
+    assert_eq!(exceptions(&mut machine, &mut host, 2_000), Vec::<String>::new());
+    assert_eq!(machine.recorder().motors()[0].position, 60 * 1_280);
+}
+
+#[test]
+fn each_event_is_told_once_and_the_state_is_right_after_it() {
+    let (mut machine, mut host) = running(&RAMPS14, &Build::of(&RAMPS14), &["{xsn:1}"]);
+    machine.tamper(|m, _| m.bounce(inputs::X_MIN, Some(Bounce { times: 30, cycles: 5_000 * US })));
+    for worked in [true, false, true] {
+        machine.tamper(|mechanics, now| mechanics.work(inputs::X_MIN, worked, now));
+        host.run_for_ms(&mut machine, 30).unwrap();
+        let response = host.ask(&mut machine, "{in1:n}", 1_000).unwrap();
+        assert_eq!(response.body["in1"], i64::from(worked));
+    }
+    machine.tamper(|mechanics, _| mechanics.stick(inputs::X_MIN, Some(false)));
+    host.run_for_ms(&mut machine, 30).unwrap();
+    assert_eq!(host.ask(&mut machine, "{in1:n}", 1_000).unwrap().body["in1"], 0);
+    assert_eq!(exceptions(&mut machine, &mut host, 1_000), Vec::<String>::new());
+}
