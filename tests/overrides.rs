@@ -54,6 +54,7 @@ struct Script {
 
 impl Script {
     fn new(deeds: &[(u16, Deed)]) -> Self {
+        #[allow(clippy::unnecessary_to_owned, reason = "it outlives what it is made from")]
         let mut deeds = deeds.to_vec().into_iter();
         let next = deeds.next();
         Self { deeds, next }
