@@ -16,6 +16,7 @@ use crate::hal::ring::Producer;
 use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
+use crate::motion::snapshot::Snapshot;
 use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
@@ -61,6 +62,7 @@ impl Links {
             cycle: Cell::default(),
             probe: Probe::default(),
             job: Cell::default(),
+            moment: Cell::new(Snapshot::new().moment()),
             storage,
             report: RefCell::new(StatusReport::new()),
             // Their defaults come when they are in place: they would take as much of the stack.

@@ -311,3 +311,31 @@ fn xoff_from_the_sender_holds_answers_back() {
     sender.ask("{ex:0}\n", 100);
     assert_ne!(sender.ask("\u{13}{fb:n}\n", 500), "");
 }
+
+#[test]
+fn a_report_tells_of_one_moment() {
+    let mut sender = Sender::boot();
+    // Longer than the transmit ring: exec has many turns until the last value has been put.
+    let between =
+        "ofsx:t,ofsy:t,ofsz:t,posa:t,posb:t,posc:t,mpoa:t,mpob:t,mpoc:t,homx:t,homy:t,homz:t";
+    sender.ask("{sv:2,si:100,xjm:5000}\n", 50);
+    sender.ask(&format!("{{sr:{{posx:t,{between},mpox:t}}}}\n"), 100);
+    sender.ask("g0x100\n", 20);
+    let mut heard = String::new();
+    for _ in 0..20 {
+        heard += &sender.ask("{sr:n}\n", 170);
+    }
+    let value = |report: &str, name: &str| {
+        let (_, rest) = report.split_once(&format!("\"{name}\":"))?;
+        rest.split([',', '}']).next()?.parse::<f64>().ok()
+    };
+    let mut moved = 0;
+    for report in heard.lines() {
+        let (Some(work), Some(machine)) = (value(report, "posx"), value(report, "mpox")) else {
+            continue;
+        };
+        assert_eq!(work, machine, "{report}");
+        moved += usize::from(work > 0.0);
+    }
+    assert!(moved > 30, "{heard}");
+}

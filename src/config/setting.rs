@@ -189,6 +189,13 @@ impl Setting {
         owner.and_then(search).or_else(|| search(Owner::System))
     }
 
+    /// Whether it is the mode at power-up.
+    pub fn is_mode(self) -> bool {
+        let row = self.row();
+        let small = self.owner() == Owner::System && row.kind == Kind::Small;
+        small && row.slot == table::system::EJ
+    }
+
     /// Whether it is a motor's microsteps.
     pub fn is_microsteps(self) -> bool {
         let row = self.row();

@@ -1,7 +1,7 @@
 //! The settings, as data in program memory: the one truth about names, storage, limits, defaults.
 //!
 //! Rows stand in the order that groups are listed in. A motor or axis setting has one row for all
-//! motors or axes; its defaults are a row of the table behind. Sizes: 56 rows of 17 bytes and 644
+//! motors or axes; its defaults are a row of the table behind. Sizes: 57 rows of 17 bytes and 644
 //! bytes of defaults; and those that are in EEPROM alone. TinyG's settings come first in each group, then those of Kerf alone.
 
 use super::name::token;
@@ -124,7 +124,7 @@ const fn up_to(mut row: Row, max: i32) -> Row {
 }
 
 /// Rows of [`SYSTEM`].
-pub const SYSTEM_ROWS: usize = 33;
+pub const SYSTEM_ROWS: usize = 34;
 /// Rows of [`MOTOR`].
 pub const MOTOR_ROWS: usize = 7;
 /// Rows of [`AXIS`].
@@ -230,7 +230,7 @@ progmem! {
         int("sl", system::SL, 0, 1),
         int("st", system::ST, 0, 1),
         up_to(fixed("mt", system::MT, 2, 2, 10), 429_496_700).with(CLAMP),
-        int("ej", system::EJ, 0, 1),
+        int("ej", system::EJ, 0, 2),
         int("jv", system::JV, 0, 5),
         int("js", system::JS, 0, 1),
         int("tv", system::TV, 0, 1),
@@ -242,6 +242,7 @@ progmem! {
         int("ex", system::EX, 0, if ACTIVE.has_handshake() { 2 } else { 1 }),
         int("rxm", system::RXM, 0, 1),
         up_to(fixed("baud", system::BAUD, 0, 0, 1), 1_000_000).with(RANGE),
+        constant("net", 0),
         int("gpl", system::GPL, 0, 2),
         int("gun", system::GUN, 0, 1),
         int("gco", system::GCO, 1, 9),
@@ -258,7 +259,7 @@ progmem! {
     /// Their defaults, scaled as kept.
     pub static SYSTEM_DEFAULTS: [i32; SYSTEM_ROWS] = [
         44_020, 970, 1, 8, 0, 10_000_000, 10_000, 0, 0, 200, 1, 3, 1, 1, 0, 1, 500, 0, 0, 1, 1, 5,
-        0, 1, 1, 2, 0, 1, 1, 0, 0, 2, 1,
+        0, 0, 1, 1, 2, 0, 1, 1, 0, 0, 2, 1,
     ];
 
     /// What the constants at the head of [`SYSTEM`] are while the machine passes for a g2core.

@@ -78,6 +78,7 @@ progmem! {
             text!("USB baud rate"),
             text!(" [1=9600,2=19200,3=38400,4=57600,5=115200,6=230400]"),
         ),
+        words(text!("network mode"), text!(" [0=master]")),
         words(text!("default gcode plane"), text!(" [0=G17,1=G18,2=G19]")),
         words(text!("default gcode units mode"), text!(" [0=G20,1=G21]")),
         words(text!("default gcode coord system"), text!(" [1-9 (G54-G59.3)]")),

@@ -89,6 +89,7 @@ impl Request {
     pub(super) fn listing<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let member = self.group.and_then(|group| group.member(self.item / PARTS, c.machine));
         let Some((index, token)) = member else { return self.next_group() };
+        c.machine.moment(self.item == 0);
         let part = self.item % PARTS;
         self.item = index * PARTS + part + 1;
         put_part(token, part, c.machine, &mut Writer::body(c.out, &mut self.format));

@@ -19,7 +19,11 @@ pub const SYSTEM: [Meaning; SYSTEM_ROWS] = [
         "Kind of switches at the ends of axes: open or closed unless worked. Probe, door and emergency stop close.",
     ),
     ("mt", "How long motors with `pm` 2 stay powered after a move."),
-    ("ej", "Mode at power-up; after that answers are in the mode of the last line."),
+    (
+        "ej",
+        "Mode at power-up; after that answers are in the mode of the last line. With `dia` 1 that takes 2, and else lines of \
+text mode are answered as `txt`.",
+    ),
     (
         "jv",
         "What JSON responses show: nothing, the footer, messages, settings, line numbers, blocks of G-code; each \
@@ -47,6 +51,7 @@ unanswered, `[1,status,length,checksum]`. `rx` counts likewise.",
         "Rate of the USB line: a code, or bits a second from 9600 to 1000000. In force when the response has \
 left; 115200 after a reset.",
     ),
+    ("net", "Network of boards: there is none."),
     ("gpl", "Plane at power-up and after M2."),
     ("gun", "Units at power-up and after M2."),
     ("gco", "Coordinate system at power-up and after M2."),
