@@ -13,7 +13,7 @@
 //! a typical G1, in inches too (`tests/sim/tests/interpreter.rs`).
 
 use super::block::Block;
-use super::command::{Commands, Overrides, Spindle};
+use super::command::{Commands, Spindle};
 use super::modal::{Defaults, Modal, MotionMode, Turn, Units};
 use super::setup::Setup;
 use super::state::State;
@@ -258,11 +258,6 @@ impl<T> Interpreter<T> {
     /// Whether an axis is homed: soft limits are for such axes alone.
     pub fn is_homed(&self, axis: u8) -> bool {
         self.state.homed & 1 << axis != 0
-    }
-
-    /// By what rates and speeds are multiplied.
-    pub fn overrides(&self) -> Overrides {
-        self.state.overrides_now()
     }
 
     /// The N word of the last line, 0 if it had none.

@@ -7,10 +7,11 @@ use super::pairs::Outcome;
 use super::program;
 use super::request::{Context, Request};
 use super::token::{Action, Subject, Target};
-use super::value::{Form, place_form};
+use super::value::{Form, Value, place_form};
 use super::write::Out;
 use crate::config::table;
 use crate::config::{Number, Setting};
+use crate::gcode::overrides::{Change, Override};
 use crate::gcode::tables::Row;
 use crate::status::Status;
 use crate::units::Length;
@@ -33,6 +34,7 @@ impl Request {
                     Some(Subject::Row(row, axis)) if !row.is_stored() => {
                         set_row(row, axis, pair, c)?
                     }
+                    Some(Subject::Single(single)) => set_value(single.value, pair, c)?,
                     _ => return Err(Status::ReadOnly),
                 }
                 Ok(Some(token))
@@ -113,6 +115,47 @@ fn set_row<M: Machine, O>(
     let inches = c.machine.inches() && place_form(axis) == Form::Length;
     let value = number.fixed(Length::DECIMALS, inches).ok_or(Status::OutOfRange)?;
     c.machine.set_row(row, axis, Length(value))
+}
+
+/// Sets a value of the machine, of which only the overrides can be.
+fn set_value<M: Machine, O>(
+    value: Value,
+    pair: &Pair,
+    c: &mut Context<'_, M, O>,
+) -> Result<(), Status> {
+    let change = match value {
+        Value::Override(which) => {
+            let on = c.machine.value(Value::OverrideOn(which)) != 0;
+            Change::new(which, on, factor(which, pair, c.line)?)
+        }
+        Value::OverrideOn(which) => {
+            let on = match pair.kind {
+                Kind::True => 1,
+                Kind::False => 0,
+                _ => whole(pair, c)?,
+            };
+            Change::switch(
+                which,
+                (0..=1).contains(&on).then_some(on != 0).ok_or(Status::OutOfRange)?,
+            )
+        }
+        _ => return Err(Status::ReadOnly),
+    };
+    c.machine.change_override(change);
+    Ok(())
+}
+
+/// The factor that a pair gives an override, thousandths.
+fn factor(which: Override, pair: &Pair, line: &[u8]) -> Result<u16, Status> {
+    if pair.kind != Kind::Number {
+        return Err(Status::UnsupportedType);
+    }
+    let number = Number::parse(pair.value.of(line)).ok_or(Status::BadNumber)?;
+    let factor = number.fixed(3, false).ok_or(Status::OutOfRange)?;
+    match u32::try_from(factor) {
+        Ok(factor) if which.allows(factor) => Ok(factor as u16),
+        _ => Err(Status::OutOfRange),
+    }
 }
 
 fn done(status: Status) -> Result<(), Status> {

@@ -7,6 +7,7 @@ pub mod health;
 pub mod hold;
 pub mod lines;
 pub mod links;
+pub mod overrides;
 pub mod parser;
 pub mod planner;
 pub mod ports;
