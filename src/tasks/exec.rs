@@ -49,8 +49,8 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
                 out.finished = out.line;
             } else if step == Step::Held {
                 hold::dropped(|| {
-                    machine.drop_all(&mut blocks, out);
-                    stepper::settle();
+                    let held = machine.drop_all(&mut blocks, out);
+                    stepper::settle(held, &mut out.target);
                     finished.rest();
                 });
             } else if out.outputs != outputs {
