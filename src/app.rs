@@ -58,6 +58,7 @@ impl Links {
             killed: Cell::new(false),
             flushed: Cell::new(false),
             limits_hit: Cell::new(0),
+            door_open: Cell::new(false),
             job: Cell::default(),
             storage,
             report: RefCell::new(StatusReport::new()),

@@ -11,6 +11,7 @@ extern crate std;
 #[macro_use]
 pub mod hal;
 
+pub mod alarm;
 pub mod app;
 pub mod baud;
 pub mod boards;

@@ -259,6 +259,11 @@ impl<T> Interpreter<T> {
         self.state.homed & 1 << axis != 0
     }
 
+    /// No axis is homed any more.
+    pub fn forget_homes(&mut self) {
+        self.state.homed = 0;
+    }
+
     /// By what rates and speeds are multiplied.
     pub fn overrides(&self) -> Overrides {
         self.state.overrides_now()

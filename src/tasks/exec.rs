@@ -4,15 +4,16 @@
 //! steppers to stop (each pends the exec interrupt). One run prepares at most the free slots: 4,000 to
 //! 8,000 cycles each.
 
+use crate::alarm::Alarm;
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::imp::{exec, flags, gpio, stepper};
 use crate::hal::ring::Producer;
 use crate::motion::dda::{SEGMENTS, Segment};
-use crate::motion::exec::{Exec, Step};
+use crate::motion::exec::{Exec, Program, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
-use crate::tasks::{hold, links, power};
+use crate::tasks::{alarm, hold, links, power};
 
 /// CPU cycles in so many tenths of a millisecond.
 const fn tenths(of_ms: u32) -> u32 {
@@ -27,7 +28,16 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
     let mut outputs = 0;
     let mut finished = Finished::new();
     loop {
-        exec::wait(|| (segments.used() < most.into()).then_some(())).await;
+        let has_room = || segments.used() < most.into();
+        exec::wait(|| (has_room() || hold::darkened() || stepper::is_stopped()).then_some(()))
+            .await;
+        if hold::darkened() {
+            hold::has_darkened();
+            outputs = 0;
+            gpio::set_outputs(outputs);
+            links::update(|out| out.outputs = outputs);
+            continue;
+        }
         let waiting = blocks.len();
         let standstill = !stepper::running();
         let step = links::update(|out| {
@@ -36,7 +46,10 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
                 out.finished = line;
             }
             let line = out.line;
-            let step = machine.step(&mut blocks, standstill, out, &mut segment);
+            let step = match stepper::is_stopped() {
+                true => Step::Held,
+                false => machine.step(&mut blocks, standstill, out, &mut segment),
+            };
             if out.line != line {
                 finished.end(line);
             }
@@ -52,6 +65,9 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
                     let held = machine.drop_all(&mut blocks, out);
                     stepper::settle(held, &mut out.target);
                     finished.rest();
+                    if alarm::now() >= Alarm::Shutdown {
+                        out.program = Program::Ready;
+                    }
                 });
             } else if out.outputs != outputs {
                 outputs = out.outputs;

@@ -6,6 +6,7 @@
 
 use embassy_futures::yield_now;
 
+use super::alarm;
 use super::hold::{self, Flush};
 use super::links::{self, Links};
 use super::parser;
@@ -408,12 +409,11 @@ impl Planner {
         model.set_outputs(spindle_of(motion.outputs), coolant_of(motion.outputs));
         drop(model);
         links.job.set(Job::default());
-        links.flush.set(Flush::None);
-        hold::end();
+        hold::over(links);
         if links.killed.get() {
             links.except(Status::KillJob);
         }
-        links.flushed.set(true);
+        links.flushed.set(!alarm::is_on());
         links.reporter_wake.urge();
     }
 

@@ -5,12 +5,14 @@
 
 use core::cell::{OnceCell, RefMut};
 
+use super::alarm;
 use super::hold;
 use super::links::{Links, snapshot};
 use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
 use super::switches;
+use crate::alarm::Alarm;
 use crate::baud;
 use crate::boards::{MOTORS, inputs};
 use crate::config::{Setting, Settings};
@@ -31,8 +33,8 @@ use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
 pub const RUN: i32 = 5;
-/// `stat` after a limit has been hit.
-const ALARM: i32 = 2;
+/// Those from here on are five less as `macs`.
+const INTERLOCK: i32 = 11;
 
 /// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
@@ -72,8 +74,12 @@ impl<'a> View<'a> {
 
     /// Whether anything is queued or runs, or a hold is on.
     pub fn is_busy(&self) -> bool {
-        hold::is_on()
-            || self.motion().running
+        hold::is_on() || self.has_work()
+    }
+
+    /// Whether anything is queued or runs.
+    pub fn has_work(&self) -> bool {
+        self.motion().running
             || queue::used() > 0
             || self.links.commands_taken.get()
             || !self.links.job.get().is_none()
@@ -81,11 +87,13 @@ impl<'a> View<'a> {
 
     /// `stat`.
     pub fn state(&self) -> i32 {
-        if self.links.limits_hit.get() != 0 {
-            return ALARM;
+        let is_g2core = self.settings.is_g2core();
+        if let Some(state) = alarm::now().state(is_g2core) {
+            return state;
         }
         if hold::is_on() {
-            return HOLD;
+            let interlock = is_g2core && self.links.door_open.get();
+            return if interlock { INTERLOCK } else { HOLD };
         }
         if self.is_busy() && !self.links.stopped.get() {
             return RUN;
@@ -209,15 +217,12 @@ impl Machine for View<'_> {
     fn value(&mut self, value: Value) -> i32 {
         match value {
             Value::State => self.state(),
-            // They differ only in a hold, and where there are alarms and cycles.
-            Value::Machine => {
-                if hold::is_on() {
-                    RUN
-                } else {
-                    self.state()
-                }
-            }
-            Value::Cycle => i32::from(self.is_busy()),
+            Value::Machine => match self.state() {
+                HOLD => RUN,
+                state if state >= INTERLOCK => state - (INTERLOCK - 6),
+                state => state,
+            },
+            Value::Cycle => i32::from(self.is_busy() && !alarm::is_on()),
             Value::Motion if hold::is_on() => 2,
             Value::Motion => i32::from(self.motion().running),
             // Lines that move nothing are finished when all before them are.
@@ -279,9 +284,12 @@ impl Machine for View<'_> {
         Status::Ok
     }
 
+    fn alarm(&mut self, alarm: Alarm) {
+        alarm::raise(self.links, alarm);
+    }
+
     fn clear(&mut self) -> Status {
-        // Where the motors are is known after a reset only.
-        if self.links.limits_hit.get() != 0 { Status::LimitHit } else { Status::Ok }
+        alarm::clear(self.links, &self.settings)
     }
 
     fn flush(&mut self) -> Status {

@@ -80,10 +80,10 @@ struct State {
     switches: Switches,
     /// Low is worked.
     low: u16,
-    /// Limits, of the ends.
-    limits: u8,
-    /// Limits that have been hit.
-    hits: u8,
+    /// What stops the steps.
+    stops: u16,
+    /// Those of them that have been hit.
+    hits: u16,
     /// The next look is to believe what it finds.
     fresh: bool,
 }
@@ -96,7 +96,7 @@ unsafe impl Sync for Shared {}
 static STATE: Shared = Shared(UnsafeCell::new(State {
     switches: Switches::new(),
     low: 0,
-    limits: 0,
+    stops: 0,
     hits: 0,
     fresh: true,
 }));
@@ -128,10 +128,10 @@ pub fn start() {
     }
 }
 
-/// Which inputs are worked when low, and which ends are limits. Thread mode.
-pub fn set_up(low: u16, limits: u8) {
+/// Which inputs are worked when low, and which of them stop the steps. Thread mode.
+pub fn set_up(low: u16, stops: u16) {
     with(|state| {
-        state.limits = limits;
+        state.stops = stops;
         if state.low != low {
             (state.low, state.fresh) = (low, true);
             // SAFETY: starts a look; one that is due does it all the same.
@@ -145,8 +145,8 @@ pub fn worked() -> u16 {
     with(|state| state.switches.worked())
 }
 
-/// The limits that have been hit since the last call. Thread mode.
-pub fn take_hits() -> u8 {
+/// What has stopped the steps since the last call. Thread mode.
+pub fn take_hits() -> u16 {
     with(|state| core::mem::take(&mut state.hits))
 }
 
@@ -190,7 +190,7 @@ extern "C" fn look() {
     }
     let (changed, next) = state.switches.look(now);
     if changed != 0 {
-        let hits = (changed & now) as u8 & state.limits;
+        let hits = changed & now & state.stops;
         if hits != 0 {
             stepper::stop();
             state.hits |= hits;

@@ -12,8 +12,8 @@ struct Inputs {
     levels: Cell<u16>,
     switches: RefCell<Switches>,
     low: Cell<u16>,
-    limits: Cell<u8>,
-    hits: Cell<u8>,
+    stops: Cell<u16>,
+    hits: Cell<u16>,
     fresh: Cell<bool>,
     next_look: Cell<u64>,
 }
@@ -23,7 +23,7 @@ machine_static! {
         levels: Cell::new(u16::MAX),
         switches: RefCell::new(Switches::new()),
         low: Cell::new(0),
-        limits: Cell::new(0),
+        stops: Cell::new(0),
         hits: Cell::new(0),
         fresh: Cell::new(true),
         next_look: Cell::new(cycles(LATER_US)),
@@ -34,9 +34,9 @@ const fn cycles(us: u32) -> u64 {
     (us * (ACTIVE.clock_hz / 1_000_000)) as u64
 }
 
-/// Which inputs are worked when low, and which ends are limits.
-pub fn set_up(low: u16, limits: u8) {
-    all().limits.set(limits);
+/// Which inputs are worked when low, and which of them stop the steps.
+pub fn set_up(low: u16, stops: u16) {
+    all().stops.set(stops);
     if all().low.replace(low) != low {
         all().fresh.set(true);
         edge();
@@ -48,8 +48,8 @@ pub fn worked() -> u16 {
     all().switches.borrow().worked()
 }
 
-/// The limits that have been hit since the last call.
-pub fn take_hits() -> u8 {
+/// What has stopped the steps since the last call.
+pub fn take_hits() -> u16 {
     all().hits.take()
 }
 
@@ -88,7 +88,7 @@ pub(super) fn look() {
     }
     let (changed, next) = switches.look(found);
     if changed != 0 {
-        let hits = (changed & found) as u8 & i.limits.get();
+        let hits = changed & found & i.stops.get();
         if hits != 0 {
             stepper::stop();
             i.hits.set(i.hits.get() | hits);
