@@ -20,7 +20,7 @@ use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
 use crate::store::kept;
-use crate::tasks::links::{Links, QueueCount};
+use crate::tasks::links::{Links, Probe, QueueCount};
 use crate::tasks::ports::Port;
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
@@ -59,6 +59,8 @@ impl Links {
             flushed: Cell::new(false),
             limits_hit: Cell::new(0),
             door_open: Cell::new(false),
+            cycle: Cell::default(),
+            probe: Probe::default(),
             job: Cell::default(),
             storage,
             report: RefCell::new(StatusReport::new()),

@@ -3,10 +3,13 @@
 //! This library is the whole firmware but for the image's entry point. It is `no_std` and runs on
 //! the ATmega2560 and, for tests and tools, on the host. `ARCHITECTURE.md` is the tour of the house.
 #![no_std]
-#![cfg_attr(target_arch = "avr", feature(asm_experimental_arch))]
+#![cfg_attr(target_arch = "avr", feature(asm_experimental_arch, optimize_attribute))]
 
 #[cfg(not(target_arch = "avr"))]
 extern crate std;
+
+#[macro_use]
+extern crate kerf_macros;
 
 #[macro_use]
 pub mod hal;

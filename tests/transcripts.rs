@@ -51,6 +51,10 @@ impl Side for Machine {
         Machine::set_input(self, input, closed);
     }
 
+    fn wire(&mut self, switches: &[(usize, i64)]) {
+        switches.iter().for_each(|(input, step)| self.set_near(*input, *step));
+    }
+
     fn steps(&self) -> [i64; 4] {
         self.emitted().position
     }
@@ -66,7 +70,7 @@ fn the_host_machine_keeps_to_the_transcripts() {
     transcript::play_all(read_all(), 16, boot);
 }
 
-/// The machine of an example as it is built so far: without switches.
+/// The machine of an example as it is built so far: without switches for homing.
 struct Built(On);
 
 impl Setup for Built {
@@ -79,8 +83,8 @@ impl Setup for Built {
     fn travel(&self, axis: u8) -> Option<(Length, Length)> {
         self.0.travel(axis)
     }
-    fn can(&self, _cycle: Cycle) -> bool {
-        false
+    fn can(&self, cycle: Cycle) -> bool {
+        cycle == Cycle::Probing
     }
 }
 

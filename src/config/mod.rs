@@ -57,6 +57,7 @@ impl Settings {
 
     /// Sets everything to its default.
     #[inline(never)]
+    #[small]
     pub fn set_defaults(&mut self) {
         for setting in (0..Setting::NUMBERS).filter_map(Setting::from_number) {
             self.keep(setting, setting.default_value());
@@ -92,6 +93,7 @@ impl Settings {
     }
 
     /// The value to store for `number` as sent, or why it is refused.
+    #[small]
     pub fn check(&self, setting: Setting, number: Number, inches: bool) -> Result<i32, Status> {
         let row = setting.row();
         if matches!(row.kind, Kind::Constant | Kind::Text) {
@@ -117,6 +119,7 @@ impl Settings {
     }
 
     /// The same with at most so many decimals.
+    #[small]
     pub fn show_as(&self, setting: Setting, value: i32, inches: bool, decimals: u8) -> Fixed {
         let row = setting.row();
         let value = Fixed { value, decimals: row.stored };

@@ -18,6 +18,7 @@ pub struct Fixed {
 /// Room for any [`Fixed`] as text.
 pub type Digits = [u8; 12];
 
+#[small]
 impl Fixed {
     /// An integer.
     pub fn int(value: i32) -> Fixed {
@@ -101,6 +102,7 @@ pub struct Number {
     negative: bool,
 }
 
+#[small]
 impl Number {
     /// An integer.
     pub fn int(value: u32) -> Number {

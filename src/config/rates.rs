@@ -10,6 +10,7 @@ use super::{Owner, Setting, Settings, StepRatio};
 use crate::boards::MOTORS;
 use crate::units::AXES;
 
+#[small]
 impl Settings {
     /// Lowers the velocity limits of the axes that `setting` is about to what their motors can follow:
     /// `rate` steps a second for so many motors. Whether one was above it.

@@ -27,6 +27,7 @@ pub fn value_name(row: Row, axis: u8) -> Name {
 }
 
 /// The row of that name. About 5,000 cycles on AVR for one that begins as they do.
+#[small]
 pub fn find_row(name: &Name) -> Option<Row> {
     if !matches!(name.first(), b'g' | b't') {
         return None;

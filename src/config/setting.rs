@@ -178,6 +178,7 @@ impl Setting {
     }
 
     /// The setting called `name`. About 10,000 cycles on AVR.
+    #[small]
     pub fn find(name: &Name) -> Option<Setting> {
         let search = |owner: Owner| {
             let skip = owner.prefix().bytes().len();

@@ -57,7 +57,8 @@ impl State {
             Some(radius) => radius_form(&start, &target, &arc, radius)?,
             None => self.center_form(block, &start, &target, &arc)?,
         };
-        if may_be_too_far(&start, &arc) && !limits::arc_is_within(&start, &target, &arc, |_| RANGE)
+        if may_be_too_far(&start, &arc)
+            && !limits::arc_is_within(&start, &target, &arc, &[RANGE; 2])
         {
             return Err(Status::OutOfRange);
         }

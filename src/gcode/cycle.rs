@@ -14,6 +14,7 @@ use super::words::{AXES, L, ROTARY};
 use crate::status::Status;
 use crate::units::Length;
 
+#[small]
 impl State {
     /// G73, G81 to G89; `before` is the motion mode of the line before.
     #[inline(never)]
@@ -189,6 +190,7 @@ fn dwell_ms(mode: MotionMode, words: &Sticky) -> Result<u32, Status> {
     }
 }
 
+#[small]
 impl Cycle {
     /// Where a hole is, counted from 1; `None` beyond the range of a length.
     pub(super) fn hole(&self, number: u16) -> Option<[Value; 2]> {

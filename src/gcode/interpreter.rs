@@ -144,7 +144,7 @@ impl<T: Tables> Interpreter<T> {
         out: &mut Commands,
     ) -> Result<(), Status> {
         let before = Before::of(&self.state);
-        let done = self.state.execute(block, &self.tables, setup, out);
+        let done = self.state.execute(block, &before.position, &self.tables, setup, out);
         if done.is_err() {
             before.restore(&mut self.state);
             out.clear();
@@ -162,7 +162,8 @@ impl<T: Tables> Interpreter<T> {
     ) -> Result<(), Status> {
         let before = self.state;
         let mut edit = None;
-        let done = self.state.execute_rarity(block, &self.tables, setup, out, &mut edit);
+        let done =
+            self.state.execute_rarity(block, &before.position, &self.tables, setup, out, &mut edit);
         match (&done, &edit) {
             (Ok(()), Some(edit)) => self.tables.apply(edit),
             (Ok(()), None) => {}

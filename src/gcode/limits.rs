@@ -16,6 +16,7 @@ const SLACK_PART: f32 = 2e-7;
 
 /// Refuses (220) a move from `start` that leaves the travel of an axis whose bit in `homed` is set.
 #[inline(never)]
+#[small]
 pub(super) fn check(
     start: &PerAxis<Length>,
     motion: &Motion,
@@ -34,7 +35,8 @@ pub(super) fn check(
         | Motion::Feed { target, .. }
         | Motion::Probe { target, .. } => target,
         Motion::Arc { target, arc, .. } => {
-            if !arc_is_within(start, target, arc, limits) {
+            let limits = [arc.first, arc.second].map(limits);
+            if !arc_is_within(start, target, arc, &limits) {
                 return Err(Status::SoftLimit);
             }
             target
@@ -43,6 +45,7 @@ pub(super) fn check(
     check_straight(start, target, limits)
 }
 
+#[small]
 fn check_straight(
     start: &PerAxis<Length>,
     target: &PerAxis<Length>,
@@ -61,6 +64,7 @@ fn check_straight(
 
 /// The first and the last hole, with what is done beside them, from the highest to the lowest point.
 #[inline(never)]
+#[small]
 fn check_cycle(
     start: &PerAxis<Length>,
     cycle: &Cycle,
@@ -82,16 +86,16 @@ fn check_cycle(
     if all { Ok(()) } else { Err(Status::SoftLimit) }
 }
 
-/// Whether the points of an arc that lie farthest out in its plane are within the limits; its end is
-/// not looked at. A helix advances evenly, so that its end is the farthest point along its axis.
+/// Whether the points of an arc that lie farthest out in its plane are within the limits, `both` of its first and
+/// second axis; its end is not looked at. A helix advances evenly, so that its end is the farthest point along its axis.
+#[inline(never)]
 pub(super) fn arc_is_within(
     start: &PerAxis<Length>,
     target: &PerAxis<Length>,
     arc: &Arc,
-    limits: impl Fn(u8) -> Option<(Length, Length)>,
+    both: &[Option<(Length, Length)>; 2],
 ) -> bool {
-    let both = [arc.first, arc.second].map(&limits);
-    if both == [None, None] {
+    if *both == [None, None] {
         return true;
     }
     let (from, to) = (spoke(start, arc), spoke(target, arc));

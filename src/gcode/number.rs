@@ -84,6 +84,7 @@ fn digit(at: &mut slice::Iter<u8>) -> Option<u8> {
 /// Any number.
 #[cold]
 #[inline(never)]
+#[small]
 fn any(input: &[u8]) -> Lexed<'_, Decimal> {
     let mut rest = input;
     let mut value = Decimal::default();
@@ -100,6 +101,7 @@ fn any(input: &[u8]) -> Lexed<'_, Decimal> {
 }
 
 /// Reads the digits left of the point. How many there are: 5 stands for more. `None` beyond 32 bits.
+#[small]
 fn whole(rest: &mut &[u8], value: &mut Decimal) -> Option<u8> {
     let (start, mut count) = four(rest);
     value.whole = start.into();
@@ -116,6 +118,7 @@ fn whole(rest: &mut &[u8], value: &mut Decimal) -> Option<u8> {
 }
 
 /// Reads the digits right of the point. How many there are: 4 stands for more.
+#[small]
 fn fraction(rest: &mut &[u8], value: &mut Decimal) -> u8 {
     let (digits, count) = four(rest);
     value.frac = aligned(digits, count);
@@ -128,6 +131,7 @@ fn fraction(rest: &mut &[u8], value: &mut Decimal) -> u8 {
 }
 
 /// Up to four digits, and how many there were.
+#[small]
 fn four(rest: &mut &[u8]) -> (u16, u8) {
     let (mut value, mut count) = (0, 0);
     // A copy, which stays in registers.

@@ -15,6 +15,7 @@ use super::words::{AXES, H, L, P};
 use crate::status::Status;
 use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
 
+#[small]
 impl State {
     /// The coordinate system in force.
     fn system_in_force(&self) -> PerAxis<Length> {

@@ -76,25 +76,28 @@ impl State {
         }
     }
 
-    /// Carries out a block of modes and moves.
+    /// Carries out a block of modes and moves; `start` is where the line before it has ended.
     #[inline(never)]
     pub fn execute(
         &mut self,
         block: &Block,
+        start: &PerAxis<Length>,
         tables: &impl Tables,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
         self.begin(block, out)?;
         self.machine_modes(block, out);
-        self.finish(block, tables, setup, out)
+        self.finish(block, start, tables, setup, out)
     }
 
     /// Carries out a block with whatever it has.
     #[inline(never)]
+    #[small]
     pub fn execute_rarity(
         &mut self,
         block: &Block,
+        start: &PerAxis<Length>,
         tables: &impl Tables,
         setup: &impl Setup,
         out: &mut Commands,
@@ -106,7 +109,7 @@ impl State {
         self.overrides(block, out)?;
         self.offsets(block, tables, setup)?;
         self.non_modal(block, tables, setup, out, edit)?;
-        self.finish(block, tables, setup, out)?;
+        self.finish(block, start, tables, setup, out)?;
         self.stop(block, tables, edit, setup, out)
     }
 
@@ -247,19 +250,19 @@ impl State {
     fn finish(
         &mut self,
         block: &Block,
+        start: &PerAxis<Length>,
         tables: &impl Tables,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        // Limits are for homed axes alone; most machines are spared the copy.
-        let start = if self.homed == 0 { None } else { Some(self.position) };
         match block.non_modal {
             Some(NonModal::GoStored(which)) => {
                 self.go_stored(block, tables, Row::stored(which), setup, out)?
             }
             _ => self.motion(block, setup, out)?,
         }
-        if let Some(start) = &start {
+        // Limits are for homed axes alone.
+        if self.homed != 0 {
             limits::check(start, &out.motion, self.homed, setup)?;
         }
         out.exact_stop = self.modal.path == PathMode::ExactStop;

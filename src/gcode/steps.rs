@@ -151,6 +151,7 @@ const fn ops(some: &[Op]) -> [Op; OPS] {
     all
 }
 
+#[small]
 impl Steps {
     /// The next step of a line, the machine being at `position`; `None` when there is none left.
     #[inline(never)]

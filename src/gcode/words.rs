@@ -87,6 +87,7 @@ pub fn slot_of(letter: u8) -> Option<u8> {
 }
 
 /// What a line is refused with that lacks the first word of a set.
+#[small]
 pub fn missing(set: u32) -> Status {
     let first = (0..COUNT as u8).find(|slot| set & bit_of(*slot) != 0);
     first.and_then(|slot| MISSING.at(slot.into())).unwrap_or(Status::InternalError)

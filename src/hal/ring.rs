@@ -76,6 +76,21 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         if head >= tail { head - tail } else { N - (tail - head) }
     }
 
+    /// The slot taken last.
+    pub fn tail(&self) -> u8 {
+        self.tail.get()
+    }
+
+    /// The value in a slot.
+    ///
+    /// # Safety
+    ///
+    /// It has been filled, and the producer is held off.
+    pub unsafe fn at(&self, index: u8) -> T {
+        // SAFETY: the caller says so.
+        unsafe { self.slot(index).read() }
+    }
+
     /// The value taken last. `None` if nobody knows: at first, and each time the ring has gone round.
     pub fn taken_last(&self) -> Option<T> {
         let tail = self.tail.get();
@@ -148,6 +163,20 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         // SAFETY: the slot was written by this producer, which alone could overwrite it, and the
         // consumer never writes to slots; the borrow of `self` keeps `push` and `amend` away.
         Some(unsafe { &*self.0.slot(self.index_of(back)) })
+    }
+
+    /// The values behind slot `index`, which the consumer has released or not; none of them may have been
+    /// overwritten since.
+    pub fn behind(&self, index: u8) -> impl Iterator<Item = &T> {
+        let (mut at, head) = (index, self.0.head.get());
+        core::iter::from_fn(move || {
+            if at == head {
+                return None;
+            }
+            at = next::<N>(at);
+            // SAFETY: a slot that this producer has written, which alone could overwrite it.
+            Some(unsafe { &*self.0.slot(at) })
+        })
     }
 
     /// Puts values in, as many as there is room for, and shows them to the consumer all at once.

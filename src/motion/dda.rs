@@ -124,7 +124,7 @@ pub trait Pins {
 }
 
 /// The generator's state. The assembly knows its layout by `offset_of`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Dda {
     /// Below [`STEP`].

@@ -30,6 +30,9 @@ pub trait Machine {
     }
 }
 
+/// A jerk in mm/min^3, in mm/s^3.
+pub const PER_SECOND_CUBED: f32 = 1.0 / 216_000.0;
+
 /// Limits of an axis; 0 for none.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Axis {
@@ -67,7 +70,7 @@ impl Dynamics {
                 velocity: machine.velocity_max(n) * (1.0 / 60.0),
                 feed: machine.feedrate_max(n) * (1.0 / 60.0),
                 accel: Short::new(machine.accel_max(n) * (1.0 / 3_600.0)),
-                jerk: Short::new(machine.jerk_max(n) * (1.0 / 216_000.0)),
+                jerk: Short::new(machine.jerk_max(n) * PER_SECOND_CUBED),
                 deviation: Short::new(machine.junction_deviation(n)),
             };
         }

@@ -8,12 +8,14 @@
 
 pub mod block;
 pub mod brake;
+pub mod contact;
 pub mod dda;
 pub mod divide;
 pub mod dynamics;
 pub mod exec;
 pub mod finished;
 pub mod float;
+pub mod follow;
 pub mod governor;
 mod halt;
 pub mod horizon;

@@ -15,6 +15,7 @@ use crate::gcode::tables::Row;
 use crate::status::Status;
 use crate::units::Length;
 
+#[small]
 impl Request {
     pub(super) fn apply<M: Machine, O: Out>(
         &mut self,
@@ -98,6 +99,7 @@ fn bits(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
 }
 
 /// Sets a value of the interpreter's tables.
+#[small]
 fn set_row<M: Machine, O>(
     row: Row,
     axis: u8,

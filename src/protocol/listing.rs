@@ -109,6 +109,7 @@ impl Request {
 
 /// What `token` is, its value, and what comes behind that.
 #[inline(never)]
+#[small]
 fn put_part<M: Machine, O: Out>(
     token: Token,
     part: u8,

@@ -2,8 +2,8 @@
 
 use super::Format;
 use super::machine::Machine;
-use super::token::Token;
-use super::value::Value;
+use super::token::{Group, Token};
+use super::value::{PROBED, Value};
 use super::write::{Ending, Out, Writer};
 use crate::boards::inputs;
 use crate::config::{Fixed, Settings};
@@ -146,6 +146,45 @@ pub(super) fn put_exception<O: Out>(
         }
     }
     true
+}
+
+/// What probing has come to, as if somebody had asked:
+/// `{"r":{"prb":{"e":1,"x":20.000,...,"c":0.000}},"f":[1,0,0]}`.
+pub struct Probing {
+    member: u8,
+    format: Format,
+}
+
+impl Probing {
+    /// Begins. It is whole whatever the verbosity, unless that is 0.
+    pub fn begin(settings: &Settings) -> Probing {
+        Probing { member: 0, format: Format::announcement(settings) }
+    }
+
+    /// Does the next part. Whether there is more to do.
+    pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+        let mut writer = Writer::frame(out, &mut self.format);
+        let group = Group::Vector(PROBED);
+        if self.member == 0 {
+            writer.begin_response();
+            writer.key(group.prefix().bytes());
+            writer.open();
+        }
+        match group.member(self.member, machine) {
+            Some((_, token)) => {
+                let name = token.name();
+                writer.key(name.bytes().get(group.prefix().bytes().len()..).unwrap_or_default());
+                writer.shown(token.read(machine));
+                self.member += 1;
+                true
+            }
+            None => {
+                writer.close();
+                writer.end_response(Status::Ok, Ending::default());
+                false
+            }
+        }
+    }
 }
 
 /// Answers the question whether anybody is there.

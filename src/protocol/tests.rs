@@ -324,7 +324,7 @@ fn notices_are_as_documented() {
 #[test]
 fn ram_is_accounted_for() {
     assert_eq!(size_of::<Request>(), 24);
-    assert_eq!(size_of::<StatusReport>(), 200);
+    assert_eq!(size_of::<StatusReport>(), 159);
     assert_eq!(size_of::<Report>(), 5);
     assert_eq!((size_of::<Banner>(), size_of::<Exception>()), (4, 4));
 }

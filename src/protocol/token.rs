@@ -2,8 +2,8 @@
 
 use super::machine::Machine;
 use super::value::{
-    Form, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value, Vector, place_form,
-    vector_value,
+    Form, PROBE_STATE, PROBED, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value,
+    Vector, place_form, vector_value,
 };
 use crate::alarm::Alarm;
 use crate::config::name::{Name, axis_letter, axis_of};
@@ -331,9 +331,11 @@ impl Group {
         match self {
             Group::Settings(owner) => (from..owner.rows())
                 .find_map(|row| Some((row, Token::of_setting(Setting::of(owner, row)?)))),
+            Group::Vector(PROBED) if from == 0 => Some((0, Token::single(PROBE_STATE))),
             Group::Vector(number) => {
+                let index = if number == PROBED { from - 1 } else { from };
                 let members = VECTORS.at(usize::from(number))?.members;
-                (from < members).then(|| (from, Token::member(number, from)))
+                (index < members).then(|| (from, Token::member(number, index)))
             }
             Group::Row(row) => {
                 let axis = (from..AXES as u8).find(|&axis| row.has(axis))?;
@@ -370,6 +372,7 @@ pub enum Target {
 }
 
 /// What `name` means behind `prefix`, a group's.
+#[small]
 pub fn resolve(prefix: Name, name: &[u8]) -> Target {
     let Some(full) = prefix.with(name) else { return Target::Unknown };
     if let Some(token) = Token::find(&full) {

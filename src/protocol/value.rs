@@ -91,6 +91,10 @@ pub enum Value {
     /// `in1` to `in8`, `inp`, `ind`, `ine`, of [`inputs`](crate::boards::inputs): 1 if the switch is worked, 0 if
     /// not, -1 if there is none or its setting is 0.
     Input(u8),
+    /// `prbe`: 0 no contact, 1 contact, 2 probing.
+    ProbeState,
+    /// `prbx` and so on: where the contact was, in units of a `Length`.
+    Probed(u8),
     /// The end whose limit has been hit, which exceptions tell; -1 for none.
     LimitHit,
 }
@@ -168,11 +172,15 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 31;
+pub const SINGLE_COUNT: usize = 32;
 /// Entries of [`VECTORS`].
-pub const VECTOR_COUNT: usize = 8;
+pub const VECTOR_COUNT: usize = 9;
 /// The number of the vector `g92`.
 pub const SHIFT: u8 = 5;
+/// The number of the vector `prb`, whose group begins with `prbe`.
+pub const PROBED: u8 = 7;
+/// The number of `prbe`.
+pub const PROBE_STATE: u8 = SINGLE_COUNT as u8 - 1;
 
 const NONE: Text = text!("");
 const LINE: Text = text!("Line number:");
@@ -250,6 +258,7 @@ progmem! {
         count("inp", PROBE, text!("Probe:"), NONE),
         count("ind", DOOR, text!("Door:"), NONE),
         count("ine", STOP, text!("Emergency stop:"), NONE),
+        count("prbe", Value::ProbeState, text!("Probe state:"), text!("Failed|Succeeded|Waiting")),
     ];
 
     /// Values of each axis or motor; [`vector_value`] gives the order.
@@ -261,6 +270,7 @@ progmem! {
         vector("tof", Form::Millimetres, 6, text!(" tool length:")),
         vector("g92", Form::Length, 6, NONE),
         vector("pwr", Form::Count, 4, NONE),
+        vector("prb", Form::Millimetres, 6, NONE),
         vector("in", Form::Count, inputs::ENDS as u8, NONE),
     ];
 }
@@ -275,6 +285,7 @@ pub fn vector_value(vector: u8, index: u8) -> Value {
         4 => Value::ToolOffset(index),
         SHIFT => Value::Shift(index),
         6 => Value::Powered(index),
+        PROBED => Value::Probed(index),
         _ => Value::Input(index),
     }
 }

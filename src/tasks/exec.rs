@@ -9,6 +9,7 @@ use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::imp::{exec, flags, gpio, stepper};
 use crate::hal::ring::Producer;
+use crate::motion::contact;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Program, Step};
 use crate::motion::finished::Finished;
@@ -40,8 +41,11 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         }
         let waiting = blocks.len();
         let standstill = !stepper::running();
+        if contact::is_noted() {
+            contact::catch_up(&segments);
+        }
         let step = links::update(|out| {
-            machine.set_hold(hold::is_wanted(out.running), out);
+            machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
             if let Some(line) = finished.take(segments.used()) {
                 out.finished = line;
             }
@@ -78,6 +82,9 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         if step == Step::Segment {
             // There is room: this task alone fills the ring.
             let _ = segments.push_copy(&segment);
+            if contact::is_noted() {
+                contact::pushed(&segment);
+            }
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
             most = queued(cycles, rests);

@@ -35,6 +35,7 @@ use crate::jobs::Job;
 use crate::motion::exec::Snapshot;
 use crate::motion::queue;
 use crate::protocol::StatusReport;
+use crate::units::{Length, PerAxis};
 
 /// The links. One for the machine, made at start-up.
 pub struct Links {
@@ -68,6 +69,10 @@ pub struct Links {
     pub limits_hit: Cell<u8>,
     /// The door is open: nothing goes on.
     pub door_open: Cell<bool>,
+    /// The cycle of the machine that runs.
+    pub cycle: Cell<Cycle>,
+    /// What probing has found.
+    pub probe: Probe,
     /// What status reports hold.
     pub report: RefCell<StatusReport>,
     /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.
@@ -94,6 +99,74 @@ pub struct Links {
     pub settings: RefCell<Settings>,
     /// The G-code model. The parser advances it; reports read it.
     pub model: RefCell<Interpreter<&'static Storage>>,
+}
+
+/// What the machine does beside carrying out moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cycle {
+    /// Nothing.
+    #[default]
+    Off,
+    /// G38.2 to G38.5.
+    Probe,
+    /// G28.2, G28.4.
+    Homing,
+    /// `{jogx:..}`.
+    Jog,
+}
+
+/// What has become of a probing. The discriminants are TinyG's numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ProbeState {
+    /// No contact.
+    #[default]
+    Failed,
+    /// There was one.
+    Touched,
+    /// It is under way.
+    Waiting,
+}
+
+/// The last probing.
+#[derive(Default)]
+pub struct Probe {
+    state: Cell<ProbeState>,
+    at: Cell<PerAxis<Length>>,
+    news: Cell<bool>,
+}
+
+impl Probe {
+    /// What has become of it.
+    pub fn state(&self) -> ProbeState {
+        self.state.get()
+    }
+
+    /// Where the contact was, or where it ended, machine coordinates.
+    pub fn at(&self) -> PerAxis<Length> {
+        self.at.get()
+    }
+
+    /// It begins.
+    pub fn begin(&self) {
+        self.state.set(ProbeState::Waiting);
+    }
+
+    /// It has come to an end, which is to be told.
+    pub fn tell(&self, state: ProbeState, at: &PerAxis<Length>) {
+        self.state.set(state);
+        self.at.set(*at);
+        self.news.set(true);
+    }
+
+    /// Whether there is a result that nobody has begun to tell.
+    pub fn is_news(&self) -> bool {
+        self.news.get()
+    }
+
+    /// The same, and begins to.
+    pub fn take_news(&self) -> bool {
+        self.news.take()
+    }
 }
 
 /// Counts blocks through the queue, modulo 2^16.

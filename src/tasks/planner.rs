@@ -4,14 +4,17 @@
 //! the queue, and at a program stop for cycle start if the settings say so. One turn builds one block.
 //! In a queue flush it forgets the line, has exec drop the blocks, and starts from where the motors are.
 
+mod probe;
+mod seek;
+
 use embassy_futures::yield_now;
 
 use super::alarm;
 use super::hold::{self, Flush};
-use super::links::{self, Links};
+use super::links::{self, Cycle, Links};
 use super::parser;
 use super::setup::moved_by;
-use crate::boards::{MOTORS, outputs};
+use crate::boards::outputs;
 use crate::config::{Settings, StepRatio};
 use crate::gcode::arc::Walk;
 use crate::gcode::command::{Commands, Feed, Motion, Overrides, Stop};
@@ -82,6 +85,8 @@ enum Turn {
     More,
     /// The machine is to stop until somebody starts it.
     Pause,
+    /// The line probes.
+    Probe,
     /// The line is done.
     Done,
 }
@@ -113,6 +118,7 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
                     Turn::Done => break,
                     Turn::More => yield_now().await,
                     Turn::Pause => planner.cycle_start().await,
+                    Turn::Probe => planner.probe().await,
                 }
             }
         }
@@ -252,8 +258,9 @@ impl Planner {
                     return Turn::Pause;
                 }
             }
-            // The tool is reported, but nothing moves; the others are refused where there are no switches.
-            Step::Tool(_) | Step::Probe | Step::Home => {}
+            Step::Probe => return Turn::Probe,
+            // The tool is reported, but nothing moves.
+            Step::Tool(_) | Step::Home => {}
         }
         Turn::More
     }
@@ -296,6 +303,7 @@ impl Planner {
     }
 
     #[inline(never)]
+    #[small]
     fn begin_arc(&mut self, motion: &Motion) {
         let Motion::Arc { target, feed, arc } = motion else { return };
         let tolerance = self.links.settings.borrow().chordal_tolerance();
@@ -326,6 +334,7 @@ impl Planner {
     }
 
     /// G28.3: the position is called something else; no motor moves.
+    #[small]
     fn set_position(&mut self, position: &PerAxis<Length>) {
         self.position = *position;
         let body = self.builder.set_position(position, &*self.links.settings.borrow());
@@ -341,6 +350,7 @@ impl Planner {
         }
     }
 
+    #[small]
     fn set_overrides(&mut self, factors: Overrides) {
         let part = |thousandths: u16| (thousandths != 1_000).then(|| f32::from(thousandths) * 1e-3);
         self.feed_factor = part(factors.feed);
@@ -392,20 +402,14 @@ impl Planner {
 
     /// Exec has dropped its blocks: planner and model start from where the motors are.
     #[inline(never)]
+    #[small]
     fn restart(&mut self) {
         let links = self.links;
         let motion = links::snapshot();
-        // Until steps have been counted anew they mean what they meant before; nothing has moved since.
-        if !links.resync.get() {
-            self.locate(&motion.target);
-        }
-        self.builder.place(&motion.target);
-        self.queue.restart();
-        (self.walk, self.parts, self.news) = (None, None, News::None);
-        self.outputs = motion.outputs;
+        self.relocate(&motion);
+        self.news = News::None;
         let mut model = links.model.borrow_mut();
         self.set_overrides(model.overrides());
-        model.set_position(&self.position);
         model.set_outputs(spindle_of(motion.outputs), coolant_of(motion.outputs));
         drop(model);
         links.job.set(Job::default());
@@ -417,18 +421,10 @@ impl Planner {
         links.reporter_wake.urge();
     }
 
-    /// The position of every axis that a motor moves, unless the step is that at which it was to end.
-    fn locate(&mut self, steps: &[i32; MOTORS]) {
-        let settings = self.links.settings.borrow();
-        // Of several motors on an axis the first tells.
-        for (m, steps) in steps.iter().enumerate().rev() {
-            let ratio = settings.step_ratio(m);
-            if let Some(position) = self.position.get_mut(usize::from(moved_by(&settings, m)))
-                && ratio.steps(*position) != *steps
-            {
-                *position = ratio.length(*steps).unwrap_or(*position);
-            }
-        }
+    /// Says what the machine does besides carrying out lines.
+    fn enter(&self, cycle: Cycle) {
+        self.links.cycle.set(cycle);
+        self.links.reporter_wake.urge();
     }
 
     /// Tells the others that a block has been queued.

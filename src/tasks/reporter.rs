@@ -12,10 +12,10 @@ use embassy_time::Timer;
 use super::links::Links;
 use super::ports::Port;
 use super::tx::Tx;
-use super::view::{HELD, HOLD, RUN, View, queue_free};
+use super::view::{View, moves, queue_free};
 use crate::hal::imp::time::millis;
 use crate::hal::serial::is_shared;
-use crate::protocol::notice::{Banner, Exception, Occasion, acknowledge};
+use crate::protocol::notice::{Banner, Exception, Occasion, Probing, acknowledge};
 use crate::protocol::{
     Machine, Mode, Report, Value, put_ready_prompt, queue_report, receive_report,
 };
@@ -49,6 +49,9 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
                 report_exception(links, port, status).await;
             }
         }
+        if links.probe.take_news() {
+            report_probing(links).await;
+        }
         let (state, hold) = state_of(links);
         if links.flushed.take() {
             report_flush(links).await;
@@ -58,7 +61,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         }
         let elapsed = millis().wrapping_sub(told.at);
         let interval = u32::from(links.settings.borrow().status_interval_ms());
-        let moves = state == RUN || state == HOLD && hold != HELD;
+        let moves = moves(state, hold);
         due |= moves;
         if (state, hold) != (told.state, told.hold) || (due && elapsed >= interval) {
             (told.state, told.hold) = (state, hold);
@@ -155,6 +158,13 @@ async fn report_exception(links: &Links, port: &Port, status: Status) {
     let mut tx = port.tx.lock().await;
     let mut exception = Exception::begin(status, &links.settings.borrow());
     send(links, port, &mut tx, |view, tx| exception.step(view, tx)).await;
+}
+
+async fn report_probing(links: &Links) {
+    let port = links.told();
+    let mut tx = port.tx.lock().await;
+    let mut probing = Probing::begin(&links.settings.borrow());
+    send(links, port, &mut tx, |view, tx| probing.step(view, tx)).await;
 }
 
 /// Returns the number of free blocks as it was told, which may have changed during the wait for the

@@ -1,5 +1,6 @@
 //! What the settings say of the machine to those who interpret lines and those who plan moves.
 
+use crate::boards::{ACTIVE, inputs};
 use crate::config::Settings;
 use crate::config::getters::TRAVEL_NONE;
 use crate::config::table::system;
@@ -64,9 +65,11 @@ impl Setup for Settings {
         self.system(system::OST) != 0
     }
 
-    /// No switch is read so far.
-    fn can(&self, _cycle: Cycle) -> bool {
-        false
+    fn can(&self, cycle: Cycle) -> bool {
+        match cycle {
+            Cycle::Probing => ACTIVE.inputs[inputs::PROBE].is_some(),
+            Cycle::Homing => false,
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use core::cell::{OnceCell, RefMut};
 
 use super::alarm;
 use super::hold;
-use super::links::{Links, snapshot};
+use super::links::{Cycle, Links, snapshot};
 use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
@@ -35,6 +35,20 @@ use crate::units::Length;
 pub const RUN: i32 = 5;
 /// Those from here on are five less as `macs`.
 const INTERLOCK: i32 = 11;
+/// `stat` in the cycles of the machine.
+const PROBING: i32 = 7;
+/// See [`PROBING`].
+const HOMING: i32 = 9;
+/// See [`PROBING`].
+const JOGGING: i32 = 10;
+
+/// Whether something moves, by `stat` and `hold`.
+pub fn moves(state: i32, hold: i32) -> bool {
+    match state {
+        HOLD => hold != HELD,
+        state => matches!(state, RUN | PROBING | HOMING | JOGGING),
+    }
+}
 
 /// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
@@ -56,6 +70,7 @@ pub struct View<'a> {
     motion: OnceCell<Snapshot>,
 }
 
+#[small]
 impl<'a> View<'a> {
     /// Looks at the machine now, as the sender on this port sees it.
     pub fn of(links: &'a Links, port: &'a Port) -> Self {
@@ -94,6 +109,12 @@ impl<'a> View<'a> {
         if hold::is_on() {
             let interlock = is_g2core && self.links.door_open.get();
             return if interlock { INTERLOCK } else { HOLD };
+        }
+        match self.links.cycle.get() {
+            Cycle::Off => {}
+            Cycle::Probe => return PROBING,
+            Cycle::Homing => return HOMING,
+            Cycle::Jog => return JOGGING,
         }
         if self.is_busy() && !self.links.stopped.get() {
             return RUN;
@@ -177,6 +198,7 @@ impl<'a> View<'a> {
     }
 }
 
+#[small]
 impl Machine for View<'_> {
     fn settings(&self) -> &Settings {
         &self.settings
@@ -218,11 +240,17 @@ impl Machine for View<'_> {
         match value {
             Value::State => self.state(),
             Value::Machine => match self.state() {
-                HOLD => RUN,
+                HOLD | PROBING | HOMING | JOGGING => RUN,
                 state if state >= INTERLOCK => state - (INTERLOCK - 6),
                 state => state,
             },
-            Value::Cycle => i32::from(self.is_busy() && !alarm::is_on()),
+            Value::Cycle if alarm::is_on() => 0,
+            Value::Cycle => match self.links.cycle.get() {
+                Cycle::Off => i32::from(self.is_busy()),
+                Cycle::Probe => 2,
+                Cycle::Homing => 3,
+                Cycle::Jog => 4,
+            },
             Value::Motion if hold::is_on() => 2,
             Value::Motion => i32::from(self.motion().running),
             // Lines that move nothing are finished when all before them are.
@@ -252,6 +280,10 @@ impl Machine for View<'_> {
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
             Value::Input(input) => self.input(input),
+            Value::ProbeState => self.links.probe.state() as i32,
+            Value::Probed(axis) => {
+                self.links.probe.at().get(usize::from(axis)).map_or(0, |at| at.0)
+            }
             Value::LimitHit => match self.links.limits_hit.get() {
                 0 => -1,
                 hit => hit.trailing_zeros() as i32,

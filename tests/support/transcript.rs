@@ -10,6 +10,8 @@
 //! @ +50ms                     time passes
 //! baud 500000                 from here on the sender speaks and hears at this rate
 //! in xmin closed              the contact of a switch closes (or: open); others are probe, door, stop
+//! near xmin -1280             from power-up on, the switch is closed while its axis is at or beyond this step:
+//!                             xmin to amax; probe, while Z is
 //! steps X=12800 Y=0           the motors come to rest there; those not named are at 0
 //! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
 //! 2cts 1                      the sender on the second port holds the machine back by that pin (0: no more)
@@ -19,6 +21,7 @@
 //! that nobody expects fails the transcript, and so does silence where a line is expected. Motors 1 to 4
 //! are `M1` to `M4`, or `X Y Z A`, which is what they move by default.
 
+use kerf::boards::inputs::PROBE;
 use std::collections::VecDeque;
 use std::fs;
 use std::path::Path;
@@ -49,6 +52,8 @@ pub trait Side {
     fn heard_aux(&mut self) -> Vec<u8>;
     /// The contact at an input closes or opens; see `kerf::boards::inputs`.
     fn set_input(&mut self, input: usize, closed: bool);
+    /// The contact at each of these inputs is closed while the motor of its axis is at or beyond a step.
+    fn wire(&mut self, switches: &[(usize, i64)]);
     /// Where the motors are, in steps.
     fn steps(&self) -> [i64; 4];
 }
@@ -65,6 +70,7 @@ enum Event {
     Pass(u64),
     Baud(u32),
     Input(usize, bool),
+    Near(usize, i64),
     Steps([i64; 4]),
 }
 
@@ -128,6 +134,7 @@ fn parse(line: &str) -> Option<Event> {
         "@" => rest.strip_prefix('+')?.strip_suffix("ms")?.parse().ok().map(Event::Pass),
         "baud" => rest.parse().ok().map(Event::Baud),
         "in" => input(rest),
+        "near" => near(rest),
         "steps" => steps(rest).map(Event::Steps),
         _ => None,
     }
@@ -157,6 +164,12 @@ fn input(text: &str) -> Option<Event> {
         _ => return None,
     };
     INPUTS.iter().position(|input| *input == name).map(|input| Event::Input(input, closed))
+}
+
+fn near(text: &str) -> Option<Event> {
+    let (name, step) = text.split_once(' ')?;
+    let input = INPUTS.iter().position(|input| *input == name).filter(|input| *input <= PROBE)?;
+    Some(Event::Near(input, step.parse().ok()?))
 }
 
 fn steps(text: &str) -> Option<[i64; 4]> {
@@ -194,6 +207,11 @@ impl Transcript {
 
     /// Plays it; the error says where it fails and how.
     pub fn play(&self, side: &mut impl Side) -> Result<(), String> {
+        let near = |(_, event): &(usize, Event)| match event {
+            Event::Near(input, step) => Some((*input, *step)),
+            _ => None,
+        };
+        side.wire(&self.events.iter().filter_map(near).collect::<Vec<_>>());
         let mut player = Player { side, ears: Default::default(), allowed: Vec::new() };
         for (line, event) in &self.events {
             player.play(event).map_err(|what| format!("{}:{line}: {what}", self.name))?;
@@ -244,6 +262,7 @@ impl<S: Side> Player<'_, S> {
             Event::Pass(ms) => self.side.run_ms(*ms),
             Event::Baud(baud) => self.side.set_baud(*baud),
             Event::Input(input, closed) => self.side.set_input(*input, *closed),
+            Event::Near(..) => {}
             Event::Steps(steps) => return self.rest_at(steps),
         }
         Ok(())

@@ -167,9 +167,11 @@ mod tests {
         assert_eq!(over, ["flash 253953 > 253952"]);
         let over = past_caps(Sizes { data: 401, bss: 0, ..SIZES }, 0);
         assert_eq!(over, [".data 401 > 400"]);
-        let over = past_caps(Sizes { bss: 5601, ..SIZES }, 0);
-        assert_eq!(over, ["static RAM 6001 > 6000"]);
-        assert_eq!(past_caps(SIZES, 1793), ["free stack 399 < 400"]);
+        let over = past_caps(Sizes { bss: SIZES.bss + 1, ..SIZES }, 0);
+        assert_eq!(over, [format!("static RAM {} > {}", caps::STATIC_RAM + 1, caps::STATIC_RAM)]);
+        let stack = caps::RAM - caps::STATIC_RAM - caps::FREE_STACK.cast_unsigned();
+        let over = past_caps(SIZES, u32::try_from(stack).unwrap() + 1);
+        assert_eq!(over, ["free stack 399 < 400"]);
     }
 
     #[test]

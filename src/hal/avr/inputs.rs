@@ -17,6 +17,7 @@ use core::cell::UnsafeCell;
 use super::{exec, flags, stepper};
 use crate::boards::{ACTIVE, Interrupt, Timer, inputs};
 use crate::hal::event::Event;
+use crate::motion::contact;
 use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
 
 const _: () = assert!(
@@ -84,6 +85,9 @@ struct State {
     stops: u16,
     /// Those of them that have been hit.
     hits: u16,
+    /// Those that end a move, and what they must be for it.
+    armed: u16,
+    awaited: u16,
     /// The next look is to believe what it finds.
     fresh: bool,
 }
@@ -98,6 +102,8 @@ static STATE: Shared = Shared(UnsafeCell::new(State {
     low: 0,
     stops: 0,
     hits: 0,
+    armed: 0,
+    awaited: 0,
     fresh: true,
 }));
 
@@ -138,6 +144,12 @@ pub fn set_up(low: u16, stops: u16) {
             unsafe { TCCR2B.write_volatile(RUN) };
         }
     });
+}
+
+/// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
+/// ([`contact`](crate::motion::contact)); none if `armed` is 0. Thread mode.
+pub fn arm(armed: u16, awaited: u16) {
+    with(|state| (state.armed, state.awaited) = (armed, awaited));
 }
 
 /// The inputs that are worked. Thread mode.
@@ -194,6 +206,11 @@ extern "C" fn look() {
         if hits != 0 {
             stepper::stop();
             state.hits |= hits;
+        }
+        if changed & state.armed & !(now ^ state.awaited) != 0 {
+            let (dda, tail) = stepper::moment();
+            contact::note(&dda, tail);
+            flags::set(Event::BlockDone);
         }
         flags::set(Event::Realtime);
     }

@@ -27,6 +27,8 @@ const RUN: u8 = 1 << 3 | 1;
 /// The same, stopped.
 pub(super) const HALT: u8 = 1 << 3;
 const OCF1A: u8 = 1 << 1;
+const GPIOR1: *const u8 = 0x4A as *const u8;
+const GPIOR2: *const u8 = 0x4B as *const u8;
 
 /// Cycles from starting the timer to the first tick.
 const FIRST_TICK: u16 = 400;
@@ -142,6 +144,28 @@ pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
         unsafe { register.write_volatile(0) };
     }
     RUNNING.set(0);
+}
+
+/// Where the generator is right now, between two ticks, and the slot of its segment. For the look interrupt, which
+/// holds exec off.
+pub fn moment() -> (Dda, u8) {
+    let mut dda = Dda::new();
+    let mut tail = 0;
+    avr_device::interrupt::free(|_| {
+        // SAFETY: the step interrupt cannot come in between.
+        let state = unsafe { &*STATE.0.get() };
+        (dda.phase, dda.due, dda.backwards) = (state.phase, state.due, state.backwards);
+        // SAFETY: reading has no effect. The count of ticks is in registers, not in the state.
+        dda.ticks = u16::from_le_bytes(unsafe { [GPIOR1.read_volatile(), GPIOR2.read_volatile()] });
+        tail = SEGMENT_RING.tail();
+    });
+    if dda.ticks > 0 {
+        // In lockstep the state has no increments, but the segment has.
+        // SAFETY: one has been taken. Another may have been since, but exec, which is held off, has not refilled
+        // the slot.
+        dda.increment = unsafe { SEGMENT_RING.at(tail) }.increment;
+    }
+    (dda, tail)
 }
 
 /// Which direction pins are inverted: bit m for motor m. For thread mode, while nothing runs.

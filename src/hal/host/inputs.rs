@@ -5,7 +5,8 @@ use core::cell::{Cell, RefCell};
 use super::{NEVER, flags, now, stepper};
 use crate::boards::{ACTIVE, inputs};
 use crate::hal::event::Event;
-use crate::switches::{LATER_US, Next, SOON_US, Switches};
+use crate::motion::contact;
+use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
 
 struct Inputs {
     /// High ones.
@@ -14,6 +15,7 @@ struct Inputs {
     low: Cell<u16>,
     stops: Cell<u16>,
     hits: Cell<u16>,
+    armed: Cell<(u16, u16)>,
     fresh: Cell<bool>,
     next_look: Cell<u64>,
 }
@@ -25,6 +27,7 @@ machine_static! {
         low: Cell::new(0),
         stops: Cell::new(0),
         hits: Cell::new(0),
+        armed: Cell::new((0, 0)),
         fresh: Cell::new(true),
         next_look: Cell::new(cycles(LATER_US)),
     };
@@ -41,6 +44,12 @@ pub fn set_up(low: u16, stops: u16) {
         all().fresh.set(true);
         edge();
     }
+}
+
+/// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
+/// ([`contact`](crate::motion::contact)); none if `armed` is 0.
+pub fn arm(armed: u16, awaited: u16) {
+    all().armed.set((armed, awaited));
 }
 
 /// The inputs that are worked.
@@ -66,7 +75,7 @@ pub(super) fn set(input: usize, high: bool) {
 /// An edge, or what is to be looked at like one.
 fn edge() {
     if all().next_look.get() == NEVER {
-        all().next_look.set(now() + cycles(SOON_US));
+        all().next_look.set(now() + cycles(FIRST_US));
     }
 }
 
@@ -92,6 +101,12 @@ pub(super) fn look() {
         if hits != 0 {
             stepper::stop();
             i.hits.set(i.hits.get() | hits);
+        }
+        let (armed, awaited) = i.armed.get();
+        if changed & armed & !(found ^ awaited) != 0 {
+            let (dda, tail) = stepper::moment();
+            contact::note(&dda, tail);
+            flags::set(Event::BlockDone);
         }
         flags::set(Event::Realtime);
     }

@@ -66,6 +66,12 @@ impl Machine {
         inputs::set(input, !closed);
     }
 
+    /// From now on the contact at an input is closed while the motor of its axis is at a step or beyond; that of the
+    /// probe while the third motor is, or below.
+    pub fn set_near(&self, input: usize, step: i64) {
+        stepper::set_near(input, step);
+    }
+
     /// Runs for a time.
     pub fn run_ms(&self, ms: u64) {
         let end = now() + ms * time::CYCLES_PER_MS;

@@ -1,9 +1,10 @@
 //! The step timer on the host: the real step generator, ticking in mocked time, with pins that count.
 
 use core::cell::{Cell, RefCell};
+use std::vec::Vec;
 
-use super::{NEVER, exec, now};
-use crate::boards::MOTORS;
+use super::{NEVER, exec, inputs, now};
+use crate::boards::{MOTORS, inputs as board_inputs};
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::motion::dda::{Dda, Pins, SEGMENTS, Segment};
 
@@ -18,7 +19,28 @@ pub struct Emitted {
     pub steps: [u64; MOTORS],
 }
 
+/// A switch that a motor works.
+struct Near {
+    input: usize,
+    motor: usize,
+    step: i64,
+    closed: bool,
+}
+
+impl Near {
+    /// The motor is at `position`.
+    fn look(&mut self, position: i64) {
+        let upper = self.input < board_inputs::ENDS && self.input % 2 == 1;
+        let closed = if upper { position >= self.step } else { position <= self.step };
+        if closed != self.closed {
+            self.closed = closed;
+            inputs::set(self.input, !closed);
+        }
+    }
+}
+
 struct Pinned {
+    near: Vec<Near>,
     backwards: u8,
     period: u64,
     stopped: bool,
@@ -40,6 +62,7 @@ machine_static! {
         segments: RefCell::new(None),
         dda: RefCell::new(Dda::new()),
         pins: RefCell::new(Pinned {
+            near: Vec::new(),
             backwards: 0,
             period: 0,
             stopped: true,
@@ -58,6 +81,8 @@ impl Pins for Pinned {
                 let backwards = self.backwards & (1 << m) != 0;
                 self.emitted.position[m] += if backwards { -1 } else { 1 };
                 self.emitted.steps[m] += 1;
+                let at = self.emitted.position[m];
+                self.near.iter_mut().filter(|n| n.motor == m).for_each(|n| n.look(at));
             }
         }
     }
@@ -131,6 +156,11 @@ pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     stepper().dda.borrow_mut().settle(&mut queued, position);
 }
 
+/// Where the generator is right now, and the slot of its segment.
+pub fn moment() -> (Dda, u8) {
+    (stepper().dda.borrow().clone(), ring().tail())
+}
+
 /// Which direction pins are inverted: of no account here, where positions are counted before the pins.
 pub fn set_inverted(_motors: u8) {}
 
@@ -143,6 +173,16 @@ pub fn set_step_output(pulse_us: u8, inverted: u8) {
 /// What was set last: pulse width, and the inverted motors as bits.
 pub fn step_output() -> (u8, u8) {
     stepper().output.get()
+}
+
+/// The motor of an axis works the switch at an input from now on: see
+/// [`Machine::set_near`](super::Machine::set_near).
+pub(super) fn set_near(input: usize, step: i64) {
+    let motor = if input < board_inputs::ENDS { input / 2 } else { 2 };
+    let mut pins = stepper().pins.borrow_mut();
+    let mut near = Near { input, motor, step, closed: false };
+    near.look(pins.emitted.position[motor]);
+    pins.near.push(near);
 }
 
 /// What the pins have done so far.

@@ -8,8 +8,13 @@ use std::path::Path;
 
 use common::firmware;
 use kerf::boards::MEGA2560_GRBL;
+use kerf::boards::inputs::PROBE;
+use kerf_sim::mechanics::{Build, Switch, Wiring};
 use kerf_sim::{AUX, Machine};
 use transcript::Side;
+
+/// Where carriages stand at power-up, in steps from a hard end.
+const START: f64 = 1e8;
 
 impl Side for Machine {
     fn send(&mut self, bytes: &[u8]) {
@@ -41,8 +46,33 @@ impl Side for Machine {
     }
 
     fn set_input(&mut self, input: usize, closed: bool) {
+        if self.mechanics().is_some() {
+            return self.tamper(|mechanics, now| mechanics.work(input, closed, now));
+        }
         let pin = self.board().inputs[input].expect("a pin");
         self.drive_pin(pin.port.letter(), pin.bit, !closed);
+    }
+
+    fn wire(&mut self, switches: &[(usize, i64)]) {
+        if switches.is_empty() {
+            return;
+        }
+        // Lengths are steps, from far off any hard end.
+        let mut build = Build::of(self.board());
+        for axis in &mut build.axes {
+            (axis.steps_per_mm, axis.travel, axis.start) = (1.0, f64::INFINITY, START);
+            (axis.min, axis.max) = (None, None);
+        }
+        for (input, step) in switches {
+            let at = START + *step as f64;
+            let switch = Some(Switch { at, hysteresis: 0.0, wiring: Wiring::NormallyOpen });
+            match (input / 2, input % 2) {
+                _ if *input == PROBE => build.plate = Some(at),
+                (axis, 0) => build.axes[axis].min = switch,
+                (axis, _) => build.axes[axis].max = switch,
+            }
+        }
+        self.build(&build);
     }
 
     fn steps(&self) -> [i64; 4] {

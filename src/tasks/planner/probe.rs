@@ -1,0 +1,82 @@
+//! Probing, G38.2 to G38.5: straight towards the work until the probe touches it, or away until it lets go.
+//!
+//! The result is the contact ([`seek`](super::seek)), in machine coordinates: `prbe` 1 and `prbx`.., which the
+//! reporter tells at once. The machine comes to rest behind it, and stays there. Without contact `prbe` is 0 and the
+//! place is where the move ended; G38.2 and G38.4 take that for a failure, and so is a probe that is as it is to
+//! become before anything moves, in which case nothing does.
+
+use embassy_futures::yield_now;
+use kerf_macros::small;
+
+use super::Planner;
+use super::seek::Sought;
+use crate::boards::inputs::PROBE;
+use crate::gcode::command::Motion;
+use crate::gcode::modal::MotionMode;
+use crate::hal::imp::inputs;
+use crate::status::Status;
+use crate::tasks::links::{Cycle, ProbeState};
+
+/// The probe, of the inputs.
+const SWITCH: u16 = 1 << PROBE;
+
+impl Planner {
+    /// Carries out the line's probing.
+    pub(super) async fn probe(&mut self) {
+        self.enter(Cycle::Probe);
+        if self.standstill().await && self.begin_probe() {
+            match self.sought().await {
+                Sought::Contact(steps) => {
+                    let at = self.located(&steps);
+                    self.links.probe.tell(ProbeState::Touched, &at);
+                }
+                Sought::End => self.probe_failed(),
+                Sought::Flushed => {}
+            }
+        }
+        self.enter(Cycle::Off);
+        // The result comes before the response to the next line.
+        while self.links.probe.is_news() {
+            yield_now().await;
+        }
+    }
+
+    /// Begins the move. False if the probe is there already.
+    #[inline(never)]
+    #[small]
+    fn begin_probe(&mut self) -> bool {
+        let links = self.links;
+        let commands = links.commands.borrow();
+        let Motion::Probe { target, feed, mode } = &commands.motion else { return false };
+        links.probe.begin();
+        let awaited = match mode {
+            MotionMode::ProbeAway | MotionMode::ProbeAwayQuietly => 0,
+            _ => SWITCH,
+        };
+        if inputs::worked() & SWITCH == awaited {
+            drop(commands);
+            // The line says that the machine is at its end.
+            links.model.borrow_mut().set_position(&self.position);
+            self.probe_failed();
+            return false;
+        }
+        self.brake_hard();
+        self.seek(target, *feed, SWITCH, awaited);
+        true
+    }
+
+    #[small]
+    fn probe_failed(&self) {
+        let links = self.links;
+        links.probe.tell(ProbeState::Failed, &self.position);
+        let loudly = match &links.commands.borrow().motion {
+            Motion::Probe { mode, .. } => {
+                matches!(mode, MotionMode::ProbeTowards | MotionMode::ProbeAway)
+            }
+            _ => false,
+        };
+        if loudly {
+            links.except(Status::ProbeFailed);
+        }
+    }
+}

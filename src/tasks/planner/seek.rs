@@ -1,0 +1,136 @@
+//! Moves that end at a switch: what homing and probing are made of.
+//!
+//! The machine stands still. [`Planner::seek`] arms switches and queues the move, [`Planner::sought`] waits for what
+//! comes of it: the end of the move, or a switch. At the switch exec comes to rest within the limits, as in a
+//! feedhold; the rest of the move is dropped, the planner goes on from where the motors are, and the contact is
+//! known to the step ([`contact`]). A feedhold on the way holds the move; a queue flush ends it.
+//!
+//! One line at a time: what comes behind it waits in the pool, and none is lost.
+
+use kerf_macros::small;
+
+use super::{Planner, Turn};
+use crate::boards::MOTORS;
+use crate::gcode::command::Feed;
+use crate::hal::event::{Event, wait};
+use crate::hal::imp::inputs;
+use crate::motion::block::Body;
+use crate::motion::dynamics::PER_SECOND_CUBED;
+use crate::motion::exec::Snapshot;
+use crate::motion::short::Short;
+use crate::motion::{contact, queue};
+use crate::tasks::{hold, links};
+use crate::units::{FIRST_ROTARY, Length, PerAxis};
+
+/// What has come of a move that is to end at a switch.
+pub(super) enum Sought {
+    /// The motors were there when the switch said so. They have come to rest further on.
+    Contact([i32; MOTORS]),
+    /// The move is at its end, and no switch has said so.
+    End,
+    /// What is queued is to be dropped.
+    Flushed,
+}
+
+impl Planner {
+    /// Waits until everything queued is done and the steppers stand still. False if that is to be dropped.
+    pub(super) async fn standstill(&mut self) -> bool {
+        self.room().await;
+        // Exec does not release it before.
+        self.pause(Body::Outputs(self.outputs));
+        wait(Event::BlockDone, || (queue::used() == 0 || self.is_flushed()).then_some(())).await;
+        !self.is_flushed()
+    }
+
+    /// Begins a move that ends at the first of the inputs `armed` (bits) that comes to be as in `awaited`. Nothing
+    /// is queued. [`Planner::sought`] is next.
+    pub(super) fn seek(&mut self, target: &PerAxis<Length>, feed: Feed, armed: u16, awaited: u16) {
+        contact::clear();
+        inputs::arm(armed, awaited);
+        self.straight(target, Some(feed));
+    }
+
+    /// Waits for what comes of it. The switches are not armed any more.
+    pub(super) async fn sought(&mut self) -> Sought {
+        while self.parts.is_some() && !self.is_over() {
+            self.seek_room().await;
+            if !self.is_over() {
+                let _: Turn = self.turn();
+            }
+        }
+        self.seek_room().await;
+        if !self.is_over() {
+            self.pause(Body::Outputs(self.outputs));
+        }
+        wait(Event::BlockDone, || (queue::used() == 0 || self.is_over()).then_some(())).await;
+        inputs::arm(0, 0);
+        self.parts = None;
+        if !contact::is_noted() || self.is_flushed() {
+            contact::clear();
+            return if self.is_flushed() { Sought::Flushed } else { Sought::End };
+        }
+        hold::drop_blocks();
+        wait(Event::BlockDone, || hold::has_dropped().then_some(())).await;
+        let motion = links::snapshot();
+        let steps = contact::steps(&motion.target);
+        contact::clear();
+        self.relocate(&motion);
+        steps.map_or(Sought::End, Sought::Contact)
+    }
+
+    /// Whether nothing more of the move is to be queued.
+    fn is_over(&self) -> bool {
+        contact::is_noted() || self.is_flushed()
+    }
+
+    async fn seek_room(&self) {
+        wait(Event::BlockDone, || (self.queue.free() > 0 || self.is_over()).then_some(())).await;
+    }
+
+    /// Exec has dropped its blocks: the planner starts from where the motors are.
+    #[inline(never)]
+    #[small]
+    pub(super) fn relocate(&mut self, motion: &Snapshot) {
+        // Until steps have been counted anew they mean what they meant before; nothing has moved since.
+        if !self.links.resync.get() {
+            self.position = self.located(&motion.target);
+        }
+        self.builder.place(&motion.target);
+        self.queue.restart();
+        (self.walk, self.parts) = (None, None);
+        self.outputs = motion.outputs;
+        self.links.model.borrow_mut().set_position(&self.position);
+    }
+
+    /// The position of every axis that a motor moves, unless the step is that at which it was to end.
+    #[small]
+    pub(super) fn located(&self, steps: &[i32; MOTORS]) -> PerAxis<Length> {
+        let settings = self.links.settings.borrow();
+        let mut located = self.position;
+        // Of several motors on an axis the first tells.
+        for (m, steps) in steps.iter().enumerate().rev() {
+            let ratio = settings.step_ratio(m);
+            let axis = usize::from(super::moved_by(&settings, m));
+            if let (Some(place), Some(now)) = (located.get_mut(axis), self.position.get(axis)) {
+                *place = match ratio.steps(*now) == *steps {
+                    true => *now,
+                    false => ratio.length(*steps).unwrap_or(*now),
+                };
+            }
+        }
+        located
+    }
+
+    /// Takes the jerk of homing and probing for the axes that have both, until the line is done.
+    #[small]
+    pub(super) fn brake_hard(&mut self) {
+        let settings = self.links.settings.borrow();
+        for (n, axis) in self.dynamics.axes.iter_mut().enumerate().take(FIRST_ROTARY + 1) {
+            let hard = settings.jerk_homing(n);
+            if hard > 0.0 && axis.jerk.get() > 0.0 {
+                axis.jerk = Short::new(hard * PER_SECOND_CUBED);
+            }
+        }
+        self.links.settings_changed.set(true);
+    }
+}
