@@ -33,6 +33,8 @@
 //! phase is complemented: counting a complement up is counting the phase down, so the fraction
 //! of a step survives any reversal.
 
+use kerf_macros::small;
+
 use crate::boards::MOTORS;
 use crate::hal::ring::Consumer;
 
@@ -159,6 +161,7 @@ impl Dda {
     /// the rest of the segment and those that `queued` gives would have made are taken off `position`. For
     /// exec, while no ticks come; exact wherever they were stopped. Cost: 1,200, and 600 a segment.
     #[inline(never)]
+    #[small]
     pub fn settle(
         &mut self,
         mut queued: impl FnMut() -> Option<Segment>,

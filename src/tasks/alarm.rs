@@ -10,6 +10,8 @@
 //!
 //! Thread mode raises and clears, any level asks. Nothing here waits, and nothing can be full.
 
+use kerf_macros::small;
+
 use super::hold::{self, Flush};
 use super::links::Links;
 use super::switches;
@@ -36,6 +38,7 @@ pub fn is_on() -> bool {
 
 /// Begins an alarm, if there is none as bad.
 #[inline(never)]
+#[small]
 pub fn raise(links: &Links, alarm: Alarm) {
     if alarm <= now() {
         return;
@@ -51,6 +54,7 @@ pub fn raise(links: &Links, alarm: Alarm) {
 
 /// Ends the alarm. [`Status::Again`] as long as the machine comes to rest.
 #[inline(never)]
+#[small]
 pub fn clear(links: &Links, settings: &Settings) -> Status {
     let alarm = now();
     let stays = match alarm {

@@ -11,6 +11,8 @@
 //! Door and emergency stop count as they stand, if `saf` and `est` say that there are any. The door is a hold
 //! that no tilde ends before it is shut; one that is open when nothing runs keeps what comes from beginning.
 
+use kerf_macros::small;
+
 use super::links::Links;
 use super::{alarm, hold};
 use crate::alarm::Alarm;
@@ -52,6 +54,7 @@ pub fn mode(settings: &Settings, end: u8) -> u8 {
 
 /// Takes over what the settings say. Those at no end close when they are worked, unless a setting says otherwise.
 #[inline(never)]
+#[small]
 pub fn set_up(settings: &Settings) {
     let mut closing = if settings.switches_normally_closed() { !ENDS } else { u16::MAX };
     if settings.door_switch() == OPENS {

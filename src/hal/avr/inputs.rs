@@ -199,6 +199,10 @@ extern "C" fn look() {
         state.switches.note(now);
         wait();
         now = levels() ^ state.low;
+        // Before anything else: each cycle counts, and only two in five are ours.
+        if state.switches.changed(now) & now & state.stops != 0 {
+            stepper::stop();
+        }
     }
     let (changed, next) = state.switches.look(now);
     if changed != 0 {

@@ -5,6 +5,7 @@
 //! owns the step generator and the pins. Everything else here is for thread mode and exec.
 
 use core::cell::UnsafeCell;
+use kerf_macros::small;
 
 use super::gpio::{self, each_motor};
 use crate::boards::{ACTIVE, MOTORS, Timer};
@@ -130,6 +131,7 @@ pub fn running() -> bool {
 /// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have
 /// come first after those that are queued. What they lack is taken off `position`. For exec, while no ticks come.
 #[inline(never)]
+#[small]
 pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     if running() {
         return;
