@@ -3,7 +3,7 @@
 //! | interrupt | does | cycles |
 //! |---|---|---|
 //! | INT0 to INT7, PCINT0 to PCINT2 | starts timer 2: someone has to look | 20, interrupts off |
-//! | TIMER2_COMPA | looks at all pins, as [`Switches`] wants it | 300, interrupts off for 26 and 18 |
+//! | TIMER2_COMPA | looks at all pins, as [`Switches`] wants it | 300, interrupts off for 26 and 26 |
 //!
 //! While no switch moves none of them comes. The look lets all interrupts in but itself and exec, which would run
 //! far too long inside it. Where a limit is hit it stops the steps right there: 20 us after the edge and its own
@@ -315,25 +315,30 @@ extern "C" fn __vector_13() -> ! {
             "pop  r1",
             "pop  r0",
             "pop  r25",
-            // Lets exec in again if it was not closed before, as `exec::open`.
+            // Lets exec in again if it was not closed before, as `exec::open`. Not before looks may come again: it
+            // runs for milliseconds.
+            "ldi  r24, {unmask}",
             "tst  r25",
             "brne 1f",
+            "cli",
+            "sts  0x70, r24",
             "sts  {closed}, r25",
             "lds  r24, {missed}",
             "tst  r24",
-            "breq 1f",
+            "breq 2f",
             "sts  {missed}, r25",
             "ldi  r24, {pended}",
             "sts  0xD1, r24",
-            "1:",
-            "ldi  r24, {unmask}",
-            "cli",
-            "sts  0x70, r24",
+            "2:",
             "pop  r24",
             "out  0x3F, r24",
             "pop  r25",
             "pop  r24",
             "reti",
+            "1:",
+            "cli",
+            "sts  0x70, r24",
+            "rjmp 2b",
             closed = sym exec::CLOSED,
             missed = sym exec::MISSED,
             pended = const exec::PENDED,

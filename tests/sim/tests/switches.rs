@@ -10,9 +10,9 @@ use kerf_sim::{Host, Machine};
 /// Cycles in a microsecond.
 const US: u64 = 16;
 /// From the edge to the last step, at 50,000 steps a second.
-const STOP_US: u64 = 66;
+const STOP_US: u64 = 50;
 /// The same where the step interrupt leaves a fifth of the CPU, at 85,000.
-const STOP_FAST_US: u64 = 120;
+const STOP_FAST_US: u64 = 100;
 /// The longest time with interrupts off outside the step interrupt.
 const WINDOW: u64 = 29;
 
@@ -99,8 +99,8 @@ fn a_carriage_that_runs_into_its_switch_stops_before_the_hard_end() {
     let told = exceptions(&mut machine, &mut host, 3_000);
     assert!(told.len() == 1 && told[0].contains("xmax"), "{told:?}");
     let mechanics = machine.mechanics().unwrap();
-    // 4,000 mm/min for the 3 ms that it bounces, and a little more.
-    assert!((198.0..198.3).contains(&mechanics.position(0)), "{}", mechanics.position(0));
+    // At 4,000 mm/min for some looks, while it bounces for 3 ms.
+    assert!((198.0..198.06).contains(&mechanics.position(0)), "{}", mechanics.position(0));
     assert_eq!(mechanics.lost(0), 0);
     check_windows(&machine);
 }
