@@ -1,8 +1,8 @@
 //! The alarm that is on: how it begins and how it ends. What each of them does is in [`alarm`](crate::alarm).
 //!
 //! ```text
-//!  raise   steps stop at once if it is sudden (the interrupt of a limit has stopped them already); outputs off by
-//!          exec; a hold, and Flush::Rest: data lines wait
+//!  raise   steps stop at once if it is sudden (the interrupt of a limit has stopped them already); outputs off;
+//!          a hold, and Flush::Rest: data lines wait
 //!  planner drop_blocks   exec, at rest or stopped, drops its blocks and counts what has been made, to the step
 //!          restart       planner and model start from there; data lines are refused from now on
 //!  clear   steps may be made again
@@ -14,6 +14,7 @@ use kerf_macros::small;
 
 use super::hold::{self, Flush};
 use super::links::Links;
+use super::spindle;
 use super::switches;
 use crate::alarm::Alarm;
 use crate::config::Settings;
@@ -49,6 +50,7 @@ pub fn raise(links: &Links, alarm: Alarm) {
         links.model.borrow_mut().forget_homes();
     }
     hold::abandon(links);
+    spindle::stop();
     links.except(alarm.status());
 }
 

@@ -62,9 +62,8 @@ const PASSING: u8 = 2;
 machine_static! {
     // Thread mode writes it, and exec if it is `PASSING`.
     fn wanted() -> SharedByte = SharedByte::new(OFF);
-    // Thread mode sets them, exec clears them.
+    // Thread mode sets it, exec clears it.
     fn dropping() -> SharedByte = SharedByte::new(0);
-    fn darkens() -> SharedByte = SharedByte::new(0);
 }
 
 /// Whether a hold is on. Any level.
@@ -135,25 +134,13 @@ pub fn dropped(drop_all: impl FnOnce()) {
     }
 }
 
-/// An alarm: drops what is queued when the machine has come to rest, which it does now, and switches outputs off.
+/// An alarm: drops what is queued when the machine has come to rest, which it does now.
 /// What waits to be interpreted is left to the parser.
 pub fn abandon(links: &Links) {
-    darkens().set(1);
     begin();
     links.percent.set(false);
     links.resume.set(false);
     drop_queue(links);
-}
-
-/// Whether outputs are to be switched off at once. Exec only.
-#[inline(always)]
-pub fn darkened() -> bool {
-    darkens().get() != 0
-}
-
-/// They have been switched off. Exec only.
-pub fn has_darkened() {
-    darkens().set(0);
 }
 
 /// The queue has been dropped: the hold is over, unless the door is open.
