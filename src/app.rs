@@ -60,6 +60,7 @@ impl Links {
             killed: Cell::new(false),
             flushed: Cell::new(false),
             limits_hit: Cell::new(0),
+            door_open: Cell::new(false),
             cycle: Cell::default(),
             probe: Probe::default(),
             job: Cell::default(),

@@ -14,6 +14,7 @@ extern crate kerf_macros;
 #[macro_use]
 pub mod hal;
 
+pub mod alarm;
 pub mod app;
 pub mod baud;
 pub mod boards;

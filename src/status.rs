@@ -82,6 +82,8 @@ pub enum Status {
     WordConflict = 185,
     Alarmed = 203,
     LimitHit = 204,
+    ShutDown = 205,
+    Panicked = 206,
     KillJob = 207,
     SoftLimit = 220,
     HomingAxis = 241,

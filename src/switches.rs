@@ -75,11 +75,16 @@ impl Switches {
         self.last = now;
     }
 
+    /// Those that have changed, should this be the second look that finds the switches `now` worked.
+    #[inline(always)]
+    pub fn changed(&self, now: u16) -> u16 {
+        (now ^ self.worked) & !(now ^ self.last) & !self.locked
+    }
+
     /// A look finds the switches `now` worked. Returns those that have changed, and when to look again.
     pub fn look(&mut self, now: u16) -> (u16, Next) {
-        let agreed = !(now ^ self.last);
+        let changed = self.changed(now);
         self.last = now;
-        let changed = (now ^ self.worked) & agreed & !self.locked;
         self.worked ^= changed;
         if changed != 0 {
             self.locked |= changed;

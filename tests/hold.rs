@@ -17,6 +17,7 @@ use jobs::{Job, any_job, plan_held};
 use keeps::check_limits;
 use kerf::boards::MOTORS;
 use kerf::motion::block::{Block, Body, Outputs};
+use kerf::motion::dda::SEGMENTS;
 use kerf::motion::exec::Step;
 use proptest::prelude::*;
 use rig::{Config, Rig, at};
@@ -111,8 +112,43 @@ fn run(job: &Job, holds: &Holds) -> Rig {
     player.rig
 }
 
+/// Runs a job that is stopped by force: after turns of exec, with segments queued, some ticks later.
+fn run_stopped(job: &Job, stops: &[(u16, usize, usize)]) {
+    let mut rig = Rig::new(job.config.clone());
+    rig.keep = false;
+    let mut stops = stops.iter();
+    let mut next = stops.next();
+    for (n, step) in job.moves.iter().enumerate() {
+        if rig.free() == 0 {
+            rig.finish();
+        }
+        let mut to = rig.position;
+        for (to, way) in to.iter_mut().zip(step.way) {
+            to.0 += way;
+        }
+        rig.line(to, step.velocity, n as u32 + 1);
+        let Some((turns, segments, ticks)) = next else { continue };
+        (0..*turns).for_each(|_| _ = rig.turn());
+        rig.stop_short(*segments, *ticks);
+        let there = rig.snapshot.target.map(i64::from);
+        assert_eq!(rig.pins.position, there, "{turns} turns, {segments} segments, {ticks} ticks");
+        assert!(rig.source.is_empty() && rig.snapshot.velocity == 0.0);
+        next = stops.next();
+    }
+    rig.finish();
+    assert_eq!(rig.pins.position, rig.target());
+}
+
 proptest! {
     #![proptest_config(cases(1_500))]
+
+    #[test]
+    fn wherever_it_is_stopped_the_position_is_known_to_the_step(
+        job in any_job(),
+        stops in prop::collection::vec((0u16..40, 0..SEGMENTS, 0usize..1_000), 1..20),
+    ) {
+        run_stopped(&job, &stops);
+    }
 
     #[test]
     fn any_job_with_holds_ends_on_its_steps(job in any_job(), holds in any_holds(false)) {

@@ -152,6 +152,16 @@ impl Settings {
         self.system(system::ST) != 0
     }
 
+    /// The switch of the door: 0 off, 1 closes when the door opens, 2 opens.
+    pub fn door_switch(&self) -> u8 {
+        self.system(system::SAF)
+    }
+
+    /// The emergency stop: 0 off, 1 closes when it is hit, 2 opens.
+    pub fn stop_switch(&self) -> u8 {
+        self.system(system::EST)
+    }
+
     /// How long motors stay powered after a move, in hundredths of a second.
     pub fn motor_timeout_centis(&self) -> u32 {
         self.system_large(system::MT).unsigned_abs()

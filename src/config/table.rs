@@ -131,7 +131,7 @@ const fn up_to(mut row: Row, max: i32) -> Row {
 }
 
 /// Rows of [`SYSTEM`].
-pub const SYSTEM_ROWS: usize = 34;
+pub const SYSTEM_ROWS: usize = 36;
 /// Rows of [`MOTOR`].
 pub const MOTOR_ROWS: usize = 7;
 /// Rows of [`AXIS`].
@@ -173,7 +173,9 @@ pub mod system {
     pub const PSW: u8 = 20;
     pub const RXM: u8 = 21;
     pub const DIA: u8 = 22;
-    pub const SMALL: usize = 23;
+    pub const SAF: u8 = 23;
+    pub const EST: u8 = 24;
+    pub const SMALL: usize = 25;
 
     pub const JA: u8 = 0;
     pub const CT: u8 = 1;
@@ -265,12 +267,14 @@ progmem! {
         int("dia", system::DIA, 0, 1),
         int("spw", system::SPW, 1, 10).with(IDLE),
         int("dsu", system::DSU, 0, 100).with(IDLE),
+        int("saf", system::SAF, 0, 2),
+        int("est", system::EST, 0, 2),
     ];
 
     /// Their defaults, scaled as kept.
     pub static SYSTEM_DEFAULTS: [i32; SYSTEM_ROWS] = [
         44_020, 970, 1, 8, 0, 10_000_000, 10_000, 0, 0, 200, 1, 3, 1, 1, 0, 1, 500, 0, 0, 1, 1, 5,
-        0, 0, 1, 1, 2, 0, 1, 1, 0, 0, 2, 1,
+        0, 0, 1, 1, 2, 0, 1, 1, 0, 0, 2, 1, 0, 0,
     ];
 
     /// What the constants at the head of [`SYSTEM`] are while the machine passes for a g2core.

@@ -91,6 +91,8 @@ progmem! {
         words(text!("protocol dialect"), text!(" [0=TinyG,1=g2core]")),
         words(text!("step pulse width"), text!(" us")),
         words(text!("direction setup time"), text!(" us")),
+        words(text!("safety door"), text!(" [0=off,1=NO,2=NC]")),
+        words(text!("emergency stop"), text!(" [0=off,1=NO,2=NC]")),
     ];
 
     static MOTOR: [Words; MOTOR_ROWS] = [

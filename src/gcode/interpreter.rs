@@ -260,6 +260,11 @@ impl<T> Interpreter<T> {
         self.state.homed & 1 << axis != 0
     }
 
+    /// No axis is homed any more.
+    pub fn forget_homes(&mut self) {
+        self.state.homed = 0;
+    }
+
     /// The N word of the last line, 0 if it had none.
     pub fn line(&self) -> u32 {
         self.state.line

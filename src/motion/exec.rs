@@ -201,14 +201,17 @@ impl Exec {
         !goes_on
     }
 
-    /// Forgets all that is queued. The steppers stand still, held; their last steps are the position from
-    /// now on. What has been said of positions before anything moves, and of drivers, holds.
+    /// Forgets all that is queued. The steppers stand still: held, or stopped in the midst of it. The target is
+    /// then where the segments that they have got end, and the one that is returned, which they have not;
+    /// [`Dda::settle`](super::dda::Dda::settle) makes their last steps the position. What has been said of
+    /// positions before anything moves, and of drivers, holds.
     ///
     /// Cost: 600 a block.
     #[inline(never)]
-    pub fn drop_all(&mut self, blocks: &mut BlockSource, out: &mut Snapshot) {
+    pub fn drop_all(&mut self, blocks: &mut BlockSource, out: &mut Snapshot) -> Option<Segment> {
+        self.halt(out);
         let mut moved = self.running.active || self.dwell_ms > 0;
-        self.prep.cut(&mut out.target);
+        let held = self.prep.cut(&mut out.target);
         self.running.active = false;
         self.dwell_ms = 0;
         out.left = 0.0;
@@ -224,6 +227,7 @@ impl Exec {
             blocks.enter();
             blocks.release();
         }
+        held
     }
 
     /// Does what the oldest block asks for, which is no line.

@@ -390,11 +390,12 @@ impl Prep {
         true
     }
 
-    /// The block ends here and now: what of its steps has not been made is taken off `target`. The steppers
-    /// stand still, and every motor is at its last step from now on ([`Dda::settle`](super::dda::Dda::settle)).
+    /// The block ends here and now: what of its steps no segment has is taken off `target`. Every motor is at
+    /// its last step from now on ([`Dda::settle`](super::dda::Dda::settle)). Returns the segment that
+    /// was to come next, if it has been prepared.
     /// Cost: 4,000 a motor.
     #[inline(never)]
-    pub fn cut(&mut self, target: &mut [i32; MOTORS]) {
+    pub fn cut(&mut self, target: &mut [i32; MOTORS]) -> Option<Segment> {
         let mut bit = 1;
         for (m, target) in target.iter_mut().enumerate() {
             if (self.full | self.minor) & bit != 0 && self.left != 0 {
@@ -407,6 +408,9 @@ impl Prep {
         self.left = 0;
         self.time = 0;
         self.debt = [0; MOTORS];
+        // The segment that was to tell of it may be among those that are lost.
+        self.turned = true;
+        self.held.take()
     }
 
     /// Phase units that a motor is short of its target: exact.

@@ -184,6 +184,10 @@ fn act<M: Machine, O>(
         Action::Block if pair.kind == Kind::Text => return Err(Status::NotAccepted),
         Action::Block => return Err(Status::UnsupportedType),
         Action::Clear => return done(c.machine.clear()),
+        Action::Raise(alarm) => {
+            c.machine.alarm(alarm);
+            return Ok(());
+        }
         Action::Test if pair.kind == Kind::Null => return Ok(()),
         Action::Test => {
             let number = whole(pair, c)?;

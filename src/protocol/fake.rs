@@ -3,6 +3,7 @@
 use super::{
     CHUNK, Checksum, Machine, Mode, Next, Out, Request, StatusReport, Store, Value, Warning,
 };
+use crate::alarm::Alarm;
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::{Change, Overrides};
 use crate::gcode::tables::Row;
@@ -184,6 +185,8 @@ impl Machine for Fake {
         self.report.restore();
         Status::Ok
     }
+
+    fn alarm(&mut self, _alarm: Alarm) {}
 
     fn clear(&mut self) -> Status {
         Status::Ok

@@ -2,6 +2,7 @@
 
 use super::report::StatusReport;
 use super::value::Value;
+use crate::alarm::Alarm;
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::Change;
 use crate::gcode::tables::Row;
@@ -95,7 +96,9 @@ pub trait Machine {
     fn report(&mut self) -> &mut StatusReport;
     /// Restores the defaults of all settings and of the status report, or refuses to: 10 ms on AVR.
     fn restore(&mut self) -> Status;
-    /// Ends an alarm, if there is one.
+    /// Begins an alarm, if there is none as bad.
+    fn alarm(&mut self, alarm: Alarm);
+    /// Ends the alarm, if there is one, or refuses to. [`Status::Again`]: not yet.
     fn clear(&mut self) -> Status;
     /// Drops what is queued, or refuses to.
     fn flush(&mut self) -> Status;

@@ -10,7 +10,7 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 78;
+const ENTRIES: usize = 80;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
@@ -95,6 +95,8 @@ progmem! {
         (Status::WordConflict, text!("Two codes of the line use the same word")),
         (Status::Alarmed, text!("Machine is alarmed - Command not processed")),
         (Status::LimitHit, text!("Limit switch hit - Shutdown occurred")),
+        (Status::ShutDown, text!("Shut down [$clear to reset]")),
+        (Status::Panicked, text!("Panic [^x to reset]")),
         (Status::KillJob, text!("Kill job")),
         (Status::SoftLimit, text!("Soft limit exceeded")),
         (Status::HomingAxis, text!("Homing Error - Bad or no axis specified")),

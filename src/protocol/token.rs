@@ -5,6 +5,7 @@ use super::value::{
     Form, PROBE_STATE, PROBED, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value,
     Vector, place_form, vector_value,
 };
+use crate::alarm::Alarm;
 use crate::config::name::{Name, axis_letter, axis_of};
 use crate::config::rows::{find_row, row_name, value_name};
 use crate::config::table::Kind;
@@ -215,10 +216,13 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [(Text, Action); 17] = [
+    static ACTIONS: [(Text, Action); 20] = [
         (text!("gc"), Action::Block),
         (text!("clear"), Action::Clear),
         (text!("clr"), Action::Clear),
+        (text!("alarm"), Action::Raise(Alarm::Alarm)),
+        (text!("shutd"), Action::Raise(Alarm::Shutdown)),
+        (text!("panic"), Action::Raise(Alarm::Panic)),
         (text!("me"), Action::Energize),
         (text!("md"), Action::Release),
         (text!("test"), Action::Test),
@@ -238,12 +242,13 @@ progmem! {
 
 /// What a request may have done.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(u8)]
 pub enum Action {
     /// `gc`: run a block of G-code.
     Block,
     /// `clear`, `clr`: end the alarm.
     Clear,
+    /// `alarm`, `shutd`, `panic`: begin one.
+    Raise(Alarm),
     /// `me`: power motors.
     Energize,
     /// `md`: take power from motors.

@@ -5,6 +5,7 @@
 //! milliseconds ([`enough`]), 4,000 to 14,000 cycles each; the rest one by one, when one is used up or thread mode
 //! has nothing else to do: a line that has come is answered meanwhile.
 
+use crate::alarm::Alarm;
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::imp::{exec, flags, stepper};
@@ -14,8 +15,9 @@ use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
+use crate::motion::snapshot::Program;
 use crate::tasks::health::{self, Sign};
-use crate::tasks::{hold, links, overrides, power, spindle};
+use crate::tasks::{alarm, hold, links, overrides, power, spindle};
 
 /// CPU cycles in so many tenths of a millisecond.
 const fn tenths(of_ms: u32) -> u32 {
@@ -31,7 +33,7 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
     loop {
         exec::wait(|| {
             health::answer(Sign::Exec);
-            (segments.used() < most.into()).then_some(())
+            (segments.used() < most.into() || stepper::is_stopped()).then_some(())
         })
         .await;
         let waiting = blocks.len();
@@ -49,7 +51,10 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
                 out.finished = line;
             }
             let line = out.line;
-            let step = machine.step(&mut blocks, standstill, out, &mut segment);
+            let step = match stepper::is_stopped() {
+                true => Step::Held,
+                false => machine.step(&mut blocks, standstill, out, &mut segment),
+            };
             if out.line != line {
                 finished.end(line);
             }
@@ -67,9 +72,12 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
                 hold::dropped(|| {
                     // What has paused stays off.
                     out.outputs = spindle::on();
-                    machine.drop_all(&mut blocks, out);
-                    stepper::settle();
+                    let held = machine.drop_all(&mut blocks, out);
+                    stepper::settle(held, &mut out.target);
                     finished.rest();
+                    if alarm::now() >= Alarm::Shutdown {
+                        out.program = Program::Ready;
+                    }
                 });
             } else if step == Step::Switched {
                 machine.wait(spindle::switch(out, true), out);

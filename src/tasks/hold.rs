@@ -91,7 +91,7 @@ fn begin() {
 }
 
 /// Ends a hold at once.
-pub fn end() {
+fn end() {
     wanted().set(OFF);
     exec::pend();
 }
@@ -131,6 +131,34 @@ pub fn dropped(drop_all: impl FnOnce()) {
         drop_all();
         dropping().set(0);
         flags::set(Event::BlockDone);
+    }
+}
+
+/// An alarm: drops what is queued when the machine has come to rest, which it does now.
+/// What waits to be interpreted is left to the parser.
+pub fn abandon(links: &Links) {
+    begin();
+    links.percent.set(false);
+    links.resume.set(false);
+    drop_queue(links);
+}
+
+/// The queue has been dropped: the hold is over, unless the door is open.
+pub fn over(links: &Links) {
+    links.flush.set(Flush::None);
+    if !links.door_open.get() {
+        end();
+    }
+}
+
+/// The door has been opened: nothing moves. Or shut: what is held waits for a tilde, if there is anything.
+pub fn door(links: &Links, open: bool) {
+    links.door_open.set(open);
+    let works = links.has_data() || View::of(links, links.feeder()).has_work();
+    if open {
+        begin();
+    } else if !works && links.flush.get() == Flush::None {
+        end();
     }
 }
 
@@ -233,7 +261,7 @@ pub fn ahead(links: &Links, mark: u8) {
 
 /// What is held goes on; and what waits at a program stop.
 fn go_on(links: &Links) {
-    if links.resume.take() && links.flush.get() == Flush::None {
+    if links.resume.take() && links.flush.get() == Flush::None && !links.door_open.get() {
         pass();
         links.cycle_start.signal();
         // It may have looked already, when the character came, and sleep again.
@@ -244,6 +272,11 @@ fn go_on(links: &Links) {
 /// All lines in the pool are dropped, and the queue next.
 fn rest(links: &Links) {
     links.ports.iter().for_each(|port| port.lines.borrow_mut().terminate());
+    drop_queue(links);
+}
+
+/// The planner is to drop the queue.
+fn drop_queue(links: &Links) {
     links.flush.set(Flush::Rest);
     links.parser_wake.signal();
     // Wherever the planner waits.

@@ -66,8 +66,10 @@ pub struct Links {
     pub resync: Cell<bool>,
     /// A new rate of USB, in bits a second: the parser sets it when its response has left.
     pub rate: Cell<Option<u32>>,
-    /// The limits that were hit first, as bits of the ends: nothing moves any more, until reset.
+    /// The limits that were hit first, as bits of the ends, for the report.
     pub limits_hit: Cell<u8>,
+    /// The door is open: nothing goes on.
+    pub door_open: Cell<bool>,
     /// The cycle of the machine that runs.
     pub cycle: Cell<Cycle>,
     /// What probing has found.

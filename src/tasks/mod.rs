@@ -1,6 +1,7 @@
 //! The tasks. Each is a thin `async fn` around a part that knows nothing of tasks; `links` lists
 //! everything that connects them.
 
+pub mod alarm;
 pub mod control;
 pub mod exec;
 pub mod health;

@@ -4,18 +4,20 @@
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
 //! data lines of the port that feeds the machine only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
 //! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
-//! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`]. After a
-//! limit has been hit lines of G-code are refused.
+//! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`]. In an
+//! alarm lines of G-code are refused.
 
 use embassy_time::Timer;
 use heapless::Vec;
 
+use super::alarm;
 use super::hold::Flush;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::ports::{Chosen, Port};
 use super::tx::Tx;
 use super::view::View;
+use crate::alarm::{Alarm, is_program_end};
 use crate::hal::imp;
 use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::serial::USB;
@@ -29,7 +31,7 @@ const ECHO: usize = 62;
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
-        let alarmed = links.limits_hit.get() != 0;
+        let alarmed = alarm::is_on();
         let free = is_free(links);
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
@@ -79,7 +81,7 @@ fn dropped(links: &Links, flush: Flush) -> Option<Chosen<'_>> {
 /// tables, and nothing is being dropped.
 fn is_free(links: &Links) -> bool {
     let waits = links.commands_taken.get() || links.storage.is_awaited();
-    (!waits && links.flush.get() == Flush::None) || links.limits_hit.get() != 0
+    !waits && links.flush.get() == Flush::None
 }
 
 /// Carries out the next line of a built-in job. Its end, and a line that is refused, are told by an exception
@@ -272,7 +274,8 @@ fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> boo
 #[inline(never)]
 fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Request) -> bool {
     if links.flush.get() != Flush::None {
-        request.ran(Status::Terminated, false);
+        let alarm = alarm::now();
+        request.ran(if alarm == Alarm::None { Status::Terminated } else { alarm.status() }, false);
         return true;
     }
     if links.may_feed(port) && !is_free(links) {
@@ -314,17 +317,27 @@ fn run_block(links: &Links, port: &Port, block: &[u8], tried: Usual) -> (Status,
 
 /// Ends the program, as M2 does, for one that has been killed. The planner is free.
 pub fn end_program(links: &Links) {
-    // It is never refused, and changes no table.
-    let _ = interpret(links, b"M2", Usual::NotTried);
+    // It is never refused, not in an alarm either, and changes no table.
+    let _ = carry_out(links, b"M2", Usual::NotTried);
+}
+
+/// Refuses a block in an alarm, unless it ends that, and else carries it out.
+fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
+    let alarm = alarm::now();
+    if alarm != Alarm::None {
+        if !(alarm.ends_with_program() && is_program_end(block)) {
+            return (alarm.status(), true);
+        }
+        // The queue has been dropped, so that nothing is waited for.
+        let _ = alarm::clear(links, &links.settings.borrow());
+    }
+    carry_out(links, block, tried)
 }
 
 /// Interprets a block and hands its commands to the planner. Returns also whether it may have a
 /// comment.
 #[inline(never)]
-fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
-    if links.limits_hit.get() != 0 {
-        return (Status::LimitHit, true);
-    }
+fn carry_out(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
     let mut commands = links.commands.borrow_mut();
     let settings = links.settings.borrow();
     let mut model = links.model.borrow_mut();

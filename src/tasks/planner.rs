@@ -9,6 +9,7 @@ mod seek;
 
 use embassy_futures::yield_now;
 
+use super::alarm;
 use super::hold::{self, Flush};
 use super::links::{self, Cycle, Links};
 use super::parser;
@@ -413,12 +414,11 @@ impl Planner {
         model.set_outputs(&spindle, coolant_of(motion.outputs));
         drop(model);
         links.job.set(Job::default());
-        links.flush.set(Flush::None);
-        hold::end();
+        hold::over(links);
         if links.killed.get() {
             links.except(Status::KillJob);
         }
-        links.flushed.set(true);
+        links.flushed.set(!alarm::is_on());
         links.reporter_wake.urge();
     }
 

@@ -8,9 +8,9 @@
 
 use core::cell::UnsafeCell;
 
-use super::hold;
 use super::links::{snapshot, update};
 use super::storage::Storage;
+use super::{alarm, hold};
 use crate::config::Setting;
 use crate::hal::byte::SharedByte;
 use crate::hal::imp::{exec, gpio, pwm, stepper};
@@ -43,7 +43,7 @@ pub fn switch(out: &Snapshot, changed: bool) -> u16 {
     let before = on();
     // A probe that has made contact holds as well.
     let wanted = match out.held && hold::is_on() {
-        _ if stepper::is_stopped() => 0,
+        _ if stepper::is_stopped() || alarm::is_on() => 0,
         true => spindle.held(out.outputs),
         false => out.outputs,
     };
@@ -57,7 +57,7 @@ pub fn switch(out: &Snapshot, changed: bool) -> u16 {
     spindle.spin_up(before, wanted)
 }
 
-/// The steps have been stopped until reset: so are the outputs. Thread mode only.
+/// An alarm has begun: the outputs go off. Thread mode only.
 pub fn stop() {
     // Exec, which alone may do so, cannot run.
     exec::lock(|_| update(|out| switch(out, true)));

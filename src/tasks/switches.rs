@@ -1,25 +1,31 @@
-//! Switches: what their settings make of them, and what a limit that is hit leads to.
+//! Switches: what their settings make of them, and what the limits, the door and the emergency stop lead to.
 //!
-//! The interrupt that finds a limit hit has stopped the steps already (`hal::imp::inputs`). This, called by the
-//! control task, switches spindle and coolant off and has the reporter tell; from then on lines of G-code are
-//! refused, and the motors stand wherever they were in the middle of their steps until a reset (`^x`): position
-//! is lost. Settings and reports go on. Nothing here waits, and nothing can be full.
+//! The interrupt that finds a limit hit, or the emergency stop, has stopped the steps already (`hal::imp::inputs`).
+//! This, called by the control task, raises the [`alarm`]. Nothing here waits, and nothing can be full.
 //!
 //! A limit is a switch whose `sn` or `sx` says so; by default none does, so that a machine without switches runs.
 //! It counts when it closes (with `st` 1, opens), not if it stands so: a machine can start on its limit and move
 //! off it. Homing will take its axis out of `limits` for as long as it goes; a probe will be latched where limits
 //! stop the steps.
+//!
+//! Door and emergency stop count as they stand, if `saf` and `est` say that there are any. The door is a hold
+//! that no tilde ends before it is shut; one that is open when nothing runs keeps what comes from beginning.
+
+use kerf_macros::small;
 
 use super::links::Links;
-use super::spindle;
+use super::{alarm, hold};
+use crate::alarm::Alarm;
 use crate::boards::{ACTIVE, inputs};
 use crate::config::Settings;
 use crate::gcode::setup::{AxisMode, Setup};
-use crate::hal::imp::inputs as pins;
-use crate::status::Status;
+use crate::hal::event::Event;
+use crate::hal::imp::{flags, inputs as pins};
 
 /// Of `sn` and `sx`: a limit.
 const LIMIT: u8 = 2;
+/// Of `saf` and `est`: it opens when it is worked.
+const OPENS: u8 = 2;
 
 /// The inputs that the board has.
 pub const WIRED: u16 = {
@@ -46,23 +52,47 @@ pub fn mode(settings: &Settings, end: u8) -> u8 {
     }
 }
 
-/// Takes over what the settings say. Those that are no ends close when they are worked, whatever `st` says.
+/// Takes over what the settings say. Those at no end close when they are worked, unless a setting says otherwise.
 #[inline(never)]
+#[small]
 pub fn set_up(settings: &Settings) {
-    let closing = if settings.switches_normally_closed() { !ENDS } else { u16::MAX };
+    let mut closing = if settings.switches_normally_closed() { !ENDS } else { u16::MAX };
+    if settings.door_switch() == OPENS {
+        closing &= !(1 << inputs::DOOR);
+    }
+    if settings.stop_switch() == OPENS {
+        closing &= !(1 << inputs::STOP);
+    }
     let is_limit = |end: &u8| mode(settings, *end) & LIMIT != 0;
-    let limits = (0..inputs::ENDS as u8).filter(is_limit).fold(0, |bits, end| bits | 1 << end);
-    pins::set_up(closing & WIRED, limits & WIRED as u8);
+    let mut stops = (0..inputs::ENDS as u8).filter(is_limit).fold(0, |bits, end| bits | 1 << end);
+    if settings.stop_switch() != 0 {
+        stops |= 1 << inputs::STOP;
+    }
+    pins::set_up(closing & WIRED, stops & WIRED);
+    // They may be worked already.
+    flags::set(Event::Realtime);
+}
+
+/// Whether the emergency stop is hit.
+pub fn is_stopped(settings: &Settings) -> bool {
+    settings.stop_switch() != 0 && pins::worked() & 1 << inputs::STOP != 0
 }
 
 /// Looks for what has happened.
 pub fn serve(links: &Links) {
     let hits = pins::take_hits();
-    if hits != 0 && links.limits_hit.get() == 0 {
-        links.limits_hit.set(hits);
-        spindle::stop();
-        links.except(Status::LimitHit);
-        links.parser_wake.signal();
+    let settings = links.settings.borrow();
+    let stops = hits & 1 << inputs::STOP != 0 || is_stopped(&settings);
+    let open = settings.door_switch() != 0 && pins::worked() & 1 << inputs::DOOR != 0;
+    drop(settings);
+    if stops {
+        alarm::raise(links, Alarm::Shutdown);
+    } else if hits as u8 != 0 && alarm::now() < Alarm::Limit {
+        links.limits_hit.set(hits as u8);
+        alarm::raise(links, Alarm::Limit);
+    }
+    if open != links.door_open.get() {
+        hold::door(links, open);
     }
     links.reporter_wake.signal();
 }

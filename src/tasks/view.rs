@@ -6,6 +6,7 @@
 
 use core::cell::{OnceCell, RefMut};
 
+use super::alarm;
 use super::hold;
 use super::links::{Cycle, Links, snapshot};
 use super::overrides;
@@ -14,6 +15,7 @@ use super::power;
 use super::setup::moved_by;
 use super::spindle;
 use super::switches;
+use crate::alarm::Alarm;
 use crate::baud;
 use crate::boards::{MOTORS, inputs};
 use crate::config::{Setting, Settings};
@@ -35,8 +37,8 @@ use crate::units::Length;
 
 /// `stat` while the machine is in a machining cycle.
 pub const RUN: i32 = 5;
-/// `stat` after a limit has been hit.
-const ALARM: i32 = 2;
+/// Those from here on are five less as `macs`.
+const INTERLOCK: i32 = 11;
 /// `stat` in the cycles of the machine.
 const PROBING: i32 = 7;
 /// See [`PROBING`].
@@ -91,8 +93,12 @@ impl<'a> View<'a> {
 
     /// Whether anything is queued or runs, or a hold is on.
     pub fn is_busy(&self) -> bool {
-        hold::is_on()
-            || self.motion().running
+        hold::is_on() || self.has_work()
+    }
+
+    /// Whether anything is queued or runs.
+    pub fn has_work(&self) -> bool {
+        self.motion().running
             || queue::used() > 0
             || self.links.commands_taken.get()
             || !self.links.job.get().is_none()
@@ -100,11 +106,13 @@ impl<'a> View<'a> {
 
     /// `stat`.
     pub fn state(&self) -> i32 {
-        if self.links.limits_hit.get() != 0 {
-            return ALARM;
+        let is_g2core = self.settings.is_g2core();
+        if let Some(state) = alarm::now().state(is_g2core) {
+            return state;
         }
         if hold::is_on() {
-            return HOLD;
+            let interlock = is_g2core && self.links.door_open.get();
+            return if interlock { INTERLOCK } else { HOLD };
         }
         match self.links.cycle.get() {
             Cycle::Off => {}
@@ -242,8 +250,10 @@ impl Machine for View<'_> {
             Value::State => self.state(),
             Value::Machine => match self.state() {
                 HOLD | PROBING | HOMING | JOGGING => RUN,
+                state if state >= INTERLOCK => state - (INTERLOCK - 6),
                 state => state,
             },
+            Value::Cycle if alarm::is_on() => 0,
             Value::Cycle => match self.links.cycle.get() {
                 Cycle::Off => i32::from(self.is_busy()),
                 Cycle::Probe => 2,
@@ -333,9 +343,12 @@ impl Machine for View<'_> {
         Status::Ok
     }
 
+    fn alarm(&mut self, alarm: Alarm) {
+        alarm::raise(self.links, alarm);
+    }
+
     fn clear(&mut self) -> Status {
-        // Where the motors are is known after a reset only.
-        if self.links.limits_hit.get() != 0 { Status::LimitHit } else { Status::Ok }
+        alarm::clear(self.links, &self.settings)
     }
 
     fn flush(&mut self) -> Status {

@@ -224,8 +224,15 @@ impl Rig {
     /// Forgets all that is queued; it has been held. The moves that follow begin where the motors are.
     pub fn drop_all(&mut self) {
         assert!(self.snapshot.held);
-        self.exec.drop_all(&mut self.source, &mut self.snapshot);
-        self.dda.settle();
+        self.forget_all();
+    }
+
+    /// The same wherever the motors are: their ticks have been stopped.
+    pub fn forget_all(&mut self) {
+        let mut held = self.exec.drop_all(&mut self.source, &mut self.snapshot);
+        let queued = || self.drain.pop().or_else(|| held.take());
+        self.dda.settle(queued, &mut self.snapshot.target);
+        self.pins.stopped = true;
         let steps = self.snapshot.target;
         self.travel = steps.map(|steps| i64::from(steps) * i64::from(STEP));
         self.builder.place(&steps);
@@ -268,6 +275,25 @@ impl Rig {
             }
         }
         step
+    }
+
+    /// Queues some segments, runs some ticks, and stops them.
+    pub fn stop_short(&mut self, segments: usize, ticks: usize) {
+        for _ in 0..segments {
+            let mut segment = Segment::default();
+            let standstill = self.pins.stopped && self.drain.is_empty();
+            let out = &mut self.snapshot;
+            if self.exec.step(&mut self.source, standstill, out, &mut segment) == Step::Segment {
+                self.fill.push(segment).expect("room");
+                self.pins.stopped = false;
+            }
+        }
+        for _ in 0..ticks {
+            if !self.pins.stopped {
+                self.tick();
+            }
+        }
+        self.forget_all();
     }
 
     fn add(&mut self, segment: &Segment) {

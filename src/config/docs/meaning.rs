@@ -16,10 +16,7 @@ pub const SYSTEM: [Meaning; SYSTEM_ROWS] = [
     ("ja", "Acceleration towards the centre of a corner; more makes corners faster."),
     ("ct", "How far the chords of an arc may leave it."),
     ("sl", "Moves of homed axes beyond `tn` and `tm` are refused (220)."),
-    (
-        "st",
-        "Kind of switches at the ends of axes: open or closed unless worked. Probe, door and emergency stop close.",
-    ),
+    ("st", "Kind of switches at the ends of axes: open or closed unless worked. A probe closes."),
     ("mt", "How long motors with `pm` 2 stay powered after a move."),
     (
         "ej",
@@ -69,6 +66,16 @@ left; 115200 after a reset.",
     ),
     ("spw", "How long a step pulse lasts. Longer pulses may lower `vm` and `fr`."),
     ("dsu", "How long a direction pin stands before a step."),
+    (
+        "saf",
+        "Door switch: none, one that closes when the door is opened, or one that opens. An open door holds the machine; \
+`~` resumes when it is shut.",
+    ),
+    (
+        "est",
+        "Emergency stop: none, one that closes when it is hit, or one that opens, as a broken wire does. It shuts the \
+machine down: no step more, spindle and coolant off, motors keep their power.",
+    ),
 ];
 
 pub const MOTOR: [Meaning; MOTOR_ROWS] = [

@@ -3,7 +3,7 @@
 //! | interrupt | does | cycles |
 //! |---|---|---|
 //! | INT0 to INT7, PCINT0 to PCINT2 | starts timer 2: someone has to look | 20, interrupts off |
-//! | TIMER2_COMPA | looks at all pins, as [`Switches`] wants it | 300, interrupts off for 26 and 18 |
+//! | TIMER2_COMPA | looks at all pins, as [`Switches`] wants it | 300, interrupts off for 26 and 26 |
 //!
 //! While no switch moves none of them comes. The look lets all interrupts in but itself and exec, which would run
 //! far too long inside it. Where a limit is hit it stops the steps right there: 20 us after the edge and its own
@@ -81,10 +81,10 @@ struct State {
     switches: Switches,
     /// Low is worked.
     low: u16,
-    /// Limits, of the ends.
-    limits: u8,
-    /// Limits that have been hit.
-    hits: u8,
+    /// What stops the steps.
+    stops: u16,
+    /// Those of them that have been hit.
+    hits: u16,
     /// Those that end a move, and what they must be for it.
     armed: u16,
     awaited: u16,
@@ -100,7 +100,7 @@ unsafe impl Sync for Shared {}
 static STATE: Shared = Shared(UnsafeCell::new(State {
     switches: Switches::new(),
     low: 0,
-    limits: 0,
+    stops: 0,
     hits: 0,
     armed: 0,
     awaited: 0,
@@ -134,10 +134,10 @@ pub fn start() {
     }
 }
 
-/// Which inputs are worked when low, and which ends are limits. Thread mode.
-pub fn set_up(low: u16, limits: u8) {
+/// Which inputs are worked when low, and which of them stop the steps. Thread mode.
+pub fn set_up(low: u16, stops: u16) {
     with(|state| {
-        state.limits = limits;
+        state.stops = stops;
         if state.low != low {
             (state.low, state.fresh) = (low, true);
             // SAFETY: starts a look; one that is due does it all the same.
@@ -157,8 +157,8 @@ pub fn worked() -> u16 {
     with(|state| state.switches.worked())
 }
 
-/// The limits that have been hit since the last call. Thread mode.
-pub fn take_hits() -> u8 {
+/// What has stopped the steps since the last call. Thread mode.
+pub fn take_hits() -> u16 {
     with(|state| core::mem::take(&mut state.hits))
 }
 
@@ -199,10 +199,14 @@ extern "C" fn look() {
         state.switches.note(now);
         wait();
         now = levels() ^ state.low;
+        // Before anything else: each cycle counts, and only two in five are ours.
+        if state.switches.changed(now) & now & state.stops != 0 {
+            stepper::stop();
+        }
     }
     let (changed, next) = state.switches.look(now);
     if changed != 0 {
-        let hits = (changed & now) as u8 & state.limits;
+        let hits = changed & now & state.stops;
         if hits != 0 {
             stepper::stop();
             state.hits |= hits;
@@ -311,25 +315,30 @@ extern "C" fn __vector_13() -> ! {
             "pop  r1",
             "pop  r0",
             "pop  r25",
-            // Lets exec in again if it was not closed before, as `exec::open`.
+            // Lets exec in again if it was not closed before, as `exec::open`. Not before looks may come again: it
+            // runs for milliseconds.
+            "ldi  r24, {unmask}",
             "tst  r25",
             "brne 1f",
+            "cli",
+            "sts  0x70, r24",
             "sts  {closed}, r25",
             "lds  r24, {missed}",
             "tst  r24",
-            "breq 1f",
+            "breq 2f",
             "sts  {missed}, r25",
             "ldi  r24, {pended}",
             "sts  0xD1, r24",
-            "1:",
-            "ldi  r24, {unmask}",
-            "cli",
-            "sts  0x70, r24",
+            "2:",
             "pop  r24",
             "out  0x3F, r24",
             "pop  r25",
             "pop  r24",
             "reti",
+            "1:",
+            "cli",
+            "sts  0x70, r24",
+            "rjmp 2b",
             closed = sym exec::CLOSED,
             missed = sym exec::MISSED,
             pended = const exec::PENDED,

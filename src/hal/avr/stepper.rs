@@ -5,9 +5,10 @@
 //! owns the step generator and the pins. Everything else here is for thread mode and exec.
 
 use core::cell::UnsafeCell;
+use kerf_macros::small;
 
 use super::gpio::{self, each_motor};
-use crate::boards::{ACTIVE, Timer};
+use crate::boards::{ACTIVE, MOTORS, Timer};
 use crate::hal::byte::SharedByte;
 use crate::hal::ring::{Producer, Ring};
 use crate::motion::dda::{Dda, SEGMENTS, Segment};
@@ -20,6 +21,8 @@ const TCNT1: *mut u16 = 0x84 as *mut u16;
 const OCR1A: *mut u16 = 0x88 as *mut u16;
 const TIFR1: *mut u8 = 0x36 as *mut u8;
 const TIMSK1: *mut u8 = 0x6F as *mut u8;
+/// General-purpose registers 1 and 2: the ticks left of the segment.
+const TICKS: [*mut u8; 2] = [0x4A as *mut u8, 0x4B as *mut u8];
 /// CTC with OCR1A as top, clock not divided.
 const RUN: u8 = 1 << 3 | 1;
 /// The same, stopped.
@@ -33,7 +36,7 @@ const FIRST_TICK: u16 = 400;
 
 pub(super) static SEGMENT_RING: Ring<Segment, SEGMENTS> = Ring::new();
 pub(super) static RUNNING: SharedByte = SharedByte::new(0);
-/// Set for good by [`stop`].
+/// Set by [`stop`].
 static STOPPED: SharedByte = SharedByte::new(0);
 
 /// How long pulses last, cycles, that no turn of a loop widens: in lockstep, and else.
@@ -104,28 +107,45 @@ pub fn go() {
     });
 }
 
-/// Stops the ticks at once and until reset, wherever the motors are. Any level.
+/// Stops the ticks at once and until [`release`], wherever the motors are. Any level.
 pub fn stop() {
     STOPPED.set(1);
     kill();
 }
 
-/// Whether the ticks have been [stopped](stop) until reset.
+/// Whether they have been stopped.
 pub fn is_stopped() -> bool {
     STOPPED.get() != 0
 }
 
-/// Whether ticks are coming.
-pub fn running() -> bool {
-    RUNNING.get() != 0
+/// Ticks may come again. Thread mode, when the motors have [settled](settle).
+pub fn release() {
+    STOPPED.set(0);
 }
 
-/// Every motor is where its last pulse has put it. For exec, while no ticks come.
-pub fn settle() {
-    if RUNNING.get() == 0 {
-        // SAFETY: the timer stands still, so its interrupt does not run; exec alone starts it.
-        unsafe { &mut *STATE.0.get() }.settle();
+/// Whether ticks are coming.
+pub fn running() -> bool {
+    RUNNING.get() != 0 && !is_stopped()
+}
+
+/// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have
+/// come first after those that are queued. What they lack is taken off `position`. For exec, while no ticks come.
+#[inline(never)]
+#[small]
+pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
+    if running() {
+        return;
     }
+    // SAFETY: the timer stands still, so its interrupt does not run; exec alone starts it.
+    let (dda, mut segments) = unsafe { (&mut *STATE.0.get(), SEGMENT_RING.stand_in()) };
+    // SAFETY: as above: these are the interrupt's as well.
+    dda.ticks = u16::from_le_bytes(TICKS.map(|register| unsafe { register.read_volatile() }));
+    dda.settle(|| segments.pop().or_else(|| held.take()), position);
+    for register in TICKS {
+        // SAFETY: as above.
+        unsafe { register.write_volatile(0) };
+    }
+    RUNNING.set(0);
 }
 
 /// Where the generator is right now, between two ticks, and the slot of its segment. For the look interrupt, which

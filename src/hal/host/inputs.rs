@@ -13,8 +13,8 @@ struct Inputs {
     levels: Cell<u16>,
     switches: RefCell<Switches>,
     low: Cell<u16>,
-    limits: Cell<u8>,
-    hits: Cell<u8>,
+    stops: Cell<u16>,
+    hits: Cell<u16>,
     armed: Cell<(u16, u16)>,
     fresh: Cell<bool>,
     next_look: Cell<u64>,
@@ -25,7 +25,7 @@ machine_static! {
         levels: Cell::new(u16::MAX),
         switches: RefCell::new(Switches::new()),
         low: Cell::new(0),
-        limits: Cell::new(0),
+        stops: Cell::new(0),
         hits: Cell::new(0),
         armed: Cell::new((0, 0)),
         fresh: Cell::new(true),
@@ -37,9 +37,9 @@ const fn cycles(us: u32) -> u64 {
     (us * (ACTIVE.clock_hz / 1_000_000)) as u64
 }
 
-/// Which inputs are worked when low, and which ends are limits.
-pub fn set_up(low: u16, limits: u8) {
-    all().limits.set(limits);
+/// Which inputs are worked when low, and which of them stop the steps.
+pub fn set_up(low: u16, stops: u16) {
+    all().stops.set(stops);
     if all().low.replace(low) != low {
         all().fresh.set(true);
         edge();
@@ -57,8 +57,8 @@ pub fn worked() -> u16 {
     all().switches.borrow().worked()
 }
 
-/// The limits that have been hit since the last call.
-pub fn take_hits() -> u8 {
+/// What has stopped the steps since the last call.
+pub fn take_hits() -> u16 {
     all().hits.take()
 }
 
@@ -97,7 +97,7 @@ pub(super) fn look() {
     }
     let (changed, next) = switches.look(found);
     if changed != 0 {
-        let hits = (changed & found) as u8 & i.limits.get();
+        let hits = changed & found & i.stops.get();
         if hits != 0 {
             stepper::stop();
             i.hits.set(i.hits.get() | hits);

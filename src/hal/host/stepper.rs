@@ -124,15 +124,20 @@ pub fn go() {
     }
 }
 
-/// Stops the ticks at once and until reset, wherever the motors are.
+/// Stops the ticks at once and until [`release`], wherever the motors are.
 pub fn stop() {
     stepper().halted.set(true);
     stepper().next_tick.set(NEVER);
 }
 
-/// Whether the ticks have been [stopped](stop) until reset.
+/// Whether they have been stopped.
 pub fn is_stopped() -> bool {
     stepper().halted.get()
+}
+
+/// Ticks may come again.
+pub fn release() {
+    stepper().halted.set(false);
 }
 
 /// Whether ticks are coming.
@@ -140,9 +145,15 @@ pub fn running() -> bool {
     stepper().next_tick.get() != NEVER
 }
 
-/// Every motor is where its last pulse has put it. For exec, while no ticks come.
-pub fn settle() {
-    stepper().dda.borrow_mut().settle();
+/// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have
+/// come first after those that are queued. What they lack is taken off `position`. For exec, while no ticks come.
+pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
+    if running() {
+        return;
+    }
+    let mut segments = stepper().segments.borrow_mut();
+    let mut queued = || segments.as_mut().and_then(Consumer::pop).or_else(|| held.take());
+    stepper().dda.borrow_mut().settle(&mut queued, position);
 }
 
 /// Where the generator is right now, and the slot of its segment.
