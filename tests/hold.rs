@@ -16,7 +16,7 @@ use cases::cases;
 use jobs::{Job, any_job, plan_held};
 use keeps::check_limits;
 use kerf::boards::MOTORS;
-use kerf::motion::block::{Action, Block};
+use kerf::motion::block::{Action, Block, Outputs};
 use kerf::motion::exec::Step;
 use proptest::prelude::*;
 use rig::{Config, Rig, at};
@@ -174,7 +174,9 @@ fn a_dwell_pauses() {
 
 #[test]
 fn nothing_begins_in_a_hold() {
-    for action in [Action::Dwell(100), Action::Outputs(1), Action::ProgramStop] {
+    for action in
+        [Action::Dwell(100), Action::Outputs(Outputs { on: 1, speed: 0.0 }), Action::ProgramStop]
+    {
         let mut rig = Rig::new(Config::new(100.0, 1_000.0, 0.0));
         rig.line(at([1.0]), 50.0, 1);
         rig.push(Block::action(action, 2));

@@ -32,6 +32,7 @@ pub mod reach;
 mod replan;
 pub mod short;
 pub mod smooth;
+pub mod snapshot;
 pub mod source;
 pub mod state;
 pub mod steps;

@@ -5,11 +5,12 @@
 //! queued takes 9 ms at most. A factor that rises waits for the planner (`motion::replan`), which the
 //! control task wakes: [`Event::Realtime`]. Nothing here waits, and nothing can be full.
 //!
-//! [`spindle`] is what the speed of the spindle is to be multiplied by; whoever drives one asks.
+//! [`tell`] passes the factor of the spindle's speed on to those who drive it.
 
 use core::cell::UnsafeCell;
 
 use super::links::Links;
+use super::spindle;
 use crate::gcode::overrides::{Change, FULL, LEAST, Override, Overrides};
 use crate::hal::event::Event;
 use crate::hal::imp::{exec, flags, uart};
@@ -31,11 +32,6 @@ machine_static! {
 pub fn now() -> Overrides {
     // SAFETY: exec does not run under the lock.
     exec::lock(|_| unsafe { *shared().0.get() })
-}
-
-/// Thousandths that the speed of the spindle is to be multiplied by. Thread mode only.
-pub fn spindle() -> u16 {
-    now().in_force(Override::Spindle)
 }
 
 /// Changes them at once. Thread mode only.
@@ -91,6 +87,7 @@ fn step(which: Override, percent: i8, anew: bool) {
 
 /// Tells the others that they may have changed. Control only.
 pub fn tell(links: &Links) {
+    spindle::follow(now().in_force(Override::Spindle));
     links.planner_wake.signal();
     flags::set(Event::BlockDone);
     links.reporter_wake.signal();

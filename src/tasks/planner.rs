@@ -16,12 +16,12 @@ use super::setup::moved_by;
 use crate::boards::outputs;
 use crate::config::{Settings, StepRatio};
 use crate::gcode::arc::Walk;
-use crate::gcode::command::{Commands, Feed, Motion, Stop};
+use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
 use crate::gcode::modal::{self, Coolant};
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, wait};
 use crate::jobs::Job;
-use crate::motion::block::{Action, Block, Line as Move};
+use crate::motion::block::{Action, Block, Line as Move, Outputs};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line, Motors};
 use crate::motion::pace::Drivers;
@@ -41,8 +41,8 @@ struct Planner {
     line: u32,
     /// What exec has been told that drivers ask for.
     drivers: Drivers,
-    /// What exec has been told to switch, bits of [`outputs`].
-    outputs: u8,
+    /// What exec has been told to switch.
+    outputs: Outputs,
     /// How far the line has been carried out.
     steps: Steps,
     walk: Option<ArcWalk>,
@@ -98,7 +98,7 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         position: [Length::ZERO; AXES],
         line: 0,
         drivers: Drivers::USUAL,
-        outputs: 0,
+        outputs: Outputs { on: 0, speed: 0.0 },
         steps: Steps::default(),
         walk: None,
         parts: None,
@@ -228,23 +228,16 @@ impl Planner {
                 let _ = self.queue.push_aside(block);
                 self.announce();
             }
-            Step::Spindle(spindle) => {
-                let turn = match spindle.turn {
-                    modal::Turn::Off => 0,
-                    modal::Turn::Clockwise => outputs::SPINDLE,
-                    modal::Turn::Counterclockwise => outputs::SPINDLE | outputs::COUNTERCLOCKWISE,
-                };
-                self.switch(outputs::SPINDLE | outputs::COUNTERCLOCKWISE, turn);
-            }
+            Step::Spindle(spindle) => self.set_spindle(spindle),
             Step::Coolant(coolant) => {
                 let bit =
                     |which: Coolant, output| if coolant & which as u8 != 0 { output } else { 0 };
                 let on = bit(Coolant::Mist, outputs::MIST) | bit(Coolant::Flood, outputs::FLOOD);
-                self.switch(outputs::MIST | outputs::FLOOD, on);
+                self.switch(outputs::MIST | outputs::FLOOD, on, self.outputs.speed);
             }
-            Step::Stop(Stop::End) if self.outputs != 0 => {
+            Step::Stop(Stop::End) if self.outputs.on != 0 => {
                 // Another turn ends the program.
-                self.switch(u8::MAX, 0);
+                self.switch(u8::MAX, 0, 0.0);
                 self.steps.repeat();
             }
             Step::Stop(Stop::End) => self.pause(Action::ProgramEnd),
@@ -349,9 +342,20 @@ impl Planner {
         }
     }
 
-    /// Switches those of `which` on that are in `on`, the others of `which` off.
-    fn switch(&mut self, which: u8, on: u8) {
-        let outputs = self.outputs & !which | on;
+    fn set_spindle(&mut self, spindle: &Spindle) {
+        let (turn, speed) = match spindle.turn {
+            modal::Turn::Off => (0, 0.0),
+            modal::Turn::Clockwise => (outputs::SPINDLE, spindle.speed),
+            modal::Turn::Counterclockwise => {
+                (outputs::SPINDLE | outputs::COUNTERCLOCKWISE, spindle.speed)
+            }
+        };
+        self.switch(outputs::SPINDLE | outputs::COUNTERCLOCKWISE, turn, speed);
+    }
+
+    /// Switches those of `which` on that are in `on`, the others of `which` off; the spindle is to have this speed.
+    fn switch(&mut self, which: u8, on: u8, speed: f32) {
+        let outputs = Outputs { on: self.outputs.on & !which | on, speed };
         if outputs != self.outputs {
             self.outputs = outputs;
             self.pause(Action::Outputs(outputs));
@@ -405,7 +409,8 @@ impl Planner {
         self.relocate(&motion);
         self.news = News::None;
         let mut model = links.model.borrow_mut();
-        model.set_outputs(spindle_of(motion.outputs), coolant_of(motion.outputs));
+        let spindle = Spindle { turn: spindle_of(motion.outputs), speed: motion.speed };
+        model.set_outputs(&spindle, coolant_of(motion.outputs));
         drop(model);
         links.job.set(Job::default());
         links.flush.set(Flush::None);

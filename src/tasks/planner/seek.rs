@@ -14,10 +14,10 @@ use crate::boards::MOTORS;
 use crate::gcode::command::Feed;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::inputs;
-use crate::motion::block::Action;
+use crate::motion::block::{Action, Outputs};
 use crate::motion::dynamics::PER_SECOND_CUBED;
-use crate::motion::exec::Snapshot;
 use crate::motion::short::Short;
+use crate::motion::snapshot::Snapshot;
 use crate::motion::{contact, queue};
 use crate::tasks::{hold, links};
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
@@ -98,7 +98,7 @@ impl Planner {
         self.builder.place(&motion.target);
         self.queue.restart();
         (self.walk, self.parts) = (None, None);
-        self.outputs = motion.outputs;
+        self.outputs = Outputs { on: motion.outputs, speed: motion.speed };
         self.links.model.borrow_mut().set_position(&self.position);
     }
 
