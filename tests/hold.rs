@@ -16,7 +16,7 @@ use cases::cases;
 use jobs::{Job, any_job, plan_held};
 use keeps::check_limits;
 use kerf::boards::MOTORS;
-use kerf::motion::block::{Block, Body, Outputs};
+use kerf::motion::block::{Action, Block, Outputs};
 use kerf::motion::dda::SEGMENTS;
 use kerf::motion::exec::Step;
 use proptest::prelude::*;
@@ -197,7 +197,7 @@ fn until_held(rig: &mut Rig) {
 #[test]
 fn a_dwell_pauses() {
     let mut rig = Rig::new(Config::new(100.0, 1_000.0, 0.0));
-    rig.push(Block { body: Body::Dwell(500), line: 1 });
+    rig.push(Block::action(Action::Dwell(500), 1));
     (0..100).for_each(|_| _ = rig.turn());
     until_held(&mut rig);
     let before = rig.seconds();
@@ -210,17 +210,18 @@ fn a_dwell_pauses() {
 
 #[test]
 fn nothing_begins_in_a_hold() {
-    for body in [Body::Dwell(100), Body::Outputs(Outputs { on: 1, speed: 0.0 }), Body::ProgramStop]
+    for action in
+        [Action::Dwell(100), Action::Outputs(Outputs { on: 1, speed: 0.0 }), Action::ProgramStop]
     {
         let mut rig = Rig::new(Config::new(100.0, 1_000.0, 0.0));
         rig.line(at([1.0]), 50.0, 1);
-        rig.push(Block { body, line: 2 });
+        rig.push(Block::action(action, 2));
         // So late that the plan itself comes to rest.
         while rig.source.len() > 1 {
             rig.turn();
         }
         until_held(&mut rig);
-        assert_eq!(rig.source.len(), 1, "{body:?}");
+        assert_eq!(rig.source.len(), 1, "{action:?}");
         assert_eq!((rig.snapshot.outputs, rig.snapshot.target[0]), (0, 80));
         rig.hold(false);
         rig.finish();
@@ -236,7 +237,7 @@ fn what_was_said_of_positions_before_the_first_move_holds() {
         if moved {
             rig.line(at([1.0]), 50.0, 1);
         }
-        rig.push(Block { body: Body::SetPosition([7; MOTORS]), line: 2 });
+        rig.push(Block::action(Action::SetPosition([7; MOTORS]), 2));
         until_held(&mut rig);
         rig.pins.position = [if moved { 0 } else { 7 }; MOTORS];
         rig.drop_all();

@@ -17,7 +17,7 @@ use cases::cases;
 use jobs::{Job, Planned, any_job, plan_changed};
 use keeps::STRETCH;
 use kerf::gcode::overrides::{Change, Override};
-use kerf::motion::block::{Block, Body};
+use kerf::motion::block::{Action, Block};
 use kerf::motion::exec::Step;
 use kerf::motion::factors::Factors;
 use proptest::prelude::*;
@@ -220,7 +220,7 @@ fn a_traverse_has_its_own_factor_and_no_feed_exceeds_the_axes() {
 fn what_stands_in_the_stream_acts_in_its_place_and_stops_nothing() {
     let mut rig = Rig::new(Config::new(100.0, 1_000.0, 0.0));
     rig.line(at([10.0]), 40.0, 1);
-    rig.aside(Block { body: Body::Override(Change::to(Override::Feed, 500)), line: 2 });
+    rig.aside(Block::action(Action::Override(Change::to(Override::Feed, 500)), 2));
     rig.line(at([20.0]), 40.0, 2);
     let mut step = rig.turn();
     while !matches!(step, Step::Override(_)) {

@@ -9,10 +9,13 @@ use super::modal::{MotionMode, Plane, Turn};
 use super::overrides::Change;
 use crate::units::{Length, PerAxis};
 
+/// The highest N word: blocks keep it in three bytes.
+pub const N_MAX: u32 = 0xFF_FFFF;
+
 /// The canonical commands of one line, in order of execution.
 #[derive(Clone, Copy, Default, Debug, PartialEq)]
 pub struct Commands {
-    /// The N word, 0 if the line has none.
+    /// The N word, 0 if the line has none; at most [`N_MAX`].
     pub line: u32,
     /// M6: this tool is in the spindle.
     pub tool: Option<u8>,

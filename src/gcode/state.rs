@@ -5,7 +5,7 @@
 
 use super::block::Block;
 use super::codes::{NonModal, OverrideCode, StopCode, Switch};
-use super::command::{Commands, Spindle, Stop};
+use super::command::{Commands, N_MAX, Spindle, Stop};
 use super::limits;
 use super::modal::{Coolant, Defaults, FeedMode, Modal, MotionMode, PathMode, Turn, Units};
 use super::overrides::{Change, Override};
@@ -108,8 +108,12 @@ impl State {
 
     /// N, the modes, and F.
     fn begin(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
-        self.line = block.rare(N).map_or(Ok(0), |value| value.integer())?;
-        out.line = self.line;
+        let line = block.rare(N).map_or(Ok(0), |value| value.integer())?;
+        if line > N_MAX {
+            return Err(Status::OutOfRange);
+        }
+        self.line = line;
+        out.line = line;
         self.modes(block);
         self.feed(block)
     }

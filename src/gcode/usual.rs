@@ -242,14 +242,14 @@ impl<'a> Words<'a> {
         number.unwrap_or_default()
     }
 
-    /// A whole number below a billion.
+    /// A whole number below ten million. One that is longer is not usual: its next digit is no letter.
     #[inline(never)]
     fn integer(&mut self) -> u32 {
         let mut value = 0;
         if !self.byte.is_ascii_digit() {
             self.byte = BAD;
         }
-        while value < 100_000_000 && self.byte.is_ascii_digit() {
+        while value < 1_000_000 && self.byte.is_ascii_digit() {
             value = value * 10 + u32::from(self.byte - b'0');
             self.step();
         }

@@ -1,31 +1,57 @@
 //! A block: one straight move, dwell or synchronised command, as the planner leaves it for exec.
 //!
 //! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block decides how
-//! far Kerf looks ahead: limits take two bytes each.
+//! far Kerf looks ahead, and each byte of it is there 65 times. So limits take two bytes each, velocity, length
+//! and line number three, and a line, which knows no [`Reserve`] of 0, no tag: 28 bytes on AVR.
 
-use super::factors::{Extent, Factors};
+use super::factors::{Factors, Reserve};
+use super::medium::Medium;
 use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
 use crate::gcode::overrides::Change;
 
 /// One block.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Block {
     /// What it does.
     pub body: Body,
-    /// The N word, 0 for none.
-    pub line: u32,
+    line: [u8; 3],
 }
 
-/// What a block does.
-#[derive(Clone, Copy, Debug, Default)]
+impl Block {
+    /// A block of the line with this N word, 0 for none; at most [`N_MAX`](crate::gcode::command::N_MAX).
+    #[inline(always)]
+    pub fn new(body: Body, line: u32) -> Self {
+        let [a, b, c, _] = line.to_le_bytes();
+        Self { body, line: [a, b, c] }
+    }
+
+    /// A block that does something other than move.
+    pub fn action(action: Action, line: u32) -> Self {
+        Self::new(Body::Action(action), line)
+    }
+
+    /// The N word, 0 for none.
+    #[inline(always)]
+    pub fn line(&self) -> u32 {
+        let [a, b, c] = self.line;
+        u32::from_le_bytes([a, b, c, 0])
+    }
+}
+
+/// What a block does. Not one enum with [`Action`]: there is one value that a line cannot have.
+#[derive(Clone, Copy, Debug)]
 pub enum Body {
-    /// Nothing.
-    #[default]
-    Nothing,
     /// Moves the motors.
     Line(Line),
+    /// Does something else.
+    Action(Action),
+}
+
+/// What a block does that moves nothing.
+#[derive(Clone, Copy, Debug)]
+pub enum Action {
     /// Stands still for so many milliseconds.
     Dwell(u32),
     /// G28.3: from here on the motor positions are these.
@@ -56,10 +82,12 @@ pub struct Outputs {
 pub struct Line {
     /// Signed steps of each motor.
     pub steps: [i16; MOTORS],
-    /// Path length, and how much faster than `cruise` it may be run.
-    pub extent: Extent,
+    /// Path length, mm.
+    pub length: Medium,
+    /// How much faster than `cruise` it may be run.
+    pub reserve: Reserve,
     /// Velocity limit on the path, mm/s, at 100 %: the feed, or what the slowest axis or motor allows.
-    pub cruise: f32,
+    pub cruise: Medium,
     /// Brake potential where it starts; see `horizon`.
     pub start: f32,
     /// Highest velocity at which it may be entered, mm/s: the corner with the line before, whatever feeds are.
@@ -71,15 +99,9 @@ pub struct Line {
 }
 
 impl Line {
-    /// Path length, mm.
-    #[inline(always)]
-    pub fn length(&self) -> f32 {
-        self.extent.length()
-    }
-
     /// Velocity limit on the path under an override, mm/s.
     #[inline(always)]
     pub fn velocity(&self, factors: &Factors) -> f32 {
-        self.extent.velocity(self.cruise, factors)
+        self.reserve.velocity(self.cruise.get(), factors)
     }
 }

@@ -20,7 +20,7 @@
 //! Cost on AVR: 6,300 cycles for a short block without a jerk limit, with [`Prep`], the task and its
 //! interrupt; a third of them are the governor's floats.
 
-use super::block::{Block, Body, Line};
+use super::block::{Action, Block, Body, Line};
 use super::dda::Segment;
 use super::float::{below, scaled, some, whole};
 use super::governor::{Ahead, Governor};
@@ -158,9 +158,9 @@ impl Exec {
                 return self.idle(standstill, out);
             }
             if !self.begin(blocks, out)
-                && let Some(block) = blocks.oldest()
+                && let Some(Block { body: Body::Action(action), .. }) = blocks.oldest()
             {
-                return self.take_up(&block, blocks, standstill, out);
+                return self.take_up(&action, blocks, standstill, out);
             }
         }
         self.run(blocks, out, segment)
@@ -187,7 +187,8 @@ impl Exec {
     #[inline(never)]
     fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
         let running = &self.running;
-        let is_line = |block: &Block| matches!(block.body, Body::Line(_) | Body::Override(_));
+        let is_line =
+            |block: &Block| matches!(block.body, Body::Line(_) | Body::Action(Action::Override(_)));
         let goes_on = if running.active {
             // What the end of a block has been planned as is handed out.
             running.done || !self.governor.is_at_rest()
@@ -219,9 +220,9 @@ impl Exec {
         out.program = Program::Stopped;
         while let Some(block) = blocks.oldest() {
             match &block.body {
-                Body::Drivers(drivers) => self.prep.set_drivers(*drivers),
-                Body::SetPosition(steps) if !moved => out.target = *steps,
-                Body::Nothing | Body::SetPosition(_) | Body::Override(_) => {}
+                Body::Action(Action::Drivers(drivers)) => self.prep.set_drivers(*drivers),
+                Body::Action(Action::SetPosition(steps)) if !moved => out.target = *steps,
+                Body::Action(Action::SetPosition(_) | Action::Override(_)) => {}
                 _ => moved = true,
             }
             blocks.enter();
@@ -234,22 +235,22 @@ impl Exec {
     #[inline(never)]
     fn take_up(
         &mut self,
-        block: &Block,
+        action: &Action,
         blocks: &mut BlockSource,
         standstill: bool,
         out: &mut Snapshot,
     ) -> Step {
-        match &block.body {
-            Body::Dwell(ms) => {
+        match action {
+            Action::Dwell(ms) => {
                 self.dwell_ms = *ms;
                 self.halt(out);
                 out.running = true;
             }
-            Body::SetPosition(steps) => {
+            Action::SetPosition(steps) => {
                 out.target = *steps;
                 out.left = 0.0;
             }
-            Body::Outputs(outputs) => {
+            Action::Outputs(outputs) => {
                 self.halt(out);
                 if !standstill {
                     return Step::Standstill;
@@ -258,24 +259,24 @@ impl Exec {
                 blocks.release();
                 return Step::Switched;
             }
-            Body::ProgramStop | Body::ProgramEnd => {
+            Action::ProgramStop | Action::ProgramEnd => {
                 self.halt(out);
                 if !standstill {
                     return Step::Standstill;
                 }
                 out.running = false;
-                out.program = match block.body {
-                    Body::ProgramEnd => Program::Ended,
+                out.program = match action {
+                    Action::ProgramEnd => Program::Ended,
                     _ => Program::Stopped,
                 };
             }
-            Body::Drivers(drivers) => self.prep.set_drivers(*drivers),
-            Body::Override(_) | Body::Nothing | Body::Line(_) => {}
+            Action::Drivers(drivers) => self.prep.set_drivers(*drivers),
+            Action::Override(_) => {}
         }
         blocks.release();
-        match &block.body {
-            Body::Override(change) => Step::Override(*change),
-            Body::ProgramEnd => Step::Override(Change::ALL_ON),
+        match action {
+            Action::Override(change) => Step::Override(*change),
+            Action::ProgramEnd => Step::Override(Change::ALL_ON),
             _ => Step::Again,
         }
     }
@@ -310,7 +311,7 @@ impl Exec {
         blocks.enter();
         let version = blocks.version().wrapping_sub(1);
         let lined = blocks.look(|block| {
-            out.line = block.line;
+            out.line = block.line();
             let Body::Line(line) = &block.body else { return false };
             self.begin_line(line, version, out);
             true
@@ -320,8 +321,8 @@ impl Exec {
 
     #[inline(always)]
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
-        let length = line.length();
-        let long = below(scaled(line.cruise, FINE_LOG2), length);
+        let length = line.length.get();
+        let long = below(scaled(line.cruise.get(), FINE_LOG2), length);
         self.prep.begin(&line.steps, &mut out.target);
         out.steps = line.steps;
         out.length = length;

@@ -11,12 +11,13 @@
 //! its axes allow in its direction. With one, acceleration and jerk must be alike for as long as
 //! possible: then they are those of the slowest axis that moves, whatever the direction.
 
-use super::block::{Block, Body, Line as Move};
+use super::block::{Action, Block, Line as Move};
 use super::dynamics::Dynamics;
-use super::factors::{Extent, Reserve};
+use super::factors::Reserve;
 use super::float::{least, some};
 use super::junction::{self, Heading};
 use super::limits::LastFeed;
+use super::medium::Medium;
 use super::path::{Path, Way};
 use super::prep::STEPS_MAX;
 use super::steps::Motor;
@@ -103,12 +104,12 @@ impl Builder {
         }
         self.heading = path.heading;
         self.top = path.top;
-        let reserve = match line.feed {
+        out.reserve = match line.feed {
             Some(_) => Reserve::new(path.cruise, path.top),
             None => Reserve::TRAVERSE,
         };
-        out.extent = Extent::new(path.length, reserve);
-        out.cruise = path.cruise;
+        out.length = Medium::new(path.length);
+        out.cruise = Medium::new(path.cruise);
         out.accel = path.accel;
         out.jerk = path.jerk;
         Built::Line(entry)
@@ -130,14 +131,14 @@ impl Builder {
     }
 
     /// The block that renames the present position. Motors without an axis keep theirs.
-    pub fn set_position(&mut self, position: &PerAxis<Length>, machine: &impl Motors) -> Body {
+    pub fn set_position(&mut self, position: &PerAxis<Length>, machine: &impl Motors) -> Action {
         for (m, motor) in self.motors.iter_mut().enumerate() {
             if let Some(&position) = position.get(usize::from(machine.motor_axis(m))) {
                 *motor = Motor::at(machine.ratio(m), position);
             }
         }
         self.stopped();
-        Body::SetPosition(self.motors.map(|motor| motor.steps))
+        Action::SetPosition(self.motors.map(|motor| motor.steps))
     }
 
     /// The machine stands still, and its motors are at these steps.
@@ -147,9 +148,9 @@ impl Builder {
     }
 
     /// The block for something that is done at rest.
-    pub fn pause(&mut self, body: Body, line: u32) -> Block {
+    pub fn pause(&mut self, action: Action, line: u32) -> Block {
         self.stopped();
-        Block { body, line }
+        Block::action(action, line)
     }
 }
 

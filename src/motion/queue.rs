@@ -187,7 +187,7 @@ impl BlockQueue {
             if self.goes_on(line, cruise, entry) { None } else { self.corner(line, cruise, entry) };
         let end = line.start + line.gain();
         let fill = |slot: &mut MaybeUninit<Block>| {
-            slot.write(Block { body: Body::Line(*line), line: number });
+            slot.write(Block::new(Body::Line(*line), number));
         };
         self.put(fill, key, |horizon| horizon.end = end)
     }
@@ -258,10 +258,11 @@ impl BlockQueue {
     fn refine(&mut self, line: &Line) {
         let end = self.end();
         // Nothing is there, or it is plainly fine: no need to compare.
-        if !some(end) || log(end) < 2 * log(line.cruise) + FINE {
+        if !some(end) || log(end) < 2 * log(line.cruise.get()) + FINE {
             return;
         }
-        if end > COARSE * line.cruise * line.cruise {
+        let cruise = line.cruise.get();
+        if end > COARSE * cruise * cruise {
             exec::lock(|ceiling| self.rebase(ceiling));
         }
     }

@@ -8,7 +8,7 @@
 //! Cost on AVR: 300 cycles a line where the feed is steady, 1,500 at a corner; exec waits for 60 a block and 250
 //! a key.
 
-use super::block::{Block, Body, Line};
+use super::block::{Action, Block, Body, Line};
 use super::factors::Factors;
 use super::horizon::{self, kappa};
 use super::queue::{BLOCKS, BlockQueue, FIRM, SEQ};
@@ -83,7 +83,9 @@ impl BlockQueue {
     /// The line before the one that has been pushed so many before the newest, if it is in the queue still.
     fn before(&self, back: usize) -> Option<&Line> {
         let mut back = back + 1;
-        while let Some(Block { body: Body::Override(_), .. }) = self.ring.pushed(back) {
+        while let Some(Block { body: Body::Action(Action::Override(_)), .. }) =
+            self.ring.pushed(back)
+        {
             back += 1;
         }
         line(self.ring.pushed(back))

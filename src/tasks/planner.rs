@@ -22,7 +22,7 @@ use crate::gcode::modal::{self, Coolant};
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, wait};
 use crate::jobs::Job;
-use crate::motion::block::{Block, Body, Line as Move, Outputs};
+use crate::motion::block::{Action, Block, Line as Move, Outputs};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line, Motors};
 use crate::motion::pace::Drivers;
@@ -222,10 +222,10 @@ impl Planner {
                 self.moved(commands);
             }
             Step::Arc => self.begin_arc(&commands.motion),
-            Step::Dwell(ms) => self.pause(Body::Dwell(*ms)),
+            Step::Dwell(ms) => self.pause(Action::Dwell(*ms)),
             Step::SetPosition(position) => self.set_position(position),
             Step::Override(change) => {
-                let block = Block { body: Body::Override(*change), line: self.line };
+                let block = Block::action(Action::Override(*change), self.line);
                 let _ = self.queue.push_aside(block);
                 self.announce();
             }
@@ -241,9 +241,9 @@ impl Planner {
                 self.switch(u8::MAX, 0, 0.0);
                 self.steps.repeat();
             }
-            Step::Stop(Stop::End) => self.pause(Body::ProgramEnd),
+            Step::Stop(Stop::End) => self.pause(Action::ProgramEnd),
             Step::Stop(_) => {
-                self.pause(Body::ProgramStop);
+                self.pause(Action::ProgramStop);
                 if self.links.settings.borrow().waits_at_stop() {
                     return Turn::Pause;
                 }
@@ -323,8 +323,8 @@ impl Planner {
     #[small]
     fn set_position(&mut self, position: &PerAxis<Length>) {
         self.position = *position;
-        let body = self.builder.set_position(position, &*self.links.settings.borrow());
-        self.push(Block { body, line: self.line });
+        let action = self.builder.set_position(position, &*self.links.settings.borrow());
+        self.push(Block::action(action, self.line));
     }
 
     /// Tells exec what the drivers ask for, if that has changed.
@@ -332,7 +332,7 @@ impl Planner {
         let drivers = Machine::drivers(&*self.links.settings.borrow());
         if drivers != self.drivers {
             self.drivers = drivers;
-            self.push(Block { body: Body::Drivers(drivers), line: self.line });
+            self.push(Block::action(Action::Drivers(drivers), self.line));
         }
     }
 
@@ -359,13 +359,13 @@ impl Planner {
         let outputs = Outputs { on: self.outputs.on & !which | on, speed };
         if outputs != self.outputs {
             self.outputs = outputs;
-            self.pause(Body::Outputs(outputs));
+            self.pause(Action::Outputs(outputs));
         }
     }
 
     /// Something that is done at rest.
-    fn pause(&mut self, body: Body) {
-        let block = self.builder.pause(body, self.line);
+    fn pause(&mut self, action: Action) {
+        let block = self.builder.pause(action, self.line);
         self.push(block);
     }
 

@@ -28,6 +28,17 @@ fn traverse_and_feed() {
 }
 
 #[test]
+fn line_numbers_have_three_bytes() {
+    for line in [9_999_999, 10_000_000, 16_777_215] {
+        let (state, out) = run(&[&std::format!("N{line} G0 X1")]);
+        assert_eq!((out.line, state.line()), (line, line));
+    }
+    for line in ["N16777216", "N16777216 G0 X1", "N100000000 G0 X1", "N4294967295 G0 X1"] {
+        assert_eq!(refusal(&[line]), Status::OutOfRange, "{line}");
+    }
+}
+
+#[test]
 fn lines_that_do_nothing() {
     for line in ["", "  ", "%", "(x)", "; x", "G0", "G80", "G40G49G54", "N5", "F0", "/X", "G2"] {
         let (_, out) = run(&[line]);

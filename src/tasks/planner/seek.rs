@@ -14,7 +14,7 @@ use crate::boards::MOTORS;
 use crate::gcode::command::Feed;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::inputs;
-use crate::motion::block::{Body, Outputs};
+use crate::motion::block::{Action, Outputs};
 use crate::motion::dynamics::PER_SECOND_CUBED;
 use crate::motion::short::Short;
 use crate::motion::snapshot::Snapshot;
@@ -37,7 +37,7 @@ impl Planner {
     pub(super) async fn standstill(&mut self) -> bool {
         self.room().await;
         // Exec does not release it before.
-        self.pause(Body::Outputs(self.outputs));
+        self.pause(Action::Outputs(self.outputs));
         wait(Event::BlockDone, || (queue::used() == 0 || self.is_flushed()).then_some(())).await;
         !self.is_flushed()
     }
@@ -60,7 +60,7 @@ impl Planner {
         }
         self.seek_room().await;
         if !self.is_over() {
-            self.pause(Body::Outputs(self.outputs));
+            self.pause(Action::Outputs(self.outputs));
         }
         wait(Event::BlockDone, || (queue::used() == 0 || self.is_over()).then_some(())).await;
         inputs::arm(0, 0);

@@ -78,7 +78,7 @@ follow lower it.",
         refusals: &[
             no(BadNumber, &["N1.5"]),
             no(OutOfRange, &["N-1"]),
-            no(OutOfRange, &["N4294967296"]),
+            no(OutOfRange, &["N16777216"]),
         ],
     },
     Rule {
