@@ -60,6 +60,7 @@ impl Links {
             limits_hit: Cell::new(0),
             cycle: Cell::default(),
             probe: Probe::default(),
+            jogged: Cell::new(false),
             job: Cell::default(),
             storage,
             report: RefCell::new(StatusReport::new()),

@@ -168,7 +168,9 @@ impl<T: Tables> Interpreter<T> {
             (Ok(()), Some(edit)) => self.tables.apply(edit),
             (Ok(()), None) => {}
             (Err(_), _) => {
+                let blamed = self.state.blamed;
                 self.state = before;
+                self.state.blamed = blamed;
                 out.clear();
             }
         }
@@ -258,6 +260,27 @@ impl<T> Interpreter<T> {
     /// Whether an axis is homed: soft limits are for such axes alone.
     pub fn is_homed(&self, axis: u8) -> bool {
         self.state.homed & 1 << axis != 0
+    }
+
+    /// An axis is homed, or no more.
+    pub fn set_homed(&mut self, axis: u8, homed: bool) {
+        let bit = 1 << axis;
+        self.state.homed = self.state.homed & !bit | if homed { bit } else { 0 };
+    }
+
+    /// The axis that could not be homed last: refused, or on the way.
+    pub fn blamed(&self) -> u8 {
+        self.state.blamed
+    }
+
+    /// An axis could not be homed.
+    pub fn blame(&mut self, axis: u8) {
+        self.state.blamed = axis;
+    }
+
+    /// No motion mode is in force any more, as after G28.2.
+    pub fn cancel_motion(&mut self) {
+        self.state.modal.motion = MotionMode::None;
     }
 
     /// By what rates and speeds are multiplied.

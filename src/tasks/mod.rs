@@ -4,6 +4,7 @@
 pub mod control;
 pub mod exec;
 pub mod hold;
+mod homing;
 pub mod lines;
 pub mod links;
 pub mod parser;

@@ -4,6 +4,8 @@
 //! the queue, and at a program stop for cycle start if the settings say so. One turn builds one block.
 //! In a queue flush it forgets the line, has exec drop the blocks, and starts from where the motors are.
 
+mod home;
+mod jog;
 mod probe;
 mod seek;
 
@@ -86,6 +88,10 @@ enum Turn {
     Pause,
     /// The line probes.
     Probe,
+    /// The line homes.
+    Home,
+    /// The axis is jogged.
+    Jog,
     /// The line is done.
     Done,
 }
@@ -118,6 +124,8 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
                     Turn::More => yield_now().await,
                     Turn::Pause => planner.cycle_start().await,
                     Turn::Probe => planner.probe().await,
+                    Turn::Home => planner.home().await,
+                    Turn::Jog => planner.jog().await,
                 }
             }
         }
@@ -258,8 +266,10 @@ impl Planner {
                 }
             }
             Step::Probe => return Turn::Probe,
+            Step::Home => return Turn::Home,
+            Step::Jog => return Turn::Jog,
             // The tool is reported, but nothing moves.
-            Step::Tool(_) | Step::Home => {}
+            Step::Tool(_) => {}
         }
         Turn::More
     }

@@ -15,7 +15,7 @@ use super::tx::Tx;
 use super::view::{View, moves, queue_free};
 use crate::hal::imp::time::millis;
 use crate::hal::serial::is_shared;
-use crate::protocol::notice::{Banner, Exception, Occasion, Probing, acknowledge};
+use crate::protocol::notice::{Banner, Exception, Occasion, Probing, acknowledge, jog_ended};
 use crate::protocol::{
     Machine, Mode, Report, Value, put_ready_prompt, queue_report, receive_report,
 };
@@ -48,6 +48,9 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             if let Some(status) = port.exception.take() {
                 report_exception(links, port, status).await;
             }
+        }
+        if links.jogged.take() {
+            report_jog(links).await;
         }
         if links.probe.take_news() {
             report_probing(links).await;
@@ -158,6 +161,16 @@ async fn report_exception(links: &Links, port: &Port, status: Status) {
     let mut tx = port.tx.lock().await;
     let mut exception = Exception::begin(status, &links.settings.borrow());
     send(links, port, &mut tx, |view, tx| exception.step(view, tx)).await;
+}
+
+async fn report_jog(links: &Links) {
+    let port = links.told();
+    let mut tx = port.tx.lock().await;
+    send(links, port, &mut tx, |view, tx| {
+        jog_ended(view.settings(), tx);
+        false
+    })
+    .await;
 }
 
 async fn report_probing(links: &Links) {

@@ -83,6 +83,8 @@ struct State {
     low: u16,
     /// Limits, of the ends.
     limits: u8,
+    /// Ends that are no limits for now.
+    spared: u8,
     /// Limits that have been hit.
     hits: u8,
     /// Those that end a move, and what they must be for it.
@@ -101,6 +103,7 @@ static STATE: Shared = Shared(UnsafeCell::new(State {
     switches: Switches::new(),
     low: 0,
     limits: 0,
+    spared: 0,
     hits: 0,
     armed: 0,
     awaited: 0,
@@ -144,6 +147,11 @@ pub fn set_up(low: u16, limits: u8) {
             unsafe { TCCR2B.write_volatile(RUN) };
         }
     });
+}
+
+/// These ends are no limits for now. Thread mode.
+pub fn spare(ends: u8) {
+    with(|state| state.spared = ends);
 }
 
 /// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
@@ -202,7 +210,7 @@ extern "C" fn look() {
     }
     let (changed, next) = state.switches.look(now);
     if changed != 0 {
-        let hits = (changed & now) as u8 & state.limits;
+        let hits = (changed & now) as u8 & state.limits & !state.spared;
         if hits != 0 {
             stepper::stop();
             state.hits |= hits;
