@@ -1,7 +1,7 @@
 //! Arduino Mega 2560 with a grbl-style shield: the pinout of grbl-Mega.
 
 use super::Port::{A, B, C, E, H, K};
-use super::{Board, Handshake, MotorPins, Serial, Timer, USB, Usart, pin};
+use super::{Board, Handshake, MotorPins, Pwm, Serial, Timer, USB, Usart, pin};
 
 /// Arduino Mega 2560 with a grbl-style shield.
 pub const MEGA2560_GRBL: Board = Board {
@@ -17,6 +17,7 @@ pub const MEGA2560_GRBL: Board = Board {
     // D5 to D9: spindle direction, enable and PWM, flood, mist
     hazards: &[pin(E, 3), pin(H, 3), pin(H, 4), pin(H, 5), pin(H, 6)],
     outputs: [Some(pin(H, 3)), Some(pin(E, 3)), Some(pin(H, 6)), Some(pin(H, 5))],
+    pwm: Some(Pwm { timer: Timer::T4, channel: 1 }), // D7
     // D19 and D18; D22 and D23
     serial: &[
         USB,

@@ -1,7 +1,7 @@
 //! Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder.
 
 use super::Port::{A, B, D, E, F, G, H, J, K, L};
-use super::{Board, MotorPins, Timer, USB, pin};
+use super::{Board, MotorPins, Pwm, Timer, USB, pin};
 
 /// Arduino Mega 2560 with RAMPS 1.4.
 pub const RAMPS14: Board = Board {
@@ -15,9 +15,19 @@ pub const RAMPS14: Board = Board {
     ],
     enable_all: None,
     // D10, D8, D9: hot end, bed, fan; then the outputs
-    hazards: &[pin(B, 4), pin(H, 5), pin(H, 6), pin(G, 5), pin(E, 3), pin(H, 3), pin(B, 5)],
-    // D4, D5, D6, D11: the servo headers, for nobody wants M8 to heat
-    outputs: [Some(pin(G, 5)), Some(pin(E, 3)), Some(pin(H, 3)), Some(pin(B, 5))],
+    hazards: &[
+        pin(B, 4),
+        pin(H, 5),
+        pin(H, 6),
+        pin(G, 5),
+        pin(E, 3),
+        pin(F, 3),
+        pin(B, 5),
+        pin(H, 3),
+    ],
+    // D4, D5, A3 of AUX-1, D11; the others are servo headers, for nobody wants M8 to heat
+    outputs: [Some(pin(G, 5)), Some(pin(E, 3)), Some(pin(F, 3)), Some(pin(B, 5))],
+    pwm: Some(Pwm { timer: Timer::T4, channel: 0 }), // D6, a servo header
     // The pins of USART1 and USART3 are those of the limit switches.
     serial: &[USB],
     inputs: [

@@ -11,13 +11,15 @@ use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::imp::{stepper, uart};
+use crate::hal::imp::{stepper, uart, watchdog};
 use crate::hal::ring::Producer;
 use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
+use crate::motion::snapshot::Snapshot;
 use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
+use crate::status::Status;
 use crate::store::Log;
 use crate::store::kept;
 use crate::tasks::links::{Links, Probe, QueueCount};
@@ -26,7 +28,7 @@ use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
 use crate::tasks::wake::{News, Wake};
-use crate::tasks::{control, exec, parser, planner, power, reader, reporter, storage};
+use crate::tasks::{control, exec, parser, planner, power, reader, reporter, spindle, storage};
 
 /// Bytes for all lines of USB together.
 const LINES_USB: usize = 480;
@@ -62,6 +64,7 @@ impl Links {
             probe: Probe::default(),
             jogged: Cell::new(false),
             job: Cell::default(),
+            moment: Cell::new(Snapshot::new().moment()),
             storage,
             report: RefCell::new(StatusReport::new()),
             // Their defaults come when they are in place: they would take as much of the stack.
@@ -129,7 +132,12 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
         links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
     }
     set_hardware(&links.settings.borrow());
+    spindle::set_all(links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
+    if watchdog::cause().is_fault() {
+        // The reporter looks before it waits.
+        links.told().exception.set(Some(Status::HardReset));
+    }
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received, aux).ok()?);
     main.spawn(planner_task(links, queue).ok()?);

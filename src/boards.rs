@@ -134,6 +134,36 @@ pub enum Timer {
     T5,
 }
 
+/// An output of a 16-bit timer that drives a pin by pulses of some width.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Pwm {
+    /// Its timer: 3, 4 or 5.
+    pub timer: Timer,
+    /// Its channel, 0 to 2 for A to C.
+    pub channel: u8,
+}
+
+impl Pwm {
+    /// The pin (ATmega2560 data sheet, pin configurations).
+    pub const fn pin(self) -> Pin {
+        let (port, first) = match self.timer {
+            Timer::T4 => (Port::H, 3),
+            Timer::T5 => (Port::L, 3),
+            _ => (Port::E, 3),
+        };
+        pin(port, first + self.channel)
+    }
+
+    /// Data-space address of the timer's first register, TCCRnA (ATmega2560 data sheet, register summary).
+    pub const fn address(self) -> usize {
+        match self.timer {
+            Timer::T4 => 0xA0,
+            Timer::T5 => 0x120,
+            _ => 0x90,
+        }
+    }
+}
+
 /// A USART of the ATmega2560. The third, USART2, is the firmware's own (`hal::avr::exec`).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
@@ -234,8 +264,10 @@ pub struct Board {
     pub enable_all: Option<Pin>,
     /// Outputs that the panic handler drives low: spindles, heaters, fans.
     pub hazards: &'static [Pin],
-    /// What M3 to M9 switch, active high: see [`outputs`]. Hazards, all of them.
+    /// What M3 to M9 switch: see [`outputs`]. Hazards, all of them.
     pub outputs: [Option<Pin>; outputs::COUNT],
+    /// Says how fast the spindle is to turn. Its pin is a hazard.
+    pub pwm: Option<Pwm>,
     /// Its serial ports: [`USB`], and a second one if there is room for it.
     pub serial: &'static [Serial],
     /// Switches between a pin and ground: see [`inputs`]. One pin may serve both ends of an axis. Each
@@ -348,6 +380,7 @@ impl Board {
         );
         let first = !self.serial.is_empty() && matches!(self.serial[0].usart, Usart::U0);
         assert!(first, "the first serial port of this board is not USART0");
+        self.check_pwm();
         self.check_outputs();
         let mut s = 0;
         while s < inputs::COUNT {
@@ -380,16 +413,32 @@ impl Board {
         any
     }
 
+    /// Panics if the spindle's timer is another's, or has no such output.
+    const fn check_pwm(&self) {
+        let Some(pwm) = self.pwm else { return };
+        let wide = matches!(pwm.timer, Timer::T3 | Timer::T4 | Timer::T5);
+        assert!(wide && pwm.channel < 3, "a timer of this board has no such output");
+        assert!(
+            pwm.timer as u8 != self.step_timer as u8 && pwm.timer as u8 != self.tick_timer as u8,
+            "a timer of this board is used twice"
+        );
+    }
+
     /// Panics if an output would stay on after a panic, or is switched by two codes.
     const fn check_outputs(&self) {
         let mut seen = 0u8;
         let mut o = 0;
-        while o < outputs::COUNT {
-            let mut found = self.outputs[o].is_none();
+        while o <= outputs::COUNT {
+            let output = match self.pwm {
+                Some(pwm) if o == outputs::COUNT => Some(pwm.pin()),
+                None if o == outputs::COUNT => None,
+                _ => self.outputs[o],
+            };
+            let mut found = output.is_none();
             let mut h = 0;
             while h < self.hazards.len() {
                 let hazard = self.hazards[h];
-                if let Some(pin) = self.outputs[o]
+                if let Some(pin) = output
                     && pin.is(hazard)
                 {
                     assert!(seen & 1 << h == 0, "an output of this board is used twice");
@@ -511,6 +560,19 @@ mod tests {
         let mut board = RAMPS14;
         board.inputs[inputs::A_MIN] = Some(pin(Port::C, 0));
         board.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "timer of this board is used twice")]
+    fn the_spindle_has_a_timer_to_itself() {
+        let pwm = Some(Pwm { timer: Timer::T4, channel: 1 });
+        Board { step_timer: Timer::T4, pwm, ..MEGA2560_GRBL }.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "output of this board is used twice")]
+    fn the_pin_of_the_pulses_is_nobody_elses() {
+        Board { pwm: Some(Pwm { timer: Timer::T4, channel: 2 }), ..MEGA2560_GRBL }.check();
     }
 
     #[test]

@@ -28,6 +28,7 @@ pub mod motors;
 pub mod progmem;
 pub mod protocol;
 pub mod realtime;
+pub mod spindle;
 pub mod status;
 pub mod store;
 pub mod switches;

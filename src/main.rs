@@ -5,7 +5,7 @@
 mod image {
     use embassy_executor::raw::Executor;
     use kerf::baud;
-    use kerf::hal::imp::{self, exec, executor, gpio, inputs, panic, time};
+    use kerf::hal::imp::{exec, executor, gpio, inputs, panic, time, watchdog};
     use kerf::hal::pender;
     use static_cell::StaticCell;
 
@@ -20,7 +20,7 @@ mod image {
     fn main() -> ! {
         static MAIN: StaticCell<Executor> = StaticCell::new();
         static EXEC: StaticCell<Executor> = StaticCell::new();
-        imp::watchdog_off();
+        watchdog::begin();
         gpio::start();
         inputs::start();
         let main: &'static Executor = MAIN.init(Executor::new(pender::THREAD));
@@ -30,6 +30,7 @@ mod image {
         }
         time::start();
         exec::start(interrupt);
+        watchdog::start();
         executor::run(main)
     }
 }

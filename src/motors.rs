@@ -92,6 +92,14 @@ impl Motors {
         self.on &= !motors;
     }
 
+    /// In a feedhold, before [`Motors::pass`]: timeouts stand still for so many milliseconds, which have passed since
+    /// the last look.
+    pub fn stand_still(&mut self, ms: u32) {
+        for last in &mut self.last {
+            *last = last.wrapping_add(ms);
+        }
+    }
+
     /// Time passes: it is `now`; `running` says that the machine moves or dwells. Takes power from
     /// motors that have not been used for `timeout`. Whether any lost it.
     pub fn pass(&mut self, now: u32, running: bool, timeout: u32) -> bool {
@@ -175,6 +183,23 @@ mod tests {
         assert_eq!(motors.on(), 0b0011);
         assert!(!motors.pass(1_001_999, false, TIMEOUT));
         assert!(motors.pass(1_003_999, false, TIMEOUT));
+    }
+
+    #[test]
+    fn timeouts_stand_still_in_a_hold() {
+        let mut motors = motors([3; 4]);
+        motors.segment(0b0011);
+        motors.segment(0b0010);
+        motors.pass(0, true, TIMEOUT);
+        assert!(!motors.pass(1_900, true, TIMEOUT));
+        // The first motor has 100 ms left, whatever the hold takes.
+        for look in 1..500 {
+            motors.stand_still(20);
+            assert!(!motors.pass(1_900 + look * 20, true, TIMEOUT));
+        }
+        assert!(!motors.pass(11_960, true, TIMEOUT));
+        assert!(motors.pass(12_000, true, TIMEOUT));
+        assert_eq!(motors.on(), 0b0010);
     }
 
     #[test]

@@ -14,6 +14,7 @@ pub enum Status {
     Again = 2,
     Noop = 3,
     Terminated = 5,
+    HardReset = 6,
     EndOfFile = 8,
     BufferFull = 13,
     Initializing = 15,

@@ -16,7 +16,7 @@ use cases::cases;
 use jobs::{Job, any_job, plan_held};
 use keeps::check_limits;
 use kerf::boards::MOTORS;
-use kerf::motion::block::{Block, Body};
+use kerf::motion::block::{Block, Body, Outputs};
 use kerf::motion::exec::Step;
 use proptest::prelude::*;
 use rig::{Config, Rig, at};
@@ -174,7 +174,8 @@ fn a_dwell_pauses() {
 
 #[test]
 fn nothing_begins_in_a_hold() {
-    for body in [Body::Dwell(100), Body::Outputs(1), Body::ProgramStop] {
+    for body in [Body::Dwell(100), Body::Outputs(Outputs { on: 1, speed: 0.0 }), Body::ProgramStop]
+    {
         let mut rig = Rig::new(Config::new(100.0, 1_000.0, 0.0));
         rig.line(at([1.0]), 50.0, 1);
         rig.push(Block { body, line: 2 });

@@ -311,3 +311,83 @@ fn xoff_from_the_sender_holds_answers_back() {
     sender.ask("{ex:0}\n", 100);
     assert_ne!(sender.ask("\u{13}{fb:n}\n", 500), "");
 }
+
+#[test]
+fn a_report_tells_of_one_moment() {
+    let mut sender = Sender::boot();
+    // Longer than the transmit ring: exec has many turns until the last value has been put.
+    let between =
+        "ofsx:t,ofsy:t,ofsz:t,posa:t,posb:t,posc:t,mpoa:t,mpob:t,mpoc:t,homx:t,homy:t,homz:t";
+    sender.ask("{sv:2,si:100,xjm:5000}\n", 50);
+    sender.ask(&format!("{{sr:{{posx:t,{between},mpox:t}}}}\n"), 100);
+    sender.ask("g0x100\n", 20);
+    let mut heard = String::new();
+    for _ in 0..20 {
+        heard += &sender.ask("{sr:n}\n", 170);
+    }
+    let value = |report: &str, name: &str| {
+        let (_, rest) = report.split_once(&format!("\"{name}\":"))?;
+        rest.split([',', '}']).next()?.parse::<f64>().ok()
+    };
+    let mut moved = 0;
+    for report in heard.lines() {
+        let (Some(work), Some(machine)) = (value(report, "posx"), value(report, "mpox")) else {
+            continue;
+        };
+        assert_eq!(work, machine, "{report}");
+        moved += usize::from(work > 0.0);
+    }
+    assert!(moved > 30, "{heard}");
+}
+
+#[test]
+fn the_watchdog_is_fed_whatever_the_machine_does() {
+    use kerf::hal::imp::{now, watchdog};
+    let mut sender = Sender::boot();
+    let mut late = 0;
+    for (line, ms) in [
+        ("g1 f600 x2\n", 1_500),
+        ("g4 p1\n", 1_200),
+        ("g1 f0.1 x2.005\n", 4_000),
+        ("{sys:n}\n{defa:1}\n{xsn:2,spph:1,spde:1}\n", 500),
+        ("m3 s1000 g1 f300 x9\n", 1_500),
+        ("!", 1_000),
+        ("~", 1_500),
+    ] {
+        sender.ask(line, 0);
+        for _ in 0..ms {
+            sender.ask("", 1);
+            late = late.max(now() - watchdog::fed());
+        }
+    }
+    // A limit stops the steps for good, and is no reason for a reset.
+    sender.machine.set_input(kerf::boards::inputs::X_MIN, true);
+    sender.ask("", 1_000);
+    assert!(sender.heard.contains("\"st\":204"), "{}", sender.heard);
+    late = late.max(now() - watchdog::fed());
+    assert!(late < 100 * 16_000, "{} ms", late / 16_000);
+}
+
+#[test]
+fn a_reset_that_nobody_wanted_is_told() {
+    use kerf::hal::imp::watchdog;
+    use kerf::hal::resets::Cause;
+    for (cause, told) in [
+        (Cause::PowerOn, false),
+        (Cause::External, false),
+        (Cause::BrownOut, true),
+        (Cause::Watchdog, true),
+        (Cause::Asked, false),
+    ] {
+        let heard = std::thread::spawn(move || {
+            watchdog::set_cause(cause);
+            let mut sender = Sender::boot();
+            sender.ask("{rst:n}\n", 100);
+            sender.heard
+        });
+        let heard = heard.join().expect("no panic");
+        assert!(heard.contains(&format!("{{\"rst\":{}}}", cause as u8)), "{heard}");
+        let er = "{\"er\":{\"fb\":440.20,\"st\":6,\"msg\":\"Hard reset\"}}";
+        assert_eq!(heard.contains(er), told, "{heard}");
+    }
+}

@@ -12,7 +12,7 @@ use kerf::config::table::Kind;
 use kerf::config::{Name, Owner, Setting};
 use kerf::gcode::codes::docs::{self, Doc, On, Refusal};
 use kerf::gcode::setup::{AxisMode, Setup};
-use kerf::hal::imp::Machine;
+use kerf::hal::imp::{Machine, gpio, pwm};
 use kerf::protocol;
 use kerf::status::Status;
 use kerf::units::Length;
@@ -58,6 +58,10 @@ impl Side for Machine {
 
     fn steps(&self) -> [i64; 4] {
         self.emitted().position
+    }
+
+    fn outputs(&self) -> (u8, f64) {
+        (gpio::outputs(), f64::from(pwm::output().1) / 1_000.0)
     }
 }
 

@@ -172,6 +172,11 @@ impl Settings {
         self.system(system::EJ) != 0
     }
 
+    /// Whether lines of text mode are answered in JSON mode, as `txt`.
+    pub fn wraps_text(&self) -> bool {
+        self.is_g2core() && self.system(system::EJ) != 2
+    }
+
     /// 0 silent, 1 footers, 2 messages, 3 settings, 4 line numbers, 5 blocks.
     pub fn json_verbosity(&self) -> u8 {
         self.system(system::JV)

@@ -105,8 +105,9 @@ impl Settings {
         let million = number.fixed(0, false).is_none_or(|v| v > 1_000_000);
         let number = if row.is(JERK) && million { number.millionth() } else { number };
         let inches = inches && self.is_length(setting, &row);
-        let linear_mode = row.is(MODE) && !setting.owner().is_rotary();
-        let value = limit(&row, row.max - i32::from(linear_mode), number, inches)?;
+        let lacks_last = (row.is(MODE) && !setting.owner().is_rotary())
+            || (setting.is_mode() && !self.is_g2core());
+        let value = limit(&row, row.max - i32::from(lacks_last), number, inches)?;
         if setting.is_baud() && baud::rate(value).is_none() {
             return Err(Status::OutOfRange);
         }

@@ -23,9 +23,9 @@ impl Settings {
                 }
                 lowered
             }
-            Owner::System | Owner::Pwm | Owner::User(_) | Owner::Job => false,
             Owner::Motor(motor) => self.limit_axis(self.motor_axis(motor.into()), &rate),
             Owner::Axis(axis) => self.limit_axis(axis, &rate),
+            _ => false,
         }
     }
 

@@ -2,9 +2,9 @@
 
 use super::name::{Name, axis_letter, axis_of};
 use super::table::{
-    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, HOMING, IDLE, JOB, JOB_ROWS, Kind, MODE, MOTOR,
-    MOTOR_DEFAULTS, MOTOR_ROWS, PWM, PWM_DEFAULTS, PWM_ROWS, RADIUS, Row, SYSTEM, SYSTEM_DEFAULTS,
-    SYSTEM_ROWS, USER, USER_ROWS,
+    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, COOLANT, COOLANT_ROWS, HOMING, IDLE, JOB, JOB_ROWS, Kind,
+    MODE, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS, PWM, PWM_DEFAULTS, PWM_ROWS, RADIUS, Row, SPINDLE,
+    SPINDLE_DEFAULTS, SPINDLE_ROWS, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS, USER, USER_ROWS,
 };
 use crate::boards::MOTORS;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -12,7 +12,9 @@ use crate::units::{AXES, FIRST_ROTARY};
 const FIRST_MOTOR: u8 = SYSTEM_ROWS as u8;
 const FIRST_AXIS: u8 = FIRST_MOTOR + (MOTORS * MOTOR_ROWS) as u8;
 const FIRST_PWM: u8 = FIRST_AXIS + (AXES * AXIS_ROWS) as u8;
-const FIRST_USER: u8 = FIRST_PWM + PWM_ROWS as u8;
+const FIRST_SPINDLE: u8 = FIRST_PWM + PWM_ROWS as u8;
+const FIRST_COOLANT: u8 = FIRST_SPINDLE + SPINDLE_ROWS as u8;
+const FIRST_USER: u8 = FIRST_COOLANT + COOLANT_ROWS as u8;
 const FIRST_JOB: u8 = FIRST_USER + USERS * USER_ROWS as u8;
 
 /// The groups of user data, `uda` to `udd`.
@@ -29,6 +31,10 @@ pub enum Owner {
     Axis(u8),
     /// The spindle's output.
     Pwm,
+    /// The spindle.
+    Spindle,
+    /// The coolant.
+    Coolant,
     /// A sender's own, 0 to 3.
     User(u8),
     /// A job's.
@@ -43,6 +49,8 @@ impl Owner {
             Owner::Motor(_) => MOTOR_ROWS as u8,
             Owner::Axis(_) => AXIS_ROWS as u8,
             Owner::Pwm => PWM_ROWS as u8,
+            Owner::Spindle => SPINDLE_ROWS as u8,
+            Owner::Coolant => COOLANT_ROWS as u8,
             Owner::User(_) => USER_ROWS as u8,
             Owner::Job => JOB_ROWS as u8,
         }
@@ -56,6 +64,8 @@ impl Owner {
             Owner::Motor(motor) => named(&[b'1' + motor]),
             Owner::Axis(axis) => named(&[axis_letter(axis)]),
             Owner::Pwm => named(b"p1"),
+            Owner::Spindle => named(b"sp"),
+            Owner::Coolant => named(b"co"),
             Owner::User(group) => named(&[b'u', b'd', b'a' + group]),
             Owner::Job => named(b"jid"),
         }
@@ -66,6 +76,8 @@ impl Owner {
         match *name.bytes() {
             [motor @ b'1'..=b'4', ..] => Some(Owner::Motor(motor - b'1')),
             [b'p', b'1', ..] => Some(Owner::Pwm),
+            [b's', b'p', ..] => Some(Owner::Spindle),
+            [b'c', b'o', ..] => Some(Owner::Coolant),
             [b'u', b'd', group @ b'a'..=b'd', ..] => Some(Owner::User(group - b'a')),
             [b'j', b'i', b'd', ..] => Some(Owner::Job),
             [letter, ..] => axis_of(letter).map(Owner::Axis),
@@ -99,6 +111,8 @@ impl Owner {
             Owner::Motor(motor) if usize::from(motor) < MOTORS => MOTOR.at(row),
             Owner::Axis(axis) if usize::from(axis) < AXES => AXIS.at(row),
             Owner::Pwm => PWM.at(row),
+            Owner::Spindle => SPINDLE.at(row),
+            Owner::Coolant => COOLANT.at(row),
             Owner::User(group) if group < USERS => USER.at(row),
             Owner::Job => JOB.at(row),
             _ => None,
@@ -171,6 +185,8 @@ impl Setting {
             Owner::Motor(motor) => FIRST_MOTOR + motor * MOTOR_ROWS as u8,
             Owner::Axis(axis) => FIRST_AXIS + axis * AXIS_ROWS as u8,
             Owner::Pwm => FIRST_PWM,
+            Owner::Spindle => FIRST_SPINDLE,
+            Owner::Coolant => FIRST_COOLANT,
             Owner::User(group) => FIRST_USER + group * USER_ROWS as u8,
             Owner::Job => FIRST_JOB,
         };
@@ -187,6 +203,13 @@ impl Setting {
         };
         let owner = Owner::of_name(name);
         owner.and_then(search).or_else(|| search(Owner::System))
+    }
+
+    /// Whether it is the mode at power-up.
+    pub fn is_mode(self) -> bool {
+        let row = self.row();
+        let small = self.owner() == Owner::System && row.kind == Kind::Small;
+        small && row.slot == table::system::EJ
     }
 
     /// Whether it is a motor's microsteps.
@@ -247,8 +270,12 @@ impl Setting {
             Owner::Motor((self.0 - FIRST_MOTOR) / MOTOR_ROWS as u8)
         } else if self.0 < FIRST_PWM {
             Owner::Axis((self.0 - FIRST_AXIS) / AXIS_ROWS as u8)
-        } else if self.0 < FIRST_USER {
+        } else if self.0 < FIRST_SPINDLE {
             Owner::Pwm
+        } else if self.0 < FIRST_COOLANT {
+            Owner::Spindle
+        } else if self.0 < FIRST_USER {
+            Owner::Coolant
         } else if self.0 < FIRST_JOB {
             Owner::User((self.0 - FIRST_USER) / USER_ROWS as u8)
         } else {
@@ -262,12 +289,14 @@ impl Setting {
     }
 
     /// The number of its row.
-    pub(super) fn index(self) -> u8 {
+    pub fn index(self) -> u8 {
         match self.owner() {
             Owner::System => self.0,
             Owner::Motor(_) => (self.0 - FIRST_MOTOR) % MOTOR_ROWS as u8,
             Owner::Axis(_) => (self.0 - FIRST_AXIS) % AXIS_ROWS as u8,
             Owner::Pwm => self.0 - FIRST_PWM,
+            Owner::Spindle => self.0 - FIRST_SPINDLE,
+            Owner::Coolant => self.0 - FIRST_COOLANT,
             Owner::User(_) => (self.0 - FIRST_USER) % USER_ROWS as u8,
             Owner::Job => self.0 - FIRST_JOB,
         }
@@ -291,7 +320,8 @@ impl Setting {
                 AXIS_DEFAULTS.at(index).and_then(|d| d.get(usize::from(axis)).copied())
             }
             Owner::Pwm => PWM_DEFAULTS.at(index),
-            Owner::User(_) | Owner::Job => None,
+            Owner::Spindle => SPINDLE_DEFAULTS.at(index),
+            Owner::Coolant | Owner::User(_) | Owner::Job => None,
         };
         value.unwrap_or(0)
     }
@@ -300,13 +330,11 @@ impl Setting {
     pub fn place(self) -> Place {
         let row = self.row();
         let (small, large) = match self.owner() {
-            Owner::System | Owner::Pwm | Owner::User(_) | Owner::Job => {
-                (small_of(AXES as u8), large_of(AXES as u8))
-            }
             Owner::Motor(motor) => {
                 (motor * table::motor::SMALL as u8, motor * table::motor::LARGE as u8)
             }
             Owner::Axis(axis) => (small_of(axis), large_of(axis)),
+            _ => (small_of(AXES as u8), large_of(AXES as u8)),
         };
         match row.kind {
             Kind::Small => Place::Small(small + row.slot),

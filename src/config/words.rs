@@ -1,7 +1,7 @@
 //! What text mode calls the settings: a row beside each row of [`table`](super::table), in program
 //! memory.
 
-use super::table::{AXIS_ROWS, MOTOR_ROWS, PWM_ROWS, SYSTEM_ROWS};
+use super::table::{AXIS_ROWS, COOLANT_ROWS, MOTOR_ROWS, PWM_ROWS, SPINDLE_ROWS, SYSTEM_ROWS};
 use super::{Owner, Setting};
 use crate::progmem;
 use crate::progmem::Text;
@@ -46,6 +46,7 @@ const SPEED: Text = text!("/min");
 const JERK: Text = text!("/min^3 * 1 million");
 const TURNS: Text = text!(" RPM");
 const PHASE: Text = text!(" [0..1]");
+const LEVEL: Text = text!(" [0=active low,1=active high]");
 const NONE: Text = text!("");
 
 progmem! {
@@ -78,6 +79,7 @@ progmem! {
             text!("USB baud rate"),
             text!(" [1=9600,2=19200,3=38400,4=57600,5=115200,6=230400]"),
         ),
+        words(text!("network mode"), text!(" [0=master]")),
         words(text!("default gcode plane"), text!(" [0=G17,1=G18,2=G19]")),
         words(text!("default gcode units mode"), text!(" [0=G20,1=G21]")),
         words(text!("default gcode coord system"), text!(" [1-9 (G54-G59.3)]")),
@@ -135,6 +137,15 @@ progmem! {
         words(text!("pwm ccw phase hi"), PHASE),
         words(text!("pwm phase off"), PHASE),
     ];
+
+    static SPINDLE: [Words; SPINDLE_ROWS] = [
+        words(text!("spindle pause on hold"), OFF_ON),
+        words(text!("spindle spinup delay"), text!(" seconds")),
+        words(text!("spindle enable polarity"), LEVEL),
+        words(text!("spindle direction polarity"), text!(" [0=CW is low,1=CW is high]")),
+    ];
+
+    static COOLANT: [Words; COOLANT_ROWS] = [words(text!("coolant pause on hold"), OFF_ON)];
 }
 
 impl Setting {
@@ -146,6 +157,8 @@ impl Setting {
             Owner::Motor(_) => MOTOR.at(index),
             Owner::Axis(_) => AXIS.at(index),
             Owner::Pwm => PWM.at(index),
+            Owner::Spindle => SPINDLE.at(index),
+            Owner::Coolant => COOLANT.at(index),
             Owner::User(_) => Some(bare(text!("user data"))),
             Owner::Job => Some(bare(text!("job id"))),
         }

@@ -13,7 +13,7 @@
 //! a typical G1, in inches too (`tests/sim/tests/interpreter.rs`).
 
 use super::block::Block;
-use super::command::{Commands, Overrides};
+use super::command::{Commands, Overrides, Spindle};
 use super::modal::{Defaults, Modal, MotionMode, Turn, Units};
 use super::setup::Setup;
 use super::state::State;
@@ -293,9 +293,12 @@ impl<T> Interpreter<T> {
         self.state.line
     }
 
-    /// Spindle and coolant are so: commands to switch them have been dropped.
-    pub fn set_outputs(&mut self, spindle: Turn, coolant: u8) {
-        self.state.modal.spindle = spindle;
+    /// Spindle and coolant are so: commands to switch them have been dropped. S of a spindle that is off stays.
+    pub fn set_outputs(&mut self, spindle: &Spindle, coolant: u8) {
+        self.state.modal.spindle = spindle.turn;
+        if spindle.turn != Turn::Off {
+            self.state.speed = spindle.speed;
+        }
         self.state.modal.coolant = coolant;
     }
 

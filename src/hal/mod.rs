@@ -33,6 +33,7 @@ macro_rules! machine_static {
 pub mod byte;
 pub mod event;
 pub mod pender;
+pub mod resets;
 pub mod ring;
 pub mod serial;
 pub mod timers;

@@ -30,12 +30,21 @@ pub enum Body {
     SetPosition([i32; MOTORS]),
     /// The drivers ask for something else from here on.
     Drivers(Drivers),
-    /// M3 to M9: the outputs are so from here on, bits of [`outputs`](crate::boards::outputs).
-    Outputs(u8),
+    /// M3 to M9, S: the outputs and the speed of the spindle are so from here on.
+    Outputs(Outputs),
     /// M0, M1, M60.
     ProgramStop,
     /// M2, M30.
     ProgramEnd,
+}
+
+/// What a program switches.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outputs {
+    /// Bits of [`outputs`](crate::boards::outputs).
+    pub on: u8,
+    /// S, turns per minute; 0 while the spindle is off.
+    pub speed: f32,
 }
 
 /// A straight move.

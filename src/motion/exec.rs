@@ -26,7 +26,7 @@ use super::float::{below, scaled, some, whole};
 use super::governor::{Ahead, Governor};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
-use crate::boards::MOTORS;
+use super::snapshot::{Program, Snapshot};
 
 /// Half CPU cycles in a second.
 const HALVES_PER_S: f32 = 2.0 * crate::boards::ACTIVE.clock_hz as f32;
@@ -50,79 +50,14 @@ pub enum Step {
     Segment,
     /// Nothing to queue, but something was done: ask again.
     Again,
+    /// The outputs or the speed of the spindle are others, at a standstill: ask again.
+    Switched,
     /// A program stop, end or change of outputs is due: ask again when the steppers stand still.
     Standstill,
     /// No block.
     Idle,
     /// A feedhold is on, and the steppers stand still.
     Held,
-}
-
-/// What reports show of the motion that is being prepared.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Snapshot {
-    /// Motor positions at the end of the block being run, in steps.
-    pub target: [i32; MOTORS],
-    /// Signed steps of that block.
-    pub steps: [i16; MOTORS],
-    /// What is still to be run of that block, mm.
-    pub left: f32,
-    /// Its length, mm.
-    pub length: f32,
-    /// Velocity along the path, mm/s.
-    pub velocity: f32,
-    /// The N word of the block being run.
-    pub line: u32,
-    /// The N word of the line finished last, to its last step.
-    pub finished: u32,
-    /// Something moves, or dwells.
-    pub running: bool,
-    /// A feedhold has brought it to rest.
-    pub held: bool,
-    /// What the program came to last.
-    pub program: Program,
-    /// What the outputs are to be, bits of [`outputs`](crate::boards::outputs).
-    pub outputs: u8,
-}
-
-impl Snapshot {
-    /// At rest, at zero.
-    pub const fn new() -> Self {
-        Self {
-            target: [0; MOTORS],
-            steps: [0; MOTORS],
-            left: 0.0,
-            length: 0.0,
-            velocity: 0.0,
-            line: 0,
-            finished: 0,
-            running: false,
-            held: false,
-            program: Program::Ready,
-            outputs: 0,
-        }
-    }
-
-    /// Where motor `m` is, in steps.
-    pub fn position(&self, m: usize) -> i32 {
-        if self.left <= 0.0 || self.steps[m] == 0 {
-            return self.target[m];
-        }
-        let short = f32::from(self.steps[m]) * (self.left / self.length);
-        self.target[m].wrapping_sub(short as i32)
-    }
-}
-
-/// How the program stands.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Program {
-    /// Nothing has run since reset.
-    #[default]
-    Ready,
-    /// The queue ran empty, or M0.
-    Stopped,
-    /// M2 or M30.
-    Ended,
 }
 
 /// The line that exec is running.
@@ -237,6 +172,14 @@ impl Exec {
         }
     }
 
+    /// Stands still for so many milliseconds, before anything else: at a standstill, perhaps in the midst of a line.
+    pub fn wait(&mut self, ms: u16, out: &mut Snapshot) {
+        if ms > 0 {
+            self.dwell_ms += u32::from(ms);
+            out.running = true;
+        }
+    }
+
     /// In a hold: whether there is nothing more to prepare.
     #[inline(never)]
     fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
@@ -304,7 +247,9 @@ impl Exec {
                 if !standstill {
                     return Step::Standstill;
                 }
-                out.outputs = *outputs;
+                (out.outputs, out.speed) = (outputs.on, outputs.speed);
+                blocks.release();
+                return Step::Switched;
             }
             Body::ProgramStop | Body::ProgramEnd => {
                 self.halt(out);

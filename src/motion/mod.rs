@@ -29,6 +29,7 @@ pub mod queue;
 pub mod reach;
 pub mod short;
 pub mod smooth;
+pub mod snapshot;
 pub mod source;
 pub mod state;
 pub mod steps;

@@ -160,6 +160,8 @@ impl Machine for Fake {
         }
     }
 
+    fn moment(&mut self, _first: bool) {}
+
     fn report(&mut self) -> &mut StatusReport {
         &mut self.report
     }

@@ -51,10 +51,10 @@ impl Series {
     /// What a letter stands for: `$` all but tools, `m` motors, `q` axes, `o` offsets.
     pub fn of_letter(letter: u8) -> Option<Series> {
         let (first, end) = match letter {
-            b'$' => (0, 24),
+            b'$' => (0, 26),
             b'm' => (1, 5),
             b'q' => (5, 11),
-            b'o' => (12, 26),
+            b'o' => (14, 28),
             _ => return None,
         };
         Some(Series { first, end })
@@ -67,10 +67,12 @@ impl Series {
             1..5 => Group::Settings(Owner::Motor(number - 1)),
             5..11 => Group::Settings(Owner::Axis(number - 5)),
             11 => Group::Settings(Owner::Pwm),
-            12..21 => Group::Row(Row::system(number - 12)),
-            21 => Group::SHIFT,
-            22 | 23 => Group::Row(Row::stored(number - 22)),
-            24 => Group::OFFSETS,
+            12 => Group::Settings(Owner::Spindle),
+            13 => Group::Settings(Owner::Coolant),
+            14..23 => Group::Row(Row::system(number - 14)),
+            23 => Group::SHIFT,
+            24 | 25 => Group::Row(Row::stored(number - 24)),
+            26 => Group::OFFSETS,
             _ => Group::TOOL_OFFSETS,
         }
     }
@@ -89,6 +91,7 @@ impl Request {
     pub(super) fn listing<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let member = self.group.and_then(|group| group.member(self.item / PARTS, c.machine));
         let Some((index, token)) = member else { return self.next_group() };
+        c.machine.moment(self.item == 0);
         let part = self.item % PARTS;
         self.item = index * PARTS + part + 1;
         put_part(token, part, c.machine, &mut Writer::body(c.out, &mut self.format));
@@ -144,9 +147,9 @@ fn title_start(setting: Setting) -> usize {
 /// The length of what tells whose a setting is: `m1 `, `x `.
 fn owner_len(setting: Setting) -> usize {
     match setting.owner() {
-        Owner::System | Owner::Pwm | Owner::User(_) | Owner::Job => 0,
         Owner::Motor(_) => 3,
         Owner::Axis(_) => 2,
+        _ => 0,
     }
 }
 

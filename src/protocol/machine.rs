@@ -88,6 +88,8 @@ pub trait Machine {
     fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status>;
     /// A value now, in the unit that [`Value`] states.
     fn value(&mut self, value: Value) -> i32;
+    /// What this step tells of motion is of now if `first`, else of the moment of the last `first`.
+    fn moment(&mut self, first: bool);
     /// What status reports hold.
     fn report(&mut self) -> &mut StatusReport;
     /// Restores the defaults of all settings and of the status report, or refuses to: 10 ms on AVR.

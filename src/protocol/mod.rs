@@ -11,6 +11,7 @@
 /// Bytes that one step puts at most.
 pub const CHUNK: usize = 64;
 
+mod amend;
 mod apply;
 mod block;
 mod checksum;

@@ -1,6 +1,7 @@
 //! Names and values of a JSON line: walking through them, and telling what has come of each.
 
 use super::Format;
+use super::amend::is_amended;
 use super::json::{self, Kind, Pair};
 use super::machine::Machine;
 use super::notice::put_exception;
@@ -23,6 +24,9 @@ impl Request {
         let target = resolve(Name::new(), pair.name.of(c.line));
         match (target, pair.kind) {
             (Target::Group(group), Kind::Null) => self.enter(group, &pair, Phase::List, c),
+            (Target::Group(Group::Report), Kind::Object) if is_amended(pair.name.of(c.line)) => {
+                self.enter(Group::Report, &pair, Phase::Amend, c);
+            }
             (Target::Group(Group::Report), Kind::Object) => {
                 self.enter(Group::Report, &pair, Phase::Select, c);
                 self.item = pair.next;
@@ -90,7 +94,7 @@ impl Request {
         self.phase = phase;
     }
 
-    fn leave<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+    pub(super) fn leave<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         if self.group.take().is_some() {
             Writer::body(c.out, &mut self.format).close();
         }
@@ -122,6 +126,7 @@ impl Request {
         let Some((group, (index, token))) = member else {
             return self.leave(c);
         };
+        c.machine.moment(self.item == 0);
         self.item = index + 1;
         let shown = token.read(c.machine);
         let (name, prefix) = (token.name(), group.prefix().bytes().len());
@@ -138,6 +143,10 @@ impl Request {
             return self.selected(c);
         };
         self.at = pair.next;
+        if pair.kind == Kind::Object {
+            self.status = Status::UnsupportedType;
+            return self.leave(c);
+        }
         let Target::Token(token) = resolve(Name::new(), pair.name.of(c.line)) else { return };
         if pair.kind != Kind::True || token.is_far() {
             return;

@@ -2,7 +2,7 @@
 //!
 //! [`StatusReport`] is the list of what to tell and what was told last; [`Report`] sends one report
 //! in steps, [`queue_report`] one queue report at once. The reporting task holds the transmitter
-//! from the first step of a report to its last.
+//! from the first step of a report to its last; [`Machine::moment`] makes it tell of one moment.
 
 use super::Format;
 use super::Mode;
@@ -79,22 +79,41 @@ impl StatusReport {
         self.fresh = true;
     }
 
-    /// Adds a token that is not [far](Token::is_far) behind the others, once. Whether there was room.
-    pub fn add(&mut self, token: Token) -> bool {
-        if (0..self.len).any(|index| self.at(index) == token) {
-            return true;
-        }
-        let place = usize::from(self.len);
+    /// Enters a token. Whether there is room.
+    fn put(&mut self, index: u8, token: Token) -> bool {
+        let place = usize::from(index);
         let [number, ninth] = token.number().to_le_bytes();
         let (Some(low), Some(high)) = (self.low.get_mut(place), self.high.get_mut(place / 8))
         else {
             return false;
         };
         *low = number;
-        let bit = 1 << (self.len % 8);
+        let bit = 1 << (index % 8);
         *high = if ninth != 0 { *high | bit } else { *high & !bit };
-        self.len += 1;
         true
+    }
+
+    /// Adds a token that is not [far](Token::is_far) behind the others, once. Whether there was room.
+    pub fn add(&mut self, token: Token) -> bool {
+        if (0..self.len).any(|index| self.at(index) == token) {
+            return true;
+        }
+        if !self.put(self.len, token) {
+            return false;
+        }
+        self.len += 1;
+        self.fresh = true;
+        true
+    }
+
+    /// Takes a token off the list.
+    pub fn remove(&mut self, token: Token) {
+        let Some(found) = (0..self.len).find(|&index| self.at(index) == token) else { return };
+        for index in found + 1..self.len {
+            self.put(index - 1, self.at(index));
+        }
+        self.len -= 1;
+        self.fresh = true;
     }
 
     /// Has the next report tell everything, as after a reset.
@@ -138,6 +157,7 @@ impl Report {
             self.end(out);
             return false;
         };
+        machine.moment(self.index == 0);
         let shown = token.read(machine);
         let value = match shown {
             Shown::Number(fixed) => fixed.value,

@@ -9,7 +9,7 @@
 //!                 | ok                                                 ^
 //!                 v   group GET                                        | end, or error
 //!               Pair <--------> List <- Select                         |
-//!                | ^ \--------> Member                                 |
+//!                | ^ \--------> Member, Amend                          |
 //!      gc        v |                                                   |
 //!   G-code ---> Gcode -> Block -> Message -> Number -------------------+
 //!                  \  text mode
@@ -60,6 +60,8 @@ pub(super) enum Phase {
     List,
     /// At a pair of a new status report.
     Select,
+    /// At a pair of what the status report gains and loses.
+    Amend,
     /// The caller is to run the block.
     Gcode,
     /// The block, its message, its line number.
@@ -171,7 +173,7 @@ impl Request {
                 }
             }
             Some(_)
-                if *mode == Mode::Json && settings.is_g2core() && help::is_text_command(line) =>
+                if *mode == Mode::Json && settings.wraps_text() && help::is_text_command(line) =>
             {
                 request.block = Span { start, end };
                 request.phase = Phase::Wrap;
@@ -278,6 +280,7 @@ impl Request {
             Phase::Member => self.member(context),
             Phase::List => self.list(context),
             Phase::Select => self.select(context),
+            Phase::Amend => self.amend(context),
             Phase::Gcode => return Next::Gcode { start: self.block.start, end: self.block.end },
             Phase::Block => self.block(context),
             Phase::BlockText => self.block_text(context),

@@ -128,7 +128,9 @@ fn write_unit<O: Out>(token: Token, inches: bool, writer: &mut Writer<'_, O>) {
             writer.text(length(inches));
             writer.text(text!("/min"));
         }
-        Some(Subject::Member(_, vector, index)) if vector.form != Form::Count => {
+        Some(Subject::Member(_, vector, index))
+            if !matches!(vector.form, Form::Count | Form::Steps) =>
+        {
             let rotary = usize::from(index) >= FIRST_ROTARY;
             let inches = inches && vector.form(index) == Form::Length;
             writer.text(if rotary { text!(" deg") } else { length(inches) });

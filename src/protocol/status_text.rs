@@ -10,7 +10,7 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 82;
+const ENTRIES: usize = 83;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
@@ -18,6 +18,7 @@ progmem! {
         (Status::Error, text!("Error")),
         (Status::Noop, text!("Noop")),
         (Status::Terminated, text!("Terminated")),
+        (Status::HardReset, text!("Hard reset")),
         (Status::EndOfFile, text!("End of file")),
         (Status::BufferFull, text!("Buffer full")),
         (Status::Initializing, text!("Initializing")),

@@ -96,9 +96,9 @@ fn groups_list_what_they_have() {
         names.collect::<Vec<_>>().join(" ")
     };
     let (sys, axis) = (names("$sys"), names("$b"));
-    assert!(
-        sys.starts_with("fb fv hp hv id ja ct sl st mt ej jv js tv qv sv si ec ee ex rxm baud gpl")
-    );
+    assert!(sys.starts_with(
+        "fb fv hp hv id ja ct sl st mt ej jv js tv qv sv si ec ee ex rxm baud net gpl"
+    ));
     assert_eq!(names("$"), sys);
     assert_eq!(axis, "bam bvm bfr btn btm bjm bjd bra bac");
     assert_eq!(names("$1"), "1ma 1sa 1tr 1mi 1po 1pm 1sp");
@@ -109,7 +109,8 @@ fn groups_list_what_they_have() {
     let places: Vec<String> = places.map(|group| names(&std::format!("${group}"))).collect();
     assert_eq!(
         names("$$"),
-        [sys, names("$m"), names("$q"), names("$p1"), places.join(" ")].join(" ")
+        [sys, names("$m"), names("$q"), names("$p1"), names("$sp"), names("$co"), places.join(" ")]
+            .join(" ")
     );
     assert_eq!(listed("$o").lines().count(), places.len() * 6 + 12);
 }

@@ -289,7 +289,7 @@ pub enum Group {
     Row(Row),
     /// A token alone.
     One(Token),
-    /// `sr`: the tokens of the status report.
+    /// `sr`, `srs`: the tokens of the status report.
     Report,
 }
 
@@ -305,7 +305,7 @@ impl Group {
         if name.is(text!("sys")) {
             return Some(Group::Settings(Owner::System));
         }
-        if name.is(text!("sr")) {
+        if name.is(text!("sr")) || name.is(text!("srs")) {
             return Some(Group::Report);
         }
         if let Some(owner) = Owner::called(name) {

@@ -58,6 +58,8 @@ pub enum Value {
     Mist,
     /// `cof`: 1 after M8.
     Flood,
+    /// `rst`: why the machine has started, see [`Cause`](crate::hal::resets::Cause).
+    Reset,
     /// `tool`: tool number.
     Tool,
     /// `home`: 0 not homed, 1 homed, 2 homing.
@@ -88,6 +90,12 @@ pub enum Value {
     Row(Row, u8),
     /// `pwr1` and so on: 1 if the motor is powered.
     Powered(u8),
+    /// `_tex` and so on: where the lines read so far end, in units of a `Length`.
+    Target(u8),
+    /// `_ts1` and so on: where exec has brought a motor, in steps.
+    Steps(u8),
+    /// What there is none of: `fd`, `ma`, `_xs1`, `_fe1`.
+    Zero,
     /// `in1` to `in8`, `inp`, `ind`, `ine`, of [`inputs`](crate::boards::inputs): 1 if the switch is worked, 0 if
     /// not, -1 if there is none or its setting is 0.
     Input(u8),
@@ -106,6 +114,9 @@ pub fn thousandths(speed: f32) -> i32 {
     (speed * 1e3 + if speed < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 
+/// Most steps that are shown: with two decimals they fit.
+const STEPS_MAX: i32 = i32::MAX / 100;
+
 /// What a value is measured in.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
@@ -118,6 +129,10 @@ pub enum Form {
     Length,
     /// A length in millimetres whatever the units, or an angle.
     Millimetres,
+    /// The same with two decimals.
+    Rough,
+    /// Steps, with two decimals.
+    Steps,
 }
 
 impl Form {
@@ -125,11 +140,20 @@ impl Form {
     pub fn show(self, value: i32, inches: bool) -> Fixed {
         let (stored, shown) = match self {
             Form::Count => return Fixed::int(value),
+            Form::Steps => {
+                let value = value.clamp(-STEPS_MAX, STEPS_MAX).wrapping_mul(100);
+                return Fixed { value, decimals: 2 };
+            }
+            Form::Rough => (4, 2),
             Form::Speed => (3, 2),
             Form::Length | Form::Millimetres => (4, 3),
         };
         let value = Fixed { value, decimals: stored };
-        if inches && self != Form::Millimetres { value.inches(shown) } else { value.rounded(shown) }
+        if inches && matches!(self, Form::Speed | Form::Length) {
+            value.inches(shown)
+        } else {
+            value.rounded(shown)
+        }
     }
 }
 
@@ -174,13 +198,13 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 32;
+pub const SINGLE_COUNT: usize = 35;
 /// Entries of [`VECTORS`].
-pub const VECTOR_COUNT: usize = 9;
+pub const VECTOR_COUNT: usize = 17;
 /// The number of the vector `g92`.
 pub const SHIFT: u8 = 5;
 /// The number of the vector `prb`, whose group begins with `prbe`.
-pub const PROBED: u8 = 7;
+pub const PROBED: u8 = 15;
 /// The number of `prbe`.
 pub const PROBE_STATE: u8 = SINGLE_COUNT as u8 - 1;
 
@@ -222,6 +246,10 @@ const fn speed(name: &str, value: Value, label: Text) -> Single {
     Single { token: token(name), value, form: Form::Speed, label, choices: NONE }
 }
 
+const fn single(name: &str, value: Value, form: Form) -> Single {
+    Single { token: token(name), value, form, label: NONE, choices: NONE }
+}
+
 const fn vector(name: &str, form: Form, members: u8, label: Text) -> Vector {
     Vector { token: token(name), form, members, label }
 }
@@ -257,6 +285,9 @@ progmem! {
         count("sps", Value::SpindleSpeed, text!("Spindle speed:"), NONE),
         count("com", Value::Mist, text!("Mist coolant:"), ON),
         count("cof", Value::Flood, text!("Flood coolant:"), ON),
+        count("fd", Value::Zero, NONE, NONE),
+        single("ma", Value::Zero, Form::Length),
+        count("rst", Value::Reset, text!("Last reset:"), text!("Power on|External|Brown-out|Watchdog|Asked for")),
         count("inp", PROBE, text!("Probe:"), NONE),
         count("ind", DOOR, text!("Door:"), NONE),
         count("ine", STOP, text!("Emergency stop:"), NONE),
@@ -272,6 +303,14 @@ progmem! {
         vector("tof", Form::Millimetres, 6, text!(" tool length:")),
         vector("g92", Form::Length, 6, NONE),
         vector("pwr", Form::Count, 4, NONE),
+        vector("_te", Form::Rough, 6, NONE),
+        vector("_tr", Form::Rough, 6, NONE),
+        vector("_ts", Form::Steps, 4, NONE),
+        vector("_ps", Form::Steps, 4, NONE),
+        vector("_cs", Form::Steps, 4, NONE),
+        vector("_es", Form::Steps, 4, NONE),
+        vector("_xs", Form::Steps, 4, NONE),
+        vector("_fe", Form::Steps, 4, NONE),
         vector("prb", Form::Millimetres, 6, NONE),
         vector("in", Form::Count, inputs::ENDS as u8, NONE),
     ];
@@ -287,6 +326,10 @@ pub fn vector_value(vector: u8, index: u8) -> Value {
         4 => Value::ToolOffset(index),
         SHIFT => Value::Shift(index),
         6 => Value::Powered(index),
+        7 => Value::Target(index),
+        8 => Value::MachinePosition(index),
+        9..13 => Value::Steps(index),
+        13 | 14 => Value::Zero,
         PROBED => Value::Probed(index),
         _ => Value::Input(index),
     }

@@ -92,6 +92,6 @@ mod tests {
             assert_eq!(keys.insert(key, Item(Setting::from_number(0).unwrap())), None);
             assert_ne!(key, NO_KEY);
         }
-        assert_eq!(keys.len(), 134 + usize::from(ROWS) * AXES + 10 + 16);
+        assert_eq!(keys.len(), 134 + usize::from(ROWS) * AXES + 10 + 5 + 16);
     }
 }

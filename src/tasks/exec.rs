@@ -1,19 +1,21 @@
 //! The exec task: keeps the segment ring full. The only task of the exec executor.
 //!
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
-//! steppers to stop (each pends the exec interrupt). One run prepares at most the free slots: 4,000 to
-//! 8,000 cycles each.
+//! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
+//! milliseconds ([`enough`]), 4,000 to 14,000 cycles each; the rest one by one, when one is used up or thread mode
+//! has nothing else to do: a line that has come is answered meanwhile.
 
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
-use crate::hal::imp::{exec, flags, gpio, stepper};
+use crate::hal::imp::{exec, flags, stepper};
 use crate::hal::ring::Producer;
 use crate::motion::contact;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
-use crate::tasks::{hold, links, power};
+use crate::tasks::health::{self, Sign};
+use crate::tasks::{hold, links, power, spindle};
 
 /// CPU cycles in so many tenths of a millisecond.
 const fn tenths(of_ms: u32) -> u32 {
@@ -24,11 +26,14 @@ const fn tenths(of_ms: u32) -> u32 {
 pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
     let mut machine = Exec::new();
     let mut segment = Segment::default();
-    let (mut most, mut rests) = (1u8, true);
-    let mut outputs = 0;
+    let (mut most, mut rests, mut count) = (1u8, true, 0u8);
     let mut finished = Finished::new();
     loop {
-        exec::wait(|| (segments.used() < most.into()).then_some(())).await;
+        exec::wait(|| {
+            health::answer(Sign::Exec);
+            (segments.used() < most.into()).then_some(())
+        })
+        .await;
         let waiting = blocks.len();
         let standstill = !stepper::running();
         if contact::is_noted() {
@@ -36,6 +41,10 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
         }
         let step = links::update(|out| {
             machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
+            // What has paused in a hold goes on before motion does.
+            if out.outputs != spindle::on() {
+                machine.wait(spindle::switch(out, false), out);
+            }
             if let Some(line) = finished.take(segments.used()) {
                 out.finished = line;
             }
@@ -52,26 +61,34 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
                 finished.rest();
                 out.finished = out.line;
             } else if step == Step::Held {
+                spindle::switch(out, false);
                 hold::dropped(|| {
+                    // What has paused stays off.
+                    out.outputs = spindle::on();
                     machine.drop_all(&mut blocks, out);
                     stepper::settle();
                     finished.rest();
                 });
-            } else if out.outputs != outputs {
-                outputs = out.outputs;
-                gpio::set_outputs(outputs);
+            } else if step == Step::Switched {
+                machine.wait(spindle::switch(out, true), out);
             }
             step
         });
         if step == Step::Segment {
             // There is room: this task alone fills the ring.
             let _ = segments.push_copy(&segment);
+            count = count.wrapping_add(1);
+            health::moves(count);
             if contact::is_noted() {
                 contact::pushed(&segment);
             }
             stepper::go();
             let cycles = u32::from(segment.ticks) * u32::from(segment.period);
             most = queued(cycles, rests);
+            if (enough(cycles)..most).contains(&(segments.used() as u8)) {
+                exec::pend_when_idle();
+                exec_asked_again().await;
+            }
         }
         if blocks.len() != waiting {
             flags::set(Event::BlockDone);
@@ -100,6 +117,12 @@ fn queued(cycles: u32, rests: bool) -> u8 {
         _ if cycles <= tenths(29) => 2,
         _ => 1,
     }
+}
+
+/// How many segments are queued in one go if the last took so many CPU cycles: 2 ms beside the one that runs.
+#[inline(always)]
+fn enough(cycles: u32) -> u8 {
+    if cycles <= tenths(10) { 3 } else { 2 }
 }
 
 /// Waits for the next time exec is pended.

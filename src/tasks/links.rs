@@ -11,6 +11,7 @@
 //! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | the writer waits, response half sent |
 //! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
+//! | [`Links::moment`] | how motion stood when the report under way began | 1 | 32 B | whoever tells it | the same | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
@@ -32,8 +33,8 @@ use crate::gcode::interpreter::Interpreter;
 use crate::hal::byte::SharedByte;
 use crate::hal::serial::PORTS;
 use crate::jobs::Job;
-use crate::motion::exec::Snapshot;
 use crate::motion::queue;
+use crate::motion::snapshot::{Moment, Snapshot};
 use crate::protocol::StatusReport;
 use crate::units::{Length, PerAxis};
 
@@ -91,6 +92,8 @@ pub struct Links {
     pub flushed: Cell<bool>,
     /// The built-in job that runs.
     pub job: Cell<Job>,
+    /// When the report that is on its way was begun.
+    pub moment: Cell<Moment>,
     /// What has to be put away, and where the rest is.
     pub storage: &'static Storage,
     /// A setting has changed since the planner looked.

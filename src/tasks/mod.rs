@@ -3,6 +3,7 @@
 
 pub mod control;
 pub mod exec;
+pub mod health;
 pub mod hold;
 mod homing;
 pub mod lines;
@@ -15,6 +16,7 @@ mod printing;
 pub mod reader;
 pub mod reporter;
 mod setup;
+pub mod spindle;
 pub mod storage;
 pub mod switches;
 pub mod tx;

@@ -18,12 +18,12 @@ use super::setup::moved_by;
 use crate::boards::outputs;
 use crate::config::{Settings, StepRatio};
 use crate::gcode::arc::Walk;
-use crate::gcode::command::{Commands, Feed, Motion, Overrides, Stop};
+use crate::gcode::command::{Commands, Feed, Motion, Overrides, Spindle, Stop};
 use crate::gcode::modal::{self, Coolant};
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, wait};
 use crate::jobs::Job;
-use crate::motion::block::{Block, Body, Line as Move};
+use crate::motion::block::{Block, Body, Line as Move, Outputs};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line, Motors};
 use crate::motion::pace::Drivers;
@@ -45,8 +45,8 @@ struct Planner {
     drivers: Drivers,
     /// By how much feeds are multiplied, if at all.
     feed_factor: Option<f32>,
-    /// What exec has been told to switch, bits of [`outputs`].
-    outputs: u8,
+    /// What exec has been told to switch.
+    outputs: Outputs,
     /// How far the line has been carried out.
     steps: Steps,
     walk: Option<ArcWalk>,
@@ -107,7 +107,7 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         line: 0,
         drivers: Drivers::USUAL,
         feed_factor: None,
-        outputs: 0,
+        outputs: Outputs { on: 0, speed: 0.0 },
         steps: Steps::default(),
         walk: None,
         parts: None,
@@ -131,8 +131,7 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         }
         links.commands_taken.set(false);
         if planner.is_flushed() {
-            hold::drop_blocks();
-            wait(Event::BlockDone, || hold::has_dropped().then_some(())).await;
+            seek::drop_blocks().await;
             planner.restart();
             if links.killed.take() {
                 parser::end_program(links);
@@ -234,23 +233,16 @@ impl Planner {
             Step::Dwell(ms) => self.pause(Body::Dwell(*ms)),
             Step::SetPosition(position) => self.set_position(position),
             Step::Overrides(factors) => self.set_overrides(*factors),
-            Step::Spindle(spindle) => {
-                let turn = match spindle.turn {
-                    modal::Turn::Off => 0,
-                    modal::Turn::Clockwise => outputs::SPINDLE,
-                    modal::Turn::Counterclockwise => outputs::SPINDLE | outputs::COUNTERCLOCKWISE,
-                };
-                self.switch(outputs::SPINDLE | outputs::COUNTERCLOCKWISE, turn);
-            }
+            Step::Spindle(spindle) => self.set_spindle(spindle),
             Step::Coolant(coolant) => {
                 let bit =
                     |which: Coolant, output| if coolant & which as u8 != 0 { output } else { 0 };
                 let on = bit(Coolant::Mist, outputs::MIST) | bit(Coolant::Flood, outputs::FLOOD);
-                self.switch(outputs::MIST | outputs::FLOOD, on);
+                self.switch(outputs::MIST | outputs::FLOOD, on, self.outputs.speed);
             }
-            Step::Stop(Stop::End) if self.outputs != 0 => {
+            Step::Stop(Stop::End) if self.outputs.on != 0 => {
                 // Another turn ends the program.
-                self.switch(u8::MAX, 0);
+                self.switch(u8::MAX, 0, 0.0);
                 self.steps.repeat();
             }
             Step::Stop(Stop::End) => {
@@ -366,9 +358,20 @@ impl Planner {
         self.builder.set_traverse_factor(part(factors.traverse));
     }
 
-    /// Switches those of `which` on that are in `on`, the others of `which` off.
-    fn switch(&mut self, which: u8, on: u8) {
-        let outputs = self.outputs & !which | on;
+    fn set_spindle(&mut self, spindle: &Spindle) {
+        let (turn, speed) = match spindle.turn {
+            modal::Turn::Off => (0, 0.0),
+            modal::Turn::Clockwise => (outputs::SPINDLE, spindle.speed),
+            modal::Turn::Counterclockwise => {
+                (outputs::SPINDLE | outputs::COUNTERCLOCKWISE, spindle.speed)
+            }
+        };
+        self.switch(outputs::SPINDLE | outputs::COUNTERCLOCKWISE, turn, speed);
+    }
+
+    /// Switches those of `which` on that are in `on`, the others of `which` off; the spindle is to have this speed.
+    fn switch(&mut self, which: u8, on: u8, speed: f32) {
+        let outputs = Outputs { on: self.outputs.on & !which | on, speed };
         if outputs != self.outputs {
             self.outputs = outputs;
             self.pause(Body::Outputs(outputs));
@@ -419,11 +422,15 @@ impl Planner {
         self.news = News::None;
         let mut model = links.model.borrow_mut();
         self.set_overrides(model.overrides());
-        model.set_outputs(spindle_of(motion.outputs), coolant_of(motion.outputs));
+        let spindle = Spindle { turn: spindle_of(motion.outputs), speed: motion.speed };
+        model.set_outputs(&spindle, coolant_of(motion.outputs));
         drop(model);
         links.job.set(Job::default());
         links.flush.set(Flush::None);
         hold::end();
+        if links.cycle.replace(Cycle::Off) == Cycle::Jog {
+            links.jogged.set(true);
+        }
         if links.killed.get() {
             links.except(Status::KillJob);
         }

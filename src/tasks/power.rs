@@ -1,7 +1,7 @@
 //! The power task: gives motors power, and takes it from them when they have been idle.
 //!
 //! Reads the settings, the milliseconds and exec's snapshot; writes the drivers' enables. Waits for
-//! [`LOOK_MS`] between looks. Exec calls [`segment`] before it queues one, so that a driver is on before
+//! [`LOOK_MS`] between looks, and sees to the [health](super::health) of all besides. Exec calls [`segment`] before it queues one, so that a driver is on before
 //! its step; that costs 40 cycles a segment. Everyone else changes the state under the ceiling.
 
 use core::cell::UnsafeCell;
@@ -9,6 +9,7 @@ use core::cell::UnsafeCell;
 use embassy_time::Timer;
 
 use super::links::{Links, snapshot};
+use super::{health, hold};
 use crate::config::Settings;
 use crate::hal::imp::time::millis;
 use crate::hal::imp::{exec, gpio};
@@ -30,9 +31,17 @@ machine_static! {
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
+        health::look();
         let timeout = links.settings.borrow().motor_timeout_centis().saturating_mul(10);
         let (now, running) = (millis(), snapshot().running);
-        if change(|motors| motors.pass(now, running, timeout)) {
+        let holds = hold::is_on();
+        let pass = |motors: &mut Motors| {
+            if holds {
+                motors.stand_still(LOOK_MS as u32);
+            }
+            motors.pass(now, running, timeout)
+        };
+        if change(pass) {
             links.reporter_wake.signal();
         }
         Timer::after_ticks(LOOK_MS).await;

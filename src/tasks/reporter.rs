@@ -94,8 +94,7 @@ fn reports_queue(links: &Links) -> bool {
     links.settings.borrow().queue_verbosity() != 0
 }
 
-/// Sends something that is put in steps: `step` says whether there is more. All of it in one turn, if there is room,
-/// so that a report tells of one moment.
+/// Sends something that is put in steps: `step` says whether there is more. All of it in one turn, if there is room.
 async fn send(
     links: &Links,
     port: &Port,

@@ -11,10 +11,11 @@
 //! stop the steps.
 
 use super::links::Links;
+use super::spindle;
 use crate::boards::{ACTIVE, inputs};
 use crate::config::Settings;
 use crate::gcode::setup::{AxisMode, Setup};
-use crate::hal::imp::{exec, gpio, inputs as pins};
+use crate::hal::imp::inputs as pins;
 use crate::status::Status;
 
 /// Of `sn` and `sx`: a limit.
@@ -59,7 +60,7 @@ pub fn serve(links: &Links) {
     let hits = pins::take_hits();
     if hits != 0 && links.limits_hit.get() == 0 {
         links.limits_hit.set(hits);
-        exec::lock(|_| gpio::set_outputs(0));
+        spindle::stop();
         links.except(Status::LimitHit);
         links.parser_wake.signal();
     }

@@ -1,7 +1,8 @@
 //! What the protocol sees of the machine: the links, through one borrow at a time.
 //!
 //! Made anew for each step of a response or report, never kept across an `.await`. Positions and
-//! speed come from exec's snapshot while something runs, from the G-code model when nothing does.
+//! speed come from exec's snapshot while something runs, from the G-code model when nothing does. Steps of one report
+//! or group share a [`Moment`], the one of [`Links::moment`]; two ports at a time would share it, too.
 
 use core::cell::{OnceCell, RefMut};
 
@@ -11,6 +12,7 @@ use super::links::{Cycle, Links, snapshot};
 use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
+use super::spindle;
 use super::switches;
 use crate::baud;
 use crate::boards::{MOTORS, inputs};
@@ -20,12 +22,12 @@ use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::gcode::tables::Row;
 use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::imp::{gpio, inputs as pins, stepper, uart};
+use crate::hal::imp::{gpio, inputs as pins, stepper, uart, watchdog};
 use crate::hal::serial::{Flow, PORTS};
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::motion::dynamics;
-use crate::motion::exec::{Program, Snapshot};
 use crate::motion::queue;
+use crate::motion::snapshot::{Moment, Program};
 use crate::protocol::{Dialect, Machine, StatusReport, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
@@ -68,7 +70,7 @@ pub struct View<'a> {
     port: &'a Port,
     settings: RefMut<'a, Settings>,
     report: RefMut<'a, StatusReport>,
-    motion: OnceCell<Snapshot>,
+    motion: OnceCell<Moment>,
 }
 
 #[small]
@@ -84,8 +86,8 @@ impl<'a> View<'a> {
         }
     }
 
-    fn motion(&self) -> &Snapshot {
-        self.motion.get_or_init(snapshot)
+    fn motion(&self) -> &Moment {
+        self.motion.get_or_init(|| snapshot().moment())
     }
 
     /// Whether anything is queued or runs, or a hold is on.
@@ -141,7 +143,7 @@ impl<'a> View<'a> {
         // Of several motors on an axis the first tells; an axis that moves none is where it should be.
         (0..MOTORS)
             .find(|m| usize::from(moved_by(&self.settings, *m)) == axis)
-            .and_then(|m| self.settings.step_ratio(m).length(self.motion().position(m)))
+            .and_then(|m| self.settings.step_ratio(m).length(*self.motion().position.get(m)?))
             .unwrap_or(programmed)
     }
 
@@ -243,6 +245,7 @@ impl Machine for View<'_> {
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
         if setting.is_cold() {
             self.links.storage.set_cold(setting, value)?;
+            spindle::set(setting, value);
             return Ok(Warning::None);
         }
         if setting.needs_rest() {
@@ -307,6 +310,13 @@ impl Machine for View<'_> {
             }
             Value::Row(row, axis) => self.links.storage.value(row, axis).0,
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
+            Value::Target(axis) => {
+                self.links.model.borrow().position().get(usize::from(axis)).map_or(0, |at| at.0)
+            }
+            Value::Steps(motor) => {
+                self.motion().position.get(usize::from(motor)).map_or(0, |at| *at)
+            }
+            Value::Zero => 0,
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Tool => self.links.model.borrow().tool().into(),
             Value::Input(input) => self.input(input),
@@ -319,10 +329,18 @@ impl Machine for View<'_> {
                 hit => hit.trailing_zeros() as i32,
             },
             Value::Hold => self.hold(),
+            Value::Reset => watchdog::cause() as i32,
             Value::Home => self.home_state(),
             Value::Blamed => self.links.model.borrow().blamed().into(),
             modal => self.modal(modal),
         }
+    }
+
+    fn moment(&mut self, first: bool) {
+        if first {
+            self.links.moment.set(*self.motion());
+        }
+        self.motion = OnceCell::from(self.links.moment.get());
     }
 
     fn report(&mut self) -> &mut StatusReport {
@@ -342,6 +360,7 @@ impl Machine for View<'_> {
         self.links.resync.set(true);
         self.links.settings_changed.set(true);
         self.links.storage.forget_cold();
+        spindle::set_all(self.links.storage);
         self.links.storage.note(0, ITEMS);
         set_hardware(&self.settings);
         Status::Ok

@@ -7,9 +7,10 @@ use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf::motion::block::{Block, Line as Move};
 use kerf::motion::dda::{Dda, PHASE_MARGIN, Pins, SEGMENTS, STEP, Segment};
 use kerf::motion::dynamics::{Dynamics, Machine};
-use kerf::motion::exec::{Exec, Snapshot, Step};
+use kerf::motion::exec::{Exec, Step};
 use kerf::motion::line::{Builder, Built, Line, Motors};
 use kerf::motion::queue::{BlockQueue, BlockSource, BlockStore};
+use kerf::motion::snapshot::Snapshot;
 use kerf::units::{AXES, Length, PerAxis};
 
 /// Limits and motors, the same for all axes unless changed; mm, s.

@@ -13,6 +13,7 @@
 //! near xmin -1280             from power-up on, the switch is closed while its axis is at or beyond this step:
 //!                             xmin to amax; probe, while Z is
 //! steps X=12800 Y=0           the motors come to rest there; those not named are at 0
+//! outputs spindle ccw 12.50%  these are on by now, of `spindle ccw mist flood`, and the spindle's pulses that wide
 //! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
 //! 2cts 1                      the sender on the second port holds the machine back by that pin (0: no more)
 //! ```
@@ -31,6 +32,8 @@ const HEAR_MS: u64 = 20_000;
 /// Longest wait for the motors to rest, and the time without a step that is called rest.
 const MOVE_MS: u64 = 120_000;
 const REST_MS: u64 = 200;
+/// Longest wait for outputs.
+const SWITCH_MS: u64 = 30;
 /// Time at the end in which nothing unexpected may come.
 const LAST_MS: u64 = 100;
 
@@ -56,6 +59,9 @@ pub trait Side {
     fn wire(&mut self, switches: &[(usize, i64)]);
     /// Where the motors are, in steps.
     fn steps(&self) -> [i64; 4];
+    /// The outputs that are on, as bits of `kerf::boards::outputs`; and what part of its period the spindle's
+    /// pulse-width output is high.
+    fn outputs(&self) -> (u8, f64);
 }
 
 /// One line of a transcript.
@@ -72,6 +78,7 @@ enum Event {
     Input(usize, bool),
     Near(usize, i64),
     Steps([i64; 4]),
+    Outputs(String),
 }
 
 /// A transcript, read.
@@ -136,6 +143,7 @@ fn parse(line: &str) -> Option<Event> {
         "in" => input(rest),
         "near" => near(rest),
         "steps" => steps(rest).map(Event::Steps),
+        "outputs" => Some(Event::Outputs(rest.to_string())),
         _ => None,
     }
 }
@@ -181,6 +189,15 @@ fn steps(text: &str) -> Option<[i64; 4]> {
         *steps.get_mut(letter.or_else(number)?)? = value.parse().ok()?;
     }
     Some(steps)
+}
+
+/// What a transcript calls outputs; the direction of a spindle that is off is of no account.
+fn name_outputs((on, share): (u8, f64)) -> String {
+    let turns = on & 1 != 0;
+    let names = ["spindle", "ccw", "mist", "flood"].into_iter().enumerate();
+    let names = names.filter(|(bit, _)| on >> bit & 1 != 0 && (*bit != 1 || turns));
+    let share = format!("{:.2}%", share * 100.0);
+    names.map(|(_, name)| name).chain([&*share]).collect::<Vec<_>>().join(" ")
 }
 
 /// Whether `pattern`, in which `*` is anything, is all of `text`.
@@ -264,6 +281,17 @@ impl<S: Side> Player<'_, S> {
             Event::Input(input, closed) => self.side.set_input(*input, *closed),
             Event::Near(..) => {}
             Event::Steps(steps) => return self.rest_at(steps),
+            Event::Outputs(wanted) => {
+                let are = (0..SWITCH_MS).find(|_| {
+                    let are = name_outputs(self.side.outputs()) == *wanted;
+                    if !are {
+                        self.side.run_ms(1);
+                    }
+                    are
+                });
+                let are = are.ok_or_else(|| name_outputs(self.side.outputs()));
+                return are.map(|_| ()).map_err(|are| format!("outputs {are}"));
+            }
         }
         Ok(())
     }

@@ -1,6 +1,8 @@
 //! What each setting means, in the order of its table.
 
-use crate::config::table::{AXIS_ROWS, JOB_ROWS, MOTOR_ROWS, PWM_ROWS, SYSTEM_ROWS, USER_ROWS};
+use crate::config::table::{
+    AXIS_ROWS, COOLANT_ROWS, JOB_ROWS, MOTOR_ROWS, PWM_ROWS, SPINDLE_ROWS, SYSTEM_ROWS, USER_ROWS,
+};
 
 /// A name without its group, and what it means.
 pub type Meaning = (&'static str, &'static str);
@@ -19,7 +21,11 @@ pub const SYSTEM: [Meaning; SYSTEM_ROWS] = [
         "Kind of switches at the ends of axes: open or closed unless worked. Probe, door and emergency stop close.",
     ),
     ("mt", "How long motors with `pm` 2 stay powered after a move."),
-    ("ej", "Mode at power-up; after that answers are in the mode of the last line."),
+    (
+        "ej",
+        "Mode at power-up; after that answers are in the mode of the last line. With `dia` 1 that takes 2, and else lines of \
+text mode are answered as `txt`.",
+    ),
     (
         "jv",
         "What JSON responses show: nothing, the footer, messages, settings, line numbers, blocks of G-code; each \
@@ -47,6 +53,7 @@ unanswered, `[1,status,length,checksum]`. `rx` counts likewise.",
         "Rate of the USB line: a code, or bits a second from 9600 to 1000000. In force when the response has \
 left; 115200 after a reset.",
     ),
+    ("net", "Network of boards: there is none."),
     ("gpl", "Plane at power-up and after M2."),
     ("gun", "Units at power-up and after M2."),
     ("gco", "Coordinate system at power-up and after M2."),
@@ -106,17 +113,35 @@ pub const AXIS: [Meaning; AXIS_ROWS] = [
 ];
 
 pub const PWM: [Meaning; PWM_ROWS] = [
-    ("frq", "Frequency. No effect yet, as all of this group."),
-    ("csl", "Lowest speed, clockwise."),
-    ("csh", "Highest speed, clockwise."),
+    ("frq", "Frequency; 0.122 Hz is the lowest there is."),
+    ("csl", "Lowest speed, clockwise: a lower S has its share."),
+    ("csh", "Highest speed, clockwise: a higher S has its share."),
     ("cpl", "Share of the period at the lowest speed, clockwise."),
     ("cph", "Share of the period at the highest speed, clockwise."),
     ("wsl", "Lowest speed, counter-clockwise."),
     ("wsh", "Highest speed, counter-clockwise."),
     ("wpl", "Share of the period at the lowest speed, counter-clockwise."),
     ("wph", "Share of the period at the highest speed, counter-clockwise."),
-    ("pof", "Share of the period while the spindle is off."),
+    ("pof", "Share of the period while the spindle is off, or S is 0."),
 ];
+
+pub const SPINDLE: [Meaning; SPINDLE_ROWS] = [
+    (
+        "ph",
+        "Whether the spindle stands still in a feedhold. It starts again before motion goes on, but not after `%`.",
+    ),
+    ("de", "Time that moves wait for when the spindle has been started, or turned round."),
+    (
+        "ep",
+        "Level of the enable pin that is on. Until the settings have been read after a reset it is not driven.",
+    ),
+    ("dp", "Level of the direction pin."),
+];
+
+pub const COOLANT: [Meaning; COOLANT_ROWS] = [(
+    "ph",
+    "Whether mist and flood pause in a feedhold. They go on with the motion, but not after `%`.",
+)];
 
 pub const USER: [Meaning; USER_ROWS] = [
     ("0", "First of the group."),

@@ -74,7 +74,7 @@ refused. A line is looked at when it is carried out, not before.
 
 /// All of it.
 pub fn markdown() -> String {
-    let groups: [(&str, &str, &[Owner], &[Meaning]); 6] = [
+    let groups: [(&str, &str, &[Owner], &[Meaning]); 8] = [
         (
             "The machine",
             "The group `sys`; names have no prefix.",
@@ -94,6 +94,8 @@ pub fn markdown() -> String {
             &meaning::AXIS,
         ),
         ("PWM of the spindle", "The group `p1`: `p1frq`.", &[Owner::Pwm], &meaning::PWM),
+        ("Spindle", "The group `sp`: `spde`.", &[Owner::Spindle], &meaning::SPINDLE),
+        ("Coolant", "The group `co`: `coph`.", &[Owner::Coolant], &meaning::COOLANT),
         (
             "User data",
             "The groups `uda` `udb` `udc` `udd`: `uda0`, `udd3`. For a sender's own use: `{uda0:\"0x2a\"}`, `$uda0=0x2a`.",
@@ -141,9 +143,8 @@ fn kind(row: &Row) -> &'static str {
         Kind::Constant => "fixed",
         Kind::Text => "fixed text",
         Kind::Data | Kind::Job => "32 bits",
-        Kind::Cold => "number",
-        Kind::Small | Kind::Large if row.stored == 0 => "integer",
-        Kind::Small | Kind::Large => "number",
+        Kind::Small | Kind::Large | Kind::Cold if row.stored == 0 => "integer",
+        Kind::Small | Kind::Large | Kind::Cold => "number",
     }
 }
 
@@ -274,6 +275,8 @@ mod tests {
             (Owner::Motor(0), &meaning::MOTOR),
             (Owner::Axis(0), &meaning::AXIS),
             (Owner::Pwm, &meaning::PWM),
+            (Owner::Spindle, &meaning::SPINDLE),
+            (Owner::Coolant, &meaning::COOLANT),
             (Owner::User(0), &meaning::USER),
             (Owner::Job, &meaning::JOB),
         ] {

@@ -33,6 +33,9 @@ pub(super) static CLOSED: SharedByte = SharedByte::new(1);
 /// Exec was asked for meanwhile.
 pub(super) static MISSED: SharedByte = SharedByte::new(0);
 
+/// Exec would go on when nobody else has anything to do.
+static PATIENT: SharedByte = SharedByte::new(0);
+
 struct Context {
     executor: Cell<Option<&'static Executor>>,
     /// Of the exec task, the only one; from its first wait on.
@@ -49,6 +52,20 @@ static CONTEXT: Context = Context { executor: Cell::new(None), waker: UnsafeCell
 pub fn pend() {
     // SAFETY: the register has two values, written whole: no read-modify-write to tear.
     unsafe { UCSR2B.write_volatile(PENDED) };
+}
+
+/// Asks for exec to run when thread mode has nothing left to do. Exec only.
+pub fn pend_when_idle() {
+    PATIENT.set(1);
+}
+
+/// Thread mode has nothing left to do; interrupts are off.
+#[inline(always)]
+pub(super) fn idle() {
+    if PATIENT.get() != 0 {
+        PATIENT.set(0);
+        pend();
+    }
 }
 
 /// Lets exec run from now on.

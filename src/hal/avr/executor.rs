@@ -2,7 +2,7 @@
 
 use embassy_executor::raw::Executor;
 
-use super::flags;
+use super::{exec, flags};
 use crate::hal::event;
 
 /// Runs the main executor for ever, asleep when there is nothing to do.
@@ -19,6 +19,8 @@ pub fn run(executor: &'static Executor) -> ! {
             unsafe { executor.poll() };
             avr_device::interrupt::disable();
         } else {
+            // If it wants to run it ends the sleep.
+            exec::idle();
             // SAFETY: plain instructions. They must stay together: an interrupt cannot come between
             // `sei` and `sleep`, so an event set after the test above still ends the sleep.
             unsafe { core::arch::asm!("sei", "sleep", "cli") };

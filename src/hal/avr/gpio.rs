@@ -4,6 +4,7 @@
 //! Otherwise, and on ports H to L, it is a read-modify-write, so the pin must share its port with no pin
 //! that another level writes meanwhile. Enables see to that themselves.
 
+use crate::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
 use crate::boards::{ACTIVE, Handshake, Pin};
 use crate::hal::byte::SharedByte;
 
@@ -33,11 +34,12 @@ pub fn toggle(pin: Pin) {
 
 fn output(pin: Pin) {
     let direction = (pin.port.address() - 1) as *mut u8;
-    // SAFETY: the data direction register lies one below the port register; start-up only.
+    // SAFETY: the data direction register lies one below the port register; thread mode alone writes it.
     unsafe { direction.write_volatile(direction.read_volatile() | 1 << pin.bit) };
 }
 
 /// Makes outputs of the board's outputs: steps low, drivers off, hazards off, senders welcome, no bus driven.
+/// Of the spindle's enable it is not known yet which level is off: see [`set_low`].
 pub fn start() {
     for motor in ACTIVE.motors {
         low(motor.step);
@@ -54,7 +56,9 @@ pub fn start() {
     }
     for &hazard in ACTIVE.hazards {
         low(hazard);
-        output(hazard);
+        if ACTIVE.outputs[0] != Some(hazard) {
+            output(hazard);
+        }
     }
     for serial in ACTIVE.serial {
         if let Some(Handshake { rts, cts }) = serial.handshake {
@@ -114,16 +118,43 @@ pub fn power(motors: u8) {
     }
 }
 
-/// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). Exec.
+/// The outputs that are on when they are low, as bits.
+static LOW: SharedByte = SharedByte::new(0);
+
+/// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). The direction of a spindle that is
+/// off stays as it is. Exec, or while it cannot run.
 pub fn set_outputs(on: u8) {
+    let high = on ^ LOW.get();
     macro_rules! each {
         ($($o:literal)+) => {$(
-            if let Some(pin) = ACTIVE.outputs[$o] {
-                set(pin, on & (1 << $o) != 0);
+            if let Some(pin) = ACTIVE.outputs[$o]
+                && (1 << $o != COUNTERCLOCKWISE || on & SPINDLE != 0)
+            {
+                set(pin, high & (1 << $o) != 0);
             }
         )+};
     }
-    each!(0 1 2 3);
+    each!(1 0 2 3);
+}
+
+/// Which outputs are on when they are low. From the first time on the spindle's enable is driven. Thread mode, while
+/// exec cannot run.
+pub fn set_low(outputs: u8, on: u8) {
+    LOW.set(outputs);
+    if let Some(direction) = ACTIVE.outputs[1] {
+        set(direction, (on ^ outputs) & COUNTERCLOCKWISE != 0);
+    }
+    set_outputs(on);
+    if let Some(enable) = ACTIVE.outputs[0] {
+        output(enable);
+    }
+}
+
+/// Stops the spindle for good. Interrupts are off.
+pub fn stop_spindle() {
+    if let Some(enable) = ACTIVE.outputs[0] {
+        set(enable, LOW.get() & SPINDLE != 0);
+    }
 }
 
 /// The compiler makes one read-modify-write of the two cases, and the port may be shared with pins of the

@@ -6,6 +6,7 @@
 //! | USART0_RX, USART0_UDRE | `uart` | 1 | bytes between the line and the rings |
 //! | TIMER0_COMPA | `time` | 1 | counts milliseconds |
 //! | INT, PCINT, TIMER2_COMPA | `inputs` | 1 | looks at the switches when one moves |
+//! | WDT | `watchdog` | 0 | resets a machine that has got stuck |
 //! | USART2_UDRE | `exec` | 2 | software interrupt: polls the exec executor, interrupts on |
 //!
 //! Everything else runs in thread mode, from `executor::run`.
@@ -17,14 +18,17 @@ pub mod gpio;
 pub mod inputs;
 mod mem;
 pub mod panic;
+pub mod pwm;
 mod step_isr;
 pub mod stepper;
 pub mod time;
 pub mod uart;
+pub mod watchdog;
 
 use avr_device::atmega2560::Peripherals;
 
 use crate::hal::event::Event;
+use crate::hal::resets::Mark;
 
 /// The peripherals.
 ///
@@ -36,24 +40,11 @@ pub(super) fn peripherals() -> Peripherals {
     unsafe { Peripherals::steal() }
 }
 
-/// Starts the firmware anew, as if the reset button had been pressed: by the watchdog, in 15 ms. Meanwhile the line that is
-/// being sent ends, lest a sender read the greeting as the rest of it.
+/// Starts the firmware anew, as if the reset button had been pressed: by the watchdog, in 15 ms.
 pub fn reset() -> ! {
     avr_device::interrupt::disable();
     stepper::kill();
-    // SAFETY: tasks of thread mode alone ask for a reset, and interrupts are off for good.
-    unsafe { uart::end_lines() };
-    const WDTCSR: *mut u8 = 0x60 as *mut u8;
-    const CHANGE: u8 = 1 << 4 | 1 << 3;
-    const SHORTEST: u8 = 1 << 3;
-    // SAFETY: the timed sequence of the data sheet (13.5), with interrupts off.
-    unsafe {
-        WDTCSR.write_volatile(CHANGE);
-        WDTCSR.write_volatile(SHORTEST);
-    }
-    loop {
-        avr_device::asm::nop();
-    }
+    watchdog::reset(Mark::ASKED)
 }
 
 /// Starts the boot loader, if the board has one; else starts the firmware anew.
@@ -67,6 +58,7 @@ pub fn boot() -> ! {
         reset();
     }
     panic::make_safe();
+    watchdog::off();
     // SAFETY: nothing of the firmware runs after this; the loader makes a stack of its own.
     unsafe {
         uart::stop();
@@ -101,18 +93,6 @@ fn has_boot_loader() -> bool {
         );
     }
     !matches!((low, high), (0xFF, 0xFF) | (0, 0))
-}
-
-/// Takes the watchdog off, which stays on over the reset it causes. First thing at start-up.
-pub fn watchdog_off() {
-    const MCUSR: *mut u8 = 0x54 as *mut u8;
-    const WDTCSR: *mut u8 = 0x60 as *mut u8;
-    // SAFETY: the sequence of the data sheet (13.5), with interrupts off; nobody else is running.
-    unsafe {
-        MCUSR.write_volatile(0);
-        WDTCSR.write_volatile(1 << 4 | 1 << 3);
-        WDTCSR.write_volatile(0);
-    }
 }
 
 /// The event bits: general-purpose I/O register 0, where a bit is set or cleared in one instruction.

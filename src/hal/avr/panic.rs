@@ -7,6 +7,7 @@ use crate::boards::ACTIVE;
 pub fn halt() -> ! {
     avr_device::interrupt::disable();
     make_safe();
+    super::watchdog::off();
     loop {
         avr_device::asm::nop();
     }
@@ -15,9 +16,11 @@ pub fn halt() -> ! {
 /// Stops the step timer, switches drivers and hazardous outputs off. Interrupts are off.
 pub fn make_safe() {
     super::stepper::kill();
+    super::pwm::kill();
     for &hazard in ACTIVE.hazards {
         super::gpio::low(hazard);
     }
+    super::gpio::stop_spindle();
     super::gpio::power(0);
 }
 

@@ -110,6 +110,11 @@ pub fn stop() {
     kill();
 }
 
+/// Whether the ticks have been [stopped](stop) until reset.
+pub fn is_stopped() -> bool {
+    STOPPED.get() != 0
+}
+
 /// Whether ticks are coming.
 pub fn running() -> bool {
     RUNNING.get() != 0

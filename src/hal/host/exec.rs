@@ -11,12 +11,28 @@ struct Waiting(Cell<Option<Waker>>);
 
 machine_static! {
     fn pended() -> Local<bool> = Local::new(false);
+    fn patient() -> Local<bool> = Local::new(false);
     fn waiting() -> Waiting = Waiting(Cell::new(None));
 }
 
 /// Asks for exec to run.
 pub fn pend() {
     pended().set(true);
+}
+
+/// Asks for exec to run when thread mode has nothing left to do. Exec only.
+pub fn pend_when_idle() {
+    patient().set(true);
+}
+
+/// Thread mode has nothing left to do. Whether exec runs then.
+pub(super) fn idle() -> bool {
+    let runs = patient().get();
+    if runs {
+        patient().set(false);
+        pend();
+    }
+    runs
 }
 
 /// Whether exec was asked for; withdraws the request and wakes the exec task.

@@ -16,6 +16,11 @@ pub fn set_outputs(on: u8) {
     switched().set(on);
 }
 
+/// Which outputs are on when they are low: of no account here, where outputs are counted before the pins.
+pub fn set_low(_outputs: u8, on: u8) {
+    set_outputs(on);
+}
+
 /// What [`set_outputs`] was told last.
 pub fn outputs() -> u8 {
     switched().get()

@@ -127,7 +127,7 @@ impl Machine {
                 event::dispatch(flags::take());
                 // SAFETY: not called from inside a task.
                 unsafe { self.main.poll() };
-            } else {
+            } else if !exec::idle() {
                 break;
             }
         }

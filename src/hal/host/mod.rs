@@ -10,9 +10,11 @@ pub mod exec;
 pub mod gpio;
 pub mod inputs;
 mod machine;
+pub mod pwm;
 pub mod stepper;
 pub mod time;
 pub mod uart;
+pub mod watchdog;
 
 pub use machine::Machine;
 

@@ -130,6 +130,11 @@ pub fn stop() {
     stepper().next_tick.set(NEVER);
 }
 
+/// Whether the ticks have been [stopped](stop) until reset.
+pub fn is_stopped() -> bool {
+    stepper().halted.get()
+}
+
 /// Whether ticks are coming.
 pub fn running() -> bool {
     stepper().next_tick.get() != NEVER

@@ -20,7 +20,7 @@
 use kerf_macros::small;
 
 use super::Planner;
-use super::seek::Sought;
+use super::seek::{Sought, drop_blocks};
 use crate::gcode::command::{Feed, Motion};
 use crate::hal::imp::inputs;
 use crate::motion::block::Body;
@@ -75,6 +75,10 @@ impl Planner {
             }
             let sought = self.sought().await;
             done = self.end_stage(&mut at, &sought);
+        }
+        if self.is_flushed() {
+            // It may still move towards the switch.
+            drop_blocks().await;
         }
         self.end_homing(&at, done.err());
     }

@@ -31,11 +31,11 @@ impl Planner {
 
     #[small]
     fn end_jog(&mut self) {
-        // In a flush it is not here yet.
+        // In a flush it ends with that, when the position is known.
         if !self.is_flushed() {
             self.links.model.borrow_mut().set_position(&self.position);
+            self.links.jogged.set(true);
+            self.enter(Cycle::Off);
         }
-        self.links.jogged.set(true);
-        self.enter(Cycle::Off);
     }
 }

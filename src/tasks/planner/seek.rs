@@ -14,10 +14,10 @@ use crate::boards::MOTORS;
 use crate::gcode::command::Feed;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::inputs;
-use crate::motion::block::Body;
+use crate::motion::block::{Body, Outputs};
 use crate::motion::dynamics::PER_SECOND_CUBED;
-use crate::motion::exec::Snapshot;
 use crate::motion::short::Short;
+use crate::motion::snapshot::Snapshot;
 use crate::motion::{contact, queue};
 use crate::tasks::{hold, links};
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
@@ -30,6 +30,12 @@ pub(super) enum Sought {
     End,
     /// What is queued is to be dropped.
     Flushed,
+}
+
+/// Has exec drop its blocks, as soon as it is at rest.
+pub(super) async fn drop_blocks() {
+    hold::drop_blocks();
+    wait(Event::BlockDone, || hold::has_dropped().then_some(())).await;
 }
 
 impl Planner {
@@ -69,8 +75,7 @@ impl Planner {
             contact::clear();
             return if self.is_flushed() { Sought::Flushed } else { Sought::End };
         }
-        hold::drop_blocks();
-        wait(Event::BlockDone, || hold::has_dropped().then_some(())).await;
+        drop_blocks().await;
         let motion = links::snapshot();
         let steps = contact::steps(&motion.target);
         contact::clear();
@@ -98,7 +103,7 @@ impl Planner {
         self.builder.place(&motion.target);
         self.queue.restart();
         (self.walk, self.parts) = (None, None);
-        self.outputs = motion.outputs;
+        self.outputs = Outputs { on: motion.outputs, speed: motion.speed };
         self.links.model.borrow_mut().set_position(&self.position);
     }
 

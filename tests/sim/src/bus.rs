@@ -208,7 +208,7 @@ impl Bus {
         }
     }
 
-    fn store(&mut self, addr: u16, value: u8) {
+    pub(crate) fn store(&mut self, addr: u16, value: u8) {
         let now = self.cpu.write_cycle();
         self.cpu.set_data(usize::from(addr), value);
         match self.owners[usize::from(addr)] {

@@ -385,6 +385,11 @@ impl Machine {
         self.cpu.data(usize::from(addr))
     }
 
+    /// Does what a store of the firmware would: to break it.
+    pub fn poke(&mut self, addr: u16, value: u8) {
+        self.bus_mut().store(addr, value);
+    }
+
     /// A word of the data space, as memory holds it.
     pub fn peek_word(&self, addr: u16) -> u16 {
         u16::from_le_bytes([self.peek(addr), self.peek(addr + 1)])

@@ -86,7 +86,7 @@ fn the_second_port_asks_while_a_job_streams() {
     assert!(answers >= 60 && asked - answers <= 1, "{answers} answers to {asked} lines");
     assert!(asked - acks <= 1, "{acks} acks to {asked}");
     let done = host.take_answered();
-    assert!(done.len() > 800, "{} lines on USB meanwhile", done.len());
+    assert!(done.len() > 750, "{} lines on USB meanwhile", done.len());
     assert!(done.iter().zip(1..).all(|(a, n)| a.number == n && a.response.status == 0));
     assert!(host.strays().is_empty(), "{:?}", host.strays());
     is_steady_and_whole(&machine);
@@ -149,10 +149,10 @@ fn a_block_is_answered_within_five_ms() {
     moving.sort_unstable();
     let (median, worst) = (moving[moving.len() / 2], moving[moving.len() - 1]);
     println!("cycles: {at_rest} at rest; {median}, at worst {worst}, while it moves");
-    // A line is answered when it is accepted; but under a jerk limit exec may fill the segment ring first, which
-    // takes up to 9 ms, and twice in a row.
+    // A line is answered when it is accepted. Under a jerk limit exec takes half of the CPU in a ramp, and the planner
+    // may have a block before this one; the response itself takes 1.8 ms.
     assert!(at_rest <= machine.cycles(5) && median <= machine.cycles(5));
-    assert!(worst <= machine.cycles(20));
+    assert!(worst <= machine.cycles(15));
 }
 
 #[test]

@@ -7,8 +7,8 @@ mod transcript;
 use std::path::Path;
 
 use common::firmware;
-use kerf::boards::MEGA2560_GRBL;
 use kerf::boards::inputs::PROBE;
+use kerf::boards::{MEGA2560_GRBL, Pin};
 use kerf_sim::mechanics::{Build, Switch, Wiring};
 use kerf_sim::{AUX, Machine};
 use transcript::Side;
@@ -77,6 +77,14 @@ impl Side for Machine {
 
     fn steps(&self) -> [i64; 4] {
         self.recorder().motors().each_ref().map(|motor| motor.position)
+    }
+
+    fn outputs(&self) -> (u8, f64) {
+        let pins = self.board().outputs.iter().enumerate();
+        let high = |(bit, pin): (usize, &Option<Pin>)| {
+            u8::from(pin.is_some_and(|pin| self.is_high(pin))) << bit
+        };
+        (pins.map(high).sum(), self.pulses().share)
     }
 }
 

@@ -3,9 +3,10 @@
 //! The receive interrupt picks real-time characters off wherever they stand and never queues them.
 //! Both it and the transmit interrupt mask their own source and then let all others in: they do not nest in
 //! themselves, so bytes keep their order, and the step interrupt waits for no more than their first and last
-//! cycles. Exec would run far too long inside the receive interrupt, so that holds it off (`exec::HOLD`); inside
-//! the transmit interrupt it only makes bytes wait. The receive interrupts of two ports may nest in each other; the
-//! outer one lets exec in.
+//! cycles. Exec would run far too long inside them, so they hold it off (`exec::HOLD`): bytes would be lost, or a
+//! response would stop in its middle. They may nest in each other. Of transmit interrupts the outermost lets exec in,
+//! if that is not a receive interrupt; receive interrupts know of each other alone, so that exec may come within a
+//! transmit interrupt that one of them has come into: its byte waits.
 //!
 //! A USART that the board does not use has interrupts that return at once, and nothing enables them.
 
@@ -372,7 +373,7 @@ macro_rules! interrupts {
 
         /// USARTn_UDRE: sends a byte, in 69 cycles, or stops asking when there is none.
         ///
-        /// Interrupts are off for 19 cycles on the way in and 16 on the way out, 21 on a bus.
+        /// Interrupts are off for 23 cycles on the way in and 21 on the way out, 26 on a bus.
         #[unsafe(no_mangle)]
         extern "C" fn $empty() -> ! {
             // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only consumer
@@ -387,6 +388,10 @@ macro_rules! interrupts {
                     "lds  r24, {control}",
                     "andi r24, {mask}",
                     "sts  {control}, r24",
+                    // Whoever holds exec off already lets it in, too. In here that bit of the status is clear.
+                    "sbic 0x1E, {hold_exec}",
+                    "ori  r25, 0x80",
+                    "sbi  0x1E, {hold_exec}",
                     "sei",
                     "push r30",
                     "push r31",
@@ -426,10 +431,25 @@ macro_rules! interrupts {
                     "ori  r24, {unmask}",
                     "sts  {control}, r24",
                     "1:",
+                    "sbrc r25, 7",
+                    "rjmp 7f",
+                    "cbi  0x1E, {hold_exec}",
+                    "sbic 0x1E, {held_exec}",
+                    "rjmp 8f",
+                    "9:",
                     "out  0x3F, r25",
                     "pop  r25",
                     "pop  r24",
                     "reti",
+                    "7:",
+                    "andi r25, 0x7F",
+                    "rjmp 9b",
+                    // Exec has been asked for meanwhile.
+                    "8:",
+                    "cbi  0x1E, {held_exec}",
+                    "ldi  r24, {pended}",
+                    "sts  0xD1, r24",
+                    "rjmp 9b",
                     // It stays masked until there is something to send.
                     "2:",
                     "pop  r31",
@@ -475,6 +495,9 @@ macro_rules! interrupts {
                     held = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, held),
                     mask = const !UDRIE,
                     unmask = const UDRIE,
+                    hold_exec = const exec::HOLD,
+                    held_exec = const exec::HELD,
+                    pended = const exec::PENDED,
                     when_complete = const TXCIE,
                     complete = const U2X | TXC,
                     transmitted = const Event::Transmitted as u8,

@@ -96,6 +96,12 @@ impl Mechanics {
         self.spindle.turns()
     }
 
+    /// Drives the spindle by pulses that are high for a part of their period: a timer's waveform is not simulated edge
+    /// by edge, see [`Machine::pulses`](crate::Machine::pulses).
+    pub fn drive_spindle(&mut self, share: f64, now: u64) {
+        self.spindle.drive_by(share, now);
+    }
+
     /// Leaves every so many index pulses out.
     pub fn miss_index_every(&mut self, pulses: Option<u64>) {
         self.spindle.miss_every(pulses);

@@ -17,7 +17,8 @@ const PULSE: f64 = 0.01;
 struct Drive {
     enabled: bool,
     reversed: bool,
-    pulse: bool,
+    /// The part of its time that it is driven.
+    share: f64,
 }
 
 /// A spindle.
@@ -70,8 +71,8 @@ impl Spindle {
     }
 
     fn target(&self) -> f64 {
-        let driven = self.drive.enabled && (self.build.pwm.is_none() || self.drive.pulse);
-        let rpm = if driven { self.build.rpm } else { 0.0 };
+        let share = if self.build.pwm.is_none() { 1.0 } else { self.drive.share };
+        let rpm = if self.drive.enabled { self.build.rpm * share } else { 0.0 };
         if self.drive.reversed { -rpm } else { rpm }
     }
 
@@ -89,8 +90,13 @@ impl Spindle {
 
     /// An edge of the pulse-width drive.
     pub fn pulse(&mut self, high: bool, now: u64) {
+        self.drive_by(f64::from(u8::from(high)), now);
+    }
+
+    /// The pulse-width drive is high for a part of its period from now on.
+    pub fn drive_by(&mut self, share: f64, now: u64) {
         self.pass(now);
-        self.drive.pulse = high;
+        self.drive.share = share;
     }
 
     /// When it wants to be looked at next.

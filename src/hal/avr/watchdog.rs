@@ -1,0 +1,102 @@
+//! The watchdog, and why the machine has started.
+//!
+//! [`start`] gives the firmware [`TIME`] between two calls of [`feed`]. If it is late, the watchdog's interrupt makes
+//! the machine safe and resets it; should interrupts be off for good, the chip resets by itself after as long again.
+//! After a reset by the watchdog it is on, with its shortest time: [`begin`] comes first at start-up.
+
+use core::arch::asm;
+
+use super::{panic, uart};
+use crate::hal::resets::{self, Cause, Mark};
+
+const MCUSR: *mut u8 = 0x54 as *mut u8;
+const WDTCSR: *mut u8 = 0x60 as *mut u8;
+const CHANGE: u8 = 1 << 4 | 1 << 3;
+/// Interrupt, then reset; 0.5 s each.
+const TIME: u8 = 1 << 6 | 1 << 3 | 0b101;
+/// Reset in 15 ms.
+const SHORTEST: u8 = 1 << 3;
+
+unsafe extern "C" {
+    /// What lies behind all statics, which start-up does not clear: the deepest stack ends above it.
+    static mut _end: u16;
+}
+
+fn leave(mark: Mark) {
+    // SAFETY: nothing else is there (`xtask size` keeps 400 bytes free). Written at start-up, and before a reset.
+    unsafe { (&raw mut _end).write_volatile(mark.0) };
+}
+
+/// The timed sequence of the data sheet (13.5). Interrupts are off.
+fn set(value: u8) {
+    // SAFETY: nobody else uses the register, and no interrupt comes in between.
+    unsafe {
+        asm!("wdr", options(nostack));
+        WDTCSR.write_volatile(CHANGE);
+        WDTCSR.write_volatile(value);
+        // From now on.
+        asm!("wdr", options(nostack));
+    }
+}
+
+/// Takes the watchdog off, and notes why the machine has started. First thing at start-up.
+pub fn begin() {
+    // SAFETY: start-up, with interrupts off. The watchdog cannot be taken off while the chip notes that it has reset it.
+    let (chip, mark) = unsafe {
+        let chip = MCUSR.read_volatile();
+        MCUSR.write_volatile(0);
+        (chip, Mark((&raw const _end).read_volatile()))
+    };
+    off();
+    leave(Mark::running(resets::cause(chip, mark)));
+}
+
+/// Why the machine has started.
+pub fn cause() -> Cause {
+    // SAFETY: written at start-up, and before a reset.
+    let mark = unsafe { (&raw const _end).read_volatile() };
+    Mark(mark).cause().unwrap_or(Cause::PowerOn)
+}
+
+/// Has the watchdog on from now on. Interrupts are off.
+pub fn start() {
+    set(TIME);
+}
+
+/// All is well. Thread mode, and exec.
+#[inline(always)]
+pub fn feed() {
+    // SAFETY: it changes nothing but the watchdog's counter.
+    unsafe { asm!("wdr", options(nostack)) };
+}
+
+/// Takes it off. Interrupts are off.
+pub fn off() {
+    set(0);
+}
+
+/// Resets the chip in 15 ms, noting why. Meanwhile the line that is being sent ends, lest a sender read the greeting
+/// as the rest of it. Interrupts are off.
+pub fn reset(why: Mark) -> ! {
+    leave(why);
+    // SAFETY: interrupts are off for good.
+    unsafe { uart::end_lines() };
+    set(SHORTEST);
+    loop {
+        avr_device::asm::nop();
+    }
+}
+
+/// WDT: something has got stuck. It never returns, so it saves nothing.
+#[unsafe(no_mangle)]
+extern "C" fn __vector_12() -> ! {
+    // SAFETY: interrupts are off; r1 is 0 for what is called.
+    unsafe { asm!("clr r1", "jmp {starved}", starved = sym starved, options(noreturn)) }
+}
+
+extern "C" fn starved() -> ! {
+    panic::make_safe();
+    // Should this get stuck as well, then the watchdog, which is on, resets the chip.
+    set(TIME & !(1 << 6));
+    reset(Mark::STARVED)
+}

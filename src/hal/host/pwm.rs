@@ -1,0 +1,27 @@
+//! The spindle's pulse-width output: what it was told.
+
+use super::Local;
+
+machine_static! {
+    fn frequency() -> Local<u32> = Local::new(0);
+}
+
+machine_static! {
+    fn told() -> Local<f32> = Local::new(0.0);
+}
+
+/// Sets the frequency, in thousandths of a Hz.
+pub fn set_frequency(millihertz: u32) {
+    frequency().set(millihertz);
+    told().set(0.0);
+}
+
+/// Sets what part of the period the pin is high, in thousandths.
+pub fn set_share(share: f32) {
+    told().set(share);
+}
+
+/// The frequency, in thousandths of a Hz, and the share, in thousandths.
+pub fn output() -> (u32, f32) {
+    (frequency().get(), told().get())
+}

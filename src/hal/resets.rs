@@ -1,0 +1,133 @@
+//! Why the machine has started.
+//!
+//! The chip notes the cause of a reset, but common boot loaders clear the note before the firmware sees it. So the
+//! firmware leaves a mark in memory that resets do not clear: that it runs, and why it is about to reset itself.
+//!
+//! | what the chip says | mark | cause |
+//! |---|---|---|
+//! | power-on | any | 0 |
+//! | brown-out | any | 2 |
+//! | watchdog, external or nothing | asked for | 4 |
+//! | watchdog | another | 3 |
+//! | external or nothing | starved | 3 |
+//! | external | another | 1 |
+//! | nothing, the loader has cleared it | running | 1: a reset by the button or the port, most likely |
+//! | nothing | none | 0 |
+
+/// Why the machine has started. The numbers are those of `{rst:n}`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Cause {
+    /// The supply came on.
+    PowerOn = 0,
+    /// The button, or the port being opened.
+    External = 1,
+    /// The supply was too low for a moment.
+    BrownOut = 2,
+    /// The firmware had got stuck.
+    Watchdog = 3,
+    /// `^x`, `{reset:1}`, or `{boot:1}` without a boot loader.
+    Asked = 4,
+}
+
+impl Cause {
+    fn from_number(number: u8) -> Cause {
+        match number {
+            0 => Cause::PowerOn,
+            2 => Cause::BrownOut,
+            3 => Cause::Watchdog,
+            4 => Cause::Asked,
+            _ => Cause::External,
+        }
+    }
+
+    /// Whether nobody wanted it.
+    pub fn is_fault(self) -> bool {
+        matches!(self, Cause::BrownOut | Cause::Watchdog)
+    }
+}
+
+/// What is left in memory over a reset.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Mark(pub u16);
+
+impl Mark {
+    const RUNNING: u16 = 0x4BA0;
+    /// About to reset, as asked.
+    pub const ASKED: Mark = Mark(0x4B5A);
+    /// About to reset, for something has got stuck.
+    pub const STARVED: Mark = Mark(0x4BC3);
+
+    /// It runs, having been started so.
+    pub fn running(cause: Cause) -> Mark {
+        Mark(Self::RUNNING | cause as u16)
+    }
+
+    /// Why it was started, if it runs.
+    pub fn cause(self) -> Option<Cause> {
+        let number = self.0 ^ Self::RUNNING;
+        (number <= Cause::Asked as u16).then(|| Cause::from_number(number as u8))
+    }
+}
+
+/// Bits of MCUSR (ATmega2560 data sheet, 12.5.1).
+const POWER_ON: u8 = 1;
+const EXTERNAL: u8 = 1 << 1;
+const BROWN_OUT: u8 = 1 << 2;
+const WATCHDOG: u8 = 1 << 3;
+
+/// Why the machine has started, of what the chip says and the mark that was left.
+#[small]
+pub fn cause(chip: u8, mark: Mark) -> Cause {
+    if chip & POWER_ON != 0 {
+        Cause::PowerOn
+    } else if chip & BROWN_OUT != 0 {
+        Cause::BrownOut
+    } else if mark == Mark::ASKED {
+        Cause::Asked
+    } else if chip & WATCHDOG != 0 || mark == Mark::STARVED {
+        Cause::Watchdog
+    } else if chip & EXTERNAL != 0 || mark.cause().is_some() {
+        Cause::External
+    } else {
+        Cause::PowerOn
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_holds() {
+        let running = Mark::running(Cause::Watchdog);
+        let none = Mark(0x1234);
+        for (chip, mark, expected) in [
+            (POWER_ON | EXTERNAL | BROWN_OUT, Mark::ASKED, Cause::PowerOn),
+            (BROWN_OUT, running, Cause::BrownOut),
+            (WATCHDOG, Mark::ASKED, Cause::Asked),
+            (0, Mark::ASKED, Cause::Asked),
+            (WATCHDOG, running, Cause::Watchdog),
+            (WATCHDOG, none, Cause::Watchdog),
+            (0, Mark::STARVED, Cause::Watchdog),
+            (EXTERNAL, running, Cause::External),
+            (EXTERNAL, none, Cause::External),
+            (0, running, Cause::External),
+            (0, none, Cause::PowerOn),
+        ] {
+            assert_eq!(cause(chip, mark), expected, "{chip} {mark:?}");
+        }
+    }
+
+    #[test]
+    fn a_mark_tells_the_cause() {
+        for number in 0..5 {
+            let cause = Cause::from_number(number);
+            assert_eq!(cause as u8, number);
+            assert_eq!(Mark::running(cause).cause(), Some(cause));
+        }
+        for mark in [Mark::ASKED, Mark::STARVED, Mark(0), Mark(0xFFFF), Mark(Mark::RUNNING | 5)] {
+            assert_eq!(mark.cause(), None);
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! How motion stands, for whoever wants to know.
+//!
+//! Exec keeps one [`Snapshot`] up to date, and thread mode copies it (`tasks::links`). What is told to senders is a
+//! [`Moment`] of it: 1,000 cycles while something moves. All values of a report come from the same one, for exec may
+//! run between any two.
+
+use crate::boards::MOTORS;
+
+/// What reports show of the motion that is being prepared.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Snapshot {
+    /// Motor positions at the end of the block being run, in steps.
+    pub target: [i32; MOTORS],
+    /// Signed steps of that block.
+    pub steps: [i16; MOTORS],
+    /// What is still to be run of that block, mm.
+    pub left: f32,
+    /// Its length, mm.
+    pub length: f32,
+    /// Velocity along the path, mm/s.
+    pub velocity: f32,
+    /// The N word of the block being run.
+    pub line: u32,
+    /// The N word of the line finished last, to its last step.
+    pub finished: u32,
+    /// Something moves, or dwells.
+    pub running: bool,
+    /// A feedhold has brought it to rest.
+    pub held: bool,
+    /// What the program came to last.
+    pub program: Program,
+    /// What the outputs are to be, bits of [`outputs`](crate::boards::outputs).
+    pub outputs: u8,
+    /// What the speed of the spindle is to be, turns per minute.
+    pub speed: f32,
+}
+
+impl Snapshot {
+    /// At rest, at zero.
+    pub const fn new() -> Self {
+        Self {
+            target: [0; MOTORS],
+            steps: [0; MOTORS],
+            left: 0.0,
+            length: 0.0,
+            velocity: 0.0,
+            line: 0,
+            finished: 0,
+            running: false,
+            held: false,
+            program: Program::Ready,
+            outputs: 0,
+            speed: 0.0,
+        }
+    }
+
+    /// Where motor `m` is, in steps.
+    pub fn position(&self, m: usize) -> i32 {
+        if self.left <= 0.0 || self.steps[m] == 0 {
+            return self.target[m];
+        }
+        let short = f32::from(self.steps[m]) * (self.left / self.length);
+        self.target[m].wrapping_sub(short as i32)
+    }
+
+    /// What is told of it.
+    pub fn moment(&self) -> Moment {
+        Moment {
+            position: core::array::from_fn(|m| self.position(m)),
+            velocity: self.velocity,
+            line: self.line,
+            finished: self.finished,
+            running: self.running,
+            held: self.held,
+            program: self.program,
+        }
+    }
+}
+
+/// What reports tell of motion; see [`Snapshot`].
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// Motor positions, in steps.
+    pub position: [i32; MOTORS],
+    /// Velocity along the path, mm/s.
+    pub velocity: f32,
+    /// The N word of the block being run.
+    pub line: u32,
+    /// The N word of the line finished last.
+    pub finished: u32,
+    /// Something moves, or dwells.
+    pub running: bool,
+    /// A feedhold has brought it to rest.
+    pub held: bool,
+    /// What the program came to last.
+    pub program: Program,
+}
+
+/// How the program stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Program {
+    /// Nothing has run since reset.
+    #[default]
+    Ready,
+    /// The queue ran empty, or M0.
+    Stopped,
+    /// M2 or M30.
+    Ended,
+}

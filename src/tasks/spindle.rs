@@ -1,0 +1,112 @@
+//! The outputs of M3 to M9 and the spindle's speed, carried out in step with motion.
+//!
+//! Exec says what the program has switched and S ([`Snapshot`]); here it becomes levels and the width of pulses
+//! ([`Spindle`]). Exec calls [`switch`] when something of it may have changed, at rest, and waits as long as that
+//! says: a spindle that has been started takes its time. In a feedhold those outputs pause that the settings say,
+//! and are on again before motion goes on. Thread mode tells what settings ([`set`]) and the override ([`set_factor`])
+//! have changed; it is in force at once. Cost of a change: 4,000 cycles.
+
+use core::cell::UnsafeCell;
+
+use super::hold;
+use super::links::{snapshot, update};
+use super::storage::Storage;
+use crate::config::Setting;
+use crate::hal::byte::SharedByte;
+use crate::hal::imp::{exec, gpio, pwm, stepper};
+use crate::motion::snapshot::Snapshot;
+use crate::spindle::{Changed, Spindle};
+
+/// The state: exec's, and thread mode's while exec is locked out.
+struct Shared(UnsafeCell<Spindle>);
+
+// SAFETY: exec reads it, and thread mode changes it while exec cannot run.
+unsafe impl Sync for Shared {}
+
+machine_static! {
+    fn shared() -> Shared = Shared(UnsafeCell::new(Spindle::new()));
+    // What is on. Exec writes it.
+    fn now_on() -> SharedByte = SharedByte::new(0);
+}
+
+/// The outputs that are on, which in a feedhold may be less than what the program has switched.
+pub fn on() -> u8 {
+    now_on().get()
+}
+
+/// Switches the outputs as they are to be now; how long motion has to wait for that, ms. `changed` says that S may
+/// be another. Exec only.
+#[inline(never)]
+pub fn switch(out: &Snapshot, changed: bool) -> u16 {
+    // SAFETY: exec runs, or cannot, and nobody else changes it.
+    let spindle = unsafe { &*shared().0.get() };
+    let before = on();
+    // A probe that has made contact holds as well.
+    let wanted = match out.held && hold::is_on() {
+        _ if stepper::is_stopped() => 0,
+        true => spindle.held(out.outputs),
+        false => out.outputs,
+    };
+    if wanted == before && !changed {
+        return 0;
+    }
+    now_on().set(wanted);
+    // A spindle that starts finds the speed there.
+    pwm::set_share(spindle.share(wanted, out.speed));
+    gpio::set_outputs(wanted);
+    spindle.spin_up(before, wanted)
+}
+
+/// The steps have been stopped until reset: so are the outputs. Thread mode only.
+pub fn stop() {
+    // Exec, which alone may do so, cannot run.
+    exec::lock(|_| update(|out| switch(out, true)));
+}
+
+/// Takes over all settings that concern the outputs, and then tells these. Thread mode, or before interrupts are on.
+#[small]
+#[inline(never)]
+pub fn set_all(storage: &Storage) {
+    let settings = (Setting::WARM..Setting::COLD).filter_map(Setting::from_number);
+    for setting in settings.filter(|setting| !setting.is_data()) {
+        let value = storage.cold(setting);
+        with(|spindle| match spindle.set(setting, value) {
+            Changed::Frequency(millihertz) => pwm::set_frequency(millihertz),
+            Changed::Outputs | Changed::Nothing => {}
+        });
+    }
+    tell();
+}
+
+/// Takes over the value of a setting, if it concerns the outputs. Thread mode only.
+#[small]
+#[inline(never)]
+pub fn set(setting: Setting, value: i32) {
+    match with(|spindle| spindle.set(setting, value)) {
+        Changed::Nothing => return,
+        Changed::Outputs => {}
+        Changed::Frequency(millihertz) => exec::lock(|_| pwm::set_frequency(millihertz)),
+    }
+    tell();
+}
+
+/// Multiplies S by so many thousandths from now on. Thread mode only.
+pub fn set_factor(thousandths: u16) {
+    with(|spindle| spindle.set_factor(thousandths));
+    tell();
+}
+
+/// Changes the state while exec cannot run.
+fn with<R>(what: impl FnOnce(&mut Spindle) -> R) -> R {
+    // SAFETY: exec cannot run, and `what` calls nothing of this module.
+    exec::lock(|_| what(unsafe { &mut *shared().0.get() }))
+}
+
+/// Tells the outputs what they are to be by now.
+fn tell() {
+    let speed = snapshot().speed;
+    with(|spindle| {
+        pwm::set_share(spindle.share(on(), speed));
+        gpio::set_low(spindle.low(), on());
+    });
+}
