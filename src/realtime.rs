@@ -49,9 +49,80 @@ pub const fn bit(byte: u8) -> u8 {
     }
 }
 
+/// The first of the characters of overrides, and the one behind the last. They are parts of letters in UTF-8
+/// too: they are none behind a byte above [`ASCII`].
+pub const FIRST: u8 = 0x90;
+/// See [`FIRST`].
+pub const END: u8 = 0x9E;
+/// The highest byte that is a letter of its own.
+pub const ASCII: u8 = 0x7F;
+
+/// Begins the steps anew, from 100 %.
+pub const FULL: u8 = 0;
+/// The same, of the second of two.
+const SPINDLE: u8 = 9;
+
+/// What characters ask of the overrides, since it was taken last: however many there are, it is as much.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Asked {
+    /// By how many percent feed and spindle are to be more, or less.
+    pub percent: [i8; 2],
+    /// From 100 %, for feed (1) and spindle (2); and the traverse, in [`TRAVERSE`]: 1 for 100 %, 2 for 50, 3 for 25.
+    pub fixed: u8,
+}
+
+/// Bits of [`Asked::fixed`].
+pub const TRAVERSE: u8 = 0x0C;
+
+impl Asked {
+    /// Nothing.
+    pub const NOTHING: Self = Self { percent: [0; 2], fixed: 0 };
+
+    /// With one more character, if it is one of these. The receive interrupt of the AVR has its twin in assembly.
+    pub fn with(mut self, byte: u8) -> Option<Self> {
+        let code = byte.wrapping_sub(FIRST);
+        let (which, code) = match code {
+            0..=4 => (0, code),
+            5..=7 => {
+                self.fixed = self.fixed & !TRAVERSE | (code - 4) << 2;
+                return Some(self);
+            }
+            SPINDLE..=13 => (1, code - SPINDLE),
+            _ => return None,
+        };
+        let percent = &mut self.percent[which];
+        match code {
+            FULL => {
+                *percent = 0;
+                self.fixed |= 1 << which;
+            }
+            1 => *percent = percent.saturating_add(10),
+            2 => *percent = percent.saturating_sub(10),
+            3 => *percent = percent.saturating_add(1),
+            _ => *percent = percent.saturating_sub(1),
+        }
+        Some(self)
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::bit;
+    use super::*;
+
+    #[test]
+    fn overrides_add_up() {
+        let all = |bytes: &[u8]| {
+            bytes.iter().fold(Asked::NOTHING, |asked, byte| asked.with(*byte).unwrap())
+        };
+        assert_eq!(all(&[0x91, 0x91, 0x94, 0x9D, 0x9B]).percent, [19, -11]);
+        let asked = all(&[0x91, 0x90, 0x93, 0x97, 0x96, 0x99]);
+        assert_eq!((asked.percent, asked.fixed), ([1, 0], 3 | 2 << 2));
+        for other in [0x8F, 0x98, 0x9E, b'x', 0xE2] {
+            assert_eq!(Asked::NOTHING.with(other), None);
+        }
+        assert_eq!(all(&[0x91; 40]).percent[0], i8::MAX);
+    }
 
     #[test]
     fn only_six_bytes_are_special() {

@@ -104,9 +104,9 @@ impl Spindle {
         Changed::Outputs
     }
 
-    /// Multiplies S by so many thousandths from now on.
-    pub fn set_factor(&mut self, thousandths: u16) {
-        self.factor = thousandths;
+    /// Multiplies S by so many thousandths from now on. Whether that is new.
+    pub fn set_factor(&mut self, thousandths: u16) -> bool {
+        core::mem::replace(&mut self.factor, thousandths) != thousandths
     }
 
     /// The part of the period that the output is high, in thousandths: with outputs that are `on`, and S.

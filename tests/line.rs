@@ -147,7 +147,7 @@ fn all_settings(machine: &Machine) -> BTreeMap<&'static str, String> {
 /// What may mean something on purpose is changed, so that none of it is asked for by chance: without the letter G no
 /// line moves anything, for no motion is modal at first; M is left out for outputs; nothing that reads as a value
 /// follows a separator in a line that begins with a brace or a dollar sign, so that nothing is set; and what acts at
-/// once (`!`, `~`, `%`, ^d, ^x, XOFF) is tested on its own. No line is empty, so that each is to be answered, in either
+/// once (`!`, `~`, `%`, ^d, ^x, XOFF, overrides) is tested on its own. No line is empty, so that each is to be answered, in either
 /// mode: the second end of a line, or one behind nothing but blanks, is left out.
 struct Noise {
     dice: Dice,
@@ -190,7 +190,7 @@ impl Noise {
         let dollar = self.first == Some(b'$') && blank;
         let separator = matches!(self.last, b':' | b'=' | b'|' | b'"' | b'-' | b',') || dollar;
         match byte {
-            b'!' | b'~' | b'%' | 0x04 | 0x13 | 0x18 => false,
+            b'!' | b'~' | b'%' | 0x04 | 0x13 | 0x18 | 0x90..=0x9D => false,
             b'g' | b'G' | b'm' | b'M' => self.first == Some(b'{') || self.first == Some(b'$'),
             b'\n' | b'\r' => self.first.is_some(),
             b'0'..=b'9' | b'-' | b'.' | b't' | b'T' | b'f' | b'F' => !(request && separator),

@@ -3,8 +3,9 @@
 use core::fmt::{Display, Formatter, Result};
 use std::string::String;
 
-use crate::gcode::command::{Arc, Feed, Overrides, Spindle};
+use crate::gcode::command::{Arc, Feed, Spindle};
 use crate::gcode::modal::{MotionMode, Turn};
+use crate::gcode::overrides::{Override, Overrides};
 use crate::units::{AXES, AXIS_LETTERS, Length, PerAxis};
 
 /// A canonical command. Places are machine coordinates.
@@ -97,8 +98,8 @@ fn write_spindle(to: &mut Formatter, spindle: &Spindle) -> Result {
 }
 
 fn write_overrides(to: &mut Formatter, factors: &Overrides) -> Result {
-    let [feed, traverse, spindle] =
-        [factors.feed, factors.traverse, factors.spindle].map(|factor| f32::from(factor) / 1_000.0);
+    let all = [Override::Feed, Override::Traverse, Override::Spindle];
+    let [feed, traverse, spindle] = all.map(|which| f32::from(factors.in_force(which)) / 1_000.0);
     write!(to, "SET_OVERRIDES({feed}, {traverse}, {spindle})")
 }
 
@@ -153,6 +154,7 @@ impl Display for Length {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gcode::overrides::Change;
     use std::string::ToString;
 
     #[test]
@@ -175,7 +177,8 @@ mod tests {
         assert_eq!(Canon::Traverse(place).to_string(), traverse);
         assert_eq!(Canon::Dwell(1_050).to_string(), "DWELL(1.050)");
         assert_eq!(Canon::Home(0b101, true).to_string(), "HOME(XZ)");
-        let factors = Overrides { feed: 500, ..Overrides::NONE };
+        let mut factors = Overrides::NONE;
+        factors.change(Change::to(Override::Feed, 500));
         assert_eq!(Canon::Overrides(factors).to_string(), "SET_OVERRIDES(0.5, 1, 1)");
     }
 }

@@ -5,8 +5,9 @@ use std::string::String;
 
 use super::command::{Canon, Turns};
 use crate::gcode::Interpreter;
-use crate::gcode::command::{Arc, Commands, Feed, Motion, Overrides, Spindle, Stop};
+use crate::gcode::command::{Arc, Commands, Feed, Motion, Spindle, Stop};
 use crate::gcode::modal::{Coolant, Turn};
+use crate::gcode::overrides::{Change, Overrides};
 use crate::gcode::setup::Setup;
 use crate::gcode::steps::{Step, Steps};
 use crate::status::Status;
@@ -73,7 +74,7 @@ impl<S: Setup> Reader<S> {
             Step::Tool(number) => self.ready.push_back(Canon::Tool(number)),
             Step::Spindle(spindle) => self.spindle(spindle),
             Step::Coolant(coolant) => self.coolant(coolant),
-            Step::Overrides(factors) => self.overrides(factors),
+            Step::Override(change) => self.change(change),
             Step::Dwell(ms) => self.ready.push_back(Canon::Dwell(ms)),
             Step::Line(target, None) => self.go(Canon::Traverse(target), target, None),
             Step::Line(target, feed) => self.go(Canon::Feed(target), target, feed),
@@ -138,9 +139,9 @@ impl<S: Setup> Reader<S> {
         }
     }
 
-    fn overrides(&mut self, factors: Overrides) {
-        self.overrides = factors;
-        self.ready.push_back(Canon::Overrides(factors));
+    fn change(&mut self, change: Change) {
+        self.overrides.change(change);
+        self.ready.push_back(Canon::Overrides(self.overrides));
     }
 
     /// The machine is left with everything off.
@@ -149,8 +150,9 @@ impl<S: Setup> Reader<S> {
             self.spindle(Spindle::default());
         }
         self.coolant(0);
-        if self.overrides != Overrides::NONE {
-            self.overrides(Overrides::NONE);
+        if !self.overrides.is_none() {
+            self.overrides = Overrides::NONE;
+            self.ready.push_back(Canon::Overrides(self.overrides));
         }
         self.ready.push_back(Canon::End);
     }

@@ -6,6 +6,7 @@
 
 use super::decimal::Exact;
 use super::modal::{MotionMode, Plane, Turn};
+use super::overrides::Change;
 use crate::units::{Length, PerAxis};
 
 /// The canonical commands of one line, in order of execution.
@@ -20,7 +21,7 @@ pub struct Commands {
     /// M7, M8, M9: the coolants that run, bits of [`Coolant`](super::modal::Coolant).
     pub coolant: Option<u8>,
     /// M48 to M51.
-    pub overrides: Option<Overrides>,
+    pub overrides: Option<Change>,
     /// G4: stand still for this many milliseconds.
     pub dwell_ms: Option<u32>,
     /// What its axes do, if anything.
@@ -80,22 +81,6 @@ pub struct Spindle {
     pub turn: Turn,
     /// S, in turns per minute.
     pub speed: f32,
-}
-
-/// By what rates and speeds are multiplied, in thousandths; by 1000 where an override is off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Overrides {
-    /// Feed rates.
-    pub feed: u16,
-    /// Traverse rates.
-    pub traverse: u16,
-    /// The speed of the spindle.
-    pub spindle: u16,
-}
-
-impl Overrides {
-    /// Nothing is overridden.
-    pub const NONE: Self = Self { feed: 1000, traverse: 1000, spindle: 1000 };
 }
 
 /// What axes do. Targets are machine coordinates.
@@ -169,16 +154,6 @@ pub enum Feed {
     PerMinute(f32),
     /// G93: the whole move takes this many minutes.
     Minutes(f32),
-}
-
-impl Feed {
-    /// So many times as fast.
-    pub fn times(self, factor: f32) -> Self {
-        match self {
-            Feed::PerMinute(rate) => Feed::PerMinute(rate * factor),
-            Feed::Minutes(minutes) => Feed::Minutes(minutes / factor),
-        }
-    }
 }
 
 /// The circle of an arc. Axes are indices in X Y Z A B C order.

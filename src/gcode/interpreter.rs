@@ -13,7 +13,7 @@
 //! a typical G1, in inches too (`tests/sim/tests/interpreter.rs`).
 
 use super::block::Block;
-use super::command::{Commands, Overrides, Spindle};
+use super::command::{Commands, Spindle};
 use super::modal::{Defaults, Modal, MotionMode, Turn, Units};
 use super::setup::Setup;
 use super::state::State;
@@ -281,11 +281,6 @@ impl<T> Interpreter<T> {
     /// No motion mode is in force any more, as after G28.2.
     pub fn cancel_motion(&mut self) {
         self.state.modal.motion = MotionMode::None;
-    }
-
-    /// By what rates and speeds are multiplied.
-    pub fn overrides(&self) -> Overrides {
-        self.state.overrides_now()
     }
 
     /// The N word of the last line, 0 if it had none.

@@ -24,6 +24,7 @@ pub mod modal;
 mod motion;
 pub mod number;
 mod offsets;
+pub mod overrides;
 pub mod setup;
 mod state;
 pub mod steps;

@@ -4,10 +4,11 @@
 //! be left half done.
 
 use super::block::Block;
-use super::codes::{NonModal, Override, OverrideCode, StopCode, Switch};
-use super::command::{Commands, Overrides, Spindle, Stop};
+use super::codes::{NonModal, OverrideCode, StopCode, Switch};
+use super::command::{Commands, Spindle, Stop};
 use super::limits;
 use super::modal::{Coolant, Defaults, FeedMode, Modal, MotionMode, PathMode, Turn, Units};
+use super::overrides::{Change, Override};
 use super::setup::Setup;
 use super::sticky::Sticky;
 use super::tables::{Edit, Row, Tables};
@@ -44,15 +45,9 @@ pub struct State {
     /// T, and the tool of the last M6.
     pub selected: u8,
     pub tool: u8,
-    /// The overrides, and which of them are on, as bits.
-    factors: Overrides,
-    overridden: u8,
     /// The words of canned cycles.
     pub sticky: Sticky,
 }
-
-/// All overrides on.
-const ALL: u8 = 7;
 
 impl State {
     /// At power-up: everything 0.
@@ -73,8 +68,6 @@ impl State {
             speed: 0.0,
             selected: 0,
             tool: 0,
-            factors: Overrides::NONE,
-            overridden: ALL,
             sticky: Sticky::NONE,
         }
     }
@@ -109,7 +102,7 @@ impl State {
         self.begin(block, out)?;
         self.tools(block, out)?;
         self.machine_modes(block, out);
-        self.overrides(block, out)?;
+        Self::overrides(block, out)?;
         self.offsets(block, tables, setup)?;
         self.non_modal(block, tables, setup, out, edit)?;
         self.finish(block, start, tables, setup, out)?;
@@ -197,55 +190,15 @@ impl State {
         Spindle { turn: self.modal.spindle, speed: self.speed }
     }
 
-    fn overrides(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
-        match block.overrides {
+    /// M48 to M51.
+    fn overrides(block: &Block, out: &mut Commands) -> Result<(), Status> {
+        out.overrides = match block.overrides {
             None => return Ok(()),
-            Some(OverrideCode::All(on)) => self.overridden = if on { ALL } else { 0 },
-            Some(OverrideCode::One(which, how)) => self.override_one(block, which, how)?,
-        }
-        out.overrides = Some(self.overrides_now());
-        Ok(())
-    }
-
-    fn override_one(&mut self, block: &Block, which: Override, how: Switch) -> Result<(), Status> {
-        let bit = 1 << which as u8;
-        let word = block.get(P);
-        let off = match how {
-            Switch::Off => true,
-            Switch::To => false,
-            Switch::Maybe => word.is_some_and(|p| p.is_zero()),
+            Some(OverrideCode::All(true)) => Some(Change::ALL_ON),
+            Some(OverrideCode::All(false)) => Some(Change::ALL_OFF),
+            Some(OverrideCode::One(which, how)) => Some(override_one(block, which, how)?),
         };
-        if off {
-            self.overridden &= !bit;
-            return Ok(());
-        }
-        if let Some(word) = word {
-            let most = if which == Override::Traverse { 1_000 } else { 2_000 };
-            let factor = word.milliseconds().map_err(|_| Status::PWordInvalid)?;
-            if !(50..=most).contains(&factor) {
-                return Err(Status::PWordInvalid);
-            }
-            let factor = factor as u16;
-            match which {
-                Override::Feed => self.factors.feed = factor,
-                Override::Traverse => self.factors.traverse = factor,
-                Override::Spindle => self.factors.spindle = factor,
-            }
-        }
-        self.overridden |= bit;
         Ok(())
-    }
-
-    /// By what rates and speeds are multiplied.
-    pub fn overrides_now(&self) -> Overrides {
-        let on = |which: Override, factor| {
-            if self.overridden & 1 << which as u8 != 0 { factor } else { 1_000 }
-        };
-        Overrides {
-            feed: on(Override::Feed, self.factors.feed),
-            traverse: on(Override::Traverse, self.factors.traverse),
-            spindle: on(Override::Spindle, self.factors.spindle),
-        }
     }
 
     /// Motion, and what belongs to it.
@@ -293,7 +246,7 @@ impl State {
         Ok(())
     }
 
-    /// M2 and M30: modes as at power-up, but G1 with F0; no G92; the overrides on. The line's own change of the
+    /// M2 and M30: modes as at power-up, but G1 with F0; no G92. The line's own change of the
     /// tables counts.
     fn end_program(
         &mut self,
@@ -309,9 +262,24 @@ impl State {
         self.modal = Modal { motion: MotionMode::Feed, ..Modal::new(&defaults) };
         self.feed = 0.0;
         (self.shift, self.shifted) = ([Length::ZERO; AXES], false);
-        self.overridden = ALL;
         self.update_origin(&system)
     }
+}
+
+/// What becomes of one override.
+fn override_one(block: &Block, which: Override, how: Switch) -> Result<Change, Status> {
+    let word = block.get(P);
+    let off = match how {
+        Switch::Off => true,
+        Switch::To => false,
+        Switch::Maybe => word.is_some_and(|p| p.is_zero()),
+    };
+    let Some(word) = word.filter(|_| !off) else { return Ok(Change::switch(which, !off)) };
+    let factor = word.milliseconds().map_err(|_| Status::PWordInvalid)?;
+    if !which.allows(factor) {
+        return Err(Status::PWordInvalid);
+    }
+    Ok(Change::to(which, factor as u16))
 }
 
 fn set<T>(mode: &mut T, new: Option<T>) {

@@ -5,8 +5,9 @@
 //!
 //! Who asks for a step has carried out the one before and says where that has led to.
 
-use super::command::{Commands, Cycle, Feed, Motion, Overrides, Spindle, Stop};
+use super::command::{Commands, Cycle, Feed, Motion, Spindle, Stop};
 use super::modal::{MotionMode, Turn};
+use super::overrides::Change;
 use crate::progmem;
 use crate::units::{Length, PerAxis};
 
@@ -19,8 +20,8 @@ pub enum Step {
     Spindle(Spindle),
     /// These coolants run, bits of [`Coolant`](super::modal::Coolant).
     Coolant(u8),
-    /// Rates and speeds are multiplied so.
-    Overrides(Overrides),
+    /// What rates and speeds are multiplied by changes so.
+    Override(Change),
     /// Stand still for so many milliseconds.
     Dwell(u32),
     /// A straight move to a place in machine coordinates; a traverse without a feed.
@@ -169,7 +170,7 @@ impl Steps {
                 Stage::Tool => (commands.tool.map(Step::Tool), Stage::Spindle),
                 Stage::Spindle => (commands.spindle.map(Step::Spindle), Stage::Coolant),
                 Stage::Coolant => (commands.coolant.map(Step::Coolant), Stage::Overrides),
-                Stage::Overrides => (commands.overrides.map(Step::Overrides), Stage::Dwell),
+                Stage::Overrides => (commands.overrides.map(Step::Override), Stage::Dwell),
                 Stage::Dwell => (commands.dwell_ms.map(Step::Dwell), Stage::Motion),
                 Stage::Motion => match self.motion(&commands.motion, position) {
                     None => (None, Stage::Stop),

@@ -259,6 +259,7 @@ impl Governor {
                 && let Some(anchor) = ahead.anchor(0)
                 && self.here(anchor.ahead)
                 && v > anchor.velocity
+                && self.takes(&anchor, v)
             {
                 // It should have got there by now: what is left is rounding.
                 seconds += lesser(brake.rest(), 4.0 * nominal);

@@ -27,6 +27,7 @@ use super::governor::{Ahead, Governor};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
 use super::snapshot::{Program, Snapshot};
+use crate::gcode::overrides::Change;
 
 /// Half CPU cycles in a second.
 const HALVES_PER_S: f32 = 2.0 * crate::boards::ACTIVE.clock_hz as f32;
@@ -52,6 +53,8 @@ pub enum Step {
     Again,
     /// The outputs or the speed of the spindle are others, at a standstill: ask again.
     Switched,
+    /// As `Again`; and an override is to change.
+    Override(Change),
     /// A program stop, end or change of outputs is due: ask again when the steppers stand still.
     Standstill,
     /// No block.
@@ -184,7 +187,7 @@ impl Exec {
     #[inline(never)]
     fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
         let running = &self.running;
-        let is_line = |block: &Block| matches!(block.body, Body::Line(_));
+        let is_line = |block: &Block| matches!(block.body, Body::Line(_) | Body::Override(_));
         let goes_on = if running.active {
             // What the end of a block has been planned as is handed out.
             running.done || !self.governor.is_at_rest()
@@ -215,7 +218,7 @@ impl Exec {
             match &block.body {
                 Body::Drivers(drivers) => self.prep.set_drivers(*drivers),
                 Body::SetPosition(steps) if !moved => out.target = *steps,
-                Body::Nothing | Body::SetPosition(_) => {}
+                Body::Nothing | Body::SetPosition(_) | Body::Override(_) => {}
                 _ => moved = true,
             }
             blocks.enter();
@@ -263,10 +266,14 @@ impl Exec {
                 };
             }
             Body::Drivers(drivers) => self.prep.set_drivers(*drivers),
-            Body::Nothing | Body::Line(_) => {}
+            Body::Override(_) | Body::Nothing | Body::Line(_) => {}
         }
         blocks.release();
-        Step::Again
+        match &block.body {
+            Body::Override(change) => Step::Override(*change),
+            Body::ProgramEnd => Step::Override(Change::ALL_ON),
+            _ => Step::Again,
+        }
     }
 
     fn halt(&mut self, out: &mut Snapshot) {
@@ -309,10 +316,11 @@ impl Exec {
 
     #[inline(always)]
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
-        let long = below(scaled(line.cruise, FINE_LOG2), line.length);
+        let length = line.length();
+        let long = below(scaled(line.cruise, FINE_LOG2), length);
         self.prep.begin(&line.steps, &mut out.target);
         out.steps = line.steps;
-        out.length = line.length;
+        out.length = length;
         out.running = true;
         let jerk = line.jerk.get();
         self.governor.begin(line.accel.get(), jerk);
@@ -320,8 +328,7 @@ impl Exec {
         let running = &mut self.running;
         running.active = true;
         running.long = long;
-        running.left = line.length;
-        running.cruise = line.cruise;
+        running.left = length;
         running.version = version;
         running.fresh = true;
         running.done = false;
@@ -339,6 +346,10 @@ impl Exec {
         let version = blocks.version();
         if version != running.version {
             running.version = version;
+            running.cruise = blocks.cruise();
+            if blocks.take_changed() {
+                self.governor.change_feed();
+            }
             if running.jerk {
                 self.governor.look_again();
             } else {

@@ -66,13 +66,16 @@ pub struct Governor {
     pub(super) brake: Option<Brake>,
     /// Something may be better than the brake.
     pub(super) look: bool,
+    /// An override has changed feeds, ever: a limit that a feed makes may be too near to be kept.
+    pub(super) late: bool,
 }
 
 impl Governor {
     /// At rest.
     pub const fn new() -> Self {
         let limits = Limits { accel: 0.0, jerk: 0.0, kappa: 0.0, pace: 0.0 };
-        Self { state: State { velocity: 0.0, alpha: 0.0 }, limits, brake: None, look: false }
+        let state = State { velocity: 0.0, alpha: 0.0 };
+        Self { state, limits, brake: None, look: false, late: false }
     }
 
     /// Velocity, mm/s.
@@ -107,6 +110,12 @@ impl Governor {
         self.limits = Limits { accel, jerk, kappa: kappa(accel, jerk), pace };
     }
 
+    /// An override has changed feeds, of what runs and of what is ahead.
+    pub fn change_feed(&mut self) {
+        self.late = true;
+        self.look = true;
+    }
+
     /// What is ahead has changed.
     pub fn look_again(&mut self) {
         self.look = true;
@@ -139,7 +148,8 @@ impl Governor {
         {
             let gain = self.limits.accel * seconds;
             let half = 0.5 * seconds;
-            let mut next = lesser(v + gain, cruise);
+            // An override may have taken the feed away from under it.
+            let mut next = greater(lesser(v + gain, cruise), v - gain);
             let mut distance = (v + next) * half;
             let twice = self.limits.accel + self.limits.accel;
             if next * next > headroom + twice * (left - distance) {
@@ -158,6 +168,14 @@ impl Governor {
         self.finish(left, cruise, headroom, seconds)
     }
 
+    /// `next`, or the least velocity that it can have at the end, from `v` and with so much to lose, if that
+    /// is more by what is not rounding: an override has lowered the limit too late.
+    #[inline(never)]
+    pub(super) fn slowest(&self, v: f32, gain: f32, next: f32, nominal: f32) -> f32 {
+        let least = sqrt(greater(v * v - gain, 0.0));
+        if least > next + self.limits.accel * nominal { least } else { next }
+    }
+
     /// All the rest of a block in one.
     #[inline(never)]
     fn finish(&mut self, left: f32, cruise: f32, headroom: f32, nominal: f32) -> Stretch {
@@ -165,10 +183,15 @@ impl Governor {
         let gain = scaled(self.limits.accel * left, 1);
         let square = v * v + gain;
         let next = least(sqrt(least(square, headroom)), cruise);
+        let late = below(next, v) && (self.late || below(cruise, v));
+        let next = if late { self.slowest(v, gain, next, nominal) } else { next };
         self.state.velocity = next;
         let sum = v + next;
         let mut seconds = 2.0 * nominal;
-        if log(sum) + log(nominal) > log(left) + PLAIN || below(left, sum * nominal) {
+        if below(cruise, v)
+            || log(sum) + log(nominal) > log(left) + PLAIN
+            || below(left, sum * nominal)
+        {
             seconds = scaled(left, 1) / sum;
         } else if square > 0.0 {
             // From rest to rest or nearly so: there is a peak between.

@@ -47,9 +47,11 @@ impl Governor {
                 return Stretch { seconds, distance: way, ends: false };
             }
         } else {
-            let square = greater(v * v - 2.0 * accel * left, 0.0);
+            let gain = 2.0 * accel * left;
+            let square = greater(v * v - gain, 0.0);
             // Rounding may put a stop before the end of the block.
             let next = sqrt(least(square, greater(headroom, 0.0)));
+            let next = if self.late { self.slowest(v, gain, next, nominal) } else { next };
             let seconds = 2.0 * left / (v + next);
             if seconds <= longest {
                 self.state.velocity = next;
@@ -78,7 +80,7 @@ mod tests {
             0.0
         }
         fn anchor(&self, n: u8) -> Option<Anchor> {
-            (n == 0).then_some(Anchor { velocity: 0.0, ahead: 0.0, firm: true })
+            (n == 0).then_some(Anchor { velocity: 0.0, ahead: 0.0, soft: false, firm: true })
         }
     }
 

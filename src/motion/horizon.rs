@@ -36,6 +36,12 @@
 //! key whatever comes (it is *firm*), with the k of what comes before; its line must be able to stop on
 //! its own, and nobody looks beyond.
 //!
+//! **Overrides.** The velocity at a corner is the lesser of what the corner and the feeds allow, the latter times a
+//! factor ([`Line::entry`]). Which keys are needless depends on it, so all are worked out anew when it changes
+//! (`replan`). What is needless at one factor is so at every lesser one, as far as corners go: a lesser factor is
+//! in force at once, and until then only a slow line behind a fast one may be entered at more than its part of
+//! the feed. A greater one waits for the keys.
+//!
 //! Potentials grow for ever. When they get so large that floats would be coarse, the planner subtracts
 //! the first one from all (`BlockQueue::rebase`). A slow line that waits behind fast ones has what is left: the
 //! velocity at its end may be off by some 0.1 % of theirs.
@@ -43,8 +49,10 @@
 //! Cost: a push 1,000 cycles, and 700 for each key dropped.
 
 use super::block::Line;
-use super::float::{OCTAVE, lesser, log, scaled, some};
+use super::factors::Factors;
+use super::float::{OCTAVE, least, lesser, log, scaled, some};
 use super::queue::BLOCKS;
+use super::short::Short;
 
 /// Half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`,
 /// 0 without one. Cost: 650.
@@ -62,30 +70,36 @@ pub fn key(w: f32, kappa: f32) -> f32 {
 }
 
 impl Line {
-    /// Its key: what potential and square of velocity before its start must not exceed together.
-    /// Cost: 500, 1,300 with a jerk limit.
-    pub fn key(&self) -> f32 {
-        self.start + key(self.entry.get(), kappa(self.accel.get(), self.jerk.get()))
+    /// Highest velocity at its start, mm/s.
+    #[inline(always)]
+    pub fn entry(&self, factors: &Factors) -> f32 {
+        Short::new(least(self.entry.get(), self.velocity(factors))).get()
     }
 
-    /// The same for a block before it that has no jerk limit. Cost: 350.
-    pub fn sharp_key(&self) -> f32 {
-        let entry = self.entry.get();
+    /// Its key: what potential and square of velocity before its start must not exceed together.
+    /// Cost: 500, 1,300 with a jerk limit.
+    pub fn key(&self, factors: &Factors) -> f32 {
+        self.start + key(self.entry(factors), kappa(self.accel.get(), self.jerk.get()))
+    }
+
+    /// The same for a block before it that has no jerk limit. Cost: 400.
+    pub fn sharp_key(&self, factors: &Factors) -> f32 {
+        let entry = self.entry(factors);
         self.start + entry * entry
     }
 
-    /// How much potential it has, (mm/s)^2. More than several times the square of its own velocity
-    /// never matters, and is left away where it is much. Cost: 350.
+    /// How much potential it has, (mm/s)^2. More than several times the square of the highest velocity that
+    /// an override gives it never matters, and is left away where it is much. Cost: 350.
     #[inline(never)]
     pub fn gain(&self) -> f32 {
-        let full = scaled(self.accel.get(), 1) * self.length;
+        let full = scaled(self.accel.get(), 1) * self.length();
         // Plainly below the square of its velocity, as short blocks have it.
         if log(full) + OCTAVE < 2 * log(self.cruise) { full } else { self.capped(full) }
     }
 
     #[inline(never)]
     fn capped(&self, full: f32) -> f32 {
-        let speed = self.cruise + 2.0 * kappa(self.accel.get(), self.jerk.get());
+        let speed = scaled(self.cruise, 1) + 2.0 * kappa(self.accel.get(), self.jerk.get());
         lesser(full, 2.0 * speed * speed)
     }
 }
@@ -99,14 +113,32 @@ pub struct Horizon {
     len: u8,
     /// Potential at the end of the newest block.
     pub end: f32,
-    /// Changes with every push.
+    /// Changes with every push, and with the factors.
     pub version: u8,
+    /// The overrides that are wanted.
+    pub wanted: Factors,
+    /// Others were wanted, or planned for, when exec looked last.
+    pub changed: bool,
+    /// Those that the keys are for, or for more: faster than by these nothing may be run.
+    pub planned: Factors,
 }
 
 impl Horizon {
     /// Of an empty queue.
     pub const fn new() -> Self {
-        Self { seqs: [0; BLOCKS], front: 0, len: 0, end: 0.0, version: 0 }
+        // All zero, so that it is not in flash as well: `begin` comes before anything else.
+        let none = Factors { feed: 0.0, traverse: 0.0 };
+        let (wanted, planned) = (none, none);
+        Self {
+            seqs: [0; BLOCKS],
+            front: 0,
+            len: 0,
+            end: 0.0,
+            version: 0,
+            wanted,
+            changed: false,
+            planned,
+        }
     }
 
     /// The block with the `n`th key.
@@ -140,6 +172,29 @@ impl Horizon {
             self.front = self.slot(1) as u8;
             self.len -= 1;
         }
+    }
+
+    /// These overrides are wanted.
+    pub fn want(&mut self, factors: Factors) {
+        self.wanted = factors;
+        self.changed = true;
+        self.version = self.version.wrapping_add(1);
+    }
+
+    /// Nothing is overridden so far.
+    pub fn begin(&mut self) {
+        (self.wanted, self.planned) = (Factors::ONE, Factors::ONE);
+    }
+
+    /// Drops all keys.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// The overrides in force: those that are wanted, as far as the keys allow.
+    #[inline(always)]
+    pub fn factors(&self) -> Factors {
+        self.wanted.least(&self.planned)
     }
 
     fn slot(&self, n: u8) -> usize {

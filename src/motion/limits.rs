@@ -72,20 +72,22 @@ impl Path {
             Some(Feed::Minutes(time)) if some(time) => self.length / (time * 60.0),
             _ => CRUISE_MOST,
         };
-        let mut cruise = self.cruise;
+        // Within what no division goes wrong with.
+        self.cruise = within(self.cruise);
+        // An override may double a feed.
+        let mut top = if feed.is_some() { scaled(self.cruise, 1) } else { self.cruise };
         for (u, axis) in self.axes(dynamics) {
             let velocity = if feed.is_some() { axis.feed } else { axis.velocity };
             // Most axes are slower than the path.
-            if some(velocity) && below(velocity, cruise) {
+            if some(velocity) && below(velocity, top) {
                 let u = float(u);
-                if below(velocity, u * cruise) {
-                    cruise = velocity / u;
+                if below(velocity, u * top) {
+                    top = velocity / u;
                 }
             }
         }
-        // Within what no division goes wrong with.
-        self.cruise =
-            if below(cruise, CRUISE_LEAST) { CRUISE_LEAST } else { least(cruise, CRUISE_MOST) };
+        self.top = within(top);
+        self.cruise = least(self.cruise, self.top);
     }
 
     /// Acceleration and jerk.
@@ -130,16 +132,22 @@ impl Path {
         let rate = rates[usize::from(self.moving) - 1];
         let most = f32::from(self.most);
         // Two octaves: plainly below the limit, whatever the logarithms' error.
-        if log(self.cruise) + log(most) + 2 * OCTAVE > log(rate) + log(self.length) {
+        if log(self.top) + log(most) + 2 * OCTAVE > log(rate) + log(self.length) {
             let way = rate * self.length;
-            if below(way, self.cruise * most) {
-                self.cruise = way / most;
+            if below(way, self.top * most) {
+                self.top = way / most;
             }
         }
-        if below(self.length, self.cruise * BLOCK_S_MIN) {
-            self.cruise = self.length * (1.0 / BLOCK_S_MIN);
+        if below(self.length, self.top * BLOCK_S_MIN) {
+            self.top = self.length * (1.0 / BLOCK_S_MIN);
         }
+        self.cruise = least(self.cruise, self.top);
     }
+}
+
+/// No slower than the least and no faster than the most. Cost: 40.
+fn within(cruise: f32) -> f32 {
+    if below(cruise, CRUISE_LEAST) { CRUISE_LEAST } else { least(cruise, CRUISE_MOST) }
 }
 
 fn least_of(accel: f32) -> f32 {

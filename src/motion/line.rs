@@ -13,6 +13,7 @@
 
 use super::block::{Block, Body, Line as Move};
 use super::dynamics::Dynamics;
+use super::factors::{Extent, Reserve};
 use super::float::{least, some};
 use super::junction::{self, Heading};
 use super::limits::LastFeed;
@@ -48,7 +49,8 @@ pub struct Line<'a> {
 pub enum Built {
     /// Nothing: it has no length.
     Nothing,
-    /// A block, which may be entered at so many mm/s.
+    /// A block, into which the corner may be taken at so many mm/s, or so much faster than it can be run
+    /// that it is no limit.
     Line(f32),
     /// More steps than a block holds: to be made in so many parts.
     Parts(u16),
@@ -59,12 +61,10 @@ pub enum Built {
 pub struct Builder {
     /// The direction of the last move.
     heading: Heading,
-    /// The velocity limit of the last move; 0 if the machine stands still after it.
-    cruise: f32,
+    /// What the machine could do at most in the last move, mm/s; 0 if it stands still after it.
+    top: f32,
     /// The feed of the last move.
     feed: LastFeed,
-    /// By how much traverses are slowed down, if at all: 0 to 1.
-    traverse_factor: Option<f32>,
     /// Motors at the end of the last block.
     motors: [Motor; MOTORS],
 }
@@ -94,20 +94,20 @@ impl Builder {
             return Built::Parts(parts);
         }
         path.limit(line.feed, &mut self.feed, dynamics);
-        if let (None, Some(factor)) = (line.feed, self.traverse_factor) {
-            path.cruise *= factor;
-        }
         path.limit_change(dynamics);
         path.limit_steps(&dynamics.rates);
         path.heading.deviation = junction::deviation(&path.heading.unit, dynamics);
-        let mut entry = least(path.cruise, self.cruise);
+        let mut entry = least(path.top, self.top);
         if some(entry) {
-            let corner = junction::limit(&self.heading, &path.heading, dynamics.junction, entry);
-            entry = least(entry, corner);
+            entry = junction::limit(&self.heading, &path.heading, dynamics.junction, entry);
         }
         self.heading = path.heading;
-        self.cruise = path.cruise;
-        out.length = path.length;
+        self.top = path.top;
+        let reserve = match line.feed {
+            Some(_) => Reserve::new(path.cruise, path.top),
+            None => Reserve::TRAVERSE,
+        };
+        out.extent = Extent::new(path.length, reserve);
         out.cruise = path.cruise;
         out.accel = path.accel;
         out.jerk = path.jerk;
@@ -124,14 +124,9 @@ impl Builder {
         }
     }
 
-    /// Slows the traverses down that come from here on.
-    pub fn set_traverse_factor(&mut self, factor: Option<f32>) {
-        self.traverse_factor = factor;
-    }
-
     /// The next move starts from rest.
     pub fn stopped(&mut self) {
-        self.cruise = 0.0;
+        self.top = 0.0;
     }
 
     /// The block that renames the present position. Motors without an axis keep theirs.

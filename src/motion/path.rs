@@ -38,6 +38,8 @@ pub(super) struct Path {
     pub(super) most: u16,
     pub(super) moving: u8,
     pub(super) cruise: f32,
+    /// What the machine could do, at most twice the feed, mm/s.
+    pub(super) top: f32,
     pub(super) accel: Short,
     pub(super) jerk: Short,
 }

@@ -8,6 +8,7 @@ use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
 use super::block::{Block, Body, Line};
+use super::factors::Factors;
 use super::float::{OCTAVE, greater, lesser, log, some};
 use super::horizon::{self, Horizon, kappa};
 use super::short::Short;
@@ -57,11 +58,24 @@ impl BlockStore {
     /// The planner's end and exec's. `None` after the first time.
     pub fn split(&'static self) -> Option<(BlockQueue, BlockSource)> {
         let (producer, consumer) = self.ring.split()?;
-        let queue = BlockQueue { ring: producer, store: self, newest: SEQ, last: None };
+        // SAFETY: these are the only ends, and nobody else has one yet.
+        unsafe { &mut *self.horizon.get() }.begin();
+        let queue = BlockQueue {
+            ring: producer,
+            store: self,
+            newest: SEQ,
+            last: None,
+            factors: Factors::ONE,
+        };
         Some((queue, BlockSource::new(consumer, self)))
     }
 
-    fn with_horizon<R>(&self, _: &Ceiling, change: impl FnOnce(&mut Horizon) -> R) -> R {
+    /// These overrides are wanted: in force at once, but for what is more than the keys are for.
+    pub fn want(&self, factors: Factors, ceiling: &Ceiling) {
+        self.with_horizon(ceiling, |horizon| horizon.want(factors));
+    }
+
+    pub(super) fn with_horizon<R>(&self, _: &Ceiling, change: impl FnOnce(&mut Horizon) -> R) -> R {
         // SAFETY: the witness says that exec does not run; thread mode comes here from the planner only,
         // and `change` does not come back here.
         change(unsafe { &mut *self.horizon.get() })
@@ -91,10 +105,10 @@ pub fn used() -> usize {
 
 /// What the planner remembers of the line pushed last.
 #[derive(Clone, Copy)]
-struct Last {
-    cruise: f32,
+pub(super) struct Last {
+    pub(super) cruise: f32,
     /// The highest velocity since the last key: many that are a little slower each do need one.
-    high: f32,
+    pub(super) high: f32,
     kappa: f32,
     limits: (Short, Short),
 }
@@ -105,10 +119,10 @@ impl Last {
         self.limits != (line.accel, line.jerk) && (some(self.kappa) || some(kappa))
     }
 
-    /// Whether `line` has the same velocity, at its start as well.
-    fn as_fast(&self, line: &Line, entry: f32) -> bool {
-        let cruise = line.cruise.to_bits();
-        entry.to_bits() == cruise
+    /// Whether a line has the same velocity, at its start as well.
+    fn as_fast(&self, cruise: f32, entry: f32) -> bool {
+        let cruise = cruise.to_bits();
+        entry.to_bits() >= cruise
             && self.cruise.to_bits() == cruise
             && self.high.to_bits() == cruise
     }
@@ -116,12 +130,14 @@ impl Last {
 
 /// The planner's end.
 pub struct BlockQueue {
-    ring: Producer<Block, BLOCKS>,
-    store: &'static BlockStore,
+    pub(super) ring: Producer<Block, BLOCKS>,
+    pub(super) store: &'static BlockStore,
     /// Sequence number of the block pushed last.
-    newest: u8,
+    pub(super) newest: u8,
     /// The line that the next one may follow without a stop.
-    last: Option<Last>,
+    pub(super) last: Option<Last>,
+    /// The overrides that keys are made for.
+    pub(super) factors: Factors,
 }
 
 impl BlockQueue {
@@ -145,7 +161,15 @@ impl BlockQueue {
         self.put(fill, None, |_| {})
     }
 
-    /// Queues a move that may be entered at `entry`, mm/s; fills in what depends on the queue. False,
+    /// Queues a block at which the machine does not stop. False, and nothing done, when there is no room.
+    pub fn push_aside(&mut self, block: Block) -> bool {
+        let fill = |slot: &mut MaybeUninit<Block>| {
+            slot.write(block);
+        };
+        self.put(fill, None, |_| {})
+    }
+
+    /// Queues a move whose corner may be taken at `entry`, mm/s; fills in what depends on the queue. False,
     /// and nothing done, when there is no room.
     ///
     /// Cost: 1,200 on a curve at a steady feed; 2,000 more for a corner, and 900 for each key that it
@@ -158,7 +182,9 @@ impl BlockQueue {
         self.refine(line);
         line.start = self.end();
         line.entry = Short::new(entry);
-        let key = if self.goes_on(line, entry) { None } else { self.corner(line, entry) };
+        let cruise = line.velocity(&self.factors);
+        let key =
+            if self.goes_on(line, cruise, entry) { None } else { self.corner(line, cruise, entry) };
         let end = line.start + line.gain();
         let fill = |slot: &mut MaybeUninit<Block>| {
             slot.write(Block { body: Body::Line(*line), line: number });
@@ -172,21 +198,21 @@ impl BlockQueue {
     }
 
     /// Whether the line is as fast as the one before, and the corner between them no limit.
-    fn goes_on(&self, line: &Line, entry: f32) -> bool {
-        self.last
-            .as_ref()
-            .is_some_and(|last| last.limits == (line.accel, line.jerk) && last.as_fast(line, entry))
+    fn goes_on(&self, line: &Line, cruise: f32, entry: f32) -> bool {
+        self.last.as_ref().is_some_and(|last| {
+            last.limits == (line.accel, line.jerk) && last.as_fast(cruise, entry)
+        })
     }
 
     /// The key of a line that does not simply go on, if it needs one.
     #[inline(never)]
-    fn corner(&mut self, line: &mut Line, entry: f32) -> Option<(f32, u8)> {
+    fn corner(&mut self, line: &mut Line, cruise: f32, entry: f32) -> Option<(f32, u8)> {
         let limits = (line.accel, line.jerk);
         let kappa =
             if line.jerk == Short::ZERO { 0.0 } else { kappa(line.accel.get(), line.jerk.get()) };
         if let Some(last) = &mut self.last {
             // Only the acceleration changes.
-            if !last.jerk_limits_change(line, kappa) && last.as_fast(line, entry) {
+            if !last.jerk_limits_change(line, kappa) && last.as_fast(cruise, entry) {
                 (last.kappa, last.limits) = (kappa, limits);
                 return None;
             }
@@ -194,23 +220,24 @@ impl BlockQueue {
         let entry = self.entry(line, entry, kappa);
         line.entry = Short::new(entry);
         let mut key = None;
-        let mut high = line.cruise;
+        let mut high = cruise;
         match &self.last {
             // What comes before brakes with its own limits.
             Some(last) if last.jerk_limits_change(line, kappa) => {
-                key = Some((line.start + horizon::key(line.entry.get(), last.kappa), FIRM));
+                key =
+                    Some((line.start + horizon::key(line.entry(&self.factors), last.kappa), FIRM));
             }
             Some(last) => {
-                let limit = lesser(last.cruise, line.cruise) * WORTH;
-                if entry < limit || line.cruise < last.high * WORTH {
-                    key = Some((line.key(), 0));
+                let limit = lesser(last.cruise, cruise) * WORTH;
+                if entry < limit || cruise < last.high * WORTH {
+                    key = Some((line.key(&self.factors), 0));
                 } else {
-                    high = greater(last.high, line.cruise);
+                    high = greater(last.high, cruise);
                 }
             }
-            None => key = Some((line.key(), 0)),
+            None => key = Some((line.key(&self.factors), 0)),
         }
-        self.last = Some(Last { cruise: line.cruise, high, kappa, limits });
+        self.last = Some(Last { cruise, high, kappa, limits });
         key
     }
 
@@ -290,7 +317,7 @@ impl BlockQueue {
     fn key(&self, seq: u8) -> f32 {
         let back = usize::from(self.newest.wrapping_sub(seq) & SEQ);
         match self.ring.pushed(back) {
-            Some(Block { body: Body::Line(line), .. }) => line.key(),
+            Some(Block { body: Body::Line(line), .. }) => line.key(&self.factors),
             // Gone already: no limit.
             _ => f32::MAX,
         }

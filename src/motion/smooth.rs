@@ -13,8 +13,10 @@
 //! that is less than `J t^2` away (with t the time of a stretch) is gone to at once, as is the end of a move
 //! that is shorter than `2 J t^3`. Cost on AVR: about 5,000 cycles.
 
-use super::float::{greater, lesser, some};
+use super::exec::SEGMENT_S;
+use super::float::{below, greater, lesser, some};
 use super::governor::{Governor, Stretch};
+use super::queue::Anchor;
 use super::reach::{Ahead, NONE, Reach};
 use super::state::State;
 use crate::math::sqrt;
@@ -52,7 +54,9 @@ impl Governor {
             return stretch;
         }
         if self.brake.is_none() || self.look {
-            self.look = false;
+            // Above the feed, which an override has lowered, it looks until it is not.
+            let v = self.state.velocity;
+            self.look = below(cruise, v) && (self.late || below(cruise * 1.01, v));
             if let Some(stretch) = self.go(left, cruise, ahead, nominal) {
                 self.brake = None;
                 return stretch;
@@ -153,9 +157,16 @@ impl Governor {
         if let Some(anchor) = ahead.anchor(0)
             && self.here(anchor.ahead)
             && next.velocity > anchor.velocity
+            && self.takes(&anchor, next.velocity)
         {
             *next = State { velocity: anchor.velocity, alpha: 0.0 };
         }
+    }
+
+    /// Whether a limit is to be kept exactly that is here, and below `velocity`: not if an override has lowered it
+    /// too late.
+    pub(super) fn takes(&self, anchor: &Anchor, velocity: f32) -> bool {
+        !(self.late && anchor.soft) || velocity - anchor.velocity <= self.limits.accel * SEGMENT_S
     }
 
     /// From rest to rest over what is too short to get going: a fraction of a step, most likely.

@@ -7,7 +7,8 @@
 use core::cell::Cell;
 
 use super::block::{Block, Body, Line};
-use super::float::lesser;
+use super::factors::Factors;
+use super::float::{below, lesser};
 use super::horizon::Horizon;
 use super::queue::{BLOCKS, BlockStore, FIRM, SEQ};
 use crate::hal::ring::Consumer;
@@ -19,6 +20,8 @@ pub struct Anchor {
     pub velocity: f32,
     /// Brake potential from the end of the oldest block to there.
     pub ahead: f32,
+    /// It is due to a feed, which an override may have lowered too late, and not to a corner.
+    pub soft: bool,
     /// Limits change there: what comes after is for the line that begins there.
     pub firm: bool,
 }
@@ -83,11 +86,32 @@ impl BlockSource {
         self.horizon().version
     }
 
+    /// What the oldest block, a line, is run at, mm/s; it changes with the version. Cost: 100.
+    #[inline(always)]
+    pub fn cruise(&self) -> f32 {
+        let factors = self.horizon().factors();
+        self.line(self.oldest, |line| line.velocity(&factors)).unwrap_or_default()
+    }
+
+    /// Whether other overrides were wanted when this was asked last. Cost: 15.
+    #[inline(always)]
+    pub fn take_changed(&mut self) -> bool {
+        core::mem::take(&mut self.horizon_mut().changed)
+    }
+
+    /// These overrides are wanted: the planner hears of it if they are not those of the keys.
+    pub fn want(&mut self, factors: Factors) {
+        self.horizon_mut().want(factors);
+    }
+
     /// The square of the velocity, (mm/s)^2, at which the oldest block, a line, may be left for the
     /// sake of all that follow, if there is no jerk limit. Cost: 900.
     pub fn headroom(&self) -> f32 {
         let horizon = self.horizon();
-        let key = match horizon.nth(0).and_then(|seq| self.line(seq, Line::sharp_key)) {
+        let key = match horizon
+            .nth(0)
+            .and_then(|seq| self.line(seq, |line| line.sharp_key(&horizon.factors())))
+        {
             // Bits tell, mostly: both are above 0.
             Some(key)
                 if key.to_bits() < horizon.end.to_bits() && !horizon.end.is_sign_negative() =>
@@ -107,14 +131,14 @@ impl BlockSource {
         let Some(seq) = horizon.nth(n) else {
             let last = n == 0 || horizon.nth(n - 1).is_some();
             let ahead = horizon.end - self.end();
-            return last.then_some(Anchor { velocity: 0.0, ahead, firm: true });
+            return last.then_some(Anchor { velocity: 0.0, ahead, soft: false, firm: true });
         };
         let firm = seq & FIRM != 0;
-        self.line(seq, |line| (line.entry.get(), line.start)).map(|(velocity, start)| Anchor {
-            velocity,
-            ahead: start - self.end(),
-            firm,
-        })
+        let factors = horizon.factors();
+        let (velocity, corner, start) =
+            self.line(seq, |line| (line.entry(&factors), line.entry.get(), line.start))?;
+        let soft = below(velocity, corner);
+        Some(Anchor { velocity, ahead: start - self.end(), soft, firm })
     }
 
     /// Potential at the end of the oldest block.

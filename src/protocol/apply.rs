@@ -12,6 +12,7 @@ use super::write::Out;
 use crate::config::name::axis_of;
 use crate::config::table;
 use crate::config::{Number, Setting};
+use crate::gcode::overrides::{Change, Override};
 use crate::gcode::tables::Row;
 use crate::status::Status;
 use crate::units::Length;
@@ -39,6 +40,7 @@ impl Request {
                             done(c.machine.home())?;
                         }
                     }
+                    Some(Subject::Single(single)) => set_value(single.value, pair, c)?,
                     _ => return Err(Status::ReadOnly),
                 }
                 Ok(Some(token))
@@ -131,6 +133,47 @@ fn jog<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Stat
     let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
     let place = number.fixed(Length::DECIMALS, false).ok_or(Status::OutOfRange)?;
     done(c.machine.jog(axis.ok_or(Status::UnrecognizedName)?, Length(place)))
+}
+
+/// Sets a value of the machine, of which only the overrides can be.
+fn set_value<M: Machine, O>(
+    value: Value,
+    pair: &Pair,
+    c: &mut Context<'_, M, O>,
+) -> Result<(), Status> {
+    let change = match value {
+        Value::Override(which) => {
+            let on = c.machine.value(Value::OverrideOn(which)) != 0;
+            Change::new(which, on, factor(which, pair, c.line)?)
+        }
+        Value::OverrideOn(which) => {
+            let on = match pair.kind {
+                Kind::True => 1,
+                Kind::False => 0,
+                _ => whole(pair, c)?,
+            };
+            Change::switch(
+                which,
+                (0..=1).contains(&on).then_some(on != 0).ok_or(Status::OutOfRange)?,
+            )
+        }
+        _ => return Err(Status::ReadOnly),
+    };
+    c.machine.change_override(change);
+    Ok(())
+}
+
+/// The factor that a pair gives an override, thousandths.
+fn factor(which: Override, pair: &Pair, line: &[u8]) -> Result<u16, Status> {
+    if pair.kind != Kind::Number {
+        return Err(Status::UnsupportedType);
+    }
+    let number = Number::parse(pair.value.of(line)).ok_or(Status::BadNumber)?;
+    let factor = number.fixed(3, false).ok_or(Status::OutOfRange)?;
+    match u32::try_from(factor) {
+        Ok(factor) if which.allows(factor) => Ok(factor as u16),
+        _ => Err(Status::OutOfRange),
+    }
 }
 
 fn done(status: Status) -> Result<(), Status> {

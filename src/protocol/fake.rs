@@ -4,6 +4,7 @@ use super::{
     CHUNK, Checksum, Machine, Mode, Next, Out, Request, StatusReport, Store, Value, Warning,
 };
 use crate::config::{Setting, Settings};
+use crate::gcode::overrides::{Change, Overrides};
 use crate::gcode::tables::Row;
 use crate::status::Status;
 use crate::units::Length;
@@ -19,6 +20,7 @@ pub struct Fake {
     pub position: i32,
     pub line: i32,
     pub powered: [bool; 4],
+    pub overrides: Overrides,
     pub state: i32,
     /// Values of the interpreter's tables.
     pub rows: HashMap<(u8, u8), i32>,
@@ -42,6 +44,7 @@ impl Fake {
             position: 0,
             line: 0,
             powered: [false; 4],
+            overrides: Overrides::NONE,
             state: 1,
             rows: HashMap::new(),
             cold: HashMap::new(),
@@ -118,6 +121,10 @@ impl Machine for Fake {
         &self.settings
     }
 
+    fn change_override(&mut self, change: Change) {
+        self.overrides.change(change);
+    }
+
     fn cold(&mut self, setting: Setting) -> i32 {
         self.cold.get(&setting.number()).copied().unwrap_or_else(|| setting.default_value())
     }
@@ -143,6 +150,8 @@ impl Machine for Fake {
 
     fn value(&mut self, value: Value) -> i32 {
         match value {
+            Value::Override(which) => self.overrides.factor(which).into(),
+            Value::OverrideOn(which) => self.overrides.is_on(which).into(),
             Value::Row(row, axis) => {
                 self.rows.get(&(row.number(), axis)).copied().unwrap_or_default()
             }

@@ -3,6 +3,7 @@
 use super::report::StatusReport;
 use super::value::Value;
 use crate::config::{Setting, Settings};
+use crate::gcode::overrides::Change;
 use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
@@ -111,6 +112,8 @@ pub trait Machine {
     /// Starts the machine anew when the response has left, in its boot loader if `boot`, for which it has to be at
     /// rest.
     fn restart(&mut self, boot: bool) -> Status;
+    /// Changes the overrides at once.
+    fn change_override(&mut self, change: Change);
     /// Powers a motor, or takes its power; all of them for `None`.
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status;
 

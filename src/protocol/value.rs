@@ -3,6 +3,7 @@
 use crate::boards::inputs;
 use crate::config::Fixed;
 use crate::config::name::token;
+use crate::gcode::overrides::Override;
 use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
@@ -88,6 +89,10 @@ pub enum Value {
     Shift(u8),
     /// `g54x`, `g28x`, `tt1z` and so on: a value of the interpreter's tables, in units of a `Length`.
     Row(Row, u8),
+    /// `mfo`, `mto`, `sso`: an override's factor, in thousandths.
+    Override(Override),
+    /// `mfoe`, `mtoe`, `ssoe`: 1 if it counts.
+    OverrideOn(Override),
     /// `pwr1` and so on: 1 if the motor is powered.
     Powered(u8),
     /// `_tex` and so on: where the lines read so far end, in units of a `Length`.
@@ -125,6 +130,8 @@ pub enum Form {
     Count,
     /// A speed.
     Speed,
+    /// A factor, in thousandths.
+    Factor,
     /// A length or angle.
     Length,
     /// A length in millimetres whatever the units, or an angle.
@@ -140,6 +147,7 @@ impl Form {
     pub fn show(self, value: i32, inches: bool) -> Fixed {
         let (stored, shown) = match self {
             Form::Count => return Fixed::int(value),
+            Form::Factor => return Fixed { value, decimals: 3 },
             Form::Steps => {
                 let value = value.clamp(-STEPS_MAX, STEPS_MAX).wrapping_mul(100);
                 return Fixed { value, decimals: 2 };
@@ -198,7 +206,7 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 35;
+pub const SINGLE_COUNT: usize = 41;
 /// Entries of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
 /// The number of the vector `g92`.
@@ -246,6 +254,11 @@ const fn speed(name: &str, value: Value, label: Text) -> Single {
     Single { token: token(name), value, form: Form::Speed, label, choices: NONE }
 }
 
+const fn factor(name: &str, of: Override, label: Text) -> Single {
+    let (value, form) = (Value::Override(of), Form::Factor);
+    Single { token: token(name), value, form, label, choices: NONE }
+}
+
 const fn single(name: &str, value: Value, form: Form) -> Single {
     Single { token: token(name), value, form, label: NONE, choices: NONE }
 }
@@ -285,6 +298,12 @@ progmem! {
         count("sps", Value::SpindleSpeed, text!("Spindle speed:"), NONE),
         count("com", Value::Mist, text!("Mist coolant:"), ON),
         count("cof", Value::Flood, text!("Flood coolant:"), ON),
+        factor("mfo", Override::Feed, text!("Feed override:")),
+        factor("mto", Override::Traverse, text!("Traverse override:")),
+        factor("sso", Override::Spindle, text!("Spindle override:")),
+        count("mfoe", Value::OverrideOn(Override::Feed), text!("Feed override enable:"), ON),
+        count("mtoe", Value::OverrideOn(Override::Traverse), text!("Traverse override enable:"), ON),
+        count("ssoe", Value::OverrideOn(Override::Spindle), text!("Spindle override enable:"), ON),
         count("fd", Value::Zero, NONE, NONE),
         single("ma", Value::Zero, Form::Length),
         count("rst", Value::Reset, text!("Last reset:"), text!("Power on|External|Brown-out|Watchdog|Asked for")),

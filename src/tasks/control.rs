@@ -7,6 +7,7 @@
 
 use super::hold;
 use super::links::Links;
+use super::overrides;
 use super::switches;
 use crate::hal::event::{Event, next};
 
@@ -14,6 +15,8 @@ use crate::hal::event::{Event, next};
 pub async fn run(links: &'static Links) -> ! {
     loop {
         hold::serve(links);
+        overrides::serve(links);
+        overrides::tell(links);
         switches::serve(links);
         next(Event::Realtime).await;
     }

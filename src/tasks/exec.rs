@@ -15,7 +15,7 @@ use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
 use crate::tasks::health::{self, Sign};
-use crate::tasks::{hold, links, power, spindle};
+use crate::tasks::{hold, links, overrides, power, spindle};
 
 /// CPU cycles in so many tenths of a millisecond.
 const fn tenths(of_ms: u32) -> u32 {
@@ -57,6 +57,8 @@ pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMEN
                 rests = out.velocity.to_bits() == 0;
                 finished.queue();
                 power::segment(segment.moving);
+            } else if let Step::Override(change) = step {
+                overrides::change_in_stream(change, &mut blocks);
             } else if step == Step::Idle && standstill {
                 finished.rest();
                 out.finished = out.line;

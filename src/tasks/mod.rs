@@ -8,6 +8,7 @@ pub mod hold;
 mod homing;
 pub mod lines;
 pub mod links;
+pub mod overrides;
 pub mod parser;
 pub mod planner;
 pub mod ports;

@@ -18,7 +18,7 @@ use super::setup::moved_by;
 use crate::boards::outputs;
 use crate::config::{Settings, StepRatio};
 use crate::gcode::arc::Walk;
-use crate::gcode::command::{Commands, Feed, Motion, Overrides, Spindle, Stop};
+use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
 use crate::gcode::modal::{self, Coolant};
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, wait};
@@ -43,8 +43,6 @@ struct Planner {
     line: u32,
     /// What exec has been told that drivers ask for.
     drivers: Drivers,
-    /// By how much feeds are multiplied, if at all.
-    feed_factor: Option<f32>,
     /// What exec has been told to switch.
     outputs: Outputs,
     /// How far the line has been carried out.
@@ -106,7 +104,6 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         position: [Length::ZERO; AXES],
         line: 0,
         drivers: Drivers::USUAL,
-        feed_factor: None,
         outputs: Outputs { on: 0, speed: 0.0 },
         steps: Steps::default(),
         walk: None,
@@ -115,6 +112,7 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
     };
     loop {
         links.planner_wake.wait().await;
+        planner.replan();
         if links.commands_taken.get() && !planner.carry_out_at_once() {
             planner.begin();
             loop {
@@ -232,7 +230,11 @@ impl Planner {
             Step::Arc => self.begin_arc(&commands.motion),
             Step::Dwell(ms) => self.pause(Body::Dwell(*ms)),
             Step::SetPosition(position) => self.set_position(position),
-            Step::Overrides(factors) => self.set_overrides(*factors),
+            Step::Override(change) => {
+                let block = Block { body: Body::Override(*change), line: self.line };
+                let _ = self.queue.push_aside(block);
+                self.announce();
+            }
             Step::Spindle(spindle) => self.set_spindle(spindle),
             Step::Coolant(coolant) => {
                 let bit =
@@ -245,12 +247,7 @@ impl Planner {
                 self.switch(u8::MAX, 0, 0.0);
                 self.steps.repeat();
             }
-            Step::Stop(Stop::End) => {
-                // On again, with the factors they had.
-                let factors = self.links.model.borrow().overrides();
-                self.set_overrides(factors);
-                self.pause(Body::ProgramEnd);
-            }
+            Step::Stop(Stop::End) => self.pause(Body::ProgramEnd),
             Step::Stop(_) => {
                 self.pause(Body::ProgramStop);
                 if self.links.settings.borrow().waits_at_stop() {
@@ -280,10 +277,6 @@ impl Planner {
     /// Queues a straight move, for which there is room, or says in how many parts it is to be made.
     fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) -> Option<u16> {
         let settings = self.links.settings.borrow();
-        let feed = match self.feed_factor {
-            None => feed,
-            Some(factor) => feed.map(|feed| feed.times(factor)),
-        };
         let line = Line { from: &self.position, to: target, feed };
         let mut block = Move::default();
         match self.builder.line(&line, &self.dynamics, &*settings, &mut block) {
@@ -351,11 +344,11 @@ impl Planner {
         }
     }
 
-    #[small]
-    fn set_overrides(&mut self, factors: Overrides) {
-        let part = |thousandths: u16| (thousandths != 1_000).then(|| f32::from(thousandths) * 1e-3);
-        self.feed_factor = part(factors.feed);
-        self.builder.set_traverse_factor(part(factors.traverse));
+    /// Plans for the overrides that are wanted.
+    fn replan(&mut self) {
+        if let Some(wanted) = self.queue.wanted() {
+            self.queue.replan(wanted);
+        }
     }
 
     fn set_spindle(&mut self, spindle: &Spindle) {
@@ -390,8 +383,12 @@ impl Planner {
         self.announce();
     }
 
-    async fn room(&self) {
-        wait(Event::BlockDone, || (self.queue.free() > 0 || self.is_flushed()).then_some(())).await;
+    async fn room(&mut self) {
+        wait(Event::BlockDone, || {
+            self.replan();
+            (self.queue.free() > 0 || self.is_flushed()).then_some(())
+        })
+        .await;
     }
 
     /// Waits until the machine has come to the stop, and then for the next cycle start.
@@ -421,7 +418,6 @@ impl Planner {
         self.relocate(&motion);
         self.news = News::None;
         let mut model = links.model.borrow_mut();
-        self.set_overrides(model.overrides());
         let spindle = Spindle { turn: spindle_of(motion.outputs), speed: motion.speed };
         model.set_outputs(&spindle, coolant_of(motion.outputs));
         drop(model);

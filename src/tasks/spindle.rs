@@ -3,7 +3,7 @@
 //! Exec says what the program has switched and S ([`Snapshot`]); here it becomes levels and the width of pulses
 //! ([`Spindle`]). Exec calls [`switch`] when something of it may have changed, at rest, and waits as long as that
 //! says: a spindle that has been started takes its time. In a feedhold those outputs pause that the settings say,
-//! and are on again before motion goes on. Thread mode tells what settings ([`set`]) and the override ([`set_factor`])
+//! and are on again before motion goes on. Thread mode tells what settings ([`set`]) and the override ([`follow`])
 //! have changed; it is in force at once. Cost of a change: 4,000 cycles.
 
 use core::cell::UnsafeCell;
@@ -91,9 +91,10 @@ pub fn set(setting: Setting, value: i32) {
 }
 
 /// Multiplies S by so many thousandths from now on. Thread mode only.
-pub fn set_factor(thousandths: u16) {
-    with(|spindle| spindle.set_factor(thousandths));
-    tell();
+pub fn follow(thousandths: u16) {
+    if with(|spindle| spindle.set_factor(thousandths)) {
+        tell();
+    }
 }
 
 /// Changes the state while exec cannot run.

@@ -9,6 +9,7 @@ use core::cell::{OnceCell, RefMut};
 use super::hold;
 use super::homing;
 use super::links::{Cycle, Links, snapshot};
+use super::overrides;
 use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
@@ -19,6 +20,7 @@ use crate::boards::{MOTORS, inputs};
 use crate::config::{Setting, Settings};
 use crate::gcode::command::Motion;
 use crate::gcode::modal::{Coolant, Turn};
+use crate::gcode::overrides::Change;
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::gcode::tables::Row;
 use crate::hal::imp::eeprom::Eeprom;
@@ -271,6 +273,10 @@ impl Machine for View<'_> {
         self.links.model.borrow_mut().set(row, axis, value)
     }
 
+    fn change_override(&mut self, change: Change) {
+        overrides::change(change);
+    }
+
     fn value(&mut self, value: Value) -> i32 {
         match value {
             Value::State => self.state(),
@@ -318,6 +324,8 @@ impl Machine for View<'_> {
             }
             Value::Zero => 0,
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
+            Value::Override(which) => overrides::now().factor(which).into(),
+            Value::OverrideOn(which) => overrides::now().is_on(which).into(),
             Value::Tool => self.links.model.borrow().tool().into(),
             Value::Input(input) => self.input(input),
             Value::ProbeState => self.links.probe.state() as i32,

@@ -2,6 +2,7 @@
 
 use kerf::motion::block::{Body, Line};
 use kerf::motion::exec::{SEGMENT_S, Step};
+use kerf::motion::factors::Factors;
 use kerf::motion::governor::{Ahead, Governor, Stretch};
 use kerf::motion::queue::{Anchor, BlockSource};
 use kerf::units::{Length, PerAxis};
@@ -123,7 +124,12 @@ pub struct Planned {
     /// The number of its block, from 1.
     pub line: u32,
     pub length: f64,
+    /// Under the override in force.
     pub cruise: f64,
+    /// Under the highest there may be.
+    pub top: f64,
+    /// What the corner at its start allows.
+    pub corner: f64,
     pub accel: f64,
     pub jerk: f64,
     pub stretch: Stretch,
@@ -138,7 +144,16 @@ pub fn plan(job: &Job) -> Vec<Planned> {
 
 /// The same, with feedholds: `held` tells before each stretch whether there is one, asked with the number of
 /// stretches so far and whether the machine stands still. At rest it is asked until there is none.
-pub fn plan_held(job: &Job, mut held: impl FnMut(usize, bool) -> bool) -> Vec<Planned> {
+pub fn plan_held(job: &Job, held: impl FnMut(usize, bool) -> bool) -> Vec<Planned> {
+    plan_changed(job, held, |_, _| {})
+}
+
+/// The same, with `change` called before each stretch, with their number.
+pub fn plan_changed(
+    job: &Job,
+    mut held: impl FnMut(usize, bool) -> bool,
+    mut change: impl FnMut(usize, &mut Rig),
+) -> Vec<Planned> {
     let mut rig = Rig::new(job.config.clone());
     let mut governor = Governor::new();
     let mut running: Option<(Line, u32, f32)> = None;
@@ -156,10 +171,14 @@ pub fn plan_held(job: &Job, mut held: impl FnMut(usize, bool) -> bool) -> Vec<Pl
             rig.source.enter();
             version = rig.source.version().wrapping_sub(1);
             governor.begin(line.accel.get(), line.jerk.get());
-            (line, block.line, line.length)
+            (line, block.line, line.length())
         });
+        change(planned.len(), rig);
         if rig.source.version() != version {
             version = rig.source.version();
+            if rig.source.take_changed() {
+                governor.change_feed();
+            }
             governor.look_again();
         }
         struct View<'a>(f32, &'a BlockSource);
@@ -171,6 +190,7 @@ pub fn plan_held(job: &Job, mut held: impl FnMut(usize, bool) -> bool) -> Vec<Pl
                 self.1.anchor(n)
             }
         }
+        let cruise = rig.source.cruise();
         let view = View(rig.source.headroom(), &rig.source);
         let before = governor.velocity().into();
         let mut hold = held(planned.len(), governor.is_at_rest());
@@ -180,19 +200,21 @@ pub fn plan_held(job: &Job, mut held: impl FnMut(usize, bool) -> bool) -> Vec<Pl
         let stretch = if hold {
             governor.halt(left, &view, SEGMENT_S)
         } else {
-            governor.stretch(left, line.cruise, &view, SEGMENT_S)
+            governor.stretch(left, cruise, &view, SEGMENT_S)
         };
         planned.push(Planned {
             line: number,
-            length: line.length.into(),
-            cruise: line.cruise.into(),
+            length: line.length().into(),
+            cruise: cruise.into(),
+            top: line.velocity(&Factors { feed: 2.0, traverse: 1.0 }).into(),
+            corner: line.entry.get().into(),
             accel: line.accel.get().into(),
             jerk: line.jerk.get().into(),
             stretch,
             before,
             after: governor.velocity().into(),
         });
-        assert!(planned.len() < 200_000, "does not come to an end: {:?}", planned.last());
+        assert!(planned.len() < 1_000_000, "does not come to an end: {:?}", planned.last());
         if stretch.ends {
             running = None;
             rig.source.release();

@@ -30,7 +30,7 @@ pub fn check_limits(planned: &[Planned]) {
 }
 
 /// From one stretch to the next.
-fn check_continuity(n: usize, a: &Planned, b: &Planned) {
+pub fn check_continuity(n: usize, a: &Planned, b: &Planned) {
     assert!(a.after == b.before || a.after < 1e-3, "{n}: {a:?} {b:?}");
     if a.jerk == 0.0 || a.jerk != b.jerk || a.accel != b.accel {
         return;

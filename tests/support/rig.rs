@@ -8,6 +8,7 @@ use kerf::motion::block::{Block, Line as Move};
 use kerf::motion::dda::{Dda, PHASE_MARGIN, Pins, SEGMENTS, STEP, Segment};
 use kerf::motion::dynamics::{Dynamics, Machine};
 use kerf::motion::exec::{Exec, Step};
+use kerf::motion::factors::Factors;
 use kerf::motion::line::{Builder, Built, Line, Motors};
 use kerf::motion::queue::{BlockQueue, BlockSource, BlockStore};
 use kerf::motion::snapshot::Snapshot;
@@ -169,7 +170,15 @@ impl Rig {
 
     /// Queues a move; there must be room. mm/s.
     pub fn line(&mut self, to: PerAxis<Length>, velocity: f32, number: u32) {
-        let feed = Some(Feed::PerMinute(velocity * 60.0));
+        self.go(to, Some(Feed::PerMinute(velocity * 60.0)), number);
+    }
+
+    /// Queues a traverse.
+    pub fn traverse(&mut self, to: PerAxis<Length>, number: u32) {
+        self.go(to, None, number);
+    }
+
+    fn go(&mut self, to: PerAxis<Length>, feed: Option<Feed>, number: u32) {
         let line = Line { from: &self.position, to: &to, feed };
         let mut block = Move::default();
         match self.builder.line(&line, &self.dynamics, &self.config, &mut block) {
@@ -188,6 +197,23 @@ impl Rig {
     pub fn push(&mut self, block: Block) {
         self.builder.stopped();
         assert!(self.queue.push(block));
+    }
+
+    /// Queues something at which the machine does not stop.
+    pub fn aside(&mut self, block: Block) {
+        assert!(self.queue.push_aside(block));
+    }
+
+    /// Other overrides are wanted.
+    pub fn want(&mut self, factors: Factors) {
+        self.source.want(factors);
+    }
+
+    /// The planner hears of it.
+    pub fn replan(&mut self) {
+        if let Some(wanted) = self.queue.wanted() {
+            self.queue.replan(wanted);
+        }
     }
 
     /// Begins a feedhold, or ends one.
@@ -280,7 +306,7 @@ impl Rig {
         let mut idle = 0;
         while self.turn() != Step::Idle || !self.pins.stopped {
             idle += 1;
-            assert!(idle < 200_000, "does not come to an end");
+            assert!(idle < 1_000_000, "does not come to an end");
         }
         self.turn();
     }

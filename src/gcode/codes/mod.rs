@@ -9,6 +9,7 @@ pub mod table;
 use super::modal::{
     ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, Turn, Units,
 };
+use super::overrides::Override;
 use crate::progmem::Progmem;
 use table::{G, G_START, M, M_START, MOTION};
 
@@ -115,18 +116,6 @@ pub enum OverrideCode {
     All(bool),
     /// M48.1, M49.1, M50; M48.2, M49.2, M50.1; M51: of one.
     One(Override, Switch),
-}
-
-/// What can be overridden.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(u8)]
-pub enum Override {
-    /// Feed rates.
-    Feed = 0,
-    /// Traverse rates.
-    Traverse = 1,
-    /// The speed of the spindle.
-    Spindle = 2,
 }
 
 /// How one override is set.

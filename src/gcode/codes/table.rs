@@ -1,9 +1,10 @@
 //! The rows of the language.
 
-use super::{Action, Code, NonModal, Override, OverrideCode, StopCode, Switch, ToolLength};
+use super::{Action, Code, NonModal, OverrideCode, StopCode, Switch, ToolLength};
 use crate::gcode::modal::{
     ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, Turn, Units,
 };
+use crate::gcode::overrides::Override;
 use crate::gcode::words::{self, AXES, H, L, OFFSETS, P, Q, R, bit};
 
 /// A code without words of its own.

@@ -7,6 +7,7 @@ use crate::gcode::modal::{
     ArcDistance, Defaults, Distance, FeedMode, Modal, MotionMode, PathMode, Plane, Retract, Turn,
     Units,
 };
+use crate::gcode::overrides::{Change, Override};
 use crate::gcode::setup::{AxisMode, Setup, Usual};
 use crate::status::Status;
 use crate::units::Length;
@@ -127,7 +128,8 @@ fn program_end_resets() {
     assert_eq!(state.position()[0], Length(254_000));
     assert_eq!(state.feed_rate(), 0.0);
     assert_eq!(run(&["G92 X5", "M2", "G92.3"]).0.work_offset()[0], Length::ZERO);
-    assert_eq!(run(&["M50 P.5 M2", "M49", "M2", "M48"]).1.overrides.unwrap().feed, 500);
+    assert_eq!(run(&["M50 P.5"]).1.overrides, Some(Change::to(Override::Feed, 500)));
+    assert_eq!(run(&["M48"]).1.overrides, Some(Change::ALL_ON));
     assert_eq!(refusal(&["G1 F9", "M2", "X1"]), Status::FeedrateMissing);
     assert_eq!(run(&["M2"]).1.stop, Stop::End);
     for line in ["M0", "M1", "M60"] {

@@ -21,7 +21,7 @@ use crate::hal::serial::{
     AUX, AUX_RING, AllEnds, Ends, Flow, PORTS, RX_RING, TX_RING, USB, XOFF, XON, hardware,
     is_shared,
 };
-use crate::realtime;
+use crate::realtime::{self, Asked};
 
 /// What the interrupts of a port and thread mode share.
 #[repr(C)]
@@ -42,6 +42,8 @@ struct Flags {
     ahead: SharedByte,
     /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`].
     held: SharedByte,
+    /// An [`Asked`], byte for byte. The receive interrupt adds to it, `take_asked` clears it.
+    asked: [SharedByte; 3],
 }
 
 /// The other side has sent XOFF.
@@ -59,6 +61,7 @@ impl<const N: usize> Shared<N> {
                 realtime: SharedByte::new(0),
                 ahead: SharedByte::new(0),
                 held: SharedByte::new(0),
+                asked: [const { SharedByte::new(0) }; 3],
             },
         }
     }
@@ -296,6 +299,19 @@ pub unsafe fn stop() {
 #[inline(always)]
 pub fn asks_hold() -> bool {
     (0..PORTS as u8).any(|port| flags(port).realtime.get() & realtime::HOLD != 0)
+}
+
+/// What characters have asked of overrides since the last call.
+#[inline(never)]
+pub fn take_asked(port: u8) -> Asked {
+    let [feed, spindle, fixed] = &flags(port).asked;
+    avr_device::interrupt::free(|_| {
+        let asked = Asked { percent: [feed.get() as i8, spindle.get() as i8], fixed: fixed.get() };
+        feed.set(0);
+        spindle.set(0);
+        fixed.set(0);
+        asked
+    })
 }
 
 /// The real-time characters since the last call, as bits (see [`realtime`](crate::realtime)).

@@ -13,7 +13,7 @@ use crate::hal::serial::{
     AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, MARKS, PORTS, RX_RING, TX_RING, USB, XOFF, XON,
     batch, hardware, high_water, lose, mark,
 };
-use crate::realtime;
+use crate::realtime::{self, Asked};
 
 /// The filling end of a receive ring, whatever its size.
 trait Fill {
@@ -77,6 +77,9 @@ struct Line {
     /// Bytes queued, modulo 256.
     queued: u8,
     realtime: u8,
+    asked: Asked,
+    /// The byte queued last.
+    last: u8,
     /// A byte's time at this end of the line and at the sender's.
     byte_cycles: u64,
     sender_cycles: u64,
@@ -100,6 +103,8 @@ impl Line {
             lost_ends: 0,
             queued: 0,
             realtime: 0,
+            asked: Asked::NOTHING,
+            last: 0,
             byte_cycles: 1,
             sender_cycles: 1,
             next_rx: NEVER,
@@ -230,6 +235,11 @@ pub fn take_realtime(port: u8) -> u8 {
     with(port, |line| core::mem::take(&mut line.realtime))
 }
 
+/// What characters have asked of overrides since the last call.
+pub fn take_asked(port: u8) -> Asked {
+    with(port, |line| core::mem::take(&mut line.asked))
+}
+
 /// The sender puts bytes on the line.
 pub(super) fn send(port: u8, bytes: &[u8]) {
     with(port, |line| {
@@ -330,6 +340,14 @@ impl Line {
             return;
         }
         let garbles = self.garbles();
+        if self.last <= realtime::ASCII
+            && !garbles
+            && let Some(asked) = self.asked.with(byte)
+        {
+            self.asked = asked;
+            flags::set(Event::Realtime);
+            return;
+        }
         let Some(ring) = self.rx_in.as_mut() else { return };
         let full = ring.is_full();
         if full || byte < MARKS || garbles {
@@ -337,6 +355,7 @@ impl Line {
         } else {
             ring.push(byte);
         }
+        self.last = ring.newest();
         self.queued = self.queued.wrapping_add(1);
         let batch = self.queued.is_multiple_of(ring.batch());
         // The reader may come too late to stop the sender.

@@ -95,8 +95,6 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn check_homing(&mut self, at: &mut Progress) -> Result<bool, Status> {
-        // As programmed: no override of the feed.
-        self.feed_factor = None;
         let (axes, _) = self.homed_by_line();
         for axis in (0..homing::AXES).filter(|axis| axes & 1 << axis != 0) {
             at.axis = axis;
@@ -241,7 +239,6 @@ impl Planner {
         let links = self.links;
         inputs::spare(0);
         let mut model = links.model.borrow_mut();
-        self.set_overrides(model.overrides());
         // In a flush it is not here yet.
         if !self.is_flushed() {
             model.set_position(&self.position);

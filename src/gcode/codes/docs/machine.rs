@@ -68,7 +68,7 @@ the speed S is reported, and G95 goes by it.",
 
 pub const OVERRIDES: Section = Section {
     title: "Overrides",
-    intro: "Factors by which rates and speeds of the moves that follow are multiplied: 1 is as programmed. Each \
+    intro: "Factors by which rates and speeds are multiplied from here on: 1 is as programmed. Each \
 has a factor and is on or off; off, it keeps its factor. At power-up and after M2 all are on; at power-up all \
 factors are 1.",
     docs: &[
@@ -111,7 +111,7 @@ factors are 1.",
         m(
             510,
             "Spindle override",
-            "As M50, of the speed of the spindle, 0.05 to 2. The outputs have no speed, so that nothing changes so far.",
+            "As M50, of the speed of the spindle, 0.05 to 2. `{sso:n}` shows it.",
             &[no(PWordInvalid, &["M51 P2.001"])],
         ),
     ],

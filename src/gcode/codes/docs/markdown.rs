@@ -31,7 +31,7 @@ Where others may do otherwise:
 - M6 stops the spindle, and nothing waits for a hand.
 - G88 goes back up by itself after its stop.
 - G95 goes by the speed that is programmed; none is measured.
-- Overrides are for the moves that follow, not for those that are queued.
+- Overrides act when the moves before them have been made, and stop nothing; requests (`mfo`) act at once.
 - M2 and M30 reset more than the standard says; see M2.
 
 ";

@@ -1,0 +1,151 @@
+//! Overrides: how much faster or slower than programmed the machine is to be, and whether that counts.
+//!
+//! [`Overrides`] is the state. It is changed by [`Change`]s, whoever asks for one: M48 to M51 in their place in
+//! the stream of moves, requests and real-time characters at once (`tasks::overrides`). Factors are
+//! thousandths.
+
+/// What can be overridden.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Override {
+    /// Feed rates.
+    Feed = 0,
+    /// Traverse rates.
+    Traverse = 1,
+    /// The speed of the spindle.
+    Spindle = 2,
+}
+
+impl Override {
+    /// The highest factor.
+    pub const fn most(self) -> u16 {
+        if self as u8 == Self::Traverse as u8 { 1_000 } else { 2_000 }
+    }
+
+    /// Whether it may be set to this.
+    pub fn allows(self, factor: u32) -> bool {
+        (LEAST.into()..=self.most().into()).contains(&factor)
+    }
+}
+
+/// The least factor.
+pub const LEAST: u16 = 50;
+/// As programmed.
+pub const FULL: u16 = 1_000;
+
+/// All of them, as bits.
+const ALL: u8 = 7;
+
+/// What becomes of overrides.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Change {
+    /// Which, as bits.
+    which: u8,
+    /// Whether they count from now on.
+    on: bool,
+    /// The factor that they get, 0 for the one that they have.
+    factor: u16,
+}
+
+impl Change {
+    /// M48, and what the end of a program does.
+    pub const ALL_ON: Self = Self { which: ALL, on: true, factor: 0 };
+    /// M49.
+    pub const ALL_OFF: Self = Self { which: ALL, on: false, factor: 0 };
+
+    /// On, or off, with the factor that it has.
+    pub const fn switch(which: Override, on: bool) -> Self {
+        Self::new(which, on, 0)
+    }
+
+    /// On or not, with a factor that it [allows](Override::allows).
+    pub const fn new(which: Override, on: bool, factor: u16) -> Self {
+        Self { which: 1 << which as u8, on, factor }
+    }
+
+    /// On, with a factor that it [allows](Override::allows).
+    pub const fn to(which: Override, factor: u16) -> Self {
+        Self::new(which, true, factor)
+    }
+}
+
+/// The overrides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Overrides {
+    factors: [u16; 3],
+    /// Those that count, as bits.
+    on: u8,
+}
+
+impl Overrides {
+    /// At power-up: all on, and nothing is overridden.
+    pub const NONE: Self = Self { factors: [FULL; 3], on: ALL };
+
+    /// Changes them.
+    #[inline(never)]
+    pub fn change(&mut self, change: Change) {
+        if change.on {
+            self.on |= change.which;
+        } else {
+            self.on &= !change.which;
+        }
+        let mut bits = change.which;
+        for factor in &mut self.factors {
+            if bits & 1 != 0 && change.factor != 0 {
+                *factor = change.factor;
+            }
+            bits >>= 1;
+        }
+    }
+
+    /// The factor that has been set, whether or not it counts.
+    pub fn factor(&self, which: Override) -> u16 {
+        self.factors.get(which as usize).copied().unwrap_or(FULL)
+    }
+
+    /// Whether it counts.
+    pub fn is_on(&self, which: Override) -> bool {
+        self.on & 1 << which as u8 != 0
+    }
+
+    /// What rates are multiplied by: the factor, or nothing if it does not count.
+    pub fn in_force(&self, which: Override) -> u16 {
+        if self.is_on(which) { self.factor(which) } else { FULL }
+    }
+
+    /// Whether rates are as programmed.
+    pub fn is_none(&self) -> bool {
+        [Override::Feed, Override::Traverse, Override::Spindle]
+            .iter()
+            .all(|which| self.in_force(*which) == FULL)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factor_outlives_its_being_off() {
+        let mut overrides = Overrides::NONE;
+        assert!(overrides.is_none());
+        overrides.change(Change::to(Override::Feed, 500));
+        overrides.change(Change::ALL_OFF);
+        assert!(overrides.is_none() && overrides.factor(Override::Feed) == 500);
+        overrides.change(Change::switch(Override::Feed, true));
+        assert_eq!(overrides.in_force(Override::Feed), 500);
+        overrides.change(Change::to(Override::Spindle, 1_200));
+        assert_eq!(overrides.in_force(Override::Spindle), 1_200);
+        assert!(!overrides.is_on(Override::Traverse));
+        overrides.change(Change::ALL_ON);
+        assert!(overrides.is_on(Override::Traverse));
+    }
+
+    #[test]
+    fn factors_have_limits() {
+        for (which, most) in [(Override::Feed, 2_000), (Override::Traverse, 1_000)] {
+            assert!(which.allows(50) && which.allows(most));
+            assert!(!which.allows(49) && !which.allows(most + 1));
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! Random jobs with overrides that change at random times: they end exactly, within the limits of the machine, and
+//! what is queued follows at once.
+
+#[path = "support/cases.rs"]
+mod cases;
+#[allow(dead_code, reason = "each test uses a part")]
+#[path = "support/jobs.rs"]
+mod jobs;
+#[allow(dead_code, reason = "each test uses a part")]
+#[path = "support/keeps.rs"]
+mod keeps;
+#[allow(dead_code, reason = "each test uses a part")]
+#[path = "support/rig.rs"]
+mod rig;
+
+use cases::cases;
+use jobs::{Job, Planned, any_job, plan_changed};
+use keeps::STRETCH;
+use kerf::gcode::overrides::{Change, Override};
+use kerf::motion::block::{Block, Body};
+use kerf::motion::exec::Step;
+use kerf::motion::factors::Factors;
+use proptest::prelude::*;
+use rig::{Config, Rig, at};
+
+/// What happens, and how many turns after the thing before.
+#[derive(Clone, Copy, Debug)]
+enum Deed {
+    Feed(f32),
+    Replan,
+    Hold,
+}
+
+fn any_deeds() -> impl Strategy<Value = Vec<(u16, Deed)>> {
+    let factor = prop_oneof![Just(1.0f32), Just(2.0), Just(0.3), 0.3f32..2.0];
+    let deed = prop_oneof![
+        3 => factor.prop_map(Deed::Feed),
+        3 => Just(Deed::Replan),
+        1 => Just(Deed::Hold),
+    ];
+    let after = prop_oneof![2 => 0u16..20, 1 => 0u16..500];
+    prop::collection::vec((after, deed), 1..30)
+}
+
+fn feed(factor: f32) -> Factors {
+    Factors { feed: factor, ..Factors::ONE }
+}
+
+/// Does things when they are due.
+struct Script {
+    deeds: std::vec::IntoIter<(u16, Deed)>,
+    next: Option<(u16, Deed)>,
+}
+
+impl Script {
+    fn new(deeds: &[(u16, Deed)]) -> Self {
+        #[allow(clippy::unnecessary_to_owned, reason = "it outlives what it is made from")]
+        let mut deeds = deeds.to_vec().into_iter();
+        let next = deeds.next();
+        Self { deeds, next }
+    }
+
+    fn due(&mut self) -> Option<Deed> {
+        match &mut self.next {
+            Some((0, deed)) => {
+                let deed = *deed;
+                self.next = self.deeds.next();
+                Some(deed)
+            }
+            Some((left, _)) => {
+                *left -= 1;
+                None
+            }
+            None => None,
+        }
+    }
+}
+
+fn run(job: &Job, deeds: &[(u16, Deed)]) -> Rig {
+    let mut rig = Rig::new(job.config.clone());
+    let mut script = Script::new(deeds);
+    let mut turn = |rig: &mut Rig| {
+        match script.due() {
+            Some(Deed::Feed(factor)) => rig.want(feed(factor)),
+            Some(Deed::Replan) => rig.replan(),
+            Some(Deed::Hold) => {
+                rig.hold(true);
+                while rig.turn() != Step::Held {}
+                rig.hold(false);
+            }
+            None => {}
+        }
+        rig.turn()
+    };
+    for (n, step) in job.moves.iter().enumerate() {
+        while rig.free() == 0 {
+            turn(&mut rig);
+        }
+        let mut to = rig.position;
+        for (to, way) in to.iter_mut().zip(step.way) {
+            to.0 += way;
+        }
+        if step.stop {
+            rig.stop();
+        }
+        rig.line(to, step.velocity, n as u32 + 1);
+        for _ in 0..step.turns {
+            if turn(&mut rig) == Step::Idle {
+                break;
+            }
+        }
+    }
+    while turn(&mut rig) != Step::Idle {}
+    rig.finish();
+    rig
+}
+
+/// The limits of the machine, whatever the feed.
+fn check_machine(planned: &[Planned]) {
+    let little = planned.iter().map(|p| p.top).fold(0.0, f64::max) * 2e-3;
+    let mut line = 0;
+    for (n, p) in planned.iter().enumerate() {
+        let seconds = f64::from(p.stretch.seconds);
+        assert!(p.after <= p.top.max(p.before) * 1.0011, "{n}: {p:?}");
+        let change = p.after - p.before;
+        assert!(change.abs() <= p.accel * (seconds + STRETCH) * 1.1 + little, "{n}: {p:?}");
+        let first = core::mem::replace(&mut line, p.line) != p.line;
+        assert!(!first || p.before <= p.corner * 1.001 + little, "{n}: {p:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(cases(1_000))]
+
+    #[test]
+    fn any_job_ends_on_its_steps(job in any_job(), deeds in any_deeds()) {
+        let rig = run(&job, &deeds);
+        prop_assert_eq!(rig.pins.position, rig.target());
+    }
+
+    #[test]
+    fn any_job_keeps_the_limits_of_the_machine(job in any_job(), deeds in any_deeds()) {
+        let script = core::cell::RefCell::new(Script::new(&deeds));
+        let holding = core::cell::Cell::new(false);
+        let held = |_, at_rest| {
+            if at_rest {
+                holding.set(false);
+            }
+            holding.get()
+        };
+        let change = |_, rig: &mut Rig| match script.borrow_mut().due() {
+            Some(Deed::Feed(factor)) => rig.want(feed(factor)),
+            Some(Deed::Replan) => rig.replan(),
+            Some(Deed::Hold) => holding.set(true),
+            None => {}
+        };
+        check_machine(&plan_changed(&job, held, change));
+    }
+
+    /// The keys that are made anew are as good as those of blocks that come with the factors in force.
+    #[test]
+    fn once_planned_anew_feeds_are_kept(job in any_job(), factor in 0.3f32..2.0) {
+        let mut planned = plan_changed(&job, |_, _| false, |n, rig| {
+            if n == 0 {
+                rig.want(feed(factor));
+            }
+            rig.replan();
+        });
+        // What came before the first stretch was planned for more, or less.
+        planned.retain(|p| p.line > 1);
+        for (n, p) in planned.iter().enumerate() {
+            prop_assert!(p.after <= p.cruise * 1.0011 + 1e-6, "{n}: {p:?}");
+        }
+    }
+}
+
+/// Runs until the velocity is steady; returns it.
+fn steady(rig: &mut Rig) -> f32 {
+    let mut before = -1.0;
+    while rig.snapshot.velocity != before {
+        before = rig.snapshot.velocity;
+        (0..3).for_each(|_| assert_eq!(rig.turn(), Step::Segment));
+    }
+    before
+}
+
+#[test]
+fn a_long_move_follows_at_the_next_stretch() {
+    for jerk in [0.0, 20_000.0] {
+        let mut rig = Rig::new(Config::new(100.0, 1_000.0, jerk));
+        rig.line(at([300.0, 100.0]), 40.0, 1);
+        assert!((steady(&mut rig) - 40.0).abs() < 1e-3);
+        for (factor, velocity) in [(0.5, 20.0), (2.0, 80.0), (1.1, 44.0), (0.05, 2.0), (1.0, 40.0)]
+        {
+            let before = rig.snapshot.velocity;
+            rig.want(feed(factor));
+            rig.replan();
+            rig.turn();
+            assert!(rig.snapshot.velocity != before, "{factor}");
+            assert!((steady(&mut rig) - velocity).abs() < 0.01 * velocity, "{factor}");
+        }
+        rig.finish();
+        assert_eq!(rig.pins.position, rig.target());
+    }
+}
+
+#[test]
+fn a_traverse_has_its_own_factor_and_no_feed_exceeds_the_axes() {
+    let mut rig = Rig::new(Config::new(50.0, 1_000.0, 0.0));
+    rig.want(Factors { feed: 2.0, traverse: 0.25 });
+    rig.replan();
+    rig.line(at([100.0]), 40.0, 1);
+    assert!((steady(&mut rig) - 50.0).abs() < 0.5);
+    rig.finish();
+    rig.traverse(at([0.0]), 2);
+    assert!((steady(&mut rig) - 12.5).abs() < 1e-3);
+}
+
+#[test]
+fn what_stands_in_the_stream_acts_in_its_place_and_stops_nothing() {
+    let mut rig = Rig::new(Config::new(100.0, 1_000.0, 0.0));
+    rig.line(at([10.0]), 40.0, 1);
+    rig.aside(Block { body: Body::Override(Change::to(Override::Feed, 500)), line: 2 });
+    rig.line(at([20.0]), 40.0, 2);
+    let mut step = rig.turn();
+    while !matches!(step, Step::Override(_)) {
+        assert!(step == Step::Segment || step == Step::Again, "{step:?}");
+        step = rig.turn();
+    }
+    assert_eq!(step, Step::Override(Change::to(Override::Feed, 500)));
+    assert!((rig.snapshot.velocity - 40.0).abs() < 1e-3);
+    rig.want(feed(0.5));
+    assert!((steady(&mut rig) - 20.0).abs() < 1e-3);
+    rig.finish();
+    assert_eq!(rig.pins.position[0], 1_600);
+}
