@@ -124,6 +124,7 @@ fn set_row<M: Machine, O>(
 }
 
 /// Jogs the axis whose letter ends the name, to a place in mm or degrees whatever the units.
+#[inline(never)]
 #[small]
 fn jog<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
     if pair.kind != Kind::Number {

@@ -27,6 +27,21 @@ const HOMING: u8 = 1;
 /// The axes that may have switches: X Y Z A.
 pub const AXES: u8 = inputs::ENDS as u8 / 2;
 
+/// The ends that are on one pin with the other end of their axis.
+const SHARED: u8 = {
+    let (mut bits, mut end) = (0, 0);
+    while end < inputs::ENDS {
+        if let (Some(this), Some(other)) = (ACTIVE.inputs[end], ACTIVE.inputs[end ^ 1])
+            && this.port as u8 == other.port as u8
+            && this.bit == other.bit
+        {
+            bits |= 1 << end;
+        }
+        end += 1;
+    }
+    bits
+};
+
 /// How an axis is homed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Homing {
@@ -105,8 +120,8 @@ pub fn of(settings: &Settings, axis: u8) -> Result<Homing, Status> {
     }
     let (low, high) = (settings.travel_min(a), settings.travel_max(a));
     let backoff = settings.latch_backoff(a);
-    let travel = (i64::from(high.0) - i64::from(low.0)).unsigned_abs();
-    let way = Length(travel.saturating_add(backoff.0 as u64).min(i32::MAX as u64) as i32);
+    let travel = high.0.saturating_sub(low.0).saturating_abs();
+    let way = Length(travel.saturating_add(backoff.0));
     if way == Length::ZERO {
         return Err(Status::HomingTravel);
     }
@@ -118,10 +133,9 @@ pub fn of(settings: &Settings, axis: u8) -> Result<Homing, Status> {
     Ok(Homing { end, search, latch, way, backoff, zero, place, shared: shares(settings, end) })
 }
 
-/// Whether the switch at the other end is on the same pin.
+/// Whether a switch may be closed at the other end that is on the same pin.
 fn shares(settings: &Settings, end: u8) -> bool {
-    let pin = |end: u8| ACTIVE.inputs.get(usize::from(end)).copied().flatten();
-    switches::mode(settings, end ^ 1) != 0 && pin(end) == pin(end ^ 1)
+    SHARED >> end & 1 != 0 && switches::mode(settings, end ^ 1) != 0
 }
 
 #[cfg(test)]

@@ -49,15 +49,13 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
                 report_exception(links, port, status).await;
             }
         }
-        if links.jogged.take() {
-            report_jog(links).await;
-        }
         if links.probe.take_news() {
             report_probing(links).await;
         }
         let (state, hold) = state_of(links);
-        if links.flushed.take() {
-            report_flush(links).await;
+        let (jogged, flushed) = (links.jogged.take(), links.flushed.take());
+        if jogged || flushed {
+            report_end(links, jogged, flushed).await;
         }
         if queue_free() != told.blocks_free && reports_queue(links) {
             told.blocks_free = report_queue(links).await;
@@ -145,10 +143,15 @@ async fn report_status(links: &Links) {
     }
 }
 
-async fn report_flush(links: &Links) {
+/// A jog has ended, or the queue has been flushed.
+async fn report_end(links: &Links, mut jogged: bool, flushed: bool) {
     let port = links.told();
     let mut tx = port.tx.lock().await;
     send(links, port, &mut tx, |view, tx| {
+        if core::mem::take(&mut jogged) {
+            jog_ended(view.settings(), tx);
+            return flushed;
+        }
         queue_report(port.mode.get(), view, tx);
         receive_report(port.mode.get(), view, tx);
         false
@@ -160,16 +163,6 @@ async fn report_exception(links: &Links, port: &Port, status: Status) {
     let mut tx = port.tx.lock().await;
     let mut exception = Exception::begin(status, &links.settings.borrow());
     send(links, port, &mut tx, |view, tx| exception.step(view, tx)).await;
-}
-
-async fn report_jog(links: &Links) {
-    let port = links.told();
-    let mut tx = port.tx.lock().await;
-    send(links, port, &mut tx, |view, tx| {
-        jog_ended(view.settings(), tx);
-        false
-    })
-    .await;
 }
 
 async fn report_probing(links: &Links) {
