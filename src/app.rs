@@ -63,6 +63,7 @@ impl Links {
             door_open: Cell::new(false),
             cycle: Cell::default(),
             probe: Probe::default(),
+            jogged: Cell::new(false),
             job: Cell::default(),
             moment: Cell::new(Snapshot::new().moment()),
             storage,

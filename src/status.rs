@@ -86,8 +86,20 @@ pub enum Status {
     Panicked = 206,
     KillJob = 207,
     SoftLimit = 220,
+    HomingFailed = 240,
     HomingAxis = 241,
+    HomingSearch = 242,
+    HomingLatch = 243,
+    HomingTravel = 244,
     HomingSwitches = 246,
+    HomingClosed = 247,
     ProbeFailed = 250,
     ProbeTooShort = 251,
+}
+
+impl Status {
+    /// Whether it says why an axis, which exceptions name, could not be homed.
+    pub fn names_axis(self) -> bool {
+        matches!(self as u8, 240 | 242..=247)
+    }
 }

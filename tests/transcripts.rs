@@ -11,9 +11,10 @@ use std::path::Path;
 use kerf::config::table::Kind;
 use kerf::config::{Name, Owner, Setting};
 use kerf::gcode::codes::docs::{self, Doc, On, Refusal};
-use kerf::gcode::setup::{AxisMode, Cycle, Setup};
+use kerf::gcode::setup::{AxisMode, Setup};
 use kerf::hal::imp::{Machine, gpio, pwm};
 use kerf::protocol;
+use kerf::status::Status;
 use kerf::units::Length;
 use requests::{Asked, pairs};
 use transcript::{Side, Transcript};
@@ -74,7 +75,7 @@ fn the_host_machine_keeps_to_the_transcripts() {
     transcript::play_all(read_all(), 16, boot);
 }
 
-/// The machine of an example as it is built so far: without switches for homing.
+/// The machine of an example as it is built: it has a probe.
 struct Built(On);
 
 impl Setup for Built {
@@ -87,8 +88,8 @@ impl Setup for Built {
     fn travel(&self, axis: u8) -> Option<(Length, Length)> {
         self.0.travel(axis)
     }
-    fn can(&self, cycle: Cycle) -> bool {
-        cycle == Cycle::Probing
+    fn homing(&self, axis: u8) -> Result<(), Status> {
+        self.0.homing(axis)
     }
 }
 
@@ -145,10 +146,9 @@ fn every_code_and_every_refusal_is_in_some_transcript() {
     assert!(missing.is_empty(), "in no transcript:\n{}", missing.join("\n"));
 }
 
-/// Of cutter compensation, or in need of switches.
+/// Of cutter compensation.
 fn is_always_refused(doc: &Doc) -> bool {
-    doc.refusals.iter().any(|refusal| refusal.on == On::NoSwitches)
-        || matches!(doc.number, 410 | 420)
+    matches!(doc.number, 410 | 420)
 }
 
 /// A setting of one motor or axis stands for that of the others.

@@ -64,7 +64,7 @@ impl Commands {
     }
 
     /// Empties it, touching nothing but the tags: it is large.
-    pub(super) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.line = 0;
         self.tool = None;
         self.spindle = None;
@@ -137,6 +137,11 @@ pub enum Motion {
         axes: u8,
         /// Whether the position is set to what the switches say.
         set: bool,
+    },
+    /// `{jogx:..}`: a traverse by itself.
+    Jog {
+        /// Where to.
+        target: PerAxis<Length>,
     },
     /// G28.3: no motor moves; the present position is called this.
     SetPosition {

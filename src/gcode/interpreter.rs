@@ -168,7 +168,9 @@ impl<T: Tables> Interpreter<T> {
             (Ok(()), Some(edit)) => self.tables.apply(edit),
             (Ok(()), None) => {}
             (Err(_), _) => {
+                let blamed = self.state.blamed;
                 self.state = before;
+                self.state.blamed = blamed;
                 out.clear();
             }
         }
@@ -263,6 +265,27 @@ impl<T> Interpreter<T> {
     /// No axis is homed any more.
     pub fn forget_homes(&mut self) {
         self.state.homed = 0;
+    }
+
+    /// An axis is homed, or no more.
+    pub fn set_homed(&mut self, axis: u8, homed: bool) {
+        let bit = 1 << axis;
+        self.state.homed = self.state.homed & !bit | if homed { bit } else { 0 };
+    }
+
+    /// The axis that could not be homed last: refused, or on the way.
+    pub fn blamed(&self) -> u8 {
+        self.state.blamed
+    }
+
+    /// An axis could not be homed.
+    pub fn blame(&mut self, axis: u8) {
+        self.state.blamed = axis;
+    }
+
+    /// No motion mode is in force any more, as after G28.2.
+    pub fn cancel_motion(&mut self) {
+        self.state.modal.motion = MotionMode::None;
     }
 
     /// The N word of the last line, 0 if it had none.

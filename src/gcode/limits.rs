@@ -32,6 +32,7 @@ pub(super) fn check(
             return check_straight(via, target, limits);
         }
         Motion::Traverse { target }
+        | Motion::Jog { target }
         | Motion::Feed { target, .. }
         | Motion::Probe { target, .. } => target,
         Motion::Arc { target, arc, .. } => {

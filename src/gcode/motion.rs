@@ -5,7 +5,7 @@ use super::block::Block;
 use super::codes::NonModal;
 use super::command::{Commands, Feed, Motion};
 use super::modal::{Distance, FeedMode, MotionMode, Turn, Units};
-use super::setup::{Cycle, Setup};
+use super::setup::Setup;
 use super::state::State;
 use super::words::{AXES, F, ROTARY};
 use crate::status::Status;
@@ -88,7 +88,7 @@ impl State {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        if !setup.can(Cycle::Probing) {
+        if !setup.has_probe() {
             return Err(Status::ProbeFailed);
         }
         if block.has(ROTARY) {

@@ -8,7 +8,8 @@ use super::axes;
 use super::block::Block;
 use super::codes::{NonModal, ToolLength};
 use super::command::{Commands, Motion};
-use super::setup::{AxisMode, Cycle, Setup};
+use super::modal::MotionMode;
+use super::setup::{AxisMode, Setup};
 use super::state::State;
 use super::tables::{Edit, Row, SYSTEMS, TOOL_AXES, Tables};
 use super::words::{AXES, H, L, P};
@@ -113,7 +114,7 @@ impl State {
                 }
                 *edit = Some(Edit::new(Row::stored(which), self.position, tables)?);
             }
-            Some(NonModal::Home { set }) => out.motion = home(block, set, setup)?,
+            Some(NonModal::Home { set }) => self.home(block, set, setup, out)?,
             Some(NonModal::SetPosition) => self.redefine_position(block, setup, out)?,
             Some(NonModal::SetOffset) => self.shift_here(block, setup)?,
             Some(NonModal::ClearOffset) => {
@@ -163,6 +164,29 @@ impl State {
             Ok(())
         })?;
         out.motion = Motion::SetPosition { position: self.position };
+        Ok(())
+    }
+
+    /// G28.2 and G28.4. No motion mode is left in force.
+    fn home(
+        &mut self,
+        block: &Block,
+        set: bool,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        let mut axes = 0;
+        for (axis, _) in block.axes() {
+            // B and C have no switches.
+            if usize::from(axis) > FIRST_ROTARY || setup.mode(axis) == AxisMode::Disabled {
+                return Err(Status::HomingAxis);
+            }
+            self.blamed = axis;
+            setup.homing(axis)?;
+            axes |= 1 << axis;
+        }
+        self.modal.motion = MotionMode::None;
+        out.motion = Motion::Home { axes, set };
         Ok(())
     }
 
@@ -313,21 +337,6 @@ impl State {
 /// G4: P seconds.
 pub(super) fn dwell_ms(block: &Block) -> Result<u32, Status> {
     block.get(P).ok_or(Status::PWordMissing)?.milliseconds()
-}
-
-fn home(block: &Block, set: bool, setup: &impl Setup) -> Result<Motion, Status> {
-    if !setup.can(Cycle::Homing) {
-        return Err(Status::HomingSwitches);
-    }
-    let mut axes = 0;
-    for (axis, _) in block.axes() {
-        // B and C have no switches.
-        if usize::from(axis) > FIRST_ROTARY || setup.mode(axis) == AxisMode::Disabled {
-            return Err(Status::HomingAxis);
-        }
-        axes |= 1 << axis;
-    }
-    Ok(Motion::Home { axes, set })
 }
 
 fn at(values: &PerAxis<Length>, axis: u8) -> Length {

@@ -2,6 +2,7 @@
 //! (`tasks::setup`).
 
 use super::modal::Defaults;
+use crate::status::Status;
 use crate::units::Length;
 
 /// How an axis takes its words. The discriminants are TinyG's numbers.
@@ -16,15 +17,6 @@ pub enum AxisMode {
     Inhibited = 2,
     /// Of an axis that turns: lengths along a circumference.
     Radius = 3,
-}
-
-/// A machine cycle that needs more than motors.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Cycle {
-    /// G28.2, G28.4.
-    Homing,
-    /// G38.2 to G38.5.
-    Probing,
 }
 
 /// The machine, as far as the language depends on it. Axes are X Y Z A B C from 0.
@@ -48,9 +40,13 @@ pub trait Setup {
     fn stops_at_m1(&self) -> bool {
         true
     }
-    /// Whether there are switches for it.
-    fn can(&self, _cycle: Cycle) -> bool {
+    /// Whether there is a probe.
+    fn has_probe(&self) -> bool {
         true
+    }
+    /// Whether an axis can be homed, or why not.
+    fn homing(&self, _axis: u8) -> Result<(), Status> {
+        Ok(())
     }
 }
 

@@ -32,6 +32,8 @@ pub struct State {
     pub origin: PerAxis<Length>,
     /// The axes whose position has been set to what it is (G28.3), as bits.
     pub homed: u8,
+    /// The axis that could not be homed last.
+    pub blamed: u8,
     pub line: u32,
     /// G92, whether or not it is in force.
     pub shift: PerAxis<Length>,
@@ -58,6 +60,7 @@ impl State {
             residue: [0; AXES],
             origin: [Length::ZERO; AXES],
             homed: 0,
+            blamed: 0,
             line: 0,
             shift: [Length::ZERO; AXES],
             shifted: false,

@@ -32,6 +32,8 @@ pub enum Step {
     Probe,
     /// The homing cycle of the commands' motion.
     Home,
+    /// The jog of the commands' motion.
+    Jog,
     /// The position is called this.
     SetPosition(PerAxis<Length>),
     /// The program stops or ends.
@@ -206,6 +208,7 @@ impl Steps {
             (Motion::Arc { .. }, _) => Some(Step::Arc),
             (Motion::Probe { .. }, _) => Some(Step::Probe),
             (Motion::Home { .. }, _) => Some(Step::Home),
+            (Motion::Jog { .. }, _) => Some(Step::Jog),
             (Motion::SetPosition { position }, _) => Some(Step::SetPosition(*position)),
             (Motion::Through { .. } | Motion::Cycle(_), _) => None,
         }

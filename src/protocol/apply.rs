@@ -9,6 +9,7 @@ use super::request::{Context, Request};
 use super::token::{Action, Subject, Target};
 use super::value::{Form, Value, place_form};
 use super::write::Out;
+use crate::config::name::axis_of;
 use crate::config::table;
 use crate::config::{Number, Setting};
 use crate::gcode::overrides::{Change, Override};
@@ -33,6 +34,11 @@ impl Request {
                     Some(Subject::Setting(setting)) => self.set(setting, pair, c)?,
                     Some(Subject::Row(row, axis)) if !row.is_stored() => {
                         set_row(row, axis, pair, c)?
+                    }
+                    Some(Subject::Single(single)) if single.value == Value::Home => {
+                        if is_sure(pair, c)? {
+                            done(c.machine.home())?;
+                        }
                     }
                     Some(Subject::Single(single)) => set_value(single.value, pair, c)?,
                     _ => return Err(Status::ReadOnly),
@@ -117,6 +123,19 @@ fn set_row<M: Machine, O>(
     c.machine.set_row(row, axis, Length(value))
 }
 
+/// Jogs the axis whose letter ends the name, to a place in mm or degrees whatever the units.
+#[inline(never)]
+#[small]
+fn jog<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
+    if pair.kind != Kind::Number {
+        return Err(Status::UnsupportedType);
+    }
+    let axis = pair.name.of(c.line).last().copied().and_then(axis_of);
+    let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
+    let place = number.fixed(Length::DECIMALS, false).ok_or(Status::OutOfRange)?;
+    done(c.machine.jog(axis.ok_or(Status::UnrecognizedName)?, Length(place)))
+}
+
 /// Sets a value of the machine, of which only the overrides can be.
 fn set_value<M: Machine, O>(
     value: Value,
@@ -194,6 +213,8 @@ fn act<M: Machine, O>(
             let number = u8::try_from(number).map_err(|_| Status::OutOfRange)?;
             return done(c.machine.start_job(number));
         }
+        Action::Jog if pair.kind == Kind::Null => return Ok(()),
+        Action::Jog => return jog(pair, c),
         Action::Text if pair.kind != Kind::Null => return Err(Status::UnsupportedType),
         Action::Program => return program::store(pair, c),
         Action::Flush => {

@@ -200,6 +200,14 @@ impl Machine for Fake {
         if number < 20 { Status::Ok } else { Status::Error }
     }
 
+    fn home(&mut self) -> Status {
+        Status::HomingSwitches
+    }
+
+    fn jog(&mut self, axis: u8, _place: Length) -> Status {
+        if axis < 3 { Status::Ok } else { Status::AxisDisabled }
+    }
+
     fn store(&mut self, what: Store<'_>) -> Result<(), Status> {
         self.waits = !self.waits;
         match what {

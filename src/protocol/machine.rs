@@ -104,6 +104,10 @@ pub trait Machine {
     fn flush(&mut self) -> Status;
     /// Starts a built-in job, or ends the one that runs: 0.
     fn start_job(&mut self, number: u8) -> Status;
+    /// Homes all axes that have a switch for it, or refuses to.
+    fn home(&mut self) -> Status;
+    /// Begins to move an axis to a place in machine coordinates, or refuses to.
+    fn jog(&mut self, axis: u8, place: Length) -> Status;
     /// Does something to the program that is kept. [`Status::Again`]: it is not done yet, and is to be asked for again.
     fn store(&mut self, what: Store<'_>) -> Result<(), Status>;
     /// A byte of the program that is kept.

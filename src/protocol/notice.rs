@@ -78,6 +78,9 @@ pub(super) fn put_row<O: Out>(row: u8, machine: &mut impl Machine, writer: &mut 
 }
 
 progmem! {
+    /// The axes that may be homed.
+    static AXES: [Text; 4] = [text!("x"), text!("y"), text!("z"), text!("a")];
+
     /// What the switches at the ends of axes are called.
     static ENDS: [Text; inputs::ENDS] = [
         text!("xmin"), text!("xmax"), text!("ymin"), text!("ymax"),
@@ -86,7 +89,8 @@ progmem! {
 }
 
 /// An exception report, `{"er":{"fb":440.20,"st":13,"msg":"Buffer full"}}`; sent whatever the
-/// verbosity, and always as JSON. Of a limit it also says which, `"sw":"xmin"`.
+/// verbosity, and always as JSON. Of a limit it also says which, `"sw":"xmin"`, of homing the axis,
+/// `"ax":"x"`.
 pub struct Exception {
     stage: u8,
     status: Status,
@@ -138,6 +142,11 @@ pub(super) fn put_exception<O: Out>(
                 writer.key_text(text!("sw"));
                 writer.string(name);
             }
+            let axis = machine.value(Value::Blamed) as usize;
+            if let Some(name) = AXES.at(axis).filter(|_| status.names_axis()) {
+                writer.key_text(text!("ax"));
+                writer.string(name);
+            }
         }
         _ => {
             writer.text(text!("}}"));
@@ -185,6 +194,17 @@ impl Probing {
             }
         }
     }
+}
+
+/// Tells that a jog has ended.
+pub fn jog_ended(settings: &Settings, out: &mut impl Out) {
+    let mut format = Format::json(settings);
+    let mut writer = Writer::body(out, &mut format);
+    writer.open();
+    writer.key_text(text!("jog"));
+    writer.fixed(Fixed::int(0));
+    writer.close();
+    writer.end_line();
 }
 
 /// Answers the question whether anybody is there.

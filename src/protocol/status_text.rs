@@ -10,7 +10,7 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 80;
+const ENTRIES: usize = 85;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
@@ -99,8 +99,13 @@ progmem! {
         (Status::Panicked, text!("Panic [^x to reset]")),
         (Status::KillJob, text!("Kill job")),
         (Status::SoftLimit, text!("Soft limit exceeded")),
+        (Status::HomingFailed, text!("Homing cycle failed")),
         (Status::HomingAxis, text!("Homing Error - Bad or no axis specified")),
+        (Status::HomingSearch, text!("Homing Error - Search velocity is zero")),
+        (Status::HomingLatch, text!("Homing Error - Latch velocity is zero")),
+        (Status::HomingTravel, text!("Homing Error - Travel min & max are the same")),
         (Status::HomingSwitches, text!("Homing Error - Homing switches misconfigured")),
+        (Status::HomingClosed, text!("Homing Error - Homing switch stays closed")),
         (Status::ProbeFailed, text!("Probe cycle failed")),
         (Status::ProbeTooShort, text!("Probe endpoint is starting point")),
     ];

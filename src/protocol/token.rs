@@ -216,7 +216,7 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [(Text, Action); 20] = [
+    static ACTIONS: [(Text, Action); 24] = [
         (text!("gc"), Action::Block),
         (text!("clear"), Action::Clear),
         (text!("clr"), Action::Clear),
@@ -235,6 +235,10 @@ progmem! {
         (text!("tid"), Action::Id),
         (text!("msg"), Action::Message),
         (text!("er"), Action::Exception),
+        (text!("jogx"), Action::Jog),
+        (text!("jogy"), Action::Jog),
+        (text!("jogz"), Action::Jog),
+        (text!("joga"), Action::Jog),
         (text!("boot"), Action::Boot),
         (text!("reset"), Action::Reset),
     ];
@@ -271,6 +275,8 @@ pub enum Action {
     Message,
     /// `er`: send an exception report.
     Exception,
+    /// `jogx` and so on: move an axis.
+    Jog,
     /// `boot`: start the boot loader.
     Boot,
     /// `reset`: start anew.

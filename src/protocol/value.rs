@@ -110,6 +110,8 @@ pub enum Value {
     Probed(u8),
     /// The end whose limit has been hit, which exceptions tell; -1 for none.
     LimitHit,
+    /// The axis that could not be homed, which exceptions tell.
+    Blamed,
 }
 
 /// A speed as [`Machine::value`](super::Machine::value) returns it: thousandths, saturating.

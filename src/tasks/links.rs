@@ -74,6 +74,8 @@ pub struct Links {
     pub cycle: Cell<Cycle>,
     /// What probing has found.
     pub probe: Probe,
+    /// A jog has ended, which is to be told.
+    pub jogged: Cell<bool>,
     /// What status reports hold.
     pub report: RefCell<StatusReport>,
     /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.

@@ -6,6 +6,7 @@ pub mod control;
 pub mod exec;
 pub mod health;
 pub mod hold;
+mod homing;
 pub mod lines;
 pub mod links;
 pub mod overrides;

@@ -355,6 +355,11 @@ fn carry_out(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
             }
             (Status::Ok, info.commented)
         }
-        Err(status) => (status, true),
+        Err(status) => {
+            if status.names_axis() {
+                links.except(status);
+            }
+            (status, true)
+        }
     }
 }

@@ -4,6 +4,8 @@
 //! the queue, and at a program stop for cycle start if the settings say so. One turn builds one block.
 //! In a queue flush it forgets the line, has exec drop the blocks, and starts from where the motors are.
 
+mod home;
+mod jog;
 mod probe;
 mod seek;
 
@@ -85,6 +87,10 @@ enum Turn {
     Pause,
     /// The line probes.
     Probe,
+    /// The line homes.
+    Home,
+    /// The axis is jogged.
+    Jog,
     /// The line is done.
     Done,
 }
@@ -117,13 +123,14 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
                     Turn::More => yield_now().await,
                     Turn::Pause => planner.cycle_start().await,
                     Turn::Probe => planner.probe().await,
+                    Turn::Home => planner.home().await,
+                    Turn::Jog => planner.jog().await,
                 }
             }
         }
         links.commands_taken.set(false);
         if planner.is_flushed() {
-            hold::drop_blocks();
-            wait(Event::BlockDone, || hold::has_dropped().then_some(())).await;
+            seek::drop_blocks().await;
             planner.restart();
             if links.killed.take() {
                 parser::end_program(links);
@@ -249,8 +256,10 @@ impl Planner {
                 }
             }
             Step::Probe => return Turn::Probe,
+            Step::Home => return Turn::Home,
+            Step::Jog => return Turn::Jog,
             // The tool is reported, but nothing moves.
-            Step::Tool(_) | Step::Home => {}
+            Step::Tool(_) => {}
         }
         Turn::More
     }
@@ -415,6 +424,9 @@ impl Planner {
         drop(model);
         links.job.set(Job::default());
         hold::over(links);
+        if links.cycle.replace(Cycle::Off) == Cycle::Jog {
+            links.jogged.set(true);
+        }
         if links.killed.get() {
             links.except(Status::KillJob);
         }

@@ -15,7 +15,7 @@ use super::tx::Tx;
 use super::view::{View, moves, queue_free};
 use crate::hal::imp::time::millis;
 use crate::hal::serial::is_shared;
-use crate::protocol::notice::{Banner, Exception, Occasion, Probing, acknowledge};
+use crate::protocol::notice::{Banner, Exception, Occasion, Probing, acknowledge, jog_ended};
 use crate::protocol::{
     Machine, Mode, Report, Value, put_ready_prompt, queue_report, receive_report,
 };
@@ -53,8 +53,9 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             report_probing(links).await;
         }
         let (state, hold) = state_of(links);
-        if links.flushed.take() {
-            report_flush(links).await;
+        let (jogged, flushed) = (links.jogged.take(), links.flushed.take());
+        if jogged || flushed {
+            report_end(links, jogged, flushed).await;
         }
         if queue_free() != told.blocks_free && reports_queue(links) {
             told.blocks_free = report_queue(links).await;
@@ -142,10 +143,15 @@ async fn report_status(links: &Links) {
     }
 }
 
-async fn report_flush(links: &Links) {
+/// A jog has ended, or the queue has been flushed.
+async fn report_end(links: &Links, mut jogged: bool, flushed: bool) {
     let port = links.told();
     let mut tx = port.tx.lock().await;
     send(links, port, &mut tx, |view, tx| {
+        if core::mem::take(&mut jogged) {
+            jog_ended(view.settings(), tx);
+            return flushed;
+        }
         queue_report(port.mode.get(), view, tx);
         receive_report(port.mode.get(), view, tx);
         false

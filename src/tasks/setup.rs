@@ -1,11 +1,13 @@
 //! What the settings say of the machine to those who interpret lines and those who plan moves.
 
+use super::homing;
 use crate::boards::{ACTIVE, inputs};
 use crate::config::Settings;
 use crate::config::getters::TRAVEL_NONE;
 use crate::config::table::system;
 use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
-use crate::gcode::setup::{AxisMode, Cycle, Setup};
+use crate::gcode::setup::{AxisMode, Setup};
+use crate::status::Status;
 use crate::units::Length;
 
 impl Setup for Settings {
@@ -65,11 +67,12 @@ impl Setup for Settings {
         self.system(system::OST) != 0
     }
 
-    fn can(&self, cycle: Cycle) -> bool {
-        match cycle {
-            Cycle::Probing => ACTIVE.inputs[inputs::PROBE].is_some(),
-            Cycle::Homing => false,
-        }
+    fn has_probe(&self) -> bool {
+        ACTIVE.inputs[inputs::PROBE].is_some()
+    }
+
+    fn homing(&self, axis: u8) -> Result<(), Status> {
+        homing::of(self, axis).map(|_| ())
     }
 }
 

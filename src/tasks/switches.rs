@@ -5,8 +5,7 @@
 //!
 //! A limit is a switch whose `sn` or `sx` says so; by default none does, so that a machine without switches runs.
 //! It counts when it closes (with `st` 1, opens), not if it stands so: a machine can start on its limit and move
-//! off it. Homing will take its axis out of `limits` for as long as it goes; a probe will be latched where limits
-//! stop the steps.
+//! off it. The ends of an axis that is being homed are no limits for as long as it goes (`spare`).
 //!
 //! Door and emergency stop count as they stand, if `saf` and `est` say that there are any. The door is a hold
 //! that no tilde ends before it is shut; one that is open when nothing runs keeps what comes from beginning.

@@ -8,6 +8,7 @@ use core::cell::{OnceCell, RefMut};
 
 use super::alarm;
 use super::hold;
+use super::homing;
 use super::links::{Cycle, Links, snapshot};
 use super::overrides;
 use super::ports::Port;
@@ -19,8 +20,10 @@ use crate::alarm::Alarm;
 use crate::baud;
 use crate::boards::{MOTORS, inputs};
 use crate::config::{Setting, Settings};
+use crate::gcode::command::Motion;
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::overrides::Change;
+use crate::gcode::setup::{AxisMode, Setup};
 use crate::gcode::tables::Row;
 use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{gpio, inputs as pins, stepper, uart, watchdog};
@@ -152,6 +155,43 @@ impl<'a> View<'a> {
             .find(|m| usize::from(moved_by(&self.settings, *m)) == axis)
             .and_then(|m| self.settings.step_ratio(m).length(*self.motion().position.get(m)?))
             .unwrap_or(programmed)
+    }
+
+    /// `home`: 2 while homing, 1 when all axes that have a switch for it are homed.
+    fn home_state(&self) -> i32 {
+        if self.links.cycle.get() == Cycle::Homing {
+            return 2;
+        }
+        let axes = homing::axes(&self.settings);
+        let model = self.links.model.borrow();
+        let homed = (0..homing::AXES).all(|axis| axes & 1 << axis == 0 || model.is_homed(axis));
+        (axes != 0 && homed).into()
+    }
+
+    /// Whether the machine is at rest, and something may begin that no line asks for.
+    fn may_begin(&self) -> Result<(), Status> {
+        if self.links.limits_hit.get() != 0 {
+            return Err(Status::LimitHit);
+        }
+        let busy = self.is_busy() || self.links.has_data();
+        if busy { Err(Status::NotAccepted) } else { Ok(()) }
+    }
+
+    /// Hands something to the planner that no line asks for. The port that did feeds the machine now.
+    #[inline(never)]
+    fn begin(&mut self, motion: Motion, cycle: Cycle) -> Status {
+        let links = self.links;
+        if links.feeder.replace(self.port.number) != self.port.number {
+            // It has been told nothing so far.
+            self.report.refresh();
+        }
+        let mut commands = links.commands.borrow_mut();
+        commands.clear();
+        commands.motion = motion;
+        links.cycle.set(cycle);
+        links.commands_taken.set(true);
+        links.planner_wake.signal();
+        Status::Ok
     }
 
     /// A setting is to be put away; if it has `lowered` others, all of them.
@@ -308,7 +348,8 @@ impl Machine for View<'_> {
             },
             Value::Hold => self.hold(),
             Value::Reset => watchdog::cause() as i32,
-            Value::Home => 0,
+            Value::Home => self.home_state(),
+            Value::Blamed => self.links.model.borrow().blamed().into(),
             modal => self.modal(modal),
         }
     }
@@ -367,6 +408,42 @@ impl Machine for View<'_> {
         self.links.job.set(job);
         self.links.parser_wake.signal();
         Status::Ok
+    }
+
+    fn home(&mut self) -> Status {
+        let axes = homing::axes(&self.settings);
+        if axes == 0 {
+            return Status::HomingSwitches;
+        }
+        if let Err(status) = self.may_begin() {
+            return status;
+        }
+        for axis in (0..homing::AXES).filter(|axis| axes & 1 << axis != 0) {
+            if let Err(status) = homing::of(&self.settings, axis) {
+                self.links.model.borrow_mut().blame(axis);
+                self.links.except(status);
+                return status;
+            }
+        }
+        self.links.model.borrow_mut().cancel_motion();
+        self.begin(Motion::Home { axes, set: true }, Cycle::Homing)
+    }
+
+    fn jog(&mut self, axis: u8, place: Length) -> Status {
+        if Setup::mode(&*self.settings, axis) == AxisMode::Disabled {
+            return Status::AxisDisabled;
+        }
+        if let Err(status) = self.may_begin() {
+            return status;
+        }
+        let model = self.links.model.borrow();
+        let mut target = *model.position();
+        let travel = self.settings.travel(axis).filter(|_| model.is_homed(axis));
+        drop(model);
+        if let Some(at) = target.get_mut(usize::from(axis)) {
+            *at = travel.map_or(place, |(low, high)| place.max(low).min(high));
+        }
+        self.begin(Motion::Jog { target }, Cycle::Jog)
     }
 
     fn store(&mut self, what: Store<'_>) -> Result<(), Status> {

@@ -104,18 +104,24 @@ pub const AXIS: [Meaning; AXIS_ROWS] = [
         "Upper end of travel, for `sl`. The lowest that can be set is none; an axis whose ends are the same has neither.",
     ),
     ("jm", "Jerk at most. A value above 1000000 is divided by a million."),
-    ("jh", "Jerk while homing and probing, likewise. No effect yet."),
+    ("jh", "Jerk while homing and probing, likewise."),
     ("jd", "How far a corner may be cut, as far as its speed goes; more makes corners faster."),
     ("ra", "Radius that turns a length into an angle with `am` 3."),
     (
         "sn",
-        "Switch at the lower end. A limit that is hit stops everything, with exception 204, until a reset. No homing yet.",
+        "Switch at the lower end. A limit that is hit stops everything, with exception 204, until a reset. One switch of an axis may be that of homing.",
     ),
     ("sx", "Switch at the upper end, likewise."),
-    ("sv", "Speed towards a homing switch. No effect yet."),
-    ("lv", "Speed off a homing switch. No effect yet."),
-    ("lb", "Way off a homing switch. No effect yet."),
-    ("zb", "Way from the switch to zero. No effect yet."),
+    ("sv", "Speed towards a homing switch; 0: the axis cannot be homed (242)."),
+    (
+        "lv",
+        "Speed off a homing switch, when its place is taken; 0: the axis cannot be homed (243).",
+    ),
+    (
+        "lb",
+        "Way off a homing switch, within which it must open. With 0 its place is taken as it closes.",
+    ),
+    ("zb", "Way from where a homing switch opens to the end of travel."),
     ("ac", "Acceleration at most, beside the jerk; 0 is none."),
 ];
 

@@ -32,6 +32,12 @@ pub(super) enum Sought {
     Flushed,
 }
 
+/// Has exec drop its blocks, as soon as it is at rest.
+pub(super) async fn drop_blocks() {
+    hold::drop_blocks();
+    wait(Event::BlockDone, || hold::has_dropped().then_some(())).await;
+}
+
 impl Planner {
     /// Waits until everything queued is done and the steppers stand still. False if that is to be dropped.
     pub(super) async fn standstill(&mut self) -> bool {
@@ -69,8 +75,7 @@ impl Planner {
             contact::clear();
             return if self.is_flushed() { Sought::Flushed } else { Sought::End };
         }
-        hold::drop_blocks();
-        wait(Event::BlockDone, || hold::has_dropped().then_some(())).await;
+        drop_blocks().await;
         let motion = links::snapshot();
         let steps = contact::steps(&motion.target);
         contact::clear();

@@ -17,7 +17,7 @@ pub use markdown::markdown;
 
 use super::super::command::Commands;
 use super::super::interpreter::Interpreter;
-use super::super::setup::{AxisMode, Cycle, Setup};
+use super::super::setup::{AxisMode, Setup};
 use super::Code;
 use crate::status::Status;
 use crate::units::Length;
@@ -96,8 +96,15 @@ impl Setup for On {
         limited.then_some((Length::ZERO, Length(1_500_000)))
     }
 
-    fn can(&self, _cycle: Cycle) -> bool {
+    fn has_probe(&self) -> bool {
         *self != On::NoSwitches
+    }
+
+    fn homing(&self, _axis: u8) -> Result<(), Status> {
+        match self {
+            On::NoSwitches => Err(Status::HomingSwitches),
+            _ => Ok(()),
+        }
     }
 }
 

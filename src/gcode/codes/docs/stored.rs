@@ -30,8 +30,14 @@ the words, and then the named axes only. Without: all axes, at once. The motion 
         g(
             282,
             "Home",
-            "Homes the named axes, X Y Z or A, against their switches, and sets their positions; the numbers \
-mean nothing. Refused on machines without switches.",
+            "Homes the named axes, one by one in the order Z X Y A; the numbers mean nothing. An axis that stands on its \
+switch backs off it by `lb`; it then searches at `sv`, for its whole travel and `lb` at most, backs off at `lv` until the \
+switch opens, and stops `zb` from there. It is then at the end of its travel: `tn` at the lower switch, `tm` at the upper; 0 if \
+that is not set or both are the same. The jerk is `jh`, its own limits are none meanwhile. No motion mode is in force after it; other \
+modes stay. What follows waits. Also refused, before anything moves, with 242 if `sv` is 0, 243 if `lv` is, 244 if there is no way \
+to search; 246: there must be one homing switch. An exception names the axis (`ax`), as it does if the switch is not found \
+or the homing is flushed (240), or if a switch stays closed (247): then the axis is not homed. `{home:1}` homes all axes that have a \
+switch for it.",
             &[
                 no(AxisWordMissing, &["G28.2"]),
                 no_on(On::NoSwitches, HomingSwitches, &["G28.2 X0"]),
@@ -42,7 +48,7 @@ mean nothing. Refused on machines without switches.",
         g(
             284,
             "Home, position kept",
-            "As G28.2, but positions stay what they were.",
+            "As G28.2, but positions count on, and no axis becomes homed by it.",
             &[
                 no(AxisWordMissing, &["G28.4"]),
                 no_on(On::NoSwitches, HomingSwitches, &["G28.4 X0"]),

@@ -1,0 +1,41 @@
+//! Jogging, `{jogx:..}`: an axis by hand, as fast as its traverse limit lets it, under its jerk limit.
+//!
+//! It has begun at rest ([`View`](crate::tasks::view)). At its end, reached or not, the reporter says `{"jog":0}`. An
+//! exclamation mark holds it, and with `%` behind that it is over: so a sender ends it when a button is let go.
+
+use kerf_macros::small;
+
+use super::Planner;
+use crate::gcode::command::Motion;
+use crate::tasks::links::Cycle;
+
+impl Planner {
+    /// Carries the jog out.
+    pub(super) async fn jog(&mut self) {
+        self.enter(Cycle::Jog);
+        if self.standstill().await {
+            self.begin_jog();
+            self.sought().await;
+        }
+        self.end_jog();
+    }
+
+    #[inline(never)]
+    #[small]
+    fn begin_jog(&mut self) {
+        let links = self.links;
+        if let Motion::Jog { target } = &links.commands.borrow().motion {
+            self.straight(target, None);
+        }
+    }
+
+    #[small]
+    fn end_jog(&mut self) {
+        // In a flush it ends with that, when the position is known.
+        if !self.is_flushed() {
+            self.links.model.borrow_mut().set_position(&self.position);
+            self.links.jogged.set(true);
+            self.enter(Cycle::Off);
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Homing on the image: carriages, switches that bounce and stick.
+
+mod common;
+
+use common::{booted, set};
+use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14, inputs};
+use kerf_sim::mechanics::{Bounce, Build, Wiring};
+use kerf_sim::{Host, Machine};
+
+/// A machine whose carriages stand near their homing switches, that bounce for a millisecond or so.
+fn standing(board: &'static Board, wiring: Wiring, starts: [f64; 3]) -> (Machine, Host) {
+    let (mut machine, mut host) = booted(board);
+    let mut build = Build::of(board).wired(wiring);
+    for (axis, start) in build.axes.iter_mut().zip(starts) {
+        axis.start = start;
+    }
+    machine.build(&build);
+    machine.tamper(|mechanics, _| {
+        for input in [inputs::X_MIN, inputs::Y_MIN, inputs::Z_MAX] {
+            mechanics.bounce(input, Some(Bounce { times: 4, cycles: 16_000 }));
+        }
+    });
+    let kind = if wiring == Wiring::NormallyClosed { "{st:1}" } else { "{st:0}" };
+    // Quick, for the simulator's sake.
+    let quick = "{x:{jh:2000,zb:0.5},y:{jh:2000,zb:0.5},z:{jh:2000,zb:0.5}}";
+    for line in [kind, quick, "{sv:0}"] {
+        set(&mut machine, &mut host, line);
+    }
+    host.run_for_ms(&mut machine, 50).unwrap();
+    (machine, host)
+}
+
+/// Homes, and says what an exception has told, if one has.
+fn home(machine: &mut Machine, host: &mut Host, line: &str) -> Option<String> {
+    host.take_reports();
+    set(machine, host, line);
+    // It is carried out when the homing has come to its end.
+    let done = host.ask(machine, "g4 p0", 30_000).unwrap();
+    assert_eq!(done.status, 0);
+    host.run_for_ms(machine, 100).unwrap();
+    let told = host.take_reports().into_iter().map(|report| report.to_string());
+    told.chain(host.strays().iter().cloned()).find(|line| line.contains("\"er\""))
+}
+
+/// Where the carriages are, in steps from the lower hard ends.
+fn places(machine: &Machine) -> [i64; 3] {
+    let mechanics = machine.mechanics().unwrap();
+    [0, 1, 2].map(|axis| (mechanics.position(axis) * 1_280.0).round() as i64)
+}
+
+#[test]
+fn every_axis_ends_on_its_step_from_wherever_it_comes() {
+    // Off the switches by their hysteresis of 0.2 mm, the step at which they open, and the zero back-off.
+    let (lower, upper) = ((2.2 + 0.5) * 1_280.0, (98.0 - 0.2 - 0.5) * 1_280.0);
+    for board in [&MEGA2560_GRBL, &RAMPS14] {
+        for wiring in [Wiring::NormallyOpen, Wiring::NormallyClosed] {
+            let (mut machine, mut host) = standing(board, wiring, [5.0, 1.0, 96.3]);
+            assert_eq!(home(&mut machine, &mut host, "{home:1}"), None);
+            let first = places(&machine);
+            println!("{} {wiring:?} {first:?}, {lower} {upper}", board.name);
+            for (place, wanted) in first.iter().zip([lower, lower, upper]) {
+                assert!((*place as f64 - wanted).abs() <= 2.0, "{place} for {wanted}");
+            }
+            let at = host.ask(&mut machine, "{mpo:n}", 1_000).unwrap();
+            assert!(at.raw.contains("\"x\":0.000,\"y\":0.000,\"z\":75.000"), "{}", at.raw);
+            set(&mut machine, &mut host, "g1 f800 x1.7 y0.9 z74.1");
+            assert_eq!(home(&mut machine, &mut host, "g28.2 x0 y0 z0"), None);
+            assert_eq!(places(&machine), first, "on {}", board.name);
+            assert_eq!([0, 1, 2].map(|axis| machine.mechanics().unwrap().lost(axis)), [0; 3]);
+        }
+    }
+}
+
+#[test]
+fn a_switch_that_sticks_is_told() {
+    let (mut machine, mut host) =
+        standing(&MEGA2560_GRBL, Wiring::NormallyOpen, [5.0, 100.0, 50.0]);
+    machine.tamper(|mechanics, _| mechanics.stick(inputs::X_MIN, Some(true)));
+    host.run_for_ms(&mut machine, 50).unwrap();
+    let told = home(&mut machine, &mut host, "g28.2 x0").unwrap();
+    assert!(told.contains("247") && told.contains("\"ax\":\"x\""), "{told}");
+    machine.tamper(|mechanics, _| mechanics.stick(inputs::X_MIN, None));
+    host.run_for_ms(&mut machine, 50).unwrap();
+    assert_eq!(host.ask(&mut machine, "g28.2 x0", 1_000).unwrap().status, 0);
+}
