@@ -41,6 +41,7 @@ pub enum Owner {
     Job,
 }
 
+#[small]
 impl Owner {
     /// Rows of the table that describe its settings.
     pub fn rows(self) -> u8 {
@@ -159,6 +160,7 @@ pub const fn large_of(axis: u8) -> u8 {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Setting(u8);
 
+#[small]
 impl Setting {
     /// Numbers below this may be settings.
     pub const NUMBERS: u8 = FIRST_JOB + JOB_ROWS as u8;

@@ -311,10 +311,12 @@ impl State {
 }
 
 /// G4: P seconds.
+#[small]
 pub(super) fn dwell_ms(block: &Block) -> Result<u32, Status> {
     block.get(P).ok_or(Status::PWordMissing)?.milliseconds()
 }
 
+#[small]
 fn home(block: &Block, set: bool, setup: &impl Setup) -> Result<Motion, Status> {
     if !setup.can(Cycle::Homing) {
         return Err(Status::HomingSwitches);
@@ -330,10 +332,12 @@ fn home(block: &Block, set: bool, setup: &impl Setup) -> Result<Motion, Status> 
     Ok(Motion::Home { axes, set })
 }
 
+#[small]
 fn at(values: &PerAxis<Length>, axis: u8) -> Length {
     values.get(usize::from(axis)).copied().unwrap_or_default()
 }
 
+#[small]
 fn put<T>(values: &mut PerAxis<T>, axis: u8, value: T) {
     if let Some(place) = values.get_mut(usize::from(axis)) {
         *place = value;

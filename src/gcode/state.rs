@@ -143,6 +143,7 @@ impl State {
     }
 
     /// S, T and M6.
+    #[small]
     fn tools(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
         if let Some(value) = block.get(S) {
             if value.negative {
@@ -188,6 +189,7 @@ impl State {
     }
 
     /// M48 to M51.
+    #[small]
     fn overrides(block: &Block, out: &mut Commands) -> Result<(), Status> {
         out.overrides = match block.overrides {
             None => return Ok(()),
@@ -223,6 +225,7 @@ impl State {
     }
 
     #[inline(never)]
+    #[small]
     fn stop(
         &mut self,
         block: &Block,
@@ -245,6 +248,7 @@ impl State {
 
     /// M2 and M30: modes as at power-up, but G1 with F0; no G92. The line's own change of the
     /// tables counts.
+    #[small]
     fn end_program(
         &mut self,
         tables: &impl Tables,
@@ -264,6 +268,7 @@ impl State {
 }
 
 /// What becomes of one override.
+#[small]
 fn override_one(block: &Block, which: Override, how: Switch) -> Result<Change, Status> {
     let word = block.get(P);
     let off = match how {

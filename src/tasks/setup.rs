@@ -8,6 +8,7 @@ use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
 use crate::gcode::setup::{AxisMode, Cycle, Setup};
 use crate::units::Length;
 
+#[small]
 impl Setup for Settings {
     fn mode(&self, axis: u8) -> AxisMode {
         match self.axis_mode(axis.into()) {
@@ -74,6 +75,7 @@ impl Setup for Settings {
 }
 
 /// The axis whose position moves a motor; none above 5: that of an inhibited axis stands still.
+#[small]
 pub fn moved_by(settings: &Settings, motor: usize) -> u8 {
     let axis = settings.motor_axis(motor);
     if settings.mode(axis) == AxisMode::Inhibited { u8::MAX } else { axis }
