@@ -79,11 +79,6 @@ impl Settings {
         self.axis(axis, axis::AC) as f32 * (0.1 * 3_600.0)
     }
 
-    /// Jerk limit while homing and probing, mm or degrees per minute cubed.
-    pub fn jerk_homing(&self, axis: usize) -> f32 {
-        self.homing(axis, axis::JH) as f32 * 1e3
-    }
-
     /// Junction deviation, mm.
     pub fn junction_deviation(&self, axis: usize) -> f32 {
         self.axis(axis, axis::JD) as f32 * 1e-6
@@ -102,26 +97,6 @@ impl Settings {
     /// Switch at the upper end, likewise.
     pub fn switch_max(&self, axis: usize) -> u8 {
         self.switch(axis, axis::SX)
-    }
-
-    /// Speed towards a homing switch, mm or degrees per minute.
-    pub fn search_velocity(&self, axis: usize) -> f32 {
-        self.homing(axis, axis::SV) as f32 * 1e-3
-    }
-
-    /// Speed off a homing switch, mm or degrees per minute.
-    pub fn latch_velocity(&self, axis: usize) -> f32 {
-        self.homing(axis, axis::LV) as f32 * 1e-3
-    }
-
-    /// Way off a homing switch before it is latched.
-    pub fn latch_backoff(&self, axis: usize) -> Length {
-        Length(self.homing(axis, axis::LB))
-    }
-
-    /// Way from the latched switch to zero.
-    pub fn zero_backoff(&self, axis: usize) -> Length {
-        Length(self.homing(axis, axis::ZB))
     }
 }
 

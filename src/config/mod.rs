@@ -198,10 +198,6 @@ impl Settings {
         if axis <= FIRST_ROTARY { self.small(small_of(axis as u8) + slot) } else { 0 }
     }
 
-    fn homing(&self, axis: usize, slot: u8) -> i32 {
-        if axis <= FIRST_ROTARY { self.axis(axis, slot) } else { 0 }
-    }
-
     pub(crate) fn system(&self, slot: u8) -> u8 {
         self.small(small_of(AXES as u8) + slot)
     }

@@ -70,6 +70,12 @@ impl Row {
     /// No setting's. All zeros, so that it needs no memory.
     pub const NONE: Row = constant("", 0);
 
+    /// The same, in EEPROM.
+    const fn cold(mut self) -> Row {
+        self.kind = Kind::Cold;
+        self
+    }
+
     const fn with(mut self, flags: u8) -> Row {
         self.flags |= flags;
         self
@@ -199,7 +205,7 @@ pub mod motor {
     pub const LARGE: usize = 2;
 }
 
-/// Slots of an axis, small and large. B and C have those before `SHORT` only.
+/// Slots of an axis, small and large. B and C have the small ones before `SHORT` only.
 #[allow(missing_docs)]
 pub mod axis {
     pub const AM: u8 = 0;
@@ -216,13 +222,17 @@ pub mod axis {
     pub const JD: u8 = 5;
     pub const RA: u8 = 6;
     pub const AC: u8 = 7;
-    pub const SHORT_LARGE: usize = 8;
-    pub const JH: u8 = 8;
-    pub const SV: u8 = 9;
-    pub const LV: u8 = 10;
-    pub const LB: u8 = 11;
-    pub const ZB: u8 = 12;
-    pub const LARGE: usize = 13;
+    pub const LARGE: usize = 8;
+}
+
+/// Rows of [`AXIS`] that are in EEPROM alone.
+#[allow(missing_docs)]
+pub mod homing {
+    pub const JH: u8 = 6;
+    pub const SV: u8 = 11;
+    pub const LV: u8 = 12;
+    pub const LB: u8 = 13;
+    pub const ZB: u8 = 14;
 }
 
 const ANY: i32 = -i32::MAX;
@@ -306,15 +316,15 @@ progmem! {
         fixed("tn", axis::TN, 4, 3, ANY).with(UNIT | CLAMP),
         fixed("tm", axis::TM, 4, 3, ANY).with(UNIT | CLAMP),
         fixed("jm", axis::JM, 3, 0, POSITIVE).with(UNIT | JERK),
-        fixed("jh", axis::JH, 3, 0, POSITIVE).with(UNIT | JERK | HOMING),
+        fixed("jh", 0, 3, 0, POSITIVE).with(UNIT | JERK | HOMING).cold(),
         fixed("jd", axis::JD, 6, 4, 0).with(UNIT),
         fixed("ra", axis::RA, 6, 3, POSITIVE).with(UNIT | RADIUS),
         int("sn", axis::SN, 0, 3).with(HOMING),
         int("sx", axis::SX, 0, 3).with(HOMING),
-        fixed("sv", axis::SV, 3, 0, 0).with(UNIT | HOMING),
-        fixed("lv", axis::LV, 3, 0, 0).with(UNIT | HOMING),
-        fixed("lb", axis::LB, 4, 3, 0).with(UNIT | HOMING),
-        fixed("zb", axis::ZB, 4, 3, 0).with(UNIT | HOMING),
+        fixed("sv", 0, 3, 0, 0).with(UNIT | HOMING).cold(),
+        fixed("lv", 0, 3, 0, 0).with(UNIT | HOMING).cold(),
+        fixed("lb", 0, 4, 3, 0).with(UNIT | HOMING).cold(),
+        fixed("zb", 0, 4, 3, 0).with(UNIT | HOMING).cold(),
         fixed("ac", axis::AC, 1, 1, 0).with(UNIT),
     ];
 

@@ -140,7 +140,6 @@ fn getters_have_their_units() {
     assert!((settings.velocity_max(3) - 230_400.0).abs() < 0.1);
     assert!((settings.feedrate_max(5) - 3_600.0).abs() < 0.001);
     assert_eq!(settings.jerk_max(0), 20e6);
-    assert_eq!(settings.jerk_homing(4), 0.0);
     assert_eq!(settings.accel_max(0), 0.0);
     set(&mut settings, "xac", "500", false).unwrap();
     assert_eq!(settings.accel_max(0), 1_800_000.0);
@@ -163,7 +162,7 @@ fn getters_have_their_units() {
 
 #[test]
 fn ram_is_accounted_for() {
-    assert_eq!(size_of::<Settings>(), 432);
+    assert_eq!(size_of::<Settings>(), 352);
     assert!(size_of::<Row>() * 51 + (28 + 7 * 4 + 16 * 6) * 4 < 2048);
 }
 

@@ -27,6 +27,8 @@ use crate::store::program::{self, Stored};
 use crate::store::{Log, Memory, tables};
 use crate::units::{Length, PerAxis};
 
+mod homing;
+
 /// What the storage task shares with those for whom it keeps things.
 pub struct Storage {
     log: Cell<Log>,
@@ -130,17 +132,17 @@ impl Storage {
     /// All of them have their defaults from now on.
     pub fn forget_cold(&self) {
         self.cold.set(None);
-        self.forgotten.set(Setting::WARM);
+        self.forgotten.set(0);
         self.wake.signal();
     }
 
     /// The next of them that is on its way.
     fn take_cold(&self) -> Option<Work> {
-        let number = self.forgotten.get();
-        if self.cold.get().is_none() && number < Setting::COLD {
-            let default = Setting::from_number(number).map_or(0, Setting::default_value);
-            self.cold.set(Some((number, default)));
-            self.forgotten.set(number + 1);
+        if self.cold.get().is_none() && self.forgotten.get() < Setting::COLD {
+            let rest = (self.forgotten.get()..Setting::COLD).filter_map(Setting::from_number);
+            let next = rest.clone().find(|setting| setting.is_cold());
+            self.cold.set(next.map(|setting| (setting.number(), setting.default_value())));
+            self.forgotten.set(next.map_or(Setting::COLD, |setting| setting.number() + 1));
         }
         self.cold.get().map(|_| Work::Cold)
     }

@@ -124,9 +124,8 @@ impl Planner {
     /// Takes the jerk of homing and probing for the axes that have both, until the line is done.
     #[small]
     pub(super) fn brake_hard(&mut self) {
-        let settings = self.links.settings.borrow();
         for (n, axis) in self.dynamics.axes.iter_mut().enumerate().take(FIRST_ROTARY + 1) {
-            let hard = settings.jerk_homing(n);
+            let hard = self.links.storage.jerk_homing(n);
             if hard > 0.0 && axis.jerk.get() > 0.0 {
                 axis.jerk = Short::new(hard * PER_SECOND_CUBED);
             }
