@@ -177,7 +177,7 @@ fn radius_form(
 ) -> Result<[Length; 2], Status> {
     let (from, to) = (in_plane(start, arc), in_plane(target, arc));
     let chord = [difference(to[0], from[0])?, difference(to[1], from[1])?];
-    if chord == [0, 0] {
+    if chord.iter().all(|way| *way == 0) {
         return Err(Status::ArcEndpointIsStart);
     }
     let square = |x: i32| i64::from(x) * i64::from(x);

@@ -58,7 +58,7 @@ impl<T: Tables> Interpreter<T> {
     pub fn start(&mut self, setup: &impl Setup) {
         self.state.modal = Modal::new(&setup.defaults());
         // Nothing else shifts the origin yet, so that the sum is within the range.
-        let _ = self.state.update_origin(&self.tables.row(Row::system(self.state.modal.system)));
+        self.restore_origin();
     }
 
     /// Sets a value of a row as G10 does: it is in force when this returns. [`Status::Again`] as of
@@ -129,7 +129,10 @@ impl<T: Tables> Interpreter<T> {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        if block.is_rare() || block.does().is_some_and(MotionMode::is_cycle) {
+        if block.does().is_some_and(MotionMode::is_cycle) {
+            return self.execute_cycle(block, setup, out);
+        }
+        if block.is_rare() {
             return self.execute_rarity(block, setup, out);
         }
         self.execute_usual(block, setup, out)
@@ -154,25 +157,53 @@ impl<T: Tables> Interpreter<T> {
 
     /// The same for a block that may change more than modes, the feed and the position of its axes.
     #[inline(never)]
+    #[small]
     fn execute_rarity(
         &mut self,
         block: &Block,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        let before = self.state;
+        let before = RareBefore::of(&self.state);
         let mut edit = None;
-        let done =
-            self.state.execute_rarity(block, &before.position, &self.tables, setup, out, &mut edit);
+        let done = self.state.execute_rarity(
+            block,
+            &before.usual.position,
+            &self.tables,
+            setup,
+            out,
+            &mut edit,
+        );
         match (&done, &edit) {
             (Ok(()), Some(edit)) => self.tables.apply(edit),
             (Ok(()), None) => {}
             (Err(_), _) => {
-                self.state = before;
+                before.restore(&mut self.state);
+                self.restore_origin();
                 out.clear();
             }
         }
         done
+    }
+
+    /// The same for a block with a canned cycle, whose words stay.
+    #[inline(never)]
+    #[small]
+    fn execute_cycle(
+        &mut self,
+        block: &Block,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        let sticky = self.state.sticky;
+        self.execute_rarity(block, setup, out).inspect_err(|_| self.state.sticky = sticky)
+    }
+
+    /// The origin by what it is the sum of, which was within the range before.
+    #[inline(never)]
+    #[small]
+    fn restore_origin(&mut self) {
+        let _ = self.state.update_origin(&self.tables.row(Row::system(self.state.modal.system)));
     }
 }
 
@@ -202,6 +233,37 @@ impl Before {
         state.line = self.line;
         state.position = self.position;
         state.residue = self.residue;
+    }
+}
+
+/// The same of a block of whatever there is, but for the words of a cycle, and the origin: the less of it there is
+/// the better, for the deepest stack is below it.
+struct RareBefore {
+    usual: Before,
+    homed: u8,
+    shift: PerAxis<Length>,
+    shifted: bool,
+    tool_length: PerAxis<Length>,
+    speed: f32,
+    selected: u8,
+    tool: u8,
+}
+
+#[small]
+impl RareBefore {
+    fn of(state: &State) -> Self {
+        let State { homed, shift, shifted, tool_length, speed, selected, tool, .. } = *state;
+        Self { usual: Before::of(state), homed, shift, shifted, tool_length, speed, selected, tool }
+    }
+
+    #[inline(never)]
+    fn restore(&self, state: &mut State) {
+        self.usual.restore(state);
+        state.homed = self.homed;
+        (state.shift, state.shifted) = (self.shift, self.shifted);
+        state.tool_length = self.tool_length;
+        state.speed = self.speed;
+        (state.selected, state.tool) = (self.selected, self.tool);
     }
 }
 

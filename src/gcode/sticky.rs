@@ -85,6 +85,11 @@ impl Sticky {
 
     /// No words; the series begins where the axis is at `initial`.
     fn forget(&mut self, initial: Length) {
-        *self = Self { initial, ..Self::NONE };
+        // One by one: whole, it would be copied from a constant, which has its place in RAM.
+        self.initial = initial;
+        (self.retract, self.depth, self.peck, self.dwell_ms) = (None, None, None, None);
+        for offset in &mut self.offsets {
+            *offset = None;
+        }
     }
 }
