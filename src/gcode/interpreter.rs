@@ -129,10 +129,7 @@ impl<T: Tables> Interpreter<T> {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        if block.does().is_some_and(MotionMode::is_cycle) {
-            return self.execute_cycle(block, setup, out);
-        }
-        if block.is_rare() {
+        if block.is_rare() || block.does().is_some_and(MotionMode::is_cycle) {
             return self.execute_rarity(block, setup, out);
         }
         self.execute_usual(block, setup, out)
@@ -186,19 +183,6 @@ impl<T: Tables> Interpreter<T> {
         done
     }
 
-    /// The same for a block with a canned cycle, whose words stay.
-    #[inline(never)]
-    #[small]
-    fn execute_cycle(
-        &mut self,
-        block: &Block,
-        setup: &impl Setup,
-        out: &mut Commands,
-    ) -> Result<(), Status> {
-        let sticky = self.state.sticky;
-        self.execute_rarity(block, setup, out).inspect_err(|_| self.state.sticky = sticky)
-    }
-
     /// The origin by what it is the sum of, which was within the range before.
     #[inline(never)]
     #[small]
@@ -236,8 +220,8 @@ impl Before {
     }
 }
 
-/// The same of a block of whatever there is, but for the words of a cycle, and the origin: the less of it there is
-/// the better, for the deepest stack is below it.
+/// The same of a block of whatever there is, but for the words of a cycle, which `State` sees to, and the origin:
+/// the less of it there is the better, for the deepest stack is below it.
 struct RareBefore {
     usual: Before,
     homed: u8,

@@ -102,6 +102,9 @@ impl State {
         Self::overrides(block, out)?;
         self.offsets(block, tables, setup)?;
         self.non_modal(block, tables, setup, out, edit)?;
+        if block.does().is_some_and(MotionMode::is_cycle) {
+            return self.finish_cycle(block, start, tables, edit, setup, out);
+        }
         self.finish(block, start, tables, setup, out)?;
         self.stop(block, tables, edit, setup, out)
     }
@@ -216,6 +219,36 @@ impl State {
             }
             _ => self.motion(block, setup, out)?,
         }
+        self.end_motion(start, setup, out)
+    }
+
+    /// A canned cycle, and what comes after it. Its words stay, unless the line is refused.
+    #[inline(never)]
+    #[small]
+    fn finish_cycle(
+        &mut self,
+        block: &Block,
+        start: &PerAxis<Length>,
+        tables: &impl Tables,
+        edit: &Option<Edit>,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        let before = self.sticky;
+        let done = self
+            .cycle_motion(block, setup, out)
+            .and_then(|()| self.end_motion(start, setup, out))
+            .and_then(|()| self.stop(block, tables, edit, setup, out));
+        done.inspect_err(|_| self.sticky = before)
+    }
+
+    #[inline(never)]
+    fn end_motion(
+        &self,
+        start: &PerAxis<Length>,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         // Limits are for homed axes alone.
         if self.homed != 0 {
             limits::check(start, &out.motion, self.homed, setup)?;
