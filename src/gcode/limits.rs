@@ -37,16 +37,26 @@ pub(super) fn check(
         | Motion::Feed { target, .. }
         | Motion::Probe { target, .. } => target,
         Motion::Arc { target, arc, .. } => {
-            let limits = [arc.first, arc.second].map(limits);
-            if !arc_is_within(start, target, arc, Some(&limits)) {
-                return Err(Status::SoftLimit);
-            }
+            check_arc(start, target, arc, limits)?;
             target
         }
     };
     check_straight(start, target, limits)
 }
 
+#[inline(never)]
+#[small]
+fn check_arc(
+    start: &PerAxis<Length>,
+    target: &PerAxis<Length>,
+    arc: &Arc,
+    limits: impl Fn(u8) -> Option<(Length, Length)>,
+) -> Result<(), Status> {
+    let limits = [limits(arc.first), limits(arc.second)];
+    if arc_is_within(start, target, arc, Some(&limits)) { Ok(()) } else { Err(Status::SoftLimit) }
+}
+
+#[inline(never)]
 #[small]
 fn check_straight(
     start: &PerAxis<Length>,

@@ -41,14 +41,12 @@ machine_static! {
 
 /// Exec gives a sign of life. Exec only.
 #[inline(always)]
-#[small]
 pub fn answer(sign: Sign) {
     signs().set(signs().get() | sign as u8);
 }
 
 /// Exec has queued a segment, the `count`th. Exec only.
 #[inline(always)]
-#[small]
 pub fn moves(count: u8) {
     answer(Sign::Segment);
     if count.is_multiple_of(OFTEN) {
@@ -61,7 +59,6 @@ pub fn moves(count: u8) {
 }
 
 /// Feeds the watchdog if all is well, and asks for other signs. Thread mode.
-#[small]
 pub fn look() {
     let rests = if stepper::running() && !stepper::is_stopped() { 0 } else { Sign::Segment as u8 };
     if signs().get() | rests == ALL {

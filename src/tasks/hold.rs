@@ -68,7 +68,6 @@ machine_static! {
 
 /// Whether a hold is on. Any level.
 #[inline(always)]
-#[small]
 pub fn is_on() -> bool {
     wanted().get() != OFF
 }
@@ -76,33 +75,28 @@ pub fn is_on() -> bool {
 /// Whether a machine that is `running` is to come to rest: it does not wait for thread mode, which may have a report
 /// to put, to begin the hold. Exec only.
 #[inline(always)]
-#[small]
 pub fn is_wanted(running: bool) -> bool {
     is_on() || (running && uart::asks_hold())
 }
 
 /// Whether the machine is to go on when it has come to rest.
-#[small]
 pub fn is_passing() -> bool {
     wanted().get() == PASSING
 }
 
 /// Begins a hold.
-#[small]
 fn begin() {
     wanted().set(ON);
     exec::pend();
 }
 
 /// Ends a hold at once.
-#[small]
 pub fn end() {
     wanted().set(OFF);
     exec::pend();
 }
 
 /// Ends a hold when the machine has come to rest.
-#[small]
 fn pass() {
     // Exec changes it only if it is `PASSING`.
     if wanted().get() == ON {
@@ -112,7 +106,6 @@ fn pass() {
 }
 
 /// The machine has come to rest: whether it goes on. Exec only.
-#[small]
 pub fn passes() -> bool {
     let passes = is_passing();
     if passes {
@@ -122,20 +115,17 @@ pub fn passes() -> bool {
 }
 
 /// Has exec drop its blocks; it sets [`Event::BlockDone`] when it [has](has_dropped).
-#[small]
 pub fn drop_blocks() {
     dropping().set(1);
     exec::pend();
 }
 
 /// Whether exec has dropped its blocks.
-#[small]
 pub fn has_dropped() -> bool {
     dropping().get() == 0
 }
 
 /// Exec, at rest, drops its blocks if that is wanted, by `drop_all`.
-#[small]
 pub fn dropped(drop_all: impl FnOnce()) {
     if dropping().get() != 0 {
         drop_all();
@@ -145,7 +135,6 @@ pub fn dropped(drop_all: impl FnOnce()) {
 }
 
 /// Acts upon the real-time characters that have come, on any port.
-#[small]
 pub fn serve(links: &Links) {
     // Before the character is taken: exec has begun, and is not to go on in between.
     if uart::asks_hold() && is_busy(links) {
@@ -159,7 +148,6 @@ pub fn serve(links: &Links) {
     }
 }
 
-#[small]
 fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
         reset();
@@ -198,7 +186,6 @@ fn act(links: &Links, port: &Port, characters: u8) {
 
 /// `{qf:1}`: drops what is queued, as a `%` does. False, and nothing done, while the machine is busy without
 /// a hold.
-#[small]
 pub fn flush_here(links: &Links, busy: bool) -> bool {
     if busy && !is_on() {
         return false;
@@ -208,7 +195,6 @@ pub fn flush_here(links: &Links, busy: bool) -> bool {
     true
 }
 
-#[small]
 fn flush(links: &Links, from: Flush) {
     if links.flush.get() == Flush::None {
         begin();
@@ -220,7 +206,6 @@ fn flush(links: &Links, from: Flush) {
 
 /// The reader has come to the place of a real-time character on a port, outside of comments. What it has got before a
 /// `%` in a hold, or a `^d`, is what is dropped; of other ports, the lines that it has got by then.
-#[small]
 pub fn placed(links: &Links, port: &Port, mark: u8) {
     serve(links);
     if mark == GO {
@@ -236,7 +221,6 @@ pub fn placed(links: &Links, port: &Port, mark: u8) {
 
 /// The same for one that waits in the receive ring, because the pool is full. One that is not there any more
 /// has left the mark of a loss.
-#[small]
 pub fn ahead(links: &Links, mark: u8) {
     serve(links);
     if mark != CUT {
@@ -248,7 +232,6 @@ pub fn ahead(links: &Links, mark: u8) {
 }
 
 /// What is held goes on; and what waits at a program stop.
-#[small]
 fn go_on(links: &Links) {
     if links.resume.take() && links.flush.get() == Flush::None {
         pass();
@@ -259,7 +242,6 @@ fn go_on(links: &Links) {
 }
 
 /// All lines in the pool are dropped, and the queue next.
-#[small]
 fn rest(links: &Links) {
     links.ports.iter().for_each(|port| port.lines.borrow_mut().terminate());
     links.flush.set(Flush::Rest);
@@ -271,7 +253,6 @@ fn rest(links: &Links) {
 }
 
 /// Whether there is anything to hold.
-#[small]
 fn is_busy(links: &Links) -> bool {
     links.has_data() || View::of(links, links.feeder()).is_busy()
 }

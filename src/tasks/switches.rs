@@ -37,7 +37,6 @@ pub const WIRED: u16 = {
 const ENDS: u16 = (1 << inputs::ENDS) - 1;
 
 /// What `sn` or `sx` says of the switch at an end: 0 off, 1 homing, 2 limit, 3 both.
-#[small]
 pub fn mode(settings: &Settings, end: u8) -> u8 {
     let axis = end / 2;
     match end % 2 {
@@ -49,7 +48,6 @@ pub fn mode(settings: &Settings, end: u8) -> u8 {
 
 /// Takes over what the settings say. Those that are no ends close when they are worked, whatever `st` says.
 #[inline(never)]
-#[small]
 pub fn set_up(settings: &Settings) {
     let closing = if settings.switches_normally_closed() { !ENDS } else { u16::MAX };
     let is_limit = |end: &u8| mode(settings, *end) & LIMIT != 0;
@@ -58,7 +56,6 @@ pub fn set_up(settings: &Settings) {
 }
 
 /// Looks for what has happened.
-#[small]
 pub fn serve(links: &Links) {
     let hits = pins::take_hits();
     if hits != 0 && links.limits_hit.get() == 0 {
