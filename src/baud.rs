@@ -21,6 +21,7 @@ progmem! {
 }
 
 /// The rate, in bits a second, that `value` stands for; `None` if there is no such rate.
+#[small]
 pub fn rate(value: i32) -> Option<u32> {
     let value = u32::try_from(value).ok()?;
     let code = usize::try_from(value).ok().and_then(|v| v.checked_sub(1));
@@ -31,6 +32,7 @@ pub fn rate(value: i32) -> Option<u32> {
     (named || (LIMITS.contains(&value) && is_near(value))).then_some(value)
 }
 
+#[small]
 fn is_near(rate: u32) -> bool {
     let ideal = rate * (u32::from(divisor(rate)) + 1);
     eighth().abs_diff(ideal) * NEARNESS <= ideal
@@ -38,11 +40,13 @@ fn is_near(rate: u32) -> bool {
 
 /// What goes into the UART's rate register for the nearest rate to `baud`, at double speed (data sheet,
 /// table 22-1). `baud` is one that [`rate`] returned.
+#[small]
 pub fn divisor(baud: u32) -> u16 {
     let nearest = (eighth() + baud / 2) / baud.max(1);
     nearest.saturating_sub(1).min(0xFFF) as u16
 }
 
+#[small]
 const fn eighth() -> u32 {
     ACTIVE.clock_hz / 8
 }

@@ -145,12 +145,14 @@ impl Spindle {
     }
 }
 
+#[small]
 impl Default for Spindle {
     fn default() -> Self {
         Self::new()
     }
 }
 
+#[small]
 fn choose(bits: &mut u8, which: u8, on: bool) {
     *bits = if on { *bits | which } else { *bits & !which };
 }

@@ -68,6 +68,7 @@ impl Settings {
     }
 
     /// The value of a setting, scaled as kept.
+    #[small]
     pub fn get(&self, setting: Setting) -> i32 {
         match setting.place() {
             Place::Small(slot) => self.small(slot).into(),
@@ -79,12 +80,14 @@ impl Settings {
     }
 
     /// Who we are depends on whom the sender takes us for.
+    #[small]
     fn constant(&self, setting: Setting) -> i32 {
         let other = if self.is_g2core() { table::G2CORE.at(setting.number().into()) } else { None };
         other.unwrap_or_else(|| setting.default_value())
     }
 
     /// Sets a value that [`Settings::check`] returned.
+    #[small]
     pub fn store(&mut self, setting: Setting, value: i32) {
         self.keep(setting, value);
         if let Owner::Motor(motor) = setting.owner() {
@@ -136,6 +139,7 @@ impl Settings {
         self.is_length(setting, &setting.row())
     }
 
+    #[small]
     fn is_length(&self, setting: Setting, row: &Row) -> bool {
         let rotary = match setting.owner() {
             Owner::Motor(motor) => {
@@ -146,6 +150,7 @@ impl Settings {
         row.is(UNIT) && !rotary
     }
 
+    #[small]
     fn keep(&mut self, setting: Setting, value: i32) {
         match setting.place() {
             Place::Small(slot) => {
@@ -162,6 +167,8 @@ impl Settings {
         }
     }
 
+    #[inline(never)]
+    #[small]
     fn derive(&mut self, motor: u8) {
         let base = motor * motor::LARGE as u8;
         let (angle, travel) = (self.large(base + motor::SA), self.large(base + motor::TR));

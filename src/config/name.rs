@@ -12,6 +12,7 @@ pub struct Name {
     len: u8,
 }
 
+#[small]
 impl Name {
     /// The empty name.
     pub fn new() -> Name {
@@ -70,11 +71,13 @@ impl Name {
 }
 
 /// The letter of an axis, X Y Z A B C in lower case.
+#[small]
 pub fn axis_letter(axis: u8) -> u8 {
     if axis < 3 { b'x' + axis } else { b'a' + (axis - 3) }
 }
 
 /// The axis of a lower-case letter.
+#[small]
 pub fn axis_of(letter: u8) -> Option<u8> {
     match letter {
         b'x'..=b'z' => Some(letter - b'x'),
@@ -84,6 +87,7 @@ pub fn axis_of(letter: u8) -> Option<u8> {
 }
 
 /// A zero-padded table name from a literal.
+#[small]
 pub const fn token(text: &str) -> [u8; 4] {
     let text = text.as_bytes();
     assert!(text.len() <= 4, "a table's name is at most 4 bytes");

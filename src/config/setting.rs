@@ -1,6 +1,6 @@
 //! A setting's handle: its row of the table and whose it is.
 
-use super::name::{Name, axis_letter, axis_of};
+use super::name::{Name, axis_letter, axis_of, token};
 use super::table::{
     self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, COOLANT, COOLANT_ROWS, HOMING, IDLE, JOB, JOB_ROWS, Kind,
     MODE, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS, PWM, PWM_DEFAULTS, PWM_ROWS, RADIUS, Row, SPINDLE,
@@ -41,6 +41,7 @@ pub enum Owner {
     Job,
 }
 
+#[small]
 impl Owner {
     /// Rows of the table that describe its settings.
     pub fn rows(self) -> u8 {
@@ -58,16 +59,15 @@ impl Owner {
 
     /// The group's name, which is the prefix of its settings' names; none for the system.
     pub fn prefix(self) -> Name {
-        let named = |bytes: &[u8]| Name::new().with(bytes).unwrap_or_default();
         match self {
             Owner::System => Name::new(),
-            Owner::Motor(motor) => named(&[b'1' + motor]),
-            Owner::Axis(axis) => named(&[axis_letter(axis)]),
-            Owner::Pwm => named(b"p1"),
-            Owner::Spindle => named(b"sp"),
-            Owner::Coolant => named(b"co"),
-            Owner::User(group) => named(&[b'u', b'd', b'a' + group]),
-            Owner::Job => named(b"jid"),
+            Owner::Motor(motor) => named([b'1' + motor, 0, 0, 0]),
+            Owner::Axis(axis) => named([axis_letter(axis), 0, 0, 0]),
+            Owner::Pwm => named(token("p1")),
+            Owner::Spindle => named(token("sp")),
+            Owner::Coolant => named(token("co")),
+            Owner::User(group) => named([b'u', b'd', b'a' + group, 0]),
+            Owner::Job => named(token("jid")),
         }
     }
 
@@ -121,6 +121,13 @@ impl Owner {
     }
 }
 
+/// By value, for a slice of a constant would have its place in RAM.
+#[inline(never)]
+#[small]
+fn named(token: [u8; 4]) -> Name {
+    Name::new().with_token(token)
+}
+
 /// Where a setting's value is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Place {
@@ -159,6 +166,7 @@ pub const fn large_of(axis: u8) -> u8 {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Setting(u8);
 
+#[small]
 impl Setting {
     /// Numbers below this may be settings.
     pub const NUMBERS: u8 = FIRST_JOB + JOB_ROWS as u8;

@@ -57,9 +57,7 @@ impl State {
             Some(radius) => radius_form(&start, &target, &arc, radius)?,
             None => self.center_form(block, &start, &target, &arc)?,
         };
-        if may_be_too_far(&start, &arc)
-            && !limits::arc_is_within(&start, &target, &arc, &[RANGE; 2])
-        {
+        if may_be_too_far(&start, &arc) && !limits::arc_is_within(&start, &target, &arc, None) {
             return Err(Status::OutOfRange);
         }
         if arc::closes(&start, &target, &arc) {
@@ -124,11 +122,9 @@ impl State {
     }
 }
 
-/// How far a point may be from the origin, in units: 1 um short of what a length can hold.
-const RANGE: Option<(Length, Length)> = Some((Length(10 - i32::MAX), Length(i32::MAX - 10)));
-
 /// Whether some point of the circle may be beyond the range of lengths: it is not, if the sides of the
 /// radius' triangle are not.
+#[small]
 fn may_be_too_far(start: &PerAxis<Length>, arc: &Arc) -> bool {
     let from = in_plane(start, arc);
     let way = |a: Length, b: Length| a.0.saturating_sub(b.0).saturating_abs();
@@ -138,6 +134,7 @@ fn may_be_too_far(start: &PerAxis<Length>, arc: &Arc) -> bool {
 }
 
 /// P: full turns.
+#[small]
 fn turns(block: &Block) -> Result<u16, Status> {
     match block.get(P) {
         None => Ok(0),
@@ -171,6 +168,7 @@ fn check_radii(arc: &Arc, start: &PerAxis<Length>, target: &PerAxis<Length>) -> 
 ///
 /// The difference of squares is formed exactly, in 64 bits, or the centre of a half circle would be
 /// off by the square root of a rounding error.
+#[small]
 fn radius_form(
     start: &PerAxis<Length>,
     target: &PerAxis<Length>,
@@ -179,7 +177,7 @@ fn radius_form(
 ) -> Result<[Length; 2], Status> {
     let (from, to) = (in_plane(start, arc), in_plane(target, arc));
     let chord = [difference(to[0], from[0])?, difference(to[1], from[1])?];
-    if chord == [0, 0] {
+    if chord.iter().all(|way| *way == 0) {
         return Err(Status::ArcEndpointIsStart);
     }
     let square = |x: i32| i64::from(x) * i64::from(x);

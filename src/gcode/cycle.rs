@@ -5,8 +5,8 @@
 
 use super::axes::{self, Value};
 use super::block::Block;
-use super::command::{Commands, Cycle, Motion};
-use super::modal::{Distance, FeedMode, MotionMode, Retract, Turn};
+use super::command::{Commands, Cycle, Feed, Motion, Spindle};
+use super::modal::{Distance, FeedMode, MotionMode, Plane, Retract, Turn};
 use super::setup::{AxisMode, Setup};
 use super::state::State;
 use super::sticky::Sticky;
@@ -30,44 +30,38 @@ impl State {
         let plane = self.modal.plane;
         let [first, second, across] = plane.axes();
         let here = self.at(across);
-        let words = self.sticky.on(block, mode, before, plane, self.modal.units, here)?;
-        let (retract, bottom) = self.levels(&words, here, across)?;
-        let clear = match self.modal.retract {
-            Retract::ToR => retract,
-            Retract::Initial => retract.max(words.initial),
-        };
-        let holes = holes(block)?;
-        let rows = [self.row(block, first)?, self.row(block, second)?];
-        let feed = self.rate(block, false)?;
-        out.motion = Motion::Cycle(Cycle {
-            mode,
-            plane,
-            from: rows.map(|row| row.0),
-            pitch: rows.map(|row| row.1),
-            holes,
-            retract,
-            bottom,
-            clear,
-            peck: peck(mode, &words)?,
-            dwell_ms: dwell_ms(mode, &words)?,
-            aside: [Length::ZERO; 2],
-            top: Length::ZERO,
-            feed,
-            spindle: self.spindle(),
-        });
+        // Of a line that is refused all of this is undone.
+        self.sticky.on(block, mode, before, plane, self.modal.units, here)?;
+        // In its place from the beginning: it is too large to be carried about.
+        out.motion = Motion::Cycle(blank(mode, plane, self.spindle()));
         let Motion::Cycle(cycle) = &mut out.motion else { return Err(Status::InternalError) };
-        if mode == MotionMode::BackBore {
-            self.back_bore(&words, cycle)?;
+        self.levels(here, across, cycle)?;
+        cycle.holes = holes(block)?;
+        for (i, axis) in [first, second].into_iter().enumerate() {
+            self.row(block, axis, cycle.from.get_mut(i), cycle.pitch.get_mut(i))?;
         }
-        let last = cycle.hole(holes).ok_or(Status::OutOfRange)?;
+        cycle.feed = self.rate(block, false)?;
+        cycle.peck = peck(mode, &self.sticky)?;
+        cycle.dwell_ms = dwell_ms(mode, &self.sticky)?;
+        if mode == MotionMode::BackBore {
+            self.back_bore(cycle)?;
+        }
+        self.end_at_last(cycle)
+    }
+
+    /// The machine is at the last hole then.
+    #[inline(never)]
+    fn end_at_last(&mut self, cycle: &Cycle) -> Result<(), Status> {
+        let [first, second, across] = cycle.plane.axes();
+        let last = cycle.hole(cycle.holes).ok_or(Status::OutOfRange)?;
         for (axis, hole) in [first, second].into_iter().zip(last) {
             self.move_to(axis, hole);
         }
-        self.move_to(across, Value { units: clear, rest: 0 });
-        self.sticky = words;
+        self.move_to(across, Value { units: cycle.clear, rest: 0 });
         Ok(())
     }
 
+    #[inline(never)]
     fn check_cycle(
         &self,
         block: &Block,
@@ -96,8 +90,10 @@ impl State {
         if turns { Ok(()) } else { Err(Status::SpindleMustTurn) }
     }
 
-    /// R and the bottom, machine coordinates.
-    fn levels(&self, words: &Sticky, here: Length, across: u8) -> Result<(Length, Length), Status> {
+    /// R, the bottom, and the height between holes, machine coordinates.
+    #[inline(never)]
+    fn levels(&self, here: Length, across: u8, cycle: &mut Cycle) -> Result<(), Status> {
+        let words = &self.sticky;
         let retract = words.retract.ok_or(Status::RWordMissing)?;
         let depth = words.depth.ok_or(Status::AxisTargetMissing)?;
         let origin = self.origin.get(usize::from(across)).copied().unwrap_or_default();
@@ -109,32 +105,49 @@ impl State {
                 (retract, sum(retract, depth)?)
             }
         };
-        if retract < bottom { Err(Status::RWordInvalid) } else { Ok((retract, bottom)) }
+        if retract < bottom {
+            return Err(Status::RWordInvalid);
+        }
+        (cycle.retract, cycle.bottom) = (retract, bottom);
+        cycle.clear = match self.modal.retract {
+            Retract::ToR => retract,
+            Retract::Initial => retract.max(words.initial),
+        };
+        Ok(())
     }
 
     /// Where holes are counted from along an axis, and from one to the next: nothing with G90, where all of
     /// them are at the word.
     #[inline(never)]
-    fn row(&self, block: &Block, axis: u8) -> Result<(Value, Value), Status> {
+    fn row(
+        &self,
+        block: &Block,
+        axis: u8,
+        from: Option<&mut Value>,
+        pitch: Option<&mut Value>,
+    ) -> Result<(), Status> {
+        let (Some(from), Some(pitch)) = (from, pitch) else { return Err(Status::InternalError) };
         let i = usize::from(axis);
         let rest = self.residue.get(i).copied().unwrap_or_default();
-        let here = Value { units: self.at(axis), rest };
-        let Some(word) = block.get(axis) else { return Ok((here, Value::default())) };
+        *from = Value { units: self.at(axis), rest };
+        let Some(word) = block.get(axis) else { return Ok(()) };
         let value = axes::length(word, self.modal.units)?;
         match self.modal.distance {
-            Distance::Incremental => Ok((here, value)),
+            Distance::Incremental => *pitch = value,
             Distance::Absolute => {
                 let origin = self.origin.get(i).copied().unwrap_or_default();
                 let units = origin.checked_add(value.units).ok_or(Status::OutOfRange)?;
-                Ok((Value { units, ..value }, Value::default()))
+                *from = Value { units, ..value };
             }
         }
+        Ok(())
     }
 
     /// G87: I, J, K.
-    fn back_bore(&self, words: &Sticky, cycle: &mut Cycle) -> Result<(), Status> {
+    #[inline(never)]
+    fn back_bore(&self, cycle: &mut Cycle) -> Result<(), Status> {
         let [first, second, across] = self.modal.plane.axes();
-        let word = |axis: u8| words.offsets.get(usize::from(axis)).copied().flatten();
+        let word = |axis: u8| self.sticky.offsets.get(usize::from(axis)).copied().flatten();
         let missing = Status::ArcOffsetsMissing;
         cycle.aside = [word(first).ok_or(missing)?, word(second).ok_or(missing)?];
         let top = word(across).ok_or(missing)?;
@@ -159,7 +172,32 @@ impl State {
     }
 }
 
+/// A cycle of which nothing is known yet.
+#[inline(never)]
+#[small]
+fn blank(mode: MotionMode, plane: Plane, spindle: Spindle) -> Cycle {
+    let (nowhere, zero) = ([Value::default(); 2], Length::ZERO);
+    Cycle {
+        mode,
+        plane,
+        from: nowhere,
+        pitch: nowhere,
+        holes: 1,
+        retract: zero,
+        bottom: zero,
+        clear: zero,
+        peck: zero,
+        dwell_ms: 0,
+        aside: [zero; 2],
+        top: zero,
+        feed: Feed::PerMinute(0.0),
+        spindle,
+    }
+}
+
 /// L: how many holes.
+#[inline(never)]
+#[small]
 fn holes(block: &Block) -> Result<u16, Status> {
     let Some(word) = block.get(L) else { return Ok(1) };
     let holes = word.integer().ok().and_then(|holes| u16::try_from(holes).ok());
@@ -167,6 +205,8 @@ fn holes(block: &Block) -> Result<u16, Status> {
 }
 
 /// Q, for the cycles that peck.
+#[inline(never)]
+#[small]
 fn peck(mode: MotionMode, words: &Sticky) -> Result<Length, Status> {
     if !matches!(mode, MotionMode::ChipBreak | MotionMode::PeckDrill) {
         return Ok(Length::ZERO);
@@ -176,6 +216,8 @@ fn peck(mode: MotionMode, words: &Sticky) -> Result<Length, Status> {
 }
 
 /// P, for the cycles that dwell; tapping may.
+#[inline(never)]
+#[small]
 fn dwell_ms(mode: MotionMode, words: &Sticky) -> Result<u32, Status> {
     match (mode, words.dwell_ms) {
         (_, Some(dwell)) => Ok(dwell),

@@ -58,7 +58,7 @@ impl<T: Tables> Interpreter<T> {
     pub fn start(&mut self, setup: &impl Setup) {
         self.state.modal = Modal::new(&setup.defaults());
         // Nothing else shifts the origin yet, so that the sum is within the range.
-        let _ = self.state.update_origin(&self.tables.row(Row::system(self.state.modal.system)));
+        self.restore_origin();
     }
 
     /// Sets a value of a row as G10 does: it is in force when this returns. [`Status::Again`] as of
@@ -154,27 +154,40 @@ impl<T: Tables> Interpreter<T> {
 
     /// The same for a block that may change more than modes, the feed and the position of its axes.
     #[inline(never)]
+    #[small]
     fn execute_rarity(
         &mut self,
         block: &Block,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        let before = self.state;
+        let before = RareBefore::of(&self.state);
         let mut edit = None;
-        let done =
-            self.state.execute_rarity(block, &before.position, &self.tables, setup, out, &mut edit);
+        let done = self.state.execute_rarity(
+            block,
+            &before.usual.position,
+            &self.tables,
+            setup,
+            out,
+            &mut edit,
+        );
         match (&done, &edit) {
             (Ok(()), Some(edit)) => self.tables.apply(edit),
             (Ok(()), None) => {}
             (Err(_), _) => {
-                let blamed = self.state.blamed;
-                self.state = before;
-                self.state.blamed = blamed;
+                before.restore(&mut self.state);
+                self.restore_origin();
                 out.clear();
             }
         }
         done
+    }
+
+    /// The origin by what it is the sum of, which was within the range before.
+    #[inline(never)]
+    #[small]
+    fn restore_origin(&mut self) {
+        let _ = self.state.update_origin(&self.tables.row(Row::system(self.state.modal.system)));
     }
 }
 
@@ -204,6 +217,37 @@ impl Before {
         state.line = self.line;
         state.position = self.position;
         state.residue = self.residue;
+    }
+}
+
+/// The same of a block of whatever there is, but for the words of a cycle, which `State` sees to, and the origin:
+/// the less of it there is the better, for the deepest stack is below it.
+struct RareBefore {
+    usual: Before,
+    homed: u8,
+    shift: PerAxis<Length>,
+    shifted: bool,
+    tool_length: PerAxis<Length>,
+    speed: f32,
+    selected: u8,
+    tool: u8,
+}
+
+#[small]
+impl RareBefore {
+    fn of(state: &State) -> Self {
+        let State { homed, shift, shifted, tool_length, speed, selected, tool, .. } = *state;
+        Self { usual: Before::of(state), homed, shift, shifted, tool_length, speed, selected, tool }
+    }
+
+    #[inline(never)]
+    fn restore(&self, state: &mut State) {
+        self.usual.restore(state);
+        state.homed = self.homed;
+        (state.shift, state.shifted) = (self.shift, self.shifted);
+        state.tool_length = self.tool_length;
+        state.speed = self.speed;
+        (state.selected, state.tool) = (self.selected, self.tool);
     }
 }
 

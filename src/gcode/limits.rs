@@ -13,6 +13,8 @@ use crate::units::{Length, PerAxis};
 /// An arc may bulge this far over a limit (1 um), and by this part of its radius: so exact is a float.
 const SLACK: f32 = 10.0;
 const SLACK_PART: f32 = 2e-7;
+/// How far a point may be from the origin: 1 um short of what a length can hold.
+const RANGE: (Length, Length) = (Length(10 - i32::MAX), Length(i32::MAX - 10));
 
 /// Refuses (220) a move from `start` that leaves the travel of an axis whose bit in `homed` is set.
 #[inline(never)]
@@ -36,16 +38,26 @@ pub(super) fn check(
         | Motion::Feed { target, .. }
         | Motion::Probe { target, .. } => target,
         Motion::Arc { target, arc, .. } => {
-            let limits = [arc.first, arc.second].map(limits);
-            if !arc_is_within(start, target, arc, &limits) {
-                return Err(Status::SoftLimit);
-            }
+            check_arc(start, target, arc, limits)?;
             target
         }
     };
     check_straight(start, target, limits)
 }
 
+#[inline(never)]
+#[small]
+fn check_arc(
+    start: &PerAxis<Length>,
+    target: &PerAxis<Length>,
+    arc: &Arc,
+    limits: impl Fn(u8) -> Option<(Length, Length)>,
+) -> Result<(), Status> {
+    let limits = [limits(arc.first), limits(arc.second)];
+    if arc_is_within(start, target, arc, Some(&limits)) { Ok(()) } else { Err(Status::SoftLimit) }
+}
+
+#[inline(never)]
 #[small]
 fn check_straight(
     start: &PerAxis<Length>,
@@ -88,15 +100,15 @@ fn check_cycle(
 }
 
 /// Whether the points of an arc that lie farthest out in its plane are within the limits, `both` of its first and
-/// second axis; its end is not looked at. A helix advances evenly, so that its end is the farthest point along its axis.
+/// second axis, or [`RANGE`]; its end is not looked at. A helix advances evenly, so that its end is the farthest point along its axis.
 #[inline(never)]
 pub(super) fn arc_is_within(
     start: &PerAxis<Length>,
     target: &PerAxis<Length>,
     arc: &Arc,
-    both: &[Option<(Length, Length)>; 2],
+    both: Option<&[Option<(Length, Length)>; 2]>,
 ) -> bool {
-    if *both == [None, None] {
+    if both.is_some_and(|both| both.iter().all(Option::is_none)) {
         return true;
     }
     let (from, to) = (spoke(start, arc), spoke(target, arc));
@@ -104,7 +116,8 @@ pub(super) fn arc_is_within(
     let part = part(start, target, arc) + f32::from(arc.extra_turns);
     let slack = SLACK + SLACK_PART * radius;
     let passes = |out: [f32; 2]| part >= 1.0 || turned(from, out, arc.clockwise) < part;
-    for (i, (limits, center)) in both.iter().zip(arc.center).enumerate() {
+    for (i, center) in arc.center.into_iter().enumerate() {
+        let limits = both.map_or(Some(RANGE), |both| both.get(i).copied().flatten());
         let Some((low, high)) = limits else { continue };
         let mut out = [0.0; 2];
         for (out_here, within) in [

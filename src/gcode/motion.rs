@@ -31,7 +31,6 @@ impl State {
         if absolute && !matches!(mode, MotionMode::Traverse | MotionMode::Feed) {
             return Err(Status::MachineCoordinatesMotion);
         }
-        let before = if block.cancels() { MotionMode::None } else { self.modal.motion };
         self.modal.motion = mode;
         match mode {
             MotionMode::None => Ok(()),
@@ -43,8 +42,27 @@ impl State {
             | MotionMode::ProbeTowardsQuietly
             | MotionMode::ProbeAway
             | MotionMode::ProbeAwayQuietly => self.probe(block, mode, setup, out),
-            cycle => self.cycle(block, cycle, before, setup, out),
+            // Cycles go their own way.
+            _ => Err(Status::InternalError),
         }
+    }
+
+    /// The canned cycle of a line that has one.
+    #[inline(never)]
+    #[small]
+    pub(super) fn cycle_motion(
+        &mut self,
+        block: &Block,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        if block.non_modal == Some(NonModal::MachineCoordinates) {
+            return Err(Status::MachineCoordinatesMotion);
+        }
+        let Some(mode) = block.does() else { return Err(Status::InternalError) };
+        let before = if block.cancels() { MotionMode::None } else { self.modal.motion };
+        self.modal.motion = mode;
+        self.cycle(block, mode, before, setup, out)
     }
 
     #[inline(never)]

@@ -335,14 +335,17 @@ impl State {
 }
 
 /// G4: P seconds.
+#[small]
 pub(super) fn dwell_ms(block: &Block) -> Result<u32, Status> {
     block.get(P).ok_or(Status::PWordMissing)?.milliseconds()
 }
 
+#[small]
 fn at(values: &PerAxis<Length>, axis: u8) -> Length {
     values.get(usize::from(axis)).copied().unwrap_or_default()
 }
 
+#[small]
 fn put<T>(values: &mut PerAxis<T>, axis: u8, value: T) {
     if let Some(place) = values.get_mut(usize::from(axis)) {
         *place = value;

@@ -16,6 +16,7 @@ pub enum Override {
     Spindle = 2,
 }
 
+#[small]
 impl Override {
     /// The highest factor.
     pub const fn most(self) -> u16 {
@@ -47,6 +48,7 @@ pub struct Change {
     factor: u16,
 }
 
+#[small]
 impl Change {
     /// M48, and what the end of a program does.
     pub const ALL_ON: Self = Self { which: ALL, on: true, factor: 0 };
@@ -77,6 +79,7 @@ pub struct Overrides {
     on: u8,
 }
 
+#[small]
 impl Overrides {
     /// At power-up: all on, and nothing is overridden.
     pub const NONE: Self = Self { factors: [FULL; 3], on: ALL };

@@ -105,6 +105,9 @@ impl State {
         Self::overrides(block, out)?;
         self.offsets(block, tables, setup)?;
         self.non_modal(block, tables, setup, out, edit)?;
+        if block.does().is_some_and(MotionMode::is_cycle) {
+            return self.finish_cycle(block, start, tables, edit, setup, out);
+        }
         self.finish(block, start, tables, setup, out)?;
         self.stop(block, tables, edit, setup, out)
     }
@@ -150,6 +153,7 @@ impl State {
     }
 
     /// S, T and M6.
+    #[small]
     fn tools(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
         if let Some(value) = block.get(S) {
             if value.negative {
@@ -195,6 +199,7 @@ impl State {
     }
 
     /// M48 to M51.
+    #[small]
     fn overrides(block: &Block, out: &mut Commands) -> Result<(), Status> {
         out.overrides = match block.overrides {
             None => return Ok(()),
@@ -221,6 +226,36 @@ impl State {
             }
             _ => self.motion(block, setup, out)?,
         }
+        self.end_motion(start, setup, out)
+    }
+
+    /// A canned cycle, and what comes after it. Its words stay, unless the line is refused.
+    #[inline(never)]
+    #[small]
+    fn finish_cycle(
+        &mut self,
+        block: &Block,
+        start: &PerAxis<Length>,
+        tables: &impl Tables,
+        edit: &Option<Edit>,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
+        let before = self.sticky;
+        let done = self
+            .cycle_motion(block, setup, out)
+            .and_then(|()| self.end_motion(start, setup, out))
+            .and_then(|()| self.stop(block, tables, edit, setup, out));
+        done.inspect_err(|_| self.sticky = before)
+    }
+
+    #[inline(never)]
+    fn end_motion(
+        &self,
+        start: &PerAxis<Length>,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<(), Status> {
         // Limits are for homed axes alone.
         if self.homed != 0 {
             limits::check(start, &out.motion, self.homed, setup)?;
@@ -230,6 +265,7 @@ impl State {
     }
 
     #[inline(never)]
+    #[small]
     fn stop(
         &mut self,
         block: &Block,
@@ -252,6 +288,7 @@ impl State {
 
     /// M2 and M30: modes as at power-up, but G1 with F0; no G92. The line's own change of the
     /// tables counts.
+    #[small]
     fn end_program(
         &mut self,
         tables: &impl Tables,
@@ -271,6 +308,7 @@ impl State {
 }
 
 /// What becomes of one override.
+#[small]
 fn override_one(block: &Block, which: Override, how: Switch) -> Result<Change, Status> {
     let word = block.get(P);
     let off = match how {

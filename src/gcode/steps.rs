@@ -246,6 +246,7 @@ impl Steps {
         }
     }
 
+    #[inline(never)]
     fn op(&mut self, op: Op, cycle: &Cycle, position: &PerAxis<Length>) -> Option<Step> {
         let across = usize::from(cycle.plane.axes()[2]);
         let spindle = |turn| Some(Step::Spindle(Spindle { turn, ..cycle.spindle }));
@@ -271,6 +272,7 @@ impl Steps {
     }
 
     /// To the hole, or so far beside it.
+    #[inline(never)]
     fn over(&self, cycle: &Cycle, position: &PerAxis<Length>, by: [Length; 2]) -> Option<Step> {
         let mut target = *position;
         let hole = cycle.hole(self.hole)?;
@@ -281,6 +283,7 @@ impl Steps {
     }
 
     /// G73 and G83: to the bottom in feeds no longer than Q.
+    #[inline(never)]
     fn peck(&mut self, cycle: &Cycle, position: &PerAxis<Length>, across: usize) -> Option<Step> {
         let again = Length(self.depth.0.saturating_add(PECK_CLEARANCE)).min(cycle.retract);
         let (to, feed, next) = match self.peck {
@@ -303,6 +306,8 @@ impl Steps {
 }
 
 /// Along the axis across the plane.
+#[inline(never)]
+#[small]
 fn level(
     position: &PerAxis<Length>,
     across: usize,

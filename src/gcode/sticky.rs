@@ -31,6 +31,7 @@ pub struct Sticky {
     pub offsets: [Option<Length>; 3],
 }
 
+#[small]
 impl Sticky {
     /// No words. All zeros, so that it needs no memory.
     pub const NONE: Self = Self {
@@ -44,40 +45,51 @@ impl Sticky {
         offsets: [None; 3],
     };
 
-    /// What is in force on a line of `mode`, after `before` was: its words, and the others of the series.
+    /// Takes what is in force on a line of `mode`, after `before` was: its words, and the others of the series.
     /// `here`: where the axis across the plane is.
+    #[inline(never)]
     pub fn on(
-        &self,
+        &mut self,
         block: &Block,
         mode: MotionMode,
         before: MotionMode,
         plane: Plane,
         units: Units,
         here: Length,
-    ) -> Result<Self, Status> {
-        let mut now = match () {
+    ) -> Result<(), Status> {
+        match () {
             // Along another axis, heights mean nothing.
-            () if self.plane != plane => Self { initial: here, ..Self::NONE },
-            () if before == mode && self.mode == mode => *self,
-            () if before.is_cycle() => Self { initial: self.initial, ..Self::NONE },
-            () => Self { initial: here, ..Self::NONE },
-        };
-        (now.mode, now.plane) = (mode, plane);
+            () if self.plane != plane => self.forget(here),
+            () if before == mode && self.mode == mode => {}
+            () if before.is_cycle() => self.forget(self.initial),
+            () => self.forget(here),
+        }
+        (self.mode, self.plane) = (mode, plane);
         let length = |slot: u8, kept: &mut Option<Length>| {
             if let Some(word) = block.get(slot) {
                 *kept = Some(axes::length(word, units)?.units);
             }
             Ok(())
         };
-        length(R, &mut now.retract)?;
-        length(plane.axes()[2], &mut now.depth)?;
-        length(Q, &mut now.peck)?;
-        for (slot, offset) in (I..).zip(&mut now.offsets) {
+        length(R, &mut self.retract)?;
+        length(plane.axes()[2], &mut self.depth)?;
+        length(Q, &mut self.peck)?;
+        for (slot, offset) in (I..).zip(&mut self.offsets) {
             length(slot, offset)?;
         }
         if let Some(word) = block.get(P) {
-            now.dwell_ms = Some(word.milliseconds()?);
+            self.dwell_ms = Some(word.milliseconds()?);
         }
-        Ok(now)
+        Ok(())
+    }
+
+    /// No words; the series begins where the axis is at `initial`.
+    fn forget(&mut self, initial: Length) {
+        // One by one: whole, it would be copied from a constant, which has its place in RAM.
+        self.initial = initial;
+        (self.retract, self.depth, self.peck, self.dwell_ms) = (None, None, None, None);
+        for offset in &mut self.offsets {
+            *offset = None;
+        }
     }
 }

@@ -23,6 +23,7 @@ pub const TOOL_AXES: [u8; 2] = [0, 2];
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Row(u8);
 
+#[small]
 impl Row {
     /// The origin of a coordinate system, from 0; machine coordinates.
     pub const fn system(number: u8) -> Self {
@@ -90,6 +91,7 @@ pub trait Tables {
     fn apply(&mut self, edit: &Edit);
 }
 
+#[small]
 impl Edit {
     /// A change that can be taken now.
     pub fn new(row: Row, values: PerAxis<Length>, tables: &impl Tables) -> Result<Self, Status> {
@@ -104,6 +106,7 @@ impl Edit {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Ram([PerAxis<Length>; ROWS as usize]);
 
+#[small]
 impl Ram {
     /// All zeros.
     pub const fn new() -> Self {
@@ -111,12 +114,14 @@ impl Ram {
     }
 }
 
+#[small]
 impl Default for Ram {
     fn default() -> Self {
         Self::new()
     }
 }
 
+#[small]
 impl Tables for Ram {
     fn row(&self, row: Row) -> PerAxis<Length> {
         self.0.get(usize::from(row.number())).copied().unwrap_or_default()

@@ -64,7 +64,7 @@ impl State {
         let mut words = Words::new(line, numbered);
         let from = match modal.distance {
             Distance::Absolute => &self.origin,
-            Distance::Incremental if self.residue == [0; AXES] => &self.position,
+            Distance::Incremental if self.residue.iter().all(|rest| *rest == 0) => &self.position,
             // What rounding has taken would have to be carried on.
             Distance::Incremental => return false,
         };

@@ -38,6 +38,7 @@ pub struct Job {
     at: u8,
 }
 
+#[small]
 impl Job {
     /// The job of that number, from its start; number 0 is none. `None` for one that does not exist; whether there is a
     /// program in EEPROM is for the caller to see.
@@ -82,6 +83,7 @@ impl Job {
     }
 }
 
+#[small]
 impl Job {
     fn stored_line(&mut self, memory: &impl Memory, line: &mut Vec<u8, LINE_MAX>) -> bool {
         line.clear();

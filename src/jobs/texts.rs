@@ -65,6 +65,7 @@ pieces!(BRAID, 3:
 );
 
 /// Piece `index` of job `number`.
+#[small]
 pub fn piece(number: u8, index: u8) -> Option<Piece> {
     let i = usize::from(index);
     match number {

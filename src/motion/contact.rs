@@ -45,6 +45,7 @@ machine_static! {
 }
 
 /// The contact is now, while the generator is `dda` in the segment of slot `tail`. Look interrupt only.
+#[small]
 pub fn note(dda: &Dda, tail: u8) {
     if contact().stage.get() == NONE {
         // SAFETY: in this stage it is the look's.
@@ -56,6 +57,7 @@ pub fn note(dda: &Dda, tail: u8) {
 
 /// Whether there has been one. Any level.
 #[inline(always)]
+#[small]
 pub fn is_noted() -> bool {
     contact().stage.get() != NONE
 }
@@ -63,6 +65,7 @@ pub fn is_noted() -> bool {
 /// Follows the generator through what has been pushed since, at most one segment of which came after the contact.
 /// Exec only, before it pushes another.
 #[inline(never)]
+#[small]
 pub fn catch_up(segments: &Producer<Segment, SEGMENTS>) {
     if contact().stage.get() == NOTED {
         // SAFETY: exec's, from now on.
@@ -74,6 +77,7 @@ pub fn catch_up(segments: &Producer<Segment, SEGMENTS>) {
 
 /// Another segment has been pushed. Exec only.
 #[inline(never)]
+#[small]
 pub fn pushed(segment: &Segment) {
     if contact().stage.get() == FOLLOWED {
         // SAFETY: exec's in this stage.
@@ -83,12 +87,14 @@ pub fn pushed(segment: &Segment) {
 
 /// Where the motors were at the contact, that have come to rest `at`. Thread mode, when exec has dropped its
 /// blocks.
+#[small]
 pub fn steps(at: &[i32; MOTORS]) -> Option<[i32; MOTORS]> {
     // SAFETY: exec has nothing to push.
     is_noted().then(|| unsafe { &*contact().follow.get() }.before(at))
 }
 
 /// Forgets it. Thread mode, when exec has dropped its blocks or no switch is armed.
+#[small]
 pub fn clear() {
     contact().stage.set(NONE);
 }

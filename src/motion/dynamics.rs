@@ -7,7 +7,7 @@ use super::line::Motors;
 use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
-use crate::units::{AXES, PerAxis};
+use crate::units::PerAxis;
 
 /// Where the limits come from: the settings, in their units. Axes are 0 to 5 for X Y Z A B C; a limit that
 /// is not positive is none; mm are degrees for rotary axes.
@@ -64,8 +64,16 @@ pub struct Dynamics {
 impl Dynamics {
     /// Cost: 2,000 an axis, 600 for each number of motors.
     pub fn new(machine: &(impl Machine + Motors)) -> Self {
-        let mut axes = [Axis::default(); AXES];
-        for (n, axis) in axes.iter_mut().enumerate() {
+        let mut dynamics = Self::default();
+        dynamics.set(machine);
+        dynamics
+    }
+
+    /// Takes the limits of `machine` over.
+    #[inline(never)]
+    #[small]
+    pub fn set(&mut self, machine: &(impl Machine + Motors)) {
+        for (n, axis) in self.axes.iter_mut().enumerate() {
             *axis = Axis {
                 velocity: machine.velocity_max(n) * (1.0 / 60.0),
                 feed: machine.feedrate_max(n) * (1.0 / 60.0),
@@ -74,16 +82,13 @@ impl Dynamics {
                 deviation: Short::new(machine.junction_deviation(n)),
             };
         }
-        let mut drives = [0; MOTORS];
-        for (m, axis) in drives.iter_mut().enumerate() {
+        for (m, axis) in self.drives.iter_mut().enumerate() {
             *axis = machine.motor_axis(m);
         }
+        self.junction = machine.junction_acceleration() * (1.0 / 3_600.0);
         let drivers = machine.drivers();
-        Self {
-            axes,
-            junction: machine.junction_acceleration() * (1.0 / 3_600.0),
-            drives,
-            rates: core::array::from_fn(|others| drivers.step_rate_max(others + 1)),
+        for (others, rate) in self.rates.iter_mut().enumerate() {
+            *rate = drivers.step_rate_max(others + 1);
         }
     }
 }

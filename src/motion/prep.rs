@@ -395,6 +395,7 @@ impl Prep {
     /// was to come next, if it has been prepared.
     /// Cost: 4,000 a motor.
     #[inline(never)]
+    #[small]
     pub fn cut(&mut self, target: &mut [i32; MOTORS]) -> Option<Segment> {
         let mut bit = 1;
         for (m, target) in target.iter_mut().enumerate() {
@@ -414,6 +415,8 @@ impl Prep {
     }
 
     /// Phase units that a motor is short of its target: exact.
+    #[inline(never)]
+    #[small]
     fn short_of(&self, m: usize, bit: u8) -> i32 {
         let (minor, debt) = (&self.minors[m], i32::from(self.debt[m]));
         if self.full & bit != 0 {

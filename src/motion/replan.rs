@@ -18,6 +18,7 @@ use crate::hal::imp::exec;
 /// A bit for each block, the newest first.
 struct Marks([u8; BLOCKS.div_ceil(8)]);
 
+#[small]
 impl Marks {
     fn set(&mut self, back: usize) {
         if let Some(byte) = self.0.get_mut(back / 8) {
@@ -30,6 +31,7 @@ impl Marks {
     }
 }
 
+#[small]
 impl BlockQueue {
     /// The overrides that are wanted, if the keys are for others. Cost: 60.
     pub fn wanted(&self) -> Option<Factors> {
@@ -120,6 +122,7 @@ impl BlockQueue {
 }
 
 /// The line that a block is.
+#[small]
 fn line(block: Option<&Block>) -> Option<&Line> {
     match block {
         Some(Block { body: Body::Line(line), .. }) => Some(line),
@@ -128,6 +131,7 @@ fn line(block: Option<&Block>) -> Option<&Line> {
 }
 
 /// Whether jerk limits change between two lines.
+#[small]
 fn is_firm(line: &Line, before: &Line) -> bool {
     let limits = |line: &Line| (line.accel, line.jerk);
     limits(line) != limits(before) && (line.jerk != Short::ZERO || before.jerk != Short::ZERO)

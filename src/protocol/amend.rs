@@ -12,10 +12,12 @@ use crate::status::Status;
 use crate::text;
 
 /// Whether an object of this name changes the report, where that of the other (`sr`) is a new one.
+#[small]
 pub(super) fn is_amended(name: &[u8]) -> bool {
     name.len() > 2
 }
 
+#[small]
 impl Request {
     /// One pair. `selected` is set in the inner object.
     pub(super) fn amend<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
@@ -56,6 +58,7 @@ impl Request {
 }
 
 /// `clear` and `defa`.
+#[small]
 fn reset(name: &Name, pair: &Pair, machine: &mut impl Machine) -> Result<(), Status> {
     let clears = name.is(text!("clear"));
     if !(clears || name.is(text!("defa"))) {
@@ -71,6 +74,7 @@ fn reset(name: &Name, pair: &Pair, machine: &mut impl Machine) -> Result<(), Sta
 }
 
 /// A value to tell from now on, or no more.
+#[small]
 fn change<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
     let token = match resolve(Name::new(), pair.name.of(c.line)) {
         Target::Token(token) if !token.is_far() => token,

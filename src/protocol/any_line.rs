@@ -10,6 +10,7 @@ use std::vec::Vec;
 use std::{format, vec};
 
 /// Whether an answer nests, separates and quotes as JSON must.
+#[small]
 fn is_json(answer: &[u8]) -> bool {
     let (mut depth, mut quoted, mut escaped, mut last) = (0, false, false, b' ');
     let mut separated = true;
@@ -35,6 +36,7 @@ fn is_json(answer: &[u8]) -> bool {
 }
 
 /// Lines that mean something, or nearly.
+#[small]
 fn lines() -> impl Strategy<Value = Vec<u8>> {
     let word = || {
         prop::sample::select(vec![
@@ -99,6 +101,7 @@ fn lines() -> impl Strategy<Value = Vec<u8>> {
     prop_oneof![sensible, valid, prop::collection::vec(any::<u8>(), 0..300)]
 }
 
+#[small]
 fn sets_style(line: &[u8]) -> bool {
     line.windows(2).any(|pair| pair.eq_ignore_ascii_case(b"js"))
 }

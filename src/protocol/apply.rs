@@ -93,6 +93,7 @@ impl Request {
 }
 
 /// The value of a pair as 32 bits: `"0x2a"`.
+#[small]
 fn bits(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
     if !matches!(pair.kind, Kind::Text | Kind::Number) {
         return Err(Status::UnsupportedType);
@@ -137,6 +138,7 @@ fn jog<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Stat
 }
 
 /// Sets a value of the machine, of which only the overrides can be.
+#[small]
 fn set_value<M: Machine, O>(
     value: Value,
     pair: &Pair,
@@ -165,6 +167,7 @@ fn set_value<M: Machine, O>(
 }
 
 /// The factor that a pair gives an override, thousandths.
+#[small]
 fn factor(which: Override, pair: &Pair, line: &[u8]) -> Result<u16, Status> {
     if pair.kind != Kind::Number {
         return Err(Status::UnsupportedType);
@@ -177,11 +180,13 @@ fn factor(which: Override, pair: &Pair, line: &[u8]) -> Result<u16, Status> {
     }
 }
 
+#[small]
 fn done(status: Status) -> Result<(), Status> {
     if status == Status::Ok { Ok(()) } else { Err(status) }
 }
 
 /// The value of a pair as a whole number.
+#[small]
 fn whole<M, O>(pair: &Pair, c: &Context<'_, M, O>) -> Result<i32, Status> {
     if pair.kind != Kind::Number {
         return Err(Status::UnsupportedType);
@@ -192,6 +197,7 @@ fn whole<M, O>(pair: &Pair, c: &Context<'_, M, O>) -> Result<i32, Status> {
         .ok_or(Status::BadNumber)
 }
 
+#[small]
 fn act<M: Machine, O>(
     action: Action,
     pair: &Pair,

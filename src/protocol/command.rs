@@ -10,6 +10,7 @@ use super::{Mode, help};
 use crate::config::{Name, Owner};
 use crate::status::Status;
 
+#[small]
 impl Request {
     /// Shows, sets or does what the line says; `at` is behind its `$`.
     pub(super) fn command<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
@@ -72,15 +73,18 @@ impl Request {
     }
 }
 
+#[small]
 fn is_separator(byte: u8) -> bool {
     matches!(byte, b'=' | b':' | b'|') || is_blank(byte)
 }
 
+#[small]
 fn is_blank(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t')
 }
 
 /// The name at `at` and what stands behind it, a number if anything does.
+#[small]
 fn split(line: &[u8], at: u8) -> Pair {
     let byte = |at: u8| line.get(usize::from(at)).copied();
     let skip = |mut at: u8, wanted: fn(u8) -> bool| {

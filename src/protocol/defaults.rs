@@ -10,6 +10,7 @@ use super::write::{Out, Writer};
 use crate::config::Number;
 use crate::status::Status;
 
+#[small]
 impl Request {
     /// Restores the defaults if the value of `pair` says so; else tells how to.
     pub(super) fn restore<M: Machine, O>(
@@ -68,6 +69,7 @@ impl Request {
 }
 
 /// Whether the value of a pair says that something is to be done.
+#[small]
 pub(super) fn is_sure<M, O>(pair: &Pair, c: &Context<'_, M, O>) -> Result<bool, Status> {
     match pair.kind {
         Kind::True => Ok(true),

@@ -89,6 +89,7 @@ progmem! {
     ];
 }
 
+#[small]
 impl Request {
     /// Shows a screen.
     pub(super) fn help(&mut self, screen: Span) {
@@ -115,12 +116,14 @@ impl Request {
 }
 
 /// Whether a line, behind its blanks, is one of text mode.
+#[small]
 pub fn is_text_command(line: &[u8]) -> bool {
     let mut bytes = line.iter().skip_while(|byte| matches!(byte, b' ' | b'\t'));
     matches!(bytes.next(), Some(b'$' | b'?')) || asks_help(line)
 }
 
 /// Whether a line is the letter H alone.
+#[small]
 pub fn asks_help(line: &[u8]) -> bool {
     let mut bytes = line.iter().filter(|byte| !matches!(byte, b' ' | b'\t'));
     matches!((bytes.next(), bytes.next()), (Some(b'h' | b'H'), None))

@@ -23,6 +23,7 @@ pub struct Span {
     pub end: u8,
 }
 
+#[small]
 impl Span {
     /// Its bytes.
     pub fn of(self, line: &[u8]) -> &[u8] {
@@ -60,16 +61,19 @@ pub struct Pair {
     pub next: u8,
 }
 
+#[small]
 fn is_punctuation(byte: u8) -> bool {
     matches!(byte, b'"' | b'{' | b'}' | b'[' | b']' | b':' | b',' | b'\\')
 }
 
 /// Whether `line` is one object, no deeper than `{srs:{set:{vel:t}}}`, or what is wrong. About 80 cycles a byte on AVR.
+#[small]
 pub fn check(line: &[u8]) -> Result<(), Status> {
     Cursor { line, at: 0 }.object().unwrap_or(Err(Status::JsonSyntax))
 }
 
 /// The first pair of the outer object that has a name like that. The line has passed [`check`].
+#[small]
 pub fn find(line: &[u8], wanted: impl Fn(&[u8]) -> bool) -> Option<Pair> {
     let mut cursor = Cursor { line, at: 0 };
     cursor.take(b'{');
@@ -91,6 +95,7 @@ pub fn find(line: &[u8], wanted: impl Fn(&[u8]) -> bool) -> Option<Pair> {
 }
 
 /// The pair at `at`, or `None` at the end of the object. The line has passed [`check`].
+#[small]
 pub fn pair(line: &[u8], at: u8) -> Option<Pair> {
     let mut cursor = Cursor { line, at };
     cursor.take(b',');
@@ -98,6 +103,7 @@ pub fn pair(line: &[u8], at: u8) -> Option<Pair> {
 }
 
 /// Where to read on behind the brace that closes an object and at or behind `at`.
+#[small]
 pub fn behind_object(line: &[u8], at: u8) -> u8 {
     let mut cursor = Cursor { line, at };
     cursor.take(b'}');
@@ -105,6 +111,7 @@ pub fn behind_object(line: &[u8], at: u8) -> u8 {
 }
 
 /// The first byte of `line` that is not a blank, as an index.
+#[small]
 pub fn skip_blanks(line: &[u8]) -> u8 {
     let mut cursor = Cursor { line, at: 0 };
     cursor.blanks();
@@ -116,6 +123,7 @@ struct Cursor<'a> {
     at: u8,
 }
 
+#[small]
 impl Cursor<'_> {
     fn peek(&self) -> Option<u8> {
         self.line.get(usize::from(self.at)).copied()

@@ -47,6 +47,7 @@ pub(super) struct Series {
     end: u8,
 }
 
+#[small]
 impl Series {
     /// What a letter stands for: `$` all but tools, `m` motors, `q` axes, `o` offsets.
     pub fn of_letter(letter: u8) -> Option<Series> {
@@ -78,6 +79,7 @@ impl Series {
     }
 }
 
+#[small]
 impl Request {
     /// Lists a group, or those of a series.
     pub(super) fn enlist(&mut self, group: Option<Group>, series: Option<Series>) {
@@ -140,11 +142,13 @@ fn put_part<M: Machine, O: Out>(
 }
 
 /// Where the description of a setting starts, behind its name in brackets.
+#[small]
 fn title_start(setting: Setting) -> usize {
     TITLE_START.max(setting.name().bytes().len() + 3)
 }
 
 /// The length of what tells whose a setting is: `m1 `, `x `.
+#[small]
 fn owner_len(setting: Setting) -> usize {
     match setting.owner() {
         Owner::Motor(_) => 3,
@@ -153,6 +157,7 @@ fn owner_len(setting: Setting) -> usize {
     }
 }
 
+#[small]
 fn put_title<O: Out>(setting: Setting, words: &Words, writer: &mut Writer<'_, O>) {
     let name = setting.name();
     writer.byte(b'[');
@@ -170,6 +175,7 @@ fn put_title<O: Out>(setting: Setting, words: &Words, writer: &mut Writer<'_, O>
 }
 
 /// The value of a setting, in its column.
+#[small]
 fn put_value<M: Machine, O: Out>(
     setting: Setting,
     words: &Words,
@@ -200,12 +206,14 @@ fn put_value<M: Machine, O: Out>(
     }
 }
 
+#[small]
 fn put_number<O: Out>(fixed: Fixed, width: usize, writer: &mut Writer<'_, O>) {
     let decimals = usize::from(fixed.decimals);
     writer.aligned(fixed, width + decimals + usize::from(decimals > 0));
 }
 
 /// The unit of a setting, or its choices.
+#[small]
 fn put_tail<M: Machine, O: Out>(
     setting: Setting,
     words: &Words,

@@ -32,6 +32,7 @@ pub enum Occasion {
 /// The rows of `sys` that the greeting tells, in its order.
 pub(super) const BANNER_ROWS: u8 = 5;
 
+#[small]
 impl Banner {
     /// Begins. It is whole whatever the verbosity, unless that is 0.
     pub fn begin(occasion: Occasion, settings: &Settings) -> Banner {
@@ -39,6 +40,7 @@ impl Banner {
     }
 
     /// Does the next part. Whether there is more to do.
+    #[inline(never)]
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         let mut writer = Writer::frame(out, &mut self.format);
         if self.stage == 0 {
@@ -70,6 +72,7 @@ impl Banner {
 }
 
 /// One of the rows that tell who we are.
+#[small]
 pub(super) fn put_row<O: Out>(row: u8, machine: &mut impl Machine, writer: &mut Writer<'_, O>) {
     // The version comes before the build.
     let token = Token::system(if row < 2 { 1 - row } else { row });
@@ -97,6 +100,7 @@ pub struct Exception {
     format: Format,
 }
 
+#[small]
 impl Exception {
     /// Begins.
     pub fn begin(status: Status, settings: &Settings) -> Exception {
@@ -104,6 +108,7 @@ impl Exception {
     }
 
     /// Does the next part. Whether there is more to do.
+    #[inline(never)]
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         let mut writer = Writer::body(out, &mut self.format);
         let more = put_exception(self.stage, self.status, machine, &mut writer);
@@ -113,6 +118,7 @@ impl Exception {
 }
 
 /// A part of an exception report. Whether there is more to do.
+#[small]
 pub(super) fn put_exception<O: Out>(
     stage: u8,
     status: Status,
@@ -164,6 +170,7 @@ pub struct Probing {
     format: Format,
 }
 
+#[small]
 impl Probing {
     /// Begins. It is whole whatever the verbosity, unless that is 0.
     pub fn begin(settings: &Settings) -> Probing {
@@ -171,6 +178,7 @@ impl Probing {
     }
 
     /// Does the next part. Whether there is more to do.
+    #[inline(never)]
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         let mut writer = Writer::frame(out, &mut self.format);
         let group = Group::Vector(PROBED);
@@ -208,6 +216,8 @@ pub fn jog_ended(settings: &Settings, out: &mut impl Out) {
 }
 
 /// Answers the question whether anybody is there.
+#[small]
+#[inline(never)]
 pub fn acknowledge(settings: &Settings, out: &mut impl Out) {
     let mut format = Format::json(settings);
     let mut writer = Writer::body(out, &mut format);

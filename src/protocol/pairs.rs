@@ -15,6 +15,7 @@ use crate::text;
 /// What to tell of a pair that was carried out.
 pub(super) type Outcome = Result<Option<Token>, Status>;
 
+#[small]
 impl Request {
     pub(super) fn pair<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let Some(pair) = json::pair(c.line, self.at) else {
@@ -234,6 +235,7 @@ impl Request {
 }
 
 /// A number without the leading zeros that JSON does not allow.
+#[small]
 fn plain_number(mut text: &[u8]) -> &[u8] {
     while let [b'0', rest @ ..] = text
         && matches!(rest, [b'0'..=b'9', ..])

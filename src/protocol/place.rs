@@ -21,6 +21,7 @@ pub(super) struct Place {
     title: Text,
 }
 
+#[small]
 impl Place {
     /// The place that a token tells, if it does.
     pub fn of(token: Token) -> Option<Place> {
@@ -72,6 +73,7 @@ impl Place {
 }
 
 /// A name without the letter of the axis.
+#[small]
 fn group(name: &Name) -> &[u8] {
     name.bytes().split_last().map_or(&[], |(_, group)| group)
 }

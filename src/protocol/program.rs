@@ -19,6 +19,7 @@ const STEP: u16 = 24;
 
 /// Does to the program what the value of a pair says.
 #[inline(never)]
+#[small]
 pub(super) fn store<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
     let text = pair.value.of(c.line);
     let what = match (pair.kind, text) {
@@ -36,6 +37,7 @@ pub(super) fn store<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Re
     c.machine.store(what)
 }
 
+#[small]
 impl Request {
     /// Begins to show the program as the value of a pair.
     pub(super) fn show_program<M: Machine, O: Out>(

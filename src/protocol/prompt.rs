@@ -9,6 +9,7 @@ use crate::config::Fixed;
 use crate::status::Status;
 use crate::text;
 
+#[small]
 impl Request {
     /// `tinyg [mm] ok> `, or the beginning of `tinyg [mm] err: <text>: <line> `.
     pub(super) fn prompt<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
@@ -55,6 +56,7 @@ impl Request {
     }
 }
 
+#[small]
 fn put_prompt<O: Out>(ok: bool, machine: &mut impl Machine, writer: &mut Writer<'_, O>) {
     let phrases = writer.dialect().phrases();
     writer.text(phrases.prompt);
@@ -63,6 +65,7 @@ fn put_prompt<O: Out>(ok: bool, machine: &mut impl Machine, writer: &mut Writer<
 }
 
 /// The prompt of a machine that has started in text mode.
+#[small]
 pub fn put_ready_prompt(machine: &mut impl Machine, out: &mut impl Out) {
     if machine.settings().text_verbosity() != 0 {
         let mut format = Format::plain(machine.settings());

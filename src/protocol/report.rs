@@ -33,12 +33,14 @@ pub struct StatusReport {
     fresh: bool,
 }
 
+#[small]
 impl Default for StatusReport {
     fn default() -> Self {
         Self::new()
     }
 }
 
+#[small]
 impl StatusReport {
     /// The default list.
     pub fn new() -> StatusReport {
@@ -139,8 +141,10 @@ pub struct Report {
     format: Format,
 }
 
+#[small]
 impl Report {
     /// Begins an automatic report, if the settings want any: of what has changed, or everything.
+    #[inline(never)]
     pub fn begin(mode: Mode, machine: &mut impl Machine) -> Option<Report> {
         let verbosity = machine.settings().status_verbosity();
         if verbosity == 0 {
@@ -152,6 +156,7 @@ impl Report {
     }
 
     /// Looks at one entry. Whether there is more to do. If nothing has changed, nothing is sent.
+    #[inline(never)]
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         let Some(token) = machine.report().token(self.index) else {
             self.end(out);
@@ -186,6 +191,8 @@ impl Report {
 
 /// Sends a queue report if the settings want any: free blocks, and with more verbosity those added
 /// and removed since the last.
+#[small]
+#[inline(never)]
 pub fn queue_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) {
     let verbosity = machine.settings().queue_verbosity();
     if verbosity == 0 {
@@ -203,6 +210,8 @@ pub fn queue_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) 
 }
 
 /// Sends what is free for lines, after a queue flush, whatever the verbosity.
+#[small]
+#[inline(never)]
 pub fn receive_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) {
     let mut format = mode.format(machine);
     let mut writer = Writer::body(out, &mut format);
@@ -211,6 +220,7 @@ pub fn receive_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out
     writer.end_object();
 }
 
+#[small]
 impl<O: Out> Writer<'_, O> {
     /// Begins a report: nothing in text, else `{"name":{`.
     fn head(&mut self, name: Text) {

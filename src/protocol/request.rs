@@ -141,6 +141,7 @@ pub(super) struct Context<'a, M, O> {
     pub out: &'a mut O,
 }
 
+#[small]
 impl Request {
     /// Begins with a line, without its terminator; its sender counts `length` bytes for it. `None` if there is
     /// nothing to answer. The line decides the `mode` from now on.

@@ -23,6 +23,7 @@ pub(super) struct Label {
     text: Text,
 }
 
+#[small]
 impl Label {
     pub fn of(token: Token) -> Label {
         match token.subject() {
@@ -84,6 +85,7 @@ impl Label {
 }
 
 /// The names of a value's numbers, and its number, if they have names.
+#[small]
 fn choice<M: Machine>(token: Token, machine: &mut M) -> Option<(Text, i32)> {
     match token.subject() {
         Some(Subject::Single(single)) if !single.choices.is_empty() => {
@@ -94,6 +96,7 @@ fn choice<M: Machine>(token: Token, machine: &mut M) -> Option<(Text, i32)> {
 }
 
 /// Entry `index` of `choices`; the number if there is none.
+#[small]
 fn write_choice<O: Out>(choices: Text, index: i32, writer: &mut Writer<'_, O>) {
     let (mut entry, mut found) = (0, false);
     for byte in choices.bytes() {
@@ -110,6 +113,7 @@ fn write_choice<O: Out>(choices: Text, index: i32, writer: &mut Writer<'_, O>) {
 }
 
 /// The value as text reports show it: speeds with a third decimal.
+#[small]
 fn read<M: Machine>(token: Token, machine: &mut M) -> Shown {
     let inches = machine.inches();
     match token.subject() {
@@ -121,6 +125,7 @@ fn read<M: Machine>(token: Token, machine: &mut M) -> Shown {
     }
 }
 
+#[small]
 fn write_unit<O: Out>(token: Token, inches: bool, writer: &mut Writer<'_, O>) {
     let length = |inches| if inches { text!(" in") } else { text!(" mm") };
     match token.subject() {

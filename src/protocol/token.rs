@@ -49,6 +49,7 @@ pub enum Shown {
     Data(i32),
 }
 
+#[small]
 impl Token {
     /// The token of row `row` of the group `sys`.
     pub const fn system(row: u8) -> Token {
@@ -191,16 +192,19 @@ impl Token {
 }
 
 /// Which group of six, and which of it.
+#[small]
 fn by_axis(number: u8) -> (u8, u8) {
     (number / AXES as u8, number % AXES as u8)
 }
 
 /// Which vector, and which member of it. The last one may have more members.
+#[small]
 fn vector_index(offset: u8) -> (u8, u8) {
     let number = (offset / AXES as u8).min(VECTOR_COUNT as u8 - 1);
     (number, offset - number * AXES as u8)
 }
 
+#[small]
 fn is_vector(name: &Name, vector: u8) -> bool {
     VECTORS.at(usize::from(vector)).is_some_and(|v| name.matches(0, v.token))
 }
@@ -298,6 +302,7 @@ pub enum Group {
     Report,
 }
 
+#[small]
 impl Group {
     /// `ofs`.
     pub const OFFSETS: Group = Group::Vector(2);
@@ -356,6 +361,7 @@ impl Group {
 /// Every name that means something at the top of a request, for tests and documents: settings and values by their
 /// full names, and actions.
 #[cfg(not(target_arch = "avr"))]
+#[small]
 pub fn names() -> std::vec::Vec<std::string::String> {
     let text = |bytes: &[u8]| std::string::String::from_utf8_lossy(bytes).into_owned();
     let tokens = (0..FIRST_ROW + u16::from(crate::gcode::tables::ROWS) * AXES as u16).map(Token);

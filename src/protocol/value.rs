@@ -115,6 +115,7 @@ pub enum Value {
 }
 
 /// A speed as [`Machine::value`](super::Machine::value) returns it: thousandths, saturating.
+#[small]
 pub fn thousandths(speed: f32) -> i32 {
     (speed * 1e3 + if speed < 0.0 { -0.5 } else { 0.5 }) as i32
 }
@@ -142,6 +143,7 @@ pub enum Form {
     Steps,
 }
 
+#[small]
 impl Form {
     /// `value` as shown, lengths in inches if `inches`.
     pub fn show(self, value: i32, inches: bool) -> Fixed {
@@ -166,6 +168,7 @@ impl Form {
 }
 
 /// How a place on an axis is shown: an angle never in inches.
+#[small]
 pub fn place_form(axis: u8) -> Form {
     if usize::from(axis) < FIRST_ROTARY { Form::Length } else { Form::Millimetres }
 }
@@ -198,6 +201,7 @@ pub struct Vector {
     pub label: Text,
 }
 
+#[small]
 impl Vector {
     /// How member `index` is shown: an angle never in inches.
     pub fn form(&self, index: u8) -> Form {
@@ -246,23 +250,28 @@ const PROBE: Value = Value::Input(inputs::PROBE as u8);
 const DOOR: Value = Value::Input(inputs::DOOR as u8);
 const STOP: Value = Value::Input(inputs::STOP as u8);
 
+#[small]
 const fn count(name: &str, value: Value, label: Text, choices: Text) -> Single {
     Single { token: token(name), value, form: Form::Count, label, choices }
 }
 
+#[small]
 const fn speed(name: &str, value: Value, label: Text) -> Single {
     Single { token: token(name), value, form: Form::Speed, label, choices: NONE }
 }
 
+#[small]
 const fn factor(name: &str, of: Override, label: Text) -> Single {
     let (value, form) = (Value::Override(of), Form::Factor);
     Single { token: token(name), value, form, label, choices: NONE }
 }
 
+#[small]
 const fn single(name: &str, value: Value, form: Form) -> Single {
     Single { token: token(name), value, form, label: NONE, choices: NONE }
 }
 
+#[small]
 const fn vector(name: &str, form: Form, members: u8, label: Text) -> Vector {
     Vector { token: token(name), form, members, label }
 }
@@ -336,6 +345,7 @@ progmem! {
 }
 
 /// Member `index` of a vector.
+#[small]
 pub fn vector_value(vector: u8, index: u8) -> Value {
     match vector {
         0 => Value::MachinePosition(index),

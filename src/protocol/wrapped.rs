@@ -15,6 +15,7 @@ use super::{CHUNK, help};
 use crate::status::Status;
 use crate::text;
 
+#[small]
 impl Request {
     /// Does what the line says, as if it stood in a `txt`.
     pub(super) fn wrap_line<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
@@ -119,6 +120,7 @@ impl Request {
 
 /// Puts a character of a string of the request into one of the response; returns how many bytes it was. A quote or a
 /// backslash that was escaped stays so. At most two bytes come out.
+#[small]
 pub(super) fn pass_on<O: Out>(line: &[u8], at: u8, end: u8, writer: &mut Writer<'_, O>) -> u8 {
     let byte = byte_of(line, at, end).unwrap_or(b' ');
     let next = byte_of(line, at.saturating_add(1), end);

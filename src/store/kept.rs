@@ -12,6 +12,7 @@ pub struct Item(Setting);
 /// How many numbers there are; some settings have no item.
 pub const ITEMS: u8 = Setting::WARM;
 
+#[small]
 impl Item {
     /// The item of that number, if there is one.
     pub fn from_number(number: u8) -> Option<Self> {
@@ -38,12 +39,14 @@ impl Item {
 }
 
 /// The key of a setting's records.
+#[small]
 pub fn key(setting: Setting) -> u16 {
     record::key(setting.name().bytes())
 }
 
 /// The value of a setting that is here alone: that which was put away, unless it could not have it; or its default.
 #[inline(never)]
+#[small]
 pub fn value<M: Memory>(log: &Log, memory: &M, setting: Setting) -> i32 {
     let kept = log.newest(memory, key(setting)).filter(|value| setting.accepts(*value));
     kept.unwrap_or_else(|| setting.default_value())
@@ -54,6 +57,7 @@ const NO_KEY: u16 = u16::MAX;
 
 /// Takes over whatever memory holds of them. At start-up: 10 ms on AVR, and up to 70 more with a full log; 600 bytes of stack.
 #[inline(never)]
+#[small]
 pub fn load<M: Memory>(log: &Log, memory: &M, settings: &mut Settings) {
     if log.is_empty() {
         return;

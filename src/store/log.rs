@@ -44,6 +44,7 @@ pub enum Put {
     Full,
 }
 
+#[small]
 impl Log {
     /// Finds the end of the log.
     pub fn open<M: Memory>(memory: &M) -> Self {
@@ -167,6 +168,7 @@ impl Log {
     }
 }
 
+#[small]
 impl Write {
     /// Begins to write the next byte; false if there is none left. Not while memory is busy.
     pub fn step<M: Memory>(&mut self, memory: &mut M) -> bool {
@@ -197,6 +199,7 @@ struct Backwards {
     end: u16,
 }
 
+#[small]
 impl Backwards {
     /// Where the next slot begins whose key may be one of those sought, and that key.
     #[inline(never)]
@@ -224,6 +227,7 @@ struct Common {
     bits: u16,
 }
 
+#[small]
 impl Common {
     fn of(keys: &[u16]) -> Self {
         let first = keys.first().copied().unwrap_or(0);
@@ -237,16 +241,19 @@ impl Common {
 }
 
 /// Whether one number was given after another, less than 32,768 records apart.
+#[small]
 fn is_after(number: u16, other: u16) -> bool {
     number.wrapping_sub(other) as i16 > 0
 }
 
 /// The key in the slot that begins there, be it that of a record or not.
 #[inline(always)]
+#[small]
 fn key_at<M: Memory>(memory: &M, start: u16) -> u16 {
     u16::from_le_bytes([memory.read(start + 1), memory.read(start + 2)])
 }
 
+#[small]
 fn read<M: Memory>(memory: &M, slot: u16) -> Option<Record> {
     let start = slot * SIZE;
     if memory.read(start) != record::VALID {

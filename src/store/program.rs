@@ -38,16 +38,19 @@ pub enum Stored {
     Done(u16),
 }
 
+#[small]
 fn base<M: Memory>() -> u16 {
     M::SIZE - AREA
 }
 
 /// The byte of the text at a place; none behind `len`.
+#[small]
 pub fn byte<M: Memory>(memory: &M, len: u16, at: u16) -> Option<u8> {
     (at < len).then(|| memory.read(base::<M>() + HEAD + at))
 }
 
 /// The length of the program, if there is one: as its head says.
+#[small]
 pub fn len<M: Memory>(memory: &M) -> Option<u16> {
     let head = |at| memory.read(base::<M>() + at);
     let len = u16::from_le_bytes([head(1), head(2)]);
@@ -56,11 +59,13 @@ pub fn len<M: Memory>(memory: &M) -> Option<u16> {
 
 /// The same, and whether the text is what was stored.
 #[inline(never)]
+#[small]
 pub fn check<M: Memory>(memory: &M) -> Option<u16> {
     let head = |at| memory.read(base::<M>() + at);
     len(memory).filter(|len| u16::from_le_bytes([head(3), head(4)]) == sum(memory, *len))
 }
 
+#[small]
 fn sum<M: Memory>(memory: &M, len: u16) -> u16 {
     let mut digest = CRC.digest();
     for at in 0..len {
@@ -70,12 +75,14 @@ fn sum<M: Memory>(memory: &M, len: u16) -> u16 {
 }
 
 /// There is no program any more, and a new one is empty.
+#[small]
 pub fn begin<M: Memory>(memory: &mut M) -> Stored {
     if put(memory, [(0, ERASED)].into_iter()) { Stored::Done(0) } else { Stored::Again }
 }
 
 /// Puts a line behind the first `len` bytes of the new program.
 #[inline(never)]
+#[small]
 pub fn line<M: Memory>(memory: &mut M, len: u16, text: &[u8]) -> Stored {
     let end = usize::from(HEAD + len) + text.len() + 1;
     if end > usize::from(AREA) {
@@ -90,6 +97,7 @@ pub fn line<M: Memory>(memory: &mut M, len: u16, text: &[u8]) -> Stored {
 
 /// The new program of `len` bytes is the program.
 #[inline(never)]
+#[small]
 pub fn end<M: Memory>(memory: &mut M, len: u16) -> Stored {
     if memory.is_busy() {
         return Stored::Again;
@@ -101,6 +109,7 @@ pub fn end<M: Memory>(memory: &mut M, len: u16) -> Stored {
 }
 
 /// Writes the first byte that is not as it is to be. Whether there is none, and nothing is being written.
+#[small]
 fn put<M: Memory>(memory: &mut M, bytes: impl Iterator<Item = (u16, u8)>) -> bool {
     if memory.is_busy() {
         return false;

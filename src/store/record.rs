@@ -36,10 +36,12 @@ pub struct Record {
 }
 
 /// The key of an item, from its name.
+#[small]
 pub fn key(name: &[u8]) -> u16 {
     CRC.checksum(name)
 }
 
+#[small]
 impl Record {
     /// Its bytes; byte 0 is what makes it valid.
     pub fn bytes(&self) -> [u8; SIZE as usize] {

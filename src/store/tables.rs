@@ -8,6 +8,7 @@ use crate::units::{AXES, Length, PerAxis};
 
 /// What a row is. Cost on AVR: see [`Log::find`].
 #[inline(never)]
+#[small]
 pub fn row<M: Memory>(log: &Log, memory: &M, row: Row) -> PerAxis<Length> {
     let mut keys = [0; AXES];
     for (axis, key) in (0..).zip(&mut keys) {
@@ -18,12 +19,14 @@ pub fn row<M: Memory>(log: &Log, memory: &M, row: Row) -> PerAxis<Length> {
 
 /// A value of a row.
 #[inline(never)]
+#[small]
 pub fn value<M: Memory>(log: &Log, memory: &M, row: Row, axis: u8) -> Length {
     Length(log.newest(memory, key(row, axis)).unwrap_or(0))
 }
 
 /// The key of a value of a row.
 #[inline(never)]
+#[small]
 pub fn key(row: Row, axis: u8) -> u16 {
     record::key(value_name(row, axis).bytes())
 }

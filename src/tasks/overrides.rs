@@ -29,12 +29,14 @@ machine_static! {
 }
 
 /// The overrides as they are. Thread mode only.
+#[small]
 pub fn now() -> Overrides {
     // SAFETY: exec does not run under the lock.
     exec::lock(|_| unsafe { *shared().0.get() })
 }
 
 /// Changes them at once. Thread mode only.
+#[small]
 pub fn change(change: Change) {
     exec::lock(|ceiling| {
         // SAFETY: exec does not run under the lock.
@@ -46,6 +48,7 @@ pub fn change(change: Change) {
 }
 
 /// The moves behind which the change stands have been prepared. Exec only.
+#[small]
 pub fn change_in_stream(change: Change, blocks: &mut BlockSource) {
     // SAFETY: exec runs, so nobody holds the lock.
     let overrides = unsafe { &mut *shared().0.get() };
@@ -56,6 +59,7 @@ pub fn change_in_stream(change: Change, blocks: &mut BlockSource) {
 
 /// Does what real-time characters ask for. A step that would go too far goes as far as may be; whatever they ask for
 /// counts from then on. Control only.
+#[small]
 pub fn serve(links: &Links) {
     for port in &links.ports {
         let asked = uart::take_asked(port.number);
@@ -76,6 +80,7 @@ pub fn serve(links: &Links) {
 }
 
 /// So many percent more, or less; from 100 % if `anew`.
+#[small]
 fn step(which: Override, percent: i8, anew: bool) {
     if percent == 0 && !anew {
         return;
@@ -86,6 +91,7 @@ fn step(which: Override, percent: i8, anew: bool) {
 }
 
 /// Tells the others that they may have changed. Control only.
+#[small]
 pub fn tell(links: &Links) {
     spindle::follow(now().in_force(Override::Spindle));
     links.planner_wake.signal();
@@ -95,6 +101,7 @@ pub fn tell(links: &Links) {
 
 /// What motion goes by. 1 is exact: velocities are as programmed, to the bit.
 #[inline(never)]
+#[small]
 fn factors(overrides: &Overrides) -> Factors {
     let factor = |which| f32::from(overrides.in_force(which)) * 0.001;
     Factors { feed: factor(Override::Feed), traverse: factor(Override::Traverse) }

@@ -66,6 +66,7 @@ pub async fn run(links: &'static Links) -> ! {
 
 /// The next line during a queue flush: control lines are carried out, those of data dropped.
 #[inline(never)]
+#[small]
 fn dropped(links: &Links, flush: Flush) -> Option<Chosen<'_>> {
     links.ports.iter().find_map(|port| {
         let (id, class) = port.lines.borrow().next(true)?;
@@ -87,6 +88,7 @@ fn is_free(links: &Links) -> bool {
 /// Carries out the next line of a built-in job. Its end, and a line that is refused, are told by an exception
 /// report.
 #[inline(never)]
+#[small]
 fn job_line(links: &Links) {
     let mut job = links.job.get();
     let mut line = Vec::new();
@@ -256,6 +258,7 @@ async fn tables_ready(links: &Links) {
 /// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so
 /// that it never stands in the midst of a response or a report, and never loses anything.
 #[inline(never)]
+#[small]
 fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> bool {
     let lines = port.lines.borrow();
     let rest = lines.text(id).get(usize::from(*at)..).unwrap_or(&[]);
@@ -299,6 +302,7 @@ fn finish(links: &Links, port: &Port, id: LineId) {
 }
 
 #[inline(never)]
+#[small]
 fn step(links: &Links, port: &Port, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
     let lines = port.lines.borrow();
     let next = request.step(lines.text(id), &mut View::of(links, port), tx);

@@ -21,6 +21,7 @@ use crate::config::{Settings, StepRatio};
 use crate::gcode::arc::Walk;
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
 use crate::gcode::modal::{self, Coolant};
+use crate::gcode::overrides::Change;
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, wait};
 use crate::jobs::Job;
@@ -171,7 +172,7 @@ impl Planner {
         self.line = self.links.commands.borrow().line;
         self.steps = Steps::default();
         if self.links.settings_changed.replace(false) {
-            self.dynamics = Dynamics::new(&*self.links.settings.borrow());
+            self.dynamics.set(&*self.links.settings.borrow());
         }
         if self.links.resync.get() {
             self.news = News::Position;
@@ -231,18 +232,9 @@ impl Planner {
             Step::Arc => self.begin_arc(&commands.motion),
             Step::Dwell(ms) => self.pause(Action::Dwell(*ms)),
             Step::SetPosition(position) => self.set_position(position),
-            Step::Override(change) => {
-                let block = Block::action(Action::Override(*change), self.line);
-                let _ = self.queue.push_aside(block);
-                self.announce();
-            }
+            Step::Override(change) => self.set_override(*change),
             Step::Spindle(spindle) => self.set_spindle(spindle),
-            Step::Coolant(coolant) => {
-                let bit =
-                    |which: Coolant, output| if coolant & which as u8 != 0 { output } else { 0 };
-                let on = bit(Coolant::Mist, outputs::MIST) | bit(Coolant::Flood, outputs::FLOOD);
-                self.switch(outputs::MIST | outputs::FLOOD, on, self.outputs.speed);
-            }
+            Step::Coolant(coolant) => self.set_coolant(*coolant),
             Step::Stop(Stop::End) if self.outputs.on != 0 => {
                 // Another turn ends the program.
                 self.switch(u8::MAX, 0, 0.0);
@@ -313,6 +305,8 @@ impl Planner {
     }
 
     /// Tells exec what has changed beside the line, one thing at a time.
+    #[inline(never)]
+    #[small]
     fn tell(&mut self) {
         match self.news {
             News::Position => {
@@ -329,6 +323,7 @@ impl Planner {
     }
 
     /// G28.3: the position is called something else; no motor moves.
+    #[inline(never)]
     #[small]
     fn set_position(&mut self, position: &PerAxis<Length>) {
         self.position = *position;
@@ -352,6 +347,24 @@ impl Planner {
         }
     }
 
+    #[inline(never)]
+    #[small]
+    fn set_override(&mut self, change: Change) {
+        let block = Block::action(Action::Override(change), self.line);
+        let _ = self.queue.push_aside(block);
+        self.announce();
+    }
+
+    #[inline(never)]
+    #[small]
+    fn set_coolant(&mut self, coolant: u8) {
+        let bit = |which: Coolant, output| if coolant & which as u8 != 0 { output } else { 0 };
+        let on = bit(Coolant::Mist, outputs::MIST) | bit(Coolant::Flood, outputs::FLOOD);
+        self.switch(outputs::MIST | outputs::FLOOD, on, self.outputs.speed);
+    }
+
+    #[inline(never)]
+    #[small]
     fn set_spindle(&mut self, spindle: &Spindle) {
         let (turn, speed) = match spindle.turn {
             modal::Turn::Off => (0, 0.0),
@@ -364,6 +377,8 @@ impl Planner {
     }
 
     /// Switches those of `which` on that are in `on`, the others of `which` off; the spindle is to have this speed.
+    #[inline(never)]
+    #[small]
     fn switch(&mut self, which: u8, on: u8, speed: f32) {
         let outputs = Outputs { on: self.outputs.on & !which | on, speed };
         if outputs != self.outputs {
@@ -373,11 +388,15 @@ impl Planner {
     }
 
     /// Something that is done at rest.
+    #[inline(never)]
+    #[small]
     fn pause(&mut self, action: Action) {
         let block = self.builder.pause(action, self.line);
         self.push(block);
     }
 
+    #[inline(never)]
+    #[small]
     fn push(&mut self, block: Block) {
         // There is room: this task alone fills the queue, and asks before each turn.
         let _ = self.queue.push(block);
@@ -465,6 +484,7 @@ fn coolant_of(on: u8) -> u8 {
 
 impl Parts {
     #[inline(never)]
+    #[small]
     fn new(target: &PerAxis<Length>, feed: Option<Feed>, of: u16) -> Self {
         // Inverse time is that of the whole.
         let feed = match feed {

@@ -50,30 +50,36 @@ pub async fn run(links: &'static Links) -> ! {
 
 /// Before a segment of a block that moves the motors `moving` (bits) is queued: they get power. Its
 /// increments would not tell: a motor may have a rest of the block before. Exec only.
+#[small]
 pub fn segment(moving: u8) {
     carry_out(|motors| motors.segment(moving));
 }
 
 /// Takes over the modes of the settings. Thread mode only.
+#[small]
 pub fn set_modes(settings: &Settings) {
     let modes = Modes::new(|m| settings.motor_power_mode(m));
     change(|motors| motors.set_modes(modes));
 }
 
 /// Powers `motors` (bits). Thread mode only.
+#[small]
 pub fn energize(motors: u8) {
     change(|all| all.energize(motors));
 }
 
 /// Takes power from `motors` (bits). Thread mode only.
+#[small]
 pub fn release(motors: u8) {
     change(|all| all.release(motors));
 }
 
+#[small]
 fn change<R>(what: impl FnOnce(&mut Motors) -> R) -> R {
     exec::lock(|_| carry_out(what))
 }
 
+#[small]
 fn carry_out<R>(what: impl FnOnce(&mut Motors) -> R) -> R {
     // SAFETY: exec runs, or cannot; and `what` calls nothing of this module.
     let motors = unsafe { &mut *shared().0.get() };

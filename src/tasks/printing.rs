@@ -6,6 +6,7 @@
 /// bytes. Returns how many.
 #[cfg(target_arch = "avr")]
 #[inline(always)]
+#[small]
 pub fn copy_printing(from: &[u8], to: &mut [u8]) -> u8 {
     let most = u8::try_from(from.len().min(to.len())).unwrap_or(u8::MAX);
     if most == 0 {
@@ -35,6 +36,7 @@ pub fn copy_printing(from: &[u8], to: &mut [u8]) -> u8 {
 
 /// The same.
 #[cfg(not(target_arch = "avr"))]
+#[small]
 pub fn copy_printing(from: &[u8], to: &mut [u8]) -> u8 {
     let most = to.len().min(from.len()).min(255);
     let count = from.iter().take(most).take_while(|byte| **byte >= b' ').count();

@@ -10,6 +10,7 @@ use crate::gcode::setup::{AxisMode, Setup};
 use crate::status::Status;
 use crate::units::Length;
 
+#[small]
 impl Setup for Settings {
     fn mode(&self, axis: u8) -> AxisMode {
         match self.axis_mode(axis.into()) {
@@ -77,6 +78,7 @@ impl Setup for Settings {
 }
 
 /// The axis whose position moves a motor; none above 5: that of an inhibited axis stands still.
+#[small]
 pub fn moved_by(settings: &Settings, motor: usize) -> u8 {
     let axis = settings.motor_axis(motor);
     if settings.mode(axis) == AxisMode::Inhibited { u8::MAX } else { axis }

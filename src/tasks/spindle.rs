@@ -30,6 +30,7 @@ machine_static! {
 }
 
 /// The outputs that are on, which in a feedhold may be less than what the program has switched.
+#[small]
 pub fn on() -> u8 {
     now_on().get()
 }
@@ -37,6 +38,7 @@ pub fn on() -> u8 {
 /// Switches the outputs as they are to be now; how long motion has to wait for that, ms. `changed` says that S may
 /// be another. Exec only.
 #[inline(never)]
+#[small]
 pub fn switch(out: &Snapshot, changed: bool) -> u16 {
     // SAFETY: exec runs, or cannot, and nobody else changes it.
     let spindle = unsafe { &*shared().0.get() };
@@ -58,6 +60,7 @@ pub fn switch(out: &Snapshot, changed: bool) -> u16 {
 }
 
 /// An alarm has begun: the outputs go off. Thread mode only.
+#[small]
 pub fn stop() {
     // Exec, which alone may do so, cannot run.
     exec::lock(|_| update(|out| switch(out, true)));
@@ -91,6 +94,7 @@ pub fn set(setting: Setting, value: i32) {
 }
 
 /// Multiplies S by so many thousandths from now on. Thread mode only.
+#[small]
 pub fn follow(thousandths: u16) {
     if with(|spindle| spindle.set_factor(thousandths)) {
         tell();
@@ -98,12 +102,14 @@ pub fn follow(thousandths: u16) {
 }
 
 /// Changes the state while exec cannot run.
+#[small]
 fn with<R>(what: impl FnOnce(&mut Spindle) -> R) -> R {
     // SAFETY: exec cannot run, and `what` calls nothing of this module.
     exec::lock(|_| what(unsafe { &mut *shared().0.get() }))
 }
 
 /// Tells the outputs what they are to be by now.
+#[small]
 fn tell() {
     let speed = snapshot().speed;
     with(|spindle| {

@@ -57,6 +57,7 @@ enum Work {
     Item(u8),
 }
 
+#[small]
 impl Storage {
     /// Nothing to do, and this log.
     pub fn new(log: Log) -> Self {
@@ -183,6 +184,7 @@ impl Storage {
     }
 }
 
+#[small]
 impl Tables for &Storage {
     #[inline(never)]
     fn row(&self, row: Row) -> PerAxis<Length> {
@@ -239,6 +241,7 @@ pub async fn run(links: &'static Links) -> ! {
 
 /// The next record to write, after `moved` others that made room for it; `None` when there is none left.
 #[inline(never)]
+#[small]
 fn next(links: &Links, memory: &Eeprom, work: Work, moved: u16) -> Option<Put> {
     let mut log = links.storage.log.get();
     let (key, value) = match work {
@@ -263,12 +266,14 @@ fn next(links: &Links, memory: &Eeprom, work: Work, moved: u16) -> Option<Put> {
 }
 
 /// A key and its value, if the log has another.
+#[small]
 fn differs(log: &Log, memory: &Eeprom, key: u16, value: i32, default: i32) -> Option<(u16, i32)> {
     (log.newest(memory, key).unwrap_or(default) != value).then_some((key, value))
 }
 
 /// The key of a value of a row that the log does not have as it is to be, and that value.
 #[inline(never)]
+#[small]
 fn changed(log: &Log, memory: &Eeprom, edit: &Edit) -> Option<(u16, i32)> {
     let kept = tables::row(log, memory, edit.row);
     let (axis, value) = (0..)
@@ -280,6 +285,7 @@ fn changed(log: &Log, memory: &Eeprom, edit: &Edit) -> Option<(u16, i32)> {
 }
 
 /// Something has arrived: there is room for another.
+#[small]
 fn done(links: &Links, work: Work) {
     match work {
         Work::Edit => links.storage.edit.set(None),

@@ -50,6 +50,7 @@ const HOMING: i32 = 9;
 const JOGGING: i32 = 10;
 
 /// Whether something moves, by `stat` and `hold`.
+#[small]
 pub fn moves(state: i32, hold: i32) -> bool {
     match state {
         HOLD => hold != HELD,
@@ -485,11 +486,13 @@ impl Machine for View<'_> {
 }
 
 /// Free blocks of the planner, as they are told.
+#[small]
 pub fn queue_free() -> usize {
     queue::free().max(QUEUE_FREE_MIN)
 }
 
 /// Tells outputs and inputs what the settings say of them. Thread mode, or before interrupts are on.
+#[small]
 pub fn set_hardware(settings: &Settings) {
     switches::set_up(settings);
     power::set_modes(settings);
@@ -501,6 +504,7 @@ pub fn set_hardware(settings: &Settings) {
 }
 
 /// The motors of which something is so, as bits.
+#[small]
 fn motors(is: impl Fn(usize) -> bool) -> u8 {
     (0..MOTORS).fold(0, |bits, m| bits | u8::from(is(m)) << m)
 }

@@ -171,7 +171,7 @@ mod tests {
         assert_eq!(over, [format!("static RAM {} > {}", caps::STATIC_RAM + 1, caps::STATIC_RAM)]);
         let stack = caps::RAM - caps::STATIC_RAM - caps::FREE_STACK.cast_unsigned();
         let over = past_caps(SIZES, u32::try_from(stack).unwrap() + 1);
-        assert_eq!(over, ["free stack 359 < 360"]);
+        assert_eq!(over, ["free stack 399 < 400"]);
     }
 
     #[test]

@@ -15,6 +15,7 @@ const COMPARE: usize = 8;
 /// Mode 8, in the second register.
 const MODE: u8 = 1 << 4;
 
+#[small]
 impl Pwm {
     /// What connects the pin: clear it on the way up, set it on the way down.
     const fn connected(self) -> u8 {
@@ -31,6 +32,7 @@ impl Pwm {
 }
 
 /// Sets the frequency, in thousandths of a Hz. The share has to be set again; until then it is 0.
+#[small]
 pub fn set_frequency(millihertz: u32) {
     let Some(pwm) = ACTIVE.pwm else { return };
     let (prescaler, top) = divide(ACTIVE.clock_hz, millihertz);
@@ -49,6 +51,7 @@ pub fn set_frequency(millihertz: u32) {
 
 /// Sets what part of the period the pin is high, in thousandths.
 #[inline(never)]
+#[small]
 pub fn set_share(share: f32) {
     let Some(pwm) = ACTIVE.pwm else { return };
     // SAFETY: as in `set_frequency`. The high byte of a word waits in a register of this timer, which nobody else uses.
@@ -60,6 +63,7 @@ pub fn set_share(share: f32) {
 }
 
 /// Disconnects the pin, which is low from then on. For the panic handler.
+#[small]
 pub fn kill() {
     if let Some(pwm) = ACTIVE.pwm {
         // SAFETY: a single store; the machine stops for good.

@@ -305,13 +305,19 @@ pub fn asks_hold() -> bool {
 #[inline(never)]
 pub fn take_asked(port: u8) -> Asked {
     let [feed, spindle, fixed] = &flags(port).asked;
-    avr_device::interrupt::free(|_| {
-        let asked = Asked { percent: [feed.get() as i8, spindle.get() as i8], fixed: fixed.get() };
-        feed.set(0);
-        spindle.set(0);
-        fixed.set(0);
-        asked
-    })
+    if feed.get() | spindle.get() | fixed.get() == 0 {
+        return Asked::NOTHING;
+    }
+    // One after the other: a character in between counts with what is taken later, in its order.
+    let taken = |byte: &SharedByte| {
+        avr_device::interrupt::free(|_| {
+            let value = byte.get();
+            byte.set(0);
+            value
+        })
+    };
+    let fixed = taken(fixed);
+    Asked { percent: [taken(feed) as i8, taken(spindle) as i8], fixed }
 }
 
 /// The real-time characters since the last call, as bits (see [`realtime`](crate::realtime)).

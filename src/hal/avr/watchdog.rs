@@ -22,12 +22,14 @@ unsafe extern "C" {
     static mut _end: u16;
 }
 
+#[small]
 fn leave(mark: Mark) {
     // SAFETY: nothing else is there (`xtask size` keeps 400 bytes free). Written at start-up, and before a reset.
     unsafe { (&raw mut _end).write_volatile(mark.0) };
 }
 
 /// The timed sequence of the data sheet (13.5). Interrupts are off.
+#[small]
 fn set(value: u8) {
     // SAFETY: nobody else uses the register, and no interrupt comes in between.
     unsafe {
@@ -40,6 +42,7 @@ fn set(value: u8) {
 }
 
 /// Takes the watchdog off, and notes why the machine has started. First thing at start-up.
+#[small]
 pub fn begin() {
     // SAFETY: start-up, with interrupts off. The watchdog cannot be taken off while the chip notes that it has reset it.
     let (chip, mark) = unsafe {
@@ -52,6 +55,7 @@ pub fn begin() {
 }
 
 /// Why the machine has started.
+#[small]
 pub fn cause() -> Cause {
     // SAFETY: written at start-up, and before a reset.
     let mark = unsafe { (&raw const _end).read_volatile() };
@@ -59,24 +63,28 @@ pub fn cause() -> Cause {
 }
 
 /// Has the watchdog on from now on. Interrupts are off.
+#[small]
 pub fn start() {
     set(TIME);
 }
 
 /// All is well. Thread mode, and exec.
 #[inline(always)]
+#[small]
 pub fn feed() {
     // SAFETY: it changes nothing but the watchdog's counter.
     unsafe { asm!("wdr", options(nostack)) };
 }
 
 /// Takes it off. Interrupts are off.
+#[small]
 pub fn off() {
     set(0);
 }
 
 /// Resets the chip in 15 ms, noting why. Meanwhile the line that is being sent ends, lest a sender read the greeting
 /// as the rest of it. Interrupts are off.
+#[small]
 pub fn reset(why: Mark) -> ! {
     leave(why);
     // SAFETY: interrupts are off for good.
