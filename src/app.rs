@@ -31,7 +31,7 @@ use crate::tasks::wake::{News, Wake};
 use crate::tasks::{control, exec, parser, planner, power, reader, reporter, spindle, storage};
 
 /// Bytes for all lines of USB together.
-const LINES_USB: usize = 480;
+const LINES_USB: usize = 456;
 /// The same of the other port.
 const LINES_AUX: usize = 80;
 

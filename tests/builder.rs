@@ -90,7 +90,7 @@ fn check_limits(
     feed: Option<Feed>,
     config: &Config,
 ) {
-    assert!((f64::from(block.length.get()) / length - 1.0).abs() < 2e-4);
+    assert!((f64::from(block.length) / length - 1.0).abs() < 2e-4);
     let mut cruise = match feed {
         Some(Feed::PerMinute(feed)) => {
             let linear = unit[..FIRST_ROTARY].iter().map(|u| u * u).sum::<f64>().sqrt();
@@ -124,7 +124,7 @@ fn check_limits(
     }
     // The slowest there is.
     let cruise = cruise.max(1e-6);
-    let got = f64::from(block.cruise.get());
+    let got = f64::from(block.cruise);
     assert!(got <= cruise * EXACT, "{got} of {cruise} mm/s");
     // Slower only for motors, and blocks too short for exec.
     let slow = block.steps.iter().any(|&s| s != 0);
@@ -139,10 +139,10 @@ fn check_override(block: &Move, unit: &PerAxis<f64>, is_feed: bool, config: &Con
     let doubled = f64::from(block.velocity(&Factors { feed: 2.0, traverse: 1.0 }));
     let axes = (0..AXES).filter(|&axis| unit[axis] > 0.0);
     let most = axes.map(|axis| f64::from(config.velocity[axis]) / unit[axis]).fold(most, f64::min);
-    let asked = f64::from(block.cruise.get()) * if is_feed { 2.0 } else { 1.0 };
+    let asked = f64::from(block.cruise) * if is_feed { 2.0 } else { 1.0 };
     assert!(doubled <= most.max(1e-6) * EXACT && doubled <= asked, "{doubled} of {most} mm/s");
     let halved = f64::from(block.velocity(&Factors { feed: 0.5, traverse: 0.5 }));
-    assert_eq!(halved, f64::from(block.cruise.get()) / 2.0);
+    assert_eq!(halved, f64::from(block.cruise) / 2.0);
 }
 
 proptest! {
@@ -208,7 +208,7 @@ proptest! {
                 to[axis] = share(way[axis]);
             }
             let (block, entry) = built(&mut builder, &config, [from, to], None);
-            prop_assert!(part == 1 || entry > 0.99 * block.cruise.get());
+            prop_assert!(part == 1 || entry > 0.99 * block.cruise);
             from = to;
         }
     }
@@ -265,16 +265,16 @@ fn rotary_moves() {
     let zero = at([0.0]);
     let turned = at([0.0, 0.0, 0.0, 90.0]);
     let (block, _) = built(&mut Builder::default(), &config, [zero, turned], None);
-    assert_eq!(block.length.get(), 90.0);
-    assert!((block.cruise.get() - 360.0).abs() < 1e-3, "{}", block.cruise.get());
+    assert_eq!(block.length, 90.0);
+    assert!((block.cruise - 360.0).abs() < 1e-3, "{}", block.cruise);
     let both = at([9.0, 0.0, 0.0, 90.0]);
     let (block, _) = built(&mut Builder::default(), &config, [zero, both], None);
-    assert!((block.length.get() - 90.0).abs() < 0.01, "{}", block.length.get());
-    assert!((block.cruise.get() - 360.0).abs() < 0.05, "{}", block.cruise.get());
+    assert!((block.length - 90.0).abs() < 0.01, "{}", block.length);
+    assert!((block.cruise - 360.0).abs() < 0.05, "{}", block.cruise);
     // The feed is that of the linear axis.
     let feed = Some(Feed::PerMinute(60.0));
     let (block, _) = built(&mut Builder::default(), &config, [zero, both], feed);
-    assert!((block.cruise.get() - 10.0).abs() < 0.01, "{}", block.cruise.get());
+    assert!((block.cruise - 10.0).abs() < 0.01, "{}", block.cruise);
 }
 
 /// Stops and set positions are left at rest, and the move after goes on from there.
@@ -291,7 +291,7 @@ fn stops() {
     };
     assert_eq!(next(&mut builder, None).1, 0.0);
     let (block, entry) = next(&mut builder, None);
-    assert!(entry > block.cruise.get() && (block.cruise.get() - 100.0).abs() < 1e-3, "{entry}");
+    assert!(entry > block.cruise && (block.cruise - 100.0).abs() < 1e-3, "{entry}");
     assert_eq!(builder.pause(Action::Dwell(1500), 3).line(), 3);
     assert_eq!(next(&mut builder, None).1, 0.0);
     builder.stopped();

@@ -5,7 +5,6 @@
 //! and line number three, and a line, which knows no [`Reserve`] of 0, no tag: 28 bytes on AVR.
 
 use super::factors::{Factors, Reserve};
-use super::medium::Medium;
 use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
@@ -83,11 +82,11 @@ pub struct Line {
     /// Signed steps of each motor.
     pub steps: [i16; MOTORS],
     /// Path length, mm.
-    pub length: Medium,
+    pub length: f32,
     /// How much faster than `cruise` it may be run.
     pub reserve: Reserve,
     /// Velocity limit on the path, mm/s, at 100 %: the feed, or what the slowest axis or motor allows.
-    pub cruise: Medium,
+    pub cruise: f32,
     /// Brake potential where it starts; see `horizon`.
     pub start: f32,
     /// Highest velocity at which it may be entered, mm/s: the corner with the line before, whatever feeds are.
@@ -102,6 +101,6 @@ impl Line {
     /// Velocity limit on the path under an override, mm/s.
     #[inline(always)]
     pub fn velocity(&self, factors: &Factors) -> f32 {
-        self.reserve.velocity(self.cruise.get(), factors)
+        self.reserve.velocity(self.cruise, factors)
     }
 }

@@ -321,8 +321,8 @@ impl Exec {
 
     #[inline(always)]
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
-        let length = line.length.get();
-        let long = below(scaled(line.cruise.get(), FINE_LOG2), length);
+        let length = line.length;
+        let long = below(scaled(line.cruise, FINE_LOG2), length);
         self.prep.begin(&line.steps, &mut out.target);
         out.steps = line.steps;
         out.length = length;

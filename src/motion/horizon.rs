@@ -92,14 +92,14 @@ impl Line {
     /// an override gives it never matters, and is left away where it is much. Cost: 350.
     #[inline(never)]
     pub fn gain(&self) -> f32 {
-        let full = scaled(self.accel.get(), 1) * self.length.get();
+        let full = scaled(self.accel.get(), 1) * self.length;
         // Plainly below the square of its velocity, as short blocks have it.
-        if log(full) + OCTAVE < 2 * log(self.cruise.get()) { full } else { self.capped(full) }
+        if log(full) + OCTAVE < 2 * log(self.cruise) { full } else { self.capped(full) }
     }
 
     #[inline(never)]
     fn capped(&self, full: f32) -> f32 {
-        let speed = scaled(self.cruise.get(), 1) + 2.0 * kappa(self.accel.get(), self.jerk.get());
+        let speed = scaled(self.cruise, 1) + 2.0 * kappa(self.accel.get(), self.jerk.get());
         lesser(full, 2.0 * speed * speed)
     }
 }

@@ -17,7 +17,6 @@ use super::factors::Reserve;
 use super::float::{least, some};
 use super::junction::{self, Heading};
 use super::limits::LastFeed;
-use super::medium::Medium;
 use super::path::{Path, Way};
 use super::prep::STEPS_MAX;
 use super::steps::Motor;
@@ -108,8 +107,8 @@ impl Builder {
             Some(_) => Reserve::new(path.cruise, path.top),
             None => Reserve::TRAVERSE,
         };
-        out.length = Medium::new(path.length);
-        out.cruise = Medium::new(path.cruise);
+        out.length = path.length;
+        out.cruise = path.cruise;
         out.accel = path.accel;
         out.jerk = path.jerk;
         Built::Line(entry)

@@ -23,7 +23,6 @@ pub mod horizon;
 pub mod junction;
 mod limits;
 pub mod line;
-pub mod medium;
 pub mod pace;
 mod path;
 pub mod prep;

@@ -258,10 +258,10 @@ impl BlockQueue {
     fn refine(&mut self, line: &Line) {
         let end = self.end();
         // Nothing is there, or it is plainly fine: no need to compare.
-        if !some(end) || log(end) < 2 * log(line.cruise.get()) + FINE {
+        if !some(end) || log(end) < 2 * log(line.cruise) + FINE {
             return;
         }
-        let cruise = line.cruise.get();
+        let cruise = line.cruise;
         if end > COARSE * cruise * cruise {
             exec::lock(|ceiling| self.rebase(ceiling));
         }

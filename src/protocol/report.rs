@@ -15,7 +15,7 @@ use crate::progmem::Text;
 use crate::text;
 
 /// Entries a report may have.
-pub const LONGEST_REPORT: usize = 38;
+pub const LONGEST_REPORT: usize = 36;
 
 /// Bytes of a bit for each entry.
 const HIGH: usize = LONGEST_REPORT.div_ceil(8);

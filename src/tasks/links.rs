@@ -4,7 +4,7 @@
 //! | link | carries | depth | RAM | from | to | when full |
 //! |---|---|---|---|---|---|---|
 //! | `uart` receive ring | bytes | 255; 63 | 259 B, 67 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
-//! | [`Port::lines`] | lines | 8 lines; 480 B, 80 B | 511 B, 111 B | reader | parser | bytes stay in the receive ring |
+//! | [`Port::lines`] | lines | 8 lines; 456 B, 80 B | 487 B, 111 B | reader | parser | bytes stay in the receive ring |
 //! | [`Links::commands`] | canonical commands | 1 | 98 B | parser | planner | the parser takes control lines only |
 //! | block ring | blocks | 64 | 1,912 B | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |
@@ -36,7 +36,7 @@ use crate::jobs::Job;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Snapshot};
 use crate::protocol::StatusReport;
-use crate::units::{Length, PerAxis};
+use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// The links. One for the machine, made at start-up.
 pub struct Links {
@@ -136,7 +136,7 @@ pub enum ProbeState {
 #[derive(Default)]
 pub struct Probe {
     state: Cell<ProbeState>,
-    at: Cell<PerAxis<Length>>,
+    at: Cell<[Length; FIRST_ROTARY]>,
     news: Cell<bool>,
 }
 
@@ -146,9 +146,9 @@ impl Probe {
         self.state.get()
     }
 
-    /// Where the contact was, or where it ended, machine coordinates.
-    pub fn at(&self) -> PerAxis<Length> {
-        self.at.get()
+    /// Where the contact was, or where it ended, machine coordinates; of the axes that may probe.
+    pub fn at(&self, axis: u8) -> Option<Length> {
+        self.at.get().get(usize::from(axis)).copied()
     }
 
     /// It begins.
@@ -159,7 +159,8 @@ impl Probe {
     /// It has come to an end, which is to be told.
     pub fn tell(&self, state: ProbeState, at: &PerAxis<Length>) {
         self.state.set(state);
-        self.at.set(*at);
+        let [x, y, z, ..] = *at;
+        self.at.set([x, y, z]);
         self.news.set(true);
     }
 

@@ -340,8 +340,10 @@ impl Machine for View<'_> {
             Value::Tool => self.links.model.borrow().tool().into(),
             Value::Input(input) => self.input(input),
             Value::ProbeState => self.links.probe.state() as i32,
+            // An axis that turns stands still in a probing move.
             Value::Probed(axis) => {
-                self.links.probe.at().get(usize::from(axis)).map_or(0, |at| at.0)
+                let at = self.links.probe.at(axis);
+                at.unwrap_or_else(|| self.position(usize::from(axis))).0
             }
             Value::LimitHit => match self.links.limits_hit.get() {
                 0 => -1,

@@ -171,7 +171,7 @@ pub fn plan_changed(
             rig.source.enter();
             version = rig.source.version().wrapping_sub(1);
             governor.begin(line.accel.get(), line.jerk.get());
-            (line, block.line(), line.length.get())
+            (line, block.line(), line.length)
         });
         change(planned.len(), rig);
         if rig.source.version() != version {
@@ -204,7 +204,7 @@ pub fn plan_changed(
         };
         planned.push(Planned {
             line: number,
-            length: line.length.get().into(),
+            length: line.length.into(),
             cruise: cruise.into(),
             top: line.velocity(&Factors { feed: 2.0, traverse: 1.0 }).into(),
             corner: line.entry.get().into(),

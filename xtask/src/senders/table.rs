@@ -3,10 +3,7 @@
 use super::session::{ARRIVAL, Done};
 use super::step::{Outcome, Step};
 
-/// Steps that the firmware is known not to do so far.
-const NOT_YET: [&str; 1] = ["override"];
-
-/// Prints every step of every sender. Returns whether all is as it should be, or known.
+/// Prints every step of every sender. Returns whether all has passed.
 pub fn show(sessions: &[Done]) -> bool {
     println!("\n{:<12}{:<20}{:<10}details", "sender", "step", "result");
     for (done, step) in steps(sessions) {
@@ -17,22 +14,11 @@ pub fn show(sessions: &[Done]) -> bool {
     for done in sessions {
         println!("{}: {} s", done.sender, done.seconds);
     }
-    for (done, step) in steps(sessions).filter(|(_, step)| step.outcome == Outcome::NotYet) {
-        println!("{}: {}: not yet", done.sender, step.name);
-    }
-    for (done, step) in steps(sessions).filter(|(_, step)| is_better(step)) {
-        println!(
-            "{}: {}: passes now, strike it off the list in {}",
-            done.sender,
-            step.name,
-            file!()
-        );
-    }
     let agree = agree(sessions);
     if !agree {
         println!("the motors have not made the same steps for every sender");
     }
-    agree && steps(sessions).all(|(_, step)| is_right(step))
+    agree && steps(sessions).all(|(_, step)| step.outcome == Outcome::Passed)
 }
 
 /// Whether the motors have made the same steps, not only the same way on balance, for every sender.
@@ -47,36 +33,9 @@ fn steps(sessions: &[Done]) -> impl Iterator<Item = (&Done, &Step)> {
     sessions.iter().flat_map(|done| done.steps.iter().map(move |step| (done, step)))
 }
 
-fn is_right(step: &Step) -> bool {
-    match step.outcome {
-        Outcome::Passed => !is_better(step),
-        Outcome::NotYet => is_known(step),
-        Outcome::Failed => false,
-    }
-}
-
-/// Whether it is on the list without need: from then on it would not be missed.
-fn is_better(step: &Step) -> bool {
-    step.outcome == Outcome::Passed && is_known(step)
-}
-
-fn is_known(step: &Step) -> bool {
-    NOT_YET.contains(&step.name.as_str())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn only_what_is_known_may_be_missing() {
-        let step = |name: &str, outcome| Step { outcome, ..Step::failed(name, "") };
-        assert!(is_right(&step("finish", Outcome::Passed)));
-        assert!(is_right(&step("override", Outcome::NotYet)));
-        assert!(!is_right(&step("override", Outcome::Passed)));
-        assert!(!is_right(&step("finish", Outcome::NotYet)));
-        assert!(!is_right(&step("override", Outcome::Failed)));
-    }
 
     #[test]
     fn senders_have_to_agree_on_the_steps() {
