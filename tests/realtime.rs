@@ -13,7 +13,7 @@ use proptest::prelude::*;
 #[derive(Clone, Debug)]
 enum Deed {
     Line(String),
-    Characters(&'static str),
+    Characters(&'static [u8]),
     Wait(u64),
 }
 
@@ -31,12 +31,35 @@ fn any_line() -> impl Strategy<Value = String> {
         1 => Just("{\"gc\":\"g91 g1 f3000 x1\"}".to_string()),
         1 => Just("{posx:n}".to_string()),
         1 => Just("{qf:1}".to_string()),
+        1 => prop::sample::select(vec!["{mfo:0.3}", "{mfo:2}", "{mto:0.2}", "m50 p0.6", "m48", "m49"])
+            .prop_map(str::to_string),
+        1 => Just("g91 g38.3 f3000 x2 z-2".to_string()),
+        1 => prop::sample::select(vec!["{alarm:1}", "{clear:1}", "{clear:1}", "{shutd:1}"])
+            .prop_map(str::to_string),
     ]
 }
 
 fn any_deed() -> impl Strategy<Value = Deed> {
     let characters = prop::sample::select(vec![
-        "!", "!", "~", "~", "%", "%\n", "!\n%\n", "!%", "%!", "!%~", "!~", "~!", "\x04", "\x04%\n",
+        &b"!"[..],
+        b"!",
+        b"~",
+        b"~",
+        b"%",
+        b"%\n",
+        b"!\n%\n",
+        b"!%",
+        b"%!",
+        b"!%~",
+        b"!~",
+        b"~!",
+        b"\x04",
+        // Overrides: 100 %, +10, -10; traverses 25 %.
+        b"\x04%\n",
+        b"\x90",
+        b"\x91\x91!",
+        b"\x92~",
+        b"\x97",
     ]);
     prop_oneof![
         3 => any_line().prop_map(Deed::Line),
@@ -58,7 +81,8 @@ impl Sender {
     }
 
     fn answered(&self) -> usize {
-        self.heard.matches("{\"r\":").count() - 1
+        // Probing tells what it has found by itself.
+        self.heard.matches("{\"r\":").count() - self.heard.matches("{\"r\":{\"prb\"").count() - 1
     }
 
     fn line(&mut self, line: &str) {
@@ -87,10 +111,11 @@ fn play(deeds: &[Deed]) {
     for deed in deeds {
         match deed {
             Deed::Line(line) => sender.line(line),
-            Deed::Characters(characters) => sender.machine.send(characters.as_bytes()),
+            Deed::Characters(characters) => sender.machine.send(characters),
             Deed::Wait(ms) => sender.run(*ms),
         }
     }
+    sender.line("{clear:1}");
     sender.line("g90 g1 f3000 x3 y-4 z1");
     let mut before = None;
     for _ in 0..2_000 {

@@ -5,7 +5,8 @@ use proptest::test_runner::RngSeed;
 
 /// The same cases each time, unless `PROPTEST_RNG_SEED` names others.
 pub fn cases(count: u32) -> ProptestConfig {
-    let mut config = ProptestConfig::with_cases(count);
+    let wanted = std::env::var("KERF_CASES").ok().and_then(|n| n.parse().ok());
+    let mut config = ProptestConfig::with_cases(wanted.unwrap_or(count));
     if config.rng_seed == RngSeed::Random {
         config.rng_seed = RngSeed::Fixed(2560);
     }
