@@ -4,7 +4,7 @@
 //! asks for a first look after [`FIRST_US`]; two looks in a row that agree, [`SOON_US`] apart, are believed. So
 //!
 //! - a pulse shorter than [`SOON_US`] is never believed, one longer than both times always;
-//! - a switch is believed 12 us after its edge, if nothing else has happened in the last [`LATER_US`], and
+//! - a switch is believed 11 us after its edge, if nothing else has happened in the last [`LATER_US`], and
 //!   after 300 us in any case;
 //! - it is not asked again for [`LOCK_MS`] after that, so that its bouncing is one event, and then believed
 //!   as it stands.
@@ -14,7 +14,7 @@
 //! [`inputs`](crate::boards::inputs).
 
 /// From an edge to a look, microseconds.
-pub const FIRST_US: u32 = 2;
+pub const FIRST_US: u32 = 1;
 /// From there to the next.
 pub const SOON_US: u32 = 10;
 /// Between looks while a switch is locked, and after one that found nothing.
@@ -152,14 +152,14 @@ mod tests {
 
     #[test]
     fn an_edge_is_believed_after_two_looks() {
-        assert_eq!(watched(&[1_000], 100_000), [(1_012, true)]);
-        assert_eq!(watched(&[1_000, 50_000], 100_000), [(1_012, true), (50_012, false)]);
+        assert_eq!(watched(&[1_000], 100_000), [(1_011, true)]);
+        assert_eq!(watched(&[1_000, 50_000], 100_000), [(1_011, true), (50_011, false)]);
     }
 
     #[test]
     fn a_contact_that_bounces_is_one_event() {
         let bounces: Vec<u32> = (0..21).map(|n| 1_000 + 130 * n).collect();
-        assert_eq!(watched(&bounces, 100_000), [(1_012, true)]);
+        assert_eq!(watched(&bounces, 100_000), [(1_011, true)]);
     }
 
     #[test]

@@ -115,6 +115,8 @@ fn play(deeds: &[Deed]) {
             Deed::Wait(ms) => sender.run(*ms),
         }
     }
+    // A queue flush takes what has come until it is done.
+    sender.run(1_000);
     sender.line("{clear:1}");
     sender.line("g90 g1 f3000 x3 y-4 z1");
     let mut before = None;
@@ -140,4 +142,11 @@ proptest! {
         let played = std::thread::scope(|scope| scope.spawn(|| play(&deeds)).join());
         prop_assert!(played.is_ok());
     }
+}
+
+/// The second move is planned while the first is in the very last of its slow-down.
+#[test]
+fn a_move_that_comes_at_the_last_moment_gets_going() {
+    let deeds = [Deed::Line("g90 g0 x-3.202 y1.395".to_string())];
+    std::thread::spawn(move || play(&deeds)).join().expect("an end");
 }

@@ -68,6 +68,13 @@ impl Governor {
         if self.state.velocity > self.crawl(nominal) {
             return self.brake(left, ahead, nominal);
         }
+        // The last of a slow-down, in whose midst a move has begun: it is at rest, and off from there.
+        if some(self.state.velocity) {
+            self.stop();
+            if let Some(stretch) = self.go(left, cruise, ahead, nominal) {
+                return stretch;
+            }
+        }
         self.creep(left, cruise, nominal)
     }
 

@@ -15,7 +15,6 @@ const WRITE: u8 = 1 << 1;
 /// Access to the EEPROM.
 pub struct Eeprom(());
 
-#[small]
 impl Eeprom {
     /// Access from thread mode. One task at most is to write each part.
     pub fn take() -> Self {
@@ -23,7 +22,6 @@ impl Eeprom {
     }
 }
 
-#[small]
 impl Memory for Eeprom {
     const SIZE: u16 = 4_096;
     const LOG: u16 = Self::SIZE - AREA;

@@ -85,7 +85,8 @@ struct State {
     stops: u16,
     /// Those of them that have been hit.
     hits: u16,
-    /// Ends that stop nothing for now.
+    /// The same without the ends that are spared for now.
+    live: u16,
     spared: u8,
     /// Those that end a move, and what they must be for it.
     armed: u16,
@@ -103,6 +104,7 @@ static STATE: Shared = Shared(UnsafeCell::new(State {
     switches: Switches::new(),
     low: 0,
     stops: 0,
+    live: 0,
     spared: 0,
     hits: 0,
     armed: 0,
@@ -141,6 +143,7 @@ pub fn start() {
 pub fn set_up(low: u16, stops: u16) {
     with(|state| {
         state.stops = stops;
+        state.live = stops & !u16::from(state.spared);
         if state.low != low {
             (state.low, state.fresh) = (low, true);
             // SAFETY: starts a look; one that is due does it all the same.
@@ -151,7 +154,10 @@ pub fn set_up(low: u16, stops: u16) {
 
 /// These ends are no limits for now. Thread mode.
 pub fn spare(ends: u8) {
-    with(|state| state.spared = ends);
+    with(|state| {
+        state.spared = ends;
+        state.live = state.stops & !u16::from(ends);
+    });
 }
 
 /// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
@@ -208,13 +214,13 @@ extern "C" fn look() {
         wait();
         now = levels() ^ state.low;
         // Before anything else: each cycle counts, and only two in five are ours.
-        if state.switches.changed(now) & now & state.stops & !u16::from(state.spared) != 0 {
+        if state.switches.changed(now) & now & state.live != 0 {
             stepper::stop();
         }
     }
     let (changed, next) = state.switches.look(now);
     if changed != 0 {
-        let hits = changed & now & state.stops & !u16::from(state.spared);
+        let hits = changed & now & state.live;
         if hits != 0 {
             stepper::stop();
             state.hits |= hits;
