@@ -5,7 +5,11 @@
 const { NotYet, sleep, until, within, ensure } = require('./steps');
 
 const READY = [1, 3, 4];
+const HOMING = 9;
 const FAR = 40;
+/// Where Z is when it is homed, and where the plate is then.
+const Z_MAX = 75;
+const PLATE = 23.2;
 
 /// The lines that come from the board from now on.
 function hear(server) {
@@ -68,6 +72,27 @@ async function stop(server) {
   return `at X ${x} of ${FAR}`;
 }
 
+/// Homes X and Y at their lower switches and Z at its upper one, which is where travel ends.
+async function home(server) {
+  server.command('homing');
+  await until(() => server.sr.machineState === HOMING);
+  await until(() => READY.includes(server.sr.machineState));
+  const { x, y, z } = server.sr.mpos;
+  ensure(Number(x) === 0 && Number(y) === 0 && Number(z) === Z_MAX, `at ${x} ${y} ${z}`);
+  return `at ${x} ${y} ${z}`;
+}
+
+/// Probes the plate from above.
+async function probe(server) {
+  const heard = hear(server);
+  server.command('gcode', `G38.2 Z0 F800`);
+  const result = await until(() => heard('{"r":{"prb":'));
+  const { e, z } = JSON.parse(result).r.prb;
+  ensure(e === 1 && Math.abs(z - PLATE) < 0.01, result);
+  await until(() => READY.includes(server.sr.machineState));
+  return `the plate is at Z ${z}`;
+}
+
 /// Ends in a board that has just started.
 async function reset(server) {
   const heard = hear(server);
@@ -75,4 +100,4 @@ async function reset(server) {
   return until(() => heard('{"r":{"fv":'));
 }
 
-module.exports = { jog, unlock, motors, override, stop, reset };
+module.exports = { jog, unlock, motors, override, stop, home, probe, reset };

@@ -6,6 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
+use kerf::boards::Board;
+use kerf_sim::mechanics::Build;
 use kerf_sim::{Image, Machine};
 
 use crate::arrival::Arrival;
@@ -21,6 +23,9 @@ const SLICE_MS: u64 = 2;
 const RESET_DELAY: Duration = Duration::from_millis(100);
 /// A machine further behind than this does not try to catch up.
 const MAX_LAG: Duration = Duration::from_millis(200);
+
+/// Where the plate is that can be probed: from the lower hard end of Z, mm.
+const PLATE_MM: f64 = 45.0;
 
 /// Bytes that may wait for the serial line, as in the buffer of a real port.
 const BACKLOG: usize = 256;
@@ -64,6 +69,11 @@ pub fn serve(args: &ServeArgs) -> Result<bool> {
     Ok(end.is_ok() && arrived)
 }
 
+/// The machine that a sender finds: in the middle of its travel, with a plate to probe some way below.
+fn around(board: &Board) -> Build {
+    Build { plate: Some(PLATE_MM), ..Build::of(board) }
+}
+
 /// Stops when the standard input ends: when whoever started this wants the verdict, or is gone.
 fn stop_with_input(stop: Arc<AtomicBool>) {
     std::thread::spawn(move || {
@@ -76,6 +86,7 @@ impl Server {
     fn new(args: &ServeArgs) -> Result<Self> {
         let image = Image::read(&args.target.elf)?;
         let mut machine = Machine::new(image.clone(), board(&args.target.board)?)?;
+        machine.build(&around(machine.board()));
         machine.set_baud(args.baud);
         machine.follow_speed();
         let mut pty = Pty::new()?;
@@ -123,6 +134,7 @@ impl Server {
 
     fn reset(&mut self) -> Result<()> {
         let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
+        fresh.build(&around(fresh.board()));
         fresh.set_baud(self.baud);
         fresh.follow_speed();
         fresh.set_eeprom(self.machine.eeprom());
