@@ -13,6 +13,8 @@ use super::links::Links;
 use super::ports::Port;
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
+use crate::hal::event::Event;
+use crate::hal::imp::flags;
 use crate::hal::imp::time::millis;
 use crate::hal::serial::is_shared;
 use crate::protocol::notice::{Banner, Exception, Occasion, Probing, acknowledge, jog_ended};
@@ -50,6 +52,8 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             }
         }
         if links.probe.take_news() {
+            // The planner waits for it.
+            flags::set(Event::BlockDone);
             report_probing(links).await;
         }
         let (state, hold) = state_of(links);

@@ -5,7 +5,6 @@
 //! place is where the move ended; G38.2 and G38.4 take that for a failure, and so is a probe that is as it is to
 //! become before anything moves, in which case nothing does.
 
-use embassy_futures::yield_now;
 use kerf_macros::small;
 
 use super::Planner;
@@ -13,6 +12,7 @@ use super::seek::Sought;
 use crate::boards::inputs::PROBE;
 use crate::gcode::command::Motion;
 use crate::gcode::modal::MotionMode;
+use crate::hal::event::{Event, wait};
 use crate::hal::imp::inputs;
 use crate::status::Status;
 use crate::tasks::links::{Cycle, ProbeState};
@@ -36,9 +36,7 @@ impl Planner {
         }
         self.enter(Cycle::Off);
         // The result comes before the response to the next line.
-        while self.links.probe.is_news() {
-            yield_now().await;
-        }
+        wait(Event::BlockDone, || (!self.links.probe.is_news()).then_some(())).await;
     }
 
     /// Begins the move. False if the probe is there already.

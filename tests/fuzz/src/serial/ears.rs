@@ -5,6 +5,9 @@ use kerf::hal::serial::{XOFF, XON};
 /// How a line begins that answers one.
 const ANSWERS: [&[u8]; 3] = [b"{\"r\":{", b"{r:{", b"tinyg ["];
 
+/// How the result of probing begins.
+const PROBED: [&str; 2] = ["{\"r\":{\"prb\":", "{r:{prb:"];
+
 /// Hears, and counts the answers.
 #[derive(Default)]
 pub struct Ears {
@@ -43,7 +46,10 @@ impl Ears {
         let line = std::mem::take(&mut self.partial);
         let text = String::from_utf8_lossy(&line);
         assert!(self.deaf || !line.starts_with(b"{") || line.ends_with(b"}"), "says {text}");
-        if ANSWERS.iter().any(|answer| line.starts_with(answer)) {
+        // What probing tells by itself: it has no length and no slots.
+        let unasked =
+            PROBED.iter().any(|probed| text.starts_with(probed)) && text.contains("[1,0,0");
+        if !unasked && ANSWERS.iter().any(|answer| line.starts_with(answer)) {
             self.answers += 1;
             self.last = line;
         }
