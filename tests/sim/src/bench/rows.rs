@@ -163,7 +163,7 @@ pub const ROWS: [Row; 18] = [
         better: Higher,
         peers: ["291 at 115,200", "-", "115 at 115,200"],
         target: Some(1_000.0),
-        floor: Some(360.0),
+        floor: Some(345.0),
         measure: costs::lines,
     },
     Row {
