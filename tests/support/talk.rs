@@ -34,8 +34,12 @@ const STEPS: [f64; 4] = [1280.0, 1280.0, 1280.0, 1600.0 / 360.0];
 
 /// Where switches are that the machine works itself: that of X at its lower end, of Z at the upper one. Y has one out
 /// of its reach, which is worked by hand.
-const SWITCHES: [(usize, i64); 4] =
-    [(X_MIN, -7_680), (Z_MAX, 7_680), (PROBE, -3_840), (Y_MIN, -1_000_000_000)];
+const SWITCHES: [(usize, i64, bool); 4] = [
+    (X_MIN, -7_680, false),
+    (Z_MAX, 7_680, false),
+    (PROBE, -3_840, false),
+    (Y_MIN, -1_000_000_000, false),
+];
 /// Where an axis is when it has been homed: the position less the steps. Its switch lets go a step off where it
 /// closes, 0.1 mm further on it is at the end of its travel, -6 mm and 6 mm.
 const HOMED: [(usize, i64); 2] = [(0, -7_680 - (-7_679 + 128)), (2, 7_680 - (7_679 - 128))];
