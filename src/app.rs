@@ -64,6 +64,7 @@ impl Links {
             door_open: Cell::new(false),
             cycle: Cell::default(),
             probe: Probe::default(),
+            jogs: Cell::default(),
             jogged: Cell::new(false),
             job: Cell::default(),
             moment: Cell::new(Snapshot::new().moment()),
