@@ -54,19 +54,22 @@ impl Snapshot {
         }
     }
 
-    /// Where motor `m` is, in steps.
-    pub fn position(&self, m: usize) -> i32 {
-        if self.left <= 0.0 || self.steps[m] == 0 {
-            return self.target[m];
+    /// Where the motors are, in steps.
+    #[small]
+    pub fn position(&self) -> [i32; MOTORS] {
+        let left = if self.left > 0.0 { self.left / self.length } else { 0.0 };
+        let mut position = self.target;
+        for (position, steps) in position.iter_mut().zip(self.steps) {
+            *position = position.wrapping_sub((f32::from(steps) * left) as i32);
         }
-        let short = f32::from(self.steps[m]) * (self.left / self.length);
-        self.target[m].wrapping_sub(short as i32)
+        position
     }
 
     /// What is told of it.
+    #[small]
     pub fn moment(&self) -> Moment {
         Moment {
-            position: core::array::from_fn(|m| self.position(m)),
+            position: self.position(),
             velocity: self.velocity,
             line: self.line,
             finished: self.finished,
