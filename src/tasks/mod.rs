@@ -10,6 +10,7 @@ pub mod exec;
 pub mod health;
 pub mod hold;
 mod homing;
+mod jog;
 pub mod lines;
 pub mod links;
 pub mod overrides;

@@ -11,6 +11,7 @@ use embassy_futures::yield_now;
 
 use super::Never;
 use super::hold::{self, Flush};
+use super::jog;
 use super::lines::{Aside, LinePool};
 use super::links::Links;
 use super::ports::Port;
@@ -47,6 +48,7 @@ pub fn run(
     let mut aux = aux.map(|received| Intake::new(links.port(AUX), received));
     async move {
         loop {
+            jog::passes(links);
             let left = usb.take(links);
             let aux_left = match &mut aux {
                 Some(aux) if !aux.is_idle() => aux.take(links),
@@ -56,7 +58,10 @@ pub fn run(
                 hold::placed(links, links.port(USB), CUT);
             }
             match left.max(aux_left) {
-                Left::Nothing => next(Event::Received).await,
+                Left::Nothing => {
+                    jog::passed(links);
+                    next(Event::Received).await;
+                }
                 Left::Bytes | Left::Placed(_) => yield_now().await,
                 Left::Full => {
                     // The ring goes on filling.

@@ -9,6 +9,7 @@ use core::cell::{OnceCell, RefMut};
 use super::alarm;
 use super::hold;
 use super::homing;
+use super::jog::Bar;
 use super::links::{Cycle, Links, snapshot};
 use super::overrides;
 use super::ports::Port;
@@ -171,8 +172,9 @@ impl<'a> View<'a> {
 
     /// Whether the machine is at rest, and something may begin that no line asks for.
     fn may_begin(&self) -> Result<(), Status> {
-        if self.links.limits_hit.get() != 0 {
-            return Err(Status::LimitHit);
+        let alarm = alarm::now();
+        if alarm != Alarm::None {
+            return Err(alarm.status());
         }
         let busy = self.is_busy() || self.links.has_data();
         if busy { Err(Status::NotAccepted) } else { Ok(()) }
@@ -435,6 +437,9 @@ impl Machine for View<'_> {
     fn jog(&mut self, axis: u8, place: Length) -> Status {
         if Setup::mode(&*self.settings, axis) == AxisMode::Disabled {
             return Status::AxisDisabled;
+        }
+        if self.links.jogs.get() != Bar::Open {
+            return Status::Terminated;
         }
         if let Err(status) = self.may_begin() {
             return status;

@@ -148,6 +148,8 @@ extern "C" fn __vector_52() -> ! {
             // Should it come again before `CLOSED` is set, then it runs first and this one after it.
             "sei",
             "in   r24, 0x3F",
+            // Interrupts stay off from `out` to `reti`: one that comes again at once must not pile up.
+            "andi r24, 0x7F",
             "push r24",
             "sbic 0x1E, {hold}",
             "rjmp 8f",
