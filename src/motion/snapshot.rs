@@ -54,22 +54,19 @@ impl Snapshot {
         }
     }
 
-    /// Where the motors are, in steps.
-    #[small]
-    pub fn position(&self) -> [i32; MOTORS] {
-        let left = if self.left > 0.0 { self.left / self.length } else { 0.0 };
-        let mut position = self.target;
-        for (position, steps) in position.iter_mut().zip(self.steps) {
-            *position = position.wrapping_sub((f32::from(steps) * left) as i32);
+    /// Where motor `m` is, in steps.
+    pub fn position(&self, m: usize) -> i32 {
+        if self.left <= 0.0 || self.steps[m] == 0 {
+            return self.target[m];
         }
-        position
+        let short = f32::from(self.steps[m]) * (self.left / self.length);
+        self.target[m].wrapping_sub(short as i32)
     }
 
     /// What is told of it.
-    #[small]
     pub fn moment(&self) -> Moment {
         Moment {
-            position: self.position(),
+            position: core::array::from_fn(|m| self.position(m)),
             velocity: self.velocity,
             line: self.line,
             finished: self.finished,
