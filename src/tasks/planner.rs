@@ -15,6 +15,7 @@ mod square;
 use embassy_futures::yield_now;
 use parts::{ArcWalk, Parts};
 
+use super::Never;
 use super::alarm;
 use super::hold::{self, Flush};
 use super::links::{self, Cycle, Links};
@@ -83,7 +84,7 @@ enum Turn {
 }
 
 /// The task.
-pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
+pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Never> {
     let mut planner = Planner {
         links,
         queue,
@@ -98,32 +99,34 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         parts: None,
         news: News::None,
     };
-    loop {
-        links.planner_wake.wait().await;
-        planner.replan();
-        if links.commands_taken.get() && !planner.carry_out_at_once() {
-            planner.begin();
-            loop {
-                planner.room().await;
-                match planner.turn() {
-                    Turn::Done => break,
-                    Turn::More => yield_now().await,
-                    Turn::Pause => planner.cycle_start().await,
-                    Turn::Probe => planner.probe().await,
-                    Turn::Home => planner.home().await,
-                    Turn::Jog => planner.jog().await,
+    async move {
+        loop {
+            links.planner_wake.wait().await;
+            planner.replan();
+            if links.commands_taken.get() && !planner.carry_out_at_once() {
+                planner.begin();
+                loop {
+                    planner.room().await;
+                    match planner.turn() {
+                        Turn::Done => break,
+                        Turn::More => yield_now().await,
+                        Turn::Pause => planner.cycle_start().await,
+                        Turn::Probe => planner.probe().await,
+                        Turn::Home => planner.home().await,
+                        Turn::Jog => planner.jog().await,
+                    }
                 }
             }
-        }
-        links.commands_taken.set(false);
-        if planner.is_flushed() {
-            seek::drop_blocks().await;
-            planner.restart();
-            if links.killed.take() {
-                parser::end_program(links);
+            links.commands_taken.set(false);
+            if planner.is_flushed() {
+                seek::drop_blocks().await;
+                planner.restart();
+                if links.killed.take() {
+                    parser::end_program(links);
+                }
             }
+            links.parser_wake.signal();
         }
-        links.parser_wake.signal();
     }
 }
 

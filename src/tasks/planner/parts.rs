@@ -34,6 +34,7 @@ impl Parts {
 
     /// The end of the next part, the machine being at `position`.
     #[inline(never)]
+    #[small]
     pub fn next(&mut self, position: &PerAxis<Length>) -> PerAxis<Length> {
         let mut end = self.target;
         for (end, start) in end.iter_mut().zip(position) {
