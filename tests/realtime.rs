@@ -1,152 +1,117 @@
-//! Real-time characters at random times, to the whole firmware on the host: it never freezes, every line is
-//! answered once, and motors are where positions are.
+//! Random conversations with the whole firmware on the host, in mocked time: lines and real-time characters on both
+//! ports, switches that change, resets. What is judged is in `tests/support/talk.rs`; `tests/sim/tests/realtime.rs` has the
+//! same conversations with the image, and shorter ones.
+//!
+//! Each is with a machine of its own. One that fails is made as small as it can be, and its seed is told:
+//! `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test realtime` has it again. A long run on all cores:
+//! `KERF_CASES=100000 cargo test --release -p kerf --test realtime`.
 
-#[path = "support/cases.rs"]
-mod cases;
+#[path = "support/deeds.rs"]
+mod deeds;
+#[path = "support/host.rs"]
+mod host;
+#[path = "support/seeds.rs"]
+mod seeds;
+#[path = "support/sender.rs"]
+mod sender;
+#[path = "support/side.rs"]
+mod side;
+#[path = "support/talk.rs"]
+mod talk;
 
-use cases::cases;
-use kerf::hal::imp::Machine;
-use kerf::motion::queue;
-use proptest::prelude::*;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
 
-/// What a sender does.
-#[derive(Clone, Debug)]
-enum Deed {
-    Line(String),
-    Characters(&'static [u8]),
-    Wait(u64),
+use deeds::{Deed, Scale};
+use kerf::hal::imp::{Machine, eeprom, was_reset};
+use proptest::test_runner::{TestCaseError, TestError};
+use talk::Talk;
+
+/// Up to a minute of the machine's time.
+const SCALE: Scale = Scale { deeds: 40, way: 3_000, radius: 1.5, wait: 1_500 };
+/// It ends when so many have failed.
+const TOLD: usize = 3;
+/// A line of progress each so many conversations.
+const PROGRESS: u64 = 5_000;
+
+/// What is left of a conversation after a reset, and of the machine the EEPROM.
+type Rest<'a> = (&'a [Deed], Vec<u8>);
+
+/// A conversation from power-up to its end, or to a reset.
+fn live<'a>(deeds: &'a [Deed], stored: Option<&[u8]>) -> Result<Option<Rest<'a>>, String> {
+    stored.into_iter().for_each(eeprom::put);
+    let mut talk = Talk::new(Machine::boot(115_200).expect("one machine for each thread"));
+    let played = match stored {
+        None => talk.begin(),
+        Some(_) => talk.greet(),
+    };
+    let played = played.and_then(|()| talk.play(deeds)).and_then(|rest| {
+        if rest.is_none() {
+            talk.finish()?;
+            return Ok(None);
+        }
+        talk.run(20)?;
+        was_reset().then_some(rest).ok_or_else(|| "no reset".to_string())
+    });
+    let rest = played.map_err(|why| format!("{why}\n{}", talk.story()))?;
+    Ok(rest.map(|rest| (rest, eeprom::contents())))
 }
 
-fn any_line() -> impl Strategy<Value = String> {
-    let way = || (-9_000i32..9_000).prop_map(|n| f64::from(n) * 1e-3);
-    prop_oneof![
-        4 => (way(), way()).prop_map(|(x, y)| format!("g91 g1 f3000 x{x} y{y}")),
-        2 => (way(), way()).prop_map(|(x, y)| format!("g90 g0 x{x} y{y}")),
-        // More chords than there are blocks.
-        1 => Just("g91 g2 f3000 x0 i5 j1 p2".to_string()),
-        1 => Just("g4 p0.1".to_string()),
-        1 => Just("m3 s100".to_string()),
-        1 => Just("m0".to_string()),
-        1 => Just("g91 g81 f600 x1 y1 z-1 r0 l3".to_string()),
-        1 => Just("{\"gc\":\"g91 g1 f3000 x1\"}".to_string()),
-        1 => Just("{posx:n}".to_string()),
-        1 => Just("{qf:1}".to_string()),
-        1 => prop::sample::select(vec!["{mfo:0.3}", "{mfo:2}", "{mto:0.2}", "m50 p0.6", "m48", "m49"])
-            .prop_map(str::to_string),
-        1 => Just("g91 g38.3 f3000 x2 z-2".to_string()),
-        1 => prop::sample::select(vec!["{alarm:1}", "{clear:1}", "{clear:1}", "{shutd:1}"])
-            .prop_map(str::to_string),
-    ]
-}
-
-fn any_deed() -> impl Strategy<Value = Deed> {
-    let characters = prop::sample::select(vec![
-        &b"!"[..],
-        b"!",
-        b"~",
-        b"~",
-        b"%",
-        b"%\n",
-        b"!\n%\n",
-        b"!%",
-        b"%!",
-        b"!%~",
-        b"!~",
-        b"~!",
-        b"\x04",
-        // Overrides: 100 %, +10, -10; traverses 25 %.
-        b"\x04%\n",
-        b"\x90",
-        b"\x91\x91!",
-        b"\x92~",
-        b"\x97",
-    ]);
-    prop_oneof![
-        3 => any_line().prop_map(Deed::Line),
-        2 => characters.prop_map(Deed::Characters),
-        2 => prop_oneof![0u64..20, 0u64..1_500].prop_map(Deed::Wait),
-    ]
-}
-
-struct Sender {
-    machine: Machine,
-    heard: String,
-    lines: usize,
-}
-
-impl Sender {
-    fn run(&mut self, ms: u64) {
-        self.machine.run_ms(ms);
-        self.heard += &String::from_utf8(self.machine.received()).expect("ASCII");
+/// Has a conversation, with a machine in a thread of its own each time it starts.
+fn play(deeds: &[Deed]) -> Result<(), String> {
+    let mut rest = Some((deeds, None));
+    while let Some((deeds, stored)) = rest {
+        let life = |stored: Option<Vec<u8>>| live(deeds, stored.as_deref());
+        let lived = thread::scope(|scope| scope.spawn(|| life(stored)).join());
+        let lived = lived.map_err(|_| "the firmware panics".to_string())?;
+        rest = lived?.map(|(rest, stored)| (rest, Some(stored)));
     }
+    Ok(())
+}
 
-    fn answered(&self) -> usize {
-        // Probing tells what it has found by itself.
-        self.heard.matches("{\"r\":").count() - self.heard.matches("{\"r\":{\"prb\"").count() - 1
+/// The conversation of a seed; one that fails is made smaller.
+fn try_seed(seed: u64) -> Result<(), String> {
+    let (tree, mut runner) = seeds::case(seed, &deeds::conversation(SCALE));
+    let tried = runner.run_one(tree, |deeds| play(&deeds).map_err(TestCaseError::fail));
+    match tried {
+        Ok(_) => Ok(()),
+        Err(TestError::Fail(why, deeds)) => Err(format!("seed {seed}: {deeds:?}\n{why}")),
+        Err(TestError::Abort(why)) => Err(format!("seed {seed}: {why}")),
     }
+}
 
-    fn line(&mut self, line: &str) {
-        // As many in flight as a sender may have.
-        let mut patience = 0;
-        while self.lines - self.answered() >= 4 {
-            self.run(100);
-            patience += 1;
-            // It may be held, with the queue full.
-            if patience % 20 == 0 {
-                self.machine.send(b"~");
+#[test]
+fn any_conversation_ends_where_it_is_to() {
+    let seeds = seeds::seeds(300);
+    let (next, failed) = (AtomicU64::new(seeds.start), Mutex::new(Vec::new()));
+    let work = || {
+        loop {
+            let seed = next.fetch_add(1, Ordering::Relaxed);
+            if !seeds.contains(&seed) || failed.lock().unwrap().len() >= TOLD {
+                return;
             }
-            assert!(patience < 3_000, "line {} is never answered: {}", self.lines, self.heard);
+            if let Err(why) = try_seed(seed) {
+                failed.lock().unwrap().push(why);
+            }
+            let done = seed + 1 - seeds.start;
+            if done.is_multiple_of(PROGRESS) {
+                seeds::tell(&format!("{done} conversations, to seed {seed}"));
+            }
         }
-        self.lines += 1;
-        self.machine.send(format!("{line}\n").as_bytes());
-    }
-}
-
-/// Does all that, and moves to a place in the end.
-fn play(deeds: &[Deed]) {
-    let machine = Machine::boot(115_200).expect("one machine for each thread");
-    let mut sender = Sender { machine, heard: String::new(), lines: 0 };
-    sender.run(50);
-    sender.line("{psw:1}");
-    for deed in deeds {
-        match deed {
-            Deed::Line(line) => sender.line(line),
-            Deed::Characters(characters) => sender.machine.send(characters),
-            Deed::Wait(ms) => sender.run(*ms),
-        }
-    }
-    // A queue flush takes what has come until it is done.
-    sender.run(1_000);
-    sender.line("{clear:1}");
-    sender.line("g90 g1 f3000 x3 y-4 z1");
-    let mut before = None;
-    for _ in 0..2_000 {
-        sender.run(100);
-        sender.machine.send(b"~");
-        let now = Some(sender.machine.emitted().steps);
-        if now == before && queue::used() == 0 && sender.answered() == sender.lines {
-            break;
-        }
-        before = now;
-    }
-    sender.run(500);
-    assert_eq!(sender.answered(), sender.lines, "{}", sender.heard);
-    assert_eq!(sender.machine.emitted().position, [3_840, -5_120, 1_280, 0], "{}", sender.heard);
-}
-
-proptest! {
-    #![proptest_config(cases(300))]
-
-    #[test]
-    fn any_conversation_ends_where_it_is_to(deeds in prop::collection::vec(any_deed(), 1..40)) {
-        let played = std::thread::scope(|scope| scope.spawn(|| play(&deeds)).join());
-        prop_assert!(played.is_ok());
-    }
+    };
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        (0..cores).for_each(|_| {
+            scope.spawn(work);
+        });
+    });
+    let failed = failed.into_inner().unwrap();
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
 /// The second move is planned while the first is in the very last of its slow-down.
 #[test]
 fn a_move_that_comes_at_the_last_moment_gets_going() {
-    let deeds = [Deed::Line("g90 g0 x-3.202 y1.395".to_string())];
-    std::thread::spawn(move || play(&deeds)).join().expect("an end");
+    play(&[Deed::Line(0, "g90 g0 x-3.202 y1.395".to_string())]).expect("an end");
 }

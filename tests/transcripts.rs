@@ -1,7 +1,11 @@
 //! The transcripts, played to the firmware on the host: each on a machine of its own.
 
+#[path = "support/host.rs"]
+mod host;
 #[path = "support/requests.rs"]
 mod requests;
+#[path = "support/side.rs"]
+mod side;
 #[path = "support/transcript.rs"]
 mod transcript;
 
@@ -12,58 +16,12 @@ use kerf::config::table::Kind;
 use kerf::config::{Name, Owner, Setting};
 use kerf::gcode::codes::docs::{self, Doc, On, Refusal};
 use kerf::gcode::setup::{AxisMode, Setup};
-use kerf::hal::imp::{Machine, gpio, pwm};
+use kerf::hal::imp::Machine;
 use kerf::protocol;
 use kerf::status::Status;
 use kerf::units::Length;
 use requests::{Asked, pairs};
-use transcript::{Side, Transcript};
-
-impl Side for Machine {
-    fn send(&mut self, bytes: &[u8]) {
-        Machine::send(self, bytes);
-    }
-
-    fn send_aux(&mut self, bytes: &[u8]) {
-        Machine::send_aux(self, bytes);
-    }
-
-    fn set_aux_cts(&mut self, stop: bool) {
-        Machine::set_aux_cts(self, stop);
-    }
-
-    fn heard_aux(&mut self) -> Vec<u8> {
-        self.received_aux()
-    }
-
-    fn set_baud(&mut self, baud: u32) {
-        Machine::set_baud(self, baud);
-    }
-
-    fn run_ms(&mut self, ms: u64) {
-        Machine::run_ms(self, ms);
-    }
-
-    fn heard(&mut self) -> Vec<u8> {
-        self.received()
-    }
-
-    fn set_input(&mut self, input: usize, closed: bool) {
-        Machine::set_input(self, input, closed);
-    }
-
-    fn wire(&mut self, switches: &[(usize, i64, bool)]) {
-        switches.iter().for_each(|(input, step, opens)| self.set_near(*input, *step, *opens));
-    }
-
-    fn steps(&self) -> [i64; 4] {
-        self.emitted().position
-    }
-
-    fn outputs(&self) -> (u8, f64) {
-        (gpio::outputs(), f64::from(pwm::output().1) / 1_000.0)
-    }
-}
+use transcript::Transcript;
 
 fn read_all() -> Vec<Transcript> {
     transcript::read_all(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/transcripts"))

@@ -171,8 +171,9 @@ impl<'a> View<'a> {
 
     /// Whether the machine is at rest, and something may begin that no line asks for.
     fn may_begin(&self) -> Result<(), Status> {
-        if self.links.limits_hit.get() != 0 {
-            return Err(Status::LimitHit);
+        let alarm = alarm::now();
+        if alarm != Alarm::None {
+            return Err(alarm.status());
         }
         let busy = self.is_busy() || self.links.has_data();
         if busy { Err(Status::NotAccepted) } else { Ok(()) }

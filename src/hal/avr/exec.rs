@@ -114,15 +114,14 @@ unsafe impl critical_section::Impl for CeilingSection {
 }
 
 /// Waits until `ready` gives a value, asking again each time exec is pended. For the exec task.
-pub async fn wait<R>(mut ready: impl FnMut() -> Option<R>) -> R {
-    poll_fn(|cx| match ready() {
+pub fn wait<R>(mut ready: impl FnMut() -> Option<R>) -> impl Future<Output = R> {
+    poll_fn(move |cx| match ready() {
         Some(value) => Poll::Ready(value),
         None => {
             keep(cx.waker());
             Poll::Pending
         }
     })
-    .await
 }
 
 /// Keeps the exec task's waker, which is the same each time.
@@ -149,6 +148,8 @@ extern "C" fn __vector_52() -> ! {
             // Should it come again before `CLOSED` is set, then it runs first and this one after it.
             "sei",
             "in   r24, 0x3F",
+            // Interrupts stay off from `out` to `reti`: one that comes again at once must not pile up.
+            "andi r24, 0x7F",
             "push r24",
             "sbic 0x1E, {hold}",
             "rjmp 8f",

@@ -75,8 +75,11 @@ pub(super) fn set(input: usize, high: bool) {
     let same = |i: &usize| pin.is_some() && ACTIVE.inputs[*i] == pin;
     let bits = (0..inputs::COUNT).filter(same).fold(0, |bits, i| bits | 1 << i);
     let before = all().levels.get();
-    all().levels.set(if high { before | bits } else { before & !bits });
-    edge();
+    let after = if high { before | bits } else { before & !bits };
+    if after != before {
+        all().levels.set(after);
+        edge();
+    }
 }
 
 /// An edge, or what is to be looked at like one.

@@ -1,93 +1,17 @@
 //! The transcripts, played to the firmware's image on the simulated chip.
 
 mod common;
+#[path = "../../support/side.rs"]
+mod side;
+#[path = "common/simulated.rs"]
+mod simulated;
 #[path = "../../support/transcript.rs"]
 mod transcript;
 
 use std::path::Path;
 
 use common::firmware;
-use kerf::boards::inputs::PROBE;
-use kerf::boards::{MEGA2560_GRBL, Pin};
-use kerf_sim::mechanics::{Build, Switch, Wiring};
-use kerf_sim::{AUX, Machine};
-use transcript::Side;
-
-/// Where carriages stand at power-up, in steps from a hard end.
-const START: f64 = 1e8;
-
-impl Side for Machine {
-    fn send(&mut self, bytes: &[u8]) {
-        Machine::send(self, bytes);
-    }
-
-    fn send_aux(&mut self, bytes: &[u8]) {
-        Machine::send_to(self, AUX, bytes);
-    }
-
-    fn set_aux_cts(&mut self, stop: bool) {
-        self.set_cts(AUX, stop);
-    }
-
-    fn heard_aux(&mut self) -> Vec<u8> {
-        self.receive_from(AUX)
-    }
-
-    fn set_baud(&mut self, baud: u32) {
-        Machine::set_baud(self, baud);
-    }
-
-    fn run_ms(&mut self, ms: u64) {
-        self.run_for_ms(ms).unwrap();
-    }
-
-    fn heard(&mut self) -> Vec<u8> {
-        self.receive()
-    }
-
-    fn set_input(&mut self, input: usize, closed: bool) {
-        if self.mechanics().is_some() {
-            return self.tamper(|mechanics, now| mechanics.work(input, closed, now));
-        }
-        let pin = self.board().inputs[input].expect("a pin");
-        self.drive_pin(pin.port.letter(), pin.bit, !closed);
-    }
-
-    fn wire(&mut self, switches: &[(usize, i64, bool)]) {
-        if switches.is_empty() {
-            return;
-        }
-        // Lengths are steps, from far off any hard end.
-        let mut build = Build::of(self.board());
-        for axis in &mut build.axes {
-            (axis.steps_per_mm, axis.travel, axis.start) = (1.0, f64::INFINITY, START);
-            (axis.min, axis.max) = (None, None);
-        }
-        for (input, step, opens) in switches {
-            let at = START + *step as f64;
-            let wiring = if *opens { Wiring::NormallyClosed } else { Wiring::NormallyOpen };
-            let switch = Some(Switch { at, hysteresis: 0.0, wiring });
-            match (input / 2, input % 2) {
-                _ if *input == PROBE => (build.plate, build.probe) = (Some(at), wiring),
-                (axis, 0) => build.axes[axis].min = switch,
-                (axis, _) => build.axes[axis].max = switch,
-            }
-        }
-        self.build(&build);
-    }
-
-    fn steps(&self) -> [i64; 4] {
-        self.recorder().motors().each_ref().map(|motor| motor.position)
-    }
-
-    fn outputs(&self) -> (u8, f64) {
-        let pins = self.board().outputs.iter().enumerate();
-        let high = |(bit, pin): (usize, &Option<Pin>)| {
-            u8::from(pin.is_some_and(|pin| self.is_high(pin))) << bit
-        };
-        (pins.map(high).sum(), self.pulses().share)
-    }
-}
+use kerf::boards::MEGA2560_GRBL;
 
 #[test]
 fn the_image_keeps_to_the_transcripts() {

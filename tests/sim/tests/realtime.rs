@@ -1,0 +1,113 @@
+//! Random conversations with the image on the simulated chip: lines and real-time characters on both ports, switches
+//! that change, resets. They are those of `tests/realtime.rs`, and shorter; what is judged is in
+//! `tests/support/talk.rs`.
+//!
+//! Each of two machines has half of them, one after the other. The seed of one that fails is told:
+//! `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim --profile sim --test realtime` has it alone, and from the first
+//! seed of its machine on with all that came before it.
+
+mod common;
+#[path = "../../support/deeds.rs"]
+mod deeds;
+#[path = "../../support/seeds.rs"]
+mod seeds;
+#[path = "../../support/sender.rs"]
+mod sender;
+#[path = "../../support/side.rs"]
+mod side;
+#[path = "common/simulated.rs"]
+mod simulated;
+#[path = "../../support/talk.rs"]
+mod talk;
+
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::thread;
+use std::time::Instant;
+
+use common::firmware;
+use deeds::{Deed, Scale};
+use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::Machine;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::{TestCaseError, TestError};
+use talk::Talk;
+
+/// About half a second of the machine's time.
+const SCALE: Scale = Scale { deeds: 14, way: 1_200, radius: 1.0, wait: 200 };
+/// Machines that run at the same time.
+const MACHINES: u64 = 2;
+
+fn play(talk: &mut Talk<Machine>, deeds: &[Deed]) -> Result<(), String> {
+    let mut deeds = deeds;
+    while let Some(rest) = talk.play(deeds)? {
+        talk.greet()?;
+        deeds = rest;
+    }
+    talk.finish()
+}
+
+/// The same, if the simulator gives up as well.
+fn try_to_play(talk: &mut Talk<Machine>, deeds: &[Deed]) -> Result<(), String> {
+    let played = catch_unwind(AssertUnwindSafe(|| play(talk, deeds)));
+    let played = played.unwrap_or_else(|_| Err("the chip crashes".to_string()));
+    played.map_err(|why| format!("{why}\n{}", talk.story()))
+}
+
+/// A machine that is ready.
+fn begun() -> Talk<Machine> {
+    let mut talk = Talk::new(firmware(&MEGA2560_GRBL));
+    talk.begin().unwrap_or_else(|why| panic!("{why}\n{}", talk.story()));
+    talk
+}
+
+/// The conversations of some seeds, with one machine.
+fn play_all(seeds: Range<u64>) {
+    let (first, began) = (seeds.start, Instant::now());
+    let mut talk = begun();
+    for seed in seeds {
+        let (tree, _) = seeds::case(seed, &deeds::conversation(SCALE));
+        if let Err(why) = try_to_play(&mut talk, &tree.current()) {
+            let alone = alone(seed).err().unwrap_or_default();
+            panic!("seed {seed}, on a machine that began with {first}: {why}\nAlone: {alone}");
+        }
+    }
+    let seconds = began.elapsed().as_secs_f32();
+    seeds::tell(&format!("conversations from seed {first} on: {seconds:.0} s"));
+}
+
+/// The conversation of a seed with a machine of its own; one that fails is made smaller.
+fn alone(seed: u64) -> Result<(), String> {
+    let (tree, mut runner) = seeds::case(seed, &deeds::conversation(SCALE));
+    let tried = runner
+        .run_one(tree, |deeds| try_to_play(&mut begun(), &deeds).map_err(TestCaseError::fail));
+    match tried {
+        Err(TestError::Fail(why, deeds)) => Err(format!("{deeds:?}\n{why}")),
+        Err(TestError::Abort(why)) => Err(why.to_string()),
+        Ok(_) => Ok(()),
+    }
+}
+
+#[test]
+fn any_conversation_ends_where_it_is_to() {
+    let seeds = seeds::seeds(500);
+    let share = (seeds.end - seeds.start).div_ceil(MACHINES) as usize;
+    thread::scope(|scope| {
+        for first in seeds.clone().step_by(share.max(1)) {
+            let share = first..(first + share as u64).min(seeds.end);
+            scope.spawn(|| play_all(share));
+        }
+    });
+}
+
+/// An arc so fast that exec has no pause for as long as there are blocks: each time it comes again at once.
+#[test]
+fn exec_that_has_no_pause_does_not_pile_up() {
+    let line = |line: &str| Deed::Line(0, line.to_string());
+    let deeds = [
+        line("g91 g1 f3000 x0.2 m3 s300"),
+        Deed::Characters(0, b"\x91\x91!"),
+        line("g91 g2 f3000 x0 i1 j0.3 p3"),
+    ];
+    try_to_play(&mut begun(), &deeds).unwrap_or_else(|why| panic!("{why}"));
+}

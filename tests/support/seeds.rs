@@ -1,0 +1,38 @@
+//! Which random conversations are had: each has a seed, which is printed, and plays the same again alone.
+//!
+//! `KERF_SEED` is the first seed, 0 if there is none, and `KERF_CASES` how many there are from there on.
+
+use std::io::{Write, stderr};
+use std::ops::Range;
+
+use proptest::strategy::Strategy;
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+
+/// The seeds, if `count` of them are usual; printed.
+pub fn seeds(count: u64) -> Range<u64> {
+    let wanted = |name| std::env::var(name).ok().and_then(|n| n.parse().ok());
+    let first = wanted("KERF_SEED").unwrap_or(0);
+    let seeds = first..first + wanted("KERF_CASES").unwrap_or(count);
+    tell(&format!("random conversations: seeds {} to {}", seeds.start, seeds.end - 1));
+    seeds
+}
+
+/// Says something although the test passes.
+pub fn tell(what: &str) {
+    let _ = writeln!(stderr(), "{what}");
+}
+
+/// What makes the case of a seed, and makes it smaller if it fails.
+fn runner(seed: u64) -> TestRunner {
+    let mut bytes = [0; 32];
+    bytes[..8].copy_from_slice(&seed.to_le_bytes());
+    let config = Config { failure_persistence: None, ..Config::default() };
+    TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &bytes))
+}
+
+/// The case of a seed, and what makes it smaller if it fails.
+pub fn case<S: Strategy>(seed: u64, strategy: &S) -> (S::Tree, TestRunner) {
+    let mut runner = runner(seed);
+    let tree = strategy.new_tree(&mut runner).expect("a strategy without filters");
+    (tree, runner)
+}
