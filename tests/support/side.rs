@@ -19,7 +19,8 @@ pub trait Side {
     fn heard_aux(&mut self) -> Vec<u8>;
     /// The contact at an input closes or opens; see `kerf::boards::inputs`.
     fn set_input(&mut self, input: usize, closed: bool);
-    /// The contact at each of these inputs is closed while the motor of its axis is at or beyond a step, or open (`true`).
+    /// The contact at each of these inputs is closed while the motor of its axis is at or beyond a step, or
+    /// open (`true`).
     fn wire(&mut self, switches: &[(usize, i64, bool)]);
     /// Where the motors are, in steps.
     fn steps(&self) -> [i64; 4];

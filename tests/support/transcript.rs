@@ -24,7 +24,7 @@
 
 use std::collections::VecDeque;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use kerf::boards::inputs::PROBE;
 
@@ -64,11 +64,13 @@ pub struct Transcript {
     events: Vec<(usize, Event)>,
 }
 
-/// Reads every transcript in a folder.
+/// Reads every transcript in a folder; those alone whose name contains `KERF_TRANSCRIPT`, if that is set.
 pub fn read_all(folder: &Path) -> Vec<Transcript> {
     let entries = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|e| e == "txt"));
+    let wanted = std::env::var("KERF_TRANSCRIPT").unwrap_or_default();
+    let is_wanted = |path: &PathBuf| path.to_string_lossy().contains(&*wanted);
+    paths.retain(|path| path.extension().is_some_and(|e| e == "txt") && is_wanted(path));
     paths.sort();
     assert!(!paths.is_empty(), "no transcripts in {}", folder.display());
     paths.iter().map(|path| read(path)).collect()
