@@ -8,6 +8,9 @@ const ANSWER: &str = "{\"r\":{";
 const UNASKED: [&str; 7] =
     ["{\"r\":{\"prb\":", "{\"sr\":", "{\"qr\":", "{\"er\":", "{\"rx\":", "{\"jog\":", "{\"ack\":"];
 
+/// What holds a sender back that heeds it.
+const XOFF: char = '\x13';
+const XON: char = '\x11';
 /// How a banner ends.
 const BANNER: &str = "\"SYSTEM READY\"},\"f\":[1,0,0]}";
 
@@ -59,7 +62,7 @@ impl Sender {
     /// Takes what has come. The error is what may not come.
     pub fn hear(&mut self, side: &mut impl Side) -> Result<(), String> {
         let bytes = if self.port == 0 { side.heard() } else { side.heard_aux() };
-        self.partial += &String::from_utf8_lossy(&bytes);
+        self.partial += &String::from_utf8_lossy(&bytes).replace([XON, XOFF], "");
         while let Some((line, rest)) = self.partial.split_once('\n') {
             let line = line.trim_matches('\r').to_string();
             self.partial = rest.to_string();
