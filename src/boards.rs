@@ -15,6 +15,20 @@ pub use ramps14::RAMPS14;
 /// Motors a board drives.
 pub const MOTORS: usize = 4;
 
+/// Does the same for each motor with its number as a constant: what is found by it is found when the image is
+/// built, which is worth its flash where each segment goes and where pins become single instructions.
+macro_rules! each_motor {
+    ($m:ident => $body:expr) => {
+        each_motor!($m => $body; 0 1 2 3)
+    };
+    ($m:ident => $body:expr; $($i:literal)+) => {{$({
+        const $m: usize = $i;
+        $body
+    })+}};
+}
+
+pub(crate) use each_motor;
+
 /// An I/O port of the ATmega2560, by its letter.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]

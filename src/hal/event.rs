@@ -59,35 +59,35 @@ machine_static! {
 }
 
 /// Waits until `ready` gives a value, asking again after each `event`. Thread mode only.
-pub async fn wait<R>(event: Event, ready: impl FnMut() -> Option<R>) -> R {
-    wait_in(event as usize, ready).await
+///
+/// Nothing but what `ready` keeps is kept, so none of these is an `async fn`: each would keep its arguments as well.
+pub fn wait<R>(event: Event, ready: impl FnMut() -> Option<R>) -> impl Future<Output = R> {
+    wait_in(event as u8, ready)
 }
 
 /// The same after each byte that any port has sent, for the task that waits for this one.
-pub async fn wait_transmitted<R>(port: u8, ready: impl FnMut() -> Option<R>) -> R {
-    let slot = if port == USB { Event::Transmitted as usize } else { WAITABLE };
-    wait_in(slot, ready).await
+pub fn wait_transmitted<R>(port: u8, ready: impl FnMut() -> Option<R>) -> impl Future<Output = R> {
+    wait_in(if port == USB { Event::Transmitted as u8 } else { WAITABLE as u8 }, ready)
 }
 
-async fn wait_in<R>(slot: usize, mut ready: impl FnMut() -> Option<R>) -> R {
-    poll_fn(|cx| {
+fn wait_in<R>(slot: u8, mut ready: impl FnMut() -> Option<R>) -> impl Future<Output = R> {
+    poll_fn(move |cx| {
         // An event between the question and the registration sets its bit, which the main loop
         // sees after this poll: nothing is missed.
         if let Some(value) = ready() {
             return Poll::Ready(value);
         }
-        if let Some(slot) = waiters().0.get(slot) {
+        if let Some(slot) = waiters().0.get(usize::from(slot)) {
             slot.set(Some(cx.waker().clone()));
         }
         Poll::Pending
     })
-    .await
 }
 
 /// Waits for the next `event` after the last poll of the task. Thread mode only.
-pub async fn next(event: Event) {
+pub fn next(event: Event) -> impl Future<Output = ()> {
     let mut asked = false;
-    wait(event, || core::mem::replace(&mut asked, true).then_some(())).await;
+    wait(event, move || core::mem::replace(&mut asked, true).then_some(()))
 }
 
 /// Wakes who waits for the events in `bits`. The main loop calls it, in thread mode.

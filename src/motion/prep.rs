@@ -23,7 +23,7 @@
 use super::dda::{STEP, Segment, start};
 use super::divide::{quotient, quotient_remainder};
 use super::pace::{COARSEST, Drivers, Pace, paces};
-use crate::boards::MOTORS;
+use crate::boards::{MOTORS, each_motor};
 
 const STEP_LOG2: u8 = 15;
 
@@ -157,15 +157,14 @@ impl Prep {
     pub fn begin(&mut self, steps: &[i16; MOTORS], target: &mut [i32; MOTORS]) {
         self.shift = u8::MAX;
         let (mut most, mut moving, mut full, mut others) = (0, 0, 0, u8::MAX);
-        let mut bit = 1;
-        for m in 0..MOTORS {
-            let signed = steps[m];
+        each_motor!(M => {
+            let (signed, bit) = (steps[M], 1 << M);
             if signed != 0 {
                 others = others.wrapping_add(1);
                 moving |= bit;
-                target[m] = target[m].wrapping_add(signed.into());
+                target[M] = target[M].wrapping_add(signed.into());
                 let steps = signed.unsigned_abs();
-                self.minors[m].steps = steps;
+                self.minors[M].steps = steps;
                 if steps > most {
                     (most, full) = (steps, 0);
                 }
@@ -174,11 +173,10 @@ impl Prep {
                 }
                 let backwards = if signed < 0 { bit } else { 0 };
                 if backwards != self.backwards & bit {
-                    self.turn(m, bit);
+                    self.turn(M, bit);
                 }
             }
-            bit <<= 1;
-        }
+        });
         self.most = most;
         self.left = u32::from(most) << STEP_LOG2;
         self.full = full;
@@ -282,18 +280,12 @@ impl Prep {
         self.time = (cycles as i32 - used as i32).max(-1000);
         out.backwards = self.backwards;
         out.moving = self.full | self.minor;
-        let (mut full, mut others) = (self.full, self.minor);
-        for m in 0..MOTORS {
-            out.increment[m] = if full & 1 != 0 {
-                step
-            } else if others & 1 != 0 {
-                minor(self, m)
-            } else {
-                0
-            };
-            full >>= 1;
-            others >>= 1;
-        }
+        let (full, others) = (self.full, self.minor);
+        each_motor!(M => out.increment[M] = match 1 << M {
+            bit if full & bit != 0 => step,
+            bit if others & bit != 0 => minor(self, M),
+            _ => 0,
+        });
         out.seal(self.full, step);
         if self.turned {
             self.behind_turn(out);
@@ -482,14 +474,11 @@ impl Prep {
     /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.
     fn scale(&mut self, shift: u8) {
         self.shift = shift;
-        let mut bit = 1;
-        for minor in &mut self.minors {
-            if self.minor & bit != 0 {
-                let travel = u32::from(minor.steps) << shift;
-                (minor.increment, minor.remainder) = quotient_remainder(travel, self.most);
-            }
-            bit <<= 1;
-        }
+        each_motor!(M => if self.minor & 1 << M != 0 {
+            let minor = &mut self.minors[M];
+            let travel = u32::from(minor.steps) << shift;
+            (minor.increment, minor.remainder) = quotient_remainder(travel, self.most);
+        });
     }
 
     /// The block is done: what its motors are short of goes into the next.

@@ -136,7 +136,7 @@ fn enough(cycles: u32) -> u8 {
 }
 
 /// Waits for the next time exec is pended.
-async fn exec_asked_again() {
-    let mut first = true;
-    exec::wait(|| (!core::mem::replace(&mut first, false)).then_some(())).await;
+fn exec_asked_again() -> impl Future<Output = ()> {
+    let mut asked = false;
+    exec::wait(move || core::mem::replace(&mut asked, true).then_some(()))
 }

@@ -403,12 +403,11 @@ impl Planner {
         self.announce();
     }
 
-    async fn room(&mut self) {
+    fn room(&mut self) -> impl Future<Output = ()> {
         wait(Event::BlockDone, || {
             self.replan();
             (self.queue.free() > 0 || self.is_flushed()).then_some(())
         })
-        .await;
     }
 
     /// Waits until the machine has come to the stop, and then for the next cycle start.

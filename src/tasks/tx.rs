@@ -33,8 +33,8 @@ impl Tx {
     }
 
     /// Waits until a piece fits.
-    pub async fn room(&mut self) {
-        wait_transmitted(self.port, || self.has_room().then_some(())).await;
+    pub fn room(&mut self) -> impl Future<Output = ()> {
+        wait_transmitted(self.port, || self.has_room().then_some(()))
     }
 
     /// Whether a piece fits now.

@@ -31,7 +31,7 @@ impl Wake {
     }
 
     /// Waits for a signal, and uses it up.
-    pub async fn wait(&self) {
+    pub fn wait(&self) -> impl Future<Output = ()> {
         poll_fn(|cx| {
             if self.signalled.replace(false) {
                 return Poll::Ready(());
@@ -39,7 +39,6 @@ impl Wake {
             self.waiter.set(Some(cx.waker().clone()));
             Poll::Pending
         })
-        .await
     }
 }
 
@@ -64,8 +63,8 @@ impl News {
     }
 
     /// Waits for a signal.
-    pub async fn wait(&self) {
-        self.wake.wait().await;
+    pub fn wait(&self) -> impl Future<Output = ()> {
+        self.wake.wait()
     }
 
     /// Whether signals may be left out from now on, for the reporter polls.

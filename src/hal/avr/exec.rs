@@ -114,15 +114,14 @@ unsafe impl critical_section::Impl for CeilingSection {
 }
 
 /// Waits until `ready` gives a value, asking again each time exec is pended. For the exec task.
-pub async fn wait<R>(mut ready: impl FnMut() -> Option<R>) -> R {
-    poll_fn(|cx| match ready() {
+pub fn wait<R>(mut ready: impl FnMut() -> Option<R>) -> impl Future<Output = R> {
+    poll_fn(move |cx| match ready() {
         Some(value) => Poll::Ready(value),
         None => {
             keep(cx.waker());
             Poll::Pending
         }
     })
-    .await
 }
 
 /// Keeps the exec task's waker, which is the same each time.

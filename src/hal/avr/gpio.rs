@@ -5,7 +5,7 @@
 //! that another level writes meanwhile. Enables see to that themselves.
 
 use crate::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
-use crate::boards::{ACTIVE, Handshake, Pin};
+use crate::boards::{ACTIVE, Handshake, Pin, each_motor};
 use crate::hal::byte::SharedByte;
 
 /// Drives a pin high.
@@ -32,35 +32,55 @@ pub fn toggle(pin: Pin) {
     unsafe { input.write_volatile(1 << pin.bit) };
 }
 
+#[inline(always)]
 fn output(pin: Pin) {
     let direction = (pin.port.address() - 1) as *mut u8;
     // SAFETY: the data direction register lies one below the port register; thread mode alone writes it.
     unsafe { direction.write_volatile(direction.read_volatile() | 1 << pin.bit) };
 }
 
+/// Does the same for each item of a list of the board's, up to eight, as a constant: neither list nor loop are left.
+macro_rules! each {
+    ($list:expr, $item:ident => $body:expr) => {
+        each!($list, $item => $body; 0 1 2 3 4 5 6 7)
+    };
+    ($list:expr, $item:ident => $body:expr; $($i:literal)+) => {$(
+        if let Some($item) = const { $crate::hal::imp::gpio::item($list, $i) } {
+            $body
+        }
+    )+};
+}
+
+pub(super) use each;
+
+/// An item of a list.
+pub(super) const fn item<T: Copy>(list: &[T], i: usize) -> Option<T> {
+    if i < list.len() { Some(list[i]) } else { None }
+}
+
 /// Makes outputs of the board's outputs: steps low, drivers off, hazards off, senders welcome, no bus driven.
 /// Of the spindle's enable it is not known yet which level is off: see [`set_low`].
 pub fn start() {
-    for motor in ACTIVE.motors {
-        low(motor.step);
-        output(motor.step);
-        output(motor.dir);
-        if let Some(enable) = motor.enable {
+    each_motor!(M => {
+        low(ACTIVE.motors[M].step);
+        output(ACTIVE.motors[M].step);
+        output(ACTIVE.motors[M].dir);
+        if let Some(enable) = ACTIVE.motors[M].enable {
             high(enable);
             output(enable);
         }
-    }
+    });
     if let Some(enable) = ACTIVE.enable_all {
         high(enable);
         output(enable);
     }
-    for &hazard in ACTIVE.hazards {
+    each!(ACTIVE.hazards, hazard => {
         low(hazard);
         if ACTIVE.outputs[0] != Some(hazard) {
             output(hazard);
         }
-    }
-    for serial in ACTIVE.serial {
+    });
+    each!(ACTIVE.serial, serial => {
         if let Some(Handshake { rts, cts }) = serial.handshake {
             low(rts);
             output(rts);
@@ -71,37 +91,14 @@ pub fn start() {
             low(driver);
             output(driver);
         }
-    }
+    });
 }
-
-/// Does the same for each motor with a constant index, so that pins fold into single instructions.
-macro_rules! each_motor {
-    ($m:ident => $body:expr) => {{
-        {
-            const $m: usize = 0;
-            $body
-        }
-        {
-            const $m: usize = 1;
-            $body
-        }
-        {
-            const $m: usize = 2;
-            $body
-        }
-        {
-            const $m: usize = 3;
-            $body
-        }
-    }};
-}
-
-pub(super) use each_motor;
 
 /// The motors whose drivers are wanted on, as bits.
 static WANTED: SharedByte = SharedByte::new(0);
 
 /// The motors whose drivers are on, as bits.
+#[inline(never)] // In a function built for size the board would be a table in RAM.
 pub fn powered() -> u8 {
     ACTIVE.powered(WANTED.get())
 }

@@ -1,6 +1,7 @@
 //! The last resort. No panic is meant to be reachable after start-up; should one be, motion and
 //! outputs stop and the machine stays still until it is reset.
 
+use super::gpio::{self, each};
 use crate::boards::ACTIVE;
 
 /// Stops the step timer, switches drivers and hazardous outputs off, and stays.
@@ -17,11 +18,9 @@ pub fn halt() -> ! {
 pub fn make_safe() {
     super::stepper::kill();
     super::pwm::kill();
-    for &hazard in ACTIVE.hazards {
-        super::gpio::low(hazard);
-    }
-    super::gpio::stop_spindle();
-    super::gpio::power(0);
+    each!(ACTIVE.hazards, hazard => gpio::low(hazard));
+    gpio::stop_spindle();
+    gpio::power(0);
 }
 
 #[panic_handler]

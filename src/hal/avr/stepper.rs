@@ -7,8 +7,8 @@
 use core::cell::UnsafeCell;
 use kerf_macros::small;
 
-use super::gpio::{self, each_motor};
-use crate::boards::{ACTIVE, MOTORS, Timer};
+use super::gpio;
+use crate::boards::{ACTIVE, MOTORS, Timer, each_motor};
 use crate::hal::byte::SharedByte;
 use crate::hal::ring::{Producer, Ring};
 use crate::motion::dda::{Dda, SEGMENTS, Segment};

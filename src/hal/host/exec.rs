@@ -53,13 +53,12 @@ pub fn lock<R>(critical: impl FnOnce(&Ceiling) -> R) -> R {
 }
 
 /// Waits until `ready` gives a value, asking again each time exec is pended. For the exec task.
-pub async fn wait<R>(mut ready: impl FnMut() -> Option<R>) -> R {
-    poll_fn(|cx| match ready() {
+pub fn wait<R>(mut ready: impl FnMut() -> Option<R>) -> impl Future<Output = R> {
+    poll_fn(move |cx| match ready() {
         Some(value) => Poll::Ready(value),
         None => {
             waiting().0.set(Some(cx.waker().clone()));
             Poll::Pending
         }
     })
-    .await
 }

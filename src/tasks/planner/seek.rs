@@ -33,9 +33,9 @@ pub(super) enum Sought {
 }
 
 /// Has exec drop its blocks, as soon as it is at rest.
-pub(super) async fn drop_blocks() {
+pub(super) fn drop_blocks() -> impl Future<Output = ()> {
     hold::drop_blocks();
-    wait(Event::BlockDone, || hold::has_dropped().then_some(())).await;
+    wait(Event::BlockDone, || hold::has_dropped().then_some(()))
 }
 
 impl Planner {
@@ -88,8 +88,8 @@ impl Planner {
         contact::is_noted() || self.is_flushed()
     }
 
-    async fn seek_room(&self) {
-        wait(Event::BlockDone, || (self.queue.free() > 0 || self.is_over()).then_some(())).await;
+    fn seek_room(&self) -> impl Future<Output = ()> {
+        wait(Event::BlockDone, || (self.queue.free() > 0 || self.is_over()).then_some(()))
     }
 
     /// Exec has dropped its blocks: the planner starts from where the motors are.
