@@ -2,7 +2,8 @@
 //!
 //! | cause | `stat` | motion | outputs | position | G-code | ended by |
 //! |---|---|---|---|---|---|---|
-//! | `{alarm:n}` | 2 | comes to rest within its limits | off | kept | 203 | `{clear:n}`, `{clr:n}`, `$clear`; M2, M30 alone on a line |
+//! | `{alarm:n}`, a failed G38.2 or G38.4 | 2 | comes to rest within its limits | off | kept | 203 | `{clear:n}`, `{clr:n}`, `$clear`; M2, M30 alone on a line |
+//! | a reset by the watchdog or a brown-out | 2 | none | off | not known | 203 | the same |
 //! | a limit is hit | 2 | no step more | off | no axis homed | 204 | the same |
 //! | `{shutd:n}`, the emergency stop | 11 (g2core 12) | no step more | off | no axis homed | 205 | clear, when the stop is let go |
 //! | `{panic:n}` | 13 | no step more | off | no axis homed | 206 | `^x` |

@@ -19,7 +19,6 @@ use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::motion::snapshot::Snapshot;
 use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
-use crate::status::Status;
 use crate::store::Log;
 use crate::store::kept;
 use crate::tasks::links::{Links, Probe, QueueCount};
@@ -28,7 +27,9 @@ use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
 use crate::tasks::wake::{News, Wake};
-use crate::tasks::{control, exec, parser, planner, power, reader, reporter, spindle, storage};
+use crate::tasks::{
+    alarm, control, exec, parser, planner, power, reader, reporter, spindle, storage,
+};
 
 /// Bytes for all lines of USB together.
 const LINES_USB: usize = 456;
@@ -63,6 +64,7 @@ impl Links {
             door_open: Cell::new(false),
             cycle: Cell::default(),
             probe: Probe::default(),
+            jogs: Cell::default(),
             jogged: Cell::new(false),
             job: Cell::default(),
             moment: Cell::new(Snapshot::new().moment()),
@@ -136,8 +138,7 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     spindle::set_all(links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
     if watchdog::cause().is_fault() {
-        // The reporter looks before it waits.
-        links.told().exception.set(Some(Status::HardReset));
+        alarm::wake_up_in(links);
     }
     exec_level.spawn(exec_task(source, segments).ok()?);
     main.spawn(reader_task(links, received, aux).ok()?);

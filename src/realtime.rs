@@ -49,31 +49,37 @@ pub const fn bit(byte: u8) -> u8 {
     }
 }
 
-/// The first of the characters of overrides, and the one behind the last. They are parts of letters in UTF-8
-/// too: they are none behind a byte above [`ASCII`].
+/// The first of the characters of overrides, and the one behind the last. They, and [`JOG_END`], are parts of letters
+/// in UTF-8 too: they are none behind a byte above [`ASCII`].
 pub const FIRST: u8 = 0x90;
 /// See [`FIRST`].
 pub const END: u8 = 0x9E;
 /// The highest byte that is a letter of its own.
 pub const ASCII: u8 = 0x7F;
 
+/// Ends a jog, and does nothing else.
+pub const JOG_END: u8 = 0x85;
+
 /// Begins the steps anew, from 100 %.
 pub const FULL: u8 = 0;
 /// The same, of the second of two.
 const SPINDLE: u8 = 9;
 
-/// What characters ask of the overrides, since it was taken last: however many there are, it is as much.
+/// What characters ask of the overrides, and of a jog, since it was taken last: however many there are, it is as much.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Asked {
     /// By how many percent feed and spindle are to be more, or less.
     pub percent: [i8; 2],
-    /// From 100 %, for feed (1) and spindle (2); and the traverse, in [`TRAVERSE`]: 1 for 100 %, 2 for 50, 3 for 25.
+    /// From 100 %, for feed (1) and spindle (2); and the traverse, in [`TRAVERSE`]: 1 for 100 %, 2 for 50, 3 for 25; and
+    /// [`NO_JOG`].
     pub fixed: u8,
 }
 
 /// Bits of [`Asked::fixed`].
 pub const TRAVERSE: u8 = 0x0C;
+/// A jog is to end.
+pub const NO_JOG: u8 = 0x10;
 
 impl Asked {
     /// Nothing.
@@ -81,6 +87,10 @@ impl Asked {
 
     /// With one more character, if it is one of these. The receive interrupt of the AVR has its twin in assembly.
     pub fn with(mut self, byte: u8) -> Option<Self> {
+        if byte == JOG_END {
+            self.fixed |= NO_JOG;
+            return Some(self);
+        }
         let code = byte.wrapping_sub(FIRST);
         let (which, code) = match code {
             0..=4 => (0, code),
@@ -118,7 +128,8 @@ mod tests {
         assert_eq!(all(&[0x91, 0x91, 0x94, 0x9D, 0x9B]).percent, [19, -11]);
         let asked = all(&[0x91, 0x90, 0x93, 0x97, 0x96, 0x99]);
         assert_eq!((asked.percent, asked.fixed), ([1, 0], 3 | 2 << 2));
-        for other in [0x8F, 0x98, 0x9E, b'x', 0xE2] {
+        assert_eq!(all(&[0x85, 0x91]), Asked { percent: [10, 0], fixed: NO_JOG });
+        for other in [0x84, 0x86, 0x8F, 0x98, 0x9E, b'x', 0xE2] {
             assert_eq!(Asked::NOTHING.with(other), None);
         }
         assert_eq!(all(&[0x91; 40]).percent[0], i8::MAX);

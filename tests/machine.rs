@@ -383,11 +383,16 @@ fn a_reset_that_nobody_wanted_is_told() {
             watchdog::set_cause(cause);
             let mut sender = Sender::boot();
             sender.ask("{rst:n}\n", 100);
+            // Whoever was sending a program is not to go on with it.
+            sender.ask("g1 f100 x1\n", 100);
+            sender.ask("{clear:n}\n", 100);
+            sender.ask("g1 f100 x1\n", 100);
             sender.heard
         });
         let heard = heard.join().expect("no panic");
         assert!(heard.contains(&format!("{{\"rst\":{}}}", cause as u8)), "{heard}");
         let er = "{\"er\":{\"fb\":440.20,\"st\":6,\"msg\":\"Hard reset\"}}";
         assert_eq!(heard.contains(er), told, "{heard}");
+        assert_eq!(heard.matches(",203,").count(), usize::from(told), "{heard}");
     }
 }

@@ -15,7 +15,7 @@ mod rig;
 
 use cases::cases;
 use jobs::{Job, Planned, any_job, plan_changed};
-use keeps::STRETCH;
+use keeps::{STRETCH, check_continuity};
 use kerf::gcode::overrides::{Change, Override};
 use kerf::motion::block::{Action, Block};
 use kerf::motion::exec::Step;
@@ -115,6 +115,10 @@ fn run(job: &Job, deeds: &[(u16, Deed)]) -> Rig {
     rig
 }
 
+/// A brake whose limit an override has raised goes on with one that is softer from its beginning: the acceleration may change
+/// by so many times as much as where nothing is overridden.
+const SOFTER: f64 = 2.0;
+
 /// The limits of the machine, whatever the feed.
 fn check_machine(planned: &[Planned]) {
     let little = planned.iter().map(|p| p.top).fold(0.0, f64::max) * 2e-3;
@@ -126,6 +130,10 @@ fn check_machine(planned: &[Planned]) {
         assert!(change.abs() <= p.accel * (seconds + STRETCH) * 1.1 + little, "{n}: {p:?}");
         let first = core::mem::replace(&mut line, p.line) != p.line;
         assert!(!first || p.before <= p.corner * 1.001 + little, "{n}: {p:?}");
+    }
+    for (n, pair) in planned.windows(2).enumerate() {
+        let [a, b] = pair else { unreachable!() };
+        check_continuity(n + 1, a, b, SOFTER);
     }
 }
 

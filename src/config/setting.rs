@@ -4,7 +4,8 @@ use super::name::{Name, axis_letter, axis_of, token};
 use super::table::{
     self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, COOLANT, COOLANT_ROWS, HOMING, IDLE, JOB, JOB_ROWS, Kind,
     MODE, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS, PWM, PWM_DEFAULTS, PWM_ROWS, RADIUS, Row, SPINDLE,
-    SPINDLE_DEFAULTS, SPINDLE_ROWS, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS, USER, USER_ROWS,
+    SPINDLE_DEFAULTS, SPINDLE_ROWS, SQUARING, SQUARING_ROWS, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS,
+    USER, USER_ROWS,
 };
 use crate::boards::MOTORS;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -14,7 +15,8 @@ const FIRST_AXIS: u8 = FIRST_MOTOR + (MOTORS * MOTOR_ROWS) as u8;
 const FIRST_PWM: u8 = FIRST_AXIS + (AXES * AXIS_ROWS) as u8;
 const FIRST_SPINDLE: u8 = FIRST_PWM + PWM_ROWS as u8;
 const FIRST_COOLANT: u8 = FIRST_SPINDLE + SPINDLE_ROWS as u8;
-const FIRST_USER: u8 = FIRST_COOLANT + COOLANT_ROWS as u8;
+const FIRST_SQUARING: u8 = FIRST_COOLANT + COOLANT_ROWS as u8;
+const FIRST_USER: u8 = FIRST_SQUARING + SQUARING_ROWS as u8;
 const FIRST_JOB: u8 = FIRST_USER + USERS * USER_ROWS as u8;
 
 /// The groups of user data, `uda` to `udd`.
@@ -35,6 +37,8 @@ pub enum Owner {
     Spindle,
     /// The coolant.
     Coolant,
+    /// That of an axis with two motors.
+    Squaring,
     /// A sender's own, 0 to 3.
     User(u8),
     /// A job's.
@@ -52,6 +56,7 @@ impl Owner {
             Owner::Pwm => PWM_ROWS as u8,
             Owner::Spindle => SPINDLE_ROWS as u8,
             Owner::Coolant => COOLANT_ROWS as u8,
+            Owner::Squaring => SQUARING_ROWS as u8,
             Owner::User(_) => USER_ROWS as u8,
             Owner::Job => JOB_ROWS as u8,
         }
@@ -66,6 +71,7 @@ impl Owner {
             Owner::Pwm => named(token("p1")),
             Owner::Spindle => named(token("sp")),
             Owner::Coolant => named(token("co")),
+            Owner::Squaring => named(token("sq")),
             Owner::User(group) => named([b'u', b'd', b'a' + group, 0]),
             Owner::Job => named(token("jid")),
         }
@@ -78,6 +84,7 @@ impl Owner {
             [b'p', b'1', ..] => Some(Owner::Pwm),
             [b's', b'p', ..] => Some(Owner::Spindle),
             [b'c', b'o', ..] => Some(Owner::Coolant),
+            [b's', b'q', ..] => Some(Owner::Squaring),
             [b'u', b'd', group @ b'a'..=b'd', ..] => Some(Owner::User(group - b'a')),
             [b'j', b'i', b'd', ..] => Some(Owner::Job),
             [letter, ..] => axis_of(letter).map(Owner::Axis),
@@ -113,6 +120,7 @@ impl Owner {
             Owner::Pwm => PWM.at(row),
             Owner::Spindle => SPINDLE.at(row),
             Owner::Coolant => COOLANT.at(row),
+            Owner::Squaring => SQUARING.at(row),
             Owner::User(group) if group < USERS => USER.at(row),
             Owner::Job => JOB.at(row),
             _ => None,
@@ -195,6 +203,7 @@ impl Setting {
             Owner::Pwm => FIRST_PWM,
             Owner::Spindle => FIRST_SPINDLE,
             Owner::Coolant => FIRST_COOLANT,
+            Owner::Squaring => FIRST_SQUARING,
             Owner::User(group) => FIRST_USER + group * USER_ROWS as u8,
             Owner::Job => FIRST_JOB,
         };
@@ -282,8 +291,10 @@ impl Setting {
             Owner::Pwm
         } else if self.0 < FIRST_COOLANT {
             Owner::Spindle
-        } else if self.0 < FIRST_USER {
+        } else if self.0 < FIRST_SQUARING {
             Owner::Coolant
+        } else if self.0 < FIRST_USER {
+            Owner::Squaring
         } else if self.0 < FIRST_JOB {
             Owner::User((self.0 - FIRST_USER) / USER_ROWS as u8)
         } else {
@@ -305,6 +316,7 @@ impl Setting {
             Owner::Pwm => self.0 - FIRST_PWM,
             Owner::Spindle => self.0 - FIRST_SPINDLE,
             Owner::Coolant => self.0 - FIRST_COOLANT,
+            Owner::Squaring => self.0 - FIRST_SQUARING,
             Owner::User(_) => (self.0 - FIRST_USER) % USER_ROWS as u8,
             Owner::Job => self.0 - FIRST_JOB,
         }
@@ -329,7 +341,7 @@ impl Setting {
             }
             Owner::Pwm => PWM_DEFAULTS.at(index),
             Owner::Spindle => SPINDLE_DEFAULTS.at(index),
-            Owner::Coolant | Owner::User(_) | Owner::Job => None,
+            Owner::Coolant | Owner::Squaring | Owner::User(_) | Owner::Job => None,
         };
         value.unwrap_or(0)
     }

@@ -5,7 +5,7 @@
 //! bytes of defaults; and those that are in EEPROM alone. TinyG's settings come first in each group, then those of Kerf alone.
 
 use super::name::token;
-use crate::boards::ACTIVE;
+use crate::boards::{ACTIVE, inputs};
 use crate::progmem;
 
 /// How a setting is kept.
@@ -101,8 +101,20 @@ const fn cold(name: &str, shown: u8) -> Row {
 
 /// Yes or no, in EEPROM.
 const fn choice(name: &str) -> Row {
-    let mut row = cold(name, 0).with(RANGE);
-    (row.stored, row.max) = (0, 1);
+    whole(cold(name, 0), 1)
+}
+
+/// A whole number up to `max`.
+const fn whole(row: Row, max: i32) -> Row {
+    let mut row = up_to(row, max).with(RANGE);
+    row.stored = 0;
+    row
+}
+
+/// A length of either sign, in EEPROM.
+const fn shift(name: &str, most: i32) -> Row {
+    let mut row = up_to(cold(name, 3), most).with(UNIT);
+    (row.stored, row.min) = (4, -most);
     row
 }
 
@@ -142,10 +154,17 @@ pub const PWM_ROWS: usize = 10;
 pub const SPINDLE_ROWS: usize = 4;
 /// Rows of [`COOLANT`].
 pub const COOLANT_ROWS: usize = 1;
+/// Rows of [`SQUARING`].
+pub const SQUARING_ROWS: usize = 2;
 /// Rows of [`USER`].
 pub const USER_ROWS: usize = 4;
 /// Rows of [`JOB`].
 pub const JOB_ROWS: usize = 4;
+
+/// Rows of [`SQUARING`].
+pub const SQUARING_SWITCH: u8 = 0;
+/// See [`SQUARING_SWITCH`].
+pub const SQUARING_OFFSET: u8 = 1;
 
 /// Slots of the system, small and large.
 #[allow(missing_docs)]
@@ -373,6 +392,12 @@ progmem! {
 
     /// The group `co`. Its default is 0.
     pub static COOLANT: [Row; COOLANT_ROWS] = [choice("ph")];
+
+    /// The group `sq`. All are 0 at first.
+    pub static SQUARING: [Row; SQUARING_ROWS] = [
+        whole(cold("sw", 0), inputs::COUNT as i32),
+        shift("of", 20_0000),
+    ];
 
     /// The groups `uda` to `udd`. All are 0 at first.
     pub static USER: [Row; USER_ROWS] = [

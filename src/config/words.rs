@@ -1,7 +1,9 @@
 //! What text mode calls the settings: a row beside each row of [`table`](super::table), in program
 //! memory.
 
-use super::table::{AXIS_ROWS, COOLANT_ROWS, MOTOR_ROWS, PWM_ROWS, SPINDLE_ROWS, SYSTEM_ROWS};
+use super::table::{
+    AXIS_ROWS, COOLANT_ROWS, MOTOR_ROWS, PWM_ROWS, SPINDLE_ROWS, SQUARING_ROWS, SYSTEM_ROWS,
+};
 use super::{Owner, Setting};
 use crate::progmem;
 use crate::progmem::Text;
@@ -148,6 +150,9 @@ progmem! {
     ];
 
     static COOLANT: [Words; COOLANT_ROWS] = [words(text!("coolant pause on hold"), OFF_ON)];
+
+    static SQUARING: [Words; SQUARING_ROWS] =
+        [bare(text!("squaring switch")), bare(text!("squaring offset"))];
 }
 
 impl Setting {
@@ -161,6 +166,7 @@ impl Setting {
             Owner::Pwm => PWM.at(index),
             Owner::Spindle => SPINDLE.at(index),
             Owner::Coolant => COOLANT.at(index),
+            Owner::Squaring => SQUARING.at(index),
             Owner::User(_) => Some(bare(text!("user data"))),
             Owner::Job => Some(bare(text!("job id"))),
         }

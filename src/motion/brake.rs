@@ -261,8 +261,10 @@ impl Governor {
                 && v > anchor.velocity
                 && self.takes(&anchor, v)
             {
-                // It should have got there by now: what is left is rounding.
-                seconds += lesser(brake.rest(), 4.0 * nominal);
+                // If it is braking for this it should have got there by now: what is left is rounding.
+                if brake.velocity.to_bits() == anchor.velocity.to_bits() {
+                    seconds += lesser(brake.rest(), 4.0 * nominal);
+                }
                 self.state = State { velocity: anchor.velocity, alpha: 0.0 };
                 self.brake = None;
             }

@@ -31,7 +31,7 @@ pub(super) const SEQ: u8 = 0x7F;
 pub(super) const FIRM: u8 = 0x80;
 
 /// A corner is worth a key if it is slower than this share of what holds on both sides.
-const WORTH: f32 = 0.999;
+pub(super) const WORTH: f32 = 0.999;
 
 /// Potentials beyond so many times the square of the velocity are made small again.
 const COARSE: f32 = 1024.0;

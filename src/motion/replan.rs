@@ -2,16 +2,17 @@
 //!
 //! Called by the planner when the factors that are wanted are not those of the keys. Blocks and their
 //! potentials stay as they are: corners are stored whatever the feeds. From the newest line to the oldest, a
-//! key is kept if it is lower than all behind it, and a limit for whoever comes from the line before. Exec goes
-//! on by the old keys until the new ones are put in their place, all at once.
+//! key is kept if it is lower than all behind it, and a limit for whoever comes from the line before, by more than a
+//! thousandth. Exec goes on by the old keys until the new ones are put in their place, all at once.
 //!
-//! Cost on AVR: 300 cycles a line where the feed is steady, 1,500 at a corner; exec waits for 60 a block and 250
-//! a key.
+//! Cost on AVR: 800 cycles a line where the feed is steady, 2,000 at a corner that limits; exec waits for 60 a block and
+//! 250 a key. All that is queued: 52,000, or 127,000 if each line is a corner.
 
 use super::block::{Action, Block, Body, Line};
-use super::factors::Factors;
+use super::factors::{Factors, Reserve};
+use super::float::{below, least};
 use super::horizon::{self, kappa};
-use super::queue::{BLOCKS, BlockQueue, FIRM, SEQ};
+use super::queue::{BLOCKS, BlockQueue, FIRM, SEQ, WORTH};
 use super::short::Short;
 use crate::hal::imp::exec;
 
@@ -31,6 +32,77 @@ impl Marks {
     }
 }
 
+/// What limits a line, of all that is behind it.
+struct Behind {
+    /// The least key.
+    key: f32,
+    /// The lowest velocity up to the next place that is worth a key.
+    low: f32,
+    known: Known,
+}
+
+/// Of the line that was asked about last, which mostly is as the next one: its velocity, and how it brakes.
+#[derive(Default)]
+struct Known {
+    cruise: f32,
+    reserve: Reserve,
+    velocity: f32,
+    limits: (Short, Short),
+    kappa: f32,
+}
+
+impl Behind {
+    /// Whether `this` line needs a key, that follows `before` without a stop.
+    #[inline(never)]
+    fn needs(&mut self, this: &Line, before: Option<&Line>, factors: &Factors) -> bool {
+        let velocity = self.known.velocity(this, factors);
+        let low = least(self.low, velocity);
+        let entry = least(velocity, this.entry.get());
+        let mut firm = false;
+        let mut brakes = this;
+        if let Some(before) = before {
+            firm = is_firm(this, before);
+            let pace = self.known.velocity(before, factors);
+            let most = least(low, entry);
+            if !firm && (!below(most, pace) || most >= pace * WORTH) {
+                self.low = low;
+                return false;
+            }
+            if firm {
+                // What comes before brakes with its own limits.
+                brakes = before;
+            }
+        }
+        self.low = f32::MAX;
+        let key = this.start + horizon::key(Short::new(entry).get(), self.known.kappa(brakes));
+        let needed = firm || key < self.key;
+        if needed {
+            self.key = key;
+        }
+        needed
+    }
+}
+
+#[small]
+impl Known {
+    fn velocity(&mut self, line: &Line, factors: &Factors) -> f32 {
+        if line.cruise.to_bits() != self.cruise.to_bits() || line.reserve != self.reserve {
+            (self.cruise, self.reserve) = (line.cruise, line.reserve);
+            self.velocity = line.velocity(factors);
+        }
+        self.velocity
+    }
+
+    fn kappa(&mut self, line: &Line) -> f32 {
+        let limits = (line.accel, line.jerk);
+        if limits != self.limits {
+            self.limits = limits;
+            self.kappa = kappa(line.accel.get(), line.jerk.get());
+        }
+        self.kappa
+    }
+}
+
 #[small]
 impl BlockQueue {
     /// The overrides that are wanted, if the keys are for others. Cost: 60.
@@ -44,12 +116,7 @@ impl BlockQueue {
     pub fn replan(&mut self, factors: Factors) {
         self.factors = factors;
         let mut marks = Marks([0; _]);
-        let mut least = f32::MAX;
-        for back in 0..self.ring.used() {
-            if self.mark(back, &mut least) {
-                marks.set(back);
-            }
-        }
+        self.look_back(&mut marks);
         if let (Some(last), Some(line)) = (&mut self.last, line(self.ring.pushed(0))) {
             last.cruise = line.velocity(&factors);
             last.high = last.cruise;
@@ -57,37 +124,30 @@ impl BlockQueue {
         self.install(&marks);
     }
 
-    /// Whether the line that has been pushed so many before the newest needs a key, all behind it having none
-    /// lower than `least`.
+    /// Marks the lines that need a key, from the newest to the oldest.
     #[inline(never)]
-    fn mark(&self, back: usize, least: &mut f32) -> bool {
-        let Some(this) = line(self.ring.pushed(back)) else { return false };
-        let before = self.before(back);
-        if let Some(before) = before {
-            if is_firm(this, before) {
-                let kappa = kappa(before.accel.get(), before.jerk.get());
-                *least = this.start + horizon::key(this.entry(&self.factors), kappa);
-                return true;
+    fn look_back(&self, marks: &mut Marks) {
+        let mut behind = Behind { key: f32::MAX, low: f32::MAX, known: Known::default() };
+        let mut last: Option<(usize, &Line)> = None;
+        for back in 0..=self.ring.used() {
+            let block = self.ring.pushed(back);
+            if is_aside(block) {
+                continue;
             }
-            let entry = this.entry(&self.factors).to_bits();
-            if entry >= before.velocity(&self.factors).to_bits() {
-                return false;
+            let before = line(block);
+            if let Some((back, this)) = last
+                && behind.needs(this, before, &self.factors)
+            {
+                marks.set(back);
             }
+            last = before.map(|line| (back, line));
         }
-        let key = this.key(&self.factors);
-        let needed = key < *least;
-        if needed {
-            *least = key;
-        }
-        needed
     }
 
     /// The line before the one that has been pushed so many before the newest, if it is in the queue still.
     fn before(&self, back: usize) -> Option<&Line> {
         let mut back = back + 1;
-        while let Some(Block { body: Body::Action(Action::Override(_)), .. }) =
-            self.ring.pushed(back)
-        {
+        while is_aside(self.ring.pushed(back)) {
             back += 1;
         }
         line(self.ring.pushed(back))
@@ -119,6 +179,12 @@ impl BlockQueue {
             });
         });
     }
+}
+
+/// Whether the machine goes on over a block that is no line.
+#[small]
+fn is_aside(block: Option<&Block>) -> bool {
+    matches!(block, Some(Block { body: Body::Action(Action::Override(_)), .. }))
 }
 
 /// The line that a block is.

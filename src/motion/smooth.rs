@@ -173,7 +173,9 @@ impl Governor {
     /// Whether a limit is to be kept exactly that is here, and below `velocity`: not if an override has lowered it
     /// too late.
     pub(super) fn takes(&self, anchor: &Anchor, velocity: f32) -> bool {
-        !(self.late && anchor.soft) || velocity - anchor.velocity <= self.limits.accel * SEGMENT_S
+        let change = lesser(self.limits.pace * SEGMENT_S, 1.0);
+        let little = self.limits.accel * change * SEGMENT_S;
+        !(self.late && anchor.soft) || velocity - anchor.velocity <= little
     }
 
     /// From rest to rest over what is too short to get going: a fraction of a step, most likely.

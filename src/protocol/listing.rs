@@ -52,10 +52,10 @@ impl Series {
     /// What a letter stands for: `$` all but tools, `m` motors, `q` axes, `o` offsets.
     pub fn of_letter(letter: u8) -> Option<Series> {
         let (first, end) = match letter {
-            b'$' => (0, 26),
+            b'$' => (0, 27),
             b'm' => (1, 5),
             b'q' => (5, 11),
-            b'o' => (14, 28),
+            b'o' => (15, 29),
             _ => return None,
         };
         Some(Series { first, end })
@@ -70,10 +70,11 @@ impl Series {
             11 => Group::Settings(Owner::Pwm),
             12 => Group::Settings(Owner::Spindle),
             13 => Group::Settings(Owner::Coolant),
-            14..23 => Group::Row(Row::system(number - 14)),
-            23 => Group::SHIFT,
-            24 | 25 => Group::Row(Row::stored(number - 24)),
-            26 => Group::OFFSETS,
+            14 => Group::Settings(Owner::Squaring),
+            15..24 => Group::Row(Row::system(number - 15)),
+            24 => Group::SHIFT,
+            25 | 26 => Group::Row(Row::stored(number - 25)),
+            27 => Group::OFFSETS,
             _ => Group::TOOL_OFFSETS,
         }
     }

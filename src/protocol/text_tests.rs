@@ -109,8 +109,17 @@ fn groups_list_what_they_have() {
     let places: Vec<String> = places.map(|group| names(&std::format!("${group}"))).collect();
     assert_eq!(
         names("$$"),
-        [sys, names("$m"), names("$q"), names("$p1"), names("$sp"), names("$co"), places.join(" ")]
-            .join(" ")
+        [
+            sys,
+            names("$m"),
+            names("$q"),
+            names("$p1"),
+            names("$sp"),
+            names("$co"),
+            names("$sq"),
+            places.join(" ")
+        ]
+        .join(" ")
     );
     assert_eq!(listed("$o").lines().count(), places.len() * 6 + 12);
 }

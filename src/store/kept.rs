@@ -96,6 +96,6 @@ mod tests {
             assert_eq!(keys.insert(key, Item(Setting::from_number(0).unwrap())), None);
             assert_ne!(key, NO_KEY);
         }
-        assert_eq!(keys.len(), 136 + usize::from(ROWS) * AXES + 10 + 5 + 16);
+        assert_eq!(keys.len(), 136 + usize::from(ROWS) * AXES + 10 + 5 + 2 + 16);
     }
 }

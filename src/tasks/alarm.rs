@@ -38,9 +38,15 @@ pub fn is_on() -> bool {
 }
 
 /// Begins an alarm, if there is none as bad.
-#[inline(never)]
 #[small]
 pub fn raise(links: &Links, alarm: Alarm) {
+    raise_for(links, alarm, alarm.status());
+}
+
+/// The same for this reason, which is what it is told as.
+#[inline(never)]
+#[small]
+pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
     if alarm <= now() {
         return;
     }
@@ -51,7 +57,14 @@ pub fn raise(links: &Links, alarm: Alarm) {
     }
     hold::abandon(links);
     spindle::stop();
-    links.except(alarm.status());
+    links.except(reason);
+}
+
+/// The machine has started as nobody wanted it to: whoever sends to it is to look first. Before anything runs.
+pub fn wake_up_in(links: &Links) {
+    state().set(Alarm::Alarm as u8);
+    // The reporter looks before it waits.
+    links.told().exception.set(Some(Status::HardReset));
 }
 
 /// Ends the alarm. [`Status::Again`] as long as the machine comes to rest.

@@ -25,6 +25,7 @@
 //! A line that is dropped is answered all the same, by [`Status::Terminated`](crate::status::Status): senders
 //! count responses. Nothing here waits, and nothing can be full: all of it is states.
 
+use super::jog;
 use super::links::Links;
 use super::ports::Port;
 use super::view::View;
@@ -188,6 +189,8 @@ fn act(links: &Links, port: &Port, characters: u8) {
     }
     if kills || busy {
         begin();
+    } else if holds {
+        jog::bar(links);
     }
     if kills {
         links.killed.set(true);

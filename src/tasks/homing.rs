@@ -69,6 +69,11 @@ impl Homing {
         1 << self.end
     }
 
+    /// Whether its switch is on the pin of this input.
+    pub fn has_pin(&self, input: u8) -> bool {
+        input == self.end || (input == self.end ^ 1 && SHARED >> self.end & 1 != 0)
+    }
+
     /// Both ends of the axis.
     pub fn ends(&self) -> u8 {
         3 << (self.end & !1)

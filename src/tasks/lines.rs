@@ -121,6 +121,11 @@ impl LinePool {
         (SLOTS - self.entries.len()) as u8
     }
 
+    /// Whether there is no line.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
     /// Whether the next byte can be taken, whatever it is.
     #[inline(never)]
     pub fn ready(&self) -> bool {

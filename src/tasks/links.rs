@@ -24,6 +24,7 @@
 use core::cell::{Cell, RefCell, UnsafeCell};
 
 use super::hold::Flush;
+use super::jog::Bar;
 use super::ports::Port;
 use super::storage::Storage;
 use super::wake::{News, Wake};
@@ -74,6 +75,8 @@ pub struct Links {
     pub cycle: Cell<Cycle>,
     /// What probing has found.
     pub probe: Probe,
+    /// Whether a jog may begin.
+    pub jogs: Cell<Bar>,
     /// A jog has ended, which is to be told.
     pub jogged: Cell<bool>,
     /// What status reports hold.

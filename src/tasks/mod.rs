@@ -7,6 +7,7 @@ pub mod exec;
 pub mod health;
 pub mod hold;
 mod homing;
+mod jog;
 pub mod lines;
 pub mod links;
 pub mod overrides;

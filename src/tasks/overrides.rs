@@ -9,6 +9,7 @@
 
 use core::cell::UnsafeCell;
 
+use super::jog;
 use super::links::Links;
 use super::spindle;
 use crate::gcode::overrides::{Change, FULL, LEAST, Override, Overrides};
@@ -16,7 +17,7 @@ use crate::hal::event::Event;
 use crate::hal::imp::{exec, flags, uart};
 use crate::motion::factors::Factors;
 use crate::motion::queue::{self, BlockSource};
-use crate::realtime::{Asked, TRAVERSE};
+use crate::realtime::{Asked, NO_JOG, TRAVERSE};
 
 /// The state: exec's, and thread mode's while exec is locked out.
 struct Shared(UnsafeCell<Overrides>);
@@ -65,6 +66,9 @@ pub fn serve(links: &Links) {
         let asked = uart::take_asked(port.number);
         if asked == Asked::NOTHING {
             continue;
+        }
+        if asked.fixed & NO_JOG != 0 {
+            jog::end(links);
         }
         for (n, which) in [(0, Override::Feed), (1, Override::Spindle)] {
             step(which, asked.percent[n], asked.fixed & 1 << n != 0);

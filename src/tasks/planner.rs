@@ -8,6 +8,7 @@ mod home;
 mod jog;
 mod probe;
 mod seek;
+mod square;
 
 use embassy_futures::yield_now;
 
@@ -442,8 +443,11 @@ impl Planner {
         drop(model);
         links.job.set(Job::default());
         hold::over(links);
-        if links.cycle.replace(Cycle::Off) == Cycle::Jog {
-            links.jogged.set(true);
+        match links.cycle.replace(Cycle::Off) {
+            Cycle::Jog => links.jogged.set(true),
+            // Motors of an axis may have moved apart.
+            Cycle::Homing => links.resync.set(true),
+            _ => {}
         }
         if links.killed.get() {
             links.except(Status::KillJob);

@@ -10,6 +10,7 @@ use embassy_futures::select::select;
 use embassy_futures::yield_now;
 
 use super::hold::{self, Flush};
+use super::jog;
 use super::lines::{Aside, LinePool};
 use super::links::Links;
 use super::ports::Port;
@@ -45,6 +46,7 @@ pub async fn run(
     let mut usb = Intake::new(links.port(USB), usb);
     let mut aux = aux.map(|received| Intake::new(links.port(AUX), received));
     loop {
+        jog::passes(links);
         let left = usb.take(links);
         let aux_left = match &mut aux {
             Some(aux) if !aux.is_idle() => aux.take(links),
@@ -54,7 +56,10 @@ pub async fn run(
             hold::placed(links, links.port(USB), CUT);
         }
         match left.max(aux_left) {
-            Left::Nothing => next(Event::Received).await,
+            Left::Nothing => {
+                jog::passed(links);
+                next(Event::Received).await;
+            }
             Left::Bytes | Left::Placed(_) => yield_now().await,
             Left::Full => {
                 // The ring goes on filling.

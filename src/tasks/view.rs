@@ -9,6 +9,7 @@ use core::cell::{OnceCell, RefMut};
 use super::alarm;
 use super::hold;
 use super::homing;
+use super::jog::Bar;
 use super::links::{Cycle, Links, snapshot};
 use super::overrides;
 use super::ports::Port;
@@ -436,6 +437,9 @@ impl Machine for View<'_> {
     fn jog(&mut self, axis: u8, place: Length) -> Status {
         if Setup::mode(&*self.settings, axis) == AxisMode::Disabled {
             return Status::AxisDisabled;
+        }
+        if self.links.jogs.get() != Bar::Open {
+            return Status::Terminated;
         }
         if let Err(status) = self.may_begin() {
             return status;

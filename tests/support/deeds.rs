@@ -82,6 +82,9 @@ const CHARACTERS: &[&[u8]] = &[
     b"\x91\x91!",
     b"\x92~",
     b"\x97",
+    // The end of a jog.
+    b"\x85",
+    b"\x85~",
 ];
 
 /// Lines in two halves.

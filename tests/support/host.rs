@@ -37,8 +37,8 @@ impl Side for Machine {
         Machine::set_input(self, input, closed);
     }
 
-    fn wire(&mut self, switches: &[(usize, i64)]) {
-        switches.iter().for_each(|(input, step)| self.set_near(*input, *step));
+    fn wire(&mut self, switches: &[(usize, i64, bool)]) {
+        switches.iter().for_each(|(input, step, opens)| self.set_near(*input, *step, *opens));
     }
 
     fn steps(&self) -> [i64; 4] {

@@ -19,8 +19,9 @@ pub trait Side {
     fn heard_aux(&mut self) -> Vec<u8>;
     /// The contact at an input closes or opens; see `kerf::boards::inputs`.
     fn set_input(&mut self, input: usize, closed: bool);
-    /// The contact at each of these inputs is closed while the motor of its axis is at or beyond a step.
-    fn wire(&mut self, switches: &[(usize, i64)]);
+    /// The contact at each of these inputs is closed while the motor of its axis is at or beyond a step, or
+    /// open (`true`).
+    fn wire(&mut self, switches: &[(usize, i64, bool)]);
     /// Where the motors are, in steps.
     fn steps(&self) -> [i64; 4];
     /// The outputs that are on, as bits of `kerf::boards::outputs`; and what part of its period the spindle's

@@ -11,7 +11,7 @@
 //! baud 500000                 from here on the sender speaks and hears at this rate
 //! in xmin closed              the contact of a switch closes (or: open); others are probe, door, stop
 //! near xmin -1280             from power-up on, the switch is closed while its axis is at or beyond this step:
-//!                             xmin to amax; probe, while Z is
+//!                             xmin to amax; probe, while Z is; `near xmin -1280 opens` is the other way round
 //! steps X=12800 Y=0           the motors come to rest there; those not named are at 0
 //! outputs spindle ccw 12.50%  these are on by now, of `spindle ccw mist flood`, and the spindle's pulses that wide
 //! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
@@ -24,7 +24,7 @@
 
 use std::collections::VecDeque;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use kerf::boards::inputs::PROBE;
 
@@ -52,7 +52,7 @@ enum Event {
     Pass(u64),
     Baud(u32),
     Input(usize, bool),
-    Near(usize, i64),
+    Near(usize, i64, bool),
     Steps([i64; 4]),
     Outputs(String),
 }
@@ -64,11 +64,13 @@ pub struct Transcript {
     events: Vec<(usize, Event)>,
 }
 
-/// Reads every transcript in a folder.
+/// Reads every transcript in a folder; those alone whose name contains `KERF_TRANSCRIPT`, if that is set.
 pub fn read_all(folder: &Path) -> Vec<Transcript> {
     let entries = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|e| e == "txt"));
+    let wanted = std::env::var("KERF_TRANSCRIPT").unwrap_or_default();
+    let is_wanted = |path: &PathBuf| path.to_string_lossy().contains(&*wanted);
+    paths.retain(|path| path.extension().is_some_and(|e| e == "txt") && is_wanted(path));
     paths.sort();
     assert!(!paths.is_empty(), "no transcripts in {}", folder.display());
     paths.iter().map(|path| read(path)).collect()
@@ -153,7 +155,8 @@ fn input(text: &str) -> Option<Event> {
 fn near(text: &str) -> Option<Event> {
     let (name, step) = text.split_once(' ')?;
     let input = INPUTS.iter().position(|input| *input == name).filter(|input| *input <= PROBE)?;
-    Some(Event::Near(input, step.parse().ok()?))
+    let (step, opens) = step.strip_suffix(" opens").map_or((step, false), |step| (step, true));
+    Some(Event::Near(input, step.parse().ok()?, opens))
 }
 
 fn steps(text: &str) -> Option<[i64; 4]> {
@@ -201,7 +204,7 @@ impl Transcript {
     /// Plays it; the error says where it fails and how.
     pub fn play(&self, side: &mut impl Side) -> Result<(), String> {
         let near = |(_, event): &(usize, Event)| match event {
-            Event::Near(input, step) => Some((*input, *step)),
+            Event::Near(input, step, opens) => Some((*input, *step, *opens)),
             _ => None,
         };
         side.wire(&self.events.iter().filter_map(near).collect::<Vec<_>>());

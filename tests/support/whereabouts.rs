@@ -6,9 +6,13 @@
 use kerf::boards::inputs::{PROBE, X_MIN, Y_MIN, Z_MAX};
 
 /// Where switches are that the machine works itself: that of X at its lower end, of Z at the upper one. Y has one out
-/// of its reach, which is worked by hand.
-pub const SWITCHES: [(usize, i64); 4] =
-    [(X_MIN, -7_680), (Z_MAX, 7_680), (PROBE, -3_840), (Y_MIN, -1_000_000_000)];
+/// of its reach, which is worked by hand. None opens when it is worked.
+pub const SWITCHES: [(usize, i64, bool); 4] = [
+    (X_MIN, -7_680, false),
+    (Z_MAX, 7_680, false),
+    (PROBE, -3_840, false),
+    (Y_MIN, -1_000_000_000, false),
+];
 /// The offset of an axis that has been homed. Its switch lets go a step off where it closes, 0.1 mm further on it is at
 /// the end of its travel, -6 mm and 6 mm.
 const HOMED: [Option<i64>; 4] =

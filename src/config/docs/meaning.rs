@@ -1,7 +1,8 @@
 //! What each setting means, in the order of its table.
 
 use crate::config::table::{
-    AXIS_ROWS, COOLANT_ROWS, JOB_ROWS, MOTOR_ROWS, PWM_ROWS, SPINDLE_ROWS, SYSTEM_ROWS, USER_ROWS,
+    AXIS_ROWS, COOLANT_ROWS, JOB_ROWS, MOTOR_ROWS, PWM_ROWS, SPINDLE_ROWS, SQUARING_ROWS,
+    SYSTEM_ROWS, USER_ROWS,
 };
 
 /// A name without its group, and what it means.
@@ -155,6 +156,18 @@ pub const COOLANT: [Meaning; COOLANT_ROWS] = [(
     "ph",
     "Whether mist and flood pause in a feedhold. They go on with the motion, but not after `%`.",
 )];
+
+pub const SQUARING: [Meaning; SQUARING_ROWS] = [
+    (
+        "sw",
+        "Input of the second motor's own homing switch, as `in1`, `in2`..; 0 is none, and the axis is not squared. The motor is that \
+         of the highest number that drives the same axis as one before it.",
+    ),
+    (
+        "of",
+        "How much farther off its switch than the first motor it stands when the axis is square.",
+    ),
+];
 
 pub const USER: [Meaning; USER_ROWS] = [
     ("0", "First of the group."),

@@ -74,7 +74,7 @@ refused. A line is looked at when it is carried out, not before.
 
 /// All of it.
 pub fn markdown() -> String {
-    let groups: [(&str, &str, &[Owner], &[Meaning]); 8] = [
+    let groups: [(&str, &str, &[Owner], &[Meaning]); 9] = [
         (
             "The machine",
             "The group `sys`; names have no prefix.",
@@ -96,6 +96,12 @@ pub fn markdown() -> String {
         ("PWM of the spindle", "The group `p1`: `p1frq`.", &[Owner::Pwm], &meaning::PWM),
         ("Spindle", "The group `sp`: `spde`.", &[Owner::Spindle], &meaning::SPINDLE),
         ("Coolant", "The group `co`: `coph`.", &[Owner::Coolant], &meaning::COOLANT),
+        (
+            "Squaring",
+            "The group `sq`: `sqsw`. Homing squares an axis whose two motors have a switch each.",
+            &[Owner::Squaring],
+            &meaning::SQUARING,
+        ),
         (
             "User data",
             "The groups `uda` `udb` `udc` `udd`: `uda0`, `udd3`. For a sender's own use: `{uda0:\"0x2a\"}`, `$uda0=0x2a`.",
@@ -277,6 +283,7 @@ mod tests {
             (Owner::Pwm, &meaning::PWM),
             (Owner::Spindle, &meaning::SPINDLE),
             (Owner::Coolant, &meaning::COOLANT),
+            (Owner::Squaring, &meaning::SQUARING),
             (Owner::User(0), &meaning::USER),
             (Owner::Job, &meaning::JOB),
         ] {

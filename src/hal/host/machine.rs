@@ -66,10 +66,10 @@ impl Machine {
         inputs::set(input, !closed);
     }
 
-    /// From now on the contact at an input is closed while the motor of its axis is at a step or beyond; that of the
-    /// probe while the third motor is, or below.
-    pub fn set_near(&self, input: usize, step: i64) {
-        stepper::set_near(input, step);
+    /// From now on the contact at an input is closed while the motor of its axis is at a step or beyond, or open if it
+    /// `opens` there; that of the probe while the third motor is, or below.
+    pub fn set_near(&self, input: usize, step: i64, opens: bool) {
+        stepper::set_near(input, step, opens);
     }
 
     /// Runs for a time.

@@ -24,6 +24,8 @@ struct Near {
     input: usize,
     motor: usize,
     step: i64,
+    /// It opens there instead of closing.
+    opens: bool,
     closed: bool,
 }
 
@@ -31,7 +33,8 @@ impl Near {
     /// The motor is at `position`.
     fn look(&mut self, position: i64) {
         let upper = self.input < board_inputs::ENDS && self.input % 2 == 1;
-        let closed = if upper { position >= self.step } else { position <= self.step };
+        let worked = if upper { position >= self.step } else { position <= self.step };
+        let closed = worked != self.opens;
         if closed != self.closed {
             self.closed = closed;
             inputs::set(self.input, !closed);
@@ -177,10 +180,10 @@ pub fn step_output() -> (u8, u8) {
 
 /// The motor of an axis works the switch at an input from now on: see
 /// [`Machine::set_near`](super::Machine::set_near).
-pub(super) fn set_near(input: usize, step: i64) {
+pub(super) fn set_near(input: usize, step: i64, opens: bool) {
     let motor = if input < board_inputs::ENDS { input / 2 } else { 2 };
     let mut pins = stepper().pins.borrow_mut();
-    let mut near = Near { input, motor, step, closed: false };
+    let mut near = Near { input, motor, step, opens, closed: false };
     near.look(pins.emitted.position[motor]);
     pins.near.push(near);
 }

@@ -34,6 +34,7 @@ fn every_token_has_a_name_that_finds_it() {
             + 41
             + 46
             + 2 * 6
+            + 2
             + 6 * 4
             + 8
             + 11 * 6

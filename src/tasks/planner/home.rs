@@ -15,12 +15,13 @@
 //! What fails ends the cycle: exception with the axis and the reason, the axis not homed, the position where
 //! it is. A feedhold holds; a flush ends it as a failure. What waits behind the line is carried out after it.
 //!
-//! Several motors of an axis move together: they have one switch, and do not square it.
+//! Several motors of an axis move together; one that has a switch of its own squares it ([`square`](super::square)).
 
 use kerf_macros::small;
 
 use super::Planner;
 use super::seek::{Sought, drop_blocks};
+use super::square::Second;
 use crate::gcode::command::{Feed, Motion};
 use crate::hal::imp::inputs;
 use crate::motion::block::Action;
@@ -37,18 +38,24 @@ const SETTLE_MS: u32 = 20;
 const ORDER: u16 = 0x3102;
 
 /// What comes next.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Default, PartialEq)]
 enum Stage {
     /// Also: with the next axis.
+    #[default]
     Clear,
     Search,
+    /// Here and in the next two some motors move alone.
+    Square,
     Latch,
+    LatchSecond,
+    Level,
     Zero,
     /// The axis is there.
     Place,
 }
 
 /// How far homing has come.
+#[derive(Default)]
 struct Progress {
     /// The place in the order of the axis after this one.
     next: u8,
@@ -56,13 +63,55 @@ struct Progress {
     stage: Stage,
     /// Where the switch was.
     contact: Length,
+    /// The motor that squares the axis.
+    second: Option<Second>,
+    /// How far the first motor is off its switch; how far the second has to go.
+    off: Length,
+}
+
+impl Stage {
+    /// Whether it is done at the speed of latching; if the axis is squared, by motors alone.
+    fn is_slow(self) -> bool {
+        matches!(self, Stage::Square | Stage::Latch | Stage::LatchSecond | Stage::Level)
+    }
+}
+
+impl Progress {
+    /// Passes over what is not to be done, as the switches are: those that are `closed`, which may be `all`.
+    fn pass(&mut self, homing: &Homing, closed: u16, all: bool) -> Result<(), Status> {
+        if self.stage == Stage::Clear {
+            // Nobody knows which of the two it is.
+            let doubtful = closed != 0 && homing.shared;
+            return match closed {
+                _ if doubtful => Err(Status::HomingClosed),
+                0 => {
+                    self.stage = Stage::Search;
+                    Ok(())
+                }
+                _ => Ok(()),
+            };
+        }
+        if self.stage == Stage::Square && all {
+            self.stage = Stage::Latch;
+        }
+        match self.stage {
+            Stage::Search if closed != 0 => Err(Status::HomingClosed),
+            Stage::Square if closed == 0 => Err(Status::HomingFailed),
+            Stage::Latch if !all => Err(Status::HomingFailed),
+            Stage::Latch if homing.backoff == Length::ZERO => {
+                self.stage = Stage::Zero;
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 impl Planner {
     /// Carries out the line's homing.
     pub(super) async fn home(&mut self) {
         self.enter(Cycle::Homing);
-        let mut at = Progress { next: 0, axis: 0, stage: Stage::Clear, contact: Length::ZERO };
+        let mut at = Progress::default();
         let mut done = self.check_homing(&mut at);
         while done.is_ok() {
             self.room().await;
@@ -99,7 +148,8 @@ impl Planner {
         let (axes, _) = self.homed_by_line();
         for axis in (0..homing::AXES).filter(|axis| axes & 1 << axis != 0) {
             at.axis = axis;
-            homing::of(&self.links.settings.borrow(), axis)?;
+            let homing = homing::of(&self.links.settings.borrow(), axis)?;
+            self.second(axis, &homing)?;
         }
         Ok(true)
     }
@@ -108,68 +158,84 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn begin_stage(&mut self, at: &mut Progress) -> Result<bool, Status> {
-        loop {
-            if at.stage == Stage::Clear && !self.next_axis(at) {
-                return Ok(false);
-            }
-            let homing = homing::of(&self.links.settings.borrow(), at.axis)?;
-            let closed = inputs::worked() & homing.switch() != 0;
-            match at.stage {
-                Stage::Clear => {
-                    self.begin_axis(at.axis, &homing);
-                    if closed && homing.shared {
-                        // Nobody knows which of the two it is.
-                        return Err(Status::HomingClosed);
-                    }
-                    if closed {
-                        self.go(at.axis, homing.away(self.at(at.axis), homing.backoff), &homing);
-                        return Ok(true);
-                    }
-                    at.stage = Stage::Search;
-                }
-                Stage::Search if closed => return Err(Status::HomingClosed),
-                Stage::Search => {
-                    let end = homing.towards(self.at(at.axis), homing.way);
-                    self.look(at.axis, end, homing.search, &homing, homing.switch());
-                    return Ok(true);
-                }
-                Stage::Latch if !closed => return Err(Status::HomingFailed),
-                Stage::Latch if homing.backoff == Length::ZERO => at.stage = Stage::Zero,
-                Stage::Latch => {
-                    let end = homing.away(at.contact, homing.backoff);
-                    self.look(at.axis, end, homing.latch, &homing, 0);
-                    return Ok(true);
-                }
-                Stage::Zero => {
-                    self.go(at.axis, homing.away(at.contact, homing.zero), &homing);
-                    return Ok(true);
-                }
-                Stage::Place => {
-                    self.place_axis(at.axis, homing.place);
-                    at.stage = Stage::Clear;
-                }
-            }
+        if at.stage == Stage::Place {
+            self.place_axis(at)?;
+            at.stage = Stage::Clear;
         }
+        if at.stage == Stage::Clear && !self.next_axis(at) {
+            return Ok(false);
+        }
+        let homing = homing::of(&self.links.settings.borrow(), at.axis)?;
+        if at.stage == Stage::Clear {
+            at.second = self.second(at.axis, &homing)?;
+            self.begin_axis(at, &homing);
+        }
+        let (own, second) = (homing.switch(), at.second.map_or(0, Second::switch));
+        let closed = inputs::worked() & (own | second);
+        at.pass(&homing, closed, closed == own | second)?;
+        // From where, how far away from the switch, and which switches end it.
+        let here = self.at(at.axis);
+        let (from, way, armed) = match at.stage {
+            Stage::Clear => (here, homing.backoff, 0),
+            Stage::Search => (here, Length(-homing.way.0), own | second),
+            Stage::Square => (here, Length(-homing.backoff.0), (own | second) & !closed),
+            Stage::Latch => (at.contact, homing.backoff, own),
+            // It has gone some way beyond, nobody knows how far.
+            Stage::LatchSecond => (here, Length(homing.backoff.0.saturating_mul(2)), second),
+            Stage::Level => (Length(here.0.saturating_add(at.off.0)), self.squaring_offset(), 0),
+            Stage::Zero | Stage::Place => (at.contact, homing.zero, 0),
+        };
+        if let Some(motor) = at.second.filter(|_| at.stage.is_slow()) {
+            let first = at.stage == Stage::Latch || armed == own;
+            self.alone(at.axis, motor, !first);
+        }
+        let speed = if at.stage.is_slow() { homing.latch } else { homing.search };
+        let awaited = if way.0 < 0 { armed } else { 0 };
+        self.look(at.axis, homing.away(from, way), speed, armed, awaited);
+        Ok(true)
     }
 
     /// What has come of the move, and what comes next.
     #[inline(never)]
     #[small]
     fn end_stage(&mut self, at: &mut Progress, sought: &Sought) -> Result<bool, Status> {
-        if let Sought::Contact(steps) = sought {
+        if let Sought::Contact(steps) = sought
+            && at.stage != Stage::LatchSecond
+        {
             let contact = self.located(steps);
             at.contact = contact.get(usize::from(at.axis)).copied().unwrap_or_default();
         }
+        self.end_alone(at, sought);
         at.stage = match (at.stage, sought) {
             (_, Sought::Flushed) => return Err(Status::HomingFailed),
             (Stage::Clear, _) => Stage::Search,
-            (Stage::Search, Sought::Contact(_)) => Stage::Latch,
-            (Stage::Search, _) => return Err(Status::HomingFailed),
+            (Stage::Search, Sought::Contact(_)) => Stage::Square,
+            (Stage::Square, Sought::Contact(_)) => Stage::Latch,
+            (Stage::Search | Stage::Square, _) => return Err(Status::HomingFailed),
+            (Stage::Latch, Sought::Contact(_)) if at.second.is_some() => Stage::LatchSecond,
             (Stage::Latch, Sought::Contact(_)) => Stage::Zero,
-            (Stage::Latch, _) => return Err(Status::HomingClosed),
+            (Stage::LatchSecond, Sought::Contact(_)) => Stage::Level,
+            (Stage::Latch | Stage::LatchSecond, _) => return Err(Status::HomingClosed),
+            (Stage::Level, _) => Stage::Zero,
             (Stage::Zero | Stage::Place, _) => Stage::Place,
         };
         Ok(true)
+    }
+
+    /// The motors of the axis move together again, and how far each is off its switch is known.
+    fn end_alone(&mut self, at: &mut Progress, sought: &Sought) {
+        let Some(second) = at.second.filter(|_| at.stage.is_slow()) else { return };
+        let contact = match sought {
+            Sought::Flushed => return,
+            Sought::Contact(steps) => second.of(steps),
+            Sought::End => 0,
+        };
+        let off = self.level(second, contact);
+        match at.stage {
+            Stage::Latch => at.off = Length(self.at(at.axis).0.wrapping_sub(at.contact.0)),
+            Stage::LatchSecond => at.off = Length(at.off.0.wrapping_sub(off.0)),
+            _ => {}
+        }
     }
 
     /// Takes the next axis of the line. False if there is none.
@@ -186,10 +252,10 @@ impl Planner {
     }
 
     /// Begins with an axis: it is not homed any more, unless its position is to stay.
-    fn begin_axis(&mut self, axis: u8, homing: &Homing) {
-        inputs::spare(homing.ends());
+    fn begin_axis(&mut self, at: &Progress, homing: &Homing) {
+        inputs::spare(homing.ends() | at.second.map_or(0, Second::switch) as u8);
         if self.homed_by_line().1 {
-            self.links.model.borrow_mut().set_homed(axis, false);
+            self.links.model.borrow_mut().set_homed(at.axis, false);
         }
         self.brake_hard();
     }
@@ -199,19 +265,10 @@ impl Planner {
         self.position.get(usize::from(axis)).copied().unwrap_or_default()
     }
 
-    /// Moves an axis.
-    fn go(&mut self, axis: u8, to: Length, homing: &Homing) {
-        self.send(axis, to, homing.search, 0, 0);
-    }
-
-    /// Moves an axis until its switch is as in `awaited`.
-    fn look(&mut self, axis: u8, to: Length, speed: f32, homing: &Homing, awaited: u16) {
-        self.send(axis, to, speed, homing.switch(), awaited);
-    }
-
+    /// Moves an axis until one of the switches `armed` is as in `awaited`.
     #[inline(never)]
     #[small]
-    fn send(&mut self, axis: u8, to: Length, speed: f32, armed: u16, awaited: u16) {
+    fn look(&mut self, axis: u8, to: Length, speed: f32, armed: u16, awaited: u16) {
         let mut target = self.position;
         if let Some(place) = target.get_mut(usize::from(axis)) {
             *place = to;
@@ -222,15 +279,17 @@ impl Planner {
     /// The axis is at its place.
     #[inline(never)]
     #[small]
-    fn place_axis(&mut self, axis: u8, place: Length) {
+    fn place_axis(&mut self, at: &Progress) -> Result<(), Status> {
         if self.homed_by_line().1 {
+            let homing = homing::of(&self.links.settings.borrow(), at.axis)?;
             let mut position = self.position;
-            if let Some(at) = position.get_mut(usize::from(axis)) {
-                *at = place;
+            if let Some(here) = position.get_mut(usize::from(at.axis)) {
+                *here = homing.place;
             }
             self.set_position(&position);
-            self.links.model.borrow_mut().set_homed(axis, true);
+            self.links.model.borrow_mut().set_homed(at.axis, true);
         }
+        Ok(())
     }
 
     /// Everything is again as it was before.
@@ -252,6 +311,9 @@ impl Planner {
             }
         }
         drop(model);
-        self.enter(Cycle::Off);
+        // In a flush it ends with that, when the position is known.
+        if !self.is_flushed() {
+            self.enter(Cycle::Off);
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Jogging, `{jogx:..}`: an axis by hand, as fast as its traverse limit lets it, under its jerk limit.
 //!
-//! It has begun at rest ([`View`](crate::tasks::view)). At its end, reached or not, the reporter says `{"jog":0}`. An
-//! exclamation mark holds it, and with `%` behind that it is over: so a sender ends it when a button is let go.
+//! It has begun at rest ([`View`](crate::tasks::view)). At its end, reached or not, the reporter says `{"jog":0}`. A
+//! sender ends it when a button is let go ([`jog`](crate::tasks::jog)). An exclamation mark holds it, and with `%` behind
+//! that it is over.
 
 use kerf_macros::small;
 

@@ -3,18 +3,21 @@
 //! The result is the contact ([`seek`](super::seek)), in machine coordinates: `prbe` 1 and `prbx`.., which the
 //! reporter tells at once. The machine comes to rest behind it, and stays there. Without contact `prbe` is 0 and the
 //! place is where the move ended; G38.2 and G38.4 take that for a failure, and so is a probe that is as it is to
-//! become before anything moves, in which case nothing does.
+//! become before anything moves, in which case nothing does. A failure is an alarm: what comes next in a program would
+//! go by a place that nobody knows.
 
 use kerf_macros::small;
 
 use super::Planner;
 use super::seek::Sought;
+use crate::alarm::Alarm;
 use crate::boards::inputs::PROBE;
 use crate::gcode::command::Motion;
 use crate::gcode::modal::MotionMode;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::inputs;
 use crate::status::Status;
+use crate::tasks::alarm;
 use crate::tasks::links::{Cycle, ProbeState};
 
 /// The probe, of the inputs.
@@ -74,7 +77,7 @@ impl Planner {
             _ => false,
         };
         if loudly {
-            links.except(Status::ProbeFailed);
+            alarm::raise_for(links, Alarm::Alarm, Status::ProbeFailed);
         }
     }
 }

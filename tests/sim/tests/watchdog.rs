@@ -83,6 +83,11 @@ fn without_the_step_interrupt_it_resets() {
     let (ms, said) = until_reset(&mut machine);
     assert!((450..650).contains(&ms), "{ms} ms");
     assert!(said.contains(TOLD), "{said}");
+    // The program that is being sent ends here.
+    machine.send(b"g1 f400 x20\n");
+    machine.run_for_ms(50).unwrap();
+    let heard = String::from_utf8_lossy(&machine.receive()).into_owned();
+    assert!(heard.contains("\"f\":[1,203,"), "{heard}");
     let is = cause(&mut machine);
     assert!(is.contains("{\"rst\":3}"), "{is}");
 }

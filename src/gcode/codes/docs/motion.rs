@@ -115,5 +115,5 @@ pub const PROBES: Section = Section {
 };
 
 const PROBE: &str = "Straight towards the axis words at the feed rate, until the probe says stop. X, Y and Z \
-only, at least 0.254 mm. To come to the end without that is an error. Refused on machines without a probe.";
-const QUIET: &str = "The same, but to come to the end without that is no error.";
+only, at least 0.254 mm. To come to the end without that is an alarm. Refused on machines without a probe.";
+const QUIET: &str = "The same, but to come to the end without that is none.";

@@ -56,6 +56,11 @@ impl Carriage {
         self.steps
     }
 
+    /// A place in steps from the lower hard end.
+    pub fn steps_at(&self, position: f64) -> i64 {
+        (position * self.steps_per_mm).round() as i64
+    }
+
     /// Steps lost at hard ends.
     pub fn lost(&self) -> u64 {
         self.lost

@@ -114,6 +114,13 @@ impl Mechanics {
         }
     }
 
+    /// Puts the plate at another height, or takes it away.
+    pub fn place_plate(&mut self, height: Option<f64>, now: u64) {
+        let before = self.contacts(2);
+        self.plate = height.map(|height| self.carriages[2].steps_at(height));
+        self.work_contacts(2, before, now);
+    }
+
     /// From now on the contacts on the wire of an input bounce.
     pub fn bounce(&mut self, input: usize, bounce: Option<Bounce>) {
         self.with(input, |line| line.set_bounce(bounce));

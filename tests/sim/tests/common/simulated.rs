@@ -47,7 +47,7 @@ impl Side for Machine {
         self.drive_pin(pin.port.letter(), pin.bit, !closed);
     }
 
-    fn wire(&mut self, switches: &[(usize, i64)]) {
+    fn wire(&mut self, switches: &[(usize, i64, bool)]) {
         if switches.is_empty() {
             return;
         }
@@ -57,11 +57,12 @@ impl Side for Machine {
             (axis.steps_per_mm, axis.travel, axis.start) = (1.0, f64::INFINITY, START);
             (axis.min, axis.max) = (None, None);
         }
-        for (input, step) in switches {
+        for (input, step, opens) in switches {
             let at = START + *step as f64;
-            let switch = Some(Switch { at, hysteresis: 0.0, wiring: Wiring::NormallyOpen });
+            let wiring = if *opens { Wiring::NormallyClosed } else { Wiring::NormallyOpen };
+            let switch = Some(Switch { at, hysteresis: 0.0, wiring });
             match (input / 2, input % 2) {
-                _ if *input == PROBE => build.plate = Some(at),
+                _ if *input == PROBE => (build.plate, build.probe) = (Some(at), wiring),
                 (axis, 0) => build.axes[axis].min = switch,
                 (axis, _) => build.axes[axis].max = switch,
             }

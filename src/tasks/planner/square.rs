@@ -1,0 +1,116 @@
+//! Squaring: an axis whose two motors have a homing switch each is homed so that each motor ends off its own.
+//!
+//! The second motor is that of the highest number that shares its axis with one before it. `sqsw` says where its switch
+//! is; the first one has that of the axis. [`home`](super::home) adds these stages:
+//!
+//! | stage | move | ends |
+//! |---|---|---|
+//! | `Search` | both motors | where the first of the switches closes |
+//! | `Square` | the motor whose switch is open, slowly, `lb` at most | where it closes |
+//! | `Latch` | the first motor off its switch | where it opens |
+//! | `LatchSecond` | the second motor off its own | where it opens |
+//! | `Level` | the second motor | as far off its switch as the first one, and `sqof` |
+//! | `Zero` | both motors | as ever |
+//!
+//! So an axis stands askew by no more than it did before, and what its switches take to open. A motor that moves
+//! alone is one that the others have left ([`Dynamics::drives`](crate::motion::dynamics::Dynamics)). After
+//! each such move the steps of all motors are counted anew, from the position of the first one
+//! ([`Planner::level`]): without that the next move would take the second motor along at once. Who ends the cycle in
+//! between has them counted anew as well.
+
+use kerf_macros::small;
+
+use super::Planner;
+use crate::boards::{MOTORS, inputs};
+use crate::config::table::{SQUARING_OFFSET, SQUARING_SWITCH};
+use crate::config::{Owner, Setting};
+use crate::status::Status;
+use crate::tasks::homing::Homing;
+use crate::tasks::setup::moved_by;
+use crate::tasks::{links, switches};
+use crate::units::{AXES, Length};
+
+/// The second motor of an axis that is squared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Second {
+    /// Its number, from 0.
+    motor: u8,
+    /// The input of its switch.
+    input: u8,
+}
+
+impl Second {
+    /// Its part of what all motors have.
+    pub fn of(self, steps: &[i32; MOTORS]) -> i32 {
+        steps.get(usize::from(self.motor)).copied().unwrap_or_default()
+    }
+
+    /// The bit of its switch.
+    pub fn switch(self) -> u16 {
+        1 << self.input
+    }
+}
+
+impl Planner {
+    /// The second motor of the axis, if it is squared; or why it cannot be.
+    #[inline(never)]
+    #[small]
+    pub(super) fn second(&self, axis: u8, homing: &Homing) -> Result<Option<Second>, Status> {
+        let Some(input) = (self.squaring(SQUARING_SWITCH) as u8).checked_sub(1) else {
+            return Ok(None);
+        };
+        let settings = self.links.settings.borrow();
+        let drives = |m: usize| moved_by(&settings, m);
+        let shares = |m: &usize| (0..*m).any(|before| drives(before) == drives(*m));
+        let Some(motor) = (1..MOTORS).rev().find(shares).filter(|m| drives(*m) == axis) else {
+            return Ok(None);
+        };
+        let wired = switches::WIRED >> input & 1 != 0;
+        if !wired || homing.has_pin(input) || homing.backoff == Length::ZERO {
+            return Err(Status::HomingSwitches);
+        }
+        Ok(Some(Second { motor: motor as u8, input }))
+    }
+
+    /// A setting of the group `sq`.
+    fn squaring(&self, row: u8) -> i32 {
+        Setting::of(Owner::Squaring, row).map_or(0, |setting| self.links.storage.cold(setting))
+    }
+
+    /// Leaves the axis to the second motor, or to the others.
+    #[inline(never)]
+    #[small]
+    pub(super) fn alone(&mut self, axis: u8, second: Second, moves: bool) {
+        for (m, drives) in (0..).zip(self.dynamics.drives.iter_mut()) {
+            if *drives == axis && (m == second.motor) != moves {
+                *drives = AXES as u8;
+            }
+        }
+    }
+
+    /// After a move of some motors of the axis: all drive it again, and their steps are counted from where the first
+    /// one is. Returns how far the second one is off its step `from`.
+    #[inline(never)]
+    #[small]
+    pub(super) fn level(&mut self, second: Second, from: i32) -> Length {
+        let motion = links::snapshot();
+        self.relocate(&motion);
+        let m = usize::from(second.motor);
+        let settings = self.links.settings.borrow();
+        for (m, drives) in self.dynamics.drives.iter_mut().enumerate() {
+            *drives = moved_by(&settings, m);
+        }
+        let ratio = settings.step_ratio(m);
+        drop(settings);
+        let position = self.position;
+        self.set_position(&position);
+        ratio.length(second.of(&motion.target).wrapping_sub(from)).unwrap_or_default()
+    }
+
+    /// How much farther than the first motor the second one is to stand off its switch.
+    pub(super) fn squaring_offset(&self) -> Length {
+        Length(self.squaring(SQUARING_OFFSET))
+    }
+}
+
+const _: () = assert!(inputs::COUNT <= 16, "a bit each");
