@@ -18,6 +18,8 @@ mod sender;
 mod side;
 #[path = "support/talk.rs"]
 mod talk;
+#[path = "support/whereabouts.rs"]
+mod whereabouts;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -21,7 +21,7 @@ pub enum Deed {
     Wait(u64),
     /// The sender waits until the machine is at rest, and asks where it is.
     Rest,
-    /// `^x`.
+    /// `^x`, in the midst of a line.
     Reset,
 }
 
@@ -82,6 +82,9 @@ const CHARACTERS: &[&[u8]] = &[
     b"\x91\x91!",
     b"\x92~",
     b"\x97",
+    // The end of a jog.
+    b"\x85",
+    b"\x85~",
 ];
 
 /// Lines in two halves.
@@ -156,7 +159,12 @@ const ANY_LINE: &[&str] = &[
     "{est:1}",
     "{est:0}",
     "{xjm:4000}",
-    // The position.
+    // What positions are called.
+    "g54",
+    "g55",
+    "g10 l20 p2 x0.5",
+    "g92 x1 y-0.5",
+    "g92.1",
     "g28.3 x0 y0 z0",
     "g28.2 x0",
     "g28.2 x0",

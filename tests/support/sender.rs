@@ -8,8 +8,40 @@ const ANSWER: &str = "{\"r\":{";
 const UNASKED: [&str; 7] =
     ["{\"r\":{\"prb\":", "{\"sr\":", "{\"qr\":", "{\"er\":", "{\"rx\":", "{\"jog\":", "{\"ack\":"];
 
+/// What holds a sender back that heeds it.
+const XOFF: char = '\x13';
+const XON: char = '\x11';
 /// How a banner ends.
 const BANNER: &str = "\"SYSTEM READY\"},\"f\":[1,0,0]}";
+
+/// What an answer to a line tells of.
+#[derive(Clone, PartialEq, Debug)]
+enum Want {
+    /// It is to tell of this first.
+    Name(String),
+    /// It is to tell of nothing, as that to G-code does.
+    Nothing,
+    /// Of whatever: a line that is broken up by real-time characters may be dropped, or be several.
+    Anything,
+}
+
+impl Want {
+    /// Of a line.
+    fn of(line: &[u8]) -> Want {
+        let line = String::from_utf8_lossy(line);
+        let is_plain = |c: char| c == ' ' || u8::try_from(c).is_ok_and(|byte| is_text(&byte));
+        if !line.chars().all(is_plain) {
+            return Want::Anything;
+        }
+        let name = line.strip_prefix('{').and_then(|rest| rest.split(':').next());
+        match name.map(|name| name.trim_matches('"')) {
+            None => Want::Nothing,
+            // If it is dropped, its answer repeats it.
+            Some("gc") => Want::Anything,
+            Some(name) => Want::Name(name.to_string()),
+        }
+    }
+}
 
 /// What is sent and heard on a port.
 pub struct Sender {
@@ -18,10 +50,8 @@ pub struct Sender {
     partial: String,
     /// All lines since [`Sender::forget`].
     pub heard: Vec<String>,
-    /// Lines that want an answer.
-    pub sent: usize,
-    /// Answers.
-    pub answered: usize,
+    /// What lines that have been sent want to hear.
+    wanted: Vec<Want>,
     /// Banners.
     pub banners: usize,
     /// Jogs that were taken, less those that have ended.
@@ -35,8 +65,7 @@ impl Sender {
             port,
             partial: String::new(),
             heard: Vec::new(),
-            sent: 0,
-            answered: 0,
+            wanted: Vec::new(),
             banners: 0,
             jogs: 0,
         }
@@ -44,12 +73,12 @@ impl Sender {
 
     /// Lines that wait for their answers.
     pub fn in_flight(&self) -> usize {
-        self.sent.saturating_sub(self.answered)
+        self.wanted.len()
     }
 
     /// Sends bytes, of which the lines want answers.
     pub fn send(&mut self, side: &mut impl Side, bytes: &[u8]) {
-        self.sent += lines_of(bytes);
+        self.wanted.extend(wants(bytes));
         match self.port {
             0 => side.send(bytes),
             _ => side.send_aux(bytes),
@@ -59,7 +88,7 @@ impl Sender {
     /// Takes what has come. The error is what may not come.
     pub fn hear(&mut self, side: &mut impl Side) -> Result<(), String> {
         let bytes = if self.port == 0 { side.heard() } else { side.heard_aux() };
-        self.partial += &String::from_utf8_lossy(&bytes);
+        self.partial += &String::from_utf8_lossy(&bytes).replace([XON, XOFF], "");
         while let Some((line, rest)) = self.partial.split_once('\n') {
             let line = line.trim_matches('\r').to_string();
             self.partial = rest.to_string();
@@ -89,20 +118,33 @@ impl Sender {
             if !line.starts_with(ANSWER) {
                 return Err(format!("heard {line}, which nobody says"));
             }
-            self.answered += 1;
-            if line.starts_with("{\"r\":{\"jog") && line.contains("\"f\":[1,0,") {
-                self.jogs += 1;
-            }
+            return self.answer();
         }
-        match self.answered > self.sent {
-            true => Err(format!("{} lines and {} answers", self.sent, self.answered)),
-            false => Ok(()),
-        }
+        Ok(())
+    }
+
+    /// The line that was heard last answers one of those that have been sent.
+    fn answer(&mut self) -> Result<(), String> {
+        let Some(line) = self.heard.last() else { return Ok(()) };
+        let name = line.strip_prefix("{\"r\":{\"").and_then(|rest| rest.split('"').next());
+        let fits = |want: &Want| match want {
+            Want::Name(wanted) => name == Some(wanted),
+            Want::Nothing => name.is_none(),
+            Want::Anything => false,
+        };
+        let anything = || self.wanted.iter().position(|want| *want == Want::Anything);
+        let at = self.wanted.iter().position(fits).or_else(anything);
+        let at = at.ok_or_else(|| format!("{line} answers none of {:?}", self.wanted))?;
+        self.jogs +=
+            isize::from(name.is_some_and(|n| n.starts_with("jog")) && line.contains("\"f\":[1,0,"));
+        self.wanted.remove(at);
+        Ok(())
     }
 
     /// The machine has been reset: nothing will be answered any more.
     pub fn reset(&mut self) {
-        (self.sent, self.answered, self.banners, self.jogs) = (0, 0, 0, 0);
+        (self.banners, self.jogs) = (0, 0);
+        self.wanted.clear();
         self.partial.clear();
     }
 
@@ -121,11 +163,14 @@ fn is_whole(line: &str) -> bool {
     plain && ends('{', '}') && ends('[', ']')
 }
 
-/// How many lines are in these bytes that are answered: real-time characters are no text, and an empty line is none.
-fn lines_of(bytes: &[u8]) -> usize {
-    let is_text = |byte: &&u8| byte.is_ascii_graphic() && !b"!~%".contains(byte);
+/// What answers the lines in these bytes: real-time characters are no text, and an empty line is none.
+fn wants(bytes: &[u8]) -> Vec<Want> {
     let mut pieces: Vec<_> = bytes.split(|byte| *byte == b'\n').collect();
     // What has no end is no line yet.
     pieces.pop();
-    pieces.iter().filter(|piece| piece.iter().any(|byte| is_text(&byte))).count()
+    pieces.into_iter().filter(|piece| piece.iter().any(is_text)).map(Want::of).collect()
+}
+
+fn is_text(byte: &u8) -> bool {
+    byte.is_ascii_graphic() && !b"!~%".contains(byte)
 }

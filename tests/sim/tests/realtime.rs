@@ -19,6 +19,8 @@ mod side;
 mod simulated;
 #[path = "../../support/talk.rs"]
 mod talk;
+#[path = "../../support/whereabouts.rs"]
+mod whereabouts;
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -33,8 +35,8 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::{TestCaseError, TestError};
 use talk::Talk;
 
-/// About half a second of the machine's time.
-const SCALE: Scale = Scale { deeds: 14, way: 1_200, radius: 1.0, wait: 200 };
+/// About two seconds of the machine's time.
+const SCALE: Scale = Scale { deeds: 24, way: 1_500, radius: 1.0, wait: 300 };
 /// Machines that run at the same time.
 const MACHINES: u64 = 2;
 

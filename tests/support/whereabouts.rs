@@ -1,0 +1,149 @@
+//! What is known of where the motors are: the position that the machine tells, less the steps that it has made.
+//!
+//! That *offset* of an axis stays the same whatever moves. Only homing, a position that is set, and a reset change
+//! it; that of an axis which was homed at a switch that it works itself is known to the step.
+
+use kerf::boards::inputs::{PROBE, X_MIN, Y_MIN, Z_MAX};
+
+/// Where switches are that the machine works itself: that of X at its lower end, of Z at the upper one. Y has one out
+/// of its reach, which is worked by hand. None opens when it is worked.
+pub const SWITCHES: [(usize, i64, bool); 4] = [
+    (X_MIN, -7_680, false),
+    (Z_MAX, 7_680, false),
+    (PROBE, -3_840, false),
+    (Y_MIN, -1_000_000_000, false),
+];
+/// The offset of an axis that has been homed. Its switch lets go a step off where it closes, 0.1 mm further on it is at
+/// the end of its travel, -6 mm and 6 mm.
+const HOMED: [Option<i64>; 4] =
+    [Some(-7_680 - (-7_679 + 128)), None, Some(7_680 - (7_679 - 128)), None];
+/// How the machine is set up for that: fast, and with short ways.
+pub const SETTINGS: [&str; 6] = [
+    "{x:{vm:3000,fr:3000,jm:2000}}",
+    "{y:{vm:3000,fr:3000,jm:2000}}",
+    "{z:{vm:3000,fr:3000,jm:2000}}",
+    "{xtn:-6,xtm:20,xsv:3000,xlv:600,xlb:1,xzb:0.1,xsx:0}",
+    "{ytn:-3,ytm:3,ysv:3000,ylv:600,ylb:1,yzb:0.1,ysx:0}",
+    "{ztn:-20,ztm:6,zsv:3000,zlv:600,zlb:1,zzb:0.1,zsn:0,a:{am:1,vm:100000,fr:100000,jm:100000}}",
+];
+
+const AXES: [&str; 4] = ["x", "y", "z", "a"];
+/// Steps in a unit of an axis: mm, or a degree.
+const STEPS: [f64; 4] = [1280.0, 1280.0, 1280.0, 1600.0 / 360.0];
+/// So many steps are so many units, without a rest.
+const GRID: [(i64, f64); 4] = [(32, 0.025), (32, 0.025), (32, 0.025), (40, 9.0)];
+/// Where motors are put in the end.
+const HOME: i64 = 640;
+/// Positions are told to 0.001 mm, 1.28 steps, and steps are rounded.
+const CLOSE: f64 = 1.2;
+/// Steps of a homing axis until a switch is seen that changes while others do: 300 us at 10 mm/s, both ways.
+const LATE: f64 = 10.0;
+
+/// What is known of an axis.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    offset: i64,
+    /// Whether that is to the step.
+    exact: bool,
+    /// It may have been homed at its switch since.
+    homed: bool,
+    /// It may be anything.
+    doubted: bool,
+}
+
+/// What is known of all of them.
+#[derive(Clone, Debug)]
+pub struct Whereabouts {
+    axes: [Axis; 4],
+    /// Other switches have changed since.
+    disturbed: bool,
+}
+
+/// A place that is known to the step, as cells of the grid.
+pub struct Place([i64; 4]);
+
+impl Whereabouts {
+    /// Of a machine that has just started, and calls the place 0 to which its motors have made `steps`.
+    pub fn at_start(steps: [i64; 4]) -> Self {
+        let axis = |steps: i64| Axis { offset: -steps, exact: true, homed: false, doubted: false };
+        Self { axes: steps.map(axis), disturbed: false }
+    }
+
+    /// A line is sent, which may change them.
+    pub fn expect(&mut self, line: &str) {
+        let homes_all = line.contains("{home:1}");
+        for (m, axis) in self.axes.iter_mut().enumerate() {
+            let homes = homes_all || line.contains("g28.2") && line.contains(AXES[m]);
+            axis.homed |= homes;
+            // A switch that is worked by hand may be anywhere.
+            axis.doubted |= homes && HOMED[m].is_none() || line.contains("g28.3");
+        }
+    }
+
+    /// A switch is worked by hand: meanwhile others are seen later than by themselves.
+    pub fn disturb(&mut self) {
+        self.disturbed = true;
+    }
+
+    /// Compares what the machine tells as `mpo` with the steps that its motors have made.
+    pub fn compare(&mut self, told: &str, steps: [i64; 4]) -> Result<(), String> {
+        for (m, steps) in steps.into_iter().enumerate() {
+            let name = format!("\"{}\":", AXES[m]);
+            let position = number(told, &name).ok_or_else(|| format!("no {name} in {told}"))?;
+            self.compare_axis(m, position * STEPS[m] - steps as f64)
+                .map_err(|off| format!("motor {} is {off:.1} steps off what {told} says", m + 1))?;
+        }
+        self.disturbed = false;
+        Ok(())
+    }
+
+    /// The same for an axis that is `at` this offset by what is told. The error is how far it is off.
+    fn compare_axis(&mut self, m: usize, at: f64) -> Result<(), f64> {
+        let disturbed = self.disturbed;
+        let axis = &mut self.axes[m];
+        let homed = HOMED[m].filter(|_| axis.homed);
+        let within = |close: f64, offset: i64| (at - offset as f64).abs() < close;
+        let near = |offset| within(if axis.exact { CLOSE } else { 2.0 * CLOSE }, offset);
+        if near(axis.offset) && !axis.doubted {
+            // As it was. Unless it may be both.
+            axis.exact &= homed.is_none_or(|offset| offset == axis.offset || !near(offset));
+        } else if let Some(offset) = homed.filter(|offset| near(*offset)) {
+            (axis.offset, axis.exact) = (offset, !axis.doubted && !disturbed);
+        } else if axis.doubted || disturbed && homed.is_some_and(|offset| within(LATE, offset)) {
+            (axis.offset, axis.exact) = (at.round() as i64, false);
+        } else {
+            return Err(at - axis.offset as f64);
+        }
+        (axis.homed, axis.doubted) = (false, false);
+        Ok(())
+    }
+
+    /// A place near where the motors were when they had made no step, and the line that goes there.
+    pub fn way_home(&self) -> (Place, String) {
+        let cell = |m: usize| (self.axes[m].offset + HOME).div_euclid(GRID[m].0);
+        let cells: [i64; 4] = std::array::from_fn(cell);
+        let words = cells.iter().zip(GRID).zip(AXES);
+        let words =
+            words.map(|((cell, (_, unit)), axis)| format!(" {axis}{:.3}", *cell as f64 * unit));
+        (Place(cells), format!("g21 g90 g94 g53 g0{}", words.collect::<String>()))
+    }
+
+    /// The motors, that have made `steps`, rest at that place: all is known to the step from now on.
+    pub fn arrive(&mut self, place: &Place, steps: [i64; 4]) -> Result<(), String> {
+        for (m, axis) in self.axes.iter_mut().enumerate() {
+            let offset = place.0[m] * GRID[m].0 - steps[m];
+            if axis.exact && axis.offset != offset {
+                let off = axis.offset - offset;
+                return Err(format!("motor {} rests {off} steps off its place", m + 1));
+            }
+            (axis.offset, axis.exact) = (offset, true);
+        }
+        Ok(())
+    }
+}
+
+/// The number behind a text.
+pub fn number(line: &str, text: &str) -> Option<f64> {
+    let rest = &line[line.find(text)? + text.len()..];
+    rest.split([',', '}']).next()?.parse().ok()
+}
