@@ -168,8 +168,8 @@ macro_rules! tasks {
     ($(fn $name:ident($($arg:ident: $type:ty),*) = $run:path;)+) => {$(
         #[cfg(target_arch = "avr")]
         #[embassy_executor::task]
-        async fn $name($($arg: $type),*) -> ! {
-            $run($($arg),*).await
+        fn $name($($arg: $type),*) -> impl Future<Output = crate::tasks::Never> {
+            $run($($arg),*)
         }
 
         #[cfg(not(target_arch = "avr"))]

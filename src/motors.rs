@@ -26,6 +26,7 @@ pub struct Modes {
 
 impl Modes {
     /// From the mode of each motor: 0 never, 1 always, 2 in a cycle, 3 while it moves.
+    #[small]
     pub fn new(mode: impl Fn(usize) -> u8) -> Self {
         let are = |wanted| (0..MOTORS).fold(0, |bits, m| bits | u8::from(mode(m) == wanted) << m);
         Self { always: are(1), in_cycle: are(2), moving: are(3) }
@@ -71,6 +72,7 @@ impl Motors {
 
     /// Other modes. One that always has power gets it now, one that never has it loses it; a motor
     /// that was on for another reason is on for the timeout.
+    #[small]
     pub fn set_modes(&mut self, modes: Modes) {
         if modes == self.modes {
             return;
@@ -94,6 +96,7 @@ impl Motors {
 
     /// In a feedhold, before [`Motors::pass`]: timeouts stand still for so many milliseconds, which have passed since
     /// the last look.
+    #[small]
     pub fn stand_still(&mut self, ms: u32) {
         for last in &mut self.last {
             *last = last.wrapping_add(ms);
@@ -102,6 +105,7 @@ impl Motors {
 
     /// Time passes: it is `now`; `running` says that the machine moves or dwells. Takes power from
     /// motors that have not been used for `timeout`. Whether any lost it.
+    #[small]
     pub fn pass(&mut self, now: u32, running: bool, timeout: u32) -> bool {
         if !running {
             self.busy = 0;

@@ -99,6 +99,7 @@ impl State {
 
     /// G38.2 to G38.5 (RS274/NGC 3.5.9).
     #[inline(never)]
+    #[small]
     fn probe(
         &mut self,
         block: &Block,

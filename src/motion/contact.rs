@@ -1,7 +1,8 @@
 //! The moment at which a switch is reached that ends a move, and where the motors were then.
 //!
 //! ```text
-//! look interrupt   note     the generator as it is; from now on exec comes to rest, as in a feedhold
+//! look interrupt   mark     the generator as it is: there may be a contact
+//!                  note     there is; from now on exec comes to rest, as in a feedhold
 //! exec             catch_up, pushed     what the generator does from there, segment by segment
 //! planner          steps    when exec has dropped its blocks; clear, when it has read them
 //! ```
@@ -44,13 +45,21 @@ machine_static! {
     };
 }
 
-/// The contact is now, while the generator is `dda` in the segment of slot `tail`. Look interrupt only.
+/// If there is a contact it is now, while the generator is `dda` in the segment of slot `tail`. Look interrupt only, which
+/// holds exec off until it calls [`note`] or ends.
 #[small]
-pub fn note(dda: &Dda, tail: u8) {
+pub fn mark(dda: &Dda, tail: u8) {
     if contact().stage.get() == NONE {
         // SAFETY: in this stage it is the look's.
         unsafe { &mut *contact().follow.get() }.begin(dda);
         contact().tail.set(tail);
+    }
+}
+
+/// It was a contact, where the generator was marked. Look interrupt only.
+#[small]
+pub fn note() {
+    if contact().stage.get() == NONE {
         contact().stage.set(NOTED);
     }
 }

@@ -116,6 +116,7 @@ impl Builder {
 
     /// Takes the motors back to where the last block ended.
     #[inline(never)]
+    #[small]
     fn put_back(&mut self, to: &PerAxis<Length>, dynamics: &Dynamics, machine: &impl Motors) {
         for (m, motor) in self.motors.iter_mut().enumerate() {
             if let Some(&position) = to.get(usize::from(dynamics.drives[m])) {
@@ -130,6 +131,7 @@ impl Builder {
     }
 
     /// The block that renames the present position. Motors without an axis keep theirs.
+    #[small]
     pub fn set_position(&mut self, position: &PerAxis<Length>, machine: &impl Motors) -> Action {
         for (m, motor) in self.motors.iter_mut().enumerate() {
             if let Some(&position) = position.get(usize::from(machine.motor_axis(m))) {
@@ -141,6 +143,7 @@ impl Builder {
     }
 
     /// The machine stands still, and its motors are at these steps.
+    #[small]
     pub fn place(&mut self, steps: &[i32; MOTORS]) {
         self.motors = steps.map(Motor::counted);
         self.stopped();

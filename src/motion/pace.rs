@@ -76,6 +76,7 @@ pub struct Pace {
 }
 
 /// The paces for such drivers, by the number of motors that move, less one. Cost: 6,000.
+#[small]
 pub const fn paces(drivers: Drivers) -> [Pace; MOTORS] {
     let extra = drivers.extra();
     let mut paces = [Pace { shortest: 0, fine: 0, coarse: 0, settles: 0 }; MOTORS];

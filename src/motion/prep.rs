@@ -126,6 +126,7 @@ impl Prep {
 
     /// From the next block on, this is what the drivers ask for.
     #[inline(never)]
+    #[small]
     pub fn set_drivers(&mut self, drivers: Drivers) {
         self.paces = paces(drivers);
         self.setup = drivers.setup();

@@ -17,7 +17,7 @@ use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
 use crate::motion::snapshot::Program;
 use crate::tasks::health::{self, Sign};
-use crate::tasks::{alarm, hold, links, overrides, power, spindle};
+use crate::tasks::{Never, alarm, hold, links, overrides, power, spindle};
 
 /// CPU cycles in so many tenths of a millisecond.
 const fn tenths(of_ms: u32) -> u32 {
@@ -25,91 +25,97 @@ const fn tenths(of_ms: u32) -> u32 {
 }
 
 /// The task.
-pub async fn run(mut blocks: BlockSource, mut segments: Producer<Segment, SEGMENTS>) -> ! {
-    let mut machine = Exec::new();
-    let mut segment = Segment::default();
-    let (mut most, mut rests, mut count) = (1u8, true, 0u8);
-    let mut finished = Finished::new();
-    loop {
-        exec::wait(|| {
-            health::answer(Sign::Exec);
-            (segments.used() < most.into() || stepper::is_stopped()).then_some(())
-        })
-        .await;
-        let waiting = blocks.len();
-        let standstill = !stepper::running();
-        if contact::is_noted() {
-            contact::catch_up(&segments);
-        }
-        let step = links::update(|out| {
-            machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
-            // What has paused in a hold goes on before motion does.
-            if out.outputs != spindle::on() {
-                machine.wait(spindle::switch(out, false), out);
-            }
-            if let Some(line) = finished.take(segments.used()) {
-                out.finished = line;
-            }
-            let line = out.line;
-            let step = match stepper::is_stopped() {
-                true => Step::Held,
-                false => machine.step(&mut blocks, standstill, out, &mut segment),
-            };
-            if out.line != line {
-                finished.end(line);
-            }
-            if step == Step::Segment {
-                rests = out.velocity.to_bits() == 0;
-                finished.queue();
-                power::segment(segment.moving);
-            } else if let Step::Override(change) = step {
-                overrides::change_in_stream(change, &mut blocks);
-            } else if step == Step::Idle && standstill {
-                finished.rest();
-                out.finished = out.line;
-            } else if step == Step::Held {
-                spindle::switch(out, false);
-                hold::dropped(|| {
-                    // What has paused stays off.
-                    out.outputs = spindle::on();
-                    let held = machine.drop_all(&mut blocks, out);
-                    stepper::settle(held, &mut out.target);
-                    finished.rest();
-                    if alarm::now() >= Alarm::Shutdown {
-                        out.program = Program::Ready;
-                    }
-                });
-            } else if step == Step::Switched {
-                machine.wait(spindle::switch(out, true), out);
-            }
-            step
-        });
-        if step == Step::Segment {
-            // There is room: this task alone fills the ring.
-            let _ = segments.push_copy(&segment);
-            count = count.wrapping_add(1);
-            health::moves(count);
+#[allow(clippy::manual_async_fn)] // See `tasks`.
+pub fn run(
+    mut blocks: BlockSource,
+    mut segments: Producer<Segment, SEGMENTS>,
+) -> impl Future<Output = Never> {
+    async move {
+        let mut machine = Exec::new();
+        let mut segment = Segment::default();
+        let (mut most, mut rests, mut count) = (1u8, true, 0u8);
+        let mut finished = Finished::new();
+        loop {
+            exec::wait(|| {
+                health::answer(Sign::Exec);
+                (segments.used() < most.into() || stepper::is_stopped()).then_some(())
+            })
+            .await;
+            let waiting = blocks.len();
+            let standstill = !stepper::running();
             if contact::is_noted() {
-                contact::pushed(&segment);
+                contact::catch_up(&segments);
             }
-            stepper::go();
-            let cycles = u32::from(segment.ticks) * u32::from(segment.period);
-            most = queued(cycles, rests);
-            if (enough(cycles)..most).contains(&(segments.used() as u8)) {
-                exec::pend_when_idle();
+            let step = links::update(|out| {
+                machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
+                // What has paused in a hold goes on before motion does.
+                if out.outputs != spindle::on() {
+                    machine.wait(spindle::switch(out, false), out);
+                }
+                if let Some(line) = finished.take(segments.used()) {
+                    out.finished = line;
+                }
+                let line = out.line;
+                let step = match stepper::is_stopped() {
+                    true => Step::Held,
+                    false => machine.step(&mut blocks, standstill, out, &mut segment),
+                };
+                if out.line != line {
+                    finished.end(line);
+                }
+                if step == Step::Segment {
+                    rests = out.velocity.to_bits() == 0;
+                    finished.queue();
+                    power::segment(segment.moving);
+                } else if let Step::Override(change) = step {
+                    overrides::change_in_stream(change, &mut blocks);
+                } else if step == Step::Idle && standstill {
+                    finished.rest();
+                    out.finished = out.line;
+                } else if step == Step::Held {
+                    spindle::switch(out, false);
+                    hold::dropped(|| {
+                        // What has paused stays off.
+                        out.outputs = spindle::on();
+                        let held = machine.drop_all(&mut blocks, out);
+                        stepper::settle(held, &mut out.target);
+                        finished.rest();
+                        if alarm::now() >= Alarm::Shutdown {
+                            out.program = Program::Ready;
+                        }
+                    });
+                } else if step == Step::Switched {
+                    machine.wait(spindle::switch(out, true), out);
+                }
+                step
+            });
+            if step == Step::Segment {
+                // There is room: this task alone fills the ring.
+                let _ = segments.push_copy(&segment);
+                count = count.wrapping_add(1);
+                health::moves(count);
+                if contact::is_noted() {
+                    contact::pushed(&segment);
+                }
+                stepper::go();
+                let cycles = u32::from(segment.ticks) * u32::from(segment.period);
+                most = queued(cycles, rests);
+                if (enough(cycles)..most).contains(&(segments.used() as u8)) {
+                    exec::pend_when_idle();
+                    exec_asked_again().await;
+                }
+            }
+            if blocks.len() != waiting {
+                flags::set(Event::BlockDone);
+            }
+            if step == Step::Held && hold::passes() {
+                continue;
+            }
+            if matches!(step, Step::Idle | Step::Standstill | Step::Held) {
+                links::hungry(true);
                 exec_asked_again().await;
+                links::hungry(false);
             }
-        }
-        if blocks.len() != waiting {
-            flags::set(Event::BlockDone);
-        }
-        if step == Step::Held && hold::passes() {
-            continue;
-        }
-        if matches!(step, Step::Idle | Step::Standstill | Step::Held) {
-            links::hungry(true);
-            exec_asked_again().await;
-            links::hungry(false);
         }
     }
 }

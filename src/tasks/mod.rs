@@ -1,5 +1,8 @@
 //! The tasks. Each is a thin `async fn` around a part that knows nothing of tasks; `links` lists
 //! everything that connects them.
+//!
+//! An `async fn` keeps its arguments beside what it makes of them, for as long as it runs. Where that tells, `run` is
+//! a function that returns an async block instead, which keeps what it uses.
 
 pub mod alarm;
 pub mod control;
@@ -25,3 +28,16 @@ pub mod switches;
 pub mod tx;
 pub mod view;
 pub mod wake;
+
+/// What a task returns, that never does: `!`, which is no type of stable Rust yet.
+pub type Never = <fn() -> ! as Returns>::Value;
+
+/// See [`Never`].
+pub trait Returns {
+    /// What the function returns.
+    type Value;
+}
+
+impl<T> Returns for fn() -> T {
+    type Value = T;
+}

@@ -6,29 +6,28 @@
 
 mod home;
 mod jog;
+mod outputs;
+mod parts;
 mod probe;
 mod seek;
 mod square;
 
 use embassy_futures::yield_now;
+use parts::{ArcWalk, Parts};
 
+use super::Never;
 use super::alarm;
 use super::hold::{self, Flush};
 use super::links::{self, Cycle, Links};
 use super::parser;
-use super::setup::moved_by;
-use crate::boards::outputs;
-use crate::config::{Settings, StepRatio};
-use crate::gcode::arc::Walk;
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
-use crate::gcode::modal::{self, Coolant};
 use crate::gcode::overrides::Change;
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, wait};
 use crate::jobs::Job;
 use crate::motion::block::{Action, Block, Line as Move, Outputs};
 use crate::motion::dynamics::{Dynamics, Machine};
-use crate::motion::line::{Builder, Built, Line, Motors};
+use crate::motion::line::{Builder, Built, Line};
 use crate::motion::pace::Drivers;
 use crate::motion::queue::{self, BlockQueue};
 use crate::status::Status;
@@ -54,19 +53,6 @@ struct Planner {
     parts: Option<Parts>,
     /// What is told before anything else of the line.
     news: News,
-}
-
-/// An arc under way.
-struct ArcWalk {
-    walk: Walk,
-    feed: Feed,
-}
-
-/// A move under way that is too long for one block.
-struct Parts {
-    target: PerAxis<Length>,
-    feed: Option<Feed>,
-    left: u16,
 }
 
 /// What has changed beside the line.
@@ -98,7 +84,7 @@ enum Turn {
 }
 
 /// The task.
-pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
+pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Never> {
     let mut planner = Planner {
         links,
         queue,
@@ -113,32 +99,34 @@ pub async fn run(links: &'static Links, queue: BlockQueue) -> ! {
         parts: None,
         news: News::None,
     };
-    loop {
-        links.planner_wake.wait().await;
-        planner.replan();
-        if links.commands_taken.get() && !planner.carry_out_at_once() {
-            planner.begin();
-            loop {
-                planner.room().await;
-                match planner.turn() {
-                    Turn::Done => break,
-                    Turn::More => yield_now().await,
-                    Turn::Pause => planner.cycle_start().await,
-                    Turn::Probe => planner.probe().await,
-                    Turn::Home => planner.home().await,
-                    Turn::Jog => planner.jog().await,
+    async move {
+        loop {
+            links.planner_wake.wait().await;
+            planner.replan();
+            if links.commands_taken.get() && !planner.carry_out_at_once() {
+                planner.begin();
+                loop {
+                    planner.room().await;
+                    match planner.turn() {
+                        Turn::Done => break,
+                        Turn::More => yield_now().await,
+                        Turn::Pause => planner.cycle_start().await,
+                        Turn::Probe => planner.probe().await,
+                        Turn::Home => planner.home().await,
+                        Turn::Jog => planner.jog().await,
+                    }
                 }
             }
-        }
-        links.commands_taken.set(false);
-        if planner.is_flushed() {
-            seek::drop_blocks().await;
-            planner.restart();
-            if links.killed.take() {
-                parser::end_program(links);
+            links.commands_taken.set(false);
+            if planner.is_flushed() {
+                seek::drop_blocks().await;
+                planner.restart();
+                if links.killed.take() {
+                    parser::end_program(links);
+                }
             }
+            links.parser_wake.signal();
         }
-        links.parser_wake.signal();
     }
 }
 
@@ -290,21 +278,6 @@ impl Planner {
         }
     }
 
-    #[inline(never)]
-    #[small]
-    fn begin_arc(&mut self, motion: &Motion) {
-        let Motion::Arc { target, feed, arc } = motion else { return };
-        let tolerance = self.links.settings.borrow().chordal_tolerance();
-        let walk = Walk::new(&self.position, target, arc, tolerance);
-        // The time of an inverse-time arc is that of all its chords together.
-        let feed = match *feed {
-            Feed::Minutes(minutes) if minutes > 0.0 => walk.length() / minutes,
-            Feed::Minutes(_) => f32::MAX,
-            Feed::PerMinute(rate) => rate,
-        };
-        self.walk = Some(ArcWalk { walk, feed: Feed::PerMinute(feed) });
-    }
-
     /// Tells exec what has changed beside the line, one thing at a time.
     #[inline(never)]
     #[small]
@@ -354,38 +327,6 @@ impl Planner {
         let block = Block::action(Action::Override(change), self.line);
         let _ = self.queue.push_aside(block);
         self.announce();
-    }
-
-    #[inline(never)]
-    #[small]
-    fn set_coolant(&mut self, coolant: u8) {
-        let bit = |which: Coolant, output| if coolant & which as u8 != 0 { output } else { 0 };
-        let on = bit(Coolant::Mist, outputs::MIST) | bit(Coolant::Flood, outputs::FLOOD);
-        self.switch(outputs::MIST | outputs::FLOOD, on, self.outputs.speed);
-    }
-
-    #[inline(never)]
-    #[small]
-    fn set_spindle(&mut self, spindle: &Spindle) {
-        let (turn, speed) = match spindle.turn {
-            modal::Turn::Off => (0, 0.0),
-            modal::Turn::Clockwise => (outputs::SPINDLE, spindle.speed),
-            modal::Turn::Counterclockwise => {
-                (outputs::SPINDLE | outputs::COUNTERCLOCKWISE, spindle.speed)
-            }
-        };
-        self.switch(outputs::SPINDLE | outputs::COUNTERCLOCKWISE, turn, speed);
-    }
-
-    /// Switches those of `which` on that are in `on`, the others of `which` off; the spindle is to have this speed.
-    #[inline(never)]
-    #[small]
-    fn switch(&mut self, which: u8, on: u8, speed: f32) {
-        let outputs = Outputs { on: self.outputs.on & !which | on, speed };
-        if outputs != self.outputs {
-            self.outputs = outputs;
-            self.pause(Action::Outputs(outputs));
-        }
     }
 
     /// Something that is done at rest.
@@ -438,8 +379,8 @@ impl Planner {
         self.relocate(&motion);
         self.news = News::None;
         let mut model = links.model.borrow_mut();
-        let spindle = Spindle { turn: spindle_of(motion.outputs), speed: motion.speed };
-        model.set_outputs(&spindle, coolant_of(motion.outputs));
+        let spindle = Spindle { turn: outputs::turn(motion.outputs), speed: motion.speed };
+        model.set_outputs(&spindle, outputs::coolant(motion.outputs));
         drop(model);
         links.job.set(Job::default());
         hold::over(links);
@@ -467,78 +408,5 @@ impl Planner {
         links::feed();
         self.links.queue_count.add();
         self.links.reporter_wake.signal();
-    }
-}
-
-/// How the spindle turns, by the outputs.
-fn spindle_of(on: u8) -> modal::Turn {
-    match on & (outputs::SPINDLE | outputs::COUNTERCLOCKWISE) {
-        0 => modal::Turn::Off,
-        outputs::SPINDLE => modal::Turn::Clockwise,
-        _ => modal::Turn::Counterclockwise,
-    }
-}
-
-/// The coolant, by the outputs.
-fn coolant_of(on: u8) -> u8 {
-    let bit = |output, which: Coolant| if on & output != 0 { which as u8 } else { 0 };
-    bit(outputs::MIST, Coolant::Mist) | bit(outputs::FLOOD, Coolant::Flood)
-}
-
-impl Parts {
-    #[inline(never)]
-    #[small]
-    fn new(target: &PerAxis<Length>, feed: Option<Feed>, of: u16) -> Self {
-        // Inverse time is that of the whole.
-        let feed = match feed {
-            Some(Feed::Minutes(minutes)) => Some(Feed::Minutes(minutes / f32::from(of))),
-            other => other,
-        };
-        Self { target: *target, feed, left: of }
-    }
-
-    /// The end of the next part, the machine being at `position`.
-    #[inline(never)]
-    fn next(&mut self, position: &PerAxis<Length>) -> PerAxis<Length> {
-        let mut end = self.target;
-        for (end, start) in end.iter_mut().zip(position) {
-            let way = i64::from(end.0) - i64::from(start.0);
-            *end = Length((i64::from(start.0) + way / i64::from(self.left)) as i32);
-        }
-        self.left -= 1;
-        end
-    }
-}
-
-impl Motors for Settings {
-    fn motor_axis(&self, motor: usize) -> u8 {
-        moved_by(self, motor)
-    }
-    fn ratio(&self, motor: usize) -> StepRatio {
-        self.step_ratio(motor)
-    }
-}
-
-impl Machine for Settings {
-    fn velocity_max(&self, axis: usize) -> f32 {
-        Settings::velocity_max(self, axis)
-    }
-    fn feedrate_max(&self, axis: usize) -> f32 {
-        Settings::feedrate_max(self, axis)
-    }
-    fn jerk_max(&self, axis: usize) -> f32 {
-        Settings::jerk_max(self, axis)
-    }
-    fn accel_max(&self, axis: usize) -> f32 {
-        Settings::accel_max(self, axis)
-    }
-    fn junction_deviation(&self, axis: usize) -> f32 {
-        Settings::junction_deviation(self, axis)
-    }
-    fn junction_acceleration(&self) -> f32 {
-        Settings::junction_acceleration(self)
-    }
-    fn drivers(&self) -> Drivers {
-        Drivers { pulse_us: self.step_pulse_us(), setup_us: self.direction_setup_us() }
     }
 }

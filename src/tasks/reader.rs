@@ -9,6 +9,7 @@
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
 
+use super::Never;
 use super::hold::{self, Flush};
 use super::jog;
 use super::lines::{Aside, LinePool};
@@ -40,32 +41,34 @@ enum Left {
 }
 
 /// The task.
-pub async fn run(
+pub fn run(
     links: &'static Links,
     usb: Received<RX_RING>,
     aux: Option<Received<AUX_RING>>,
-) -> ! {
+) -> impl Future<Output = Never> {
     let mut usb = Intake::new(links.port(USB), usb);
     let mut aux = aux.map(|received| Intake::new(links.port(AUX), received));
-    loop {
-        jog::passes(links);
-        let left = usb.take(links);
-        let aux_left = match &mut aux {
-            Some(aux) if !aux.is_idle() => aux.take(links),
-            _ => Left::Nothing,
-        };
-        if links.flush.get() == Flush::Here {
-            hold::placed(links, links.port(USB), CUT);
-        }
-        match left.max(aux_left) {
-            Left::Nothing => {
-                jog::passed(links);
-                next(Event::Received).await;
+    async move {
+        loop {
+            jog::passes(links);
+            let left = usb.take(links);
+            let aux_left = match &mut aux {
+                Some(aux) if !aux.is_idle() => aux.take(links),
+                _ => Left::Nothing,
+            };
+            if links.flush.get() == Flush::Here {
+                hold::placed(links, links.port(USB), CUT);
             }
-            Left::Bytes | Left::Placed(_) | Left::Aside(_) => yield_now().await,
-            Left::Full => {
-                // The ring goes on filling.
-                select(links.pool_space.wait(), next(Event::Received)).await;
+            match left.max(aux_left) {
+                Left::Nothing => {
+                    jog::passed(links);
+                    next(Event::Received).await;
+                }
+                Left::Bytes | Left::Placed(_) | Left::Aside(_) => yield_now().await,
+                Left::Full => {
+                    // The ring goes on filling.
+                    select(links.pool_space.wait(), next(Event::Received)).await;
+                }
             }
         }
     }

@@ -2,11 +2,14 @@
 
 use super::homing;
 use crate::boards::{ACTIVE, inputs};
-use crate::config::Settings;
 use crate::config::getters::TRAVEL_NONE;
 use crate::config::table::system;
+use crate::config::{Settings, StepRatio};
 use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
 use crate::gcode::setup::{AxisMode, Setup};
+use crate::motion::dynamics::Machine;
+use crate::motion::line::Motors;
+use crate::motion::pace::Drivers;
 use crate::status::Status;
 use crate::units::Length;
 
@@ -82,4 +85,37 @@ impl Setup for Settings {
 pub fn moved_by(settings: &Settings, motor: usize) -> u8 {
     let axis = settings.motor_axis(motor);
     if settings.mode(axis) == AxisMode::Inhibited { u8::MAX } else { axis }
+}
+
+impl Motors for Settings {
+    fn motor_axis(&self, motor: usize) -> u8 {
+        moved_by(self, motor)
+    }
+    fn ratio(&self, motor: usize) -> StepRatio {
+        self.step_ratio(motor)
+    }
+}
+
+impl Machine for Settings {
+    fn velocity_max(&self, axis: usize) -> f32 {
+        Settings::velocity_max(self, axis)
+    }
+    fn feedrate_max(&self, axis: usize) -> f32 {
+        Settings::feedrate_max(self, axis)
+    }
+    fn jerk_max(&self, axis: usize) -> f32 {
+        Settings::jerk_max(self, axis)
+    }
+    fn accel_max(&self, axis: usize) -> f32 {
+        Settings::accel_max(self, axis)
+    }
+    fn junction_deviation(&self, axis: usize) -> f32 {
+        Settings::junction_deviation(self, axis)
+    }
+    fn junction_acceleration(&self) -> f32 {
+        Settings::junction_acceleration(self)
+    }
+    fn drivers(&self) -> Drivers {
+        Drivers { pulse_us: self.step_pulse_us(), setup_us: self.direction_setup_us() }
+    }
 }

@@ -115,7 +115,8 @@ pub(super) fn look() {
         let (armed, awaited) = i.armed.get();
         if changed & armed & !(found ^ awaited) != 0 {
             let (dda, tail) = stepper::moment();
-            contact::note(&dda, tail);
+            contact::mark(&dda, tail);
+            contact::note();
             flags::set(Event::BlockDone);
         }
         flags::set(Event::Realtime);

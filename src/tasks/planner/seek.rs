@@ -19,6 +19,7 @@ use crate::motion::dynamics::PER_SECOND_CUBED;
 use crate::motion::short::Short;
 use crate::motion::snapshot::Snapshot;
 use crate::motion::{contact, queue};
+use crate::tasks::setup::moved_by;
 use crate::tasks::{hold, links};
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
@@ -115,7 +116,7 @@ impl Planner {
         // Of several motors on an axis the first tells.
         for (m, steps) in steps.iter().enumerate().rev() {
             let ratio = settings.step_ratio(m);
-            let axis = usize::from(super::moved_by(&settings, m));
+            let axis = usize::from(moved_by(&settings, m));
             if let (Some(place), Some(now)) = (located.get_mut(axis), self.position.get(axis)) {
                 *place = match ratio.steps(*now) == *steps {
                     true => *now,

@@ -435,6 +435,11 @@ impl Machine {
         self.bus_mut().wires.iter_mut().for_each(|(_, wire)| wire.spoil(one_in, seed));
     }
 
+    /// Has one byte of so many to the machine arrive without its stop bit, on every port.
+    pub fn break_frames(&mut self, one_in: Option<u64>, seed: u64) {
+        self.bus_mut().wires.iter_mut().for_each(|(_, wire)| wire.break_frames(one_in, seed));
+    }
+
     /// The EEPROM's contents.
     pub fn eeprom(&self) -> &[u8; eeprom::SIZE] {
         self.bus().eeprom.cells()

@@ -1,7 +1,8 @@
 //! The USARTs as asynchronous serial ports.
 //!
 //! A frame takes exactly its bits. The receiver has a two-byte FIFO behind the shift register; a
-//! third byte waits in the shift register and is lost, with DOR set, when a fourth begins. RXC and
+//! third byte waits in the shift register and is lost, with DOR set, when a fourth begins. FE is of the byte
+//! that is to be read next: its stop bit was low. RXC and
 //! UDRE are levels: they ask for service as long as their condition holds, so UDRIE makes a
 //! software interrupt out of a transmitter that is never written to.
 
@@ -43,6 +44,8 @@ pub const OFFSETS: [u16; 6] = [0, UCSRB, UCSRC, UBRRL, UBRRH, UDR];
 #[derive(Clone, Copy)]
 struct Frame {
     byte: u8,
+    /// Its stop bit is low.
+    broken: bool,
     done: u64,
 }
 
@@ -54,10 +57,11 @@ pub struct Uart {
     control: u8,
     format: u8,
     divisor: u16,
-    fifo: VecDeque<u8>,
+    /// Bytes received, and whether each has a frame error.
+    fifo: VecDeque<(u8, bool)>,
     receiving: Option<Frame>,
     /// A complete byte that found the FIFO full.
-    waiting: Option<u8>,
+    waiting: Option<(u8, bool)>,
     sending: Option<Frame>,
     buffered: Option<u8>,
     sent: VecDeque<(u64, u8)>,
@@ -115,7 +119,7 @@ impl Uart {
         self.overruns
     }
 
-    /// Frames received at a speed too far from the receiver's own.
+    /// Frames received at a speed too far from the receiver's own, or with a stop bit that was low.
     pub fn misframed(&self) -> u64 {
         self.misframed
     }
@@ -150,20 +154,26 @@ impl Uart {
             self.status |= DOR;
         }
         let own = self.bit_cycles() as f64;
-        if (own - bit_cycles).abs() > bit_cycles * TOLERANCE {
-            self.misframed += 1;
-            self.status |= FE;
-        }
-        let byte = if self.status & FE != 0 { !byte } else { byte };
+        let broken = (own - bit_cycles).abs() > bit_cycles * TOLERANCE;
+        self.misframed += u64::from(broken);
+        let byte = if broken { !byte } else { byte };
         // Complete in the middle of the stop bit.
         let done = now + self.bit_cycles() * (2 * self.frame_bits() - 1) / 2;
-        self.receiving = Some(Frame { byte, done });
+        self.receiving = Some(Frame { byte, broken, done });
+    }
+
+    /// The stop bit of the frame that is being received is low: noise, or the sender has let go of the line.
+    pub fn break_frame(&mut self) {
+        if let Some(frame) = &mut self.receiving {
+            frame.broken = true;
+            self.misframed += 1;
+        }
     }
 
     /// Completes the frames that are due by `now`.
     pub fn advance(&mut self, now: u64) {
         if let Some(frame) = self.receiving.take_if(|f| f.done <= now) {
-            self.waiting = Some(frame.byte);
+            self.waiting = Some((frame.byte, frame.broken));
             self.settle();
         }
         while let Some(frame) = self.sending.take_if(|f| f.done <= now) {
@@ -178,7 +188,7 @@ impl Uart {
 
     fn begin_frame(&mut self, byte: u8, now: u64) {
         let done = now + self.bit_cycles() * self.frame_bits();
-        self.sending = Some(Frame { byte, done });
+        self.sending = Some(Frame { byte, broken: false, done });
     }
 
     /// Moves a waiting byte into the FIFO if there is room.
@@ -186,7 +196,11 @@ impl Uart {
         if self.fifo.len() < 2 {
             self.fifo.extend(self.waiting.take());
         }
-        self.status = (self.status & !RXC) | if self.fifo.is_empty() { 0 } else { RXC };
+        let found = match self.fifo.front() {
+            None => 0,
+            Some((_, broken)) => RXC | if *broken { FE } else { 0 },
+        };
+        self.status = self.status & !(RXC | FE) | found;
     }
 
     /// A load that samples at cycle `now`; `None` for registers without side effects.
@@ -195,8 +209,8 @@ impl Uart {
         match addr - self.base {
             0 => Some(self.status),
             UDR => {
-                let byte = self.fifo.pop_front().unwrap_or(0);
-                self.status &= !(DOR | FE);
+                let (byte, _) = self.fifo.pop_front().unwrap_or((0, false));
+                self.status &= !DOR;
                 self.settle();
                 Some(byte)
             }

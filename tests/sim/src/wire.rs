@@ -28,6 +28,8 @@ pub struct Wire {
     own_before: f64,
     /// One byte of so many has a bit turned over on its way to the machine.
     spoils: Option<(u64, Random)>,
+    /// One byte of so many has no stop bit.
+    breaks: Option<(u64, Random)>,
 }
 
 impl Wire {
@@ -45,6 +47,7 @@ impl Wire {
             follows: false,
             own_before: 0.0,
             spoils: None,
+            breaks: None,
         }
     }
 
@@ -100,6 +103,15 @@ impl Wire {
         self.spoils = one_in.map(|n| (n.max(1), Random::new(seed)));
     }
 
+    /// From now on one byte of so many comes to the machine without its stop bit; `None` ends that.
+    pub fn break_frames(&mut self, one_in: Option<u64>, seed: u64) {
+        self.breaks = one_in.map(|n| (n.max(1), Random::new(seed)));
+    }
+
+    fn breaks(&mut self) -> bool {
+        self.breaks.as_mut().is_some_and(|(one_in, random)| random.below(*one_in) == 0)
+    }
+
     fn spoilt(&mut self, byte: u8) -> u8 {
         let Some((one_in, random)) = &mut self.spoils else { return byte };
         let spoils = random.below(*one_in) == 0;
@@ -111,6 +123,9 @@ impl Wire {
         if let Some(byte) = self.outgoing.pop_front() {
             let byte = self.spoilt(byte);
             uart.start_bit(byte, self.bit_cycles, self.due);
+            if self.breaks() {
+                uart.break_frame();
+            }
             self.free_at = self.due + (self.bit_cycles * FRAME_BITS).round() as u64;
             self.sent += 1;
         }

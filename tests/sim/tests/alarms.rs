@@ -15,8 +15,8 @@ const BYTE: u64 = 1_389;
 /// From the last bit of a line, which is read between others: 250 moves a second at 32,000 steps a second leave little of
 /// the CPU. Measured: 22.7 ms; in a long move 7.2.
 const LINE_MS: f64 = 30.0;
-/// From the edge of a switch. Measured: 1.8 ms.
-const SWITCH_MS: f64 = 2.0;
+/// From the edge of a switch: a turn of the tasks, and the interrupts meanwhile. Measured: 2.5 ms.
+const SWITCH_MS: f64 = 4.0;
 /// From the last bit of `^x`, by way of the watchdog. Measured: 22 ms.
 const RESET_MS: f64 = 25.0;
 

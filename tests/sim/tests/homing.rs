@@ -83,3 +83,51 @@ fn a_switch_that_sticks_is_told() {
     host.run_for_ms(&mut machine, 50).unwrap();
     assert_eq!(host.ask(&mut machine, "g28.2 x0", 1_000).unwrap().status, 0);
 }
+
+/// The step from the lower hard end on which X ends: one off its switch, and the zero back-off.
+const ENDS: i64 = 2_816 + 1 + 640;
+
+/// A machine whose X homes at these speeds, mm/min.
+fn quick(search: f64, latch: f64) -> (Machine, Host) {
+    let (mut machine, mut host) =
+        standing(&MEGA2560_GRBL, Wiring::NormallyOpen, [14.0, 100.0, 50.0]);
+    machine.tamper(|mechanics, _| mechanics.bounce(inputs::X_MIN, None));
+    let speeds = format!("{{x:{{vm:4000,jh:20000,sv:{search},lv:{latch},lb:3}}}}");
+    set(&mut machine, &mut host, &speeds);
+    (machine, host)
+}
+
+#[test]
+fn whatever_the_speed_it_ends_within_a_step() {
+    for (search, latch) in [(300.0, 20.0), (1_000.0, 100.0), (2_500.0, 471.0), (3_500.0, 1_500.0)] {
+        let (mut machine, mut host) = quick(search, latch);
+        for n in 0..3 {
+            assert_eq!(home(&mut machine, &mut host, "g28.2 x0"), None);
+            let off = places(&machine)[0] - ENDS;
+            // Measured: 0 at all of them.
+            assert!(off.abs() <= 1, "{off} steps at {search}, {latch} mm/min");
+            assert_eq!(machine.mechanics().unwrap().lost(0), 0);
+            // From another phase of a step's interval.
+            set(&mut machine, &mut host, &format!("g1 f3000 x{}", 4.0 + 0.317 * f64::from(n)));
+        }
+    }
+}
+
+#[test]
+fn a_hold_in_any_stage_of_homing_changes_nothing_of_its_end() {
+    for ms in [300, 700, 900, 950, 1_000, 1_050, 1_100, 1_150] {
+        let (mut machine, mut host) = quick(1_500.0, 150.0);
+        set(&mut machine, &mut host, "g28.2 x0");
+        host.run_for_ms(&mut machine, ms).unwrap();
+        machine.send_now(b'!');
+        host.run_for_ms(&mut machine, 300).unwrap();
+        let steps = machine.recorder().steps();
+        host.run_for_ms(&mut machine, 300).unwrap();
+        assert_eq!(machine.recorder().steps(), steps, "held after {ms} ms");
+        machine.send_now(b'~');
+        assert_eq!(host.ask(&mut machine, "g4 p0", 30_000).unwrap().status, 0);
+        host.run_for_ms(&mut machine, 50).unwrap();
+        let off = places(&machine)[0] - ENDS;
+        assert!(off.abs() <= 1, "{off} steps, held after {ms} ms");
+    }
+}

@@ -1,7 +1,7 @@
 //! Probing on the image: what is told against the step at which the contact closed, at 10,000 steps a second.
 //!
-//! An edge is believed after two looks 10 us apart, and the generator is taken down when the second has been thought
-//! about: 37 us behind the edge, a third of a step. Where a plate is reached by a step that is less than the way to the next,
+//! An edge is believed after two looks 10 us apart, and the generator is taken down at the first: 20 us behind the edge, a
+//! fifth of a step. Where a plate is reached by a step that is less than the way to the next,
 //! and nothing is off; where the contact closes between two steps it may be one.
 
 mod common;
@@ -103,6 +103,11 @@ impl Bench {
     /// The greatest error of an axis, in steps, if the contact closed at this cycle.
     fn error(&mut self, closed: u64) -> u64 {
         let (told, is) = (self.told(), self.at(closed));
+        println!(
+            "  {told:?} {is:?} {:?} {:?}",
+            self.at(closed + 37 * 16),
+            self.at(closed + 200 * 16)
+        );
         told.iter().zip(is).map(|(told, is)| told.abs_diff(is)).max().unwrap_or(0)
     }
 
@@ -154,8 +159,8 @@ fn a_contact_at_any_phase_of_a_step_is_found_to_the_step() {
         off += usize::from(error > 0);
     }
     println!("{worst} steps, {off} of 16 off");
-    // Measured: 1, at 6 of the 16 phases.
-    assert!(worst <= 1 && off <= 7, "{worst} steps, {off} of 16 off");
+    // Measured: 1, at 3 of the 16 phases.
+    assert!(worst <= 1 && off <= 4, "{worst} steps, {off} of 16 off");
 }
 
 #[test]

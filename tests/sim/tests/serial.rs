@@ -122,6 +122,36 @@ fn flood(end: &str) {
 }
 
 #[test]
+fn lines_with_frame_errors_are_refused_and_no_other() {
+    const LINES: u64 = 300;
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    for line in ["{ex:0}", "{jv:4}", "{xvm:6000,xfr:6000,xjm:1e5}", "g91 f6000"] {
+        set(&mut machine, &mut host, line);
+    }
+    machine.break_frames(Some(150), 7);
+    let tenths = |n: u64| n as i64 * 7 % 23 + 1;
+    let (mut damaged, mut before) = (Vec::new(), 0);
+    for n in 1..=LINES {
+        machine.send(format!("N{n} G1 X{:.1}\n", tenths(n) as f64 / 10.0).as_bytes());
+        // Slower than the moves, so that nothing else is lost.
+        machine.run_for_ms(60).unwrap();
+        let broken = machine.uart(0).misframed();
+        if core::mem::replace(&mut before, broken) != broken {
+            damaged.push(n);
+        }
+    }
+    machine.break_frames(None, 0);
+    let heard = hear_out(&mut machine);
+    assert!(heard.strange.is_empty(), "{:?}", heard.strange);
+    // One byte in 150: 33 lines.
+    assert!(damaged.len() > 20, "{damaged:?}");
+    let whole: Vec<u64> = (1..=LINES).filter(|n| !damaged.contains(n)).collect();
+    assert_eq!((heard.taken, heard.refused), (whole.clone(), damaged.len()));
+    let want: i64 = whole.iter().map(|n| tenths(*n) * 128).sum();
+    assert_eq!(machine.recorder().motors()[0].position, want);
+}
+
+#[test]
 fn answers_stop_while_the_planner_is_full_and_come_again() {
     const LINES: usize = 100;
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);

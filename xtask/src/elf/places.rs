@@ -54,14 +54,13 @@ pub fn function_at(image: &Image, insn: u32) -> &str {
     image.symbols.iter().rfind(before).map_or("code without a name", |symbol| &symbol.name)
 }
 
-/// `exec` of `<...TaskStorage<kerf::app::__exec_task_task::...>>::poll`: `embassy_executor::task` puts
-/// another `_task` behind the name of the function.
+/// `exec` of `<...TaskStorage<kerf::tasks::exec::run::{closure#0}>>::poll`.
 pub fn task_name(poll: &str) -> Option<String> {
     if !poll.contains("TaskStorage<") || !poll.ends_with("::poll") {
         return None;
     }
-    let (_, rest) = poll.split_once("::__")?;
-    let (name, _) = rest.split_once("_task")?;
+    let (path, _) = poll.split_once("::run::{closure")?;
+    let (_, name) = path.rsplit_once("::")?;
     Some(name.to_owned())
 }
 

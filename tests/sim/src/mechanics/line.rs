@@ -60,6 +60,11 @@ impl Line {
         self.pin
     }
 
+    /// Whether its contacts open when they are worked.
+    pub fn opens(&self) -> bool {
+        self.wiring == Wiring::NormallyClosed
+    }
+
     /// Whether the contact of an input on it is worked.
     pub fn is_worked(&self, input: usize) -> bool {
         self.worked & 1 << input != 0

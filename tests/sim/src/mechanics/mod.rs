@@ -114,6 +114,12 @@ impl Mechanics {
         }
     }
 
+    /// Closes the contact of an input by hand, or opens it: what that means is its wiring's.
+    pub fn close(&mut self, input: usize, closed: bool, now: u64) {
+        let opens = self.line_of[input].is_some_and(|line| self.lines[line].opens());
+        self.work(input, closed != opens, now);
+    }
+
     /// Puts the plate at another height, or takes it away.
     pub fn place_plate(&mut self, height: Option<f64>, now: u64) {
         let before = self.contacts(2);

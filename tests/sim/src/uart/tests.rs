@@ -75,6 +75,22 @@ fn the_empty_transmitter_is_a_level() {
 }
 
 #[test]
+fn a_frame_error_is_of_its_byte() {
+    let mut u = uart();
+    u.start_bit(b'a', BIT as f64, 0);
+    u.start_bit(b'b', BIT as f64, BYTE);
+    u.break_frame();
+    u.start_bit(b'c', BIT as f64, 2 * BYTE);
+    u.advance(2 * BYTE);
+    let read = |u: &mut Uart, now| (u.read(BASE, now).unwrap() & FE != 0, u.read(BASE + UDR, now));
+    assert_eq!(read(&mut u, 2 * BYTE), (false, Some(b'a')));
+    assert_eq!(read(&mut u, 2 * BYTE), (true, Some(b'b')));
+    u.advance(3 * BYTE);
+    assert_eq!(read(&mut u, 3 * BYTE), (false, Some(b'c')));
+    assert_eq!(u.misframed(), 1);
+}
+
+#[test]
 fn a_receiver_at_another_speed_reads_rubbish() {
     let mut u = uart();
     u.start_bit(b'a', 2.0 * BIT as f64, 0);

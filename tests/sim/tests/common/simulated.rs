@@ -41,7 +41,7 @@ impl Side for Machine {
 
     fn set_input(&mut self, input: usize, closed: bool) {
         if self.mechanics().is_some() {
-            return self.tamper(|mechanics, now| mechanics.work(input, closed, now));
+            return self.tamper(|mechanics, now| mechanics.close(input, closed, now));
         }
         let pin = self.board().inputs[input].expect("a pin");
         self.drive_pin(pin.port.letter(), pin.bit, !closed);

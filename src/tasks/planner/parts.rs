@@ -1,0 +1,64 @@
+//! Lines that take several blocks: arcs, chord by chord, and moves of more steps than a block holds.
+
+use kerf_macros::small;
+
+use super::Planner;
+use crate::gcode::arc::Walk;
+use crate::gcode::command::{Feed, Motion};
+use crate::units::{Length, PerAxis};
+
+/// An arc under way.
+pub(super) struct ArcWalk {
+    pub walk: Walk,
+    pub feed: Feed,
+}
+
+/// A move under way that is too long for one block.
+pub(super) struct Parts {
+    target: PerAxis<Length>,
+    pub feed: Option<Feed>,
+    pub left: u16,
+}
+
+impl Parts {
+    #[inline(never)]
+    #[small]
+    pub fn new(target: &PerAxis<Length>, feed: Option<Feed>, of: u16) -> Self {
+        // Inverse time is that of the whole.
+        let feed = match feed {
+            Some(Feed::Minutes(minutes)) => Some(Feed::Minutes(minutes / f32::from(of))),
+            other => other,
+        };
+        Self { target: *target, feed, left: of }
+    }
+
+    /// The end of the next part, the machine being at `position`.
+    #[inline(never)]
+    #[small]
+    pub fn next(&mut self, position: &PerAxis<Length>) -> PerAxis<Length> {
+        let mut end = self.target;
+        for (end, start) in end.iter_mut().zip(position) {
+            let way = i64::from(end.0) - i64::from(start.0);
+            *end = Length((i64::from(start.0) + way / i64::from(self.left)) as i32);
+        }
+        self.left -= 1;
+        end
+    }
+}
+
+impl Planner {
+    #[inline(never)]
+    #[small]
+    pub(super) fn begin_arc(&mut self, motion: &Motion) {
+        let Motion::Arc { target, feed, arc } = motion else { return };
+        let tolerance = self.links.settings.borrow().chordal_tolerance();
+        let walk = Walk::new(&self.position, target, arc, tolerance);
+        // The time of an inverse-time arc is that of all its chords together.
+        let feed = match *feed {
+            Feed::Minutes(minutes) if minutes > 0.0 => walk.length() / minutes,
+            Feed::Minutes(_) => f32::MAX,
+            Feed::PerMinute(rate) => rate,
+        };
+        self.walk = Some(ArcWalk { walk, feed: Feed::PerMinute(feed) });
+    }
+}
