@@ -250,6 +250,15 @@ pub fn placed(links: &Links, port: &Port, mark: u8) {
     }
 }
 
+/// The same in a comment, where it is text; but a `^d` is none anywhere, and nothing else is cut then. It may have come
+/// so lately that only the mark has been seen.
+pub fn aside(links: &Links, port: &Port, mark: u8) {
+    serve(links);
+    if links.flush.get() != Flush::None {
+        placed(links, port, mark);
+    }
+}
+
 /// The same for one that waits in the receive ring, because the pool is full. One that is not there any more
 /// has left the mark of a loss.
 pub fn ahead(links: &Links, mark: u8) {

@@ -36,6 +36,8 @@ enum Left {
     Bytes,
     /// Bytes, perhaps, behind this mark: the place of a real-time character.
     Placed(u8),
+    /// The same in a comment.
+    Aside(u8),
 }
 
 /// The task.
@@ -62,7 +64,7 @@ pub fn run(
                     jog::passed(links);
                     next(Event::Received).await;
                 }
-                Left::Bytes | Left::Placed(_) => yield_now().await,
+                Left::Bytes | Left::Placed(_) | Left::Aside(_) => yield_now().await,
                 Left::Full => {
                     // The ring goes on filling.
                     select(links.pool_space.wait(), next(Event::Received)).await;
@@ -106,6 +108,7 @@ impl<const N: usize> Intake<N> {
         self.control_flow(links);
         match left {
             Left::Placed(mark) => hold::placed(links, self.port, mark),
+            Left::Aside(mark) => hold::aside(links, self.port, mark),
             Left::Full => self.look_ahead(links),
             _ => {}
         }
@@ -134,10 +137,7 @@ impl<const N: usize> Intake<N> {
                 return Left::Nothing;
             };
             let is_line = match byte {
-                // In a comment it is text; but nothing else is cut then.
-                CUT | GO if pool.aside() != Aside::None && links.flush.get() == Flush::None => {
-                    false
-                }
+                CUT | GO if pool.aside() != Aside::None => return Left::Aside(byte),
                 CUT | GO => return Left::Placed(byte),
                 ..MARKS => {
                     let is_line = self.loss(pool, byte, links);

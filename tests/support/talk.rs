@@ -14,7 +14,7 @@ use crate::whereabouts::{SETTINGS, SWITCHES, Whereabouts, number};
 /// Lines in flight on each port.
 const IN_FLIGHT: [usize; 2] = [4, 2];
 /// Longest that the machine may take to come to rest, ms.
-const REST_MS: u64 = 120_000;
+const REST_MS: u64 = 60_000;
 /// `stat`: nothing runs.
 const READY: f64 = 1.0;
 const STOPPED: f64 = 3.0;
@@ -120,13 +120,15 @@ impl<S: Side> Talk<S> {
         Ok(())
     }
 
-    /// All that was done, and heard, of a conversation that failed.
+    /// All that was done, and heard, of a conversation that failed; what was heard again and again, once.
     pub fn story(&self) -> String {
-        let log = self.log.iter().map(|done| format!("  {done}\n"));
-        let heard = self.ports.iter().enumerate();
-        let heard = heard.flat_map(|(n, port)| port.heard.iter().map(move |line| (n, line)));
-        let heard = heard.map(|(n, line)| format!("  {n}: {line}\n"));
-        log.chain(["heard\n".to_string()]).chain(heard).collect()
+        let mut story: Vec<_> = self.log.iter().map(|done| format!("  {done}\n")).collect();
+        story.push("heard\n".to_string());
+        for (n, port) in self.ports.iter().enumerate() {
+            story.extend(port.heard.iter().map(|line| format!("  {n}: {line}\n")));
+        }
+        story.dedup();
+        story.concat()
     }
 
     /// Lets time pass.

@@ -113,3 +113,26 @@ fn exec_that_has_no_pause_does_not_pile_up() {
     ];
     try_to_play(&mut begun(), &deeds).unwrap_or_else(|why| panic!("{why}"));
 }
+
+/// The reader, woken together with a task that works long before it, may come to its place before the control task has
+/// heard of it.
+#[test]
+fn a_kill_in_a_comment_is_one_whatever_is_under_way() {
+    const COMMENT: &str = "(of which so much has come when something else is under way for a while";
+    let mut machine = firmware(&MEGA2560_GRBL);
+    machine.run_for_ms(100).unwrap();
+    for n in 0..200 {
+        let later = machine.cycle() + n * 997 % 16_000;
+        machine.run_until(later).unwrap();
+        let comment = &COMMENT[..1 + n as usize % (COMMENT.len() - 1)];
+        let job =
+            format!("{{posx:n,posy:n}}\ng91 g2 f3000 x0 i1 p2\ng91 g0 x0.1 y0.2\n{comment}\x04)\n");
+        machine.send(job.as_bytes());
+        machine.run_for_ms(60).unwrap();
+        machine.receive();
+        machine.send(b"{stat:n}\n");
+        machine.run_for_ms(10).unwrap();
+        let heard = String::from_utf8(machine.receive()).unwrap();
+        assert!(heard.contains("{\"stat\":4}"), "{n}: {heard}");
+    }
+}
