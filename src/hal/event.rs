@@ -9,6 +9,7 @@ use core::cell::Cell;
 use core::future::poll_fn;
 use core::task::{Poll, Waker};
 
+use super::byte::SharedByte;
 use super::imp;
 use super::serial::{PORTS, USB};
 
@@ -58,6 +59,18 @@ machine_static! {
     fn waiters() -> Waiters = Waiters::new();
 }
 
+machine_static! {
+    // Exec counts; the main loop, which never runs in between, begins anew.
+    fn passed_over() -> SharedByte = SharedByte::new(0);
+}
+
+/// Counts one more segment since the main loop had its last turn, and says how many they are. Exec only.
+pub fn pass_over() -> u8 {
+    let count = passed_over().get().saturating_add(1);
+    passed_over().set(count);
+    count
+}
+
 /// Waits until `ready` gives a value, asking again after each `event`. Thread mode only.
 ///
 /// Nothing but what `ready` keeps is kept, so none of these is an `async fn`: each would keep its arguments as well.
@@ -92,6 +105,7 @@ pub fn next(event: Event) -> impl Future<Output = ()> {
 
 /// Wakes who waits for the events in `bits`. The main loop calls it, in thread mode.
 pub fn dispatch(bits: u8) {
+    passed_over().set(0);
     let mut left = bits & ((1 << WAITABLE) - 1);
     for slot in waiters().0.iter().take(WAITABLE) {
         if left == 0 {

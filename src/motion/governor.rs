@@ -22,6 +22,7 @@
 //! with one about 5,000.
 
 use super::brake::Brake;
+use super::exec::SEGMENT_S;
 use super::float::{OCTAVE, below, greater, least, lesser, log, scaled, some};
 use super::horizon::kappa;
 pub use super::reach::Ahead;
@@ -121,11 +122,12 @@ impl Governor {
         self.look = true;
     }
 
-    /// The next stretch, of about `seconds`, in a block with `left` mm to go at up to `cruise` mm/s.
+    /// The next stretch, of about `seconds` under a jerk limit and [`SEGMENT_S`] else, in a block with `left` mm to go at up to
+    /// `cruise` mm/s.
     #[inline(always)]
     pub fn stretch(&mut self, left: f32, cruise: f32, ahead: &impl Ahead, seconds: f32) -> Stretch {
         if !some(self.limits.jerk) {
-            return self.trapezoid(left, cruise, ahead.headroom(), seconds);
+            return self.trapezoid(left, cruise, ahead.headroom(), SEGMENT_S);
         }
         self.smooth(left, cruise, ahead, seconds)
     }

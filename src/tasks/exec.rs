@@ -7,7 +7,7 @@
 
 use crate::alarm::Alarm;
 use crate::boards::ACTIVE;
-use crate::hal::event::Event;
+use crate::hal::event::{self, Event};
 use crate::hal::imp::{exec, flags, stepper};
 use crate::hal::ring::Producer;
 use crate::motion::contact;
@@ -18,6 +18,9 @@ use crate::motion::queue::BlockSource;
 use crate::motion::snapshot::Program;
 use crate::tasks::health::{self, Sign};
 use crate::tasks::{Never, alarm, hold, links, overrides, power, spindle};
+
+/// After so many segments without a turn of thread mode they become longer, which takes less of the CPU.
+const PATIENCE: u8 = 6;
 
 /// CPU cycles in so many tenths of a millisecond.
 const fn tenths(of_ms: u32) -> u32 {
@@ -94,6 +97,7 @@ pub fn run(
                 let _ = segments.push_copy(&segment);
                 count = count.wrapping_add(1);
                 health::moves(count);
+                machine.set_coarse(event::pass_over() > PATIENCE);
                 if contact::is_noted() {
                     contact::pushed(&segment);
                 }
