@@ -34,7 +34,10 @@ fn interpret(interpreter: &mut Interpreter, line: &[u8]) -> Commands {
             }
         }
         Err(_) => {
-            assert_eq!(*interpreter, before);
+            // Which axis is to blame is told by it.
+            let mut expected = before;
+            expected.blame(interpreter.blamed());
+            assert_eq!(*interpreter, expected);
             assert_eq!(out, Commands::default());
         }
     }

@@ -369,6 +369,35 @@ fn the_watchdog_is_fed_whatever_the_machine_does() {
 }
 
 #[test]
+fn a_jog_whose_line_is_cut_by_its_end_does_not_begin() {
+    let mut sender = Sender::boot();
+    sender.ask("{jogx:10", 50);
+    sender.machine.send(&[0x85]);
+    sender.ask("", 50);
+    sender.ask("0}\n", 500);
+    assert!(sender.heard.contains("{\"r\":{\"jogx\":100},\"f\":[1,5,"), "{}", sender.heard);
+    assert_eq!(sender.machine.emitted().steps, [0; 4]);
+    sender.ask("{jogx:1}\n", 1_000);
+    assert!(sender.heard.contains("{\"r\":{\"jogx\":1},\"f\":[1,0,"), "{}", sender.heard);
+}
+
+#[test]
+fn a_probing_may_fail_while_its_alarm_is_being_cleared() {
+    // The move takes about so long.
+    for ms in 0..150 {
+        let play = move || {
+            let mut sender = Sender::boot();
+            sender.ask("g38.2 z-0.3 f600\n", 5 * ms);
+            sender.ask("{\"sys\":n,\"clear\":n}\n", 1_500);
+            sender.ask("{clear:n}\n", 500);
+            sender.ask("{stat:n}\n", 500);
+            assert!(sender.heard.contains("\"stat\":3},\"f\""), "{ms}: {}", sender.heard);
+        };
+        std::thread::spawn(play).join().expect("no panic");
+    }
+}
+
+#[test]
 fn a_reset_that_nobody_wanted_is_told() {
     use kerf::hal::imp::watchdog;
     use kerf::hal::resets::Cause;

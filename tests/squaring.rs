@@ -65,8 +65,9 @@ fn any_switches() -> impl Strategy<Value = [i64; 2]> {
     (-20_000i64..-100, -6_300i64..6_300).prop_map(|(one, more)| [one, (one + more).min(-1)])
 }
 
-fn home(switches: [i64; 2]) {
+fn home(switches: [i64; 2], speed: u32) {
     let mut sender = Sender::with_switches(switches);
+    sender.say(&format!("{{x:{{fr:5000,vm:5000,sv:{speed}}}}}"));
     sender.say("g28.2 x0");
     let ends = sender.rest();
     // A switch opens a step off where it closes; from there it is 1 mm.
@@ -74,6 +75,16 @@ fn home(switches: [i64; 2]) {
     assert!(!sender.heard.contains("\"er\""), "{}", sender.heard);
     sender.say("g0 x2");
     assert_eq!(sender.rest(), ends.map(|at| at + 2 * STEPS));
+}
+
+/// The other motor does not find its switch in the way that it may go alone.
+fn fail(switches: [i64; 2]) {
+    let mut sender = Sender::with_switches(switches);
+    sender.say("g28.2 x0");
+    let before = sender.rest();
+    assert!(sender.heard.contains("\"st\":240"), "{}", sender.heard);
+    sender.say("g91 g0 x2");
+    assert_eq!(sender.rest(), before.map(|at| at + 2 * STEPS), "{}", sender.heard);
 }
 
 fn end_it(switches: [i64; 2], ms: u64, by: &'static str) {
@@ -88,6 +99,17 @@ fn end_it(switches: [i64; 2], ms: u64, by: &'static str) {
     assert_eq!(sender.rest(), before.map(|at| at + 2 * STEPS), "{}", sender.heard);
 }
 
+#[test]
+fn motors_of_axes_that_stand_still_are_not_a_pair() {
+    let play = || {
+        let mut sender = Sender::with_switches([-2_000, -2_500]);
+        sender.say("{zam:2,aam:2}");
+        sender.say("g28.2 x0");
+        assert_eq!(sender.rest(), [-2_000, -2_500].map(|at| at + 1 + STEPS));
+    };
+    assert!(alone(play));
+}
+
 /// On a thread of its own: a machine is a thread's.
 fn alone(play: impl FnOnce() + Send + 'static) -> bool {
     std::thread::spawn(play).join().is_ok()
@@ -97,8 +119,15 @@ proptest! {
     #![proptest_config(cases(60))]
 
     #[test]
-    fn homing_squares(switches in any_switches()) {
-        prop_assert!(alone(move || home(switches)));
+    fn homing_squares(switches in any_switches(), speed in 100u32..3_000) {
+        prop_assert!(alone(move || home(switches, speed)));
+    }
+
+    #[test]
+    fn nothing_jumps_where_squaring_has_failed(one in -20_000i64..-100, more in 12_000i64..20_000, which: bool) {
+        let far = one - more;
+        let switches = if which { [one, far] } else { [far, one] };
+        prop_assert!(alone(move || fail(switches)));
     }
 
     #[test]

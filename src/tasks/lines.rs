@@ -121,9 +121,9 @@ impl LinePool {
         (SLOTS - self.entries.len()) as u8
     }
 
-    /// Whether there is no line.
+    /// Whether there is no line, nor any part of one.
     pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
+        self.entries.is_empty() && self.partial == 0
     }
 
     /// Whether the next byte can be taken, whatever it is.

@@ -65,6 +65,8 @@ struct Progress {
     contact: Length,
     /// The motor that squares the axis.
     second: Option<Second>,
+    /// How far the axis has gone beyond that.
+    beyond: Length,
     /// How far the first motor is off its switch; how far the second has to go.
     off: Length,
 }
@@ -81,7 +83,7 @@ impl Progress {
     fn pass(&mut self, homing: &Homing, closed: u16, all: bool) -> Result<(), Status> {
         if self.stage == Stage::Clear {
             // Nobody knows which of the two it is.
-            let doubtful = closed != 0 && homing.shared;
+            let doubtful = closed & homing.switch() != 0 && homing.shared;
             return match closed {
                 _ if doubtful => Err(Status::HomingClosed),
                 0 => {
@@ -175,13 +177,14 @@ impl Planner {
         at.pass(&homing, closed, closed == own | second)?;
         // From where, how far away from the switch, and which switches end it.
         let here = self.at(at.axis);
+        // A motor may have gone as far beyond its own switch.
+        let back = Length(homing.backoff.0.saturating_add(at.beyond.0));
         let (from, way, armed) = match at.stage {
             Stage::Clear => (here, homing.backoff, 0),
             Stage::Search => (here, Length(-homing.way.0), own | second),
             Stage::Square => (here, Length(-homing.backoff.0), (own | second) & !closed),
-            Stage::Latch => (at.contact, homing.backoff, own),
-            // It has gone some way beyond, nobody knows how far.
-            Stage::LatchSecond => (here, Length(homing.backoff.0.saturating_mul(2)), second),
+            Stage::Latch => (here, back, own),
+            Stage::LatchSecond => (here, back, second),
             Stage::Level => (Length(here.0.saturating_add(at.off.0)), self.squaring_offset(), 0),
             Stage::Zero | Stage::Place => (at.contact, homing.zero, 0),
         };
@@ -200,10 +203,14 @@ impl Planner {
     #[small]
     fn end_stage(&mut self, at: &mut Progress, sought: &Sought) -> Result<bool, Status> {
         if let Sought::Contact(steps) = sought
-            && at.stage != Stage::LatchSecond
+            && matches!(at.stage, Stage::Search | Stage::Latch)
         {
             let contact = self.located(steps);
             at.contact = contact.get(usize::from(at.axis)).copied().unwrap_or_default();
+        }
+        if at.stage == Stage::Search {
+            let beyond = self.at(at.axis).0.wrapping_sub(at.contact.0);
+            at.beyond = Length(beyond.saturating_abs());
         }
         self.end_alone(at, sought);
         at.stage = match (at.stage, sought) {
@@ -253,7 +260,7 @@ impl Planner {
 
     /// Begins with an axis: it is not homed any more, unless its position is to stay.
     fn begin_axis(&mut self, at: &Progress, homing: &Homing) {
-        inputs::spare(homing.ends() | at.second.map_or(0, Second::switch) as u8);
+        inputs::spare(homing.ends() | at.second.map_or(0, Second::ends));
         if self.homed_by_line().1 {
             self.links.model.borrow_mut().set_homed(at.axis, false);
         }

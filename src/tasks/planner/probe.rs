@@ -38,8 +38,10 @@ impl Planner {
             }
         }
         self.enter(Cycle::Off);
-        // The result comes before the response to the next line.
-        wait(Event::BlockDone, || (!self.links.probe.is_news()).then_some(())).await;
+        // The result comes before the response to the next line. In an alarm that line, whose response may be half
+        // written, may itself wait for this task.
+        let told = || !self.links.probe.is_news() || self.is_flushed();
+        wait(Event::BlockDone, || told().then_some(())).await;
     }
 
     /// Begins the move. False if the probe is there already.

@@ -49,6 +49,11 @@ impl Second {
     pub fn switch(self) -> u16 {
         1 << self.input
     }
+
+    /// The ends of axes that are spared for its sake: both of a pair, which may be on one pin.
+    pub fn ends(self) -> u8 {
+        if usize::from(self.input) < inputs::ENDS { 3 << (self.input & !1) } else { 0 }
+    }
 }
 
 impl Planner {
@@ -61,7 +66,10 @@ impl Planner {
         };
         let settings = self.links.settings.borrow();
         let drives = |m: usize| moved_by(&settings, m);
-        let shares = |m: &usize| (0..*m).any(|before| drives(before) == drives(*m));
+        let shares = |m: &usize| {
+            let axis = drives(*m);
+            usize::from(axis) < AXES && (0..*m).any(|before| drives(before) == axis)
+        };
         let Some(motor) = (1..MOTORS).rev().find(shares).filter(|m| drives(*m) == axis) else {
             return Ok(None);
         };
