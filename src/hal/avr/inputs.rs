@@ -200,6 +200,14 @@ fn wait() {
     }
 }
 
+/// There may be a contact. Out of line: what it needs of registers and stack, a limit has no time to put away.
+#[cold]
+#[inline(never)]
+fn mark() {
+    let (dda, tail) = stepper::moment();
+    contact::mark(&dda, tail);
+}
+
 /// A look, or two.
 extern "C" fn look() {
     // SAFETY: the look interrupt, which does not nest, runs this alone.
@@ -213,8 +221,7 @@ extern "C" fn look() {
         state.switches.note(now);
         // As near to the edge as may be: the rest takes long where the step interrupt does.
         if state.armed != 0 {
-            let (dda, tail) = stepper::moment();
-            contact::mark(&dda, tail);
+            mark();
         }
         wait();
         now = levels() ^ state.low;
