@@ -27,7 +27,6 @@ use std::thread;
 
 use deeds::{Deed, Scale};
 use kerf::hal::imp::{Machine, eeprom, was_reset};
-use proptest::test_runner::{TestCaseError, TestError};
 use talk::Talk;
 
 /// Up to a minute of the machine's time.
@@ -74,13 +73,8 @@ fn play(deeds: &[Deed]) -> Result<(), String> {
 
 /// The conversation of a seed; one that fails is made smaller.
 fn try_seed(seed: u64) -> Result<(), String> {
-    let (tree, mut runner) = seeds::case(seed, &deeds::conversation(SCALE));
-    let tried = runner.run_one(tree, |deeds| play(&deeds).map_err(TestCaseError::fail));
-    match tried {
-        Ok(_) => Ok(()),
-        Err(TestError::Fail(why, deeds)) => Err(format!("seed {seed}: {deeds:?}\n{why}")),
-        Err(TestError::Abort(why)) => Err(format!("seed {seed}: {why}")),
-    }
+    let tried = seeds::smallest(seed, &deeds::conversation(SCALE), |deeds| play(&deeds));
+    tried.map_err(|why| format!("seed {seed}: {why}"))
 }
 
 #[test]

@@ -2,11 +2,12 @@
 //!
 //! `KERF_SEED` is the first seed, 0 if there is none, and `KERF_CASES` how many there are from there on.
 
+use std::fmt::Debug;
 use std::io::{Write, stderr};
 use std::ops::Range;
 
 use proptest::strategy::Strategy;
-use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
 /// The seeds, if `count` of them are usual; printed.
 pub fn seeds(count: u64) -> Range<u64> {
@@ -35,4 +36,21 @@ pub fn case<S: Strategy>(seed: u64, strategy: &S) -> (S::Tree, TestRunner) {
     let mut runner = runner(seed);
     let tree = strategy.new_tree(&mut runner).expect("a strategy without filters");
     (tree, runner)
+}
+
+/// Plays the case of a seed. One that fails is made as small as it can be, and told.
+pub fn smallest<S: Strategy>(
+    seed: u64,
+    strategy: &S,
+    play: impl Fn(S::Value) -> Result<(), String>,
+) -> Result<(), String>
+where
+    S::Value: Debug,
+{
+    let (tree, mut runner) = case(seed, strategy);
+    match runner.run_one(tree, |value| play(value).map_err(TestCaseError::fail)) {
+        Ok(_) => Ok(()),
+        Err(TestError::Fail(why, value)) => Err(format!("{value:?}\n{why}")),
+        Err(TestError::Abort(why)) => Err(why.to_string()),
+    }
 }

@@ -2,15 +2,10 @@
 
 mod common;
 
-use common::{booted, set};
+use common::{MS, booted, say_line, say_now, set};
 use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14, inputs};
 use kerf_sim::mechanics::Build;
 use kerf_sim::{Host, Machine};
-
-/// Cycles in a millisecond.
-const MS: u64 = 16_000;
-/// Bits of a byte on the wire, in cycles.
-const BYTE: u64 = 1_389;
 
 /// From the last bit of a line, which is read between others: 250 moves a second at 32,000 steps a second leave little of
 /// the CPU. Measured: 22.7 ms; in a long move 7.2.
@@ -72,25 +67,14 @@ fn on(machine: &Machine) -> [bool; 4] {
 
 /// Raises the alarm, and returns the cycle at which it was told all of it.
 fn raise(machine: &mut Machine, host: &mut Host, cause: Cause) -> u64 {
-    let before = machine.wire().sent();
-    let bytes = match cause {
+    match cause {
         Switch(input) => {
             machine.tamper(|mechanics, now| mechanics.work(input, true, now));
-            return machine.cycle();
+            machine.cycle()
         }
-        Line(text) => {
-            host.send(machine, 0, text);
-            machine.wire().backlog() as u64
-        }
-        Reset => {
-            machine.send_now(0x18);
-            1
-        }
-    };
-    while machine.wire().sent() < before + bytes {
-        machine.run_until(machine.cycle() + 16).unwrap();
+        Line(text) => say_line(machine, host, text),
+        Reset => say_now(machine, 0x18),
     }
-    machine.cycle() + BYTE
 }
 
 /// How long it takes until all is off, cycles.

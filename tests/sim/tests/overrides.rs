@@ -2,13 +2,10 @@
 
 mod common;
 
-use common::{booted, set};
+use common::{MS, booted, say_line, say_now, set};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::{Host, Machine, Stopwatch};
 
-const MS: u64 = 16_000;
-/// Bits of a byte on the wire, in cycles.
-const BYTE: u64 = 1_389;
 /// What every change keeps to.
 const LIMIT_MS: f64 = 20.0;
 /// What it takes to see it in short moves: 8 steps, a ms, and the velocity has to change by 0.2 %, for which a low jerk
@@ -68,21 +65,10 @@ fn add_replan_watch(machine: &mut Machine) {
 
 /// Says it, and returns the cycle at which its last bit has come.
 fn say(machine: &mut Machine, host: &mut Host, what: Say) -> u64 {
-    let before = machine.wire().sent();
-    let bytes = match what {
-        Character(byte) => {
-            machine.send_now(byte);
-            1
-        }
-        Line(text) => {
-            host.send(machine, 0, text);
-            machine.wire().backlog() as u64
-        }
-    };
-    while machine.wire().sent() < before + bytes {
-        machine.run_until(machine.cycle() + 16).unwrap();
+    match what {
+        Character(byte) => say_now(machine, byte),
+        Line(text) => say_line(machine, host, text),
     }
-    machine.cycle() + BYTE
 }
 
 /// When X first steps otherwise than in all the time before `from`: so many steps take another time than they ever did, by

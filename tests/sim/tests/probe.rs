@@ -103,11 +103,7 @@ impl Bench {
     /// The greatest error of an axis, in steps, if the contact closed at this cycle.
     fn error(&mut self, closed: u64) -> u64 {
         let (told, is) = (self.told(), self.at(closed));
-        println!(
-            "  {told:?} {is:?} {:?} {:?}",
-            self.at(closed + 37 * 16),
-            self.at(closed + 200 * 16)
-        );
+        println!("  {told:?} {is:?}");
         told.iter().zip(is).map(|(told, is)| told.abs_diff(is)).max().unwrap_or(0)
     }
 

@@ -32,7 +32,6 @@ use deeds::{Deed, Scale};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
 use proptest::strategy::ValueTree;
-use proptest::test_runner::{TestCaseError, TestError};
 use talk::Talk;
 
 /// About two seconds of the machine's time.
@@ -80,14 +79,8 @@ fn play_all(seeds: Range<u64>) {
 
 /// The conversation of a seed with a machine of its own; one that fails is made smaller.
 fn alone(seed: u64) -> Result<(), String> {
-    let (tree, mut runner) = seeds::case(seed, &deeds::conversation(SCALE));
-    let tried = runner
-        .run_one(tree, |deeds| try_to_play(&mut begun(), &deeds).map_err(TestCaseError::fail));
-    match tried {
-        Err(TestError::Fail(why, deeds)) => Err(format!("{deeds:?}\n{why}")),
-        Err(TestError::Abort(why)) => Err(why.to_string()),
-        Ok(_) => Ok(()),
-    }
+    let play = |deeds: Vec<Deed>| try_to_play(&mut begun(), &deeds);
+    seeds::smallest(seed, &deeds::conversation(SCALE), play)
 }
 
 #[test]

@@ -21,8 +21,13 @@ pub struct Carriage {
 impl Axis {
     /// A position in steps from the lower hard end.
     pub(super) fn steps(&self, position: f64) -> i64 {
-        (position * self.steps_per_mm).round() as i64
+        steps(position, self.steps_per_mm)
     }
+}
+
+/// A length in steps.
+fn steps(length: f64, steps_per_mm: f64) -> i64 {
+    (length * steps_per_mm).round() as i64
 }
 
 impl Carriage {
@@ -58,7 +63,7 @@ impl Carriage {
 
     /// A place in steps from the lower hard end.
     pub fn steps_at(&self, position: f64) -> i64 {
-        (position * self.steps_per_mm).round() as i64
+        steps(position, self.steps_per_mm)
     }
 
     /// Steps lost at hard ends.

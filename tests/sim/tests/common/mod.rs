@@ -68,3 +68,31 @@ pub fn set(machine: &mut Machine, host: &mut Host, line: &str) {
     let response = host.ask(machine, line, 5_000).unwrap();
     assert_eq!(response.status, 0, "{line} is answered by {}", response.raw);
 }
+
+/// Cycles in a millisecond.
+pub const MS: u64 = 16_000;
+/// Bits of a byte on the wire at 115,200 baud, in cycles.
+const BYTE: u64 = 1_389;
+
+/// Sends a byte before all others, and returns the cycle at which its last bit has come.
+pub fn say_now(machine: &mut Machine, byte: u8) -> u64 {
+    let sent = machine.wire().sent() + 1;
+    machine.send_now(byte);
+    last_bit(machine, sent)
+}
+
+/// Sends a line behind none, and returns the cycle at which its last bit has come.
+pub fn say_line(machine: &mut Machine, host: &mut Host, line: &str) -> u64 {
+    let before = machine.wire().sent();
+    host.send(machine, 0, line);
+    let bytes = machine.wire().backlog() as u64;
+    last_bit(machine, before + bytes)
+}
+
+/// Runs until so many bytes have been sent, and returns the cycle at which the last of them has come.
+fn last_bit(machine: &mut Machine, sent: u64) -> u64 {
+    while machine.wire().sent() < sent {
+        machine.run_until(machine.cycle() + 16).unwrap();
+    }
+    machine.cycle() + BYTE
+}
