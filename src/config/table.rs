@@ -161,9 +161,9 @@ pub const USER_ROWS: usize = 4;
 /// Rows of [`JOB`].
 pub const JOB_ROWS: usize = 4;
 
-/// Rows of [`SQUARING`].
+/// The row of [`SQUARING`] that says where the second motor's switch is.
 pub const SQUARING_SWITCH: u8 = 0;
-/// See [`SQUARING_SWITCH`].
+/// The row of [`SQUARING`] that says how much farther off it the second motor stands.
 pub const SQUARING_OFFSET: u8 = 1;
 
 /// Slots of the system, small and large.
