@@ -127,14 +127,14 @@ impl Governor {
     #[inline(always)]
     pub fn stretch(&mut self, left: f32, cruise: f32, ahead: &impl Ahead, seconds: f32) -> Stretch {
         if !some(self.limits.jerk) {
-            return self.trapezoid(left, cruise, ahead.headroom(), SEGMENT_S);
+            return self.trapezoid(left, cruise, ahead.headroom());
         }
         self.smooth(left, cruise, ahead, seconds)
     }
 
     #[inline(never)]
-    fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32, seconds: f32) -> Stretch {
-        let v = self.state.velocity;
+    fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
+        let (v, seconds) = (self.state.velocity, SEGMENT_S);
         // Rounding may put a stop before the end of the block.
         let headroom = if headroom.is_sign_negative() { 0.0 } else { headroom };
         // Steady over a block that is short enough to be one stretch.
@@ -167,7 +167,7 @@ impl Governor {
                 return Stretch { seconds, distance, ends: false };
             }
         }
-        self.finish(left, cruise, headroom, seconds)
+        self.finish(left, cruise, headroom)
     }
 
     /// `next`, or the least velocity that it can have at the end, from `v` and with so much to lose, if that
@@ -180,8 +180,8 @@ impl Governor {
 
     /// All the rest of a block in one.
     #[inline(never)]
-    fn finish(&mut self, left: f32, cruise: f32, headroom: f32, nominal: f32) -> Stretch {
-        let v = self.state.velocity;
+    fn finish(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
+        let (v, nominal) = (self.state.velocity, SEGMENT_S);
         let gain = scaled(self.limits.accel * left, 1);
         let square = v * v + gain;
         let next = least(sqrt(least(square, headroom)), cruise);
