@@ -15,7 +15,7 @@ mod rig;
 
 use cases::cases;
 use jobs::{Job, Planned, any_job, plan_changed};
-use keeps::{STRETCH, check_continuity};
+use keeps::{check_changes, check_corners};
 use kerf::gcode::overrides::{Change, Override};
 use kerf::motion::block::{Action, Block};
 use kerf::motion::exec::Step;
@@ -121,20 +121,11 @@ const SOFTER: f64 = 2.0;
 
 /// The limits of the machine, whatever the feed.
 fn check_machine(planned: &[Planned]) {
-    let little = planned.iter().map(|p| p.top).fold(0.0, f64::max) * 2e-3;
-    let mut line = 0;
     for (n, p) in planned.iter().enumerate() {
-        let seconds = f64::from(p.stretch.seconds);
         assert!(p.after <= p.top.max(p.before) * 1.0011, "{n}: {p:?}");
-        let change = p.after - p.before;
-        assert!(change.abs() <= p.accel * (seconds + STRETCH) * 1.1 + little, "{n}: {p:?}");
-        let first = core::mem::replace(&mut line, p.line) != p.line;
-        assert!(!first || p.before <= p.corner * 1.001 + little, "{n}: {p:?}");
     }
-    for (n, pair) in planned.windows(2).enumerate() {
-        let [a, b] = pair else { unreachable!() };
-        check_continuity(n + 1, a, b, SOFTER);
-    }
+    check_corners(planned, 2e-3);
+    check_changes(planned, 2e-3, 1.1, SOFTER);
 }
 
 proptest! {

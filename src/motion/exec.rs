@@ -112,8 +112,11 @@ impl Ahead for View<'_> {
     fn headroom(&self) -> f32 {
         self.headroom
     }
-    fn anchor(&self, n: u8) -> Option<Anchor> {
-        self.blocks.anchor(n)
+    fn slower(&self, n: u8, velocity: f32) -> Option<(u8, Anchor)> {
+        self.blocks.slower(n, velocity)
+    }
+    fn end(&self) -> f32 {
+        self.blocks.end_of_queue()
     }
 }
 

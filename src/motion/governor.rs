@@ -1,32 +1,25 @@
-//! The governor: how fast the machine goes in the next few milliseconds.
+//! The governor, which generates velocities: how fast the machine goes in the next few milliseconds.
 //!
-//! Owned by exec, which asks [`Governor::stretch`] for one stretch after the other: with the way left in
+//! Owned by exec, which asks [`Governor::stretch`] for one stretch after the other: with the distance left in
 //! the block, its velocity limit, and what is ahead ([`Ahead`]). It goes as fast as it may, always able
-//! to slow down in time for all that is queued. Its state is velocity and acceleration, and the [`Brake`]
-//! that it is on, if any: it does not care where blocks begin and end, so a ramp goes on over any number
-//! of them, and a limit that changes (more blocks, a lower feed) is taken up at the next stretch from
-//! where it is.
+//! to slow down in time for all that is queued. It does not care where blocks begin and end, so a ramp goes on over any number
+//! of them, and a limit that changes (more blocks, a lower feed) is taken up from where it is.
 //!
 //! Units: mm, s (degrees for a rotary-only move).
 //!
-//! # Without a jerk limit
+//! Without a jerk limit its velocities are those of trapezoids (`trapezoid`). With one it works in slices
+//! (`slice`, `rise`), with ramps that are laid out once (`ramp`), and looks at what is ahead at most once for a stretch
+//! (`constraint`). The work for a stretch has a bound in every state.
 //!
-//! Velocities are those of trapezoids, `v^2 <= headroom + 2 A left`, and a stretch is the solution of
-//! that with its own length in it.
-//!
-//! # With one
-//!
-//! See `smooth`.
-//!
-//! Cost on AVR: 1,500 cycles a stretch without a jerk limit, 2,500 for one that ends a block or brakes;
-//! with one about 5,000.
+//! Cost on AVR: 1,500 to 2,500 cycles a stretch without a jerk limit. With one 500 for a block that is over within the slice,
+//! 2,500 at a steady velocity, 4,000 in a ramp; at worst 16,000.
 
-use super::brake::Brake;
-use super::exec::SEGMENT_S;
-use super::float::{OCTAVE, below, greater, least, lesser, log, scaled, some};
+pub use super::constraint::Ahead;
+use super::constraint::Clear;
+use super::float::{greater, some};
 use super::horizon::kappa;
-pub use super::reach::Ahead;
-use super::state::{Limits, State};
+use super::ramp::{Phase, Ramp};
+use super::slice::Rest;
 use crate::math::sqrt;
 
 /// A part of a block, all of it that is left or less.
@@ -51,22 +44,49 @@ pub fn effective_jerk(jerk: f32, accel: f32) -> f32 {
     if jerk > 0.0 && accel > jerk * JERK_TIME_MIN { jerk } else { 0.0 }
 }
 
-/// Logarithms that are further apart leave no doubt about the product of two numbers.
-const PLAIN: i32 = OCTAVE / 5;
-
 /// Whether two limits are equal, or one velocity is the other. Cost: 15.
-fn same(a: f32, b: f32) -> bool {
+pub(super) fn same(a: f32, b: f32) -> bool {
     a.to_bits() == b.to_bits()
 }
 
-/// Velocity and acceleration along the path.
+/// Limits of the block that runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Limits {
+    /// mm/s^2.
+    pub accel: f32,
+    /// mm/s^3, 0 for none.
+    pub jerk: f32,
+    /// `accel^2 / 2 jerk`, mm/s.
+    pub kappa: f32,
+    /// `jerk / accel`: how much alpha may change in a second.
+    pub pace: f32,
+}
+
+/// Velocity and acceleration along the path, at the end of what has been worked out.
 #[derive(Debug, Default)]
 pub struct Governor {
-    pub(super) state: State,
+    /// mm/s.
+    pub(super) velocity: f32,
+    /// The acceleration as a share of its limit, with a jerk limit. From 0 to 1 unless a ramp runs, which knows it.
+    pub(super) alpha: f32,
     pub(super) limits: Limits,
-    pub(super) brake: Option<Brake>,
-    /// Something may be better than the brake.
-    pub(super) look: bool,
+    pub(super) ramp: Option<Ramp>,
+    /// What of the last slice has not been handed out.
+    pub(super) rest: Rest,
+    /// What is known of what is ahead.
+    pub(super) clear: Clear,
+    /// Something ahead has changed that a ramp does not know.
+    pub(super) changed: bool,
+    /// The ramp is that of a feedhold.
+    pub(super) halting: bool,
+    /// What is ahead has been looked at for this stretch.
+    pub(super) scanned: bool,
+    /// Slices until it is worth another try to go faster.
+    pub(super) wait: u8,
+    /// Slices by which the next scan looks further than it has to.
+    pub(super) margin: u8,
+    /// Counts slices of a ramp.
+    pub(super) turn: u8,
     /// An override has changed feeds, ever: a limit that a feed makes may be too near to be kept.
     pub(super) late: bool,
 }
@@ -74,141 +94,101 @@ pub struct Governor {
 impl Governor {
     /// At rest.
     pub const fn new() -> Self {
-        let limits = Limits { accel: 0.0, jerk: 0.0, kappa: 0.0, pace: 0.0 };
-        let state = State { velocity: 0.0, alpha: 0.0 };
-        Self { state, limits, brake: None, look: false, late: false }
+        Self {
+            velocity: 0.0,
+            alpha: 0.0,
+            limits: Limits { accel: 0.0, jerk: 0.0, kappa: 0.0, pace: 0.0 },
+            ramp: None,
+            rest: Rest::NONE,
+            clear: Clear::NONE,
+            changed: false,
+            halting: false,
+            scanned: false,
+            wait: 0,
+            margin: 0,
+            turn: 0,
+            late: false,
+        }
     }
 
-    /// Velocity, mm/s.
+    /// Velocity, mm/s, at the end of the last slice.
     pub fn velocity(&self) -> f32 {
-        self.state.velocity
+        self.velocity
+    }
+
+    /// Time (s) and distance (mm) that have been worked out and not been handed out: [`Governor::velocity`] is that so much later.
+    pub fn pending(&self) -> (f32, f32) {
+        (self.rest.seconds, self.rest.distance)
+    }
+
+    /// Whether the machine stands still, and nothing is left to be handed out.
+    pub fn is_at_rest(&self) -> bool {
+        !some(self.velocity) && !some(self.rest.seconds)
     }
 
     /// The machine stands still.
     pub fn stop(&mut self) {
-        self.state = State::default();
-        self.brake = None;
+        (self.velocity, self.alpha) = (0.0, 0.0);
+        self.rest = Rest::NONE;
+        self.clear = Clear::NONE;
+        self.ramp = None;
+        self.halting = false;
+        (self.wait, self.margin) = (0, 0);
     }
 
     /// A block with these limits begins, mm/s^2 and mm/s^3. If they are others than before, it goes on with
     /// as much of its deceleration as may be ended in time; acceleration ends at once.
     pub fn begin(&mut self, accel: f32, jerk: f32) {
-        if same(accel, self.limits.accel) && same(jerk, self.limits.jerk) {
-            return;
+        if !same(accel, self.limits.accel) || !same(jerk, self.limits.jerk) {
+            self.change_limits(accel, jerk);
         }
-        self.brake = None;
+    }
+
+    #[inline(never)]
+    fn change_limits(&mut self, accel: f32, jerk: f32) {
+        self.leave_ramp();
+        self.halting = false;
+        self.clear = Clear::NONE;
+        (self.wait, self.margin) = (0, 0);
         let mut pace = 0.0;
         let mut alpha = 0.0;
         if jerk > 0.0 {
             pace = jerk / accel;
-            if self.state.alpha < 0.0 {
-                alpha = greater(self.state.alpha * self.limits.accel / accel, -1.0);
-                let most = sqrt(2.0 * jerk * self.state.velocity) / accel;
+            if self.alpha < 0.0 {
+                alpha = greater(self.alpha * self.limits.accel / accel, -1.0);
+                let most = sqrt(2.0 * jerk * self.velocity) / accel;
                 alpha = greater(alpha, -most);
             }
         }
-        self.state.alpha = alpha;
+        self.alpha = alpha;
         self.limits = Limits { accel, jerk, kappa: kappa(accel, jerk), pace };
     }
 
     /// An override has changed feeds, of what runs and of what is ahead.
     pub fn change_feed(&mut self) {
-        self.late = true;
-        self.look = true;
+        (self.late, self.changed) = (true, true);
+        self.clear = Clear::NONE;
+        self.wait = 0;
+        if !self.halting && self.ramp.as_ref().is_some_and(|ramp| ramp.phase() == Phase::Up) {
+            self.leave_ramp();
+        }
     }
 
     /// What is ahead has changed.
     pub fn look_again(&mut self) {
-        self.look = true;
+        self.changed = true;
     }
 
-    /// The next stretch, of about `seconds` under a jerk limit and [`SEGMENT_S`] else, in a block with `left` mm to go at up to
-    /// `cruise` mm/s.
+    /// The next stretch, of about `seconds` under a jerk limit and [`SEGMENT_S`](super::exec::SEGMENT_S) else, in a block with
+    /// `left` mm to go at up to `cruise` mm/s.
     #[inline(always)]
     pub fn stretch(&mut self, left: f32, cruise: f32, ahead: &impl Ahead, seconds: f32) -> Stretch {
-        if !some(self.limits.jerk) {
-            return self.trapezoid(left, cruise, ahead.headroom());
+        if some(self.limits.jerk) {
+            return self.smooth(left, cruise, ahead, seconds);
         }
-        self.smooth(left, cruise, ahead, seconds)
-    }
-
-    #[inline(never)]
-    fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
-        let (v, seconds) = (self.state.velocity, SEGMENT_S);
-        // Rounding may put a stop before the end of the block.
-        let headroom = if headroom.is_sign_negative() { 0.0 } else { headroom };
-        // Steady over a block that is short enough to be one stretch.
-        if same(v, cruise)
-            && below(cruise * cruise, headroom)
-            && below(left, cruise * (seconds + seconds))
-        {
-            return Stretch { seconds: left / v, distance: left, ends: true };
+        if some(self.rest.seconds) {
+            return self.cut(left);
         }
-        // Mostly plain: a block that is run through in no more than one.
-        if log(v) + log(seconds + seconds) < log(left) + PLAIN
-            && below(v * (seconds + seconds), left)
-        {
-            let gain = self.limits.accel * seconds;
-            let half = 0.5 * seconds;
-            // An override may have taken the feed away from under it.
-            let mut next = greater(lesser(v + gain, cruise), v - gain);
-            let mut distance = (v + next) * half;
-            let twice = self.limits.accel + self.limits.accel;
-            if next * next > headroom + twice * (left - distance) {
-                let b = 0.5 * gain;
-                next = sqrt(b * b + headroom + twice * left - gain * v) - b;
-                // A little more than the limit makes up for rounding.
-                let least = v - gain * 1.005;
-                next = greater(lesser(next, cruise), greater(least, 0.0));
-                distance = (v + next) * half;
-            }
-            if distance + half * next < left && distance > 0.0 {
-                self.state.velocity = next;
-                return Stretch { seconds, distance, ends: false };
-            }
-        }
-        self.finish(left, cruise, headroom)
-    }
-
-    /// `next`, or the least velocity that it can have at the end, from `v` and with so much to lose, if that
-    /// is more by what is not rounding: an override has lowered the limit too late.
-    #[inline(never)]
-    pub(super) fn slowest(&self, v: f32, gain: f32, next: f32, nominal: f32) -> f32 {
-        let least = sqrt(greater(v * v - gain, 0.0));
-        if least > next + self.limits.accel * nominal { least } else { next }
-    }
-
-    /// All the rest of a block in one.
-    #[inline(never)]
-    fn finish(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
-        let (v, nominal) = (self.state.velocity, SEGMENT_S);
-        let gain = scaled(self.limits.accel * left, 1);
-        let square = v * v + gain;
-        let next = least(sqrt(least(square, headroom)), cruise);
-        let late = below(next, v) && (self.late || below(cruise, v));
-        let next = if late { self.slowest(v, gain, next, nominal) } else { next };
-        self.state.velocity = next;
-        let sum = v + next;
-        let mut seconds = 2.0 * nominal;
-        if below(cruise, v)
-            || log(sum) + log(nominal) > log(left) + PLAIN
-            || below(left, sum * nominal)
-        {
-            seconds = scaled(left, 1) / sum;
-        } else if square > 0.0 {
-            // From rest to rest or nearly so: there is a peak between.
-            let peak = sqrt(0.5 * (square + next * next));
-            if peak < cruise {
-                seconds = (peak + peak - sum) / self.limits.accel;
-            } else {
-                let ramps = (cruise + cruise - sum) / self.limits.accel;
-                // The ramps' way: each at the mean of its ends.
-                let slower =
-                    0.5 * ((cruise - v) * (cruise - v) + (cruise - next) * (cruise - next));
-                seconds = (left + slower / self.limits.accel) / cruise;
-                seconds = greater(seconds, ramps);
-            }
-        }
-        Stretch { seconds, distance: left, ends: true }
+        self.trapezoid(left, cruise, ahead.headroom())
     }
 }

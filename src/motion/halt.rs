@@ -1,35 +1,31 @@
 //! The governor's stretches in a feedhold: to a standstill, as soon as the limits allow.
 //!
-//! Called by exec instead of [`Governor::stretch`] while a hold is on. From velocity and acceleration as
-//! they are: without a jerk limit that is plain deceleration; with one the acceleration falls (from above
-//! 0 too), is kept, and rises to 0, as `brake` has it for the hardest brake. It goes on over any number of
+//! Called by exec instead of [`Governor::stretch`] while a hold is on. Without a jerk limit that is plain deceleration; with one it is
+//! a ramp that is laid out when the hold begins (`ramp`). It goes on over any number of
 //! blocks, each with its own limits. What is planned can be braked for by braking as hard as may be (`horizon`,
-//! `reach`), so velocities are nowhere above those of the plan, and no corner ahead is too fast.
+//! `constraint`), so velocities are nowhere above those of the plan, and no corner ahead is too fast.
 //!
 //! At rest the governor is as if it had never moved: to go on is ordinary governing, from the middle of a
 //! block.
 //!
-//! Units: mm, s. Cost on AVR: 2,500 cycles a stretch, 6,000 under a jerk limit.
+//! Units: mm, s. Cost on AVR: 2,500 cycles a stretch; with a jerk limit 6,000 for the first, and 2,500.
 
+use super::constraint::Ahead;
 use super::float::{greater, least, some};
 use super::governor::{Governor, Stretch};
-use super::reach::Ahead;
 use crate::math::sqrt;
 
 /// A stop this close to the end of the block, of what is left of it, is one at the end.
 const AT_END: f32 = 0.9999;
 
 impl Governor {
-    /// Whether it stands still.
-    pub fn is_at_rest(&self) -> bool {
-        !some(self.velocity())
-    }
-
     /// The next stretch of a hold, in a block with `left` mm to go.
     #[inline(never)]
     pub fn halt(&mut self, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
         if some(self.limits.jerk) {
-            self.hard(left, ahead, nominal)
+            self.smooth_halt(left, nominal)
+        } else if some(self.rest.seconds) {
+            self.cut(left)
         } else {
             self.halt_sharply(left, ahead.headroom(), nominal)
         }
@@ -37,7 +33,7 @@ impl Governor {
 
     /// Without a jerk limit; with `headroom` as in `trapezoid`.
     fn halt_sharply(&mut self, left: f32, headroom: f32, nominal: f32) -> Stretch {
-        let (v, accel) = (self.state.velocity, self.limits.accel);
+        let (v, accel) = (self.velocity, self.limits.accel);
         let longest = 1.5 * nominal;
         let way = 0.5 * v * v / accel;
         if way < AT_END * left {
@@ -54,12 +50,12 @@ impl Governor {
             let next = if self.late { self.slowest(v, gain, next, nominal) } else { next };
             let seconds = 2.0 * left / (v + next);
             if seconds <= longest {
-                self.state.velocity = next;
+                self.velocity = next;
                 return Stretch { seconds, distance: left, ends: true };
             }
         }
         let next = v - accel * nominal;
-        self.state.velocity = next;
+        self.velocity = next;
         Stretch { seconds: nominal, distance: 0.5 * (v + next) * nominal, ends: false }
     }
 }
@@ -69,7 +65,6 @@ mod tests {
     use super::*;
     use crate::motion::exec::SEGMENT_S;
     use crate::motion::queue::Anchor;
-    use crate::motion::state::State;
     use proptest::prelude::*;
 
     /// A block that ends in a stop, far away.
@@ -79,8 +74,11 @@ mod tests {
         fn headroom(&self) -> f32 {
             0.0
         }
-        fn anchor(&self, n: u8) -> Option<Anchor> {
-            (n == 0).then_some(Anchor { velocity: 0.0, ahead: 0.0, soft: false, firm: true })
+        fn slower(&self, n: u8, _: f32) -> Option<(u8, Anchor)> {
+            (n == 0).then_some((0, Anchor { velocity: 0.0, ahead: 0.0, soft: false, firm: true }))
+        }
+        fn end(&self) -> f32 {
+            0.0
         }
     }
 
@@ -128,7 +126,7 @@ mod tests {
             // Braking no harder than may end at a standstill.
             let most = crate::math::sqrt(2.0 * jerk * v) / accel;
             let alpha = if sharp { 0.0 } else { share.max(-0.999 * most) };
-            governor.state = State { velocity: v, alpha };
+            (governor.velocity, governor.alpha) = (v, alpha);
             let best = shortest(v.into(), (alpha * accel).into(), accel.into(), jerk.into());
             let way = f64::from(stop(&mut governor));
             prop_assert!((way / best - 1.0).abs() < 0.005, "{way} mm, the shortest is {best}");

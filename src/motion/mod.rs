@@ -3,11 +3,11 @@
 //! ```text
 //! target -> line -> block queue -> exec -> segment ring -> dda -> pins
 //!           junction   |   ^        governor, prep
-//!                      horizon      smooth, brake, reach, halt
+//!                      horizon      slice, rise, ramp, constraint
 //! ```
 
 pub mod block;
-pub mod brake;
+mod constraint;
 pub mod contact;
 pub mod dda;
 pub mod divide;
@@ -27,11 +27,12 @@ pub mod pace;
 mod path;
 pub mod prep;
 pub mod queue;
-pub mod reach;
+mod ramp;
 mod replan;
+mod rise;
 pub mod short;
-pub mod smooth;
+mod slice;
 pub mod snapshot;
 pub mod source;
-pub mod state;
 pub mod steps;
+mod trapezoid;

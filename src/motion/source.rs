@@ -13,6 +13,9 @@ use super::horizon::Horizon;
 use super::queue::{BLOCKS, BlockStore, FIRM, SEQ};
 use crate::hal::ring::Consumer;
 
+/// Constraints that a search for a slower one passes over.
+pub(super) const WALK: u8 = 16;
+
 /// A limit ahead of exec.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anchor {
@@ -139,6 +142,27 @@ impl BlockSource {
             self.line(seq, |line| (line.entry(&factors), line.entry.get(), line.start))?;
         let soft = below(velocity, corner);
         Some(Anchor { velocity, ahead: start - self.end(), soft, firm })
+    }
+
+    /// The first constraint from the `n`th on that is slower than `velocity` or firm, or the one after [`WALK`] others that are
+    /// not; with its number. Cost: as `anchor`, and 150 for each that is passed over.
+    pub fn slower(&self, n: u8, velocity: f32) -> Option<(u8, Anchor)> {
+        let horizon = self.horizon();
+        let factors = horizon.factors();
+        let mut found = n;
+        while let Some(seq) = horizon.nth(found)
+            && found - n < WALK
+            && seq & FIRM == 0
+            && self.line(seq, |line| below(line.entry(&factors), velocity)) == Some(false)
+        {
+            found += 1;
+        }
+        Some((found, self.anchor(found)?))
+    }
+
+    /// Potential from the end of the oldest block to the end of the queue.
+    pub fn end_of_queue(&self) -> f32 {
+        self.horizon().end - self.end()
     }
 
     /// Potential at the end of the oldest block.

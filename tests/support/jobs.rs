@@ -135,6 +135,12 @@ pub struct Planned {
     pub stretch: Stretch,
     pub before: f64,
     pub after: f64,
+    /// When the stretch ends, and how far on the path that is, from the beginning of the job.
+    pub clock: f64,
+    pub place: f64,
+    /// When and where the velocity is `after`: later than the stretch ends if a part of a slice is left.
+    pub after_clock: f64,
+    pub after_place: f64,
 }
 
 /// Runs a job through queue and governor alone.
@@ -158,11 +164,13 @@ pub fn plan_changed(
     let mut governor = Governor::new();
     let mut running: Option<(Line, u32, f32)> = None;
     let mut version = 0;
-    let mut planned = Vec::new();
+    let mut planned: Vec<Planned> = Vec::new();
     let mut step = |rig: &mut Rig| -> bool {
         let Some(block) = rig.source.oldest() else {
             assert!(running.is_none());
-            assert!(governor.velocity() <= 1e-3, "the queue ends at {}", governor.velocity());
+            let jump = planned.last().map_or(0.0, |p| p.jerk) as f32 * SEGMENT_S * SEGMENT_S;
+            let velocity = governor.velocity();
+            assert!(velocity <= 1e-3 + 2.0 * jump, "the queue ends at {velocity}");
             governor.stop();
             return false;
         };
@@ -186,8 +194,11 @@ pub fn plan_changed(
             fn headroom(&self) -> f32 {
                 self.0
             }
-            fn anchor(&self, n: u8) -> Option<Anchor> {
-                self.1.anchor(n)
+            fn slower(&self, n: u8, velocity: f32) -> Option<(u8, Anchor)> {
+                self.1.slower(n, velocity)
+            }
+            fn end(&self) -> f32 {
+                self.1.end_of_queue()
             }
         }
         let cruise = rig.source.cruise();
@@ -202,7 +213,15 @@ pub fn plan_changed(
         } else {
             governor.stretch(left, cruise, &view, SEGMENT_S)
         };
+        let (clock, place) = planned.last().map_or((0.0, 0.0), |p| (p.clock, p.place));
+        let clock = clock + f64::from(stretch.seconds);
+        let place = place + f64::from(stretch.distance);
+        let (more, further) = governor.pending();
         planned.push(Planned {
+            clock,
+            place,
+            after_clock: clock + f64::from(more),
+            after_place: place + f64::from(further),
             line: number,
             length: line.length.into(),
             cruise: cruise.into(),

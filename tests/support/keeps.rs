@@ -7,37 +7,103 @@ use crate::jobs::Planned;
 /// A stretch, s.
 pub const STRETCH: f64 = SEGMENT_S as f64;
 
-/// Velocity, acceleration and jerk along the path stay within the block's limits.
-///
-/// What the length of stretches adds: acceleration 1 %, and what is gone to at once, a velocity less than
-/// `J t^2` away, or a thousandth of the highest feed: the queue keeps no key for less, and potentials are
-/// no finer.
-pub fn check_limits(planned: &[Planned]) {
-    let little = planned.iter().map(|p| p.cruise).fold(0.0, f64::max) * 1e-3;
-    for (n, p) in planned.iter().enumerate() {
-        let seconds = f64::from(p.stretch.seconds);
-        assert!(p.after <= p.cruise * 1.0011, "{n}: {p:?}");
-        let change = p.after - p.before;
-        assert!(change.abs() <= p.accel * seconds * 1.01 + little, "{n}: {p:?}");
-        let mean = f64::from(p.stretch.distance) / seconds;
-        let high = p.before.max(p.after) + 0.5 * p.accel * seconds;
-        assert!(mean <= high * 1.001 || p.stretch.distance < 1e-5, "{n}: {mean} mm/s in {p:?}");
+/// The velocity at a time, as the governor has worked it out.
+#[derive(Clone, Copy, Debug)]
+struct State {
+    clock: f64,
+    place: f64,
+    velocity: f64,
+    /// The stretch after which it stands.
+    of: usize,
+}
+
+/// The states that the governor has gone through.
+fn states(planned: &[Planned]) -> Vec<State> {
+    let mut states = vec![State { clock: 0.0, place: 0.0, velocity: 0.0, of: 0 }];
+    for (of, p) in planned.iter().enumerate() {
+        let state = State { clock: p.after_clock, place: p.after_place, velocity: p.after, of };
+        let last = states.last_mut().expect("it begins with one");
+        // The rest of a slice is where it was, but for rounding.
+        if state.clock - last.clock > 2e-5 {
+            states.push(state);
+        }
     }
+    states
+}
+
+/// What is gone to at once: a velocity less than `J t^2` away, or a share of the highest feed: the queue keeps no
+/// key for less than a thousandth, and potentials are no finer.
+fn little(planned: &[Planned], share: f64) -> f64 {
+    planned.iter().map(|p| p.top).fold(0.0, f64::max) * share
+}
+
+/// Velocity, acceleration and jerk along the path stay within the block's limits.
+pub fn check_limits(planned: &[Planned]) {
+    for (n, p) in planned.iter().enumerate() {
+        let mean = f64::from(p.stretch.distance) / f64::from(p.stretch.seconds);
+        let change = p.accel * 0.5 * f64::from(p.stretch.seconds);
+        assert!(mean <= p.cruise * 1.0011 + change || p.stretch.distance < 1e-5, "{n}: {p:?}");
+        assert!(p.after <= p.cruise.max(p.before) * 1.0011, "{n}: {p:?}");
+    }
+    check_corners(planned, 1e-3);
+    check_changes(planned, 1e-3, 1.0, 1.0);
+}
+
+/// At each corner it is no faster than the corner allows.
+pub fn check_corners(planned: &[Planned], share: f64) {
+    let states = states(planned);
+    let mut at = 0;
     for (n, pair) in planned.windows(2).enumerate() {
         let [a, b] = pair else { unreachable!() };
-        check_continuity(n + 1, a, b, 1.0);
+        if a.line == b.line {
+            continue;
+        }
+        while at + 2 < states.len() && states[at + 1].clock < a.clock {
+            at += 1;
+        }
+        let (from, to) = (states[at], states[at + 1]);
+        let part = ((a.clock - from.clock) / (to.clock - from.clock)).clamp(0.0, 1.0);
+        let velocity = from.velocity + (to.velocity - from.velocity) * part;
+        let jump = b.jerk.max(a.jerk).min(b.accel / STRETCH) * STRETCH * STRETCH;
+        let most = b.corner * 1.001 + little(planned, share) + jump;
+        assert!(velocity <= most, "{n}: {velocity} of {most} mm/s at a corner, {b:?}");
     }
 }
 
-/// From one stretch to the next; the acceleration may change by so many times as much as usual.
-pub fn check_continuity(n: usize, a: &Planned, b: &Planned, times: f64) {
-    assert!(a.after == b.before || a.after < 1e-3, "{n}: {a:?} {b:?}");
-    if a.jerk == 0.0 || a.jerk != b.jerk || a.accel != b.accel {
-        return;
+/// Changes of velocity and of acceleration: so many times as much as the limits allow.
+pub fn check_changes(planned: &[Planned], share: f64, accel: f64, jerk: f64) {
+    let little = little(planned, share);
+    let states = states(planned);
+    let mut before: Option<(f64, f64, f64)> = None;
+    for pair in states.windows(2) {
+        let [a, b] = pair else { unreachable!() };
+        let p = &planned[b.of];
+        let (seconds, change) = (b.clock - a.clock, b.velocity - a.velocity);
+        let jump = p.jerk * STRETCH * STRETCH;
+        let most = p.accel * seconds * 1.01 * accel + little + jump.min(p.accel * STRETCH);
+        assert!(change.abs() <= most, "{change} of {most} mm/s: {a:?} {b:?} {p:?}");
+        let mean = (b.place - a.place) / seconds;
+        let (low, high) = (a.velocity.min(b.velocity), a.velocity.max(b.velocity));
+        // From rest to rest there is a peak between.
+        let peak = if high == 0.0 { f64::MAX } else { high + 0.25 * p.accel * seconds };
+        let off = 1e-3 * high + 3e-3 / seconds;
+        let even = mean <= peak + off && mean >= low - off;
+        assert!(p.jerk == 0.0 || even, "{mean} mm/s: {a:?} {b:?} {p:?}");
+        let limits = &planned[a.of];
+        let same = p.jerk == limits.jerk && p.accel == limits.accel;
+        let rate = change / seconds;
+        if p.jerk == 0.0 || !same {
+            before = None;
+            continue;
+        }
+        if let Some((rate_before, seconds_before, jerk_before)) = before
+            && jerk_before == p.jerk
+        {
+            let time = 0.5 * (seconds + seconds_before) + STRETCH;
+            let most = p.jerk * time * 1.02 * jerk + little / seconds.min(seconds_before);
+            let change = (rate - rate_before).abs();
+            assert!(change <= most, "{change} of {most} mm/s^2: {a:?} {b:?} {p:?}");
+        }
+        before = Some((rate, seconds, p.jerk));
     }
-    let of = |p: &Planned| (p.after - p.before) / f64::from(p.stretch.seconds);
-    let seconds = f64::from(a.stretch.seconds + b.stretch.seconds);
-    let change = (of(b) - of(a)).abs();
-    let most = b.jerk * (0.5 * seconds + 3.0 * STRETCH) * 1.01 * times;
-    assert!(change <= most, "{n}: {change} of {most} mm/s^2 from {a:?} to {b:?}");
 }

@@ -1,0 +1,384 @@
+//! A slice under a jerk limit: as fast as may be, with work that has a bound.
+//!
+//! Called for each slice (`slice`), exec level. The state is a velocity and an acceleration, alpha times its limit A.
+//!
+//! **Safe.** An acceleration takes time to end, so what counts is the *top*: the velocity `v + k alpha^2` at which it is ended when
+//! that begins now, and how far on that is. A state is safe if its top may be steady where it is reached
+//! ([`Clear`]). It stays safe while the acceleration ends, and at the top for as long as `Clear` says; then a ramp that is laid
+//! out at once, as hard as the limits allow, is in time for all that is ahead. So there is always an answer without a search:
+//! no scan is needed to go on.
+//!
+//! **Faster.** In each slice alpha is raised, or kept, or ended at the feed, if the top of that is safe. A scan asks for a
+//! top that is some slices further, so that the next ones need not ask.
+//!
+//! **Slower.** A ramp is followed to its end. In every fourth slice, if something ahead has changed, it asks whether the
+//! machine may go on at the velocity at which the deceleration is ended when that begins now.
+//!
+//! What the length of slices makes unavoidable: alpha changes in steps of a slice while it rises. A velocity that is less than `J t^2`
+//! away (t the time of a slice) is gone to at once, as is the end of a move that is shorter than `2 J t^3`.
+//!
+//! Units: mm, s; distances to what is ahead are brake potential (`constraint`). Cost on AVR: 2,000 cycles at a steady velocity
+//! or in a ramp, 3,500 while alpha rises; a scan and a ramp that is laid out 10,000 more at worst.
+
+use super::constraint::{Ahead, Ask, Clear, LOWEST, needed};
+use super::exec::SEGMENT_S;
+use super::float::{greater, lesser, some};
+use super::governor::{Governor, same};
+use super::ramp::Phase;
+use super::slice::Span;
+
+/// Slices before it tries again to go faster, when it could not.
+const WAIT: u8 = 8;
+
+/// Most slices by which a scan looks further than it has to.
+const MARGIN: u8 = 15;
+
+/// A state that could be next.
+#[derive(Clone, Copy, Default)]
+struct Next {
+    velocity: f32,
+    alpha: f32,
+    distance: f32,
+    top: f32,
+    /// Distance to the top, brake potential.
+    at: f32,
+}
+
+impl Governor {
+    /// Works a slice out. False, and nothing done, if it would have to look ahead a second time in this stretch.
+    #[inline(never)]
+    pub(super) fn slice(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
+        if let Some(ramp) = &self.ramp {
+            self.turn = self.turn.wrapping_add(1);
+            let news = self.changed || !ramp.closed;
+            if news && self.turn & 3 == 0 && ramp.phase() != Phase::Ending && !self.scanned {
+                self.reconsider(span, ahead);
+            }
+            if self.ramp.is_some() {
+                self.follow(span.seconds);
+                return true;
+            }
+        }
+        self.free(span, ahead)
+    }
+
+    /// A slice without a ramp.
+    #[inline(never)]
+    fn free(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
+        let velocity = self.velocity;
+        if self.alpha.is_sign_negative() && some(self.alpha) {
+            return self.recover(span, ahead);
+        }
+        if velocity > span.cruise {
+            return self.slow_down(span, ahead);
+        }
+        let steady = !some(self.alpha) && some(velocity);
+        if steady && (same(velocity, span.cruise) || self.wait > 0) {
+            self.wait = self.wait.saturating_sub(1);
+            return self.keep(span, ahead);
+        }
+        self.climb(span, ahead)
+    }
+
+    /// A slice at a steady velocity.
+    #[inline(never)]
+    fn keep(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
+        let velocity = self.velocity;
+        let distance = velocity * span.seconds;
+        let at = self.potential(distance);
+        if !self.is_clear(velocity, at) {
+            if self.scanned {
+                return false;
+            }
+            self.scan(&Ask::about(velocity, 0.0, self.here(span)), ahead);
+        }
+        self.keep_or_slow(span, distance, at);
+        true
+    }
+
+    /// After a scan for the steady velocity: goes on, or slows down where it has to.
+    fn keep_or_slow(&mut self, span: &Span, distance: f32, at: f32) {
+        if self.is_clear(self.velocity, at) {
+            self.add(span.seconds, distance);
+        } else {
+            self.slow_for_clear(0.0);
+            self.follow(span.seconds);
+        }
+    }
+
+    /// Lays out the ramp for what the last scan has found; the top is `at` so far on.
+    fn slow_for_clear(&mut self, at: f32) {
+        let Clear { distance, target, closed, .. } = self.clear;
+        let slack = 0.5 * (distance - at) / self.limits.accel;
+        self.lay(target, slack, closed);
+        self.changed = false;
+    }
+
+    /// Distance from the state to the end of the block, brake potential; negative if it is beyond.
+    fn here(&self, span: &Span) -> f32 {
+        span.left * (self.limits.accel + self.limits.accel)
+    }
+
+    /// The state after a slice in which alpha goes to `alpha`.
+    #[inline(never)]
+    fn next(&self, alpha: f32, seconds: f32, out: &mut Next) {
+        let half = 0.5 * seconds;
+        let velocity = self.velocity + half * self.limits.accel * (self.alpha + alpha);
+        out.velocity = velocity;
+        out.alpha = alpha;
+        out.distance = half * (self.velocity + velocity);
+        out.top = velocity + self.limits.kappa * alpha * alpha;
+    }
+
+    /// Fills in how far on the top is.
+    #[inline(never)]
+    fn place_top(&self, next: &mut Next) {
+        next.at = self.potential(next.distance) + self.rising(next.alpha, next.velocity, next.top);
+    }
+
+    /// Distance in which an acceleration ends, or a deceleration, then less than 0; brake potential.
+    fn rising(&self, alpha: f32, velocity: f32, top: f32) -> f32 {
+        // Velocity plus two thirds of what is to come.
+        4.0 * self.limits.kappa * alpha * (top - (top - velocity) * (1.0 / 3.0))
+    }
+
+    /// A slice of acceleration, if that is safe.
+    #[inline(never)]
+    fn climb(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
+        let (alpha, seconds) = (self.alpha, span.seconds);
+        let mut next = Next::default();
+        self.next(lesser(alpha + self.limits.pace * seconds, 1.0), seconds, &mut next);
+        if next.top > span.cruise {
+            if !some(alpha) {
+                // So near that the acceleration need not build up.
+                next = Next {
+                    velocity: span.cruise,
+                    alpha: 0.0,
+                    distance: 0.5 * (self.velocity + span.cruise) * seconds,
+                    top: span.cruise,
+                    at: 0.0,
+                };
+            } else {
+                self.next(alpha, seconds, &mut next);
+                if next.top > span.cruise {
+                    return self.arrive(span, ahead);
+                }
+            }
+        }
+        self.place_top(&mut next);
+        if !self.is_clear(next.top, next.at) {
+            if self.scanned {
+                return false;
+            }
+            if !self.look_ahead(&next, span, ahead) {
+                self.end_climb(span);
+                return true;
+            }
+        }
+        (self.velocity, self.alpha) = (next.velocity, next.alpha);
+        self.add(seconds, next.distance);
+        true
+    }
+
+    /// Whether the next state is safe; looks further if that is worth while. If it is not safe, `clear` is for the
+    /// state that is.
+    #[inline(never)]
+    fn look_ahead(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) -> bool {
+        let gain = self.limits.accel * span.seconds * f32::from(self.margin);
+        let far = lesser(next.top + gain, greater(span.cruise, next.top));
+        let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
+        let ask = Ask {
+            tops: [far, next.top, top],
+            at: [next.at, next.at, self.rising(self.alpha, self.velocity, top)],
+            first: u8::from(self.margin == 0),
+            level: 0.0,
+            here: self.here(span),
+        };
+        let found = self.scan(&ask, ahead);
+        self.margin = if found == ask.first { (2 * self.margin + 1).min(MARGIN) } else { 0 };
+        self.changed = false;
+        found != LOWEST
+    }
+
+    /// It goes no faster: the acceleration ends, and if it is time, a ramp goes down. `clear` is for the state.
+    #[inline(never)]
+    fn end_climb(&mut self, span: &Span) {
+        self.wait = WAIT;
+        let crawl = 2.0 * self.limits.jerk * span.seconds * span.seconds;
+        if self.velocity <= crawl && self.clear.place <= self.here(span) + crawl {
+            // A stop is so near that it is not worth a ramp.
+            return self.creep(span);
+        }
+        if some(self.alpha) {
+            let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
+            let at = self.rising(self.alpha, self.velocity, top);
+            let soon = self.potential(top * span.seconds);
+            if self.clear.distance - at > soon + soon {
+                self.level_off(top);
+            } else {
+                self.slow_for_clear(at);
+            }
+            self.follow(span.seconds);
+        } else if some(self.velocity) {
+            let distance = self.velocity * span.seconds;
+            self.keep_or_slow(span, distance, self.potential(distance));
+        } else {
+            self.creep(span);
+        }
+    }
+
+    /// The acceleration ends at the feed, if that is safe.
+    #[inline(never)]
+    fn arrive(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
+        let cruise = span.cruise;
+        let climb = self.limits.kappa * self.alpha * self.alpha;
+        if cruise - self.velocity < 0.98 * climb {
+            // An override has lowered the feed.
+            return self.slow_down(span, ahead);
+        }
+        let distance = self.level_off(cruise);
+        let next = Next { top: cruise, at: self.potential(distance), ..Next::default() };
+        if !self.is_clear(cruise, next.at) {
+            if self.scanned {
+                self.ramp = None;
+                return false;
+            }
+            if !self.look_ahead(&next, span, ahead) {
+                self.ramp = None;
+                self.end_climb(span);
+                return true;
+            }
+        }
+        self.follow(span.seconds);
+        true
+    }
+
+    /// It is faster than the feed, or will be.
+    #[inline(never)]
+    fn slow_down(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
+        let (cruise, seconds) = (span.cruise, span.seconds);
+        let near = self.limits.jerk * seconds * seconds;
+        if !some(self.alpha) && self.velocity - cruise <= near {
+            let distance = 0.5 * (self.velocity + cruise) * seconds;
+            self.velocity = cruise;
+            self.add(seconds, distance);
+            return true;
+        }
+        if self.scanned {
+            return false;
+        }
+        self.go_down_to(cruise, span, ahead);
+        self.follow(seconds);
+        true
+    }
+
+    /// Lays out a ramp down to `velocity`, or, if that is not safe, one to a standstill.
+    #[inline(never)]
+    fn go_down_to(&mut self, velocity: f32, span: &Span, ahead: &impl Ahead) {
+        let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
+        let low = lesser(velocity, top);
+        let at = self.rising(self.alpha, self.velocity, top) + needed(top, low, self.limits.kappa);
+        self.scan(&Ask::about(low, at, self.here(span)), ahead);
+        self.changed = false;
+        if self.clear.distance >= at {
+            self.lay(low, 0.0, true);
+        } else {
+            self.lay(0.0, 0.0, false);
+        }
+    }
+
+    /// It decelerates without a ramp: after a feedhold, or where limits change. Or a ramp is not what it has to be any more.
+    #[inline(never)]
+    fn recover(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
+        if self.scanned {
+            return false;
+        }
+        let bottom = self.bottom();
+        if bottom > span.cruise {
+            self.go_down_to(span.cruise, span, ahead);
+        } else {
+            self.changed = false;
+            if !self.try_bottom(bottom, span, ahead) {
+                self.brake_harder();
+            }
+        }
+        self.follow(span.seconds);
+        true
+    }
+
+    /// It decelerates, and has to go on: to the constraint that the scan has found, or, if that is too near for a deceleration that
+    /// ends there, to a standstill.
+    #[inline(never)]
+    fn brake_harder(&mut self) {
+        let Clear { target, place, closed, .. } = self.clear;
+        let kappa = self.limits.kappa;
+        let top = self.velocity + kappa * self.alpha * self.alpha;
+        let at = self.rising(self.alpha, self.velocity, top);
+        let fits = target < top && at + needed(top, target, kappa) <= place;
+        self.lay(if fits { target } else { 0.0 }, 0.0, closed && fits);
+    }
+
+    /// Something ahead has changed: gives the ramp up if there is something better.
+    #[inline(never)]
+    fn reconsider(&mut self, span: &Span, ahead: &impl Ahead) {
+        self.changed = false;
+        let ramp = self.ramp;
+        self.leave_ramp();
+        if !self.alpha.is_sign_negative() || !some(self.alpha) {
+            // It has not begun to slow down.
+            (self.alpha, self.wait) = (greater(self.alpha, 0.0), 0);
+            return;
+        }
+        let bottom = self.bottom();
+        if bottom > span.cruise || !self.try_bottom(bottom, span, ahead) {
+            self.ramp = ramp;
+        }
+    }
+
+    /// The velocity at which the deceleration is ended, if that begins now; none if it is hardly any.
+    #[inline(never)]
+    fn bottom(&self) -> f32 {
+        let bottom = self.velocity - self.limits.kappa * self.alpha * self.alpha;
+        if bottom > 0.2 * self.limits.jerk * (SEGMENT_S * SEGMENT_S) { bottom } else { 0.0 }
+    }
+
+    /// Ends the deceleration, at the velocity `bottom`, if that is safe.
+    #[inline(never)]
+    fn try_bottom(&mut self, bottom: f32, span: &Span, ahead: &impl Ahead) -> bool {
+        // Less than 0 is from the bottom back to the state.
+        let at = -self.rising(self.alpha, self.velocity, bottom);
+        let ask = Ask { level: self.velocity, ..Ask::about(bottom, at, self.here(span)) };
+        self.scan(&ask, ahead);
+        let safe = self.clear.distance >= at;
+        if safe {
+            self.bottom_out(bottom);
+        }
+        safe
+    }
+
+    /// From rest to rest over what is too short to get going: a fraction of a step, most likely.
+    #[inline(never)]
+    fn creep(&mut self, span: &Span) {
+        (self.velocity, self.alpha, self.wait) = (0.0, 0.0, 0);
+        let left = greater(span.left, 0.0);
+        // Four jerk phases: left = J T^3 / 32.
+        let seconds = greater(cube_root(32.0 * left / self.limits.jerk), span.seconds);
+        self.add(greater(seconds, left / span.cruise), left);
+    }
+
+    /// A feedhold begins: the ramp down to a standstill, as hard as the limits allow.
+    #[inline(never)]
+    pub(super) fn halt_ramp(&mut self) {
+        self.leave_ramp();
+        self.halting = true;
+        self.clear = Clear::NONE;
+        if some(self.velocity) {
+            self.lay(0.0, 0.0, true);
+        }
+    }
+}
+
+/// Up to 5 % more than the cube root of a positive number: the bits of a float are nearly its logarithm.
+fn cube_root(x: f32) -> f32 {
+    f32::from_bits(x.to_bits() / 3 + 0x2A51_19F2) * 1.05
+}

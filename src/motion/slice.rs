@@ -1,0 +1,164 @@
+//! Time under a jerk limit goes in slices of a few milliseconds, whatever blocks do.
+//!
+//! Called by [`Governor::stretch`](super::governor::Governor::stretch), exec level. A stretch is a slice, or what of it lies in the block;
+//! the rest of the slice belongs to the blocks that follow. So the mathematics of a ramp is done once for a slice, however short
+//! blocks are, and a block that is over within the slice costs one multiplication. Near the end of a block slices are made
+//! longer or shorter, so that no stretch is much shorter than a slice unless its block is.
+//!
+//! Units: mm, s.
+
+use super::constraint::Ahead;
+use super::float::{below, greater, scaled, some};
+use super::governor::{Governor, Stretch};
+
+/// A part of a slice that has been worked out and not been handed out.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rest {
+    pub seconds: f32,
+    pub distance: f32,
+    /// Seconds for a millimetre, once a part has been handed out.
+    inverse: f32,
+}
+
+impl Rest {
+    pub const NONE: Self = Self { seconds: 0.0, distance: 0.0, inverse: 0.0 };
+}
+
+/// What a slice is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    /// Distance from the state to the end of the block.
+    pub left: f32,
+    /// Velocity limit.
+    pub cruise: f32,
+    /// How long it is to be.
+    pub seconds: f32,
+}
+
+/// At rest, a distance that rounding leaves: it takes no ramp of its own.
+const ROUNDING: f32 = 5e-4;
+
+impl Governor {
+    /// The next stretch, in slices of about `nominal` seconds.
+    #[inline(never)]
+    pub(super) fn smooth(
+        &mut self,
+        left: f32,
+        cruise: f32,
+        ahead: &impl Ahead,
+        nominal: f32,
+    ) -> Stretch {
+        if self.is_within_slice(left) {
+            return self.part(left);
+        }
+        if self.halting {
+            self.halting = false;
+            self.leave_ramp();
+        }
+        self.scanned = false;
+        for _ in 0..2 {
+            let Some(seconds) = self.wanted(left, nominal) else { break };
+            let span = Span { left: left - self.rest.distance, cruise, seconds };
+            if !self.slice(&span, ahead) {
+                break;
+            }
+        }
+        self.cut(left)
+    }
+
+    /// A stretch of a feedhold.
+    #[inline(never)]
+    pub(super) fn smooth_halt(&mut self, left: f32, nominal: f32) -> Stretch {
+        if self.is_within_slice(left) {
+            return self.part(left);
+        }
+        if !self.halting {
+            self.halt_ramp();
+        }
+        for _ in 0..2 {
+            if self.ramp.is_none() {
+                break;
+            }
+            let Some(seconds) = self.wanted(left, nominal) else { break };
+            self.follow(seconds);
+        }
+        self.cut(left)
+    }
+
+    /// Whether the block is over within the slice.
+    #[inline(always)]
+    fn is_within_slice(&self, left: f32) -> bool {
+        !self.rest.distance.is_sign_negative() && below(left, self.rest.distance)
+    }
+
+    /// How long the next slice is to be, if what there is will not do: a stretch would be too short, or leave too
+    /// little of the block. Cost: 600, 1,200 near the end of a block.
+    #[inline(never)]
+    fn wanted(&self, left: f32, nominal: f32) -> Option<f32> {
+        let Rest { seconds, distance, .. } = self.rest;
+        let more = left - distance;
+        let velocity = self.velocity;
+        if more <= self.little() {
+            return (seconds <= 0.0).then_some(nominal);
+        }
+        let slice = velocity * nominal;
+        let much = more >= 0.5 * slice;
+        if much && seconds >= scaled(nominal, -1) {
+            return None;
+        }
+        if !much || more >= slice + slice {
+            return Some(nominal);
+        }
+        // So that it ends about where the block does.
+        let time = more / velocity;
+        Some(if time >= 1.5 * nominal { scaled(time, -1) } else { time })
+    }
+
+    /// A distance that counts as none.
+    #[inline(always)]
+    fn little(&self) -> f32 {
+        if some(self.velocity) { scaled(self.velocity, -13) } else { ROUNDING }
+    }
+
+    /// A slice has been worked out.
+    #[inline(always)]
+    pub(super) fn add(&mut self, seconds: f32, distance: f32) {
+        self.clear.distance -= self.potential(distance);
+        self.clear.age = self.clear.age.saturating_add(1);
+        if some(self.rest.seconds) {
+            self.rest.seconds += seconds;
+            self.rest.distance += distance;
+        } else {
+            self.rest = Rest { seconds, distance, inverse: 0.0 };
+        }
+    }
+
+    /// What of the slices is in the block.
+    #[inline(never)]
+    pub(super) fn cut(&mut self, left: f32) -> Stretch {
+        let Rest { seconds, distance, .. } = self.rest;
+        let more = left - distance;
+        if more > self.little() {
+            self.rest = Rest::NONE;
+            // What has been borrowed before a stop is not given back.
+            let (seconds, distance) = (greater(seconds, 1e-6), greater(distance, 0.0));
+            return Stretch { seconds, distance, ends: false };
+        }
+        if !some(self.velocity) && more >= -ROUNDING {
+            self.rest = Rest::NONE;
+            return Stretch { seconds: greater(seconds, 1e-6), distance: left, ends: true };
+        }
+        // A little less than nothing may be left.
+        self.rest.inverse = seconds / distance;
+        self.part(left)
+    }
+
+    /// So much of the slice.
+    #[inline(always)]
+    fn part(&mut self, left: f32) -> Stretch {
+        let seconds = left * self.rest.inverse;
+        self.rest.seconds -= seconds;
+        self.rest.distance -= left;
+        Stretch { seconds, distance: left, ends: true }
+    }
+}

@@ -1,0 +1,95 @@
+//! The governor without a jerk limit: trapezoids of velocity.
+//!
+//! Called by [`Governor::stretch`], exec level. Velocities keep to `v^2 <= headroom + 2 A left`, and a stretch is the solution of
+//! that with its own length in it. Units: mm, s. Cost on AVR: 1,500 cycles a stretch, 2,500 for one that ends a block or
+//! brakes.
+
+use super::exec::SEGMENT_S;
+use super::float::{OCTAVE, below, greater, least, lesser, log, scaled};
+use super::governor::{Governor, Stretch, same};
+use crate::math::sqrt;
+
+/// Logarithms that are further apart leave no doubt about the product of two numbers.
+const PLAIN: i32 = OCTAVE / 5;
+
+impl Governor {
+    #[inline(never)]
+    pub(super) fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
+        let (v, seconds) = (self.velocity, SEGMENT_S);
+        // Rounding may put a stop before the end of the block.
+        let headroom = if headroom.is_sign_negative() { 0.0 } else { headroom };
+        // Steady over a block that is short enough to be one stretch.
+        if same(v, cruise)
+            && below(cruise * cruise, headroom)
+            && below(left, cruise * (seconds + seconds))
+        {
+            return Stretch { seconds: left / v, distance: left, ends: true };
+        }
+        // Mostly plain: a block that is run through in no more than one.
+        if log(v) + log(seconds + seconds) < log(left) + PLAIN
+            && below(v * (seconds + seconds), left)
+        {
+            let gain = self.limits.accel * seconds;
+            let half = 0.5 * seconds;
+            // An override may have taken the feed away from under it.
+            let mut next = greater(lesser(v + gain, cruise), v - gain);
+            let mut distance = (v + next) * half;
+            let twice = self.limits.accel + self.limits.accel;
+            if next * next > headroom + twice * (left - distance) {
+                let b = 0.5 * gain;
+                next = sqrt(b * b + headroom + twice * left - gain * v) - b;
+                // A little more than the limit makes up for rounding.
+                let least = v - gain * 1.005;
+                next = greater(lesser(next, cruise), greater(least, 0.0));
+                distance = (v + next) * half;
+            }
+            if distance + half * next < left && distance > 0.0 {
+                self.velocity = next;
+                return Stretch { seconds, distance, ends: false };
+            }
+        }
+        self.finish(left, cruise, headroom)
+    }
+
+    /// `next`, or the least velocity that it can have at the end, from `v` and with so much to lose, if that
+    /// is more by what is not rounding: an override has lowered the limit too late.
+    #[inline(never)]
+    pub(super) fn slowest(&self, v: f32, gain: f32, next: f32, nominal: f32) -> f32 {
+        let least = sqrt(greater(v * v - gain, 0.0));
+        if least > next + self.limits.accel * nominal { least } else { next }
+    }
+
+    /// All the rest of a block in one.
+    #[inline(never)]
+    fn finish(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
+        let (v, nominal) = (self.velocity, SEGMENT_S);
+        let gain = scaled(self.limits.accel * left, 1);
+        let square = v * v + gain;
+        let next = least(sqrt(least(square, headroom)), cruise);
+        let late = below(next, v) && (self.late || below(cruise, v));
+        let next = if late { self.slowest(v, gain, next, nominal) } else { next };
+        self.velocity = next;
+        let sum = v + next;
+        let mut seconds = 2.0 * nominal;
+        if below(cruise, v)
+            || log(sum) + log(nominal) > log(left) + PLAIN
+            || below(left, sum * nominal)
+        {
+            seconds = scaled(left, 1) / sum;
+        } else if square > 0.0 {
+            // From rest to rest or nearly so: there is a peak between.
+            let peak = sqrt(0.5 * (square + next * next));
+            if peak < cruise {
+                seconds = (peak + peak - sum) / self.limits.accel;
+            } else {
+                let ramps = (cruise + cruise - sum) / self.limits.accel;
+                // The ramps' way: each at the mean of its ends.
+                let slower =
+                    0.5 * ((cruise - v) * (cruise - v) + (cruise - next) * (cruise - next));
+                seconds = (left + slower / self.limits.accel) / cruise;
+                seconds = greater(seconds, ramps);
+            }
+        }
+        Stretch { seconds, distance: left, ends: true }
+    }
+}
