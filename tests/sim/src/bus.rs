@@ -34,6 +34,8 @@ pub struct Bus {
     pub(crate) cpu: Cpu,
     owners: [Owner; IO_END],
     pub(crate) timers: [Timer; 6],
+    /// Which of them makes the ticks of the step generator.
+    step_timer: usize,
     pub(crate) uarts: [Uart; 4],
     pub(crate) eeprom: Eeprom,
     /// A line for each serial port of the board, and the USART it leads to.
@@ -54,11 +56,12 @@ pub struct Bus {
 
 impl Bus {
     /// Puts the peripherals around a CPU, which keeps the pointer returned.
-    pub fn install(cpu: Cpu, wires: Vec<(usize, Wire)>) -> NonNull<Bus> {
+    pub fn install(cpu: Cpu, step_timer: usize, wires: Vec<(usize, Wire)>) -> NonNull<Bus> {
         let bus = Box::new(Bus {
             cpu,
             owners: owners(),
             timers: std::array::from_fn(|i| Timer::new(&LAYOUTS[i])),
+            step_timer,
             uarts: std::array::from_fn(Uart::new),
             eeprom: Eeprom::new(),
             wires,
@@ -213,7 +216,12 @@ impl Bus {
         self.cpu.set_data(usize::from(addr), value);
         match self.owners[usize::from(addr)] {
             Owner::Timer(i) => {
+                let ran = self.timers[i].runs();
                 self.timers[i].write(addr, value, now);
+                let runs = self.timers[i].runs();
+                if i == self.step_timer && ran != runs {
+                    self.recorder.timer(runs);
+                }
                 self.update_timer(i, now);
             }
             Owner::Uart(i) => {

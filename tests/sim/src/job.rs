@@ -7,10 +7,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use kerf::boards::MOTORS;
 
 use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::machine::Machine;
 use crate::oracle::{self, Outcome, Setup, Unclear};
+use crate::pauses::Scale;
 use crate::protocol::STATUS_NOOP;
 use crate::report::{Measured, Rejected, Report};
 use crate::trace::Trace;
@@ -90,6 +92,19 @@ fn put_away(machine: &mut Machine, host: &mut Host) -> Result<()> {
     Ok(())
 }
 
+/// What the meter of pauses needs to know.
+fn scale(machine: &Machine, lines: &Lines, setup: &Setup) -> Scale {
+    let ends = oracle::ends(lines.iter().map(|(n, l)| (*n, l.as_str())), setup);
+    let at_pins = |steps: Vec<i64>| -> [i64; MOTORS] {
+        std::array::from_fn(|m| if setup.motors[m].inverted { -steps[m] } else { steps[m] })
+    };
+    Scale {
+        clock_hz: f64::from(machine.board().clock_hz),
+        motors: setup.travels(),
+        ends: ends.into_iter().map(|(line, steps)| (line, at_pins(steps))).collect(),
+    }
+}
+
 /// Boots the machine, runs a job on it and says how it went. An error means that the job could not
 /// begin; all that goes wrong later is in the report. `progress` gets the lines answered so far.
 pub fn run(
@@ -122,6 +137,8 @@ pub fn run(
     let active_low = active_low.fold(0, |bits, (m, motor)| bits | u8::from(motor.active_low) << m);
     machine.recorder_mut().set_active_low(active_low);
     machine.recorder_mut().clear();
+    let scale = scale(machine, lines, &setup);
+    machine.recorder_mut().meter_pauses(scale);
     machine.meters_mut().clear();
     let banners = host.banners();
     let mut run = Run {

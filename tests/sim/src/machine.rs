@@ -98,7 +98,7 @@ impl Machine {
             };
             (usart, Wire::new(board.clock_hz, serial.rate))
         });
-        let bus = Bus::install(cpu, wires.collect());
+        let bus = Bus::install(cpu, board.step_timer as usize, wires.collect());
         let probes = recorder::attach(bus, cpu, board);
         let meters = Meters::new(vectors::compare_a(board.step_timer));
         Ok(Machine {

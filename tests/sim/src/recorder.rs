@@ -9,6 +9,7 @@ use simavr_ffi as ffi;
 use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::mechanics::SpindlePin;
+use crate::pauses::{Found, Meter, Scale};
 use crate::trace::Trace;
 
 /// A step: when, which motor (0 is motor 1), which way.
@@ -100,6 +101,7 @@ pub struct Recorder {
     last: Option<(u64, Sums)>,
     log: Option<Vec<Step>>,
     trace: Option<Trace>,
+    pauses: Option<Meter>,
 }
 
 impl Recorder {
@@ -110,6 +112,7 @@ impl Recorder {
             last: None,
             log: None,
             trace: None,
+            pauses: None,
         }
     }
 
@@ -146,6 +149,23 @@ impl Recorder {
     /// When a motor stepped, of the steps kept.
     pub fn steps_of(&self, motor: u8) -> Vec<u64> {
         self.log().iter().filter(|s| s.motor == motor).map(|s| s.cycle).collect()
+    }
+
+    /// Looks for pauses from now on, motors being at rest.
+    pub fn meter_pauses(&mut self, scale: Scale) {
+        self.pauses = Some(Meter::new(scale));
+    }
+
+    /// The pauses found; none if nobody has asked to look for them.
+    pub fn pauses(&self) -> Found {
+        self.pauses.as_ref().map(Meter::found).unwrap_or_default()
+    }
+
+    /// The step timer was started or stopped.
+    pub(crate) fn timer(&mut self, runs: bool) {
+        if let Some(meter) = &mut self.pauses {
+            meter.timer(runs);
+        }
     }
 
     pub(crate) fn set_trace(&mut self, trace: Option<Trace>) -> Option<Trace> {
@@ -191,8 +211,12 @@ impl Recorder {
             m.begin_pulse(now);
             self.first.get_or_insert((now, sums));
             self.last = Some((now, sums));
+            let step = Step { cycle: now, motor: motor as u8, positive };
             if let Some(log) = &mut self.log {
-                log.push(Step { cycle: now, motor: motor as u8, positive });
+                log.push(step);
+            }
+            if let Some(meter) = &mut self.pauses {
+                meter.step(step);
             }
         } else {
             m.end_pulse(now);
