@@ -250,3 +250,6 @@ fn planned(gap: f64, before: &Side, after: &Side) -> bool {
     let reach = 0.6 * gap + SLICES_S;
     after.rest <= reach && (before.rest <= reach || gap > ENDED_S)
 }
+
+#[cfg(test)]
+mod tests;
