@@ -48,6 +48,8 @@ pub struct Bus {
     pub(crate) sums: Sums,
     /// Interrupts that ask for service, by vector.
     pub(crate) pending: u64,
+    /// Interrupts that are not served although they ask, by vector.
+    withheld: u64,
     /// When each of them began to ask.
     raised_at: [u64; vectors::COUNT],
     /// Cycle of the next thing to happen.
@@ -71,6 +73,7 @@ impl Bus {
             changed: Vec::new(),
             sums: Sums::default(),
             pending: 0,
+            withheld: 0,
             raised_at: [0; vectors::COUNT],
             due: u64::MAX,
         });
@@ -152,6 +155,13 @@ impl Bus {
         self.refresh_due();
     }
 
+    /// An interrupt of a USART is not served from now on, or it is again.
+    pub fn withhold(&mut self, vector: u8, withheld: bool) {
+        let bit = 1 << vector;
+        self.withheld = if withheld { self.withheld | bit } else { self.withheld & !bit };
+        (0..self.uarts.len()).for_each(|i| self.update_uart(i, self.cpu.cycle()));
+    }
+
     /// The level of an input has changed.
     pub fn pin_edge(&mut self, port: char, bit: u8, high: bool) {
         self.pins.edge(port, bit, high);
@@ -203,6 +213,7 @@ impl Bus {
     }
 
     fn set_lines(&mut self, mask: u64, lines: u64, at: u64) {
+        let lines = lines & !self.withheld;
         let mut fresh = lines & !self.pending;
         self.pending = (self.pending & !mask) | lines;
         while fresh != 0 {
@@ -220,7 +231,7 @@ impl Bus {
                 self.timers[i].write(addr, value, now);
                 let runs = self.timers[i].runs();
                 if i == self.step_timer && ran != runs {
-                    self.recorder.timer(runs);
+                    self.recorder.timer(runs, now);
                 }
                 self.update_timer(i, now);
             }

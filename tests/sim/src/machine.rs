@@ -390,6 +390,11 @@ impl Machine {
         self.bus_mut().store(addr, value);
     }
 
+    /// An interrupt of a USART is not served from now on, or it is again: to hold up what runs in it.
+    pub fn withhold(&mut self, vector: u8, withheld: bool) {
+        self.bus_mut().withhold(vector, withheld);
+    }
+
     /// A word of the data space, as memory holds it.
     pub fn peek_word(&self, addr: u16) -> u16 {
         u16::from_le_bytes([self.peek(addr), self.peek(addr + 1)])

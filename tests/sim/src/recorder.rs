@@ -100,6 +100,7 @@ pub struct Recorder {
     first: Option<(u64, Sums)>,
     last: Option<(u64, Sums)>,
     log: Option<Vec<Step>>,
+    runs: Vec<(u64, u64)>,
     trace: Option<Trace>,
     pauses: Option<Meter>,
 }
@@ -111,6 +112,7 @@ impl Recorder {
             first: None,
             last: None,
             log: None,
+            runs: Vec::new(),
             trace: None,
             pauses: None,
         }
@@ -161,8 +163,19 @@ impl Recorder {
         self.pauses.as_ref().map(Meter::found).unwrap_or_default()
     }
 
+    /// The times that the step timer has run, from cycle to cycle, while steps were kept; one that still runs ends at
+    /// [`u64::MAX`].
+    pub fn timer_runs(&self) -> &[(u64, u64)] {
+        &self.runs
+    }
+
     /// The step timer was started or stopped.
-    pub(crate) fn timer(&mut self, runs: bool) {
+    pub(crate) fn timer(&mut self, runs: bool, now: u64) {
+        if self.log.is_some() && runs {
+            self.runs.push((now, u64::MAX));
+        } else if let Some(run) = self.runs.last_mut() {
+            run.1 = run.1.min(now);
+        }
         if let Some(meter) = &mut self.pauses {
             meter.timer(runs);
         }
@@ -179,6 +192,7 @@ impl Recorder {
             *m = Motor { active_low, step_high, dir_high, ..Motor::new() };
         }
         (self.first, self.last) = (None, None);
+        self.runs.clear();
         if let Some(log) = &mut self.log {
             log.clear();
         }

@@ -36,6 +36,8 @@ pub struct Measured {
     pub rejected: Vec<Rejected>,
     /// Banners that came while the job ran.
     pub restarts: usize,
+    /// Segments that were late since the reset, as the firmware counts them.
+    pub late_segments: Option<u64>,
     /// What came and should not have.
     pub strays: Vec<String>,
     /// From the first line to rest.
@@ -166,6 +168,8 @@ pub struct Report {
     pub pauses: Vec<PauseReport>,
     /// Times that the step timer stood still in mid-motion.
     pub starved: Vec<PauseReport>,
+    /// Segments that were late since the reset, as the firmware counts them: 255 for more.
+    pub late_segments: Option<u64>,
     /// Tops of the step timer written behind its counter.
     pub missed_tops: u64,
     /// Resets by the watchdog.
@@ -211,6 +215,7 @@ impl Report {
             uart_overruns: machine.uart(0).overruns(),
             pauses: pause_reports(machine, &found.pauses),
             starved: pause_reports(machine, &found.starved),
+            late_segments: measured.late_segments,
             missed_tops: machine.missed_tops(),
             resets: machine.resets(),
             vectors: vector_reports(machine),
@@ -219,6 +224,27 @@ impl Report {
         report.problems = report.find_problems(&measured);
         report.ok = report.problems.is_empty();
         report
+    }
+
+    /// Pauses and stops of the step timer, whichever are more.
+    pub fn dry(&self) -> usize {
+        self.pauses.len().max(self.starved.len())
+    }
+
+    /// Whether nothing is wrong but pauses.
+    pub fn is_exact(&self) -> bool {
+        self.problems.len() == self.pause_problems().len()
+    }
+
+    fn pause_problems(&self) -> Vec<String> {
+        let late = match self.late_segments {
+            Some(0) => None,
+            Some(n) => Some(format!("{n} late segments by the firmware's count")),
+            None => Some("the firmware does not tell of late segments".to_string()),
+        };
+        let pauses = worst("pauses in the step stream", &self.pauses);
+        let starved = worst("stops of the step timer in mid-motion", &self.starved);
+        [pauses, starved, late].into_iter().flatten().collect()
     }
 
     fn find_problems(&self, measured: &Measured) -> Vec<String> {
@@ -238,8 +264,7 @@ impl Report {
             Err(unclear) => problems.push(unclear.to_string()),
             Ok(_) => problems.extend(self.wrong_motors()),
         }
-        problems.extend(worst("pauses in the step stream", &self.pauses));
-        problems.extend(worst("stops of the step timer in mid-motion", &self.starved));
+        problems.extend(self.pause_problems());
         if measured.restarts > 0 {
             problems.push(format!("the firmware restarted {} times", measured.restarts));
         }

@@ -21,6 +21,7 @@ impl Display for Report {
         self.axes(f)?;
         pauses(f, "pauses", &self.pauses)?;
         pauses(f, "step timer starved", &self.starved)?;
+        row(f, "late segments", or_dash(self.late_segments))?;
         self.load(f)?;
         window(f, "interrupts off", &self.interrupts_off)?;
         window(f, "  in the step interrupt", &self.interrupts_off_in_step)?;

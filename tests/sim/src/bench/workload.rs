@@ -135,7 +135,8 @@ impl Bed {
         stopwatches.into_iter().for_each(|s| machine.add_stopwatch(s));
         let baud = (how.baud != USUAL_BAUD).then_some(how.baud);
         let settings = self.settings(how);
-        let options = Options { baud, settings, in_flight: IN_FLIGHT, vcd: None };
+        let options =
+            Options { baud, settings, in_flight: IN_FLIGHT, vcd: None, interjections: Vec::new() };
         let report = job::run(&mut machine, &job::lines_of(job), &options, |_| {})?;
         Ok((machine, report))
     }
