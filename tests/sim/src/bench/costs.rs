@@ -51,7 +51,8 @@ pub fn segment(bed: &Bed) -> Result<Figure> {
 
 /// The same under a jerk limit: on short moves and on arcs.
 pub fn segment_jerk(bed: &Bed) -> Result<Figure> {
-    let costs = jerk_costs(bed, &[USUAL_JERK])?;
+    let jobs = [spiral(0.1), arcs(), braid(0.33, 3_000.0)];
+    let costs = jerk_costs(bed, &[USUAL_JERK], &jobs)?;
     let cycles = costs.iter().map(|c| c.mean() * c.count as f64).sum::<f64>();
     let count = costs.iter().map(|c| c.count).sum::<u64>();
     Ok(Figure { value: cycles / count as f64, note: format!("{count} segments") })
@@ -59,15 +60,15 @@ pub fn segment_jerk(bed: &Bed) -> Result<Figure> {
 
 /// The longest that exec takes for a segment under any jerk limit.
 pub fn segment_jerk_worst(bed: &Bed) -> Result<Figure> {
-    let costs = jerk_costs(bed, &[500.0, USUAL_JERK, 50_000.0])?;
+    let jobs = [arcs(), braid(0.33, 3_000.0)];
+    let costs = jerk_costs(bed, &[500.0, USUAL_JERK, 50_000.0], &jobs)?;
     let count = costs.iter().map(|c| c.count).sum::<u64>();
     let worst = costs.iter().map(|c| c.max).max().unwrap_or(0);
     Ok(Figure { value: worst as f64, note: format!("{count} segments") })
 }
 
-/// What exec takes for segments of jobs that ask much of it, under each of these jerk limits.
-fn jerk_costs(bed: &Bed, jerks: &[f64]) -> Result<Vec<Cost>> {
-    let jobs = [spiral(0.1), arcs(), braid(0.33, 3_000.0)];
+/// What exec takes for segments of these jobs under each of these jerk limits.
+fn jerk_costs(bed: &Bed, jerks: &[f64], jobs: &[String]) -> Result<Vec<Cost>> {
     let runs = jerks.iter().flat_map(|jerk| jobs.iter().map(move |job| (jerk, job)));
     runs.map(|(jerk, job)| {
         let how = How { baud: FAST_BAUD, jerk: Some(*jerk), ..How::default() };
