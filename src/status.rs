@@ -22,6 +22,7 @@ pub enum Status {
     InternalError = 20,
     ExceptionReport = 29,
     PersistenceError = 34,
+    StepsLate = 37,
     UnrecognizedName = 100,
     MalformedCommand = 101,
     BadNumber = 102,

@@ -10,7 +10,7 @@ pub fn status_text(status: Status) -> Option<Text> {
     (0..TEXTS.len()).find_map(|i| TEXTS.at(i).filter(|(code, _)| *code == status)).map(|(_, t)| t)
 }
 
-const ENTRIES: usize = 85;
+const ENTRIES: usize = 86;
 
 progmem! {
     static TEXTS: [(Status, Text); ENTRIES] = [
@@ -26,6 +26,7 @@ progmem! {
         (Status::InternalError, text!("Internal error")),
         (Status::ExceptionReport, text!("Generic exception report")),
         (Status::PersistenceError, text!("Persistence error")),
+        (Status::StepsLate, text!("Steps came late")),
         (Status::UnrecognizedName, text!("Unrecognized command or config name")),
         (Status::MalformedCommand, text!("Invalid or malformed command")),
         (Status::BadNumber, text!("Bad number format")),

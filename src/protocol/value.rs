@@ -61,6 +61,8 @@ pub enum Value {
     Flood,
     /// `rst`: why the machine has started, see [`Cause`](crate::hal::resets::Cause).
     Reset,
+    /// `stv`: how many times steps have waited for the planner in mid-motion since the reset, 255 for more.
+    Starvations,
     /// `tool`: tool number.
     Tool,
     /// `home`: 0 not homed, 1 homed, 2 homing.
@@ -210,7 +212,7 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 41;
+pub const SINGLE_COUNT: usize = 42;
 /// Entries of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
 /// The number of the vector `g92`.
@@ -316,6 +318,7 @@ progmem! {
         count("fd", Value::Zero, NONE, NONE),
         single("ma", Value::Zero, Form::Length),
         count("rst", Value::Reset, text!("Last reset:"), text!("Power on|External|Brown-out|Watchdog|Asked for")),
+        count("stv", Value::Starvations, text!("Late segments:"), NONE),
         count("inp", PROBE, text!("Probe:"), NONE),
         count("ind", DOOR, text!("Door:"), NONE),
         count("ine", STOP, text!("Emergency stop:"), NONE),

@@ -45,6 +45,7 @@ pub fn run(
             })
             .await;
             let waiting = blocks.len();
+            let rested = rests;
             let standstill = !stepper::running();
             if contact::is_noted() {
                 contact::catch_up(&segments);
@@ -67,7 +68,6 @@ pub fn run(
                     finished.end(line);
                 }
                 if step == Step::Segment {
-                    rests = out.velocity.to_bits() == 0;
                     finished.queue();
                     power::segment(segment.moving);
                 } else if let Step::Override(change) = step {
@@ -90,6 +90,8 @@ pub fn run(
                 } else if step == Step::Switched {
                     machine.wait(spindle::switch(out, true), out);
                 }
+                // A standstill stays one until a segment leads out of it; velocity is ahead of the segments.
+                rests = out.velocity.to_bits() == 0 || (rests && step != Step::Segment);
                 step
             });
             if step == Step::Segment {
@@ -100,6 +102,9 @@ pub fn run(
                 machine.set_coarse(event::pass_over() > PATIENCE);
                 if contact::is_noted() {
                     contact::pushed(&segment);
+                }
+                if !rested {
+                    health::look_for_starvation();
                 }
                 stepper::go();
                 let cycles = u32::from(segment.ticks) * u32::from(segment.period);

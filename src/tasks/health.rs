@@ -7,7 +7,10 @@
 //!
 //! While motors move on fine ticks, thread mode may have a few percent of the CPU, and one report may take all of half a
 //! second. So exec feeds the watchdog as well, each [`OFTEN`] segments, as long as it has [`PATIENCE`]: 3 s of the
-//! shortest segments, 8 s of usual ones. Cost: 300 cycles a look, and one poll of exec.
+//! shortest segments, 8 s of usual ones. Exec counts as well how often the steppers have waited for it in mid-motion
+//! ([`starvations`]), which is a fault, but none that a reset mends: `{stv:n}` tells it, and the reporter the first. Cost: 300 cycles a look, and one poll of exec.
+
+use kerf_macros::small;
 
 use crate::hal::byte::SharedByte;
 use crate::hal::imp::{exec, stepper, watchdog};
@@ -56,6 +59,25 @@ pub fn moves(count: u8) {
             watchdog::feed();
         }
     }
+}
+
+machine_static! {
+    // Exec counts; thread mode reads.
+    fn late() -> SharedByte = SharedByte::new(0);
+}
+
+/// A segment follows one that ended at speed: if the steppers stand still, they have waited for it. Exec only.
+#[inline(never)]
+#[small]
+pub fn look_for_starvation() {
+    if !stepper::running() && !stepper::is_stopped() {
+        late().set(late().get().saturating_add(1));
+    }
+}
+
+/// How many times the steppers have waited for a segment in mid-motion since the reset, 255 for more. Any level.
+pub fn starvations() -> u8 {
+    late().get()
 }
 
 /// Feeds the watchdog if all is well, and asks for other signs. Thread mode.

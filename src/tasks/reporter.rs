@@ -9,6 +9,7 @@
 use embassy_futures::select::select;
 use embassy_time::Timer;
 
+use super::health;
 use super::links::Links;
 use super::ports::Port;
 use super::tx::Tx;
@@ -32,6 +33,7 @@ struct Told {
     hold: i32,
     blocks_free: usize,
     at: u32,
+    starved: bool,
 }
 
 /// The task; `occasion` is what has come of the start.
@@ -40,9 +42,16 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         greet(links, occasion).await;
     }
     greet(links, Occasion::Ready).await;
-    let mut told = Told { state: 0, hold: 0, blocks_free: queue_free(), at: millis() };
+    let mut told =
+        Told { state: 0, hold: 0, blocks_free: queue_free(), at: millis(), starved: false };
     let mut due = true;
     loop {
+        // Once: `stv` counts the others.
+        let exception = &links.told().exception;
+        if !told.starved && health::starvations() > 0 && exception.get().is_none() {
+            told.starved = true;
+            exception.set(Some(Status::StepsLate));
+        }
         for port in &links.ports {
             if port.enquiry.take() {
                 answer_enquiry(links, port).await;

@@ -7,6 +7,7 @@
 use core::cell::{OnceCell, RefMut};
 
 use super::alarm;
+use super::health;
 use super::hold;
 use super::homing;
 use super::jog::Bar;
@@ -353,6 +354,7 @@ impl Machine for View<'_> {
             },
             Value::Hold => self.hold(),
             Value::Reset => watchdog::cause() as i32,
+            Value::Starvations => health::starvations().into(),
             Value::Home => self.home_state(),
             Value::Blamed => self.links.model.borrow().blamed().into(),
             modal => self.modal(modal),

@@ -31,7 +31,7 @@ fn every_token_has_a_name_that_finds_it() {
             + 3 * 15
             + 16
             + 2 * 9
-            + 41
+            + 42
             + 46
             + 2 * 6
             + 2

@@ -34,6 +34,8 @@ pub struct Bus {
     pub(crate) cpu: Cpu,
     owners: [Owner; IO_END],
     pub(crate) timers: [Timer; 6],
+    /// Which of them makes the ticks of the step generator.
+    step_timer: usize,
     pub(crate) uarts: [Uart; 4],
     pub(crate) eeprom: Eeprom,
     /// A line for each serial port of the board, and the USART it leads to.
@@ -46,6 +48,8 @@ pub struct Bus {
     pub(crate) sums: Sums,
     /// Interrupts that ask for service, by vector.
     pub(crate) pending: u64,
+    /// Interrupts that are not served although they ask, by vector.
+    withheld: u64,
     /// When each of them began to ask.
     raised_at: [u64; vectors::COUNT],
     /// Cycle of the next thing to happen.
@@ -54,11 +58,12 @@ pub struct Bus {
 
 impl Bus {
     /// Puts the peripherals around a CPU, which keeps the pointer returned.
-    pub fn install(cpu: Cpu, wires: Vec<(usize, Wire)>) -> NonNull<Bus> {
+    pub fn install(cpu: Cpu, step_timer: usize, wires: Vec<(usize, Wire)>) -> NonNull<Bus> {
         let bus = Box::new(Bus {
             cpu,
             owners: owners(),
             timers: std::array::from_fn(|i| Timer::new(&LAYOUTS[i])),
+            step_timer,
             uarts: std::array::from_fn(Uart::new),
             eeprom: Eeprom::new(),
             wires,
@@ -68,6 +73,7 @@ impl Bus {
             changed: Vec::new(),
             sums: Sums::default(),
             pending: 0,
+            withheld: 0,
             raised_at: [0; vectors::COUNT],
             due: u64::MAX,
         });
@@ -149,6 +155,13 @@ impl Bus {
         self.refresh_due();
     }
 
+    /// An interrupt of a USART is not served from now on, or it is again.
+    pub fn withhold(&mut self, vector: u8, withheld: bool) {
+        let bit = 1 << vector;
+        self.withheld = if withheld { self.withheld | bit } else { self.withheld & !bit };
+        (0..self.uarts.len()).for_each(|i| self.update_uart(i, self.cpu.cycle()));
+    }
+
     /// The level of an input has changed.
     pub fn pin_edge(&mut self, port: char, bit: u8, high: bool) {
         self.pins.edge(port, bit, high);
@@ -200,6 +213,7 @@ impl Bus {
     }
 
     fn set_lines(&mut self, mask: u64, lines: u64, at: u64) {
+        let lines = lines & !self.withheld;
         let mut fresh = lines & !self.pending;
         self.pending = (self.pending & !mask) | lines;
         while fresh != 0 {
@@ -213,7 +227,12 @@ impl Bus {
         self.cpu.set_data(usize::from(addr), value);
         match self.owners[usize::from(addr)] {
             Owner::Timer(i) => {
+                let ran = self.timers[i].runs();
                 self.timers[i].write(addr, value, now);
+                let runs = self.timers[i].runs();
+                if i == self.step_timer && ran != runs {
+                    self.recorder.timer(runs, now);
+                }
                 self.update_timer(i, now);
             }
             Owner::Uart(i) => {

@@ -47,6 +47,8 @@ pub struct Host {
     stat: Option<i64>,
     heard_at: u64,
     idle_since: Option<u64>,
+    /// Characters to be sent ahead of everything, and the cycles at which they are.
+    interjections: VecDeque<(u64, u8)>,
 }
 
 impl Host {
@@ -64,12 +66,18 @@ impl Host {
             stat: None,
             heard_at: 0,
             idle_since: None,
+            interjections: VecDeque::new(),
         }
     }
 
     /// Queues a line, without its line end, under a number of the caller's choice.
     pub fn queue(&mut self, number: usize, text: &str) {
         self.queue.push_back((number, text.to_string()));
+    }
+
+    /// Has a character sent ahead of everything at a cycle; the earliest first.
+    pub fn interject(&mut self, cycle: u64, byte: u8) {
+        self.interjections.push_back((cycle, byte));
     }
 
     /// Whether every line was sent and answered.
@@ -136,7 +144,14 @@ impl Host {
     /// Like `run_until`, but stops after any line from the firmware. False when time is up.
     pub fn run_until_line(&mut self, machine: &mut Machine, cycle: u64) -> Result<bool> {
         self.fill(machine);
-        machine.run_until_line(cycle)?;
+        while let Some((at, byte)) = self.interjections.front().copied()
+            && at <= machine.cycle()
+        {
+            self.interjections.pop_front();
+            machine.send_now(byte);
+        }
+        let next = self.interjections.front().map_or(u64::MAX, |(at, _)| *at);
+        machine.run_until_line(cycle.min(next))?;
         self.listen(machine);
         self.fill(machine);
         Ok(machine.cycle() < cycle)

@@ -7,10 +7,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use kerf::boards::MOTORS;
 
 use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::machine::Machine;
 use crate::oracle::{self, Outcome, Setup, Unclear};
+use crate::pauses::Scale;
 use crate::protocol::STATUS_NOOP;
 use crate::report::{Measured, Rejected, Report};
 use crate::trace::Trace;
@@ -38,11 +40,19 @@ pub struct Options {
     pub in_flight: usize,
     /// Where to write the step and direction signals.
     pub vcd: Option<PathBuf>,
+    /// Real-time characters, and after how many ms of the job each is sent; the earliest first.
+    pub interjections: Vec<(u64, u8)>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { baud: None, settings: Vec::new(), in_flight: LINES_IN_FLIGHT, vcd: None }
+        Options {
+            baud: None,
+            settings: Vec::new(),
+            in_flight: LINES_IN_FLIGHT,
+            vcd: None,
+            interjections: Vec::new(),
+        }
     }
 }
 
@@ -90,6 +100,20 @@ fn put_away(machine: &mut Machine, host: &mut Host) -> Result<()> {
     Ok(())
 }
 
+/// Looks for pauses from now on, of a machine at rest where `lines` begin.
+pub fn meter_pauses(machine: &mut Machine, lines: &Lines, setup: &Setup) {
+    let ends = oracle::ends(lines.iter().map(|(n, l)| (*n, l.as_str())), setup);
+    let at_pins = |steps: Vec<i64>| -> [i64; MOTORS] {
+        std::array::from_fn(|m| if setup.motors[m].inverted { -steps[m] } else { steps[m] })
+    };
+    let scale = Scale {
+        clock_hz: f64::from(machine.board().clock_hz),
+        motors: setup.travels(),
+        ends: ends.into_iter().map(|(line, steps)| (line, at_pins(steps))).collect(),
+    };
+    machine.recorder_mut().meter_pauses(scale);
+}
+
 /// Boots the machine, runs a job on it and says how it went. An error means that the job could not
 /// begin; all that goes wrong later is in the report. `progress` gets the lines answered so far.
 pub fn run(
@@ -113,6 +137,9 @@ pub fn run(
     let setup = read_setup(machine, &mut host)?;
     let expected = oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup);
     let began = machine.cycle();
+    for (ms, byte) in &options.interjections {
+        host.interject(began + machine.cycles(*ms), *byte);
+    }
     let trace = options.vcd.as_deref().map(|path| {
         let clock_hz = machine.board().clock_hz;
         Trace::create(path, clock_hz, began)
@@ -122,6 +149,7 @@ pub fn run(
     let active_low = active_low.fold(0, |bits, (m, motor)| bits | u8::from(motor.active_low) << m);
     machine.recorder_mut().set_active_low(active_low);
     machine.recorder_mut().clear();
+    meter_pauses(machine, lines, &setup);
     machine.meters_mut().clear();
     let banners = host.banners();
     let mut run = Run {
@@ -136,11 +164,12 @@ pub fn run(
         progress_at: began,
     };
     let end = run.stream(lines, &mut progress).and_then(|()| run.settle());
+    let late = run.late_segments();
     if let Some(trace) = run.machine.set_trace(None) {
         trace.finish()?;
     }
     let restarts = run.host.banners() - banners;
-    Ok(run.report(lines.len(), restarts, end))
+    Ok(run.report(lines.len(), restarts, late, end))
 }
 
 impl Run<'_> {
@@ -192,7 +221,18 @@ impl Run<'_> {
         self.expected.as_ref().map_or(0, |e| e.longest_dwell_ms)
     }
 
-    fn report(self, lines: usize, restarts: usize, end: Result<()>) -> Report {
+    /// What the firmware has counted itself; `None` if it does not answer.
+    fn late_segments(&mut self) -> Option<u64> {
+        self.host.ask(self.machine, "{stv:n}", ASK_MS).ok()?.body.get("stv")?.as_u64()
+    }
+
+    fn report(
+        self,
+        lines: usize,
+        restarts: usize,
+        late_segments: Option<u64>,
+        end: Result<()>,
+    ) -> Report {
         let moved = self.machine.recorder().last_step().unwrap_or(self.began);
         let idle_at = self.host.idle_since().unwrap_or(0).max(moved).max(self.progress_at);
         Report::new(
@@ -203,6 +243,7 @@ impl Run<'_> {
                 skipped: self.skipped,
                 rejected: self.rejected,
                 restarts,
+                late_segments,
                 strays: self.host.strays().to_vec(),
                 seconds_to_idle: self.machine.seconds(idle_at.saturating_sub(self.began)),
                 seconds_to_answer: self.machine.seconds(self.progress_at - self.began),

@@ -19,6 +19,7 @@ mod machine;
 pub mod mechanics;
 mod meters;
 pub mod oracle;
+pub mod pauses;
 mod pins;
 pub mod plot;
 pub mod protocol;

@@ -98,7 +98,7 @@ impl Machine {
             };
             (usart, Wire::new(board.clock_hz, serial.rate))
         });
-        let bus = Bus::install(cpu, wires.collect());
+        let bus = Bus::install(cpu, board.step_timer as usize, wires.collect());
         let probes = recorder::attach(bus, cpu, board);
         let meters = Meters::new(vectors::compare_a(board.step_timer));
         Ok(Machine {
@@ -388,6 +388,11 @@ impl Machine {
     /// Does what a store of the firmware would: to break it.
     pub fn poke(&mut self, addr: u16, value: u8) {
         self.bus_mut().store(addr, value);
+    }
+
+    /// An interrupt of a USART is not served from now on, or it is again: to hold up what runs in it.
+    pub fn withhold(&mut self, vector: u8, withheld: bool) {
+        self.bus_mut().withhold(vector, withheld);
     }
 
     /// A word of the data space, as memory holds it.

@@ -9,6 +9,10 @@ mod words;
 
 use std::fmt;
 
+use kerf::boards::MOTORS;
+
+use crate::pauses::Travel;
+
 pub use exact::Decimal;
 use exact::divide;
 use words::{Word, split};
@@ -47,6 +51,18 @@ impl MotorSetup {
         let up = i128::from(position) * 360 * i128::from(self.microsteps) * angle_one * travel_one;
         let down = angle * travel * UNITS;
         if down == 0 { 0 } else { divide(up, down) as i64 }
+    }
+}
+
+impl Setup {
+    /// What each motor moves, for the meter of pauses.
+    pub fn travels(&self) -> [Travel; MOTORS] {
+        std::array::from_fn(|m| {
+            let motor = &self.motors[m];
+            let per_unit = motor.steps(1_000_000 * UNITS as i64) as f64 / 1e6;
+            let step = if per_unit == 0.0 { 0.0 } else { 1.0 / per_unit };
+            Travel { axis: motor.axis, step, rotary: motor.axis >= FIRST_ROTARY }
+        })
     }
 }
 
@@ -112,6 +128,20 @@ pub fn run<'a>(
         reader.line(text).map_err(|what| Unclear { line, what })?;
     }
     Ok(reader.finish())
+}
+
+/// Where each line ends, in steps of each motor: its number, and what [`run`] would say if the job ended there.
+/// Lines from one that is unclear on are left out.
+pub fn ends<'a>(
+    lines: impl IntoIterator<Item = (usize, &'a str)>,
+    setup: &Setup,
+) -> Vec<(usize, Vec<i64>)> {
+    let mut reader = Reader::new(setup);
+    let clear = lines.into_iter().map_while(|(line, text)| {
+        reader.line(text).ok()?;
+        Some((line, reader.steps_here()))
+    });
+    clear.collect()
 }
 
 /// What a line does once, G-code times ten.
@@ -316,12 +346,20 @@ impl<'a> Reader<'a> {
 
     /// Adds the steps from `origin` to the position.
     fn count_steps(&mut self) {
-        for (motor, steps) in self.setup.motors.iter().zip(&mut self.steps) {
-            if self.setup.modes[motor.axis] == AxisMode::Standard {
+        self.steps = self.steps_here();
+    }
+
+    /// The steps made so far, with those from `origin` to the position.
+    fn steps_here(&self) -> Vec<i64> {
+        let counted = self.setup.motors.iter().zip(&self.steps);
+        let here = counted.map(|(motor, steps)| match self.setup.modes[motor.axis] {
+            AxisMode::Standard => {
                 let (from, to) = (self.origin[motor.axis], self.position[motor.axis]);
-                *steps += motor.steps(to) - motor.steps(from);
+                *steps + motor.steps(to) - motor.steps(from)
             }
-        }
+            _ => *steps,
+        });
+        here.collect()
     }
 
     fn finish(mut self) -> Outcome {

@@ -9,6 +9,7 @@ use simavr_ffi as ffi;
 use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::mechanics::SpindlePin;
+use crate::pauses::{Found, Meter, Scale};
 use crate::trace::Trace;
 
 /// A step: when, which motor (0 is motor 1), which way.
@@ -99,7 +100,9 @@ pub struct Recorder {
     first: Option<(u64, Sums)>,
     last: Option<(u64, Sums)>,
     log: Option<Vec<Step>>,
+    runs: Vec<(u64, u64)>,
     trace: Option<Trace>,
+    pauses: Option<Meter>,
 }
 
 impl Recorder {
@@ -109,7 +112,9 @@ impl Recorder {
             first: None,
             last: None,
             log: None,
+            runs: Vec::new(),
             trace: None,
+            pauses: None,
         }
     }
 
@@ -148,6 +153,34 @@ impl Recorder {
         self.log().iter().filter(|s| s.motor == motor).map(|s| s.cycle).collect()
     }
 
+    /// Looks for pauses from now on, motors being at rest.
+    pub fn meter_pauses(&mut self, scale: Scale) {
+        self.pauses = Some(Meter::new(scale));
+    }
+
+    /// The pauses found; none if nobody has asked to look for them.
+    pub fn pauses(&self) -> Found {
+        self.pauses.as_ref().map(Meter::found).unwrap_or_default()
+    }
+
+    /// The times that the step timer has run, from cycle to cycle, while steps were kept; one that still runs ends at
+    /// [`u64::MAX`].
+    pub fn timer_runs(&self) -> &[(u64, u64)] {
+        &self.runs
+    }
+
+    /// The step timer was started or stopped.
+    pub(crate) fn timer(&mut self, runs: bool, now: u64) {
+        if self.log.is_some() && runs {
+            self.runs.push((now, u64::MAX));
+        } else if let Some(run) = self.runs.last_mut() {
+            run.1 = run.1.min(now);
+        }
+        if let Some(meter) = &mut self.pauses {
+            meter.timer(runs);
+        }
+    }
+
     pub(crate) fn set_trace(&mut self, trace: Option<Trace>) -> Option<Trace> {
         std::mem::replace(&mut self.trace, trace)
     }
@@ -159,6 +192,7 @@ impl Recorder {
             *m = Motor { active_low, step_high, dir_high, ..Motor::new() };
         }
         (self.first, self.last) = (None, None);
+        self.runs.clear();
         if let Some(log) = &mut self.log {
             log.clear();
         }
@@ -191,8 +225,12 @@ impl Recorder {
             m.begin_pulse(now);
             self.first.get_or_insert((now, sums));
             self.last = Some((now, sums));
+            let step = Step { cycle: now, motor: motor as u8, positive };
             if let Some(log) = &mut self.log {
-                log.push(Step { cycle: now, motor: motor as u8, positive });
+                log.push(step);
+            }
+            if let Some(meter) = &mut self.pauses {
+                meter.step(step);
             }
         } else {
             m.end_pulse(now);

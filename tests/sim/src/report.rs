@@ -1,10 +1,13 @@
 //! How a job went, as data.
 
+use std::fmt::{self, Display, Formatter};
+
 use serde::Serialize;
 
 use crate::machine::Machine;
 use crate::meters::Window;
 use crate::oracle::{AXES, MotorSetup, Outcome, Setup, UNITS, Unclear};
+use crate::pauses::Pause;
 use crate::recorder::Motor;
 use crate::vectors;
 
@@ -33,6 +36,8 @@ pub struct Measured {
     pub rejected: Vec<Rejected>,
     /// Banners that came while the job ran.
     pub restarts: usize,
+    /// Segments that were late since the reset, as the firmware counts them.
+    pub late_segments: Option<u64>,
     /// What came and should not have.
     pub strays: Vec<String>,
     /// From the first line to rest.
@@ -45,6 +50,19 @@ pub struct Measured {
     pub expected: Result<Outcome, Unclear>,
     /// What ended the job before its time.
     pub fault: Option<String>,
+}
+
+/// A pause in the step stream.
+#[derive(Clone, Serialize, Debug)]
+pub struct PauseReport {
+    /// The line of the job that was on its way, if it is known.
+    pub line: Option<usize>,
+    /// When it began, from the first step.
+    pub seconds: f64,
+    /// How long it took.
+    pub ms: f64,
+    /// Velocity of the path beside it, mm/s.
+    pub velocity: f64,
 }
 
 /// One motor in a report.
@@ -146,6 +164,12 @@ pub struct Report {
     pub free_stack: Option<i32>,
     /// Bytes that came in faster than they were read.
     pub uart_overruns: u64,
+    /// Pauses in the step stream ([`crate::pauses`]).
+    pub pauses: Vec<PauseReport>,
+    /// Times that the step timer stood still in mid-motion.
+    pub starved: Vec<PauseReport>,
+    /// Segments that were late since the reset, as the firmware counts them: 255 for more.
+    pub late_segments: Option<u64>,
     /// Tops of the step timer written behind its counter.
     pub missed_tops: u64,
     /// Resets by the watchdog.
@@ -169,6 +193,7 @@ impl Report {
         let axes = expected.map_or(Vec::new(), |e| axis_reports(&motors, &measured.setup, e));
         let (cpu_load, interrupt_load) = loads(machine);
         let span = recorder.span();
+        let found = recorder.pauses();
         let mut report = Report {
             ok: false,
             problems: Vec::new(),
@@ -188,6 +213,9 @@ impl Report {
             interrupts_off_in_step: window_report(machine, machine.meters().window_step()),
             free_stack: machine.free_stack(),
             uart_overruns: machine.uart(0).overruns(),
+            pauses: pause_reports(machine, &found.pauses),
+            starved: pause_reports(machine, &found.starved),
+            late_segments: measured.late_segments,
             missed_tops: machine.missed_tops(),
             resets: machine.resets(),
             vectors: vector_reports(machine),
@@ -196,6 +224,27 @@ impl Report {
         report.problems = report.find_problems(&measured);
         report.ok = report.problems.is_empty();
         report
+    }
+
+    /// Pauses and stops of the step timer, whichever are more.
+    pub fn dry(&self) -> usize {
+        self.pauses.len().max(self.starved.len())
+    }
+
+    /// Whether nothing is wrong but pauses.
+    pub fn is_exact(&self) -> bool {
+        self.problems.len() == self.pause_problems().len()
+    }
+
+    fn pause_problems(&self) -> Vec<String> {
+        let late = match self.late_segments {
+            Some(0) => None,
+            Some(n) => Some(format!("{n} late segments by the firmware's count")),
+            None => Some("the firmware does not tell of late segments".to_string()),
+        };
+        let pauses = worst("pauses in the step stream", &self.pauses);
+        let starved = worst("stops of the step timer in mid-motion", &self.starved);
+        [pauses, starved, late].into_iter().flatten().collect()
     }
 
     fn find_problems(&self, measured: &Measured) -> Vec<String> {
@@ -215,6 +264,7 @@ impl Report {
             Err(unclear) => problems.push(unclear.to_string()),
             Ok(_) => problems.extend(self.wrong_motors()),
         }
+        problems.extend(self.pause_problems());
         if measured.restarts > 0 {
             problems.push(format!("the firmware restarted {} times", measured.restarts));
         }
@@ -230,6 +280,34 @@ impl Report {
             Some(format!("motor {} is at {} steps instead of {expected}", m.motor, m.steps))
         })
     }
+}
+
+/// How many there are, and the longest; `None` if there are none.
+fn worst(what: &str, pauses: &[PauseReport]) -> Option<String> {
+    let longest = pauses.iter().max_by(|a, b| a.ms.total_cmp(&b.ms))?;
+    Some(format!("{} {what}, the longest {longest}", pauses.len()))
+}
+
+impl Display for PauseReport {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let PauseReport { seconds, ms, velocity, .. } = self;
+        match self.line {
+            Some(line) => write!(f, "in line {line}")?,
+            None => f.write_str("in an unknown line")?,
+        }
+        write!(f, " at {seconds:.3} s: {ms:.3} ms at {velocity:.1} mm/s")
+    }
+}
+
+fn pause_reports(machine: &Machine, pauses: &[Pause]) -> Vec<PauseReport> {
+    let first = machine.recorder().span().map_or(0, |((first, _), _)| first);
+    let report = |pause: &Pause| PauseReport {
+        line: pause.line,
+        seconds: machine.seconds(pause.cycle.saturating_sub(first)),
+        ms: microseconds(machine, pause.cycles) / 1e3,
+        velocity: pause.velocity,
+    };
+    pauses.iter().map(report).collect()
 }
 
 fn microseconds(machine: &Machine, cycles: u64) -> f64 {

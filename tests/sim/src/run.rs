@@ -30,6 +30,7 @@ pub fn run(args: &RunArgs) -> Result<bool> {
         settings: args.settings.clone(),
         in_flight: args.in_flight,
         vcd: args.vcd.clone(),
+        interjections: Vec::new(),
     };
     if args.plot.is_some() {
         machine.recorder_mut().keep_log();

@@ -2,10 +2,12 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use crate::report::{Report, WindowReport};
+use crate::report::{PauseReport, Report, WindowReport};
 
 /// Refused lines that are shown; the rest is only counted.
 const REJECTED_SHOWN: usize = 20;
+/// Pauses that are shown; the rest is only counted.
+const PAUSES_SHOWN: usize = 10;
 
 impl Display for Report {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
@@ -17,6 +19,9 @@ impl Display for Report {
         )?;
         self.motors(f)?;
         self.axes(f)?;
+        pauses(f, "pauses", &self.pauses)?;
+        pauses(f, "step timer starved", &self.starved)?;
+        row(f, "late segments", or_dash(self.late_segments))?;
         self.load(f)?;
         window(f, "interrupts off", &self.interrupts_off)?;
         window(f, "  in the step interrupt", &self.interrupts_off_in_step)?;
@@ -40,6 +45,21 @@ fn window(f: &mut Formatter<'_>, name: &str, w: &WindowReport) -> fmt::Result {
         return row(f, name, "never");
     }
     row(f, name, format!("{} cycles ({:.1} us) in {}: {}", w.cycles, w.us, w.context, w.place))
+}
+
+/// How many, the longest, and the first few.
+fn pauses(f: &mut Formatter<'_>, name: &str, pauses: &[PauseReport]) -> fmt::Result {
+    let Some(longest) = pauses.iter().max_by(|a, b| a.ms.total_cmp(&b.ms)) else {
+        return row(f, name, "none");
+    };
+    row(f, name, format!("{}, the longest {longest}", pauses.len()))?;
+    for pause in pauses.iter().take(PAUSES_SHOWN) {
+        row(f, "", pause)?;
+    }
+    if pauses.len() > PAUSES_SHOWN {
+        row(f, "", format!("and {} more", pauses.len() - PAUSES_SHOWN))?;
+    }
+    Ok(())
 }
 
 /// A number, or a dash.

@@ -111,6 +111,11 @@ impl Timer {
         self.missed
     }
 
+    /// Whether it counts.
+    pub fn runs(&self) -> bool {
+        self.prescale != 0
+    }
+
     /// Vectors that ask for service, as a bit set.
     pub fn lines(&self) -> u64 {
         let mut active = self.flags & self.mask;

@@ -5,10 +5,10 @@ use anyhow::Result;
 use super::Figure;
 use super::jitter;
 use super::spirals::{lines_per_second, spiral};
-use super::workload::{Bed, FAST_BAUD, How, straight};
+use super::workload::{Bed, FACTORY_JERK, FAST_BAUD, How, USUAL_JERK, arcs, braid, straight};
 use crate::machine::Machine;
 use crate::report::Report;
-use crate::stopwatch::Stopwatch;
+use crate::stopwatch::{Cost, Stopwatch};
 
 /// USART2_UDRE, the software interrupt that exec runs in.
 const EXEC_VECTOR: u8 = 52;
@@ -49,11 +49,41 @@ pub fn segment(bed: &Bed) -> Result<Figure> {
     Ok(Figure { value: cost.mean(), note })
 }
 
+/// The same under a jerk limit: on short moves and on arcs.
+pub fn segment_jerk(bed: &Bed) -> Result<Figure> {
+    let jobs = [spiral(0.1), arcs(), braid(0.33, 3_000.0)];
+    let costs = jerk_costs(bed, &[USUAL_JERK], &jobs)?;
+    let cycles = costs.iter().map(|c| c.mean() * c.count as f64).sum::<f64>();
+    let count = costs.iter().map(|c| c.count).sum::<u64>();
+    Ok(Figure { value: cycles / count as f64, note: format!("{count} segments") })
+}
+
+/// The longest that exec takes for a segment under any jerk limit.
+pub fn segment_jerk_worst(bed: &Bed) -> Result<Figure> {
+    let jobs = [arcs(), braid(0.33, 3_000.0)];
+    let costs = jerk_costs(bed, &[500.0, USUAL_JERK, 50_000.0], &jobs)?;
+    let count = costs.iter().map(|c| c.count).sum::<u64>();
+    let worst = costs.iter().map(|c| c.max).max().unwrap_or(0);
+    Ok(Figure { value: worst as f64, note: format!("{count} segments") })
+}
+
+/// What exec takes for segments of these jobs under each of these jerk limits.
+fn jerk_costs(bed: &Bed, jerks: &[f64], jobs: &[String]) -> Result<Vec<Cost>> {
+    let runs = jerks.iter().flat_map(|jerk| jobs.iter().map(move |job| (jerk, job)));
+    runs.map(|(jerk, job)| {
+        let how = How { baud: FAST_BAUD, jerk: Some(*jerk), ..How::default() };
+        let laps = bed.laps(EXEC_VECTOR, SEGMENT_READY)?;
+        let (machine, _) = bed.try_run(job, how, vec![laps])?;
+        Ok(machine.stopwatches()[0].cost())
+    })
+    .collect()
+}
+
 /// Cycles of queuing a block with all replanning, at worst.
 pub fn replan(bed: &Bed) -> Result<Figure> {
     let (curve, _) = spiral_on_fast_line(bed, vec![bed.calls(QUEUE_PUSH)?])?;
     // With a low jerk limit it takes all of the queue to stop: each new block changes every other.
-    let how = How { baud: FAST_BAUD, jerk: true, ..How::default() };
+    let how = How { baud: FAST_BAUD, jerk: Some(FACTORY_JERK), ..How::default() };
     let (line, _) =
         bed.try_run(&straight(1_000, 0.1, 6_000.0), how, vec![bed.calls(QUEUE_PUSH)?])?;
     let costs = [&curve, &line].map(|machine| machine.stopwatches()[0].cost());

@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::Figure;
-use super::workload::{Bed, How, PER_MM, chatter};
+use super::workload::{Bed, How, PER_MM, chatter, straight};
 use crate::machine::Machine;
 
 /// Steps a second of the dominant motor and of the minor one.
@@ -11,6 +11,8 @@ const DOMINANT: f64 = 20_000.0;
 const MINOR: f64 = 7_400.0;
 /// The way of X, mm, for some 2 s of cruise.
 const WAY: f64 = 650.0;
+/// A block of many, mm.
+const BLOCK: f64 = 5.0;
 /// The part of it that counts, s: all of it cruise.
 const COUNTED_S: f64 = 1.0;
 /// Lines that take longer than the move.
@@ -32,6 +34,13 @@ pub fn busy(bed: &Bed) -> Result<Figure> {
 pub fn minor(bed: &Bed) -> Result<Figure> {
     let machine = run(bed, LINES)?;
     Ok((machine.seconds(peak_to_peak(&machine, 1)) * 1e6).into())
+}
+
+/// The same over the boundaries of blocks: lines of 5 mm in a row; nothing else on the line.
+pub fn boundaries(bed: &Bed) -> Result<Figure> {
+    let job = straight((WAY / BLOCK) as u32, BLOCK, DOMINANT / PER_MM * 60.0);
+    let machine = bed.run(&job, How { log: true, ..How::default() })?.0;
+    Ok(in_cycles(&machine, peak_to_peak(&machine, 0)))
 }
 
 fn in_cycles(machine: &Machine, cycles: u64) -> Figure {

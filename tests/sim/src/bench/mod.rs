@@ -7,6 +7,10 @@
 mod beyond;
 mod costs;
 mod jitter;
+mod limits;
+#[path = "../../../support/optimum.rs"]
+mod optimum;
+mod pauses;
 mod rates;
 mod rows;
 mod spirals;

@@ -4,7 +4,7 @@
 use anyhow::Result;
 
 use super::Figure;
-use super::workload::{ACCELERATION, Bed, How, PER_MM, PER_MM_Z};
+use super::workload::{ACCELERATION, Bed, How, PER_MM, PER_MM_Z, USUAL_JERK};
 use crate::machine::Machine;
 
 /// Tolerance of the mean rate.
@@ -34,15 +34,44 @@ pub fn four(bed: &Bed) -> Result<Figure> {
     highest(bed, 4)
 }
 
+/// One motor under a jerk limit.
+pub fn one_jerk(bed: &Bed) -> Result<Figure> {
+    highest_jerk(bed, 1, 80_000.0)
+}
+
+/// Three motors under a jerk limit.
+pub fn three_jerk(bed: &Bed) -> Result<Figure> {
+    highest_jerk(bed, 3, 53_000.0)
+}
+
+/// Four motors under a jerk limit.
+pub fn four_jerk(bed: &Bed) -> Result<Figure> {
+    highest_jerk(bed, 4, 40_000.0)
+}
+
 fn highest(bed: &Bed, motors: usize) -> Result<Figure> {
-    let (mut good, mut bad, mut held) = (0.0, FIRST, 0.0);
+    search(FIRST, REFINEMENTS, |rate| held_at(bed, motors, rate, None))
+}
+
+/// Fewer moves than without a jerk limit: the search begins near its end.
+fn highest_jerk(bed: &Bed, motors: usize, first: f64) -> Result<Figure> {
+    search(first, REFINEMENTS - 1, |rate| held_at(bed, motors, rate, Some(USUAL_JERK)))
+}
+
+/// The highest rate that is held, upwards from `first`.
+fn search(
+    first: f64,
+    refinements: u32,
+    held_at: impl Fn(f64) -> Result<Option<f64>>,
+) -> Result<Figure> {
+    let (mut good, mut bad, mut held) = (0.0, first, 0.0);
     while bad < LAST {
-        let Some(rate) = held_at(bed, motors, bad)? else { break };
+        let Some(rate) = held_at(bad)? else { break };
         (good, held, bad) = (bad, rate, bad * UP);
     }
-    for _ in 0..REFINEMENTS {
+    for _ in 0..refinements {
         let middle = f64::midpoint(good, bad);
-        match held_at(bed, motors, middle)? {
+        match held_at(middle)? {
             Some(rate) => (good, held) = (middle, rate),
             None => bad = middle,
         }
@@ -51,8 +80,8 @@ fn highest(bed: &Bed, motors: usize) -> Result<Figure> {
 }
 
 /// The lowest mean rate of the motors in a move at `rate`, if that was held.
-fn held_at(bed: &Bed, motors: usize, rate: f64) -> Result<Option<f64>> {
-    let how = How { log: true, ..How::default() };
+fn held_at(bed: &Bed, motors: usize, rate: f64, jerk: Option<f64>) -> Result<Option<f64>> {
+    let how = How { log: true, jerk, ..How::default() };
     let (machine, report) = bed.try_run(&long_move(motors, rate), how, Vec::new())?;
     if !report.ok {
         return Ok(None);

@@ -3,10 +3,10 @@
 
 use std::fmt::Write;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use super::Figure;
-use super::workload::{ACCELERATION, Bed, FAST_BAUD, How};
+use super::workload::{ACCELERATION, Bed, FAST_BAUD, How, USUAL_JERK};
 use crate::report::Report;
 
 const MOVES: u32 = 2_000;
@@ -47,9 +47,28 @@ pub fn half_fast(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, 0.5, fast())
 }
 
-/// Moves of 0.1 mm with the default jerk limit.
+/// Moves of 0.1 mm under a jerk limit, over the same without.
 pub fn tenth_jerk(bed: &Bed) -> Result<Figure> {
-    over_ideal(bed, 0.1, How { jerk: true, ..How::default() })
+    over_no_jerk_limit(bed, 0.1)
+}
+
+/// Moves of 0.2 mm under a jerk limit.
+pub fn fifth_jerk(bed: &Bed) -> Result<Figure> {
+    over_no_jerk_limit(bed, 0.2)
+}
+
+/// Moves of 0.5 mm under a jerk limit.
+pub fn half_jerk(bed: &Bed) -> Result<Figure> {
+    over_no_jerk_limit(bed, 0.5)
+}
+
+fn over_no_jerk_limit(bed: &Bed, chord: f64) -> Result<Figure> {
+    let job = spiral(chord);
+    let (_, without) = bed.run(&job, fast())?;
+    let (_, with) = bed.try_run(&job, How { jerk: Some(USUAL_JERK), ..fast() }, Vec::new())?;
+    let value = with.seconds_moving / without.seconds_moving;
+    ensure!(with.ok, "{value:.3}, but {}", with.problems.join("; "));
+    Ok(Figure { value, note: format!("{:.0} lines/s", lines_per_second(&with)) })
 }
 
 fn fast() -> How {

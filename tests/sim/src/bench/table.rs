@@ -14,7 +14,7 @@ TinyG: published for its own chip, an ATxmega192 at 32 MHz. Rates are held if th
 1 % of the command and the end exact. Jitter is peak to peak of the interval between steps. Moves are 2,000
 along a spiral at 6,000 mm/min; their time runs from the first step to the last, and the ideal is unlimited
 look-ahead with trapezoids, way / v + v / a. Kerf runs with a jerk limit out of the way to be comparable,
-but for the row that names it. The floor is what the tests insist on; * marks targets that are not reached.
+but for the rows that name one: 5,000 million mm/min3 unless they say another. The floor is what the tests insist on; * marks targets that are not reached.
 ";
 
 /// Measures the rows and prints each as it is there. True when all was measured.

@@ -10,6 +10,7 @@ use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::image::Image;
 use crate::job::{self, Options};
 use crate::machine::Machine;
+use crate::mechanics::Random;
 use crate::report::Report;
 use crate::stopwatch::Stopwatch;
 
@@ -23,6 +24,9 @@ pub const ACCELERATION: f64 = 500.0;
 pub const USUAL_BAUD: u32 = 115_200;
 /// See [`USUAL_BAUD`].
 pub const FAST_BAUD: u32 = 500_000;
+
+/// After so long a job is left alone.
+const DISTURBED_MS: u64 = 120_000;
 
 /// Lines in flight: as many as the firmware keeps, so that the line is never idle.
 const IN_FLIGHT: usize = 2 * LINES_IN_FLIGHT;
@@ -38,11 +42,16 @@ const SETTINGS: [&str; 8] = [
     "{z:{vm:2000000,fr:2000000,jd:0.01}}",
     "{a:{am:1,vm:2000000,fr:2000000,jd:0.01}}",
 ];
+/// The factory's jerk limit, and one that is usual for such machines, millions of mm/min3.
+pub const FACTORY_JERK: f64 = 20.0;
+/// See [`FACTORY_JERK`].
+pub const USUAL_JERK: f64 = 5_000.0;
+/// Millions of mm/min3 in a mm/s3.
+pub const PER_JERK: f64 = 1e6 / 216e3;
 /// 500 mm/s2 towards the centre of a corner; reports off.
 const MORE: [&str; 2] = ["{ja:1800000}", "{sv:0,qv:0}"];
-/// So much jerk that ramps are trapezoids.
-const NO_JERK_LIMIT: [&str; 4] =
-    ["{xjm:1000000}", "{yjm:1000000}", "{zjm:1000000}", "{ajm:1000000}"];
+/// So much jerk, in millions of mm/min3, that ramps are trapezoids.
+const NO_JERK_LIMIT: f64 = 1_000_000.0;
 
 /// The firmware and the board under it.
 pub struct Bed {
@@ -59,15 +68,26 @@ pub struct How {
     pub baud: u32,
     /// Acceleration, mm/s2.
     pub acceleration: f64,
-    /// The default jerk limit stays.
-    pub jerk: bool,
+    /// Jerk limit, millions of mm/min3.
+    pub jerk: Option<f64>,
     /// Every step is kept.
     pub log: bool,
+    /// More settings.
+    pub more: &'static [&'static str],
+    /// Holds and overrides come in between, as of this seed.
+    pub disturbed: Option<u64>,
 }
 
 impl Default for How {
     fn default() -> Self {
-        How { baud: USUAL_BAUD, acceleration: ACCELERATION, jerk: false, log: false }
+        How {
+            baud: USUAL_BAUD,
+            acceleration: ACCELERATION,
+            jerk: None,
+            log: false,
+            more: &[],
+            disturbed: None,
+        }
     }
 }
 
@@ -90,13 +110,13 @@ impl Bed {
     /// What makes the firmware comparable.
     pub fn settings(&self, how: How) -> Vec<String> {
         let mut all: Vec<String> = SETTINGS.iter().chain(&MORE).map(|s| s.to_string()).collect();
-        if !how.jerk {
-            all.extend(NO_JERK_LIMIT.map(str::to_string));
-        }
+        let jerk = how.jerk.unwrap_or(NO_JERK_LIMIT);
+        all.extend(["x", "y", "z", "a"].map(|axis| format!("{{{axis}jm:{jerk}}}")));
         if self.has_acceleration {
             let limit = |axis| format!("{{{axis}ac:{}}}", how.acceleration);
             all.extend(["x", "y", "z", "a"].map(limit));
         }
+        all.extend(how.more.iter().map(|s| s.to_string()));
         all
     }
 
@@ -135,10 +155,29 @@ impl Bed {
         stopwatches.into_iter().for_each(|s| machine.add_stopwatch(s));
         let baud = (how.baud != USUAL_BAUD).then_some(how.baud);
         let settings = self.settings(how);
-        let options = Options { baud, settings, in_flight: IN_FLIGHT, vcd: None };
+        let interjections = how.disturbed.map_or_else(Vec::new, disturbances);
+        let options = Options { baud, settings, in_flight: IN_FLIGHT, vcd: None, interjections };
         let report = job::run(&mut machine, &job::lines_of(job), &options, |_| {})?;
         Ok((machine, report))
     }
+}
+
+/// Holds that are resumed, and overrides of feed and traverse, at random times.
+fn disturbances(seed: u64) -> Vec<(u64, u8)> {
+    const OVERRIDES: [u8; 8] = [0x90, 0x91, 0x92, 0x93, 0x94, 0x95, 0x96, 0x97];
+    let mut random = Random::new(seed);
+    let (mut ms, mut all) = (100, Vec::new());
+    while ms < DISTURBED_MS {
+        ms += 30 + random.below(800);
+        if random.below(2) == 0 {
+            all.push((ms, b'!'));
+            ms += 5 + random.below(300);
+            all.push((ms, b'~'));
+        } else {
+            all.push((ms, OVERRIDES[random.below(8) as usize]));
+        }
+    }
+    all
 }
 
 /// A straight way of `mm` in `count` equal moves at `feed` mm/min.
@@ -158,4 +197,54 @@ pub fn chatter(lines: u32) -> String {
         _ => format!("N{n} G17\n"),
     };
     (1..=lines).map(line).collect()
+}
+
+/// Arcs one behind the other, whose radius grows from 0.4 mm to 18, two to the left and one to the right, then a helix.
+pub fn arcs() -> String {
+    let mut job = String::from("G17 G64 G1 F5400\n");
+    let (mut x, mut y, mut radius) = (0.0f64, 0.0f64, 0.4f64);
+    for n in 0..44u32 {
+        let (sin, cos) = (f64::from(n) * 0.7).sin_cos();
+        let (i, j) = (radius * cos, radius * sin);
+        let code = if n.is_multiple_of(3) { 2 } else { 3 };
+        let to = (x + 2.0 * i, y + 2.0 * j);
+        let _ = writeln!(job, "G{code} X{:.4} Y{:.4} I{i:.4} J{j:.4}", to.0, to.1);
+        ((x, y), radius) = (to, (radius * 1.095).min(18.0));
+    }
+    let _ = writeln!(job, "G2 X{x:.4} Y{y:.4} Z-2 I6 J0 P3\nG0 Z0\nG0 X0 Y0");
+    job
+}
+
+/// A wavy ring in straight moves of about `mm`, at `feed` mm/min.
+pub fn braid(mm: f64, feed: f64) -> String {
+    let count = (240.0 / mm).round();
+    let mut job = format!("G64 G1 F{feed}\n");
+    for n in 0..=count as u32 {
+        let angle = std::f64::consts::TAU * f64::from(n) / count;
+        let radius = 30.0 + 8.0 * (7.0 * angle).sin();
+        let _ = writeln!(job, "G1 X{:.3} Y{:.3}", radius * angle.cos(), radius * angle.sin());
+    }
+    job + "G0 X0 Y0\n"
+}
+
+/// Squares within squares, their corners rounded with 1.2 mm.
+pub fn pocket() -> String {
+    const R: f64 = 1.2;
+    let mut job = String::from("G17 G64 G1 F3300\n");
+    for turn in 0..10 {
+        let a = 2.0 + 1.9 * f64::from(turn);
+        let b = a - R;
+        let _ = writeln!(job, "G1 X{:.3} Y{:.3}", -a, -b);
+        for (from, to, centre) in [
+            ([-a, b], [-b, a], [R, 0.0]),
+            ([b, a], [a, b], [0.0, -R]),
+            ([a, -b], [b, -a], [-R, 0.0]),
+            ([-b, -a], [-a, -b], [0.0, R]),
+        ] {
+            let _ = writeln!(job, "G1 X{:.3} Y{:.3}", from[0], from[1]);
+            let [i, j] = centre;
+            let _ = writeln!(job, "G2 X{:.3} Y{:.3} I{i} J{j}", to[0], to[1]);
+        }
+    }
+    job + "G0 X0 Y0\n"
 }

@@ -1,0 +1,144 @@
+//! How near motion comes to its limits: lone moves, holds, and the acceleration of axes on arcs.
+
+use anyhow::{Context, Result, ensure};
+
+use super::Figure;
+use super::optimum::rest_to_rest;
+use super::workload::{ACCELERATION, Bed, How, PER_JERK, USUAL_JERK, arcs};
+use crate::host::{Host, LINES_IN_FLIGHT};
+use crate::machine::Machine;
+
+/// Feed of lone moves, mm/min: more than they reach.
+const FEED: f64 = 30_000.0;
+/// Velocity that holds stop from, mm/s.
+const HELD: f64 = 50.0;
+/// Holds come at so many phases of segments.
+const PHASES: u64 = 8;
+/// Four times as fine steps, for the acceleration of X and Y to be told from them.
+const FINE: [&str; 2] = ["{1:{tr:5}}", "{2:{tr:5}}"];
+const FINE_PER_MM: f64 = 320.0;
+/// The time over which acceleration is taken, s.
+const WINDOW_S: f64 = 0.010;
+
+/// A lone move of 0.1 mm, over the shortest time within the limits.
+pub fn lone_tenth(bed: &Bed) -> Result<Figure> {
+    lone(bed, 0.1)
+}
+
+/// A lone move of 1 mm.
+pub fn lone_one(bed: &Bed) -> Result<Figure> {
+    lone(bed, 1.0)
+}
+
+/// A lone move of 10 mm.
+pub fn lone_ten(bed: &Bed) -> Result<Figure> {
+    lone(bed, 10.0)
+}
+
+/// A lone move of 100 mm.
+pub fn lone_hundred(bed: &Bed) -> Result<Figure> {
+    lone(bed, 100.0)
+}
+
+/// Its time is that of the step timer, which runs from rest to rest.
+fn lone(bed: &Bed, mm: f64) -> Result<Figure> {
+    let how = How { log: true, jerk: Some(USUAL_JERK), ..How::default() };
+    let (machine, _) = bed.run(&format!("G1 X{mm} F{FEED}\n"), how)?;
+    let runs = machine.recorder().timer_runs();
+    let (first, last) = runs.first().zip(runs.last()).context("nothing has moved")?;
+    let seconds = machine.seconds(last.1 - first.0);
+    let best = rest_to_rest(mm, FEED / 60.0, ACCELERATION, USUAL_JERK * PER_JERK);
+    Ok(Figure { value: seconds / best, note: format!("{:.1} ms", seconds * 1e3) })
+}
+
+/// From `!` to the first step of a slower segment, ms at most.
+pub fn hold_begins(bed: &Bed) -> Result<Figure> {
+    let all = holds(bed)?;
+    Ok((all.iter().map(|h| h.begins).fold(0.0, f64::max) * 1e3).into())
+}
+
+/// From there to rest, over the shortest time within the limits, at most.
+pub fn hold_stops(bed: &Bed) -> Result<Figure> {
+    let all = holds(bed)?;
+    let seconds = all.iter().map(|h| h.stops).fold(0.0, f64::max);
+    // From rest to HELD and back to rest without a cruise takes two ramps.
+    let jerk = USUAL_JERK * PER_JERK;
+    let ramp = HELD / ACCELERATION + ACCELERATION / jerk;
+    Ok(Figure { value: seconds / ramp, note: format!("{:.1} ms", seconds * 1e3) })
+}
+
+/// A hold, s.
+struct Hold {
+    begins: f64,
+    stops: f64,
+}
+
+fn holds(bed: &Bed) -> Result<Vec<Hold>> {
+    (0..PHASES).map(|phase| hold(bed, 800_000 + phase * 5_137)).collect()
+}
+
+/// A hold so many us after a long move was sent.
+fn hold(bed: &Bed, us: u64) -> Result<Hold> {
+    let mut machine = bed.machine()?;
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut machine, 1_000)?;
+    let how = How { jerk: Some(USUAL_JERK), ..How::default() };
+    for line in bed.settings(how) {
+        ensure!(host.ask(&mut machine, &line, 1_000)?.status == 0, "{line} is refused");
+    }
+    machine.recorder_mut().keep_log();
+    host.ask(&mut machine, &format!("G1 X200 F{}", HELD * 60.0), 1_000)?;
+    let held_at = machine.cycle() + us * machine.cycles(1) / 1_000;
+    host.run_until(&mut machine, held_at)?;
+    machine.send_now(b'!');
+    let said = machine.cycle();
+    host.run_for_ms(&mut machine, 500)?;
+    let slower = first_slower(&machine, said).context("it does not slow down")?;
+    let rest = machine.recorder().timer_runs().last().map_or(u64::MAX, |run| run.1);
+    ensure!(rest < machine.cycle(), "it does not come to rest");
+    Ok(Hold { begins: machine.seconds(slower - said), stops: machine.seconds(rest - slower) })
+}
+
+/// When the first interval begins that is longer than all in the 100 ms before `said`, by more than a cycle.
+fn first_slower(machine: &Machine, said: u64) -> Option<u64> {
+    let steps = machine.recorder().steps_of(0);
+    let steady = steps.partition_point(|s| *s < said - machine.cycles(100));
+    let told = steps.partition_point(|s| *s < said);
+    let usual = steps[steady..told].windows(2).map(|pair| pair[1] - pair[0]).max()?;
+    let slower = steps[told..].windows(2).find(|pair| pair[1] - pair[0] > usual + 1)?;
+    Some(slower[0])
+}
+
+/// Acceleration of X and Y on arcs, 99th percentile, over the limit.
+pub fn arcs_acceleration(bed: &Bed) -> Result<Figure> {
+    let how = How { log: true, more: &FINE, ..How::default() };
+    let (machine, _) = bed.run(&arcs(), how)?;
+    let mut all: Vec<f64> = (0..2).flat_map(|motor| accelerations(&machine, motor)).collect();
+    all.sort_by(f64::total_cmp);
+    let percentile = all.get(all.len() * 99 / 100).context("nothing has moved")?;
+    let note = format!("most {:.0} mm/s2", all[all.len() - 1]);
+    Ok(Figure { value: percentile / ACCELERATION, note })
+}
+
+/// The size of a motor's acceleration all the time, by positions a window apart.
+fn accelerations(machine: &Machine, motor: u8) -> Vec<f64> {
+    let clock = f64::from(machine.board().clock_hz);
+    let mut place = 0.0;
+    // A step comes when the motor is in the middle between two.
+    let steps = machine.recorder().log().iter().filter(|s| s.motor == motor).map(|s| {
+        place += if s.positive { 1.0 } else { -1.0 };
+        let middle = place - if s.positive { 0.5 } else { -0.5 };
+        (s.cycle as f64 / clock, middle / FINE_PER_MM)
+    });
+    let steps: Vec<(f64, f64)> = steps.collect();
+    let Some(((from, _), (to, _))) = steps.first().zip(steps.last()) else { return Vec::new() };
+    let at = |t: f64| {
+        let next = steps.partition_point(|(s, _)| *s < t).clamp(1, steps.len() - 1);
+        let ((a, x), (b, y)) = (steps[next - 1], steps[next]);
+        x + (y - x) * ((t - a) / (b - a)).clamp(0.0, 1.0)
+    };
+    let count = ((to - from) / WINDOW_S) as usize;
+    let places: Vec<f64> = (0..count).map(|n| at(from + n as f64 * WINDOW_S)).collect();
+    let change = |w: &[f64]| (w[2] - 2.0 * w[1] + w[0]).abs() / (WINDOW_S * WINDOW_S);
+    places.windows(3).map(change).collect()
+}

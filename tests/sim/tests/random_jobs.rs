@@ -1,0 +1,160 @@
+//! Random jobs on the image: lines and arcs of all sizes with four axes, under random jerk limits and at random feeds.
+//! None has a pause, and each ends exactly.
+//!
+//! `KERF_SEED` and `KERF_CASES` choose the jobs: `KERF_CASES=1000` for a thousand.
+
+mod common;
+#[path = "../../support/seeds.rs"]
+#[allow(dead_code)]
+mod seeds;
+
+use std::collections::VecDeque;
+use std::fmt::Write;
+use std::sync::Mutex;
+use std::thread;
+
+use common::firmware;
+use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::job::{self, Options};
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+
+/// Jobs unless asked otherwise: about two minutes on two cores.
+const CASES: u64 = 50;
+
+/// A place to go to, as offsets of X, Y, Z (mm) and A (degrees).
+#[derive(Clone, Debug)]
+enum Move {
+    Line { way: [f64; 4], feed: f64 },
+    Arc { radius: f64, from: f64, turn: f64, rise: f64, feed: f64 },
+}
+
+#[derive(Clone, Debug)]
+struct Job {
+    /// Millions of mm/min3; 1,000,000 is none.
+    jerk: f64,
+    moves: Vec<Move>,
+}
+
+/// Evenly over the decades.
+fn decades(from: f64, to: f64) -> impl Strategy<Value = f64> {
+    (from.ln()..to.ln()).prop_map(f64::exp)
+}
+
+fn line() -> impl Strategy<Value = Move> {
+    let axes = prop_oneof![
+        3 => Just([1.0, 1.0, 0.0, 0.0]),
+        1 => Just([1.0, 0.0, 0.0, 0.0]),
+        1 => Just([1.0, 1.0, 0.3, 0.0]),
+        1 => Just([1.0, 1.0, 0.3, 1.0]),
+    ];
+    let way = prop::array::uniform4(-1.0..1.0f64);
+    (decades(0.05, 20.0), way, axes, decades(300.0, 12_000.0)).prop_map(|(mm, way, axes, feed)| {
+        let way: [f64; 4] = std::array::from_fn(|axis| way[axis] * axes[axis]);
+        let length = way[..3].iter().map(|w| w * w).sum::<f64>().sqrt().max(1e-3);
+        Move::Line { way: way.map(|w| w * mm / length), feed }
+    })
+}
+
+fn arc() -> impl Strategy<Value = Move> {
+    let turn = prop_oneof![0.2..6.0f64, -6.0..-0.2f64];
+    let rise = prop_oneof![3 => Just(0.0), 1 => -1.0..1.0f64];
+    (decades(0.2, 30.0), 0.0..6.28f64, turn, rise, decades(300.0, 12_000.0)).prop_map(
+        |(radius, from, turn, rise, feed)| {
+            // Large circles only in part: they would take most of the time.
+            let turn = turn / (radius / 10.0).max(1.0);
+            Move::Arc { radius, from, turn, rise, feed }
+        },
+    )
+}
+
+/// Moves one by one, and curves of many short ones.
+fn any_job() -> impl Strategy<Value = Job> {
+    let jerk = prop_oneof![Just(1e6), Just(500.0), Just(5_000.0), Just(50_000.0)];
+    let mixed = prop::collection::vec(prop_oneof![2 => line(), 1 => arc()], 10..40);
+    let curve = (decades(0.05, 1.0), -0.3..0.3f64, decades(600.0, 12_000.0), 50usize..250);
+    let curve = curve.prop_map(|(mm, bend, feed, count)| {
+        let way = |n: usize| {
+            let (sin, cos) = (bend * n as f64).sin_cos();
+            Move::Line { way: [mm * cos, mm * sin, 0.0, 0.0], feed }
+        };
+        (0..count).map(way).collect::<Vec<_>>()
+    });
+    (jerk, prop_oneof![2 => mixed, 1 => curve]).prop_map(|(jerk, moves)| Job { jerk, moves })
+}
+
+impl Job {
+    fn settings(&self) -> Vec<String> {
+        let jerk = self.jerk;
+        let axis = |axis| format!("{{{axis}:{{vm:30000,fr:30000,jm:{jerk},ac:500,jd:0.01}}}}");
+        let motors = ["{1:{tr:20}}", "{2:{tr:20}}", "{3:{tr:4}}", "{4:{ma:3,tr:20}}"];
+        let more = ["{a:{am:1}}", "{ja:1800000}", "{sv:0,qv:0}"];
+        let all = motors.iter().chain(&more).map(|s| s.to_string());
+        all.chain(["x", "y", "z", "a"].map(axis)).collect()
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::from("G17 G64 G90\n");
+        let mut at = [0.0f64; 4];
+        for step in &self.moves {
+            let (code, feed, centre) = match step {
+                Move::Line { way, feed } => {
+                    at.iter_mut().zip(way).for_each(|(at, way)| *at += way);
+                    ("G1", feed, None)
+                }
+                Move::Arc { radius, from, turn, rise, feed } => {
+                    let (i, j) = (-radius * from.cos(), -radius * from.sin());
+                    let to = from + turn;
+                    at[0] += i + radius * to.cos();
+                    at[1] += j + radius * to.sin();
+                    at[2] += rise;
+                    (if *turn > 0.0 { "G3" } else { "G2" }, feed, Some((i, j)))
+                }
+            };
+            let [x, y, z, a] = at;
+            let _ = write!(text, "{code} X{x:.3} Y{y:.3} Z{z:.3}");
+            let _ = match centre {
+                Some((i, j)) => writeln!(text, " I{i:.3} J{j:.3} F{feed:.0}"),
+                None => writeln!(text, " A{a:.3} F{feed:.0}"),
+            };
+        }
+        text
+    }
+}
+
+/// Plays the job of a seed; what is wrong with it.
+fn play(seed: u64) -> Option<String> {
+    let (tree, _) = seeds::case(seed, &any_job());
+    let job = tree.current();
+    let options = Options { settings: job.settings(), ..Options::default() };
+    let mut machine = firmware(&MEGA2560_GRBL);
+    let lines = job::lines_of(&job.text());
+    let report = job::run(&mut machine, &lines, &options, |_| {}).map_err(|why| why.to_string());
+    let problems = match report {
+        Ok(report) if report.ok => return None,
+        Ok(report) => report.problems.join("; "),
+        Err(why) => why,
+    };
+    Some(format!("seed {seed}, jerk {}, {} lines: {problems}", job.jerk, lines.len()))
+}
+
+#[test]
+fn random_jobs_have_no_pause_and_end_exactly() {
+    let seeds = seeds::seeds(CASES);
+    let waiting: Mutex<VecDeque<u64>> = Mutex::new(seeds.clone().collect());
+    let wrong = Mutex::new(Vec::new());
+    let work = || {
+        loop {
+            let next = waiting.lock().unwrap().pop_front();
+            let Some(seed) = next else { return };
+            wrong.lock().unwrap().extend(play(seed));
+        }
+    };
+    thread::scope(|scope| {
+        scope.spawn(work);
+        scope.spawn(work);
+    });
+    let wrong = wrong.into_inner().unwrap();
+    let (count, of) = (wrong.len(), seeds.count());
+    assert!(wrong.is_empty(), "{count} of {of} jobs:\n{}", wrong.join("\n"));
+}
