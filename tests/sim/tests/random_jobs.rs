@@ -59,7 +59,7 @@ fn line() -> impl Strategy<Value = Move> {
 fn arc() -> impl Strategy<Value = Move> {
     let turn = prop_oneof![0.2..6.0f64, -6.0..-0.2f64];
     let rise = prop_oneof![3 => Just(0.0), 1 => -1.0..1.0f64];
-    (decades(0.2, 30.0), 0.0..6.28f64, turn, rise, decades(300.0, 12_000.0)).prop_map(
+    (decades(0.2, 30.0), 0.0..std::f64::consts::TAU, turn, rise, decades(300.0, 12_000.0)).prop_map(
         |(radius, from, turn, rise, feed)| {
             // Large circles only in part: they would take most of the time.
             let turn = turn / (radius / 10.0).max(1.0);

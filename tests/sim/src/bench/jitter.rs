@@ -1,9 +1,11 @@
 //! How evenly the steps come at cruise: X at 20,000 steps/s with Y at 7,400 in one move.
 
+use std::fmt::Write;
+
 use anyhow::Result;
 
 use super::Figure;
-use super::workload::{Bed, How, PER_MM, chatter, straight};
+use super::workload::{Bed, How, PER_MM, chatter};
 use crate::machine::Machine;
 
 /// Steps a second of the dominant motor and of the minor one.
@@ -36,11 +38,21 @@ pub fn minor(bed: &Bed) -> Result<Figure> {
     Ok((machine.seconds(peak_to_peak(&machine, 1)) * 1e6).into())
 }
 
-/// The same over the boundaries of blocks: lines of 5 mm in a row; nothing else on the line.
+/// The same over the boundaries of blocks: lines of 5 mm in a row, of X alone and with Y; nothing else on the line.
 pub fn boundaries(bed: &Bed) -> Result<Figure> {
-    let job = straight((WAY / BLOCK) as u32, BLOCK, DOMINANT / PER_MM * 60.0);
-    let machine = bed.run(&job, How { log: true, ..How::default() })?.0;
-    Ok(in_cycles(&machine, peak_to_peak(&machine, 0)))
+    let (mut worst, mut note) = (0, Vec::new());
+    for (name, minor) in [("alone", 0.0), ("with Y", MINOR / DOMINANT)] {
+        let mut job = format!("G1 F{:.3}\n", DOMINANT / PER_MM * 60.0 * 1f64.hypot(minor));
+        for n in 1..=(WAY / BLOCK) as u32 {
+            let x = f64::from(n) * BLOCK;
+            let _ = writeln!(job, "G1X{x:.2}Y{:.4}", x * minor);
+        }
+        let machine = bed.run(&job, How { log: true, ..How::default() })?.0;
+        let cycles = peak_to_peak(&machine, 0);
+        note.push(format!("{name} {cycles}"));
+        worst = worst.max(cycles);
+    }
+    Ok(Figure { value: worst as f64, note: note.join(", ") })
 }
 
 fn in_cycles(machine: &Machine, cycles: u64) -> Figure {

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 
 use super::Figure;
 use super::optimum::rest_to_rest;
-use super::workload::{ACCELERATION, Bed, How, PER_JERK, USUAL_JERK, arcs};
+use super::workload::{ACCELERATION, Bed, How, PER_JERK, USUAL_JERK, small_arcs};
 use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::machine::Machine;
 
@@ -112,7 +112,7 @@ fn first_slower(machine: &Machine, said: u64) -> Option<u64> {
 /// Acceleration of X and Y on arcs, 99th percentile, over the limit.
 pub fn arcs_acceleration(bed: &Bed) -> Result<Figure> {
     let how = How { log: true, more: &FINE, ..How::default() };
-    let (machine, _) = bed.run(&arcs(), how)?;
+    let (machine, _) = bed.run(&small_arcs(), how)?;
     let mut all: Vec<f64> = (0..2).flat_map(|motor| accelerations(&machine, motor)).collect();
     all.sort_by(f64::total_cmp);
     let percentile = all.get(all.len() * 99 / 100).context("nothing has moved")?;

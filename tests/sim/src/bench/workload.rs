@@ -199,20 +199,32 @@ pub fn chatter(lines: u32) -> String {
     (1..=lines).map(line).collect()
 }
 
-/// Arcs one behind the other, whose radius grows from 0.4 mm to 18, two to the left and one to the right, then a helix.
+/// Arcs one behind the other, whose radius grows from 0.4 mm to 18, then a helix.
 pub fn arcs() -> String {
+    let (mut job, [x, y]) = half_circles(44, 1.095);
+    let _ = writeln!(job, "G2 X{x:.4} Y{y:.4} Z-2 I6 J0 P3\nG0 Z0\nG0 X0 Y0");
+    job
+}
+
+/// Arcs one behind the other, whose radius grows from 0.4 mm to 5.
+pub fn small_arcs() -> String {
+    half_circles(50, 1.053).0
+}
+
+/// Half circles one behind the other, two to the left and one to the right, each `growth` times as large as the one
+/// before it; and where they end.
+fn half_circles(count: u32, growth: f64) -> (String, [f64; 2]) {
     let mut job = String::from("G17 G64 G1 F5400\n");
     let (mut x, mut y, mut radius) = (0.0f64, 0.0f64, 0.4f64);
-    for n in 0..44u32 {
+    for n in 0..count {
         let (sin, cos) = (f64::from(n) * 0.7).sin_cos();
         let (i, j) = (radius * cos, radius * sin);
         let code = if n.is_multiple_of(3) { 2 } else { 3 };
         let to = (x + 2.0 * i, y + 2.0 * j);
         let _ = writeln!(job, "G{code} X{:.4} Y{:.4} I{i:.4} J{j:.4}", to.0, to.1);
-        ((x, y), radius) = (to, (radius * 1.095).min(18.0));
+        ((x, y), radius) = (to, (radius * growth).min(18.0));
     }
-    let _ = writeln!(job, "G2 X{x:.4} Y{y:.4} Z-2 I6 J0 P3\nG0 Z0\nG0 X0 Y0");
-    job
+    (job, [x, y])
 }
 
 /// A wavy ring in straight moves of about `mm`, at `feed` mm/min.
