@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! target -> line -> block queue -> exec -> segment ring -> dda -> pins
-//!           junction   |   ^        governor, prep
+//!    junction, curve   |   ^        governor, prep
 //!                      horizon      smooth, brake, reach, halt
 //! ```
 
 pub mod block;
 pub mod brake;
 pub mod contact;
+pub mod curve;
 pub mod dda;
 pub mod divide;
 pub mod dynamics;
