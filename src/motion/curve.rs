@@ -34,6 +34,9 @@ const NOISE: f32 = 8.0;
 const RADIUS_LEAST: f32 = 1e-3;
 /// Changes of direction below this count as none, as in `junction`. In 2^-14.
 const STRAIGHT: u16 = 31;
+/// A curve has this many corners, each like the one before it, before the one that slows it down: rounding of
+/// positions makes few such rows.
+const CORNERS: u8 = 1;
 /// Changes of direction beyond this, some 40 degrees, are no part of a curve. In 2^-14.
 const CORNER: u16 = 11_000;
 
@@ -63,7 +66,7 @@ impl Curve {
         let mut slowest = Slowest::default();
         for axis in axes {
             if let Some(axis) = dynamics.axes.get(usize::from(axis)) {
-                slowest.look(ONE as u16, axis.accel, axis.jerk);
+                slowest.look_at(ONE as u16, axis.accel, axis.jerk);
             }
         }
         let (accel, jerk) = (slowest.least.get(), slowest.jerk.get());
@@ -95,10 +98,12 @@ impl Curve {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bend {
     /// The change of direction, in 2^-14.
-    change: [i16; FIRST_ROTARY],
+    turned: [i16; FIRST_ROTARY],
     /// Length of the last line and of the one before, mm.
     last: Short,
     before: Short,
+    /// How many corners in a row were like the one before them, up to [`CORNERS`].
+    corners: u8,
 }
 
 impl Bend {
@@ -121,45 +126,42 @@ impl Bend {
         let (last, before) = (self.last, self.before);
         self.last = Short::new(path.length);
         self.before = last;
-        let turned = core::mem::take(&mut self.change);
-        let mut most = 0;
-        let mut change = [0; FIRST_ROTARY];
-        for (change, (a, b)) in change.iter_mut().zip(from.unit.iter().zip(&path.heading.unit)) {
-            *change = b.wrapping_sub(*a);
-            most = change.unsigned_abs().max(most);
+        let (mut most, mut sum, mut difference) = (0, 0, 0);
+        let mut both = [0; FIRST_ROTARY];
+        let ends = from.unit.iter().zip(&path.heading.unit);
+        for ((turned, both), (a, b)) in self.turned.iter_mut().zip(&mut both).zip(ends) {
+            let turns = b.wrapping_sub(*a);
+            let before = core::mem::replace(turned, turns);
+            if turns | before != 0 {
+                *both = turns.wrapping_add(before).unsigned_abs();
+                most = turns.unsigned_abs().max(most);
+                sum = (*both).max(sum);
+                difference = turns.wrapping_sub(before).unsigned_abs().max(difference);
+            }
         }
         if !(STRAIGHT..=CORNER).contains(&most) {
+            self.turned = [0; FIRST_ROTARY];
+            self.corners = 0;
             return;
         }
-        self.change = change;
-        if turned != [0; FIRST_ROTARY] && alike(&turned, &change) {
-            let span = last.get() + scaled(before.get() + path.length, -1);
-            // A chamfer between long lines, or the end of a long one.
-            if below(scaled(last.get(), 2), span) {
-                return;
-            }
-            let noise = noise(span);
-            let both = core::array::from_fn(|n| {
-                let size = change[n].saturating_add(turned[n]).unsigned_abs();
-                size.saturating_sub(noise)
-            });
-            path.bend(&both, span, dynamics);
+        // The two turn the same way, and one no more than three times as much as the other.
+        if difference > sum / 2 {
+            self.corners = 0;
+            return;
         }
+        if self.corners < CORNERS {
+            self.corners += 1;
+            return;
+        }
+        let span = last.get() + scaled(before.get() + path.length, -1);
+        // A chamfer between long lines, or the end of a long one.
+        if below(scaled(last.get(), 2), span) {
+            return;
+        }
+        let noise = noise(span);
+        both = both.map(|size: u16| size.saturating_sub(noise));
+        path.bend(&both, span, dynamics);
     }
-}
-
-/// Whether two corners turn the same way, and neither four times as much as the other.
-#[inline(never)]
-fn alike(a: &[i16; FIRST_ROTARY], b: &[i16; FIRST_ROTARY]) -> bool {
-    let (mut dot, mut first, mut second) = (0i32, 0u32, 0u32);
-    for (a, b) in a.iter().zip(b) {
-        let (size, other) = (a.unsigned_abs(), b.unsigned_abs());
-        first += product(size, size);
-        second += product(other, other);
-        let term = product(size, other) as i32;
-        dot += if (a ^ b) < 0 { -term } else { term };
-    }
-    dot > 0 && dot as u32 >= first.max(second) / 4
 }
 
 /// How much of a change of direction within `span` mm may be what positions of three decimals have been rounded by,
@@ -205,7 +207,7 @@ impl Path {
         for (&u, axis) in both.iter().zip(&dynamics.axes) {
             // An axis that hardly takes part does not count.
             if u >= STRAIGHT {
-                slowest.look(u, axis.accel, axis.jerk);
+                slowest.look_at(u, axis.accel, axis.jerk);
             }
         }
         if slowest.accel != Short::ZERO {

@@ -184,7 +184,14 @@ pub(super) struct Slowest {
 }
 
 impl Slowest {
-    pub(super) fn look(&mut self, u: u16, accel: Short, jerk: Short) {
+    /// As [`Slowest::look`], where it is not called as often. Cost: 130.
+    #[inline(never)]
+    pub(super) fn look_at(&mut self, u: u16, accel: Short, jerk: Short) {
+        self.look(u, accel, jerk);
+    }
+
+    #[inline(always)]
+    fn look(&mut self, u: u16, accel: Short, jerk: Short) {
         if accel != Short::ZERO {
             if self.least == Short::ZERO || accel < self.least {
                 self.least = accel;
