@@ -44,6 +44,17 @@ impl Case {
         Arc { first, second, linear, center, clockwise, extra_turns: 0 }
     }
 
+    /// How far points of a chord are outside the circle, in units.
+    fn offsets(&self, from: &PerAxis<Length>, to: &PerAxis<Length>, radius: f64) -> Vec<f64> {
+        let [first, second, _] = self.axes();
+        let at = |axis: usize, n: usize, part: f64| {
+            let (from, to) = (f64::from(from[axis].0), f64::from(to[axis].0));
+            from + (to - from) * part - f64::from(self.center[n])
+        };
+        let parts = (0..100).map(|n| (f64::from(n) + 0.5) / 100.0);
+        parts.map(|part| at(first, 0, part).hypot(at(second, 1, part)) - radius).collect()
+    }
+
     /// Radius and angle (from the start, in the sense of the arc, 0 to 2 pi) of a point.
     fn polar(&self, point: &PerAxis<Length>, start: f64) -> (f64, f64) {
         let [first, second, _] = self.axes();
@@ -94,18 +105,30 @@ proptest! {
             f64::from(start[second].0 - case.center[1]).atan2(x)
         });
         let mut last = (0.0, start);
+        // Of the mean distance from the circle, inner chords only.
+        let (mut sum, mut inner) = (0.0, 0.0);
         for (i, point) in chords.enumerate() {
-            let (r, angle) = case.polar(&point, begin);
-            prop_assert!((r - radius).abs() <= 10.0, "1 um: {} from {radius}", r - radius);
+            let (_, angle) = case.polar(&point, begin);
             let turned = angle - last.0;
             prop_assert!(turned > 0.0, "chord {i} goes backwards");
-            let sagitta = r * (1.0 - (turned / 2.0).cos());
-            let short = r * turned <= 505.0;
-            prop_assert!(short || sagitta <= f64::from(tolerance) * 10_000.0 * 1.01 + 1.5, "{sagitta}");
+            let short = radius * turned <= 505.0;
+            let most = f64::from(tolerance) * 10_000.0 * 1.01 + 1.5;
+            let offsets = case.offsets(&last.1, &point, radius);
+            let worst = offsets.iter().map(|d| d.abs()).fold(0.0, f64::max);
+            prop_assert!(short || worst <= most, "chord {i} of {count} is {worst} units off");
+            if i > 0 && i as u32 + 1 < count {
+                sum += offsets.iter().sum::<f64>() / offsets.len() as f64;
+                inner += 1.0;
+            }
             let even = across * (i + 1) as f64 / f64::from(count);
             prop_assert!((f64::from(point[case.axes()[2]].0) - even)
                 .abs() <= 1.0);
             last = (angle, point);
+        }
+        if inner > 0.0 {
+            let mean: f64 = sum / inner;
+            let most = 1.0 + f64::from(tolerance) * 100.0 + radius * 1e-6;
+            prop_assert!(mean.abs() <= most, "{mean} units in the mean");
         }
         prop_assert_eq!(last.1, target);
     }

@@ -31,7 +31,7 @@ fn built(
     ends: [PerAxis<Length>; 2],
     feed: Option<Feed>,
 ) -> (Move, f32) {
-    let line = Line { from: &ends[0], to: &ends[1], feed };
+    let line = Line { from: &ends[0], to: &ends[1], feed, curve: None };
     let mut block = Move::default();
     match builder.line(&line, &Dynamics::new(config), config, &mut block) {
         Built::Line(entry) => (block, entry),
@@ -157,7 +157,7 @@ proptest! {
         let mut motors = [0i64; MOTORS];
         let mut began = false;
         for (to, feed) in moves {
-            let line = Line { from: &from, to: &to, feed };
+            let line = Line { from: &from, to: &to, feed, curve: None };
             let mut block = Move::default();
             match builder.line(&line, &dynamics, &config, &mut block) {
                 Built::Nothing => prop_assert_eq!(from, to),
@@ -178,7 +178,14 @@ proptest! {
                 }
                 Built::Line(entry) => {
                     let (unit, length) = unit(&from, &to);
-                    check_limits(&block, &unit, length, feed, &config);
+                    // What comes before it slows it down only where they are parts of a curve.
+                    let mut alone = Builder::default();
+                    let _ = alone.set_position(&from, &config);
+                    let (alone, _) = built(&mut alone, &config, [from, to], feed);
+                    check_limits(&alone, &unit, length, feed, &config);
+                    prop_assert!(block.cruise <= alone.cruise);
+                    let limits = |block: &Move| (block.accel, block.jerk, block.steps);
+                    prop_assert_eq!(limits(&block), limits(&alone));
                     prop_assert!(began || entry == 0.0);
                     began = true;
                     for m in 0..MOTORS {
@@ -210,6 +217,56 @@ proptest! {
             let (block, entry) = built(&mut builder, &config, [from, to], None);
             prop_assert!(part == 1 || entry > 0.99 * block.cruise);
             from = to;
+        }
+    }
+}
+
+proptest! {
+    /// Short lines on a circle keep to what the axes can on a curve, within a factor of 1.5, from the third on.
+    #[test]
+    fn short_lines_on_a_curve_keep_to_its_limits(
+        radius in decades(0.2, 30.0), chord in decades(0.02, 1.0), accel in decades(50.0, 5e3),
+        jerk in prop_oneof![Just(0.0), decades(1e3, 1e6)], start in 0.0..6.3f64, feed in decades(60.0, 2e4),
+    ) {
+        // As coarse as a part of a turn: then it is a polygon.
+        prop_assume!(chord < 0.6 * radius);
+        // As flat as what three decimals leave of a straight line.
+        prop_assume!(chord * chord > 1.2e-3 * radius);
+        let config = Config { deviation: 0.1, junction: accel, ..Config::new(500.0, accel, jerk) };
+        let mut builder = Builder::default();
+        let mut from = at([0.0]);
+        for n in 0..30 {
+            let angle = start + f64::from(n) * f64::from(chord / radius);
+            let point = [angle.cos(), angle.sin()].map(|u| u * f64::from(radius));
+            let to = at(point);
+            let (block, _) = built(&mut builder, &config, [from, to], Some(Feed::PerMinute(feed)));
+            from = to;
+            if n < 4 {
+                continue;
+            }
+            let (v, r) = (f64::from(block.velocity(&Factors { feed: 2.0, traverse: 1.0 })), f64::from(radius));
+            prop_assert!(v * v / r <= 1.5 * f64::from(accel), "{v} mm/s: {} of {accel} mm/s^2", v * v / r);
+            let most = if jerk > 0.0 { 1.5 * f64::from(jerk) } else { f64::MAX };
+            prop_assert!(v.powi(3) / r.powi(2) <= most, "{v} mm/s: {} of {jerk} mm/s^3", v.powi(3) / r.powi(2));
+        }
+    }
+
+    /// A corner between long lines is no curve, nor is a chamfer of it.
+    #[test]
+    fn a_corner_is_no_curve(angle in 0.01..3.0f64, side in 5.0..50.0f64, chamfer in 0.05..1.5f64) {
+        let config = Config::new(500.0, 500.0, 0.0);
+        let end = [side + side * angle.cos(), side * angle.sin()];
+        let (half, beyond) = (angle / 2.0, side + chamfer);
+        let cut = [side + chamfer * half.cos(), chamfer * half.sin()];
+        let last = [cut[0] + beyond * angle.cos(), cut[1] + beyond * angle.sin()];
+        for path in [vec![[side, 0.0], end], vec![[side, 0.0], cut, last]] {
+            let mut builder = Builder::default();
+            let mut from = at([0.0]);
+            for to in path.into_iter().map(at) {
+                let (block, _) = built(&mut builder, &config, [from, to], Some(Feed::PerMinute(3000.0)));
+                prop_assert!((block.cruise - 50.0).abs() < 1e-3);
+                from = to;
+            }
         }
     }
 }

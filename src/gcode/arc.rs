@@ -10,9 +10,15 @@
 //! Where the radius at the end differs from that at the start (by what the interpreter tolerates),
 //! the radius changes evenly along the arc.
 //!
-//! Cost on AVR: [`Walk::new`] 13,000 cycles; a chord 8,700, and 600 for each other axis that moves.
+//! The chords lie inside the arc for one part and outside for the other, so that their mean distance from the
+//! centre is the radius: all ends but the first and the last are outside by two thirds of the sagitta. A chord may
+//! then have a sagitta of 1.44 times the tolerance. The limit is the first chord, whose start is on the arc itself.
+//!
+//! Cost on AVR: [`Extent::of`] and [`Walk::new`] 14,000 cycles; a chord 8,700, and 600 for each other axis that moves.
 
 use core::f32::consts::TAU;
+
+use kerf_macros::small;
 
 use super::command::Arc;
 use crate::math;
@@ -24,6 +30,8 @@ const MIN_CHORD: f32 = 500.0;
 const SAME_RADIUS: f32 = 2.0;
 /// Binary fractions in a turn.
 const TURN: f32 = 4_294_967_296.0;
+/// The sagitta of a chord that leaves its arc by 1.
+const SAGITTA: f32 = 1.44;
 
 /// How far the chords of an arc have come. The arc and its target stay where they are: see [`Chords`].
 #[derive(Clone, Copy, Debug)]
@@ -33,8 +41,6 @@ pub struct Walk {
     spoke: [f32; 2],
     /// By what part of itself the radius grows along the arc.
     growth: f32,
-    /// Path length, units.
-    length: f32,
     /// How far the spoke has turned, and turns with each chord, in binary fractions of a turn.
     angle: u32,
     step: u32,
@@ -44,39 +50,100 @@ pub struct Walk {
     part: f32,
 }
 
+/// How large an arc is. All lengths in units.
+#[derive(Clone, Copy, Debug)]
+pub struct Extent {
+    /// From start to end, as a part of a turn, 0 to 1.
+    part: f32,
+    /// Radius at the start and at the end.
+    radii: [f32; 2],
+    /// Length of the arc in its plane.
+    planar: f32,
+    /// Length of the path: of the arc, or of the helix.
+    length: f32,
+}
+
+impl Extent {
+    /// The extent of the arc from `start` to `target`.
+    #[inline(never)]
+    #[small]
+    pub fn of(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> Self {
+        let radii = [norm(spoke(start, arc)), norm(spoke(target, arc))];
+        let part = part(start, target, arc);
+        let planar = (part + f32::from(arc.extra_turns)) * TAU * (radii[0] + radii[1]) * 0.5;
+        let length = norm([planar, way(start, target, arc.linear)]);
+        Self { part, radii, planar, length }
+    }
+
+    /// Length of the path, in mm.
+    pub fn length(&self) -> f32 {
+        self.length * 1e-4
+    }
+
+    /// The least radius, in mm.
+    pub fn radius(&self) -> f32 {
+        self.radii[0].min(self.radii[1]) * 1e-4
+    }
+
+    /// Length of the path over that in the plane, 1 or more.
+    pub fn slope(&self) -> f32 {
+        if self.planar > 0.0 { self.length / self.planar } else { 1.0 }
+    }
+
+    /// How many chords keep within `tolerance` mm of the arc and are not longer than `longest` mm.
+    ///
+    /// A chord of sagitta s is 2 sqrt(s (2 r - s)) long. Never longer than the radius: a full circle then
+    /// has seven chords, whatever the tolerance.
+    #[inline(never)]
+    #[small]
+    fn count(&self, tolerance: f32, longest: f32) -> u32 {
+        const UNITS: f32 = Length::PER_MM as f32;
+        let (radius, sagitta) = (self.radii[0].max(self.radii[1]), tolerance * (UNITS * SAGITTA));
+        let chord = 2.0 * math::sqrt(sagitta * (2.0 * radius - sagitta));
+        let chord =
+            if sagitta < radius { chord.min(longest * UNITS).max(MIN_CHORD) } else { radius };
+        let chord = chord.min(radius);
+        // Casts saturate, and take 0 / 0 for 0.
+        let count = self.planar / chord;
+        let whole = count as u32;
+        let whole = if (whole as f32) < count { whole.saturating_add(1) } else { whole };
+        // A single chord has both ends on the arc, and leaves it by all of its sagitta.
+        let alone = whole == 1 && count * (SAGITTA * 0.84) > 1.0 && self.planar > MIN_CHORD;
+        if alone { 2 } else { whole.clamp(1, i32::MAX as u32) }
+    }
+}
+
 impl Walk {
-    /// The arc from `start` to `target`; the chords leave it by `tolerance` mm at most.
+    /// The arc from `start` to `target`, of this extent; the chords leave it by `tolerance` mm at most, and are
+    /// not longer than `longest` mm.
+    #[inline(never)]
+    #[small]
     pub fn new(
         start: &PerAxis<Length>,
-        target: &PerAxis<Length>,
         arc: &Arc,
+        extent: &Extent,
         tolerance: f32,
+        longest: f32,
     ) -> Self {
-        let (spoke, end) = (spoke(start, arc), spoke(target, arc));
-        let (radius, end_radius) = (norm(spoke), norm(end));
-        let part = part(start, target, arc);
-        let planar = (part + f32::from(arc.extra_turns)) * TAU * (radius + end_radius) * 0.5;
-        let count = count(planar, radius.max(end_radius), tolerance * Length::PER_MM as f32);
+        let count = extent.count(tolerance, longest);
+        let [radius, end_radius] = extent.radii;
         let grows = (end_radius - radius).abs() > SAME_RADIUS && radius > 0.0;
         // A whole turn saturates to a hair less; the last chord makes up for it.
-        let turned = u64::from(arc.extra_turns) << 32 | u64::from((part * TURN) as u32);
+        let turned = u64::from(arc.extra_turns) << 32 | u64::from((extent.part * TURN) as u32);
         let step = (turned / u64::from(count)) as u32;
+        // Two thirds of the sagitta, r angle^2 / 8.
+        let angle = step as f32 * (TAU / TURN);
+        let outside = 1.0 + angle * angle * (1.0 / 12.0);
         Self {
             start: *start,
-            spoke,
+            spoke: spoke(start, arc).map(|component| component * outside),
             growth: if grows { end_radius / radius - 1.0 } else { 0.0 },
-            length: norm([planar, way(start, target, arc.linear)]),
             angle: 0,
             step: if arc.clockwise { step.wrapping_neg() } else { step },
             done: 0,
             count,
             part: 1.0 / count as f32,
         }
-    }
-
-    /// Length of the whole path (arc, or helix), in mm.
-    pub fn length(&self) -> f32 {
-        self.length * 1e-4
     }
 
     /// The end of the next chord; `None` when there is none.
@@ -133,6 +200,7 @@ impl Walk {
 pub struct Chords<'a> {
     arc: &'a Arc,
     target: &'a PerAxis<Length>,
+    length: f32,
     walk: Walk,
 }
 
@@ -144,12 +212,14 @@ impl<'a> Chords<'a> {
         arc: &'a Arc,
         tolerance: f32,
     ) -> Self {
-        Self { arc, target, walk: Walk::new(start, target, arc, tolerance) }
+        let extent = Extent::of(start, target, arc);
+        let walk = Walk::new(start, arc, &extent, tolerance, f32::MAX);
+        Self { arc, target, length: extent.length(), walk }
     }
 
     /// Length of the whole path (arc, or helix), in mm.
     pub fn length(&self) -> f32 {
-        self.walk.length()
+        self.length
     }
 
     /// Number of chords in all.
@@ -205,20 +275,6 @@ pub(super) fn turned(from: [f32; 2], to: [f32; 2], clockwise: bool) -> f32 {
     if angle > 0.0 { angle } else { angle + 1.0 }
 }
 
-/// How many chords keep within `tolerance` of an arc of this length and radius (all in units).
-///
-/// A chord of sagitta s is 2 sqrt(s (2 r - s)) long. Never longer than the radius: a full circle then
-/// has seven chords, whatever the tolerance.
-fn count(length: f32, radius: f32, tolerance: f32) -> u32 {
-    let chord = 2.0 * math::sqrt(tolerance * (2.0 * radius - tolerance));
-    let chord = if tolerance < radius { chord.max(MIN_CHORD) } else { radius }.min(radius);
-    // Casts saturate, and take 0 / 0 for 0.
-    let count = length / chord;
-    let whole = count as u32;
-    let whole = if (whole as f32) < count { whole.saturating_add(1) } else { whole };
-    whole.clamp(1, i32::MAX as u32)
-}
-
 /// How far an axis goes, in units.
 fn way(start: &PerAxis<Length>, target: &PerAxis<Length>, axis: u8) -> f32 {
     let at = |point: &PerAxis<Length>| point.get(usize::from(axis)).map_or(0.0, |at| at.0 as f32);
@@ -254,15 +310,16 @@ mod tests {
         let (start, target) = (point(10 * MM, 0, 0, 0), point(0, 10 * MM, MM, 90 * MM));
         let arc = xy((0, 0), false, 0);
         let chords = Chords::new(&start, &target, &arc, 0.01);
-        // A chord is 2 sqrt(0.01 * 19.99) = 0.894 mm of the 15.708.
-        assert_eq!(chords.total(), 18);
+        // A chord is 2 sqrt(0.0144 * 19.9856) = 1.073 mm of the 15.708.
+        assert_eq!(chords.total(), 15);
         assert!((chords.length() - 15.7398).abs() < 1e-3);
         let points: Vec<_> = chords.collect();
-        assert_eq!(points.len(), 18);
-        assert_eq!(points[17], target);
-        assert_eq!(points[8][..2], [Length(70_711); 2]);
+        assert_eq!(points.len(), 15);
+        assert_eq!(points[14], target);
+        // A third of the way, and 9.1 um outside: two thirds of the sagitta.
+        assert_eq!(points[4][..2], [Length(86_682), Length(50_046)]);
         for (i, at) in points.iter().enumerate() {
-            let even = (i as i32 + 1) * 50_000;
+            let even = (i as i32 + 1) * 60_000;
             assert!((at[3].0 - even).abs() <= 1 && (at[2].0 - even / 90).abs() <= 1, "{at:?}");
         }
     }

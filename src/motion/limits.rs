@@ -103,6 +103,7 @@ impl Path {
             let u = if mixed { ONE as u16 } else { u };
             slowest.look(u, along(axis.accel), along(axis.jerk));
         }
+        self.slowest = (slowest.least, slowest.jerk);
         let jerk = slowest.jerk.get();
         let least = slowest.least.get();
         if some(least) {
@@ -157,7 +158,7 @@ fn least_of(accel: f32) -> f32 {
 /// A limit along the path: that of an axis, not 0, over its part `u` of the heading, not 0. As exact as
 /// a [`Short`]. Cost: 350, where a division of floats takes 700.
 #[inline(never)]
-fn over(limit: Short, u: u16) -> f32 {
+pub(super) fn over(limit: Short, u: u16) -> f32 {
     let (limit, u) = (limit.get().to_bits(), f32::from(u).to_bits());
     // Their mantissas, the first of 9 bits, the other of 16.
     let above = u32::from((limit >> 15) as u16 & 0xFF | 0x100) << 22;
@@ -174,15 +175,22 @@ fn float(u: u16) -> f32 {
 
 /// The axis that limits the acceleration, and the least limits of all axes.
 #[derive(Default)]
-struct Slowest {
+pub(super) struct Slowest {
     /// Limit and unit of the axis that limits most.
-    accel: Short,
-    unit: u16,
-    least: Short,
-    jerk: Short,
+    pub(super) accel: Short,
+    pub(super) unit: u16,
+    pub(super) least: Short,
+    pub(super) jerk: Short,
 }
 
 impl Slowest {
+    /// As [`Slowest::look`], where it is not called as often. Cost: 130.
+    #[inline(never)]
+    pub(super) fn look_at(&mut self, u: u16, accel: Short, jerk: Short) {
+        self.look(u, accel, jerk);
+    }
+
+    #[inline(always)]
     fn look(&mut self, u: u16, accel: Short, jerk: Short) {
         if accel != Short::ZERO {
             if self.least == Short::ZERO || accel < self.least {

@@ -12,6 +12,7 @@
 //! possible: then they are those of the slowest axis that moves, whatever the direction.
 
 use super::block::{Action, Block, Line as Move};
+use super::curve::{Bend, Curve};
 use super::dynamics::Dynamics;
 use super::factors::Reserve;
 use super::float::{least, some};
@@ -42,6 +43,8 @@ pub struct Line<'a> {
     pub to: &'a PerAxis<Length>,
     /// How fast; a traverse if `None`. Positive: the interpreter refuses a feed of 0.
     pub feed: Option<Feed>,
+    /// The arc that it is a chord of.
+    pub curve: Option<&'a Curve>,
 }
 
 /// What becomes of a move.
@@ -65,6 +68,8 @@ pub struct Builder {
     top: f32,
     /// The feed of the last move.
     feed: LastFeed,
+    /// How the path has turned so far.
+    bend: Bend,
     /// Motors at the end of the last block.
     motors: [Motor; MOTORS],
 }
@@ -95,6 +100,11 @@ impl Builder {
         }
         path.limit(line.feed, &mut self.feed, dynamics);
         path.limit_change(dynamics);
+        match line.curve {
+            Some(curve) => self.bend.chord(&mut path, curve),
+            None if some(self.top) => self.bend.line(&self.heading, &mut path, dynamics),
+            None => self.bend = Bend::default(),
+        }
         path.limit_steps(&dynamics.rates);
         path.heading.deviation = junction::deviation(&path.heading.unit, dynamics);
         let mut entry = least(path.top, self.top);

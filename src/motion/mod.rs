@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! target -> line -> block queue -> exec -> segment ring -> dda -> pins
-//!           junction   |   ^        governor, prep
+//!    junction, curve   |   ^        governor, prep
 //!                      horizon      slice, rise, ramp, constraint
 //! ```
 
 pub mod block;
 mod constraint;
 pub mod contact;
+pub mod curve;
 pub mod dda;
 pub mod divide;
 pub mod dynamics;

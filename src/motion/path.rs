@@ -42,6 +42,8 @@ pub(super) struct Path {
     pub(super) top: f32,
     pub(super) accel: Short,
     pub(super) jerk: Short,
+    /// The least acceleration and jerk of the axes that move, 0 for none.
+    pub(super) slowest: (Short, Short),
 }
 
 impl Path {

@@ -196,7 +196,7 @@ impl Planner {
         {
             match arc.walk.next(circle, target) {
                 Some(end) => {
-                    let feed = arc.feed;
+                    let feed = Feed::PerMinute(arc.feed);
                     self.straight(&end, Some(feed));
                 }
                 None => {
@@ -259,7 +259,8 @@ impl Planner {
     /// Queues a straight move, for which there is room, or says in how many parts it is to be made.
     fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) -> Option<u16> {
         let settings = self.links.settings.borrow();
-        let line = Line { from: &self.position, to: target, feed };
+        let curve = self.walk.as_ref().map(|arc| &arc.curve);
+        let line = Line { from: &self.position, to: target, feed, curve };
         let mut block = Move::default();
         match self.builder.line(&line, &self.dynamics, &*settings, &mut block) {
             Built::Nothing => None,

@@ -179,7 +179,7 @@ impl Rig {
     }
 
     fn go(&mut self, to: PerAxis<Length>, feed: Option<Feed>, number: u32) {
-        let line = Line { from: &self.position, to: &to, feed };
+        let line = Line { from: &self.position, to: &to, feed, curve: None };
         let mut block = Move::default();
         match self.builder.line(&line, &self.dynamics, &self.config, &mut block) {
             Built::Nothing => {}

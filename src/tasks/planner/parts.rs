@@ -3,14 +3,17 @@
 use kerf_macros::small;
 
 use super::Planner;
-use crate::gcode::arc::Walk;
+use crate::gcode::arc::{Extent, Walk};
 use crate::gcode::command::{Feed, Motion};
+use crate::motion::curve::Curve;
 use crate::units::{Length, PerAxis};
 
 /// An arc under way.
 pub(super) struct ArcWalk {
     pub walk: Walk,
-    pub feed: Feed,
+    /// mm/min.
+    pub feed: f32,
+    pub curve: Curve,
 }
 
 /// A move under way that is too long for one block.
@@ -52,13 +55,17 @@ impl Planner {
     pub(super) fn begin_arc(&mut self, motion: &Motion) {
         let Motion::Arc { target, feed, arc } = motion else { return };
         let tolerance = self.links.settings.borrow().chordal_tolerance();
-        let walk = Walk::new(&self.position, target, arc, tolerance);
+        let extent = Extent::of(&self.position, target, arc);
         // The time of an inverse-time arc is that of all its chords together.
         let feed = match *feed {
-            Feed::Minutes(minutes) if minutes > 0.0 => walk.length() / minutes,
+            Feed::Minutes(minutes) if minutes > 0.0 => extent.length() / minutes,
             Feed::Minutes(_) => f32::MAX,
             Feed::PerMinute(rate) => rate,
         };
-        self.walk = Some(ArcWalk { walk, feed: Feed::PerMinute(feed) });
+        let axes = [arc.first, arc.second];
+        let (radius, slope) = (extent.radius(), extent.slope());
+        let (curve, longest) = Curve::of(axes, radius, slope, feed, &self.dynamics);
+        let walk = Walk::new(&self.position, arc, &extent, tolerance, longest);
+        self.walk = Some(ArcWalk { walk, feed, curve });
     }
 }

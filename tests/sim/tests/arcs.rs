@@ -2,8 +2,12 @@
 
 mod common;
 
-use common::{booted, set};
+use std::fmt::Write;
+
+use common::{booted, firmware, set};
 use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::Machine;
+use kerf_sim::job::{self, Options};
 
 /// Steps in a millimetre.
 const MM: u64 = 1280;
@@ -43,10 +47,94 @@ fn every_arc_goes_its_way_round() {
             let after = steps(&machine);
             let went = [after[0] - before[0], after[1] - before[1]];
             let wanted = [first_mm * MM, second_mm * MM];
-            // Chords cut the turning points off by 10 um at most, on the way there and back.
-            let near =
-                |(went, wanted): (&u64, &u64)| wanted - wanted / 50 <= *went && went <= wanted;
+            // Chords are 10 um off at the turning points at most, on the way there and back.
+            let near = |(went, wanted): (&u64, &u64)| went.abs_diff(*wanted) <= wanted / 50;
             assert!(went.iter().zip(&wanted).all(near), "{plane} {words}: {went:?} not {wanted:?}");
         }
+    }
+}
+
+/// What axes may do, mm/s^2.
+const ACCEL: f64 = 500.0;
+/// The time over which velocities are taken, s.
+const WINDOW_S: f64 = 0.01;
+/// The part of all windows in which the acceleration is no greater.
+const PERCENTILE: f64 = 0.99;
+/// mm in a step.
+const STEP_MM: f64 = 0.0125;
+
+/// Arcs of 0.2 to 30 mm that go on into each other, left and right in turns, and a helix.
+fn garland() -> String {
+    let mut job = "g21 g90 g17 g64 f6000\n".to_string();
+    let mut x = 0.0;
+    for n in 0..34u32 {
+        let radius = 0.2 * 150f64.powf(f64::from(n) / 33.0);
+        x += 2.0 * radius;
+        writeln!(job, "g{} x{x:.4} i{radius:.4}", 2 + n % 2).unwrap();
+    }
+    job + "g3 z-2 i-6 p3\n"
+}
+
+/// Where a motor is at the end of each window, mm: between two steps on the line through both.
+fn positions(machine: &Machine, motor: u8) -> Vec<f64> {
+    let log = machine.recorder().log();
+    let hertz = f64::from(machine.board().clock_hz);
+    let mut steps = vec![(log[0].cycle as f64 / hertz, 0.0)];
+    let mut at = 0.0;
+    for step in log.iter().filter(|step| step.motor == motor) {
+        let way = if step.positive { STEP_MM } else { -STEP_MM };
+        // A step is made when half of it is behind.
+        steps.push((step.cycle as f64 / hertz, at + way / 2.0));
+        at += way;
+    }
+    let end = log[log.len() - 1].cycle as f64 / hertz;
+    steps.push((end, at));
+    let windows = ((end - steps[0].0) / WINDOW_S) as usize;
+    let mut next = 1;
+    let mut position = |n: usize| {
+        let time = steps[0].0 + n as f64 * WINDOW_S;
+        while next + 1 < steps.len() && steps[next].0 < time {
+            next += 1;
+        }
+        let ((t0, p0), (t1, p1)) = (steps[next - 1], steps[next]);
+        if t1 > t0 { p0 + (p1 - p0) * ((time - t0) / (t1 - t0)) } else { p1 }
+    };
+    (0..=windows).map(&mut position).collect()
+}
+
+/// Accelerations of X and Y in windows, mm/s^2: the percentile, and the time that the job takes, s.
+fn acceleration(job: &str, settings: &[String]) -> (f64, f64) {
+    let mut machine = firmware(&MEGA2560_GRBL);
+    machine.recorder_mut().keep_log();
+    let options = Options { settings: settings.to_vec(), ..Options::default() };
+    let report = job::run(&mut machine, &job::lines_of(job), &options, |_| {}).unwrap();
+    assert!(report.ok, "{:?}", report.problems);
+    let mut all: Vec<f64> = Vec::new();
+    for motor in 0..2 {
+        let second = |p: &[f64]| (p[2] - 2.0 * p[1] + p[0]).abs() / (WINDOW_S * WINDOW_S);
+        all.extend(positions(&machine, motor).windows(3).map(second));
+    }
+    all.sort_by(f64::total_cmp);
+    (all[(all.len() as f64 * PERCENTILE) as usize], report.seconds_moving)
+}
+
+/// 80 steps a mm, and these limits for X, Y and Z.
+fn settings(jerk: u32, tolerance: f64) -> Vec<String> {
+    let motors = (1..=3).map(|motor| format!("{{{motor}:{{tr:20,mi:8}}}}"));
+    let axes = ["x", "y", "z"]
+        .into_iter()
+        .map(|axis| format!("{{{axis}:{{vm:30000,fr:30000,ac:{ACCEL},jd:0.01,jm:{jerk}}}}}"));
+    let rest = ["{ja:1800000}".to_string(), format!("{{ct:{tolerance}}}")];
+    motors.chain(axes).chain(rest).collect()
+}
+
+#[test]
+fn arcs_keep_the_acceleration_of_their_axes() {
+    for (jerk, tolerance) in [(1_000_000, 0.002), (5_000, 0.002), (1_000_000, 0.01), (5_000, 0.01)]
+    {
+        let (got, seconds) = acceleration(&garland(), &settings(jerk, tolerance));
+        let all = format!("jm {jerk}, ct {tolerance}: {got:.0} mm/s^2, {seconds:.1} s");
+        println!("{all}");
+        assert!(got <= 1.1 * ACCEL, "{all}");
     }
 }
