@@ -62,9 +62,9 @@ fn one_setting_is_a_line() {
         "[xtn] x travel minimum            0.000 mm",
         "[atn] a travel minimum           -1.000 deg",
         "[xtm] x travel maximum          150.000 mm",
-        "[xjm] x jerk maximum             20 mm/min^3 * 1 million",
-        "[xjh] x jerk homing              40 mm/min^3 * 1 million",
-        "[xjd] x junction deviation        0.0500 mm (larger is faster)",
+        "[xjm] x jerk maximum           1000 mm/min^3 * 1 million",
+        "[xjh] x jerk homing            2000 mm/min^3 * 1 million",
+        "[xjd] x junction deviation        0.0100 mm (larger is faster)",
         "[xsn] x switch min                1 [0=off,1=homing,2=limit,3=limit+homing]",
         "[xsx] x switch max                0 [0=off,1=homing,2=limit,3=limit+homing]",
         "[xsv] x search velocity         500 mm/min",
@@ -72,7 +72,7 @@ fn one_setting_is_a_line() {
         "[xlb] x latch backoff             5.000 mm",
         "[xzb] x zero backoff              1.000 mm",
         "[ara] a radius value              0.1989 deg",
-        "[xac] x acceleration maximum      0.0 mm/s^2 (0 is none)",
+        "[xac] x acceleration maximum    200.0 mm/s^2 (0 is none)",
     ] {
         let name = line[1..].split(']').next().unwrap();
         assert_eq!(listed(&std::format!("${name}")), line);
