@@ -4,8 +4,10 @@
 //! does without it (`motion::governor::effective_jerk`): slices of motion are no shorter. The protocol says so
 //! when such a limit is set. Cost on AVR: 1,500 cycles.
 
+use super::setting::large_of;
 use super::table::{Kind, axis};
 use super::{Owner, Setting, Settings};
+use crate::units::FIRST_ROTARY;
 
 /// How much of a jerk limit as it is kept, 1,000 mm/min^3, comes to 0.1 mm/s^2 in a millisecond.
 const PER_ACCEL: i32 = 21_600;
@@ -13,18 +15,20 @@ const PER_ACCEL: i32 = 21_600;
 #[small]
 impl Settings {
     /// Whether `setting` is a jerk limit, or the acceleration limit beside one, that leaves the jerk limit without effect.
+    #[inline(never)]
     pub fn has_idle_jerk(&self, setting: Setting) -> bool {
         let (Owner::Axis(owner), row) = (setting.owner(), setting.row()) else { return false };
-        let n = usize::from(owner);
-        let accel = self.axis(n, axis::AC);
-        let idle = |jerk: i32| accel > 0 && jerk / PER_ACCEL >= accel;
-        row.kind == Kind::Large
-            && match row.slot {
-                axis::JM => idle(self.axis(n, axis::JM)),
-                axis::JH => idle(self.homing(n, axis::JH)),
-                axis::AC => idle(self.axis(n, axis::JM)) || idle(self.homing(n, axis::JH)),
-                _ => false,
-            }
+        let first = large_of(owner);
+        let accel = self.large(first + axis::AC);
+        // No jerk limit that there is reaches more than that so soon.
+        if row.kind != Kind::Large || !(1..=i32::MAX / PER_ACCEL).contains(&accel) {
+            return false;
+        }
+        let idle = |slot: u8| {
+            (row.slot == slot || row.slot == axis::AC)
+                && self.large(first + slot) >= accel * PER_ACCEL
+        };
+        idle(axis::JM) || (usize::from(owner) <= FIRST_ROTARY && idle(axis::JH))
     }
 }
 
@@ -59,6 +63,7 @@ mod tests {
         assert!(!idle(&mut settings, "yac", 5_000));
         assert!(idle(&mut settings, "yjh", 200_000_000));
         assert!(idle(&mut settings, "yac", 5_001));
+        assert!(!idle(&mut settings, "yac", i32::MAX));
         assert!(!idle(&mut settings, "bac", 5_001), "which has no jerk limit for homing");
     }
 

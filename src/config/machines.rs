@@ -60,6 +60,9 @@ pub const ACTIVE: u8 = if cfg!(feature = "machine-router") {
     0
 };
 
+/// The number of the setting that chooses one.
+pub(super) const CHOICE: u8 = find(&SYSTEM_LIST, b"mch") as u8;
+
 /// A setting of a machine, or of several of its motors or axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {

@@ -275,9 +275,7 @@ impl Setting {
 
     /// Whether it is the machine's profile.
     pub fn is_machine(self) -> bool {
-        let row = self.row();
-        let small = self.owner() == Owner::System && row.kind == Kind::Small;
-        small && row.slot == table::system::MCH
+        self.0 == machines::CHOICE
     }
 
     /// Whether it is the width of step pulses.

@@ -147,7 +147,7 @@ pub const ROWS: [Row; 18] = [
     },
     Row {
         name: "spiral-0.1-jerk",
-        what: "moves of 0.1 mm, default jerk limit",
+        what: "moves of 0.1 mm, `jm` 20",
         unit: "x",
         decimals: 3,
         better: Lower,

@@ -47,7 +47,7 @@ pub fn half_fast(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, 0.5, fast())
 }
 
-/// Moves of 0.1 mm with the default jerk limit.
+/// Moves of 0.1 mm with a low jerk limit.
 pub fn tenth_jerk(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, 0.1, How { jerk: true, ..How::default() })
 }

@@ -38,6 +38,8 @@ const SETTINGS: [&str; 8] = [
     "{z:{vm:2000000,fr:2000000,jd:0.01}}",
     "{a:{am:1,vm:2000000,fr:2000000,jd:0.01}}",
 ];
+/// TinyG's jerk limit: it takes all of the queue to stop.
+const LOW_JERK_LIMIT: [&str; 4] = ["{xjm:20}", "{yjm:20}", "{zjm:20}", "{ajm:20}"];
 /// 500 mm/s2 towards the centre of a corner; reports off.
 const MORE: [&str; 2] = ["{ja:1800000}", "{sv:0,qv:0}"];
 /// So much jerk that ramps are trapezoids.
@@ -59,7 +61,7 @@ pub struct How {
     pub baud: u32,
     /// Acceleration, mm/s2.
     pub acceleration: f64,
-    /// The default jerk limit stays.
+    /// There is a low jerk limit, 20 millions of mm/min3.
     pub jerk: bool,
     /// Every step is kept.
     pub log: bool,
@@ -90,9 +92,8 @@ impl Bed {
     /// What makes the firmware comparable.
     pub fn settings(&self, how: How) -> Vec<String> {
         let mut all: Vec<String> = SETTINGS.iter().chain(&MORE).map(|s| s.to_string()).collect();
-        if !how.jerk {
-            all.extend(NO_JERK_LIMIT.map(str::to_string));
-        }
+        let jerk = if how.jerk { LOW_JERK_LIMIT } else { NO_JERK_LIMIT };
+        all.extend(jerk.map(str::to_string));
         if self.has_acceleration {
             let limit = |axis| format!("{{{axis}ac:{}}}", how.acceleration);
             all.extend(["x", "y", "z", "a"].map(limit));
