@@ -238,8 +238,7 @@ pub(super) fn differ_in(setting: Setting) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Name, Owner, Settings};
-    use crate::motion::dynamics::Machine as _;
+    use crate::config::{Name, Settings};
     use crate::motion::pace::Drivers;
     use std::collections::HashSet;
     use std::vec::Vec;
@@ -248,9 +247,9 @@ mod tests {
         Setting::find(&Name::new().with(name.as_bytes()).unwrap()).unwrap()
     }
 
-    fn settings_of(machine: usize) -> Settings {
+    fn settings_of(machine: u8) -> Settings {
         let mut settings = Settings::new();
-        settings.take_over(machine as u8, false);
+        settings.take_over(machine, false);
         settings
     }
 
@@ -283,29 +282,32 @@ mod tests {
         assert_eq!(settings.get(setting("si")), 200);
     }
 
+    /// Every machine: its number, its name, its settings.
+    fn each() -> impl Iterator<Item = (u8, &'static str, Settings)> {
+        (0..).zip(ALL).map(|(n, machine)| (n, machine.name, settings_of(n)))
+    }
+
     #[test]
     fn whatever_was_chosen_before_makes_no_difference() {
-        for machine in 0..COUNT {
-            let mut settings = settings_of((machine + 1) % COUNT);
-            settings.take_over(machine as u8, false);
-            assert_eq!(values(&settings), values(&settings_of(machine)), "{}", ALL[machine].name);
+        for (n, name, expected) in each() {
+            let mut settings = settings_of((n + 1) % COUNT as u8);
+            settings.take_over(n, false);
+            assert_eq!(values(&settings), values(&expected), "{name}");
         }
-        assert_eq!(values(&settings_of(usize::from(ACTIVE))), values(&Settings::new()));
+        assert_eq!(values(&settings_of(ACTIVE)), values(&Settings::new()));
     }
 
     #[test]
     fn machines_have_values_that_their_settings_can_have() {
-        for machine in 0..COUNT {
-            let settings = settings_of(machine);
+        for (_, name, settings) in each() {
             for setting in all().filter(|setting| setting.is_kept()) {
-                let value = settings.get(setting);
-                assert!(setting.accepts(value), "{}: {:?}", ALL[machine].name, setting.name());
+                assert!(setting.accepts(settings.get(setting)), "{name}: {:?}", setting.name());
             }
         }
     }
 
     #[test]
-    fn nothing_is_said_twice() {
+    fn nothing_is_said_twice_or_in_vain() {
         for machine in ALL {
             let mut seen = HashSet::new();
             for entry in machine.entries {
@@ -314,60 +316,48 @@ mod tests {
                 }
             }
         }
-        for machine in 1..COUNT {
-            let settings = settings_of(machine);
-            let same = |s: &Setting| s.value_on(0) == s.value_on(machine as u8);
-            let named = all().filter(|s| value(machine as u8, *s).is_some());
-            let vain: Vec<_> = named.filter(same).map(Setting::name).collect();
-            assert!(vain.is_empty(), "{}: {vain:?}", ALL[machine].name);
-            assert_eq!(settings.get(setting("mch")), machine as i32);
+        for (n, name, _) in each().skip(1) {
+            let vain = all().filter(|s| value(n, *s) == Some(s.value_on(0))).map(Setting::name);
+            assert_eq!(vain.collect::<Vec<_>>(), [], "{name}");
         }
     }
 
     /// The axes that some motor moves.
     fn moved(settings: &Settings) -> HashSet<usize> {
-        (0..MOTORS)
-            .map(|motor| usize::from(settings.motor_axis(motor)))
-            .filter(|a| *a < AXES)
-            .collect()
+        let axes = (0..MOTORS).map(|motor| usize::from(settings.motor_axis(motor)));
+        axes.filter(|axis| *axis < AXES).collect()
     }
 
     #[test]
     fn motors_follow_with_all_others_at_once() {
-        for machine in 0..COUNT {
-            let mut settings = settings_of(machine);
-            let rate = Drivers::USUAL.step_rate_max(MOTORS) as u32;
-            assert!(!settings.limit_velocity(setting("mch"), |_| rate), "{}", ALL[machine].name);
+        let rate = Drivers::USUAL.step_rate_max(MOTORS) as u32;
+        for (_, name, mut settings) in each() {
+            assert!(!settings.limit_velocity(setting("mch"), |_| rate), "{name}");
         }
     }
 
     #[test]
     fn ramps_are_neither_a_crawl_nor_a_jolt() {
-        for machine in 0..COUNT {
-            let settings = settings_of(machine);
+        for (_, name, settings) in each() {
             for axis in moved(&settings) {
                 let accel = settings.accel_max(axis) / 3_600.0;
                 let seconds = accel / (settings.jerk_max(axis) / 216_000.0);
-                let velocity = Settings::velocity_max(&settings, axis) / 60.0;
-                let name = ALL[machine].name;
+                let ramp = settings.velocity_max(axis) / 60.0 / accel + seconds;
                 assert!((0.020..0.050).contains(&seconds), "{name} {axis}: {seconds} s");
-                let ramp = velocity / accel + seconds;
                 assert!((0.05..0.40).contains(&ramp), "{name} {axis}: {ramp} s");
-                let homing = settings.homing(axis, super::super::axis::JH) as f32 * 1e3;
-                assert!(homing >= settings.jerk_max(axis), "{name} {axis}");
-                let owner = Setting::of(Owner::Axis(axis as u8), 5).unwrap();
-                assert!(!settings.has_idle_jerk(owner));
+                assert!(settings.jerk_homing(axis) >= settings.jerk_max(axis), "{name} {axis}");
             }
+            let idle = all().find(|setting| settings.has_idle_jerk(*setting));
+            assert_eq!(idle.map(Setting::name), None, "{name}");
         }
     }
 
     #[test]
     fn corners_ask_for_no_more_than_ramps() {
-        for machine in 0..COUNT {
-            let settings = settings_of(machine);
-            let most = moved(&settings).into_iter().filter(|axis| *axis < FIRST_ROTARY);
-            let most = most.map(|axis| settings.accel_max(axis)).fold(0.0, f32::max);
-            assert!(settings.junction_acceleration() <= most, "{}", ALL[machine].name);
+        for (_, name, settings) in each() {
+            let linear = moved(&settings).into_iter().filter(|axis| *axis < FIRST_ROTARY);
+            let most = linear.map(|axis| settings.accel_max(axis)).fold(0.0, f32::max);
+            assert!(settings.junction_acceleration() <= most, "{name}");
         }
     }
 }
