@@ -62,7 +62,7 @@ impl Settings {
     }
 
     /// Sets what a machine's profile says, to what it is on the machine of this number; with `all` everything else too,
-    /// to its default. About 1,000,000 cycles on AVR.
+    /// to its default. Up to 1,000,000 cycles on AVR.
     #[inline(never)]
     #[small]
     pub fn take_over(&mut self, machine: u8, all: bool) {

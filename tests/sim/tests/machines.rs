@@ -16,13 +16,13 @@ fn value(machine: &mut Machine, host: &mut Host, name: &str) -> f64 {
 fn a_job_runs_on_every_machine() {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     set(&mut machine, &mut host, "{sv:0,qv:0}");
-    for number in 0..ALL.len() {
+    for (number, profile) in ALL.iter().enumerate() {
         let before = machine.cycle();
         set(&mut machine, &mut host, &format!("{{mch:{number}}}"));
         let ms = (machine.cycle() - before) as f64 / machine.cycles(1) as f64;
-        println!("{}: {ms:.1} ms", ALL[number].name);
-        // The line and its response take 3 ms.
-        assert!(ms < 60.0, "{ms} ms");
+        println!("{}: {ms:.1} ms", profile.name);
+        // Thread mode is busy meanwhile; the watchdog waits for half a second.
+        assert!(ms < 100.0, "{ms} ms");
         assert_eq!(value(&mut machine, &mut host, "mch"), number as f64);
         // Small moves.
         set(&mut machine, &mut host, "{test:11}");
@@ -36,7 +36,14 @@ fn a_job_runs_on_every_machine() {
             }
         }
         let heard = String::from_utf8(heard).unwrap();
-        assert!(heard.contains("\"st\":8,"), "{}: {heard}", ALL[number].name);
+        assert!(heard.contains("\"st\":8,"), "{}: {heard}", profile.name);
+        // Its last moves are still under way.
+        let mut wait = 0;
+        while value(&mut machine, &mut host, "stat") == 5.0 {
+            host.run_for_ms(&mut machine, 100).unwrap();
+            wait += 1;
+            assert!(wait < 200, "{} does not stop", profile.name);
+        }
     }
     // It ends where it began, on every machine.
     assert_eq!(value(&mut machine, &mut host, "posx"), 0.0);
