@@ -6,6 +6,7 @@
 
 #[cfg(not(target_arch = "avr"))]
 pub mod docs;
+pub mod machines;
 pub mod name;
 pub mod number;
 pub mod ratio;
@@ -56,11 +57,19 @@ impl Settings {
     }
 
     /// Sets everything to its default.
+    pub fn set_defaults(&mut self) {
+        self.take_over(machines::ACTIVE, true);
+    }
+
+    /// Sets what a machine's profile says, to what it is on the machine of this number; with `all` everything else too,
+    /// to its default. Up to 1,000,000 cycles on AVR.
     #[inline(never)]
     #[small]
-    pub fn set_defaults(&mut self) {
+    pub fn take_over(&mut self, machine: u8, all: bool) {
         for setting in (0..Setting::NUMBERS).filter_map(Setting::from_number) {
-            self.keep(setting, setting.default_value());
+            if all || setting.is_machine() || setting.is_of_machine() {
+                self.keep(setting, setting.value_on(machine));
+            }
         }
         for motor in 0..MOTORS as u8 {
             self.derive(motor);
@@ -246,6 +255,7 @@ fn limit(row: &Row, max: i32, number: Number, inches: bool) -> Result<i32, Statu
 }
 
 pub mod getters;
+mod jerk;
 mod rates;
 #[cfg(test)]
 mod tests;

@@ -16,7 +16,7 @@ impl Settings {
     /// `rate` steps a second for so many motors. Whether one was above it.
     pub fn limit_velocity(&mut self, setting: Setting, rate: impl Fn(usize) -> u32) -> bool {
         match setting.owner() {
-            Owner::System if setting.is_pulse_width() => {
+            Owner::System if setting.is_pulse_width() || setting.is_machine() => {
                 let mut lowered = false;
                 for axis in 0..AXES as u8 {
                     lowered |= self.limit_axis(axis, &rate);

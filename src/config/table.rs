@@ -4,9 +4,11 @@
 //! motors or axes; its defaults are a row of the table behind. Sizes: 57 rows of 17 bytes and 644
 //! bytes of defaults; and those that are in EEPROM alone. TinyG's settings come first in each group, then those of Kerf alone.
 
+use super::machines;
 use super::name::token;
-use crate::boards::{ACTIVE, inputs};
+use crate::boards::{ACTIVE, MOTORS, inputs};
 use crate::progmem;
+use crate::units::AXES;
 
 /// How a setting is kept.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -76,7 +78,7 @@ impl Row {
     }
 
     /// Whether it has all of `flags`.
-    pub fn is(&self, flags: u8) -> bool {
+    pub const fn is(&self, flags: u8) -> bool {
         self.flags & flags == flags
     }
 }
@@ -143,7 +145,7 @@ const fn up_to(mut row: Row, max: i32) -> Row {
 }
 
 /// Rows of [`SYSTEM`].
-pub const SYSTEM_ROWS: usize = 36;
+pub const SYSTEM_ROWS: usize = 37;
 /// Rows of [`MOTOR`].
 pub const MOTOR_ROWS: usize = 7;
 /// Rows of [`AXIS`].
@@ -194,7 +196,8 @@ pub mod system {
     pub const DIA: u8 = 22;
     pub const SAF: u8 = 23;
     pub const EST: u8 = 24;
-    pub const SMALL: usize = 25;
+    pub const MCH: u8 = 25;
+    pub const SMALL: usize = 26;
 
     pub const JA: u8 = 0;
     pub const CT: u8 = 1;
@@ -249,69 +252,92 @@ pub mod axis {
 const ANY: i32 = -i32::MAX;
 const POSITIVE: i32 = 1;
 
-progmem! {
-    /// The group `sys`.
-    pub static SYSTEM: [Row; SYSTEM_ROWS] = [
-        constant("fb", 2),
-        constant("fv", 3),
-        constant("hp", 0),
-        constant("hv", 0),
-        board_name(),
-        fixed("ja", system::JA, 2, 0, POSITIVE).with(UNIT),
-        fixed("ct", system::CT, 6, 4, 1_000).with(UNIT),
-        int("sl", system::SL, 0, 1),
-        int("st", system::ST, 0, 1),
-        up_to(fixed("mt", system::MT, 2, 2, 10), 429_496_700).with(CLAMP),
-        int("ej", system::EJ, 0, 2),
-        int("jv", system::JV, 0, 5),
-        int("js", system::JS, 0, 1),
-        int("tv", system::TV, 0, 1),
-        int("qv", system::QV, 0, 3),
-        int("sv", system::SV, 0, 2),
-        up_to(fixed("si", system::SI, 0, 0, 100), 65_535).with(CLAMP),
-        int("ec", system::EC, 0, 1),
-        int("ee", system::EE, 0, 1),
-        int("ex", system::EX, 0, if ACTIVE.has_handshake() { 2 } else { 1 }),
-        int("rxm", system::RXM, 0, 1),
-        up_to(fixed("baud", system::BAUD, 0, 0, 1), 1_000_000).with(RANGE),
-        constant("net", 0),
-        int("gpl", system::GPL, 0, 2),
-        int("gun", system::GUN, 0, 1),
-        int("gco", system::GCO, 1, 9),
-        int("gpa", system::GPA, 0, 2),
-        int("gdi", system::GDI, 0, 1),
-        int("bd", system::BD, 0, 1),
-        int("ost", system::OST, 0, 1),
-        int("psw", system::PSW, 0, 1),
-        int("dia", system::DIA, 0, 1),
-        int("spw", system::SPW, 1, 10).with(IDLE),
-        int("dsu", system::DSU, 0, 100).with(IDLE),
-        int("saf", system::SAF, 0, 2),
-        int("est", system::EST, 0, 2),
-    ];
+/// The rows of [`SYSTEM`]; constants, for the profiles of machines are made of them when the image is built.
+pub(super) const SYSTEM_LIST: [Row; SYSTEM_ROWS] = [
+    constant("fb", 2),
+    constant("fv", 3),
+    constant("hp", 0),
+    constant("hv", 0),
+    board_name(),
+    fixed("ja", system::JA, 2, 0, POSITIVE).with(UNIT),
+    fixed("ct", system::CT, 6, 4, 1_000).with(UNIT),
+    int("sl", system::SL, 0, 1),
+    int("st", system::ST, 0, 1),
+    up_to(fixed("mt", system::MT, 2, 2, 10), 429_496_700).with(CLAMP),
+    int("ej", system::EJ, 0, 2),
+    int("jv", system::JV, 0, 5),
+    int("js", system::JS, 0, 1),
+    int("tv", system::TV, 0, 1),
+    int("qv", system::QV, 0, 3),
+    int("sv", system::SV, 0, 2),
+    up_to(fixed("si", system::SI, 0, 0, 100), 65_535).with(CLAMP),
+    int("ec", system::EC, 0, 1),
+    int("ee", system::EE, 0, 1),
+    int("ex", system::EX, 0, if ACTIVE.has_handshake() { 2 } else { 1 }),
+    int("rxm", system::RXM, 0, 1),
+    up_to(fixed("baud", system::BAUD, 0, 0, 1), 1_000_000).with(RANGE),
+    constant("net", 0),
+    int("gpl", system::GPL, 0, 2),
+    int("gun", system::GUN, 0, 1),
+    int("gco", system::GCO, 1, 9),
+    int("gpa", system::GPA, 0, 2),
+    int("gdi", system::GDI, 0, 1),
+    int("bd", system::BD, 0, 1),
+    int("ost", system::OST, 0, 1),
+    int("psw", system::PSW, 0, 1),
+    int("dia", system::DIA, 0, 1),
+    int("spw", system::SPW, 1, 10).with(IDLE),
+    int("dsu", system::DSU, 0, 100).with(IDLE),
+    int("saf", system::SAF, 0, 2),
+    int("est", system::EST, 0, 2),
+    int("mch", system::MCH, 0, machines::COUNT as i32 - 1).with(IDLE),
+];
 
-    /// Their defaults, scaled as kept.
-    pub static SYSTEM_DEFAULTS: [i32; SYSTEM_ROWS] = [
+/// Those of [`MOTOR`].
+pub(super) const MOTOR_LIST: [Row; MOTOR_ROWS] = [
+    int("ma", motor::MA, 0, 255),
+    fixed("sa", motor::SA, 4, 3, POSITIVE),
+    fixed("tr", motor::TR, 6, 4, POSITIVE).with(UNIT),
+    int("mi", motor::MI, 1, 255),
+    int("po", motor::PO, 0, 1),
+    int("pm", motor::PM, 0, 3),
+    int("sp", motor::SP, 0, 1),
+];
+
+/// Those of [`AXIS`].
+pub(super) const AXIS_LIST: [Row; AXIS_ROWS] = [
+    int("am", axis::AM, 0, 3).with(MODE | IDLE),
+    fixed("vm", axis::VM, 3, 0, POSITIVE).with(UNIT),
+    fixed("fr", axis::FR, 3, 0, POSITIVE).with(UNIT),
+    fixed("tn", axis::TN, 4, 3, ANY).with(UNIT | CLAMP),
+    fixed("tm", axis::TM, 4, 3, ANY).with(UNIT | CLAMP),
+    fixed("jm", axis::JM, 3, 0, POSITIVE).with(UNIT | JERK),
+    fixed("jh", axis::JH, 3, 0, POSITIVE).with(UNIT | JERK | HOMING),
+    fixed("jd", axis::JD, 6, 4, 0).with(UNIT),
+    fixed("ra", axis::RA, 6, 3, POSITIVE).with(UNIT | RADIUS),
+    int("sn", axis::SN, 0, 3).with(HOMING),
+    int("sx", axis::SX, 0, 3).with(HOMING),
+    fixed("sv", axis::SV, 3, 0, 0).with(UNIT | HOMING),
+    fixed("lv", axis::LV, 3, 0, 0).with(UNIT | HOMING),
+    fixed("lb", axis::LB, 4, 3, 0).with(UNIT | HOMING),
+    fixed("zb", axis::ZB, 4, 3, 0).with(UNIT | HOMING),
+    fixed("ac", axis::AC, 1, 1, 0).with(UNIT),
+];
+
+/// Values of the settings, scaled as kept.
+pub(super) struct Values {
+    pub(super) system: [i32; SYSTEM_ROWS],
+    pub(super) motor: [[i32; MOTORS]; MOTOR_ROWS],
+    pub(super) axis: [[i32; AXES]; AXIS_ROWS],
+}
+
+/// What TinyG has by default, and Kerf where no profile says otherwise.
+const PLAIN: Values = Values {
+    system: [
         44_020, 970, 1, 8, 0, 10_000_000, 10_000, 0, 0, 200, 1, 3, 1, 1, 0, 1, 500, 0, 0, 1, 1, 5,
-        0, 0, 1, 1, 2, 0, 1, 1, 0, 0, 2, 1, 0, 0,
-    ];
-
-    /// What the constants at the head of [`SYSTEM`] are while the machine passes for a g2core.
-    pub static G2CORE: [i32; 4] = [10_103, 990, 3, 0];
-
-    /// The groups `1` to `4`.
-    pub static MOTOR: [Row; MOTOR_ROWS] = [
-        int("ma", motor::MA, 0, 255),
-        fixed("sa", motor::SA, 4, 3, POSITIVE),
-        fixed("tr", motor::TR, 6, 4, POSITIVE).with(UNIT),
-        int("mi", motor::MI, 1, 255),
-        int("po", motor::PO, 0, 1),
-        int("pm", motor::PM, 0, 3),
-        int("sp", motor::SP, 0, 1),
-    ];
-
-    /// Their defaults, by motor.
-    pub static MOTOR_DEFAULTS: [[i32; 4]; MOTOR_ROWS] = [
+        0, 0, 1, 1, 2, 0, 1, 1, 0, 0, 2, 1, 0, 0, 0,
+    ],
+    motor: [
         [0, 1, 2, 3],
         [1_8000; 4],
         [1_250_000, 1_250_000, 1_250_000, 360_000_000],
@@ -319,30 +345,8 @@ progmem! {
         [0; 4],
         [2; 4],
         [0; 4],
-    ];
-
-    /// The groups `x` to `c`.
-    pub static AXIS: [Row; AXIS_ROWS] = [
-        int("am", axis::AM, 0, 3).with(MODE | IDLE),
-        fixed("vm", axis::VM, 3, 0, POSITIVE).with(UNIT),
-        fixed("fr", axis::FR, 3, 0, POSITIVE).with(UNIT),
-        fixed("tn", axis::TN, 4, 3, ANY).with(UNIT | CLAMP),
-        fixed("tm", axis::TM, 4, 3, ANY).with(UNIT | CLAMP),
-        fixed("jm", axis::JM, 3, 0, POSITIVE).with(UNIT | JERK),
-        fixed("jh", axis::JH, 3, 0, POSITIVE).with(UNIT | JERK | HOMING),
-        fixed("jd", axis::JD, 6, 4, 0).with(UNIT),
-        fixed("ra", axis::RA, 6, 3, POSITIVE).with(UNIT | RADIUS),
-        int("sn", axis::SN, 0, 3).with(HOMING),
-        int("sx", axis::SX, 0, 3).with(HOMING),
-        fixed("sv", axis::SV, 3, 0, 0).with(UNIT | HOMING),
-        fixed("lv", axis::LV, 3, 0, 0).with(UNIT | HOMING),
-        fixed("lb", axis::LB, 4, 3, 0).with(UNIT | HOMING),
-        fixed("zb", axis::ZB, 4, 3, 0).with(UNIT | HOMING),
-        fixed("ac", axis::AC, 1, 1, 0).with(UNIT),
-    ];
-
-    /// Their defaults, by axis.
-    pub static AXIS_DEFAULTS: [[i32; 6]; AXIS_ROWS] = [
+    ],
+    axis: [
         [1, 1, 1, 3, 0, 0],
         [800_000, 800_000, 800_000, 230_400_000, 3_600_000, 3_600_000],
         [800_000, 800_000, 800_000, 230_400_000, 3_600_000, 3_600_000],
@@ -359,7 +363,33 @@ progmem! {
         [5_0000, 5_0000, 5_0000, 5_0000, 0, 0],
         [1_0000, 1_0000, 1_0000, 2_0000, 0, 0],
         [0; 6],
-    ];
+    ],
+};
+
+/// The careful machine's, from which the other profiles differ.
+const CAREFUL: Values = PLAIN.with(machines::CAREFUL.entries);
+
+progmem! {
+    /// The group `sys`.
+    pub static SYSTEM: [Row; SYSTEM_ROWS] = SYSTEM_LIST;
+
+    /// Their defaults, scaled as kept.
+    pub static SYSTEM_DEFAULTS: [i32; SYSTEM_ROWS] = CAREFUL.system;
+
+    /// What the constants at the head of [`SYSTEM`] are while the machine passes for a g2core.
+    pub static G2CORE: [i32; 4] = [10_103, 990, 3, 0];
+
+    /// The groups `1` to `4`.
+    pub static MOTOR: [Row; MOTOR_ROWS] = MOTOR_LIST;
+
+    /// Their defaults, by motor.
+    pub static MOTOR_DEFAULTS: [[i32; MOTORS]; MOTOR_ROWS] = CAREFUL.motor;
+
+    /// The groups `x` to `c`.
+    pub static AXIS: [Row; AXIS_ROWS] = AXIS_LIST;
+
+    /// Their defaults, by axis.
+    pub static AXIS_DEFAULTS: [[i32; AXES]; AXIS_ROWS] = CAREFUL.axis;
 
     /// The group `p1`.
     pub static PWM: [Row; PWM_ROWS] = [

@@ -32,20 +32,21 @@ fn defaults_show_as_documented() {
         ("fb", "440.20"),
         ("fv", "0.970"),
         ("hp", "1"),
-        ("ja", "100000"),
+        ("ja", "720000"),
         ("ct", "0.0100"),
         ("mt", "2.00"),
         ("1tr", "1.2500"),
         ("4tr", "360.0000"),
         ("1sa", "1.800"),
         ("xvm", "800"),
-        ("ajm", "5760"),
+        ("ajm", "2000"),
         ("ara", "0.199"),
         ("ztm", "75.000"),
         ("atn", "-1.000"),
-        ("cjd", "0.0500"),
-        ("xac", "0.0"),
+        ("cjd", "0.0100"),
+        ("xac", "200.0"),
         ("gpa", "2"),
+        ("mch", "0"),
     ] {
         assert_eq!(shown(&settings, name, false), value, "{name}");
     }
@@ -137,18 +138,18 @@ fn a_rate_is_shown_as_it_was_set() {
 #[test]
 fn getters_have_their_units() {
     let mut settings = Settings::new();
-    assert!((settings.velocity_max(3) - 230_400.0).abs() < 0.1);
-    assert!((settings.feedrate_max(5) - 3_600.0).abs() < 0.001);
-    assert_eq!(settings.jerk_max(0), 20e6);
+    assert!((settings.velocity_max(3) - 7_200.0).abs() < 0.1);
+    assert!((settings.feedrate_max(5) - 7_200.0).abs() < 0.001);
+    assert_eq!(settings.jerk_max(0), 1e9);
     assert_eq!(settings.jerk_homing(4), 0.0);
-    assert_eq!(settings.accel_max(0), 0.0);
+    assert_eq!(settings.accel_max(0), 720_000.0);
     set(&mut settings, "xac", "500", false).unwrap();
     assert_eq!(settings.accel_max(0), 1_800_000.0);
-    assert_eq!(settings.junction_deviation(0), 0.05);
-    assert_eq!(settings.junction_acceleration(), 100_000.0);
+    assert_eq!(settings.junction_deviation(0), 0.01);
+    assert_eq!(settings.junction_acceleration(), 720_000.0);
     assert_eq!(settings.chordal_tolerance(), 0.01);
     assert_eq!(settings.travel_max(2), Length(750_000));
-    assert_eq!((settings.axis_mode(0), settings.axis_mode(3), settings.axis_mode(5)), (1, 3, 0));
+    assert_eq!((settings.axis_mode(0), settings.axis_mode(3), settings.axis_mode(5)), (1, 1, 0));
     assert_eq!((settings.switch_min(0), settings.switch_max(2), settings.switch_max(5)), (1, 1, 0));
     assert_eq!(settings.status_interval_ms(), 500);
     assert_eq!((settings.json_verbosity(), settings.motor_axis(3)), (3, 3));

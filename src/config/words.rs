@@ -95,6 +95,7 @@ progmem! {
         words(text!("direction setup time"), text!(" us")),
         words(text!("safety door"), text!(" [0=off,1=NO,2=NC]")),
         words(text!("emergency stop"), text!(" [0=off,1=NO,2=NC]")),
+        words(text!("machine"), text!(" [0=careful,1=router,2=mill,3=printer,4=lathe]")),
     ];
 
     static MOTOR: [Words; MOTOR_ROWS] = [

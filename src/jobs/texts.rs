@@ -38,7 +38,7 @@ pieces!(FEEDHOLD, 2:
 );
 pieces!(M_CODES, 2:
     1 x "(MSG spindle and coolant)\nG21 G90 F400\nG92 X0 Y0\nM3\nG4 P.5\nM4\nG4 P.5\nM5\nG4 P.5\nM7\nG4 P.5\nM8\nG4 P.5\nM9\n"
-    1 x "M3 G1 X10\nM5 Y10\nM4 G2 X0 R10\nM5 G1 Y0\nM8 G0 X10\nM9 X0\nM30\n"
+    1 x "M3 G1 X10\nM5 Y10\nM4 X0\nM5 Y0\nM8 G0 X10\nM9 X0\nM30\n"
 );
 pieces!(INVERSE_TIME, 1:
     1 x "(MSG inverse time)\nG21 G90 G93\nG92 X0 Y0 Z0\nG1 X10 F30\nY10 F30\nX0 F30\nY0 F30\nG2 I5 F10\nG3 Z5 I5 F10\nG1 Z0 F30\nG94\nM30\n"

@@ -22,6 +22,8 @@ pub enum Warning {
     Microsteps,
     /// The velocity limits of an axis were lowered to what its motors can follow.
     Velocity,
+    /// A jerk limit of an axis is not in force beside its acceleration limit.
+    Jerk,
     /// The line has no such rate.
     Baud,
     /// There is no such built-in job.
@@ -47,10 +49,11 @@ impl Warning {
 
 progmem! {
     // A table, for what the compiler makes of a `match` would be in RAM.
-    static WARNINGS: [Text; 10] = [
+    static WARNINGS: [Text; 11] = [
         text!(""),
         text!("*** WARNING *** Setting non-standard microstep value"),
         text!("*** WARNING *** Velocity limited by the step rate"),
+        text!("*** WARNING *** Jerk limit has no effect beside ac"),
         text!("*** WARNING *** Unsupported baud rate specified"),
         text!("Test not found"),
         text!("Send $h for help, {sys:n} for the settings"),

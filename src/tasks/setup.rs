@@ -11,7 +11,7 @@ use crate::motion::dynamics::Machine;
 use crate::motion::line::Motors;
 use crate::motion::pace::Drivers;
 use crate::status::Status;
-use crate::units::Length;
+use crate::units::{AXES, Length};
 
 #[small]
 impl Setup for Settings {
@@ -80,11 +80,12 @@ impl Setup for Settings {
     }
 }
 
-/// The axis whose position moves a motor; none above 5: that of an inhibited axis stands still.
+/// The axis whose position moves a motor; none above 5: that of an inhibited axis stands still, and there may be no axis.
 #[small]
 pub fn moved_by(settings: &Settings, motor: usize) -> u8 {
     let axis = settings.motor_axis(motor);
-    if settings.mode(axis) == AxisMode::Inhibited { u8::MAX } else { axis }
+    let is_axis = usize::from(axis) < AXES;
+    if is_axis && settings.mode(axis) != AxisMode::Inhibited { axis } else { u8::MAX }
 }
 
 impl Motors for Settings {

@@ -198,9 +198,9 @@ impl<'a> View<'a> {
         Status::Ok
     }
 
-    /// A setting is to be put away; if it has `lowered` others, all of them.
-    fn note(&self, setting: Setting, lowered: bool) {
-        match lowered {
+    /// A setting is to be put away; if it has changed `others`, all of them.
+    fn note(&self, setting: Setting, others: bool) {
+        match others {
             true => self.links.storage.note(0, ITEMS),
             false => self.links.storage.note(setting.number(), 1),
         }
@@ -272,13 +272,21 @@ impl Machine for View<'_> {
             self.links.rate.set(baud::rate(value));
         }
         self.settings.store(setting, value);
+        let is_machine = setting.is_machine();
+        if is_machine {
+            self.settings.take_over(value as u8, false);
+        }
         let drivers = dynamics::Machine::drivers(&*self.settings);
         let rate = |motors| drivers.step_rate_max(motors) as u32;
         let lowered = self.settings.limit_velocity(setting, rate);
         self.links.settings_changed.set(true);
-        self.note(setting, lowered);
+        self.note(setting, lowered || is_machine);
         set_hardware(&self.settings);
-        Ok(if lowered { Warning::Velocity } else { Warning::None })
+        Ok(match lowered {
+            true => Warning::Velocity,
+            false if self.settings.has_idle_jerk(setting) => Warning::Jerk,
+            false => Warning::None,
+        })
     }
 
     fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {

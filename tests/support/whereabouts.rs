@@ -19,12 +19,12 @@ const HOMED: [Option<i64>; 4] =
     [Some(-7_680 - (-7_679 + 128)), None, Some(7_680 - (7_679 - 128)), None];
 /// How the machine is set up for that: fast, and with short ways.
 pub const SETTINGS: [&str; 6] = [
-    "{x:{vm:3000,fr:3000,jm:2000}}",
-    "{y:{vm:3000,fr:3000,jm:2000}}",
-    "{z:{vm:3000,fr:3000,jm:2000}}",
+    "{x:{vm:3000,fr:3000,jm:2000,ac:0}}",
+    "{y:{vm:3000,fr:3000,jm:2000,ac:0}}",
+    "{z:{vm:3000,fr:3000,jm:2000,ac:0}}",
     "{xtn:-6,xtm:20,xsv:3000,xlv:600,xlb:1,xzb:0.1,xsx:0}",
     "{ytn:-3,ytm:3,ysv:3000,ylv:600,ylb:1,yzb:0.1,ysx:0}",
-    "{ztn:-20,ztm:6,zsv:3000,zlv:600,zlb:1,zzb:0.1,zsn:0,a:{am:1,vm:100000,fr:100000,jm:100000}}",
+    "{ztn:-20,ztm:6,zsv:3000,zlv:600,zlb:1,zzb:0.1,zsn:0,a:{am:1,vm:100000,fr:100000,jm:100000,ac:0}}",
 ];
 
 const AXES: [&str; 4] = ["x", "y", "z", "a"];

@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 
 use crate::boards::Board;
 use crate::firmware;
+use crate::machines::Machine;
 use crate::process::{host_cargo, probe, root, run as run_child, which};
 use crate::setup::{self, Scope};
 use crate::size;
@@ -80,13 +81,15 @@ fn host_tests() -> Result<()> {
 
 fn build_all() -> Result<()> {
     for board in Board::all() {
-        println!("elf: {}", firmware::build(*board)?.display());
+        println!("elf: {}", firmware::build(*board, Machine::default())?.display());
     }
     Ok(())
 }
 
 fn size_all() -> Result<()> {
-    Board::all().iter().try_for_each(|board| size::show(&firmware::image(*board)))
+    Board::all()
+        .iter()
+        .try_for_each(|board| size::show(&firmware::image(*board, Machine::default())))
 }
 
 fn simulator_tests() -> Result<()> {

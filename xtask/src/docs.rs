@@ -11,9 +11,11 @@ use std::path::{Path, PathBuf};
 use crate::process::root;
 
 /// The documents.
-const DOCUMENTS: [&str; 4] = ["ARCHITECTURE.md", "README.md", "CHANGELOG.md", "boards/README.md"];
+const DOCUMENTS: [&str; 5] =
+    ["ARCHITECTURE.md", "README.md", "CHANGELOG.md", "boards/README.md", "machines/README.md"];
 /// Where the sources are.
-const SOURCES: [&str; 7] = ["src", "boards", "tests", "xtask", "Cargo.toml", ".cargo", ".ci"];
+const SOURCES: [&str; 8] =
+    ["src", "boards", "machines", "tests", "xtask", "Cargo.toml", ".cargo", ".ci"];
 
 /// A file of the sources: its path, the words of its path, and those of its text.
 struct Source {

@@ -7,6 +7,7 @@ use clap::Args;
 
 use crate::boards::Board;
 use crate::elf;
+use crate::machines::Machine;
 use crate::process::{self, root, run};
 use crate::setup::{self, Scope};
 use crate::toolchain::Toolchain;
@@ -14,36 +15,40 @@ use crate::toolchain::Toolchain;
 const FLAGS: &str = "-C target-cpu=atmega2560 -C llvm-args=-inline-threshold=30 -C jump-tables=no -C linker=avr-gcc -C link-arg=-mmcu=atmega2560 \
                      -C link-arg=-Wl,--gc-sections";
 
-/// Where the images lie, one `BOARD.elf` each.
+/// Where the images lie: `BOARD.elf`, or `BOARD-MACHINE.elf` if it is not for the usual machine.
 pub fn directory() -> PathBuf {
     root().join("target/firmware")
 }
 
-/// Where the image of a board lies once it is built.
-pub fn image(board: Board) -> PathBuf {
-    directory().join(format!("{board}.elf"))
+/// Where the image of a board and a machine lies once it is built.
+pub fn image(board: Board, machine: Machine) -> PathBuf {
+    let name = match machine == Machine::default() {
+        true => format!("{board}.elf"),
+        false => format!("{board}-{machine}.elf"),
+    };
+    directory().join(name)
 }
 
 /// Builds and checks the image; returns where it lies.
-pub fn build(board: Board) -> Result<PathBuf> {
+pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
     // One target directory for all boards: the dependencies are built once.
     let target = root().join("target/avr");
     let mut cargo = rust.cargo();
     cargo.current_dir(root()).env("RUSTFLAGS", FLAGS);
     cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none"]);
-    cargo.args(["--package", "kerf", "--bin", "kerf", "--features", &format!("board-{board}")]);
+    let features = format!("board-{board},machine-{machine}");
+    cargo.args(["--package", "kerf", "--bin", "kerf", "--features", &features]);
     run(cargo.arg("--target-dir").arg(&target))?;
-    keep(&target.join("avr-none/release/kerf.elf"), board)
+    keep(&target.join("avr-none/release/kerf.elf"), &image(board, machine))
 }
 
 /// Copies the image to its own name and refuses one that would not work: see [`elf::check`].
-fn keep(built: &Path, board: Board) -> Result<PathBuf> {
-    let kept = image(board);
+fn keep(built: &Path, kept: &Path) -> Result<PathBuf> {
     std::fs::create_dir_all(directory())?;
-    std::fs::copy(built, &kept).with_context(|| format!("cannot copy {}", built.display()))?;
-    elf::check(&kept)?;
-    Ok(kept)
+    std::fs::copy(built, kept).with_context(|| format!("cannot copy {}", built.display()))?;
+    elf::check(kept)?;
+    Ok(kept.to_owned())
 }
 
 /// `cargo xtask flash`
@@ -52,6 +57,9 @@ pub struct FlashArgs {
     /// The board to build for
     #[arg(long, value_enum, default_value_t)]
     board: Board,
+    /// The machine whose settings are the defaults
+    #[arg(long, value_enum, default_value_t)]
+    machine: Machine,
     /// The board's serial port, such as /dev/ttyACM0
     #[arg(long)]
     port: String,
@@ -63,7 +71,7 @@ pub struct FlashArgs {
 /// Builds, then writes the image through the boot loader of the board.
 pub fn flash(args: &FlashArgs) -> Result<()> {
     setup::ensure(Scope::Firmware)?;
-    let elf = build(args.board)?;
+    let elf = build(args.board, args.machine)?;
     let mut avrdude = avrdude(&args.port, &elf);
     println!("{}", process::shown(&avrdude));
     if args.dry_run {
@@ -82,6 +90,13 @@ fn avrdude(port: &str, elf: &Path) -> std::process::Command {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn images_have_names_of_their_own() {
+        let name = |machine| image(Board::Ramps14, machine).file_name().unwrap().to_owned();
+        assert_eq!(name(Machine::Careful), "ramps14.elf");
+        assert_eq!(name(Machine::Lathe), "ramps14-lathe.elf");
+    }
 
     #[test]
     fn avrdude_writes_the_elf_to_flash() {

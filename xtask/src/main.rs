@@ -24,6 +24,7 @@ mod elf;
 mod firmware;
 mod fuzz;
 mod jobs;
+mod machines;
 mod nist;
 mod process;
 mod senders;
@@ -37,6 +38,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use boards::Board;
+use machines::Machine;
 use process::host_cargo;
 use setup::Scope;
 
@@ -46,7 +48,7 @@ enum Command {
     /// Find the tools that Kerf needs and install what is missing
     Setup,
     /// Build the firmware of a board; the last line is `elf: PATH`
-    Build(BoardArg),
+    Build(BuildArgs),
     /// Show what the firmware takes of flash, RAM and stack; fail past the caps
     Size(size::SizeArgs),
     /// Run a job on the simulated board
@@ -73,10 +75,13 @@ enum Command {
 }
 
 #[derive(clap::Args)]
-struct BoardArg {
+struct BuildArgs {
     /// The board to build for
     #[arg(long, value_enum, default_value_t)]
     board: Board,
+    /// The machine whose settings are the defaults
+    #[arg(long, value_enum, default_value_t)]
+    machine: Machine,
 }
 
 fn main() -> ExitCode {
@@ -92,7 +97,7 @@ fn main() -> ExitCode {
 fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Setup => setup::report()?,
-        Command::Build(arg) => build(arg.board)?,
+        Command::Build(arg) => build(&arg)?,
         Command::Size(args) => size::run(&args)?,
         Command::Sim(args) => return sim::run(&args),
         Command::Bench(args) => return sim::bench(&args),
@@ -112,9 +117,9 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
 const DESCRIBE: [&str; 8] =
     ["test", "--quiet", "--package", "kerf", "--test", "docs", "--", "--ignored"];
 
-fn build(board: Board) -> anyhow::Result<()> {
+fn build(args: &BuildArgs) -> anyhow::Result<()> {
     setup::ensure(Scope::Firmware)?;
-    let elf = firmware::build(board)?;
+    let elf = firmware::build(args.board, args.machine)?;
     println!("elf: {}", elf.display());
     Ok(())
 }

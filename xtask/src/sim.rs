@@ -9,6 +9,7 @@ use clap::Args;
 
 use crate::boards::Board;
 use crate::firmware;
+use crate::machines::Machine;
 use crate::process::{host_cargo, pass_through, root, run as run_child};
 use crate::setup::{self, Scope};
 
@@ -20,6 +21,9 @@ pub struct RunArgs {
     /// The board to simulate
     #[arg(long, value_enum, default_value_t)]
     board: Board,
+    /// The machine whose settings are the defaults
+    #[arg(long, value_enum, default_value_t)]
+    machine: Machine,
     /// A setting sent before the job, as the sender would: '{"xvm":800}'
     #[arg(long, value_name = "JSON")]
     set: Vec<String>,
@@ -49,6 +53,9 @@ pub struct ServeArgs {
     /// The board to simulate
     #[arg(long, value_enum, default_value_t)]
     board: Board,
+    /// The machine whose settings are the defaults
+    #[arg(long, value_enum, default_value_t)]
+    machine: Machine,
     /// How many times faster than a real board, or `max`
     #[arg(long, value_name = "N|max")]
     speed: Option<String>,
@@ -68,26 +75,26 @@ pub struct BenchArgs {
 /// Builds and runs a job; the simulator's exit code is ours.
 pub fn run(args: &RunArgs) -> Result<ExitCode> {
     ensure!(args.job.is_file(), "there is no job {}", args.job.display());
-    let elf = prepare(args.board)?;
+    let elf = prepare(args.board, args.machine)?;
     pass_through(&mut run_command(args, &elf))
 }
 
 /// Builds and offers the simulated board as a serial port.
 pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
-    let elf = prepare(args.board)?;
+    let elf = prepare(args.board, args.machine)?;
     pass_through(&mut serve_command(args, &elf))
 }
 
 /// Builds and measures, on the board that others were measured on.
 pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
-    let elf = prepare(Board::default())?;
+    let elf = prepare(Board::default(), Machine::default())?;
     pass_through(&mut bench_command(args, &elf))
 }
 
 /// Gets everything that the simulator needs, and builds the firmware; where that lies.
-pub fn prepare(board: Board) -> Result<PathBuf> {
+pub fn prepare(board: Board, machine: Machine) -> Result<PathBuf> {
     setup::ensure(Scope::Simulator)?;
-    let elf = firmware::build(board)?;
+    let elf = firmware::build(board, machine)?;
     if !root().join("target/sim/kerf-sim").exists() {
         eprintln!("building the simulator: some minutes, this once");
     }
@@ -163,6 +170,7 @@ mod tests {
         let args = RunArgs {
             job: "a.gcode".into(),
             board: Board::Ramps14,
+            machine: Machine::Careful,
             set: vec!["{\"xvm\":800}".into(), "{\"yvm\":800}".into()],
             baud: Some(250_000),
             report: Some("r.json".into()),
@@ -188,7 +196,12 @@ mod tests {
 
     #[test]
     fn nothing_is_sent_that_was_not_asked_for() {
-        let args = ServeArgs { board: Board::default(), speed: None, link: None };
+        let args = ServeArgs {
+            board: Board::default(),
+            machine: Machine::default(),
+            speed: None,
+            link: None,
+        };
         let command = serve_command(&args, Path::new("k.elf"));
         assert_eq!(after_dashes(&command), "serve --elf k.elf --board mega2560-grbl");
     }

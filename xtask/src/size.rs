@@ -11,6 +11,7 @@ use crate::elf::places::task_name;
 use crate::elf::stack::{Chain, Stack};
 use crate::elf::{self, Image, Sizes, Symbol};
 use crate::firmware;
+use crate::machines::Machine;
 use crate::setup::{self, Scope};
 
 /// How many rows the lists have.
@@ -35,7 +36,7 @@ pub fn run(args: &SizeArgs) -> Result<()> {
             elf::check(path)?;
             show(path)
         }
-        None => show(&firmware::build(args.board)?),
+        None => show(&firmware::build(args.board, Machine::default())?),
     }
 }
 

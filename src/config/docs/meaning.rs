@@ -77,6 +77,10 @@ left; 115200 after a reset.",
         "Emergency stop: none, one that closes when it is hit, or one that opens, as a broken wire does. It shuts the \
 machine down: no step more, spindle and coolant off, motors keep their power.",
     ),
+    (
+        "mch",
+        "Machine that was chosen last. Choosing one sets all settings of motors and axes, `ja`, `ct` and `gpl` to what they are on that machine: see Machines.",
+    ),
 ];
 
 pub const MOTOR: [Meaning; MOTOR_ROWS] = [
@@ -104,8 +108,13 @@ pub const AXIS: [Meaning; AXIS_ROWS] = [
         "tm",
         "Upper end of travel, for `sl`. The lowest that can be set is none; an axis whose ends are the same has neither.",
     ),
-    ("jm", "Jerk at most. A value above 1000000 is divided by a million."),
-    ("jh", "Jerk while homing and probing, likewise."),
+    (
+        "jm",
+        "Jerk at most. A value above 1000000 is divided by a million. A jerk that reaches `ac` within 1 ms has no effect: \
+ramps are those of `ac` alone, and a message says so. That is `jm` of 216 times `ac` and more. About 6 times \
+`ac` takes 36 ms.",
+    ),
+    ("jh", "Jerk while homing and probing, likewise; `ac` holds there too."),
     ("jd", "How far a corner may be cut, as far as its speed goes; more makes corners faster."),
     ("ra", "Radius that turns a length into an angle with `am` 3."),
     (
@@ -123,7 +132,11 @@ pub const AXIS: [Meaning; AXIS_ROWS] = [
         "Way off a homing switch, within which it must open. With 0 its place is taken as it closes.",
     ),
     ("zb", "Way from where a homing switch opens to the end of travel."),
-    ("ac", "Acceleration at most, beside the jerk; 0 is none."),
+    (
+        "ac",
+        "Acceleration at most; 0 is none, and the jerk alone limits. `jm` says how soon it is reached; \
+within 1 ms `jm` has no effect, and a message says so.",
+    ),
 ];
 
 pub const PWM: [Meaning; PWM_ROWS] = [

@@ -8,7 +8,7 @@ use std::vec::Vec;
 
 use super::name::token;
 use super::table::{CLAMP, HOMING, IDLE, JERK, Kind, MODE, RADIUS, Row};
-use super::{Digits, Fixed, Owner, Setting, Words};
+use super::{Digits, Fixed, Name, Owner, Setting, Words, machines};
 use crate::progmem::Text;
 use meaning::Meaning;
 
@@ -34,6 +34,17 @@ has a fraction where an integer is due with 102, a string with 103, and what has
 rest with 106. `Decimals` are those that are kept; more are rounded, and fewer may be shown.
 
 `{defa:1}` needs the machine at rest, and is answered with status 15, the build and a message. Offsets, stored positions and tools are kept.
+
+";
+
+const MACHINES: &str = "\
+## Machines
+
+`{mch:1}` sets all settings of motors and axes, `ja`, `ct` and `gpl` as they are on that machine; all others stay. It is
+refused while anything moves (106). `{mch:n}` says which was chosen last, whatever was set since. An image that
+is built with `--machine NAME` has that machine's values as defaults. They are a beginning: check `tr`, `sa`, `mi` and
+the travel against your machine before you trust them. It takes up to 5 s until all of them survive a power cut; one before that may
+leave some as they were: choose again.
 
 ";
 
@@ -124,7 +135,47 @@ pub fn markdown() -> String {
         }
         text += "\n";
     }
-    text + PLACES
+    text + MACHINES + &machine_table() + PLACES
+}
+
+/// The machines, with what says most about them.
+fn machine_table() -> String {
+    let mut text =
+        "| `mch` | Name | What | Motors 1 to 4 move | `tr` | `vm` | `ac` | `jm` | Travel |\n"
+            .to_string();
+    text += "|---|---|---|---|---|---|---|---|---|\n";
+    for (n, machine) in (0..).zip(machines::ALL) {
+        let value = |name: &str| value_on(n, name);
+        let moves =
+            |motor: &&str| value(&format!("{motor}ma")).parse().ok().filter(|a| *a < 6usize);
+        let motors = ["1", "2", "3", "4"];
+        let letters = motors.map(|m| moves(&m).map_or("none", |axis| &"XYZABC"[axis..=axis]));
+        let axes = ["x", "y", "z"].into_iter().filter(|axis| value(&format!("{axis}am")) != "0");
+        let all = |of: &dyn Fn(&str) -> String| axes.clone().map(of).collect::<Vec<_>>().join(", ");
+        let of_axes = |name: &str| all(&|axis| value(&format!("{axis}{name}")));
+        let turns = motors.iter().filter(|m| moves(m).is_some_and(|axis| axis < 3));
+        let turns: Vec<_> = turns.map(|motor| value(&format!("{motor}tr"))).collect();
+        let travel = all(&|axis| {
+            format!("{} to {}", value(&format!("{axis}tn")), value(&format!("{axis}tm")))
+        });
+        text += &format!(
+            "| {n} | `{}` | {} | {} | {} | {} | {} | {} | {travel} |\n",
+            machine.name,
+            machine.about,
+            letters.join(" "),
+            turns.join(", "),
+            of_axes("vm"),
+            of_axes("ac"),
+            of_axes("jm"),
+        );
+    }
+    text + "\n"
+}
+
+/// What a setting is on a machine.
+fn value_on(machine: u8, name: &str) -> String {
+    let setting = Name::new().with(name.as_bytes()).and_then(|name| Setting::find(&name));
+    setting.map_or_else(String::new, |s| number(s.value_on(machine), s.row().stored))
 }
 
 /// One setting, of all its owners.
@@ -298,7 +349,7 @@ mod tests {
         let text = markdown();
         for row in [
             "| `mt` | number | s | 0.1 to 4294967 | 2 | 2 |",
-            "| `vm` | number | mm or deg/min | 0.001 to 2147483.647 | X Y Z: 800, A: 230400, B C: 3600 | 3 |",
+            "| `vm` | number | mm or deg/min | 0.001 to 2147483.647 | X Y Z: 800, A B C: 7200 | 3 |",
         ] {
             assert!(text.contains(row), "{row}");
         }

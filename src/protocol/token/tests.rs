@@ -27,7 +27,7 @@ fn every_token_has_a_name_that_finds_it() {
     }
     assert_eq!(
         count,
-        36 + 28
+        37 + 28
             + 3 * 15
             + 16
             + 2 * 9

@@ -9,7 +9,7 @@ use kerf::boards::MEGA2560_GRBL;
 fn longest(jerk: u32, feed: u32) -> f64 {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     for axis in ["x", "y"] {
-        set(&mut machine, &mut host, &format!("{{{axis}:{{vm:5000,fr:5000,jm:{jerk}}}}}"));
+        set(&mut machine, &mut host, &format!("{{{axis}:{{vm:5000,fr:5000,jm:{jerk},ac:0}}}}"));
     }
     set(&mut machine, &mut host, "{sv:0,qv:0}");
     set(&mut machine, &mut host, "{mfo:1.2}");

@@ -15,7 +15,7 @@ use kerf_sim::report::Report;
 
 /// Steps a millimetre.
 const PER_MM: f64 = 1_280.0;
-/// The default jerk limit of an axis, mm/s3.
+/// A jerk limit of 20 millions of mm/min3, in mm/s3.
 const JERK: f64 = 20e6 / 216_000.0;
 
 fn scratch(name: &str) -> PathBuf {
@@ -36,7 +36,8 @@ fn highest(values: &[f64]) -> f64 {
 
 #[test]
 fn an_s_curve_is_seen_in_the_steps() {
-    let (machine, report) = run("g1 x20 f600", &Options::default());
+    let low = Options { settings: vec!["{xjm:20,xac:0}".to_string()], ..Options::default() };
+    let (machine, report) = run("g1 x20 f600", &low);
     let motion = Motion::of(&machine, &report.setup, WINDOW_MS);
     // 10 mm/s, and ramps in which the jerk limit is in force.
     let velocity = highest(&motion.velocity);

@@ -23,6 +23,7 @@ use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 
 use crate::boards::Board;
+use crate::machines::Machine;
 use crate::process::root;
 use crate::setup::{self, Scope};
 use crate::sim;
@@ -63,7 +64,7 @@ pub fn run(args: &SendersArgs) -> Result<()> {
     let job = job.canonicalize()?;
     setup::ensure(Scope::Senders)?;
     let folder = install::senders()?;
-    let elf = sim::prepare(Board::default())?;
+    let elf = sim::prepare(Board::default(), Machine::default())?;
     let program = sim::build()?;
     let senders = args.sender.map_or_else(|| Sender::value_variants().to_vec(), |one| vec![one]);
     let session =

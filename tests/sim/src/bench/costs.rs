@@ -5,7 +5,7 @@ use anyhow::Result;
 use super::Figure;
 use super::jitter;
 use super::spirals::{lines_per_second, spiral};
-use super::workload::{Bed, FACTORY_JERK, FAST_BAUD, How, USUAL_JERK, arcs, braid, straight};
+use super::workload::{Bed, LOW_JERK, FAST_BAUD, How, USUAL_JERK, arcs, braid, straight};
 use crate::machine::Machine;
 use crate::report::Report;
 use crate::stopwatch::{Cost, Stopwatch};
@@ -83,7 +83,7 @@ fn jerk_costs(bed: &Bed, jerks: &[f64], jobs: &[String]) -> Result<Vec<Cost>> {
 pub fn replan(bed: &Bed) -> Result<Figure> {
     let (curve, _) = spiral_on_fast_line(bed, vec![bed.calls(QUEUE_PUSH)?])?;
     // With a low jerk limit it takes all of the queue to stop: each new block changes every other.
-    let how = How { baud: FAST_BAUD, jerk: Some(FACTORY_JERK), ..How::default() };
+    let how = How { baud: FAST_BAUD, jerk: Some(LOW_JERK), ..How::default() };
     let (line, _) =
         bed.try_run(&straight(1_000, 0.1, 6_000.0), how, vec![bed.calls(QUEUE_PUSH)?])?;
     let costs = [&curve, &line].map(|machine| machine.stopwatches()[0].cost());

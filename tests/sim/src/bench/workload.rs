@@ -42,9 +42,9 @@ const SETTINGS: [&str; 8] = [
     "{z:{vm:2000000,fr:2000000,jd:0.01}}",
     "{a:{am:1,vm:2000000,fr:2000000,jd:0.01}}",
 ];
-/// The factory's jerk limit, and one that is usual for such machines, millions of mm/min3.
-pub const FACTORY_JERK: f64 = 20.0;
-/// See [`FACTORY_JERK`].
+/// TinyG's jerk limit, with which it takes all of the queue to stop, and one that is usual, millions of mm/min3.
+pub const LOW_JERK: f64 = 20.0;
+/// See [`LOW_JERK`].
 pub const USUAL_JERK: f64 = 5_000.0;
 /// Millions of mm/min3 in a mm/s3.
 pub const PER_JERK: f64 = 1e6 / 216e3;

@@ -1,0 +1,24 @@
+//! A machine that nobody has told Kerf anything about: TinyG's screws, and ramps that stall no stepper and need no patience.
+
+use super::{Machine, set};
+
+/// The machine that an image is built for unless another is asked for.
+pub const CAREFUL: Machine = Machine {
+    name: "careful",
+    about: "a machine that nothing is known of",
+    entries: &[
+        // 200 mm/s^2, reached in 43 ms
+        set("xyz", "ac", 200.0),
+        set("xyz", "jm", 1_000.0),
+        set("xyz", "jh", 2_000.0),
+        set("", "ja", 720_000.0),
+        set("xyzabc", "jd", 0.01),
+        // A table that turns: words are degrees
+        set("a", "am", 1.0),
+        set("abc", "vm", 7_200.0),
+        set("abc", "fr", 7_200.0),
+        set("abc", "ac", 400.0),
+        set("abc", "jm", 2_000.0),
+        set("a", "jh", 4_000.0),
+    ],
+};

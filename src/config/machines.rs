@@ -1,0 +1,363 @@
+//! Machines as data: what the settings are on a router, a mill, a printer, a lathe.
+//!
+//! A machine is one constant in one file under `machines/`: the settings that it has otherwise than the careful
+//! one, whose own file changes TinyG's. Names, ranges and decimals are checked when the image is built. In program
+//! memory are six bytes for each difference; one of X and Y alike is one.
+//!
+//! An image is built for [`ACTIVE`], whose values are its defaults. `{mch:2}` takes those of another over
+//! ([`Settings::take_over`](super::Settings::take_over)).
+
+use super::setting::Setting;
+use super::table::{AXIS_LIST, HOMING, MOTOR_LIST, RADIUS, Row, SYSTEM_LIST, Values};
+use super::table::{AXIS_ROWS, MOTOR_ROWS, SYSTEM_ROWS};
+use crate::boards::MOTORS;
+use crate::progmem;
+use crate::units::{AXES, FIRST_ROTARY};
+
+#[path = "../../machines/careful.rs"]
+mod careful;
+#[path = "../../machines/lathe.rs"]
+mod lathe;
+#[path = "../../machines/mill.rs"]
+mod mill;
+#[path = "../../machines/printer.rs"]
+mod printer;
+#[path = "../../machines/router.rs"]
+mod router;
+
+pub(super) use careful::CAREFUL;
+use lathe::LATHE;
+use mill::MILL;
+use printer::PRINTER;
+use router::ROUTER;
+
+/// A machine.
+#[derive(Debug)]
+pub struct Machine {
+    /// The name that `--machine` takes.
+    pub name: &'static str,
+    /// What it is, in some words.
+    pub about: &'static str,
+    /// Its settings, where they are not the careful machine's.
+    pub entries: &'static [Entry],
+}
+
+/// The machines, by their numbers: what `mch` is.
+pub const ALL: [&Machine; COUNT] = [&CAREFUL, &ROUTER, &MILL, &PRINTER, &LATHE];
+/// How many there are.
+pub const COUNT: usize = 5;
+
+/// The number of the machine that this image is built for.
+pub const ACTIVE: u8 = if cfg!(feature = "machine-router") {
+    1
+} else if cfg!(feature = "machine-mill") {
+    2
+} else if cfg!(feature = "machine-printer") {
+    3
+} else if cfg!(feature = "machine-lathe") {
+    4
+} else {
+    0
+};
+
+/// The number of the setting that chooses one.
+pub(super) const CHOICE: u8 = find(&SYSTEM_LIST, b"mch") as u8;
+
+/// A setting of a machine, or of several of its motors or axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// The setting, of the first motor or axis.
+    setting: u8,
+    /// The motors or axes, as bits; 1 for the machine itself.
+    owners: u8,
+    /// Scaled as kept.
+    value: i32,
+}
+
+impl Entry {
+    const NONE: Entry = Entry { setting: 0, owners: 0, value: 0 };
+}
+
+/// A setting of the groups that `owners` names: `"xy"`, `"14"`, or none for the machine itself. `value` in the
+/// setting's own unit.
+///
+/// Panics, so fails the build, if there is no such setting or it cannot have the value.
+const fn set(owners: &str, name: &str, value: f64) -> Entry {
+    let (owners, name) = (owners.as_bytes(), name.as_bytes());
+    if owners.is_empty() {
+        let row = find(&SYSTEM_LIST, name);
+        return entry(row, 1, &SYSTEM_LIST[row], value);
+    }
+    if owners[0].is_ascii_digit() {
+        let row = find(&MOTOR_LIST, name);
+        return entry(SYSTEM_ROWS + row, bits(owners, b"1234"), &MOTOR_LIST[row], value);
+    }
+    let row = find(&AXIS_LIST, name);
+    let bits = bits(owners, b"xyzabc");
+    let homes = (1 << (FIRST_ROTARY + 1)) - 1;
+    let turns = !((1 << FIRST_ROTARY) - 1);
+    assert!(!AXIS_LIST[row].is(HOMING) || bits & !homes == 0, "an axis lacks this setting");
+    assert!(!AXIS_LIST[row].is(RADIUS) || bits & !turns == 0, "an axis lacks this setting");
+    entry(SYSTEM_ROWS + MOTORS * MOTOR_ROWS + row, bits, &AXIS_LIST[row], value)
+}
+
+const fn entry(setting: usize, owners: u8, row: &Row, value: f64) -> Entry {
+    let mut scaled = value;
+    let mut decimals = row.stored;
+    while decimals > 0 {
+        scaled *= 10.0;
+        decimals -= 1;
+    }
+    let value = (scaled + if scaled < 0.0 { -0.5 } else { 0.5 }) as i32;
+    assert!(value >= row.min && value <= row.max, "a setting of a machine is out of its range");
+    Entry { setting: setting as u8, owners, value }
+}
+
+/// The groups of `owners` as bits, by their order in `all`.
+const fn bits(owners: &[u8], all: &[u8]) -> u8 {
+    let (mut bits, mut i) = (0, 0);
+    while i < owners.len() {
+        let mut bit = 0;
+        while all[bit] != owners[i] {
+            bit += 1;
+        }
+        bits |= 1 << bit;
+        i += 1;
+    }
+    bits
+}
+
+/// The row of that name.
+const fn find(rows: &[Row], name: &[u8]) -> usize {
+    let mut row = 0;
+    while !is_called(&rows[row].token, name) {
+        row += 1;
+        assert!(row < rows.len(), "a machine has a setting that does not exist");
+    }
+    row
+}
+
+const fn is_called(token: &[u8; 4], name: &[u8]) -> bool {
+    let mut i = 0;
+    while i < token.len() {
+        let letter = if i < name.len() { name[i] } else { 0 };
+        if token[i] != letter {
+            return false;
+        }
+        i += 1;
+    }
+    name.len() <= token.len()
+}
+
+impl Values {
+    /// These with those of `entries` in their places.
+    pub(super) const fn with(mut self, entries: &[Entry]) -> Values {
+        let mut i = 0;
+        while i < entries.len() {
+            let Entry { setting, owners, value } = entries[i];
+            let mut owner = 0;
+            while owner < AXES {
+                if owners >> owner & 1 != 0 {
+                    self.put(setting as usize, owner, value);
+                }
+                owner += 1;
+            }
+            i += 1;
+        }
+        self
+    }
+
+    const fn put(&mut self, setting: usize, owner: usize, value: i32) {
+        const FIRST_AXIS: usize = SYSTEM_ROWS + MOTORS * MOTOR_ROWS;
+        if setting < SYSTEM_ROWS {
+            self.system[setting] = value;
+        } else if setting < FIRST_AXIS {
+            self.motor[setting - SYSTEM_ROWS][owner] = value;
+        } else {
+            assert!(setting - FIRST_AXIS < AXIS_ROWS);
+            self.axis[setting - FIRST_AXIS][owner] = value;
+        }
+    }
+}
+
+/// Where the entries of each machine end in [`ENTRIES`]. The careful one has none there.
+const ENDS: [u8; COUNT] = {
+    let (mut ends, mut machine) = ([0; COUNT], 1);
+    while machine < COUNT {
+        let end = ends[machine - 1] as usize + ALL[machine].entries.len();
+        assert!(end <= u8::MAX as usize, "the machines have too many settings");
+        ends[machine] = end as u8;
+        machine += 1;
+    }
+    ends
+};
+
+const fn joined() -> [Entry; ENDS[COUNT - 1] as usize] {
+    let mut all = [Entry::NONE; ENDS[COUNT - 1] as usize];
+    let (mut machine, mut at) = (1, 0);
+    while machine < COUNT {
+        let mut i = 0;
+        while i < ALL[machine].entries.len() {
+            all[at] = ALL[machine].entries[i];
+            at += 1;
+            i += 1;
+        }
+        machine += 1;
+    }
+    all
+}
+
+progmem! {
+    static ENTRIES: [Entry; ENDS[COUNT - 1] as usize] = joined();
+    static END_OF: [u8; COUNT] = ENDS;
+}
+
+/// Entry `index`, if it is of `setting`.
+#[inline(never)]
+#[small]
+fn of(setting: Setting, index: u8) -> Option<i32> {
+    let (first, owner) = setting.first_of_row();
+    let entry = ENTRIES.at(index.into())?;
+    (entry.setting == first.number() && entry.owners & owner != 0).then_some(entry.value)
+}
+
+/// What a machine has otherwise than the careful one; `None` if not this. About 2,000 cycles on AVR.
+#[small]
+pub(super) fn value(machine: u8, setting: Setting) -> Option<i32> {
+    let machine = usize::from(machine);
+    let begin = machine.checked_sub(1).and_then(|before| END_OF.at(before)).unwrap_or(0);
+    (begin..END_OF.at(machine).unwrap_or(0)).find_map(|index| of(setting, index))
+}
+
+/// Whether some machine has it otherwise than another. About 10,000 cycles on AVR.
+#[small]
+pub(super) fn differ_in(setting: Setting) -> bool {
+    (0..ENDS[COUNT - 1]).any(|index| of(setting, index).is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Name, Settings};
+    use crate::motion::pace::Drivers;
+    use std::collections::HashSet;
+    use std::vec::Vec;
+
+    fn setting(name: &str) -> Setting {
+        Setting::find(&Name::new().with(name.as_bytes()).unwrap()).unwrap()
+    }
+
+    fn settings_of(machine: u8) -> Settings {
+        let mut settings = Settings::new();
+        settings.take_over(machine, false);
+        settings
+    }
+
+    fn all() -> impl Iterator<Item = Setting> {
+        (0..Setting::NUMBERS).filter_map(Setting::from_number)
+    }
+
+    fn values(settings: &Settings) -> Vec<i32> {
+        all().map(|setting| settings.get(setting)).collect()
+    }
+
+    #[test]
+    fn every_machine_is_as_its_file_says() {
+        let router = settings_of(1);
+        let value = |name: &str| router.get(setting(name));
+        assert_eq!((value("mch"), value("1tr"), value("3tr")), (1, 40_000_000, 1_250_000));
+        assert_eq!((value("4ma"), value("4po"), value("2po")), (1, 1, 0));
+        assert_eq!((value("yjm"), value("zjm"), value("ztn")), (4_000_000, 500_000, -60_0000));
+        assert_eq!(router.step_ratio(0).steps(crate::units::Length(10_000)), 40);
+        let lathe = settings_of(4);
+        let value = |name: &str| lathe.get(setting(name));
+        assert_eq!((value("yam"), value("gpl"), value("ja")), (0, 1, 72_000_000));
+    }
+
+    #[test]
+    fn settings_that_are_not_the_machines_stay() {
+        let mut settings = Settings::new();
+        settings.store(setting("si"), 200);
+        settings.take_over(3, false);
+        assert_eq!(settings.get(setting("si")), 200);
+    }
+
+    /// Every machine: its number, its name, its settings.
+    fn each() -> impl Iterator<Item = (u8, &'static str, Settings)> {
+        (0..).zip(ALL).map(|(n, machine)| (n, machine.name, settings_of(n)))
+    }
+
+    #[test]
+    fn whatever_was_chosen_before_makes_no_difference() {
+        for (n, name, expected) in each() {
+            let mut settings = settings_of((n + 1) % COUNT as u8);
+            settings.take_over(n, false);
+            assert_eq!(values(&settings), values(&expected), "{name}");
+        }
+        assert_eq!(values(&settings_of(ACTIVE)), values(&Settings::new()));
+    }
+
+    #[test]
+    fn machines_have_values_that_their_settings_can_have() {
+        for (_, name, settings) in each() {
+            for setting in all().filter(|setting| setting.is_kept()) {
+                assert!(setting.accepts(settings.get(setting)), "{name}: {:?}", setting.name());
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_said_twice_or_in_vain() {
+        for machine in ALL {
+            let mut seen = HashSet::new();
+            for entry in machine.entries {
+                for owner in (0..8).filter(|owner| entry.owners >> owner & 1 != 0) {
+                    assert!(seen.insert((entry.setting, owner)), "{}: {entry:?}", machine.name);
+                }
+            }
+        }
+        for (n, name, _) in each().skip(1) {
+            let vain = all().filter(|s| value(n, *s) == Some(s.value_on(0))).map(Setting::name);
+            assert_eq!(vain.collect::<Vec<_>>(), [], "{name}");
+        }
+    }
+
+    /// The axes that some motor moves.
+    fn moved(settings: &Settings) -> HashSet<usize> {
+        let axes = (0..MOTORS).map(|motor| usize::from(settings.motor_axis(motor)));
+        axes.filter(|axis| *axis < AXES).collect()
+    }
+
+    #[test]
+    fn motors_follow_with_all_others_at_once() {
+        let rate = Drivers::USUAL.step_rate_max(MOTORS) as u32;
+        for (_, name, mut settings) in each() {
+            assert!(!settings.limit_velocity(setting("mch"), |_| rate), "{name}");
+        }
+    }
+
+    #[test]
+    fn ramps_are_neither_a_crawl_nor_a_jolt() {
+        for (_, name, settings) in each() {
+            for axis in moved(&settings) {
+                let accel = settings.accel_max(axis) / 3_600.0;
+                let seconds = accel / (settings.jerk_max(axis) / 216_000.0);
+                let ramp = settings.velocity_max(axis) / 60.0 / accel + seconds;
+                assert!((0.020..0.050).contains(&seconds), "{name} {axis}: {seconds} s");
+                assert!((0.05..0.40).contains(&ramp), "{name} {axis}: {ramp} s");
+                assert!(settings.jerk_homing(axis) >= settings.jerk_max(axis), "{name} {axis}");
+            }
+            let idle = all().find(|setting| settings.has_idle_jerk(*setting));
+            assert_eq!(idle.map(Setting::name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn corners_ask_for_no_more_than_ramps() {
+        for (_, name, settings) in each() {
+            let linear = moved(&settings).into_iter().filter(|axis| *axis < FIRST_ROTARY);
+            let most = linear.map(|axis| settings.accel_max(axis)).fold(0.0, f32::max);
+            assert!(settings.junction_acceleration() <= most, "{name}");
+        }
+    }
+}

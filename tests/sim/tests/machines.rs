@@ -1,0 +1,72 @@
+//! Machines chosen on the chip: how long it takes, that a job runs on each, and that it survives a power cut.
+
+mod common;
+
+use common::{booted, firmware, set};
+use kerf::boards::MEGA2560_GRBL;
+use kerf::config::machines::ALL;
+use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
+
+fn value(machine: &mut Machine, host: &mut Host, name: &str) -> f64 {
+    let response = host.ask(machine, &format!("{{{name}:n}}"), 5_000).unwrap();
+    response.body[name].as_f64().unwrap_or_else(|| panic!("{}", response.raw))
+}
+
+#[test]
+fn a_job_runs_on_every_machine() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    set(&mut machine, &mut host, "{sv:0,qv:0}");
+    for (number, profile) in ALL.iter().enumerate() {
+        let before = machine.cycle();
+        set(&mut machine, &mut host, &format!("{{mch:{number}}}"));
+        let ms = (machine.cycle() - before) as f64 / machine.cycles(1) as f64;
+        println!("{}: {ms:.1} ms", profile.name);
+        // Thread mode is busy meanwhile; the watchdog waits for half a second.
+        assert!(ms < 100.0, "{ms} ms");
+        assert_eq!(value(&mut machine, &mut host, "mch"), number as f64);
+        // Small moves.
+        set(&mut machine, &mut host, "{test:11}");
+        let _ = machine.receive();
+        let mut heard = Vec::new();
+        for _ in 0..300 {
+            machine.run_for_ms(100).unwrap();
+            heard.extend(machine.receive());
+            if heard.ends_with(b"\n") {
+                break;
+            }
+        }
+        let heard = String::from_utf8(heard).unwrap();
+        assert!(heard.contains("\"st\":8,"), "{}: {heard}", profile.name);
+        // Its last moves are still under way.
+        let mut wait = 0;
+        while value(&mut machine, &mut host, "stat") == 5.0 {
+            host.run_for_ms(&mut machine, 100).unwrap();
+            wait += 1;
+            assert!(wait < 200, "{} does not stop", profile.name);
+        }
+    }
+    // It ends where it began, on every machine.
+    assert_eq!(value(&mut machine, &mut host, "posx"), 0.0);
+}
+
+#[test]
+fn a_machine_survives_a_power_cut() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    set(&mut machine, &mut host, "{mch:3}");
+    let before = machine.cycle();
+    let mut writes = 0;
+    while machine.eeprom_writes() != writes {
+        writes = machine.eeprom_writes();
+        host.run_for_ms(&mut machine, 200).unwrap();
+    }
+    let ms = (machine.cycle() - before) / machine.cycles(1);
+    println!("{writes} bytes, {ms} ms");
+    assert!(ms < 5_000, "docs/settings.md says 5 s");
+    let left = *machine.eeprom();
+    let (mut machine, mut host) = (firmware(&MEGA2560_GRBL), Host::new(LINES_IN_FLIGHT));
+    machine.set_eeprom(&left);
+    host.boot(&mut machine, 1_000).unwrap();
+    for (name, expected) in [("mch", 3.0), ("xvm", 12_000.0), ("2mi", 16.0), ("aam", 3.0)] {
+        assert_eq!(value(&mut machine, &mut host, name), expected, "{name}");
+    }
+}
