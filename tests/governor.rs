@@ -156,6 +156,8 @@ struct Outcome {
     cruise: f64,
     /// Constraints asked for in a stretch, at worst.
     asked: u32,
+    /// Most stretches in a row that end no block and are together shorter than a slice.
+    tiny: u32,
 }
 
 fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
@@ -167,6 +169,7 @@ fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
     let mut states = vec![State { clock: 0.0, place: 0.0, velocity: 0.0, restarted: true }];
     let mut corners = Vec::new();
     let (mut clock, mut place, mut hold, mut stretches) = (0.0, 0.0, 0, 0);
+    let (mut short, mut tiny) = (0.0, 0);
     governor.begin(path.accel as f32, path.jerk as f32);
     while at < path.blocks.len() {
         if end < path.blocks.len() && end - at < path.queue && dice.roll() < 0.7 {
@@ -197,6 +200,15 @@ fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
         assert!(stretch.seconds > 0.0 && stretch.seconds.is_finite(), "{stretch:?} {governor:?}");
         assert!(stretch.distance >= 0.0, "{stretch:?} {governor:?}");
         out.asked = out.asked.max(asked.get());
+        short += f64::from(stretch.seconds);
+        tiny += u32::from(!stretch.ends);
+        if short > 0.5 * SLICE || hold > 0 {
+            (short, tiny) = (0.0, 0);
+        }
+        if trace && tiny > out.tiny {
+            println!("tiny {tiny} at {clock}");
+        }
+        out.tiny = out.tiny.max(tiny);
         clock += f64::from(stretch.seconds);
         place += f64::from(stretch.distance);
         stretches += 1;
@@ -300,7 +312,7 @@ fn seeds(count: u64) -> (Vec<u64>, bool) {
 fn any_path_is_within_its_limits_and_work() {
     let (seeds, trace) = seeds(3_000);
     let mut bad = Vec::new();
-    let mut worst = 0;
+    let (mut worst, mut most_tiny) = (0, 0);
     for seed in seeds {
         let dice = &mut Dice::new(seed);
         let path = Path::random(dice);
@@ -312,6 +324,10 @@ fn any_path_is_within_its_limits_and_work() {
         };
         worst = worst.max(out.asked);
         let within = out.accel <= 1.02 && out.jerk <= 1.05 && out.corner <= 1.01;
+        most_tiny = most_tiny.max(out.tiny);
+        if out.tiny > 1 {
+            println!("seed {seed} tiny {}", out.tiny);
+        }
         if !within || out.cruise > 1.01 || out.asked > ASKED_MOST {
             bad.push(format!("seed {seed}: {out:?}"));
         }

@@ -2,16 +2,30 @@
 
 use kerf_macros::small;
 
-/// The lesser of two numbers. Cost: 70.
-#[inline]
-pub fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
+/// Whether `a` is less than `b`, neither of them a NaN. Cost: 45, where a comparison of floats takes 90, or 180 where the compiler
+/// sees to NaN as well.
+#[inline(never)]
+pub fn less(a: f32, b: f32) -> bool {
+    order(a) < order(b)
 }
 
-/// The greater of two numbers. Cost: 70.
+/// Integers in the order of the floats: those of negative numbers are turned round.
+#[inline(always)]
+fn order(x: f32) -> i32 {
+    let bits = x.to_bits() as i32;
+    if bits < 0 { bits ^ 0x7FFF_FFFF } else { bits }
+}
+
+/// The lesser of two numbers. Cost: 55.
+#[inline]
+pub fn lesser(a: f32, b: f32) -> f32 {
+    if less(a, b) { a } else { b }
+}
+
+/// The greater of two numbers. Cost: 55.
 #[inline]
 pub fn greater(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
+    if less(b, a) { a } else { b }
 }
 
 /// Whether `a` is below `b`, neither of them negative: the bits of such floats are in the same order.
@@ -83,6 +97,16 @@ mod tests {
             let x = 1.37f32.powi(n.into());
             let exact = f64::from(x).cbrt();
             assert!((f64::from(cube_root(x)) / exact - 1.0).abs() < 4e-6, "{x}");
+        }
+    }
+
+    #[test]
+    fn less_is_less() {
+        let numbers = [f32::MIN, -2.5, -1.0, -1e-30, -0.0, 0.0, 1e-30, 1.0, 2.5, f32::MAX];
+        for a in numbers {
+            for b in numbers.into_iter().filter(|b| *b != a) {
+                assert_eq!(less(a, b), a < b, "{a} {b}");
+            }
         }
     }
 

@@ -60,6 +60,8 @@ pub(super) struct Limits {
     pub kappa: f32,
     /// `jerk / accel`: how much alpha may change in a second.
     pub pace: f32,
+    /// `accel / jerk`: the seconds that takes from 0 to 1.
+    pub build: f32,
 }
 
 /// Velocity and acceleration along the path, at the end of what has been worked out.
@@ -97,7 +99,7 @@ impl Governor {
         Self {
             velocity: 0.0,
             alpha: 0.0,
-            limits: Limits { accel: 0.0, jerk: 0.0, kappa: 0.0, pace: 0.0 },
+            limits: Limits { accel: 0.0, jerk: 0.0, kappa: 0.0, pace: 0.0, build: 0.0 },
             ramp: None,
             rest: Rest::NONE,
             clear: Clear::NONE,
@@ -150,10 +152,11 @@ impl Governor {
         self.halting = false;
         self.clear = Clear::NONE;
         (self.wait, self.margin) = (0, 0);
-        let mut pace = 0.0;
+        let (mut pace, mut build) = (0.0, 0.0);
         let mut alpha = 0.0;
-        if jerk > 0.0 {
+        if some(jerk) {
             pace = jerk / accel;
+            build = accel / jerk;
             if self.alpha < 0.0 {
                 alpha = greater(self.alpha * self.limits.accel / accel, -1.0);
                 let most = sqrt(2.0 * jerk * self.velocity) / accel;
@@ -161,7 +164,7 @@ impl Governor {
             }
         }
         self.alpha = alpha;
-        self.limits = Limits { accel, jerk, kappa: kappa(accel, jerk), pace };
+        self.limits = Limits { accel, jerk, kappa: kappa(accel, jerk), pace, build };
     }
 
     /// An override has changed feeds, of what runs and of what is ahead.

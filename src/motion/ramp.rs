@@ -7,8 +7,8 @@
 //!
 //! Units: mm, s. Cost on AVR: 3,500 cycles to lay out, 1,000 to 1,700 a slice.
 
-use super::float::greater;
-use super::governor::Governor;
+use super::float::{below, greater, less, scaled};
+use super::governor::{Governor, same};
 use crate::math::sqrt;
 
 /// What is left of a ramp.
@@ -55,11 +55,11 @@ impl Ramp {
     fn at(&self, time: f32) -> (f32, f32) {
         const THIRD: f32 = 1.0 / 3.0;
         let w = self.velocity;
-        if time <= self.rise {
+        if !less(self.rise, time) {
             let gain = self.half * time * time;
             return (w + gain, time * (w + gain * THIRD));
         }
-        if time <= self.hold {
+        if !below(self.hold, time) {
             // As if it had decelerated so from half of the rise on.
             let accel = 2.0 * self.half * self.rise;
             let since = time - 0.5 * self.rise;
@@ -68,11 +68,11 @@ impl Ramp {
             return (w + gain, w * time + 0.5 * gain * since + more);
         }
         let fall = self.fall();
-        if time <= fall {
+        if !below(fall, time) {
             let (velocity, far) = self.off_top(fall - time);
             return (velocity, self.begin - far);
         }
-        if time <= self.coast {
+        if !below(self.coast, time) {
             return (self.top, self.begin + self.top * (time - fall));
         }
         let (velocity, far) = self.off_top(time - self.coast);
@@ -115,8 +115,8 @@ impl Ramp {
 
 /// The share of the acceleration limit that a change of velocity by `drop` reaches.
 fn share_of(drop: f32, kappa: f32) -> f32 {
-    let twice = kappa + kappa;
-    if drop < twice { sqrt(drop / twice) } else { 1.0 }
+    let twice = scaled(kappa, 1);
+    if less(drop, twice) { sqrt(drop / twice) } else { 1.0 }
 }
 
 impl Governor {
@@ -133,7 +133,7 @@ impl Governor {
     #[inline(never)]
     pub(super) fn lay(&mut self, w: f32, slack: f32, closed: bool) {
         let (alpha, limits) = (self.alpha, &self.limits);
-        let build = 1.0 / limits.pace;
+        let build = limits.build;
         let climb = limits.kappa * alpha * alpha;
         let top = self.velocity + climb;
         let mut w = w;
@@ -143,8 +143,9 @@ impl Governor {
             w = greater(top - climb - climb, 0.0);
         }
         let rise = greater(share, 1e-4) * build;
-        let half = 0.5 * limits.jerk;
-        let hold = greater((top - w) / (2.0 * half * rise), rise);
+        let half = scaled(limits.jerk, -1);
+        // Only the whole deceleration is kept.
+        let hold = if same(share, 1.0) { greater((top - w) / limits.accel, rise) } else { rise };
         let fall = hold + rise;
         let coast = if slack > 0.0 { fall + slack / top } else { fall };
         let begin = 0.5 * (top + w) * fall;
@@ -188,8 +189,8 @@ impl Governor {
     /// Ends the deceleration as soon as the limits allow, at the velocity `bottom`.
     #[inline(never)]
     pub(super) fn bottom_out(&mut self, bottom: f32) {
-        let rise = -self.alpha / self.limits.pace;
-        let half = 0.5 * self.limits.jerk;
+        let rise = -self.alpha * self.limits.build;
+        let half = scaled(self.limits.jerk, -1);
         self.set_ramp(Ramp {
             time: rise,
             distance: 0.0,
@@ -218,7 +219,7 @@ impl Governor {
         let Some(ramp) = &mut self.ramp else { return };
         let next = ramp.time - seconds;
         let (time, distance);
-        if next < 0.4 * seconds {
+        if less(next, 0.4 * seconds) {
             (time, distance) = (ramp.time, ramp.distance);
             (self.velocity, self.alpha) = (ramp.velocity, 0.0);
             self.ramp = None;

@@ -22,7 +22,7 @@
 
 use super::constraint::{Ahead, Ask, Clear, LOWEST, needed};
 use super::exec::SEGMENT_S;
-use super::float::{greater, lesser, some};
+use super::float::{below, greater, less, lesser, scaled, some};
 use super::governor::{Governor, same};
 use super::ramp::Phase;
 use super::slice::Span;
@@ -69,7 +69,7 @@ impl Governor {
         if self.alpha.is_sign_negative() && some(self.alpha) {
             return self.recover(span, ahead);
         }
-        if velocity > span.cruise {
+        if below(span.cruise, velocity) {
             return self.slow_down(span, ahead);
         }
         let steady = !some(self.alpha) && some(velocity);
@@ -116,13 +116,13 @@ impl Governor {
 
     /// Distance from the state to the end of the block, brake potential; negative if it is beyond.
     fn here(&self, span: &Span) -> f32 {
-        span.left * (self.limits.accel + self.limits.accel)
+        self.potential(span.left)
     }
 
     /// The state after a slice in which alpha goes to `alpha`.
     #[inline(never)]
     fn next(&self, alpha: f32, seconds: f32, out: &mut Next) {
-        let half = 0.5 * seconds;
+        let half = scaled(seconds, -1);
         let velocity = self.velocity + half * self.limits.accel * (self.alpha + alpha);
         out.velocity = velocity;
         out.alpha = alpha;
@@ -139,7 +139,7 @@ impl Governor {
     /// Distance in which an acceleration ends, or a deceleration, then less than 0; brake potential.
     fn rising(&self, alpha: f32, velocity: f32, top: f32) -> f32 {
         // Velocity plus two thirds of what is to come.
-        4.0 * self.limits.kappa * alpha * (top - (top - velocity) * (1.0 / 3.0))
+        scaled(self.limits.kappa, 2) * alpha * (top - (top - velocity) * (1.0 / 3.0))
     }
 
     /// A slice of acceleration, if that is safe.
@@ -148,7 +148,7 @@ impl Governor {
         let (alpha, seconds) = (self.alpha, span.seconds);
         let mut next = Next::default();
         self.next(lesser(alpha + self.limits.pace * seconds, 1.0), seconds, &mut next);
-        if next.top > span.cruise {
+        if below(span.cruise, next.top) {
             if !some(alpha) {
                 // So near that the acceleration need not build up.
                 next = Next {
@@ -160,7 +160,7 @@ impl Governor {
                 };
             } else {
                 self.next(alpha, seconds, &mut next);
-                if next.top > span.cruise {
+                if below(span.cruise, next.top) {
                     return self.arrive(span, ahead);
                 }
             }
@@ -204,8 +204,8 @@ impl Governor {
     #[inline(never)]
     fn end_climb(&mut self, span: &Span) {
         self.wait = WAIT;
-        let crawl = 2.0 * self.limits.jerk * span.seconds * span.seconds;
-        if self.velocity <= crawl && self.clear.place <= self.here(span) + crawl {
+        let crawl = scaled(self.limits.jerk, 1) * span.seconds * span.seconds;
+        if !below(crawl, self.velocity) && !less(self.here(span) + crawl, self.clear.place) {
             // A stop is so near that it is not worth a ramp.
             return self.creep(span);
         }
@@ -213,7 +213,7 @@ impl Governor {
             let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
             let at = self.rising(self.alpha, self.velocity, top);
             let soon = self.potential(top * span.seconds);
-            if self.clear.distance - at > soon + soon {
+            if less(scaled(soon, 1), self.clear.distance - at) {
                 self.level_off(top);
             } else {
                 self.slow_for_clear(at);
@@ -232,7 +232,7 @@ impl Governor {
     fn arrive(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let cruise = span.cruise;
         let climb = self.limits.kappa * self.alpha * self.alpha;
-        if cruise - self.velocity < 0.98 * climb {
+        if less(cruise - self.velocity, 0.98 * climb) {
             // An override has lowered the feed.
             return self.slow_down(span, ahead);
         }
@@ -258,7 +258,7 @@ impl Governor {
     fn slow_down(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let (cruise, seconds) = (span.cruise, span.seconds);
         let near = self.limits.jerk * seconds * seconds;
-        if !some(self.alpha) && self.velocity - cruise <= near {
+        if !some(self.alpha) && !less(near, self.velocity - cruise) {
             let distance = 0.5 * (self.velocity + cruise) * seconds;
             self.velocity = cruise;
             self.add(seconds, distance);
@@ -280,7 +280,7 @@ impl Governor {
         let at = self.rising(self.alpha, self.velocity, top) + needed(top, low, self.limits.kappa);
         self.scan(&Ask::about(low, at, self.here(span)), ahead);
         self.changed = false;
-        if self.clear.distance >= at {
+        if !less(self.clear.distance, at) {
             self.lay(low, 0.0, true);
         } else {
             self.lay(0.0, 0.0, false);
@@ -339,7 +339,7 @@ impl Governor {
     #[inline(never)]
     fn bottom(&self) -> f32 {
         let bottom = self.velocity - self.limits.kappa * self.alpha * self.alpha;
-        if bottom > 0.2 * self.limits.jerk * (SEGMENT_S * SEGMENT_S) { bottom } else { 0.0 }
+        if less(0.2 * SEGMENT_S * SEGMENT_S * self.limits.jerk, bottom) { bottom } else { 0.0 }
     }
 
     /// Ends the deceleration, at the velocity `bottom`, if that is safe.
@@ -349,7 +349,7 @@ impl Governor {
         let at = -self.rising(self.alpha, self.velocity, bottom);
         let ask = Ask { level: self.velocity, ..Ask::about(bottom, at, self.here(span)) };
         self.scan(&ask, ahead);
-        let safe = self.clear.distance >= at;
+        let safe = !less(self.clear.distance, at);
         if safe {
             self.bottom_out(bottom);
         }
