@@ -67,17 +67,13 @@ impl Ahead for Queue<'_> {
     fn headroom(&self) -> f32 {
         0.0
     }
-    fn slower(&self, n: u8, velocity: f32) -> Option<(u8, Anchor)> {
+    fn slower(&self, n: u8, velocity: f32) -> (u8, Anchor) {
         self.asked.set(self.asked.get() + 1);
-        for at in usize::from(n).. {
-            let &(w, ahead) = self.constraints.get(at)?;
-            let firm = at + 1 == self.constraints.len();
-            if w < velocity || firm || at - usize::from(n) >= 16 {
-                let anchor = Anchor { velocity: w, ahead, soft: false, firm };
-                return Some((at as u8, anchor));
-            }
-        }
-        None
+        let last = self.constraints.len() - 1;
+        let slower = |at: &usize| *at == last || self.constraints[*at].0 < velocity;
+        let at = (usize::from(n)..last).find(slower).unwrap_or(last);
+        let (velocity, ahead) = self.constraints[at];
+        (at as u8, Anchor { velocity, ahead, firm: at == last })
     }
     fn end(&self) -> f32 {
         self.constraints[self.constraints.len() - 1].1
@@ -195,7 +191,11 @@ fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
             governor.stretch(left, block.cruise as f32, &ahead, SLICE as f32)
         };
         if trace {
-            println!("{clock:.5} {place:.5} block {at} left {left:.5} hold {hold} {stretch:?} asked {} ahead {:?}\n    {governor:?}", asked.get(), &ahead.constraints[..ahead.constraints.len().min(4)]);
+            println!(
+                "{clock:.5} {place:.5} block {at} left {left:.5} hold {hold} {stretch:?} asked {} ahead {:?}\n    {governor:?}",
+                asked.get(),
+                &ahead.constraints[..ahead.constraints.len().min(4)]
+            );
         }
         assert!(stretch.seconds > 0.0 && stretch.seconds.is_finite(), "{stretch:?} {governor:?}");
         assert!(stretch.distance >= 0.0, "{stretch:?} {governor:?}");
@@ -344,7 +344,11 @@ fn lone_moves_take_little_longer_than_the_optimum() {
             let path = Path { accel: 500.0, jerk, blocks, queue: 64, holds: false };
             let out = run(&path, &mut Dice::new(1), false);
             let best = rest_to_rest(length, 100.0, 500.0, jerk);
-            println!("{length} mm, jerk {jerk}: {:.4} s, {:.3} of the optimum", out.seconds, out.seconds / best);
+            println!(
+                "{length} mm, jerk {jerk}: {:.4} s, {:.3} of the optimum",
+                out.seconds,
+                out.seconds / best
+            );
             assert!(out.seconds <= best * most + SLICE, "{} s, not {best}", out.seconds);
         }
     }

@@ -27,7 +27,7 @@
 //! A scan looks at no more than [`EXACT`] constraints exactly, each slower than all before it: whoever is down to one of them may
 //! keep that velocity past all that are no slower. One more answers for all that follow, by its key: keys rise, and `(u + k)^2 <= key`
 //! is enough for any of them. So the work has a bound, whatever is queued: 2,500 cycles on AVR for each of these, and
-//! 150 for each constraint passed over, [`WALK`](super::source::WALK) at most.
+//! 25 for each constraint that is passed over.
 
 use super::float::{below, greater, least, less, lesser, scaled, some};
 use super::governor::Governor;
@@ -39,15 +39,15 @@ use crate::math::sqrt;
 pub trait Ahead {
     /// The square of the velocity at the block's end without a jerk limit.
     fn headroom(&self) -> f32;
-    /// The first constraint from the `n`th on that is slower than `velocity` or the last, or the one at which the search was
-    /// given up; with its number.
-    fn slower(&self, n: u8, velocity: f32) -> Option<(u8, Anchor)>;
+    /// The first constraint from the `n`th on that is slower than `velocity`, or firm: nothing beyond that counts. With its
+    /// number.
+    fn slower(&self, n: u8, velocity: f32) -> (u8, Anchor);
     /// Brake potential from the end of the block to that of the queue.
     fn end(&self) -> f32;
 }
 
 /// Constraints that a scan looks at exactly.
-pub const EXACT: u8 = 4;
+pub const EXACT: u8 = 3;
 
 /// Constraints behind the machine that a scan passes over.
 const PASSED: u8 = 4;
@@ -66,6 +66,9 @@ pub(super) struct Clear {
     pub target: f32,
     /// which is kept from here on.
     pub place: f32,
+    /// `(top + k)^2` and `(target + k)^2`: more than it takes to come down from there to any velocity.
+    high: f32,
+    low: f32,
     /// From the target on nothing else is too near.
     pub closed: bool,
     /// Slices since: what has been driven is subtracted in floats, so it gets less exact.
@@ -77,8 +80,16 @@ const AGE_MOST: u8 = 64;
 
 impl Clear {
     /// Nothing is known.
-    pub const NONE: Self =
-        Self { top: -1.0, distance: 0.0, target: 0.0, place: 0.0, closed: true, age: 0 };
+    pub const NONE: Self = Self {
+        top: -1.0,
+        distance: 0.0,
+        target: 0.0,
+        place: 0.0,
+        high: 0.0,
+        low: 0.0,
+        closed: true,
+        age: 0,
+    };
 }
 
 /// Velocities to try, fastest first, and where each of them would be reached.
@@ -112,6 +123,10 @@ pub(super) fn needed(u: f32, w: f32, kappa: f32) -> f32 {
     sum * if below(drop, twice) { sqrt(scaled(kappa * drop, 3)) } else { drop + twice }
 }
 
+fn square(x: f32) -> f32 {
+    x * x
+}
+
 impl Governor {
     /// Finds the fastest of the velocities that is safe, and how long it is; the last of them is taken whatever is ahead.
     /// Returns its number.
@@ -131,18 +146,29 @@ impl Governor {
     fn try_top(&mut self, ask: &Ask, n: u8, budget: &mut u8, ahead: &impl Ahead) -> bool {
         let n = usize::from(n);
         let (Some(&top), Some(&at)) = (ask.tops.get(n), ask.at.get(n)) else { return true };
-        self.clear =
-            Clear { top, distance: f32::MAX, target: top, place: f32::MAX, closed: true, age: 0 };
+        let high = square(top + self.limits.kappa);
+        let none = f32::MAX;
+        self.clear = Clear {
+            top,
+            distance: none,
+            target: top,
+            place: none,
+            high,
+            low: high,
+            closed: true,
+            age: 0,
+        };
         let (mut next, mut passed) = (0, 0);
         let mut low = greater(top, ask.level);
-        while let Some((found, anchor)) = ahead.slower(next, low) {
+        loop {
+            let (found, anchor) = ahead.slower(next, low);
             let place = anchor.ahead + ask.here;
             next = found + 1;
             if !anchor.firm && self.is_here(place) && passed < PASSED {
                 passed += 1;
                 continue;
             }
-            if *budget == 0 || !anchor.firm && !below(anchor.velocity, low) {
+            if *budget == 0 {
                 self.look_no_further(&anchor, place, ahead.end() + ask.here);
                 return !less(self.clear.distance, at);
             }
@@ -157,7 +183,6 @@ impl Governor {
             }
             low = anchor.velocity;
         }
-        true
     }
 
     /// A constraint to `velocity`, slower than those before it, at `place`, for a top that is reached `at` whatever is ahead.
@@ -180,27 +205,24 @@ impl Governor {
         }
         if nearer || self.is_close(low, place) {
             (self.clear.target, self.clear.place) = (low, place);
+            self.clear.low = square(low + kappa);
         }
     }
 
     /// Whether a constraint is too near to be slowed down for from the target.
     fn is_close(&self, low: f32, place: f32) -> bool {
-        let Clear { target, place: from, .. } = self.clear;
+        let Clear { target, place: from, low: enough, .. } = self.clear;
         let distance = place - from;
-        let kappa = self.limits.kappa;
-        // Plainly enough for any velocity, or what there is.
-        let high = target + kappa;
-        less(distance, high * high)
+        less(distance, enough)
             && below(low, target)
-            && less(distance * ROUNDING, needed(target, low, kappa))
+            && less(distance * ROUNDING, needed(target, low, self.limits.kappa))
     }
 
     /// Nothing beyond `place` makes a difference: even the lowest key there would not.
     #[inline(never)]
     fn is_out_of_reach(&self, place: f32) -> bool {
         let clear = &self.clear;
-        let (high, low) = (clear.top + self.limits.kappa, clear.target + self.limits.kappa);
-        !less(place - high * high, clear.distance) && !less(place - clear.place, low * low)
+        !less(place - clear.high, clear.distance) && !less(place - clear.place, clear.low)
     }
 
     /// A constraint that stands for all that follow: what its key says of them, and that of the end of the queue.
@@ -209,12 +231,10 @@ impl Governor {
         let kappa = self.limits.kappa;
         let key = lesser(horizon::key(anchor.velocity, kappa) + place, kappa * kappa + end);
         let clear = &mut self.clear;
-        let low = clear.target + kappa;
-        if less(clear.place, place) && !less((key - clear.place) * ROUNDING, low * low) {
+        if less(clear.place, place) && !less((key - clear.place) * ROUNDING, clear.low) {
             return;
         }
-        let high = clear.top + kappa;
-        clear.distance = lesser(clear.distance, key - high * high);
+        clear.distance = lesser(clear.distance, key - clear.high);
         (clear.target, clear.closed) = (0.0, false);
     }
 

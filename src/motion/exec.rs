@@ -112,7 +112,7 @@ impl Ahead for View<'_> {
     fn headroom(&self) -> f32 {
         self.headroom
     }
-    fn slower(&self, n: u8, velocity: f32) -> Option<(u8, Anchor)> {
+    fn slower(&self, n: u8, velocity: f32) -> (u8, Anchor) {
         self.blocks.slower(n, velocity)
     }
     fn end(&self) -> f32 {

@@ -19,6 +19,7 @@ use super::constraint::Clear;
 use super::float::{greater, some};
 use super::horizon::kappa;
 use super::ramp::{Phase, Ramp};
+use super::rise::MARGIN_FIRST;
 use super::slice::Rest;
 use crate::math::sqrt;
 
@@ -87,6 +88,8 @@ pub struct Governor {
     pub(super) wait: u8,
     /// Slices by which the next scan looks further than it has to.
     pub(super) margin: u8,
+    /// A scan has not found what it asked for: the acceleration is about to end.
+    pub(super) closing: bool,
     /// Counts slices of a ramp.
     pub(super) turn: u8,
     /// An override has changed feeds, ever: a limit that a feed makes may be too near to be kept.
@@ -107,7 +110,8 @@ impl Governor {
             halting: false,
             scanned: false,
             wait: 0,
-            margin: 0,
+            margin: MARGIN_FIRST,
+            closing: false,
             turn: 0,
             late: false,
         }
@@ -135,7 +139,7 @@ impl Governor {
         self.clear = Clear::NONE;
         self.ramp = None;
         self.halting = false;
-        (self.wait, self.margin) = (0, 0);
+        (self.wait, self.margin, self.closing) = (0, MARGIN_FIRST, false);
     }
 
     /// A block with these limits begins, mm/s^2 and mm/s^3. If they are others than before, it goes on with
@@ -151,7 +155,7 @@ impl Governor {
         self.leave_ramp();
         self.halting = false;
         self.clear = Clear::NONE;
-        (self.wait, self.margin) = (0, 0);
+        (self.wait, self.margin, self.closing) = (0, MARGIN_FIRST, false);
         let (mut pace, mut build) = (0.0, 0.0);
         let mut alpha = 0.0;
         if some(jerk) {

@@ -74,8 +74,8 @@ mod tests {
         fn headroom(&self) -> f32 {
             0.0
         }
-        fn slower(&self, n: u8, _: f32) -> Option<(u8, Anchor)> {
-            (n == 0).then_some((0, Anchor { velocity: 0.0, ahead: 0.0, soft: false, firm: true }))
+        fn slower(&self, _: u8, _: f32) -> (u8, Anchor) {
+            (0, Anchor { velocity: 0.0, ahead: 0.0, firm: true })
         }
         fn end(&self) -> f32 {
             0.0

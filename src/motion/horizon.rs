@@ -51,7 +51,7 @@
 use super::block::Line;
 use super::factors::Factors;
 use super::float::{OCTAVE, least, lesser, log, scaled, some};
-use super::queue::BLOCKS;
+use super::queue::{BLOCKS, FIRM};
 use super::short::Short;
 
 /// Half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`,
@@ -109,6 +109,8 @@ impl Line {
 pub struct Horizon {
     /// Sequence numbers of blocks with rising keys: a ring.
     seqs: [u8; BLOCKS],
+    /// The velocity at which each of them may be entered, with the factors that keys are for.
+    entries: [Short; BLOCKS],
     front: u8,
     len: u8,
     /// Potential at the end of the newest block.
@@ -131,6 +133,7 @@ impl Horizon {
         let (wanted, planned) = (none, none);
         Self {
             seqs: [0; BLOCKS],
+            entries: [Short::ZERO; BLOCKS],
             front: 0,
             len: 0,
             end: 0.0,
@@ -147,21 +150,50 @@ impl Horizon {
         (n < self.len).then(|| self.seqs[self.slot(n)])
     }
 
-    /// The block with the last key.
-    pub fn last(&self) -> Option<u8> {
-        self.nth(self.len.wrapping_sub(1))
+    /// The block with the last key but `back`.
+    pub fn nth_last(&self, back: u8) -> Option<u8> {
+        self.nth(self.len.checked_sub(back)?.wrapping_sub(1))
     }
 
-    /// Drops the last key.
-    pub fn drop_last(&mut self) {
-        self.len = self.len.saturating_sub(1);
+    /// Drops the last `count` keys, as many as there are.
+    pub fn drop_last(&mut self, count: u8) {
+        self.len = self.len.saturating_sub(count);
     }
 
-    /// Adds a block whose key is above all others.
-    pub fn add(&mut self, seq: u8) {
+    /// The velocity of the `n`th key.
+    #[inline]
+    pub fn entry(&self, n: u8) -> f32 {
+        self.entries[self.slot(n)].get()
+    }
+
+    /// The first key from the `n`th on that is slower than `velocity`, or firm, or one more than the last. Cost: 100, and 25 for
+    /// each that is passed over.
+    #[inline(never)]
+    pub fn slower(&self, n: u8, velocity: f32) -> u8 {
+        // What is below this is slower.
+        let limit = Short::above(velocity);
+        let mut slot = self.slot(n);
+        for n in n..self.len {
+            let (Some(seq), Some(entry)) = (self.seqs.get(slot), self.entries.get(slot)) else {
+                return n;
+            };
+            if seq & FIRM != 0 || *entry < limit {
+                return n;
+            }
+            slot += 1;
+            if slot == BLOCKS {
+                slot = 0;
+            }
+        }
+        self.len
+    }
+
+    /// Adds a block whose key is above all others, that may be entered at `entry`.
+    pub fn add(&mut self, seq: u8, entry: Short) {
         if usize::from(self.len) < BLOCKS {
             let slot = self.slot(self.len);
             self.seqs[slot] = seq;
+            self.entries[slot] = entry;
             self.len += 1;
         }
     }

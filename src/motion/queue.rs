@@ -189,7 +189,8 @@ impl BlockQueue {
         let fill = |slot: &mut MaybeUninit<Block>| {
             slot.write(Block::new(Body::Line(*line), number));
         };
-        self.put(fill, key, |horizon| horizon.end = end)
+        let entry = Short::new(lesser(line.entry.get(), cruise));
+        self.put(fill, key.map(|(key, firm)| (key, firm, entry)), |horizon| horizon.end = end)
     }
 
     /// Potential at the end of the queue.
@@ -290,20 +291,18 @@ impl BlockQueue {
     fn put(
         &mut self,
         fill: impl FnOnce(&mut MaybeUninit<Block>),
-        key: Option<(f32, u8)>,
+        key: Option<(f32, u8, Short)>,
         end: impl FnOnce(&mut Horizon),
     ) -> bool {
         let Some(slot) = self.ring.vacant().first_mut() else { return false };
         fill(slot);
         let seq = self.newest.wrapping_add(1) & SEQ;
+        let needless = key.map_or(0, |(key, ..)| self.needless(key));
         exec::lock(|ceiling| {
             self.store.with_horizon(ceiling, |horizon| {
-                if let Some((key, firm)) = key {
-                    let needless = |last| last & FIRM == 0 && self.key(last) >= key;
-                    while horizon.last().is_some_and(needless) {
-                        horizon.drop_last();
-                    }
-                    horizon.add(seq | firm);
+                if let Some((_, firm, entry)) = key {
+                    horizon.drop_last(needless);
+                    horizon.add(seq | firm, entry);
                 }
                 end(horizon);
                 horizon.version = horizon.version.wrapping_add(1);
@@ -313,6 +312,23 @@ impl BlockQueue {
         });
         self.newest = seq;
         true
+    }
+
+    /// How many of the last keys a lower one makes needless. Exec goes on meanwhile, which only passes the first ones: it
+    /// must not wait for the mathematics of a whole queue.
+    #[inline(never)]
+    fn needless(&self, key: f32) -> u8 {
+        let mut count = 0;
+        loop {
+            let last = exec::lock(|ceiling| {
+                self.store.with_horizon(ceiling, |horizon| horizon.nth_last(count))
+            });
+            let needless = |last| last & FIRM == 0 && self.key(last) >= key;
+            if !last.is_some_and(needless) {
+                return count;
+            }
+            count += 1;
+        }
     }
 
     fn key(&self, seq: u8) -> f32 {

@@ -9,6 +9,7 @@
 
 use super::float::{below, greater, less, scaled};
 use super::governor::{Governor, same};
+use super::rise::MARGIN_FIRST;
 use crate::math::sqrt;
 
 /// What is left of a ramp.
@@ -124,7 +125,9 @@ impl Governor {
     #[inline(never)]
     pub(super) fn leave_ramp(&mut self) {
         if let Some(ramp) = self.ramp.take() {
-            self.alpha = greater(ramp.acceleration() / self.limits.accel, -1.0);
+            let alpha = greater(ramp.acceleration() / self.limits.accel, -1.0);
+            // What rounding leaves is no acceleration that could be ended.
+            self.alpha = if less(alpha, 1e-4) && less(-1e-4, alpha) { 0.0 } else { alpha };
         }
     }
 
@@ -223,7 +226,7 @@ impl Governor {
             (time, distance) = (ramp.time, ramp.distance);
             (self.velocity, self.alpha) = (ramp.velocity, 0.0);
             self.ramp = None;
-            self.wait = 0;
+            (self.wait, self.margin, self.closing) = (0, MARGIN_FIRST, false);
         } else {
             let (velocity, left) = ramp.at(next);
             (time, distance) = (seconds, ramp.distance - left);

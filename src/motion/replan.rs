@@ -167,11 +167,10 @@ impl BlockQueue {
                     if back + 1 == used && first.is_none_or(|first| first & SEQ != seq) {
                         continue;
                     }
-                    let firm = match (line(self.ring.pushed(back)), self.before(back)) {
-                        (Some(this), Some(before)) => is_firm(this, before),
-                        _ => false,
-                    };
-                    horizon.add(if firm { seq | FIRM } else { seq });
+                    let Some(this) = line(self.ring.pushed(back)) else { continue };
+                    let firm = self.before(back).is_some_and(|before| is_firm(this, before));
+                    let entry = Short::new(this.entry(&self.factors));
+                    horizon.add(if firm { seq | FIRM } else { seq }, entry);
                 }
                 horizon.planned = self.factors;
                 horizon.changed = true;

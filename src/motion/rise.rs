@@ -30,7 +30,10 @@ use super::slice::Span;
 /// Slices before it tries again to go faster, when it could not.
 const WAIT: u8 = 8;
 
-/// Most slices by which a scan looks further than it has to.
+/// Slices by which the first scan of an acceleration looks further than it has to.
+pub(super) const MARGIN_FIRST: u8 = 3;
+
+/// Most of them.
 const MARGIN: u8 = 15;
 
 /// A state that could be next.
@@ -195,15 +198,26 @@ impl Governor {
             here: self.here(span),
         };
         let found = self.scan(&ask, ahead);
-        self.margin = if found == ask.first { (2 * self.margin + 1).min(MARGIN) } else { 0 };
+        self.adjust_margin(found == ask.first);
         self.changed = false;
         found != LOWEST
+    }
+
+    /// How far the next scan looks: further and further, until it does not find what it asks for; then half as far each time.
+    fn adjust_margin(&mut self, found: bool) {
+        if found && !self.closing {
+            self.margin = (2 * self.margin + 1).min(MARGIN);
+        } else {
+            self.closing = true;
+            self.margin /= 2;
+        }
     }
 
     /// It goes no faster: the acceleration ends, and if it is time, a ramp goes down. `clear` is for the state.
     #[inline(never)]
     fn end_climb(&mut self, span: &Span) {
         self.wait = WAIT;
+        (self.margin, self.closing) = (MARGIN_FIRST, false);
         let crawl = scaled(self.limits.jerk, 1) * span.seconds * span.seconds;
         if !below(crawl, self.velocity) && !less(self.here(span) + crawl, self.clear.place) {
             // A stop is so near that it is not worth a ramp.
@@ -259,10 +273,8 @@ impl Governor {
         let (cruise, seconds) = (span.cruise, span.seconds);
         let near = self.limits.jerk * seconds * seconds;
         if !some(self.alpha) && !less(near, self.velocity - cruise) {
-            let distance = 0.5 * (self.velocity + cruise) * seconds;
             self.velocity = cruise;
-            self.add(seconds, distance);
-            return true;
+            return self.keep(span, ahead);
         }
         if self.scanned {
             return false;

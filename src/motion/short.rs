@@ -12,6 +12,12 @@ impl Short {
         if bits >> 31 != 0 { Short(0) } else { Short((bits >> 15) as u16) }
     }
 
+    /// The least that is no less than a number that is not negative. Cost: 20.
+    #[inline]
+    pub fn above(x: f32) -> Self {
+        Short(((x.to_bits() + 0x7FFF) >> 15) as u16)
+    }
+
     /// Zero.
     pub const ZERO: Self = Short(0);
 
@@ -33,5 +39,9 @@ mod tests {
             assert!(short <= x && short >= x * 0.996, "{x} became {short}");
         }
         assert_eq!(Short::new(-3.0).get(), 0.0);
+        for x in [0.0, 1e-6, 0.3, 1.0, 499.99, 500.0, 7.3e9] {
+            let (low, high) = (Short::new(x), Short::above(x));
+            assert!(high.get() >= x && (low < high) == (low.get() < x), "{x}");
+        }
     }
 }

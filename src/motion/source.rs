@@ -8,13 +8,10 @@ use core::cell::Cell;
 
 use super::block::{Block, Body, Line};
 use super::factors::Factors;
-use super::float::{below, lesser};
+use super::float::lesser;
 use super::horizon::Horizon;
 use super::queue::{BLOCKS, BlockStore, FIRM, SEQ};
 use crate::hal::ring::Consumer;
-
-/// Constraints that a search for a slower one passes over.
-pub(super) const WALK: u8 = 16;
 
 /// A limit ahead of exec.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,8 +20,6 @@ pub struct Anchor {
     pub velocity: f32,
     /// Brake potential from the end of the oldest block to there.
     pub ahead: f32,
-    /// It is due to a feed, which an override may have lowered too late, and not to a corner.
-    pub soft: bool,
     /// Limits change there: what comes after is for the line that begins there.
     pub firm: bool,
 }
@@ -127,37 +122,17 @@ impl BlockSource {
         key - self.end()
     }
 
-    /// The `n`th limit ahead, nearest first, seen from the end of the oldest block. The last is the
-    /// end of the queue. Cost: 350, and 1,500 more the first time after a change.
-    pub fn anchor(&self, n: u8) -> Option<Anchor> {
+    /// The first constraint ahead from the `n`th on that is slower than `velocity`, or firm; with its number. The last is the
+    /// end of the queue. Cost: 450, 25 for each that is passed over, and 1,500 more the first time after a change.
+    pub fn slower(&self, n: u8, velocity: f32) -> (u8, Anchor) {
         let horizon = self.horizon();
-        let Some(seq) = horizon.nth(n) else {
-            let last = n == 0 || horizon.nth(n - 1).is_some();
-            let ahead = horizon.end - self.end();
-            return last.then_some(Anchor { velocity: 0.0, ahead, soft: false, firm: true });
+        let found = horizon.slower(n, velocity);
+        let Some(seq) = horizon.nth(found) else {
+            return (found, Anchor { velocity: 0.0, ahead: self.end_of_queue(), firm: true });
         };
-        let firm = seq & FIRM != 0;
-        let factors = horizon.factors();
-        let (velocity, corner, start) =
-            self.line(seq, |line| (line.entry(&factors), line.entry.get(), line.start))?;
-        let soft = below(velocity, corner);
-        Some(Anchor { velocity, ahead: start - self.end(), soft, firm })
-    }
-
-    /// The first constraint from the `n`th on that is slower than `velocity` or firm, or the one after [`WALK`] others that are
-    /// not; with its number. Cost: as `anchor`, and 150 for each that is passed over.
-    pub fn slower(&self, n: u8, velocity: f32) -> Option<(u8, Anchor)> {
-        let horizon = self.horizon();
-        let factors = horizon.factors();
-        let mut found = n;
-        while let Some(seq) = horizon.nth(found)
-            && found - n < WALK
-            && seq & FIRM == 0
-            && self.line(seq, |line| below(line.entry(&factors), velocity)) == Some(false)
-        {
-            found += 1;
-        }
-        Some((found, self.anchor(found)?))
+        let start = self.line(seq, |line| line.start).unwrap_or(horizon.end);
+        let (velocity, firm) = (horizon.entry(found), seq & FIRM != 0);
+        (found, Anchor { velocity, ahead: start - self.end(), firm })
     }
 
     /// Potential from the end of the oldest block to the end of the queue.

@@ -2,7 +2,7 @@
 //!
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
 //! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
-//! milliseconds ([`enough`]), 4,000 to 14,000 cycles each; the rest one by one, when one is used up or thread mode
+//! milliseconds ([`WAITING_LEAST`]), 4,000 to 14,000 cycles each; the rest one by one, when one is used up or thread mode
 //! has nothing else to do: a line that has come is answered meanwhile.
 
 use crate::alarm::Alarm;
@@ -36,15 +36,15 @@ pub fn run(
     async move {
         let mut machine = Exec::new();
         let mut segment = Segment::default();
-        let (mut most, mut rests, mut count) = (1u8, true, 0u8);
+        let (mut waiting, mut rests) = (Waiting::new(), true);
         let mut finished = Finished::new();
         loop {
             exec::wait(|| {
                 health::answer(Sign::Exec);
-                (segments.used() < most.into() || stepper::is_stopped()).then_some(())
+                (waiting.has_room(segments.used(), rests) || stepper::is_stopped()).then_some(())
             })
             .await;
-            let waiting = blocks.len();
+            let queued = blocks.len();
             let rested = rests;
             let standstill = !stepper::running();
             if contact::is_noted() {
@@ -97,8 +97,8 @@ pub fn run(
             if step == Step::Segment {
                 // There is room: this task alone fills the ring.
                 let _ = segments.push_copy(&segment);
-                count = count.wrapping_add(1);
-                health::moves(count);
+                waiting.push(u32::from(segment.ticks) * u32::from(segment.period));
+                health::moves(waiting.count);
                 machine.set_coarse(event::pass_over() > PATIENCE);
                 if contact::is_noted() {
                     contact::pushed(&segment);
@@ -107,14 +107,13 @@ pub fn run(
                     health::look_for_starvation();
                 }
                 stepper::go();
-                let cycles = u32::from(segment.ticks) * u32::from(segment.period);
-                most = queued(cycles, rests);
-                if (enough(cycles)..most).contains(&(segments.used() as u8)) {
+                let used = segments.used();
+                if waiting.has_room(used, rests) && waiting.sum(used) >= WAITING_LEAST {
                     exec::pend_when_idle();
                     exec_asked_again().await;
                 }
             }
-            if blocks.len() != waiting {
+            if blocks.len() != queued {
                 flags::set(Event::BlockDone);
             }
             if step == Step::Held && hold::passes() {
@@ -129,25 +128,70 @@ pub fn run(
     }
 }
 
-/// How many segments are queued at a time if the last took so many CPU cycles: what is queued cannot be
-/// slowed down any more. With the one that runs they take 9 ms at most; unless it `rests` at the end of each,
-/// as blocks do that come late: then a hold has no speed to take away.
-#[inline(always)]
-fn queued(cycles: u32, rests: bool) -> u8 {
-    match cycles {
-        _ if cycles <= tenths(9) => SEGMENTS as u8 - 1,
-        _ if cycles <= tenths(12) => 6,
-        _ if rests => 4,
-        _ if cycles <= tenths(21) => 3,
-        _ if cycles <= tenths(29) => 2,
-        _ => 1,
-    }
+/// How long the segments last that wait in the ring, in units of 2^11 CPU cycles.
+struct Waiting {
+    /// Those of the last segments, the newest at `count - 1`, modulo their number.
+    lengths: [u8; SEGMENTS],
+    /// Segments queued, modulo 256.
+    count: u8,
+    /// How many wait, as far as that is known, and how long they take together.
+    used: u8,
+    sum: u16,
 }
 
-/// How many segments are queued in one go if the last took so many CPU cycles: 2 ms beside the one that runs.
-#[inline(always)]
-fn enough(cycles: u32) -> u8 {
-    if cycles <= tenths(10) { 3 } else { 2 }
+/// The unit: shifts are cheaper than divisions.
+const UNIT_LOG2: u8 = 11;
+
+/// Units in so many tenths of a millisecond.
+const fn units(tenths: u32) -> u16 {
+    (ACTIVE.clock_hz / 10_000 * tenths >> UNIT_LOG2) as u16
+}
+
+/// What may wait: with the segment that runs, which takes 2 ms or less while anything is fast, and exec's own time, a feedhold
+/// begins within 10 ms.
+const WAITING_MOST: u16 = units(70);
+
+/// What is prepared before thread mode gets a turn.
+const WAITING_LEAST: u16 = units(30);
+
+impl Waiting {
+    const fn new() -> Self {
+        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0 }
+    }
+
+    /// The length of the segment that was queued so many before the next one.
+    fn length(&self, back: u8) -> u16 {
+        let at = usize::from(self.count.wrapping_sub(back)) % SEGMENTS;
+        self.lengths.get(at).copied().unwrap_or_default().into()
+    }
+
+    /// A segment of so many CPU cycles has been queued.
+    fn push(&mut self, cycles: u32) {
+        let units = cycles >> UNIT_LOG2;
+        let length = if units > 0xFF { 0xFF } else { units as u8 };
+        if let Some(place) = self.lengths.get_mut(usize::from(self.count) % SEGMENTS) {
+            *place = length;
+        }
+        self.count = self.count.wrapping_add(1);
+        self.used = self.used.wrapping_add(1);
+        self.sum += u16::from(length);
+    }
+
+    /// How long the `used` segments take that wait.
+    fn sum(&mut self, used: usize) -> u16 {
+        while usize::from(self.used) > used {
+            self.sum -= self.length(self.used);
+            self.used -= 1;
+        }
+        self.sum
+    }
+
+    /// Whether another one like the last may wait: what is queued cannot be slowed down any more. Unless the machine `rests` at
+    /// the end of each, as blocks do that come late: then a hold has no speed to take away.
+    fn has_room(&mut self, used: usize, rests: bool) -> bool {
+        let sum = self.sum(used) + self.length(1);
+        used == 0 || used < SEGMENTS - 1 && (sum <= WAITING_MOST || rests && used < 4)
+    }
 }
 
 /// Waits for the next time exec is pended.

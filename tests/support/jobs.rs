@@ -194,7 +194,7 @@ pub fn plan_changed(
             fn headroom(&self) -> f32 {
                 self.0
             }
-            fn slower(&self, n: u8, velocity: f32) -> Option<(u8, Anchor)> {
+            fn slower(&self, n: u8, velocity: f32) -> (u8, Anchor) {
                 self.1.slower(n, velocity)
             }
             fn end(&self) -> f32 {
@@ -233,6 +233,14 @@ pub fn plan_changed(
             before,
             after: governor.velocity().into(),
         });
+        if std::env::var_os("KERF_TRACE").is_some() {
+            println!(
+                "{:?}\n   {governor:?} ahead {:?} end {}",
+                planned.last(),
+                view.slower(0, 1e9),
+                view.end()
+            );
+        }
         assert!(planned.len() < 1_000_000, "does not come to an end: {:?}", planned.last());
         if stretch.ends {
             running = None;

@@ -5,7 +5,7 @@ use anyhow::Result;
 use super::Figure;
 use super::jitter;
 use super::spirals::{lines_per_second, spiral};
-use super::workload::{Bed, LOW_JERK, FAST_BAUD, How, USUAL_JERK, arcs, braid, straight};
+use super::workload::{Bed, FAST_BAUD, How, LOW_JERK, USUAL_JERK, arcs, braid, straight};
 use crate::machine::Machine;
 use crate::report::Report;
 use crate::stopwatch::{Cost, Stopwatch};
