@@ -174,14 +174,15 @@ impl Governor {
             }
             *budget -= 1;
             let lowest = n >= usize::from(LOWEST);
-            self.take_in(anchor.velocity, place, if lowest { at } else { f32::MIN });
+            // A firm one may be faster than those before it.
+            low = least(anchor.velocity, low);
+            self.take_in(low, place, if lowest { at } else { f32::MIN });
             if !lowest && less(self.clear.distance, at) {
                 return false;
             }
             if anchor.firm || self.is_out_of_reach(place) {
                 return true;
             }
-            low = anchor.velocity;
         }
     }
 

@@ -193,7 +193,7 @@ impl Governor {
         if some(self.limits.jerk) {
             return self.smooth(left, cruise, ahead, seconds);
         }
-        if some(self.rest.seconds) {
+        if self.has_rest() {
             return self.cut(left);
         }
         self.trapezoid(left, cruise, ahead.headroom())

@@ -24,7 +24,7 @@ impl Governor {
     pub fn halt(&mut self, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
         if some(self.limits.jerk) {
             self.smooth_halt(left, nominal)
-        } else if some(self.rest.seconds) {
+        } else if self.has_rest() {
             self.cut(left)
         } else {
             self.halt_sharply(left, ahead.headroom(), nominal)

@@ -146,6 +146,14 @@ impl Governor {
         if some(self.velocity) { scaled(self.velocity, -13) } else { ROUNDING }
     }
 
+    /// Whether a part of a slice is left where there is no jerk limit any more. One that counts as none is dropped.
+    pub(super) fn has_rest(&mut self) -> bool {
+        if some(self.rest.seconds) && !less(self.little(), self.rest.distance) {
+            self.rest = Rest::NONE;
+        }
+        some(self.rest.seconds)
+    }
+
     /// A slice has been worked out.
     #[inline(always)]
     pub(super) fn add(&mut self, seconds: f32, distance: f32) {

@@ -22,11 +22,6 @@ use crate::tasks::{Never, alarm, hold, links, overrides, power, spindle};
 /// After so many segments without a turn of thread mode they become longer, which takes less of the CPU.
 const PATIENCE: u8 = 6;
 
-/// CPU cycles in so many tenths of a millisecond.
-const fn tenths(of_ms: u32) -> u32 {
-    ACTIVE.clock_hz / 10_000 * of_ms
-}
-
 /// The task.
 #[allow(clippy::manual_async_fn)] // See `tasks`.
 pub fn run(
@@ -180,7 +175,7 @@ impl Waiting {
     /// How long the `used` segments take that wait.
     fn sum(&mut self, used: usize) -> u16 {
         while usize::from(self.used) > used {
-            self.sum -= self.length(self.used);
+            self.sum = self.sum.saturating_sub(self.length(self.used));
             self.used -= 1;
         }
         self.sum

@@ -168,9 +168,13 @@ pub fn plan_changed(
     let mut step = |rig: &mut Rig| -> bool {
         let Some(block) = rig.source.oldest() else {
             assert!(running.is_none());
-            let jump = planned.last().map_or(0.0, |p| p.jerk) as f32 * SEGMENT_S * SEGMENT_S;
+            // What may be gone at once.
+            let jump = |p: &Planned| {
+                if p.jerk > 0.0 { 2.0 * p.jerk as f32 * SEGMENT_S } else { p.accel as f32 }
+            };
+            let most = 1e-3 + planned.last().map_or(0.0, jump) * SEGMENT_S;
             let velocity = governor.velocity();
-            assert!(velocity <= 1e-3 + 2.0 * jump, "the queue ends at {velocity}");
+            assert!(velocity <= most, "the queue ends at {velocity}");
             governor.stop();
             return false;
         };
@@ -233,14 +237,6 @@ pub fn plan_changed(
             before,
             after: governor.velocity().into(),
         });
-        if std::env::var_os("KERF_TRACE").is_some() {
-            println!(
-                "{:?}\n   {governor:?} ahead {:?} end {}",
-                planned.last(),
-                view.slower(0, 1e9),
-                view.end()
-            );
-        }
         assert!(planned.len() < 1_000_000, "does not come to an end: {:?}", planned.last());
         if stretch.ends {
             running = None;

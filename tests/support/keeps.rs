@@ -24,7 +24,7 @@ fn states(planned: &[Planned]) -> Vec<State> {
         let state = State { clock: p.after_clock, place: p.after_place, velocity: p.after, of };
         let last = states.last_mut().expect("it begins with one");
         // The rest of a slice is where it was, but for rounding.
-        if state.clock - last.clock > 2e-5 {
+        if state.clock - last.clock > 2e-6 {
             states.push(state);
         }
     }
@@ -42,11 +42,12 @@ pub fn check_limits(planned: &[Planned]) {
     for (n, p) in planned.iter().enumerate() {
         let mean = f64::from(p.stretch.distance) / f64::from(p.stretch.seconds);
         let change = p.accel * 0.5 * f64::from(p.stretch.seconds);
+        let jump = (p.jerk * STRETCH * STRETCH).min(p.accel * STRETCH);
         assert!(mean <= p.cruise * 1.0011 + change || p.stretch.distance < 1e-5, "{n}: {p:?}");
-        assert!(p.after <= p.cruise.max(p.before) * 1.0011, "{n}: {p:?}");
+        assert!(p.after <= p.cruise.max(p.before) * 1.0011 + jump, "{n}: {p:?}");
     }
     check_corners(planned, 1e-3);
-    check_changes(planned, 1e-3, 1.0, 1.0);
+    check_changes(planned, 1e-3, 1.0, 1.0, false);
 }
 
 /// At each corner it is no faster than the corner allows.
@@ -65,13 +66,16 @@ pub fn check_corners(planned: &[Planned], share: f64) {
         let part = ((a.clock - from.clock) / (to.clock - from.clock)).clamp(0.0, 1.0);
         let velocity = from.velocity + (to.velocity - from.velocity) * part;
         let jump = b.jerk.max(a.jerk).min(b.accel / STRETCH) * STRETCH * STRETCH;
-        let most = b.corner * 1.001 + little(planned, share) + jump;
+        // What rounding leaves, 0.5 um, is made at once.
+        let near = (4.5 * a.jerk.max(b.jerk) * 2.5e-7).cbrt();
+        let most = b.corner * 1.001 + little(planned, share) + jump + near;
         assert!(velocity <= most, "{n}: {velocity} of {most} mm/s at a corner, {b:?}");
     }
 }
 
-/// Changes of velocity and of acceleration: so many times as much as the limits allow.
-pub fn check_changes(planned: &[Planned], share: f64, accel: f64, jerk: f64) {
+/// Changes of velocity and of acceleration: so many times as much as the limits allow. `late`: an override may have lowered a
+/// velocity too late, which takes a slice more.
+pub fn check_changes(planned: &[Planned], share: f64, accel: f64, jerk: f64, late: bool) {
     let little = little(planned, share);
     let states = states(planned);
     let mut before: Option<(f64, f64, f64)> = None;
@@ -80,7 +84,10 @@ pub fn check_changes(planned: &[Planned], share: f64, accel: f64, jerk: f64) {
         let p = &planned[b.of];
         let (seconds, change) = (b.clock - a.clock, b.velocity - a.velocity);
         let jump = p.jerk * STRETCH * STRETCH;
-        let most = p.accel * seconds * 1.01 * accel + little + jump.min(p.accel * STRETCH);
+        // A slice may reach from a block with a jerk limit into one without.
+        let into = p.jerk == 0.0 && planned[a.of].jerk > 0.0;
+        let more = if late || into { p.accel * STRETCH } else { jump.min(p.accel * STRETCH) };
+        let most = p.accel * seconds * 1.01 * accel + little + more;
         assert!(change.abs() <= most, "{change} of {most} mm/s: {a:?} {b:?} {p:?}");
         let mean = (b.place - a.place) / seconds;
         let (low, high) = (a.velocity.min(b.velocity), a.velocity.max(b.velocity));
