@@ -97,8 +97,9 @@ impl Clear {
 pub(super) struct Ask {
     pub tops: [f32; 3],
     pub at: [f32; 3],
-    /// The first that is to be tried.
+    /// The first that is to be tried, and whether the middle one is.
     pub first: u8,
+    pub middle: bool,
     /// Constraints from this velocity on down must be behind where the top is reached.
     pub level: f32,
     /// Distance from the state to the end of the block.
@@ -111,7 +112,7 @@ pub(super) const LOWEST: u8 = 2;
 impl Ask {
     /// About one velocity, reached at `at`.
     pub fn about(velocity: f32, at: f32, here: f32) -> Self {
-        Self { tops: [velocity; 3], at: [at; 3], first: LOWEST, level: 0.0, here }
+        Self { tops: [velocity; 3], at: [at; 3], first: LOWEST, middle: false, level: 0.0, here }
     }
 }
 
@@ -136,7 +137,7 @@ impl Governor {
         let mut budget = EXACT;
         let mut n = ask.first;
         while !self.try_top(ask, n, &mut budget, ahead) && n < LOWEST {
-            n += 1;
+            n = if ask.middle { n + 1 } else { LOWEST };
         }
         n
     }

@@ -137,7 +137,7 @@ mod tests {
     fn a_stop_at_the_very_end_of_a_block_ends_it() {
         let mut governor = Governor::new();
         governor.begin(1_000.0, 0.0);
-        governor.state.velocity = 2.0;
+        governor.velocity = 2.0;
         let stretch = governor.halt(0.002, &Far, SEGMENT_S);
         assert!(stretch.ends && governor.is_at_rest(), "{stretch:?}");
     }

@@ -30,8 +30,9 @@ use super::slice::Span;
 /// Slices before it tries again to go faster, when it could not.
 const WAIT: u8 = 8;
 
-/// Slices by which the first scan of an acceleration looks further than it has to.
-pub(super) const MARGIN_FIRST: u8 = 3;
+/// Slices by which the first scan of an acceleration looks further than it has to. From a steady velocity it does not begin for
+/// less: where the queue is short, a velocity that is kept is better than one that goes up and down.
+pub(super) const MARGIN_FIRST: u8 = 4;
 
 /// Most of them.
 const MARGIN: u8 = 15;
@@ -193,6 +194,7 @@ impl Governor {
         let ask = Ask {
             tops: [far, next.top, top],
             at: [next.at, next.at, self.rising(self.alpha, self.velocity, top)],
+            middle: some(self.alpha) || !some(self.velocity),
             first: u8::from(self.margin == 0),
             level: 0.0,
             here: self.here(span),

@@ -94,7 +94,7 @@ pub fn run(
                 let _ = segments.push_copy(&segment);
                 waiting.push(u32::from(segment.ticks) * u32::from(segment.period));
                 health::moves(waiting.count);
-                machine.set_coarse(event::pass_over() > PATIENCE);
+                machine.set_coarse(event::pass_over() > PATIENCE || waiting.is_busy());
                 if contact::is_noted() {
                     contact::pushed(&segment);
                 }
@@ -103,9 +103,11 @@ pub fn run(
                 }
                 stepper::go();
                 let used = segments.used();
-                if waiting.has_room(used, rests) && waiting.sum(used) >= WAITING_LEAST {
+                if used >= 2 && waiting.sum(used) >= WAITING_LEAST && waiting.has_room(used, rests)
+                {
                     exec::pend_when_idle();
                     exec_asked_again().await;
+                    waiting.go_on(segments.used());
                 }
             }
             if blocks.len() != queued {
@@ -132,7 +134,12 @@ struct Waiting {
     /// How many wait, as far as that is known, and how long they take together.
     used: u8,
     sum: u16,
+    /// How many segments in a row were used up before thread mode was idle.
+    busy: u8,
 }
+
+/// So many of them say that the CPU has no time left.
+const BUSY: u8 = 8;
 
 /// The unit: shifts are cheaper than divisions.
 const UNIT_LOG2: u8 = 11;
@@ -151,7 +158,7 @@ const WAITING_LEAST: u16 = units(30);
 
 impl Waiting {
     const fn new() -> Self {
-        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0 }
+        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0, busy: 0 }
     }
 
     /// The length of the segment that was queued so many before the next one.
@@ -181,11 +188,25 @@ impl Waiting {
         self.sum
     }
 
+    /// Exec has waited for thread mode to be idle, and goes on: because it is, or because a segment has been used up.
+    fn go_on(&mut self, used: usize) {
+        let idle = usize::from(self.used) == used;
+        self.busy = if idle { 0 } else { self.busy.saturating_add(1) };
+    }
+
+    /// Whether the CPU has no time left: then segments are longer, which takes less of it.
+    fn is_busy(&self) -> bool {
+        self.busy >= BUSY
+    }
+
     /// Whether another one like the last may wait: what is queued cannot be slowed down any more. Unless the machine `rests` at
     /// the end of each, as blocks do that come late: then a hold has no speed to take away.
     fn has_room(&mut self, used: usize, rests: bool) -> bool {
+        if used < 2 {
+            return true;
+        }
         let sum = self.sum(used) + self.length(1);
-        used == 0 || used < SEGMENTS - 1 && (sum <= WAITING_MOST || rests && used < 4)
+        used < SEGMENTS - 1 && (sum <= WAITING_MOST || rests && used < 4)
     }
 }
 

@@ -50,13 +50,14 @@ pub fn check_limits(planned: &[Planned]) {
     check_changes(planned, 1e-3, 1.0, 1.0, false);
 }
 
-/// At each corner it is no faster than the corner allows.
+/// At each corner it is no faster than the corner allows. Corners of moves that are shorter than 1 um are not looked at.
 pub fn check_corners(planned: &[Planned], share: f64) {
     let states = states(planned);
     let mut at = 0;
     for (n, pair) in planned.windows(2).enumerate() {
         let [a, b] = pair else { unreachable!() };
-        if a.line == b.line {
+        // Moves of less than 1 um are a tenth of a step.
+        if a.line == b.line || a.length < 1e-3 || b.length < 1e-3 {
             continue;
         }
         while at + 2 < states.len() && states[at + 1].clock < a.clock {

@@ -82,7 +82,9 @@ fn search(
 /// The lowest mean rate of the motors in a move at `rate`, if that was held.
 fn held_at(bed: &Bed, motors: usize, rate: f64, jerk: Option<f64>) -> Result<Option<f64>> {
     let how = How { log: true, jerk, ..How::default() };
-    let (machine, report) = bed.try_run(&long_move(motors, rate), how, Vec::new())?;
+    // Under a jerk limit the acceleration along the path is that of the slowest axis, and builds up.
+    let times = if jerk.is_some() { 1.6 } else { 1.0 };
+    let (machine, report) = bed.try_run(&move_of(motors, rate, times), how, Vec::new())?;
     if !report.ok {
         return Ok(None);
     }
@@ -93,9 +95,14 @@ fn held_at(bed: &Bed, motors: usize, rate: f64, jerk: Option<f64>) -> Result<Opt
 
 /// A move of this many motors, all at `rate` steps/s, long enough for cruise at `ACCELERATION`.
 pub fn long_move(motors: usize, rate: f64) -> String {
+    move_of(motors, rate, 1.0)
+}
+
+/// Such a move with ramps `times` as long.
+fn move_of(motors: usize, rate: f64, times: f64) -> String {
     let velocity = rate / PER_MM;
     // The slowest axis sets the pace of an acceleration along the path.
-    let mm = (velocity * velocity / ACCELERATION + CRUISE_S * velocity).round();
+    let mm = (times * velocity * velocity / ACCELERATION + CRUISE_S * velocity).round();
     let z = mm * PER_MM / PER_MM_Z;
     let path = [mm, mm.hypot(mm), (2.0 * mm * mm + z * z).sqrt()];
     // A rotary axis has no part in the feed of a move of linear ones.
