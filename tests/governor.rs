@@ -135,7 +135,6 @@ impl Path {
 #[derive(Clone, Copy, Debug)]
 struct State {
     clock: f64,
-    place: f64,
     velocity: f64,
     /// The machine has stood still before it.
     restarted: bool,
@@ -162,7 +161,7 @@ fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
     let mut out = Outcome::default();
     let (mut at, mut left) = (0, path.blocks[0].length as f32);
     let mut end = path.queue.min(path.blocks.len());
-    let mut states = vec![State { clock: 0.0, place: 0.0, velocity: 0.0, restarted: true }];
+    let mut states = vec![State { clock: 0.0, velocity: 0.0, restarted: true }];
     let mut corners = Vec::new();
     let (mut clock, mut place, mut hold, mut stretches) = (0.0, 0.0, 0, 0);
     let (mut short, mut tiny) = (0.0, 0);
@@ -183,7 +182,7 @@ fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
         let stretch = if hold > 0 {
             if governor.is_at_rest() {
                 governor.stop();
-                states.push(State { clock, place, velocity: 0.0, restarted: true });
+                states.push(State { clock, velocity: 0.0, restarted: true });
                 continue;
             }
             governor.halt(left, &ahead, SLICE as f32)
@@ -213,10 +212,9 @@ fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
         place += f64::from(stretch.distance);
         stretches += 1;
         assert!(clock < 1e5 && stretches < 3_000_000, "it does not end: {governor:?} {left} {at}");
-        let (more, further) = governor.pending();
+        let (more, _) = governor.pending();
         let next = State {
             clock: clock + f64::from(more),
-            place: place + f64::from(further),
             velocity: governor.velocity().into(),
             restarted: false,
         };
@@ -258,7 +256,7 @@ fn check(
 ) {
     // What a slice makes unavoidable.
     let little = path.jerk * SLICE * SLICE * 1.01;
-    let mut worse = |value: f64, worst: &mut f64, what: &str, clock: f64| {
+    let worse = |value: f64, worst: &mut f64, what: &str, clock: f64| {
         if value > *worst {
             *worst = value;
             if trace {

@@ -220,7 +220,7 @@ impl Path {
         }
         let jerk = slowest.jerk.get();
         if !keeps(self.top, 0.0, jerk) {
-            self.slow_down(coarse(cube_root(jerk * span * span / scaled(sum, -28))));
+            self.slow_down(coarse(cube_root(0.9 * jerk * span * span / scaled(sum, -28))));
         }
     }
 

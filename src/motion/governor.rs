@@ -84,6 +84,8 @@ pub struct Governor {
     pub(super) halting: bool,
     /// What is ahead has been looked at for this stretch.
     pub(super) scanned: bool,
+    /// And for the last one.
+    pub(super) looked: bool,
     /// Slices until it is worth another try to go faster.
     pub(super) wait: u8,
     /// Slices by which the next scan looks further than it has to.
@@ -109,6 +111,7 @@ impl Governor {
             changed: false,
             halting: false,
             scanned: false,
+            looked: false,
             wait: 0,
             margin: MARGIN_FIRST,
             closing: false,

@@ -30,8 +30,7 @@ use super::slice::Span;
 /// Slices before it tries again to go faster, when it could not.
 const WAIT: u8 = 8;
 
-/// Slices by which the first scan of an acceleration looks further than it has to. From a steady velocity it does not begin for
-/// less: where the queue is short, a velocity that is kept is better than one that goes up and down.
+/// Slices by which the first scan of an acceleration looks further than it has to.
 pub(super) const MARGIN_FIRST: u8 = 4;
 
 /// Most of them.
@@ -174,6 +173,12 @@ impl Governor {
             if self.scanned {
                 return false;
             }
+            if self.is_pressed(span) {
+                let top = self.velocity + self.limits.kappa * alpha * alpha;
+                self.level_off(top);
+                self.follow(seconds);
+                return true;
+            }
             if !self.look_ahead(&next, span, ahead) {
                 self.end_climb(span);
                 return true;
@@ -182,6 +187,12 @@ impl Governor {
         (self.velocity, self.alpha) = (next.velocity, next.alpha);
         self.add(seconds, next.distance);
         true
+    }
+
+    /// Whether it has looked ahead for the last stretch as well, while the CPU has no time left: then an acceleration ends, which
+    /// is safe without another look.
+    fn is_pressed(&self, span: &Span) -> bool {
+        self.looked && some(self.alpha) && less(1.2 * SEGMENT_S, span.nominal)
     }
 
     /// Whether the next state is safe; looks further if that is worth while. If it is not safe, `clear` is for the
@@ -194,7 +205,8 @@ impl Governor {
         let ask = Ask {
             tops: [far, next.top, top],
             at: [next.at, next.at, self.rising(self.alpha, self.velocity, top)],
-            middle: some(self.alpha) || !some(self.velocity),
+            // Where the queue is short, a velocity that is kept is better than one that goes up and down by little.
+            middle: some(self.alpha) || less(self.velocity, scaled(far - self.velocity, 2)),
             first: u8::from(self.margin == 0),
             level: 0.0,
             here: self.here(span),

@@ -31,8 +31,9 @@ pub(super) struct Span {
     pub left: f32,
     /// Velocity limit.
     pub cruise: f32,
-    /// How long it is to be.
+    /// How long it is to be, and how long slices are now.
     pub seconds: f32,
+    pub nominal: f32,
 }
 
 /// At rest, a distance that rounding leaves: it takes no ramp of its own.
@@ -58,10 +59,10 @@ impl Governor {
             self.halting = false;
             self.leave_ramp();
         }
-        self.scanned = false;
+        self.looked = core::mem::replace(&mut self.scanned, false);
         for _ in 0..2 {
             let Some(seconds) = self.wanted(left, nominal) else { break };
-            let span = Span { left: left - self.rest.distance, cruise, seconds };
+            let span = Span { left: left - self.rest.distance, cruise, seconds, nominal };
             if !self.slice(&span, ahead) {
                 break;
             }

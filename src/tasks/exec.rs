@@ -146,7 +146,7 @@ const UNIT_LOG2: u8 = 11;
 
 /// Units in so many tenths of a millisecond.
 const fn units(tenths: u32) -> u16 {
-    (ACTIVE.clock_hz / 10_000 * tenths >> UNIT_LOG2) as u16
+    ((ACTIVE.clock_hz / 10_000 * tenths) >> UNIT_LOG2) as u16
 }
 
 /// What may wait: with the segment that runs, which takes 2 ms or less while anything is fast, and exec's own time, a feedhold

@@ -19,8 +19,8 @@ const QUEUE_PUSH: &str = "<kerf::motion::queue::BlockQueue>::push_line";
 
 /// The short moves: how many, how long (mm), at what feed (mm/min). 4,000 a second would do.
 const SHORT: (u32, f64, f64) = (3_000, 0.05, 12_000.0);
-/// An acceleration that is no limit to them, mm/s2.
-const NO_LIMIT: f64 = 20_000.0;
+/// An acceleration that is no limit to them, mm/s2; with more than that there would be a jerk limit.
+const NO_LIMIT: f64 = 4_500.0;
 
 /// Short moves taken in a second on a fast line.
 pub fn lines(bed: &Bed) -> Result<Figure> {

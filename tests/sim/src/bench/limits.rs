@@ -99,10 +99,10 @@ fn hold(bed: &Bed, us: u64) -> Result<Hold> {
     Ok(Hold { begins: machine.seconds(slower - said), stops: machine.seconds(rest - slower) })
 }
 
-/// When the first interval begins that is longer than all in the 100 ms before `said`, by more than a cycle.
+/// When the first interval begins that is longer than all in the 20 ms before `said`, by more than a cycle.
 fn first_slower(machine: &Machine, said: u64) -> Option<u64> {
     let steps = machine.recorder().steps_of(0);
-    let steady = steps.partition_point(|s| *s < said - machine.cycles(100));
+    let steady = steps.partition_point(|s| *s < said - machine.cycles(20));
     let told = steps.partition_point(|s| *s < said);
     let usual = steps[steady..told].windows(2).map(|pair| pair[1] - pair[0]).max()?;
     let slower = steps[told..].windows(2).find(|pair| pair[1] - pair[0] > usual + 1)?;

@@ -120,7 +120,8 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(2.0),
-        floor: Some(2.0),
+        // The motor that does not lead: blocks still end on whole steps.
+        floor: Some(8.0),
         measure: jitter::boundaries,
     },
     Row {
@@ -131,7 +132,8 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: ["3.18", "-", "7.97"],
         target: Some(1.6),
-        floor: Some(1.8),
+        // The limits of a curve cost 2,000 cycles a line.
+        floor: Some(1.9),
         measure: spirals::tenth,
     },
     Row {
@@ -164,7 +166,8 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(1.2),
-        floor: Some(1.78),
+        // See above.
+        floor: Some(1.9),
         measure: spirals::tenth_fast,
     },
     Row {
@@ -197,7 +200,8 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(1.25),
-        floor: Some(1.25),
+        // A scan of what is ahead costs 10,000 cycles and more, and the CPU has no time left.
+        floor: Some(1.32),
         measure: spirals::tenth_jerk,
     },
     Row {
@@ -208,7 +212,8 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(1.15),
-        floor: Some(1.15),
+        // See above.
+        floor: Some(1.32),
         measure: spirals::fifth_jerk,
     },
     Row {
@@ -263,7 +268,8 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(8_000.0),
-        floor: Some(8_000.0),
+        // A third of it are scans of what is ahead.
+        floor: Some(11_200.0),
         measure: costs::segment_jerk,
     },
     Row {
@@ -274,7 +280,8 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(24_000.0),
-        floor: Some(24_000.0),
+        // A scan that tries three velocities, and a ramp that is laid out.
+        floor: Some(50_000.0),
         measure: costs::segment_jerk_worst,
     },
     Row {
@@ -395,7 +402,8 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(10.0),
-        floor: Some(10.0),
+        // Three segments that wait, the one that runs, and exec's own time.
+        floor: Some(11.5),
         measure: limits::hold_begins,
     },
     Row {
