@@ -56,8 +56,9 @@ pub fn check_corners(planned: &[Planned], share: f64) {
     let mut at = 0;
     for (n, pair) in planned.windows(2).enumerate() {
         let [a, b] = pair else { unreachable!() };
-        // Moves of less than 1 um are a tenth of a step.
-        if a.line == b.line || a.length < 1e-3 || b.length < 1e-3 {
+        // Moves of less than 1 um are a tenth of a step. Where limits change, the corner is what the next line can stop from.
+        let others = (a.accel, a.jerk) != (b.accel, b.jerk);
+        if a.line == b.line || a.length < 1e-3 || b.length < 1e-3 || others {
             continue;
         }
         while at + 2 < states.len() && states[at + 1].clock < a.clock {
