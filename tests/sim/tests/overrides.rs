@@ -158,8 +158,8 @@ fn to_plan_a_queue_of_corners_anew_makes_no_segment_late() {
     }
     let replan = machine.stopwatches()[0].cost();
     println!("corners: {replan:?}");
-    // Measured: 127,000 cycles, 2,000 a key.
-    assert!(replan.count >= 10 && replan.max <= 140_000, "{replan:?}");
+    // Measured: 163,000 cycles, 2,500 a key with its velocity.
+    assert!(replan.count >= 10 && replan.max <= 175_000, "{replan:?}");
     // At a corner it takes up to 20,800 cycles from step to step: more would be a stop.
     let log = machine.recorder().log();
     let longest = log.windows(2).map(|pair| pair[1].cycle - pair[0].cycle).max().unwrap();

@@ -325,7 +325,8 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(0.0),
-        floor: Some(0.0),
+        // Spirals of 0.1 mm with holds and overrides, on a line that never rests.
+        floor: Some(4.0),
         measure: pauses::low,
     },
     Row {
@@ -403,7 +404,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(10.0),
         // Three segments that wait, the one that runs, and exec's own time.
-        floor: Some(11.5),
+        floor: Some(12.1),
         measure: limits::hold_begins,
     },
     Row {
