@@ -7,13 +7,14 @@ use kerf::units::{Length, PerAxis};
 /// An arc may have thousands of millions of chords: so many are looked at.
 const LOOKED_AT: u32 = 2_000;
 
-/// Walks along an arc: its chords lie on the circle, are as many as was said, and end at the end.
+/// Walks along an arc: the ends of its chords lie on the circle or as far outside as they may, are as many as was said, and end at the end.
 pub fn check(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc, tolerance: f32) {
     let chords = Chords::new(start, target, arc, tolerance);
     let total = chords.total();
     assert!(total > 0);
     assert!(chords.length() >= 0.0, "{} mm of {arc:?}", chords.length());
     let (inner, outer) = radii(start, target, arc);
+    let outer = outer + outside(outer, tolerance);
     let fits = is_within_reach(outer, arc);
     let mut last = (0, *start);
     for (n, point) in (1..=LOOKED_AT).zip(chords) {
@@ -34,6 +35,13 @@ fn radii(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> (f64, 
     let (inner, outer) = (from.min(to), from.max(to));
     let slack = 20.0 + outer * 1e-6;
     (inner - slack, outer + slack)
+}
+
+/// How far ends of chords lie outside of a circle, so that chords are on both sides of it: two thirds of what chords of this tolerance,
+/// or the shortest of 0.05 mm, or those of a seventh of a circle leave it by, or a little more.
+fn outside(radius: f64, tolerance: f32) -> f64 {
+    let units = f64::from(tolerance) * f64::from(Length::PER_MM);
+    units.max(500.0 * 500.0 / 8.0 / radius).min(0.1 * radius)
 }
 
 /// Whether the whole circle can be told in lengths: of one that cannot, the rest is cut off.
