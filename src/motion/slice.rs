@@ -147,7 +147,7 @@ impl Governor {
         if some(self.velocity) { scaled(self.velocity, -13) } else { ROUNDING }
     }
 
-    /// Whether a part of a slice is left where there is no jerk limit any more. One that counts as none is dropped.
+    /// Whether a block without a jerk limit begins with the rest of a slice. A rest shorter than rounding is dropped.
     pub(super) fn has_rest(&mut self) -> bool {
         if some(self.rest.seconds) && !less(self.little(), self.rest.distance) {
             self.rest = Rest::NONE;

@@ -49,7 +49,7 @@ pub fn segment(bed: &Bed) -> Result<Figure> {
     Ok(Figure { value: cost.mean(), note })
 }
 
-/// The same under a jerk limit: on short moves and on arcs.
+/// Cycles of exec for one segment under a jerk limit, on short moves and on arcs.
 pub fn segment_jerk(bed: &Bed) -> Result<Figure> {
     let jobs = [spiral(0.1), arcs(), braid(0.33, 3_000.0)];
     let costs = jerk_costs(bed, &[USUAL_JERK], &jobs)?;

@@ -38,7 +38,7 @@ pub fn minor(bed: &Bed) -> Result<Figure> {
     Ok((machine.seconds(peak_to_peak(&machine, 1)) * 1e6).into())
 }
 
-/// The same over the boundaries of blocks: lines of 5 mm in a row, of X alone and with Y; nothing else on the line.
+/// Jitter over the ends of blocks: lines of 5 mm in a row, of X alone and with Y, while the serial line is quiet.
 pub fn boundaries(bed: &Bed) -> Result<Figure> {
     let (mut worst, mut note) = (0, Vec::new());
     for (name, minor) in [("alone", 0.0), ("with Y", MINOR / DOMINANT)] {
