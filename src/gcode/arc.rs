@@ -131,9 +131,10 @@ impl Walk {
         // A whole turn saturates to a hair less; the last chord makes up for it.
         let turned = u64::from(arc.extra_turns) << 32 | u64::from((extent.part * TURN) as u32);
         let step = (turned / u64::from(count)) as u32;
-        // Two thirds of the sagitta, r angle^2 / 8.
+        // Two thirds of the sagitta, r angle^2 / 8; the next term of the series counts from half a radian on.
         let angle = step as f32 * (TAU / TURN);
-        let outside = 1.0 + angle * angle * (1.0 / 12.0);
+        let square = angle * angle;
+        let outside = 1.0 + square * (1.0 / 12.0 + square * (1.0 / 240.0));
         Self {
             start: *start,
             spoke: spoke(start, arc).map(|component| component * outside),
@@ -345,6 +346,24 @@ mod tests {
             let crossings = points.windows(2).filter(|w| w[0][1].0 > 50_000 && w[1][1].0 <= 50_000);
             assert_eq!(crossings.count() as f32, turns, "{extra}");
         }
+    }
+
+    /// Chords of 0.86 rad lie as much inside as outside too.
+    #[test]
+    fn the_mean_distance_of_coarse_chords_is_the_radius() {
+        let (start, target) = (point(10_000, 0, 0, 0), point(4_395, -8_982, 0, 0));
+        let arc = xy((0, 0), false, 0);
+        let points: Vec<_> = Chords::new(&start, &target, &arc, 0.09).collect();
+        assert_eq!(points.len(), 6);
+        let chord = |part: f64| {
+            let at = |i: usize| {
+                let (from, to) = (f64::from(points[1][i].0), f64::from(points[2][i].0));
+                from + (to - from) * part
+            };
+            at(0).hypot(at(1))
+        };
+        let mean = (0..1_000).map(|n| chord((f64::from(n) + 0.5) / 1_000.0)).sum::<f64>() / 1_000.0;
+        assert!((mean - 10_000.0).abs() < 3.0, "{mean}");
     }
 
     #[test]
