@@ -10,6 +10,7 @@ use std::cell::Cell;
 use kerf::motion::governor::{Ahead, Governor};
 use kerf::motion::horizon;
 use kerf::motion::queue::Anchor;
+use kerf::motion::short::Short;
 use optimum::rest_to_rest;
 
 /// Nominal time of a slice.
@@ -67,12 +68,13 @@ impl Ahead for Queue<'_> {
     fn headroom(&self) -> f32 {
         0.0
     }
-    fn slower(&self, n: u8, velocity: f32) -> (u8, Anchor) {
+    fn slower(&self, n: u8, velocity: Short) -> (u8, Anchor) {
         self.asked.set(self.asked.get() + 1);
         let last = self.constraints.len() - 1;
-        let slower = |at: &usize| *at == last || self.constraints[*at].0 < velocity;
+        let slower = |at: &usize| *at == last || Short::new(self.constraints[*at].0) < velocity;
         let at = (usize::from(n)..last).find(slower).unwrap_or(last);
         let (velocity, ahead) = self.constraints[at];
+        let velocity = Short::new(velocity);
         (at as u8, Anchor { velocity, ahead, firm: at == last })
     }
     fn end(&self) -> f32 {
@@ -153,6 +155,8 @@ struct Outcome {
     asked: u32,
     /// Most stretches in a row that end no block and are together shorter than a slice.
     tiny: u32,
+    /// Stretches, those that looked ahead, and all constraints that were asked for.
+    work: [u64; 3],
 }
 
 fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
@@ -199,6 +203,8 @@ fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
         assert!(stretch.seconds > 0.0 && stretch.seconds.is_finite(), "{stretch:?} {governor:?}");
         assert!(stretch.distance >= 0.0, "{stretch:?} {governor:?}");
         out.asked = out.asked.max(asked.get());
+        let looks = [1, u64::from(asked.get() > 0), asked.get().into()];
+        out.work.iter_mut().zip(looks).for_each(|(sum, more)| *sum += more);
         short += f64::from(stretch.seconds);
         tiny += u32::from(!stretch.ends);
         if short > 0.5 * SLICE || hold > 0 {
@@ -309,8 +315,10 @@ fn seeds(count: u64) -> (Vec<u64>, bool) {
 #[test]
 fn any_path_is_within_its_limits_and_work() {
     let (seeds, trace) = seeds(3_000);
-    let mut bad = Vec::new();
+    let (mut bad, count) = (Vec::new(), seeds.len() as f64);
     let (mut worst, mut most_tiny) = (0, 0);
+    // Means over all paths: of the logarithm of the time, looks in a stretch, constraints in a stretch.
+    let mut means = [0.0; 3];
     for seed in seeds {
         let dice = &mut Dice::new(seed);
         let path = Path::random(dice);
@@ -321,6 +329,9 @@ fn any_path_is_within_its_limits_and_work() {
             continue;
         };
         worst = worst.max(out.asked);
+        let [stretches, looks, asked] = out.work.map(|n| n as f64);
+        let more = [out.seconds.ln(), looks / stretches, asked / stretches];
+        means.iter_mut().zip(more).for_each(|(sum, more)| *sum += more / count);
         let within = out.accel <= 1.02 && out.jerk <= 1.05 && out.corner <= 1.01;
         most_tiny = most_tiny.max(out.tiny);
         if out.tiny > 1 {
@@ -330,6 +341,12 @@ fn any_path_is_within_its_limits_and_work() {
             bad.push(format!("seed {seed}: {out:?}"));
         }
     }
+    println!(
+        "mean time {:.4} s, a stretch has {:.4} looks at {:.4} constraints, {worst} at most",
+        means[0].exp(),
+        means[1],
+        means[2]
+    );
     assert!(bad.is_empty(), "{} paths, worst work {worst}:\n{}", bad.len(), bad.join("\n"));
 }
 

@@ -29,10 +29,11 @@
 //! is enough for any of them. So the work has a bound, whatever is queued: 2,500 cycles on AVR for each of these, and
 //! 25 for each constraint that is passed over.
 
-use super::float::{below, greater, least, less, lesser, scaled, some};
-use super::governor::Governor;
-use super::horizon;
+use super::float::{below, greater, least, less, scaled};
+use super::governor::{Governor, Limits};
+use super::need::Scale;
 use super::queue::Anchor;
+use super::short::Short;
 use crate::math::sqrt;
 
 /// What is ahead of the block that runs.
@@ -41,7 +42,7 @@ pub trait Ahead {
     fn headroom(&self) -> f32;
     /// The first constraint from the `n`th on that is slower than `velocity`, or firm: nothing beyond that counts. With its
     /// number.
-    fn slower(&self, n: u8, velocity: f32) -> (u8, Anchor);
+    fn slower(&self, n: u8, velocity: Short) -> (u8, Anchor);
     /// Brake potential from the end of the block to that of the queue.
     fn end(&self) -> f32;
 }
@@ -52,9 +53,6 @@ pub const EXACT: u8 = 3;
 /// Constraints behind the machine that a scan passes over.
 const PASSED: u8 = 4;
 
-/// What floats may be off.
-const ROUNDING: f32 = 1.00002;
-
 /// How far on a velocity may be kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Clear {
@@ -64,13 +62,13 @@ pub(super) struct Clear {
     pub distance: f32,
     /// Then it has to slow down to this velocity,
     pub target: f32,
-    /// which is kept from here on.
-    pub place: f32,
-    /// `(top + k)^2` and `(target + k)^2`: more than it takes to come down from there to any velocity.
-    high: f32,
-    low: f32,
+    /// which is kept from here on, as seen from where `distance` was `from`.
+    place: f32,
+    from: f32,
     /// From the target on nothing else is too near.
     pub closed: bool,
+    /// It is the target that asks for that.
+    binds: bool,
     /// Slices since: what has been driven is subtracted in floats, so it gets less exact.
     pub age: u8,
 }
@@ -85,35 +83,49 @@ impl Clear {
         distance: 0.0,
         target: 0.0,
         place: 0.0,
-        high: 0.0,
-        low: 0.0,
-        closed: true,
+        from: 0.0,
+        closed: false,
+        binds: false,
         age: 0,
     };
+
+    /// How far on the target is kept from.
+    pub fn place(&self) -> f32 {
+        self.place - (self.from - self.distance)
+    }
+
+    /// What is known of a faster velocity holds for `top` too, which may be kept to the target's place if it is no faster.
+    pub fn narrow(&mut self, top: f32) {
+        if self.closed && !below(self.target, top) {
+            self.distance = self.place();
+            (self.top, self.target, self.from) = (top, top, self.place);
+        }
+    }
+
+    /// How long the top is kept before a ramp begins down to the target, if the top is reached `at`.
+    pub fn slack(&self, at: f32, kappa: f32) -> f32 {
+        // A scan is a little off, and a ramp to a standstill has to end at its place.
+        let exact = self.binds && self.closed;
+        let distance =
+            if exact { self.place() - needed(self.top, self.target, kappa) } else { self.distance };
+        distance - at
+    }
 }
 
-/// Velocities to try, fastest first, and where each of them would be reached.
+/// A velocity to try.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Ask {
-    pub tops: [f32; 3],
-    pub at: [f32; 3],
-    /// The first that is to be tried, and whether the middle one is.
-    pub first: u8,
-    pub middle: bool,
+    /// The velocity, and where it would be reached.
+    pub top: f32,
+    pub at: f32,
+    /// The fastest that it is until then.
+    pub fastest: f32,
     /// Constraints from this velocity on down must be behind where the top is reached.
     pub level: f32,
     /// Distance from the state to the end of the block.
     pub here: f32,
-}
-
-/// The number of the velocity that is taken in any case.
-pub(super) const LOWEST: u8 = 2;
-
-impl Ask {
-    /// About one velocity, reached at `at`.
-    pub fn about(velocity: f32, at: f32, here: f32) -> Self {
-        Self { tops: [velocity; 3], at: [at; 3], first: LOWEST, middle: false, level: 0.0, here }
-    }
+    /// It is taken in any case: what is wanted is how long it may be kept.
+    pub taken: bool,
 }
 
 /// The distance it takes to come from `u` down to `w`, not above it. Cost: 700, 1,000 if the deceleration does not reach A.
@@ -124,125 +136,134 @@ pub(super) fn needed(u: f32, w: f32, kappa: f32) -> f32 {
     sum * if below(drop, twice) { sqrt(scaled(kappa * drop, 3)) } else { drop + twice }
 }
 
-fn square(x: f32) -> f32 {
-    x * x
+/// What a scan has found so far, in the units of its scale.
+struct Scan {
+    scale: Scale,
+    /// The top, and where it is reached.
+    top: u16,
+    at: i32,
+    distance: i32,
+    place: i32,
+    /// The target, and as a velocity of the scale.
+    target: Short,
+    low: u16,
+    /// From here on nothing makes a difference.
+    reach: i32,
+    closed: bool,
+    binds: bool,
 }
 
-impl Governor {
-    /// Finds the fastest of the velocities that is safe, and how long it is; the last of them is taken whatever is ahead.
-    /// Returns its number.
-    #[inline(never)]
-    pub(super) fn scan(&mut self, ask: &Ask, ahead: &impl Ahead) -> u8 {
-        self.scanned = true;
-        let mut budget = EXACT;
-        let mut n = ask.first;
-        while !self.try_top(ask, n, &mut budget, ahead) && n < LOWEST {
-            n = if ask.middle { n + 1 } else { LOWEST };
+impl Scan {
+    #[inline(always)]
+    fn new(ask: &Ask, limits: &Limits) -> Self {
+        let scale = Scale::of(ask.fastest, limits);
+        let top = scale.velocity_above(ask.top);
+        Self {
+            at: scale.distance(ask.at),
+            top,
+            low: top,
+            scale,
+            distance: i32::MAX,
+            place: i32::MAX,
+            target: Short::ZERO,
+            reach: i32::MAX,
+            closed: true,
+            binds: true,
         }
-        n
     }
 
-    /// Whether the `n`th velocity is safe. Fills in `clear` as far as it gets.
+    /// Looks at one constraint after the other. Returns whether the top is safe.
     #[inline(never)]
-    fn try_top(&mut self, ask: &Ask, n: u8, budget: &mut u8, ahead: &impl Ahead) -> bool {
-        let n = usize::from(n);
-        let (Some(&top), Some(&at)) = (ask.tops.get(n), ask.at.get(n)) else { return true };
-        let high = square(top + self.limits.kappa);
-        let none = f32::MAX;
-        self.clear = Clear {
-            top,
-            distance: none,
-            target: top,
-            place: none,
-            high,
-            low: high,
-            closed: true,
-            age: 0,
-        };
-        let (mut next, mut passed) = (0, 0);
-        let mut low = greater(top, ask.level);
+    fn run(&mut self, ask: &Ask, ahead: &impl Ahead, behind: f32) -> bool {
+        let (mut next, mut passed, mut budget) = (0, 0, EXACT);
+        let mut low = Short::above(greater(ask.top, ask.level));
         loop {
             let (found, anchor) = ahead.slower(next, low);
-            let place = anchor.ahead + ask.here;
             next = found + 1;
-            if !anchor.firm && self.is_here(place) && passed < PASSED {
+            let place = anchor.ahead + ask.here;
+            if !anchor.firm && passed < PASSED && less(place, behind) {
                 passed += 1;
                 continue;
             }
-            if *budget == 0 {
-                self.look_no_further(&anchor, place, ahead.end() + ask.here);
-                return !less(self.clear.distance, at);
+            let place = self.scale.distance(place);
+            if place >= self.reach {
+                break;
             }
-            *budget -= 1;
-            let lowest = n >= usize::from(LOWEST);
             // A firm one may be faster than those before it.
-            low = least(anchor.velocity, low);
-            self.take_in(low, place, if lowest { at } else { f32::MIN });
-            if !lowest && less(self.clear.distance, at) {
-                return false;
+            low = anchor.velocity.min(low);
+            if budget == 0 {
+                self.look_no_further(low, place, ahead.end() + ask.here);
+                break;
             }
-            if anchor.firm || self.is_out_of_reach(place) {
-                return true;
+            budget -= 1;
+            self.take_in(low, place, ask.taken);
+            if anchor.firm || !ask.taken && self.distance < self.at {
+                break;
             }
         }
+        self.distance >= self.at
     }
 
-    /// A constraint to `velocity`, slower than those before it, at `place`, for a top that is reached `at` whatever is ahead.
+    /// A constraint to `velocity`, slower than those before it, at `place`. A top that is `taken` is reached whatever is ahead.
     #[inline(never)]
-    fn take_in(&mut self, velocity: f32, place: f32, at: f32) {
-        let kappa = self.limits.kappa;
-        let clear = &mut self.clear;
-        let mut low = least(velocity, clear.top);
-        let mut distance = place - needed(clear.top, low, kappa);
-        if less(distance, at) && some(low) {
+    fn take_in(&mut self, velocity: Short, place: i32, taken: bool) {
+        let scale = &self.scale;
+        let (mut target, mut low) = (velocity, scale.velocity(velocity).min(self.top));
+        let mut distance = place - scale.need(self.top, low);
+        if taken && distance < self.at && low > 0 {
             // To a standstill is a shorter way than to a low velocity.
-            let stop = place - needed(clear.top, 0.0, kappa);
-            if less(distance, stop) {
-                (low, distance) = (0.0, stop);
+            let stop = place - scale.need(self.top, 0);
+            if distance < stop {
+                (target, low, distance) = (Short::ZERO, 0, stop);
             }
         }
-        let nearer = less(distance, clear.distance);
+        let nearer = distance < self.distance;
+        if !nearer && !(low < self.low && place - self.place < scale.need(self.low, low)) {
+            return;
+        }
         if nearer {
-            clear.distance = distance;
+            self.distance = distance;
         }
-        if nearer || self.is_close(low, place) {
-            (self.clear.target, self.clear.place) = (low, place);
-            self.clear.low = square(low + kappa);
-        }
-    }
-
-    /// Whether a constraint is too near to be slowed down for from the target.
-    fn is_close(&self, low: f32, place: f32) -> bool {
-        let Clear { target, place: from, low: enough, .. } = self.clear;
-        let distance = place - from;
-        less(distance, enough)
-            && below(low, target)
-            && less(distance * ROUNDING, needed(target, low, self.limits.kappa))
-    }
-
-    /// Nothing beyond `place` makes a difference: even the lowest key there would not.
-    #[inline(never)]
-    fn is_out_of_reach(&self, place: f32) -> bool {
-        let clear = &self.clear;
-        !less(place - clear.high, clear.distance) && !less(place - clear.place, clear.low)
+        (self.target, self.low, self.place, self.binds) = (target, low, place, nearer);
+        let beyond = place.saturating_add(scale.most(low));
+        self.reach = beyond.max(self.distance.saturating_add(scale.most(self.top)));
     }
 
     /// A constraint that stands for all that follow: what its key says of them, and that of the end of the queue.
     #[inline(never)]
-    fn look_no_further(&mut self, anchor: &Anchor, place: f32, end: f32) {
-        let kappa = self.limits.kappa;
-        let key = lesser(horizon::key(anchor.velocity, kappa) + place, kappa * kappa + end);
-        let clear = &mut self.clear;
-        if less(clear.place, place) && !less((key - clear.place) * ROUNDING, clear.low) {
-            return;
-        }
-        clear.distance = lesser(clear.distance, key - clear.high);
-        (clear.target, clear.closed) = (0.0, false);
+    fn look_no_further(&mut self, velocity: Short, place: i32, end: f32) {
+        let scale = &self.scale;
+        let by_key =
+            place.saturating_sub(scale.by_key(self.top, scale.velocity(velocity).min(self.top)));
+        let end = scale.distance(end).saturating_sub(scale.by_key(self.top, 0));
+        // Whatever it is, it is not nearer.
+        let distance = by_key.min(end).max(place - scale.most(self.top));
+        (self.closed, self.target, self.binds) = (false, Short::ZERO, false);
+        self.distance = self.distance.min(distance);
     }
 
-    /// Whether a place is behind the machine, or where it is, but for rounding: 0.1 um.
-    fn is_here(&self, place: f32) -> bool {
-        less(place, self.limits.accel * 2e-4)
+    #[inline(always)]
+    fn clear(&self, top: f32) -> Clear {
+        let (distance, place) =
+            (self.scale.potential(self.distance), self.scale.potential(self.place));
+        let target = least(self.target.get(), top);
+        let (closed, binds) = (self.closed, self.binds);
+        Clear { top, distance, target, place, from: distance, closed, binds, age: 0 }
+    }
+}
+
+impl Governor {
+    /// Whether a velocity is safe. Fills in how long it may be kept, if it is or if it is taken in any case.
+    #[inline(never)]
+    pub(super) fn scan(&mut self, ask: &Ask, ahead: &impl Ahead) -> bool {
+        self.scanned = true;
+        let mut scan = Scan::new(ask, &self.limits);
+        // But for rounding: 0.1 um.
+        let safe = scan.run(ask, ahead, self.limits.accel * 2e-4);
+        if safe || ask.taken {
+            self.clear = scan.clear(ask.top);
+        }
+        safe
     }
 
     /// Whether it is known that the steady velocity `top` is safe at a place `at` so far on.

@@ -26,6 +26,7 @@ use super::float::{below, scaled, some, whole};
 use super::governor::{Ahead, Governor};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
+use super::short::Short;
 use super::snapshot::{Program, Snapshot};
 use crate::gcode::overrides::Change;
 
@@ -112,7 +113,7 @@ impl Ahead for View<'_> {
     fn headroom(&self) -> f32 {
         self.headroom
     }
-    fn slower(&self, n: u8, velocity: f32) -> (u8, Anchor) {
+    fn slower(&self, n: u8, velocity: Short) -> (u8, Anchor) {
         self.blocks.slower(n, velocity)
     }
     fn end(&self) -> f32 {

@@ -16,7 +16,7 @@
 
 pub use super::constraint::Ahead;
 use super::constraint::Clear;
-use super::float::{greater, some};
+use super::float::{greater, scaled, some};
 use super::horizon::kappa;
 use super::ramp::{Phase, Ramp};
 use super::rise::MARGIN_FIRST;
@@ -63,6 +63,24 @@ pub(super) struct Limits {
     pub pace: f32,
     /// `accel / jerk`: the seconds that takes from 0 to 1.
     pub build: f32,
+    /// `sqrt(8 kappa)`.
+    pub root: f32,
+}
+
+impl Limits {
+    /// In floats what follows from the two limits; only they without a jerk limit. Cost: 2,700 with one.
+    pub fn new(accel: f32, jerk: f32) -> Self {
+        let mut limits = Self { accel, jerk, ..Self::NONE };
+        if some(jerk) {
+            limits.kappa = kappa(accel, jerk);
+            limits.pace = jerk / accel;
+            limits.build = accel / jerk;
+            limits.root = sqrt(scaled(limits.kappa, 3));
+        }
+        limits
+    }
+
+    const NONE: Self = Self { accel: 0.0, jerk: 0.0, kappa: 0.0, pace: 0.0, build: 0.0, root: 0.0 };
 }
 
 /// Velocity and acceleration along the path, at the end of what has been worked out.
@@ -84,10 +102,12 @@ pub struct Governor {
     pub(super) halting: bool,
     /// What is ahead has been looked at for this stretch.
     pub(super) scanned: bool,
-    /// And for the last one.
-    pub(super) looked: bool,
+    /// The CPU has no time left: no look ahead but those that it takes to go on.
+    pub(super) hurry: bool,
     /// Slices until it is worth another try to go faster.
     pub(super) wait: u8,
+    /// Slices until it is worth while to go faster by little.
+    pub(super) calm: u8,
     /// Slices by which the next scan looks further than it has to.
     pub(super) margin: u8,
     /// A scan has not found what it asked for: the acceleration is about to end.
@@ -104,15 +124,16 @@ impl Governor {
         Self {
             velocity: 0.0,
             alpha: 0.0,
-            limits: Limits { accel: 0.0, jerk: 0.0, kappa: 0.0, pace: 0.0, build: 0.0 },
+            limits: Limits::NONE,
             ramp: None,
             rest: Rest::NONE,
             clear: Clear::NONE,
             changed: false,
             halting: false,
             scanned: false,
-            looked: false,
+            hurry: false,
             wait: 0,
+            calm: 0,
             margin: MARGIN_FIRST,
             closing: false,
             turn: 0,
@@ -159,19 +180,14 @@ impl Governor {
         self.halting = false;
         self.clear = Clear::NONE;
         (self.wait, self.margin, self.closing) = (0, MARGIN_FIRST, false);
-        let (mut pace, mut build) = (0.0, 0.0);
         let mut alpha = 0.0;
-        if some(jerk) {
-            pace = jerk / accel;
-            build = accel / jerk;
-            if self.alpha < 0.0 {
-                alpha = greater(self.alpha * self.limits.accel / accel, -1.0);
-                let most = sqrt(2.0 * jerk * self.velocity) / accel;
-                alpha = greater(alpha, -most);
-            }
+        if some(jerk) && self.alpha < 0.0 {
+            alpha = greater(self.alpha * self.limits.accel / accel, -1.0);
+            let most = sqrt(2.0 * jerk * self.velocity) / accel;
+            alpha = greater(alpha, -most);
         }
         self.alpha = alpha;
-        self.limits = Limits { accel, jerk, kappa: kappa(accel, jerk), pace, build };
+        self.limits = Limits::new(accel, jerk);
     }
 
     /// An override has changed feeds, of what runs and of what is ahead.

@@ -65,6 +65,7 @@ mod tests {
     use super::*;
     use crate::motion::exec::SEGMENT_S;
     use crate::motion::queue::Anchor;
+    use crate::motion::short::Short;
     use proptest::prelude::*;
 
     /// A block that ends in a stop, far away.
@@ -74,8 +75,8 @@ mod tests {
         fn headroom(&self) -> f32 {
             0.0
         }
-        fn slower(&self, _: u8, _: f32) -> (u8, Anchor) {
-            (0, Anchor { velocity: 0.0, ahead: 0.0, firm: true })
+        fn slower(&self, _: u8, _: Short) -> (u8, Anchor) {
+            (0, Anchor { velocity: Short::ZERO, ahead: 0.0, firm: true })
         }
         fn end(&self) -> f32 {
             0.0

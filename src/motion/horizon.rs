@@ -162,22 +162,20 @@ impl Horizon {
 
     /// The velocity of the `n`th key.
     #[inline]
-    pub fn entry(&self, n: u8) -> f32 {
-        self.entries[self.slot(n)].get()
+    pub fn entry(&self, n: u8) -> Short {
+        self.entries[self.slot(n)]
     }
 
     /// The first key from the `n`th on that is slower than `velocity`, or firm, or one more than the last. Cost: 100, and 25 for
     /// each that is passed over.
     #[inline(never)]
-    pub fn slower(&self, n: u8, velocity: f32) -> u8 {
-        // What is below this is slower.
-        let limit = Short::above(velocity);
+    pub fn slower(&self, n: u8, velocity: Short) -> u8 {
         let mut slot = self.slot(n);
         for n in n..self.len {
             let (Some(seq), Some(entry)) = (self.seqs.get(slot), self.entries.get(slot)) else {
                 return n;
             };
-            if seq & FIRM != 0 || *entry < limit {
+            if seq & FIRM != 0 || *entry < velocity {
                 return n;
             }
             slot += 1;

@@ -3,7 +3,7 @@
 //! ```text
 //! target -> line -> block queue -> exec -> segment ring -> dda -> pins
 //!    junction, curve   |   ^        governor, prep
-//!                      horizon      slice, rise, ramp, constraint
+//!                      horizon      slice, rise, ramp, constraint, need
 //! ```
 
 pub mod block;
@@ -24,6 +24,7 @@ pub mod horizon;
 pub mod junction;
 mod limits;
 pub mod line;
+mod need;
 pub mod pace;
 mod path;
 pub mod prep;

@@ -20,7 +20,7 @@
 //! Units: mm, s; distances to what is ahead are brake potential (`constraint`). Cost on AVR: 2,000 cycles at a steady velocity
 //! or in a ramp, 3,500 while alpha rises; a scan and a ramp that is laid out 10,000 to 30,000 more.
 
-use super::constraint::{Ahead, Ask, Clear, LOWEST, needed};
+use super::constraint::{Ahead, Ask, Clear, needed};
 use super::exec::SEGMENT_S;
 use super::float::{below, greater, less, lesser, scaled, some};
 use super::governor::{Governor, same};
@@ -29,6 +29,9 @@ use super::slice::Span;
 
 /// Slices before it tries again to go faster, when it could not.
 const WAIT: u8 = 8;
+
+/// Slices at a steady velocity before it goes faster by little.
+const CALM: u8 = 32;
 
 /// Slices by which the first scan of an acceleration looks further than it has to.
 pub(super) const MARGIN_FIRST: u8 = 4;
@@ -54,7 +57,12 @@ impl Governor {
         if let Some(ramp) = &self.ramp {
             self.turn = self.turn.wrapping_add(1);
             let news = self.changed || !ramp.closed;
-            if news && self.turn & 3 == 0 && ramp.phase() != Phase::Ending && !self.scanned {
+            if news
+                && !self.hurry
+                && self.turn & 3 == 0
+                && ramp.phase() != Phase::Ending
+                && !self.scanned
+            {
                 self.reconsider(span, ahead);
             }
             if self.ramp.is_some() {
@@ -76,11 +84,33 @@ impl Governor {
             return self.slow_down(span, ahead);
         }
         let steady = !some(self.alpha) && some(velocity);
-        if steady && (same(velocity, span.cruise) || self.wait > 0) {
-            self.wait = self.wait.saturating_sub(1);
+        if steady && (self.hurry || self.waits(span) || self.is_calm(span.cruise)) {
             return self.keep(span, ahead);
         }
         self.climb(span, ahead)
+    }
+
+    /// Whether it has the feed, or all but a part in 64, and has been steady for a short time only: where the feed is another for
+    /// each block, as on a spiral, going after each of them would cost more than it is worth.
+    fn is_calm(&mut self, cruise: f32) -> bool {
+        let velocity = self.velocity;
+        if same(velocity, cruise) {
+            return true;
+        }
+        let calm = self.calm > 0 && below(cruise, velocity + scaled(velocity, -6));
+        self.calm = if calm { self.calm - 1 } else { CALM };
+        calm
+    }
+
+    /// Whether it is too early to try to go faster: it is not known either that this velocity may be kept, or it could not a moment
+    /// ago.
+    fn waits(&mut self, span: &Span) -> bool {
+        if self.wait > 0 {
+            self.wait -= 1;
+            return true;
+        }
+        let known = !self.clear.top.is_sign_negative();
+        known && !self.is_clear(self.velocity, self.potential(self.velocity * span.seconds))
     }
 
     /// A slice at a steady velocity.
@@ -93,7 +123,7 @@ impl Governor {
             if self.scanned {
                 return false;
             }
-            self.scan(&Ask::about(velocity, 0.0, self.here(span)), ahead);
+            self.look_about(velocity, 0.0, velocity, span, ahead);
         }
         self.keep_or_slow(span, distance, at);
         true
@@ -111,8 +141,8 @@ impl Governor {
 
     /// Lays out the ramp for what the last scan has found; the top is `at` so far on.
     fn slow_for_clear(&mut self, at: f32) {
-        let Clear { distance, target, closed, .. } = self.clear;
-        let slack = 0.5 * (distance - at) / self.limits.accel;
+        let slack = 0.5 * self.clear.slack(at, self.limits.kappa) / self.limits.accel;
+        let Clear { target, closed, .. } = self.clear;
         self.lay(target, slack, closed);
         self.changed = false;
     }
@@ -169,18 +199,14 @@ impl Governor {
             }
         }
         self.place_top(&mut next);
-        if !self.is_clear(next.top, next.at) {
+        if self.is_clear(next.top, next.at) {
+            self.look_early(&next, span, ahead);
+        } else {
             if self.scanned {
                 return false;
             }
-            if self.is_pressed(span) {
-                let top = self.velocity + self.limits.kappa * alpha * alpha;
-                self.level_off(top);
-                self.follow(seconds);
-                return true;
-            }
             if !self.look_ahead(&next, span, ahead) {
-                self.end_climb(span);
+                self.end_climb(span, ahead);
                 return true;
             }
         }
@@ -189,35 +215,59 @@ impl Governor {
         true
     }
 
-    /// Whether it has looked ahead for the last stretch as well, while the CPU has no time left: then an acceleration ends, which
-    /// is safe without another look.
-    fn is_pressed(&self, span: &Span) -> bool {
-        self.looked && some(self.alpha) && less(1.2 * SEGMENT_S, span.nominal)
+    /// While it is known that the next state is safe: looks further, if it is not for those that follow. Whatever the answer, the
+    /// next state stays safe.
+    #[inline(always)]
+    fn look_early(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) {
+        if self.scanned || self.hurry || self.margin == 0 || !below(self.clear.top, span.cruise) {
+            return;
+        }
+        let gain = self.limits.accel * span.seconds;
+        if below(self.clear.top, next.top + scaled(gain, 1)) {
+            self.look_further(next, span, ahead);
+        }
     }
 
-    /// Whether the next state is safe; looks further if that is worth while. If it is not safe, `clear` is for the
-    /// state that is.
+    /// Asks for a top that is some slices further. Returns whether that is safe.
     #[inline(never)]
-    fn look_ahead(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) -> bool {
+    fn look_further(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) -> bool {
         let gain = self.limits.accel * span.seconds * f32::from(self.margin);
         let far = lesser(next.top + gain, greater(span.cruise, next.top));
-        let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
-        let ask = Ask {
-            tops: [far, next.top, top],
-            at: [next.at, next.at, self.rising(self.alpha, self.velocity, top)],
-            // Where the queue is short, a velocity that is kept is better than one that goes up and down by little.
-            middle: some(self.alpha) || less(self.velocity, scaled(far - self.velocity, 2)),
-            first: u8::from(self.margin == 0),
-            level: 0.0,
-            here: self.here(span),
-        };
-        let found = self.scan(&ask, ahead);
-        self.adjust_margin(found == ask.first);
-        self.changed = false;
-        found != LOWEST
+        let found = self.ask(far, next.at, span, ahead);
+        self.adjust_margin(found);
+        found
     }
 
-    /// How far the next scan looks: further and further, until it does not find what it asks for; then half as far each time.
+    /// How long a velocity may be kept that is reached `at` in any case, after others up to `fastest`.
+    fn look_about(&mut self, top: f32, at: f32, fastest: f32, span: &Span, ahead: &impl Ahead) {
+        let ask = Ask { top, at, fastest, level: 0.0, here: self.here(span), taken: true };
+        self.scan(&ask, ahead);
+    }
+
+    /// Whether the top is safe that is reached `at`.
+    fn ask(&mut self, top: f32, at: f32, span: &Span, ahead: &impl Ahead) -> bool {
+        self.changed = false;
+        let ask = Ask { top, at, fastest: top, level: 0.0, here: self.here(span), taken: false };
+        self.scan(&ask, ahead)
+    }
+
+    /// Whether the next state is safe, which is not known: from a steady velocity it asks for more than the next slice takes, as long
+    /// as there are smaller gains to be tried.
+    #[inline(never)]
+    fn look_ahead(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) -> bool {
+        if !some(self.alpha) && self.margin > 0 {
+            let found = self.look_further(next, span, ahead);
+            // At rest there is time for another look.
+            if found || some(self.velocity) {
+                return found;
+            }
+        }
+        let found = self.ask(next.top, next.at, span, ahead);
+        self.closing &= found;
+        found
+    }
+
+    /// How far the next look goes: further and further, until it does not find what it asks for; then half as far each time.
     fn adjust_margin(&mut self, found: bool) {
         if found && !self.closing {
             self.margin = (2 * self.margin + 1).min(MARGIN);
@@ -227,24 +277,31 @@ impl Governor {
         }
     }
 
-    /// It goes no faster: the acceleration ends, and if it is time, a ramp goes down. `clear` is for the state.
+    /// It goes no faster: the acceleration ends, and if it is time, a ramp goes down. `clear` is for the state, or for a faster one.
     #[inline(never)]
-    fn end_climb(&mut self, span: &Span) {
-        self.wait = WAIT;
-        (self.margin, self.closing) = (MARGIN_FIRST, false);
+    fn end_climb(&mut self, span: &Span, ahead: &impl Ahead) {
+        if !self.tries_less() {
+            self.wait = WAIT;
+            (self.margin, self.closing) = (MARGIN_FIRST, false);
+        }
+        let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
+        let at = self.rising(self.alpha, self.velocity, top);
+        if self.clear.top.is_sign_negative() {
+            // Limits or feeds have changed.
+            self.look_about(top, at, top, span, ahead);
+        }
+        self.clear.narrow(top);
         let crawl = scaled(self.limits.jerk, 1) * span.seconds * span.seconds;
-        if !below(crawl, self.velocity) && !less(self.here(span) + crawl, self.clear.place) {
+        if !below(crawl, self.velocity) && !less(self.here(span) + crawl, self.clear.place()) {
             // A stop is so near that it is not worth a ramp.
             return self.creep(span);
         }
         if some(self.alpha) {
-            let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
-            let at = self.rising(self.alpha, self.velocity, top);
-            let soon = self.potential(top * span.seconds);
-            if less(scaled(soon, 1), self.clear.distance - at) {
-                self.level_off(top);
-            } else {
+            // What is known is enough to get to the top. There it is seen what comes then.
+            if less(self.clear.distance, at) {
                 self.slow_for_clear(at);
+            } else {
+                self.level_off(top);
             }
             self.follow(span.seconds);
         } else if some(self.velocity) {
@@ -253,6 +310,13 @@ impl Governor {
         } else {
             self.creep(span);
         }
+    }
+
+    /// Whether a steady velocity is so low that it is worth while to look again for a gain that is less. Where the queue is short, a
+    /// velocity that is kept is better than one that goes up and down by little.
+    fn tries_less(&self) -> bool {
+        let gain = self.limits.accel * SEGMENT_S * f32::from(self.margin + 1);
+        !some(self.alpha) && self.closing && less(self.velocity, scaled(gain, 3))
     }
 
     /// The acceleration ends at the feed, if that is safe.
@@ -265,15 +329,15 @@ impl Governor {
             return self.slow_down(span, ahead);
         }
         let distance = self.level_off(cruise);
-        let next = Next { top: cruise, at: self.potential(distance), ..Next::default() };
-        if !self.is_clear(cruise, next.at) {
+        let at = self.potential(distance);
+        if !self.is_clear(cruise, at) {
             if self.scanned {
                 self.ramp = None;
                 return false;
             }
-            if !self.look_ahead(&next, span, ahead) {
+            if !self.ask(cruise, at, span, ahead) {
                 self.ramp = None;
-                self.end_climb(span);
+                self.end_climb(span, ahead);
                 return true;
             }
         }
@@ -304,7 +368,7 @@ impl Governor {
         let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
         let low = lesser(velocity, top);
         let at = self.rising(self.alpha, self.velocity, top) + needed(top, low, self.limits.kappa);
-        self.scan(&Ask::about(low, at, self.here(span)), ahead);
+        self.look_about(low, at, top, span, ahead);
         self.changed = false;
         if !less(self.clear.distance, at) {
             self.lay(low, 0.0, true);
@@ -336,11 +400,11 @@ impl Governor {
     /// ends there, to a standstill.
     #[inline(never)]
     fn brake_harder(&mut self) {
-        let Clear { target, place, closed, .. } = self.clear;
+        let Clear { target, closed, .. } = self.clear;
         let kappa = self.limits.kappa;
         let top = self.velocity + kappa * self.alpha * self.alpha;
         let at = self.rising(self.alpha, self.velocity, top);
-        let fits = target < top && at + needed(top, target, kappa) <= place;
+        let fits = target < top && at + needed(top, target, kappa) <= self.clear.place();
         self.lay(if fits { target } else { 0.0 }, 0.0, closed && fits);
     }
 
@@ -373,9 +437,10 @@ impl Governor {
     fn try_bottom(&mut self, bottom: f32, span: &Span, ahead: &impl Ahead) -> bool {
         // Less than 0 is from the bottom back to the state.
         let at = -self.rising(self.alpha, self.velocity, bottom);
-        let ask = Ask { level: self.velocity, ..Ask::about(bottom, at, self.here(span)) };
-        self.scan(&ask, ahead);
-        let safe = !less(self.clear.distance, at);
+        let level = self.velocity;
+        let ask =
+            Ask { top: bottom, at, fastest: level, level, here: self.here(span), taken: true };
+        let safe = self.scan(&ask, ahead);
         if safe {
             self.bottom_out(bottom);
         }

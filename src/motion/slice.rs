@@ -8,6 +8,7 @@
 //! Units: mm, s.
 
 use super::constraint::Ahead;
+use super::exec::SEGMENT_S;
 use super::float::{below, greater, less, scaled, some};
 use super::governor::{Governor, Stretch, same};
 
@@ -31,9 +32,8 @@ pub(super) struct Span {
     pub left: f32,
     /// Velocity limit.
     pub cruise: f32,
-    /// How long it is to be, and how long slices are now.
+    /// How long it is to be.
     pub seconds: f32,
-    pub nominal: f32,
 }
 
 /// At rest, a distance that rounding leaves: it takes no ramp of its own.
@@ -59,11 +59,12 @@ impl Governor {
             self.halting = false;
             self.leave_ramp();
         }
-        self.looked = core::mem::replace(&mut self.scanned, false);
+        self.scanned = false;
+        self.hurry = below(1.2 * SEGMENT_S, nominal);
         for _ in 0..2 {
             let Some(seconds) = self.wanted(left, nominal) else { break };
-            let span = Span { left: left - self.rest.distance, cruise, seconds, nominal };
-            if !self.slice(&span, ahead) {
+            let span = Span { left: left - self.rest.distance, cruise, seconds };
+            if !self.slice(&span, ahead) || same(seconds, nominal) {
                 break;
             }
         }
@@ -126,7 +127,7 @@ impl Governor {
         let more = left - distance;
         let velocity = self.velocity;
         if !less(self.little(), more) {
-            return (!less(0.0, seconds)).then_some(nominal);
+            return (!less(0.0, distance)).then_some(nominal);
         }
         let slice = velocity * nominal;
         let much = !less(more, 0.5 * slice);

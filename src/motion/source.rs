@@ -11,13 +11,14 @@ use super::factors::Factors;
 use super::float::lesser;
 use super::horizon::Horizon;
 use super::queue::{BLOCKS, BlockStore, FIRM, SEQ};
+use super::short::Short;
 use crate::hal::ring::Consumer;
 
 /// A limit ahead of exec.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anchor {
     /// Velocity there, mm/s.
-    pub velocity: f32,
+    pub velocity: Short,
     /// Brake potential from the end of the oldest block to there.
     pub ahead: f32,
     /// Limits change there: what comes after is for the line that begins there.
@@ -124,11 +125,14 @@ impl BlockSource {
 
     /// The first constraint ahead from the `n`th on that is slower than `velocity`, or firm; with its number. The last is the
     /// end of the queue. Cost: 450, 25 for each that is passed over, and 1,500 more the first time after a change.
-    pub fn slower(&self, n: u8, velocity: f32) -> (u8, Anchor) {
+    pub fn slower(&self, n: u8, velocity: Short) -> (u8, Anchor) {
         let horizon = self.horizon();
         let found = horizon.slower(n, velocity);
         let Some(seq) = horizon.nth(found) else {
-            return (found, Anchor { velocity: 0.0, ahead: self.end_of_queue(), firm: true });
+            return (
+                found,
+                Anchor { velocity: Short::ZERO, ahead: self.end_of_queue(), firm: true },
+            );
         };
         let start = self.line(seq, |line| line.start).unwrap_or(horizon.end);
         let (velocity, firm) = (horizon.entry(found), seq & FIRM != 0);

@@ -94,7 +94,8 @@ pub fn run(
                 let _ = segments.push_copy(&segment);
                 waiting.push(u32::from(segment.ticks) * u32::from(segment.period));
                 health::moves(waiting.count);
-                machine.set_coarse(event::pass_over() > PATIENCE || waiting.is_busy());
+                let short = waiting.sum(segments.used()) < WAITING_SHORT;
+                machine.set_coarse(event::pass_over() > PATIENCE || short && !rests);
                 if contact::is_noted() {
                     contact::pushed(&segment);
                 }
@@ -107,7 +108,6 @@ pub fn run(
                 {
                     exec::pend_when_idle();
                     exec_asked_again().await;
-                    waiting.go_on(segments.used());
                 }
             }
             if blocks.len() != queued {
@@ -134,12 +134,7 @@ struct Waiting {
     /// How many wait, as far as that is known, and how long they take together.
     used: u8,
     sum: u16,
-    /// How many segments in a row were used up before thread mode was idle.
-    busy: u8,
 }
-
-/// So many of them say that the CPU has no time left.
-const BUSY: u8 = 8;
 
 /// The unit: shifts are cheaper than divisions.
 const UNIT_LOG2: u8 = 11;
@@ -151,14 +146,17 @@ const fn units(tenths: u32) -> u16 {
 
 /// What may wait: with the segment that runs, which takes 2 ms or less while anything is fast, and exec's own time, a feedhold
 /// begins within 10 ms.
-const WAITING_MOST: u16 = units(70);
+const WAITING_MOST: u16 = units(55);
 
 /// What is prepared before thread mode gets a turn.
-const WAITING_LEAST: u16 = units(30);
+const WAITING_LEAST: u16 = units(45);
+
+/// With less than this exec is late, and makes longer stretches.
+const WAITING_SHORT: u16 = units(25);
 
 impl Waiting {
     const fn new() -> Self {
-        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0, busy: 0 }
+        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0 }
     }
 
     /// The length of the segment that was queued so many before the next one.
@@ -186,17 +184,6 @@ impl Waiting {
             self.used -= 1;
         }
         self.sum
-    }
-
-    /// Exec has waited for thread mode to be idle, and goes on: because it is, or because a segment has been used up.
-    fn go_on(&mut self, used: usize) {
-        let idle = usize::from(self.used) == used;
-        self.busy = if idle { 0 } else { self.busy.saturating_add(1) };
-    }
-
-    /// Whether the CPU has no time left: then segments are longer, which takes less of it.
-    fn is_busy(&self) -> bool {
-        self.busy >= BUSY
     }
 
     /// Whether another one like the last may wait: what is queued cannot be slowed down any more. Unless the machine `rests` at

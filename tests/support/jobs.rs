@@ -198,7 +198,7 @@ pub fn plan_changed(
             fn headroom(&self) -> f32 {
                 self.0
             }
-            fn slower(&self, n: u8, velocity: f32) -> (u8, Anchor) {
+            fn slower(&self, n: u8, velocity: kerf::motion::short::Short) -> (u8, Anchor) {
                 self.1.slower(n, velocity)
             }
             fn end(&self) -> f32 {

@@ -41,6 +41,8 @@ struct Call {
 enum Kind {
     /// Calls from thread code, from the first instruction to behind the return.
     Calls { under_way: Option<Call> },
+    /// Calls from an interrupt: its own time when the call under way began, and the stack pointer.
+    CallsIn { vector: u8, under_way: Option<(u16, u64)> },
     /// Laps of an interrupt: each call of the function ends one. What the interrupt does behind the last
     /// one belongs to that; runs without a call are spread over all.
     Laps { vector: u8, lap: Lap },
@@ -67,6 +69,11 @@ impl Stopwatch {
     /// Times the calls of the function at `entry` from thread code.
     pub fn calls(entry: u32) -> Self {
         Stopwatch { entry, kind: Kind::Calls { under_way: None }, cost: Cost::default() }
+    }
+
+    /// Times the calls of the function at `entry` from an interrupt.
+    pub fn calls_in(vector: u8, entry: u32) -> Self {
+        Stopwatch { entry, kind: Kind::CallsIn { vector, under_way: None }, cost: Cost::default() }
     }
 
     /// Times an interrupt from call to call of the function at `entry`.
@@ -106,6 +113,20 @@ impl Stopwatch {
                 _ => {}
             },
             Kind::Calls { .. } => {}
+            Kind::CallsIn { vector, under_way } => {
+                let Some(own) = meters.serving(*vector, cpu.cycle()) else { return };
+                match *under_way {
+                    None if pc == self.entry => {
+                        let sp = cpu.sp() + u16::from(cpu.opcode(pc) & PUSH_MASK == PUSH);
+                        *under_way = Some((sp, own));
+                    }
+                    Some((sp, from)) if cpu.opcode(pc) == RET && cpu.sp() > sp => {
+                        *under_way = None;
+                        self.cost.add(own - from);
+                    }
+                    _ => {}
+                }
+            }
             Kind::Laps { vector, lap } => {
                 let Some(own) = meters.serving(*vector, cpu.cycle()) else { return };
                 if pc == self.entry {
