@@ -36,6 +36,19 @@ impl Short {
         Log::new(power.wrapping_sub(ONE), mantissa)
     }
 
+    /// Its logarithm, or up to 0.09 octaves less. Cost: 5.
+    #[inline(always)]
+    pub fn rough(self) -> Log {
+        let (mantissa, power) = self.parts();
+        Log(i16::from_le_bytes([mantissa, power.wrapping_sub(ONE)]))
+    }
+
+    /// From a mantissa without the leading 1, and an exponent.
+    #[inline(always)]
+    pub fn of_parts(mantissa: u8, power: u8) -> Self {
+        Self(u16::from_le_bytes([mantissa, power]))
+    }
+
     /// Its mantissa without the leading 1, and its exponent.
     #[inline(always)]
     pub fn parts(self) -> (u8, u8) {
@@ -94,7 +107,7 @@ impl Log {
     pub fn power(self) -> Short {
         let [fraction, power] = self.0.to_le_bytes();
         let mantissa = fraction.wrapping_sub(bulge(fraction));
-        Short(u16::from_le_bytes([mantissa, power.wrapping_add(ONE)]))
+        Short::of_parts(mantissa, power.wrapping_add(ONE))
     }
 }
 
