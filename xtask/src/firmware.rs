@@ -13,7 +13,7 @@ use crate::setup::{self, Scope};
 use crate::toolchain::Toolchain;
 
 const FLAGS: &str = "-C target-cpu=atmega2560 -C llvm-args=-inline-threshold=30 -C jump-tables=no -C linker=avr-gcc -C link-arg=-mmcu=atmega2560 \
-                     -C link-arg=-Wl,--gc-sections";
+                     -C link-arg=-Wl,--gc-sections -C link-arg=-Wl,--relax";
 
 /// Where the images lie: `BOARD.elf`, or `BOARD-MACHINE.elf` if it is not for the usual machine.
 pub fn directory() -> PathBuf {
