@@ -210,6 +210,7 @@ fn root(mut square: u64) -> f32 {
 }
 
 /// The two coordinates in the plane of an arc.
+#[inline(never)]
 fn in_plane(point: &PerAxis<Length>, arc: &Arc) -> [Length; 2] {
     [arc.first, arc.second].map(|axis| point.get(usize::from(axis)).copied().unwrap_or_default())
 }
