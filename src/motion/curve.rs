@@ -213,10 +213,10 @@ fn noise(span: Log) -> u16 {
     noise
 }
 
-/// A third of a logarithm. Cost: 40.
+/// A third of a logarithm, which is at least that of 2^-48. Cost: 40.
 fn third(log: i16) -> i16 {
-    const UP: i16 = 3 << 13;
-    (product((log + UP) as u16, 0x5556) >> 16) as i16 - UP / 3
+    const UP: u16 = 3 << 12;
+    (product((log as u16).wrapping_add(UP), 0x5556) >> 16) as i16 - UP as i16 / 3
 }
 
 /// The limits of the axes that take part in a curve: the least jerk, and the acceleration if it is that of all.
@@ -326,6 +326,13 @@ mod tests {
             deviation: Short::new(0.01),
         };
         Dynamics { axes: [axis; 6], junction: accel, ..Dynamics::default() }
+    }
+
+    #[test]
+    fn thirds() {
+        for log in -48 * OCTAVE..=i16::MAX {
+            assert!((3 * i32::from(third(log)) - i32::from(log)).abs() <= 3, "{log}");
+        }
     }
 
     proptest! {
