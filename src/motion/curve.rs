@@ -125,7 +125,7 @@ impl Bend {
     /// The path goes on with a line, from heading `from`. Slows it down if the last two corners are those of a
     /// curve that cannot be taken as fast.
     ///
-    /// Cost: 150 straight on, 550 on a curve that is plainly no limit, else 900.
+    /// Cost: 350 where it is no curve, 750 on a curve that is plainly no limit, else 1,400.
     #[inline(never)]
     pub(super) fn line(&mut self, from: &Heading, path: &mut Path, dynamics: &Dynamics) {
         let (last, before) = (self.last, self.before);

@@ -141,7 +141,7 @@ pub fn high_product(a: u8, b: u8) -> u8 {
 /// `a * b / 256`, rounded down.
 #[cfg(not(target_arch = "avr"))]
 pub fn high_product(a: u8, b: u8) -> u8 {
-    (u16::from(a) * u16::from(b) >> 8) as u8
+    ((u16::from(a) * u16::from(b)) >> 8) as u8
 }
 
 /// The square root, rounded down. Cost: 320.
