@@ -2,6 +2,8 @@
 //!
 //! The same on AVR and on the host; what differs is in `hal::imp`.
 
+use kerf_macros::small;
+
 use core::cell::{Cell, RefCell};
 
 use embassy_executor::Spawner;
@@ -106,6 +108,7 @@ macro_rules! place {
 
 /// Makes the links. Not inlined: what it needs of the stack is free again after it.
 #[inline(never)]
+#[small]
 fn place(ports: [Port; PORTS]) -> &'static Links {
     let storage: &'static Storage = place!(Storage, Storage::new(Log::open(&Eeprom::take())));
     place!(Links, Links::new(ports, storage))
@@ -115,6 +118,7 @@ fn place(ports: [Port; PORTS]) -> &'static Links {
 ///
 /// Interrupts are off. `None` if it has been started before.
 #[inline(never)]
+#[small]
 pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     let AllEnds { usb: (received, outgoing), aux } = uart::start(rate)?;
     let segments = stepper::start()?;

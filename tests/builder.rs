@@ -248,6 +248,11 @@ proptest! {
             prop_assert!(v * v / r <= 1.5 * f64::from(accel), "{v} mm/s: {} of {accel} mm/s^2", v * v / r);
             let most = if jerk > 0.0 { 1.5 * f64::from(jerk) } else { f64::MAX };
             prop_assert!(v.powi(3) / r.powi(2) <= most, "{v} mm/s: {} of {jerk} mm/s^3", v.powi(3) / r.powi(2));
+            // Nor slower than they have to.
+            let (accel, jerk) = (f64::from(accel), if jerk > 0.0 { f64::from(jerk) } else { f64::MAX });
+            let best = (accel * r).sqrt().min((jerk * r * r).cbrt()).min(f64::from(feed) / 30.0).min(500.0);
+            let best = best.min(f64::from(block.length) / f64::from(BLOCK_S_MIN));
+            prop_assert!(v > 0.8 * best, "{v} of {best} mm/s");
         }
     }
 

@@ -199,6 +199,7 @@ impl Settings {
         self.small((motor * motor::SMALL) as u8 + slot)
     }
 
+    #[inline(never)]
     fn axis(&self, axis: usize, slot: u8) -> i32 {
         self.large(large_of(axis as u8) + slot)
     }

@@ -4,6 +4,8 @@
 //! velocity limits of that axis; the protocol says so. Called when a setting is stored. Cost on AVR:
 //! 6,000 cycles for each motor of the axis.
 
+use kerf_macros::small;
+
 use super::setting::large_of;
 use super::table::axis;
 use super::{Owner, Setting, Settings, StepRatio};
@@ -30,6 +32,7 @@ impl Settings {
     }
 
     #[inline(never)]
+    #[small]
     fn limit_axis(&mut self, axis: u8, rate: &impl Fn(usize) -> u32) -> bool {
         if usize::from(axis) >= AXES {
             return false;

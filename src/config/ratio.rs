@@ -4,6 +4,8 @@
 //! fraction; stopping before one leaves 32 bits gives the best approximation that fits, within half
 //! a step over the whole range of a [`Length`].
 
+use kerf_macros::small;
+
 use crate::units::Length;
 
 /// Steps per unit of [`Length`], as the fraction `num` / `den`.
@@ -70,6 +72,7 @@ impl StepRatio {
     /// Steps for `length`, to the nearest, half away from zero, saturating.
     ///
     /// About 800 cycles on AVR while the product fits 32 bits, else 5,000.
+    #[small]
     pub fn steps(self, length: Length) -> i32 {
         let units = length.0.unsigned_abs();
         let half = self.den / 2;

@@ -1,5 +1,7 @@
 //! What the words of an axis mean: its mode, and lengths as angles.
 
+use kerf_macros::small;
+
 use super::decimal::Decimal;
 pub(super) use super::decimal::Exact as Value;
 use super::decimal::Exact;
@@ -46,6 +48,7 @@ const REST: i64 = 10_000;
 /// In integers and with the rest, so that incremental moves add up. Three 64-bit divisions: 15,000
 /// cycles on AVR.
 #[inline(never)]
+#[small]
 fn angle(length: Exact, radius: u32) -> Result<Exact, Status> {
     let divisor = i64::from(radius.max(1)) * SCALE;
     let product = i64::from(length.units.0) * UNITS;

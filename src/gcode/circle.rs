@@ -1,5 +1,7 @@
 //! Which circle the words of a G2 or G3 line describe, and whether they describe one.
 
+use kerf_macros::small;
+
 use super::arc;
 use super::axes;
 use super::block::Block;
@@ -86,6 +88,7 @@ impl State {
 
     /// The centre from I, J, K, which count from the start with G91.1, from the origin with G90.1, in every
     /// distance mode.
+    #[small]
     fn center_form(
         &self,
         block: &Block,
@@ -207,6 +210,7 @@ fn root(mut square: u64) -> f32 {
 }
 
 /// The two coordinates in the plane of an arc.
+#[inline(never)]
 fn in_plane(point: &PerAxis<Length>, arc: &Arc) -> [Length; 2] {
     [arc.first, arc.second].map(|axis| point.get(usize::from(axis)).copied().unwrap_or_default())
 }

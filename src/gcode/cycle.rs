@@ -3,6 +3,8 @@
 //! What is done at each hole is in `steps`. R, the depth, Q and P stay in force (`sticky`). With G91 the
 //! holes are counted from the present place, R from the present height, and the depth from R.
 
+use kerf_macros::small;
+
 use super::axes::{self, Value};
 use super::block::Block;
 use super::command::{Commands, Cycle, Feed, Motion, Spindle};
@@ -18,6 +20,7 @@ use crate::units::Length;
 impl State {
     /// G73, G81 to G89; `before` is the motion mode of the line before.
     #[inline(never)]
+    #[small]
     pub(super) fn cycle(
         &mut self,
         block: &Block,
@@ -51,6 +54,7 @@ impl State {
 
     /// The machine is at the last hole then.
     #[inline(never)]
+    #[small]
     fn end_at_last(&mut self, cycle: &Cycle) -> Result<(), Status> {
         let [first, second, across] = cycle.plane.axes();
         let last = cycle.hole(cycle.holes).ok_or(Status::OutOfRange)?;

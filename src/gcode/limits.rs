@@ -4,6 +4,8 @@
 //! line does not move is not looked at, so that one beyond its travel does not lock the others. Cost on
 //! AVR: 200 cycles for each axis that moves; an arc 25,000 more.
 
+use kerf_macros::small;
+
 use super::arc::{norm, part, round, spoke, turned};
 use super::command::{Arc, Cycle, Motion};
 use super::setup::Setup;
@@ -102,6 +104,7 @@ fn check_cycle(
 /// Whether the points of an arc that lie farthest out in its plane are within the limits, `both` of its first and
 /// second axis, or [`RANGE`]; its end is not looked at. A helix advances evenly, so that its end is the farthest point along its axis.
 #[inline(never)]
+#[small]
 pub(super) fn arc_is_within(
     start: &PerAxis<Length>,
     target: &PerAxis<Length>,

@@ -4,6 +4,8 @@
 //! kept in [`State::origin`], so that moves add one number; the coordinate system in force is that sum without the
 //! other two, so that the tables are asked for other systems only.
 
+use kerf_macros::small;
+
 use super::axes;
 use super::block::Block;
 use super::codes::{NonModal, ToolLength};
@@ -52,6 +54,7 @@ impl State {
 
     /// Tool length and coordinate system.
     #[inline(never)]
+    #[small]
     pub(super) fn offsets(
         &mut self,
         block: &Block,
@@ -85,6 +88,7 @@ impl State {
     }
 
     /// The lengths of tool H; without H, of the tool in the spindle. None are those of an empty spindle, 0.
+    #[small]
     fn tool_named(&self, block: &Block, tables: &impl Tables) -> Result<PerAxis<Length>, Status> {
         let number = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
         let number = number.ok().and_then(|number| u8::try_from(number).ok());
@@ -96,6 +100,7 @@ impl State {
 
     /// Group 0, but for the moves to stored positions.
     #[inline(never)]
+    #[small]
     pub(super) fn non_modal(
         &mut self,
         block: &Block,

@@ -8,14 +8,14 @@
 
 use kerf_macros::small;
 
-use super::divide::{product, quotient, root};
-use super::dynamics::Dynamics;
-use super::float::{OCTAVE, below, cube_root, greater, least, log, scaled, some, whole};
+use super::divide::product;
+use super::dynamics::{Axis, Dynamics};
+use super::float::{cube_root, greater, least, some};
 use super::governor::effective_jerk;
 use super::junction::{Heading, ONE};
-use super::limits::{Slowest, over};
+use super::limits::Slowest;
 use super::path::Path;
-use super::short::Short;
+use super::short::{Log, OCTAVE, Short};
 use crate::math::sqrt;
 use crate::units::FIRST_ROTARY;
 
@@ -29,7 +29,11 @@ const TURNING_JERK: f32 = 0.65;
 /// A corner between two chords changes the velocity by no more than the acceleration does in this time, s.
 const CORNER_S: f32 = 0.01;
 /// 0.5 um, in 2^-14 mm.
-const NOISE: f32 = 8.0;
+const NOISE: Log = Log(3 * OCTAVE);
+/// The square root of three, as a logarithm.
+const THREE: i16 = OCTAVE * 4 / 5;
+/// What a velocity rounded up may take of the jerk, as a logarithm: a tenth.
+const JERK_SPARE: i16 = 39;
 /// No arc is smaller, mm.
 const RADIUS_LEAST: f32 = 1e-3;
 /// Changes of direction below this count as none, as in `junction`. In 2^-14.
@@ -86,7 +90,8 @@ impl Curve {
             let turns = top * top / radius;
             let both = BOTH * accel;
             curve.accel = Short::new(sqrt(both * both - turns * turns));
-            longest = CORNER_S * accel * radius / least(curve.velocity, feed);
+            // A turn takes as long as its chord: that much of its acceleration is left to slow down.
+            longest = CORNER_S * turning * accel * radius / least(curve.velocity, feed);
         }
         // The radius of curvature of a helix is that of its arc times the square of the slope.
         curve.velocity *= slope;
@@ -120,7 +125,7 @@ impl Bend {
     /// The path goes on with a line, from heading `from`. Slows it down if the last two corners are those of a
     /// curve that cannot be taken as fast.
     ///
-    /// Cost: 150 straight on, 1,000 on a curve that is plainly no limit, else 2,500, and 5,000 under a jerk limit.
+    /// Cost: 350 where it is no curve, 750 on a curve that is plainly no limit, else 1,400.
     #[inline(never)]
     pub(super) fn line(&mut self, from: &Heading, path: &mut Path, dynamics: &Dynamics) {
         let (last, before) = (self.last, self.before);
@@ -153,74 +158,149 @@ impl Bend {
             self.corners += 1;
             return;
         }
-        let span = last.get() + scaled(before.get() + path.length, -1);
-        // A chamfer between long lines, or the end of a long one.
-        if below(scaled(last.get(), 2), span) {
-            return;
+        if let Some(span) = span(before, last, self.last) {
+            let plain = Log(Log::of(sum).0 + THREE);
+            if path.bends_too_much(plain, span, path.slowest) {
+                path.bend(&mut both, span, dynamics);
+            }
         }
-        let noise = noise(span);
-        both = both.map(|size: u16| size.saturating_sub(noise));
-        path.bend(&both, span, dynamics);
     }
 }
 
-/// How much of a change of direction within `span` mm may be what positions of three decimals have been rounded by,
-/// in 2^-14. Cost: 400.
-fn noise(span: f32) -> u16 {
-    // The reciprocal, 12 % exact.
-    let reciprocal = f32::from_bits(0x7EF3_11C7u32.wrapping_sub(span.to_bits()));
-    // Never 2^16 or more: the shortest line is 1e-4 mm.
-    whole(NOISE * reciprocal).min(ONE as u32) as u16
+/// The length of a line and of half of both around it, mm; or `None` if it is short against these, as a chamfer between
+/// long lines is, or the end of a long one. Cost: 150.
+#[inline(never)]
+fn span(before: Short, line: Short, after: Short) -> Option<Log> {
+    let (mantissa, power) = line.parts();
+    let mantissa = u16::from(mantissa) | 0x100;
+    let mut twice = 2 * mantissa;
+    for around in [before, after] {
+        let (part, of) = around.parts();
+        let mut part = u16::from(part) | 0x100;
+        let mut shift = of.wrapping_sub(power) as i8;
+        if shift > 3 {
+            return None;
+        }
+        while shift > 0 {
+            part <<= 1;
+            shift -= 1;
+        }
+        while shift < 0 && part != 0 {
+            part >>= 1;
+            shift += 1;
+        }
+        twice += part;
+    }
+    let octaves = (i16::from(power) - 127 - 9 - 4) * OCTAVE;
+    (twice <= 8 * mantissa).then(|| Log(Log::of(twice << 4).0 + octaves))
 }
 
-/// To the nearest of eight values in an octave, so that lines of a curve have one velocity in spite of what is rounded.
-fn coarse(x: f32) -> f32 {
-    f32::from_bits((x.to_bits() + (1 << 19)) & !0xF_FFFF)
+/// How much of a change of direction within `span` mm may be what positions of three decimals have been rounded by,
+/// in 2^-14. Cost: 100.
+#[inline(never)]
+fn noise(span: Log) -> u16 {
+    let (mantissa, power) = Log(NOISE.0 - span.0).power().parts();
+    let mut noise = u16::from(mantissa) | 0x100;
+    let mut shift = power.wrapping_sub(127 + 8) as i8;
+    while shift < 0 && noise != 0 {
+        noise >>= 1;
+        shift += 1;
+    }
+    while shift > 0 && noise < ONE as u16 {
+        noise <<= 1;
+        shift -= 1;
+    }
+    noise
+}
+
+/// A third of a logarithm, which is at least that of 2^-48. Cost: 40.
+fn third(log: i16) -> i16 {
+    const UP: u16 = 3 << 12;
+    (product((log as u16).wrapping_add(UP), 0x5556) >> 16) as i16 - UP as i16 / 3
+}
+
+/// The limits of the axes that take part in a curve: the least jerk, and the acceleration if it is that of all.
+#[derive(Default)]
+struct Sharp {
+    accel: Short,
+    jerk: Short,
+    mixed: bool,
+}
+
+impl Sharp {
+    #[inline(always)]
+    fn look(&mut self, axis: &Axis) {
+        if self.accel == Short::ZERO {
+            self.accel = axis.accel;
+        } else if axis.accel != self.accel {
+            self.mixed = true;
+        }
+        if axis.jerk != Short::ZERO && (self.jerk == Short::ZERO || axis.jerk < self.jerk) {
+            self.jerk = axis.jerk;
+        }
+    }
+}
+
+/// What the curve may take altogether, as axes have different limits: it turns on, so that each will take part in it as
+/// much as the one that does most now.
+#[inline(never)]
+#[small]
+fn acceleration(both: &[u16; FIRST_ROTARY], dynamics: &Dynamics) -> i16 {
+    let most = both.iter().fold(0, |most, size| most.max(*size));
+    let mut least = i16::MAX;
+    for (&size, axis) in both.iter().zip(&dynamics.axes) {
+        // An axis that hardly takes part does not count.
+        if size >= STRAIGHT && axis.accel != Short::ZERO {
+            let along = axis.accel.log().0 + Log::of(most).0 - Log::of(size).0;
+            least = least.min(along);
+        }
+    }
+    least
 }
 
 impl Path {
+    /// Whether it is too fast for an acceleration and a jerk, 0 for none, on a path whose direction changes by `both`, in
+    /// 2^-14, within `span` mm.
+    #[inline(never)]
+    fn bends_too_much(&self, both: Log, span: Log, (accel, jerk): (Short, Short)) -> bool {
+        let top = Short::new(self.top).log().0;
+        // v^2 / r and v^3 / r^2.
+        let once = top + both.0 - 14 * OCTAVE - span.0 + top;
+        accel != Short::ZERO && once > accel.log().0
+            || jerk != Short::ZERO && once + once - top > jerk.log().0
+    }
+
     /// Keeps to what axes can on a path whose direction changes by `both`, in 2^-14, within `span` mm.
     #[inline(never)]
-    fn bend(&mut self, both: &[u16; FIRST_ROTARY], span: f32, dynamics: &Dynamics) {
-        let (mut squares, mut most) = (0u32, 0);
-        for &size in both {
-            squares += product(size, size);
-            most = size.max(most);
-        }
-        if most == 0 {
-            return;
-        }
-        // The square of the curvature, and its logarithm.
-        let sum = squares as f32;
-        let bent = log(sum) - 28 * OCTAVE - 2 * log(span);
-        let (accel, jerk) = (self.slowest.0.get(), self.slowest.1.get());
-        // Half an octave for the logarithms' error.
-        let keeps = |top: f32, accel: f32, jerk: f32| {
-            let top = log(top);
-            (!some(accel) || 2 * top + bent / 2 + OCTAVE / 2 < log(accel))
-                && (!some(jerk) || 3 * top + bent + OCTAVE / 2 < log(jerk))
-        };
-        if keeps(self.top, accel, jerk) {
-            return;
-        }
-        let mut slowest = Slowest::default();
-        for (&u, axis) in both.iter().zip(&dynamics.axes) {
-            // An axis that hardly takes part does not count.
-            if u >= STRAIGHT {
-                slowest.look_at(u, axis.accel, axis.jerk);
+    fn bend(&mut self, both: &mut [u16; FIRST_ROTARY], span: Log, dynamics: &Dynamics) {
+        let noise = noise(span);
+        let mut squares = 0u32;
+        let mut slowest = Sharp::default();
+        for (size, axis) in both.iter_mut().zip(&dynamics.axes) {
+            *size = size.saturating_sub(noise);
+            if *size >= STRAIGHT {
+                squares += product(*size, *size);
+                slowest.look(axis);
             }
         }
-        if slowest.accel != Short::ZERO {
-            // The curve turns on: the axis will take part in it as much as the one that does most now.
-            let unit = quotient(product(root(squares), slowest.unit), most);
-            let square = over(slowest.accel, unit) * span;
-            if below(square, self.top * self.top) {
-                self.slow_down(coarse(sqrt(square)));
-            }
+        if squares == 0 {
+            return;
         }
-        let jerk = slowest.jerk.get();
-        if !keeps(self.top, 0.0, jerk) {
-            self.slow_down(coarse(cube_root(0.9 * jerk * span * span / scaled(sum, -28))));
+        let curvature = Log::of_wide(squares).0 / 2 - 14 * OCTAVE - span.0;
+        let mut velocity = i16::MAX;
+        if slowest.mixed {
+            velocity = (acceleration(both, dynamics) - curvature) / 2;
+        } else if slowest.accel != Short::ZERO {
+            velocity = (slowest.accel.log().0 - curvature) / 2;
+        }
+        if slowest.jerk != Short::ZERO {
+            let log = slowest.jerk.log().0 - JERK_SPARE - 2 * curvature;
+            velocity = velocity.min(third(log));
+        }
+        if velocity < Short::new(self.top).log().0 {
+            // To one of eight values in an octave, so that lines of a curve have one velocity in spite of what is
+            // rounded: 2 % up or 6 % down.
+            self.slow_down(Log((velocity + OCTAVE / 32) & !(OCTAVE / 8 - 1)).power().get());
         }
     }
 
@@ -246,6 +326,13 @@ mod tests {
             deviation: Short::new(0.01),
         };
         Dynamics { axes: [axis; 6], junction: accel, ..Dynamics::default() }
+    }
+
+    #[test]
+    fn thirds() {
+        for log in -48 * OCTAVE..=i16::MAX {
+            assert!((3 * i32::from(third(log)) - i32::from(log)).abs() <= 3, "{log}");
+        }
     }
 
     proptest! {

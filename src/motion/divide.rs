@@ -118,6 +118,32 @@ pub fn product(a: u16, b: u16) -> u32 {
     u32::from(a) * u32::from(b)
 }
 
+/// `a * b / 256`, rounded down. Cost: 5, where the compiler takes 15.
+#[cfg(target_arch = "avr")]
+#[inline(always)]
+pub fn high_product(a: u8, b: u8) -> u8 {
+    let high: u8;
+    // SAFETY: arithmetic on its operands; r0 is scratch, and r1 is 0 again at the end.
+    unsafe {
+        core::arch::asm!(
+            "mul  {a}, {b}",
+            "mov  {high}, r1",
+            "clr  r1",
+            a = in(reg) a,
+            b = in(reg) b,
+            high = lateout(reg) high,
+            options(pure, nomem, nostack),
+        );
+    }
+    high
+}
+
+/// `a * b / 256`, rounded down.
+#[cfg(not(target_arch = "avr"))]
+pub fn high_product(a: u8, b: u8) -> u8 {
+    ((u16::from(a) * u16::from(b)) >> 8) as u8
+}
+
 /// The square root, rounded down. Cost: 320.
 #[inline(never)]
 pub fn root(x: u32) -> u16 {

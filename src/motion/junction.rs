@@ -6,6 +6,8 @@
 //!
 //! Called by the line builder. Units: mm (degrees for rotary axes), s. Costs are AVR cycles.
 
+use kerf_macros::small;
+
 use super::divide::product;
 use super::dynamics::Dynamics;
 use super::float::{OCTAVE, below, log, scaled, some};
@@ -43,6 +45,7 @@ pub fn deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> f32 {
 }
 
 #[inline(never)]
+#[small]
 fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> f32 {
     let (mut norm, mut sum) = (0.0, 0.0);
     for (&u, axis) in unit.iter().zip(&dynamics.axes) {

@@ -2,14 +2,16 @@
 //!
 //! Called by the line builder. Units: mm, s.
 
+use kerf_macros::small;
+
 use super::divide::quotient;
 use super::dynamics::{Axis, Dynamics};
 use super::exec::BLOCK_S_MIN;
 use super::float::{OCTAVE, below, least, log, scaled, some};
 use super::governor::{ACCEL_MOST, effective_jerk};
 use super::junction::ONE;
-use super::path::{Path, composed};
-use super::short::Short;
+use super::path::Path;
+use super::short::{self, Log, Short};
 use crate::boards::MOTORS;
 use crate::gcode::command::Feed;
 use crate::math::sqrt;
@@ -18,6 +20,8 @@ use crate::math::sqrt;
 const CRUISE_MOST: f32 = 1e5;
 /// See [`CRUISE_MOST`].
 const CRUISE_LEAST: f32 = 1e-6;
+/// The logarithm of [`BLOCK_S_MIN`], or more by what rough ones are off.
+const BLOCK_S_LOG: i16 = -10 * short::OCTAVE;
 
 /// A feed and what it comes to: mostly that of the move before.
 #[derive(Clone, Copy, Debug, Default)]
@@ -57,7 +61,7 @@ impl Path {
                 left >>= 1;
                 let (u, axis) = all.next()?;
                 if moves {
-                    return Some(((u.unsigned_abs() + 2).min(ONE as u16), axis));
+                    return Some((part(*u), axis));
                 }
             }
             None
@@ -75,18 +79,22 @@ impl Path {
         // Within what no division goes wrong with.
         self.cruise = within(self.cruise);
         // An override may double a feed.
-        let mut top = if feed.is_some() { scaled(self.cruise, 1) } else { self.cruise };
-        for (u, axis) in self.axes(dynamics) {
-            let velocity = if feed.is_some() { axis.feed } else { axis.velocity };
-            // Most axes are slower than the path.
-            if some(velocity) && below(velocity, top) {
-                let u = float(u);
-                if below(velocity, u * top) {
-                    top = velocity / u;
+        let top = if feed.is_some() { scaled(self.cruise, 1) } else { self.cruise };
+        self.top = within(top);
+        let mut left = self.moved;
+        for (u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
+            if left & 1 != 0 {
+                let velocity = if feed.is_some() { axis.feed } else { axis.velocity };
+                // Most axes are slower than the path.
+                if below(velocity, self.top) && some(velocity) {
+                    self.top = slower(self.top, *u, velocity);
                 }
             }
+            left >>= 1;
+            if left == 0 {
+                break;
+            }
         }
-        self.top = within(top);
         self.cruise = least(self.cruise, self.top);
     }
 
@@ -94,32 +102,40 @@ impl Path {
     #[inline(never)]
     pub(super) fn limit_change(&mut self, dynamics: &Dynamics) {
         let mut slowest = Slowest::default();
-        // Of lengths and angles together each limit is measured along the way.
-        let mixed = some(self.stretch);
-        for (u, axis) in self.axes(dynamics) {
-            let along = |limit: Short| {
-                if mixed && limit != Short::ZERO { Short::new(over(limit, u)) } else { limit }
-            };
-            let u = if mixed { ONE as u16 } else { u };
-            slowest.look(u, along(axis.accel), along(axis.jerk));
+        if some(self.stretch) {
+            self.look_along(&mut slowest, dynamics);
+        } else {
+            for (u, axis) in self.axes(dynamics) {
+                slowest.look(u, axis.accel, axis.jerk);
+            }
         }
         self.slowest = (slowest.least, slowest.jerk);
         let jerk = slowest.jerk.get();
-        let least = slowest.least.get();
-        if some(least) {
+        if slowest.least != Short::ZERO {
+            let least = slowest.least.get();
             // Plainly of no effect if it allows the acceleration within 2^-11 s.
             let plain = log(least) + 11 * OCTAVE < log(jerk);
             let jerk = if !some(jerk) || plain { 0.0 } else { effective_jerk(jerk, least) };
-            let accel = if some(jerk) { least } else { over(slowest.accel, slowest.unit) };
-            self.accel = Short::new(least_of(accel));
+            let accel = if some(jerk) { slowest.least } else { over(slowest.accel, slowest.unit) };
+            self.accel = accel.min(Short::new(ACCEL_MOST));
             self.jerk = Short::new(jerk);
         } else if some(jerk) {
             // What a ramp to full speed comes to, so that the jerk alone limits it.
-            let accel = least_of(sqrt(jerk * power_of_two_above(self.cruise)));
+            let accel = least(sqrt(jerk * power_of_two_above(self.cruise)), ACCEL_MOST);
             self.accel = Short::new(accel);
             self.jerk = Short::new(effective_jerk(jerk, accel));
         } else {
             self.accel = Short::new(ACCEL_MOST);
+        }
+    }
+
+    /// Of lengths and angles together each limit is measured along the way.
+    #[inline(never)]
+    #[small]
+    fn look_along(&self, slowest: &mut Slowest, dynamics: &Dynamics) {
+        for (u, axis) in self.axes(dynamics) {
+            let along = |limit| if limit == Short::ZERO { limit } else { over(limit, u) };
+            slowest.look_at(ONE as u16, along(axis.accel), along(axis.jerk));
         }
     }
 
@@ -131,19 +147,34 @@ impl Path {
             return;
         }
         let rate = rates[usize::from(self.moving) - 1];
-        let most = f32::from(self.most);
-        // Two octaves: plainly below the limit, whatever the logarithms' error.
-        if log(self.top) + log(most) + 2 * OCTAVE > log(rate) + log(self.length) {
+        let rough = |x| Short::new(x).rough().0;
+        let (top, length) = (rough(self.top), rough(self.length));
+        // An octave: plainly below the limit, whatever the logarithms' error.
+        if top + Log::of(self.most).0 + short::OCTAVE > rough(rate) + length {
+            let most = f32::from(self.most);
             let way = rate * self.length;
             if below(way, self.top * most) {
                 self.top = way / most;
             }
         }
-        if below(self.length, self.top * BLOCK_S_MIN) {
-            self.top = self.length * (1.0 / BLOCK_S_MIN);
+        if top + BLOCK_S_LOG > length {
+            self.top = least(self.top, self.length * (1.0 / BLOCK_S_MIN));
         }
         self.cruise = least(self.cruise, self.top);
     }
+}
+
+/// `top`, or what an axis with this part of the heading and this limit allows.
+#[inline(never)]
+fn slower(top: f32, u: i16, velocity: f32) -> f32 {
+    let u = float(part(u));
+    if below(velocity, u * top) { within(velocity / u) } else { top }
+}
+
+/// The size of a part of the heading, or a little more: never less than it is.
+#[inline(always)]
+fn part(u: i16) -> u16 {
+    (u.unsigned_abs() + 2).min(ONE as u16)
 }
 
 /// No slower than the least and no faster than the most. Cost: 40.
@@ -151,21 +182,25 @@ fn within(cruise: f32) -> f32 {
     if below(cruise, CRUISE_LEAST) { CRUISE_LEAST } else { least(cruise, CRUISE_MOST) }
 }
 
-fn least_of(accel: f32) -> f32 {
-    least(accel, ACCEL_MOST)
-}
-
-/// A limit along the path: that of an axis, not 0, over its part `u` of the heading, not 0. As exact as
-/// a [`Short`]. Cost: 350, where a division of floats takes 700.
+/// A limit along the path: that of an axis, not 0, over its part `u` of the heading, not 0. Cost: 230, where a division
+/// of floats takes 700.
 #[inline(never)]
-pub(super) fn over(limit: Short, u: u16) -> f32 {
-    let (limit, u) = (limit.get().to_bits(), f32::from(u).to_bits());
-    // Their mantissas, the first of 9 bits, the other of 16.
-    let above = u32::from((limit >> 15) as u16 & 0xFF | 0x100) << 22;
-    let below = (u >> 8) as u16 | 0x8000;
-    let quotient = quotient(above, below);
-    let power = (limit >> 23) as i16 - (u >> 23) as i16 + 127 + 14;
-    composed(quotient, power)
+pub(super) fn over(limit: Short, u: u16) -> Short {
+    let (mantissa, mut power) = limit.parts();
+    let above = u16::from(mantissa) << 7 | 0x8000;
+    let mut below = u;
+    power = power.wrapping_sub(1);
+    while below & 0x8000 == 0 && below != 0 {
+        below <<= 1;
+        power = power.wrapping_add(1);
+    }
+    // The quotient less one: the leading 1 is left away.
+    let mut rest = above.wrapping_sub(below);
+    if above < below {
+        rest = rest.wrapping_add(above);
+        power = power.wrapping_sub(1);
+    }
+    Short::of_parts(quotient(u32::from(rest) << 8, below) as u8, power)
 }
 
 /// A part of a heading as a float.
@@ -201,7 +236,7 @@ impl Slowest {
             } else if accel == self.accel {
                 self.unit < u
             } else {
-                below(accel.get() * f32::from(self.unit), self.accel.get() * f32::from(u))
+                is_slower(accel, self.unit, self.accel, u)
             };
             if slower {
                 self.accel = accel;
@@ -212,6 +247,12 @@ impl Slowest {
             self.jerk = jerk;
         }
     }
+}
+
+/// Whether `a / u` is below `b / v`, given crosswise.
+#[inline(never)]
+fn is_slower(a: Short, v: u16, b: Short, u: u16) -> bool {
+    below(a.get() * f32::from(v), b.get() * f32::from(u))
 }
 
 /// The power of two that is not below `x`, as blocks of nearly the same velocity are to have the same
@@ -231,7 +272,7 @@ mod tests {
         fn over_is_a_division(limit in 1e-3f32..1e7, u in 1..=ONE as u16) {
             let limit = Short::new(limit);
             let exact = limit.get() / float(u);
-            prop_assert_eq!(Short::new(over(limit, u)), Short::new(exact));
+            prop_assert_eq!(over(limit, u), Short::new(exact));
         }
     }
 }

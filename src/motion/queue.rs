@@ -9,7 +9,7 @@ use core::mem::MaybeUninit;
 
 use super::block::{Block, Body, Line};
 use super::factors::Factors;
-use super::float::{OCTAVE, greater, lesser, log, some};
+use super::float::{OCTAVE, below, greater, least, lesser, log, some};
 use super::horizon::{self, Horizon, kappa};
 use super::short::Short;
 pub use super::source::{Anchor, BlockSource};
@@ -179,8 +179,7 @@ impl BlockQueue {
         if self.ring.free() == 0 {
             return false;
         }
-        self.refine(line);
-        line.start = self.end();
+        line.start = self.refined(line);
         line.entry = Short::new(entry);
         let cruise = line.velocity(&self.factors);
         let key =
@@ -189,7 +188,7 @@ impl BlockQueue {
         let fill = |slot: &mut MaybeUninit<Block>| {
             slot.write(Block::new(Body::Line(*line), number));
         };
-        let entry = Short::new(lesser(line.entry.get(), cruise));
+        let entry = Short::new(least(line.entry.get(), cruise));
         self.put(fill, key.map(|(key, firm)| (key, firm, entry)), |horizon| horizon.end = end)
     }
 
@@ -255,17 +254,17 @@ impl BlockQueue {
         }
     }
 
-    /// Makes potentials small if they have become large for this line.
-    fn refine(&mut self, line: &Line) {
+    /// Potential at the end of the queue, after all of them have been made small if they have become large for this line.
+    fn refined(&mut self, line: &Line) -> f32 {
         let end = self.end();
         // Nothing is there, or it is plainly fine: no need to compare.
         if !some(end) || log(end) < 2 * log(line.cruise) + FINE {
-            return;
+            return end;
         }
-        let cruise = line.cruise;
-        if end > COARSE * cruise * cruise {
+        if below(COARSE * line.cruise * line.cruise, end) {
             exec::lock(|ceiling| self.rebase(ceiling));
         }
+        self.end()
     }
 
     /// Takes the potential of the oldest line in the queue off all of them. Cost: 400 a block, exec

@@ -1,4 +1,6 @@
-//! A positive float in two bytes, for limits kept in every block.
+//! A positive float in two bytes, for limits kept in every block, and its logarithm.
+
+use super::divide::high_product;
 
 /// Eight bits of exponent and eight of mantissa: 0.4 % exact, rounded down, so that a limit stays one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -32,6 +34,93 @@ impl Short {
     pub fn get(self) -> f32 {
         f32::from_bits(u32::from(self.0) << 15)
     }
+
+    /// Its logarithm. The number is not 0. Cost: 20.
+    #[inline(always)]
+    pub fn log(self) -> Log {
+        let (mantissa, power) = self.parts();
+        Log::new(power.wrapping_sub(ONE), mantissa)
+    }
+
+    /// Its logarithm, or up to 0.09 octaves less. Cost: 5.
+    #[inline(always)]
+    pub fn rough(self) -> Log {
+        let (mantissa, power) = self.parts();
+        Log(i16::from_le_bytes([mantissa, power.wrapping_sub(ONE)]))
+    }
+
+    /// From a mantissa without the leading 1, and an exponent.
+    #[inline(always)]
+    pub fn of_parts(mantissa: u8, power: u8) -> Self {
+        Self(u16::from_le_bytes([mantissa, power]))
+    }
+
+    /// Its mantissa without the leading 1, and its exponent.
+    #[inline(always)]
+    pub fn parts(self) -> (u8, u8) {
+        let [mantissa, power] = self.0.to_le_bytes();
+        (mantissa, power)
+    }
+}
+
+/// The exponent of 1, as a [`Short`] has it.
+const ONE: u8 = 127;
+
+/// A logarithm to base two, in 1/256: of products and powers it makes sums and multiples, at 5 cycles each. 1.5 % exact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Log(pub i16);
+
+/// A factor of two.
+pub const OCTAVE: i16 = 256;
+
+impl Log {
+    /// From a power of two and a mantissa.
+    #[inline(always)]
+    fn new(power: u8, mantissa: u8) -> Self {
+        Self(i16::from_le_bytes([mantissa.wrapping_add(bulge(mantissa)), power]))
+    }
+
+    /// Of an integer, not 0. Cost: 45 to 85.
+    #[inline(never)]
+    pub fn of(n: u16) -> Self {
+        // The last bit of the first one ends the search, whatever there is.
+        let (mut n, mut power) = if n < 0x100 { (n << 8 | 1, 7u8) } else { (n, 15) };
+        while n & 0x8000 == 0 {
+            n <<= 1;
+            power = power.wrapping_sub(1);
+        }
+        let [_, mantissa] = (n << 1).to_le_bytes();
+        Self::new(power, mantissa)
+    }
+
+    /// Of a larger integer, not 0. Cost: 60 to 100.
+    #[inline(never)]
+    pub fn of_wide(n: u32) -> Self {
+        let [_, _, low, high] = n.to_le_bytes();
+        // At least nine bits are left.
+        let (n, octaves) = if high != 0 {
+            ((n >> 16) as u16, 16 * OCTAVE)
+        } else if low != 0 {
+            ((n >> 8) as u16, 8 * OCTAVE)
+        } else {
+            (n as u16, 0)
+        };
+        Self(Self::of(n).0 + octaves)
+    }
+
+    /// The number. Cost: 20.
+    #[inline(always)]
+    pub fn power(self) -> Short {
+        let [fraction, power] = self.0.to_le_bytes();
+        let mantissa = fraction.wrapping_sub(bulge(fraction));
+        Short::of_parts(mantissa, power.wrapping_add(ONE))
+    }
+}
+
+/// How much the logarithm of 1 + m is above m, and nearly how much 1 + m is above 2 to the power of m. All in 1/256.
+#[inline(always)]
+fn bulge(m: u8) -> u8 {
+    high_product(high_product(m, !m), 88)
 }
 
 #[cfg(test)]
@@ -48,6 +137,30 @@ mod tests {
         for x in [0.0, 1e-6, 0.3, 1.0, 499.99, 500.0, 7.3e9] {
             let (low, high) = (Short::new(x), Short::above(x));
             assert!(high.get() >= x && (low < high) == (low.get() < x), "{x}");
+        }
+    }
+
+    #[test]
+    fn logarithms_are_exact_to_two_percent() {
+        for n in 1..=u16::MAX {
+            let exact = f64::from(n).log2();
+            let log = |log: Log| f64::from(log.0) / f64::from(OCTAVE);
+            assert!((log(Log::of(n)) - exact).abs() < 0.02, "{n}");
+            assert!((log(Log::of_wide(n.into())) - exact).abs() < 0.02, "{n}");
+            let wide = u32::from(n) * 65_537;
+            assert!((log(Log::of_wide(wide)) - f64::from(wide).log2()).abs() < 0.02, "{n}");
+            let short = Short::new(n.into());
+            assert!((log(short.log()) - exact).abs() < 0.02, "{n}");
+            let back = short.log().power().get() / short.get();
+            assert!((back - 1.0).abs() < 0.012, "{n} {back}");
+        }
+    }
+
+    #[test]
+    fn logarithms_reach_far() {
+        for x in [1e-9f32, 3e-4, 1.0, 2.5e7, 1e20] {
+            let log = f64::from(Short::new(x).log().0) / f64::from(OCTAVE);
+            assert!((log - f64::from(x).log2()).abs() < 0.014, "{x}");
         }
     }
 }

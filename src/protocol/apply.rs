@@ -73,13 +73,13 @@ impl Request {
             }
             table::Kind::Constant | table::Kind::Text => return Err(Status::ReadOnly),
         };
-        let number = match pair.kind {
-            Kind::Number => Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?,
+        let value = match pair.kind {
+            Kind::Number => number(pair, c.line)?,
             Kind::True | Kind::False if small => Number::int((pair.kind == Kind::True).into()),
             _ => return Err(Status::UnsupportedType),
         };
         let inches = c.machine.inches();
-        let checked = c.machine.settings().check(setting, number, inches);
+        let checked = c.machine.settings().check(setting, value, inches);
         if checked.is_err() && setting.is_baud() {
             self.warning = self.warning.max(Warning::Baud);
         }
@@ -115,12 +115,8 @@ fn set_row<M: Machine, O>(
     pair: &Pair,
     c: &mut Context<'_, M, O>,
 ) -> Result<(), Status> {
-    if pair.kind != Kind::Number {
-        return Err(Status::UnsupportedType);
-    }
-    let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
     let inches = c.machine.inches() && place_form(axis) == Form::Length;
-    let value = number.fixed(Length::DECIMALS, inches).ok_or(Status::OutOfRange)?;
+    let value = fixed(pair, c.line, Length::DECIMALS, inches)?;
     c.machine.set_row(row, axis, Length(value))
 }
 
@@ -128,12 +124,8 @@ fn set_row<M: Machine, O>(
 #[inline(never)]
 #[small]
 fn jog<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
-    if pair.kind != Kind::Number {
-        return Err(Status::UnsupportedType);
-    }
     let axis = pair.name.of(c.line).last().copied().and_then(axis_of);
-    let number = Number::parse(pair.value.of(c.line)).ok_or(Status::BadNumber)?;
-    let place = number.fixed(Length::DECIMALS, false).ok_or(Status::OutOfRange)?;
+    let place = fixed(pair, c.line, Length::DECIMALS, false)?;
     done(c.machine.jog(axis.ok_or(Status::UnrecognizedName)?, Length(place)))
 }
 
@@ -153,7 +145,7 @@ fn set_value<M: Machine, O>(
             let on = match pair.kind {
                 Kind::True => 1,
                 Kind::False => 0,
-                _ => whole(pair, c)?,
+                _ => whole(pair, c.line)?,
             };
             Change::switch(
                 which,
@@ -169,11 +161,7 @@ fn set_value<M: Machine, O>(
 /// The factor that a pair gives an override, thousandths.
 #[small]
 fn factor(which: Override, pair: &Pair, line: &[u8]) -> Result<u16, Status> {
-    if pair.kind != Kind::Number {
-        return Err(Status::UnsupportedType);
-    }
-    let number = Number::parse(pair.value.of(line)).ok_or(Status::BadNumber)?;
-    let factor = number.fixed(3, false).ok_or(Status::OutOfRange)?;
+    let factor = fixed(pair, line, 3, false)?;
     match u32::try_from(factor) {
         Ok(factor) if which.allows(factor) => Ok(factor as u16),
         _ => Err(Status::OutOfRange),
@@ -185,16 +173,30 @@ fn done(status: Status) -> Result<(), Status> {
     if status == Status::Ok { Ok(()) } else { Err(status) }
 }
 
-/// The value of a pair as a whole number.
+/// The value of a pair, a number.
+#[inline(never)]
 #[small]
-fn whole<M, O>(pair: &Pair, c: &Context<'_, M, O>) -> Result<i32, Status> {
-    if pair.kind != Kind::Number {
-        return Err(Status::UnsupportedType);
+fn number(pair: &Pair, line: &[u8]) -> Result<Number, Status> {
+    match pair.kind {
+        Kind::Number => Number::parse(pair.value.of(line)).ok_or(Status::BadNumber),
+        _ => Err(Status::UnsupportedType),
     }
-    Number::parse(pair.value.of(c.line))
-        .filter(|number| number.is_integer())
-        .and_then(|number| number.fixed(0, false))
-        .ok_or(Status::BadNumber)
+}
+
+/// The value of a pair with so many decimals.
+#[inline(never)]
+#[small]
+fn fixed(pair: &Pair, line: &[u8], decimals: u8, inches: bool) -> Result<i32, Status> {
+    number(pair, line)?.fixed(decimals, inches).ok_or(Status::OutOfRange)
+}
+
+/// The value of a pair as a whole number.
+#[inline(never)]
+#[small]
+fn whole(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
+    let number = number(pair, line)?;
+    let value = if number.is_integer() { number.fixed(0, false) } else { None };
+    value.ok_or(Status::BadNumber)
 }
 
 #[small]
@@ -215,7 +217,7 @@ fn act<M: Machine, O>(
         }
         Action::Test if pair.kind == Kind::Null => return Ok(()),
         Action::Test => {
-            let number = whole(pair, c)?;
+            let number = whole(pair, c.line)?;
             let number = u8::try_from(number).map_err(|_| Status::OutOfRange)?;
             return done(c.machine.start_job(number));
         }
@@ -240,7 +242,7 @@ fn act<M: Machine, O>(
     };
     let motor = match pair.kind {
         Kind::Null | Kind::True => 0,
-        _ => whole(pair, c)?,
+        _ => whole(pair, c.line)?,
     };
     match motor {
         0 => done(c.machine.energize(None, on)),

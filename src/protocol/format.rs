@@ -24,6 +24,7 @@ pub(super) const SILENT: u8 = 128;
 
 impl Format {
     /// JSON, as the settings say.
+    #[inline(never)]
     pub fn json(settings: &Settings) -> Format {
         let strict = if settings.json_strict() { STRICT } else { 0 };
         let plain = Format::plain(settings);
@@ -55,6 +56,7 @@ impl Format {
     }
 
     /// Text: `key:value,key:value`.
+    #[inline(never)]
     pub fn plain(settings: &Settings) -> Format {
         let expand = if settings.expand_line_feeds() { EXPAND } else { 0 };
         Format { flags: PLAIN | expand, dialect: Dialect::of(settings) }

@@ -26,6 +26,7 @@ pub struct Span {
 #[small]
 impl Span {
     /// Its bytes.
+    #[inline(never)]
     pub fn of(self, line: &[u8]) -> &[u8] {
         line.get(usize::from(self.start)..usize::from(self.end)).unwrap_or(&[])
     }

@@ -8,6 +8,7 @@
 
 use embassy_futures::select::select;
 use embassy_time::Timer;
+use kerf_macros::small;
 
 use super::health;
 use super::links::Links;
@@ -54,24 +55,24 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         }
         for port in &links.ports {
             if port.enquiry.take() {
-                answer_enquiry(links, port).await;
+                tell(links, port, What::Enquiry).await;
             }
             if let Some(status) = port.exception.take() {
-                report_exception(links, port, status).await;
+                tell(links, port, What::Exception(status)).await;
             }
         }
         if links.probe.take_news() {
             // The planner waits for it.
             flags::set(Event::BlockDone);
-            report_probing(links).await;
+            tell(links, links.told(), What::Probing).await;
         }
         let (state, hold) = state_of(links);
         let (jogged, flushed) = (links.jogged.take(), links.flushed.take());
         if jogged || flushed {
-            report_end(links, jogged, flushed).await;
+            tell(links, links.told(), What::End { jogged, flushed }).await;
         }
         if queue_free() != told.blocks_free && reports_queue(links) {
-            told.blocks_free = report_queue(links).await;
+            told.blocks_free = tell(links, links.told(), What::Queue).await;
         }
         let elapsed = millis().wrapping_sub(told.at);
         let interval = u32::from(links.settings.borrow().status_interval_ms());
@@ -81,7 +82,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             (told.state, told.hold) = (state, hold);
             told.at = millis();
             due = false;
-            report_status(links).await;
+            tell(links, links.told(), What::Status).await;
         }
         links.reporter_wake.set_polling(moves && !reports_queue(links));
         if due || moves {
@@ -105,97 +106,119 @@ fn reports_queue(links: &Links) -> bool {
     links.settings.borrow().queue_verbosity() != 0
 }
 
-/// Sends something that is put in steps: `step` says whether there is more. All of it in one turn, if there is room.
-async fn send(
-    links: &Links,
-    port: &Port,
-    tx: &mut Tx,
-    mut step: impl FnMut(&mut View, &mut Tx) -> bool,
-) {
+/// What can be told.
+#[derive(Clone, Copy)]
+enum What {
+    /// Who the machine is; in text mode with the first prompt.
+    Greeting(Occasion),
+    /// The answer to ENQ.
+    Enquiry,
+    Exception(Status),
+    Probing,
+    Status,
+    /// A jog has ended, or the queue has been flushed, or both.
+    End {
+        jogged: bool,
+        flushed: bool,
+    },
+    Queue,
+}
+
+/// How far it has been told.
+enum Telling {
+    Greeting(Banner, Occasion),
+    Enquiry,
+    Exception(Exception),
+    Probing(Probing),
+    Status(Option<Report>),
+    End {
+        jogged: bool,
+        flushed: bool,
+    },
+    /// How many blocks are free, as it was told.
+    Queue(usize),
+}
+
+#[small]
+impl Telling {
+    /// Begins. What is told is what is so by now.
+    #[inline(never)]
+    fn begin(what: What, links: &Links, port: &Port) -> Self {
+        let settings = links.settings.borrow();
+        match what {
+            What::Greeting(occasion) => {
+                Self::Greeting(Banner::begin(occasion, &settings), occasion)
+            }
+            What::Enquiry => Self::Enquiry,
+            What::Exception(status) => Self::Exception(Exception::begin(status, &settings)),
+            What::Probing => Self::Probing(Probing::begin(&settings)),
+            What::Status => {
+                drop(settings);
+                Self::Status(Report::begin(port.mode.get(), &mut View::of(links, port)))
+            }
+            What::End { jogged, flushed } => Self::End { jogged, flushed },
+            What::Queue => Self::Queue(0),
+        }
+    }
+
+    /// Puts the next part. Whether there is more.
+    #[inline(never)]
+    fn step(&mut self, links: &Links, port: &Port, tx: &mut Tx) -> bool {
+        let view = &mut View::of(links, port);
+        let mode = port.mode.get();
+        let more = match self {
+            Self::Greeting(banner, occasion) => {
+                let more = banner.step(view, tx);
+                if !more && *occasion == Occasion::Ready && mode == Mode::Text {
+                    put_ready_prompt(view, tx);
+                }
+                more
+            }
+            Self::Enquiry => {
+                acknowledge(view.settings(), tx);
+                false
+            }
+            Self::Exception(exception) => exception.step(view, tx),
+            Self::Probing(probing) => probing.step(view, tx),
+            Self::Status(report) => report.as_mut().is_some_and(|report| report.step(view, tx)),
+            Self::End { jogged, flushed } => {
+                if core::mem::take(jogged) {
+                    jog_ended(view.settings(), tx);
+                    *flushed
+                } else {
+                    queue_report(mode, view, tx);
+                    receive_report(mode, view, tx);
+                    false
+                }
+            }
+            Self::Queue(free) => {
+                *free = view.value(Value::QueueFree) as usize;
+                queue_report(mode, view, tx);
+                false
+            }
+        };
+        tx.flush();
+        more
+    }
+}
+
+/// Tells it on a port, a part at a time: all in one turn, if there is room. Of a queue report returns how many blocks are
+/// free in it, which may have changed during the wait for the transmitter.
+async fn tell(links: &Links, port: &Port, what: What) -> usize {
+    let mut tx = port.tx.lock().await;
+    let mut telling = Telling::begin(what, links, port);
     loop {
         tx.room().await;
-        let more = step(&mut View::of(links, port), tx);
-        tx.flush();
-        if !more {
+        if !telling.step(links, port, &mut tx) {
             break;
         }
     }
+    if let Telling::Queue(free) = telling { free } else { 0 }
 }
 
-/// Says who the machine is; in text mode with the first prompt.
+/// Says who the machine is.
 async fn greet(links: &Links, occasion: Occasion) {
     for port in links.ports.iter().filter(|port| !is_shared(port.number)) {
-        let mut tx = port.tx.lock().await;
-        let mut banner = Banner::begin(occasion, &links.settings.borrow());
-        send(links, port, &mut tx, |view, tx| {
-            let more = banner.step(view, tx);
-            if !more && occasion == Occasion::Ready && port.mode.get() == Mode::Text {
-                put_ready_prompt(view, tx);
-            }
-            more
-        })
-        .await;
+        tell(links, port, What::Greeting(occasion)).await;
     }
-}
-
-async fn answer_enquiry(links: &Links, port: &Port) {
-    let mut tx = port.tx.lock().await;
-    send(links, port, &mut tx, |view, tx| {
-        acknowledge(view.settings(), tx);
-        false
-    })
-    .await;
-}
-
-async fn report_status(links: &Links) {
-    let port = links.told();
-    let mut tx = port.tx.lock().await;
-    let report = Report::begin(port.mode.get(), &mut View::of(links, port));
-    if let Some(mut report) = report {
-        send(links, port, &mut tx, |view, tx| report.step(view, tx)).await;
-    }
-}
-
-/// A jog has ended, or the queue has been flushed.
-async fn report_end(links: &Links, mut jogged: bool, flushed: bool) {
-    let port = links.told();
-    let mut tx = port.tx.lock().await;
-    send(links, port, &mut tx, |view, tx| {
-        if core::mem::take(&mut jogged) {
-            jog_ended(view.settings(), tx);
-            return flushed;
-        }
-        queue_report(port.mode.get(), view, tx);
-        receive_report(port.mode.get(), view, tx);
-        false
-    })
-    .await;
-}
-
-async fn report_exception(links: &Links, port: &Port, status: Status) {
-    let mut tx = port.tx.lock().await;
-    let mut exception = Exception::begin(status, &links.settings.borrow());
-    send(links, port, &mut tx, |view, tx| exception.step(view, tx)).await;
-}
-
-async fn report_probing(links: &Links) {
-    let port = links.told();
-    let mut tx = port.tx.lock().await;
-    let mut probing = Probing::begin(&links.settings.borrow());
-    send(links, port, &mut tx, |view, tx| probing.step(view, tx)).await;
-}
-
-/// Returns the number of free blocks as it was told, which may have changed during the wait for the
-/// transmitter.
-async fn report_queue(links: &Links) -> usize {
-    let port = links.told();
-    let mut tx = port.tx.lock().await;
-    let mut told = 0;
-    send(links, port, &mut tx, |view, tx| {
-        told = view.value(Value::QueueFree) as usize;
-        queue_report(port.mode.get(), view, tx);
-        false
-    })
-    .await;
-    told
 }

@@ -1,5 +1,7 @@
 //! What the settings say of the machine to those who interpret lines and those who plan moves.
 
+use kerf_macros::small;
+
 use super::homing;
 use crate::boards::{ACTIVE, inputs};
 use crate::config::getters::TRAVEL_NONE;
@@ -28,17 +30,9 @@ impl Setup for Settings {
         self.radius_nm(axis.into())
     }
 
+    #[inline(always)]
     fn travel(&self, axis: u8) -> Option<(Length, Length)> {
-        if !self.soft_limits() {
-            return None;
-        }
-        let (low, high) = (self.travel_min(axis.into()), self.travel_max(axis.into()));
-        if low == high {
-            return None;
-        }
-        // The lowest that can be set, and anything below it, means no limit, at either end.
-        let end = |end, far| if end == TRAVEL_NONE { Length(far) } else { end };
-        Some((end(low, i32::MIN), end(high, i32::MAX)))
+        if self.soft_limits() { limited_travel(self, axis) } else { None }
     }
 
     #[inline(never)]
@@ -119,4 +113,17 @@ impl Machine for Settings {
     fn drivers(&self) -> Drivers {
         Drivers { pulse_us: self.step_pulse_us(), setup_us: self.direction_setup_us() }
     }
+}
+
+/// The travel of an axis where soft limits are on.
+#[inline(never)]
+#[small]
+fn limited_travel(settings: &Settings, axis: u8) -> Option<(Length, Length)> {
+    let (low, high) = (settings.travel_min(axis.into()), settings.travel_max(axis.into()));
+    if low == high {
+        return None;
+    }
+    // The lowest that can be set, and anything below it, means no limit, at either end.
+    let end = |end, far| if end == TRAVEL_NONE { Length(far) } else { end };
+    Some((end(low, i32::MIN), end(high, i32::MAX)))
 }

@@ -4,6 +4,8 @@
 //! speed come from exec's snapshot while something runs, from the G-code model when nothing does. Steps of one report
 //! or group share a [`Moment`], the one of [`Links::moment`]; two ports at a time would share it, too.
 
+use kerf_macros::small;
+
 use core::cell::{OnceCell, RefMut};
 
 use super::alarm;
@@ -219,6 +221,7 @@ impl<'a> View<'a> {
         (pins::worked() >> input & 1).into()
     }
 
+    #[small]
     fn modal(&self, value: Value) -> i32 {
         let model = self.links.model.borrow();
         let modal = model.modal();
@@ -297,6 +300,7 @@ impl Machine for View<'_> {
         overrides::change(change);
     }
 
+    #[small]
     fn value(&mut self, value: Value) -> i32 {
         match value {
             Value::State => self.state(),

@@ -1,5 +1,5 @@
 //! Where a job's cycles go, function by function:
-//! `cargo run --profile sim -p kerf-sim --example profile -- ELF BOARD JOB [SETTING...]`.
+//! `cargo run --profile sim -p kerf-sim --example profile -- ELF BOARD JOB [SETTING...]`. `{baud:500000}` is a setting, too.
 
 use std::path::Path;
 
@@ -16,11 +16,18 @@ fn main() -> Result<()> {
     let mut machine = Machine::load(Path::new(&elf), board)?;
     machine.start_profile();
     let lines = job::read_lines(Path::new(&path))?;
-    let options = Options { settings: args.collect(), ..Options::default() };
+    let mut options = Options { settings: args.collect(), ..Options::default() };
+    options.settings.retain(|setting| match setting.strip_prefix("{baud:") {
+        Some(rate) => {
+            options.baud = rate.trim_end_matches('}').parse().ok();
+            false
+        }
+        None => true,
+    });
     let report = job::run(&mut machine, &lines, &options, |_| {})?;
     println!("{report}");
     let total = machine.cycle() as f64;
-    for (function, cycles) in machine.profile().into_iter().take(40) {
+    for (function, cycles) in machine.profile().into_iter().take(150) {
         println!("{:6.2} %  {:>12}  {function}", cycles as f64 / total * 100.0, cycles);
     }
     Ok(())

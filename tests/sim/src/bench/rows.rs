@@ -132,8 +132,7 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: ["3.18", "-", "7.97"],
         target: Some(1.6),
-        // The limits of a curve cost 2,000 cycles a line.
-        floor: Some(1.9),
+        floor: Some(1.8),
         measure: spirals::tenth,
     },
     Row {
@@ -166,8 +165,7 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(1.2),
-        // See above.
-        floor: Some(1.9),
+        floor: Some(1.78),
         measure: spirals::tenth_fast,
     },
     Row {
