@@ -76,6 +76,9 @@ pub struct Recorder {
     /// Cycle of each step of each motor, if wanted.
     pub edges: [Vec<u64>; MOTORS],
     pub keep_edges: bool,
+    /// Where the motors are after each tick in which any steps, if wanted.
+    pub trail: Vec<[i64; MOTORS]>,
+    pub keep_trail: bool,
     pub now: u64,
     pub stopped: bool,
     backwards: u8,
@@ -91,6 +94,9 @@ impl Pins for Recorder {
                     self.edges[m].push(self.now);
                 }
             }
+        }
+        if self.keep_trail && motors != 0 {
+            self.trail.push(self.position);
         }
     }
     fn fall(&mut self, _: u8) {}

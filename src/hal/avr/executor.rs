@@ -21,9 +21,11 @@ pub fn run(executor: &'static Executor) -> ! {
         } else {
             // If it wants to run it ends the sleep.
             exec::idle();
+            // The CPU executes one instruction after `reti` before it serves the next interrupt. That is `nop`, not
+            // `cli`: a step that is due when another interrupt ends must not wait for this loop as well.
             // SAFETY: plain instructions. They must stay together: an interrupt cannot come between
             // `sei` and `sleep`, so an event set after the test above still ends the sleep.
-            unsafe { core::arch::asm!("sei", "sleep", "cli") };
+            unsafe { core::arch::asm!("sei", "sleep", "nop", "cli") };
         }
     }
 }

@@ -120,8 +120,7 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(2.0),
-        // The motor that does not lead: blocks still end on whole steps.
-        floor: Some(8.0),
+        floor: Some(2.0),
         measure: jitter::boundaries,
     },
     Row {
