@@ -67,8 +67,8 @@ impl Scale {
     /// A velocity, rounded down. Cost: 60.
     #[inline(never)]
     pub fn velocity(&self, velocity: Short) -> u16 {
-        let (exponent, bits) = velocity.parts();
-        self.shifted(exponent, bits)
+        let (mantissa, power) = velocity.parts();
+        self.shifted(i16::from(power) - 127, 0x8000 | u16::from(mantissa) << 7)
     }
 
     /// A velocity, rounded up. Cost: 60.

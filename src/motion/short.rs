@@ -23,12 +23,6 @@ impl Short {
     /// Zero.
     pub const ZERO: Self = Short(0);
 
-    /// Exponent and bits: `bits * 2^(exponent - 15)`. Cost: 10.
-    #[inline]
-    pub fn parts(self) -> (i16, u16) {
-        ((self.0 >> 8) as i16 - 127, 0x8000 | (self.0 & 0xFF) << 7)
-    }
-
     /// As a float again. Cost: 15.
     #[inline]
     pub fn get(self) -> f32 {
