@@ -48,7 +48,7 @@ pub trait Ahead {
 }
 
 /// Constraints that a scan looks at exactly.
-pub const EXACT: u8 = 3;
+pub const EXACT: u8 = 2;
 
 /// Constraints behind the machine that a scan passes over.
 const PASSED: u8 = 4;
@@ -147,6 +147,8 @@ struct Scan {
     /// The target, and as a velocity of the scale.
     target: Short,
     low: u16,
+    /// What it takes at most to slow down from the top.
+    most: i32,
     /// From here on nothing makes a difference.
     reach: i32,
     closed: bool,
@@ -162,6 +164,7 @@ impl Scan {
             at: scale.distance(ask.at),
             top,
             low: top,
+            most: scale.most(top),
             scale,
             distance: i32::MAX,
             place: i32::MAX,
@@ -226,7 +229,7 @@ impl Scan {
         }
         (self.target, self.low, self.place, self.binds) = (target, low, place, nearer);
         let beyond = place.saturating_add(scale.most(low));
-        self.reach = beyond.max(self.distance.saturating_add(scale.most(self.top)));
+        self.reach = beyond.max(self.distance.saturating_add(self.most));
     }
 
     /// A constraint that stands for all that follow: what its key says of them, and that of the end of the queue.
@@ -237,7 +240,7 @@ impl Scan {
             place.saturating_sub(scale.by_key(self.top, scale.velocity(velocity).min(self.top)));
         let end = scale.distance(end).saturating_sub(scale.by_key(self.top, 0));
         // Whatever it is, it is not nearer.
-        let distance = by_key.min(end).max(place - scale.most(self.top));
+        let distance = by_key.min(end).max(place - self.most);
         (self.closed, self.target, self.binds) = (false, Short::ZERO, false);
         self.distance = self.distance.min(distance);
     }

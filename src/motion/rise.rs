@@ -152,20 +152,20 @@ impl Governor {
         self.potential(span.left)
     }
 
-    /// The state after a slice in which alpha goes to `alpha`.
+    /// The state after a slice in which alpha goes to `alpha`, but for distances.
     #[inline(never)]
     fn next(&self, alpha: f32, seconds: f32, out: &mut Next) {
         let half = scaled(seconds, -1);
         let velocity = self.velocity + half * self.limits.accel * (self.alpha + alpha);
         out.velocity = velocity;
         out.alpha = alpha;
-        out.distance = half * (self.velocity + velocity);
         out.top = velocity + self.limits.kappa * alpha * alpha;
     }
 
-    /// Fills in how far on the top is.
+    /// Fills in how far the slice goes, and how far on the top is.
     #[inline(never)]
-    fn place_top(&self, next: &mut Next) {
+    fn place_top(&self, next: &mut Next, seconds: f32) {
+        next.distance = scaled(seconds, -1) * (self.velocity + next.velocity);
         next.at = self.potential(next.distance) + self.rising(next.alpha, next.velocity, next.top);
     }
 
@@ -184,13 +184,7 @@ impl Governor {
         if below(span.cruise, next.top) {
             if !some(alpha) {
                 // So near that the acceleration need not build up.
-                next = Next {
-                    velocity: span.cruise,
-                    alpha: 0.0,
-                    distance: 0.5 * (self.velocity + span.cruise) * seconds,
-                    top: span.cruise,
-                    at: 0.0,
-                };
+                next = Next { velocity: span.cruise, top: span.cruise, ..Next::default() };
             } else {
                 self.next(alpha, seconds, &mut next);
                 if below(span.cruise, next.top) {
@@ -198,14 +192,15 @@ impl Governor {
                 }
             }
         }
-        self.place_top(&mut next);
+        self.place_top(&mut next, seconds);
         if self.is_clear(next.top, next.at) {
             self.look_early(&next, span, ahead);
         } else {
             if self.scanned {
                 return false;
             }
-            if !self.look_ahead(&next, span, ahead) {
+            let has_time = !self.hurry || !some(alpha);
+            if !has_time || !self.look_ahead(&next, span, ahead) {
                 self.end_climb(span, ahead);
                 return true;
             }
