@@ -96,7 +96,7 @@ pub struct Exec {
     running: Running,
     /// A feedhold is on.
     hold: bool,
-    /// Stretches under a jerk limit are twice as long.
+    /// Stretches are twice as long.
     coarse: bool,
     dwell_ms: u32,
     governor: Governor,
@@ -179,7 +179,7 @@ impl Exec {
         self.run(blocks, out, segment)
     }
 
-    /// Makes stretches under a jerk limit twice as long, or not: their mathematics take half as much of the CPU then.
+    /// Makes stretches twice as long, or not: their mathematics take half as much of the CPU then.
     #[inline(always)]
     pub fn set_coarse(&mut self, coarse: bool) {
         self.coarse = coarse;

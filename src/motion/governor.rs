@@ -102,6 +102,8 @@ pub struct Governor {
     pub(super) halting: bool,
     /// What is ahead has been looked at for this stretch.
     pub(super) scanned: bool,
+    /// How long a stretch without a jerk limit is to be, s.
+    pub(super) nominal: f32,
     /// The CPU has no time left: no look ahead but those that it takes to go on.
     pub(super) hurry: bool,
     /// Slices until it is worth another try to go faster.
@@ -131,6 +133,7 @@ impl Governor {
             changed: false,
             halting: false,
             scanned: false,
+            nominal: 0.0,
             hurry: false,
             wait: 0,
             calm: 0,
@@ -205,8 +208,7 @@ impl Governor {
         self.changed = true;
     }
 
-    /// The next stretch, of about `seconds` under a jerk limit and [`SEGMENT_S`](super::exec::SEGMENT_S) else, in a block with
-    /// `left` mm to go at up to `cruise` mm/s.
+    /// The next stretch, of about `seconds`, in a block with `left` mm to go at up to `cruise` mm/s.
     #[inline(always)]
     pub fn stretch(&mut self, left: f32, cruise: f32, ahead: &impl Ahead, seconds: f32) -> Stretch {
         if some(self.limits.jerk) {
@@ -215,6 +217,7 @@ impl Governor {
         if self.has_rest() {
             return self.cut(left);
         }
+        self.nominal = seconds;
         self.trapezoid(left, cruise, ahead.headroom())
     }
 }

@@ -47,7 +47,7 @@ impl Governor {
             let square = greater(v * v - gain, 0.0);
             // Rounding may put a stop before the end of the block.
             let next = sqrt(least(square, greater(headroom, 0.0)));
-            let next = if self.late { self.slowest(v, gain, next, nominal) } else { next };
+            let next = if self.late { self.slowest(v, gain, next) } else { next };
             let seconds = 2.0 * left / (v + next);
             if seconds <= longest {
                 self.velocity = next;

@@ -13,9 +13,10 @@ use crate::math::sqrt;
 const PLAIN: i32 = OCTAVE / 5;
 
 impl Governor {
+    /// The next stretch, of about `nominal` seconds.
     #[inline(never)]
     pub(super) fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
-        let (v, seconds) = (self.velocity, SEGMENT_S);
+        let (v, seconds) = (self.velocity, self.nominal);
         // Rounding may put a stop before the end of the block.
         let headroom = if headroom.is_sign_negative() { 0.0 } else { headroom };
         // Steady over a block that is short enough to be one stretch.
@@ -54,20 +55,20 @@ impl Governor {
     /// `next`, or the least velocity that it can have at the end, from `v` and with so much to lose, if that
     /// is more by what is not rounding: an override has lowered the limit too late.
     #[inline(never)]
-    pub(super) fn slowest(&self, v: f32, gain: f32, next: f32, nominal: f32) -> f32 {
+    pub(super) fn slowest(&self, v: f32, gain: f32, next: f32) -> f32 {
         let least = sqrt(greater(v * v - gain, 0.0));
-        if least > next + self.limits.accel * nominal { least } else { next }
+        if least > next + self.limits.accel * SEGMENT_S { least } else { next }
     }
 
     /// All the rest of a block in one.
     #[inline(never)]
     fn finish(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
-        let (v, nominal) = (self.velocity, SEGMENT_S);
+        let (v, nominal) = (self.velocity, self.nominal);
         let gain = scaled(self.limits.accel * left, 1);
         let square = v * v + gain;
         let next = least(sqrt(least(square, headroom)), cruise);
         let late = below(next, v) && (self.late || below(cruise, v));
-        let next = if late { self.slowest(v, gain, next, nominal) } else { next };
+        let next = if late { self.slowest(v, gain, next) } else { next };
         self.velocity = next;
         let sum = v + next;
         let mut seconds = 2.0 * nominal;

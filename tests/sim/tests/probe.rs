@@ -195,8 +195,7 @@ fn a_contact_that_bounces_is_found_where_it_closed() {
         worst = worst.max(bench.error(closed));
     }
     println!("bouncing: {worst} steps");
-    // A contact that opens again may be missed by a look, which comes within two steps here.
-    assert!(worst <= 2, "{worst} steps");
+    assert!(worst <= 1, "{worst} steps");
 }
 
 #[test]

@@ -12,9 +12,6 @@ const US: u64 = 16;
 /// How much wider a pulse may be, cycles.
 const LOADING: u64 = 240;
 
-/// Segments that come late in a job, at most; 22 have been measured, and 174 with pulses of 10 us.
-const LATE_MOST: u64 = 200;
-
 /// Runs a job that must end on its steps, with these settings besides those of a fast machine.
 fn ran(board: &'static Board, setting: &str, job: &str) -> Machine {
     let mut machine = firmware(board);
@@ -23,9 +20,7 @@ fn ran(board: &'static Board, setting: &str, job: &str) -> Machine {
     let settings = fast.into_iter().chain([setting.to_string()]).collect();
     let options = Options { settings, ..Options::default() };
     let report = job::run(&mut machine, &job::lines_of(job), &options, |_| {}).unwrap();
-    // Ramps of 2,000 mm/s2 at these rates under a jerk limit leave exec too little of the CPU: no more than so.
-    let late = report.late_segments.is_some_and(|late| late <= LATE_MOST);
-    assert!(report.is_exact() && late, "{setting}: {:?}", report.problems);
+    assert!(report.ok, "{setting}: {:?}", report.problems);
     assert_eq!(machine.missed_tops(), 0, "{setting}: a tick is lost");
     machine
 }
