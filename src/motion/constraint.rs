@@ -1,6 +1,6 @@
 //! What it takes to slow down under a jerk limit, and which constraint ahead is the first to ask for it.
 //!
-//! Called by the [`Governor`](super::governor::Governor) at exec level, at most once for a stretch.
+//! Called by the [`Governor`](super::governor::Governor) at exec level, once for a stretch (`rise`).
 //!
 //! # Units
 //!
@@ -20,14 +20,14 @@
 //!
 //! A scan answers one question: how far on may the machine still be at the steady velocity u, and which constraint does it
 //! have to slow down for then? The answer, [`Clear`], holds for every lower velocity as well: less distance is needed
-//! from there. It stays true when blocks are added, which never make the distance to a standstill shorter.
+//! from there ([`Clear::narrow`]). It stays true when blocks are added, which never make the distance to a standstill shorter.
 //!
 //! # Work
 //!
 //! A scan looks at no more than [`EXACT`] constraints exactly, each slower than all before it: whoever is down to one of them may
 //! keep that velocity past all that are no slower. One more answers for all that follow, by its key: keys rise, and `(u + k)^2 <= key`
-//! is enough for any of them. So the work has a bound, whatever is queued: 2,500 cycles on AVR for each of these, and
-//! 25 for each constraint that is passed over.
+//! is enough for any of them. So the work has a bound, whatever is queued. It is done in integers (`need`): 2,000 cycles on AVR for each
+//! of these, 25 for each constraint that is passed over, and 1,500 for the rest.
 
 use super::float::{below, greater, least, less, scaled};
 use super::governor::{Governor, Limits};
