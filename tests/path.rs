@@ -36,8 +36,6 @@ struct Kind {
     way: (f64, f64),
     /// How far a line may turn from the one before, rad.
     turn: f64,
-    /// mm/s.
-    velocity: f32,
 }
 
 /// Off the path: the most and the root of the mean square, steps.
@@ -139,7 +137,7 @@ fn lines(axes: usize) -> Worst {
     for way in [(0.05, 0.2), (0.2, 1.0), (1.0, 5.0)] {
         for turn in [0.1, 1.0] {
             for velocity in [10.0, 60.0, 300.0] {
-                let points = path(&mut random, &Kind { axes, way, turn, velocity }, 400);
+                let points = path(&mut random, &Kind { axes, way, turn }, 400);
                 worst.add(off(&points, velocity, 5_000.0, 0.0));
                 worst.add(off(&points, velocity, 5_000.0, 1e6));
             }

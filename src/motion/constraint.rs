@@ -221,7 +221,8 @@ impl Scan {
             }
         }
         let nearer = distance < self.distance;
-        if !nearer && !(low < self.low && place - self.place < scale.need(self.low, low)) {
+        let close = || low < self.low && place - self.place < scale.need(self.low, low);
+        if !(nearer || close()) {
             return;
         }
         if nearer {

@@ -179,10 +179,12 @@ impl Exec {
         self.run(blocks, out, segment)
     }
 
-    /// Makes stretches twice as long, or not: their mathematics take half as much of the CPU then.
+    /// Makes stretches twice as long, or not: their mathematics take half as much of the CPU then. In a `hurry` they are,
+    /// and nothing is looked at that may wait.
     #[inline(always)]
-    pub fn set_coarse(&mut self, coarse: bool) {
-        self.coarse = coarse;
+    pub fn set_coarse(&mut self, coarse: bool, hurry: bool) {
+        self.coarse = coarse || hurry;
+        self.governor.set_hurry(hurry);
     }
 
     /// Begins a feedhold, or ends one. Cost: 15 if nothing changes.

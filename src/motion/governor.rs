@@ -104,7 +104,7 @@ pub struct Governor {
     pub(super) scanned: bool,
     /// How long a stretch without a jerk limit is to be, s.
     pub(super) nominal: f32,
-    /// The CPU has no time left: no look ahead but those that it takes to go on.
+    /// No time for looks ahead.
     pub(super) hurry: bool,
     /// Slices until it is worth another try to go faster.
     pub(super) wait: u8,
@@ -201,6 +201,12 @@ impl Governor {
         if !self.halting && self.ramp.as_ref().is_some_and(|ramp| ramp.phase() == Phase::Up) {
             self.leave_ramp();
         }
+    }
+
+    /// The CPU has no time left: no looks ahead but those that it takes to go on. Or it has.
+    #[inline(always)]
+    pub fn set_hurry(&mut self, hurry: bool) {
+        self.hurry = hurry;
     }
 
     /// What is ahead has changed.

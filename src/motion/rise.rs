@@ -114,8 +114,17 @@ impl Governor {
             self.wait -= 1;
             return true;
         }
-        let known = !self.clear.top.is_sign_negative();
-        known && !self.is_clear(self.velocity, self.potential(self.velocity * span.seconds))
+        if self.clear.top.is_sign_negative() || self.knows(span) {
+            return false;
+        }
+        // Where the queue is short it is never known for long.
+        self.turn = self.turn.wrapping_add(1);
+        self.turn & 3 != 0
+    }
+
+    /// Whether it is known that a steady velocity may be kept for the slice.
+    fn knows(&self, span: &Span) -> bool {
+        self.is_clear(self.velocity, self.potential(self.velocity * span.seconds))
     }
 
     /// A slice at a steady velocity.
@@ -286,8 +295,8 @@ impl Governor {
         }
         let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
         let at = self.rising(self.alpha, self.velocity, top);
-        if self.clear.top.is_sign_negative() {
-            // Limits or feeds have changed.
+        let steady = !some(self.alpha) && some(self.velocity);
+        if self.clear.top.is_sign_negative() || steady && !self.knows(span) {
             self.look_about(top, at, top, span, ahead);
         }
         self.clear.narrow(top);

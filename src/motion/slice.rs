@@ -8,7 +8,6 @@
 //! Units: mm, s.
 
 use super::constraint::Ahead;
-use super::exec::SEGMENT_S;
 use super::float::{below, greater, less, scaled, some};
 use super::governor::{Governor, Stretch, same};
 
@@ -60,7 +59,6 @@ impl Governor {
             self.leave_ramp();
         }
         self.scanned = false;
-        self.hurry = below(1.2 * SEGMENT_S, nominal);
         for _ in 0..2 {
             let Some(seconds) = self.wanted(left, nominal) else { break };
             let span = Span { left: left - self.rest.distance, cruise, seconds };

@@ -96,7 +96,7 @@ pub fn run(
                 waiting.push(u32::from(segment.ticks) * u32::from(segment.period));
                 health::moves(waiting.count);
                 let short = waiting.is_short(segments.used(), rests);
-                machine.set_coarse(event::pass_over() > PATIENCE || short);
+                machine.set_coarse(event::pass_over() > PATIENCE, short);
                 if contact::is_noted() {
                     contact::pushed(&segment);
                 }
