@@ -96,7 +96,7 @@ pub fn run(
                 waiting.push(u32::from(segment.ticks) * u32::from(segment.period));
                 health::moves(waiting.count);
                 let short = waiting.is_short(segments.used(), rests);
-                machine.set_coarse(event::pass_over() > PATIENCE, short);
+                machine.set_coarse(event::pass_over() > PATIENCE || waiting.is_busy(), short);
                 if contact::is_noted() {
                     contact::pushed(&segment);
                 }
@@ -105,12 +105,10 @@ pub fn run(
                 }
                 stepper::go();
                 let used = segments.used();
-                if used >= 2
-                    && waiting.sum(used) >= waiting.limits().least
-                    && waiting.has_room(used, rests)
-                {
+                if used >= 2 && waiting.sum(used) >= waiting.limits().least {
                     exec::pend_when_idle();
                     exec_asked_again().await;
+                    waiting.go_on(segments.used());
                 }
             }
             if blocks.len() != queued {
@@ -141,7 +139,12 @@ struct Waiting {
     pressed: u8,
     /// Segments since the machine stood still.
     moved: u8,
+    /// How many segments in a row were used up before thread mode was idle.
+    busy: u8,
 }
+
+/// So many of them say that thread mode has no time left.
+const BUSY: u8 = 3;
 
 /// The unit: shifts are cheaper than divisions.
 const UNIT_LOG2: u8 = 11;
@@ -161,7 +164,7 @@ struct Amount {
 
 /// With the segment that runs, which takes 2 ms or less while anything is fast, and exec's own time, a feedhold begins within
 /// 10 ms.
-const USUAL: Amount = Amount { most: units(55), least: units(45) };
+const USUAL: Amount = Amount { most: units(55), least: units(38) };
 
 /// For a while after too little has been waiting: a feedhold begins within 13 ms.
 const PRESSED: Amount = Amount { most: units(80), least: units(65) };
@@ -174,7 +177,7 @@ const WAITING_SHORT: u16 = units(25);
 
 impl Waiting {
     const fn new() -> Self {
-        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0, pressed: 0, moved: 0 }
+        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0, pressed: 0, moved: 0, busy: 0 }
     }
 
     /// The length of the segment that was queued so many before the next one.
@@ -203,6 +206,17 @@ impl Waiting {
             self.used -= 1;
         }
         self.sum
+    }
+
+    /// Exec has waited for thread mode to be idle, and goes on: because it is, or because a segment has been used up.
+    fn go_on(&mut self, used: usize) {
+        let idle = usize::from(self.used) == used;
+        self.busy = if idle { 0 } else { self.busy.saturating_add(1) };
+    }
+
+    /// Whether thread mode has no time left: then stretches are longer, which leaves it more.
+    fn is_busy(&self) -> bool {
+        self.busy >= BUSY
     }
 
     fn limits(&self) -> &'static Amount {
