@@ -163,10 +163,10 @@ struct Amount {
 }
 
 /// With the segment that runs, which takes 2 ms or less while anything is fast, and exec's own time, a feedhold begins within
-/// 10 ms.
-const USUAL: Amount = Amount { most: units(55), least: units(38) };
+/// 12 ms. Less would not outlast a line that is queued at the same time as a ramp is laid out.
+const USUAL: Amount = Amount { most: units(70), least: units(38) };
 
-/// For a while after too little has been waiting: a feedhold begins within 13 ms.
+/// For a while after too little has been waiting: a feedhold begins within 14 ms.
 const PRESSED: Amount = Amount { most: units(80), least: units(65) };
 
 /// That while, in segments.
