@@ -16,6 +16,7 @@
 
 pub use super::constraint::Ahead;
 use super::constraint::Clear;
+use super::exec::SEGMENT_S;
 use super::float::{greater, scaled, some};
 use super::horizon::kappa;
 use super::ramp::{Phase, Ramp};
@@ -223,7 +224,8 @@ impl Governor {
         if self.has_rest() {
             return self.cut(left);
         }
-        self.nominal = seconds;
+        // Shorter segments are more even for motors that do not lead.
+        self.nominal = if self.hurry { seconds } else { SEGMENT_S };
         self.trapezoid(left, cruise, ahead.headroom())
     }
 }
