@@ -197,8 +197,8 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(1.25),
-        // A scan of what is ahead costs 10,000 cycles and more, and the CPU has no time left.
-        floor: Some(1.32),
+        // The CPU has no time left.
+        floor: Some(1.25),
         measure: spirals::tenth_jerk,
     },
     Row {
@@ -210,7 +210,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(1.15),
         // See above.
-        floor: Some(1.32),
+        floor: Some(1.2),
         measure: spirals::fifth_jerk,
     },
     Row {
