@@ -322,8 +322,7 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(0.0),
-        // Spirals of 0.1 mm with holds and overrides, on a line that never rests.
-        floor: Some(4.0),
+        floor: Some(0.0),
         measure: pauses::low,
     },
     Row {
