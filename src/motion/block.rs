@@ -8,6 +8,16 @@ use super::factors::{Factors, Reserve};
 use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
+
+/// Parts of a step to which blocks know where they end: the logarithm of their number.
+pub const PARTS_LOG2: u8 = 4;
+
+/// The least and the greatest fraction at a block's end, in 1/16 step from the whole step next to it. Nearly half a step: what
+/// rounding leaves must not tell which one is next.
+pub const FRACTIONS: (i8, i8) = (-7, 6);
+
+/// Most steps of a motor in a block that knows parts of them.
+pub const PARTS_STEPS_MAX: u16 = 2046;
 use crate::gcode::overrides::Change;
 
 /// One block.
@@ -76,13 +86,37 @@ pub struct Outputs {
     pub speed: f32,
 }
 
+/// How long a line is, and what its way is counted in.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Extent(f32);
+
+impl Extent {
+    /// So many mm, with a way in whole steps or in 1/16 step.
+    #[inline(always)]
+    pub fn new(length: f32, whole_steps: bool) -> Self {
+        Self(if whole_steps { -length } else { length })
+    }
+
+    /// mm.
+    #[inline(always)]
+    pub fn length(self) -> f32 {
+        f32::from_bits(self.0.to_bits() & 0x7FFF_FFFF)
+    }
+
+    /// Whether the way is in steps, not in 1/16 step.
+    #[inline(always)]
+    pub fn has_whole_steps(self) -> bool {
+        self.0.is_sign_negative()
+    }
+}
+
 /// A straight move.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
-    /// Signed steps of each motor.
-    pub steps: [i16; MOTORS],
-    /// Path length, mm.
-    pub length: f32,
+    /// Signed way of each motor, from the end of the block before; in 1/16 step or, if that is too far, in steps.
+    pub way: [i16; MOTORS],
+    /// Path length, and which it is.
+    pub extent: Extent,
     /// How much faster than `cruise` it may be run.
     pub reserve: Reserve,
     /// Velocity limit on the path, mm/s, at 100 %: the feed, or what the slowest axis or motor allows.

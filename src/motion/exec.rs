@@ -340,10 +340,9 @@ impl Exec {
 
     #[inline(always)]
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
-        let length = line.length;
+        let length = line.extent.length();
         let long = below(scaled(line.cruise, FINE_LOG2), length);
-        self.prep.begin(&line.steps, &mut out.target);
-        out.steps = line.steps;
+        self.prep.begin(line, &mut out.steps, &mut out.target);
         out.length = length;
         out.running = true;
         let jerk = line.jerk.get();
@@ -397,7 +396,7 @@ impl Exec {
         }
         if running.fresh {
             running.fresh = false;
-            running.scale = self.prep.left() as f32 / running.left;
+            running.scale = self.prep.own() as f32 / running.left;
         }
         running.left -= stretch.distance;
         out.left = running.left;
@@ -417,8 +416,12 @@ impl Exec {
         blocks: &mut BlockSource,
         segment: &mut Segment,
     ) -> Step {
-        let some =
-            if whole { self.prep.whole(cycles, segment) } else { self.prep.last(cycles, segment) };
+        let exact = self.governor.is_at_rest() || !blocks.goes_on();
+        let some = if whole {
+            self.prep.whole(cycles, exact, segment)
+        } else {
+            self.prep.last(cycles, exact, segment)
+        };
         if self.prep.left() == 0 {
             self.running.active = false;
             blocks.release();

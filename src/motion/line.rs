@@ -5,13 +5,15 @@
 //!
 //! Steps are the difference of two exact absolute positions, so nothing accumulates: neither
 //! rounding nor moves shorter than a step. A move without any steps (shorter than one, or of an axis
-//! without a motor) is still a block and takes its time, or the next step would come too early.
+//! without a motor) is still a block and takes its time, or the next step would come too early. A block is told
+//! where between two steps its motors arrive, to 1/16 step: [`Builder::fractions`] has where they are already, whatever
+//! positions are renamed to.
 //!
 //! A ramp may go over many blocks. Without a jerk limit each may have its own acceleration limit, what
 //! its axes allow in its direction. With one, acceleration and jerk must be alike for as long as
 //! possible: then they are those of the slowest axis that moves, whatever the direction.
 
-use super::block::{Action, Block, Line as Move};
+use super::block::{Action, Block, Extent, Line as Move, PARTS_LOG2, PARTS_STEPS_MAX};
 use super::curve::{Bend, Curve};
 use super::dynamics::Dynamics;
 use super::factors::Reserve;
@@ -19,12 +21,14 @@ use super::float::{least, some};
 use super::junction::{self, Heading};
 use super::limits::LastFeed;
 use super::path::{Path, Way};
-use super::prep::STEPS_MAX;
 use super::steps::Motor;
 use crate::boards::MOTORS;
 use crate::config::StepRatio;
 use crate::gcode::command::Feed;
 use crate::units::{Length, PerAxis};
+
+/// Most steps of a motor in a block: phase units of a block fit 30 bits.
+pub const STEPS_MAX: u16 = 0x7FFF;
 
 /// What the builder needs to know of the motors.
 pub trait Motors {
@@ -72,6 +76,8 @@ pub struct Builder {
     bend: Bend,
     /// Motors at the end of the last block.
     motors: [Motor; MOTORS],
+    /// How far beyond the whole step it is rounded to each motor is then, in 1/16 step: what blocks have been told.
+    fractions: [i8; MOTORS],
 }
 
 impl Builder {
@@ -92,12 +98,17 @@ impl Builder {
             Way::Far => return Built::Parts(2),
             Way::Near => {}
         }
-        out.steps = [0; MOTORS];
-        let parts = path.drive(&mut self.motors, line.to, dynamics, machine, &mut out.steps);
+        out.way = [0; MOTORS];
+        let parts = path.drive(&mut self.motors, line.to, dynamics, machine, &mut out.way);
         if parts > 0 {
             self.put_back(line.from, dynamics, machine);
             return Built::Parts(parts);
         }
+        let whole_steps = path.most > PARTS_STEPS_MAX;
+        if !whole_steps {
+            self.refine(&path, dynamics, &mut out.way);
+        }
+        out.extent = Extent::new(path.length, whole_steps);
         path.limit(line.feed, &mut self.feed, dynamics);
         path.limit_change(dynamics);
         match line.curve {
@@ -117,11 +128,24 @@ impl Builder {
             Some(_) => Reserve::new(path.cruise, path.top),
             None => Reserve::TRAVERSE,
         };
-        out.length = path.length;
         out.cruise = path.cruise;
         out.accel = path.accel;
         out.jerk = path.jerk;
         Built::Line(entry)
+    }
+
+    /// Makes a way in 1/16 step from one in steps. Cost: 60 for each motor.
+    #[inline(never)]
+    #[small]
+    fn refine(&mut self, path: &Path, dynamics: &Dynamics, way: &mut [i16; MOTORS]) {
+        for (m, way) in way.iter_mut().enumerate() {
+            let travel = path.travel.get(usize::from(dynamics.drives[m]));
+            if travel.is_some_and(|travel| *travel != 0) {
+                let to = self.motors[m].fraction;
+                let from = core::mem::replace(&mut self.fractions[m], to);
+                *way = (*way << PARTS_LOG2) + i16::from(to - from);
+            }
+        }
     }
 
     /// Takes the motors back to where the last block ended.
@@ -156,6 +180,7 @@ impl Builder {
     #[small]
     pub fn place(&mut self, steps: &[i32; MOTORS]) {
         self.motors = steps.map(Motor::counted);
+        self.fractions = [0; MOTORS];
         self.stopped();
     }
 

@@ -14,21 +14,41 @@
 //!
 //! The other motors get the rounded increment, and [`Minor::owed`] remembers exactly what rounding
 //! took: a segment in which it comes to half a unit a tick or more is corrected by a unit a tick. It is
-//! carried from segment to segment, and over the end of the block: never above half a tick count, far
-//! below half a step, so every block ends exactly on its step.
+//! carried from segment to segment, and over the end of the block, so that nothing adds up.
 //!
-//! Cost on AVR: 600 cycles a segment and 150 for each motor that moves; 600 for `begin`, and 300 for each
+//! **Between two steps.** A block ends where its line ends, to 1/16 step ([`PART`]), not on a whole step: a curve of short
+//! lines would round each of its corners to a step, and the steps between once more. Ticks rarely fit such a way. So the
+//! last stretch of a block is the nearest number of whole ticks; what the motors are short of then, in proportion, or ahead,
+//! is a debt, and belongs to the next block: it goes from where the motors are to where its own line ends. Its time
+//! goes with it. A dominant motor thus keeps its phase and its rhythm over any number of blocks.
+//!
+//! Where the motion may end, in whatever comes to rest or is not followed by a line, a block is made to its end (`exact`): with finer ticks
+//! for the last of it if need be. The end is less than half a step from the whole step that it is rounded to ([`FRACTIONS`](super::block::FRACTIONS)),
+//! by more than rounding leaves ([`super::dda::PHASE_MARGIN`]), so that the position is exact. A block of more steps
+//! than [`PARTS_STEPS_MAX`](super::block::PARTS_STEPS_MAX) has whole steps from end to end, whatever fraction it begins with.
+//!
+//! Segments of fine ticks end between two steps of the dominant motor, where the interrupt has time to load the next, as far as
+//! can be; those of one or two ticks a step end on a step. So the next one is in time when they become a step on every tick.
+//!
+//! Cost on AVR: 600 cycles a segment and 150 for each motor that moves; 800 for `begin`, and 300 for each
 //! motor when `k` changes.
 
-use super::dda::{STEP, Segment, start};
-use super::divide::{quotient, quotient_remainder};
+use super::block::{Line, PARTS_LOG2};
+use super::dda::{PHASE_START, STEP, Segment};
+use super::divide::{product, quotient, quotient_remainder};
 use super::pace::{COARSEST, Drivers, Pace, paces};
 use crate::boards::{MOTORS, each_motor};
 
 const STEP_LOG2: u8 = 15;
 
-/// Most steps of a motor in a block: phase units of a block fit 30 bits.
-pub const STEPS_MAX: u16 = 0x7FFF;
+/// Phase units in the part of a step to which blocks know their ends.
+const PART: u16 = STEP >> PARTS_LOG2;
+
+/// The exponent of it.
+const PART_LOG2: u8 = STEP_LOG2 - PARTS_LOG2;
+
+/// Half a step, in such parts.
+const HALF: u16 = 1 << (PARTS_LOG2 - 1);
 
 /// Most ticks of a segment: keeps the rounding rest below [`super::dda::PHASE_MARGIN`].
 pub const TICKS_MAX: u16 = 2000;
@@ -57,8 +77,8 @@ const LOCKSTEP_TICKS: u32 = 16;
 /// A motor that moves but does not step on every tick of the dominant one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Minor {
-    /// Its steps in the block.
-    steps: u16,
+    /// Its way in the block, in units of that.
+    way: u16,
     /// Travel in a tick, rounded down, and what that leaves, in 1 / most.
     increment: u16,
     remainder: u16,
@@ -75,13 +95,15 @@ pub struct Prep {
     left: u32,
     /// Time that has not been used, CPU cycles.
     time: i32,
-    /// Steps of the dominant motor.
+    /// Way of the dominant motor, in units of the block.
     most: u16,
+    /// These are [`PART`]s, not steps.
+    parts: bool,
     /// The shift for which increments have been computed; none yet if above [`STEP_LOG2`].
     shift: u8,
-    /// Motors that make as many steps as the dominant one.
+    /// Motors that go as far as the dominant one.
     full: u8,
-    /// Motors that make some, but fewer.
+    /// Motors that go less far.
     minor: u8,
     /// Motors that move, less one.
     others: u8,
@@ -92,8 +114,18 @@ pub struct Prep {
     turned: bool,
     /// How long directions must stand before the first step, CPU cycles.
     setup: u16,
-    /// Phase units that a motor is short of at the end of a block.
+    /// What the dominant motor's way is without debts, in the same units.
+    own: u16,
+    /// A motor makes a step in the block.
+    steps: bool,
+    /// How far the dominant motor is past a step, in its direction, at the block's end: phase units.
+    past: u16,
+    /// Phase units that the dominant motor is short of when all segments of the block are out.
+    short: i16,
+    /// Phase units that a motor is short of at the end of a block, counted forwards.
     debt: [i16; MOTORS],
+    /// How far the end of the block is beyond the whole step that it is rounded to, in 1/16 step.
+    fraction: [i8; MOTORS],
     minors: [Minor; MOTORS],
     /// By the number of motors that move, less one.
     paces: [Pace; MOTORS],
@@ -104,13 +136,19 @@ pub struct Prep {
 impl Prep {
     /// Nothing to prepare.
     pub const fn new() -> Self {
-        const MINOR: Minor = Minor { steps: 0, increment: 0, remainder: 0, owed: 0 };
+        const MINOR: Minor = Minor { way: 0, increment: 0, remainder: 0, owed: 0 };
         Self {
             left: 0,
             time: 0,
             most: 0,
+            parts: true,
             minors: [MINOR; MOTORS],
+            own: 0,
+            steps: false,
+            past: 0,
+            short: 0,
             debt: [0; MOTORS],
+            fraction: [0; MOTORS],
             shift: u8::MAX,
             full: 0,
             minor: 0,
@@ -153,51 +191,112 @@ impl Prep {
         self.fine = fine;
     }
 
-    /// Starts a block. Its steps are added to `target`.
+    /// Starts a block. The steps to the whole ones next to its end are put into `steps` and added to `target`.
     #[inline(never)]
-    pub fn begin(&mut self, steps: &[i16; MOTORS], target: &mut [i32; MOTORS]) {
+    pub fn begin(&mut self, line: &Line, steps: &mut [i16; MOTORS], target: &mut [i32; MOTORS]) {
         self.shift = u8::MAX;
+        self.steps = false;
+        let parts = !line.extent.has_whole_steps();
         let (mut most, mut moving, mut full, mut others) = (0, 0, 0, u8::MAX);
         each_motor!(M => {
-            let (signed, bit) = (steps[M], 1 << M);
-            if signed != 0 {
+            let bit = 1 << M;
+            let mut way = line.way[M];
+            let mut whole = way;
+            if parts {
+                whole = self.round(M, way);
+                way = self.with_debt(M, way);
+            }
+            steps[M] = whole;
+            if whole != 0 {
+                self.steps = true;
+                target[M] = target[M].wrapping_add(whole.into());
+            }
+            if way != 0 {
                 others = others.wrapping_add(1);
                 moving |= bit;
-                target[M] = target[M].wrapping_add(signed.into());
-                let steps = signed.unsigned_abs();
-                self.minors[M].steps = steps;
-                if steps > most {
-                    (most, full) = (steps, 0);
+                let size = way.unsigned_abs();
+                self.minors[M].way = size;
+                if size > most {
+                    (most, full) = (size, 0);
+                    self.own = line.way[M].unsigned_abs();
+                    let at = i16::from(self.fraction[M]) + HALF as i16;
+                    self.past = if way < 0 { !at } else { at } as u16;
                 }
-                if steps == most {
+                if size == most {
                     full |= bit;
                 }
-                let backwards = if signed < 0 { bit } else { 0 };
+                let backwards = if way < 0 { bit } else { 0 };
                 if backwards != self.backwards & bit {
-                    self.turn(M, bit);
+                    self.backwards ^= bit;
+                    self.turned = true;
                 }
             }
         });
         self.most = most;
-        self.left = u32::from(most) << STEP_LOG2;
+        self.past <<= PART_LOG2;
+        self.parts = parts;
+        self.left = product(most, if parts { PART } else { STEP });
         self.full = full;
         self.minor = moving & !full;
         // Without motors there are no ticks to pace.
         self.others = if moving == 0 { 0 } else { others };
+        if !parts {
+            self.lengthen();
+        }
     }
 
-    /// Motor `m` turns round.
+    /// The dominant motor of a block of whole steps makes up what it is short of, and with it those that go as far.
     #[inline(never)]
-    fn turn(&mut self, m: usize, bit: u8) {
-        self.backwards ^= bit;
-        self.turned = true;
-        // It was measured in the old direction.
-        self.debt[m] = -self.debt[m];
+    #[small]
+    fn lengthen(&mut self) {
+        let mut due = None;
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            if self.full & bit != 0 {
+                let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
+                let due = *due.get_or_insert((debt + (PART / 2) as i16) & !(PART as i16 - 1));
+                if (debt - due).unsigned_abs() <= PART {
+                    self.owe(m, bit, -due);
+                } else {
+                    // It goes as far, but not as what it was short of.
+                    self.full &= !bit;
+                    self.minor |= bit;
+                }
+            }
+            bit <<= 1;
+        }
+        self.left = self.left.wrapping_add_signed(due.unwrap_or(0).into());
+    }
+
+    /// A way with the parts of a step that the motor is short of; the rest stays a debt.
+    #[inline(never)]
+    fn with_debt(&mut self, m: usize, way: i16) -> i16 {
+        let debt = self.debt[m];
+        let due = (debt + (PART / 2) as i16) & !(PART as i16 - 1);
+        if due == 0 {
+            return way;
+        }
+        self.debt[m] = debt - due;
+        way + (due >> PART_LOG2)
+    }
+
+    /// The whole steps in a way, with the fraction where it begins.
+    #[inline(never)]
+    fn round(&mut self, m: usize, way: i16) -> i16 {
+        let sum = way + i16::from(self.fraction[m]) + HALF as i16;
+        self.fraction[m] = ((sum as u8 & 15) as i8) - HALF as i8;
+        sum >> PARTS_LOG2
     }
 
     /// Phase units of the dominant motor in the block that no segment has covered yet.
     pub fn left(&self) -> u32 {
         self.left
+    }
+
+    /// How far the dominant motor goes in the block, debts apart, phase units. What a debt adds belongs to the first stretch, as
+    /// does its time.
+    pub fn own(&self) -> u32 {
+        product(self.own, if self.parts { PART } else { STEP })
     }
 
     /// `cycles` with what has been kept of the time before, at least 1.
@@ -220,10 +319,13 @@ impl Prep {
         let cycles = self.with_kept(cycles);
         let limit = self.limit(cycles, self.pace());
         let (_, shift) = coarsen(travel, limit);
-        // What is left must be whole ticks, now and at the end: of up to an eighth of this stretch.
-        let shift = shift.min(self.left.trailing_zeros() as u8);
+        // From where a tick is a step; of fine ticks, from the middle between two, where the interrupt has time for a segment.
+        let middle = if shift < STEP_LOG2 - 1 { STEP / 2 } else { 0 };
+        let at = self.left.wrapping_sub(self.past.wrapping_add(middle).into());
+        let shift = self.fitting(shift, at.trailing_zeros() as u8, cycles, travel);
         let grain = grain(travel >> shift, shift);
-        let short = (self.left - travel).wrapping_neg() & !(u32::MAX << grain);
+        let at = at & (u32::MAX << shift);
+        let short = at.wrapping_sub(travel).wrapping_neg() & !(u32::MAX << grain);
         if travel <= short {
             return self.idle(cycles, out);
         }
@@ -237,33 +339,99 @@ impl Prep {
         true
     }
 
+    /// The exponent of ticks that end on the steps of the dominant motor: `fits`, if `shift` is more and there is time.
+    fn fitting(&self, shift: u8, fits: u8, cycles: u32, travel: u32) -> u8 {
+        let finer =
+            fits < shift && self.period(cycles, travel, fits) >= u32::from(self.paces().settles);
+        if finer { fits } else { shift }
+    }
+
     /// Prepares the whole of a block that begins: `cycles` for it, no more than a few milliseconds. False,
     /// and no segment, when it has no steps; the time is kept then.
     ///
     /// The same as `last` for it, but short and simple. Cost: 700, and 400 for each motor but the dominant.
     #[inline(never)]
-    pub fn whole(&mut self, cycles: u32, out: &mut Segment) -> bool {
+    pub fn whole(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
         let most = self.most;
-        if most == 0 || most > TICKS_MAX {
-            return self.last_of(cycles, COARSEST, out);
+        // What has been kept may be long.
+        if exact || most == 0 || !self.parts || cycles >> 24 != 0 {
+            return self.last_of(cycles, COARSEST, exact, out);
+        }
+        if !self.steps && most < HALF {
+            return self.postpone(cycles);
         }
         let limit = self.limit(cycles, COARSEST) as u16;
-        let (mut ticks, mut increment) = (most, STEP);
-        while ticks <= limit / 2 {
-            ticks *= 2;
-            increment /= 2;
+        // Ticks of a part, finer or coarser; and so many times the period.
+        let (mut ticks, mut step, mut time) = (most, PART, cycles);
+        if ticks > limit {
+            let mut half = 0;
+            while ticks > limit && step != STEP {
+                half = ticks & 1;
+                ticks >>= 1;
+                step <<= 1;
+                time <<= 1;
+            }
+            ticks += half;
+        } else {
+            while ticks <= limit / 2 {
+                ticks *= 2;
+                step /= 2;
+                time >>= 1;
+            }
+        }
+        if ticks > TICKS_MAX {
+            return self.last_of(cycles, COARSEST, exact, out);
         }
         let shortest = self.paces().shortest;
-        let long = (cycles >> 16) as u16 >= ticks;
-        let period = if long { u16::MAX } else { quotient(cycles + u32::from(ticks / 2), ticks) };
+        let long = (time >> 16) as u16 >= most;
+        let period = if long { u16::MAX } else { quotient(time + u32::from(most / 2), most) };
         let period = period.max(shortest);
         self.left = 0;
         out.ticks = ticks;
         out.period = period;
         out.settle = 0;
-        self.complete(cycles, increment, out, |prep, m| prep.even(m, ticks));
+        let short = most.wrapping_mul(PART).wrapping_sub(ticks.wrapping_mul(step)) as i16;
+        if short != 0 {
+            self.owe_full(short);
+        }
+        self.complete(cycles, step, out, |prep, m| prep.even(m, ticks, step));
         true
+    }
+
+    /// Nothing of a block moves yet: the next one goes all the way.
+    #[inline(never)]
+    #[small]
+    fn postpone(&mut self, cycles: u32) -> bool {
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            if (self.full | self.minor) & bit != 0 {
+                self.owe(m, bit, self.minors[m].way.wrapping_mul(PART) as i16);
+            }
+            bit <<= 1;
+        }
+        self.left = 0;
+        self.time = cycles.min(KEPT_MAX) as i32;
+        false
+    }
+
+    /// A motor is that short, in its direction.
+    #[inline(always)]
+    fn owe(&mut self, m: usize, bit: u8, short: i16) {
+        self.debt[m] += if self.backwards & bit != 0 { -short } else { short };
+    }
+
+    /// All motors that go as far as the dominant one are that short.
+    #[inline(never)]
+    #[small]
+    fn owe_full(&mut self, short: i16) {
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            if self.full & bit != 0 {
+                self.owe(m, bit, short);
+            }
+            bit <<= 1;
+        }
     }
 
     /// Completes a segment that has ticks and a period, in the `cycles` there are: `step` for the motors that
@@ -277,8 +445,9 @@ impl Prep {
         minor: impl Fn(&mut Self, usize) -> u16,
     ) {
         let used = u32::from(out.ticks) * u32::from(out.period);
-        // Time that cannot be caught up is let go, or the machine would race to do so.
-        self.time = (cycles as i32 - used as i32).max(-1000);
+        // Time that cannot be caught up is let go, or the machine would race to do so. A tick may be half ahead.
+        let ahead = -1000 - i32::from(out.period / 2);
+        self.time = (cycles as i32 - used as i32).max(ahead);
         out.backwards = self.backwards;
         out.moving = self.full | self.minor;
         let (full, others) = (self.full, self.minor);
@@ -293,38 +462,47 @@ impl Prep {
         }
     }
 
-    /// The increment that takes a motor over its block in `ticks`, and what it is short of then.
-    fn even(&mut self, m: usize, ticks: u16) -> u16 {
-        let wanted = (u32::from(self.minors[m].steps) << 16 >> 1) as i32 + i32::from(self.debt[m]);
-        let wanted = wanted.max(0);
-        let increment = quotient(wanted as u32 + u32::from(ticks / 2), ticks).min(STEP);
-        self.debt[m] = (wanted - (u32::from(increment) * u32::from(ticks)) as i32) as i16;
+    /// The increment of a motor over its block in `ticks` of `step`; and what it is short of then.
+    #[inline(never)]
+    fn even(&mut self, m: usize, ticks: u16, step: u16) -> u16 {
+        let way = self.minors[m].way;
+        let increment = quotient(product(way, step) + u32::from(self.most / 2), self.most);
+        let short = product(way, PART).wrapping_sub(product(increment, ticks)) as i16;
+        self.owe(m, 1 << m, short);
         increment
     }
 
-    /// Prepares the last stretch of the block, everything that is left, in `cycles`. False,
-    /// and no segment, when nothing is left; the time is kept then.
-    pub fn last(&mut self, cycles: u32, out: &mut Segment) -> bool {
+    /// Prepares the last stretch of the block, everything that is left, in `cycles`; all of it if `exact`, else the nearest
+    /// number of ticks. False, and no segment, when nothing is left; the time is kept then.
+    pub fn last(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
-        self.last_of(cycles, self.pace(), out)
+        self.last_of(cycles, self.pace(), exact, out)
     }
 
-    fn last_of(&mut self, cycles: u32, pace: u16, out: &mut Segment) -> bool {
-        if self.left == 0 {
+    #[inline(never)]
+    fn last_of(&mut self, cycles: u32, pace: u16, exact: bool, out: &mut Segment) -> bool {
+        let left = self.left;
+        if left == 0 {
             self.time = cycles.min(KEPT_MAX) as i32;
             return false;
         }
-        let (_, shift) = coarsen(self.left, self.limit(cycles, pace));
-        // Ticks that do not go into what is left would leave a rest.
-        let shift = shift.min(self.left.trailing_zeros() as u8);
-        let ticks = self.left >> shift;
+        let (mut ticks, mut shift) = coarsen(left, self.limit(cycles, pace));
+        let fits = left.trailing_zeros() as u8;
+        if exact && fits > shift && left < STEP.into() {
+            // The rest of it, in no more ticks than need be.
+            (ticks, shift) = (left >> fits, fits);
+        }
+        let period = self.period(cycles, left, shift).min(PERIOD_MAX);
+        let over = left & !(u32::MAX << shift);
         if ticks > u32::from(TICKS_MAX) {
             // Too much for one segment: a part of it, and the rest when asked again.
-            let period = self.period(cycles, self.left, shift) as u16;
-            self.emit(TICKS_MAX, shift, period, cycles, out);
-            return true;
+            ticks = TICKS_MAX.into();
+        } else if !exact {
+            // The nearest; what is over is never above half a tick then.
+            ticks += u32::from(over > 1 << shift >> 1);
+            self.left = ticks << shift;
+            self.short = left.wrapping_sub(self.left) as i16;
         }
-        let period = self.period(cycles, self.left, shift).min(PERIOD_MAX);
         self.emit(ticks as u16, shift, period as u16, cycles, out);
         true
     }
@@ -392,34 +570,39 @@ impl Prep {
     pub fn cut(&mut self, target: &mut [i32; MOTORS]) -> Option<Segment> {
         let mut bit = 1;
         for (m, target) in target.iter_mut().enumerate() {
-            if (self.full | self.minor) & bit != 0 && self.left != 0 {
-                let backwards = self.backwards & bit != 0;
-                let steps = steps_of(self.short_of(m, bit), backwards);
-                *target = target.wrapping_add(if backwards { steps } else { -steps });
-            }
+            // Where the whole step is that its end is rounded to, from where it is.
+            let beyond = i32::from(self.fraction[m]) * i32::from(PART);
+            let left = self.left_of(m, bit);
+            let left = if self.backwards & bit != 0 { -left } else { left };
+            let short = left + i32::from(self.debt[m]) - beyond;
+            *target = target.wrapping_add((i32::from(PHASE_START) - short) >> STEP_LOG2);
             bit <<= 1;
         }
         self.left = 0;
         self.time = 0;
         self.debt = [0; MOTORS];
+        self.fraction = [0; MOTORS];
         // The segment that was to tell of it may be among those that are lost.
         self.turned = true;
         self.held.take()
     }
 
-    /// Phase units that a motor is short of its target: exact.
+    /// Phase units that no segment has of a motor's way, in its direction, but for its debt.
     #[inline(never)]
     #[small]
-    fn short_of(&self, m: usize, bit: u8) -> i32 {
-        let (minor, debt) = (&self.minors[m], i32::from(self.debt[m]));
+    fn left_of(&self, m: usize, bit: u8) -> i32 {
+        let minor = &self.minors[m];
+        if self.left == 0 || (self.full | self.minor) & bit == 0 {
+            return 0;
+        }
         if self.full & bit != 0 {
-            return self.left as i32 + debt;
+            return self.left as i32;
         }
         if self.shift == u8::MAX {
             // Nothing of the block has been prepared.
-            return (i32::from(minor.steps) << STEP_LOG2) + debt;
+            return product(minor.way, if self.parts { PART } else { STEP }) as i32;
         }
-        let wide = i64::from(minor.steps) * i64::from(self.left) + i64::from(minor.owed);
+        let wide = i64::from(minor.way) * i64::from(self.left) + i64::from(minor.owed);
         (wide / i64::from(self.most)) as i32
     }
 
@@ -449,11 +632,19 @@ impl Prep {
     }
 
     /// What motors are short of from blocks before, in the units of this one.
+    #[inline(never)]
+    #[small]
     fn take_up_debts(&mut self) {
+        // What makes the dominant motor's way longer makes theirs so in proportion, and they have their own debts.
+        let way = product(self.most, if self.parts { PART } else { STEP });
+        let due = self.left.wrapping_sub(way) as i16 + self.short;
         let mut bit = 1;
         for m in 0..MOTORS {
             if self.minor & bit != 0 {
-                self.minors[m].owed = product(self.debt[m], self.most);
+                let debt = core::mem::take(&mut self.debt[m]);
+                let debt = if self.backwards & bit != 0 { -debt } else { debt };
+                let way = self.minors[m].way;
+                self.minors[m].owed = times(debt, self.most) - times(due, way);
             }
             bit <<= 1;
         }
@@ -473,24 +664,36 @@ impl Prep {
     }
 
     /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.
+    #[inline(never)]
+    #[small]
     fn scale(&mut self, shift: u8) {
         self.shift = shift;
-        each_motor!(M => if self.minor & 1 << M != 0 {
-            let minor = &mut self.minors[M];
-            let travel = u32::from(minor.steps) << shift;
-            (minor.increment, minor.remainder) = quotient_remainder(travel, self.most);
-        });
+        let step = 1 << shift;
+        let mut bit = 1;
+        for minor in &mut self.minors {
+            if self.minor & bit != 0 {
+                let travel = product(minor.way, step);
+                (minor.increment, minor.remainder) = quotient_remainder(travel, self.most);
+            }
+            bit <<= 1;
+        }
     }
 
     /// The block is done: what its motors are short of goes into the next.
+    #[inline(never)]
+    #[small]
     fn settle_debts(&mut self) {
+        let short = core::mem::take(&mut self.short);
+        self.owe_full(short);
         let mut bit = 1;
-        for (debt, minor) in self.debt.iter_mut().zip(&self.minors) {
+        for m in 0..MOTORS {
             if self.minor & bit != 0 {
-                // Exact: the line has arrived at a whole step.
-                let owed = minor.owed.unsigned_abs();
-                let whole = if owed == 0 { 0 } else { quotient(owed, self.most) as i16 };
-                *debt = if minor.owed < 0 { -whole } else { whole };
+                let minor = &self.minors[m];
+                // In proportion: they are on the line.
+                let owed = minor.owed + times(short, minor.way);
+                let size = owed.unsigned_abs();
+                let whole = if size == 0 { 0 } else { quotient(size, self.most) as i16 };
+                self.owe(m, bit, if owed < 0 { -whole } else { whole });
             }
             bit <<= 1;
         }
@@ -505,6 +708,7 @@ impl Default for Prep {
 
 impl Minor {
     /// The increment for the next `ticks`, and what it owes then.
+    #[inline(never)]
     fn advance(&mut self, ticks: u16, most: u16) -> u16 {
         let unit = u32::from(ticks) * u32::from(most);
         let half = (unit / 2) as i32;
@@ -533,14 +737,8 @@ fn rounded(owed: u32, unit: u32) -> u16 {
     ((owed + unit / 2) / unit) as u16
 }
 
-/// The steps in the last `travel` phase units before a whole step.
-fn steps_of(travel: i32, backwards: bool) -> i32 {
-    let last = i32::from(start(backwards));
-    if travel <= last { 0 } else { (travel - last + i32::from(STEP - 1)) >> STEP_LOG2 }
-}
-
-fn product(a: i16, b: u16) -> i32 {
-    let size = (u32::from(a.unsigned_abs()) * u32::from(b)) as i32;
+fn times(a: i16, b: u16) -> i32 {
+    let size = product(a.unsigned_abs(), b) as i32;
     if a < 0 { -size } else { size }
 }
 
