@@ -202,14 +202,18 @@ impl Prep {
             let bit = 1 << M;
             let mut way = line.way[M];
             let mut whole = way;
-            if parts {
-                whole = self.round(M, way);
-                way = self.with_debt(M, way);
+            if way != 0 {
+                if parts {
+                    whole = self.round(M, way);
+                }
+                if whole != 0 {
+                    self.steps = true;
+                    target[M] = target[M].wrapping_add(whole.into());
+                }
             }
             steps[M] = whole;
-            if whole != 0 {
-                self.steps = true;
-                target[M] = target[M].wrapping_add(whole.into());
+            if parts && !is_little(self.debt[M]) {
+                way = self.with_debt(M, way);
             }
             if way != 0 {
                 others = others.wrapping_add(1);
@@ -245,7 +249,7 @@ impl Prep {
         }
     }
 
-    /// The dominant motor of a block of whole steps makes up what it is short of, and with it those that go as far.
+    /// In a block of whole steps the dominant motor makes up what it is short of, and with it those that go as far.
     #[inline(never)]
     #[small]
     fn lengthen(&mut self) {
@@ -254,13 +258,22 @@ impl Prep {
         for m in 0..MOTORS {
             if self.full & bit != 0 {
                 let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
-                let due = *due.get_or_insert((debt + (PART / 2) as i16) & !(PART as i16 - 1));
+                let due = *due.get_or_insert(parts_of(debt));
                 if (debt - due).unsigned_abs() <= PART {
                     self.owe(m, bit, -due);
                 } else {
                     // It goes as far, but not as what it was short of.
                     self.full &= !bit;
                     self.minor |= bit;
+                }
+            } else if self.minor & bit == 0 && !is_little(self.debt[m]) {
+                // It has no part in the line, but not arrived where that begins.
+                self.minor |= bit;
+                self.minors[m].way = 0;
+                self.others += 1;
+                if (self.debt[m] < 0) != (self.backwards & bit != 0) {
+                    self.backwards ^= bit;
+                    self.turned = true;
                 }
             }
             bit <<= 1;
@@ -272,10 +285,7 @@ impl Prep {
     #[inline(never)]
     fn with_debt(&mut self, m: usize, way: i16) -> i16 {
         let debt = self.debt[m];
-        let due = (debt + (PART / 2) as i16) & !(PART as i16 - 1);
-        if due == 0 {
-            return way;
-        }
+        let due = parts_of(debt);
         self.debt[m] = debt - due;
         way + (due >> PART_LOG2)
     }
@@ -423,15 +433,11 @@ impl Prep {
 
     /// All motors that go as far as the dominant one are that short.
     #[inline(never)]
-    #[small]
     fn owe_full(&mut self, short: i16) {
-        let mut bit = 1;
-        for m in 0..MOTORS {
-            if self.full & bit != 0 {
-                self.owe(m, bit, short);
-            }
-            bit <<= 1;
-        }
+        let full = self.full;
+        each_motor!(M => if full & 1 << M != 0 {
+            self.owe(M, 1 << M, short);
+        });
     }
 
     /// Completes a segment that has ticks and a period, in the `cycles` there are: `step` for the motors that
@@ -737,6 +743,20 @@ fn rounded(owed: u32, unit: u32) -> u16 {
     ((owed + unit / 2) / unit) as u16
 }
 
+/// Whether a debt is less than a part of a step, by rounding.
+#[inline(always)]
+fn is_little(debt: i16) -> bool {
+    (debt as u16).wrapping_add(PART / 2) < PART
+}
+
+/// A debt rounded to parts of a step, in phase units.
+#[inline(always)]
+fn parts_of(debt: i16) -> i16 {
+    (debt + (PART / 2) as i16) & !(PART as i16 - 1)
+}
+
+#[inline(never)]
+#[small]
 fn times(a: i16, b: u16) -> i32 {
     let size = product(a.unsigned_abs(), b) as i32;
     if a < 0 { -size } else { size }

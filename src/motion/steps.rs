@@ -85,18 +85,17 @@ impl Motor {
         }
         self.steps = self.steps.wrapping_add(steps);
         self.rest = rest.into();
-        self.fraction = fraction(self.rest, ratio.den);
+        self.fraction = fraction_near(self.rest as i16, den);
         true
     }
 }
 
-/// `rest / den`, at most half, in parts of a step. Cost: 150.
+/// The same for a denominator below 2^14. Cost: 80.
 #[inline(never)]
 #[small]
-fn fraction(rest: i32, den: u32) -> i8 {
-    // From the step before, so that it is positive.
-    let mut over = if rest < 0 { rest.wrapping_add_unsigned(den) } else { rest } as u32;
-    let mut parts = 0;
+fn fraction_near(rest: i16, den: u16) -> i8 {
+    let mut over = if rest < 0 { rest.wrapping_add_unsigned(den) } else { rest } as u16;
+    let mut parts = if rest < 0 { -1 } else { 0 };
     for _ in 0..PARTS_LOG2 {
         over = over.wrapping_mul(2);
         parts *= 2;
@@ -105,9 +104,25 @@ fn fraction(rest: i32, den: u32) -> i8 {
             parts += 1;
         }
     }
-    let (least, most) = FRACTIONS;
-    let before = if rest < 0 { 1 << PARTS_LOG2 } else { 0 };
-    (parts - before).clamp(least, most)
+    parts.clamp(FRACTIONS.0, FRACTIONS.1)
+}
+
+/// `rest / den`, at most half, in parts of a step. Cost: 200.
+#[inline(never)]
+#[small]
+fn fraction(rest: i32, den: u32) -> i8 {
+    // From the step before, so that it is positive.
+    let mut over = if rest < 0 { rest.wrapping_add_unsigned(den) } else { rest } as u32;
+    let mut parts = if rest < 0 { -1 } else { 0 };
+    for _ in 0..PARTS_LOG2 {
+        over = over.wrapping_mul(2);
+        parts *= 2;
+        if over >= den {
+            over = over.wrapping_sub(den);
+            parts += 1;
+        }
+    }
+    parts.clamp(FRACTIONS.0, FRACTIONS.1)
 }
 
 #[cfg(test)]
