@@ -1,8 +1,9 @@
 //! A block: one straight move, dwell or synchronised command, as the planner leaves it for exec.
 //!
 //! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block decides how
-//! far Kerf looks ahead, and each byte of it is there 65 times. So limits take two bytes each, velocity, length
-//! and line number three, and a line, which knows no [`Reserve`] of 0, no tag: 28 bytes on AVR.
+//! far Kerf looks ahead, and each byte of it is there 65 times. So limits take two bytes each, the line
+//! number three, the sign of a length tells what distances are counted in ([`Extent`]), and a line, which knows no [`Reserve`] of 0, has no tag:
+//! 30 bytes on AVR.
 
 use super::factors::{Factors, Reserve};
 use super::pace::Drivers;

@@ -3,34 +3,36 @@
 //! Owned by the exec task, which calls [`Prep::begin`] for a block and then [`Prep::segment`] or
 //! [`Prep::last`] for each stretch of it.
 //!
-//! The motor with the most steps in a block is dominant. Its increment is `STEP / 2^k`, so it steps on
+//! The motor that goes farthest in a block is dominant. Its increment is `STEP / 2^k`, so it steps on
 //! every `2^k`th tick exactly, with no jitter; `k` is as large as the shortest tick period allows, so
 //! that the other motors, which may step on any tick, stay close to their true times too. If all motors
-//! that move make the same number of steps there are no others: then `k` is 0 as far as can be, and
+//! that move go equally far there are no others: then `k` is 0 as far as can be, and
 //! the interrupt has next to nothing to do (lockstep).
 //!
-//! A stretch is cut to whole ticks, and so that coarser ticks fit what is left. What is cut off is
-//! still in `left` and comes with the next stretch, as does its time: nothing is lost.
+//! A stretch is cut to whole ticks. What is cut off is still in `left` and comes with the next stretch, as does its time:
+//! nothing is lost.
 //!
 //! The other motors get the rounded increment, and [`Minor::owed`] remembers exactly what rounding
 //! took: a segment in which it comes to half a unit a tick or more is corrected by a unit a tick. It is
 //! carried from segment to segment, and over the end of the block, so that nothing adds up.
 //!
-//! **Between two steps.** A block ends where its line ends, to 1/16 step ([`PART`]), not on a whole step: a curve of short
-//! lines would round each of its corners to a step, and the steps between once more. Ticks rarely fit such a way. So the
-//! last stretch of a block is the nearest number of whole ticks; what the motors are short of then, in proportion, or ahead,
-//! is a debt, and belongs to the next block: it goes from where the motors are to where its own line ends. Its time
-//! goes with it. A dominant motor thus keeps its phase and its rhythm over any number of blocks.
+//! **Ends of blocks.** A block ends where its line ends, to 1/16 step ([`PART`]). If blocks ended on whole steps, a curve of
+//! short lines would be rounded twice: its corners, and the steps between them. Ticks rarely fit such a distance. So the
+//! last stretch of a block takes the nearest number of whole ticks. What each motor is then short of, or ahead by, is its
+//! `debt`. The next block starts from where the motors are and so pays it. The time of the missing part is carried over with it.
+//! A dominant motor thus keeps its phase, and its steps stay even, over any number of blocks.
 //!
-//! Where the motion may end, in whatever comes to rest or is not followed by a line, a block is made to its end (`exact`): with finer ticks
-//! for the last of it if need be. The end is less than half a step from the whole step that it is rounded to ([`FRACTIONS`](super::block::FRACTIONS)),
-//! by more than rounding leaves ([`super::dda::PHASE_MARGIN`]), so that the position is exact. A block of more steps
-//! than [`PARTS_STEPS_MAX`](super::block::PARTS_STEPS_MAX) has whole steps from end to end, whatever fraction it begins with.
+//! **Ends of motion.** A block that comes to rest, or that no line follows, is made to its end (`exact`), with finer ticks
+//! for the remainder if need be. That end is less than half a step from the whole step it is rounded to
+//! ([`FRACTIONS`](super::block::FRACTIONS)), by more than rounding can leave. So the position is exact whenever the machine rests.
+//! Blocks of more than [`PARTS_STEPS_MAX`](super::block::PARTS_STEPS_MAX) steps do not fit 1/16 steps: they are a whole number
+//! of steps long, and keep the fraction with which they begin.
 //!
-//! Segments of fine ticks end between two steps of the dominant motor, where the interrupt has time to load the next, as far as
-//! can be; those of one or two ticks a step end on a step. So the next one is in time when they become a step on every tick.
+//! **Ends of segments.** A segment with one or two ticks a step ends on a step of the dominant motor as far as possible. So the next step
+//! is in time when a later segment has one tick a step. A segment with more ticks a step ends in the middle between two steps: a tick without
+//! a pulse leaves the interrupt time to load the next segment.
 //!
-//! Cost on AVR: 600 cycles a segment and 150 for each motor that moves; 800 for `begin`, and 300 for each
+//! Cost on AVR: 600 cycles a segment and 200 for each motor that moves; 600 to 800 for `begin`, and 300 for each
 //! motor when `k` changes.
 
 use super::block::{Line, PARTS_LOG2};
