@@ -127,9 +127,8 @@ fn check_limits(
     let got = f64::from(block.cruise);
     assert!(got <= cruise * EXACT, "{got} of {cruise} mm/s");
     // Slower only for motors, and blocks too short for exec.
-    // It is the first: from a whole step.
-    let part = |way: i16| if block.extent.has_whole_steps() { way } else { (way + 8) >> 4 };
-    let slow = block.way.iter().any(|&way| part(way) != 0);
+    let least = if block.extent.has_whole_steps() { 1 } else { 8 };
+    let slow = block.way.iter().any(|&way| way.unsigned_abs() >= least);
     let shortest = length / f64::from(BLOCK_S_MIN);
     assert!(slow || got >= slowest.max(1e-6) * (2.0 - EXACT), "{got} of {cruise} mm/s");
     assert!(!slow || got <= shortest * EXACT);
@@ -255,7 +254,7 @@ proptest! {
             // Nor slower than they have to.
             let (accel, jerk) = (f64::from(accel), if jerk > 0.0 { f64::from(jerk) } else { f64::MAX });
             let best = (accel * r).sqrt().min((jerk * r * r).cbrt()).min(f64::from(feed) / 30.0).min(500.0);
-            let best = best.min(f64::from(block.length) / f64::from(BLOCK_S_MIN));
+            let best = best.min(f64::from(block.extent.length()) / f64::from(BLOCK_S_MIN));
             prop_assert!(v > 0.8 * best, "{v} of {best} mm/s");
         }
     }

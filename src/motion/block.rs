@@ -9,6 +9,7 @@ use super::factors::{Factors, Reserve};
 use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
+use crate::gcode::overrides::Change;
 
 /// Parts of a step to which blocks know where they end: the logarithm of their number.
 pub const PARTS_LOG2: u8 = 4;
@@ -16,10 +17,6 @@ pub const PARTS_LOG2: u8 = 4;
 /// The least and the greatest fraction at a block's end, in 1/16 step from the whole step next to it. Nearly half a step: what
 /// rounding leaves must not tell which one is next.
 pub const FRACTIONS: (i8, i8) = (-7, 6);
-
-/// Most steps of a motor in a block that knows parts of them.
-pub const PARTS_STEPS_MAX: u16 = 2046;
-use crate::gcode::overrides::Change;
 
 /// One block.
 #[derive(Clone, Copy, Debug)]

@@ -42,6 +42,9 @@ pub const SEGMENT_S: f32 = 0.002;
 /// Shortest block with steps, s: twice what exec takes for it while the step interrupt is busy.
 pub const BLOCK_S_MIN: f32 = 0.000_75;
 
+/// Faster than this no line ends but at another one, mm/s.
+const SLOW: f32 = 5.0;
+
 /// A dwell's segment: this many ticks of a millisecond.
 const DWELL_TICKS: u16 = 2;
 
@@ -416,7 +419,9 @@ impl Exec {
         blocks: &mut BlockSource,
         segment: &mut Segment,
     ) -> Step {
-        let exact = self.governor.is_at_rest() || !blocks.goes_on();
+        // What the planner has been asked for ends at rest, or the governor nearly so.
+        let exact = below(self.governor.velocity(), SLOW)
+            && (self.governor.is_at_rest() || !blocks.goes_on());
         let some = if whole {
             self.prep.whole(cycles, exact, segment)
         } else {

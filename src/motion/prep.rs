@@ -50,7 +50,7 @@ const PART: u16 = STEP >> PARTS_LOG2;
 const PART_LOG2: u8 = STEP_LOG2 - PARTS_LOG2;
 
 /// Half a step, in such parts.
-const HALF: u16 = 1 << (PARTS_LOG2 - 1);
+const HALF: u8 = 1 << (PARTS_LOG2 - 1);
 
 /// Most ticks of a segment: keeps the rounding rest below [`super::dda::PHASE_MARGIN`].
 pub const TICKS_MAX: u16 = 2000;
@@ -116,18 +116,14 @@ pub struct Prep {
     turned: bool,
     /// How long directions must stand before the first step, CPU cycles.
     setup: u16,
-    /// What the dominant motor's way is without debts, in the same units.
-    own: u16,
-    /// A motor makes a step in the block.
-    steps: bool,
-    /// How far the dominant motor is past a step, in its direction, at the block's end: phase units.
-    past: u16,
+    /// What the dominant motor's way is without debts, in the same units, signed.
+    own: i16,
     /// Phase units that the dominant motor is short of when all segments of the block are out.
     short: i16,
     /// Phase units that a motor is short of at the end of a block, counted forwards.
     debt: [i16; MOTORS],
-    /// How far the end of the block is beyond the whole step that it is rounded to, in 1/16 step.
-    fraction: [i8; MOTORS],
+    /// How far the end of the block is beyond half a step before the whole step that it is rounded to, in 1/16 step.
+    fraction: [u8; MOTORS],
     minors: [Minor; MOTORS],
     /// By the number of motors that move, less one.
     paces: [Pace; MOTORS],
@@ -146,11 +142,9 @@ impl Prep {
             parts: true,
             minors: [MINOR; MOTORS],
             own: 0,
-            steps: false,
-            past: 0,
             short: 0,
             debt: [0; MOTORS],
-            fraction: [0; MOTORS],
+            fraction: [HALF; MOTORS],
             shift: u8::MAX,
             full: 0,
             minor: 0,
@@ -197,57 +191,84 @@ impl Prep {
     #[inline(never)]
     pub fn begin(&mut self, line: &Line, steps: &mut [i16; MOTORS], target: &mut [i32; MOTORS]) {
         self.shift = u8::MAX;
-        self.steps = false;
-        let parts = !line.extent.has_whole_steps();
-        let (mut most, mut moving, mut full, mut others) = (0, 0, 0, u8::MAX);
+        (self.full, self.minor, self.most, self.others) = (0, 0, 0, u8::MAX);
+        self.parts = !line.extent.has_whole_steps();
+        if !self.parts {
+            return self.begin_far(&line.way, steps, target);
+        }
         each_motor!(M => {
-            let bit = 1 << M;
             let mut way = line.way[M];
-            let mut whole = way;
+            let mut whole = 0;
             if way != 0 {
-                if parts {
-                    whole = self.round(M, way);
-                }
-                if whole != 0 {
-                    self.steps = true;
-                    target[M] = target[M].wrapping_add(whole.into());
-                }
+                let sum = way + i16::from(self.fraction[M]);
+                self.fraction[M] = sum as u8 & 15;
+                whole = sum >> PARTS_LOG2;
+                target[M] = target[M].wrapping_add(whole.into());
             }
             steps[M] = whole;
-            if parts && !is_little(self.debt[M]) {
-                way = self.with_debt(M, way);
+            let debt = self.debt[M];
+            if !is_little(debt) {
+                // The parts of a step that it is short of; the rest stays a debt.
+                let due = parts_of(debt);
+                self.debt[M] = debt - due;
+                way += due >> PART_LOG2;
             }
             if way != 0 {
-                others = others.wrapping_add(1);
-                moving |= bit;
-                let size = way.unsigned_abs();
-                self.minors[M].way = size;
-                if size > most {
-                    (most, full) = (size, 0);
-                    self.own = line.way[M].unsigned_abs();
-                    let at = i16::from(self.fraction[M]) + HALF as i16;
-                    self.past = if way < 0 { !at } else { at } as u16;
-                }
-                if size == most {
-                    full |= bit;
-                }
-                let backwards = if way < 0 { bit } else { 0 };
-                if backwards != self.backwards & bit {
-                    self.backwards ^= bit;
-                    self.turned = true;
-                }
+                self.take_up(M, 1 << M, way, line.way[M]);
             }
         });
-        self.most = most;
-        self.past <<= PART_LOG2;
-        self.parts = parts;
-        self.left = product(most, if parts { PART } else { STEP });
-        self.full = full;
-        self.minor = moving & !full;
-        // Without motors there are no ticks to pace.
-        self.others = if moving == 0 { 0 } else { others };
-        if !parts {
-            self.lengthen();
+        self.left = product(self.most, PART);
+        if self.most == 0 {
+            // Without motors there are no ticks to pace.
+            self.others = 0;
+        }
+    }
+
+    /// The same for a way in whole steps.
+    #[inline(never)]
+    #[small]
+    fn begin_far(
+        &mut self,
+        ways: &[i16; MOTORS],
+        steps: &mut [i16; MOTORS],
+        target: &mut [i32; MOTORS],
+    ) {
+        *steps = *ways;
+        let mut bit = 1;
+        for (m, way) in ways.iter().enumerate() {
+            if *way != 0 {
+                target[m] = target[m].wrapping_add((*way).into());
+                self.take_up(m, bit, *way, *way);
+            }
+            bit <<= 1;
+        }
+        self.left = product(self.most, STEP);
+        self.lengthen();
+    }
+
+    /// A motor goes this way in the block, of which it has `own` but for its debt.
+    #[inline(always)]
+    fn take_up(&mut self, m: usize, bit: u8, way: i16, own: i16) {
+        self.others = self.others.wrapping_add(1);
+        let (size, turned) = if way < 0 {
+            ((way as u16).wrapping_neg(), !self.backwards & bit)
+        } else {
+            (way as u16, self.backwards & bit)
+        };
+        if turned != 0 {
+            self.backwards ^= bit;
+            self.turned = true;
+        }
+        self.minors[m].way = size;
+        if size == self.most {
+            self.full |= bit;
+        } else if size > self.most {
+            self.minor |= self.full;
+            self.full = bit;
+            self.most = size;
+            self.own = own;
+        } else {
+            self.minor |= bit;
         }
     }
 
@@ -283,23 +304,6 @@ impl Prep {
         self.left = self.left.wrapping_add_signed(due.unwrap_or(0).into());
     }
 
-    /// A way with the parts of a step that the motor is short of; the rest stays a debt.
-    #[inline(never)]
-    fn with_debt(&mut self, m: usize, way: i16) -> i16 {
-        let debt = self.debt[m];
-        let due = parts_of(debt);
-        self.debt[m] = debt - due;
-        way + (due >> PART_LOG2)
-    }
-
-    /// The whole steps in a way, with the fraction where it begins.
-    #[inline(never)]
-    fn round(&mut self, m: usize, way: i16) -> i16 {
-        let sum = way + i16::from(self.fraction[m]) + HALF as i16;
-        self.fraction[m] = ((sum as u8 & 15) as i8) - HALF as i8;
-        sum >> PARTS_LOG2
-    }
-
     /// Phase units of the dominant motor in the block that no segment has covered yet.
     pub fn left(&self) -> u32 {
         self.left
@@ -308,7 +312,7 @@ impl Prep {
     /// How far the dominant motor goes in the block, debts apart, phase units. What a debt adds belongs to the first stretch, as
     /// does its time.
     pub fn own(&self) -> u32 {
-        product(self.own, if self.parts { PART } else { STEP })
+        product(self.own.unsigned_abs(), if self.parts { PART } else { STEP })
     }
 
     /// `cycles` with what has been kept of the time before, at least 1.
@@ -330,14 +334,19 @@ impl Prep {
         let travel = self.left.saturating_sub(left);
         let cycles = self.with_kept(cycles);
         let limit = self.limit(cycles, self.pace());
-        let (_, shift) = coarsen(travel, limit);
+        let (_, mut shift) = coarsen(travel, limit);
         // From where a tick is a step; of fine ticks, from the middle between two, where the interrupt has time for a segment.
         let middle = if shift < STEP_LOG2 - 1 { STEP / 2 } else { 0 };
-        let at = self.left.wrapping_sub(self.past.wrapping_add(middle).into());
-        let shift = self.fitting(shift, at.trailing_zeros() as u8, cycles, travel);
+        // No tick is longer than a step.
+        let at = (self.left as u16).wrapping_sub(self.past().wrapping_add(middle));
+        let mut rest = (1 << shift) - 1;
+        if at & rest != 0 {
+            shift = self.fitting(shift, at.trailing_zeros() as u8, cycles, travel);
+            rest = (1 << shift) - 1;
+        }
         let grain = grain(travel >> shift, shift);
-        let at = at & (u32::MAX << shift);
-        let short = at.wrapping_sub(travel).wrapping_neg() & !(u32::MAX << grain);
+        let short = (travel as u16).wrapping_sub(at & !rest) & ((1 << grain) - 1);
+        let short = u32::from(short);
         if travel <= short {
             return self.idle(cycles, out);
         }
@@ -349,6 +358,20 @@ impl Prep {
         }
         self.emit(ticks, shift, period as u16, cycles, out);
         true
+    }
+
+    /// How far the dominant motor is past a step, in its direction, at the block's end: phase units.
+    #[inline(never)]
+    fn past(&self) -> u16 {
+        let mut bit = 1;
+        for fraction in &self.fraction {
+            if self.full & bit != 0 {
+                let at = if self.backwards & bit != 0 { !fraction } else { *fraction };
+                return u16::from(at) << PART_LOG2;
+            }
+            bit <<= 1;
+        }
+        0
     }
 
     /// The exponent of ticks that end on the steps of the dominant motor: `fits`, if `shift` is more and there is time.
@@ -370,7 +393,7 @@ impl Prep {
         if exact || most == 0 || !self.parts || cycles >> 24 != 0 {
             return self.last_of(cycles, COARSEST, exact, out);
         }
-        if !self.steps && most < HALF {
+        if most < HALF.into() {
             return self.postpone(cycles);
         }
         let limit = self.limit(cycles, COARSEST) as u16;
@@ -407,7 +430,14 @@ impl Prep {
         if short != 0 {
             self.owe_full(short);
         }
-        self.complete(cycles, step, out, |prep, m| prep.even(m, ticks, step));
+        self.complete(cycles, step, out, |prep, m| {
+            let way = prep.minors[m].way;
+            let increment = even(way, step, most);
+            // Modulo 2^16, of which it is the lesser half.
+            let short = way.wrapping_mul(PART).wrapping_sub(increment.wrapping_mul(ticks));
+            prep.owe(m, 1 << m, short as i16);
+            increment
+        });
         true
     }
 
@@ -468,16 +498,6 @@ impl Prep {
         if self.turned {
             self.behind_turn(out);
         }
-    }
-
-    /// The increment of a motor over its block in `ticks` of `step`; and what it is short of then.
-    #[inline(never)]
-    fn even(&mut self, m: usize, ticks: u16, step: u16) -> u16 {
-        let way = self.minors[m].way;
-        let increment = quotient(product(way, step) + u32::from(self.most / 2), self.most);
-        let short = product(way, PART).wrapping_sub(product(increment, ticks)) as i16;
-        self.owe(m, 1 << m, short);
-        increment
     }
 
     /// Prepares the last stretch of the block, everything that is left, in `cycles`; all of it if `exact`, else the nearest
@@ -579,7 +599,7 @@ impl Prep {
         let mut bit = 1;
         for (m, target) in target.iter_mut().enumerate() {
             // Where the whole step is that its end is rounded to, from where it is.
-            let beyond = i32::from(self.fraction[m]) * i32::from(PART);
+            let beyond = (i32::from(self.fraction[m]) - i32::from(HALF)) * i32::from(PART);
             let left = self.left_of(m, bit);
             let left = if self.backwards & bit != 0 { -left } else { left };
             let short = left + i32::from(self.debt[m]) - beyond;
@@ -589,7 +609,7 @@ impl Prep {
         self.left = 0;
         self.time = 0;
         self.debt = [0; MOTORS];
-        self.fraction = [0; MOTORS];
+        self.fraction = [HALF; MOTORS];
         // The segment that was to tell of it may be among those that are lost.
         self.turned = true;
         self.held.take()
@@ -623,7 +643,7 @@ impl Prep {
     #[inline(never)]
     fn emit(&mut self, ticks: u16, shift: u8, period: u16, cycles: u32, out: &mut Segment) {
         if shift != self.shift {
-            if self.shift == u8::MAX {
+            if self.shift == u8::MAX && !self.parts {
                 self.take_up_debts();
             }
             self.scale(shift);
@@ -639,13 +659,12 @@ impl Prep {
         }
     }
 
-    /// What motors are short of from blocks before, in the units of this one.
+    /// What motors are short of from blocks before, in the units of this one, which is of whole steps.
     #[inline(never)]
     #[small]
     fn take_up_debts(&mut self) {
         // What makes the dominant motor's way longer makes theirs so in proportion, and they have their own debts.
-        let way = product(self.most, if self.parts { PART } else { STEP });
-        let due = self.left.wrapping_sub(way) as i16 + self.short;
+        let due = self.left.wrapping_sub(product(self.most, STEP)) as i16 + self.short;
         let mut bit = 1;
         for m in 0..MOTORS {
             if self.minor & bit != 0 {
@@ -673,35 +692,40 @@ impl Prep {
 
     /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.
     #[inline(never)]
-    #[small]
     fn scale(&mut self, shift: u8) {
-        self.shift = shift;
-        let step = 1 << shift;
-        let mut bit = 1;
-        for minor in &mut self.minors {
-            if self.minor & bit != 0 {
-                let travel = product(minor.way, step);
-                (minor.increment, minor.remainder) = quotient_remainder(travel, self.most);
+        let first = core::mem::replace(&mut self.shift, shift) == u8::MAX && self.parts;
+        let (step, most, others) = (1 << shift, self.most, self.minor);
+        each_motor!(M => if others & 1 << M != 0 {
+            let minor = &mut self.minors[M];
+            (minor.increment, minor.remainder) = share(minor.way, step, most);
+            if first {
+                // Its way has them.
+                minor.owed = 0;
             }
-            bit <<= 1;
-        }
+        });
     }
 
     /// The block is done: what its motors are short of goes into the next.
     #[inline(never)]
-    #[small]
     fn settle_debts(&mut self) {
         let short = core::mem::take(&mut self.short);
-        self.owe_full(short);
+        if short != 0 {
+            self.owe_full(short);
+        }
+        let (most, others, backwards) = (self.most, self.minor, self.backwards);
         let mut bit = 1;
-        for m in 0..MOTORS {
-            if self.minor & bit != 0 {
-                let minor = &self.minors[m];
-                // In proportion: they are on the line.
-                let owed = minor.owed + times(short, minor.way);
-                let size = owed.unsigned_abs();
-                let whole = if size == 0 { 0 } else { quotient(size, self.most) as i16 };
-                self.owe(m, bit, if owed < 0 { -whole } else { whole });
+        for (debt, minor) in self.debt.iter_mut().zip(&self.minors) {
+            if others & bit != 0 {
+                let mut owed = minor.owed;
+                if short != 0 {
+                    // In proportion: they are on the line.
+                    owed += times(short, minor.way);
+                }
+                if owed != 0 {
+                    let whole = quotient(owed.unsigned_abs(), most) as i16;
+                    let ahead = (owed < 0) != (backwards & bit != 0);
+                    *debt += if ahead { -whole } else { whole };
+                }
             }
             bit <<= 1;
         }
@@ -716,7 +740,6 @@ impl Default for Prep {
 
 impl Minor {
     /// The increment for the next `ticks`, and what it owes then.
-    #[inline(never)]
     fn advance(&mut self, ticks: u16, most: u16) -> u16 {
         let unit = u32::from(ticks) * u32::from(most);
         let half = (unit / 2) as i32;
@@ -737,6 +760,18 @@ impl Minor {
         self.owed = owed;
         increment
     }
+}
+
+/// What is `way` of `step` in `most`, and what that leaves.
+#[inline(never)]
+fn share(way: u16, step: u16, most: u16) -> (u16, u16) {
+    quotient_remainder(product(way, step), most)
+}
+
+/// The same, rounded to the nearest.
+#[inline(never)]
+fn even(way: u16, step: u16, most: u16) -> u16 {
+    quotient(product(way, step) + u32::from(most / 2), most)
 }
 
 /// `owed / unit`, rounded. Rare: a debt that meets a short segment.
