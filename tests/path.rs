@@ -39,23 +39,23 @@ struct Kind {
     turn: f64,
 }
 
-/// Off the path: the most and the root of the mean square, steps.
+/// Off the path: the most and, over the time, the root of the mean square, steps.
 #[derive(Clone, Copy, Debug, Default)]
 struct Off {
     most: f64,
     square: f64,
-    count: f64,
+    time: f64,
 }
 
 impl Off {
-    fn add(&mut self, off: f64) {
+    fn add(&mut self, off: f64, time: f64) {
         self.most = self.most.max(off);
-        self.square += off * off;
-        self.count += 1.0;
+        self.square += off * off * time;
+        self.time += time;
     }
 
     fn rms(&self) -> f64 {
-        (self.square / self.count).sqrt()
+        (self.square / self.time).sqrt()
     }
 }
 
@@ -89,7 +89,7 @@ fn path(random: &mut Random, kind: &Kind, lines: usize) -> Vec<PerAxis<Length>> 
     points
 }
 
-/// Runs a path, and measures after each tick in which a motor steps.
+/// Runs a path, and measures how far motors are from the nearest point of it, wherever they should be at that time.
 fn off(points: &[PerAxis<Length>], velocity: f32, accel: f32, jerk: f32) -> Off {
     let mut rig = Rig::new(Config::new(500.0, accel, jerk));
     rig.pins.keep_trail = true;
@@ -105,13 +105,15 @@ fn off(points: &[PerAxis<Length>], velocity: f32, accel: f32, jerk: f32) -> Off 
     assert_eq!(rig.pins.position, rig.target());
     let mut off = Off::default();
     let mut near = 0;
-    for point in &rig.pins.trail {
+    for pair in rig.pins.trail.windows(2) {
+        let [(point, from), (_, to)] = pair else { unreachable!() };
+        let time = (to - from) as f64;
         let point = point.map(|x| x as f64);
         let to = |n: usize| distance(&point, &ideal[n], &ideal[n + 1]);
         // No loop of a path is so small that a later part of it could be taken for this one.
         let last = (near + 4).min(ideal.len() - 2);
         let best = (near..=last).min_by(|a, b| to(*a).total_cmp(&to(*b))).unwrap();
-        off.add(to(best));
+        off.add(to(best), time);
         near = best;
     }
     off
@@ -169,6 +171,7 @@ fn circles() -> Worst {
 fn steps_keep_to_the_path() {
     let worst = [lines(2), lines(3), lines(4), circles()];
     let most = [(0.8, 0.41), (0.93, 0.51), (1.06, 0.61), (0.8, 0.4)];
+    println!("{worst:?}");
     for (worst, (most, rms)) in worst.iter().zip(most) {
         assert!(worst.most <= most && worst.rms <= rms, "{worst:?} of {most}, {rms}");
     }

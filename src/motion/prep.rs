@@ -118,9 +118,10 @@ pub struct Prep {
     setup: u16,
     /// What the dominant motor's way is without debts, in the same units, signed.
     own: i16,
-    /// Phase units that the dominant motor is short of when all segments of the block are out.
-    short: i16,
-    /// Phase units that a motor is short of at the end of a block, counted forwards.
+    /// How far the dominant motor is past half a step, in its direction, at the block's end: 1/16 step, modulo 16.
+    past: u8,
+    /// Phase units that a motor is short of what blocks, that being run as well, have told it to go, counted forwards; modulo 2^16,
+    /// which at a block's end is all of it.
     debt: [i16; MOTORS],
     /// How far the end of the block is beyond half a step before the whole step that it is rounded to, in 1/16 step.
     fraction: [u8; MOTORS],
@@ -142,7 +143,7 @@ impl Prep {
             parts: true,
             minors: [MINOR; MOTORS],
             own: 0,
-            short: 0,
+            past: 0,
             debt: [0; MOTORS],
             fraction: [HALF; MOTORS],
             shift: u8::MAX,
@@ -199,19 +200,18 @@ impl Prep {
         each_motor!(M => {
             let mut way = line.way[M];
             let mut whole = 0;
+            let debt = self.debt[M];
             if way != 0 {
+                self.debt[M] = debt.wrapping_add(way << PART_LOG2);
                 let sum = way + i16::from(self.fraction[M]);
                 self.fraction[M] = sum as u8 & 15;
                 whole = sum >> PARTS_LOG2;
                 target[M] = target[M].wrapping_add(whole.into());
             }
             steps[M] = whole;
-            let debt = self.debt[M];
             if !is_little(debt) {
-                // The parts of a step that it is short of; the rest stays a debt.
-                let due = parts_of(debt);
-                self.debt[M] = debt - due;
-                way += due >> PART_LOG2;
+                // With the parts of a step that it is short of.
+                way += parts_of(debt) >> PART_LOG2;
             }
             if way != 0 {
                 self.take_up(M, 1 << M, way, line.way[M]);
@@ -244,6 +244,9 @@ impl Prep {
         }
         self.left = product(self.most, STEP);
         self.lengthen();
+        for (debt, way) in self.debt.iter_mut().zip(ways) {
+            *debt = debt.wrapping_add(way << STEP_LOG2);
+        }
     }
 
     /// A motor goes this way in the block, of which it has `own` but for its debt.
@@ -267,6 +270,8 @@ impl Prep {
             self.full = bit;
             self.most = size;
             self.own = own;
+            let at = self.fraction[m];
+            self.past = if way < 0 { !at } else { at };
         } else {
             self.minor |= bit;
         }
@@ -282,9 +287,7 @@ impl Prep {
             if self.full & bit != 0 {
                 let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
                 let due = *due.get_or_insert(parts_of(debt));
-                if (debt - due).unsigned_abs() <= PART {
-                    self.owe(m, bit, -due);
-                } else {
+                if (debt - due).unsigned_abs() > PART {
                     // It goes as far, but not as what it was short of.
                     self.full &= !bit;
                     self.minor |= bit;
@@ -301,7 +304,16 @@ impl Prep {
             }
             bit <<= 1;
         }
-        self.left = self.left.wrapping_add_signed(due.unwrap_or(0).into());
+        let due = due.unwrap_or(0);
+        self.left = self.left.wrapping_add_signed(due.into());
+        // What makes the dominant motor's way longer makes theirs so in proportion, and they have their own debts.
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
+            let way = self.minors[m].way;
+            self.minors[m].owed = times(debt, self.most) - times(due, way);
+            bit <<= 1;
+        }
     }
 
     /// Phase units of the dominant motor in the block that no segment has covered yet.
@@ -338,7 +350,8 @@ impl Prep {
         // From where a tick is a step; of fine ticks, from the middle between two, where the interrupt has time for a segment.
         let middle = if shift < STEP_LOG2 - 1 { STEP / 2 } else { 0 };
         // No tick is longer than a step.
-        let at = (self.left as u16).wrapping_sub(self.past().wrapping_add(middle));
+        let at = (self.left as u16)
+            .wrapping_sub((u16::from(self.past) << PART_LOG2).wrapping_add(middle));
         let mut rest = (1 << shift) - 1;
         if at & rest != 0 {
             shift = self.fitting(shift, at.trailing_zeros() as u8, cycles, travel);
@@ -358,20 +371,6 @@ impl Prep {
         }
         self.emit(ticks, shift, period as u16, cycles, out);
         true
-    }
-
-    /// How far the dominant motor is past a step, in its direction, at the block's end: phase units.
-    #[inline(never)]
-    fn past(&self) -> u16 {
-        let mut bit = 1;
-        for fraction in &self.fraction {
-            if self.full & bit != 0 {
-                let at = if self.backwards & bit != 0 { !fraction } else { *fraction };
-                return u16::from(at) << PART_LOG2;
-            }
-            bit <<= 1;
-        }
-        0
     }
 
     /// The exponent of ticks that end on the steps of the dominant motor: `fits`, if `shift` is more and there is time.
@@ -394,7 +393,9 @@ impl Prep {
             return self.last_of(cycles, COARSEST, exact, out);
         }
         if most < HALF.into() {
-            return self.postpone(cycles);
+            // Nothing moves yet: the next block goes all the way.
+            self.left = 0;
+            return self.last_of(cycles, COARSEST, exact, out);
         }
         let limit = self.limit(cycles, COARSEST) as u16;
         // Ticks of a part, finer or coarser; and so many times the period.
@@ -426,50 +427,8 @@ impl Prep {
         out.ticks = ticks;
         out.period = period;
         out.settle = 0;
-        let short = most.wrapping_mul(PART).wrapping_sub(ticks.wrapping_mul(step)) as i16;
-        if short != 0 {
-            self.owe_full(short);
-        }
-        self.complete(cycles, step, out, |prep, m| {
-            let way = prep.minors[m].way;
-            let increment = even(way, step, most);
-            // Modulo 2^16, of which it is the lesser half.
-            let short = way.wrapping_mul(PART).wrapping_sub(increment.wrapping_mul(ticks));
-            prep.owe(m, 1 << m, short as i16);
-            increment
-        });
+        self.complete(cycles, step, out, |prep, m| even(prep.minors[m].way, step, most));
         true
-    }
-
-    /// Nothing of a block moves yet: the next one goes all the way.
-    #[inline(never)]
-    #[small]
-    fn postpone(&mut self, cycles: u32) -> bool {
-        let mut bit = 1;
-        for m in 0..MOTORS {
-            if (self.full | self.minor) & bit != 0 {
-                self.owe(m, bit, self.minors[m].way.wrapping_mul(PART) as i16);
-            }
-            bit <<= 1;
-        }
-        self.left = 0;
-        self.time = cycles.min(KEPT_MAX) as i32;
-        false
-    }
-
-    /// A motor is that short, in its direction.
-    #[inline(always)]
-    fn owe(&mut self, m: usize, bit: u8, short: i16) {
-        self.debt[m] += if self.backwards & bit != 0 { -short } else { short };
-    }
-
-    /// All motors that go as far as the dominant one are that short.
-    #[inline(never)]
-    fn owe_full(&mut self, short: i16) {
-        let full = self.full;
-        each_motor!(M => if full & 1 << M != 0 {
-            self.owe(M, 1 << M, short);
-        });
     }
 
     /// Completes a segment that has ticks and a period, in the `cycles` there are: `step` for the motors that
@@ -488,11 +447,24 @@ impl Prep {
         self.time = (cycles as i32 - used as i32).max(ahead);
         out.backwards = self.backwards;
         out.moving = self.full | self.minor;
-        let (full, others) = (self.full, self.minor);
-        each_motor!(M => out.increment[M] = match 1 << M {
-            bit if full & bit != 0 => step,
-            bit if others & bit != 0 => minor(self, M),
-            _ => 0,
+        let (full, moving) = (self.full, out.moving);
+        let ticks = out.ticks;
+        let travel = step.wrapping_mul(ticks);
+        each_motor!(M => {
+            let mut increment = 0;
+            if moving & 1 << M != 0 {
+                let mut travel = travel;
+                increment = step;
+                if full & 1 << M == 0 {
+                    increment = minor(self, M);
+                    travel = increment.wrapping_mul(ticks);
+                }
+                if out.backwards & 1 << M == 0 {
+                    travel = travel.wrapping_neg();
+                }
+                self.debt[M] = self.debt[M].wrapping_add_unsigned(travel);
+            }
+            out.increment[M] = increment;
         });
         out.seal(self.full, step);
         if self.turned {
@@ -515,21 +487,26 @@ impl Prep {
             return false;
         }
         let (mut ticks, mut shift) = coarsen(left, self.limit(cycles, pace));
-        let fits = left.trailing_zeros() as u8;
-        if exact && fits > shift && left < STEP.into() {
-            // The rest of it, in no more ticks than need be.
-            (ticks, shift) = (left >> fits, fits);
+        if exact && left < STEP.into() {
+            let fits = left.trailing_zeros() as u8;
+            if fits > shift {
+                // The rest of it, in no more ticks than need be.
+                (ticks, shift) = (left >> fits, fits);
+            }
         }
         let period = self.period(cycles, left, shift).min(PERIOD_MAX);
-        let over = left & !(u32::MAX << shift);
         if ticks > u32::from(TICKS_MAX) {
             // Too much for one segment: a part of it, and the rest when asked again.
             ticks = TICKS_MAX.into();
         } else if !exact {
             // The nearest; what is over is never above half a tick then.
-            ticks += u32::from(over > 1 << shift >> 1);
-            self.left = ticks << shift;
-            self.short = left.wrapping_sub(self.left) as i16;
+            let tick = 1u16 << shift;
+            let over = left as u16 & (tick - 1);
+            self.left = left - u32::from(over);
+            if over > tick / 2 {
+                ticks += 1;
+                self.left += u32::from(tick);
+            }
         }
         self.emit(ticks as u16, shift, period as u16, cycles, out);
         true
@@ -602,7 +579,8 @@ impl Prep {
             let beyond = (i32::from(self.fraction[m]) - i32::from(HALF)) * i32::from(PART);
             let left = self.left_of(m, bit);
             let left = if self.backwards & bit != 0 { -left } else { left };
-            let short = left + i32::from(self.debt[m]) - beyond;
+            // The debt has that as well, modulo 2^16.
+            let short = left + i32::from(self.debt[m].wrapping_sub(left as i16)) - beyond;
             *target = target.wrapping_add((i32::from(PHASE_START) - short) >> STEP_LOG2);
             bit <<= 1;
         }
@@ -643,9 +621,6 @@ impl Prep {
     #[inline(never)]
     fn emit(&mut self, ticks: u16, shift: u8, period: u16, cycles: u32, out: &mut Segment) {
         if shift != self.shift {
-            if self.shift == u8::MAX && !self.parts {
-                self.take_up_debts();
-            }
             self.scale(shift);
         }
         self.left -= u32::from(ticks) << shift;
@@ -654,27 +629,6 @@ impl Prep {
         let settles = period >= self.paces().settles;
         out.settle = if settles { SETTLE } else { 0 };
         self.complete(cycles, 1 << shift, out, |prep, m| prep.minors[m].advance(ticks, prep.most));
-        if self.left == 0 {
-            self.settle_debts();
-        }
-    }
-
-    /// What motors are short of from blocks before, in the units of this one, which is of whole steps.
-    #[inline(never)]
-    #[small]
-    fn take_up_debts(&mut self) {
-        // What makes the dominant motor's way longer makes theirs so in proportion, and they have their own debts.
-        let due = self.left.wrapping_sub(product(self.most, STEP)) as i16 + self.short;
-        let mut bit = 1;
-        for m in 0..MOTORS {
-            if self.minor & bit != 0 {
-                let debt = core::mem::take(&mut self.debt[m]);
-                let debt = if self.backwards & bit != 0 { -debt } else { debt };
-                let way = self.minors[m].way;
-                self.minors[m].owed = times(debt, self.most) - times(due, way);
-            }
-            bit <<= 1;
-        }
     }
 
     /// The first segment after motors have turned round, or, if its first steps come too soon after
@@ -703,32 +657,6 @@ impl Prep {
                 minor.owed = 0;
             }
         });
-    }
-
-    /// The block is done: what its motors are short of goes into the next.
-    #[inline(never)]
-    fn settle_debts(&mut self) {
-        let short = core::mem::take(&mut self.short);
-        if short != 0 {
-            self.owe_full(short);
-        }
-        let (most, others, backwards) = (self.most, self.minor, self.backwards);
-        let mut bit = 1;
-        for (debt, minor) in self.debt.iter_mut().zip(&self.minors) {
-            if others & bit != 0 {
-                let mut owed = minor.owed;
-                if short != 0 {
-                    // In proportion: they are on the line.
-                    owed += times(short, minor.way);
-                }
-                if owed != 0 {
-                    let whole = quotient(owed.unsigned_abs(), most) as i16;
-                    let ahead = (owed < 0) != (backwards & bit != 0);
-                    *debt += if ahead { -whole } else { whole };
-                }
-            }
-            bit <<= 1;
-        }
     }
 }
 

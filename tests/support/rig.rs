@@ -76,8 +76,8 @@ pub struct Recorder {
     /// Cycle of each step of each motor, if wanted.
     pub edges: [Vec<u64>; MOTORS],
     pub keep_edges: bool,
-    /// Where the motors are after each tick in which any steps, if wanted.
-    pub trail: Vec<[i64; MOTORS]>,
+    /// Where the motors are after each tick in which any steps, and from which cycle on, if wanted.
+    pub trail: Vec<([i64; MOTORS], u64)>,
     pub keep_trail: bool,
     pub now: u64,
     pub stopped: bool,
@@ -96,7 +96,7 @@ impl Pins for Recorder {
             }
         }
         if self.keep_trail && motors != 0 {
-            self.trail.push(self.position);
+            self.trail.push((self.position, self.now));
         }
     }
     fn fall(&mut self, _: u8) {}
