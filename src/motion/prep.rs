@@ -501,12 +501,8 @@ impl Prep {
         } else if !exact {
             // The nearest; what is over is never above half a tick then.
             let tick = 1u16 << shift;
-            let over = left as u16 & (tick - 1);
-            self.left = left - u32::from(over);
-            if over > tick / 2 {
-                ticks += 1;
-                self.left += u32::from(tick);
-            }
+            ticks += u32::from(left as u16 & (tick - 1) > tick / 2);
+            self.left = ticks << shift;
         }
         self.emit(ticks as u16, shift, period as u16, cycles, out);
         true
