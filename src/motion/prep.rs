@@ -19,20 +19,19 @@
 //! **Ends of blocks.** A block ends where its line ends, to 1/16 step ([`PART`]). If blocks ended on whole steps, a curve of
 //! short lines would be rounded twice: its corners, and the steps between them. Ticks rarely fit such a distance. So the
 //! last stretch of a block takes the nearest number of whole ticks. What each motor is then short of, or ahead by, is its
-//! `debt`. The next block starts from where the motors are and so pays it. The time of the missing part is carried over with it.
+//! `debt`: what lines have told it to go, less what segments have, modulo 2^16. The next block starts from where the motors are and so pays it. The time of the missing part is carried over with it.
 //! A dominant motor thus keeps its phase, and its steps stay even, over any number of blocks.
 //!
 //! **Ends of motion.** A block that comes to rest, or that no line follows, is made to its end (`exact`), with finer ticks
 //! for the remainder if need be. That end is less than half a step from the whole step it is rounded to
 //! ([`FRACTIONS`](super::block::FRACTIONS)), by more than rounding can leave. So the position is exact whenever the machine rests.
-//! Blocks of more than [`PARTS_STEPS_MAX`](super::block::PARTS_STEPS_MAX) steps do not fit 1/16 steps: they are a whole number
-//! of steps long, and keep the fraction with which they begin.
+//! Blocks of more than 2,030 steps do not fit 1/16 steps: they are a whole number of steps long, and keep the fraction with which they begin.
 //!
 //! **Ends of segments.** A segment with one or two ticks a step ends on a step of the dominant motor as far as possible. So the next step
 //! is in time when a later segment has one tick a step. A segment with more ticks a step ends in the middle between two steps: a tick without
 //! a pulse leaves the interrupt time to load the next segment.
 //!
-//! Cost on AVR: 600 cycles a segment and 200 for each motor that moves; 600 to 800 for `begin`, and 300 for each
+//! Cost on AVR: 600 cycles a segment and 200 for each motor that moves; 400 for `begin`, and 300 for each
 //! motor when `k` changes.
 
 use super::block::{Line, PARTS_LOG2};
