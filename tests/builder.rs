@@ -12,8 +12,8 @@ use kerf::motion::dynamics::Dynamics;
 use kerf::motion::exec::BLOCK_S_MIN;
 use kerf::motion::factors::Factors;
 use kerf::motion::junction::{self, Heading, ONE};
+use kerf::motion::line::STEPS_MAX;
 use kerf::motion::line::{Builder, Built, Line};
-use kerf::motion::prep::STEPS_MAX;
 use kerf::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 use proptest::prelude::*;
 use rig::{Config, at};
@@ -90,7 +90,7 @@ fn check_limits(
     feed: Option<Feed>,
     config: &Config,
 ) {
-    assert!((f64::from(block.length) / length - 1.0).abs() < 2e-4);
+    assert!((f64::from(block.extent.length()) / length - 1.0).abs() < 2e-4);
     let mut cruise = match feed {
         Some(Feed::PerMinute(feed)) => {
             let linear = unit[..FIRST_ROTARY].iter().map(|u| u * u).sum::<f64>().sqrt();
@@ -127,7 +127,8 @@ fn check_limits(
     let got = f64::from(block.cruise);
     assert!(got <= cruise * EXACT, "{got} of {cruise} mm/s");
     // Slower only for motors, and blocks too short for exec.
-    let slow = block.steps.iter().any(|&s| s != 0);
+    let least = if block.extent.has_whole_steps() { 1 } else { 8 };
+    let slow = block.way.iter().any(|&way| way.unsigned_abs() >= least);
     let shortest = length / f64::from(BLOCK_S_MIN);
     assert!(slow || got >= slowest.max(1e-6) * (2.0 - EXACT), "{got} of {cruise} mm/s");
     assert!(!slow || got <= shortest * EXACT);
@@ -154,7 +155,7 @@ proptest! {
         let dynamics = Dynamics::new(&config);
         let mut builder = Builder::default();
         let mut from = at([0.0]);
-        let mut motors = [0i64; MOTORS];
+        let (mut motors, mut places) = ([0i64; MOTORS], [0i64; MOTORS]);
         let mut began = false;
         for (to, feed) in moves {
             let line = Line { from: &from, to: &to, feed, curve: None };
@@ -184,12 +185,14 @@ proptest! {
                     let (alone, _) = built(&mut alone, &config, [from, to], feed);
                     check_limits(&alone, &unit, length, feed, &config);
                     prop_assert!(block.cruise <= alone.cruise);
-                    let limits = |block: &Move| (block.accel, block.jerk, block.steps);
+                    let limits = |block: &Move| (block.accel, block.jerk);
                     prop_assert_eq!(limits(&block), limits(&alone));
                     prop_assert!(began || entry == 0.0);
                     began = true;
                     for m in 0..MOTORS {
-                        motors[m] += i64::from(block.steps[m]);
+                        let parts = if block.extent.has_whole_steps() { 16 } else { 1 };
+                        places[m] += i64::from(block.way[m]) * parts;
+                        motors[m] = (places[m] + 8).div_euclid(16);
                         prop_assert_eq!(motors[m], i64::from(config.ratio[m].steps(to[m])));
                     }
                 }
@@ -251,7 +254,7 @@ proptest! {
             // Nor slower than they have to.
             let (accel, jerk) = (f64::from(accel), if jerk > 0.0 { f64::from(jerk) } else { f64::MAX });
             let best = (accel * r).sqrt().min((jerk * r * r).cbrt()).min(f64::from(feed) / 30.0).min(500.0);
-            let best = best.min(f64::from(block.length) / f64::from(BLOCK_S_MIN));
+            let best = best.min(f64::from(block.extent.length()) / f64::from(BLOCK_S_MIN));
             prop_assert!(v > 0.8 * best, "{v} of {best} mm/s");
         }
     }
@@ -327,11 +330,11 @@ fn rotary_moves() {
     let zero = at([0.0]);
     let turned = at([0.0, 0.0, 0.0, 90.0]);
     let (block, _) = built(&mut Builder::default(), &config, [zero, turned], None);
-    assert_eq!(block.length, 90.0);
+    assert_eq!(block.extent.length(), 90.0);
     assert!((block.cruise - 360.0).abs() < 1e-3, "{}", block.cruise);
     let both = at([9.0, 0.0, 0.0, 90.0]);
     let (block, _) = built(&mut Builder::default(), &config, [zero, both], None);
-    assert!((block.length - 90.0).abs() < 0.01, "{}", block.length);
+    assert!((block.extent.length() - 90.0).abs() < 0.01, "{}", block.extent.length());
     assert!((block.cruise - 360.0).abs() < 0.05, "{}", block.cruise);
     // The feed is that of the linear axis.
     let feed = Some(Feed::PerMinute(60.0));
@@ -361,5 +364,5 @@ fn stops() {
     let body = builder.set_position(&at([1.0]), &config);
     assert!(matches!(body, Action::SetPosition([80, 0, 0, 0])), "{body:?}");
     let (block, entry) = next(&mut builder, Some(1.0));
-    assert_eq!((block.steps, entry), ([800, 0, 0, 0], 0.0));
+    assert_eq!((block.way, entry), ([800 * 16, 0, 0, 0], 0.0));
 }

@@ -1,14 +1,22 @@
 //! A block: one straight move, dwell or synchronised command, as the planner leaves it for exec.
 //!
 //! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block decides how
-//! far Kerf looks ahead, and each byte of it is there 65 times. So limits take two bytes each, velocity, length
-//! and line number three, and a line, which knows no [`Reserve`] of 0, no tag: 28 bytes on AVR.
+//! far Kerf looks ahead, and each byte of it is there 65 times. So limits take two bytes each, the line
+//! number three, the sign of a length tells what distances are counted in ([`Extent`]), and a line, which knows no [`Reserve`] of 0, has no tag:
+//! 30 bytes on AVR.
 
 use super::factors::{Factors, Reserve};
 use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
 use crate::gcode::overrides::Change;
+
+/// Parts of a step to which blocks know where they end: the logarithm of their number.
+pub const PARTS_LOG2: u8 = 4;
+
+/// The least and the greatest fraction at a block's end, in 1/16 step from the whole step next to it. Nearly half a step: what
+/// rounding leaves must not tell which one is next.
+pub const FRACTIONS: (i8, i8) = (-7, 6);
 
 /// One block.
 #[derive(Clone, Copy, Debug)]
@@ -76,13 +84,37 @@ pub struct Outputs {
     pub speed: f32,
 }
 
+/// How long a line is, and what its way is counted in.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Extent(f32);
+
+impl Extent {
+    /// So many mm, with a way in whole steps or in 1/16 step.
+    #[inline(always)]
+    pub fn new(length: f32, whole_steps: bool) -> Self {
+        Self(if whole_steps { -length } else { length })
+    }
+
+    /// mm.
+    #[inline(always)]
+    pub fn length(self) -> f32 {
+        f32::from_bits(self.0.to_bits() & 0x7FFF_FFFF)
+    }
+
+    /// Whether the way is in steps, not in 1/16 step.
+    #[inline(always)]
+    pub fn has_whole_steps(self) -> bool {
+        self.0.is_sign_negative()
+    }
+}
+
 /// A straight move.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
-    /// Signed steps of each motor.
-    pub steps: [i16; MOTORS],
-    /// Path length, mm.
-    pub length: f32,
+    /// Signed way of each motor, from the end of the block before; in 1/16 step or, if that is too far, in steps.
+    pub way: [i16; MOTORS],
+    /// Path length, and which it is.
+    pub extent: Extent,
     /// How much faster than `cruise` it may be run.
     pub reserve: Reserve,
     /// Velocity limit on the path, mm/s, at 100 %: the feed, or what the slowest axis or motor allows.

@@ -42,6 +42,9 @@ pub const SEGMENT_S: f32 = 0.002;
 /// Shortest block with steps, s: twice what exec takes for it while the step interrupt is busy.
 pub const BLOCK_S_MIN: f32 = 0.000_75;
 
+/// Faster than this no line ends but at another one, mm/s.
+const SLOW: f32 = 5.0;
+
 /// A dwell's segment: this many ticks of a millisecond.
 const DWELL_TICKS: u16 = 2;
 
@@ -342,10 +345,9 @@ impl Exec {
 
     #[inline(always)]
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
-        let length = line.length;
+        let length = line.extent.length();
         let long = below(scaled(line.cruise, FINE_LOG2), length);
-        self.prep.begin(&line.steps, &mut out.target);
-        out.steps = line.steps;
+        self.prep.begin(line, &mut out.steps, &mut out.target);
         out.length = length;
         out.running = true;
         let jerk = line.jerk.get();
@@ -399,7 +401,7 @@ impl Exec {
         }
         if running.fresh {
             running.fresh = false;
-            running.scale = self.prep.left() as f32 / running.left;
+            running.scale = self.prep.own() as f32 / running.left;
         }
         running.left -= stretch.distance;
         out.left = running.left;
@@ -419,8 +421,14 @@ impl Exec {
         blocks: &mut BlockSource,
         segment: &mut Segment,
     ) -> Step {
-        let some =
-            if whole { self.prep.whole(cycles, segment) } else { self.prep.last(cycles, segment) };
+        // What the planner has been asked for ends at rest, or the governor nearly so.
+        let exact = below(self.governor.velocity(), SLOW)
+            && (self.governor.is_at_rest() || !blocks.goes_on());
+        let some = if whole {
+            self.prep.whole(cycles, exact, segment)
+        } else {
+            self.prep.last(cycles, exact, segment)
+        };
         if self.prep.left() == 0 {
             self.running.active = false;
             blocks.release();

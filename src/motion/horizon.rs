@@ -92,7 +92,7 @@ impl Line {
     /// an override gives it never matters, and is left away where it is much. Cost: 350.
     #[inline(never)]
     pub fn gain(&self) -> f32 {
-        let full = scaled(self.accel.get(), 1) * self.length;
+        let full = scaled(self.accel.get(), 1) * self.extent.length();
         // Plainly below the square of its velocity, as short blocks have it.
         if log(full) + OCTAVE < 2 * log(self.cruise) { full } else { self.capped(full) }
     }

@@ -4,6 +4,7 @@
 
 use kerf_macros::small;
 
+use super::block::PARTS_LOG2;
 use super::divide::quotient;
 use super::dynamics::{Axis, Dynamics};
 use super::exec::BLOCK_S_MIN;
@@ -143,15 +144,17 @@ impl Path {
     /// enough for exec.
     #[inline(never)]
     pub(super) fn limit_steps(&mut self, rates: &[f32; MOTORS]) {
-        if self.moving == 0 {
+        // Exec waits for more of it.
+        if self.most < 1 << (PARTS_LOG2 - 1) {
             return;
         }
         let rate = rates[usize::from(self.moving) - 1];
         let rough = |x| Short::new(x).rough().0;
         let (top, length) = (rough(self.top), rough(self.length));
         // An octave: plainly below the limit, whatever the logarithms' error.
-        if top + Log::of(self.most).0 + short::OCTAVE > rough(rate) + length {
-            let most = f32::from(self.most);
+        let octaves = if self.whole_steps { 0 } else { i16::from(PARTS_LOG2) };
+        if top + Log::of(self.most).0 + (1 - octaves) * short::OCTAVE > rough(rate) + length {
+            let most = scaled(f32::from(self.most), -octaves as i8);
             let way = rate * self.length;
             if below(way, self.top * most) {
                 self.top = way / most;

@@ -5,13 +5,14 @@
 //!
 //! Steps are the difference of two exact absolute positions, so nothing accumulates: neither
 //! rounding nor moves shorter than a step. A move without any steps (shorter than one, or of an axis
-//! without a motor) is still a block and takes its time, or the next step would come too early.
+//! without a motor) is still a block and takes its time, or the next step would come too early. A block is told
+//! where between two steps its motors arrive, to 1/16 step, and so each motor knows where blocks have taken it, whatever positions are renamed to.
 //!
 //! A ramp may go over many blocks. Without a jerk limit each may have its own acceleration limit, what
 //! its axes allow in its direction. With one, acceleration and jerk must be alike for as long as
 //! possible: then they are those of the slowest axis that moves, whatever the direction.
 
-use super::block::{Action, Block, Line as Move};
+use super::block::{Action, Block, Extent, Line as Move};
 use super::curve::{Bend, Curve};
 use super::dynamics::Dynamics;
 use super::factors::Reserve;
@@ -19,12 +20,14 @@ use super::float::{least, some};
 use super::junction::{self, Heading};
 use super::limits::LastFeed;
 use super::path::{Path, Way};
-use super::prep::STEPS_MAX;
 use super::steps::Motor;
 use crate::boards::MOTORS;
 use crate::config::StepRatio;
 use crate::gcode::command::Feed;
 use crate::units::{Length, PerAxis};
+
+/// Most steps of a motor in a block: phase units of a block fit 30 bits.
+pub const STEPS_MAX: u16 = 0x7FFF;
 
 /// What the builder needs to know of the motors.
 pub trait Motors {
@@ -92,12 +95,15 @@ impl Builder {
             Way::Far => return Built::Parts(2),
             Way::Near => {}
         }
-        out.steps = [0; MOTORS];
-        let parts = path.drive(&mut self.motors, line.to, dynamics, machine, &mut out.steps);
-        if parts > 0 {
-            self.put_back(line.from, dynamics, machine);
-            return Built::Parts(parts);
+        out.way = [0; MOTORS];
+        let near = path.drive(&mut self.motors, line.to, dynamics, machine, &mut out.way);
+        if !near {
+            let parts = self.stride(&mut path, line, dynamics, machine, &mut out.way);
+            if parts > 0 {
+                return Built::Parts(parts);
+            }
         }
+        out.extent = Extent::new(path.length, !near);
         path.limit(line.feed, &mut self.feed, dynamics);
         path.limit_change(dynamics);
         match line.curve {
@@ -117,22 +123,56 @@ impl Builder {
             Some(_) => Reserve::new(path.cruise, path.top),
             None => Reserve::TRAVERSE,
         };
-        out.length = path.length;
         out.cruise = path.cruise;
         out.accel = path.accel;
         out.jerk = path.jerk;
         Built::Line(entry)
     }
 
-    /// Takes the motors back to where the last block ended.
+    /// A way that is too far for parts of a step, in whole steps: motors keep the fraction that they have. Or says in how many
+    /// parts these would fit, if not 0, and nothing has moved then.
     #[inline(never)]
     #[small]
-    fn put_back(&mut self, to: &PerAxis<Length>, dynamics: &Dynamics, machine: &impl Motors) {
-        for (m, motor) in self.motors.iter_mut().enumerate() {
-            if let Some(&position) = to.get(usize::from(dynamics.drives[m])) {
-                *motor = Motor::at(machine.ratio(m), position);
+    fn stride(
+        &mut self,
+        path: &mut Path,
+        line: &Line,
+        dynamics: &Dynamics,
+        machine: &impl Motors,
+        steps: &mut [i16; MOTORS],
+    ) -> u16 {
+        (path.most, path.moving, path.whole_steps) = (0, 0, true);
+        let mut parts = 0;
+        for done in [false, true] {
+            for (m, motor) in self.motors.iter_mut().enumerate() {
+                let axis = usize::from(dynamics.drives[m]);
+                let (Some(&from), Some(&to)) = (line.from.get(axis), line.to.get(axis)) else {
+                    continue;
+                };
+                if from == to {
+                    continue;
+                }
+                let ratio = machine.ratio(m);
+                if !done {
+                    motor.put_back(ratio, from, core::mem::take(&mut steps[m]));
+                }
+                let mut there = *motor;
+                let way = there.stride(ratio, to);
+                let size = way.unsigned_abs();
+                if size > STEPS_MAX.into() {
+                    parts = parts.max(parts_of(size));
+                }
+                if done {
+                    *motor = there;
+                    steps[m] = way as i16;
+                    path.go(size as u16);
+                }
+            }
+            if parts > 0 {
+                break;
             }
         }
+        parts
     }
 
     /// The next move starts from rest.
@@ -145,11 +185,11 @@ impl Builder {
     pub fn set_position(&mut self, position: &PerAxis<Length>, machine: &impl Motors) -> Action {
         for (m, motor) in self.motors.iter_mut().enumerate() {
             if let Some(&position) = position.get(usize::from(machine.motor_axis(m))) {
-                *motor = Motor::at(machine.ratio(m), position);
+                motor.rename(machine.ratio(m), position);
             }
         }
         self.stopped();
-        Action::SetPosition(self.motors.map(|motor| motor.steps))
+        Action::SetPosition(self.motors.map(|motor| motor.steps()))
     }
 
     /// The machine stands still, and its motors are at these steps.
@@ -168,14 +208,14 @@ impl Builder {
 
 /// Parts of at most [`STEPS_MAX`] steps.
 #[inline(never)]
-fn parts_of(from: i32, to: i32) -> u16 {
+fn parts_of(steps: u64) -> u16 {
     // The rounding of their ends may add a step.
-    u16::try_from(from.abs_diff(to) / u32::from(STEPS_MAX - 1) + 1).unwrap_or(u16::MAX)
+    u16::try_from(steps / u64::from(STEPS_MAX - 1) + 1).unwrap_or(u16::MAX)
 }
 
 impl Path {
-    /// Takes the motors to the end of the move and counts their steps; or says in how many parts these
-    /// would fit, if not 0.
+    /// Takes the motors to the end of the move, and says how far each goes, in parts of a step. False if that does not fit for
+    /// one of them, which has not been moved then.
     #[inline(never)]
     fn drive(
         &mut self,
@@ -183,29 +223,33 @@ impl Path {
         to: &PerAxis<Length>,
         dynamics: &Dynamics,
         machine: &impl Motors,
-        steps: &mut [i16; MOTORS],
-    ) -> u16 {
-        let mut parts = 0;
-        let all = motors.iter_mut().zip(steps).zip(&dynamics.drives);
-        for (m, ((motor, steps), &axis)) in all.enumerate() {
+        ways: &mut [i16; MOTORS],
+    ) -> bool {
+        let mut near = true;
+        let all = motors.iter_mut().zip(ways).zip(&dynamics.drives);
+        for (m, ((motor, way), &axis)) in all.enumerate() {
             let axis = usize::from(axis);
             let Some(&travel) = self.travel.get(axis) else { continue };
             if travel == 0 {
                 continue;
             }
-            let before = motor.steps;
-            motor.go(machine.ratio(m), travel, to[axis]);
-            let after = motor.steps;
-            let way = after.wrapping_sub(before);
-            let size = way.unsigned_abs();
-            if size > u32::from(STEPS_MAX) || (way < 0) != (after < before) {
-                parts = parts.max(parts_of(before, after));
-            } else if size != 0 {
-                *steps = way as i16;
-                self.moving += 1;
-                self.most = self.most.max(size as u16);
+            match motor.go(machine.ratio(m), travel, to[axis]) {
+                Some(parts) => {
+                    *way = parts;
+                    self.go(parts.unsigned_abs());
+                }
+                None => near = false,
             }
         }
-        parts
+        near
+    }
+
+    /// A motor goes so far.
+    #[inline(always)]
+    fn go(&mut self, way: u16) {
+        if way != 0 {
+            self.moving += 1;
+            self.most = self.most.max(way);
+        }
     }
 }

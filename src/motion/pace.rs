@@ -59,7 +59,7 @@ const fn usual(motors: usize) -> Usual {
 }
 
 /// Ticks of blocks so short that they are a single segment: 2^22 / the tick period.
-pub const COARSEST: u16 = per(640);
+pub const COARSEST: u16 = per(800);
 
 /// How close ticks may come.
 #[derive(Clone, Copy, Debug)]

@@ -34,9 +34,11 @@ pub(super) struct Path {
     pub(super) stretch: f32,
     /// The axes that move: a bit for each, the first axis lowest.
     pub(super) moved: u8,
-    /// Steps of the motor that makes most, and how many motors make any.
+    /// How far the motor goes that goes farthest, in parts of a step, and how many motors move.
     pub(super) most: u16,
     pub(super) moving: u8,
+    /// That way is in whole steps.
+    pub(super) whole_steps: bool,
     pub(super) cruise: f32,
     /// What the machine could do, at most twice the feed, mm/s.
     pub(super) top: f32,

@@ -3,32 +3,53 @@
 //! Owned by the exec task, which calls [`Prep::begin`] for a block and then [`Prep::segment`] or
 //! [`Prep::last`] for each stretch of it.
 //!
-//! The motor with the most steps in a block is dominant. Its increment is `STEP / 2^k`, so it steps on
+//! The motor that goes farthest in a block is dominant. Its increment is `STEP / 2^k`, so it steps on
 //! every `2^k`th tick exactly, with no jitter; `k` is as large as the shortest tick period allows, so
 //! that the other motors, which may step on any tick, stay close to their true times too. If all motors
-//! that move make the same number of steps there are no others: then `k` is 0 as far as can be, and
+//! that move go equally far there are no others: then `k` is 0 as far as can be, and
 //! the interrupt has next to nothing to do (lockstep).
 //!
-//! A stretch is cut to whole ticks, and so that coarser ticks fit what is left. What is cut off is
-//! still in `left` and comes with the next stretch, as does its time: nothing is lost.
+//! A stretch is cut to whole ticks. What is cut off is still in `left` and comes with the next stretch, as does its time:
+//! nothing is lost.
 //!
 //! The other motors get the rounded increment, and [`Minor::owed`] remembers exactly what rounding
 //! took: a segment in which it comes to half a unit a tick or more is corrected by a unit a tick. It is
-//! carried from segment to segment, and over the end of the block: never above half a tick count, far
-//! below half a step, so every block ends exactly on its step.
+//! carried from segment to segment, and over the end of the block, so that nothing adds up.
 //!
-//! Cost on AVR: 600 cycles a segment and 150 for each motor that moves; 600 for `begin`, and 300 for each
+//! **Ends of blocks.** A block ends where its line ends, to 1/16 step ([`PART`]). If blocks ended on whole steps, a curve of
+//! short lines would be rounded twice: its corners, and the steps between them. Ticks rarely fit such a distance. So the
+//! last stretch of a block takes the nearest number of whole ticks. What each motor is then short of, or ahead by, is its
+//! `debt`: what lines have told it to go, less what segments have, modulo 2^16. The next block starts from where the motors are and so pays it. The time of the missing part is carried over with it.
+//! A dominant motor thus keeps its phase, and its steps stay even, over any number of blocks.
+//!
+//! **Ends of motion.** A block that comes to rest, or that no line follows, is made to its end (`exact`), with finer ticks
+//! for the remainder if need be. That end is less than half a step from the whole step it is rounded to
+//! ([`FRACTIONS`](super::block::FRACTIONS)), by more than rounding can leave. So the position is exact whenever the machine rests.
+//! Blocks of more than 2,030 steps do not fit 1/16 steps: they are a whole number of steps long, and keep the fraction with which they begin.
+//!
+//! **Ends of segments.** A segment with one or two ticks a step ends on a step of the dominant motor as far as possible. So the next step
+//! is in time when a later segment has one tick a step. A segment with more ticks a step ends in the middle between two steps: a tick without
+//! a pulse leaves the interrupt time to load the next segment.
+//!
+//! Cost on AVR: 600 cycles a segment and 200 for each motor that moves; 400 for `begin`, and 300 for each
 //! motor when `k` changes.
 
-use super::dda::{STEP, Segment, start};
-use super::divide::{quotient, quotient_remainder};
+use super::block::{Line, PARTS_LOG2};
+use super::dda::{PHASE_START, STEP, Segment};
+use super::divide::{product, quotient, quotient_remainder};
 use super::pace::{COARSEST, Drivers, Pace, paces};
 use crate::boards::{MOTORS, each_motor};
 
 const STEP_LOG2: u8 = 15;
 
-/// Most steps of a motor in a block: phase units of a block fit 30 bits.
-pub const STEPS_MAX: u16 = 0x7FFF;
+/// Phase units in the part of a step to which blocks know their ends.
+const PART: u16 = STEP >> PARTS_LOG2;
+
+/// The exponent of it.
+const PART_LOG2: u8 = STEP_LOG2 - PARTS_LOG2;
+
+/// Half a step, in such parts.
+const HALF: u8 = 1 << (PARTS_LOG2 - 1);
 
 /// Most ticks of a segment: keeps the rounding rest below [`super::dda::PHASE_MARGIN`].
 pub const TICKS_MAX: u16 = 2000;
@@ -57,8 +78,8 @@ const LOCKSTEP_TICKS: u32 = 16;
 /// A motor that moves but does not step on every tick of the dominant one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Minor {
-    /// Its steps in the block.
-    steps: u16,
+    /// Its way in the block, in units of that.
+    way: u16,
     /// Travel in a tick, rounded down, and what that leaves, in 1 / most.
     increment: u16,
     remainder: u16,
@@ -75,13 +96,15 @@ pub struct Prep {
     left: u32,
     /// Time that has not been used, CPU cycles.
     time: i32,
-    /// Steps of the dominant motor.
+    /// Way of the dominant motor, in units of the block.
     most: u16,
+    /// These are [`PART`]s, not steps.
+    parts: bool,
     /// The shift for which increments have been computed; none yet if above [`STEP_LOG2`].
     shift: u8,
-    /// Motors that make as many steps as the dominant one.
+    /// Motors that go as far as the dominant one.
     full: u8,
-    /// Motors that make some, but fewer.
+    /// Motors that go less far.
     minor: u8,
     /// Motors that move, less one.
     others: u8,
@@ -92,8 +115,15 @@ pub struct Prep {
     turned: bool,
     /// How long directions must stand before the first step, CPU cycles.
     setup: u16,
-    /// Phase units that a motor is short of at the end of a block.
+    /// What the dominant motor's way is without debts, in the same units, signed.
+    own: i16,
+    /// How far the dominant motor is past half a step, in its direction, at the block's end: 1/16 step, modulo 16.
+    past: u8,
+    /// Phase units that a motor is short of what blocks, that being run as well, have told it to go, counted forwards; modulo 2^16,
+    /// which at a block's end is all of it.
     debt: [i16; MOTORS],
+    /// How far the end of the block is beyond half a step before the whole step that it is rounded to, in 1/16 step.
+    fraction: [u8; MOTORS],
     minors: [Minor; MOTORS],
     /// By the number of motors that move, less one.
     paces: [Pace; MOTORS],
@@ -104,13 +134,17 @@ pub struct Prep {
 impl Prep {
     /// Nothing to prepare.
     pub const fn new() -> Self {
-        const MINOR: Minor = Minor { steps: 0, increment: 0, remainder: 0, owed: 0 };
+        const MINOR: Minor = Minor { way: 0, increment: 0, remainder: 0, owed: 0 };
         Self {
             left: 0,
             time: 0,
             most: 0,
+            parts: true,
             minors: [MINOR; MOTORS],
+            own: 0,
+            past: 0,
             debt: [0; MOTORS],
+            fraction: [HALF; MOTORS],
             shift: u8::MAX,
             full: 0,
             minor: 0,
@@ -153,51 +187,143 @@ impl Prep {
         self.fine = fine;
     }
 
-    /// Starts a block. Its steps are added to `target`.
+    /// Starts a block. The steps to the whole ones next to its end are put into `steps` and added to `target`.
     #[inline(never)]
-    pub fn begin(&mut self, steps: &[i16; MOTORS], target: &mut [i32; MOTORS]) {
+    pub fn begin(&mut self, line: &Line, steps: &mut [i16; MOTORS], target: &mut [i32; MOTORS]) {
         self.shift = u8::MAX;
-        let (mut most, mut moving, mut full, mut others) = (0, 0, 0, u8::MAX);
+        (self.full, self.minor, self.most, self.others) = (0, 0, 0, u8::MAX);
+        self.parts = !line.extent.has_whole_steps();
+        if !self.parts {
+            return self.begin_far(&line.way, steps, target);
+        }
         each_motor!(M => {
-            let (signed, bit) = (steps[M], 1 << M);
-            if signed != 0 {
-                others = others.wrapping_add(1);
-                moving |= bit;
-                target[M] = target[M].wrapping_add(signed.into());
-                let steps = signed.unsigned_abs();
-                self.minors[M].steps = steps;
-                if steps > most {
-                    (most, full) = (steps, 0);
-                }
-                if steps == most {
-                    full |= bit;
-                }
-                let backwards = if signed < 0 { bit } else { 0 };
-                if backwards != self.backwards & bit {
-                    self.turn(M, bit);
-                }
+            let mut way = line.way[M];
+            let mut whole = 0;
+            let debt = self.debt[M];
+            if way != 0 {
+                self.debt[M] = debt.wrapping_add(way << PART_LOG2);
+                let sum = way + i16::from(self.fraction[M]);
+                self.fraction[M] = sum as u8 & 15;
+                whole = sum >> PARTS_LOG2;
+                target[M] = target[M].wrapping_add(whole.into());
+            }
+            steps[M] = whole;
+            if !is_little(debt) {
+                // With the parts of a step that it is short of.
+                way += parts_of(debt) >> PART_LOG2;
+            }
+            if way != 0 {
+                self.take_up(M, 1 << M, way, line.way[M]);
             }
         });
-        self.most = most;
-        self.left = u32::from(most) << STEP_LOG2;
-        self.full = full;
-        self.minor = moving & !full;
-        // Without motors there are no ticks to pace.
-        self.others = if moving == 0 { 0 } else { others };
+        self.left = product(self.most, PART);
+        if self.most == 0 {
+            // Without motors there are no ticks to pace.
+            self.others = 0;
+        }
     }
 
-    /// Motor `m` turns round.
+    /// The same for a way in whole steps.
     #[inline(never)]
-    fn turn(&mut self, m: usize, bit: u8) {
-        self.backwards ^= bit;
-        self.turned = true;
-        // It was measured in the old direction.
-        self.debt[m] = -self.debt[m];
+    #[small]
+    fn begin_far(
+        &mut self,
+        ways: &[i16; MOTORS],
+        steps: &mut [i16; MOTORS],
+        target: &mut [i32; MOTORS],
+    ) {
+        *steps = *ways;
+        let mut bit = 1;
+        for (m, way) in ways.iter().enumerate() {
+            if *way != 0 {
+                target[m] = target[m].wrapping_add((*way).into());
+                self.take_up(m, bit, *way, *way);
+            }
+            bit <<= 1;
+        }
+        self.left = product(self.most, STEP);
+        self.lengthen();
+        for (debt, way) in self.debt.iter_mut().zip(ways) {
+            *debt = debt.wrapping_add(way << STEP_LOG2);
+        }
+    }
+
+    /// A motor goes this way in the block, of which it has `own` but for its debt.
+    #[inline(always)]
+    fn take_up(&mut self, m: usize, bit: u8, way: i16, own: i16) {
+        self.others = self.others.wrapping_add(1);
+        let (size, turned) = if way < 0 {
+            ((way as u16).wrapping_neg(), !self.backwards & bit)
+        } else {
+            (way as u16, self.backwards & bit)
+        };
+        if turned != 0 {
+            self.backwards ^= bit;
+            self.turned = true;
+        }
+        self.minors[m].way = size;
+        if size == self.most {
+            self.full |= bit;
+        } else if size > self.most {
+            self.minor |= self.full;
+            self.full = bit;
+            self.most = size;
+            self.own = own;
+            let at = self.fraction[m];
+            self.past = if way < 0 { !at } else { at };
+        } else {
+            self.minor |= bit;
+        }
+    }
+
+    /// In a block of whole steps the dominant motor makes up what it is short of, and with it those that go as far.
+    #[inline(never)]
+    #[small]
+    fn lengthen(&mut self) {
+        let mut due = None;
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            if self.full & bit != 0 {
+                let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
+                let due = *due.get_or_insert(parts_of(debt));
+                if (debt - due).unsigned_abs() > PART {
+                    // It goes as far, but not as what it was short of.
+                    self.full &= !bit;
+                    self.minor |= bit;
+                }
+            } else if self.minor & bit == 0 && !is_little(self.debt[m]) {
+                // It has no part in the line, but not arrived where that begins.
+                self.minor |= bit;
+                self.minors[m].way = 0;
+                self.others += 1;
+                if (self.debt[m] < 0) != (self.backwards & bit != 0) {
+                    self.backwards ^= bit;
+                    self.turned = true;
+                }
+            }
+            bit <<= 1;
+        }
+        let due = due.unwrap_or(0);
+        self.left = self.left.wrapping_add_signed(due.into());
+        // What makes the dominant motor's way longer makes theirs so in proportion, and they have their own debts.
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
+            let way = self.minors[m].way;
+            self.minors[m].owed = times(debt, self.most) - times(due, way);
+            bit <<= 1;
+        }
     }
 
     /// Phase units of the dominant motor in the block that no segment has covered yet.
     pub fn left(&self) -> u32 {
         self.left
+    }
+
+    /// How far the dominant motor goes in the block, debts apart, phase units. What a debt adds belongs to the first stretch, as
+    /// does its time.
+    pub fn own(&self) -> u32 {
+        product(self.own.unsigned_abs(), if self.parts { PART } else { STEP })
     }
 
     /// `cycles` with what has been kept of the time before, at least 1.
@@ -219,11 +345,20 @@ impl Prep {
         let travel = self.left.saturating_sub(left);
         let cycles = self.with_kept(cycles);
         let limit = self.limit(cycles, self.pace());
-        let (_, shift) = coarsen(travel, limit);
-        // What is left must be whole ticks, now and at the end: of up to an eighth of this stretch.
-        let shift = shift.min(self.left.trailing_zeros() as u8);
+        let (_, mut shift) = coarsen(travel, limit);
+        // From where a tick is a step; of fine ticks, from the middle between two, where the interrupt has time for a segment.
+        let middle = if shift < STEP_LOG2 - 1 { STEP / 2 } else { 0 };
+        // No tick is longer than a step.
+        let at = (self.left as u16)
+            .wrapping_sub((u16::from(self.past) << PART_LOG2).wrapping_add(middle));
+        let mut rest = (1 << shift) - 1;
+        if at & rest != 0 {
+            shift = self.fitting(shift, at.trailing_zeros() as u8, cycles, travel);
+            rest = (1 << shift) - 1;
+        }
         let grain = grain(travel >> shift, shift);
-        let short = (self.left - travel).wrapping_neg() & !(u32::MAX << grain);
+        let short = (travel as u16).wrapping_sub(at & !rest) & ((1 << grain) - 1);
+        let short = u32::from(short);
         if travel <= short {
             return self.idle(cycles, out);
         }
@@ -237,32 +372,61 @@ impl Prep {
         true
     }
 
+    /// The exponent of ticks that end on the steps of the dominant motor: `fits`, if `shift` is more and there is time.
+    fn fitting(&self, shift: u8, fits: u8, cycles: u32, travel: u32) -> u8 {
+        let finer =
+            fits < shift && self.period(cycles, travel, fits) >= u32::from(self.paces().settles);
+        if finer { fits } else { shift }
+    }
+
     /// Prepares the whole of a block that begins: `cycles` for it, no more than a few milliseconds. False,
     /// and no segment, when it has no steps; the time is kept then.
     ///
     /// The same as `last` for it, but short and simple. Cost: 700, and 400 for each motor but the dominant.
     #[inline(never)]
-    pub fn whole(&mut self, cycles: u32, out: &mut Segment) -> bool {
+    pub fn whole(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
         let most = self.most;
-        if most == 0 || most > TICKS_MAX {
-            return self.last_of(cycles, COARSEST, out);
+        // What has been kept may be long.
+        if exact || most == 0 || !self.parts || cycles >> 24 != 0 {
+            return self.last_of(cycles, COARSEST, exact, out);
+        }
+        if most < HALF.into() {
+            // Nothing moves yet: the next block goes all the way.
+            self.left = 0;
+            return self.last_of(cycles, COARSEST, exact, out);
         }
         let limit = self.limit(cycles, COARSEST) as u16;
-        let (mut ticks, mut increment) = (most, STEP);
-        while ticks <= limit / 2 {
-            ticks *= 2;
-            increment /= 2;
+        // Ticks of a part, finer or coarser; and so many times the period.
+        let (mut ticks, mut step, mut time) = (most, PART, cycles);
+        if ticks > limit {
+            let mut half = 0;
+            while ticks > limit && step != STEP {
+                half = ticks & 1;
+                ticks >>= 1;
+                step <<= 1;
+                time <<= 1;
+            }
+            ticks += half;
+        } else {
+            while ticks <= limit / 2 {
+                ticks *= 2;
+                step /= 2;
+                time >>= 1;
+            }
+        }
+        if ticks > TICKS_MAX {
+            return self.last_of(cycles, COARSEST, exact, out);
         }
         let shortest = self.paces().shortest;
-        let long = (cycles >> 16) as u16 >= ticks;
-        let period = if long { u16::MAX } else { quotient(cycles + u32::from(ticks / 2), ticks) };
+        let long = (time >> 16) as u16 >= most;
+        let period = if long { u16::MAX } else { quotient(time + u32::from(most / 2), most) };
         let period = period.max(shortest);
         self.left = 0;
         out.ticks = ticks;
         out.period = period;
         out.settle = 0;
-        self.complete(cycles, increment, out, |prep, m| prep.even(m, ticks));
+        self.complete(cycles, step, out, |prep, m| even(prep.minors[m].way, step, most));
         true
     }
 
@@ -277,15 +441,29 @@ impl Prep {
         minor: impl Fn(&mut Self, usize) -> u16,
     ) {
         let used = u32::from(out.ticks) * u32::from(out.period);
-        // Time that cannot be caught up is let go, or the machine would race to do so.
-        self.time = (cycles as i32 - used as i32).max(-1000);
+        // Time that cannot be caught up is let go, or the machine would race to do so. A tick may be half ahead.
+        let ahead = -1000 - i32::from(out.period / 2);
+        self.time = (cycles as i32 - used as i32).max(ahead);
         out.backwards = self.backwards;
         out.moving = self.full | self.minor;
-        let (full, others) = (self.full, self.minor);
-        each_motor!(M => out.increment[M] = match 1 << M {
-            bit if full & bit != 0 => step,
-            bit if others & bit != 0 => minor(self, M),
-            _ => 0,
+        let (full, moving) = (self.full, out.moving);
+        let ticks = out.ticks;
+        let travel = step.wrapping_mul(ticks);
+        each_motor!(M => {
+            let mut increment = 0;
+            if moving & 1 << M != 0 {
+                let mut travel = travel;
+                increment = step;
+                if full & 1 << M == 0 {
+                    increment = minor(self, M);
+                    travel = increment.wrapping_mul(ticks);
+                }
+                if out.backwards & 1 << M == 0 {
+                    travel = travel.wrapping_neg();
+                }
+                self.debt[M] = self.debt[M].wrapping_add_unsigned(travel);
+            }
+            out.increment[M] = increment;
         });
         out.seal(self.full, step);
         if self.turned {
@@ -293,38 +471,38 @@ impl Prep {
         }
     }
 
-    /// The increment that takes a motor over its block in `ticks`, and what it is short of then.
-    fn even(&mut self, m: usize, ticks: u16) -> u16 {
-        let wanted = (u32::from(self.minors[m].steps) << 16 >> 1) as i32 + i32::from(self.debt[m]);
-        let wanted = wanted.max(0);
-        let increment = quotient(wanted as u32 + u32::from(ticks / 2), ticks).min(STEP);
-        self.debt[m] = (wanted - (u32::from(increment) * u32::from(ticks)) as i32) as i16;
-        increment
-    }
-
-    /// Prepares the last stretch of the block, everything that is left, in `cycles`. False,
-    /// and no segment, when nothing is left; the time is kept then.
-    pub fn last(&mut self, cycles: u32, out: &mut Segment) -> bool {
+    /// Prepares the last stretch of the block, everything that is left, in `cycles`; all of it if `exact`, else the nearest
+    /// number of ticks. False, and no segment, when nothing is left; the time is kept then.
+    pub fn last(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
-        self.last_of(cycles, self.pace(), out)
+        self.last_of(cycles, self.pace(), exact, out)
     }
 
-    fn last_of(&mut self, cycles: u32, pace: u16, out: &mut Segment) -> bool {
-        if self.left == 0 {
+    #[inline(never)]
+    fn last_of(&mut self, cycles: u32, pace: u16, exact: bool, out: &mut Segment) -> bool {
+        let left = self.left;
+        if left == 0 {
             self.time = cycles.min(KEPT_MAX) as i32;
             return false;
         }
-        let (_, shift) = coarsen(self.left, self.limit(cycles, pace));
-        // Ticks that do not go into what is left would leave a rest.
-        let shift = shift.min(self.left.trailing_zeros() as u8);
-        let ticks = self.left >> shift;
+        let (mut ticks, mut shift) = coarsen(left, self.limit(cycles, pace));
+        if exact && left < STEP.into() {
+            let fits = left.trailing_zeros() as u8;
+            if fits > shift {
+                // The rest of it, in no more ticks than need be.
+                (ticks, shift) = (left >> fits, fits);
+            }
+        }
+        let period = self.period(cycles, left, shift).min(PERIOD_MAX);
         if ticks > u32::from(TICKS_MAX) {
             // Too much for one segment: a part of it, and the rest when asked again.
-            let period = self.period(cycles, self.left, shift) as u16;
-            self.emit(TICKS_MAX, shift, period, cycles, out);
-            return true;
+            ticks = TICKS_MAX.into();
+        } else if !exact {
+            // The nearest; what is over is never above half a tick then.
+            let tick = 1u16 << shift;
+            ticks += u32::from(left as u16 & (tick - 1) > tick / 2);
+            self.left = ticks << shift;
         }
-        let period = self.period(cycles, self.left, shift).min(PERIOD_MAX);
         self.emit(ticks as u16, shift, period as u16, cycles, out);
         true
     }
@@ -392,34 +570,40 @@ impl Prep {
     pub fn cut(&mut self, target: &mut [i32; MOTORS]) -> Option<Segment> {
         let mut bit = 1;
         for (m, target) in target.iter_mut().enumerate() {
-            if (self.full | self.minor) & bit != 0 && self.left != 0 {
-                let backwards = self.backwards & bit != 0;
-                let steps = steps_of(self.short_of(m, bit), backwards);
-                *target = target.wrapping_add(if backwards { steps } else { -steps });
-            }
+            // Where the whole step is that its end is rounded to, from where it is.
+            let beyond = (i32::from(self.fraction[m]) - i32::from(HALF)) * i32::from(PART);
+            let left = self.left_of(m, bit);
+            let left = if self.backwards & bit != 0 { -left } else { left };
+            // The debt has that as well, modulo 2^16.
+            let short = left + i32::from(self.debt[m].wrapping_sub(left as i16)) - beyond;
+            *target = target.wrapping_add((i32::from(PHASE_START) - short) >> STEP_LOG2);
             bit <<= 1;
         }
         self.left = 0;
         self.time = 0;
         self.debt = [0; MOTORS];
+        self.fraction = [HALF; MOTORS];
         // The segment that was to tell of it may be among those that are lost.
         self.turned = true;
         self.held.take()
     }
 
-    /// Phase units that a motor is short of its target: exact.
+    /// Phase units that no segment has of a motor's way, in its direction, but for its debt.
     #[inline(never)]
     #[small]
-    fn short_of(&self, m: usize, bit: u8) -> i32 {
-        let (minor, debt) = (&self.minors[m], i32::from(self.debt[m]));
+    fn left_of(&self, m: usize, bit: u8) -> i32 {
+        let minor = &self.minors[m];
+        if self.left == 0 || (self.full | self.minor) & bit == 0 {
+            return 0;
+        }
         if self.full & bit != 0 {
-            return self.left as i32 + debt;
+            return self.left as i32;
         }
         if self.shift == u8::MAX {
             // Nothing of the block has been prepared.
-            return (i32::from(minor.steps) << STEP_LOG2) + debt;
+            return product(minor.way, if self.parts { PART } else { STEP }) as i32;
         }
-        let wide = i64::from(minor.steps) * i64::from(self.left) + i64::from(minor.owed);
+        let wide = i64::from(minor.way) * i64::from(self.left) + i64::from(minor.owed);
         (wide / i64::from(self.most)) as i32
     }
 
@@ -432,9 +616,6 @@ impl Prep {
     #[inline(never)]
     fn emit(&mut self, ticks: u16, shift: u8, period: u16, cycles: u32, out: &mut Segment) {
         if shift != self.shift {
-            if self.shift == u8::MAX {
-                self.take_up_debts();
-            }
             self.scale(shift);
         }
         self.left -= u32::from(ticks) << shift;
@@ -443,20 +624,6 @@ impl Prep {
         let settles = period >= self.paces().settles;
         out.settle = if settles { SETTLE } else { 0 };
         self.complete(cycles, 1 << shift, out, |prep, m| prep.minors[m].advance(ticks, prep.most));
-        if self.left == 0 {
-            self.settle_debts();
-        }
-    }
-
-    /// What motors are short of from blocks before, in the units of this one.
-    fn take_up_debts(&mut self) {
-        let mut bit = 1;
-        for m in 0..MOTORS {
-            if self.minor & bit != 0 {
-                self.minors[m].owed = product(self.debt[m], self.most);
-            }
-            bit <<= 1;
-        }
     }
 
     /// The first segment after motors have turned round, or, if its first steps come too soon after
@@ -473,27 +640,18 @@ impl Prep {
     }
 
     /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.
+    #[inline(never)]
     fn scale(&mut self, shift: u8) {
-        self.shift = shift;
-        each_motor!(M => if self.minor & 1 << M != 0 {
+        let first = core::mem::replace(&mut self.shift, shift) == u8::MAX && self.parts;
+        let (step, most, others) = (1 << shift, self.most, self.minor);
+        each_motor!(M => if others & 1 << M != 0 {
             let minor = &mut self.minors[M];
-            let travel = u32::from(minor.steps) << shift;
-            (minor.increment, minor.remainder) = quotient_remainder(travel, self.most);
-        });
-    }
-
-    /// The block is done: what its motors are short of goes into the next.
-    fn settle_debts(&mut self) {
-        let mut bit = 1;
-        for (debt, minor) in self.debt.iter_mut().zip(&self.minors) {
-            if self.minor & bit != 0 {
-                // Exact: the line has arrived at a whole step.
-                let owed = minor.owed.unsigned_abs();
-                let whole = if owed == 0 { 0 } else { quotient(owed, self.most) as i16 };
-                *debt = if minor.owed < 0 { -whole } else { whole };
+            (minor.increment, minor.remainder) = share(minor.way, step, most);
+            if first {
+                // Its way has them.
+                minor.owed = 0;
             }
-            bit <<= 1;
-        }
+        });
     }
 }
 
@@ -527,20 +685,40 @@ impl Minor {
     }
 }
 
+/// What is `way` of `step` in `most`, and what that leaves.
+#[inline(never)]
+fn share(way: u16, step: u16, most: u16) -> (u16, u16) {
+    quotient_remainder(product(way, step), most)
+}
+
+/// The same, rounded to the nearest.
+#[inline(never)]
+fn even(way: u16, step: u16, most: u16) -> u16 {
+    quotient(product(way, step) + u32::from(most / 2), most)
+}
+
 /// `owed / unit`, rounded. Rare: a debt that meets a short segment.
 #[inline(never)]
 fn rounded(owed: u32, unit: u32) -> u16 {
     ((owed + unit / 2) / unit) as u16
 }
 
-/// The steps in the last `travel` phase units before a whole step.
-fn steps_of(travel: i32, backwards: bool) -> i32 {
-    let last = i32::from(start(backwards));
-    if travel <= last { 0 } else { (travel - last + i32::from(STEP - 1)) >> STEP_LOG2 }
+/// Whether a debt is less than a part of a step, by rounding.
+#[inline(always)]
+fn is_little(debt: i16) -> bool {
+    (debt as u16).wrapping_add(PART / 2) < PART
 }
 
-fn product(a: i16, b: u16) -> i32 {
-    let size = (u32::from(a.unsigned_abs()) * u32::from(b)) as i32;
+/// A debt rounded to parts of a step, in phase units.
+#[inline(always)]
+fn parts_of(debt: i16) -> i16 {
+    (debt + (PART / 2) as i16) & !(PART as i16 - 1)
+}
+
+#[inline(never)]
+#[small]
+fn times(a: i16, b: u16) -> i32 {
+    let size = product(a.unsigned_abs(), b) as i32;
     if a < 0 { -size } else { size }
 }
 

@@ -6,6 +6,8 @@
 
 use core::cell::Cell;
 
+use kerf_macros::small;
+
 use super::block::{Block, Body, Line};
 use super::factors::Factors;
 use super::float::lesser;
@@ -54,6 +56,13 @@ impl BlockSource {
     /// A copy of the oldest block.
     pub fn oldest(&self) -> Option<Block> {
         self.look(|block| *block)
+    }
+
+    /// Whether the oldest block is followed by a line. Cost: 40.
+    #[inline(never)]
+    #[small]
+    pub fn goes_on(&self) -> bool {
+        self.ring.peek(1, |block| matches!(block.body, Body::Line(_))) == Some(true)
     }
 
     /// What `look` makes of the oldest block.

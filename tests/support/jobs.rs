@@ -183,7 +183,7 @@ pub fn plan_changed(
             rig.source.enter();
             version = rig.source.version().wrapping_sub(1);
             governor.begin(line.accel.get(), line.jerk.get());
-            (line, block.line(), line.length)
+            (line, block.line(), line.extent.length())
         });
         change(planned.len(), rig);
         if rig.source.version() != version {
@@ -227,7 +227,7 @@ pub fn plan_changed(
             after_clock: clock + f64::from(more),
             after_place: place + f64::from(further),
             line: number,
-            length: line.length.into(),
+            length: line.extent.length().into(),
             cruise: cruise.into(),
             top: line.velocity(&Factors { feed: 2.0, traverse: 1.0 }).into(),
             corner: line.entry.get().into(),
