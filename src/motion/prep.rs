@@ -374,8 +374,9 @@ impl Prep {
 
     /// The exponent of ticks that end on the steps of the dominant motor: `fits`, if `shift` is more and there is time.
     fn fitting(&self, shift: u8, fits: u8, cycles: u32, travel: u32) -> u8 {
+        // A period that is no longer than the shortest may have been made as long.
         let finer =
-            fits < shift && self.period(cycles, travel, fits) >= u32::from(self.paces().settles);
+            fits < shift && self.period(cycles, travel, fits) > u32::from(self.paces().settles);
         if finer { fits } else { shift }
     }
 
