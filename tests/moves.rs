@@ -209,3 +209,48 @@ fn a_million_segments_end_on_the_step() {
     rig.finish();
     assert_eq!(rig.pins.position, rig.target());
 }
+
+/// Long fast lines have brake potentials that are coarse for slow lines behind them: those count anew, and keep their feed.
+#[test]
+fn slow_lines_behind_fast_ones_keep_their_feed() {
+    for jerk in [0.0, 50_000.0] {
+        let mut config = Config::new(500.0, 500.0, jerk);
+        config.deviation = 0.5;
+        let mut rig = Rig::new(config);
+        let (mut x, mut number, mut slow) = (0.0, 0, Vec::new());
+        let mut line = |rig: &mut Rig, way: f64, velocity: f32| {
+            while rig.free() == 0 {
+                rig.turn();
+            }
+            (x, number) = (x + way, number + 1);
+            rig.line(at([x]), velocity, number);
+            number
+        };
+        // The second time some of the first are in the queue still, so that potentials go on.
+        for _ in 0..2 {
+            for _ in 0..20 {
+                line(&mut rig, 20.0, 400.0);
+            }
+            slow.push(line(&mut rig, 0.1, 1.0));
+            for _ in 0..19 {
+                line(&mut rig, 0.1, 1.0);
+            }
+            rig.want(kerf::motion::factors::Factors {
+                feed: 0.999,
+                ..kerf::motion::factors::Factors::ONE
+            });
+            rig.replan();
+        }
+        rig.finish();
+        for first in slow {
+            let of = |e: &&rig::Emitted| (first + 1..first + 19).contains(&e.line);
+            let velocities = rig.emitted.iter().filter(of).map(|e| e.velocity);
+            for velocity in velocities {
+                assert!(
+                    (velocity - 0.999).abs() < 0.01,
+                    "{velocity} of 1 mm/s in the lines behind {first}"
+                );
+            }
+        }
+    }
+}

@@ -42,16 +42,17 @@
 //! in force at once, and until then only a slow line behind a fast one may be entered at more than its part of
 //! the feed. A greater one waits for the keys.
 //!
-//! Potentials grow for ever. When they get so large that floats would be coarse, the planner subtracts
-//! the first one from all (`BlockQueue::rebase`). A slow line that waits behind fast ones has what is left: the
-//! velocity at its end may be off by some 0.1 % of theirs.
+//! Potentials grow for ever. When they have got so large that floats would be coarse for a line, they are counted from
+//! zero again from that line on ([`Horizon::count_anew`]). Until exec has come there, what was left out
+//! ([`Horizon::lifted`]) is added where potentials on both sides meet. One such place is in the queue at a time: a slow line
+//! behind fast ones that follow it has what is left, and the velocity at its end may be off by some 0.1 % of theirs.
 //!
 //! Cost: a push 1,000 cycles, and 700 for each key dropped.
 
 use super::block::Line;
 use super::factors::Factors;
 use super::float::{OCTAVE, least, lesser, log, scaled, some};
-use super::queue::{BLOCKS, FIRM};
+use super::queue::{BLOCKS, FIRM, SEQ};
 use super::short::Short;
 
 /// Half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`,
@@ -106,15 +107,17 @@ impl Line {
 
 /// Keys of blocks in the queue, lowest first, which is nearest first too.
 #[derive(Debug)]
+#[repr(C)]
 pub struct Horizon {
-    /// Sequence numbers of blocks with rising keys: a ring.
-    seqs: [u8; BLOCKS],
-    /// The velocity at which each of them may be entered, with the factors that keys are for.
-    entries: [Short; BLOCKS],
+    // What is used most comes first: the CPU reaches 64 bytes from a pointer.
     front: u8,
     len: u8,
     /// Potential at the end of the newest block.
     pub end: f32,
+    /// From this block on potentials are counted anew; `left_out` is 0 if no block before it is left.
+    anew: u8,
+    /// Potential where they are.
+    left_out: f32,
     /// Changes with every push, and with the factors.
     pub version: u8,
     /// The overrides that are wanted.
@@ -123,6 +126,10 @@ pub struct Horizon {
     pub changed: bool,
     /// Those that the keys are for, or for more: faster than by these nothing may be run.
     pub planned: Factors,
+    /// Sequence numbers of blocks with rising keys: a ring.
+    seqs: [u8; BLOCKS],
+    /// The velocity at which each of them may be entered, with the factors that keys are for.
+    entries: [Short; BLOCKS],
 }
 
 impl Horizon {
@@ -137,6 +144,8 @@ impl Horizon {
             front: 0,
             len: 0,
             end: 0.0,
+            anew: 0,
+            left_out: 0.0,
             version: 0,
             wanted,
             changed: false,
@@ -204,6 +213,38 @@ impl Horizon {
         }
     }
 
+    /// Counts potentials anew from block `seq` on, the next one, unless they are from another block in the queue already.
+    pub fn count_anew(&mut self, seq: u8) {
+        if !some(self.left_out) {
+            (self.anew, self.left_out, self.end) = (seq, self.end, 0.0);
+        }
+    }
+
+    /// Block `seq` is the oldest from now on.
+    pub fn oldest_is(&mut self, seq: u8) {
+        if self.anew == seq {
+            self.left_out = 0.0;
+        }
+    }
+
+    /// Whether there are blocks before the one from which potentials are counted anew. Cost: 10.
+    #[inline(always)]
+    pub fn is_mixed(&self) -> bool {
+        some(self.left_out)
+    }
+
+    /// A potential at block `seq`, counted as at the `oldest` one. Cost: 150.
+    pub fn lifted(&self, potential: f32, seq: u8, oldest: u8) -> f32 {
+        let place = |seq: u8| seq.wrapping_sub(oldest) & SEQ;
+        if place(seq) >= place(self.anew) { potential + self.left_out } else { potential }
+    }
+
+    /// What potentials of older blocks than that from which they are counted anew have more; `next` is the block to be
+    /// queued next.
+    pub fn older(&self, next: u8) -> Older {
+        Older { behind: next.wrapping_sub(self.anew) & SEQ, more: self.left_out }
+    }
+
     /// These overrides are wanted.
     pub fn want(&mut self, factors: Factors) {
         self.wanted = factors;
@@ -230,6 +271,22 @@ impl Horizon {
     fn slot(&self, n: u8) -> usize {
         let slot = usize::from(self.front) + usize::from(n);
         if slot >= BLOCKS { slot - BLOCKS } else { slot }
+    }
+}
+
+/// See [`Horizon::older`].
+#[derive(Clone, Copy)]
+pub struct Older {
+    /// How many blocks are counted anew.
+    behind: u8,
+    more: f32,
+}
+
+impl Older {
+    /// For the block that so many have been queued after.
+    #[inline(always)]
+    pub fn of(&self, back: u8) -> f32 {
+        if back >= self.behind { self.more } else { 0.0 }
     }
 }
 

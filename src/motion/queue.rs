@@ -33,7 +33,7 @@ pub(super) const FIRM: u8 = 0x80;
 /// A corner is worth a key if it is slower than this share of what holds on both sides.
 pub(super) const WORTH: f32 = 0.999;
 
-/// Potentials beyond so many times the square of the velocity are made small again.
+/// Potentials beyond so many times the square of the velocity are counted anew.
 const COARSE: f32 = 1024.0;
 
 /// The logarithm of half of it.
@@ -254,7 +254,7 @@ impl BlockQueue {
         }
     }
 
-    /// Potential at the end of the queue, after all of them have been made small if they have become large for this line.
+    /// Potential at the end of the queue, counted anew if it has become large for this line.
     fn refined(&mut self, line: &Line) -> f32 {
         let end = self.end();
         // Nothing is there, or it is plainly fine: no need to compare.
@@ -262,28 +262,18 @@ impl BlockQueue {
             return end;
         }
         if below(COARSE * line.cruise * line.cruise, end) {
-            exec::lock(|ceiling| self.rebase(ceiling));
-        }
-        self.end()
-    }
-
-    /// Takes the potential of the oldest line in the queue off all of them. Cost: 400 a block, exec
-    /// waiting.
-    fn rebase(&mut self, ceiling: &Ceiling) {
-        let mut base = None;
-        for back in (0..self.ring.used()).rev() {
-            self.ring.amend(ceiling, back, |block| {
-                if let Body::Line(line) = &mut block.body {
-                    let base = *base.get_or_insert(line.start);
-                    line.start -= base;
-                }
+            exec::lock(|ceiling| {
+                let next = self.newest.wrapping_add(1) & SEQ;
+                let used = self.ring.used();
+                self.store.with_horizon(ceiling, |horizon| {
+                    horizon.count_anew(next);
+                    if used == 0 {
+                        horizon.oldest_is(next);
+                    }
+                });
             });
         }
-        self.store.with_horizon(ceiling, |horizon| {
-            let base = base.unwrap_or(horizon.end);
-            horizon.end -= base;
-            horizon.version = horizon.version.wrapping_add(1);
-        });
+        self.end()
     }
 
     /// Puts a block, which `fill` writes, into the ring and what follows from it into the horizon, all at once for exec.
@@ -319,10 +309,14 @@ impl BlockQueue {
     fn needless(&self, key: f32) -> u8 {
         let mut count = 0;
         loop {
+            let next = self.newest.wrapping_add(1) & SEQ;
             let last = exec::lock(|ceiling| {
-                self.store.with_horizon(ceiling, |horizon| horizon.nth_last(count))
+                self.store.with_horizon(ceiling, |horizon| {
+                    let seq = horizon.nth_last(count)?;
+                    Some((seq, horizon.older(next).of(self.newest.wrapping_sub(seq) & SEQ)))
+                })
             });
-            let needless = |last| last & FIRM == 0 && self.key(last) >= key;
+            let needless = |(last, more)| last & FIRM == 0 && self.key(last) - more >= key;
             if !last.is_some_and(needless) {
                 return count;
             }

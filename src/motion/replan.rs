@@ -38,6 +38,8 @@ struct Behind {
     key: f32,
     /// The lowest velocity up to the next place that is worth a key.
     low: f32,
+    /// What potentials counted so far have less than those of the line that is asked about.
+    left_out: f32,
     known: Known,
 }
 
@@ -52,6 +54,14 @@ struct Known {
 }
 
 impl Behind {
+    /// Potentials of the next line to be asked about have so much more than those at the end of the queue.
+    fn count_from(&mut self, left_out: f32) {
+        if left_out.to_bits() != self.left_out.to_bits() {
+            self.key += left_out - self.left_out;
+            self.left_out = left_out;
+        }
+    }
+
     /// Whether `this` line needs a key, that follows `before` without a stop.
     #[inline(never)]
     fn needs(&mut self, this: &Line, before: Option<&Line>, factors: &Factors) -> bool {
@@ -127,18 +137,22 @@ impl BlockQueue {
     /// Marks the lines that need a key, from the newest to the oldest.
     #[inline(never)]
     fn look_back(&self, marks: &mut Marks) {
-        let mut behind = Behind { key: f32::MAX, low: f32::MAX, known: Known::default() };
+        let mut behind =
+            Behind { key: f32::MAX, low: f32::MAX, left_out: 0.0, known: Known::default() };
         let mut last: Option<(usize, &Line)> = None;
+        let next = self.newest.wrapping_add(1) & SEQ;
+        let older = exec::lock(|ceiling| self.store.with_horizon(ceiling, |h| h.older(next)));
         for back in 0..=self.ring.used() {
             let block = self.ring.pushed(back);
             if is_aside(block) {
                 continue;
             }
             let before = line(block);
-            if let Some((back, this)) = last
-                && behind.needs(this, before, &self.factors)
-            {
-                marks.set(back);
+            if let Some((back, this)) = last {
+                behind.count_from(older.of(back as u8));
+                if behind.needs(this, before, &self.factors) {
+                    marks.set(back);
+                }
             }
             last = before.map(|line| (back, line));
         }

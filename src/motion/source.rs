@@ -77,6 +77,8 @@ impl BlockSource {
             self.ring.release();
             self.end.set(None);
             self.oldest = self.oldest.wrapping_add(1) & SEQ;
+            let oldest = self.oldest;
+            self.horizon_mut().oldest_is(oldest);
         }
     }
 
@@ -116,19 +118,16 @@ impl BlockSource {
     /// sake of all that follow, if there is no jerk limit. Cost: 900.
     pub fn headroom(&self) -> f32 {
         let horizon = self.horizon();
-        let key = match horizon
-            .nth(0)
-            .and_then(|seq| self.line(seq, |line| line.sharp_key(&horizon.factors())))
-        {
-            // Bits tell, mostly: both are above 0.
-            Some(key)
-                if key.to_bits() < horizon.end.to_bits() && !horizon.end.is_sign_negative() =>
+        let end = self.queue_end();
+        let sharp_key = |line: &Line| line.sharp_key(&horizon.factors());
+        let key =
+            match horizon.nth(0).and_then(|seq| Some(self.lifted(seq, self.line(seq, sharp_key)?)))
             {
-                key
-            }
-            Some(key) => lesser(key, horizon.end),
-            None => horizon.end,
-        };
+                // Bits tell, mostly: both are above 0.
+                Some(key) if key.to_bits() < end.to_bits() && !end.is_sign_negative() => key,
+                Some(key) => lesser(key, end),
+                None => end,
+            };
         key - self.end()
     }
 
@@ -145,12 +144,29 @@ impl BlockSource {
         };
         let start = self.line(seq, |line| line.start).unwrap_or(horizon.end);
         let (velocity, firm) = (horizon.entry(found), seq & FIRM != 0);
-        (found, Anchor { velocity, ahead: start - self.end(), firm })
+        (found, Anchor { velocity, ahead: self.lifted(seq, start) - self.end(), firm })
     }
 
     /// Potential from the end of the oldest block to the end of the queue.
     pub fn end_of_queue(&self) -> f32 {
-        self.horizon().end - self.end()
+        self.queue_end() - self.end()
+    }
+
+    /// Potential at the end of the queue, counted as at the oldest block.
+    fn queue_end(&self) -> f32 {
+        // Behind all blocks, of which the last number is that before the oldest.
+        self.lifted(self.oldest.wrapping_sub(1), self.horizon().end)
+    }
+
+    /// A potential at block `seq`, counted as at the oldest one.
+    #[inline(always)]
+    fn lifted(&self, seq: u8, potential: f32) -> f32 {
+        if self.horizon().is_mixed() { self.lifted_anew(seq, potential) } else { potential }
+    }
+
+    #[inline(never)]
+    fn lifted_anew(&self, seq: u8, potential: f32) -> f32 {
+        self.horizon().lifted(potential, seq, self.oldest)
     }
 
     /// Potential at the end of the oldest block.
@@ -163,7 +179,7 @@ impl BlockSource {
         }
         // Where the next begins, if that is a line.
         let next = self.ring.peek(1, |block| match &block.body {
-            Body::Line(line) => Some(line.start),
+            Body::Line(line) => Some(self.lifted(self.oldest.wrapping_add(1), line.start)),
             _ => None,
         });
         let end = next.flatten().unwrap_or_else(|| {
