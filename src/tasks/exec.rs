@@ -162,9 +162,9 @@ struct Amount {
     least: u16,
 }
 
-/// With the segment that runs, which takes 2 ms or less while anything is fast, and exec's own time, a feedhold begins within
-/// 12 ms. Less would not outlast a line that is queued at the same time as a ramp is laid out.
-const USUAL: Amount = Amount { most: units(70), least: units(38) };
+/// With the segment that runs, which takes 2 ms or less while anything is fast, a feedhold begins within 10 ms. Three segments of 2 ms must
+/// fit: where a ramp is laid out while ticks take two thirds of the CPU, exec takes up to 4.1 ms for a segment.
+const USUAL: Amount = Amount { most: units(62), least: units(38) };
 
 /// For a while after too little has been waiting: a feedhold begins within 14 ms.
 const PRESSED: Amount = Amount { most: units(80), least: units(65) };

@@ -109,7 +109,7 @@ pub const ROWS: [Row; 37] = [
         peers: ["52", "-", "63"],
         target: Some(13.0),
         // A tick, and the longest time interrupts are off: now and then that meets the tick behind a new segment.
-        floor: Some(14.4),
+        floor: Some(13.0),
         measure: jitter::minor,
     },
     Row {
@@ -210,7 +210,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(1.15),
         // See above.
-        floor: Some(1.2),
+        floor: Some(1.15),
         measure: spirals::fifth_jerk,
     },
     Row {
@@ -266,7 +266,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(8_000.0),
         // A third of it are scans of what is ahead.
-        floor: Some(11_200.0),
+        floor: Some(10_600.0),
         measure: costs::segment_jerk,
     },
     Row {
@@ -278,7 +278,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(24_000.0),
         // A scan that tries three velocities, and a ramp that is laid out.
-        floor: Some(50_000.0),
+        floor: Some(36_000.0),
         measure: costs::segment_jerk_worst,
     },
     Row {
@@ -400,7 +400,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(10.0),
         // Three segments that wait, the one that runs, and exec's own time.
-        floor: Some(12.1),
+        floor: Some(10.0),
         measure: limits::hold_begins,
     },
     Row {
