@@ -7,7 +7,9 @@
 //! When full, [`Producer::slot`] is `None`; the producer waits, or counts the loss.
 
 use core::cell::UnsafeCell;
+use core::marker::PhantomData;
 use core::mem::MaybeUninit;
+use core::ops::{Deref, DerefMut};
 
 use super::byte::SharedByte;
 
@@ -140,19 +142,18 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         Ok(())
     }
 
-    /// Puts a copy of a value in; false if the ring is full. Cheaper than `push` for one that stays in
-    /// its place.
-    #[inline]
-    pub fn push_copy(&mut self, value: &T) -> bool {
-        let head = self.0.head.get();
-        let after = next::<N>(head);
+    /// The slot that the next value goes to, with `value` in it. None if the ring is full.
+    ///
+    /// To make a value in its place saves the CPU a copy.
+    #[inline(always)]
+    pub fn slot(&mut self, value: T) -> Option<Slot<'_, T, N>> {
+        let after = next::<N>(self.0.head.get());
         if after == self.0.tail.get() {
-            return false;
+            return None;
         }
-        // SAFETY: as in `push`; a reference of the caller's does not point into the ring's free slots.
-        unsafe { self.0.slot(after).copy_from_nonoverlapping(value, 1) };
-        self.0.head.set(after);
-        true
+        // SAFETY: the slot behind `head` is the producer's until `head` moves onto it.
+        unsafe { self.0.slot(after).write(value) };
+        Some(Slot { ring: self.0, after, producer: PhantomData })
     }
 
     /// A look at a value pushed earlier; `back` 0 is the newest. `None` if it has been released.
@@ -316,6 +317,40 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
     }
 }
 
+/// A value that the consumer does not see before it is published.
+pub struct Slot<'a, T: 'static, const N: usize> {
+    ring: &'static Ring<T, N>,
+    after: u8,
+    /// Nothing else goes into the ring meanwhile.
+    producer: PhantomData<&'a mut Producer<T, N>>,
+}
+
+impl<T: Copy, const N: usize> Slot<'_, T, N> {
+    /// Shows the value to the consumer.
+    #[inline(always)]
+    pub fn publish(self) {
+        self.ring.head.set(self.after);
+    }
+}
+
+impl<T: Copy, const N: usize> Deref for Slot<'_, T, N> {
+    type Target = T;
+
+    #[inline(always)]
+    fn deref(&self) -> &T {
+        // SAFETY: `Producer::slot` has written it, and it is the producer's until it is published.
+        unsafe { &*self.ring.slot(self.after) }
+    }
+}
+
+impl<T: Copy, const N: usize> DerefMut for Slot<'_, T, N> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut T {
+        // SAFETY: as in `deref`, and `self` is the only way to it.
+        unsafe { &mut *self.ring.slot(self.after) }
+    }
+}
+
 /// Witness that the exec level cannot run: only `imp::exec::lock` and tests make one.
 pub struct Ceiling(pub(in crate::hal) ());
 
@@ -337,13 +372,13 @@ mod tests {
             assert_eq!(p.free(), 3);
             for i in 0..3 {
                 if i == 1 {
-                    assert!(p.push_copy(&(round * 10 + i)));
+                    p.slot(round * 10 + i).unwrap().publish();
                 } else {
                     assert_eq!(p.push(round * 10 + i), Ok(()));
                 }
             }
             assert_eq!(p.push(99), Err(99));
-            assert!(!p.push_copy(&99));
+            assert!(p.slot(99).is_none());
             assert_eq!(c.len(), 3);
             assert_eq!(c.peek(2, |v| *v), Some(round * 10 + 2));
             assert_eq!(c.peek(3, |v| *v), None);

@@ -13,11 +13,14 @@ use crate::hal::imp::{exec, flags, stepper};
 use crate::hal::ring::Producer;
 use crate::motion::contact;
 use crate::motion::dda::{SEGMENTS, Segment};
+use crate::motion::divide::product;
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
-use crate::motion::snapshot::Program;
+use crate::motion::snapshot::{Program, Snapshot};
 use crate::tasks::health::{self, Sign};
+use kerf_macros::small;
+
 use crate::tasks::{Never, alarm, hold, links, overrides, power, spindle};
 
 /// After so many segments without a turn of thread mode they become longer, which takes less of the CPU.
@@ -26,103 +29,191 @@ const PATIENCE: u8 = 6;
 /// The task.
 #[allow(clippy::manual_async_fn)] // See `tasks`.
 pub fn run(
-    mut blocks: BlockSource,
-    mut segments: Producer<Segment, SEGMENTS>,
+    blocks: BlockSource,
+    segments: Producer<Segment, SEGMENTS>,
 ) -> impl Future<Output = Never> {
     async move {
+        // By itself: it would be made on the stack, and copied.
         let mut machine = Exec::new();
-        let mut segment = Segment::default();
-        let (mut waiting, mut rests) = (Waiting::new(), true);
-        let mut finished = Finished::new();
+        let mut runner = Runner::new(blocks, segments, &mut machine);
         loop {
-            exec::wait(|| {
-                health::answer(Sign::Exec);
-                (waiting.has_room(segments.used(), rests) || stepper::is_stopped()).then_some(())
-            })
-            .await;
-            let queued = blocks.len();
-            let rested = rests;
-            let standstill = !stepper::running();
-            if contact::is_noted() {
-                contact::catch_up(&segments);
-            }
-            let step = links::update(|out| {
-                machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
-                // What has paused in a hold goes on before motion does.
-                if out.outputs != spindle::on() {
-                    machine.wait(spindle::switch(out, false), out);
-                }
-                if let Some(line) = finished.take(segments.used()) {
-                    out.finished = line;
-                }
-                let line = out.line;
-                let step = match stepper::is_stopped() {
-                    true => Step::Held,
-                    false => machine.step(&mut blocks, standstill, out, &mut segment),
-                };
-                if out.line != line {
-                    finished.end(line);
-                }
-                if step == Step::Segment {
-                    finished.queue();
-                    power::segment(segment.moving);
-                } else if let Step::Override(change) = step {
-                    overrides::change_in_stream(change, &mut blocks);
-                } else if step == Step::Idle && standstill {
-                    finished.rest();
-                    out.finished = out.line;
-                } else if step == Step::Held {
-                    spindle::switch(out, false);
-                    hold::dropped(|| {
-                        // What has paused stays off.
-                        out.outputs = spindle::on();
-                        let held = machine.drop_all(&mut blocks, out);
-                        stepper::settle(held, &mut out.target);
-                        finished.rest();
-                        if alarm::now() >= Alarm::Shutdown {
-                            out.program = Program::Ready;
-                        }
-                    });
-                } else if step == Step::Switched {
-                    machine.wait(spindle::switch(out, true), out);
-                }
-                // A standstill stays one until a segment leads out of it; velocity is ahead of the segments.
-                rests = out.velocity.to_bits() == 0 || (rests && step != Step::Segment);
-                step
-            });
-            if step == Step::Segment {
-                // There is room: this task alone fills the ring.
-                let _ = segments.push_copy(&segment);
-                waiting.push(u32::from(segment.ticks) * u32::from(segment.period));
-                health::moves(waiting.count);
-                let short = waiting.is_short(segments.used(), rests);
-                machine.set_coarse(event::pass_over() > PATIENCE || waiting.is_busy(), short);
-                if contact::is_noted() {
-                    contact::pushed(&segment);
-                }
-                if !rested {
-                    health::look_for_starvation();
-                }
-                stepper::go();
-                let used = segments.used();
-                if used >= 2 && waiting.sum(used) >= waiting.limits().least {
+            exec::wait(|| runner.is_due().then_some(())).await;
+            match runner.turn() {
+                Next::Turn => {}
+                Next::Idle => {
                     exec::pend_when_idle();
                     exec_asked_again().await;
-                    waiting.go_on(segments.used());
+                }
+                Next::Block => {
+                    links::hungry(true);
+                    exec_asked_again().await;
+                    links::hungry(false);
                 }
             }
-            if blocks.len() != queued {
-                flags::set(Event::BlockDone);
-            }
-            if step == Step::Held && hold::passes() {
-                continue;
-            }
-            if matches!(step, Step::Idle | Step::Standstill | Step::Held) {
-                links::hungry(true);
-                exec_asked_again().await;
-                links::hungry(false);
-            }
         }
+    }
+}
+
+/// What the task goes on with.
+enum Next {
+    /// The next turn, as soon as there is room.
+    Turn,
+    /// The next turn, if there is room: when thread mode is idle, or a segment has been used up.
+    Idle,
+    /// Whatever it is pended for: a block, the steppers at a standstill, the end of a hold.
+    Block,
+}
+
+/// What the task owns.
+struct Runner<'a> {
+    waiting: Waiting,
+    finished: Finished,
+    /// The machine stands still, and no segment leads out of that.
+    rests: bool,
+    /// It waits until thread mode is idle, or has been.
+    asked: bool,
+    segments: Producer<Segment, SEGMENTS>,
+    blocks: BlockSource,
+    machine: &'a mut Exec,
+}
+
+impl<'a> Runner<'a> {
+    fn new(
+        blocks: BlockSource,
+        segments: Producer<Segment, SEGMENTS>,
+        machine: &'a mut Exec,
+    ) -> Self {
+        let (waiting, finished) = (Waiting::new(), Finished::new());
+        Self { waiting, finished, rests: true, asked: false, segments, blocks, machine }
+    }
+
+    /// Whether there is room for a segment, or a stop to be seen to.
+    fn is_due(&mut self) -> bool {
+        health::answer(Sign::Exec);
+        self.waiting.update(self.segments.used());
+        let due = self.waiting.has_room(self.rests) || stepper::is_stopped();
+        if due && self.asked {
+            self.asked = false;
+            self.waiting.go_on(exec::was_idle());
+        }
+        due
+    }
+
+    /// Does the next thing there is to do.
+    #[inline(always)]
+    fn turn(&mut self) -> Next {
+        let queued = self.blocks.len();
+        let rested = self.rests;
+        if contact::is_noted() {
+            contact::catch_up(&self.segments);
+        }
+        let standstill = !stepper::running();
+        let step = links::update(|out| self.step(standstill, out));
+        if self.blocks.len() != queued {
+            flags::set(Event::BlockDone);
+        }
+        match step {
+            Step::Segment => self.queued(rested),
+            Step::Held if hold::passes() => Next::Turn,
+            Step::Idle | Step::Standstill | Step::Held => Next::Block,
+            Step::Again | Step::Switched | Step::Override(_) => Next::Turn,
+        }
+    }
+
+    /// The next step of the machine, and what follows from it; a segment is put into the ring.
+    #[inline(always)]
+    fn step(&mut self, standstill: bool, out: &mut Snapshot) -> Step {
+        let used = self.segments.used();
+        self.machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
+        // What has paused in a hold goes on before motion does.
+        if out.outputs != spindle::on() {
+            self.machine.wait(spindle::switch(out, false), out);
+        }
+        if let Some(line) = self.finished.take(used) {
+            out.finished = line;
+        }
+        let line = out.line;
+        let step = self.next_step(standstill, out);
+        if out.line != line {
+            self.finished.end(line);
+        }
+        match step {
+            Step::Segment => self.finished.queue(),
+            Step::Override(change) => overrides::change_in_stream(change, &mut self.blocks),
+            Step::Idle if standstill => {
+                self.finished.rest();
+                out.finished = out.line;
+            }
+            Step::Held => self.held(out),
+            Step::Switched => self.machine.wait(spindle::switch(out, true), out),
+            Step::Again | Step::Idle | Step::Standstill => {}
+        }
+        // A standstill stays one until a segment leads out of it; velocity is ahead of the segments.
+        self.rests = out.velocity.to_bits() == 0 || (self.rests && step != Step::Segment);
+        step
+    }
+
+    #[inline(always)]
+    fn next_step(&mut self, standstill: bool, out: &mut Snapshot) -> Step {
+        if stepper::is_stopped() {
+            return Step::Held;
+        }
+        // There is room: this task alone fills the ring.
+        let Some(mut slot) = self.segments.slot(Segment::default()) else {
+            return Step::Standstill;
+        };
+        let step = self.machine.step(&mut self.blocks, standstill, out, &mut slot);
+        if step == Step::Segment {
+            power::segment(slot.moving);
+            self.waiting.push(product(slot.ticks, slot.period));
+            slot.publish();
+        }
+        step
+    }
+
+    /// The machine stands still in a hold, which may be the end of what is queued.
+    #[inline(never)]
+    #[small]
+    fn held(&mut self, out: &mut Snapshot) {
+        spindle::switch(out, false);
+        hold::dropped(|| {
+            // What has paused stays off.
+            out.outputs = spindle::on();
+            let held = self.machine.drop_all(&mut self.blocks, out);
+            stepper::settle(held, &mut out.target);
+            self.finished.rest();
+            if alarm::now() >= Alarm::Shutdown {
+                out.program = Program::Ready;
+            }
+        });
+    }
+
+    /// A segment is in the ring: the steppers go, or go on.
+    #[inline(always)]
+    fn queued(&mut self, rested: bool) -> Next {
+        let Self { waiting, segments, rests, .. } = self;
+        health::moves(waiting.count);
+        waiting.update(segments.used());
+        let short = waiting.is_short(*rests);
+        self.machine.set_coarse(event::pass_over() > PATIENCE || waiting.is_busy(), short);
+        if contact::is_noted()
+            && let Some(segment) = segments.pushed(0)
+        {
+            contact::pushed(segment);
+        }
+        if !rested {
+            health::look_for_starvation();
+        }
+        stepper::go();
+        if !waiting.is_enough() {
+            return Next::Turn;
+        }
+        self.asked = true;
+        if waiting.has_room(*rests) {
+            return Next::Idle;
+        }
+        exec::note_idle();
+        Next::Turn
     }
 }
 
@@ -181,15 +272,17 @@ impl Waiting {
     }
 
     /// The length of the segment that was queued so many before the next one.
+    #[inline(always)]
     fn length(&self, back: u8) -> u16 {
         let at = usize::from(self.count.wrapping_sub(back)) % SEGMENTS;
         self.lengths.get(at).copied().unwrap_or_default().into()
     }
 
     /// A segment of so many CPU cycles has been queued.
+    #[inline(always)]
     fn push(&mut self, cycles: u32) {
-        let units = cycles >> UNIT_LOG2;
-        let length = if units > 0xFF { 0xFF } else { units as u8 };
+        let units = (cycles >> 8) as u16 >> (UNIT_LOG2 - 8);
+        let length = if cycles >> 24 != 0 || units > 0xFF { 0xFF } else { units as u8 };
         if let Some(place) = self.lengths.get_mut(usize::from(self.count) % SEGMENTS) {
             *place = length;
         }
@@ -199,18 +292,17 @@ impl Waiting {
         self.sum += u16::from(length);
     }
 
-    /// How long the `used` segments take that wait.
-    fn sum(&mut self, used: usize) -> u16 {
-        while usize::from(self.used) > used {
+    /// No more than `used` segments wait.
+    #[inline(always)]
+    fn update(&mut self, used: usize) {
+        while self.used > used as u8 {
             self.sum = self.sum.saturating_sub(self.length(self.used));
             self.used -= 1;
         }
-        self.sum
     }
 
-    /// Exec has waited for thread mode to be idle, and goes on: because it is, or because a segment has been used up.
-    fn go_on(&mut self, used: usize) {
-        let idle = usize::from(self.used) == used;
+    /// Exec goes on: thread mode was `idle` meanwhile, or a segment was used up before.
+    fn go_on(&mut self, idle: bool) {
         self.busy = if idle { 0 } else { self.busy.saturating_add(1) };
     }
 
@@ -224,23 +316,31 @@ impl Waiting {
     }
 
     /// Whether exec is late. Motion that has just begun, or `rests`, has not much waiting yet.
-    fn is_short(&mut self, used: usize, rests: bool) -> bool {
+    #[inline(always)]
+    fn is_short(&mut self, rests: bool) -> bool {
         self.moved = if rests { 0 } else { self.moved.saturating_add(1) };
-        let short = usize::from(self.moved) > SEGMENTS && self.sum(used) < WAITING_SHORT;
+        let short = usize::from(self.moved) > SEGMENTS && self.sum < WAITING_SHORT;
         if short {
             self.pressed = PRESSED_FOR;
         }
         short
     }
 
+    /// Whether thread mode gets a turn before more is prepared.
+    #[inline(always)]
+    fn is_enough(&self) -> bool {
+        self.used >= 2 && self.sum >= self.limits().least
+    }
+
     /// Whether another one like the last may wait: what is queued cannot be slowed down any more. Unless the machine `rests` at
     /// the end of each, as blocks do that come late: then a hold has no speed to take away.
-    fn has_room(&mut self, used: usize, rests: bool) -> bool {
-        if used < 2 {
+    #[inline(never)]
+    fn has_room(&self, rests: bool) -> bool {
+        if self.used < 2 {
             return true;
         }
-        let sum = self.sum(used) + self.length(1);
-        used < SEGMENTS - 1 && (sum <= self.limits().most || rests && used < 4)
+        let sum = self.sum + self.length(1);
+        self.used < SEGMENTS as u8 - 1 && (sum <= self.limits().most || rests && self.used < 4)
     }
 }
 

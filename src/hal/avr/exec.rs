@@ -33,8 +33,12 @@ pub(super) static CLOSED: SharedByte = SharedByte::new(1);
 /// Exec was asked for meanwhile.
 pub(super) static MISSED: SharedByte = SharedByte::new(0);
 
-/// Exec would go on when nobody else has anything to do.
-static PATIENT: SharedByte = SharedByte::new(0);
+/// What exec wants of the time when nobody else has anything to do: [`GO_ON`], [`TELL`], or nothing.
+static WANTED: SharedByte = SharedByte::new(0);
+/// To go on then.
+const GO_ON: u8 = 1;
+/// To know of it.
+const TELL: u8 = 2;
 
 struct Context {
     executor: Cell<Option<&'static Executor>>,
@@ -56,15 +60,28 @@ pub fn pend() {
 
 /// Asks for exec to run when thread mode has nothing left to do. Exec only.
 pub fn pend_when_idle() {
-    PATIENT.set(1);
+    WANTED.set(GO_ON);
+}
+
+/// [`was_idle`] is to say whether thread mode has had nothing left to do from now on. Exec only.
+pub fn note_idle() {
+    WANTED.set(TELL);
+}
+
+/// Whether thread mode has had nothing left to do since [`pend_when_idle`] or [`note_idle`]. Exec only.
+pub fn was_idle() -> bool {
+    WANTED.get() == 0
 }
 
 /// Thread mode has nothing left to do; interrupts are off.
 #[inline(always)]
 pub(super) fn idle() {
-    if PATIENT.get() != 0 {
-        PATIENT.set(0);
-        pend();
+    let wanted = WANTED.get();
+    if wanted != 0 {
+        WANTED.set(0);
+        if wanted == GO_ON {
+            pend();
+        }
     }
 }
 

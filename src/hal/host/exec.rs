@@ -7,11 +7,19 @@ use core::task::{Poll, Waker};
 use super::Local;
 use crate::hal::ring::Ceiling;
 
+/// What exec wants of the time when nobody else has anything to do.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Wanted {
+    Nothing,
+    GoOn,
+    Tell,
+}
+
 struct Waiting(Cell<Option<Waker>>);
 
 machine_static! {
     fn pended() -> Local<bool> = Local::new(false);
-    fn patient() -> Local<bool> = Local::new(false);
+    fn wanted() -> Local<Wanted> = Local::new(Wanted::Nothing);
     fn waiting() -> Waiting = Waiting(Cell::new(None));
 }
 
@@ -22,14 +30,24 @@ pub fn pend() {
 
 /// Asks for exec to run when thread mode has nothing left to do. Exec only.
 pub fn pend_when_idle() {
-    patient().set(true);
+    wanted().set(Wanted::GoOn);
+}
+
+/// [`was_idle`] is to say whether thread mode has had nothing left to do from now on. Exec only.
+pub fn note_idle() {
+    wanted().set(Wanted::Tell);
+}
+
+/// Whether thread mode has had nothing left to do since [`pend_when_idle`] or [`note_idle`]. Exec only.
+pub fn was_idle() -> bool {
+    wanted().get() == Wanted::Nothing
 }
 
 /// Thread mode has nothing left to do. Whether exec runs then.
 pub(super) fn idle() -> bool {
-    let runs = patient().get();
+    let runs = wanted().get() == Wanted::GoOn;
+    wanted().set(Wanted::Nothing);
     if runs {
-        patient().set(false);
         pend();
     }
     runs
