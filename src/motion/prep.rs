@@ -73,7 +73,7 @@ const SETTLE: u8 = 68;
 const TURNED: u16 = 150;
 
 /// A lockstep segment has at least half as many ticks, if it is shorter than as many steps.
-const LOCKSTEP_TICKS: u32 = 16;
+const LOCKSTEP_TICKS: u16 = 16;
 
 /// A motor that moves but does not step on every tick of the dominant one.
 #[derive(Clone, Copy, Debug, Default)]
@@ -345,25 +345,31 @@ impl Prep {
         let travel = self.left.saturating_sub(left);
         let cycles = self.with_kept(cycles);
         let limit = self.limit(cycles, self.pace());
-        let (_, mut shift) = coarsen(travel, limit);
+        let (mut ticks, mut shift) = coarsen(travel, limit);
         // From where a tick is a step; of fine ticks, from the middle between two, where the interrupt has time for a segment.
         let middle = if shift < STEP_LOG2 - 1 { STEP / 2 } else { 0 };
         // No tick is longer than a step.
         let at = (self.left as u16)
             .wrapping_sub((u16::from(self.past) << PART_LOG2).wrapping_add(middle));
-        let mut rest = (1 << shift) - 1;
+        let mut rest = bit(shift) - 1;
         if at & rest != 0 {
-            shift = self.fitting(shift, at.trailing_zeros() as u8, cycles, travel);
-            rest = (1 << shift) - 1;
+            let fits = self.fitting(shift, at.trailing_zeros() as u8, cycles, travel);
+            if fits != shift {
+                (ticks, shift) = (travel >> fits, fits);
+                rest = bit(shift) - 1;
+            }
         }
-        let grain = grain(travel >> shift, shift);
-        let short = (travel as u16).wrapping_sub(at & !rest) & ((1 << grain) - 1);
-        let short = u32::from(short);
-        if travel <= short {
+        let grain = grain(ticks, shift);
+        let short = (travel as u16).wrapping_sub(at & !rest) & (bit(grain) - 1);
+        if travel <= short.into() {
             return self.idle(cycles, out);
         }
-        let aligned = travel - short;
-        let ticks = ((aligned >> shift) as u16).min(TICKS_MAX);
+        // Whole ticks of the travel without what is short.
+        let part = travel as u16 & rest;
+        if short > part {
+            ticks -= u32::from((short - part + rest) >> shift);
+        }
+        let ticks = if ticks > TICKS_MAX.into() { TICKS_MAX } else { ticks as u16 };
         let period = self.period(cycles, travel, shift);
         if period > PERIOD_MAX {
             return self.idle(cycles, out);
@@ -397,7 +403,7 @@ impl Prep {
             self.left = 0;
             return self.last_of(cycles, COARSEST, exact, out);
         }
-        let limit = self.limit(cycles, COARSEST) as u16;
+        let limit = self.limit(cycles, COARSEST);
         // Ticks of a part, finer or coarser; and so many times the period.
         let (mut ticks, mut step, mut time) = (most, PART, cycles);
         if ticks > limit {
@@ -500,9 +506,9 @@ impl Prep {
             ticks = TICKS_MAX.into();
         } else if !exact {
             // The nearest; what is over is never above half a tick then.
-            let tick = 1u16 << shift;
+            let tick = bit(shift);
             ticks += u32::from(left as u16 & (tick - 1) > tick / 2);
-            self.left = ticks << shift;
+            self.left = product(ticks as u16, tick);
         }
         self.emit(ticks as u16, shift, period as u16, cycles, out);
         true
@@ -518,13 +524,14 @@ impl Prep {
     }
 
     /// Most ticks for a stretch.
-    fn limit(&self, cycles: u32, pace: u16) -> u32 {
+    fn limit(&self, cycles: u32, pace: u16) -> u16 {
         if self.minor == 0 {
             return LOCKSTEP_TICKS;
         }
         let cycles = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
-        let limit = (u32::from(cycles) * u32::from(pace)) >> 22;
-        limit.clamp(1, TICKS_MAX.into())
+        // Of 22 bits, 16 are dropped for nothing.
+        let limit = (product(cycles, pace) >> 16) as u16 >> 6;
+        limit.clamp(1, TICKS_MAX)
     }
 
     /// Cycles from tick to tick when a stretch of `travel` takes `cycles`; no less than
@@ -619,12 +626,13 @@ impl Prep {
         if shift != self.shift {
             self.scale(shift);
         }
-        self.left -= u32::from(ticks) << shift;
+        let step = bit(shift);
+        self.left -= product(ticks, step);
         out.ticks = ticks;
         out.period = period;
         let settles = period >= self.paces().settles;
         out.settle = if settles { SETTLE } else { 0 };
-        self.complete(cycles, 1 << shift, out, |prep, m| prep.minors[m].advance(ticks, prep.most));
+        self.complete(cycles, step, out, |prep, m| prep.minors[m].advance(ticks, prep.most));
     }
 
     /// The first segment after motors have turned round, or, if its first steps come too soon after
@@ -644,7 +652,7 @@ impl Prep {
     #[inline(never)]
     fn scale(&mut self, shift: u8) {
         let first = core::mem::replace(&mut self.shift, shift) == u8::MAX && self.parts;
-        let (step, most, others) = (1 << shift, self.most, self.minor);
+        let (step, most, others) = (bit(shift), self.most, self.minor);
         each_motor!(M => if others & 1 << M != 0 {
             let minor = &mut self.minors[M];
             (minor.increment, minor.remainder) = share(minor.way, step, most);
@@ -731,11 +739,22 @@ fn product_wide(unit: u32, times: u16) -> i32 {
     }
 }
 
-/// Ticks of a travel, no more than `limit` if steps allow, and the shift between the two.
-fn coarsen(travel: u32, limit: u32) -> (u32, u8) {
-    let mut shift = 0;
-    let mut ticks = travel;
-    while ticks > limit && shift < STEP_LOG2 {
+/// `1 << n`, up to [`STEP`]. Cost: 30; the compiler makes a loop of six cycles a bit.
+#[inline(never)]
+fn bit(n: u8) -> u16 {
+    let (byte, n) = if n & 8 != 0 { (0x100, n & 7) } else { (1, n) };
+    let nibble = if n & 4 != 0 { byte << 4 } else { byte };
+    let pair = if n & 2 != 0 { nibble << 2 } else { nibble };
+    if n & 1 != 0 { pair << 1 } else { pair }
+}
+
+/// Ticks of a travel, no more than `limit` if steps allow, and the shift between the two. Cost: 100.
+fn coarsen(travel: u32, limit: u16) -> (u32, u8) {
+    let (mut ticks, mut shift) = (travel, 0);
+    if ticks >> 8 > limit.into() {
+        (ticks, shift) = (ticks >> 8, 8);
+    }
+    while ticks > limit.into() && shift < STEP_LOG2 {
         ticks >>= 1;
         shift += 1;
     }

@@ -4,6 +4,8 @@
 //! [`Moment`] of it: 1,000 cycles while something moves. All values of a report come from the same one, for exec may
 //! run between any two.
 
+use kerf_macros::small;
+
 use crate::boards::MOTORS;
 
 /// What reports show of the motion that is being prepared.
@@ -55,6 +57,8 @@ impl Snapshot {
     }
 
     /// Where motor `m` is, in steps.
+    #[inline(never)]
+    #[small]
     pub fn position(&self, m: usize) -> i32 {
         if self.left <= 0.0 || self.steps[m] == 0 {
             return self.target[m];
@@ -64,6 +68,7 @@ impl Snapshot {
     }
 
     /// What is told of it.
+    #[small]
     pub fn moment(&self) -> Moment {
         Moment {
             position: core::array::from_fn(|m| self.position(m)),
