@@ -23,7 +23,7 @@
 use super::block::{Action, Block, Body, Line};
 use super::dda::Segment;
 use super::float::{below, scaled, some, whole};
-use super::governor::{Ahead, Governor};
+use super::governor::{Ahead, Governor, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
 use super::short::Short;
@@ -38,6 +38,9 @@ const CYCLES_PER_MS: u16 = (crate::boards::ACTIVE.clock_hz / 1000) as u16;
 
 /// Nominal time of a segment: as short as leaves two thirds of the CPU to others.
 pub const SEGMENT_S: f32 = 0.002;
+
+/// The same in CPU cycles.
+const SEGMENT_CYCLES: u32 = crate::boards::ACTIVE.clock_hz / 500;
 
 /// Shortest block with steps, s: twice what exec takes for it while the step interrupt is busy.
 pub const BLOCK_S_MIN: f32 = 0.000_75;
@@ -441,8 +444,11 @@ fn step(segment: bool) -> Step {
     if segment { Step::Segment } else { Step::Again }
 }
 
-/// CPU cycles in `seconds`; at least 1, at most what [`Prep`] takes.
+/// CPU cycles in `seconds`; at least 1, at most what [`Prep`] takes. Cost: 350, 15 for a usual stretch.
 fn cycles_of(seconds: f32) -> u32 {
+    if same(seconds, SEGMENT_S) {
+        return SEGMENT_CYCLES;
+    }
     let cycles = (whole(seconds * HALVES_PER_S) + 1) >> 1;
     cycles.clamp(1, CYCLES_MAX)
 }

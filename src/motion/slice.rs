@@ -118,12 +118,16 @@ impl Governor {
     }
 
     /// How long the next slice is to be, if what there is will not do: a stretch would be too short, or leave too
-    /// little of the block. Cost: 600, 1,200 near the end of a block.
+    /// little of the block. Cost: 200, 1,200 near the end of a block.
     #[inline(never)]
     fn wanted(&self, left: f32, nominal: f32) -> Option<f32> {
         let Rest { seconds, distance, .. } = self.rest;
-        let more = left - distance;
         let velocity = self.velocity;
+        if !some(seconds) && some(velocity) && below(scaled(velocity * nominal, 1), left) {
+            // The block is long: there is no need to look closer.
+            return (!left.is_sign_negative()).then_some(nominal);
+        }
+        let more = left - distance;
         if !less(self.little(), more) {
             return (!less(0.0, distance)).then_some(nominal);
         }
@@ -174,8 +178,11 @@ impl Governor {
         let more = left - distance;
         if less(self.little(), more) {
             self.rest = Rest::NONE;
-            // What has been borrowed before a stop is not given back.
-            let (seconds, distance) = (greater(seconds, 1e-6), greater(distance, 0.0));
+            if below(seconds, 1e-6) || distance.is_sign_negative() || seconds.is_sign_negative() {
+                // What has been borrowed before a stop is not given back.
+                let (seconds, distance) = (greater(seconds, 1e-6), greater(distance, 0.0));
+                return Stretch { seconds, distance, ends: false };
+            }
             return Stretch { seconds, distance, ends: false };
         }
         if !some(self.velocity) && !less(more, -ROUNDING) {
