@@ -109,7 +109,7 @@ pub const ROWS: [Row; 37] = [
         peers: ["52", "-", "63"],
         target: Some(13.0),
         // A tick, and the longest time interrupts are off: now and then that meets the tick behind a new segment.
-        floor: Some(13.0),
+        floor: Some(13.2),
         measure: jitter::minor,
     },
     Row {
@@ -266,7 +266,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(8_000.0),
         // A third of it are scans of what is ahead.
-        floor: Some(10_600.0),
+        floor: Some(9_500.0),
         measure: costs::segment_jerk,
     },
     Row {
