@@ -89,7 +89,8 @@ impl Governor {
             return self.slow_down(span, ahead);
         }
         let steady = !some(self.alpha) && some(velocity);
-        if steady && (self.hurry || self.waits(span) || self.is_calm(span.cruise)) {
+        if steady && (self.hurry || !self.knows(span) || self.waits() || self.is_calm(span.cruise))
+        {
             return self.keep(span, ahead);
         }
         self.climb(span, ahead)
@@ -107,22 +108,15 @@ impl Governor {
         calm
     }
 
-    /// Whether it is too early to try to go faster: it is not known either that this velocity may be kept, or it could not a moment
-    /// ago.
-    fn waits(&mut self, span: &Span) -> bool {
-        if self.wait > 0 {
-            self.wait -= 1;
-            return true;
-        }
-        if self.clear.top.is_sign_negative() || self.knows(span) {
-            return false;
-        }
-        // Where the queue is short it is never known for long.
-        self.turn = self.turn.wrapping_add(1);
-        self.turn & 3 != 0
+    /// Whether it is too early to try to go faster: it could not a moment ago.
+    fn waits(&mut self) -> bool {
+        let waits = self.wait > 0;
+        self.wait = self.wait.saturating_sub(1);
+        waits
     }
 
-    /// Whether it is known that a steady velocity may be kept for the slice.
+    /// Whether it is known that a steady velocity may be kept for the slice. If it is not, it is the first thing to find out: whatever is
+    /// faster is safe for a shorter time.
     fn knows(&self, span: &Span) -> bool {
         self.is_clear(self.velocity, self.potential(self.velocity * span.seconds))
     }
