@@ -62,7 +62,7 @@ impl Governor {
         for _ in 0..2 {
             let Some(seconds) = self.wanted(left, nominal) else { break };
             let span = Span { left: left - self.rest.distance, cruise, seconds };
-            if !self.slice(&span, ahead) || same(seconds, nominal) {
+            if !self.slice(&span, ahead) || self.scanned || same(seconds, nominal) {
                 break;
             }
         }
