@@ -73,7 +73,7 @@ pub fn was_idle() -> bool {
     WANTED.get() == 0
 }
 
-/// Thread mode has nothing left to do; interrupts are off.
+/// Thread mode has nothing left to do.
 #[inline(always)]
 pub(super) fn idle() {
     let wanted = WANTED.get();
