@@ -409,9 +409,8 @@ impl Exec {
         running.left -= stretch.distance;
         out.left = running.left;
         let left = whole(running.left * running.scale);
-        // The mathematics of a ramp under a jerk limit leaves no time for fine ticks.
-        let steady =
-            !running.jerk || self.governor.velocity().to_bits() == running.cruise.to_bits();
+        // Fine ticks leave no time to lay out a ramp under a jerk limit.
+        let steady = !running.jerk || self.governor.is_far_from_ramps();
         self.prep.refine(running.long && steady);
         step(self.prep.segment(left, cycles, segment))
     }

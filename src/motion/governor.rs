@@ -103,6 +103,8 @@ pub struct Governor {
     pub(super) halting: bool,
     /// What is ahead has been looked at for this stretch.
     pub(super) scanned: bool,
+    /// The velocity is steady, and no ramp begins for a while.
+    pub(super) far: bool,
     /// How long a stretch without a jerk limit is to be, s.
     pub(super) nominal: f32,
     /// No time for looks ahead.
@@ -134,6 +136,7 @@ impl Governor {
             changed: false,
             halting: false,
             scanned: false,
+            far: false,
             nominal: 0.0,
             hurry: false,
             wait: 0,
@@ -208,6 +211,11 @@ impl Governor {
     #[inline(always)]
     pub fn set_hurry(&mut self, hurry: bool) {
         self.hurry = hurry;
+    }
+
+    /// Whether the velocity is steady, with a jerk limit, and no ramp begins in the next stretches.
+    pub fn is_far_from_ramps(&self) -> bool {
+        self.far
     }
 
     /// What is ahead has changed.

@@ -103,6 +103,11 @@ impl Ramp {
         }
     }
 
+    /// Whether it does nothing but end an acceleration, at this velocity.
+    pub fn ends_at(&self, velocity: f32) -> bool {
+        same(self.velocity, velocity) && same(self.top, velocity)
+    }
+
     pub fn phase(&self) -> Phase {
         if self.time <= self.rise {
             Phase::Ending

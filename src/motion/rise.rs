@@ -115,10 +115,10 @@ impl Governor {
         waits
     }
 
-    /// Whether it is known that a steady velocity may be kept for the slice. If it is not, it is the first thing to find out: whatever is
+    /// Whether it is known that a steady velocity may be kept for the slice and as long again. If it is not, it is the first thing to find out: whatever is
     /// faster is safe for a shorter time.
     fn knows(&self, span: &Span) -> bool {
-        self.is_clear(self.velocity, self.potential(self.velocity * span.seconds))
+        self.is_clear(self.velocity, scaled(self.potential(self.velocity * span.seconds), 1))
     }
 
     /// A slice at a steady velocity.
@@ -127,7 +127,11 @@ impl Governor {
         let velocity = self.velocity;
         let distance = velocity * span.seconds;
         let at = self.potential(distance);
-        if !self.is_clear(velocity, at) {
+        let clear = self.is_clear(velocity, at);
+        // What the slice before has found out holds still: to look again and to lay a ramp out is too much for one slice.
+        let is_new = self.clear.age <= 1 && !less(self.clear.top, velocity);
+        let may_wait = clear && (self.hurry || self.scanned || self.knows(span));
+        if !is_new && !may_wait {
             if self.scanned {
                 return false;
             }
@@ -416,6 +420,9 @@ impl Governor {
     fn reconsider(&mut self, span: &Span, ahead: &impl Ahead) {
         self.changed = false;
         let ramp = self.ramp;
+        if ramp.as_ref().is_some_and(|ramp| ramp.ends_at(span.cruise)) {
+            return;
+        }
         self.leave_ramp();
         if !self.alpha.is_sign_negative() || !some(self.alpha) {
             // It has not begun to slow down.

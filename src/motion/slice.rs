@@ -35,6 +35,9 @@ pub(super) struct Span {
     pub seconds: f32,
 }
 
+/// So many stretches before a ramp begins, as a power of two, segments are no longer made for a steady velocity.
+const FAR_LOG2: i8 = 3;
+
 /// At rest, a distance that rounding leaves: it takes no ramp of its own.
 const ROUNDING: f32 = 5e-4;
 
@@ -58,7 +61,7 @@ impl Governor {
             self.halting = false;
             self.leave_ramp();
         }
-        self.scanned = false;
+        (self.scanned, self.far) = (false, false);
         for _ in 0..2 {
             let Some(seconds) = self.wanted(left, nominal) else { break };
             let span = Span { left: left - self.rest.distance, cruise, seconds };
@@ -78,17 +81,18 @@ impl Governor {
         if !free || self.halting || !same(velocity, cruise) {
             return None;
         }
-        let (mut seconds, mut distance) = (nominal, velocity * nominal);
-        let ends = below(left, scaled(distance, 1));
-        if ends {
-            (seconds, distance) = (left / velocity, left);
-        }
+        let slice = velocity * nominal;
+        let ends = below(left, scaled(slice, 1));
+        let distance = if ends { left } else { slice };
         let at = self.potential(distance);
-        if !self.is_clear(velocity, at) {
+        // As much again must be known: there is a look while nothing has to be done about it.
+        if !self.is_clear(velocity, scaled(at, 1)) {
             return None;
         }
+        self.far = !less(self.clear.distance, scaled(at, FAR_LOG2));
         self.clear.distance -= at;
         self.clear.age += 1;
+        let seconds = if ends { left / velocity } else { nominal };
         Some(Stretch { seconds, distance, ends })
     }
 
@@ -178,11 +182,8 @@ impl Governor {
         let more = left - distance;
         if less(self.little(), more) {
             self.rest = Rest::NONE;
-            if below(seconds, 1e-6) || distance.is_sign_negative() || seconds.is_sign_negative() {
-                // What has been borrowed before a stop is not given back.
-                let (seconds, distance) = (greater(seconds, 1e-6), greater(distance, 0.0));
-                return Stretch { seconds, distance, ends: false };
-            }
+            // What has been borrowed before a stop is not given back.
+            let (seconds, distance) = (greater(seconds, 1e-6), greater(distance, 0.0));
             return Stretch { seconds, distance, ends: false };
         }
         if !some(self.velocity) && !less(more, -ROUNDING) {
