@@ -49,6 +49,9 @@ fn times(a: f32, b: f32) -> f32 {
     a * b
 }
 
+/// The share of the step rate that short blocks may have.
+const SHORT_SHARE: f32 = 0.625;
+
 impl Path {
     /// The axes that move, with the size of their part of the heading, or a little more: never less
     /// than it is. Ends with the last that moves.
@@ -140,20 +143,28 @@ impl Path {
         }
     }
 
-    /// Keeps motors within the rate that so many can have together, and a block with steps long
-    /// enough for exec.
+    /// Keeps motors within the rate that so many can have together, or, in chords of arcs and in blocks short enough for parts of a
+    /// step, within five eighths of that: exec has much more to do there than in a long line. Keeps a block with steps long enough for
+    /// exec.
     #[inline(never)]
-    pub(super) fn limit_steps(&mut self, rates: &[f32; MOTORS]) {
+    pub(super) fn limit_steps(&mut self, rates: &[f32; MOTORS], chord: bool) {
         // Exec waits for more of it.
         if self.most < 1 << (PARTS_LOG2 - 1) {
             return;
         }
-        let rate = rates[usize::from(self.moving) - 1];
+        let mut rate = rates[usize::from(self.moving) - 1];
         let rough = |x| Short::new(x).rough().0;
         let (top, length) = (rough(self.top), rough(self.length));
         // An octave: plainly below the limit, whatever the logarithms' error.
         let octaves = if self.whole_steps { 0 } else { i16::from(PARTS_LOG2) };
-        if top + Log::of(self.most).0 + (1 - octaves) * short::OCTAVE > rough(rate) + length {
+        let short = chord || !self.whole_steps;
+        // Five eighths are 0.68 octaves.
+        let spare = if short { 7 * short::OCTAVE / 4 } else { short::OCTAVE };
+        let most = Log::of(self.most).0 - octaves * short::OCTAVE;
+        if top + most + spare > rough(rate) + length {
+            if short {
+                rate *= SHORT_SHARE;
+            }
             let most = scaled(f32::from(self.most), -octaves as i8);
             let way = rate * self.length;
             if below(way, self.top * most) {

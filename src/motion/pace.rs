@@ -21,9 +21,11 @@ impl Drivers {
     /// What the settings have by default, and what the interrupt's times are measured with.
     pub const USUAL: Self = Self { pulse_us: 2, setup_us: 1 };
 
-    /// By how much ticks are longer than usual.
+    /// By how much ticks are longer than usual: by what the interrupt waits, and half of it, so that as large a part of the time
+    /// is left to the others.
     const fn extra(self) -> u16 {
-        self.pulse_us.saturating_sub(Self::USUAL.pulse_us) as u16 * CYCLES_PER_US
+        let waits = self.pulse_us.saturating_sub(Self::USUAL.pulse_us) as u16 * CYCLES_PER_US;
+        waits + waits / 2
     }
 
     /// How long a direction stands before the first step.
@@ -85,8 +87,8 @@ pub const fn paces(drivers: Drivers) -> [Pace; MOTORS] {
         let usual = usual(m);
         paces[m] = Pace {
             shortest: usual.shortest + extra,
-            fine: per(usual.fine + extra),
-            coarse: per(usual.coarse + extra),
+            fine: per(usual.fine + extra + extra / 2),
+            coarse: per(usual.coarse + 2 * extra),
             settles: usual.settles + extra,
         };
         m += 1;
@@ -108,11 +110,11 @@ mod tests {
             Drivers { pulse_us, ..Drivers::USUAL }.step_rate_max(motors).round() as u32
         };
         assert_eq!([1, 2].map(|us| rate(us, 1)), [100_000; 2]);
-        // 160 cycles and 8 us of 16.
-        assert_eq!((rate(10, 1), rate(10, 4)), (55_556, 35_794));
+        // 160 cycles and half more than 8 us of 16.
+        assert_eq!((rate(10, 1), rate(10, 4)), (45_455, 31_311));
         let [usual, wide] = [2, 10].map(|pulse_us| paces(Drivers { pulse_us, setup_us: 1 }));
         for (usual, wide) in usual.iter().zip(&wide) {
-            assert_eq!(wide.shortest, usual.shortest + 128);
+            assert_eq!(wide.shortest, usual.shortest + 192);
             assert!(wide.fine < usual.fine && wide.coarse < usual.coarse);
         }
     }

@@ -344,7 +344,7 @@ impl Prep {
     pub fn segment(&mut self, left: u32, cycles: u32, out: &mut Segment) -> bool {
         let travel = self.left.saturating_sub(left);
         let cycles = self.with_kept(cycles);
-        let limit = self.limit(cycles, self.pace());
+        let limit = self.most_ticks(cycles, travel);
         let (mut ticks, mut shift) = coarsen(travel, limit);
         // From where a tick is a step; of fine ticks, from the middle between two, where the interrupt has time for a segment.
         let middle = if shift < STEP_LOG2 - 1 { STEP / 2 } else { 0 };
@@ -394,16 +394,16 @@ impl Prep {
     pub fn whole(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
         let most = self.most;
+        let limit = self.limit(cycles, COARSEST);
         // What has been kept may be long.
         if exact || most == 0 || !self.parts || cycles >> 24 != 0 {
-            return self.last_of(cycles, COARSEST, exact, out);
+            return self.last_of(cycles, limit, exact, out);
         }
         if most < HALF.into() {
             // Nothing moves yet: the next block goes all the way.
             self.left = 0;
-            return self.last_of(cycles, COARSEST, exact, out);
+            return self.last_of(cycles, limit, exact, out);
         }
-        let limit = self.limit(cycles, COARSEST);
         // Ticks of a part, finer or coarser; and so many times the period.
         let (mut ticks, mut step, mut time) = (most, PART, cycles);
         if ticks > limit {
@@ -423,7 +423,7 @@ impl Prep {
             }
         }
         if ticks > TICKS_MAX {
-            return self.last_of(cycles, COARSEST, exact, out);
+            return self.last_of(cycles, limit, exact, out);
         }
         let shortest = self.paces().shortest;
         let long = (time >> 16) as u16 >= most;
@@ -482,17 +482,18 @@ impl Prep {
     /// number of ticks. False, and no segment, when nothing is left; the time is kept then.
     pub fn last(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
-        self.last_of(cycles, self.pace(), exact, out)
+        let limit = self.most_ticks(cycles, self.left);
+        self.last_of(cycles, limit, exact, out)
     }
 
     #[inline(never)]
-    fn last_of(&mut self, cycles: u32, pace: u16, exact: bool, out: &mut Segment) -> bool {
+    fn last_of(&mut self, cycles: u32, limit: u16, exact: bool, out: &mut Segment) -> bool {
         let left = self.left;
         if left == 0 {
             self.time = cycles.min(KEPT_MAX) as i32;
             return false;
         }
-        let (mut ticks, mut shift) = coarsen(left, self.limit(cycles, pace));
+        let (mut ticks, mut shift) = coarsen(left, limit);
         if exact && left < STEP.into() {
             let fits = left.trailing_zeros() as u8;
             if fits > shift {
@@ -518,12 +519,21 @@ impl Prep {
         &self.paces[usize::from(self.others)]
     }
 
-    fn pace(&self) -> u16 {
-        let pace = self.paces();
-        if self.fine { pace.fine } else { pace.coarse }
+    /// Most ticks for a stretch of `travel`: fine ones, if they are to be, where no more than every fourth tick is a step. The
+    /// interrupt takes longer for a tick with a step, and would leave too little to exec.
+    #[inline(never)]
+    fn most_ticks(&self, cycles: u32, travel: u32) -> u16 {
+        if self.fine {
+            let fine = self.limit(cycles, self.paces().fine);
+            if travel >> (STEP_LOG2 - 2) <= fine.into() {
+                return fine;
+            }
+        }
+        self.limit(cycles, self.paces().coarse)
     }
 
     /// Most ticks for a stretch.
+    #[inline(always)]
     fn limit(&self, cycles: u32, pace: u16) -> u16 {
         if self.minor == 0 {
             return LOCKSTEP_TICKS;
@@ -749,6 +759,7 @@ fn bit(n: u8) -> u16 {
 }
 
 /// Ticks of a travel, no more than `limit` if steps allow, and the shift between the two. Cost: 100.
+#[inline(never)]
 fn coarsen(travel: u32, limit: u16) -> (u32, u8) {
     let (mut ticks, mut shift) = (travel, 0);
     if ticks >> 8 > limit.into() {
