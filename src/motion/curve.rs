@@ -51,6 +51,8 @@ pub struct Curve {
     velocity: f32,
     /// Highest acceleration along the path where there is no jerk limit; 0 for what axes allow.
     accel: Short,
+    /// A chord of it has been made: the next one follows without a corner.
+    pub(super) goes_on: bool,
 }
 
 impl Curve {
@@ -75,7 +77,7 @@ impl Curve {
         }
         let (accel, jerk) = (slowest.least.get(), slowest.jerk.get());
         let radius = greater(radius, RADIUS_LEAST);
-        let mut curve = Self { velocity: f32::MAX, accel: Short::ZERO };
+        let mut curve = Self { velocity: f32::MAX, accel: Short::ZERO, goes_on: false };
         let mut longest = f32::MAX;
         if some(jerk) {
             curve.velocity = cube_root(jerk * radius * radius);
@@ -96,6 +98,13 @@ impl Curve {
         // The radius of curvature of a helix is that of its arc times the square of the slope.
         curve.velocity *= slope;
         (curve, longest)
+    }
+}
+
+impl Curve {
+    /// A chord has been made.
+    pub fn go_on(&mut self) {
+        self.goes_on = true;
     }
 }
 

@@ -20,6 +20,7 @@ use super::float::{least, some};
 use super::junction::{self, Heading};
 use super::limits::LastFeed;
 use super::path::{Path, Way};
+use super::short::Short;
 use super::steps::Motor;
 use crate::boards::MOTORS;
 use crate::config::StepRatio;
@@ -111,10 +112,13 @@ impl Builder {
             None if some(self.top) => self.bend.line(&self.heading, &mut path, dynamics),
             None => self.bend = Bend::default(),
         }
-        path.limit_steps(&dynamics.rates);
+        path.limit_steps(&dynamics.rates, line.curve.is_some());
         path.heading.deviation = junction::deviation(&path.heading.unit, dynamics);
         let mut entry = least(path.top, self.top);
-        if some(entry) {
+        // The chords of an arc have its limits, and under a jerk limit no corners between them.
+        let goes_on =
+            path.jerk != Short::ZERO && matches!(line.curve, Some(curve) if curve.goes_on);
+        if some(entry) && !goes_on {
             entry = junction::limit(&self.heading, &path.heading, dynamics.junction, entry);
         }
         self.heading = path.heading;

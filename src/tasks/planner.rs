@@ -266,6 +266,9 @@ impl Planner {
             Built::Nothing => None,
             Built::Parts(parts) => Some(parts),
             Built::Line(entry) => {
+                if let Some(arc) = &mut self.walk {
+                    arc.curve.go_on();
+                }
                 self.queue.push_line(&mut block, entry, self.line);
                 None
             }
