@@ -84,7 +84,7 @@ pub fn catch_up(segments: &Producer<Segment, SEGMENTS>) {
     }
 }
 
-/// Another segment has been pushed. Exec only.
+/// Another segment is pushed. Exec only, before it does: behind that the generator may take it at once.
 #[inline(never)]
 #[small]
 pub fn pushed(segment: &Segment) {

@@ -64,8 +64,8 @@ pub fn log(x: f32) -> i32 {
 /// A factor of two.
 pub const OCTAVE: i32 = 1 << 23;
 
-/// A number rounded down; one of 2^31 or more, or below 0, is 2^31. Cost: 110, where `as` takes 260.
-#[inline]
+/// A number rounded down; one of 2^31 or more, or below 0, is 2^31. Cost: 120, where `as` takes 260.
+#[inline(never)]
 pub fn whole(x: f32) -> u32 {
     const END: f32 = 2_147_483_648.0;
     if !below(x, END) {

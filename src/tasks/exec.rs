@@ -2,7 +2,7 @@
 //!
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
 //! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
-//! milliseconds ([`Amount::least`]), 4,000 to 14,000 cycles each, 33,000 where much changes at once; the rest one by one, when one is used up or thread mode
+//! milliseconds ([`Amount::least`]), 4,000 to 14,000 cycles each, 27,000 where much changes at once; the rest one by one, when one is used up or thread mode
 //! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`WAITING_SHORT`]), stretches become twice
 //! as long, and for a while more waits ([`PRESSED`]).
 
@@ -39,17 +39,12 @@ pub fn run(
         loop {
             exec::wait(|| runner.is_due().then_some(())).await;
             match runner.turn() {
-                Next::Turn => {}
-                Next::Idle => {
-                    exec::pend_when_idle();
-                    exec_asked_again().await;
-                }
-                Next::Block => {
-                    links::hungry(true);
-                    exec_asked_again().await;
-                    links::hungry(false);
-                }
+                Next::Turn => continue,
+                Next::Idle => exec::pend_when_idle(),
+                Next::Block => links::hungry(true),
             }
+            exec_asked_again().await;
+            links::hungry(false);
         }
     }
 }
@@ -166,6 +161,9 @@ impl<'a> Runner<'a> {
         if step == Step::Segment {
             power::segment(slot.moving);
             self.waiting.push(product(slot.ticks, slot.period));
+            if contact::is_noted() {
+                contact::pushed(&slot);
+            }
             slot.publish();
         }
         step
@@ -196,11 +194,6 @@ impl<'a> Runner<'a> {
         waiting.update(segments.used());
         let short = waiting.is_short(*rests);
         self.machine.set_coarse(event::pass_over() > PATIENCE || waiting.is_busy(), short);
-        if contact::is_noted()
-            && let Some(segment) = segments.pushed(0)
-        {
-            contact::pushed(segment);
-        }
         if !rested {
             health::look_for_starvation();
         }
@@ -253,9 +246,10 @@ struct Amount {
     least: u16,
 }
 
-/// With the segment that runs, which takes 2 ms or less while anything is fast, a feedhold begins within 10 ms. Three segments of 2 ms must
-/// fit: where a ramp is laid out while ticks take two thirds of the CPU, exec takes up to 4.1 ms for a segment.
-const USUAL: Amount = Amount { most: units(62), least: units(38) };
+/// With the segment that runs, which takes 2 ms or less while anything is fast, a feedhold begins within 10 ms where segments take
+/// 2 ms, three of which wait, and within 11.5 ms where they are longer or shorter. Less would not outlast a ramp that is laid out while
+/// ticks take two thirds of the CPU, which takes up to 4.1 ms, or an override.
+const USUAL: Amount = Amount { most: units(70), least: units(38) };
 
 /// For a while after too little has been waiting: a feedhold begins within 14 ms.
 const PRESSED: Amount = Amount { most: units(80), least: units(65) };
