@@ -115,9 +115,9 @@ fn one_step_every_ten_seconds_with_coarse_steps() {
 
 #[test]
 fn one_step_every_ten_seconds_with_fine_steps() {
-    // 1280 steps/mm, so that 3.125 um are four steps.
-    let (mut machine, mut host) = machine(&MEGA2560_GRBL, &[]);
-    carry_out(&mut machine, &mut host, "g1 x0.003125 f0.0046875", 4);
+    // A thousand steps a millimetre.
+    let (mut machine, mut host) = machine(&MEGA2560_GRBL, &["{1:{tr:1.6}}"]);
+    carry_out(&mut machine, &mut host, "g1 x0.004 f0.006", 4);
     ten_seconds_each(&machine);
 }
 

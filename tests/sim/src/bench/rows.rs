@@ -131,7 +131,7 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: ["3.18", "-", "7.97"],
         target: Some(1.6),
-        floor: Some(1.8),
+        floor: Some(1.81),
         measure: spirals::tenth,
     },
     Row {
@@ -278,7 +278,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(24_000.0),
         // A scan that tries three velocities, and a ramp that is laid out.
-        floor: Some(36_000.0),
+        floor: Some(28_500.0),
         measure: costs::segment_jerk_worst,
     },
     Row {
