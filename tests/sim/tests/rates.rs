@@ -2,8 +2,9 @@
 
 mod common;
 
-use common::{booted, set};
+use common::{booted, firmware, set};
 use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14};
+use kerf_sim::job::{self, Options};
 use kerf_sim::{Host, Machine};
 
 /// Cycles in a second.
@@ -145,4 +146,34 @@ fn reversals_of_all_motors_never_miss_a_tick() {
     assert_eq!(machine.missed_tops(), 0);
     let steps: Vec<i64> = machine.recorder().motors().iter().map(|m| m.position).collect();
     assert_eq!(steps, [0, 128, 13, 1]);
+}
+
+/// Limits of X and Y that are met at high step rates: mm/s^2, and millions of mm/min^3.
+fn limits(accel: f64, jerk: f64) -> Vec<String> {
+    let axis = |axis| format!("{{{axis}:{{vm:30000,fr:30000,ac:{accel},jm:{jerk}}}}}");
+    vec![axis("x"), axis("y"), "{ja:3600000}".into()]
+}
+
+/// The step interrupt takes most of the CPU here, and a ramp has to be laid out, or chord after chord to be begun, in what is left.
+#[test]
+fn nothing_is_late_at_high_step_rates() {
+    let wide = || [limits(500.0, 2_000.0), vec!["{spw:10}".into()]].concat();
+    let rotary = |jerk: f64| {
+        let axis = |axis| format!("{{{axis}:{{vm:30000,fr:30000,ac:500,jm:{jerk}}}}}");
+        vec!["{4:{tr:20}}".into(), "{a:{am:1}}".into(), axis("a"), axis("x")]
+    };
+    for (job, settings) in [
+        ("G3 X0 Y0 I-20 J0 F4200", limits(500.0, 2_000.0)),
+        ("G3 X0 Y0 I-30 J0 F3900", limits(1_000.0, 5_000.0)),
+        ("G3 X0 Y0 I-20 J0 F2400", wide()),
+        ("G1 X60 Y60 F4800\nX0 Y30", wide()),
+        ("G1 X1 A1800 F6000", rotary(1e6)),
+        ("G1 X10 A3600 F600", rotary(5_000.0)),
+    ] {
+        let mut machine = firmware(&MEGA2560_GRBL);
+        let options = Options { settings, ..Options::default() };
+        let lines = job::lines_of(job);
+        let report = job::run(&mut machine, &lines, &options, |_| {}).unwrap();
+        assert!(report.ok, "{job}: {}", report.problems.join("; "));
+    }
 }
