@@ -278,7 +278,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(24_000.0),
         // A scan that tries three velocities, and a ramp that is laid out.
-        floor: Some(28_500.0),
+        floor: Some(30_500.0),
         measure: costs::segment_jerk_worst,
     },
     Row {
