@@ -2,7 +2,7 @@
 //!
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
 //! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
-//! milliseconds ([`Amount::least`]), 4,000 to 14,000 cycles each, 27,000 where much changes at once; the rest one by one, when one is used up or thread mode
+//! milliseconds ([`Amount::least`]), 4,000 to 14,000 cycles each, 30,000 where much changes at once; the rest one by one, when one is used up or thread mode
 //! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`WAITING_SHORT`]), stretches become twice
 //! as long, and for a while more waits ([`PRESSED`]).
 
