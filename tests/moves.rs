@@ -12,6 +12,7 @@ mod rig;
 
 use jobs::{Job, Move, plan};
 use kerf::motion::block::{Action, Block};
+use kerf::motion::factors::Factors;
 use optimum::rest_to_rest;
 use rig::{Config, Rig, at};
 
@@ -235,10 +236,7 @@ fn slow_lines_behind_fast_ones_keep_their_feed() {
             for _ in 0..19 {
                 line(&mut rig, 0.1, 1.0);
             }
-            rig.want(kerf::motion::factors::Factors {
-                feed: 0.999,
-                ..kerf::motion::factors::Factors::ONE
-            });
+            rig.want(Factors { feed: 0.999, ..Factors::ONE });
             rig.replan();
         }
         rig.finish();

@@ -151,17 +151,18 @@ fn lines(axes: usize) -> Worst {
     worst
 }
 
+/// The ends of so many chords of a circle that begins at the origin; each turns by so much, rad.
+fn circle(radius: f64, turn: f64, chords: u32) -> Vec<PerAxis<Length>> {
+    let angles = (1..=chords).map(|n| turn * f64::from(n));
+    angles.map(|angle| at([radius * angle.sin(), radius * (1.0 - angle.cos())])).collect()
+}
+
 /// The chords of circles.
 fn circles() -> Worst {
     let mut worst = Worst::default();
     for (radius, turn) in [(0.5, 0.3), (3.0, 0.1), (20.0, 0.03)] {
         for velocity in [5.0, 50.0, 200.0] {
-            let place = |n: u16| {
-                let angle = turn * f64::from(n);
-                at([radius * angle.sin(), radius * (1.0 - angle.cos())])
-            };
-            let points: Vec<_> = (1..=400).map(place).collect();
-            worst.add(off(&points, velocity, 5_000.0, 0.0));
+            worst.add(off(&circle(radius, turn, 400), velocity, 5_000.0, 0.0));
         }
     }
     worst
@@ -268,10 +269,7 @@ fn a_steady_feed_is_steady_in_all_directions() {
         for (radius, turn, velocity) in
             [(18.0, 0.02, 39.0), (18.0, 0.1, 39.0), (3.0, 0.1, 30.0), (6.0, 0.05, 38.0)]
         {
-            let count = (4.0 * std::f64::consts::TAU / turn) as u32;
-            let angle = |n: u32| turn * f64::from(n);
-            let place = |n| at([radius * angle(n).sin(), radius * (1.0 - angle(n).cos())]);
-            let points: Vec<_> = (1..=count).map(place).collect();
+            let points = circle(radius, turn, (4.0 * std::f64::consts::TAU / turn) as u32);
             check_velocity(&config, &points, velocity);
         }
         for axes in [2, 3] {

@@ -99,9 +99,7 @@ impl Curve {
         curve.velocity *= slope;
         (curve, longest)
     }
-}
 
-impl Curve {
     /// A chord has been made.
     pub fn go_on(&mut self) {
         self.goes_on = true;

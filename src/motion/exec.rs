@@ -39,8 +39,8 @@ const CYCLES_PER_MS: u16 = (crate::boards::ACTIVE.clock_hz / 1000) as u16;
 /// Nominal time of a segment: as short as leaves two thirds of the CPU to others.
 pub const SEGMENT_S: f32 = 0.002;
 
-/// The same in CPU cycles.
-const SEGMENT_CYCLES: u32 = crate::boards::ACTIVE.clock_hz / 500;
+/// CPU cycles in [`SEGMENT_S`].
+const SEGMENT_CYCLES: u32 = (crate::boards::ACTIVE.clock_hz as f32 * SEGMENT_S) as u32;
 
 /// Shortest block with steps, s: twice what exec takes for it while the step interrupt is busy.
 pub const BLOCK_S_MIN: f32 = 0.000_75;
@@ -185,8 +185,8 @@ impl Exec {
         self.run(blocks, out, segment)
     }
 
-    /// Makes stretches twice as long, or not: their mathematics take half as much of the CPU then. In a `hurry` they are,
-    /// and nothing is looked at that may wait.
+    /// Makes stretches twice as long, or not: their mathematics take half as much of the CPU then. In a `hurry` they are twice as
+    /// long too, and the governor looks at nothing that may wait.
     #[inline(always)]
     pub fn set_coarse(&mut self, coarse: bool, hurry: bool) {
         self.coarse = coarse || hurry;

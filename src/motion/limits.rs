@@ -155,10 +155,9 @@ impl Path {
         let mut rate = rates[usize::from(self.moving) - 1];
         let rough = |x| Short::new(x).rough().0;
         let (top, length) = (rough(self.top), rough(self.length));
-        // An octave: plainly below the limit, whatever the logarithms' error.
         let octaves = if self.whole_steps { 0 } else { i16::from(PARTS_LOG2) };
         let short = chord || !self.whole_steps;
-        // Five eighths are 0.68 octaves.
+        // Logarithms tell whether a block is plainly below the limit: an octave covers their error. Five eighths are 0.68 octaves.
         let spare = if short { 7 * short::OCTAVE / 4 } else { short::OCTAVE };
         let most = Log::of(self.most).0 - octaves * short::OCTAVE;
         if top + most + spare > rough(rate) + length {

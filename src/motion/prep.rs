@@ -78,7 +78,7 @@ const LOCKSTEP_TICKS: u16 = 16;
 /// A motor that moves but does not step on every tick of the dominant one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Minor {
-    /// Its way in the block, in units of that.
+    /// Its way in the block, in parts of a step or in whole steps.
     way: u16,
     /// Travel in a tick, rounded down, and what that leaves, in 1 / most.
     increment: u16,
@@ -96,9 +96,9 @@ pub struct Prep {
     left: u32,
     /// Time that has not been used, CPU cycles.
     time: i32,
-    /// Way of the dominant motor, in units of the block.
+    /// Way of the dominant motor, in parts of a step or in whole steps.
     most: u16,
-    /// These are [`PART`]s, not steps.
+    /// The ways of this block are in parts of a step ([`PART`]).
     parts: bool,
     /// The shift for which increments have been computed; none yet if above [`STEP_LOG2`].
     shift: u8,
@@ -119,8 +119,8 @@ pub struct Prep {
     own: i16,
     /// How far the dominant motor is past half a step, in its direction, at the block's end: 1/16 step, modulo 16.
     past: u8,
-    /// Phase units that a motor is short of what blocks, that being run as well, have told it to go, counted forwards; modulo 2^16,
-    /// which at a block's end is all of it.
+    /// Phase units, positive forwards: how far blocks have told a motor to go, the running one included, less how far segments
+    /// have. Modulo 2^16; at the end of a block it is less than that.
     debt: [i16; MOTORS],
     /// How far the end of the block is beyond half a step before the whole step that it is rounded to, in 1/16 step.
     fraction: [u8; MOTORS],
@@ -223,7 +223,7 @@ impl Prep {
         }
     }
 
-    /// The same for a way in whole steps.
+    /// Starts a block whose ways are in whole steps. Else as [`Prep::begin`].
     #[inline(never)]
     #[small]
     fn begin_far(
@@ -704,13 +704,13 @@ impl Minor {
     }
 }
 
-/// What is `way` of `step` in `most`, and what that leaves.
+/// `way * step / most`, rounded down, and the remainder.
 #[inline(never)]
 fn share(way: u16, step: u16, most: u16) -> (u16, u16) {
     quotient_remainder(product(way, step), most)
 }
 
-/// The same, rounded to the nearest.
+/// `way * step / most`, rounded to the nearest.
 #[inline(never)]
 fn even(way: u16, step: u16, most: u16) -> u16 {
     quotient(product(way, step) + u32::from(most / 2), most)

@@ -41,10 +41,10 @@ pub fn run(
             match runner.turn() {
                 Next::Turn => continue,
                 Next::Idle => exec::pend_when_idle(),
-                Next::Block => links::hungry(true),
+                Next::Block => links::wait_for_block(true),
             }
             exec_asked_again().await;
-            links::hungry(false);
+            links::wait_for_block(false);
         }
     }
 }
@@ -63,9 +63,9 @@ enum Next {
 struct Runner<'a> {
     waiting: Waiting,
     finished: Finished,
-    /// The machine stands still, and no segment leads out of that.
+    /// The machine stands still at the end of what has been queued.
     rests: bool,
-    /// It waits until thread mode is idle, or has been.
+    /// It is to be told whether thread mode has been idle since the last segment.
     asked: bool,
     segments: Producer<Segment, SEGMENTS>,
     blocks: BlockSource,
@@ -169,7 +169,7 @@ impl<'a> Runner<'a> {
         step
     }
 
-    /// The machine stands still in a hold, which may be the end of what is queued.
+    /// The machine stands still in a hold. Drops what is queued if that is wanted.
     #[inline(never)]
     #[small]
     fn held(&mut self, out: &mut Snapshot) {

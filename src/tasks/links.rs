@@ -228,17 +228,17 @@ pub fn snapshot() -> Snapshot {
 }
 
 machine_static! {
-    fn hunger() -> SharedByte = SharedByte::new(1);
+    fn waits() -> SharedByte = SharedByte::new(1);
 }
 
 /// Exec waits for a block, or no more. Exec only.
-pub fn hungry(waits: bool) {
-    hunger().set(waits.into());
+pub fn wait_for_block(yes: bool) {
+    waits().set(yes.into());
 }
 
 /// A block has been queued: exec is pended if it waits for one. Else it looks when a segment has been used up.
 pub fn feed() {
-    if hunger().get() != 0 {
+    if waits().get() != 0 {
         crate::hal::imp::exec::pend();
     }
 }

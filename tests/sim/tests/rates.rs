@@ -148,10 +148,14 @@ fn reversals_of_all_motors_never_miss_a_tick() {
     assert_eq!(steps, [0, 128, 13, 1]);
 }
 
-/// Limits of X and Y that are met at high step rates: mm/s^2, and millions of mm/min^3.
+/// Limits of an axis that goes fast: mm/s^2, and millions of mm/min^3.
+fn limit(axis: &str, accel: f64, jerk: f64) -> String {
+    format!("{{{axis}:{{vm:30000,fr:30000,ac:{accel},jm:{jerk}}}}}")
+}
+
+/// X and Y with such limits, and corners that are none.
 fn limits(accel: f64, jerk: f64) -> Vec<String> {
-    let axis = |axis| format!("{{{axis}:{{vm:30000,fr:30000,ac:{accel},jm:{jerk}}}}}");
-    vec![axis("x"), axis("y"), "{ja:3600000}".into()]
+    vec![limit("x", accel, jerk), limit("y", accel, jerk), "{ja:3600000}".into()]
 }
 
 /// The step interrupt takes most of the CPU here, and a ramp has to be laid out, or chord after chord to be begun, in what is left.
@@ -159,7 +163,7 @@ fn limits(accel: f64, jerk: f64) -> Vec<String> {
 fn nothing_is_late_at_high_step_rates() {
     let wide = || [limits(500.0, 2_000.0), vec!["{spw:10}".into()]].concat();
     let rotary = |jerk: f64| {
-        let axis = |axis| format!("{{{axis}:{{vm:30000,fr:30000,ac:500,jm:{jerk}}}}}");
+        let axis = |axis| limit(axis, 500.0, jerk);
         vec!["{4:{tr:20}}".into(), "{a:{am:1}}".into(), axis("a"), axis("x")]
     };
     for (job, settings) in [
