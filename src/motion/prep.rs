@@ -351,14 +351,15 @@ impl Prep {
         // No tick is longer than a step.
         let at = (self.left as u16)
             .wrapping_sub((u16::from(self.past) << PART_LOG2).wrapping_add(middle));
-        let mut rest = bit(shift) - 1;
-        if at & rest != 0 {
+        let mut step = bit(shift);
+        if at & (step - 1) != 0 {
             let fits = self.fitting(shift, at.trailing_zeros() as u8, cycles, travel);
             if fits != shift {
                 (ticks, shift) = (travel >> fits, fits);
-                rest = bit(shift) - 1;
+                step = bit(shift);
             }
         }
+        let rest = step - 1;
         let grain = grain(ticks, shift);
         let short = (travel as u16).wrapping_sub(at & !rest) & (bit(grain) - 1);
         if travel <= short.into() {
@@ -374,7 +375,7 @@ impl Prep {
         if period > PERIOD_MAX {
             return self.idle(cycles, out);
         }
-        self.emit(ticks, shift, period as u16, cycles, out);
+        self.emit(ticks, shift, step, period as u16, cycles, out);
         true
     }
 
@@ -447,7 +448,7 @@ impl Prep {
         out: &mut Segment,
         minor: impl Fn(&mut Self, usize) -> u16,
     ) {
-        let used = u32::from(out.ticks) * u32::from(out.period);
+        let used = product(out.ticks, out.period);
         // Time that cannot be caught up is let go, or the machine would race to do so. A tick may be half ahead.
         let ahead = -1000 - i32::from(out.period / 2);
         self.time = (cycles as i32 - used as i32).max(ahead);
@@ -502,16 +503,16 @@ impl Prep {
             }
         }
         let period = self.period(cycles, left, shift).min(PERIOD_MAX);
+        let tick = bit(shift);
         if ticks > u32::from(TICKS_MAX) {
             // Too much for one segment: a part of it, and the rest when asked again.
             ticks = TICKS_MAX.into();
         } else if !exact {
             // The nearest; what is over is never above half a tick then.
-            let tick = bit(shift);
             ticks += u32::from(left as u16 & (tick - 1) > tick / 2);
             self.left = product(ticks as u16, tick);
         }
-        self.emit(ticks as u16, shift, period as u16, cycles, out);
+        self.emit(ticks as u16, shift, tick, period as u16, cycles, out);
         true
     }
 
@@ -630,13 +631,20 @@ impl Prep {
         *out = Segment { ticks, period, backwards: self.backwards, ..Segment::default() };
     }
 
-    /// A segment of `ticks` in each of which the dominant motor travels `1 << shift`.
+    /// A segment of `ticks` in each of which the dominant motor travels a `step` of `1 << shift`.
     #[inline(never)]
-    fn emit(&mut self, ticks: u16, shift: u8, period: u16, cycles: u32, out: &mut Segment) {
+    fn emit(
+        &mut self,
+        ticks: u16,
+        shift: u8,
+        step: u16,
+        period: u16,
+        cycles: u32,
+        out: &mut Segment,
+    ) {
         if shift != self.shift {
-            self.scale(shift);
+            self.scale(shift, step);
         }
-        let step = bit(shift);
         self.left -= product(ticks, step);
         out.ticks = ticks;
         out.period = period;
@@ -660,9 +668,9 @@ impl Prep {
 
     /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.
     #[inline(never)]
-    fn scale(&mut self, shift: u8) {
+    fn scale(&mut self, shift: u8, step: u16) {
         let first = core::mem::replace(&mut self.shift, shift) == u8::MAX && self.parts;
-        let (step, most, others) = (bit(shift), self.most, self.minor);
+        let (most, others) = (self.most, self.minor);
         each_motor!(M => if others & 1 << M != 0 {
             let minor = &mut self.minors[M];
             (minor.increment, minor.remainder) = share(minor.way, step, most);
@@ -683,9 +691,9 @@ impl Default for Prep {
 impl Minor {
     /// The increment for the next `ticks`, and what it owes then.
     fn advance(&mut self, ticks: u16, most: u16) -> u16 {
-        let unit = u32::from(ticks) * u32::from(most);
+        let unit = product(ticks, most);
         let half = (unit / 2) as i32;
-        let mut owed = self.owed + (u32::from(ticks) * u32::from(self.remainder)) as i32;
+        let mut owed = self.owed + product(ticks, self.remainder) as i32;
         let mut increment = self.increment;
         if owed > half {
             let more = if owed - (unit as i32) <= half { 1 } else { rounded(owed as u32, unit) };
@@ -765,11 +773,19 @@ fn coarsen(travel: u32, limit: u16) -> (u32, u8) {
     if ticks >> 8 > limit.into() {
         (ticks, shift) = (ticks >> 8, 8);
     }
-    while ticks > limit.into() && shift < STEP_LOG2 {
+    while ticks > 0xFFFF && shift < STEP_LOG2 {
         ticks >>= 1;
         shift += 1;
     }
-    (ticks, shift)
+    if ticks > 0xFFFF {
+        return (ticks, shift);
+    }
+    let mut few = ticks as u16;
+    while few > limit && shift < STEP_LOG2 {
+        few >>= 1;
+        shift += 1;
+    }
+    (few.into(), shift)
 }
 
 /// The exponent of what a stretch's end is aligned to: a tick, up to an eighth of the stretch, up to a

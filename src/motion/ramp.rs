@@ -56,17 +56,17 @@ impl Ramp {
     fn at(&self, time: f32) -> (f32, f32) {
         const THIRD: f32 = 1.0 / 3.0;
         let w = self.velocity;
-        if !less(self.rise, time) {
+        if !below(self.rise, time) {
             let gain = self.half * time * time;
             return (w + gain, time * (w + gain * THIRD));
         }
         if !below(self.hold, time) {
             // As if it had decelerated so from half of the rise on.
-            let accel = 2.0 * self.half * self.rise;
-            let since = time - 0.5 * self.rise;
+            let accel = scaled(self.half * self.rise, 1);
+            let since = time - scaled(self.rise, -1);
             let gain = accel * since;
             let more = accel * self.rise * self.rise * (1.0 / 24.0);
-            return (w + gain, w * time + 0.5 * gain * since + more);
+            return (w + gain, w * time + scaled(gain, -1) * since + more);
         }
         let fall = self.fall();
         if !below(fall, time) {
@@ -122,7 +122,7 @@ impl Ramp {
 /// The share of the acceleration limit that a change of velocity by `drop` reaches.
 fn share_of(drop: f32, kappa: f32) -> f32 {
     let twice = scaled(kappa, 1);
-    if less(drop, twice) { sqrt(drop / twice) } else { 1.0 }
+    if below(drop, twice) { sqrt(drop / twice) } else { 1.0 }
 }
 
 impl Governor {
@@ -228,7 +228,7 @@ impl Governor {
         let Some(ramp) = &mut self.ramp else { return };
         let next = ramp.time - seconds;
         let (time, distance);
-        if less(next, 0.4 * seconds) {
+        if below(scaled(next, 1), seconds) {
             (time, distance) = (ramp.time, ramp.distance);
             (self.velocity, self.alpha) = (ramp.velocity, 0.0);
             self.ramp = None;
@@ -237,8 +237,8 @@ impl Governor {
             let (velocity, left) = ramp.at(next);
             (time, distance) = (seconds, ramp.distance - left);
             (ramp.time, ramp.distance) = (next, left);
-            self.velocity = greater(velocity, 0.0);
+            self.velocity = if velocity.is_sign_negative() { 0.0 } else { velocity };
         }
-        self.add(time, distance);
+        self.add(time, distance, self.potential(distance));
     }
 }

@@ -27,7 +27,7 @@
 
 use super::constraint::{Ahead, Ask, Clear, needed};
 use super::exec::SEGMENT_S;
-use super::float::{below, greater, less, lesser, scaled, some};
+use super::float::{below, greater, least, less, lesser, scaled, some};
 use super::governor::{Governor, same};
 use super::ramp::Phase;
 use super::slice::Span;
@@ -51,8 +51,31 @@ struct Next {
     alpha: f32,
     distance: f32,
     top: f32,
-    /// Distance to the top, brake potential.
+    /// The distance, and that to the top, brake potential.
+    far: f32,
     at: f32,
+}
+
+/// Whether an acceleration can end at the feed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Arrives {
+    /// It ends so.
+    Safely,
+    /// That is not safe.
+    Unsafe,
+    /// It would take a second look in this stretch to know.
+    Unknown,
+}
+
+/// A slice at a steady velocity.
+#[derive(Clone, Copy)]
+struct Steady {
+    distance: f32,
+    /// The distance, brake potential.
+    at: f32,
+    /// It is known that the velocity may be kept for the slice and as long again. If it is not, it is the first thing to find out:
+    /// whatever is faster is safe for a shorter time.
+    known: bool,
 }
 
 impl Governor {
@@ -88,10 +111,11 @@ impl Governor {
         if below(span.cruise, velocity) {
             return self.slow_down(span, ahead);
         }
-        let steady = !some(self.alpha) && some(velocity);
-        if steady && (self.hurry || !self.knows(span) || self.waits() || self.is_calm(span.cruise))
-        {
-            return self.keep(span, ahead);
+        if !some(self.alpha) && some(velocity) {
+            let steady = self.steady_slice(span);
+            if self.hurry || !steady.known || self.waits() || self.is_calm(span.cruise) {
+                return self.keep(&steady, span, ahead);
+            }
         }
         self.climb(span, ahead)
     }
@@ -115,36 +139,36 @@ impl Governor {
         waits
     }
 
-    /// Whether it is known that a steady velocity may be kept for the slice and as long again. If it is not, it is the first thing to find out: whatever is
-    /// faster is safe for a shorter time.
-    fn knows(&self, span: &Span) -> bool {
-        self.is_clear(self.velocity, scaled(self.potential(self.velocity * span.seconds), 1))
+    /// A slice at the velocity that there is. Cost: 300.
+    #[inline(never)]
+    fn steady_slice(&self, span: &Span) -> Steady {
+        let velocity = self.velocity;
+        let distance = velocity * span.seconds;
+        let at = self.potential(distance);
+        Steady { distance, at, known: self.is_clear(velocity, scaled(at, 1)) }
     }
 
     /// A slice at a steady velocity.
     #[inline(never)]
-    fn keep(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
+    fn keep(&mut self, steady: &Steady, span: &Span, ahead: &impl Ahead) -> bool {
         let velocity = self.velocity;
-        let distance = velocity * span.seconds;
-        let at = self.potential(distance);
-        let clear = self.is_clear(velocity, at);
+        let may_wait =
+            steady.known || (self.hurry || self.scanned) && self.is_clear(velocity, steady.at);
         // What the slice before has found out holds still: to look again and to lay a ramp out is too much for one slice.
-        let is_new = self.clear.age <= 1 && !less(self.clear.top, velocity);
-        let may_wait = clear && (self.hurry || self.scanned || self.knows(span));
-        if !is_new && !may_wait {
+        if !may_wait && (self.clear.age > 1 || below(self.clear.top, velocity)) {
             if self.scanned {
                 return false;
             }
             self.look_about(velocity, 0.0, velocity, span, ahead);
         }
-        self.keep_or_slow(span, distance, at);
+        self.keep_or_slow(steady, span);
         true
     }
 
     /// After a scan for the steady velocity: goes on, or slows down where it has to.
-    fn keep_or_slow(&mut self, span: &Span, distance: f32, at: f32) {
-        if self.is_clear(self.velocity, at) {
-            self.add(span.seconds, distance);
+    fn keep_or_slow(&mut self, steady: &Steady, span: &Span) {
+        if self.is_clear(self.velocity, steady.at) {
+            self.add(span.seconds, steady.distance, steady.at);
         } else {
             self.slow_for_clear(0.0);
             self.follow(span.seconds);
@@ -178,7 +202,8 @@ impl Governor {
     #[inline(never)]
     fn place_top(&self, next: &mut Next, seconds: f32) {
         next.distance = scaled(seconds, -1) * (self.velocity + next.velocity);
-        next.at = self.potential(next.distance) + self.rising(next.alpha, next.velocity, next.top);
+        next.far = self.potential(next.distance);
+        next.at = next.far + self.rising(next.alpha, next.velocity, next.top);
     }
 
     /// Distance in which an acceleration ends, or a deceleration, then less than 0; brake potential.
@@ -192,7 +217,7 @@ impl Governor {
     fn climb(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let (alpha, seconds) = (self.alpha, span.seconds);
         let mut next = Next::default();
-        self.next(lesser(alpha + self.limits.pace * seconds, 1.0), seconds, &mut next);
+        self.next(least(alpha + self.limits.pace * seconds, 1.0), seconds, &mut next);
         if below(span.cruise, next.top) {
             if !some(alpha) {
                 // So near that the acceleration need not build up.
@@ -200,7 +225,14 @@ impl Governor {
             } else {
                 self.next(alpha, seconds, &mut next);
                 if below(span.cruise, next.top) {
-                    return self.arrive(span, ahead);
+                    if self.is_lowered(span.cruise) {
+                        return self.slow_down(span, ahead);
+                    }
+                    let arrives = self.arrive(span, ahead);
+                    if arrives == Arrives::Unsafe {
+                        self.end_climb(span, ahead);
+                    }
+                    return arrives != Arrives::Unknown;
                 }
             }
         }
@@ -218,7 +250,7 @@ impl Governor {
             }
         }
         (self.velocity, self.alpha) = (next.velocity, next.alpha);
-        self.add(seconds, next.distance);
+        self.add(seconds, next.distance, next.far);
         true
     }
 
@@ -293,8 +325,9 @@ impl Governor {
         }
         let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
         let at = self.rising(self.alpha, self.velocity, top);
-        let steady = !some(self.alpha) && some(self.velocity);
-        if self.clear.top.is_sign_negative() || steady && !self.knows(span) {
+        let steady = self.steady_slice(span);
+        let is_steady = !some(self.alpha) && some(self.velocity);
+        if self.clear.top.is_sign_negative() || is_steady && !steady.known {
             self.look_about(top, at, top, span, ahead);
         }
         self.clear.narrow(top);
@@ -305,15 +338,14 @@ impl Governor {
         }
         if some(self.alpha) {
             // What is known is enough to get to the top. There it is seen what comes then.
-            if less(self.clear.distance, at) {
+            if below(self.clear.distance, at) {
                 self.slow_for_clear(at);
             } else {
                 self.level_off(top);
             }
             self.follow(span.seconds);
         } else if some(self.velocity) {
-            let distance = self.velocity * span.seconds;
-            self.keep_or_slow(span, distance, self.potential(distance));
+            self.keep_or_slow(&steady, span);
         } else {
             self.creep(span);
         }
@@ -323,33 +355,33 @@ impl Governor {
     /// velocity that is kept is better than one that goes up and down by little.
     fn tries_less(&self) -> bool {
         let gain = self.limits.accel * SEGMENT_S * f32::from(self.margin + 1);
-        !some(self.alpha) && self.closing && less(self.velocity, scaled(gain, 3))
+        !some(self.alpha) && self.closing && below(self.velocity, scaled(gain, 3))
+    }
+
+    /// Whether an override has lowered the feed: the acceleration cannot end at it any more.
+    fn is_lowered(&self, cruise: f32) -> bool {
+        let climb = self.limits.kappa * self.alpha * self.alpha;
+        below(cruise - self.velocity, 0.98 * climb)
     }
 
     /// The acceleration ends at the feed, if that is safe.
     #[inline(never)]
-    fn arrive(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
+    fn arrive(&mut self, span: &Span, ahead: &impl Ahead) -> Arrives {
         let cruise = span.cruise;
-        let climb = self.limits.kappa * self.alpha * self.alpha;
-        if less(cruise - self.velocity, 0.98 * climb) {
-            // An override has lowered the feed.
-            return self.slow_down(span, ahead);
-        }
         let distance = self.level_off(cruise);
         let at = self.potential(distance);
         if !self.is_clear(cruise, at) {
             if self.scanned {
                 self.ramp = None;
-                return false;
+                return Arrives::Unknown;
             }
             if !self.ask(cruise, at, span, ahead) {
                 self.ramp = None;
-                self.end_climb(span, ahead);
-                return true;
+                return Arrives::Unsafe;
             }
         }
         self.follow(span.seconds);
-        true
+        Arrives::Safely
     }
 
     /// It is faster than the feed, or will be.
@@ -357,9 +389,9 @@ impl Governor {
     fn slow_down(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let (cruise, seconds) = (span.cruise, span.seconds);
         let near = self.limits.jerk * seconds * seconds;
-        if !some(self.alpha) && !less(near, self.velocity - cruise) {
+        if !some(self.alpha) && !below(near, self.velocity - cruise) {
             self.velocity = cruise;
-            return self.keep(span, ahead);
+            return self.keep(&self.steady_slice(span), span, ahead);
         }
         if self.scanned {
             return false;
@@ -377,7 +409,7 @@ impl Governor {
         let at = self.rising(self.alpha, self.velocity, top) + needed(top, low, self.limits.kappa);
         self.look_about(low, at, top, span, ahead);
         self.changed = false;
-        if !less(self.clear.distance, at) {
+        if !below(self.clear.distance, at) {
             self.lay(low, 0.0, true);
         } else {
             self.lay(0.0, 0.0, false);
@@ -439,7 +471,7 @@ impl Governor {
     #[inline(never)]
     fn bottom(&self) -> f32 {
         let bottom = self.velocity - self.limits.kappa * self.alpha * self.alpha;
-        if less(0.2 * SEGMENT_S * SEGMENT_S * self.limits.jerk, bottom) { bottom } else { 0.0 }
+        if below(0.2 * SEGMENT_S * SEGMENT_S * self.limits.jerk, bottom) { bottom } else { 0.0 }
     }
 
     /// Ends the deceleration, at the velocity `bottom`, if that is safe.
@@ -464,7 +496,7 @@ impl Governor {
         let left = greater(span.left, 0.0);
         // Four jerk phases: left = J T^3 / 32.
         let seconds = greater(rough_cube_root(32.0 * left / self.limits.jerk), span.seconds);
-        self.add(greater(seconds, left / span.cruise), left);
+        self.add(greater(seconds, left / span.cruise), left, self.potential(left));
     }
 
     /// A feedhold begins: the ramp down to a standstill, as hard as the limits allow.

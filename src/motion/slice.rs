@@ -8,7 +8,7 @@
 //! Units: mm, s.
 
 use super::constraint::Ahead;
-use super::float::{below, greater, less, scaled, some};
+use super::float::{below, greater, less, ratio, scaled, some};
 use super::governor::{Governor, Stretch, same};
 
 /// A part of a slice that has been worked out and not been handed out.
@@ -62,10 +62,12 @@ impl Governor {
             self.leave_ramp();
         }
         (self.scanned, self.far) = (false, false);
+        let mut span = Span { left, cruise, seconds: nominal };
         for _ in 0..2 {
-            let Some(seconds) = self.wanted(left, nominal) else { break };
-            let span = Span { left: left - self.rest.distance, cruise, seconds };
-            if !self.slice(&span, ahead) || self.scanned || same(seconds, nominal) {
+            if !self.wanted(left, nominal, &mut span) || !self.slice(&span, ahead) {
+                break;
+            }
+            if self.scanned || same(span.seconds, nominal) {
                 break;
             }
         }
@@ -73,8 +75,8 @@ impl Governor {
     }
 
     /// A stretch at the feed, if the machine has it and it is known that it may keep it. Not cut from a slice: it takes all of the
-    /// block if that is short. Cost: 900, 1,400 at the end of a block.
-    #[inline(never)]
+    /// block if that is short. Cost: 700, 1,200 at the end of a block.
+    #[inline(always)]
     fn steady(&mut self, left: f32, cruise: f32, nominal: f32) -> Option<Stretch> {
         let velocity = self.velocity;
         let free = self.ramp.is_none() && !some(self.alpha) && !some(self.rest.seconds);
@@ -89,10 +91,10 @@ impl Governor {
         if !self.is_clear(velocity, scaled(at, 1)) {
             return None;
         }
-        self.far = !less(self.clear.distance, scaled(at, FAR_LOG2));
+        self.far = !below(self.clear.distance, scaled(at, FAR_LOG2));
         self.clear.distance -= at;
         self.clear.age += 1;
-        let seconds = if ends { left / velocity } else { nominal };
+        let seconds = if ends { ratio(left, velocity) } else { nominal };
         Some(Stretch { seconds, distance, ends })
     }
 
@@ -109,8 +111,11 @@ impl Governor {
             if self.ramp.is_none() {
                 break;
             }
-            let Some(seconds) = self.wanted(left, nominal) else { break };
-            self.follow(seconds);
+            let mut span = Span { left, cruise: 0.0, seconds: nominal };
+            if !self.wanted(left, nominal, &mut span) {
+                break;
+            }
+            self.follow(span.seconds);
         }
         self.cut(left)
     }
@@ -118,34 +123,37 @@ impl Governor {
     /// Whether the block is over within the slice.
     #[inline(always)]
     fn is_within_slice(&self, left: f32) -> bool {
-        !self.rest.distance.is_sign_negative() && below(left, self.rest.distance)
+        below(left, self.rest.distance)
     }
 
-    /// How long the next slice is to be, if what there is will not do: a stretch would be too short, or leave too
-    /// little of the block. Cost: 200, 1,200 near the end of a block.
+    /// Whether there is to be another slice: a stretch would be too short, or leave too little of the block. Fills in how long
+    /// it is to be, in a `span` that says `nominal`, and how far it is to the end of the block. Cost: 200, 1,000 near the end of a block.
     #[inline(never)]
-    fn wanted(&self, left: f32, nominal: f32) -> Option<f32> {
+    fn wanted(&self, left: f32, nominal: f32, span: &mut Span) -> bool {
         let Rest { seconds, distance, .. } = self.rest;
         let velocity = self.velocity;
-        if !some(seconds) && some(velocity) && below(scaled(velocity * nominal, 1), left) {
+        let slice = velocity * nominal;
+        if !some(seconds) && some(velocity) && below(scaled(slice, 1), left) {
             // The block is long: there is no need to look closer.
-            return (!left.is_sign_negative()).then_some(nominal);
+            return true;
         }
         let more = left - distance;
-        if !less(self.little(), more) {
-            return (!less(0.0, distance)).then_some(nominal);
+        span.left = more;
+        if !below(self.little(), more) {
+            return !below(0.0, distance);
         }
-        let slice = velocity * nominal;
-        let much = !less(more, 0.5 * slice);
-        if much && !less(seconds, scaled(nominal, -1)) {
-            return None;
+        let twice = scaled(more, 1);
+        let much = !below(twice, slice);
+        if much && !below(scaled(seconds, 1), nominal) {
+            return false;
         }
-        if !much || !less(more, slice + slice) {
-            return Some(nominal);
+        if much && below(more, scaled(slice, 1)) {
+            // So that it ends about where the block does.
+            let time = ratio(more, velocity);
+            let long = !below(time, nominal + scaled(nominal, -1));
+            span.seconds = if long { scaled(time, -1) } else { time };
         }
-        // So that it ends about where the block does.
-        let time = more / velocity;
-        Some(if less(time, 1.5 * nominal) { time } else { scaled(time, -1) })
+        true
     }
 
     /// A distance that counts as none.
@@ -156,16 +164,16 @@ impl Governor {
 
     /// Whether a block without a jerk limit begins with the rest of a slice. A rest shorter than rounding is dropped.
     pub(super) fn has_rest(&mut self) -> bool {
-        if some(self.rest.seconds) && !less(self.little(), self.rest.distance) {
+        if some(self.rest.seconds) && !below(self.little(), self.rest.distance) {
             self.rest = Rest::NONE;
         }
         some(self.rest.seconds)
     }
 
-    /// A slice has been worked out.
+    /// A slice has been worked out, `distance` long, or `at` as brake potential.
     #[inline(always)]
-    pub(super) fn add(&mut self, seconds: f32, distance: f32) {
-        self.clear.distance -= self.potential(distance);
+    pub(super) fn add(&mut self, seconds: f32, distance: f32, at: f32) {
+        self.clear.distance -= at;
         self.clear.age = self.clear.age.saturating_add(1);
         if some(self.rest.seconds) {
             self.rest.seconds += seconds;
@@ -180,7 +188,7 @@ impl Governor {
     pub(super) fn cut(&mut self, left: f32) -> Stretch {
         let Rest { seconds, distance, .. } = self.rest;
         let more = left - distance;
-        if less(self.little(), more) {
+        if below(self.little(), more) {
             self.rest = Rest::NONE;
             // What has been borrowed before a stop is not given back.
             let (seconds, distance) = (greater(seconds, 1e-6), greater(distance, 0.0));
@@ -191,7 +199,7 @@ impl Governor {
             return Stretch { seconds: greater(seconds, 1e-6), distance: left, ends: true };
         }
         // A little less than nothing may be left.
-        self.rest.inverse = seconds / distance;
+        self.rest.inverse = ratio(seconds, distance);
         self.part(left)
     }
 

@@ -41,6 +41,7 @@ pub fn run(
             match runner.turn() {
                 Next::Turn => continue,
                 Next::Idle => exec::pend_when_idle(),
+                Next::Room => exec::note_idle(),
                 Next::Block => links::wait_for_block(true),
             }
             exec_asked_again().await;
@@ -55,6 +56,8 @@ enum Next {
     Turn,
     /// The next turn, if there is room: when thread mode is idle, or a segment has been used up.
     Idle,
+    /// The next turn, when a segment has been used up.
+    Room,
     /// Whatever it is pended for: a block, the steppers at a standstill, the end of a hold.
     Block,
 }
@@ -202,11 +205,7 @@ impl<'a> Runner<'a> {
             return Next::Turn;
         }
         self.asked = true;
-        if waiting.has_room(*rests) {
-            return Next::Idle;
-        }
-        exec::note_idle();
-        Next::Turn
+        if waiting.has_room(*rests) { Next::Idle } else { Next::Room }
     }
 }
 

@@ -33,12 +33,13 @@ pub(super) static CLOSED: SharedByte = SharedByte::new(1);
 /// Exec was asked for meanwhile.
 pub(super) static MISSED: SharedByte = SharedByte::new(0);
 
-/// What exec wants of the time when nobody else has anything to do: [`GO_ON`], [`TELL`], or nothing.
-static WANTED: SharedByte = SharedByte::new(0);
-/// To go on then.
+/// What exec has asked for last, for when nobody else has anything to do: a number, and whether to go on then
+/// ([`GO_ON`]). Written by exec only.
+static ASKED: SharedByte = SharedByte::new(0);
 const GO_ON: u8 = 1;
-/// To know of it.
-const TELL: u8 = 2;
+const NEXT: u8 = 2;
+/// What of that thread mode, the only writer, has seen with nothing left to do.
+static SEEN: SharedByte = SharedByte::new(0);
 
 struct Context {
     executor: Cell<Option<&'static Executor>>,
@@ -60,26 +61,27 @@ pub fn pend() {
 
 /// Asks for exec to run when thread mode has nothing left to do. Exec only.
 pub fn pend_when_idle() {
-    WANTED.set(GO_ON);
+    ASKED.set(ASKED.get().wrapping_add(NEXT) | GO_ON);
 }
 
 /// [`was_idle`] is to say whether thread mode has had nothing left to do from now on. Exec only.
 pub fn note_idle() {
-    WANTED.set(TELL);
+    ASKED.set(ASKED.get().wrapping_add(NEXT) & !GO_ON);
 }
 
 /// Whether thread mode has had nothing left to do since [`pend_when_idle`] or [`note_idle`]. Exec only.
 pub fn was_idle() -> bool {
-    WANTED.get() == 0
+    SEEN.get() == ASKED.get()
 }
 
 /// Thread mode has nothing left to do.
 #[inline(always)]
 pub(super) fn idle() {
-    let wanted = WANTED.get();
-    if wanted != 0 {
-        WANTED.set(0);
-        if wanted == GO_ON {
+    // Exec may ask for something else in between: it is seen the next time.
+    let asked = ASKED.get();
+    if SEEN.get() != asked {
+        SEEN.set(asked);
+        if asked & GO_ON != 0 {
             pend();
         }
     }
