@@ -257,9 +257,10 @@ impl Horizon {
         (self.wanted, self.planned) = (Factors::ONE, Factors::ONE);
     }
 
-    /// Drops all keys.
-    pub fn clear(&mut self) {
-        self.len = 0;
+    /// Other keys in the place of all. Cost: 1,500.
+    pub fn replace(&mut self, keys: &Keys) {
+        (self.seqs, self.entries) = (keys.seqs, keys.entries);
+        (self.front, self.len) = (keys.front, BLOCKS as u8 - keys.front);
     }
 
     /// The overrides in force: those that are wanted, as far as the keys allow.
@@ -271,6 +272,30 @@ impl Horizon {
     fn slot(&self, n: u8) -> usize {
         let slot = usize::from(self.front) + usize::from(n);
         if slot >= BLOCKS { slot - BLOCKS } else { slot }
+    }
+}
+
+/// Keys that are to be those of the horizon, made from the last one to the first.
+pub struct Keys {
+    front: u8,
+    seqs: [u8; BLOCKS],
+    entries: [Short; BLOCKS],
+}
+
+impl Keys {
+    /// None.
+    pub const fn new() -> Self {
+        Self { front: BLOCKS as u8, seqs: [0; BLOCKS], entries: [Short::ZERO; BLOCKS] }
+    }
+
+    /// Adds the key of a block that comes before all others, if there is room.
+    pub fn add_before(&mut self, seq: u8, entry: Short) {
+        let front = usize::from(self.front.wrapping_sub(1));
+        if let (Some(to), Some(velocity)) = (self.seqs.get_mut(front), self.entries.get_mut(front))
+        {
+            (*to, *velocity) = (seq, entry);
+            self.front = front as u8;
+        }
     }
 }
 

@@ -7,7 +7,7 @@
 //!
 //! Units: mm, s. Cost on AVR: 3,500 cycles to lay out, 1,000 to 1,700 a slice.
 
-use super::float::{below, greater, less, scaled};
+use super::float::{below, greater, ratio, scaled, some};
 use super::governor::{Governor, same};
 use super::rise::MARGIN_FIRST;
 use crate::math::sqrt;
@@ -26,8 +26,9 @@ pub(super) struct Ramp {
     hold: f32,
     /// How long before the end the top is reached.
     coast: f32,
-    /// Half of the jerk.
+    /// Half of the jerk, and by how much alpha changes in a second.
     half: f32,
+    pace: f32,
     /// Distance to the end where the deceleration begins.
     begin: f32,
     /// It is known what comes after it; else it ends in a standstill.
@@ -87,19 +88,19 @@ impl Ramp {
         (self.top - loss, time * (self.top - loss * (1.0 / 3.0)))
     }
 
-    /// The acceleration now.
-    #[inline(never)]
-    fn acceleration(&self) -> f32 {
+    /// For how long the acceleration of now has built up; less than 0 if it is a deceleration.
+    fn built(&self) -> f32 {
         let (time, fall) = (self.time, self.fall());
-        let jerk = self.half + self.half;
-        if time <= self.rise {
-            -jerk * time
-        } else if time <= self.hold {
-            -jerk * self.rise
-        } else if time <= fall {
-            jerk * (time - fall)
+        if !below(self.rise, time) {
+            -time
+        } else if !below(self.hold, time) {
+            -self.rise
+        } else if !below(fall, time) {
+            time - fall
+        } else if below(self.coast, time) {
+            time - self.coast
         } else {
-            jerk * greater(time - self.coast, 0.0)
+            0.0
         }
     }
 
@@ -109,14 +110,21 @@ impl Ramp {
     }
 
     pub fn phase(&self) -> Phase {
-        if self.time <= self.rise {
+        if !below(self.rise, self.time) {
             Phase::Ending
-        } else if self.time < self.fall() {
+        } else if below(self.time, self.fall()) {
             Phase::Down
         } else {
             Phase::Up
         }
     }
+}
+
+/// The end of an acceleration: how long it takes, and how far it goes.
+#[derive(Clone, Copy)]
+pub(super) struct Leveling {
+    time: f32,
+    pub distance: f32,
 }
 
 /// The share of the acceleration limit that a change of velocity by `drop` reaches.
@@ -129,10 +137,17 @@ impl Governor {
     /// Gives up the ramp: the state is that of now.
     #[inline(never)]
     pub(super) fn leave_ramp(&mut self) {
-        if let Some(ramp) = self.ramp.take() {
-            let alpha = greater(ramp.acceleration() / self.limits.accel, -1.0);
+        self.take_alpha();
+        self.ramp = None;
+    }
+
+    /// The state is that of now, if there is a ramp, which runs still.
+    #[inline(never)]
+    pub(super) fn take_alpha(&mut self) {
+        if let Some(ramp) = &self.ramp {
+            let alpha = greater(ramp.built() * ramp.pace, -1.0);
             // What rounding leaves is no acceleration that could be ended.
-            self.alpha = if less(alpha, 1e-4) && less(-1e-4, alpha) { 0.0 } else { alpha };
+            self.alpha = if below(alpha.abs(), 1e-4) { 0.0 } else { alpha };
         }
     }
 
@@ -158,28 +173,39 @@ impl Governor {
         let coast = if slack > 0.0 { fall + slack / top } else { fall };
         let begin = 0.5 * (top + w) * fall;
         let time = coast + alpha * build;
-        self.set_ramp(Ramp {
+        let ramp = Ramp {
             time,
-            distance: 0.0,
+            distance: begin + greater(slack, 0.0),
             velocity: w,
             top,
             rise,
             hold,
             coast,
             half,
+            pace: limits.pace,
             begin,
             closed,
-        });
+        };
+        let at_top = !some(alpha);
+        let ramp = self.ramp.insert(ramp);
+        if !at_top {
+            (_, ramp.distance) = ramp.at(time);
+        }
     }
 
-    /// Ends the acceleration so that the velocity comes to `top`; the distance it takes. Cost: 2,200.
+    /// How an acceleration ends so that the velocity comes to `top`. Cost: 1,100.
     #[inline(never)]
-    pub(super) fn level_off(&mut self, top: f32) -> f32 {
-        let accel = self.alpha * self.limits.accel;
+    pub(super) fn leveling(&self, top: f32) -> Leveling {
         let gain = top - self.velocity;
-        let time = 2.0 * gain / accel;
-        let half = 0.5 * accel / time;
-        let distance = time * (top - gain * (1.0 / 3.0));
+        let time = ratio(scaled(gain, 1), self.alpha * self.limits.accel);
+        Leveling { time, distance: time * (top - gain * (1.0 / 3.0)) }
+    }
+
+    /// Ends the acceleration so that the velocity comes to `top`. Cost: 700.
+    #[inline(never)]
+    pub(super) fn level_off(&mut self, top: f32, how: &Leveling) {
+        let Leveling { time, distance } = *how;
+        let pace = ratio(self.alpha, time);
         let none = 0.0;
         self.ramp = Some(Ramp {
             time,
@@ -189,11 +215,11 @@ impl Governor {
             rise: none,
             hold: none,
             coast: none,
-            half,
+            half: scaled(pace * self.limits.accel, -1),
+            pace,
             begin: none,
             closed: true,
         });
-        distance
     }
 
     /// Ends the deceleration as soon as the limits allow, at the velocity `bottom`.
@@ -201,7 +227,8 @@ impl Governor {
     pub(super) fn bottom_out(&mut self, bottom: f32) {
         let rise = -self.alpha * self.limits.build;
         let half = scaled(self.limits.jerk, -1);
-        self.set_ramp(Ramp {
+        let pace = self.limits.pace;
+        let ramp = Ramp {
             time: rise,
             distance: 0.0,
             velocity: bottom,
@@ -210,16 +237,12 @@ impl Governor {
             hold: rise,
             coast: rise,
             half,
+            pace,
             begin: 0.0,
             closed: true,
-        });
-    }
-
-    /// Not inlined: a ramp is too large to be made twice.
-    #[inline(never)]
-    fn set_ramp(&mut self, ramp: Ramp) {
-        let (_, distance) = ramp.at(ramp.time);
-        self.ramp.insert(ramp).distance = distance;
+        };
+        let ramp = self.ramp.insert(ramp);
+        (_, ramp.distance) = ramp.at(rise);
     }
 
     /// A slice of the ramp: to its end, if little more is left.

@@ -3,34 +3,19 @@
 //! Called by the planner when the factors that are wanted are not those of the keys. Blocks and their
 //! potentials stay as they are: corners are stored whatever the feeds. From the newest line to the oldest, a
 //! key is kept if it is lower than all behind it, and a limit for whoever comes from the line before, by more than a
-//! thousandth. Exec goes on by the old keys until the new ones are put in their place, all at once.
+//! thousandth. Exec goes on by the old keys until the new ones are put in their place, all at once. They are made on the stack, so
+//! that exec waits for no more than a copy.
 //!
-//! Cost on AVR: 800 cycles a line where the feed is steady, 2,000 at a corner that limits; exec waits for 60 a block and
-//! 250 a key. All that is queued: 52,000, or 127,000 if each line is a corner.
+//! Cost on AVR: 800 cycles a line where the feed is steady, 2,000 at a corner that limits; all that is queued 52,000, or 127,000 if
+//! each line is a corner. Exec waits for 2,000 of them.
 
 use super::block::{Action, Block, Body, Line};
 use super::factors::{Factors, Reserve};
 use super::float::{below, least};
-use super::horizon::{self, kappa};
-use super::queue::{BLOCKS, BlockQueue, FIRM, SEQ, WORTH};
+use super::horizon::{self, Keys, kappa};
+use super::queue::{BlockQueue, FIRM, SEQ, WORTH};
 use super::short::Short;
 use crate::hal::imp::exec;
-
-/// A bit for each block, the newest first.
-struct Marks([u8; BLOCKS.div_ceil(8)]);
-
-#[small]
-impl Marks {
-    fn set(&mut self, back: usize) {
-        if let Some(byte) = self.0.get_mut(back / 8) {
-            *byte |= 1 << (back % 8);
-        }
-    }
-
-    fn has(&self, back: usize) -> bool {
-        self.0.get(back / 8).is_some_and(|byte| byte & 1 << (back % 8) != 0)
-    }
-}
 
 /// What limits a line, of all that is behind it.
 struct Behind {
@@ -62,34 +47,40 @@ impl Behind {
         }
     }
 
-    /// Whether `this` line needs a key, that follows `before` without a stop.
+    /// The velocity of the key of `this` line, that follows `before` without a stop, and whether it is firm; none if it needs no key.
     #[inline(never)]
-    fn needs(&mut self, this: &Line, before: Option<&Line>, factors: &Factors) -> bool {
+    fn key(
+        &mut self,
+        this: &Line,
+        before: Option<&Line>,
+        factors: &Factors,
+    ) -> Option<(Short, u8)> {
         let velocity = self.known.velocity(this, factors);
         let low = least(self.low, velocity);
         let entry = least(velocity, this.entry.get());
-        let mut firm = false;
+        let mut firm = 0;
         let mut brakes = this;
         if let Some(before) = before {
-            firm = is_firm(this, before);
+            firm = if is_firm(this, before) { FIRM } else { 0 };
             let pace = self.known.velocity(before, factors);
             let most = least(low, entry);
-            if !firm && (!below(most, pace) || most >= pace * WORTH) {
+            if firm == 0 && (!below(most, pace) || most >= pace * WORTH) {
                 self.low = low;
-                return false;
+                return None;
             }
-            if firm {
+            if firm != 0 {
                 // What comes before brakes with its own limits.
                 brakes = before;
             }
         }
         self.low = f32::MAX;
-        let key = this.start + horizon::key(Short::new(entry).get(), self.known.kappa(brakes));
-        let needed = firm || key < self.key;
-        if needed {
-            self.key = key;
+        let entry = Short::new(entry);
+        let key = this.start + horizon::key(entry.get(), self.known.kappa(brakes));
+        if firm == 0 && key >= self.key {
+            return None;
         }
-        needed
+        self.key = key;
+        Some((entry, firm))
     }
 }
 
@@ -125,18 +116,18 @@ impl BlockQueue {
     #[inline(never)]
     pub fn replan(&mut self, factors: Factors) {
         self.factors = factors;
-        let mut marks = Marks([0; _]);
-        self.look_back(&mut marks);
+        let mut keys = Keys::new();
+        self.look_back(&mut keys);
         if let (Some(last), Some(line)) = (&mut self.last, line(self.ring.pushed(0))) {
             last.cruise = line.velocity(&factors);
             last.high = last.cruise;
         }
-        self.install(&marks);
+        self.install(&keys);
     }
 
-    /// Marks the lines that need a key, from the newest to the oldest.
+    /// Makes the keys, from the newest to the oldest.
     #[inline(never)]
-    fn look_back(&self, marks: &mut Marks) {
+    fn look_back(&self, keys: &mut Keys) {
         let mut behind =
             Behind { key: f32::MAX, low: f32::MAX, left_out: 0.0, known: Known::default() };
         let mut last: Option<(usize, &Line)> = None;
@@ -150,41 +141,31 @@ impl BlockQueue {
             let before = line(block);
             if let Some((back, this)) = last {
                 behind.count_from(older.of(back as u8));
-                if behind.needs(this, before, &self.factors) {
-                    marks.set(back);
+                if let Some((entry, firm)) = behind.key(this, before, &self.factors) {
+                    let seq = self.newest.wrapping_sub(back as u8) & SEQ;
+                    keys.add_before(seq | firm, entry);
                 }
             }
             last = before.map(|line| (back, line));
         }
     }
 
-    /// The line before the one that has been pushed so many before the newest, if it is in the queue still.
-    fn before(&self, back: usize) -> Option<&Line> {
-        let mut back = back + 1;
-        while is_aside(self.ring.pushed(back)) {
-            back += 1;
-        }
-        line(self.ring.pushed(back))
-    }
-
-    /// Puts the keys that are marked in the place of those that there are.
+    /// Puts the keys in the place of those that there are.
     #[inline(never)]
-    fn install(&self, marks: &Marks) {
+    fn install(&self, keys: &Keys) {
         exec::lock(|ceiling| {
             self.store.with_horizon(ceiling, |horizon| {
-                let first = horizon.nth(0);
-                horizon.clear();
-                let used = self.ring.used();
-                for back in (0..used).rev().filter(|back| marks.has(*back)) {
-                    let seq = self.newest.wrapping_sub(back as u8) & SEQ;
-                    // What has begun has no key any more.
-                    if back + 1 == used && first.is_none_or(|first| first & SEQ != seq) {
-                        continue;
+                let used = self.ring.used() as u8;
+                let oldest = self.newest.wrapping_sub(used).wrapping_add(1) & SEQ;
+                // What has begun has no key any more, nor what has been run meanwhile.
+                let begun = horizon.nth(0).is_none_or(|first| first & SEQ != oldest);
+                horizon.replace(keys);
+                while let Some(first) = horizon.nth(0) {
+                    let place = (first & SEQ).wrapping_sub(oldest) & SEQ;
+                    if place < used && !(begun && place == 0) {
+                        break;
                     }
-                    let Some(this) = line(self.ring.pushed(back)) else { continue };
-                    let firm = self.before(back).is_some_and(|before| is_firm(this, before));
-                    let entry = Short::new(this.entry(&self.factors));
-                    horizon.add(if firm { seq | FIRM } else { seq }, entry);
+                    horizon.pass();
                 }
                 horizon.planned = self.factors;
                 horizon.changed = true;

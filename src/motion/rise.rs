@@ -91,17 +91,15 @@ impl Governor {
                 && ramp.phase() != Phase::Ending
                 && !self.scanned
             {
-                self.reconsider(span, ahead);
+                return self.reconsider(span, ahead);
             }
-            if self.ramp.is_some() {
-                self.follow(span.seconds);
-                return true;
-            }
+            self.follow(span.seconds);
+            return true;
         }
         self.free(span, ahead)
     }
 
-    /// A slice without a ramp.
+    /// A slice without a ramp, or of something better than the ramp.
     #[inline(never)]
     fn free(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let velocity = self.velocity;
@@ -113,7 +111,8 @@ impl Governor {
         }
         if !some(self.alpha) && some(velocity) {
             let steady = self.steady_slice(span);
-            if self.hurry || !steady.known || self.waits() || self.is_calm(span.cruise) {
+            let keeps = self.ramp.is_some() || self.hurry || !steady.known;
+            if keeps || self.waits() || self.is_calm(span.cruise) {
                 return self.keep(&steady, span, ahead);
             }
         }
@@ -168,11 +167,14 @@ impl Governor {
     /// After a scan for the steady velocity: goes on, or slows down where it has to.
     fn keep_or_slow(&mut self, steady: &Steady, span: &Span) {
         if self.is_clear(self.velocity, steady.at) {
+            self.ramp = None;
             self.add(span.seconds, steady.distance, steady.at);
-        } else {
-            self.slow_for_clear(0.0);
-            self.follow(span.seconds);
+            return;
         }
+        if self.ramp.is_none() {
+            self.slow_for_clear(0.0);
+        }
+        self.follow(span.seconds);
     }
 
     /// Lays out the ramp for what the last scan has found; the top is `at` so far on.
@@ -230,7 +232,7 @@ impl Governor {
                     }
                     let arrives = self.arrive(span, ahead);
                     if arrives == Arrives::Unsafe {
-                        self.end_climb(span, ahead);
+                        self.go_on(span, ahead);
                     }
                     return arrives != Arrives::Unknown;
                 }
@@ -245,10 +247,11 @@ impl Governor {
             }
             let has_time = !self.hurry || !some(alpha);
             if !has_time || !self.look_ahead(&next, span, ahead) {
-                self.end_climb(span, ahead);
+                self.go_on(span, ahead);
                 return true;
             }
         }
+        self.ramp = None;
         (self.velocity, self.alpha) = (next.velocity, next.alpha);
         self.add(seconds, next.distance, next.far);
         true
@@ -316,7 +319,16 @@ impl Governor {
         }
     }
 
-    /// It goes no faster: the acceleration ends, and if it is time, a ramp goes down. `clear` is for the state, or for a faster one.
+    /// It goes no faster: a slice of the ramp that there is, or of one that there is then.
+    fn go_on(&mut self, span: &Span, ahead: &impl Ahead) {
+        if self.ramp.is_some() {
+            self.follow(span.seconds);
+        } else {
+            self.end_climb(span, ahead);
+        }
+    }
+
+    /// Without a ramp: the acceleration ends, and if it is time, a ramp goes down. `clear` is for the state, or for a faster one.
     #[inline(never)]
     fn end_climb(&mut self, span: &Span, ahead: &impl Ahead) {
         if !self.tries_less() {
@@ -341,7 +353,8 @@ impl Governor {
             if below(self.clear.distance, at) {
                 self.slow_for_clear(at);
             } else {
-                self.level_off(top);
+                let how = self.leveling(top);
+                self.level_off(top, &how);
             }
             self.follow(span.seconds);
         } else if some(self.velocity) {
@@ -368,18 +381,17 @@ impl Governor {
     #[inline(never)]
     fn arrive(&mut self, span: &Span, ahead: &impl Ahead) -> Arrives {
         let cruise = span.cruise;
-        let distance = self.level_off(cruise);
-        let at = self.potential(distance);
+        let how = self.leveling(cruise);
+        let at = self.potential(how.distance);
         if !self.is_clear(cruise, at) {
             if self.scanned {
-                self.ramp = None;
                 return Arrives::Unknown;
             }
             if !self.ask(cruise, at, span, ahead) {
-                self.ramp = None;
                 return Arrives::Unsafe;
             }
         }
+        self.level_off(cruise, &how);
         self.follow(span.seconds);
         Arrives::Safely
     }
@@ -389,6 +401,7 @@ impl Governor {
     fn slow_down(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let (cruise, seconds) = (span.cruise, span.seconds);
         let near = self.limits.jerk * seconds * seconds;
+        self.ramp = None;
         if !some(self.alpha) && !below(near, self.velocity - cruise) {
             self.velocity = cruise;
             return self.keep(&self.steady_slice(span), span, ahead);
@@ -447,24 +460,25 @@ impl Governor {
         self.lay(if fits { target } else { 0.0 }, 0.0, closed && fits);
     }
 
-    /// Something ahead has changed: gives the ramp up if there is something better.
+    /// Something ahead has changed: a slice of the ramp, or of something better.
     #[inline(never)]
-    fn reconsider(&mut self, span: &Span, ahead: &impl Ahead) {
+    fn reconsider(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         self.changed = false;
-        let ramp = self.ramp;
-        if ramp.as_ref().is_some_and(|ramp| ramp.ends_at(span.cruise)) {
-            return;
+        if self.ramp.as_ref().is_some_and(|ramp| !ramp.ends_at(span.cruise)) {
+            self.take_alpha();
+            if !self.alpha.is_sign_negative() || !some(self.alpha) {
+                // It has not begun to slow down.
+                (self.alpha, self.wait) = (greater(self.alpha, 0.0), 0);
+                return self.free(span, ahead);
+            }
+            let bottom = self.bottom();
+            if !below(span.cruise, bottom) {
+                // The ramp stays, if that is not safe.
+                self.try_bottom(bottom, span, ahead);
+            }
         }
-        self.leave_ramp();
-        if !self.alpha.is_sign_negative() || !some(self.alpha) {
-            // It has not begun to slow down.
-            (self.alpha, self.wait) = (greater(self.alpha, 0.0), 0);
-            return;
-        }
-        let bottom = self.bottom();
-        if bottom > span.cruise || !self.try_bottom(bottom, span, ahead) {
-            self.ramp = ramp;
-        }
+        self.follow(span.seconds);
+        true
     }
 
     /// The velocity at which the deceleration is ended, if that begins now; none if it is hardly any.
