@@ -1,13 +1,13 @@
 //! The jobs, by number: those of TinyG's kinds that a machine can run.
 
 use super::Piece;
+use crate::plain;
 use crate::progmem;
-use crate::text;
 
 macro_rules! pieces {
     ($name:ident, $count:literal: $($times:literal x $text:literal)+) => {
         progmem! {
-            static $name: [Piece; $count] = [$(Piece { text: text!($text), times: $times }),+];
+            static $name: [Piece; $count] = [$(Piece { text: plain!($text), times: $times }),+];
         }
     };
 }

@@ -8,8 +8,8 @@ use super::request::{Context, Request};
 use super::token::{Target, resolve};
 use super::write::{Out, Writer};
 use crate::config::Name;
+use crate::plain;
 use crate::status::Status;
-use crate::text;
 
 /// Whether an object of this name changes the report, where that of the other (`sr`) is a new one.
 #[small]
@@ -27,7 +27,7 @@ impl Request {
         };
         self.at = pair.next;
         let name = Name::beginning(pair.name.of(c.line));
-        if !self.selected && pair.kind == Kind::Object && name.is(text!("set")) {
+        if !self.selected && pair.kind == Kind::Object && name.is(plain!("set")) {
             let mut writer = Writer::body(c.out, &mut self.format);
             writer.key(name.bytes());
             writer.open();
@@ -60,8 +60,8 @@ impl Request {
 /// `clear` and `defa`.
 #[small]
 fn reset(name: &Name, pair: &Pair, machine: &mut impl Machine) -> Result<(), Status> {
-    let clears = name.is(text!("clear"));
-    if !(clears || name.is(text!("defa"))) {
+    let clears = name.is(plain!("clear"));
+    if !(clears || name.is(plain!("defa"))) {
         return Err(Status::UnrecognizedName);
     }
     match pair.kind {
