@@ -52,6 +52,13 @@ fn load<T: Copy>(from: *const T) -> T {
     let mut value = MaybeUninit::<T>::uninit();
     let mut to = value.as_mut_ptr().cast::<u8>();
     let mut from = from.cast::<u8>();
+    if core::mem::size_of::<T>() > WORD {
+        // SAFETY: as below.
+        unsafe {
+            copy(from, to, core::mem::size_of::<T>() as u8);
+            return value.assume_init();
+        }
+    }
     for _ in 0..core::mem::size_of::<T>() {
         // SAFETY: `from` walks a static in program memory (the contract of `Progmem::new`), `to`
         // walks `value`; both are `size_of::<T>()` bytes long.
@@ -66,6 +73,10 @@ fn load<T: Copy>(from: *const T) -> T {
     // SAFETY: every byte was copied from a valid `T`.
     unsafe { value.assume_init() }
 }
+
+/// Values up to this size, in bytes, are read byte by byte into registers; larger ones by a loop in half the code.
+#[cfg(target_arch = "avr")]
+const WORD: usize = 4;
 
 #[cfg(not(target_arch = "avr"))]
 fn load<T: Copy>(from: *const T) -> T {
