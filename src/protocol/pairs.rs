@@ -123,6 +123,7 @@ impl Request {
     }
 
     /// One member of the group, in its order.
+    #[inline(never)]
     pub(super) fn list<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let member =
             self.group.and_then(|group| Some((group, group.member(self.item, c.machine)?)));
