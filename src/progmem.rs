@@ -45,6 +45,26 @@ impl<T: Copy, const N: usize> Progmem<[T; N]> {
         // The pointer arithmetic stays inside the array, and nothing is read but through `load`.
         (index < N).then(|| load((&raw const self.0).cast::<T>().wrapping_add(index)))
     }
+
+    /// All of it, whatever its length.
+    pub const fn slice(&self) -> Slice<T> {
+        Slice { start: (&raw const self.0).cast(), len: N }
+    }
+}
+
+/// An array in program memory, of any length.
+#[derive(Clone, Copy)]
+pub struct Slice<T> {
+    start: *const T,
+    len: usize,
+}
+
+impl<T: Copy> Slice<T> {
+    /// A copy of element `index`, or `None` beyond the end.
+    pub fn at(self, index: usize) -> Option<T> {
+        // As in an array of known length.
+        (index < self.len).then(|| load(self.start.wrapping_add(index)))
+    }
 }
 
 #[cfg(target_arch = "avr")]
