@@ -1,9 +1,10 @@
 //! Text in program memory, packed.
 //!
-//! A byte beyond ASCII is a code for one of [`PARTS`], each of which is two bytes or codes: `missing` is a single byte. That
-//! makes texts for people 40 % shorter. They are packed when the image is built, and unpacked byte by byte as they are
-//! written. It is byte pair encoding: [`PARTS`] was found by adding, again and again, the pair that occurred most often in all texts. Any
-//! other table works, and new texts need no new one.
+//! This is byte pair encoding. A byte beyond ASCII is a code for one of [`PARTS`], and each part is two bytes or codes. The word
+//! `missing` takes one byte. Texts for people become 40 % shorter. The compiler packs them; [`Text::bytes`] unpacks them byte by byte.
+//!
+//! [`PARTS`] was found by adding, again and again, the pair that occurred most often in all texts of the image. The table may
+//! change freely, and new texts need no change to it. Texts that are written with every line are [`Plain`].
 
 use heapless::Vec;
 
@@ -14,12 +15,12 @@ use crate::progmem;
 const FIRST: u8 = 128;
 /// Number of codes.
 const CODES: usize = 128;
-/// How often a part may be made of another one, that of another, and so on.
+/// The deepest nesting of parts in parts.
 const DEPTH: usize = 4;
 /// The longest text, in bytes.
 const LONGEST: usize = 255;
 
-/// What codes stand for. Each becomes two codes or bytes with the parts before it.
+/// What codes stand for, in order. Packed with the parts before it, a part is two bytes or codes.
 #[rustfmt::skip]
 const PARTS: [&str; CODES] = [
     "in", "e ", "  ", "er", "s ", "or", "d ", "st", "ing", "t ", "on", "an", "de", "is ", "at", "al", "se",
@@ -99,7 +100,7 @@ impl Text {
     }
 
     /// Whether there is none.
-    pub const fn is_empty(&self) -> bool {
+    pub const fn is_empty(self) -> bool {
         self.0.is_empty()
     }
 
