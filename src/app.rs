@@ -120,20 +120,9 @@ fn place(ports: [Port; PORTS]) -> &'static Links {
 #[inline(never)]
 #[small]
 pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
-    let AllEnds { usb: (received, outgoing), aux } = uart::start(rate)?;
     let segments = stepper::start()?;
     let (queue, source) = queue::store().split()?;
-    let mut ports = Vec::<Port, PORTS>::new();
-    ports.push(Port::new(USB, line_bytes!(LINES_USB), Tx::new(outgoing, USB, rate))).ok()?;
-    let aux = match (aux, hardware(AUX)) {
-        (Some((received, outgoing)), Some(board)) => {
-            let tx = Tx::new(outgoing, AUX, board.rate);
-            ports.push(Port::new(AUX, line_bytes!(LINES_AUX), tx)).ok()?;
-            Some(received)
-        }
-        _ => None,
-    };
-    let links = place(ports.into_array().ok()?);
+    let (links, received, aux) = connect(rate)?;
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
     if !links.settings.borrow().starts_in_json() {
         links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
@@ -153,6 +142,24 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     main.spawn(control_task(links).ok()?);
     main.spawn(storage_task(links).ok()?);
     Some(())
+}
+
+/// Starts the ports and makes the links. Not inlined, as [`place`].
+#[inline(never)]
+#[small]
+fn connect(rate: u32) -> Option<(&'static Links, Received<RX_RING>, Option<Received<AUX_RING>>)> {
+    let AllEnds { usb: (received, outgoing), aux } = uart::start(rate)?;
+    let mut ports = Vec::<Port, PORTS>::new();
+    ports.push(Port::new(USB, line_bytes!(LINES_USB), Tx::new(outgoing, USB, rate))).ok()?;
+    let aux = match (aux, hardware(AUX)) {
+        (Some((received, outgoing)), Some(board)) => {
+            let tx = Tx::new(outgoing, AUX, board.rate);
+            ports.push(Port::new(AUX, line_bytes!(LINES_AUX), tx)).ok()?;
+            Some(received)
+        }
+        _ => None,
+    };
+    Some((place(ports.into_array().ok()?), received, aux))
 }
 
 /// The defaults, and over them what was put away before the reset. Says also what has come of it.

@@ -28,8 +28,17 @@ impl Modes {
     /// From the mode of each motor: 0 never, 1 always, 2 in a cycle, 3 while it moves.
     #[small]
     pub fn new(mode: impl Fn(usize) -> u8) -> Self {
-        let are = |wanted| (0..MOTORS).fold(0, |bits, m| bits | u8::from(mode(m) == wanted) << m);
-        Self { always: are(1), in_cycle: are(2), moving: are(3) }
+        let mut modes = Self::default();
+        for motor in 0..MOTORS {
+            let bit = 1 << motor;
+            match mode(motor) {
+                1 => modes.always |= bit,
+                2 => modes.in_cycle |= bit,
+                3 => modes.moving |= bit,
+                _ => {}
+            }
+        }
+        modes
     }
 
     fn any(&self) -> u8 {
@@ -96,6 +105,7 @@ impl Motors {
 
     /// In a feedhold, before [`Motors::pass`]: timeouts stand still for so many milliseconds, which have passed since
     /// the last look.
+    #[inline(never)]
     #[small]
     pub fn stand_still(&mut self, ms: u32) {
         for last in &mut self.last {
@@ -105,6 +115,7 @@ impl Motors {
 
     /// Time passes: it is `now`; `running` says that the machine moves or dwells. Takes power from
     /// motors that have not been used for `timeout`. Whether any lost it.
+    #[inline(never)]
     #[small]
     pub fn pass(&mut self, now: u32, running: bool, timeout: u32) -> bool {
         if !running {

@@ -9,6 +9,9 @@ const OPTIMIZE_SIZE: &str = "#[cfg_attr(target_arch = \"avr\", optimize(size))]"
 ///
 /// The image is built for speed, which unrolls every loop over axes and digits. That is worth its flash where each
 /// block or each segment goes, and nowhere else.
+///
+/// A closure in the function is still built for speed, and so is what is inlined into it: a function with a loop that a closure
+/// calls wants `#[inline(never)]` as well, and a loop over motors or axes is better a `for` than a `fold`.
 #[proc_macro_attribute]
 pub fn small(_: TokenStream, item: TokenStream) -> TokenStream {
     let first = item.clone().into_iter().find(|token| is(token, "fn") || is(token, "impl"));

@@ -1,6 +1,6 @@
 //! Names of settings and values: at most five bytes, lower case, as senders write them.
 
-use crate::progmem::Text;
+use crate::progmem::Plain;
 
 /// The longest name, in bytes.
 pub const LONGEST: usize = 5;
@@ -49,7 +49,7 @@ impl Name {
     }
 
     /// Whether it is `text`.
-    pub fn is(&self, text: Text) -> bool {
+    pub fn is(&self, text: Plain) -> bool {
         text.bytes().eq(self.bytes().iter().copied())
     }
 

@@ -113,20 +113,19 @@ impl Owner {
 
     /// Row `row` of its table, if it has that.
     fn load(self, row: u8) -> Option<Row> {
-        let row = usize::from(row);
-        let row = match self {
-            Owner::System => SYSTEM.at(row),
-            Owner::Motor(motor) if usize::from(motor) < MOTORS => MOTOR.at(row),
-            Owner::Axis(axis) if usize::from(axis) < AXES => AXIS.at(row),
-            Owner::Pwm => PWM.at(row),
-            Owner::Spindle => SPINDLE.at(row),
-            Owner::Coolant => COOLANT.at(row),
-            Owner::Squaring => SQUARING.at(row),
-            Owner::User(group) if group < USERS => USER.at(row),
-            Owner::Job => JOB.at(row),
-            _ => None,
+        let rows = match self {
+            Owner::System => SYSTEM.slice(),
+            Owner::Motor(motor) if usize::from(motor) < MOTORS => MOTOR.slice(),
+            Owner::Axis(axis) if usize::from(axis) < AXES => AXIS.slice(),
+            Owner::Pwm => PWM.slice(),
+            Owner::Spindle => SPINDLE.slice(),
+            Owner::Coolant => COOLANT.slice(),
+            Owner::Squaring => SQUARING.slice(),
+            Owner::User(group) if group < USERS => USER.slice(),
+            Owner::Job => JOB.slice(),
+            _ => return None,
         };
-        row.filter(|row| self.has(row))
+        rows.at(row.into()).filter(|row| self.has(row))
     }
 }
 

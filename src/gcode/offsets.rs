@@ -70,7 +70,7 @@ impl State {
             None => {}
             Some(ToolLength::Off) => self.tool_length = [Length::ZERO; units::AXES],
             Some(ToolLength::Words) => {
-                self.each_word(block, setup, |state, axis, value| {
+                self.each_word(block, setup, &mut |state, axis, value| {
                     put(&mut state.tool_length, axis, value.units);
                     Ok(())
                 })?;
@@ -145,7 +145,7 @@ impl State {
             self.shift = [Length::ZERO; units::AXES];
         }
         self.shifted = true;
-        self.each_word(block, setup, |state, axis, value| {
+        self.each_word(block, setup, &mut |state, axis, value| {
             let others = at(&system, axis).checked_add(at(&state.tool_length, axis));
             let shift = state.offset_here(axis, others, value.units)?;
             put(&mut state.shift, axis, shift);
@@ -162,7 +162,7 @@ impl State {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        self.each_word(block, setup, |state, axis, value| {
+        self.each_word(block, setup, &mut |state, axis, value| {
             put(&mut state.position, axis, value.units);
             put(&mut state.residue, axis, value.rest);
             state.homed |= 1 << axis;
@@ -232,7 +232,7 @@ impl State {
         edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
         let mut system = self.system(number, tables);
-        self.each_word(block, setup, |state, axis, value| {
+        self.each_word(block, setup, &mut |state, axis, value| {
             let origin = if here {
                 let shift = if state.shifted { at(&state.shift, axis) } else { Length::ZERO };
                 let others = shift.checked_add(at(&state.tool_length, axis));
@@ -262,7 +262,7 @@ impl State {
         edit: &mut Option<Edit>,
     ) -> Result<(), Status> {
         let mut lengths = tables.row(row);
-        self.each_word(block, setup, |state, axis, value| {
+        self.each_word(block, setup, &mut |state, axis, value| {
             if !TOOL_AXES.contains(&axis) {
                 return Err(Status::AxisInvalid);
             }
@@ -281,6 +281,7 @@ impl State {
 
     /// The offset that, beside the `others` along an axis, makes the position be called `value`. No `others` are
     /// a sum beyond the range.
+    #[inline(never)]
     fn offset_here(
         &self,
         axis: u8,
@@ -292,11 +293,12 @@ impl State {
     }
 
     /// Does something for each axis word, but those of disabled axes.
+    #[inline(never)]
     fn each_word(
         &mut self,
         block: &Block,
         setup: &impl Setup,
-        mut each: impl FnMut(&mut Self, u8, axes::Value) -> Result<(), Status>,
+        each: &mut dyn FnMut(&mut Self, u8, axes::Value) -> Result<(), Status>,
     ) -> Result<(), Status> {
         for (axis, word) in block.axes() {
             if let Some(value) = axes::value(word, axis, self.modal.units, setup)? {

@@ -90,11 +90,18 @@ fn wait_in<R>(slot: u8, mut ready: impl FnMut() -> Option<R>) -> impl Future<Out
         if let Some(value) = ready() {
             return Poll::Ready(value);
         }
-        if let Some(slot) = waiters().0.get(usize::from(slot)) {
-            slot.set(Some(cx.waker().clone()));
-        }
+        register(slot, cx.waker());
         Poll::Pending
     })
+}
+
+/// Has the main loop wake this task after the event of a slot. By itself, for each of those who wait would have it.
+#[inline(never)]
+#[small]
+fn register(slot: u8, waker: &Waker) {
+    if let Some(slot) = waiters().0.get(usize::from(slot)) {
+        slot.set(Some(waker.clone()));
+    }
 }
 
 /// Waits for the next `event` after the last poll of the task. Thread mode only.

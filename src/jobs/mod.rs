@@ -9,7 +9,7 @@ mod texts;
 
 use heapless::Vec;
 
-use crate::progmem::Text;
+use crate::progmem::Plain;
 use crate::store::{Memory, program};
 
 /// The longest line of a job, in bytes.
@@ -22,7 +22,7 @@ pub const STORED: u8 = 100;
 #[derive(Clone, Copy)]
 pub struct Piece {
     /// Lines, parted by line feeds.
-    text: Text,
+    text: Plain,
     /// How many times they are carried out.
     times: u8,
 }
@@ -65,7 +65,7 @@ impl Job {
         loop {
             let Some(piece) = texts::piece(self.number, self.piece) else { return false };
             line.clear();
-            while let Some(byte) = piece.text.at(self.at.into()) {
+            while let Some(byte) = piece.text.at(self.at) {
                 self.at += 1;
                 if byte == b'\n' {
                     return true;

@@ -8,8 +8,8 @@ use super::request::{Context, Request};
 use super::token::{Target, resolve};
 use super::write::{Out, Writer};
 use crate::config::Name;
+use crate::plain;
 use crate::status::Status;
-use crate::text;
 
 /// Whether an object of this name changes the report, where that of the other (`sr`) is a new one.
 #[small]
@@ -20,6 +20,7 @@ pub(super) fn is_amended(name: &[u8]) -> bool {
 #[small]
 impl Request {
     /// One pair. `selected` is set in the inner object.
+    #[inline(never)]
     pub(super) fn amend<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let Some(pair) = json::pair(c.line, self.at) else {
             self.at = json::behind_object(c.line, self.at);
@@ -27,7 +28,7 @@ impl Request {
         };
         self.at = pair.next;
         let name = Name::beginning(pair.name.of(c.line));
-        if !self.selected && pair.kind == Kind::Object && name.is(text!("set")) {
+        if !self.selected && pair.kind == Kind::Object && name.is(plain!("set")) {
             let mut writer = Writer::body(c.out, &mut self.format);
             writer.key(name.bytes());
             writer.open();
@@ -60,8 +61,8 @@ impl Request {
 /// `clear` and `defa`.
 #[small]
 fn reset(name: &Name, pair: &Pair, machine: &mut impl Machine) -> Result<(), Status> {
-    let clears = name.is(text!("clear"));
-    if !(clears || name.is(text!("defa"))) {
+    let clears = name.is(plain!("clear"));
+    if !(clears || name.is(plain!("defa"))) {
         return Err(Status::UnrecognizedName);
     }
     match pair.kind {

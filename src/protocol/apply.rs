@@ -58,6 +58,7 @@ impl Request {
         }
     }
 
+    #[inline(never)]
     fn set<M: Machine, O: Out>(
         &mut self,
         setting: Setting,

@@ -9,7 +9,7 @@ use super::wrapped::pass_on;
 use super::write::{Ending, Out, Writer};
 use crate::config::{Fixed, Settings};
 use crate::status::Status;
-use crate::text;
+use crate::{plain, text};
 
 /// Verbosities from which the parts show.
 const FRAMES: u8 = 1;
@@ -32,10 +32,10 @@ pub fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out) {
         return put_other(settings, ending, out);
     }
     let strict = settings.json_strict();
-    out.put_text(if strict { text!("{\"r\":{},\"f\":[1,0,") } else { text!("{r:{},f:[1,0,") });
+    out.put_plain(if strict { plain!("{\"r\":{},\"f\":[1,0,") } else { plain!("{r:{},f:[1,0,") });
     // There are fewer than ten.
     out.put(b'0' + ending.free % 10);
-    out.put_text(text!("]}\n"));
+    out.put_plain(plain!("]}\n"));
 }
 
 /// The same in another dialect.

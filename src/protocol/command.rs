@@ -13,6 +13,7 @@ use crate::status::Status;
 #[small]
 impl Request {
     /// Shows, sets or does what the line says; `at` is behind its `$`.
+    #[inline(never)]
     pub(super) fn command<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let pair = split(c.line, self.at);
         let name = Name::beginning(pair.name.of(c.line));

@@ -101,7 +101,7 @@ impl Request {
     pub(super) fn help_line<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         if let Some(line) = SCREENS.at(self.block.start.into()) {
             let mut writer = Writer::body(c.out, &mut self.format);
-            if line.at(0) == Some(b'#') {
+            if line.bytes().next() == Some(b'#') {
                 (0..3).for_each(|_| writer.end_line());
             }
             writer.text(line);

@@ -6,8 +6,8 @@
 //! if the second is called `set`.
 
 use crate::config::Name;
+use crate::plain;
 use crate::status::Status;
-use crate::text;
 
 /// The longest name that is read.
 const LONGEST_NAME: u8 = 32;
@@ -161,7 +161,7 @@ impl Cursor<'_> {
                 if pair.kind == Kind::Object {
                     depth += 1;
                     empty = true;
-                    let is_set = Name::beginning(pair.name.of(self.line)).is(text!("set"));
+                    let is_set = Name::beginning(pair.name.of(self.line)).is(plain!("set"));
                     if depth > 2 + u8::from(is_set) {
                         return Some(Err(Status::JsonTooDeep));
                     }

@@ -17,6 +17,7 @@ pub(super) type Outcome = Result<Option<Token>, Status>;
 
 #[small]
 impl Request {
+    #[inline(never)]
     pub(super) fn pair<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let Some(pair) = json::pair(c.line, self.at) else {
             self.phase = Phase::Warning;
@@ -103,6 +104,7 @@ impl Request {
         self.phase = if on { Phase::Pair } else { Phase::Warning };
     }
 
+    #[inline(never)]
     pub(super) fn member<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let Some(pair) = json::pair(c.line, self.at) else {
             self.at = json::behind_object(c.line, self.at);
@@ -121,6 +123,7 @@ impl Request {
     }
 
     /// One member of the group, in its order.
+    #[inline(never)]
     pub(super) fn list<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let member =
             self.group.and_then(|group| Some((group, group.member(self.item, c.machine)?)));
@@ -138,6 +141,7 @@ impl Request {
 
     /// One entry of a new status report. Names that mean nothing here are passed over; a report
     /// that would hold nothing is refused.
+    #[inline(never)]
     pub(super) fn select<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let Some(pair) = json::pair(c.line, self.at) else {
             self.at = json::behind_object(c.line, self.at);
@@ -177,6 +181,7 @@ impl Request {
         self.leave(c);
     }
 
+    #[inline(never)]
     fn carry_out<M: Machine, O: Out>(
         &mut self,
         pair: &Pair,

@@ -12,9 +12,9 @@ use crate::config::table::Kind;
 use crate::config::{Fixed, Owner, Setting};
 use crate::gcode::tables::Row;
 use crate::progmem;
-use crate::progmem::Text;
-use crate::text;
+use crate::progmem::{Plain, Text};
 use crate::units::AXES;
+use crate::{plain, text};
 
 const FIRST_SINGLE: u16 = Setting::NUMBERS as u16;
 const FIRST_VECTOR: u16 = FIRST_SINGLE + SINGLE_COUNT as u16;
@@ -220,31 +220,31 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [(Text, Action); 24] = [
-        (text!("gc"), Action::Block),
-        (text!("clear"), Action::Clear),
-        (text!("clr"), Action::Clear),
-        (text!("alarm"), Action::Raise(Alarm::Alarm)),
-        (text!("shutd"), Action::Raise(Alarm::Shutdown)),
-        (text!("panic"), Action::Raise(Alarm::Panic)),
-        (text!("me"), Action::Energize),
-        (text!("md"), Action::Release),
-        (text!("test"), Action::Test),
-        (text!("prog"), Action::Program),
-        (text!("qf"), Action::Flush),
-        (text!("defa"), Action::Defaults),
-        (text!("h"), Action::Help),
-        (text!("help"), Action::Help),
-        (text!("txt"), Action::Text),
-        (text!("tid"), Action::Id),
-        (text!("msg"), Action::Message),
-        (text!("er"), Action::Exception),
-        (text!("jogx"), Action::Jog),
-        (text!("jogy"), Action::Jog),
-        (text!("jogz"), Action::Jog),
-        (text!("joga"), Action::Jog),
-        (text!("boot"), Action::Boot),
-        (text!("reset"), Action::Reset),
+    static ACTIONS: [(Plain, Action); 24] = [
+        (plain!("gc"), Action::Block),
+        (plain!("clear"), Action::Clear),
+        (plain!("clr"), Action::Clear),
+        (plain!("alarm"), Action::Raise(Alarm::Alarm)),
+        (plain!("shutd"), Action::Raise(Alarm::Shutdown)),
+        (plain!("panic"), Action::Raise(Alarm::Panic)),
+        (plain!("me"), Action::Energize),
+        (plain!("md"), Action::Release),
+        (plain!("test"), Action::Test),
+        (plain!("prog"), Action::Program),
+        (plain!("qf"), Action::Flush),
+        (plain!("defa"), Action::Defaults),
+        (plain!("h"), Action::Help),
+        (plain!("help"), Action::Help),
+        (plain!("txt"), Action::Text),
+        (plain!("tid"), Action::Id),
+        (plain!("msg"), Action::Message),
+        (plain!("er"), Action::Exception),
+        (plain!("jogx"), Action::Jog),
+        (plain!("jogy"), Action::Jog),
+        (plain!("jogz"), Action::Jog),
+        (plain!("joga"), Action::Jog),
+        (plain!("boot"), Action::Boot),
+        (plain!("reset"), Action::Reset),
     ];
 }
 
@@ -312,10 +312,10 @@ impl Group {
     pub const SHIFT: Group = Group::Vector(SHIFT);
 
     fn find(name: &Name) -> Option<Group> {
-        if name.is(text!("sys")) {
+        if name.is(plain!("sys")) {
             return Some(Group::Settings(Owner::System));
         }
-        if name.is(text!("sr")) || name.is(text!("srs")) {
+        if name.is(plain!("sr")) || name.is(plain!("srs")) {
             return Some(Group::Report);
         }
         if let Some(owner) = Owner::called(name) {

@@ -29,6 +29,7 @@ impl Request {
     }
 
     /// Does what the text of `pair` says.
+    #[inline(never)]
     pub(super) fn wrap<M: Machine, O: Out>(
         &mut self,
         pair: &Pair,

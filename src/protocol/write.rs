@@ -4,9 +4,9 @@ use super::dialect::Dialect;
 use super::format::{COMMA, EXPAND, Format, HUSHED, MUTE, SILENT, STRICT, WRAPPED};
 use super::token::Shown;
 use crate::config::{Digits, Fixed, Settings};
-use crate::progmem::Text;
+use crate::progmem::{Plain, Text};
 use crate::status::Status;
-use crate::text;
+use crate::{plain, text};
 
 /// What a footer says beside the status, as the dialect wants.
 #[derive(Clone, Copy, Default)]
@@ -23,9 +23,9 @@ pub trait Out {
     /// Takes one byte.
     fn put(&mut self, byte: u8);
 
-    /// Takes a text.
-    fn put_text(&mut self, text: Text) {
-        self.put_all(text.bytes());
+    /// Takes bytes out of program memory.
+    fn put_plain(&mut self, bytes: Plain) {
+        self.put_all(bytes.bytes());
     }
 
     /// Takes several.
@@ -100,10 +100,10 @@ impl<'a, O: Out> Writer<'a, O> {
             return;
         }
         if self.format.flags & WRAPPED != 0 {
-            return self.out.put_text(text!("\\n"));
+            return self.out.put_plain(plain!("\\n"));
         }
         let expand = self.format.flags & EXPAND != 0;
-        self.out.put_text(if expand { text!("\n\r") } else { text!("\n") });
+        self.out.put_plain(if expand { plain!("\n\r") } else { plain!("\n") });
     }
 
     /// One byte of somebody else's text; what does not print becomes `?`.
@@ -119,13 +119,11 @@ impl<'a, O: Out> Writer<'a, O> {
         self.printable(byte);
     }
 
-    /// A text.
+    /// A text. By itself, for it is called in many places.
+    #[inline(never)]
+    #[small]
     pub fn text(&mut self, text: Text) {
-        match self.format.flags & WRAPPED {
-            _ if !self.shown => {}
-            0 => self.out.put_text(text),
-            _ => text.bytes().for_each(|byte| self.byte(byte)),
-        }
+        text.bytes().for_each(|byte| self.byte(byte));
     }
 
     /// Bytes as they are, in lower case.

@@ -32,19 +32,26 @@ machine_static! {
 pub async fn run(links: &'static Links) -> ! {
     loop {
         health::look();
-        let timeout = links.settings.borrow().motor_timeout_centis().saturating_mul(10);
-        let (now, running) = (millis(), snapshot().running);
-        let holds = hold::is_on();
-        let pass = |motors: &mut Motors| {
-            if holds {
-                motors.stand_still(LOOK_MS as u32);
-            }
-            motors.pass(now, running, timeout)
-        };
-        if change(pass) {
-            links.reporter_wake.signal();
-        }
+        look(links);
         Timer::after_ticks(LOOK_MS).await;
+    }
+}
+
+/// Takes power from the motors that have been idle long enough.
+#[inline(never)]
+#[small]
+fn look(links: &Links) {
+    let timeout = links.settings.borrow().motor_timeout_centis().saturating_mul(10);
+    let (now, running) = (millis(), snapshot().running);
+    let holds = hold::is_on();
+    let pass = |motors: &mut Motors| {
+        if holds {
+            motors.stand_still(LOOK_MS as u32);
+        }
+        motors.pass(now, running, timeout)
+    };
+    if change(pass) {
+        links.reporter_wake.signal();
     }
 }
 

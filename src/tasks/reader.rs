@@ -105,7 +105,7 @@ impl<const N: usize> Intake<N> {
     /// Takes a turn's bytes, stops the sender or lets it go on, and sees to real-time characters where they stand.
     fn take(&mut self, links: &Links) -> Left {
         let left = self.turn(links);
-        self.control_flow(links);
+        self.control_flow(self.received.len(), N, links);
         match left {
             Left::Placed(mark) => hold::placed(links, self.port, mark),
             Left::Aside(mark) => hold::aside(links, self.port, mark),
@@ -163,6 +163,7 @@ impl<const N: usize> Intake<N> {
     /// No line can be taken before the machine goes on: looks for real-time characters in the ring that have
     /// it do so. Cost: 30 cycles a byte.
     #[inline(never)]
+    #[small]
     fn look_ahead(&self, links: &Links) {
         if !hold::is_on() && !links.stopped.get() {
             return;
@@ -177,13 +178,12 @@ impl<const N: usize> Intake<N> {
         }
     }
 
-    /// Stops the sender, or lets it go on.
+    /// Stops the sender, or lets it go on, when so many bytes wait in a ring of so many.
     #[inline(never)]
-    fn control_flow(&mut self, links: &Links) {
-        let waiting = self.received.len();
+    fn control_flow(&mut self, waiting: usize, ring: usize, links: &Links) {
         let stop = match self.stopped {
-            Flow::None => waiting > high_water(N),
-            _ => waiting >= low_water(N),
+            Flow::None => waiting > high_water(ring),
+            _ => waiting >= low_water(ring),
         };
         // One that was stopped must not stay so when the setting changes.
         let flow = if stop { self.flow(links) } else { Flow::None };

@@ -39,10 +39,11 @@ struct Told {
 
 /// The task; `occasion` is what has come of the start.
 pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
-    if occasion != Occasion::Ready {
+    let mut greeting = Some(occasion);
+    while let Some(occasion) = greeting {
         greet(links, occasion).await;
+        greeting = (occasion != Occasion::Ready).then_some(Occasion::Ready);
     }
-    greet(links, Occasion::Ready).await;
     let mut told =
         Told { state: 0, hold: 0, blocks_free: queue_free(), at: millis(), starved: false };
     let mut due = true;

@@ -8,7 +8,7 @@ use embassy_time::Timer;
 use crate::hal::event::wait_transmitted;
 use crate::hal::imp::uart;
 use crate::hal::serial::{Outgoing, TX_RING};
-use crate::progmem::Text;
+use crate::progmem::Plain;
 use crate::protocol::Checksum;
 
 /// Most bytes written between two calls of [`Tx::room`].
@@ -86,11 +86,11 @@ impl crate::protocol::Out for Tx {
 
     // By itself, for it is called in many places.
     #[inline(never)]
-    fn put_text(&mut self, text: Text) {
+    fn put_plain(&mut self, bytes: Plain) {
         if self.sum.is_some() {
-            return self.put_summed(text.bytes());
+            return bytes.bytes().for_each(|byte| self.put(byte));
         }
-        let mut left = text;
+        let mut left = bytes;
         // The ring's end may come in between; there is room beyond it.
         for _ in 0..2 {
             let count = left.copy(self.ring.vacant());

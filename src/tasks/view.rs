@@ -527,5 +527,9 @@ pub fn set_hardware(settings: &Settings) {
 /// The motors of which something is so, as bits.
 #[small]
 fn motors(is: impl Fn(usize) -> bool) -> u8 {
-    (0..MOTORS).fold(0, |bits, m| bits | u8::from(is(m)) << m)
+    let mut bits = 0;
+    for motor in 0..MOTORS {
+        bits |= u8::from(is(motor)) << motor;
+    }
+    bits
 }
