@@ -345,7 +345,7 @@ impl Prep {
         let travel = self.left.saturating_sub(left);
         let cycles = self.with_kept(cycles);
         let limit = self.most_ticks(cycles, travel);
-        let (mut ticks, mut shift) = coarsen(travel, limit);
+        let (mut fine, mut shift) = coarsen(travel, limit);
         // From where a tick is a step; of fine ticks, from the middle between two, where the interrupt has time for a segment.
         let middle = if shift < STEP_LOG2 - 1 { STEP / 2 } else { 0 };
         // No tick is longer than a step.
@@ -355,11 +355,12 @@ impl Prep {
         if at & (step - 1) != 0 {
             let fits = self.fitting(shift, at.trailing_zeros() as u8, cycles, travel);
             if fits != shift {
-                (ticks, shift) = (travel >> fits, fits);
+                (fine, shift) = (finer(travel, fits), fits);
                 step = bit(shift);
             }
         }
         let rest = step - 1;
+        let mut ticks = whole_ticks(fine, shift);
         let grain = grain(ticks, shift);
         let short = (travel as u16).wrapping_sub(at & !rest) & (bit(grain) - 1);
         if travel <= short.into() {
@@ -371,7 +372,7 @@ impl Prep {
             ticks -= u32::from((short - part + rest) >> shift);
         }
         let ticks = if ticks > TICKS_MAX.into() { TICKS_MAX } else { ticks as u16 };
-        let period = self.period(cycles, travel, shift);
+        let period = self.period(cycles, fine, shift);
         if period > PERIOD_MAX {
             return self.idle(cycles, out);
         }
@@ -382,8 +383,8 @@ impl Prep {
     /// The exponent of ticks that end on the steps of the dominant motor: `fits`, if `shift` is more and there is time.
     fn fitting(&self, shift: u8, fits: u8, cycles: u32, travel: u32) -> u8 {
         // A period that is no longer than the shortest may have been made as long.
-        let finer =
-            fits < shift && self.period(cycles, travel, fits) > u32::from(self.paces().settles);
+        let finer = fits < shift
+            && self.period(cycles, finer(travel, fits), fits) > u32::from(self.paces().settles);
         if finer { fits } else { shift }
     }
 
@@ -494,15 +495,16 @@ impl Prep {
             self.time = cycles.min(KEPT_MAX) as i32;
             return false;
         }
-        let (mut ticks, mut shift) = coarsen(left, limit);
+        let (mut fine, mut shift) = coarsen(left, limit);
         if exact && left < STEP.into() {
             let fits = left.trailing_zeros() as u8;
             if fits > shift {
                 // The rest of it, in no more ticks than need be.
-                (ticks, shift) = (left >> fits, fits);
+                (fine, shift) = (finer(left, fits), fits);
             }
         }
-        let period = self.period(cycles, left, shift).min(PERIOD_MAX);
+        let mut ticks = whole_ticks(fine, shift);
+        let period = self.period(cycles, fine, shift).min(PERIOD_MAX);
         let tick = bit(shift);
         if ticks > u32::from(TICKS_MAX) {
             // Too much for one segment: a part of it, and the rest when asked again.
@@ -545,14 +547,11 @@ impl Prep {
         limit.clamp(1, TICKS_MAX)
     }
 
-    /// Cycles from tick to tick when a stretch of `travel` takes `cycles`; no less than
+    /// Cycles from tick to tick when a stretch of so many parts of a tick ([`coarsen`]) takes `cycles`; no less than
     /// can be sustained, at most 2^16 if it does not fit 16 bits.
-    fn period(&self, cycles: u32, travel: u32, shift: u8) -> u32 {
-        // In 1/32 tick, as far as that fits 16 bits.
-        let (mut cycles, mut ticks) = match shift {
-            0..5 => (cycles << shift, travel),
-            _ => (cycles << 5, travel >> (shift - 5)),
-        };
+    fn period(&self, cycles: u32, fine: u32, shift: u8) -> u32 {
+        let (mut cycles, mut ticks) =
+            (if shift < FINE { cycles << shift } else { cycles << FINE }, fine);
         while ticks > 0xFFFF {
             ticks >>= 1;
             cycles >>= 1;
@@ -757,35 +756,74 @@ fn product_wide(unit: u32, times: u16) -> i32 {
     }
 }
 
-/// `1 << n`, up to [`STEP`]. Cost: 30; the compiler makes a loop of six cycles a bit.
-#[inline(never)]
+/// `1 << n`, up to [`STEP`]. Cost: 15; the compiler makes a loop of six cycles a bit.
+#[inline(always)]
 fn bit(n: u8) -> u16 {
-    let (byte, n) = if n & 8 != 0 { (0x100, n & 7) } else { (1, n) };
-    let nibble = if n & 4 != 0 { byte << 4 } else { byte };
-    let pair = if n & 2 != 0 { nibble << 2 } else { nibble };
-    if n & 1 != 0 { pair << 1 } else { pair }
+    let pair = if n & 2 != 0 { 4 } else { 1 };
+    let nibble: u8 = if n & 1 != 0 { pair << 1 } else { pair };
+    let byte = if n & 4 != 0 { nibble << 4 } else { nibble };
+    if n & 8 != 0 { u16::from(byte) << 8 } else { byte.into() }
 }
 
-/// Ticks of a travel, no more than `limit` if steps allow, and the shift between the two. Cost: 100.
+/// Parts of a tick for its period: 1/32, if the tick has as many phase units.
+const FINE: u8 = 5;
+
+/// Most ticks of a limit, in such parts.
+const fn limit_in_parts(limit: u16) -> u16 {
+    limit << FINE | ((1 << FINE) - 1)
+}
+
+const _: () = assert!(limit_in_parts(TICKS_MAX) >> FINE == TICKS_MAX);
+
+/// A travel in parts of ticks, of which there are no more than `limit` if steps allow, and the exponent of a tick. Cost: 100.
 #[inline(never)]
 fn coarsen(travel: u32, limit: u16) -> (u32, u8) {
-    let (mut ticks, mut shift) = (travel, 0);
-    if ticks >> 8 > limit.into() {
-        (ticks, shift) = (ticks >> 8, 8);
+    let limit = limit_in_parts(limit);
+    if travel <= limit.into() {
+        return coarsen_little(travel, limit);
     }
-    while ticks > 0xFFFF && shift < STEP_LOG2 {
-        ticks >>= 1;
+    let (mut fine, mut shift) = (travel, FINE);
+    if fine >> 8 > limit.into() {
+        (fine, shift) = (fine >> 8, FINE + 8);
+    }
+    while fine > 0xFFFF && shift < STEP_LOG2 {
+        fine >>= 1;
         shift += 1;
     }
-    if ticks > 0xFFFF {
-        return (ticks, shift);
+    if fine > 0xFFFF {
+        return (fine, shift);
     }
-    let mut few = ticks as u16;
+    let mut few = fine as u16;
     while few > limit && shift < STEP_LOG2 {
         few >>= 1;
         shift += 1;
     }
     (few.into(), shift)
+}
+
+/// A travel for which ticks of less than [`FINE`] bits do: it is its own parts.
+#[inline(never)]
+#[small]
+fn coarsen_little(travel: u32, limit: u16) -> (u32, u8) {
+    let (limit, mut ticks, mut shift) = (limit >> FINE, travel as u16, 0);
+    while ticks > limit && shift < FINE {
+        ticks >>= 1;
+        shift += 1;
+    }
+    (travel, shift)
+}
+
+/// A travel in parts of ticks of so many bits.
+#[inline(never)]
+#[small]
+fn finer(travel: u32, shift: u8) -> u32 {
+    travel >> shift.saturating_sub(FINE)
+}
+
+/// Whole ticks of so many parts. Cost: 25.
+#[inline(always)]
+fn whole_ticks(fine: u32, shift: u8) -> u32 {
+    if shift < FINE { fine >> shift } else { fine >> FINE }
 }
 
 /// The exponent of what a stretch's end is aligned to: a tick, up to an eighth of the stretch, up to a
