@@ -77,6 +77,10 @@ impl Ramp {
         if !below(self.coast, time) {
             return (self.top, self.begin + self.top * (time - fall));
         }
+        if !some(self.coast) {
+            // It does nothing but end an acceleration.
+            return self.off_top(time);
+        }
         let (velocity, far) = self.off_top(time - self.coast);
         (velocity, self.begin + self.top * (self.coast - fall) + far)
     }

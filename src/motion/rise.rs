@@ -225,9 +225,11 @@ impl Governor {
                 // So near that the acceleration need not build up.
                 next = Next { velocity: span.cruise, top: span.cruise, ..Next::default() };
             } else {
-                self.next(alpha, seconds, &mut next);
+                if !same(next.alpha, alpha) {
+                    self.next(alpha, seconds, &mut next);
+                }
                 if below(span.cruise, next.top) {
-                    if self.is_lowered(span.cruise) {
+                    if self.is_lowered(next.top - next.velocity, span.cruise) {
                         return self.slow_down(span, ahead);
                     }
                     let arrives = self.arrive(span, ahead);
@@ -371,10 +373,10 @@ impl Governor {
         !some(self.alpha) && self.closing && below(self.velocity, scaled(gain, 3))
     }
 
-    /// Whether an override has lowered the feed: the acceleration cannot end at it any more.
-    fn is_lowered(&self, cruise: f32) -> bool {
-        let climb = self.limits.kappa * self.alpha * self.alpha;
-        below(cruise - self.velocity, 0.98 * climb)
+    /// Whether an override has lowered the feed: the acceleration, in which the velocity grows by `climb` until it has ended, cannot end
+    /// at it any more.
+    fn is_lowered(&self, climb: f32, cruise: f32) -> bool {
+        below(cruise - self.velocity, climb - scaled(climb, -6))
     }
 
     /// The acceleration ends at the feed, if that is safe.

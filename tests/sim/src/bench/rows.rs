@@ -109,7 +109,7 @@ pub const ROWS: [Row; 37] = [
         peers: ["52", "-", "63"],
         target: Some(13.0),
         // A tick, and the longest time interrupts are off: now and then that meets the tick behind a new segment.
-        floor: Some(13.2),
+        floor: Some(13.0),
         measure: jitter::minor,
     },
     Row {
@@ -131,7 +131,7 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: ["3.18", "-", "7.97"],
         target: Some(1.6),
-        floor: Some(1.81),
+        floor: Some(1.80),
         measure: spirals::tenth,
     },
     Row {
@@ -266,7 +266,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(8_000.0),
         // A third of it are scans of what is ahead.
-        floor: Some(9_500.0),
+        floor: Some(8_000.0),
         measure: costs::segment_jerk,
     },
     Row {
@@ -278,7 +278,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(24_000.0),
         // A scan that tries three velocities, and a ramp that is laid out.
-        floor: Some(30_500.0),
+        floor: Some(24_000.0),
         measure: costs::segment_jerk_worst,
     },
     Row {
