@@ -6,7 +6,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Lines, Read, Write};
 use std::process::{Child, Command, Stdio};
 
-use common::image;
+use common::{image, kerf_sim};
 use kerf::boards::MEGA2560_GRBL;
 
 /// Ends the server however the test ends.
@@ -27,7 +27,7 @@ fn next(lines: &mut Lines<BufReader<File>>) -> String {
 
 /// Starts a server; its first line is the port.
 fn serve(more: &[&str]) -> (Server, File) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_kerf-sim"));
+    let mut command = kerf_sim();
     command.arg("serve").arg("--elf").arg(image(&MEGA2560_GRBL)).args(more);
     command.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut server = Server(command.spawn().unwrap());
