@@ -375,6 +375,11 @@ impl Machine {
         &self.bus().uarts[index]
     }
 
+    /// Whether the first USART takes bytes now: its receiver is on, and interrupts are.
+    pub fn is_listening(&self) -> bool {
+        self.uart(0).is_listening() && self.cpu.interrupts_on()
+    }
+
     /// CTC tops of the step timer that were written behind its counter.
     pub fn missed_tops(&self) -> u64 {
         self.bus().timers[self.board.step_timer as usize].missed()

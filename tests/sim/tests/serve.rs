@@ -62,6 +62,16 @@ fn it_is_told_whether_the_machine_is_where_the_job_ends() {
 }
 
 #[test]
+fn what_is_sent_before_the_firmware_listens_is_kept() {
+    let (_server, mut port) = serve(&[]);
+    port.write_all(b"{fb:n}\n").unwrap();
+    let mut lines = BufReader::new(port.try_clone().unwrap()).lines();
+    assert!(next(&mut lines).contains("SYSTEM READY"));
+    port.write_all(b"{fv:n}\n").unwrap();
+    assert!(next(&mut lines).starts_with(r#"{"r":{"fb":440.20},"f":[1,0,"#));
+}
+
+#[test]
 fn a_sender_opens_the_port_and_moves_the_machine() {
     let (_server, mut port) = serve(&[]);
     let mut lines = BufReader::new(port.try_clone().unwrap()).lines();
