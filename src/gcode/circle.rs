@@ -53,6 +53,9 @@ impl State {
         let start = self.position;
         self.advance(block, false, setup)?;
         let target = self.position;
+        if is_far(&start, &target) {
+            return Err(Status::OutOfRange);
+        }
         let mut arc =
             Arc { first, second, linear, center: [Length::ZERO; 2], clockwise, extra_turns: turns };
         arc.center = match radius {
@@ -134,6 +137,18 @@ fn may_be_too_far(start: &PerAxis<Length>, arc: &Arc) -> bool {
     let [first, second] = arc.center;
     let radius = way(from[0], first).saturating_add(way(from[1], second));
     [first, second].iter().any(|at| at.0.saturating_abs().saturating_add(radius) == i32::MAX)
+}
+
+/// Whether some axis goes farther than a length can be, which its advance along an arc is worked out from.
+#[inline(never)]
+#[small]
+fn is_far(start: &PerAxis<Length>, target: &PerAxis<Length>) -> bool {
+    for (start, target) in start.iter().zip(target) {
+        if target.checked_sub(*start).is_none() {
+            return true;
+        }
+    }
+    false
 }
 
 /// P: full turns.

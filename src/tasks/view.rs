@@ -25,6 +25,7 @@ use crate::baud;
 use crate::boards::{MOTORS, inputs};
 use crate::config::{Setting, Settings};
 use crate::gcode::command::Motion;
+use crate::gcode::limits::is_near;
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::overrides::Change;
 use crate::gcode::setup::{AxisMode, Setup};
@@ -462,8 +463,12 @@ impl Machine for View<'_> {
         let mut target = *model.position();
         let travel = self.settings.travel(axis).filter(|_| model.is_homed(axis));
         drop(model);
+        let near = is_near(&target, &*self.settings);
         if let Some(at) = target.get_mut(usize::from(axis)) {
             *at = travel.map_or(place, |(low, high)| place.max(low).min(high));
+        }
+        if !near || !is_near(&target, &*self.settings) {
+            return Status::OutOfRange;
         }
         self.begin(Motion::Jog { target }, Cycle::Jog)
     }
