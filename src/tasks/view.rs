@@ -107,10 +107,17 @@ impl<'a> View<'a> {
 
     /// Whether anything is queued or runs.
     pub fn has_work(&self) -> bool {
-        self.motion().running
-            || queue::used() > 0
-            || self.links.commands_taken.get()
-            || !self.links.job.get().is_none()
+        self.carries_out() || !self.links.job.get().is_none()
+    }
+
+    /// Whether a line is being carried out.
+    fn carries_out(&self) -> bool {
+        self.motion().running || queue::used() > 0 || self.links.commands_taken.get()
+    }
+
+    /// Whether a built-in job has been carried out to its end.
+    pub fn has_done_job(&self) -> bool {
+        self.links.job.get().is_over() && !self.carries_out()
     }
 
     /// `stat`.
