@@ -113,7 +113,8 @@ fn check_within(
     check_straight(start, target, limits)
 }
 
-#[inline(never)]
+// The deepest stack is below it.
+#[inline(always)]
 #[small]
 fn check_arc(
     start: &PerAxis<Length>,
