@@ -4,7 +4,7 @@ mod common;
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Lines, Read, Write};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 
 use common::{image, kerf_sim};
 use kerf::boards::MEGA2560_GRBL;
