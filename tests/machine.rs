@@ -425,3 +425,20 @@ fn a_reset_that_nobody_wanted_is_told() {
         assert_eq!(heard.matches(",203,").count(), usize::from(told), "{heard}");
     }
 }
+
+#[test]
+fn a_move_of_several_blocks_stops_exactly_at_its_end() {
+    // 25.6 mm are a block at most.
+    let time = |mode: &str, to: [u8; 2]| {
+        let lines = format!("{mode}\ng1 f3000 x{}\nx{}\n", to[0], to[1]);
+        let timed = move || {
+            let mut sender = Sender::boot();
+            sender.ask("{xvm:3000,xfr:3000,xac:100}\n", 50);
+            sender.time(&lines, 1)
+        };
+        std::thread::spawn(timed).join().unwrap()
+    };
+    let [one, several] = [[20, 60], [40, 60]].map(|to| time("g61.1", to) - time("g64", to));
+    assert!(one > 100, "{one} ms more");
+    assert!(several.abs_diff(one) < 20, "{one} ms and {several} ms more");
+}

@@ -72,8 +72,7 @@ fn differences_are_of_programs() {
 
 /// The programs in a folder of the repository.
 fn programs(folder: &str) -> Vec<PathBuf> {
-    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
-    let files = fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path());
+    let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let mut programs: Vec<_> =
         files.filter(|file| file.extension().is_some_and(|ending| ending == "ngc")).collect();
     programs.sort();

@@ -24,7 +24,7 @@ use requests::{Asked, pairs};
 use transcript::Transcript;
 
 fn read_all() -> Vec<Transcript> {
-    transcript::read_all(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/transcripts"))
+    transcript::read_all(Path::new("tests/transcripts"))
 }
 
 #[test]

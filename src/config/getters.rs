@@ -33,6 +33,11 @@ impl Settings {
         self.motor(motor, motor::MI)
     }
 
+    /// How many times the steps of the shortest length have to be halved until no motor makes more than one; 15 for more than 14.
+    pub fn octaves(&self) -> u8 {
+        self.octaves
+    }
+
     /// Its steps for a length.
     pub fn step_ratio(&self, motor: usize) -> StepRatio {
         self.ratios.get(motor).copied().unwrap_or(StepRatio::NONE)

@@ -34,6 +34,8 @@ pub struct Settings {
     large: [i32; LARGES],
     /// Derived from a motor's angle, travel and microsteps; used for every block.
     ratios: [StepRatio; MOTORS],
+    /// Of the motor with the finest steps: see [`StepRatio::octaves`].
+    octaves: u8,
 }
 
 impl Default for Settings {
@@ -53,7 +55,7 @@ impl Settings {
     /// Nothing set, for [`Settings::set_defaults`].
     pub const fn blank() -> Settings {
         let ratios = [StepRatio::NONE; MOTORS];
-        Settings { small: [0; SMALLS], large: [0; LARGES], ratios }
+        Settings { small: [0; SMALLS], large: [0; LARGES], ratios, octaves: 0 }
     }
 
     /// Sets everything to its default.
@@ -185,6 +187,7 @@ impl Settings {
         if let Some(ratio) = self.ratios.get_mut(usize::from(motor)) {
             *ratio = StepRatio::new(angle, travel, microsteps);
         }
+        self.octaves = self.ratios.iter().map(|ratio| ratio.octaves()).max().unwrap_or(0);
     }
 
     fn small(&self, slot: u8) -> u8 {

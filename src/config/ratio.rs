@@ -55,6 +55,18 @@ impl StepRatio {
         StepRatio { num: this.0, den: this.1 }
     }
 
+    /// How many times the steps of a unit have to be halved until they are one or less; 15 for more than 14.
+    #[inline(never)]
+    #[small]
+    pub fn octaves(self) -> u8 {
+        let (mut den, mut octaves) = (self.den, 0);
+        while den < self.num && octaves < 15 {
+            den = den.saturating_add(den);
+            octaves += 1;
+        }
+        octaves
+    }
+
     /// The length of `steps`, to the nearest, half away from zero; `None` for a motor that never
     /// steps, or beyond the range.
     ///

@@ -16,8 +16,8 @@ use crate::math;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
 
-/// The smallest radius: 0.1 mm, in units.
-const MIN_RADIUS: i32 = 1_000;
+/// The smallest radius: 1 um, in units.
+const MIN_RADIUS: i32 = 10;
 /// The largest R: 150 m, which keeps its square in 64 bits.
 const MAX_RADIUS: i32 = 1_500_000_000;
 /// Radii at start and end always may differ by this much (5 um) ...
@@ -53,6 +53,9 @@ impl State {
         let start = self.position;
         self.advance(block, false, setup)?;
         let target = self.position;
+        if is_far(&start, &target) {
+            return Err(Status::OutOfRange);
+        }
         let mut arc =
             Arc { first, second, linear, center: [Length::ZERO; 2], clockwise, extra_turns: turns };
         arc.center = match radius {
@@ -136,6 +139,18 @@ fn may_be_too_far(start: &PerAxis<Length>, arc: &Arc) -> bool {
     [first, second].iter().any(|at| at.0.saturating_abs().saturating_add(radius) == i32::MAX)
 }
 
+/// Whether some axis goes farther than a length can be, which its advance along an arc is worked out from.
+#[inline(never)]
+#[small]
+fn is_far(start: &PerAxis<Length>, target: &PerAxis<Length>) -> bool {
+    for (start, target) in start.iter().zip(target) {
+        if target.checked_sub(*start).is_none() {
+            return true;
+        }
+    }
+    false
+}
+
 /// P: full turns.
 #[small]
 fn turns(block: &Block) -> Result<u16, Status> {
@@ -186,8 +201,10 @@ fn radius_form(
     let square = |x: i32| i64::from(x) * i64::from(x);
     let chord_squared = square(chord[0]).saturating_add(square(chord[1]));
     let excess = 4 * square(radius.0) - chord_squared;
-    // Half a chord up to 5 um longer than R passes for a half circle.
-    if excess < -(8 * SLACK as i64) * i64::from(radius.0.abs()) {
+    // Half a chord up to 5 um longer than R, or a twentieth of it, passes for a half circle; always what rounding makes of the ends.
+    let size = radius.0.abs();
+    let slack = (size / 20).clamp(1, SLACK as i32);
+    if excess < -8 * i64::from(slack) * i64::from(size) {
         return Err(Status::ArcRadiusTolerance);
     }
     // 2 h / chord. To the left of the chord lies the centre of the short way counter-clockwise.

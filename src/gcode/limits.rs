@@ -1,4 +1,5 @@
-//! Soft limits: whether a move stays within the travel of the axes that are homed.
+//! Soft limits: whether a move stays within the travel of the axes that are homed. And whether its steps can be
+//! counted ([`Setup::reach`]).
 //!
 //! Asked for each move before anything is planned; positions are machine coordinates. An axis that a
 //! line does not move is not looked at, so that one beyond its travel does not lock the others. Cost on
@@ -27,7 +28,72 @@ pub(super) fn check(
     homed: u8,
     setup: &impl Setup,
 ) -> Result<(), Status> {
-    let limits = |axis: u8| if homed & 1 << axis != 0 { setup.travel(axis) } else { None };
+    check_within(start, motion, &Limits { homed: Some(homed), setup })
+}
+
+/// Refuses (110) a move from or to a place where steps cannot be counted, or by way of one. Axes that do not move count as well:
+/// G28.3 tells them where they are.
+#[inline(never)]
+#[small]
+pub(super) fn check_reach(
+    start: &PerAxis<Length>,
+    end: &PerAxis<Length>,
+    motion: &Motion,
+    setup: &impl Setup,
+) -> Result<(), Status> {
+    if setup.reach().is_none() {
+        return Ok(());
+    }
+    let from = match motion {
+        Motion::None | Motion::Home { .. } => return Ok(()),
+        Motion::SetPosition { .. } => end,
+        _ => start,
+    };
+    let near = is_near(from, setup)
+        && is_near(end, setup)
+        && check_within(start, motion, &Limits { homed: None, setup }).is_ok();
+    if near { Ok(()) } else { Err(Status::OutOfRange) }
+}
+
+/// Whether steps can be counted there.
+#[inline(never)]
+#[small]
+pub fn is_near(place: &PerAxis<Length>, setup: &impl Setup) -> bool {
+    let Some(most) = setup.reach() else { return true };
+    for at in place {
+        if at.0.saturating_abs() > most.0 {
+            return false;
+        }
+    }
+    true
+}
+
+/// Which limits: the travel of the axes that are homed, or how far steps can be counted.
+struct Limits<'a, S> {
+    homed: Option<u8>,
+    setup: &'a S,
+}
+
+impl<S: Setup> Limits<'_, S> {
+    /// Those of an axis, if it has any.
+    #[inline(never)]
+    #[small]
+    fn of(&self, axis: u8) -> Option<(Length, Length)> {
+        match self.homed {
+            None => self.setup.reach().map(|most| (Length(-most.0), most)),
+            Some(homed) if homed & 1 << axis != 0 => self.setup.travel(axis),
+            Some(_) => None,
+        }
+    }
+}
+
+#[inline(never)]
+#[small]
+fn check_within(
+    start: &PerAxis<Length>,
+    motion: &Motion,
+    limits: &Limits<'_, impl Setup>,
+) -> Result<(), Status> {
     let target = match motion {
         Motion::None | Motion::Home { .. } | Motion::SetPosition { .. } => return Ok(()),
         Motion::Cycle(cycle) => return check_cycle(start, cycle, limits),
@@ -47,15 +113,16 @@ pub(super) fn check(
     check_straight(start, target, limits)
 }
 
-#[inline(never)]
+// The deepest stack is below it.
+#[inline(always)]
 #[small]
 fn check_arc(
     start: &PerAxis<Length>,
     target: &PerAxis<Length>,
     arc: &Arc,
-    limits: impl Fn(u8) -> Option<(Length, Length)>,
+    limits: &Limits<'_, impl Setup>,
 ) -> Result<(), Status> {
-    let limits = [limits(arc.first), limits(arc.second)];
+    let limits = [limits.of(arc.first), limits.of(arc.second)];
     if arc_is_within(start, target, arc, Some(&limits)) { Ok(()) } else { Err(Status::SoftLimit) }
 }
 
@@ -64,11 +131,11 @@ fn check_arc(
 fn check_straight(
     start: &PerAxis<Length>,
     target: &PerAxis<Length>,
-    limits: impl Fn(u8) -> Option<(Length, Length)>,
+    limits: &Limits<'_, impl Setup>,
 ) -> Result<(), Status> {
     for (axis, (from, to)) in (0..).zip(start.iter().zip(target)) {
         if from != to
-            && let Some((low, high)) = limits(axis)
+            && let Some((low, high)) = limits.of(axis)
             && !(low..=high).contains(to)
         {
             return Err(Status::SoftLimit);
@@ -83,12 +150,12 @@ fn check_straight(
 fn check_cycle(
     start: &PerAxis<Length>,
     cycle: &Cycle,
-    limits: impl Fn(u8) -> Option<(Length, Length)>,
+    limits: &Limits<'_, impl Setup>,
 ) -> Result<(), Status> {
     let [first, second, across] = cycle.plane.axes();
     let inside = |axis: u8, at: Length| {
         let here = start.get(usize::from(axis)).is_some_and(|start| *start == at);
-        here || limits(axis).is_none_or(|(low, high)| (low..=high).contains(&at))
+        here || limits.of(axis).is_none_or(|(low, high)| (low..=high).contains(&at))
     };
     let mut all = [cycle.retract, cycle.bottom, cycle.clear].iter().all(|at| inside(across, *at));
     for number in [1, cycle.holes] {

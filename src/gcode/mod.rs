@@ -19,7 +19,7 @@ pub mod decimal;
 mod digits;
 pub mod interpreter;
 mod lexer;
-mod limits;
+pub mod limits;
 pub mod modal;
 mod motion;
 pub mod number;

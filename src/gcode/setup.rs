@@ -28,6 +28,12 @@ pub trait Setup {
     /// The ends of its travel in machine coordinates, if moves beyond them are to be refused.
     fn travel(&self, axis: u8) -> Option<(Length, Length)>;
 
+    /// How far from the origin of machine coordinates the steps of all motors can be counted, if these do not hold every length. Moves
+    /// from or to places beyond are refused.
+    fn reach(&self) -> Option<Length> {
+        None
+    }
+
     /// The modes at start-up and after M2 and M30.
     fn defaults(&self) -> Defaults {
         Defaults::USUAL

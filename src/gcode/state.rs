@@ -256,6 +256,7 @@ impl State {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
+        limits::check_reach(start, &self.position, &out.motion, setup)?;
         // Limits are for homed axes alone.
         if self.homed != 0 {
             limits::check(start, &out.motion, self.homed, setup)?;

@@ -57,6 +57,7 @@ impl State {
         }
         if modal.units != Units::Mm
             || modal.feed_mode != FeedMode::PerMinute
+            || setup.reach().is_some()
             || line.len() > usize::from(u8::MAX)
         {
             return false;

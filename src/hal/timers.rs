@@ -2,7 +2,8 @@
 //!
 //! Owned by the time driver of `imp`. A task has one entry, its earliest time: woken then, it asks again for
 //! what it still waits for. With more than [`TIMERS`] tasks waiting, one is woken at once, looks at its
-//! timer and asks again: it costs cycles, and no time is missed. Times are milliseconds since reset.
+//! timer and asks again: it costs cycles, and no time is missed. Times are milliseconds since reset, modulo 2^32;
+//! a task that waits for more than 24 days is woken early, and asks again.
 //!
 //! embassy's own queue keeps an entry of 16 bytes in every task; of ours, few wait for a time.
 
@@ -34,9 +35,11 @@ impl Timers {
     /// Wakes a task at a time, or before.
     pub fn schedule(&self, at: u64, waker: &Waker) {
         let Ok(mut list) = self.0.try_borrow_mut() else { return waker.wake_by_ref() };
-        let at = u32::try_from(at).unwrap_or(u32::MAX);
+        let at = at as u32;
         if let Some(entry) = list.iter_mut().find(|entry| entry.waker.will_wake(waker)) {
-            entry.at = entry.at.min(at);
+            if is_after(entry.at, at) {
+                entry.at = at;
+            }
         } else if list.push(Entry { at, waker: waker.clone() }).is_err() {
             waker.wake_by_ref();
         }
@@ -46,13 +49,18 @@ impl Timers {
     pub fn wake_expired(&self, now: u32) {
         let Ok(mut list) = self.0.try_borrow_mut() else { return };
         list.retain(|entry| {
-            let waits = entry.at > now;
+            let waits = is_after(entry.at, now);
             if !waits {
                 entry.waker.wake_by_ref();
             }
             waits
         });
     }
+}
+
+/// Whether a time is after another, by less than 2^31 ms.
+fn is_after(time: u32, other: u32) -> bool {
+    (other.wrapping_sub(time) as i32) < 0
 }
 
 impl Default for Timers {
@@ -94,6 +102,19 @@ mod tests {
             task.0.load(Relaxed)
         });
         assert_eq!(woken, [0, 1, 1, 1]);
+    }
+
+    #[test]
+    fn a_time_may_lie_beyond_the_wrap_of_the_count() {
+        let timers = Timers::new();
+        let (task, waker) = task();
+        timers.schedule((1 << 32) + 10, &waker);
+        timers.schedule((1 << 32) + 30, &waker);
+        let woken = [u32::MAX - 2_000, u32::MAX, 0, 9, 10, 30].map(|now| {
+            timers.wake_expired(now);
+            task.0.load(Relaxed)
+        });
+        assert_eq!(woken, [0, 0, 0, 0, 1, 1]);
     }
 
     #[test]

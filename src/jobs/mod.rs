@@ -18,6 +18,9 @@ pub const LINE_MAX: usize = 48;
 /// The number of the program in EEPROM.
 pub const STORED: u8 = 100;
 
+/// The round of a job that is over; no piece has as many.
+const OVER: u8 = u8::MAX;
+
 /// A piece of a job.
 #[derive(Clone, Copy)]
 pub struct Piece {
@@ -50,6 +53,16 @@ impl Job {
     /// Whether there is none.
     pub fn is_none(&self) -> bool {
         self.number == 0
+    }
+
+    /// All of its lines have been taken.
+    pub fn end(&mut self) {
+        self.round = OVER;
+    }
+
+    /// Whether they have; what they asked for may still be under way.
+    pub fn is_over(&self) -> bool {
+        self.round == OVER
     }
 
     /// Its number.

@@ -67,6 +67,11 @@ impl Format {
         self.flags & PLAIN != 0
     }
 
+    /// Whether lines are parts of a string.
+    pub fn is_wrapped(self) -> bool {
+        self.flags & WRAPPED != 0
+    }
+
     /// Whose words are used.
     pub fn dialect(self) -> Dialect {
         self.dialect

@@ -35,11 +35,11 @@ impl Span {
 /// What a value is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// A word beginning with `n`, or the empty string.
+    /// `n`, `null`, or the empty string.
     Null,
-    /// A word beginning with `t`.
+    /// `t` or `true`.
     True,
-    /// A word beginning with `f`.
+    /// `f` or `false`.
     False,
     /// A number.
     Number,
@@ -118,6 +118,11 @@ pub fn skip_blanks(line: &[u8]) -> u8 {
     cursor.blanks();
     cursor.at
 }
+
+/// What may stand behind the first letter of `null`, `true` and `false`.
+const ULL: u32 = u32::from_be_bytes(*b"\0ull");
+const RUE: u32 = u32::from_be_bytes(*b"\0rue");
+const ALSE: u32 = u32::from_be_bytes(*b"alse");
 
 struct Cursor<'a> {
     line: &'a [u8],
@@ -211,13 +216,19 @@ impl Cursor<'_> {
                 Some((Kind::Object, Span { start: self.at, end: self.at }))
             }
             letter => {
-                let kind = match letter {
-                    b'n' => Kind::Null,
-                    b't' => Kind::True,
-                    b'f' => Kind::False,
+                // The last four letters behind the first, in one word.
+                let mut rest = 0u32;
+                let span = self.span(|b| b.is_ascii_alphanumeric());
+                for byte in span.of(self.line).iter().skip(1) {
+                    rest = rest << 8 | u32::from(byte.to_ascii_lowercase());
+                }
+                let kind = match (letter, rest, span.end - span.start) {
+                    (b'n', 0 | ULL, ..=4) => Kind::Null,
+                    (b't', 0 | RUE, ..=4) => Kind::True,
+                    (b'f', 0 | ALSE, ..=5) => Kind::False,
                     _ => return None,
                 };
-                Some((kind, self.span(|b| b.is_ascii_alphanumeric())))
+                Some((kind, span))
             }
         }
     }

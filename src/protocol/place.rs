@@ -62,13 +62,14 @@ impl Place {
         }
     }
 
-    /// In what that is measured.
+    /// In what that is measured, and the end of the line.
     pub fn unit<M: Machine, O: Out>(&self, machine: &mut M, writer: &mut Writer<'_, O>) {
         writer.text(match (place_form(self.axis), machine.inches()) {
-            (Form::Length, true) => text!(" in\n"),
-            (Form::Length, false) => text!(" mm\n"),
-            _ => text!(" deg\n"),
+            (Form::Length, true) => text!(" in"),
+            (Form::Length, false) => text!(" mm"),
+            _ => text!(" deg"),
         });
+        writer.end_line();
     }
 }
 

@@ -54,16 +54,18 @@ impl Request {
     pub(super) fn program<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let start = u16::from(self.item) * STEP;
         self.item += 1;
+        // That of text mode, in a string or not, ends otherwise.
+        let is_value = self.is_json && !self.format.is_wrapped();
         let mut writer = Writer::body(c.out, &mut self.format);
         for at in start..start + STEP {
             match c.machine.program(at) {
-                Some(b'\n') if self.is_json => {
+                Some(b'\n') if is_value => {
                     writer.byte(b'\\');
                     writer.byte(b'n');
                 }
-                Some(b'\n') => writer.byte(b'\n'),
+                Some(b'\n') => writer.end_line(),
                 Some(byte) => writer.printable(byte),
-                None if self.is_json => {
+                None if is_value => {
                     writer.byte(b'"');
                     self.phase = Phase::Pair;
                     return;

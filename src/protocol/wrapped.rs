@@ -44,6 +44,7 @@ impl Request {
                 self.at = start + 1;
                 self.phase = Phase::Command;
             }
+            Some(b'?') if text.trim_ascii().len() > 1 => return Err(Status::MalformedCommand),
             Some(b'?') => self.enlist(Some(Group::Report), None),
             _ if help::asks_help(text) => self.help(help::GENERAL),
             _ if self.begun => return Err(Status::NotAccepted),

@@ -18,6 +18,8 @@ use crate::status::Status;
 pub const SLOTS: usize = 8;
 /// Longest line, in bytes without its end; less in a pool that has no more.
 pub const LINE_MAX: usize = 254;
+/// Asks for a status report. Senders of other firmwares say it without a line end, and then go on with their job.
+const ASKS: u8 = b'?';
 /// What is kept of a longer one.
 const REST_MAX: u8 = 32;
 
@@ -137,7 +139,9 @@ impl LinePool {
     /// [`LinePool::put`]. Returns how many. Cost: 9 cycles a byte.
     #[inline(never)]
     pub fn put_text(&mut self, bytes: &[u8]) -> u8 {
-        if self.fault.is_some() || (self.partial == 0 && bytes.first().is_none_or(|b| is_blank(*b)))
+        if self.fault.is_some()
+            || self.is_asking()
+            || (self.partial == 0 && bytes.first().is_none_or(|b| is_blank(*b) || *b == ASKS))
         {
             return 0;
         }
@@ -166,6 +170,12 @@ impl LinePool {
             self.pass(1);
             return false;
         }
+        let asks = self.is_asking() && !is_blank(byte);
+        if asks {
+            // It has no end of its own.
+            self.besides = self.besides.wrapping_sub(1);
+            self.end_line();
+        }
         let at = self.room_at();
         match self.bytes.get_mut(at) {
             Some(slot) if self.partial < self.longest => {
@@ -177,7 +187,12 @@ impl LinePool {
                 self.pass(1);
             }
         }
-        false
+        asks
+    }
+
+    /// Whether the line that is coming in is a question mark so far: whatever follows is another line.
+    fn is_asking(&self) -> bool {
+        self.partial > 0 && self.bytes.get(usize::from(self.end)) == Some(&ASKS)
     }
 
     /// Bytes have come that are not kept.
@@ -322,7 +337,7 @@ impl LinePool {
 
     /// How many bytes its sender counts for a line, with its end.
     pub fn length(&self, id: LineId) -> u16 {
-        let length = |entry: &Entry| entry.besides.saturating_add(u16::from(entry.len) + 1);
+        let length = |entry: &Entry| entry.besides.wrapping_add(u16::from(entry.len) + 1);
         self.entries.get(usize::from(id.0)).map_or(0, length)
     }
 

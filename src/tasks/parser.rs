@@ -18,6 +18,7 @@ use super::ports::{Chosen, Port};
 use super::tx::Tx;
 use super::view::View;
 use crate::alarm::{Alarm, is_program_end};
+use crate::gcode::command::Stop;
 use crate::hal::imp;
 use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::serial::USB;
@@ -44,7 +45,7 @@ pub async fn run(links: &'static Links) -> ! {
             flush => dropped(links, flush),
         };
         let Some(Chosen { port, id, class }) = next else {
-            match free && runs_job {
+            match free && runs_job && !links.job.get().is_over() {
                 true => job_line(links),
                 false => links.parser_wake.wait().await,
             }
@@ -85,25 +86,28 @@ fn is_free(links: &Links) -> bool {
     !waits && links.flush.get() == Flush::None
 }
 
-/// Carries out the next line of a built-in job. Its end, and a line that is refused, are told by an exception
-/// report.
+/// Carries out the next line of a built-in job. A line that is refused is told by an exception report. The end is told by
+/// the reporter, when everything is done.
 #[inline(never)]
 #[small]
 fn job_line(links: &Links) {
     let mut job = links.job.get();
     let mut line = Vec::new();
-    let status = match job.next_line(&Eeprom::take(), &mut line) {
-        true => interpret(links, &line, Usual::NotTried).0,
-        false => Status::EndOfFile,
-    };
-    if status == Status::Again {
-        return;
-    }
-    if !matches!(status, Status::Ok | Status::Noop) {
-        job = Job::default();
-        links.except(status);
+    if !job.next_line(&Eeprom::take(), &mut line) {
+        job.end();
+    } else {
+        match interpret(links, &line, Usual::NotTried).0 {
+            Status::Again => return,
+            Status::Ok if links.commands.borrow().stop == Stop::End => job.end(),
+            Status::Ok | Status::Noop => {}
+            status => {
+                job = Job::default();
+                links.except(status);
+            }
+        }
     }
     links.job.set(job);
+    links.reporter_wake.signal();
 }
 
 /// Whether the next line was a usual one.

@@ -178,19 +178,12 @@ impl Planner {
             self.tell();
             return Turn::More;
         }
-        if let Some(parts) = &mut self.parts {
-            let (end, feed) = (parts.next(&self.position), parts.feed);
-            if parts.left == 0 {
-                self.parts = None;
-            }
-            // Not longer than a block: the steps have been counted.
-            let _ = self.line(&end, feed);
-            self.position = end;
-            self.announce();
-            return Turn::More;
-        }
         let links = self.links;
         let commands = links.commands.borrow();
+        if self.parts.is_some() {
+            self.part(&commands);
+            return Turn::More;
+        }
         if let Some(arc) = &mut self.walk
             && let Motion::Arc { target, arc: circle, .. } = &commands.motion
         {
@@ -216,7 +209,9 @@ impl Planner {
         match step {
             Step::Line(target, feed) => {
                 self.straight(target, *feed);
-                self.moved(commands);
+                if self.parts.is_none() {
+                    self.moved(commands);
+                }
             }
             Step::Arc => self.begin_arc(&commands.motion),
             Step::Dwell(ms) => self.pause(Action::Dwell(*ms)),
@@ -256,6 +251,29 @@ impl Planner {
         }
     }
 
+    /// Queues the next part of a move, or makes parts of it in turn.
+    #[inline(never)]
+    #[small]
+    fn part(&mut self, commands: &Commands) {
+        let Some(parts) = &self.parts else { return };
+        let (end, feed) = (parts.end(&self.position), parts.feed);
+        let of = self.line(&end, feed);
+        let Some(parts) = &mut self.parts else { return };
+        if let Some(of) = of {
+            parts.divide(of);
+            return;
+        }
+        self.position = end;
+        parts.left -= 1;
+        if parts.left == 0 {
+            self.parts = None;
+            if self.walk.is_none() {
+                self.moved(commands);
+            }
+        }
+        self.announce();
+    }
+
     /// Queues a straight move, for which there is room, or says in how many parts it is to be made.
     fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) -> Option<u16> {
         let settings = self.links.settings.borrow();
@@ -275,7 +293,7 @@ impl Planner {
         }
     }
 
-    /// A move of the line has been queued, or its parts will be.
+    /// A move of the line has been queued.
     fn moved(&mut self, commands: &Commands) {
         if commands.exact_stop {
             self.builder.stopped();

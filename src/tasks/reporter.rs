@@ -19,6 +19,7 @@ use crate::hal::event::Event;
 use crate::hal::imp::flags;
 use crate::hal::imp::time::millis;
 use crate::hal::serial::is_shared;
+use crate::jobs::Job;
 use crate::protocol::notice::{Banner, Exception, Occasion, Probing, acknowledge, jog_ended};
 use crate::protocol::{
     Machine, Mode, Report, Value, put_ready_prompt, queue_report, receive_report,
@@ -53,6 +54,11 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         if !told.starved && health::starvations() > 0 && exception.get().is_none() {
             told.starved = true;
             exception.set(Some(Status::StepsLate));
+        }
+        if View::of(links, links.told()).has_done_job() {
+            links.job.set(Job::default());
+            links.except(Status::EndOfFile);
+            links.parser_wake.signal();
         }
         for port in &links.ports {
             if port.enquiry.take() {

@@ -15,6 +15,9 @@ use crate::motion::pace::Drivers;
 use crate::status::Status;
 use crate::units::{AXES, Length};
 
+/// An arc may bulge beyond the reach by this much at most: see `gcode::limits`.
+const REACH_SLACK: i32 = 256;
+
 #[small]
 impl Setup for Settings {
     fn mode(&self, axis: u8) -> AxisMode {
@@ -33,6 +36,11 @@ impl Setup for Settings {
     #[inline(always)]
     fn travel(&self, axis: u8) -> Option<(Length, Length)> {
         if self.soft_limits() { limited_travel(self, axis) } else { None }
+    }
+
+    #[inline(always)]
+    fn reach(&self) -> Option<Length> {
+        if self.octaves() == 0 { None } else { Some(fine_reach(self)) }
     }
 
     #[inline(never)]
@@ -112,6 +120,17 @@ impl Machine for Settings {
     }
     fn drivers(&self) -> Drivers {
         Drivers { pulse_us: self.step_pulse_us(), setup_us: self.direction_setup_us() }
+    }
+}
+
+/// How far steps can be counted if some motor makes several in the shortest length.
+#[inline(never)]
+#[small]
+fn fine_reach(settings: &Settings) -> Length {
+    match settings.octaves() {
+        octaves @ ..=14 => Length((i32::MAX >> octaves) - REACH_SLACK),
+        // A block could not hold the steps of the shortest move: there is no way, not even from the origin.
+        _ => Length(-1),
     }
 }
 

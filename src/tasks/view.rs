@@ -25,6 +25,7 @@ use crate::baud;
 use crate::boards::{MOTORS, inputs};
 use crate::config::{Setting, Settings};
 use crate::gcode::command::Motion;
+use crate::gcode::limits::is_near;
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::overrides::Change;
 use crate::gcode::setup::{AxisMode, Setup};
@@ -106,10 +107,17 @@ impl<'a> View<'a> {
 
     /// Whether anything is queued or runs.
     pub fn has_work(&self) -> bool {
-        self.motion().running
-            || queue::used() > 0
-            || self.links.commands_taken.get()
-            || !self.links.job.get().is_none()
+        self.carries_out() || !self.links.job.get().is_none()
+    }
+
+    /// Whether a line is being carried out.
+    fn carries_out(&self) -> bool {
+        self.motion().running || queue::used() > 0 || self.links.commands_taken.get()
+    }
+
+    /// Whether a built-in job has been carried out to its end.
+    pub fn has_done_job(&self) -> bool {
+        self.links.job.get().is_over() && !self.carries_out()
     }
 
     /// `stat`.
@@ -462,8 +470,12 @@ impl Machine for View<'_> {
         let mut target = *model.position();
         let travel = self.settings.travel(axis).filter(|_| model.is_homed(axis));
         drop(model);
+        let near = is_near(&target, &*self.settings);
         if let Some(at) = target.get_mut(usize::from(axis)) {
             *at = travel.map_or(place, |(low, high)| place.max(low).min(high));
+        }
+        if !near || !is_near(&target, &*self.settings) {
+            return Status::OutOfRange;
         }
         self.begin(Motion::Jog { target }, Cycle::Jog)
     }

@@ -1,13 +1,31 @@
 //! Child processes, and where the repository is.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, ExitStatus, Stdio};
+use std::sync::LazyLock;
 
 use anyhow::{Context, Result, ensure};
 
-/// The repository's root.
+/// The repository's root, worked out at run time.
+///
+/// Cargo takes a target folder that was copied with its checkout for up to date, so that a path fixed at compile time
+/// would be that of the original.
 pub fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies in the repository")
+    static ROOT: LazyLock<PathBuf> = LazyLock::new(|| {
+        let program = std::env::current_exe().unwrap_or_default();
+        find_root(std::env::var_os("CARGO_MANIFEST_DIR"), &program)
+            .expect("start me by `cargo xtask` in the repository")
+    });
+    &ROOT
+}
+
+/// The repository of the package that cargo has started, else of the program in its target folder.
+fn find_root(package: Option<OsString>, program: &Path) -> Option<PathBuf> {
+    let package = package.map(PathBuf::from).filter(|dir| dir.ends_with("xtask"));
+    let starts = package.iter().map(PathBuf::as_path).chain([program]);
+    let mut folders = starts.flat_map(|start| start.ancestors().skip(1));
+    folders.find(|dir| dir.join("xtask/Cargo.toml").is_file()).map(Path::to_owned)
 }
 
 /// The cargo that started this program, for everything that runs on the host.
@@ -58,4 +76,59 @@ pub fn which(program: &str) -> Option<PathBuf> {
 pub fn shown(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder that looks like a checkout of the repository.
+    fn checkout(name: &str) -> PathBuf {
+        let root = root().join("target/tmp/checkouts").join(name);
+        std::fs::create_dir_all(root.join("xtask")).unwrap();
+        std::fs::write(root.join("xtask/Cargo.toml"), "").unwrap();
+        root
+    }
+
+    #[test]
+    fn a_copied_checkout_is_its_own_root() {
+        let (original, copy) = (checkout("original"), checkout("copy"));
+        let package = |root: &Path| Some(root.join("xtask").into_os_string());
+        let program = |root: &Path| root.join("target/debug/xtask");
+        assert_eq!(find_root(package(&copy), &program(&copy)).as_ref(), Some(&copy));
+        // Cargo's word counts: the target folder may be anywhere.
+        assert_eq!(find_root(package(&copy), &program(&original)).as_ref(), Some(&copy));
+        assert_eq!(find_root(None, &program(&copy)).as_ref(), Some(&copy));
+        // Started by another package's cargo.
+        let other = Some(original.clone().into_os_string());
+        assert_eq!(find_root(other, &program(&copy)).as_ref(), Some(&copy));
+        assert_eq!(find_root(None, Path::new("/xtask")), None);
+    }
+
+    /// Macros that fix a place at compile time; what they say is wrong in a copied checkout.
+    const FIXED_PLACES: [&str; 3] =
+        ["env!(\"CARGO_MANIFEST_DIR", "env!(\"CARGO_TARGET_TMPDIR", "env!(\"CARGO_BIN_EXE"];
+
+    #[test]
+    fn no_place_is_fixed_at_compile_time() {
+        let mut folders: Vec<_> =
+            ["src", "macros", "xtask", "tests"].map(|name| root().join(name)).into();
+        let mut found = Vec::new();
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|ending| ending == "rs")
+                    && !path.ends_with("xtask/src/process.rs")
+                {
+                    let text = std::fs::read_to_string(&path).unwrap();
+                    if FIXED_PLACES.iter().any(|place| text.contains(place)) {
+                        found.push(path);
+                    }
+                }
+            }
+        }
+        assert!(found.is_empty(), "fixed at compile time: {found:?}");
+    }
 }

@@ -89,7 +89,10 @@ pub const MOTOR: [Meaning; MOTOR_ROWS] = [
         "Axis that it moves: 0 X, 1 Y, 2 Z, 3 A, 4 B, 5 C; above that none. Several may move one axis.",
     ),
     ("sa", "Angle of a full step."),
-    ("tr", "Travel of the axis in a turn."),
+    (
+        "tr",
+        "Travel of the axis in a turn. More than 10,000 steps in a millimetre or degree leave less room for positions: see [how far numbers go](protocol.md#how-far-numbers-go).",
+    ),
     ("mi", "Microsteps of the driver. Usual are 1, 2, 4 and 8; others are taken with a warning."),
     ("po", "Direction."),
     ("pm", "When it is powered; see `mt`."),

@@ -79,7 +79,7 @@ go to a place:
 | end that | `{test:0}` | `$test=0` |
 
 It is there when `{prog:t}` is answered with status 0; until then there is none, and a power cut leaves none. It
-is written at rest (else 106). 34 means that it has no room. Like a built-in job it ends with an exception report: 8 at its end, or why a line was
+is written at rest (else 106). 34 means that it has no room. Like a built-in job it ends with M2 or M30, or with its last line, and then, when its motion is done, with an exception report: 8, or at once why a line was
 refused. A line is looked at when it is carried out, not before.
 ";
 

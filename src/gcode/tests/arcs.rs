@@ -88,6 +88,9 @@ fn incomplete_arcs() {
 fn impossible_arcs() {
     for (line, status) in [
         ("G2 X0 Y10 R0.09", Status::ArcRadiusTolerance),
+        ("G2 X10.0017 R0.0009", Status::ArcRadiusTolerance),
+        ("G2 X10.0023 R0.001", Status::ArcRadiusTolerance),
+        ("G2 X10.044 R0.02", Status::ArcRadiusTolerance),
         ("G2 X-10 R9.99", Status::ArcRadiusTolerance),
         ("G2 X-10 R0", Status::ArcRadiusTolerance),
         ("G2 X1000000 R10", Status::OutOfRange),
@@ -101,6 +104,9 @@ fn impossible_arcs() {
     ] {
         assert_eq!(refusal(&[AT_10_0, line]), status, "{line}");
     }
+    // Small ones: 1 um, and what a real program has.
+    assert_eq!(center(&[AT_10_0, "G2 X10.002 R0.001"]), [100_010, 0]);
+    run(&["F1 G20 G0 X0.00392 Y0.000795", "G2 R0.002 X0.00199 Y0.0002"]);
     // 5 um, or a thousandth of the radius up to 1 mm.
     run(&[AT_10_0, "G3 X0 Y10.0049 I-10"]);
     run(&["F1 G0 X500", "G3 X0 Y500.4 I-500"]);

@@ -15,8 +15,8 @@ use crate::hal::timers::Timers;
 
 const _: () = assert!(matches!(ACTIVE.tick_timer, Timer::T0), "the tick is on timer 0");
 
-/// Milliseconds since reset. The interrupt alone writes it.
-static mut MILLIS: u32 = 0;
+/// Milliseconds since reset, the lowest byte first: enough for 34 years. The interrupt alone writes it.
+static mut MILLIS: [u8; 5] = [0; 5];
 
 /// TIMER0_COMPA: counts. Interrupts are off for 20 cycles.
 ///
@@ -46,6 +46,10 @@ extern "C" fn __vector_21() -> ! {
             "lds  r24, {millis} + 3",
             "inc  r24",
             "sts  {millis} + 3, r24",
+            "brne 1f",
+            "lds  r24, {millis} + 4",
+            "inc  r24",
+            "sts  {millis} + 4, r24",
             "1:",
             "sbi  0x1E, {tick}",
             "pop  r24",
@@ -59,10 +63,15 @@ extern "C" fn __vector_21() -> ! {
     }
 }
 
-/// Milliseconds since reset.
-pub fn millis() -> u32 {
+fn count() -> [u8; 5] {
     // SAFETY: the writer is an interrupt, and interrupts are off.
     avr_device::interrupt::free(|_| unsafe { MILLIS })
+}
+
+/// Milliseconds since reset, modulo 2^32: they wrap after 49.7 days.
+pub fn millis() -> u32 {
+    let [a, b, c, d, _] = count();
+    u32::from_le_bytes([a, b, c, d])
 }
 
 struct Millis(Timers);
@@ -71,8 +80,8 @@ time_driver_impl!(static DRIVER: Millis = Millis(Timers::new()));
 
 impl Driver for Millis {
     fn now(&self) -> u64 {
-        // 49 days, then timers that are pending fire late by as much: a machine is off by then.
-        u64::from(millis())
+        let [a, b, c, d, e] = count();
+        u64::from_le_bytes([a, b, c, d, e, 0, 0, 0])
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {

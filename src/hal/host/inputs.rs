@@ -31,7 +31,7 @@ machine_static! {
         hits: Cell::new(0),
         armed: Cell::new((0, 0)),
         fresh: Cell::new(true),
-        next_look: Cell::new(cycles(LATER_US)),
+        next_look: Cell::new(now() + cycles(LATER_US)),
     };
 }
 

@@ -18,6 +18,12 @@ pub struct Machine {
 impl Machine {
     /// Makes the machine and boots the firmware at `baud`. One for each thread: `None` for a second.
     pub fn boot(baud: u32) -> Option<Self> {
+        Self::boot_at(baud, 0)
+    }
+
+    /// The same, and its millisecond count begins at `ms`.
+    pub fn boot_at(baud: u32, ms: u64) -> Option<Self> {
+        clock().set(ms * time::CYCLES_PER_MS);
         let main: &'static Executor = Box::leak(Box::new(Executor::new(pender::THREAD)));
         let exec: &'static Executor = Box::leak(Box::new(Executor::new(pender::EXEC)));
         crate::app::start(main.spawner(), exec.spawner(), baud)?;

@@ -30,7 +30,7 @@ impl Driver for Millis {
     }
 }
 
-/// Milliseconds since the machine was made.
+/// Milliseconds since the machine was made, modulo 2^32.
 pub fn millis() -> u32 {
     DRIVER.now() as u32
 }

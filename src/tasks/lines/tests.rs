@@ -194,3 +194,18 @@ fn an_over_long_line_is_known_by_its_beginning() {
     assert_eq!(class, Class::Fault(Status::InputTooLong));
     assert!(text.starts_with(b"{xxx") && text.len() == usize::from(REST_MAX));
 }
+
+#[test]
+fn a_question_mark_needs_no_end() {
+    let mut pool = pool();
+    feed(&mut pool, b" ??\t?g0x1\n?\n? \r\n?{a:n}\n");
+    let lengths = (0..7).map(|n| pool.length(LineId(n))).collect::<std::vec::Vec<_>>();
+    assert_eq!(lengths, [2, 2, 1, 5, 2, 3, 2]);
+    let mut lines = std::vec::Vec::new();
+    while let Some((line, class)) = take(&mut pool, true) {
+        lines.push((std::string::String::from_utf8(line).unwrap(), class));
+    }
+    let text = lines.iter().map(|(line, _)| line.trim()).collect::<std::vec::Vec<_>>();
+    assert_eq!(text, ["?", "?", "?", "?", "?", "?", "{a:n}", "g0x1"]);
+    assert_eq!(lines[7].1, Class::Data);
+}

@@ -16,35 +16,42 @@ pub(super) struct ArcWalk {
     pub curve: Curve,
 }
 
-/// A move under way that is too long for one block.
+/// A move under way that is too long for one block, or longer than a [`Length`] can be.
 pub(super) struct Parts {
     target: PerAxis<Length>,
     pub feed: Option<Feed>,
-    pub left: u16,
+    pub left: u32,
 }
 
 impl Parts {
     #[inline(never)]
     #[small]
     pub fn new(target: &PerAxis<Length>, feed: Option<Feed>, of: u16) -> Self {
+        let mut parts = Self { target: *target, feed, left: 1 };
+        parts.divide(of);
+        parts
+    }
+
+    /// Makes so many of each part that is left. Interpreters refuse moves of which the shortest part is too long still.
+    #[inline(never)]
+    #[small]
+    pub fn divide(&mut self, of: u16) {
         // Inverse time is that of the whole.
-        let feed = match feed {
-            Some(Feed::Minutes(minutes)) => Some(Feed::Minutes(minutes / f32::from(of))),
-            other => other,
-        };
-        Self { target: *target, feed, left: of }
+        if let Some(Feed::Minutes(minutes)) = &mut self.feed {
+            *minutes /= f32::from(of);
+        }
+        self.left = self.left.wrapping_mul(of.into());
     }
 
     /// The end of the next part, the machine being at `position`.
     #[inline(never)]
     #[small]
-    pub fn next(&mut self, position: &PerAxis<Length>) -> PerAxis<Length> {
+    pub fn end(&self, position: &PerAxis<Length>) -> PerAxis<Length> {
         let mut end = self.target;
         for (end, start) in end.iter_mut().zip(position) {
             let way = i64::from(end.0) - i64::from(start.0);
             *end = Length((i64::from(start.0) + way / i64::from(self.left)) as i32);
         }
-        self.left -= 1;
         end
     }
 }

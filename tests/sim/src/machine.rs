@@ -69,6 +69,9 @@ impl fmt::Display for Fault {
 
 impl std::error::Error for Fault {}
 
+/// The first address of the data space behind the registers.
+const RAM_START: usize = 0x200;
+
 /// A simulated ATmega2560 on a board, running a firmware image.
 pub struct Machine {
     cpu: Cpu,
@@ -375,6 +378,11 @@ impl Machine {
         &self.bus().uarts[index]
     }
 
+    /// Whether the first USART takes bytes now: its receiver is on, and interrupts are.
+    pub fn is_listening(&self) -> bool {
+        self.uart(0).is_listening() && self.cpu.interrupts_on()
+    }
+
     /// CTC tops of the step timer that were written behind its counter.
     pub fn missed_tops(&self) -> u64 {
         self.bus().timers[self.board.step_timer as usize].missed()
@@ -385,9 +393,12 @@ impl Machine {
         self.cpu.data(usize::from(addr))
     }
 
-    /// Does what a store of the firmware would: to break it.
+    /// Does what a store of the firmware would, to a register or to RAM: to break it, or to make it old.
     pub fn poke(&mut self, addr: u16, value: u8) {
-        self.bus_mut().store(addr, value);
+        match usize::from(addr) {
+            addr if addr >= RAM_START => self.cpu.set_data(addr, value),
+            _ => self.bus_mut().store(addr, value),
+        }
     }
 
     /// An interrupt of a USART is not served from now on, or it is again: to hold up what runs in it.

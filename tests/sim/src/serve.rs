@@ -38,6 +38,8 @@ struct Server {
     speed: Speed,
     peer: Peer,
     reset_at: Option<Instant>,
+    /// The firmware has begun to take bytes since the last reset.
+    listens: bool,
     /// The cycle that belongs to an instant.
     anchor: (Instant, u64),
     boots: u64,
@@ -102,6 +104,7 @@ impl Server {
             speed: args.speed,
             peer: Peer::Closed,
             reset_at: None,
+            listens: false,
             boots: 0,
         })
     }
@@ -117,9 +120,8 @@ impl Server {
             self.reset_at = None;
             self.reset()?;
         }
-        let room = self.machine.wire().backlog() < BACKLOG;
-        let bytes = if room { self.pty.read()? } else { Vec::new() };
-        if !bytes.is_empty() && self.reset_at.is_none() {
+        if self.takes_bytes() {
+            let bytes = self.pty.read()?;
             self.machine.send(&bytes);
         }
         self.run()?;
@@ -132,6 +134,13 @@ impl Server {
         Ok(())
     }
 
+    /// Whether bytes go to the machine. Before the reset, and until the firmware listens after it, they wait in the
+    /// pseudo-terminal; a board loses them.
+    fn takes_bytes(&mut self) -> bool {
+        self.listens = self.listens || self.machine.is_listening();
+        self.listens && self.reset_at.is_none() && self.machine.wire().backlog() < BACKLOG
+    }
+
     fn reset(&mut self) -> Result<()> {
         let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
         fresh.build(&around(fresh.board()));
@@ -140,6 +149,7 @@ impl Server {
         fresh.set_eeprom(self.machine.eeprom());
         self.machine = fresh;
         self.anchor = (Instant::now(), 0);
+        self.listens = false;
         self.boots += 1;
         Ok(())
     }

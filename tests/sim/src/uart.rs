@@ -114,6 +114,11 @@ impl Uart {
         }
     }
 
+    /// Whether the receiver is on.
+    pub fn is_listening(&self) -> bool {
+        self.control & RXEN != 0
+    }
+
     /// Bytes lost because they were not read in time.
     pub fn overruns(&self) -> u64 {
         self.overruns

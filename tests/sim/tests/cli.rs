@@ -5,18 +5,14 @@ mod common;
 use std::fs::{self, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Output, Stdio};
 
-use common::build;
+use common::{build, kerf_sim};
 
 fn scratch(name: &str, text: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let path = common::scratch(name);
     fs::write(&path, text).unwrap();
     path
-}
-
-fn kerf_sim() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_kerf-sim"))
 }
 
 fn run(elf: &Path, job: &Path, more: &[&str]) -> Output {

@@ -58,8 +58,7 @@ fn said(why: &(dyn std::any::Any + Send)) -> String {
 }
 
 fn lines(job: &str) -> Lines {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-    job::read_lines(&folder.join(format!("{job}.gcode"))).unwrap()
+    job::read_lines(Path::new(&format!("../../examples/{job}.gcode"))).unwrap()
 }
 
 fn settings(board: &Board) -> Vec<String> {

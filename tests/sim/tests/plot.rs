@@ -4,9 +4,8 @@ mod common;
 
 use std::fs::{self, File};
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
 
-use common::firmware;
+use common::{firmware, scratch};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
@@ -17,10 +16,6 @@ use kerf_sim::report::Report;
 const PER_MM: f64 = 1_280.0;
 /// A jerk limit of 20 millions of mm/min3, in mm/s3.
 const JERK: f64 = 20e6 / 216_000.0;
-
-fn scratch(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
-}
 
 fn run(job: &str, options: &Options) -> (Machine, Report) {
     let mut machine = firmware(&MEGA2560_GRBL);

@@ -4,9 +4,9 @@ mod common;
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Lines, Read, Write};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 
-use common::image;
+use common::{image, kerf_sim};
 use kerf::boards::MEGA2560_GRBL;
 
 /// Ends the server however the test ends.
@@ -27,7 +27,7 @@ fn next(lines: &mut Lines<BufReader<File>>) -> String {
 
 /// Starts a server; its first line is the port.
 fn serve(more: &[&str]) -> (Server, File) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_kerf-sim"));
+    let mut command = kerf_sim();
     command.arg("serve").arg("--elf").arg(image(&MEGA2560_GRBL)).args(more);
     command.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut server = Server(command.spawn().unwrap());
@@ -59,6 +59,16 @@ fn it_is_told_whether_the_machine_is_where_the_job_ends() {
         assert_eq!((ok, text.contains("result: OK")), (content, content), "{text}");
     }
     std::fs::remove_file(job).unwrap();
+}
+
+#[test]
+fn what_is_sent_before_the_firmware_listens_is_kept() {
+    let (_server, mut port) = serve(&[]);
+    port.write_all(b"{fb:n}\n").unwrap();
+    let mut lines = BufReader::new(port.try_clone().unwrap()).lines();
+    assert!(next(&mut lines).contains("SYSTEM READY"));
+    port.write_all(b"{fv:n}\n").unwrap();
+    assert!(next(&mut lines).starts_with(r#"{"r":{"fb":440.20},"f":[1,0,"#));
 }
 
 #[test]

@@ -15,6 +15,6 @@ use kerf::boards::MEGA2560_GRBL;
 
 #[test]
 fn the_image_keeps_to_the_transcripts() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../transcripts");
-    transcript::play_all(transcript::read_all(&folder), 2, || firmware(&MEGA2560_GRBL));
+    let folder = Path::new("../transcripts");
+    transcript::play_all(transcript::read_all(folder), 2, || firmware(&MEGA2560_GRBL));
 }

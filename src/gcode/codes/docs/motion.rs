@@ -24,7 +24,7 @@ macro_rules! arc {
             no(ArcOffsetsMissing, &[concat!($code, " X1 I0 J0 F100")]),
             no(ArcOffsetsMissing, &["G90.1", concat!($code, " X2 I1 F100")]),
             no(ArcRadiusTolerance, &[concat!($code, " X5 R1 F100")]),
-            no(ArcRadiusTolerance, &[concat!($code, " X0.1 R0.09 F100")]),
+            no(ArcRadiusTolerance, &[concat!($code, " X0.1 R0.04 F100")]),
             no(ArcEndpointIsStart, &[concat!($code, " X0 R5 F100")]),
             no(OutOfRange, &["G28.3 X214000", concat!($code, " I500 F100")]),
             no(PWordNegative, &[concat!($code, " I1 P-1 F100")]),
@@ -101,7 +101,7 @@ positive end of the third axis, along which a helix advances. The centre is at I
 start, where one of two may be left out, with G90.1 from the origin), or R is the radius, negative for the \
 long way round. Without an end point in the plane: a full circle. P full turns more; of a full circle, P \
 turns in all. Radii at start and end may differ by 5 um, or by a thousandth, but never by 1 mm; the smallest \
-R is 0.1 mm. Stays in force.";
+R is 0.001 mm. Stays in force.";
 
 pub const PROBES: Section = Section {
     title: "Probing",

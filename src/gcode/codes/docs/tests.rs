@@ -70,7 +70,7 @@ fn examples_are_of_their_code() {
 
 /// The statuses that are named in the sources of the language.
 fn named() -> HashSet<String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/gcode");
+    let folder = Path::new("src/gcode");
     let mut named = HashSet::new();
     for file in fs::read_dir(folder).unwrap() {
         let Ok(text) = fs::read_to_string(file.unwrap().path()) else { continue };

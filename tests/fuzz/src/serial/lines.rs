@@ -42,10 +42,13 @@ impl Lines {
                 None
             }
             _ => {
+                // A question mark is a line of its own, with an end or without.
+                let asked = self.first == Some(b'?') && !matches!(byte, b' ' | b'\t');
+                let ended = (asked && !self.damaged && self.len <= LINE_MAX).then(|| self.end());
                 self.more |= self.first.is_some() && !matches!(byte, b' ' | b'\t');
                 self.first = self.first.or(Some(byte));
                 self.len += 1;
-                None
+                ended
             }
         }
     }

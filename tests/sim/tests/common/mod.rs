@@ -7,13 +7,31 @@ use std::process::Command;
 use kerf::boards::{Board, MEGA2560_GRBL};
 use kerf_sim::{Host, Image, LINES_IN_FLIGHT, Machine};
 
+/// The folder of the profile's programs, which this one lies in too: cargo runs tests in the package's folder, but a path
+/// fixed at compile time is that of the original in a copied checkout.
+fn programs() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    test.ancestors().nth(2).expect("deps/test in the folder of the profile").to_owned()
+}
+
+/// The simulator's program.
+pub fn kerf_sim() -> Command {
+    Command::new(programs().join("kerf-sim"))
+}
+
+/// A file for a test to write.
+pub fn scratch(name: &str) -> PathBuf {
+    let folder = programs().join("scratch");
+    std::fs::create_dir_all(&folder).unwrap();
+    folder.join(name)
+}
+
 /// Compiles a fixture and returns the ELF file's path.
 pub fn build(name: &str) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures").join(name);
-    let scratch = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let source = Path::new("fixtures").join(name);
     // Tests run at the same time: each writes a file of its own.
     let unique = format!("{name}.{:?}.elf", std::thread::current().id());
-    let elf = scratch.join(unique.replace(['(', ')'], ""));
+    let elf = scratch(&unique.replace(['(', ')'], ""));
     let status = Command::new("avr-gcc")
         .args(["-mmcu=atmega2560", "-Os", "-DF_CPU=16000000UL", "-o"])
         .arg(&elf)
@@ -42,9 +60,8 @@ pub fn word(machine: &Machine, name: &str) -> u16 {
 
 /// Where the firmware's image for a board lies.
 pub fn image(board: &Board) -> PathBuf {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap();
     let folder = std::env::var_os("KERF_ELF_DIR")
-        .map_or_else(|| workspace.join("target/firmware"), PathBuf::from);
+        .map_or_else(|| PathBuf::from("../../target/firmware"), PathBuf::from);
     let elf = folder.join(format!("{}.elf", board.name));
     let (elf_name, name) = (elf.display(), board.name);
     assert!(elf.exists(), "no {elf_name}: `cargo xtask build --board {name}` makes it");

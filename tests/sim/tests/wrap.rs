@@ -1,0 +1,76 @@
+//! The millisecond count of the image wraps after 2^32 ms, 49.7 days. Each machine here is 3 s before it when it starts.
+
+mod common;
+
+use common::{firmware, set};
+use kerf::boards::RAMPS14;
+use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
+
+/// The mask of the tick's interrupt.
+const TIMSK0: u16 = 0x6E;
+/// The count, the lowest byte first.
+const MILLIS: &str = "kerf::hal::imp::time::MILLIS";
+
+/// A machine that has run for 49.7 days but 3 s.
+fn old() -> (Machine, Host) {
+    let mut machine = firmware(&RAMPS14);
+    // Before any task waits for a time.
+    while machine.peek(TIMSK0) == 0 {
+        machine.run_until(machine.cycle() + 16).unwrap();
+    }
+    let count = machine.image().variable(MILLIS).expect("the count of milliseconds");
+    for (at, byte) in (count..).zip(3_000u32.wrapping_neg().to_le_bytes()) {
+        machine.poke(at, byte);
+    }
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut machine, 1_000).unwrap();
+    (machine, host)
+}
+
+/// Runs until the count has wrapped, and longer than the watchdog has patience.
+fn pass(machine: &mut Machine, host: &mut Host) {
+    host.run_for_ms(machine, 12_000).unwrap();
+    assert_eq!(machine.resets(), 0, "the watchdog has bitten");
+    set(machine, host, "{fb:n}");
+}
+
+#[test]
+fn idle() {
+    let (mut machine, mut host) = old();
+    pass(&mut machine, &mut host);
+    set(&mut machine, &mut host, "{xvm:700}");
+    host.run_for_ms(&mut machine, 200).unwrap();
+    assert!(machine.eeprom_writes() > 0, "the setting is stored");
+}
+
+#[test]
+fn with_a_spindle() {
+    let (mut machine, mut host) = old();
+    set(&mut machine, &mut host, "m3 s1000");
+    pass(&mut machine, &mut host);
+    let spindle = RAMPS14.outputs[0].unwrap();
+    assert!(machine.is_high(spindle));
+    set(&mut machine, &mut host, "m5");
+    host.run_for_ms(&mut machine, 100).unwrap();
+    assert!(!machine.is_high(spindle));
+}
+
+#[test]
+fn in_a_dwell() {
+    let (mut machine, mut host) = old();
+    set(&mut machine, &mut host, "g4 p13");
+    set(&mut machine, &mut host, "g1 x1 f500");
+    pass(&mut machine, &mut host);
+    assert_eq!(machine.recorder().steps(), 0);
+    host.run_for_ms(&mut machine, 1_500).unwrap();
+    assert_eq!(machine.recorder().motors()[0].position, 1_280);
+}
+
+#[test]
+fn in_a_move() {
+    let (mut machine, mut host) = old();
+    set(&mut machine, &mut host, "g1 x110 f500");
+    pass(&mut machine, &mut host);
+    host.run_for_ms(&mut machine, 1_500).unwrap();
+    assert_eq!(machine.recorder().motors()[0].position, 140_800);
+}
