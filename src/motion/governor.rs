@@ -12,7 +12,7 @@
 //! (`constraint`). The work for a stretch has a bound in every state.
 //!
 //! Cost on AVR: 1,500 to 2,500 cycles a stretch without a jerk limit. With one 500 for a block that is over within the slice,
-//! 1,500 at the feed, 4,000 in a ramp; at worst some 27,000, with a scan and a ramp that is laid out.
+//! 1,200 at the feed, 3,500 in a ramp; at worst some 19,000, with a scan and a ramp that is laid out.
 
 pub use super::constraint::Ahead;
 use super::constraint::Clear;

@@ -20,7 +20,6 @@ use super::float::{least, some};
 use super::junction::{self, Heading};
 use super::limits::LastFeed;
 use super::path::{Path, Way};
-use super::short::Short;
 use super::steps::Motor;
 use crate::boards::MOTORS;
 use crate::config::StepRatio;
@@ -115,9 +114,8 @@ impl Builder {
         path.limit_steps(&dynamics.rates, line.curve.is_some());
         path.heading.deviation = junction::deviation(&path.heading.unit, dynamics);
         let mut entry = least(path.top, self.top);
-        // The chords of an arc have its limits, and under a jerk limit no corners between them.
-        let goes_on =
-            path.jerk != Short::ZERO && matches!(line.curve, Some(curve) if curve.goes_on);
+        // The chords of an arc have its limits, and no corners between them.
+        let goes_on = matches!(line.curve, Some(curve) if curve.goes_on);
         if some(entry) && !goes_on {
             entry = junction::limit(&self.heading, &path.heading, dynamics.junction, entry);
         }

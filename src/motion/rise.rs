@@ -17,13 +17,14 @@
 //! what is known allows it.
 //!
 //! **Slower.** A ramp is followed to its end. In every fourth slice of it, if something ahead has changed, it asks whether the
-//! machine may go on at the velocity at which the deceleration is ended when that begins now.
+//! machine may go on at the velocity at which the deceleration is ended when that begins now, or, if it has not begun, go faster.
+//! If not, the ramp goes on.
 //!
 //! What the length of slices makes unavoidable: alpha changes in steps of a slice while it rises. A velocity that is less than `J t^2`
 //! away (t the time of a slice) is gone to at once, as is the end of a move that is shorter than `2 J t^3`.
 //!
-//! Units: mm, s; distances to what is ahead are brake potential (`constraint`). Cost on AVR: 2,000 cycles at a steady velocity
-//! or in a ramp, 3,500 while alpha rises; a scan 4,000 to 10,000 more, a ramp that is laid out 2,200 to 5,000.
+//! Units: mm, s; distances to what is ahead are brake potential (`constraint`). Cost on AVR: 800 cycles at a steady velocity, 2,400
+//! in a ramp, 3,000 while alpha rises; a scan 3,500 to 7,500 more, a ramp that is laid out 2,000 to 4,000.
 
 use super::constraint::{Ahead, Ask, Clear, needed};
 use super::exec::SEGMENT_S;

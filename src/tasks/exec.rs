@@ -2,7 +2,7 @@
 //!
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
 //! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
-//! milliseconds ([`Amount::least`]), 4,000 to 14,000 cycles each, 30,000 where much changes at once; the rest one by one, when one is used up or thread mode
+//! milliseconds ([`Amount::least`]), 4,000 to 12,000 cycles each, 24,000 at worst; the rest one by one, when one is used up or thread mode
 //! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`WAITING_SHORT`]), stretches become twice
 //! as long, and for a while more waits ([`PRESSED`]).
 
@@ -245,9 +245,8 @@ struct Amount {
     least: u16,
 }
 
-/// With the segment that runs, which takes 2 ms or less while anything is fast, a feedhold begins within 10 ms where segments take
-/// 2 ms, three of which wait, and within 11.5 ms where they are longer or shorter. Less would not outlast a ramp that is laid out while
-/// ticks take two thirds of the CPU, which takes up to 4.1 ms, or an override.
+/// With the segment that runs, which takes 2 ms or less while anything is fast, a feedhold begins within 10 ms. Less would not outlast a
+/// ramp that is laid out while ticks take two thirds of the CPU, which takes up to 4.1 ms, or an override.
 const USUAL: Amount = Amount { most: units(70), least: units(38) };
 
 /// For a while after too little has been waiting: a feedhold begins within 14 ms.

@@ -1,5 +1,5 @@
-//! Random jobs on the image: lines and arcs of all sizes with four axes, under random jerk limits and at random feeds.
-//! None has a pause, and each ends exactly.
+//! Random jobs on the image: lines and arcs of all sizes with four axes, under random jerk limits and at random feeds; and with
+//! two axes at high step rates, with holds and overrides at random times. None has a pause, and each ends exactly.
 //!
 //! `KERF_SEED` and `KERF_CASES` choose the jobs: `KERF_CASES=1000` for a thousand.
 
@@ -22,6 +22,9 @@ use proptest::strategy::ValueTree;
 /// Jobs unless asked otherwise: about two minutes on two cores.
 const CASES: u64 = 50;
 
+/// Of those with holds and overrides: about a minute.
+const DISTURBED: u64 = 12;
+
 /// A place to go to, as offsets of X, Y, Z (mm) and A (degrees).
 #[derive(Clone, Debug)]
 enum Move {
@@ -33,7 +36,13 @@ enum Move {
 struct Job {
     /// Millions of mm/min3; 1,000,000 is none.
     jerk: f64,
+    /// mm/s2.
+    accel: f64,
+    /// Steps of X and Y in a mm.
+    per_mm: f64,
     moves: Vec<Move>,
+    /// Real-time characters, and when they are said, ms after the first line.
+    said: Vec<(u64, u8)>,
 }
 
 /// Evenly over the decades.
@@ -80,16 +89,84 @@ fn any_job() -> impl Strategy<Value = Job> {
         };
         (0..count).map(way).collect::<Vec<_>>()
     });
-    (jerk, prop_oneof![2 => mixed, 1 => curve]).prop_map(|(jerk, moves)| Job { jerk, moves })
+    (jerk, prop_oneof![2 => mixed, 1 => curve]).prop_map(|(jerk, moves)| Job {
+        jerk,
+        accel: 500.0,
+        per_mm: 80.0,
+        moves,
+        said: Vec::new(),
+    })
+}
+
+/// Arcs, lines, and curves of short lines with X and Y at one feed.
+fn fast_moves() -> impl Strategy<Value = Vec<Move>> {
+    let feed = 0.0;
+    let angle = || 0.0..std::f64::consts::TAU;
+    let arc = (2.0..30.0f64, angle(), 1.0..5.5f64, any::<bool>()).prop_map(
+        move |(radius, from, turn, left)| {
+            let turn = if left { turn } else { -turn };
+            vec![Move::Arc { radius, from, turn, rise: 0.0, feed }]
+        },
+    );
+    let line = move |mm: f64, angle: f64| Move::Line {
+        way: [mm * angle.cos(), mm * angle.sin(), 0.0, 0.0],
+        feed,
+    };
+    let long = (1.0..40.0f64, angle()).prop_map(move |(mm, angle)| vec![line(mm, angle)]);
+    let bends = prop::collection::vec(-0.1..0.15f64, 60);
+    let mm = prop_oneof![Just(0.05), Just(0.1), Just(0.3)];
+    let curve = (mm, angle(), bends).prop_map(move |(mm, mut angle, bends)| {
+        let next = |bend| {
+            angle += bend;
+            line(mm, angle)
+        };
+        bends.into_iter().map(next).collect()
+    });
+    let parts = prop_oneof![4 => arc, 3 => long, 3 => curve];
+    prop::collection::vec(parts, 10).prop_map(|parts| parts.concat())
+}
+
+/// Holds that are resumed, and overrides of the feed, for half a minute.
+fn anything_said() -> impl Strategy<Value = Vec<(u64, u8)>> {
+    let hold = (3..400u64, 5..300u64).prop_map(|(wait, hold)| vec![(wait, b'!'), (hold, b'~')]);
+    let feeds = prop::sample::select(vec![0x90u8, 0x91, 0x91, 0x92, 0x92]);
+    let feed = (3..400u64, feeds).prop_map(|(wait, byte)| vec![(wait, byte)]);
+    prop::collection::vec(prop_oneof![1 => hold, 5 => feed], 150).prop_map(|said| {
+        let mut at = 100;
+        let when = |(wait, byte): (u64, u8)| {
+            at += wait;
+            (at, byte)
+        };
+        said.concat().into_iter().map(when).collect()
+    })
+}
+
+/// Motors at 15,000 to 45,000 steps a second.
+fn fast_job() -> impl Strategy<Value = Job> {
+    let per_mm = prop::sample::select(vec![80.0, 160.0, 320.0, 640.0, 1280.0]);
+    let rate = prop::sample::select(vec![15e3, 25e3, 35e3, 45e3f64]);
+    let accel = prop::sample::select(vec![200.0, 500.0, 2_000.0f64]);
+    // Times the acceleration; or none.
+    let jerk = prop::sample::select(vec![Some(5.0), Some(20.0), None]);
+    (per_mm, rate, accel, jerk, fast_moves(), anything_said()).prop_map(
+        |(per_mm, rate, accel, jerk, mut moves, said)| {
+            let all = (rate / per_mm).min(400.0) * 60.0;
+            moves.iter_mut().for_each(|step| match step {
+                Move::Line { feed, .. } | Move::Arc { feed, .. } => *feed = all,
+            });
+            Job { jerk: jerk.map_or(1e6, |times| times * accel), accel, per_mm, moves, said }
+        },
+    )
 }
 
 impl Job {
     fn settings(&self) -> Vec<String> {
-        let jerk = self.jerk;
-        let axis = |axis| format!("{{{axis}:{{vm:30000,fr:30000,jm:{jerk},ac:500,jd:0.01}}}}");
-        let motors = ["{1:{tr:20}}", "{2:{tr:20}}", "{3:{tr:4}}", "{4:{ma:3,tr:20}}"];
-        let more = ["{a:{am:1}}", "{ja:1800000}", "{sv:0,qv:0}"];
-        let all = motors.iter().chain(&more).map(|s| s.to_string());
+        let Job { jerk, accel, per_mm, .. } = self;
+        let axis = |axis| format!("{{{axis}:{{vm:30000,fr:30000,jm:{jerk},ac:{accel},jd:0.01}}}}");
+        let turn = 1_600.0 / per_mm;
+        let motors = ["1", "2"].map(|motor| format!("{{{motor}:{{tr:{turn}}}}}"));
+        let more = ["{3:{tr:4}}", "{4:{ma:3,tr:20}}", "{a:{am:1}}", "{ja:1800000}", "{sv:0,qv:0}"];
+        let all = motors.into_iter().chain(more.map(String::from));
         all.chain(["x", "y", "z", "a"].map(axis)).collect()
     }
 
@@ -123,10 +200,11 @@ impl Job {
 }
 
 /// Plays the job of a seed; what is wrong with it.
-fn play(seed: u64) -> Option<String> {
-    let (tree, _) = seeds::case(seed, &any_job());
+fn play(seed: u64, any: impl Strategy<Value = Job>) -> Option<String> {
+    let (tree, _) = seeds::case(seed, &any);
     let job = tree.current();
-    let options = Options { settings: job.settings(), ..Options::default() };
+    let interjections = job.said.clone();
+    let options = Options { settings: job.settings(), interjections, ..Options::default() };
     let mut machine = firmware(&MEGA2560_GRBL);
     let lines = job::lines_of(&job.text());
     let report = job::run(&mut machine, &lines, &options, |_| {}).map_err(|why| why.to_string());
@@ -135,12 +213,26 @@ fn play(seed: u64) -> Option<String> {
         Ok(report) => report.problems.join("; "),
         Err(why) => why,
     };
-    Some(format!("seed {seed}, jerk {}, {} lines: {problems}", job.jerk, lines.len()))
+    let Job { jerk, accel, per_mm, .. } = job;
+    let lines = lines.len();
+    Some(format!(
+        "seed {seed}, jerk {jerk}, {accel} mm/s2, {per_mm} steps/mm, {lines} lines: {problems}"
+    ))
 }
 
 #[test]
 fn random_jobs_have_no_pause_and_end_exactly() {
-    let seeds = seeds::seeds(CASES);
+    play_all(CASES, |seed| play(seed, any_job()));
+}
+
+#[test]
+fn holds_and_overrides_at_high_step_rates_make_no_pause() {
+    play_all(DISTURBED, |seed| play(seed, fast_job()));
+}
+
+/// Plays as many as there are to be, two at a time.
+fn play_all(cases: u64, play: impl Fn(u64) -> Option<String> + Sync) {
+    let seeds = seeds::seeds(cases);
     let waiting: Mutex<VecDeque<u64>> = Mutex::new(seeds.clone().collect());
     let wrong = Mutex::new(Vec::new());
     let work = || {
