@@ -283,8 +283,8 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// None.
-    pub const fn new() -> Self {
+    /// No keys.
+    pub const fn none() -> Self {
         Self { front: BLOCKS as u8, seqs: [0; BLOCKS], entries: [Short::ZERO; BLOCKS] }
     }
 

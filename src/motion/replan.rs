@@ -116,7 +116,7 @@ impl BlockQueue {
     #[inline(never)]
     pub fn replan(&mut self, factors: Factors) {
         self.factors = factors;
-        let mut keys = Keys::new();
+        let mut keys = Keys::none();
         self.look_back(&mut keys);
         if let (Some(last), Some(line)) = (&mut self.last, line(self.ring.pushed(0))) {
             last.cruise = line.velocity(&factors);
