@@ -1,6 +1,6 @@
 //! What the firmware's parts cost.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use super::Figure;
 use super::jitter;
@@ -73,7 +73,8 @@ fn jerk_costs(bed: &Bed, jerks: &[f64], jobs: &[String]) -> Result<Vec<Cost>> {
     runs.map(|(jerk, job)| {
         let how = How { baud: FAST_BAUD, jerk: Some(*jerk), ..How::default() };
         let laps = bed.laps(EXEC_VECTOR, SEGMENT_READY)?;
-        let (machine, _) = bed.try_run(job, how, vec![laps])?;
+        let (machine, report) = bed.try_run(job, how, vec![laps])?;
+        ensure!(report.rejected.is_empty(), "{}", report.problems.join("; "));
         Ok(machine.stopwatches()[0].cost())
     })
     .collect()

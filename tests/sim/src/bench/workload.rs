@@ -28,8 +28,11 @@ pub const FAST_BAUD: u32 = 500_000;
 /// After so long a job is left alone.
 const DISTURBED_MS: u64 = 120_000;
 
-/// Lines in flight: as many as the firmware keeps, so that the line is never idle.
+/// Most lines in flight: as many as the firmware keeps, so that the line is never idle.
 const IN_FLIGHT: usize = 2 * LINES_IN_FLIGHT;
+
+/// Bytes that the firmware's receive ring holds: more than these might be lost while the planner is busy.
+const RING: usize = 254;
 
 /// 80 and 400 steps/mm; velocity and jerk limits out of the way.
 const SETTINGS: [&str; 8] = [
@@ -156,8 +159,11 @@ impl Bed {
         let baud = (how.baud != USUAL_BAUD).then_some(how.baud);
         let settings = self.settings(how);
         let interjections = how.disturbed.map_or_else(Vec::new, disturbances);
-        let options = Options { baud, settings, in_flight: IN_FLIGHT, vcd: None, interjections };
-        let report = job::run(&mut machine, &job::lines_of(job), &options, |_| {})?;
+        let lines = job::lines_of(job);
+        let longest = lines.iter().map(|(_, line)| line.len() + 1).max().unwrap_or(1);
+        let in_flight = (RING / longest).clamp(LINES_IN_FLIGHT, IN_FLIGHT);
+        let options = Options { baud, settings, in_flight, vcd: None, interjections };
+        let report = job::run(&mut machine, &lines, &options, |_| {})?;
         Ok((machine, report))
     }
 }
