@@ -21,7 +21,8 @@ impl Machine {
         Self::boot_at(baud, 0)
     }
 
-    /// The same, and its millisecond count begins at `ms`.
+    /// Makes the machine and boots the firmware at `baud`, with a millisecond count that begins at `ms`: to test what happens when it
+    /// wraps. `None` for a second machine in a thread.
     pub fn boot_at(baud: u32, ms: u64) -> Option<Self> {
         clock().set(ms * time::CYCLES_PER_MS);
         let main: &'static Executor = Box::leak(Box::new(Executor::new(pender::THREAD)));
