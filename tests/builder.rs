@@ -31,7 +31,7 @@ fn built(
     ends: [PerAxis<Length>; 2],
     feed: Option<Feed>,
 ) -> (Move, f32) {
-    let line = Line { from: &ends[0], to: &ends[1], feed, curve: None };
+    let line = Line { from: &ends[0], to: &ends[1], feed, curve: None, may_merge: false };
     let mut block = Move::default();
     match builder.line(&line, &Dynamics::new(config), config, &mut block) {
         Built::Line(entry) => (block, entry),
@@ -128,11 +128,12 @@ fn check_limits(
     assert!(got <= cruise * EXACT, "{got} of {cruise} mm/s");
     // Slower only for motors, and blocks too short for exec.
     let least = if block.extent.has_whole_steps() { 1 } else { 8 };
-    let slow = block.way.iter().any(|&way| way.unsigned_abs() >= least);
+    let moves = block.way.iter().any(|&way| way.unsigned_abs() >= least);
     let shortest = length / f64::from(BLOCK_S_MIN);
+    let slow = moves || shortest < slowest.max(1e-6);
     assert!(slow || got >= slowest.max(1e-6) * (2.0 - EXACT), "{got} of {cruise} mm/s");
-    assert!(!slow || got <= shortest * EXACT);
-    check_override(block, unit, feed.is_some(), config, if slow { shortest } else { f64::MAX });
+    assert!(got <= shortest * EXACT);
+    check_override(block, unit, feed.is_some(), config, shortest);
 }
 
 /// The same of what an override makes of it: as much faster as the axes can.
@@ -151,17 +152,28 @@ proptest! {
 
     /// Limits are kept, and steps are the difference of exact positions.
     #[test]
-    fn builder_keeps_limits_and_steps(config in any_config(), moves in any_moves()) {
+    fn builder_keeps_limits_and_steps(
+        config in any_config(), moves in any_moves(), may_merge in any::<bool>(),
+    ) {
         let dynamics = Dynamics::new(&config);
         let mut builder = Builder::default();
         let mut from = at([0.0]);
         let (mut motors, mut places) = ([0i64; MOTORS], [0i64; MOTORS]);
         let mut began = false;
         for (to, feed) in moves {
-            let line = Line { from: &from, to: &to, feed, curve: None };
+            let line = Line { from: &from, to: &to, feed, curve: None, may_merge };
             let mut block = Move::default();
             match builder.line(&line, &dynamics, &config, &mut block) {
                 Built::Nothing => prop_assert_eq!(from, to),
+                // As if it had not been asked for either: the next one begins where it did.
+                Built::Merge => {
+                    prop_assert!(may_merge);
+                    for m in 0..MOTORS {
+                        let steps = config.ratio[m].steps(to[m]);
+                        prop_assert!((i64::from(steps) - motors[m]).abs() <= 1);
+                    }
+                    continue;
+                }
                 // Nothing has changed: as if it had not been asked for.
                 Built::Parts(parts) => {
                     let steps =

@@ -211,6 +211,28 @@ fn a_million_segments_end_on_the_step() {
     assert_eq!(rig.pins.position, rig.target());
 }
 
+/// An acceleration that no ramp reaches under the jerk limit, by a factor of a thousand, leaves what is ahead as exact as it was.
+#[test]
+fn short_lines_keep_their_feed_under_a_low_jerk_and_a_high_acceleration() {
+    for (accel, jerk) in [(20_000.0, 20.0), (1e6, 1.0), (1e6, 1_000.0)] {
+        let mut config = Config::new(500.0, accel, jerk);
+        config.deviation = 0.5;
+        let mut rig = Rig::new(config);
+        for n in 1..=40u32 {
+            let (x, velocity) = match n {
+                1..4 => (20.0 * f64::from(n), 500.0),
+                4..38 => (60.0 + 0.05 * f64::from(n), 5.0),
+                _ => (20.0 * f64::from(n - 34), 500.0),
+            };
+            rig.line(at([x]), velocity, n);
+        }
+        rig.finish();
+        let short = rig.emitted.iter().filter(|e| (4..38).contains(&e.line));
+        let fastest = short.map(|e| e.velocity).fold(0.0, f32::max);
+        assert!(fastest > 1.0 && fastest < 5.1, "{fastest} mm/s, {accel} mm/s2, {jerk} mm/s3");
+    }
+}
+
 /// Long fast lines have brake potentials that are coarse for slow lines behind them: those count anew, and keep their feed.
 #[test]
 fn slow_lines_behind_fast_ones_keep_their_feed() {

@@ -41,6 +41,12 @@ impl Commands {
         matches!(self.motion, Motion::None) && self.is_motion_alone()
     }
 
+    /// Whether it has nothing to do but a straight move.
+    pub fn is_straight(&self) -> bool {
+        matches!(self.motion, Motion::Traverse { .. } | Motion::Feed { .. })
+            && self.is_motion_alone()
+    }
+
     /// Whether it has nothing to do but to move.
     pub fn is_motion_alone(&self) -> bool {
         // In full, so that a new part is not forgotten here.

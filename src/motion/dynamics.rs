@@ -3,11 +3,17 @@
 //! Owned by the planner task, made from the settings when they change: they keep integers in the units
 //! of the sender, whose conversion takes longer than planning a block.
 
+use super::float::{greater, lesser};
+use super::governor::JERK_TIME_MIN;
 use super::line::Motors;
 use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
+use crate::math::sqrt;
 use crate::units::PerAxis;
+
+/// A jerk limit that takes the acceleration to its limit in so long has an effect, s.
+const JERKY_S: f32 = 1.0625 * JERK_TIME_MIN;
 
 /// Where the limits come from: the settings, in their units. Axes are 0 to 5 for X Y Z A B C; a limit that
 /// is not positive is none; mm are degrees for rotary axes.
@@ -30,6 +36,9 @@ pub trait Machine {
     }
 }
 
+/// An acceleration in mm/min^2, in mm/s^2.
+pub const PER_SECOND_SQUARED: f32 = 1.0 / 3_600.0;
+
 /// A jerk in mm/min^3, in mm/s^3.
 pub const PER_SECOND_CUBED: f32 = 1.0 / 216_000.0;
 
@@ -48,6 +57,22 @@ pub struct Axis {
     pub deviation: Short,
 }
 
+impl Axis {
+    /// Takes acceleration and jerk over, mm/s^2 and mm/s^3; 0 or less for none. The velocities are known. Cost: 3,000.
+    ///
+    /// An acceleration far beyond what any ramp reaches under the jerk limit would make the potentials of `horizon` coarse. Between 0
+    /// and v a ramp reaches `sqrt(J v)`, in a direction between three axes a third more: half more is kept. The least that is kept has
+    /// its jerk limit still ([`effective_jerk`](super::governor::effective_jerk)).
+    #[inline(never)]
+    #[small]
+    pub fn limit_change(&mut self, accel: f32, jerk: f32) {
+        let most = 1.5 * sqrt(greater(jerk, 0.0) * greater(self.velocity, self.feed));
+        let limits = most > 0.0 && accel > most;
+        let accel = if limits { lesser(accel, greater(most, jerk * JERKY_S)) } else { accel };
+        (self.accel, self.jerk) = (Short::new(accel), Short::new(jerk));
+    }
+}
+
 /// Limits of the machine.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Dynamics {
@@ -62,7 +87,7 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// Cost: 2,000 an axis, 600 for each number of motors.
+    /// Cost: 5,000 an axis, 600 for each number of motors.
     pub fn new(machine: &(impl Machine + Motors)) -> Self {
         let mut dynamics = Self::default();
         dynamics.set(machine);
@@ -74,18 +99,16 @@ impl Dynamics {
     #[small]
     pub fn set(&mut self, machine: &(impl Machine + Motors)) {
         for (n, axis) in self.axes.iter_mut().enumerate() {
-            *axis = Axis {
-                velocity: machine.velocity_max(n) * (1.0 / 60.0),
-                feed: machine.feedrate_max(n) * (1.0 / 60.0),
-                accel: Short::new(machine.accel_max(n) * (1.0 / 3_600.0)),
-                jerk: Short::new(machine.jerk_max(n) * PER_SECOND_CUBED),
-                deviation: Short::new(machine.junction_deviation(n)),
-            };
+            axis.velocity = machine.velocity_max(n) * (1.0 / 60.0);
+            axis.feed = machine.feedrate_max(n) * (1.0 / 60.0);
+            axis.deviation = Short::new(machine.junction_deviation(n));
+            let accel = machine.accel_max(n) * PER_SECOND_SQUARED;
+            axis.limit_change(accel, machine.jerk_max(n) * PER_SECOND_CUBED);
         }
         for (m, axis) in self.drives.iter_mut().enumerate() {
             *axis = machine.motor_axis(m);
         }
-        self.junction = machine.junction_acceleration() * (1.0 / 3_600.0);
+        self.junction = machine.junction_acceleration() * PER_SECOND_SQUARED;
         let drivers = machine.drivers();
         for (others, rate) in self.rates.iter_mut().enumerate() {
             *rate = drivers.step_rate_max(others + 1);

@@ -39,7 +39,7 @@ pub struct Stretch {
 pub const ACCEL_MOST: f32 = 1e6;
 
 /// A jerk limit that takes the acceleration to its limit in less is none: stretches are no shorter.
-const JERK_TIME_MIN: f32 = 0.001;
+pub(super) const JERK_TIME_MIN: f32 = 0.001;
 
 /// The jerk to put into a block, 0 for none; `accel` is its acceleration. Cost: 500.
 pub fn effective_jerk(jerk: f32, accel: f32) -> f32 {

@@ -49,6 +49,9 @@ fn times(a: f32, b: f32) -> f32 {
     a * b
 }
 
+/// In parts of a step.
+const HALF_STEP: u16 = 1 << (PARTS_LOG2 - 1);
+
 /// The share of the step rate that short blocks may have.
 const SHORT_SHARE: f32 = 0.625;
 
@@ -143,16 +146,26 @@ impl Path {
         }
     }
 
+    /// Whether no motor goes half a step and no axis 3 mm, and the move is over before exec can prepare the next one. Cost: 10; 400 if
+    /// it is so short.
+    #[inline(always)]
+    pub(super) fn is_brief(&self) -> bool {
+        self.most < HALF_STEP && self.is_over_soon()
+    }
+
+    #[inline(never)]
+    #[small]
+    fn is_over_soon(&self) -> bool {
+        let near = |way: &i32| i16::try_from(*way).is_ok();
+        !self.whole_steps
+            && self.travel.iter().all(near)
+            && below(self.length, self.top * BLOCK_S_MIN)
+    }
+
     /// Keeps motors within the rate that so many can have together, or, in chords of arcs and in blocks short enough for parts of a
-    /// step, within five eighths of that: exec has much more to do there than in a long line. Keeps a block with steps long enough for
-    /// exec.
+    /// step, within five eighths of that: exec has much more to do there than in a long line. Keeps every block long enough for exec.
     #[inline(never)]
     pub(super) fn limit_steps(&mut self, rates: &[f32; MOTORS], chord: bool) {
-        // Exec waits for more of it.
-        if self.most < 1 << (PARTS_LOG2 - 1) {
-            return;
-        }
-        let mut rate = rates[usize::from(self.moving) - 1];
         let rough = |x| Short::new(x).rough().0;
         let (top, length) = (rough(self.top), rough(self.length));
         let octaves = if self.whole_steps { 0 } else { i16::from(PARTS_LOG2) };
@@ -160,10 +173,12 @@ impl Path {
         // Logarithms tell whether a block is plainly below the limit: an octave covers their error. Five eighths are 0.68 octaves.
         let spare = if short { 7 * short::OCTAVE / 4 } else { short::OCTAVE };
         let most = Log::of(self.most).0 - octaves * short::OCTAVE;
-        if top + most + spare > rough(rate) + length {
-            if short {
-                rate *= SHORT_SHARE;
-            }
+        // One step at most is made in a shorter way.
+        if self.most >= HALF_STEP
+            && let Some(&most_rate) = rates.get(usize::from(self.moving).wrapping_sub(1))
+            && top + most + spare > rough(most_rate) + length
+        {
+            let rate = if short { most_rate * SHORT_SHARE } else { most_rate };
             let most = scaled(f32::from(self.most), -octaves as i8);
             let way = rate * self.length;
             if below(way, self.top * most) {

@@ -5,7 +5,8 @@
 //!
 //! Steps are the difference of two exact absolute positions, so nothing accumulates: neither
 //! rounding nor moves shorter than a step. A move without any steps (shorter than one, or of an axis
-//! without a motor) is still a block and takes its time, or the next step would come too early. A block is told
+//! without a motor) is still a block and takes its time, or the next step would come too early; a fast one of less than half a step
+//! is merged with the next ([`Built::Merge`]). A block is told
 //! where between two steps its motors arrive, to 1/16 step, and so each motor knows where blocks have taken it, whatever positions are renamed to.
 //!
 //! A ramp may go over many blocks. Without a jerk limit each may have its own acceleration limit, what
@@ -48,6 +49,8 @@ pub struct Line<'a> {
     pub feed: Option<Feed>,
     /// The arc that it is a chord of.
     pub curve: Option<&'a Curve>,
+    /// It may be merged with the next move.
+    pub may_merge: bool,
 }
 
 /// What becomes of a move.
@@ -60,6 +63,9 @@ pub enum Built {
     Line(f32),
     /// More steps than a block holds: to be made in so many parts.
     Parts(u16),
+    /// Less than half a step, and over before exec could prepare it: the next move begins where this one does. The way of each axis
+    /// fits 16 bits.
+    Merge,
 }
 
 /// Makes blocks.
@@ -105,6 +111,10 @@ impl Builder {
         }
         out.extent = Extent::new(path.length, !near);
         path.limit(line.feed, &mut self.feed, dynamics);
+        if line.may_merge && path.is_brief() {
+            self.undo(&path, line, dynamics, machine, &out.way);
+            return Built::Merge;
+        }
         path.limit_change(dynamics);
         match line.curve {
             Some(curve) => self.bend.chord(&mut path, curve),
@@ -175,6 +185,29 @@ impl Builder {
             }
         }
         parts
+    }
+
+    /// Takes the motors back to where the move begins, from `ways`, in parts of a step. Cost: 1,000 to 5,000 each.
+    #[inline(never)]
+    #[small]
+    fn undo(
+        &mut self,
+        path: &Path,
+        line: &Line,
+        dynamics: &Dynamics,
+        machine: &impl Motors,
+        ways: &[i16; MOTORS],
+    ) {
+        let all = self.motors.iter_mut().zip(ways).zip(&dynamics.drives);
+        for (m, ((motor, &way), &axis)) in all.enumerate() {
+            let axis = usize::from(axis);
+            match (line.from.get(axis), path.travel.get(axis)) {
+                (Some(&from), Some(&travel)) if travel != 0 => {
+                    motor.put_back(machine.ratio(m), from, way);
+                }
+                _ => {}
+            }
+        }
     }
 
     /// The next move starts from rest.

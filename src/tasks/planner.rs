@@ -6,12 +6,14 @@
 
 mod home;
 mod jog;
+mod merge;
 mod outputs;
 mod parts;
 mod probe;
 mod seek;
 mod square;
 
+use embassy_futures::select::select;
 use embassy_futures::yield_now;
 use parts::{ArcWalk, Parts};
 
@@ -29,7 +31,7 @@ use crate::motion::block::{Action, Block, Line as Move, Outputs};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line};
 use crate::motion::pace::Drivers;
-use crate::motion::queue::{self, BlockQueue};
+use crate::motion::queue::{self, BlockQueue, CAPACITY};
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -41,6 +43,8 @@ struct Planner {
     dynamics: Dynamics,
     /// Where the last block ends, machine coordinates.
     position: PerAxis<Length>,
+    /// How far the lines beyond it go that are merged with the next one.
+    merged: PerAxis<i16>,
     /// The N word of the line that is carried out.
     line: u32,
     /// What exec has been told that drivers ask for.
@@ -91,6 +95,7 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
         builder: Builder::default(),
         dynamics: Dynamics::default(),
         position: [Length::ZERO; AXES],
+        merged: [0; AXES],
         line: 0,
         drivers: Drivers::USUAL,
         outputs: Outputs { on: 0, speed: 0.0 },
@@ -101,9 +106,16 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
     };
     async move {
         loop {
-            links.planner_wake.wait().await;
+            match planner.has_merged() {
+                false => links.planner_wake.wait().await,
+                true => {
+                    select(links.planner_wake.wait(), planner.nothing_follows()).await;
+                }
+            }
             planner.replan();
-            if links.commands_taken.get() && !planner.carry_out_at_once() {
+            if !links.commands_taken.get() {
+                planner.make_up();
+            } else if !planner.carry_out_at_once() {
                 planner.begin();
                 loop {
                     planner.room().await;
@@ -142,16 +154,21 @@ impl Planner {
             _ => return false,
         };
         let quiet = !self.links.settings_changed.get() && !self.links.resync.get();
-        if !commands.is_motion_alone() || !quiet || self.queue.free() == 0 {
+        let free = self.queue.free();
+        if !commands.is_motion_alone() || !quiet || free == 0 {
             return false;
         }
         self.line = commands.line;
-        if self.line(target, feed).is_some() {
-            return false;
+        let may_merge = !commands.exact_stop && free < CAPACITY - 1;
+        match self.line(target, feed, may_merge) {
+            Built::Parts(_) => return false,
+            Built::Merge => self.merge(target),
+            Built::Line(_) | Built::Nothing => {
+                self.moved(&commands);
+                self.position = *target;
+                self.announce();
+            }
         }
-        self.moved(&commands);
-        self.position = *target;
-        self.announce();
         true
     }
 
@@ -180,6 +197,10 @@ impl Planner {
         }
         let links = self.links;
         let commands = links.commands.borrow();
+        if self.has_merged() && !commands.is_straight() {
+            self.go_on();
+            return Turn::More;
+        }
         if self.parts.is_some() {
             self.part(&commands);
             return Turn::More;
@@ -242,9 +263,9 @@ impl Planner {
 
     /// Queues a straight move, or begins with its parts.
     fn straight(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) {
-        match self.line(target, feed) {
-            Some(of) => self.parts = Some(Parts::new(target, feed, of)),
-            None => {
+        match self.line(target, feed, false) {
+            Built::Parts(of) => self.parts = Some(Parts::new(target, feed, of)),
+            _ => {
                 self.position = *target;
                 self.announce();
             }
@@ -257,9 +278,9 @@ impl Planner {
     fn part(&mut self, commands: &Commands) {
         let Some(parts) = &self.parts else { return };
         let (end, feed) = (parts.end(&self.position), parts.feed);
-        let of = self.line(&end, feed);
+        let built = self.line(&end, feed, false);
         let Some(parts) = &mut self.parts else { return };
-        if let Some(of) = of {
+        if let Built::Parts(of) = built {
             parts.divide(of);
             return;
         }
@@ -274,23 +295,23 @@ impl Planner {
         self.announce();
     }
 
-    /// Queues a straight move, for which there is room, or says in how many parts it is to be made.
-    fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) -> Option<u16> {
+    /// Queues a straight move, for which there is room, unless it is to be made in parts or merged.
+    fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>, may_merge: bool) -> Built {
         let settings = self.links.settings.borrow();
         let curve = self.walk.as_ref().map(|arc| &arc.curve);
-        let line = Line { from: &self.position, to: target, feed, curve };
+        let line = Line { from: &self.position, to: target, feed, curve, may_merge };
         let mut block = Move::default();
-        match self.builder.line(&line, &self.dynamics, &*settings, &mut block) {
-            Built::Nothing => None,
-            Built::Parts(parts) => Some(parts),
-            Built::Line(entry) => {
-                if let Some(arc) = &mut self.walk {
-                    arc.curve.go_on();
-                }
-                self.queue.push_line(&mut block, entry, self.line);
-                None
+        let built = self.builder.line(&line, &self.dynamics, &*settings, &mut block);
+        if let Built::Line(entry) = built {
+            if let Some(arc) = &mut self.walk {
+                arc.curve.go_on();
             }
+            self.queue.push_line(&mut block, entry, self.line);
         }
+        if let Built::Line(_) | Built::Nothing = built {
+            self.merged = [0; AXES];
+        }
+        built
     }
 
     /// A move of the line has been queued.

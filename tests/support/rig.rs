@@ -185,11 +185,12 @@ impl Rig {
     }
 
     fn go(&mut self, to: PerAxis<Length>, feed: Option<Feed>, number: u32) {
-        let line = Line { from: &self.position, to: &to, feed, curve: None };
+        let line = Line { from: &self.position, to: &to, feed, curve: None, may_merge: false };
         let mut block = Move::default();
         match self.builder.line(&line, &self.dynamics, &self.config, &mut block) {
             Built::Nothing => {}
             Built::Parts(_) => panic!("too long for a test"),
+            Built::Merge => unreachable!("it may not"),
             Built::Line(entry) => assert!(self.queue.push_line(&mut block, entry, number)),
         }
         self.position = to;

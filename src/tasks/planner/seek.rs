@@ -15,13 +15,12 @@ use crate::gcode::command::Feed;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::inputs;
 use crate::motion::block::{Action, Outputs};
-use crate::motion::dynamics::PER_SECOND_CUBED;
-use crate::motion::short::Short;
+use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};
 use crate::motion::snapshot::Snapshot;
 use crate::motion::{contact, queue};
 use crate::tasks::setup::moved_by;
 use crate::tasks::{hold, links};
-use crate::units::{FIRST_ROTARY, Length, PerAxis};
+use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
 /// What has come of a move that is to end at a switch.
 pub(super) enum Sought {
@@ -103,7 +102,7 @@ impl Planner {
         }
         self.builder.place(&motion.target);
         self.queue.restart();
-        (self.walk, self.parts) = (None, None);
+        (self.walk, self.parts, self.merged) = (None, None, [0; AXES]);
         self.outputs = Outputs { on: motion.outputs, speed: motion.speed };
         self.links.model.borrow_mut().set_position(&self.position);
     }
@@ -134,7 +133,8 @@ impl Planner {
         for (n, axis) in self.dynamics.axes.iter_mut().enumerate().take(FIRST_ROTARY + 1) {
             let hard = settings.jerk_homing(n);
             if hard > 0.0 && axis.jerk.get() > 0.0 {
-                axis.jerk = Short::new(hard * PER_SECOND_CUBED);
+                let accel = Machine::accel_max(&*settings, n) * PER_SECOND_SQUARED;
+                axis.limit_change(accel, hard * PER_SECOND_CUBED);
             }
         }
         self.links.settings_changed.set(true);

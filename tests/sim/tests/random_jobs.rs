@@ -1,5 +1,6 @@
 //! Random jobs on the image: lines and arcs of all sizes with four axes, under random jerk limits and at random feeds; and with
-//! two axes at high step rates, with holds and overrides at random times. None has a pause, and each ends exactly.
+//! two axes at high step rates, with holds and overrides at random times; and many lines shorter than a step between fast ones. None
+//! has a pause, and each ends exactly.
 //!
 //! `KERF_SEED` and `KERF_CASES` choose the jobs: `KERF_CASES=1000` for a thousand.
 
@@ -24,6 +25,9 @@ const CASES: u64 = 50;
 
 /// Of those with holds and overrides: about a minute.
 const DISTURBED: u64 = 12;
+
+/// Of those with lines shorter than a step: about half a minute.
+const BRIEF: u64 = 20;
 
 /// A place to go to, as offsets of X, Y, Z (mm) and A (degrees).
 #[derive(Clone, Debug)]
@@ -141,10 +145,10 @@ fn anything_said() -> impl Strategy<Value = Vec<(u64, u8)>> {
     })
 }
 
-/// Motors at 15,000 to 45,000 steps a second.
+/// Motors at 15,000 to 80,000 steps a second, or as fast as two can.
 fn fast_job() -> impl Strategy<Value = Job> {
     let per_mm = prop::sample::select(vec![80.0, 160.0, 320.0, 640.0, 1280.0]);
-    let rate = prop::sample::select(vec![15e3, 25e3, 35e3, 45e3f64]);
+    let rate = prop::sample::select(vec![15e3, 25e3, 35e3, 45e3, 60e3, 80e3f64]);
     let accel = prop::sample::select(vec![200.0, 500.0, 2_000.0f64]);
     // Times the acceleration; or none.
     let jerk = prop::sample::select(vec![Some(5.0), Some(20.0), None]);
@@ -157,6 +161,33 @@ fn fast_job() -> impl Strategy<Value = Job> {
             Job { jerk: jerk.map_or(1e6, |times| times * accel), accel, per_mm, moves, said }
         },
     )
+}
+
+/// Chains of lines, most of them shorter than a step, straight or in zigzag, between long ones, all as fast as the axes can.
+fn brief_moves() -> impl Strategy<Value = Vec<Move>> {
+    let mm = prop::sample::select(vec![0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.03f64]);
+    let slope = prop::sample::select(vec![0.0, 0.05, 0.3, 1.0f64]);
+    let chain = (mm, slope, 2..65usize, any::<bool>(), 1.0..30.0f64).prop_map(
+        |(mm, slope, count, zigzag, long)| {
+            let line = |x: f64, y: f64| Move::Line { way: [x, y, 0.0, 0.0], feed: 60e3 };
+            let turn = |n: usize| if zigzag && n % 2 == 1 { -1.0 } else { 1.0 };
+            let brief = (0..count).map(|n| line(mm, mm * slope * turn(n)));
+            brief.chain([line(long, long * slope)]).collect()
+        },
+    );
+    prop::collection::vec(chain, 6).prop_map(|chains: Vec<Vec<Move>>| chains.concat())
+}
+
+/// On machines of all resolutions and accelerations.
+fn brief_job() -> impl Strategy<Value = Job> {
+    let per_mm = prop::sample::select(vec![80.0, 99.0, 160.0, 320.0, 640.0, 1280.0]);
+    let accel = prop::sample::select(vec![500.0, 2_000.0, 20_000.0f64]);
+    let jerk = prop::sample::select(vec![Some(30.0), Some(200.0), None]);
+    (per_mm, accel, jerk, brief_moves()).prop_map(|(per_mm, accel, jerk, moves)| {
+        // From 1,000,000 on it is none.
+        let jerk = jerk.map_or(1e6, |times| (times * accel).min(1e6));
+        Job { jerk, accel, per_mm, moves, said: Vec::new() }
+    })
 }
 
 impl Job {
@@ -189,10 +220,10 @@ impl Job {
                 }
             };
             let [x, y, z, a] = at;
-            let _ = write!(text, "{code} X{x:.3} Y{y:.3} Z{z:.3}");
+            let _ = write!(text, "{code} X{x:.4} Y{y:.4} Z{z:.4}");
             let _ = match centre {
-                Some((i, j)) => writeln!(text, " I{i:.3} J{j:.3} F{feed:.0}"),
-                None => writeln!(text, " A{a:.3} F{feed:.0}"),
+                Some((i, j)) => writeln!(text, " I{i:.4} J{j:.4} F{feed:.0}"),
+                None => writeln!(text, " A{a:.4} F{feed:.0}"),
             };
         }
         text
@@ -228,6 +259,11 @@ fn random_jobs_have_no_pause_and_end_exactly() {
 #[test]
 fn holds_and_overrides_at_high_step_rates_make_no_pause() {
     play_all(DISTURBED, |seed| play(seed, fast_job()));
+}
+
+#[test]
+fn lines_shorter_than_a_step_make_no_pause() {
+    play_all(BRIEF, |seed| play(seed, brief_job()));
 }
 
 /// Plays as many as there are to be, two at a time.
