@@ -196,7 +196,8 @@ impl<'a> Runner<'a> {
         health::moves(waiting.count);
         waiting.update(segments.used());
         let short = waiting.is_short(*rests);
-        self.machine.set_coarse(event::pass_over() > PATIENCE || waiting.is_busy(), short);
+        let coarse = event::pass_over() > PATIENCE || waiting.is_busy() || waiting.is_behind();
+        self.machine.set_coarse(coarse, short);
         if !rested {
             health::look_for_starvation();
         }
@@ -255,6 +256,9 @@ const PRESSED: Amount = Amount { most: units(80), least: units(65) };
 /// That while, in segments.
 const PRESSED_FOR: u8 = 100;
 
+/// With less than this exec makes longer stretches.
+const WAITING_LITTLE: u16 = units(45);
+
 /// With less than this exec is late, and makes longer stretches.
 const WAITING_SHORT: u16 = units(25);
 
@@ -305,6 +309,11 @@ impl Waiting {
 
     fn limits(&self) -> &'static Amount {
         if self.pressed > 0 { &PRESSED } else { &USUAL }
+    }
+
+    /// Whether less waits than usual.
+    fn is_behind(&self) -> bool {
+        usize::from(self.moved) > SEGMENTS && self.sum < WAITING_LITTLE
     }
 
     /// Whether exec is late. Motion that has just begun, or `rests`, has not much waiting yet.
