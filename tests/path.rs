@@ -267,7 +267,7 @@ fn a_steady_feed_is_steady_in_all_directions() {
     for num in [1, 4, 8, 16] {
         let config = fine(num);
         for (radius, turn, velocity) in
-            [(18.0, 0.02, 36.5), (18.0, 0.1, 36.5), (3.0, 0.1, 30.0), (6.0, 0.05, 36.0)]
+            [(18.0, 0.02, 32.0), (18.0, 0.1, 32.0), (3.0, 0.1, 30.0), (6.0, 0.05, 31.5)]
         {
             let points = circle(radius, turn, (4.0 * std::f64::consts::TAU / turn) as u32);
             check_velocity(&config, &points, velocity);

@@ -53,7 +53,7 @@ struct Usual {
 const fn usual(motors: usize) -> Usual {
     let (shortest, fine, coarse, settles) = match motors {
         0 => (160, 200, 400, 200),
-        1 => (224, 224, 400, 224),
+        1 => (240, 240, 400, 240),
         2 => (240, 320, 480, 300),
         _ => (319, 400, 560, 320),
     };

@@ -240,27 +240,27 @@ const fn units(tenths: u32) -> u16 {
 
 /// How much waits, in the unit.
 struct Amount {
-    /// What may wait.
+    /// What may wait, with the segment that runs.
     most: u16,
     /// What is prepared before thread mode gets a turn.
     least: u16,
 }
 
-/// With the segment that runs, which takes 2 ms or less while anything is fast, a feedhold begins within 10 ms. Less would not outlast a
-/// ramp that is laid out while ticks take two thirds of the CPU, which takes up to 4.1 ms, or an override.
-const USUAL: Amount = Amount { most: units(70), least: units(38) };
+/// A feedhold begins within 10 ms: a segment may be 1 ms longer than the one before it, where a chord of an arc ends. Less would not
+/// outlast a ramp that is laid out while ticks take two thirds of the CPU, which takes up to 4.1 ms, or an override.
+const USUAL: Amount = Amount { most: units(95), least: units(38) };
 
 /// For a while after too little has been waiting: a feedhold begins within 14 ms.
-const PRESSED: Amount = Amount { most: units(80), least: units(65) };
+const PRESSED: Amount = Amount { most: units(115), least: units(65) };
 
 /// That while, in segments.
 const PRESSED_FOR: u8 = 100;
 
 /// With less than this exec makes longer stretches.
-const WAITING_LITTLE: u16 = units(45);
+const WAITING_LITTLE: u16 = units(52);
 
 /// With less than this exec is late, and makes longer stretches.
-const WAITING_SHORT: u16 = units(25);
+const WAITING_SHORT: u16 = units(30);
 
 impl Waiting {
     const fn new() -> Self {
@@ -340,7 +340,7 @@ impl Waiting {
         if self.used < 2 {
             return true;
         }
-        let sum = self.sum + self.length(1);
+        let sum = self.sum + self.length(1) + self.length(self.used + 1);
         self.used < SEGMENTS as u8 - 1 && (sum <= self.limits().most || rests && self.used < 4)
     }
 }
