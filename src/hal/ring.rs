@@ -78,6 +78,12 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         if head >= tail { head - tail } else { N - (tail - head) }
     }
 
+    /// The slot filled last, if it has not been taken.
+    pub fn newest(&self) -> Option<u8> {
+        let head = self.head.get();
+        (head != self.tail.get()).then_some(head)
+    }
+
     /// The slot taken last.
     pub fn tail(&self) -> u8 {
         self.tail.get()
@@ -253,6 +259,12 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.0.head.get() == self.0.tail.get()
+    }
+
+    /// The slot taken last.
+    #[inline]
+    pub fn taken(&self) -> u8 {
+        self.0.tail()
     }
 
     /// What `look` makes of the value `ahead` places behind the oldest.

@@ -5,7 +5,7 @@
 //! three bits what the reader must know. Line ends that were lost are counted besides (`imp::uart::lost_ends`),
 //! so that each lost line is answered.
 
-use super::ring::{Consumer, Producer};
+use super::ring::{Consumer, Producer, Ring};
 use crate::boards::{ACTIVE, Serial};
 
 /// How many ports there are, and the numbers of the one that every board has and of the other.
@@ -42,7 +42,8 @@ pub const fn batch(ring: usize) -> u8 {
     (ring / 8) as u8
 }
 
-/// What stops the other side of a line, and lets it go on.
+/// What stops the other side of a line, and lets it go on. Where they mean that (`ex` 1) the receive interrupt takes them
+/// out of the stream and obeys: they never wait behind data.
 pub const XOFF: u8 = 0x13;
 /// See [`XOFF`].
 pub const XON: u8 = 0x11;
@@ -125,6 +126,24 @@ pub fn lose(mark: u8, byte: u8) -> (u8, bool) {
         b'\n' => (begun | CLEAN, mark & RETURNED == 0),
         _ => (begun, false),
     }
+}
+
+/// The slot of the last [`CUT`] that waits in a receive ring. One that found the ring full has become the mark of a loss, the
+/// newest byte. Thread mode.
+#[small]
+pub fn last_mark<const N: usize>(ring: &Ring<u8, N>) -> Option<u8> {
+    let newest = ring.newest()?;
+    let (mut at, tail) = (newest, ring.tail());
+    while at != tail {
+        // SAFETY: it has been filled and not been taken. The receive interrupt may make it a mark meanwhile, in one
+        // instruction.
+        let byte = unsafe { ring.at(at) };
+        if byte == CUT || (at == newest && byte < MARKS && byte != GO) {
+            return Some(at);
+        }
+        at = if at == 0 { (N - 1) as u8 } else { at - 1 };
+    }
+    None
 }
 
 #[cfg(test)]

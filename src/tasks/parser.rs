@@ -42,7 +42,7 @@ pub async fn run(links: &'static Links) -> ! {
         }
         let next = match links.flush.get() {
             Flush::None => links.next_line(data),
-            flush => dropped(links, flush),
+            _ => undropped(links),
         };
         let Some(Chosen { port, id, class }) = next else {
             match free && runs_job && !links.job.get().is_over() {
@@ -65,17 +65,13 @@ pub async fn run(links: &'static Links) -> ! {
     }
 }
 
-/// The next line during a queue flush: control lines are carried out, those of data dropped.
+/// The next line during a queue flush: control lines are carried out, those that are dropped are refused, and G-code waits.
 #[inline(never)]
 #[small]
-fn dropped(links: &Links, flush: Flush) -> Option<Chosen<'_>> {
+fn undropped(links: &Links) -> Option<Chosen<'_>> {
     links.ports.iter().find_map(|port| {
         let (id, class) = port.lines.borrow().next(true)?;
-        match class {
-            Class::Data if flush == Flush::Rest => None,
-            Class::Data => Some(Chosen { port, id, class: Class::Fault(Status::Terminated) }),
-            class => Some(Chosen { port, id, class }),
-        }
+        (class != Class::Data).then_some(Chosen { port, id, class })
     })
 }
 

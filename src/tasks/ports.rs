@@ -35,6 +35,8 @@ pub struct Port {
     pub enquiry: Cell<bool>,
     /// An exception to report.
     pub exception: Cell<Option<Status>>,
+    /// The slot of the receive ring up to which lines of G-code are dropped, by a kill or flush that has come behind it.
+    pub cut: Cell<Option<u8>>,
 }
 
 impl Port {
@@ -47,6 +49,7 @@ impl Port {
             mode: Cell::new(Mode::Json),
             enquiry: Cell::new(false),
             exception: Cell::new(None),
+            cut: Cell::new(None),
         }
     }
 }

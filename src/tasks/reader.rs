@@ -10,7 +10,7 @@ use embassy_futures::select::select;
 use embassy_futures::yield_now;
 
 use super::Never;
-use super::hold::{self, Flush};
+use super::hold;
 use super::jog;
 use super::lines::{Aside, LinePool};
 use super::links::Links;
@@ -18,8 +18,8 @@ use super::ports::Port;
 use crate::hal::event::{Event, next};
 use crate::hal::imp::uart::{self, lost_ends};
 use crate::hal::serial::{
-    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, RETURNED, RX_RING, Received, USB, XOFF,
-    XON, high_water, is_shared, low_water,
+    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, RETURNED, RX_RING, Received, USB,
+    high_water, is_shared, low_water,
 };
 use crate::protocol::Mode;
 use crate::status::Status;
@@ -36,8 +36,8 @@ enum Left {
     Bytes,
     /// Bytes, perhaps, behind this mark: the place of a real-time character.
     Placed(u8),
-    /// The same in a comment.
-    Aside(u8),
+    /// The same in a comment, where it is text; but a `^d` is none anywhere.
+    Aside,
 }
 
 /// The task.
@@ -56,15 +56,13 @@ pub fn run(
                 Some(aux) if !aux.is_idle() => aux.take(links),
                 _ => Left::Nothing,
             };
-            if links.flush.get() == Flush::Here {
-                hold::placed(links, links.port(USB), CUT);
-            }
+            hold::here(links);
             match left.max(aux_left) {
                 Left::Nothing => {
                     jog::passed(links);
                     next(Event::Received).await;
                 }
-                Left::Bytes | Left::Placed(_) | Left::Aside(_) => yield_now().await,
+                Left::Bytes | Left::Placed(_) | Left::Aside => yield_now().await,
                 Left::Full => {
                     // The ring goes on filling.
                     select(links.pool_space.wait(), next(Event::Received)).await;
@@ -108,7 +106,7 @@ impl<const N: usize> Intake<N> {
         self.control_flow(self.received.len(), N, links);
         match left {
             Left::Placed(mark) => hold::placed(links, self.port, mark),
-            Left::Aside(mark) => hold::aside(links, self.port, mark),
+            Left::Aside => hold::serve(links),
             Left::Full => self.look_ahead(links),
             _ => {}
         }
@@ -128,8 +126,11 @@ impl<const N: usize> Intake<N> {
             if self.received.is_empty() {
                 return Left::Nothing;
             }
-            let text = pool.put_text(self.received.waiting());
-            self.received.release_many(text);
+            let cuts = self.cuts(pool);
+            if !cuts {
+                let text = pool.put_text(self.received.waiting());
+                self.received.release_many(text);
+            }
             if !pool.ready() {
                 return Left::Full;
             }
@@ -137,27 +138,37 @@ impl<const N: usize> Intake<N> {
                 return Left::Nothing;
             };
             let is_line = match byte {
-                CUT | GO if pool.aside() != Aside::None => return Left::Aside(byte),
+                CUT | GO if cuts => false,
+                CUT | GO if pool.aside() != Aside::None => return Left::Aside,
                 CUT | GO => return Left::Placed(byte),
-                ..MARKS => {
-                    let is_line = self.loss(pool, byte, links);
-                    if links.flush.get() == Flush::Input {
-                        // It may stand for the cut.
-                        return Left::Placed(CUT);
-                    }
-                    is_line
-                }
-                XON | XOFF if self.flow(links) == Flow::Characters => {
-                    uart::hold(self.port.number, byte == XOFF);
-                    false
-                }
+                ..MARKS => self.loss(pool, byte, links),
                 _ => pool.put(byte),
             };
             if is_line {
+                if cuts {
+                    pool.terminate();
+                }
                 links.parser_wake.signal();
             }
         }
         Left::Bytes
+    }
+
+    /// Whether the next byte is one of those that are dropped. It is taken by itself then.
+    #[inline(always)]
+    fn cuts(&self, pool: &mut LinePool) -> bool {
+        self.port.cut.get().is_some_and(|last| self.cuts_up_to(last, pool))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn cuts_up_to(&self, last: u8, pool: &mut LinePool) -> bool {
+        let cuts = self.received.taken() != last;
+        if !cuts {
+            pool.terminate_partial();
+            self.port.cut.set(None);
+        }
+        cuts
     }
 
     /// No line can be taken before the machine goes on: looks for real-time characters in the ring that have
@@ -169,11 +180,15 @@ impl<const N: usize> Intake<N> {
             return;
         }
         let mut aside = self.port.lines.borrow().aside();
+        // Marks before a cut have had their effect.
+        let mut last = self.port.cut.get();
         for n in 0..self.received.len() {
             let Some(byte) = self.received.peek(n, |byte| *byte) else { return };
-            if byte < MARKS && aside == Aside::None {
-                hold::ahead(links, byte);
+            let slot = (usize::from(self.received.taken()) + 1 + n) % N;
+            if byte < MARKS && aside == Aside::None && last.is_none() {
+                hold::ahead(links, self.port, byte, slot as u8);
             }
+            last = last.filter(|last| usize::from(*last) != slot);
             aside = aside.after(byte);
         }
     }
