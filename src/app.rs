@@ -50,6 +50,7 @@ impl Links {
             planner_wake: Wake::default(),
             cycle_start: Wake::default(),
             stopped: Cell::new(false),
+            exception: Cell::new(None),
             reporter_wake: News::default(),
             queue_count: QueueCount::default(),
             resync: Cell::new(false),

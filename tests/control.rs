@@ -24,3 +24,8 @@ fn xon_gets_through() {
 fn all_that_has_come_is_dropped() {
     crowd::all_that_has_come_is_dropped(boot);
 }
+
+#[test]
+fn a_stopped_port_does_not_stop_the_other() {
+    crowd::a_stopped_port_does_not_stop_the_other(boot);
+}

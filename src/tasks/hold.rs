@@ -215,6 +215,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
     }
     if characters & ENQUIRY != 0 {
         port.enquiry.set(true);
+        links.parser_wake.signal();
     }
     links.reporter_wake.urge();
 }

@@ -247,6 +247,22 @@ impl LinePool {
         self.entries.len() > usize::from(self.controls)
     }
 
+    /// Whether lines of G-code, or faults, came before a line.
+    pub fn is_behind_data(&self, id: LineId) -> bool {
+        let mut before = self.entries.iter().take(id.0.into());
+        before.any(|entry| entry.class != Class::Control)
+    }
+
+    /// A control line turns out to be G-code: it waits among the data lines.
+    pub fn wait_in_order(&mut self, id: LineId) {
+        if let Some(entry) = self.entries.get_mut(usize::from(id.0))
+            && entry.class == Class::Control
+        {
+            entry.class = Class::Data;
+            self.controls -= 1;
+        }
+    }
+
     /// Drops all data lines: they will be answered with [`Status::Terminated`].
     #[inline(never)]
     pub fn terminate(&mut self) {

@@ -6,22 +6,33 @@
 //! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
 //! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`]. In an
 //! alarm lines of G-code are refused.
+//!
+//! Each port has a [`Session`] of its own, so that no port waits for the other's line: no line is begun before the first part
+//! of its response has room in the transmit ring, and a response that lacks room stays half written until there is some.
 
-use embassy_time::Timer;
+use core::future::poll_fn;
+use core::task::Poll;
+
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::mutex::MutexGuard;
 use heapless::Vec;
 
+use super::Never;
 use super::alarm;
 use super::hold::Flush;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::ports::{Chosen, Port};
+use super::reporter::{What, tell_at_once};
 use super::tx::Tx;
 use super::view::View;
 use crate::alarm::{Alarm, is_program_end};
 use crate::gcode::command::Stop;
+use crate::hal::event::{Event, wake_after, wake_after_transmitted};
 use crate::hal::imp;
 use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::serial::USB;
+use crate::hal::imp::time::millis;
+use crate::hal::serial::{PORTS, USB};
 use crate::jobs::Job;
 use crate::protocol::{Ending, Mode, Next, Out, Request, Span, is_brief, put_brief, put_line_end};
 use crate::status::Status;
@@ -29,50 +40,313 @@ use crate::status::Status;
 /// Bytes of an echo that are put at once.
 const ECHO: usize = 62;
 
+/// A port's transmitter, while it is the parser's.
+type Line = MutexGuard<'static, NoopRawMutex, Tx>;
+
+/// What the parser is about on a port.
+enum Session {
+    /// Nothing.
+    Idle,
+    /// It answers a line.
+    Answer(Answer),
+    /// The line has been answered; it changes the rate, or resets the machine, when the response has left: since when
+    /// there is nothing more of that in the ring, ms.
+    Leave(Line, Option<u16>),
+}
+
+/// A response under way.
+struct Answer {
+    request: Request,
+    id: LineId,
+    /// How much of the line has been sent back.
+    echoed: u8,
+    /// The line is to be sent back.
+    echoes: bool,
+    /// Tables have to be waited for.
+    waits: bool,
+    /// From the first byte on: nobody else talks on this port.
+    tx: Option<Line>,
+}
+
+/// How far it has come.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Progress {
+    /// To its end.
+    Done,
+    /// It goes on later.
+    Waits,
+    /// Its G-code is to wait among the others of its port.
+    InOrder,
+}
+
+/// The parser's own state.
+struct Parser {
+    links: &'static Links,
+    sessions: [Session; PORTS],
+    /// The ports, as bits, that have something to say and lack room.
+    lacking: u8,
+}
+
 /// The task.
-pub async fn run(links: &'static Links) -> ! {
-    loop {
+pub fn run(links: &'static Links) -> impl Future<Output = Never> {
+    let mut parser = Parser { links, sessions: [const { Session::Idle }; PORTS], lacking: 0 };
+    async move {
+        loop {
+            while parser.turn() {}
+            parser.wait().await;
+        }
+    }
+}
+
+impl Parser {
+    /// Does what can be done at once. Whether there may be more.
+    #[inline(always)]
+    fn turn(&mut self) -> bool {
+        let links = self.links;
         let alarmed = alarm::is_on();
         let free = is_free(links);
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
         let tried = if data && !alarmed { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
-            continue;
+            return true;
         }
-        let next = match links.flush.get() {
-            Flush::None => links.next_line(data),
-            _ => undropped(links),
-        };
-        let Some(Chosen { port, id, class }) = next else {
-            match free && runs_job && !links.job.get().is_over() {
-                true => job_line(links),
-                false => links.parser_wake.wait().await,
+        self.lacking = 0;
+        if self.go_on() {
+            return true;
+        }
+        match self.next_line(data) {
+            Some(chosen) => self.take(chosen, tried),
+            None if free && runs_job && !links.job.get().is_over() => job_line(links),
+            None => return false,
+        }
+        true
+    }
+
+    /// Goes on with what is under way, and tells what a port alone is told. Whether something has come to its end.
+    #[inline(never)]
+    fn go_on(&mut self) -> bool {
+        let links = self.links;
+        let mut ended = false;
+        for (port, session) in links.ports.iter().zip(&mut self.sessions) {
+            ended |= match session {
+                Session::Idle if port.number == USB && links.rate.get().is_some() => {
+                    if let Ok(tx) = port.tx.try_lock() {
+                        *session = Session::Leave(tx, None);
+                    }
+                    false
+                }
+                Session::Idle if port.tells() => {
+                    let told = tell(links, port);
+                    self.lacking |= u8::from(!told) << port.number;
+                    told
+                }
+                Session::Idle => false,
+                Session::Answer(answer) => match answer.step(links, port) {
+                    Progress::Waits => false,
+                    progress => {
+                        *session = end(links, port, answer, progress);
+                        true
+                    }
+                },
+                Session::Leave(tx, since) => {
+                    let left = has_left(tx, since);
+                    if left {
+                        act(links, tx);
+                        *session = Session::Idle;
+                    }
+                    left
+                }
+            };
+        }
+        ended
+    }
+
+    /// The line to begin with; G-code of the feeder only if `data` is wanted. That of others does not wait. During a flush none
+    /// is but what has been dropped, to be refused.
+    #[inline(never)]
+    fn next_line(&mut self, data: bool) -> Option<Chosen> {
+        let links = self.links;
+        let (feeder, flushes) = (links.feeder.get(), links.flush.get() != Flush::None);
+        let lacking = &mut self.lacking;
+        links.ports.iter().zip(&self.sessions).find_map(|(port, session)| {
+            let any = data || flushes || port.number != feeder;
+            let (id, class) = port.lines.borrow().next(any)?;
+            if !matches!(session, Session::Idle) || (flushes && class == Class::Data) {
+                return None;
             }
-            continue;
-        };
-        let echoes = links.settings.borrow().echo();
+            let has_room = port.tx.try_lock().is_ok_and(|tx| tx.has_room());
+            *lacking |= u8::from(!has_room) << port.number;
+            has_room.then_some(Chosen { port, id, class })
+        })
+    }
+
+    /// Takes a line: most are answered to the end at once.
+    #[inline(never)]
+    fn take(&mut self, chosen: Chosen, tried: Usual) {
+        let links = self.links;
+        let Chosen { port, id, class } = chosen;
         match begin(links, port, id, class, tried) {
-            Begun::Answer(mut request) => {
-                if echoes || !answer_at_once(links, port, id, &mut request) {
-                    answer(links, port, id, &mut request, echoes).await;
+            Begun::Answer(request) => {
+                let echoes = links.settings.borrow().echo();
+                let mut answer = Answer { request, id, echoed: 0, echoes, waits: false, tx: None };
+                let session = match answer.step(links, port) {
+                    Progress::Waits => Session::Answer(answer),
+                    progress => end(links, port, &mut answer, progress),
+                };
+                if let Some(place) = self.sessions.get_mut(usize::from(port.number)) {
+                    *place = session;
                 }
             }
-            Begun::Silent => {}
-            Begun::Again => continue,
+            Begun::Silent => finish(links, port, id),
+            Begun::Again => {}
         }
-        finish(links, port, id);
+    }
+
+    /// Waits until something may go on.
+    fn wait(&self) -> impl Future<Output = ()> + '_ {
+        let links = self.links;
+        let mut asked = false;
+        poll_fn(move |cx| {
+            let waited = core::mem::replace(&mut asked, true);
+            let mut ready = links.parser_wake.poll(cx).is_ready();
+            for (port, session) in links.ports.iter().zip(&self.sessions) {
+                let ticks = match session {
+                    Session::Leave(..) => true,
+                    Session::Answer(answer) => answer.waits && !links.storage.is_awaited(),
+                    Session::Idle => false,
+                };
+                if ticks {
+                    ready |= waited;
+                    wake_after(Event::Tick, cx.waker());
+                }
+                let has_room = match session {
+                    Session::Answer(Answer { waits: true, .. }) => None,
+                    Session::Answer(Answer { tx: Some(tx), .. }) => Some(tx.has_room()),
+                    // While others talk, their end wakes it.
+                    _ if self.lacking & 1 << port.number != 0 => {
+                        port.tx.try_lock().ok().map(|tx| tx.has_room())
+                    }
+                    _ => None,
+                };
+                match has_room {
+                    Some(true) => ready = true,
+                    Some(false) => wake_after_transmitted(port.number, cx.waker()),
+                    None => {}
+                }
+            }
+            if ready { Poll::Ready(()) } else { Poll::Pending }
+        })
     }
 }
 
-/// The next line during a queue flush: control lines are carried out, those that are dropped are refused, and G-code waits.
+/// Answers who asks whether anybody is there, or tells of bytes that were lost. False if that has to wait.
 #[inline(never)]
 #[small]
-fn undropped(links: &Links) -> Option<Chosen<'_>> {
-    links.ports.iter().find_map(|port| {
-        let (id, class) = port.lines.borrow().next(true)?;
-        (class != Class::Data).then_some(Chosen { port, id, class })
-    })
+fn tell(links: &Links, port: &Port) -> bool {
+    let what = if port.enquiry.get() { What::Enquiry } else { What::Exception(Status::BufferFull) };
+    let told = tell_at_once(links, port, what);
+    if told {
+        match what {
+            What::Enquiry => port.enquiry.set(false),
+            _ => port.lost.set(false),
+        }
+    }
+    told
+}
+
+/// A line has been answered, or waits with those of G-code. What becomes of its session.
+#[inline(never)]
+fn end(links: &Links, port: &Port, answer: &mut Answer, progress: Progress) -> Session {
+    if progress == Progress::InOrder {
+        port.lines.borrow_mut().wait_in_order(answer.id);
+        return Session::Idle;
+    }
+    finish(links, port, answer.id);
+    let leaves =
+        links.restart.get().is_some() || (links.rate.get().is_some() && port.number == USB);
+    match answer.tx.take() {
+        Some(tx) if leaves => Session::Leave(tx, None),
+        _ => Session::Idle,
+    }
+}
+
+/// Whether what has been put has left: since 1 to 4 ms.
+#[inline(never)]
+#[small]
+fn has_left(tx: &Tx, since: &mut Option<u16>) -> bool {
+    if !tx.is_empty() {
+        *since = None;
+        return false;
+    }
+    let now = millis() as u16;
+    now.wrapping_sub(*since.get_or_insert(now)) >= tx.last_ms()
+}
+
+/// Does what a response has been waited for.
+#[inline(never)]
+#[small]
+fn act(links: &Links, tx: &mut Tx) {
+    if let Some(boot) = links.restart.take() {
+        if boot {
+            imp::boot()
+        } else {
+            imp::reset()
+        };
+    }
+    if let Some(rate) = links.rate.take() {
+        tx.set_rate(rate);
+    }
+}
+
+impl Answer {
+    /// Goes on as far as there is room.
+    #[inline(never)]
+    fn step(&mut self, links: &'static Links, port: &'static Port) -> Progress {
+        if self.waits && links.storage.is_awaited() {
+            return Progress::Waits;
+        }
+        let begun = self.tx.is_some();
+        let Some(mut tx) = self.tx.take().or_else(|| port.tx.try_lock().ok()) else {
+            return Progress::Waits;
+        };
+        self.waits = false;
+        let (progress, talks) = self.steps(links, port, &mut tx, begun);
+        if talks {
+            self.tx = Some(tx);
+        }
+        progress
+    }
+
+    /// The same, and whether the transmitter is still needed.
+    fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
+        let mut begun = begun;
+        while tx.has_room() {
+            if self.echoes {
+                self.echoes = echo(links, port, self.id, &mut self.echoed, tx);
+                begun = true;
+                continue;
+            }
+            match step(links, port, self.id, &mut self.request, tx) {
+                Next::More => begun = true,
+                // Of a response that has begun the rest is due.
+                Next::Wait => {
+                    self.waits = true;
+                    return (Progress::Waits, self.request.has_begun());
+                }
+                Next::Gcode { start, end } => {
+                    if !ran(links, port, self.id, Span { start, end }, &mut self.request) {
+                        // Nothing of the response has been put yet. A line is not sent back twice.
+                        self.waits = self.echoed > 0;
+                        let later = if self.waits { Progress::Waits } else { Progress::InOrder };
+                        return (later, false);
+                    }
+                }
+                Next::Done(_) => return (Progress::Done, true),
+            }
+        }
+        (Progress::Waits, begun)
+    }
 }
 
 /// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the
@@ -149,19 +423,6 @@ fn usual(links: &Links) -> Usual {
     Usual::Done
 }
 
-/// Answers a line as far as that goes without waiting: most of them to the end. Returns whether it was
-/// this one.
-#[inline(never)]
-fn answer_at_once(links: &Links, port: &Port, id: LineId, request: &mut Request) -> bool {
-    match port.tx.try_lock() {
-        // What waits for the planner is left to `answer`.
-        Ok(mut tx) if tx.has_room() && request.gcode().is_none() => {
-            matches!(step(links, port, id, request, &mut tx), Next::Done(_))
-        }
-        _ => false,
-    }
-}
-
 /// How it goes on with a line.
 enum Begun {
     /// It is to be answered.
@@ -199,62 +460,6 @@ fn begin(links: &Links, port: &Port, id: LineId, class: Class, tried: Usual) -> 
     Begun::Answer(request)
 }
 
-/// Writes the response to a line, and before that the line if it `echoes`.
-async fn answer(links: &Links, port: &Port, id: LineId, request: &mut Request, echoes: bool) {
-    let mut tx = port.tx.lock().await;
-    let mut at = 0;
-    let mut echoes = echoes;
-    while echoes {
-        tx.room().await;
-        echoes = echo(links, port, id, &mut at, &mut tx);
-    }
-    loop {
-        tx.room().await;
-        match step(links, port, id, request, &mut tx) {
-            Next::More => {}
-            // Of a response that has begun the rest is due.
-            Next::Wait if request.has_begun() => tables_ready(links).await,
-            Next::Wait => {
-                drop(tx);
-                tables_ready(links).await;
-                tx = port.tx.lock().await;
-            }
-            Next::Gcode { start, end } => {
-                let block = Span { start, end };
-                while !ran(links, port, id, block, request) {
-                    // Nothing of the response has been put yet: others may talk meanwhile.
-                    drop(tx);
-                    while !is_free(links) && links.flush.get() == Flush::None {
-                        links.parser_wake.wait().await;
-                    }
-                    tx = port.tx.lock().await;
-                }
-            }
-            Next::Done(_) => break,
-        }
-    }
-    if let Some(boot) = links.restart.take() {
-        tx.drain().await;
-        if boot {
-            imp::boot()
-        } else {
-            imp::reset()
-        };
-    }
-    drop(tx);
-    if let Some(rate) = links.rate.take() {
-        links.port(USB).tx.lock().await.set_rate(rate).await;
-    }
-}
-
-/// Waits until the tables take another change. A program that is being stored has only to be asked again.
-async fn tables_ready(links: &Links) {
-    Timer::after_ticks(1).await;
-    while links.storage.is_awaited() {
-        links.parser_wake.wait().await;
-    }
-}
-
 /// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so
 /// that it never stands in the midst of a response or a report, and never loses anything.
 #[inline(never)]
@@ -281,10 +486,10 @@ fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Reques
         request.ran(if alarm == Alarm::None { Status::Terminated } else { alarm.status() }, false);
         return true;
     }
-    if links.may_feed(port) && !is_free(links) {
+    let lines = port.lines.borrow();
+    if lines.is_behind_data(id) || (links.may_feed(port) && !is_free(links)) {
         return false;
     }
-    let lines = port.lines.borrow();
     let (status, commented) = run_block(links, port, block.of(lines.text(id)), Usual::NotTried);
     if status == Status::Again {
         return false;

@@ -232,8 +232,8 @@ impl<const N: usize> Intake<N> {
         }
         // A bus is not told: the line is refused anyway.
         if (self.refused > 0 || mark & CLEAN == 0) && !is_shared(self.port.number) {
-            self.port.exception.set(Some(Status::BufferFull));
-            links.reporter_wake.signal();
+            self.port.lost.set(true);
+            links.parser_wake.signal();
         }
         is_line
     }

@@ -126,6 +126,7 @@ pub fn xon_gets_through<S: Side>(boot: impl Fn() -> S + Sync) {
             crowd.send(port, &lines);
             crowd.pass(200);
             assert_eq!(crowd.heard[port], "", "held back");
+            crowd.prompt(USB + AUX - port, "{stat:n}\n", "{\"stat\":1}");
             crowd.send(port, XON);
             crowd.pass(400);
             assert_eq!(crowd.responses(port, 0), answers, "{lines:?}: {:?}", crowd.heard);
@@ -158,6 +159,38 @@ pub fn all_that_has_come_is_dropped<S: Side>(boot: impl Fn() -> S + Sync) {
             crowd.send(USB, "g91g1x.1f500\n");
             crowd.pass(500);
             assert_eq!(crowd.steps(), [128, 0, 0, 0]);
+        });
+    }
+}
+
+/// A port whose sender holds the machine back keeps the other from nothing.
+pub fn a_stopped_port_does_not_stop_the_other<S: Side>(boot: impl Fn() -> S + Sync) {
+    for by_pin in [false, true] {
+        alone(&boot, |mut crowd| {
+            crowd.set(USB, "{sv:0}");
+            if by_pin {
+                crowd.set(USB, "{ex:2}");
+                crowd.side.set_aux_cts(true);
+            } else {
+                crowd.send(AUX, XOFF);
+            }
+            crowd.send(AUX, &"{xvm:n}\n".repeat(6));
+            crowd.send(AUX, "\x05");
+            crowd.pass(100);
+            crowd.prompt(USB, "{stat:n}\n", "{\"stat\":1}");
+            crowd.prompt(USB, "\x05", "{\"ack\":true}");
+            crowd.send(USB, "g91g1x.1f500\n");
+            crowd.pass(500);
+            assert_eq!(crowd.steps(), [128, 0, 0, 0]);
+            assert_eq!(crowd.responses(USB, 0), 1);
+            if by_pin {
+                crowd.side.set_aux_cts(false);
+            } else {
+                crowd.send(AUX, XON);
+            }
+            crowd.pass(300);
+            assert_eq!(crowd.responses(AUX, 0), 6, "{:?}", crowd.heard);
+            assert_eq!(crowd.heard[AUX].matches("{\"ack\":true}").count(), 1);
         });
     }
 }
