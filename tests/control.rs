@@ -26,6 +26,11 @@ fn all_that_has_come_is_dropped() {
 }
 
 #[test]
+fn data_does_not_hold_up_control() {
+    crowd::data_does_not_hold_up_control(boot);
+}
+
+#[test]
 fn a_stopped_port_does_not_stop_the_other() {
     crowd::a_stopped_port_does_not_stop_the_other(boot);
 }

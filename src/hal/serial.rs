@@ -5,7 +5,7 @@
 //! three bits what the reader must know. Line ends that were lost are counted besides (`imp::uart::lost_ends`),
 //! so that each lost line is answered.
 
-use super::ring::{Consumer, Producer, Ring};
+use super::ring::{Consumer, Producer, Window};
 use crate::boards::{ACTIVE, Serial};
 
 /// How many ports there are, and the numbers of the one that every board has and of the other.
@@ -36,6 +36,11 @@ pub const RETURNED: u8 = 4;
 pub const CUT: u8 = RETURNED;
 /// The same: here a `~` stood.
 pub const GO: u8 = RETURNED | BEHIND_END;
+
+/// Stands where a line was that has been taken out of its turn. No such byte comes into the ring from outside: it resets.
+pub const TAKEN: u8 = 0x18;
+/// The same behind [`TAKEN`], for a carriage return, which a line feed may follow.
+pub const TAKEN_RETURN: u8 = b'!';
 
 /// The reader is woken at the end of a line, and when this many bytes have come since: a power of two.
 pub const fn batch(ring: usize) -> u8 {
@@ -129,19 +134,17 @@ pub fn lose(mark: u8, byte: u8) -> (u8, bool) {
 }
 
 /// The slot of the last [`CUT`] that waits in a receive ring. One that found the ring full has become the mark of a loss, the
-/// newest byte. Thread mode.
+/// newest byte.
+#[inline(never)]
 #[small]
-pub fn last_mark<const N: usize>(ring: &Ring<u8, N>) -> Option<u8> {
-    let newest = ring.newest()?;
-    let (mut at, tail) = (newest, ring.tail());
-    while at != tail {
-        // SAFETY: it has been filled and not been taken. The receive interrupt may make it a mark meanwhile, in one
-        // instruction.
-        let byte = unsafe { ring.at(at) };
-        if byte == CUT || (at == newest && byte < MARKS && byte != GO) {
-            return Some(at);
+pub fn last_mark(ring: &Window<'_>) -> Option<u8> {
+    let mut at = ring.len();
+    while at > 0 {
+        at -= 1;
+        let byte = ring.get(at);
+        if byte == CUT || (at + 1 == ring.len() && byte < MARKS && byte != GO) {
+            return Some(ring.slot(at));
         }
-        at = if at == 0 { (N - 1) as u8 } else { at - 1 };
     }
     None
 }

@@ -39,6 +39,8 @@ use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
 const ECHO: usize = 62;
+/// Steps of a response before others have their turn: to find a name takes a ms, and the ring of the second port is full in 5.
+const STEPS: u8 = 4;
 
 /// A port's transmitter, while it is the parser's.
 type Line = MutexGuard<'static, NoopRawMutex, Tx>;
@@ -107,7 +109,7 @@ impl Parser {
         let free = is_free(links);
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
-        let tried = if data && !alarmed { usual(links) } else { Usual::NotTried };
+        let tried = if data && !alarmed && self.is_idle() { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
             return true;
         }
@@ -123,41 +125,29 @@ impl Parser {
         true
     }
 
+    /// Whether no line of the port that feeds the machine is being answered.
+    #[inline(always)]
+    fn is_idle(&self) -> bool {
+        let feeder = self.sessions.get(usize::from(self.links.feeder.get()));
+        matches!(feeder, Some(Session::Idle))
+    }
+
     /// Goes on with what is under way, and tells what a port alone is told. Whether something has come to its end.
     #[inline(never)]
     fn go_on(&mut self) -> bool {
         let links = self.links;
         let mut ended = false;
         for (port, session) in links.ports.iter().zip(&mut self.sessions) {
-            ended |= match session {
-                Session::Idle if port.number == USB && links.rate.get().is_some() => {
-                    if let Ok(tx) = port.tx.try_lock() {
-                        *session = Session::Leave(tx, None);
-                    }
-                    false
-                }
-                Session::Idle if port.tells() => {
-                    let told = tell(links, port);
-                    self.lacking |= u8::from(!told) << port.number;
-                    told
-                }
-                Session::Idle => false,
-                Session::Answer(answer) => match answer.step(links, port) {
-                    Progress::Waits => false,
-                    progress => {
-                        *session = end(links, port, answer, progress);
-                        true
-                    }
-                },
-                Session::Leave(tx, since) => {
-                    let left = has_left(tx, since);
-                    if left {
-                        act(links, tx);
-                        *session = Session::Idle;
-                    }
-                    left
-                }
-            };
+            if !matches!(session, Session::Idle) {
+                ended |= go_on(links, port, session);
+            } else if port.tells() {
+                let told = tell(links, port);
+                self.lacking |= u8::from(!told) << port.number;
+                ended |= told;
+            } else if port.number == USB && links.rate.get().is_some() {
+                // The other port has asked for it.
+                leave(port.tx.try_lock().ok(), session);
+            }
         }
         ended
     }
@@ -185,20 +175,12 @@ impl Parser {
     #[inline(never)]
     fn take(&mut self, chosen: Chosen, tried: Usual) {
         let links = self.links;
-        let Chosen { port, id, class } = chosen;
-        match begin(links, port, id, class, tried) {
-            Begun::Answer(request) => {
-                let echoes = links.settings.borrow().echo();
-                let mut answer = Answer { request, id, echoed: 0, echoes, waits: false, tx: None };
-                let session = match answer.step(links, port) {
-                    Progress::Waits => Session::Answer(answer),
-                    progress => end(links, port, &mut answer, progress),
-                };
-                if let Some(place) = self.sessions.get_mut(usize::from(port.number)) {
-                    *place = session;
-                }
+        let Some(session) = self.sessions.get_mut(usize::from(chosen.port.number)) else { return };
+        match begin(links, &chosen, tried, session) {
+            Begun::Answer => {
+                go_on(links, chosen.port, session);
             }
-            Begun::Silent => finish(links, port, id),
+            Begun::Silent => finish(links, chosen.port, chosen.id),
             Begun::Again => {}
         }
     }
@@ -235,6 +217,11 @@ impl Parser {
                     None => {}
                 }
             }
+            if ready && !waited {
+                // Others have their turn first.
+                cx.waker().wake_by_ref();
+                return Poll::Pending;
+            }
             if ready { Poll::Ready(()) } else { Poll::Pending }
         })
     }
@@ -255,38 +242,54 @@ fn tell(links: &Links, port: &Port) -> bool {
     told
 }
 
-/// A line has been answered, or waits with those of G-code. What becomes of its session.
+/// Goes on with what is under way on a port. Whether it has come to its end.
 #[inline(never)]
-fn end(links: &Links, port: &Port, answer: &mut Answer, progress: Progress) -> Session {
-    if progress == Progress::InOrder {
-        port.lines.borrow_mut().wait_in_order(answer.id);
-        return Session::Idle;
+fn go_on(links: &'static Links, port: &'static Port, session: &mut Session) -> bool {
+    match session {
+        Session::Idle => return false,
+        Session::Leave(tx, since) => {
+            if !has_left(links, tx, since) {
+                return false;
+            }
+        }
+        Session::Answer(answer) => match answer.step(links, port) {
+            Progress::Waits => return false,
+            Progress::InOrder => port.lines.borrow_mut().wait_in_order(answer.id),
+            Progress::Done => {
+                finish(links, port, answer.id);
+                let changes_rate = links.rate.get().is_some() && port.number == USB;
+                if links.restart.get().is_some() || changes_rate {
+                    leave(answer.tx.take(), session);
+                    return true;
+                }
+            }
+        },
     }
-    finish(links, port, answer.id);
-    let leaves =
-        links.restart.get().is_some() || (links.rate.get().is_some() && port.number == USB);
-    match answer.tx.take() {
-        Some(tx) if leaves => Session::Leave(tx, None),
-        _ => Session::Idle,
+    *session = Session::Idle;
+    true
+}
+
+/// What is in the ring has to leave before anything else is said.
+#[inline(never)]
+#[small]
+fn leave(tx: Option<Line>, session: &mut Session) {
+    if let Some(tx) = tx {
+        *session = Session::Leave(tx, None);
     }
 }
 
-/// Whether what has been put has left: since 1 to 4 ms.
+/// Does what a response has been waited for if that has left: 1 to 4 ms after its last byte. Whether it has.
 #[inline(never)]
 #[small]
-fn has_left(tx: &Tx, since: &mut Option<u16>) -> bool {
+fn has_left(links: &Links, tx: &mut Tx, since: &mut Option<u16>) -> bool {
     if !tx.is_empty() {
         *since = None;
         return false;
     }
     let now = millis() as u16;
-    now.wrapping_sub(*since.get_or_insert(now)) >= tx.last_ms()
-}
-
-/// Does what a response has been waited for.
-#[inline(never)]
-#[small]
-fn act(links: &Links, tx: &mut Tx) {
+    if now.wrapping_sub(*since.get_or_insert(now)) < tx.last_ms() {
+        return false;
+    }
     if let Some(boot) = links.restart.take() {
         if boot {
             imp::boot()
@@ -297,6 +300,7 @@ fn act(links: &Links, tx: &mut Tx) {
     if let Some(rate) = links.rate.take() {
         tx.set_rate(rate);
     }
+    true
 }
 
 impl Answer {
@@ -320,8 +324,9 @@ impl Answer {
 
     /// The same, and whether the transmitter is still needed.
     fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
-        let mut begun = begun;
-        while tx.has_room() {
+        let (mut begun, mut left) = (begun, STEPS);
+        while tx.has_room() && left > 0 {
+            left -= 1;
             if self.echoes {
                 self.echoes = echo(links, port, self.id, &mut self.echoed, tx);
                 begun = true;
@@ -414,7 +419,7 @@ fn usual(links: &Links) -> Usual {
     }
     links.commands_taken.set(true);
     links.planner_wake.signal();
-    let ending = Ending { free: lines.free(), length: lines.oldest_length() };
+    let ending = Ending { free: port.promise(&lines), length: lines.oldest_length() };
     put_brief(&settings, ending, &mut *tx);
     tx.flush();
     lines.remove_oldest();
@@ -425,8 +430,8 @@ fn usual(links: &Links) -> Usual {
 
 /// How it goes on with a line.
 enum Begun {
-    /// It is to be answered.
-    Answer(Request),
+    /// It is being answered.
+    Answer,
     /// It gets no answer.
     Silent,
     /// It has to wait.
@@ -436,7 +441,8 @@ enum Begun {
 /// Begins with a line. One of G-code has run after that, for data lines are taken only while the
 /// planner is free.
 #[inline(never)]
-fn begin(links: &Links, port: &Port, id: LineId, class: Class, tried: Usual) -> Begun {
+fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) -> Begun {
+    let Chosen { port, id, class } = *chosen;
     let lines = port.lines.borrow();
     let (line, length) = (lines.text(id), lines.length(id));
     let mut mode = port.mode.get();
@@ -457,7 +463,9 @@ fn begin(links: &Links, port: &Port, id: LineId, class: Class, tried: Usual) -> 
         }
         request.ran(status, commented);
     }
-    Begun::Answer(request)
+    let echoes = links.settings.borrow().echo();
+    *session = Session::Answer(Answer { request, id, echoed: 0, echoes, waits: false, tx: None });
+    Begun::Answer
 }
 
 /// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so

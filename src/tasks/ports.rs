@@ -16,9 +16,19 @@ use super::lines::{Class, LineId, LinePool};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::View;
+use crate::hal::imp::uart;
 use crate::hal::serial::{USB, is_shared};
 use crate::protocol::Mode;
 use crate::status::Status;
+
+/// How long control lines of USB may be that overtake, and those of the other port.
+const RESERVE: u8 = 40;
+/// See [`RESERVE`].
+pub const AUX_RESERVE: u8 = 16;
+/// How long lines may be of which footers tell how many may come: powers of two.
+const PROMISED: u8 = 32;
+/// The same of the other port.
+const AUX_PROMISED: u8 = 16;
 
 /// What a port has to itself.
 pub struct Port {
@@ -43,13 +53,28 @@ impl Port {
     pub fn new(number: u8, bytes: &'static mut [u8], tx: Tx) -> Self {
         Self {
             number,
-            lines: RefCell::new(LinePool::new(bytes)),
+            lines: RefCell::new(LinePool::new(
+                bytes,
+                if number == USB { RESERVE } else { AUX_RESERVE },
+            )),
             tx: Mutex::new(tx),
             mode: Cell::new(Mode::Json),
             enquiry: Cell::new(false),
             lost: Cell::new(false),
             cut: Cell::new(None),
         }
+    }
+
+    /// How many lines may come: what footers tell. Each may be [`PROMISED`] bytes long with its end, a longer one takes several.
+    #[inline(never)]
+    pub fn promise(&self, lines: &LinePool) -> u8 {
+        let (slots, room) = (lines.free(), lines.room());
+        let shift = if self.number == USB { PROMISED } else { AUX_PROMISED }.trailing_zeros();
+        if u16::from(slots) << shift <= room {
+            return slots;
+        }
+        let all = room + u16::from(uart::room(self.number));
+        slots.min((all >> shift) as u8)
     }
 
     /// Whether there is something to tell on this port alone.

@@ -13,8 +13,8 @@ const BYTES_MS: usize = 11;
 
 pub const USB: usize = 0;
 pub const AUX: usize = 1;
-pub const XOFF: &str = "\x13";
-pub const XON: &str = "\x11";
+pub const XOFF: char = '\x13';
+pub const XON: char = '\x11';
 
 /// A machine, and what its two ports have said.
 pub struct Crowd<S> {
@@ -57,8 +57,11 @@ impl<S: Side> Crowd<S> {
 
     pub fn pass(&mut self, ms: u64) {
         self.side.run_ms(ms);
-        self.heard[USB] += &String::from_utf8_lossy(&self.side.heard());
-        self.heard[AUX] += &String::from_utf8_lossy(&self.side.heard_aux());
+        for (port, heard) in [self.side.heard(), self.side.heard_aux()].iter().enumerate() {
+            // The machine may hold its sender back.
+            let heard = String::from_utf8_lossy(heard).replace([XOFF, XON], "");
+            self.heard[port] += &heard;
+        }
     }
 
     pub fn forget(&mut self) {
@@ -100,6 +103,16 @@ impl<S: Side> Crowd<S> {
     pub fn turns(&self) -> bool {
         self.side.outputs().0 & 1 != 0
     }
+
+    /// Fills the planner with slow moves, until a line waits.
+    fn fill_planner(&mut self) {
+        let mut taken = true;
+        while taken {
+            self.forget();
+            self.send(USB, "g91g1x.1f10\n");
+            taken = self.hears(USB, "\"f\":[", 200);
+        }
+    }
 }
 
 /// Has a machine of its own, in a thread of its own, for on the host there is one in each.
@@ -122,12 +135,12 @@ pub fn xon_gets_through<S: Side>(boot: impl Fn() -> S + Sync) {
     ] {
         alone(&boot, |mut crowd| {
             crowd.set(USB, setting);
-            crowd.send(port, XOFF);
+            crowd.send(port, &XOFF.to_string());
             crowd.send(port, &lines);
             crowd.pass(200);
             assert_eq!(crowd.heard[port], "", "held back");
             crowd.prompt(USB + AUX - port, "{stat:n}\n", "{\"stat\":1}");
-            crowd.send(port, XON);
+            crowd.send(port, &XON.to_string());
             crowd.pass(400);
             assert_eq!(crowd.responses(port, 0), answers, "{lines:?}: {:?}", crowd.heard);
             crowd.prompt(port, "{stat:n}\n", "{\"stat\":1}");
@@ -163,6 +176,36 @@ pub fn all_that_has_come_is_dropped<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
+/// Waiting lines are in nobody's way: however many and however long they are.
+pub fn data_does_not_hold_up_control<S: Side>(boot: impl Fn() -> S + Sync) {
+    let long = |n: usize| format!("g91g1x.1f10({})\n", "x".repeat(n - 14));
+    let crowds =
+        [long(170).repeat(3), "g4p9\n".repeat(50), format!("g4p1\n{}", long(254).repeat(2))];
+    for stopped in [false, true] {
+        for lines in &crowds {
+            alone(&boot, |mut crowd| {
+                crowd.set(USB, "{psw:1}");
+                crowd.set(USB, "{rxm:0,sv:0}");
+                crowd.send(USB, "m3 s1000\n");
+                match stopped {
+                    true => crowd.send(USB, "m0\n"),
+                    false => crowd.fill_planner(),
+                }
+                crowd.pass(200);
+                crowd.send(USB, lines);
+                crowd.pass(200);
+                let stat = if stopped { "{\"stat\":3}" } else { "{\"stat\":5}" };
+                crowd.prompt(USB, "{stat:n}\n", stat);
+                crowd.prompt(USB, "{fb:null}\r\n", "{\"fb\":440.20}");
+                crowd.prompt(AUX, "{stat:n}\n", stat);
+                crowd.prompt(USB, "{alarm:1}\n", "{\"alarm\":1}");
+                crowd.pass(5);
+                assert!(!crowd.turns());
+            });
+        }
+    }
+}
+
 /// A port whose sender holds the machine back keeps the other from nothing.
 pub fn a_stopped_port_does_not_stop_the_other<S: Side>(boot: impl Fn() -> S + Sync) {
     for by_pin in [false, true] {
@@ -172,7 +215,7 @@ pub fn a_stopped_port_does_not_stop_the_other<S: Side>(boot: impl Fn() -> S + Sy
                 crowd.set(USB, "{ex:2}");
                 crowd.side.set_aux_cts(true);
             } else {
-                crowd.send(AUX, XOFF);
+                crowd.send(AUX, &XOFF.to_string());
             }
             crowd.send(AUX, &"{xvm:n}\n".repeat(6));
             crowd.send(AUX, "\x05");
@@ -186,7 +229,7 @@ pub fn a_stopped_port_does_not_stop_the_other<S: Side>(boot: impl Fn() -> S + Sy
             if by_pin {
                 crowd.side.set_aux_cts(false);
             } else {
-                crowd.send(AUX, XON);
+                crowd.send(AUX, &XON.to_string());
             }
             crowd.pass(300);
             assert_eq!(crowd.responses(AUX, 0), 6, "{:?}", crowd.heard);

@@ -231,10 +231,9 @@ pub fn newest(port: u8) -> Option<u8> {
 
 /// The slot of the mark that stands for the last `%` or `^d`, if it has not been read.
 pub fn last_cut(port: u8) -> Option<u8> {
-    match port {
-        AUX => last_mark(aux_rx()),
-        _ => last_mark(usb_rx()),
-    }
+    // SAFETY: the reader does not run meanwhile.
+    let ring = unsafe { if port == AUX { aux_rx().window() } else { usb_rx().window() } };
+    last_mark(&ring)
 }
 
 /// Whether an exclamation mark has come that nobody has taken yet, on any port.
