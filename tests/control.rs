@@ -34,3 +34,8 @@ fn data_does_not_hold_up_control() {
 fn a_stopped_port_does_not_stop_the_other() {
     crowd::a_stopped_port_does_not_stop_the_other(boot);
 }
+
+#[test]
+fn nothing_starves_control() {
+    crowd::nothing_starves_control(boot);
+}

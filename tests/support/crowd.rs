@@ -11,6 +11,9 @@ const PROMPT_MS: u64 = 20;
 /// A byte on the line takes less than a tenth of a ms.
 const BYTES_MS: usize = 11;
 
+/// A slow move.
+const MOVE: &str = "g91g1x.1f10\n";
+
 pub const USB: usize = 0;
 pub const AUX: usize = 1;
 pub const XOFF: char = '\x13';
@@ -105,13 +108,28 @@ impl<S: Side> Crowd<S> {
     }
 
     /// Fills the planner with slow moves, until a line waits.
-    fn fill_planner(&mut self) {
+    fn fill_planner(&mut self, port: usize) {
         let mut taken = true;
         while taken {
             self.forget();
-            self.send(USB, "g91g1x.1f10\n");
-            taken = self.hears(USB, "\"f\":[", 200);
+            self.send(port, MOVE);
+            taken = self.hears(port, "\"f\":[", 200);
         }
+    }
+
+    /// Lets a sender take no more answers, or take them again.
+    fn hold_back(&mut self, port: usize, holds: bool) {
+        self.send(port, if holds { "\x13" } else { "\x11" });
+        self.pass(60);
+    }
+
+    /// The spindle stops at once.
+    fn stops(&mut self, what: &str) {
+        let turns = |crowd: &mut Self| {
+            crowd.pass(1);
+            crowd.turns()
+        };
+        assert!((0..PROMPT_MS).any(|_| !turns(self)), "{what:?} does nothing: {:?}", self.heard);
     }
 }
 
@@ -136,7 +154,11 @@ pub fn xon_gets_through<S: Side>(boot: impl Fn() -> S + Sync) {
         alone(&boot, |mut crowd| {
             crowd.set(USB, setting);
             crowd.send(port, &XOFF.to_string());
-            crowd.send(port, &lines);
+            // Nobody heeds what the machine says of its short ring.
+            for line in lines.split_inclusive('\n') {
+                crowd.send(port, line);
+                crowd.pass(if port == AUX { 15 } else { 0 });
+            }
             crowd.pass(200);
             assert_eq!(crowd.heard[port], "", "held back");
             crowd.prompt(USB + AUX - port, "{stat:n}\n", "{\"stat\":1}");
@@ -189,7 +211,7 @@ pub fn data_does_not_hold_up_control<S: Side>(boot: impl Fn() -> S + Sync) {
                 crowd.send(USB, "m3 s1000\n");
                 match stopped {
                     true => crowd.send(USB, "m0\n"),
-                    false => crowd.fill_planner(),
+                    false => crowd.fill_planner(USB),
                 }
                 crowd.pass(200);
                 crowd.send(USB, lines);
@@ -235,5 +257,48 @@ pub fn a_stopped_port_does_not_stop_the_other<S: Side>(boot: impl Fn() -> S + Sy
             assert_eq!(crowd.responses(AUX, 0), 6, "{:?}", crowd.heard);
             assert_eq!(crowd.heard[AUX].matches("{\"ack\":true}").count(), 1);
         });
+    }
+}
+
+/// Everything at once: the planner full or waiting for a tilde, pool and ring of the port that feeds it full, one of the ports held
+/// back with answers pending. Questions, holds, kills and alarms get through on the other, whichever that is.
+pub fn nothing_starves_control<S: Side>(boot: impl Fn() -> S + Sync) {
+    for (feeder, waiting) in [(USB, 24), (AUX, 8)] {
+        for (waits, speaker) in [(false, USB), (false, AUX), (true, USB), (true, AUX)] {
+            for stop in ["\x04", "{alarm:1}\n", "!\x04"] {
+                alone(&boot, |mut crowd| {
+                    let silent = USB + AUX - speaker;
+                    crowd.set(USB, "{psw:1,sv:0}");
+                    crowd.set(feeder, "m3 s1000");
+                    if waits {
+                        crowd.set(feeder, "m0");
+                    } else {
+                        crowd.fill_planner(feeder);
+                    }
+                    crowd.hold_back(silent, true);
+                    crowd.send(silent, &"{xvm:n}\n".repeat(2));
+                    crowd.send(feeder, &MOVE.repeat(waiting));
+                    crowd.pass(100);
+                    let stat = if waits { "{\"stat\":3}" } else { "{\"stat\":5}" };
+                    crowd.prompt(speaker, "{stat:n}\n", stat);
+                    crowd.prompt(speaker, "\x05", "{\"ack\":true}");
+                    if !waits {
+                        crowd.send(speaker, "!");
+                        crowd.prompt(speaker, "{stat:n}\n", "{\"stat\":6}");
+                    }
+                    assert!(crowd.turns());
+                    crowd.send(speaker, stop);
+                    crowd.stops(stop);
+                    crowd.prompt(speaker, "{stat:n}\n", "{\"stat\":");
+                    // All lines are answered in the end.
+                    crowd.forget();
+                    crowd.hold_back(silent, false);
+                    crowd.pass(1_000);
+                    let answers = if silent == feeder { waiting + 2 } else { 2 };
+                    let heard = crowd.heard[silent].matches("{\"r\":").count();
+                    assert!(heard >= answers, "{heard} of {answers}: {:?}", crowd.heard);
+                });
+            }
+        }
     }
 }

@@ -35,3 +35,8 @@ fn a_stopped_port_does_not_stop_the_other() {
 fn data_does_not_hold_up_control() {
     crowd::data_does_not_hold_up_control(boot);
 }
+
+#[test]
+fn nothing_starves_control() {
+    crowd::nothing_starves_control(boot);
+}
