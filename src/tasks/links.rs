@@ -4,11 +4,11 @@
 //! | link | carries | depth | RAM | from | to | when full |
 //! |---|---|---|---|---|---|---|
 //! | `uart` receive ring | bytes | 255; 63 | 259 B, 67 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
-//! | [`Port::lines`] | lines | 8 lines; 456 B, 80 B | 487 B, 111 B | reader | parser | bytes stay in the receive ring |
+//! | [`Port::lines`] | lines | 8 lines; 456 B, 96 B | 487 B, 127 B | reader | parser | bytes stay in the receive ring |
 //! | [`Links::commands`] | canonical commands | 1 | 98 B | parser | planner | the parser takes control lines only |
 //! | block ring | blocks | 64 | 1,912 B | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |
-//! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | the writer waits, response half sent |
+//! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | parser: the port waits, response half sent; reporter: waits |
 //! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
 //! | [`Links::moment`] | how motion stood when the report under way began | 1 | 32 B | whoever tells it | the same | overwritten |
@@ -37,6 +37,7 @@ use crate::jobs::Job;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Snapshot};
 use crate::protocol::StatusReport;
+use crate::status::Status;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// The links. One for the machine, made at start-up.
@@ -59,6 +60,8 @@ pub struct Links {
     pub cycle_start: Wake,
     /// The machine has come to a program stop and waits for cycle start.
     pub stopped: Cell<bool>,
+    /// An exception to report to whoever feeds the machine.
+    pub exception: Cell<Option<Status>>,
     /// Something that reports show may have changed.
     pub reporter_wake: News,
     /// Blocks that came and went, for queue reports.

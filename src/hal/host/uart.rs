@@ -11,7 +11,7 @@ use crate::hal::event::Event;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
 use crate::hal::serial::{
     AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, MARKS, PORTS, RX_RING, TX_RING, USB, XOFF, XON,
-    batch, hardware, high_water, lose, mark,
+    batch, hardware, high_water, last_mark, lose, mark,
 };
 use crate::realtime::{self, Asked};
 
@@ -68,6 +68,8 @@ struct Line {
     /// A byte to send before all others, and whether these are held back.
     ahead: Option<u8>,
     held: bool,
+    /// Whether XOFF and XON count.
+    heeds_xoff: bool,
     /// Whether CTS counts, and holds them back.
     heeds_cts: bool,
     cts: bool,
@@ -97,6 +99,7 @@ impl Line {
             leaving: None,
             ahead: None,
             held: false,
+            heeds_xoff: false,
             heeds_cts: false,
             cts: false,
             rts: false,
@@ -187,18 +190,11 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool) {
     });
 }
 
-/// Holds what the ring holds back, or lets it go: the other side has sent XOFF, or XON.
-pub fn hold(port: u8, held: bool) {
-    with(port, |line| {
-        line.held = held;
-        line.kick();
-    });
-}
-
 /// How the other side may hold it back from now on.
 pub fn set_flow(port: u8, flow: Flow) {
     with(port, |line| {
-        line.held &= flow == Flow::Characters;
+        line.heeds_xoff = flow == Flow::Characters;
+        line.held &= line.heeds_xoff;
         line.heeds_cts = flow == Flow::Pins;
         line.rts &= line.heeds_cts;
         line.let_arrive();
@@ -223,6 +219,21 @@ pub fn room(port: u8) -> u8 {
         _ => (RX_RING, usb_rx().used()),
     };
     (size - 2).saturating_sub(used) as u8
+}
+
+/// The slot of the receive ring with the byte that came last, if it still waits there.
+pub fn newest(port: u8) -> Option<u8> {
+    match port {
+        AUX => aux_rx().newest(),
+        _ => usb_rx().newest(),
+    }
+}
+
+/// The slot of the mark that stands for the last `%` or `^d`, if it has not been read.
+pub fn last_cut(port: u8) -> Option<u8> {
+    // SAFETY: the reader does not run meanwhile.
+    let ring = unsafe { if port == AUX { aux_rx().window() } else { usb_rx().window() } };
+    last_mark(&ring)
 }
 
 /// Whether an exclamation mark has come that nobody has taken yet, on any port.
@@ -330,6 +341,14 @@ impl Line {
     }
 
     fn arrive(&mut self, byte: u8) {
+        if self.heeds_xoff && (byte == XOFF || byte == XON) {
+            self.held = byte == XOFF;
+            if byte == XON {
+                self.realtime |= realtime::LET_GO;
+                flags::set(Event::Realtime);
+            }
+            return;
+        }
         let special = realtime::bit(byte);
         if special != 0 {
             self.realtime = realtime::with(self.realtime, special);
