@@ -150,7 +150,9 @@ fn enquiry_and_reset_act_at_once() {
 #[test]
 fn a_damaged_byte_behind_a_return_damages_one_line_only() {
     let mut sender = Sender::boot();
-    let heard = sender.ask("g0 x1\r\x01\ng0 x2\r", 2_000);
+    sender.machine.send(b"g0 x1\r");
+    sender.machine.send_damaged();
+    let heard = sender.ask("\ng0 x2\r", 2_000);
     let statuses: Vec<_> =
         heard.lines().filter_map(|line| line.strip_prefix("{\"r\":{},\"f\":[1,")).collect();
     assert_eq!(statuses, ["0,7]}", "13,7]}", "0,7]}"], "{heard}");
@@ -162,7 +164,9 @@ fn a_damaged_byte_behind_a_return_damages_one_line_only() {
 #[test]
 fn an_enquiry_and_an_exception_wait_for_a_response() {
     let mut sender = Sender::boot();
-    let heard = sender.ask("{sys:n}\n{sys:n}\n\x01\n\x05g0 x1\n", 1_000);
+    sender.machine.send(b"{sys:n}\n{sys:n}\n");
+    sender.machine.send_damaged();
+    let heard = sender.ask("\n\x05g0 x1\n", 1_000);
     assert_eq!(heard.matches("{\"ack\":true}\n").count(), 1, "{heard}");
     assert_eq!(heard.matches("{\"er\":{").count(), 1, "{heard}");
     assert_eq!(sender.answered(), 4, "{heard}");

@@ -22,9 +22,10 @@ pub const AUX_RING: usize = 64;
 /// Size of each transmit ring, a power of two.
 pub const TX_RING: usize = 128;
 
-/// Bytes below this are marks. None of them is in a line of text; what comes of them from outside
-/// counts as damaged.
+/// Bytes below this are marks. None of them is in a line of text: in place of one that comes from outside there is a [`STRAY`].
 pub const MARKS: u8 = 8;
+/// A byte that no line may hold, and no mark.
+pub const STRAY: u8 = 8;
 /// Of a mark: it replaced the end of a whole line.
 pub const BEHIND_END: u8 = 1;
 /// Of a mark: the byte lost last was the end of a line.

@@ -10,8 +10,8 @@ use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
 use crate::hal::serial::{
-    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, MARKS, PORTS, RX_RING, TX_RING, USB, XOFF, XON,
-    batch, hardware, high_water, lose, mark,
+    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, MARKS, PORTS, RX_RING, STRAY, TX_RING, USB, XOFF,
+    XON, batch, hardware, high_water, lose, mark,
 };
 use crate::realtime::{self, Asked};
 
@@ -59,8 +59,8 @@ impl<const N: usize> Fill for Producer<u8, N> {
 struct Line {
     rx_in: Option<Box<dyn Fill>>,
     tx_out: Option<Consumer<u8, TX_RING>>,
-    /// Bytes the sender has yet to put on the line.
-    arriving: VecDeque<u8>,
+    /// Bytes the sender has yet to put on the line, and whether they arrive whole.
+    arriving: VecDeque<(u8, bool)>,
     /// What the firmware has sent.
     sent: Vec<u8>,
     /// The byte that is leaving.
@@ -243,7 +243,15 @@ pub fn take_asked(port: u8) -> Asked {
 /// The sender puts bytes on the line.
 pub(super) fn send(port: u8, bytes: &[u8]) {
     with(port, |line| {
-        line.arriving.extend(bytes);
+        line.arriving.extend(bytes.iter().map(|byte| (*byte, true)));
+        line.let_arrive();
+    });
+}
+
+/// The sender puts a byte on the line that arrives damaged.
+pub(super) fn send_damaged(port: u8) {
+    with(port, |line| {
+        line.arriving.push_back((b'x', false));
         line.let_arrive();
     });
 }
@@ -291,8 +299,8 @@ impl Line {
 
     fn advance(&mut self) {
         if self.next_rx <= now() {
-            if let Some(byte) = self.arriving.pop_front() {
-                self.arrive(byte);
+            if let Some((byte, whole)) = self.arriving.pop_front() {
+                self.arrive(byte, whole);
             }
             self.next_rx = NEVER;
             self.let_arrive();
@@ -329,7 +337,7 @@ impl Line {
         flags::set(Event::Received);
     }
 
-    fn arrive(&mut self, byte: u8) {
+    fn arrive(&mut self, byte: u8, whole: bool) {
         let special = realtime::bit(byte);
         if special != 0 {
             self.realtime = realtime::with(self.realtime, special);
@@ -339,7 +347,7 @@ impl Line {
             }
             return;
         }
-        let garbles = self.garbles();
+        let garbles = self.garbles() || !whole;
         if self.last <= realtime::ASCII
             && !garbles
             && let Some(asked) = self.asked.with(byte)
@@ -350,7 +358,8 @@ impl Line {
         }
         let Some(ring) = self.rx_in.as_mut() else { return };
         let full = ring.is_full();
-        if full || byte < MARKS || garbles {
+        let byte = if byte < MARKS { STRAY } else { byte };
+        if full || garbles {
             self.lost_ends = self.lost_ends.wrapping_add(lost(ring.as_mut(), byte));
         } else {
             ring.push(byte);

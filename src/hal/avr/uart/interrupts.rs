@@ -19,8 +19,8 @@ use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::event::Event;
 use crate::hal::ring::Ring;
 use crate::hal::serial::{
-    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, GO, MARKS, PORTS, RETURNED, RX_RING, TX_RING, USB,
-    batch, hardware, high_water, is_shared,
+    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, GO, MARKS, PORTS, RETURNED, RX_RING, STRAY, TX_RING,
+    USB, batch, hardware, high_water, is_shared,
 };
 use crate::realtime;
 
@@ -182,8 +182,10 @@ macro_rules! interrupts {
                     // A line end, or nearly: the reader is to look.
                     "sbi  0x1E, {received}",
                     "cpi  r24, {marks}",
-                    "brsh 1b",
-                    "rjmp 7f",
+                    "brsh 11f",
+                    "ldi  r24, {stray}",
+                    "11:",
+                    "rjmp 1b",
                     // From blank to percent: special are 0x21 and 0x25, those of odd number with bit 1 clear.
                     "6:",
                     "sbrs r24, 0",
@@ -433,6 +435,7 @@ macro_rules! interrupts {
                     unmask = const RXCIE,
                     batch = const batch($ring) - 1,
                     marks = const MARKS,
+                    stray = const STRAY,
                     behind_end = const BEHIND_END,
                     behind_lf = const BEHIND_END | CLEAN,
                     behind_cr = const BEHIND_END | CLEAN | RETURNED,
