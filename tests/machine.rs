@@ -256,6 +256,55 @@ fn settings_and_offsets_survive_a_reset() {
 }
 
 #[test]
+fn a_kill_at_rest_is_no_hold() {
+    let mut sender = Sender::boot();
+    sender.ask("{sr:{stat:t,hold:t,mots:t,cycs:t}}\n", 100);
+    for kill in ["!\x04", "\x04", "!\x04%"] {
+        let heard = sender.ask(kill, 200);
+        assert!(heard.contains("\"st\":207"), "{heard}");
+        for held in ["\"stat\":6", "\"hold\":3", "\"hold\":4", "\"mots\":2", "\"cycs\":1"] {
+            assert!(!heard.contains(held), "{heard}");
+        }
+    }
+    assert!(sender.heard.contains("{\"sr\":{\"stat\":4,"), "{}", sender.heard);
+    // One that stops something is.
+    sender.ask("g1 x10 f500\n", 200);
+    let heard = sender.ask("!\x04", 500);
+    assert!(heard.contains("\"stat\":6"), "{heard}");
+    // And a program stop stands still.
+    sender.ask("m0\n", 200);
+    let heard = sender.ask("!\x04", 200);
+    assert!(heard.contains("\"st\":207") && !heard.contains("\"stat\":6"), "{heard}");
+}
+
+/// What EEPROM holds when the machine starts anew because these lines asked for it.
+fn left_by(lines: &'static str) -> Vec<u8> {
+    let play = move || {
+        let sender = Sender::boot();
+        sender.machine.send(lines.as_bytes());
+        assert!(sender.machine.run_until(10_000, kerf::hal::imp::was_reset), "{lines}");
+        kerf::hal::imp::eeprom::contents()
+    };
+    std::thread::spawn(play).join().unwrap()
+}
+
+#[test]
+fn an_ordered_reset_keeps_every_setting_that_was_acknowledged() {
+    let all = "{xvm:1234,yvm:1235}\n{zvm:1236}\ng10 l2 p2 x1.5 y2\n{p1frq:2500}\n";
+    let expected = "{\"r\":{\"xvm\":1234,\"yvm\":1235,\"zvm\":1236,\"p1frq\":2500,\"g55x\":1.500,\
+                    \"g55y\":2.000},\"f\":[1,0,7]}";
+    for order in ["{reset:1}\n", "{boot:1}\n", "$reset=1\n"] {
+        let contents = left_by((all.to_string() + order).leak());
+        let check = move || {
+            kerf::hal::imp::eeprom::put(&contents);
+            let answer = Sender::boot().ask("{xvm:n,yvm:n,zvm:n,p1frq:n,g55x:n,g55y:n}\n", 300);
+            assert_eq!(answer.lines().next(), Some(expected), "{order}");
+        };
+        std::thread::spawn(check).join().unwrap();
+    }
+}
+
+#[test]
 fn defaults_and_the_mode_survive_a_reset() {
     let contents = {
         let mut sender = Sender::boot();

@@ -116,7 +116,7 @@ pub trait Machine {
     /// A byte of the program that is kept.
     fn program(&mut self, at: u16) -> Option<u8>;
     /// Starts the machine anew when the response has left, in its boot loader if `boot`, for which it has to be at
-    /// rest.
+    /// rest. [`Status::Again`] while settings are on their way to memory.
     fn restart(&mut self, boot: bool) -> Status;
     /// Changes the overrides at once.
     fn change_override(&mut self, change: Change);
