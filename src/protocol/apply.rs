@@ -163,10 +163,8 @@ fn set_value<M: Machine, O>(
 #[small]
 fn factor(which: Override, pair: &Pair, line: &[u8]) -> Result<u16, Status> {
     let factor = fixed(pair, line, 3, false)?;
-    match u32::try_from(factor) {
-        Ok(factor) if which.allows(factor) => Ok(factor as u16),
-        _ => Err(Status::OutOfRange),
-    }
+    let factor = u32::try_from(factor).ok().and_then(|factor| which.checked(factor));
+    factor.ok_or(Status::OutOfRange)
 }
 
 #[small]
