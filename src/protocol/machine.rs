@@ -91,6 +91,8 @@ pub trait Machine {
     /// Sets a value of the interpreter's tables. [`Status::Again`]: nothing is done, and it is to be tried again when
     /// the tables are ready.
     fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status>;
+    /// Sets the tool length on one axis, as G43.1 does.
+    fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status>;
     /// A value now, in the unit that [`Value`] states.
     fn value(&mut self, value: Value) -> i32;
     /// What this step tells of motion is of now if `first`, else of the moment of the last `first`.

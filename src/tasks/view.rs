@@ -310,6 +310,10 @@ impl Machine for View<'_> {
         self.links.model.borrow_mut().set(row, axis, value)
     }
 
+    fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status> {
+        self.links.model.borrow_mut().set_tool_length(axis, length)
+    }
+
     fn change_override(&mut self, change: Change) {
         overrides::change(change);
     }
