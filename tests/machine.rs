@@ -356,6 +356,39 @@ fn xoff_stops_a_sender_that_heeds_it_before_anything_is_lost() {
 }
 
 #[test]
+fn xoff_and_xon_stand_between_lines() {
+    let mut sender = Sender::boot();
+    sender.ask("{sv:0}\n", 100);
+    // Slow moves, so that lines pile up, and requests, so that the transmitter is busy.
+    let line = |i| format!("N{i} g1 f600 x{}.25\n{{xvm:n,yvm:n}}\n{{xvm:n}}\n", i % 7);
+    let lines: Vec<u8> = (0..150).flat_map(|i| line(i).into_bytes()).collect();
+    let mut bytes = lines.chunks(1);
+    let (mut stopped, mut said) = (false, Vec::new());
+    while bytes.len() > 0 {
+        if !stopped && let Some(byte) = bytes.next() {
+            sender.machine.send(byte);
+        }
+        sender.machine.run_until(1, || false);
+        for byte in sender.machine.received() {
+            stopped = if stopped { byte != 0x11 } else { byte == 0x13 };
+            said.push(byte);
+        }
+    }
+    sender.machine.run_ms(100_000);
+    said.extend(sender.machine.received());
+    let is_flow = |byte: &u8| matches!(byte, 0x11 | 0x13);
+    let flows = said.iter().filter(|byte| is_flow(byte)).count();
+    assert!(flows > 20, "{flows}");
+    for line in said.split(|byte| *byte == b'\n') {
+        let text = line.iter().skip_while(|byte| is_flow(byte));
+        let inside = text.filter(|byte| is_flow(byte)).count();
+        assert_eq!(inside, 0, "{:?}", String::from_utf8_lossy(line));
+    }
+    let answered = said.split(|byte| *byte == b'\n').filter(|line| line.ends_with(b"]}")).count();
+    assert_eq!(answered, 450, "{:?}", String::from_utf8_lossy(&said));
+}
+
+#[test]
 fn xoff_from_the_sender_holds_answers_back() {
     let mut sender = Sender::boot();
     assert_eq!(sender.ask("\u{13}{fb:n}\n", 500), "");

@@ -47,9 +47,22 @@ pub const fn batch(ring: usize) -> u8 {
 pub const XOFF: u8 = 0x13;
 /// See [`XOFF`].
 pub const XON: u8 = 0x11;
-/// The sender is stopped when the receive ring holds more. Most say 100 bytes more before they heed XOFF.
-pub const fn high_water(ring: usize) -> usize {
-    ring / 2
+/// Added to one of the two for each millisecond that it may wait for the end of the line that is being sent.
+pub const WAIT_MS: u8 = 0x20;
+/// A byte below this ends a line: XOFF and XON may follow it.
+pub const LINE_END: u8 = b' ';
+
+/// How many ms XOFF and XON wait for the end of a line on a port with this divisor (`baud::divisor`), at most. The sender
+/// says up to 50 bytes meanwhile, or 23 where the ring is short.
+pub const fn wait_ms(port: u8, divisor: u8) -> u8 {
+    let (ms, most) = (divisor / 3, if port == USB { 4 } else { 2 });
+    if ms > most { most } else { ms }
+}
+
+/// The sender is stopped when the receive ring holds more. Most say 100 bytes more before they heed XOFF, and that waits
+/// for the end of a line.
+pub const fn high_water(flow: Flow, ring: usize) -> usize {
+    if matches!(flow, Flow::Characters) { ring / 4 } else { ring / 2 }
 }
 /// And goes on when it holds less.
 pub const fn low_water(ring: usize) -> usize {

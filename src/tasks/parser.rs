@@ -62,6 +62,8 @@ pub async fn run(links: &'static Links) -> ! {
             Begun::Again => continue,
         }
         finish(links, port, id);
+        // The reader has its turn, and stops the sender in time.
+        embassy_futures::yield_now().await;
     }
 }
 

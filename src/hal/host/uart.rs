@@ -6,12 +6,13 @@ use std::collections::VecDeque;
 use std::vec::Vec;
 
 use super::{NEVER, flags, now};
+use crate::baud;
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
 use crate::hal::serial::{
-    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, MARKS, PORTS, RX_RING, STRAY, TX_RING, USB, XOFF,
-    XON, batch, hardware, high_water, lose, mark,
+    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LINE_END, MARKS, PORTS, RX_RING, STRAY, TX_RING,
+    USB, XOFF, XON, batch, hardware, high_water, lose, mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -32,7 +33,7 @@ impl<const N: usize> Fill for Producer<u8, N> {
     }
 
     fn is_high(&self) -> bool {
-        self.used() > high_water(N)
+        self.used() > high_water(Flow::Pins, N)
     }
 
     fn push(&mut self, byte: u8) {
@@ -67,6 +68,9 @@ struct Line {
     leaving: Option<u8>,
     /// A byte to send before all others, and whether these are held back.
     ahead: Option<u8>,
+    /// For how many ms it waits for the end of a line, and whether a line is open.
+    wait_ms: u8,
+    open: bool,
     held: bool,
     /// Whether CTS counts, and holds them back.
     heeds_cts: bool,
@@ -82,6 +86,7 @@ struct Line {
     last: u8,
     /// A byte's time at this end of the line and at the sender's.
     byte_cycles: u64,
+    rate: u32,
     sender_cycles: u64,
     next_rx: u64,
     next_tx: u64,
@@ -96,6 +101,8 @@ impl Line {
             sent: Vec::new(),
             leaving: None,
             ahead: None,
+            wait_ms: 0,
+            open: false,
             held: false,
             heeds_cts: false,
             cts: false,
@@ -106,6 +113,7 @@ impl Line {
             asked: Asked::NOTHING,
             last: 0,
             byte_cycles: 1,
+            rate: 1,
             sender_cycles: 1,
             next_rx: NEVER,
             next_tx: NEVER,
@@ -155,7 +163,7 @@ fn split<const N: usize>(
 
 /// Goes on at `rate` bits a second.
 pub fn set_rate(port: u8, rate: u32) {
-    with(port, |line| line.byte_cycles = byte_cycles(rate));
+    with(port, |line| (line.byte_cycles, line.rate) = (byte_cycles(rate), rate));
 }
 
 /// The sender goes on at `rate` bits a second.
@@ -172,12 +180,14 @@ pub fn kick(port: u8) {
     with(port, Line::kick);
 }
 
-/// Stops the sender, or lets it go on, in the way they have agreed upon.
-pub fn stop_sender(port: u8, flow: Flow, stop: bool) {
+/// Stops the sender, or lets it go on, in the way they have agreed upon. A character may wait for the end of a line if
+/// it `waits`.
+pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
     with(port, |line| match flow {
         Flow::None => {}
         Flow::Characters => {
             line.ahead = Some(if stop { XOFF } else { XON });
+            line.wait_ms = if waits { wait_ms(port, baud::divisor(line.rate) as u8) } else { 0 };
             line.kick();
         }
         Flow::Pins => {
@@ -206,9 +216,12 @@ pub fn set_flow(port: u8, flow: Flow) {
     });
 }
 
-/// Sends on what CTS has held back. Each millisecond.
+/// Sends on what CTS has held back, and XOFF or XON that has waited for long enough. Each millisecond.
 pub fn look() {
-    (0..PORTS as u8).for_each(kick);
+    for port in 0..PORTS as u8 {
+        with(port, |line| line.wait_ms = line.wait_ms.saturating_sub(1));
+        kick(port);
+    }
 }
 
 /// Line ends lost since start-up, modulo 2^16.
@@ -317,9 +330,12 @@ impl Line {
 
     fn load_tx(&mut self) {
         let held = self.held || (self.heeds_cts && self.cts);
-        self.leaving = match self.ahead.take() {
+        let may_pass = self.wait_ms == 0 || !self.open;
+        self.leaving = match self.ahead.take_if(|_| may_pass) {
             None if held => None,
-            None => self.tx_out.as_mut().and_then(Consumer::pop),
+            None => self.tx_out.as_mut().and_then(Consumer::pop).inspect(|byte| {
+                self.open = *byte >= LINE_END;
+            }),
             ahead => ahead,
         };
         self.next_tx = if self.leaving.is_some() { now() + self.byte_cycles } else { NEVER };
