@@ -242,7 +242,8 @@ impl Cursor<'_> {
             match self.next_if(|b| matches!(b, b' '..=b'~' | b'\t'))? {
                 b'"' => return Some(Span { start, end }),
                 b'\\' => {
-                    if self.next_if(|b| matches!(b, b' '..=b'~'))? == b'u' {
+                    let letter = self.next_if(|b| matches!(b, b' '..=b'~'))?;
+                    if letter == b'u' {
                         // Four digits; those behind them are characters like others.
                         let digits = self.span(|b| b.is_ascii_hexdigit());
                         (digits.end - digits.start >= 4).then_some(())?;
