@@ -24,7 +24,7 @@ use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
 use crate::store::kept;
 use crate::tasks::links::{Links, Probe, QueueCount};
-use crate::tasks::ports::Port;
+use crate::tasks::ports::{AUX_RESERVE, Port};
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
@@ -36,7 +36,7 @@ use crate::tasks::{
 /// Bytes for all lines of USB together.
 const LINES_USB: usize = 456;
 /// The same of the other port.
-const LINES_AUX: usize = 80;
+const LINES_AUX: usize = 80 + AUX_RESERVE as usize;
 
 impl Links {
     fn new(ports: [Port; PORTS], storage: &'static Storage) -> Self {
@@ -50,6 +50,7 @@ impl Links {
             planner_wake: Wake::default(),
             cycle_start: Wake::default(),
             stopped: Cell::new(false),
+            exception: Cell::new(None),
             reporter_wake: News::default(),
             queue_count: QueueCount::default(),
             resync: Cell::new(false),

@@ -18,6 +18,9 @@ pub const ENQUIRY: u8 = 1 << 5;
 /// Beside [`RESUME`]: its place in the stream is not known, for the receive ring was full.
 pub const UNPLACED: u8 = 1 << 6;
 
+/// No character that asks for something: XON has come, and what was held back may leave.
+pub const LET_GO: u8 = 1 << 7;
+
 /// Those of which the place in the stream counts: there the receive ring gets a
 /// [`CUT`](crate::hal::serial::CUT) or [`GO`](crate::hal::serial::GO).
 pub const PLACED: u8 = FLUSH | KILL | RESUME;

@@ -153,9 +153,9 @@ fn a_damaged_byte_behind_a_return_damages_one_line_only() {
     sender.machine.send(b"g0 x1\r");
     sender.machine.send_damaged();
     let heard = sender.ask("\ng0 x2\r", 2_000);
-    let statuses: Vec<_> =
-        heard.lines().filter_map(|line| line.strip_prefix("{\"r\":{},\"f\":[1,")).collect();
-    assert_eq!(statuses, ["0,7]}", "13,7]}", "0,7]}"], "{heard}");
+    let answers = heard.lines().filter_map(|line| line.strip_prefix("{\"r\":{},\"f\":[1,"));
+    let statuses: Vec<_> = answers.filter_map(|line| line.split(',').next()).collect();
+    assert_eq!(statuses, ["0", "13", "0"], "{heard}");
     assert_eq!(sender.machine.emitted().position[0], 2 * 1_280);
 }
 

@@ -80,7 +80,21 @@ pub fn wait<R>(event: Event, ready: impl FnMut() -> Option<R>) -> impl Future<Ou
 
 /// The same after each byte that any port has sent, for the task that waits for this one.
 pub fn wait_transmitted<R>(port: u8, ready: impl FnMut() -> Option<R>) -> impl Future<Output = R> {
-    wait_in(if port == USB { Event::Transmitted as u8 } else { WAITABLE as u8 }, ready)
+    wait_in(transmitted(port), ready)
+}
+
+/// Has the main loop wake a task after the next `event`. Thread mode only.
+pub fn wake_after(event: Event, waker: &Waker) {
+    register(event as u8, waker);
+}
+
+/// The same after the next byte that any port has sent, for the task that waits for this one.
+pub fn wake_after_transmitted(port: u8, waker: &Waker) {
+    register(transmitted(port), waker);
+}
+
+const fn transmitted(port: u8) -> u8 {
+    if port == USB { Event::Transmitted as u8 } else { WAITABLE as u8 }
 }
 
 fn wait_in<R>(slot: u8, mut ready: impl FnMut() -> Option<R>) -> impl Future<Output = R> {

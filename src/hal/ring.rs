@@ -78,6 +78,12 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         if head >= tail { head - tail } else { N - (tail - head) }
     }
 
+    /// The slot filled last, if it has not been taken.
+    pub fn newest(&self) -> Option<u8> {
+        let head = self.head.get();
+        (head != self.tail.get()).then_some(head)
+    }
+
     /// The slot taken last.
     pub fn tail(&self) -> u8 {
         self.tail.get()
@@ -255,6 +261,12 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         self.0.head.get() == self.0.tail.get()
     }
 
+    /// The slot taken last.
+    #[inline]
+    pub fn taken(&self) -> u8 {
+        self.0.tail()
+    }
+
     /// What `look` makes of the value `ahead` places behind the oldest.
     #[inline]
     pub fn peek<R>(&self, ahead: usize, look: impl FnOnce(&T) -> R) -> Option<R> {
@@ -314,6 +326,93 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         let value = unsafe { self.0.slot(after).read() };
         self.0.tail.set(after);
         Some(value)
+    }
+}
+
+/// The bytes that wait in a ring, for code that is the same for all sizes of rings.
+pub struct Window<'a> {
+    slots: *mut u8,
+    /// The highest index: one less than a power of two.
+    last: u8,
+    tail: u8,
+    len: u8,
+    /// Nobody takes them meanwhile.
+    consumer: PhantomData<&'a mut ()>,
+}
+
+impl<const N: usize> Ring<u8, N> {
+    /// What waits now.
+    ///
+    /// # Safety
+    /// The caller is the consumer, or that does not run meanwhile.
+    pub unsafe fn window(&self) -> Window<'_> {
+        const { assert!(N.is_power_of_two()) };
+        Window {
+            slots: self.slots.get().cast(),
+            last: (N - 1) as u8,
+            tail: self.tail.get(),
+            len: self.used() as u8,
+            consumer: PhantomData,
+        }
+    }
+}
+
+impl<const N: usize> Consumer<u8, N> {
+    /// What waits now.
+    pub fn window(&mut self) -> Window<'_> {
+        // SAFETY: this is the consumer.
+        unsafe { self.0.window() }
+    }
+}
+
+impl Window<'_> {
+    /// How many bytes wait.
+    pub fn len(&self) -> u8 {
+        self.len
+    }
+
+    /// Whether none does.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Whether no byte more has room.
+    pub fn is_full(&self) -> bool {
+        self.len == self.last
+    }
+
+    /// The slot of the byte `ahead` places behind the oldest.
+    pub fn slot(&self, ahead: u8) -> u8 {
+        self.tail.wrapping_add(ahead).wrapping_add(1) & self.last
+    }
+
+    /// The byte `ahead` places behind the oldest, 0 if none waits there.
+    pub fn get(&self, ahead: u8) -> u8 {
+        if ahead >= self.len {
+            return 0;
+        }
+        // SAFETY: it waits, so it has been filled, and `slot` is within the ring. The producer may change the newest in
+        // one instruction.
+        unsafe { self.slots.add(self.slot(ahead).into()).read_volatile() }
+    }
+
+    /// Replaces a byte that waits, if it is still `from`: the producer may have changed the newest. Whether it was. Masks
+    /// interrupts for some cycles.
+    pub fn replace(&mut self, ahead: u8, from: u8, to: u8) -> bool {
+        if ahead >= self.len {
+            return false;
+        }
+        super::imp::mask(|| {
+            // SAFETY: as in `get`; the producer does not run meanwhile, and nobody else has a reference.
+            unsafe {
+                let slot = self.slots.add(self.slot(ahead).into());
+                let same = slot.read_volatile() == from;
+                if same {
+                    slot.write_volatile(to);
+                }
+                same
+            }
+        })
     }
 }
 
@@ -455,6 +554,23 @@ mod tests {
             }
         }
         assert!(taken.len() > 50 && taken.iter().copied().eq(0..taken.len() as u16));
+    }
+
+    #[test]
+    fn what_waits_is_replaced_in_place() {
+        let ring: &'static Ring<u8, 8> = Box::leak(Box::new(Ring::new()));
+        let (mut p, mut c) = ring.split().unwrap();
+        for round in 0..20 {
+            for byte in [round, b'x', b'y'] {
+                p.push(byte).unwrap();
+            }
+            let mut window = c.window();
+            assert_eq!((window.len(), window.get(0), window.get(3)), (3, round, 0));
+            assert!(window.replace(2, b'y', b'z') && !window.replace(1, b'y', b'z'));
+            assert!(!window.replace(3, 0, b'z'), "none waits there");
+            let got: Vec<u8> = core::iter::from_fn(|| c.pop()).collect();
+            assert_eq!(got, [round, b'x', b'z']);
+        }
     }
 
     #[test]

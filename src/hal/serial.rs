@@ -5,7 +5,7 @@
 //! three bits what the reader must know. Line ends that were lost are counted besides (`imp::uart::lost_ends`),
 //! so that each lost line is answered.
 
-use super::ring::{Consumer, Producer};
+use super::ring::{Consumer, Producer, Window};
 use crate::boards::{ACTIVE, Serial};
 
 /// How many ports there are, and the numbers of the one that every board has and of the other.
@@ -38,12 +38,18 @@ pub const CUT: u8 = RETURNED;
 /// The same: here a `~` stood.
 pub const GO: u8 = RETURNED | BEHIND_END;
 
+/// Stands where a line was that has been taken out of its turn. No such byte comes into the ring from outside: it resets.
+pub const TAKEN: u8 = 0x18;
+/// The same behind [`TAKEN`], for a carriage return, which a line feed may follow.
+pub const TAKEN_RETURN: u8 = b'!';
+
 /// The reader is woken at the end of a line, and when this many bytes have come since: a power of two.
 pub const fn batch(ring: usize) -> u8 {
     (ring / 8) as u8
 }
 
-/// What stops the other side of a line, and lets it go on.
+/// What stops the other side of a line, and lets it go on. Where they mean that (`ex` 1) the receive interrupt takes them
+/// out of the stream and obeys: they never wait behind data.
 pub const XOFF: u8 = 0x13;
 /// See [`XOFF`].
 pub const XON: u8 = 0x11;
@@ -139,6 +145,22 @@ pub fn lose(mark: u8, byte: u8) -> (u8, bool) {
         b'\n' => (begun | CLEAN, mark & RETURNED == 0),
         _ => (begun, false),
     }
+}
+
+/// The slot of the last [`CUT`] that waits in a receive ring. One that found the ring full has become the mark of a loss, the
+/// newest byte.
+#[inline(never)]
+#[small]
+pub fn last_mark(ring: &Window<'_>) -> Option<u8> {
+    let mut at = ring.len();
+    while at > 0 {
+        at -= 1;
+        let byte = ring.get(at);
+        if byte == CUT || (at + 1 == ring.len() && byte < MARKS && byte != GO) {
+            return Some(ring.slot(at));
+        }
+    }
+    None
 }
 
 #[cfg(test)]

@@ -64,7 +64,7 @@ pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
 pub fn wake_up_in(links: &Links) {
     state().set(Alarm::Alarm as u8);
     // The reporter looks before it waits.
-    links.told().exception.set(Some(Status::HardReset));
+    links.exception.set(Some(Status::HardReset));
 }
 
 /// Ends the alarm. [`Status::Again`] as long as the machine comes to rest.

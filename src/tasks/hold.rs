@@ -6,11 +6,14 @@
 //! ```text
 //!  !   begin: exec slows down; Held               ~   pass: exec goes on, once it is at rest
 //!  %   in a hold, and ^d:
-//!      flush    Flush::Input   the parser refuses data lines; nothing is interpreted any more
-//!      placed   Flush::Rest    the reader has come to the `%`: lines from here on are kept, and wait
+//!      cut      Flush::Rest    lines of G-code that have come by then are refused, those behind wait
 //!      planner  drop_blocks    exec, at rest, drops its blocks and has the position, to the step
 //!               end            planner and model start from there; the hold is over
 //! ```
+//!
+//! A cut goes through the streams of all ports at once. The port of the character is cut at its place, the others at the
+//! byte that has come last. What the line pools hold is dropped at once. What is still in a receive ring is dropped when the
+//! reader comes to it ([`Port::cut`]). Neither planner nor exec wait for that: a pool may be full, and its sender may take no answers.
 //!
 //! A hold is on from the character on, whatever the machine does, as long as there is anything to do: also
 //! between two blocks, in a dwell, or while M0 waits. An idle machine has nothing to hold and takes no notice.
@@ -33,8 +36,8 @@ use crate::hal::byte::SharedByte;
 use crate::hal::event::Event;
 use crate::hal::imp::time::millis;
 use crate::hal::imp::{exec, flags, reset, uart};
-use crate::hal::serial::{CUT, GO};
-use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, RESET, RESUME, UNPLACED};
+use crate::hal::serial::{CUT, GO, USB};
+use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, LET_GO, RESET, RESUME, UNPLACED};
 
 /// How far a queue flush has come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,9 +45,7 @@ pub enum Flush {
     /// There is none.
     #[default]
     None,
-    /// What the reader gets is dropped, as far as the mark.
-    Input,
-    /// The same, and the mark is here: `{qf:1}`.
+    /// All that has come is to be dropped, by the reader: `{qf:1}`.
     Here,
     /// The queue is to be dropped.
     Rest,
@@ -181,6 +182,9 @@ fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
         reset();
     }
+    if characters & LET_GO != 0 {
+        uart::kick(port.number);
+    }
     let (holds, cuts) = (characters & HOLD != 0, characters & FLUSH != 0);
     let (kills, busy) = (characters & KILL != 0, holds && is_busy(links));
     if holds {
@@ -194,7 +198,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
     }
     if kills {
         links.killed.set(true);
-        flush(links, Flush::Input);
+        cut(links, port, uart::last_cut(port.number));
     }
     if cuts && is_on() {
         links.percent.set(true);
@@ -211,6 +215,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
     }
     if characters & ENQUIRY != 0 {
         port.enquiry.set(true);
+        links.parser_wake.signal();
     }
     links.reporter_wake.urge();
 }
@@ -221,53 +226,61 @@ pub fn flush_here(links: &Links, busy: bool) -> bool {
     if busy && !is_on() {
         return false;
     }
-    flush(links, Flush::Here);
-    flags::set(Event::Received);
+    if links.flush.get() == Flush::None {
+        begin();
+        links.flush.set(Flush::Here);
+        flags::set(Event::Received);
+    }
     true
 }
 
-fn flush(links: &Links, from: Flush) {
-    if links.flush.get() == Flush::None {
-        begin();
-        links.percent.set(false);
-        links.flush.set(from);
-        links.parser_wake.signal();
+/// The reader drops all that has come, if that is wanted.
+#[inline(always)]
+pub fn here(links: &Links) {
+    if links.flush.get() == Flush::Here {
+        cut(links, links.port(USB), uart::newest(USB));
     }
 }
 
-/// The reader has come to the place of a real-time character on a port, outside of comments. What it has got before a
-/// `%` in a hold, or a `^d`, is what is dropped; of other ports, the lines that it has got by then.
+/// Drops the lines of G-code that have come: on this port up to a slot of its receive ring, or what the reader has got;
+/// on others all. A line that has come in part goes whole.
+#[inline(never)]
+#[small]
+fn cut(links: &Links, port: &Port, slot: Option<u8>) {
+    begin();
+    links.percent.set(false);
+    for each in &links.ports {
+        let slot = if each.number == port.number { slot } else { uart::newest(each.number) };
+        let mut lines = each.lines.borrow_mut();
+        lines.terminate();
+        match slot {
+            Some(_) => each.cut.set(slot),
+            None if each.cut.get().is_none() => lines.terminate_partial(),
+            None => {}
+        }
+    }
+    drop_queue(links);
+}
+
+/// The reader has come to the place of a real-time character on a port, outside of comments, and behind all cuts.
 pub fn placed(links: &Links, port: &Port, mark: u8) {
     serve(links);
     if mark == GO {
         go_on(links);
     } else if is_on() {
-        flush(links, Flush::Input);
-        if links.flush.get() != Flush::Here {
-            port.lines.borrow_mut().terminate_partial();
-        }
-        rest(links);
+        cut(links, port, None);
     }
 }
 
-/// The same in a comment, where it is text; but a `^d` is none anywhere, and nothing else is cut then. It may have come
-/// so lately that only the mark has been seen.
-pub fn aside(links: &Links, port: &Port, mark: u8) {
-    serve(links);
-    if links.flush.get() != Flush::None {
-        placed(links, port, mark);
-    }
-}
-
-/// The same for one that waits in the receive ring, because the pool is full. One that is not there any more
+/// The same for one that waits in the receive ring, because the pool is full: its slot. One that is not there any more
 /// has left the mark of a loss.
-pub fn ahead(links: &Links, mark: u8) {
+pub fn ahead(links: &Links, port: &Port, mark: u8, slot: u8) {
     serve(links);
     if mark != CUT {
         go_on(links);
     }
     if is_on() && mark != GO && (mark == CUT || links.percent.get()) {
-        flush(links, Flush::Input);
+        cut(links, port, Some(slot));
     }
 }
 
@@ -279,12 +292,6 @@ fn go_on(links: &Links) {
         // It may have looked already, when the character came, and sleep again.
         links.reporter_wake.urge();
     }
-}
-
-/// All lines in the pool are dropped, and the queue next.
-fn rest(links: &Links) {
-    links.ports.iter().for_each(|port| port.lines.borrow_mut().terminate());
-    drop_queue(links);
 }
 
 /// The planner is to drop the queue.

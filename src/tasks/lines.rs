@@ -4,6 +4,9 @@
 //! end in one buffer in order of arrival, so that eight short lines of G-code and one long line of JSON fit the same
 //! memory. Control lines (JSON, `$`, `?`) are taken before data lines, each kind in order.
 //!
+//! Lines that come in order leave the last slot and some bytes free, the *reserve*, and none begins where a short control line
+//! would not fit whole. The reserve is for such lines that wait behind data in the receive ring ([`overtake`](super::overtake)).
+//!
 //! A line that cannot be kept whole is kept as a fault instead, with as much of it as is given back: the sender gets
 //! exactly one response for it either way. Senders may count characters, so every byte that comes belongs to a line:
 //! blanks before it, and what came between it and the line before, count with it. When the pool is full the reader leaves bytes in the receive ring.
@@ -11,6 +14,8 @@
 use heapless::Vec;
 
 use super::printing::copy_printing;
+use crate::hal::ring::Window;
+use crate::hal::serial::TAKEN_RETURN;
 use crate::protocol::asks_help;
 use crate::status::Status;
 
@@ -92,12 +97,15 @@ pub struct LinePool {
     keep_empty: bool,
     /// Longest line.
     longest: u8,
+    /// Bytes left to control lines that overtake: as long as they may be.
+    reserve: u8,
     bytes: &'static mut [u8],
 }
 
 impl LinePool {
-    /// An empty pool that keeps its lines in `bytes`.
-    pub const fn new(bytes: &'static mut [u8]) -> Self {
+    /// An empty pool that keeps its lines in `bytes`, and leaves `reserve` of them to control lines that overtake.
+    pub const fn new(bytes: &'static mut [u8], reserve: u8) -> Self {
+        let room = bytes.len().saturating_sub(reserve as usize);
         Self {
             entries: Vec::new(),
             controls: 0,
@@ -108,7 +116,8 @@ impl LinePool {
             fault: None,
             returned: false,
             keep_empty: false,
-            longest: if bytes.len() > LINE_MAX { LINE_MAX } else { bytes.len() - 1 } as u8,
+            longest: if room > LINE_MAX { LINE_MAX } else { room - 1 } as u8,
+            reserve,
             bytes,
         }
     }
@@ -131,8 +140,72 @@ impl LinePool {
     /// Whether the next byte can be taken, whatever it is.
     #[inline(never)]
     pub fn ready(&self) -> bool {
-        let used = self.end - self.start + u16::from(self.partial);
-        self.entries.len() < SLOTS && usize::from(used) < self.bytes.len()
+        let need = if self.is_within_line() { 1 } else { self.reserve.into() };
+        self.entries.len() < SLOTS - 1 && self.room() >= need
+    }
+
+    /// Bytes that lines in order may take.
+    #[inline(always)]
+    pub fn room(&self) -> u16 {
+        let used = self.end - self.start + u16::from(self.partial) + u16::from(self.reserve);
+        (self.bytes.len() as u16).saturating_sub(used)
+    }
+
+    /// Whether a part of a line has come.
+    #[inline(always)]
+    pub fn is_within_line(&self) -> bool {
+        self.partial > 0 || self.fault.is_some()
+    }
+
+    /// Longest control line that may overtake, without its end.
+    pub fn reserve(&self) -> u8 {
+        self.reserve
+    }
+
+    /// Whether a control line of so many bytes may overtake now.
+    pub fn has_reserve(&self, len: u8) -> bool {
+        let used = self.end - self.start + u16::from(self.partial) + u16::from(len);
+        self.entries.len() < SLOTS && usize::from(used) <= self.bytes.len()
+    }
+
+    /// Whether so many bytes of a ring are a control line; there is [room](Self::has_reserve) for it. It is laid behind the line that
+    /// is coming in.
+    #[inline(never)]
+    #[small]
+    pub fn is_control(&mut self, ring: &Window<'_>, from: u8, len: u8) -> bool {
+        let mut at = usize::from(self.end) + usize::from(self.partial);
+        if at + usize::from(len) > self.bytes.len() {
+            at = self.move_down(at);
+        }
+        classify(self.lay(ring, from, len, at)) == Class::Control
+    }
+
+    /// Puts that control line before the line that is coming in; its sender counts so many bytes besides.
+    #[inline(never)]
+    #[small]
+    pub fn put_before(&mut self, ring: &Window<'_>, from: u8, len: u8, besides: u16) {
+        let at = usize::from(self.end);
+        for n in (at..at + usize::from(self.partial)).rev() {
+            if let Some(byte) = self.bytes.get(n).copied()
+                && let Some(place) = self.bytes.get_mut(n + usize::from(len))
+            {
+                *place = byte;
+            }
+        }
+        self.lay(ring, from, len, at);
+        if self.entries.push(Entry { len, class: Class::Control, besides }).is_ok() {
+            self.end += u16::from(len);
+            self.controls += 1;
+        }
+    }
+
+    /// Copies bytes of a ring to a place.
+    #[inline(never)]
+    #[small]
+    fn lay(&mut self, ring: &Window<'_>, from: u8, len: u8, at: usize) -> &[u8] {
+        let line = self.bytes.get_mut(at..at + usize::from(len)).unwrap_or(&mut []);
+        line.iter_mut().zip(from..).for_each(|(place, n)| *place = ring.get(n));
+        line
     }
 
     /// Takes the printing bytes that `bytes` begins with, as far as they fit and are no matter for
@@ -141,11 +214,12 @@ impl LinePool {
     pub fn put_text(&mut self, bytes: &[u8]) -> u8 {
         if self.fault.is_some()
             || self.is_asking()
-            || (self.partial == 0 && bytes.first().is_none_or(|b| is_blank(*b) || *b == ASKS))
+            || (self.partial == 0
+                && bytes.first().is_none_or(|b| is_blank(*b) || matches!(*b, ASKS | TAKEN_RETURN)))
         {
             return 0;
         }
-        let room = usize::from(self.longest - self.partial);
+        let room = usize::from(self.room().min((self.longest - self.partial).into()));
         let at = self.room_at();
         let slots = self.bytes.get_mut(at..).unwrap_or(&mut []);
         let slots = slots.get_mut(..room.min(slots.len())).unwrap_or(&mut []);
@@ -245,6 +319,22 @@ impl LinePool {
     /// Whether a data line waits, or a fault.
     pub fn has_data(&self) -> bool {
         self.entries.len() > usize::from(self.controls)
+    }
+
+    /// Whether lines of G-code, or faults, came before a line.
+    pub fn is_behind_data(&self, id: LineId) -> bool {
+        let mut before = self.entries.iter().take(id.0.into());
+        before.any(|entry| entry.class != Class::Control)
+    }
+
+    /// A control line turns out to be G-code: it waits among the data lines.
+    pub fn wait_in_order(&mut self, id: LineId) {
+        if let Some(entry) = self.entries.get_mut(usize::from(id.0))
+            && entry.class == Class::Control
+        {
+            entry.class = Class::Data;
+            self.controls -= 1;
+        }
     }
 
     /// Drops all data lines: they will be answered with [`Status::Terminated`].
@@ -382,7 +472,13 @@ impl LinePool {
     }
 }
 
-fn is_blank(byte: u8) -> bool {
+/// Whether a control line may begin so.
+pub fn may_be_control(byte: u8) -> bool {
+    matches!(byte, b'{' | b'$' | ASKS | b'h' | b'H')
+}
+
+/// Whether a byte is a blank.
+pub fn is_blank(byte: u8) -> bool {
     byte == b' ' || byte == b'\t'
 }
 

@@ -37,6 +37,7 @@ use crate::jobs::Job;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Snapshot};
 use crate::protocol::StatusReport;
+use crate::status::Status;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// The links. One for the machine, made at start-up.
@@ -59,6 +60,8 @@ pub struct Links {
     pub cycle_start: Wake,
     /// The machine has come to a program stop and waits for cycle start.
     pub stopped: Cell<bool>,
+    /// An exception to report to whoever feeds the machine.
+    pub exception: Cell<Option<Status>>,
     /// Something that reports show may have changed.
     pub reporter_wake: News,
     /// Blocks that came and went, for queue reports.

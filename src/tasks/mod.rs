@@ -14,6 +14,7 @@ mod jog;
 pub mod lines;
 pub mod links;
 pub mod overrides;
+mod overtake;
 pub mod parser;
 pub mod planner;
 pub mod ports;

@@ -6,79 +6,352 @@
 //! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
 //! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`]. In an
 //! alarm lines of G-code are refused.
+//!
+//! Each port has a [`Session`] of its own, so that no port waits for the other's line: no line is begun before the first part
+//! of its response has room in the transmit ring, and a response that lacks room stays half written until there is some.
 
-use embassy_time::Timer;
+use core::future::poll_fn;
+use core::task::Poll;
+
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::mutex::MutexGuard;
 use heapless::Vec;
 
+use super::Never;
 use super::alarm;
 use super::hold::Flush;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::ports::{Chosen, Port};
+use super::reporter::{What, tell_at_once};
 use super::tx::Tx;
 use super::view::View;
 use crate::alarm::{Alarm, is_program_end};
 use crate::gcode::command::Stop;
+use crate::hal::event::{Event, wake_after, wake_after_transmitted};
 use crate::hal::imp;
 use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::serial::USB;
+use crate::hal::imp::time::millis;
+use crate::hal::serial::{PORTS, USB};
 use crate::jobs::Job;
 use crate::protocol::{Ending, Mode, Next, Out, Request, Span, is_brief, put_brief, put_line_end};
 use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
 const ECHO: usize = 62;
+/// Steps of a response before others have their turn: to find a name takes a ms, and the ring of the second port is full in 5.
+const STEPS: u8 = 4;
+
+/// A port's transmitter, while it is the parser's.
+type Line = MutexGuard<'static, NoopRawMutex, Tx>;
+
+/// What the parser is about on a port.
+enum Session {
+    /// Nothing.
+    Idle,
+    /// It answers a line.
+    Answer(Answer),
+    /// The line has been answered; it changes the rate, or resets the machine, when the response has left: since when
+    /// there is nothing more of that in the ring, ms.
+    Leave(Line, Option<u16>),
+}
+
+/// A response under way.
+struct Answer {
+    request: Request,
+    id: LineId,
+    /// How much of the line has been sent back.
+    echoed: u8,
+    /// The line is to be sent back.
+    echoes: bool,
+    /// Tables have to be waited for.
+    waits: bool,
+    /// From the first byte on: nobody else talks on this port.
+    tx: Option<Line>,
+}
+
+/// How far it has come.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Progress {
+    /// To its end.
+    Done,
+    /// It goes on later.
+    Waits,
+    /// Its G-code is to wait among the others of its port.
+    InOrder,
+}
+
+/// The parser's own state.
+struct Parser {
+    links: &'static Links,
+    sessions: [Session; PORTS],
+    /// The ports, as bits, that have something to say and lack room.
+    lacking: u8,
+}
 
 /// The task.
-pub async fn run(links: &'static Links) -> ! {
-    loop {
+pub fn run(links: &'static Links) -> impl Future<Output = Never> {
+    let mut parser = Parser { links, sessions: [const { Session::Idle }; PORTS], lacking: 0 };
+    async move {
+        loop {
+            while parser.turn() {}
+            parser.wait().await;
+        }
+    }
+}
+
+impl Parser {
+    /// Does what can be done at once. Whether there may be more.
+    #[inline(always)]
+    fn turn(&mut self) -> bool {
+        let links = self.links;
         let alarmed = alarm::is_on();
         let free = is_free(links);
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
-        let tried = if data && !alarmed { usual(links) } else { Usual::NotTried };
+        let tried = if data && !alarmed && self.is_idle() { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
-            continue;
+            return true;
         }
-        let next = match links.flush.get() {
-            Flush::None => links.next_line(data),
-            flush => dropped(links, flush),
-        };
-        let Some(Chosen { port, id, class }) = next else {
-            match free && runs_job && !links.job.get().is_over() {
-                true => job_line(links),
-                false => links.parser_wake.wait().await,
+        self.lacking = 0;
+        if self.go_on() {
+            return true;
+        }
+        match self.next_line(data) {
+            Some(chosen) => self.take(chosen, tried),
+            None if free && runs_job && !links.job.get().is_over() => job_line(links),
+            None => return false,
+        }
+        true
+    }
+
+    /// Whether no line of the port that feeds the machine is being answered.
+    #[inline(always)]
+    fn is_idle(&self) -> bool {
+        let feeder = self.sessions.get(usize::from(self.links.feeder.get()));
+        matches!(feeder, Some(Session::Idle))
+    }
+
+    /// Goes on with what is under way, and tells what a port alone is told. Whether something has come to its end.
+    #[inline(never)]
+    fn go_on(&mut self) -> bool {
+        let links = self.links;
+        let mut ended = false;
+        for (port, session) in links.ports.iter().zip(&mut self.sessions) {
+            if !matches!(session, Session::Idle) {
+                ended |= go_on(links, port, session);
+            } else if port.tells() {
+                let told = tell(links, port);
+                self.lacking |= u8::from(!told) << port.number;
+                ended |= told;
+            } else if port.number == USB && links.rate.get().is_some() {
+                // The other port has asked for it.
+                leave(port.tx.try_lock().ok(), session);
             }
-            continue;
-        };
-        let echoes = links.settings.borrow().echo();
-        match begin(links, port, id, class, tried) {
-            Begun::Answer(mut request) => {
-                if echoes || !answer_at_once(links, port, id, &mut request) {
-                    answer(links, port, id, &mut request, echoes).await;
+        }
+        ended
+    }
+
+    /// The line to begin with; G-code of the feeder only if `data` is wanted. That of others does not wait. During a flush none
+    /// is but what has been dropped, to be refused.
+    #[inline(never)]
+    fn next_line(&mut self, data: bool) -> Option<Chosen> {
+        let links = self.links;
+        let (feeder, flushes) = (links.feeder.get(), links.flush.get() != Flush::None);
+        let lacking = &mut self.lacking;
+        links.ports.iter().zip(&self.sessions).find_map(|(port, session)| {
+            let any = data || flushes || port.number != feeder;
+            let (id, class) = port.lines.borrow().next(any)?;
+            if !matches!(session, Session::Idle) || (flushes && class == Class::Data) {
+                return None;
+            }
+            let has_room = port.tx.try_lock().is_ok_and(|tx| tx.has_room());
+            *lacking |= u8::from(!has_room) << port.number;
+            has_room.then_some(Chosen { port, id, class })
+        })
+    }
+
+    /// Takes a line: most are answered to the end at once.
+    #[inline(never)]
+    fn take(&mut self, chosen: Chosen, tried: Usual) {
+        let links = self.links;
+        let Some(session) = self.sessions.get_mut(usize::from(chosen.port.number)) else { return };
+        match begin(links, &chosen, tried, session) {
+            Begun::Answer => {
+                go_on(links, chosen.port, session);
+            }
+            Begun::Silent => finish(links, chosen.port, chosen.id),
+            Begun::Again => {}
+        }
+    }
+
+    /// Waits until something may go on.
+    fn wait(&self) -> impl Future<Output = ()> + '_ {
+        let links = self.links;
+        let mut asked = false;
+        poll_fn(move |cx| {
+            let waited = core::mem::replace(&mut asked, true);
+            let mut ready = links.parser_wake.poll(cx).is_ready();
+            for (port, session) in links.ports.iter().zip(&self.sessions) {
+                let ticks = match session {
+                    Session::Leave(..) => true,
+                    Session::Answer(answer) => answer.waits && !links.storage.is_awaited(),
+                    Session::Idle => false,
+                };
+                if ticks {
+                    ready |= waited;
+                    wake_after(Event::Tick, cx.waker());
+                }
+                let has_room = match session {
+                    Session::Answer(Answer { waits: true, .. }) => None,
+                    Session::Answer(Answer { tx: Some(tx), .. }) => Some(tx.has_room()),
+                    // While others talk, their end wakes it.
+                    _ if self.lacking & 1 << port.number != 0 => {
+                        port.tx.try_lock().ok().map(|tx| tx.has_room())
+                    }
+                    _ => None,
+                };
+                match has_room {
+                    Some(true) => ready = true,
+                    Some(false) => wake_after_transmitted(port.number, cx.waker()),
+                    None => {}
                 }
             }
-            Begun::Silent => {}
-            Begun::Again => continue,
-        }
-        finish(links, port, id);
-        // The reader has its turn, and stops the sender in time.
-        embassy_futures::yield_now().await;
+            if ready && !waited {
+                // Others have their turn first.
+                cx.waker().wake_by_ref();
+                return Poll::Pending;
+            }
+            if ready { Poll::Ready(()) } else { Poll::Pending }
+        })
     }
 }
 
-/// The next line during a queue flush: control lines are carried out, those of data dropped.
+/// Answers who asks whether anybody is there, or tells of bytes that were lost. False if that has to wait.
 #[inline(never)]
 #[small]
-fn dropped(links: &Links, flush: Flush) -> Option<Chosen<'_>> {
-    links.ports.iter().find_map(|port| {
-        let (id, class) = port.lines.borrow().next(true)?;
-        match class {
-            Class::Data if flush == Flush::Rest => None,
-            Class::Data => Some(Chosen { port, id, class: Class::Fault(Status::Terminated) }),
-            class => Some(Chosen { port, id, class }),
+fn tell(links: &Links, port: &Port) -> bool {
+    let what = if port.enquiry.get() { What::Enquiry } else { What::Exception(Status::BufferFull) };
+    let told = tell_at_once(links, port, what);
+    if told {
+        match what {
+            What::Enquiry => port.enquiry.set(false),
+            _ => port.lost.set(false),
         }
-    })
+    }
+    told
+}
+
+/// Goes on with what is under way on a port. Whether it has come to its end.
+#[inline(never)]
+fn go_on(links: &'static Links, port: &'static Port, session: &mut Session) -> bool {
+    match session {
+        Session::Idle => return false,
+        Session::Leave(tx, since) => {
+            if !has_left(links, tx, since) {
+                return false;
+            }
+        }
+        Session::Answer(answer) => match answer.step(links, port) {
+            Progress::Waits => return false,
+            Progress::InOrder => port.lines.borrow_mut().wait_in_order(answer.id),
+            Progress::Done => {
+                finish(links, port, answer.id);
+                let changes_rate = links.rate.get().is_some() && port.number == USB;
+                if links.restart.get().is_some() || changes_rate {
+                    leave(answer.tx.take(), session);
+                    return true;
+                }
+            }
+        },
+    }
+    *session = Session::Idle;
+    true
+}
+
+/// What is in the ring has to leave before anything else is said.
+#[inline(never)]
+#[small]
+fn leave(tx: Option<Line>, session: &mut Session) {
+    if let Some(tx) = tx {
+        *session = Session::Leave(tx, None);
+    }
+}
+
+/// Does what a response has been waited for if that has left: 1 to 4 ms after its last byte. Whether it has.
+#[inline(never)]
+#[small]
+fn has_left(links: &Links, tx: &mut Tx, since: &mut Option<u16>) -> bool {
+    if !tx.is_empty() {
+        *since = None;
+        return false;
+    }
+    let now = millis() as u16;
+    if now.wrapping_sub(*since.get_or_insert(now)) < tx.last_ms() {
+        return false;
+    }
+    if let Some(boot) = links.restart.take() {
+        if boot {
+            imp::boot()
+        } else {
+            imp::reset()
+        };
+    }
+    if let Some(rate) = links.rate.take() {
+        tx.set_rate(rate);
+    }
+    true
+}
+
+impl Answer {
+    /// Goes on as far as there is room.
+    #[inline(never)]
+    fn step(&mut self, links: &'static Links, port: &'static Port) -> Progress {
+        if self.waits && links.storage.is_awaited() {
+            return Progress::Waits;
+        }
+        let begun = self.tx.is_some();
+        let Some(mut tx) = self.tx.take().or_else(|| port.tx.try_lock().ok()) else {
+            return Progress::Waits;
+        };
+        self.waits = false;
+        let (progress, talks) = self.steps(links, port, &mut tx, begun);
+        if talks {
+            self.tx = Some(tx);
+        }
+        progress
+    }
+
+    /// The same, and whether the transmitter is still needed.
+    fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
+        let (mut begun, mut left) = (begun, STEPS);
+        while tx.has_room() && left > 0 {
+            left -= 1;
+            if self.echoes {
+                self.echoes = echo(links, port, self.id, &mut self.echoed, tx);
+                begun = true;
+                continue;
+            }
+            match step(links, port, self.id, &mut self.request, tx) {
+                Next::More => begun = true,
+                // Of a response that has begun the rest is due.
+                Next::Wait => {
+                    self.waits = true;
+                    return (Progress::Waits, self.request.has_begun());
+                }
+                Next::Gcode { start, end } => {
+                    if !ran(links, port, self.id, Span { start, end }, &mut self.request) {
+                        // Nothing of the response has been put yet. A line is not sent back twice.
+                        self.waits = self.echoed > 0;
+                        let later = if self.waits { Progress::Waits } else { Progress::InOrder };
+                        return (later, false);
+                    }
+                }
+                Next::Done(_) => return (Progress::Done, true),
+            }
+        }
+        (Progress::Waits, begun)
+    }
 }
 
 /// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the
@@ -146,7 +419,7 @@ fn usual(links: &Links) -> Usual {
     }
     links.commands_taken.set(true);
     links.planner_wake.signal();
-    let ending = Ending { free: lines.free(), length: lines.oldest_length() };
+    let ending = Ending { free: port.promise(&lines), length: lines.oldest_length() };
     put_brief(&settings, ending, &mut *tx);
     tx.flush();
     lines.remove_oldest();
@@ -155,23 +428,10 @@ fn usual(links: &Links) -> Usual {
     Usual::Done
 }
 
-/// Answers a line as far as that goes without waiting: most of them to the end. Returns whether it was
-/// this one.
-#[inline(never)]
-fn answer_at_once(links: &Links, port: &Port, id: LineId, request: &mut Request) -> bool {
-    match port.tx.try_lock() {
-        // What waits for the planner is left to `answer`.
-        Ok(mut tx) if tx.has_room() && request.gcode().is_none() => {
-            matches!(step(links, port, id, request, &mut tx), Next::Done(_))
-        }
-        _ => false,
-    }
-}
-
 /// How it goes on with a line.
 enum Begun {
-    /// It is to be answered.
-    Answer(Request),
+    /// It is being answered.
+    Answer,
     /// It gets no answer.
     Silent,
     /// It has to wait.
@@ -181,7 +441,8 @@ enum Begun {
 /// Begins with a line. One of G-code has run after that, for data lines are taken only while the
 /// planner is free.
 #[inline(never)]
-fn begin(links: &Links, port: &Port, id: LineId, class: Class, tried: Usual) -> Begun {
+fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) -> Begun {
+    let Chosen { port, id, class } = *chosen;
     let lines = port.lines.borrow();
     let (line, length) = (lines.text(id), lines.length(id));
     let mut mode = port.mode.get();
@@ -202,63 +463,9 @@ fn begin(links: &Links, port: &Port, id: LineId, class: Class, tried: Usual) -> 
         }
         request.ran(status, commented);
     }
-    Begun::Answer(request)
-}
-
-/// Writes the response to a line, and before that the line if it `echoes`.
-async fn answer(links: &Links, port: &Port, id: LineId, request: &mut Request, echoes: bool) {
-    let mut tx = port.tx.lock().await;
-    let mut at = 0;
-    let mut echoes = echoes;
-    while echoes {
-        tx.room().await;
-        echoes = echo(links, port, id, &mut at, &mut tx);
-    }
-    loop {
-        tx.room().await;
-        match step(links, port, id, request, &mut tx) {
-            Next::More => {}
-            // Of a response that has begun the rest is due.
-            Next::Wait if request.has_begun() => tables_ready(links).await,
-            Next::Wait => {
-                drop(tx);
-                tables_ready(links).await;
-                tx = port.tx.lock().await;
-            }
-            Next::Gcode { start, end } => {
-                let block = Span { start, end };
-                while !ran(links, port, id, block, request) {
-                    // Nothing of the response has been put yet: others may talk meanwhile.
-                    drop(tx);
-                    while !is_free(links) && links.flush.get() == Flush::None {
-                        links.parser_wake.wait().await;
-                    }
-                    tx = port.tx.lock().await;
-                }
-            }
-            Next::Done(_) => break,
-        }
-    }
-    if let Some(boot) = links.restart.take() {
-        tx.drain().await;
-        if boot {
-            imp::boot()
-        } else {
-            imp::reset()
-        };
-    }
-    drop(tx);
-    if let Some(rate) = links.rate.take() {
-        links.port(USB).tx.lock().await.set_rate(rate).await;
-    }
-}
-
-/// Waits until the tables take another change. A program that is being stored has only to be asked again.
-async fn tables_ready(links: &Links) {
-    Timer::after_ticks(1).await;
-    while links.storage.is_awaited() {
-        links.parser_wake.wait().await;
-    }
+    let echoes = links.settings.borrow().echo();
+    *session = Session::Answer(Answer { request, id, echoed: 0, echoes, waits: false, tx: None });
+    Begun::Answer
 }
 
 /// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so
@@ -287,10 +494,10 @@ fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Reques
         request.ran(if alarm == Alarm::None { Status::Terminated } else { alarm.status() }, false);
         return true;
     }
-    if links.may_feed(port) && !is_free(links) {
+    let lines = port.lines.borrow();
+    if lines.is_behind_data(id) || (links.may_feed(port) && !is_free(links)) {
         return false;
     }
-    let lines = port.lines.borrow();
     let (status, commented) = run_block(links, port, block.of(lines.text(id)), Usual::NotTried);
     if status == Status::Again {
         return false;

@@ -16,9 +16,19 @@ use super::lines::{Class, LineId, LinePool};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::View;
+use crate::hal::imp::uart;
 use crate::hal::serial::{USB, is_shared};
 use crate::protocol::Mode;
 use crate::status::Status;
+
+/// How long control lines of USB may be that overtake, and those of the other port.
+const RESERVE: u8 = 40;
+/// See [`RESERVE`].
+pub const AUX_RESERVE: u8 = 16;
+/// How long lines may be of which footers tell how many may come: powers of two.
+const PROMISED: u8 = 32;
+/// The same of the other port.
+const AUX_PROMISED: u8 = 16;
 
 /// What a port has to itself.
 pub struct Port {
@@ -26,15 +36,16 @@ pub struct Port {
     pub number: u8,
     /// Received lines.
     pub lines: RefCell<LinePool>,
-    /// The line to the sender, for the parser and the reporter. The mutex knows of one task that waits: two
-    /// would keep waking each other.
+    /// The line to the sender, for the parser and the reporter. The mutex knows of one task that waits, the reporter.
     pub tx: Mutex<NoopRawMutex, Tx>,
     /// How the sender wants to be answered.
     pub mode: Cell<Mode>,
-    /// The sender asks whether anybody is there: control sets it, the reporter answers.
+    /// The sender asks whether anybody is there: control sets it, the parser answers.
     pub enquiry: Cell<bool>,
-    /// An exception to report.
-    pub exception: Cell<Option<Status>>,
+    /// Bytes have been lost, which the parser tells.
+    pub lost: Cell<bool>,
+    /// The slot of the receive ring up to which lines of G-code are dropped, by a kill or flush that has come behind it.
+    pub cut: Cell<Option<u8>>,
 }
 
 impl Port {
@@ -42,19 +53,41 @@ impl Port {
     pub fn new(number: u8, bytes: &'static mut [u8], tx: Tx) -> Self {
         Self {
             number,
-            lines: RefCell::new(LinePool::new(bytes)),
+            lines: RefCell::new(LinePool::new(
+                bytes,
+                if number == USB { RESERVE } else { AUX_RESERVE },
+            )),
             tx: Mutex::new(tx),
             mode: Cell::new(Mode::Json),
             enquiry: Cell::new(false),
-            exception: Cell::new(None),
+            lost: Cell::new(false),
+            cut: Cell::new(None),
         }
+    }
+
+    /// How many lines may come: what footers tell. Each may be [`PROMISED`] bytes long with its end, a longer one takes several.
+    #[inline(never)]
+    pub fn promise(&self, lines: &LinePool) -> u8 {
+        let (slots, room) = (lines.free(), lines.room());
+        let shift = if self.number == USB { PROMISED } else { AUX_PROMISED }.trailing_zeros();
+        if u16::from(slots) << shift <= room {
+            return slots;
+        }
+        let all = room + u16::from(uart::room(self.number));
+        slots.min((all >> shift) as u8)
+    }
+
+    /// Whether there is something to tell on this port alone.
+    #[inline(always)]
+    pub fn tells(&self) -> bool {
+        self.enquiry.get() || self.lost.get()
     }
 }
 
 /// A line that is next.
-pub struct Chosen<'a> {
+pub struct Chosen {
     /// Where it came from, and where the answer goes.
-    pub port: &'a Port,
+    pub port: &'static Port,
     /// It, in the port's pool.
     pub id: LineId,
     /// What to do with it.
@@ -83,18 +116,8 @@ impl Links {
 
     /// Reports an exception to whoever feeds the machine.
     pub fn except(&self, status: Status) {
-        self.told().exception.set(Some(status));
+        self.exception.set(Some(status));
         self.reporter_wake.signal();
-    }
-
-    /// The line to process next; G-code of the feeder only if `data` is wanted. That of others does not wait.
-    pub fn next_line(&self, data: bool) -> Option<Chosen<'_>> {
-        let feeder = self.feeder.get();
-        self.ports.iter().find_map(|port| {
-            let any = data || port.number != feeder;
-            let (id, class) = port.lines.borrow().next(any)?;
-            Some(Chosen { port, id, class })
-        })
     }
 
     /// Whether lines of G-code wait, on any port.

@@ -2,7 +2,7 @@
 //!
 //! Reads the receive rings, writes the line pools, waits on [`Event::Received`] or for pool space; never
 //! runs longer than the ring is full (255 bytes, about 6,000 cycles). When the pool is full the bytes
-//! stay in the ring, and when that is full too bytes are lost: the line that is damaged thereby is
+//! stay in the ring, but for short control lines, which [overtake](super::overtake); and when that is full too bytes are lost: the line that is damaged thereby is
 //! refused, and so is each line that is lost whole. With `ex` 1 the sender is stopped before that by XOFF, and
 //! stops the machine's answers so; with `ex` 2 both are done by pins.
 
@@ -10,16 +10,18 @@ use embassy_futures::select::select;
 use embassy_futures::yield_now;
 
 use super::Never;
-use super::hold::{self, Flush};
+use super::hold;
 use super::jog;
 use super::lines::{Aside, LinePool};
 use super::links::Links;
+use super::overtake::Scan;
 use super::ports::Port;
 use crate::hal::event::{Event, next};
 use crate::hal::imp::uart::{self, lost_ends};
+use crate::hal::ring::Window;
 use crate::hal::serial::{
-    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, RETURNED, RX_RING, Received, USB, XOFF,
-    XON, high_water, is_shared, low_water,
+    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, RETURNED, RX_RING, Received, TAKEN,
+    TAKEN_RETURN, USB, high_water, is_shared, low_water,
 };
 use crate::protocol::Mode;
 use crate::status::Status;
@@ -36,8 +38,8 @@ enum Left {
     Bytes,
     /// Bytes, perhaps, behind this mark: the place of a real-time character.
     Placed(u8),
-    /// The same in a comment.
-    Aside(u8),
+    /// The same in a comment, where it is text; but a `^d` is none anywhere.
+    Aside,
 }
 
 /// The task.
@@ -56,15 +58,13 @@ pub fn run(
                 Some(aux) if !aux.is_idle() => aux.take(links),
                 _ => Left::Nothing,
             };
-            if links.flush.get() == Flush::Here {
-                hold::placed(links, links.port(USB), CUT);
-            }
+            hold::here(links);
             match left.max(aux_left) {
                 Left::Nothing => {
                     jog::passed(links);
                     next(Event::Received).await;
                 }
-                Left::Bytes | Left::Placed(_) | Left::Aside(_) => yield_now().await,
+                Left::Bytes | Left::Placed(_) | Left::Aside => yield_now().await,
                 Left::Full => {
                     // The ring goes on filling.
                     select(links.pool_space.wait(), next(Event::Received)).await;
@@ -88,13 +88,24 @@ struct Intake<const N: usize> {
     stopped: Flow,
     /// The receive interrupt may have stopped it too, by a pin.
     has_pins: bool,
+    /// How far control lines have been looked for.
+    scan: Scan,
 }
 
 impl<const N: usize> Intake<N> {
     fn new(port: &'static Port, received: Received<N>) -> Self {
         let seen = lost_ends(port.number);
         let has_pins = Flow::of(port.number, 2) == Flow::Pins;
-        Self { port, received, seen, refused: 0, then: 0, stopped: Flow::None, has_pins }
+        Self {
+            port,
+            received,
+            seen,
+            refused: 0,
+            then: 0,
+            stopped: Flow::None,
+            has_pins,
+            scan: Scan::NONE,
+        }
     }
 
     /// Whether there is nothing to do: most of the time, on a port that nobody uses.
@@ -108,8 +119,14 @@ impl<const N: usize> Intake<N> {
         self.control_flow(self.received.len(), N, links);
         match left {
             Left::Placed(mark) => hold::placed(links, self.port, mark),
-            Left::Aside(mark) => hold::aside(links, self.port, mark),
-            Left::Full => self.look_ahead(links),
+            Left::Aside => hold::serve(links),
+            Left::Full => {
+                let ring = &mut self.received.window();
+                look_ahead(links, self.port, ring);
+                if self.scan.run(&mut self.port.lines.borrow_mut(), ring) {
+                    links.parser_wake.signal();
+                }
+            }
             _ => {}
         }
         left
@@ -128,54 +145,56 @@ impl<const N: usize> Intake<N> {
             if self.received.is_empty() {
                 return Left::Nothing;
             }
-            let text = pool.put_text(self.received.waiting());
-            self.received.release_many(text);
+            let cuts = self.cuts(pool);
+            if !cuts {
+                let text = pool.put_text(self.received.waiting());
+                self.received.release_many(text);
+                self.scan.pass(text);
+            }
             if !pool.ready() {
                 return Left::Full;
             }
             let Some(byte) = self.received.pop() else {
                 return Left::Nothing;
             };
+            self.scan.pass(1);
             let is_line = match byte {
-                CUT | GO if pool.aside() != Aside::None => return Left::Aside(byte),
+                CUT | GO if cuts => false,
+                CUT | GO if pool.aside() != Aside::None => return Left::Aside,
                 CUT | GO => return Left::Placed(byte),
-                ..MARKS => {
-                    let is_line = self.loss(pool, byte, links);
-                    if links.flush.get() == Flush::Input {
-                        // It may stand for the cut.
-                        return Left::Placed(CUT);
-                    }
-                    is_line
-                }
-                XON | XOFF if self.flow(links) == Flow::Characters => {
-                    uart::hold(self.port.number, byte == XOFF);
+                ..MARKS => self.loss(pool, byte, links),
+                // A line was here that has overtaken. It counts already.
+                TAKEN | TAKEN_RETURN => {
+                    pool.follow(byte == TAKEN_RETURN);
                     false
                 }
                 _ => pool.put(byte),
             };
             if is_line {
+                if cuts {
+                    pool.terminate();
+                }
                 links.parser_wake.signal();
             }
         }
         Left::Bytes
     }
 
-    /// No line can be taken before the machine goes on: looks for real-time characters in the ring that have
-    /// it do so. Cost: 30 cycles a byte.
+    /// Whether the next byte is one of those that are dropped. It is taken by itself then.
+    #[inline(always)]
+    fn cuts(&self, pool: &mut LinePool) -> bool {
+        self.port.cut.get().is_some_and(|last| self.cuts_up_to(last, pool))
+    }
+
+    #[cold]
     #[inline(never)]
-    #[small]
-    fn look_ahead(&self, links: &Links) {
-        if !hold::is_on() && !links.stopped.get() {
-            return;
+    fn cuts_up_to(&self, last: u8, pool: &mut LinePool) -> bool {
+        let cuts = self.received.taken() != last;
+        if !cuts {
+            pool.terminate_partial();
+            self.port.cut.set(None);
         }
-        let mut aside = self.port.lines.borrow().aside();
-        for n in 0..self.received.len() {
-            let Some(byte) = self.received.peek(n, |byte| *byte) else { return };
-            if byte < MARKS && aside == Aside::None {
-                hold::ahead(links, byte);
-            }
-            aside = aside.after(byte);
-        }
+        cuts
     }
 
     /// Stops the sender, or lets it go on, when so many bytes wait in a ring of so many.
@@ -220,8 +239,8 @@ impl<const N: usize> Intake<N> {
         }
         // A bus is not told: the line is refused anyway.
         if (self.refused > 0 || mark & CLEAN == 0) && !is_shared(self.port.number) {
-            self.port.exception.set(Some(Status::BufferFull));
-            links.reporter_wake.signal();
+            self.port.lost.set(true);
+            links.parser_wake.signal();
         }
         is_line
     }
@@ -250,5 +269,26 @@ impl<const N: usize> Intake<N> {
             pool.forget();
         }
         pool.follow(self.then & RETURNED != 0);
+    }
+}
+
+/// No line can be taken before the machine goes on: looks for real-time characters in the ring that have
+/// it do so. Cost: 30 cycles a byte.
+#[inline(never)]
+#[small]
+fn look_ahead(links: &Links, port: &Port, ring: &Window<'_>) {
+    if !hold::is_on() && !links.stopped.get() {
+        return;
+    }
+    let mut aside = port.lines.borrow().aside();
+    // Marks before a cut have had their effect.
+    let mut last = port.cut.get();
+    for n in 0..ring.len() {
+        let (byte, slot) = (ring.get(n), ring.slot(n));
+        if byte < MARKS && aside == Aside::None && last.is_none() {
+            hold::ahead(links, port, byte, slot);
+        }
+        last = last.filter(|last| *last != slot);
+        aside = aside.after(byte);
     }
 }

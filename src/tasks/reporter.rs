@@ -1,6 +1,6 @@
-//! The reporter task: the greeting, then status and queue reports, exceptions, and the answer to ENQ.
+//! The reporter task: the greeting, then status and queue reports, and exceptions.
 //!
-//! Reads everything through [`View`], writes to the port that is told, and answers ENQ and losses on their own; waits for something to report, and polls
+//! Reads everything through [`View`], writes to the port that is told; what one port alone is told is the parser's ([`tell_at_once`]). Waits for something to report, and polls
 //! every [`POLL_MS`] while the machine moves; it is not woken besides then, unless queue reports are
 //! wanted. A change of `stat` or `hold` is told at once, anything else every
 //! `si` milliseconds. While the sender is slow it waits, and then reports what is so by then: it never
@@ -28,6 +28,8 @@ use crate::status::Status;
 
 /// How often a busy machine is looked at, ms.
 const POLL_MS: u64 = 10;
+/// How often room is looked for on a port that is greeted besides.
+const PATIENCE: u8 = 20;
 
 /// What was told last.
 struct Told {
@@ -50,7 +52,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
     let mut due = true;
     loop {
         // Once: `stv` counts the others.
-        let exception = &links.told().exception;
+        let exception = &links.exception;
         if !told.starved && health::starvations() > 0 && exception.get().is_none() {
             told.starved = true;
             exception.set(Some(Status::StepsLate));
@@ -60,13 +62,8 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             links.except(Status::EndOfFile);
             links.parser_wake.signal();
         }
-        for port in &links.ports {
-            if port.enquiry.take() {
-                tell(links, port, What::Enquiry).await;
-            }
-            if let Some(status) = port.exception.take() {
-                tell(links, port, What::Exception(status)).await;
-            }
+        if let Some(status) = links.exception.take() {
+            tell(links, links.told(), What::Exception(status)).await;
         }
         if links.probe.take_news() {
             // The planner waits for it.
@@ -115,19 +112,25 @@ fn reports_queue(links: &Links) -> bool {
 
 /// What can be told.
 #[derive(Clone, Copy)]
-enum What {
+pub enum What {
     /// Who the machine is; in text mode with the first prompt.
     Greeting(Occasion),
     /// The answer to ENQ.
     Enquiry,
+    /// Something has gone wrong.
     Exception(Status),
+    /// What probing has found.
     Probing,
+    /// A status report.
     Status,
     /// A jog has ended, or the queue has been flushed, or both.
     End {
+        /// The first.
         jogged: bool,
+        /// The second.
         flushed: bool,
     },
+    /// A queue report.
     Queue,
 }
 
@@ -220,12 +223,37 @@ async fn tell(links: &Links, port: &Port, what: What) -> usize {
             break;
         }
     }
+    drop(tx);
+    // A line may wait for the transmitter.
+    links.parser_wake.signal();
     if let Telling::Queue(free) = telling { free } else { 0 }
 }
 
-/// Says who the machine is.
+/// Tells something short on a port, if nobody else talks there and there is room for it: at most 64 bytes, or all of an
+/// empty ring for a greeting. Else returns false.
+#[inline(never)]
+#[small]
+pub fn tell_at_once(links: &Links, port: &Port, what: What) -> bool {
+    let Ok(mut tx) = port.tx.try_lock() else { return false };
+    let fits = if matches!(what, What::Greeting(_)) { tx.is_empty() } else { tx.has_room() };
+    if fits {
+        let mut telling = Telling::begin(what, links, port);
+        while telling.step(links, port, &mut tx) {}
+    }
+    fits
+}
+
+/// Says who the machine is. The other port gets no greeting if it cannot talk for long: its sender may hold it back.
 async fn greet(links: &Links, occasion: Occasion) {
-    for port in links.ports.iter().filter(|port| !is_shared(port.number)) {
-        tell(links, port, What::Greeting(occasion)).await;
+    let told = links.told();
+    tell(links, told, What::Greeting(occasion)).await;
+    let others = links.ports.iter().filter(|port| port.number != told.number);
+    for port in others.filter(|port| !is_shared(port.number)) {
+        for _ in 0..PATIENCE {
+            if tell_at_once(links, port, What::Greeting(occasion)) {
+                break;
+            }
+            Timer::after_ticks(POLL_MS).await;
+        }
     }
 }

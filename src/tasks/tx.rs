@@ -3,8 +3,6 @@
 //! Owned by whoever holds `Port::tx`, for as long as one line takes, so lines never mix. Call
 //! [`Tx::room`] before each piece of at most [`PIECE`] bytes; it waits until the transmit ring has room.
 
-use embassy_time::Timer;
-
 use crate::hal::event::wait_transmitted;
 use crate::hal::imp::uart;
 use crate::hal::serial::{Outgoing, TX_RING};
@@ -47,20 +45,22 @@ impl Tx {
         uart::kick(self.port);
     }
 
-    /// Goes on at `rate` bits a second, when what has been put has left at the old rate: 1 to 4 ms after
-    /// its last byte. What the sender says meanwhile may be spoilt.
-    pub async fn set_rate(&mut self, rate: u32) {
-        self.drain().await;
+    /// Goes on at `rate` bits a second. What has been put is to have left at the old rate; what the sender says
+    /// meanwhile may be spoilt.
+    pub fn set_rate(&mut self, rate: u32) {
         uart::set_rate(self.port, rate);
         self.rate = rate;
     }
 
-    /// Waits until what has been put has left: 1 to 4 ms after its last byte.
-    pub async fn drain(&mut self) {
-        wait_transmitted(self.port, || (self.ring.free() == TX_RING - 1).then_some(())).await;
-        // The transmitter holds two bytes more. It has a flag for their end, but the flag may be left
-        // from a pause in the middle of the line; their time is certain.
-        Timer::after_ticks(u64::from(TWO_BYTES_MS / self.rate) + 2).await;
+    /// Whether the ring is empty.
+    pub fn is_empty(&self) -> bool {
+        self.ring.free() == TX_RING - 1
+    }
+
+    /// How long what has been put may take to leave when the ring is empty, ms. The transmitter holds two bytes more. It
+    /// has a flag for their end, but the flag may be left from a pause in the middle of the line; their time is certain.
+    pub fn last_ms(&self) -> u16 {
+        (TWO_BYTES_MS / self.rate) as u16 + 2
     }
 
     /// The response under way ends with a checksum: it takes bytes one by one.

@@ -344,10 +344,10 @@ impl Machine for View<'_> {
             Value::QueueFree => queue_free() as i32,
             Value::QueueAdded => self.links.queue_count.take_added(),
             Value::QueueRemoved => self.links.queue_count.take_removed(),
-            Value::SlotsFree => self.port.lines.borrow().free().into(),
+            Value::SlotsFree => self.port.promise(&self.port.lines.borrow()).into(),
             Value::Room => match Dialect::of(&self.settings) {
                 Dialect::Characters => uart::room(self.port.number).into(),
-                _ => self.port.lines.borrow().free().into(),
+                _ => self.value(Value::SlotsFree),
             },
             Value::MachinePosition(axis) => self.position(axis.into()).0,
             Value::Position(axis) => {

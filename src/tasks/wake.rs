@@ -5,7 +5,7 @@
 
 use core::cell::Cell;
 use core::future::poll_fn;
-use core::task::{Poll, Waker};
+use core::task::{Context, Poll, Waker};
 
 /// A remembered wake-up. Thread mode only.
 #[derive(Default)]
@@ -32,13 +32,16 @@ impl Wake {
 
     /// Waits for a signal, and uses it up.
     pub fn wait(&self) -> impl Future<Output = ()> {
-        poll_fn(|cx| {
-            if self.signalled.replace(false) {
-                return Poll::Ready(());
-            }
-            self.waiter.set(Some(cx.waker().clone()));
-            Poll::Pending
-        })
+        poll_fn(|cx| self.poll(cx))
+    }
+
+    /// The same, for whoever waits for something else besides.
+    pub fn poll(&self, cx: &mut Context<'_>) -> Poll<()> {
+        if self.signalled.replace(false) {
+            return Poll::Ready(());
+        }
+        self.waiter.set(Some(cx.waker().clone()));
+        Poll::Pending
     }
 }
 
@@ -78,7 +81,6 @@ mod tests {
     use super::*;
     use core::future::Future;
     use core::pin::pin;
-    use core::task::Context;
 
     fn is_ready(wake: &Wake) -> bool {
         pin!(wake.wait()).poll(&mut Context::from_waker(Waker::noop())).is_ready()

@@ -40,6 +40,12 @@ pub(super) fn peripherals() -> Peripherals {
     unsafe { Peripherals::steal() }
 }
 
+/// Does something of a few cycles with interrupts off.
+#[inline(always)]
+pub fn mask<R>(act: impl FnOnce() -> R) -> R {
+    avr_device::interrupt::free(|_| act())
+}
+
 /// Starts the firmware anew, as if the reset button had been pressed: by the watchdog, in 15 ms.
 pub fn reset() -> ! {
     avr_device::interrupt::disable();

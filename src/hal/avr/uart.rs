@@ -19,7 +19,7 @@ use crate::hal::byte::SharedByte;
 use crate::hal::ring::Ring;
 use crate::hal::serial::{
     AUX, AUX_RING, AllEnds, Ends, Flow, PORTS, RX_RING, TX_RING, USB, WAIT_MS, XOFF, XON, hardware,
-    is_shared, wait_ms,
+    is_shared, last_mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -41,7 +41,8 @@ struct Flags {
     /// A byte to send before all others, if it is not 0; [`WAIT_MS`] and above: when the line that is being sent is at
     /// its end.
     ahead: SharedByte,
-    /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`].
+    /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`], [`HEEDS_XOFF`]. The receive interrupt
+    /// changes the first.
     held: SharedByte,
     /// An [`Asked`], byte for byte. The receive interrupt adds to it, `take_asked` clears it.
     asked: [SharedByte; 3],
@@ -51,6 +52,8 @@ struct Flags {
 const STOPPED: u8 = 1 << 0;
 /// CTS decides.
 const HEEDS_CTS: u8 = 1 << 1;
+/// XOFF and XON are obeyed.
+const HEEDS_XOFF: u8 = 1 << 2;
 
 impl<const N: usize> Shared<N> {
     const fn new() -> Self {
@@ -234,22 +237,16 @@ fn set_rts(port: u8, stop: bool) {
     }
 }
 
-/// Holds what the ring holds back, or lets it go: the other side has sent XOFF, or XON. Thread mode.
-pub fn hold(port: u8, held: bool) {
-    let kept = flags(port).held.get() & !STOPPED;
-    flags(port).held.set(kept | if held { STOPPED } else { 0 });
-    kick(port);
-}
-
 /// How the other side may hold it back from now on. Thread mode.
 pub fn set_flow(port: u8, flow: Flow) {
-    let held = match flow {
+    let heeds = match flow {
         Flow::None => 0,
-        Flow::Characters => flags(port).held.get() & STOPPED,
+        Flow::Characters => HEEDS_XOFF,
         Flow::Pins => HEEDS_CTS,
     };
-    if held != flags(port).held.get() {
-        flags(port).held.set(held);
+    if flags(port).held.get() & !STOPPED != heeds {
+        // An XOFF that has come does not count any more.
+        flags(port).held.set(heeds);
         set_rts(port, false);
         kick(port);
     }
@@ -300,6 +297,21 @@ pub fn room(port: u8) -> u8 {
         (RX_RING, USB_SHARED.rx.used())
     };
     (size - 2).saturating_sub(used) as u8
+}
+
+/// The slot of the receive ring with the byte that came last, if it still waits there. Thread mode.
+pub fn newest(port: u8) -> Option<u8> {
+    if PORTS > 1 && port == AUX { AUX_SHARED.rx.newest() } else { USB_SHARED.rx.newest() }
+}
+
+/// The slot of the mark that stands for the last `%` or `^d`, if it has not been read. Thread mode. Cost: 12 cycles a byte
+/// that waits.
+pub fn last_cut(port: u8) -> Option<u8> {
+    // SAFETY: the reader does not run meanwhile.
+    let ring = unsafe {
+        if PORTS > 1 && port == AUX { AUX_SHARED.rx.window() } else { USB_SHARED.rx.window() }
+    };
+    last_mark(&ring)
 }
 
 /// Leaves the lines to others, for good.

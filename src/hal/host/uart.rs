@@ -12,7 +12,7 @@ use crate::hal::event::Event;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
 use crate::hal::serial::{
     AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LINE_END, MARKS, PORTS, RX_RING, STRAY, TX_RING,
-    USB, XOFF, XON, batch, hardware, high_water, lose, mark, wait_ms,
+    USB, XOFF, XON, batch, hardware, high_water, last_mark, lose, mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -72,6 +72,8 @@ struct Line {
     wait_ms: u8,
     open: bool,
     held: bool,
+    /// Whether XOFF and XON count.
+    heeds_xoff: bool,
     /// Whether CTS counts, and holds them back.
     heeds_cts: bool,
     cts: bool,
@@ -104,6 +106,7 @@ impl Line {
             wait_ms: 0,
             open: false,
             held: false,
+            heeds_xoff: false,
             heeds_cts: false,
             cts: false,
             rts: false,
@@ -197,18 +200,11 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
     });
 }
 
-/// Holds what the ring holds back, or lets it go: the other side has sent XOFF, or XON.
-pub fn hold(port: u8, held: bool) {
-    with(port, |line| {
-        line.held = held;
-        line.kick();
-    });
-}
-
 /// How the other side may hold it back from now on.
 pub fn set_flow(port: u8, flow: Flow) {
     with(port, |line| {
-        line.held &= flow == Flow::Characters;
+        line.heeds_xoff = flow == Flow::Characters;
+        line.held &= line.heeds_xoff;
         line.heeds_cts = flow == Flow::Pins;
         line.rts &= line.heeds_cts;
         line.let_arrive();
@@ -236,6 +232,21 @@ pub fn room(port: u8) -> u8 {
         _ => (RX_RING, usb_rx().used()),
     };
     (size - 2).saturating_sub(used) as u8
+}
+
+/// The slot of the receive ring with the byte that came last, if it still waits there.
+pub fn newest(port: u8) -> Option<u8> {
+    match port {
+        AUX => aux_rx().newest(),
+        _ => usb_rx().newest(),
+    }
+}
+
+/// The slot of the mark that stands for the last `%` or `^d`, if it has not been read.
+pub fn last_cut(port: u8) -> Option<u8> {
+    // SAFETY: the reader does not run meanwhile.
+    let ring = unsafe { if port == AUX { aux_rx().window() } else { usb_rx().window() } };
+    last_mark(&ring)
 }
 
 /// Whether an exclamation mark has come that nobody has taken yet, on any port.
@@ -354,6 +365,14 @@ impl Line {
     }
 
     fn arrive(&mut self, byte: u8, whole: bool) {
+        if self.heeds_xoff && (byte == XOFF || byte == XON) {
+            self.held = byte == XOFF;
+            if byte == XON {
+                self.realtime |= realtime::LET_GO;
+                flags::set(Event::Realtime);
+            }
+            return;
+        }
         let special = realtime::bit(byte);
         if special != 0 {
             self.realtime = realtime::with(self.realtime, special);

@@ -1,8 +1,9 @@
 use super::*;
+use crate::hal::ring::Ring;
 use std::boxed::Box;
 
 fn pool() -> LinePool {
-    LinePool::new(Box::leak(Box::new([0; 560])))
+    LinePool::new(Box::leak(Box::new([0; 600])), 40)
 }
 
 fn feed(pool: &mut LinePool, text: &[u8]) {
@@ -58,7 +59,7 @@ fn long_and_damaged_lines_become_one_fault_each() {
 
 #[test]
 fn a_line_longer_than_the_pool_is_one_fault() {
-    let mut pool = LinePool::new(Box::leak(Box::new([0; 20])));
+    let mut pool = LinePool::new(Box::leak(Box::new([0; 20])), 0);
     for line in ["g1 x2 (0123456789)  \r\n", "(0123456789abcdefghi)\n"] {
         feed(&mut pool, line.as_bytes());
         // What is given back of it leaves room for a control line.
@@ -146,7 +147,7 @@ fn comments_are_known() {
 #[test]
 fn a_full_pool_is_not_ready() {
     let mut pool = pool();
-    feed(&mut pool, b"1\n2\n3\n4\n5\n6\n7\n8\n");
+    feed(&mut pool, b"1\n2\n3\n4\n5\n6\n7\n");
     assert!(!pool.ready());
     take(&mut pool, true);
     assert!(pool.ready());
@@ -198,14 +199,68 @@ fn an_over_long_line_is_known_by_its_beginning() {
 #[test]
 fn a_question_mark_needs_no_end() {
     let mut pool = pool();
-    feed(&mut pool, b" ??\t?g0x1\n?\n? \r\n?{a:n}\n");
-    let lengths = (0..7).map(|n| pool.length(LineId(n))).collect::<std::vec::Vec<_>>();
-    assert_eq!(lengths, [2, 2, 1, 5, 2, 3, 2]);
-    let mut lines = std::vec::Vec::new();
-    while let Some((line, class)) = take(&mut pool, true) {
-        lines.push((std::string::String::from_utf8(line).unwrap(), class));
+    let mut heard = |text: &[u8]| {
+        feed(&mut pool, text);
+        let lengths = (0..pool.entries.len()).map(|n| pool.length(LineId(n as u8)));
+        let lengths = lengths.collect::<std::vec::Vec<_>>();
+        let mut lines = std::vec::Vec::new();
+        while let Some((line, class)) = take(&mut pool, true) {
+            let text = std::string::String::from_utf8(line).unwrap();
+            lines.push((std::string::String::from(text.trim()), class));
+        }
+        let (text, classes): (std::vec::Vec<_>, std::vec::Vec<_>) = lines.into_iter().unzip();
+        (lengths, text.join(" "), classes.last().copied())
+    };
+    let (lengths, text, last) = heard(b" ??\t?g0x1\n?\n");
+    assert_eq!((&lengths[..], &*text), (&[2, 2, 1, 5, 2][..], "? ? ? ? g0x1"));
+    assert_eq!(last, Some(Class::Data));
+    let (lengths, text, last) = heard(b"? \r\n?{a:n}\n");
+    assert_eq!((&lengths[..], &*text), (&[3, 2, 6][..], "? ? {a:n}"));
+    assert_eq!(last, Some(Class::Control));
+}
+
+#[test]
+fn lines_in_order_leave_the_reserve() {
+    let mut pool = LinePool::new(Box::leak(Box::new([0; 100])), 20);
+    // Each begins where a short control line would fit whole.
+    feed(&mut pool, b"0123456789012345678901234567890123456789\n");
+    assert!(pool.ready());
+    feed(&mut pool, b"{a:n}\n0123456789012345");
+    assert_eq!(pool.put_text(b"456789"), 6);
+    assert_eq!(pool.put_text(b"0123456789012345"), 13);
+    assert!(!pool.ready() && pool.room() == 0);
+    assert!(pool.has_reserve(20) && !pool.has_reserve(21));
+}
+
+#[test]
+fn a_control_line_overtakes_what_is_coming_in() {
+    let mut pool = LinePool::new(Box::leak(Box::new([0; 40])), 16);
+    let ring: &'static Ring<u8, 32> = Box::leak(Box::new(Ring::new()));
+    let (mut put, mut got) = ring.split().unwrap();
+    for _ in 0..9 {
+        feed(&mut pool, b"g1x1\ng1x2 y");
+        take(&mut pool, true);
+        put.push_all(b"{gc:\"g1\"}{stat:n}".iter().copied());
+        let ring = got.window();
+        assert!(pool.has_reserve(9) && !pool.is_control(&ring, 0, 9));
+        assert!(pool.has_reserve(8) && pool.is_control(&ring, 9, 8));
+        pool.put_before(&ring, 9, 8, 1);
+        while got.pop().is_some() {}
+        assert_eq!(pool.length(LineId(0)), 10);
+        feed(&mut pool, b"3\n");
+        assert_eq!(take(&mut pool, true), Some((b"{stat:n}".to_vec(), Class::Control)));
+        assert_eq!(take(&mut pool, true), Some((b"g1x2 y3".to_vec(), Class::Data)));
     }
-    let text = lines.iter().map(|(line, _)| line.trim()).collect::<std::vec::Vec<_>>();
-    assert_eq!(text, ["?", "?", "?", "?", "?", "?", "{a:n}", "g0x1"]);
-    assert_eq!(lines[7].1, Class::Data);
+}
+
+#[test]
+fn g_code_that_looked_like_control_waits_in_order() {
+    let mut pool = pool();
+    feed(&mut pool, b"g1x1\n{tid:1,gc:\"g1x2\"}\ng1x3\n");
+    let (id, _) = pool.next(false).unwrap();
+    assert!(pool.is_behind_data(id));
+    pool.wait_in_order(id);
+    assert_eq!(pool.next(false), None);
+    assert_eq!(take(&mut pool, true), Some((b"g1x1".to_vec(), Class::Data)));
+    assert!(!pool.is_behind_data(LineId(0)));
 }

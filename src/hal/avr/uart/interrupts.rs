@@ -14,13 +14,16 @@ use core::arch::asm;
 use core::mem::offset_of;
 
 use super::super::exec;
-use super::{AUX_SHARED, Flags, RXCIE, Shared, TXC, TXCIE, U2X, UDRIE, USB_SHARED};
+use super::{
+    AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, RXCIE, STOPPED, Shared, TXC, TXCIE, U2X, UDRIE,
+    USB_SHARED,
+};
 use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::event::Event;
 use crate::hal::ring::Ring;
 use crate::hal::serial::{
     AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, LINE_END, MARKS, PORTS, RETURNED, RX_RING,
-    STRAY, TX_RING, USB, WAIT_MS, batch, hardware, high_water, is_shared,
+    STRAY, TX_RING, USB, WAIT_MS, XOFF, XON, batch, hardware, high_water, is_shared,
 };
 use crate::realtime;
 
@@ -179,12 +182,18 @@ macro_rules! interrupts {
                     "breq 14f",
                     "cpi  r24, 0x04",
                     "breq 15f",
+                    "cpi  r24, {xon}",
+                    "breq 50f",
+                    "cpi  r24, {xoff}",
+                    "breq 50f",
+                    "53:",
                     // A line end, or nearly: the reader is to look.
                     "sbi  0x1E, {received}",
                     "cpi  r24, {marks}",
-                    "brsh 11f",
+                    "brlo 54f",
+                    "rjmp 1b",
+                    "54:",
                     "ldi  r24, {stray}",
-                    "11:",
                     "rjmp 1b",
                     // From blank to percent: special are 0x21 and 0x25, those of odd number with bit 1 clear.
                     "6:",
@@ -226,6 +235,22 @@ macro_rules! interrupts {
                     "andi r31, 0x18",
                     "brne 7f",
                     "rjmp 3b",
+                    // XON or XOFF, if they count.
+                    "50:",
+                    "lds  r30, {shared} + {held}",
+                    "sbrs r30, {heeds_xoff}",
+                    "rjmp 53b",
+                    "ori  r30, {stopped}",
+                    "cpi  r24, {xoff}",
+                    "breq 51f",
+                    "andi r30, {not_stopped}",
+                    "lds  r24, {shared} + {realtime}",
+                    "ori  r24, {let_go}",
+                    "sts  {shared} + {realtime}, r24",
+                    "sbi  0x1E, {special}",
+                    "51:",
+                    "sts  {shared} + {held}, r30",
+                    "rjmp 24b",
                     // Something was lost: a mark for it, if there is room.
                     "7:",
                     "push r26",
@@ -428,6 +453,12 @@ macro_rules! interrupts {
                     rts_bit = const place(rts($port), 2).1,
                     high = const high_water(Flow::Pins, $ring),
                     held = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, held),
+                    heeds_xoff = const HEEDS_XOFF.trailing_zeros(),
+                    stopped = const STOPPED,
+                    not_stopped = const !STOPPED,
+                    xon = const XON,
+                    xoff = const XOFF,
+                    let_go = const realtime::LET_GO,
                     mask = const !RXCIE,
                     hold_exec = const exec::HOLD,
                     held_exec = const exec::HELD,
@@ -495,7 +526,7 @@ macro_rules! interrupts {
                     "brne 3f",
                     "10:",
                     "lds  r24, {shared} + {held}",
-                    "tst  r24",
+                    "andi r24, {holds}",
                     "brne 5f",
                     "6:",
                     "lds  r30, {shared} + {tail}",
@@ -602,6 +633,7 @@ macro_rules! interrupts {
                     held = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, held),
                     wait = const WAIT_MS,
                     line_end = const LINE_END,
+                    holds = const STOPPED | HEEDS_CTS,
                     mask = const !UDRIE,
                     unmask = const UDRIE,
                     hold_exec = const exec::HOLD,

@@ -1,0 +1,141 @@
+//! Control lines that overtake data in the receive ring.
+//!
+//! When the pool takes no more lines in order, bytes stay in the ring. The reader looks on through them for short control lines,
+//! so that a stop or a question never waits for the moves before it:
+//!
+//! ```text
+//!  pool  | g1x1.. | g1x2.. | g1x3   part |  reserve  |
+//!  ring  | 00 | {stat:n} | g1x4 |             the line moves in front of the part, into the reserve,
+//!        | 00 | ######### | g1x4 |            and `serial::TAKEN` stands in its place
+//! ```
+//!
+//! A line overtakes if it has come whole, is no longer than the pool's reserve and is a control line. A longer one waits in order, and
+//! shorter ones overtake it. Its sender's count stays right: its bytes count with it and its place counts nothing.
+//! Each byte is looked at once (15 cycles), those of a line whose end has not come each time that the reader looks.
+
+use super::lines::{LinePool, is_blank, may_be_control};
+use crate::hal::ring::Window;
+use crate::hal::serial::{CLEAN, CUT, GO, MARKS, TAKEN, TAKEN_RETURN};
+
+/// How far a ring has been looked through.
+pub struct Scan {
+    /// So many of the bytes that wait.
+    looked: u8,
+    /// What follows is a part of a line that does not overtake.
+    within: bool,
+}
+
+/// What begins at a place.
+enum Found {
+    /// A line that may overtake, of so many bytes without its end.
+    Line(u8),
+    /// A question mark, which needs no end.
+    Question,
+    /// One whose end has not come.
+    Unfinished,
+    /// Something else.
+    Other,
+}
+
+impl Scan {
+    /// Nothing has been looked at.
+    pub const NONE: Self = Self { looked: 0, within: false };
+
+    /// The reader has taken so many bytes in order.
+    #[inline(always)]
+    pub fn pass(&mut self, count: u8) {
+        if self.looked != 0 {
+            self.looked = self.looked.saturating_sub(count);
+        }
+    }
+
+    /// Looks on; takes the lines that overtake, as long as there is room for them. Whether there were any.
+    #[inline(never)]
+    #[small]
+    pub fn run(&mut self, pool: &mut LinePool, ring: &mut Window<'_>) -> bool {
+        if self.looked == 0 {
+            self.within = pool.is_within_line();
+        }
+        let mut took = false;
+        while self.looked < ring.len() {
+            let byte = ring.get(self.looked);
+            if byte < MARKS && byte != CUT && byte != GO {
+                // Bytes were lost here. The newest mark may tell of more.
+                if self.looked + 1 == ring.len() {
+                    break;
+                }
+                self.within = byte & CLEAN == 0;
+            } else if byte == b'\n' || byte == b'\r' {
+                self.within = false;
+            } else if !self.within && !is_nothing(byte) {
+                match find(ring, self.looked, pool.reserve()) {
+                    Found::Unfinished => break,
+                    Found::Line(len) if !pool.has_reserve(len) => break,
+                    Found::Question if !pool.has_reserve(1) => break,
+                    Found::Line(len) if take(pool, ring, self.looked, len, true) => {
+                        took = true;
+                        self.looked += len;
+                    }
+                    Found::Question if take(pool, ring, self.looked, 1, false) => took = true,
+                    _ => self.within = true,
+                }
+            }
+            self.looked += 1;
+        }
+        took
+    }
+}
+
+/// Whether a byte between two lines belongs to none.
+fn is_nothing(byte: u8) -> bool {
+    is_blank(byte) || byte < MARKS || byte == TAKEN || byte == TAKEN_RETURN
+}
+
+/// What begins at a place in the ring, if it is no longer than `most`.
+#[inline(never)]
+#[small]
+fn find(ring: &Window<'_>, at: u8, most: u8) -> Found {
+    let first = ring.get(at);
+    if !may_be_control(first) {
+        return Found::Other;
+    }
+    let mut len = 1;
+    loop {
+        if len >= ring.len() - at {
+            return Found::Unfinished;
+        }
+        match ring.get(at + len) {
+            b'\n' | b'\r' => return Found::Line(len),
+            byte if first == b'?' && !is_blank(byte) => return Found::Question,
+            ..b' ' => return Found::Other,
+            _ if len == most => return Found::Other,
+            _ => len += 1,
+        }
+    }
+}
+
+/// Takes a line out of the ring into the pool, with its end if it `ends`. False if it is no control line, or its end has been lost
+/// meanwhile.
+#[inline(never)]
+#[small]
+fn take(pool: &mut LinePool, ring: &mut Window<'_>, at: u8, len: u8, ends: bool) -> bool {
+    if !pool.is_control(ring, at, len) || (ends && !take_end(ring, at + len)) {
+        return false;
+    }
+    pool.put_before(ring, at, len, if ends { 0 } else { u16::MAX });
+    for place in at..at + len {
+        ring.replace(place, ring.get(place), TAKEN);
+    }
+    true
+}
+
+/// Takes the end of a line. It is the only byte that may change meanwhile: if it is the newest, and the ring is full, it becomes the
+/// mark of what is lost behind it. A line feed that is lost there behind a carriage return must not count as an end.
+fn take_end(ring: &mut Window<'_>, at: u8) -> bool {
+    match ring.get(at) {
+        b'\n' => ring.replace(at, b'\n', TAKEN),
+        b'\r' if ring.is_full() && at + 1 == ring.len() => false,
+        b'\r' => ring.replace(at, b'\r', TAKEN_RETURN),
+        _ => false,
+    }
+}

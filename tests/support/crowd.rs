@@ -1,0 +1,239 @@
+//! Ports that are crowded with lines, stopped by their senders, or both: control gets through all the same.
+//!
+//! Each of these is had with a machine that has just booted, on the host and on the simulated chip.
+
+use std::thread;
+
+use crate::side::Side;
+
+/// Longest that the machine may take to answer or to act, ms, from the last bit of what asks for it.
+const PROMPT_MS: u64 = 20;
+/// A byte on the line takes less than a tenth of a ms.
+const BYTES_MS: usize = 11;
+
+pub const USB: usize = 0;
+pub const AUX: usize = 1;
+pub const XOFF: char = '\x13';
+pub const XON: char = '\x11';
+
+/// A machine, and what its two ports have said.
+pub struct Crowd<S> {
+    side: S,
+    heard: [String; 2],
+}
+
+impl<S: Side> Crowd<S> {
+    /// Waits for the greeting.
+    pub fn new(mut side: S) -> Self {
+        side.wire(&[]);
+        let mut crowd = Crowd { side, heard: Default::default() };
+        let greeted = crowd.hears(USB, "SYSTEM READY", 3_000) && crowd.hears(AUX, "READY", 1_000);
+        assert!(greeted, "no greeting");
+        crowd.pass(50);
+        crowd.forget();
+        crowd
+    }
+
+    /// Puts text on the line of a port, and lets it arrive.
+    pub fn send(&mut self, port: usize, text: &str) {
+        self.put(port, text);
+        self.pass((text.len() / BYTES_MS + 1) as u64);
+    }
+
+    fn put(&mut self, port: usize, text: &str) {
+        match port {
+            USB => self.side.send(text.as_bytes()),
+            _ => self.side.send_aux(text.as_bytes()),
+        }
+    }
+
+    /// Sends a setting and waits for its answer.
+    pub fn set(&mut self, port: usize, line: &str) {
+        self.send(port, &format!("{line}\n"));
+        assert!(self.hears(port, "\"f\":[", 500), "no answer to {line}: {:?}", self.heard);
+        self.pass(20);
+        self.forget();
+    }
+
+    pub fn pass(&mut self, ms: u64) {
+        self.side.run_ms(ms);
+        for (port, heard) in [self.side.heard(), self.side.heard_aux()].iter().enumerate() {
+            // The machine may hold its sender back.
+            let heard = String::from_utf8_lossy(heard).replace([XOFF, XON], "");
+            self.heard[port] += &heard;
+        }
+    }
+
+    pub fn forget(&mut self) {
+        self.heard.iter_mut().for_each(String::clear);
+    }
+
+    /// Whether a port says this within so many ms.
+    pub fn hears(&mut self, port: usize, text: &str, ms: u64) -> bool {
+        (0..=ms).any(|_| {
+            let hears = self.heard[port].contains(text);
+            if !hears {
+                self.pass(1);
+            }
+            hears
+        })
+    }
+
+    /// How many responses a port has heard that end with this status.
+    pub fn responses(&self, port: usize, status: u16) -> usize {
+        self.heard[port].matches(&format!("\"f\":[1,{status},")).count()
+    }
+
+    /// A line on a port is answered at once: by this.
+    pub fn prompt(&mut self, port: usize, line: &str, answer: &str) {
+        self.forget();
+        self.send(port, line);
+        let begun = self.heard[port].len();
+        let hears = self.hears(port, answer, PROMPT_MS);
+        let (heard, asked) =
+            (&self.heard[port][begun.min(self.heard[port].len())..], line.trim_end());
+        assert!(hears, "{asked} on port {port} is not answered: {heard:?}");
+    }
+
+    pub fn steps(&self) -> [i64; 4] {
+        self.side.steps()
+    }
+
+    /// Whether the spindle turns.
+    pub fn turns(&self) -> bool {
+        self.side.outputs().0 & 1 != 0
+    }
+
+    /// Fills the planner with slow moves, until a line waits.
+    fn fill_planner(&mut self) {
+        let mut taken = true;
+        while taken {
+            self.forget();
+            self.send(USB, "g91g1x.1f10\n");
+            taken = self.hears(USB, "\"f\":[", 200);
+        }
+    }
+}
+
+/// Has a machine of its own, in a thread of its own, for on the host there is one in each.
+fn alone<S: Side>(boot: &(impl Fn() -> S + Sync), play: impl Fn(Crowd<S>) + Sync) {
+    thread::scope(|scope| {
+        let played = scope.spawn(|| play(Crowd::new(boot()))).join();
+        played.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    });
+}
+
+/// Settings are asked for while the sender holds the machine back: it gets its answers when it lets go.
+pub fn xon_gets_through<S: Side>(boot: impl Fn() -> S + Sync) {
+    let many = format!("{{{}xvm:n}}", "xvm:n,xfr:n,".repeat(11));
+    let pool = format!("{{{}xvm:n}}\n", "xvm:n,".repeat(5));
+    for (port, setting, lines, answers) in [
+        (USB, "{ex:1}", format!("{many}\n").repeat(4), 4),
+        (USB, "{rxm:0}", "{xvm:n,xfr:n,xac:n,xjm:n}\n".repeat(9), 9),
+        (USB, "{ex:1}", "{xvm:n}\n".repeat(10), 10),
+        (AUX, "{ex:1}", pool.repeat(3), 3),
+    ] {
+        alone(&boot, |mut crowd| {
+            crowd.set(USB, setting);
+            crowd.send(port, &XOFF.to_string());
+            crowd.send(port, &lines);
+            crowd.pass(200);
+            assert_eq!(crowd.heard[port], "", "held back");
+            crowd.prompt(USB + AUX - port, "{stat:n}\n", "{\"stat\":1}");
+            crowd.send(port, &XON.to_string());
+            crowd.pass(400);
+            assert_eq!(crowd.responses(port, 0), answers, "{lines:?}: {:?}", crowd.heard);
+            crowd.prompt(port, "{stat:n}\n", "{\"stat\":1}");
+        });
+    }
+}
+
+/// A kill or a flush on one port drops what has come on the other, wherever it is.
+pub fn all_that_has_come_is_dropped<S: Side>(boot: impl Fn() -> S + Sync) {
+    for (cut, ends) in [("\x04", false), ("!%", true)] {
+        alone(&boot, |mut crowd| {
+            crowd.set(USB, "{psw:1,jv:2}");
+            crowd.send(USB, "m3 s1000\nm0\n");
+            crowd.pass(100);
+            crowd.send(USB, &"g91g1x.1f500\n".repeat(12));
+            crowd.pass(100);
+            assert!(crowd.turns());
+            crowd.forget();
+            crowd.send(AUX, cut);
+            crowd.pass(1_000);
+            assert_eq!(
+                (crowd.responses(USB, 5), crowd.responses(USB, 0)),
+                (12, 0),
+                "{:?}",
+                crowd.heard
+            );
+            assert_eq!((crowd.steps(), crowd.turns()), ([0; 4], ends), "{cut:?}");
+            // What comes later is carried out.
+            crowd.send(USB, "g91g1x.1f500\n");
+            crowd.pass(500);
+            assert_eq!(crowd.steps(), [128, 0, 0, 0]);
+        });
+    }
+}
+
+/// Waiting lines are in nobody's way: however many and however long they are.
+pub fn data_does_not_hold_up_control<S: Side>(boot: impl Fn() -> S + Sync) {
+    let long = |n: usize| format!("g91g1x.1f10({})\n", "x".repeat(n - 14));
+    let crowds =
+        [long(170).repeat(3), "g4p9\n".repeat(50), format!("g4p1\n{}", long(254).repeat(2))];
+    for stopped in [false, true] {
+        for lines in &crowds {
+            alone(&boot, |mut crowd| {
+                crowd.set(USB, "{psw:1}");
+                crowd.set(USB, "{rxm:0,sv:0}");
+                crowd.send(USB, "m3 s1000\n");
+                match stopped {
+                    true => crowd.send(USB, "m0\n"),
+                    false => crowd.fill_planner(),
+                }
+                crowd.pass(200);
+                crowd.send(USB, lines);
+                crowd.pass(200);
+                let stat = if stopped { "{\"stat\":3}" } else { "{\"stat\":5}" };
+                crowd.prompt(USB, "{stat:n}\n", stat);
+                crowd.prompt(USB, "{fb:null}\r\n", "{\"fb\":440.20}");
+                crowd.prompt(AUX, "{stat:n}\n", stat);
+                crowd.prompt(USB, "{alarm:1}\n", "{\"alarm\":1}");
+                crowd.pass(5);
+                assert!(!crowd.turns());
+            });
+        }
+    }
+}
+
+/// A port whose sender holds the machine back keeps the other from nothing.
+pub fn a_stopped_port_does_not_stop_the_other<S: Side>(boot: impl Fn() -> S + Sync) {
+    for by_pin in [false, true] {
+        alone(&boot, |mut crowd| {
+            crowd.set(USB, "{sv:0}");
+            if by_pin {
+                crowd.set(USB, "{ex:2}");
+                crowd.side.set_aux_cts(true);
+            } else {
+                crowd.send(AUX, &XOFF.to_string());
+            }
+            crowd.send(AUX, &"{xvm:n}\n".repeat(6));
+            crowd.send(AUX, "\x05");
+            crowd.pass(100);
+            crowd.prompt(USB, "{stat:n}\n", "{\"stat\":1}");
+            crowd.prompt(USB, "\x05", "{\"ack\":true}");
+            crowd.send(USB, "g91g1x.1f500\n");
+            crowd.pass(500);
+            assert_eq!(crowd.steps(), [128, 0, 0, 0]);
+            assert_eq!(crowd.responses(USB, 0), 1);
+            if by_pin {
+                crowd.side.set_aux_cts(false);
+            } else {
+                crowd.send(AUX, &XON.to_string());
+            }
+            crowd.pass(300);
+            assert_eq!(crowd.responses(AUX, 0), 6, "{:?}", crowd.heard);
+            assert_eq!(crowd.heard[AUX].matches("{\"ack\":true}").count(), 1);
+        });
+    }
+}
