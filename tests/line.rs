@@ -178,8 +178,7 @@ impl Noise {
                 b' ' | b'\t' | 0x05 | 0x11 => {}
                 _ => {
                     if self.first == Some(b'?') {
-                        // What is damaged is still a part of that line.
-                        self.asked += usize::from(byte >= 8);
+                        self.asked += 1;
                         self.first = Some(byte);
                     }
                     self.first = self.first.or(Some(byte));
@@ -221,7 +220,7 @@ fn noise_is_answered_and_changes_nothing() {
     let (mut bytes, mut lines, mut answers, mut enquiries) = (0, 0, 0, 0);
     let mut heard = Vec::new();
     while bytes < BYTES || noise.first.is_some() {
-        // A line at a time, which is never lost; marks of bytes that would be are among the noise.
+        // A line at a time, which is never lost.
         let mut line = Vec::new();
         loop {
             line.push(noise.byte());

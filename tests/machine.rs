@@ -150,7 +150,9 @@ fn enquiry_and_reset_act_at_once() {
 #[test]
 fn a_damaged_byte_behind_a_return_damages_one_line_only() {
     let mut sender = Sender::boot();
-    let heard = sender.ask("g0 x1\r\x01\ng0 x2\r", 2_000);
+    sender.machine.send(b"g0 x1\r");
+    sender.machine.send_damaged();
+    let heard = sender.ask("\ng0 x2\r", 2_000);
     let answers = heard.lines().filter_map(|line| line.strip_prefix("{\"r\":{},\"f\":[1,"));
     let statuses: Vec<_> = answers.filter_map(|line| line.split(',').next()).collect();
     assert_eq!(statuses, ["0", "13", "0"], "{heard}");
@@ -162,7 +164,9 @@ fn a_damaged_byte_behind_a_return_damages_one_line_only() {
 #[test]
 fn an_enquiry_and_an_exception_wait_for_a_response() {
     let mut sender = Sender::boot();
-    let heard = sender.ask("{sys:n}\n{sys:n}\n\x01\n\x05g0 x1\n", 1_000);
+    sender.machine.send(b"{sys:n}\n{sys:n}\n");
+    sender.machine.send_damaged();
+    let heard = sender.ask("\n\x05g0 x1\n", 1_000);
     assert_eq!(heard.matches("{\"ack\":true}\n").count(), 1, "{heard}");
     assert_eq!(heard.matches("{\"er\":{").count(), 1, "{heard}");
     assert_eq!(sender.answered(), 4, "{heard}");
@@ -252,6 +256,55 @@ fn settings_and_offsets_survive_a_reset() {
 }
 
 #[test]
+fn a_kill_at_rest_is_no_hold() {
+    let mut sender = Sender::boot();
+    sender.ask("{sr:{stat:t,hold:t,mots:t,cycs:t}}\n", 100);
+    for kill in ["!\x04", "\x04", "!\x04%"] {
+        let heard = sender.ask(kill, 200);
+        assert!(heard.contains("\"st\":207"), "{heard}");
+        for held in ["\"stat\":6", "\"hold\":3", "\"hold\":4", "\"mots\":2", "\"cycs\":1"] {
+            assert!(!heard.contains(held), "{heard}");
+        }
+    }
+    assert!(sender.heard.contains("{\"sr\":{\"stat\":4,"), "{}", sender.heard);
+    // One that stops something is.
+    sender.ask("g1 x10 f500\n", 200);
+    let heard = sender.ask("!\x04", 500);
+    assert!(heard.contains("\"stat\":6"), "{heard}");
+    // And a program stop stands still.
+    sender.ask("m0\n", 200);
+    let heard = sender.ask("!\x04", 200);
+    assert!(heard.contains("\"st\":207") && !heard.contains("\"stat\":6"), "{heard}");
+}
+
+/// What EEPROM holds when the machine starts anew because these lines asked for it.
+fn left_by(lines: &'static str) -> Vec<u8> {
+    let play = move || {
+        let sender = Sender::boot();
+        sender.machine.send(lines.as_bytes());
+        assert!(sender.machine.run_until(10_000, kerf::hal::imp::was_reset), "{lines}");
+        kerf::hal::imp::eeprom::contents()
+    };
+    std::thread::spawn(play).join().unwrap()
+}
+
+#[test]
+fn an_ordered_reset_keeps_every_setting_that_was_acknowledged() {
+    let all = "{xvm:1234,yvm:1235}\n{zvm:1236}\ng10 l2 p2 x1.5 y2\n{p1frq:2500}\n";
+    let expected = "{\"r\":{\"xvm\":1234,\"yvm\":1235,\"zvm\":1236,\"p1frq\":2500,\"g55x\":1.500,\
+                    \"g55y\":2.000},\"f\":[1,0,7]}";
+    for order in ["{reset:1}\n", "{boot:1}\n", "$reset=1\n"] {
+        let contents = left_by((all.to_string() + order).leak());
+        let check = move || {
+            kerf::hal::imp::eeprom::put(&contents);
+            let answer = Sender::boot().ask("{xvm:n,yvm:n,zvm:n,p1frq:n,g55x:n,g55y:n}\n", 300);
+            assert_eq!(answer.lines().next(), Some(expected), "{order}");
+        };
+        std::thread::spawn(check).join().unwrap();
+    }
+}
+
+#[test]
 fn defaults_and_the_mode_survive_a_reset() {
     let contents = {
         let mut sender = Sender::boot();
@@ -300,6 +353,39 @@ fn xoff_stops_a_sender_that_heeds_it_before_anything_is_lost() {
     assert!(stops > 2, "{stops}");
     assert_eq!(sender.answered(), 120);
     assert!(!sender.heard.contains("\"er\""), "{}", sender.heard);
+}
+
+#[test]
+fn xoff_and_xon_stand_between_lines() {
+    let mut sender = Sender::boot();
+    sender.ask("{sv:0}\n", 100);
+    // Slow moves, so that lines pile up, and requests, so that the transmitter is busy.
+    let line = |i| format!("N{i} g1 f600 x{}.25\n{{xvm:n,yvm:n}}\n{{xvm:n}}\n", i % 7);
+    let lines: Vec<u8> = (0..150).flat_map(|i| line(i).into_bytes()).collect();
+    let mut bytes = lines.chunks(1);
+    let (mut stopped, mut said) = (false, Vec::new());
+    while bytes.len() > 0 {
+        if !stopped && let Some(byte) = bytes.next() {
+            sender.machine.send(byte);
+        }
+        sender.machine.run_until(1, || false);
+        for byte in sender.machine.received() {
+            stopped = if stopped { byte != 0x11 } else { byte == 0x13 };
+            said.push(byte);
+        }
+    }
+    sender.machine.run_ms(100_000);
+    said.extend(sender.machine.received());
+    let is_flow = |byte: &u8| matches!(byte, 0x11 | 0x13);
+    let flows = said.iter().filter(|byte| is_flow(byte)).count();
+    assert!(flows > 20, "{flows}");
+    for line in said.split(|byte| *byte == b'\n') {
+        let text = line.iter().skip_while(|byte| is_flow(byte));
+        let inside = text.filter(|byte| is_flow(byte)).count();
+        assert_eq!(inside, 0, "{:?}", String::from_utf8_lossy(line));
+    }
+    let answered = said.split(|byte| *byte == b'\n').filter(|line| line.ends_with(b"]}")).count();
+    assert_eq!(answered, 450, "{:?}", String::from_utf8_lossy(&said));
 }
 
 #[test]

@@ -189,8 +189,8 @@ fn a_long_move_follows_at_the_next_stretch_or_the_one_behind() {
         let mut rig = Rig::new(Config::new(100.0, 1_000.0, jerk));
         rig.line(at([300.0, 100.0]), 40.0, 1);
         assert!((steady(&mut rig) - 40.0).abs() < 1e-3);
-        for (factor, velocity) in [(0.5, 20.0), (2.0, 80.0), (1.1, 44.0), (0.05, 2.0), (1.0, 40.0)]
-        {
+        for factor in [0.5, 2.0, 1.1, 0.05, 0.5, 0.001, 1.0] {
+            let velocity = 40.0 * factor;
             let before = rig.snapshot.velocity;
             rig.want(feed(factor));
             rig.replan();

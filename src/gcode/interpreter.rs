@@ -76,6 +76,12 @@ impl<T: Tables> Interpreter<T> {
         Ok(())
     }
 
+    /// Sets the tool length on one axis, machine coordinates, as G43.1 does; lines that are interpreted later go by it.
+    #[small]
+    pub fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status> {
+        self.state.set_tool_length(axis, length)
+    }
+
     /// Interprets one line without its terminator, for a machine that is `setup` so.
     ///
     /// `Ok`: `out` is what the machine has to do, and the state has advanced as if it had done so.

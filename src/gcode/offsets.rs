@@ -87,6 +87,17 @@ impl State {
         self.update_origin(&system)
     }
 
+    /// The tool length on one axis, as G43.1 sets it.
+    pub(super) fn set_tool_length(&mut self, axis: u8, new: Length) -> Result<(), Status> {
+        let axis = usize::from(axis);
+        let parts = self.origin.get_mut(axis).zip(self.tool_length.get_mut(axis));
+        let (origin, length) = parts.ok_or(Status::AxisInvalid)?;
+        let others = Length(origin.0.wrapping_sub(length.0));
+        *origin = others.checked_add(new).ok_or(Status::OutOfRange)?;
+        *length = new;
+        Ok(())
+    }
+
     /// The lengths of tool H; without H, of the tool in the spindle. None are those of an empty spindle, 0.
     #[small]
     fn tool_named(&self, block: &Block, tables: &impl Tables) -> Result<PerAxis<Length>, Status> {

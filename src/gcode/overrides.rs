@@ -23,13 +23,16 @@ impl Override {
         if self as u8 == Self::Traverse as u8 { 1_000 } else { 2_000 }
     }
 
-    /// Whether it may be set to this.
-    pub fn allows(self, factor: u32) -> bool {
-        (LEAST.into()..=self.most().into()).contains(&factor)
+    /// The factor that it gets if it is to be set to this; `None` if it may not be. Feeds and traverses of 0 are
+    /// carried out a thousand times slower, so that a program that asks for it comes to its end.
+    pub fn checked(self, factor: u32) -> Option<u16> {
+        let least = if self == Self::Spindle { LEAST } else { 0 };
+        let factor = u16::try_from(factor).ok()?;
+        (least..=self.most()).contains(&factor).then_some(factor.max(1))
     }
 }
 
-/// The least factor.
+/// The least factor of the spindle, and the least that real-time characters ask for.
 pub const LEAST: u16 = 50;
 /// As programmed.
 pub const FULL: u16 = 1_000;
@@ -60,12 +63,12 @@ impl Change {
         Self::new(which, on, 0)
     }
 
-    /// On or not, with a factor that it [allows](Override::allows).
+    /// On or not, with a [checked](Override::checked) factor.
     pub const fn new(which: Override, on: bool, factor: u16) -> Self {
         Self { which: 1 << which as u8, on, factor }
     }
 
-    /// On, with a factor that it [allows](Override::allows).
+    /// On, with a [checked](Override::checked) factor.
     pub const fn to(which: Override, factor: u16) -> Self {
         Self::new(which, true, factor)
     }
@@ -147,8 +150,11 @@ mod tests {
     #[test]
     fn factors_have_limits() {
         for (which, most) in [(Override::Feed, 2_000), (Override::Traverse, 1_000)] {
-            assert!(which.allows(50) && which.allows(most));
-            assert!(!which.allows(49) && !which.allows(most + 1));
+            assert_eq!(which.checked(most), Some(most as u16));
+            assert_eq!((which.checked(most + 1), which.checked(10)), (None, Some(10)));
+            assert_eq!((which.checked(0), which.checked(65_536)), (Some(1), None));
         }
+        assert_eq!(Override::Spindle.checked(49), None);
+        assert_eq!(Override::Spindle.checked(2_000), Some(2_000));
     }
 }

@@ -319,10 +319,8 @@ fn override_one(block: &Block, which: Override, how: Switch) -> Result<Change, S
     };
     let Some(word) = word.filter(|_| !off) else { return Ok(Change::switch(which, !off)) };
     let factor = word.milliseconds().map_err(|_| Status::PWordInvalid)?;
-    if !which.allows(factor) {
-        return Err(Status::PWordInvalid);
-    }
-    Ok(Change::to(which, factor as u16))
+    let factor = which.checked(factor).ok_or(Status::PWordInvalid)?;
+    Ok(Change::to(which, factor))
 }
 
 fn set<T>(mode: &mut T, new: Option<T>) {

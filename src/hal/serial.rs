@@ -22,9 +22,10 @@ pub const AUX_RING: usize = 64;
 /// Size of each transmit ring, a power of two.
 pub const TX_RING: usize = 128;
 
-/// Bytes below this are marks. None of them is in a line of text; what comes of them from outside
-/// counts as damaged.
+/// Bytes below this are marks. None of them is in a line of text: in place of one that comes from outside there is a [`STRAY`].
 pub const MARKS: u8 = 8;
+/// A byte that no line may hold, and no mark.
+pub const STRAY: u8 = 8;
 /// Of a mark: it replaced the end of a whole line.
 pub const BEHIND_END: u8 = 1;
 /// Of a mark: the byte lost last was the end of a line.
@@ -52,9 +53,22 @@ pub const fn batch(ring: usize) -> u8 {
 pub const XOFF: u8 = 0x13;
 /// See [`XOFF`].
 pub const XON: u8 = 0x11;
-/// The sender is stopped when the receive ring holds more. Most say 100 bytes more before they heed XOFF.
-pub const fn high_water(ring: usize) -> usize {
-    ring / 2
+/// Added to one of the two for each millisecond that it may wait for the end of the line that is being sent.
+pub const WAIT_MS: u8 = 0x20;
+/// A byte below this ends a line: XOFF and XON may follow it.
+pub const LINE_END: u8 = b' ';
+
+/// How many ms XOFF and XON wait for the end of a line on a port with this divisor (`baud::divisor`), at most. The sender
+/// says up to 50 bytes meanwhile, or 23 where the ring is short.
+pub const fn wait_ms(port: u8, divisor: u8) -> u8 {
+    let (ms, most) = (divisor / 3, if port == USB { 4 } else { 2 });
+    if ms > most { most } else { ms }
+}
+
+/// The sender is stopped when the receive ring holds more. Most say 100 bytes more before they heed XOFF, and that waits
+/// for the end of a line.
+pub const fn high_water(flow: Flow, ring: usize) -> usize {
+    if matches!(flow, Flow::Characters) { ring / 4 } else { ring / 2 }
 }
 /// And goes on when it holds less.
 pub const fn low_water(ring: usize) -> usize {

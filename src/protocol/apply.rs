@@ -6,7 +6,7 @@ use super::machine::{Machine, Warning};
 use super::pairs::Outcome;
 use super::program;
 use super::request::{Context, Request};
-use super::token::{Action, Subject, Target};
+use super::token::{Action, Group, Subject, Target};
 use super::value::{Form, Value, place_form};
 use super::write::Out;
 use crate::config::name::axis_of;
@@ -34,6 +34,13 @@ impl Request {
                     Some(Subject::Setting(setting)) => self.set(setting, pair, c)?,
                     Some(Subject::Row(row, axis)) if !row.is_stored() => {
                         set_row(row, axis, pair, c)?
+                    }
+                    Some(Subject::Member(vector, _, axis))
+                        if Group::Vector(vector) == Group::TOOL_OFFSETS =>
+                    {
+                        // In millimetres, as it is told.
+                        let length = fixed(pair, c.line, Length::DECIMALS, false)?;
+                        c.machine.set_tool_length(axis, Length(length))?;
                     }
                     Some(Subject::Single(single)) if single.value == Value::Home => {
                         if is_sure(pair, c)? {
@@ -163,10 +170,8 @@ fn set_value<M: Machine, O>(
 #[small]
 fn factor(which: Override, pair: &Pair, line: &[u8]) -> Result<u16, Status> {
     let factor = fixed(pair, line, 3, false)?;
-    match u32::try_from(factor) {
-        Ok(factor) if which.allows(factor) => Ok(factor as u16),
-        _ => Err(Status::OutOfRange),
-    }
+    let factor = u32::try_from(factor).ok().and_then(|factor| which.checked(factor));
+    factor.ok_or(Status::OutOfRange)
 }
 
 #[small]

@@ -16,6 +16,9 @@ const FRAMES: u8 = 1;
 const LINE_NUMBERS: u8 = 4;
 const BLOCKS: u8 = 5;
 
+/// Behind the highest line number.
+const LINE_NUMBER_END: i32 = 1 << 24;
+
 /// Whether nothing of a block is to be shown, so that the response is the frame alone: of a block
 /// without a comment, in JSON mode, and `numbered` or not.
 pub fn is_brief(settings: &Settings, numbered: bool) -> bool {
@@ -45,15 +48,23 @@ fn put_other(settings: &Settings, ending: Ending, out: &mut impl Out) {
 }
 
 impl Request {
-    fn is_brief<M: Machine>(&self, machine: &mut M) -> bool {
-        let quiet = is_brief(machine.settings(), true)
-            || (is_brief(machine.settings(), false) && machine.value(Value::BlockLine) == 0);
+    fn is_brief<M: Machine, O>(&self, c: &mut Context<'_, M, O>) -> bool {
+        let quiet = is_brief(c.machine.settings(), true)
+            || (is_brief(c.machine.settings(), false) && self.line_number(c) == 0);
         quiet && !self.begun && !self.is_json && !self.commented
+    }
+
+    /// The block's line number, 0 for none. The machine does not know that of a block that it has not carried out.
+    fn line_number<M: Machine, O>(&self, c: &mut Context<'_, M, O>) -> i32 {
+        match self.status {
+            Status::Ok => c.machine.value(Value::BlockLine),
+            _ => leading_number(self.block.of(c.line)),
+        }
     }
 
     /// The whole response to most lines, in one step.
     pub(super) fn brief<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) -> bool {
-        let brief = self.is_brief(c.machine);
+        let brief = self.is_brief(c);
         if brief {
             let ending = self.ending(c.machine);
             let mut format = Format::json(c.machine.settings());
@@ -143,7 +154,7 @@ impl Request {
             self.phase = Phase::Done;
             return;
         }
-        let line = c.machine.value(Value::BlockLine);
+        let line = self.line_number(c);
         if self.verbosity >= LINE_NUMBERS && line != 0 {
             let mut writer = Writer::message(c.out, &mut self.format);
             writer.key_text(text!("n"));
@@ -152,6 +163,26 @@ impl Request {
         let on = self.is_json && self.status == Status::Ok;
         self.phase = if on { Phase::Pair } else { Phase::Warning };
     }
+}
+
+/// The number of the N word that a block begins with; 0 if it does not, or if that is no line number.
+#[inline(never)]
+#[small]
+fn leading_number(block: &[u8]) -> i32 {
+    let mut number = -1;
+    for byte in block {
+        match byte {
+            b' ' | b'\t' | b'/' => {}
+            b'N' | b'n' if number < 0 => number = 0,
+            // Higher ones are none, and would not fit at last.
+            b'0'..=b'9' if (0..LINE_NUMBER_END).contains(&number) => {
+                number = number * 10 + i32::from(byte - b'0');
+            }
+            b'0'..=b'9' | b'.' => return 0,
+            _ => break,
+        }
+    }
+    number.max(0)
 }
 
 /// Byte `at` of the line if that is before `end`.

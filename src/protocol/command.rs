@@ -16,6 +16,7 @@ impl Request {
     #[inline(never)]
     pub(super) fn command<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let pair = split(c.line, self.at);
+        let pair = divide(c.line, &pair).unwrap_or(pair);
         let name = Name::beginning(pair.name.of(c.line));
         let null = pair.kind == Kind::Null;
         let series = match name.bytes() {
@@ -105,6 +106,23 @@ fn split(line: &[u8], at: u8) -> Pair {
     Pair { name: Span { start, end }, kind, value: Span { start: value, end: next }, next }
 }
 
+/// A setting and a number without anything in between, `$xfr30`: the two. No name is another with digits behind it.
+#[inline(never)]
+#[small]
+fn divide(line: &[u8], pair: &Pair) -> Option<Pair> {
+    let text = pair.name.of(line);
+    let is_number = |byte: &&u8| matches!(byte, b'0'..=b'9' | b'.' | b',' | b'-');
+    let digits = text.iter().rev().take_while(is_number).count() as u8;
+    if pair.kind != Kind::Null || digits == 0 {
+        return None;
+    }
+    let middle = pair.name.end - digits;
+    let name = Span { end: middle, ..pair.name };
+    let Target::Token(_) = resolve(Name::new(), name.of(line)) else { return None };
+    let value = Span { start: middle, ..pair.name };
+    Some(Pair { name, kind: Kind::Number, value, next: pair.name.end })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -128,6 +146,15 @@ mod tests {
             let kind = if value.is_some() { Kind::Number } else { Kind::Null };
             assert_eq!(pair.kind, kind, "{line}");
             assert_eq!(pair.value.of(line.as_bytes()), value.unwrap_or("").as_bytes(), "{line}");
+        }
+    }
+
+    #[test]
+    fn no_name_is_another_with_digits_behind_it() {
+        for name in super::super::token::names() {
+            let head = name.trim_end_matches(|c: char| c.is_ascii_digit());
+            let target = resolve(Name::new(), head.as_bytes());
+            assert!(head == name || !matches!(target, Target::Token(_)), "{name}");
         }
     }
 

@@ -25,6 +25,8 @@ pub struct Fake {
     pub state: i32,
     /// Values of the interpreter's tables.
     pub rows: HashMap<(u8, u8), i32>,
+    /// Lengths of the tool, by axis.
+    pub tool_lengths: HashMap<u8, i32>,
     /// Settings that are in EEPROM.
     pub cold: HashMap<u8, i32>,
     /// The program that is kept.
@@ -48,6 +50,7 @@ impl Fake {
             overrides: Overrides::NONE,
             state: 1,
             rows: HashMap::new(),
+            tool_lengths: HashMap::new(),
             cold: HashMap::new(),
             program: Vec::new(),
             waits: false,
@@ -137,6 +140,11 @@ impl Machine for Fake {
         self.settings.store(setting, value);
         let lowered = self.settings.limit_velocity(setting, |_| 40_000);
         Ok(if lowered { Warning::Velocity } else { Warning::None })
+    }
+
+    fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status> {
+        self.tool_lengths.insert(axis, length.0);
+        Ok(())
     }
 
     fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {

@@ -9,17 +9,17 @@ use crate::progmem::Text;
 use crate::text;
 
 /// Lines of [`SCREENS`]; a screen is some of them.
-const LINES: usize = 59;
+const LINES: usize = 61;
 /// What `h` shows.
-pub const GENERAL: Span = Span { start: 0, end: 17 };
+pub const GENERAL: Span = Span { start: 0, end: 19 };
 /// What `$h` shows.
-pub const SETTINGS: Span = Span { start: 17, end: 32 };
+pub const SETTINGS: Span = Span { start: 19, end: 34 };
 /// What `$defa` shows.
-pub const DEFAULTS: Span = Span { start: 32, end: 37 };
+pub const DEFAULTS: Span = Span { start: 34, end: 39 };
 /// What `$test` shows.
-pub const TESTS: Span = Span { start: 37, end: 54 };
+pub const TESTS: Span = Span { start: 39, end: 56 };
 /// What `$boot` shows.
-pub const BOOT: Span = Span { start: 54, end: LINES as u8 };
+pub const BOOT: Span = Span { start: 56, end: LINES as u8 };
 
 progmem! {
     static SCREENS: [Text; LINES] = [
@@ -34,7 +34,9 @@ progmem! {
         text!("  $test     list of built-in jobs; $test=3 runs one"),
         text!("  $me $md   motors on, motors off"),
         text!("  h         this help"),
-        text!("  ~         go on after a program stop"),
+        text!("  !         hold"),
+        text!("  ~         go on after a hold, or a program stop"),
+        text!("  %         in a hold: drop what is queued (^d: both)"),
         text!("  ^x        reset: the position is lost"),
         text!("  {...}     JSON; answers are JSON from then on"),
         text!("To stop the machine at once, cut its power."),

@@ -242,7 +242,12 @@ impl Cursor<'_> {
             match self.next_if(|b| matches!(b, b' '..=b'~' | b'\t'))? {
                 b'"' => return Some(Span { start, end }),
                 b'\\' => {
-                    self.next_if(|b| matches!(b, b' '..=b'~'))?;
+                    let letter = self.next_if(|b| matches!(b, b' '..=b'~'))?;
+                    if letter == b'u' {
+                        // Four digits; those behind them are characters like others.
+                        let digits = self.span(|b| b.is_ascii_hexdigit());
+                        (digits.end - digits.start >= 4).then_some(())?;
+                    }
                 }
                 _ => {}
             }

@@ -91,6 +91,8 @@ pub trait Machine {
     /// Sets a value of the interpreter's tables. [`Status::Again`]: nothing is done, and it is to be tried again when
     /// the tables are ready.
     fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status>;
+    /// Sets the tool length on one axis, as G43.1 does.
+    fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status>;
     /// A value now, in the unit that [`Value`] states.
     fn value(&mut self, value: Value) -> i32;
     /// What this step tells of motion is of now if `first`, else of the moment of the last `first`.
@@ -116,7 +118,7 @@ pub trait Machine {
     /// A byte of the program that is kept.
     fn program(&mut self, at: u16) -> Option<u8>;
     /// Starts the machine anew when the response has left, in its boot loader if `boot`, for which it has to be at
-    /// rest.
+    /// rest. [`Status::Again`] while settings are on their way to memory.
     fn restart(&mut self, boot: bool) -> Status;
     /// Changes the overrides at once.
     fn change_override(&mut self, change: Change);

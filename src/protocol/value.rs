@@ -63,6 +63,8 @@ pub enum Value {
     Reset,
     /// `stv`: how many times steps have waited for the planner in mid-motion since the reset, 255 for more.
     Starvations,
+    /// `kept`: 1 if all settings and tables are in EEPROM, 0 if some are on their way.
+    Kept,
     /// `tool`: tool number.
     Tool,
     /// `home`: 0 not homed, 1 homed, 2 homing.
@@ -212,7 +214,7 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 42;
+pub const SINGLE_COUNT: usize = 43;
 /// Entries of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
 /// The number of the vector `g92`.
@@ -319,6 +321,7 @@ progmem! {
         single("ma", Value::Zero, Form::Length),
         count("rst", Value::Reset, text!("Last reset:"), text!("Power on|External|Brown-out|Watchdog|Asked for")),
         count("stv", Value::Starvations, text!("Late segments:"), NONE),
+        count("kept", Value::Kept, NONE, NONE),
         count("inp", PROBE, text!("Probe:"), NONE),
         count("ind", DOOR, text!("Door:"), NONE),
         count("ine", STOP, text!("Emergency stop:"), NONE),

@@ -120,15 +120,17 @@ impl Request {
     }
 }
 
-/// Puts a character of a string of the request into one of the response; returns how many bytes it was. A quote or a
-/// backslash that was escaped stays so. At most two bytes come out.
+/// Puts a character of a string of the request into one of the response; returns how many bytes it was. An escape of JSON
+/// stays as it is; any other backslash is a character. At most two bytes come out.
 #[small]
 pub(super) fn pass_on<O: Out>(line: &[u8], at: u8, end: u8, writer: &mut Writer<'_, O>) -> u8 {
     let byte = byte_of(line, at, end).unwrap_or(b' ');
     let next = byte_of(line, at.saturating_add(1), end);
     match (byte, next) {
-        (b'\\', Some(b'"' | b'\\')) => {
-            writer.escaped(next.unwrap_or(b' '));
+        // Digits follow a `u`: `json::check` has seen to it.
+        (b'\\', Some(letter @ (b'"' | b'\\' | b'/' | b'b' | b'f' | b'n' | b'r' | b't' | b'u'))) => {
+            writer.byte(byte);
+            writer.byte(letter);
             2
         }
         // A tabulator may stand in a request, not in a response.

@@ -90,7 +90,9 @@ fn step(which: Override, percent: i8, anew: bool) {
         return;
     }
     let before = if anew { FULL } else { now().factor(which) };
-    let factor = (before.cast_signed() + 10 * i16::from(percent)).max(LEAST.cast_signed());
+    // One that has been set lower is not raised by asking for less.
+    let least = LEAST.min(before).cast_signed();
+    let factor = (before.cast_signed() + 10 * i16::from(percent)).max(least);
     change(Change::to(which, factor.cast_unsigned().min(which.most())));
 }
 

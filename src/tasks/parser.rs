@@ -13,6 +13,7 @@
 use core::future::poll_fn;
 use core::task::Poll;
 
+use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::MutexGuard;
 use heapless::Vec;
@@ -81,6 +82,17 @@ enum Progress {
     InOrder,
 }
 
+/// What has been done at once.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Turn {
+    /// A usual line.
+    Usual,
+    /// Something else; there may be more.
+    More,
+    /// Nothing.
+    Nothing,
+}
+
 /// The parser's own state.
 struct Parser {
     links: &'static Links,
@@ -94,16 +106,20 @@ pub fn run(links: &'static Links) -> impl Future<Output = Never> {
     let mut parser = Parser { links, sessions: [const { Session::Idle }; PORTS], lacking: 0 };
     async move {
         loop {
-            while parser.turn() {}
-            parser.wait().await;
+            match parser.turn() {
+                Turn::Usual => {}
+                // The reader has its turn, and stops the sender in time.
+                Turn::More => yield_now().await,
+                Turn::Nothing => parser.wait().await,
+            }
         }
     }
 }
 
 impl Parser {
-    /// Does what can be done at once. Whether there may be more.
+    /// Does what can be done at once.
     #[inline(always)]
-    fn turn(&mut self) -> bool {
+    fn turn(&mut self) -> Turn {
         let links = self.links;
         let alarmed = alarm::is_on();
         let free = is_free(links);
@@ -111,18 +127,18 @@ impl Parser {
         let data = free && !runs_job;
         let tried = if data && !alarmed && self.is_idle() { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
-            return true;
+            return Turn::Usual;
         }
         self.lacking = 0;
         if self.go_on() {
-            return true;
+            return Turn::More;
         }
         match self.next_line(data) {
             Some(chosen) => self.take(chosen, tried),
             None if free && runs_job && !links.job.get().is_over() => job_line(links),
-            None => return false,
+            None => return Turn::Nothing,
         }
-        true
+        Turn::More
     }
 
     /// Whether no line of the port that feeds the machine is being answered.

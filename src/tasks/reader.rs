@@ -201,18 +201,21 @@ impl<const N: usize> Intake<N> {
     #[inline(never)]
     fn control_flow(&mut self, waiting: usize, ring: usize, links: &Links) {
         let stop = match self.stopped {
-            Flow::None => waiting > high_water(ring),
+            Flow::None if waiting <= high_water(Flow::Characters, ring) => false,
+            Flow::None => waiting > high_water(self.flow(links), ring),
             _ => waiting >= low_water(ring),
         };
         // One that was stopped must not stay so when the setting changes.
         let flow = if stop { self.flow(links) } else { Flow::None };
         if flow != self.stopped {
             let port = self.port.number;
-            uart::stop_sender(port, self.stopped, false);
-            uart::stop_sender(port, flow, true);
+            // There is time to wait for the end of a line, unless it is late already.
+            let waits = waiting <= high_water(Flow::Pins, ring);
+            uart::stop_sender(port, self.stopped, false, true);
+            uart::stop_sender(port, flow, true, waits);
             self.stopped = flow;
         } else if self.has_pins && flow == Flow::None {
-            uart::stop_sender(self.port.number, Flow::Pins, false);
+            uart::stop_sender(self.port.number, Flow::Pins, false, false);
         }
     }
 

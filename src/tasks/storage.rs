@@ -91,6 +91,13 @@ impl Storage {
         self.awaited.get()
     }
 
+    /// Whether EEPROM holds all that it is to hold.
+    pub fn is_done(&self) -> bool {
+        // The end of the range is cleared when the last of it has been put away.
+        let waits = self.edit.get().is_some() || self.cold.get().is_some();
+        !waits && self.to.get() == 0 && self.forgotten.get() >= Setting::COLD
+    }
+
     /// A value of a row. Cost as of [`Tables::row`].
     #[inline(never)]
     pub fn value(&self, row: Row, axis: u8) -> Length {

@@ -120,13 +120,19 @@ impl<'a> View<'a> {
         self.links.job.get().is_over() && !self.carries_out()
     }
 
+    /// Whether a hold is on that anybody is to see: not that of a kill at rest, which lasts until what waits is dropped.
+    fn is_held(&self) -> bool {
+        let rests = || !self.has_work() || self.links.stopped.get();
+        hold::is_on() && !(self.links.killed.get() && rests())
+    }
+
     /// `stat`.
     pub fn state(&self) -> i32 {
         let is_g2core = self.settings.is_g2core();
         if let Some(state) = alarm::now().state(is_g2core) {
             return state;
         }
-        if hold::is_on() {
+        if self.is_held() {
             let interlock = is_g2core && self.links.door_open.get();
             return if interlock { INTERLOCK } else { HOLD };
         }
@@ -136,7 +142,7 @@ impl<'a> View<'a> {
             Cycle::Homing => return HOMING,
             Cycle::Jog => return JOGGING,
         }
-        if self.is_busy() && !self.links.stopped.get() {
+        if self.has_work() && !self.links.stopped.get() {
             return RUN;
         }
         match self.motion().program {
@@ -148,7 +154,7 @@ impl<'a> View<'a> {
 
     /// `hold`.
     pub fn hold(&self) -> i32 {
-        match hold::is_on() {
+        match self.is_held() {
             false => 0,
             true if self.motion().held && !hold::is_passing() => HELD,
             true => SLOWING,
@@ -304,6 +310,10 @@ impl Machine for View<'_> {
         self.links.model.borrow_mut().set(row, axis, value)
     }
 
+    fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status> {
+        self.links.model.borrow_mut().set_tool_length(axis, length)
+    }
+
     fn change_override(&mut self, change: Change) {
         overrides::change(change);
     }
@@ -319,12 +329,12 @@ impl Machine for View<'_> {
             },
             Value::Cycle if alarm::is_on() => 0,
             Value::Cycle => match self.links.cycle.get() {
-                Cycle::Off => i32::from(self.is_busy()),
+                Cycle::Off => i32::from(self.is_held() || self.has_work()),
                 Cycle::Probe => 2,
                 Cycle::Homing => 3,
                 Cycle::Jog => 4,
             },
-            Value::Motion if hold::is_on() => 2,
+            Value::Motion if self.is_held() => 2,
             Value::Motion => i32::from(self.motion().running),
             // Lines that move nothing are finished when all before them are.
             Value::FinishedLine if !self.is_busy() => self.modal(Value::BlockLine),
@@ -375,6 +385,7 @@ impl Machine for View<'_> {
             Value::Hold => self.hold(),
             Value::Reset => watchdog::cause() as i32,
             Value::Starvations => health::starvations().into(),
+            Value::Kept => self.links.storage.is_done().into(),
             Value::Home => self.home_state(),
             Value::Blamed => self.links.model.borrow().blamed().into(),
             modal => self.modal(modal),
@@ -498,6 +509,9 @@ impl Machine for View<'_> {
     fn restart(&mut self, boot: bool) -> Status {
         if boot && self.is_busy() {
             return Status::NotAccepted;
+        }
+        if !self.links.storage.is_done() {
+            return Status::Again;
         }
         self.links.restart.set(Some(boot));
         Status::Ok

@@ -18,8 +18,8 @@ use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::byte::SharedByte;
 use crate::hal::ring::Ring;
 use crate::hal::serial::{
-    AUX, AUX_RING, AllEnds, Ends, Flow, PORTS, RX_RING, TX_RING, USB, XOFF, XON, hardware,
-    is_shared, last_mark,
+    AUX, AUX_RING, AllEnds, Ends, Flow, PORTS, RX_RING, TX_RING, USB, WAIT_MS, XOFF, XON, hardware,
+    is_shared, last_mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -38,7 +38,8 @@ struct Flags {
     lost_ends: [SharedByte; 2],
     /// Real-time characters, as bits. The receive interrupt sets them, `take_realtime` clears them.
     realtime: SharedByte,
-    /// A byte to send before all others, if it is not 0.
+    /// A byte to send before all others, if it is not 0; [`WAIT_MS`] and above: when the line that is being sent is at
+    /// its end.
     ahead: SharedByte,
     /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`], [`HEEDS_XOFF`]. The receive interrupt
     /// changes the first.
@@ -208,12 +209,15 @@ fn each_driver(port: u8, act: impl Fn(Pin)) {
 }
 
 /// Stops the sender, or lets it go on, in the way they have agreed upon; by a pin the receive interrupt does so
-/// too. Thread mode.
-pub fn stop_sender(port: u8, flow: Flow, stop: bool) {
+/// too. A character may wait for the end of a line if it `waits`. Thread mode.
+pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
     match flow {
         Flow::None => {}
         Flow::Characters => {
-            flags(port).ahead.set(if stop { XOFF } else { XON });
+            // SAFETY: thread mode alone writes it.
+            let divisor = unsafe { register(port, 4).read_volatile() };
+            let wait = if waits { WAIT_MS * wait_ms(port, divisor) } else { 0 };
+            flags(port).ahead.set(wait + if stop { XOFF } else { XON });
             kick(port);
         }
         Flow::Pins => set_rts(port, stop),
@@ -248,15 +252,29 @@ pub fn set_flow(port: u8, flow: Flow) {
     }
 }
 
-/// Sends on what CTS has held back. Each millisecond, in thread mode.
+/// Sends on what CTS has held back, and XOFF or XON that has waited for long enough. Each millisecond, in thread mode.
 #[inline(always)]
 pub fn look() {
     for port in 0..PORTS as u8 {
+        if flags(port).ahead.get() >= WAIT_MS {
+            wait_less(port);
+        }
         let has_pins = matches!(Flow::of(port, 2), Flow::Pins);
         if has_pins && flags(port).held.get() & HEEDS_CTS != 0 {
             kick(port);
         }
     }
+}
+
+/// A millisecond of what XOFF or XON waits for is over.
+#[inline(never)]
+fn wait_less(port: u8) {
+    avr_device::interrupt::free(|_| {
+        let ahead = &flags(port).ahead;
+        // The transmit interrupt may have sent it.
+        ahead.set(ahead.get().checked_sub(WAIT_MS).unwrap_or(0));
+    });
+    kick(port);
 }
 
 /// Line ends lost since start-up, modulo 2^16.

@@ -43,6 +43,11 @@ impl Machine {
         uart::send(USB, bytes);
     }
 
+    /// The sender puts a byte on the line that arrives damaged.
+    pub fn send_damaged(&self) {
+        uart::send_damaged(USB);
+    }
+
     /// The sender on the second port does.
     pub fn send_aux(&self, bytes: &[u8]) {
         uart::send(AUX, bytes);

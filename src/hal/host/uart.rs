@@ -6,12 +6,13 @@ use std::collections::VecDeque;
 use std::vec::Vec;
 
 use super::{NEVER, flags, now};
+use crate::baud;
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
 use crate::hal::serial::{
-    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, MARKS, PORTS, RX_RING, TX_RING, USB, XOFF, XON,
-    batch, hardware, high_water, last_mark, lose, mark,
+    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LINE_END, MARKS, PORTS, RX_RING, STRAY, TX_RING,
+    USB, XOFF, XON, batch, hardware, high_water, last_mark, lose, mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -32,7 +33,7 @@ impl<const N: usize> Fill for Producer<u8, N> {
     }
 
     fn is_high(&self) -> bool {
-        self.used() > high_water(N)
+        self.used() > high_water(Flow::Pins, N)
     }
 
     fn push(&mut self, byte: u8) {
@@ -59,14 +60,17 @@ impl<const N: usize> Fill for Producer<u8, N> {
 struct Line {
     rx_in: Option<Box<dyn Fill>>,
     tx_out: Option<Consumer<u8, TX_RING>>,
-    /// Bytes the sender has yet to put on the line.
-    arriving: VecDeque<u8>,
+    /// Bytes the sender has yet to put on the line, and whether they arrive whole.
+    arriving: VecDeque<(u8, bool)>,
     /// What the firmware has sent.
     sent: Vec<u8>,
     /// The byte that is leaving.
     leaving: Option<u8>,
     /// A byte to send before all others, and whether these are held back.
     ahead: Option<u8>,
+    /// For how many ms it waits for the end of a line, and whether a line is open.
+    wait_ms: u8,
+    open: bool,
     held: bool,
     /// Whether XOFF and XON count.
     heeds_xoff: bool,
@@ -84,6 +88,7 @@ struct Line {
     last: u8,
     /// A byte's time at this end of the line and at the sender's.
     byte_cycles: u64,
+    rate: u32,
     sender_cycles: u64,
     next_rx: u64,
     next_tx: u64,
@@ -98,6 +103,8 @@ impl Line {
             sent: Vec::new(),
             leaving: None,
             ahead: None,
+            wait_ms: 0,
+            open: false,
             held: false,
             heeds_xoff: false,
             heeds_cts: false,
@@ -109,6 +116,7 @@ impl Line {
             asked: Asked::NOTHING,
             last: 0,
             byte_cycles: 1,
+            rate: 1,
             sender_cycles: 1,
             next_rx: NEVER,
             next_tx: NEVER,
@@ -158,7 +166,7 @@ fn split<const N: usize>(
 
 /// Goes on at `rate` bits a second.
 pub fn set_rate(port: u8, rate: u32) {
-    with(port, |line| line.byte_cycles = byte_cycles(rate));
+    with(port, |line| (line.byte_cycles, line.rate) = (byte_cycles(rate), rate));
 }
 
 /// The sender goes on at `rate` bits a second.
@@ -175,12 +183,14 @@ pub fn kick(port: u8) {
     with(port, Line::kick);
 }
 
-/// Stops the sender, or lets it go on, in the way they have agreed upon.
-pub fn stop_sender(port: u8, flow: Flow, stop: bool) {
+/// Stops the sender, or lets it go on, in the way they have agreed upon. A character may wait for the end of a line if
+/// it `waits`.
+pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
     with(port, |line| match flow {
         Flow::None => {}
         Flow::Characters => {
             line.ahead = Some(if stop { XOFF } else { XON });
+            line.wait_ms = if waits { wait_ms(port, baud::divisor(line.rate) as u8) } else { 0 };
             line.kick();
         }
         Flow::Pins => {
@@ -202,9 +212,12 @@ pub fn set_flow(port: u8, flow: Flow) {
     });
 }
 
-/// Sends on what CTS has held back. Each millisecond.
+/// Sends on what CTS has held back, and XOFF or XON that has waited for long enough. Each millisecond.
 pub fn look() {
-    (0..PORTS as u8).for_each(kick);
+    for port in 0..PORTS as u8 {
+        with(port, |line| line.wait_ms = line.wait_ms.saturating_sub(1));
+        kick(port);
+    }
 }
 
 /// Line ends lost since start-up, modulo 2^16.
@@ -254,7 +267,15 @@ pub fn take_asked(port: u8) -> Asked {
 /// The sender puts bytes on the line.
 pub(super) fn send(port: u8, bytes: &[u8]) {
     with(port, |line| {
-        line.arriving.extend(bytes);
+        line.arriving.extend(bytes.iter().map(|byte| (*byte, true)));
+        line.let_arrive();
+    });
+}
+
+/// The sender puts a byte on the line that arrives damaged.
+pub(super) fn send_damaged(port: u8) {
+    with(port, |line| {
+        line.arriving.push_back((b'x', false));
         line.let_arrive();
     });
 }
@@ -302,8 +323,8 @@ impl Line {
 
     fn advance(&mut self) {
         if self.next_rx <= now() {
-            if let Some(byte) = self.arriving.pop_front() {
-                self.arrive(byte);
+            if let Some((byte, whole)) = self.arriving.pop_front() {
+                self.arrive(byte, whole);
             }
             self.next_rx = NEVER;
             self.let_arrive();
@@ -320,9 +341,12 @@ impl Line {
 
     fn load_tx(&mut self) {
         let held = self.held || (self.heeds_cts && self.cts);
-        self.leaving = match self.ahead.take() {
+        let may_pass = self.wait_ms == 0 || !self.open;
+        self.leaving = match self.ahead.take_if(|_| may_pass) {
             None if held => None,
-            None => self.tx_out.as_mut().and_then(Consumer::pop),
+            None => self.tx_out.as_mut().and_then(Consumer::pop).inspect(|byte| {
+                self.open = *byte >= LINE_END;
+            }),
             ahead => ahead,
         };
         self.next_tx = if self.leaving.is_some() { now() + self.byte_cycles } else { NEVER };
@@ -340,7 +364,7 @@ impl Line {
         flags::set(Event::Received);
     }
 
-    fn arrive(&mut self, byte: u8) {
+    fn arrive(&mut self, byte: u8, whole: bool) {
         if self.heeds_xoff && (byte == XOFF || byte == XON) {
             self.held = byte == XOFF;
             if byte == XON {
@@ -358,7 +382,7 @@ impl Line {
             }
             return;
         }
-        let garbles = self.garbles();
+        let garbles = self.garbles() || !whole;
         if self.last <= realtime::ASCII
             && !garbles
             && let Some(asked) = self.asked.with(byte)
@@ -369,7 +393,8 @@ impl Line {
         }
         let Some(ring) = self.rx_in.as_mut() else { return };
         let full = ring.is_full();
-        if full || byte < MARKS || garbles {
+        let byte = if byte < MARKS { STRAY } else { byte };
+        if full || garbles {
             self.lost_ends = self.lost_ends.wrapping_add(lost(ring.as_mut(), byte));
         } else {
             ring.push(byte);

@@ -42,7 +42,7 @@ fn every_token_has_a_name_that_finds_it() {
             + 10
             + 5
             + 16
-            + 4
+            + 5
     );
     for bad in [
         "g53x", "g54d", "tt1y", "tt11z", "posd", "pwr5", "pwr0", "pos", "homd", "pwra", "velo",

@@ -127,3 +127,18 @@ fn what_is_dropped_leaves_no_step_behind() {
         assert_eq!(positions(&machine), [x * 1280, y * 1280], "round {n}");
     }
 }
+
+#[test]
+fn a_kill_at_rest_shows_no_hold() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    set(&mut machine, &mut host, "{sr:{stat:t,hold:t,mots:t}}");
+    for kill in [&b"!\x04"[..], b"\x04"] {
+        machine.run_for_ms(100).unwrap();
+        machine.receive();
+        machine.send(kill);
+        machine.run_for_ms(200).unwrap();
+        let heard = String::from_utf8(machine.receive()).expect("ASCII");
+        assert!(heard.contains("\"st\":207"), "{heard}");
+        assert!(!heard.contains("\"stat\":6") && !heard.contains("\"mots\":2"), "{heard}");
+    }
+}

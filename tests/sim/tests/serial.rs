@@ -232,3 +232,71 @@ fn a_reset_in_the_middle_of_a_response_leaves_the_greeting_whole() {
         assert_eq!(machine.resets(), 1);
     }
 }
+
+/// What a sender hears that says these lines a byte at a time, goes on for `lag` bytes behind XOFF, and again at XON.
+fn heard_by_one_who_heeds_xoff(lines: &str, lag: usize) -> Vec<u8> {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    set(&mut machine, &mut host, "{sv:0}");
+    machine.receive();
+    let mut bytes = lines.as_bytes().iter();
+    let (mut left, mut heard, mut quiet) = (usize::MAX, Vec::new(), 0);
+    while quiet < 5_000 {
+        if left > 0
+            && let Some(byte) = bytes.next()
+        {
+            machine.send(&[*byte]);
+            left = if left == usize::MAX { left } else { left - 1 };
+        }
+        // A little more than a byte takes.
+        machine.run_until(machine.cycle() + 1_400).unwrap();
+        let said = machine.receive();
+        quiet = if bytes.len() == 0 && said.is_empty() { quiet + 1 } else { 0 };
+        for byte in &said {
+            match byte {
+                0x13 => left = lag,
+                0x11 => left = usize::MAX,
+                _ => {}
+            }
+        }
+        heard.extend(said);
+    }
+    heard
+}
+
+/// How many XOFF and XON there are in all, and inside lines; nothing is lost.
+fn flows(lines: &str, lag: usize) -> (usize, usize) {
+    let heard = heard_by_one_who_heeds_xoff(lines, lag);
+    let is_flow = |byte: &u8| matches!(byte, 0x11 | 0x13);
+    let (mut inside, mut answered) = (0, 0);
+    for line in heard.split(|byte| *byte == b'\n') {
+        let text = line.iter().skip_while(|byte| is_flow(byte));
+        inside += text.filter(|byte| is_flow(byte)).count();
+        answered += usize::from(line.ends_with(b"]}"));
+        let shown = String::from_utf8_lossy(line);
+        assert!(!shown.contains("\"er\""), "{shown}");
+    }
+    assert_eq!(answered, lines.lines().count());
+    (heard.iter().filter(|byte| is_flow(byte)).count(), inside)
+}
+
+#[test]
+fn xoff_and_xon_of_a_job_stand_between_lines() {
+    let lines: String = (0..300).map(|i| format!("N{i} g1 f1200 x{}.25\n", i % 2)).collect();
+    for lag in [0, 100] {
+        let (all, inside) = flows(&lines, lag);
+        println!("{all} times XOFF or XON, {inside} inside lines, lag {lag}");
+        assert!(all > 10 && inside == 0, "{inside} of {all}");
+    }
+}
+
+#[test]
+fn xoff_comes_in_time_among_requests() {
+    // Requests take the CPU's time, so that some are late and do not wait for the end of a line.
+    let line = |i| format!("N{i} g1 f1200 x{}.25\n{{xvm:n,yvm:n}}\n{{xvm:n}}\n", i % 2);
+    let lines: String = (0..100).map(line).collect();
+    for lag in [0, 32] {
+        let (all, inside) = flows(&lines, lag);
+        println!("{all} times XOFF or XON, {inside} inside lines, lag {lag}");
+        assert!(all > 20 && inside * 3 < all, "{inside} of {all}");
+    }
+}

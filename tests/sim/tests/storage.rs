@@ -112,3 +112,54 @@ fn no_step_is_late_while_settings_are_written() {
     println!("{} intervals of {least} to {most} cycles", gaps.len());
     assert!(most - least <= 2, "{least} to {most}");
 }
+
+/// How long a line's settings are on their way to EEPROM, ms from their response on.
+fn kept_after(machine: &mut Machine, host: &mut Host, line: &str) -> f64 {
+    set(machine, host, line);
+    let from = machine.cycle();
+    while value(machine, host, "kept") == 0.0 {}
+    machine.seconds(machine.cycle() - from) * 1e3
+}
+
+/// A log in which every slot has been used, and half of them count.
+fn worn() -> [u8; 4096] {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    for round in 0..3 {
+        for row in 1..=9 {
+            let line = format!("g10 l2 p{row} x{row} y{round} z{row} a{round} b{row} c{round}.5");
+            set(&mut machine, &mut host, &line);
+            set(&mut machine, &mut host, &format!("g10 l1 p{row} x{round} z{round}.5"));
+        }
+    }
+    for tool in 1..=10 {
+        set(&mut machine, &mut host, &format!("g10 l1 p{tool} x1.5 z{tool}.5"));
+    }
+    kept_after(&mut machine, &mut host, "{si:200}");
+    *machine.eeprom()
+}
+
+#[test]
+fn a_setting_that_is_kept_survives_a_reset_at_once() {
+    for (log, one_ms, four_ms) in [([0xFF; 4096], 65.0, 250.0), (worn(), 150.0, 500.0)] {
+        let (mut machine, mut host) = booted_with(&log);
+        let one = kept_after(&mut machine, &mut host, "{xvm:1234}");
+        let four = kept_after(&mut machine, &mut host, "{xvm:900,yvm:901,zvm:902,avm:903}");
+        println!("kept: one setting after {one:.1} ms, four after {four:.1} ms");
+        assert!(one < one_ms && four < four_ms, "{one} ms, {four} ms");
+        let left = *machine.eeprom();
+        let (mut machine, mut host) = booted_with(&left);
+        for (token, expected) in [("xvm", 900.0), ("yvm", 901.0), ("zvm", 902.0), ("avm", 903.0)] {
+            assert_eq!(value(&mut machine, &mut host, token), expected, "{token}");
+        }
+    }
+}
+
+#[test]
+fn all_defaults_are_kept_in_time() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    kept_after(&mut machine, &mut host, "{mch:1}");
+    set(&mut machine, &mut host, "{mch:2}");
+    let ms = kept_after(&mut machine, &mut host, "{mch:3}");
+    println!("kept: a machine after {ms:.0} ms");
+    assert!(ms < 8_000.0, "{ms} ms");
+}

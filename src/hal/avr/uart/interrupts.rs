@@ -22,8 +22,8 @@ use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::event::Event;
 use crate::hal::ring::Ring;
 use crate::hal::serial::{
-    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, GO, MARKS, PORTS, RETURNED, RX_RING, TX_RING, USB, XOFF,
-    XON, batch, hardware, high_water, is_shared,
+    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, LINE_END, MARKS, PORTS, RETURNED, RX_RING,
+    STRAY, TX_RING, USB, WAIT_MS, XOFF, XON, batch, hardware, high_water, is_shared,
 };
 use crate::realtime;
 
@@ -193,7 +193,8 @@ macro_rules! interrupts {
                     "brlo 54f",
                     "rjmp 1b",
                     "54:",
-                    "rjmp 7f",
+                    "ldi  r24, {stray}",
+                    "rjmp 1b",
                     // From blank to percent: special are 0x21 and 0x25, those of odd number with bit 1 clear.
                     "6:",
                     "sbrs r24, 0",
@@ -450,7 +451,7 @@ macro_rules! interrupts {
                     rts_there = const rts($port).is_some() as u8,
                     rts_register = const place(rts($port), 2).0,
                     rts_bit = const place(rts($port), 2).1,
-                    high = const high_water($ring),
+                    high = const high_water(Flow::Pins, $ring),
                     held = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, held),
                     heeds_xoff = const HEEDS_XOFF.trailing_zeros(),
                     stopped = const STOPPED,
@@ -465,6 +466,7 @@ macro_rules! interrupts {
                     unmask = const RXCIE,
                     batch = const batch($ring) - 1,
                     marks = const MARKS,
+                    stray = const STRAY,
                     behind_end = const BEHIND_END,
                     behind_lf = const BEHIND_END | CLEAN,
                     behind_cr = const BEHIND_END | CLEAN | RETURNED,
@@ -495,7 +497,7 @@ macro_rules! interrupts {
             }
         }
 
-        /// USARTn_UDRE: sends a byte, in 69 cycles, or stops asking when there is none.
+        /// USARTn_UDRE: sends a byte, in 69 cycles, or 81 while XOFF or XON waits, or stops asking when there is none.
         ///
         /// Interrupts are off for 23 cycles on the way in and 21 on the way out, 26 on a bus.
         #[unsafe(no_mangle)]
@@ -522,6 +524,7 @@ macro_rules! interrupts {
                     "lds  r24, {shared} + {ahead}",
                     "tst  r24",
                     "brne 3f",
+                    "10:",
                     "lds  r24, {shared} + {held}",
                     "andi r24, {holds}",
                     "brne 5f",
@@ -585,8 +588,19 @@ macro_rules! interrupts {
                     "sts  {control}, r24",
                     ".endif",
                     "rjmp 1b",
-                    // A byte that goes before all others.
+                    // A byte that goes before all others, if it waits no more, or the byte sent last ends a line.
                     "3:",
+                    "cpi  r24, {wait}",
+                    "brlo 11f",
+                    "lds  r30, {shared} + {tail}",
+                    "ldi  r31, 0",
+                    "subi r30, lo8(-({shared} + {slots}))",
+                    "sbci r31, hi8(-({shared} + {slots}))",
+                    "ld   r31, Z",
+                    "cpi  r31, {line_end}",
+                    "brsh 10b",
+                    "andi r24, {wait} - 1",
+                    "11:",
                     "ldi  r30, 0",
                     "sts  {shared} + {ahead}, r30",
                     "rjmp 4b",
@@ -617,6 +631,8 @@ macro_rules! interrupts {
                     slots = const offset_of!(Shared<$ring>, tx) + Ring::<u8, TX_RING>::SLOTS,
                     ahead = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, ahead),
                     held = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, held),
+                    wait = const WAIT_MS,
+                    line_end = const LINE_END,
                     holds = const STOPPED | HEEDS_CTS,
                     mask = const !UDRIE,
                     unmask = const UDRIE,

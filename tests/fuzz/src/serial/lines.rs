@@ -1,6 +1,5 @@
 //! Which bytes make a line that is to be answered, worked out anew.
 
-use kerf::hal::serial::MARKS;
 use kerf::realtime;
 use kerf::tasks::lines::LINE_MAX;
 
@@ -22,7 +21,6 @@ pub struct Lines {
     /// There is more than one byte that is no blank.
     more: bool,
     len: usize,
-    damaged: bool,
     returned: bool,
 }
 
@@ -37,14 +35,10 @@ impl Lines {
             b'\n' if returned => None,
             b'\n' | b'\r' => Some(self.end()),
             b' ' | b'\t' if self.first.is_none() => None,
-            _ if byte < MARKS => {
-                self.damaged = true;
-                None
-            }
             _ => {
                 // A question mark is a line of its own, with an end or without.
                 let asked = self.first == Some(b'?') && !matches!(byte, b' ' | b'\t');
-                let ended = (asked && !self.damaged && self.len <= LINE_MAX).then(|| self.end());
+                let ended = (asked && self.len <= LINE_MAX).then(|| self.end());
                 self.more |= self.first.is_some() && !matches!(byte, b' ' | b'\t');
                 self.first = self.first.or(Some(byte));
                 self.len += 1;
@@ -54,15 +48,15 @@ impl Lines {
     }
 
     fn end(&mut self) -> End {
-        let whole = !self.damaged && self.len <= LINE_MAX;
+        let whole = self.len <= LINE_MAX;
         match self.first {
             Some(b'{') if whole => self.is_text = false,
             Some(b'?' | b'$') if whole => self.is_text = true,
             Some(b'h' | b'H') if whole && !self.more => self.is_text = true,
             _ => {}
         }
-        let is_empty = self.first.is_none() && !self.damaged;
-        (self.first, self.more, self.len, self.damaged) = (None, false, 0, false);
+        let is_empty = self.first.is_none();
+        (self.first, self.more, self.len) = (None, false, 0);
         if is_empty { End::Empty } else { End::Line }
     }
 }
