@@ -34,7 +34,7 @@ use crate::tasks::{
 };
 
 /// Bytes for all lines of USB together.
-const LINES_USB: usize = 456;
+const LINES_USB: usize = 448;
 /// The same of the other port.
 const LINES_AUX: usize = 80 + AUX_RESERVE as usize;
 

@@ -166,6 +166,10 @@ impl Path {
     /// step, within five eighths of that: exec has much more to do there than in a long line. Keeps every block long enough for exec.
     #[inline(never)]
     pub(super) fn limit_steps(&mut self, rates: &[f32; MOTORS], chord: bool) {
+        if self.most < HALF_STEP {
+            return self.limit_time();
+        }
+        let mut rate = rates[usize::from(self.moving) - 1];
         let rough = |x| Short::new(x).rough().0;
         let (top, length) = (rough(self.top), rough(self.length));
         let octaves = if self.whole_steps { 0 } else { i16::from(PARTS_LOG2) };
@@ -173,12 +177,10 @@ impl Path {
         // Logarithms tell whether a block is plainly below the limit: an octave covers their error. Five eighths are 0.68 octaves.
         let spare = if short { 7 * short::OCTAVE / 4 } else { short::OCTAVE };
         let most = Log::of(self.most).0 - octaves * short::OCTAVE;
-        // One step at most is made in a shorter way.
-        if self.most >= HALF_STEP
-            && let Some(&most_rate) = rates.get(usize::from(self.moving).wrapping_sub(1))
-            && top + most + spare > rough(most_rate) + length
-        {
-            let rate = if short { most_rate * SHORT_SHARE } else { most_rate };
+        if top + most + spare > rough(rate) + length {
+            if short {
+                rate *= SHORT_SHARE;
+            }
             let most = scaled(f32::from(self.most), -octaves as i8);
             let way = rate * self.length;
             if below(way, self.top * most) {
@@ -189,6 +191,16 @@ impl Path {
             self.top = least(self.top, self.length * (1.0 / BLOCK_S_MIN));
         }
         self.cruise = least(self.cruise, self.top);
+    }
+
+    /// Keeps a block long enough for exec. Cost: 300.
+    #[inline(never)]
+    #[small]
+    fn limit_time(&mut self) {
+        if below(self.length, self.top * BLOCK_S_MIN) {
+            self.top = self.length * (1.0 / BLOCK_S_MIN);
+            self.cruise = least(self.cruise, self.top);
+        }
     }
 }
 

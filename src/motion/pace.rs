@@ -33,16 +33,17 @@ impl Drivers {
         self.setup_us as u16 * CYCLES_PER_US
     }
 
-    /// Highest step rate of each of so many motors that move together, steps per second: a step on every
-    /// tick.
+    /// Highest step rate of each of so many motors that move together, steps per second: a step on every tick, but with two motors, which
+    /// would leave exec too little time for ramps.
     pub const fn step_rate_max(self, motors: usize) -> f32 {
         let usual = usual(if motors == 0 { 0 } else { motors - 1 });
-        ACTIVE.clock_hz as f32 / (usual.shortest + self.extra()) as f32
+        ACTIVE.clock_hz as f32 / (usual.step + self.extra()) as f32
     }
 }
 
-/// Tick periods with usual pulses.
+/// Tick periods with usual pulses; `step` is that at the highest step rate.
 struct Usual {
+    step: u16,
     shortest: u16,
     fine: u16,
     coarse: u16,
@@ -51,13 +52,13 @@ struct Usual {
 
 /// By the number of motors that move, less one. No table: that would be in RAM.
 const fn usual(motors: usize) -> Usual {
-    let (shortest, fine, coarse, settles) = match motors {
-        0 => (160, 200, 400, 200),
-        1 => (240, 240, 400, 240),
-        2 => (240, 320, 480, 300),
-        _ => (319, 400, 560, 320),
+    let (step, shortest, fine, coarse, settles) = match motors {
+        0 => (160, 160, 200, 400, 200),
+        1 => (240, 200, 200, 400, 200),
+        2 => (240, 240, 320, 480, 300),
+        _ => (319, 319, 400, 560, 320),
     };
-    Usual { shortest, fine, coarse, settles }
+    Usual { step, shortest, fine, coarse, settles }
 }
 
 /// Ticks of blocks so short that they are a single segment: 2^22 / the tick period.

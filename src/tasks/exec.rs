@@ -3,7 +3,7 @@
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
 //! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
 //! milliseconds ([`Amount::least`]), 4,000 to 12,000 cycles each, 24,000 at worst; the rest one by one, when one is used up or thread mode
-//! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`WAITING_SHORT`]), stretches become twice
+//! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`SHORT`]), stretches become twice
 //! as long, and for a while more waits ([`PRESSED`]).
 
 use crate::alarm::Alarm;
@@ -164,6 +164,7 @@ impl<'a> Runner<'a> {
         if step == Step::Segment {
             power::segment(slot.moving);
             self.waiting.push(product(slot.ticks, slot.period));
+            self.waiting.short = if slot.period < DENSE { SHORT_DENSE } else { SHORT };
             if contact::is_noted() {
                 contact::pushed(&slot);
             }
@@ -196,8 +197,7 @@ impl<'a> Runner<'a> {
         health::moves(waiting.count);
         waiting.update(segments.used());
         let short = waiting.is_short(*rests);
-        let coarse = event::pass_over() > PATIENCE || waiting.is_busy() || waiting.is_behind();
-        self.machine.set_coarse(coarse, short);
+        self.machine.set_coarse(event::pass_over() > PATIENCE || waiting.is_busy(), short);
         if !rested {
             health::look_for_starvation();
         }
@@ -219,6 +219,8 @@ struct Waiting {
     /// How many wait, as far as that is known, and how long they take together.
     used: u8,
     sum: u16,
+    /// With less exec is late.
+    short: u16,
     /// Segments until the usual amount waits again.
     pressed: u8,
     /// Segments since the machine stood still.
@@ -240,31 +242,43 @@ const fn units(tenths: u32) -> u16 {
 
 /// How much waits, in the unit.
 struct Amount {
-    /// What may wait, with the segment that runs.
+    /// What may wait.
     most: u16,
     /// What is prepared before thread mode gets a turn.
     least: u16,
 }
 
-/// A feedhold begins within 10 ms: a segment may be 1 ms longer than the one before it, where a chord of an arc ends. Less would not
-/// outlast a ramp that is laid out while ticks take two thirds of the CPU, which takes up to 4.1 ms, or an override.
-const USUAL: Amount = Amount { most: units(95), least: units(38) };
+/// With the segment that runs a feedhold begins within 10 ms: it takes 2 ms or less while anything is fast, 3 ms where a chord of an arc
+/// ends. Less would not outlast a ramp that is laid out while ticks take two thirds of the CPU, which takes up to 4.1 ms, or an override.
+const USUAL: Amount = Amount { most: units(70), least: units(38) };
 
 /// For a while after too little has been waiting: a feedhold begins within 14 ms.
-const PRESSED: Amount = Amount { most: units(115), least: units(65) };
+const PRESSED: Amount = Amount { most: units(80), least: units(65) };
 
 /// That while, in segments.
 const PRESSED_FOR: u8 = 100;
 
-/// With less than this exec makes longer stretches.
-const WAITING_LITTLE: u16 = units(52);
-
 /// With less than this exec is late, and makes longer stretches.
-const WAITING_SHORT: u16 = units(30);
+const SHORT: u16 = units(25);
+
+/// The same where ticks are so close that exec has a third of the CPU.
+const SHORT_DENSE: u16 = units(38);
+
+/// CPU cycles of such a tick, or less.
+const DENSE: u16 = 360;
 
 impl Waiting {
     const fn new() -> Self {
-        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0, pressed: 0, moved: 0, busy: 0 }
+        Self {
+            lengths: [0; SEGMENTS],
+            count: 0,
+            used: 0,
+            sum: 0,
+            short: SHORT,
+            pressed: 0,
+            moved: 0,
+            busy: 0,
+        }
     }
 
     /// The length of the segment that was queued so many before the next one.
@@ -311,16 +325,11 @@ impl Waiting {
         if self.pressed > 0 { &PRESSED } else { &USUAL }
     }
 
-    /// Whether less waits than usual.
-    fn is_behind(&self) -> bool {
-        usize::from(self.moved) > SEGMENTS && self.sum < WAITING_LITTLE
-    }
-
     /// Whether exec is late. Motion that has just begun, or `rests`, has not much waiting yet.
     #[inline(always)]
     fn is_short(&mut self, rests: bool) -> bool {
         self.moved = if rests { 0 } else { self.moved.saturating_add(1) };
-        let short = usize::from(self.moved) > SEGMENTS && self.sum < WAITING_SHORT;
+        let short = usize::from(self.moved) > SEGMENTS && self.sum < self.short;
         if short {
             self.pressed = PRESSED_FOR;
         }
@@ -340,8 +349,9 @@ impl Waiting {
         if self.used < 2 {
             return true;
         }
-        let sum = self.sum + self.length(1) + self.length(self.used + 1);
-        self.used < SEGMENTS as u8 - 1 && (sum <= self.limits().most || rests && self.used < 4)
+        let sum = self.sum + self.length(1);
+        let fits = sum <= self.limits().most;
+        self.used < SEGMENTS as u8 - 1 && (fits || rests && self.used < 4)
     }
 }
 

@@ -4,7 +4,7 @@
 //! end in one buffer in order of arrival, so that eight short lines of G-code and one long line of JSON fit the same
 //! memory. Control lines (JSON, `$`, `?`) are taken before data lines, each kind in order.
 //!
-//! Lines that come in order leave the last slot and some bytes free, the *reserve*, and none begins where a short control line
+//! Lines that come in order leave a slot and some bytes free, the *reserve*, and none begins where a short control line
 //! would not fit whole. The reserve is for such lines that wait behind data in the receive ring ([`overtake`](super::overtake)).
 //!
 //! A line that cannot be kept whole is kept as a fault instead, with as much of it as is given back: the sender gets
@@ -19,7 +19,7 @@ use crate::hal::serial::TAKEN_RETURN;
 use crate::protocol::asks_help;
 use crate::status::Status;
 
-/// Line slots. Senders count on eight.
+/// Line slots, beside the one for control lines that overtake. Senders count on eight.
 pub const SLOTS: usize = 8;
 /// Longest line, in bytes without its end; less in a pool that has no more.
 pub const LINE_MAX: usize = 254;
@@ -78,7 +78,7 @@ impl Aside {
 /// The pool.
 pub struct LinePool {
     /// Complete lines, in order; their bytes lie end to end.
-    entries: Vec<Entry, SLOTS>,
+    entries: Vec<Entry, { SLOTS + 1 }>,
     /// How many of them are control lines.
     controls: u8,
     /// Where the oldest line begins.
@@ -129,7 +129,7 @@ impl LinePool {
 
     /// Free slots, not counting the one a line is coming into.
     pub fn free(&self) -> u8 {
-        (SLOTS - self.entries.len()) as u8
+        SLOTS.saturating_sub(self.entries.len()) as u8
     }
 
     /// Whether there is no line, nor any part of one.
@@ -141,7 +141,7 @@ impl LinePool {
     #[inline(never)]
     pub fn ready(&self) -> bool {
         let need = if self.is_within_line() { 1 } else { self.reserve.into() };
-        self.entries.len() < SLOTS - 1 && self.room() >= need
+        self.entries.len() < SLOTS && self.room() >= need
     }
 
     /// Bytes that lines in order may take.
@@ -165,7 +165,7 @@ impl LinePool {
     /// Whether a control line of so many bytes may overtake now.
     pub fn has_reserve(&self, len: u8) -> bool {
         let used = self.end - self.start + u16::from(self.partial) + u16::from(len);
-        self.entries.len() < SLOTS && usize::from(used) <= self.bytes.len()
+        self.entries.len() <= SLOTS && usize::from(used) <= self.bytes.len()
     }
 
     /// Whether so many bytes of a ring are a control line; there is [room](Self::has_reserve) for it. It is laid behind the line that

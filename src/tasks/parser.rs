@@ -130,7 +130,7 @@ impl Parser {
             return Turn::Usual;
         }
         self.lacking = 0;
-        if self.go_on() {
+        if self.has_work() && self.go_on() {
             return Turn::More;
         }
         match self.next_line(data) {
@@ -146,6 +146,20 @@ impl Parser {
     fn is_idle(&self) -> bool {
         let feeder = self.sessions.get(usize::from(self.links.feeder.get()));
         matches!(feeder, Some(Session::Idle))
+    }
+
+    /// Whether nothing is under way.
+    #[inline(always)]
+    fn is_quiet(&self) -> bool {
+        self.sessions.iter().all(|session| matches!(session, Session::Idle))
+    }
+
+    /// Whether anything is under way, or to be told on a port alone.
+    #[inline(always)]
+    fn has_work(&self) -> bool {
+        !self.is_quiet()
+            || self.links.ports.iter().any(Port::tells)
+            || self.links.rate.get().is_some()
     }
 
     /// Goes on with what is under way, and tells what a port alone is told. Whether something has come to its end.
@@ -207,7 +221,11 @@ impl Parser {
         let mut asked = false;
         poll_fn(move |cx| {
             let waited = core::mem::replace(&mut asked, true);
-            let mut ready = links.parser_wake.poll(cx).is_ready();
+            let woken = links.parser_wake.poll(cx);
+            if self.lacking == 0 && self.is_quiet() {
+                return woken;
+            }
+            let mut ready = woken.is_ready();
             for (port, session) in links.ports.iter().zip(&self.sessions) {
                 let ticks = match session {
                     Session::Leave(..) => true,

@@ -43,7 +43,9 @@ struct Planner {
     dynamics: Dynamics,
     /// Where the last block ends, machine coordinates.
     position: PerAxis<Length>,
-    /// How far the lines beyond it go that are merged with the next one.
+    /// Lines beyond it are merged with the next one.
+    has_merged: bool,
+    /// How far they go.
     merged: PerAxis<i16>,
     /// The N word of the line that is carried out.
     line: u32,
@@ -95,6 +97,7 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
         builder: Builder::default(),
         dynamics: Dynamics::default(),
         position: [Length::ZERO; AXES],
+        has_merged: false,
         merged: [0; AXES],
         line: 0,
         drivers: Drivers::USUAL,
@@ -106,7 +109,7 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
     };
     async move {
         loop {
-            match planner.has_merged() {
+            match planner.has_merged {
                 false => links.planner_wake.wait().await,
                 true => {
                     select(links.planner_wake.wait(), planner.nothing_follows()).await;
@@ -197,7 +200,7 @@ impl Planner {
         }
         let links = self.links;
         let commands = links.commands.borrow();
-        if self.has_merged() && !commands.is_straight() {
+        if self.has_merged && !commands.is_straight() {
             self.go_on();
             return Turn::More;
         }
@@ -309,7 +312,7 @@ impl Planner {
             self.queue.push_line(&mut block, entry, self.line);
         }
         if let Built::Line(_) | Built::Nothing = built {
-            self.merged = [0; AXES];
+            self.has_merged = false;
         }
         built
     }

@@ -147,7 +147,7 @@ fn comments_are_known() {
 #[test]
 fn a_full_pool_is_not_ready() {
     let mut pool = pool();
-    feed(&mut pool, b"1\n2\n3\n4\n5\n6\n7\n");
+    feed(&mut pool, b"1\n2\n3\n4\n5\n6\n7\n8\n");
     assert!(!pool.ready());
     take(&mut pool, true);
     assert!(pool.ready());

@@ -20,13 +20,7 @@ impl Planner {
         for ((merged, to), from) in self.merged.iter_mut().zip(target).zip(&self.position) {
             *merged = to.0.wrapping_sub(from.0) as i16;
         }
-    }
-
-    /// Whether the planner is not where the last line ends.
-    #[inline(never)]
-    #[small]
-    pub(super) fn has_merged(&self) -> bool {
-        self.merged.iter().any(|&way| way != 0)
+        self.has_merged = true;
     }
 
     /// Waits until the last block runs.
@@ -36,7 +30,7 @@ impl Planner {
 
     /// Queues what has been merged if the last block runs.
     pub(super) fn make_up(&mut self) {
-        if self.has_merged() && self.is_last() {
+        if self.has_merged && self.is_last() {
             self.go_on();
         }
     }

@@ -20,7 +20,7 @@ use crate::motion::snapshot::Snapshot;
 use crate::motion::{contact, queue};
 use crate::tasks::setup::moved_by;
 use crate::tasks::{hold, links};
-use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
+use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// What has come of a move that is to end at a switch.
 pub(super) enum Sought {
@@ -102,7 +102,7 @@ impl Planner {
         }
         self.builder.place(&motion.target);
         self.queue.restart();
-        (self.walk, self.parts, self.merged) = (None, None, [0; AXES]);
+        (self.walk, self.parts, self.has_merged) = (None, None, false);
         self.outputs = Outputs { on: motion.outputs, speed: motion.speed };
         self.links.model.borrow_mut().set_position(&self.position);
     }
