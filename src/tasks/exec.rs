@@ -3,7 +3,7 @@
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
 //! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
 //! milliseconds ([`Amount::least`]), 4,000 to 12,000 cycles each, 24,000 at worst; the rest one by one, when one is used up or thread mode
-//! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`SHORT`]), stretches become twice
+//! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`WAITING_SHORT`]), stretches become twice
 //! as long, and for a while more waits ([`PRESSED`]).
 
 use crate::alarm::Alarm;
@@ -164,7 +164,6 @@ impl<'a> Runner<'a> {
         if step == Step::Segment {
             power::segment(slot.moving);
             self.waiting.push(product(slot.ticks, slot.period));
-            self.waiting.short = if slot.period < DENSE { SHORT_DENSE } else { SHORT };
             if contact::is_noted() {
                 contact::pushed(&slot);
             }
@@ -219,8 +218,6 @@ struct Waiting {
     /// How many wait, as far as that is known, and how long they take together.
     used: u8,
     sum: u16,
-    /// With less exec is late.
-    short: u16,
     /// Segments until the usual amount waits again.
     pressed: u8,
     /// Segments since the machine stood still.
@@ -248,8 +245,8 @@ struct Amount {
     least: u16,
 }
 
-/// With the segment that runs a feedhold begins within 10 ms: it takes 2 ms or less while anything is fast, 3 ms where a chord of an arc
-/// ends. Less would not outlast a ramp that is laid out while ticks take two thirds of the CPU, which takes up to 4.1 ms, or an override.
+/// With the segment that runs, which takes 2 ms or less while anything is fast, a feedhold begins within 10 ms. Less would not outlast a
+/// ramp that is laid out while ticks take two thirds of the CPU, which takes up to 4.1 ms, or an override.
 const USUAL: Amount = Amount { most: units(70), least: units(38) };
 
 /// For a while after too little has been waiting: a feedhold begins within 14 ms.
@@ -259,26 +256,11 @@ const PRESSED: Amount = Amount { most: units(80), least: units(65) };
 const PRESSED_FOR: u8 = 100;
 
 /// With less than this exec is late, and makes longer stretches.
-const SHORT: u16 = units(25);
-
-/// The same where ticks are so close that exec has a third of the CPU.
-const SHORT_DENSE: u16 = units(38);
-
-/// CPU cycles of such a tick, or less.
-const DENSE: u16 = 360;
+const WAITING_SHORT: u16 = units(25);
 
 impl Waiting {
     const fn new() -> Self {
-        Self {
-            lengths: [0; SEGMENTS],
-            count: 0,
-            used: 0,
-            sum: 0,
-            short: SHORT,
-            pressed: 0,
-            moved: 0,
-            busy: 0,
-        }
+        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0, pressed: 0, moved: 0, busy: 0 }
     }
 
     /// The length of the segment that was queued so many before the next one.
@@ -329,7 +311,7 @@ impl Waiting {
     #[inline(always)]
     fn is_short(&mut self, rests: bool) -> bool {
         self.moved = if rests { 0 } else { self.moved.saturating_add(1) };
-        let short = usize::from(self.moved) > SEGMENTS && self.sum < self.short;
+        let short = usize::from(self.moved) > SEGMENTS && self.sum < WAITING_SHORT;
         if short {
             self.pressed = PRESSED_FOR;
         }
@@ -350,8 +332,7 @@ impl Waiting {
             return true;
         }
         let sum = self.sum + self.length(1);
-        let fits = sum <= self.limits().most;
-        self.used < SEGMENTS as u8 - 1 && (fits || rests && self.used < 4)
+        self.used < SEGMENTS as u8 - 1 && (sum <= self.limits().most || rests && self.used < 4)
     }
 }
 
