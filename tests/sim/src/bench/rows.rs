@@ -109,7 +109,7 @@ pub const ROWS: [Row; 37] = [
         peers: ["52", "-", "63"],
         target: Some(13.0),
         // A tick, and the longest time interrupts are off: now and then that meets the tick behind a new segment.
-        floor: Some(13.5),
+        floor: Some(13.0),
         measure: jitter::minor,
     },
     Row {
