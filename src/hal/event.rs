@@ -88,7 +88,8 @@ pub fn wake_after(event: Event, waker: &Waker) {
     register(event as u8, waker);
 }
 
-/// The same after the next byte that any port has sent, for the task that waits for this one.
+/// Has the main loop wake the task that waits for the transmitter of `port`, after the next byte that any port has sent.
+/// Thread mode only.
 pub fn wake_after_transmitted(port: u8, waker: &Waker) {
     register(transmitted(port), waker);
 }

@@ -40,7 +40,7 @@ pub const GO: u8 = RETURNED | BEHIND_END;
 
 /// Stands where a line was that has been taken out of its turn. No such byte comes into the ring from outside: it resets.
 pub const TAKEN: u8 = 0x18;
-/// The same behind [`TAKEN`], for a carriage return, which a line feed may follow.
+/// Stands behind [`TAKEN`] for the carriage return of that line, which a line feed may follow.
 pub const TAKEN_RETURN: u8 = b'!';
 
 /// The reader is woken at the end of a line, and when this many bytes have come since: a power of two.

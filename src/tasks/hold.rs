@@ -272,8 +272,8 @@ pub fn placed(links: &Links, port: &Port, mark: u8) {
     }
 }
 
-/// The same for one that waits in the receive ring, because the pool is full: its slot. One that is not there any more
-/// has left the mark of a loss.
+/// A real-time character still waits in the receive ring, at `slot`, because the pool is full. One that is not there any
+/// more has left the mark of a loss.
 pub fn ahead(links: &Links, port: &Port, mark: u8, slot: u8) {
     serve(links);
     if mark != CUT {

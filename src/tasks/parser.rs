@@ -356,7 +356,8 @@ impl Answer {
         progress
     }
 
-    /// The same, and whether the transmitter is still needed.
+    /// Carries the response on while there is room, a bounded number of steps. Says how far it has come, and whether the
+    /// transmitter is still needed.
     fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
         let (mut begun, mut left) = (begun, STEPS);
         while tx.has_room() && left > 0 {

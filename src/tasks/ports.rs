@@ -27,7 +27,7 @@ const RESERVE: u8 = 40;
 pub const AUX_RESERVE: u8 = 16;
 /// How long lines may be of which footers tell how many may come: powers of two.
 const PROMISED: u8 = 32;
-/// The same of the other port.
+/// See [`PROMISED`]; of the other port.
 const AUX_PROMISED: u8 = 16;
 
 /// What a port has to itself.

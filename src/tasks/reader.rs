@@ -38,7 +38,7 @@ enum Left {
     Bytes,
     /// Bytes, perhaps, behind this mark: the place of a real-time character.
     Placed(u8),
-    /// The same in a comment, where it is text; but a `^d` is none anywhere.
+    /// Bytes, perhaps, behind a mark in a comment: there a real-time character is text, but for `^d`, which kills anywhere.
     Aside,
 }
 

@@ -35,7 +35,8 @@ impl Wake {
         poll_fn(|cx| self.poll(cx))
     }
 
-    /// The same, for whoever waits for something else besides.
+    /// Ready, and the signal used up, if there is one; else `cx` is woken at the next. For a task that waits for
+    /// something else as well.
     pub fn poll(&self, cx: &mut Context<'_>) -> Poll<()> {
         if self.signalled.replace(false) {
             return Poll::Ready(());

@@ -6,6 +6,21 @@ use std::thread;
 
 use crate::side::Side;
 
+/// A test of each crowd, with the machine that a function boots.
+macro_rules! tests {
+    ($boot:ident) => {
+        crowd::tests!($boot: xon_gets_through, all_that_has_come_is_dropped, data_does_not_hold_up_control,
+            a_stopped_port_does_not_stop_the_other, nothing_starves_control);
+    };
+    ($boot:ident: $($name:ident),+) => {
+        $(#[test]
+        fn $name() {
+            crowd::$name($boot);
+        })+
+    };
+}
+pub(crate) use tests;
+
 /// Longest that the machine may take to answer or to act, ms, from the last bit of what asks for it.
 const PROMPT_MS: u64 = 20;
 /// A byte on the line takes less than a tenth of a ms.
