@@ -269,7 +269,7 @@ pub fn look() {
 /// A millisecond of what XOFF or XON waits for is over.
 #[inline(never)]
 fn wait_less(port: u8) {
-    avr_device::interrupt::free(|_| {
+    super::mask(|| {
         let ahead = &flags(port).ahead;
         // The transmit interrupt may have sent it.
         ahead.set(ahead.get().checked_sub(WAIT_MS).unwrap_or(0));
