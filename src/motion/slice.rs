@@ -8,6 +8,7 @@
 //! Units: mm, s.
 
 use super::constraint::Ahead;
+use super::exec::SEGMENT_S;
 use super::float::{below, greater, less, ratio, scaled, some};
 use super::governor::{Governor, Stretch, same};
 
@@ -37,6 +38,12 @@ pub(super) struct Span {
 
 /// So many stretches before a ramp begins, as a power of two, segments are no longer made for a steady velocity.
 const FAR_LOG2: i8 = 3;
+
+/// Longest stretch, s, where most are `nominal` seconds long. A feedhold begins behind those that are handed out.
+#[inline(always)]
+pub(super) fn longest(nominal: f32) -> f32 {
+    if same(nominal, SEGMENT_S) { 1.5 * SEGMENT_S } else { 2.0 * SEGMENT_S }
+}
 
 /// At rest, a distance that rounding leaves: it takes no ramp of its own.
 const ROUNDING: f32 = 5e-4;
@@ -84,8 +91,14 @@ impl Governor {
             return None;
         }
         let slice = velocity * nominal;
-        let ends = below(left, scaled(slice, 1));
-        let distance = if ends { left } else { slice };
+        let ends = below(left, velocity * longest(nominal));
+        let distance = if ends {
+            left
+        } else if below(left, scaled(slice, 1)) {
+            scaled(left, -1)
+        } else {
+            slice
+        };
         let at = self.potential(distance);
         // As much again must be known: there is a look while nothing has to be done about it.
         if !self.is_clear(velocity, scaled(at, 1)) {
@@ -94,7 +107,7 @@ impl Governor {
         self.far = !below(self.clear.distance, scaled(at, FAR_LOG2));
         self.clear.distance -= at;
         self.clear.age += 1;
-        let seconds = if ends { ratio(left, velocity) } else { nominal };
+        let seconds = if same(distance, slice) { nominal } else { ratio(distance, velocity) };
         Some(Stretch { seconds, distance, ends })
     }
 
@@ -142,15 +155,17 @@ impl Governor {
         if !below(self.little(), more) {
             return !below(0.0, distance);
         }
-        let twice = scaled(more, 1);
-        let much = !below(twice, slice);
+        // Where slices are longer, for want of time, they go on over blocks of up to two thirds of them.
+        let usual = same(nominal, SEGMENT_S);
+        let enough = if usual { scaled(more, 1) } else { more + scaled(more, -1) };
+        let much = !below(enough, slice);
         if much && !below(scaled(seconds, 1), nominal) {
             return false;
         }
         if much && below(more, scaled(slice, 1)) {
             // So that it ends about where the block does.
             let time = ratio(more, velocity);
-            let long = !below(time, nominal + scaled(nominal, -1));
+            let long = !below(time, longest(nominal));
             span.seconds = if long { scaled(time, -1) } else { time };
         }
         true

@@ -7,6 +7,7 @@
 use super::exec::SEGMENT_S;
 use super::float::{OCTAVE, below, greater, least, lesser, log, scaled};
 use super::governor::{Governor, Stretch, same};
+use super::slice::longest;
 use crate::math::sqrt;
 
 /// Logarithms that are further apart leave no doubt about the product of two numbers.
@@ -20,16 +21,12 @@ impl Governor {
         // Rounding may put a stop before the end of the block.
         let headroom = if headroom.is_sign_negative() { 0.0 } else { headroom };
         // Steady over a block that is short enough to be one stretch.
-        if same(v, cruise)
-            && below(cruise * cruise, headroom)
-            && below(left, cruise * (seconds + seconds))
-        {
+        let longest = longest(seconds);
+        if same(v, cruise) && below(cruise * cruise, headroom) && below(left, cruise * longest) {
             return Stretch { seconds: left / v, distance: left, ends: true };
         }
         // Mostly plain: a block that is run through in no more than one.
-        if log(v) + log(seconds + seconds) < log(left) + PLAIN
-            && below(v * (seconds + seconds), left)
-        {
+        if log(v) + log(longest) < log(left) + PLAIN && below(v * longest, left) {
             let gain = self.limits.accel * seconds;
             let half = 0.5 * seconds;
             // An override may have taken the feed away from under it.
