@@ -150,16 +150,14 @@ impl Path {
     /// it is so short.
     #[inline(always)]
     pub(super) fn is_brief(&self) -> bool {
-        self.most < HALF_STEP && self.is_over_soon()
+        self.most < HALF_STEP && self.is_short_of_time()
     }
 
     #[inline(never)]
     #[small]
-    fn is_over_soon(&self) -> bool {
+    fn is_short_of_time(&self) -> bool {
         let near = |way: &i32| i16::try_from(*way).is_ok();
-        !self.whole_steps
-            && self.travel.iter().all(near)
-            && below(self.length, self.top * BLOCK_S_MIN)
+        !self.whole_steps && self.travel.iter().all(near) && self.is_too_fast()
     }
 
     /// Keeps motors within the rate that so many can have together, or, in chords of arcs and in blocks short enough for parts of a
@@ -193,11 +191,17 @@ impl Path {
         self.cruise = least(self.cruise, self.top);
     }
 
+    /// Whether it may be over before exec can prepare the next block.
+    #[inline(never)]
+    fn is_too_fast(&self) -> bool {
+        below(self.length, self.top * BLOCK_S_MIN)
+    }
+
     /// Keeps a block long enough for exec. Cost: 300.
     #[inline(never)]
     #[small]
     fn limit_time(&mut self) {
-        if below(self.length, self.top * BLOCK_S_MIN) {
+        if self.is_too_fast() {
             self.top = self.length * (1.0 / BLOCK_S_MIN);
             self.cruise = least(self.cruise, self.top);
         }

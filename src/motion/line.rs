@@ -153,6 +153,8 @@ impl Builder {
         machine: &impl Motors,
         steps: &mut [i16; MOTORS],
     ) -> u16 {
+        self.undo(path, line, dynamics, machine, steps);
+        *steps = [0; MOTORS];
         (path.most, path.moving, path.whole_steps) = (0, 0, true);
         let mut parts = 0;
         for done in [false, true] {
@@ -164,12 +166,8 @@ impl Builder {
                 if from == to {
                     continue;
                 }
-                let ratio = machine.ratio(m);
-                if !done {
-                    motor.put_back(ratio, from, core::mem::take(&mut steps[m]));
-                }
                 let mut there = *motor;
-                let way = there.stride(ratio, to);
+                let way = there.stride(machine.ratio(m), to);
                 let size = way.unsigned_abs();
                 if size > STEPS_MAX.into() {
                     parts = parts.max(parts_of(size));
