@@ -316,6 +316,11 @@ impl LinePool {
         text.iter().fold(Aside::None, |aside, byte| aside.after(*byte))
     }
 
+    /// Whether a control line waits.
+    pub fn has_controls(&self) -> bool {
+        self.controls > 0
+    }
+
     /// Whether a data line waits, or a fault.
     pub fn has_data(&self) -> bool {
         self.entries.len() > usize::from(self.controls)

@@ -127,7 +127,7 @@ impl Parser {
         let data = free && !runs_job;
         let tried = if data && !alarmed && self.is_idle() { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
-            return Turn::Usual;
+            return if self.has_more() { Turn::Usual } else { Turn::Nothing };
         }
         self.lacking = 0;
         if self.has_work() && self.go_on() {
@@ -160,6 +160,17 @@ impl Parser {
         !self.is_quiet()
             || self.links.ports.iter().any(Port::tells)
             || self.links.rate.get().is_some()
+    }
+
+    /// Whether there is anything to do before the planner has taken up the move of a usual line.
+    #[inline(always)]
+    fn has_more(&self) -> bool {
+        let feeder = self.links.feeder.get();
+        let has_lines = |port: &Port| {
+            let lines = port.lines.borrow();
+            lines.has_controls() || (port.number != feeder && lines.has_data())
+        };
+        self.has_work() || self.links.ports.iter().any(has_lines)
     }
 
     /// Goes on with what is under way, and tells what a port alone is told. Whether something has come to its end.
