@@ -1,4 +1,4 @@
-//! Alarms: what brings the machine to a stop that lasts until somebody ends it. The table, without any task.
+//! Alarms: what brings the machine to a stop that lasts until somebody ends it.
 //!
 //! | cause | `stat` | motion | outputs | position | G-code | ended by |
 //! |---|---|---|---|---|---|---|
@@ -14,9 +14,10 @@
 //!
 //! Each is told by one exception report when it begins. What comes later counts only if it is worse.
 
+use super::Event;
 use crate::status::Status;
 
-/// How bad it is.
+/// A part of what the machine is doing: how bad it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Alarm {
@@ -34,6 +35,29 @@ pub enum Alarm {
 }
 
 impl Alarm {
+    /// All of them, by their discriminants.
+    pub const ALL: [Alarm; Alarm::Panic as usize + 1] =
+        [Alarm::None, Alarm::Alarm, Alarm::Limit, Alarm::Shutdown, Alarm::Panic];
+
+    /// The state that an event leads to. An alarm does not end while the hold `flushes`, nor a panic at all.
+    pub const fn after(self, event: Event, flushes: bool) -> Alarm {
+        match (event.alarm(), event) {
+            (Some(alarm), _) if self.is_exceeded_by(alarm) => alarm,
+            (None, Event::Cleared) if !flushes && !matches!(self, Alarm::Panic) => Alarm::None,
+            _ => self,
+        }
+    }
+
+    /// Whether the other one is worse, so that it counts.
+    pub const fn is_exceeded_by(self, other: Alarm) -> bool {
+        (self as u8) < other as u8
+    }
+
+    /// Whether there is one.
+    pub const fn is_on(self) -> bool {
+        !matches!(self, Alarm::None)
+    }
+
     /// The one that is so bad.
     pub fn from_bits(bits: u8) -> Alarm {
         match bits {
