@@ -48,6 +48,13 @@ impl Probe {
         self.news.set(true);
     }
 
+    /// It has been flushed, if it was under way: it has found nothing, and nobody is told.
+    pub fn abandon(&self) {
+        if self.state.get() == ProbeState::Waiting {
+            self.state.set(ProbeState::Failed);
+        }
+    }
+
     /// Whether there is a result that nobody has begun to tell.
     pub fn is_news(&self) -> bool {
         self.news.get()

@@ -432,7 +432,8 @@ impl Planner {
             Cycle::Jog => links.notices.jogged.set(true),
             // Motors of an axis may have moved apart.
             Cycle::Homing => links.changes.note(Changes::STEPS),
-            Cycle::Probe | Cycle::Lines | Cycle::Stopped => {}
+            Cycle::Probe => links.probe.abandon(),
+            Cycle::Lines | Cycle::Stopped => {}
         }
         if killed {
             links.except(Status::KillJob);
