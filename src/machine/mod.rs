@@ -10,7 +10,7 @@
 //! | [`Hold`] | off, resuming, held, door, flush, drop, kill; the last three with the door open, too | whether motion goes on, and whether what is queued is being dropped |
 //! | [`Cycle`] | lines, program stop, probe, homing, jog | what is carried out |
 //!
-//! `Lines` is idle as well as run: whether anything is queued or moves is asked of the queue and of exec's snapshot, which
+//! [`Doing`] is all three in one word, which is what `stat` tells. `Lines` is idle as well as run: whether anything is queued or moves is asked of the queue and of exec's snapshot, which
 //! count it anyway (`View::has_work`). Held is slowing as well as at rest: exec's snapshot knows (`Snapshot::held`).
 //!
 //! ```text
@@ -54,6 +54,7 @@
 
 pub mod alarm;
 mod cycle;
+mod doing;
 mod event;
 mod hold;
 pub mod jog;
@@ -65,6 +66,7 @@ mod tests;
 
 pub use alarm::Alarm;
 pub use cycle::Cycle;
+pub use doing::{Doing, doing, shows_hold};
 pub use event::Event;
 pub use hold::Hold;
 pub use notices::Notices;
@@ -181,6 +183,12 @@ pub fn is_stopped() -> bool {
 pub fn has_open_door() -> bool {
     let byte = hold_byte().get();
     byte > Hold::Resuming as u8 && byte & 1 != 0
+}
+
+/// Whether motion goes on, or will when it has come to rest. Thread mode.
+#[inline(always)]
+pub fn goes_on() -> bool {
+    hold_byte().get() <= Hold::Resuming as u8
 }
 
 /// Whether what is held goes on when it has come to rest. Any level.

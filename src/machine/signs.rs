@@ -14,7 +14,7 @@ const TOGETHER_MS: u16 = 20;
 pub struct Signs {
     /// A tilde, and no exclamation mark since: where it stands, what is held goes on.
     pub resume: Cell<bool>,
-    /// A percent sign in the hold.
+    /// A percent sign in the hold that is on; perhaps in a comment, where it is none.
     pub percent: Cell<bool>,
     /// One that ends jogs.
     pub jogs: Cell<Bar>,

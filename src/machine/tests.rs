@@ -162,9 +162,34 @@ fn questions_are_those_of_the_state() {
         assert_eq!(has_open_door(), "Dfxk".contains(LETTERS.as_bytes()[hold as usize] as char));
         assert_eq!(may_resume(), !hold.flushes() && !has_open_door(), "{hold:?}");
         assert_eq!(is_resuming(), hold == Hold::Resuming);
+        assert_eq!(goes_on(), matches!(hold, Hold::Off | Hold::Resuming));
         assert_eq!(is_stopped(), state.cycle == Cycle::Stopped);
         assert_eq!(is_alarmed(), state.alarm != Alarm::None);
         assert_eq!((alarm(), cycle()), (state.alarm, state.cycle));
+    }
+}
+
+#[test]
+fn one_word_says_what_the_machine_is_doing() {
+    for (state, works) in all().flat_map(|state| [(state, false), (state, true)]) {
+        set(state);
+        // A stop is told as one, and so is a kill at rest.
+        let moves = works && state.cycle != Cycle::Stopped;
+        let expected = match (state.alarm, LETTERS.as_bytes()[state.hold as usize], state.cycle) {
+            (Alarm::None, b'R' | b'H' | b'F' | b'X', _) => Doing::Holds,
+            (Alarm::None, b'D' | b'f' | b'x', _) => Doing::Door,
+            (Alarm::None, b'K', _) if moves => Doing::Holds,
+            (Alarm::None, b'k', _) if moves => Doing::Door,
+            (Alarm::None, _, Cycle::Probe) => Doing::Probes,
+            (Alarm::None, _, Cycle::Homing) => Doing::Homes,
+            (Alarm::None, _, Cycle::Jog) => Doing::Jogs,
+            (Alarm::None, _, _) if moves => Doing::Runs,
+            (Alarm::None, _, _) => Doing::Rests,
+            (alarm, _, _) => Doing::Alarm(alarm),
+        };
+        assert_eq!(doing(|| works), expected, "{state:?}");
+        let is_seen = state.hold.holds() && (moves || !state.hold.kills());
+        assert_eq!(shows_hold(|| works), is_seen, "{state:?}");
     }
 }
 

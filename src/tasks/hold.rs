@@ -57,6 +57,10 @@ pub fn abandon(links: &Links) {
 
 /// The door has been opened: nothing moves. Or shut: what is held waits for a tilde, if there is anything.
 pub fn door(links: &Links, open: bool) {
+    if open && machine::goes_on() {
+        // A hold of its own: a percent sign was of one before it.
+        links.signs.percent.set(false);
+    }
     let works = links.has_data() || View::of(links, links.feeder()).has_work();
     machine::take(match works {
         _ if open => machine::Event::DoorOpened,

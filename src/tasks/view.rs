@@ -33,7 +33,7 @@ use crate::hal::imp::{gpio, inputs as pins, stepper, uart, watchdog};
 use crate::hal::serial::{Flow, PORTS};
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::machine::jog::Bar;
-use crate::machine::{self, Alarm, Cycle};
+use crate::machine::{self, Alarm, Cycle, Doing};
 use crate::motion::dynamics;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Program};
@@ -120,35 +120,27 @@ impl<'a> View<'a> {
         self.links.job.get().is_over() && !self.carries_out()
     }
 
-    /// Whether a hold is on that anybody is to see: not that of a kill at rest, which lasts until what waits is dropped.
+    /// Whether a hold is on that anybody is to see.
     fn is_held(&self) -> bool {
-        let rests = || !self.has_work() || machine::is_stopped();
-        machine::is_held() && !(machine::is_killing() && rests())
+        machine::shows_hold(|| self.has_work())
     }
 
     /// `stat`.
     pub fn state(&self) -> i32 {
         let is_g2core = self.settings.is_g2core();
-        if let Some(state) = machine::alarm().state(is_g2core) {
-            return state;
-        }
-        if self.is_held() {
-            let interlock = is_g2core && machine::has_open_door();
-            return if interlock { INTERLOCK } else { HOLD };
-        }
-        match machine::cycle() {
-            Cycle::Lines | Cycle::Stopped => {}
-            Cycle::Probe => return PROBING,
-            Cycle::Homing => return HOMING,
-            Cycle::Jog => return JOGGING,
-        }
-        if self.has_work() && !machine::is_stopped() {
-            return RUN;
-        }
-        match self.motion().program {
-            Program::Ready => 1,
-            Program::Stopped => 3,
-            Program::Ended => 4,
+        match machine::doing(|| self.has_work()) {
+            Doing::Alarm(alarm) => alarm.state(is_g2core),
+            Doing::Door if is_g2core => INTERLOCK,
+            Doing::Door | Doing::Holds => HOLD,
+            Doing::Probes => PROBING,
+            Doing::Homes => HOMING,
+            Doing::Jogs => JOGGING,
+            Doing::Runs => RUN,
+            Doing::Rests => match self.motion().program {
+                Program::Ready => 1,
+                Program::Stopped => 3,
+                Program::Ended => 4,
+            },
         }
     }
 
