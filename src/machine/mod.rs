@@ -10,23 +10,30 @@
 //! | [`Hold`] | off, resuming, held, door, flush, drop, kill; the last three with the door open, too | whether motion goes on, and whether what is queued is being dropped |
 //! | [`Cycle`] | lines, program stop, probe, homing, jog | what is carried out |
 //!
-//! [`Doing`] is all three in one word, which is what `stat` tells. `Lines` is idle as well as run: whether anything is queued or moves is asked of the queue and of exec's snapshot, which
-//! count it anyway (`View::has_work`). Held is slowing as well as at rest: exec's snapshot knows (`Snapshot::held`).
+//! [`Doing`] is all three in one word, which is what `stat` tells. `Lines` is idle as well as run: whether anything is queued or
+//! moves is asked of the queue and of exec's snapshot, which count it anyway (`View::has_work`). Held is slowing as well as at
+//! rest: exec's snapshot knows (`Snapshot::held`).
+//!
+//! Where events lead a [`Hold`]; where there is nothing, it stays. Of `Flush`, `Drop` and `Kill` there is each with the door open as well:
+//! it goes on alike, with the door open.
+//!
+//! | | `Hold` | `Resume` | `Rested` | `Flush` | `Cut`, an alarm | `Kill` | `Dropped` | `DoorOpened` | `DoorShut` | `DoorShutIdle` |
+//! |---|---|---|---|---|---|---|---|---|---|---|
+//! | Off | Held | | | Flush | Drop | Kill | | Door | | |
+//! | Resuming | Held | | Off | Flush | Drop | Kill | | Door | | |
+//! | Held | | Resuming | | Flush | Drop | Kill | | Door | | |
+//! | Door | | | | Flush | Drop | Kill | | | Held | Off |
+//! | Flush | | | | | Drop | Kill | | door open | door shut | door shut |
+//! | Drop | | | | | | Kill | Off, or Door | door open | door shut | door shut |
+//! | Kill | | | | | | | Off, or Door; the program ends | door open | door shut | door shut |
+//!
+//! Where events lead the others:
 //!
 //! ```text
-//!            Hold                     Resume                  Rested
-//!   Off ------------> Held ------------------> Resuming ---------------> Off
-//!                      ^ DoorShut
-//!   DoorOpened         |             DoorShutIdle
-//!   any -------------> Door -------------------------------------------> Off
-//!
-//!            Flush            Cut                Dropped
-//!   any ------------> Flush ------> Drop ------------------------------> Off, or Door if that is open
-//!            Cut, an alarm           | Kill      Dropped
-//!   any ---------------------------> Kill -----------------------------> Off, or Door; the program ends
-//!
-//!   Lines -- Probe, Homing, Jog, Stopped --> that cycle -- Done, Dropped --> Lines
-//!   None  -- Alarm, Limit, Shutdown, Panic: the worst counts --> that alarm -- Cleared --> None
+//!  Cycle   Lines   Probe, Homing, Jog, Stopped: not in an alarm, nor while Drop or Kill     that cycle
+//!          any     Done: not while Drop or Kill; Dropped                                    Lines
+//!  Alarm   any     Alarm, Limit, Shutdown, Panic: if it is worse                            that alarm
+//!          any     Cleared: not a Panic, nor while Flush, Drop or Kill                      None
 //! ```
 //!
 //! | event | raised by | level | what comes with it |
@@ -122,7 +129,7 @@ machine_static! {
 }
 
 progmem! {
-    /// Where each event of [`Event::OF_HOLD`] leads each [`Hold`].
+    /// Where each event of the first `Event::OF_HOLD` leads each [`Hold`].
     static HOLDS: [u8; Event::OF_HOLD * Hold::ALL.len()] = hold::table();
 }
 
@@ -203,7 +210,7 @@ pub fn may_resume() -> bool {
     hold_byte().get() < Hold::Door as u8
 }
 
-/// Takes one of the events of [`Event::OF_HOLD`], and has exec look. Of `Dropped` this is the part of the hold: [`dropped`]. Thread mode.
+/// Takes an event that concerns the [`Hold`] alone, and has exec look. (Of `Dropped` this is a part: [`dropped`] is the whole.) Thread mode.
 #[inline(never)]
 #[small]
 pub fn take(event: Event) {
@@ -248,9 +255,11 @@ pub fn raise(alarm: Alarm, first: impl FnOnce()) -> bool {
 /// Ends the alarm, if it can be. Says whether. Thread mode.
 #[inline(always)]
 pub fn clear() -> bool {
-    let after = alarm().after(Event::Cleared, is_flushing());
-    alarm_byte().set(after as u8);
-    !after.is_on()
+    let ends = !is_flushing() && alarm_byte().get() != Alarm::Panic as u8;
+    if ends {
+        alarm_byte().set(Alarm::None as u8);
+    }
+    ends
 }
 
 /// The machine has been reset by nobody: [`State::AFTER_FAULT`]. Before anything runs.

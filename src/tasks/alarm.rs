@@ -1,8 +1,8 @@
-//! The alarm that is on: how it begins and how it ends. What each of them does is in [`machine::alarm`](crate::machine::alarm).
+//! The alarm that is on: how it begins and how it ends. What each of them does is in [`machine::alarm`](mod@crate::machine::alarm).
 //!
 //! ```text
 //!  raise   steps stop at once if it is sudden (the interrupt of a limit has stopped them already); outputs off;
-//!          a hold, and Flush::Rest: data lines wait
+//!          Event::Cut: a hold, and data lines wait
 //!  planner drop_blocks   exec, at rest or stopped, drops its blocks and counts what has been made, to the step
 //!          restart       planner and model start from there; data lines are refused from now on
 //!  clear   steps may be made again

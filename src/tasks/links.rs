@@ -13,6 +13,13 @@
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
 //! | [`Links::moment`] | how motion stood when the report under way began | 1 | 32 B | whoever tells it | the same | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
+//! | [`Links::changes`] | what the planner has to look at before the next line | a bit each | 1 B | parser, planner | planner | bits merge |
+//! | [`Links::notices`], [`Links::probe`] | what is to be told: an exception, the end of a jog or of a flush, a probing | 1 each | 4 B, 14 B | all | reporter | overwritten: the newest counts |
+//! | [`Links::job`] | the built-in job, and how far it has come | 1 | 4 B | parser | parser, reporter, planner in a flush | a second one is refused |
+//! | [`Links::feeder`] | which port's lines are carried out | 1 | 1 B | parser | all | never: it changes at rest |
+//!
+//! What the machine is doing is no link: that is in [`machine`](crate::machine). [`Links::signs`] belong to the control task
+//! and the reader.
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
 //! lines wait in the pool, and their responses wait with them. The sender has at most its lines in
@@ -55,7 +62,7 @@ pub struct Links {
     pub planner_wake: Wake,
     /// A tilde: what has stopped goes on.
     pub cycle_start: Wake,
-    /// What is still to be told.
+    /// What is still to be told. Any task writes, the reporter takes.
     pub notices: Notices,
     /// Something that reports show may have changed.
     pub reporter_wake: News,
@@ -67,7 +74,7 @@ pub struct Links {
     pub rate: Cell<Option<u32>>,
     /// What probing has found.
     pub probe: Probe,
-    /// Real-time characters that have not had all their effect yet.
+    /// Real-time characters that have not had all their effect yet. Of the control task and the reader, with `tasks::hold`.
     pub signs: Signs,
     /// What status reports hold.
     pub report: RefCell<StatusReport>,
