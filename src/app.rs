@@ -16,6 +16,7 @@ use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{stepper, uart, watchdog};
 use crate::hal::ring::Producer;
 use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
+use crate::machine::{Notices, Probe, Signs};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::motion::snapshot::Snapshot;
@@ -23,7 +24,7 @@ use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
 use crate::store::kept;
-use crate::tasks::links::{Links, Probe, QueueCount};
+use crate::tasks::links::{Changes, Links, QueueCount};
 use crate::tasks::ports::{AUX_RESERVE, Port};
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
@@ -49,26 +50,14 @@ impl Links {
             commands_taken: Cell::new(false),
             planner_wake: Wake::default(),
             cycle_start: Wake::default(),
-            stopped: Cell::new(false),
-            exception: Cell::new(None),
+            notices: Notices::default(),
             reporter_wake: News::default(),
             queue_count: QueueCount::default(),
-            resync: Cell::new(false),
-            settings_changed: Cell::new(true),
+            changes: Changes::new(Changes::SETTINGS),
             rate: Cell::new(None),
             restart: Cell::new(None),
-            flush: Cell::default(),
-            resume: Cell::new(false),
-            percent: Cell::new(false),
-            percent_at: Cell::new(0),
-            killed: Cell::new(false),
-            flushed: Cell::new(false),
-            limits_hit: Cell::new(0),
-            door_open: Cell::new(false),
-            cycle: Cell::default(),
             probe: Probe::default(),
-            jogs: Cell::default(),
-            jogged: Cell::new(false),
+            signs: Signs::default(),
             job: Cell::default(),
             moment: Cell::new(Snapshot::new().moment()),
             storage,

@@ -14,7 +14,6 @@ extern crate kerf_macros;
 #[macro_use]
 pub mod hal;
 
-pub mod alarm;
 pub mod app;
 pub mod baud;
 pub mod boards;
@@ -23,6 +22,7 @@ pub mod canon;
 pub mod config;
 pub mod gcode;
 pub mod jobs;
+pub mod machine;
 pub mod math;
 pub mod motion;
 pub mod motors;

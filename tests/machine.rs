@@ -1,5 +1,6 @@
 //! The whole firmware on the host, over mocked time: bytes in, responses and steps out.
 
+use kerf::boards::inputs;
 use kerf::hal::imp::Machine;
 use kerf::motion::queue::{self, CAPACITY};
 
@@ -527,4 +528,29 @@ fn a_move_of_several_blocks_stops_exactly_at_its_end() {
     let [one, several] = [[20, 60], [40, 60]].map(|to| time("g61.1", to) - time("g64", to));
     assert!(one > 100, "{one} ms more");
     assert!(several.abs_diff(one) < 20, "{one} ms and {several} ms more");
+}
+
+#[test]
+fn a_percent_sign_in_a_comment_of_an_earlier_hold_flushes_nothing() {
+    let mut sender = Sender::boot();
+    sender.ask("{saf:1,psw:1}\n", 50);
+    sender.ask("g1x20f600\nm0\n", 300);
+    assert!(sender.ask("!", 500).contains("\"stat\":6"));
+    sender.ask("(100 %)\n", 100);
+    sender.ask("~", 300);
+    // The pool is full, so that the reader looks ahead in the ring, where a byte has been lost.
+    for n in 0..8 {
+        sender.ask(&format!("g0 y0 ({n})\n"), 10);
+    }
+    sender.machine.send(b"g0 y1\ng0");
+    sender.machine.send_damaged();
+    let answer = sender.ask("y2\n", 100);
+    sender.machine.set_input(inputs::DOOR, true);
+    let answer = answer + &sender.ask("", 500);
+    assert!(answer.contains("\"stat\":6"), "{answer}");
+    assert!(!answer.contains("\"rx\""), "{answer}");
+    sender.machine.set_input(inputs::DOOR, false);
+    sender.ask("", 100);
+    sender.ask("~", 3_000);
+    assert_eq!(sender.machine.emitted().position[0], 25_600);
 }

@@ -54,6 +54,18 @@ fn in_a_move() {
     assert_eq!(sender.machine.emitted().position[0], 64_000);
 }
 
+/// No percent sign has ever come: an exclamation mark right behind the wrap is a hold and no flush.
+#[test]
+fn in_a_hold() {
+    let mut sender = Sender::boot();
+    sender.ask("g1x50f1000\n", 2_905);
+    let answer = sender.ask("!", 300);
+    assert!(answer.contains("\"stat\":6"), "{answer}");
+    assert!(!answer.contains("\"rx\""), "nothing is flushed: {answer}");
+    sender.ask("~", 3_000);
+    assert_eq!(sender.machine.emitted().position[0], 64_000);
+}
+
 #[test]
 fn in_a_dwell() {
     let mut sender = Sender::boot();

@@ -3,10 +3,10 @@
 use super::{
     CHUNK, Checksum, Machine, Mode, Next, Out, Request, StatusReport, Store, Value, Warning,
 };
-use crate::alarm::Alarm;
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::{Change, Overrides};
 use crate::gcode::tables::Row;
+use crate::machine::Alarm;
 use crate::status::Status;
 use crate::units::Length;
 use std::collections::HashMap;

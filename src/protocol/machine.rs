@@ -2,10 +2,10 @@
 
 use super::report::StatusReport;
 use super::value::Value;
-use crate::alarm::Alarm;
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::Change;
 use crate::gcode::tables::Row;
+use crate::machine::Alarm;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::status::Status;

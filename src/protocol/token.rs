@@ -5,12 +5,12 @@ use super::value::{
     Form, PROBE_STATE, PROBED, SHIFT, SINGLE_COUNT, SINGLES, Single, VECTOR_COUNT, VECTORS, Value,
     Vector, place_form, vector_value,
 };
-use crate::alarm::Alarm;
 use crate::config::name::{Name, axis_letter, axis_of};
 use crate::config::rows::{find_row, row_name, value_name};
 use crate::config::table::Kind;
 use crate::config::{Fixed, Owner, Setting};
 use crate::gcode::tables::Row;
+use crate::machine::Alarm;
 use crate::progmem;
 use crate::progmem::{Plain, Text};
 use crate::units::AXES;

@@ -6,11 +6,11 @@
 //! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`WAITING_SHORT`]), stretches become twice
 //! as long, and for a while more waits ([`PRESSED`]).
 
-use crate::alarm::Alarm;
 use crate::boards::ACTIVE;
 use crate::hal::event::{self, Event};
 use crate::hal::imp::{exec, flags, stepper};
 use crate::hal::ring::Producer;
+use crate::machine::{self, Alarm};
 use crate::motion::contact;
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::divide::product;
@@ -21,7 +21,7 @@ use crate::motion::snapshot::{Program, Snapshot};
 use crate::tasks::health::{self, Sign};
 use kerf_macros::small;
 
-use crate::tasks::{Never, alarm, hold, links, overrides, power, spindle};
+use crate::tasks::{Never, hold, links, overrides, power, spindle};
 
 /// After so many segments without a turn of thread mode they become longer, which takes less of the CPU.
 const PATIENCE: u8 = 6;
@@ -112,7 +112,7 @@ impl<'a> Runner<'a> {
         }
         match step {
             Step::Segment => self.queued(rested),
-            Step::Held if hold::passes() => Next::Turn,
+            Step::Held if machine::rested() => Next::Turn,
             Step::Idle | Step::Standstill | Step::Held => Next::Block,
             Step::Again | Step::Switched | Step::Override(_) => Next::Turn,
         }
@@ -177,13 +177,13 @@ impl<'a> Runner<'a> {
     #[small]
     fn held(&mut self, out: &mut Snapshot) {
         spindle::switch(out, false);
-        hold::dropped(|| {
+        machine::drop_if_wanted(|| {
             // What has paused stays off.
             out.outputs = spindle::on();
             let held = self.machine.drop_all(&mut self.blocks, out);
             stepper::settle(held, &mut out.target);
             self.finished.rest();
-            if alarm::now() >= Alarm::Shutdown {
+            if machine::alarm() >= Alarm::Shutdown {
                 out.program = Program::Ready;
             }
         });

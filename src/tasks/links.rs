@@ -13,6 +13,13 @@
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
 //! | [`Links::moment`] | how motion stood when the report under way began | 1 | 32 B | whoever tells it | the same | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
+//! | [`Links::changes`] | what the planner has to look at before the next line | a bit each | 1 B | parser, planner | planner | bits merge |
+//! | [`Links::notices`], [`Links::probe`] | what is to be told: an exception, the end of a jog or of a flush, a probing | 1 each | 4 B, 14 B | all | reporter | overwritten: the newest counts |
+//! | [`Links::job`] | the built-in job, and how far it has come | 1 | 4 B | parser | parser, reporter, planner in a flush | a second one is refused |
+//! | [`Links::feeder`] | which port's lines are carried out | 1 | 1 B | parser | all | never: it changes at rest |
+//!
+//! What the machine is doing is no link: that is in [`machine`](crate::machine). [`Links::signs`] belong to the control task
+//! and the reader.
 //!
 //! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
 //! lines wait in the pool, and their responses wait with them. The sender has at most its lines in
@@ -23,8 +30,6 @@
 
 use core::cell::{Cell, RefCell, UnsafeCell};
 
-use super::hold::Flush;
-use super::jog::Bar;
 use super::ports::Port;
 use super::storage::Storage;
 use super::wake::{News, Wake};
@@ -34,11 +39,10 @@ use crate::gcode::interpreter::Interpreter;
 use crate::hal::byte::SharedByte;
 use crate::hal::serial::PORTS;
 use crate::jobs::Job;
+use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Snapshot};
 use crate::protocol::StatusReport;
-use crate::status::Status;
-use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// The links. One for the machine, made at start-up.
 pub struct Links {
@@ -58,126 +62,73 @@ pub struct Links {
     pub planner_wake: Wake,
     /// A tilde: what has stopped goes on.
     pub cycle_start: Wake,
-    /// The machine has come to a program stop and waits for cycle start.
-    pub stopped: Cell<bool>,
-    /// An exception to report to whoever feeds the machine.
-    pub exception: Cell<Option<Status>>,
+    /// What is still to be told. Any task writes, the reporter takes.
+    pub notices: Notices,
     /// Something that reports show may have changed.
     pub reporter_wake: News,
     /// Blocks that came and went, for queue reports.
     pub queue_count: QueueCount,
-    /// A setting has changed what steps mean: the planner counts them anew.
-    pub resync: Cell<bool>,
+    /// What the planner has to look at before the next line.
+    pub changes: Changes,
     /// A new rate of USB, in bits a second: the parser sets it when its response has left.
     pub rate: Cell<Option<u32>>,
-    /// The limits that were hit first, as bits of the ends, for the report.
-    pub limits_hit: Cell<u8>,
-    /// The door is open: nothing goes on.
-    pub door_open: Cell<bool>,
-    /// The cycle of the machine that runs.
-    pub cycle: Cell<Cycle>,
     /// What probing has found.
     pub probe: Probe,
-    /// Whether a jog may begin.
-    pub jogs: Cell<Bar>,
-    /// A jog has ended, which is to be told.
-    pub jogged: Cell<bool>,
+    /// Real-time characters that have not had all their effect yet. Of the control task and the reader, with `tasks::hold`.
+    pub signs: Signs,
     /// What status reports hold.
     pub report: RefCell<StatusReport>,
     /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.
     pub restart: Cell<Option<bool>>,
-    /// How far a queue flush has come.
-    pub flush: Cell<Flush>,
-    /// A tilde has come, and no exclamation mark since: where it stands, what is held goes on.
-    pub resume: Cell<bool>,
-    /// A percent sign has come in the hold.
-    pub percent: Cell<bool>,
-    /// When a percent sign came that was none, ms: an exclamation mark right after it makes it one.
-    pub percent_at: Cell<u32>,
-    /// The job has been killed: when its queue has been flushed, the program ends.
-    pub killed: Cell<bool>,
-    /// The queue has been flushed, which is to be told.
-    pub flushed: Cell<bool>,
     /// The built-in job that runs.
     pub job: Cell<Job>,
     /// When the report that is on its way was begun.
     pub moment: Cell<Moment>,
     /// What has to be put away, and where the rest is.
     pub storage: &'static Storage,
-    /// A setting has changed since the planner looked.
-    pub settings_changed: Cell<bool>,
     /// Settings in force.
     pub settings: RefCell<Settings>,
     /// The G-code model. The parser advances it; reports read it.
     pub model: RefCell<Interpreter<&'static Storage>>,
 }
 
-/// What the machine does beside carrying out moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Cycle {
-    /// Nothing.
-    #[default]
-    Off,
-    /// G38.2 to G38.5.
-    Probe,
-    /// G28.2, G28.4.
-    Homing,
-    /// `{jogx:..}`.
-    Jog,
-}
+/// What has changed beside the lines: whoever changes it notes it, the planner takes it before the next line.
+pub struct Changes(Cell<u8>);
 
-/// What has become of a probing. The discriminants are TinyG's numbers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ProbeState {
-    /// No contact.
-    #[default]
-    Failed,
-    /// There was one.
-    Touched,
-    /// It is under way.
-    Waiting,
-}
+impl Changes {
+    /// What steps mean: they are counted anew.
+    pub const STEPS: u8 = 1;
+    /// A setting.
+    pub const SETTINGS: u8 = 2;
 
-/// The last probing.
-#[derive(Default)]
-pub struct Probe {
-    state: Cell<ProbeState>,
-    at: Cell<[Length; FIRST_ROTARY]>,
-    news: Cell<bool>,
-}
-
-impl Probe {
-    /// What has become of it.
-    pub fn state(&self) -> ProbeState {
-        self.state.get()
+    /// With these.
+    pub const fn new(bits: u8) -> Self {
+        Self(Cell::new(bits))
     }
 
-    /// Where the contact was, or where it ended, machine coordinates; of the axes that may probe.
-    pub fn at(&self, axis: u8) -> Option<Length> {
-        self.at.get().get(usize::from(axis)).copied()
+    /// These have changed.
+    pub fn note(&self, bits: u8) {
+        self.0.set(self.0.get() | bits);
     }
 
-    /// It begins.
-    pub fn begin(&self) {
-        self.state.set(ProbeState::Waiting);
+    /// Whether nothing has.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.0.get() == 0
     }
 
-    /// It has come to an end, which is to be told.
-    pub fn tell(&self, state: ProbeState, at: &PerAxis<Length>) {
-        self.state.set(state);
-        let [x, y, z, ..] = *at;
-        self.at.set([x, y, z]);
-        self.news.set(true);
+    /// Whether this has.
+    #[inline(always)]
+    pub fn has(&self, bit: u8) -> bool {
+        self.0.get() & bit != 0
     }
 
-    /// Whether there is a result that nobody has begun to tell.
-    pub fn is_news(&self) -> bool {
-        self.news.get()
-    }
-
-    /// The same, and begins to.
-    pub fn take_news(&self) -> bool {
-        self.news.take()
+    /// The same, and is no news any more.
+    #[inline(always)]
+    pub fn take(&self, bit: u8) -> bool {
+        let bits = self.0.get();
+        self.0.set(bits & !bit);
+        bits & bit != 0
     }
 }
 

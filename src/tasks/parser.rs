@@ -20,14 +20,12 @@ use heapless::Vec;
 
 use super::Never;
 use super::alarm;
-use super::hold::Flush;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::ports::{Chosen, Port};
 use super::reporter::{What, tell_at_once};
 use super::tx::Tx;
 use super::view::View;
-use crate::alarm::{Alarm, is_program_end};
 use crate::gcode::command::Stop;
 use crate::hal::event::{Event, wake_after, wake_after_transmitted};
 use crate::hal::imp;
@@ -35,6 +33,8 @@ use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::time::millis;
 use crate::hal::serial::{PORTS, USB};
 use crate::jobs::Job;
+use crate::machine::alarm::is_program_end;
+use crate::machine::{self, Alarm};
 use crate::protocol::{Ending, Mode, Next, Out, Request, Span, is_brief, put_brief, put_line_end};
 use crate::status::Status;
 
@@ -121,7 +121,7 @@ impl Parser {
     #[inline(always)]
     fn turn(&mut self) -> Turn {
         let links = self.links;
-        let alarmed = alarm::is_on();
+        let alarmed = machine::is_alarmed();
         let free = is_free(links);
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
@@ -198,7 +198,7 @@ impl Parser {
     #[inline(never)]
     fn next_line(&mut self, data: bool) -> Option<Chosen> {
         let links = self.links;
-        let (feeder, flushes) = (links.feeder.get(), links.flush.get() != Flush::None);
+        let (feeder, flushes) = (links.feeder.get(), machine::is_flushing());
         let lacking = &mut self.lacking;
         links.ports.iter().zip(&self.sessions).find_map(|(port, session)| {
             let any = data || flushes || port.number != feeder;
@@ -404,7 +404,7 @@ impl Answer {
 /// tables, and nothing is being dropped.
 fn is_free(links: &Links) -> bool {
     let waits = links.commands_taken.get() || links.storage.is_awaited();
-    !waits && links.flush.get() == Flush::None
+    !waits && !machine::is_flushing()
 }
 
 /// Carries out the next line of a built-in job. A line that is refused is told by an exception report. The end is told by
@@ -535,8 +535,8 @@ fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> boo
 /// Carries out the block of a request, if that can be done now; or drops it in a queue flush.
 #[inline(never)]
 fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Request) -> bool {
-    if links.flush.get() != Flush::None {
-        let alarm = alarm::now();
+    if machine::is_flushing() {
+        let alarm = machine::alarm();
         request.ran(if alarm == Alarm::None { Status::Terminated } else { alarm.status() }, false);
         return true;
     }
@@ -586,7 +586,7 @@ pub fn end_program(links: &Links) {
 
 /// Refuses a block in an alarm, unless it ends that, and else carries it out.
 fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
-    let alarm = alarm::now();
+    let alarm = machine::alarm();
     if alarm != Alarm::None {
         if !(alarm.ends_with_program() && is_program_end(block)) {
             return (alarm.status(), true);

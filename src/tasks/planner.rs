@@ -18,15 +18,14 @@ use embassy_futures::yield_now;
 use parts::{ArcWalk, Parts};
 
 use super::Never;
-use super::alarm;
-use super::hold::{self, Flush};
-use super::links::{self, Cycle, Links};
+use super::links::{self, Changes, Links};
 use super::parser;
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
 use crate::gcode::overrides::Change;
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, wait};
 use crate::jobs::Job;
+use crate::machine::{self, Cycle};
 use crate::motion::block::{Action, Block, Line as Move, Outputs};
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line};
@@ -135,8 +134,7 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
             links.commands_taken.set(false);
             if planner.is_flushed() {
                 seek::drop_blocks().await;
-                planner.restart();
-                if links.killed.take() {
+                if planner.restart() {
                     parser::end_program(links);
                 }
             }
@@ -156,7 +154,7 @@ impl Planner {
             Motion::Feed { target, feed } => (target, Some(*feed)),
             _ => return false,
         };
-        let quiet = !self.links.settings_changed.get() && !self.links.resync.get();
+        let quiet = self.links.changes.is_empty();
         let free = self.queue.free();
         if !commands.is_motion_alone() || !quiet || free == 0 {
             return false;
@@ -180,10 +178,10 @@ impl Planner {
     fn begin(&mut self) {
         self.line = self.links.commands.borrow().line;
         self.steps = Steps::default();
-        if self.links.settings_changed.replace(false) {
+        if self.links.changes.take(Changes::SETTINGS) {
             self.dynamics.set(&*self.links.settings.borrow());
         }
-        if self.links.resync.get() {
+        if self.links.changes.has(Changes::STEPS) {
             self.news = News::Position;
         }
     }
@@ -336,7 +334,7 @@ impl Planner {
             }
             _ => {
                 self.set_drivers();
-                self.links.resync.set(false);
+                self.links.changes.take(Changes::STEPS);
                 self.news = News::None;
             }
         }
@@ -404,22 +402,22 @@ impl Planner {
         if self.is_flushed() {
             return;
         }
-        self.links.stopped.set(true);
+        machine::carry_out(machine::Event::Stopped);
         self.links.reporter_wake.signal();
         self.links.cycle_start.take();
         self.links.cycle_start.wait().await;
-        self.links.stopped.set(false);
+        machine::carry_out(machine::Event::Done);
     }
 
     /// Whether all that is queued is to be dropped.
     fn is_flushed(&self) -> bool {
-        self.links.flush.get() == Flush::Rest
+        machine::is_dropping()
     }
 
-    /// Exec has dropped its blocks: planner and model start from where the motors are.
+    /// Exec has dropped its blocks: planner and model start from where the motors are. Whether the program is to end.
     #[inline(never)]
     #[small]
-    fn restart(&mut self) {
+    fn restart(&mut self) -> bool {
         let links = self.links;
         let motion = links::snapshot();
         self.relocate(&motion);
@@ -429,23 +427,25 @@ impl Planner {
         model.set_outputs(&spindle, outputs::coolant(motion.outputs));
         drop(model);
         links.job.set(Job::default());
-        hold::over(links);
-        match links.cycle.replace(Cycle::Off) {
-            Cycle::Jog => links.jogged.set(true),
+        let (cycle, killed) = machine::dropped();
+        match cycle {
+            Cycle::Jog => links.notices.jogged.set(true),
             // Motors of an axis may have moved apart.
-            Cycle::Homing => links.resync.set(true),
-            _ => {}
+            Cycle::Homing => links.changes.note(Changes::STEPS),
+            Cycle::Probe => links.probe.abandon(),
+            Cycle::Lines | Cycle::Stopped => {}
         }
-        if links.killed.get() {
+        if killed {
             links.except(Status::KillJob);
         }
-        links.flushed.set(!alarm::is_on());
+        links.notices.flushed.set(!machine::is_alarmed());
         links.reporter_wake.urge();
+        killed
     }
 
     /// Says what the machine does besides carrying out lines.
-    fn enter(&self, cycle: Cycle) {
-        self.links.cycle.set(cycle);
+    fn enter(&self, cycle: machine::Event) {
+        machine::carry_out(cycle);
         self.links.reporter_wake.urge();
     }
 

@@ -116,7 +116,7 @@ impl Links {
 
     /// Reports an exception to whoever feeds the machine.
     pub fn except(&self, status: Status) {
-        self.exception.set(Some(status));
+        self.notices.exception.set(Some(status));
         self.reporter_wake.signal();
     }
 

@@ -8,11 +8,12 @@ use core::cell::UnsafeCell;
 
 use embassy_time::Timer;
 
+use super::health;
 use super::links::{Links, snapshot};
-use super::{health, hold};
 use crate::config::Settings;
 use crate::hal::imp::time::millis;
 use crate::hal::imp::{exec, gpio};
+use crate::machine;
 use crate::motors::{Modes, Motors};
 
 /// How often idle motors are looked for, ms.
@@ -32,6 +33,7 @@ machine_static! {
 pub async fn run(links: &'static Links) -> ! {
     loop {
         health::look();
+        links.signs.age(millis());
         look(links);
         Timer::after_ticks(LOOK_MS).await;
     }
@@ -43,7 +45,7 @@ pub async fn run(links: &'static Links) -> ! {
 fn look(links: &Links) {
     let timeout = links.settings.borrow().motor_timeout_centis().saturating_mul(10);
     let (now, running) = (millis(), snapshot().running);
-    let holds = hold::is_on();
+    let holds = machine::is_held();
     let pass = |motors: &mut Motors| {
         if holds {
             motors.stand_still(LOOK_MS as u32);

@@ -23,6 +23,7 @@ use crate::hal::serial::{
     AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, RETURNED, RX_RING, Received, TAKEN,
     TAKEN_RETURN, USB, high_water, is_shared, low_water,
 };
+use crate::machine;
 use crate::protocol::Mode;
 use crate::status::Status;
 
@@ -277,7 +278,7 @@ impl<const N: usize> Intake<N> {
 #[inline(never)]
 #[small]
 fn look_ahead(links: &Links, port: &Port, ring: &Window<'_>) {
-    if !hold::is_on() && !links.stopped.get() {
+    if !machine::is_held() && !machine::is_stopped() {
         return;
     }
     let mut aside = port.lines.borrow().aside();

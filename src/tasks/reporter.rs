@@ -52,7 +52,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
     let mut due = true;
     loop {
         // Once: `stv` counts the others.
-        let exception = &links.exception;
+        let exception = &links.notices.exception;
         if !told.starved && health::starvations() > 0 && exception.get().is_none() {
             told.starved = true;
             exception.set(Some(Status::StepsLate));
@@ -62,7 +62,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             links.except(Status::EndOfFile);
             links.parser_wake.signal();
         }
-        if let Some(status) = links.exception.take() {
+        if let Some(status) = links.notices.exception.take() {
             tell(links, links.told(), What::Exception(status)).await;
         }
         if links.probe.take_news() {
@@ -71,7 +71,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             tell(links, links.told(), What::Probing).await;
         }
         let (state, hold) = state_of(links);
-        let (jogged, flushed) = (links.jogged.take(), links.flushed.take());
+        let (jogged, flushed) = (links.notices.jogged.take(), links.notices.flushed.take());
         if jogged || flushed {
             tell(links, links.told(), What::End { jogged, flushed }).await;
         }

@@ -10,10 +10,10 @@ use core::cell::UnsafeCell;
 
 use super::links::{snapshot, update};
 use super::storage::Storage;
-use super::{alarm, hold};
 use crate::config::Setting;
 use crate::hal::byte::SharedByte;
 use crate::hal::imp::{exec, gpio, pwm, stepper};
+use crate::machine;
 use crate::motion::snapshot::Snapshot;
 use crate::spindle::{Changed, Spindle};
 
@@ -44,8 +44,8 @@ pub fn switch(out: &Snapshot, changed: bool) -> u16 {
     let spindle = unsafe { &*shared().0.get() };
     let before = on();
     // A probe that has made contact holds as well.
-    let wanted = match out.held && hold::is_on() {
-        _ if stepper::is_stopped() || alarm::is_on() => 0,
+    let wanted = match out.held && machine::is_held() {
+        _ if stepper::is_stopped() || machine::is_alarmed() => 0,
         true => spindle.held(out.outputs),
         false => out.outputs,
     };

@@ -14,12 +14,12 @@ use kerf_macros::small;
 
 use super::links::Links;
 use super::{alarm, hold};
-use crate::alarm::Alarm;
 use crate::boards::{ACTIVE, inputs};
 use crate::config::Settings;
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::hal::event::Event;
 use crate::hal::imp::{flags, inputs as pins};
+use crate::machine::{self, Alarm};
 
 /// Of `sn` and `sx`: a limit.
 const LIMIT: u8 = 2;
@@ -86,11 +86,11 @@ pub fn serve(links: &Links) {
     drop(settings);
     if stops {
         alarm::raise(links, Alarm::Shutdown);
-    } else if hits as u8 != 0 && alarm::now() < Alarm::Limit {
-        links.limits_hit.set(hits as u8);
+    } else if hits as u8 != 0 && machine::alarm() < Alarm::Limit {
+        links.notices.limits_hit.set(hits as u8);
         alarm::raise(links, Alarm::Limit);
     }
-    if open != links.door_open.get() {
+    if open != machine::has_open_door() {
         hold::door(links, open);
     }
     links.reporter_wake.signal();

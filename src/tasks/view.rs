@@ -12,15 +12,13 @@ use super::alarm;
 use super::health;
 use super::hold;
 use super::homing;
-use super::jog::Bar;
-use super::links::{Cycle, Links, snapshot};
+use super::links::{Changes, Links, snapshot};
 use super::overrides;
 use super::ports::Port;
 use super::power;
 use super::setup::moved_by;
 use super::spindle;
 use super::switches;
-use crate::alarm::Alarm;
 use crate::baud;
 use crate::boards::{MOTORS, inputs};
 use crate::config::{Setting, Settings};
@@ -34,6 +32,8 @@ use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{gpio, inputs as pins, stepper, uart, watchdog};
 use crate::hal::serial::{Flow, PORTS};
 use crate::jobs::{Job, LINE_MAX, STORED};
+use crate::machine::jog::Bar;
+use crate::machine::{self, Alarm, Cycle, Doing};
 use crate::motion::dynamics;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Program};
@@ -102,7 +102,7 @@ impl<'a> View<'a> {
 
     /// Whether anything is queued or runs, or a hold is on.
     pub fn is_busy(&self) -> bool {
-        hold::is_on() || self.has_work()
+        machine::is_held() || self.has_work()
     }
 
     /// Whether anything is queued or runs.
@@ -120,35 +120,27 @@ impl<'a> View<'a> {
         self.links.job.get().is_over() && !self.carries_out()
     }
 
-    /// Whether a hold is on that anybody is to see: not that of a kill at rest, which lasts until what waits is dropped.
+    /// Whether a hold is on that anybody is to see.
     fn is_held(&self) -> bool {
-        let rests = || !self.has_work() || self.links.stopped.get();
-        hold::is_on() && !(self.links.killed.get() && rests())
+        machine::shows_hold(|| self.has_work())
     }
 
     /// `stat`.
     pub fn state(&self) -> i32 {
         let is_g2core = self.settings.is_g2core();
-        if let Some(state) = alarm::now().state(is_g2core) {
-            return state;
-        }
-        if self.is_held() {
-            let interlock = is_g2core && self.links.door_open.get();
-            return if interlock { INTERLOCK } else { HOLD };
-        }
-        match self.links.cycle.get() {
-            Cycle::Off => {}
-            Cycle::Probe => return PROBING,
-            Cycle::Homing => return HOMING,
-            Cycle::Jog => return JOGGING,
-        }
-        if self.has_work() && !self.links.stopped.get() {
-            return RUN;
-        }
-        match self.motion().program {
-            Program::Ready => 1,
-            Program::Stopped => 3,
-            Program::Ended => 4,
+        match machine::doing(|| self.has_work()) {
+            Doing::Alarm(alarm) => alarm.state(is_g2core),
+            Doing::Door if is_g2core => INTERLOCK,
+            Doing::Door | Doing::Holds => HOLD,
+            Doing::Probes => PROBING,
+            Doing::Homes => HOMING,
+            Doing::Jogs => JOGGING,
+            Doing::Runs => RUN,
+            Doing::Rests => match self.motion().program {
+                Program::Ready => 1,
+                Program::Stopped => 3,
+                Program::Ended => 4,
+            },
         }
     }
 
@@ -156,7 +148,7 @@ impl<'a> View<'a> {
     pub fn hold(&self) -> i32 {
         match self.is_held() {
             false => 0,
-            true if self.motion().held && !hold::is_passing() => HELD,
+            true if self.motion().held && !machine::is_resuming() => HELD,
             true => SLOWING,
         }
     }
@@ -166,7 +158,7 @@ impl<'a> View<'a> {
         let programmed = self.links.model.borrow().position().get(axis).copied();
         let programmed = programmed.unwrap_or(Length::ZERO);
         // Until the planner has counted anew, steps mean what they meant before a setting changed.
-        if !self.is_busy() || self.links.resync.get() {
+        if !self.is_busy() || self.links.changes.has(Changes::STEPS) {
             return programmed;
         }
         // Of several motors on an axis the first tells; an axis that moves none is where it should be.
@@ -178,7 +170,7 @@ impl<'a> View<'a> {
 
     /// `home`: 2 while homing, 1 when all axes that have a switch for it are homed.
     fn home_state(&self) -> i32 {
-        if self.links.cycle.get() == Cycle::Homing {
+        if machine::cycle() == Cycle::Homing {
             return 2;
         }
         let axes = homing::axes(&self.settings);
@@ -189,7 +181,7 @@ impl<'a> View<'a> {
 
     /// Whether the machine is at rest, and something may begin that no line asks for.
     fn may_begin(&self) -> Result<(), Status> {
-        let alarm = alarm::now();
+        let alarm = machine::alarm();
         if alarm != Alarm::None {
             return Err(alarm.status());
         }
@@ -199,7 +191,7 @@ impl<'a> View<'a> {
 
     /// Hands something to the planner that no line asks for. The port that did feeds the machine now.
     #[inline(never)]
-    fn begin(&mut self, motion: Motion, cycle: Cycle) -> Status {
+    fn begin(&mut self, motion: Motion, cycle: machine::Event) -> Status {
         let links = self.links;
         if links.feeder.replace(self.port.number) != self.port.number {
             // It has been told nothing so far.
@@ -208,7 +200,7 @@ impl<'a> View<'a> {
         let mut commands = links.commands.borrow_mut();
         commands.clear();
         commands.motion = motion;
-        links.cycle.set(cycle);
+        machine::carry_out(cycle);
         links.commands_taken.set(true);
         links.planner_wake.signal();
         Status::Ok
@@ -283,7 +275,7 @@ impl Machine for View<'_> {
             if self.is_busy() {
                 return Err(Status::NotAccepted);
             }
-            self.links.resync.set(true);
+            self.links.changes.note(Changes::STEPS);
         }
         if setting.is_baud() {
             self.links.rate.set(baud::rate(value));
@@ -296,7 +288,7 @@ impl Machine for View<'_> {
         let drivers = dynamics::Machine::drivers(&*self.settings);
         let rate = |motors| drivers.step_rate_max(motors) as u32;
         let lowered = self.settings.limit_velocity(setting, rate);
-        self.links.settings_changed.set(true);
+        self.links.changes.note(Changes::SETTINGS);
         self.note(setting, lowered || is_machine);
         set_hardware(&self.settings);
         Ok(match lowered {
@@ -327,9 +319,9 @@ impl Machine for View<'_> {
                 state if state >= INTERLOCK => state - (INTERLOCK - 6),
                 state => state,
             },
-            Value::Cycle if alarm::is_on() => 0,
-            Value::Cycle => match self.links.cycle.get() {
-                Cycle::Off => i32::from(self.is_held() || self.has_work()),
+            Value::Cycle if machine::is_alarmed() => 0,
+            Value::Cycle => match machine::cycle() {
+                Cycle::Lines | Cycle::Stopped => i32::from(self.is_held() || self.has_work()),
                 Cycle::Probe => 2,
                 Cycle::Homing => 3,
                 Cycle::Jog => 4,
@@ -378,7 +370,7 @@ impl Machine for View<'_> {
                 let at = self.links.probe.at(axis);
                 at.unwrap_or_else(|| self.position(usize::from(axis))).0
             }
-            Value::LimitHit => match self.links.limits_hit.get() {
+            Value::LimitHit => match self.links.notices.limits_hit.get() {
                 0 => -1,
                 hit => hit.trailing_zeros() as i32,
             },
@@ -413,8 +405,7 @@ impl Machine for View<'_> {
             self.links.rate.set(baud::rate(self.settings.baud()));
         }
         self.report.restore();
-        self.links.resync.set(true);
-        self.links.settings_changed.set(true);
+        self.links.changes.note(Changes::STEPS | Changes::SETTINGS);
         self.links.storage.forget_cold();
         spindle::set_all(self.links.storage);
         self.links.storage.note(0, ITEMS);
@@ -431,8 +422,11 @@ impl Machine for View<'_> {
     }
 
     fn flush(&mut self) -> Status {
-        let busy = self.is_busy() || self.links.has_data();
-        if hold::flush_here(self.links, busy) { Status::Ok } else { Status::NotAccepted }
+        if !machine::is_held() && (self.has_work() || self.links.has_data()) {
+            return Status::NotAccepted;
+        }
+        hold::flush_here();
+        Status::Ok
     }
 
     fn start_job(&mut self, number: u8) -> Status {
@@ -464,14 +458,14 @@ impl Machine for View<'_> {
             }
         }
         self.links.model.borrow_mut().cancel_motion();
-        self.begin(Motion::Home { axes, set: true }, Cycle::Homing)
+        self.begin(Motion::Home { axes, set: true }, machine::Event::Homing)
     }
 
     fn jog(&mut self, axis: u8, place: Length) -> Status {
         if Setup::mode(&*self.settings, axis) == AxisMode::Disabled {
             return Status::AxisDisabled;
         }
-        if self.links.jogs.get() != Bar::Open {
+        if self.links.signs.jogs.get() != Bar::Open {
             return Status::Terminated;
         }
         if let Err(status) = self.may_begin() {
@@ -488,7 +482,7 @@ impl Machine for View<'_> {
         if !near || !is_near(&target, &*self.settings) {
             return Status::OutOfRange;
         }
-        self.begin(Motion::Jog { target }, Cycle::Jog)
+        self.begin(Motion::Jog { target }, machine::Event::Jog)
     }
 
     fn store(&mut self, what: Store<'_>) -> Result<(), Status> {

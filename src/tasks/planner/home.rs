@@ -24,11 +24,10 @@ use super::seek::{Sought, drop_blocks};
 use super::square::Second;
 use crate::gcode::command::{Feed, Motion};
 use crate::hal::imp::inputs;
+use crate::machine::{self, Event};
 use crate::motion::block::Action;
 use crate::status::Status;
-use crate::tasks::alarm;
 use crate::tasks::homing::{self, Homing};
-use crate::tasks::links::Cycle;
 use crate::units::Length;
 
 /// Longer than a switch is not asked again ([`LOCK_MS`](crate::switches::LOCK_MS)).
@@ -112,7 +111,7 @@ impl Progress {
 impl Planner {
     /// Carries out the line's homing.
     pub(super) async fn home(&mut self) {
-        self.enter(Cycle::Homing);
+        self.enter(Event::Homing);
         let mut at = Progress::default();
         let mut done = self.check_homing(&mut at);
         while done.is_ok() {
@@ -313,14 +312,12 @@ impl Planner {
         if let Some(status) = failure {
             model.blame(at.axis);
             // An alarm has said already what ended it.
-            if !alarm::is_on() {
+            if !machine::is_alarmed() {
                 links.except(status);
             }
         }
         drop(model);
         // In a flush it ends with that, when the position is known.
-        if !self.is_flushed() {
-            self.enter(Cycle::Off);
-        }
+        self.enter(Event::Done);
     }
 }

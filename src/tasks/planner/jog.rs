@@ -8,12 +8,12 @@ use kerf_macros::small;
 
 use super::Planner;
 use crate::gcode::command::Motion;
-use crate::tasks::links::Cycle;
+use crate::machine::Event;
 
 impl Planner {
     /// Carries the jog out.
     pub(super) async fn jog(&mut self) {
-        self.enter(Cycle::Jog);
+        self.enter(Event::Jog);
         if self.standstill().await {
             self.begin_jog();
             self.sought().await;
@@ -35,8 +35,8 @@ impl Planner {
         // In a flush it ends with that, when the position is known.
         if !self.is_flushed() {
             self.links.model.borrow_mut().set_position(&self.position);
-            self.links.jogged.set(true);
-            self.enter(Cycle::Off);
+            self.links.notices.jogged.set(true);
+            self.enter(Event::Done);
         }
     }
 }

@@ -48,7 +48,6 @@ impl Planner {
 
     /// Whether the last block runs, and steps mean what they did: else a line comes that sees to it.
     fn is_last(&self) -> bool {
-        let changed = self.links.settings_changed.get() || self.links.resync.get();
-        queue::used() <= 1 && !changed && !self.is_flushed()
+        queue::used() <= 1 && self.links.changes.is_empty() && !self.is_flushed()
     }
 }

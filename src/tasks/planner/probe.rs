@@ -10,15 +10,14 @@ use kerf_macros::small;
 
 use super::Planner;
 use super::seek::Sought;
-use crate::alarm::Alarm;
 use crate::boards::inputs::PROBE;
 use crate::gcode::command::Motion;
 use crate::gcode::modal::MotionMode;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::inputs;
+use crate::machine::{self, Alarm, ProbeState};
 use crate::status::Status;
 use crate::tasks::alarm;
-use crate::tasks::links::{Cycle, ProbeState};
 
 /// The probe, of the inputs.
 const SWITCH: u16 = 1 << PROBE;
@@ -26,7 +25,7 @@ const SWITCH: u16 = 1 << PROBE;
 impl Planner {
     /// Carries out the line's probing.
     pub(super) async fn probe(&mut self) {
-        self.enter(Cycle::Probe);
+        self.enter(machine::Event::Probe);
         if self.standstill().await && self.begin_probe() {
             match self.sought().await {
                 Sought::Contact(steps) => {
@@ -37,7 +36,7 @@ impl Planner {
                 Sought::Flushed => {}
             }
         }
-        self.enter(Cycle::Off);
+        self.enter(machine::Event::Done);
         // The result comes before the response to the next line. In an alarm that line, whose response may be half
         // written, may itself wait for this task.
         let told = || !self.links.probe.is_news() || self.is_flushed();

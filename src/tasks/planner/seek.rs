@@ -14,12 +14,13 @@ use crate::boards::MOTORS;
 use crate::gcode::command::Feed;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::inputs;
+use crate::machine;
 use crate::motion::block::{Action, Outputs};
 use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};
 use crate::motion::snapshot::Snapshot;
 use crate::motion::{contact, queue};
+use crate::tasks::links::{self, Changes};
 use crate::tasks::setup::moved_by;
-use crate::tasks::{hold, links};
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// What has come of a move that is to end at a switch.
@@ -34,8 +35,8 @@ pub(super) enum Sought {
 
 /// Has exec drop its blocks, as soon as it is at rest.
 pub(super) fn drop_blocks() -> impl Future<Output = ()> {
-    hold::drop_blocks();
-    wait(Event::BlockDone, || hold::has_dropped().then_some(()))
+    machine::drop_blocks();
+    wait(Event::BlockDone, || machine::has_dropped_blocks().then_some(()))
 }
 
 impl Planner {
@@ -97,7 +98,7 @@ impl Planner {
     #[small]
     pub(super) fn relocate(&mut self, motion: &Snapshot) {
         // Until steps have been counted anew they mean what they meant before; nothing has moved since.
-        if !self.links.resync.get() {
+        if !self.links.changes.has(Changes::STEPS) {
             self.position = self.located(&motion.target);
         }
         self.builder.place(&motion.target);
@@ -137,6 +138,6 @@ impl Planner {
                 axis.limit_change(accel, hard * PER_SECOND_CUBED);
             }
         }
-        self.links.settings_changed.set(true);
+        self.links.changes.note(Changes::SETTINGS);
     }
 }

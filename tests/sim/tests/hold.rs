@@ -48,23 +48,26 @@ fn positions(machine: &Machine) -> [i64; 2] {
     [0, 1].map(|m| machine.recorder().motors()[m].position)
 }
 
-/// The first step of X after `from` that comes later than all at the feed do, and how long before that it is.
+/// The first step of X after `from` that comes later than all at the feed do, and so do those behind it: one that is late by
+/// itself has waited for an interrupt.
 fn first_slower(machine: &Machine, from: u64) -> u64 {
     let steady = (CLOCK / VELOCITY / STEPS) as u64;
     let steps = machine.recorder().steps_of(0);
-    let slower = |pair: &&[u64]| pair[1] > from && pair[1] - pair[0] > steady + steady / 40;
-    steps.windows(2).find(slower).expect("it slows down")[1]
+    let is_slower = |pair: &[u64]| pair[1] - pair[0] > steady + steady / 40;
+    let slow_down = |few: &&[u64]| few[1] > from && few.windows(2).all(is_slower);
+    steps.windows(4).find(slow_down).expect("it slows down")[1]
 }
 
 #[test]
-fn it_slows_down_within_10_ms() {
+fn it_slows_down_within_10_ms_and_12_while_segments_are_long() {
     let one = vec!["g1 x100 f1500".to_string()];
     // Blocks that take 4 and 2 ms, sent meanwhile, keep everybody busy.
     let many = |way: f64| {
         let first = std::iter::once("g1 f1500".to_string());
         first.chain((1..400).map(|n| format!("x{:.2}", f64::from(n) * way))).collect()
     };
-    for job in [one, many(0.1), many(0.05)] {
+    // On blocks of 4 ms segments are twice as long while thread mode has no time left.
+    for (job, most) in [(one, 10.0), (many(0.1), 12.0), (many(0.05), 10.0)] {
         let mut worst = 0;
         for n in 0..30 {
             let (mut machine, mut host) = board(SHARP);
@@ -77,7 +80,7 @@ fn it_slows_down_within_10_ms() {
         let ms = worst as f64 / CLOCK * 1e3;
         println!("{} lines: slower after {ms:.2} ms at most", job.len());
         // A step that is plainly slower may come a part of a segment after the first slower one.
-        assert!(ms > 1.0 && ms <= 10.0, "{ms} ms");
+        assert!(ms > 1.0 && ms <= most, "{ms} ms");
     }
 }
 

@@ -1,4 +1,4 @@
-//! Alarms: what brings the machine to a stop that lasts until somebody ends it. The table, without any task.
+//! Alarms: what brings the machine to a stop that lasts until somebody ends it.
 //!
 //! | cause | `stat` | motion | outputs | position | G-code | ended by |
 //! |---|---|---|---|---|---|---|
@@ -14,9 +14,10 @@
 //!
 //! Each is told by one exception report when it begins. What comes later counts only if it is worse.
 
+use super::Event;
 use crate::status::Status;
 
-/// How bad it is.
+/// A part of what the machine is doing: how bad it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Alarm {
@@ -34,6 +35,29 @@ pub enum Alarm {
 }
 
 impl Alarm {
+    /// All of them, by their discriminants.
+    pub const ALL: [Alarm; Alarm::Panic as usize + 1] =
+        [Alarm::None, Alarm::Alarm, Alarm::Limit, Alarm::Shutdown, Alarm::Panic];
+
+    /// The state that an event leads to. An alarm does not end while the hold `flushes`, nor a panic at all.
+    pub const fn after(self, event: Event, flushes: bool) -> Alarm {
+        match (event.alarm(), event) {
+            (Some(alarm), _) if self.is_exceeded_by(alarm) => alarm,
+            (None, Event::Cleared) if !flushes && !matches!(self, Alarm::Panic) => Alarm::None,
+            _ => self,
+        }
+    }
+
+    /// Whether the other one is worse, so that it counts.
+    pub const fn is_exceeded_by(self, other: Alarm) -> bool {
+        (self as u8) < other as u8
+    }
+
+    /// Whether there is one.
+    pub const fn is_on(self) -> bool {
+        !matches!(self, Alarm::None)
+    }
+
     /// The one that is so bad.
     pub fn from_bits(bits: u8) -> Alarm {
         match bits {
@@ -66,13 +90,13 @@ impl Alarm {
         }
     }
 
-    /// `stat`, for a sender that takes the machine for a g2core or not; `None` if there is no alarm.
-    pub fn state(self, is_g2core: bool) -> Option<i32> {
+    /// `stat`, for a sender that takes the machine for a g2core or not; without an alarm, that of a machine that is ready.
+    pub fn state(self, is_g2core: bool) -> i32 {
         match self {
-            Alarm::None => None,
-            Alarm::Alarm | Alarm::Limit => Some(2),
-            Alarm::Shutdown => Some(11 + i32::from(is_g2core)),
-            Alarm::Panic => Some(13),
+            Alarm::None => 1,
+            Alarm::Alarm | Alarm::Limit => 2,
+            Alarm::Shutdown => 11 + i32::from(is_g2core),
+            Alarm::Panic => 13,
         }
     }
 }
@@ -103,7 +127,7 @@ mod tests {
     fn the_worse_it_is_the_more_it_takes() {
         let all = [0, 1, 2, 3, 4].map(Alarm::from_bits);
         assert!(all.is_sorted() && all.is_sorted_by_key(|alarm| alarm.status() as u8));
-        assert_eq!(all.map(|alarm| alarm.state(true).unwrap_or(1)), [1, 2, 2, 12, 13]);
-        assert_eq!(all.map(|alarm| alarm.state(false).unwrap_or(1)), [1, 2, 2, 11, 13]);
+        assert_eq!(all.map(|alarm| alarm.state(true)), [1, 2, 2, 12, 13]);
+        assert_eq!(all.map(|alarm| alarm.state(false)), [1, 2, 2, 11, 13]);
     }
 }

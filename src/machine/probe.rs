@@ -1,0 +1,67 @@
+//! What probing has found. The planner writes, reports read.
+
+use core::cell::Cell;
+
+use crate::units::{FIRST_ROTARY, Length, PerAxis};
+
+/// What has become of a probing. The discriminants are TinyG's numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ProbeState {
+    /// No contact.
+    #[default]
+    Failed,
+    /// There was one.
+    Touched,
+    /// It is under way.
+    Waiting,
+}
+
+/// The last probing.
+#[derive(Default)]
+pub struct Probe {
+    state: Cell<ProbeState>,
+    at: Cell<[Length; FIRST_ROTARY]>,
+    news: Cell<bool>,
+}
+
+impl Probe {
+    /// What has become of it.
+    pub fn state(&self) -> ProbeState {
+        self.state.get()
+    }
+
+    /// Where the contact was, or where it ended, machine coordinates; of the axes that may probe.
+    pub fn at(&self, axis: u8) -> Option<Length> {
+        self.at.get().get(usize::from(axis)).copied()
+    }
+
+    /// It begins.
+    pub fn begin(&self) {
+        self.state.set(ProbeState::Waiting);
+    }
+
+    /// It has come to an end, which is to be told.
+    pub fn tell(&self, state: ProbeState, at: &PerAxis<Length>) {
+        self.state.set(state);
+        let [x, y, z, ..] = *at;
+        self.at.set([x, y, z]);
+        self.news.set(true);
+    }
+
+    /// It has been flushed, if it was under way: it has found nothing, and nobody is told.
+    pub fn abandon(&self) {
+        if self.state.get() == ProbeState::Waiting {
+            self.state.set(ProbeState::Failed);
+        }
+    }
+
+    /// Whether there is a result that nobody has begun to tell.
+    pub fn is_news(&self) -> bool {
+        self.news.get()
+    }
+
+    /// The same, and begins to.
+    pub fn take_news(&self) -> bool {
+        self.news.take()
+    }
+}
