@@ -4,7 +4,7 @@
 //! Called by exec's preparation of segments and by the line builder, a few times each. No units.
 
 /// `a / b`, rounded down, if that fits 16 bits: `a >> 16 < b`. Else something, without a panic.
-/// Cost: 230, 140 if it fits eight bits.
+/// Cost: 195, 120 if it fits eight bits.
 #[inline]
 pub fn quotient(a: u32, b: u16) -> u16 {
     quotient_remainder(a, b).0
@@ -16,7 +16,7 @@ pub fn quotient_remainder(a: u32, b: u16) -> (u16, u16) {
     divide(a, b)
 }
 
-/// Bit by bit: the compiler makes three times as much of it.
+/// Bit by bit, four in a turn: the compiler makes three times as much of it.
 #[cfg(target_arch = "avr")]
 #[inline(always)]
 fn divide(a: u32, b: u16) -> (u16, u16) {
@@ -25,7 +25,7 @@ fn divide(a: u32, b: u16) -> (u16, u16) {
     // SAFETY: arithmetic on its operands.
     unsafe {
         core::arch::asm!(
-            "ldi  {n}, 16",
+            "ldi  {n}, 4",
             // Where the quotient has eight bits there is no need to look for more.
             "cp   {low:h}, {b:l}",
             "cpc  {rest:l}, {b:h}",
@@ -35,8 +35,9 @@ fn divide(a: u32, b: u16) -> (u16, u16) {
             "mov  {rest:l}, {low:h}",
             "mov  {low:h}, {low:l}",
             "clr  {low:l}",
-            "ldi  {n}, 8",
+            "ldi  {n}, 2",
             "1:",
+            ".rept 4",
             "lsl  {low:l}",
             "rol  {low:h}",
             "rol  {rest:l}",
@@ -51,6 +52,7 @@ fn divide(a: u32, b: u16) -> (u16, u16) {
             "sbc  {rest:h}, {b:h}",
             "inc  {low:l}",
             "3:",
+            ".endr",
             "dec  {n}",
             "brne 1b",
             n = out(reg_upper) _,
