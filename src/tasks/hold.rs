@@ -178,6 +178,8 @@ pub fn serve(links: &Links) {
     }
 }
 
+#[inline(never)]
+#[small]
 fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
         reset();
@@ -203,9 +205,13 @@ fn act(links: &Links, port: &Port, characters: u8) {
     if cuts && is_on() {
         links.percent.set(true);
     } else if cuts {
-        links.percent_at.set(millis());
-    } else if busy && millis().wrapping_sub(links.percent_at.get()) < TOGETHER_MS {
-        flush_here(links, true);
+        // Up to a ms early: 0 is none.
+        links.percent_at.set(millis().wrapping_sub(1) | 1);
+    } else if holds {
+        let at = links.percent_at.take();
+        if busy && at != 0 && millis().wrapping_sub(at) < TOGETHER_MS {
+            flush_here(links, true);
+        }
     }
     if characters & RESUME != 0 {
         links.resume.set(true);

@@ -92,7 +92,7 @@ pub struct Links {
     pub resume: Cell<bool>,
     /// A percent sign has come in the hold.
     pub percent: Cell<bool>,
-    /// When a percent sign came that was none, ms: an exclamation mark right after it makes it one.
+    /// When a percent sign came that was none, ms: an exclamation mark right after it makes it one. 0 is never.
     pub percent_at: Cell<u32>,
     /// The job has been killed: when its queue has been flushed, the program ends.
     pub killed: Cell<bool>,
