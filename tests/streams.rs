@@ -23,11 +23,14 @@ use stream::dialogue::Dialogue;
 /// Up to a minute of the machine's time.
 const SCALE: Scale = Scale { deeds: 40, lines: 12, wait: 1_500, wrap: 20_000 };
 
+/// Within which questions are answered, ms; a ms of it is that of the test.
+const PROMPT_MS: f64 = 21.0;
+
 /// A conversation from power-up to its end.
 fn live(setup: &Setup, deeds: &[Deed]) -> Result<(), String> {
     let start = (1 << 32) - u64::from(setup.wrap);
     let machine = Machine::boot_at(115_200, start).expect("one machine for each thread");
-    let mut dialogue = Dialogue::new(machine);
+    let mut dialogue = Dialogue::new(machine, PROMPT_MS);
     let played = dialogue.begin().and_then(|()| dialogue.play(setup, deeds));
     played.map_err(|why| format!("{why}\n{}", dialogue.story()))
 }

@@ -168,6 +168,8 @@ pub fn door(links: &Links, open: bool) {
 pub fn serve(links: &Links) {
     // Before the character is taken: exec has begun, and is not to go on in between.
     if uart::asks_hold() && is_busy(links) {
+        // Those of a hold before this one count for nothing.
+        links.percent.set(links.percent.get() && is_on());
         begin();
     }
     for port in &links.ports {
@@ -191,7 +193,6 @@ fn act(links: &Links, port: &Port, characters: u8) {
     let (kills, busy) = (characters & KILL != 0, holds && is_busy(links));
     if holds {
         links.resume.set(false);
-        links.percent.set(false);
     }
     if kills || busy {
         begin();
@@ -273,7 +274,7 @@ pub fn placed(links: &Links, port: &Port, mark: u8) {
     serve(links);
     if mark == GO {
         go_on(links);
-    } else if is_on() {
+    } else if is_on() && links.percent.get() {
         cut(links, port, None);
     }
 }
@@ -285,7 +286,7 @@ pub fn ahead(links: &Links, port: &Port, mark: u8, slot: u8) {
     if mark != CUT {
         go_on(links);
     }
-    if is_on() && mark != GO && (mark == CUT || links.percent.get()) {
+    if is_on() && mark != GO && links.percent.get() {
         cut(links, port, Some(slot));
     }
 }

@@ -10,7 +10,8 @@ use crate::side::Side;
 macro_rules! tests {
     ($boot:ident) => {
         crowd::tests!($boot: xon_gets_through, all_that_has_come_is_dropped, data_does_not_hold_up_control,
-            a_stopped_port_does_not_stop_the_other, questions_leave_nothing_behind, nothing_starves_control);
+            a_stopped_port_does_not_stop_the_other, questions_leave_nothing_behind, nothing_starves_control,
+            a_percent_sign_before_a_hold_is_none);
     };
     ($boot:ident: $($name:ident),+) => {
         $(#[test]
@@ -333,5 +334,29 @@ pub fn nothing_starves_control<S: Side>(boot: impl Fn() -> S + Sync) {
                 });
             }
         }
+    }
+}
+
+/// Programs end with a percent sign. One that waits in the ring when a hold begins drops nothing; one that comes in the hold does.
+pub fn a_percent_sign_before_a_hold_is_none<S: Side>(boot: impl Fn() -> S + Sync) {
+    for (flush, steps) in [("", 12 * 128), ("%", 0)] {
+        alone(&boot, |mut crowd| {
+            crowd.set(USB, "{psw:1,sv:0}");
+            crowd.send(USB, "m0\n");
+            crowd.send(USB, &"g91g1x.1f500\n".repeat(12));
+            crowd.send(USB, "%\n");
+            crowd.pass(100);
+            crowd.send(AUX, "!");
+            crowd.pass(100);
+            crowd.send(USB, flush);
+            crowd.pass(100);
+            let dropped = if steps == 0 { 12 } else { 0 };
+            assert_eq!(crowd.responses(USB, 5), dropped, "{:?}", crowd.heard);
+            for _ in 0..2 {
+                crowd.send(USB, "~");
+                crowd.pass(2_000);
+            }
+            assert_eq!(crowd.steps(), [steps, 0, 0, 0], "{:?}", crowd.heard);
+        });
     }
 }

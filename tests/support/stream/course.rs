@@ -104,8 +104,13 @@ impl Course {
             let axis = AXES[self.axis];
             return Err(format!("{axis} went {went} steps, and its lines were {}", self.way));
         }
+        self.start();
+        Ok(())
+    }
+
+    /// What follows counts from here, where all axes rest.
+    pub fn start(&mut self) {
         (self.base, self.way, self.exact) = (self.steps[self.axis], 0, true);
         self.stirs = [false; AXES.len()];
-        Ok(())
     }
 }

@@ -15,8 +15,7 @@ use super::lines::{AXES, Effect};
 use super::port::{BYTES_MS, Port, Put};
 use crate::side::Side;
 
-/// Longest that an answer to a question takes, ms; and a byte, ms.
-const PROMPT_MS: f64 = 21.0;
+/// How long a byte takes, ms.
 const BYTE_MS: f64 = 0.0869;
 /// Bytes of answers that may have been on their way when their lines were killed: the ring, the response that is half sent, and what is
 /// said until the kill is seen.
@@ -68,12 +67,16 @@ pub struct Dialogue<S> {
     alarmed: bool,
     /// The answer to the last line of the dialogue's own.
     told: Option<Answer>,
+    /// Longest that an answer to a question may take, ms; and has taken.
+    prompt: f64,
+    pub slowest: f64,
     /// Position that is told less the steps made, of each axis.
     offsets: Option<[f64; 3]>,
 }
 
 impl<S: Side> Dialogue<S> {
-    pub fn new(side: S) -> Self {
+    /// With a machine that is to answer questions within so many ms.
+    pub fn new(side: S, prompt: f64) -> Self {
         let course = Course::new(side.steps());
         Self {
             side,
@@ -93,6 +96,8 @@ impl<S: Side> Dialogue<S> {
             percent: None,
             alarmed: false,
             told: None,
+            prompt,
+            slowest: 0.0,
             offsets: None,
         }
     }
@@ -150,6 +155,10 @@ impl<S: Side> Dialogue<S> {
         // Its answer counts already so.
         self.sums = *rxm == 0;
         self.ask(&format!("rxm:{rxm}"))?;
+        // The planner takes up settings with the first move behind them, which keeps the chip busy for some ms.
+        self.ask("gc:\"g91 g0 z0.025\"")?;
+        self.run(100)?;
+        self.course.start();
         self.ports.iter_mut().for_each(|port| {
             port.set_up(setup);
             port.counted = [port.carried(); 2];
@@ -350,7 +359,9 @@ impl<S: Side> Dialogue<S> {
             Effect::Set(value) if clear => self.values[port] = value,
             Effect::Get => self.check_value(port, &answer)?,
             Effect::Flush if !self.alarmed => {
-                self.doubt = self.now + ABOUT_MS;
+                let drops = |sent: &Sent| sent.line.effect == Effect::Flush;
+                let more = self.ports.iter().any(|port| port.ledger.waiting.iter().any(drops));
+                self.doubt = if more { u64::MAX } else { self.now + ABOUT_MS };
                 // Lines that came behind it may have been dropped with it.
                 self.course.doubt();
             }
@@ -403,7 +414,9 @@ impl<S: Side> Dialogue<S> {
             return Ok(());
         };
         let said = (heard - sent.heard) as f64 * BYTE_MS;
-        if (now - ended) as f64 - said <= PROMPT_MS {
+        let took = (now - ended) as f64 - said;
+        self.slowest = self.slowest.max(took);
+        if took <= self.prompt {
             return Ok(());
         }
         Err(format!("{:?} on port {port} is not answered", sent.line.text))

@@ -98,8 +98,8 @@ pub struct Line {
 /// What moves are multiples of, steps and mm.
 pub const CELL: (i64, f64) = (32, 0.025);
 pub const AXES: [&str; 3] = ["x", "y", "z"];
-/// Longest line of each port, and longest that overtakes wherever it is.
-pub const LONGEST: [usize; 2] = [254, 79];
+/// Longest line of each port, on the second as its ring has room for, and longest that overtakes wherever it is.
+pub const LONGEST: [usize; 2] = [254, 60];
 pub const SHORT: [usize; 2] = [40, 16];
 
 impl Template {
@@ -142,12 +142,14 @@ impl Template {
             What::Flush => (format!("{{qf:1,tid:{id}}}"), Effect::Flush),
             What::Alarm => (format!("{{alarm:1,tid:{id}}}"), Effect::Alarm),
             What::Clear => (format!("{{clear:n,tid:{id}}}"), Effect::Clear),
+            // The second port's ring has no room for one.
+            What::TooLong(_) if port == 1 => (format!("N{id} (too long)"), Effect::None),
             What::TooLong(more) => {
                 let pad = "x".repeat(LONGEST[port] + 1 + usize::from(*more % 40));
                 (format!("N{id} ({pad})"), Effect::None)
             }
         };
-        let too_long = matches!(self.what, What::TooLong(_));
+        let too_long = port == 0 && matches!(self.what, What::TooLong(_));
         let text =
             if too_long { text } else { pad(text, usize::from(self.len).min(LONGEST[port])) };
         let kind = match &self.what {

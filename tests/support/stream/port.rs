@@ -8,9 +8,10 @@ use super::lines::{Effect, End, Kind, Line, Template, What};
 
 /// Bytes that arrive in a ms, at most.
 pub const BYTES_MS: usize = 11;
-/// What may wait for answers: lines, and bytes of them on each port. A line counter's bytes on USB, and those of all others.
+/// What may wait for answers: lines, and bytes of them on each port. A line counter's, and those of who counts characters. The reader
+/// may not have a turn for 6 ms, in which more come on the second port than its ring has room for.
 const LINES: usize = 4;
-const BYTES: [usize; 2] = [623, 127];
+const BYTES: [usize; 2] = [623, 62];
 const CHARACTERS: [usize; 2] = [254, 62];
 /// Longest question.
 const ASK: usize = 17;
@@ -95,7 +96,8 @@ impl Port {
     /// Goes on so.
     pub fn set_up(&mut self, setup: &Setup) {
         self.count = setup.counts[self.number];
-        let has_flow = setup.ex == 1 || setup.ex == 2 && self.number == 1;
+        // XOFF comes too late for the second port's ring.
+        let has_flow = setup.ex == 1 + self.number as u8;
         if self.count == Count::Flow && !has_flow {
             self.count = Count::Lines;
         }
@@ -163,7 +165,8 @@ impl Port {
     /// Whether a line of so many bytes may be begun.
     fn may_begin(&self, bytes: usize) -> bool {
         let used = self.ledger.bytes() + self.placed;
-        let fits = used + bytes <= self.limit().saturating_sub(self.margin) || used == 0;
+        let margin = self.margin.min(self.limit() / 3);
+        let fits = used + bytes <= self.limit().saturating_sub(margin) || used == 0;
         fits && self.flows() && (self.count != Count::Lines || self.ledger.lines() < LINES)
     }
 
