@@ -55,5 +55,5 @@ fn settings_at_their_limits_together_move_as_they_say() {
     let moves = |case: &Case| matches!(case.setting.owner(), Owner::Motor(_) | Owner::Axis(_));
     let cases: Vec<_> = extremes::cases().into_iter().filter(moves).collect();
     let three = prop::collection::vec(select(cases), 3);
-    seeds::try_all(200, |seed| seeds::smallest(seed, &three, play));
+    seeds::try_all(1_000, |seed| seeds::smallest(seed, &three, play));
 }

@@ -17,8 +17,8 @@
 //!
 //! A hold is on from the character on, whatever the machine does, as long as there is anything to do: also
 //! between two blocks, in a dwell, or while M0 waits. An idle machine has nothing to hold and takes no notice.
-//! A `%` without a hold is none, unless an exclamation mark comes right behind it: programs begin and end
-//! with one. A tilde while the machine slows down waits until it stands. The machine does not go on if an
+//! A `%` that does not come in a hold is none, unless an exclamation mark comes right behind it: programs begin and end
+//! with one, and it may wait behind data. A tilde while the machine slows down waits until it stands. The machine does not go on if an
 //! exclamation mark comes behind the tilde, nor if there is a `%` on either side.
 //!
 //! In a comment, tilde and `%` are text: the receive interrupt leaves marks where they stand (`serial::GO`,

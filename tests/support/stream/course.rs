@@ -112,5 +112,6 @@ impl Course {
     pub fn start(&mut self) {
         (self.base, self.way, self.exact) = (self.steps[self.axis], 0, true);
         self.stirs = [false; AXES.len()];
+        self.watch = None;
     }
 }

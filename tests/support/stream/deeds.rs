@@ -31,7 +31,8 @@ pub struct Setup {
     pub sv: u8,
     pub ec: u8,
     pub jv: u8,
-    /// How long before its wrap the count of milliseconds begins.
+    /// How long before its wrap the count of milliseconds begins, where each conversation has a machine of its own.
+    #[allow(dead_code)]
     pub wrap: u16,
 }
 

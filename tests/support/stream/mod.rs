@@ -9,13 +9,14 @@
 //! | `ledger` | which lines wait for answers, and in which order these may come |
 //! | `answer`, `json` | what the machine says |
 //! | `course` | where the motors are to be |
-//! | `dialogue` | a conversation, had and judged |
+//! | `dialogue`, `judge` | a conversation, had and judged |
 
 pub mod answer;
 pub mod course;
 pub mod deeds;
 pub mod dialogue;
 pub mod json;
+mod judge;
 pub mod ledger;
 pub mod lines;
 pub mod port;

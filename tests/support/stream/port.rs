@@ -41,6 +41,8 @@ pub struct Port {
     /// The machine has stopped it, by characters or by the pin; and how many bytes it has yet to send before it heeds that.
     stopped: bool,
     stopped_by_pin: bool,
+    /// Ms since then: what it had sent before has arrived.
+    since_pin: usize,
     grace: usize,
     /// Characters of which the place counts, since all was answered.
     placed: usize,
@@ -49,7 +51,8 @@ pub struct Port {
     /// Bytes that it has counted, and that the machine has; and how many of them may count with a line that is yet to come,
     /// for they were before one that overtakes.
     pub counted: [usize; 2],
-    pub slack: usize,
+    slack: usize,
+    before: usize,
     /// Lines of G-code that have been sent.
     pub fed: bool,
     /// How many times it has asked whether anybody is there.
@@ -83,11 +86,13 @@ impl Port {
             holds: false,
             stopped: false,
             stopped_by_pin: false,
+            since_pin: 0,
             grace: 0,
             placed: 0,
             carry: 0,
             counted: [0; 2],
             slack: 0,
+            before: 0,
             fed: false,
             enquiries: 0,
         }
@@ -142,6 +147,7 @@ impl Port {
     /// The machine stops it by the pin, or not. A question may be on its way then.
     pub fn stop_by_pin(&mut self, stopped: bool) {
         self.stopped_by_pin = stopped;
+        self.since_pin = if stopped { 0 } else { self.since_pin + 1 };
         if stopped {
             self.ledger.waiting.iter_mut().for_each(|sent| sent.due = false);
         }
@@ -190,7 +196,7 @@ impl Port {
                 let blocked = bytes.is_empty();
                 match self.inserts.front() {
                     // Those behind the pin do not go; nor may they be stopped half-way.
-                    Some(_) if self.by_pin && (self.stopped_by_pin || most < BYTES_MS) => break,
+                    Some(_) if self.by_pin && (self.since_pin < 4 || most < BYTES_MS) => break,
                     Some((_, characters)) if blocked => {
                         let characters = *characters;
                         self.inserts.pop_front();
@@ -280,12 +286,22 @@ impl Port {
 
     /// A character of which the place counts stands in the line that is being sent: it does not overtake where it waits.
     pub fn break_line(&mut self) {
+        if self.has_only_led() {
+            return;
+        }
         if let Some(sent) = self.ledger.waiting.last_mut().filter(|sent| sent.ended.is_none()) {
             sent.due = false;
             if sent.line.kind == Kind::Short {
                 sent.line.kind = Kind::Long;
             }
         }
+    }
+
+    /// Of the line that is being sent nothing but blanks before it has gone.
+    pub fn has_only_led(&self) -> bool {
+        let text = self.ledger.waiting.last().map_or("", |sent| &sent.line.text);
+        self.rest.len() > text.len() && self.rest.front() == text.as_bytes().first()
+            || self.rest.front() == Some(&b' ') && self.rest.len() > text.len() + 1
     }
 
     /// Bytes of the line that is being sent that have gone, if there is one.
@@ -309,8 +325,14 @@ impl Port {
         self.is_done() && self.ledger.waiting.is_empty()
     }
 
-    /// Bytes that have been counted and belong to no line yet.
-    pub fn carried(&self) -> usize {
-        self.carry
+    /// Counts anew: what has been counted and belongs to no line yet may come on top.
+    pub fn count_anew(&mut self) {
+        (self.counted, self.before) = ([0; 2], self.slack + self.carry);
+    }
+
+    /// Whether all that was sent has been told, but for what counts with a line to come.
+    pub fn counts_right(&self) -> bool {
+        let [sent, told] = self.counted;
+        (sent.saturating_sub(self.slack)..=sent + self.before).contains(&told)
     }
 }
