@@ -226,7 +226,8 @@ impl Port {
     /// Whether characters may go: those of which the place counts take room.
     fn may_place(&mut self, characters: &[u8]) -> bool {
         let placed = characters.iter().filter(|byte| b"~%\x04".contains(byte)).count();
-        let may = placed == 0 || self.has_margin(placed);
+        // Behind the pin they may come much later than they were sent.
+        let may = placed == 0 || !self.by_pin && self.has_margin(placed);
         if may {
             self.placed += placed;
             self.enquiries += characters.iter().filter(|byte| **byte == 5).count();
