@@ -21,8 +21,6 @@ mod talk;
 #[path = "support/whereabouts.rs"]
 mod whereabouts;
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
 use deeds::{Deed, Scale};
@@ -31,11 +29,6 @@ use talk::Talk;
 
 /// Up to a minute of the machine's time.
 const SCALE: Scale = Scale { deeds: 40, way: 3_000, radius: 1.5, wait: 1_500 };
-/// It ends when so many have failed.
-const TOLD: usize = 3;
-/// A line of progress each so many conversations.
-const PROGRESS: u64 = 5_000;
-
 /// What is left of a conversation after a reset, and of the machine the EEPROM.
 type Rest<'a> = (&'a [Deed], Vec<u8>);
 
@@ -71,39 +64,11 @@ fn play(deeds: &[Deed]) -> Result<(), String> {
     Ok(())
 }
 
-/// The conversation of a seed; one that fails is made smaller.
-fn try_seed(seed: u64) -> Result<(), String> {
-    let tried = seeds::smallest(seed, &deeds::conversation(SCALE), |deeds| play(&deeds));
-    tried.map_err(|why| format!("seed {seed}: {why}"))
-}
-
 #[test]
 fn any_conversation_ends_where_it_is_to() {
-    let seeds = seeds::seeds(300);
-    let (next, failed) = (AtomicU64::new(seeds.start), Mutex::new(Vec::new()));
-    let work = || {
-        loop {
-            let seed = next.fetch_add(1, Ordering::Relaxed);
-            if !seeds.contains(&seed) || failed.lock().unwrap().len() >= TOLD {
-                return;
-            }
-            if let Err(why) = try_seed(seed) {
-                failed.lock().unwrap().push(why);
-            }
-            let done = seed + 1 - seeds.start;
-            if done.is_multiple_of(PROGRESS) {
-                seeds::tell(&format!("{done} conversations, to seed {seed}"));
-            }
-        }
-    };
-    let cores = thread::available_parallelism().map_or(1, usize::from);
-    thread::scope(|scope| {
-        (0..cores).for_each(|_| {
-            scope.spawn(work);
-        });
+    seeds::try_all(300, |seed| {
+        seeds::smallest(seed, &deeds::conversation(SCALE), |deeds| play(&deeds))
     });
-    let failed = failed.into_inner().unwrap();
-    assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
 /// The second move is planned while the first is in the very last of its slow-down.

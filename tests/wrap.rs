@@ -97,3 +97,14 @@ fn motors_lose_their_power_in_time() {
     sender.ask("", 2_000);
     println!("{}", sender.ask("{pwr:n}\n", 100));
 }
+
+/// An exclamation mark right behind a percent sign drops what is queued. None has come here, at the time 0 or ever.
+#[test]
+fn a_hold_is_no_flush() {
+    let mut sender = Sender::boot();
+    sender.ask("g1x1f20\ng1x2\n", 2_907);
+    let answer = sender.ask("!", 500);
+    assert!(!answer.contains("\"rx\""), "{answer}");
+    sender.ask("~", 4_000);
+    assert_eq!(sender.machine.emitted().position[0], 2_560);
+}

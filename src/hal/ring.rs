@@ -413,8 +413,26 @@ impl Window<'_> {
         at
     }
 
+    /// Takes bytes out of the midst: those before them move up, and the consumer is to release as many. The newest byte of a full
+    /// ring stays. Cost: 20 cycles for each byte before them.
+    #[inline(never)]
+    #[small]
+    pub fn take_out(&mut self, at: u8, count: u8) {
+        let most = self.len.saturating_sub(at).saturating_sub(self.is_full().into());
+        let count = count.min(most);
+        for n in (0..at.min(self.len)).rev() {
+            let byte = self.get(n);
+            // SAFETY: the place is one of a byte that waits, and not the newest of a full ring, which alone the producer changes.
+            unsafe { self.slots.add(self.slot(n + count).into()).write_volatile(byte) };
+        }
+        self.tail = self.tail.wrapping_add(count) & self.last;
+        self.len -= count;
+    }
+
     /// Replaces a byte that waits, if it is still `from`: the producer may have changed the newest. Whether it was. Masks
     /// interrupts for some cycles.
+    #[inline(never)]
+    #[small]
     pub fn replace(&mut self, ahead: u8, from: u8, to: u8) -> bool {
         if ahead >= self.len {
             return false;

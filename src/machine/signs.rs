@@ -29,8 +29,15 @@ impl Signs {
     }
 
     /// Whether such a percent sign has come right before.
-    pub fn is_behind_percent(&self, now: u32) -> bool {
+    fn is_behind_percent(&self, now: u32) -> bool {
         self.lone.get().is_some_and(|at| (now as u16).wrapping_sub(at) < TOGETHER_MS)
+    }
+
+    /// Whether such a percent sign has come right before an exclamation mark that comes now. None has come for the next one.
+    pub fn take_lone_percent(&self, now: u32) -> bool {
+        let is_behind = self.is_behind_percent(now);
+        self.lone.set(None);
+        is_behind
     }
 
     /// Forgets a percent sign that is too old. To be called at least once a minute, for the time wraps.

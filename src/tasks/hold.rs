@@ -19,8 +19,8 @@
 //!
 //! A hold is on from the character on, whatever the machine does, as long as there is anything to do: also
 //! between two blocks, in a dwell, or while M0 waits. An idle machine has nothing to hold and takes no notice.
-//! A `%` without a hold is none, unless an exclamation mark comes right behind it: programs begin and end
-//! with one. A tilde while the machine slows down waits until it stands. The machine does not go on if an
+//! A `%` that does not come in a hold is none, unless an exclamation mark comes right behind it: programs begin and end
+//! with one, and it may wait behind data. A tilde while the machine slows down waits until it stands. The machine does not go on if an
 //! exclamation mark comes behind the tilde, nor if there is a `%` on either side.
 //!
 //! In a comment, tilde and `%` are text: the receive interrupt leaves marks where they stand (`serial::GO`,
@@ -73,6 +73,8 @@ pub fn door(links: &Links, open: bool) {
 pub fn serve(links: &Links) {
     // Before the character is taken: exec has begun, and is not to go on in between.
     if uart::asks_hold() && is_busy(links) {
+        // Those of a hold before this one count for nothing.
+        links.signs.percent.set(links.signs.percent.get() && machine::is_held());
         machine::take(machine::Event::Hold);
     }
     for port in &links.ports {
@@ -83,6 +85,8 @@ pub fn serve(links: &Links) {
     }
 }
 
+#[inline(never)]
+#[small]
 fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
         reset();
@@ -94,7 +98,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
     let (kills, busy) = (characters & KILL != 0, holds && is_busy(links));
     let signs = &links.signs;
     if holds {
-        signs.clear();
+        signs.resume.set(false);
     }
     if busy {
         machine::take(machine::Event::Hold);
@@ -108,7 +112,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
         signs.percent.set(true);
     } else if cuts {
         signs.lone_percent(millis());
-    } else if busy && signs.is_behind_percent(millis()) {
+    } else if holds && signs.take_lone_percent(millis()) && busy {
         flush_here();
     }
     if characters & RESUME != 0 {
@@ -163,7 +167,7 @@ pub fn placed(links: &Links, port: &Port, mark: u8) {
     serve(links);
     if mark == GO {
         go_on(links);
-    } else if machine::is_held() {
+    } else if machine::is_held() && links.signs.percent.get() {
         cut(links, port, None, machine::Event::Cut);
     }
 }
@@ -175,7 +179,7 @@ pub fn ahead(links: &Links, port: &Port, mark: u8, slot: u8) {
     if mark != CUT {
         go_on(links);
     }
-    if machine::is_held() && mark != GO && (mark == CUT || links.signs.percent.get()) {
+    if machine::is_held() && mark != GO && links.signs.percent.get() {
         cut(links, port, Some(slot), machine::Event::Cut);
     }
 }

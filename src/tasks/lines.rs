@@ -4,7 +4,7 @@
 //! end in one buffer in order of arrival, so that eight short lines of G-code and one long line of JSON fit the same
 //! memory. Control lines (JSON, `$`, `?`) are taken before data lines, each kind in order.
 //!
-//! Lines that come in order leave a slot and some bytes free, the *reserve*, and none begins where a short control line
+//! Lines that come in order leave a slot and some bytes free, the *reserve*, and no control line begins where a short one
 //! would not fit whole. The reserve is for such lines that wait behind data in the receive ring ([`overtake`](super::overtake)).
 //!
 //! A line that cannot be kept whole is kept as a fault instead, with as much of it as is given back: the sender gets
@@ -140,7 +140,7 @@ impl LinePool {
     /// Whether the next byte can be taken, whatever it is.
     #[inline(never)]
     pub fn ready(&self) -> bool {
-        let need = if self.is_within_line() { 1 } else { self.reserve.into() };
+        let need = if self.is_within_line() { 1 } else { u16::from(self.reserve) + 1 };
         self.entries.len() < SLOTS && self.room() >= need
     }
 
@@ -212,10 +212,7 @@ impl LinePool {
     /// [`LinePool::put`]. Returns how many. Cost: 9 cycles a byte.
     #[inline(never)]
     pub fn put_text(&mut self, bytes: &[u8]) -> u8 {
-        if self.fault.is_some()
-            || self.is_asking()
-            || (self.partial == 0
-                && bytes.first().is_none_or(|b| is_blank(*b) || matches!(*b, ASKS | TAKEN_RETURN)))
+        if self.fault.is_some() || self.is_asking() || (self.partial == 0 && !self.may_begin(bytes))
         {
             return 0;
         }
@@ -227,6 +224,16 @@ impl LinePool {
         self.returned &= count == 0;
         self.partial += count;
         count
+    }
+
+    /// Whether a line may begin with these bytes at once: [`LinePool::put`] sees to all others. A control line waits in the ring, where
+    /// it may overtake, rather than come in half.
+    #[inline(always)]
+    fn may_begin(&self, bytes: &[u8]) -> bool {
+        match bytes.first() {
+            None | Some(b' ' | b'\t' | &ASKS | &TAKEN_RETURN) => false,
+            Some(first) => !may_be_control(*first) || self.ready(),
+        }
     }
 
     /// Takes a byte. Returns true when it completes a line.
@@ -324,22 +331,6 @@ impl LinePool {
     /// Whether a data line waits, or a fault.
     pub fn has_data(&self) -> bool {
         self.entries.len() > usize::from(self.controls)
-    }
-
-    /// Whether lines of G-code, or faults, came before a line.
-    pub fn is_behind_data(&self, id: LineId) -> bool {
-        let mut before = self.entries.iter().take(id.0.into());
-        before.any(|entry| entry.class != Class::Control)
-    }
-
-    /// A control line turns out to be G-code: it waits among the data lines.
-    pub fn wait_in_order(&mut self, id: LineId) {
-        if let Some(entry) = self.entries.get_mut(usize::from(id.0))
-            && entry.class == Class::Control
-        {
-            entry.class = Class::Data;
-            self.controls -= 1;
-        }
     }
 
     /// Drops all data lines: they will be answered with [`Status::Terminated`].
@@ -487,20 +478,44 @@ pub fn is_blank(byte: u8) -> bool {
     byte == b' ' || byte == b'\t'
 }
 
-/// Control lines are those whose first character says so; JSON that wraps G-code is data.
+/// Control lines are those whose first character says so; JSON that holds G-code is data.
 fn classify(line: &[u8]) -> Class {
     match line.first() {
         Some(b'$' | b'?') => Class::Control,
-        Some(b'{') if !wraps_gcode(line) => Class::Control,
+        Some(b'{') if !holds_gcode(line) => Class::Control,
         Some(b'h' | b'H') if asks_help(line) => Class::Control,
         _ => Class::Data,
     }
 }
 
-fn wraps_gcode(line: &[u8]) -> bool {
-    let mut name =
-        line.iter().skip(1).filter(|b| !is_blank(**b) && **b != b'"').map(u8::to_ascii_lowercase);
-    (name.next(), name.next(), name.next()) == (Some(b'g'), Some(b'c'), Some(b':'))
+/// Whether a line of JSON is `gc`, or a `txt` that is no line of text mode, as far as it has come. Either may stand behind `tid`.
+#[inline(never)]
+#[small]
+fn holds_gcode(line: &[u8]) -> bool {
+    // The last letters of a name, and whether its value is being read.
+    let (mut last, mut before, mut within) = (0, 0, false);
+    for byte in line.iter().skip(1) {
+        // Letters in lower case; others that count here stay as they are, and a tab is a parenthesis.
+        let byte = *byte | b' ';
+        if matches!(byte, b' ' | b'"' | b')') {
+            continue;
+        }
+        if within {
+            if last == b't' {
+                return !matches!(byte, b'$' | b'?');
+            }
+            within = byte != b',';
+        } else if byte == b':' {
+            match (before, last) {
+                (b'g', b'c') => return true,
+                (b'x', b't') | (b'i', b'd') => within = true,
+                _ => return false,
+            }
+        } else {
+            (before, last) = (last, byte);
+        }
+    }
+    false
 }
 
 #[cfg(test)]

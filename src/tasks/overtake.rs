@@ -6,11 +6,14 @@
 //! ```text
 //!  pool  | g1x1.. | g1x2.. | g1x3   part |  reserve  |
 //!  ring  | 00 | {stat:n} | g1x4 |             the line moves in front of the part, into the reserve,
-//!        | 00 | ######### | g1x4 |            and `serial::TAKEN` stands in its place
+//!             | 00 | g1x4 |                   and what is before it in the ring moves up
 //! ```
 //!
 //! A line overtakes if it has come whole, is no longer than the pool's reserve and is a control line. A longer one waits in order, and
-//! shorter ones overtake it. Its sender's count stays right: its bytes count with it and its place counts nothing.
+//! shorter ones overtake it. Its sender's count stays right: its bytes count with it, and their room is free when it is answered.
+//! Only of its end one byte may stay, which counts nothing: of a carriage return, which a line feed may follow, and of one that is the
+//! newest of a full ring. While lines are being dropped, up to a slot of the ring, nothing moves there, and `serial::TAKEN` stands
+//! for each byte.
 //! Each byte is looked at once (11 cycles), those of a line whose end has not come each time that the reader looks.
 
 use super::lines::{LinePool, is_blank, may_be_control};
@@ -49,10 +52,11 @@ impl Scan {
         }
     }
 
-    /// Looks on; takes the lines that overtake, as long as there is room for them. Whether there were any.
+    /// Looks on; takes the lines that overtake, as long as there is room for them. Whether there were any. If the ring `closes`
+    /// behind them it has fewer bytes then, which are to be released.
     #[inline(never)]
     #[small]
-    pub fn run(&mut self, pool: &mut LinePool, ring: &mut Window<'_>) -> bool {
+    pub fn run(&mut self, pool: &mut LinePool, ring: &mut Window<'_>, closes: bool) -> bool {
         if self.looked == 0 {
             self.within = pool.is_within_line();
         }
@@ -74,17 +78,21 @@ impl Scan {
             } else if byte == b'\n' || byte == b'\r' {
                 self.within = false;
             } else if !self.within && !is_nothing(byte) {
-                match find(ring, self.looked, pool.reserve()) {
+                let (len, ends) = match find(ring, self.looked, pool.reserve()) {
                     Found::Unfinished => break,
-                    Found::Line(len) if !pool.has_reserve(len) => break,
-                    Found::Question if !pool.has_reserve(1) => break,
-                    Found::Line(len) if take(pool, ring, self.looked, len, true) => {
-                        took = true;
-                        self.looked += len;
-                    }
-                    Found::Question if take(pool, ring, self.looked, 1, false) => took = true,
-                    _ => self.within = true,
+                    Found::Line(len) => (len, true),
+                    Found::Question => (1, false),
+                    Found::Other => (0, false),
+                };
+                if len > 0 && !pool.has_reserve(len) {
+                    break;
                 }
+                if len > 0 && take(pool, ring, self.looked, len, ends) {
+                    close(ring, self.looked, len, closes);
+                    took = true;
+                    continue;
+                }
+                self.within = true;
             }
             self.looked += 1;
         }
@@ -129,10 +137,22 @@ fn take(pool: &mut LinePool, ring: &mut Window<'_>, at: u8, len: u8, ends: bool)
         return false;
     }
     pool.put_before(ring, at, len, if ends { 0 } else { u16::MAX });
-    for place in at..at + len {
+    true
+}
+
+/// The place of a line that has been taken, with its end if that was a line feed, is free; or it is nobody's.
+#[inline(never)]
+#[small]
+fn close(ring: &mut Window<'_>, at: u8, len: u8, closes: bool) {
+    if closes {
+        ring.take_out(at, len + u8::from(ring.get(at + len) == TAKEN));
+        return;
+    }
+    let mut place = at + len;
+    while place > at {
+        place -= 1;
         ring.replace(place, ring.get(place), TAKEN);
     }
-    true
 }
 
 /// Takes the end of a line. It is the only byte that may change meanwhile: if it is the newest, and the ring is full, it becomes the

@@ -78,8 +78,6 @@ enum Progress {
     Done,
     /// It goes on later.
     Waits,
-    /// Its G-code is to wait among the others of its port.
-    InOrder,
 }
 
 /// What has been done at once.
@@ -299,7 +297,6 @@ fn go_on(links: &'static Links, port: &'static Port, session: &mut Session) -> b
         }
         Session::Answer(answer) => match answer.step(links, port) {
             Progress::Waits => return false,
-            Progress::InOrder => port.lines.borrow_mut().wait_in_order(answer.id),
             Progress::Done => {
                 finish(links, port, answer.id);
                 let changes_rate = links.rate.get().is_some() && port.number == USB;
@@ -387,10 +384,9 @@ impl Answer {
                 }
                 Next::Gcode { start, end } => {
                     if !ran(links, port, self.id, Span { start, end }, &mut self.request) {
-                        // Nothing of the response has been put yet. A line is not sent back twice.
-                        self.waits = self.echoed > 0;
-                        let later = if self.waits { Progress::Waits } else { Progress::InOrder };
-                        return (later, false);
+                        // Nothing of the response has been put yet.
+                        self.waits = true;
+                        return (Progress::Waits, false);
                     }
                 }
                 Next::Done(_) => return (Progress::Done, true),
@@ -541,7 +537,7 @@ fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Reques
         return true;
     }
     let lines = port.lines.borrow();
-    if lines.is_behind_data(id) || (links.may_feed(port) && !is_free(links)) {
+    if links.may_feed(port) && !is_free(links) {
         return false;
     }
     let (status, commented) = run_block(links, port, block.of(lines.text(id)), Usual::NotTried);

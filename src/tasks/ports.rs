@@ -130,7 +130,7 @@ impl Links {
         if port.number == self.feeder.get() {
             return true;
         }
-        let waits = self.feeder().lines.borrow().next(true).is_some();
+        let waits = self.feeder().lines.borrow().has_data();
         let free = !waits && !View::of(self, port).is_busy();
         if free {
             self.feeder.set(port.number);

@@ -122,11 +122,9 @@ impl<const N: usize> Intake<N> {
             Left::Placed(mark) => hold::placed(links, self.port, mark),
             Left::Aside => hold::serve(links),
             Left::Full => {
-                let ring = &mut self.received.window();
-                look_ahead(links, self.port, ring);
-                if self.scan.run(&mut self.port.lines.borrow_mut(), ring) {
-                    links.parser_wake.signal();
-                }
+                let taken =
+                    look_ahead(links, self.port, &mut self.scan, &mut self.received.window());
+                self.received.release_many(taken);
             }
             _ => {}
         }
@@ -273,14 +271,25 @@ impl<const N: usize> Intake<N> {
     }
 }
 
-/// No line can be taken before the machine goes on: looks for real-time characters in the ring that have
-/// it do so. Cost: 30 cycles a byte.
+/// No line can be taken before the machine goes on: looks for real-time characters in the ring that have it do so, and for lines that
+/// overtake. Returns how many bytes of these are to be released.
 #[inline(never)]
 #[small]
-fn look_ahead(links: &Links, port: &Port, ring: &Window<'_>) {
-    if !machine::is_held() && !machine::is_stopped() {
-        return;
+fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>) -> u8 {
+    if machine::is_held() || machine::is_stopped() {
+        look_for_marks(links, port, ring);
     }
+    let (waiting, closes) = (ring.len(), port.cut.get().is_none());
+    if scan.run(&mut port.lines.borrow_mut(), ring, closes) {
+        links.parser_wake.signal();
+    }
+    waiting - ring.len()
+}
+
+/// Acts upon real-time characters in the ring. Cost: 30 cycles a byte.
+#[inline(never)]
+#[small]
+fn look_for_marks(links: &Links, port: &Port, ring: &Window<'_>) {
     let mut aside = port.lines.borrow().aside();
     // Marks before a cut have had their effect.
     let mut last = port.cut.get();

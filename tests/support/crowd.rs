@@ -10,7 +10,8 @@ use crate::side::Side;
 macro_rules! tests {
     ($boot:ident) => {
         crowd::tests!($boot: xon_gets_through, all_that_has_come_is_dropped, data_does_not_hold_up_control,
-            a_stopped_port_does_not_stop_the_other, nothing_starves_control);
+            a_stopped_port_does_not_stop_the_other, questions_leave_nothing_behind, nothing_starves_control,
+            a_percent_sign_before_a_hold_is_none);
     };
     ($boot:ident: $($name:ident),+) => {
         $(#[test]
@@ -245,32 +246,50 @@ pub fn data_does_not_hold_up_control<S: Side>(boot: impl Fn() -> S + Sync) {
 
 /// A port whose sender holds the machine back keeps the other from nothing.
 pub fn a_stopped_port_does_not_stop_the_other<S: Side>(boot: impl Fn() -> S + Sync) {
-    for by_pin in [false, true] {
+    for (stopped, by_pin) in [(AUX, false), (AUX, true), (USB, false)] {
         alone(&boot, |mut crowd| {
+            let free = USB + AUX - stopped;
             crowd.set(USB, "{sv:0}");
             if by_pin {
                 crowd.set(USB, "{ex:2}");
                 crowd.side.set_aux_cts(true);
             } else {
-                crowd.send(AUX, &XOFF.to_string());
+                crowd.send(stopped, &XOFF.to_string());
             }
-            crowd.send(AUX, &"{xvm:n}\n".repeat(6));
-            crowd.send(AUX, "\x05");
+            crowd.send(stopped, &"{xvm:n}\n".repeat(6));
+            crowd.send(stopped, "\x05");
             crowd.pass(100);
-            crowd.prompt(USB, "{stat:n}\n", "{\"stat\":1}");
-            crowd.prompt(USB, "\x05", "{\"ack\":true}");
-            crowd.send(USB, "g91g1x.1f500\n");
+            crowd.prompt(free, "{stat:n}\n", "{\"stat\":1}");
+            crowd.prompt(free, "\x05", "{\"ack\":true}");
+            crowd.send(free, "g91g1x.1f500\n");
             crowd.pass(500);
-            assert_eq!(crowd.steps(), [128, 0, 0, 0]);
-            assert_eq!(crowd.responses(USB, 0), 1);
+            assert_eq!(crowd.steps(), [128, 0, 0, 0], "{:?}", crowd.heard);
+            assert_eq!(crowd.responses(free, 0), 1);
             if by_pin {
                 crowd.side.set_aux_cts(false);
             } else {
-                crowd.send(AUX, &XON.to_string());
+                crowd.send(stopped, &XON.to_string());
             }
             crowd.pass(300);
-            assert_eq!(crowd.responses(AUX, 0), 6, "{:?}", crowd.heard);
-            assert_eq!(crowd.heard[AUX].matches("{\"ack\":true}").count(), 1);
+            assert_eq!(crowd.responses(stopped, 0), 6, "{:?}", crowd.heard);
+            assert_eq!(crowd.heard[stopped].matches("{\"ack\":true}").count(), 1);
+        });
+    }
+}
+
+/// The room of a line that has overtaken is free again: whoever counts may ask as often as he likes.
+pub fn questions_leave_nothing_behind<S: Side>(boot: impl Fn() -> S + Sync) {
+    for (port, waiting, ends) in [(USB, 48, "\n"), (USB, 48, "\r"), (AUX, 18, "\n")] {
+        alone(&boot, |mut crowd| {
+            crowd.set(USB, "{psw:1,rxm:0,sv:0}");
+            crowd.set(port, "m0");
+            crowd.send(port, &format!("g4p0{ends}").repeat(waiting));
+            for _ in 0..12 {
+                crowd.prompt(port, &format!("{{stat:n}}{ends}"), "{\"stat\":3}");
+            }
+            crowd.prompt(port, "{alarm:1}\n", "{\"alarm\":1}");
+            crowd.pass(200);
+            assert_eq!(crowd.heard[port].matches("[1,203,").count(), waiting, "{:?}", crowd.heard);
         });
     }
 }
@@ -315,5 +334,29 @@ pub fn nothing_starves_control<S: Side>(boot: impl Fn() -> S + Sync) {
                 });
             }
         }
+    }
+}
+
+/// Programs end with a percent sign. One that waits in the ring when a hold begins drops nothing; one that comes in the hold does.
+pub fn a_percent_sign_before_a_hold_is_none<S: Side>(boot: impl Fn() -> S + Sync) {
+    for (flush, steps) in [("", 12 * 128), ("%", 0)] {
+        alone(&boot, |mut crowd| {
+            crowd.set(USB, "{psw:1,sv:0}");
+            crowd.send(USB, "m0\n");
+            crowd.send(USB, &"g91g1x.1f500\n".repeat(12));
+            crowd.send(USB, "%\n");
+            crowd.pass(100);
+            crowd.send(AUX, "!");
+            crowd.pass(100);
+            crowd.send(USB, flush);
+            crowd.pass(100);
+            let dropped = if steps == 0 { 12 } else { 0 };
+            assert_eq!(crowd.responses(USB, 5), dropped, "{:?}", crowd.heard);
+            for _ in 0..2 {
+                crowd.send(USB, "~");
+                crowd.pass(2_000);
+            }
+            assert_eq!(crowd.steps(), [steps, 0, 0, 0], "{:?}", crowd.heard);
+        });
     }
 }

@@ -17,6 +17,10 @@ impl Side for Machine {
         Machine::set_aux_cts(self, stop);
     }
 
+    fn stops_aux(&self) -> bool {
+        self.aux_rts()
+    }
+
     fn heard_aux(&mut self) -> Vec<u8> {
         self.received_aux()
     }

@@ -5,17 +5,62 @@
 use std::fmt::Debug;
 use std::io::{Write, stderr};
 use std::ops::Range;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
 
 use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
 /// The seeds, if `count` of them are usual; printed.
 pub fn seeds(count: u64) -> Range<u64> {
-    let wanted = |name| std::env::var(name).ok().and_then(|n| n.parse().ok());
     let first = wanted("KERF_SEED").unwrap_or(0);
     let seeds = first..first + wanted("KERF_CASES").unwrap_or(count);
     tell(&format!("random conversations: seeds {} to {}", seeds.start, seeds.end - 1));
     seeds
+}
+
+/// It ends when so many have failed.
+const TOLD: usize = 3;
+/// A line of progress each so many cases.
+const PROGRESS: u64 = 5_000;
+
+/// Tries the case of each seed, on all cores, or on as many as `KERF_CORES` says. The first that fail are told.
+#[allow(dead_code)]
+pub fn try_all(count: u64, try_seed: impl Fn(u64) -> Result<(), String> + Sync) {
+    let seeds = seeds(count);
+    let (next, failed) = (AtomicU64::new(seeds.start), Mutex::new(Vec::new()));
+    let work = || {
+        loop {
+            let seed = next.fetch_add(1, Ordering::Relaxed);
+            if !seeds.contains(&seed) || failed.lock().unwrap().len() >= TOLD {
+                return;
+            }
+            if let Err(why) = try_seed(seed) {
+                failed.lock().unwrap().push(format!("seed {seed}: {why}"));
+            }
+            let done = seed + 1 - seeds.start;
+            if done.is_multiple_of(PROGRESS) {
+                tell(&format!("{done} cases, to seed {seed}"));
+            }
+        }
+    };
+    let cores = wanted("KERF_CORES").map_or_else(cores, |n| n as usize);
+    thread::scope(|scope| {
+        (0..cores).for_each(|_| {
+            scope.spawn(work);
+        });
+    });
+    let failed = failed.into_inner().unwrap();
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+fn cores() -> usize {
+    thread::available_parallelism().map_or(1, usize::from)
+}
+
+fn wanted(name: &str) -> Option<u64> {
+    std::env::var(name).ok().and_then(|n| n.parse().ok())
 }
 
 /// Says something although the test passes.

@@ -9,6 +9,8 @@ pub trait Side {
     fn send_aux(&mut self, bytes: &[u8]);
     /// Drives the pin with which its sender holds the machine back.
     fn set_aux_cts(&mut self, stop: bool);
+    /// Whether the machine stops that sender by the other pin.
+    fn stops_aux(&self) -> bool;
     /// The sender's end changes its rate.
     fn set_baud(&mut self, baud: u32);
     /// Lets time pass.

@@ -58,6 +58,11 @@ impl Machine {
         uart::set_cts(AUX, stop);
     }
 
+    /// Whether the firmware holds the sender on the second port back by the pin.
+    pub fn aux_rts(&self) -> bool {
+        uart::rts(AUX)
+    }
+
     /// What the firmware has sent since the last call.
     pub fn received(&self) -> Vec<u8> {
         uart::received(USB)

@@ -285,6 +285,11 @@ pub(super) fn set_cts(port: u8, stop: bool) {
     with(port, |line| line.cts = stop);
 }
 
+/// Whether the machine holds the sender back by RTS.
+pub(super) fn rts(port: u8) -> bool {
+    with(port, |line| line.rts)
+}
+
 /// Takes what the firmware has sent.
 pub(super) fn received(port: u8) -> Vec<u8> {
     with(port, |line| core::mem::take(&mut line.sent))

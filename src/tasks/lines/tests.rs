@@ -253,14 +253,42 @@ fn a_control_line_overtakes_what_is_coming_in() {
     }
 }
 
+/// A line of JSON that holds G-code is data from the start, or it would overtake, and outlive a kill.
 #[test]
-fn g_code_that_looked_like_control_waits_in_order() {
-    let mut pool = pool();
-    feed(&mut pool, b"g1x1\n{tid:1,gc:\"g1x2\"}\ng1x3\n");
-    let (id, _) = pool.next(false).unwrap();
-    assert!(pool.is_behind_data(id));
-    pool.wait_in_order(id);
-    assert_eq!(pool.next(false), None);
-    assert_eq!(take(&mut pool, true), Some((b"g1x1".to_vec(), Class::Data)));
-    assert!(!pool.is_behind_data(LineId(0)));
+fn json_that_holds_g_code_is_data() {
+    for line in [
+        r#"{gc:"g1x2"}"#,
+        r#"{ "GC" : "g1x2" }"#,
+        r#"{tid:1,gc:"g1x2"}"#,
+        r#"{"tid" : 1, "tid":2 ,"gc":"g1x2"}"#,
+        r#"{txt:"g1x2"}"#,
+        r#"{tid:1,txt:" n1 g1"}"#,
+        r#"{txt:"h1 g43"}"#,
+    ] {
+        assert_eq!(classify(line.as_bytes()), Class::Data, "{line}");
+    }
+    for line in [
+        "{gcx:n}",
+        "{tid:1}",
+        "{tid:1,tid:2}",
+        "{tid:1,stat:n}",
+        r#"{txt:" $xvm=1"}"#,
+        r#"{txt:"?"}"#,
+        r#"{msg:"gc:"}"#,
+        "{",
+        "{tid",
+        "{txt:",
+    ] {
+        assert_eq!(classify(line.as_bytes()), Class::Control, "{line}");
+    }
+}
+
+/// It would wait in half, and those behind it would overtake it.
+#[test]
+fn a_control_line_comes_whole_or_stays_in_the_ring() {
+    let mut pool = LinePool::new(Box::leak(Box::new([0; 40])), 16);
+    feed(&mut pool, b"g1x1y1z1\n");
+    assert_eq!((pool.room(), pool.ready()), (16, false), "a line end needs room too");
+    assert_eq!(pool.put_text(b"{stat:n}"), 0);
+    assert_eq!(pool.put_text(b"g1x2"), 4);
 }

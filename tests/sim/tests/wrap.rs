@@ -2,26 +2,14 @@
 
 mod common;
 
-use common::{firmware, set};
+use common::{age, firmware, set};
 use kerf::boards::RAMPS14;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
-
-/// The mask of the tick's interrupt.
-const TIMSK0: u16 = 0x6E;
-/// The count, the lowest byte first.
-const MILLIS: &str = "kerf::hal::imp::time::MILLIS";
 
 /// A machine that has run for 49.7 days but 3 s.
 fn old() -> (Machine, Host) {
     let mut machine = firmware(&RAMPS14);
-    // Before any task waits for a time.
-    while machine.peek(TIMSK0) == 0 {
-        machine.run_until(machine.cycle() + 16).unwrap();
-    }
-    let count = machine.image().variable(MILLIS).expect("the count of milliseconds");
-    for (at, byte) in (count..).zip(3_000u32.wrapping_neg().to_le_bytes()) {
-        machine.poke(at, byte);
-    }
+    age(&mut machine, 3_000);
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut machine, 1_000).unwrap();
     (machine, host)

@@ -73,6 +73,23 @@ pub fn firmware(board: &'static Board) -> Machine {
     Machine::load(&image(board), board).unwrap()
 }
 
+/// The mask of the tick's interrupt.
+const TIMSK0: u16 = 0x6E;
+/// The count of milliseconds, the lowest byte first.
+const MILLIS: &str = "kerf::hal::imp::time::MILLIS";
+
+/// A machine that has just been started has run for 49.7 days, but for so many ms.
+pub fn age(machine: &mut Machine, ms: u32) {
+    // Before any task waits for a time.
+    while machine.peek(TIMSK0) == 0 {
+        machine.run_until(machine.cycle() + 16).unwrap();
+    }
+    let count = machine.image().variable(MILLIS).expect("the count of milliseconds");
+    for (at, byte) in (count..).zip(ms.wrapping_neg().to_le_bytes()) {
+        machine.poke(at, byte);
+    }
+}
+
 /// A machine that runs the firmware, booted, and a sender.
 pub fn booted(board: &'static Board) -> (Machine, Host) {
     let (mut machine, mut host) = (firmware(board), Host::new(LINES_IN_FLIGHT));

@@ -23,6 +23,11 @@ impl Side for Machine {
         self.set_cts(AUX, stop);
     }
 
+    fn stops_aux(&self) -> bool {
+        let pins = self.board().serial.get(AUX).and_then(|port| port.handshake);
+        pins.is_some_and(|pins| self.is_high(pins.rts))
+    }
+
     fn heard_aux(&mut self) -> Vec<u8> {
         self.receive_from(AUX)
     }

@@ -1,0 +1,47 @@
+//! Random streams on both ports of the whole firmware on the host, in mocked time: the model of a port's stream is in
+//! `tests/support/stream`; `tests/sim/tests/streams.rs` has the same with the image, and shorter ones.
+//!
+//! Each is with a machine of its own, whose count of milliseconds wraps within it. One that fails is made as small as
+//! it can be, and its seed is told: `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test streams` has it again. A
+//! long run on all cores: `KERF_CASES=100000 cargo test --release -p kerf --test streams`.
+
+#[path = "support/host.rs"]
+mod host;
+#[path = "support/seeds.rs"]
+mod seeds;
+#[path = "support/side.rs"]
+mod side;
+#[path = "support/stream/mod.rs"]
+mod stream;
+
+use std::thread;
+
+use kerf::hal::imp::Machine;
+use stream::deeds::{Deed, Scale, Setup, conversation};
+use stream::dialogue::Dialogue;
+
+/// Up to a minute of the machine's time.
+const SCALE: Scale = Scale { deeds: 40, lines: 12, wait: 1_500, wrap: 20_000 };
+
+/// Within which questions are answered, ms; a ms of it is that of the test.
+const PROMPT_MS: f64 = 21.0;
+
+/// A conversation from power-up to its end.
+fn live(setup: &Setup, deeds: &[Deed]) -> Result<(), String> {
+    let start = (1 << 32) - u64::from(setup.wrap);
+    let machine = Machine::boot_at(115_200, start).expect("one machine for each thread");
+    let mut dialogue = Dialogue::new(machine, PROMPT_MS);
+    let played = dialogue.begin().and_then(|()| dialogue.play(setup, deeds));
+    played.map_err(|why| format!("{why}\n{}", dialogue.story()))
+}
+
+/// Has a conversation, with a machine in a thread of its own.
+fn play((setup, deeds): (Setup, Vec<Deed>)) -> Result<(), String> {
+    let lived = thread::scope(|scope| scope.spawn(|| live(&setup, &deeds)).join());
+    lived.map_err(|_| "the firmware panics".to_string())?
+}
+
+#[test]
+fn any_stream_is_answered_and_carried_out() {
+    seeds::try_all(6_000, |seed| seeds::smallest(seed, &conversation(SCALE), play));
+}

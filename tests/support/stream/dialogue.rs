@@ -1,0 +1,318 @@
+//! A conversation of two streams, had and judged.
+//!
+//! Every line is answered once, in its port's order; questions are answered within 20 ms unless their sender holds the machine back; what
+//! has been answered by 0 has been done, and what has been dropped has not; the machine comes to rest, and stands where
+//! it says.
+
+use kerf::boards::outputs;
+
+use super::answer::{Answer, Heard, read};
+use super::course::Course;
+use super::deeds::{Deed, Setup};
+use super::json::Value;
+use super::port::{BYTES_MS, Port, Put};
+use crate::side::Side;
+
+/// Longest that the machine may take to come to rest.
+const REST_MS: u64 = 60_000;
+
+/// How the machine moves: fast, for there is much to do. M0 waits for a tilde, and answers have the numbers of their lines.
+const MODES: [&str; 5] = [
+    "x:{vm:3000,fr:3000,jm:2000,ac:0}",
+    "y:{vm:3000,fr:3000,jm:2000,ac:0}",
+    "z:{vm:3000,fr:3000,jm:2000,ac:0}",
+    "psw:1,jv:4,xsn:0,ysn:0,zsx:0",
+    "uda0:\"0x0\",udb0:\"0x0\"",
+];
+
+pub(super) type Outcome<T> = Result<T, String>;
+
+/// A machine, and the senders on its two ports.
+pub struct Dialogue<S> {
+    pub(super) side: S,
+    pub(super) ports: [Port; 2],
+    pub(super) course: Course,
+    pub(super) now: u64,
+    /// The number of the next line.
+    pub(super) id: u32,
+    /// Footers have a checksum.
+    pub(super) sums: bool,
+    /// What has come of the line that is being heard, and all bytes and lines so far.
+    pub(super) partial: [Vec<u8>; 2],
+    pub(super) heard: [usize; 2],
+    pub(super) story: Vec<String>,
+    pub(super) banners: usize,
+    pub(super) acks: [usize; 2],
+    /// What each port has set its value to.
+    pub(super) values: [u16; 2],
+    /// Until when lines may be dropped although none was sent behind what drops them.
+    pub(super) doubt: u64,
+    /// When an exclamation mark was sent last, since the machine was at rest; and a percent sign.
+    pub(super) held: Option<u64>,
+    pub(super) percent: Option<u64>,
+    pub(super) alarmed: bool,
+    /// The answer to the last line of the dialogue's own.
+    pub(super) told: Option<Answer>,
+    /// Longest that an answer to a question may take, ms; and has taken.
+    pub(super) prompt: f64,
+    pub slowest: f64,
+    /// Position that is told less the steps made, of each axis.
+    pub(super) offsets: Option<[f64; 3]>,
+}
+
+impl<S: Side> Dialogue<S> {
+    /// With a machine that is to answer questions within so many ms.
+    pub fn new(side: S, prompt: f64) -> Self {
+        let course = Course::new(side.steps());
+        Self {
+            side,
+            ports: [Port::new(0), Port::new(1)],
+            course,
+            now: 0,
+            id: 1,
+            sums: false,
+            partial: Default::default(),
+            heard: [0; 2],
+            story: Vec::new(),
+            banners: 0,
+            acks: [0; 2],
+            values: [0; 2],
+            doubt: 0,
+            held: None,
+            percent: None,
+            alarmed: false,
+            told: None,
+            prompt,
+            slowest: 0.0,
+            offsets: None,
+        }
+    }
+
+    /// A machine that has never been used boots, and is set up to move.
+    pub fn begin(&mut self) -> Outcome<()> {
+        self.side.wire(&[]);
+        self.side.set_aux_cts(false);
+        while self.banners < 2 {
+            self.tick()?;
+            if self.now > 3_000 {
+                return Err("no SYSTEM READY".to_string());
+            }
+        }
+        for modes in MODES {
+            self.ask(modes)?;
+        }
+        self.rest()
+    }
+
+    /// Has a conversation.
+    pub fn play(&mut self, setup: &Setup, deeds: &[Deed]) -> Outcome<()> {
+        self.story.push(format!("{setup:?}"));
+        self.set_up(setup)?;
+        for deed in deeds {
+            self.story.push(format!("{} ms: {deed:?}", self.now));
+            match deed {
+                Deed::Feed(main, lines) => {
+                    let port = if *main { setup.main } else { 1 - setup.main };
+                    self.ports[port].queue.extend(lines.iter().cloned());
+                }
+                Deed::Characters(port, characters, after) => {
+                    // The pin may stop the sender between two of them.
+                    let one = self.ports[*port].by_pin;
+                    let characters = if one { &characters[..1] } else { characters };
+                    self.ports[*port].inserts.push_back(((*after).into(), characters));
+                }
+                Deed::Hold(port, holds) => self.hold(*port, *holds),
+                Deed::Ask(port) => self.ports[*port].asks = true,
+                Deed::Wait(ms) => self.run((*ms).into())?,
+                Deed::Rest => self.rest()?,
+            }
+        }
+        self.rest()?;
+        self.ask("ex:1,rxm:1")?;
+        self.sums = false;
+        self.story.clear();
+        Ok(())
+    }
+
+    /// All that was done, and heard, of a conversation that failed.
+    pub fn story(&self) -> String {
+        self.story.join("\n")
+    }
+
+    fn set_up(&mut self, setup: &Setup) -> Outcome<()> {
+        let Setup { ex, rxm, sv, ec, jv, .. } = setup;
+        self.ask(&format!("sv:{sv},ec:{ec},jv:{jv},ex:{ex}"))?;
+        // Its answer counts already so.
+        self.sums = *rxm == 0;
+        self.ask(&format!("rxm:{rxm}"))?;
+        // The planner takes up settings with the first move behind them, which keeps the chip busy for some ms.
+        self.ask("gc:\"g91 g0 z0.025\"")?;
+        self.run(100)?;
+        self.course.start();
+        self.ports.iter_mut().for_each(|port| {
+            port.set_up(setup);
+            port.count_anew();
+        });
+        Ok(())
+    }
+
+    fn hold(&mut self, port: usize, holds: bool) {
+        let (bytes, level) = self.ports[port].hold(holds);
+        self.send(port, bytes);
+        if let Some(level) = level {
+            self.side.set_aux_cts(level);
+        }
+    }
+
+    fn send(&mut self, port: usize, bytes: &[u8]) {
+        match port {
+            0 => self.side.send(bytes),
+            _ => self.side.send_aux(bytes),
+        }
+    }
+
+    fn run(&mut self, ms: u64) -> Outcome<()> {
+        (0..ms).try_for_each(|_| self.tick())
+    }
+
+    /// A ms.
+    fn tick(&mut self) -> Outcome<()> {
+        let stopped = self.side.stops_aux();
+        self.ports[1].stop_by_pin(stopped);
+        (0..2).for_each(|port| self.emit(port));
+        self.side.run_ms(1);
+        self.now += 1;
+        for port in 0..2 {
+            let mut bytes = if port == 0 { self.side.heard() } else { self.side.heard_aux() };
+            self.ports[port].heed(&mut bytes);
+            for byte in bytes {
+                self.heard[port] += 1;
+                match byte {
+                    b'\n' => self.line(port)?,
+                    b'\r' => {}
+                    byte => self.partial[port].push(byte),
+                }
+            }
+            self.check_due(port)?;
+        }
+        let turns = self.side.outputs().0 & outputs::SPINDLE != 0;
+        self.course.see(self.now, self.side.steps(), turns)
+    }
+
+    /// A port's sender puts on the line what it may.
+    fn emit(&mut self, number: usize) {
+        let mut left = BYTES_MS;
+        while left > 0 {
+            let (axis, epoch) = (self.course.axis, self.course.epoch);
+            let before = self.id;
+            let put = self.ports[number].put(left, self.now, &mut self.id, axis, epoch);
+            match put {
+                Put::Nothing => return,
+                Put::Bytes(bytes) => {
+                    left -= bytes.len();
+                    self.send(number, &bytes);
+                    if self.id > before {
+                        self.begun(number, before);
+                    }
+                }
+                Put::Characters(characters) => {
+                    left = left.saturating_sub(characters.len());
+                    self.send(number, characters);
+                    self.story.push(format!(
+                        "{} ms: {number}: {:?}",
+                        self.now,
+                        characters.escape_ascii().to_string()
+                    ));
+                    characters.iter().for_each(|character| self.acts(number, *character));
+                }
+            }
+        }
+    }
+
+    /// A line has been heard.
+    fn line(&mut self, port: usize) -> Outcome<()> {
+        let line = String::from_utf8_lossy(&std::mem::take(&mut self.partial[port])).to_string();
+        self.story.push(format!("{} ms:     {port} heard {line}", self.now));
+        if self.banners < 2 && !line.contains("SYSTEM READY") {
+            return Ok(());
+        }
+        match read(&line, self.sums)? {
+            Heard::Banner => {
+                self.banners += 1;
+                if self.banners > 2 { Err("it has started anew".to_string()) } else { Ok(()) }
+            }
+            Heard::Ack => {
+                self.acks[port] += 1;
+                let many = self.acks[port] > self.ports[port].enquiries;
+                if many { Err("an ack that nobody asked for".to_string()) } else { Ok(()) }
+            }
+            Heard::Exception(13 | 37) => Err(format!("heard {line}")),
+            Heard::Exception(_) | Heard::Report => Ok(()),
+            Heard::Answer(answer) => self.answer(port, answer),
+        }
+    }
+
+    /// Asks something of its own, and waits for the answer.
+    pub(super) fn ask(&mut self, pairs: &str) -> Outcome<Answer> {
+        self.told = None;
+        let id = self.id;
+        let line = format!("{{{pairs},tid:{id}}}");
+        self.ports[0].own(id, &line, self.now);
+        self.id += 1;
+        self.story.push(format!("{} ms: {line}", self.now));
+        let from = self.now;
+        loop {
+            self.tick()?;
+            match self.told.take() {
+                Some(answer) if answer.id == Some(id) => return Ok(answer),
+                _ if self.now - from > REST_MS => return Err(format!("{line} is not answered")),
+                _ => {}
+            }
+        }
+    }
+
+    /// Waits until all is answered and nothing moves, and looks whether it is as it is to be.
+    fn rest(&mut self) -> Outcome<()> {
+        let from = self.now;
+        let (mut last, mut quiet) = (self.side.steps(), 0);
+        loop {
+            if self.now - from > REST_MS {
+                return Err("the machine does not come to rest".to_string());
+            }
+            self.relieve()?;
+            self.run(50)?;
+            let (steps, idle) = (self.side.steps(), self.ports.iter().all(Port::is_idle));
+            // What waits for a tilde gets one.
+            quiet = if steps == last && idle { quiet + 1 } else { 0 };
+            last = steps;
+            if quiet < 2 {
+                continue;
+            }
+            let answer = self.ask("stat:n,qr:n,hold:n")?;
+            let number = |name| answer.told(name).and_then(Value::number).unwrap_or(-1.0) as i32;
+            match number("stat") {
+                2 => drop(self.ask("clear:n")?),
+                1 | 3 | 4 if number("qr") == 64 && number("hold") == 0 => break,
+                _ => {}
+            }
+        }
+        self.course.rest()?;
+        (self.held, self.percent, self.alarmed, self.doubt) = (None, None, false, 0);
+        self.ports.iter_mut().for_each(|port| port.fed = false);
+        self.check_counts()?;
+        self.check_position()
+    }
+
+    /// Lets go of all that holds the machine back.
+    fn relieve(&mut self) -> Outcome<()> {
+        (0..2)
+            .filter(|port| self.ports[*port].holds)
+            .collect::<Vec<_>>()
+            .into_iter()
+            .for_each(|port| self.hold(port, false));
+        // A character of two that make a flush is not to come now.
+        self.send(0, b"~\x90\x95");
+        self.ports[0].break_line();
+        Ok(())
+    }
+}

@@ -1,0 +1,174 @@
+//! The lines of a stream. Each is made when its first byte is put on the line, and has a number that comes back.
+
+/// What a line does.
+#[derive(Clone, Debug)]
+pub enum What {
+    /// Moves by so many [`CELL`]s at a feed, mm/min; 0 is a traverse.
+    Move(i8, u16),
+    /// The same in JSON, with the number before the block or behind it.
+    Wrapped(i8, u16, bool),
+    /// Waits, ms.
+    Dwell(u16),
+    /// Another block.
+    Block(&'static str),
+    /// Reads something: pairs of JSON.
+    Read(&'static str),
+    /// Asks what the machine does, and is to be answered at once.
+    Ask,
+    /// Sets a value of the port's own, or reads it.
+    Set(u16),
+    Get,
+    /// Drops what is queued; begins an alarm; ends one.
+    Flush,
+    Alarm,
+    Clear,
+    /// Is longer than a line may be.
+    TooLong(u8),
+}
+
+/// A line to be.
+#[derive(Clone, Debug)]
+pub struct Template {
+    pub what: What,
+    /// Its length, if there is room for comments or blanks.
+    pub len: u8,
+    /// Blanks before it, and how it ends.
+    pub lead: u8,
+    pub end: End,
+}
+
+/// How a line ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum End {
+    Feed,
+    Return,
+    Both,
+    /// With an empty line behind it.
+    Empty,
+}
+
+impl End {
+    pub fn bytes(self) -> &'static str {
+        match self {
+            End::Feed => "\n",
+            End::Return => "\r",
+            End::Both => "\r\n",
+            End::Empty => "\n\n",
+        }
+    }
+}
+
+/// How a line goes through the machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// In order.
+    Data,
+    /// It overtakes data wherever it is.
+    Short,
+    /// It overtakes data in the pool.
+    Long,
+}
+
+/// What an answer of 0 says that the line has done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Effect {
+    None,
+    /// An axis has moved, or will, by so many steps.
+    Move(usize, i64),
+    /// A spindle turns.
+    Spindle,
+    Ask,
+    Set(u16),
+    Get,
+    Flush,
+    Alarm,
+    Clear,
+}
+
+/// A line.
+#[derive(Clone, Debug)]
+pub struct Line {
+    pub text: String,
+    pub kind: Kind,
+    pub effect: Effect,
+    /// It may be refused as too long.
+    pub too_long: bool,
+}
+
+/// What moves are multiples of, steps and mm.
+pub const CELL: (i64, f64) = (32, 0.025);
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+/// Longest line of each port, on the second as its ring has room for, and longest that overtakes wherever it is.
+pub const LONGEST: [usize; 2] = [254, 60];
+pub const SHORT: [usize; 2] = [40, 16];
+
+impl Template {
+    /// A line of natural length.
+    pub fn plain(what: What) -> Self {
+        Self { what, len: 0, lead: 0, end: End::Feed }
+    }
+
+    /// The line of a port, with its number; what moves is an axis.
+    pub fn line(&self, port: usize, id: u32, axis: usize) -> Line {
+        let block = |way: i8, feed: u16| {
+            let way = f64::from(way) * CELL.1;
+            let axis = AXES[axis];
+            match feed {
+                0 => format!("g91 g0 {axis}{way:.3}"),
+                feed => format!("g91 g1 f{feed} {axis}{way:.3}"),
+            }
+        };
+        let moves = |way: i8| Effect::Move(axis, i64::from(way) * CELL.0);
+        let user = if port == 0 { "uda0" } else { "udb0" };
+        let (text, effect) = match &self.what {
+            What::Move(way, feed) => (format!("N{id} {}", block(*way, *feed)), moves(*way)),
+            What::Wrapped(way, feed, true) => {
+                (format!("{{tid:{id},gc:\"{}\"}}", block(*way, *feed)), moves(*way))
+            }
+            What::Wrapped(way, feed, false) => {
+                (format!("{{\"gc\":\"{}\",\"tid\":{id}}}", block(*way, *feed)), moves(*way))
+            }
+            What::Dwell(ms) => (format!("N{id} g4 p{:.3}", f64::from(*ms) / 1e3), Effect::None),
+            What::Block(block) => {
+                let turns = block.contains("m3") || block.contains("m4");
+                (format!("N{id} {block}"), if turns { Effect::Spindle } else { Effect::None })
+            }
+            What::Read(pairs) => (format!("{{{pairs},tid:{id}}}"), Effect::None),
+            What::Ask => (format!("{{stat:n,tid:{id}}}"), Effect::Ask),
+            What::Set(value) => {
+                (format!("{{{user}:\"0x{value:x}\",tid:{id}}}"), Effect::Set(*value))
+            }
+            What::Get => (format!("{{{user}:n,tid:{id}}}"), Effect::Get),
+            What::Flush => (format!("{{qf:1,tid:{id}}}"), Effect::Flush),
+            What::Alarm => (format!("{{alarm:1,tid:{id}}}"), Effect::Alarm),
+            What::Clear => (format!("{{clear:n,tid:{id}}}"), Effect::Clear),
+            // The second port's ring has no room for one.
+            What::TooLong(_) if port == 1 => (format!("N{id} (too long)"), Effect::None),
+            What::TooLong(more) => {
+                let pad = "x".repeat(LONGEST[port] + 1 + usize::from(*more % 40));
+                (format!("N{id} ({pad})"), Effect::None)
+            }
+        };
+        let too_long = port == 0 && matches!(self.what, What::TooLong(_));
+        let text =
+            if too_long { text } else { pad(text, usize::from(self.len).min(LONGEST[port])) };
+        let kind = match &self.what {
+            What::Wrapped(..) => Kind::Data,
+            _ if text.starts_with('N') => Kind::Data,
+            _ if text.len() <= SHORT[port] => Kind::Short,
+            _ => Kind::Long,
+        };
+        Line { text, kind, effect, too_long }
+    }
+}
+
+/// The line made longer, by a comment or by blanks.
+fn pad(text: String, len: usize) -> String {
+    let more = len.saturating_sub(text.len());
+    match text.split_at(1) {
+        (_, _) if more == 0 => text,
+        ("{", rest) => format!("{{{}{rest}", " ".repeat(more)),
+        _ if more < 3 => text + &" ".repeat(more),
+        _ => format!("{text} ({})", "c".repeat(more - 3)),
+    }
+}
