@@ -30,6 +30,7 @@ use crate::gcode::command::Stop;
 use crate::hal::event::{Event, wake_after, wake_after_transmitted};
 use crate::hal::imp;
 use crate::hal::imp::eeprom::Eeprom;
+use crate::hal::imp::flags;
 use crate::hal::imp::time::millis;
 use crate::hal::serial::{PORTS, USB};
 use crate::jobs::Job;
@@ -40,7 +41,8 @@ use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
 const ECHO: usize = 62;
-/// Steps of a response before others have their turn: to find a name takes a ms, and the ring of the second port is full in 5.
+/// Most steps of a response before others have their turn. They have it as well when a ms is over: to find a name may take as long, while
+/// exec takes most of the CPU two, and the ring of the second port is full in 5.
 const STEPS: u8 = 4;
 
 /// A port's transmitter, while it is the parser's.
@@ -366,10 +368,14 @@ impl Answer {
 
     /// Carries the response on while there is room, a bounded number of steps. Says how far it has come, and whether the
     /// transmitter is still needed.
+    #[inline(never)]
+    #[small]
     fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
-        let (mut begun, mut left) = (begun, STEPS);
-        while tx.has_room() && left > 0 {
-            left -= 1;
+        let mut begun = begun;
+        for done in 0..STEPS {
+            if !tx.has_room() || (done > 0 && flags::has(Event::Tick)) {
+                break;
+            }
             if self.echoes {
                 self.echoes = echo(links, port, self.id, &mut self.echoed, tx);
                 begun = true;

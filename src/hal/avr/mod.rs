@@ -125,6 +125,13 @@ pub mod flags {
         })
     }
 
+    /// Whether a bit is set.
+    #[inline(always)]
+    pub fn has(event: Event) -> bool {
+        // SAFETY: as in `set`.
+        unsafe { GPIOR0.read_volatile() & 1 << event as u8 != 0 }
+    }
+
     /// Whether any is set.
     #[inline(always)]
     pub fn any() -> bool {

@@ -87,6 +87,12 @@ pub mod flags {
         taken
     }
 
+    /// Whether a bit is set.
+    #[inline(always)]
+    pub fn has(event: Event) -> bool {
+        bits().get() & 1 << event as u8 != 0
+    }
+
     /// Whether any is set.
     pub fn any() -> bool {
         bits().get() != 0
