@@ -274,8 +274,9 @@ impl<S: Side> Dialogue<S> {
     /// Waits until all is answered and nothing moves, and looks whether it is as it is to be.
     fn rest(&mut self) -> Outcome<()> {
         let from = self.now;
-        let (mut last, mut quiet) = (self.side.steps(), 0);
-        loop {
+        let (mut last, mut quiet, mut rested) = (self.side.steps(), 0, 0);
+        // A machine that waits at M0 says that it rests as well: it is to say so again, behind another tilde.
+        while rested < 2 {
             if self.now - from > REST_MS {
                 return Err("the machine does not come to rest".to_string());
             }
@@ -292,8 +293,8 @@ impl<S: Side> Dialogue<S> {
             let number = |name| answer.told(name).and_then(Value::number).unwrap_or(-1.0) as i32;
             match number("stat") {
                 2 => drop(self.ask("clear:n")?),
-                1 | 3 | 4 if number("qr") == 64 && number("hold") == 0 => break,
-                _ => {}
+                1 | 3 | 4 if number("qr") == 64 && number("hold") == 0 => rested += 1,
+                _ => rested = 0,
             }
         }
         self.course.rest()?;
