@@ -65,6 +65,10 @@ impl Name {
 
     /// Whether what follows the first `skip` bytes is `token`, a table's zero-padded name.
     pub fn matches(&self, skip: usize, token: [u8; 4]) -> bool {
+        // Most names differ in the first byte.
+        if self.bytes.get(skip) != token.first() {
+            return false;
+        }
         let mut rest = self.bytes.iter().skip(skip).copied().chain([0; LONGEST]);
         token.iter().all(|&b| rest.next() == Some(b)) && rest.next() == Some(0)
     }

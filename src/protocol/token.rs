@@ -387,12 +387,13 @@ pub enum Target {
 #[small]
 pub fn resolve(prefix: Name, name: &[u8]) -> Target {
     let Some(full) = prefix.with(name) else { return Target::Unknown };
-    if let Some(token) = Token::find(&full) {
-        return Target::Token(token);
-    }
+    // First, for they are few: `tid` comes with each line of some senders.
     let action = |i| ACTIONS.at(i).filter(|(text, _)| full.is(*text));
     if let Some((_, action)) = (0..ACTIONS.len()).find_map(action) {
         return Target::Action(action);
+    }
+    if let Some(token) = Token::find(&full) {
+        return Target::Token(token);
     }
     Group::find(&full).map_or(Target::Unknown, Target::Group)
 }

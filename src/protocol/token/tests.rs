@@ -74,3 +74,13 @@ fn names_mean_what_they_should() {
     assert_eq!(resolve(name("x"), b"vm"), resolved("xvm"));
     assert_eq!(resolve(name("x"), "".to_string().as_bytes()), resolved("x"));
 }
+
+#[test]
+fn no_action_is_called_as_a_value_is() {
+    for i in 0..ACTIONS.len() {
+        let (text, action) = ACTIONS.at(i).unwrap();
+        let name = Name::beginning(&Vec::from_iter(text.bytes()));
+        assert!(name.is(text), "{action:?}");
+        assert_eq!(Token::find(&name), None, "{action:?}");
+    }
+}
