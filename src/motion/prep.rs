@@ -518,8 +518,11 @@ impl Prep {
         true
     }
 
+    /// The paces of the motors that move. With a motor above the second the interrupt goes through all of them (`dda::WIDE`), so that
+    /// two take as long as three.
     fn paces(&self) -> &Pace {
-        &self.paces[usize::from(self.others)]
+        let is_wide = self.others == 1 && self.full | self.minor > 0b11;
+        &self.paces[usize::from(if is_wide { 2 } else { self.others })]
     }
 
     /// Most ticks for a stretch of `travel`: fine ones, if they are to be, where no more than every fourth tick is a step. The

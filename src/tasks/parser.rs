@@ -373,7 +373,7 @@ impl Answer {
     fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
         let mut begun = begun;
         for done in 0..STEPS {
-            if !tx.has_room() || (done > 0 && flags::has(Event::Tick)) {
+            if !tx.has_room() || (done > 1 && flags::has(Event::Tick)) {
                 break;
             }
             if self.echoes {

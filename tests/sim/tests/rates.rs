@@ -181,3 +181,21 @@ fn nothing_is_late_at_high_step_rates() {
         assert!(report.ok, "{job}: {}", report.problems.join("; "));
     }
 }
+
+/// With a motor above the second the step interrupt goes through all of them, so that two take as much of the CPU as three.
+#[test]
+fn any_two_motors_make_no_pause_at_their_highest_rate() {
+    let axes = ["x:{", "y:{", "z:{", "a:{am:1,"];
+    let limits = axes.map(|axis| format!("{{{axis}vm:30000,fr:30000,ac:2500,jm:500000}}}}"));
+    // 1,000 steps a mm.
+    let motors = [1, 2, 3, 4].map(|motor| format!("{{{motor}:{{tr:1.6}}}}"));
+    let settings: Vec<_> = motors.into_iter().chain(limits).collect();
+    for (leads, follows) in [("x", "y"), ("z", "x"), ("x", "z"), ("a", "y"), ("y", "a"), ("z", "a")]
+    {
+        let moves = [2.5, 20.0].map(|mm| format!("g0 {follows}{:.4} {leads}{mm}", mm / 20.0));
+        let lines = (1..).zip(std::iter::once("g91".to_string()).chain(moves)).collect::<Vec<_>>();
+        let options = Options { settings: settings.clone(), ..Options::default() };
+        let report = job::run(&mut firmware(&MEGA2560_GRBL), &lines, &options, |_| {}).unwrap();
+        assert!(report.problems.is_empty(), "{leads} and {follows}: {:?}", report.problems);
+    }
+}
