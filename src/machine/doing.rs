@@ -20,7 +20,7 @@ pub enum Doing {
     Jogs,
     /// It is held, or what is queued is being dropped.
     Holds,
-    /// The same, and the door is open.
+    /// It is held, or what is queued is being dropped, and the door is open.
     Door,
     /// An alarm is on.
     Alarm(Alarm),

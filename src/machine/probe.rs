@@ -60,7 +60,7 @@ impl Probe {
         self.news.get()
     }
 
-    /// The same, and begins to.
+    /// Whether there is a result that nobody has begun to tell; the caller begins to tell it.
     pub fn take_news(&self) -> bool {
         self.news.take()
     }

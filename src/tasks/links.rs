@@ -123,7 +123,7 @@ impl Changes {
         self.0.get() & bit != 0
     }
 
-    /// The same, and is no news any more.
+    /// Whether this has, since it was taken last.
     #[inline(always)]
     pub fn take(&self, bit: u8) -> bool {
         let bits = self.0.get();

@@ -5,7 +5,7 @@
 pub enum What {
     /// Moves by so many [`CELL`]s at a feed, mm/min; 0 is a traverse.
     Move(i8, u16),
-    /// The same in JSON, with the number before the block or behind it.
+    /// A move in JSON (`gc`), with its number (`tid`) before the block or behind it.
     Wrapped(i8, u16, bool),
     /// Waits, ms.
     Dwell(u16),
