@@ -63,14 +63,17 @@ impl Name {
         self.bytes().last().copied().unwrap_or(0)
     }
 
-    /// Whether what follows the first `skip` bytes is `token`, a table's zero-padded name.
-    pub fn matches(&self, skip: usize, token: [u8; 4]) -> bool {
-        // Most names differ in the first byte.
-        if self.bytes.get(skip) != token.first() {
-            return false;
-        }
-        let mut rest = self.bytes.iter().skip(skip).copied().chain([0; LONGEST]);
-        token.iter().all(|&b| rest.next() == Some(b)) && rest.next() == Some(0)
+    /// The bytes, padded with zeros.
+    pub fn padded(&self) -> [u8; LONGEST] {
+        self.bytes
+    }
+
+    /// What follows the first `skip` bytes as a table's zero-padded name, or `None` if that is too long.
+    pub fn token(&self, skip: usize) -> Option<[u8; 4]> {
+        let rest = self.bytes().get(skip..)?;
+        let mut token = [0; 4];
+        token.get_mut(..rest.len())?.copy_from_slice(rest);
+        Some(token)
     }
 }
 
@@ -90,12 +93,17 @@ pub fn axis_of(letter: u8) -> Option<u8> {
     }
 }
 
-/// A zero-padded table name from a literal.
-#[small]
+/// A table's zero-padded name of a setting or value from a literal.
 pub const fn token(text: &str) -> [u8; 4] {
+    padded(text)
+}
+
+/// A zero-padded name from a literal.
+#[small]
+pub const fn padded<const N: usize>(text: &str) -> [u8; N] {
     let text = text.as_bytes();
-    assert!(text.len() <= 4, "a table's name is at most 4 bytes");
-    let mut bytes = [0; 4];
+    assert!(text.len() <= N, "a table's name is too long");
+    let mut bytes = [0; N];
     let mut i = 0;
     while i < text.len() {
         bytes[i] = text[i];
@@ -109,16 +117,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn matches_whole_names_only() {
+    fn names_are_as_in_tables() {
         let name = Name::new().with(b"XVm").unwrap();
         assert_eq!(name.bytes(), b"xvm");
-        assert!(name.matches(1, token("vm")));
-        assert!(!name.matches(1, token("v")));
-        assert!(!name.matches(0, token("xv")));
+        assert_eq!((name.token(0), name.token(1)), (Some(*b"xvm\0"), Some(token("vm"))));
+        assert_eq!((name.token(3), name.token(4)), (Some([0; 4]), None));
         assert!(Name::new().with(b"posxyz").is_none());
-        assert!(Name::new().with(b"abaud").unwrap().matches(1, token("baud")));
+        assert_eq!(Name::new().with(b"abaud").unwrap().token(1), Some(token("baud")));
         assert_eq!(Name::beginning(b"X,velocity").bytes(), b"xvelo");
-        assert!(!Name::new().with(b"bauds").unwrap().matches(0, token("baud")));
+        assert_eq!(Name::new().with(b"bauds").unwrap().token(0), None);
     }
 
     #[test]

@@ -7,8 +7,8 @@
 use super::machines;
 use super::name::token;
 use crate::boards::{ACTIVE, MOTORS, inputs};
-use crate::progmem;
 use crate::units::AXES;
+use crate::{named, progmem};
 
 /// How a setting is kept.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -67,6 +67,8 @@ pub struct Row {
     /// Upper limit, scaled as kept.
     pub max: i32,
 }
+
+named! { Row, 4 }
 
 impl Row {
     /// No setting's. All zeros, so that it needs no memory.

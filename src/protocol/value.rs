@@ -5,10 +5,9 @@ use crate::config::Fixed;
 use crate::config::name::token;
 use crate::gcode::overrides::Override;
 use crate::gcode::tables::Row;
-use crate::progmem;
 use crate::progmem::Text;
-use crate::text;
 use crate::units::FIRST_ROTARY;
+use crate::{named, progmem, text};
 
 /// A value of the machine, and what [`Machine::value`](super::Machine::value) returns for it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -192,6 +191,8 @@ pub struct Single {
     pub choices: Text,
 }
 
+named! { Single, 4 }
+
 /// Values of each axis or motor.
 #[derive(Clone, Copy)]
 pub struct Vector {
@@ -204,6 +205,8 @@ pub struct Vector {
     /// What text reports call it, behind the axis's letter.
     pub label: Text,
 }
+
+named! { Vector, 4 }
 
 #[small]
 impl Vector {

@@ -78,9 +78,8 @@ fn names_mean_what_they_should() {
 #[test]
 fn no_action_is_called_as_a_value_is() {
     for i in 0..ACTIONS.len() {
-        let (text, action) = ACTIONS.at(i).unwrap();
-        let name = Name::beginning(&Vec::from_iter(text.bytes()));
-        assert!(name.is(text), "{action:?}");
+        let Verb { token, action } = ACTIONS.at(i).unwrap();
+        let name = Name::beginning(token.split(|byte| *byte == 0).next().unwrap());
         assert_eq!(Token::find(&name), None, "{action:?}");
     }
 }
