@@ -26,6 +26,10 @@ use crate::tasks::{Never, hold, links, overrides, power, spindle};
 /// After so many segments without a turn of thread mode they become longer, which takes less of the CPU.
 const PATIENCE: u8 = 6;
 
+/// While motion has just begun thread mode gets a turn after so many segments: the amount that waits is built up from nothing,
+/// which would take 6 ms at a stretch.
+const FIRST_TURN: u8 = 2;
+
 /// The task.
 #[allow(clippy::manual_async_fn)] // See `tasks`.
 pub fn run(
@@ -196,13 +200,15 @@ impl<'a> Runner<'a> {
         health::moves(waiting.count);
         waiting.update(segments.used());
         let short = waiting.is_short(*rests);
-        self.machine.set_coarse(event::pass_over() > PATIENCE || waiting.is_busy(), short);
+        let passed_over = event::pass_over();
+        self.machine.set_coarse(passed_over > PATIENCE || waiting.is_busy(), short);
         if !rested {
             health::look_for_starvation();
         }
         stepper::go();
         if !waiting.is_enough() {
-            return Next::Turn;
+            let gives_way = passed_over >= FIRST_TURN && waiting.has_just_begun();
+            return if gives_way { Next::Idle } else { Next::Turn };
         }
         self.asked = true;
         if waiting.has_room(*rests) { Next::Idle } else { Next::Room }
@@ -257,6 +263,9 @@ const PRESSED_FOR: u8 = 100;
 
 /// With less than this exec is late, and makes longer stretches.
 const WAITING_SHORT: u16 = units(25);
+
+/// What waits at least, at first, when thread mode gets a turn: as long as exec takes for a segment at worst.
+const FIRST_LEAST: u16 = units(15);
 
 impl Waiting {
     const fn new() -> Self {
@@ -316,6 +325,12 @@ impl Waiting {
             self.pressed = PRESSED_FOR;
         }
         short
+    }
+
+    /// Whether the machine stood still not long ago, and enough waits for a turn of thread mode.
+    #[inline(always)]
+    fn has_just_begun(&self) -> bool {
+        usize::from(self.moved) <= SEGMENTS && self.sum >= FIRST_LEAST
     }
 
     /// Whether thread mode gets a turn before more is prepared.
