@@ -7,6 +7,7 @@
 //! holds up anything else.
 
 use embassy_futures::select::select;
+use embassy_futures::yield_now;
 use embassy_time::Timer;
 use kerf_macros::small;
 
@@ -110,6 +111,9 @@ fn reports_queue(links: &Links) -> bool {
     links.settings.borrow().queue_verbosity() != 0
 }
 
+/// How many turns of the parser a report leaves to control lines that wait on its port: their answers come first.
+const COURTESY: u8 = 8;
+
 /// What can be told.
 #[derive(Clone, Copy)]
 pub enum What {
@@ -212,15 +216,25 @@ impl Telling {
     }
 }
 
-/// Tells it on a port, a part at a time: all in one turn, if there is room. Of a queue report returns how many blocks are
+/// Tells it on a port, a part at a time: for a millisecond in one turn, if there is room. Of a queue report returns how many blocks are
 /// free in it, which may have changed during the wait for the transmitter.
 async fn tell(links: &Links, port: &Port, what: What) -> usize {
+    for _ in 0..COURTESY {
+        if !port.lines.borrow().has_controls() {
+            break;
+        }
+        yield_now().await;
+    }
     let mut tx = port.tx.lock().await;
     let mut telling = Telling::begin(what, links, port);
     loop {
         tx.room().await;
         if !telling.step(links, port, &mut tx) {
             break;
+        }
+        // A status report takes 4 ms, and the ring of a second port may be full in 5.
+        if flags::has(Event::Tick) {
+            yield_now().await;
         }
     }
     drop(tx);
