@@ -30,7 +30,7 @@ use stream::dialogue::Dialogue;
 /// About two seconds of the machine's time.
 const SCALE: Scale = Scale { deeds: 20, lines: 8, wait: 200, wrap: 0 };
 /// Within which questions are answered, ms; a ms of it is that of the test.
-const PROMPT_MS: f64 = 51.0;
+const PROMPT_MS: f64 = 21.0;
 /// How many are usual: what CI has time for.
 const USUAL: u64 = 40;
 /// Machines that run at the same time.
