@@ -5,7 +5,7 @@
 
 use core::marker::PhantomData;
 
-/// Shows that thread mode runs: the main loop, or a task of the [`Executor`](crate::Executor).
+/// Shows that thread mode runs: the main loop, or a task of the `Executor`.
 ///
 /// A task of the interrupt executor cannot have it:
 ///

@@ -15,7 +15,7 @@
 //! |---|---|---|
 //! | short interrupts | the program's handlers, in Rust or assembly; the tick | [`Event::set`], [`interrupt::pend`], its ends of rings, [`SharedByte`](byte::SharedByte) |
 //! | interrupt mode | tasks of the [`interrupt`] executor, with interrupts on | besides, all of Embassy; [`interrupt::wait`] |
-//! | thread mode | tasks of the [`Executor`], the main loop | besides, [`Event::wait`], [`interrupt::lock`] |
+//! | thread mode | tasks of the `Executor`, the main loop | besides, [`Event::wait`], [`interrupt::lock`] |
 //!
 //! Functions that belong to a level ask for its token, [`Thread`] or [`Interrupt`], which the other level cannot have.
 //!

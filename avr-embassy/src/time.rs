@@ -15,7 +15,7 @@ use embassy_executor::raw::wake_task;
 use embassy_time_driver::{Driver, time_driver_impl};
 
 use crate::assembly::{CLOSED, FLAGS, MISSED, PEND, PENDED};
-use crate::chip::{OCRA, TCCRA, TCCRB, TIMSK};
+use crate::chip::{self, OCRA, TCCRA, TCCRB, TIMSK};
 use crate::timers::Timers;
 use crate::{Event, Thread, interrupt};
 
@@ -147,6 +147,7 @@ pub(crate) fn wake_expired(thread: Thread) {
 pub fn start<const CLOCK_HZ: u32>() {
     let (select, counts) =
         const { scale(CLOCK_HZ).expect("a millisecond is no whole number of the timer's counts") };
+    chip::link();
     // SAFETY: the timer is nobody else's. CTC: it counts up to `OCRA` and begins anew.
     unsafe {
         (OCRA as *mut u8).write_volatile(counts - 1);

@@ -9,7 +9,7 @@
 //! | `PENDED`, `WITHDRAWN` | the values of that register for the two |
 //! | `SMCR`, `SLEEP_IDLE` | data address of the sleep register, and its value for idle sleep, enabled |
 //! | `TCCRA`, `TCCRB`, `OCRA`, `TIMSK` | data addresses of the 8-bit timer of the tick |
-//! | `handlers!` | the vectors of the tick and of the software interrupt, by their numbers |
+//! | `handlers!` | makes the handlers, by the numbers of their vectors: those of the tick and of the software interrupt |
 
 /// Gives the runtime's two handlers the names that the start-up code's vector table refers to.
 macro_rules! handlers {
@@ -25,6 +25,11 @@ macro_rules! handlers {
             // SAFETY: the hardware calls it.
             unsafe { crate::interrupt::handler() }
         }
+
+        /// Whoever starts one of the two calls this, so that a linker without LTO takes the handlers along: they are
+        /// in the same object file. With LTO nothing is left of it.
+        #[inline(never)]
+        pub fn link() {}
     };
 }
 #[cfg(feature = "atmega2560")]

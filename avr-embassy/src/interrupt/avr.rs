@@ -10,7 +10,7 @@ use embassy_executor::{SendSpawner, Spawner};
 
 use crate::assembly::{CLOSED, FLAGS, HELD, HOLD, MISSED, NOT_STARTED, PEND, PENDED};
 use crate::byte::SharedByte;
-use crate::chip::WITHDRAWN;
+use crate::chip::{self, WITHDRAWN};
 use crate::{Interrupt, pender};
 
 /// What was asked for last, for when thread mode has nothing left to do: a number, and whether to go on then
@@ -79,6 +79,7 @@ pub fn start(init: impl FnOnce(Spawner, Interrupt) + Send) -> Option<SendSpawner
     if CLOSED.get() != NOT_STARTED {
         return None;
     }
+    chip::link();
     // SAFETY: once, before the software interrupt is let in. What `init` takes along is `Send`; interrupt mode does not
     // run yet, so the token stands for it.
     let (spawner, level) = unsafe {

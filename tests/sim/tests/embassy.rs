@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
 
-use common::MS;
+use common::{MS, firmware};
 
 /// The vector of the tick.
 const TIMER0_COMPA: u8 = 21;
@@ -89,6 +89,25 @@ fn a_task_of_interrupt_mode_preempts_one_of_thread_mode() {
     let late =
         tell.iter().zip(pulse.iter().skip(99).step_by(100)).map(|(tell, pulse)| tell - pulse);
     assert!(late.max() < Some(2 * 21 * MS), "later than two polls");
+}
+
+/// Every 256 ms the tick carries with interrupts on. A task of interrupt mode that asked for the time then would get one of 256 ms ago.
+#[test]
+fn interrupt_mode_is_kept_out_while_the_time_is_carried() {
+    let mut machine = firmware(&MEGA2560_GRBL);
+    let variable = |machine: &Machine, name| machine.image().variable(name).expect("a static");
+    let millis = variable(&machine, "avr_embassy::time::MILLIS");
+    let closed = variable(&machine, "avr_embassy::assembly::CLOSED");
+    machine.run_for_ms(250).unwrap();
+    assert_eq!((machine.peek(closed), machine.peek(millis + 1)), (0, 0), "at rest");
+    let (mut low, mut kept_out) = (0, false);
+    while machine.peek(millis + 1) == 0 {
+        (low, kept_out) = (machine.peek(millis), machine.peek(closed) != 0);
+        machine.step(u64::MAX).unwrap();
+    }
+    assert!(low == 0 && kept_out);
+    machine.run_for_ms(1).unwrap();
+    assert_eq!(machine.peek(closed), 0, "let in again");
 }
 
 #[test]
