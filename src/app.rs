@@ -6,6 +6,7 @@ use kerf_macros::small;
 
 use core::cell::{Cell, RefCell};
 
+use avr_embassy::interrupt;
 use embassy_executor::Spawner;
 use heapless::Vec;
 
@@ -104,14 +105,14 @@ fn place(ports: [Port; PORTS]) -> &'static Links {
     place!(Links, Links::new(ports, storage))
 }
 
-/// Starts the firmware: `main` is the thread-mode executor, `exec_level` the interrupt-mode one.
+/// Starts the firmware: `main` is the thread-mode executor, the exec task has the interrupt executor to itself.
 ///
 /// Interrupts are off. `None` if it has been started before.
 #[inline(never)]
 #[small]
-pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
+pub fn start(main: Spawner, rate: u32) -> Option<()> {
     let segments = stepper::start()?;
-    let (queue, source) = queue::store().split()?;
+    let (queue, blocks) = queue::store().split()?;
     let (links, received, aux) = connect(rate)?;
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
     if !links.settings.borrow().starts_in_json() {
@@ -123,7 +124,11 @@ pub fn start(main: Spawner, exec_level: Spawner, rate: u32) -> Option<()> {
     if watchdog::cause().is_fault() {
         alarm::wake_up_in(links);
     }
-    exec_level.spawn(exec_task(source, segments).ok()?);
+    interrupt::start(|exec_level, _| {
+        if let Ok(task) = exec_task(blocks, segments) {
+            exec_level.spawn(task);
+        }
+    })?;
     main.spawn(reader_task(links, received, aux).ok()?);
     main.spawn(planner_task(links, queue).ok()?);
     main.spawn(reporter_task(links, occasion).ok()?);

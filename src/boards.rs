@@ -178,7 +178,7 @@ impl Pwm {
     }
 }
 
-/// A USART of the ATmega2560. The third, USART2, is the firmware's own (`hal::avr::exec`).
+/// A USART of the ATmega2560. The third, USART2, is the firmware's own (`avr_embassy::interrupt`).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Usart {
@@ -294,7 +294,7 @@ pub struct Board {
 }
 
 /// A pin that the firmware itself uses on every board: the transmitter of USART2, which is driven high for
-/// the sake of its interrupt (`hal::avr::exec`).
+/// the sake of its interrupt (`avr_embassy::interrupt`).
 const OWN_PIN: Pin = pin(Port::H, 1);
 
 /// Ports a board may have, and pins of a port.

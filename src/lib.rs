@@ -8,10 +8,11 @@
 #[cfg(not(target_arch = "avr"))]
 extern crate std;
 
+#[macro_use(machine_static)]
+extern crate avr_embassy;
 #[macro_use]
 extern crate kerf_macros;
 
-#[macro_use]
 pub mod hal;
 
 pub mod app;

@@ -3,10 +3,10 @@
 
 #[cfg(target_arch = "avr")]
 mod image {
-    use embassy_executor::raw::Executor;
+    use avr_embassy::Executor;
     use kerf::baud;
-    use kerf::hal::imp::{exec, executor, gpio, inputs, panic, time, watchdog};
-    use kerf::hal::pender;
+    use kerf::hal::event;
+    use kerf::hal::imp::{gpio, inputs, panic, time, watchdog};
     use static_cell::StaticCell;
 
     // Naming avr-libc and libgcc in the image itself puts them before `compiler_builtins` in the link:
@@ -19,19 +19,19 @@ mod image {
     #[avr_device::entry]
     fn main() -> ! {
         static MAIN: StaticCell<Executor> = StaticCell::new();
-        static EXEC: StaticCell<Executor> = StaticCell::new();
         watchdog::begin();
         gpio::start();
         inputs::start();
-        let main: &'static Executor = MAIN.init(Executor::new(pender::THREAD));
-        let interrupt: &'static Executor = EXEC.init(Executor::new(pender::EXEC));
-        if kerf::app::start(main.spawner(), interrupt.spawner(), baud::DEFAULT).is_none() {
-            panic::halt();
-        }
-        time::start();
-        exec::start(interrupt);
-        watchdog::start();
-        executor::run(main)
+        MAIN.init(Executor::new()).run_with(
+            |main, _| {
+                if kerf::app::start(main, baud::DEFAULT).is_none() {
+                    panic::halt();
+                }
+                time::start();
+                watchdog::start();
+            },
+            event::turn,
+        )
     }
 }
 

@@ -24,6 +24,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "lints", run: lints },
     Stage { name: "host tests", run: host_tests },
     Stage { name: "firmware of every board", run: build_all },
+    Stage { name: "examples of avr-embassy", run: || firmware::build_examples().map(drop) },
     Stage { name: "sizes and stack of every board", run: size_all },
     Stage { name: "simulator tests", run: simulator_tests },
     Stage { name: "real senders", run: || crate::senders::run(&Default::default()) },

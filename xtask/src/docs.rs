@@ -11,11 +11,17 @@ use std::path::{Path, PathBuf};
 use crate::process::root;
 
 /// The documents.
-const DOCUMENTS: [&str; 5] =
-    ["ARCHITECTURE.md", "README.md", "CHANGELOG.md", "boards/README.md", "machines/README.md"];
+const DOCUMENTS: [&str; 6] = [
+    "ARCHITECTURE.md",
+    "README.md",
+    "CHANGELOG.md",
+    "avr-embassy/README.md",
+    "boards/README.md",
+    "machines/README.md",
+];
 /// Where the sources are.
-const SOURCES: [&str; 8] =
-    ["src", "boards", "machines", "tests", "xtask", "Cargo.toml", ".cargo", ".ci"];
+const SOURCES: [&str; 9] =
+    ["avr-embassy", "src", "boards", "machines", "tests", "xtask", "Cargo.toml", ".cargo", ".ci"];
 
 /// A file of the sources: its path, the words of its path, and those of its text.
 struct Source {

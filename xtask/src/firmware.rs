@@ -49,11 +49,31 @@ pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
 
 /// Copies the image to its own name and refuses one that would not work: see [`elf::check`].
 fn keep(built: &Path, kept: &Path) -> Result<PathBuf> {
-    std::fs::create_dir_all(directory())?;
+    std::fs::create_dir_all(kept.parent().unwrap_or(kept))?;
     std::fs::copy(built, kept).with_context(|| format!("cannot copy {}", built.display()))?;
     elf::check(kept)?;
     Ok(kept.to_owned())
 }
+
+/// Builds and checks the examples of the runtime, `avr-embassy`; returns the folder where they lie, `NAME.elf`.
+pub fn build_examples() -> Result<PathBuf> {
+    let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
+    let target = root().join("target/avr");
+    let mut cargo = rust.cargo();
+    cargo.current_dir(root()).env("RUSTFLAGS", FLAGS);
+    cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none", "--package"]);
+    cargo.args(["avr-embassy", "--examples", "--features", "atmega2560"]);
+    run(cargo.arg("--target-dir").arg(&target))?;
+    let folder = directory().join("avr-embassy");
+    for name in EXAMPLES {
+        let built = target.join(format!("avr-none/release/examples/{name}.elf"));
+        keep(&built, &folder.join(format!("{name}.elf")))?;
+    }
+    Ok(folder)
+}
+
+/// The examples of `avr-embassy`.
+const EXAMPLES: [&str; 4] = ["blink", "echo", "preempt", "costs"];
 
 /// `cargo xtask flash`
 #[derive(Args)]

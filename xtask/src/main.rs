@@ -49,6 +49,8 @@ enum Command {
     Setup,
     /// Build the firmware of a board; the last line is `elf: PATH`
     Build(BuildArgs),
+    /// Build the examples of the runtime, `avr-embassy`; the last line is `elf: FOLDER`
+    Examples,
     /// Show what the firmware takes of flash, RAM and stack; fail past the caps
     Size(size::SizeArgs),
     /// Run a job on the simulated board
@@ -98,6 +100,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Setup => setup::report()?,
         Command::Build(arg) => build(&arg)?,
+        Command::Examples => examples()?,
         Command::Size(args) => size::run(&args)?,
         Command::Sim(args) => return sim::run(&args),
         Command::Bench(args) => return sim::bench(&args),
@@ -121,5 +124,11 @@ fn build(args: &BuildArgs) -> anyhow::Result<()> {
     setup::ensure(Scope::Firmware)?;
     let elf = firmware::build(args.board, args.machine)?;
     println!("elf: {}", elf.display());
+    Ok(())
+}
+
+fn examples() -> anyhow::Result<()> {
+    setup::ensure(Scope::Firmware)?;
+    println!("elf: {}", firmware::build_examples()?.display());
     Ok(())
 }

@@ -14,7 +14,9 @@
 use core::arch::asm;
 use core::cell::UnsafeCell;
 
-use super::{exec, flags, stepper};
+use avr_embassy::assembly;
+
+use super::{flags, stepper};
 use crate::boards::{ACTIVE, Interrupt, Timer, inputs};
 use crate::hal::event::Event;
 use crate::motion::contact;
@@ -340,7 +342,7 @@ extern "C" fn __vector_13() -> ! {
             "pop  r1",
             "pop  r0",
             "pop  r25",
-            // Lets exec in again if it was not closed before, as `exec::open`. Not before looks may come again: it
+            // Lets exec in again if it was not closed before. Not before looks may come again: it
             // runs for milliseconds.
             "ldi  r24, {unmask}",
             "tst  r25",
@@ -353,7 +355,7 @@ extern "C" fn __vector_13() -> ! {
             "breq 2f",
             "sts  {missed}, r25",
             "ldi  r24, {pended}",
-            "sts  0xD1, r24",
+            "sts  {pend}, r24",
             "2:",
             "pop  r24",
             "out  0x3F, r24",
@@ -364,9 +366,10 @@ extern "C" fn __vector_13() -> ! {
             "cli",
             "sts  0x70, r24",
             "rjmp 2b",
-            closed = sym exec::CLOSED,
-            missed = sym exec::MISSED,
-            pended = const exec::PENDED,
+            closed = sym assembly::CLOSED,
+            missed = sym assembly::MISSED,
+            pend = const assembly::PEND,
+            pended = const assembly::PENDED,
             unmask = const OCIE2A,
             look = sym look,
             options(noreturn),

@@ -1,19 +1,18 @@
-//! The ATmega2560: all the registers, the interrupts, the two executors' loops.
+//! The ATmega2560: all the registers, and the interrupts.
 //!
 //! | interrupt | file | level | does |
 //! |---|---|---|---|
 //! | TIMER1_COMPA | `step_isr` | 0 | one tick of the step generator |
 //! | USART0_RX, USART0_UDRE | `uart` | 1 | bytes between the line and the rings |
-//! | TIMER0_COMPA | `time` | 1 | counts milliseconds |
+//! | TIMER0_COMPA | [`avr_embassy::time`] | 1 | counts milliseconds |
 //! | INT, PCINT, TIMER2_COMPA | `inputs` | 1 | looks at the switches when one moves |
 //! | WDT | `watchdog` | 0 | resets a machine that has got stuck |
-//! | USART2_UDRE | `exec` | 2 | software interrupt: polls the exec executor, interrupts on |
+//! | USART2_UDRE | [`avr_embassy::interrupt`] | 2 | software interrupt: polls the exec executor, interrupts on |
 //!
-//! Everything else runs in thread mode, from `executor::run`.
+//! Each register has one owner, named here; the others are set up before interrupts are on.
+//! Everything else runs in thread mode, from [`avr_embassy::Executor::run_with`].
 
 pub mod eeprom;
-pub mod exec;
-pub mod executor;
 pub mod gpio;
 pub mod inputs;
 mod mem;
@@ -25,26 +24,11 @@ pub mod time;
 pub mod uart;
 pub mod watchdog;
 
-use avr_device::atmega2560::Peripherals;
+pub use avr_embassy::mask;
 
-use crate::hal::event::Event;
+pub use crate::hal::{exec, flags};
+
 use crate::hal::resets::Mark;
-
-/// The peripherals.
-///
-/// Each register has one owner, named in the table above; the others are set up before interrupts
-/// are on.
-pub(super) fn peripherals() -> Peripherals {
-    // SAFETY: see above: no register is written from two levels, but for single-instruction bit
-    // operations.
-    unsafe { Peripherals::steal() }
-}
-
-/// Does something of a few cycles with interrupts off.
-#[inline(always)]
-pub fn mask<R>(act: impl FnOnce() -> R) -> R {
-    avr_device::interrupt::free(|_| act())
-}
 
 /// Starts the firmware anew, as if the reset button had been pressed: by the watchdog, in 15 ms.
 pub fn reset() -> ! {
@@ -99,43 +83,4 @@ fn has_boot_loader() -> bool {
         );
     }
     !matches!((low, high), (0xFF, 0xFF) | (0, 0))
-}
-
-/// The event bits: general-purpose I/O register 0, where a bit is set or cleared in one instruction.
-pub mod flags {
-    use super::Event;
-
-    const GPIOR0: *mut u8 = 0x3E as *mut u8;
-
-    /// Sets a bit. Any level.
-    #[inline(always)]
-    pub fn set(event: Event) {
-        // One `sbi` for a constant bit: cannot be torn.
-        // SAFETY: the register is nobody else's.
-        unsafe { GPIOR0.write_volatile(GPIOR0.read_volatile() | 1 << event as u8) };
-    }
-
-    /// The bits that are set, cleared by reading. Thread mode.
-    pub fn take() -> u8 {
-        // SAFETY: the register is nobody else's; interrupts are off in between.
-        avr_device::interrupt::free(|_| unsafe {
-            let bits = GPIOR0.read_volatile();
-            GPIOR0.write_volatile(0);
-            bits
-        })
-    }
-
-    /// Whether a bit is set.
-    #[inline(always)]
-    pub fn has(event: Event) -> bool {
-        // SAFETY: as in `set`.
-        unsafe { GPIOR0.read_volatile() & 1 << event as u8 != 0 }
-    }
-
-    /// Whether any is set.
-    #[inline(always)]
-    pub fn any() -> bool {
-        // SAFETY: as in `set`.
-        unsafe { GPIOR0.read_volatile() != 0 }
-    }
 }

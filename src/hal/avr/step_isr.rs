@@ -19,6 +19,8 @@
 use core::arch::asm;
 use core::mem::{offset_of, size_of};
 
+use avr_embassy::assembly;
+
 use super::stepper;
 use crate::boards::{ACTIVE, Pin, Timer};
 use crate::hal::ring::Ring;
@@ -244,8 +246,8 @@ extern "C" fn __vector_17() -> ! {
             "    sts  0x84, r24",
             "22:",
             // A slot is free: exec may fill it.
-            "    ldi  r24, {pend}",
-            "    sts  0xD1, r24",
+            "    ldi  r24, {pended}",
+            "    sts  {pend}, r24",
             "    ldd  r24, Z + {s_settle}",
             "    sts  {state} + {settle}, r24",
             "    lds  r27, {state} + {backwards}",
@@ -288,8 +290,8 @@ extern "C" fn __vector_17() -> ! {
             "30:",
             "    ldi  r24, {halt}",
             "    sts  0x81, r24",
-            "    ldi  r24, {pend}",
-            "    sts  0xD1, r24",
+            "    ldi  r24, {pended}",
+            "    sts  {pend}, r24",
             "    clr  r27",
             "    sts  {running}, r27",
             "    sts  {state} + {mode}, r27",
@@ -318,7 +320,8 @@ extern "C" fn __vector_17() -> ! {
             width = sym stepper::WIDTH,
             lockstep_width = sym stepper::LOCKSTEP_WIDTH,
             halt = const stepper::HALT,
-            pend = const super::exec::PENDED,
+            pend = const assembly::PEND,
+            pended = const assembly::PENDED,
             step0 = const pin_register(ACTIVE.motors[0].step),
             step1 = const pin_register(ACTIVE.motors[1].step),
             step2 = const pin_register(ACTIVE.motors[2].step),

@@ -1,18 +1,16 @@
 //! One machine on the host: the firmware's tasks, its clock, and a sender's end of the line.
 
-use std::boxed::Box;
 use std::vec::Vec;
 
-use embassy_executor::raw::Executor;
+use avr_embassy::host::Runtime;
 
-use super::{clock, exec, flags, inputs, now, stepper, time, uart};
+use super::{clock, inputs, now, stepper, time, uart};
+use crate::hal::event::{self, Event};
 use crate::hal::serial::{AUX, USB};
-use crate::hal::{event, pender};
 
 /// The machine of this thread.
 pub struct Machine {
-    main: &'static Executor,
-    exec: &'static Executor,
+    runtime: Runtime,
 }
 
 impl Machine {
@@ -25,10 +23,9 @@ impl Machine {
     /// wraps. `None` for a second machine in a thread.
     pub fn boot_at(baud: u32, ms: u64) -> Option<Self> {
         clock().set(ms * time::CYCLES_PER_MS);
-        let main: &'static Executor = Box::leak(Box::new(Executor::new(pender::THREAD)));
-        let exec: &'static Executor = Box::leak(Box::new(Executor::new(pender::EXEC)));
-        crate::app::start(main.spawner(), exec.spawner(), baud)?;
-        let machine = Self { main, exec };
+        let runtime = Runtime::new();
+        crate::app::start(runtime.spawner(), baud)?;
+        let machine = Self { runtime };
         machine.settle();
         Some(machine)
     }
@@ -136,17 +133,12 @@ impl Machine {
 
     /// Polls until nobody has anything left to do now.
     fn settle(&self) {
-        loop {
-            if exec::take_request() {
-                // SAFETY: not called from inside a task.
-                unsafe { self.exec.poll() };
-            } else if flags::any() {
-                event::dispatch(flags::take());
-                // SAFETY: not called from inside a task.
-                unsafe { self.main.poll() };
-            } else if !exec::idle() {
-                break;
+        let thread = self.runtime.thread();
+        self.runtime.settle(|bits| {
+            event::turn(thread, bits);
+            if Event::Tick.is_in(bits) {
+                time::wake_expired();
             }
-        }
+        });
     }
 }

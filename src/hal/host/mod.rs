@@ -6,7 +6,6 @@
 //! generator as the image.
 
 pub mod eeprom;
-pub mod exec;
 pub mod gpio;
 pub mod inputs;
 mod machine;
@@ -20,7 +19,9 @@ pub use machine::Machine;
 
 use core::cell::Cell;
 
-use super::event::Event;
+pub use avr_embassy::mask;
+
+pub use super::{exec, flags};
 
 /// Never.
 const NEVER: u64 = u64::MAX;
@@ -41,14 +42,8 @@ impl<T: Copy> Local<T> {
 }
 
 machine_static! {
-    fn bits() -> Local<u8> = Local::new(0);
     fn resets() -> Local<bool> = Local::new(false);
     fn clock() -> Local<u64> = Local::new(0);
-}
-
-/// Does something with interrupts off. Here everything is one thread.
-pub fn mask<R>(act: impl FnOnce() -> R) -> R {
-    act()
 }
 
 /// The machine's time in CPU cycles.
@@ -69,32 +64,4 @@ pub fn boot() {
 /// Whether the firmware has asked for a reset.
 pub fn was_reset() -> bool {
     resets().get()
-}
-
-/// The event bits.
-pub mod flags {
-    use super::{Event, bits};
-
-    /// Sets a bit.
-    pub fn set(event: Event) {
-        bits().set(bits().get() | 1 << event as u8);
-    }
-
-    /// The bits that are set, cleared by reading.
-    pub fn take() -> u8 {
-        let taken = bits().get();
-        bits().set(0);
-        taken
-    }
-
-    /// Whether a bit is set.
-    #[inline(always)]
-    pub fn has(event: Event) -> bool {
-        bits().get() & 1 << event as u8 != 0
-    }
-
-    /// Whether any is set.
-    pub fn any() -> bool {
-        bits().get() != 0
-    }
 }

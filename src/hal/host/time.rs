@@ -1,19 +1,21 @@
 //! embassy-time's driver over the machine's clock.
 
+use core::cell::RefCell;
 use core::task::Waker;
 
+use avr_embassy::timers::Timers;
+use embassy_executor::raw::wake_task;
 use embassy_time_driver::{Driver, time_driver_impl};
 
 use super::{flags, now};
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
-use crate::hal::timers::Timers;
 
 /// CPU cycles in a millisecond.
 pub(super) const CYCLES_PER_MS: u64 = ACTIVE.clock_hz as u64 / 1000;
 
 machine_static! {
-    fn timers() -> Timers = Timers::new();
+    fn timers() -> RefCell<Timers<4>> = RefCell::new(Timers::new());
 }
 
 struct Millis;
@@ -26,7 +28,7 @@ impl Driver for Millis {
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
-        timers().schedule(at, waker);
+        timers().borrow_mut().schedule(at, waker);
     }
 }
 
@@ -37,7 +39,10 @@ pub fn millis() -> u32 {
 
 /// Wakes the tasks whose time has come.
 pub fn wake_expired() {
-    timers().wake_expired(millis());
+    let take = || timers().borrow_mut().take_expired(millis());
+    while let Some(task) = take() {
+        wake_task(task);
+    }
 }
 
 /// When the next millisecond is due.

@@ -5,11 +5,11 @@ use std::boxed::Box;
 use std::collections::VecDeque;
 use std::vec::Vec;
 
-use super::{NEVER, flags, now};
+use super::{NEVER, exec, flags, now};
 use crate::baud;
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
-use crate::hal::ring::{Ceiling, Consumer, Producer, Ring};
+use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::hal::serial::{
     AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LINE_END, MARKS, PORTS, RX_RING, STRAY, TX_RING,
     USB, XOFF, XON, batch, hardware, high_water, last_mark, lose, mark, wait_ms,
@@ -47,7 +47,7 @@ impl<const N: usize> Fill for Producer<u8, N> {
     fn mark(&mut self, mark: u8) {
         if Producer::push(self, mark).is_err() {
             // The reader is not running: everything here is one thread.
-            self.amend(&Ceiling(()), 0, |newest| *newest = mark);
+            exec::lock(|ceiling| self.amend(ceiling, 0, |newest| *newest = mark));
         }
     }
 

@@ -3,7 +3,7 @@
 //! The receive interrupt picks real-time characters off wherever they stand and never queues them.
 //! Both it and the transmit interrupt mask their own source and then let all others in: they do not nest in
 //! themselves, so bytes keep their order, and the step interrupt waits for no more than their first and last
-//! cycles. Exec would run far too long inside them, so they hold it off (`exec::HOLD`): bytes would be lost, or a
+//! cycles. Exec would run far too long inside them, so they hold it off (`assembly::HOLD`): bytes would be lost, or a
 //! response would stop in its middle. They may nest in each other. Of transmit interrupts the outermost lets exec in,
 //! if that is not a receive interrupt; receive interrupts know of each other alone, so that exec may come within a
 //! transmit interrupt that one of them has come into: its byte waits.
@@ -13,7 +13,8 @@
 use core::arch::asm;
 use core::mem::offset_of;
 
-use super::super::exec;
+use avr_embassy::assembly;
+
 use super::{
     AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, RXCIE, STOPPED, Shared, TXC, TXCIE, U2X, UDRIE,
     USB_SHARED,
@@ -95,7 +96,7 @@ macro_rules! interrupts {
                     "lds  r24, {control}",
                     "andi r24, {mask}",
                     "sts  {control}, r24",
-                    "sbi  0x1E, {hold_exec}",
+                    "sbi  {flags}, {hold_exec}",
                     "push r31",
                     // The status goes with the byte that is read after it: nothing comes in between, for an
                     // instruction behind `sei` is executed first.
@@ -143,8 +144,8 @@ macro_rules! interrupts {
                     "sbrs r24, 7",
                     "rjmp 23f",
                     ".endif",
-                    "cbi  0x1E, {hold_exec}",
-                    "sbic 0x1E, {held_exec}",
+                    "cbi  {flags}, {hold_exec}",
+                    "sbic {flags}, {held_exec}",
                     "rjmp 22f",
                     "23:",
                     "out  0x3F, r25",
@@ -153,15 +154,15 @@ macro_rules! interrupts {
                     "reti",
                     // Exec has been asked for meanwhile.
                     "22:",
-                    "cbi  0x1E, {held_exec}",
+                    "cbi  {flags}, {held_exec}",
                     "ldi  r24, {pended}",
-                    "sts  0xD1, r24",
+                    "sts  {pend}, r24",
                     "out  0x3F, r25",
                     "pop  r25",
                     "pop  r24",
                     "reti",
                     "4:",
-                    "sbi  0x1E, {received}",
+                    "sbi  {flags}, {received}",
                     ".if {rts_there}",
                     "rjmp 30f",
                     ".endif",
@@ -188,7 +189,7 @@ macro_rules! interrupts {
                     "breq 50f",
                     "53:",
                     // A line end, or nearly: the reader is to look.
-                    "sbi  0x1E, {received}",
+                    "sbi  {flags}, {received}",
                     "cpi  r24, {marks}",
                     "brlo 54f",
                     "rjmp 1b",
@@ -221,14 +222,14 @@ macro_rules! interrupts {
                     "andi r24, {not_resume}",
                     "or   r24, r30",
                     "sts  {shared} + {realtime}, r24",
-                    "sbi  0x1E, {special}",
+                    "sbi  {flags}, {special}",
                     // Where it stands counts, of some: queue a mark.
                     "ldi  r24, {cut}",
                     "sbrc r30, {resume_bit}",
                     "ldi  r24, {go}",
                     "andi r30, {placed}",
                     "breq 24f",
-                    "sbi  0x1E, {received}",
+                    "sbi  {flags}, {received}",
                     "rjmp 1b",
                     "24:",
                     "ldi  r24, 0",
@@ -247,7 +248,7 @@ macro_rules! interrupts {
                     "lds  r24, {shared} + {realtime}",
                     "ori  r24, {let_go}",
                     "sts  {shared} + {realtime}, r24",
-                    "sbi  0x1E, {special}",
+                    "sbi  {flags}, {special}",
                     "51:",
                     "sts  {shared} + {held}, r30",
                     "rjmp 24b",
@@ -293,7 +294,7 @@ macro_rules! interrupts {
                     "ldi  r26, 0",
                     // One more byte is lost (`serial::lose`).
                     "10:",
-                    "sbi  0x1E, {received}",
+                    "sbi  {flags}, {received}",
                     "cpi  r24, 0x0D",
                     "breq 17f",
                     "cpi  r24, 0x0A",
@@ -359,7 +360,7 @@ macro_rules! interrupts {
                     "41:",
                     "rjmp 1b",
                     "42:",
-                    "sbi  0x1E, {special}",
+                    "sbi  {flags}, {special}",
                     "lds  r30, {shared} + {asked} + 2",
                     "cpi  r24, {jog_end}",
                     "brne 37f",
@@ -460,9 +461,11 @@ macro_rules! interrupts {
                     xoff = const XOFF,
                     let_go = const realtime::LET_GO,
                     mask = const !RXCIE,
-                    hold_exec = const exec::HOLD,
-                    held_exec = const exec::HELD,
-                    pended = const exec::PENDED,
+                    hold_exec = const assembly::HOLD,
+                    held_exec = const assembly::HELD,
+                    flags = const assembly::FLAGS,
+                    pend = const assembly::PEND,
+                    pended = const assembly::PENDED,
                     unmask = const RXCIE,
                     batch = const batch($ring) - 1,
                     marks = const MARKS,
@@ -515,9 +518,9 @@ macro_rules! interrupts {
                     "andi r24, {mask}",
                     "sts  {control}, r24",
                     // Whoever holds exec off already lets it in, too. In here that bit of the status is clear.
-                    "sbic 0x1E, {hold_exec}",
+                    "sbic {flags}, {hold_exec}",
                     "ori  r25, 0x80",
-                    "sbi  0x1E, {hold_exec}",
+                    "sbi  {flags}, {hold_exec}",
                     "sei",
                     "push r30",
                     "push r31",
@@ -544,7 +547,7 @@ macro_rules! interrupts {
                     ".if !{bus}",
                     "sts  {data}, r24",
                     ".endif",
-                    "sbi  0x1E, {transmitted}",
+                    "sbi  {flags}, {transmitted}",
                     "pop  r31",
                     "pop  r30",
                     "cli",
@@ -560,8 +563,8 @@ macro_rules! interrupts {
                     "1:",
                     "sbrc r25, 7",
                     "rjmp 7f",
-                    "cbi  0x1E, {hold_exec}",
-                    "sbic 0x1E, {held_exec}",
+                    "cbi  {flags}, {hold_exec}",
+                    "sbic {flags}, {held_exec}",
                     "rjmp 8f",
                     "9:",
                     "out  0x3F, r25",
@@ -573,9 +576,9 @@ macro_rules! interrupts {
                     "rjmp 9b",
                     // Exec has been asked for meanwhile.
                     "8:",
-                    "cbi  0x1E, {held_exec}",
+                    "cbi  {flags}, {held_exec}",
                     "ldi  r24, {pended}",
-                    "sts  0xD1, r24",
+                    "sts  {pend}, r24",
                     "rjmp 9b",
                     // It stays masked until there is something to send.
                     "2:",
@@ -636,9 +639,11 @@ macro_rules! interrupts {
                     holds = const STOPPED | HEEDS_CTS,
                     mask = const !UDRIE,
                     unmask = const UDRIE,
-                    hold_exec = const exec::HOLD,
-                    held_exec = const exec::HELD,
-                    pended = const exec::PENDED,
+                    hold_exec = const assembly::HOLD,
+                    held_exec = const assembly::HELD,
+                    flags = const assembly::FLAGS,
+                    pend = const assembly::PEND,
+                    pended = const assembly::PENDED,
                     when_complete = const TXCIE,
                     complete = const U2X | TXC,
                     transmitted = const Event::Transmitted as u8,

@@ -76,7 +76,7 @@ pub fn firmware(board: &'static Board) -> Machine {
 /// The mask of the tick's interrupt.
 const TIMSK0: u16 = 0x6E;
 /// The count of milliseconds, the lowest byte first.
-const MILLIS: &str = "kerf::hal::imp::time::MILLIS";
+const MILLIS: &str = "avr_embassy::time::MILLIS";
 
 /// A machine that has just been started has run for 49.7 days, but for so many ms.
 pub fn age(machine: &mut Machine, ms: u32) {

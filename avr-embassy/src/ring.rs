@@ -11,7 +11,11 @@ use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::{Deref, DerefMut};
 
-use super::byte::SharedByte;
+mod window;
+pub use window::Window;
+
+pub use crate::Ceiling;
+use crate::byte::SharedByte;
 
 /// The storage. `N` is 2 to 256.
 pub struct Ring<T, const N: usize> {
@@ -20,7 +24,26 @@ pub struct Ring<T, const N: usize> {
     head: SharedByte,
     /// The slot read last; written by the consumer only.
     tail: SharedByte,
+    /// Which ends have been taken.
     taken: SharedByte,
+}
+
+/// The end of the producer.
+const FILLS: u8 = 1;
+/// The end of the consumer.
+const READS: u8 = 2;
+
+/// Takes ends, if none of them has been taken.
+#[inline(never)]
+#[cfg_attr(target_arch = "avr", optimize(size))]
+fn take(taken: &SharedByte, ends: u8) -> bool {
+    crate::mask(|| {
+        let before = taken.get();
+        if before & ends == 0 {
+            taken.set(before | ends);
+        }
+        before & ends == 0
+    })
 }
 
 // SAFETY: a slot belongs to the producer until `head` has moved onto it and to the consumer until
@@ -53,14 +76,19 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         }
     }
 
-    /// Its two ends. `None` after the first time.
+    /// Its two ends. `None` if one has been taken. Any level.
     pub fn split(&'static self) -> Option<(Producer<T, N>, Consumer<T, N>)> {
-        // No compare-and-swap on AVR; this runs once, before interrupts are on.
-        if self.taken.get() != 0 {
-            return None;
-        }
-        self.taken.set(1);
-        Some((Producer(self), Consumer(self)))
+        take(&self.taken, FILLS | READS).then_some((Producer(self), Consumer(self)))
+    }
+
+    /// The end that fills. `None` if it has been taken. Any level, such as a handler that takes it when it first runs.
+    pub fn producer(&'static self) -> Option<Producer<T, N>> {
+        take(&self.taken, FILLS).then_some(Producer(self))
+    }
+
+    /// The end that reads. `None` if it has been taken. Any level.
+    pub fn consumer(&'static self) -> Option<Consumer<T, N>> {
+        take(&self.taken, READS).then_some(Consumer(self))
     }
 
     /// The end that reads, for who stands in for its owner.
@@ -226,8 +254,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
 
     /// Changes a value pushed earlier; `back` 0 is the newest. False if it has been released.
     ///
-    /// The caller keeps the consumer from running meanwhile (see `imp::exec::lock`): `_ceiling` is
-    /// the witness.
+    /// The consumer is interrupt mode, which cannot run meanwhile: `_ceiling` is the witness.
     pub fn amend(&mut self, _ceiling: &Ceiling, back: usize, change: impl FnOnce(&mut T)) -> bool {
         if back >= self.0.used() {
             return false;
@@ -329,128 +356,6 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
     }
 }
 
-/// The bytes that wait in a ring, for code that is the same for all sizes of rings.
-pub struct Window<'a> {
-    slots: *mut u8,
-    /// The highest index: one less than a power of two.
-    last: u8,
-    tail: u8,
-    len: u8,
-    /// Nobody takes them meanwhile.
-    consumer: PhantomData<&'a mut ()>,
-}
-
-impl<const N: usize> Ring<u8, N> {
-    /// What waits now.
-    ///
-    /// # Safety
-    /// The caller is the consumer, or that does not run meanwhile.
-    pub unsafe fn window(&self) -> Window<'_> {
-        const { assert!(N.is_power_of_two()) };
-        Window {
-            slots: self.slots.get().cast(),
-            last: (N - 1) as u8,
-            tail: self.tail.get(),
-            len: self.used() as u8,
-            consumer: PhantomData,
-        }
-    }
-}
-
-impl<const N: usize> Consumer<u8, N> {
-    /// What waits now.
-    pub fn window(&mut self) -> Window<'_> {
-        // SAFETY: this is the consumer.
-        unsafe { self.0.window() }
-    }
-}
-
-impl Window<'_> {
-    /// How many bytes wait.
-    pub fn len(&self) -> u8 {
-        self.len
-    }
-
-    /// Whether none does.
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
-    /// Whether no byte more has room.
-    pub fn is_full(&self) -> bool {
-        self.len == self.last
-    }
-
-    /// The slot of the byte `ahead` places behind the oldest.
-    pub fn slot(&self, ahead: u8) -> u8 {
-        self.tail.wrapping_add(ahead).wrapping_add(1) & self.last
-    }
-
-    /// The byte `ahead` places behind the oldest, 0 if none waits there.
-    pub fn get(&self, ahead: u8) -> u8 {
-        if ahead >= self.len {
-            return 0;
-        }
-        // SAFETY: it waits, so it has been filled, and `slot` is within the ring. The producer may change the newest in
-        // one instruction.
-        unsafe { self.slots.add(self.slot(ahead).into()).read_volatile() }
-    }
-
-    /// The first place from `ahead` on with a byte below a blank, or behind the newest byte. Cost: 11 cycles a byte.
-    #[inline(never)]
-    pub fn behind_text(&self, ahead: u8) -> u8 {
-        let mut at = ahead;
-        let mut slot = self.slot(at);
-        while at < self.len {
-            // SAFETY: as in `get`.
-            let byte = unsafe { self.slots.add(slot.into()).read_volatile() };
-            if byte < b' ' {
-                break;
-            }
-            slot = slot.wrapping_add(1) & self.last;
-            at += 1;
-        }
-        at
-    }
-
-    /// Takes bytes out of the midst: those before them move up, and the consumer is to release as many. The newest byte of a full
-    /// ring stays. Cost: 20 cycles for each byte before them.
-    #[inline(never)]
-    #[small]
-    pub fn take_out(&mut self, at: u8, count: u8) {
-        let most = self.len.saturating_sub(at).saturating_sub(self.is_full().into());
-        let count = count.min(most);
-        for n in (0..at.min(self.len)).rev() {
-            let byte = self.get(n);
-            // SAFETY: the place is one of a byte that waits, and not the newest of a full ring, which alone the producer changes.
-            unsafe { self.slots.add(self.slot(n + count).into()).write_volatile(byte) };
-        }
-        self.tail = self.tail.wrapping_add(count) & self.last;
-        self.len -= count;
-    }
-
-    /// Replaces a byte that waits, if it is still `from`: the producer may have changed the newest. Whether it was. Masks
-    /// interrupts for some cycles.
-    #[inline(never)]
-    #[small]
-    pub fn replace(&mut self, ahead: u8, from: u8, to: u8) -> bool {
-        if ahead >= self.len {
-            return false;
-        }
-        super::imp::mask(|| {
-            // SAFETY: as in `get`; the producer does not run meanwhile, and nobody else has a reference.
-            unsafe {
-                let slot = self.slots.add(self.slot(ahead).into());
-                let same = slot.read_volatile() == from;
-                if same {
-                    slot.write_volatile(to);
-                }
-                same
-            }
-        })
-    }
-}
-
 /// A value that the consumer does not see before it is published.
 pub struct Slot<'a, T: 'static, const N: usize> {
     ring: &'static Ring<T, N>,
@@ -484,9 +389,6 @@ impl<T: Copy, const N: usize> DerefMut for Slot<'_, T, N> {
         unsafe { &mut *self.ring.slot(self.after) }
     }
 }
-
-/// Witness that the exec level cannot run: only `imp::exec::lock` and tests make one.
-pub struct Ceiling(pub(in crate::hal) ());
 
 #[cfg(test)]
 mod tests {
@@ -612,6 +514,17 @@ mod tests {
     fn splits_once() {
         let ring: &'static Ring<u8, 4> = Box::leak(Box::new(Ring::new()));
         assert!(ring.split().is_some());
-        assert!(ring.split().is_none());
+        assert!(ring.split().is_none() && ring.producer().is_none() && ring.consumer().is_none());
+    }
+
+    #[test]
+    fn each_end_is_taken_once() {
+        let ring: &'static Ring<u8, 4> = Box::leak(Box::new(Ring::new()));
+        let (Some(mut producer), Some(mut consumer)) = (ring.producer(), ring.consumer()) else {
+            panic!("neither has been taken")
+        };
+        assert!(ring.producer().is_none() && ring.consumer().is_none() && ring.split().is_none());
+        producer.push(5).unwrap();
+        assert_eq!(consumer.pop(), Some(5));
     }
 }

@@ -1,0 +1,39 @@
+//! Two tasks that blink: the LED of an Arduino Mega 2560 (pin 13, PB7) four times a second, pin 12 (PB6) ten times.
+#![no_std]
+#![no_main]
+
+use avr_device::atmega2560::Peripherals;
+use avr_embassy::{Executor, time};
+use embassy_time::{Duration, Ticker};
+use static_cell::StaticCell;
+
+#[embassy_executor::task(pool_size = 2)]
+async fn blink(pin: u8, half_period: Duration) {
+    let mut ticker = Ticker::every(half_period);
+    loop {
+        ticker.next().await;
+        // SAFETY: a 1 written to PINB turns that pin over and leaves the others alone.
+        unsafe { Peripherals::steal().PORTB.pinb().write(|w| w.bits(1 << pin)) };
+    }
+}
+
+#[avr_device::entry]
+fn main() -> ! {
+    static EXECUTOR: StaticCell<Executor> = StaticCell::new();
+    // SAFETY: called once.
+    let peripherals = unsafe { Peripherals::steal() };
+    peripherals.PORTB.ddrb().write(|w| w.pb7().set_bit().pb6().set_bit());
+    time::start::<16_000_000>();
+    EXECUTOR.init(Executor::new()).run(|spawner, _| {
+        for (pin, ms) in [(7, 125), (6, 50)] {
+            if let Ok(task) = blink(pin, Duration::from_millis(ms)) {
+                spawner.spawn(task);
+            }
+        }
+    })
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    loop {}
+}

@@ -1,0 +1,28 @@
+//! The ATmega2560, and with it the ATmega1280 and ATmega640: their registers and vectors are the same.
+//!
+//! The tick is on timer 0. The software interrupt is USART2's data-register-empty: that transmitter never sends, so its
+//! condition always holds, and the enable bit raises or withdraws it. The transmitter is on, which keeps port H bit 1 high.
+
+/// GPIOR0.
+pub const FLAGS: u8 = 0x1E;
+/// UCSR2B.
+pub const PEND: usize = 0xD1;
+/// TXEN2 and UDRIE2.
+pub const PENDED: u8 = 1 << 3 | 1 << 5;
+/// TXEN2.
+pub const WITHDRAWN: u8 = 1 << 3;
+/// SMCR.
+pub const SMCR: usize = 0x53;
+/// SE, with the mode bits 0: idle.
+pub const SLEEP_IDLE: u8 = 1;
+/// TCCR0A.
+pub const TCCRA: usize = 0x44;
+/// TCCR0B.
+pub const TCCRB: usize = 0x45;
+/// OCR0A.
+pub const OCRA: usize = 0x47;
+/// TIMSK0.
+pub const TIMSK: usize = 0x6E;
+
+// TIMER0_COMPA and USART2_UDRE.
+handlers!(tick: __vector_21, software: __vector_52);

@@ -1,0 +1,43 @@
+//! The chips: where their registers are, and which vectors the runtime takes. All that differs between them.
+//!
+//! A chip is one file with these names:
+//!
+//! | name | what it is |
+//! |---|---|
+//! | `FLAGS` | I/O address (as `sbi` and `in` count) of the register of the event bits; below 0x20, so that `sbi` reaches it |
+//! | `PEND` | data address of the register with which the software interrupt is raised and withdrawn |
+//! | `PENDED`, `WITHDRAWN` | the values of that register for the two |
+//! | `SMCR`, `SLEEP_IDLE` | data address of the sleep register, and its value for idle sleep, enabled |
+//! | `TCCRA`, `TCCRB`, `OCRA`, `TIMSK` | data addresses of the 8-bit timer of the tick |
+//! | `handlers!` | makes the handlers, by the numbers of their vectors: those of the tick and of the software interrupt |
+
+/// Gives the runtime's two handlers the names that the start-up code's vector table refers to.
+macro_rules! handlers {
+    (tick: $tick:ident, software: $software:ident) => {
+        #[unsafe(no_mangle)]
+        extern "C" fn $tick() -> ! {
+            // SAFETY: the hardware calls it.
+            unsafe { crate::time::handler() }
+        }
+
+        #[unsafe(no_mangle)]
+        extern "C" fn $software() -> ! {
+            // SAFETY: the hardware calls it.
+            unsafe { crate::interrupt::handler() }
+        }
+
+        /// Whoever starts one of the two calls this, so that a linker without LTO takes the handlers along: they are
+        /// in the same object file. With LTO nothing is left of it.
+        #[inline(never)]
+        pub fn link() {}
+    };
+}
+#[cfg(feature = "atmega2560")]
+mod atmega2560;
+#[cfg(feature = "atmega2560")]
+pub use atmega2560::*;
+
+#[cfg(not(feature = "atmega2560"))]
+compile_error!(
+    "avr-embassy does not know the chip: enable one of its features, such as `atmega2560`"
+);

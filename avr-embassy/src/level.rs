@@ -1,0 +1,52 @@
+//! Levels as types: who runs, and who cannot run meanwhile.
+//!
+//! Functions that belong to a level ask for its token. Tokens take no room and no cycles. [`Thread`] and [`Interrupt`]
+//! are not [`Send`], so neither reaches the other level: what goes to a task of the interrupt executor must be [`Send`].
+
+use core::marker::PhantomData;
+
+/// Shows that thread mode runs: the main loop, or a task of the `Executor`.
+///
+/// A task of the interrupt executor cannot have it:
+///
+/// ```compile_fail
+/// fn is_send<T: Send>() {}
+/// is_send::<avr_embassy::Thread>();
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Thread(PhantomData<*mut ()>);
+
+impl Thread {
+    /// A token out of nothing.
+    ///
+    /// # Safety
+    /// It is used in thread mode only.
+    #[inline(always)]
+    pub const unsafe fn assume() -> Self {
+        Thread(PhantomData)
+    }
+}
+
+/// Shows that a task of the interrupt executor runs.
+#[derive(Clone, Copy, Debug)]
+pub struct Interrupt(PhantomData<*mut ()>);
+
+impl Interrupt {
+    /// A token out of nothing.
+    ///
+    /// # Safety
+    /// It is used in tasks of the interrupt executor only.
+    #[inline(always)]
+    pub const unsafe fn assume() -> Self {
+        Interrupt(PhantomData)
+    }
+}
+
+/// Shows that the interrupt executor cannot run: [`interrupt::lock`](crate::interrupt::lock) lends it, and nobody else
+/// can make one.
+///
+/// ```compile_fail
+/// let forged = avr_embassy::Ceiling(());
+/// ```
+#[derive(Debug)]
+pub struct Ceiling(pub(crate) ());

@@ -1,0 +1,137 @@
+//! Embassy on 8-bit AVR with two levels of tasks: a thread-mode executor, an interrupt-mode executor that preempts it, a time driver,
+//! event bits that a handler sets in one instruction, and rings between levels that never mask interrupts.
+//!
+//! On top of it programs use Embassy as they know it: `#[embassy_executor::task]`, [`embassy_time`], [`embassy_sync`],
+//! `embassy-futures`. The README has examples and what everything costs in cycles.
+//!
+//! [`embassy_time`]: https://docs.rs/embassy-time
+//! [`embassy_sync`]: https://docs.rs/embassy-sync
+//!
+//! # Levels
+//!
+//! A lower one preempts those below it in this table.
+//!
+//! | level | what runs there | what it may do |
+//! |---|---|---|
+//! | short interrupts | the program's handlers, in Rust or assembly; the tick | [`Event::set`], [`interrupt::pend`], its ends of rings, [`SharedByte`](byte::SharedByte) |
+//! | interrupt mode | tasks of the [`interrupt`] executor, with interrupts on | besides, all of Embassy; [`interrupt::wait`] |
+//! | thread mode | tasks of the `Executor`, the main loop | besides, [`Event::wait`], [`interrupt::lock`] |
+//!
+//! Functions that belong to a level ask for its token, [`Thread`] or [`Interrupt`], which the other level cannot have.
+//!
+//! # Critical sections mask nothing
+//!
+//! The `critical-section` of this crate is [`interrupt::lock`]: it keeps interrupt mode out, and **no other interrupt**. That makes wake-ups
+//! and channels between the two levels cheap, and delays no handler. The price: a handler must not enter a critical section, so it
+//! wakes no `Waker` and touches no `embassy_sync` channel. It sets an event, pends, or fills a ring; a task does the rest.
+//! Of other crates, turn off their own critical section (`avr-device`: feature `critical-section-impl`).
+//!
+//! # What the runtime owns
+//!
+//! | what | ATmega2560 |
+//! |---|---|
+//! | the register of event bits; bits 0 to 3 are the program's | GPIOR0 |
+//! | a software interrupt | USART2_UDRE; with it USART2's transmitter, whose pin (port H bit 1) is high |
+//! | a timer for the millisecond | timer 0 and TIMER0_COMPA |
+//! | the sleep mode | idle |
+//! | the pender of Embassy's executors and the critical section | |
+//!
+//! # When full or late
+//!
+//! - **Events** that repeat before the main loop looks merge into one. None is lost.
+//! - **A ring** that is full refuses: [`Producer::push`](ring::Producer::push) gives the value back.
+//! - **Timers** of more than 4 tasks at once (features `timers-8`, `timers-16`): those beyond are polled all the time until
+//!   there is room. No time is missed, but the CPU does not sleep.
+//! - **A timer** is as late as the longest poll of a thread-mode task. What must be on time is done by a handler of the program that pends
+//!   a task of interrupt mode.
+//! - **Requests** to interrupt mode merge while it cannot run, and are served right after.
+//! - **A second task** that waits for an event, or in [`interrupt::wait`], takes turns with the first: both go on, at the cost of polls.
+//!
+//! # Host
+//!
+//! Everything that is not a register works on the host, too, where each thread is a machine of its own: see `host::Runtime`.
+#![no_std]
+#![cfg_attr(target_arch = "avr", feature(asm_experimental_arch, optimize_attribute))]
+
+#[cfg(not(target_arch = "avr"))]
+#[doc(hidden)]
+pub extern crate std;
+
+/// Declares a value that a machine has one of, as a function that returns `&'static` to it.
+///
+/// On AVR it is a static. On the host each thread is a machine of its own, so that tests run side
+/// by side: the value is made on the thread's first use.
+///
+/// ```
+/// use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
+///
+/// avr_embassy::machine_static! {
+///     /// Bytes that were lost.
+///     fn lost() -> AtomicU8 = AtomicU8::new(0);
+/// }
+///
+/// lost().store(1, Relaxed);
+/// assert_eq!(lost().load(Relaxed), 1);
+/// ```
+#[macro_export]
+macro_rules! machine_static {
+    ($($(#[$meta:meta])* $vis:vis fn $name:ident() -> $type:ty = $init:expr;)+) => {$(
+        $(#[$meta])*
+        #[inline(always)]
+        $vis fn $name() -> &'static $type {
+            #[cfg(target_arch = "avr")]
+            {
+                static VALUE: $type = $init;
+                &VALUE
+            }
+            #[cfg(not(target_arch = "avr"))]
+            {
+                $crate::std::thread_local!(static VALUE: &'static $type =
+                    $crate::std::boxed::Box::leak($crate::std::boxed::Box::new($init)));
+                VALUE.with(|value| *value)
+            }
+        }
+    )+};
+}
+
+#[cfg(target_arch = "avr")]
+pub mod assembly;
+pub mod byte;
+#[cfg(target_arch = "avr")]
+mod chip;
+pub mod event;
+#[cfg(target_arch = "avr")]
+mod executor;
+#[cfg(not(target_arch = "avr"))]
+pub mod host;
+pub mod interrupt;
+mod level;
+mod pender;
+pub mod ring;
+#[cfg(target_arch = "avr")]
+pub mod time;
+pub mod timers;
+
+pub use event::{Event, Waiter};
+#[cfg(target_arch = "avr")]
+pub use executor::Executor;
+pub use level::{Ceiling, Interrupt, Thread};
+
+/// Does something of a few cycles with interrupts off. Any level. Cost: 3 cycles.
+///
+/// On the host it only does it.
+#[inline(always)]
+pub fn mask<R>(act: impl FnOnce() -> R) -> R {
+    #[cfg(target_arch = "avr")]
+    {
+        let status: u8;
+        // SAFETY: the status is restored below.
+        unsafe { core::arch::asm!("in {status}, 0x3F", "cli", status = out(reg) status) };
+        let result = act();
+        // SAFETY: interrupts are as they were before.
+        unsafe { core::arch::asm!("out 0x3F, {status}", status = in(reg) status) };
+        result
+    }
+    #[cfg(not(target_arch = "avr"))]
+    act()
+}

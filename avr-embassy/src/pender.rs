@@ -1,0 +1,18 @@
+//! The pender that Embassy's executors call when a task of theirs is woken; it tells the two apart by their context.
+
+use crate::event::{POLL, flags};
+use crate::interrupt;
+
+/// Context of the thread-mode executor.
+pub const THREAD: *mut () = core::ptr::null_mut();
+/// Context of the interrupt-mode executor.
+pub const INTERRUPT: *mut () = core::ptr::dangling_mut();
+
+#[unsafe(export_name = "__pender")]
+fn pender(context: *mut ()) {
+    if context == THREAD {
+        flags::set(POLL);
+    } else {
+        interrupt::woken();
+    }
+}

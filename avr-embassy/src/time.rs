@@ -1,0 +1,173 @@
+//! Time: a millisecond tick, and embassy-time's driver on top of it.
+//!
+//! The interrupt only counts and sets [`Event::TICK`]. The list of those who wait is walked in thread mode, where it costs
+//! no time with interrupts off: a timer is as late as the longest poll of a thread-mode task, and exact to the millisecond
+//! otherwise.
+//!
+//! The list has room for 4 tasks, with the feature `timers-8` for 8, with `timers-16` for 16. Further ones are polled all the
+//! time until there is room.
+
+use core::arch::asm;
+use core::cell::UnsafeCell;
+use core::task::Waker;
+
+use embassy_executor::raw::wake_task;
+use embassy_time_driver::{Driver, time_driver_impl};
+
+use crate::assembly::{CLOSED, FLAGS, MISSED, PEND, PENDED};
+use crate::chip::{self, OCRA, TCCRA, TCCRB, TIMSK};
+use crate::timers::Timers;
+use crate::{Event, Thread, interrupt};
+
+const TIMERS: usize = match (cfg!(feature = "timers-8"), cfg!(feature = "timers-16")) {
+    (_, true) => 16,
+    (true, _) => 8,
+    _ => 4,
+};
+
+/// Milliseconds since reset, the lowest byte first: enough for 34 years. The interrupt alone writes it.
+static mut MILLIS: [u8; 5] = [0; 5];
+
+/// The tick: counts, in 32 cycles, with interrupts off for 20.
+///
+/// Every 256 ms it carries into the upper bytes, with interrupts on. Interrupt mode is kept out meanwhile: its tasks
+/// may ask for the time.
+///
+/// # Safety
+/// It is the handler of the tick's interrupt, and nothing else calls it.
+#[inline(always)]
+pub(crate) unsafe fn handler() -> ! {
+    // SAFETY: every register it changes is restored, and it returns by `reti`. Only it writes `MILLIS`. Whoever
+    // interrupts it leaves `CLOSED` as it was, so counting up and down restores it.
+    unsafe {
+        asm!(
+            "push r24",
+            "in   r24, 0x3F",
+            "push r24",
+            "lds  r24, {millis}",
+            "inc  r24",
+            "sts  {millis}, r24",
+            "breq 2f",
+            "sei",
+            "sbi  {flags}, {tick}",
+            "1:",
+            "pop  r24",
+            "out  0x3F, r24",
+            "pop  r24",
+            "reti",
+            "2:",
+            "lds  r24, {closed}",
+            "inc  r24",
+            "sts  {closed}, r24",
+            "sei",
+            "lds  r24, {millis} + 1",
+            "inc  r24",
+            "sts  {millis} + 1, r24",
+            "brne 3f",
+            "lds  r24, {millis} + 2",
+            "inc  r24",
+            "sts  {millis} + 2, r24",
+            "brne 3f",
+            "lds  r24, {millis} + 3",
+            "inc  r24",
+            "sts  {millis} + 3, r24",
+            "brne 3f",
+            "lds  r24, {millis} + 4",
+            "inc  r24",
+            "sts  {millis} + 4, r24",
+            "3:",
+            "sbi  {flags}, {tick}",
+            "cli",
+            "lds  r24, {closed}",
+            "dec  r24",
+            "sts  {closed}, r24",
+            "brne 1b",
+            "lds  r24, {missed}",
+            "tst  r24",
+            "breq 1b",
+            "ldi  r24, 0",
+            "sts  {missed}, r24",
+            "ldi  r24, {pended}",
+            "sts  {pend}, r24",
+            "rjmp 1b",
+            millis = sym MILLIS,
+            closed = sym CLOSED,
+            missed = sym MISSED,
+            flags = const FLAGS,
+            pend = const PEND,
+            pended = const PENDED,
+            tick = const Event::TICK.bit(),
+            options(noreturn),
+        );
+    }
+}
+
+fn count() -> [u8; 5] {
+    // SAFETY: the writer is an interrupt, and interrupts are off.
+    crate::mask(|| unsafe { MILLIS })
+}
+
+/// Milliseconds since reset, modulo 2^32: they wrap after 49.7 days. Thread mode and interrupt mode. Cost: 24 cycles.
+pub fn millis() -> u32 {
+    let [a, b, c, d, _] = count();
+    u32::from_le_bytes([a, b, c, d])
+}
+
+struct Millis(UnsafeCell<Timers<TIMERS>>);
+
+// SAFETY: the list is touched under the ceiling lock only.
+unsafe impl Sync for Millis {}
+
+time_driver_impl!(static DRIVER: Millis = Millis(UnsafeCell::new(Timers::new())));
+
+impl Driver for Millis {
+    fn now(&self) -> u64 {
+        let [a, b, c, d, e] = count();
+        u64::from_le_bytes([a, b, c, d, e, 0, 0, 0])
+    }
+
+    fn schedule_wake(&self, at: u64, waker: &Waker) {
+        // SAFETY: see above; to wake a task does not come back here.
+        critical_section::with(|_| unsafe { &mut *self.0.get() }.schedule(at, waker));
+    }
+}
+
+/// Wakes the tasks whose time has come.
+pub(crate) fn wake_expired(thread: Thread) {
+    let now = millis();
+    // SAFETY: see above.
+    let take = || interrupt::lock(thread, |_| unsafe { &mut *DRIVER.0.get() }.take_expired(now));
+    while let Some(task) = take() {
+        wake_task(task);
+    }
+}
+
+/// Starts the tick of a chip whose clock is `CLOCK_HZ`: 8 or 16 MHz for example. One of which a millisecond
+/// is no whole number of timer counts, such as 20 MHz, does not compile. The timer then is the runtime's.
+pub fn start<const CLOCK_HZ: u32>() {
+    let (select, counts) =
+        const { scale(CLOCK_HZ).expect("a millisecond is no whole number of the timer's counts") };
+    chip::link();
+    // SAFETY: the timer is nobody else's. CTC: it counts up to `OCRA` and begins anew.
+    unsafe {
+        (OCRA as *mut u8).write_volatile(counts - 1);
+        (TCCRA as *mut u8).write_volatile(0b10);
+        (TCCRB as *mut u8).write_volatile(select);
+        (TIMSK as *mut u8).write_volatile(0b10);
+    }
+}
+
+/// Which prescaler makes a millisecond a whole number of counts that fits the timer: its code, and the counts.
+const fn scale(clock_hz: u32) -> Option<(u8, u8)> {
+    const PRESCALERS: [(u8, u32); 4] = [(2, 8), (3, 64), (4, 256), (5, 1024)];
+    let mut n = 0;
+    while n < PRESCALERS.len() {
+        let (code, divisor) = PRESCALERS[n];
+        let counts = clock_hz / divisor / 1_000;
+        if counts * divisor * 1_000 == clock_hz && counts >= 2 && counts <= 255 {
+            return Some((code, counts as u8));
+        }
+        n += 1;
+    }
+    None
+}
