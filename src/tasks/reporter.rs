@@ -111,7 +111,7 @@ fn reports_queue(links: &Links) -> bool {
     links.settings.borrow().queue_verbosity() != 0
 }
 
-/// How many turns of the parser a report leaves to control lines that wait on its port: their answers come first.
+/// How many turns of the parser a status report leaves to control lines that wait on its port: their answers come first.
 const COURTESY: u8 = 8;
 
 /// What can be told.
@@ -220,7 +220,8 @@ impl Telling {
 /// free in it, which may have changed during the wait for the transmitter.
 async fn tell(links: &Links, port: &Port, what: What) -> usize {
     for _ in 0..COURTESY {
-        if !port.lines.borrow().has_controls() {
+        // Anything else may be told by the parser meanwhile.
+        if !matches!(what, What::Status) || !port.lines.borrow().has_controls() {
             break;
         }
         yield_now().await;
