@@ -20,7 +20,6 @@ use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, 
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
-use crate::motion::snapshot::Snapshot;
 use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
@@ -60,7 +59,7 @@ impl Links {
             probe: Probe::default(),
             signs: Signs::default(),
             job: Cell::default(),
-            moment: Cell::new(Snapshot::new().moment()),
+            seen: Cell::default(),
             storage,
             report: RefCell::new(StatusReport::new()),
             // Their defaults come when they are in place: they would take as much of the stack.

@@ -11,7 +11,7 @@
 //! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | parser: the port waits, response half sent; reporter: waits |
 //! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
-//! | [`Links::moment`] | how motion stood when the report under way began | 1 | 32 B | whoever tells it | the same | overwritten |
+//! | [`Links::seen`] | how the machine stood when the report under way began | 1 | 33 B | whoever tells it | the same | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
 //! | [`Links::changes`] | what the planner has to look at before the next line | a bit each | 1 B | parser, planner | planner | bits merge |
 //! | [`Links::notices`], [`Links::probe`] | what is to be told: an exception, the end of a jog or of a flush, a probing | 1 each | 4 B, 14 B | all | reporter | overwritten: the newest counts |
@@ -32,6 +32,7 @@ use core::cell::{Cell, RefCell, UnsafeCell};
 
 use super::ports::Port;
 use super::storage::Storage;
+use super::view::Seen;
 use super::wake::{News, Wake};
 use crate::config::Settings;
 use crate::gcode::command::Commands;
@@ -41,7 +42,7 @@ use crate::hal::serial::PORTS;
 use crate::jobs::Job;
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue;
-use crate::motion::snapshot::{Moment, Snapshot};
+use crate::motion::snapshot::Snapshot;
 use crate::protocol::StatusReport;
 
 /// The links. One for the machine, made at start-up.
@@ -82,8 +83,8 @@ pub struct Links {
     pub restart: Cell<Option<bool>>,
     /// The built-in job that runs.
     pub job: Cell<Job>,
-    /// When the report that is on its way was begun.
-    pub moment: Cell<Moment>,
+    /// How the machine stood when the report that is on its way was begun.
+    pub seen: Cell<Seen>,
     /// What has to be put away, and where the rest is.
     pub storage: &'static Storage,
     /// Settings in force.

@@ -111,9 +111,6 @@ fn reports_queue(links: &Links) -> bool {
     links.settings.borrow().queue_verbosity() != 0
 }
 
-/// How many turns of the parser a status report leaves to control lines that wait on its port: their answers come first.
-const COURTESY: u8 = 8;
-
 /// What can be told.
 #[derive(Clone, Copy)]
 pub enum What {
@@ -216,16 +213,10 @@ impl Telling {
     }
 }
 
-/// Tells it on a port, a part at a time: for a millisecond in one turn, if there is room. Of a queue report returns how many blocks are
-/// free in it, which may have changed during the wait for the transmitter.
+/// Tells it on a port, a part at a time: for a millisecond in one turn, if there is room. Of a queue
+/// report returns how many blocks are free in it, which may have changed during the wait for the
+/// transmitter.
 async fn tell(links: &Links, port: &Port, what: What) -> usize {
-    for _ in 0..COURTESY {
-        // Anything else may be told by the parser meanwhile.
-        if !matches!(what, What::Status) || !port.lines.borrow().has_controls() {
-            break;
-        }
-        yield_now().await;
-    }
     let mut tx = port.tx.lock().await;
     let mut telling = Telling::begin(what, links, port);
     loop {

@@ -2,7 +2,7 @@
 //!
 //! Made anew for each step of a response or report, never kept across an `.await`. Positions and
 //! speed come from exec's snapshot while something runs, from the G-code model when nothing does. Steps of one report
-//! or group share a [`Moment`], the one of [`Links::moment`]; two ports at a time would share it, too.
+//! or group share what was [`Seen`] at its beginning, [`Links::seen`]; two ports at a time would share it, too.
 
 use kerf_macros::small;
 
@@ -36,7 +36,7 @@ use crate::machine::jog::Bar;
 use crate::machine::{self, Alarm, Cycle, Doing};
 use crate::motion::dynamics;
 use crate::motion::queue;
-use crate::motion::snapshot::{Moment, Program};
+use crate::motion::snapshot::{Moment, Program, Snapshot};
 use crate::protocol::{Dialect, Machine, StatusReport, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
@@ -80,7 +80,32 @@ pub struct View<'a> {
     port: &'a Port,
     settings: RefMut<'a, Settings>,
     report: RefMut<'a, StatusReport>,
-    motion: OnceCell<Moment>,
+    seen: OnceCell<Seen>,
+}
+
+/// How the machine stood at one moment.
+#[derive(Clone, Copy)]
+pub struct Seen {
+    motion: Moment,
+    /// A line was being carried out.
+    carries_out: bool,
+}
+
+impl Default for Seen {
+    /// Before anything has moved.
+    fn default() -> Self {
+        Self { motion: Snapshot::new().moment(), carries_out: false }
+    }
+}
+
+impl Seen {
+    /// How it stands now. Thread mode.
+    fn now(links: &Links) -> Self {
+        // In this order: exec may take up what is queued in between.
+        let queued = links.commands_taken.get() || queue::used() > 0;
+        let motion = snapshot().moment();
+        Self { motion, carries_out: queued || motion.running }
+    }
 }
 
 #[small]
@@ -92,12 +117,16 @@ impl<'a> View<'a> {
             port,
             settings: links.settings.borrow_mut(),
             report: links.report.borrow_mut(),
-            motion: OnceCell::new(),
+            seen: OnceCell::new(),
         }
     }
 
+    fn seen(&self) -> &Seen {
+        self.seen.get_or_init(|| Seen::now(self.links))
+    }
+
     fn motion(&self) -> &Moment {
-        self.motion.get_or_init(|| snapshot().moment())
+        &self.seen().motion
     }
 
     /// Whether anything is queued or runs, or a hold is on.
@@ -112,7 +141,7 @@ impl<'a> View<'a> {
 
     /// Whether a line is being carried out.
     fn carries_out(&self) -> bool {
-        self.motion().running || queue::used() > 0 || self.links.commands_taken.get()
+        self.seen().carries_out
     }
 
     /// Whether a built-in job has been carried out to its end.
@@ -386,9 +415,9 @@ impl Machine for View<'_> {
 
     fn moment(&mut self, first: bool) {
         if first {
-            self.links.moment.set(*self.motion());
+            self.links.seen.set(*self.seen());
         }
-        self.motion = OnceCell::from(self.links.moment.get());
+        self.seen = OnceCell::from(self.links.seen.get());
     }
 
     fn report(&mut self) -> &mut StatusReport {

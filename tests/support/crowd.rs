@@ -89,12 +89,25 @@ impl<S: Side> Crowd<S> {
 
     /// Whether a port says this within so many ms.
     pub fn hears(&mut self, port: usize, text: &str, ms: u64) -> bool {
+        self.comes(ms, |crowd| crowd.heard[port].contains(text))
+    }
+
+    /// Whether a port says a whole line that contains this within so many ms.
+    fn hears_line(&mut self, port: usize, text: &str, ms: u64) -> bool {
+        self.comes(ms, |crowd| {
+            let mut lines = crowd.heard[port].split_inclusive('\n');
+            lines.any(|line| line.contains(text) && line.ends_with('\n'))
+        })
+    }
+
+    /// Whether this is so within so many ms.
+    fn comes(&mut self, ms: u64, is_so: impl Fn(&Self) -> bool) -> bool {
         (0..=ms).any(|_| {
-            let hears = self.heard[port].contains(text);
-            if !hears {
+            let is_so = is_so(self);
+            if !is_so {
                 self.pass(1);
             }
-            hears
+            is_so
         })
     }
 
@@ -108,7 +121,7 @@ impl<S: Side> Crowd<S> {
         self.forget();
         self.send(port, line);
         let begun = self.heard[port].len();
-        let hears = self.hears(port, answer, PROMPT_MS);
+        let hears = self.hears_line(port, answer, PROMPT_MS);
         let (heard, asked) =
             (&self.heard[port][begun.min(self.heard[port].len())..], line.trim_end());
         assert!(hears, "{asked} on port {port} is not answered: {heard:?}");
@@ -264,7 +277,7 @@ pub fn a_stopped_port_does_not_stop_the_other<S: Side>(boot: impl Fn() -> S + Sy
             crowd.send(free, "g91g1x.1f500\n");
             crowd.pass(500);
             assert_eq!(crowd.steps(), [128, 0, 0, 0], "{:?}", crowd.heard);
-            assert_eq!(crowd.responses(free, 0), 1);
+            assert_eq!(crowd.responses(free, 0), 1, "{stopped} {by_pin} {:?}", crowd.heard);
             if by_pin {
                 crowd.side.set_aux_cts(false);
             } else {
