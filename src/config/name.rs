@@ -69,11 +69,11 @@ impl Name {
     }
 
     /// What follows the first `skip` bytes as a table's zero-padded name, or `None` if that is too long.
-    pub fn token(&self, skip: usize) -> Option<[u8; 4]> {
+    pub fn row_name(&self, skip: usize) -> Option<[u8; 4]> {
         let rest = self.bytes().get(skip..)?;
-        let mut token = [0; 4];
-        token.get_mut(..rest.len())?.copy_from_slice(rest);
-        Some(token)
+        let mut padded = [0; 4];
+        padded.get_mut(..rest.len())?.copy_from_slice(rest);
+        Some(padded)
     }
 }
 
@@ -120,12 +120,12 @@ mod tests {
     fn names_are_as_in_tables() {
         let name = Name::new().with(b"XVm").unwrap();
         assert_eq!(name.bytes(), b"xvm");
-        assert_eq!((name.token(0), name.token(1)), (Some(*b"xvm\0"), Some(token("vm"))));
-        assert_eq!((name.token(3), name.token(4)), (Some([0; 4]), None));
+        assert_eq!((name.row_name(0), name.row_name(1)), (Some(*b"xvm\0"), Some(token("vm"))));
+        assert_eq!((name.row_name(3), name.row_name(4)), (Some([0; 4]), None));
         assert!(Name::new().with(b"posxyz").is_none());
-        assert_eq!(Name::new().with(b"abaud").unwrap().token(1), Some(token("baud")));
+        assert_eq!(Name::new().with(b"abaud").unwrap().row_name(1), Some(token("baud")));
         assert_eq!(Name::beginning(b"X,velocity").bytes(), b"xvelo");
-        assert_eq!(Name::new().with(b"bauds").unwrap().token(0), None);
+        assert_eq!(Name::new().with(b"bauds").unwrap().row_name(0), None);
     }
 
     #[test]

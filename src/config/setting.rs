@@ -219,7 +219,7 @@ impl Setting {
     #[small]
     pub fn find(name: &Name) -> Option<Setting> {
         let search = |owner: Owner| {
-            let token = name.token(owner.prefix().bytes().len())?;
+            let token = name.row_name(owner.prefix().bytes().len())?;
             Setting::of(owner, owner.table()?.find(token)?)
         };
         let owner = Owner::of_name(name);

@@ -93,7 +93,7 @@ impl Token {
     /// The setting or value called `name`. About 3,000 cycles on AVR; 8,000 for one that begins as those of the tables do.
     pub fn find(name: &Name) -> Option<Token> {
         let setting = || Setting::find(name).map(Token::of_setting);
-        let single = name.token(0).and_then(|token| SINGLES.slice().find(token));
+        let single = name.row_name(0).and_then(|token| SINGLES.slice().find(token));
         single
             .map(Token::single)
             .or_else(|| Token::find_member(name))
@@ -202,7 +202,7 @@ fn vector_index(offset: u8) -> (u8, u8) {
 
 #[small]
 fn find_vector(name: &Name) -> Option<u8> {
-    VECTORS.slice().find(name.token(0)?)
+    VECTORS.slice().find(name.row_name(0)?)
 }
 
 /// The reports that a machine sends before anyone asks for others.

@@ -26,8 +26,8 @@ use crate::tasks::{Never, hold, links, overrides, power, spindle};
 /// After so many segments without a turn of thread mode they become longer, which takes less of the CPU.
 const PATIENCE: u8 = 6;
 
-/// While motion has just begun thread mode gets a turn after so many segments: the amount that waits is built up from nothing,
-/// which would take 6 ms at a stretch.
+/// While motion has just begun thread mode gets a turn after so many segments: what waits is built up from
+/// nothing, which would take 6 ms at a stretch.
 const FIRST_TURN: u8 = 2;
 
 /// The task.
@@ -206,9 +206,8 @@ impl<'a> Runner<'a> {
             health::look_for_starvation();
         }
         stepper::go();
-        if !waiting.is_enough() {
-            let gives_way = passed_over >= FIRST_TURN && waiting.has_just_begun();
-            return if gives_way { Next::Idle } else { Next::Turn };
+        if !waiting.is_enough(passed_over) {
+            return Next::Turn;
         }
         self.asked = true;
         if waiting.has_room(*rests) { Next::Idle } else { Next::Room }
@@ -264,7 +263,8 @@ const PRESSED_FOR: u8 = 100;
 /// With less than this exec is late, and makes longer stretches.
 const WAITING_SHORT: u16 = units(25);
 
-/// What waits at least, at first, when thread mode gets a turn: as long as exec takes for a segment at worst.
+/// What waits at least when thread mode gets a turn while motion has just begun: exec takes that long for a
+/// segment at worst.
 const FIRST_LEAST: u16 = units(15);
 
 impl Waiting {
@@ -327,16 +327,12 @@ impl Waiting {
         short
     }
 
-    /// Whether the machine stood still not long ago, and enough waits for a turn of thread mode.
+    /// Whether thread mode gets a turn before more is prepared, after so many segments without one.
     #[inline(always)]
-    fn has_just_begun(&self) -> bool {
-        usize::from(self.moved) <= SEGMENTS && self.sum >= FIRST_LEAST
-    }
-
-    /// Whether thread mode gets a turn before more is prepared.
-    #[inline(always)]
-    fn is_enough(&self) -> bool {
-        self.used >= 2 && self.sum >= self.limits().least
+    fn is_enough(&self, passed_over: u8) -> bool {
+        let has_just_begun = usize::from(self.moved) <= SEGMENTS && passed_over >= FIRST_TURN;
+        let least = if has_just_begun { FIRST_LEAST } else { self.limits().least };
+        self.used >= 2 && self.sum >= least
     }
 
     /// Whether another one like the last may wait: what is queued cannot be slowed down any more. Unless the machine `rests` at
