@@ -5,7 +5,7 @@
 #![no_std]
 #![cfg_attr(target_arch = "avr", feature(asm_experimental_arch, optimize_attribute))]
 
-#[cfg(not(target_arch = "avr"))]
+#[cfg(feature = "std")]
 extern crate std;
 
 #[macro_use(machine_static)]
@@ -13,12 +13,13 @@ extern crate avr_embassy;
 #[macro_use]
 extern crate kerf_macros;
 
+#[macro_use]
 pub mod hal;
 
 pub mod app;
 pub mod baud;
 pub mod boards;
-#[cfg(not(target_arch = "avr"))]
+#[cfg(feature = "std")]
 pub mod canon;
 pub mod config;
 pub mod gcode;
@@ -27,7 +28,6 @@ pub mod machine;
 pub mod math;
 pub mod motion;
 pub mod motors;
-pub mod progmem;
 pub mod protocol;
 pub mod realtime;
 pub mod spindle;
@@ -36,3 +36,5 @@ pub mod store;
 pub mod switches;
 pub mod tasks;
 pub mod units;
+
+pub use hal::progmem;

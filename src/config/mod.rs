@@ -4,7 +4,7 @@
 //! [`Settings`], which cost a load. Values are integers scaled by a power of ten, so text goes in
 //! and out exactly. Those that are seldom asked for are in EEPROM alone, and `tasks::storage` has them.
 
-#[cfg(not(target_arch = "avr"))]
+#[cfg(feature = "std")]
 pub mod docs;
 pub mod machines;
 pub mod name;

@@ -9,10 +9,12 @@
 
 use super::command::{Commands, Feed, Motion};
 use super::decimal::Decimal;
-use super::digits::{Digits, ten_thousand_times};
+use super::digits::decimal;
 use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units};
 use super::setup::{AxisMode, Setup};
 use super::state::State;
+use crate::hal::imp::arithmetic::ten_thousand_times;
+use crate::hal::imp::text::Cursor;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
 /// What tells upper from lower case.
@@ -236,10 +238,10 @@ impl<'a> Words<'a> {
     #[inline(always)]
     fn decimal(&mut self) -> (u16, u16) {
         let rest = self.text.get(usize::from(self.next)..).unwrap_or(&[]);
-        let mut digits = Digits::new(self.byte, rest);
-        let number = digits.decimal();
-        self.next = self.text.len() as u8 - digits.left();
-        self.byte = if number.is_some() { digits.byte } else { BAD };
+        let mut cursor = Cursor::new(self.byte, rest);
+        let number = decimal(&mut cursor);
+        self.next = self.text.len() as u8 - cursor.left();
+        self.byte = if number.is_some() { cursor.byte } else { BAD };
         number.unwrap_or_default()
     }
 

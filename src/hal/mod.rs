@@ -7,9 +7,13 @@
 
 pub use avr_embassy::{byte, ring};
 
+#[macro_use]
+mod place;
+
 pub mod event;
 pub mod exec;
 pub mod flags;
+pub mod progmem;
 pub mod resets;
 pub mod serial;
 

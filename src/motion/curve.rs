@@ -8,7 +8,6 @@
 
 use kerf_macros::small;
 
-use super::divide::product;
 use super::dynamics::{Axis, Dynamics};
 use super::float::{cube_root, greater, least, some};
 use super::governor::effective_jerk;
@@ -16,6 +15,7 @@ use super::junction::{Heading, ONE};
 use super::limits::Slowest;
 use super::path::Path;
 use super::short::{Log, OCTAVE, Short};
+use crate::hal::imp::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::FIRST_ROTARY;
 

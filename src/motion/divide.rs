@@ -1,7 +1,9 @@
 //! Division and square root of 32 bits into 16: a third of the cycles of the library's division, which
-//! is by 32 bits, and of its float root.
+//! is by 32 bits, and of its float root. Their kernels are the chip's ([`arithmetic`]).
 //!
 //! Called by exec's preparation of segments and by the line builder, a few times each. No units.
+
+use crate::hal::imp::arithmetic;
 
 /// `a / b`, rounded down, if that fits 16 bits: `a >> 16 < b`. Else something, without a panic.
 /// Cost: 195, 120 if it fits eight bits.
@@ -13,214 +15,13 @@ pub fn quotient(a: u32, b: u16) -> u16 {
 /// `a / b` and `a % b`, as [`quotient`].
 #[inline(never)]
 pub fn quotient_remainder(a: u32, b: u16) -> (u16, u16) {
-    divide(a, b)
-}
-
-/// Bit by bit, four in a turn: the compiler makes three times as much of it.
-#[cfg(target_arch = "avr")]
-#[inline(always)]
-fn divide(a: u32, b: u16) -> (u16, u16) {
-    let mut rest = (a >> 16) as u16;
-    let mut low = a as u16;
-    // SAFETY: arithmetic on its operands.
-    unsafe {
-        core::arch::asm!(
-            "ldi  {n}, 4",
-            // Where the quotient has eight bits there is no need to look for more.
-            "cp   {low:h}, {b:l}",
-            "cpc  {rest:l}, {b:h}",
-            "cpc  {rest:h}, {zero}",
-            "brcc 1f",
-            "mov  {rest:h}, {rest:l}",
-            "mov  {rest:l}, {low:h}",
-            "mov  {low:h}, {low:l}",
-            "clr  {low:l}",
-            "ldi  {n}, 2",
-            "1:",
-            ".rept 4",
-            "lsl  {low:l}",
-            "rol  {low:h}",
-            "rol  {rest:l}",
-            "rol  {rest:h}",
-            // With the bit that the shift lost the rest is above any divisor.
-            "brcs 2f",
-            "cp   {rest:l}, {b:l}",
-            "cpc  {rest:h}, {b:h}",
-            "brcs 3f",
-            "2:",
-            "sub  {rest:l}, {b:l}",
-            "sbc  {rest:h}, {b:h}",
-            "inc  {low:l}",
-            "3:",
-            ".endr",
-            "dec  {n}",
-            "brne 1b",
-            n = out(reg_upper) _,
-            low = inout(reg_pair) low,
-            rest = inout(reg_pair) rest,
-            b = in(reg_pair) b,
-            zero = in(reg) 0u8,
-            options(pure, nomem, nostack),
-        );
-    }
-    (low, rest)
-}
-
-#[cfg(not(target_arch = "avr"))]
-fn divide(a: u32, b: u16) -> (u16, u16) {
-    let mut rest = (a >> 16) as u16;
-    let mut low = a as u16;
-    for _ in 0..16 {
-        let carry = rest & 0x8000 != 0;
-        rest = rest << 1 | low >> 15;
-        low <<= 1;
-        if carry || rest >= b {
-            rest = rest.wrapping_sub(b);
-            low |= 1;
-        }
-    }
-    (low, rest)
-}
-
-/// `a * b`. Cost: 20, where the compiler calls a multiplication of 32 bits for 80.
-#[cfg(target_arch = "avr")]
-#[inline(always)]
-pub fn product(a: u16, b: u16) -> u32 {
-    let (low, high): (u16, u16);
-    // SAFETY: arithmetic on its operands; r0 is scratch, and r1 is 0 again at the end.
-    unsafe {
-        core::arch::asm!(
-            "mul  {a:l}, {b:l}",
-            "movw {low:l}, r0",
-            "mul  {a:h}, {b:h}",
-            "movw {high:l}, r0",
-            "mul  {a:h}, {b:l}",
-            "add  {low:h}, r0",
-            "adc  {high:l}, r1",
-            "clr  r1",
-            "adc  {high:h}, r1",
-            "mul  {a:l}, {b:h}",
-            "add  {low:h}, r0",
-            "adc  {high:l}, r1",
-            "clr  r1",
-            "adc  {high:h}, r1",
-            a = in(reg_pair) a,
-            b = in(reg_pair) b,
-            low = out(reg_pair) low,
-            high = out(reg_pair) high,
-            options(pure, nomem, nostack),
-        );
-    }
-    u32::from(high) << 16 | u32::from(low)
-}
-
-/// `a * b`.
-#[cfg(not(target_arch = "avr"))]
-pub fn product(a: u16, b: u16) -> u32 {
-    u32::from(a) * u32::from(b)
-}
-
-/// `a * b / 256`, rounded down. Cost: 5, where the compiler takes 15.
-#[cfg(target_arch = "avr")]
-#[inline(always)]
-pub fn high_product(a: u8, b: u8) -> u8 {
-    let high: u8;
-    // SAFETY: arithmetic on its operands; r0 is scratch, and r1 is 0 again at the end.
-    unsafe {
-        core::arch::asm!(
-            "mul  {a}, {b}",
-            "mov  {high}, r1",
-            "clr  r1",
-            a = in(reg) a,
-            b = in(reg) b,
-            high = lateout(reg) high,
-            options(pure, nomem, nostack),
-        );
-    }
-    high
-}
-
-/// `a * b / 256`, rounded down.
-#[cfg(not(target_arch = "avr"))]
-pub fn high_product(a: u8, b: u8) -> u8 {
-    ((u16::from(a) * u16::from(b)) >> 8) as u8
+    arithmetic::divide(a, b)
 }
 
 /// The square root, rounded down. Cost: 320.
 #[inline(never)]
 pub fn root(x: u32) -> u16 {
-    root_of(x)
-}
-
-/// A bit of the root at a time, from the top: each is the greatest whose square with the bits before it
-/// still fits. What is left is doubled every time, so that all of it is done in 16 bits and the carry.
-#[cfg(target_arch = "avr")]
-#[inline(always)]
-fn root_of(x: u32) -> u16 {
-    let mut high = (x >> 16) as u16;
-    let mut low = x as u16;
-    let root: u16;
-    // SAFETY: arithmetic on its operands.
-    unsafe {
-        core::arch::asm!(
-            "clr  {root:l}",
-            "clr  {root:h}",
-            "ldi  {half:h}, 0x40",
-            "ldi  {half:l}, 0",
-            "clc",
-            "rjmp 2f",
-            // Half of what was tried is what is tried next; the carry ends it before the last bit.
-            "1:",
-            "lsl  {low:l}",
-            "rol  {low:h}",
-            "rol  {high:l}",
-            "rol  {high:h}",
-            "2:",
-            "movw {trial:l}, {root:l}",
-            "or   {trial:l}, {half:l}",
-            "or   {trial:h}, {half:h}",
-            "brcs 3f",
-            "cp   {high:l}, {trial:l}",
-            "cpc  {high:h}, {trial:h}",
-            "brcs 4f",
-            "3:",
-            "sub  {high:l}, {trial:l}",
-            "sbc  {high:h}, {trial:h}",
-            // Twice `half` is the bit: with one `half` in the trial already.
-            "movw {root:l}, {trial:l}",
-            "add  {root:l}, {half:l}",
-            "adc  {root:h}, {half:h}",
-            "4:",
-            "lsr  {half:h}",
-            "ror  {half:l}",
-            "brcc 1b",
-            // The last bit: its half is not in 16 bits, but the one after the rest.
-            "lsl  {low:l}",
-            "rol  {low:h}",
-            "rol  {high:l}",
-            "rol  {high:h}",
-            "brcs 5f",
-            "lsl  {low:h}",
-            "cpc  {root:l}, {high:l}",
-            "cpc  {root:h}, {high:h}",
-            "5:",
-            "adc  {root:l}, {half:l}",
-            "adc  {root:h}, {half:l}",
-            half = out(reg_iw) _,
-            trial = out(reg_pair) _,
-            high = inout(reg_pair) high,
-            low = inout(reg_pair) low,
-            root = out(reg_pair) root,
-            options(pure, nomem, nostack),
-        );
-    }
-    let _ = (high, low);
-    root
-}
-
-#[cfg(not(target_arch = "avr"))]
-fn root_of(x: u32) -> u16 {
-    x.isqrt() as u16
+    arithmetic::root(x)
 }
 
 #[cfg(test)]

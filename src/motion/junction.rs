@@ -8,9 +8,9 @@
 
 use kerf_macros::small;
 
-use super::divide::product;
 use super::dynamics::Dynamics;
 use super::float::{OCTAVE, below, log, scaled, some};
+use crate::hal::imp::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::PerAxis;
 

@@ -6,10 +6,11 @@
 //!
 //! Called at exec level. Units outside: velocities mm/s, distances brake potential, (mm/s)^2 (`constraint`).
 
-use super::divide::{product, root};
+use super::divide::root;
 use super::float::{scaled, some, whole};
 use super::governor::Limits;
 use super::short::Short;
+use crate::hal::imp::arithmetic::product;
 
 /// Bits of the fastest velocity, or one more.
 const BITS: i16 = 12;

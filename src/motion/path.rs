@@ -5,10 +5,11 @@
 //!
 //! Units: those of [`Length`] on the way in, mm (or degrees) on the way out.
 
-use super::divide::{product, quotient, root};
+use super::divide::{quotient, root};
 use super::float::below;
 use super::junction::{Heading, ONE};
 use super::short::Short;
+use crate::hal::imp::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 

@@ -36,9 +36,10 @@
 
 use super::block::{Line, PARTS_LOG2};
 use super::dda::{PHASE_START, STEP, Segment};
-use super::divide::{product, quotient, quotient_remainder};
+use super::divide::{quotient, quotient_remainder};
 use super::pace::{COARSEST, Drivers, Pace, paces};
 use crate::boards::{MOTORS, each_motor};
+use crate::hal::imp::arithmetic::product;
 
 const STEP_LOG2: u8 = 15;
 

@@ -50,7 +50,7 @@ pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report, receive_rep
 pub use request::{Next, Request};
 pub use status_text::status_text;
 pub use token::Token;
-#[cfg(not(target_arch = "avr"))]
+#[cfg(feature = "std")]
 pub use token::names;
 pub use value::{Value, thousandths};
 pub use write::{Ending, Out, put_line_end};

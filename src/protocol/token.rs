@@ -368,7 +368,7 @@ impl Group {
 
 /// Every name that means something at the top of a request, for tests and documents: settings and values by their
 /// full names, and actions.
-#[cfg(not(target_arch = "avr"))]
+#[cfg(feature = "std")]
 #[small]
 pub fn names() -> std::vec::Vec<std::string::String> {
     let text = |bytes: &[u8]| std::string::String::from_utf8_lossy(bytes).into_owned();

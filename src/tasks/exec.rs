@@ -8,12 +8,12 @@
 
 use crate::boards::ACTIVE;
 use crate::hal::event::{self, Event};
+use crate::hal::imp::arithmetic::product;
 use crate::hal::imp::{exec, flags, stepper};
 use crate::hal::ring::Producer;
 use crate::machine::{self, Alarm};
 use crate::motion::contact;
 use crate::motion::dda::{SEGMENTS, Segment};
-use crate::motion::divide::product;
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;

@@ -13,7 +13,7 @@
 
 use heapless::Vec;
 
-use super::printing::copy_printing;
+use crate::hal::imp::text::copy_printing;
 use crate::hal::ring::Window;
 use crate::hal::serial::TAKEN_RETURN;
 use crate::protocol::asks_help;

@@ -19,7 +19,6 @@ pub mod parser;
 pub mod planner;
 pub mod ports;
 pub mod power;
-mod printing;
 pub mod reader;
 pub mod reporter;
 mod setup;

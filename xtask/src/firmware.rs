@@ -42,7 +42,15 @@ pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
     cargo.current_dir(root()).env("RUSTFLAGS", FLAGS);
     cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none"]);
     let features = format!("board-{board},machine-{machine}");
-    cargo.args(["--package", "kerf", "--bin", "kerf", "--features", &features]);
+    cargo.args([
+        "--package",
+        "kerf",
+        "--bin",
+        "kerf",
+        "--no-default-features",
+        "--features",
+        &features,
+    ]);
     run(cargo.arg("--target-dir").arg(&target))?;
     keep(&target.join("avr-none/release/kerf.elf"), &image(board, machine))
 }

@@ -2,7 +2,7 @@
 //!
 //! A new code is a row of [`table`] and a text of [`docs`], from which `docs/gcode.md` is made.
 
-#[cfg(not(target_arch = "avr"))]
+#[cfg(feature = "std")]
 pub mod docs;
 pub mod table;
 

@@ -12,7 +12,10 @@
 //! Each register has one owner, named here; the others are set up before interrupts are on.
 //! Everything else runs in thread mode, from [`avr_embassy::Executor::run_with`].
 
+pub mod arithmetic;
 pub mod eeprom;
+pub mod flash;
+pub mod float;
 pub mod gpio;
 pub mod inputs;
 mod mem;
@@ -20,6 +23,7 @@ pub mod panic;
 pub mod pwm;
 mod step_isr;
 pub mod stepper;
+pub mod text;
 pub mod time;
 pub mod uart;
 pub mod watchdog;

@@ -5,12 +5,16 @@
 //! [`Machine`] moves the clock from one such event to the next and runs the same tasks, rings and step
 //! generator as the image.
 
+pub mod arithmetic;
 pub mod eeprom;
+pub mod flash;
+pub mod float;
 pub mod gpio;
 pub mod inputs;
 mod machine;
 pub mod pwm;
 pub mod stepper;
+pub mod text;
 pub mod time;
 pub mod uart;
 pub mod watchdog;

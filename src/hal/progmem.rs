@@ -5,11 +5,13 @@
 //! the vectors, inside the first 64 KiB, where `lpm` reaches without touching RAMPZ, so reading is
 //! safe in interrupts too. On the host it is an ordinary constant.
 //!
-//! Cost on AVR: about 4 cycles a byte.
+//! Cost on AVR: about 4 cycles a byte. The reads are the chip's (`imp::flash`).
 
 mod text;
 
 use core::mem::MaybeUninit;
+
+use super::imp::flash;
 
 pub use text::{Text, pack};
 
@@ -116,75 +118,10 @@ impl<T: Copy> Slice<T> {
     }
 }
 
-#[cfg(target_arch = "avr")]
+/// A copy of a value that is part of a [`Progmem`].
 fn load<T: Copy>(from: *const T) -> T {
-    let mut value = MaybeUninit::<T>::uninit();
-    let mut to = value.as_mut_ptr().cast::<u8>();
-    let mut from = from.cast::<u8>();
-    if core::mem::size_of::<T>() > WORD {
-        // SAFETY: as below.
-        unsafe {
-            copy(from, to, core::mem::size_of::<T>() as u8);
-            return value.assume_init();
-        }
-    }
-    for _ in 0..core::mem::size_of::<T>() {
-        // SAFETY: `from` walks a static in program memory (the contract of `Progmem::new`), `to`
-        // walks `value`; both are `size_of::<T>()` bytes long.
-        unsafe {
-            let byte: u8;
-            core::arch::asm!("lpm {b}, Z+", b = out(reg) byte, inout("Z") from,
-                options(readonly, nostack, preserves_flags));
-            to.write(byte);
-            to = to.add(1);
-        }
-    }
-    // SAFETY: every byte was copied from a valid `T`.
-    unsafe { value.assume_init() }
-}
-
-/// Values up to this size, in bytes, are read byte by byte into registers; larger ones by a loop in half the code.
-#[cfg(target_arch = "avr")]
-const WORD: usize = 4;
-
-#[cfg(not(target_arch = "avr"))]
-fn load<T: Copy>(from: *const T) -> T {
-    // SAFETY: callers pass a pointer into a live `Progmem` of theirs.
-    unsafe { from.read() }
-}
-
-/// Copies `count` bytes, 1 to 255, out of program memory.
-///
-/// # Safety
-/// `from` points to a [`Progmem`], `to` to memory, of at least as many bytes.
-#[cfg(target_arch = "avr")]
-#[inline(always)]
-unsafe fn copy(from: *const u8, to: *mut u8, count: u8) {
-    // SAFETY: the caller's.
-    unsafe {
-        core::arch::asm!(
-            "1:",
-            "lpm  {byte}, Z+",
-            "st   X+, {byte}",
-            "dec  {count}",
-            "brne 1b",
-            byte = out(reg) _,
-            count = inout(reg) count => _,
-            inout("Z") from => _,
-            inout("X") to => _,
-            options(nostack),
-        );
-    }
-}
-
-/// The same.
-///
-/// # Safety
-/// As above.
-#[cfg(not(target_arch = "avr"))]
-unsafe fn copy(from: *const u8, to: *mut u8, count: u8) {
-    // SAFETY: the caller's.
-    unsafe { from.copy_to_nonoverlapping(to, count.into()) }
+    // SAFETY: the callers in this module pass a pointer into a `Progmem` of theirs.
+    unsafe { flash::load(from) }
 }
 
 /// Unpacked bytes in program memory: a pointer that only this type follows. They are copied five times as fast as a [`Text`].
@@ -224,7 +161,7 @@ impl Plain {
         let count = usize::from(self.len).min(to.len()) as u8;
         if count > 0 {
             // SAFETY: both have as many bytes, and there is at least one.
-            unsafe { copy(self.start, to.as_mut_ptr().cast(), count) }
+            unsafe { flash::copy(self.start, to.as_mut_ptr().cast(), count) }
         }
         count
     }

@@ -1,0 +1,37 @@
+//! What `avr/arithmetic.rs` does, as the language does it.
+
+/// `a / b` and `a % b` if the quotient fits 16 bits: `a >> 16 < b`. Else what the chip makes of it.
+pub fn divide(a: u32, b: u16) -> (u16, u16) {
+    let mut rest = (a >> 16) as u16;
+    let mut low = a as u16;
+    for _ in 0..16 {
+        let carry = rest & 0x8000 != 0;
+        rest = rest << 1 | low >> 15;
+        low <<= 1;
+        if carry || rest >= b {
+            rest = rest.wrapping_sub(b);
+            low |= 1;
+        }
+    }
+    (low, rest)
+}
+
+/// `a * b`.
+pub fn product(a: u16, b: u16) -> u32 {
+    u32::from(a) * u32::from(b)
+}
+
+/// `a * b / 256`, rounded down.
+pub fn high_product(a: u8, b: u8) -> u8 {
+    ((u16::from(a) * u16::from(b)) >> 8) as u8
+}
+
+/// The square root, rounded down.
+pub fn root(x: u32) -> u16 {
+    x.isqrt() as u16
+}
+
+/// 10,000 times `whole`.
+pub fn ten_thousand_times(whole: u16) -> u32 {
+    u32::from(whole) * 10_000
+}
