@@ -162,6 +162,12 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         self.0.used()
     }
 
+    /// The slot filled last.
+    #[inline]
+    pub fn filled(&self) -> u8 {
+        self.0.head.get()
+    }
+
     /// Puts a value in. Gives it back if the ring is full.
     #[inline]
     pub fn push(&mut self, value: T) -> Result<(), T> {

@@ -63,33 +63,35 @@ impl Tx {
         (TWO_BYTES_MS / self.rate) as u16 + 2
     }
 
-    /// The response under way ends with a checksum: it takes bytes one by one.
-    #[inline(never)]
-    fn put_summed(&mut self, bytes: impl Iterator<Item = u8>) {
-        for byte in bytes {
-            if let Some(sum) = &mut self.sum {
-                sum.add(byte);
-            }
-            let _ = self.ring.push(byte);
+    /// Takes what has been put behind a slot of the ring into the checksum, if the response under way ends with one.
+    #[inline(always)]
+    fn sum_behind(&mut self, slot: u8) {
+        if let Some(sum) = &mut self.sum {
+            add_all(&self.ring, slot, sum);
         }
     }
 }
 
+/// Takes what has been put behind a slot of the ring into a checksum.
+#[inline(never)]
+fn add_all(ring: &Outgoing, slot: u8, sum: &mut Checksum) {
+    let mut all = *sum;
+    ring.behind(slot).for_each(|byte| all.add(*byte));
+    *sum = all;
+}
+
 impl crate::protocol::Out for Tx {
     fn put(&mut self, byte: u8) {
-        if self.sum.is_some() {
-            return self.put_summed(core::iter::once(byte));
-        }
+        let before = self.ring.filled();
         // Room was made by `room`; a byte beyond it is a defect that tests of `protocol` exclude.
         let _ = self.ring.push(byte);
+        self.sum_behind(before);
     }
 
     // By itself, for it is called in many places.
     #[inline(never)]
     fn put_plain(&mut self, bytes: Plain) {
-        if self.sum.is_some() {
-            return bytes.bytes().for_each(|byte| self.put(byte));
-        }
+        let before = self.ring.filled();
         let mut left = bytes;
         // The ring's end may come in between; there is room beyond it.
         for _ in 0..2 {
@@ -101,13 +103,13 @@ impl crate::protocol::Out for Tx {
                 break;
             }
         }
+        self.sum_behind(before);
     }
 
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
-        if self.sum.is_some() {
-            return self.put_summed(bytes);
-        }
+        let before = self.ring.filled();
         self.ring.push_all(bytes);
+        self.sum_behind(before);
     }
 
     fn begin_sum(&mut self) {

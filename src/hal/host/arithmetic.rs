@@ -21,6 +21,11 @@ pub fn product(a: u16, b: u16) -> u32 {
     u32::from(a) * u32::from(b)
 }
 
+/// `a * b`, modulo 2^32.
+pub fn times(a: u32, b: u8) -> u32 {
+    a.wrapping_mul(b.into())
+}
+
 /// `a * b / 256`, rounded down.
 pub fn high_product(a: u8, b: u8) -> u8 {
     ((u16::from(a) * u16::from(b)) >> 8) as u8
