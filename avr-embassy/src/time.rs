@@ -28,7 +28,7 @@ const TIMERS: usize = match (cfg!(feature = "timers-8"), cfg!(feature = "timers-
 /// Milliseconds since reset, the lowest byte first: enough for 34 years. The interrupt alone writes it.
 static mut MILLIS: [u8; 5] = [0; 5];
 
-/// The tick: counts, in 32 cycles, with interrupts off for 20.
+/// The tick: counts, in 33 cycles, with interrupts off for 21.
 ///
 /// Every 256 ms it carries into the upper bytes, with interrupts on. Interrupt mode is kept out meanwhile: its tasks
 /// may ask for the time.
@@ -47,15 +47,8 @@ pub(crate) unsafe fn handler() -> ! {
             "lds  r24, {millis}",
             "inc  r24",
             "sts  {millis}, r24",
-            "breq 2f",
-            "sei",
-            "sbi  {flags}, {tick}",
-            "1:",
-            "pop  r24",
-            "out  0x3F, r24",
-            "pop  r24",
-            "reti",
-            "2:",
+            // Each 256 ms the way is 8 cycles longer, so it is the one without a jump.
+            "brne 4f",
             "lds  r24, {closed}",
             "inc  r24",
             "sts  {closed}, r24",
@@ -76,20 +69,25 @@ pub(crate) unsafe fn handler() -> ! {
             "inc  r24",
             "sts  {millis} + 4, r24",
             "3:",
-            "sbi  {flags}, {tick}",
             "cli",
             "lds  r24, {closed}",
             "dec  r24",
             "sts  {closed}, r24",
-            "brne 1b",
+            "brne 4f",
             "lds  r24, {missed}",
             "tst  r24",
-            "breq 1b",
+            "breq 4f",
             "ldi  r24, 0",
             "sts  {missed}, r24",
             "ldi  r24, {pended}",
             "sts  {pend}, r24",
-            "rjmp 1b",
+            "4:",
+            "sei",
+            "sbi  {flags}, {tick}",
+            "pop  r24",
+            "out  0x3F, r24",
+            "pop  r24",
+            "reti",
             millis = sym MILLIS,
             closed = sym CLOSED,
             missed = sym MISSED,

@@ -32,6 +32,7 @@ use crate::hal::imp;
 use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::flags;
 use crate::hal::imp::time::millis;
+use crate::hal::imp::uart;
 use crate::hal::serial::{PORTS, USB};
 use crate::jobs::Job;
 use crate::machine::alarm::is_program_end;
@@ -41,8 +42,8 @@ use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
 const ECHO: usize = 62;
-/// Most steps of a response before others have their turn. They have it as well when a ms is over: to find a name may take as long, while
-/// exec takes most of the CPU two, and the ring of the second port is full in 5.
+/// Most steps of a response before others have their turn. They have it as well when a ms is over, and behind each step while the ring
+/// of the second port is filling: to read a row of the tables may take 3 ms, and twice that while exec takes most of the CPU.
 const STEPS: u8 = 4;
 
 /// A port's transmitter, while it is the parser's.
@@ -373,7 +374,7 @@ impl Answer {
     fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
         let mut begun = begun;
         for done in 0..STEPS {
-            if !tx.has_room() || (done > 1 && flags::has(Event::Tick)) {
+            if !tx.has_room() || gives_way(done) {
                 break;
             }
             if self.echoes {
@@ -400,6 +401,11 @@ impl Answer {
         }
         (Progress::Waits, begun)
     }
+}
+
+/// Whether others have their turn before a response goes on that has come so many steps on in this turn.
+fn gives_way(done: u8) -> bool {
+    done > 0 && uart::presses() || done > 1 && flags::has(Event::Tick)
 }
 
 /// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the

@@ -9,8 +9,9 @@
 
 use core::cell::{Cell, RefCell};
 
+use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
-use embassy_sync::mutex::Mutex;
+use embassy_sync::mutex::{Mutex, MutexGuard};
 
 use super::lines::{Class, LineId, LinePool};
 use super::links::Links;
@@ -29,6 +30,9 @@ pub const AUX_RESERVE: u8 = 16;
 const PROMISED: u8 = 32;
 /// See [`PROMISED`]; of the other port.
 const AUX_PROMISED: u8 = 16;
+
+/// How many turns of the parser a status report leaves to control lines that wait on its port.
+const COURTESY: u8 = 8;
 
 /// What a port has to itself.
 pub struct Port {
@@ -75,6 +79,18 @@ impl Port {
         }
         let all = room + u16::from(uart::room(self.number));
         slots.min((all >> shift) as u8)
+    }
+
+    /// The transmitter for a status report: the answers to control lines that wait come first, as far as they take
+    /// [`COURTESY`] turns.
+    pub async fn tx_behind_answers(&self) -> MutexGuard<'_, NoopRawMutex, Tx> {
+        for _ in 0..COURTESY {
+            if !self.lines.borrow().has_controls() {
+                break;
+            }
+            yield_now().await;
+        }
+        self.tx.lock().await
     }
 
     /// Whether there is something to tell on this port alone.

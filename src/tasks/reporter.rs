@@ -19,6 +19,7 @@ use super::view::{View, moves, queue_free};
 use crate::hal::event::Event;
 use crate::hal::imp::flags;
 use crate::hal::imp::time::millis;
+use crate::hal::imp::uart;
 use crate::hal::serial::is_shared;
 use crate::jobs::Job;
 use crate::protocol::notice::{Banner, Exception, Occasion, Probing, acknowledge, jog_ended};
@@ -217,7 +218,10 @@ impl Telling {
 /// report returns how many blocks are free in it, which may have changed during the wait for the
 /// transmitter.
 async fn tell(links: &Links, port: &Port, what: What) -> usize {
-    let mut tx = port.tx.lock().await;
+    let mut tx = match what {
+        What::Status => port.tx_behind_answers().await,
+        _ => port.tx.lock().await,
+    };
     let mut telling = Telling::begin(what, links, port);
     loop {
         tx.room().await;
@@ -225,7 +229,7 @@ async fn tell(links: &Links, port: &Port, what: What) -> usize {
             break;
         }
         // A status report takes 4 ms, and the ring of a second port may be full in 5.
-        if flags::has(Event::Tick) {
+        if flags::has(Event::Tick) || uart::presses() {
             yield_now().await;
         }
     }

@@ -299,6 +299,12 @@ pub fn room(port: u8) -> u8 {
     (size - 2).saturating_sub(used) as u8
 }
 
+/// Whether half of the second port's receive ring is full: the other half lasts 3 ms, so that whoever has much to do gives
+/// way to the reader. Thread mode.
+pub fn presses() -> bool {
+    PORTS > 1 && AUX_SHARED.rx.used() >= AUX_RING / 2
+}
+
 /// The slot of the receive ring with the byte that came last, if it still waits there. Thread mode.
 pub fn newest(port: u8) -> Option<u8> {
     if PORTS > 1 && port == AUX { AUX_SHARED.rx.newest() } else { USB_SHARED.rx.newest() }
