@@ -13,7 +13,7 @@ use super::digits::decimal;
 use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units};
 use super::setup::{AxisMode, Setup};
 use super::state::State;
-use crate::hal::imp::arithmetic::ten_thousand_times;
+use crate::hal::imp::arithmetic::product;
 use crate::hal::imp::text::Cursor;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
@@ -220,7 +220,7 @@ impl<'a> Words<'a> {
         }
         let (whole, frac) = self.decimal();
         // 65,535.9999 at most: that fits.
-        let value = (ten_thousand_times(whole) + u32::from(frac)) as i32;
+        let value = (product(whole, 10_000) + u32::from(frac)) as i32;
         if negative { -value } else { value }
     }
 

@@ -195,35 +195,3 @@ pub fn root(x: u32) -> u16 {
     let _ = (high, low);
     root
 }
-
-/// 10,000 times `whole`. The compiler's product of 32 bits takes 60 cycles more.
-#[inline(always)]
-pub fn ten_thousand_times(whole: u16) -> u32 {
-    let (low, high): (u16, u16);
-    // SAFETY: arithmetic on its operands; r1 is 0 again.
-    unsafe {
-        core::arch::asm!(
-            "mul  {whole:h}, {upper}",
-            "movw {high:l}, r0",
-            "mul  {whole:l}, {lower}",
-            "movw {low:l}, r0",
-            "mul  {whole:l}, {upper}",
-            "add  {low:h}, r0",
-            "adc  {high:l}, r1",
-            "clr  r1",
-            "adc  {high:h}, r1",
-            "mul  {whole:h}, {lower}",
-            "add  {low:h}, r0",
-            "adc  {high:l}, r1",
-            "clr  r1",
-            "adc  {high:h}, r1",
-            whole = in(reg_pair) whole,
-            lower = in(reg) (10_000u16 & 0xFF) as u8,
-            upper = in(reg) (10_000u16 >> 8) as u8,
-            low = out(reg_pair) low,
-            high = out(reg_pair) high,
-            options(pure, nomem, nostack),
-        );
-    }
-    u32::from(high) << 16 | u32::from(low)
-}

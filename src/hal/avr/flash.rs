@@ -37,7 +37,7 @@ pub unsafe fn load<T: Copy>(from: *const T) -> T {
 /// Copies `count` bytes, 1 to 255, out of program memory.
 ///
 /// # Safety
-/// `from` points to a [`Progmem`], `to` to memory, of at least as many bytes.
+/// `from` points to program memory, `to` to memory, of at least as many bytes.
 #[inline(always)]
 pub unsafe fn copy(from: *const u8, to: *mut u8, count: u8) {
     // SAFETY: the caller's.

@@ -35,8 +35,3 @@ pub fn high_product(a: u8, b: u8) -> u8 {
 pub fn root(x: u32) -> u16 {
     x.isqrt() as u16
 }
-
-/// 10,000 times `whole`.
-pub fn ten_thousand_times(whole: u16) -> u32 {
-    u32::from(whole) * 10_000
-}
