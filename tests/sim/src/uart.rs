@@ -1,9 +1,9 @@
 //! The USARTs as asynchronous serial ports.
 //!
 //! A frame takes exactly its bits. The receiver has a two-byte FIFO behind the shift register; a
-//! third byte waits in the shift register and is lost, with DOR set, when a fourth begins. FE is of the byte
-//! that is to be read next: its stop bit was low. RXC and
-//! UDRE are levels: they ask for service as long as their condition holds, so UDRIE makes a
+//! third byte waits in the shift register and is lost when a fourth begins. FE and DOR are kept in the FIFO with the byte
+//! that is to be read next, as the data sheet has it: FE says that its stop bit was low, DOR that bytes before it were
+//! lost. RXC and UDRE are levels: they ask for service as long as their condition holds, so UDRIE makes a
 //! software interrupt out of a transmitter that is never written to.
 
 use std::collections::VecDeque;
@@ -44,8 +44,8 @@ pub const OFFSETS: [u16; 6] = [0, UCSRB, UCSRC, UBRRL, UBRRH, UDR];
 #[derive(Clone, Copy)]
 struct Frame {
     byte: u8,
-    /// Its stop bit is low.
-    broken: bool,
+    /// FE and DOR.
+    errors: u8,
     done: u64,
 }
 
@@ -57,11 +57,11 @@ pub struct Uart {
     control: u8,
     format: u8,
     divisor: u16,
-    /// Bytes received, and whether each has a frame error.
-    fifo: VecDeque<(u8, bool)>,
+    /// Bytes received, the errors of each (FE, DOR) beside it.
+    fifo: VecDeque<(u8, u8)>,
     receiving: Option<Frame>,
     /// A complete byte that found the FIFO full.
-    waiting: Option<(u8, bool)>,
+    waiting: Option<(u8, u8)>,
     sending: Option<Frame>,
     buffered: Option<u8>,
     sent: VecDeque<(u64, u8)>,
@@ -154,23 +154,23 @@ impl Uart {
         if self.control & RXEN == 0 || self.receiving.is_some() {
             return;
         }
-        if self.waiting.take().is_some() {
-            self.overruns += 1;
-            self.status |= DOR;
-        }
+        // The next byte that gets into the FIFO tells of it.
+        let lost = self.waiting.take().is_some();
+        self.overruns += u64::from(lost);
         let own = self.bit_cycles() as f64;
         let broken = (own - bit_cycles).abs() > bit_cycles * TOLERANCE;
         self.misframed += u64::from(broken);
         let byte = if broken { !byte } else { byte };
         // Complete in the middle of the stop bit.
         let done = now + self.bit_cycles() * (2 * self.frame_bits() - 1) / 2;
-        self.receiving = Some(Frame { byte, broken, done });
+        let errors = u8::from(broken) * FE | u8::from(lost) * DOR;
+        self.receiving = Some(Frame { byte, errors, done });
     }
 
     /// The stop bit of the frame that is being received is low: noise, or the sender has let go of the line.
     pub fn break_frame(&mut self) {
         if let Some(frame) = &mut self.receiving {
-            frame.broken = true;
+            frame.errors |= FE;
             self.misframed += 1;
         }
     }
@@ -178,7 +178,7 @@ impl Uart {
     /// Completes the frames that are due by `now`.
     pub fn advance(&mut self, now: u64) {
         if let Some(frame) = self.receiving.take_if(|f| f.done <= now) {
-            self.waiting = Some((frame.byte, frame.broken));
+            self.waiting = Some((frame.byte, frame.errors));
             self.settle();
         }
         while let Some(frame) = self.sending.take_if(|f| f.done <= now) {
@@ -193,7 +193,7 @@ impl Uart {
 
     fn begin_frame(&mut self, byte: u8, now: u64) {
         let done = now + self.bit_cycles() * self.frame_bits();
-        self.sending = Some(Frame { byte, broken: false, done });
+        self.sending = Some(Frame { byte, errors: 0, done });
     }
 
     /// Moves a waiting byte into the FIFO if there is room.
@@ -203,9 +203,9 @@ impl Uart {
         }
         let found = match self.fifo.front() {
             None => 0,
-            Some((_, broken)) => RXC | if *broken { FE } else { 0 },
+            Some((_, errors)) => RXC | errors,
         };
-        self.status = self.status & !(RXC | FE) | found;
+        self.status = self.status & !(RXC | FE | DOR) | found;
     }
 
     /// A load that samples at cycle `now`; `None` for registers without side effects.
@@ -214,8 +214,7 @@ impl Uart {
         match addr - self.base {
             0 => Some(self.status),
             UDR => {
-                let (byte, _) = self.fifo.pop_front().unwrap_or((0, false));
-                self.status &= !DOR;
+                let (byte, _) = self.fifo.pop_front().unwrap_or((0, 0));
                 self.settle();
                 Some(byte)
             }

@@ -152,6 +152,43 @@ fn lines_with_frame_errors_are_refused_and_no_other() {
 }
 
 #[test]
+fn a_line_that_the_receiver_overruns_at_a_megabaud_is_never_carried_out() {
+    const LINES: usize = 600;
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    let axis = "vm:6000,fr:6000,jm:1e5";
+    for line in ["{ex:0}", &format!("{{x:{{{axis}}},y:{{{axis}}}}}"), "g91 g1 f4000", "{jv:5}"] {
+        set(&mut machine, &mut host, line);
+    }
+    host.change_speed(&mut machine, 1_000_000).unwrap();
+    // Each is one that none of the others becomes when a byte of it is lost.
+    let line = |n: usize| format!("X.{:03}Y{}1.5", n * 7 % 899 + 101, ["", "-"][n / 40 % 2]);
+    let mut heard = String::new();
+    for n in 0..LINES {
+        machine.send(format!("{}\n", line(n)).as_bytes());
+        machine.run_for_ms(if n % 4 == 3 { 90 } else { 0 }).unwrap();
+        heard += &String::from_utf8(machine.receive()).expect("no byte is garbled");
+    }
+    let overruns = machine.uart(0).overruns();
+    let sent: Vec<String> = (0..LINES).map(line).collect();
+    let (mut taken, mut refused) = (0, 0);
+    for line in heard.lines() {
+        match classify(line) {
+            Incoming::Response(r) if r.status == 0 => {
+                let block = r.body["gc"].as_str().unwrap_or_else(|| panic!("{line}"));
+                assert!(sent.iter().any(|sent| sent == block), "{line}");
+                taken += 1;
+            }
+            Incoming::Response(r) => refused += usize::from(r.status == BUFFER_FULL),
+            _ => {}
+        }
+    }
+    println!("{overruns} overruns: {taken} lines carried out, {refused} refused");
+    assert!(overruns > 20 && taken > 20, "{overruns} overruns, {taken} lines carried out");
+    // Where the end of a line is lost two of them are refused as one.
+    assert!((taken + refused) * 10 > LINES * 9, "{refused} refused, {taken} carried out");
+}
+
+#[test]
 fn answers_stop_while_the_planner_is_full_and_come_again() {
     const LINES: usize = 100;
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
