@@ -93,7 +93,7 @@ impl<'a> Runner<'a> {
     fn is_due(&mut self) -> bool {
         health::answer(Sign::Exec);
         self.waiting.update(self.segments.used());
-        let due = self.waiting.has_room(self.rests) || stepper::is_stopped();
+        let due = self.waiting.has_room() || stepper::is_stopped();
         if due && self.asked {
             self.asked = false;
             self.waiting.go_on(exec::was_idle());
@@ -210,7 +210,7 @@ impl<'a> Runner<'a> {
             return Next::Turn;
         }
         self.asked = true;
-        if waiting.has_room(*rests) { Next::Idle } else { Next::Room }
+        if waiting.has_room() { Next::Idle } else { Next::Room }
     }
 }
 
@@ -335,15 +335,14 @@ impl Waiting {
         self.used >= 2 && self.sum >= least
     }
 
-    /// Whether another one like the last may wait: what is queued cannot be slowed down any more. Unless the machine `rests` at
-    /// the end of each, as blocks do that come late: then a hold has no speed to take away.
+    /// Whether another one like the last may wait: what is queued cannot be slowed down any more, nor kept from beginning.
     #[inline(never)]
-    fn has_room(&self, rests: bool) -> bool {
+    fn has_room(&self) -> bool {
         if self.used < 2 {
             return true;
         }
         let sum = self.sum + self.length(1);
-        self.used < SEGMENTS as u8 - 1 && (sum <= self.limits().most || rests && self.used < 4)
+        self.used < SEGMENTS as u8 - 1 && sum <= self.limits().most
     }
 }
 

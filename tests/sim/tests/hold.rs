@@ -84,6 +84,27 @@ fn it_slows_down_within_10_ms() {
 }
 
 #[test]
+fn it_is_soon_the_last_of_moves_that_each_stop() {
+    // Moves to and fro, in mm, of 2 to 13 ms each.
+    for (way, accel) in [(0.03, 20_000.0), (0.03, 1_000.0), (0.003, 1_000.0), (0.01, 200.0)] {
+        let mut worst = 0;
+        for n in 0..30 {
+            let (mut machine, mut host) = board(SHARP);
+            set(&mut machine, &mut host, &format!("{{xac:{accel},xvm:6000,xfr:6000}}"));
+            (0..400).for_each(|i| host.queue(i, &format!("g1f6000x{}", f64::from(i as u8 % 2) * way)));
+            let from = hold_after(&mut machine, &mut host, 300_000 + n * 5_137);
+            host.run_for_ms(&mut machine, 300).unwrap();
+            let last = machine.recorder().steps_of(0).last().copied().unwrap_or_default();
+            worst = worst.max(last.saturating_sub(from));
+        }
+        let ms = worst as f64 / CLOCK * 1e3;
+        println!("moves of {way} mm at {accel} mm/s^2: the last step {ms:.2} ms behind it at most");
+        // One that has begun within 10 ms takes as long as its last segment.
+        assert!(ms < 14.0, "{ms} ms");
+    }
+}
+
+#[test]
 fn it_stops_as_soon_as_the_limits_allow_and_ends_exactly() {
     // A jerk limit that tells: the acceleration takes 22 ms to build up.
     for jerk in [SHARP, 5_000.0] {
