@@ -56,10 +56,10 @@ impl Links {
             changes: Changes::new(Changes::SETTINGS),
             rate: Cell::new(None),
             restart: Cell::new(None),
+            cleared_by: Cell::new(USB),
             probe: Probe::default(),
             signs: Signs::default(),
             job: Cell::default(),
-            seen: Cell::default(),
             storage,
             report: RefCell::new(StatusReport::new()),
             // Their defaults come when they are in place: they would take as much of the stack.

@@ -33,6 +33,7 @@ mod report;
 mod request;
 mod screen;
 mod status_text;
+mod stop;
 mod token;
 mod value;
 mod wrapped;
@@ -49,6 +50,7 @@ pub use prompt::put_ready_prompt;
 pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report, receive_report};
 pub use request::{Next, Request};
 pub use status_text::status_text;
+pub use stop::{STOP_MAX, asks_alarm};
 pub use token::Token;
 #[cfg(feature = "std")]
 pub use token::names;

@@ -16,7 +16,8 @@ use heapless::Vec;
 use crate::hal::imp::text::copy_printing;
 use crate::hal::ring::Window;
 use crate::hal::serial::TAKEN_RETURN;
-use crate::protocol::asks_help;
+use crate::machine::Alarm;
+use crate::protocol::{asks_alarm, asks_help};
 use crate::status::Status;
 
 /// Line slots, beside the one for control lines that overtake. Senders count on eight.
@@ -99,6 +100,8 @@ pub struct LinePool {
     longest: u8,
     /// Bytes left to control lines that overtake: as long as they may be.
     reserve: u8,
+    /// The worst alarm that lines have begun which have come.
+    stop: Alarm,
     bytes: &'static mut [u8],
 }
 
@@ -118,6 +121,7 @@ impl LinePool {
             keep_empty: false,
             longest: if room > LINE_MAX { LINE_MAX } else { room - 1 } as u8,
             reserve,
+            stop: Alarm::None,
             bytes,
         }
     }
@@ -195,8 +199,23 @@ impl LinePool {
         self.lay(ring, from, len, at);
         if self.entries.push(Entry { len, class: Class::Control, besides }).is_ok() {
             self.end += u16::from(len);
-            self.controls += 1;
+            self.note_control(at, len);
         }
+    }
+
+    /// The worst alarm that lines ask for which have come since this was called last ([`stop`](super::stop)).
+    #[inline(always)]
+    pub fn take_stop(&mut self) -> Alarm {
+        core::mem::replace(&mut self.stop, Alarm::None)
+    }
+
+    /// A control line has come whole.
+    #[inline(never)]
+    #[small]
+    fn note_control(&mut self, start: usize, len: u8) {
+        self.controls += 1;
+        let asked = asks_alarm(self.slice(start, len));
+        self.stop = self.stop.max(asked.unwrap_or(Alarm::None));
     }
 
     /// Copies bytes of a ring to a place.
@@ -376,8 +395,11 @@ impl LinePool {
         self.partial = 0;
         let besides = core::mem::take(&mut self.besides);
         if self.entries.push(Entry { len, class, besides }).is_ok() {
+            let start = usize::from(self.end);
             self.end += u16::from(len);
-            self.controls += u8::from(class == Class::Control);
+            if class == Class::Control {
+                self.note_control(start, len);
+            }
         }
         true
     }

@@ -11,11 +11,12 @@
 //! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | parser: the port waits, response half sent; reporter: waits |
 //! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
-//! | [`Links::seen`] | how the machine stood when the report under way began | 1 | 33 B | whoever tells it | the same | overwritten |
+//! | [`Port::seen`] | how the machine stood when the report under way began | 1 | 33 B each port | whoever tells it on the port | the same | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
 //! | [`Links::changes`] | what the planner has to look at before the next line | a bit each | 1 B | parser, planner | planner | bits merge |
 //! | [`Links::notices`], [`Links::probe`] | what is to be told: an exception, the end of a jog or of a flush, a probing | 1 each | 4 B, 14 B | all | reporter | overwritten: the newest counts |
 //! | [`Links::job`] | the built-in job, and how far it has come | 1 | 4 B | parser | parser, reporter, planner in a flush | a second one is refused |
+//! | [`Links::cleared_by`] | who has ended an alarm last | 1 | 1 B | parser | parser | overwritten |
 //! | [`Links::feeder`] | which port's lines are carried out | 1 | 1 B | parser | all | never: it changes at rest |
 //!
 //! What the machine is doing is no link: that is in [`machine`](crate::machine). [`Links::signs`] belong to the control task
@@ -32,7 +33,6 @@ use core::cell::{Cell, RefCell, UnsafeCell};
 
 use super::ports::Port;
 use super::storage::Storage;
-use super::view::Seen;
 use super::wake::{News, Wake};
 use crate::config::Settings;
 use crate::gcode::command::Commands;
@@ -73,6 +73,8 @@ pub struct Links {
     pub changes: Changes,
     /// A new rate of USB, in bits a second: the parser sets it when its response has left.
     pub rate: Cell<Option<u32>>,
+    /// The number of the port that has asked last for the end of an alarm.
+    pub cleared_by: Cell<u8>,
     /// What probing has found.
     pub probe: Probe,
     /// Real-time characters that have not had all their effect yet. Of the control task and the reader, with `tasks::hold`.
@@ -83,8 +85,6 @@ pub struct Links {
     pub restart: Cell<Option<bool>>,
     /// The built-in job that runs.
     pub job: Cell<Job>,
-    /// How the machine stood when the report that is on its way was begun.
-    pub seen: Cell<Seen>,
     /// What has to be put away, and where the rest is.
     pub storage: &'static Storage,
     /// Settings in force.

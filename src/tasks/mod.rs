@@ -23,6 +23,7 @@ pub mod reader;
 pub mod reporter;
 mod setup;
 pub mod spindle;
+mod stop;
 pub mod storage;
 pub mod switches;
 pub mod tx;

@@ -16,9 +16,14 @@
 //! for each byte.
 //! Each byte is looked at once (11 cycles), those of a line whose end has not come each time that the reader looks.
 
+use heapless::Vec;
+
+use super::alarm;
 use super::lines::{LinePool, is_blank, may_be_control};
+use super::links::Links;
 use crate::hal::ring::Window;
 use crate::hal::serial::{CLEAN, CUT, GO, MARKS, TAKEN, TAKEN_RETURN};
+use crate::protocol::{STOP_MAX, asks_alarm};
 
 /// How far a ring has been looked through.
 pub struct Scan {
@@ -26,6 +31,8 @@ pub struct Scan {
     looked: u8,
     /// What follows is a part of a line that does not overtake.
     within: bool,
+    /// Lines among so many of the bytes that wait have begun the alarms that they ask for: 0, or at the beginning of a line.
+    stops: u8,
 }
 
 /// What begins at a place.
@@ -42,14 +49,21 @@ enum Found {
 
 impl Scan {
     /// Nothing has been looked at.
-    pub const NONE: Self = Self { looked: 0, within: false };
+    pub const NONE: Self = Self { looked: 0, within: false, stops: 0 };
 
     /// The reader has taken so many bytes in order.
     #[inline(always)]
     pub fn pass(&mut self, count: u8) {
         if self.looked != 0 {
             self.looked = self.looked.saturating_sub(count);
+            self.stops = self.stops.saturating_sub(count);
         }
+    }
+
+    /// Whether the next line has begun the alarm that it asks for.
+    #[inline(always)]
+    pub fn has_stopped(&self) -> bool {
+        self.stops != 0
     }
 
     /// Looks on; takes the lines that overtake, as long as there is room for them. Whether there were any. If the ring `closes`
@@ -88,7 +102,11 @@ impl Scan {
                     break;
                 }
                 if len > 0 && take(pool, ring, self.looked, len, ends) {
-                    close(ring, self.looked, len, closes);
+                    let closed = close(ring, self.looked, len, closes);
+                    if self.stops > self.looked {
+                        pool.take_stop();
+                        self.stops -= closed;
+                    }
                     took = true;
                     continue;
                 }
@@ -97,6 +115,29 @@ impl Scan {
             self.looked += 1;
         }
         took
+    }
+
+    /// Looks on behind a line that waits for room, through lines that have come whole, and begins the alarms that they ask for.
+    #[inline(never)]
+    #[small]
+    pub fn look_for_stops(&mut self, links: &Links, ring: &Window<'_>) {
+        let mut at = self.stops.max(self.looked);
+        loop {
+            let end = ring.behind_text(at);
+            // What is behind the mark of a loss may be a part of a line.
+            if end >= ring.len() || ring.get(end) < MARKS {
+                break;
+            }
+            let mut line = Vec::<u8, STOP_MAX>::new();
+            let fits = (at..end).all(|n| line.push(ring.get(n)).is_ok());
+            if let Some(alarm) = asks_alarm(&line).filter(|_| fits) {
+                alarm::raise(links, alarm);
+            }
+            at = end + 1;
+        }
+        if self.looked != 0 {
+            self.stops = at;
+        }
     }
 }
 
@@ -140,19 +181,22 @@ fn take(pool: &mut LinePool, ring: &mut Window<'_>, at: u8, len: u8, ends: bool)
     true
 }
 
-/// The place of a line that has been taken, with its end if that was a line feed, is free; or it is nobody's.
+/// The place of a line that has been taken, with its end if that was a line feed, is free; or it is nobody's. How many bytes it took
+/// that are free.
 #[inline(never)]
 #[small]
-fn close(ring: &mut Window<'_>, at: u8, len: u8, closes: bool) {
+fn close(ring: &mut Window<'_>, at: u8, len: u8, closes: bool) -> u8 {
     if closes {
+        let waiting = ring.len();
         ring.take_out(at, len + u8::from(ring.get(at + len) == TAKEN));
-        return;
+        return waiting - ring.len();
     }
     let mut place = at + len;
     while place > at {
         place -= 1;
         ring.replace(place, ring.get(place), TAKEN);
     }
+    0
 }
 
 /// Takes the end of a line. It is the only byte that may change meanwhile: if it is the newest, and the ring is full, it becomes the

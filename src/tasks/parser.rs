@@ -37,7 +37,9 @@ use crate::hal::serial::{PORTS, USB};
 use crate::jobs::Job;
 use crate::machine::alarm::is_program_end;
 use crate::machine::{self, Alarm};
-use crate::protocol::{Ending, Mode, Next, Out, Request, Span, is_brief, put_brief, put_line_end};
+use crate::protocol::{
+    Ending, Mode, Next, Out, Request, Span, asks_alarm, is_brief, put_brief, put_line_end,
+};
 use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
@@ -510,6 +512,7 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
     };
     drop(settings);
     port.mode.set(mode);
+    port.has_stopped.set(class == Class::Control && asks_alarm(line).is_some());
     if let Some(block) = request.gcode() {
         let (status, commented) = run_block(links, port, block.of(line), tried);
         if status == Status::Again {

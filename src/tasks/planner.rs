@@ -14,7 +14,6 @@ mod seek;
 mod square;
 
 use embassy_futures::select::select;
-use embassy_futures::yield_now;
 use parts::{ArcWalk, Parts};
 
 use super::Never;
@@ -123,7 +122,7 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
                     planner.room().await;
                     match planner.turn() {
                         Turn::Done => break,
-                        Turn::More => yield_now().await,
+                        Turn::More => links.give_way(|_| queue::used() >= ENOUGH).await,
                         Turn::Pause => planner.cycle_start().await,
                         Turn::Probe => planner.probe().await,
                         Turn::Home => planner.home().await,
@@ -142,6 +141,9 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
         }
     }
 }
+
+/// With so many blocks answers come before another one.
+const ENOUGH: usize = CAPACITY / 2;
 
 impl Planner {
     /// Most lines are a straight move for which there is room: no need to be prepared for a wait. False,

@@ -16,7 +16,7 @@ use embassy_sync::mutex::{Mutex, MutexGuard};
 use super::lines::{Class, LineId, LinePool};
 use super::links::Links;
 use super::tx::Tx;
-use super::view::View;
+use super::view::{Seen, View};
 use crate::hal::imp::uart;
 use crate::hal::serial::{USB, is_shared};
 use crate::protocol::Mode;
@@ -31,7 +31,7 @@ const PROMISED: u8 = 32;
 /// See [`PROMISED`]; of the other port.
 const AUX_PROMISED: u8 = 16;
 
-/// How many turns of the parser a status report leaves to control lines that wait on its port.
+/// How many turns a report, a part of one, or the next block leaves to control lines that wait.
 const COURTESY: u8 = 8;
 
 /// What a port has to itself.
@@ -44,8 +44,12 @@ pub struct Port {
     pub tx: Mutex<NoopRawMutex, Tx>,
     /// How the sender wants to be answered.
     pub mode: Cell<Mode>,
+    /// The line that is being answered has begun the alarm that it asks for when it arrived ([`stop`](super::stop)).
+    pub has_stopped: Cell<bool>,
     /// The sender asks whether anybody is there: control sets it, the parser answers.
     pub enquiry: Cell<bool>,
+    /// How the machine stood when the report or group began that is being told on this port.
+    pub seen: Cell<Seen>,
     /// Bytes have been lost, which the parser tells.
     pub lost: Cell<bool>,
     /// The slot of the receive ring up to which lines of G-code are dropped, by a kill or flush that has come behind it.
@@ -63,7 +67,9 @@ impl Port {
             )),
             tx: Mutex::new(tx),
             mode: Cell::new(Mode::Json),
+            has_stopped: Cell::new(false),
             enquiry: Cell::new(false),
+            seen: Cell::default(),
             lost: Cell::new(false),
             cut: Cell::new(None),
         }
@@ -81,7 +87,7 @@ impl Port {
         slots.min((all >> shift) as u8)
     }
 
-    /// The transmitter for a status report: the answers to control lines that wait come first, as far as they take
+    /// The transmitter for a report: the answers to control lines that wait come first, as far as they take
     /// [`COURTESY`] turns.
     pub async fn tx_behind_answers(&self) -> MutexGuard<'_, NoopRawMutex, Tx> {
         for _ in 0..COURTESY {
@@ -134,6 +140,18 @@ impl Links {
     pub fn except(&self, status: Status) {
         self.notices.exception.set(Some(status));
         self.reporter_wake.signal();
+    }
+
+    /// Others have their turn; and up to [`COURTESY`] turns, while control lines wait or are being answered on a port that `counts`.
+    /// A turn is 300 cycles if nobody has anything to do.
+    pub async fn give_way(&self, counts: impl Fn(&Port) -> bool) {
+        for _ in 0..COURTESY {
+            yield_now().await;
+            let waits = |port: &Port| port.lines.borrow().has_controls() && counts(port);
+            if !self.ports.iter().any(waits) {
+                break;
+            }
+        }
     }
 
     /// Whether lines of G-code wait, on any port.

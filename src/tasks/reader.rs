@@ -16,6 +16,7 @@ use super::lines::{Aside, LinePool};
 use super::links::Links;
 use super::overtake::Scan;
 use super::ports::Port;
+use super::stop;
 use crate::hal::event::{Event, next};
 use crate::hal::imp::uart::{self, lost_ends};
 use crate::hal::ring::Window;
@@ -156,6 +157,7 @@ impl<const N: usize> Intake<N> {
             let Some(byte) = self.received.pop() else {
                 return Left::Nothing;
             };
+            let has_stopped = self.scan.has_stopped();
             self.scan.pass(1);
             let is_line = match byte {
                 CUT | GO if cuts => false,
@@ -173,6 +175,7 @@ impl<const N: usize> Intake<N> {
                 if cuts {
                     pool.terminate();
                 }
+                stop::serve(links, pool, has_stopped);
                 links.parser_wake.signal();
             }
         }
@@ -280,9 +283,12 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
         look_for_marks(links, port, ring);
     }
     let (waiting, closes) = (ring.len(), port.cut.get().is_none());
-    if scan.run(&mut port.lines.borrow_mut(), ring, closes) {
+    let mut pool = port.lines.borrow_mut();
+    if scan.run(&mut pool, ring, closes) {
         links.parser_wake.signal();
     }
+    stop::serve(links, &mut pool, false);
+    scan.look_for_stops(links, ring);
     waiting - ring.len()
 }
 

@@ -7,7 +7,6 @@
 //! holds up anything else.
 
 use embassy_futures::select::select;
-use embassy_futures::yield_now;
 use embassy_time::Timer;
 use kerf_macros::small;
 
@@ -219,7 +218,7 @@ impl Telling {
 /// transmitter.
 async fn tell(links: &Links, port: &Port, what: What) -> usize {
     let mut tx = match what {
-        What::Status => port.tx_behind_answers().await,
+        What::Status | What::Exception(_) => port.tx_behind_answers().await,
         _ => port.tx.lock().await,
     };
     let mut telling = Telling::begin(what, links, port);
@@ -230,7 +229,7 @@ async fn tell(links: &Links, port: &Port, what: What) -> usize {
         }
         // A status report takes 4 ms, and the ring of a second port may be full in 5.
         if flags::has(Event::Tick) || uart::presses() {
-            yield_now().await;
+            links.give_way(|other| other.number != port.number).await;
         }
     }
     drop(tx);

@@ -2,7 +2,7 @@
 //!
 //! Made anew for each step of a response or report, never kept across an `.await`. Positions and
 //! speed come from exec's snapshot while something runs, from the G-code model when nothing does. Steps of one report
-//! or group share what was [`Seen`] at its beginning, [`Links::seen`]; two ports at a time would share it, too.
+//! or group share what was [`Seen`] at its beginning, [`Port::seen`].
 
 use kerf_macros::small;
 
@@ -415,9 +415,9 @@ impl Machine for View<'_> {
 
     fn moment(&mut self, first: bool) {
         if first {
-            self.links.seen.set(*self.seen());
+            self.port.seen.set(*self.seen());
         }
-        self.seen = OnceCell::from(self.links.seen.get());
+        self.seen = OnceCell::from(self.port.seen.get());
     }
 
     fn report(&mut self) -> &mut StatusReport {
@@ -443,10 +443,15 @@ impl Machine for View<'_> {
     }
 
     fn alarm(&mut self, alarm: Alarm) {
-        alarm::raise(self.links, alarm);
+        // One that another port has ended since the line arrived does not begin again.
+        let port = self.port;
+        if !port.has_stopped.get() || self.links.cleared_by.get() == port.number {
+            alarm::raise(self.links, alarm);
+        }
     }
 
     fn clear(&mut self) -> Status {
+        self.links.cleared_by.set(self.port.number);
         alarm::clear(self.links, &self.settings)
     }
 

@@ -91,7 +91,8 @@ fn it_is_soon_the_last_of_moves_that_each_stop() {
         for n in 0..30 {
             let (mut machine, mut host) = board(SHARP);
             set(&mut machine, &mut host, &format!("{{xac:{accel},xvm:6000,xfr:6000}}"));
-            (0..400).for_each(|i| host.queue(i, &format!("g1f6000x{}", f64::from(i as u8 % 2) * way)));
+            (0..400)
+                .for_each(|i| host.queue(i, &format!("g1f6000x{}", f64::from(i as u8 % 2) * way)));
             let from = hold_after(&mut machine, &mut host, 300_000 + n * 5_137);
             host.run_for_ms(&mut machine, 300).unwrap();
             let last = machine.recorder().steps_of(0).last().copied().unwrap_or_default();

@@ -61,7 +61,11 @@ fn three_bytes_wait_and_the_fourth_start_bit_costs_one() {
         (u.read(BASE + UDR, now + BYTE).unwrap(), lost)
     };
     let all = [read(), read(), read()];
-    assert_eq!(all, [(b'a', false), (b'b', false), (b'd', true)], "told with the byte behind the loss");
+    assert_eq!(
+        all,
+        [(b'a', false), (b'b', false), (b'd', true)],
+        "told with the byte behind the loss"
+    );
     assert_eq!(u.read(BASE, now + BYTE).unwrap() & (DOR | RXC), 0);
 }
 
