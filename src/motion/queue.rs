@@ -5,7 +5,6 @@
 //! full the planner waits ([`BlockQueue::free`]).
 
 use core::cell::UnsafeCell;
-use core::mem::MaybeUninit;
 
 use super::block::{Block, Body, Line};
 use super::factors::Factors;
@@ -155,18 +154,12 @@ impl BlockQueue {
     /// no room.
     pub fn push(&mut self, block: Block) -> bool {
         self.last = None;
-        let fill = |slot: &mut MaybeUninit<Block>| {
-            slot.write(block);
-        };
-        self.put(fill, None, |_| {})
+        self.put(|| block, None, |_| {})
     }
 
     /// Queues a block at which the machine does not stop. False, and nothing done, when there is no room.
     pub fn push_aside(&mut self, block: Block) -> bool {
-        let fill = |slot: &mut MaybeUninit<Block>| {
-            slot.write(block);
-        };
-        self.put(fill, None, |_| {})
+        self.put(|| block, None, |_| {})
     }
 
     /// Queues a move whose corner may be taken at `entry`, mm/s; fills in what depends on the queue. False,
@@ -185,11 +178,9 @@ impl BlockQueue {
         let key =
             if self.goes_on(line, cruise, entry) { None } else { self.corner(line, cruise, entry) };
         let end = line.start + line.gain();
-        let fill = |slot: &mut MaybeUninit<Block>| {
-            slot.write(Block::new(Body::Line(*line), number));
-        };
+        let make = || Block::new(Body::Line(*line), number);
         let entry = Short::new(least(line.entry.get(), cruise));
-        self.put(fill, key.map(|(key, firm)| (key, firm, entry)), |horizon| horizon.end = end)
+        self.put(make, key.map(|(key, firm)| (key, firm, entry)), |horizon| horizon.end = end)
     }
 
     /// Potential at the end of the queue.
@@ -276,17 +267,19 @@ impl BlockQueue {
         self.end()
     }
 
-    /// Puts a block, which `fill` writes, into the ring and what follows from it into the horizon, all at once for exec.
+    /// Puts a block, which `make` makes, into the ring and what follows from it into the horizon, all at once for exec.
     fn put(
         &mut self,
-        fill: impl FnOnce(&mut MaybeUninit<Block>),
+        make: impl FnOnce() -> Block,
         key: Option<(f32, u8, Short)>,
         end: impl FnOnce(&mut Horizon),
     ) -> bool {
-        let Some(slot) = self.ring.vacant().first_mut() else { return false };
-        fill(slot);
+        if self.ring.free() == 0 {
+            return false;
+        }
         let seq = self.newest.wrapping_add(1) & SEQ;
         let needless = key.map_or(0, |(key, ..)| self.needless(key));
+        let Some(slot) = self.ring.slot_with(make) else { return false };
         exec::lock(|ceiling| {
             self.store.with_horizon(ceiling, |horizon| {
                 if let Some((_, firm, entry)) = key {
@@ -296,8 +289,7 @@ impl BlockQueue {
                 end(horizon);
                 horizon.version = horizon.version.wrapping_add(1);
             });
-            // SAFETY: the first vacant slot has been filled.
-            unsafe { self.ring.publish(1) };
+            slot.publish();
         });
         self.newest = seq;
         true

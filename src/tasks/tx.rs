@@ -95,9 +95,7 @@ impl crate::protocol::Out for Tx {
         let mut left = bytes;
         // The ring's end may come in between; there is room beyond it.
         for _ in 0..2 {
-            let count = left.copy(self.ring.vacant());
-            // SAFETY: so many have been copied there.
-            unsafe { self.ring.publish(count) };
+            let count = self.ring.fill(|slots| left.copy(slots));
             left = left.behind(count);
             if left.is_empty() {
                 break;
