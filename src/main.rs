@@ -9,12 +9,7 @@ mod image {
     use kerf::hal::imp::{gpio, inputs, panic, time, watchdog};
     use static_cell::StaticCell;
 
-    // Naming avr-libc and libgcc in the image itself puts them before `compiler_builtins` in the link:
-    // see `kerf::math`.
-    #[link(name = "c")]
-    #[link(name = "m")]
-    #[link(name = "gcc")]
-    unsafe extern "C" {}
+    kerf::link_libraries!();
 
     #[avr_device::entry]
     fn main() -> ! {
