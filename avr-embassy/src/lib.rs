@@ -96,6 +96,7 @@ macro_rules! machine_static {
 
 #[cfg(target_arch = "avr")]
 pub mod assembly;
+mod baton;
 pub mod byte;
 #[cfg(target_arch = "avr")]
 mod chip;
@@ -112,6 +113,7 @@ pub mod ring;
 pub mod time;
 pub mod timers;
 
+pub use baton::Baton;
 pub use event::{Event, Waiter};
 #[cfg(target_arch = "avr")]
 pub use executor::Executor;

@@ -78,8 +78,7 @@ impl Planner {
         }
         drop_blocks().await;
         let motion = links::snapshot();
-        let steps = contact::steps(&motion.target);
-        contact::clear();
+        let steps = contact::take(&motion.target);
         self.relocate(&motion);
         steps.map_or(Sought::End, Sought::Contact)
     }
