@@ -18,8 +18,8 @@ mod image {
         gpio::start();
         inputs::start();
         MAIN.init(Executor::new()).run_with(
-            |main, _| {
-                if kerf::app::start(main, baud::DEFAULT).is_none() {
+            |main, thread| {
+                if kerf::app::start(main, thread, baud::DEFAULT).is_none() {
                     panic::halt();
                 }
                 time::start();

@@ -12,6 +12,7 @@ use super::float::{OCTAVE, below, greater, least, lesser, log, some};
 use super::horizon::{self, Horizon, kappa};
 use super::short::Short;
 pub use super::source::{Anchor, BlockSource};
+use crate::hal::Thread;
 use crate::hal::imp::exec;
 use crate::hal::ring::{Ceiling, Producer, Ring};
 use crate::math::sqrt;
@@ -55,11 +56,12 @@ impl BlockStore {
     }
 
     /// The planner's end and exec's. `None` after the first time.
-    pub fn split(&'static self) -> Option<(BlockQueue, BlockSource)> {
+    pub fn split(&'static self, thread: Thread) -> Option<(BlockQueue, BlockSource)> {
         let (producer, consumer) = self.ring.split()?;
         // SAFETY: these are the only ends, and nobody else has one yet.
         unsafe { &mut *self.horizon.get() }.begin();
         let queue = BlockQueue {
+            thread,
             ring: producer,
             store: self,
             newest: SEQ,
@@ -129,6 +131,7 @@ impl Last {
 
 /// The planner's end.
 pub struct BlockQueue {
+    pub(super) thread: Thread,
     pub(super) ring: Producer<Block, BLOCKS>,
     pub(super) store: &'static BlockStore,
     /// Sequence number of the block pushed last.
@@ -185,7 +188,7 @@ impl BlockQueue {
 
     /// Potential at the end of the queue.
     fn end(&self) -> f32 {
-        exec::lock(|ceiling| self.store.with_horizon(ceiling, |horizon| horizon.end))
+        exec::lock(self.thread, |ceiling| self.store.with_horizon(ceiling, |horizon| horizon.end))
     }
 
     /// Whether the line is as fast as the one before, and the corner between them no limit.
@@ -253,7 +256,7 @@ impl BlockQueue {
             return end;
         }
         if below(COARSE * line.cruise * line.cruise, end) {
-            exec::lock(|ceiling| {
+            exec::lock(self.thread, |ceiling| {
                 let next = self.newest.wrapping_add(1) & SEQ;
                 let used = self.ring.used();
                 self.store.with_horizon(ceiling, |horizon| {
@@ -280,7 +283,7 @@ impl BlockQueue {
         let seq = self.newest.wrapping_add(1) & SEQ;
         let needless = key.map_or(0, |(key, ..)| self.needless(key));
         let Some(slot) = self.ring.slot_with(make) else { return false };
-        exec::lock(|ceiling| {
+        exec::lock(self.thread, |ceiling| {
             self.store.with_horizon(ceiling, |horizon| {
                 if let Some((_, firm, entry)) = key {
                     horizon.drop_last(needless);
@@ -302,7 +305,7 @@ impl BlockQueue {
         let mut count = 0;
         loop {
             let next = self.newest.wrapping_add(1) & SEQ;
-            let last = exec::lock(|ceiling| {
+            let last = exec::lock(self.thread, |ceiling| {
                 self.store.with_horizon(ceiling, |horizon| {
                     let seq = horizon.nth_last(count)?;
                     Some((seq, horizon.older(next).of(self.newest.wrapping_sub(seq) & SEQ)))

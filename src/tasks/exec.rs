@@ -7,6 +7,7 @@
 //! as long, and for a while more waits ([`PRESSED`]).
 
 use crate::boards::ACTIVE;
+use crate::hal::Interrupt;
 use crate::hal::event::{self, Event};
 use crate::hal::imp::arithmetic::product;
 use crate::hal::imp::{exec, flags, stepper};
@@ -33,6 +34,7 @@ const FIRST_TURN: u8 = 2;
 /// The task.
 #[allow(clippy::manual_async_fn)] // See `tasks`.
 pub fn run(
+    level: Interrupt,
     blocks: BlockSource,
     segments: Producer<Segment, SEGMENTS>,
 ) -> impl Future<Output = Never> {
@@ -41,14 +43,14 @@ pub fn run(
         let mut machine = Exec::new();
         let mut runner = Runner::new(blocks, segments, &mut machine);
         loop {
-            exec::wait(|| runner.is_due().then_some(())).await;
+            exec::wait(level, || runner.is_due().then_some(())).await;
             match runner.turn() {
                 Next::Turn => continue,
                 Next::Idle => exec::pend_when_idle(),
                 Next::Room => exec::note_idle(),
                 Next::Block => links::wait_for_block(true),
             }
-            exec_asked_again().await;
+            exec_asked_again(level).await;
             links::wait_for_block(false);
         }
     }
@@ -348,7 +350,7 @@ impl Waiting {
 }
 
 /// Waits for the next time exec is pended.
-fn exec_asked_again() -> impl Future<Output = ()> {
+fn exec_asked_again(level: Interrupt) -> impl Future<Output = ()> {
     let mut asked = false;
-    exec::wait(move || core::mem::replace(&mut asked, true).then_some(()))
+    exec::wait(level, move || core::mem::replace(&mut asked, true).then_some(()))
 }

@@ -37,6 +37,7 @@ use super::wake::{News, Wake};
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
+use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
 use crate::hal::serial::PORTS;
 use crate::jobs::Job;
@@ -47,6 +48,8 @@ use crate::protocol::StatusReport;
 
 /// The links. One for the machine, made at start-up.
 pub struct Links {
+    /// All of this is thread mode's.
+    pub thread: Thread,
     /// The serial ports.
     pub ports: [Port; PORTS],
     /// The number of the port that feeds the machine.
@@ -176,10 +179,10 @@ pub fn update<R>(change: impl FnOnce(&mut Snapshot) -> R) -> R {
     change(unsafe { &mut *published().0.get() })
 }
 
-/// How motion stands. Thread mode only.
-pub fn snapshot() -> Snapshot {
+/// How motion stands.
+pub fn snapshot(thread: Thread) -> Snapshot {
     // SAFETY: the writer does not run under the lock.
-    crate::hal::imp::exec::lock(|_| unsafe { *published().0.get() })
+    crate::hal::imp::exec::lock(thread, |_| unsafe { *published().0.get() })
 }
 
 machine_static! {

@@ -133,7 +133,7 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
             }
             links.commands_taken.set(false);
             if planner.is_flushed() {
-                seek::drop_blocks().await;
+                seek::drop_blocks(links.thread).await;
                 if planner.restart() {
                     parser::end_program(links);
                 }
@@ -390,7 +390,7 @@ impl Planner {
     }
 
     fn room(&mut self) -> impl Future<Output = ()> {
-        wait(Event::BlockDone, || {
+        wait(self.links.thread, Event::BlockDone, || {
             self.replan();
             (self.queue.free() > 0 || self.is_flushed()).then_some(())
         })
@@ -398,7 +398,10 @@ impl Planner {
 
     /// Waits until the machine has come to the stop, and then for the next cycle start.
     async fn cycle_start(&self) {
-        wait(Event::BlockDone, || (queue::used() == 0 || self.is_flushed()).then_some(())).await;
+        wait(self.links.thread, Event::BlockDone, || {
+            (queue::used() == 0 || self.is_flushed()).then_some(())
+        })
+        .await;
         if self.is_flushed() {
             return;
         }
@@ -419,7 +422,7 @@ impl Planner {
     #[small]
     fn restart(&mut self) -> bool {
         let links = self.links;
-        let motion = links::snapshot();
+        let motion = links::snapshot(links.thread);
         self.relocate(&motion);
         self.news = News::None;
         let mut model = links.model.borrow_mut();

@@ -11,6 +11,7 @@ use embassy_time::Timer;
 use super::health;
 use super::links::{Links, snapshot};
 use crate::config::Settings;
+use crate::hal::Thread;
 use crate::hal::imp::time::millis;
 use crate::hal::imp::{exec, gpio};
 use crate::machine;
@@ -44,7 +45,7 @@ pub async fn run(links: &'static Links) -> ! {
 #[small]
 fn look(links: &Links) {
     let timeout = links.settings.borrow().motor_timeout_centis().saturating_mul(10);
-    let (now, running) = (millis(), snapshot().running);
+    let (now, running) = (millis(), snapshot(links.thread).running);
     let holds = machine::is_held();
     let pass = |motors: &mut Motors| {
         if holds {
@@ -52,7 +53,7 @@ fn look(links: &Links) {
         }
         motors.pass(now, running, timeout)
     };
-    if change(pass) {
+    if change(links.thread, pass) {
         links.reporter_wake.signal();
     }
 }
@@ -64,28 +65,28 @@ pub fn segment(moving: u8) {
     carry_out(|motors| motors.segment(moving));
 }
 
-/// Takes over the modes of the settings. Thread mode only.
+/// Takes over the modes of the settings.
 #[small]
-pub fn set_modes(settings: &Settings) {
+pub fn set_modes(thread: Thread, settings: &Settings) {
     let modes = Modes::new(|m| settings.motor_power_mode(m));
-    change(|motors| motors.set_modes(modes));
+    change(thread, |motors| motors.set_modes(modes));
 }
 
-/// Powers `motors` (bits). Thread mode only.
+/// Powers `motors` (bits).
 #[small]
-pub fn energize(motors: u8) {
-    change(|all| all.energize(motors));
+pub fn energize(thread: Thread, motors: u8) {
+    change(thread, |all| all.energize(motors));
 }
 
-/// Takes power from `motors` (bits). Thread mode only.
+/// Takes power from `motors` (bits).
 #[small]
-pub fn release(motors: u8) {
-    change(|all| all.release(motors));
+pub fn release(thread: Thread, motors: u8) {
+    change(thread, |all| all.release(motors));
 }
 
 #[small]
-fn change<R>(what: impl FnOnce(&mut Motors) -> R) -> R {
-    exec::lock(|_| carry_out(what))
+fn change<R>(thread: Thread, what: impl FnOnce(&mut Motors) -> R) -> R {
+    exec::lock(thread, |_| carry_out(what))
 }
 
 #[small]

@@ -11,6 +11,7 @@ use core::cell::UnsafeCell;
 use super::links::{snapshot, update};
 use super::storage::Storage;
 use crate::config::Setting;
+use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
 use crate::hal::imp::{exec, gpio, pwm, stepper};
 use crate::machine;
@@ -59,60 +60,60 @@ pub fn switch(out: &Snapshot, changed: bool) -> u16 {
     spindle.spin_up(before, wanted)
 }
 
-/// An alarm has begun: the outputs go off. Thread mode only.
+/// An alarm has begun: the outputs go off.
 #[small]
-pub fn stop() {
+pub fn stop(thread: Thread) {
     // Exec, which alone may do so, cannot run.
-    exec::lock(|_| update(|out| switch(out, true)));
+    exec::lock(thread, |_| update(|out| switch(out, true)));
 }
 
-/// Takes over all settings that concern the outputs, and then tells these. Thread mode, or before interrupts are on.
+/// Takes over all settings that concern the outputs, and then tells these.
 #[small]
 #[inline(never)]
-pub fn set_all(storage: &Storage) {
+pub fn set_all(thread: Thread, storage: &Storage) {
     let settings = (Setting::WARM..Setting::COLD).filter_map(Setting::from_number);
     for setting in settings.filter(|setting| !setting.is_data()) {
         let value = storage.cold(setting);
-        with(|spindle| match spindle.set(setting, value) {
+        with(thread, |spindle| match spindle.set(setting, value) {
             Changed::Frequency(millihertz) => pwm::set_frequency(millihertz),
             Changed::Outputs | Changed::Nothing => {}
         });
     }
-    tell();
+    tell(thread);
 }
 
-/// Takes over the value of a setting, if it concerns the outputs. Thread mode only.
+/// Takes over the value of a setting, if it concerns the outputs.
 #[small]
 #[inline(never)]
-pub fn set(setting: Setting, value: i32) {
-    match with(|spindle| spindle.set(setting, value)) {
+pub fn set(thread: Thread, setting: Setting, value: i32) {
+    match with(thread, |spindle| spindle.set(setting, value)) {
         Changed::Nothing => return,
         Changed::Outputs => {}
-        Changed::Frequency(millihertz) => exec::lock(|_| pwm::set_frequency(millihertz)),
+        Changed::Frequency(millihertz) => exec::lock(thread, |_| pwm::set_frequency(millihertz)),
     }
-    tell();
+    tell(thread);
 }
 
-/// Multiplies S by so many thousandths from now on. Thread mode only.
+/// Multiplies S by so many thousandths from now on.
 #[small]
-pub fn follow(thousandths: u16) {
-    if with(|spindle| spindle.set_factor(thousandths)) {
-        tell();
+pub fn follow(thread: Thread, thousandths: u16) {
+    if with(thread, |spindle| spindle.set_factor(thousandths)) {
+        tell(thread);
     }
 }
 
 /// Changes the state while exec cannot run.
 #[small]
-fn with<R>(what: impl FnOnce(&mut Spindle) -> R) -> R {
+fn with<R>(thread: Thread, what: impl FnOnce(&mut Spindle) -> R) -> R {
     // SAFETY: exec cannot run, and `what` calls nothing of this module.
-    exec::lock(|_| what(unsafe { &mut *shared().0.get() }))
+    exec::lock(thread, |_| what(unsafe { &mut *shared().0.get() }))
 }
 
 /// Tells the outputs what they are to be by now.
 #[small]
-fn tell() {
-    let speed = snapshot().speed;
-    with(|spindle| {
+fn tell(thread: Thread) {
+    let speed = snapshot(thread).speed;
+    with(thread, |spindle| {
         pwm::set_share(spindle.share(on(), speed));
         gpio::set_low(spindle.low(), on());
     });

@@ -101,7 +101,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     pub(super) fn level(&mut self, second: Second, from: i32) -> Length {
-        let motion = links::snapshot();
+        let motion = links::snapshot(self.links.thread);
         self.relocate(&motion);
         let m = usize::from(second.motor);
         let settings = self.links.settings.borrow();
