@@ -109,6 +109,7 @@ pub mod interrupt;
 mod level;
 mod pender;
 pub mod ring;
+mod shared;
 #[cfg(target_arch = "avr")]
 pub mod time;
 pub mod timers;
@@ -118,6 +119,7 @@ pub use event::{Event, Waiter};
 #[cfg(target_arch = "avr")]
 pub use executor::Executor;
 pub use level::{Ceiling, Interrupt, Thread};
+pub use shared::{InterruptEnd, Shared};
 
 /// Does something of a few cycles with interrupts off. Any level. Cost: 3 cycles.
 ///

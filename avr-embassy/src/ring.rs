@@ -447,8 +447,8 @@ mod tests {
         c.release();
         p.push(4).expect("room");
         assert_eq!((p.pushed(0), p.pushed(2), p.pushed(3)), (Some(&4), Some(&2), None));
-        assert!(p.amend(&Ceiling(()), 1, |v| *v = 30));
-        assert!(!p.amend(&Ceiling(()), 3, |v| *v = 0));
+        assert!(p.amend(&Ceiling::new(), 1, |v| *v = 30));
+        assert!(!p.amend(&Ceiling::new(), 3, |v| *v = 0));
         let got: Vec<u16> = core::iter::from_fn(|| c.pop()).collect();
         assert_eq!(got, [2, 30, 4]);
     }
