@@ -6,7 +6,7 @@ use kerf_macros::small;
 
 use core::cell::{Cell, RefCell};
 
-use avr_embassy::{Interrupt, Thread, interrupt};
+use avr_embassy::{Interrupt, InterruptEnd, Thread, interrupt};
 use embassy_executor::Spawner;
 use heapless::Vec;
 
@@ -24,6 +24,7 @@ use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
 use crate::store::kept;
+use crate::tasks::common::Common;
 use crate::tasks::links::{Changes, Links, QueueCount};
 use crate::tasks::ports::{AUX_RESERVE, Port};
 use crate::tasks::storage::Storage;
@@ -98,7 +99,9 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
         alarm::wake_up_in(links);
     }
     interrupt::start(|exec_level, level| {
-        if let Ok(task) = exec_task(level, blocks, segments) {
+        if let Some(common) = InterruptEnd::of(Common, level)
+            && let Ok(task) = exec_task(level, common, blocks, segments)
+        {
             exec_level.spawn(task);
         }
     })?;
@@ -150,6 +153,7 @@ fn recall(settings: &mut Settings, storage: &Storage) -> Occasion {
 tasks! {
     fn exec_task(
         level: Interrupt,
+        common: InterruptEnd<Common>,
         blocks: BlockSource,
         segments: Producer<Segment, SEGMENTS>
     ) = exec::run;

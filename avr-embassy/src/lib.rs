@@ -119,7 +119,7 @@ pub use event::{Event, Waiter};
 #[cfg(target_arch = "avr")]
 pub use executor::Executor;
 pub use level::{Ceiling, Interrupt, Thread};
-pub use shared::{InterruptEnd, Shared};
+pub use shared::{InterruptEnd, Place, Shared};
 
 /// Does something of a few cycles with interrupts off. Any level. Cost: 3 cycles.
 ///

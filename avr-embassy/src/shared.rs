@@ -17,19 +17,20 @@ use crate::{Ceiling, Interrupt};
 /// A value that thread mode and interrupt mode share. Its end for interrupt mode is handed out once.
 ///
 /// ```
-/// use avr_embassy::{Shared, host::Runtime, interrupt};
+/// use avr_embassy::{InterruptEnd, host::Runtime, interrupt};
 ///
-/// avr_embassy::machine_static! {
-///     fn count() -> Shared<u32> = Shared::new(0);
+/// avr_embassy::shared_static! {
+///     /// How often something has happened.
+///     struct Count: u32 = 0;
 /// }
 ///
 /// let runtime = Runtime::new();
 /// interrupt::start(|_, level| {
 ///     // This goes along with a task of interrupt mode.
-///     let mut end = count().end(level).expect("the first time");
+///     let mut end = InterruptEnd::of(Count, level).expect("the first time");
 ///     end.with(|count| *count += 1);
 /// });
-/// let now = interrupt::lock(runtime.thread(), |ceiling| count().with(ceiling, |count| *count));
+/// let now = interrupt::lock(runtime.thread(), |ceiling| Count.with(ceiling, |count| *count));
 /// assert_eq!(now, 1);
 /// ```
 ///
@@ -72,9 +73,9 @@ use crate::{Ceiling, Interrupt};
 /// It cannot have the end of interrupt mode:
 ///
 /// ```compile_fail,E0308
-/// # use avr_embassy::{Shared, Thread};
+/// # use avr_embassy::{InterruptEnd, Shared, Thread};
 /// fn steal(thread: Thread, count: &'static Shared<u32>) {
-///     count.end(thread);
+///     InterruptEnd::of(count, thread);
 /// }
 /// ```
 pub struct Shared<T> {
@@ -97,15 +98,63 @@ impl<T: Send> Shared<T> {
         // ceiling, and `T` holds none.
         unsafe { self.value.with(act) }
     }
+}
 
-    /// The end of interrupt mode. `None` after the first time.
-    pub fn end(&'static self, _: Interrupt) -> Option<InterruptEnd<T>> {
-        if self.taken.get() != 0 {
-            return None;
-        }
-        self.taken.set(1);
-        Some(InterruptEnd(self, PhantomData))
+/// Where a [`Shared`] is: a reference, or a type that [`shared_static!`](crate::shared_static!) declares, which takes no room.
+///
+/// # Safety
+/// [`Place::shared`] always returns the same (on the host: in a thread).
+pub unsafe trait Place: Copy {
+    /// What is shared.
+    type Value: Send + 'static;
+
+    /// The one.
+    fn shared(self) -> &'static Shared<Self::Value>;
+}
+
+// SAFETY: a reference is always to the same.
+unsafe impl<T: Send> Place for &'static Shared<T> {
+    type Value = T;
+
+    #[inline(always)]
+    fn shared(self) -> &'static Shared<T> {
+        self
     }
+}
+
+/// Declares a [`Shared`] that a machine has one of, as a type that stands for it.
+#[macro_export]
+macro_rules! shared_static {
+    ($(#[$meta:meta])* $vis:vis struct $name:ident: $type:ty = $init:expr;) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy)]
+        $vis struct $name;
+
+        // SAFETY: the only one that this type stands for.
+        unsafe impl $crate::Place for $name {
+            type Value = $type;
+
+            #[inline(always)]
+            fn shared(self) -> &'static $crate::Shared<$type> {
+                $crate::machine_static! {
+                    fn value() -> $crate::Shared<$type> = $crate::Shared::new($init);
+                }
+                value()
+            }
+        }
+
+        impl $name {
+            /// Has `act` use the value, see [`Shared::with`]($crate::Shared::with).
+            #[inline(always)]
+            $vis fn with<R>(
+                self,
+                ceiling: &$crate::Ceiling,
+                act: impl FnOnce(&mut $type) -> R + Send,
+            ) -> R {
+                $crate::Place::shared(self).with(ceiling, act)
+            }
+        }
+    };
 }
 
 /// Interrupt mode's end of a [`Shared`]. It is not [`Send`]: it stays there.
@@ -113,10 +162,11 @@ impl<T: Send> Shared<T> {
 /// Nothing of the value is kept while the task waits:
 ///
 /// ```compile_fail
-/// # use avr_embassy::InterruptEnd;
-/// async fn keep(mut end: InterruptEnd<u32>) {
+/// # use avr_embassy::{InterruptEnd, Shared};
+/// async fn keep(mut end: InterruptEnd<&'static Shared<u32>>) {
 ///     let mut kept = None;
 ///     end.with(|count| kept = Some(count));
+///     drop(kept);
 /// }
 /// ```
 ///
@@ -124,24 +174,34 @@ impl<T: Send> Shared<T> {
 ///
 /// ```compile_fail,E0277
 /// fn is_send<T: Send>() {}
-/// is_send::<avr_embassy::InterruptEnd<u32>>();
+/// is_send::<avr_embassy::InterruptEnd<&'static avr_embassy::Shared<u32>>>();
 /// ```
-pub struct InterruptEnd<T: 'static>(&'static Shared<T>, PhantomData<*mut ()>);
+pub struct InterruptEnd<P: Place>(P, PhantomData<*mut ()>);
 
-impl<T: Send> InterruptEnd<T> {
+impl<P: Place> InterruptEnd<P> {
+    /// That of what is at a place. `None` after the first time.
+    pub fn of(place: P, _: Interrupt) -> Option<Self> {
+        let taken = &place.shared().taken;
+        if taken.get() != 0 {
+            return None;
+        }
+        taken.set(1);
+        Some(Self(place, PhantomData))
+    }
+
     /// Has `act` use the value.
     #[inline(always)]
-    pub fn with<R>(&mut self, act: impl FnOnce(&mut T) -> R) -> R {
+    pub fn with<R>(&mut self, act: impl FnOnce(&mut P::Value) -> R) -> R {
         // SAFETY: interrupt mode runs, for this cannot leave it; so thread mode does not, nor is it within the lock. This is
         // the only end, and it is borrowed.
-        unsafe { self.0.value.with(act) }
+        unsafe { self.0.shared().value.with(act) }
     }
 
     /// Has `act` look at the value.
     #[inline(always)]
-    pub fn look<R>(&self, act: impl FnOnce(&T) -> R) -> R {
+    pub fn look<R>(&self, act: impl FnOnce(&P::Value) -> R) -> R {
         // SAFETY: as in `with`; the borrow keeps that away.
-        unsafe { self.0.value.look(act) }
+        unsafe { self.0.shared().value.look(act) }
     }
 }
 
@@ -214,8 +274,8 @@ mod tests {
     fn both_levels_change_the_value_and_interrupt_mode_has_one_end() {
         let shared: &'static Shared<u8> = Box::leak(Box::new(Shared::new(1)));
         let runtime = Runtime::new();
-        let mut end = shared.end(runtime.interrupt()).expect("the first");
-        assert!(shared.end(runtime.interrupt()).is_none());
+        let mut end = InterruptEnd::of(shared, runtime.interrupt()).expect("the first");
+        assert!(InterruptEnd::of(shared, runtime.interrupt()).is_none());
         end.with(|value| *value += 1);
         let seen = interrupt::lock(runtime.thread(), |ceiling| {
             shared.with(ceiling, |value| {

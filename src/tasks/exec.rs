@@ -6,6 +6,8 @@
 //! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`WAITING_SHORT`]), stretches become twice
 //! as long, and for a while more waits ([`PRESSED`]).
 
+use avr_embassy::InterruptEnd;
+
 use crate::boards::ACTIVE;
 use crate::hal::Interrupt;
 use crate::hal::event::{self, Event};
@@ -22,6 +24,9 @@ use crate::motion::snapshot::{Program, Snapshot};
 use crate::tasks::health::{self, Sign};
 use kerf_macros::small;
 
+use crate::motors::Motors;
+use crate::spindle::Spindle;
+use crate::tasks::common::{Common, State};
 use crate::tasks::{Never, hold, links, overrides, power, spindle};
 
 /// After so many segments without a turn of thread mode they become longer, which takes less of the CPU.
@@ -35,6 +40,7 @@ const FIRST_TURN: u8 = 2;
 #[allow(clippy::manual_async_fn)] // See `tasks`.
 pub fn run(
     level: Interrupt,
+    mut common: InterruptEnd<Common>,
     blocks: BlockSource,
     segments: Producer<Segment, SEGMENTS>,
 ) -> impl Future<Output = Never> {
@@ -44,7 +50,7 @@ pub fn run(
         let mut runner = Runner::new(blocks, segments, &mut machine);
         loop {
             exec::wait(level, || runner.is_due().then_some(())).await;
-            match runner.turn() {
+            match runner.turn(&mut common) {
                 Next::Turn => continue,
                 Next::Idle => exec::pend_when_idle(),
                 Next::Room => exec::note_idle(),
@@ -105,14 +111,14 @@ impl<'a> Runner<'a> {
 
     /// Does the next thing there is to do.
     #[inline(always)]
-    fn turn(&mut self) -> Next {
+    fn turn(&mut self, common: &mut InterruptEnd<Common>) -> Next {
         let queued = self.blocks.len();
         let rested = self.rests;
         if contact::is_noted() {
             contact::catch_up(&self.segments);
         }
         let standstill = !stepper::running();
-        let step = links::update(|out| self.step(standstill, out));
+        let step = common.with(|common| self.step(standstill, common));
         if self.blocks.len() != queued {
             flags::set(Event::BlockDone);
         }
@@ -126,30 +132,33 @@ impl<'a> Runner<'a> {
 
     /// The next step of the machine, and what follows from it; a segment is put into the ring.
     #[inline(always)]
-    fn step(&mut self, standstill: bool, out: &mut Snapshot) -> Step {
+    fn step(&mut self, standstill: bool, common: &mut State) -> Step {
+        let State { motion: out, overrides, motors, spindle } = common;
         let used = self.segments.used();
         self.machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
         // What has paused in a hold goes on before motion does.
         if out.outputs != spindle::on() {
-            self.machine.wait(spindle::switch(out, false), out);
+            self.machine.wait(spindle::switch(spindle, out, false), out);
         }
         if let Some(line) = self.finished.take(used) {
             out.finished = line;
         }
         let line = out.line;
-        let step = self.next_step(standstill, out);
+        let step = self.next_step(standstill, out, motors);
         if out.line != line {
             self.finished.end(line);
         }
         match step {
             Step::Segment => self.finished.queue(),
-            Step::Override(change) => overrides::change_in_stream(change, &mut self.blocks),
+            Step::Override(change) => {
+                overrides::change_in_stream(overrides, change, &mut self.blocks)
+            }
             Step::Idle if standstill => {
                 self.finished.rest();
                 out.finished = out.line;
             }
-            Step::Held => self.held(out),
-            Step::Switched => self.machine.wait(spindle::switch(out, true), out),
+            Step::Held => self.held(out, spindle),
+            Step::Switched => self.machine.wait(spindle::switch(spindle, out, true), out),
             Step::Again | Step::Idle | Step::Standstill => {}
         }
         // A standstill stays one until a segment leads out of it; velocity is ahead of the segments.
@@ -158,7 +167,7 @@ impl<'a> Runner<'a> {
     }
 
     #[inline(always)]
-    fn next_step(&mut self, standstill: bool, out: &mut Snapshot) -> Step {
+    fn next_step(&mut self, standstill: bool, out: &mut Snapshot, motors: &mut Motors) -> Step {
         if stepper::is_stopped() {
             return Step::Held;
         }
@@ -168,7 +177,7 @@ impl<'a> Runner<'a> {
         };
         let step = self.machine.step(&mut self.blocks, standstill, out, &mut slot);
         if step == Step::Segment {
-            power::segment(slot.moving);
+            power::segment(motors, slot.moving);
             self.waiting.push(product(slot.ticks, slot.period));
             if contact::is_noted() {
                 contact::pushed(&slot);
@@ -181,8 +190,8 @@ impl<'a> Runner<'a> {
     /// The machine stands still in a hold. Drops what is queued if that is wanted.
     #[inline(never)]
     #[small]
-    fn held(&mut self, out: &mut Snapshot) {
-        spindle::switch(out, false);
+    fn held(&mut self, out: &mut Snapshot, spindle: &Spindle) {
+        spindle::switch(spindle, out, false);
         machine::drop_if_wanted(|| {
             // What has paused stays off.
             out.outputs = spindle::on();

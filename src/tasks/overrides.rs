@@ -7,8 +7,7 @@
 //!
 //! [`tell`] passes the factor of the spindle's speed on to those who drive it.
 
-use core::cell::UnsafeCell;
-
+use super::common::{self, Common};
 use super::jog;
 use super::links::Links;
 use super::spindle;
@@ -20,40 +19,28 @@ use crate::motion::factors::Factors;
 use crate::motion::queue::{self, BlockSource};
 use crate::realtime::{Asked, NO_JOG, TRAVERSE};
 
-/// The state: exec's, and thread mode's while exec is locked out.
-struct Shared(UnsafeCell<Overrides>);
-
-// SAFETY: exec changes it, and thread mode does while exec cannot run.
-unsafe impl Sync for Shared {}
-
-machine_static! {
-    fn shared() -> Shared = Shared(UnsafeCell::new(Overrides::NONE));
-}
-
 /// The overrides as they are.
 #[small]
 pub fn now(thread: Thread) -> Overrides {
-    // SAFETY: exec does not run under the lock.
-    exec::lock(thread, |_| unsafe { *shared().0.get() })
+    common::with(thread, |common| common.overrides)
 }
 
 /// Changes them at once.
 #[small]
 pub fn change(thread: Thread, change: Change) {
     exec::lock(thread, |ceiling| {
-        // SAFETY: exec does not run under the lock.
-        let overrides = unsafe { &mut *shared().0.get() };
-        overrides.change(change);
-        queue::store().want(factors(overrides), ceiling);
+        let factors = Common.with(ceiling, |common| {
+            common.overrides.change(change);
+            factors(&common.overrides)
+        });
+        queue::store().want(factors, ceiling);
     });
     flags::set(Event::Realtime);
 }
 
 /// The moves behind which the change stands have been prepared. Exec only.
 #[small]
-pub fn change_in_stream(change: Change, blocks: &mut BlockSource) {
-    // SAFETY: exec runs, so nobody holds the lock.
-    let overrides = unsafe { &mut *shared().0.get() };
+pub fn change_in_stream(overrides: &mut Overrides, change: Change, blocks: &mut BlockSource) {
     overrides.change(change);
     blocks.want(factors(overrides));
     flags::set(Event::Realtime);

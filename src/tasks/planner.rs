@@ -18,6 +18,7 @@ use embassy_futures::yield_now;
 use parts::{ArcWalk, Parts};
 
 use super::Never;
+use super::common;
 use super::links::{self, Changes, Links};
 use super::parser;
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
@@ -422,7 +423,7 @@ impl Planner {
     #[small]
     fn restart(&mut self) -> bool {
         let links = self.links;
-        let motion = links::snapshot(links.thread);
+        let motion = common::snapshot(links.thread);
         self.relocate(&motion);
         self.news = News::None;
         let mut model = links.model.borrow_mut();

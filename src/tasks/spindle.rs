@@ -6,9 +6,7 @@
 //! and are on again before motion goes on. Thread mode tells what settings ([`set`]) and the override ([`follow`])
 //! have changed; it is in force at once. Cost of a change: 4,000 cycles.
 
-use core::cell::UnsafeCell;
-
-use super::links::{snapshot, update};
+use super::common;
 use super::storage::Storage;
 use crate::config::Setting;
 use crate::hal::Thread;
@@ -18,14 +16,7 @@ use crate::machine;
 use crate::motion::snapshot::Snapshot;
 use crate::spindle::{Changed, Spindle};
 
-/// The state: exec's, and thread mode's while exec is locked out.
-struct Shared(UnsafeCell<Spindle>);
-
-// SAFETY: exec reads it, and thread mode changes it while exec cannot run.
-unsafe impl Sync for Shared {}
-
 machine_static! {
-    fn shared() -> Shared = Shared(UnsafeCell::new(Spindle::new()));
     // What is on. Exec writes it.
     fn now_on() -> SharedByte = SharedByte::new(0);
 }
@@ -37,12 +28,10 @@ pub fn on() -> u8 {
 }
 
 /// Switches the outputs as they are to be now; how long motion has to wait for that, ms. `changed` says that S may
-/// be another. Exec only.
+/// be another. Exec, or who locks it out.
 #[inline(never)]
 #[small]
-pub fn switch(out: &Snapshot, changed: bool) -> u16 {
-    // SAFETY: exec runs, or cannot, and nobody else changes it.
-    let spindle = unsafe { &*shared().0.get() };
+pub fn switch(spindle: &Spindle, out: &Snapshot, changed: bool) -> u16 {
     let before = on();
     // A probe that has made contact holds as well.
     let wanted = match out.held && machine::is_held() {
@@ -63,8 +52,7 @@ pub fn switch(out: &Snapshot, changed: bool) -> u16 {
 /// An alarm has begun: the outputs go off.
 #[small]
 pub fn stop(thread: Thread) {
-    // Exec, which alone may do so, cannot run.
-    exec::lock(thread, |_| update(|out| switch(out, true)));
+    common::with(thread, |common| switch(&common.spindle, &common.motion, true));
 }
 
 /// Takes over all settings that concern the outputs, and then tells these.
@@ -104,17 +92,15 @@ pub fn follow(thread: Thread, thousandths: u16) {
 
 /// Changes the state while exec cannot run.
 #[small]
-fn with<R>(thread: Thread, what: impl FnOnce(&mut Spindle) -> R) -> R {
-    // SAFETY: exec cannot run, and `what` calls nothing of this module.
-    exec::lock(thread, |_| what(unsafe { &mut *shared().0.get() }))
+fn with<R>(thread: Thread, what: impl FnOnce(&mut Spindle) -> R + Send) -> R {
+    common::with(thread, |common| what(&mut common.spindle))
 }
 
 /// Tells the outputs what they are to be by now.
 #[small]
 fn tell(thread: Thread) {
-    let speed = snapshot(thread).speed;
-    with(thread, |spindle| {
-        pwm::set_share(spindle.share(on(), speed));
-        gpio::set_low(spindle.low(), on());
+    common::with(thread, |common| {
+        pwm::set_share(common.spindle.share(on(), common.motion.speed));
+        gpio::set_low(common.spindle.low(), on());
     });
 }

@@ -9,10 +9,11 @@ use kerf_macros::small;
 use core::cell::{OnceCell, RefMut};
 
 use super::alarm;
+use super::common::snapshot;
 use super::health;
 use super::hold;
 use super::homing;
-use super::links::{Changes, Links, snapshot};
+use super::links::{Changes, Links};
 use super::overrides;
 use super::ports::Port;
 use super::power;

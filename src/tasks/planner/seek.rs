@@ -20,7 +20,8 @@ use crate::motion::block::{Action, Outputs};
 use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};
 use crate::motion::snapshot::Snapshot;
 use crate::motion::{contact, queue};
-use crate::tasks::links::{self, Changes};
+use crate::tasks::common;
+use crate::tasks::links::Changes;
 use crate::tasks::setup::moved_by;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
@@ -84,7 +85,7 @@ impl Planner {
             return if self.is_flushed() { Sought::Flushed } else { Sought::End };
         }
         drop_blocks(self.links.thread).await;
-        let motion = links::snapshot(self.links.thread);
+        let motion = common::snapshot(self.links.thread);
         let steps = contact::take(&motion.target);
         self.relocate(&motion);
         steps.map_or(Sought::End, Sought::Contact)

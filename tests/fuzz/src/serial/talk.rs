@@ -2,7 +2,7 @@
 
 use kerf::hal::imp::{Machine, stepper};
 use kerf::motion::queue;
-use kerf::tasks::links::snapshot;
+use kerf::tasks::common::snapshot;
 
 use super::ears::Ears;
 use super::lines::{End, Lines};
