@@ -86,7 +86,7 @@ fn place(thread: Thread, ports: [Port; PORTS]) -> &'static Links {
 #[small]
 pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     let segments = stepper::start()?;
-    let (queue, blocks) = queue::store().split(thread)?;
+    let queue = queue::store().queue(thread)?;
     let (links, received, aux) = connect(thread, rate)?;
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
     if !links.settings.borrow().starts_in_json() {
@@ -100,6 +100,7 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     }
     interrupt::start(|exec_level, level| {
         if let Some(common) = InterruptEnd::of(Common, level)
+            && let Some(blocks) = queue::store().source(level)
             && let Ok(task) = exec_task(level, common, blocks, segments)
         {
             exec_level.spawn(task);

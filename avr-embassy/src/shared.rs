@@ -79,14 +79,15 @@ use crate::{Ceiling, Interrupt};
 /// }
 /// ```
 pub struct Shared<T> {
-    taken: SharedByte,
     value: imp::Value<T>,
+    /// Whether there is an end of interrupt mode.
+    taken: SharedByte,
 }
 
 impl<T: Send> Shared<T> {
     /// With a value.
     pub const fn new(value: T) -> Self {
-        Self { taken: SharedByte::new(0), value: imp::Value::new(value) }
+        Self { value: imp::Value::new(value), taken: SharedByte::new(0) }
     }
 
     /// Has `act` use the value. Thread mode, which shows the ceiling.

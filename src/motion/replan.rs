@@ -108,8 +108,7 @@ impl Known {
 impl BlockQueue {
     /// The overrides that are wanted, if the keys are for others. Cost: 60.
     pub fn wanted(&self) -> Option<Factors> {
-        let wanted =
-            exec::lock(self.thread, |ceiling| self.store.with_horizon(ceiling, |h| h.wanted));
+        let wanted = exec::lock(self.thread, |ceiling| self.horizon.with(ceiling, |h| h.wanted));
         (!wanted.same(&self.factors)).then_some(wanted)
     }
 
@@ -134,7 +133,7 @@ impl BlockQueue {
         let mut last: Option<(usize, &Line)> = None;
         let next = self.newest.wrapping_add(1) & SEQ;
         let older =
-            exec::lock(self.thread, |ceiling| self.store.with_horizon(ceiling, |h| h.older(next)));
+            exec::lock(self.thread, |ceiling| self.horizon.with(ceiling, |h| h.older(next)));
         for back in 0..=self.ring.used() {
             let block = self.ring.pushed(back);
             if is_aside(block) {
@@ -156,9 +155,9 @@ impl BlockQueue {
     #[inline(never)]
     fn install(&self, keys: &Keys) {
         exec::lock(self.thread, |ceiling| {
-            self.store.with_horizon(ceiling, |horizon| {
-                let used = self.ring.used() as u8;
-                let oldest = self.newest.wrapping_sub(used).wrapping_add(1) & SEQ;
+            let (used, factors) = (self.ring.used() as u8, self.factors);
+            let oldest = self.newest.wrapping_sub(used).wrapping_add(1) & SEQ;
+            self.horizon.with(ceiling, |horizon| {
                 // What has begun has no key any more, nor what has been run meanwhile.
                 let begun = horizon.nth(0).is_none_or(|first| first & SEQ != oldest);
                 horizon.replace(keys);
@@ -169,7 +168,7 @@ impl BlockQueue {
                     }
                     horizon.pass();
                 }
-                horizon.planned = self.factors;
+                horizon.planned = factors;
                 horizon.changed = true;
                 horizon.version = horizon.version.wrapping_add(1);
             });

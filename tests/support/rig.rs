@@ -148,7 +148,9 @@ pub struct Rig {
 impl Rig {
     pub fn new(config: Config) -> Self {
         let blocks: &'static BlockStore = Box::leak(Box::new(BlockStore::new()));
-        let (queue, source) = blocks.split(Runtime::new().thread()).expect("first");
+        let runtime = Runtime::new();
+        let queue = blocks.queue(runtime.thread()).expect("first");
+        let source = blocks.source(runtime.interrupt()).expect("first");
         let segments: &'static Ring<Segment, SEGMENTS> = Box::leak(Box::new(Ring::new()));
         let (fill, drain) = segments.split().expect("first");
         Rig {
