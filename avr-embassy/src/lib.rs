@@ -17,7 +17,8 @@
 //! | interrupt mode | tasks of the [`interrupt`] executor, with interrupts on | besides, all of Embassy; [`interrupt::wait`] |
 //! | thread mode | tasks of the `Executor`, the main loop | besides, [`Event::wait`], [`interrupt::lock`] |
 //!
-//! Functions that belong to a level ask for its token, [`Thread`] or [`Interrupt`], which the other level cannot have.
+//! Functions that belong to a level ask for its token, [`Thread`] or [`Interrupt`], which the other level cannot have. What both change is a
+//! [`Shared`], what a handler and tasks have in turn a [`Baton`].
 //!
 //! # Critical sections mask nothing
 //!

@@ -66,6 +66,19 @@ impl BlockStore {
     }
 
     /// Exec's end. `None` after the first time.
+    ///
+    /// Thread mode cannot have it, nor be given it:
+    ///
+    /// ```compile_fail,E0308
+    /// fn steal(thread: kerf::hal::Thread) {
+    ///     kerf::motion::queue::store().source(thread);
+    /// }
+    /// ```
+    ///
+    /// ```compile_fail,E0277
+    /// fn is_send<T: Send>() {}
+    /// is_send::<kerf::motion::queue::BlockSource>();
+    /// ```
     pub fn source(&'static self, level: Interrupt) -> Option<BlockSource> {
         Some(BlockSource::new(self.ring.consumer()?, InterruptEnd::of(&self.horizon, level)?))
     }

@@ -24,6 +24,22 @@ pub struct State {
 
 avr_embassy::shared_static! {
     /// Where it is.
+    ///
+    /// Nobody looks at it without the lock:
+    ///
+    /// ```compile_fail,E0061
+    /// use kerf::tasks::common::Common;
+    ///
+    /// let running = Common.with(|state| state.motion.running);
+    /// ```
+    ///
+    /// and thread mode does not get exec's end:
+    ///
+    /// ```compile_fail,E0308
+    /// fn steal(thread: kerf::hal::Thread) {
+    ///     avr_embassy::InterruptEnd::of(kerf::tasks::common::Common, thread);
+    /// }
+    /// ```
     pub struct Common: State = State {
         motion: Snapshot::new(),
         overrides: Overrides::NONE,
