@@ -6,7 +6,7 @@ use kerf_macros::small;
 
 use core::cell::{Cell, RefCell};
 
-use avr_embassy::interrupt;
+use avr_embassy::{Interrupt, InterruptEnd, Thread, interrupt};
 use embassy_executor::Spawner;
 use heapless::Vec;
 
@@ -24,6 +24,7 @@ use crate::protocol::notice::Occasion;
 use crate::protocol::{Mode, StatusReport};
 use crate::store::Log;
 use crate::store::kept;
+use crate::tasks::common::Common;
 use crate::tasks::links::{Changes, Links, QueueCount};
 use crate::tasks::ports::{AUX_RESERVE, Port};
 use crate::tasks::storage::Storage;
@@ -40,8 +41,9 @@ const LINES_USB: usize = 448;
 const LINES_AUX: usize = 80 + AUX_RESERVE as usize;
 
 impl Links {
-    fn new(ports: [Port; PORTS], storage: &'static Storage) -> Self {
+    fn new(thread: Thread, ports: [Port; PORTS], storage: &'static Storage) -> Self {
         Self {
+            thread,
             ports,
             feeder: Cell::new(USB),
             pool_space: Wake::default(),
@@ -72,32 +74,35 @@ impl Links {
 /// Makes the links. Not inlined: what it needs of the stack is free again after it.
 #[inline(never)]
 #[small]
-fn place(ports: [Port; PORTS]) -> &'static Links {
+fn place(thread: Thread, ports: [Port; PORTS]) -> &'static Links {
     let storage: &'static Storage = place!(Storage, Storage::new(Log::open(&Eeprom::take())));
-    place!(Links, Links::new(ports, storage))
+    place!(Links, Links::new(thread, ports, storage))
 }
 
-/// Starts the firmware: `main` is the thread-mode executor, the exec task has the interrupt executor to itself.
+/// Starts the firmware: `main` is the thread-mode executor, of which `thread` is the token; the exec task has the interrupt executor to itself.
 ///
 /// Interrupts are off. `None` if it has been started before.
 #[inline(never)]
 #[small]
-pub fn start(main: Spawner, rate: u32) -> Option<()> {
+pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     let segments = stepper::start()?;
-    let (queue, blocks) = queue::store().split()?;
-    let (links, received, aux) = connect(rate)?;
+    let queue = queue::store().queue(thread)?;
+    let (links, received, aux) = connect(thread, rate)?;
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
     if !links.settings.borrow().starts_in_json() {
         links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
     }
-    set_hardware(&links.settings.borrow());
-    spindle::set_all(links.storage);
+    set_hardware(thread, &links.settings.borrow());
+    spindle::set_all(thread, links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
     if watchdog::cause().is_fault() {
         alarm::wake_up_in(links);
     }
-    interrupt::start(|exec_level, _| {
-        if let Ok(task) = exec_task(blocks, segments) {
+    interrupt::start(|exec_level, level| {
+        if let Some(common) = InterruptEnd::of(Common, level)
+            && let Some(blocks) = queue::store().source(level)
+            && let Ok(task) = exec_task(level, common, blocks, segments)
+        {
             exec_level.spawn(task);
         }
     })?;
@@ -114,19 +119,24 @@ pub fn start(main: Spawner, rate: u32) -> Option<()> {
 /// Starts the ports and makes the links. Not inlined, as [`place`].
 #[inline(never)]
 #[small]
-fn connect(rate: u32) -> Option<(&'static Links, Received<RX_RING>, Option<Received<AUX_RING>>)> {
+fn connect(
+    thread: Thread,
+    rate: u32,
+) -> Option<(&'static Links, Received<RX_RING>, Option<Received<AUX_RING>>)> {
     let AllEnds { usb: (received, outgoing), aux } = uart::start(rate)?;
     let mut ports = Vec::<Port, PORTS>::new();
-    ports.push(Port::new(USB, line_bytes!(LINES_USB), Tx::new(outgoing, USB, rate))).ok()?;
+    ports
+        .push(Port::new(USB, line_bytes!(LINES_USB), Tx::new(thread, outgoing, USB, rate)))
+        .ok()?;
     let aux = match (aux, hardware(AUX)) {
         (Some((received, outgoing)), Some(board)) => {
-            let tx = Tx::new(outgoing, AUX, board.rate);
+            let tx = Tx::new(thread, outgoing, AUX, board.rate);
             ports.push(Port::new(AUX, line_bytes!(LINES_AUX), tx)).ok()?;
             Some(received)
         }
         _ => None,
     };
-    Some((place(ports.into_array().ok()?), received, aux))
+    Some((place(thread, ports.into_array().ok()?), received, aux))
 }
 
 /// The defaults, and over them what was put away before the reset. Says also what has come of it.
@@ -142,7 +152,12 @@ fn recall(settings: &mut Settings, storage: &Storage) -> Occasion {
 }
 
 tasks! {
-    fn exec_task(blocks: BlockSource, segments: Producer<Segment, SEGMENTS>) = exec::run;
+    fn exec_task(
+        level: Interrupt,
+        common: InterruptEnd<Common>,
+        blocks: BlockSource,
+        segments: Producer<Segment, SEGMENTS>
+    ) = exec::run;
     fn reader_task(
         links: &'static Links,
         usb: Received<RX_RING>,

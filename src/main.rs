@@ -9,12 +9,7 @@ mod image {
     use kerf::hal::imp::{gpio, inputs, panic, time, watchdog};
     use static_cell::StaticCell;
 
-    // Naming avr-libc and libgcc in the image itself puts them before `compiler_builtins` in the link:
-    // see `kerf::math`.
-    #[link(name = "c")]
-    #[link(name = "m")]
-    #[link(name = "gcc")]
-    unsafe extern "C" {}
+    kerf::link_libraries!();
 
     #[avr_device::entry]
     fn main() -> ! {
@@ -23,8 +18,8 @@ mod image {
         gpio::start();
         inputs::start();
         MAIN.init(Executor::new()).run_with(
-            |main, _| {
-                if kerf::app::start(main, baud::DEFAULT).is_none() {
+            |main, thread| {
+                if kerf::app::start(main, thread, baud::DEFAULT).is_none() {
                     panic::halt();
                 }
                 time::start();

@@ -10,7 +10,7 @@ use embassy_executor::Spawner;
 use embassy_executor::raw::{Executor, TaskStorage};
 
 use crate::event::{self, flags};
-use crate::{Thread, interrupt, pender};
+use crate::{Interrupt, Thread, interrupt, pender};
 
 /// The thread-mode executor of this thread's machine, beside the one that [`interrupt::start`] makes. Neither is ever given back.
 pub struct Runtime(&'static Executor);
@@ -31,6 +31,12 @@ impl Runtime {
     pub fn thread(&self) -> Thread {
         // SAFETY: interrupt mode runs between other things here, never within them.
         unsafe { Thread::assume() }
+    }
+
+    /// The token of interrupt mode, for tests that do themselves what its tasks do.
+    pub fn interrupt(&self) -> Interrupt {
+        // SAFETY: as above.
+        unsafe { Interrupt::assume() }
     }
 
     /// Spawns a future as a task of thread mode.

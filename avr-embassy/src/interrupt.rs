@@ -69,7 +69,7 @@ pub fn was_idle() -> bool {
 #[inline(always)]
 pub fn lock<R>(_: Thread, critical: impl FnOnce(&Ceiling) -> R) -> R {
     let before = imp::close();
-    let result = critical(&Ceiling(()));
+    let result = critical(&Ceiling::new());
     imp::open(before);
     result
 }

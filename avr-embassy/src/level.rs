@@ -9,7 +9,7 @@ use core::marker::PhantomData;
 ///
 /// A task of the interrupt executor cannot have it:
 ///
-/// ```compile_fail
+/// ```compile_fail,E0277
 /// fn is_send<T: Send>() {}
 /// is_send::<avr_embassy::Thread>();
 /// ```
@@ -45,8 +45,36 @@ impl Interrupt {
 /// Shows that the interrupt executor cannot run: [`interrupt::lock`](crate::interrupt::lock) lends it, and nobody else
 /// can make one.
 ///
-/// ```compile_fail
-/// let forged = avr_embassy::Ceiling(());
+/// ```compile_fail,E0423
+/// let forged = avr_embassy::Ceiling(core::marker::PhantomData);
 /// ```
+///
+/// It does not outlive the lock:
+///
+/// ```compile_fail
+/// # use avr_embassy::{Ceiling, Thread, interrupt};
+/// fn keep(thread: Thread) -> &'static Ceiling {
+///     interrupt::lock(thread, |ceiling| ceiling)
+/// }
+/// ```
+///
+/// Interrupt mode has no way to one:
+///
+/// ```compile_fail,E0308
+/// # use avr_embassy::{Interrupt, interrupt};
+/// fn lock(level: Interrupt) {
+///     interrupt::lock(level, |_| ());
+/// }
+/// ```
+///
+/// It takes no room. As the tokens it is not [`Send`], nor is a reference to it.
 #[derive(Debug)]
-pub struct Ceiling(pub(crate) ());
+pub struct Ceiling(PhantomData<*mut ()>);
+
+impl Ceiling {
+    /// Interrupt mode cannot run now.
+    #[inline(always)]
+    pub(crate) const fn new() -> Self {
+        Ceiling(PhantomData)
+    }
+}

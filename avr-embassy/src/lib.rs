@@ -17,7 +17,8 @@
 //! | interrupt mode | tasks of the [`interrupt`] executor, with interrupts on | besides, all of Embassy; [`interrupt::wait`] |
 //! | thread mode | tasks of the `Executor`, the main loop | besides, [`Event::wait`], [`interrupt::lock`] |
 //!
-//! Functions that belong to a level ask for its token, [`Thread`] or [`Interrupt`], which the other level cannot have.
+//! Functions that belong to a level ask for its token, [`Thread`] or [`Interrupt`], which the other level cannot have. What both change is a
+//! [`Shared`], what a handler and tasks have in turn a [`Baton`].
 //!
 //! # Critical sections mask nothing
 //!
@@ -96,6 +97,7 @@ macro_rules! machine_static {
 
 #[cfg(target_arch = "avr")]
 pub mod assembly;
+mod baton;
 pub mod byte;
 #[cfg(target_arch = "avr")]
 mod chip;
@@ -108,14 +110,17 @@ pub mod interrupt;
 mod level;
 mod pender;
 pub mod ring;
+mod shared;
 #[cfg(target_arch = "avr")]
 pub mod time;
 pub mod timers;
 
+pub use baton::Baton;
 pub use event::{Event, Waiter};
 #[cfg(target_arch = "avr")]
 pub use executor::Executor;
 pub use level::{Ceiling, Interrupt, Thread};
+pub use shared::{InterruptEnd, Place, Shared};
 
 /// Does something of a few cycles with interrupts off. Any level. Cost: 3 cycles.
 ///

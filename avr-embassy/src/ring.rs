@@ -187,12 +187,18 @@ impl<T: Copy, const N: usize> Producer<T, N> {
     /// To make a value in its place saves the CPU a copy.
     #[inline(always)]
     pub fn slot(&mut self, value: T) -> Option<Slot<'_, T, N>> {
+        self.slot_with(|| value)
+    }
+
+    /// As [`Producer::slot`], with what `make` makes. It is not called if the ring is full.
+    #[inline(always)]
+    pub fn slot_with(&mut self, make: impl FnOnce() -> T) -> Option<Slot<'_, T, N>> {
         let after = next::<N>(self.0.head.get());
         if after == self.0.tail.get() {
             return None;
         }
         // SAFETY: the slot behind `head` is the producer's until `head` moves onto it.
-        unsafe { self.0.slot(after).write(value) };
+        unsafe { self.0.slot(after).write(make()) };
         Some(Slot { ring: self.0, after, producer: PhantomData })
     }
 
@@ -237,25 +243,28 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         self.0.head.set(head);
     }
 
-    /// The slots that a run of values goes to, as many as lie side by side: fill them from the first on, then
-    /// call [`Producer::publish`].
-    #[inline]
-    pub fn vacant(&mut self) -> &mut [MaybeUninit<T>] {
+    /// Puts a run of values in: `fill` gets the vacant slots that lie side by side, writes them from the first on, and
+    /// gives those back that it has written. The consumer sees these, all at once. How many they are.
+    #[inline(always)]
+    pub fn fill(
+        &mut self,
+        fill: impl for<'a> FnOnce(&'a mut [MaybeUninit<T>]) -> &'a mut [T],
+    ) -> u8 {
         let start = next::<N>(self.0.head.get());
         let len = self.free().min(N - usize::from(start));
+        let slots = self.0.slot(start);
         // SAFETY: the slots behind `head` are the producer's, as many as are free, and these do not
         // go beyond the end; `MaybeUninit` may lie there whatever was written.
-        unsafe { core::slice::from_raw_parts_mut(self.0.slot(start).cast(), len) }
-    }
-
-    /// Shows the consumer the first `count` of the slots that [`Producer::vacant`] gave.
-    ///
-    /// # Safety
-    /// They have been filled.
-    #[inline]
-    pub unsafe fn publish(&mut self, count: u8) {
-        let head = usize::from(self.0.head.get()) + usize::from(count);
+        let vacant = unsafe { core::slice::from_raw_parts_mut(slots.cast(), len) };
+        let filled = fill(vacant);
+        // Values that lie elsewhere have filled no slot.
+        if filled.as_ptr() != slots.cast_const() {
+            return 0;
+        }
+        let count = filled.len();
+        let head = usize::from(self.0.head.get()) + count;
         self.0.head.set(if head >= N { head - N } else { head } as u8);
+        count as u8
     }
 
     /// Changes a value pushed earlier; `back` 0 is the newest. False if it has been released.
@@ -438,8 +447,8 @@ mod tests {
         c.release();
         p.push(4).expect("room");
         assert_eq!((p.pushed(0), p.pushed(2), p.pushed(3)), (Some(&4), Some(&2), None));
-        assert!(p.amend(&Ceiling(()), 1, |v| *v = 30));
-        assert!(!p.amend(&Ceiling(()), 3, |v| *v = 0));
+        assert!(p.amend(&Ceiling::new(), 1, |v| *v = 30));
+        assert!(!p.amend(&Ceiling::new(), 3, |v| *v = 0));
         let got: Vec<u16> = core::iter::from_fn(|| c.pop()).collect();
         assert_eq!(got, [2, 30, 4]);
     }
@@ -483,20 +492,26 @@ mod tests {
         let (mut p, mut c) = ring.split().unwrap();
         let (mut next, mut taken) = (0.., Vec::new());
         for round in 0..50u8 {
-            let slots = p.vacant();
-            let count = slots.len().min(usize::from(round % 5));
-            slots.iter_mut().zip(&mut next).take(count).for_each(|(slot, value)| {
-                slot.write(value);
+            let most = p.free().min(round.into());
+            let count = p.fill(|slots| {
+                let count = slots.len().min(usize::from(round % 5));
+                let values: Vec<u16> = next.by_ref().take(count).collect();
+                slots[..count].write_copy_of_slice(&values)
             });
-            // SAFETY: as many have been written.
-            unsafe { p.publish(count as u8) };
-            assert!(p.free() == 0 || !p.vacant().is_empty());
+            assert!(usize::from(count) <= most && (round % 5 == 0 || most == 0 || count > 0));
             if round % 3 != 0 {
                 taken.extend_from_slice(c.waiting());
                 c.release_many(c.waiting().len() as u8);
             }
         }
         assert!(taken.len() > 50 && taken.iter().copied().eq(0..taken.len() as u16));
+    }
+
+    #[test]
+    fn values_from_elsewhere_fill_nothing() {
+        let (mut p, c) = ring::<4>();
+        assert_eq!(p.fill(|_| Box::leak(Box::new([1, 2]))), 0);
+        assert!(c.is_empty());
     }
 
     #[test]

@@ -10,7 +10,6 @@ use avr_embassy::{Thread, Waiter};
 use super::byte::SharedByte;
 use super::imp;
 use super::serial::{PORTS, USB};
-use super::thread;
 
 /// What happened. The discriminant is the bit.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -62,13 +61,18 @@ pub fn pass_over() -> u8 {
     count
 }
 
-/// Waits until `ready` gives a value, asking again after each `event`. Thread mode only.
-pub fn wait<R>(event: Event, ready: impl FnMut() -> Option<R>) -> impl Future<Output = R> {
-    event.bit().wait(thread(), ready)
+/// Waits until `ready` gives a value, asking again after each `event`.
+pub fn wait<R>(
+    thread: Thread,
+    event: Event,
+    ready: impl FnMut() -> Option<R>,
+) -> impl Future<Output = R> {
+    event.bit().wait(thread, ready)
 }
 
 /// The same after each byte that any port has sent, for the task that waits for this one.
 pub fn wait_transmitted<R>(
+    thread: Thread,
     port: u8,
     mut ready: impl FnMut() -> Option<R>,
 ) -> impl Future<Output = R> {
@@ -76,28 +80,27 @@ pub fn wait_transmitted<R>(
         if let Some(value) = ready() {
             return Poll::Ready(value);
         }
-        wake_after_transmitted(port, cx.waker());
+        wake_after_transmitted(thread, port, cx.waker());
         Poll::Pending
     })
 }
 
-/// Has the main loop wake a task after the next `event`. Thread mode only.
-pub fn wake_after(event: Event, waker: &Waker) {
-    event.bit().wake_after(thread(), waker);
+/// Has the main loop wake a task after the next `event`.
+pub fn wake_after(thread: Thread, event: Event, waker: &Waker) {
+    event.bit().wake_after(thread, waker);
 }
 
 /// Has the main loop wake the task that waits for the transmitter of `port`, after the next byte that any port has sent.
-/// Thread mode only.
-pub fn wake_after_transmitted(port: u8, waker: &Waker) {
+pub fn wake_after_transmitted(thread: Thread, port: u8, waker: &Waker) {
     match port {
-        USB => wake_after(Event::Transmitted, waker),
-        _ => transmitted().wake_after(thread(), waker),
+        USB => wake_after(thread, Event::Transmitted, waker),
+        _ => transmitted().wake_after(thread, waker),
     }
 }
 
-/// Waits for the next `event` after the last poll of the task. Thread mode only.
-pub fn next(event: Event) -> impl Future<Output = ()> {
-    event.bit().next(thread())
+/// Waits for the next `event` after the last poll of the task.
+pub fn next(thread: Thread, event: Event) -> impl Future<Output = ()> {
+    event.bit().next(thread)
 }
 
 /// A turn of the main loop: what is too small for a task. `bits` are the events since the last.

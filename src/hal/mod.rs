@@ -5,7 +5,7 @@
 //! mocked time. Exactly one of the two is compiled, under the name [`imp`]; nothing else in Kerf
 //! knows which.
 
-pub use avr_embassy::{byte, ring};
+pub use avr_embassy::{Ceiling, Interrupt, Thread, byte, ring};
 
 #[macro_use]
 mod place;
@@ -16,15 +16,6 @@ pub mod flags;
 pub mod progmem;
 pub mod resets;
 pub mod serial;
-
-use avr_embassy::Thread;
-
-/// The token of thread mode, for functions of which the doc says that they are called there.
-#[inline(always)]
-fn thread() -> Thread {
-    // SAFETY: see above.
-    unsafe { Thread::assume() }
-}
 
 #[cfg(target_arch = "avr")]
 #[path = "avr/mod.rs"]

@@ -154,16 +154,19 @@ impl Plain {
         (index < self.len).then(|| load(self.start.wrapping_add(index.into())))
     }
 
-    /// Copies them to the beginning of `to`, as far as there is room. Returns how many that are. Cost on AVR:
-    /// 8 cycles a byte.
+    /// Copies them to the beginning of `to`, as far as there is room. Returns the part of `to` that is filled now. Cost on
+    /// AVR: 8 cycles a byte.
     #[inline(always)]
-    pub fn copy(self, to: &mut [MaybeUninit<u8>]) -> u8 {
+    pub fn copy(self, to: &mut [MaybeUninit<u8>]) -> &mut [u8] {
         let count = usize::from(self.len).min(to.len()) as u8;
-        if count > 0 {
-            // SAFETY: both have as many bytes, and there is at least one.
-            unsafe { flash::copy(self.start, to.as_mut_ptr().cast(), count) }
+        let start = to.as_mut_ptr().cast();
+        // SAFETY: both have as many bytes; these are copied if there is at least one, and then all of them are filled.
+        unsafe {
+            if count > 0 {
+                flash::copy(self.start, start, count);
+            }
+            core::slice::from_raw_parts_mut(start, count.into())
         }
-        count
     }
 
     /// What is behind the first `count` bytes.

@@ -2,6 +2,8 @@
 
 use kerf_macros::small;
 
+pub use crate::hal::imp::arithmetic::whole;
+
 /// Whether `a` is less than `b`, neither of them a NaN. Cost: 45, where a comparison of floats takes 90, or 180 where the compiler
 /// sees to NaN as well.
 #[inline(never)]
@@ -70,18 +72,6 @@ pub fn log(x: f32) -> i32 {
 
 /// A factor of two.
 pub const OCTAVE: i32 = 1 << 23;
-
-/// A number rounded down; one of 2^31 or more, or below 0, is 2^31. Cost: 120, where `as` takes 260.
-#[inline(never)]
-pub fn whole(x: f32) -> u32 {
-    const END: u32 = 2_147_483_648.0f32.to_bits();
-    // Bits of negative numbers are above those of all others.
-    if x.to_bits() >= END {
-        return 1 << 31;
-    }
-    // SAFETY: from 0 to below 2^31, as its bits tell; not a NaN.
-    unsafe { x.to_int_unchecked() }
-}
 
 /// The cube root of a positive number that is neither tiny nor huge. Cost: 2,700.
 #[inline(never)]

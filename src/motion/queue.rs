@@ -4,8 +4,7 @@
 //! The planner changes the horizon under the ceiling lock only, exec at any time. When the ring is
 //! full the planner waits ([`BlockQueue::free`]).
 
-use core::cell::UnsafeCell;
-use core::mem::MaybeUninit;
+use avr_embassy::{InterruptEnd, Shared};
 
 use super::block::{Block, Body, Line};
 use super::factors::Factors;
@@ -15,6 +14,7 @@ use super::short::Short;
 pub use super::source::{Anchor, BlockSource};
 use crate::hal::imp::exec;
 use crate::hal::ring::{Ceiling, Producer, Ring};
+use crate::hal::{Interrupt, Thread};
 use crate::math::sqrt;
 
 /// Blocks the planner can queue, plus one slot that stays empty. At most 128: sequence numbers have
@@ -42,43 +42,50 @@ const FINE: i32 = 9 * OCTAVE;
 /// The storage.
 pub struct BlockStore {
     ring: Ring<Block, BLOCKS>,
-    pub(super) horizon: UnsafeCell<Horizon>,
+    horizon: Shared<Horizon>,
 }
-
-// SAFETY: the ends of the ring are safe to share; the horizon belongs to exec, and to whoever keeps exec
-// from running (`with_horizon`).
-unsafe impl Sync for BlockStore {}
 
 impl BlockStore {
     /// Without blocks.
     pub const fn new() -> Self {
-        Self { ring: Ring::new(), horizon: UnsafeCell::new(Horizon::new()) }
+        Self { ring: Ring::new(), horizon: Shared::new(Horizon::new()) }
     }
 
-    /// The planner's end and exec's. `None` after the first time.
-    pub fn split(&'static self) -> Option<(BlockQueue, BlockSource)> {
-        let (producer, consumer) = self.ring.split()?;
-        // SAFETY: these are the only ends, and nobody else has one yet.
-        unsafe { &mut *self.horizon.get() }.begin();
-        let queue = BlockQueue {
-            ring: producer,
-            store: self,
+    /// The planner's end. `None` after the first time.
+    pub fn queue(&'static self, thread: Thread) -> Option<BlockQueue> {
+        let ring = self.ring.producer()?;
+        exec::lock(thread, |ceiling| self.horizon.with(ceiling, Horizon::begin));
+        Some(BlockQueue {
+            thread,
+            ring,
+            horizon: &self.horizon,
             newest: SEQ,
             last: None,
             factors: Factors::ONE,
-        };
-        Some((queue, BlockSource::new(consumer, self)))
+        })
+    }
+
+    /// Exec's end. `None` after the first time.
+    ///
+    /// Thread mode cannot have it, nor be given it:
+    ///
+    /// ```compile_fail,E0308
+    /// fn steal(thread: kerf::hal::Thread) {
+    ///     kerf::motion::queue::store().source(thread);
+    /// }
+    /// ```
+    ///
+    /// ```compile_fail,E0277
+    /// fn is_send<T: Send>() {}
+    /// is_send::<kerf::motion::queue::BlockSource>();
+    /// ```
+    pub fn source(&'static self, level: Interrupt) -> Option<BlockSource> {
+        Some(BlockSource::new(self.ring.consumer()?, InterruptEnd::of(&self.horizon, level)?))
     }
 
     /// These overrides are wanted: in force at once, but for what is more than the keys are for.
     pub fn want(&self, factors: Factors, ceiling: &Ceiling) {
-        self.with_horizon(ceiling, |horizon| horizon.want(factors));
-    }
-
-    pub(super) fn with_horizon<R>(&self, _: &Ceiling, change: impl FnOnce(&mut Horizon) -> R) -> R {
-        // SAFETY: the witness says that exec does not run; thread mode comes here from the planner only,
-        // and `change` does not come back here.
-        change(unsafe { &mut *self.horizon.get() })
+        self.horizon.with(ceiling, |horizon| horizon.want(factors));
     }
 }
 
@@ -130,8 +137,9 @@ impl Last {
 
 /// The planner's end.
 pub struct BlockQueue {
+    pub(super) thread: Thread,
     pub(super) ring: Producer<Block, BLOCKS>,
-    pub(super) store: &'static BlockStore,
+    pub(super) horizon: &'static Shared<Horizon>,
     /// Sequence number of the block pushed last.
     pub(super) newest: u8,
     /// The line that the next one may follow without a stop.
@@ -155,18 +163,12 @@ impl BlockQueue {
     /// no room.
     pub fn push(&mut self, block: Block) -> bool {
         self.last = None;
-        let fill = |slot: &mut MaybeUninit<Block>| {
-            slot.write(block);
-        };
-        self.put(fill, None, |_| {})
+        self.put(|| block, None, |_| {})
     }
 
     /// Queues a block at which the machine does not stop. False, and nothing done, when there is no room.
     pub fn push_aside(&mut self, block: Block) -> bool {
-        let fill = |slot: &mut MaybeUninit<Block>| {
-            slot.write(block);
-        };
-        self.put(fill, None, |_| {})
+        self.put(|| block, None, |_| {})
     }
 
     /// Queues a move whose corner may be taken at `entry`, mm/s; fills in what depends on the queue. False,
@@ -185,16 +187,14 @@ impl BlockQueue {
         let key =
             if self.goes_on(line, cruise, entry) { None } else { self.corner(line, cruise, entry) };
         let end = line.start + line.gain();
-        let fill = |slot: &mut MaybeUninit<Block>| {
-            slot.write(Block::new(Body::Line(*line), number));
-        };
+        let make = || Block::new(Body::Line(*line), number);
         let entry = Short::new(least(line.entry.get(), cruise));
-        self.put(fill, key.map(|(key, firm)| (key, firm, entry)), |horizon| horizon.end = end)
+        self.put(make, key.map(|(key, firm)| (key, firm, entry)), |horizon| horizon.end = end)
     }
 
     /// Potential at the end of the queue.
     fn end(&self) -> f32 {
-        exec::lock(|ceiling| self.store.with_horizon(ceiling, |horizon| horizon.end))
+        exec::lock(self.thread, |ceiling| self.horizon.with(ceiling, |horizon| horizon.end))
     }
 
     /// Whether the line is as fast as the one before, and the corner between them no limit.
@@ -262,10 +262,10 @@ impl BlockQueue {
             return end;
         }
         if below(COARSE * line.cruise * line.cruise, end) {
-            exec::lock(|ceiling| {
+            exec::lock(self.thread, |ceiling| {
                 let next = self.newest.wrapping_add(1) & SEQ;
                 let used = self.ring.used();
-                self.store.with_horizon(ceiling, |horizon| {
+                self.horizon.with(ceiling, |horizon| {
                     horizon.count_anew(next);
                     if used == 0 {
                         horizon.oldest_is(next);
@@ -276,19 +276,21 @@ impl BlockQueue {
         self.end()
     }
 
-    /// Puts a block, which `fill` writes, into the ring and what follows from it into the horizon, all at once for exec.
+    /// Puts a block, which `make` makes, into the ring and what follows from it into the horizon, all at once for exec.
     fn put(
         &mut self,
-        fill: impl FnOnce(&mut MaybeUninit<Block>),
+        make: impl FnOnce() -> Block,
         key: Option<(f32, u8, Short)>,
-        end: impl FnOnce(&mut Horizon),
+        end: impl FnOnce(&mut Horizon) + Send,
     ) -> bool {
-        let Some(slot) = self.ring.vacant().first_mut() else { return false };
-        fill(slot);
+        if self.ring.free() == 0 {
+            return false;
+        }
         let seq = self.newest.wrapping_add(1) & SEQ;
         let needless = key.map_or(0, |(key, ..)| self.needless(key));
-        exec::lock(|ceiling| {
-            self.store.with_horizon(ceiling, |horizon| {
+        let Some(slot) = self.ring.slot_with(make) else { return false };
+        exec::lock(self.thread, |ceiling| {
+            self.horizon.with(ceiling, |horizon| {
                 if let Some((_, firm, entry)) = key {
                     horizon.drop_last(needless);
                     horizon.add(seq | firm, entry);
@@ -296,8 +298,7 @@ impl BlockQueue {
                 end(horizon);
                 horizon.version = horizon.version.wrapping_add(1);
             });
-            // SAFETY: the first vacant slot has been filled.
-            unsafe { self.ring.publish(1) };
+            slot.publish();
         });
         self.newest = seq;
         true
@@ -307,13 +308,14 @@ impl BlockQueue {
     /// must not wait for the mathematics of a whole queue.
     #[inline(never)]
     fn needless(&self, key: f32) -> u8 {
+        let newest = self.newest;
+        let next = newest.wrapping_add(1) & SEQ;
         let mut count = 0;
         loop {
-            let next = self.newest.wrapping_add(1) & SEQ;
-            let last = exec::lock(|ceiling| {
-                self.store.with_horizon(ceiling, |horizon| {
+            let last = exec::lock(self.thread, |ceiling| {
+                self.horizon.with(ceiling, move |horizon| {
                     let seq = horizon.nth_last(count)?;
-                    Some((seq, horizon.older(next).of(self.newest.wrapping_sub(seq) & SEQ)))
+                    Some((seq, horizon.older(next).of(newest.wrapping_sub(seq) & SEQ)))
                 })
             });
             let needless = |(last, more)| last & FIRM == 0 && self.key(last) - more >= key;

@@ -108,7 +108,7 @@ impl Known {
 impl BlockQueue {
     /// The overrides that are wanted, if the keys are for others. Cost: 60.
     pub fn wanted(&self) -> Option<Factors> {
-        let wanted = exec::lock(|ceiling| self.store.with_horizon(ceiling, |h| h.wanted));
+        let wanted = exec::lock(self.thread, |ceiling| self.horizon.with(ceiling, |h| h.wanted));
         (!wanted.same(&self.factors)).then_some(wanted)
     }
 
@@ -132,7 +132,8 @@ impl BlockQueue {
             Behind { key: f32::MAX, low: f32::MAX, left_out: 0.0, known: Known::default() };
         let mut last: Option<(usize, &Line)> = None;
         let next = self.newest.wrapping_add(1) & SEQ;
-        let older = exec::lock(|ceiling| self.store.with_horizon(ceiling, |h| h.older(next)));
+        let older =
+            exec::lock(self.thread, |ceiling| self.horizon.with(ceiling, |h| h.older(next)));
         for back in 0..=self.ring.used() {
             let block = self.ring.pushed(back);
             if is_aside(block) {
@@ -153,10 +154,10 @@ impl BlockQueue {
     /// Puts the keys in the place of those that there are.
     #[inline(never)]
     fn install(&self, keys: &Keys) {
-        exec::lock(|ceiling| {
-            self.store.with_horizon(ceiling, |horizon| {
-                let used = self.ring.used() as u8;
-                let oldest = self.newest.wrapping_sub(used).wrapping_add(1) & SEQ;
+        exec::lock(self.thread, |ceiling| {
+            let (used, factors) = (self.ring.used() as u8, self.factors);
+            let oldest = self.newest.wrapping_sub(used).wrapping_add(1) & SEQ;
+            self.horizon.with(ceiling, |horizon| {
                 // What has begun has no key any more, nor what has been run meanwhile.
                 let begun = horizon.nth(0).is_none_or(|first| first & SEQ != oldest);
                 horizon.replace(keys);
@@ -167,7 +168,7 @@ impl BlockQueue {
                     }
                     horizon.pass();
                 }
-                horizon.planned = self.factors;
+                horizon.planned = factors;
                 horizon.changed = true;
                 horizon.version = horizon.version.wrapping_add(1);
             });

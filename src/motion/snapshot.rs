@@ -1,6 +1,6 @@
 //! How motion stands, for whoever wants to know.
 //!
-//! Exec keeps one [`Snapshot`] up to date, and thread mode copies it (`tasks::links`). What is told to senders is a
+//! Exec keeps one [`Snapshot`] up to date, and thread mode copies it (`tasks::common`). What is told to senders is a
 //! [`Moment`] of it: 1,000 cycles while something moves. All values of a report come from the same one, for exec may
 //! run between any two.
 

@@ -6,13 +6,14 @@
 
 use core::cell::Cell;
 
+use avr_embassy::{InterruptEnd, Shared};
 use kerf_macros::small;
 
 use super::block::{Block, Body, Line};
 use super::factors::Factors;
 use super::float::lesser;
 use super::horizon::Horizon;
-use super::queue::{BLOCKS, BlockStore, FIRM, SEQ};
+use super::queue::{BLOCKS, FIRM, SEQ};
 use super::short::Short;
 use crate::hal::ring::Consumer;
 
@@ -30,7 +31,7 @@ pub struct Anchor {
 /// Exec's end.
 pub struct BlockSource {
     ring: Consumer<Block, BLOCKS>,
-    store: &'static BlockStore,
+    horizon: InterruptEnd<&'static Shared<Horizon>>,
     /// Sequence number of the oldest block.
     oldest: u8,
     /// Potential at its end, and the version of the horizon it is of.
@@ -38,9 +39,12 @@ pub struct BlockSource {
 }
 
 impl BlockSource {
-    /// Of a store whose planner's end goes elsewhere.
-    pub(super) fn new(ring: Consumer<Block, BLOCKS>, store: &'static BlockStore) -> Self {
-        Self { ring, store, oldest: 0, end: Cell::new(None) }
+    /// With the ends of a store that are exec's.
+    pub(super) fn new(
+        ring: Consumer<Block, BLOCKS>,
+        horizon: InterruptEnd<&'static Shared<Horizon>>,
+    ) -> Self {
+        Self { ring, horizon, oldest: 0, end: Cell::new(None) }
     }
 
     /// Blocks waiting, with the one that runs.
@@ -78,73 +82,74 @@ impl BlockSource {
             self.end.set(None);
             self.oldest = self.oldest.wrapping_add(1) & SEQ;
             let oldest = self.oldest;
-            self.horizon_mut().oldest_is(oldest);
+            self.horizon.with(|horizon| horizon.oldest_is(oldest));
         }
     }
 
     /// The oldest block begins: what limited its start is of the past.
     pub fn enter(&mut self) {
         let oldest = self.oldest;
-        let horizon = self.horizon_mut();
-        if horizon.nth(0).is_some_and(|seq| seq & SEQ == oldest) {
-            horizon.pass();
-        }
+        self.horizon.with(|horizon| {
+            if horizon.nth(0).is_some_and(|seq| seq & SEQ == oldest) {
+                horizon.pass();
+            }
+        });
     }
 
     /// Changes when what is ahead changes.
     pub fn version(&self) -> u8 {
-        self.horizon().version
+        self.horizon.look(|horizon| horizon.version)
     }
 
     /// What the oldest block, a line, is run at, mm/s; it changes with the version. Cost: 100.
     #[inline(always)]
     pub fn cruise(&self) -> f32 {
-        let factors = self.horizon().factors();
+        let factors = self.horizon.look(Horizon::factors);
         self.line(self.oldest, |line| line.velocity(&factors)).unwrap_or_default()
     }
 
     /// Whether other overrides were wanted when this was asked last. Cost: 15.
     #[inline(always)]
     pub fn take_changed(&mut self) -> bool {
-        core::mem::take(&mut self.horizon_mut().changed)
+        self.horizon.with(|horizon| core::mem::take(&mut horizon.changed))
     }
 
     /// These overrides are wanted: the planner hears of it if they are not those of the keys.
     pub fn want(&mut self, factors: Factors) {
-        self.horizon_mut().want(factors);
+        self.horizon.with(|horizon| horizon.want(factors));
     }
 
     /// The square of the velocity, (mm/s)^2, at which the oldest block, a line, may be left for the
     /// sake of all that follow, if there is no jerk limit. Cost: 900.
     pub fn headroom(&self) -> f32 {
-        let horizon = self.horizon();
         let end = self.queue_end();
-        let sharp_key = |line: &Line| line.sharp_key(&horizon.factors());
-        let key =
-            match horizon.nth(0).and_then(|seq| Some(self.lifted(seq, self.line(seq, sharp_key)?)))
-            {
-                // Bits tell, mostly: both are above 0.
-                Some(key) if key.to_bits() < end.to_bits() && !end.is_sign_negative() => key,
-                Some(key) => lesser(key, end),
-                None => end,
-            };
+        let first = self.horizon.look(|horizon| {
+            let seq = horizon.nth(0)?;
+            let key = self.line(seq, |line| line.sharp_key(&horizon.factors()))?;
+            Some(self.lifted(seq, key))
+        });
+        let key = match first {
+            // Bits tell, mostly: both are above 0.
+            Some(key) if key.to_bits() < end.to_bits() && !end.is_sign_negative() => key,
+            Some(key) => lesser(key, end),
+            None => end,
+        };
         key - self.end()
     }
 
     /// The first constraint ahead from the `n`th on that is slower than `velocity`, or firm; with its number. The last is the
     /// end of the queue. Cost: 450, 25 for each that is passed over, and 1,500 more the first time after a change.
     pub fn slower(&self, n: u8, velocity: Short) -> (u8, Anchor) {
-        let horizon = self.horizon();
-        let found = horizon.slower(n, velocity);
-        let Some(seq) = horizon.nth(found) else {
-            return (
-                found,
-                Anchor { velocity: Short::ZERO, ahead: self.end_of_queue(), firm: true },
-            );
-        };
-        let start = self.line(seq, |line| line.start).unwrap_or(horizon.end);
-        let (velocity, firm) = (horizon.entry(found), seq & FIRM != 0);
-        (found, Anchor { velocity, ahead: self.lifted(seq, start) - self.end(), firm })
+        self.horizon.look(|horizon| {
+            let found = horizon.slower(n, velocity);
+            let Some(seq) = horizon.nth(found) else {
+                let ahead = self.end_of_queue();
+                return (found, Anchor { velocity: Short::ZERO, ahead, firm: true });
+            };
+            let start = self.line(seq, |line| line.start).unwrap_or(horizon.end);
+            let (velocity, firm) = (horizon.entry(found), seq & FIRM != 0);
+            (found, Anchor { velocity, ahead: self.lifted(seq, start) - self.end(), firm })
+        })
     }
 
     /// Potential from the end of the oldest block to the end of the queue.
@@ -155,18 +160,22 @@ impl BlockSource {
     /// Potential at the end of the queue, counted as at the oldest block.
     fn queue_end(&self) -> f32 {
         // Behind all blocks, of which the last number is that before the oldest.
-        self.lifted(self.oldest.wrapping_sub(1), self.horizon().end)
+        self.lifted(self.oldest.wrapping_sub(1), self.horizon.look(|horizon| horizon.end))
     }
 
     /// A potential at block `seq`, counted as at the oldest one.
     #[inline(always)]
     fn lifted(&self, seq: u8, potential: f32) -> f32 {
-        if self.horizon().is_mixed() { self.lifted_anew(seq, potential) } else { potential }
+        if self.horizon.look(Horizon::is_mixed) {
+            self.lifted_anew(seq, potential)
+        } else {
+            potential
+        }
     }
 
     #[inline(never)]
     fn lifted_anew(&self, seq: u8, potential: f32) -> f32 {
-        self.horizon().lifted(potential, seq, self.oldest)
+        self.horizon.look(|horizon| horizon.lifted(potential, seq, self.oldest))
     }
 
     /// Potential at the end of the oldest block.
@@ -196,15 +205,5 @@ impl BlockSource {
             Body::Line(line) => Some(look(line)),
             _ => None,
         })?
-    }
-
-    fn horizon(&self) -> &Horizon {
-        // SAFETY: exec runs, so nobody holds the ceiling lock.
-        unsafe { &*self.store.horizon.get() }
-    }
-
-    fn horizon_mut(&mut self) -> &mut Horizon {
-        // SAFETY: as in `horizon`; the borrow of `self` keeps the others away.
-        unsafe { &mut *self.store.horizon.get() }
     }
 }

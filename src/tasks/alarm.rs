@@ -41,7 +41,7 @@ pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
         return;
     }
     hold::abandon(links);
-    spindle::stop();
+    spindle::stop(links.thread);
     links.except(reason);
 }
 

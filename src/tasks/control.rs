@@ -18,6 +18,6 @@ pub async fn run(links: &'static Links) -> ! {
         overrides::serve(links);
         overrides::tell(links);
         switches::serve(links);
-        next(Event::Realtime).await;
+        next(links.thread, Event::Realtime).await;
     }
 }

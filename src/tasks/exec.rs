@@ -6,7 +6,10 @@
 //! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`WAITING_SHORT`]), stretches become twice
 //! as long, and for a while more waits ([`PRESSED`]).
 
+use avr_embassy::InterruptEnd;
+
 use crate::boards::ACTIVE;
+use crate::hal::Interrupt;
 use crate::hal::event::{self, Event};
 use crate::hal::imp::arithmetic::product;
 use crate::hal::imp::{exec, flags, stepper};
@@ -21,6 +24,9 @@ use crate::motion::snapshot::{Program, Snapshot};
 use crate::tasks::health::{self, Sign};
 use kerf_macros::small;
 
+use crate::motors::Motors;
+use crate::spindle::Spindle;
+use crate::tasks::common::{Common, State};
 use crate::tasks::{Never, hold, links, overrides, power, spindle};
 
 /// After so many segments without a turn of thread mode they become longer, which takes less of the CPU.
@@ -33,6 +39,8 @@ const FIRST_TURN: u8 = 2;
 /// The task.
 #[allow(clippy::manual_async_fn)] // See `tasks`.
 pub fn run(
+    level: Interrupt,
+    mut common: InterruptEnd<Common>,
     blocks: BlockSource,
     segments: Producer<Segment, SEGMENTS>,
 ) -> impl Future<Output = Never> {
@@ -41,14 +49,14 @@ pub fn run(
         let mut machine = Exec::new();
         let mut runner = Runner::new(blocks, segments, &mut machine);
         loop {
-            exec::wait(|| runner.is_due().then_some(())).await;
-            match runner.turn() {
+            exec::wait(level, || runner.is_due().then_some(())).await;
+            match runner.turn(&mut common) {
                 Next::Turn => continue,
                 Next::Idle => exec::pend_when_idle(),
                 Next::Room => exec::note_idle(),
                 Next::Block => links::wait_for_block(true),
             }
-            exec_asked_again().await;
+            exec_asked_again(level).await;
             links::wait_for_block(false);
         }
     }
@@ -103,14 +111,14 @@ impl<'a> Runner<'a> {
 
     /// Does the next thing there is to do.
     #[inline(always)]
-    fn turn(&mut self) -> Next {
+    fn turn(&mut self, common: &mut InterruptEnd<Common>) -> Next {
         let queued = self.blocks.len();
         let rested = self.rests;
         if contact::is_noted() {
             contact::catch_up(&self.segments);
         }
         let standstill = !stepper::running();
-        let step = links::update(|out| self.step(standstill, out));
+        let step = common.with(|common| self.step(standstill, common));
         if self.blocks.len() != queued {
             flags::set(Event::BlockDone);
         }
@@ -124,30 +132,33 @@ impl<'a> Runner<'a> {
 
     /// The next step of the machine, and what follows from it; a segment is put into the ring.
     #[inline(always)]
-    fn step(&mut self, standstill: bool, out: &mut Snapshot) -> Step {
+    fn step(&mut self, standstill: bool, common: &mut State) -> Step {
+        let State { motion: out, overrides, motors, spindle } = common;
         let used = self.segments.used();
         self.machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
         // What has paused in a hold goes on before motion does.
         if out.outputs != spindle::on() {
-            self.machine.wait(spindle::switch(out, false), out);
+            self.machine.wait(spindle::switch(spindle, out, false), out);
         }
         if let Some(line) = self.finished.take(used) {
             out.finished = line;
         }
         let line = out.line;
-        let step = self.next_step(standstill, out);
+        let step = self.next_step(standstill, out, motors);
         if out.line != line {
             self.finished.end(line);
         }
         match step {
             Step::Segment => self.finished.queue(),
-            Step::Override(change) => overrides::change_in_stream(change, &mut self.blocks),
+            Step::Override(change) => {
+                overrides::change_in_stream(overrides, change, &mut self.blocks)
+            }
             Step::Idle if standstill => {
                 self.finished.rest();
                 out.finished = out.line;
             }
-            Step::Held => self.held(out),
-            Step::Switched => self.machine.wait(spindle::switch(out, true), out),
+            Step::Held => self.held(out, spindle),
+            Step::Switched => self.machine.wait(spindle::switch(spindle, out, true), out),
             Step::Again | Step::Idle | Step::Standstill => {}
         }
         // A standstill stays one until a segment leads out of it; velocity is ahead of the segments.
@@ -156,7 +167,7 @@ impl<'a> Runner<'a> {
     }
 
     #[inline(always)]
-    fn next_step(&mut self, standstill: bool, out: &mut Snapshot) -> Step {
+    fn next_step(&mut self, standstill: bool, out: &mut Snapshot, motors: &mut Motors) -> Step {
         if stepper::is_stopped() {
             return Step::Held;
         }
@@ -166,7 +177,7 @@ impl<'a> Runner<'a> {
         };
         let step = self.machine.step(&mut self.blocks, standstill, out, &mut slot);
         if step == Step::Segment {
-            power::segment(slot.moving);
+            power::segment(motors, slot.moving);
             self.waiting.push(product(slot.ticks, slot.period));
             if contact::is_noted() {
                 contact::pushed(&slot);
@@ -179,8 +190,8 @@ impl<'a> Runner<'a> {
     /// The machine stands still in a hold. Drops what is queued if that is wanted.
     #[inline(never)]
     #[small]
-    fn held(&mut self, out: &mut Snapshot) {
-        spindle::switch(out, false);
+    fn held(&mut self, out: &mut Snapshot, spindle: &Spindle) {
+        spindle::switch(spindle, out, false);
         machine::drop_if_wanted(|| {
             // What has paused stays off.
             out.outputs = spindle::on();
@@ -347,7 +358,7 @@ impl Waiting {
 }
 
 /// Waits for the next time exec is pended.
-fn exec_asked_again() -> impl Future<Output = ()> {
+fn exec_asked_again(level: Interrupt) -> impl Future<Output = ()> {
     let mut asked = false;
-    exec::wait(move || core::mem::replace(&mut asked, true).then_some(()))
+    exec::wait(level, move || core::mem::replace(&mut asked, true).then_some(()))
 }

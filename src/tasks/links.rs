@@ -29,7 +29,7 @@
 //! All but the interrupt rings belong to thread-mode tasks of one executor, which take turns: plain
 //! `RefCell`s, never borrowed across an `.await`.
 
-use core::cell::{Cell, RefCell, UnsafeCell};
+use core::cell::{Cell, RefCell};
 
 use super::ports::Port;
 use super::storage::Storage;
@@ -37,16 +37,18 @@ use super::wake::{News, Wake};
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
+use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
 use crate::hal::serial::PORTS;
 use crate::jobs::Job;
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue;
-use crate::motion::snapshot::Snapshot;
 use crate::protocol::StatusReport;
 
 /// The links. One for the machine, made at start-up.
 pub struct Links {
+    /// All of this is thread mode's.
+    pub thread: Thread,
     /// The serial ports.
     pub ports: [Port; PORTS],
     /// The number of the port that feeds the machine.
@@ -158,28 +160,6 @@ impl QueueCount {
         let removed = self.added.get().wrapping_sub(queue::used() as u16);
         removed.wrapping_sub(self.told_removed.replace(removed)).into()
     }
-}
-
-/// What exec tells the others: written at level 2, read under the ceiling.
-pub struct Published(UnsafeCell<Snapshot>);
-
-// SAFETY: exec writes it, and thread mode reads it while exec is locked out.
-unsafe impl Sync for Published {}
-
-machine_static! {
-    fn published() -> Published = Published(UnsafeCell::new(Snapshot::new()));
-}
-
-/// Changes how motion stands. Exec only, and not from within `change`.
-pub fn update<R>(change: impl FnOnce(&mut Snapshot) -> R) -> R {
-    // SAFETY: the only writer; readers keep it from running.
-    change(unsafe { &mut *published().0.get() })
-}
-
-/// How motion stands. Thread mode only.
-pub fn snapshot() -> Snapshot {
-    // SAFETY: the writer does not run under the lock.
-    crate::hal::imp::exec::lock(|_| unsafe { *published().0.get() })
 }
 
 machine_static! {

@@ -5,6 +5,7 @@
 //! a function that returns an async block instead, which keeps what it uses.
 
 pub mod alarm;
+pub mod common;
 pub mod control;
 pub mod exec;
 pub mod health;

@@ -1,58 +1,46 @@
 //! The overrides in force: one state for all who change it, and all who go by it.
 //!
-//! Changed by requests and real-time characters ([`change`], thread mode), and by M48 to M51 and the end of a
+//! Changed by requests and real-time characters ([`change`]), and by M48 to M51 and the end of a
 //! program when exec comes to them ([`change_in_stream`]). Exec goes by the factors from its next stretch on: what is
 //! queued takes 9 ms at most. A factor that rises waits for the planner (`motion::replan`), which the
 //! control task wakes: [`Event::Realtime`]. Nothing here waits, and nothing can be full.
 //!
 //! [`tell`] passes the factor of the spindle's speed on to those who drive it.
 
-use core::cell::UnsafeCell;
-
+use super::common::{self, Common};
 use super::jog;
 use super::links::Links;
 use super::spindle;
 use crate::gcode::overrides::{Change, FULL, LEAST, Override, Overrides};
+use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::imp::{exec, flags, uart};
 use crate::motion::factors::Factors;
 use crate::motion::queue::{self, BlockSource};
 use crate::realtime::{Asked, NO_JOG, TRAVERSE};
 
-/// The state: exec's, and thread mode's while exec is locked out.
-struct Shared(UnsafeCell<Overrides>);
-
-// SAFETY: exec changes it, and thread mode does while exec cannot run.
-unsafe impl Sync for Shared {}
-
-machine_static! {
-    fn shared() -> Shared = Shared(UnsafeCell::new(Overrides::NONE));
+/// The overrides as they are.
+#[small]
+pub fn now(thread: Thread) -> Overrides {
+    common::with(thread, |common| common.overrides)
 }
 
-/// The overrides as they are. Thread mode only.
+/// Changes them at once.
 #[small]
-pub fn now() -> Overrides {
-    // SAFETY: exec does not run under the lock.
-    exec::lock(|_| unsafe { *shared().0.get() })
-}
-
-/// Changes them at once. Thread mode only.
-#[small]
-pub fn change(change: Change) {
-    exec::lock(|ceiling| {
-        // SAFETY: exec does not run under the lock.
-        let overrides = unsafe { &mut *shared().0.get() };
-        overrides.change(change);
-        queue::store().want(factors(overrides), ceiling);
+pub fn change(thread: Thread, change: Change) {
+    exec::lock(thread, |ceiling| {
+        let factors = Common.with(ceiling, |common| {
+            common.overrides.change(change);
+            factors(&common.overrides)
+        });
+        queue::store().want(factors, ceiling);
     });
     flags::set(Event::Realtime);
 }
 
 /// The moves behind which the change stands have been prepared. Exec only.
 #[small]
-pub fn change_in_stream(change: Change, blocks: &mut BlockSource) {
-    // SAFETY: exec runs, so nobody holds the lock.
-    let overrides = unsafe { &mut *shared().0.get() };
+pub fn change_in_stream(overrides: &mut Overrides, change: Change, blocks: &mut BlockSource) {
     overrides.change(change);
     blocks.want(factors(overrides));
     flags::set(Event::Realtime);
@@ -71,7 +59,7 @@ pub fn serve(links: &Links) {
             jog::end(links);
         }
         for (n, which) in [(0, Override::Feed), (1, Override::Spindle)] {
-            step(which, asked.percent[n], asked.fixed & 1 << n != 0);
+            step(links.thread, which, asked.percent[n], asked.fixed & 1 << n != 0);
         }
         let traverse = match (asked.fixed & TRAVERSE) >> 2 {
             0 => continue,
@@ -79,27 +67,27 @@ pub fn serve(links: &Links) {
             2 => FULL / 2,
             _ => FULL / 4,
         };
-        change(Change::to(Override::Traverse, traverse));
+        change(links.thread, Change::to(Override::Traverse, traverse));
     }
 }
 
 /// So many percent more, or less; from 100 % if `anew`.
 #[small]
-fn step(which: Override, percent: i8, anew: bool) {
+fn step(thread: Thread, which: Override, percent: i8, anew: bool) {
     if percent == 0 && !anew {
         return;
     }
-    let before = if anew { FULL } else { now().factor(which) };
+    let before = if anew { FULL } else { now(thread).factor(which) };
     // One that has been set lower is not raised by asking for less.
     let least = LEAST.min(before).cast_signed();
     let factor = (before.cast_signed() + 10 * i16::from(percent)).max(least);
-    change(Change::to(which, factor.cast_unsigned().min(which.most())));
+    change(thread, Change::to(which, factor.cast_unsigned().min(which.most())));
 }
 
 /// Tells the others that they may have changed. Control only.
 #[small]
 pub fn tell(links: &Links) {
-    spindle::follow(now().in_force(Override::Spindle));
+    spindle::follow(links.thread, now(links.thread).in_force(Override::Spindle));
     links.planner_wake.signal();
     flags::set(Event::BlockDone);
     links.reporter_wake.signal();

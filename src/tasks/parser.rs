@@ -248,7 +248,7 @@ impl Parser {
                 };
                 if ticks {
                     ready |= waited;
-                    wake_after(Event::Tick, cx.waker());
+                    wake_after(links.thread, Event::Tick, cx.waker());
                 }
                 let has_room = match session {
                     Session::Answer(Answer { waits: true, .. }) => None,
@@ -261,7 +261,7 @@ impl Parser {
                 };
                 match has_room {
                     Some(true) => ready = true,
-                    Some(false) => wake_after_transmitted(port.number, cx.waker()),
+                    Some(false) => wake_after_transmitted(links.thread, port.number, cx.waker()),
                     None => {}
                 }
             }

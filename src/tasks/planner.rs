@@ -17,6 +17,7 @@ use embassy_futures::select::select;
 use parts::{ArcWalk, Parts};
 
 use super::Never;
+use super::common;
 use super::links::{self, Changes, Links};
 use super::parser;
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
@@ -132,7 +133,7 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
             }
             links.commands_taken.set(false);
             if planner.is_flushed() {
-                seek::drop_blocks().await;
+                seek::drop_blocks(links.thread).await;
                 if planner.restart() {
                     parser::end_program(links);
                 }
@@ -392,7 +393,7 @@ impl Planner {
     }
 
     fn room(&mut self) -> impl Future<Output = ()> {
-        wait(Event::BlockDone, || {
+        wait(self.links.thread, Event::BlockDone, || {
             self.replan();
             (self.queue.free() > 0 || self.is_flushed()).then_some(())
         })
@@ -400,7 +401,10 @@ impl Planner {
 
     /// Waits until the machine has come to the stop, and then for the next cycle start.
     async fn cycle_start(&self) {
-        wait(Event::BlockDone, || (queue::used() == 0 || self.is_flushed()).then_some(())).await;
+        wait(self.links.thread, Event::BlockDone, || {
+            (queue::used() == 0 || self.is_flushed()).then_some(())
+        })
+        .await;
         if self.is_flushed() {
             return;
         }
@@ -421,7 +425,7 @@ impl Planner {
     #[small]
     fn restart(&mut self) -> bool {
         let links = self.links;
-        let motion = links::snapshot();
+        let motion = common::snapshot(links.thread);
         self.relocate(&motion);
         self.news = News::None;
         let mut model = links.model.borrow_mut();

@@ -64,12 +64,12 @@ pub fn run(
             match left.max(aux_left) {
                 Left::Nothing => {
                     jog::passed(links);
-                    next(Event::Received).await;
+                    next(links.thread, Event::Received).await;
                 }
                 Left::Bytes | Left::Placed(_) | Left::Aside => yield_now().await,
                 Left::Full => {
                     // The ring goes on filling.
-                    select(links.pool_space.wait(), next(Event::Received)).await;
+                    select(links.pool_space.wait(), next(links.thread, Event::Received)).await;
                 }
             }
         }

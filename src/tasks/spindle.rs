@@ -6,25 +6,17 @@
 //! and are on again before motion goes on. Thread mode tells what settings ([`set`]) and the override ([`follow`])
 //! have changed; it is in force at once. Cost of a change: 4,000 cycles.
 
-use core::cell::UnsafeCell;
-
-use super::links::{snapshot, update};
+use super::common;
 use super::storage::Storage;
 use crate::config::Setting;
+use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
 use crate::hal::imp::{exec, gpio, pwm, stepper};
 use crate::machine;
 use crate::motion::snapshot::Snapshot;
 use crate::spindle::{Changed, Spindle};
 
-/// The state: exec's, and thread mode's while exec is locked out.
-struct Shared(UnsafeCell<Spindle>);
-
-// SAFETY: exec reads it, and thread mode changes it while exec cannot run.
-unsafe impl Sync for Shared {}
-
 machine_static! {
-    fn shared() -> Shared = Shared(UnsafeCell::new(Spindle::new()));
     // What is on. Exec writes it.
     fn now_on() -> SharedByte = SharedByte::new(0);
 }
@@ -36,12 +28,10 @@ pub fn on() -> u8 {
 }
 
 /// Switches the outputs as they are to be now; how long motion has to wait for that, ms. `changed` says that S may
-/// be another. Exec only.
+/// be another. Exec, or who locks it out.
 #[inline(never)]
 #[small]
-pub fn switch(out: &Snapshot, changed: bool) -> u16 {
-    // SAFETY: exec runs, or cannot, and nobody else changes it.
-    let spindle = unsafe { &*shared().0.get() };
+pub fn switch(spindle: &Spindle, out: &Snapshot, changed: bool) -> u16 {
     let before = on();
     // A probe that has made contact holds as well.
     let wanted = match out.held && machine::is_held() {
@@ -59,61 +49,58 @@ pub fn switch(out: &Snapshot, changed: bool) -> u16 {
     spindle.spin_up(before, wanted)
 }
 
-/// An alarm has begun: the outputs go off. Thread mode only.
+/// An alarm has begun: the outputs go off.
 #[small]
-pub fn stop() {
-    // Exec, which alone may do so, cannot run.
-    exec::lock(|_| update(|out| switch(out, true)));
+pub fn stop(thread: Thread) {
+    common::with(thread, |common| switch(&common.spindle, &common.motion, true));
 }
 
-/// Takes over all settings that concern the outputs, and then tells these. Thread mode, or before interrupts are on.
+/// Takes over all settings that concern the outputs, and then tells these.
 #[small]
 #[inline(never)]
-pub fn set_all(storage: &Storage) {
+pub fn set_all(thread: Thread, storage: &Storage) {
     let settings = (Setting::WARM..Setting::COLD).filter_map(Setting::from_number);
     for setting in settings.filter(|setting| !setting.is_data()) {
         let value = storage.cold(setting);
-        with(|spindle| match spindle.set(setting, value) {
+        with(thread, |spindle| match spindle.set(setting, value) {
             Changed::Frequency(millihertz) => pwm::set_frequency(millihertz),
             Changed::Outputs | Changed::Nothing => {}
         });
     }
-    tell();
+    tell(thread);
 }
 
-/// Takes over the value of a setting, if it concerns the outputs. Thread mode only.
+/// Takes over the value of a setting, if it concerns the outputs.
 #[small]
 #[inline(never)]
-pub fn set(setting: Setting, value: i32) {
-    match with(|spindle| spindle.set(setting, value)) {
+pub fn set(thread: Thread, setting: Setting, value: i32) {
+    match with(thread, |spindle| spindle.set(setting, value)) {
         Changed::Nothing => return,
         Changed::Outputs => {}
-        Changed::Frequency(millihertz) => exec::lock(|_| pwm::set_frequency(millihertz)),
+        Changed::Frequency(millihertz) => exec::lock(thread, |_| pwm::set_frequency(millihertz)),
     }
-    tell();
+    tell(thread);
 }
 
-/// Multiplies S by so many thousandths from now on. Thread mode only.
+/// Multiplies S by so many thousandths from now on.
 #[small]
-pub fn follow(thousandths: u16) {
-    if with(|spindle| spindle.set_factor(thousandths)) {
-        tell();
+pub fn follow(thread: Thread, thousandths: u16) {
+    if with(thread, |spindle| spindle.set_factor(thousandths)) {
+        tell(thread);
     }
 }
 
 /// Changes the state while exec cannot run.
 #[small]
-fn with<R>(what: impl FnOnce(&mut Spindle) -> R) -> R {
-    // SAFETY: exec cannot run, and `what` calls nothing of this module.
-    exec::lock(|_| what(unsafe { &mut *shared().0.get() }))
+fn with<R>(thread: Thread, what: impl FnOnce(&mut Spindle) -> R + Send) -> R {
+    common::with(thread, |common| what(&mut common.spindle))
 }
 
 /// Tells the outputs what they are to be by now.
 #[small]
-fn tell() {
-    let speed = snapshot().speed;
-    with(|spindle| {
-        pwm::set_share(spindle.share(on(), speed));
-        gpio::set_low(spindle.low(), on());
+fn tell(thread: Thread) {
+    common::with(thread, |common| {
+        pwm::set_share(common.spindle.share(on(), common.motion.speed));
+        gpio::set_low(common.spindle.low(), on());
     });
 }

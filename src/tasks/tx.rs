@@ -3,6 +3,7 @@
 //! Owned by whoever holds `Port::tx`, for as long as one line takes, so lines never mix. Call
 //! [`Tx::room`] before each piece of at most [`PIECE`] bytes; it waits until the transmit ring has room.
 
+use crate::hal::Thread;
 use crate::hal::event::wait_transmitted;
 use crate::hal::imp::uart;
 use crate::hal::serial::{Outgoing, TX_RING};
@@ -16,6 +17,7 @@ const TWO_BYTES_MS: u32 = 20 * 1_000;
 
 /// The transmit ring's filling end.
 pub struct Tx {
+    thread: Thread,
     ring: Outgoing,
     port: u8,
     /// Bits a second.
@@ -26,13 +28,13 @@ pub struct Tx {
 
 impl Tx {
     /// Takes over the ring of a port whose line runs at `rate` bits a second.
-    pub fn new(ring: Outgoing, port: u8, rate: u32) -> Self {
-        Self { ring, port, rate, sum: None }
+    pub fn new(thread: Thread, ring: Outgoing, port: u8, rate: u32) -> Self {
+        Self { thread, ring, port, rate, sum: None }
     }
 
     /// Waits until a piece fits.
     pub fn room(&mut self) -> impl Future<Output = ()> {
-        wait_transmitted(self.port, || self.has_room().then_some(()))
+        wait_transmitted(self.thread, self.port, || self.has_room().then_some(()))
     }
 
     /// Whether a piece fits now.
@@ -95,9 +97,7 @@ impl crate::protocol::Out for Tx {
         let mut left = bytes;
         // The ring's end may come in between; there is room beyond it.
         for _ in 0..2 {
-            let count = left.copy(self.ring.vacant());
-            // SAFETY: so many have been copied there.
-            unsafe { self.ring.publish(count) };
+            let count = self.ring.fill(|slots| left.copy(slots));
             left = left.behind(count);
             if left.is_empty() {
                 break;

@@ -9,10 +9,11 @@ use kerf_macros::small;
 use core::cell::{OnceCell, RefMut};
 
 use super::alarm;
+use super::common::snapshot;
 use super::health;
 use super::hold;
 use super::homing;
-use super::links::{Changes, Links, snapshot};
+use super::links::{Changes, Links};
 use super::overrides;
 use super::ports::Port;
 use super::power;
@@ -28,6 +29,7 @@ use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::overrides::Change;
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::gcode::tables::Row;
+use crate::hal::Thread;
 use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::{gpio, inputs as pins, stepper, uart, watchdog};
 use crate::hal::serial::{Flow, PORTS};
@@ -103,7 +105,7 @@ impl Seen {
     fn now(links: &Links) -> Self {
         // In this order: exec may take up what is queued in between.
         let queued = links.commands_taken.get() || queue::used() > 0;
-        let motion = snapshot().moment();
+        let motion = snapshot(links.thread).moment();
         Self { motion, carries_out: queued || motion.running }
     }
 }
@@ -297,7 +299,7 @@ impl Machine for View<'_> {
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
         if setting.is_cold() {
             self.links.storage.set_cold(setting, value)?;
-            spindle::set(setting, value);
+            spindle::set(self.links.thread, setting, value);
             return Ok(Warning::None);
         }
         if setting.needs_rest() {
@@ -319,7 +321,7 @@ impl Machine for View<'_> {
         let lowered = self.settings.limit_velocity(setting, rate);
         self.links.changes.note(Changes::SETTINGS);
         self.note(setting, lowered || is_machine);
-        set_hardware(&self.settings);
+        set_hardware(self.links.thread, &self.settings);
         Ok(match lowered {
             true => Warning::Velocity,
             false if self.settings.has_idle_jerk(setting) => Warning::Jerk,
@@ -336,7 +338,7 @@ impl Machine for View<'_> {
     }
 
     fn change_override(&mut self, change: Change) {
-        overrides::change(change);
+        overrides::change(self.links.thread, change);
     }
 
     #[small]
@@ -389,8 +391,8 @@ impl Machine for View<'_> {
             }
             Value::Zero => 0,
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
-            Value::Override(which) => overrides::now().factor(which).into(),
-            Value::OverrideOn(which) => overrides::now().is_on(which).into(),
+            Value::Override(which) => overrides::now(self.links.thread).factor(which).into(),
+            Value::OverrideOn(which) => overrides::now(self.links.thread).is_on(which).into(),
             Value::Tool => self.links.model.borrow().tool().into(),
             Value::Input(input) => self.input(input),
             Value::ProbeState => self.links.probe.state() as i32,
@@ -436,9 +438,9 @@ impl Machine for View<'_> {
         self.report.restore();
         self.links.changes.note(Changes::STEPS | Changes::SETTINGS);
         self.links.storage.forget_cold();
-        spindle::set_all(self.links.storage);
+        spindle::set_all(self.links.thread, self.links.storage);
         self.links.storage.note(0, ITEMS);
-        set_hardware(&self.settings);
+        set_hardware(self.links.thread, &self.settings);
         Status::Ok
     }
 
@@ -552,9 +554,9 @@ impl Machine for View<'_> {
         }
         let motors = motor.map_or(u8::MAX, |motor| 1 << motor);
         if on {
-            power::energize(motors)
+            power::energize(self.links.thread, motors)
         } else {
-            power::release(motors)
+            power::release(self.links.thread, motors)
         }
         Status::Ok
     }
@@ -566,11 +568,11 @@ pub fn queue_free() -> usize {
     queue::free().max(QUEUE_FREE_MIN)
 }
 
-/// Tells outputs and inputs what the settings say of them. Thread mode, or before interrupts are on.
+/// Tells outputs and inputs what the settings say of them.
 #[small]
-pub fn set_hardware(settings: &Settings) {
+pub fn set_hardware(thread: Thread, settings: &Settings) {
     switches::set_up(settings);
-    power::set_modes(settings);
+    power::set_modes(thread, settings);
     for port in 0..PORTS as u8 {
         uart::set_flow(port, Flow::of(port, settings.flow_control()));
     }

@@ -1,5 +1,6 @@
 //! Planner, exec and step generator without a board: moves go in, steps come out.
 
+use avr_embassy::host::Runtime;
 use kerf::boards::MOTORS;
 use kerf::config::StepRatio;
 use kerf::gcode::command::Feed;
@@ -147,7 +148,9 @@ pub struct Rig {
 impl Rig {
     pub fn new(config: Config) -> Self {
         let blocks: &'static BlockStore = Box::leak(Box::new(BlockStore::new()));
-        let (queue, source) = blocks.split().expect("first");
+        let runtime = Runtime::new();
+        let queue = blocks.queue(runtime.thread()).expect("first");
+        let source = blocks.source(runtime.interrupt()).expect("first");
         let segments: &'static Ring<Segment, SEGMENTS> = Box::leak(Box::new(Ring::new()));
         let (fill, drain) = segments.split().expect("first");
         Rig {

@@ -35,3 +35,9 @@ pub fn high_product(a: u8, b: u8) -> u8 {
 pub fn root(x: u32) -> u16 {
     x.isqrt() as u16
 }
+
+/// A number rounded down; one of 2^31 or more, or below 0, or a NaN, is 2^31.
+pub fn whole(x: f32) -> u32 {
+    // As the chip does: -0 is below 0.
+    if x.to_bits() < 2_147_483_648.0f32.to_bits() { x as u32 } else { 1 << 31 }
+}

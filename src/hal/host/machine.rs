@@ -2,6 +2,7 @@
 
 use std::vec::Vec;
 
+use avr_embassy::Thread;
 use avr_embassy::host::Runtime;
 
 use super::{clock, inputs, now, stepper, time, uart};
@@ -24,10 +25,15 @@ impl Machine {
     pub fn boot_at(baud: u32, ms: u64) -> Option<Self> {
         clock().set(ms * time::CYCLES_PER_MS);
         let runtime = Runtime::new();
-        crate::app::start(runtime.spawner(), baud)?;
+        crate::app::start(runtime.spawner(), runtime.thread(), baud)?;
         let machine = Self { runtime };
         machine.settle();
         Some(machine)
+    }
+
+    /// The token of thread mode: between two calls of this nothing else runs.
+    pub fn thread(&self) -> Thread {
+        self.runtime.thread()
     }
 
     /// The sender goes on at `baud`.

@@ -8,6 +8,7 @@ use std::vec::Vec;
 use super::{NEVER, exec, flags, now};
 use crate::baud;
 use crate::boards::ACTIVE;
+use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::hal::serial::{
@@ -46,8 +47,9 @@ impl<const N: usize> Fill for Producer<u8, N> {
 
     fn mark(&mut self, mark: u8) {
         if Producer::push(self, mark).is_err() {
-            // The reader is not running: everything here is one thread.
-            exec::lock(|ceiling| self.amend(ceiling, 0, |newest| *newest = mark));
+            // SAFETY: everything here is one thread, and neither exec nor the reader is running.
+            let thread = unsafe { Thread::assume() };
+            exec::lock(thread, |ceiling| self.amend(ceiling, 0, |newest| *newest = mark));
         }
     }
 

@@ -129,7 +129,7 @@ impl Planner {
         }
         if self.is_flushed() {
             // It may still move towards the switch.
-            drop_blocks().await;
+            drop_blocks(self.links.thread).await;
         }
         self.end_homing(&at, done.err());
     }

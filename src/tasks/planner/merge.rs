@@ -25,7 +25,7 @@ impl Planner {
 
     /// Waits until the last block runs.
     pub(super) fn nothing_follows(&self) -> impl Future<Output = ()> {
-        wait(Event::BlockDone, || self.is_last().then_some(()))
+        wait(self.links.thread, Event::BlockDone, || self.is_last().then_some(()))
     }
 
     /// Queues what has been merged if the last block runs.

@@ -40,7 +40,7 @@ impl Planner {
         // The result comes before the response to the next line. In an alarm that line, whose response may be half
         // written, may itself wait for this task.
         let told = || !self.links.probe.is_news() || self.is_flushed();
-        wait(Event::BlockDone, || told().then_some(())).await;
+        wait(self.links.thread, Event::BlockDone, || told().then_some(())).await;
     }
 
     /// Begins the move. False if the probe is there already.

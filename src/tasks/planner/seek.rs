@@ -12,6 +12,7 @@ use kerf_macros::small;
 use super::{Planner, Turn};
 use crate::boards::MOTORS;
 use crate::gcode::command::Feed;
+use crate::hal::Thread;
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::inputs;
 use crate::machine;
@@ -19,7 +20,8 @@ use crate::motion::block::{Action, Outputs};
 use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};
 use crate::motion::snapshot::Snapshot;
 use crate::motion::{contact, queue};
-use crate::tasks::links::{self, Changes};
+use crate::tasks::common;
+use crate::tasks::links::Changes;
 use crate::tasks::setup::moved_by;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
@@ -34,9 +36,9 @@ pub(super) enum Sought {
 }
 
 /// Has exec drop its blocks, as soon as it is at rest.
-pub(super) fn drop_blocks() -> impl Future<Output = ()> {
+pub(super) fn drop_blocks(thread: Thread) -> impl Future<Output = ()> {
     machine::drop_blocks();
-    wait(Event::BlockDone, || machine::has_dropped_blocks().then_some(()))
+    wait(thread, Event::BlockDone, || machine::has_dropped_blocks().then_some(()))
 }
 
 impl Planner {
@@ -45,7 +47,10 @@ impl Planner {
         self.room().await;
         // Exec does not release it before.
         self.pause(Action::Outputs(self.outputs));
-        wait(Event::BlockDone, || (queue::used() == 0 || self.is_flushed()).then_some(())).await;
+        wait(self.links.thread, Event::BlockDone, || {
+            (queue::used() == 0 || self.is_flushed()).then_some(())
+        })
+        .await;
         !self.is_flushed()
     }
 
@@ -69,17 +74,19 @@ impl Planner {
         if !self.is_over() {
             self.pause(Action::Outputs(self.outputs));
         }
-        wait(Event::BlockDone, || (queue::used() == 0 || self.is_over()).then_some(())).await;
+        wait(self.links.thread, Event::BlockDone, || {
+            (queue::used() == 0 || self.is_over()).then_some(())
+        })
+        .await;
         inputs::arm(0, 0);
         self.parts = None;
         if !contact::is_noted() || self.is_flushed() {
             contact::clear();
             return if self.is_flushed() { Sought::Flushed } else { Sought::End };
         }
-        drop_blocks().await;
-        let motion = links::snapshot();
-        let steps = contact::steps(&motion.target);
-        contact::clear();
+        drop_blocks(self.links.thread).await;
+        let motion = common::snapshot(self.links.thread);
+        let steps = contact::take(&motion.target);
         self.relocate(&motion);
         steps.map_or(Sought::End, Sought::Contact)
     }
@@ -90,7 +97,9 @@ impl Planner {
     }
 
     fn seek_room(&self) -> impl Future<Output = ()> {
-        wait(Event::BlockDone, || (self.queue.free() > 0 || self.is_over()).then_some(()))
+        wait(self.links.thread, Event::BlockDone, || {
+            (self.queue.free() > 0 || self.is_over()).then_some(())
+        })
     }
 
     /// Exec has dropped its blocks: the planner starts from where the motors are.

@@ -27,7 +27,7 @@ use crate::config::{Owner, Setting};
 use crate::status::Status;
 use crate::tasks::homing::Homing;
 use crate::tasks::setup::moved_by;
-use crate::tasks::{links, switches};
+use crate::tasks::{common, switches};
 use crate::units::{AXES, Length};
 
 /// The second motor of an axis that is squared.
@@ -101,7 +101,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     pub(super) fn level(&mut self, second: Second, from: i32) -> Length {
-        let motion = links::snapshot();
+        let motion = common::snapshot(self.links.thread);
         self.relocate(&motion);
         let m = usize::from(second.motor);
         let settings = self.links.settings.borrow();

@@ -2,7 +2,7 @@
 
 use kerf::hal::imp::{Machine, stepper};
 use kerf::motion::queue;
-use kerf::tasks::links::snapshot;
+use kerf::tasks::common::snapshot;
 
 use super::ears::Ears;
 use super::lines::{End, Lines};
@@ -118,7 +118,7 @@ impl Talk {
             let said = self.ears.answers;
             self.run(LOOK_MS, |_| false)?;
             let quiet = said == self.ears.answers && !self.ears.listening();
-            let busy = snapshot().running || queue::used() > 0;
+            let busy = snapshot(self.machine.thread()).running || queue::used() > 0;
             idle = if busy || stepper::running() || !quiet { 0 } else { idle + LOOK_MS };
             self.go_on();
             still = if busy && !stepper::running() { still + LOOK_MS } else { 0 };

@@ -1,0 +1,125 @@
+//! A value that handlers and tasks of both levels have in turn: a byte, its stage, says whose turn it is.
+//!
+//! No level waits for another, and nothing is masked. Who finds another stage than its own, or the value in use, gets
+//! `None`.
+
+use crate::byte::SharedByte;
+
+/// Somebody has the value.
+const IN_USE: u8 = u8::MAX;
+
+/// A value, and its stage: 0 at first, at most 254. What stages mean is the program's.
+///
+/// ```
+/// use avr_embassy::Baton;
+/// const FILLED: u8 = 1;
+///
+/// let baton = Baton::new(0);
+/// // A handler measures,
+/// assert_eq!(baton.pass(0, FILLED, |value| *value = 7), Some(()));
+/// // and measures no more until
+/// assert_eq!(baton.pass(0, FILLED, |value| *value = 8), None);
+/// // a task has had the value.
+/// assert_eq!(baton.pass(FILLED, 0, |value| *value), Some(7));
+/// ```
+pub struct Baton<T> {
+    stage: SharedByte,
+    value: imp::Value<T>,
+}
+
+impl<T> Baton<T> {
+    /// In stage 0.
+    pub const fn new(value: T) -> Self {
+        Self { stage: SharedByte::new(0), value: imp::Value::new(value) }
+    }
+
+    /// The stage; 255 while somebody has the value. Any level.
+    #[inline(always)]
+    pub fn stage(&self) -> u8 {
+        self.stage.get()
+    }
+
+    /// Sets the stage, whatever it was. Nothing happens while somebody has the value. Any level. Cost: 6 cycles.
+    #[inline(always)]
+    pub fn set_stage(&self, to: u8) {
+        if self.stage.get() != IN_USE {
+            self.stage.set(to);
+        }
+    }
+
+    /// Has `act` use the value if the stage is `from`; then the stage is `to`. Any level. Cost: 12 cycles and `act`.
+    #[inline(always)]
+    pub fn pass<R>(&self, from: u8, to: u8, act: impl FnOnce(&mut T) -> R) -> Option<R> {
+        if from == IN_USE || self.stage.get() != from {
+            return None;
+        }
+        // Who comes in between has gone before this goes on: levels preempt one another like calls.
+        self.stage.set(IN_USE);
+        // SAFETY: whoever has the value has set the stage to `IN_USE`, and nobody takes it in that stage.
+        let result = unsafe { self.value.with(act) };
+        self.stage.set(to);
+        Some(result)
+    }
+}
+
+#[cfg(target_arch = "avr")]
+mod imp {
+    use core::cell::UnsafeCell;
+
+    pub struct Value<T>(UnsafeCell<T>);
+
+    // SAFETY: on the only core one level at a time has it, see `with`.
+    unsafe impl<T: Send> Sync for Value<T> {}
+
+    impl<T> Value<T> {
+        pub const fn new(value: T) -> Self {
+            Self(UnsafeCell::new(value))
+        }
+
+        /// # Safety
+        /// Nobody else has the value.
+        #[inline(always)]
+        pub unsafe fn with<R>(&self, act: impl FnOnce(&mut T) -> R) -> R {
+            // SAFETY: the caller says so.
+            act(unsafe { &mut *self.0.get() })
+        }
+    }
+}
+
+#[cfg(not(target_arch = "avr"))]
+mod imp {
+    use std::sync::Mutex;
+
+    /// On the host other cores may come in between: there it is a lock.
+    pub struct Value<T>(Mutex<T>);
+
+    impl<T> Value<T> {
+        pub const fn new(value: T) -> Self {
+            Self(Mutex::new(value))
+        }
+
+        /// # Safety
+        /// None: see above.
+        pub unsafe fn with<R>(&self, act: impl FnOnce(&mut T) -> R) -> R {
+            act(&mut self.0.try_lock().expect("nobody else has the value"))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nobody_gets_what_another_has() {
+        let baton = Baton::new(1);
+        let inner = baton.pass(0, 2, |value| {
+            *value += 1;
+            let stage = baton.stage();
+            baton.set_stage(0);
+            (baton.pass(0, 1, |_| ()), baton.pass(2, 1, |_| ()), baton.pass(stage, 1, |_| ()))
+        });
+        assert_eq!(inner, Some((None, None, None)));
+        assert_eq!((baton.stage(), baton.pass(2, 0, |value| *value)), (2, Some(2)));
+    }
+}

@@ -1,0 +1,289 @@
+//! State that thread mode and interrupt mode both change: one by the ceiling lock, the other because it preempts.
+//!
+//! | end | who has it | why nobody else has the value meanwhile |
+//! |---|---|---|
+//! | [`Shared::with`] | thread mode, within [`interrupt::lock`](crate::interrupt::lock) | the lock keeps interrupt mode out |
+//! | [`InterruptEnd`] | a task of interrupt mode | thread mode goes on only when that task waits, which it cannot within a closure |
+//!
+//! Nothing is checked or counted at run time: who would come back to a value from within itself finds that it does not
+//! compile. (On the host, where a thread-local could smuggle a token, a second borrow is a panic.) A handler of a
+//! short interrupt has no end; see [`Baton`](crate::Baton).
+
+use core::marker::PhantomData;
+
+use crate::byte::SharedByte;
+use crate::{Ceiling, Interrupt};
+
+/// A value that thread mode and interrupt mode share. Its end for interrupt mode is handed out once.
+///
+/// ```
+/// use avr_embassy::{InterruptEnd, host::Runtime, interrupt};
+///
+/// avr_embassy::shared_static! {
+///     /// How often something has happened.
+///     struct Count: u32 = 0;
+/// }
+///
+/// let runtime = Runtime::new();
+/// interrupt::start(|_, level| {
+///     // This goes along with a task of interrupt mode.
+///     let mut end = InterruptEnd::of(Count, level).expect("the first time");
+///     end.with(|count| *count += 1);
+/// });
+/// let now = interrupt::lock(runtime.thread(), |ceiling| Count.with(ceiling, |count| *count));
+/// assert_eq!(now, 1);
+/// ```
+///
+/// Thread mode has no way to the value without the lock:
+///
+/// ```compile_fail,E0061
+/// # use avr_embassy::Shared;
+/// fn now(count: &Shared<u32>) -> u32 {
+///     count.with(|count| *count)
+/// }
+/// ```
+///
+/// It keeps no borrow beyond the lock:
+///
+/// ```compile_fail
+/// # use avr_embassy::{Shared, Thread, interrupt};
+/// fn now(thread: Thread, count: &Shared<u32>) -> &u32 {
+///     interrupt::lock(thread, |ceiling| count.with(ceiling, |count| &*count))
+/// }
+/// ```
+///
+/// It cannot come back to the value from within, because neither the ceiling nor its own token goes in there:
+///
+/// ```compile_fail,E0277
+/// # use avr_embassy::{Ceiling, Shared};
+/// fn twice(ceiling: &Ceiling, count: &Shared<u32>) {
+///     count.with(ceiling, |first| count.with(ceiling, |second| *first += *second));
+/// }
+/// ```
+///
+/// ```compile_fail,E0277
+/// # use avr_embassy::{Ceiling, Shared, Thread, interrupt};
+/// fn twice(thread: Thread, ceiling: &Ceiling, count: &Shared<u32>) {
+///     count.with(ceiling, |first| {
+///         interrupt::lock(thread, |again| count.with(again, |second| *first += *second))
+///     });
+/// }
+/// ```
+///
+/// It cannot have the end of interrupt mode:
+///
+/// ```compile_fail,E0308
+/// # use avr_embassy::{InterruptEnd, Shared, Thread};
+/// fn steal(thread: Thread, count: &'static Shared<u32>) {
+///     InterruptEnd::of(count, thread);
+/// }
+/// ```
+pub struct Shared<T> {
+    value: imp::Value<T>,
+    /// Whether there is an end of interrupt mode.
+    taken: SharedByte,
+}
+
+impl<T: Send> Shared<T> {
+    /// With a value.
+    pub const fn new(value: T) -> Self {
+        Self { value: imp::Value::new(value), taken: SharedByte::new(0) }
+    }
+
+    /// Has `act` use the value. Thread mode, which shows the ceiling.
+    ///
+    /// `act` is [`Send`], so that it takes along no [`Thread`](crate::Thread) and no [`Ceiling`]: it cannot come back here.
+    #[inline(always)]
+    pub fn with<R>(&self, _: &Ceiling, act: impl FnOnce(&mut T) -> R + Send) -> R {
+        // SAFETY: the ceiling says that interrupt mode cannot run. Thread mode is here once: `act`, without a token, gets no
+        // ceiling, and `T` holds none.
+        unsafe { self.value.with(act) }
+    }
+}
+
+/// Where a [`Shared`] is: a reference, or a type that [`shared_static!`](crate::shared_static!) declares, which takes no room.
+///
+/// # Safety
+/// [`Place::shared`] always returns the same (on the host: in a thread).
+pub unsafe trait Place: Copy {
+    /// What is shared.
+    type Value: Send + 'static;
+
+    /// The one.
+    fn shared(self) -> &'static Shared<Self::Value>;
+}
+
+// SAFETY: a reference is always to the same.
+unsafe impl<T: Send> Place for &'static Shared<T> {
+    type Value = T;
+
+    #[inline(always)]
+    fn shared(self) -> &'static Shared<T> {
+        self
+    }
+}
+
+/// Declares a [`Shared`] that a machine has one of, as a type that stands for it.
+#[macro_export]
+macro_rules! shared_static {
+    ($(#[$meta:meta])* $vis:vis struct $name:ident: $type:ty = $init:expr;) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy)]
+        $vis struct $name;
+
+        // SAFETY: the only one that this type stands for.
+        unsafe impl $crate::Place for $name {
+            type Value = $type;
+
+            #[inline(always)]
+            fn shared(self) -> &'static $crate::Shared<$type> {
+                $crate::machine_static! {
+                    fn value() -> $crate::Shared<$type> = $crate::Shared::new($init);
+                }
+                value()
+            }
+        }
+
+        impl $name {
+            /// Has `act` use the value, see [`Shared::with`]($crate::Shared::with).
+            #[inline(always)]
+            $vis fn with<R>(
+                self,
+                ceiling: &$crate::Ceiling,
+                act: impl FnOnce(&mut $type) -> R + Send,
+            ) -> R {
+                $crate::Place::shared(self).with(ceiling, act)
+            }
+        }
+    };
+}
+
+/// Interrupt mode's end of a [`Shared`]. It is not [`Send`]: it stays there.
+///
+/// Nothing of the value is kept while the task waits:
+///
+/// ```compile_fail
+/// # use avr_embassy::{InterruptEnd, Shared};
+/// async fn keep(mut end: InterruptEnd<&'static Shared<u32>>) {
+///     let mut kept = None;
+///     end.with(|count| kept = Some(count));
+///     drop(kept);
+/// }
+/// ```
+///
+/// A task of thread mode cannot have it:
+///
+/// ```compile_fail,E0277
+/// fn is_send<T: Send>() {}
+/// is_send::<avr_embassy::InterruptEnd<&'static avr_embassy::Shared<u32>>>();
+/// ```
+pub struct InterruptEnd<P: Place>(P, PhantomData<*mut ()>);
+
+impl<P: Place> InterruptEnd<P> {
+    /// That of what is at a place. `None` after the first time.
+    pub fn of(place: P, _: Interrupt) -> Option<Self> {
+        let taken = &place.shared().taken;
+        if taken.get() != 0 {
+            return None;
+        }
+        taken.set(1);
+        Some(Self(place, PhantomData))
+    }
+
+    /// Has `act` use the value.
+    #[inline(always)]
+    pub fn with<R>(&mut self, act: impl FnOnce(&mut P::Value) -> R) -> R {
+        // SAFETY: interrupt mode runs, for this cannot leave it; so thread mode does not, nor is it within the lock. This is
+        // the only end, and it is borrowed.
+        unsafe { self.0.shared().value.with(act) }
+    }
+
+    /// Has `act` look at the value.
+    #[inline(always)]
+    pub fn look<R>(&self, act: impl FnOnce(&P::Value) -> R) -> R {
+        // SAFETY: as in `with`; the borrow keeps that away.
+        unsafe { self.0.shared().value.look(act) }
+    }
+}
+
+#[cfg(target_arch = "avr")]
+mod imp {
+    use core::cell::UnsafeCell;
+
+    pub struct Value<T>(UnsafeCell<T>);
+
+    // SAFETY: on the only core one level at a time has it, see `with`.
+    unsafe impl<T: Send> Sync for Value<T> {}
+
+    impl<T> Value<T> {
+        pub const fn new(value: T) -> Self {
+            Self(UnsafeCell::new(value))
+        }
+
+        /// # Safety
+        /// Nobody else has the value.
+        #[inline(always)]
+        pub unsafe fn with<R>(&self, act: impl FnOnce(&mut T) -> R) -> R {
+            // SAFETY: the caller says so.
+            act(unsafe { &mut *self.0.get() })
+        }
+
+        /// # Safety
+        /// Nobody else changes the value.
+        #[inline(always)]
+        pub unsafe fn look<R>(&self, act: impl FnOnce(&T) -> R) -> R {
+            // SAFETY: the caller says so.
+            act(unsafe { &*self.0.get() })
+        }
+    }
+}
+
+#[cfg(not(target_arch = "avr"))]
+mod imp {
+    use std::sync::RwLock;
+
+    /// On the host it is a lock that nobody ever has to wait for.
+    pub struct Value<T>(RwLock<T>);
+
+    impl<T> Value<T> {
+        pub const fn new(value: T) -> Self {
+            Self(RwLock::new(value))
+        }
+
+        /// # Safety
+        /// None: see above.
+        pub unsafe fn with<R>(&self, act: impl FnOnce(&mut T) -> R) -> R {
+            act(&mut self.0.try_write().expect("nobody else has the value"))
+        }
+
+        /// # Safety
+        /// None: see above.
+        pub unsafe fn look<R>(&self, act: impl FnOnce(&T) -> R) -> R {
+            act(&self.0.try_read().expect("nobody else changes the value"))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::host::Runtime;
+    use crate::interrupt;
+    use std::boxed::Box;
+
+    #[test]
+    fn both_levels_change_the_value_and_interrupt_mode_has_one_end() {
+        let shared: &'static Shared<u8> = Box::leak(Box::new(Shared::new(1)));
+        let runtime = Runtime::new();
+        let mut end = InterruptEnd::of(shared, runtime.interrupt()).expect("the first");
+        assert!(InterruptEnd::of(shared, runtime.interrupt()).is_none());
+        end.with(|value| *value += 1);
+        let seen = interrupt::lock(runtime.thread(), |ceiling| {
+            shared.with(ceiling, |value| {
+                *value += 1;
+                *value
+            })
+        });
+        assert_eq!((seen, end.look(|value| *value)), (3, 3));
+    }
+}

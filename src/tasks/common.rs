@@ -1,0 +1,60 @@
+//! What exec and thread mode both change: how motion stands, the overrides, which motors have power, the outputs.
+//!
+//! Exec has it, by its [end](avr_embassy::InterruptEnd), while it does one step; everybody else has it [`with`] exec locked out. What is
+//! done with the parts is in `overrides`, `power` and `spindle`.
+
+use crate::gcode::overrides::Overrides;
+use crate::hal::Thread;
+use crate::hal::imp::exec;
+use crate::motion::snapshot::Snapshot;
+use crate::motors::Motors;
+use crate::spindle::Spindle;
+
+/// Which motors have power, and so on: see the module's text.
+pub struct State {
+    /// How motion stands. Exec changes it, the others read.
+    pub motion: Snapshot,
+    /// The overrides in force.
+    pub overrides: Overrides,
+    /// Which motors have power.
+    pub motors: Motors,
+    /// What settings and override say of the outputs.
+    pub spindle: Spindle,
+}
+
+avr_embassy::shared_static! {
+    /// Where it is.
+    ///
+    /// Nobody looks at it without the lock:
+    ///
+    /// ```compile_fail,E0061
+    /// use kerf::tasks::common::Common;
+    ///
+    /// let running = Common.with(|state| state.motion.running);
+    /// ```
+    ///
+    /// and thread mode does not get exec's end:
+    ///
+    /// ```compile_fail,E0308
+    /// fn steal(thread: kerf::hal::Thread) {
+    ///     avr_embassy::InterruptEnd::of(kerf::tasks::common::Common, thread);
+    /// }
+    /// ```
+    pub struct Common: State = State {
+        motion: Snapshot::new(),
+        overrides: Overrides::NONE,
+        motors: Motors::new(),
+        spindle: Spindle::new(),
+    };
+}
+
+/// Has `act` use it while exec cannot run.
+#[inline(always)]
+pub fn with<R>(thread: Thread, act: impl FnOnce(&mut State) -> R + Send) -> R {
+    exec::lock(thread, |ceiling| Common.with(ceiling, act))
+}
+
+/// How motion stands.
+pub fn snapshot(thread: Thread) -> Snapshot {
+    with(thread, |common| common.motion)
+}
