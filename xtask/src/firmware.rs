@@ -10,6 +10,7 @@ use crate::elf;
 use crate::machines::Machine;
 use crate::process::{self, root, run};
 use crate::setup::{self, Scope};
+use crate::shrink::{self, link};
 use crate::toolchain::Toolchain;
 
 /// Copies of code (`tail-dup-placement`, `rotation-max-header-size`, `jump-threading-threshold`) save no cycle here: without them the image
@@ -17,7 +18,11 @@ use crate::toolchain::Toolchain;
 /// LLVM leaves it a relocation for every branch.
 const FLAGS: &str = "-C target-cpu=atmega2560 -C llvm-args=-inline-threshold=30 -C llvm-args=-tail-dup-placement=false \
                      -C llvm-args=-rotation-max-header-size=4 -C llvm-args=-jump-threading-threshold=3 -C jump-tables=no \
-                     -C linker=avr-gcc -C link-arg=-mmcu=atmega2560 -C link-arg=-Wl,--gc-sections -C link-arg=-Wl,--relax";
+                     -C linker=target/avr/keep-gcc -C link-arg=-mmcu=atmega2560 -C link-arg=-Wl,--gc-sections -C link-arg=-Wl,--relax";
+
+/// The linker in `FLAGS`: a script that writes down how it was called. Its path does not name the checkout, for cargo would build all
+/// anew in a copy; `rustc` knows by the end of the name which options it takes.
+const LINKER: &str = "target/avr/keep-gcc";
 
 /// Where the images lie: `BOARD.elf`, or `BOARD-MACHINE.elf` if it is not for the usual machine.
 pub fn directory() -> PathBuf {
@@ -38,21 +43,35 @@ pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
     // One target directory for all boards: the dependencies are built once.
     let target = root().join("target/avr");
+    let kept = target.join("kept").join(format!("{board}-{machine}"));
+    link::write_script(&root().join(LINKER))?;
+    std::fs::create_dir_all(&kept)?;
+    let (text, linked) = (kept.join("kerf.s"), kept.join("link"));
     let mut cargo = rust.cargo();
-    cargo.current_dir(root()).env("RUSTFLAGS", FLAGS);
-    cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none"]);
-    let features = format!("board-{board},machine-{machine}");
-    cargo.args([
-        "--package",
-        "kerf",
-        "--bin",
-        "kerf",
-        "--no-default-features",
-        "--features",
-        &features,
-    ]);
-    run(cargo.arg("--target-dir").arg(&target))?;
-    keep(&target.join("avr-none/release/kerf.elf"), &image(board, machine))
+    cargo.current_dir(root()).env("RUSTFLAGS", FLAGS).env(link::KEPT, &linked);
+    cargo
+        .args(["rustc", "--release", "-Zbuild-std=core", "--target", "avr-none", "--target-dir"])
+        .arg(&target);
+    cargo.args(["--package", "kerf", "--bin", "kerf", "--no-default-features", "--features"]);
+    cargo.arg(format!("board-{board},machine-{machine}"));
+    run(cargo.args(["--", "--emit"]).arg(format!("asm={}", text.display())))?;
+    make_small(&text, &linked, &image(board, machine))
+}
+
+/// Links the program that the compiler wrote a second time, made smaller; refuses one that would not work: see [`elf`].
+///
+/// `rustc` makes a text and an object by two runs of its back end, which need not agree. So the image comes from the text, and so does
+/// the program in which defects of the compiler are looked for: shared code would hide them.
+fn make_small(text: &Path, linked: &Path, elf: &Path) -> Result<PathBuf> {
+    let program =
+        std::fs::read_to_string(text).with_context(|| format!("cannot read {}", text.display()))?;
+    let texts = shrink::shrink(&program)?;
+    let link = link::Link::read(linked)?;
+    let made = |name| text.with_file_name(name);
+    link.image(&texts.plain, &made("plain.elf"))?;
+    elf::check_compiled(&made("plain.elf"))?;
+    link.image(&texts.small, &made("small.elf"))?;
+    keep(&made("small.elf"), elf)
 }
 
 /// Copies the image to its own name and refuses one that would not work: see [`elf::check`].
@@ -67,14 +86,16 @@ fn keep(built: &Path, kept: &Path) -> Result<PathBuf> {
 pub fn build_examples() -> Result<PathBuf> {
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
     let target = root().join("target/avr");
+    link::write_script(&root().join(LINKER))?;
     let mut cargo = rust.cargo();
-    cargo.current_dir(root()).env("RUSTFLAGS", FLAGS);
+    cargo.current_dir(root()).env("RUSTFLAGS", FLAGS).env(link::KEPT, "/dev/null");
     cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none", "--package"]);
     cargo.args(["avr-embassy", "--examples", "--features", "atmega2560"]);
     run(cargo.arg("--target-dir").arg(&target))?;
     let folder = directory().join("avr-embassy");
     for name in EXAMPLES {
         let built = target.join(format!("avr-none/release/examples/{name}.elf"));
+        elf::check_compiled(&built)?;
         keep(&built, &folder.join(format!("{name}.elf")))?;
     }
     Ok(folder)

@@ -5,6 +5,7 @@
 //! | [`setup`] | finds the tools, installs what is missing |
 //! | [`toolchain`] | which Rust builds for AVR, and its environment |
 //! | [`firmware`] | builds the image of a board, flashes it |
+//! | [`shrink`] | makes the image smaller before the link |
 //! | [`elf`] | what is in an image: sizes, stack, what must not be in it |
 //! | [`size`], [`caps`] | prints and limits what an image takes |
 //! | [`sim`] | runs the image on the simulated board |
@@ -29,6 +30,7 @@ mod nist;
 mod process;
 mod senders;
 mod setup;
+mod shrink;
 mod sim;
 mod size;
 mod toolchain;

@@ -13,6 +13,7 @@ use crate::elf::{self, Image, Sizes, Symbol};
 use crate::firmware;
 use crate::machines::Machine;
 use crate::setup::{self, Scope};
+use crate::shrink::hot;
 
 /// How many rows the lists have.
 const ROWS: usize = 15;
@@ -50,6 +51,12 @@ pub fn show(elf: &Path) -> Result<()> {
     print_totals(image.sizes, &stack);
     let over = past_caps(image.sizes, stack.bytes());
     ensure!(over.is_empty(), "past the caps of xtask/src/caps.rs: {}", over.join("; "));
+    let stale = hot::stale(image.symbols.iter().map(|symbol| symbol.name.as_str()));
+    ensure!(
+        stale.is_empty(),
+        "rows of xtask/src/shrink/hot.rs that name no function: {}",
+        stale.join(", ")
+    );
     Ok(())
 }
 

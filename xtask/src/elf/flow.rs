@@ -24,6 +24,8 @@ pub struct Landmarks {
     pub ends: HashSet<u32>,
     /// libgcc's shared prologue, which is jumped into and jumps back.
     pub prologue_saves: Range<u32>,
+    /// The shared prologues of `crate::shrink`, which are called and return with more on the stack.
+    pub enters: HashSet<u32>,
 }
 
 /// Stack use of one function. All depths are from its entry, its return address excluded.
@@ -107,6 +109,9 @@ impl Walk<'_> {
 
     fn call(&mut self, at: usize, insn: &Insn, depth: u32, todo: &mut Vec<(usize, u32)>) {
         let next = self.code.get(at + 1).map(|next| next.address);
+        if let Some(target) = insn.target.filter(|target| self.marks.enters.contains(target)) {
+            return todo.push((at + 1, self.enter(at, target, depth)));
+        }
         if !self.is_reservation(at, insn)
             && let Some(target) = insn.target
         {
@@ -128,6 +133,39 @@ impl Walk<'_> {
         let inside = inside.take_while(|i| self.marks.prologue_saves.contains(&i.address));
         let pushes = inside.filter(|i| i.op == "push").count();
         Some((at + 1, depth + u32::try_from(pushes).ok()?))
+    }
+
+    /// The depth behind a shared prologue: what it pushes, and the frame whose size r26 and r27 hold.
+    fn enter(&mut self, at: usize, target: u32, depth: u32) -> u32 {
+        let mut depth = depth + RETURN_ADDRESS;
+        let mut inside = self.code.at(target);
+        while let Some(insn) = inside.and_then(|at| self.code.get(at)) {
+            depth = match (insn.op.as_str(), insn.args.first().map(String::as_str)) {
+                ("push", _) => depth + 1,
+                ("pop", _) => depth.saturating_sub(1),
+                ("out", Some(SPL)) => depth + self.frame_size(at),
+                ("ret", _) => break,
+                _ => depth,
+            };
+            self.flow.frame = self.flow.frame.max(depth);
+            let goes = insn.target.filter(|_| matches!(insn.op.as_str(), "jmp" | "rjmp"));
+            inside = goes.map_or(inside.map(|at| at + 1), |target| self.code.at(target));
+        }
+        depth.saturating_sub(RETURN_ADDRESS)
+    }
+
+    /// What is loaded for a shared prologue that is called at `at`.
+    fn frame_size(&self, at: usize) -> u32 {
+        let loaded = |at: usize, register: &str| {
+            let insn = self
+                .code
+                .get(at)
+                .filter(|i| i.op == "ldi" && i.args.first().is_some_and(|arg| arg == register));
+            insn.and_then(|insn| number(insn.args.get(1)?))
+        };
+        let high = loaded(at - 1, "r27");
+        let low = loaded(at - 1 - usize::from(high.is_some()), "r26");
+        (high.unwrap_or(0) << 8) | low.unwrap_or(BOTTOMLESS)
     }
 
     fn depth_after(&self, at: usize, insn: &Insn, depth: u32) -> u32 {
@@ -162,7 +200,7 @@ impl Walk<'_> {
                 ("adiw", true) => return -value.unwrap_or(0),
                 ("subi", true) => low_byte = low_byte.or(value),
                 ("sbci", _) if before.args[0] == high => high_byte = high_byte.or(value),
-                ("in", true) | ("ret" | "reti", _) => break,
+                ("in", true) | ("ret" | "reti" | "jmp" | "rjmp", _) => break,
                 _ => {}
             }
         }

@@ -3,6 +3,8 @@
 use super::disasm::Code;
 use super::flow::Landmarks;
 use super::{Image, RAM_BASE};
+use crate::shrink::prologue::NAME as ENTER;
+use crate::shrink::text::TAKEN;
 
 /// The interrupt handlers. Vectors without one of their own share a way to the reset.
 pub fn handlers(image: &Image) -> Vec<u32> {
@@ -18,13 +20,14 @@ fn is_number(text: &str) -> bool {
     text.parse::<u8>().is_ok()
 }
 
-/// The functions whose address is taken: the linker makes a stub for each.
+/// The functions whose address is taken. The linker makes a stub for each beyond 128 KiB; `crate::shrink` names them all.
 pub fn addresses_taken(image: &Image, code: &Code) -> Vec<u32> {
     let place = |wanted: &str| image.named(|name| name == wanted).next().map(|s| s.address);
     let stubs = place("__trampolines_start").zip(place("__trampolines_end"));
     let (start, end) = stubs.map_or((0, 0), |(start, end)| (address(start), address(end)));
     let inside = (start..end).step_by(2).filter_map(|at| code.get(code.at(at)?)?.target);
-    let mut taken: Vec<_> = inside.collect();
+    let named = image.named(|name| name.starts_with(TAKEN)).map(|s| address(s.address));
+    let mut taken: Vec<_> = inside.chain(named).collect();
     taken.sort_unstable();
     taken.dedup();
     taken
@@ -35,7 +38,8 @@ pub fn landmarks(image: &Image) -> Landmarks {
     let ends = code.map(|s| address(s.address + s.size)).collect();
     let saves = image.named(|name| name == "__prologue_saves__").next();
     let prologue_saves = saves.map_or(0..0, |s| address(s.address)..address(s.address + s.size));
-    Landmarks { ends, prologue_saves }
+    let enters = image.named(|name| name.starts_with(ENTER)).map(|s| address(s.address)).collect();
+    Landmarks { ends, prologue_saves, enters }
 }
 
 /// The name of an address; of several, that of the function with a size.
@@ -50,7 +54,9 @@ pub fn name_at(image: &Image, entry: u32) -> String {
 
 /// The function that an instruction belongs to: labels of assembler code have no size.
 pub fn function_at(image: &Image, insn: u32) -> &str {
-    let before = |s: &&super::Symbol| s.address <= u64::from(insn) && !s.is_data;
+    let before = |s: &&super::Symbol| {
+        s.address <= u64::from(insn) && !s.is_data && !s.name.starts_with(TAKEN)
+    };
     image.symbols.iter().rfind(before).map_or("code without a name", |symbol| &symbol.name)
 }
 

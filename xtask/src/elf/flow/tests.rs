@@ -65,6 +65,29 @@ fn a_shared_prologue_comes_back() {
 }
 
 #[test]
+fn a_prologue_that_is_called_leaves_more_on_the_stack() {
+    let marks = Landmarks { enters: HashSet::from([8]), ..Default::default() };
+    let calls = ["ldi\tr26, 0x05", "rcall\t.+4\t; 0x8", "push\tr2", "ret"];
+    let takes = [
+        "pop\tr0",
+        "pop\tr31",
+        "pop\tr30",
+        "push\tr28",
+        "push\tr29",
+        "in\tr26, 0x3f",
+        "out\t0x3e, r29",
+    ];
+    let rest =
+        ["out\t0x3d, r28", "rjmp\t.+2\t; 0x1c", "nop", "push\tr30", "push\tr31", "push\tr0", "ret"];
+    let flow = follow(&code(&[&calls[..], &takes, &rest].concat()), 0, &marks);
+    // Two registers, a frame of five and the return address; behind that no deeper.
+    assert_eq!(flow.frame, 2 + 5 + 3);
+    assert!(flow.calls.is_empty());
+    let two = ["ldi\tr26, 0x2c", "ldi\tr27, 0x01", "rcall\t.+2\t; 0x8", "ret"];
+    assert_eq!(follow(&code(&[&two[..], &takes, &rest].concat()), 0, &marks).frame, 2 + 300 + 3);
+}
+
+#[test]
 fn a_loop_that_pushes_is_noticed() {
     let flow = follow(&code(&["push\tr2", "rjmp\t.-4\t; 0x0"]), 0, &Landmarks::default());
     assert!(flow.bottomless);

@@ -1,0 +1,145 @@
+//! Holds the program that was made against the one that the compiler wrote.
+//!
+//! All that is shared is put back where it is called from, by nothing but the text of the routines; what comes out must be the
+//! compiler's text, instruction by instruction. A difference fails the build.
+
+use std::collections::HashMap;
+
+use anyhow::{Context, Result, bail, ensure};
+
+use super::text::{Function, Insn, Line, Program};
+use super::{prologue, repeats};
+
+/// Routines that call routines: deeper than this means one that calls itself.
+const DEEPEST: usize = 100;
+
+/// Fails if `after` is not `before`, but for what is shared.
+pub fn check(before: &Program, after: &Program) -> Result<()> {
+    ensure!(
+        before.head == after.head && before.rest == after.rest,
+        "data or start-up code was changed"
+    );
+    let functions: HashMap<&str, &Function> =
+        after.functions.iter().map(|f| (f.name.as_str(), f)).collect();
+    ensure!(functions.len() == after.functions.len(), "two functions have one name");
+    let routines: HashMap<_, _> = functions
+        .iter()
+        .map(|(name, f)| (*name, *f))
+        .filter(|(name, _)| is_routine(name))
+        .collect();
+    ensure!(
+        functions.len() == before.functions.len() + routines.len(),
+        "functions were lost or added"
+    );
+    for function in &before.functions {
+        let name = &function.name;
+        let made = functions.get(name.as_str()).with_context(|| format!("{name} is gone"))?;
+        let whole = put_back(made, &routines, 0).with_context(|| format!("in {name}"))?;
+        ensure!(function.code().eq(whole.iter()), "{name} is not what the compiler wrote");
+    }
+    Ok(())
+}
+
+fn is_routine(name: &str) -> bool {
+    [prologue::NAME, repeats::PART, repeats::TAIL].iter().any(|prefix| name.starts_with(prefix))
+}
+
+/// The code of a function with all that it shares.
+fn put_back(
+    function: &Function,
+    routines: &HashMap<&str, &Function>,
+    depth: usize,
+) -> Result<Vec<Line>> {
+    ensure!(depth < DEEPEST, "{} contains itself", function.name);
+    let mut whole = Vec::new();
+    for line in function.code() {
+        match line {
+            Line::Insn(insn) if is_routine(&insn.args) => {
+                let routine = routines
+                    .get(insn.args.as_str())
+                    .with_context(|| format!("{} is missing", insn.args))?;
+                take_in(insn, put_back(routine, routines, depth + 1)?, &mut whole)?;
+            }
+            other => whole.push(other.clone()),
+        }
+    }
+    Ok(whole)
+}
+
+/// What the call of a routine stands for.
+fn take_in(site: &Insn, mut routine: Vec<Line>, whole: &mut Vec<Line>) -> Result<()> {
+    let ret = Line::Insn(Insn::new("ret"));
+    match site.op.as_str() {
+        "jmp" if site.args.starts_with(repeats::TAIL) => {
+            ensure!(routine.last() == Some(&ret), "{} does not return", site.args)
+        }
+        "call" if site.args.starts_with(repeats::PART) => {
+            ensure!(routine.pop() == Some(ret), "{} does not return", site.args);
+        }
+        "call" if site.args.starts_with(prologue::NAME) => {
+            let insns = prologue::put_back(&insns(&routine)?, &insns(whole)?);
+            let insns =
+                insns.with_context(|| format!("{} is no beginning of a function", site.args))?;
+            routine = insns.into_iter().map(Line::Insn).collect();
+            whole.clear();
+        }
+        op => bail!("{op} {}", site.args),
+    }
+    whole.append(&mut routine);
+    Ok(())
+}
+
+fn insns(code: &[Line]) -> Result<Vec<Insn>> {
+    let insn = |line: &Line| match line {
+        Line::Insn(insn) => Ok(insn.clone()),
+        other => bail!("{other:?} in the beginning of a function"),
+    };
+    code.iter().map(insn).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::text::tests::program;
+    use super::*;
+
+    const BEFORE: [(&str, &str); 2] =
+        [("f", "ldi r24, 1\ninc r24\nret"), ("g", "ldi r24, 1\ninc r24\ninc r24\nret")];
+
+    fn refused(after: &[(&str, &str)]) -> String {
+        format!("{:#}", check(&program(&BEFORE), &program(after)).unwrap_err())
+    }
+
+    #[test]
+    fn what_is_shared_may_be_anywhere() {
+        let part = ("__part_0", "ldi r24, 1\ninc r24\nret");
+        let tail = ("__tail_1", "inc r24\nret");
+        let after =
+            [("g", "call __part_0\njmp __tail_1"), part, tail, ("f", "ldi r24, 1\njmp __tail_1")];
+        check(&program(&BEFORE), &program(&after)).unwrap();
+    }
+
+    #[test]
+    fn another_program_is_refused() {
+        let [f, g] = BEFORE;
+        assert!(refused(&[f]).contains("lost or added"));
+        assert!(refused(&[f, ("g", "ldi r24, 1\ninc r24\nret")]).contains("g is not what"));
+        assert!(refused(&[f, g, ("h", "ret")]).contains("lost or added"));
+        assert!(refused(&[f, ("h", "ret")]).contains("g is gone"));
+        assert!(refused(&[f, f]).contains("one name"));
+    }
+
+    #[test]
+    fn a_wrong_routine_is_refused() {
+        let [_, g] = BEFORE;
+        let f = |routine| [("f", "call __part_0\nret"), g, ("__part_0", routine)];
+        assert!(check(&program(&BEFORE), &program(&f("ldi r24, 1\ninc r24\nret"))).is_ok());
+        assert!(refused(&f("ldi r24, 2\ninc r24\nret")).contains("f is not what"));
+        assert!(refused(&f("ldi r24, 1\ninc r24")).contains("does not return"));
+        assert!(refused(&f("call __part_0\nret")).contains("contains itself"));
+        assert!(refused(&[("f", "call __part_1\nret"), g]).contains("missing"));
+        assert!(
+            refused(&[("f", "call __enter_0\nret"), g, ("__enter_0", "push r2\nret")])
+                .contains("no beginning")
+        );
+    }
+}
