@@ -11,8 +11,7 @@ pub fn row_name(row: Row) -> Name {
     match row.number() {
         row @ 0..6 => named(&[b'g', b'5', b'4' + row]),
         row @ 6..9 => named(&[b'g', b'5', b'9', b'1' + row - 6]),
-        9 => named(b"g28"),
-        10 => named(b"g30"),
+        row @ 9..11 => named(&[b'g', b'2' + row - 9, if row == 9 { b'8' } else { b'0' }]),
         row @ FIRST_TOOL.. => match row - FIRST_TOOL + 1 {
             tool @ ..10 => named(&[b't', b't', b'0' + tool]),
             tool => named(&[b't', b't', b'0' + tool / 10, b'0' + tool % 10]),
