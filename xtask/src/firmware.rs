@@ -63,15 +63,27 @@ pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
 /// `rustc` makes a text and an object by two runs of its back end, which need not agree. So the image comes from the text, and so does
 /// the program in which defects of the compiler are looked for: shared code would hide them.
 fn make_small(text: &Path, linked: &Path, elf: &Path) -> Result<PathBuf> {
-    let program =
-        std::fs::read_to_string(text).with_context(|| format!("cannot read {}", text.display()))?;
-    let texts = shrink::shrink(&program)?;
-    let link = link::Link::read(linked)?;
-    let made = |name| text.with_file_name(name);
-    link.image(&texts.plain, &made("plain.elf"))?;
-    elf::check_compiled(&made("plain.elf"))?;
-    link.image(&texts.small, &made("small.elf"))?;
-    keep(&made("small.elf"), elf)
+    let (plain, small) = (text.with_file_name("plain.elf"), text.with_file_name("small.elf"));
+    if !is_newer(&small, &[text, linked, &std::env::current_exe()?]) {
+        let program = std::fs::read_to_string(text);
+        let program = program.with_context(|| {
+            format!("no {}: remove target/avr, and it is written again", text.display())
+        })?;
+        let texts = shrink::shrink(&program)?;
+        let link = link::Link::read(linked)?;
+        link.image(&texts.plain, &plain)?;
+        elf::check_compiled(&plain)?;
+        link.image(&texts.small, &small)?;
+    }
+    keep(&small, elf)
+}
+
+/// Whether a file was made after all of the others.
+fn is_newer(made: &Path, others: &[&Path]) -> bool {
+    let time = |path: &Path| std::fs::metadata(path).and_then(|data| data.modified()).ok();
+    time(made).is_some_and(|made| {
+        others.iter().all(|other| time(other).is_some_and(|other| other < made))
+    })
 }
 
 /// Copies the image to its own name and refuses one that would not work: see [`elf::check`].
@@ -149,6 +161,20 @@ mod tests {
         let name = |machine| image(Board::Ramps14, machine).file_name().unwrap().to_owned();
         assert_eq!(name(Machine::Careful), "ramps14.elf");
         assert_eq!(name(Machine::Lathe), "ramps14-lathe.elf");
+    }
+
+    #[test]
+    fn a_file_is_newer_than_those_it_is_made_of() {
+        let folder = root().join("target/tmp/newer");
+        std::fs::create_dir_all(&folder).unwrap();
+        let (old, new) = (folder.join("old"), folder.join("new"));
+        std::fs::write(&new, "").unwrap();
+        let file = std::fs::File::create(&old).unwrap();
+        file.set_modified(std::time::SystemTime::UNIX_EPOCH).unwrap();
+        assert!(is_newer(&new, &[&old]));
+        assert!(!is_newer(&old, &[&new]));
+        assert!(!is_newer(&new, &[&old, &folder.join("none")]));
+        assert!(!is_newer(&folder.join("none"), &[&old]));
     }
 
     #[test]

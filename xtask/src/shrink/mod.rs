@@ -8,6 +8,7 @@
 //! | [`text`], `dialect` | reads LLVM's text, writes it for `avr-as` | |
 //! | [`prologue`] | shares what functions begin with | 5,400 |
 //! | [`repeats`] | shares any other code that repeats, ends of functions above all | 10,800 |
+//! | [`branch`] | branches go where they lead, not round a jump | 700 |
 //! | [`order`] | puts functions near those they call, which shortens calls | 3,200 |
 //! | [`verify`] | puts back what is shared, and compares with the compiler's text | |
 //! | [`link`] | assembles and links, as `rustc` did | |
@@ -15,6 +16,7 @@
 //! A shared piece costs its caller 7 to 25 cycles, and three bytes of stack while it runs. `crate::elf` checks the program that is linked
 //! from the compiler's own text for the compiler's defects, and the stack in the image that was made.
 
+mod branch;
 mod dialect;
 pub mod hot;
 pub mod link;
@@ -44,6 +46,7 @@ pub fn shrink(text: &str) -> Result<Texts> {
     let mut small = plain.clone();
     prologue::share(&mut small);
     repeats::share(&mut small);
+    branch::shorten(&mut small);
     order::arrange(&mut small);
     verify::check(&plain, &small).context("the program that was made smaller is another one")?;
     Ok(Texts { plain: plain.text(), small: small.text() })
