@@ -56,7 +56,7 @@ pub const ROWS: &[&str] = &[
     "kerf::tasks::view::View>::of",
     "kerf::tasks::view::View>::seen",
     "kerf::tasks::view::View>::state",
-    "kerf::tasks::links::snapshot",
+    "kerf::tasks::common::snapshot",
     "kerf::tasks::power::",
     "kerf::motors::Motors>::pass",
     "kerf::config::number::Fixed>::render",
