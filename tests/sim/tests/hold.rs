@@ -85,8 +85,11 @@ fn it_slows_down_within_10_ms() {
 
 #[test]
 fn it_is_soon_the_last_of_moves_that_each_stop() {
-    // Moves to and fro, in mm, of 2 to 13 ms each.
-    for (way, accel) in [(0.03, 20_000.0), (0.03, 1_000.0), (0.003, 1_000.0), (0.01, 200.0)] {
+    // Moves to and fro, in mm and mm/s^2, and how long after it the last step may come, ms: one that has begun within 10 ms goes on for
+    // 2.5 ms if it is the shortest, and the others come to rest in the midst.
+    for (way, accel, most) in
+        [(0.03, 20_000.0, 13.0), (0.03, 1_000.0, 16.0), (0.003, 1_000.0, 13.0), (0.01, 200.0, 16.0)]
+    {
         let mut worst = 0;
         for n in 0..30 {
             let (mut machine, mut host) = board(SHARP);
@@ -100,8 +103,7 @@ fn it_is_soon_the_last_of_moves_that_each_stop() {
         }
         let ms = worst as f64 / CLOCK * 1e3;
         println!("moves of {way} mm at {accel} mm/s^2: the last step {ms:.2} ms behind it at most");
-        // One that has begun within 10 ms takes as long as its last segment.
-        assert!(ms < 14.0, "{ms} ms");
+        assert!(ms < most, "{ms} ms");
     }
 }
 

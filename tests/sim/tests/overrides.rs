@@ -84,13 +84,17 @@ fn begins(machine: &Machine, from: u64, steps: usize) -> u64 {
     after.iter().find(|(_, taken)| !usual.contains(taken)).expect("it follows").0
 }
 
+/// How much later in its tick a pulse comes that waits for all other interrupts, cycles: it does at one of two velocities if their ticks
+/// are on both sides of `Pace::settles`. The step between the two takes as much longer.
+const SETTLES: u64 = 44;
+
 /// No segment has come late: no step has taken longer than steps at the slower of the two velocities do.
 fn check_no_stop(machine: &Machine) {
     let x = machine.recorder().steps_of(0);
     let taken: Vec<u64> = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let ends = taken[..100].iter().chain(&taken[taken.len() - 20..]);
     let (slowest, usual) = (taken.iter().max().unwrap(), ends.max().unwrap());
-    assert!(*slowest <= usual + usual / 100, "{slowest} cycles instead of {usual}");
+    assert!(*slowest <= usual + usual / 100 + SETTLES, "{slowest} cycles instead of {usual}");
 }
 
 /// The longest time from any of these to what comes of it, ms. What is compared is the time that so many steps take.
