@@ -163,7 +163,7 @@ impl Uart {
         let byte = if broken { !byte } else { byte };
         // Complete in the middle of the stop bit.
         let done = now + self.bit_cycles() * (2 * self.frame_bits() - 1) / 2;
-        let errors = u8::from(broken) * FE | u8::from(lost) * DOR;
+        let errors = (u8::from(broken) * FE) | (u8::from(lost) * DOR);
         self.receiving = Some(Frame { byte, errors, done });
     }
 
