@@ -59,20 +59,27 @@ pub const WAIT_MS: u8 = 0x20;
 pub const LINE_END: u8 = b' ';
 
 /// How many ms XOFF and XON wait for the end of a line on a port with this divisor (`baud::divisor`), at most. The sender
-/// says up to 50 bytes meanwhile, or 23 where the ring is short.
+/// says up to 50 bytes meanwhile, or 12 where the ring is short.
 pub const fn wait_ms(port: u8, divisor: u8) -> u8 {
-    let (ms, most) = (divisor / 3, if port == USB { 4 } else { 2 });
+    let (ms, most) = (divisor / 3, if port == USB { 4 } else { 1 });
     if ms > most { most } else { ms }
 }
 
 /// The sender is stopped when the receive ring holds more. Most say 100 bytes more before they heed XOFF, and that waits
 /// for the end of a line.
 pub const fn high_water(flow: Flow, ring: usize) -> usize {
-    if matches!(flow, Flow::Characters) { ring / 4 } else { ring / 2 }
+    match flow {
+        Flow::Characters if ring < RX_RING => ring / 8,
+        Flow::Characters => ring / 4,
+        _ => ring / 2,
+    }
 }
+/// With so many bytes in the ring of the second port thread mode is late, and exec stops the sender.
+pub const LATE: usize = AUX_RING / 4;
+
 /// And goes on when it holds less.
 pub const fn low_water(ring: usize) -> usize {
-    ring / 8
+    if ring < RX_RING { ring / 16 } else { ring / 8 }
 }
 
 /// How the two sides of a line stop each other.

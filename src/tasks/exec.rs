@@ -12,7 +12,7 @@ use crate::boards::ACTIVE;
 use crate::hal::Interrupt;
 use crate::hal::event::{self, Event};
 use crate::hal::imp::arithmetic::product;
-use crate::hal::imp::{exec, flags, stepper};
+use crate::hal::imp::{exec, flags, stepper, uart};
 use crate::hal::ring::Producer;
 use crate::machine::{self, Alarm};
 use crate::motion::contact;
@@ -112,6 +112,7 @@ impl<'a> Runner<'a> {
     /// Does the next thing there is to do.
     #[inline(always)]
     fn turn(&mut self, common: &mut InterruptEnd<Common>) -> Next {
+        uart::stop_late();
         let queued = self.blocks.len();
         let rested = self.rests;
         if contact::is_noted() {

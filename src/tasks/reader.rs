@@ -202,6 +202,10 @@ impl<const N: usize> Intake<N> {
     /// Stops the sender, or lets it go on, when so many bytes wait in a ring of so many.
     #[inline(never)]
     fn control_flow(&mut self, waiting: usize, ring: usize, links: &Links) {
+        if self.stopped == Flow::None && uart::is_stopped(self.port.number) {
+            // By exec.
+            self.stopped = Flow::Characters;
+        }
         let stop = match self.stopped {
             Flow::None if waiting <= high_water(Flow::Characters, ring) => false,
             Flow::None => waiting > high_water(self.flow(links), ring),

@@ -18,8 +18,8 @@ use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::byte::SharedByte;
 use crate::hal::ring::Ring;
 use crate::hal::serial::{
-    AUX, AUX_RING, AllEnds, Ends, Flow, PORTS, RX_RING, TX_RING, USB, WAIT_MS, XOFF, XON, hardware,
-    is_shared, last_mark, wait_ms,
+    AUX, AUX_RING, AllEnds, Ends, Flow, LATE, PORTS, RX_RING, TX_RING, USB, WAIT_MS, XOFF, XON,
+    hardware, is_shared, last_mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -44,6 +44,8 @@ struct Flags {
     /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`], [`HEEDS_XOFF`]. The receive interrupt
     /// changes the first.
     held: SharedByte,
+    /// Not 0 if the sender has been stopped by XOFF. Exec sets it too, thread mode clears it.
+    stopped: SharedByte,
     /// An [`Asked`], byte for byte. The receive interrupt adds to it, `take_asked` clears it.
     asked: [SharedByte; 3],
 }
@@ -65,6 +67,7 @@ impl<const N: usize> Shared<N> {
                 realtime: SharedByte::new(0),
                 ahead: SharedByte::new(0),
                 held: SharedByte::new(0),
+                stopped: SharedByte::new(0),
                 asked: [const { SharedByte::new(0) }; 3],
             },
         }
@@ -168,7 +171,7 @@ pub unsafe fn end_lines() {
     }
 }
 
-/// Sends what the ring holds. Thread mode.
+/// Sends what the ring holds. Thread mode, or exec on a port that is no bus.
 pub fn kick(port: u8) {
     if is_shared(port) {
         return kick_bus(port);
@@ -217,10 +220,43 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
             // SAFETY: thread mode alone writes it.
             let divisor = unsafe { register(port, 4).read_volatile() };
             let wait = if waits { WAIT_MS * wait_ms(port, divisor) } else { 0 };
-            flags(port).ahead.set(wait + if stop { XOFF } else { XON });
+            let flags = flags(port);
+            // In an order that exec may come between: see `stop_late`.
+            if stop {
+                flags.stopped.set(1);
+            }
+            flags.ahead.set(wait + if stop { XOFF } else { XON });
+            flags.stopped.set(stop.into());
             kick(port);
         }
         Flow::Pins => set_rts(port, stop),
+    }
+}
+
+/// Whether the sender has been stopped by XOFF, by thread mode or by [`stop_late`].
+pub fn is_stopped(port: u8) -> bool {
+    flags(port).stopped.get() != 0
+}
+
+/// Stops the sender of the second port by XOFF if its ring fills while thread mode has no turn. Exec, which no interrupt of a port is
+/// interrupted by. Cost: 12 cycles.
+#[inline(always)]
+pub fn stop_late() {
+    if PORTS > 1 && AUX_SHARED.rx.used() >= LATE {
+        stop_now();
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn stop_now() {
+    let flags = flags(AUX);
+    // One that waits for the end of a line waits no more.
+    let waits = flags.ahead.get() > WAIT_MS + XON;
+    if flags.held.get() & HEEDS_XOFF != 0 && (flags.stopped.get() == 0 || waits) {
+        flags.stopped.set(1);
+        flags.ahead.set(XOFF);
+        kick(AUX);
     }
 }
 

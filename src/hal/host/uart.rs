@@ -12,8 +12,8 @@ use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::hal::serial::{
-    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LINE_END, MARKS, PORTS, RX_RING, STRAY, TX_RING,
-    USB, XOFF, XON, batch, hardware, high_water, last_mark, lose, mark, wait_ms,
+    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS, RX_RING, STRAY,
+    TX_RING, USB, XOFF, XON, batch, hardware, high_water, last_mark, lose, mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -74,6 +74,8 @@ struct Line {
     wait_ms: u8,
     open: bool,
     held: bool,
+    /// The sender has been stopped by XOFF.
+    stopped: bool,
     /// Whether XOFF and XON count.
     heeds_xoff: bool,
     /// Whether CTS counts, and holds them back.
@@ -108,6 +110,7 @@ impl Line {
             wait_ms: 0,
             open: false,
             held: false,
+            stopped: false,
             heeds_xoff: false,
             heeds_cts: false,
             cts: false,
@@ -192,12 +195,32 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
         Flow::None => {}
         Flow::Characters => {
             line.ahead = Some(if stop { XOFF } else { XON });
+            line.stopped = stop;
             line.wait_ms = if waits { wait_ms(port, baud::divisor(line.rate) as u8) } else { 0 };
             line.kick();
         }
         Flow::Pins => {
             line.rts = stop;
             line.let_arrive();
+        }
+    });
+}
+
+/// Whether the sender has been stopped by XOFF, by thread mode or by [`stop_late`].
+pub fn is_stopped(port: u8) -> bool {
+    with(port, |line| line.stopped)
+}
+
+/// Stops the sender of the second port by XOFF if its ring fills while thread mode has no turn. Exec.
+pub fn stop_late() {
+    if aux_rx().used() < LATE {
+        return;
+    }
+    with(AUX, |line| {
+        let waits = line.wait_ms > 0 && line.ahead == Some(XOFF);
+        if line.heeds_xoff && (!line.stopped || waits) {
+            (line.stopped, line.ahead, line.wait_ms) = (true, Some(XOFF), 0);
+            line.kick();
         }
     });
 }

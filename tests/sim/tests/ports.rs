@@ -232,3 +232,75 @@ fn only_one_port_feeds_at_a_time() {
     let moved = machine.recorder().motors().each_ref().map(|motor| motor.position);
     assert_eq!(moved, [40.0, 10.0, 0.0, 0.0].map(|mm| (mm * PER_MM) as i64));
 }
+
+/// A sender that says lines one behind the other, stops at XOFF as soon as it has said `lag` bytes more, and goes on at XON.
+struct Heeds<'a> {
+    port: usize,
+    lag: usize,
+    bytes: std::slice::Iter<'a, u8>,
+    /// How many bytes it says still.
+    left: usize,
+    heard: Vec<u8>,
+}
+
+impl<'a> Heeds<'a> {
+    fn new(port: usize, lag: usize, lines: &'a str) -> Self {
+        Heeds { port, lag, bytes: lines.as_bytes().iter(), left: usize::MAX, heard: Vec::new() }
+    }
+
+    /// Says the next byte, if it may, and listens.
+    fn turn(&mut self, machine: &mut Machine) {
+        if self.left > 0
+            && let Some(byte) = self.bytes.next()
+        {
+            machine.send_to(self.port, &[*byte]);
+            self.left = if self.left == usize::MAX { self.left } else { self.left - 1 };
+        }
+        for byte in machine.receive_from(self.port) {
+            match byte {
+                0x13 => self.left = self.left.min(self.lag),
+                0x11 => self.left = usize::MAX,
+                _ => self.heard.push(byte),
+            }
+        }
+    }
+}
+
+#[test]
+fn who_heeds_xoff_loses_nothing_while_the_other_port_asks() {
+    const LINES: usize = 200;
+    let lines: String = (0..LINES).map(|n| format!("N{n} g1 f1200 x{}.25\n", n % 3)).collect();
+    for port in [0, 1] {
+        for lag in [0, 4, 12] {
+            let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+            set(&mut machine, &mut host, "{xjm:5000,sv:2,si:100,jv:4}");
+            let _ = machine.receive_from(1);
+            let mut sender = Heeds::new(port, lag, &lines);
+            let (mut other, mut quiet) = (Heeds::new(1 - port, 0, ""), 0);
+            for n in 0.. {
+                sender.turn(&mut machine);
+                other.turn(&mut machine);
+                if n % 300 == 0 {
+                    machine
+                        .send_to(1 - port, if n % 900 == 0 { b"{sr:n}\n" } else { b"{posx:n}\n" });
+                }
+                let before = sender.heard.len();
+                // A little more than a byte takes.
+                machine.run_until(machine.cycle() + 1_400).unwrap();
+                let rests = sender.bytes.len() == 0 && sender.heard.len() == before;
+                quiet = if rests { quiet + 1 } else { 0 };
+                if quiet > 40_000 {
+                    break;
+                }
+            }
+            let heard = String::from_utf8_lossy(&sender.heard).into_owned();
+            let refused = heard.matches("\"f\":[1,13,").count();
+            let answered = heard.lines().filter(|line| line.starts_with("{\"r\":")).count();
+            println!("port {port}, lag {lag}: {answered} answers, {refused} refused");
+            assert_eq!(answered, LINES, "{heard}");
+            // Measured: 2.
+            let most = if port == 0 || lag == 0 { 0 } else { 4 };
+            assert!(refused <= most, "{refused} lines are refused, lag {lag}");
+        }
+    }
+}
