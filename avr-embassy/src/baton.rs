@@ -4,6 +4,7 @@
 //! `None`.
 
 use crate::byte::SharedByte;
+use crate::value::Value;
 
 /// Somebody has the value.
 const IN_USE: u8 = u8::MAX;
@@ -24,13 +25,13 @@ const IN_USE: u8 = u8::MAX;
 /// ```
 pub struct Baton<T> {
     stage: SharedByte,
-    value: imp::Value<T>,
+    value: Value<T>,
 }
 
 impl<T> Baton<T> {
     /// In stage 0.
     pub const fn new(value: T) -> Self {
-        Self { stage: SharedByte::new(0), value: imp::Value::new(value) }
+        Self { stage: SharedByte::new(0), value: Value::new(value) }
     }
 
     /// The stage; 255 while somebody has the value. Any level.
@@ -59,50 +60,6 @@ impl<T> Baton<T> {
         let result = unsafe { self.value.with(act) };
         self.stage.set(to);
         Some(result)
-    }
-}
-
-#[cfg(target_arch = "avr")]
-mod imp {
-    use core::cell::UnsafeCell;
-
-    pub struct Value<T>(UnsafeCell<T>);
-
-    // SAFETY: on the only core one level at a time has it, see `with`.
-    unsafe impl<T: Send> Sync for Value<T> {}
-
-    impl<T> Value<T> {
-        pub const fn new(value: T) -> Self {
-            Self(UnsafeCell::new(value))
-        }
-
-        /// # Safety
-        /// Nobody else has the value.
-        #[inline(always)]
-        pub unsafe fn with<R>(&self, act: impl FnOnce(&mut T) -> R) -> R {
-            // SAFETY: the caller says so.
-            act(unsafe { &mut *self.0.get() })
-        }
-    }
-}
-
-#[cfg(not(target_arch = "avr"))]
-mod imp {
-    use std::sync::Mutex;
-
-    /// On the host other cores may come in between: there it is a lock.
-    pub struct Value<T>(Mutex<T>);
-
-    impl<T> Value<T> {
-        pub const fn new(value: T) -> Self {
-            Self(Mutex::new(value))
-        }
-
-        /// # Safety
-        /// None: see above.
-        pub unsafe fn with<R>(&self, act: impl FnOnce(&mut T) -> R) -> R {
-            act(&mut self.0.try_lock().expect("nobody else has the value"))
-        }
     }
 }
 

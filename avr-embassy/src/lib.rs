@@ -114,6 +114,7 @@ mod shared;
 #[cfg(target_arch = "avr")]
 pub mod time;
 pub mod timers;
+mod value;
 
 pub use baton::Baton;
 pub use event::{Event, Waiter};

@@ -12,6 +12,7 @@
 use core::marker::PhantomData;
 
 use crate::byte::SharedByte;
+use crate::value::Value;
 use crate::{Ceiling, Interrupt};
 
 /// A value that thread mode and interrupt mode share. Its end for interrupt mode is handed out once.
@@ -79,7 +80,7 @@ use crate::{Ceiling, Interrupt};
 /// }
 /// ```
 pub struct Shared<T> {
-    value: imp::Value<T>,
+    value: Value<T>,
     /// Whether there is an end of interrupt mode.
     taken: SharedByte,
 }
@@ -87,7 +88,7 @@ pub struct Shared<T> {
 impl<T: Send> Shared<T> {
     /// With a value.
     pub const fn new(value: T) -> Self {
-        Self { value: imp::Value::new(value), taken: SharedByte::new(0) }
+        Self { value: Value::new(value), taken: SharedByte::new(0) }
     }
 
     /// Has `act` use the value. Thread mode, which shows the ceiling.
@@ -203,64 +204,6 @@ impl<P: Place> InterruptEnd<P> {
     pub fn look<R>(&self, act: impl FnOnce(&P::Value) -> R) -> R {
         // SAFETY: as in `with`; the borrow keeps that away.
         unsafe { self.0.shared().value.look(act) }
-    }
-}
-
-#[cfg(target_arch = "avr")]
-mod imp {
-    use core::cell::UnsafeCell;
-
-    pub struct Value<T>(UnsafeCell<T>);
-
-    // SAFETY: on the only core one level at a time has it, see `with`.
-    unsafe impl<T: Send> Sync for Value<T> {}
-
-    impl<T> Value<T> {
-        pub const fn new(value: T) -> Self {
-            Self(UnsafeCell::new(value))
-        }
-
-        /// # Safety
-        /// Nobody else has the value.
-        #[inline(always)]
-        pub unsafe fn with<R>(&self, act: impl FnOnce(&mut T) -> R) -> R {
-            // SAFETY: the caller says so.
-            act(unsafe { &mut *self.0.get() })
-        }
-
-        /// # Safety
-        /// Nobody else changes the value.
-        #[inline(always)]
-        pub unsafe fn look<R>(&self, act: impl FnOnce(&T) -> R) -> R {
-            // SAFETY: the caller says so.
-            act(unsafe { &*self.0.get() })
-        }
-    }
-}
-
-#[cfg(not(target_arch = "avr"))]
-mod imp {
-    use std::sync::RwLock;
-
-    /// On the host it is a lock that nobody ever has to wait for.
-    pub struct Value<T>(RwLock<T>);
-
-    impl<T> Value<T> {
-        pub const fn new(value: T) -> Self {
-            Self(RwLock::new(value))
-        }
-
-        /// # Safety
-        /// None: see above.
-        pub unsafe fn with<R>(&self, act: impl FnOnce(&mut T) -> R) -> R {
-            act(&mut self.0.try_write().expect("nobody else has the value"))
-        }
-
-        /// # Safety
-        /// None: see above.
-        pub unsafe fn look<R>(&self, act: impl FnOnce(&T) -> R) -> R {
-            act(&self.0.try_read().expect("nobody else changes the value"))
-        }
     }
 }
 

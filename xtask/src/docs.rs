@@ -11,8 +11,9 @@ use std::path::{Path, PathBuf};
 use crate::process::root;
 
 /// The documents.
-const DOCUMENTS: [&str; 6] = [
+const DOCUMENTS: [&str; 7] = [
     "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
     "README.md",
     "CHANGELOG.md",
     "avr-embassy/README.md",
