@@ -6,6 +6,12 @@ use std::thread;
 
 use crate::side::Side;
 
+mod stops;
+pub use stops::{
+    a_report_is_of_one_moment_whoever_asks_on_the_other_port, a_stop_acts_once,
+    a_stop_acts_when_it_arrives,
+};
+
 /// A test of each crowd, with the machine that a function boots.
 macro_rules! tests {
     ($boot:ident) => {
@@ -373,98 +379,4 @@ pub fn a_percent_sign_before_a_hold_is_none<S: Side>(boot: impl Fn() -> S + Sync
             assert_eq!(crowd.steps(), [steps, 0, 0, 0], "{:?}", crowd.heard);
         });
     }
-}
-
-/// Alarms do not wait for the answers of their own port: not in the pool, and not in the ring of a port whose pool is full.
-pub fn a_stop_acts_when_it_arrives<S: Side>(boot: impl Fn() -> S + Sync) {
-    let before = ["", "$$\n", "{g59:n}\n{g59:n}\n{g59:n}\n"];
-    // Several long lines, so that the one that stops waits in the ring; then the reserve is taken, too.
-    let long = format!("{{{}xvm:n}}\n", "xvm:n,xfr:n,".repeat(17));
-    let full = format!("{long}{long}{{g59:n}}\n{{g58:n}}\n{{g57:n}}\n{{g56:n}}\n");
-    for (port, lines) in
-        before.map(|lines| (USB, lines)).into_iter().chain([(AUX, before[2]), (USB, &full)])
-    {
-        for stop in ["{alarm:1}\n", "{\"shutd\": true}\r\n", " { Panic : n }\n"] {
-            alone(&boot, |mut crowd| {
-                crowd.set(USB, "{psw:1,ex:0}");
-                crowd.set(USB, "{sv:0}");
-                crowd.set(USB, "m3 s1000");
-                crowd.send(USB, &MOVE.repeat(2));
-                crowd.pass(200);
-                assert!(crowd.turns());
-                crowd.forget();
-                // Together: the stop comes while the lines before it are being answered.
-                crowd.put(port, lines);
-                crowd.put(port, stop);
-                crowd.pass((lines.len() / BYTES_MS + 2) as u64);
-                crowd.stops(stop);
-                // It has an answer of its own, behind those of the lines before it.
-                let name: String = stop.chars().filter(char::is_ascii_alphabetic).take(5).collect();
-                let answer = format!("{{\"r\":{{\"{}\":", name.to_lowercase());
-                assert!(crowd.hears_line(port, &answer, 4_000), "{:?}", crowd.heard);
-                let answers = crowd.heard[port].matches("\"f\":[1,0,").count();
-                assert!(answers >= lines.lines().filter(|line| !line.starts_with('$')).count());
-            });
-        }
-    }
-}
-
-/// An alarm that has been ended from the other port does not begin again when the turn of its line comes.
-pub fn a_stop_acts_once<S: Side>(boot: impl Fn() -> S + Sync) {
-    let long = format!("{{{}xvm:n}}\n", "xvm:n,xfr:n,".repeat(17));
-    for lines in ["$$\n", &format!("{long}{long}{{g59:n}}\n{{g58:n}}\n{{g57:n}}\n")] {
-        alone(&boot, |mut crowd| {
-            crowd.set(USB, "{sv:0,ex:0}");
-            crowd.put(USB, lines);
-            crowd.put(USB, "{alarm:1}\n");
-            crowd.pass((lines.len() / BYTES_MS + 2) as u64);
-            crowd.prompt(AUX, "{stat:n}\n", "{\"stat\":2}");
-            crowd.prompt(AUX, "{clear:n}\n", "{\"clear\":null}");
-            crowd.prompt(AUX, "{stat:n}\n", "{\"stat\":3}");
-            assert!(crowd.hears_line(USB, "\"alarm\":", 4_000), "{:?}", crowd.heard);
-            crowd.pass(100);
-            crowd.prompt(AUX, "{stat:n}\n", "{\"stat\":3}");
-            // The next one counts, also behind the end of one on its own port.
-            for stops in ["{alarm:1}\n", "{clear:n}\n{alarm:1}\n"] {
-                crowd.prompt(USB, stops, "{\"alarm\":1}");
-                crowd.prompt(AUX, "{stat:n}\n", "{\"stat\":2}");
-            }
-        });
-    }
-}
-
-/// The number of a name in a line of JSON.
-fn value(line: &str, name: &str) -> Option<f64> {
-    let (_, rest) = line.split_once(&format!("\"{name}\":"))?;
-    rest.split([',', '}']).next()?.parse().ok()
-}
-
-/// The first and the last place in a report are the same one, though the other port is told places as well.
-pub fn a_report_is_of_one_moment_whoever_asks_on_the_other_port<S: Side>(
-    boot: impl Fn() -> S + Sync,
-) {
-    alone(&boot, |mut crowd| {
-        crowd.set(USB, "{sv:0,xjm:5000}");
-        // Longer than the transmit ring.
-        let between =
-            "ofsx:t,ofsy:t,ofsz:t,posa:t,posb:t,posc:t,mpoa:t,mpob:t,mpoc:t,homx:t,homy:t,homz:t";
-        crowd.set(USB, &format!("{{sr:{{posx:t,{between},mpox:t}}}}"));
-        crowd.set(USB, "g0x100");
-        for _ in 0..60 {
-            crowd.put(USB, "{sr:n}\n");
-            for _ in 0..4 {
-                crowd.put(AUX, "{mpo:n}\n");
-                crowd.pass(9);
-            }
-        }
-        crowd.pass(200);
-        let mut moved = 0;
-        for line in crowd.heard[USB].lines() {
-            if let (Some(work), Some(machine)) = (value(line, "posx"), value(line, "mpox")) {
-                assert_eq!(work, machine, "{line}");
-                moved += usize::from(work > 0.0);
-            }
-        }
-        assert!(moved > 30, "{:?}", crowd.heard);
-    });
 }
