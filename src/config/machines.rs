@@ -212,27 +212,30 @@ progmem! {
     static END_OF: [u8; COUNT] = ENDS;
 }
 
-/// Entry `index`, if it is of `setting`.
+/// The value of the first of these entries that is of `setting`. About 30 cycles an entry on AVR.
 #[inline(never)]
 #[small]
-fn of(setting: Setting, index: u8) -> Option<i32> {
+fn first_of(setting: Setting, mut entries: core::ops::Range<u8>) -> Option<i32> {
     let (first, owner) = setting.first_of_row();
-    let entry = ENTRIES.at(index.into())?;
-    (entry.setting == first.number() && entry.owners & owner != 0).then_some(entry.value)
+    let first = first.number();
+    entries.find_map(|index| {
+        let entry = ENTRIES.at(index.into())?;
+        (entry.setting == first && entry.owners & owner != 0).then_some(entry.value)
+    })
 }
 
-/// What a machine has otherwise than the careful one; `None` if not this. About 2,000 cycles on AVR.
+/// What a machine has otherwise than the careful one; `None` if not this. About 1,000 cycles on AVR.
 #[small]
 pub(super) fn value(machine: u8, setting: Setting) -> Option<i32> {
     let machine = usize::from(machine);
     let begin = machine.checked_sub(1).and_then(|before| END_OF.at(before)).unwrap_or(0);
-    (begin..END_OF.at(machine).unwrap_or(0)).find_map(|index| of(setting, index))
+    first_of(setting, begin..END_OF.at(machine).unwrap_or(0))
 }
 
-/// Whether some machine has it otherwise than another. About 10,000 cycles on AVR.
+/// Whether some machine has it otherwise than another. About 3,000 cycles on AVR.
 #[small]
 pub(super) fn differ_in(setting: Setting) -> bool {
-    (0..ENDS[COUNT - 1]).any(|index| of(setting, index).is_some())
+    first_of(setting, 0..ENDS[COUNT - 1]).is_some()
 }
 
 #[cfg(test)]
