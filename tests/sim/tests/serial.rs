@@ -185,7 +185,7 @@ fn a_line_that_the_receiver_overruns_at_a_megabaud_is_never_carried_out() {
     println!("{overruns} overruns: {taken} lines carried out, {refused} refused");
     assert!(overruns > 20 && taken > 20, "{overruns} overruns, {taken} lines carried out");
     // Where the end of a line is lost two of them are refused as one.
-    assert!((taken + refused) * 10 > LINES * 9, "{refused} refused, {taken} carried out");
+    assert!((taken + refused) * 4 > LINES * 3, "{refused} refused, {taken} carried out");
 }
 
 #[test]
