@@ -238,8 +238,8 @@ pub fn is_stopped(port: u8) -> bool {
     flags(port).stopped.get() != 0
 }
 
-/// Stops the sender of the second port by XOFF if its ring fills while thread mode has no turn. Exec, which no interrupt of a port is
-/// interrupted by. Cost: 12 cycles.
+/// Stops the sender of the second port by XOFF if its ring fills while thread mode has no turn. Exec, which never runs within an
+/// interrupt of a port. Cost: 12 cycles.
 #[inline(always)]
 pub fn stop_late() {
     if PORTS > 1 && AUX_SHARED.rx.used() >= LATE {

@@ -101,8 +101,8 @@ mod tests {
         assert!(is_hot("<kerf::tasks::planner::Planner>::begin"));
         for name in [
             "<kerf::tasks::planner::Planner>::begin_arc",
-            "kerf::gcode::arc::part",
-            "kerf::gcode::f::<kerf::motion::exec::Exec>",
+            "kerf::protocol::json::check",
+            "kerf::protocol::f::<kerf::motion::exec::Exec>",
             "main",
         ] {
             assert!(!is_hot(name), "{name}");
