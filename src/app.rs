@@ -20,8 +20,7 @@ use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, 
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
-use crate::protocol::notice::Occasion;
-use crate::protocol::{Mode, StatusReport};
+use crate::protocol::{Memory, Occasion, Remembers, Speech};
 use crate::store::Log;
 use crate::store::kept;
 use crate::tasks::common::Common;
@@ -63,7 +62,7 @@ impl Links {
             signs: Signs::default(),
             job: Cell::default(),
             storage,
-            report: RefCell::new(StatusReport::new()),
+            report: RefCell::new(Memory::new()),
             // Their defaults come when they are in place: they would take as much of the stack.
             settings: RefCell::new(Settings::blank()),
             model: RefCell::new(Interpreter::with(storage)),
@@ -89,9 +88,8 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     let queue = queue::store().queue(thread)?;
     let (links, received, aux) = connect(thread, rate)?;
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
-    if !links.settings.borrow().starts_in_json() {
-        links.ports.iter().for_each(|port| port.mode.set(Mode::Text));
-    }
+    let speech = Speech::at_start(&links.settings.borrow());
+    links.ports.iter().for_each(|port| port.speech.set(speech));
     set_hardware(thread, &links.settings.borrow());
     spindle::set_all(thread, links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());

@@ -17,7 +17,7 @@ use kerf::config::{Name, Owner, Setting};
 use kerf::gcode::codes::docs::{self, Doc, On, Refusal};
 use kerf::gcode::setup::{AxisMode, Setup};
 use kerf::hal::imp::Machine;
-use kerf::protocol;
+use kerf::protocol::tinyg::{names, number};
 use kerf::status::Status;
 use kerf::units::Length;
 use requests::{Asked, pairs};
@@ -91,13 +91,13 @@ fn every_code_and_every_refusal_is_in_some_transcript() {
             missing.push(format!("{name}, carried out"));
         }
         for refusal in doc.refusals.iter().filter(can_happen) {
-            if !seen(Some(&name), refusal.status as u8) {
-                missing.push(format!("{name}, refused with {}", refusal.status as u8));
+            if !seen(Some(&name), number(refusal.status)) {
+                missing.push(format!("{name}, refused with {}", number(refusal.status)));
             }
         }
     }
     for refusal in docs::RULES.iter().flat_map(|rule| rule.refusals) {
-        if !seen(None, refusal.status as u8) {
+        if !seen(None, number(refusal.status)) {
             missing.push(format!("{:?}", refusal.lines));
         }
     }
@@ -144,7 +144,7 @@ fn every_name_is_in_some_transcript() {
     let asked = asked_for(&read_all());
     let was = |name: &str, how| asked.contains(&(name.to_string(), how));
     let mut missing = Vec::new();
-    for name in protocol::names() {
+    for name in names() {
         let short = without_owner(&name);
         let (group, _) = name.split_at(name.len() - 1);
         let setting = Setting::find(&Name::new().with(name.as_bytes()).expect("short"));

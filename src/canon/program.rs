@@ -7,7 +7,7 @@ use std::vec::Vec;
 use super::command::Canon;
 use super::reader::Reader;
 use crate::gcode::setup::Setup;
-use crate::protocol::status_text;
+use crate::protocol::tinyg::{number, status_text};
 use crate::status::Status;
 
 /// A line that is refused.
@@ -31,7 +31,7 @@ impl Refusal {
 impl Display for Refusal {
     /// `line: status code text: the line`.
     fn fmt(&self, to: &mut Formatter) -> core::fmt::Result {
-        write!(to, "{}: status {} ", self.number, self.status as u8)?;
+        write!(to, "{}: status {} ", self.number, number(self.status))?;
         for byte in status_text(self.status).into_iter().flat_map(|text| text.bytes()) {
             write!(to, "{}", char::from(byte))?;
         }

@@ -89,16 +89,6 @@ impl Alarm {
             Alarm::Panic => Status::Panicked,
         }
     }
-
-    /// `stat`, for a sender that takes the machine for a g2core or not; without an alarm, that of a machine that is ready.
-    pub fn state(self, is_g2core: bool) -> i32 {
-        match self {
-            Alarm::None => 1,
-            Alarm::Alarm | Alarm::Limit => 2,
-            Alarm::Shutdown => 11 + i32::from(is_g2core),
-            Alarm::Panic => 13,
-        }
-    }
 }
 
 /// Whether a block is M2 or M30 and nothing else.
@@ -127,7 +117,5 @@ mod tests {
     fn the_worse_it_is_the_more_it_takes() {
         let all = [0, 1, 2, 3, 4].map(Alarm::from_bits);
         assert!(all.is_sorted() && all.is_sorted_by_key(|alarm| alarm.status() as u8));
-        assert_eq!(all.map(|alarm| alarm.state(true)), [1, 2, 2, 12, 13]);
-        assert_eq!(all.map(|alarm| alarm.state(false)), [1, 2, 2, 11, 13]);
     }
 }

@@ -1,155 +1,339 @@
-//! Dialects: what machines that speak this protocol say differently. One table, no branches elsewhere.
+//! What a dialect has to have, and which dialects there are.
 //!
-//! | | setting | footer | senders |
-//! |---|---|---|---|
-//! | [`Dialect::Lines`] | as it comes | `[1,status,free line slots]` | count responses |
-//! | [`Dialect::Characters`] | `rxm` 0 | `[1,status,length,checksum]` | count characters: TinyG 0.97 |
-//! | [`Dialect::G2core`] | `dia` 1 | `[1,status,length]` | take the machine for a g2core |
-//!
-//! The length is that of the line that is answered, its end included; 0 if no line is (g2core says 1). The
-//! first two share TinyG's status codes and texts, the third has its own for some ([`CHANGES`]), and for prompts.
+//! A dialect is a folder beside this file with a type that implements [`Dialect`], and a row of `dialects!` below. The table makes an
+//! enum of each of its types, with a variant for each dialect that is built in. Of an image with one dialect the variants
+//! take neither room nor time.
 
+use super::line::{Ending, Next, Span};
+use super::machine::Machine;
+use super::notice::Notice;
+use super::out::Out;
+#[cfg(feature = "dialect-tinyg")]
+use super::tinyg;
 use crate::config::Settings;
-use crate::progmem;
-use crate::progmem::Text;
+use crate::machine::Alarm;
 use crate::status::Status;
-use crate::text;
 
-/// What a sender takes the machine for.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(u8)]
-pub enum Dialect {
-    /// It counts lines.
-    Lines,
-    /// It counts characters.
-    Characters,
-    /// It knows g2core.
-    G2core,
+/// A way to speak to senders. All of it runs in thread mode; lines are without their ends.
+pub trait Dialect {
+    /// How a port is spoken to, if there are several ways; kept with the port. The default counts until settings have been read.
+    type Speech: Copy + Default;
+    /// A line on its way to its answer.
+    type Request: Answers;
+    /// A notice on its way out.
+    type Telling: Tells;
+    /// What is kept between reports.
+    type Memory: Remembers;
+
+    /// How ports are spoken to after a start.
+    fn speech(settings: &Settings) -> Self::Speech;
+
+    /// Begins with a line, of which the sender counts `length` bytes. `None` if there is nothing to answer. The line decides how the
+    /// port is spoken to from now on.
+    fn begin(
+        line: &[u8],
+        length: u16,
+        speech: &mut Self::Speech,
+        settings: &Settings,
+    ) -> Option<Self::Request>;
+
+    /// Answers a line that could not be kept with a status; `line` is what is left of it.
+    fn refuse(
+        status: Status,
+        line: &[u8],
+        length: u16,
+        speech: Self::Speech,
+        settings: &Settings,
+    ) -> Self::Request;
+
+    /// Begins to tell what is so by now.
+    fn tell(notice: Notice, speech: Self::Speech, machine: &mut impl Machine) -> Self::Telling;
+
+    /// Whether blocks of G-code that are carried out, and have no comment, are answered by [`Dialect::put_brief`]: `Some(true)` all,
+    /// `Some(false)` those without a line number, `None` none. Asked before each line: a few cycles.
+    fn brief(speech: Self::Speech, settings: &Settings) -> Option<bool>;
+
+    /// Puts the whole answer to such a block. Called for each usual move: part of its budget.
+    fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out);
+
+    /// Puts the end of a line.
+    fn put_line_end(settings: &Settings, out: &mut impl Out);
+
+    /// Whether empty lines are answered.
+    fn answers_empty(speech: Self::Speech) -> bool;
+
+    /// Whether a [control line](Dialect::is_control) may begin so.
+    fn may_be_control(first: u8) -> bool;
+
+    /// Whether a line is a control line, which overtakes G-code that waits.
+    fn is_control(line: &[u8]) -> bool;
+
+    /// The alarm that a line of at most [`STOP_MAX`](super::STOP_MAX) bytes begins when it arrives, before it is answered.
+    fn asks_alarm(line: &[u8]) -> Option<Alarm>;
 }
 
-/// What a dialect says.
-#[derive(Clone, Copy)]
-pub struct Phrases {
-    /// Before and behind the units of a prompt, if all is well and if not.
-    pub prompt: Text,
-    /// See `prompt`.
-    pub ok: Text,
-    /// See `prompt`.
-    pub err: Text,
-    /// Behind the status code of a prompt; it is left out if this is empty.
-    pub code: Text,
-    /// The length of what answers no line.
-    pub no_line: u8,
+/// A line that is being answered. No answer begins before the G-code of its line has run.
+pub trait Answers {
+    /// The G-code that the next step would ask for with [`Next::Gcode`], if that is so already.
+    fn gcode(&self) -> Option<Span>;
+
+    /// That G-code has run, with this status; whether it may have a `comment`.
+    fn ran(&mut self, status: Status, comment: bool);
+
+    /// Does the next bit of work and puts at most [`CHUNK`](super::CHUNK) bytes. The line is handed in anew each time.
+    fn step(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Next;
+
+    /// Whether something of the answer has been put.
+    fn has_begun(&self) -> bool;
 }
 
-const TINYG: Phrases = Phrases {
-    prompt: text!("tinyg ["),
-    ok: text!("] ok> "),
-    err: text!("] err: "),
-    code: text!(""),
-    no_line: 0,
-};
+/// A notice that is being told.
+pub trait Tells {
+    /// Puts the next part, at most [`CHUNK`](super::CHUNK) bytes. Whether there is more.
+    fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool;
 
-progmem! {
-    static PHRASES: [Phrases; 3] = [
-        TINYG,
-        TINYG,
-        Phrases {
-            prompt: text!("g2core["),
-            err: text!("] err["),
-            code: text!("]: "),
-            no_line: 1,
-            ..TINYG
-        },
-    ];
-
-    /// What g2core calls otherwise: a status, its code there, its text there.
-    static CHANGES: [(Status, u8, Text); 32] = [
-        (Status::Noop, 3, text!("No operation performed")),
-        (Status::BufferFull, 13, text!("Buffer full non-fatal")),
-        (Status::NotAccepted, 106, text!("Command not accepted")),
-        (Status::JsonTooManyPairs, 112, text!("JSON has too many pairs")),
-        (Status::AxisInvalid, 136, text!("Axis invalid for this command")),
-        (Status::AxisDisabled, 137, text!("Axis disabled")),
-        (Status::AxisTargetMissing, 138, text!("Axis target position missing")),
-        (Status::PlaneMissing, 140, text!("Selected plane missing")),
-        (Status::SWordMissing, 178, text!("S word missing")),
-        (Status::SWordInvalid, 179, text!("S word invalid")),
-        (Status::SpindleMustTurn, 152, text!("Spindle must be turning for this command")),
-        (Status::ArcSpecification, 153, text!("Arc specification error")),
-        (Status::PWordMissing, 160, text!("P word missing")),
-        (Status::PWordInvalid, 161, text!("P word invalid")),
-        (Status::PWordNegative, 163, text!("P word negative")),
-        (Status::ToolInvalid, 165, text!("P word not a valid tool number")),
-        (Status::HWordMissing, 170, text!("H word missing")),
-        (Status::HWordInvalid, 171, text!("H word invalid")),
-        (Status::LWordMissing, 172, text!("L word missing")),
-        (Status::LWordInvalid, 173, text!("L word invalid")),
-        (Status::QWordMissing, 174, text!("Q word missing")),
-        (Status::QWordInvalid, 175, text!("Q word invalid")),
-        (Status::RWordMissing, 176, text!("R word missing")),
-        (Status::RWordInvalid, 177, text!("R word invalid")),
-        (Status::TWordMissing, 180, text!("T word missing")),
-        (Status::TWordInvalid, 181, text!("T word invalid")),
-        (Status::Alarmed, 204, text!("Command rejected by ALARM [$clear to reset]")),
-        (Status::LimitHit, 203, text!("Limit hit [$clear to reset, $lim=0 to override]")),
-        (Status::SoftLimit, 220, text!("Soft limit")),
-        (Status::HomingAxis, 241, text!("Homing Err - Bad or no axis specified")),
-        (Status::HomingSwitches, 246, text!("Homing Err - Homing input is misconfigured")),
-        (Status::ProbeTooShort, 251, text!("Probe travel is too small")),
-    ];
+    /// Of a queue report: how many free blocks it has told.
+    fn blocks_free(&self) -> usize;
 }
 
-impl Dialect {
-    /// The one that the settings say.
-    pub fn of(settings: &Settings) -> Self {
-        match (settings.is_g2core(), settings.counts_characters()) {
-            (true, _) => Dialect::G2core,
-            (false, true) => Dialect::Characters,
-            (false, false) => Dialect::Lines,
+/// What is kept between reports.
+pub trait Remembers {
+    /// After a start.
+    fn new() -> Self;
+
+    /// Settings have their defaults again, and so has what reports hold.
+    fn restore(&mut self);
+
+    /// The next report tells everything, for its reader has been told nothing so far.
+    fn refresh(&mut self);
+}
+
+macro_rules! dialects {
+    ($($(#[$what:meta])* $field:ident: $name:ident($dialect:ty) if $feature:literal;)+) => {
+        #[cfg(not(any($(feature = $feature),+)))]
+        compile_error!("an image needs a dialect: one of the features `dialect-...`");
+
+        /// How a port is spoken to: in which dialect, and what that keeps.
+        #[derive(Clone, Copy)]
+        pub enum Speech {
+            $($(#[$what])* #[cfg(feature = $feature)] $name(<$dialect as Dialect>::Speech),)+
         }
-    }
 
-    /// What it says.
-    pub fn phrases(self) -> Phrases {
-        PHRASES.at(self as usize).unwrap_or(TINYG)
-    }
-
-    /// The number of a status.
-    pub fn code(self, status: Status) -> u8 {
-        self.change(status).map_or(status as u8, |(code, _)| code)
-    }
-
-    /// The text of a status; `None` for one that prints its number.
-    pub fn status_text(self, status: Status) -> Option<Text> {
-        self.change(status).map(|(_, text)| text).or_else(|| super::status_text(status))
-    }
-
-    fn change(self, status: Status) -> Option<(u8, Text)> {
-        if self != Dialect::G2core {
-            return None;
+        /// A line on its way to its answer.
+        pub enum Request {
+            $($(#[$what])* #[cfg(feature = $feature)] $name(<$dialect as Dialect>::Request),)+
         }
-        let find = |i| CHANGES.at(i).filter(|(changed, _, _)| *changed == status);
-        (0..CHANGES.len()).find_map(find).map(|(_, code, text)| (code, text))
-    }
+
+        /// A notice on its way out.
+        pub enum Telling {
+            $($(#[$what])* #[cfg(feature = $feature)] $name(<$dialect as Dialect>::Telling),)+
+        }
+
+        /// What the dialects keep between reports.
+        pub struct Memory {
+            $($(#[$what])* #[cfg(feature = $feature)] pub $field: <$dialect as Dialect>::Memory,)+
+        }
+
+        impl Default for Speech {
+            /// In the first dialect of the table that is built in.
+            #[allow(unreachable_code)]
+            fn default() -> Self {
+                $(#[cfg(feature = $feature)]
+                { return Self::$name(Default::default()); })+
+            }
+        }
+
+        impl Speech {
+            /// How ports are spoken to after a start: in the first dialect of the table that is built in.
+            #[allow(unreachable_code)]
+            #[inline(always)]
+            pub fn at_start(settings: &Settings) -> Self {
+                $(#[cfg(feature = $feature)]
+                { return Self::$name(<$dialect>::speech(settings)); })+
+            }
+
+            /// See [`Dialect::brief`].
+            #[inline(always)]
+            pub fn brief(self, settings: &Settings) -> Option<bool> {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(speech) => <$dialect>::brief(speech, settings),)+
+                }
+            }
+
+            /// See [`Dialect::put_brief`].
+            #[inline(always)]
+            pub fn put_brief(self, settings: &Settings, ending: Ending, out: &mut impl Out) {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(_) => <$dialect>::put_brief(settings, ending, out),)+
+                }
+            }
+
+            /// See [`Dialect::put_line_end`].
+            #[inline(always)]
+            pub fn put_line_end(self, settings: &Settings, out: &mut impl Out) {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(_) => <$dialect>::put_line_end(settings, out),)+
+                }
+            }
+
+            /// See [`Dialect::answers_empty`].
+            #[inline(always)]
+            pub fn answers_empty(self) -> bool {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(speech) => <$dialect>::answers_empty(speech),)+
+                }
+            }
+        }
+
+        impl Request {
+            /// See [`Dialect::begin`].
+            #[inline(always)]
+            pub fn begin(
+                line: &[u8],
+                length: u16,
+                speech: &mut Speech,
+                settings: &Settings,
+            ) -> Option<Self> {
+                match speech {
+                    $(#[cfg(feature = $feature)]
+                    Speech::$name(speech) => {
+                        <$dialect>::begin(line, length, speech, settings).map(Self::$name)
+                    })+
+                }
+            }
+
+            /// See [`Dialect::refuse`].
+            #[inline(always)]
+            pub fn refused(
+                status: Status,
+                line: &[u8],
+                length: u16,
+                speech: Speech,
+                settings: &Settings,
+            ) -> Self {
+                match speech {
+                    $(#[cfg(feature = $feature)]
+                    Speech::$name(speech) => {
+                        Self::$name(<$dialect>::refuse(status, line, length, speech, settings))
+                    })+
+                }
+            }
+        }
+
+        impl Answers for Request {
+            #[inline(always)]
+            fn gcode(&self) -> Option<Span> {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(request) => request.gcode(),)+
+                }
+            }
+
+            #[inline(always)]
+            fn ran(&mut self, status: Status, comment: bool) {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(request) => request.ran(status, comment),)+
+                }
+            }
+
+            #[inline(always)]
+            fn step(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Next {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(request) => request.step(line, machine, out),)+
+                }
+            }
+
+            #[inline(always)]
+            fn has_begun(&self) -> bool {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(request) => request.has_begun(),)+
+                }
+            }
+        }
+
+        impl Telling {
+            /// See [`Dialect::tell`].
+            #[inline(always)]
+            pub fn begin(notice: Notice, speech: Speech, machine: &mut impl Machine) -> Self {
+                match speech {
+                    $(#[cfg(feature = $feature)]
+                    Speech::$name(speech) => {
+                        Self::$name(<$dialect>::tell(notice, speech, machine))
+                    })+
+                }
+            }
+        }
+
+        impl Tells for Telling {
+            #[inline(always)]
+            fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(telling) => telling.step(machine, out),)+
+                }
+            }
+
+            #[inline(always)]
+            fn blocks_free(&self) -> usize {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(telling) => telling.blocks_free(),)+
+                }
+            }
+        }
+
+        impl Remembers for Memory {
+            #[inline(always)]
+            fn new() -> Self {
+                Self { $(#[cfg(feature = $feature)] $field: Remembers::new(),)+ }
+            }
+
+            fn restore(&mut self) {
+                $(#[cfg(feature = $feature)] self.$field.restore();)+
+            }
+
+            fn refresh(&mut self) {
+                $(#[cfg(feature = $feature)] self.$field.refresh();)+
+            }
+        }
+
+        /// See [`Dialect::may_be_control`]: in any dialect that is built in.
+        #[inline(always)]
+        pub fn may_be_control(first: u8) -> bool {
+            let mut may = false;
+            $(#[cfg(feature = $feature)]
+            { may |= <$dialect>::may_be_control(first); })+
+            may
+        }
+
+        /// See [`Dialect::is_control`]: in any dialect that is built in.
+        #[inline(always)]
+        pub fn is_control(line: &[u8]) -> bool {
+            let mut is = false;
+            $(#[cfg(feature = $feature)]
+            { is = is || <$dialect>::is_control(line); })+
+            is
+        }
+
+        /// See [`Dialect::asks_alarm`]: in any dialect that is built in.
+        #[inline(always)]
+        pub fn asks_alarm(line: &[u8]) -> Option<Alarm> {
+            let mut alarm = None;
+            $(#[cfg(feature = $feature)]
+            { alarm = alarm.or_else(|| <$dialect>::asks_alarm(line)); })+
+            alarm
+        }
+    };
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::HashSet;
-    use std::string::String;
-
-    #[test]
-    fn each_status_is_changed_once() {
-        let statuses: HashSet<u8> = CHANGES.get().iter().map(|change| change.0 as u8).collect();
-        assert_eq!(statuses.len(), CHANGES.len());
-        let text = |status| -> String {
-            Dialect::G2core.status_text(status).unwrap().bytes().map(char::from).collect()
-        };
-        assert_eq!(Dialect::G2core.code(Status::LimitHit), 203);
-        assert_eq!(text(Status::Alarmed), "Command rejected by ALARM [$clear to reset]");
-        assert_eq!(text(Status::ReadOnly), "Parameter is read-only");
-        assert_eq!(Dialect::Characters.code(Status::LimitHit), 204);
-    }
+dialects! {
+    /// TinyG's, and g2core's.
+    tinyg: Tinyg(tinyg::Tinyg) if "dialect-tinyg";
 }

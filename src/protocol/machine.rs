@@ -1,67 +1,37 @@
-//! What the protocol asks of the machine.
+//! What dialects ask of the machine.
 
-use super::report::StatusReport;
+use super::dialect::Memory;
 use super::value::Value;
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::Change;
 use crate::gcode::tables::Row;
-use crate::machine::Alarm;
-use crate::progmem;
-use crate::progmem::Text;
+use crate::machine::{Alarm, Cycle, Doing};
+use crate::motion::snapshot::Program;
 use crate::status::Status;
-use crate::text;
 use crate::units::Length;
 
-/// What is told beside what has been done; the last one counts most.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
+/// What storing a setting has brought about besides.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Warning {
     /// Nothing.
     #[default]
     None,
-    /// Drivers with so many microsteps are unusual.
-    Microsteps,
     /// The velocity limits of an axis were lowered to what its motors can follow.
     Velocity,
     /// A jerk limit of an axis is not in force beside its acceleration limit.
     Jerk,
-    /// The line has no such rate.
-    Baud,
-    /// There is no such built-in job.
-    Test,
-    /// Where help is.
-    Help,
-    /// How to get into the boot loader.
-    AskBoot,
-    /// The boot loader is next.
-    Boot,
-    /// How to restore the defaults.
-    AskDefaults,
-    /// The defaults have been restored.
-    Defaults,
 }
 
-impl Warning {
-    /// What it says.
-    pub(super) fn text(self) -> Text {
-        WARNINGS.at(self as usize).unwrap_or(text!(""))
-    }
-}
-
-progmem! {
-    // A table, for what the compiler makes of a `match` would be in RAM.
-    static WARNINGS: [Text; 11] = [
-        text!(""),
-        text!("*** WARNING *** Setting non-standard microstep value"),
-        text!("*** WARNING *** Velocity limited by the step rate"),
-        text!("*** WARNING *** Jerk limit has no effect beside ac"),
-        text!("*** WARNING *** Unsupported baud rate specified"),
-        text!("Test not found"),
-        text!("Send $h for help, {sys:n} for the settings"),
-        text!("Send {boot:true} to enter boot loader"),
-        text!("Entering boot loader"),
-        text!("Send {defa:true} to reset to default settings"),
-        text!("Initializing configs to default settings"),
-    ];
+/// How far a hold has come.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Hold {
+    /// There is none, or none that anybody is to see.
+    #[default]
+    None,
+    /// The machine slows down, or goes on again.
+    Slows,
+    /// It stands still.
+    Rests,
 }
 
 /// What is done to the program that is kept.
@@ -75,7 +45,7 @@ pub enum Store<'a> {
     End,
 }
 
-/// The machine behind the protocol. Nothing here waits.
+/// The machine behind the dialects. Nothing here waits.
 pub trait Machine {
     /// The settings in force.
     fn settings(&self) -> &Settings;
@@ -97,9 +67,17 @@ pub trait Machine {
     fn value(&mut self, value: Value) -> i32;
     /// What this step tells of motion is of now if `first`, else of the moment of the last `first`.
     fn moment(&mut self, first: bool);
-    /// What status reports hold.
-    fn report(&mut self) -> &mut StatusReport;
-    /// Restores the defaults of all settings and of the status report, or refuses to: 10 ms on AVR.
+    /// What the dialects keep of their reports.
+    fn memory(&mut self) -> &mut Memory;
+    /// What the machine is doing.
+    fn doing(&mut self) -> Doing;
+    /// What it is about as a whole, held or not.
+    fn cycle(&mut self) -> Cycle;
+    /// How far a hold has come.
+    fn hold(&mut self) -> Hold;
+    /// While the machine rests, what the program has come to.
+    fn rest(&mut self) -> Program;
+    /// Restores the defaults of all settings and of what dialects remember, or refuses to: 10 ms on AVR.
     fn restore(&mut self) -> Status;
     /// Begins an alarm, if there is none as bad.
     fn alarm(&mut self, alarm: Alarm);

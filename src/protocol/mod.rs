@@ -1,86 +1,45 @@
-//! The TinyG protocol: JSON lines in, responses and reports out.
+//! How senders are spoken to: the interface that tasks know, and the dialects behind it.
 //!
-//! Pure and synchronous; the tasks own the bytes and the waiting. A line becomes a [`Request`],
-//! which the parser task steps until it is done; [`Report`] and the [`notice`]s are stepped alike.
-//! No step puts more than [`CHUNK`] bytes, keeps a reference, allocates or recurses. Tables and
-//! texts are in program memory.
+//! A line that has come becomes a [`Request`], which the parser task steps until it is answered. What the machine tells
+//! unasked is a [`Notice`]: it becomes a [`Telling`], which is stepped alike. Both ask the [`Machine`] and write to an [`Out`]. No
+//! step waits, keeps a reference, allocates or recurses, and none puts more than [`CHUNK`] bytes.
 //!
-//! Wire format: TinyG 0.97 build 440.20, by default with the three-element footer `[1,status,free line slots]`;
-//! [`dialect`] has what can be chosen instead.
+//! | module | what it has |
+//! |---|---|
+//! | [`dialect`] | [`Dialect`], what a dialect has to have, and the table of dialects |
+//! | [`line`](mod@line) | what comes in: parts of lines, what is to be done next with one |
+//! | [`machine`], [`value`] | what dialects ask of the machine |
+//! | [`notice`] | what is told unasked |
+//! | [`out`] | where dialects write to |
+//! | [`tinyg`] | TinyG's dialect |
+//!
+//! A dialect spells what is neutral here: the numbers and texts of a [`Status`](crate::status::Status), names of settings and values, what
+//! the machine is [doing](crate::machine::Doing). Which dialects an image has is a Cargo feature each; where there is one, nothing is left
+//! to choose at run time, and the choice costs nothing.
+
+pub mod checksum;
+pub mod dialect;
+pub mod line;
+pub mod machine;
+pub mod notice;
+pub mod out;
+#[cfg(feature = "dialect-tinyg")]
+pub mod tinyg;
+pub mod value;
+
+pub use checksum::Checksum;
+pub use dialect::{
+    Answers, Dialect, Memory, Remembers, Request, Speech, Telling, Tells, asks_alarm, is_control,
+    may_be_control,
+};
+pub use line::{Ending, Next, Span};
+pub use machine::{Hold, Machine, Store, Warning};
+pub use notice::{Notice, Occasion};
+pub use out::Out;
+pub use value::{Value, thousandths};
 
 /// Bytes that one step puts at most.
 pub const CHUNK: usize = 64;
 
-mod amend;
-mod apply;
-mod block;
-mod checksum;
-mod command;
-mod defaults;
-pub mod dialect;
-mod ending;
-mod format;
-mod help;
-mod json;
-mod listing;
-mod machine;
-pub mod notice;
-mod pairs;
-mod place;
-mod program;
-mod prompt;
-mod report;
-mod request;
-mod screen;
-mod status_text;
-mod stop;
-mod token;
-mod value;
-mod wrapped;
-mod write;
-
-pub use block::{is_brief, put_brief};
-pub use checksum::Checksum;
-pub use dialect::Dialect;
-pub use format::Format;
-pub use help::asks_help;
-pub use json::Span;
-pub use machine::{Machine, Store, Warning};
-pub use prompt::put_ready_prompt;
-pub use report::{LONGEST_REPORT, Report, StatusReport, queue_report, receive_report};
-pub use request::{Next, Request};
-pub use status_text::status_text;
-pub use stop::{STOP_MAX, asks_alarm};
-pub use token::Token;
-#[cfg(feature = "std")]
-pub use token::names;
-pub use value::{Value, thousandths};
-pub use write::{Ending, Out, put_line_end};
-
-/// How the host wants to be spoken to: as it spoke last.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Mode {
-    /// In JSON.
-    Json,
-    /// In text, with prompts.
-    Text,
-}
-
-impl Mode {
-    /// The format of unasked reports.
-    fn format(self, machine: &impl Machine) -> Format {
-        match self {
-            Mode::Json => Format::json(machine.settings()),
-            Mode::Text => Format::plain(machine.settings()),
-        }
-    }
-}
-
-#[cfg(test)]
-mod any_line;
-#[cfg(test)]
-mod fake;
-#[cfg(test)]
-mod tests;
-#[cfg(test)]
-mod text_tests;
+/// Longest line that may begin an alarm when it arrives: see [`asks_alarm`].
+pub const STOP_MAX: usize = 32;

@@ -1,23 +1,29 @@
-//! What the machine tells once: that it is ready, and that something has gone wrong.
+//! What the machine tells unasked.
 
-use super::Format;
-use super::machine::Machine;
-use super::token::{Group, Token};
-use super::value::{PROBED, Value};
-use super::write::{Ending, Out, Writer};
-use crate::boards::inputs;
-use crate::config::{Fixed, Settings};
-use crate::progmem;
-use crate::progmem::Text;
 use crate::status::Status;
-use crate::text;
 
-/// The greeting after a reset:
-/// `{"r":{"fv":0.970,"fb":440.20,"hp":1,"hv":8,"id":"...","msg":"SYSTEM READY"},"f":[1,0,0]}`.
-pub struct Banner {
-    stage: u8,
-    occasion: Occasion,
-    format: Format,
+/// Something to tell.
+#[derive(Clone, Copy)]
+pub enum Notice {
+    /// Who the machine is.
+    Greeting(Occasion),
+    /// Somebody is there: the answer to ENQ.
+    Enquiry,
+    /// Something has gone wrong.
+    Exception(Status),
+    /// What probing has found.
+    Probing,
+    /// How the machine stands: a status report.
+    Status,
+    /// A jog has ended, or the queue has been flushed, or both.
+    End {
+        /// The first.
+        jogged: bool,
+        /// The second.
+        flushed: bool,
+    },
+    /// How many blocks are free: a queue report.
+    Queue,
 }
 
 /// Why the machine says who it is.
@@ -27,200 +33,4 @@ pub enum Occasion {
     Defaults,
     /// It is ready.
     Ready,
-}
-
-/// The rows of `sys` that the greeting tells, in its order.
-pub(super) const BANNER_ROWS: u8 = 5;
-
-#[small]
-impl Banner {
-    /// Begins. It is whole whatever the verbosity, unless that is 0.
-    pub fn begin(occasion: Occasion, settings: &Settings) -> Banner {
-        Banner { stage: 0, occasion, format: Format::announcement(settings) }
-    }
-
-    /// Does the next part. Whether there is more to do.
-    #[inline(never)]
-    pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
-        let mut writer = Writer::frame(out, &mut self.format);
-        if self.stage == 0 {
-            writer.begin_response();
-        }
-        match self.stage {
-            0..BANNER_ROWS => {
-                put_row(self.stage, machine, &mut writer);
-            }
-            BANNER_ROWS => {
-                writer.key_text(text!("msg"));
-                writer.string(match self.occasion {
-                    Occasion::Ready => text!("SYSTEM READY"),
-                    Occasion::Defaults => text!("Initializing configs to default settings"),
-                });
-            }
-            _ => {
-                let status = match self.occasion {
-                    Occasion::Ready => Status::Ok,
-                    Occasion::Defaults => Status::Initializing,
-                };
-                writer.end_response(status, Ending::default());
-                return false;
-            }
-        }
-        self.stage += 1;
-        true
-    }
-}
-
-/// One of the rows that tell who we are.
-#[small]
-pub(super) fn put_row<O: Out>(row: u8, machine: &mut impl Machine, writer: &mut Writer<'_, O>) {
-    // The version comes before the build.
-    let token = Token::system(if row < 2 { 1 - row } else { row });
-    writer.key(token.name().bytes());
-    writer.shown(token.read(machine));
-}
-
-progmem! {
-    /// The axes that may be homed.
-    static AXES: [Text; 4] = [text!("x"), text!("y"), text!("z"), text!("a")];
-
-    /// What the switches at the ends of axes are called.
-    static ENDS: [Text; inputs::ENDS] = [
-        text!("xmin"), text!("xmax"), text!("ymin"), text!("ymax"),
-        text!("zmin"), text!("zmax"), text!("amin"), text!("amax"),
-    ];
-}
-
-/// An exception report, `{"er":{"fb":440.20,"st":13,"msg":"Buffer full"}}`; sent whatever the
-/// verbosity, and always as JSON. Of a limit it also says which, `"sw":"xmin"`, of homing the axis,
-/// `"ax":"x"`.
-pub struct Exception {
-    stage: u8,
-    status: Status,
-    format: Format,
-}
-
-#[small]
-impl Exception {
-    /// Begins.
-    pub fn begin(status: Status, settings: &Settings) -> Exception {
-        Exception { stage: 0, status, format: Format::json(settings) }
-    }
-
-    /// Does the next part. Whether there is more to do.
-    #[inline(never)]
-    pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
-        let mut writer = Writer::body(out, &mut self.format);
-        let more = put_exception(self.stage, self.status, machine, &mut writer);
-        self.stage += 1;
-        more
-    }
-}
-
-/// A part of an exception report. Whether there is more to do.
-#[small]
-pub(super) fn put_exception<O: Out>(
-    stage: u8,
-    status: Status,
-    machine: &mut impl Machine,
-    writer: &mut Writer<'_, O>,
-) -> bool {
-    match stage {
-        0 => {
-            writer.open();
-            writer.key_text(text!("er"));
-            writer.open();
-            let build = Token::system(0);
-            writer.key(build.name().bytes());
-            writer.shown(build.read(machine));
-            writer.key_text(text!("st"));
-            writer.fixed(Fixed::int(writer.dialect().code(status).into()));
-        }
-        1 => {
-            if let Some(text) = writer.dialect().status_text(status) {
-                writer.key_text(text!("msg"));
-                writer.string(text);
-            }
-        }
-        2 => {
-            let hit = machine.value(Value::LimitHit) as usize;
-            if let Some(name) = ENDS.at(hit).filter(|_| status == Status::LimitHit) {
-                writer.key_text(text!("sw"));
-                writer.string(name);
-            }
-            let axis = machine.value(Value::Blamed) as usize;
-            if let Some(name) = AXES.at(axis).filter(|_| status.names_axis()) {
-                writer.key_text(text!("ax"));
-                writer.string(name);
-            }
-        }
-        _ => {
-            writer.text(text!("}}"));
-            writer.end_line();
-            return false;
-        }
-    }
-    true
-}
-
-/// What probing has come to, as if somebody had asked:
-/// `{"r":{"prb":{"e":1,"x":20.000,...,"c":0.000}},"f":[1,0,0]}`.
-pub struct Probing {
-    member: u8,
-    format: Format,
-}
-
-#[small]
-impl Probing {
-    /// Begins. It is whole whatever the verbosity, unless that is 0.
-    pub fn begin(settings: &Settings) -> Probing {
-        Probing { member: 0, format: Format::announcement(settings) }
-    }
-
-    /// Does the next part. Whether there is more to do.
-    #[inline(never)]
-    pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
-        let mut writer = Writer::frame(out, &mut self.format);
-        let group = Group::Vector(PROBED);
-        if self.member == 0 {
-            writer.begin_response();
-            writer.key(group.prefix().bytes());
-            writer.open();
-        }
-        match group.member(self.member, machine) {
-            Some((_, token)) => {
-                let name = token.name();
-                writer.key(name.bytes().get(group.prefix().bytes().len()..).unwrap_or_default());
-                writer.shown(token.read(machine));
-                self.member += 1;
-                true
-            }
-            None => {
-                writer.close();
-                writer.end_response(Status::Ok, Ending::default());
-                false
-            }
-        }
-    }
-}
-
-/// Tells that a jog has ended.
-pub fn jog_ended(settings: &Settings, out: &mut impl Out) {
-    let mut format = Format::json(settings);
-    let mut writer = Writer::body(out, &mut format);
-    writer.open();
-    writer.key_text(text!("jog"));
-    writer.fixed(Fixed::int(0));
-    writer.close();
-    writer.end_line();
-}
-
-/// Answers the question whether anybody is there.
-#[small]
-#[inline(never)]
-pub fn acknowledge(settings: &Settings, out: &mut impl Out) {
-    let mut format = Format::json(settings);
-    let mut writer = Writer::body(out, &mut format);
-    writer.text(text!("{\"ack\":true}"));
-    writer.end_line();
 }

@@ -1,115 +1,101 @@
-//! What can be read of the machine beside its settings: names, units and texts, as tables.
+//! What can be asked of the machine beside its settings.
 
-use crate::boards::inputs;
-use crate::config::Fixed;
-use crate::config::name::token;
 use crate::gcode::overrides::Override;
 use crate::gcode::tables::Row;
-use crate::progmem::Text;
-use crate::units::FIRST_ROTARY;
-use crate::{named, progmem, text};
 
 /// A value of the machine, and what [`Machine::value`](super::Machine::value) returns for it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Value {
-    /// Line number of the block read last, which responses tell as `n`.
+    /// Line number of the block read last.
     BlockLine,
-    /// `n`: line number of the block finished last, to its last step.
+    /// Line number of the block finished last, to its last step.
     FinishedLine,
-    /// `line`: line number of the block that moves.
+    /// Line number of the block that moves.
     MotionLine,
-    /// `vel`: speed now, in 0.001 mm/min.
+    /// Speed now, in 0.001 mm/min.
     Velocity,
-    /// `feed`: feed rate, in 0.001 mm/min.
+    /// Feed rate, in 0.001 mm/min.
     Feed,
-    /// `stat`: the state in one number.
-    State,
-    /// `macs`: machine state.
-    Machine,
-    /// `cycs`: cycle.
-    Cycle,
-    /// `mots`: motion.
-    Motion,
-    /// `hold`: feedhold.
-    Hold,
-    /// `unit`: 0 inch, 1 mm.
+    /// 1 if anything is queued or runs.
+    Working,
+    /// 1 if a block is being carried out.
+    Running,
+    /// 0 inch, 1 mm.
     Units,
-    /// `coor`: 0 G53, 1 to 9 G54 to G59.3.
+    /// 0 G53, 1 to 9 G54 to G59.3.
     Coordinates,
-    /// `momo`: see [`MotionMode`](crate::gcode::modal::MotionMode).
+    /// See [`MotionMode`](crate::gcode::modal::MotionMode).
     MotionMode,
-    /// `plan`: 0 to 2 G17 to G19.
+    /// 0 to 2 G17 to G19.
     Plane,
-    /// `path`: 0 G61, 1 G61.1, 2 G64.
+    /// 0 G61, 1 G61.1, 2 G64.
     Path,
-    /// `dist`: 0 G90, 1 G91.
+    /// 0 G90, 1 G91.
     Distance,
-    /// `admo`: 0 G90.1, 1 G91.1.
+    /// 0 G90.1, 1 G91.1.
     ArcDistance,
-    /// `frmo`: 0 G93, 1 G94, 2 G95.
+    /// 0 G93, 1 G94, 2 G95.
     FeedMode,
-    /// `spe`: 1 if the spindle turns.
+    /// 1 if the spindle turns.
     SpindleOn,
-    /// `spd`: 1 if it turns counter-clockwise.
+    /// 1 if it turns counter-clockwise.
     SpindleDirection,
-    /// `sps`: S, in turns per minute.
+    /// S, in turns per minute.
     SpindleSpeed,
-    /// `com`: 1 after M7.
+    /// 1 after M7.
     Mist,
-    /// `cof`: 1 after M8.
+    /// 1 after M8.
     Flood,
-    /// `rst`: why the machine has started, see [`Cause`](crate::hal::resets::Cause).
+    /// Why the machine has started, see [`Cause`](crate::hal::resets::Cause).
     Reset,
-    /// `stv`: how many times steps have waited for the planner in mid-motion since the reset, 255 for more.
+    /// How many times steps have waited for the planner in mid-motion since the reset, 255 for more.
     Starvations,
-    /// `kept`: 1 if all settings and tables are in EEPROM, 0 if some are on their way.
+    /// 1 if all settings and tables are in EEPROM, 0 if some are on their way.
     Kept,
-    /// `tool`: tool number.
+    /// Tool number.
     Tool,
-    /// `home`: 0 not homed, 1 homed, 2 homing.
+    /// 0 not homed, 1 homed, 2 homing.
     Home,
-    /// `qr`: free blocks of the planner; never told as less than six.
+    /// Free blocks of the planner; never told as less than six.
     QueueFree,
-    /// `qi`: blocks added since this was last read.
+    /// Blocks added since this was last read.
     QueueAdded,
-    /// `qo`: blocks removed since this was last read.
+    /// Blocks removed since this was last read.
     QueueRemoved,
-    /// Free line slots, as footers tell them.
+    /// Line slots that a sender may count on.
     SlotsFree,
-    /// `rx`: what the sender may send: lines, or characters if it counts those.
-    Room,
-    /// `mpox` and so on: position in machine coordinates, in units of a `Length`.
+    /// Bytes that the receive ring has room for.
+    BytesFree,
+    /// Position in machine coordinates, in units of a `Length`.
     MachinePosition(u8),
-    /// `posx` and so on: position in work coordinates, in units of a `Length`.
+    /// Position in work coordinates, in units of a `Length`.
     Position(u8),
-    /// `ofsx` and so on: work offset, in units of a `Length`; shown in millimetres in any units.
+    /// Work offset, in units of a `Length`; shown in millimetres in any units.
     Offset(u8),
-    /// `tofx` and so on: tool length, in units of a `Length`.
+    /// Tool length, in units of a `Length`.
     ToolOffset(u8),
-    /// `homx` and so on: 1 if the axis is homed.
+    /// 1 if the axis is homed.
     Homed(u8),
-    /// `g92x` and so on: G92, in force or not, in units of a `Length`.
+    /// G92, in force or not, in units of a `Length`.
     Shift(u8),
-    /// `g54x`, `g28x`, `tt1z` and so on: a value of the interpreter's tables, in units of a `Length`.
+    /// A value of the interpreter's tables, in units of a `Length`.
     Row(Row, u8),
-    /// `mfo`, `mto`, `sso`: an override's factor, in thousandths.
+    /// An override's factor, in thousandths.
     Override(Override),
-    /// `mfoe`, `mtoe`, `ssoe`: 1 if it counts.
+    /// 1 if it counts.
     OverrideOn(Override),
-    /// `pwr1` and so on: 1 if the motor is powered.
+    /// 1 if the motor is powered.
     Powered(u8),
-    /// `_tex` and so on: where the lines read so far end, in units of a `Length`.
+    /// Where the lines read so far end, in units of a `Length`.
     Target(u8),
-    /// `_ts1` and so on: where exec has brought a motor, in steps.
+    /// Where exec has brought a motor, in steps.
     Steps(u8),
-    /// What there is none of: `fd`, `ma`, `_xs1`, `_fe1`.
-    Zero,
-    /// `in1` to `in8`, `inp`, `ind`, `ine`, of [`inputs`](crate::boards::inputs): 1 if the switch is worked, 0 if
-    /// not, -1 if there is none or its setting is 0.
+    /// An input of [`inputs`](crate::boards::inputs): 1 if the switch is worked, 0 if not, -1 if there is none or its
+    /// setting is 0.
     Input(u8),
-    /// `prbe`: 0 no contact, 1 contact, 2 probing.
+    /// 0 no contact, 1 contact, 2 probing.
     ProbeState,
-    /// `prbx` and so on: where the contact was, in units of a `Length`.
+    /// Where the contact was, in units of a `Length`.
     Probed(u8),
     /// The end whose limit has been hit, which exceptions tell; -1 for none.
     LimitHit,
@@ -123,256 +109,6 @@ pub fn thousandths(speed: f32) -> i32 {
     (speed * 1e3 + if speed < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 
-/// Most steps that are shown: with two decimals they fit.
-const STEPS_MAX: i32 = i32::MAX / 100;
-
-/// What a value is measured in.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(u8)]
-pub enum Form {
-    /// An integer, or a choice.
-    Count,
-    /// A speed.
-    Speed,
-    /// A factor, in thousandths.
-    Factor,
-    /// A length or angle.
-    Length,
-    /// A length in millimetres whatever the units, or an angle.
-    Millimetres,
-    /// The same with two decimals.
-    Rough,
-    /// Steps, with two decimals.
-    Steps,
-}
-
-#[small]
-impl Form {
-    /// `value` as shown, lengths in inches if `inches`.
-    pub fn show(self, value: i32, inches: bool) -> Fixed {
-        let (stored, shown) = match self {
-            Form::Count => return Fixed::int(value),
-            Form::Factor => return Fixed { value, decimals: 3 },
-            Form::Steps => {
-                let value = value.clamp(-STEPS_MAX, STEPS_MAX).wrapping_mul(100);
-                return Fixed { value, decimals: 2 };
-            }
-            Form::Rough => (4, 2),
-            Form::Speed => (3, 2),
-            Form::Length | Form::Millimetres => (4, 3),
-        };
-        let value = Fixed { value, decimals: stored };
-        if inches && matches!(self, Form::Speed | Form::Length) {
-            value.inches(shown)
-        } else {
-            value.rounded(shown)
-        }
-    }
-}
-
-/// How a place on an axis is shown: an angle never in inches.
-#[small]
-pub fn place_form(axis: u8) -> Form {
-    if usize::from(axis) < FIRST_ROTARY { Form::Length } else { Form::Millimetres }
-}
-
-/// A value with a name of its own.
-#[derive(Clone, Copy)]
-pub struct Single {
-    /// Its name, zero padded.
-    pub token: [u8; 4],
-    /// What it is.
-    pub value: Value,
-    /// What it is measured in.
-    pub form: Form,
-    /// What text reports call it; empty if they do not know it.
-    pub label: Text,
-    /// The names of its numbers from 0, separated by `|`; empty if they have none.
-    pub choices: Text,
-}
-
-named! { Single, 4 }
-
-/// Values of each axis or motor.
-#[derive(Clone, Copy)]
-pub struct Vector {
-    /// The group's name, zero padded.
-    pub token: [u8; 4],
-    /// What they are measured in.
-    pub form: Form,
-    /// Members: axes, motors, or inputs. More than axes only in the last row.
-    pub members: u8,
-    /// What text reports call it, behind the axis's letter.
-    pub label: Text,
-}
-
-named! { Vector, 4 }
-
-#[small]
-impl Vector {
-    /// How member `index` is shown: an angle never in inches.
-    pub fn form(&self, index: u8) -> Form {
-        if self.form == Form::Length { place_form(index) } else { self.form }
-    }
-}
-
-/// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 43;
-/// Entries of [`VECTORS`].
-pub const VECTOR_COUNT: usize = 17;
-/// The number of the vector `g92`.
-pub const SHIFT: u8 = 5;
-/// The number of the vector `prb`, whose group begins with `prbe`.
-pub const PROBED: u8 = 15;
-/// The number of `prbe`.
-pub const PROBE_STATE: u8 = SINGLE_COUNT as u8 - 1;
-
-const NONE: Text = text!("");
-const LINE: Text = text!("Line number:");
-const STATES: Text = text!(
-    "Initializing|Ready|Alarm|Stop|End|Run|Hold|Probe|Cycle|Homing|Jog|Interlock|Shutdown|Panic"
-);
-const MACHINE: Text = text!("Initializing|Ready|Alarm|Stop|End|Cycle|Interlock|Shutdown|Panic");
-const COORDINATES: Text = text!(
-    "G53 - machine coordinate system|G54 - coordinate system 1|G55 - coordinate system 2|\
-     G56 - coordinate system 3|G57 - coordinate system 4|G58 - coordinate system 5|\
-     G59 - coordinate system 6|G59.1|G59.2|G59.3"
-);
-const MOTION: Text = text!(
-    "G0  - linear traverse|G1  - linear feed|G2  - clockwise arc feed|\
-     G3  - counter clockwise arc feed|G80 - cancel motion mode (none active)|\
-     G38.2 - probe|G81|G82|G83|G84|G85|G86|G87|G88|G89|G73|G38.3|G38.4|G38.5"
-);
-const FEED: Text = text!(
-    "G93 - inverse time mode|G94 - units-per-minute mode (i.e. feedrate mode)|\
-     G95 - units-per-revolution mode"
-);
-const DISTANCE: Text = text!("G90 - absolute distance mode|G91 - incremental distance mode");
-const ARC_DISTANCE: Text =
-    text!("G90.1 - absolute distance mode|G91.1 - incremental distance mode (default mode)");
-const ON: Text = text!("Off|On");
-const PATH: Text = text!("G61 - exact path mode|G61.1 - exact stop mode|G64 - continuous mode");
-
-const PROBE: Value = Value::Input(inputs::PROBE as u8);
-const DOOR: Value = Value::Input(inputs::DOOR as u8);
-const STOP: Value = Value::Input(inputs::STOP as u8);
-
-#[small]
-const fn count(name: &str, value: Value, label: Text, choices: Text) -> Single {
-    Single { token: token(name), value, form: Form::Count, label, choices }
-}
-
-#[small]
-const fn speed(name: &str, value: Value, label: Text) -> Single {
-    Single { token: token(name), value, form: Form::Speed, label, choices: NONE }
-}
-
-#[small]
-const fn factor(name: &str, of: Override, label: Text) -> Single {
-    let (value, form) = (Value::Override(of), Form::Factor);
-    Single { token: token(name), value, form, label, choices: NONE }
-}
-
-#[small]
-const fn single(name: &str, value: Value, form: Form) -> Single {
-    Single { token: token(name), value, form, label: NONE, choices: NONE }
-}
-
-#[small]
-const fn vector(name: &str, form: Form, members: u8, label: Text) -> Vector {
-    Vector { token: token(name), form, members, label }
-}
-
-progmem! {
-    /// Values with names of their own.
-    pub static SINGLES: [Single; SINGLE_COUNT] = [
-        count("n", Value::FinishedLine, text!("Line finished:"), NONE),
-        count("line", Value::MotionLine, LINE, NONE),
-        speed("vel", Value::Velocity, text!("Velocity:")),
-        speed("feed", Value::Feed, text!("Feed rate:")),
-        count("stat", Value::State, text!("Machine state:"), STATES),
-        count("macs", Value::Machine, text!("Raw machine state:"), MACHINE),
-        count("cycs", Value::Cycle, text!("Cycle state:"), text!("Off|Machining|Probe|Homing|Jog")),
-        count("mots", Value::Motion, text!("Motion state:"), text!("Stop|Run|Hold")),
-        count("hold", Value::Hold, text!("Feedhold state:"), text!("Off|Sync|Plan|Decel|Hold|End-Hold")),
-        count("unit", Value::Units, text!("Units:"), text!("G20 - inches mode|G21 - millimeter mode")),
-        count("coor", Value::Coordinates, text!("Coordinate system:"), COORDINATES),
-        count("momo", Value::MotionMode, text!("Motion mode:"), MOTION),
-        count("plan", Value::Plane, text!("Plane:"), text!("G17 - XY plane|G18 - XZ plane|G19 - YZ plane")),
-        count("path", Value::Path, text!("Path Mode:"), PATH),
-        count("dist", Value::Distance, text!("Distance mode:"), DISTANCE),
-        count("frmo", Value::FeedMode, text!("Feed rate mode:"), FEED),
-        count("tool", Value::Tool, text!("Tool number"), NONE),
-        count("home", Value::Home, text!("Homing state:"), text!("Not Homed|Homed|Homing")),
-        count("qr", Value::QueueFree, NONE, NONE),
-        count("qi", Value::QueueAdded, NONE, NONE),
-        count("qo", Value::QueueRemoved, NONE, NONE),
-        count("rx", Value::Room, NONE, NONE),
-        count("admo", Value::ArcDistance, text!("Arc Distance mode:"), ARC_DISTANCE),
-        count("spe", Value::SpindleOn, text!("Spindle:"), ON),
-        count("spd", Value::SpindleDirection, text!("Spindle direction:"), text!("CW|CCW")),
-        count("sps", Value::SpindleSpeed, text!("Spindle speed:"), NONE),
-        count("com", Value::Mist, text!("Mist coolant:"), ON),
-        count("cof", Value::Flood, text!("Flood coolant:"), ON),
-        factor("mfo", Override::Feed, text!("Feed override:")),
-        factor("mto", Override::Traverse, text!("Traverse override:")),
-        factor("sso", Override::Spindle, text!("Spindle override:")),
-        count("mfoe", Value::OverrideOn(Override::Feed), text!("Feed override enable:"), ON),
-        count("mtoe", Value::OverrideOn(Override::Traverse), text!("Traverse override enable:"), ON),
-        count("ssoe", Value::OverrideOn(Override::Spindle), text!("Spindle override enable:"), ON),
-        count("fd", Value::Zero, NONE, NONE),
-        single("ma", Value::Zero, Form::Length),
-        count("rst", Value::Reset, text!("Last reset:"), text!("Power on|External|Brown-out|Watchdog|Asked for")),
-        count("stv", Value::Starvations, text!("Late segments:"), NONE),
-        count("kept", Value::Kept, NONE, NONE),
-        count("inp", PROBE, text!("Probe:"), NONE),
-        count("ind", DOOR, text!("Door:"), NONE),
-        count("ine", STOP, text!("Emergency stop:"), NONE),
-        count("prbe", Value::ProbeState, text!("Probe state:"), text!("Failed|Succeeded|Waiting")),
-    ];
-
-    /// Values of each axis or motor; [`vector_value`] gives the order.
-    pub static VECTORS: [Vector; VECTOR_COUNT] = [
-        vector("mpo", Form::Millimetres, 6, text!(" machine posn:")),
-        vector("pos", Form::Length, 6, text!(" position:")),
-        vector("ofs", Form::Millimetres, 6, text!(" work offset:")),
-        vector("hom", Form::Count, 6, text!(" axis homing state:")),
-        vector("tof", Form::Millimetres, 6, text!(" tool length:")),
-        vector("g92", Form::Length, 6, NONE),
-        vector("pwr", Form::Count, 4, NONE),
-        vector("_te", Form::Rough, 6, NONE),
-        vector("_tr", Form::Rough, 6, NONE),
-        vector("_ts", Form::Steps, 4, NONE),
-        vector("_ps", Form::Steps, 4, NONE),
-        vector("_cs", Form::Steps, 4, NONE),
-        vector("_es", Form::Steps, 4, NONE),
-        vector("_xs", Form::Steps, 4, NONE),
-        vector("_fe", Form::Steps, 4, NONE),
-        vector("prb", Form::Millimetres, 6, NONE),
-        vector("in", Form::Count, inputs::ENDS as u8, NONE),
-    ];
-}
-
-/// Member `index` of a vector.
-#[small]
-pub fn vector_value(vector: u8, index: u8) -> Value {
-    match vector {
-        0 => Value::MachinePosition(index),
-        1 => Value::Position(index),
-        2 => Value::Offset(index),
-        3 => Value::Homed(index),
-        4 => Value::ToolOffset(index),
-        SHIFT => Value::Shift(index),
-        6 => Value::Powered(index),
-        7 => Value::Target(index),
-        8 => Value::MachinePosition(index),
-        9..13 => Value::Steps(index),
-        13 | 14 => Value::Zero,
-        PROBED => Value::Probed(index),
-        _ => Value::Input(index),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -383,14 +119,5 @@ mod tests {
         assert_eq!(thousandths(-0.0005), -1);
         assert_eq!(thousandths(1e30), i32::MAX);
         assert_eq!(thousandths(f32::NAN), 0);
-    }
-
-    #[test]
-    fn shows_in_the_units_in_force() {
-        let show = |form: Form, value, inches| form.show(value, inches);
-        assert_eq!(show(Form::Speed, 25_400, true), Fixed { value: 100, decimals: 2 });
-        assert_eq!(show(Form::Length, 254_000, true), Fixed { value: 1000, decimals: 3 });
-        assert_eq!(show(Form::Millimetres, 254_000, true), Fixed { value: 25_400, decimals: 3 });
-        assert_eq!(show(Form::Count, 7, true), Fixed::int(7));
     }
 }

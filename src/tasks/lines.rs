@@ -17,7 +17,7 @@ use crate::hal::imp::text::copy_printing;
 use crate::hal::ring::Window;
 use crate::hal::serial::TAKEN_RETURN;
 use crate::machine::Alarm;
-use crate::protocol::{asks_alarm, asks_help};
+use crate::protocol::{asks_alarm, is_control, may_be_control};
 use crate::status::Status;
 
 /// Line slots, beside the one for control lines that overtake. Senders count on eight.
@@ -490,54 +490,15 @@ impl LinePool {
     }
 }
 
-/// Whether a control line may begin so.
-pub fn may_be_control(byte: u8) -> bool {
-    matches!(byte, b'{' | b'$' | ASKS | b'h' | b'H')
-}
-
 /// Whether a byte is a blank.
 pub fn is_blank(byte: u8) -> bool {
     byte == b' ' || byte == b'\t'
 }
 
-/// Control lines are those whose first character says so; JSON that holds G-code is data.
+/// What to do with a line that has come whole.
+#[inline(always)]
 fn classify(line: &[u8]) -> Class {
-    match line.first() {
-        Some(b'$' | b'?') => Class::Control,
-        Some(b'{') if !holds_gcode(line) => Class::Control,
-        Some(b'h' | b'H') if asks_help(line) => Class::Control,
-        _ => Class::Data,
-    }
-}
-
-/// Whether a line of JSON is `gc`, or a `txt` that is no line of text mode, as far as it has come. Either may stand behind `tid`.
-#[inline(never)]
-#[small]
-fn holds_gcode(line: &[u8]) -> bool {
-    // The last letters of a name, and whether its value is being read.
-    let (mut last, mut before, mut within) = (0, 0, false);
-    for byte in line.iter().skip(1) {
-        // Letters in lower case; others that count here stay as they are, and a tab is a parenthesis.
-        let byte = *byte | b' ';
-        if matches!(byte, b' ' | b'"' | b')') {
-            continue;
-        }
-        if within {
-            if last == b't' {
-                return !matches!(byte, b'$' | b'?');
-            }
-            within = byte != b',';
-        } else if byte == b':' {
-            match (before, last) {
-                (b'g', b'c') => return true,
-                (b'x', b't') | (b'i', b'd') => within = true,
-                _ => return false,
-            }
-        } else {
-            (before, last) = (last, byte);
-        }
-    }
-    false
+    if is_control(line) { Class::Control } else { Class::Data }
 }
 
 #[cfg(test)]

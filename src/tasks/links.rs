@@ -43,7 +43,7 @@ use crate::hal::serial::PORTS;
 use crate::jobs::Job;
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue;
-use crate::protocol::StatusReport;
+use crate::protocol::Memory;
 
 /// The links. One for the machine, made at start-up.
 pub struct Links {
@@ -81,8 +81,8 @@ pub struct Links {
     pub probe: Probe,
     /// Real-time characters that have not had all their effect yet. Of the control task and the reader, with `tasks::hold`.
     pub signs: Signs,
-    /// What status reports hold.
-    pub report: RefCell<StatusReport>,
+    /// What dialects keep between reports.
+    pub report: RefCell<Memory>,
     /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.
     pub restart: Cell<Option<bool>>,
     /// The built-in job that runs.

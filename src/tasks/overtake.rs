@@ -19,11 +19,11 @@
 use heapless::Vec;
 
 use super::alarm;
-use super::lines::{LinePool, is_blank, may_be_control};
+use super::lines::{LinePool, is_blank};
 use super::links::Links;
 use crate::hal::ring::Window;
 use crate::hal::serial::{CLEAN, CUT, GO, MARKS, TAKEN, TAKEN_RETURN};
-use crate::protocol::{STOP_MAX, asks_alarm};
+use crate::protocol::{STOP_MAX, asks_alarm, may_be_control};
 
 /// How far a ring has been looked through.
 pub struct Scan {

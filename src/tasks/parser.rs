@@ -23,7 +23,7 @@ use super::alarm;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::ports::{Chosen, Port};
-use super::reporter::{What, tell_at_once};
+use super::reporter::tell_at_once;
 use super::tx::Tx;
 use super::view::View;
 use crate::gcode::command::Stop;
@@ -37,9 +37,7 @@ use crate::hal::serial::{PORTS, USB};
 use crate::jobs::Job;
 use crate::machine::alarm::is_program_end;
 use crate::machine::{self, Alarm};
-use crate::protocol::{
-    Ending, Mode, Next, Out, Request, Span, asks_alarm, is_brief, put_brief, put_line_end,
-};
+use crate::protocol::{Answers, Ending, Next, Notice, Out, Request, Span, asks_alarm};
 use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
@@ -279,13 +277,11 @@ impl Parser {
 #[inline(never)]
 #[small]
 fn tell(links: &Links, port: &Port) -> bool {
-    let what = if port.enquiry.get() { What::Enquiry } else { What::Exception(Status::BufferFull) };
+    let asked = port.enquiry.get();
+    let what = if asked { Notice::Enquiry } else { Notice::Exception(Status::BufferFull) };
     let told = tell_at_once(links, port, what);
     if told {
-        match what {
-            What::Enquiry => port.enquiry.set(false),
-            _ => port.lost.set(false),
-        }
+        if asked { &port.enquiry } else { &port.lost }.set(false);
     }
     told
 }
@@ -458,15 +454,12 @@ enum Usual {
 #[inline(never)]
 fn usual(links: &Links) -> Usual {
     let port = links.feeder();
-    if port.mode.get() != Mode::Json {
-        return Usual::NotTried;
-    }
+    let (speech, settings) = (port.speech.get(), links.settings.borrow());
+    let Some(numbered) = speech.brief(&settings) else { return Usual::NotTried };
     let Ok(mut tx) = port.tx.try_lock() else { return Usual::NotTried };
     let mut lines = port.lines.borrow_mut();
     let Some(line) = lines.oldest() else { return Usual::NotTried };
-    let settings = links.settings.borrow();
-    let numbered = is_brief(&settings, true);
-    if !tx.has_room() || settings.echo() || !(numbered || is_brief(&settings, false)) {
+    if !tx.has_room() || settings.echo() {
         return Usual::NotTried;
     }
     let mut commands = links.commands.borrow_mut();
@@ -476,7 +469,7 @@ fn usual(links: &Links) -> Usual {
     links.commands_taken.set(true);
     links.planner_wake.signal();
     let ending = Ending { free: port.promise(&lines), length: lines.oldest_length() };
-    put_brief(&settings, ending, &mut *tx);
+    speech.put_brief(&settings, ending, &mut *tx);
     tx.flush();
     lines.remove_oldest();
     links.pool_space.signal();
@@ -501,17 +494,17 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
     let Chosen { port, id, class } = *chosen;
     let lines = port.lines.borrow();
     let (line, length) = (lines.text(id), lines.length(id));
-    let mut mode = port.mode.get();
+    let mut speech = port.speech.get();
     let settings = links.settings.borrow();
     let mut request = match class {
-        Class::Fault(status) => Request::refused(status, line, length, mode, &settings),
-        _ => match Request::begin(line, length, &mut mode, &settings) {
+        Class::Fault(status) => Request::refused(status, line, length, speech, &settings),
+        _ => match Request::begin(line, length, &mut speech, &settings) {
             Some(request) => request,
             None => return Begun::Silent,
         },
     };
     drop(settings);
-    port.mode.set(mode);
+    port.speech.set(speech);
     port.has_stopped.set(class == Class::Control && asks_alarm(line).is_some());
     if let Some(block) = request.gcode() {
         let (status, commented) = run_block(links, port, block.of(line), tried);
@@ -537,7 +530,7 @@ fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> boo
     *at += part.len() as u8;
     let more = part.len() == ECHO;
     if !more {
-        put_line_end(&links.settings.borrow(), tx);
+        port.speech.get().put_line_end(&links.settings.borrow(), tx);
     }
     tx.flush();
     more

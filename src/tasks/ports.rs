@@ -19,7 +19,7 @@ use super::tx::Tx;
 use super::view::{Seen, View};
 use crate::hal::imp::uart;
 use crate::hal::serial::{USB, is_shared};
-use crate::protocol::Mode;
+use crate::protocol::{Remembers, Speech};
 use crate::status::Status;
 
 /// How long control lines of USB may be that overtake, and those of the other port.
@@ -43,7 +43,7 @@ pub struct Port {
     /// The line to the sender, for the parser and the reporter. The mutex knows of one task that waits, the reporter.
     pub tx: Mutex<NoopRawMutex, Tx>,
     /// How the sender wants to be answered.
-    pub mode: Cell<Mode>,
+    pub speech: Cell<Speech>,
     /// The line that is being answered has begun the alarm that it asks for when it arrived ([`stop`](super::stop)).
     pub has_stopped: Cell<bool>,
     /// The sender asks whether anybody is there: control sets it, the parser answers.
@@ -66,7 +66,7 @@ impl Port {
                 if number == USB { RESERVE } else { AUX_RESERVE },
             )),
             tx: Mutex::new(tx),
-            mode: Cell::new(Mode::Json),
+            speech: Cell::default(),
             has_stopped: Cell::new(false),
             enquiry: Cell::new(false),
             seen: Cell::default(),

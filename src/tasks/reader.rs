@@ -25,7 +25,6 @@ use crate::hal::serial::{
     TAKEN_RETURN, USB, high_water, is_shared, low_water,
 };
 use crate::machine;
-use crate::protocol::Mode;
 use crate::status::Status;
 
 /// Pieces taken before others get a turn: a piece is a line, or a part of one, and its end.
@@ -137,7 +136,7 @@ impl<const N: usize> Intake<N> {
     fn turn(&mut self, links: &Links) -> Left {
         let mut pool = self.port.lines.borrow_mut();
         let pool = &mut *pool;
-        pool.keep_empty(self.port.mode.get() == Mode::Text);
+        pool.keep_empty(self.port.speech.get().answers_empty());
         for _ in 0..TURN {
             if self.refused > 0 && !self.refuse(pool, links) {
                 return Left::Full;

@@ -21,10 +21,9 @@ use crate::hal::imp::time::millis;
 use crate::hal::imp::uart;
 use crate::hal::serial::is_shared;
 use crate::jobs::Job;
-use crate::protocol::notice::{Banner, Exception, Occasion, Probing, acknowledge, jog_ended};
-use crate::protocol::{
-    Machine, Mode, Report, Value, put_ready_prompt, queue_report, receive_report,
-};
+use crate::machine::Doing;
+use crate::motion::snapshot::Program;
+use crate::protocol::{Hold, Machine, Notice, Occasion, Telling, Tells};
 use crate::status::Status;
 
 /// How often a busy machine is looked at, ms.
@@ -34,8 +33,7 @@ const PATIENCE: u8 = 20;
 
 /// What was told last.
 struct Told {
-    state: i32,
-    hold: i32,
+    state: State,
     blocks_free: usize,
     at: u32,
     starved: bool,
@@ -49,7 +47,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         greeting = (occasion != Occasion::Ready).then_some(Occasion::Ready);
     }
     let mut told =
-        Told { state: 0, hold: 0, blocks_free: queue_free(), at: millis(), starved: false };
+        Told { state: State::FIRST, blocks_free: queue_free(), at: millis(), starved: false };
     let mut due = true;
     loop {
         // Once: `stv` counts the others.
@@ -64,30 +62,30 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             links.parser_wake.signal();
         }
         if let Some(status) = links.notices.exception.take() {
-            tell(links, links.told(), What::Exception(status)).await;
+            tell(links, links.told(), Notice::Exception(status)).await;
         }
         if links.probe.take_news() {
             // The planner waits for it.
             flags::set(Event::BlockDone);
-            tell(links, links.told(), What::Probing).await;
+            tell(links, links.told(), Notice::Probing).await;
         }
-        let (state, hold) = state_of(links);
+        let state = State::now(links);
         let (jogged, flushed) = (links.notices.jogged.take(), links.notices.flushed.take());
         if jogged || flushed {
-            tell(links, links.told(), What::End { jogged, flushed }).await;
+            tell(links, links.told(), Notice::End { jogged, flushed }).await;
         }
         if queue_free() != told.blocks_free && reports_queue(links) {
-            told.blocks_free = tell(links, links.told(), What::Queue).await;
+            told.blocks_free = tell(links, links.told(), Notice::Queue).await;
         }
         let elapsed = millis().wrapping_sub(told.at);
         let interval = u32::from(links.settings.borrow().status_interval_ms());
-        let moves = moves(state, hold);
+        let moves = moves(state.doing, state.hold);
         due |= moves;
-        if (state, hold) != (told.state, told.hold) || (due && elapsed >= interval) {
-            (told.state, told.hold) = (state, hold);
+        if state != told.state || (due && elapsed >= interval) {
+            told.state = state;
             told.at = millis();
             due = false;
-            tell(links, links.told(), What::Status).await;
+            tell(links, links.told(), Notice::Status).await;
         }
         links.reporter_wake.set_polling(moves && !reports_queue(links));
         if due || moves {
@@ -100,10 +98,27 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
     }
 }
 
-/// `stat` and `hold`.
-fn state_of(links: &Links) -> (i32, i32) {
-    let view = View::of(links, links.told());
-    (view.state(), view.hold())
+/// A change of this is told at once.
+#[derive(Clone, Copy, PartialEq)]
+struct State {
+    doing: Doing,
+    hold: Hold,
+    /// While the machine rests.
+    rest: Program,
+}
+
+impl State {
+    /// Another one than ever is.
+    const FIRST: Self = Self { doing: Doing::Rests, hold: Hold::Slows, rest: Program::Ready };
+
+    #[inline(never)]
+    #[small]
+    fn now(links: &Links) -> Self {
+        let mut view = View::of(links, links.told());
+        let (doing, hold) = (view.doing(), view.hold());
+        let rest = if doing == Doing::Rests { view.rest() } else { Program::Ready };
+        Self { doing, hold, rest }
+    }
 }
 
 /// Whether the sender wants to know of each block that comes or goes.
@@ -111,120 +126,34 @@ fn reports_queue(links: &Links) -> bool {
     links.settings.borrow().queue_verbosity() != 0
 }
 
-/// What can be told.
-#[derive(Clone, Copy)]
-pub enum What {
-    /// Who the machine is; in text mode with the first prompt.
-    Greeting(Occasion),
-    /// The answer to ENQ.
-    Enquiry,
-    /// Something has gone wrong.
-    Exception(Status),
-    /// What probing has found.
-    Probing,
-    /// A status report.
-    Status,
-    /// A jog has ended, or the queue has been flushed, or both.
-    End {
-        /// The first.
-        jogged: bool,
-        /// The second.
-        flushed: bool,
-    },
-    /// A queue report.
-    Queue,
-}
-
-/// How far it has been told.
-enum Telling {
-    Greeting(Banner, Occasion),
-    Enquiry,
-    Exception(Exception),
-    Probing(Probing),
-    Status(Option<Report>),
-    End {
-        jogged: bool,
-        flushed: bool,
-    },
-    /// How many blocks are free, as it was told.
-    Queue(usize),
-}
-
+/// Begins to tell it on a port. What is told is what is so by now.
+#[inline(never)]
 #[small]
-impl Telling {
-    /// Begins. What is told is what is so by now.
-    #[inline(never)]
-    fn begin(what: What, links: &Links, port: &Port) -> Self {
-        let settings = links.settings.borrow();
-        match what {
-            What::Greeting(occasion) => {
-                Self::Greeting(Banner::begin(occasion, &settings), occasion)
-            }
-            What::Enquiry => Self::Enquiry,
-            What::Exception(status) => Self::Exception(Exception::begin(status, &settings)),
-            What::Probing => Self::Probing(Probing::begin(&settings)),
-            What::Status => {
-                drop(settings);
-                Self::Status(Report::begin(port.mode.get(), &mut View::of(links, port)))
-            }
-            What::End { jogged, flushed } => Self::End { jogged, flushed },
-            What::Queue => Self::Queue(0),
-        }
-    }
+fn begin(notice: Notice, links: &Links, port: &Port) -> Telling {
+    Telling::begin(notice, port.speech.get(), &mut View::of(links, port))
+}
 
-    /// Puts the next part. Whether there is more.
-    #[inline(never)]
-    fn step(&mut self, links: &Links, port: &Port, tx: &mut Tx) -> bool {
-        let view = &mut View::of(links, port);
-        let mode = port.mode.get();
-        let more = match self {
-            Self::Greeting(banner, occasion) => {
-                let more = banner.step(view, tx);
-                if !more && *occasion == Occasion::Ready && mode == Mode::Text {
-                    put_ready_prompt(view, tx);
-                }
-                more
-            }
-            Self::Enquiry => {
-                acknowledge(view.settings(), tx);
-                false
-            }
-            Self::Exception(exception) => exception.step(view, tx),
-            Self::Probing(probing) => probing.step(view, tx),
-            Self::Status(report) => report.as_mut().is_some_and(|report| report.step(view, tx)),
-            Self::End { jogged, flushed } => {
-                if core::mem::take(jogged) {
-                    jog_ended(view.settings(), tx);
-                    *flushed
-                } else {
-                    queue_report(mode, view, tx);
-                    receive_report(mode, view, tx);
-                    false
-                }
-            }
-            Self::Queue(free) => {
-                *free = view.value(Value::QueueFree) as usize;
-                queue_report(mode, view, tx);
-                false
-            }
-        };
-        tx.flush();
-        more
-    }
+/// Puts the next part. Whether there is more.
+#[inline(never)]
+#[small]
+fn step(telling: &mut Telling, links: &Links, port: &Port, tx: &mut Tx) -> bool {
+    let more = telling.step(&mut View::of(links, port), tx);
+    tx.flush();
+    more
 }
 
 /// Tells it on a port, a part at a time: for a millisecond in one turn, if there is room. Of a queue
 /// report returns how many blocks are free in it, which may have changed during the wait for the
 /// transmitter.
-async fn tell(links: &Links, port: &Port, what: What) -> usize {
-    let mut tx = match what {
-        What::Status | What::Exception(_) => port.tx_behind_answers().await,
+async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
+    let mut tx = match notice {
+        Notice::Status | Notice::Exception(_) => port.tx_behind_answers().await,
         _ => port.tx.lock().await,
     };
-    let mut telling = Telling::begin(what, links, port);
+    let mut telling = begin(notice, links, port);
     loop {
         tx.room().await;
-        if !telling.step(links, port, &mut tx) {
+        if !step(&mut telling, links, port, &mut tx) {
             break;
         }
         // A status report takes 4 ms, and the ring of a second port may be full in 5.
@@ -235,19 +164,19 @@ async fn tell(links: &Links, port: &Port, what: What) -> usize {
     drop(tx);
     // A line may wait for the transmitter.
     links.parser_wake.signal();
-    if let Telling::Queue(free) = telling { free } else { 0 }
+    telling.blocks_free()
 }
 
 /// Tells something short on a port, if nobody else talks there and there is room for it: at most 64 bytes, or all of an
 /// empty ring for a greeting. Else returns false.
 #[inline(never)]
 #[small]
-pub fn tell_at_once(links: &Links, port: &Port, what: What) -> bool {
+pub fn tell_at_once(links: &Links, port: &Port, notice: Notice) -> bool {
     let Ok(mut tx) = port.tx.try_lock() else { return false };
-    let fits = if matches!(what, What::Greeting(_)) { tx.is_empty() } else { tx.has_room() };
+    let fits = if matches!(notice, Notice::Greeting(_)) { tx.is_empty() } else { tx.has_room() };
     if fits {
-        let mut telling = Telling::begin(what, links, port);
-        while telling.step(links, port, &mut tx) {}
+        let mut telling = begin(notice, links, port);
+        while step(&mut telling, links, port, &mut tx) {}
     }
     fits
 }
@@ -255,11 +184,11 @@ pub fn tell_at_once(links: &Links, port: &Port, what: What) -> bool {
 /// Says who the machine is. The other port gets no greeting if it cannot talk for long: its sender may hold it back.
 async fn greet(links: &Links, occasion: Occasion) {
     let told = links.told();
-    tell(links, told, What::Greeting(occasion)).await;
+    tell(links, told, Notice::Greeting(occasion)).await;
     let others = links.ports.iter().filter(|port| port.number != told.number);
     for port in others.filter(|port| !is_shared(port.number)) {
         for _ in 0..PATIENCE {
-            if tell_at_once(links, port, What::Greeting(occasion)) {
+            if tell_at_once(links, port, Notice::Greeting(occasion)) {
                 break;
             }
             Timer::after_ticks(POLL_MS).await;

@@ -39,29 +39,19 @@ use crate::machine::{self, Alarm, Cycle, Doing};
 use crate::motion::dynamics;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Program, Snapshot};
-use crate::protocol::{Dialect, Machine, StatusReport, Store, Value, Warning, thousandths};
+use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
 use crate::store::program;
 use crate::units::Length;
 
-/// `stat` while the machine is in a machining cycle.
-pub const RUN: i32 = 5;
-/// Those from here on are five less as `macs`.
-const INTERLOCK: i32 = 11;
-/// `stat` in the cycles of the machine.
-const PROBING: i32 = 7;
-/// See [`PROBING`].
-const HOMING: i32 = 9;
-/// See [`PROBING`].
-const JOGGING: i32 = 10;
-
-/// Whether something moves, by `stat` and `hold`.
+/// Whether something moves.
 #[small]
-pub fn moves(state: i32, hold: i32) -> bool {
-    match state {
-        HOLD => hold != HELD,
-        state => matches!(state, RUN | PROBING | HOMING | JOGGING),
+pub fn moves(doing: Doing, hold: Hold) -> bool {
+    match doing {
+        Doing::Holds | Doing::Door => hold != Hold::Rests,
+        Doing::Runs | Doing::Probes | Doing::Homes | Doing::Jogs => true,
+        Doing::Rests | Doing::Alarm(_) => false,
     }
 }
 
@@ -69,19 +59,12 @@ pub fn moves(state: i32, hold: i32) -> bool {
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
 const QUEUE_FREE_MIN: usize = 6;
 
-/// `stat` in a feedhold, from its first moment on.
-pub const HOLD: i32 = 6;
-/// `hold` while the machine slows down, and when it stands still.
-const SLOWING: i32 = 3;
-/// See [`SLOWING`].
-pub const HELD: i32 = 4;
-
 /// A look at the machine.
 pub struct View<'a> {
     links: &'a Links,
     port: &'a Port,
     settings: RefMut<'a, Settings>,
-    report: RefMut<'a, StatusReport>,
+    report: RefMut<'a, Memory>,
     seen: OnceCell<Seen>,
 }
 
@@ -154,34 +137,6 @@ impl<'a> View<'a> {
     /// Whether a hold is on that anybody is to see.
     fn is_held(&self) -> bool {
         machine::shows_hold(|| self.has_work())
-    }
-
-    /// `stat`.
-    pub fn state(&self) -> i32 {
-        let is_g2core = self.settings.is_g2core();
-        match machine::doing(|| self.has_work()) {
-            Doing::Alarm(alarm) => alarm.state(is_g2core),
-            Doing::Door if is_g2core => INTERLOCK,
-            Doing::Door | Doing::Holds => HOLD,
-            Doing::Probes => PROBING,
-            Doing::Homes => HOMING,
-            Doing::Jogs => JOGGING,
-            Doing::Runs => RUN,
-            Doing::Rests => match self.motion().program {
-                Program::Ready => 1,
-                Program::Stopped => 3,
-                Program::Ended => 4,
-            },
-        }
-    }
-
-    /// `hold`.
-    pub fn hold(&self) -> i32 {
-        match self.is_held() {
-            false => 0,
-            true if self.motion().held && !machine::is_resuming() => HELD,
-            true => SLOWING,
-        }
     }
 
     /// The machine position of an axis.
@@ -344,21 +299,8 @@ impl Machine for View<'_> {
     #[small]
     fn value(&mut self, value: Value) -> i32 {
         match value {
-            Value::State => self.state(),
-            Value::Machine => match self.state() {
-                HOLD | PROBING | HOMING | JOGGING => RUN,
-                state if state >= INTERLOCK => state - (INTERLOCK - 6),
-                state => state,
-            },
-            Value::Cycle if machine::is_alarmed() => 0,
-            Value::Cycle => match machine::cycle() {
-                Cycle::Lines | Cycle::Stopped => i32::from(self.is_held() || self.has_work()),
-                Cycle::Probe => 2,
-                Cycle::Homing => 3,
-                Cycle::Jog => 4,
-            },
-            Value::Motion if self.is_held() => 2,
-            Value::Motion => i32::from(self.motion().running),
+            Value::Working => self.has_work().into(),
+            Value::Running => self.motion().running.into(),
             // Lines that move nothing are finished when all before them are.
             Value::FinishedLine if !self.is_busy() => self.modal(Value::BlockLine),
             Value::FinishedLine => self.motion().finished as i32,
@@ -368,10 +310,7 @@ impl Machine for View<'_> {
             Value::QueueAdded => self.links.queue_count.take_added(),
             Value::QueueRemoved => self.links.queue_count.take_removed(),
             Value::SlotsFree => self.port.promise(&self.port.lines.borrow()).into(),
-            Value::Room => match Dialect::of(&self.settings) {
-                Dialect::Characters => uart::room(self.port.number).into(),
-                _ => self.value(Value::SlotsFree),
-            },
+            Value::BytesFree => uart::room(self.port.number).into(),
             Value::MachinePosition(axis) => self.position(axis.into()).0,
             Value::Position(axis) => {
                 let axis = axis.into();
@@ -389,7 +328,6 @@ impl Machine for View<'_> {
             Value::Steps(motor) => {
                 self.motion().position.get(usize::from(motor)).map_or(0, |at| *at)
             }
-            Value::Zero => 0,
             Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
             Value::Override(which) => overrides::now(self.links.thread).factor(which).into(),
             Value::OverrideOn(which) => overrides::now(self.links.thread).is_on(which).into(),
@@ -405,7 +343,6 @@ impl Machine for View<'_> {
                 0 => -1,
                 hit => hit.trailing_zeros() as i32,
             },
-            Value::Hold => self.hold(),
             Value::Reset => watchdog::cause() as i32,
             Value::Starvations => health::starvations().into(),
             Value::Kept => self.links.storage.is_done().into(),
@@ -422,8 +359,28 @@ impl Machine for View<'_> {
         self.seen = OnceCell::from(self.port.seen.get());
     }
 
-    fn report(&mut self) -> &mut StatusReport {
+    fn memory(&mut self) -> &mut Memory {
         &mut self.report
+    }
+
+    fn doing(&mut self) -> Doing {
+        machine::doing(|| self.has_work())
+    }
+
+    fn cycle(&mut self) -> Cycle {
+        machine::cycle()
+    }
+
+    fn hold(&mut self) -> Hold {
+        match self.is_held() {
+            false => Hold::None,
+            true if self.motion().held && !machine::is_resuming() => Hold::Rests,
+            true => Hold::Slows,
+        }
+    }
+
+    fn rest(&mut self) -> Program {
+        self.motion().program
     }
 
     fn restore(&mut self) -> Status {

@@ -53,7 +53,7 @@ pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
         .args(["rustc", "--release", "-Zbuild-std=core", "--target", "avr-none", "--target-dir"])
         .arg(&target);
     cargo.args(["--package", "kerf", "--bin", "kerf", "--no-default-features", "--features"]);
-    cargo.arg(format!("board-{board},machine-{machine}"));
+    cargo.arg(format!("board-{board},machine-{machine},dialect-tinyg"));
     run(cargo.args(["--", "--emit"]).arg(format!("asm={}", text.display())))?;
     make_small(&text, &linked, &image(board, machine))
 }

@@ -28,8 +28,9 @@ pub const ROWS: &[&str] = &[
     "kerf::tasks::wake::",
     "kerf::gcode::",
     "kerf::store::",
-    "kerf::protocol::block::put_brief",
-    "kerf::protocol::write::",
+    "kerf::protocol::tinyg::block::put_brief",
+    "kerf::protocol::tinyg::control::",
+    "kerf::protocol::tinyg::write::",
     // Each block.
     "kerf::tasks::planner::run::",
     "kerf::tasks::planner::Planner>::announce",
@@ -44,12 +45,9 @@ pub const ROWS: &[&str] = &[
     // Woken by all of these.
     "kerf::tasks::reporter::run::",
     "kerf::tasks::reporter::tell",
-    "kerf::tasks::view::View>::hold",
-    "kerf::tasks::view::View>::is_held",
     "kerf::tasks::view::View>::modal",
     "kerf::tasks::view::View>::of",
     "kerf::tasks::view::View>::seen",
-    "kerf::tasks::view::View>::state",
     "kerf::tasks::common::snapshot",
     "kerf::tasks::power::",
     "kerf::motors::Motors>::pass",
@@ -101,7 +99,7 @@ mod tests {
         assert!(is_hot("<kerf::tasks::planner::Planner>::begin"));
         for name in [
             "<kerf::tasks::planner::Planner>::begin_arc",
-            "kerf::protocol::json::check",
+            "kerf::protocol::tinyg::json::check",
             "kerf::protocol::f::<kerf::motion::exec::Exec>",
             "main",
         ] {

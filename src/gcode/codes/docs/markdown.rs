@@ -7,7 +7,7 @@ use std::vec::Vec;
 use super::{Doc, On, RULES, Refusal, SECTIONS, docs};
 use crate::gcode::codes::Action;
 use crate::gcode::words::{AXES, COUNT, LETTERS};
-use crate::protocol::status_text;
+use crate::protocol::tinyg::{number, status_text};
 use crate::status::Status;
 
 const PREFACE: &str = "\
@@ -147,7 +147,7 @@ fn refused(refusals: &[Refusal]) -> String {
     }
     let mut text = "\n| Refused | | Example |\n|---|---|---|\n".to_string();
     for refusal in refusals {
-        let (number, words) = (refusal.status as u8, status(refusal.status));
+        let (number, words) = (number(refusal.status), status(refusal.status));
         text += &format!("| {number} | {words} | {} |\n", example(refusal));
     }
     text

@@ -7,7 +7,7 @@ use std::vec::Vec;
 use super::*;
 use crate::gcode::codes::table::{G, M};
 use crate::gcode::setup::Usual;
-use crate::protocol::status_text;
+use crate::protocol::tinyg::status_text;
 
 fn refusals() -> impl Iterator<Item = &'static Refusal> {
     docs().flat_map(|doc| doc.refusals).chain(RULES.iter().flat_map(|rule| rule.refusals))

@@ -1,0 +1,93 @@
+//! What a status report gains and loses: `{srs:{set:{vel:t,posa:f}}}`, `{srs:{clear:t}}`, `{srs:{defa:t}}`.
+//!
+//! One pair a step, told as it was sent. The first that makes no sense is refused; those before it have taken effect.
+
+use super::json::{self, Kind, Pair};
+use super::request::{Context, Request};
+use super::token::{Target, resolve};
+use super::write::Writer;
+use crate::config::Name;
+use crate::plain;
+use crate::protocol::{Machine, Out, Remembers};
+use crate::status::Status;
+
+/// Whether an object of this name changes the report, where that of the other (`sr`) is a new one.
+#[small]
+pub(super) fn is_amended(name: &[u8]) -> bool {
+    name.len() > 2
+}
+
+#[small]
+impl Request {
+    /// One pair. `selected` is set in the inner object.
+    #[inline(never)]
+    pub(super) fn amend<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let Some(pair) = json::pair(c.line, self.at) else {
+            self.at = json::behind_object(c.line, self.at);
+            return self.amended(c);
+        };
+        self.at = pair.next;
+        let name = Name::beginning(pair.name.of(c.line));
+        if !self.selected && pair.kind == Kind::Object && name.is(plain!("set")) {
+            let mut writer = Writer::body(c.out, &mut self.format);
+            writer.key(name.bytes());
+            writer.open();
+            self.selected = true;
+            return;
+        }
+        let done = match self.selected {
+            true => change(&pair, c),
+            false => reset(&name, &pair, c.machine),
+        };
+        self.tell_sent(&pair, done != Err(Status::UnrecognizedName), c);
+        if let Err(status) = done {
+            self.status = status;
+            self.amended(c);
+            if self.group.is_some() {
+                self.leave(c);
+            }
+        }
+    }
+
+    /// The end of an object.
+    fn amended<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        match core::mem::take(&mut self.selected) {
+            true => Writer::body(c.out, &mut self.format).close(),
+            false => self.leave(c),
+        }
+    }
+}
+
+/// `clear` and `defa`.
+#[small]
+fn reset(name: &Name, pair: &Pair, machine: &mut impl Machine) -> Result<(), Status> {
+    let clears = name.is(plain!("clear"));
+    if !(clears || name.is(plain!("defa"))) {
+        return Err(Status::UnrecognizedName);
+    }
+    match pair.kind {
+        Kind::True if clears => machine.memory().tinyg.clear(),
+        Kind::True => machine.memory().tinyg.restore(),
+        Kind::False => {}
+        _ => return Err(Status::UnsupportedType),
+    }
+    Ok(())
+}
+
+/// A value to tell from now on, or no more.
+#[small]
+fn change<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
+    let token = match resolve(Name::new(), pair.name.of(c.line)) {
+        Target::Token(token) if !token.is_far() => token,
+        _ => return Err(Status::UnrecognizedName),
+    };
+    match pair.kind {
+        Kind::True if !c.machine.memory().tinyg.add(token) => Err(Status::JsonTooManyPairs),
+        Kind::True => Ok(()),
+        Kind::False => {
+            c.machine.memory().tinyg.remove(token);
+            Ok(())
+        }
+        _ => Err(Status::UnsupportedType),
+    }
+}

@@ -1,0 +1,258 @@
+//! What a pair of a request does: reading, setting, acting.
+
+use super::defaults::is_sure;
+use super::json::{Kind, Pair};
+use super::pairs::Outcome;
+use super::program;
+use super::remark::Remark;
+use super::request::{Context, Request};
+use super::token::{Action, Group, Subject, Target};
+use super::value::{Form, Source, place_form};
+use crate::config::name::axis_of;
+use crate::config::table;
+use crate::config::{Number, Setting};
+use crate::gcode::overrides::{Change, Override};
+use crate::gcode::tables::Row;
+use crate::protocol::{Machine, Out, Value};
+use crate::status::Status;
+use crate::units::Length;
+
+#[small]
+impl Request {
+    pub(super) fn apply<M: Machine, O: Out>(
+        &mut self,
+        pair: &Pair,
+        target: Target,
+        c: &mut Context<'_, M, O>,
+    ) -> Outcome {
+        match (target, pair.kind) {
+            (Target::Unknown, _) => Err(Status::UnrecognizedName),
+            (_, Kind::Object) | (Target::Group(_), _) => Err(Status::UnsupportedType),
+            (Target::Token(token), Kind::Null) => Ok(Some(token)),
+            (Target::Token(token), _) => {
+                match token.subject() {
+                    Some(Subject::Setting(setting)) => self.set(setting, pair, c)?,
+                    Some(Subject::Row(row, axis)) if !row.is_stored() => {
+                        set_row(row, axis, pair, c)?
+                    }
+                    Some(Subject::Member(vector, _, axis))
+                        if Group::Vector(vector) == Group::TOOL_OFFSETS =>
+                    {
+                        // In millimetres, as it is told.
+                        let length = fixed(pair, c.line, Length::DECIMALS, false)?;
+                        c.machine.set_tool_length(axis, Length(length))?;
+                    }
+                    Some(Subject::Single(single)) if single.source == Source::Of(Value::Home) => {
+                        if is_sure(pair, c)? {
+                            done(c.machine.home())?;
+                        }
+                    }
+                    Some(Subject::Single(single)) => set_value(single.source, pair, c)?,
+                    _ => return Err(Status::ReadOnly),
+                }
+                Ok(Some(token))
+            }
+            (Target::Action(Action::Help), _) => self.advise(Remark::Help),
+            (Target::Action(Action::Defaults), _) => self.restore(pair, c),
+            (Target::Action(Action::Boot), _) => self.boot(pair, c),
+            (Target::Action(action), _) => {
+                let done = act(action, pair, c);
+                if action == Action::Test && done == Err(Status::Error) {
+                    self.remark = self.remark.max(Remark::Test);
+                }
+                done.map(|()| None)
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn set<M: Machine, O: Out>(
+        &mut self,
+        setting: Setting,
+        pair: &Pair,
+        c: &mut Context<'_, M, O>,
+    ) -> Result<(), Status> {
+        let small = match setting.row().kind {
+            table::Kind::Small => true,
+            table::Kind::Large | table::Kind::Cold => false,
+            table::Kind::Data | table::Kind::Job => {
+                let value = bits(pair, c.line)?;
+                return c.machine.set(setting, value).map(|_| ());
+            }
+            table::Kind::Constant | table::Kind::Text => return Err(Status::ReadOnly),
+        };
+        let value = match pair.kind {
+            Kind::Number => number(pair, c.line)?,
+            Kind::True | Kind::False if small => Number::int((pair.kind == Kind::True).into()),
+            _ => return Err(Status::UnsupportedType),
+        };
+        let inches = c.machine.inches();
+        let checked = c.machine.settings().check(setting, value, inches);
+        if checked.is_err() && setting.is_baud() {
+            self.remark = self.remark.max(Remark::Baud);
+        }
+        let value = checked?;
+        let remark = Remark::from(c.machine.set(setting, value)?);
+        let unusual = setting.is_microsteps() && !matches!(value, 1 | 2 | 4 | 8);
+        let unusual = if unusual { Remark::Microsteps } else { Remark::None };
+        self.remark = self.remark.max(remark).max(unusual);
+        Ok(())
+    }
+}
+
+/// The value of a pair as 32 bits: `"0x2a"`.
+#[small]
+fn bits(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
+    if !matches!(pair.kind, Kind::Text | Kind::Number) {
+        return Err(Status::UnsupportedType);
+    }
+    let digits = match pair.value.of(line) {
+        [b'0', b'x' | b'X', digits @ ..] if (1..=8).contains(&digits.len()) => digits,
+        _ => return Err(Status::BadNumber),
+    };
+    let digit = |bits: u32, byte: &u8| Some(bits << 4 | char::from(*byte).to_digit(16)?);
+    let bits = digits.iter().try_fold(0, digit).ok_or(Status::BadNumber)?;
+    Ok(bits.cast_signed())
+}
+
+/// Sets a value of the interpreter's tables.
+#[small]
+fn set_row<M: Machine, O>(
+    row: Row,
+    axis: u8,
+    pair: &Pair,
+    c: &mut Context<'_, M, O>,
+) -> Result<(), Status> {
+    let inches = c.machine.inches() && place_form(axis) == Form::Length;
+    let value = fixed(pair, c.line, Length::DECIMALS, inches)?;
+    c.machine.set_row(row, axis, Length(value))
+}
+
+/// Jogs the axis whose letter ends the name, to a place in mm or degrees whatever the units.
+#[inline(never)]
+#[small]
+fn jog<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
+    let axis = pair.name.of(c.line).last().copied().and_then(axis_of);
+    let place = fixed(pair, c.line, Length::DECIMALS, false)?;
+    done(c.machine.jog(axis.ok_or(Status::UnrecognizedName)?, Length(place)))
+}
+
+/// Sets a value of the machine, of which only the overrides can be.
+#[small]
+fn set_value<M: Machine, O>(
+    source: Source,
+    pair: &Pair,
+    c: &mut Context<'_, M, O>,
+) -> Result<(), Status> {
+    let change = match source {
+        Source::Of(Value::Override(which)) => {
+            let on = c.machine.value(Value::OverrideOn(which)) != 0;
+            Change::new(which, on, factor(which, pair, c.line)?)
+        }
+        Source::Of(Value::OverrideOn(which)) => {
+            let on = match pair.kind {
+                Kind::True => 1,
+                Kind::False => 0,
+                _ => whole(pair, c.line)?,
+            };
+            Change::switch(
+                which,
+                (0..=1).contains(&on).then_some(on != 0).ok_or(Status::OutOfRange)?,
+            )
+        }
+        _ => return Err(Status::ReadOnly),
+    };
+    c.machine.change_override(change);
+    Ok(())
+}
+
+/// The factor that a pair gives an override, thousandths.
+#[small]
+fn factor(which: Override, pair: &Pair, line: &[u8]) -> Result<u16, Status> {
+    let factor = fixed(pair, line, 3, false)?;
+    let factor = u32::try_from(factor).ok().and_then(|factor| which.checked(factor));
+    factor.ok_or(Status::OutOfRange)
+}
+
+#[small]
+fn done(status: Status) -> Result<(), Status> {
+    if status == Status::Ok { Ok(()) } else { Err(status) }
+}
+
+/// The value of a pair, a number.
+#[inline(never)]
+#[small]
+fn number(pair: &Pair, line: &[u8]) -> Result<Number, Status> {
+    match pair.kind {
+        Kind::Number => Number::parse(pair.value.of(line)).ok_or(Status::BadNumber),
+        _ => Err(Status::UnsupportedType),
+    }
+}
+
+/// The value of a pair with so many decimals.
+#[inline(never)]
+#[small]
+fn fixed(pair: &Pair, line: &[u8], decimals: u8, inches: bool) -> Result<i32, Status> {
+    number(pair, line)?.fixed(decimals, inches).ok_or(Status::OutOfRange)
+}
+
+/// The value of a pair as a whole number.
+#[inline(never)]
+#[small]
+fn whole(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
+    let number = number(pair, line)?;
+    let value = if number.is_integer() { number.fixed(0, false) } else { None };
+    value.ok_or(Status::BadNumber)
+}
+
+#[small]
+fn act<M: Machine, O>(
+    action: Action,
+    pair: &Pair,
+    c: &mut Context<'_, M, O>,
+) -> Result<(), Status> {
+    let on = match action {
+        // A block is run only where nothing of the response is out yet.
+        Action::Block if pair.kind == Kind::Null => return Ok(()),
+        Action::Block if pair.kind == Kind::Text => return Err(Status::NotAccepted),
+        Action::Block => return Err(Status::UnsupportedType),
+        Action::Clear => return done(c.machine.clear()),
+        Action::Raise(alarm) => {
+            c.machine.alarm(alarm);
+            return Ok(());
+        }
+        Action::Test if pair.kind == Kind::Null => return Ok(()),
+        Action::Test => {
+            let number = whole(pair, c.line)?;
+            let number = u8::try_from(number).map_err(|_| Status::OutOfRange)?;
+            return done(c.machine.start_job(number));
+        }
+        Action::Jog if pair.kind == Kind::Null => return Ok(()),
+        Action::Jog => return jog(pair, c),
+        Action::Text if pair.kind != Kind::Null => return Err(Status::UnsupportedType),
+        Action::Program => return program::store(pair, c),
+        Action::Flush => {
+            let sure = is_sure(pair, c)?;
+            return if sure { done(c.machine.flush()) } else { Ok(()) };
+        }
+        Action::Reset => {
+            let sure = is_sure(pair, c)?;
+            return if sure { done(c.machine.restart(false)) } else { Ok(()) };
+        }
+        // Its report would stand in the midst of the response.
+        Action::Exception => return Err(Status::NotAccepted),
+        Action::Energize => true,
+        Action::Release => false,
+        Action::Defaults | Action::Help | Action::Boot => return Ok(()),
+        Action::Text | Action::Message | Action::Id => return Ok(()),
+    };
+    let motor = match pair.kind {
+        Kind::Null | Kind::True => 0,
+        _ => whole(pair, c.line)?,
+    };
+    match motor {
+        0 => done(c.machine.energize(None, on)),
+        1..=4 => done(c.machine.energize(Some(motor as u8 - 1), on)),
+        _ => Err(Status::OutOfRange),
+    }
+}

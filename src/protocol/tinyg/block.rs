@@ -1,0 +1,206 @@
+//! What a response tells of its G-code block: the block itself, its message, its line number.
+
+use super::Format;
+use super::request::{Context, Phase, Request};
+use super::variation::Variation;
+use super::wrapped::pass_on;
+use super::write::Writer;
+use crate::config::{Fixed, Settings};
+use crate::protocol::{Ending, Machine, Out, Value};
+use crate::status::Status;
+use crate::{plain, text};
+
+/// Verbosities from which the parts show.
+const FRAMES: u8 = 1;
+const LINE_NUMBERS: u8 = 4;
+const BLOCKS: u8 = 5;
+
+/// Behind the highest line number.
+const LINE_NUMBER_END: i32 = 1 << 24;
+
+/// Whether nothing of a block is to be shown, so that the response is the frame alone: of a block
+/// without a comment, in JSON mode, and `numbered` or not.
+pub fn is_brief(settings: &Settings, numbered: bool) -> bool {
+    match settings.json_verbosity() {
+        FRAMES..LINE_NUMBERS => true,
+        LINE_NUMBERS..BLOCKS => !numbered,
+        _ => false,
+    }
+}
+
+/// The response to a block that has run, of which nothing is to be shown.
+pub fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out) {
+    if Variation::of(settings) != Variation::Lines || settings.expand_line_feeds() {
+        return put_other(settings, ending, out);
+    }
+    let strict = settings.json_strict();
+    out.put_plain(if strict { plain!("{\"r\":{},\"f\":[1,0,") } else { plain!("{r:{},f:[1,0,") });
+    // There are fewer than ten.
+    out.put(b'0' + ending.free % 10);
+    out.put_plain(plain!("]}\n"));
+}
+
+/// The same in another variation.
+#[inline(never)]
+fn put_other(settings: &Settings, ending: Ending, out: &mut impl Out) {
+    Writer::frame(out, &mut Format::json(settings)).empty_response(Status::Ok, ending);
+}
+
+impl Request {
+    fn is_brief<M: Machine, O>(&self, c: &mut Context<'_, M, O>) -> bool {
+        let quiet = is_brief(c.machine.settings(), true)
+            || (is_brief(c.machine.settings(), false) && self.line_number(c) == 0);
+        quiet && !self.begun && !self.is_json && !self.commented
+    }
+
+    /// The block's line number, 0 for none. The machine does not know that of a block that it has not carried out.
+    fn line_number<M: Machine, O>(&self, c: &mut Context<'_, M, O>) -> i32 {
+        match self.status {
+            Status::Ok => c.machine.value(Value::BlockLine),
+            _ => leading_number(self.block.of(c.line)),
+        }
+    }
+
+    /// The whole response to most lines, in one step.
+    pub(super) fn brief<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) -> bool {
+        let brief = self.is_brief(c);
+        if brief {
+            let ending = self.ending(c.machine);
+            let mut format = Format::json(c.machine.settings());
+            Writer::frame(c.out, &mut format).empty_response(self.status, ending);
+            self.phase = Phase::Done;
+        }
+        brief
+    }
+
+    pub(super) fn block<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        if self.brief(c) {
+            return;
+        }
+        self.open(c);
+        self.unwrap_block(c);
+        self.phase = Phase::Message;
+        if self.verbosity >= BLOCKS {
+            let mut writer = Writer::message(c.out, &mut self.format);
+            writer.key_text(text!("gc"));
+            writer.byte(b'"');
+            self.item = self.block.start;
+            self.phase = Phase::BlockText;
+        }
+    }
+
+    /// The block as it is read: upper case, without blanks and comments.
+    pub(super) fn block_text<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let mut writer = Writer::message(c.out, &mut self.format);
+        for _ in 0..super::CHUNK / 2 {
+            match byte_of(c.line, self.item, self.block.end) {
+                None | Some(b'(' | b';') => {
+                    writer.byte(b'"');
+                    self.phase = Phase::Message;
+                    return;
+                }
+                Some(byte) if byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'.') => {
+                    writer.byte(byte.to_ascii_uppercase());
+                }
+                Some(_) => {}
+            }
+            self.item = self.item.saturating_add(1);
+        }
+    }
+
+    pub(super) fn message<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        self.phase = Phase::Number;
+        let Some(start) = message_start(c.line, self.block.start, self.block.end) else {
+            return;
+        };
+        self.item = start;
+        self.phase = Phase::MessageText;
+        if !self.format.is_plain() {
+            let mut writer = Writer::message(c.out, &mut self.format);
+            writer.key_text(text!("msg"));
+            writer.byte(b'"');
+        }
+    }
+
+    pub(super) fn message_text<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let plain = self.format.is_plain();
+        let mut writer = Writer::message(c.out, &mut self.format);
+        for _ in 0..super::CHUNK / 2 {
+            match byte_of(c.line, self.item, self.block.end) {
+                None | Some(b')') => {
+                    if !plain {
+                        writer.byte(b'"');
+                    }
+                    self.phase = Phase::Number;
+                    return;
+                }
+                Some(byte) if plain => writer.printable(byte),
+                Some(_) if self.is_json => {
+                    self.item += pass_on(c.line, self.item, self.block.end, &mut writer);
+                    continue;
+                }
+                Some(byte) => writer.escaped(byte),
+            }
+            self.item = self.item.saturating_add(1);
+        }
+    }
+
+    pub(super) fn number<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        if self.format.is_plain() {
+            let mut writer = Writer::message(c.out, &mut self.format);
+            writer.text(self.remark.text());
+            writer.end_line();
+            self.phase = Phase::Done;
+            return;
+        }
+        let line = self.line_number(c);
+        if self.verbosity >= LINE_NUMBERS && line != 0 {
+            let mut writer = Writer::message(c.out, &mut self.format);
+            writer.key_text(text!("n"));
+            writer.fixed(Fixed::int(line));
+        }
+        let on = self.is_json && self.status == Status::Ok;
+        self.phase = if on { Phase::Pair } else { Phase::Warning };
+    }
+}
+
+/// The number of the N word that a block begins with; 0 if it does not, or if that is no line number.
+#[inline(never)]
+#[small]
+fn leading_number(block: &[u8]) -> i32 {
+    let mut number = -1;
+    for byte in block {
+        match byte {
+            b' ' | b'\t' | b'/' => {}
+            b'N' | b'n' if number < 0 => number = 0,
+            // Higher ones are none, and would not fit at last.
+            b'0'..=b'9' if (0..LINE_NUMBER_END).contains(&number) => {
+                number = number * 10 + i32::from(byte - b'0');
+            }
+            b'0'..=b'9' | b'.' => return 0,
+            _ => break,
+        }
+    }
+    number.max(0)
+}
+
+/// Byte `at` of the line if that is before `end`.
+pub(super) fn byte_of(line: &[u8], at: u8, end: u8) -> Option<u8> {
+    line.get(usize::from(at)).copied().filter(|_| at < end)
+}
+
+/// Where the message of a comment `(MSG text)` begins.
+fn message_start(line: &[u8], start: u8, end: u8) -> Option<u8> {
+    let byte = |at| byte_of(line, at, end);
+    let mut at = (start..end).find(|&at| matches!(byte(at), Some(b'(' | b';')))? + 1;
+    while byte(at).is_some_and(|b| matches!(b, b' ' | b'\t')) {
+        at += 1;
+    }
+    for letter in [b'M', b'S', b'G'] {
+        if !byte(at)?.eq_ignore_ascii_case(&letter) {
+            return None;
+        }
+        at += 1;
+    }
+    Some(at)
+}

@@ -1,0 +1,131 @@
+//! Text mode: help for people at a terminal.
+
+use super::request::{Context, Phase, Request};
+use super::write::Writer;
+use crate::progmem;
+use crate::progmem::Text;
+use crate::protocol::{Machine, Out, Span};
+use crate::text;
+
+/// Lines of [`SCREENS`]; a screen is some of them.
+const LINES: usize = 61;
+/// What `h` shows.
+pub const GENERAL: Span = Span { start: 0, end: 19 };
+/// What `$h` shows.
+pub const SETTINGS: Span = Span { start: 19, end: 34 };
+/// What `$defa` shows.
+pub const DEFAULTS: Span = Span { start: 34, end: 39 };
+/// What `$test` shows.
+pub const TESTS: Span = Span { start: 39, end: 56 };
+/// What `$boot` shows.
+pub const BOOT: Span = Span { start: 56, end: LINES as u8 };
+
+progmem! {
+    static SCREENS: [Text; LINES] = [
+        text!("### Kerf Help ###"),
+        text!("Lines of G-code are run and answered with a prompt."),
+        text!("These act as well:"),
+        text!("  ?         status report"),
+        text!("  $         settings of the machine"),
+        text!("  $$        all settings"),
+        text!("  $h        help with settings"),
+        text!("  $defa=1   all settings back to their defaults"),
+        text!("  $test     list of built-in jobs; $test=3 runs one"),
+        text!("  $me $md   motors on, motors off"),
+        text!("  h         this help"),
+        text!("  !         hold"),
+        text!("  ~         go on after a hold, or a program stop"),
+        text!("  %         in a hold: drop what is queued (^d: both)"),
+        text!("  ^x        reset: the position is lost"),
+        text!("  {...}     JSON; answers are JSON from then on"),
+        text!("To stop the machine at once, cut its power."),
+        text!("All codes: docs/gcode.md in the sources."),
+        text!("All settings: docs/settings.md in the sources."),
+
+        text!("### Kerf Settings Help ###"),
+        text!("To show:"),
+        text!("  $x        settings of an axis: x y z a b c"),
+        text!("  $1        settings of a motor: 1 2 3 4"),
+        text!("  $sys      settings of the machine; $ does so too"),
+        text!("  $m $q     all motors, all axes"),
+        text!("  $o        offsets, stored positions; $tt1 a tool"),
+        text!("  $$        everything"),
+        text!("  $xvm      one setting, here: x velocity maximum"),
+        text!("  $posx     one value, here: where x is"),
+        text!("To set one, with = or a blank between:"),
+        text!("  $xvm=1200"),
+        text!("  $xvm 1200"),
+        text!("Settings stay when the power goes."),
+        text!("What each one means: docs/settings.md in the sources."),
+
+        text!("### Kerf Defaults Help ###"),
+        text!("  $defa=1   sets all settings to their defaults"),
+        text!("Your own values are gone then: note them first ($$)."),
+        text!("Offsets of G54 to G59.3 and tools are kept."),
+        text!("It is refused while the machine moves."),
+
+        text!("### Kerf Test Jobs Help ###"),
+        text!("Start at zero; leave 80 mm free in X and Y, 40 mm in Z."),
+        text!("  $test=1   smoke test: outputs, all axes"),
+        text!("  $test=2   homing"),
+        text!("  $test=3   squares"),
+        text!("  $test=4   arcs"),
+        text!("  $test=5   dwells"),
+        text!("  $test=6   a long move, to try hold and resume"),
+        text!("  $test=7   spindle and coolant"),
+        text!("  $test=9   inverse time"),
+        text!("  $test=10  rotary axes"),
+        text!("  $test=11  small moves"),
+        text!("  $test=12  slow moves"),
+        text!("  $test=13  offsets"),
+        text!("  $test=51  braid: 2,500 short moves"),
+        text!("  $test=0   ends the job that runs"),
+        text!("  $test=100 your own: $prog=f, $prog=G0 X1, ..., $prog=t"),
+
+        text!("### Kerf Boot Loader Help ###"),
+        text!("  $boot=1   starts the boot loader of the board"),
+        text!("It waits a second or so for a programmer, and"),
+        text!("starts the machine anew then: the position is lost."),
+        text!("It is refused while the machine moves."),
+    ];
+}
+
+#[small]
+impl Request {
+    /// Shows a screen.
+    pub(super) fn help(&mut self, screen: Span) {
+        self.block = screen;
+        self.phase = Phase::Help;
+    }
+
+    /// A line of it.
+    pub(super) fn help_line<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        if let Some(line) = SCREENS.at(self.block.start.into()) {
+            let mut writer = Writer::body(c.out, &mut self.format);
+            if line.bytes().next() == Some(b'#') {
+                (0..3).for_each(|_| writer.end_line());
+            }
+            writer.text(line);
+            writer.end_line();
+        }
+        self.block.start += 1;
+        if self.block.start >= self.block.end {
+            self.block = Span::default();
+            self.phase = Phase::Prompt;
+        }
+    }
+}
+
+/// Whether a line, behind its blanks, is one of text mode.
+#[small]
+pub fn is_text_command(line: &[u8]) -> bool {
+    let mut bytes = line.iter().skip_while(|byte| matches!(byte, b' ' | b'\t'));
+    matches!(bytes.next(), Some(b'$' | b'?')) || asks_help(line)
+}
+
+/// Whether a line is the letter H alone.
+#[small]
+pub fn asks_help(line: &[u8]) -> bool {
+    let mut bytes = line.iter().filter(|byte| !matches!(byte, b' ' | b'\t'));
+    matches!((bytes.next(), bytes.next()), (Some(b'h' | b'H'), None))
+}

@@ -1,0 +1,156 @@
+//! TinyG's dialect: JSON lines in, responses and reports out; and text for people.
+//!
+//! Pure and synchronous; the tasks own the bytes and the waiting. A line becomes a [`Request`],
+//! [`Report`] and the [`notice`]s are stepped alike. Tables and texts are in program memory.
+//!
+//! Wire format: TinyG 0.97 build 440.20, by default with the three-element footer `[1,status,free line slots]`;
+//! [`variation`] has what can be chosen instead.
+
+mod amend;
+mod apply;
+mod block;
+mod command;
+mod control;
+mod defaults;
+mod ending;
+mod format;
+mod help;
+mod json;
+mod listing;
+pub mod notice;
+mod pairs;
+mod place;
+mod program;
+mod prompt;
+mod remark;
+mod report;
+mod request;
+mod screen;
+mod state;
+mod status;
+mod stop;
+mod telling;
+mod token;
+mod value;
+pub mod variation;
+mod wrapped;
+mod write;
+
+use super::{CHUNK, Dialect, Ending, Machine, Notice, Out};
+use crate::config::Settings;
+use crate::machine::Alarm;
+use crate::status::Status;
+
+pub use format::Format;
+pub use report::{LONGEST_REPORT, Report, StatusReport};
+pub use request::Request;
+pub use status::{number, status_text};
+pub use telling::Telling;
+pub use token::Token;
+#[cfg(feature = "std")]
+pub use token::names;
+pub use variation::Variation;
+
+/// The dialect.
+pub struct Tinyg;
+
+impl Dialect for Tinyg {
+    type Speech = Mode;
+    type Request = Request;
+    type Telling = Telling;
+    type Memory = StatusReport;
+
+    fn speech(settings: &Settings) -> Mode {
+        if settings.starts_in_json() { Mode::Json } else { Mode::Text }
+    }
+
+    #[inline(always)]
+    fn begin(line: &[u8], length: u16, mode: &mut Mode, settings: &Settings) -> Option<Request> {
+        Request::begin(line, length, mode, settings)
+    }
+
+    #[inline(always)]
+    fn refuse(
+        status: Status,
+        line: &[u8],
+        length: u16,
+        mode: Mode,
+        settings: &Settings,
+    ) -> Request {
+        Request::refused(status, line, length, mode, settings)
+    }
+
+    #[inline(always)]
+    fn tell(notice: Notice, mode: Mode, machine: &mut impl Machine) -> Telling {
+        Telling::begin(notice, mode, machine)
+    }
+
+    #[inline(always)]
+    fn brief(mode: Mode, settings: &Settings) -> Option<bool> {
+        if mode != Mode::Json {
+            return None;
+        }
+        let numbered = block::is_brief(settings, true);
+        (numbered || block::is_brief(settings, false)).then_some(numbered)
+    }
+
+    #[inline(always)]
+    fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out) {
+        block::put_brief(settings, ending, out);
+    }
+
+    #[inline(always)]
+    fn put_line_end(settings: &Settings, out: &mut impl Out) {
+        write::put_line_end(settings, out);
+    }
+
+    /// In text mode by a prompt.
+    #[inline(always)]
+    fn answers_empty(mode: Mode) -> bool {
+        mode == Mode::Text
+    }
+
+    #[inline(always)]
+    fn may_be_control(first: u8) -> bool {
+        control::may_be(first)
+    }
+
+    #[inline(always)]
+    fn is_control(line: &[u8]) -> bool {
+        control::is(line)
+    }
+
+    #[inline(always)]
+    fn asks_alarm(line: &[u8]) -> Option<Alarm> {
+        stop::asks_alarm(line)
+    }
+}
+
+/// How the host wants to be spoken to: as it spoke last.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Mode {
+    /// In JSON.
+    #[default]
+    Json,
+    /// In text, with prompts.
+    Text,
+}
+
+impl Mode {
+    /// The format of unasked reports.
+    fn format(self, machine: &impl Machine) -> Format {
+        match self {
+            Mode::Json => Format::json(machine.settings()),
+            Mode::Text => Format::plain(machine.settings()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod any_line;
+#[cfg(test)]
+mod fake;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod text_tests;

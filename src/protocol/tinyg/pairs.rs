@@ -1,0 +1,251 @@
+//! Names and values of a JSON line: walking through them, and telling what has come of each.
+
+use super::Format;
+use super::amend::is_amended;
+use super::json::{self, Kind, Pair};
+use super::notice::put_exception;
+use super::request::{Context, Phase, Request};
+use super::token::{Action, Group, Target, Token, resolve};
+use super::write::Writer;
+use crate::config::Name;
+use crate::protocol::{Machine, Out};
+use crate::status::Status;
+use crate::text;
+
+/// What to tell of a pair that was carried out.
+pub(super) type Outcome = Result<Option<Token>, Status>;
+
+#[small]
+impl Request {
+    #[inline(never)]
+    pub(super) fn pair<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let Some(pair) = json::pair(c.line, self.at) else {
+            self.phase = Phase::Warning;
+            return;
+        };
+        let target = resolve(Name::new(), pair.name.of(c.line));
+        match (target, pair.kind) {
+            (Target::Group(group), Kind::Null) => self.enter(group, &pair, Phase::List, c),
+            (Target::Group(Group::Report), Kind::Object) if is_amended(pair.name.of(c.line)) => {
+                self.enter(Group::Report, &pair, Phase::Amend, c);
+            }
+            (Target::Group(Group::Report), Kind::Object) => {
+                self.enter(Group::Report, &pair, Phase::Select, c);
+                self.item = pair.next;
+                self.selected = false;
+            }
+            (Target::Group(group), Kind::Object) => self.enter(group, &pair, Phase::Member, c),
+            (Target::Action(Action::Block), Kind::Text) if !self.begun => {
+                self.block = pair.value;
+                self.phase = Phase::Gcode;
+            }
+            (Target::Action(Action::Program), Kind::Null) => self.show_program(&pair, c),
+            (Target::Action(Action::Text), Kind::Text) => {
+                self.at = pair.next;
+                let Err(status) = self.wrap(&pair, c) else { return };
+                self.open(c);
+                self.refuse_pair(&pair, target, status, c);
+            }
+            (Target::Action(Action::Message), Kind::Text) => self.give_string(&pair, c),
+            // It is told when everything else has been, so that a block may still be run.
+            (Target::Action(Action::Id), Kind::Number | Kind::Null) => self.identified = true,
+            (Target::Action(Action::Id), _) => {
+                self.status = Status::UnsupportedType;
+                self.phase = Phase::Warning;
+            }
+            (Target::Action(Action::Exception), _) if !self.begun => {
+                self.format = Format::json(c.machine.settings());
+                self.block = pair.name;
+                self.item = 0;
+                self.phase = Phase::Raise;
+            }
+            // It goes on by itself: a pair may have to wait.
+            _ => return self.carry_out(&pair, target, c),
+        }
+        self.at = pair.next;
+    }
+
+    /// A part of an exception report that was asked for; then the response.
+    pub(super) fn raise<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let (stage, status) = (self.item, Status::ExceptionReport);
+        self.item += 1;
+        let mut writer = Writer::body(c.out, &mut self.format);
+        if !put_exception(stage, status, c.machine, &mut writer) {
+            self.open(c);
+            let mut writer = Writer::body(c.out, &mut self.format);
+            writer.key(self.block.of(c.line));
+            writer.text(text!("null"));
+            self.status = status;
+            self.phase = Phase::Warning;
+        }
+    }
+
+    fn enter<M: Machine, O: Out>(
+        &mut self,
+        group: Group,
+        pair: &Pair,
+        phase: Phase,
+        c: &mut Context<'_, M, O>,
+    ) {
+        self.open(c);
+        let mut writer = Writer::body(c.out, &mut self.format);
+        writer.key(pair.name.of(c.line));
+        writer.open();
+        self.group = Some(group);
+        self.item = 0;
+        self.phase = phase;
+    }
+
+    pub(super) fn leave<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        if self.group.take().is_some() {
+            Writer::body(c.out, &mut self.format).close();
+        }
+        let on = matches!(self.status, Status::Ok | Status::Initializing);
+        self.phase = if on { Phase::Pair } else { Phase::Warning };
+    }
+
+    #[inline(never)]
+    pub(super) fn member<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let Some(pair) = json::pair(c.line, self.at) else {
+            self.at = json::behind_object(c.line, self.at);
+            return self.leave(c);
+        };
+        let prefix = self.group.map_or(Name::new(), Group::prefix);
+        let target = match resolve(prefix, pair.name.of(c.line)) {
+            // A group has no groups, and no strings, in it.
+            Target::Group(_) => Target::Unknown,
+            Target::Action(Action::Block | Action::Text | Action::Message | Action::Id) => {
+                Target::Unknown
+            }
+            target => target,
+        };
+        self.carry_out(&pair, target, c);
+    }
+
+    /// One member of the group, in its order.
+    #[inline(never)]
+    pub(super) fn list<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let member =
+            self.group.and_then(|group| Some((group, group.member(self.item, c.machine)?)));
+        let Some((group, (index, token))) = member else {
+            return self.leave(c);
+        };
+        c.machine.moment(self.item == 0);
+        self.item = index + 1;
+        let shown = token.read(c.machine);
+        let (name, prefix) = (token.name(), group.prefix().bytes().len());
+        let mut writer = Writer::body(c.out, &mut self.format);
+        writer.key(name.bytes().get(prefix..).unwrap_or(&[]));
+        writer.shown(shown);
+    }
+
+    /// One entry of a new status report. Names that mean nothing here are passed over; a report
+    /// that would hold nothing is refused.
+    #[inline(never)]
+    pub(super) fn select<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let Some(pair) = json::pair(c.line, self.at) else {
+            self.at = json::behind_object(c.line, self.at);
+            return self.selected(c);
+        };
+        self.at = pair.next;
+        if pair.kind == Kind::Object {
+            self.status = Status::UnsupportedType;
+            return self.leave(c);
+        }
+        let Target::Token(token) = resolve(Name::new(), pair.name.of(c.line)) else { return };
+        if pair.kind != Kind::True || token.is_far() {
+            return;
+        }
+        let report = &mut c.machine.memory().tinyg;
+        if !core::mem::replace(&mut self.selected, true) {
+            report.clear();
+        }
+        if !report.add(token) {
+            self.status = Status::JsonTooManyPairs;
+        }
+    }
+
+    /// Tells the new report, or why there is none.
+    fn selected<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        if self.selected {
+            self.item = 0;
+            self.phase = Phase::List;
+            return;
+        }
+        self.status = Status::MalformedCommand;
+        if let Some(first) = json::pair(c.line, self.item) {
+            self.status = Status::UnrecognizedName;
+            let known = resolve(Name::new(), first.name.of(c.line)) != Target::Unknown;
+            self.tell_sent(&first, known, c);
+        }
+        self.leave(c);
+    }
+
+    #[inline(never)]
+    fn carry_out<M: Machine, O: Out>(
+        &mut self,
+        pair: &Pair,
+        target: Target,
+        c: &mut Context<'_, M, O>,
+    ) {
+        let outcome = self.apply(pair, target, c);
+        if outcome == Err(Status::Again) {
+            // From its beginning, later.
+            self.waits = true;
+            return;
+        }
+        self.at = pair.next;
+        self.open(c);
+        match outcome {
+            Ok(Some(token)) => {
+                let shown = token.read(c.machine);
+                let mut writer = Writer::body(c.out, &mut self.format);
+                writer.key(pair.name.of(c.line));
+                writer.shown(shown);
+            }
+            Ok(None) if self.phase == Phase::Greeting => {}
+            Ok(None) => self.tell_sent(pair, true, c),
+            Err(status) => self.refuse_pair(pair, target, status, c),
+        }
+    }
+
+    fn refuse_pair<M: Machine, O: Out>(
+        &mut self,
+        pair: &Pair,
+        target: Target,
+        status: Status,
+        c: &mut Context<'_, M, O>,
+    ) {
+        self.status = status;
+        self.tell_sent(pair, target != Target::Unknown, c);
+        self.leave(c);
+    }
+
+    /// Tells a pair as it was sent; null if its name means nothing, or for a string.
+    pub(super) fn tell_sent<M, O: Out>(
+        &mut self,
+        pair: &Pair,
+        known: bool,
+        c: &mut Context<'_, M, O>,
+    ) {
+        let mut writer = Writer::body(c.out, &mut self.format);
+        writer.key(pair.name.of(c.line));
+        match pair.kind {
+            Kind::True if known => writer.text(text!("true")),
+            Kind::False if known => writer.text(text!("false")),
+            Kind::Number if known => writer.lower(plain_number(pair.value.of(c.line))),
+            _ => writer.text(text!("null")),
+        }
+    }
+}
+
+/// A number without the leading zeros that JSON does not allow.
+#[small]
+fn plain_number(mut text: &[u8]) -> &[u8] {
+    while let [b'0', rest @ ..] = text
+        && matches!(rest, [b'0'..=b'9', ..])
+    {
+        text = rest;
+    }
+    text
+}

@@ -1,0 +1,80 @@
+//! Text mode: a line for a place on an axis: a coordinate system's, G92's, a stored one, a tool's.
+//!
+//! ```text
+//! [g54x] g54 x offset               0.000 mm
+//! [g28z] g28 z position             0.000 mm
+//! ```
+
+use super::token::{Shown, Subject, Token};
+use super::value::{Form, SHIFT, place_form};
+use super::write::Writer;
+use crate::config::Fixed;
+use crate::config::name::{Name, axis_letter};
+use crate::progmem::Text;
+use crate::protocol::{Machine, Out};
+use crate::text;
+
+/// A place.
+pub(super) struct Place {
+    token: Token,
+    axis: u8,
+    title: Text,
+}
+
+#[small]
+impl Place {
+    /// The place that a token tells, if it does.
+    pub fn of(token: Token) -> Option<Place> {
+        let (axis, title) = match token.subject()? {
+            Subject::Member(SHIFT, _, axis) => (axis, text!(" offset")),
+            Subject::Row(row, axis) if row.is_stored() => (axis, text!(" position")),
+            Subject::Row(row, axis) if row.is_tool() => (axis, text!(" length")),
+            Subject::Row(_, axis) => (axis, text!(" offset")),
+            _ => return None,
+        };
+        Some(Place { token, axis, title })
+    }
+
+    /// What it is.
+    #[inline(never)]
+    pub fn title<O: Out>(&self, writer: &mut Writer<'_, O>) {
+        let name = self.token.name();
+        writer.byte(b'[');
+        writer.lower(name.bytes());
+        writer.byte(b']');
+        writer.byte(b' ');
+        writer.lower(group(&name));
+        writer.byte(b' ');
+        writer.byte(axis_letter(self.axis));
+        writer.text(self.title);
+    }
+
+    /// Where that ends.
+    pub fn title_end(&self) -> usize {
+        2 * self.token.name().bytes().len() + 4 + self.title.len()
+    }
+
+    /// Where it is.
+    pub fn value(&self, machine: &mut impl Machine) -> Fixed {
+        match self.token.read(machine) {
+            Shown::Number(fixed) => fixed,
+            Shown::Text(_) | Shown::Data(_) => Fixed::int(0),
+        }
+    }
+
+    /// In what that is measured, and the end of the line.
+    pub fn unit<M: Machine, O: Out>(&self, machine: &mut M, writer: &mut Writer<'_, O>) {
+        writer.text(match (place_form(self.axis), machine.inches()) {
+            (Form::Length, true) => text!(" in"),
+            (Form::Length, false) => text!(" mm"),
+            _ => text!(" deg"),
+        });
+        writer.end_line();
+    }
+}
+
+/// A name without the letter of the axis.
+#[small]
+fn group(name: &Name) -> &[u8] {
+    name.bytes().split_last().map_or(&[], |(_, group)| group)
+}

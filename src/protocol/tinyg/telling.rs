@@ -1,0 +1,92 @@
+//! A notice on its way out, in this dialect.
+
+use super::Mode;
+use super::notice::{Banner, Exception, Probing, acknowledge, jog_ended};
+use super::prompt::put_ready_prompt;
+use super::report::{Report, queue_report, receive_report};
+use crate::protocol::{Machine, Notice, Occasion, Out, Tells, Value};
+
+/// How far it has been told, and how.
+pub struct Telling {
+    part: Part,
+    mode: Mode,
+}
+
+/// What is being told.
+enum Part {
+    Greeting(Banner, Occasion),
+    Enquiry,
+    Exception(Exception),
+    Probing(Probing),
+    Status(Option<Report>),
+    End {
+        jogged: bool,
+        flushed: bool,
+    },
+    /// How many blocks are free, as it was told.
+    Queue(usize),
+}
+
+#[small]
+impl Telling {
+    /// Begins. What is told is what is so by now.
+    #[inline(never)]
+    pub(super) fn begin(notice: Notice, mode: Mode, machine: &mut impl Machine) -> Self {
+        let settings = machine.settings();
+        let part = match notice {
+            Notice::Greeting(occasion) => {
+                Part::Greeting(Banner::begin(occasion, settings), occasion)
+            }
+            Notice::Enquiry => Part::Enquiry,
+            Notice::Exception(status) => Part::Exception(Exception::begin(status, settings)),
+            Notice::Probing => Part::Probing(Probing::begin(settings)),
+            Notice::Status => Part::Status(Report::begin(mode, machine)),
+            Notice::End { jogged, flushed } => Part::End { jogged, flushed },
+            Notice::Queue => Part::Queue(0),
+        };
+        Self { part, mode }
+    }
+}
+
+#[small]
+impl Tells for Telling {
+    #[inline(never)]
+    fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+        let mode = self.mode;
+        match &mut self.part {
+            Part::Greeting(banner, occasion) => {
+                let more = banner.step(machine, out);
+                if !more && *occasion == Occasion::Ready && mode == Mode::Text {
+                    put_ready_prompt(machine, out);
+                }
+                more
+            }
+            Part::Enquiry => {
+                acknowledge(machine.settings(), out);
+                false
+            }
+            Part::Exception(exception) => exception.step(machine, out),
+            Part::Probing(probing) => probing.step(machine, out),
+            Part::Status(report) => report.as_mut().is_some_and(|report| report.step(machine, out)),
+            Part::End { jogged, flushed } => {
+                if core::mem::take(jogged) {
+                    jog_ended(machine.settings(), out);
+                    *flushed
+                } else {
+                    queue_report(mode, machine, out);
+                    receive_report(mode, machine, out);
+                    false
+                }
+            }
+            Part::Queue(free) => {
+                *free = machine.value(Value::QueueFree) as usize;
+                queue_report(mode, machine, out);
+                false
+            }
+        }
+    }
+
+    fn blocks_free(&self) -> usize {
+        if let Part::Queue(free) = self.part { free } else { 0 }
+    }
+}

@@ -1,0 +1,410 @@
+//! Names on the wire: settings, values, groups and actions.
+
+use super::value::{
+    Form, PROBE_STATE, PROBED, SHIFT, SINGLE_COUNT, SINGLES, Single, Source, VECTOR_COUNT, VECTORS,
+    Vector, place_form, vector_value,
+};
+use crate::config::name::{LONGEST, Name, axis_letter, axis_of, padded};
+use crate::config::rows::{find_row, row_name, value_name};
+use crate::config::table::Kind;
+use crate::config::{Fixed, Owner, Setting};
+use crate::gcode::tables::Row;
+use crate::machine::Alarm;
+use crate::progmem::Text;
+use crate::protocol::{Machine, Value};
+use crate::units::AXES;
+use crate::{named, plain, progmem, text};
+
+const FIRST_SINGLE: u16 = Setting::NUMBERS as u16;
+const FIRST_VECTOR: u16 = FIRST_SINGLE + SINGLE_COUNT as u16;
+
+/// The first value of the interpreter's tables. Those below it may be told all the time.
+const FIRST_ROW: u16 = 512;
+
+/// A setting or a value, as a number.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Token(u16);
+
+/// What a token is.
+pub enum Subject {
+    /// A setting.
+    Setting(Setting),
+    /// A value with a name of its own.
+    Single(Single),
+    /// A member of a vector: the vector's number, the vector, the member's number.
+    Member(u8, Vector, u8),
+    /// A value of the interpreter's tables.
+    Row(Row, u8),
+}
+
+/// A token's value, ready to be written.
+#[derive(Clone, Copy)]
+pub enum Shown {
+    /// A number.
+    Number(Fixed),
+    /// A string.
+    Text(Text),
+    /// 32 bits.
+    Data(i32),
+}
+
+#[small]
+impl Token {
+    /// The token of row `row` of the group `sys`.
+    pub const fn system(row: u8) -> Token {
+        Token(row as u16)
+    }
+
+    /// Whether it is in EEPROM alone, too far away to be told all the time.
+    pub fn is_far(self) -> bool {
+        self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
+    }
+
+    /// Its number; of those that are not [far](Self::is_far) below 512.
+    pub const fn number(self) -> u16 {
+        self.0
+    }
+
+    /// The token of a number that [`Token::number`] returned.
+    pub const fn numbered(number: u16) -> Token {
+        Token(number)
+    }
+
+    /// The token of a setting.
+    fn of_setting(setting: Setting) -> Token {
+        Token(setting.number().into())
+    }
+
+    /// The token of a value in the table of [`SINGLES`].
+    const fn single(index: u8) -> Token {
+        Token(FIRST_SINGLE + index as u16)
+    }
+
+    /// The token of a vector's member.
+    const fn member(vector: u8, index: u8) -> Token {
+        Token(FIRST_VECTOR + (vector * AXES as u8 + index) as u16)
+    }
+
+    /// The token of a value of a row.
+    fn row(row: Row, axis: u8) -> Token {
+        Token(FIRST_ROW + u16::from(row.number()) * AXES as u16 + u16::from(axis))
+    }
+
+    /// The setting or value called `name`. About 3,000 cycles on AVR; 8,000 for one that begins as those of the tables do.
+    pub fn find(name: &Name) -> Option<Token> {
+        let setting = || Setting::find(name).map(Token::of_setting);
+        let single = name.row_name(0).and_then(|token| SINGLES.slice().find(token));
+        single
+            .map(Token::single)
+            .or_else(|| Token::find_member(name))
+            .or_else(|| Token::find_row(name))
+            .or_else(setting)
+    }
+
+    fn find_member(name: &Name) -> Option<Token> {
+        let (letter, group) = name.bytes().split_last()?;
+        let number = find_vector(&Name::new().with(group)?)?;
+        let vector = VECTORS.at(usize::from(number))?;
+        let index = match usize::from(vector.members) {
+            AXES => axis_of(*letter)?,
+            _ => letter.checked_sub(b'1')?,
+        };
+        (index < vector.members).then(|| Token::member(number, index))
+    }
+
+    #[inline(never)]
+    fn find_row(name: &Name) -> Option<Token> {
+        let (letter, row) = name.bytes().split_last()?;
+        let axis = axis_of(*letter)?;
+        let row = find_row(&Name::new().with(row)?)?;
+        row.has(axis).then(|| Token::row(row, axis))
+    }
+
+    /// What it is.
+    pub fn subject(self) -> Option<Subject> {
+        let number = self.0;
+        if let Some(setting) = self.setting() {
+            return Some(Subject::Setting(setting));
+        }
+        if number < FIRST_VECTOR {
+            let index = number.checked_sub(FIRST_SINGLE)?;
+            return SINGLES.at(usize::from(index)).map(Subject::Single);
+        }
+        if number < FIRST_ROW {
+            let (number, index) = vector_index((number - FIRST_VECTOR) as u8);
+            return VECTORS
+                .at(usize::from(number))
+                .filter(|vector| index < vector.members)
+                .map(|vector| Subject::Member(number, vector, index));
+        }
+        let (row, axis) = by_axis((number - FIRST_ROW) as u8);
+        Row::from_number(row).map(|row| Subject::Row(row, axis))
+    }
+
+    /// The setting it is, if it is one.
+    pub fn setting(self) -> Option<Setting> {
+        u8::try_from(self.0).ok().and_then(Setting::from_number)
+    }
+
+    /// Its full name.
+    pub fn name(self) -> Name {
+        match self.subject() {
+            Some(Subject::Setting(setting)) => setting.name(),
+            Some(Subject::Single(single)) => Name::new().with_token(single.token),
+            Some(Subject::Member(_, vector, index)) => {
+                let axis = usize::from(vector.members) == AXES;
+                let letter = if axis { axis_letter(index) } else { b'1' + index };
+                let group = Name::new().with_token(vector.token);
+                group.with(&[letter]).unwrap_or(group)
+            }
+            Some(Subject::Row(row, axis)) => value_name(row, axis),
+            None => Name::new(),
+        }
+    }
+
+    /// Its value now.
+    pub fn read(self, machine: &mut impl Machine) -> Shown {
+        let inches = machine.inches();
+        let (source, form) = match self.subject() {
+            Some(Subject::Setting(setting)) => {
+                return match setting.row().kind {
+                    Kind::Text => Shown::Text(text!("0000-KERF")),
+                    Kind::Data | Kind::Job => Shown::Data(machine.setting(setting)),
+                    _ => {
+                        let value = machine.setting(setting);
+                        Shown::Number(machine.settings().show(setting, value, inches))
+                    }
+                };
+            }
+            Some(Subject::Single(single)) => (single.source, single.form),
+            Some(Subject::Member(number, vector, index)) => {
+                (vector_value(number, index), vector.form(index))
+            }
+            Some(Subject::Row(row, axis)) => (Source::Of(Value::Row(row, axis)), place_form(axis)),
+            None => (Source::State, Form::Count),
+        };
+        Shown::Number(form.show(source.read(machine), inches))
+    }
+}
+
+/// Which group of six, and which of it.
+#[small]
+fn by_axis(number: u8) -> (u8, u8) {
+    (number / AXES as u8, number % AXES as u8)
+}
+
+/// Which vector, and which member of it. The last one may have more members.
+#[small]
+fn vector_index(offset: u8) -> (u8, u8) {
+    let number = (offset / AXES as u8).min(VECTOR_COUNT as u8 - 1);
+    (number, offset - number * AXES as u8)
+}
+
+#[small]
+fn find_vector(name: &Name) -> Option<u8> {
+    VECTORS.slice().find(name.row_name(0)?)
+}
+
+/// The reports that a machine sends before anyone asks for others.
+pub const DEFAULT_REPORT: usize = 11;
+
+progmem! {
+    /// posx posy posz posa feed vel unit coor dist frmo stat.
+    pub static DEFAULT_TOKENS: [Token; DEFAULT_REPORT] = [
+        Token::member(1, 0), Token::member(1, 1), Token::member(1, 2), Token::member(1, 3),
+        Token::single(3), Token::single(2), Token::single(9), Token::single(10),
+        Token::single(14), Token::single(15), Token::single(4),
+    ];
+
+    static ACTIONS: [Verb; 24] = [
+        verb("gc", Action::Block),
+        verb("clear", Action::Clear),
+        verb("clr", Action::Clear),
+        verb("alarm", Action::Raise(Alarm::Alarm)),
+        verb("shutd", Action::Raise(Alarm::Shutdown)),
+        verb("panic", Action::Raise(Alarm::Panic)),
+        verb("me", Action::Energize),
+        verb("md", Action::Release),
+        verb("test", Action::Test),
+        verb("prog", Action::Program),
+        verb("qf", Action::Flush),
+        verb("defa", Action::Defaults),
+        verb("h", Action::Help),
+        verb("help", Action::Help),
+        verb("txt", Action::Text),
+        verb("tid", Action::Id),
+        verb("msg", Action::Message),
+        verb("er", Action::Exception),
+        verb("jogx", Action::Jog),
+        verb("jogy", Action::Jog),
+        verb("jogz", Action::Jog),
+        verb("joga", Action::Jog),
+        verb("boot", Action::Boot),
+        verb("reset", Action::Reset),
+    ];
+}
+
+/// The name of an action, padded with zeros, and the action.
+#[derive(Clone, Copy)]
+struct Verb {
+    token: [u8; LONGEST],
+    action: Action,
+}
+
+named! { Verb, 5 }
+
+const fn verb(name: &str, action: Action) -> Verb {
+    Verb { token: padded(name), action }
+}
+
+/// What a request may have done.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Action {
+    /// `gc`: run a block of G-code.
+    Block,
+    /// `clear`, `clr`: end the alarm.
+    Clear,
+    /// `alarm`, `shutd`, `panic`: begin one.
+    Raise(Alarm),
+    /// `me`: power motors.
+    Energize,
+    /// `md`: take power from motors.
+    Release,
+    /// `test`: run a built-in job.
+    Test,
+    /// `prog`: the program in EEPROM.
+    Program,
+    /// `qf`: drop what is queued.
+    Flush,
+    /// `defa`: restore the defaults.
+    Defaults,
+    /// `h`, `help`: tell about settings.
+    Help,
+    /// `txt`: do what a line of text mode says.
+    Text,
+    /// `tid`: nothing; it comes back.
+    Id,
+    /// `msg`: nothing; it comes back.
+    Message,
+    /// `er`: send an exception report.
+    Exception,
+    /// `jogx` and so on: move an axis.
+    Jog,
+    /// `boot`: start the boot loader.
+    Boot,
+    /// `reset`: start anew.
+    Reset,
+}
+
+/// Names that stand for several.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Group {
+    /// `sys`, `1` to `4`, `x` to `c`, `p1`, `uda` to `udd`, `jid`.
+    Settings(Owner),
+    /// `pos` and its like, by their number in [`VECTORS`].
+    Vector(u8),
+    /// `g54`, `g28`, `tt1` and their like.
+    Row(Row),
+    /// A token alone.
+    One(Token),
+    /// `sr`, `srs`: the tokens of the status report.
+    Report,
+}
+
+#[small]
+impl Group {
+    /// `ofs`.
+    pub const OFFSETS: Group = Group::Vector(2);
+    /// `tof`.
+    pub const TOOL_OFFSETS: Group = Group::Vector(4);
+    /// `g92`.
+    pub const SHIFT: Group = Group::Vector(SHIFT);
+
+    fn find(name: &Name) -> Option<Group> {
+        if name.is(plain!("sys")) {
+            return Some(Group::Settings(Owner::System));
+        }
+        if name.is(plain!("sr")) || name.is(plain!("srs")) {
+            return Some(Group::Report);
+        }
+        if let Some(owner) = Owner::called(name) {
+            return Some(Group::Settings(owner));
+        }
+        find_vector(name).map(Group::Vector).or_else(|| find_row(name).map(Group::Row))
+    }
+
+    /// What comes before the names of its members.
+    pub fn prefix(self) -> Name {
+        match self {
+            Group::Settings(owner) => owner.prefix(),
+            Group::Vector(number) => VECTORS
+                .at(usize::from(number))
+                .map_or(Name::new(), |vector| Name::new().with_token(vector.token)),
+            Group::Row(row) => row_name(row),
+            Group::Report | Group::One(_) => Name::new(),
+        }
+    }
+
+    /// The member behind number `from` and its number, if there is one.
+    pub fn member(self, from: u8, machine: &mut impl Machine) -> Option<(u8, Token)> {
+        match self {
+            Group::Settings(owner) => (from..owner.rows())
+                .find_map(|row| Some((row, Token::of_setting(Setting::of(owner, row)?)))),
+            Group::Vector(PROBED) if from == 0 => Some((0, Token::single(PROBE_STATE))),
+            Group::Vector(number) => {
+                let index = if number == PROBED { from - 1 } else { from };
+                let members = VECTORS.at(usize::from(number))?.members;
+                (index < members).then(|| (from, Token::member(number, index)))
+            }
+            Group::Row(row) => {
+                let axis = (from..AXES as u8).find(|&axis| row.has(axis))?;
+                Some((axis, Token::row(row, axis)))
+            }
+            Group::One(token) => (from == 0).then_some((0, token)),
+            Group::Report => machine.memory().tinyg.token(from).map(|token| (from, token)),
+        }
+    }
+}
+
+/// Every name that means something at the top of a request, for tests and documents: settings and values by their
+/// full names, and actions.
+#[cfg(feature = "std")]
+#[small]
+pub fn names() -> std::vec::Vec<std::string::String> {
+    let text = |bytes: &[u8]| std::string::String::from_utf8_lossy(bytes).into_owned();
+    let tokens = (0..FIRST_ROW + u16::from(crate::gcode::tables::ROWS) * AXES as u16).map(Token);
+    let tokens = tokens.filter(|token| Token::find(&token.name()) == Some(*token));
+    let actions = ACTIONS.get().map(|verb| text(&verb.token).trim_end_matches('\0').into());
+    tokens.map(|token| text(token.name().bytes())).chain(actions).collect()
+}
+
+/// What a name in a request means.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Target {
+    /// A setting or value.
+    Token(Token),
+    /// Something to do.
+    Action(Action),
+    /// Several settings or values.
+    Group(Group),
+    /// Nothing.
+    Unknown,
+}
+
+/// What `name` means behind `prefix`, a group's.
+#[small]
+pub fn resolve(prefix: Name, name: &[u8]) -> Target {
+    let Some(full) = prefix.with(name) else { return Target::Unknown };
+    // First, for they are few: `tid` comes with each line of some senders.
+    let verb = ACTIONS.slice().find(full.padded());
+    if let Some(verb) = verb.and_then(|verb| ACTIONS.at(verb.into())) {
+        return Target::Action(verb.action);
+    }
+    if let Some(token) = Token::find(&full) {
+        return Target::Token(token);
+    }
+    Group::find(&full).map_or(Target::Unknown, Target::Group)
+}
+
+#[cfg(test)]
+mod tests;

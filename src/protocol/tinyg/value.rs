@@ -1,0 +1,324 @@
+//! What can be read of the machine beside its settings: names, units and texts, as tables.
+
+use super::state;
+use super::variation::Variation;
+use crate::boards::inputs;
+use crate::config::Fixed;
+use crate::config::name::token;
+use crate::gcode::overrides::Override;
+use crate::progmem::Text;
+use crate::protocol::{Machine, Value};
+use crate::units::FIRST_ROTARY;
+use crate::{named, progmem, text};
+
+/// Where a number comes from that is told.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Source {
+    /// It is a value of the machine.
+    Of(Value),
+    /// `stat`.
+    State,
+    /// `macs`.
+    Machine,
+    /// `cycs`.
+    Cycle,
+    /// `mots`.
+    Motion,
+    /// `hold`.
+    Hold,
+    /// `rx`: what the sender may send: lines, or characters if it counts those.
+    Room,
+    /// What there is none of: `fd`, `ma`, `_xs1`, `_fe1`.
+    Zero,
+}
+
+#[small]
+impl Source {
+    /// The number now.
+    #[inline(never)]
+    pub fn read(self, machine: &mut impl Machine) -> i32 {
+        match self {
+            Source::Of(value) => machine.value(value),
+            Source::State => state::stat(machine),
+            Source::Machine => state::macs(machine),
+            Source::Cycle => state::cycs(machine),
+            Source::Motion => state::mots(machine),
+            Source::Hold => state::hold(machine),
+            Source::Room => machine.value(match Variation::of(machine.settings()) {
+                Variation::Characters => Value::BytesFree,
+                _ => Value::SlotsFree,
+            }),
+            Source::Zero => 0,
+        }
+    }
+}
+
+/// A value of the machine.
+const fn of(value: Value) -> Source {
+    Source::Of(value)
+}
+
+/// Most steps that are shown: with two decimals they fit.
+const STEPS_MAX: i32 = i32::MAX / 100;
+
+/// What a value is measured in.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Form {
+    /// An integer, or a choice.
+    Count,
+    /// A speed.
+    Speed,
+    /// A factor, in thousandths.
+    Factor,
+    /// A length or angle.
+    Length,
+    /// A length in millimetres whatever the units, or an angle.
+    Millimetres,
+    /// The same with two decimals.
+    Rough,
+    /// Steps, with two decimals.
+    Steps,
+}
+
+#[small]
+impl Form {
+    /// `value` as shown, lengths in inches if `inches`.
+    pub fn show(self, value: i32, inches: bool) -> Fixed {
+        let (stored, shown) = match self {
+            Form::Count => return Fixed::int(value),
+            Form::Factor => return Fixed { value, decimals: 3 },
+            Form::Steps => {
+                let value = value.clamp(-STEPS_MAX, STEPS_MAX).wrapping_mul(100);
+                return Fixed { value, decimals: 2 };
+            }
+            Form::Rough => (4, 2),
+            Form::Speed => (3, 2),
+            Form::Length | Form::Millimetres => (4, 3),
+        };
+        let value = Fixed { value, decimals: stored };
+        if inches && matches!(self, Form::Speed | Form::Length) {
+            value.inches(shown)
+        } else {
+            value.rounded(shown)
+        }
+    }
+}
+
+/// How a place on an axis is shown: an angle never in inches.
+#[small]
+pub fn place_form(axis: u8) -> Form {
+    if usize::from(axis) < FIRST_ROTARY { Form::Length } else { Form::Millimetres }
+}
+
+/// A value with a name of its own.
+#[derive(Clone, Copy)]
+pub struct Single {
+    /// Its name, zero padded.
+    pub token: [u8; 4],
+    /// What it is.
+    pub source: Source,
+    /// What it is measured in.
+    pub form: Form,
+    /// What text reports call it; empty if they do not know it.
+    pub label: Text,
+    /// The names of its numbers from 0, separated by `|`; empty if they have none.
+    pub choices: Text,
+}
+
+named! { Single, 4 }
+
+/// Values of each axis or motor.
+#[derive(Clone, Copy)]
+pub struct Vector {
+    /// The group's name, zero padded.
+    pub token: [u8; 4],
+    /// What they are measured in.
+    pub form: Form,
+    /// Members: axes, motors, or inputs. More than axes only in the last row.
+    pub members: u8,
+    /// What text reports call it, behind the axis's letter.
+    pub label: Text,
+}
+
+named! { Vector, 4 }
+
+#[small]
+impl Vector {
+    /// How member `index` is shown: an angle never in inches.
+    pub fn form(&self, index: u8) -> Form {
+        if self.form == Form::Length { place_form(index) } else { self.form }
+    }
+}
+
+/// Entries of [`SINGLES`].
+pub const SINGLE_COUNT: usize = 43;
+/// Entries of [`VECTORS`].
+pub const VECTOR_COUNT: usize = 17;
+/// The number of the vector `g92`.
+pub const SHIFT: u8 = 5;
+/// The number of the vector `prb`, whose group begins with `prbe`.
+pub const PROBED: u8 = 15;
+/// The number of `prbe`.
+pub const PROBE_STATE: u8 = SINGLE_COUNT as u8 - 1;
+
+const NONE: Text = text!("");
+const LINE: Text = text!("Line number:");
+const STATES: Text = text!(
+    "Initializing|Ready|Alarm|Stop|End|Run|Hold|Probe|Cycle|Homing|Jog|Interlock|Shutdown|Panic"
+);
+const MACHINE: Text = text!("Initializing|Ready|Alarm|Stop|End|Cycle|Interlock|Shutdown|Panic");
+const COORDINATES: Text = text!(
+    "G53 - machine coordinate system|G54 - coordinate system 1|G55 - coordinate system 2|\
+     G56 - coordinate system 3|G57 - coordinate system 4|G58 - coordinate system 5|\
+     G59 - coordinate system 6|G59.1|G59.2|G59.3"
+);
+const MOTION: Text = text!(
+    "G0  - linear traverse|G1  - linear feed|G2  - clockwise arc feed|\
+     G3  - counter clockwise arc feed|G80 - cancel motion mode (none active)|\
+     G38.2 - probe|G81|G82|G83|G84|G85|G86|G87|G88|G89|G73|G38.3|G38.4|G38.5"
+);
+const FEED: Text = text!(
+    "G93 - inverse time mode|G94 - units-per-minute mode (i.e. feedrate mode)|\
+     G95 - units-per-revolution mode"
+);
+const DISTANCE: Text = text!("G90 - absolute distance mode|G91 - incremental distance mode");
+const ARC_DISTANCE: Text =
+    text!("G90.1 - absolute distance mode|G91.1 - incremental distance mode (default mode)");
+const ON: Text = text!("Off|On");
+const PATH: Text = text!("G61 - exact path mode|G61.1 - exact stop mode|G64 - continuous mode");
+
+const PROBE: Value = Value::Input(inputs::PROBE as u8);
+const DOOR: Value = Value::Input(inputs::DOOR as u8);
+const STOP: Value = Value::Input(inputs::STOP as u8);
+
+#[small]
+const fn count(name: &str, source: Source, label: Text, choices: Text) -> Single {
+    Single { token: token(name), source, form: Form::Count, label, choices }
+}
+
+#[small]
+const fn speed(name: &str, source: Source, label: Text) -> Single {
+    Single { token: token(name), source, form: Form::Speed, label, choices: NONE }
+}
+
+#[small]
+const fn factor(name: &str, of: Override, label: Text) -> Single {
+    let (source, form) = (Source::Of(Value::Override(of)), Form::Factor);
+    Single { token: token(name), source, form, label, choices: NONE }
+}
+
+#[small]
+const fn single(name: &str, source: Source, form: Form) -> Single {
+    Single { token: token(name), source, form, label: NONE, choices: NONE }
+}
+
+#[small]
+const fn vector(name: &str, form: Form, members: u8, label: Text) -> Vector {
+    Vector { token: token(name), form, members, label }
+}
+
+progmem! {
+    /// Values with names of their own.
+    pub static SINGLES: [Single; SINGLE_COUNT] = [
+        count("n", of(Value::FinishedLine), text!("Line finished:"), NONE),
+        count("line", of(Value::MotionLine), LINE, NONE),
+        speed("vel", of(Value::Velocity), text!("Velocity:")),
+        speed("feed", of(Value::Feed), text!("Feed rate:")),
+        count("stat", Source::State, text!("Machine state:"), STATES),
+        count("macs", Source::Machine, text!("Raw machine state:"), MACHINE),
+        count("cycs", Source::Cycle, text!("Cycle state:"), text!("Off|Machining|Probe|Homing|Jog")),
+        count("mots", Source::Motion, text!("Motion state:"), text!("Stop|Run|Hold")),
+        count("hold", Source::Hold, text!("Feedhold state:"), text!("Off|Sync|Plan|Decel|Hold|End-Hold")),
+        count("unit", of(Value::Units), text!("Units:"), text!("G20 - inches mode|G21 - millimeter mode")),
+        count("coor", of(Value::Coordinates), text!("Coordinate system:"), COORDINATES),
+        count("momo", of(Value::MotionMode), text!("Motion mode:"), MOTION),
+        count("plan", of(Value::Plane), text!("Plane:"), text!("G17 - XY plane|G18 - XZ plane|G19 - YZ plane")),
+        count("path", of(Value::Path), text!("Path Mode:"), PATH),
+        count("dist", of(Value::Distance), text!("Distance mode:"), DISTANCE),
+        count("frmo", of(Value::FeedMode), text!("Feed rate mode:"), FEED),
+        count("tool", of(Value::Tool), text!("Tool number"), NONE),
+        count("home", of(Value::Home), text!("Homing state:"), text!("Not Homed|Homed|Homing")),
+        count("qr", of(Value::QueueFree), NONE, NONE),
+        count("qi", of(Value::QueueAdded), NONE, NONE),
+        count("qo", of(Value::QueueRemoved), NONE, NONE),
+        count("rx", Source::Room, NONE, NONE),
+        count("admo", of(Value::ArcDistance), text!("Arc Distance mode:"), ARC_DISTANCE),
+        count("spe", of(Value::SpindleOn), text!("Spindle:"), ON),
+        count("spd", of(Value::SpindleDirection), text!("Spindle direction:"), text!("CW|CCW")),
+        count("sps", of(Value::SpindleSpeed), text!("Spindle speed:"), NONE),
+        count("com", of(Value::Mist), text!("Mist coolant:"), ON),
+        count("cof", of(Value::Flood), text!("Flood coolant:"), ON),
+        factor("mfo", Override::Feed, text!("Feed override:")),
+        factor("mto", Override::Traverse, text!("Traverse override:")),
+        factor("sso", Override::Spindle, text!("Spindle override:")),
+        count("mfoe", of(Value::OverrideOn(Override::Feed)), text!("Feed override enable:"), ON),
+        count("mtoe", of(Value::OverrideOn(Override::Traverse)), text!("Traverse override enable:"), ON),
+        count("ssoe", of(Value::OverrideOn(Override::Spindle)), text!("Spindle override enable:"), ON),
+        count("fd", Source::Zero, NONE, NONE),
+        single("ma", Source::Zero, Form::Length),
+        count("rst", of(Value::Reset), text!("Last reset:"), text!("Power on|External|Brown-out|Watchdog|Asked for")),
+        count("stv", of(Value::Starvations), text!("Late segments:"), NONE),
+        count("kept", of(Value::Kept), NONE, NONE),
+        count("inp", of(PROBE), text!("Probe:"), NONE),
+        count("ind", of(DOOR), text!("Door:"), NONE),
+        count("ine", of(STOP), text!("Emergency stop:"), NONE),
+        count("prbe", of(Value::ProbeState), text!("Probe state:"), text!("Failed|Succeeded|Waiting")),
+    ];
+
+    /// Values of each axis or motor; [`vector_value`] gives the order.
+    pub static VECTORS: [Vector; VECTOR_COUNT] = [
+        vector("mpo", Form::Millimetres, 6, text!(" machine posn:")),
+        vector("pos", Form::Length, 6, text!(" position:")),
+        vector("ofs", Form::Millimetres, 6, text!(" work offset:")),
+        vector("hom", Form::Count, 6, text!(" axis homing state:")),
+        vector("tof", Form::Millimetres, 6, text!(" tool length:")),
+        vector("g92", Form::Length, 6, NONE),
+        vector("pwr", Form::Count, 4, NONE),
+        vector("_te", Form::Rough, 6, NONE),
+        vector("_tr", Form::Rough, 6, NONE),
+        vector("_ts", Form::Steps, 4, NONE),
+        vector("_ps", Form::Steps, 4, NONE),
+        vector("_cs", Form::Steps, 4, NONE),
+        vector("_es", Form::Steps, 4, NONE),
+        vector("_xs", Form::Steps, 4, NONE),
+        vector("_fe", Form::Steps, 4, NONE),
+        vector("prb", Form::Millimetres, 6, NONE),
+        vector("in", Form::Count, inputs::ENDS as u8, NONE),
+    ];
+}
+
+/// Member `index` of a vector.
+#[small]
+pub fn vector_value(vector: u8, index: u8) -> Source {
+    let value = match vector {
+        0 => Value::MachinePosition(index),
+        1 => Value::Position(index),
+        2 => Value::Offset(index),
+        3 => Value::Homed(index),
+        4 => Value::ToolOffset(index),
+        SHIFT => Value::Shift(index),
+        6 => Value::Powered(index),
+        7 => Value::Target(index),
+        8 => Value::MachinePosition(index),
+        9..13 => Value::Steps(index),
+        13 | 14 => return Source::Zero,
+        PROBED => Value::Probed(index),
+        _ => Value::Input(index),
+    };
+    Source::Of(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shows_in_the_units_in_force() {
+        let show = |form: Form, value, inches| form.show(value, inches);
+        assert_eq!(show(Form::Speed, 25_400, true), Fixed { value: 100, decimals: 2 });
+        assert_eq!(show(Form::Length, 254_000, true), Fixed { value: 1000, decimals: 3 });
+        assert_eq!(show(Form::Millimetres, 254_000, true), Fixed { value: 25_400, decimals: 3 });
+        assert_eq!(show(Form::Count, 7, true), Fixed::int(7));
+    }
+}

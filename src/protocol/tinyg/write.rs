@@ -1,0 +1,264 @@
+//! Writing JSON and plain text, byte by byte, into an [`Out`].
+
+use super::format::{COMMA, EXPAND, Format, HUSHED, MUTE, SILENT, STRICT, WRAPPED};
+use super::token::Shown;
+use super::variation::Variation;
+use crate::config::{Digits, Fixed, Settings};
+use crate::progmem::Text;
+pub use crate::protocol::{Ending, Out};
+use crate::status::Status;
+use crate::{plain, text};
+
+/// Puts the end of a line.
+pub fn put_line_end(settings: &Settings, out: &mut impl Out) {
+    Writer::body(out, &mut Format::plain(settings)).end_line();
+}
+
+/// A writer for the time of one step.
+pub struct Writer<'a, O> {
+    out: &'a mut O,
+    format: &'a mut Format,
+    shown: bool,
+}
+
+impl<'a, O: Out> Writer<'a, O> {
+    /// Writes names and values, or a report.
+    pub fn body(out: &'a mut O, format: &'a mut Format) -> Self {
+        Self::unless(HUSHED, out, format)
+    }
+
+    /// Writes messages, and what a response says of its line.
+    pub fn message(out: &'a mut O, format: &'a mut Format) -> Self {
+        Self::unless(MUTE, out, format)
+    }
+
+    /// Writes the frame of a response.
+    pub fn frame(out: &'a mut O, format: &'a mut Format) -> Self {
+        Self::unless(SILENT, out, format)
+    }
+
+    fn unless(hidden: u8, out: &'a mut O, format: &'a mut Format) -> Self {
+        let shown = format.flags & hidden == 0;
+        Writer { out, format, shown }
+    }
+
+    /// Whose words are used.
+    pub fn variation(&self) -> Variation {
+        self.format.variation
+    }
+
+    /// Whether this is text.
+    pub fn is_plain(&self) -> bool {
+        self.format.is_plain()
+    }
+
+    /// One byte.
+    pub fn byte(&mut self, byte: u8) {
+        if !self.shown {
+            return;
+        }
+        if self.format.flags & WRAPPED != 0 && matches!(byte, b'"' | b'\\') {
+            self.out.put(b'\\');
+        }
+        self.out.put(byte);
+    }
+
+    /// The end of a line.
+    pub fn end_line(&mut self) {
+        if !self.shown {
+            return;
+        }
+        if self.format.flags & WRAPPED != 0 {
+            return self.out.put_plain(plain!("\\n"));
+        }
+        let expand = self.format.flags & EXPAND != 0;
+        self.out.put_plain(if expand { plain!("\n\r") } else { plain!("\n") });
+    }
+
+    /// One byte of somebody else's text; what does not print becomes `?`.
+    pub fn printable(&mut self, byte: u8) {
+        self.byte(if matches!(byte, b' '..=b'~') { byte } else { b'?' });
+    }
+
+    /// One byte of somebody else's text within a string. At most two bytes come out.
+    pub fn escaped(&mut self, byte: u8) {
+        if matches!(byte, b'"' | b'\\') {
+            self.byte(b'\\');
+        }
+        self.printable(byte);
+    }
+
+    /// A text. By itself, for it is called in many places.
+    #[inline(never)]
+    #[small]
+    pub fn text(&mut self, text: Text) {
+        text.bytes().for_each(|byte| self.byte(byte));
+    }
+
+    /// Bytes as they are, in lower case.
+    pub fn lower(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.printable(byte.to_ascii_lowercase()));
+    }
+
+    /// A blank, `count` times.
+    pub fn blanks(&mut self, count: usize) {
+        (0..count).for_each(|_| self.byte(b' '));
+    }
+
+    /// A number.
+    pub fn fixed(&mut self, fixed: Fixed) {
+        let mut digits = Digits::default();
+        fixed.render(&mut digits).iter().for_each(|&byte| self.byte(byte));
+    }
+
+    /// A number, ending in column `width`.
+    pub fn aligned(&mut self, fixed: Fixed, width: usize) {
+        let mut digits = Digits::default();
+        let digits = fixed.render(&mut digits);
+        self.blanks(width.saturating_sub(digits.len()));
+        digits.iter().for_each(|&byte| self.byte(byte));
+    }
+
+    /// Begins a member: a comma if one is due, the key, a colon.
+    pub fn key(&mut self, name: &[u8]) {
+        self.before_key();
+        self.lower(name);
+        self.after_key();
+    }
+
+    /// The same with a key of ours.
+    pub fn key_text(&mut self, name: Text) {
+        self.before_key();
+        self.text(name);
+        self.after_key();
+    }
+
+    fn before_key(&mut self) {
+        if !self.shown {
+            return;
+        }
+        if self.format.flags & COMMA != 0 {
+            self.byte(b',');
+        }
+        self.format.flags |= COMMA;
+        self.key_quote();
+    }
+
+    fn after_key(&mut self) {
+        self.key_quote();
+        self.byte(b':');
+    }
+
+    fn key_quote(&mut self) {
+        if self.format.flags & STRICT != 0 {
+            self.byte(b'"');
+        }
+    }
+
+    /// A string of ours as a value.
+    pub fn string(&mut self, text: Text) {
+        self.byte(b'"');
+        self.text(text);
+        self.byte(b'"');
+    }
+
+    /// A token's value.
+    pub fn shown(&mut self, shown: Shown) {
+        match shown {
+            Shown::Number(fixed) => self.fixed(fixed),
+            Shown::Text(text) => self.string(text),
+            Shown::Data(bits) => {
+                self.byte(b'"');
+                self.bits(bits);
+                self.byte(b'"');
+            }
+        }
+    }
+
+    /// 32 bits: `0x2a`.
+    pub fn bits(&mut self, bits: i32) {
+        self.text(text!("0x"));
+        let mut begun = false;
+        for place in (0..8).rev() {
+            let digit = (bits >> (4 * place)) as u8 & 15;
+            begun |= digit != 0 || place == 0;
+            if begun {
+                self.byte(if digit < 10 { b'0' + digit } else { b'a' - 10 + digit });
+            }
+        }
+    }
+
+    /// Opens an object.
+    pub fn open(&mut self) {
+        if self.shown {
+            self.byte(b'{');
+            self.format.flags &= !COMMA;
+        }
+    }
+
+    /// Closes an object.
+    pub fn close(&mut self) {
+        if self.shown {
+            self.byte(b'}');
+            self.format.flags |= COMMA;
+        }
+    }
+
+    /// Opens a response, and its body.
+    pub fn begin_response(&mut self) {
+        self.begin_sum();
+        self.open();
+        self.key_text(text!("r"));
+        self.open();
+    }
+
+    /// Closes the body of a response, and the response with its footer: `},"f":[1,status,free]}`. See [`Ending`].
+    pub fn end_response(&mut self, status: Status, ending: Ending) {
+        self.close();
+        self.key_text(text!("f"));
+        self.text(text!("[1,"));
+        self.footer_values(status, ending);
+    }
+
+    /// A whole response of which nothing but the frame shows.
+    pub fn empty_response(&mut self, status: Status, ending: Ending) {
+        self.begin_sum();
+        let strict = self.format.flags & STRICT != 0;
+        self.text(if strict { text!("{\"r\":{},\"f\":[1,") } else { text!("{r:{},f:[1,") });
+        self.footer_values(status, ending);
+    }
+
+    fn begin_sum(&mut self) {
+        if self.format.variation == Variation::Characters {
+            self.out.begin_sum();
+        }
+    }
+
+    fn footer_values(&mut self, status: Status, ending: Ending) {
+        let variation = self.format.variation;
+        self.small(variation.code(status).into());
+        self.byte(b',');
+        self.small(match variation {
+            Variation::Lines => ending.free.into(),
+            _ => ending.length.max(variation.phrases().no_line.into()),
+        });
+        if variation == Variation::Characters {
+            let sum = self.out.take_sum();
+            self.byte(b',');
+            self.fixed(Fixed::int(sum.into()));
+        }
+        self.text(text!("]}"));
+        self.end_line();
+    }
+
+    /// A number, which most often has one digit.
+    fn small(&mut self, value: u16) {
+        match value {
+            ..10 => self.byte(b'0' + value as u8),
+            _ => self.fixed(Fixed::int(value.into())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
