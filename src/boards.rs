@@ -270,6 +270,9 @@ pub mod inputs {
 pub struct Board {
     /// The name that `--board` takes.
     pub name: &'static str,
+    /// The Cargo features that its image has: dialects and [capabilities](crate::capability::Capability). `cargo xtask` reads them in
+    /// the board's file.
+    pub features: &'static [&'static str],
     /// CPU clock, Hz.
     pub clock_hz: u32,
     /// The four stepper drivers, motor 1 first.

@@ -21,6 +21,7 @@ pub mod baud;
 pub mod boards;
 #[cfg(feature = "std")]
 pub mod canon;
+pub mod capability;
 pub mod config;
 pub mod gcode;
 pub mod jobs;

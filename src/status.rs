@@ -38,6 +38,7 @@ pub enum Status {
     TextNested,
     JsonTooDeep,
     Muted,
+    NotBuiltIn,
     GcodeGeneric,
     GcodeUnsupported,
     McodeUnsupported,

@@ -149,6 +149,7 @@ impl Block {
         self.needed |= code.needs;
         let is_first = match code.action {
             Action::NonModal(code) => first(&mut self.non_modal, code),
+            Action::Motion(mode) if !mode.is_built_in() => return Err(Status::NotBuiltIn),
             Action::Motion(MotionMode::None) => first(&mut self.cancel, ()),
             Action::Motion(mode) => first(&mut self.motion, mode),
             Action::Plane(plane) => first(&mut self.plane, plane),

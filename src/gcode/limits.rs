@@ -10,6 +10,7 @@ use kerf_macros::small;
 use super::arc::{norm, part, round, spoke, turned};
 use super::command::{Arc, Cycle, Motion};
 use super::setup::Setup;
+use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
 
@@ -96,6 +97,7 @@ fn check_within(
 ) -> Result<(), Status> {
     let target = match motion {
         Motion::None | Motion::Home { .. } | Motion::SetPosition { .. } => return Ok(()),
+        Motion::Cycle(_) if !Capability::Cycles.is_built_in() => return Ok(()),
         Motion::Cycle(cycle) => return check_cycle(start, cycle, limits),
         Motion::Through { via, target } => {
             check_straight(start, via, limits)?;

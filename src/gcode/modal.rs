@@ -2,6 +2,8 @@
 //!
 //! The discriminants are the numbers in which TinyG reports these modes.
 
+use crate::capability::Capability;
+
 /// Group 1: what axis words alone do.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
@@ -50,9 +52,28 @@ impl MotionMode {
     /// How many there are.
     pub const COUNT: usize = 19;
 
-    /// G73, G81 to G89.
+    /// G73, G81 to G89. Never in an image without them.
     pub fn is_cycle(self) -> bool {
-        matches!(self as u8, 6..=15)
+        Capability::Cycles.is_built_in() && self.capability() == Some(Capability::Cycles)
+    }
+
+    /// What an image needs to have for it.
+    #[inline(always)]
+    pub const fn capability(self) -> Option<Capability> {
+        match self as u8 {
+            5 | 16..=18 => Some(Capability::Probing),
+            6..=15 => Some(Capability::Cycles),
+            _ => None,
+        }
+    }
+
+    /// Whether this image has it.
+    #[inline(always)]
+    pub const fn is_built_in(self) -> bool {
+        match self.capability() {
+            Some(capability) => capability.is_built_in(),
+            None => true,
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use super::modal::{Distance, FeedMode, MotionMode, Turn, Units};
 use super::setup::Setup;
 use super::state::State;
 use super::words::{AXES, F, ROTARY};
+use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{FIRST_ROTARY, Length};
 
@@ -107,6 +108,7 @@ impl State {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
+        Capability::Probing.check()?;
         if !setup.has_probe() {
             return Err(Status::ProbeFailed);
         }

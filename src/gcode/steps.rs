@@ -8,6 +8,7 @@
 use super::command::{Commands, Cycle, Feed, Motion, Spindle, Stop};
 use super::modal::{MotionMode, Turn};
 use super::overrides::Change;
+use crate::capability::Capability;
 use crate::progmem;
 use crate::units::{Length, PerAxis};
 
@@ -196,7 +197,8 @@ impl Steps {
 
     fn motion(&mut self, motion: &Motion, position: &PerAxis<Length>) -> Option<Step> {
         if let Motion::Cycle(cycle) = motion {
-            return self.cycle(cycle, position);
+            let is_built_in = Capability::Cycles.is_built_in();
+            return if is_built_in { self.cycle(cycle, position) } else { None };
         }
         self.part += 1;
         match (motion, self.part) {

@@ -1,6 +1,7 @@
 //! The jobs, by number: those of TinyG's kinds that a machine can run.
 
 use super::Piece;
+use crate::capability::Capability;
 use crate::plain;
 use crate::progmem;
 
@@ -48,6 +49,7 @@ pieces!(27:
 /// Piece `index` of job `number`.
 #[small]
 pub fn piece(number: u8, index: u8) -> Option<Piece> {
+    Capability::Jobs.check().ok()?;
     let of_job = |i| PIECES.at(i).filter(|(job, _)| *job == number);
     (0..PIECES.len()).filter_map(of_job).nth(index.into()).map(|(_, piece)| piece)
 }

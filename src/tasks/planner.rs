@@ -9,6 +9,7 @@ mod jog;
 mod merge;
 mod outputs;
 mod parts;
+#[cfg(feature = "probing")]
 mod probe;
 mod seek;
 mod square;
@@ -125,7 +126,11 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
                         Turn::Done => break,
                         Turn::More => links.give_way(|_| queue::used() >= ENOUGH).await,
                         Turn::Pause => planner.cycle_start().await,
+                        #[cfg(feature = "probing")]
                         Turn::Probe => planner.probe().await,
+                        // No line asks for it.
+                        #[cfg(not(feature = "probing"))]
+                        Turn::Probe => {}
                         Turn::Home => planner.home().await,
                         Turn::Jog => planner.jog().await,
                     }

@@ -22,6 +22,7 @@ use super::spindle;
 use super::switches;
 use crate::baud;
 use crate::boards::{MOTORS, inputs};
+use crate::capability::Capability;
 use crate::config::{Setting, Settings};
 use crate::gcode::command::Motion;
 use crate::gcode::limits::is_near;
@@ -423,7 +424,9 @@ impl Machine for View<'_> {
     }
 
     fn start_job(&mut self, number: u8) -> Status {
-        let Some(job) = Job::new(number) else { return Status::Error };
+        let Some(job) = Job::new(number) else {
+            return Capability::Jobs.check().err().unwrap_or(Status::Error);
+        };
         if !job.is_none() && self.is_busy() {
             return Status::NotAccepted;
         }

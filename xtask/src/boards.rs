@@ -2,7 +2,11 @@
 
 use std::fmt;
 
+use anyhow::{Context, Result};
+
 use clap::ValueEnum;
+
+use crate::process::root;
 
 /// A board that firmware is built for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -22,6 +26,14 @@ impl Board {
         Board::value_variants()
     }
 
+    /// The Cargo features that its file asks for: dialects and capabilities.
+    pub fn features(self) -> Result<Vec<String>> {
+        let file = root().join(format!("boards/{self}.rs"));
+        let text = std::fs::read_to_string(&file);
+        let text = text.with_context(|| format!("no {}", file.display()))?;
+        listed(&text).with_context(|| format!("no line `features: &[...]` in {}", file.display()))
+    }
+
     /// The name in `boards/`, on the command line and after `board-` in the package's features.
     pub fn name(self) -> &'static str {
         match self {
@@ -35,6 +47,13 @@ impl fmt::Display for Board {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
+}
+
+/// What `features: &["a", "b"],` lists.
+fn listed(text: &str) -> Option<Vec<String>> {
+    let (_, rest) = text.split_once("\n    features: &[")?;
+    let (list, _) = rest.split_once(']')?;
+    Some(list.split('"').skip(1).step_by(2).map(str::to_owned).collect())
 }
 
 #[cfg(test)]
@@ -65,5 +84,22 @@ mod tests {
         for board in Board::all() {
             assert_eq!(board.to_possible_value().unwrap().get_name(), board.name());
         }
+    }
+
+    #[test]
+    fn features_of_boards_are_features_of_the_package() {
+        let manifest = std::fs::read_to_string(root().join("Cargo.toml")).unwrap();
+        for board in Board::all() {
+            let features = board.features().unwrap();
+            assert!(features.iter().any(|name| name.starts_with("dialect-")), "{board}");
+            for name in features {
+                assert!(manifest.contains(&format!("\n{name} = ")), "{board}: no feature {name}");
+            }
+        }
+        assert_eq!(
+            listed("\n    features: &[\n \"a\",\n \"b-c\",\n],"),
+            Some(vec!["a".into(), "b-c".into()])
+        );
+        assert_eq!(listed("features"), None);
     }
 }

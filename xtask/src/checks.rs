@@ -1,11 +1,13 @@
 //! `cargo xtask test`: everything that must pass before a merge.
 
+use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 use crate::boards::Board;
+use crate::elf;
 use crate::firmware;
 use crate::machines::Machine;
 use crate::process::{host_cargo, probe, root, run as run_child, which};
@@ -24,6 +26,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "lints", run: lints },
     Stage { name: "host tests", run: host_tests },
     Stage { name: "firmware of every board", run: build_all },
+    Stage { name: "an image without capabilities", run: build_without },
     Stage { name: "examples of avr-embassy", run: || firmware::build_examples().map(drop) },
     Stage { name: "sizes and stack of every board", run: size_all },
     Stage { name: "simulator tests", run: simulator_tests },
@@ -85,6 +88,23 @@ fn build_all() -> Result<()> {
         println!("elf: {}", firmware::build(*board, Machine::default())?.display());
     }
     Ok(())
+}
+
+/// What capabilities take of the flash, bytes, at the least: a check that leaving them out does leave them out.
+const CAPABILITIES: u64 = 8_000;
+
+/// An image without capabilities is smaller, and refuses what it lacks.
+fn build_without() -> Result<()> {
+    let board = Board::Ramps14;
+    let is_capability = |feature: &String| !feature.starts_with("dialect-");
+    let without: Vec<_> = board.features()?.into_iter().filter(is_capability).collect();
+    let flash = |elf: &Path| anyhow::Ok(elf::Image::load(elf)?.sizes.flash);
+    let all = flash(&firmware::image(board, Machine::default()))?;
+    let least = flash(&firmware::build_without(board, Machine::default(), &without)?)?;
+    println!("{} take {} bytes of flash", without.join(", "), all.saturating_sub(least));
+    ensure!(least + CAPABILITIES < all, "{least} bytes without capabilities, {all} with them");
+    let features = ["--no-default-features", "--features", "std,dialect-tinyg"];
+    cargo(&[&["test", "--package", "kerf", "--test", "capabilities"], &features[..]].concat())
 }
 
 fn size_all() -> Result<()> {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 
 use crate::boards::Board;
@@ -24,26 +24,40 @@ const FLAGS: &str = "-C target-cpu=atmega2560 -C llvm-args=-inline-threshold=30 
 /// anew in a copy; `rustc` knows by the end of the name which options it takes.
 const LINKER: &str = "target/avr/keep-gcc";
 
-/// Where the images lie: `BOARD.elf`, or `BOARD-MACHINE.elf` if it is not for the usual machine.
+/// Where the images lie: `BOARD.elf`, or `BOARD-MACHINE.elf` if it is not for the usual machine. The name of one that lacks features says
+/// so: `BOARD-without-FEATURE.elf`.
 pub fn directory() -> PathBuf {
     root().join("target/firmware")
 }
 
 /// Where the image of a board and a machine lies once it is built.
 pub fn image(board: Board, machine: Machine) -> PathBuf {
-    let name = match machine == Machine::default() {
-        true => format!("{board}.elf"),
-        false => format!("{board}-{machine}.elf"),
+    image_without(board, machine, &[])
+}
+
+/// The same of one that lacks some of the board's features.
+fn image_without(board: Board, machine: Machine, without: &[String]) -> PathBuf {
+    let machine = match machine == Machine::default() {
+        true => String::new(),
+        false => format!("-{machine}"),
     };
-    directory().join(name)
+    let lacks: String = without.iter().map(|feature| format!("-without-{feature}")).collect();
+    directory().join(format!("{board}{machine}{lacks}.elf"))
 }
 
 /// Builds and checks the image; returns where it lies.
 pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
+    build_without(board, machine, &[])
+}
+
+/// Builds and checks the image without some of the board's features; returns where it lies.
+pub fn build_without(board: Board, machine: Machine, without: &[String]) -> Result<PathBuf> {
+    let features = features(board, machine, without)?;
+    let image = image_without(board, machine, without);
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
     // One target directory for all boards: the dependencies are built once.
     let target = root().join("target/avr");
-    let kept = target.join("kept").join(format!("{board}-{machine}"));
+    let kept = target.join("kept").join(image.with_extension("").file_name().unwrap_or_default());
     link::write_script(&root().join(LINKER))?;
     std::fs::create_dir_all(&kept)?;
     let (text, linked) = (kept.join("kerf.s"), kept.join("link"));
@@ -53,9 +67,21 @@ pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
         .args(["rustc", "--release", "-Zbuild-std=core", "--target", "avr-none", "--target-dir"])
         .arg(&target);
     cargo.args(["--package", "kerf", "--bin", "kerf", "--no-default-features", "--features"]);
-    cargo.arg(format!("board-{board},machine-{machine},dialect-tinyg"));
+    cargo.arg(features);
     run(cargo.args(["--", "--emit"]).arg(format!("asm={}", text.display())))?;
-    make_small(&text, &linked, &image(board, machine))
+    make_small(&text, &linked, &image)
+}
+
+/// The Cargo features of an image, separated by commas: what the board's file says, but for some.
+fn features(board: Board, machine: Machine, without: &[String]) -> Result<String> {
+    let own = board.features()?;
+    if let Some(unknown) = without.iter().find(|feature| !own.contains(feature)) {
+        bail!("{board} has no feature `{unknown}`; boards/{board}.rs has {}", own.join(", "));
+    }
+    let kept = own.into_iter().filter(|feature| !without.contains(feature));
+    let all: Vec<_> =
+        [format!("board-{board}"), format!("machine-{machine}")].into_iter().chain(kept).collect();
+    Ok(all.join(","))
 }
 
 /// Links the program that the compiler wrote a second time, made smaller; refuses one that would not work: see [`elf`].
@@ -161,6 +187,18 @@ mod tests {
         let name = |machine| image(Board::Ramps14, machine).file_name().unwrap().to_owned();
         assert_eq!(name(Machine::Careful), "ramps14.elf");
         assert_eq!(name(Machine::Lathe), "ramps14-lathe.elf");
+        let lacks = image_without(Board::Ramps14, Machine::Careful, &["help".into()]);
+        assert_eq!(lacks.file_name().unwrap(), "ramps14-without-help.elf");
+    }
+
+    #[test]
+    fn what_is_left_out_is_no_feature_of_the_image() {
+        let all = features(Board::Ramps14, Machine::Careful, &[]).unwrap();
+        assert!(all.starts_with("board-ramps14,machine-careful,dialect-tinyg,"), "{all}");
+        let some = features(Board::Ramps14, Machine::Careful, &["help".into()]).unwrap();
+        assert_eq!(some, all.replace(",help", ""));
+        let unknown = features(Board::Ramps14, Machine::Careful, &["hlep".into()]);
+        assert!(unknown.unwrap_err().to_string().contains("no feature `hlep`"));
     }
 
     #[test]

@@ -86,6 +86,9 @@ struct BuildArgs {
     /// The machine whose settings are the defaults
     #[arg(long, value_enum, default_value_t)]
     machine: Machine,
+    /// A feature of the board that the image is to lack, such as `help`; may be given several times
+    #[arg(long, value_name = "FEATURE")]
+    without: Vec<String>,
 }
 
 fn main() -> ExitCode {
@@ -124,7 +127,7 @@ const DESCRIBE: [&str; 8] =
 
 fn build(args: &BuildArgs) -> anyhow::Result<()> {
     setup::ensure(Scope::Firmware)?;
-    let elf = firmware::build(args.board, args.machine)?;
+    let elf = firmware::build_without(args.board, args.machine, &args.without)?;
     println!("elf: {}", elf.display());
     Ok(())
 }

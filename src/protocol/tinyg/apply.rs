@@ -8,6 +8,7 @@ use super::remark::Remark;
 use super::request::{Context, Request};
 use super::token::{Action, Group, Subject, Target};
 use super::value::{Form, Source, place_form};
+use crate::capability::Capability;
 use crate::config::name::axis_of;
 use crate::config::table;
 use crate::config::{Number, Setting};
@@ -52,7 +53,10 @@ impl Request {
                 }
                 Ok(Some(token))
             }
-            (Target::Action(Action::Help), _) => self.advise(Remark::Help),
+            (Target::Action(Action::Help), _) => {
+                Capability::Help.check()?;
+                self.advise(Remark::Help)
+            }
             (Target::Action(Action::Defaults), _) => self.restore(pair, c),
             (Target::Action(Action::Boot), _) => self.boot(pair, c),
             (Target::Action(action), _) => {

@@ -5,6 +5,7 @@ use super::listing::Series;
 use super::request::{Context, Phase, Request};
 use super::token::{Action, Group, Target, resolve};
 use super::{Mode, help};
+use crate::capability::Capability;
 use crate::config::{Name, Owner};
 use crate::protocol::{Machine, Out, Span};
 use crate::status::Status;
@@ -38,7 +39,10 @@ impl Request {
             }
             Target::Action(Action::Exception) => self.fail(Status::ExceptionReport, Mode::Text),
             Target::Action(Action::Help) => self.help(help::SETTINGS),
-            Target::Action(Action::Test) if null => self.help(help::TESTS),
+            Target::Action(Action::Test) if null => match Capability::Jobs.check() {
+                Ok(()) => self.help(help::TESTS),
+                Err(status) => self.fail(status, Mode::Text),
+            },
             Target::Action(Action::Program) if null => {
                 self.item = 0;
                 self.phase = Phase::Program;

@@ -1,7 +1,9 @@
 //! Text mode: help for people at a terminal.
 
+use super::Mode;
 use super::request::{Context, Phase, Request};
 use super::write::Writer;
+use crate::capability::Capability;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::protocol::{Machine, Out, Span};
@@ -92,15 +94,21 @@ progmem! {
 
 #[small]
 impl Request {
-    /// Shows a screen.
+    /// Shows a screen, if this image has them.
     pub(super) fn help(&mut self, screen: Span) {
-        self.block = screen;
-        self.phase = Phase::Help;
+        match Capability::Help.check() {
+            Ok(()) => {
+                self.block = screen;
+                self.phase = Phase::Help;
+            }
+            Err(status) => self.fail(status, Mode::Text),
+        }
     }
 
     /// A line of it.
     pub(super) fn help_line<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        if let Some(line) = SCREENS.at(self.block.start.into()) {
+        let line = SCREENS.at(self.block.start.into()).filter(|_| Capability::Help.is_built_in());
+        if let Some(line) = line {
             let mut writer = Writer::body(c.out, &mut self.format);
             if line.bytes().next() == Some(b'#') {
                 (0..3).for_each(|_| writer.end_line());

@@ -68,6 +68,7 @@ rows! {
     TextNested = 114, "JSON txt fields cannot be nested";
     JsonTooDeep = 115, "JSON maximum nesting depth exceeded";
     Muted = 117, "Another port feeds the machine";
+    NotBuiltIn = 118, "Not built into this image";
     GcodeGeneric = 130, "Generic Gcode input error";
     GcodeUnsupported = 131, "Gcode command unsupported";
     McodeUnsupported = 132, "M code unsupported";

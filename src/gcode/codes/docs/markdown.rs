@@ -39,14 +39,17 @@ Where others may do otherwise:
 /// All of it.
 pub fn markdown() -> String {
     let mut text = PREFACE.to_string();
-    text += "## Overview\n\nWords in bold are needed; of axes at least one.\n\n";
-    text += "| Code | | Group | Words |\n|---|---|---|---|\n";
+    text += "## Overview\n\nWords in bold are needed; of axes at least one. A code with a capability is refused with status ";
+    text += &format!("{} by an image\nthat lacks it: see ", number(Status::NotBuiltIn));
+    text += "[what an image may lack](protocol.md#what-an-image-may-lack).\n\n";
+    text += "| Code | | Group | Words | Capability |\n|---|---|---|---|---|\n";
     let mut sorted: Vec<_> = docs().collect();
     sorted.sort_by_key(|doc| (doc.letter, doc.number));
     for doc in sorted {
         let anchor = anchor(&heading(doc));
-        let (group, words) = (group(doc), words(doc));
-        text += &format!("| [{}](#{anchor}) | {} | {group} | {words} |\n", doc.name(), doc.title);
+        let (group, words, needs) = (group(doc), words(doc), capability(doc));
+        let name = doc.name();
+        text += &format!("| [{name}](#{anchor}) | {} | {group} | {words} | {needs} |\n", doc.title);
     }
     text += "\n## Every line\n";
     for rule in RULES {
@@ -113,6 +116,16 @@ fn group(doc: &Doc) -> &'static str {
         Action::Spindle(_) => "M 7",
         Action::Coolant(_) => "M 8",
         Action::Override(_) => "M 9",
+    }
+}
+
+/// What an image needs to have for it.
+fn capability(doc: &Doc) -> String {
+    match doc.row().map(|row| row.action) {
+        Some(Action::Motion(mode)) => {
+            mode.capability().map_or(String::new(), |needed| format!("`{}`", needed.name()))
+        }
+        _ => String::new(),
     }
 }
 
