@@ -130,13 +130,15 @@ impl Block {
 
     fn word(&mut self, letter: u8, value: Decimal) -> Result<(), Status> {
         match letter {
-            b'G' => {
-                let code = value.code().and_then(|(whole, tenth)| codes::g(whole, tenth));
-                self.code(&code.ok_or(Status::GcodeUnsupported)?)
-            }
-            b'M' => {
-                let code = value.code().and_then(|(whole, tenth)| codes::m(whole, tenth));
-                self.code(&code.ok_or(Status::McodeUnsupported)?)
+            b'G' | b'M' => {
+                let is_g = letter == b'G';
+                let find = |(whole, tenth)| match is_g {
+                    true => codes::g(whole, tenth),
+                    false => codes::m(whole, tenth),
+                };
+                let unknown =
+                    if is_g { Status::GcodeUnsupported } else { Status::McodeUnsupported };
+                self.code(&value.code().and_then(find).ok_or(unknown)?)
             }
             _ => self.value(letter, value),
         }

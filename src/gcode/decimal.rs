@@ -119,9 +119,9 @@ impl Decimal {
         }
     }
 
-    /// As the number of a G or M code: 28 and 3 of `G28.3`. `None` if no code has such a number.
-    pub fn code(&self) -> Option<(u8, u8)> {
-        let whole = u8::try_from(self.whole).ok()?;
+    /// As the number of a G or M code: 28 and 3 of `G28.3`. `None` if no code has such a number: the highest is 999.9.
+    pub fn code(&self) -> Option<(u16, u8)> {
+        let whole = u16::try_from(self.whole).ok().filter(|whole| *whole < 1_000)?;
         let tenth = if self.frac == 0 { 0 } else { (self.frac / 1_000) as u8 };
         let exact = self.tail == 0 && u16::from(tenth) * 1_000 == self.frac;
         (exact && !self.negative).then_some((whole, tenth))
@@ -197,6 +197,7 @@ mod tests {
         assert_eq!(read("1.00").code(), Some((1, 0)));
         assert_eq!(read("028.30").code(), Some((28, 3)));
         assert_eq!(read("255").code(), Some((255, 0)));
+        assert_eq!(read("999.9").code(), Some((999, 9)));
         for text in ["28.35", "28.30001", "-1", "65537", "1000"] {
             assert_eq!(read(text).code(), None, "{text}");
         }

@@ -11,6 +11,8 @@ pub const LETTERS: [u8; COUNT] = *b"XYZABCIJKRPQLHFSTN";
 /// How many slots there are.
 pub const COUNT: usize = 18;
 
+const _: () = assert!(COUNT <= 32, "a set of words is a `u32`");
+
 /// The slot of I, of I J K.
 pub const I: u8 = 6;
 #[allow(missing_docs)]

@@ -11,7 +11,7 @@ use super::modal::{
 };
 use super::overrides::Override;
 use crate::progmem::Progmem;
-use table::{G, G_START, M, M_START, MOTION};
+use table::{DENSE, G, G_START, M, M_START, MOTION, STARTS};
 
 /// What a code does. The variant is the modal group: a line may carry one code of each
 /// (RS274/NGC section 3.4).
@@ -143,12 +143,12 @@ pub struct Code {
 }
 
 /// G code `whole`.`tenth`.
-pub fn g(whole: u8, tenth: u8) -> Option<Code> {
+pub fn g(whole: u16, tenth: u8) -> Option<Code> {
     find(&G, &G_START, whole, tenth)
 }
 
 /// M code `whole`.`tenth`.
-pub fn m(whole: u8, tenth: u8) -> Option<Code> {
+pub fn m(whole: u16, tenth: u8) -> Option<Code> {
     find(&M, &M_START, whole, tenth)
 }
 
@@ -157,15 +157,16 @@ pub fn taken_by(mode: MotionMode) -> u32 {
     MOTION.at(mode as usize).unwrap_or(0)
 }
 
-/// Looks a code up. Cost on AVR: 60 cycles, and 9 for each byte of the row.
+/// Looks a code up; `whole` is at most 999. Cost on AVR: 60 cycles, and 9 for each byte of the row; from [`DENSE`] on the
+/// same for each row before it.
 fn find<const N: usize>(
     table: &Progmem<[Code; N]>,
-    starts: &Progmem<[u8; 101]>,
-    whole: u8,
+    starts: &Progmem<[u8; STARTS]>,
+    whole: u16,
     tenth: u8,
 ) -> Option<Code> {
-    let number = u16::from(whole) * 10 + u16::from(tenth);
-    let mut index = usize::from(starts.at(whole.into())?);
+    let number = whole * 10 + u16::from(tenth);
+    let mut index = usize::from(starts.at(usize::from(whole.min(DENSE)))?);
     loop {
         let row = table.at(index)?;
         if row.number >= number {

@@ -33,6 +33,11 @@ const fn probe(number: u16, mode: MotionMode) -> Code {
 
 const ARC: u32 = AXES | OFFSETS | bit(R) | bit(P);
 
+/// From this whole number on codes are few, and are looked for one after the other: they take no room but their rows.
+pub const DENSE: u16 = 100;
+/// Entries of the tables of first rows.
+pub const STARTS: usize = DENSE as usize + 1;
+
 /// Rows of G codes.
 pub const G_ROWS: usize = 66;
 /// Rows of M codes.
@@ -43,10 +48,10 @@ crate::progmem! {
     pub static G: [Code; G_ROWS] = G_TABLE;
     /// M codes, by number.
     pub static M: [Code; M_ROWS] = M_TABLE;
-    /// For each whole number, the first row of that number or a greater one.
-    pub static G_START: [u8; 101] = starts(&G_TABLE);
+    /// For each whole number up to [`DENSE`], the first row of that number or a greater one.
+    pub static G_START: [u8; STARTS] = starts(&G_TABLE);
     /// The same for M codes.
-    pub static M_START: [u8; 101] = starts(&M_TABLE);
+    pub static M_START: [u8; STARTS] = starts(&M_TABLE);
     /// The words that the code of each motion mode takes.
     pub static MOTION: [u32; MotionMode::COUNT] = motions();
 }
@@ -148,10 +153,11 @@ const M_TABLE: [Code; M_ROWS] = [
     code(600, Action::Stop(StopCode::Program)),
 ];
 
-const fn starts<const N: usize>(rows: &[Code; N]) -> [u8; 101] {
-    let mut starts = [0; 101];
+const fn starts<const N: usize>(rows: &[Code; N]) -> [u8; STARTS] {
+    assert!(N <= u8::MAX as usize, "more rows than a byte can count: make the starts `u16`");
+    let mut starts = [0; STARTS];
     let mut whole = 0;
-    while whole <= 100 {
+    while whole <= DENSE {
         let mut row = 0;
         while row < N && rows[row].number < 10 * whole {
             row += 1;
@@ -188,7 +194,7 @@ const _: () = {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gcode::codes::{g, m};
+    use crate::gcode::codes::{find, g, m};
 
     #[test]
     fn tables_are_sorted() {
@@ -198,11 +204,32 @@ mod tests {
 
     #[test]
     fn every_row_is_found_and_nothing_else() {
-        for number in 0..2_560u16 {
-            let (whole, tenth) = ((number / 10) as u8, (number % 10) as u8);
+        for number in 0..10_000u16 {
+            let (whole, tenth) = (number / 10, (number % 10) as u8);
             let of = |rows: &[Code]| rows.iter().find(|row| row.number == number).copied();
             assert_eq!(g(whole, tenth), of(&G.get()), "G{whole}.{tenth}");
             assert_eq!(m(whole, tenth), of(&M.get()), "M{whole}.{tenth}");
+        }
+    }
+
+    const HIGH_TABLE: [Code; 5] = [
+        code(990, Action::Stop(StopCode::Program)),
+        code(1_000, Action::Stop(StopCode::Optional)),
+        code(1_040, Action::Stop(StopCode::End)),
+        with(1_095, Action::Stop(StopCode::Program), bit(P)),
+        code(9_999, Action::Stop(StopCode::Optional)),
+    ];
+
+    crate::progmem! {
+        static HIGH: [Code; 5] = HIGH_TABLE;
+        static HIGH_START: [u8; STARTS] = starts(&HIGH_TABLE);
+    }
+
+    #[test]
+    fn codes_go_up_to_999() {
+        for number in 0..10_000u16 {
+            let found = find(&HIGH, &HIGH_START, number / 10, (number % 10) as u8);
+            assert_eq!(found, HIGH_TABLE.iter().find(|row| row.number == number).copied());
         }
     }
 }

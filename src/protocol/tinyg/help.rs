@@ -107,7 +107,8 @@ impl Request {
 
     /// A line of it.
     pub(super) fn help_line<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        let line = SCREENS.at(self.block.start.into()).filter(|_| Capability::Help.is_built_in());
+        let is_built_in = Capability::Help.is_built_in();
+        let line = if is_built_in { SCREENS.at(self.block.start.into()) } else { None };
         if let Some(line) = line {
             let mut writer = Writer::body(c.out, &mut self.format);
             if line.bytes().next() == Some(b'#') {

@@ -131,7 +131,7 @@ impl Doc {
 
     /// Its row of the tables.
     pub fn row(&self) -> Option<Code> {
-        let (whole, tenth) = (u8::try_from(self.number / 10).ok()?, (self.number % 10) as u8);
+        let (whole, tenth) = (self.number / 10, (self.number % 10) as u8);
         if self.letter == 'G' { super::g(whole, tenth) } else { super::m(whole, tenth) }
     }
 }
