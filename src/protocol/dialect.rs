@@ -8,8 +8,6 @@ use super::line::{Ending, Next, Span};
 use super::machine::Machine;
 use super::notice::Notice;
 use super::out::Out;
-#[cfg(feature = "dialect-tinyg")]
-use super::tinyg;
 use crate::config::Settings;
 use crate::machine::Alarm;
 use crate::status::Status;
@@ -335,5 +333,5 @@ macro_rules! dialects {
 
 dialects! {
     /// TinyG's, and g2core's.
-    tinyg: Tinyg(tinyg::Tinyg) if "dialect-tinyg";
+    tinyg: Tinyg(super::tinyg::Tinyg) if "dialect-tinyg";
 }
