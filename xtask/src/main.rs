@@ -15,6 +15,7 @@
 //! | [`jobs`] | writes the example jobs |
 //! | [`nist`] | what another interpreter makes of G-code, to compare with |
 //! | `docs` | test: what the documents name exists |
+//! | `seam` | test: dialects are known to their table alone |
 
 mod boards;
 mod caps;
@@ -28,6 +29,8 @@ mod jobs;
 mod machines;
 mod nist;
 mod process;
+#[cfg(test)]
+mod seam;
 mod senders;
 mod setup;
 mod shrink;

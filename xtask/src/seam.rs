@@ -1,0 +1,69 @@
+//! Dialects stay behind their interface: nothing of the firmware knows one by name but the table of dialects.
+//!
+//! Tools of the host may: they print the numbers and texts of TinyG.
+
+use std::path::{Path, PathBuf};
+
+use crate::process::root;
+
+/// Where a dialect may be named: its own folder, the table, and tools.
+const KNOWN: [&str; 5] = [
+    "src/protocol/tinyg/",
+    "src/protocol/dialect.rs",
+    "src/protocol/mod.rs",
+    "src/canon/",
+    "src/gcode/codes/docs/",
+];
+
+fn collect(path: &Path, files: &mut Vec<PathBuf>) {
+    match std::fs::read_dir(path) {
+        Ok(entries) => entries.flatten().for_each(|entry| collect(&entry.path(), files)),
+        Err(_) => files.push(path.to_owned()),
+    }
+}
+
+/// The lines of a file that name a dialect.
+fn naming<'a>(text: &'a str, dialects: &[String]) -> Vec<&'a str> {
+    let names = |line: &&str| {
+        dialects.iter().any(|name| {
+            [format!("{name}::"), format!("::{name}")].iter().any(|path| line.contains(path))
+        })
+    };
+    text.lines().filter(names).collect()
+}
+
+/// The folders beside the interface.
+fn dialects() -> Vec<String> {
+    let entries = std::fs::read_dir(root().join("src/protocol")).expect("the interface");
+    let folders = entries.flatten().filter(|entry| entry.path().is_dir());
+    folders.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect()
+}
+
+#[test]
+fn dialects_are_known_to_their_table_alone() {
+    let (dialects, mut files) = (dialects(), Vec::new());
+    assert!(dialects.contains(&"tinyg".to_owned()));
+    collect(&root().join("src"), &mut files);
+    let mut wrong = Vec::new();
+    for file in files {
+        let name = file
+            .strip_prefix(root())
+            .expect("in the checkout")
+            .to_string_lossy()
+            .replace('\\', "/");
+        if KNOWN.iter().any(|known| name.starts_with(known)) {
+            continue;
+        }
+        let text = std::fs::read_to_string(&file).unwrap_or_default();
+        wrong
+            .extend(naming(&text, &dialects).iter().map(|line| format!("{name}: {}", line.trim())));
+    }
+    assert!(wrong.is_empty(), "these name a dialect:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_dialect_is_named_by_its_path() {
+    let dialects = ["tinyg".to_owned()];
+    let text = "use crate::protocol::tinyg::Mode;\nuse crate::protocol::Speech;\n// TinyG's\ntinyg::names()";
+    assert_eq!(naming(text, &dialects).len(), 2);
+}
