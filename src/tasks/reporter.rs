@@ -2,8 +2,8 @@
 //!
 //! Reads everything through [`View`], writes to the port that is told; what one port alone is told is the parser's ([`tell_at_once`]). Waits for something to report, and polls
 //! every [`POLL_MS`] while the machine moves; it is not woken besides then, unless queue reports are
-//! wanted. A change of `stat` or `hold` is told at once, anything else every
-//! `si` milliseconds. While the sender is slow it waits, and then reports what is so by then: it never
+//! wanted. A change of what the machine is doing is told at once, anything else every
+//! `si` milliseconds. How it is told is the dialect's ([`Telling`]). While the sender is slow it waits, and then reports what is so by then: it never
 //! holds up anything else.
 
 use embassy_futures::select::select;
