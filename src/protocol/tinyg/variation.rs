@@ -7,7 +7,7 @@
 //! | [`Variation::G2core`] | `dia` 1 | `[1,status,length]` | take the machine for a g2core |
 //!
 //! The length is that of the line that is answered, its end included; 0 if no line is (g2core says 1). The
-//! first two share TinyG's status codes and texts, the third has its own for some ([`CHANGES`]), and for prompts.
+//! first two share TinyG's status codes and texts, the third has its own for some (`CHANGES`), and for prompts.
 
 use super::{number, status_text};
 use crate::config::Settings;
