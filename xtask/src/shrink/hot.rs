@@ -44,6 +44,7 @@ pub const ROWS: &[&str] = &[
     "kerf::tasks::planner::Planner>::turn",
     // Woken by all of these.
     "kerf::tasks::reporter::run::",
+    "kerf::tasks::reporter::State>::now",
     "kerf::tasks::reporter::tell",
     "kerf::tasks::view::View>::modal",
     "kerf::tasks::view::View>::of",
