@@ -54,7 +54,7 @@ impl Scan {
     /// The reader has taken so many bytes in order.
     #[inline(always)]
     pub fn pass(&mut self, count: u8) {
-        if self.looked != 0 {
+        if self.looked | self.stops != 0 {
             self.looked = self.looked.saturating_sub(count);
             self.stops = self.stops.saturating_sub(count);
         }
@@ -135,9 +135,7 @@ impl Scan {
             }
             at = end + 1;
         }
-        if self.looked != 0 {
-            self.stops = at;
-        }
+        self.stops = at;
     }
 }
 

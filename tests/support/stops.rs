@@ -40,7 +40,9 @@ pub fn a_stop_acts_when_it_arrives<S: Side>(boot: impl Fn() -> S + Sync) {
 /// An alarm that has been ended from the other port does not begin again when the turn of its line comes.
 pub fn a_stop_acts_once<S: Side>(boot: impl Fn() -> S + Sync) {
     let long = format!("{{{}xvm:n}}\n", "xvm:n,xfr:n,".repeat(17));
-    for lines in ["$$\n", &format!("{long}{long}{{g59:n}}\n{{g58:n}}\n{{g57:n}}\n")] {
+    // In the pool; in the ring behind lines that overtake; in the ring behind a line that waits for room there.
+    let behind_long = format!("{long}{long}{{g59:n}}\n{{g58:n}}\n{{g57:n}}\n");
+    for lines in ["$$\n", &behind_long, &"{g59:n}\n".repeat(14)] {
         alone(&boot, |mut crowd| {
             crowd.set(USB, "{sv:0,ex:0}");
             crowd.put(USB, lines);
