@@ -63,6 +63,58 @@ pub fn a_stop_acts_once<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
+/// An alarm acts at once behind whatever is no line, or ends without a line's end: in the pool, and in the ring behind a full pool.
+pub fn a_stop_acts_behind_what_is_no_line<S: Side>(boot: impl Fn() -> S + Sync) {
+    let full = "{xvm:n}\n".repeat(22);
+    for (port, before) in [
+        (AUX, "????????".to_string()),
+        (AUX, "? ".repeat(9)),
+        (USB, "?".repeat(40)),
+        (USB, format!("{full}~")),
+        (USB, format!("{full}%?")),
+        (USB, format!("{full}{}", " ".repeat(30))),
+    ] {
+        for stop in ["{alarm:1}\n", "{shutd:n}\r\n"] {
+            alone(&boot, |mut crowd| {
+                crowd.set(USB, "{sv:0,ex:0}");
+                crowd.set(USB, "m3 s1000");
+                crowd.send(USB, &MOVE.repeat(2));
+                crowd.pass(200);
+                assert!(crowd.turns());
+                crowd.forget();
+                crowd.put(port, &before);
+                crowd.put(port, stop);
+                crowd.pass((before.len() / BYTES_MS + 2) as u64);
+                crowd.stops(&format!("{before}{stop}"));
+            });
+        }
+    }
+}
+
+/// A way of many blocks, which all have room, leaves control its turns.
+pub fn a_long_way_does_not_hold_up_control<S: Side>(boot: impl Fn() -> S + Sync) {
+    for (line, stop) in [
+        ("{jogx:2000}\n", "{alarm:1}\n"),
+        ("g38.2 z-1000 f100\n", "{alarm:1}\n"),
+        ("g0 x1000\n", "{alarm:1}\n"),
+    ] {
+        for wait in [1, 3, 20] {
+            alone(&boot, |mut crowd| {
+                crowd.set(USB, "{sv:0}");
+                crowd.set(USB, "m3 s1000");
+                crowd.pass(100);
+                assert!(crowd.turns());
+                crowd.send(USB, line);
+                crowd.pass(wait);
+                crowd.prompt(AUX, "{stat:n}\n", "{\"stat\":");
+                crowd.put(AUX, stop);
+                crowd.pass(1);
+                crowd.stops(stop);
+            });
+        }
+    }
+}
+
 /// The number of a name in a line of JSON.
 fn value(line: &str, name: &str) -> Option<f64> {
     let (_, rest) = line.split_once(&format!("\"{name}\":"))?;
