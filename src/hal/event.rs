@@ -47,11 +47,34 @@ impl Event {
     }
 }
 
+/// Whether bytes have come, and a millisecond has passed, since the main loop had its last turn: the reader should have one before a
+/// long calculation.
+#[inline(always)]
+pub fn is_unheard() -> bool {
+    imp::flags::has(Event::Received) && imp::flags::has(Event::Tick)
+}
+
+/// So many segments.
+const UNHEARD: u8 = 1;
+
 machine_static! {
     // Who waits for the transmitter of the second port.
     fn transmitted() -> Waiter = Waiter::new();
     // Exec counts; the main loop, which never runs in between, begins anew.
     fn passed_over() -> SharedByte = SharedByte::new(0);
+    // Thread mode says so, exec looks.
+    fn asked() -> SharedByte = SharedByte::new(0);
+}
+
+/// Says whether somebody waits for an answer that thread mode works on. Exec leaves it more of the CPU then.
+pub fn set_asked(waits: bool) {
+    asked().set(waits.into());
+}
+
+/// Whether somebody does, or may: bytes have come, and the main loop has had no turn for several segments. Exec only.
+#[inline(always)]
+pub fn is_asked() -> bool {
+    asked().get() != 0 || (passed_over().get() >= UNHEARD && is_unheard())
 }
 
 /// Counts one more segment since the main loop had its last turn, and says how many they are. Exec only.

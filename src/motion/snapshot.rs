@@ -56,22 +56,28 @@ impl Snapshot {
         }
     }
 
-    /// Where motor `m` is, in steps.
+    /// Where the motors are, in steps. Cost: 1,400 in motion, and 900 for each motor that moves.
     #[inline(never)]
     #[small]
-    pub fn position(&self, m: usize) -> i32 {
-        if self.left <= 0.0 || self.steps[m] == 0 {
-            return self.target[m];
+    pub fn positions(&self) -> [i32; MOTORS] {
+        if self.left <= 0.0 {
+            return self.target;
         }
-        let short = f32::from(self.steps[m]) * (self.left / self.length);
-        self.target[m].wrapping_sub(short as i32)
+        let share = self.left / self.length;
+        let mut positions = self.target;
+        for (position, steps) in positions.iter_mut().zip(self.steps) {
+            if steps != 0 {
+                *position = position.wrapping_sub((f32::from(steps) * share) as i32);
+            }
+        }
+        positions
     }
 
     /// What is told of it.
     #[small]
     pub fn moment(&self) -> Moment {
         Moment {
-            position: core::array::from_fn(|m| self.position(m)),
+            position: self.positions(),
             velocity: self.velocity,
             line: self.line,
             finished: self.finished,

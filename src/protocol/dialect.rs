@@ -90,6 +90,9 @@ pub trait Tells {
     /// Puts the next part, at most [`CHUNK`](super::CHUNK) bytes. Whether there is more.
     fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool;
 
+    /// Ends the line here, so that an answer can be sent: the rest follows in a line of its own. False if a line of it can't end here.
+    fn split(&mut self, out: &mut impl Out) -> bool;
+
     /// Of a queue report: how many free blocks it has told.
     fn blocks_free(&self) -> usize;
 }
@@ -275,6 +278,14 @@ macro_rules! dialects {
                 match self {
                     $(#[cfg(feature = $feature)]
                     Self::$name(telling) => telling.step(machine, out),)+
+                }
+            }
+
+            #[inline(always)]
+            fn split(&mut self, out: &mut impl Out) -> bool {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(telling) => telling.split(out),)+
                 }
             }
 

@@ -194,8 +194,9 @@ impl<'a> Runner<'a> {
     fn held(&mut self, out: &mut Snapshot, spindle: &Spindle) {
         spindle::switch(spindle, out, false);
         machine::drop_if_wanted(|| {
-            // What has paused stays off.
-            out.outputs = spindle::on();
+            // What has paused stays off. A kill switches off the rest: the end of the program may wait for a door.
+            out.outputs = if machine::is_killing() { 0 } else { spindle::on() };
+            spindle::switch(spindle, out, false);
             let held = self.machine.drop_all(&mut self.blocks, out);
             stepper::settle(held, &mut out.target);
             self.finished.rest();
@@ -213,7 +214,8 @@ impl<'a> Runner<'a> {
         waiting.update(segments.used());
         let short = waiting.is_short(*rests);
         let passed_over = event::pass_over();
-        self.machine.set_coarse(passed_over > PATIENCE || waiting.is_busy(), short);
+        let busy = waiting.is_busy() || (waiting.busy > 0 && event::is_asked());
+        self.machine.set_coarse(passed_over > PATIENCE || busy, short);
         if !rested {
             health::look_for_starvation();
         }
@@ -324,6 +326,12 @@ impl Waiting {
         self.busy >= BUSY
     }
 
+    /// Whether enough waits, and thread mode is asked for something: it gets the CPU then until less does.
+    #[inline(always)]
+    fn gives_way(&self) -> bool {
+        event::is_asked() && self.sum >= USUAL.least
+    }
+
     fn limits(&self) -> &'static Amount {
         if self.pressed > 0 { &PRESSED } else { &USUAL }
     }
@@ -344,7 +352,7 @@ impl Waiting {
     fn is_enough(&self, passed_over: u8) -> bool {
         let has_just_begun = usize::from(self.moved) <= SEGMENTS && passed_over >= FIRST_TURN;
         let least = if has_just_begun { FIRST_LEAST } else { self.limits().least };
-        self.used >= 2 && self.sum >= least
+        self.used >= 2 && (self.sum >= least || self.gives_way())
     }
 
     /// Whether another one like the last may wait: what is queued cannot be slowed down any more, nor kept from beginning.
@@ -354,7 +362,7 @@ impl Waiting {
             return true;
         }
         let sum = self.sum + self.length(1);
-        self.used < SEGMENTS as u8 - 1 && sum <= self.limits().most
+        self.used < SEGMENTS as u8 - 1 && sum <= self.limits().most && !self.gives_way()
     }
 }
 

@@ -270,12 +270,7 @@ impl LinePool {
             self.pass(1);
             return false;
         }
-        let asks = self.is_asking() && !is_blank(byte);
-        if asks {
-            // It has no end of its own.
-            self.besides = self.besides.wrapping_sub(1);
-            self.end_line();
-        }
+        let asks = self.end_question(byte);
         let at = self.room_at();
         match self.bytes.get_mut(at) {
             Some(slot) if self.partial < self.longest => {
@@ -290,8 +285,21 @@ impl LinePool {
         asks
     }
 
+    /// Ends the line that is coming in if that is a question mark, and this byte begins another. Returns true if that was a line.
+    #[inline(never)]
+    #[small]
+    pub fn end_question(&mut self, next: u8) -> bool {
+        let ends = self.is_asking() && next > b' ' && next != TAKEN_RETURN;
+        if ends {
+            // It has no end of its own.
+            self.besides = self.besides.wrapping_sub(1);
+            self.end_line();
+        }
+        ends
+    }
+
     /// Whether the line that is coming in is a question mark so far: whatever follows is another line.
-    fn is_asking(&self) -> bool {
+    pub fn is_asking(&self) -> bool {
         self.partial > 0 && self.bytes.get(usize::from(self.end)) == Some(&ASKS)
     }
 

@@ -16,23 +16,22 @@
 //! for each byte.
 //! Each byte is looked at once (11 cycles), those of a line whose end has not come each time that the reader looks.
 
-use heapless::Vec;
-
-use super::alarm;
 use super::lines::{LinePool, is_blank};
 use super::links::Links;
 use crate::hal::ring::Window;
 use crate::hal::serial::{CLEAN, CUT, GO, MARKS, TAKEN, TAKEN_RETURN};
-use crate::protocol::{STOP_MAX, asks_alarm, may_be_control};
+use crate::protocol::may_be_control;
 
 /// How far a ring has been looked through.
 pub struct Scan {
     /// So many of the bytes that wait.
-    looked: u8,
+    pub(super) looked: u8,
     /// What follows is a part of a line that does not overtake.
-    within: bool,
-    /// Lines among so many of the bytes that wait have begun the alarms that they ask for: 0, or at the beginning of a line.
-    stops: u8,
+    pub(super) within: bool,
+    /// Alarms have been looked for in so many of the bytes that wait: 0, or at the beginning of a line.
+    pub(super) stops: u8,
+    /// So many of the lines there have begun theirs.
+    pub(super) begun: u8,
 }
 
 /// What begins at a place.
@@ -49,20 +48,20 @@ enum Found {
 
 impl Scan {
     /// Nothing has been looked at.
-    pub const NONE: Self = Self { looked: 0, within: false, stops: 0 };
+    pub const NONE: Self = Self { looked: 0, within: false, stops: 0, begun: 0 };
 
     /// The reader has taken so many bytes in order.
     #[inline(always)]
     pub fn pass(&mut self, count: u8) {
-        if self.looked != 0 {
+        if self.looked | self.stops != 0 {
             self.looked = self.looked.saturating_sub(count);
             self.stops = self.stops.saturating_sub(count);
         }
     }
 
-    /// Whether the next line has begun the alarm that it asks for.
+    /// Whether alarms have been looked for in the next line.
     #[inline(always)]
-    pub fn has_stopped(&self) -> bool {
+    pub fn has_looked(&self) -> bool {
         self.stops != 0
     }
 
@@ -70,9 +69,16 @@ impl Scan {
     /// behind them it has fewer bytes then, which are to be released.
     #[inline(never)]
     #[small]
-    pub fn run(&mut self, pool: &mut LinePool, ring: &mut Window<'_>, closes: bool) -> bool {
+    pub fn run(
+        &mut self,
+        links: &Links,
+        pool: &mut LinePool,
+        ring: &mut Window<'_>,
+        closes: bool,
+    ) -> bool {
         if self.looked == 0 {
-            self.within = pool.is_within_line();
+            // A question has no end of its own: what follows is another line.
+            self.within = pool.is_within_line() && !pool.is_asking();
         }
         let mut took = false;
         loop {
@@ -103,8 +109,9 @@ impl Scan {
                 }
                 if len > 0 && take(pool, ring, self.looked, len, ends) {
                     let closed = close(ring, self.looked, len, closes);
-                    if self.stops > self.looked {
-                        pool.take_stop();
+                    let looked = self.stops > self.looked;
+                    self.serve(links, pool, looked);
+                    if looked {
                         self.stops -= closed;
                     }
                     took = true;
@@ -115,29 +122,6 @@ impl Scan {
             self.looked += 1;
         }
         took
-    }
-
-    /// Looks on behind a line that waits for room, through lines that have come whole, and begins the alarms that they ask for.
-    #[inline(never)]
-    #[small]
-    pub fn look_for_stops(&mut self, links: &Links, ring: &Window<'_>) {
-        let mut at = self.stops.max(self.looked);
-        loop {
-            let end = ring.behind_text(at);
-            // What is behind the mark of a loss may be a part of a line.
-            if end >= ring.len() || ring.get(end) < MARKS {
-                break;
-            }
-            let mut line = Vec::<u8, STOP_MAX>::new();
-            let fits = (at..end).all(|n| line.push(ring.get(n)).is_ok());
-            if let Some(alarm) = asks_alarm(&line).filter(|_| fits) {
-                alarm::raise(links, alarm);
-            }
-            at = end + 1;
-        }
-        if self.looked != 0 {
-            self.stops = at;
-        }
     }
 }
 

@@ -27,7 +27,7 @@ use super::reporter::tell_at_once;
 use super::tx::Tx;
 use super::view::View;
 use crate::gcode::command::Stop;
-use crate::hal::event::{Event, wake_after, wake_after_transmitted};
+use crate::hal::event::{Event, is_unheard, set_asked, wake_after, wake_after_transmitted};
 use crate::hal::imp;
 use crate::hal::imp::eeprom::Eeprom;
 use crate::hal::imp::flags;
@@ -42,9 +42,13 @@ use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
 const ECHO: usize = 62;
-/// Most steps of a response before others have their turn. They have it as well when a ms is over, and behind each step while the ring
-/// of the second port is filling: to read a row of the tables may take 3 ms, and twice that while exec takes most of the CPU.
-const STEPS: u8 = 4;
+/// Most steps of a response before others have their turn: most answers take six. They have it as well behind each step while the
+/// ring of the second port is filling: to read a row of the tables may take 3 ms, and twice that while exec takes most of the CPU.
+const STEPS: u8 = 8;
+/// Most steps when a ms is over before they are done.
+const STEPS_LATE: u8 = 5;
+/// None is begun after so long, ms.
+const TURN_MS: u32 = 4;
 
 /// A port's transmitter, while it is the parser's.
 type Line = MutexGuard<'static, NoopRawMutex, Tx>;
@@ -100,13 +104,19 @@ struct Parser {
     sessions: [Session; PORTS],
     /// The ports, as bits, that have something to say and lack room.
     lacking: u8,
+    /// The port whose line was begun last: it is the other one's turn.
+    last: u8,
 }
 
 /// The task.
 pub fn run(links: &'static Links) -> impl Future<Output = Never> {
-    let mut parser = Parser { links, sessions: [const { Session::Idle }; PORTS], lacking: 0 };
+    let mut parser =
+        Parser { links, sessions: [const { Session::Idle }; PORTS], lacking: 0, last: USB };
     async move {
         loop {
+            if is_unheard() {
+                yield_now().await;
+            }
             match parser.turn() {
                 Turn::Usual => {}
                 // The reader has its turn, and stops the sender in time.
@@ -194,23 +204,30 @@ impl Parser {
         ended
     }
 
-    /// The line to begin with; G-code of the feeder only if `data` is wanted. That of others does not wait. During a flush none
-    /// is but what has been dropped, to be refused.
+    /// The line to begin with, of each port in turn.
     #[inline(never)]
     fn next_line(&mut self, data: bool) -> Option<Chosen> {
+        let after = usize::from(self.last) + 1;
+        let chosen = (after..after + PORTS).find_map(|n| self.line_of(n % PORTS, data))?;
+        self.last = chosen.port.number;
+        Some(chosen)
+    }
+
+    /// The line of a port to begin with; G-code of the feeder only if `data` is wanted. That of others does not wait. During a flush
+    /// none is but what has been dropped, to be refused.
+    #[inline(never)]
+    fn line_of(&mut self, number: usize, data: bool) -> Option<Chosen> {
         let links = self.links;
-        let (feeder, flushes) = (links.feeder.get(), machine::is_flushing());
-        let lacking = &mut self.lacking;
-        links.ports.iter().zip(&self.sessions).find_map(|(port, session)| {
-            let any = data || flushes || port.number != feeder;
-            let (id, class) = port.lines.borrow().next(any)?;
-            if !matches!(session, Session::Idle) || (flushes && class == Class::Data) {
-                return None;
-            }
-            let has_room = port.tx.try_lock().is_ok_and(|tx| tx.has_room());
-            *lacking |= u8::from(!has_room) << port.number;
-            has_room.then_some(Chosen { port, id, class })
-        })
+        let (port, session) = (links.ports.get(number)?, self.sessions.get(number)?);
+        let flushes = machine::is_flushing();
+        let any = data || flushes || port.number != links.feeder.get();
+        let (id, class) = port.lines.borrow().next(any)?;
+        if !matches!(session, Session::Idle) || (flushes && class == Class::Data) {
+            return None;
+        }
+        let has_room = port.tx.try_lock().is_ok_and(|tx| tx.has_room());
+        self.lacking |= u8::from(!has_room) << port.number;
+        has_room.then_some(Chosen { port, id, class })
     }
 
     /// Takes a line: most are answered to the end at once.
@@ -230,6 +247,8 @@ impl Parser {
     /// Waits until something may go on.
     fn wait(&self) -> impl Future<Output = ()> + '_ {
         let links = self.links;
+        // Whoever still waits does not wait for the CPU.
+        set_asked(false);
         let mut asked = false;
         poll_fn(move |cx| {
             let waited = core::mem::replace(&mut asked, true);
@@ -370,9 +389,9 @@ impl Answer {
     #[inline(never)]
     #[small]
     fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
-        let mut begun = begun;
+        let (mut begun, since) = (begun, millis());
         for done in 0..STEPS {
-            if !tx.has_room() || gives_way(done) {
+            if !tx.has_room() || gives_way(done, since) {
                 break;
             }
             if self.echoes {
@@ -401,9 +420,10 @@ impl Answer {
     }
 }
 
-/// Whether others have their turn before a response goes on that has come so many steps on in this turn.
-fn gives_way(done: u8) -> bool {
-    done > 0 && uart::presses() || done > 1 && flags::has(Event::Tick)
+/// Whether others have their turn before a response goes on that has come so many steps on in this turn, which began then.
+fn gives_way(done: u8, since: u32) -> bool {
+    let late = || done >= STEPS_LATE && flags::has(Event::Tick);
+    done > 0 && (uart::presses() || late() || millis().wrapping_sub(since) >= TURN_MS)
 }
 
 /// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the

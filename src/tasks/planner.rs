@@ -15,6 +15,7 @@ mod seek;
 mod square;
 
 use embassy_futures::select::select;
+use embassy_futures::yield_now;
 use parts::{ArcWalk, Parts};
 
 use super::Never;
@@ -122,9 +123,10 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
                 planner.begin();
                 loop {
                     planner.room().await;
+                    links.give_way(PATIENCE, || queue::used() >= ENOUGH).await;
                     match planner.turn() {
                         Turn::Done => break,
-                        Turn::More => links.give_way(|_| queue::used() >= ENOUGH).await,
+                        Turn::More => yield_now().await,
                         Turn::Pause => planner.cycle_start().await,
                         #[cfg(feature = "probing")]
                         Turn::Probe => planner.probe().await,
@@ -150,6 +152,8 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
 
 /// With so many blocks answers come before another one.
 const ENOUGH: usize = CAPACITY / 2;
+/// So many turns they have: two answers and what else thread mode does meanwhile.
+const PATIENCE: u8 = 16;
 
 impl Planner {
     /// Most lines are a straight move for which there is room: no need to be prepared for a wait. False,

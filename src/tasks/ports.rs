@@ -17,6 +17,7 @@ use super::lines::{Class, LineId, LinePool};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::{Seen, View};
+use crate::hal::event::is_unheard;
 use crate::hal::imp::uart;
 use crate::hal::serial::{USB, is_shared};
 use crate::protocol::{Remembers, Speech};
@@ -31,8 +32,8 @@ const PROMISED: u8 = 32;
 /// See [`PROMISED`]; of the other port.
 const AUX_PROMISED: u8 = 16;
 
-/// How many turns a report, a part of one, or the next block leaves to control lines that wait.
-const COURTESY: u8 = 8;
+/// How many turns a report or a part of one leaves to control lines that wait.
+pub const COURTESY: u8 = 8;
 
 /// What a port has to itself.
 pub struct Port {
@@ -90,6 +91,9 @@ impl Port {
     /// The transmitter for a report: the answers to control lines that wait come first, as far as they take
     /// [`COURTESY`] turns.
     pub async fn tx_behind_answers(&self) -> MutexGuard<'_, NoopRawMutex, Tx> {
+        if is_unheard() {
+            yield_now().await;
+        }
         for _ in 0..COURTESY {
             if !self.lines.borrow().has_controls() {
                 break;
@@ -142,15 +146,17 @@ impl Links {
         self.reporter_wake.signal();
     }
 
-    /// Others have their turn; and up to [`COURTESY`] turns, while control lines wait or are being answered on a port that `counts`.
-    /// A turn is 300 cycles if nobody has anything to do.
-    pub async fn give_way(&self, counts: impl Fn(&Port) -> bool) {
-        for _ in 0..COURTESY {
+    /// Others have up to so many `turns`, while control lines wait or are being answered and that `counts`; and one if
+    /// bytes have come that may be such a line. A turn is 300 cycles if nobody has anything to do.
+    pub async fn give_way(&self, turns: u8, counts: impl Fn() -> bool) {
+        if is_unheard() {
             yield_now().await;
-            let waits = |port: &Port| port.lines.borrow().has_controls() && counts(port);
-            if !self.ports.iter().any(waits) {
+        }
+        for _ in 0..turns {
+            if !counts() || !self.ports.iter().any(|port| port.lines.borrow().has_controls()) {
                 break;
             }
+            yield_now().await;
         }
     }
 

@@ -16,8 +16,7 @@ use super::lines::{Aside, LinePool};
 use super::links::Links;
 use super::overtake::Scan;
 use super::ports::Port;
-use super::stop;
-use crate::hal::event::{Event, next};
+use crate::hal::event::{Event, next, set_asked};
 use crate::hal::imp::uart::{self, lost_ends};
 use crate::hal::ring::Window;
 use crate::hal::serial::{
@@ -153,10 +152,16 @@ impl<const N: usize> Intake<N> {
             if !pool.ready() {
                 return Left::Full;
             }
+            let next = self.received.waiting().first().copied();
+            if next.is_some_and(|next| pool.end_question(next)) {
+                // There may be no room for what it begins.
+                links.parser_wake.signal();
+                continue;
+            }
             let Some(byte) = self.received.pop() else {
                 return Left::Nothing;
             };
-            let has_stopped = self.scan.has_stopped();
+            let looked = self.scan.has_looked();
             self.scan.pass(1);
             let is_line = match byte {
                 CUT | GO if cuts => false,
@@ -174,7 +179,10 @@ impl<const N: usize> Intake<N> {
                 if cuts {
                     pool.terminate();
                 }
-                stop::serve(links, pool, has_stopped);
+                self.scan.serve(links, pool, looked);
+                if pool.has_controls() {
+                    set_asked(true);
+                }
                 links.parser_wake.signal();
             }
         }
@@ -287,10 +295,9 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
     }
     let (waiting, closes) = (ring.len(), port.cut.get().is_none());
     let mut pool = port.lines.borrow_mut();
-    if scan.run(&mut pool, ring, closes) {
+    if scan.run(links, &mut pool, ring, closes) {
         links.parser_wake.signal();
     }
-    stop::serve(links, &mut pool, false);
     scan.look_for_stops(links, ring);
     waiting - ring.len()
 }

@@ -7,12 +7,13 @@
 //! holds up anything else.
 
 use embassy_futures::select::select;
+use embassy_futures::yield_now;
 use embassy_time::Timer;
 use kerf_macros::small;
 
 use super::health;
 use super::links::Links;
-use super::ports::Port;
+use super::ports::{COURTESY, Port};
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
 use crate::hal::event::Event;
@@ -30,6 +31,8 @@ use crate::status::Status;
 const POLL_MS: u64 = 10;
 /// How often room is looked for on a port that is greeted besides.
 const PATIENCE: u8 = 20;
+/// So many turns of [`COURTESY`] it takes to end a line early: more lines would take the line's time.
+const SPLIT: u8 = COURTESY / 2;
 
 /// What was told last.
 struct Told {
@@ -142,6 +145,15 @@ fn step(telling: &mut Telling, links: &Links, port: &Port, tx: &mut Tx) -> bool 
     more
 }
 
+/// Ends the line early if an answer waits for it. False if none does, or it can't be ended.
+fn split(telling: &mut Telling, port: &Port, tx: &mut Tx) -> bool {
+    let split = port.lines.borrow().has_controls() && telling.split(tx);
+    if split {
+        tx.flush();
+    }
+    split
+}
+
 /// Tells it on a port, a part at a time: for a millisecond in one turn, if there is room. Of a queue
 /// report returns how many blocks are free in it, which may have changed during the wait for the
 /// transmitter.
@@ -151,14 +163,24 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
         _ => port.tx.lock().await,
     };
     let mut telling = begin(notice, links, port);
+    // For all of it: while it is being told, the port is not answered.
+    let mut turns = COURTESY;
     loop {
         tx.room().await;
+        if turns >= SPLIT && split(&mut telling, port, &mut tx) {
+            turns -= SPLIT;
+            drop(tx);
+            links.parser_wake.signal();
+            tx = port.tx_behind_answers().await;
+            continue;
+        }
         if !step(&mut telling, links, port, &mut tx) {
             break;
         }
         // A status report takes 4 ms, and the ring of a second port may be full in 5.
-        if flags::has(Event::Tick) || uart::presses() {
-            links.give_way(|other| other.number != port.number).await;
+        if uart::presses() || (turns > 0 && flags::has(Event::Tick)) {
+            turns = turns.saturating_sub(1);
+            yield_now().await;
         }
     }
     drop(tx);

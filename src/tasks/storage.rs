@@ -15,6 +15,7 @@ use core::cell::Cell;
 use embassy_time::Timer;
 
 use super::links::Links;
+use super::ports::COURTESY;
 use super::wake::Wake;
 use crate::config::Setting;
 use crate::gcode::tables::{Edit, Row, Tables};
@@ -242,6 +243,9 @@ pub async fn run(links: &'static Links) -> ! {
             done(links, work);
             // Others have their turn.
             embassy_futures::yield_now().await;
+            if !links.storage.is_awaited() {
+                links.give_way(COURTESY, || true).await;
+            }
         }
     }
 }

@@ -8,8 +8,8 @@ use crate::side::Side;
 
 mod stops;
 pub use stops::{
-    a_report_is_of_one_moment_whoever_asks_on_the_other_port, a_stop_acts_once,
-    a_stop_acts_when_it_arrives,
+    a_long_way_does_not_hold_up_control, a_report_is_of_one_moment_whoever_asks_on_the_other_port,
+    a_stop_acts_behind_what_is_no_line, a_stop_acts_once, a_stop_acts_when_it_arrives,
 };
 
 /// A test of each crowd, with the machine that a function boots.
@@ -18,7 +18,8 @@ macro_rules! tests {
         crowd::tests!($boot: xon_gets_through, all_that_has_come_is_dropped, data_does_not_hold_up_control,
             a_stopped_port_does_not_stop_the_other, questions_leave_nothing_behind, nothing_starves_control,
             a_percent_sign_before_a_hold_is_none, a_stop_acts_when_it_arrives, a_stop_acts_once,
-            a_report_is_of_one_moment_whoever_asks_on_the_other_port);
+            a_report_is_of_one_moment_whoever_asks_on_the_other_port, a_stop_acts_behind_what_is_no_line,
+            a_long_way_does_not_hold_up_control);
     };
     ($boot:ident: $($name:ident),+) => {
         $(#[test]

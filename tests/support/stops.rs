@@ -40,7 +40,9 @@ pub fn a_stop_acts_when_it_arrives<S: Side>(boot: impl Fn() -> S + Sync) {
 /// An alarm that has been ended from the other port does not begin again when the turn of its line comes.
 pub fn a_stop_acts_once<S: Side>(boot: impl Fn() -> S + Sync) {
     let long = format!("{{{}xvm:n}}\n", "xvm:n,xfr:n,".repeat(17));
-    for lines in ["$$\n", &format!("{long}{long}{{g59:n}}\n{{g58:n}}\n{{g57:n}}\n")] {
+    // In the pool; in the ring behind lines that overtake; in the ring behind a line that waits for room there.
+    let behind_long = format!("{long}{long}{{g59:n}}\n{{g58:n}}\n{{g57:n}}\n");
+    for lines in ["$$\n", &behind_long, &"{g59:n}\n".repeat(14)] {
         alone(&boot, |mut crowd| {
             crowd.set(USB, "{sv:0,ex:0}");
             crowd.put(USB, lines);
@@ -58,6 +60,58 @@ pub fn a_stop_acts_once<S: Side>(boot: impl Fn() -> S + Sync) {
                 crowd.prompt(AUX, "{stat:n}\n", "{\"stat\":2}");
             }
         });
+    }
+}
+
+/// An alarm acts at once behind whatever is no line, or ends without a line's end: in the pool, and in the ring behind a full pool.
+pub fn a_stop_acts_behind_what_is_no_line<S: Side>(boot: impl Fn() -> S + Sync) {
+    let full = "{xvm:n}\n".repeat(22);
+    for (port, before) in [
+        (AUX, "????????".to_string()),
+        (AUX, "? ".repeat(9)),
+        (USB, "?".repeat(40)),
+        (USB, format!("{full}~")),
+        (USB, format!("{full}%?")),
+        (USB, format!("{full}{}", " ".repeat(30))),
+    ] {
+        for stop in ["{alarm:1}\n", "{shutd:n}\r\n"] {
+            alone(&boot, |mut crowd| {
+                crowd.set(USB, "{sv:0,ex:0}");
+                crowd.set(USB, "m3 s1000");
+                crowd.send(USB, &MOVE.repeat(2));
+                crowd.pass(200);
+                assert!(crowd.turns());
+                crowd.forget();
+                crowd.put(port, &before);
+                crowd.put(port, stop);
+                crowd.pass((before.len() / BYTES_MS + 2) as u64);
+                crowd.stops(&format!("{before}{stop}"));
+            });
+        }
+    }
+}
+
+/// A way of many blocks, which all have room, leaves control its turns.
+pub fn a_long_way_does_not_hold_up_control<S: Side>(boot: impl Fn() -> S + Sync) {
+    for (line, stop) in [
+        ("{jogx:2000}\n", "{alarm:1}\n"),
+        ("g38.2 z-1000 f100\n", "{alarm:1}\n"),
+        ("g0 x1000\n", "{alarm:1}\n"),
+    ] {
+        for wait in [1, 3, 20] {
+            alone(&boot, |mut crowd| {
+                crowd.set(USB, "{sv:0}");
+                crowd.set(USB, "m3 s1000");
+                crowd.pass(100);
+                assert!(crowd.turns());
+                crowd.send(USB, line);
+                crowd.pass(wait);
+                crowd.prompt(AUX, "{stat:n}\n", "{\"stat\":");
+                crowd.put(AUX, stop);
+                crowd.pass(1);
+                crowd.stops(stop);
+            });
+        }
     }
 }
 

@@ -48,7 +48,7 @@ unanswered, `[1,status,length,checksum]`. `rx` counts likewise.",
     ),
     (
         "baud",
-        "Rate of the USB line: a code, or bits a second from 9600 to 1000000. In force when the response has \
+        "Rate of the USB line: a code, or bits a second from 9600 to 1000000; above 500000 lines may be refused by 13 while motors move. In force when the response has \
 left; 115200 after a reset.",
     ),
     ("net", "Network of boards: there is none."),

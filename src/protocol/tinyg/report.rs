@@ -131,6 +131,9 @@ impl Remembers for StatusReport {
 pub struct Report {
     index: u8,
     all: bool,
+    /// The next entry is the first of a line: it is told of now.
+    first: bool,
+    /// Something has been put of the line.
     begun: bool,
     format: Format,
 }
@@ -146,7 +149,8 @@ impl Report {
         }
         let fresh = core::mem::take(&mut machine.memory().tinyg.fresh);
         let format = mode.format(machine);
-        Some(Report { index: 0, all: fresh || verbosity > 1, begun: false, format })
+        let all = fresh || verbosity > 1;
+        Some(Report { index: 0, all, first: true, begun: false, format })
     }
 
     /// Looks at one entry. Whether there is more to do. If nothing has changed, nothing is sent.
@@ -156,7 +160,7 @@ impl Report {
             self.end(out);
             return false;
         };
-        machine.moment(self.index == 0);
+        machine.moment(core::mem::take(&mut self.first));
         let shown = token.read(machine);
         let value = match shown {
             Shown::Number(fixed) => fixed.value,
@@ -173,6 +177,17 @@ impl Report {
             writer.key(token.name().bytes());
             writer.shown(shown);
         }
+        true
+    }
+
+    /// Ends the line here, so that an answer can be sent: what is left follows in a line of its own, which tells of its own moment.
+    /// False if a line can't end here: in text a report is as many lines as it has entries.
+    pub fn split(&mut self, out: &mut impl Out) -> bool {
+        if self.format.is_plain() {
+            return false;
+        }
+        self.end(out);
+        (self.first, self.begun) = (true, false);
         true
     }
 

@@ -86,6 +86,14 @@ impl Tells for Telling {
         }
     }
 
+    #[inline(never)]
+    fn split(&mut self, out: &mut impl Out) -> bool {
+        match &mut self.part {
+            Part::Status(Some(report)) => report.split(out),
+            _ => false,
+        }
+    }
+
     fn blocks_free(&self) -> usize {
         if let Part::Queue(free) = self.part { free } else { 0 }
     }

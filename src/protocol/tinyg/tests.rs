@@ -333,6 +333,6 @@ fn notices_are_as_documented() {
 fn ram_is_accounted_for() {
     assert_eq!(size_of::<Request>(), 24);
     assert_eq!(size_of::<StatusReport>(), 151);
-    assert_eq!(size_of::<Report>(), 5);
+    assert_eq!(size_of::<Report>(), 6);
     assert_eq!((size_of::<Banner>(), size_of::<Exception>()), (4, 4));
 }

@@ -108,7 +108,11 @@ impl<'a, O: Out> Writer<'a, O> {
     /// A number.
     pub fn fixed(&mut self, fixed: Fixed) {
         let mut digits = Digits::default();
-        fixed.render(&mut digits).iter().for_each(|&byte| self.byte(byte));
+        let digits = fixed.render(&mut digits);
+        if self.shown {
+            // Nothing in it has to be escaped, wrapped or not.
+            self.out.put_all(digits.iter().copied());
+        }
     }
 
     /// A number, ending in column `width`.

@@ -7,6 +7,7 @@
 //!
 //! One line at a time: what comes behind it waits in the pool, and none is lost.
 
+use embassy_futures::yield_now;
 use kerf_macros::small;
 
 use super::{Planner, Turn};
@@ -66,6 +67,8 @@ impl Planner {
     pub(super) async fn sought(&mut self) -> Sought {
         while self.parts.is_some() && !self.is_over() {
             self.seek_room().await;
+            // Others have their turn: a long way is many blocks, and there may be room for all of them.
+            yield_now().await;
             if !self.is_over() {
                 let _: Turn = self.turn();
             }

@@ -52,6 +52,8 @@ pub enum Fault {
     },
     /// Interrupts nest without end.
     EndlessNesting,
+    /// Bytes were written to a transmitter that had no room for them.
+    LostByte,
 }
 
 impl fmt::Display for Fault {
@@ -63,6 +65,7 @@ impl fmt::Display for Fault {
                 write!(f, "the stack runs {bytes} bytes into static data in {place}")
             }
             Fault::EndlessNesting => f.write_str("interrupts nest without end"),
+            Fault::LostByte => f.write_str("a byte was written to a transmitter that had no room"),
         }
     }
 }
@@ -218,7 +221,7 @@ impl Machine {
         while self.cpu.cycle() < cycle {
             self.step(cycle)?;
         }
-        self.check_stack()
+        self.check()
     }
 
     /// Runs to a cycle, or until a whole line has come over the serial line.
@@ -226,7 +229,7 @@ impl Machine {
         while self.cpu.cycle() < cycle && !self.bus().wires[USB].1.has_line() {
             self.step(cycle)?;
         }
-        self.check_stack()
+        self.check()
     }
 
     /// Runs for a time.
@@ -300,12 +303,13 @@ impl Machine {
         }
     }
 
-    fn check_stack(&self) -> Result<(), Fault> {
+    fn check(&self) -> Result<(), Fault> {
         match self.free_stack() {
             Some(free) if free < 0 && self.meters.booted() => {
                 let place = self.place(self.cpu.pc());
                 Err(Fault::StackOverflow { place, bytes: free.unsigned_abs() as u16 })
             }
+            _ if self.bus().uarts.iter().any(|uart| uart.overwritten() > 0) => Err(Fault::LostByte),
             _ => Ok(()),
         }
     }

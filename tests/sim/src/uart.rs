@@ -67,6 +67,7 @@ pub struct Uart {
     sent: VecDeque<(u64, u8)>,
     overruns: u64,
     misframed: u64,
+    overwritten: u64,
 }
 
 impl Uart {
@@ -88,6 +89,7 @@ impl Uart {
             sent: VecDeque::new(),
             overruns: 0,
             misframed: 0,
+            overwritten: 0,
         }
     }
 
@@ -122,6 +124,11 @@ impl Uart {
     /// Bytes lost because they were not read in time.
     pub fn overruns(&self) -> u64 {
         self.overruns
+    }
+
+    /// Bytes written while the transmitter had no room, which are lost.
+    pub fn overwritten(&self) -> u64 {
+        self.overwritten
     }
 
     /// Frames received at a speed too far from the receiver's own, or with a stop bit that was low.
@@ -258,6 +265,8 @@ impl Uart {
         } else if self.buffered.is_none() {
             self.buffered = Some(byte);
             self.status &= !UDRE;
+        } else {
+            self.overwritten += 1;
         }
     }
 }

@@ -93,7 +93,7 @@ fn requests_on_both_ports_are_answered_in_arcs_at_the_highest_step_rate() {
                 ms[0], ms[1]
             );
             // Steps and exec take nine tenths of the CPU, and a report 12 ms of the line of USB: docs/protocol.md.
-            assert!(ms[0] <= 60.0 && ms[1] <= 35.0, "jm {jerk}, radius {radius}: {ms:?} ms");
+            assert!(ms[0] <= 30.0 && ms[1] <= 25.0, "jm {jerk}, radius {radius}: {ms:?} ms");
         }
     }
 }

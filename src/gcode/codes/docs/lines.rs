@@ -10,7 +10,7 @@ use crate::status::Status::{
 pub const RULES: &[Rule] = &[
     Rule {
         title: "Lines",
-        text: "A line is words and comments, at most 254 bytes. Upper and lower case are the same, blanks may stand \
+        text: "A line is words and comments, at most 254 bytes, 79 on the second port. Upper and lower case are the same, blanks may stand \
 anywhere, inside numbers too, and words in any order. An empty line does nothing, and so does `%` alone. The \
 bytes `!`, 4, 5 and 24 act wherever they stand, in comments too, and `%` and `~` anywhere but in comments; none of \
 them is part of any line.",

@@ -4,9 +4,7 @@
 //! Both it and the transmit interrupt mask their own source and then let all others in: they do not nest in
 //! themselves, so bytes keep their order, and the step interrupt waits for no more than their first and last
 //! cycles. Exec would run far too long inside them, so they hold it off (`assembly::HOLD`): bytes would be lost, or a
-//! response would stop in its middle. They may nest in each other. Of transmit interrupts the outermost lets exec in,
-//! if that is not a receive interrupt; receive interrupts know of each other alone, so that exec may come within a
-//! transmit interrupt that one of them has come into: its byte waits.
+//! response would stop in its middle. They may nest in each other: the outermost lets exec in.
 //!
 //! A USART that the board does not use has interrupts that return at once, and nothing enables them.
 
@@ -23,22 +21,14 @@ use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::event::Event;
 use crate::hal::ring::Ring;
 use crate::hal::serial::{
-    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, LINE_END, MARKS, PORTS, RETURNED, RX_RING,
-    STRAY, TX_RING, USB, WAIT_MS, XOFF, XON, batch, hardware, high_water, is_shared,
+    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, LINE_END, MARKS, RETURNED, RX_RING, STRAY,
+    TX_RING, USB, WAIT_MS, XOFF, XON, batch, hardware, high_water, is_shared,
 };
 use crate::realtime;
 
 /// Whether the port is on this USART.
 const fn is_on(port: u8, usart: Usart) -> bool {
     matches!(hardware(port), Some(serial) if serial.usart as u8 == usart as u8)
-}
-
-/// The first register of the USART of the other port.
-const fn other(port: u8) -> usize {
-    match hardware(USB + AUX - port) {
-        Some(serial) => serial.usart.address(),
-        None => 0,
-    }
 }
 
 /// The pin that the other side holds us back with.
@@ -96,6 +86,9 @@ macro_rules! interrupts {
                     "lds  r24, {control}",
                     "andi r24, {mask}",
                     "sts  {control}, r24",
+                    // Whoever holds exec off already lets it in, too. In here that bit of the status is clear.
+                    "sbic {flags}, {hold_exec}",
+                    "ori  r25, 0x80",
                     "sbi  {flags}, {hold_exec}",
                     "push r31",
                     // The status goes with the byte that is read after it: nothing comes in between, for an
@@ -137,30 +130,26 @@ macro_rules! interrupts {
                     "lds  r24, {control}",
                     "ori  r24, {unmask}",
                     "sts  {control}, r24",
-                    // Exec is held off still if this came within the receive interrupt of the other port, which has
-                    // masked its source.
-                    ".if {others}",
-                    "lds  r24, {other_control}",
-                    "sbrs r24, 7",
+                    "sbrc r25, 7",
                     "rjmp 23f",
-                    ".endif",
                     "cbi  {flags}, {hold_exec}",
                     "sbic {flags}, {held_exec}",
                     "rjmp 22f",
-                    "23:",
+                    "25:",
                     "out  0x3F, r25",
                     "pop  r25",
                     "pop  r24",
                     "reti",
+                    // Exec is held off still.
+                    "23:",
+                    "andi r25, 0x7F",
+                    "rjmp 25b",
                     // Exec has been asked for meanwhile.
                     "22:",
                     "cbi  {flags}, {held_exec}",
                     "ldi  r24, {pended}",
                     "sts  {pend}, r24",
-                    "out  0x3F, r25",
-                    "pop  r25",
-                    "pop  r24",
-                    "reti",
+                    "rjmp 25b",
                     "4:",
                     "sbi  {flags}, {received}",
                     ".if {rts_there}",
@@ -437,8 +426,6 @@ macro_rules! interrupts {
                     "reti",
                     ".endif",
                     here = const is_on($port, Usart::$usart) as u8,
-                    others = const (PORTS > 1) as u8,
-                    other_control = const other($port) + 1,
                     status = const Usart::$usart.address(),
                     control = const Usart::$usart.address() + 1,
                     data = const Usart::$usart.address() + 6,
