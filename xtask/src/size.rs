@@ -41,7 +41,7 @@ pub fn run(args: &SizeArgs) -> Result<()> {
     }
 }
 
-/// Prints what an image takes, and fails past a cap.
+/// Prints what an image takes, and fails past a cap, or if the stack has no bound.
 pub fn show(elf: &Path) -> Result<()> {
     let image = Image::load(elf)?;
     let stack = Stack::of(&image, caps::INTERRUPT_TASKS)?;
@@ -51,6 +51,8 @@ pub fn show(elf: &Path) -> Result<()> {
     print_totals(image.sizes, &stack);
     let over = past_caps(image.sizes, stack.bytes());
     ensure!(over.is_empty(), "past the caps of xtask/src/caps.rs: {}", over.join("; "));
+    let unbounded = &stack.unbounded;
+    ensure!(unbounded.is_empty(), "the stack has no bound: {}", unbounded.join("; "));
     let stale = hot::stale(image.symbols.iter().map(|symbol| symbol.name.as_str()));
     ensure!(
         stale.is_empty(),
