@@ -214,8 +214,7 @@ impl<'a> Runner<'a> {
         waiting.update(segments.used());
         let short = waiting.is_short(*rests);
         let passed_over = event::pass_over();
-        let busy = waiting.is_busy() || (waiting.busy > 0 && event::is_asked());
-        self.machine.set_coarse(passed_over > PATIENCE || busy, short);
+        self.machine.set_coarse(passed_over > PATIENCE || waiting.is_busy(), short);
         if !rested {
             health::look_for_starvation();
         }

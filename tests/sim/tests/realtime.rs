@@ -121,7 +121,8 @@ fn a_kill_in_a_comment_is_one_whatever_is_under_way() {
         let job =
             format!("{{posx:n,posy:n}}\ng91 g2 f3000 x0 i1 p2\ng91 g0 x0.1 y0.2\n{comment}\x04)\n");
         machine.send(job.as_bytes());
-        machine.run_for_ms(60).unwrap();
+        // It comes to rest within 55 ms.
+        machine.run_for_ms(80).unwrap();
         machine.receive();
         machine.send(b"{stat:n}\n");
         machine.run_for_ms(10).unwrap();
