@@ -149,7 +149,11 @@ macro_rules! interrupts {
                     "cbi  {flags}, {held_exec}",
                     "ldi  r24, {pended}",
                     "sts  {pend}, r24",
-                    "rjmp 25b",
+                    // Once more, for a jump would take two cycles with interrupts off.
+                    "out  0x3F, r25",
+                    "pop  r25",
+                    "pop  r24",
+                    "reti",
                     "4:",
                     "sbi  {flags}, {received}",
                     ".if {rts_there}",
