@@ -14,7 +14,7 @@ const STOP_US: u64 = 50;
 /// The same where the step interrupt leaves a fifth of the CPU, at 85,000.
 const STOP_FAST_US: u64 = 125;
 /// The longest time with interrupts off outside the step interrupt.
-const WINDOW: u64 = 29;
+const WINDOW: u64 = 31;
 
 /// A machine with switches that moves X and Y, and these settings.
 fn running(board: &'static Board, build: &Build, settings: &[&str]) -> (Machine, Host) {

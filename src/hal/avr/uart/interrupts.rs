@@ -70,7 +70,7 @@ macro_rules! interrupts {
     ) => {
         /// USARTn_RX: takes a byte, in 79 cycles.
         ///
-        /// Interrupts are off for 25 cycles on the way in and 24 on the way out, or 30 if exec has been held
+        /// Interrupts are off for 31 cycles on the way in and 24 on the way out, or 29 if exec has been held
         /// off. The reader is told at the ends of lines and every `batch` bytes.
         #[unsafe(no_mangle)]
         extern "C" fn $rx() -> ! {
