@@ -54,7 +54,7 @@ pub fn is_unheard() -> bool {
     imp::flags::has(Event::Received) && imp::flags::has(Event::Tick)
 }
 
-/// So many segments.
+/// Segments without a turn of the main loop after which bytes that have come count as a question.
 const UNHEARD: u8 = 1;
 
 machine_static! {
@@ -71,7 +71,7 @@ pub fn set_asked(waits: bool) {
     asked().set(waits.into());
 }
 
-/// Whether somebody does, or may: bytes have come, and the main loop has had no turn for several segments. Exec only.
+/// Whether somebody does, or may: bytes have come, and the main loop has had no turn since the last segment. Exec only.
 #[inline(always)]
 pub fn is_asked() -> bool {
     asked().get() != 0 || (passed_over().get() >= UNHEARD && is_unheard())

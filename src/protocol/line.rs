@@ -41,6 +41,6 @@ pub enum Next {
 pub struct Ending {
     /// Free line slots.
     pub free: u8,
-    /// The length of the line that is answered, with its end; 0 if none is.
+    /// Length in bytes of the line that is answered, its line end included; 0 if the response answers no line.
     pub length: u16,
 }

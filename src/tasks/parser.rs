@@ -45,9 +45,9 @@ const ECHO: usize = 62;
 /// Most steps of a response before others have their turn: most answers take six. They have it as well behind each step while the
 /// ring of the second port is filling: to read a row of the tables may take 3 ms, and twice that while exec takes most of the CPU.
 const STEPS: u8 = 8;
-/// Most steps when a ms is over before they are done.
+/// Most steps in a turn in which a millisecond has ended.
 const STEPS_LATE: u8 = 5;
-/// None is begun after so long, ms.
+/// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
 
 /// A port's transmitter, while it is the parser's.
@@ -213,8 +213,8 @@ impl Parser {
         Some(chosen)
     }
 
-    /// The line of a port to begin with; G-code of the feeder only if `data` is wanted. That of others does not wait. During a flush
-    /// none is but what has been dropped, to be refused.
+    /// The next line of a port. G-code of the feeder is taken only if `data` is wanted; G-code of another port is taken at any time, and
+    /// refused. During a flush only lines that have been dropped are taken, to be refused.
     #[inline(never)]
     fn line_of(&mut self, number: usize, data: bool) -> Option<Chosen> {
         let links = self.links;

@@ -32,7 +32,7 @@ const PROMISED: u8 = 32;
 /// See [`PROMISED`]; of the other port.
 const AUX_PROMISED: u8 = 16;
 
-/// How many turns a report or a part of one leaves to control lines that wait.
+/// The turns that a report leaves to control lines before it begins, and that it leaves to others while it is told.
 pub const COURTESY: u8 = 8;
 
 /// What a port has to itself.
@@ -146,8 +146,8 @@ impl Links {
         self.reporter_wake.signal();
     }
 
-    /// Others have up to so many `turns`, while control lines wait or are being answered and that `counts`; and one if
-    /// bytes have come that may be such a line. A turn is 300 cycles if nobody has anything to do.
+    /// Gives the other tasks up to so many `turns`, as long as control lines wait or are being answered and `counts` says that they come
+    /// first; and one turn if bytes have come that may be such a line. A turn is 300 cycles if nobody has anything to do.
     pub async fn give_way(&self, turns: u8, counts: impl Fn() -> bool) {
         if is_unheard() {
             yield_now().await;

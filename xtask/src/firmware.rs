@@ -35,7 +35,7 @@ pub fn image(board: Board, machine: Machine) -> PathBuf {
     image_without(board, machine, &[])
 }
 
-/// The same of one that lacks some of the board's features.
+/// Where the image of a board without some of its features lies once it is built.
 fn image_without(board: Board, machine: Machine, without: &[String]) -> PathBuf {
     let machine = match machine == Machine::default() {
         true => String::new(),

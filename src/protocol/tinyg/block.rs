@@ -40,7 +40,7 @@ pub fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out) {
     out.put_plain(plain!("]}\n"));
 }
 
-/// The same in another variation.
+/// The response of [`put_brief`] in a variation that does not count lines, or with `ec` 1.
 #[inline(never)]
 fn put_other(settings: &Settings, ending: Ending, out: &mut impl Out) {
     Writer::frame(out, &mut Format::json(settings)).empty_response(Status::Ok, ending);

@@ -28,7 +28,7 @@ pub enum Source {
     Hold,
     /// `rx`: what the sender may send: lines, or characters if it counts those.
     Room,
-    /// What there is none of: `fd`, `ma`, `_xs1`, `_fe1`.
+    /// Not supported; always reads 0: `fd`, `ma`, `_xs1`, `_fe1`.
     Zero,
 }
 
@@ -75,7 +75,7 @@ pub enum Form {
     Length,
     /// A length in millimetres whatever the units, or an angle.
     Millimetres,
-    /// The same with two decimals.
+    /// A length in millimetres whatever the units, or an angle, shown with two decimals.
     Rough,
     /// Steps, with two decimals.
     Steps,
