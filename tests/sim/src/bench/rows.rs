@@ -11,7 +11,7 @@ use super::{Row, beyond, costs, jitter, limits, pauses, rates, spirals};
 const NONE: [&str; 3] = ["-"; 3];
 
 /// The table.
-pub const ROWS: [Row; 37] = [
+pub const ROWS: [Row; 42] = [
     Row {
         name: "rate-1",
         what: "highest rate held, 1 motor",
@@ -192,6 +192,28 @@ pub const ROWS: [Row; 37] = [
         measure: spirals::half_fast,
     },
     Row {
+        name: "spiral-0.1-terse",
+        what: "moves of 0.1 mm, 115,200 baud, js 0",
+        unit: "x",
+        decimals: 3,
+        better: Lower,
+        peers: NONE,
+        target: Some(1.5),
+        floor: None,
+        measure: spirals::tenth_terse,
+    },
+    Row {
+        name: "spiral-0.1-smooth",
+        what: "moves of 0.1 mm under a jerk limit, 500,000 baud",
+        unit: "x",
+        decimals: 3,
+        better: Lower,
+        peers: NONE,
+        target: Some(1.3),
+        floor: None,
+        measure: spirals::tenth_smooth,
+    },
+    Row {
         name: "spiral-0.1-jerk",
         what: "moves of 0.1 mm under a jerk limit, over without",
         unit: "x",
@@ -236,6 +258,39 @@ pub const ROWS: [Row; 37] = [
         target: Some(1_000.0),
         floor: Some(345.0),
         measure: costs::lines,
+    },
+    Row {
+        name: "lines-jerk",
+        what: "short moves taken under a jerk limit, 500,000 baud",
+        unit: "lines/s",
+        decimals: 0,
+        better: Higher,
+        peers: NONE,
+        target: Some(800.0),
+        floor: None,
+        measure: costs::lines_jerk,
+    },
+    Row {
+        name: "lines-curve",
+        what: "moves of 0.33 mm taken on a curve, 500,000 baud",
+        unit: "lines/s",
+        decimals: 0,
+        better: Higher,
+        peers: NONE,
+        target: Some(700.0),
+        floor: None,
+        measure: spirals::curve_lines,
+    },
+    Row {
+        name: "line-cycles",
+        what: "a move of 0.1 mm, 500,000 baud",
+        unit: "cycles",
+        decimals: 0,
+        better: Lower,
+        peers: NONE,
+        target: Some(16_000.0),
+        floor: None,
+        measure: spirals::cycles_per_line,
     },
     Row {
         name: "interrupts-off",
