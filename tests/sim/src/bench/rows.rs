@@ -131,8 +131,7 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: ["3.18", "-", "7.97"],
         target: Some(1.6),
-        // 1.792 before control lines could overtake data: a line costs 1 % more since.
-        floor: Some(1.84),
+        floor: Some(1.70),
         measure: spirals::tenth,
     },
     Row {
@@ -165,8 +164,7 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: NONE,
         target: Some(1.2),
-        // 1.776 before: a line costs 1 % more since control lines overtake data.
-        floor: Some(1.81),
+        floor: Some(1.50),
         measure: spirals::tenth_fast,
     },
     Row {
@@ -199,7 +197,7 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: NONE,
         target: Some(1.5),
-        floor: None,
+        floor: Some(1.52),
         measure: spirals::tenth_terse,
     },
     Row {
@@ -256,7 +254,7 @@ pub const ROWS: [Row; 42] = [
         better: Higher,
         peers: ["291 at 115,200", "-", "115 at 115,200"],
         target: Some(1_000.0),
-        floor: Some(345.0),
+        floor: Some(870.0),
         measure: costs::lines,
     },
     Row {
@@ -267,7 +265,7 @@ pub const ROWS: [Row; 42] = [
         better: Higher,
         peers: NONE,
         target: Some(800.0),
-        floor: None,
+        floor: Some(1_000.0),
         measure: costs::lines_jerk,
     },
     Row {
@@ -278,7 +276,7 @@ pub const ROWS: [Row; 42] = [
         better: Higher,
         peers: NONE,
         target: Some(700.0),
-        floor: None,
+        floor: Some(420.0),
         measure: spirals::curve_lines,
     },
     Row {
@@ -289,7 +287,7 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: NONE,
         target: Some(16_000.0),
-        floor: None,
+        floor: Some(26_000.0),
         measure: spirals::cycles_per_line,
     },
     Row {
