@@ -7,7 +7,9 @@
 //! An image is built for [`ACTIVE`], whose values are its defaults. `{mch:2}` takes those of another over
 //! ([`Settings::take_over`](super::Settings::take_over)).
 
-use super::setting::Setting;
+use core::ops::Range;
+
+use super::setting::{Owner, Setting};
 use super::table::{AXIS_LIST, HOMING, MOTOR_LIST, RADIUS, Row, SYSTEM_LIST, Values};
 use super::table::{AXIS_ROWS, MOTOR_ROWS, SYSTEM_ROWS};
 use crate::boards::MOTORS;
@@ -76,6 +78,23 @@ pub struct Entry {
 
 impl Entry {
     const NONE: Entry = Entry { setting: 0, owners: 0, value: 0 };
+
+    /// The setting, of the first motor or axis.
+    pub(super) fn first(&self) -> Setting {
+        Setting::of_entry(self.setting)
+    }
+
+    /// Whose settings these are.
+    pub(super) fn owners(&self) -> impl Iterator<Item = Owner> {
+        let (first, owners) = (self.first().owner(), self.owners);
+        let numbers = (0..u8::BITS as u8).filter(move |number| owners >> number & 1 != 0);
+        numbers.map(move |number| first.numbered(number))
+    }
+
+    /// Their value, scaled as kept.
+    pub(super) fn value(&self) -> i32 {
+        self.value
+    }
 }
 
 /// A setting of the groups that `owners` names: `"xy"`, `"14"`, or none for the machine itself. `value` in the
@@ -207,15 +226,29 @@ const fn joined() -> [Entry; ENDS[COUNT - 1] as usize] {
     all
 }
 
+/// By row of the system: 1 if some machine has it otherwise than another.
+const fn of_machines() -> [u8; SYSTEM_ROWS] {
+    let (entries, mut rows, mut i) = (joined(), [0; SYSTEM_ROWS], 0);
+    while i < entries.len() {
+        let row = entries[i].setting as usize;
+        if row < SYSTEM_ROWS {
+            rows[row] = 1;
+        }
+        i += 1;
+    }
+    rows
+}
+
 progmem! {
     static ENTRIES: [Entry; ENDS[COUNT - 1] as usize] = joined();
     static END_OF: [u8; COUNT] = ENDS;
+    static OF_MACHINES: [u8; SYSTEM_ROWS] = of_machines();
 }
 
 /// The value of the first of these entries that is of `setting`. About 30 cycles an entry on AVR.
 #[inline(never)]
 #[small]
-fn first_of(setting: Setting, mut entries: core::ops::Range<u8>) -> Option<i32> {
+fn first_of(setting: Setting, mut entries: Range<u8>) -> Option<i32> {
     let (first, owner) = setting.first_of_row();
     let first = first.number();
     entries.find_map(|index| {
@@ -227,15 +260,25 @@ fn first_of(setting: Setting, mut entries: core::ops::Range<u8>) -> Option<i32> 
 /// What a machine has otherwise than the careful one; `None` if not this. About 1,000 cycles on AVR.
 #[small]
 pub(super) fn value(machine: u8, setting: Setting) -> Option<i32> {
-    let machine = usize::from(machine);
-    let begin = machine.checked_sub(1).and_then(|before| END_OF.at(before)).unwrap_or(0);
-    first_of(setting, begin..END_OF.at(machine).unwrap_or(0))
+    first_of(setting, range(machine))
 }
 
-/// Whether some machine has it otherwise than another. About 3,000 cycles on AVR.
+/// Where the entries of a machine are in [`ENTRIES`].
 #[small]
-pub(super) fn differ_in(setting: Setting) -> bool {
-    first_of(setting, 0..ENDS[COUNT - 1]).is_some()
+fn range(machine: u8) -> Range<u8> {
+    let machine = usize::from(machine);
+    let begin = machine.checked_sub(1).and_then(|before| END_OF.at(before)).unwrap_or(0);
+    begin..END_OF.at(machine).unwrap_or(0)
+}
+
+/// What a machine has otherwise than the careful one.
+pub(super) fn differences(machine: u8) -> impl Iterator<Item = Entry> {
+    range(machine).filter_map(|index| ENTRIES.at(index.into()))
+}
+
+/// Whether some machine has this setting of the system otherwise than another.
+pub(super) fn is_of_machine(row: usize) -> bool {
+    OF_MACHINES.at(row).is_some_and(|yes| yes != 0)
 }
 
 #[cfg(test)]
@@ -252,7 +295,7 @@ mod tests {
 
     fn settings_of(machine: u8) -> Settings {
         let mut settings = Settings::new();
-        settings.take_over(machine, false);
+        settings.take_over(machine);
         settings
     }
 
@@ -278,10 +321,20 @@ mod tests {
     }
 
     #[test]
+    fn every_setting_is_what_it_is_on_the_machine() {
+        for (n, name, settings) in each() {
+            for setting in all().filter(|setting| setting.is_kept()) {
+                let is = settings.get(setting);
+                assert_eq!(is, setting.value_on(n), "{name}: {:?}", setting.name());
+            }
+        }
+    }
+
+    #[test]
     fn settings_that_are_not_the_machines_stay() {
         let mut settings = Settings::new();
         settings.store(setting("si"), 200);
-        settings.take_over(3, false);
+        settings.take_over(3);
         assert_eq!(settings.get(setting("si")), 200);
     }
 
@@ -294,7 +347,7 @@ mod tests {
     fn whatever_was_chosen_before_makes_no_difference() {
         for (n, name, expected) in each() {
             let mut settings = settings_of((n + 1) % COUNT as u8);
-            settings.take_over(n, false);
+            settings.take_over(n);
             assert_eq!(values(&settings), values(&expected), "{name}");
         }
         assert_eq!(values(&settings_of(ACTIVE)), values(&Settings::new()));

@@ -58,26 +58,6 @@ impl Settings {
         Settings { small: [0; SMALLS], large: [0; LARGES], ratios, octaves: 0 }
     }
 
-    /// Sets everything to its default.
-    pub fn set_defaults(&mut self) {
-        self.take_over(machines::ACTIVE, true);
-    }
-
-    /// Sets what a machine's profile says, to what it is on the machine of this number; with `all` everything else too,
-    /// to its default. Up to 1,000,000 cycles on AVR.
-    #[inline(never)]
-    #[small]
-    pub fn take_over(&mut self, machine: u8, all: bool) {
-        for setting in (0..Setting::NUMBERS).filter_map(Setting::from_number) {
-            if all || setting.is_machine() || setting.is_of_machine() {
-                self.keep(setting, setting.value_on(machine));
-            }
-        }
-        for motor in 0..MOTORS as u8 {
-            self.derive(motor);
-        }
-    }
-
     /// The value of a setting, scaled as kept.
     #[small]
     pub fn get(&self, setting: Setting) -> i32 {
@@ -163,7 +143,13 @@ impl Settings {
 
     #[small]
     fn keep(&mut self, setting: Setting, value: i32) {
-        match setting.place() {
+        self.put(setting.place(), value);
+    }
+
+    #[inline(never)]
+    #[small]
+    fn put(&mut self, place: Place, value: i32) {
+        match place {
             Place::Small(slot) => {
                 if let Some(place) = self.small.get_mut(usize::from(slot)) {
                     *place = value as u8;
@@ -258,6 +244,7 @@ fn limit(row: &Row, max: i32, number: Number, inches: bool) -> Result<i32, Statu
     }
 }
 
+mod defaults;
 pub mod getters;
 mod jerk;
 mod rates;

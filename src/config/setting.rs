@@ -104,7 +104,7 @@ impl Owner {
         matches!(self, Owner::Axis(axis) if usize::from(axis) >= FIRST_ROTARY)
     }
 
-    fn has(self, row: &Row) -> bool {
+    pub(super) fn has(self, row: &Row) -> bool {
         match self {
             Owner::Axis(axis) if row.is(HOMING) => usize::from(axis) <= FIRST_ROTARY,
             Owner::Axis(_) if row.is(RADIUS) => self.is_rotary(),
@@ -128,8 +128,35 @@ impl Owner {
         })
     }
 
+    /// Motor or axis `number`, if it is one; else itself.
+    pub(super) fn numbered(self, number: u8) -> Owner {
+        match self {
+            Owner::Motor(_) => Owner::Motor(number),
+            Owner::Axis(_) => Owner::Axis(number),
+            owner => owner,
+        }
+    }
+
+    /// Where its setting of this row is kept.
+    #[inline(never)]
+    pub(super) fn place(self, row: &Row) -> Place {
+        let (small, large) = match self {
+            Owner::Motor(motor) => {
+                (motor * table::motor::SMALL as u8, motor * table::motor::LARGE as u8)
+            }
+            Owner::Axis(axis) => (small_of(axis), large_of(axis)),
+            _ => (small_of(AXES as u8), large_of(AXES as u8)),
+        };
+        match row.kind {
+            Kind::Small => Place::Small(small + row.slot),
+            Kind::Large | Kind::Job => Place::Large(large + row.slot),
+            Kind::Cold | Kind::Data => Place::Log,
+            Kind::Constant | Kind::Text => Place::Constant,
+        }
+    }
+
     /// Row `row` of its table, if it has that.
-    fn load(self, row: u8) -> Option<Row> {
+    pub(super) fn load(self, row: u8) -> Option<Row> {
         self.table()?.at(row.into()).filter(|row| self.has(row))
     }
 }
@@ -197,6 +224,11 @@ impl Setting {
     pub fn from_number(number: u8) -> Option<Setting> {
         let setting = Setting(number);
         setting.owner().load(setting.index()).map(|_| setting)
+    }
+
+    /// The setting of a row's number among the entries of machines, which are checked when the image is built.
+    pub(super) const fn of_entry(number: u8) -> Setting {
+        Setting(number)
     }
 
     /// The setting of `owner` in `row` of its table, if it has that.
@@ -362,18 +394,8 @@ impl Setting {
         machines::value(machine, self).unwrap_or_else(|| self.careful_value())
     }
 
-    /// Whether `mch` sets it: all of motors and axes, and what else some machine has otherwise than another. About
-    /// 10,000 cycles on AVR.
-    pub(super) fn is_of_machine(self) -> bool {
-        match self.owner() {
-            Owner::Motor(_) | Owner::Axis(_) => true,
-            Owner::System => machines::differ_in(self),
-            _ => false,
-        }
-    }
-
     #[inline(never)]
-    fn careful_value(self) -> i32 {
+    pub(super) fn careful_value(self) -> i32 {
         let index = usize::from(self.index());
         let value = match self.owner() {
             Owner::System => SYSTEM_DEFAULTS.at(index),
@@ -392,20 +414,7 @@ impl Setting {
 
     /// Where its value is kept.
     pub fn place(self) -> Place {
-        let row = self.row();
-        let (small, large) = match self.owner() {
-            Owner::Motor(motor) => {
-                (motor * table::motor::SMALL as u8, motor * table::motor::LARGE as u8)
-            }
-            Owner::Axis(axis) => (small_of(axis), large_of(axis)),
-            _ => (small_of(AXES as u8), large_of(AXES as u8)),
-        };
-        match row.kind {
-            Kind::Small => Place::Small(small + row.slot),
-            Kind::Large | Kind::Job => Place::Large(large + row.slot),
-            Kind::Cold | Kind::Data => Place::Log,
-            Kind::Constant | Kind::Text => Place::Constant,
-        }
+        self.owner().place(&self.row())
     }
 }
 
