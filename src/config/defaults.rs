@@ -4,12 +4,10 @@
 //! hold up everything else in thread mode meanwhile.
 
 use super::Settings;
+use super::groups::{axis, job, motor, system};
 use super::machines::{self, CHOICE, Entry};
 use super::setting::{Owner, Setting};
-use super::table::{
-    AXIS, AXIS_DEFAULTS, AXIS_ROWS, JOB, JOB_ROWS, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS, Row, SYSTEM,
-    SYSTEM_DEFAULTS, SYSTEM_ROWS,
-};
+use super::table::Row;
 use crate::boards::MOTORS;
 
 #[small]
@@ -27,23 +25,28 @@ impl Settings {
 
     #[inline(never)]
     fn set(&mut self, machine: u8, all: bool) {
-        for index in 0..SYSTEM_ROWS {
-            let (Some(row), Some(value)) = (SYSTEM.at(index), SYSTEM_DEFAULTS.at(index)) else {
+        for index in 0..system::COUNT {
+            let (Some(row), Some(value)) = (system::ROWS.at(index), system::DEFAULTS.at(index))
+            else {
                 break;
             };
             if all || machines::is_of_machine(index) {
                 self.put(Owner::System.place(&row), value);
             }
         }
-        for row in (0..JOB_ROWS).filter(|_| all).filter_map(|row| JOB.at(row)) {
+        for row in (0..job::COUNT).filter(|_| all).filter_map(|row| job::ROWS.at(row)) {
             self.put(Owner::Job.place(&row), 0);
         }
-        for row in 0..MOTOR_ROWS {
-            let (Some(row), Some(values)) = (MOTOR.at(row), MOTOR_DEFAULTS.at(row)) else { break };
+        for row in 0..motor::COUNT {
+            let (Some(row), Some(values)) = (motor::ROWS.at(row), motor::DEFAULTS.at(row)) else {
+                break;
+            };
             self.put_row(&row, Owner::Motor(0), &values);
         }
-        for row in 0..AXIS_ROWS {
-            let (Some(row), Some(values)) = (AXIS.at(row), AXIS_DEFAULTS.at(row)) else { break };
+        for row in 0..axis::COUNT {
+            let (Some(row), Some(values)) = (axis::ROWS.at(row), axis::DEFAULTS.at(row)) else {
+                break;
+            };
             self.put_row(&row, Owner::Axis(0), &values);
         }
         for entry in machines::differences(machine) {

@@ -9,9 +9,9 @@
 
 use core::ops::Range;
 
+use super::groups::{axis, motor, system};
 use super::setting::{Owner, Setting};
-use super::table::{AXIS_LIST, HOMING, MOTOR_LIST, RADIUS, Row, SYSTEM_LIST, Values};
-use super::table::{AXIS_ROWS, MOTOR_ROWS, SYSTEM_ROWS};
+use super::table::{HOMING, RADIUS, Row, Values, row_of};
 use crate::boards::MOTORS;
 use crate::progmem;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -63,7 +63,7 @@ pub const ACTIVE: u8 = if cfg!(feature = "machine-router") {
 };
 
 /// The number of the setting that chooses one.
-pub(super) const CHOICE: u8 = find(&SYSTEM_LIST, b"mch") as u8;
+pub(super) const CHOICE: u8 = row_of(&system::LIST, "mch");
 
 /// A setting of a machine, or of several of its motors or axes.
 #[derive(Clone, Copy, Debug)]
@@ -102,22 +102,22 @@ impl Entry {
 ///
 /// Panics, so fails the build, if there is no such setting or it cannot have the value.
 const fn set(owners: &str, name: &str, value: f64) -> Entry {
-    let (owners, name) = (owners.as_bytes(), name.as_bytes());
+    let owners = owners.as_bytes();
     if owners.is_empty() {
-        let row = find(&SYSTEM_LIST, name);
-        return entry(row, 1, &SYSTEM_LIST[row], value);
+        let row = row_of(&system::LIST, name) as usize;
+        return entry(row, 1, &system::LIST[row], value);
     }
     if owners[0].is_ascii_digit() {
-        let row = find(&MOTOR_LIST, name);
-        return entry(SYSTEM_ROWS + row, bits(owners, b"1234"), &MOTOR_LIST[row], value);
+        let row = row_of(&motor::LIST, name) as usize;
+        return entry(system::COUNT + row, bits(owners, b"1234"), &motor::LIST[row], value);
     }
-    let row = find(&AXIS_LIST, name);
+    let row = row_of(&axis::LIST, name) as usize;
     let bits = bits(owners, b"xyzabc");
     let homes = (1 << (FIRST_ROTARY + 1)) - 1;
     let turns = !((1 << FIRST_ROTARY) - 1);
-    assert!(!AXIS_LIST[row].is(HOMING) || bits & !homes == 0, "an axis lacks this setting");
-    assert!(!AXIS_LIST[row].is(RADIUS) || bits & !turns == 0, "an axis lacks this setting");
-    entry(SYSTEM_ROWS + MOTORS * MOTOR_ROWS + row, bits, &AXIS_LIST[row], value)
+    assert!(!axis::LIST[row].is(HOMING) || bits & !homes == 0, "an axis lacks this setting");
+    assert!(!axis::LIST[row].is(RADIUS) || bits & !turns == 0, "an axis lacks this setting");
+    entry(system::COUNT + MOTORS * motor::COUNT + row, bits, &axis::LIST[row], value)
 }
 
 const fn entry(setting: usize, owners: u8, row: &Row, value: f64) -> Entry {
@@ -146,28 +146,6 @@ const fn bits(owners: &[u8], all: &[u8]) -> u8 {
     bits
 }
 
-/// The row of that name.
-const fn find(rows: &[Row], name: &[u8]) -> usize {
-    let mut row = 0;
-    while !is_called(&rows[row].token, name) {
-        row += 1;
-        assert!(row < rows.len(), "a machine has a setting that does not exist");
-    }
-    row
-}
-
-const fn is_called(token: &[u8; 4], name: &[u8]) -> bool {
-    let mut i = 0;
-    while i < token.len() {
-        let letter = if i < name.len() { name[i] } else { 0 };
-        if token[i] != letter {
-            return false;
-        }
-        i += 1;
-    }
-    name.len() <= token.len()
-}
-
 impl Values {
     /// These with those of `entries` in their places.
     pub(super) const fn with(mut self, entries: &[Entry]) -> Values {
@@ -187,13 +165,13 @@ impl Values {
     }
 
     const fn put(&mut self, setting: usize, owner: usize, value: i32) {
-        const FIRST_AXIS: usize = SYSTEM_ROWS + MOTORS * MOTOR_ROWS;
-        if setting < SYSTEM_ROWS {
+        const FIRST_AXIS: usize = system::COUNT + MOTORS * motor::COUNT;
+        if setting < system::COUNT {
             self.system[setting] = value;
         } else if setting < FIRST_AXIS {
-            self.motor[setting - SYSTEM_ROWS][owner] = value;
+            self.motor[setting - system::COUNT][owner] = value;
         } else {
-            assert!(setting - FIRST_AXIS < AXIS_ROWS);
+            assert!(setting - FIRST_AXIS < axis::COUNT);
             self.axis[setting - FIRST_AXIS][owner] = value;
         }
     }
@@ -227,11 +205,11 @@ const fn joined() -> [Entry; ENDS[COUNT - 1] as usize] {
 }
 
 /// By row of the system: 1 if some machine has it otherwise than another.
-const fn of_machines() -> [u8; SYSTEM_ROWS] {
-    let (entries, mut rows, mut i) = (joined(), [0; SYSTEM_ROWS], 0);
+const fn of_machines() -> [u8; system::COUNT] {
+    let (entries, mut rows, mut i) = (joined(), [0; system::COUNT], 0);
     while i < entries.len() {
         let row = entries[i].setting as usize;
-        if row < SYSTEM_ROWS {
+        if row < system::COUNT {
             rows[row] = 1;
         }
         i += 1;
@@ -242,7 +220,7 @@ const fn of_machines() -> [u8; SYSTEM_ROWS] {
 progmem! {
     static ENTRIES: [Entry; ENDS[COUNT - 1] as usize] = joined();
     static END_OF: [u8; COUNT] = ENDS;
-    static OF_MACHINES: [u8; SYSTEM_ROWS] = of_machines();
+    static OF_MACHINES: [u8; system::COUNT] = of_machines();
 }
 
 /// The value of the first of these entries that is of `setting`. About 30 cycles an entry on AVR.

@@ -6,6 +6,7 @@
 
 #[cfg(feature = "std")]
 pub mod docs;
+pub mod groups;
 pub mod machines;
 pub mod name;
 pub mod number;
@@ -25,8 +26,9 @@ use crate::baud;
 use crate::boards::MOTORS;
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
+use groups::motor;
 use setting::{LARGES, SMALLS, large_of, small_of};
-use table::{CLAMP, JERK, Kind, MODE, RADIUS, RANGE, Row, UNIT, axis, motor, system};
+use table::{CLAMP, JERK, Kind, MODE, RADIUS, RANGE, Row, UNIT};
 
 /// The values in force.
 pub struct Settings {
@@ -167,7 +169,7 @@ impl Settings {
     #[inline(never)]
     #[small]
     fn derive(&mut self, motor: u8) {
-        let base = motor * motor::LARGE as u8;
+        let base = motor * motor::LARGES[0] as u8;
         let (angle, travel) = (self.large(base + motor::SA), self.large(base + motor::TR));
         let microsteps = self.motor(motor.into(), motor::MI);
         if let Some(ratio) = self.ratios.get_mut(usize::from(motor)) {
@@ -185,7 +187,7 @@ impl Settings {
     }
 
     fn motor(&self, motor: usize, slot: u8) -> u8 {
-        self.small((motor * motor::SMALL) as u8 + slot)
+        self.small((motor * motor::SMALLS[0]) as u8 + slot)
     }
 
     #[inline(never)]
