@@ -13,7 +13,7 @@
 //! that groups are listed in: TinyG's settings come first in each group, then those of Kerf alone. The constructors of rows are in
 //! [`table`](super::table), those of words in [`words`](super::words).
 //!
-//! To add a setting, add its row, and a getter in `getters.rs`; `defaults` of machines that want another value are in `machines/`.
+//! To add a setting, add its row, and a getter in `getters.rs`. A machine that wants another default has it in its file under `machines/`.
 
 mod axes;
 mod machine;
@@ -33,7 +33,7 @@ pub type Meaning = (&'static str, &'static str);
 
 /// Makes a group's module of its rows: its tables, and a constant for each row by which getters find the setting.
 ///
-/// `group! { module: type of a value, table of defaults { CONSTANT "name": row, default, words, meaning; .. } }`. The table of
+/// `group! { module: type of a value, table of defaults => { CONSTANT "name": row, default, words, meaning; .. } }`. The table of
 /// defaults is `PLAIN`, which has them as the rows say, or what the profile of the careful machine makes of them. A default is scaled
 /// as kept.
 macro_rules! group {

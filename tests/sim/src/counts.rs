@@ -1,6 +1,6 @@
 //! How often each instruction ran, written to a file when a machine is dropped.
 //!
-//! `KERF_COUNTS=FOLDER` has every machine of a process do so: `xtask/src/shrink/hot.rs` says what for. A file has the cycles of the
+//! `KERF_COUNTS=FOLDER` has every machine of a process do so: what seldom runs need not be in `xtask/src/shrink/hot.rs`. A file has the cycles of the
 //! machine in its first line, then an address in bytes and how often it was executed in each.
 
 use std::fmt::Write;
