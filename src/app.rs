@@ -115,7 +115,7 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     Some(())
 }
 
-/// Starts the ports and makes the links. Not inlined, as [`place`].
+/// Starts the ports and makes the links. Not inlined, as [`place()`].
 #[inline(never)]
 #[small]
 fn connect(

@@ -3,7 +3,8 @@
 //! Axes and motors count from 0; one that is not there reads 0. A getter that returns a float costs
 //! about 300 cycles on AVR, the others about 20.
 
-use super::{Settings, StepRatio, axis, motor, setting::small_of, system};
+use super::groups::{axis, motor, system};
+use super::{Settings, StepRatio, setting::small_of};
 use crate::units::Length;
 
 /// Motors.

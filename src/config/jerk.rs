@@ -4,8 +4,9 @@
 //! does without it (`motion::governor::effective_jerk`): slices of motion are no shorter. The protocol says so
 //! when such a limit is set. Cost on AVR: 1,500 cycles.
 
+use super::groups::axis;
 use super::setting::large_of;
-use super::table::{Kind, axis};
+use super::table::Kind;
 use super::{Owner, Setting, Settings};
 use crate::units::FIRST_ROTARY;
 

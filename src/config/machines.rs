@@ -7,9 +7,11 @@
 //! An image is built for [`ACTIVE`], whose values are its defaults. `{mch:2}` takes those of another over
 //! ([`Settings::take_over`](super::Settings::take_over)).
 
-use super::setting::Setting;
-use super::table::{AXIS_LIST, HOMING, MOTOR_LIST, RADIUS, Row, SYSTEM_LIST, Values};
-use super::table::{AXIS_ROWS, MOTOR_ROWS, SYSTEM_ROWS};
+use core::ops::Range;
+
+use super::groups::{axis, motor, system};
+use super::setting::{Owner, Setting};
+use super::table::{HOMING, RADIUS, Row, Values, row_of};
 use crate::boards::MOTORS;
 use crate::progmem;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -61,7 +63,7 @@ pub const ACTIVE: u8 = if cfg!(feature = "machine-router") {
 };
 
 /// The number of the setting that chooses one.
-pub(super) const CHOICE: u8 = find(&SYSTEM_LIST, b"mch") as u8;
+pub(super) const CHOICE: u8 = row_of(&system::LIST, "mch");
 
 /// A setting of a machine, or of several of its motors or axes.
 #[derive(Clone, Copy, Debug)]
@@ -76,6 +78,23 @@ pub struct Entry {
 
 impl Entry {
     const NONE: Entry = Entry { setting: 0, owners: 0, value: 0 };
+
+    /// The setting, of the first motor or axis.
+    pub(super) fn first(&self) -> Setting {
+        Setting::of_entry(self.setting)
+    }
+
+    /// Whose settings these are.
+    pub(super) fn owners(&self) -> impl Iterator<Item = Owner> {
+        let (first, owners) = (self.first().owner(), self.owners);
+        let numbers = (0..u8::BITS as u8).filter(move |number| owners >> number & 1 != 0);
+        numbers.map(move |number| first.numbered(number))
+    }
+
+    /// Their value, scaled as kept.
+    pub(super) fn value(&self) -> i32 {
+        self.value
+    }
 }
 
 /// A setting of the groups that `owners` names: `"xy"`, `"14"`, or none for the machine itself. `value` in the
@@ -83,22 +102,22 @@ impl Entry {
 ///
 /// Panics, so fails the build, if there is no such setting or it cannot have the value.
 const fn set(owners: &str, name: &str, value: f64) -> Entry {
-    let (owners, name) = (owners.as_bytes(), name.as_bytes());
+    let owners = owners.as_bytes();
     if owners.is_empty() {
-        let row = find(&SYSTEM_LIST, name);
-        return entry(row, 1, &SYSTEM_LIST[row], value);
+        let row = row_of(&system::LIST, name) as usize;
+        return entry(row, 1, &system::LIST[row], value);
     }
     if owners[0].is_ascii_digit() {
-        let row = find(&MOTOR_LIST, name);
-        return entry(SYSTEM_ROWS + row, bits(owners, b"1234"), &MOTOR_LIST[row], value);
+        let row = row_of(&motor::LIST, name) as usize;
+        return entry(system::COUNT + row, bits(owners, b"1234"), &motor::LIST[row], value);
     }
-    let row = find(&AXIS_LIST, name);
+    let row = row_of(&axis::LIST, name) as usize;
     let bits = bits(owners, b"xyzabc");
     let homes = (1 << (FIRST_ROTARY + 1)) - 1;
     let turns = !((1 << FIRST_ROTARY) - 1);
-    assert!(!AXIS_LIST[row].is(HOMING) || bits & !homes == 0, "an axis lacks this setting");
-    assert!(!AXIS_LIST[row].is(RADIUS) || bits & !turns == 0, "an axis lacks this setting");
-    entry(SYSTEM_ROWS + MOTORS * MOTOR_ROWS + row, bits, &AXIS_LIST[row], value)
+    assert!(!axis::LIST[row].is(HOMING) || bits & !homes == 0, "an axis lacks this setting");
+    assert!(!axis::LIST[row].is(RADIUS) || bits & !turns == 0, "an axis lacks this setting");
+    entry(system::COUNT + MOTORS * motor::COUNT + row, bits, &axis::LIST[row], value)
 }
 
 const fn entry(setting: usize, owners: u8, row: &Row, value: f64) -> Entry {
@@ -127,28 +146,6 @@ const fn bits(owners: &[u8], all: &[u8]) -> u8 {
     bits
 }
 
-/// The row of that name.
-const fn find(rows: &[Row], name: &[u8]) -> usize {
-    let mut row = 0;
-    while !is_called(&rows[row].token, name) {
-        row += 1;
-        assert!(row < rows.len(), "a machine has a setting that does not exist");
-    }
-    row
-}
-
-const fn is_called(token: &[u8; 4], name: &[u8]) -> bool {
-    let mut i = 0;
-    while i < token.len() {
-        let letter = if i < name.len() { name[i] } else { 0 };
-        if token[i] != letter {
-            return false;
-        }
-        i += 1;
-    }
-    name.len() <= token.len()
-}
-
 impl Values {
     /// These with those of `entries` in their places.
     pub(super) const fn with(mut self, entries: &[Entry]) -> Values {
@@ -168,13 +165,13 @@ impl Values {
     }
 
     const fn put(&mut self, setting: usize, owner: usize, value: i32) {
-        const FIRST_AXIS: usize = SYSTEM_ROWS + MOTORS * MOTOR_ROWS;
-        if setting < SYSTEM_ROWS {
+        const FIRST_AXIS: usize = system::COUNT + MOTORS * motor::COUNT;
+        if setting < system::COUNT {
             self.system[setting] = value;
         } else if setting < FIRST_AXIS {
-            self.motor[setting - SYSTEM_ROWS][owner] = value;
+            self.motor[setting - system::COUNT][owner] = value;
         } else {
-            assert!(setting - FIRST_AXIS < AXIS_ROWS);
+            assert!(setting - FIRST_AXIS < axis::COUNT);
             self.axis[setting - FIRST_AXIS][owner] = value;
         }
     }
@@ -207,15 +204,29 @@ const fn joined() -> [Entry; ENDS[COUNT - 1] as usize] {
     all
 }
 
+/// By row of the system: 1 if some machine has it otherwise than another.
+const fn of_machines() -> [u8; system::COUNT] {
+    let (entries, mut rows, mut i) = (joined(), [0; system::COUNT], 0);
+    while i < entries.len() {
+        let row = entries[i].setting as usize;
+        if row < system::COUNT {
+            rows[row] = 1;
+        }
+        i += 1;
+    }
+    rows
+}
+
 progmem! {
     static ENTRIES: [Entry; ENDS[COUNT - 1] as usize] = joined();
     static END_OF: [u8; COUNT] = ENDS;
+    static OF_MACHINES: [u8; system::COUNT] = of_machines();
 }
 
 /// The value of the first of these entries that is of `setting`. About 30 cycles an entry on AVR.
 #[inline(never)]
 #[small]
-fn first_of(setting: Setting, mut entries: core::ops::Range<u8>) -> Option<i32> {
+fn first_of(setting: Setting, mut entries: Range<u8>) -> Option<i32> {
     let (first, owner) = setting.first_of_row();
     let first = first.number();
     entries.find_map(|index| {
@@ -227,15 +238,25 @@ fn first_of(setting: Setting, mut entries: core::ops::Range<u8>) -> Option<i32> 
 /// What a machine has otherwise than the careful one; `None` if not this. About 1,000 cycles on AVR.
 #[small]
 pub(super) fn value(machine: u8, setting: Setting) -> Option<i32> {
-    let machine = usize::from(machine);
-    let begin = machine.checked_sub(1).and_then(|before| END_OF.at(before)).unwrap_or(0);
-    first_of(setting, begin..END_OF.at(machine).unwrap_or(0))
+    first_of(setting, range(machine))
 }
 
-/// Whether some machine has it otherwise than another. About 3,000 cycles on AVR.
+/// Where the entries of a machine are in [`ENTRIES`].
 #[small]
-pub(super) fn differ_in(setting: Setting) -> bool {
-    first_of(setting, 0..ENDS[COUNT - 1]).is_some()
+fn range(machine: u8) -> Range<u8> {
+    let machine = usize::from(machine);
+    let begin = machine.checked_sub(1).and_then(|before| END_OF.at(before)).unwrap_or(0);
+    begin..END_OF.at(machine).unwrap_or(0)
+}
+
+/// What a machine has otherwise than the careful one.
+pub(super) fn differences(machine: u8) -> impl Iterator<Item = Entry> {
+    range(machine).filter_map(|index| ENTRIES.at(index.into()))
+}
+
+/// Whether some machine has this setting of the system otherwise than another.
+pub(super) fn is_of_machine(row: usize) -> bool {
+    OF_MACHINES.at(row).is_some_and(|yes| yes != 0)
 }
 
 #[cfg(test)]
@@ -252,7 +273,7 @@ mod tests {
 
     fn settings_of(machine: u8) -> Settings {
         let mut settings = Settings::new();
-        settings.take_over(machine, false);
+        settings.take_over(machine);
         settings
     }
 
@@ -278,10 +299,20 @@ mod tests {
     }
 
     #[test]
+    fn every_setting_is_what_it_is_on_the_machine() {
+        for (n, name, settings) in each() {
+            for setting in all().filter(|setting| setting.is_kept()) {
+                let is = settings.get(setting);
+                assert_eq!(is, setting.value_on(n), "{name}: {:?}", setting.name());
+            }
+        }
+    }
+
+    #[test]
     fn settings_that_are_not_the_machines_stay() {
         let mut settings = Settings::new();
         settings.store(setting("si"), 200);
-        settings.take_over(3, false);
+        settings.take_over(3);
         assert_eq!(settings.get(setting("si")), 200);
     }
 
@@ -294,7 +325,7 @@ mod tests {
     fn whatever_was_chosen_before_makes_no_difference() {
         for (n, name, expected) in each() {
             let mut settings = settings_of((n + 1) % COUNT as u8);
-            settings.take_over(n, false);
+            settings.take_over(n);
             assert_eq!(values(&settings), values(&expected), "{name}");
         }
         assert_eq!(values(&settings_of(ACTIVE)), values(&Settings::new()));

@@ -6,6 +6,7 @@
 
 #[cfg(feature = "std")]
 pub mod docs;
+pub mod groups;
 pub mod machines;
 pub mod name;
 pub mod number;
@@ -25,8 +26,9 @@ use crate::baud;
 use crate::boards::MOTORS;
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
+use groups::motor;
 use setting::{LARGES, SMALLS, large_of, small_of};
-use table::{CLAMP, JERK, Kind, MODE, RADIUS, RANGE, Row, UNIT, axis, motor, system};
+use table::{CLAMP, JERK, Kind, MODE, RADIUS, RANGE, Row, UNIT};
 
 /// The values in force.
 pub struct Settings {
@@ -56,26 +58,6 @@ impl Settings {
     pub const fn blank() -> Settings {
         let ratios = [StepRatio::NONE; MOTORS];
         Settings { small: [0; SMALLS], large: [0; LARGES], ratios, octaves: 0 }
-    }
-
-    /// Sets everything to its default.
-    pub fn set_defaults(&mut self) {
-        self.take_over(machines::ACTIVE, true);
-    }
-
-    /// Sets what a machine's profile says, to what it is on the machine of this number; with `all` everything else too,
-    /// to its default. Up to 1,000,000 cycles on AVR.
-    #[inline(never)]
-    #[small]
-    pub fn take_over(&mut self, machine: u8, all: bool) {
-        for setting in (0..Setting::NUMBERS).filter_map(Setting::from_number) {
-            if all || setting.is_machine() || setting.is_of_machine() {
-                self.keep(setting, setting.value_on(machine));
-            }
-        }
-        for motor in 0..MOTORS as u8 {
-            self.derive(motor);
-        }
     }
 
     /// The value of a setting, scaled as kept.
@@ -163,7 +145,13 @@ impl Settings {
 
     #[small]
     fn keep(&mut self, setting: Setting, value: i32) {
-        match setting.place() {
+        self.put(setting.place(), value);
+    }
+
+    #[inline(never)]
+    #[small]
+    fn put(&mut self, place: Place, value: i32) {
+        match place {
             Place::Small(slot) => {
                 if let Some(place) = self.small.get_mut(usize::from(slot)) {
                     *place = value as u8;
@@ -181,7 +169,7 @@ impl Settings {
     #[inline(never)]
     #[small]
     fn derive(&mut self, motor: u8) {
-        let base = motor * motor::LARGE as u8;
+        let base = motor * motor::LARGES[0] as u8;
         let (angle, travel) = (self.large(base + motor::SA), self.large(base + motor::TR));
         let microsteps = self.motor(motor.into(), motor::MI);
         if let Some(ratio) = self.ratios.get_mut(usize::from(motor)) {
@@ -199,7 +187,7 @@ impl Settings {
     }
 
     fn motor(&self, motor: usize, slot: u8) -> u8 {
-        self.small((motor * motor::SMALL) as u8 + slot)
+        self.small((motor * motor::SMALLS[0]) as u8 + slot)
     }
 
     #[inline(never)]
@@ -258,6 +246,7 @@ fn limit(row: &Row, max: i32, number: Number, inches: bool) -> Result<i32, Statu
     }
 }
 
+mod defaults;
 pub mod getters;
 mod jerk;
 mod rates;

@@ -6,8 +6,8 @@
 
 use kerf_macros::small;
 
+use super::groups::axis;
 use super::setting::large_of;
-use super::table::axis;
 use super::{Owner, Setting, Settings, StepRatio};
 use crate::boards::MOTORS;
 use crate::units::AXES;

@@ -1,25 +1,22 @@
 //! A setting's handle: its row of the table and whose it is.
 
+use super::groups::{axis, coolant, job, motor, pwm, spindle, squaring, system, user};
 use super::machines;
 use super::name::{Name, axis_letter, axis_of, token};
-use super::table::{
-    self, AXIS, AXIS_DEFAULTS, AXIS_ROWS, COOLANT, COOLANT_ROWS, HOMING, IDLE, JOB, JOB_ROWS, Kind,
-    MODE, MOTOR, MOTOR_DEFAULTS, MOTOR_ROWS, PWM, PWM_DEFAULTS, PWM_ROWS, RADIUS, Row, SPINDLE,
-    SPINDLE_DEFAULTS, SPINDLE_ROWS, SQUARING, SQUARING_ROWS, SYSTEM, SYSTEM_DEFAULTS, SYSTEM_ROWS,
-    USER, USER_ROWS,
-};
+use super::table::{HOMING, IDLE, Kind, MODE, RADIUS, Row, row_of};
+use super::words::Words;
 use crate::boards::MOTORS;
 use crate::progmem::Slice;
 use crate::units::{AXES, FIRST_ROTARY};
 
-const FIRST_MOTOR: u8 = SYSTEM_ROWS as u8;
-const FIRST_AXIS: u8 = FIRST_MOTOR + (MOTORS * MOTOR_ROWS) as u8;
-const FIRST_PWM: u8 = FIRST_AXIS + (AXES * AXIS_ROWS) as u8;
-const FIRST_SPINDLE: u8 = FIRST_PWM + PWM_ROWS as u8;
-const FIRST_COOLANT: u8 = FIRST_SPINDLE + SPINDLE_ROWS as u8;
-const FIRST_SQUARING: u8 = FIRST_COOLANT + COOLANT_ROWS as u8;
-const FIRST_USER: u8 = FIRST_SQUARING + SQUARING_ROWS as u8;
-const FIRST_JOB: u8 = FIRST_USER + USERS * USER_ROWS as u8;
+const FIRST_MOTOR: u8 = system::COUNT as u8;
+const FIRST_AXIS: u8 = FIRST_MOTOR + (MOTORS * motor::COUNT) as u8;
+const FIRST_PWM: u8 = FIRST_AXIS + (AXES * axis::COUNT) as u8;
+const FIRST_SPINDLE: u8 = FIRST_PWM + pwm::COUNT as u8;
+const FIRST_COOLANT: u8 = FIRST_SPINDLE + spindle::COUNT as u8;
+const FIRST_SQUARING: u8 = FIRST_COOLANT + coolant::COUNT as u8;
+const FIRST_USER: u8 = FIRST_SQUARING + squaring::COUNT as u8;
+const FIRST_JOB: u8 = FIRST_USER + USERS * user::COUNT as u8;
 
 /// The groups of user data, `uda` to `udd`.
 pub const USERS: u8 = 4;
@@ -52,15 +49,15 @@ impl Owner {
     /// Rows of the table that describe its settings.
     pub fn rows(self) -> u8 {
         match self {
-            Owner::System => SYSTEM_ROWS as u8,
-            Owner::Motor(_) => MOTOR_ROWS as u8,
-            Owner::Axis(_) => AXIS_ROWS as u8,
-            Owner::Pwm => PWM_ROWS as u8,
-            Owner::Spindle => SPINDLE_ROWS as u8,
-            Owner::Coolant => COOLANT_ROWS as u8,
-            Owner::Squaring => SQUARING_ROWS as u8,
-            Owner::User(_) => USER_ROWS as u8,
-            Owner::Job => JOB_ROWS as u8,
+            Owner::System => system::COUNT as u8,
+            Owner::Motor(_) => motor::COUNT as u8,
+            Owner::Axis(_) => axis::COUNT as u8,
+            Owner::Pwm => pwm::COUNT as u8,
+            Owner::Spindle => spindle::COUNT as u8,
+            Owner::Coolant => coolant::COUNT as u8,
+            Owner::Squaring => squaring::COUNT as u8,
+            Owner::User(_) => user::COUNT as u8,
+            Owner::Job => job::COUNT as u8,
         }
     }
 
@@ -104,7 +101,7 @@ impl Owner {
         matches!(self, Owner::Axis(axis) if usize::from(axis) >= FIRST_ROTARY)
     }
 
-    fn has(self, row: &Row) -> bool {
+    pub(super) fn has(self, row: &Row) -> bool {
         match self {
             Owner::Axis(axis) if row.is(HOMING) => usize::from(axis) <= FIRST_ROTARY,
             Owner::Axis(_) if row.is(RADIUS) => self.is_rotary(),
@@ -115,21 +112,62 @@ impl Owner {
     /// Its table.
     fn table(self) -> Option<Slice<Row>> {
         Some(match self {
-            Owner::System => SYSTEM.slice(),
-            Owner::Motor(motor) if usize::from(motor) < MOTORS => MOTOR.slice(),
-            Owner::Axis(axis) if usize::from(axis) < AXES => AXIS.slice(),
-            Owner::Pwm => PWM.slice(),
-            Owner::Spindle => SPINDLE.slice(),
-            Owner::Coolant => COOLANT.slice(),
-            Owner::Squaring => SQUARING.slice(),
-            Owner::User(group) if group < USERS => USER.slice(),
-            Owner::Job => JOB.slice(),
+            Owner::System => system::ROWS.slice(),
+            Owner::Motor(motor) if usize::from(motor) < MOTORS => motor::ROWS.slice(),
+            Owner::Axis(axis) if usize::from(axis) < AXES => axis::ROWS.slice(),
+            Owner::Pwm => pwm::ROWS.slice(),
+            Owner::Spindle => spindle::ROWS.slice(),
+            Owner::Coolant => coolant::ROWS.slice(),
+            Owner::Squaring => squaring::ROWS.slice(),
+            Owner::User(group) if group < USERS => user::ROWS.slice(),
+            Owner::Job => job::ROWS.slice(),
             _ => return None,
         })
     }
 
+    /// Motor or axis `number`, if it is one; else itself.
+    pub(super) fn numbered(self, number: u8) -> Owner {
+        match self {
+            Owner::Motor(_) => Owner::Motor(number),
+            Owner::Axis(_) => Owner::Axis(number),
+            owner => owner,
+        }
+    }
+
+    /// Where its setting of this row is kept.
+    #[inline(never)]
+    pub(super) fn place(self, row: &Row) -> Place {
+        let (small, large) = match self {
+            Owner::Motor(motor) => (motor * motor::SMALLS[0] as u8, motor * motor::LARGES[0] as u8),
+            Owner::Axis(axis) => (small_of(axis), large_of(axis)),
+            Owner::Job => (0, large_of(AXES as u8) + system::LARGES[0] as u8),
+            _ => (small_of(AXES as u8), large_of(AXES as u8)),
+        };
+        match row.kind {
+            Kind::Small => Place::Small(small + row.slot),
+            Kind::Large | Kind::Job => Place::Large(large + row.slot),
+            Kind::Cold | Kind::Data => Place::Log,
+            Kind::Constant | Kind::Text => Place::Constant,
+        }
+    }
+
+    /// What text mode calls its settings, by row.
+    pub(super) fn words(self) -> Slice<Words> {
+        match self {
+            Owner::System => system::WORDS.slice(),
+            Owner::Motor(_) => motor::WORDS.slice(),
+            Owner::Axis(_) => axis::WORDS.slice(),
+            Owner::Pwm => pwm::WORDS.slice(),
+            Owner::Spindle => spindle::WORDS.slice(),
+            Owner::Coolant => coolant::WORDS.slice(),
+            Owner::Squaring => squaring::WORDS.slice(),
+            Owner::User(_) => user::WORDS.slice(),
+            Owner::Job => job::WORDS.slice(),
+        }
+    }
+
     /// Row `row` of its table, if it has that.
-    fn load(self, row: u8) -> Option<Row> {
+    pub(super) fn load(self, row: u8) -> Option<Row> {
         self.table()?.at(row.into()).filter(|row| self.has(row))
     }
 }
@@ -155,24 +193,25 @@ pub enum Place {
 }
 
 /// Bytes that the settings take.
-pub const SMALLS: usize = small_of(AXES as u8) as usize + table::system::SMALL;
+pub const SMALLS: usize = small_of(AXES as u8) as usize + system::SMALLS[0];
 /// Words that the settings take.
-pub const LARGES: usize = large_of(AXES as u8) as usize + table::system::LARGE;
+pub const LARGES: usize = large_of(AXES as u8) as usize + system::LARGES[0] + job::COUNT;
 
-const fn base(axis: u8, full: usize, short: usize) -> u8 {
-    let homing = FIRST_ROTARY as u8 + 1;
-    let fulls = if axis < homing { axis } else { homing };
-    fulls * full as u8 + (axis - fulls) * short as u8
+/// What the axes before this one take, of which each takes `all` and those that home `homing` besides.
+const fn base(axis: u8, [all, homing]: [usize; 2]) -> u8 {
+    let homes = FIRST_ROTARY as u8 + 1;
+    let homes = if axis < homes { axis } else { homes };
+    axis * all as u8 + homes * homing as u8
 }
 
 /// The first byte of an axis; of the system for axis 6. Motors come first.
 pub const fn small_of(axis: u8) -> u8 {
-    (MOTORS * table::motor::SMALL) as u8 + base(axis, table::axis::SMALL, table::axis::SHORT_SMALL)
+    (MOTORS * motor::SMALLS[0]) as u8 + base(axis, axis::SMALLS)
 }
 
 /// The first word of an axis; of the system for axis 6. Motors come first.
 pub const fn large_of(axis: u8) -> u8 {
-    (MOTORS * table::motor::LARGE) as u8 + base(axis, table::axis::LARGE, table::axis::SHORT_LARGE)
+    (MOTORS * motor::LARGES[0]) as u8 + base(axis, axis::LARGES)
 }
 
 /// A setting.
@@ -182,7 +221,7 @@ pub struct Setting(u8);
 #[small]
 impl Setting {
     /// Numbers below this may be settings.
-    pub const NUMBERS: u8 = FIRST_JOB + JOB_ROWS as u8;
+    pub const NUMBERS: u8 = FIRST_JOB + job::COUNT as u8;
     /// Numbers below this may be settings that are in RAM and are kept.
     pub const WARM: u8 = FIRST_PWM;
     /// From [`Self::WARM`] to before this are those that are in EEPROM alone.
@@ -199,17 +238,22 @@ impl Setting {
         setting.owner().load(setting.index()).map(|_| setting)
     }
 
+    /// The setting of a row's number among the entries of machines, which are checked when the image is built.
+    pub(super) const fn of_entry(number: u8) -> Setting {
+        Setting(number)
+    }
+
     /// The setting of `owner` in `row` of its table, if it has that.
     pub fn of(owner: Owner, row: u8) -> Option<Setting> {
         let base = match owner {
             Owner::System => 0,
-            Owner::Motor(motor) => FIRST_MOTOR + motor * MOTOR_ROWS as u8,
-            Owner::Axis(axis) => FIRST_AXIS + axis * AXIS_ROWS as u8,
+            Owner::Motor(motor) => FIRST_MOTOR + motor * motor::COUNT as u8,
+            Owner::Axis(axis) => FIRST_AXIS + axis * axis::COUNT as u8,
             Owner::Pwm => FIRST_PWM,
             Owner::Spindle => FIRST_SPINDLE,
             Owner::Coolant => FIRST_COOLANT,
             Owner::Squaring => FIRST_SQUARING,
-            Owner::User(group) => FIRST_USER + group * USER_ROWS as u8,
+            Owner::User(group) => FIRST_USER + group * user::COUNT as u8,
             Owner::Job => FIRST_JOB,
         };
         owner.load(row).map(|_| Setting(base + row))
@@ -228,16 +272,13 @@ impl Setting {
 
     /// Whether it is the mode at power-up.
     pub fn is_mode(self) -> bool {
-        let row = self.row();
-        let small = self.owner() == Owner::System && row.kind == Kind::Small;
-        small && row.slot == table::system::EJ
+        self.0 == const { row_of(&system::LIST, "ej") }
     }
 
     /// Whether it is a motor's microsteps.
     pub fn is_microsteps(self) -> bool {
-        let row = self.row();
-        let motor = matches!(self.owner(), Owner::Motor(_));
-        motor && row.kind == Kind::Small && row.slot == table::motor::MI
+        matches!(self.owner(), Owner::Motor(_))
+            && self.index() == const { row_of(&motor::LIST, "mi") }
     }
 
     /// Whether it is refused while anything moves: a step, or what becomes of one, would change its
@@ -248,9 +289,7 @@ impl Setting {
 
     /// Whether it is the rate of the serial line.
     pub fn is_baud(self) -> bool {
-        let row = self.row();
-        let large = self.owner() == Owner::System && row.kind == Kind::Large;
-        large && row.slot == table::system::BAUD
+        self.0 == const { row_of(&system::LIST, "baud") }
     }
 
     /// Whether it is in EEPROM alone.
@@ -283,9 +322,7 @@ impl Setting {
 
     /// Whether it is the width of step pulses.
     pub fn is_pulse_width(self) -> bool {
-        let row = self.row();
-        let small = self.owner() == Owner::System && row.kind == Kind::Small;
-        small && row.slot == table::system::SPW
+        self.0 == const { row_of(&system::LIST, "spw") }
     }
 
     /// Whose it is.
@@ -293,9 +330,9 @@ impl Setting {
         if self.0 < FIRST_MOTOR {
             Owner::System
         } else if self.0 < FIRST_AXIS {
-            Owner::Motor((self.0 - FIRST_MOTOR) / MOTOR_ROWS as u8)
+            Owner::Motor((self.0 - FIRST_MOTOR) / motor::COUNT as u8)
         } else if self.0 < FIRST_PWM {
-            Owner::Axis((self.0 - FIRST_AXIS) / AXIS_ROWS as u8)
+            Owner::Axis((self.0 - FIRST_AXIS) / axis::COUNT as u8)
         } else if self.0 < FIRST_SPINDLE {
             Owner::Pwm
         } else if self.0 < FIRST_COOLANT {
@@ -305,7 +342,7 @@ impl Setting {
         } else if self.0 < FIRST_USER {
             Owner::Squaring
         } else if self.0 < FIRST_JOB {
-            Owner::User((self.0 - FIRST_USER) / USER_ROWS as u8)
+            Owner::User((self.0 - FIRST_USER) / user::COUNT as u8)
         } else {
             Owner::Job
         }
@@ -320,13 +357,13 @@ impl Setting {
     pub fn index(self) -> u8 {
         match self.owner() {
             Owner::System => self.0,
-            Owner::Motor(_) => (self.0 - FIRST_MOTOR) % MOTOR_ROWS as u8,
-            Owner::Axis(_) => (self.0 - FIRST_AXIS) % AXIS_ROWS as u8,
+            Owner::Motor(_) => (self.0 - FIRST_MOTOR) % motor::COUNT as u8,
+            Owner::Axis(_) => (self.0 - FIRST_AXIS) % axis::COUNT as u8,
             Owner::Pwm => self.0 - FIRST_PWM,
             Owner::Spindle => self.0 - FIRST_SPINDLE,
             Owner::Coolant => self.0 - FIRST_COOLANT,
             Owner::Squaring => self.0 - FIRST_SQUARING,
-            Owner::User(_) => (self.0 - FIRST_USER) % USER_ROWS as u8,
+            Owner::User(_) => (self.0 - FIRST_USER) % user::COUNT as u8,
             Owner::Job => self.0 - FIRST_JOB,
         }
     }
@@ -340,8 +377,8 @@ impl Setting {
     /// That of the first motor or axis in its row, and its own motor or axis as a bit.
     pub(super) fn first_of_row(self) -> (Setting, u8) {
         match self.owner() {
-            Owner::Motor(motor) => (Setting(self.0 - motor * MOTOR_ROWS as u8), 1 << motor),
-            Owner::Axis(axis) => (Setting(self.0 - axis * AXIS_ROWS as u8), 1 << axis),
+            Owner::Motor(motor) => (Setting(self.0 - motor * motor::COUNT as u8), 1 << motor),
+            Owner::Axis(axis) => (Setting(self.0 - axis * axis::COUNT as u8), 1 << axis),
             _ => (self, 1),
         }
     }
@@ -362,29 +399,19 @@ impl Setting {
         machines::value(machine, self).unwrap_or_else(|| self.careful_value())
     }
 
-    /// Whether `mch` sets it: all of motors and axes, and what else some machine has otherwise than another. About
-    /// 10,000 cycles on AVR.
-    pub(super) fn is_of_machine(self) -> bool {
-        match self.owner() {
-            Owner::Motor(_) | Owner::Axis(_) => true,
-            Owner::System => machines::differ_in(self),
-            _ => false,
-        }
-    }
-
     #[inline(never)]
-    fn careful_value(self) -> i32 {
+    pub(super) fn careful_value(self) -> i32 {
         let index = usize::from(self.index());
         let value = match self.owner() {
-            Owner::System => SYSTEM_DEFAULTS.at(index),
+            Owner::System => system::DEFAULTS.at(index),
             Owner::Motor(motor) => {
-                MOTOR_DEFAULTS.at(index).and_then(|d| d.get(usize::from(motor)).copied())
+                motor::DEFAULTS.at(index).and_then(|d| d.get(usize::from(motor)).copied())
             }
             Owner::Axis(axis) => {
-                AXIS_DEFAULTS.at(index).and_then(|d| d.get(usize::from(axis)).copied())
+                axis::DEFAULTS.at(index).and_then(|d| d.get(usize::from(axis)).copied())
             }
-            Owner::Pwm => PWM_DEFAULTS.at(index),
-            Owner::Spindle => SPINDLE_DEFAULTS.at(index),
+            Owner::Pwm => pwm::DEFAULTS.at(index),
+            Owner::Spindle => spindle::DEFAULTS.at(index),
             Owner::Coolant | Owner::Squaring | Owner::User(_) | Owner::Job => None,
         };
         value.unwrap_or(0)
@@ -392,20 +419,7 @@ impl Setting {
 
     /// Where its value is kept.
     pub fn place(self) -> Place {
-        let row = self.row();
-        let (small, large) = match self.owner() {
-            Owner::Motor(motor) => {
-                (motor * table::motor::SMALL as u8, motor * table::motor::LARGE as u8)
-            }
-            Owner::Axis(axis) => (small_of(axis), large_of(axis)),
-            _ => (small_of(AXES as u8), large_of(AXES as u8)),
-        };
-        match row.kind {
-            Kind::Small => Place::Small(small + row.slot),
-            Kind::Large | Kind::Job => Place::Large(large + row.slot),
-            Kind::Cold | Kind::Data => Place::Log,
-            Kind::Constant | Kind::Text => Place::Constant,
-        }
+        self.owner().place(&self.row())
     }
 }
 

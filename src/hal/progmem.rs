@@ -202,7 +202,7 @@ macro_rules! progmem {
     )+};
 }
 
-/// [`Plain`](crate::progmem::Plain) bytes from a literal: `plain!("]}")`.
+/// [`Plain`] bytes from a literal: `plain!("]}")`.
 #[macro_export]
 macro_rules! plain {
     ($literal:literal) => {{

@@ -1,6 +1,6 @@
 //! What it takes to slow down under a jerk limit, and which constraint ahead is the first to ask for it.
 //!
-//! Called by the [`Governor`](super::governor::Governor) at exec level, once for a stretch (`rise`).
+//! Called by the [`Governor`] at exec level, once for a stretch (`rise`).
 //!
 //! # Units
 //!

@@ -32,7 +32,7 @@ pub const STEPS_MAX: u16 = 0x7FFF;
 
 /// What the builder needs to know of the motors.
 pub trait Motors {
-    /// The axis that a motor drives; [`AXES`] or more if none.
+    /// The axis that a motor drives; [`AXES`](crate::units::AXES) or more if none.
     fn motor_axis(&self, motor: usize) -> u8;
     /// Steps of a motor for its axis' travel.
     fn ratio(&self, motor: usize) -> StepRatio;

@@ -1,6 +1,6 @@
 //! A ramp laid out to its end: from a state to a steady velocity at a place.
 //!
-//! Owned by the [`Governor`](super::governor::Governor), exec level. Five phases of constant jerk: an acceleration ends, the
+//! Owned by the [`Governor`], exec level. Five phases of constant jerk: an acceleration ends, the
 //! velocity is kept, the deceleration builds up, is kept, and ends. Velocity and distance are polynomials of the time that
 //! is left, so a slice is the difference of two values: nothing adds up, the ramp ends where it was meant to, and a slice in
 //! which phases change costs no more than any other.

@@ -1,7 +1,7 @@
 //! The control task: real-time characters, which act at once and get no response.
 //!
 //! Reads what the receive interrupt picked off; waits on [`Event::Realtime`]. What they lead to is in
-//! [`hold`](super::hold); besides, `^x` resets the machine, and ENQ asks whether anybody is there, which the
+//! [`hold`]; besides, `^x` resets the machine, and ENQ asks whether anybody is there, which the
 //! reporter answers. A switch that
 //! changes is seen to as well, by [`switches`].
 

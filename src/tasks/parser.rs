@@ -479,7 +479,8 @@ fn usual(links: &Links) -> Usual {
     let Ok(mut tx) = port.tx.try_lock() else { return Usual::NotTried };
     let mut lines = port.lines.borrow_mut();
     let Some(line) = lines.oldest() else { return Usual::NotTried };
-    if !tx.has_room() || settings.echo() {
+    // What the port is told at once goes first: an acknowledgement is not to wait for a move.
+    if !tx.has_room() || settings.echo() || port.tells() {
         return Usual::NotTried;
     }
     let mut commands = links.commands.borrow_mut();

@@ -1,7 +1,7 @@
 //! The power task: gives motors power, and takes it from them when they have been idle.
 //!
 //! Reads the settings, the milliseconds and exec's snapshot; writes the drivers' enables. Waits for
-//! [`LOOK_MS`] between looks, and sees to the [health](super::health) of all besides. Exec calls [`segment`] before it queues one, so that a driver is on before
+//! [`LOOK_MS`] between looks, and sees to the [`health`] of all besides. Exec calls [`segment`] before it queues one, so that a driver is on before
 //! its step; that costs 40 cycles a segment. Everyone else changes the state under the ceiling.
 
 use embassy_time::Timer;

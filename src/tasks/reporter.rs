@@ -31,8 +31,8 @@ use crate::status::Status;
 const POLL_MS: u64 = 10;
 /// How often room is looked for on a port that is greeted besides.
 const PATIENCE: u8 = 20;
-/// So many turns of [`COURTESY`] it takes to end a line early: more lines would take the line's time.
-const SPLIT: u8 = COURTESY / 2;
+/// How many times a report ends its line early for an answer: each line of a report takes the serial line's time for its frame.
+const SPLITS: u8 = 2;
 
 /// What was told last.
 struct Told {
@@ -164,11 +164,11 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
     };
     let mut telling = begin(notice, links, port);
     // For all of it: while it is being told, the port is not answered.
-    let mut turns = COURTESY;
+    let (mut turns, mut splits) = (COURTESY, SPLITS);
     loop {
         tx.room().await;
-        if turns >= SPLIT && split(&mut telling, port, &mut tx) {
-            turns -= SPLIT;
+        if splits > 0 && split(&mut telling, port, &mut tx) {
+            splits -= 1;
             drop(tx);
             links.parser_wake.signal();
             tx = port.tx_behind_answers().await;

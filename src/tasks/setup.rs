@@ -5,7 +5,7 @@ use kerf_macros::small;
 use super::homing;
 use crate::boards::{ACTIVE, inputs};
 use crate::config::getters::TRAVEL_NONE;
-use crate::config::table::system;
+use crate::config::groups::system;
 use crate::config::{Settings, StepRatio};
 use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
 use crate::gcode::setup::{AxisMode, Setup};

@@ -6,7 +6,7 @@
 //! the line it begins the alarm again if a line before it has ended it, but not if the other port has
 //! ([`Port::has_stopped`](super::ports::Port::has_stopped), [`Links::cleared_by`]).
 //!
-//! Which lines these are is said by [`asks_alarm`](crate::protocol::asks_alarm). Thread mode.
+//! Which lines these are is said by [`asks_alarm`]. Thread mode.
 
 use heapless::Vec;
 use kerf_macros::small;

@@ -12,6 +12,9 @@ use crate::protocol::Checksum;
 
 /// Most bytes written between two calls of [`Tx::room`].
 pub const PIECE: usize = 64;
+/// Most bytes of a report that wait to leave when its next piece is put: an answer that comes in between waits for these, 2 ms at
+/// 115,200 baud.
+const AHEAD: usize = 24;
 /// The bits of two bytes, times the milliseconds in a second.
 const TWO_BYTES_MS: u32 = 20 * 1_000;
 
@@ -32,9 +35,10 @@ impl Tx {
         Self { thread, ring, port, rate, sum: None }
     }
 
-    /// Waits until a piece fits.
+    /// Waits until the next piece of a report may be put.
     pub fn room(&mut self) -> impl Future<Output = ()> {
-        wait_transmitted(self.thread, self.port, || self.has_room().then_some(()))
+        let is_due = || (self.ring.free() >= TX_RING - 1 - AHEAD).then_some(());
+        wait_transmitted(self.thread, self.port, is_due)
     }
 
     /// Whether a piece fits now.

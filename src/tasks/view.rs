@@ -279,7 +279,7 @@ impl Machine for View<'_> {
         self.settings.store(setting, value);
         let is_machine = setting.is_machine();
         if is_machine {
-            self.settings.take_over(value as u8, false);
+            self.settings.take_over(value as u8);
         }
         let drivers = dynamics::Machine::drivers(&*self.settings);
         let rate = |motors| drivers.step_rate_max(motors) as u32;

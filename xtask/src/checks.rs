@@ -24,6 +24,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "tools", run: || setup::ensure(Scope::Simulator) },
     Stage { name: "format", run: format },
     Stage { name: "lints", run: lints },
+    Stage { name: "documentation", run: documentation },
     Stage { name: "host tests", run: host_tests },
     Stage { name: "firmware of every board", run: build_all },
     Stage { name: "an image without capabilities", run: build_without },
@@ -61,6 +62,14 @@ fn lints() -> Result<()> {
         cargo(&[&["clippy", "--package", "kerf-sim", "--profile", "sim"], &deny[..]].concat())?;
     }
     Ok(())
+}
+
+/// The documentation of the source is made without a warning.
+fn documentation() -> Result<()> {
+    let mut doc = host_cargo();
+    doc.current_dir(root()).env("RUSTDOCFLAGS", "-D warnings");
+    let packages = ["kerf", "avr-embassy", "kerf-macros"].map(|name| ["--package", name]).concat();
+    run_child(doc.args(["doc", "--no-deps", "--document-private-items"]).args(packages))
 }
 
 /// Whether cargo has this subcommand; rustup may have to bring it first. Without rustup and

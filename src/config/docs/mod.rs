@@ -1,16 +1,14 @@
 //! `docs/settings.md`, from the tables of settings and what is said of each.
 
-mod meaning;
-
 use std::format;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
+use super::groups::{Meaning, axis, coolant, job, motor, pwm, spindle, squaring, system, user};
 use super::name::token;
 use super::table::{CLAMP, HOMING, IDLE, JERK, Kind, MODE, RADIUS, Row};
 use super::{Digits, Fixed, Name, Owner, Setting, Words, machines};
 use crate::progmem::Text;
-use meaning::Meaning;
 
 const PREFACE: &str = "\
 # Settings
@@ -90,40 +88,40 @@ pub fn markdown() -> String {
             "The machine",
             "The group `sys`; names have no prefix.",
             &[Owner::System],
-            &meaning::SYSTEM,
+            &system::MEANINGS,
         ),
         (
             "Motors",
             "The groups `1` to `4`: `1tr`, `2tr`. Written at rest only.",
             &[0, 1, 2, 3].map(Owner::Motor),
-            &meaning::MOTOR,
+            &motor::MEANINGS,
         ),
         (
             "Axes",
             "The groups `x` `y` `z` `a` `b` `c`: `xvm`, `yvm`.",
             &[0, 1, 2, 3, 4, 5].map(Owner::Axis),
-            &meaning::AXIS,
+            &axis::MEANINGS,
         ),
-        ("PWM of the spindle", "The group `p1`: `p1frq`.", &[Owner::Pwm], &meaning::PWM),
-        ("Spindle", "The group `sp`: `spde`.", &[Owner::Spindle], &meaning::SPINDLE),
-        ("Coolant", "The group `co`: `coph`.", &[Owner::Coolant], &meaning::COOLANT),
+        ("PWM of the spindle", "The group `p1`: `p1frq`.", &[Owner::Pwm], &pwm::MEANINGS),
+        ("Spindle", "The group `sp`: `spde`.", &[Owner::Spindle], &spindle::MEANINGS),
+        ("Coolant", "The group `co`: `coph`.", &[Owner::Coolant], &coolant::MEANINGS),
         (
             "Squaring",
             "The group `sq`: `sqsw`. Homing squares an axis whose two motors have a switch each.",
             &[Owner::Squaring],
-            &meaning::SQUARING,
+            &squaring::MEANINGS,
         ),
         (
             "User data",
             "The groups `uda` `udb` `udc` `udd`: `uda0`, `udd3`. For a sender's own use: `{uda0:\"0x2a\"}`, `$uda0=0x2a`.",
             &[0, 1, 2, 3].map(Owner::User),
-            &meaning::USER,
+            &user::MEANINGS,
         ),
         (
             "Job",
             "The group `jid`: `jida`. Who runs what, for senders, in the same form; 0 after a reset.",
             &[Owner::Job],
-            &meaning::JOB,
+            &job::MEANINGS,
         ),
     ];
     let mut text = PREFACE.to_string();
@@ -328,15 +326,15 @@ mod tests {
     #[test]
     fn every_setting_has_its_meaning() {
         for (owner, meanings) in [
-            (Owner::System, &meaning::SYSTEM[..]),
-            (Owner::Motor(0), &meaning::MOTOR),
-            (Owner::Axis(0), &meaning::AXIS),
-            (Owner::Pwm, &meaning::PWM),
-            (Owner::Spindle, &meaning::SPINDLE),
-            (Owner::Coolant, &meaning::COOLANT),
-            (Owner::Squaring, &meaning::SQUARING),
-            (Owner::User(0), &meaning::USER),
-            (Owner::Job, &meaning::JOB),
+            (Owner::System, &system::MEANINGS[..]),
+            (Owner::Motor(0), &motor::MEANINGS),
+            (Owner::Axis(0), &axis::MEANINGS),
+            (Owner::Pwm, &pwm::MEANINGS),
+            (Owner::Spindle, &spindle::MEANINGS),
+            (Owner::Coolant, &coolant::MEANINGS),
+            (Owner::Squaring, &squaring::MEANINGS),
+            (Owner::User(0), &user::MEANINGS),
+            (Owner::Job, &job::MEANINGS),
         ] {
             let described: Vec<_> = meanings.iter().map(|(name, _)| name.to_string()).collect();
             assert_eq!(names(owner), described);

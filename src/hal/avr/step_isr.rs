@@ -6,7 +6,7 @@
 //! | two motors step | 127, and up to the segment's `settle` |
 //! | four motors step | 175, and up to `settle` |
 //! | all moving motors step on every tick (lockstep) | 92, and up to `settle` |
-//! | a segment is loaded | 100 more; 20 for each direction that changes |
+//! | a segment is loaded | 100 more, 120 for more than two motors; 20 for each direction that changes |
 //!
 //! A pin on ports H to L adds 2 cycles a motor. Step and direction pins are toggled by writing ones to
 //! PIN registers: one instruction, which disturbs no other pin of the port and whose time does not
@@ -273,9 +273,10 @@ extern "C" fn __vector_17() -> ! {
             "    brmi 25f",
             "    KERF_LOAD_INCREMENT 0",
             "    KERF_LOAD_INCREMENT 1",
+            "    tst  r27",
+            "    breq 27f",
             "    KERF_LOAD_INCREMENT 2",
             "    KERF_LOAD_INCREMENT 3",
-            // Pins of any motor may have to fall, so that the wide way serves all.
             "    pop  r31",
             "    pop  r30",
             "    rjmp 42b",
@@ -286,6 +287,17 @@ extern "C" fn __vector_17() -> ! {
             "    pop  r31",
             "    pop  r30",
             "    rjmp 43b",
+            // Two motors at most: a short way, lest the tick behind this one is late. Pins of the others may have to fall
+            // yet.
+            "27:",
+            "    clr  r27",
+            "    sts  {state} + {increment} + 4, r27",
+            "    sts  {state} + {increment} + 5, r27",
+            "    sts  {state} + {increment} + 6, r27",
+            "    sts  {state} + {increment} + 7, r27",
+            "    KERF_ADD 0",
+            "    KERF_ADD 1",
+            "    rjmp 26b",
             // There is none: no more ticks.
             "30:",
             "    ldi  r24, {halt}",

@@ -54,7 +54,7 @@ pub fn spare(ends: u8) {
 }
 
 /// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
-/// ([`contact`](crate::motion::contact)); none if `armed` is 0.
+/// ([`contact`]); none if `armed` is 0.
 pub fn arm(armed: u16, awaited: u16) {
     all().armed.set((armed, awaited));
 }

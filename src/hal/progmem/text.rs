@@ -142,7 +142,7 @@ impl Iterator for Bytes {
     }
 }
 
-/// A [`Text`](crate::progmem::Text) from a literal: `text!("SYSTEM READY")`.
+/// A [`Text`] from a literal: `text!("SYSTEM READY")`.
 #[macro_export]
 macro_rules! text {
     ($literal:literal) => {{

@@ -22,7 +22,7 @@ use kerf_macros::small;
 
 use super::Planner;
 use crate::boards::{MOTORS, inputs};
-use crate::config::table::{SQUARING_OFFSET, SQUARING_SWITCH};
+use crate::config::groups::squaring;
 use crate::config::{Owner, Setting};
 use crate::status::Status;
 use crate::tasks::homing::Homing;
@@ -61,7 +61,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     pub(super) fn second(&self, axis: u8, homing: &Homing) -> Result<Option<Second>, Status> {
-        let Some(input) = (self.squaring(SQUARING_SWITCH) as u8).checked_sub(1) else {
+        let Some(input) = (self.squaring(squaring::SW) as u8).checked_sub(1) else {
             return Ok(None);
         };
         let settings = self.links.settings.borrow();
@@ -117,7 +117,7 @@ impl Planner {
 
     /// How much farther than the first motor the second one is to stand off its switch.
     pub(super) fn squaring_offset(&self) -> Length {
-        Length(self.squaring(SQUARING_OFFSET))
+        Length(self.squaring(squaring::OF))
     }
 }
 

@@ -10,6 +10,7 @@
 
 pub mod bench;
 mod bus;
+mod counts;
 mod cpu;
 mod eeprom;
 mod host;

@@ -8,6 +8,7 @@ use anyhow::Result;
 use kerf::boards::{Board, Pin, Usart};
 
 use crate::bus::Bus;
+use crate::counts::Counts;
 use crate::cpu::{Cpu, Mode};
 use crate::eeprom;
 use crate::image::Image;
@@ -89,6 +90,8 @@ pub struct Machine {
     resets: u64,
     /// Cycles spent at each word of flash, if asked for.
     profile: Option<Vec<u64>>,
+    /// How often each word of flash ran, if the environment asks for it.
+    counts: Option<Counts>,
     stopwatches: Vec<Stopwatch>,
 }
 
@@ -117,6 +120,7 @@ impl Machine {
             board,
             resets: 0,
             profile: None,
+            counts: Counts::wanted(),
             stopwatches: Vec::new(),
         })
     }
@@ -148,6 +152,9 @@ impl Machine {
             self.meters.executed(cpu, pc, began);
             if let Some(spent) = self.profile.as_mut().and_then(|p| p.get_mut(pc as usize / 2)) {
                 *spent += cpu.cycle() - began;
+            }
+            if let Some(counts) = &mut self.counts {
+                counts.executed(pc);
             }
             if !self.stopwatches.is_empty() {
                 self.time(pc, began);
@@ -545,6 +552,9 @@ impl Machine {
 
 impl Drop for Machine {
     fn drop(&mut self) {
+        if let Some(counts) = &self.counts {
+            counts.write(self.cpu.cycle());
+        }
         self.cpu.power_down();
         // SAFETY: `Bus::install` leaked this box; the CPU that had the pointer is gone.
         drop(unsafe { Box::from_raw(self.bus.as_ptr()) });

@@ -4,6 +4,7 @@ mod common;
 
 use common::{booted, set};
 use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::{Host, Machine};
 
 /// The longest wait for an answer, ms of AVR time, with arcs of 1 mm at this jerk limit (millions of mm/min^3) and feed.
 fn longest(jerk: u32, feed: u32) -> f64 {
@@ -95,5 +96,50 @@ fn requests_on_both_ports_are_answered_in_arcs_at_the_highest_step_rate() {
             // Steps and exec take nine tenths of the CPU, and a report 12 ms of the line of USB: docs/protocol.md.
             assert!(ms[0] <= 30.0 && ms[1] <= 25.0, "jm {jerk}, radius {radius}: {ms:?} ms");
         }
+    }
+}
+
+/// Lines of USB that take much of thread mode, while the machine rests.
+const HEAVY: [&str; 8] = [
+    "{mch:2}",
+    "{mch:0}",
+    "{defa:1}",
+    "{x:{am:1,vm:5000,fr:5000,tn:0,tm:200,jm:500,jh:1000}}",
+    "{sys:n}",
+    "{1:n}",
+    "$$",
+    "{txt:\"$$\"}",
+];
+
+/// How long a question on the second port waits for its answer when it ends so many us behind a line on USB, ms of AVR time.
+fn waits_behind(machine: &mut Machine, host: &mut Host, line: &str, us: u64) -> f64 {
+    host.send(machine, 0, line);
+    while machine.wire().backlog() > 0 {
+        machine.run_until(machine.cycle() + 160).unwrap();
+    }
+    machine.run_until(machine.cycle() + us * 16).unwrap();
+    let _ = machine.receive_from(1);
+    let from = machine.cycle();
+    machine.send_to(1, b"{stat:n}\n");
+    let mut heard = Vec::new();
+    while !heard.ends_with(b"\n") {
+        machine.run_until(machine.cycle() + 160).unwrap();
+        heard.extend(machine.receive_from(1));
+        assert!(machine.cycle() - from < machine.cycles(3_000), "no answer behind {line}");
+    }
+    let ms = (machine.cycle() - from) as f64 / machine.cycles(1) as f64;
+    host.run_for_ms(machine, 1_500).unwrap();
+    host.take_answered();
+    ms
+}
+
+#[test]
+fn a_long_answer_does_not_hold_up_the_other_port() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    for line in HEAVY {
+        let waits = (0..8).map(|n| waits_behind(&mut machine, &mut host, line, n * 1_500));
+        let longest = waits.fold(0.0, f64::max);
+        println!("{line}: {longest:.1} ms");
+        assert!(longest <= 20.0, "{line}: {longest} ms");
     }
 }

@@ -18,6 +18,10 @@ pub const ROWS: &[&str] = &[
     // Each segment.
     "kerf::motion::",
     "kerf::tasks::exec::",
+    // Each hold.
+    "kerf::tasks::control::",
+    "kerf::tasks::hold::",
+    "kerf::machine::",
     // Each line.
     "kerf::tasks::reader::",
     "kerf::tasks::lines::",

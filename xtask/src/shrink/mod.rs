@@ -1,19 +1,18 @@
 //! Makes the image smaller: what the compiler wrote is rewritten before it is linked.
 //!
 //! Fat LTO gives one assembler text for the whole program, so that what repeats can be shared wherever it stands. LLVM does nothing of
-//! the kind for AVR. Only cold functions are changed ([`hot`] has the others), never assembler of the source.
+//! the kind for AVR. Only cold functions share ([`hot`] has the others); assembler of the source is never changed.
 //!
 //! | module | what it does | flash, bytes |
 //! |---|---|---|
 //! | [`text`], `dialect` | reads LLVM's text, writes it for `avr-as` | |
-//! | [`prologue`] | shares what functions begin with | 5,400 |
-//! | [`repeats`] | shares any other code that repeats, ends of functions above all | 10,800 |
-//! | [`branch`] | branches go where they lead, not round a jump | 700 |
+//! | [`tidy`] | leaves out what the compiler need not have written, and runs both to compare them | 6,700 |
+//! | [`prologue`] | shares what functions begin with | 2,700 |
+//! | [`repeats`] | shares any other code that repeats, ends of functions above all | 5,400 |
+//! | [`branch`] | branches go where they lead, not round a jump | 1,300 |
 //! | [`order`] | puts functions near those they call, which shortens calls | 3,200 |
-//! | [`verify`] | puts back what is shared, and compares with the compiler's text | |
+//! | [`verify`] | puts back what is shared, and compares with the tidied text | |
 //! | [`link`] | assembles and links, as `rustc` did | |
-//!
-//! The figures were measured when all of the interpreter but its usual lines was cold; now that it is hot they are half of that in all.
 //!
 //! A shared piece costs its caller 7 to 25 cycles, and three bytes of stack while it runs. `crate::elf` checks the program that is linked
 //! from the compiler's own text for the compiler's defects, and the stack in the image that was made.
@@ -26,6 +25,7 @@ mod order;
 pub mod prologue;
 mod repeats;
 pub mod text;
+mod tidy;
 mod verify;
 
 use std::collections::HashSet;
@@ -38,19 +38,21 @@ use text::{Function, Insn, Line, Program};
 pub struct Texts {
     /// The program as the compiler wrote it.
     pub plain: String,
-    /// What is linked: the program with its cold functions made smaller.
+    /// What is linked: the program tidied, with what cold functions share.
     pub small: String,
 }
 
 /// Reads what the compiler wrote, and makes it smaller.
 pub fn shrink(text: &str) -> Result<Texts> {
     let plain = Program::parse(text);
-    let mut small = plain.clone();
+    let mut tidy = plain.clone();
+    tidy::tidy(&mut tidy).context("the program that was tidied is another one")?;
+    let mut small = tidy.clone();
     prologue::share(&mut small);
     repeats::share(&mut small);
     branch::shorten(&mut small);
     order::arrange(&mut small);
-    verify::check(&plain, &small).context("the program that was made smaller is another one")?;
+    verify::check(&tidy, &small).context("the program that was made smaller is another one")?;
     Ok(Texts { plain: plain.text(), small: small.text() })
 }
 

@@ -1,7 +1,7 @@
-//! Holds the program that was made against the one that the compiler wrote.
+//! Holds the program that shares against the one that was tidied.
 //!
 //! All that is shared is put back where it is called from, by nothing but the text of the routines; what comes out must be the
-//! compiler's text, instruction by instruction, but for branches that went round a jump. A difference fails the build.
+//! text that was tidied, instruction by instruction, but for branches that went round a jump. A difference fails the build.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,5 @@
 use super::*;
+use crate::config::groups::system;
 use crate::gcode::tables::ROWS;
 use std::string::{String, ToString};
 use std::vec::Vec;
@@ -27,7 +28,8 @@ fn every_token_has_a_name_that_finds_it() {
     }
     assert_eq!(
         count,
-        37 + 28
+        system::COUNT
+            + 28
             + 3 * 15
             + 16
             + 2 * 9

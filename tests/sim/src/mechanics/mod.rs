@@ -20,7 +20,7 @@ use kerf::boards::{Board, MOTORS, Pin, inputs};
 
 pub use build::{Axis, Build, Spindle as SpindleBuild, Switch, Wiring};
 pub use line::Bounce;
-pub(crate) use random::Random;
+pub use random::Random;
 
 use carriage::Carriage;
 use line::Line;

@@ -1,0 +1,81 @@
+//! Sets settings to what they are by default, or on a machine.
+//!
+//! Goes through the tables row by row, so that a row is read once for all motors or axes: a reset to defaults, and a new profile,
+//! hold up everything else in thread mode meanwhile.
+
+use super::Settings;
+use super::groups::{axis, job, motor, system};
+use super::machines::{self, CHOICE, Entry};
+use super::setting::{Owner, Setting};
+use super::table::Row;
+use crate::boards::MOTORS;
+
+#[small]
+impl Settings {
+    /// Sets everything to its default.
+    pub fn set_defaults(&mut self) {
+        self.set(machines::ACTIVE, true);
+    }
+
+    /// Sets what a machine's profile says to what it is on the machine of this number: all settings of motors and axes, and what else
+    /// some machine has otherwise than another. Up to 150,000 cycles on AVR.
+    pub fn take_over(&mut self, machine: u8) {
+        self.set(machine, false);
+    }
+
+    #[inline(never)]
+    fn set(&mut self, machine: u8, all: bool) {
+        for index in 0..system::COUNT {
+            let (Some(row), Some(value)) = (system::ROWS.at(index), system::DEFAULTS.at(index))
+            else {
+                break;
+            };
+            if all || machines::is_of_machine(index) {
+                self.put(Owner::System.place(&row), value);
+            }
+        }
+        for row in (0..job::COUNT).filter(|_| all).filter_map(|row| job::ROWS.at(row)) {
+            self.put(Owner::Job.place(&row), 0);
+        }
+        for row in 0..motor::COUNT {
+            let (Some(row), Some(values)) = (motor::ROWS.at(row), motor::DEFAULTS.at(row)) else {
+                break;
+            };
+            self.put_row(&row, Owner::Motor(0), &values);
+        }
+        for row in 0..axis::COUNT {
+            let (Some(row), Some(values)) = (axis::ROWS.at(row), axis::DEFAULTS.at(row)) else {
+                break;
+            };
+            self.put_row(&row, Owner::Axis(0), &values);
+        }
+        for entry in machines::differences(machine) {
+            self.put_entry(&entry);
+        }
+        self.keep(Setting::of_entry(CHOICE), machine.into());
+        for motor in 0..MOTORS as u8 {
+            self.derive(motor);
+        }
+    }
+
+    #[inline(never)]
+    fn put_entry(&mut self, entry: &Entry) {
+        let index = entry.first().index();
+        for owner in entry.owners() {
+            // The first axis may lack what another has.
+            if let Some(row) = owner.load(index) {
+                self.put(owner.place(&row), entry.value());
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn put_row(&mut self, row: &Row, first: Owner, values: &[i32]) {
+        for (number, value) in (0..).zip(values) {
+            let owner = first.numbered(number);
+            if owner.has(row) {
+                self.put(owner.place(row), *value);
+            }
+        }
+    }
+}

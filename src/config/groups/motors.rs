@@ -1,0 +1,42 @@
+//! The settings of motors.
+
+use super::group;
+
+group! {
+    /// The groups `1` to `4`.
+    motor: [i32; MOTORS], CAREFUL.motor => {
+        MA "ma": int(0, 255), [0, 1, 2, 3],
+            words(text!("map to axis"), text!(" [0=X,1=Y,2=Z...]")),
+            "Axis that it moves: 0 X, 1 Y, 2 Z, 3 A, 4 B, 5 C; above that none. Several may move one axis.";
+        SA "sa": fixed(4, 3, POSITIVE), [1_8000; 4],
+            words(text!("step angle"), text!(" deg")),
+            "Angle of a full step.";
+        TR "tr": fixed(6, 4, POSITIVE).with(UNIT), [1_250_000, 1_250_000, 1_250_000, 360_000_000],
+            length(text!("travel per revolution"), NONE),
+            "Travel of the axis in a turn. More than 10,000 steps in a millimetre or degree leave less room for positions: see [how far numbers go](protocol.md#how-far-numbers-go).";
+        MI "mi": int(1, 255), [8; 4],
+            words(text!("microsteps"), text!(" [1,2,4,8]")),
+            "Microsteps of the driver. Usual are 1, 2, 4 and 8; others are taken with a warning.";
+        PO "po": int(0, 1), [0; 4],
+            words(text!("polarity"), POLARITY),
+            "Direction.";
+        PM "pm": int(0, 3), [2; 4],
+            words(text!("power management"), text!(" [0=disabled,1=always on,2=in cycle,3=when moving]")),
+            "When it is powered; see `mt`.";
+        SP "sp": int(0, 1), [0; 4],
+            words(text!("step polarity"), POLARITY),
+            "Whether the driver steps on a falling edge.";
+    }
+}
+
+group! {
+    /// The group `sq`.
+    squaring: i32, PLAIN => {
+        SW "sw": whole(cold(0), inputs::COUNT as i32), 0,
+            bare(text!("squaring switch")),
+            "Input of the second motor's own homing switch, as `in1`, `in2`..; 0 is none, and the axis is not squared. The motor is that of the highest number that drives the same axis as one before it.";
+        OF "of": shift(20_0000), 0,
+            bare(text!("squaring offset")),
+            "How much farther off its switch than the first motor it stands when the axis is square.";
+    }
+}

@@ -1,0 +1,66 @@
+//! The settings of the spindle, its PWM and the coolant.
+
+use super::group;
+
+group! {
+    /// The group `p1`.
+    pwm: i32, PLAIN => {
+        FRQ "frq": cold(0), 100_000,
+            words(text!("pwm frequency"), text!(" Hz")),
+            "Frequency; 0.122 Hz is the lowest there is.";
+        CSL "csl": cold(0), 1_000_000,
+            words(text!("pwm cw speed lo"), TURNS),
+            "Lowest speed, clockwise: a lower S has its share.";
+        CSH "csh": cold(0), 2_000_000,
+            words(text!("pwm cw speed hi"), TURNS),
+            "Highest speed, clockwise: a higher S has its share.";
+        CPL "cpl": up_to(cold(3), 1_000), 125,
+            words(text!("pwm cw phase lo"), PHASE),
+            "Share of the period at the lowest speed, clockwise.";
+        CPH "cph": up_to(cold(3), 1_000), 200,
+            words(text!("pwm cw phase hi"), PHASE),
+            "Share of the period at the highest speed, clockwise.";
+        WSL "wsl": cold(0), 1_000_000,
+            words(text!("pwm ccw speed lo"), TURNS),
+            "Lowest speed, counter-clockwise.";
+        WSH "wsh": cold(0), 2_000_000,
+            words(text!("pwm ccw speed hi"), TURNS),
+            "Highest speed, counter-clockwise.";
+        WPL "wpl": up_to(cold(3), 1_000), 125,
+            words(text!("pwm ccw phase lo"), PHASE),
+            "Share of the period at the lowest speed, counter-clockwise.";
+        WPH "wph": up_to(cold(3), 1_000), 200,
+            words(text!("pwm ccw phase hi"), PHASE),
+            "Share of the period at the highest speed, counter-clockwise.";
+        POF "pof": up_to(cold(3), 1_000), 100,
+            words(text!("pwm phase off"), PHASE),
+            "Share of the period while the spindle is off, or S is 0.";
+    }
+}
+
+group! {
+    /// The group `sp`.
+    spindle: i32, PLAIN => {
+        PH "ph": choice(), 0,
+            words(text!("spindle pause on hold"), OFF_ON),
+            "Whether the spindle stands still in a feedhold. It starts again before motion goes on, but not after `%`.";
+        DE "de": up_to(cold(3), 60_000), 0,
+            words(text!("spindle spinup delay"), text!(" seconds")),
+            "Time that moves wait for when the spindle has been started, or turned round.";
+        EP "ep": choice(), 1,
+            words(text!("spindle enable polarity"), LEVEL),
+            "Level of the enable pin that is on. Until the settings have been read after a reset it is not driven.";
+        DP "dp": choice(), 0,
+            words(text!("spindle direction polarity"), text!(" [0=CW is low,1=CW is high]")),
+            "Level of the direction pin.";
+    }
+}
+
+group! {
+    /// The group `co`.
+    coolant: i32, PLAIN => {
+        PH "ph": choice(), 0,
+            words(text!("coolant pause on hold"), OFF_ON),
+            "Whether mist and flood pause in a feedhold. They go on with the motion, but not after `%`.";
+    }
+}

@@ -1,0 +1,39 @@
+//! What senders keep with the machine.
+
+use super::group;
+
+group! {
+    /// The groups `uda` to `udd`.
+    user: i32, PLAIN => {
+        D0 "0": bits(Kind::Data), 0,
+            bare(USER_DATA),
+            "First of the group.";
+        D1 "1": bits(Kind::Data), 0,
+            bare(USER_DATA),
+            "Second of the group.";
+        D2 "2": bits(Kind::Data), 0,
+            bare(USER_DATA),
+            "Third of the group.";
+        D3 "3": bits(Kind::Data), 0,
+            bare(USER_DATA),
+            "Fourth of the group.";
+    }
+}
+
+group! {
+    /// The group `jid`.
+    job: i32, PLAIN => {
+        A "a": bits(Kind::Job), 0,
+            bare(JOB_ID),
+            "First part.";
+        B "b": bits(Kind::Job), 0,
+            bare(JOB_ID),
+            "Second part.";
+        C "c": bits(Kind::Job), 0,
+            bare(JOB_ID),
+            "Third part.";
+        D "d": bits(Kind::Job), 0,
+            bare(JOB_ID),
+            "Fourth part.";
+    }
+}

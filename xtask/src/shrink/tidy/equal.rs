@@ -1,0 +1,187 @@
+//! Runs two functions side by side: whether one does what the other does.
+//!
+//! Both run from each label that both have to the next, from registers that hold random values. They must read and write memory
+//! alike, call alike, arrive at one label, and arrive there with all that is needed. What [`super::flow`] says is put to the test
+//! on the way: registers that it says nobody needs hold different values in the two, and those that arrive must be as it says.
+
+use std::collections::HashMap;
+
+use anyhow::{Context, Result, bail, ensure};
+
+use super::super::text::{Function, Line};
+use super::effect::{self, Set, bit};
+use super::flow::{Flow, Known};
+use super::run::{End, Run};
+
+/// How often each piece runs.
+const TRIALS: u64 = 12;
+
+/// Fails if the last of several versions of a function does anything else than the first.
+///
+/// What is true of a version may follow from what became of it on the way: where the last does not match the first, those between
+/// are compared, too.
+pub fn check(versions: &[Function]) -> Result<()> {
+    let [first, .., last] = versions else { return Ok(()) };
+    let refused = match function(first, last) {
+        Ok(()) => return Ok(()),
+        Err(refused) => refused.context(format!("in {}", first.name)),
+    };
+    if versions.len() == 2 {
+        return Err(refused);
+    }
+    let middle = versions.len() / 2;
+    check(&versions[..=middle])?;
+    check(&versions[middle..])
+}
+
+fn function(old: &Function, new: &Function) -> Result<()> {
+    let (Some(old), Some(new)) = (Flow::of(old), Flow::of(new)) else {
+        bail!("it goes where nobody knows");
+    };
+    let pieces = Pieces { stops: stops(&new), needed: new.needed(), known: old.known(), old, new };
+    pieces.piece(None)?;
+    for label in pieces.new.labels.keys() {
+        pieces.piece(Some(label)).with_context(|| format!("from {label}"))?;
+    }
+    Ok(())
+}
+
+/// The labels where a piece ends: not those that lead straight on.
+fn stops<'a>(flow: &Flow<'a>) -> HashMap<&'a str, ()> {
+    let leads_on = |at: usize| {
+        let insn = flow.lines[at..].iter().find(|line| !matches!(line, Line::Label(_)));
+        matches!(insn, Some(Line::Insn(insn)) if insn.op == "rjmp" || insn.op == "ret")
+    };
+    flow.labels.iter().filter(|(_, at)| !leads_on(**at)).map(|(label, _)| (*label, ())).collect()
+}
+
+struct Pieces<'a> {
+    old: Flow<'a>,
+    new: Flow<'a>,
+    stops: HashMap<&'a str, ()>,
+    /// Of the new one: what is needed behind each line.
+    needed: Vec<Set>,
+    /// Of the old one: what is known before each line.
+    known: Vec<Known>,
+}
+
+impl Pieces<'_> {
+    fn piece(&self, label: Option<&str>) -> Result<()> {
+        let place = |flow: &Flow| label.map_or(Some(0), |label| flow.labels.get(label).copied());
+        let (from, to) = (
+            place(&self.old).context("a label is new")?,
+            place(&self.new).context("a label is lost")?,
+        );
+        let needed = label.map_or(effect::ALL, |_| self.needed[to]);
+        for trial in 0..TRIALS {
+            let mut first = Run::new(trial, trial, &self.known[from]);
+            let mut second = Run::new(trial, trial + 1_000, &self.known[from]);
+            second.take(&first, needed);
+            let ends =
+                (first.run(&self.old, from, &self.stops), second.run(&self.new, to, &self.stops));
+            self.compare(&first, &second, ends)?;
+        }
+        Ok(())
+    }
+
+    fn compare(&self, first: &Run, second: &Run, ends: (End, End)) -> Result<()> {
+        for (a, b) in first.log.iter().zip(&second.log) {
+            ensure!(a == b, "{a:?} became {b:?}");
+        }
+        let (all, made) = (first.log.len(), second.log.len());
+        ensure!(all == made, "{made} things are done instead of {all}, {:?}", first.log.last());
+        let at = match ends {
+            (End::At(a), End::At(b)) => {
+                // Two labels may stand at one place.
+                let place = |label: &str| self.old.skip_labels(self.old.labels[label]);
+                ensure!(place(&a) == place(&b), "it goes to {b} instead of {a}");
+                (self.old.labels[a.as_str()], self.new.labels[a.as_str()])
+            }
+            (End::Left, End::Left) | (End::Endless, End::Endless) => return Ok(()),
+            (a, b) => bail!("it ends with {b:?} instead of {a:?}"),
+        };
+        for part in (0..39).filter(|part| self.needed[at.1] & 1 << part != 0) {
+            ensure!(first.part(part) == second.part(part), "{} is another", name(part));
+        }
+        for register in 0..32 {
+            let (value, bits) = (first.part(register), self.known[at.0].bits(register));
+            ensure!(
+                value & bits.zeros == 0 && value & bits.ones == bits.ones,
+                "r{register} is not as it should be"
+            );
+        }
+        Ok(())
+    }
+}
+
+fn name(part: u8) -> String {
+    if bit(part) & effect::REGISTERS != 0 {
+        format!("r{part}")
+    } else {
+        format!("flag {}", part - 32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::text::tests::program;
+    use super::*;
+
+    fn refused(before: &str, after: &str) -> Option<String> {
+        let versions = [before, after].map(|code| program(&[("f", code)]).functions.remove(0));
+        check(&versions).err().map(|error| format!("{error:#}"))
+    }
+
+    #[test]
+    fn what_does_alike_is_equal() {
+        for (before, after) in [
+            ("ldi r24, 1\nret", "ldi r24, 1\nret"),
+            ("ldi r26, 1\nmov r24, r26\nret", "ldi r24, 1\nret"),
+            ("movw r18, r22\nmovw r24, r18\nret", "movw r24, r22\nmovw r18, r22\nret"),
+            ("mov r24, r1\nret", "ldi r24, 0\nret"),
+            (
+                "add r24, r22\ncpi r24, 0\nbreq .LBB0_1\ninc r24\n.LBB0_1:\nret",
+                "add r24, r22\nbreq .LBB0_1\ninc r24\n.LBB0_1:\nret",
+            ),
+            (
+                "rjmp .LBB0_1\n.LBB0_1:\nrjmp .LBB0_2\n.LBB0_2:\nret",
+                "rjmp .LBB0_2\n.LBB0_1:\nrjmp .LBB0_2\n.LBB0_2:\nret",
+            ),
+        ] {
+            assert_eq!(refused(before, after), None, "{before} and {after}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_is_refused() {
+        for (before, after) in [
+            ("ldi r24, 1\nret", "ldi r24, 2\nret"),
+            ("mov r2, r24\nret", "ret"),
+            ("std Z+1, r24\nret", "std Z+2, r24\nret"),
+            ("sts 500, r24\nret", "ret"),
+            ("push r24\nret", "push r22\nret"),
+            ("call f\nmov r24, r26\nret", "call f\nret"),
+            ("call f\nret", "call g\nret"),
+            (
+                "cp r24, r22\nbrlo .LBB0_1\ninc r24\n.LBB0_1:\nret",
+                "cp r24, r22\nbrlt .LBB0_1\ninc r24\n.LBB0_1:\nret",
+            ),
+            (
+                "add r24, r22\ncpi r24, 0\nbrlo .LBB0_1\ninc r24\n.LBB0_1:\nret",
+                "add r24, r22\nbrlo .LBB0_1\ninc r24\n.LBB0_1:\nret",
+            ),
+            (
+                "sub r24, r22\nsbc r25, r23\ncpi r25, 0\nbreq .LBB0_1\ninc r24\n.LBB0_1:\nret",
+                "sub r24, r22\nsbc r25, r23\nbreq .LBB0_1\ninc r24\n.LBB0_1:\nret",
+            ),
+            (
+                "ldi r24, 3\n.LBB0_1:\ndec r24\nbrne .LBB0_1\nret",
+                "ldi r24, 3\n.LBB0_1:\ndec r24\nbreq .LBB0_1\nret",
+            ),
+            ("ldd r24, Z+1\nldd r24, Z+2\nret", "ldd r24, Z+2\nret"),
+            ("ldi r26, 1\n.LBB0_1:\nmov r24, r26\nret", ".LBB0_1:\nldi r24, 2\nret"),
+        ] {
+            assert!(refused(before, after).is_some(), "{before} and {after}");
+        }
+    }
+}

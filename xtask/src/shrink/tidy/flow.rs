@@ -1,0 +1,210 @@
+//! Where a function goes from each of its lines, which values are needed there, and what is known of them.
+
+use std::collections::HashMap;
+
+use super::super::text::{Function, Insn, Line};
+use super::effect::{self, Effect, Set};
+
+/// The code of a function, line by line, and where it goes.
+pub struct Flow<'a> {
+    /// What makes code, and labels.
+    pub lines: Vec<&'a Line>,
+    /// Where these stand among the lines of the function.
+    pub origins: Vec<usize>,
+    pub effects: Vec<Effect>,
+    /// Where it goes on behind each line: nowhere, to one line or to two.
+    pub next: Vec<Vec<usize>>,
+    /// An instruction before may skip this one.
+    pub may_be_skipped: Vec<bool>,
+    pub labels: HashMap<&'a str, usize>,
+}
+
+impl<'a> Flow<'a> {
+    /// None if the function goes where nobody knows.
+    pub fn of(function: &'a Function) -> Option<Flow<'a>> {
+        let code =
+            function.lines.iter().enumerate().filter(|(_, line)| !matches!(line, Line::Note(_)));
+        let (origins, lines): (Vec<usize>, Vec<&Line>) = code.unzip();
+        let label = |(at, line): (usize, &&'a Line)| match line {
+            Line::Label(label) => Some((label.as_str(), at)),
+            _ => None,
+        };
+        let labels: HashMap<&str, usize> = lines.iter().enumerate().filter_map(label).collect();
+        let effects = lines.iter().map(|line| effect::of_line(line)).collect();
+        let next =
+            (0..lines.len()).map(|at| next(&lines, &labels, at)).collect::<Option<Vec<_>>>()?;
+        let may_be_skipped = (0..lines.len()).map(|at| at > 0 && is_skip(lines[at - 1])).collect();
+        Some(Flow { lines, origins, effects, next, may_be_skipped, labels })
+    }
+
+    /// The first line at or behind a line that is no label.
+    pub fn skip_labels(&self, at: usize) -> usize {
+        self.lines[at..].iter().take_while(|line| matches!(line, Line::Label(_))).count() + at
+    }
+
+    /// Of each line: what is needed behind it.
+    pub fn needed(&self) -> Vec<Set> {
+        let mut before = vec![0; self.lines.len()];
+        let mut behind = vec![0; self.lines.len()];
+        let mut again = true;
+        while again {
+            again = false;
+            for at in (0..self.lines.len()).rev() {
+                let effect = &self.effects[at];
+                behind[at] =
+                    self.next[at].iter().map(|to| before[*to]).fold(0, |all, one| all | one);
+                let written = if self.may_be_skipped[at] { 0 } else { effect.writes };
+                let needed = behind[at] & !written | effect.reads;
+                again |= needed != before[at];
+                before[at] = needed;
+            }
+        }
+        behind
+    }
+
+    /// Of each line: what is known of the registers before it.
+    pub fn known(&self) -> Vec<Known> {
+        let mut before: Vec<Option<Known>> = vec![None; self.lines.len()];
+        let mut open = Vec::new();
+        if let Some(first) = before.first_mut() {
+            *first = Some(Known::at_entry());
+            open.push(0);
+        }
+        while let Some(at) = open.pop() {
+            let Some(known) = before[at] else { continue };
+            let mut behind = known.behind(self.lines[at], &self.effects[at]);
+            if self.may_be_skipped[at] {
+                behind = behind.or(&known);
+            }
+            for to in &self.next[at] {
+                let joined = before[*to].map_or(behind, |old| old.or(&behind));
+                if before[*to] != Some(joined) {
+                    before[*to] = Some(joined);
+                    open.push(*to);
+                }
+            }
+        }
+        before.into_iter().map(Option::unwrap_or_default).collect()
+    }
+}
+
+fn is_skip(line: &Line) -> bool {
+    matches!(line, Line::Insn(insn) if insn.is_skip())
+}
+
+/// Where it goes on behind a line.
+fn next(lines: &[&Line], labels: &HashMap<&str, usize>, at: usize) -> Option<Vec<usize>> {
+    let follows = (at + 1 < lines.len()).then_some(at + 1);
+    let Line::Insn(insn) = lines[at] else { return Some(follows.into_iter().collect()) };
+    let to = || labels.get(insn.args.as_str()).copied();
+    match insn.op.as_str() {
+        "ret" | "jmp" => Some(Vec::new()),
+        "rjmp" => Some(vec![to()?]),
+        _ if effect::branch(&insn.op).is_some() => Some(vec![to()?, follows?]),
+        "cpse" | "sbrc" | "sbrs" | "sbic" | "sbis" => {
+            Some(vec![follows?, (at + 2 < lines.len()).then_some(at + 2)?])
+        }
+        _ if insn.is_jump() => None,
+        _ => Some(vec![follows?]),
+    }
+}
+
+/// Which bits of each register are 0 for certain, and which 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Known {
+    registers: [Bits; 32],
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Bits {
+    pub zeros: u8,
+    pub ones: u8,
+}
+
+impl Bits {
+    pub fn of(value: u8) -> Bits {
+        Bits { zeros: !value, ones: value }
+    }
+
+    pub fn value(self) -> Option<u8> {
+        (self.zeros | self.ones == u8::MAX).then_some(self.ones)
+    }
+}
+
+impl Known {
+    /// Register 1 is 0 wherever a function begins.
+    fn at_entry() -> Known {
+        let mut known = Known::default();
+        known.registers[1] = Bits::of(0);
+        known
+    }
+
+    pub fn bits(&self, register: u8) -> Bits {
+        self.registers[usize::from(register)]
+    }
+
+    pub fn value(&self, register: u8) -> Option<u8> {
+        self.bits(register).value()
+    }
+
+    fn or(&self, other: &Known) -> Known {
+        let both = |at: usize| {
+            let (a, b) = (self.registers[at], other.registers[at]);
+            Bits { zeros: a.zeros & b.zeros, ones: a.ones & b.ones }
+        };
+        Known { registers: std::array::from_fn(both) }
+    }
+
+    /// What is known behind a line.
+    pub fn behind(&self, line: &Line, effect: &Effect) -> Known {
+        let mut known = *self;
+        for (number, register) in known.registers.iter_mut().enumerate() {
+            if effect.changes() & 1 << number != 0 {
+                *register = Bits::default();
+            }
+        }
+        // Assembler of the source leaves register 1 as it was.
+        if matches!(line, Line::Fixed(_)) {
+            known.registers[1] = self.registers[1];
+        }
+        if let Line::Insn(insn) = line {
+            self.computed(insn, &mut known);
+        }
+        known
+    }
+
+    fn computed(&self, insn: &Insn, known: &mut Known) {
+        let (first, second) = effect::operands(insn);
+        let Some(d) = effect::register(first) else { return };
+        let s = effect::register(second);
+        let (a, b) = (self.bits(d), s.map_or_else(Bits::default, |s| self.bits(s)));
+        let number = immediate(second);
+        let result = match (insn.op.as_str(), number) {
+            ("ldi", Some(value)) => Bits::of(value),
+            ("mov", _) => b,
+            ("clr", _) => Bits::of(0),
+            ("eor" | "sub", _) if s == Some(d) => Bits::of(0),
+            ("andi", Some(mask)) => Bits { zeros: a.zeros | !mask, ones: a.ones & mask },
+            ("ori", Some(mask)) => Bits { zeros: a.zeros & !mask, ones: a.ones | mask },
+            ("and", _) => Bits { zeros: a.zeros | b.zeros, ones: a.ones & b.ones },
+            ("or", _) => Bits { zeros: a.zeros & b.zeros, ones: a.ones | b.ones },
+            ("lsr", _) => Bits { zeros: a.zeros >> 1 | 0x80, ones: a.ones >> 1 },
+            ("lsl", _) => Bits { zeros: a.zeros << 1 | 1, ones: a.ones << 1 },
+            ("swap", _) => Bits { zeros: a.zeros.rotate_left(4), ones: a.ones.rotate_left(4) },
+            ("com", _) => Bits { zeros: a.ones, ones: a.zeros },
+            ("movw", _) => {
+                let Some(s) = s else { return };
+                known.registers[usize::from(d) + 1] = self.bits(s + 1);
+                self.bits(s)
+            }
+            _ => return,
+        };
+        known.registers[usize::from(d)] = result;
+    }
+}
+
+/// An operand that is a number, as a byte.
+pub fn immediate(operand: &str) -> Option<u8> {
+    let number: i32 = operand.parse().ok()?;
+    u8::try_from(number & 0xFF).ok()
+}

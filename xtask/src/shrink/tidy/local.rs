@@ -1,0 +1,109 @@
+//! What is known between two labels: which registers hold copies, and which hold what lies in the frame.
+
+use super::super::text::{Insn, Line};
+use super::effect::{self, Effect, bit, operands, register};
+use super::flow::Flow;
+
+/// What is known before a line.
+#[derive(Clone, Default)]
+pub struct Local {
+    /// Of each register: another that has the same value.
+    copies: [Option<u8>; 32],
+    /// Places in the frame and the registers that hold what is there.
+    frame: Vec<(String, u8)>,
+    /// Y points to the frame, and nowhere else.
+    pub has_frame: bool,
+}
+
+impl Local {
+    pub fn of(flow: &Flow) -> Local {
+        let loads = |op: &str, args: &str| {
+            flow.lines
+                .iter()
+                .any(|line| matches!(line, Line::Insn(insn) if insn.op == op && insn.args == args))
+        };
+        Local { has_frame: loads("in", "r28, 61") && loads("in", "r29, 62"), ..Local::default() }
+    }
+
+    /// Forgets all: control may come from elsewhere.
+    pub fn clear(&mut self) {
+        self.copies = [None; 32];
+        self.frame.clear();
+    }
+
+    pub fn original(&self, copy: u8) -> Option<u8> {
+        self.copies[usize::from(copy)]
+    }
+
+    fn root(&self, register: u8) -> u8 {
+        self.original(register).unwrap_or(register)
+    }
+
+    pub fn are_equal(&self, a: u8, b: u8) -> bool {
+        self.root(a) == self.root(b)
+    }
+
+    /// The register that holds what this would load.
+    pub fn held(&self, is_load: bool, place: &str) -> Option<u8> {
+        let found = self.frame.iter().find(|(known, _)| known == place);
+        found.filter(|_| is_load && self.has_frame).map(|(_, register)| *register)
+    }
+
+    /// Goes past a line.
+    pub fn pass(&mut self, line: &Line, effect: &Effect, may_be_skipped: bool) {
+        let before = self.clone();
+        for r in (0..32).filter(|r| effect.changes() & bit(*r) != 0) {
+            self.forget(r);
+        }
+        match line {
+            Line::Insn(insn) if !may_be_skipped => self.learn(insn, &before),
+            Line::Insn(insn) if insn.op.starts_with("st") => self.frame.clear(),
+            Line::Insn(_) | Line::Note(_) => {}
+            Line::Label(_) | Line::Fixed(_) => self.clear(),
+        }
+    }
+
+    fn forget(&mut self, register: u8) {
+        self.copies[usize::from(register)] = None;
+        for copy in &mut self.copies {
+            *copy = copy.filter(|original| *original != register);
+        }
+        self.frame.retain(|(_, held)| *held != register);
+        if register == 28 || register == 29 {
+            self.frame.clear();
+        }
+    }
+
+    fn learn(&mut self, insn: &Insn, before: &Local) {
+        let (first, second) = operands(insn);
+        let (d, s) = (register(first), register(second));
+        match (insn.op.as_str(), d, s) {
+            ("mov", Some(d), Some(s)) => self.copy(d, before.root(s)),
+            ("movw", Some(d), Some(s)) => {
+                let lost = effect::pair(d);
+                let root =
+                    |s| Some(before.root(s)).filter(|root| bit(*root) & lost == 0).unwrap_or(s);
+                if lost & effect::pair(s) == 0 {
+                    self.copy(d, root(s));
+                    self.copy(d + 1, root(s + 1));
+                }
+            }
+            ("ldd", Some(d), _) if second.starts_with("Y+") => self.hold(second, d),
+            ("std", _, Some(s)) if first.starts_with("Y+") => self.hold(first, s),
+            // It may be the frame that this writes to.
+            ("st" | "std" | "call" | "eicall", ..) => self.frame.clear(),
+            _ => {}
+        }
+    }
+
+    fn copy(&mut self, d: u8, s: u8) {
+        if d != s {
+            self.copies[usize::from(d)] = Some(s);
+        }
+    }
+
+    fn hold(&mut self, place: &str, register: u8) {
+        self.frame.retain(|(known, _)| known != place);
+        self.frame.push((place.to_owned(), register));
+    }
+}

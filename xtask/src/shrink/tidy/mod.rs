@@ -1,0 +1,277 @@
+//! Leaves out what the compiler need not have written.
+//!
+//! LLVM's back end for AVR makes 0 or 1 of a condition and tests that, copies registers to and fro, loads from the frame what a
+//! register holds still, and compares with 0 what has set the flags. What goes here takes flash and time, so it goes from hot
+//! functions as well. [`rules`] has what is done, each by what [`flow`] and [`local`] know; [`equal`] holds every function against the one
+//! that the compiler wrote, by running both.
+
+mod effect;
+mod equal;
+mod flow;
+mod local;
+mod rules;
+mod run;
+
+use std::collections::HashMap;
+
+use anyhow::Result;
+
+use super::names_in_source;
+use super::text::{Function, Line, Program};
+use effect::Set;
+use flow::{Flow, Known};
+use local::Local;
+use rules::{Edit, Place};
+
+/// How often a function is looked at.
+const SWEEPS: usize = 1_000;
+
+/// Tidies all functions that follow the compiler's own conventions.
+pub fn tidy(program: &mut Program) -> Result<()> {
+    let in_source = names_in_source(program);
+    for function in &mut program.functions {
+        let has_convention =
+            !in_source.contains(&function.name) && function.insns().all(|insn| insn.op != "reti");
+        if has_convention {
+            tidy_function(function)?;
+        }
+    }
+    Ok(())
+}
+
+fn tidy_function(function: &mut Function) -> Result<()> {
+    let mut versions = vec![function.clone()];
+    while versions.len() < SWEEPS && sweep(function) {
+        versions.push(function.clone());
+    }
+    equal::check(&versions)
+}
+
+/// Applies one rule between each two labels; whether there was one.
+fn sweep(function: &mut Function) -> bool {
+    let Some(flow) = Flow::of(function) else { return false };
+    let sweep =
+        Sweep { needed: flow.needed(), known: flow.known(), uses: uses(&flow), flow: &flow };
+    let mut edits = sweep.edits(|place| place.edit(), false);
+    if edits.is_empty() {
+        edits = sweep.edits(|place| place.constant(), true);
+    }
+    let origins = flow.origins;
+    let lost = edits.is_empty();
+    let mut gone = Vec::new();
+    for (at, becomes) in edits {
+        match becomes {
+            Some(insn) => function.lines[origins[at]] = Line::Insn(insn),
+            None => gone.push(origins[at]),
+        }
+    }
+    gone.sort_unstable();
+    let mut line = 0..;
+    function.lines.retain(|_| gone.binary_search(&line.next().expect("lines are finite")).is_err());
+    !lost
+}
+
+/// How many jumps and branches go to each label.
+fn uses(flow: &Flow) -> HashMap<String, usize> {
+    let mut uses = HashMap::new();
+    for line in &flow.lines {
+        if let Line::Insn(insn) = line
+            && insn.is_jump()
+        {
+            *uses.entry(insn.args.clone()).or_default() += 1;
+        }
+    }
+    uses
+}
+
+struct Sweep<'a> {
+    flow: &'a Flow<'a>,
+    needed: Vec<Set>,
+    known: Vec<Known>,
+    uses: HashMap<String, usize>,
+}
+
+impl Sweep<'_> {
+    fn edits(&self, rule: impl Fn(&Place) -> Option<Edit>, only_one: bool) -> Edit {
+        let flow = self.flow;
+        let calls = |label: &str| self.uses.get(label).copied().unwrap_or(0);
+        let mut local = Local::of(flow);
+        let mut edits = Edit::new();
+        // Behind the last line that an edit changes a new look may begin.
+        let mut busy = None;
+        let mut waits = false;
+        for (at, line) in flow.lines.iter().enumerate() {
+            if let Line::Label(label) = line {
+                waits &= busy.is_some_and(|last| last > at);
+                local.clear();
+                if calls(label) == 0 && label.starts_with(".LBB") && !waits {
+                    edits.push((at, None));
+                }
+                continue;
+            }
+            if let Line::Insn(insn) = line
+                && !waits
+                && !flow.may_be_skipped[at]
+            {
+                let place = Place {
+                    flow,
+                    needed: &self.needed,
+                    known: &self.known,
+                    local: &local,
+                    calls: &calls,
+                    at,
+                    insn,
+                };
+                if let Some(edit) = rule(&place) {
+                    if only_one {
+                        return edit;
+                    }
+                    busy = edit.iter().map(|(at, _)| *at).max();
+                    waits = true;
+                    edits.extend(edit);
+                }
+            }
+            local.pass(line, &flow.effects[at], flow.may_be_skipped[at]);
+        }
+        edits
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::text::tests::{code, program};
+    use super::*;
+
+    fn tidied(text: &str) -> String {
+        let mut program = program(&[("f", text)]);
+        tidy(&mut program).unwrap();
+        code(&program, "f")
+    }
+
+    #[test]
+    fn a_condition_is_branched_on() {
+        for (test, branch, becomes) in [
+            ("andi r24, 1\ncpi r24, 0", "breq", "brge"),
+            ("andi r24, 1", "brne", "brlt"),
+            ("cpi r24, 0\nldd r26, Z+1\nst Z, r26", "brne", "brlt"),
+        ] {
+            let text = format!(
+                "cp r24, r22\nldi r24, 1\nbrlt .LBB0_1\nmov r24, r1\n.LBB0_1:\n{test}\n{branch} .LBB0_2\n\
+                 sts 500, r1\n.LBB0_2:\nldi r24, 5\nret"
+            );
+            let after = tidied(&text);
+            assert!(after.starts_with("cp r24, r22; "), "{after}");
+            assert!(
+                after.contains(&format!(
+                    "{becomes} .LBB0_2; sts 500, r1; .LBB0_2:; ldi r24, 5; ret"
+                )),
+                "{after}"
+            );
+            assert!(!after.contains(".LBB0_1"), "{after}");
+        }
+    }
+
+    #[test]
+    fn a_condition_that_is_needed_stays() {
+        let text = "cp r24, r22\nldi r24, 1\nbrlt .LBB0_1\nmov r24, r1\n.LBB0_1:\ncpi r24, 0\nbreq .LBB0_2\nsts 500, r1\n\
+                    .LBB0_2:\nret";
+        assert!(tidied(text).contains("brlt .LBB0_1; mov r24, r1"));
+    }
+
+    #[test]
+    fn what_nobody_needs_goes() {
+        assert_eq!(tidied("ldi r26, 3\nldi r24, 3\nret"), "ldi r24, 3; ret");
+        assert_eq!(
+            tidied("ldd r26, Z+1\nret"),
+            "ldd r26, Z+1; ret",
+            "it may be a register of the chip"
+        );
+        assert_eq!(tidied("ldi r24, 3\ncall g\nret"), "ldi r24, 3; call g; ret");
+        assert_eq!(
+            tidied("mul r24, r22\nmov r24, r0\nclr r1\nret"),
+            "mul r24, r22; mov r24, r0; clr r1; ret"
+        );
+    }
+
+    #[test]
+    fn copies_are_made_once() {
+        assert_eq!(
+            tidied("movw r18, r24\nmovw r30, r18\nst Z, r1\ncall g\nret"),
+            "movw r18, r24; movw r30, r24; st Z, r1; call g; ret"
+        );
+        assert_eq!(tidied("mov r24, r22\nmov r25, r23\nret"), "movw r24, r22; ret");
+        assert_eq!(
+            tidied("ldd r26, Z+1\nldd r27, Z+2\nmovw r24, r26\nret"),
+            "ldd r24, Z+1; ldd r25, Z+2; ret"
+        );
+        assert_eq!(tidied("mov r18, r24\nmov r24, r18\nret"), "mov r18, r24; ret");
+    }
+
+    #[test]
+    fn a_zero_is_register_1() {
+        assert_eq!(tidied("ldi r26, 0\nstd Z+1, r26\nret"), "std Z+1, r1; ret");
+        assert_eq!(
+            tidied("ldi r26, 0\nmul r24, r22\nmov r24, r0\nstd Z+1, r26\nclr r1\nret")
+                .matches("std Z+1, r26")
+                .count(),
+            1
+        );
+    }
+
+    #[test]
+    fn flags_that_are_set_are_not_set_again() {
+        let text = |test: &str, branch: &str| {
+            format!("{test}\ncpi r24, 0\n{branch} .LBB0_1\nsts 500, r1\n.LBB0_1:\nret")
+        };
+        for (test, branch, goes) in [
+            ("and r24, r22", "breq", true),
+            ("add r24, r22", "breq", true),
+            ("add r24, r22", "brlo", false),
+            ("add r24, r22", "brlt", false),
+            ("sbc r24, r22", "breq", false),
+            ("add r22, r24", "breq", false),
+            ("and r24, r22\nadd r22, r24", "breq", false),
+        ] {
+            assert_eq!(!tidied(&text(test, branch)).contains("cpi"), goes, "{test} {branch}");
+        }
+    }
+
+    #[test]
+    fn what_a_register_holds_is_not_loaded() {
+        let frame = "push r28\npush r29\nin r28, 61\nin r29, 62\n";
+        let after = |text: &str| tidied(&format!("{frame}{text}\npop r29\npop r28\nret"));
+        assert!(after("std Y+1, r22\nldd r24, Y+1").contains("std Y+1, r22; mov r24, r22; pop"));
+        assert!(after("std Y+1, r22\ncall g\nldd r24, Y+1").contains("ldd r24, Y+1"));
+        assert!(after("std Y+1, r22\nst Z, r24\nldd r24, Y+1").contains("ldd r24, Y+1"));
+        assert!(after("std Y+1, r22\ninc r22\nldd r24, Y+1").contains("ldd r24, Y+1"));
+        assert!(
+            tidied("std Y+1, r22\nldd r24, Y+1\nret").contains("ldd r24, Y+1"),
+            "Y may point anywhere"
+        );
+    }
+
+    #[test]
+    fn jumps_go_where_jumps_lead() {
+        assert_eq!(
+            tidied("cpi r24, 1\nbreq .LBB0_2\nrjmp .LBB0_1\n.LBB0_2:\nwdr\n.LBB0_1:\nret"),
+            "cpi r24, 1; breq .LBB0_2; ret; .LBB0_2:; wdr; ret"
+        );
+    }
+
+    #[test]
+    fn what_may_be_skipped_stays() {
+        assert_eq!(
+            tidied("sbrc r24, 0\nldi r25, 0\nmov r22, r25\nret"),
+            "sbrc r24, 0; ldi r25, 0; mov r22, r25; ret"
+        );
+    }
+
+    #[test]
+    fn interrupts_and_what_assembler_calls_stay() {
+        let text = "ldi r26, 3\nldi r24, 3\nreti";
+        assert_eq!(tidied(text), "ldi r26, 3; ldi r24, 3; reti");
+        let mut program = program(&[("f", "ldi r26, 3\nret"), ("g", ";APP\ncall f\n;NO_APP\nret")]);
+        tidy(&mut program).unwrap();
+        assert_eq!(code(&program, "f"), "ldi r26, 3; ret");
+    }
+}

@@ -1,0 +1,428 @@
+//! What may be left out or written otherwise.
+//!
+//! A rule looks at one line, with what is known there, and says which lines become what. A rule holds for itself: only one is
+//! applied between two labels before all is looked at again.
+
+use super::super::text::{Insn, Line};
+use super::effect::{self, Set, bit, operands, pair, register};
+use super::flow::{Flow, Known, immediate};
+use super::local::Local;
+
+/// Lines of a [`Flow`], and what becomes of them.
+pub type Edit = Vec<(usize, Option<Insn>)>;
+
+/// A place in a function, and all that is known of it.
+pub struct Place<'a> {
+    pub flow: &'a Flow<'a>,
+    /// What is needed behind each line.
+    pub needed: &'a [Set],
+    pub known: &'a [Known],
+    pub local: &'a Local,
+    /// How many jumps and branches go to each label.
+    pub calls: &'a dyn Fn(&str) -> usize,
+    pub at: usize,
+    pub insn: &'a Insn,
+}
+
+impl Place<'_> {
+    pub fn edit(&self) -> Option<Edit> {
+        let rules = [
+            Self::dead,
+            Self::mask,
+            Self::again,
+            Self::compare,
+            Self::truth,
+            Self::copies,
+            Self::zero,
+            Self::pairs,
+            Self::reload,
+            Self::origin,
+            Self::thread,
+        ];
+        rules.iter().find_map(|rule| rule(self))
+    }
+
+    fn insn_at(&self, at: usize) -> Option<&Insn> {
+        match self.flow.lines.get(at)? {
+            Line::Insn(insn) => Some(insn),
+            _ => None,
+        }
+    }
+
+    fn gone(&self) -> Option<Edit> {
+        Some(vec![(self.at, None)])
+    }
+
+    fn becomes(&self, insn: Insn) -> Option<Edit> {
+        (insn != *self.insn).then(|| vec![(self.at, Some(insn))])
+    }
+
+    fn known(&self) -> &Known {
+        &self.known[self.at]
+    }
+
+    /// Nobody needs what it computes.
+    fn dead(&self) -> Option<Edit> {
+        let effect = &self.flow.effects[self.at];
+        let is_dead = !effect.acts && effect.changes() & self.needed[self.at] == 0;
+        let reads_frame = self.local.has_frame
+            && self.insn.op == "ldd"
+            && self.insn.args.contains("Y+")
+            && effect.writes & self.needed[self.at] == 0;
+        (is_dead || reads_frame).then(|| self.gone())?
+    }
+
+    /// Takes bits off that are off already.
+    fn mask(&self) -> Option<Edit> {
+        let (first, second) = operands(self.insn);
+        if self.insn.op != "andi"
+            || effect::FLAGS & self.flow.effects[self.at].writes & self.needed[self.at] != 0
+        {
+            return None;
+        }
+        let mask = immediate(second)?;
+        (self.known().bits(register(first)?).zeros | mask == u8::MAX).then(|| self.gone())?
+    }
+
+    /// Copies what was copied.
+    fn again(&self) -> Option<Edit> {
+        let (first, second) = operands(self.insn);
+        let (d, s) = (register(first)?, register(second)?);
+        let again = match self.insn.op.as_str() {
+            "mov" => self.local.are_equal(d, s),
+            "movw" => self.local.are_equal(d, s) && self.local.are_equal(d + 1, s + 1),
+            _ => false,
+        };
+        again.then(|| self.gone())?
+    }
+
+    /// Gives a register the value that it has.
+    ///
+    /// What gave it that value may stand anywhere before, and be needed for this alone: nothing else may be left out with it.
+    pub fn constant(&self) -> Option<Edit> {
+        let (first, second) = operands(self.insn);
+        let d = register(first)?;
+        let value = |r: u8| self.known().value(r);
+        let are_equal = |d: u8, s: u8| value(d).is_some() && value(d) == value(s);
+        let again = match self.insn.op.as_str() {
+            "ldi" => immediate(second).is_some_and(|number| value(d) == Some(number)),
+            "mov" => are_equal(d, register(second)?),
+            "movw" => are_equal(d, register(second)?) && are_equal(d + 1, register(second)? + 1),
+            _ => false,
+        };
+        again.then(|| self.gone())?
+    }
+
+    /// Compares a register with 0 whose value set the flags alike.
+    fn compare(&self) -> Option<Edit> {
+        let d = self.tested()?;
+        let needed = self.needed[self.at] & effect::FLAGS;
+        for before in (0..self.at).rev() {
+            let insn = self.insn_at(before)?;
+            let effect = &self.flow.effects[before];
+            if self.flow.may_be_skipped[before] || insn.is_jump() {
+                return None;
+            }
+            if effect.changes() & (bit(d) | effect::FLAGS) == 0 {
+                continue;
+            }
+            let alike = match insn.op.as_str() {
+                "and" | "andi" | "or" | "ori" | "eor" => {
+                    effect::Z | effect::N | effect::V | effect::S
+                }
+                "add" | "adc" | "sub" | "subi" | "neg" | "inc" | "dec" | "lsl" | "rol" | "lsr"
+                | "asr" | "ror" | "com" => effect::Z | effect::N,
+                _ => return None,
+            };
+            let is_result = register(operands(insn).0) == Some(d);
+            return (is_result && needed & !alike == 0).then(|| self.gone())?;
+        }
+        None
+    }
+
+    /// The register that is compared with 0 here.
+    fn tested(&self) -> Option<u8> {
+        let (first, second) = operands(self.insn);
+        let is_test = match self.insn.op.as_str() {
+            "cpi" => second == "0",
+            "cp" => second == "r1" && self.known().value(1) == Some(0),
+            "tst" => true,
+            "and" => first == second,
+            _ => false,
+        };
+        is_test.then(|| register(first))?
+    }
+
+    /// Makes 0 or 1 of a condition, and branches on that.
+    ///
+    /// ```text
+    ///   ldi  r24, 1
+    ///   brlt .L1
+    ///   mov  r24, r1     becomes  brge .L2
+    /// .L1:
+    ///   andi r24, 1
+    ///   breq .L2
+    /// ```
+    fn truth(&self) -> Option<Edit> {
+        effect::branch(&self.insn.op)?;
+        let set = self.insn_at(self.at + 1)?;
+        let (first, second) = operands(set);
+        let x = register(first)?;
+        let if_not = match set.op.as_str() {
+            "mov" => self.known[self.at + 1].value(register(second)?)?,
+            "ldi" => immediate(second)?,
+            _ => return None,
+        };
+        let if_so = self.known().value(x)?;
+        let mut edit = vec![(self.at, None), (self.at + 1, None)];
+        let mut at = self.at + 2;
+        let mut seen = false;
+        while let Line::Label(label) = self.flow.lines.get(at)? {
+            seen |= *label == self.insn.args;
+            if (self.calls)(label) != usize::from(*label == self.insn.args) {
+                return None;
+            }
+            edit.push((at, None));
+            at += 1;
+        }
+        let mut mask = u8::MAX;
+        let mut tests = false;
+        loop {
+            let insn = self.insn_at(at)?;
+            let effect = &self.flow.effects[at];
+            let (first, second) = operands(insn);
+            match insn.op.as_str() {
+                "andi" if register(first) == Some(x) => {
+                    mask &= immediate(second)?;
+                    tests = true;
+                    edit.push((at, None));
+                }
+                "cpi" if register(first) == Some(x) && second == "0" => {
+                    tests = true;
+                    edit.push((at, None));
+                }
+                "tst" if register(first) == Some(x) => {
+                    tests = true;
+                    edit.push((at, None));
+                }
+                "breq" | "brne" => break,
+                _ if insn.is_jump()
+                    || (effect.reads | effect.changes()) & (bit(x) | effect::FLAGS) != 0 =>
+                {
+                    return None;
+                }
+                _ => {}
+            }
+            at += 1;
+        }
+        let branch = self.insn_at(at)?;
+        let (if_so, if_not) = (if_so & mask != 0, if_not & mask != 0);
+        let is_free = self.needed[at] & (bit(x) | effect::FLAGS) == 0;
+        if !seen || !tests || !is_free || if_so == if_not {
+            return None;
+        }
+        let on_so = (branch.op == "brne") == if_so;
+        let op = if on_so {
+            self.insn.op.as_str()
+        } else {
+            super::super::branch::inverse(&self.insn.op)?
+        };
+        edit.push((at, Some(Insn { op: op.into(), args: branch.args.clone() })));
+        Some(edit)
+    }
+
+    /// Reads a copy where the original is.
+    fn copies(&self) -> Option<Edit> {
+        let (first, second) = operands(self.insn);
+        let original = |operand: &str| register(operand).and_then(|copy| self.local.original(copy));
+        let op = self.insn.op.as_str();
+        let mut insn = self.insn.clone();
+        if op == "movw" {
+            let s = register(second)?;
+            let (low, high) = (self.local.original(s)?, self.local.original(s + 1)?);
+            if low % 2 == 0 && high == low + 1 {
+                insn.args = format!("{first}, r{low}");
+                return self.becomes(insn);
+            }
+            return None;
+        }
+        let mut args = (first.to_owned(), second.to_owned());
+        if let Some(s) = original(second).filter(|_| reads_second(op)) {
+            args.1 = format!("r{s}");
+        }
+        if let Some(d) = original(first).filter(|_| matches!(op, "cp" | "cpc" | "push" | "tst")) {
+            args.0 = format!("r{d}");
+        }
+        if args.0 == args.1 && first != second {
+            return None;
+        }
+        insn.args = if second.is_empty() { args.0 } else { format!("{}, {}", args.0, args.1) };
+        self.becomes(insn)
+    }
+
+    /// Reads a 0 that register 1 is, too.
+    fn zero(&self) -> Option<Edit> {
+        let (first, second) = operands(self.insn);
+        let op = self.insn.op.as_str();
+        if self.known().value(1) != Some(0) {
+            return None;
+        }
+        let is_zero = |operand: &str| {
+            register(operand).is_some_and(|r| r != 1 && self.known().value(r) == Some(0))
+        };
+        let mut args = (first, second);
+        if is_zero(second) && reads_second(op) {
+            args.1 = "r1";
+        }
+        if is_zero(first) && matches!(op, "cp" | "cpc") && args.1 != "r1" {
+            args.0 = "r1";
+        }
+        if first == second || args == (first, second) {
+            return None;
+        }
+        self.becomes(Insn { op: op.into(), args: format!("{}, {}", args.0, args.1) })
+    }
+
+    /// Copies a pair byte by byte.
+    fn pairs(&self) -> Option<Edit> {
+        let other = self.insn_at(self.at + 1)?;
+        let copied = |insn: &Insn| {
+            let (first, second) = operands(insn);
+            (insn.op == "mov").then_some((register(first)?, register(second)?))
+        };
+        let (a, b) = (copied(self.insn)?, copied(other)?);
+        let (low, high) = if a.0 < b.0 { (a, b) } else { (b, a) };
+        let is_pair = low.0 % 2 == 0 && low.1 % 2 == 0 && high == (low.0 + 1, low.1 + 1);
+        let is_free = !self.flow.may_be_skipped[self.at] && !self.flow.may_be_skipped[self.at + 1];
+        let whole = Insn::new(&format!("movw r{}, r{}", low.0, low.1));
+        (is_pair && is_free).then(|| vec![(self.at, Some(whole)), (self.at + 1, None)])
+    }
+
+    /// Loads from the frame what a register holds.
+    fn reload(&self) -> Option<Edit> {
+        let (first, second) = operands(self.insn);
+        let d = register(first)?;
+        let held = self.local.held(self.insn.op == "ldd", second)?;
+        if held == d {
+            return self.gone();
+        }
+        self.becomes(Insn::new(&format!("mov r{d}, r{held}")))
+    }
+
+    /// Computes in one register what is wanted in another.
+    fn origin(&self) -> Option<Edit> {
+        let (first, second) = operands(self.insn);
+        let (d, s) = (register(first)?, register(second)?);
+        let (to, from) = match self.insn.op.as_str() {
+            "mov" => (bit(d), bit(s)),
+            "movw" => (pair(d), pair(s)),
+            _ => return None,
+        };
+        if self.needed[self.at] & from != 0 || to & from != 0 {
+            return None;
+        }
+        let mut edit = vec![(self.at, None)];
+        let mut open = from;
+        for at in (0..self.at).rev() {
+            let insn = self.insn_at(at)?;
+            let effect = &self.flow.effects[at];
+            let touched = effect.reads | effect.changes();
+            let odd = self.flow.may_be_skipped[at]
+                || insn.is_jump()
+                || insn.op == "call"
+                || effect.spoils != 0;
+            if odd || touched & to != 0 || touched & (from & !open) != 0 {
+                return None;
+            }
+            if touched & from == 0 {
+                continue;
+            }
+            edit.push((at, Some(renamed(insn, from, d, s)?)));
+            if effect.reads & from == 0 {
+                open &= !effect.writes;
+            }
+            if open == 0 {
+                return Some(edit);
+            }
+        }
+        None
+    }
+
+    /// Jumps to a jump.
+    fn thread(&self) -> Option<Edit> {
+        if self.insn.op != "rjmp" {
+            return None;
+        }
+        let mut at = *self.flow.labels.get(self.insn.args.as_str())?;
+        while let Line::Label(_) = self.flow.lines.get(at)? {
+            at += 1;
+        }
+        let insn = self.insn_at(at)?;
+        let goes_on = insn.op == "rjmp" && insn.args != self.insn.args;
+        (at != self.at && (goes_on || insn.op == "ret")).then(|| self.becomes(insn.clone()))?
+    }
+}
+
+/// Whether an instruction only reads its second operand, and any register does.
+fn reads_second(op: &str) -> bool {
+    matches!(
+        op,
+        "mov"
+            | "add"
+            | "adc"
+            | "sub"
+            | "sbc"
+            | "cp"
+            | "cpc"
+            | "and"
+            | "or"
+            | "eor"
+            | "st"
+            | "std"
+            | "sts"
+            | "out"
+            | "mul"
+    )
+}
+
+/// An instruction with other registers, if it may have them.
+fn renamed(insn: &Insn, from: Set, to: u8, was: u8) -> Option<Insn> {
+    let (first, second) = operands(insn);
+    let other = |operand: &str| match register(operand) {
+        Some(r) if bit(r) & from != 0 => Some(to + (r - was)),
+        _ => None,
+    };
+    let (d, s) = (other(first), other(second));
+    let op = insn.op.as_str();
+    let upper = matches!(op, "ldi" | "cpi" | "subi" | "sbci" | "andi" | "ori");
+    let allowed = match op {
+        _ if upper => d.is_some_and(|d| d >= 16),
+        "adiw" | "sbiw" => d.is_some_and(|d| d >= 24 && d % 2 == 0),
+        "movw" => d.is_none_or(|d| d % 2 == 0) && s.is_none_or(|s| s % 2 == 0),
+        "muls" => d.is_none_or(|d| d >= 16) && s.is_none_or(|s| s >= 16),
+        "mov" | "add" | "adc" | "sub" | "sbc" | "cp" | "cpc" | "and" | "or" | "eor" | "com"
+        | "neg" | "inc" | "dec" | "lsl" | "rol" | "lsr" | "asr" | "ror" | "swap" | "tst"
+        | "clr" | "mul" | "lds" | "in" => true,
+        // A pointer stays what it is.
+        "ld" | "ldd" => d.is_some() && pointer(second) & from == 0,
+        "st" | "std" => s.is_some() && pointer(first) & from == 0,
+        "sts" | "out" => true,
+        _ => false,
+    };
+    // A pair is renamed whole.
+    let halves = matches!(op, "adiw" | "sbiw" | "movw") && from.count_ones() == 1;
+    if !allowed || halves || (d.is_none() && s.is_none()) {
+        return None;
+    }
+    let name = |new: Option<u8>, old: &str| new.map_or_else(|| old.to_owned(), |r| format!("r{r}"));
+    let args = if second.is_empty() {
+        name(d, first)
+    } else {
+        format!("{}, {}", name(d, first), name(s, second))
+    };
+    Some(Insn { op: op.into(), args })
+}
+
+fn pointer(operand: &str) -> Set {
+    effect::place(operand).map_or(0, |(base, _)| pair(base))
+}
