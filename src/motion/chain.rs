@@ -171,8 +171,8 @@ impl Chain {
         self.blend = 0;
     }
 
-    /// Where it ends.
-    #[inline(never)]
+    /// Where it ends, if it begins at `from`.
+    #[inline(always)]
     pub fn end(&self, from: &PerAxis<Length>) -> PerAxis<Length> {
         let mut end = *from;
         for (end, way) in end.iter_mut().zip(&self.way) {

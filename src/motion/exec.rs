@@ -80,7 +80,7 @@ struct Running {
     active: bool,
     /// It takes long enough for fine ticks.
     long: bool,
-    /// It takes so long only that another one follows soon.
+    /// Without a jerk limit: another one follows soon.
     short: bool,
     /// Way to go, mm.
     left: f32,
@@ -200,6 +200,12 @@ impl Exec {
     pub fn set_coarse(&mut self, coarse: bool, hurry: bool) {
         (self.coarse, self.hurry) = (coarse || hurry, hurry);
         self.governor.set_hurry(hurry);
+    }
+
+    /// Whether the block that runs has a jerk limit.
+    #[inline(always)]
+    pub fn has_jerk(&self) -> bool {
+        self.running.jerk
     }
 
     /// Begins a feedhold, or ends one. Cost: 15 if nothing changes.
@@ -359,7 +365,7 @@ impl Exec {
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
         let length = line.extent.length();
         let long = below(scaled(line.cruise, FINE_LOG2), length);
-        let short = below(length, scaled(line.cruise, SHORT_LOG2));
+        let short = line.jerk == Short::ZERO && below(length, scaled(line.cruise, SHORT_LOG2));
         self.prep.begin(line, &mut out.steps, &mut out.target);
         out.length = length;
         out.running = true;
@@ -422,7 +428,8 @@ impl Exec {
         let left = whole(running.left * running.scale);
         // Fine ticks leave no time to lay out a ramp under a jerk limit.
         let steady = !running.jerk || self.governor.is_far_from_ramps();
-        self.prep.refine(running.long && steady, running.short && self.coarse);
+        let short = if running.jerk { !running.long } else { running.short };
+        self.prep.refine(running.long && steady, short && self.coarse);
         step(self.prep.segment(left, cycles, segment))
     }
 

@@ -235,8 +235,7 @@ impl Governor {
         if self.has_rest() {
             return self.cut(left);
         }
-        // Shorter segments are more even for motors that do not lead, and a feedhold begins behind those that wait.
-        self.nominal = if self.hurry { seconds } else { SEGMENT_S };
+        self.nominal = seconds;
         self.spares = !same(seconds, SEGMENT_S);
         self.trapezoid(left, cruise, ahead.headroom())
     }

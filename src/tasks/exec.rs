@@ -212,6 +212,7 @@ impl<'a> Runner<'a> {
         let Self { waiting, segments, rests, .. } = self;
         health::moves(waiting.count);
         waiting.update(segments.used());
+        waiting.fewest = if self.machine.has_jerk() || waiting.length(1) < LONG { 2 } else { 1 };
         let short = waiting.is_short(*rests);
         let passed_over = event::pass_over();
         self.machine.set_coarse(passed_over > PATIENCE || waiting.is_busy(), short);
@@ -233,6 +234,8 @@ struct Waiting {
     lengths: [u8; SEGMENTS],
     /// Segments queued, modulo 256.
     count: u8,
+    /// How many wait at least.
+    fewest: u8,
     /// How many wait, as far as that is known, and how long they take together.
     used: u8,
     sum: u16,
@@ -276,13 +279,16 @@ const PRESSED_FOR: u8 = 100;
 /// With less than this exec is late, and makes longer stretches.
 const WAITING_SHORT: u16 = units(25);
 
+/// A segment that takes so long may wait alone, except under a jerk limit, where a ramp takes long to lay out.
+const LONG: u16 = units(30);
+
 /// What waits at least when thread mode gets a turn while motion has just begun: exec takes that long for a
 /// segment at worst.
 const FIRST_LEAST: u16 = units(15);
 
 impl Waiting {
     const fn new() -> Self {
-        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0, pressed: 0, moved: 0, busy: 0 }
+        Self { lengths: [0; SEGMENTS], count: 0, fewest: 2, used: 0, sum: 0, pressed: 0, moved: 0, busy: 0 }
     }
 
     /// The length of the segment that was queued so many before the next one.
@@ -351,13 +357,13 @@ impl Waiting {
     fn is_enough(&self, passed_over: u8) -> bool {
         let has_just_begun = usize::from(self.moved) <= SEGMENTS && passed_over >= FIRST_TURN;
         let least = if has_just_begun { FIRST_LEAST } else { self.limits().least };
-        self.used >= 2 && (self.sum >= least || self.gives_way())
+        self.used >= self.fewest && (self.sum >= least || self.gives_way())
     }
 
     /// Whether another one like the last may wait: what is queued cannot be slowed down any more, nor kept from beginning.
     #[inline(never)]
     fn has_room(&self) -> bool {
-        if self.used < 2 {
+        if self.used < self.fewest {
             return true;
         }
         let sum = self.sum + self.length(1);

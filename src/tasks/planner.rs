@@ -57,6 +57,8 @@ struct Planner {
     begun: Begun,
     /// Since when a chain waits, ms.
     waits_since: u16,
+    /// Chains in a row that nothing went on with.
+    alone: u8,
     /// What is told before anything else of the line.
     news: News,
 }
@@ -114,6 +116,7 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
         walk: None,
         begun: Begun::Nothing,
         waits_since: 0,
+        alone: 0,
         news: News::None,
     };
     async move {
@@ -179,6 +182,7 @@ impl Planner {
         }
         if let Begun::Chain(chain) = &mut self.begun {
             if chain.go_on(&self.position, target, feed, commands.blend) {
+                self.alone = 0;
                 self.wait_for_more(commands.line);
                 return true;
             }
@@ -188,7 +192,7 @@ impl Planner {
         }
         let free = self.queue.free();
         let may_merge = !commands.exact_stop && free < CAPACITY - 1;
-        if may_merge && self.begin_chain(target, feed, &commands) {
+        if may_merge && self.is_worth_a_chain() && self.begin_chain(target, feed, &commands) {
             return true;
         }
         if free == 0 {

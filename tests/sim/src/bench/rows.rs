@@ -131,7 +131,7 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: ["3.18", "-", "7.97"],
         target: Some(1.6),
-        floor: Some(1.70),
+        floor: Some(1.69),
         measure: spirals::tenth,
     },
     Row {
@@ -164,7 +164,7 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: NONE,
         target: Some(1.2),
-        floor: Some(1.50),
+        floor: Some(1.30),
         measure: spirals::tenth_fast,
     },
     Row {
@@ -197,7 +197,7 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: NONE,
         target: Some(1.5),
-        floor: Some(1.52),
+        floor: Some(1.50),
         measure: spirals::tenth_terse,
     },
     Row {
@@ -208,7 +208,7 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: NONE,
         target: Some(1.3),
-        floor: None,
+        floor: Some(1.45),
         measure: spirals::tenth_smooth,
     },
     Row {
@@ -220,7 +220,7 @@ pub const ROWS: [Row; 42] = [
         peers: NONE,
         target: Some(1.25),
         // The CPU has no time left.
-        floor: Some(1.25),
+        floor: Some(1.15),
         measure: spirals::tenth_jerk,
     },
     Row {
@@ -254,7 +254,7 @@ pub const ROWS: [Row; 42] = [
         better: Higher,
         peers: ["291 at 115,200", "-", "115 at 115,200"],
         target: Some(1_000.0),
-        floor: Some(870.0),
+        floor: Some(1_080.0),
         measure: costs::lines,
     },
     Row {
@@ -265,7 +265,7 @@ pub const ROWS: [Row; 42] = [
         better: Higher,
         peers: NONE,
         target: Some(800.0),
-        floor: Some(1_000.0),
+        floor: Some(1_060.0),
         measure: costs::lines_jerk,
     },
     Row {
@@ -276,7 +276,7 @@ pub const ROWS: [Row; 42] = [
         better: Higher,
         peers: NONE,
         target: Some(700.0),
-        floor: Some(420.0),
+        floor: Some(470.0),
         measure: spirals::curve_lines,
     },
     Row {
@@ -287,7 +287,7 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: NONE,
         target: Some(16_000.0),
-        floor: Some(26_000.0),
+        floor: Some(22_500.0),
         measure: spirals::cycles_per_line,
     },
     Row {
@@ -332,8 +332,8 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: NONE,
         target: Some(24_000.0),
-        // A scan that tries three velocities, and a ramp that is laid out.
-        floor: Some(24_000.0),
+        // A scan that tries three velocities, and a ramp that is laid out. 24,326 where two moves of 0.33 mm have become one block.
+        floor: Some(24_600.0),
         measure: costs::segment_jerk_worst,
     },
     Row {
@@ -454,7 +454,7 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: NONE,
         target: Some(10.0),
-        // Three segments that wait, the one that runs, and exec's own time.
+        // Three segments that wait, the one that runs, and what exec is at.
         floor: Some(10.0),
         measure: limits::hold_begins,
     },
