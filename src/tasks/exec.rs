@@ -2,7 +2,7 @@
 //!
 //! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
 //! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
-//! milliseconds ([`Amount::least`]), 4,000 to 12,000 cycles each, 24,000 at worst; the rest one by one, when one is used up or thread mode
+//! milliseconds ([`Amount::least`]), 4,000 to 12,000 cycles each, 24,500 at worst; the rest one by one, when one is used up or thread mode
 //! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`WAITING_SHORT`]), stretches become twice
 //! as long, and for a while more waits ([`PRESSED`]).
 
@@ -288,7 +288,16 @@ const FIRST_LEAST: u16 = units(15);
 
 impl Waiting {
     const fn new() -> Self {
-        Self { lengths: [0; SEGMENTS], count: 0, fewest: 2, used: 0, sum: 0, pressed: 0, moved: 0, busy: 0 }
+        Self {
+            lengths: [0; SEGMENTS],
+            count: 0,
+            fewest: 2,
+            used: 0,
+            sum: 0,
+            pressed: 0,
+            moved: 0,
+            busy: 0,
+        }
     }
 
     /// The length of the segment that was queued so many before the next one.

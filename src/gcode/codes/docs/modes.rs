@@ -47,8 +47,8 @@ force at power-up and after M2, unless `gun` says otherwise.",
             640,
             "Continuous path",
             "The path is followed without a stop where none is needed. Short feed moves of linear axes that lie on a line, to within P, are \
-made one: up to 12 ms of them, or 3.2 mm. P is 0.001 mm if it is not given, and 0.0254 mm at most; with 0 they lie on the line exactly. In \
-force at power-up and after M2, unless `gpa` says otherwise.",
+made one: up to 12 ms of them, or 3.2 mm. P is 0.001 mm if it is not given, and 0.0254 mm at most; with 0 they lie on the line exactly. On \
+a curve on which none can be made one with the next, only every eighth is looked at. In force at power-up and after M2, unless `gpa` says otherwise.",
             &[no(PWordNegative, &["G64 P-0.001"])],
         ),
         g(
