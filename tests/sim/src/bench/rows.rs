@@ -332,8 +332,8 @@ pub const ROWS: [Row; 42] = [
         better: Lower,
         peers: NONE,
         target: Some(24_000.0),
-        // A scan that tries three velocities, and a ramp that is laid out. 24,326 where two moves of 0.33 mm have become one block.
-        floor: Some(24_600.0),
+        // A scan that tries three velocities, and a ramp that is laid out.
+        floor: Some(24_000.0),
         measure: costs::segment_jerk_worst,
     },
     Row {
