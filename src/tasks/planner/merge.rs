@@ -45,7 +45,7 @@ impl Planner {
     #[inline(always)]
     pub(super) fn is_worth_a_chain(&mut self) -> bool {
         self.alone = self.alone.wrapping_add(1);
-        self.alone <= ALONE || self.alone % ALONE == 0
+        self.alone <= ALONE || self.alone.is_multiple_of(ALONE)
     }
 
     /// Begins a chain with a line, if it may be merged with those that follow.
