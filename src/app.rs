@@ -50,6 +50,7 @@ impl Links {
             commands: RefCell::new(Commands::default()),
             commands_taken: Cell::new(false),
             planner_wake: Wake::default(),
+            chain_waits: Cell::new(false),
             cycle_start: Wake::default(),
             notices: Notices::default(),
             reporter_wake: News::default(),

@@ -31,6 +31,9 @@ pub struct Commands {
     pub motion: Motion,
     /// G61.1 is in force: moves end at rest. By itself it is nothing to carry out.
     pub exact_stop: bool,
+    /// G64, of a straight move: short ones within this tolerance of a line may be made one, in units of [`Length`] and one more. 0 under
+    /// G61 and G61.1: none are.
+    pub blend: u8,
     /// M0, M1, M2, M30, M60.
     pub stop: Stop,
 }
@@ -59,6 +62,7 @@ impl Commands {
             dwell_ms,
             motion: _,
             exact_stop: _,
+            blend: _,
             stop,
         } = self;
         tool.is_none()
@@ -79,6 +83,7 @@ impl Commands {
         self.dwell_ms = None;
         self.motion = Motion::None;
         self.exact_stop = false;
+        self.blend = 0;
         self.stop = Stop::None;
     }
 }

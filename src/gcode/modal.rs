@@ -142,8 +142,7 @@ pub enum Units {
     Mm = 1,
 }
 
-/// Group 13: how closely the path is followed. Kerf's planner never leaves the path, so that the first
-/// and the last are the same.
+/// Group 13: how closely the path is followed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum PathMode {
@@ -151,9 +150,14 @@ pub enum PathMode {
     Exact = 0,
     /// G61.1: a stop at the end of each move.
     ExactStop = 1,
-    /// G64.
+    /// G64: short moves that lie on a line may be made one (`motion::chain`).
     Continuous = 2,
 }
+
+/// How far from the path G64 may take short moves if it does not say: 1 um, in units of [`Length`](crate::units::Length).
+pub const TOLERANCE: u8 = 10;
+/// The most that it can say.
+pub const TOLERANCE_MAX: u8 = 254;
 
 /// Group 7 of the M codes: how the spindle turns.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -211,6 +215,8 @@ pub struct Modal {
     pub system: u8,
     /// Group 13.
     pub path: PathMode,
+    /// G64 P: how far from the path short moves may be taken, in units of [`Length`](crate::units::Length).
+    pub tolerance: u8,
     /// Group 7 of the M codes.
     pub spindle: Turn,
     /// The coolants that run, bits of [`Coolant`].
@@ -244,6 +250,12 @@ impl Defaults {
 }
 
 impl Modal {
+    /// See [`Commands::blend`](super::command::Commands::blend).
+    #[inline(always)]
+    pub fn blend(&self) -> u8 {
+        if self.path == PathMode::Continuous { self.tolerance + 1 } else { 0 }
+    }
+
     /// At power-up: the defaults, and G80 G91.1 G94 G98 M5 M9.
     pub const fn new(defaults: &Defaults) -> Self {
         let Defaults { plane, units, system, path, distance } = *defaults;
@@ -257,6 +269,7 @@ impl Modal {
             retract: Retract::Initial,
             system,
             path,
+            tolerance: TOLERANCE,
             spindle: Turn::Off,
             coolant: 0,
         }

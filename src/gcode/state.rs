@@ -7,7 +7,9 @@ use super::block::Block;
 use super::codes::{NonModal, OverrideCode, StopCode, Switch};
 use super::command::{Commands, N_MAX, Spindle, Stop};
 use super::limits;
-use super::modal::{Coolant, Defaults, FeedMode, Modal, MotionMode, PathMode, Turn, Units};
+use super::modal::{
+    Coolant, Defaults, FeedMode, Modal, MotionMode, PathMode, TOLERANCE, TOLERANCE_MAX, Turn, Units,
+};
 use super::overrides::{Change, Override};
 use super::setup::Setup;
 use super::sticky::Sticky;
@@ -121,6 +123,9 @@ impl State {
         self.line = line;
         out.line = line;
         self.modes(block);
+        if block.path == Some(PathMode::Continuous) {
+            self.modal.tolerance = tolerance(block, self.modal.units)?;
+        }
         self.feed(block)
     }
 
@@ -262,6 +267,8 @@ impl State {
             limits::check(start, &out.motion, self.homed, setup)?;
         }
         out.exact_stop = self.modal.path == PathMode::ExactStop;
+        // A line without a move asks for nothing.
+        out.blend = if out.is_straight() { self.modal.blend() } else { 0 };
         Ok(())
     }
 
@@ -321,6 +328,19 @@ fn override_one(block: &Block, which: Override, how: Switch) -> Result<Change, S
     let factor = word.milliseconds().map_err(|_| Status::PWordInvalid)?;
     let factor = which.checked(factor).ok_or(Status::PWordInvalid)?;
     Ok(Change::to(which, factor))
+}
+
+/// G64 P, in units of [`Length`]; the most there is if that is more.
+#[inline(never)]
+#[small]
+fn tolerance(block: &Block, units: Units) -> Result<u8, Status> {
+    let Some(word) = block.get(P) else { return Ok(TOLERANCE) };
+    let exact = if units == Units::Inch { word.inch() } else { word.mm() };
+    let far = exact.map_err(|_| Status::PWordInvalid)?.units.0;
+    if far < 0 {
+        return Err(Status::PWordNegative);
+    }
+    Ok(u8::try_from(far).map_or(TOLERANCE_MAX, |far| far.min(TOLERANCE_MAX)))
 }
 
 fn set<T>(mode: &mut T, new: Option<T>) {

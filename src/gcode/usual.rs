@@ -94,6 +94,7 @@ impl State {
         out.clear();
         out.line = words.line;
         out.exact_stop = self.modal.path == PathMode::ExactStop;
+        out.blend = self.modal.blend();
         match mode {
             MotionMode::Traverse => out.motion = Motion::Traverse { target: self.position },
             _ => straight(&self.position, feed, out),

@@ -39,6 +39,9 @@ const CYCLES_PER_MS: u16 = (crate::boards::ACTIVE.clock_hz / 1000) as u16;
 /// Nominal time of a segment: as short as leaves two thirds of the CPU to others.
 pub const SEGMENT_S: f32 = 0.002;
 
+/// Blocks that take less than 1/32 s are short: that power of two.
+const SHORT_LOG2: i8 = -5;
+
 /// CPU cycles in [`SEGMENT_S`].
 const SEGMENT_CYCLES: u32 = (crate::boards::ACTIVE.clock_hz as f32 * SEGMENT_S) as u32;
 
@@ -77,6 +80,8 @@ struct Running {
     active: bool,
     /// It takes long enough for fine ticks.
     long: bool,
+    /// Without a jerk limit: another one follows soon.
+    short: bool,
     /// Way to go, mm.
     left: f32,
     /// Velocity limit, mm/s.
@@ -102,8 +107,10 @@ pub struct Exec {
     running: Running,
     /// A feedhold is on.
     hold: bool,
-    /// Stretches are twice as long.
+    /// Stretches are twice as long, but in long lines without a jerk limit.
     coarse: bool,
+    /// There too.
+    hurry: bool,
     dwell_ms: u32,
     governor: Governor,
     prep: Prep,
@@ -133,6 +140,7 @@ impl Exec {
         let running = Running {
             active: false,
             long: false,
+            short: false,
             left: 0.0,
             cruise: 0.0,
             scale: 0.0,
@@ -148,6 +156,7 @@ impl Exec {
             running,
             hold: false,
             coarse: false,
+            hurry: false,
             dwell_ms: 0,
         }
     }
@@ -189,8 +198,14 @@ impl Exec {
     /// long too, and the governor looks at nothing that may wait.
     #[inline(always)]
     pub fn set_coarse(&mut self, coarse: bool, hurry: bool) {
-        self.coarse = coarse || hurry;
+        (self.coarse, self.hurry) = (coarse || hurry, hurry);
         self.governor.set_hurry(hurry);
+    }
+
+    /// Whether the block that runs has a jerk limit.
+    #[inline(always)]
+    pub fn has_jerk(&self) -> bool {
+        self.running.jerk
     }
 
     /// Begins a feedhold, or ends one. Cost: 15 if nothing changes.
@@ -350,6 +365,7 @@ impl Exec {
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
         let length = line.extent.length();
         let long = below(scaled(line.cruise, FINE_LOG2), length);
+        let short = line.jerk == Short::ZERO && below(length, scaled(line.cruise, SHORT_LOG2));
         self.prep.begin(line, &mut out.steps, &mut out.target);
         out.length = length;
         out.running = true;
@@ -358,7 +374,7 @@ impl Exec {
         // Field by field: in place. The others are set before they are read.
         let running = &mut self.running;
         running.active = true;
-        running.long = long;
+        (running.long, running.short) = (long, short);
         running.left = length;
         running.version = version;
         running.fresh = true;
@@ -391,7 +407,8 @@ impl Exec {
         let stretch = if self.hold {
             self.governor.halt(running.left, &ahead, SEGMENT_S)
         } else {
-            let seconds = if self.coarse { 2.0 * SEGMENT_S } else { SEGMENT_S };
+            let coarse = self.coarse && (running.jerk || running.short) || self.hurry;
+            let seconds = if coarse { 2.0 * SEGMENT_S } else { SEGMENT_S };
             self.governor.stretch(running.left, running.cruise, &ahead, seconds)
         };
         out.velocity = self.governor.velocity();
@@ -411,7 +428,8 @@ impl Exec {
         let left = whole(running.left * running.scale);
         // Fine ticks leave no time to lay out a ramp under a jerk limit.
         let steady = !running.jerk || self.governor.is_far_from_ramps();
-        self.prep.refine(running.long && steady);
+        let short = if running.jerk { !running.long } else { running.short };
+        self.prep.refine(running.long && steady, short && self.coarse);
         step(self.prep.segment(left, cycles, segment))
     }
 

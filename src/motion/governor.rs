@@ -107,6 +107,8 @@ pub struct Governor {
     pub(super) far: bool,
     /// How long a stretch without a jerk limit is to be, s.
     pub(super) nominal: f32,
+    /// Without a jerk limit: a velocity that would soon be lost again is not gained.
+    pub(super) spares: bool,
     /// No time for looks ahead.
     pub(super) hurry: bool,
     /// Slices until it is worth another try to go faster.
@@ -138,6 +140,7 @@ impl Governor {
             scanned: false,
             far: false,
             nominal: 0.0,
+            spares: false,
             hurry: false,
             wait: 0,
             calm: 0,
@@ -232,8 +235,8 @@ impl Governor {
         if self.has_rest() {
             return self.cut(left);
         }
-        // Shorter segments are more even for motors that do not lead.
-        self.nominal = if self.hurry { seconds } else { SEGMENT_S };
+        self.nominal = seconds;
+        self.spares = !same(seconds, SEGMENT_S);
         self.trapezoid(left, cruise, ahead.headroom())
     }
 }

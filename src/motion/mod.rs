@@ -7,6 +7,7 @@
 //! ```
 
 pub mod block;
+pub mod chain;
 mod constraint;
 pub mod contact;
 pub mod curve;

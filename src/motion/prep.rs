@@ -112,6 +112,8 @@ pub struct Prep {
     backwards: u8,
     /// Ticks are to be as fine as can be.
     fine: bool,
+    /// As few as in a block of one segment.
+    coarse: bool,
     /// A motor has turned round, and no segment tells of it yet.
     turned: bool,
     /// How long directions must stand before the first step, CPU cycles.
@@ -152,6 +154,7 @@ impl Prep {
             others: 0,
             backwards: 0,
             fine: false,
+            coarse: false,
             turned: false,
             paces: paces(Drivers::USUAL),
             setup: Drivers::USUAL.setup(),
@@ -182,10 +185,10 @@ impl Prep {
         true
     }
 
-    /// Whether ticks are to be as fine as can be, from now on.
+    /// Whether ticks are to be as fine as can be, from now on, or as coarse.
     #[inline(always)]
-    pub fn refine(&mut self, fine: bool) {
-        self.fine = fine;
+    pub fn refine(&mut self, fine: bool, coarse: bool) {
+        (self.fine, self.coarse) = (fine, coarse);
     }
 
     /// Starts a block. The steps to the whole ones next to its end are put into `steps` and added to `target`.
@@ -536,7 +539,7 @@ impl Prep {
                 return fine;
             }
         }
-        self.limit(cycles, self.paces().coarse)
+        self.limit(cycles, if self.coarse { COARSEST } else { self.paces().coarse })
     }
 
     /// Most ticks for a stretch.

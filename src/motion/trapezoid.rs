@@ -5,13 +5,16 @@
 //! brakes.
 
 use super::exec::SEGMENT_S;
-use super::float::{OCTAVE, below, greater, least, lesser, log, scaled};
+use super::float::{OCTAVE, below, greater, least, lesser, log, ratio, scaled, some};
 use super::governor::{Governor, Stretch, same};
 use super::slice::longest;
 use crate::math::sqrt;
 
 /// Logarithms that are further apart leave no doubt about the product of two numbers.
 const PLAIN: i32 = OCTAVE / 5;
+
+/// The square of a velocity is not worth a gain of less than a third: as a logarithm.
+const SCARCE: i32 = 3 * (OCTAVE / 8);
 
 impl Governor {
     /// The next stretch, of about `nominal` seconds.
@@ -20,10 +23,13 @@ impl Governor {
         let (v, seconds) = (self.velocity, self.nominal);
         // Rounding may put a stop before the end of the block.
         let headroom = if headroom.is_sign_negative() { 0.0 } else { headroom };
-        // Steady over a block that is short enough to be one stretch.
         let longest = longest(seconds);
-        if same(v, cruise) && below(cruise * cruise, headroom) && below(left, cruise * longest) {
-            return Stretch { seconds: left / v, distance: left, ends: true };
+        if self.stays(cruise, headroom) {
+            let distance = v * seconds;
+            if below(left, v * longest) {
+                return Stretch { seconds: ratio(left, v), distance: left, ends: true };
+            }
+            return Stretch { seconds, distance, ends: false };
         }
         // Mostly plain: a block that is run through in no more than one.
         if log(v) + log(longest) < log(left) + PLAIN && below(v * longest, left) {
@@ -47,6 +53,18 @@ impl Governor {
             }
         }
         self.finish(left, cruise, headroom)
+    }
+
+    /// Whether the velocity is kept: it is the limit, or, where stretches are longer for want of time, so near to what has to be reached
+    /// at the end of the block that a gain would soon be lost again.
+    #[inline(always)]
+    fn stays(&self, cruise: f32, headroom: f32) -> bool {
+        let v = self.velocity;
+        let square = v * v;
+        if below(headroom, square) || !some(v) {
+            return false;
+        }
+        same(v, cruise) || self.spares && below(v, cruise) && log(headroom) < log(square) + SCARCE
     }
 
     /// `next`, or the least velocity that it can have at the end, from `v` and with so much to lose, if that

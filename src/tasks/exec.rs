@@ -212,9 +212,11 @@ impl<'a> Runner<'a> {
         let Self { waiting, segments, rests, .. } = self;
         health::moves(waiting.count);
         waiting.update(segments.used());
+        waiting.fewest = if self.machine.has_jerk() { 2 } else { 1 };
         let short = waiting.is_short(*rests);
         let passed_over = event::pass_over();
-        self.machine.set_coarse(passed_over > PATIENCE || waiting.is_busy(), short);
+        waiting.coarse = passed_over > PATIENCE || waiting.is_busy();
+        self.machine.set_coarse(waiting.coarse, short);
         if !rested {
             health::look_for_starvation();
         }
@@ -233,6 +235,10 @@ struct Waiting {
     lengths: [u8; SEGMENTS],
     /// Segments queued, modulo 256.
     count: u8,
+    /// How many wait at least.
+    fewest: u8,
+    /// Stretches are twice as long.
+    coarse: bool,
     /// How many wait, as far as that is known, and how long they take together.
     used: u8,
     sum: u16,
@@ -255,20 +261,20 @@ const fn units(tenths: u32) -> u16 {
     ((ACTIVE.clock_hz / 10_000 * tenths) >> UNIT_LOG2) as u16
 }
 
-/// How much waits, in the unit.
+/// How much is handed out, in the unit.
 struct Amount {
-    /// What may wait.
+    /// What may wait, with the segment that runs.
     most: u16,
     /// What is prepared before thread mode gets a turn.
     least: u16,
 }
 
-/// With the segment that runs, which takes 2 ms or less while anything is fast, a feedhold begins within 10 ms. Less would not outlast a
-/// ramp that is laid out while ticks take two thirds of the CPU, which takes up to 4.1 ms, or an override.
-const USUAL: Amount = Amount { most: units(70), least: units(38) };
+/// A feedhold begins within 10 ms. Less would not outlast a ramp that is laid out while ticks take two thirds of the CPU, which takes up to
+/// 4.1 ms, or an override.
+const USUAL: Amount = Amount { most: units(88), least: units(38) };
 
 /// For a while after too little has been waiting: a feedhold begins within 14 ms.
-const PRESSED: Amount = Amount { most: units(80), least: units(65) };
+const PRESSED: Amount = Amount { most: units(108), least: units(65) };
 
 /// That while, in segments.
 const PRESSED_FOR: u8 = 100;
@@ -276,13 +282,32 @@ const PRESSED_FOR: u8 = 100;
 /// With less than this exec is late, and makes longer stretches.
 const WAITING_SHORT: u16 = units(25);
 
+/// With less than this another segment may wait in any case.
+const SOON: u16 = units(20);
+
+/// A segment that takes so long may wait alone, except under a jerk limit, where a ramp takes long to lay out.
+const LONG: u16 = units(30);
+
+/// What a stretch takes at most while thread mode is busy.
+const COARSE: u16 = units(40);
+
 /// What waits at least when thread mode gets a turn while motion has just begun: exec takes that long for a
 /// segment at worst.
 const FIRST_LEAST: u16 = units(15);
 
 impl Waiting {
     const fn new() -> Self {
-        Self { lengths: [0; SEGMENTS], count: 0, used: 0, sum: 0, pressed: 0, moved: 0, busy: 0 }
+        Self {
+            lengths: [0; SEGMENTS],
+            count: 0,
+            fewest: 2,
+            coarse: false,
+            used: 0,
+            sum: 0,
+            pressed: 0,
+            moved: 0,
+            busy: 0,
+        }
     }
 
     /// The length of the segment that was queued so many before the next one.
@@ -339,7 +364,9 @@ impl Waiting {
     #[inline(always)]
     fn is_short(&mut self, rests: bool) -> bool {
         self.moved = if rests { 0 } else { self.moved.saturating_add(1) };
-        let short = usize::from(self.moved) > SEGMENTS && self.sum < WAITING_SHORT;
+        // The end of a block behind a long segment waits alone for a moment.
+        let is_end = self.fewest == 1 && self.length(2) >= LONG;
+        let short = usize::from(self.moved) > SEGMENTS && self.sum < WAITING_SHORT && !is_end;
         if short {
             self.pressed = PRESSED_FOR;
         }
@@ -351,16 +378,17 @@ impl Waiting {
     fn is_enough(&self, passed_over: u8) -> bool {
         let has_just_begun = usize::from(self.moved) <= SEGMENTS && passed_over >= FIRST_TURN;
         let least = if has_just_begun { FIRST_LEAST } else { self.limits().least };
-        self.used >= 2 && (self.sum >= least || self.gives_way())
+        self.used >= self.fewest && (self.sum >= least || self.gives_way())
     }
 
-    /// Whether another one like the last may wait: what is queued cannot be slowed down any more, nor kept from beginning.
+    /// Whether another one may wait: what is queued cannot be slowed down any more, nor kept from beginning.
     #[inline(never)]
     fn has_room(&self) -> bool {
-        if self.used < 2 {
-            return true;
+        if self.used < self.fewest || self.sum < SOON {
+            return self.used < SEGMENTS as u8 - 1;
         }
-        let sum = self.sum + self.length(1);
+        let next = if self.coarse && self.fewest == 1 { COARSE } else { self.length(1) };
+        let sum = self.length(self.used + 1) + self.sum + next;
         self.used < SEGMENTS as u8 - 1 && sum <= self.limits().most && !self.gives_way()
     }
 }

@@ -63,6 +63,8 @@ pub struct Links {
     pub commands_taken: Cell<bool>,
     /// `commands` was filled.
     pub planner_wake: Wake,
+    /// A chain of lines may wait for more: the power task has the planner look.
+    pub chain_waits: Cell<bool>,
     /// A tilde: what has stopped goes on.
     pub cycle_start: Wake,
     /// What is still to be told. Any task writes, the reporter takes.

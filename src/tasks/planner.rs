@@ -29,6 +29,7 @@ use crate::hal::event::{Event, wait};
 use crate::jobs::Job;
 use crate::machine::{self, Cycle};
 use crate::motion::block::{Action, Block, Line as Move, Outputs};
+use crate::motion::chain::Chain;
 use crate::motion::dynamics::{Dynamics, Machine};
 use crate::motion::line::{Builder, Built, Line};
 use crate::motion::pace::Drivers;
@@ -44,10 +45,6 @@ struct Planner {
     dynamics: Dynamics,
     /// Where the last block ends, machine coordinates.
     position: PerAxis<Length>,
-    /// Lines beyond it are merged with the next one.
-    has_merged: bool,
-    /// How far they go.
-    merged: PerAxis<i16>,
     /// The N word of the line that is carried out.
     line: u32,
     /// What exec has been told that drivers ask for.
@@ -57,9 +54,23 @@ struct Planner {
     /// How far the line has been carried out.
     steps: Steps,
     walk: Option<ArcWalk>,
-    parts: Option<Parts>,
+    begun: Begun,
+    /// Since when a chain waits, ms.
+    waits_since: u16,
+    /// Chains in a row that nothing went on with.
+    alone: u8,
     /// What is told before anything else of the line.
     news: News,
+}
+
+/// What a line has left to be done.
+enum Begun {
+    /// Nothing.
+    Nothing,
+    /// The rest of its parts.
+    Parts(Parts),
+    /// All of it, and of those before it, from `position` on: more may go on with it.
+    Chain(Chain),
 }
 
 /// What has changed beside the line.
@@ -98,19 +109,19 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
         builder: Builder::default(),
         dynamics: Dynamics::default(),
         position: [Length::ZERO; AXES],
-        has_merged: false,
-        merged: [0; AXES],
         line: 0,
         drivers: Drivers::USUAL,
         outputs: Outputs { on: 0, speed: 0.0 },
         steps: Steps::default(),
         walk: None,
-        parts: None,
+        begun: Begun::Nothing,
+        waits_since: 0,
+        alone: 0,
         news: News::None,
     };
     async move {
         loop {
-            match planner.has_merged {
+            match planner.has_chain() {
                 false => links.planner_wake.wait().await,
                 true => {
                     select(links.planner_wake.wait(), planner.nothing_follows()).await;
@@ -163,20 +174,36 @@ impl Planner {
         let commands = self.links.commands.borrow();
         let (target, feed) = match &commands.motion {
             Motion::Traverse { target } => (target, None),
-            Motion::Feed { target, feed } => (target, Some(*feed)),
+            Motion::Feed { target, feed } => (target, Some(feed)),
             _ => return false,
         };
-        let quiet = self.links.changes.is_empty();
+        if !commands.is_motion_alone() || !self.links.changes.is_empty() {
+            return false;
+        }
+        if let Begun::Chain(chain) = &mut self.begun {
+            if chain.go_on(&self.position, target, feed, commands.blend) {
+                self.alone = 0;
+                self.wait_for_more(commands.line);
+                return true;
+            }
+            if self.queue.free() == 0 || !self.close_chain() {
+                return false;
+            }
+        }
         let free = self.queue.free();
-        if !commands.is_motion_alone() || !quiet || free == 0 {
+        let may_merge = !commands.exact_stop && free < CAPACITY - 1;
+        if may_merge && self.is_worth_a_chain() && self.begin_chain(target, feed, &commands) {
+            return true;
+        }
+        if free == 0 {
             return false;
         }
         self.line = commands.line;
-        let may_merge = !commands.exact_stop && free < CAPACITY - 1;
-        match self.line(target, feed, may_merge) {
+        match self.line(target, feed.copied(), may_merge) {
             Built::Parts(_) => return false,
-            Built::Merge => self.merge(target),
+            Built::Merge => self.begun = Begun::Chain(Chain::closed(&self.position, target)),
             Built::Line(_) | Built::Nothing => {
+                self.begun = Begun::Nothing;
                 self.moved(&commands);
                 self.position = *target;
                 self.announce();
@@ -188,7 +215,9 @@ impl Planner {
     /// Begins with a line.
     #[inline(never)]
     fn begin(&mut self) {
-        self.line = self.links.commands.borrow().line;
+        if !self.has_chain() {
+            self.line = self.links.commands.borrow().line;
+        }
         self.steps = Steps::default();
         if self.links.changes.take(Changes::SETTINGS) {
             self.dynamics.set(&*self.links.settings.borrow());
@@ -210,11 +239,10 @@ impl Planner {
         }
         let links = self.links;
         let commands = links.commands.borrow();
-        if self.has_merged && !commands.is_straight() {
-            self.go_on();
-            return Turn::More;
+        if self.has_chain() {
+            return self.end_chain(&commands);
         }
-        if self.parts.is_some() {
+        if matches!(self.begun, Begun::Parts(_)) {
             self.part(&commands);
             return Turn::More;
         }
@@ -243,7 +271,7 @@ impl Planner {
         match step {
             Step::Line(target, feed) => {
                 self.straight(target, *feed);
-                if self.parts.is_none() {
+                if !self.has_begun() {
                     self.moved(commands);
                 }
             }
@@ -277,7 +305,7 @@ impl Planner {
     /// Queues a straight move, or begins with its parts.
     fn straight(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) {
         match self.line(target, feed, false) {
-            Built::Parts(of) => self.parts = Some(Parts::new(target, feed, of)),
+            Built::Parts(of) => self.begun = Begun::Parts(Parts::new(target, feed, of)),
             _ => {
                 self.position = *target;
                 self.announce();
@@ -289,10 +317,10 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn part(&mut self, commands: &Commands) {
-        let Some(parts) = &self.parts else { return };
+        let Begun::Parts(parts) = &self.begun else { return };
         let (end, feed) = (parts.end(&self.position), parts.feed);
         let built = self.line(&end, feed, false);
-        let Some(parts) = &mut self.parts else { return };
+        let Begun::Parts(parts) = &mut self.begun else { return };
         if let Built::Parts(of) = built {
             parts.divide(of);
             return;
@@ -300,7 +328,7 @@ impl Planner {
         self.position = end;
         parts.left -= 1;
         if parts.left == 0 {
-            self.parts = None;
+            self.begun = Begun::Nothing;
             if self.walk.is_none() {
                 self.moved(commands);
             }
@@ -320,9 +348,6 @@ impl Planner {
                 arc.curve.go_on();
             }
             self.queue.push_line(&mut block, entry, self.line);
-        }
-        if let Built::Line(_) | Built::Nothing = built {
-            self.has_merged = false;
         }
         built
     }

@@ -25,6 +25,10 @@ pub async fn run(links: &'static Links) -> ! {
         health::look();
         links.signs.age(millis());
         look(links);
+        if links.chain_waits.take() {
+            // Perhaps for long enough.
+            links.planner_wake.signal();
+        }
         Timer::after_ticks(LOOK_MS).await;
     }
 }

@@ -15,10 +15,12 @@ use crate::toolchain::Toolchain;
 
 /// Copies of code (`tail-dup-placement`, `rotation-max-header-size`, `jump-threading-threshold`) save no cycle here: without them the image
 /// is 900 bytes smaller. `--relax`: the linker shortens calls and jumps to what is near, 1,600 bytes and a cycle each. It may, for
-/// LLVM leaves it a relocation for every branch.
+/// LLVM leaves it a relocation for every branch. `__TEXT_REGION_LENGTH__`: what the compiler wrote may be larger than the flash, since it is
+/// made smaller behind it; the image is held against the flash by [`elf::check`].
 const FLAGS: &str = "-C target-cpu=atmega2560 -C llvm-args=-inline-threshold=30 -C llvm-args=-tail-dup-placement=false \
                      -C llvm-args=-rotation-max-header-size=4 -C llvm-args=-jump-threading-threshold=3 -C jump-tables=no \
-                     -C linker=target/avr/keep-gcc -C link-arg=-mmcu=atmega2560 -C link-arg=-Wl,--gc-sections -C link-arg=-Wl,--relax";
+                     -C linker=target/avr/keep-gcc -C link-arg=-mmcu=atmega2560 -C link-arg=-Wl,--gc-sections -C link-arg=-Wl,--relax \
+                     -C link-arg=-Wl,--defsym=__TEXT_REGION_LENGTH__=0x60000";
 
 /// The linker in `FLAGS`: a script that writes down how it was called. Its path does not name the checkout, for cargo would build all
 /// anew in a copy; `rustc` knows by the end of the name which options it takes.

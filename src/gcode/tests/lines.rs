@@ -60,11 +60,39 @@ fn modes_stay_in_force() {
         retract: Retract::ToR,
         system: 8,
         path: PathMode::Exact,
+        tolerance: 123,
         spindle: Turn::Counterclockwise,
         coolant: 3,
     };
-    let (state, _) = run(&["M7", "G0 G18 G20 G91 G90.1 G93 G99 G59.3 G61 M4 M8"]);
+    let (state, _) = run(&["M7", "G64 P0.0123", "G0 G18 G20 G91 G90.1 G93 G99 G59.3 G61 M4 M8"]);
     assert_eq!(state.modal(), &set);
+}
+
+#[test]
+fn the_tolerance_of_the_path_is_modal() {
+    let blend = |lines: &[&str]| run(lines).1.blend;
+    for (line, tolerance) in [
+        ("G64", 10),
+        ("G64 P0", 0),
+        ("G64 P0.005", 50),
+        ("G20 G64 P0.0001", 25),
+        ("G64 P0.0254", 254),
+        ("G64 P0.1", 254),
+        ("G64 P1000", 254),
+    ] {
+        assert_eq!(blend(&[line, "G21 G1 F100 X1"]), tolerance + 1, "{line}");
+    }
+    assert_eq!(blend(&["G1 F100 X1"]), 11);
+    assert_eq!(blend(&["G64 P0.005", "G0 X1"]), 51);
+    assert_eq!(blend(&["G64 P0.005", "G64", "G0 X1"]), 11);
+    assert_eq!(blend(&["G64 P0.005", "M30", "G0 X1"]), 11);
+    assert_eq!(blend(&["G64 P0.005", "G61", "G64", "G0 X1"]), 11);
+    // Nothing is merged with an exact path, and an arc with nothing.
+    for line in ["G61", "G61.1"] {
+        assert_eq!(blend(&["G64 P0.005", line, "G0 X1"]), 0, "{line}");
+    }
+    assert_eq!(blend(&["G2 F100 X2 I1"]), 0);
+    assert_eq!(refusal(&["G64 P-0.001"]), Status::PWordNegative);
 }
 
 #[test]

@@ -1,53 +1,146 @@
-//! Lines that are merged with the next one: less than half a step, and over before exec could prepare them.
+//! Lines that wait for the next one: a chain of short ones that lie on a line (`motion::chain`), and those that are less than half a
+//! step, and over before exec could prepare them.
 //!
-//! CAM files are full of such lines. As blocks of their own they would slow the path down to half a step in 0.75 ms each.
-//! Only a line behind which others run is merged. The planner stays where the line began, and knows how far it went. The next
-//! line begins there. What is not a line, and the last block that runs, have the way made up for first: so positions
-//! at stops are exact.
+//! CAM files are full of such lines. A block costs the planner and exec as much whether it is long or short; and a block of
+//! less than half a step in 0.75 ms would slow the path down.
+//! A line waits only where others run. The planner stays where the chain began, and knows where it ends. The next
+//! line goes on with it, or the chain becomes a block and the line begins another one. What is less than half a step becomes no
+//! block then: the next line begins where it did.
+//!
+//! **Nothing waits long.** A chain becomes a block when the last block runs, and before anything that is not a line; and, [`STALE_MS`]
+//! after its last line, at the next block or when the power task looks. So positions at stops are exact, and what is sent last is run as if
+//! it had not waited: exec is some milliseconds ahead of the motors.
+//!
+//! **N words.** A block has that of its last line: it is finished when that is.
 
-use kerf_macros::small;
-
-use super::Planner;
+use super::{Begun, Parts, Planner, Turn};
+use crate::gcode::command::{Commands, Feed};
 use crate::hal::event::{Event, wait};
+use crate::hal::imp::time::millis;
+use crate::motion::chain::Chain;
+use crate::motion::line::Built;
 use crate::motion::queue;
 use crate::units::{Length, PerAxis};
 
+/// So long after its last line a chain waits no more, ms.
+const STALE_MS: u16 = 8;
+
+/// After so many chains in a row that nothing went on with, only each line of so many begins one.
+const ALONE: u8 = 8;
+
 impl Planner {
-    /// Merges the way to `target` with the next line. Each axis goes at most what 16 bits hold.
-    #[inline(never)]
-    #[small]
-    pub(super) fn merge(&mut self, target: &PerAxis<Length>) {
-        for ((merged, to), from) in self.merged.iter_mut().zip(target).zip(&self.position) {
-            *merged = to.0.wrapping_sub(from.0) as i16;
-        }
-        self.has_merged = true;
+    /// Whether a chain waits for the next line.
+    #[inline(always)]
+    pub(super) fn has_chain(&self) -> bool {
+        matches!(self.begun, Begun::Chain(_))
     }
 
-    /// Waits until the last block runs.
+    /// Whether something is left to be done of what has been carried out.
+    pub(super) fn has_begun(&self) -> bool {
+        !matches!(self.begun, Begun::Nothing)
+    }
+
+    /// Whether a line is to begin a chain: it costs 2,000 cycles, so that on a curve on which nothing goes on with any only
+    /// every eighth line does.
+    #[inline(always)]
+    pub(super) fn is_worth_a_chain(&mut self) -> bool {
+        self.alone = self.alone.wrapping_add(1);
+        self.alone <= ALONE || self.alone.is_multiple_of(ALONE)
+    }
+
+    /// Begins a chain with a line, if it may be merged with those that follow.
+    #[inline(always)]
+    pub(super) fn begin_chain(
+        &mut self,
+        target: &PerAxis<Length>,
+        feed: Option<&Feed>,
+        commands: &Commands,
+    ) -> bool {
+        if !self.has_chain() {
+            self.begun = Begun::Chain(Chain::default());
+        }
+        if let Begun::Chain(chain) = &mut self.begun
+            && chain.begin(&self.position, target, feed, commands.blend)
+        {
+            self.wait_for_more(commands.line);
+            return true;
+        }
+        self.begun = Begun::Nothing;
+        false
+    }
+
+    /// The line with this N word waits for the next one.
+    #[inline(always)]
+    pub(super) fn wait_for_more(&mut self, line: u32) {
+        self.line = line;
+        self.waits_since = millis() as u16;
+        self.links.chain_waits.set(true);
+    }
+
+    /// Makes a block of the chain. If it is less than half a step, only closes it. There is room. False if it is to be made in parts.
+    #[inline(never)]
+    pub(super) fn close_chain(&mut self) -> bool {
+        self.build_chain(true)
+    }
+
+    /// Queues the chain, for which there is room.
+    #[inline(never)]
+    fn build_chain(&mut self, may_merge: bool) -> bool {
+        let Begun::Chain(chain) = &self.begun else { return true };
+        if may_merge && chain.is_closed() {
+            return true;
+        }
+        let (target, feed) = (chain.end(&self.position), chain.feed());
+        match self.line(&target, feed, may_merge) {
+            Built::Parts(of) => {
+                self.begun = Begun::Parts(Parts::new(&target, feed, of));
+                return false;
+            }
+            Built::Merge => {
+                if let Begun::Chain(chain) = &mut self.begun {
+                    chain.close();
+                }
+            }
+            Built::Line(_) | Built::Nothing => {
+                self.begun = Begun::Nothing;
+                self.position = target;
+                self.announce();
+            }
+        }
+        true
+    }
+
+    /// The line that comes behind a chain, for which there is room: goes on with it, or has it queued first.
+    #[inline(never)]
+    pub(super) fn end_chain(&mut self, commands: &Commands) -> Turn {
+        if commands.is_straight() && self.carry_out_at_once() {
+            return Turn::Done;
+        }
+        self.build_chain(false);
+        self.line = commands.line;
+        Turn::More
+    }
+
+    /// Waits until the chain is not to wait any longer.
     pub(super) fn nothing_follows(&self) -> impl Future<Output = ()> {
-        wait(self.links.thread, Event::BlockDone, || self.is_last().then_some(()))
+        wait(self.links.thread, Event::BlockDone, || self.is_due().then_some(()))
     }
 
-    /// Queues what has been merged if the last block runs.
-    pub(super) fn make_up(&mut self) {
-        if self.has_merged && self.is_last() {
-            self.go_on();
-        }
-    }
-
-    /// Queues what has been merged. There is room.
+    /// Queues the chain if it is not to wait any longer.
     #[inline(never)]
-    #[small]
-    pub(super) fn go_on(&mut self) {
-        let mut target = self.position;
-        for (to, &way) in target.iter_mut().zip(&self.merged) {
-            *to = Length(to.0.wrapping_add(way.into()));
+    pub(super) fn make_up(&mut self) {
+        if self.is_due() {
+            self.build_chain(false);
         }
-        self.straight(&target, None);
+        self.links.chain_waits.set(self.has_chain());
     }
 
-    /// Whether the last block runs, and steps mean what they did: else a line comes that sees to it.
-    fn is_last(&self) -> bool {
-        queue::used() <= 1 && self.links.changes.is_empty() && !self.is_flushed()
+    /// Whether a chain is not to wait any longer, and steps mean what they did: else a line comes that sees to it.
+    fn is_due(&self) -> bool {
+        let Begun::Chain(chain) = &self.begun else { return false };
+        let is_stale =
+            || !chain.is_closed() && (millis() as u16).wrapping_sub(self.waits_since) >= STALE_MS;
+        let is_due = queue::used() <= 1 || is_stale() && self.queue.free() > 0;
+        is_due && self.links.changes.is_empty() && !self.is_flushed()
     }
 }

@@ -10,7 +10,7 @@
 use embassy_futures::yield_now;
 use kerf_macros::small;
 
-use super::{Planner, Turn};
+use super::{Begun, Planner, Turn};
 use crate::boards::MOTORS;
 use crate::gcode::command::Feed;
 use crate::hal::Thread;
@@ -65,7 +65,7 @@ impl Planner {
 
     /// Waits for what comes of it. The switches are not armed any more.
     pub(super) async fn sought(&mut self) -> Sought {
-        while self.parts.is_some() && !self.is_over() {
+        while self.has_begun() && !self.is_over() {
             self.seek_room().await;
             // Others have their turn: a long way is many blocks, and there may be room for all of them.
             yield_now().await;
@@ -82,7 +82,7 @@ impl Planner {
         })
         .await;
         inputs::arm(0, 0);
-        self.parts = None;
+        self.begun = Begun::Nothing;
         if !contact::is_noted() || self.is_flushed() {
             contact::clear();
             return if self.is_flushed() { Sought::Flushed } else { Sought::End };
@@ -115,7 +115,7 @@ impl Planner {
         }
         self.builder.place(&motion.target);
         self.queue.restart();
-        (self.walk, self.parts, self.has_merged) = (None, None, false);
+        (self.walk, self.begun) = (None, Begun::Nothing);
         self.outputs = Outputs { on: motion.outputs, speed: motion.speed };
         self.links.model.borrow_mut().set_position(&self.position);
     }

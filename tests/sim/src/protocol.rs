@@ -40,7 +40,8 @@ impl Response {
 
 /// Tells what a line is.
 pub fn classify(line: &str) -> Incoming {
-    let Ok(value) = serde_json::from_str::<Value>(line) else {
+    let strict = serde_json::from_str::<Value>(line);
+    let Ok(value) = strict.or_else(|_| serde_json::from_str(&quoted(line))) else {
         return Incoming::Other(line.to_string());
     };
     let Some(body) = value.get("r") else {
@@ -61,6 +62,26 @@ pub fn classify(line: &str) -> Incoming {
         }
         _ => Incoming::Other(line.to_string()),
     }
+}
+
+/// The line with its names in quotes, which `{js:0}` leaves out.
+fn quoted(line: &str) -> String {
+    let (mut out, mut in_text) = (String::new(), false);
+    let mut rest = line;
+    while let Some(byte) = rest.chars().next() {
+        let (here, behind) = rest.split_at(byte.len_utf8());
+        (rest, in_text) = (behind, in_text != (byte == '"'));
+        out.push_str(here);
+        if !in_text && matches!(byte, '{' | ',') {
+            let end = rest.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(rest.len());
+            let (name, behind) = rest.split_at(end);
+            if end > 0 && behind.starts_with(':') {
+                out.push_str(&format!("\"{name}\""));
+                rest = behind;
+            }
+        }
+    }
+    out
 }
 
 /// The machine state in a report or in the body of a response.
@@ -90,6 +111,9 @@ mod tests {
     fn tells_lines_apart() {
         let Incoming::Response(r) = classify(r#"{"r":{"n":3},"f":[1,0,7]}"#) else { panic!() };
         assert_eq!((r.status, r.free, r.is_ok()), (0, 7, true));
+        let relaxed = r#"{r:{msg:"a, b:{c:"},f:[1,0,7]}"#;
+        let Incoming::Response(r) = classify(relaxed) else { panic!() };
+        assert_eq!((&r.body["msg"], r.status, r.free), (&"a, b:{c:".into(), 0, 7));
         let banner = r#"{"r":{"fv":0.97,"msg":"SYSTEM READY"},"f":[1,0,0]}"#;
         assert_eq!(classify(banner), Incoming::Banner);
         let Incoming::Report(sr) = classify(r#"{"sr":{"stat":3}}"#) else { panic!() };

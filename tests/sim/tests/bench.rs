@@ -47,10 +47,15 @@ rows! {
     moves_of_a_tenth_on_a_fast_line = "spiral-0.1-fast";
     moves_of_a_fifth_on_a_fast_line = "spiral-0.2-fast";
     moves_of_a_half_on_a_fast_line = "spiral-0.5-fast";
+    moves_of_a_tenth_with_short_answers = "spiral-0.1-terse";
+    moves_of_a_tenth_under_a_jerk_limit_over_the_ideal = "spiral-0.1-smooth";
     moves_of_a_tenth_under_a_jerk_limit = "spiral-0.1-jerk";
     moves_of_a_fifth_under_a_jerk_limit = "spiral-0.2-jerk";
     moves_of_a_half_under_a_jerk_limit = "spiral-0.5-jerk";
     lines_in_a_second = "lines";
+    lines_in_a_second_under_a_jerk_limit = "lines-jerk";
+    lines_in_a_second_on_a_curve = "lines-curve";
+    cycles_of_a_line = "line-cycles";
     interrupts_off = "interrupts-off";
     cycles_of_a_segment = "segment";
     cycles_of_a_segment_under_a_jerk_limit = "segment-jerk";

@@ -130,7 +130,12 @@ fn no_step_is_made_and_taken_back() {
         }
         let (want, got) = (commanded(&lines(run.job), &setup), report.motors.iter());
         let got: Vec<_> = got.map(|m| m.total).collect();
-        ensure(got == want, || format!("{got:?} steps instead of {want:?}"))
+        // Where a curve turns round less than the tolerance of G64 behind a step, that step is left out there and back.
+        let is_right = |(got, want): (&u64, &u64)| {
+            got <= want && (want - got).is_multiple_of(2) && (want - got) * 10_000 <= *want
+        };
+        let right = got.len() == want.len() && got.iter().zip(&want).all(is_right);
+        ensure(right, || format!("{got:?} steps instead of {want:?}"))
     });
 }
 

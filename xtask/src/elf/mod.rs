@@ -11,11 +11,13 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use object::elf::SHF_ALLOC;
 use object::{File, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
 
 use disasm::Code;
+
+use crate::caps;
 
 /// From here up, avr-gcc's addresses mean RAM; below, flash.
 const RAM_BASE: u64 = 0x80_0000;
@@ -77,6 +79,12 @@ impl Sizes {
 /// Refuses an image that would not work, or far too slowly: see the modules.
 pub fn check(path: &Path) -> Result<()> {
     let image = Image::load(path)?;
+    let (flash, shown) = (image.sizes.flash, path.display());
+    ensure!(
+        flash <= caps::FLASH,
+        "{shown} takes {flash} bytes of flash, more than {}",
+        caps::FLASH
+    );
     arithmetic::check(&image)?;
     tables::check(&image)
 }

@@ -2,7 +2,8 @@
 
 use super::{Section, g, no};
 use crate::status::Status::{
-    CutterCompensation, FeedrateMissing, InverseTimeNotAllowed, SWordMissing, SpindleMustTurn,
+    CutterCompensation, FeedrateMissing, InverseTimeNotAllowed, PWordNegative, SWordMissing,
+    SpindleMustTurn,
 };
 
 pub const MODES: Section = Section {
@@ -38,16 +39,17 @@ force at power-up and after M2, unless `gun` says otherwise.",
         g(
             610,
             "Exact path",
-            "The path is followed exactly, without a stop where none is needed: the same as G64.",
+            "The path is followed exactly, without a stop where none is needed. Each move is made by itself.",
             &[],
         ),
         g(611, "Exact stop", "Each move ends at rest; the chords of an arc do not.", &[]),
         g(
             640,
             "Continuous path",
-            "The path is followed without a stop where none is needed. P, a tolerance, is taken and not needed: the path is \
-never left. In force at power-up and after M2, unless `gpa` says otherwise.",
-            &[],
+            "The path is followed without a stop where none is needed. Short feed moves of linear axes that lie on a line, to within P, are \
+made one: up to 12 ms of them, or 3.2 mm. P is 0.001 mm if it is not given, and 0.0254 mm at most; with 0 they lie on the line exactly. On \
+a curve on which none can be made one with the next, only every eighth is looked at. In force at power-up and after M2, unless `gpa` says otherwise.",
+            &[no(PWordNegative, &["G64 P-0.001"])],
         ),
         g(
             900,

@@ -5,7 +5,7 @@ use anyhow::{Result, ensure};
 use super::Figure;
 use super::jitter;
 use super::spirals::{lines_per_second, spiral};
-use super::workload::{Bed, FAST_BAUD, How, LOW_JERK, USUAL_JERK, arcs, braid, straight};
+use super::workload::{Bed, FAST_BAUD, How, LOW_JERK, NO_LIMIT, USUAL_JERK, arcs, braid, straight};
 use crate::machine::Machine;
 use crate::report::Report;
 use crate::stopwatch::{Cost, Stopwatch};
@@ -19,12 +19,17 @@ const QUEUE_PUSH: &str = "<kerf::motion::queue::BlockQueue>::push_line";
 
 /// The short moves: how many, how long (mm), at what feed (mm/min). 4,000 a second would do.
 const SHORT: (u32, f64, f64) = (3_000, 0.05, 12_000.0);
-/// An acceleration that is no limit to them, mm/s2; with more than that there would be a jerk limit.
-const NO_LIMIT: f64 = 4_500.0;
-
 /// Short moves taken in a second on a fast line.
 pub fn lines(bed: &Bed) -> Result<Figure> {
     let how = How { baud: FAST_BAUD, acceleration: NO_LIMIT, ..How::default() };
+    let (_, report) = bed.run(&short_moves(), how)?;
+    Ok(lines_per_second(&report).into())
+}
+
+/// Short moves taken in a second on a fast line, under a jerk limit.
+pub fn lines_jerk(bed: &Bed) -> Result<Figure> {
+    let how =
+        How { baud: FAST_BAUD, acceleration: NO_LIMIT, jerk: Some(USUAL_JERK), ..How::default() };
     let (_, report) = bed.run(&short_moves(), how)?;
     Ok(lines_per_second(&report).into())
 }

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 
 use super::Figure;
 use super::optimum::rest_to_rest;
-use super::workload::{ACCELERATION, Bed, How, PER_JERK, USUAL_JERK, small_arcs};
+use super::workload::{ACCELERATION, Bed, How, PER_JERK, PER_MM, USUAL_JERK, small_arcs};
 use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::machine::Machine;
 
@@ -54,7 +54,9 @@ fn lone(bed: &Bed, mm: f64) -> Result<Figure> {
 /// From `!` to the first step of a slower segment, ms at most.
 pub fn hold_begins(bed: &Bed) -> Result<Figure> {
     let all = holds(bed)?;
-    Ok((all.iter().map(|h| h.begins).fold(0.0, f64::max) * 1e3).into())
+    let value = all.iter().map(|h| h.begins).fold(0.0, f64::max) * 1e3;
+    let note = all.iter().map(|h| format!("{:.2}", h.begins * 1e3)).collect::<Vec<_>>().join(", ");
+    Ok(Figure { value, note })
 }
 
 /// From there to rest, over the shortest time within the limits, at most.
@@ -99,14 +101,19 @@ fn hold(bed: &Bed, us: u64) -> Result<Hold> {
     Ok(Hold { begins: machine.seconds(slower - said), stops: machine.seconds(rest - slower) })
 }
 
-/// When the first interval begins that is longer than all in the 20 ms before `said`, by more than a cycle.
+/// When the velocity begins to fall. A jerk limit has it fall by less than pulses can show for some milliseconds; so that is when a ramp
+/// under the limit must have begun which is as far behind the old velocity as the motor is a little later.
 fn first_slower(machine: &Machine, said: u64) -> Option<u64> {
+    const BEHIND: u64 = 2;
     let steps = machine.recorder().steps_of(0);
     let steady = steps.partition_point(|s| *s < said - machine.cycles(20));
     let told = steps.partition_point(|s| *s < said);
-    let usual = steps[steady..told].windows(2).map(|pair| pair[1] - pair[0]).max()?;
-    let slower = steps[told..].windows(2).find(|pair| pair[1] - pair[0] > usual + 1)?;
-    Some(slower[0])
+    let (first, last) = (*steps.get(steady)?, *steps.get(told.checked_sub(1)?)?);
+    let interval = (last - first) / (told - 1 - steady) as u64;
+    let due = |n: usize| last + (n as u64 + 1 + BEHIND) * interval;
+    let behind = steps[told..].iter().enumerate().find(|(n, step)| **step >= due(*n))?.1;
+    let ramp = (6.0 * BEHIND as f64 / PER_MM / (USUAL_JERK * PER_JERK)).cbrt();
+    Some(behind - (ramp * f64::from(machine.board().clock_hz)) as u64)
 }
 
 /// Acceleration of X and Y on arcs, 99th percentile, over the limit.

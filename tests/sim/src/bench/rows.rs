@@ -11,7 +11,7 @@ use super::{Row, beyond, costs, jitter, limits, pauses, rates, spirals};
 const NONE: [&str; 3] = ["-"; 3];
 
 /// The table.
-pub const ROWS: [Row; 37] = [
+pub const ROWS: [Row; 42] = [
     Row {
         name: "rate-1",
         what: "highest rate held, 1 motor",
@@ -131,8 +131,7 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: ["3.18", "-", "7.97"],
         target: Some(1.6),
-        // 1.792 before control lines could overtake data: a line costs 1 % more since.
-        floor: Some(1.84),
+        floor: Some(1.69),
         measure: spirals::tenth,
     },
     Row {
@@ -165,8 +164,7 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(1.2),
-        // 1.776 before: a line costs 1 % more since control lines overtake data.
-        floor: Some(1.81),
+        floor: Some(1.30),
         measure: spirals::tenth_fast,
     },
     Row {
@@ -192,6 +190,28 @@ pub const ROWS: [Row; 37] = [
         measure: spirals::half_fast,
     },
     Row {
+        name: "spiral-0.1-terse",
+        what: "moves of 0.1 mm, 115,200 baud, js 0",
+        unit: "x",
+        decimals: 3,
+        better: Lower,
+        peers: NONE,
+        target: Some(1.5),
+        floor: Some(1.50),
+        measure: spirals::tenth_terse,
+    },
+    Row {
+        name: "spiral-0.1-smooth",
+        what: "moves of 0.1 mm under a jerk limit, 500,000 baud",
+        unit: "x",
+        decimals: 3,
+        better: Lower,
+        peers: NONE,
+        target: Some(1.3),
+        floor: Some(1.45),
+        measure: spirals::tenth_smooth,
+    },
+    Row {
         name: "spiral-0.1-jerk",
         what: "moves of 0.1 mm under a jerk limit, over without",
         unit: "x",
@@ -200,7 +220,7 @@ pub const ROWS: [Row; 37] = [
         peers: NONE,
         target: Some(1.25),
         // The CPU has no time left.
-        floor: Some(1.25),
+        floor: Some(1.15),
         measure: spirals::tenth_jerk,
     },
     Row {
@@ -234,8 +254,41 @@ pub const ROWS: [Row; 37] = [
         better: Higher,
         peers: ["291 at 115,200", "-", "115 at 115,200"],
         target: Some(1_000.0),
-        floor: Some(345.0),
+        floor: Some(1_080.0),
         measure: costs::lines,
+    },
+    Row {
+        name: "lines-jerk",
+        what: "short moves taken under a jerk limit, 500,000 baud",
+        unit: "lines/s",
+        decimals: 0,
+        better: Higher,
+        peers: NONE,
+        target: Some(800.0),
+        floor: Some(1_060.0),
+        measure: costs::lines_jerk,
+    },
+    Row {
+        name: "lines-curve",
+        what: "moves of 0.33 mm taken on a curve, 500,000 baud",
+        unit: "lines/s",
+        decimals: 0,
+        better: Higher,
+        peers: NONE,
+        target: Some(700.0),
+        floor: Some(470.0),
+        measure: spirals::curve_lines,
+    },
+    Row {
+        name: "line-cycles",
+        what: "a move of 0.1 mm, 500,000 baud",
+        unit: "cycles",
+        decimals: 0,
+        better: Lower,
+        peers: NONE,
+        target: Some(16_000.0),
+        floor: Some(22_500.0),
+        measure: spirals::cycles_per_line,
     },
     Row {
         name: "interrupts-off",
@@ -401,7 +454,7 @@ pub const ROWS: [Row; 37] = [
         better: Lower,
         peers: NONE,
         target: Some(10.0),
-        // Three segments that wait, the one that runs, and exec's own time.
+        // Three segments that wait, the one that runs, and what exec is at.
         floor: Some(10.0),
         measure: limits::hold_begins,
     },

@@ -6,12 +6,14 @@ use std::fmt::Write;
 use anyhow::{Result, ensure};
 
 use super::Figure;
-use super::workload::{ACCELERATION, Bed, FAST_BAUD, How, USUAL_JERK};
+use super::workload::{ACCELERATION, Bed, FAST_BAUD, How, NO_LIMIT, USUAL_JERK};
 use crate::report::Report;
 
 const MOVES: u32 = 2_000;
 /// mm/min.
 const FEED: f64 = 6_000.0;
+/// The feed of [`curve_lines`]: 910 moves a second would do.
+const CURVE_FEED: f64 = 18_000.0;
 /// Where the spiral begins, mm from its centre: wide enough for no corner to limit the feed.
 const RADIUS: f64 = 30.0;
 /// Radial distance of two turns, mm.
@@ -45,6 +47,32 @@ pub fn fifth_fast(bed: &Bed) -> Result<Figure> {
 /// Moves of 0.5 mm on a fast line.
 pub fn half_fast(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, 0.5, fast())
+}
+
+/// Moves of 0.1 mm at the usual speed of the line, answers without the marks of strict JSON.
+pub fn tenth_terse(bed: &Bed) -> Result<Figure> {
+    over_ideal(bed, 0.1, How { more: &["{js:0}"], ..How::default() })
+}
+
+/// Moves of 0.1 mm under a jerk limit, on a fast line. The ideal is that without the limit.
+pub fn tenth_smooth(bed: &Bed) -> Result<Figure> {
+    over_ideal(bed, 0.1, How { jerk: Some(USUAL_JERK), ..fast() })
+}
+
+/// Moves of 0.33 mm in a second, on a curve on which no two of them lie on a line.
+pub fn curve_lines(bed: &Bed) -> Result<Figure> {
+    let how = How { acceleration: NO_LIMIT, ..fast() };
+    let (_, report) = bed.run(&spiral_at(0.33, CURVE_FEED), how)?;
+    Ok(lines_per_second(&report).into())
+}
+
+/// Cycles awake for each move of 0.1 mm on a fast line, from the first step to the last.
+pub fn cycles_per_line(bed: &Bed) -> Result<Figure> {
+    let (machine, report) = bed.run(&spiral(0.1), fast())?;
+    let awake = report.cpu_load.unwrap_or(1.0);
+    let hz = f64::from(machine.board().clock_hz);
+    let value = awake * report.seconds_moving * hz / f64::from(MOVES);
+    Ok(Figure { value, note: format!("awake {:.0} %", 100.0 * awake) })
 }
 
 /// Moves of 0.1 mm under a jerk limit, over the same without.
@@ -90,7 +118,12 @@ pub fn lines_per_second(report: &Report) -> f64 {
 
 /// The job. It begins where the machine stands, at 0.
 pub fn spiral(chord: f64) -> String {
-    let mut job = format!("G1 F{FEED}\n");
+    spiral_at(chord, FEED)
+}
+
+/// The same at another feed, mm/min.
+fn spiral_at(chord: f64, feed: f64) -> String {
+    let mut job = format!("G1 F{feed}\n");
     let mut angle = 0.0f64;
     let mut at = (0.0, 0.0);
     for _ in 0..MOVES {

@@ -20,6 +20,8 @@ pub const PER_MM: f64 = 80.0;
 pub const PER_MM_Z: f64 = 400.0;
 /// Acceleration, mm/s2.
 pub const ACCELERATION: f64 = 500.0;
+/// An acceleration that is no limit to short moves, mm/s2; with more than that there would be a jerk limit.
+pub const NO_LIMIT: f64 = 4_500.0;
 /// The usual speed of the line, and a fast one.
 pub const USUAL_BAUD: u32 = 115_200;
 /// See [`USUAL_BAUD`].
