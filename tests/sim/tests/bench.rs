@@ -56,6 +56,8 @@ rows! {
     lines_in_a_second_under_a_jerk_limit = "lines-jerk";
     lines_in_a_second_on_a_curve = "lines-curve";
     cycles_of_a_line = "line-cycles";
+    look_ahead = "ahead";
+    velocity_from_slice_to_slice = "jumps";
     interrupts_off = "interrupts-off";
     cycles_of_a_segment = "segment";
     cycles_of_a_segment_under_a_jerk_limit = "segment-jerk";

@@ -11,6 +11,7 @@ mod limits;
 #[path = "../../../support/optimum.rs"]
 mod optimum;
 mod pauses;
+mod places;
 mod rates;
 mod rows;
 mod spirals;

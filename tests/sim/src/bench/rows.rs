@@ -11,7 +11,7 @@ use super::{Row, beyond, costs, jitter, limits, pauses, rates, spirals};
 const NONE: [&str; 3] = ["-"; 3];
 
 /// The table.
-pub const ROWS: [Row; 42] = [
+pub const ROWS: [Row; 44] = [
     Row {
         name: "rate-1",
         what: "highest rate held, 1 motor",
@@ -289,6 +289,28 @@ pub const ROWS: [Row; 42] = [
         target: Some(16_000.0),
         floor: Some(22_500.0),
         measure: spirals::cycles_per_line,
+    },
+    Row {
+        name: "ahead",
+        what: "look-ahead over moves of 0.1 mm",
+        unit: "mm",
+        decimals: 1,
+        better: Higher,
+        peers: NONE,
+        target: None,
+        floor: None,
+        measure: spirals::look_ahead,
+    },
+    Row {
+        name: "jumps",
+        what: "velocity from 4 ms to the next, moves of 0.1 mm, 500,000 baud",
+        unit: "mm/s",
+        decimals: 1,
+        better: Lower,
+        peers: NONE,
+        target: Some(2.5),
+        floor: Some(2.5),
+        measure: limits::velocity_jumps,
     },
     Row {
         name: "interrupts-off",

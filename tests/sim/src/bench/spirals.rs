@@ -7,6 +7,7 @@ use anyhow::{Result, ensure};
 
 use super::Figure;
 use super::workload::{ACCELERATION, Bed, FAST_BAUD, How, NO_LIMIT, USUAL_JERK};
+use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::report::Report;
 
 const MOVES: u32 = 2_000;
@@ -64,6 +65,23 @@ pub fn curve_lines(bed: &Bed) -> Result<Figure> {
     let how = How { acceleration: NO_LIMIT, ..fast() };
     let (_, report) = bed.run(&spiral_at(0.33, CURVE_FEED), how)?;
     Ok(lines_per_second(&report).into())
+}
+
+/// How far the queue reaches over moves of 0.1 mm, mm: so many are answered while a slow move before them runs.
+pub fn look_ahead(bed: &Bed) -> Result<Figure> {
+    let mut machine = bed.machine()?;
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut machine, 1_000)?;
+    for line in bed.settings(How::default()) {
+        host.ask(&mut machine, &line, 1_000)?;
+    }
+    host.ask(&mut machine, "G1 F1 X-1", 1_000)?;
+    let job = spiral(0.1);
+    job.lines().enumerate().for_each(|(n, line)| host.queue(n, line));
+    host.run_for_ms(&mut machine, 3_000)?;
+    // The first line sets the feed.
+    let moves = host.take_answered().len().saturating_sub(1);
+    Ok(Figure { value: 0.1 * moves as f64, note: format!("{moves} moves") })
 }
 
 /// Cycles awake for each move of 0.1 mm on a fast line, from the first step to the last.
