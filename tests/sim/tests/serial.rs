@@ -4,6 +4,7 @@ mod common;
 
 use common::{booted, set};
 use kerf::boards::MEGA2560_GRBL;
+use kerf::motion::queue::CAPACITY;
 use kerf_sim::Machine;
 use kerf_sim::protocol::{Incoming, classify};
 
@@ -197,7 +198,7 @@ fn answers_stop_while_the_planner_is_full_and_come_again() {
     (1..=LINES).for_each(|n| host.queue(n, "x10"));
     host.run_for_ms(&mut machine, 700).unwrap();
     let at_once = host.take_answered().len();
-    assert!((65..75).contains(&at_once), "{at_once} lines fill the planner");
+    assert!((CAPACITY + 1..CAPACITY + 11).contains(&at_once), "{at_once} lines fill the planner");
     assert_eq!(host.in_flight(), 4, "the others wait");
     host.run_for_ms(&mut machine, 3_000).unwrap();
     let later = host.take_answered().len();
