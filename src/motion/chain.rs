@@ -137,7 +137,7 @@ impl Chain {
         let tolerance = blend - 1;
         // Both may be off by as much.
         let both = ends.iter().all(|way| *way != 0);
-        self.tolerance = if both { (u16::from(tolerance) * 181 >> 8) as u8 } else { tolerance };
+        self.tolerance = if both { ((u16::from(tolerance) * 181) >> 8) as u8 } else { tolerance };
         self.moved = 0;
         let mut bit = 1;
         for (minor, &way) in self.minors.iter_mut().zip(&ends) {

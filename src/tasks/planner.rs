@@ -219,6 +219,12 @@ impl Planner {
             self.line = self.links.commands.borrow().line;
         }
         self.steps = Steps::default();
+        self.take_up_changes();
+    }
+
+    /// Takes up settings that have changed. Of some exec has to be told before anything else.
+    #[inline(never)]
+    fn take_up_changes(&mut self) {
         if self.links.changes.take(Changes::SETTINGS) {
             self.dynamics.set(&*self.links.settings.borrow());
         }

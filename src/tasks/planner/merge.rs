@@ -13,7 +13,7 @@
 //!
 //! **N words.** A block has that of its last line: it is finished when that is.
 
-use super::{Begun, Parts, Planner, Turn};
+use super::{Begun, News, Parts, Planner, Turn};
 use crate::gcode::command::{Commands, Feed};
 use crate::hal::event::{Event, wait};
 use crate::hal::imp::time::millis;
@@ -24,6 +24,9 @@ use crate::units::{Length, PerAxis};
 
 /// So long after its last line a chain waits no more, ms.
 const STALE_MS: u16 = 8;
+
+/// A chain, where the machine is and what drivers ask for.
+const BLOCKS: usize = 3;
 
 /// After so many chains in a row that nothing went on with, only each line of so many begins one.
 const ALONE: u8 = 8;
@@ -130,17 +133,21 @@ impl Planner {
     #[inline(never)]
     pub(super) fn make_up(&mut self) {
         if self.is_due() {
+            self.take_up_changes();
+            while self.news != News::None {
+                self.tell();
+            }
             self.build_chain(false);
         }
         self.links.chain_waits.set(self.has_chain());
     }
 
-    /// Whether a chain is not to wait any longer, and steps mean what they did: else a line comes that sees to it.
+    /// Whether a chain is not to wait any longer, and there is room for it and for what settings that have changed come to.
     fn is_due(&self) -> bool {
         let Begun::Chain(chain) = &self.begun else { return false };
         let is_stale =
             || !chain.is_closed() && (millis() as u16).wrapping_sub(self.waits_since) >= STALE_MS;
-        let is_due = queue::used() <= 1 || is_stale() && self.queue.free() > 0;
-        is_due && self.links.changes.is_empty() && !self.is_flushed()
+        let is_due = queue::used() <= 1 || is_stale() && self.queue.free() >= BLOCKS;
+        is_due && !self.is_flushed()
     }
 }
