@@ -218,16 +218,16 @@ fn short_lines_keep_their_feed_under_a_low_jerk_and_a_high_acceleration() {
         let mut config = Config::new(500.0, accel, jerk);
         config.deviation = 0.5;
         let mut rig = Rig::new(config);
-        for n in 1..=30u32 {
+        for n in 1..=40u32 {
             let (x, velocity) = match n {
                 1..4 => (20.0 * f64::from(n), 500.0),
-                4..28 => (60.0 + 0.05 * f64::from(n), 5.0),
-                _ => (20.0 * f64::from(n - 24), 500.0),
+                4..38 => (60.0 + 0.05 * f64::from(n), 5.0),
+                _ => (20.0 * f64::from(n - 34), 500.0),
             };
             rig.line(at([x]), velocity, n);
         }
         rig.finish();
-        let short = rig.emitted.iter().filter(|e| (4..28).contains(&e.line));
+        let short = rig.emitted.iter().filter(|e| (4..38).contains(&e.line));
         let fastest = short.map(|e| e.velocity).fold(0.0, f32::max);
         assert!(fastest > 1.0 && fastest < 5.1, "{fastest} mm/s, {accel} mm/s2, {jerk} mm/s3");
     }

@@ -133,22 +133,22 @@ impl Number {
     pub fn parse(text: &[u8]) -> Option<Number> {
         let mut number = Number::int(0);
         let mut bytes = text.iter().copied().filter(|byte| *byte != b',').peekable();
-        number.negative = bytes.next_if(|b| *b == b'-').is_some();
+        number.negative = bytes.next_if_eq(&b'-').is_some();
         let mut any = false;
         while let Some(digit) = bytes.next_if(u8::is_ascii_digit) {
             number.push(digit, false);
             any = true;
         }
-        if bytes.next_if(|b| *b == b'.').is_some() {
+        if bytes.next_if_eq(&b'.').is_some() {
             while let Some(digit) = bytes.next_if(u8::is_ascii_digit) {
                 number.push(digit, true);
                 any = true;
             }
         }
         if bytes.next_if(|b| b.eq_ignore_ascii_case(&b'e')).is_some() {
-            let down = bytes.next_if(|b| *b == b'-').is_some();
+            let down = bytes.next_if_eq(&b'-').is_some();
             if !down {
-                bytes.next_if(|b| *b == b'+');
+                bytes.next_if_eq(&b'+');
             }
             let mut exponent = 0i16;
             any &= bytes.peek().is_some();

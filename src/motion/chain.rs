@@ -102,7 +102,7 @@ pub struct Chain {
     /// What was asked for, see [`Commands::blend`](crate::gcode::command::Commands::blend); 0 if nothing goes on with it.
     blend: u8,
     /// The tolerance of each axis.
-    tolerance: u8,
+    tolerance: i16,
     dominant: u8,
     /// Which minors have moved, a bit each.
     moved: u8,
@@ -134,15 +134,15 @@ impl Chain {
             return false;
         }
         (self.feed, self.blend) = (feed, blend);
-        let tolerance = blend - 1;
+        let tolerance = u16::from(blend - 1);
         // Both may be off by as much.
         let both = ends.iter().all(|way| *way != 0);
-        self.tolerance = if both { ((u16::from(tolerance) * 181) >> 8) as u8 } else { tolerance };
+        self.tolerance = if both { product(tolerance, 181) >> 8 } else { tolerance.into() } as i16;
         self.moved = 0;
         let mut bit = 1;
         for (minor, &way) in self.minors.iter_mut().zip(&ends) {
             if way != 0 {
-                *minor = Minor::past(&Slope { way, over }, self.tolerance.into());
+                *minor = Minor::past(&Slope { way, over }, self.tolerance);
                 self.moved |= bit;
             }
             bit <<= 1;
@@ -222,10 +222,10 @@ impl Chain {
                     return false;
                 }
                 // Of all ends at which it has not moved the last says most.
-                *minor = Minor::past(&Slope { way: 0, over: passed }, self.tolerance.into());
+                *minor = Minor::past(&Slope { way: 0, over: passed }, self.tolerance);
                 self.moved = bit;
             }
-            if self.moved & bit != 0 && !minor.pass(&Slope { way, over }, self.tolerance.into()) {
+            if self.moved & bit != 0 && !minor.pass(&Slope { way, over }, self.tolerance) {
                 return false;
             }
             bit <<= 1;

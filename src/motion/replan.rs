@@ -6,7 +6,7 @@
 //! thousandth. Exec goes on by the old keys until the new ones are put in their place, all at once. They are made on the stack, so
 //! that exec waits for no more than a copy.
 //!
-//! Cost on AVR: 800 cycles a line where the feed is steady, 2,000 at a corner that limits; all that is queued 26,000, or 64,000 if
+//! Cost on AVR: 800 cycles a line where the feed is steady, 2,000 at a corner that limits; all that is queued 52,000, or 127,000 if
 //! each line is a corner. Exec waits for 2,000 of them.
 
 use super::block::{Action, Block, Body, Line};

@@ -212,15 +212,11 @@ impl<'a> Runner<'a> {
         let Self { waiting, segments, rests, .. } = self;
         health::moves(waiting.count);
         waiting.update(segments.used());
+        waiting.fewest = if self.machine.has_jerk() { 2 } else { 1 };
         let short = waiting.is_short(*rests);
         let passed_over = event::pass_over();
-        let coarse = passed_over > PATIENCE || waiting.is_busy();
-        waiting.next = match coarse {
-            _ if self.machine.has_jerk() => Stretch::Smooth,
-            true => Stretch::Coarse,
-            false => Stretch::Usual,
-        };
-        self.machine.set_coarse(coarse, short);
+        waiting.coarse = passed_over > PATIENCE || waiting.is_busy();
+        self.machine.set_coarse(waiting.coarse, short);
         if !rested {
             health::look_for_starvation();
         }
@@ -239,8 +235,10 @@ struct Waiting {
     lengths: [u8; SEGMENTS],
     /// Segments queued, modulo 256.
     count: u8,
-    /// What the next one is like.
-    next: Stretch,
+    /// How many wait at least.
+    fewest: u8,
+    /// Stretches are twice as long.
+    coarse: bool,
     /// How many wait, as far as that is known, and how long they take together.
     used: u8,
     sum: u16,
@@ -250,17 +248,6 @@ struct Waiting {
     moved: u8,
     /// How many segments in a row were used up before thread mode was idle.
     busy: u8,
-}
-
-/// What a stretch is like.
-#[derive(Clone, Copy, PartialEq)]
-enum Stretch {
-    /// Under a jerk limit.
-    Smooth,
-    /// Without one.
-    Usual,
-    /// Without one, and perhaps twice as long.
-    Coarse,
 }
 
 /// So many of them say that thread mode has no time left.
@@ -313,7 +300,8 @@ impl Waiting {
         Self {
             lengths: [0; SEGMENTS],
             count: 0,
-            next: Stretch::Smooth,
+            fewest: 2,
+            coarse: false,
             used: 0,
             sum: 0,
             pressed: 0,
@@ -377,7 +365,7 @@ impl Waiting {
     fn is_short(&mut self, rests: bool) -> bool {
         self.moved = if rests { 0 } else { self.moved.saturating_add(1) };
         // The end of a block behind a long segment waits alone for a moment.
-        let is_end = self.next != Stretch::Smooth && self.length(2) >= LONG;
+        let is_end = self.fewest == 1 && self.length(2) >= LONG;
         let short = usize::from(self.moved) > SEGMENTS && self.sum < WAITING_SHORT && !is_end;
         if short {
             self.pressed = PRESSED_FOR;
@@ -385,27 +373,21 @@ impl Waiting {
         short
     }
 
-    /// How many wait at least.
-    #[inline(always)]
-    fn fewest(&self) -> u8 {
-        if self.next == Stretch::Smooth { 2 } else { 1 }
-    }
-
     /// Whether thread mode gets a turn before more is prepared, after so many segments without one.
     #[inline(always)]
     fn is_enough(&self, passed_over: u8) -> bool {
         let has_just_begun = usize::from(self.moved) <= SEGMENTS && passed_over >= FIRST_TURN;
         let least = if has_just_begun { FIRST_LEAST } else { self.limits().least };
-        self.used >= self.fewest() && (self.sum >= least || self.gives_way())
+        self.used >= self.fewest && (self.sum >= least || self.gives_way())
     }
 
     /// Whether another one may wait: what is queued cannot be slowed down any more, nor kept from beginning.
     #[inline(never)]
     fn has_room(&self) -> bool {
-        if self.used < self.fewest() || self.sum < SOON {
+        if self.used < self.fewest || self.sum < SOON {
             return self.used < SEGMENTS as u8 - 1;
         }
-        let next = if self.next == Stretch::Coarse { COARSE } else { self.length(1) };
+        let next = if self.coarse && self.fewest == 1 { COARSE } else { self.length(1) };
         let sum = self.length(self.used + 1) + self.sum + next;
         self.used < SEGMENTS as u8 - 1 && sum <= self.limits().most && !self.gives_way()
     }

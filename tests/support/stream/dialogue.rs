@@ -5,7 +5,6 @@
 //! it says.
 
 use kerf::boards::outputs;
-use kerf::motion::queue::CAPACITY;
 
 use super::answer::{Answer, Heard, read};
 use super::course::Course;
@@ -294,7 +293,7 @@ impl<S: Side> Dialogue<S> {
             let number = |name| answer.told(name).and_then(Value::number).unwrap_or(-1.0) as i32;
             match number("stat") {
                 2 => drop(self.ask("clear:n")?),
-                1 | 3 | 4 if number("qr") == CAPACITY as i32 && number("hold") == 0 => rested += 1,
+                1 | 3 | 4 if number("qr") == 64 && number("hold") == 0 => rested += 1,
                 _ => rested = 0,
             }
         }
