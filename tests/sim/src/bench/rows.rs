@@ -298,7 +298,7 @@ pub const ROWS: [Row; 44] = [
         better: Higher,
         peers: NONE,
         target: None,
-        floor: None,
+        floor: Some(24.0),
         measure: spirals::look_ahead,
     },
     Row {
@@ -354,8 +354,8 @@ pub const ROWS: [Row; 44] = [
         better: Lower,
         peers: NONE,
         target: Some(24_000.0),
-        // A scan that tries three velocities, and a ramp that is laid out.
-        floor: Some(24_000.0),
+        // A scan that tries three velocities, and a ramp that is laid out: 22,700 to 24,330, as blocks happen to lie.
+        floor: Some(24_500.0),
         measure: costs::segment_jerk_worst,
     },
     Row {
