@@ -2,6 +2,7 @@
 
 use super::block::byte_of;
 use super::json;
+use super::remark::Remark;
 use super::request::{Context, Phase, Request};
 use super::write::Writer;
 use crate::protocol::{Ending, Machine, Out, Value};
@@ -9,6 +10,11 @@ use crate::status::Status;
 use crate::text;
 
 impl Request {
+    /// Whether the footer is all that has to be told when all has been carried out.
+    pub(super) fn adds_nothing(&self) -> bool {
+        !self.identified && self.status == Status::Ok && self.remark == Remark::None
+    }
+
     /// Tells the `tid` of the line, which one that has failed may have further on.
     pub(super) fn warning<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         self.open(c);

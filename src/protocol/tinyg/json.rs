@@ -94,6 +94,12 @@ pub fn behind_object(line: &[u8], at: u8) -> u8 {
     cursor.at
 }
 
+/// Whether no other pair of the object follows at `at`. The line has passed [`check`].
+#[small]
+pub fn is_last(line: &[u8], at: u8) -> bool {
+    Cursor { line, at }.take(b'}')
+}
+
 /// The first byte of `line` that is not a blank, as an index.
 #[small]
 pub fn skip_blanks(line: &[u8]) -> u8 {

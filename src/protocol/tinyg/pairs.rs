@@ -202,6 +202,13 @@ impl Request {
                 let mut writer = Writer::body(c.out, &mut self.format);
                 writer.key(pair.name.of(c.line));
                 writer.shown(shown);
+                // A short question is answered in one step: each costs 700 cycles, and may wait for motion.
+                if self.phase == Phase::Pair
+                    && self.adds_nothing()
+                    && json::is_last(c.line, self.at)
+                {
+                    self.footer(c);
+                }
             }
             Ok(None) if self.phase == Phase::Greeting => {}
             Ok(None) => self.tell_sent(pair, true, c),

@@ -4,7 +4,7 @@ use super::format::{COMMA, EXPAND, Format, HUSHED, MUTE, SILENT, STRICT, WRAPPED
 use super::token::Shown;
 use super::variation::Variation;
 use crate::config::{Digits, Fixed, Settings};
-use crate::progmem::Text;
+use crate::progmem::{Plain, Text};
 pub use crate::protocol::{Ending, Out};
 use crate::status::Status;
 use crate::{plain, text};
@@ -211,25 +211,29 @@ impl<'a, O: Out> Writer<'a, O> {
     /// Opens a response, and its body.
     pub fn begin_response(&mut self) {
         self.begin_sum();
-        self.open();
-        self.key_text(text!("r"));
-        self.open();
+        self.frame_part(plain!("{\"r\":{"), plain!("{r:{"));
+        self.format.flags &= !COMMA;
     }
 
     /// Closes the body of a response, and the response with its footer: `},"f":[1,status,free]}`. See [`Ending`].
     pub fn end_response(&mut self, status: Status, ending: Ending) {
-        self.close();
-        self.key_text(text!("f"));
-        self.text(text!("[1,"));
+        self.frame_part(plain!("},\"f\":[1,"), plain!("},f:[1,"));
         self.footer_values(status, ending);
     }
 
     /// A whole response of which nothing but the frame shows.
     pub fn empty_response(&mut self, status: Status, ending: Ending) {
         self.begin_sum();
-        let strict = self.format.flags & STRICT != 0;
-        self.text(if strict { text!("{\"r\":{},\"f\":[1,") } else { text!("{r:{},f:[1,") });
+        self.frame_part(plain!("{\"r\":{},\"f\":[1,"), plain!("{r:{},f:[1,"));
         self.footer_values(status, ending);
+    }
+
+    /// A part of the frame of a response, which never stands within a string: at once, which is 100 cycles a byte less on AVR than
+    /// [`Writer::byte`].
+    fn frame_part(&mut self, strict: Plain, relaxed: Plain) {
+        if self.shown {
+            self.out.put_plain(if self.format.flags & STRICT != 0 { strict } else { relaxed });
+        }
     }
 
     fn begin_sum(&mut self) {
@@ -251,8 +255,10 @@ impl<'a, O: Out> Writer<'a, O> {
             self.byte(b',');
             self.fixed(Fixed::int(sum.into()));
         }
-        self.text(text!("]}"));
-        self.end_line();
+        if self.shown {
+            let expand = self.format.flags & EXPAND != 0;
+            self.out.put_plain(if expand { plain!("]}\n\r") } else { plain!("]}\n") });
+        }
     }
 
     /// A number, which most often has one digit.
