@@ -5,6 +5,8 @@
 //! merge into one. So an event says "look again", and what there is to be seen lies elsewhere, in a [`Ring`](crate::ring::Ring)
 //! for example.
 //!
+//! Of events in one turn of the main loop the one with the highest bit is seen to first, timers last.
+//!
 //! ```
 //! use avr_embassy::{Event, Thread};
 //!
@@ -148,7 +150,7 @@ machine_static! {
     fn waiters() -> [Waiter; WAITABLE] = [const { Waiter::new() }; WAITABLE];
 }
 
-/// Wakes who waits for the events in `bits`. The main loop calls it.
+/// Wakes who waits for the events in `bits`, in the order of the bits: Embassy polls them in the reverse order. The main loop calls it.
 pub(crate) fn dispatch(thread: Thread, bits: u8) {
     let mut left = bits & ((1 << WAITABLE) - 1);
     for waiter in waiters() {

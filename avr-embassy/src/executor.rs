@@ -48,11 +48,12 @@ impl Executor {
         loop {
             if flags::all() != 0 {
                 let bits = flags::take();
-                event::dispatch(thread, bits);
-                turn(thread, bits);
+                // Embassy polls tasks in the reverse order of their wake-ups: those that wait for a time come last.
                 if bits & 1 << Event::TICK.bit() != 0 {
                     time::wake_expired(thread);
                 }
+                event::dispatch(thread, bits);
+                turn(thread, bits);
                 // SAFETY: called from here only, so never reentered.
                 unsafe { executor.poll() };
                 continue;

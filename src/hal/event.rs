@@ -11,16 +11,17 @@ use super::byte::SharedByte;
 use super::imp;
 use super::serial::{PORTS, USB};
 
-/// What happened. The discriminant is the bit.
+/// What happened. The discriminant is the bit; of events that happen in one turn of the main loop the one with the highest bit is
+/// seen to first: control before the reader, and that before the planner and the reporter, whose turns may take 10 ms of a busy CPU.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Event {
-    /// Bytes arrived, or were lost.
-    Received = 0,
     /// The transmit ring drained by a byte.
-    Transmitted = 1,
+    Transmitted = 0,
     /// Exec released a block.
-    BlockDone = 2,
+    BlockDone = 1,
+    /// Bytes arrived, or were lost.
+    Received = 2,
     /// A real-time character arrived, or a switch has changed.
     Realtime = 3,
     /// A millisecond has passed.
@@ -32,9 +33,9 @@ impl Event {
     #[inline(always)]
     pub(super) const fn bit(self) -> avr_embassy::Event {
         match self {
-            Event::Received => avr_embassy::Event::new::<0>(),
-            Event::Transmitted => avr_embassy::Event::new::<1>(),
-            Event::BlockDone => avr_embassy::Event::new::<2>(),
+            Event::Transmitted => avr_embassy::Event::new::<0>(),
+            Event::BlockDone => avr_embassy::Event::new::<1>(),
+            Event::Received => avr_embassy::Event::new::<2>(),
             Event::Realtime => avr_embassy::Event::new::<3>(),
             Event::Tick => avr_embassy::Event::TICK,
         }
