@@ -215,7 +215,8 @@ impl<'a> Runner<'a> {
         waiting.fewest = if self.machine.has_jerk() { 2 } else { 1 };
         let short = waiting.is_short(*rests);
         let passed_over = event::pass_over();
-        waiting.coarse = passed_over > PATIENCE || waiting.is_busy();
+        // While somebody asks, a ramp in usual stretches would keep the answer away for 9 ms.
+        waiting.coarse = event::is_asked() || passed_over > PATIENCE || waiting.is_busy();
         self.machine.set_coarse(waiting.coarse, short);
         if !rested {
             health::look_for_starvation();

@@ -57,7 +57,7 @@ fn longest_on_both(line: &str, setup: &[&str]) -> [f64; 2] {
     (0..4_000).for_each(|n| host.queue(n, &line.replace('@', if n % 2 == 0 { "" } else { "-" })));
     host.run_for_ms(&mut machine, 700).unwrap();
     let mut longest = [0.0f64; 2];
-    for n in 0..80 {
+    for n in 0..120 {
         host.run_for_ms(&mut machine, 23 + n % 7).unwrap();
         let _ = machine.receive_from(1);
         let from = machine.cycle();
@@ -93,8 +93,9 @@ fn requests_on_both_ports_are_answered_in_arcs_at_the_highest_step_rate() {
                 "jm {jerk}, radius {radius}: {:.1} ms, {:.1} ms on the second port",
                 ms[0], ms[1]
             );
-            // Steps and exec take nine tenths of the CPU, and a report 12 ms of the line of USB: docs/protocol.md.
-            assert!(ms[0] <= 30.0 && ms[1] <= 25.0, "jm {jerk}, radius {radius}: {ms:?} ms");
+            // Steps and exec take nine tenths of the CPU, and a report 12 ms of the line of USB: docs/protocol.md. Of 400 questions the
+            // slowest took 19.2 ms.
+            assert!(ms.iter().all(|ms| *ms <= 20.0), "jm {jerk}, radius {radius}: {ms:?} ms");
         }
     }
 }
