@@ -6,12 +6,14 @@
 #![feature(abi_avr_interrupt)]
 #![allow(missing_docs)] // of what `avr_device::interrupt` makes
 
+mod chip;
+
 use core::hint::black_box;
 use core::sync::atomic::{AtomicU8, AtomicU16, Ordering::Relaxed};
 
-use avr_device::atmega2560::{Peripherals, TC1};
 use avr_embassy::ring::Ring;
 use avr_embassy::{Event, Executor, Interrupt, Thread, interrupt, time};
+use chip::{Peripherals, TC1};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use static_cell::StaticCell;
@@ -49,7 +51,8 @@ fn now() -> u16 {
     timer().tcnt1().read().bits()
 }
 
-#[avr_device::interrupt(atmega2560)]
+#[cfg_attr(feature = "atmega1284p", avr_device::interrupt(atmega1284p))]
+#[cfg_attr(feature = "atmega2560", avr_device::interrupt(atmega2560))]
 fn TIMER1_COMPB() {
     timer().timsk1().write(|w| w.ocie1b().clear_bit());
     CALLED.set();

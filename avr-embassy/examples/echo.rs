@@ -1,15 +1,17 @@
-//! Sends back what comes over the serial port of an Arduino Mega 2560 (USART0) at 115,200 baud, 8 bits, no parity.
+//! Sends back what comes over USART0, the serial port of an Arduino Mega 2560, at 115,200 baud, 8 bits, no parity.
 //!
-//! Handlers move bytes and set events; the task is woken by these. Up to 63 bytes wait; what comes then is lost, and the LED
-//! (pin 13, PB7) says so.
+//! Handlers move bytes and set events; the task is woken by these. Up to 63 bytes wait; what comes then is lost, and PB7 (the LED
+//! on pin 13) says so.
 #![no_std]
 #![no_main]
 #![feature(abi_avr_interrupt)]
 #![allow(missing_docs)] // of what `avr_device::interrupt` makes
 
-use avr_device::atmega2560::{Peripherals, USART0};
+mod chip;
+
 use avr_embassy::ring::{Consumer, Producer, Ring};
 use avr_embassy::{Event, Executor, Thread};
+use chip::{Peripherals, USART0};
 use static_cell::StaticCell;
 
 static BYTES: Ring<u8, 64> = Ring::new();
@@ -21,7 +23,8 @@ fn peripherals() -> Peripherals {
     unsafe { Peripherals::steal() }
 }
 
-#[avr_device::interrupt(atmega2560)]
+#[cfg_attr(feature = "atmega1284p", avr_device::interrupt(atmega1284p))]
+#[cfg_attr(feature = "atmega2560", avr_device::interrupt(atmega2560))]
 fn USART0_RX() {
     static mut INPUT: Option<Producer<u8, 64>> = None;
     let byte = peripherals().USART0.udr0().read().bits();
@@ -34,7 +37,8 @@ fn USART0_RX() {
     RECEIVED.set();
 }
 
-#[avr_device::interrupt(atmega2560)]
+#[cfg_attr(feature = "atmega1284p", avr_device::interrupt(atmega1284p))]
+#[cfg_attr(feature = "atmega2560", avr_device::interrupt(atmega2560))]
 fn USART0_UDRE() {
     peripherals().USART0.ucsr0b().modify(|_, w| w.udrie0().clear_bit());
     SENT.set();
@@ -56,7 +60,8 @@ fn main() -> ! {
     let Peripherals { USART0: usart, PORTB: port, .. } = peripherals();
     port.ddrb().write(|w| w.pb7().set_bit());
     // 16 MHz / 8 / 17 is 2.1 % above 115,200.
-    usart.ubrr0().write(|w| w.set(16));
+    // SAFETY: a divisor of 12 bits.
+    unsafe { usart.ubrr0().write(|w| w.bits(16)) };
     usart.ucsr0a().write(|w| w.u2x0().set_bit());
     usart.ucsr0b().write(|w| w.rxen0().set_bit().txen0().set_bit().rxcie0().set_bit());
     EXECUTOR.init(Executor::new()).run(|spawner, thread| {

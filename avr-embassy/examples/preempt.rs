@@ -8,8 +8,10 @@
 #![feature(abi_avr_interrupt)]
 #![allow(missing_docs)] // of what `avr_device::interrupt` makes
 
-use avr_device::atmega2560::Peripherals;
+mod chip;
+
 use avr_embassy::{Executor, Interrupt, interrupt};
+use chip::Peripherals;
 use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
@@ -27,7 +29,8 @@ fn turn_over(pin: u8) {
     unsafe { peripherals().PORTB.pinb().write(|w| w.bits(1 << pin)) };
 }
 
-#[avr_device::interrupt(atmega2560)]
+#[cfg_attr(feature = "atmega1284p", avr_device::interrupt(atmega1284p))]
+#[cfg_attr(feature = "atmega2560", avr_device::interrupt(atmega2560))]
 fn TIMER1_COMPA() {
     interrupt::pend();
 }

@@ -29,13 +29,13 @@
 //!
 //! # What the runtime owns
 //!
-//! | what | ATmega2560 |
-//! |---|---|
-//! | the register of event bits; bits 0 to 3 are the program's | GPIOR0 |
-//! | a software interrupt | USART2_UDRE; with it USART2's transmitter, whose pin (port H bit 1) is high |
-//! | a timer for the millisecond | timer 0 and TIMER0_COMPA |
-//! | the sleep mode | idle |
-//! | the pender of Embassy's executors and the critical section | |
+//! | what | ATmega2560 | ATmega1284P |
+//! |---|---|---|
+//! | the register of event bits; bits 0 to 3 are the program's | GPIOR0 | GPIOR0 |
+//! | a software interrupt | USART2_UDRE; with it USART2's transmitter, whose pin (port H bit 1) is high | USART1_UDRE; with it USART1's transmitter, whose pin (port D bit 3) is high |
+//! | a timer for the millisecond | timer 0 and TIMER0_COMPA | timer 0 and TIMER0_COMPA |
+//! | the sleep mode | idle | idle |
+//! | the pender of Embassy's executors and the critical section | | |
 //!
 //! # When full or late
 //!
@@ -109,6 +109,8 @@ pub mod host;
 pub mod interrupt;
 mod level;
 mod pender;
+#[cfg(any(target_arch = "avr", test))]
+mod period;
 pub mod ring;
 mod shared;
 #[cfg(target_arch = "avr")]

@@ -15,7 +15,8 @@ use embassy_executor::raw::wake_task;
 use embassy_time_driver::{Driver, time_driver_impl};
 
 use crate::assembly::{CLOSED, FLAGS, MISSED, PEND, PENDED};
-use crate::chip::{self, OCRA, TCCRA, TCCRB, TIMSK};
+use crate::chip::{self, OCRA, PRESCALERS, TCCRA, TCCRB, TIMSK};
+use crate::period::Period;
 use crate::timers::Timers;
 use crate::{Event, Thread, interrupt};
 
@@ -28,22 +29,20 @@ const TIMERS: usize = match (cfg!(feature = "timers-8"), cfg!(feature = "timers-
 /// Milliseconds since reset, the lowest byte first: enough for 34 years. The interrupt alone writes it.
 static mut MILLIS: [u8; 5] = [0; 5];
 
-/// The tick: counts, in 33 cycles, with interrupts off for 21.
-///
-/// Every 256 ms it carries into the upper bytes, with interrupts on. Interrupt mode is kept out meanwhile: its tasks
-/// may ask for the time.
-///
-/// # Safety
-/// It is the handler of the tick's interrupt, and nothing else calls it.
-#[inline(always)]
-pub(crate) unsafe fn handler() -> ! {
-    // SAFETY: every register it changes is restored, and it returns by `reti`. Only it writes `MILLIS`. Whoever
-    // interrupts it leaves `CLOSED` as it was, so counting up and down restores it.
-    unsafe {
+/// What a millisecond is on an uneven clock, of which it is no whole number of the timer's counts: the parts of a count that have been
+/// left out so far, the parts that each millisecond leaves out, of how many, and the whole counts. The interrupt alone touches it
+/// once it is on.
+#[cfg(feature = "uneven-clock")]
+static mut PERIOD: [u8; 4] = [0; 4];
+
+/// The text of the tick. In brackets what it does about the length of the millisecond that has begun, then the operands of that.
+macro_rules! tick {
+    ([$($period:literal),*] $($operands:tt)*) => {
         asm!(
             "push r24",
             "in   r24, 0x3F",
             "push r24",
+            $($period,)*
             "lds  r24, {millis}",
             "inc  r24",
             "sts  {millis}, r24",
@@ -95,8 +94,50 @@ pub(crate) unsafe fn handler() -> ! {
             pend = const PEND,
             pended = const PENDED,
             tick = const Event::TICK.bit(),
+            $($operands)*
             options(noreturn),
-        );
+        )
+    };
+}
+
+/// The tick: counts, in 33 cycles, with interrupts off for 21.
+///
+/// Every 256 ms it carries into the upper bytes, with interrupts on. Interrupt mode is kept out meanwhile: its tasks
+/// may ask for the time.
+///
+/// With the feature `uneven-clock` it also says how long the millisecond is that has begun, which takes 21 cycles more, with interrupts
+/// off: one count more as soon as the parts that were left out make a count. The timer's count is far from its end then.
+///
+/// # Safety
+/// It is the handler of the tick's interrupt, and nothing else calls it.
+#[inline(always)]
+pub(crate) unsafe fn handler() -> ! {
+    // SAFETY: every register it changes is restored, and it returns by `reti`. Only it writes `MILLIS` and `PERIOD`. Whoever
+    // interrupts it leaves `CLOSED` as it was, so counting up and down restores it.
+    #[cfg(not(feature = "uneven-clock"))]
+    unsafe {
+        tick!([])
+    }
+    // SAFETY: as above.
+    #[cfg(feature = "uneven-clock")]
+    unsafe {
+        tick!([
+            "push r25",
+            "lds  r24, {period}",
+            "lds  r25, {period} + 1",
+            "add  r24, r25",
+            "lds  r25, {period} + 2",
+            "cp   r24, r25",
+            // Carry is set from here to `sbci` if this millisecond is one of whole counts.
+            "brlo 5f",
+            "sub  r24, r25",
+            "5:",
+            "sts  {period}, r24",
+            "lds  r24, {period} + 3",
+            "sbci r24, 0",
+            "sts  {top}, r24",
+            "pop  r25"
+        ] period = sym PERIOD, top = const OCRA,)
     }
 }
 
@@ -140,32 +181,33 @@ pub(crate) fn wake_expired(thread: Thread) {
     }
 }
 
-/// Starts the tick of a chip whose clock is `CLOCK_HZ`: 8 or 16 MHz for example. One of which a millisecond
-/// is no whole number of timer counts, such as 20 MHz, does not compile. The timer then is the runtime's.
+/// Starts the tick of a chip whose clock is `CLOCK_HZ`, 8 or 16 MHz for example. The timer then is the runtime's.
+///
+/// A clock of which a millisecond is no whole number of timer counts, such as 20 MHz, needs the feature `uneven-clock`. Milliseconds
+/// differ by a count then, 12.8 us at 20 MHz, and their mean is exact: no parts of a count are lost. A clock of which a
+/// millisecond is no whole number of 128ths of a count, or of larger parts, does not compile.
 pub fn start<const CLOCK_HZ: u32>() {
-    let (select, counts) =
-        const { scale(CLOCK_HZ).expect("a millisecond is no whole number of the timer's counts") };
+    let period = const {
+        let period = Period::new(CLOCK_HZ, &PRESCALERS)
+            .expect("a millisecond of this clock cannot be made of the timer's counts");
+        assert!(
+            period.parts == 0 || cfg!(feature = "uneven-clock"),
+            "a millisecond of this clock is no whole number of the timer's counts: \
+             turn on the feature `uneven-clock` of avr-embassy"
+        );
+        period
+    };
     chip::link();
+    #[cfg(feature = "uneven-clock")]
+    // SAFETY: the tick is not on yet.
+    unsafe {
+        (&raw mut PERIOD).write([0, period.parts, period.of, period.counts]);
+    }
     // SAFETY: the timer is nobody else's. CTC: it counts up to `OCRA` and begins anew.
     unsafe {
-        (OCRA as *mut u8).write_volatile(counts - 1);
+        (OCRA as *mut u8).write_volatile(period.counts - 1);
         (TCCRA as *mut u8).write_volatile(0b10);
-        (TCCRB as *mut u8).write_volatile(select);
+        (TCCRB as *mut u8).write_volatile(period.select);
         (TIMSK as *mut u8).write_volatile(0b10);
     }
-}
-
-/// Which prescaler makes a millisecond a whole number of counts that fits the timer: its code, and the counts.
-const fn scale(clock_hz: u32) -> Option<(u8, u8)> {
-    const PRESCALERS: [(u8, u32); 4] = [(2, 8), (3, 64), (4, 256), (5, 1024)];
-    let mut n = 0;
-    while n < PRESCALERS.len() {
-        let (code, divisor) = PRESCALERS[n];
-        let counts = clock_hz / divisor / 1_000;
-        if counts * divisor * 1_000 == clock_hz && counts >= 2 && counts <= 255 {
-            return Some((code, counts as u8));
-        }
-        n += 1;
-    }
-    None
 }

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 
 use crate::boards::Board;
+use crate::chips::{ATMEGA1284P, ATMEGA2560, Chip};
 use crate::elf;
 use crate::machines::Machine;
 use crate::process::{self, root, run};
@@ -16,15 +17,28 @@ use crate::toolchain::Toolchain;
 /// Copies of code (`tail-dup-placement`, `rotation-max-header-size`, `jump-threading-threshold`) save no cycle here: without them the image
 /// is 900 bytes smaller. `--relax`: the linker shortens calls and jumps to what is near, 1,600 bytes and a cycle each. It may, for
 /// LLVM leaves it a relocation for every branch. `__TEXT_REGION_LENGTH__`: what the compiler wrote may be larger than the flash, since it is
-/// made smaller behind it; the image is held against the flash by [`elf::check`].
-const FLAGS: &str = "-C target-cpu=atmega2560 -C llvm-args=-inline-threshold=30 -C llvm-args=-tail-dup-placement=false \
+/// made smaller behind it; the image is held against the flash by [`elf::check`]. For `CHIP` stands the chip's name.
+const FLAGS: &str = "-C target-cpu=CHIP -C llvm-args=-inline-threshold=30 -C llvm-args=-tail-dup-placement=false \
                      -C llvm-args=-rotation-max-header-size=4 -C llvm-args=-jump-threading-threshold=3 -C jump-tables=no \
-                     -C linker=target/avr/keep-gcc -C link-arg=-mmcu=atmega2560 -C link-arg=-Wl,--gc-sections -C link-arg=-Wl,--relax \
+                     -C linker=target/avr/keep-gcc -C link-arg=-mmcu=CHIP -C link-arg=-Wl,--gc-sections -C link-arg=-Wl,--relax \
                      -C link-arg=-Wl,--defsym=__TEXT_REGION_LENGTH__=0x60000";
 
 /// The linker in `FLAGS`: a script that writes down how it was called. Its path does not name the checkout, for cargo would build all
 /// anew in a copy; `rustc` knows by the end of the name which options it takes.
 const LINKER: &str = "target/avr/keep-gcc";
+
+/// The flags for a chip.
+fn flags(chip: &Chip) -> String {
+    FLAGS.replace("CHIP", chip.name)
+}
+
+/// Where cargo builds for a chip: one directory for all boards of it, so that the dependencies are built once.
+fn target(chip: &Chip) -> PathBuf {
+    match chip.name == ATMEGA2560.name {
+        true => root().join("target/avr"),
+        false => root().join(format!("target/avr-{}", chip.name)),
+    }
+}
 
 /// Where the images lie: `BOARD.elf`, or `BOARD-MACHINE.elf` if it is not for the usual machine. The name of one that lacks features says
 /// so: `BOARD-without-FEATURE.elf`.
@@ -57,14 +71,13 @@ pub fn build_without(board: Board, machine: Machine, without: &[String]) -> Resu
     let features = features(board, machine, without)?;
     let image = image_without(board, machine, without);
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
-    // One target directory for all boards: the dependencies are built once.
-    let target = root().join("target/avr");
+    let target = target(&ATMEGA2560);
     let kept = target.join("kept").join(image.with_extension("").file_name().unwrap_or_default());
     link::write_script(&root().join(LINKER))?;
     std::fs::create_dir_all(&kept)?;
     let (text, linked) = (kept.join("kerf.s"), kept.join("link"));
     let mut cargo = rust.cargo();
-    cargo.current_dir(root()).env("RUSTFLAGS", FLAGS).env(link::KEPT, &linked);
+    cargo.current_dir(root()).env("RUSTFLAGS", flags(&ATMEGA2560)).env(link::KEPT, &linked);
     cargo
         .args(["rustc", "--release", "-Zbuild-std=core", "--target", "avr-none", "--target-dir"])
         .arg(&target);
@@ -99,9 +112,9 @@ fn make_small(text: &Path, linked: &Path, elf: &Path) -> Result<PathBuf> {
         })?;
         let texts = shrink::shrink(&program)?;
         let link = link::Link::read(linked)?;
-        link.image(&texts.plain, &plain)?;
-        elf::check_compiled(&plain)?;
-        link.image(&texts.small, &small)?;
+        link.image(&texts.plain, &plain, &ATMEGA2560)?;
+        elf::check_compiled(&plain, &ATMEGA2560)?;
+        link.image(&texts.small, &small, &ATMEGA2560)?;
     }
     keep(&small, elf)
 }
@@ -122,23 +135,37 @@ fn keep(built: &Path, kept: &Path) -> Result<PathBuf> {
     Ok(kept.to_owned())
 }
 
-/// Builds and checks the examples of the runtime, `avr-embassy`; returns the folder where they lie, `NAME.elf`.
+/// Builds and checks the examples of the runtime, `avr-embassy`; returns the folder where they lie, `CHIP/NAME.elf`.
+///
+/// That of a clock of which a millisecond is no whole number of counts is `CHIP-uneven-clock/blink.elf`.
 pub fn build_examples() -> Result<PathBuf> {
+    let folder = directory().join("avr-embassy");
+    for chip in [ATMEGA2560, ATMEGA1284P] {
+        build_examples_of(&chip, "", &EXAMPLES, &folder.join(chip.name))?;
+    }
+    let uneven = folder.join(format!("{}-uneven-clock", ATMEGA1284P.name));
+    build_examples_of(&ATMEGA1284P, "uneven-clock", &EXAMPLES[..1], &uneven)?;
+    Ok(folder)
+}
+
+/// Builds some examples for a chip, with a feature of the runtime, into a folder.
+fn build_examples_of(chip: &Chip, feature: &str, names: &[&str], folder: &Path) -> Result<()> {
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
-    let target = root().join("target/avr");
+    let target = target(chip);
     link::write_script(&root().join(LINKER))?;
     let mut cargo = rust.cargo();
-    cargo.current_dir(root()).env("RUSTFLAGS", FLAGS).env(link::KEPT, "/dev/null");
-    cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none", "--package"]);
-    cargo.args(["avr-embassy", "--examples", "--features", "atmega2560"]);
+    cargo.current_dir(root()).env("RUSTFLAGS", flags(chip)).env(link::KEPT, "/dev/null");
+    cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none"]);
+    cargo.args(["--package", "avr-embassy", "--features"]);
+    cargo.arg(format!("{},{feature}", chip.name).trim_end_matches(','));
+    cargo.args(names.iter().flat_map(|name| ["--example", name]));
     run(cargo.arg("--target-dir").arg(&target))?;
-    let folder = directory().join("avr-embassy");
-    for name in EXAMPLES {
+    for name in names {
         let built = target.join(format!("avr-none/release/examples/{name}.elf"));
-        elf::check_compiled(&built)?;
+        elf::check_compiled(&built, chip)?;
         keep(&built, &folder.join(format!("{name}.elf")))?;
     }
-    Ok(folder)
+    Ok(())
 }
 
 /// The examples of `avr-embassy`.
@@ -175,7 +202,7 @@ pub fn flash(args: &FlashArgs) -> Result<()> {
 
 fn avrdude(port: &str, elf: &Path) -> std::process::Command {
     let mut command = std::process::Command::new("avrdude");
-    command.args(["-p", "m2560", "-c", "wiring", "-P", port, "-b", "115200", "-D"]);
+    command.args(["-p", ATMEGA2560.part, "-c", "wiring", "-P", port, "-b", "115200", "-D"]);
     command.arg("-U").arg(format!("flash:w:{}:e", elf.display()));
     command
 }

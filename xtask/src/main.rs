@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`setup`] | finds the tools, installs what is missing |
 //! | [`toolchain`] | which Rust builds for AVR, and its environment |
+//! | [`chips`] | the chips that images are built for |
 //! | [`firmware`] | builds the image of a board, flashes it |
 //! | [`shrink`] | makes the image smaller before the link |
 //! | [`elf`] | what is in an image: sizes, stack, what must not be in it |
@@ -20,6 +21,7 @@
 mod boards;
 mod caps;
 mod checks;
+mod chips;
 #[cfg(test)]
 mod docs;
 mod elf;

@@ -23,6 +23,8 @@ pub const TCCRB: usize = 0x45;
 pub const OCRA: usize = 0x47;
 /// TIMSK0.
 pub const TIMSK: usize = 0x6E;
+/// CS02 to CS00.
+pub const PRESCALERS: [(u8, u32); 4] = [(2, 8), (3, 64), (4, 256), (5, 1024)];
 
 // TIMER0_COMPA and USART2_UDRE.
 handlers!(tick: __vector_21, software: __vector_52);

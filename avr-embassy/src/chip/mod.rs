@@ -9,6 +9,7 @@
 //! | `PENDED`, `WITHDRAWN` | the values of that register for the two |
 //! | `SMCR`, `SLEEP_IDLE` | data address of the sleep register, and its value for idle sleep, enabled |
 //! | `TCCRA`, `TCCRB`, `OCRA`, `TIMSK` | data addresses of the 8-bit timer of the tick |
+//! | `PRESCALERS` | the codes of the timer's clock select, each with the cycles of a count, rising |
 //! | `handlers!` | makes the handlers, by the numbers of their vectors: those of the tick and of the software interrupt |
 
 /// Gives the runtime's two handlers the names that the start-up code's vector table refers to.
@@ -37,7 +38,14 @@ mod atmega2560;
 #[cfg(feature = "atmega2560")]
 pub use atmega2560::*;
 
-#[cfg(not(feature = "atmega2560"))]
+#[cfg(all(feature = "atmega1284p", not(feature = "atmega2560")))]
+mod atmega1284p;
+#[cfg(all(feature = "atmega1284p", not(feature = "atmega2560")))]
+pub use atmega1284p::*;
+
+#[cfg(not(feature = "_chip"))]
 compile_error!(
     "avr-embassy does not know the chip: enable one of its features, such as `atmega2560`"
 );
+#[cfg(all(feature = "atmega1284p", feature = "atmega2560"))]
+compile_error!("avr-embassy is for one chip: enable one of its features for chips, not several");

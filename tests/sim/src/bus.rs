@@ -6,14 +6,14 @@ use std::ptr::NonNull;
 use kerf::boards::Pin;
 use simavr_ffi as ffi;
 
+use crate::chip::{Chip, MAX_VECTORS};
 use crate::cpu::Cpu;
 use crate::eeprom::Eeprom;
 use crate::mechanics::Mechanics;
 use crate::pins::PinInterrupts;
 use crate::recorder::{Recorder, Sums};
-use crate::timer::{LAYOUTS, Timer};
-use crate::uart::{OFFSETS, PLACES, Uart};
-use crate::vectors;
+use crate::timer::Timer;
+use crate::uart::{OFFSETS, Uart};
 use crate::wire::Wire;
 
 /// Whose register it is.
@@ -32,11 +32,12 @@ const IO_END: usize = 0x138;
 /// Everything around the CPU.
 pub struct Bus {
     pub(crate) cpu: Cpu,
+    chip: &'static Chip,
     owners: [Owner; IO_END],
-    pub(crate) timers: [Timer; 6],
-    /// Which of them makes the ticks of the step generator.
-    step_timer: usize,
-    pub(crate) uarts: [Uart; 4],
+    pub(crate) timers: Vec<Timer>,
+    /// Which of them makes the ticks of the step generator, if one does.
+    step_timer: Option<usize>,
+    pub(crate) uarts: Vec<Uart>,
     pub(crate) eeprom: Eeprom,
     /// A line for each serial port of the board, and the USART it leads to.
     pub(crate) wires: Vec<(usize, Wire)>,
@@ -51,40 +52,46 @@ pub struct Bus {
     /// Interrupts that are not served although they ask, by vector.
     withheld: u64,
     /// When each of them began to ask.
-    raised_at: [u64; vectors::COUNT],
+    raised_at: [u64; MAX_VECTORS],
     /// Cycle of the next thing to happen.
     pub(crate) due: u64,
 }
 
 impl Bus {
     /// Puts the peripherals around a CPU, which keeps the pointer returned.
-    pub fn install(cpu: Cpu, step_timer: usize, wires: Vec<(usize, Wire)>) -> NonNull<Bus> {
+    pub fn install(
+        cpu: Cpu,
+        chip: &'static Chip,
+        step_timer: Option<usize>,
+        wires: Vec<(usize, Wire)>,
+    ) -> NonNull<Bus> {
         let bus = Box::new(Bus {
             cpu,
-            owners: owners(),
-            timers: std::array::from_fn(|i| Timer::new(&LAYOUTS[i])),
+            chip,
+            owners: owners(chip),
+            timers: chip.timers.iter().map(Timer::new).collect(),
             step_timer,
-            uarts: std::array::from_fn(Uart::new),
+            uarts: chip.usarts.iter().copied().map(Uart::new).collect(),
             eeprom: Eeprom::new(),
             wires,
-            pins: PinInterrupts::default(),
+            pins: PinInterrupts::new(&chip.pins),
             recorder: Recorder::new(),
             mechanics: None,
             changed: Vec::new(),
             sums: Sums::default(),
             pending: 0,
             withheld: 0,
-            raised_at: [0; vectors::COUNT],
+            raised_at: [0; MAX_VECTORS],
             due: u64::MAX,
         });
         let bus = NonNull::from(Box::leak(bus));
         let param = bus.as_ptr().cast::<c_void>();
-        for (addr, owner) in owners().iter().enumerate() {
+        for (addr, owner) in owners(chip).iter().enumerate() {
             if !matches!(owner, Owner::Nobody) {
                 cpu.hook(addr as u16, Some(io_read), Some(io_write), param);
             }
         }
-        for (timer, layout) in LAYOUTS.iter().enumerate() {
+        for (timer, layout) in chip.timers.iter().enumerate() {
             cpu.hook_bits(layout.tifr, TIFR_BITS[timer], param);
         }
         for (register, write) in PinInterrupts::FLAGS.into_iter().zip(PIN_FLAG_BITS) {
@@ -95,10 +102,10 @@ impl Bus {
 
     /// All peripherals as after a reset; the world outside keeps its state.
     pub fn reset(&mut self) {
-        self.timers = std::array::from_fn(|i| Timer::new(&LAYOUTS[i]));
-        self.uarts = std::array::from_fn(Uart::new);
+        self.timers = self.chip.timers.iter().map(Timer::new).collect();
+        self.uarts = self.chip.usarts.iter().copied().map(Uart::new).collect();
         self.eeprom.reset();
-        self.pins = PinInterrupts::default();
+        self.pins = PinInterrupts::new(&self.chip.pins);
         self.recorder.pins_released();
         self.pending = 0;
         self.refresh_due();
@@ -142,13 +149,15 @@ impl Bus {
     /// The interrupt is being served.
     pub fn acknowledge(&mut self, vector: u8, now: u64) {
         let bit = 1u64 << vector;
-        if let Some(i) = (0..6).find(|i| LAYOUTS[*i].vectors.contains(&vector)) {
+        if let Some(i) = self.chip.timers.iter().position(|t| t.vectors.contains(&vector)) {
             self.timers[i].acknowledge(vector, now);
             self.update_timer(i, now);
-        } else if let Some(i) = (0..4).find(|i| (7u64 << PLACES[*i].1) & bit != 0) {
+        } else if let Some(i) =
+            self.chip.usarts.iter().position(|(_, first)| (7u64 << first) & bit != 0)
+        {
             self.uarts[i].acknowledge(vector);
             self.update_uart(i, now);
-        } else if PinInterrupts::VECTORS & bit != 0 {
+        } else if self.chip.pins.vectors() & bit != 0 {
             self.pins.acknowledge(vector);
             self.update_pins(now);
         }
@@ -196,20 +205,22 @@ impl Bus {
     }
 
     fn update_timer(&mut self, i: usize, at: u64) {
-        let mask = LAYOUTS[i].vectors.iter().filter(|v| **v != 0).fold(0, |m, v| m | 1u64 << v);
+        let mask =
+            self.chip.timers[i].vectors.iter().filter(|v| **v != 0).fold(0, |m, v| m | 1u64 << v);
         self.set_lines(mask, self.timers[i].lines(), at);
     }
 
     fn update_uart(&mut self, i: usize, at: u64) {
-        self.set_lines(7u64 << PLACES[i].1, self.uarts[i].lines(), at);
+        self.set_lines(7u64 << self.chip.usarts[i].1, self.uarts[i].lines(), at);
     }
 
     fn update_eeprom(&mut self, at: u64) {
-        self.set_lines(1u64 << Eeprom::VECTOR, self.eeprom.lines(), at);
+        let ready = self.chip.eeprom_ready;
+        self.set_lines(1u64 << ready, u64::from(self.eeprom.asks()) << ready, at);
     }
 
     fn update_pins(&mut self, at: u64) {
-        self.set_lines(PinInterrupts::VECTORS, self.pins.lines(), at);
+        self.set_lines(self.chip.pins.vectors(), self.pins.lines(), at);
     }
 
     fn set_lines(&mut self, mask: u64, lines: u64, at: u64) {
@@ -230,7 +241,7 @@ impl Bus {
                 let ran = self.timers[i].runs();
                 self.timers[i].write(addr, value, now);
                 let runs = self.timers[i].runs();
-                if i == self.step_timer && ran != runs {
+                if Some(i) == self.step_timer && ran != runs {
                     self.recorder.timer(runs, now);
                 }
                 self.update_timer(i, now);
@@ -290,19 +301,19 @@ impl Bus {
     }
 }
 
-fn owners() -> [Owner; IO_END] {
+fn owners(chip: &Chip) -> [Owner; IO_END] {
     let mut owners = [Owner::Nobody; IO_END];
-    for (i, layout) in LAYOUTS.iter().enumerate() {
+    for (i, layout) in chip.timers.iter().enumerate() {
         for addr in layout.registers() {
             owners[usize::from(addr)] = Owner::Timer(i);
         }
     }
-    for (i, (base, _)) in PLACES.iter().enumerate() {
+    for (i, (base, _)) in chip.usarts.iter().enumerate() {
         for offset in OFFSETS {
             owners[usize::from(base + offset)] = Owner::Uart(i);
         }
     }
-    for addr in PinInterrupts::REGISTERS {
+    for addr in chip.pins.registers() {
         owners[usize::from(addr)] = Owner::Pins;
     }
     for addr in Eeprom::REGISTERS {

@@ -9,6 +9,7 @@ use std::ptr::NonNull;
 use anyhow::{Result, bail};
 use simavr_ffi as ffi;
 
+use crate::chip::Chip;
 use crate::image::Image;
 
 /// Stack pointer, low byte; the high byte follows.
@@ -52,11 +53,11 @@ unsafe extern "C" fn bad_instruction(_: *mut ffi::avr_irq_t, _: u32, avr: *mut c
 }
 
 impl Cpu {
-    /// A powered-up ATmega2560 with the image in its flash.
-    pub fn power_up(image: &Image, clock_hz: u32) -> Result<Self> {
+    /// A powered-up chip with the image in its flash.
+    pub fn power_up(image: &Image, chip: &Chip, clock_hz: u32) -> Result<Self> {
         // SAFETY: the name is a C string; simavr returns null or a core that nothing else uses.
-        let made = unsafe { ffi::avr_make_mcu_by_name(c"atmega2560".as_ptr()) };
-        let Some(avr) = NonNull::new(made) else { bail!("simavr has no atmega2560") };
+        let made = unsafe { ffi::avr_make_mcu_by_name(chip.name.as_ptr()) };
+        let Some(avr) = NonNull::new(made) else { bail!("simavr has no {:?}", chip.name) };
         let p = avr.as_ptr();
         // SAFETY: `p` is a fresh core; the flash that `avr_init` allocates has `flashend + 1` bytes.
         unsafe {
@@ -172,7 +173,7 @@ impl Cpu {
     /// The stack pointer.
     #[inline]
     pub fn sp(self) -> u16 {
-        // SAFETY: both bytes are inside the data space of the ATmega2560.
+        // SAFETY: both bytes are inside the data space of every chip.
         unsafe { (*self.p()).data.add(SPL).cast::<u16>().read_unaligned().to_le() }
     }
 

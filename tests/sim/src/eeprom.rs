@@ -34,8 +34,6 @@ pub struct Eeprom {
 }
 
 impl Eeprom {
-    /// Vector of EE_READY.
-    pub const VECTOR: u8 = 30;
     /// Registers.
     pub const REGISTERS: [u16; 4] = [EECR, EEDR, EEARL, EEARH];
 
@@ -84,10 +82,9 @@ impl Eeprom {
         }
     }
 
-    /// EE_READY, as a bit set of vectors.
-    pub fn lines(&self) -> u64 {
-        let ready = self.busy_until == 0 && self.control & READY_ENABLE != 0;
-        u64::from(ready) << Self::VECTOR
+    /// Whether EE_READY asks for service.
+    pub fn asks(&self) -> bool {
+        self.busy_until == 0 && self.control & READY_ENABLE != 0
     }
 
     /// A load that samples at cycle `now`.

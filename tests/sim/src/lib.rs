@@ -5,11 +5,12 @@
 //! the cost of entering an interrupt, software interrupts. Time is counted in CPU cycles and is
 //! exactly repeatable.
 //!
-//! [`Machine`] is the chip on its board, [`mechanics`] what is built around it, [`Host`] a sender on its serial line, [`oracle`] an
+//! [`Machine`] is a [chip] on its board, [`mechanics`] what is built around it, [`Host`] a sender on its serial line, [`oracle`] an
 //! independent reading of the same G-code, and [`job`] all of them together.
 
 pub mod bench;
 mod bus;
+pub mod chip;
 mod counts;
 mod cpu;
 mod eeprom;
@@ -32,7 +33,6 @@ mod summary;
 mod timer;
 mod trace;
 mod uart;
-mod vectors;
 mod wire;
 
 pub use host::{Answered, Host, LINES_IN_FLIGHT};
@@ -44,5 +44,4 @@ pub use recorder::{Motor, Recorder, Step, Sums};
 pub use stopwatch::{Cost, Stopwatch};
 pub use trace::Trace;
 pub use uart::Uart;
-pub use vectors::name as vector_name;
 pub use wire::Wire;

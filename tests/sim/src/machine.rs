@@ -8,6 +8,7 @@ use anyhow::Result;
 use kerf::boards::{Board, Pin, Usart};
 
 use crate::bus::Bus;
+use crate::chip::{ATMEGA2560, Chip};
 use crate::counts::Counts;
 use crate::cpu::{Cpu, Mode};
 use crate::eeprom;
@@ -16,14 +17,12 @@ use crate::mechanics::{Build, Mechanics};
 use crate::meters::{Meters, Window};
 use crate::recorder::{self, Probe, Recorder};
 use crate::stopwatch::Stopwatch;
+use crate::timer::COMPARE;
 use crate::trace::Trace;
 use crate::uart::Uart;
-use crate::vectors;
 use crate::wire::Wire;
 
-/// Cycles from acceptance of an interrupt to the first instruction at its vector.
-const ENTRY_CYCLES: u64 = 5;
-/// Cycles more when it ends a sleep.
+/// Cycles more until an interrupt is entered when it ends a sleep.
 const WAKE_CYCLES: u64 = 4;
 
 /// The ports of a board, as [`Machine::send_to`] counts them.
@@ -73,10 +72,7 @@ impl fmt::Display for Fault {
 
 impl std::error::Error for Fault {}
 
-/// The first address of the data space behind the registers.
-const RAM_START: usize = 0x200;
-
-/// A simulated ATmega2560 on a board, running a firmware image.
+/// A simulated chip, on a board or alone, running a firmware image.
 pub struct Machine {
     cpu: Cpu,
     bus: NonNull<Bus>,
@@ -86,7 +82,9 @@ pub struct Machine {
     driven: [(u8, u8); 12],
     meters: Meters,
     image: Image,
-    board: &'static Board,
+    chip: &'static Chip,
+    clock_hz: u32,
+    board: Option<&'static Board>,
     resets: u64,
     /// Cycles spent at each word of flash, if asked for.
     profile: Option<Vec<u64>>,
@@ -96,9 +94,8 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// A machine with this image in its flash, at cycle 0. Its serial line runs at 115200 baud.
+    /// A board, with this image in its chip's flash, at cycle 0. Its serial line runs at 115200 baud.
     pub fn new(image: Image, board: &'static Board) -> Result<Self> {
-        let cpu = Cpu::power_up(&image, board.clock_hz)?;
         let wires = board.serial.iter().map(|serial| {
             let usart = match serial.usart {
                 Usart::U0 => 0,
@@ -107,16 +104,35 @@ impl Machine {
             };
             (usart, Wire::new(board.clock_hz, serial.rate))
         });
-        let bus = Bus::install(cpu, board.step_timer as usize, wires.collect());
-        let probes = recorder::attach(bus, cpu, board);
-        let meters = Meters::new(vectors::compare_a(board.step_timer));
+        Self::make(image, &ATMEGA2560, board.clock_hz, Some(board), wires.collect())
+    }
+
+    /// A chip alone, with this image in its flash, at cycle 0, and a serial line of 115200 baud at its first USART.
+    pub fn bare(image: Image, chip: &'static Chip, clock_hz: u32) -> Result<Self> {
+        Self::make(image, chip, clock_hz, None, vec![(0, Wire::new(clock_hz, 115_200))])
+    }
+
+    fn make(
+        image: Image,
+        chip: &'static Chip,
+        clock_hz: u32,
+        board: Option<&'static Board>,
+        wires: Vec<(usize, Wire)>,
+    ) -> Result<Self> {
+        let cpu = Cpu::power_up(&image, chip, clock_hz)?;
+        let step_timer = board.map(|board| board.step_timer as usize);
+        let bus = Bus::install(cpu, chip, step_timer, wires);
+        let probes = board.map(|board| recorder::attach(bus, cpu, board));
+        let meters = Meters::new(chip, step_timer.map(|n| chip.timers[n].vectors[COMPARE]));
         Ok(Machine {
             cpu,
             bus,
-            probes: vec![probes],
+            probes: probes.into_iter().collect(),
             driven: [(0, 0); 12],
             meters,
             image,
+            chip,
+            clock_hz,
             board,
             resets: 0,
             profile: None,
@@ -278,7 +294,7 @@ impl Machine {
         if !cpu.enter(vector) {
             return Err(Fault::EndlessNesting);
         }
-        cpu.set_cycle(at + ENTRY_CYCLES + if asleep { WAKE_CYCLES } else { 0 });
+        cpu.set_cycle(at + self.chip.entry_cycles + if asleep { WAKE_CYCLES } else { 0 });
         if own == Some(vector) {
             self.bus_mut().acknowledge(vector, at);
         } else {
@@ -336,17 +352,25 @@ impl Machine {
 
     /// Cycles in so many milliseconds.
     pub fn cycles(&self, ms: u64) -> u64 {
-        ms * u64::from(self.board.clock_hz) / 1000
+        ms * u64::from(self.clock_hz) / 1000
     }
 
     /// Seconds that so many cycles take.
     pub fn seconds(&self, cycles: u64) -> f64 {
-        cycles as f64 / f64::from(self.board.clock_hz)
+        cycles as f64 / f64::from(self.clock_hz)
     }
 
     /// The board.
+    ///
+    /// # Panics
+    /// If it is a chip alone.
     pub fn board(&self) -> &'static Board {
-        self.board
+        self.board.expect("a chip on a board")
+    }
+
+    /// The chip.
+    pub fn chip(&self) -> &'static Chip {
+        self.chip
     }
 
     /// The firmware.
@@ -384,7 +408,7 @@ impl Machine {
         &mut self.meters
     }
 
-    /// One of the four USARTs.
+    /// One of the USARTs.
     pub fn uart(&self, index: usize) -> &Uart {
         &self.bus().uarts[index]
     }
@@ -396,7 +420,7 @@ impl Machine {
 
     /// CTC tops of the step timer that were written behind its counter.
     pub fn missed_tops(&self) -> u64 {
-        self.bus().timers[self.board.step_timer as usize].missed()
+        self.bus().timers[self.board().step_timer as usize].missed()
     }
 
     /// A byte of the data space, as memory holds it.
@@ -406,9 +430,9 @@ impl Machine {
 
     /// Does what a store of the firmware would, to a register or to RAM: to break it, or to make it old.
     pub fn poke(&mut self, addr: u16, value: u8) {
-        match usize::from(addr) {
-            addr if addr >= RAM_START => self.cpu.set_data(addr, value),
-            _ => self.bus_mut().store(addr, value),
+        match addr >= self.chip.ram_start {
+            true => self.cpu.set_data(usize::from(addr), value),
+            false => self.bus_mut().store(addr, value),
         }
     }
 
@@ -436,8 +460,8 @@ impl Machine {
 
     /// Builds a machine around the chip, best before the first instruction.
     pub fn build(&mut self, build: &Build) {
-        let mechanics = Mechanics::new(build, self.board);
-        let spindle = recorder::attach_spindle(self.bus, self.cpu, self.board, build.spindle.pwm);
+        let mechanics = Mechanics::new(build, self.board());
+        let spindle = recorder::attach_spindle(self.bus, self.cpu, self.board(), build.spindle.pwm);
         self.probes.push(spindle);
         self.bus_mut().mechanics = Some(Box::new(mechanics));
         self.bus_mut().refresh_due();
@@ -484,7 +508,7 @@ impl Machine {
 
     /// Sets the speed of the host's side of the serial line.
     pub fn set_baud(&mut self, baud: u32) {
-        let clock_hz = self.board.clock_hz;
+        let clock_hz = self.clock_hz;
         self.bus_mut().wires[USB].1.set_baud(clock_hz, baud);
     }
 
@@ -505,7 +529,7 @@ impl Machine {
 
     /// Drives the pin with which the other side of a port holds the firmware back.
     pub fn set_cts(&mut self, port: usize, stop: bool) {
-        let handshake = self.board.serial[port].handshake.expect("a port with the pins");
+        let handshake = self.board().serial[port].handshake.expect("a port with the pins");
         self.drive_pin(handshake.cts.port.letter(), handshake.cts.bit, stop);
     }
 
@@ -537,8 +561,8 @@ impl Machine {
     /// A function name for a flash address; vectors by their own names.
     pub fn place(&self, pc: u32) -> String {
         let vector = pc / 4;
-        if pc.is_multiple_of(4) && (1..vectors::COUNT as u32).contains(&vector) {
-            return vectors::name(vector as u8).to_string();
+        if pc.is_multiple_of(4) && (1..self.chip.vectors.len() as u32).contains(&vector) {
+            return self.chip.vector_name(vector as u8).to_string();
         }
         self.image.function_at(pc)
     }

@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::chip::Chip;
 use crate::cpu::Cpu;
-use crate::vectors;
 
 /// The opcode of `out SPH, Rr` under this mask.
 const OUT_SPH: u16 = 0xBE0E;
@@ -47,8 +47,9 @@ struct Frame {
 
 /// All meters. `clear` begins a new measurement.
 pub struct Meters {
-    step_vector: u8,
-    services: [Service; vectors::COUNT],
+    step_vector: Option<u8>,
+    ram_start: u16,
+    services: Vec<Service>,
     frames: Vec<Frame>,
     window_outside: Window,
     window_step: Window,
@@ -60,11 +61,12 @@ pub struct Meters {
 }
 
 impl Meters {
-    /// Meters at rest; `step_vector` is the step interrupt.
-    pub fn new(step_vector: u8) -> Self {
+    /// Meters at rest; `step_vector` is the step interrupt, if there is one.
+    pub fn new(chip: &Chip, step_vector: Option<u8>) -> Self {
         Meters {
             step_vector,
-            services: [Service::default(); vectors::COUNT],
+            ram_start: chip.ram_start,
+            services: vec![Service::default(); chip.vectors.len()],
             frames: Vec::new(),
             window_outside: Window::default(),
             window_step: Window::default(),
@@ -78,7 +80,7 @@ impl Meters {
 
     /// Forgets what was measured, but for the stack: its lowest point counts from power-up.
     pub fn clear(&mut self) {
-        self.services = [Service::default(); vectors::COUNT];
+        self.services.fill(Service::default());
         self.window_outside = Window::default();
         self.window_step = Window::default();
     }
@@ -172,7 +174,7 @@ impl Meters {
                 *place = window;
             }
         }
-        let inside = window.vector == Some(self.step_vector);
+        let inside = window.vector.is_some() && window.vector == self.step_vector;
         let worst = if inside { &mut self.window_step } else { &mut self.window_outside };
         if window.cycles > worst.cycles {
             *worst = window;
@@ -184,7 +186,7 @@ impl Meters {
         // between. In the meantime it means nothing.
         let is_half = |pc: u32| cpu.opcode(pc) & OUT_MASK == OUT_SPH;
         let half_written = is_half(pc) || is_half(pc.saturating_sub(2));
-        if !half_written && sp >= 0x200 {
+        if !half_written && sp >= self.ram_start {
             self.lowest_sp = sp;
         }
     }

@@ -1,4 +1,4 @@
-//! Interrupts of pins: INT0 to INT7 and PCINT0 to PCINT23.
+//! Interrupts of pins: INT0 to INT7 at the most, and PCINT0 to PCINT31.
 //!
 //! In place of simavr's: a flag stays raised while it is masked, each group of eight pins has one flag, and an edge
 //! counts at its cycle. An edge is one that comes from outside; the firmware's own outputs raise nothing here. The
@@ -11,32 +11,105 @@ const EIMSK: u16 = 0x3D;
 const PCICR: u16 = 0x68;
 const EICRA: u16 = 0x69;
 const EICRB: u16 = 0x6A;
-const PCMSK: [u16; 3] = [0x6B, 0x6C, 0x6D];
 
-/// The vector of INT0, and that of PCINT0; the others follow.
-const INT0: u8 = 1;
-const PCINT0: u8 = 9;
+/// Which pins have which interrupts. All the rest is alike on all chips.
+pub struct PinLayout {
+    /// The vector of INT0; the others follow.
+    pub external_vector: u8,
+    /// The vector of PCINT0 to PCINT7; the others follow.
+    pub change_vector: u8,
+    /// The mask of each eight pins, PCMSK0 first.
+    masks: &'static [u16],
+    /// Pins with an INT.
+    externals: &'static [Pins],
+    /// Pins with a PCINT.
+    changes: &'static [Pins],
+}
+
+/// Pins of a port, beside each other, whose interrupts have numbers beside each other.
+struct Pins {
+    port: char,
+    first: u8,
+    count: u8,
+    number: u8,
+}
+
+const fn pins(port: char, first: u8, count: u8, number: u8) -> Pins {
+    Pins { port, first, count, number }
+}
+
+/// Those of the ATmega2560.
+pub const ATMEGA2560: PinLayout = PinLayout {
+    external_vector: 1,
+    change_vector: 9,
+    masks: &[0x6B, 0x6C, 0x6D],
+    externals: &[pins('D', 0, 4, 0), pins('E', 4, 4, 4)],
+    changes: &[pins('B', 0, 8, 0), pins('E', 0, 1, 8), pins('J', 0, 7, 9), pins('K', 0, 8, 16)],
+};
+
+/// Those of the ATmega1284P.
+pub const ATMEGA1284P: PinLayout = PinLayout {
+    external_vector: 1,
+    change_vector: 4,
+    masks: &[0x6B, 0x6C, 0x6D, 0x73],
+    externals: &[pins('D', 2, 2, 0), pins('B', 2, 1, 2)],
+    changes: &[pins('A', 0, 8, 0), pins('B', 0, 8, 8), pins('C', 0, 8, 16), pins('D', 0, 8, 24)],
+};
+
+impl PinLayout {
+    /// The vectors, as a bit set.
+    pub fn vectors(&self) -> u64 {
+        let externals: u8 = self.externals.iter().map(|pins| pins.count).sum();
+        let bits = |count: u64| (1 << count) - 1;
+        bits(externals.into()) << self.external_vector
+            | bits(self.masks.len() as u64) << self.change_vector
+    }
+
+    /// Every register.
+    pub fn registers(&self) -> impl Iterator<Item = u16> {
+        [PCIFR, EIFR, EIMSK, PCICR, EICRA, EICRB].into_iter().chain(self.masks.iter().copied())
+    }
+
+    fn group(&self, mask: u16) -> Option<usize> {
+        self.masks.iter().position(|known| *known == mask)
+    }
+}
+
+/// The number of the interrupt of a pin.
+fn number(of: &[Pins], port: char, bit: u8) -> Option<u8> {
+    of.iter().filter(|pins| pins.port == port).find_map(|pins| {
+        bit.checked_sub(pins.first).filter(|n| *n < pins.count).map(|n| pins.number + n)
+    })
+}
 
 /// The registers of pin interrupts.
-#[derive(Default)]
 pub struct PinInterrupts {
+    layout: &'static PinLayout,
     /// EICRB and EICRA: two bits for each INT.
     sense: u16,
     external_mask: u8,
     external_flags: u8,
     change_enable: u8,
     change_flags: u8,
-    change_mask: [u8; 3],
+    change_mask: [u8; 4],
 }
 
 impl PinInterrupts {
-    /// Every register.
-    pub const REGISTERS: [u16; 9] =
-        [PCIFR, EIFR, EIMSK, PCICR, EICRA, EICRB, PCMSK[0], PCMSK[1], PCMSK[2]];
     /// The two of flags, of which SBI touches one flag only.
     pub const FLAGS: [u16; 2] = [PCIFR, EIFR];
-    /// The vectors, as a bit set.
-    pub const VECTORS: u64 = 0x7FF << INT0;
+
+    /// As after reset.
+    pub fn new(layout: &'static PinLayout) -> Self {
+        PinInterrupts {
+            layout,
+            sense: 0,
+            external_mask: 0,
+            external_flags: 0,
+            change_enable: 0,
+            change_flags: 0,
+            change_mask: [0; 4],
+        }
+    }
 
     /// A register is written.
     pub fn write(&mut self, addr: u16, value: u8) {
@@ -44,11 +117,11 @@ impl PinInterrupts {
             PCIFR => self.change_flags &= !value,
             EIFR => self.external_flags &= !value,
             EIMSK => self.external_mask = value,
-            PCICR => self.change_enable = value & 7,
+            PCICR => self.change_enable = value & ((1 << self.layout.masks.len()) - 1),
             EICRA => self.sense = self.sense & 0xFF00 | u16::from(value),
             EICRB => self.sense = self.sense & 0x00FF | u16::from(value) << 8,
             _ => {
-                if let Some(group) = PCMSK.iter().position(|a| *a == addr) {
+                if let Some(group) = self.layout.group(addr) {
                     self.change_mask[group] = value;
                 }
             }
@@ -64,17 +137,13 @@ impl PinInterrupts {
             PCICR => self.change_enable,
             EICRA => self.sense as u8,
             EICRB => (self.sense >> 8) as u8,
-            _ => PCMSK.iter().position(|a| *a == addr).map_or(0, |g| self.change_mask[g]),
+            _ => self.layout.group(addr).map_or(0, |g| self.change_mask[g]),
         }
     }
 
     /// The level of a pin has changed.
     pub fn edge(&mut self, port: char, bit: u8, high: bool) {
-        let external = match (port, bit) {
-            ('D', 0..4) | ('E', 4..8) => Some(bit),
-            _ => None,
-        };
-        if let Some(n) = external {
+        if let Some(n) = number(self.layout.externals, port, bit) {
             let counts = match self.sense >> (2 * n) & 3 {
                 1 => true,
                 3 => high,
@@ -82,14 +151,7 @@ impl PinInterrupts {
             };
             self.external_flags |= u8::from(counts) << n;
         }
-        let change = match (port, bit) {
-            ('B', _) => Some(bit),
-            ('E', 0) => Some(8),
-            ('J', 0..7) => Some(9 + bit),
-            ('K', _) => Some(16 + bit),
-            _ => None,
-        };
-        if let Some(n) = change
+        if let Some(n) = number(self.layout.changes, port, bit)
             && self.change_mask[usize::from(n / 8)] & 1 << (n % 8) != 0
         {
             self.change_flags |= 1 << (n / 8);
@@ -98,9 +160,9 @@ impl PinInterrupts {
 
     /// The interrupt is being served.
     pub fn acknowledge(&mut self, vector: u8) {
-        match vector.checked_sub(PCINT0) {
+        match vector.checked_sub(self.layout.change_vector) {
             Some(group) => self.change_flags &= !(1 << group),
-            None => self.external_flags &= !(1 << (vector - INT0)),
+            None => self.external_flags &= !(1 << (vector - self.layout.external_vector)),
         }
     }
 
@@ -108,7 +170,7 @@ impl PinInterrupts {
     pub fn lines(&self) -> u64 {
         let external = u64::from(self.external_flags & self.external_mask);
         let change = u64::from(self.change_flags & self.change_enable);
-        external << INT0 | change << PCINT0
+        external << self.layout.external_vector | change << self.layout.change_vector
     }
 }
 
@@ -118,10 +180,10 @@ mod tests {
 
     #[test]
     fn a_change_that_is_masked_raises_nothing_and_a_flag_waits_for_its_enable() {
-        let mut pins = PinInterrupts::default();
+        let mut pins = PinInterrupts::new(&ATMEGA2560);
         pins.edge('B', 4, true);
         assert_eq!(pins.read(PCIFR), 0);
-        pins.write(PCMSK[0], 1 << 4);
+        pins.write(ATMEGA2560.masks[0], 1 << 4);
         pins.edge('B', 5, true);
         assert_eq!(pins.read(PCIFR), 0);
         pins.edge('B', 4, false);
@@ -135,7 +197,7 @@ mod tests {
     #[test]
     fn external_interrupts_go_by_their_sense() {
         for (sense, rising, falling) in [(1, true, true), (2, false, true), (3, true, false)] {
-            let mut pins = PinInterrupts::default();
+            let mut pins = PinInterrupts::new(&ATMEGA2560);
             pins.write(EICRB, sense << 2);
             pins.write(EIMSK, 1 << 5);
             for (high, wanted) in [(true, rising), (false, falling)] {
@@ -148,8 +210,8 @@ mod tests {
 
     #[test]
     fn port_j_is_one_off() {
-        let mut pins = PinInterrupts::default();
-        pins.write(PCMSK[1], 1 << 2);
+        let mut pins = PinInterrupts::new(&ATMEGA2560);
+        pins.write(ATMEGA2560.masks[1], 1 << 2);
         pins.edge('J', 0, true);
         assert_eq!(pins.read(PCIFR), 0);
         pins.edge('J', 1, true);

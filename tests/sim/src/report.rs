@@ -9,7 +9,6 @@ use crate::meters::Window;
 use crate::oracle::{AXES, MotorSetup, Outcome, Setup, UNITS, Unclear};
 use crate::pauses::Pause;
 use crate::recorder::Motor;
-use crate::vectors;
 
 const AXIS_NAMES: [char; AXES] = ['X', 'Y', 'Z', 'A', 'B', 'C'];
 
@@ -365,16 +364,16 @@ fn window_report(machine: &Machine, window: Window) -> WindowReport {
     WindowReport {
         cycles: window.cycles,
         us: microseconds(machine, window.cycles),
-        context: window.vector.map_or("thread", vectors::name),
+        context: window.vector.map_or("thread", |vector| machine.chip().vector_name(vector)),
         place: if window.cycles == 0 { String::new() } else { machine.describe(&window) },
     }
 }
 
 fn vector_reports(machine: &Machine) -> Vec<VectorReport> {
-    let all = (0..vectors::COUNT as u8).map(|v| (v, machine.meters().service(v)));
+    let all = (0..machine.chip().vectors.len() as u8).map(|v| (v, machine.meters().service(v)));
     all.filter(|(_, s)| s.count > 0)
         .map(|(v, s)| VectorReport {
-            vector: vectors::name(v),
+            vector: machine.chip().vector_name(v),
             count: s.count,
             own_mean: s.own_sum as f64 / s.count as f64,
             own_max: s.own_max,

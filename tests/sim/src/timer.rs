@@ -11,14 +11,14 @@
 
 mod layout;
 
-pub use layout::{LAYOUTS, Layout};
+pub use layout::{ATMEGA1284P, ATMEGA2560, Layout};
 
 /// Never.
 const NEVER: u64 = u64::MAX;
 
 // Bits of TIFR and TIMSK; compare channel n is bit `COMPARE + n`.
 const OVERFLOW: usize = 0;
-const COMPARE: usize = 1;
+pub(crate) const COMPARE: usize = 1;
 const CAPTURE: usize = 5;
 /// Not a flag: when double-buffered compare values take effect.
 const LATCH: usize = 6;

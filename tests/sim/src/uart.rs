@@ -35,8 +35,6 @@ const UBRRL: u16 = 4;
 const UBRRH: u16 = 5;
 const UDR: u16 = 6;
 
-/// Base register and first vector (RX; UDRE and TX follow) of USART0 to USART3.
-pub const PLACES: [(u16, u8); 4] = [(0xC0, 25), (0xC8, 36), (0xD0, 51), (0x130, 54)];
 /// Register offsets that are in use.
 pub const OFFSETS: [u16; 6] = [0, UCSRB, UCSRC, UBRRL, UBRRH, UDR];
 
@@ -71,9 +69,8 @@ pub struct Uart {
 }
 
 impl Uart {
-    /// USART `index` as it is after reset.
-    pub fn new(index: usize) -> Self {
-        let (base, vector) = PLACES[index];
+    /// A USART as it is after reset, by its first register and its first vector: see [`Chip`](crate::chip::Chip).
+    pub fn new((base, vector): (u16, u8)) -> Self {
         Uart {
             base,
             vector,

@@ -20,6 +20,9 @@ use super::Image;
 use super::disasm::{Code, Insn, number};
 use super::places::{function_at, landmarks};
 
+/// Bytes of a return address on the chips that the defect is of.
+pub const RETURN_ADDRESS: usize = 3;
+
 /// Fails when some code reaches behind the registers that it saved.
 pub fn check(image: &Image, code: &Code) -> Result<()> {
     let ends = landmarks(image).ends;

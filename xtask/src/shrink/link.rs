@@ -5,6 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::chips::Chip;
 use crate::process::run;
 
 /// What `rustc` takes for its linker: it writes its arguments into the file that `KERF_LINK` names, one a line, and links.
@@ -36,14 +37,14 @@ impl Link {
         Ok(Link { arguments: text.lines().map(str::to_owned).collect() })
     }
 
-    /// Assembles a program and links it.
-    pub fn image(&self, text: &str, elf: &Path) -> Result<()> {
+    /// Assembles a program for the chip that it was linked for, and links it.
+    pub fn image(&self, text: &str, elf: &Path, chip: &Chip) -> Result<()> {
         let (source, object) = (elf.with_extension("s"), elf.with_extension("o"));
         std::fs::write(&source, text)
             .with_context(|| format!("cannot write {}", source.display()))?;
         // Without `-mlink-relax` distances would be fixed here, and the linker could shorten nothing.
         run(Command::new("avr-gcc")
-            .args(["-c", "-mmcu=atmega2560", "-Wa,-mlink-relax"])
+            .args(["-c", &format!("-mmcu={}", chip.name), "-Wa,-mlink-relax"])
             .arg(&source)
             .arg("-o")
             .arg(&object))?;

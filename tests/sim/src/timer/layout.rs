@@ -1,8 +1,8 @@
-//! Where the registers and vectors of each timer are (ATmega2560 data sheet, register summary).
+//! Where the registers and vectors of each timer are (data sheets: register summary).
 
 /// Registers and vectors of one timer.
 pub struct Layout {
-    /// 16 bits, three compare channels and a capture register.
+    /// 16 bits, and a capture register.
     pub wide: bool,
     /// Control register A.
     pub tccra: u16,
@@ -30,12 +30,13 @@ const ASYNCHRONOUS: [u64; 8] = [0, 1, 8, 32, 64, 128, 256, 1024];
 impl Layout {
     /// Compare channels.
     pub fn channels(&self) -> usize {
-        if self.wide { 3 } else { 2 }
+        self.ocr.iter().filter(|r| **r != 0).count()
     }
 
     /// Bits of the mask and flag registers that exist.
     pub fn implemented(&self) -> u8 {
-        if self.wide { 0x2F } else { 0x07 }
+        let capture = if self.wide { 0x20 } else { 0 };
+        capture | ((2 << self.channels()) - 1)
     }
 
     /// Whether a register is the high byte of a 16-bit register.
@@ -74,6 +75,7 @@ impl Layout {
         }
     }
 
+    /// With three compare channels.
     const fn wide(tccra: u16, timsk: u16, tifr: u16, v: u8) -> Layout {
         Layout {
             wide: true,
@@ -88,14 +90,31 @@ impl Layout {
             prescale: SYNCHRONOUS,
         }
     }
+
+    /// With two compare channels.
+    const fn wide_of_two(tccra: u16, timsk: u16, tifr: u16, v: u8) -> Layout {
+        Layout {
+            ocr: [tccra + 8, tccra + 10, 0],
+            vectors: [v + 3, v + 1, v + 2, 0, 0, v],
+            ..Self::wide(tccra, timsk, tifr, v)
+        }
+    }
 }
 
-/// Timers 0 to 5.
-pub static LAYOUTS: [Layout; 6] = [
+/// Timers 0 to 5 of the ATmega2560.
+pub static ATMEGA2560: [Layout; 6] = [
     Layout::narrow(0x44, 0x6E, 0x35, 21, SYNCHRONOUS),
     Layout::wide(0x80, 0x6F, 0x36, 16),
     Layout::narrow(0xB0, 0x70, 0x37, 13, ASYNCHRONOUS),
     Layout::wide(0x90, 0x71, 0x38, 31),
     Layout::wide(0xA0, 0x72, 0x39, 41),
     Layout::wide(0x120, 0x73, 0x3A, 46),
+];
+
+/// Timers 0 to 3 of the ATmega1284P.
+pub static ATMEGA1284P: [Layout; 4] = [
+    Layout::narrow(0x44, 0x6E, 0x35, 16, SYNCHRONOUS),
+    Layout::wide_of_two(0x80, 0x6F, 0x36, 12),
+    Layout::narrow(0xB0, 0x70, 0x37, 9, ASYNCHRONOUS),
+    Layout::wide_of_two(0x90, 0x71, 0x38, 31),
 ];

@@ -11,7 +11,7 @@ const BY_8: u8 = 2;
 const COMPARE_A: u8 = 1 << 1;
 
 fn timer1() -> Timer {
-    Timer::new(&LAYOUTS[1])
+    Timer::new(&ATMEGA2560[1])
 }
 
 fn write_word(t: &mut Timer, addr: u16, value: u16, now: u64) {
@@ -103,7 +103,7 @@ fn writing_the_counter_blocks_one_match() {
 
 #[test]
 fn pwm_compare_values_wait_for_the_wrap() {
-    let mut t = Timer::new(&LAYOUTS[0]);
+    let mut t = Timer::new(&ATMEGA2560[0]);
     let (tccr0a, tccr0b, ocr0b, tifr0) = (0x44, 0x45, 0x48, 0x35);
     t.write(tccr0a, 3, 0);
     t.write(tccr0b, BY_1, 0);

@@ -1,4 +1,5 @@
 use super::*;
+use crate::chip::ATMEGA2560;
 
 const BASE: u16 = 0xC0;
 /// 117647 baud at 16 MHz, as near to 115200 as it gets.
@@ -6,7 +7,7 @@ const BIT: u64 = 136;
 const BYTE: u64 = 10 * BIT;
 
 fn uart() -> Uart {
-    let mut u = Uart::new(0);
+    let mut u = Uart::new(ATMEGA2560.usarts[0]);
     u.write(BASE, U2X, 0);
     u.write(BASE + UBRRL, 16, 0);
     u.write(BASE + UCSRB, RXEN | TXEN | RXC, 0);
@@ -71,7 +72,7 @@ fn three_bytes_wait_and_the_fourth_start_bit_costs_one() {
 
 #[test]
 fn the_empty_transmitter_is_a_level() {
-    let mut u = Uart::new(3);
+    let mut u = Uart::new(ATMEGA2560.usarts[3]);
     assert_eq!(u.lines(), 0);
     u.write(0x131, TXEN | UDRE, 0);
     assert_eq!(u.lines(), 1 << 55);
