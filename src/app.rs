@@ -11,6 +11,7 @@ use embassy_executor::Spawner;
 use heapless::Vec;
 
 use crate::config::Settings;
+use crate::dda::{SEGMENTS, Segment};
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 use crate::hal::imp::eeprom::Eeprom;
@@ -18,7 +19,6 @@ use crate::hal::imp::{stepper, uart, watchdog};
 use crate::hal::ring::Producer;
 use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
 use crate::machine::{Notices, Probe, Signs};
-use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Memory, Occasion, Remembers, Speech};
 use crate::store::Log;
@@ -113,6 +113,21 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     main.spawn(control_task(links).ok()?);
     main.spawn(storage_task(links).ok()?);
     Some(())
+}
+
+/// A machine on the host that runs the firmware.
+#[cfg(feature = "std")]
+impl crate::hal::imp::Machine {
+    /// Makes the machine and boots the firmware at `baud`. One for each thread: `None` for a second.
+    pub fn boot(baud: u32) -> Option<Self> {
+        Self::boot_at(baud, 0)
+    }
+
+    /// Makes the machine and boots the firmware at `baud`, with a millisecond count that begins at `ms`: to test what happens when it
+    /// wraps. `None` for a second machine in a thread.
+    pub fn boot_at(baud: u32, ms: u64) -> Option<Self> {
+        Self::start(ms, |main, thread| start(main, thread, baud))
+    }
 }
 
 /// Starts the ports and makes the links. Not inlined, as [`place()`].

@@ -15,7 +15,7 @@
 //! | the line into commands, and its answer | thread | [`tasks::parser`], [`protocol`], [`gcode`] |
 //! | commands into blocks, with speeds at their ends | thread | [`tasks::planner`], [`motion::line`], [`motion::queue`] |
 //! | blocks into segments of some milliseconds | exec interrupt | [`tasks::exec`], [`motion::governor`], [`motion::prep`] |
-//! | segments into steps at pins | step interrupt | [`motion::dda`], `hal::avr::step_isr` |
+//! | segments into steps at pins | step interrupt | [`dda`], `hal::avr::step_isr` |
 //!
 //! Beside that way: [`tasks::control`] carries out real-time characters, [`tasks::reporter`] tells what changes, [`tasks::storage`] puts
 //! settings away, [`tasks::power`] switches motors on and off.
@@ -47,6 +47,7 @@ pub mod boards;
 pub mod canon;
 pub mod capability;
 pub mod config;
+pub mod dda;
 pub mod gcode;
 pub mod jobs;
 pub mod machine;

@@ -6,7 +6,7 @@ mod rig;
 
 use kerf::boards::MOTORS;
 use kerf::config::StepRatio;
-use kerf::motion::dda::STEP;
+use kerf::dda::STEP;
 use kerf::motion::exec::Step;
 use kerf::units::{Length, PerAxis};
 use rig::{Config, Rig, at};

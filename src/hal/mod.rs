@@ -10,6 +10,8 @@ pub use avr_embassy::{Ceiling, Interrupt, Thread, byte, ring};
 #[macro_use]
 mod place;
 
+pub use place::Never;
+
 pub mod event;
 pub mod exec;
 pub mod flags;

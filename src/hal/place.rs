@@ -33,7 +33,7 @@ macro_rules! tasks {
     ($(fn $name:ident($($arg:ident: $type:ty),*) = $run:path;)+) => {$(
         #[cfg(target_arch = "avr")]
         #[embassy_executor::task]
-        fn $name($($arg: $type),*) -> impl Future<Output = crate::tasks::Never> {
+        fn $name($($arg: $type),*) -> impl Future<Output = crate::hal::Never> {
             $run($($arg),*)
         }
 
@@ -45,4 +45,17 @@ macro_rules! tasks {
             std::boxed::Box::leak(storage).spawn(move || $run($($arg),*))
         }
     )+};
+}
+
+/// What a task returns, that never does: `!`, which is no type of stable Rust yet.
+pub type Never = <fn() -> ! as Returns>::Value;
+
+/// See [`Never`].
+pub trait Returns {
+    /// What the function returns.
+    type Value;
+}
+
+impl<T> Returns for fn() -> T {
+    type Value = T;
 }

@@ -21,13 +21,13 @@
 //! interrupt; a third of them are the governor's floats.
 
 use super::block::{Action, Block, Body, Line};
-use super::dda::Segment;
 use super::float::{below, scaled, some, whole};
 use super::governor::{Ahead, Governor, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
 use super::short::Short;
 use super::snapshot::{Program, Snapshot};
+use crate::dda::Segment;
 use crate::gcode::overrides::Change;
 
 /// Half CPU cycles in a second.
@@ -246,7 +246,7 @@ impl Exec {
 
     /// Forgets all that is queued. The steppers stand still: held, or stopped in the midst of it. The target is
     /// then where the segments that they have got end, and the one that is returned, which they have not;
-    /// [`Dda::settle`](super::dda::Dda::settle) makes their last steps the position. What has been said of
+    /// [`Dda::settle`](crate::dda::Dda::settle) makes their last steps the position. What has been said of
     /// positions before anything moves, and of drivers, holds.
     ///
     /// Cost: 600 a block.

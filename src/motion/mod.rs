@@ -9,16 +9,13 @@
 pub mod block;
 pub mod chain;
 mod constraint;
-pub mod contact;
 pub mod curve;
-pub mod dda;
 pub mod divide;
 pub mod dynamics;
 pub mod exec;
 pub mod factors;
 pub mod finished;
 pub mod float;
-pub mod follow;
 pub mod governor;
 mod halt;
 pub mod horizon;

@@ -8,14 +8,7 @@ use crate::boards::{ACTIVE, MOTORS};
 
 const CYCLES_PER_US: u16 = (ACTIVE.clock_hz / 1_000_000) as u16;
 
-/// What the drivers of the motors ask of their pins.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Drivers {
-    /// How long a step pulse lasts, us.
-    pub pulse_us: u8,
-    /// How long a direction stands before the first step, us.
-    pub setup_us: u8,
-}
+pub use crate::dda::Drivers;
 
 impl Drivers {
     /// What the settings have by default, and what the interrupt's times are measured with.
@@ -74,7 +67,7 @@ pub struct Pace {
     pub fine: u16,
     /// 2^22 / that of short blocks, for which they need more.
     pub coarse: u16,
-    /// From this tick period on pulses wait for the interrupt's worst latency ([`super::dda::Segment::settle`]).
+    /// From this tick period on pulses wait for the interrupt's worst latency ([`crate::dda::Segment::settle`]).
     pub settles: u16,
 }
 

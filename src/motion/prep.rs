@@ -35,10 +35,10 @@
 //! motor when `k` changes.
 
 use super::block::{Line, PARTS_LOG2};
-use super::dda::{PHASE_START, STEP, Segment};
 use super::divide::{quotient, quotient_remainder};
 use super::pace::{COARSEST, Drivers, Pace, paces};
 use crate::boards::{MOTORS, each_motor};
+use crate::dda::{PHASE_START, STEP, Segment};
 use crate::hal::imp::arithmetic::product;
 
 const STEP_LOG2: u8 = 15;
@@ -52,7 +52,7 @@ const PART_LOG2: u8 = STEP_LOG2 - PARTS_LOG2;
 /// Half a step, in such parts.
 const HALF: u8 = 1 << (PARTS_LOG2 - 1);
 
-/// Most ticks of a segment: keeps the rounding rest below [`super::dda::PHASE_MARGIN`].
+/// Most ticks of a segment: keeps the rounding rest below [`crate::dda::PHASE_MARGIN`].
 pub const TICKS_MAX: u16 = 2000;
 
 /// Longest stretch, CPU cycles.
@@ -587,7 +587,7 @@ impl Prep {
     }
 
     /// The block ends here and now: what of its steps no segment has is taken off `target`. Every motor is at
-    /// its last step from now on ([`Dda::settle`](super::dda::Dda::settle)). Returns the segment that
+    /// its last step from now on ([`Dda::settle`](crate::dda::Dda::settle)). Returns the segment that
     /// was to come next, if it has been prepared.
     /// Cost: 4,000 a motor.
     #[inline(never)]

@@ -9,14 +9,14 @@
 use avr_embassy::InterruptEnd;
 
 use crate::boards::ACTIVE;
+use crate::dda::contact;
+use crate::dda::{SEGMENTS, Segment};
 use crate::hal::Interrupt;
 use crate::hal::event::{self, Event};
 use crate::hal::imp::arithmetic::product;
 use crate::hal::imp::{exec, flags, stepper, uart};
 use crate::hal::ring::Producer;
 use crate::machine::{self, Alarm};
-use crate::motion::contact;
-use crate::motion::dda::{SEGMENTS, Segment};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;

@@ -31,15 +31,4 @@ pub mod tx;
 pub mod view;
 pub mod wake;
 
-/// What a task returns, that never does: `!`, which is no type of stable Rust yet.
-pub type Never = <fn() -> ! as Returns>::Value;
-
-/// See [`Never`].
-pub trait Returns {
-    /// What the function returns.
-    type Value;
-}
-
-impl<T> Returns for fn() -> T {
-    type Value = T;
-}
+pub use crate::hal::Never;

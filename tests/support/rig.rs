@@ -3,10 +3,10 @@
 use avr_embassy::host::Runtime;
 use kerf::boards::MOTORS;
 use kerf::config::StepRatio;
+use kerf::dda::{Dda, PHASE_MARGIN, Pins, SEGMENTS, STEP, Segment};
 use kerf::gcode::command::Feed;
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf::motion::block::{Block, Line as Move};
-use kerf::motion::dda::{Dda, PHASE_MARGIN, Pins, SEGMENTS, STEP, Segment};
 use kerf::motion::dynamics::{Dynamics, Machine};
 use kerf::motion::exec::{Exec, Step};
 use kerf::motion::factors::Factors;

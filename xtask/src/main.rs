@@ -16,6 +16,7 @@
 //! | [`jobs`] | writes the example jobs |
 //! | [`nist`] | what another interpreter makes of G-code, to compare with |
 //! | `docs` | test: what the documents name exists |
+//! | `layers` | test: who uses whom is what ARCHITECTURE.md says |
 //! | `seam` | test: dialects are known to their table alone |
 
 mod boards;
@@ -28,6 +29,8 @@ mod elf;
 mod firmware;
 mod fuzz;
 mod jobs;
+#[cfg(test)]
+mod layers;
 mod machines;
 mod nist;
 mod process;

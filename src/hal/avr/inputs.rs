@@ -18,8 +18,8 @@ use avr_embassy::assembly;
 
 use super::{flags, stepper};
 use crate::boards::{ACTIVE, Interrupt, Timer, inputs};
+use crate::dda::contact;
 use crate::hal::event::Event;
-use crate::motion::contact;
 use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
 
 const _: () = assert!(
@@ -163,7 +163,7 @@ pub fn spare(ends: u8) {
 }
 
 /// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
-/// ([`contact`](crate::motion::contact)); none if `armed` is 0. Thread mode.
+/// ([`contact`](crate::dda::contact)); none if `armed` is 0. Thread mode.
 pub fn arm(armed: u16, awaited: u16) {
     with(|state| (state.armed, state.awaited) = (armed, awaited));
 }

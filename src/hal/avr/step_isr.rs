@@ -1,4 +1,4 @@
-//! The step interrupt, in assembly: [`Dda::tick`](crate::motion::dda::Dda::tick) on the board's pins.
+//! The step interrupt, in assembly: [`Dda::tick`](crate::dda::Dda::tick) on the board's pins.
 //!
 //! | a tick in which | cycles, entry and return included |
 //! |---|---|
@@ -23,8 +23,8 @@ use avr_embassy::assembly;
 
 use super::stepper;
 use crate::boards::{ACTIVE, Pin, Timer};
+use crate::dda::{Dda, SEGMENTS, Segment};
 use crate::hal::ring::Ring;
-use crate::motion::dda::{Dda, SEGMENTS, Segment};
 
 const _: () = assert!(matches!(ACTIVE.step_timer, Timer::T1), "vector 17 is timer 1, compare A");
 const _: () = assert!(size_of::<Segment>() == 16, "slots are found by shifting the index by four");

@@ -9,10 +9,10 @@ use kerf_macros::small;
 
 use super::gpio;
 use crate::boards::{ACTIVE, MOTORS, Timer, each_motor};
+use crate::dda::Drivers;
+use crate::dda::{Dda, SEGMENTS, Segment};
 use crate::hal::byte::SharedByte;
 use crate::hal::ring::{Producer, Ring};
-use crate::motion::dda::{Dda, SEGMENTS, Segment};
-use crate::motion::pace::Drivers;
 
 const _: () = assert!(matches!(ACTIVE.step_timer, Timer::T1), "the step timer is timer 1");
 

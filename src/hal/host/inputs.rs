@@ -4,8 +4,8 @@ use core::cell::{Cell, RefCell};
 
 use super::{NEVER, flags, now, stepper};
 use crate::boards::{ACTIVE, inputs};
+use crate::dda::contact;
 use crate::hal::event::Event;
-use crate::motion::contact;
 use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
 
 struct Inputs {

@@ -4,6 +4,7 @@ use std::vec::Vec;
 
 use avr_embassy::Thread;
 use avr_embassy::host::Runtime;
+use embassy_executor::Spawner;
 
 use super::{clock, inputs, now, stepper, time, uart};
 use crate::hal::event::{self, Event};
@@ -15,17 +16,12 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Makes the machine and boots the firmware at `baud`. One for each thread: `None` for a second.
-    pub fn boot(baud: u32) -> Option<Self> {
-        Self::boot_at(baud, 0)
-    }
-
-    /// Makes the machine and boots the firmware at `baud`, with a millisecond count that begins at `ms`: to test what happens when it
-    /// wraps. `None` for a second machine in a thread.
-    pub fn boot_at(baud: u32, ms: u64) -> Option<Self> {
+    /// Makes the machine, with a millisecond count that begins at `ms`, and starts the firmware: `start` spawns its tasks, and says `None` if
+    /// it has been started before.
+    pub fn start(ms: u64, start: impl FnOnce(Spawner, Thread) -> Option<()>) -> Option<Self> {
         clock().set(ms * time::CYCLES_PER_MS);
         let runtime = Runtime::new();
-        crate::app::start(runtime.spawner(), runtime.thread(), baud)?;
+        start(runtime.spawner(), runtime.thread())?;
         let machine = Self { runtime };
         machine.settle();
         Some(machine)

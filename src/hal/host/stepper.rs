@@ -5,8 +5,8 @@ use std::vec::Vec;
 
 use super::{NEVER, exec, inputs, now};
 use crate::boards::{MOTORS, inputs as board_inputs};
+use crate::dda::{Dda, Pins, SEGMENTS, Segment};
 use crate::hal::ring::{Consumer, Producer, Ring};
-use crate::motion::dda::{Dda, Pins, SEGMENTS, Segment};
 
 const FIRST_TICK: u64 = 400;
 

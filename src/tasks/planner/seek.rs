@@ -12,6 +12,7 @@ use kerf_macros::small;
 
 use super::{Begun, Planner, Turn};
 use crate::boards::MOTORS;
+use crate::dda::contact;
 use crate::gcode::command::Feed;
 use crate::hal::Thread;
 use crate::hal::event::{Event, wait};
@@ -19,8 +20,8 @@ use crate::hal::imp::inputs;
 use crate::machine;
 use crate::motion::block::{Action, Outputs};
 use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};
+use crate::motion::queue;
 use crate::motion::snapshot::Snapshot;
-use crate::motion::{contact, queue};
 use crate::tasks::common;
 use crate::tasks::links::Changes;
 use crate::tasks::setup::moved_by;

@@ -7,8 +7,8 @@ mod common;
 
 use common::booted;
 use kerf::boards::{Board, MEGA2560_GRBL, MOTORS, RAMPS14};
+use kerf::dda::{Dda, Pins, SEGMENTS, STEP, Segment};
 use kerf::hal::ring::{Consumer, Producer, Ring};
-use kerf::motion::dda::{Dda, Pins, SEGMENTS, STEP, Segment};
 use kerf_sim::mechanics::Random;
 use kerf_sim::{Machine, Step};
 

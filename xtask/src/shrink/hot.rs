@@ -16,6 +16,7 @@ pub const ROWS: &[&str] = &[
     "embassy_time::",
     "kerf::image::",
     // Each segment.
+    "kerf::dda::",
     "kerf::motion::",
     "kerf::tasks::exec::",
     // Each hold.

@@ -14,10 +14,10 @@
 
 use avr_embassy::Baton;
 
-use super::dda::{Dda, SEGMENTS, Segment};
 use super::follow::Follow;
+use super::{Dda, SEGMENTS, Segment};
 use crate::boards::MOTORS;
-use crate::hal::ring::Producer;
+use avr_embassy::ring::Producer;
 
 /// There is none. The look has the value.
 const NONE: u8 = 0;

@@ -35,8 +35,12 @@
 
 use kerf_macros::small;
 
+use avr_embassy::ring::Consumer;
+
 use crate::boards::MOTORS;
-use crate::hal::ring::Consumer;
+
+pub mod contact;
+pub mod follow;
 
 /// One step, in phase units.
 pub const STEP: u16 = 0x8000;
@@ -107,6 +111,15 @@ impl Segment {
             *way = way.wrapping_add(if self.backwards & 1 << m != 0 { -far } else { far });
         }
     }
+}
+
+/// What the drivers of the motors ask of their pins.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Drivers {
+    /// How long a step pulse lasts, us.
+    pub pulse_us: u8,
+    /// How long a direction stands before the first step, us.
+    pub setup_us: u8,
 }
 
 /// What the step generator does to the outside.

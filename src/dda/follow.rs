@@ -7,7 +7,7 @@
 //!
 //! Cost on AVR: 500 cycles a segment, nothing while there is no such moment.
 
-use super::dda::{Dda, STEP, Segment};
+use super::{Dda, STEP, Segment};
 use crate::boards::MOTORS;
 
 /// Steps in a phase.
@@ -76,8 +76,8 @@ fn signed(steps: i32, backwards: u8, motor: usize) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hal::ring::Ring;
-    use crate::motion::dda::{LOCKSTEP, Pins, SEGMENTS};
+    use crate::dda::{LOCKSTEP, Pins, SEGMENTS};
+    use avr_embassy::ring::Ring;
     use proptest::prelude::*;
     use std::boxed::Box;
     use std::vec::Vec;

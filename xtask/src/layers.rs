@@ -1,0 +1,373 @@
+//! Who uses whom in `src`: computed from the sources, and held against the table of layers in ARCHITECTURE.md.
+//!
+//! A **unit** is a folder of `src` or a file beside these. What a unit uses is every path of its code that begins with `crate::`, or that
+//! `super::` leads out of the unit, but for tests. The table's third column lists paths that the units of the first may use;
+//! a path stands for all below it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use crate::process::root;
+
+/// Files of a folder that are a unit of their own: how their paths begin, and the unit's name.
+const APART: [(&str, &str); 4] = [
+    ("hal/progmem", "primitives"),
+    ("hal/avr/PRIMITIVE", "primitives"),
+    ("hal/host/PRIMITIVE", "primitives"),
+    ("gcode/codes/docs", "docs"),
+];
+/// The bottom of `hal`: what is arithmetic or reads flash, and touches no register.
+const PRIMITIVES: [&str; 4] = ["arithmetic", "flash", "float", "text"];
+/// Macros of theirs, which the crate has at its root.
+const MACROS: [&str; 4] = ["named", "plain", "progmem", "text"];
+/// Not layers: they put the others together.
+const ENTRIES: [&str; 2] = ["lib", "main"];
+
+/// A path as it is used: its words.
+type Used = Vec<String>;
+
+/// What each unit uses, each with a file that does.
+type Uses = BTreeMap<String, BTreeMap<String, String>>;
+
+/// Code with comments, strings and characters left out.
+fn code(text: &str) -> String {
+    let (mut code, mut rest) = (String::new(), text);
+    while let Some(c) = rest.chars().next() {
+        let skipped = match c {
+            '/' if rest.starts_with("//") => rest.find('\n').unwrap_or(rest.len()),
+            '/' if rest.starts_with("/*") => rest.find("*/").map_or(rest.len(), |end| end + 2),
+            '"' => string(rest),
+            'r' if raw(rest).is_some() && !code.ends_with(is_word) => raw(rest).unwrap_or(1),
+            '\'' => character(rest),
+            _ => 0,
+        };
+        if skipped == 0 {
+            code.push(c);
+        }
+        rest = &rest[skipped.max(c.len_utf8())..];
+    }
+    code
+}
+
+fn is_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+/// The length of a string literal.
+fn string(text: &str) -> usize {
+    let mut escaped = true;
+    for (at, c) in text.char_indices() {
+        match c {
+            '"' if !escaped => return at + 1,
+            '\\' if !escaped => escaped = true,
+            _ => escaped = false,
+        }
+    }
+    text.len()
+}
+
+/// The length of a raw string literal, if one begins here.
+fn raw(text: &str) -> Option<usize> {
+    let hashes = text[1..].chars().take_while(|c| *c == '#').count();
+    let body = text[1 + hashes..].strip_prefix('"')?;
+    let end = body.find(&format!("\"{}", "#".repeat(hashes)))?;
+    Some(2 + 2 * hashes + end + 1)
+}
+
+/// The length of a character literal; 0 if it is a lifetime.
+fn character(text: &str) -> usize {
+    let body = &text[1..];
+    let end = match body.strip_prefix('\\') {
+        Some(escape) => {
+            escape.char_indices().skip(1).find(|(_, c)| *c == '\'').map(|(at, _)| at + 1)
+        }
+        None => body.chars().next().map(char::len_utf8).filter(|at| body[*at..].starts_with('\'')),
+    };
+    end.map_or(0, |at| at + 2)
+}
+
+/// Code without what is for tests alone, and the modules in other files that are.
+fn without_tests(code: &str) -> (String, Vec<String>) {
+    let (mut kept, mut modules, mut rest) = (String::new(), Vec::new(), code);
+    while let Some(at) = rest.find("#[cfg(test)]") {
+        kept.push_str(&rest[..at]);
+        let item = &rest[at + "#[cfg(test)]".len()..];
+        let end = item.find([';', '{']).unwrap_or(item.len());
+        if item[end..].starts_with(';') {
+            let words: Vec<_> = item[..end].split_whitespace().collect();
+            if let Some(name) = words.iter().position(|word| *word == "mod") {
+                modules.push(words[name + 1].to_owned());
+            }
+        }
+        rest = &item[end + block(&item[end..])..];
+    }
+    kept.push_str(rest);
+    (kept, modules)
+}
+
+/// The length of a block in braces, or of the one character that ends an item without one.
+fn block(text: &str) -> usize {
+    let mut depth = 0;
+    for (at, c) in text.char_indices() {
+        match c {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return at + c.len_utf8();
+        }
+    }
+    text.len()
+}
+
+/// The paths that a tree of `use` stands for, or one path of an expression. Adds them; returns what follows.
+fn tree<'a>(text: &'a str, before: &[String], found: &mut Vec<Used>) -> &'a str {
+    let text = text.trim_start();
+    if let Some(mut list) = text.strip_prefix('{') {
+        loop {
+            list = list.trim_start_matches([',', ' ', '\n', '\t']);
+            match list.strip_prefix('}') {
+                Some(rest) => return rest,
+                None if list.is_empty() => return list,
+                None => list = tree(list, before, found),
+            }
+        }
+    }
+    let end = text.find(|c| !is_word(c)).unwrap_or(text.len());
+    let mut path = before.to_vec();
+    match end {
+        0 if text.starts_with('*') => path.push("*".into()),
+        0 => {}
+        _ => path.push(text[..end].into()),
+    }
+    let mut rest = &text[end.max(usize::from(text.starts_with('*')))..];
+    if end > 0
+        && let Some(deeper) = rest.strip_prefix("::")
+        && deeper.trim_start().starts_with(|c: char| is_word(c) || c == '{' || c == '*')
+    {
+        return tree(deeper, &path, found);
+    }
+    if let Some(renamed) = rest.trim_start().strip_prefix("as ") {
+        rest = renamed.trim_start().trim_start_matches(is_word);
+    }
+    if end == 0 && rest.len() == text.len() {
+        // Neither a name nor a list: go on behind it.
+        rest = text.get(1..).unwrap_or_default();
+    }
+    found.push(path);
+    rest
+}
+
+/// The paths from the crate's root that code of a file uses which is so many modules deep.
+fn paths(code: &str, depth: usize) -> Vec<Used> {
+    let mut found = Vec::new();
+    let out = "super::".repeat(depth);
+    for begin in ["crate::", &out] {
+        for (at, _) in code.match_indices(begin) {
+            if !code[..at].ends_with(|c| is_word(c) || c == ':') {
+                tree(&code[at + begin.len()..], &[], &mut found);
+            }
+        }
+    }
+    found
+}
+
+fn collect(path: &Path, files: &mut Vec<PathBuf>) {
+    match std::fs::read_dir(path) {
+        Ok(entries) => entries.flatten().for_each(|entry| collect(&entry.path(), files)),
+        Err(_) => files.push(path.to_owned()),
+    }
+}
+
+/// The modules of a file: its path below `src` without endings.
+fn modules(file: &Path) -> String {
+    let below = file.strip_prefix(root().join("src")).expect("in src").with_extension("");
+    let below = below.to_string_lossy().replace('\\', "/");
+    below.strip_suffix("/mod").unwrap_or(&below).to_owned()
+}
+
+/// The unit of a module.
+fn unit(modules: &str) -> String {
+    let begins = |path: &str| {
+        let rest = |path: &str| modules.strip_prefix(path).map(|rest| !rest.starts_with(is_word));
+        match path.strip_suffix("PRIMITIVE") {
+            Some(folder) => {
+                PRIMITIVES.iter().any(|name| rest(&format!("{folder}{name}")) == Some(true))
+            }
+            None => rest(path) == Some(true),
+        }
+    };
+    let apart = APART.iter().find(|(path, _)| begins(path));
+    let folder = || modules.split('/').next().unwrap_or(modules);
+    apart.map_or_else(folder, |(_, name)| name).to_owned()
+}
+
+/// A path as the table has it: what is a part of a folder but a unit of its own begins with the unit's name.
+fn shown(path: &[String]) -> String {
+    let words: Vec<_> = path.iter().map(String::as_str).collect();
+    let primitive = |name: &str| PRIMITIVES.contains(&name);
+    match words[..] {
+        ["progmem", ..] | ["hal", "progmem", ..] => "primitives".into(),
+        [name, ..] if MACROS.contains(&name) => "primitives".into(),
+        ["hal", "imp", name, ..] if primitive(name) => "primitives".into(),
+        _ => words.join("::"),
+    }
+}
+
+/// Who uses what.
+fn uses() -> Uses {
+    let mut files = Vec::new();
+    collect(&root().join("src"), &mut files);
+    files.retain(|file| file.extension().is_some_and(|ending| ending == "rs"));
+    let (mut sources, mut tests) = (Vec::new(), Vec::new());
+    for file in files {
+        let text = std::fs::read_to_string(&file).expect("a source");
+        let name = modules(&file);
+        let (code, own) = without_tests(&code(&text));
+        tests.extend(own.into_iter().map(|module| format!("{name}/{module}")));
+        sources.push((name, code));
+    }
+    let is_test =
+        |name: &str| tests.iter().any(|test| name == test || name.starts_with(&format!("{test}/")));
+    let mut uses = Uses::new();
+    for (name, code) in sources.iter().filter(|(name, _)| !is_test(name)) {
+        let own = unit(name);
+        let used = uses.entry(own.clone()).or_default();
+        for path in paths(code, name.split('/').count()) {
+            let path = shown(&path);
+            if !begins_with(&path, &own) && !path.is_empty() {
+                used.entry(path).or_insert_with(|| name.clone());
+            }
+        }
+    }
+    uses.retain(|unit, _| !ENTRIES.contains(&unit.as_str()));
+    uses
+}
+
+/// Whether a path is another, or one below it.
+fn begins_with(path: &str, other: &str) -> bool {
+    path.strip_prefix(other).is_some_and(|rest| rest.is_empty() || rest.starts_with("::"))
+}
+
+/// A row of the table: its units, and what they may use; `None` for everything.
+struct Row {
+    units: Vec<String>,
+    may_use: Option<Vec<String>>,
+}
+
+/// The rows of the table of layers that are about units of `src`.
+fn rows() -> Vec<Row> {
+    let tour = std::fs::read_to_string(root().join("ARCHITECTURE.md")).expect("the tour");
+    let lines = tour.lines().skip_while(|line| !line.starts_with("| folder |"));
+    let rows = lines.skip(2).take_while(|line| line.starts_with('|'));
+    let row = |line: &str| {
+        let cells: Vec<_> = line.split('|').map(str::trim).collect();
+        let spans = |cell: &str| -> Vec<String> {
+            cell.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+        };
+        let file = |span: String| {
+            let name = span.strip_prefix("src/")?;
+            Some(unit(name.strip_suffix(".rs").unwrap_or(name)))
+        };
+        // The units of a row that names none are the folders of the project beside `src`.
+        let units: Vec<_> = spans(cells[1]).into_iter().filter_map(file).collect();
+        let may_use = (cells[3] != "everything").then(|| spans(cells[3]));
+        (!units.is_empty()).then_some(Row { units, may_use })
+    };
+    rows.filter_map(row).collect()
+}
+
+#[test]
+fn units_use_what_the_tour_says() {
+    let (uses, rows) = (uses(), rows());
+    let mut wrong = Vec::new();
+    for (unit, used) in &uses {
+        let Some(row) = rows.iter().find(|row| row.units.contains(unit)) else {
+            wrong.push(format!("`{unit}` has no row"));
+            continue;
+        };
+        let Some(may_use) = &row.may_use else { continue };
+        let forbidden =
+            used.iter().filter(|(path, _)| !may_use.iter().any(|may| begins_with(path, may)));
+        wrong.extend(forbidden.map(|(path, file)| format!("src/{file}.rs uses `{path}`")));
+    }
+    for row in &rows {
+        let of = || row.units.iter().filter_map(|unit| uses.get(unit));
+        let is_used =
+            |may: &&String| of().any(|used| used.keys().any(|path| begins_with(path, may)));
+        let idle = row.may_use.iter().flatten().filter(|may| !may.contains('-') && !is_used(may));
+        wrong.extend(idle.map(|may| format!("{} use no `{may}`", row.units.join(", "))));
+        let gone = row.units.iter().filter(|unit| !uses.contains_key(*unit));
+        wrong.extend(gone.map(|unit| format!("there is no `{unit}`")));
+    }
+    assert!(
+        wrong.is_empty(),
+        "ARCHITECTURE.md's table of layers says otherwise; mend the code, or the table:\n{}",
+        wrong.join("\n")
+    );
+}
+
+#[test]
+fn there_is_no_circle() {
+    let uses = uses();
+    let of = |unit: &str| -> BTreeSet<String> {
+        let used = uses.get(unit).into_iter().flat_map(BTreeMap::keys);
+        let first = |path: &String| path.split("::").next().unwrap_or_default().to_owned();
+        used.map(first).filter(|used| used != unit).collect()
+    };
+    // Whoever uses only units that are settled is settled.
+    let mut open: BTreeSet<_> = uses.keys().cloned().collect();
+    loop {
+        let settled: Vec<_> =
+            open.iter().filter(|unit| of(unit).is_disjoint(&open)).cloned().collect();
+        if settled.is_empty() {
+            break;
+        }
+        settled.iter().for_each(|unit| _ = open.remove(unit));
+    }
+    let circle = open.iter().map(|unit| {
+        let used: Vec<_> = of(unit).intersection(&open).cloned().collect();
+        format!("{unit} uses {}", used.join(", "))
+    });
+    assert!(open.is_empty(), "in a circle:\n{}", circle.collect::<Vec<_>>().join("\n"));
+}
+
+#[test]
+fn the_chip_knows_nothing_of_motion() {
+    let uses = uses();
+    let known = uses["hal"].keys().filter(|path| begins_with(path, "motion"));
+    assert_eq!(known.count(), 0);
+    // What it has to know of steps is here.
+    assert!(
+        uses["hal"].contains_key("dda::Segment")
+            && uses["dda"].keys().all(|path| begins_with(path, "boards"))
+    );
+}
+
+#[test]
+fn paths_are_found_and_tests_are_none() {
+    let text = r#"
+        use crate::a::{self, b::{C, D as E}, f::*};
+        // crate::comment
+        fn g<'a>(x: &'a str) { crate::h::i(x, "crate::text \" }", '}', '\''); $crate::j!(); }
+        #[cfg(test)]
+        mod tests { use crate::k; const C: char = '{'; }
+        #[cfg(test)]
+        mod other;
+        pub(super) use super::super::l::M;
+    "#;
+    let (code, modules) = without_tests(&code(text));
+    let found: Vec<_> = paths(&code, 2).iter().map(|path| path.join("::")).collect();
+    assert_eq!(found, ["a::self", "a::b::C", "a::b::D", "a::f::*", "h::i", "j", "l::M"]);
+    assert_eq!(modules, ["other"]);
+}
+
+#[test]
+fn parts_of_a_folder_may_be_units() {
+    let units = ["hal/avr/text", "hal/avr/textile", "hal/progmem/text", "gcode/codes/docs", "baud"];
+    assert_eq!(units.map(unit), ["primitives", "hal", "primitives", "docs", "baud"]);
+    let path = |text: &str| shown(&text.split("::").map(str::to_owned).collect::<Vec<_>>());
+    assert_eq!(path("hal::imp::float::sqrtf"), "primitives");
+    assert_eq!(path("hal::imp::floats"), "hal::imp::floats");
+}
