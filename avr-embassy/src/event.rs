@@ -30,6 +30,11 @@ use crate::Thread;
 pub const OWN: usize = 4;
 /// Events that tasks can wait for.
 const WAITABLE: usize = OWN + 1;
+// The runtime has the others: see `assembly` and `POLL`.
+const _: () = assert!(
+    WAITABLE <= 5,
+    "bits 5, 6 and 7 are HOLD, HELD and POLL: an event needs another register"
+);
 /// A task of the thread-mode executor was woken: there is something to poll.
 pub(crate) const POLL: u8 = 7;
 
@@ -47,7 +52,13 @@ impl Event {
     /// const TOO_MANY: avr_embassy::Event = avr_embassy::Event::new::<4>();
     /// ```
     pub const fn new<const BIT: u8>() -> Event {
-        const { assert!((BIT as usize) < OWN, "the program's own events are the bits 0 to 3") };
+        const {
+            assert!(
+                (BIT as usize) < OWN,
+                "the program's own events are the bits 0 to 3, and the register has no more: let two things that happen share an \
+                 event, whose task looks at both, or pend a task of interrupt mode"
+            );
+        };
         Event(BIT)
     }
 

@@ -17,14 +17,8 @@ use embassy_time_driver::{Driver, time_driver_impl};
 use crate::assembly::{CLOSED, FLAGS, MISSED, PEND, PENDED};
 use crate::chip::{self, OCRA, PRESCALERS, TCCRA, TCCRB, TIMSK};
 use crate::period::Period;
-use crate::timers::Timers;
+use crate::timers::{TIMERS, Timers};
 use crate::{Event, Thread, interrupt};
-
-const TIMERS: usize = match (cfg!(feature = "timers-8"), cfg!(feature = "timers-16")) {
-    (_, true) => 16,
-    (true, _) => 8,
-    _ => 4,
-};
 
 /// Milliseconds since reset, the lowest byte first: enough for 34 years. The interrupt alone writes it.
 static mut MILLIS: [u8; 5] = [0; 5];

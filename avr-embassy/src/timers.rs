@@ -11,6 +11,14 @@ use core::task::Waker;
 use embassy_executor::raw::{TaskRef, task_from_waker, wake_task};
 use heapless::Vec;
 
+/// How many tasks of a program can wait for a time at once without polling: 4, or as a feature says. A program that counts its own can
+/// check them against it when it is built.
+pub const TIMERS: usize = match (cfg!(feature = "timers-8"), cfg!(feature = "timers-16")) {
+    (_, true) => 16,
+    (true, _) => 8,
+    _ => 4,
+};
+
 struct Entry {
     at: u32,
     task: TaskRef,

@@ -214,6 +214,31 @@ pub const fn large_of(axis: u8) -> u8 {
     (MOTORS * motor::LARGES[0]) as u8 + base(axis, axis::LARGES)
 }
 
+/// In wide integers, where nothing wraps.
+const NUMBERS: usize = system::COUNT
+    + MOTORS * motor::COUNT
+    + AXES * axis::COUNT
+    + pwm::COUNT
+    + spindle::COUNT
+    + coolant::COUNT
+    + squaring::COUNT
+    + USERS as usize * user::COUNT
+    + job::COUNT;
+const _: () = assert!(
+    NUMBERS <= u8::MAX as usize,
+    "there are more settings than a byte can number: make `Setting` and what is kept of it (`Storage`, `Item`) two bytes wide"
+);
+const _: () = assert!(
+    MOTORS * motor::SMALLS[0] + AXES * (axis::SMALLS[0] + axis::SMALLS[1]) + system::SMALLS[0]
+        <= 256
+        && MOTORS * motor::LARGES[0]
+            + AXES * (axis::LARGES[0] + axis::LARGES[1])
+            + system::LARGES[0]
+            + job::COUNT
+            <= 256,
+    "the settings have more places in RAM than a byte can number: widen `Place`, or keep some in EEPROM alone (`Kind::Cold`)"
+);
+
 /// A setting.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Setting(u8);
@@ -226,6 +251,9 @@ impl Setting {
     pub const WARM: u8 = FIRST_PWM;
     /// From [`Self::WARM`] to before this are those that are in EEPROM alone.
     pub const COLD: u8 = FIRST_JOB;
+
+    /// How many are kept, in RAM or in EEPROM alone; one or two of them are not.
+    pub const KEPT: u16 = (SMALLS + LARGES - job::COUNT) as u16 + (Self::COLD - Self::WARM) as u16;
 
     /// Its number.
     pub fn number(self) -> u8 {

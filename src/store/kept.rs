@@ -4,6 +4,8 @@
 
 use super::{Log, Memory, record};
 use crate::config::{Setting, Settings};
+use crate::gcode::tables::ROWS;
+use crate::units::AXES;
 
 /// A setting that is kept and in RAM.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -52,6 +54,9 @@ pub fn value<M: Memory>(log: &Log, memory: &M, setting: Setting) -> i32 {
     kept.unwrap_or_else(|| setting.default_value())
 }
 
+/// Keys that the log may have to hold: of every setting that is kept, and of every value of the tables.
+pub const KEYS: u16 = Setting::KEPT + ROWS as u16 * AXES as u16;
+
 /// What stands for no item among the keys.
 const NO_KEY: u16 = u16::MAX;
 
@@ -79,8 +84,6 @@ pub fn load<M: Memory>(log: &Log, memory: &M, settings: &mut Settings) {
 mod tests {
     use super::super::tables;
     use super::*;
-    use crate::gcode::tables::ROWS;
-    use crate::units::AXES;
     use std::collections::HashMap;
 
     #[test]
@@ -96,6 +99,7 @@ mod tests {
             assert_eq!(keys.insert(key, Item(Setting::from_number(0).unwrap())), None);
             assert_ne!(key, NO_KEY);
         }
+        assert!(keys.len() <= usize::from(KEYS));
         assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + 10 + 5 + 2 + 16);
     }
 }

@@ -32,3 +32,10 @@ pub mod view;
 pub mod wake;
 
 pub use crate::hal::Never;
+
+/// Tasks that wait for a time. `xtask/src/layers.rs` looks whether these are all.
+pub const WAIT_FOR_TIME: [&str; 3] = ["power", "reporter", "storage"];
+const _: () = assert!(
+    WAIT_FOR_TIME.len() <= avr_embassy::timers::TIMERS,
+    "more tasks wait for a time than the runtime has timers, and would poll: turn on the feature `timers-8` of avr-embassy in Cargo.toml"
+);

@@ -345,6 +345,30 @@ fn the_chip_knows_nothing_of_motion() {
     );
 }
 
+/// The list that is held against the number of timers when Kerf is built.
+#[test]
+fn tasks_that_wait_for_a_time_are_counted() {
+    let mut files = Vec::new();
+    collect(&root().join("src"), &mut files);
+    let text = |file: &Path| std::fs::read_to_string(file).unwrap_or_default();
+    let mut waiting: Vec<_> = files
+        .iter()
+        .filter(|file| code(&text(file)).contains("Timer::after"))
+        .map(|file| modules(file))
+        .collect();
+    waiting.sort();
+    let tasks = text(&root().join("src/tasks/mod.rs"));
+    let list = tasks.split("WAIT_FOR_TIME: ").nth(1).and_then(|rest| rest.split(';').nth(1));
+    let counted: Vec<_> = list
+        .unwrap_or_default()
+        .split('"')
+        .skip(1)
+        .step_by(2)
+        .map(|name| format!("tasks/{name}"))
+        .collect();
+    assert_eq!(waiting, counted, "`WAIT_FOR_TIME` of src/tasks/mod.rs");
+}
+
 #[test]
 fn paths_are_found_and_tests_are_none() {
     let text = r#"
