@@ -1,6 +1,6 @@
 //! Putting it together: makes the links, hands every end to its task, starts the hardware.
 //!
-//! The same on AVR and on the host; what differs is in `hal::imp`.
+//! The same on AVR and on the host; what differs is in `hal`.
 
 use kerf_macros::small;
 
@@ -14,10 +14,10 @@ use crate::config::Settings;
 use crate::dda::{SEGMENTS, Segment};
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
-use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::imp::{stepper, uart, watchdog};
+use crate::hal::eeprom::Eeprom;
 use crate::hal::ring::Producer;
 use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
+use crate::hal::{stepper, uart, watchdog};
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Memory, Occasion, Remembers, Speech};

@@ -27,7 +27,8 @@
 //! - [`boards`]: pins and chips as data; [`hal`]: the chip, behind one interface for AVR and host.
 //! - [`units`], [`math`], [`status`], [`baud`]: what all of these share.
 #![no_std]
-#![cfg_attr(target_arch = "avr", feature(asm_experimental_arch, optimize_attribute))]
+// An image has no `std`, and needs these of the compiler.
+#![cfg_attr(not(feature = "std"), feature(asm_experimental_arch, optimize_attribute))]
 
 #[cfg(feature = "std")]
 extern crate std;

@@ -5,7 +5,7 @@
 //!
 //! Cost on AVR, cycles: add 130, mul 160, div 500, sqrt 490, sin and cos about 1,800, atan2 3,000.
 
-use crate::hal::imp::float;
+use crate::hal::float;
 
 /// Square root; 0 for a negative argument, which rounding produces where the true value is 0.
 pub fn sqrt(x: f32) -> f32 {

@@ -113,6 +113,22 @@ impl Segment {
     }
 }
 
+/// How close ticks may come on a chip with usual pulses ([`Drivers::USUAL`]), for some number of motors that move. All are periods of
+/// [`Segment::period`].
+#[derive(Clone, Copy, Debug)]
+pub struct Ticks {
+    /// At the highest step rate: of lockstep.
+    pub step: u16,
+    /// The shortest: the step interrupt, a short interrupt before it, and some time for everything else.
+    pub shortest: u16,
+    /// Of steady motion: as fine as leaves exec and the planner a third of the CPU.
+    pub fine: u16,
+    /// Of short blocks, for which they need more.
+    pub coarse: u16,
+    /// From this period on pulses wait for the interrupt's worst latency ([`Segment::settle`]).
+    pub settles: u16,
+}
+
 /// What the drivers of the motors ask of their pins.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Drivers {

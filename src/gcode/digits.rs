@@ -2,7 +2,7 @@
 //!
 //! Cost on AVR: 22 cycles a digit, and 80 for a number; of the loop the compiler makes twice as much.
 
-use crate::hal::imp::text::Cursor;
+use crate::hal::text::Cursor;
 
 /// A number below 65,530: the whole, and the decimals as ten-thousandths. More digits are left, where
 /// no word can begin with them. `None` without any digit.

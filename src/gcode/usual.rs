@@ -13,8 +13,8 @@ use super::digits::decimal;
 use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units};
 use super::setup::{AxisMode, Setup};
 use super::state::State;
-use crate::hal::imp::arithmetic::product;
-use crate::hal::imp::text::Cursor;
+use crate::hal::arithmetic::product;
+use crate::hal::text::Cursor;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
 /// What tells upper from lower case.

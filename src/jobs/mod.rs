@@ -123,7 +123,7 @@ mod tests {
     use crate::gcode::Interpreter;
     use crate::gcode::command::Commands;
     use crate::gcode::setup::Usual;
-    use crate::hal::imp::eeprom::Eeprom;
+    use crate::hal::eeprom::Eeprom;
     use std::string::String;
 
     #[test]

@@ -82,7 +82,7 @@ pub use signs::Signs;
 
 use crate::hal::byte::SharedByte;
 use crate::hal::event::Event::BlockDone;
-use crate::hal::imp::{exec, flags};
+use crate::hal::{exec, flags};
 use crate::progmem;
 
 /// What the machine is doing.

@@ -22,7 +22,7 @@ use kerf_macros::small;
 
 use super::float::{scaled, whole};
 use crate::gcode::command::Feed;
-use crate::hal::imp::arithmetic::product;
+use crate::hal::arithmetic::product;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
 /// What a chain takes at most, at its feed.

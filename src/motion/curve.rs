@@ -15,7 +15,7 @@ use super::junction::{Heading, ONE};
 use super::limits::Slowest;
 use super::path::Path;
 use super::short::{Log, OCTAVE, Short};
-use crate::hal::imp::arithmetic::product;
+use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::FIRST_ROTARY;
 

@@ -3,7 +3,7 @@
 //!
 //! Called by exec's preparation of segments and by the line builder, a few times each. No units.
 
-use crate::hal::imp::arithmetic;
+use crate::hal::arithmetic;
 
 /// `a / b`, rounded down, if that fits 16 bits: `a >> 16 < b`. Else something, without a panic.
 /// Cost: 195, 120 if it fits eight bits.

@@ -29,12 +29,13 @@ use super::short::Short;
 use super::snapshot::{Program, Snapshot};
 use crate::dda::Segment;
 use crate::gcode::overrides::Change;
+use crate::hal::TIMER_HZ;
 
 /// Half CPU cycles in a second.
-const HALVES_PER_S: f32 = 2.0 * crate::boards::ACTIVE.clock_hz as f32;
+const HALVES_PER_S: f32 = 2.0 * TIMER_HZ as f32;
 
-/// CPU cycles in a millisecond.
-const CYCLES_PER_MS: u16 = (crate::boards::ACTIVE.clock_hz / 1000) as u16;
+/// The ticks of a pause: how many a millisecond has, as few as periods allow, and their period.
+const PAUSE: (u16, u16) = pause(TIMER_HZ);
 
 /// Nominal time of a segment: as short as leaves two thirds of the CPU to others.
 pub const SEGMENT_S: f32 = 0.002;
@@ -43,7 +44,7 @@ pub const SEGMENT_S: f32 = 0.002;
 const SHORT_LOG2: i8 = -5;
 
 /// CPU cycles in [`SEGMENT_S`].
-const SEGMENT_CYCLES: u32 = (crate::boards::ACTIVE.clock_hz as f32 * SEGMENT_S) as u32;
+const SEGMENT_CYCLES: u32 = (TIMER_HZ as f32 * SEGMENT_S) as u32;
 
 /// Shortest block with steps, s: twice what exec takes for it while the step interrupt is busy.
 pub const BLOCK_S_MIN: f32 = 0.000_75;
@@ -51,8 +52,19 @@ pub const BLOCK_S_MIN: f32 = 0.000_75;
 /// Faster than this no line ends but at another one, mm/s.
 const SLOW: f32 = 5.0;
 
-/// A dwell's segment: this many ticks of a millisecond.
-const DWELL_TICKS: u16 = 2;
+/// A dwell's segment lasts so many milliseconds.
+const DWELL_MS: u16 = 2;
+
+/// See [`PAUSE`].
+const fn pause(timer_hz: u32) -> (u16, u16) {
+    let counts = timer_hz / 1_000;
+    let ticks = counts.div_ceil(u16::MAX as u32);
+    assert!(
+        counts / ticks * ticks * 1_000 == timer_hz,
+        "a millisecond is no whole number of such ticks"
+    );
+    (ticks as u16, (counts / ticks) as u16)
+}
 
 /// What [`Exec::step`] found to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -341,9 +353,10 @@ impl Exec {
 
     #[inline(never)]
     fn dwell(&mut self, segment: &mut Segment) {
-        let ticks = if self.dwell_ms < u32::from(DWELL_TICKS) { 1 } else { DWELL_TICKS };
-        self.dwell_ms -= u32::from(ticks);
-        self.prep.pause(ticks, CYCLES_PER_MS, segment);
+        let ms = if self.dwell_ms < u32::from(DWELL_MS) { 1 } else { DWELL_MS };
+        self.dwell_ms -= u32::from(ms);
+        let (ticks, period) = PAUSE;
+        self.prep.pause(ms * ticks, period, segment);
     }
 
     /// Takes up the oldest block if it is a line. It stays in the ring until its last segment, so that
@@ -468,4 +481,17 @@ fn cycles_of(seconds: f32) -> u32 {
     }
     let cycles = (whole(seconds * HALVES_PER_S) + 1) >> 1;
     cycles.clamp(1, CYCLES_MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pause_is_exact_on_a_fast_chip() {
+        assert_eq!(pause(16_000_000), (1, 16_000));
+        assert_eq!(pause(20_000_000), (1, 20_000));
+        assert_eq!(pause(125_000_000), (2, 62_500));
+        assert_eq!(pause(168_000_000), (3, 56_000));
+    }
 }

@@ -2,7 +2,7 @@
 
 use kerf_macros::small;
 
-pub use crate::hal::imp::arithmetic::whole;
+pub use crate::hal::arithmetic::whole;
 
 /// Whether `a` is less than `b`, neither of them a NaN. Cost: 45, where a comparison of floats takes 90, or 180 where the compiler
 /// sees to NaN as well.

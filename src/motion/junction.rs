@@ -10,7 +10,7 @@ use kerf_macros::small;
 
 use super::dynamics::Dynamics;
 use super::float::{OCTAVE, below, log, scaled, some};
-use crate::hal::imp::arithmetic::product;
+use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::PerAxis;
 

@@ -10,7 +10,7 @@ use super::divide::root;
 use super::float::{scaled, some, whole};
 use super::governor::Limits;
 use super::short::Short;
-use crate::hal::imp::arithmetic::product;
+use crate::hal::arithmetic::product;
 
 /// Bits of the fastest velocity, or one more.
 const BITS: i16 = 12;

@@ -4,9 +4,12 @@
 //! interrupt waits out each pulse, so that ticks keep the more distance the wider a pulse is. Times are
 //! CPU cycles unless they are named otherwise.
 
-use crate::boards::{ACTIVE, MOTORS};
+use crate::boards::MOTORS;
+use crate::dda::Ticks;
+use crate::hal::{TICKS, TIMER_HZ};
 
-const CYCLES_PER_US: u16 = (ACTIVE.clock_hz / 1_000_000) as u16;
+const CYCLES_PER_US: u16 = (TIMER_HZ / 1_000_000) as u16;
+const _: () = assert!(TIMER_HZ / 1_000_000 < 256, "255 us take more than a tick period holds");
 
 pub use crate::dda::Drivers;
 
@@ -30,28 +33,18 @@ impl Drivers {
     /// would leave exec too little time for ramps.
     pub const fn step_rate_max(self, motors: usize) -> f32 {
         let usual = usual(if motors == 0 { 0 } else { motors - 1 });
-        ACTIVE.clock_hz as f32 / (usual.step + self.extra()) as f32
+        TIMER_HZ as f32 / (usual.step + self.extra()) as f32
     }
 }
 
-/// Tick periods with usual pulses; `step` is that at the highest step rate.
-struct Usual {
-    step: u16,
-    shortest: u16,
-    fine: u16,
-    coarse: u16,
-    settles: u16,
-}
-
-/// By the number of motors that move, less one. No table: that would be in RAM.
-const fn usual(motors: usize) -> Usual {
-    let (step, shortest, fine, coarse, settles) = match motors {
-        0 => (160, 160, 200, 400, 200),
-        1 => (240, 200, 200, 400, 200),
-        2 => (240, 240, 320, 480, 300),
-        _ => (319, 319, 400, 560, 320),
-    };
-    Usual { step, shortest, fine, coarse, settles }
+/// Tick periods with usual pulses, by the number of motors, less one. No table: that would be in RAM.
+const fn usual(motors: usize) -> Ticks {
+    match motors {
+        0 => const { TICKS[0] },
+        1 => const { TICKS[1] },
+        2 => const { TICKS[2] },
+        _ => const { TICKS[MOTORS - 1] },
+    }
 }
 
 /// Ticks of blocks so short that they are a single segment: 2^22 / the tick period.

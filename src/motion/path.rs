@@ -9,7 +9,7 @@ use super::divide::{quotient, root};
 use super::float::below;
 use super::junction::{Heading, ONE};
 use super::short::Short;
-use crate::hal::imp::arithmetic::product;
+use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 

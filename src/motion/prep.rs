@@ -39,7 +39,7 @@ use super::divide::{quotient, quotient_remainder};
 use super::pace::{COARSEST, Drivers, Pace, paces};
 use crate::boards::{MOTORS, each_motor};
 use crate::dda::{PHASE_START, STEP, Segment};
-use crate::hal::imp::arithmetic::product;
+use crate::hal::arithmetic::product;
 
 const STEP_LOG2: u8 = 15;
 

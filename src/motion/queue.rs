@@ -12,7 +12,7 @@ use super::float::{OCTAVE, below, greater, least, lesser, log, some};
 use super::horizon::{self, Horizon, kappa};
 use super::short::Short;
 pub use super::source::{Anchor, BlockSource};
-use crate::hal::imp::exec;
+use crate::hal::exec;
 use crate::hal::ring::{Ceiling, Producer, Ring};
 use crate::hal::{Interrupt, Thread};
 use crate::math::sqrt;

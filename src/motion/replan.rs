@@ -15,7 +15,7 @@ use super::float::{below, least};
 use super::horizon::{self, Keys, kappa};
 use super::queue::{BlockQueue, FIRM, SEQ, WORTH};
 use super::short::Short;
-use crate::hal::imp::exec;
+use crate::hal::exec;
 
 /// What limits a line, of all that is behind it.
 struct Behind {

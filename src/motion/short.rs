@@ -1,6 +1,6 @@
 //! A positive float in two bytes, for limits kept in every block, and its logarithm.
 
-use crate::hal::imp::arithmetic::high_product;
+use crate::hal::arithmetic::high_product;
 
 /// Eight bits of exponent and eight of mantissa: 0.4 % exact, rounded down, so that a limit stays one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]

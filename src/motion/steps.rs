@@ -10,7 +10,7 @@ use kerf_macros::small;
 use super::block::{FRACTIONS, PARTS_LOG2};
 use super::divide::quotient_remainder;
 use crate::config::StepRatio;
-use crate::hal::imp::arithmetic::product;
+use crate::hal::arithmetic::product;
 use crate::units::Length;
 
 /// Parts of a step.

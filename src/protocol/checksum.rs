@@ -3,7 +3,7 @@
 //! h = 31 h + byte, modulo 2^32, over every byte from the first brace up to the comma before the checksum; what is told is
 //! h modulo 9999. Cost on AVR: 30 cycles a byte.
 
-use crate::hal::imp::arithmetic::times;
+use crate::hal::arithmetic::times;
 
 /// A checksum being made.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]

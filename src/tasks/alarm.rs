@@ -17,7 +17,7 @@ use super::links::Links;
 use super::spindle;
 use super::switches;
 use crate::config::Settings;
-use crate::hal::imp::stepper;
+use crate::hal::stepper;
 use crate::machine::{self, Alarm};
 use crate::status::Status;
 

@@ -5,7 +5,7 @@
 
 use crate::gcode::overrides::Overrides;
 use crate::hal::Thread;
-use crate::hal::imp::exec;
+use crate::hal::exec;
 use crate::motion::snapshot::Snapshot;
 use crate::motors::Motors;
 use crate::spindle::Spindle;

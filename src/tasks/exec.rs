@@ -8,14 +8,13 @@
 
 use avr_embassy::InterruptEnd;
 
-use crate::boards::ACTIVE;
 use crate::dda::contact;
 use crate::dda::{SEGMENTS, Segment};
 use crate::hal::Interrupt;
+use crate::hal::arithmetic::product;
 use crate::hal::event::{self, Event};
-use crate::hal::imp::arithmetic::product;
-use crate::hal::imp::{exec, flags, stepper, uart};
 use crate::hal::ring::Producer;
+use crate::hal::{TIMER_HZ, exec, flags, stepper, uart};
 use crate::machine::{self, Alarm};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
@@ -259,7 +258,7 @@ const UNIT_LOG2: u8 = 11;
 
 /// Units in so many tenths of a millisecond.
 const fn units(tenths: u32) -> u16 {
-    ((ACTIVE.clock_hz / 10_000 * tenths) >> UNIT_LOG2) as u16
+    ((TIMER_HZ / 10_000 * tenths) >> UNIT_LOG2) as u16
 }
 
 /// How much is handed out, in the unit.

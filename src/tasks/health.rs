@@ -13,7 +13,7 @@
 use kerf_macros::small;
 
 use crate::hal::byte::SharedByte;
-use crate::hal::imp::{exec, stepper, watchdog};
+use crate::hal::{exec, stepper, watchdog};
 
 /// A sign of life.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -35,9 +35,10 @@ use super::links::Links;
 use super::ports::Port;
 use super::view::View;
 use crate::hal::event::Event;
-use crate::hal::imp::time::millis;
-use crate::hal::imp::{flags, reset, uart};
 use crate::hal::serial::{CUT, GO, USB};
+use crate::hal::system::reset;
+use crate::hal::time::millis;
+use crate::hal::{flags, uart};
 use crate::machine;
 use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, LET_GO, RESET, RESUME, UNPLACED};
 

@@ -10,7 +10,7 @@
 use super::hold;
 use super::links::Links;
 use crate::hal::event::Event;
-use crate::hal::imp::flags;
+use crate::hal::flags;
 use crate::machine::jog::Bar;
 use crate::machine::{self, Cycle};
 

@@ -13,9 +13,9 @@
 
 use heapless::Vec;
 
-use crate::hal::imp::text::copy_printing;
 use crate::hal::ring::Window;
 use crate::hal::serial::TAKEN_RETURN;
+use crate::hal::text::copy_printing;
 use crate::machine::Alarm;
 use crate::protocol::{asks_alarm, is_control, may_be_control};
 use crate::status::Status;

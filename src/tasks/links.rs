@@ -176,6 +176,6 @@ pub fn wait_for_block(yes: bool) {
 /// A block has been queued: exec is pended if it waits for one. Else it looks when a segment has been used up.
 pub fn feed() {
     if waits().get() != 0 {
-        crate::hal::imp::exec::pend();
+        crate::hal::exec::pend();
     }
 }

@@ -14,7 +14,7 @@ use super::spindle;
 use crate::gcode::overrides::{Change, FULL, LEAST, Override, Overrides};
 use crate::hal::Thread;
 use crate::hal::event::Event;
-use crate::hal::imp::{exec, flags, uart};
+use crate::hal::{exec, flags, uart};
 use crate::motion::factors::Factors;
 use crate::motion::queue::{self, BlockSource};
 use crate::realtime::{Asked, NO_JOG, TRAVERSE};

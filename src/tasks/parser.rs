@@ -27,13 +27,13 @@ use super::reporter::tell_at_once;
 use super::tx::Tx;
 use super::view::View;
 use crate::gcode::command::Stop;
+use crate::hal::eeprom::Eeprom;
 use crate::hal::event::{Event, is_unheard, set_asked, wake_after, wake_after_transmitted};
-use crate::hal::imp;
-use crate::hal::imp::eeprom::Eeprom;
-use crate::hal::imp::flags;
-use crate::hal::imp::time::millis;
-use crate::hal::imp::uart;
+use crate::hal::flags;
 use crate::hal::serial::{PORTS, USB};
+use crate::hal::system;
+use crate::hal::time::millis;
+use crate::hal::uart;
 use crate::jobs::Job;
 use crate::machine::alarm::is_program_end;
 use crate::machine::{self, Alarm};
@@ -354,9 +354,9 @@ fn has_left(links: &Links, tx: &mut Tx, since: &mut Option<u16>) -> bool {
     }
     if let Some(boot) = links.restart.take() {
         if boot {
-            imp::boot()
+            system::boot()
         } else {
-            imp::reset()
+            system::reset()
         };
     }
     if let Some(rate) = links.rate.take() {

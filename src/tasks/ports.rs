@@ -18,8 +18,8 @@ use super::links::Links;
 use super::tx::Tx;
 use super::view::{Seen, View};
 use crate::hal::event::is_unheard;
-use crate::hal::imp::uart;
 use crate::hal::serial::{USB, is_shared};
+use crate::hal::uart;
 use crate::protocol::{Remembers, Speech};
 use crate::status::Status;
 

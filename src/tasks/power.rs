@@ -11,8 +11,8 @@ use super::health;
 use super::links::Links;
 use crate::config::Settings;
 use crate::hal::Thread;
-use crate::hal::imp::gpio;
-use crate::hal::imp::time::millis;
+use crate::hal::gpio;
+use crate::hal::time::millis;
 use crate::machine;
 use crate::motors::{Modes, Motors};
 

@@ -17,12 +17,12 @@ use super::links::Links;
 use super::overtake::Scan;
 use super::ports::Port;
 use crate::hal::event::{Event, next, set_asked};
-use crate::hal::imp::uart::{self, lost_ends};
 use crate::hal::ring::Window;
 use crate::hal::serial::{
     AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, RETURNED, RX_RING, Received, TAKEN,
     TAKEN_RETURN, USB, high_water, is_shared, low_water,
 };
+use crate::hal::uart::{self, lost_ends};
 use crate::machine;
 use crate::status::Status;
 

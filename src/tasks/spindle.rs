@@ -11,7 +11,7 @@ use super::storage::Storage;
 use crate::config::Setting;
 use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
-use crate::hal::imp::{exec, gpio, pwm, stepper};
+use crate::hal::{exec, gpio, pwm, stepper};
 use crate::machine;
 use crate::motion::snapshot::Snapshot;
 use crate::spindle::{Changed, Spindle};

@@ -19,7 +19,7 @@ use super::ports::COURTESY;
 use super::wake::Wake;
 use crate::config::Setting;
 use crate::gcode::tables::{Edit, Row, Tables};
-use crate::hal::imp::eeprom::Eeprom;
+use crate::hal::eeprom::Eeprom;
 use crate::protocol::Store;
 use crate::status::Status;
 use crate::store::kept::{self, ITEMS, Item};

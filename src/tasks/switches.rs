@@ -1,6 +1,6 @@
 //! Switches: what their settings make of them, and what the limits, the door and the emergency stop lead to.
 //!
-//! The interrupt that finds a limit hit, or the emergency stop, has stopped the steps already (`hal::imp::inputs`).
+//! The interrupt that finds a limit hit, or the emergency stop, has stopped the steps already (`hal::inputs`).
 //! This, called by the control task, raises the [`alarm`]. Nothing here waits, and nothing can be full.
 //!
 //! A limit is a switch whose `sn` or `sx` says so; by default none does, so that a machine without switches runs.
@@ -18,7 +18,7 @@ use crate::boards::{ACTIVE, inputs};
 use crate::config::Settings;
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::hal::event::Event;
-use crate::hal::imp::{flags, inputs as pins};
+use crate::hal::{flags, inputs as pins};
 use crate::machine::{self, Alarm};
 
 /// Of `sn` and `sx`: a limit.

@@ -5,8 +5,8 @@
 
 use crate::hal::Thread;
 use crate::hal::event::wait_transmitted;
-use crate::hal::imp::uart;
 use crate::hal::serial::{Outgoing, TX_RING};
+use crate::hal::uart;
 use crate::progmem::Plain;
 use crate::protocol::Checksum;
 

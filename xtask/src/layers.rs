@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 use crate::process::root;
 
 /// Files of a folder that are a unit of their own: how their paths begin, and the unit's name.
-const APART: [(&str, &str); 4] = [
+const APART: [(&str, &str); 5] = [
+    ("hal/primitives", "primitives"),
     ("hal/progmem", "primitives"),
     ("hal/avr/PRIMITIVE", "primitives"),
     ("hal/host/PRIMITIVE", "primitives"),
@@ -210,7 +211,8 @@ fn shown(path: &[String]) -> String {
     match words[..] {
         ["progmem", ..] | ["hal", "progmem", ..] => "primitives".into(),
         [name, ..] if MACROS.contains(&name) => "primitives".into(),
-        ["hal", "imp", name, ..] if primitive(name) => "primitives".into(),
+        ["hal", "primitives", ..] => "primitives".into(),
+        ["hal", name, ..] | ["hal", "imp", name, ..] if primitive(name) => "primitives".into(),
         _ => words.join("::"),
     }
 }
@@ -331,6 +333,16 @@ fn there_is_no_circle() {
         format!("{unit} uses {}", used.join(", "))
     });
     assert!(open.is_empty(), "in a circle:\n{}", circle.collect::<Vec<_>>().join("\n"));
+}
+
+/// But by the contract, `hal::contract` and `hal::primitives`. On the host there is also the machine, for tests.
+#[test]
+fn no_layer_knows_the_chip() {
+    let uses = uses();
+    let knows = |path: &&String| begins_with(path, "hal::imp") && *path != "hal::imp::Machine";
+    let wrong = uses.iter().filter(|(unit, _)| *unit != "hal" && *unit != "primitives");
+    let wrong: Vec<_> = wrong.flat_map(|(_, used)| used.keys().filter(knows)).collect();
+    assert!(wrong.is_empty(), "{wrong:?}: `hal` has it without `imp`");
 }
 
 #[test]

@@ -25,6 +25,7 @@ mod step_isr;
 pub mod stepper;
 pub mod text;
 pub mod time;
+mod timing;
 pub mod uart;
 pub mod watchdog;
 
@@ -33,6 +34,19 @@ pub use avr_embassy::mask;
 pub use crate::hal::{exec, flags};
 
 use crate::hal::resets::Mark;
+
+/// This chip, for the [contract](super::contract).
+pub struct Chip;
+
+/// Functions of [`System`](super::contract::System).
+pub mod system {
+    pub use super::{boot, reset};
+}
+
+/// Functions of [`Text`](super::primitives::Text).
+pub mod text_functions {
+    pub use super::text::copy_printing;
+}
 
 /// Starts the firmware anew, as if the reset button had been pressed: by the watchdog, in 15 ms.
 pub fn reset() -> ! {

@@ -16,6 +16,8 @@ pub mod pwm;
 pub mod stepper;
 pub mod text;
 pub mod time;
+#[path = "../avr/timing.rs"]
+mod timing;
 pub mod uart;
 pub mod watchdog;
 
@@ -26,6 +28,19 @@ use core::cell::Cell;
 pub use avr_embassy::mask;
 
 pub use super::{exec, flags};
+
+/// This chip, for the [contract](super::contract).
+pub struct Chip;
+
+/// Functions of [`System`](super::contract::System).
+pub mod system {
+    pub use super::{boot, reset};
+}
+
+/// Functions of [`Text`](super::primitives::Text).
+pub mod text_functions {
+    pub use super::text::copy_printing;
+}
 
 /// Never.
 const NEVER: u64 = u64::MAX;

@@ -23,7 +23,7 @@ use super::Planner;
 use super::seek::{Sought, drop_blocks};
 use super::square::Second;
 use crate::gcode::command::{Feed, Motion};
-use crate::hal::imp::inputs;
+use crate::hal::inputs;
 use crate::machine::{self, Event};
 use crate::motion::block::Action;
 use crate::status::Status;

@@ -16,7 +16,7 @@
 use super::{Begun, News, Parts, Planner, Turn};
 use crate::gcode::command::{Commands, Feed};
 use crate::hal::event::{Event, wait};
-use crate::hal::imp::time::millis;
+use crate::hal::time::millis;
 use crate::motion::chain::Chain;
 use crate::motion::line::Built;
 use crate::motion::queue;

@@ -14,7 +14,7 @@ use crate::boards::inputs::PROBE;
 use crate::gcode::command::Motion;
 use crate::gcode::modal::MotionMode;
 use crate::hal::event::{Event, wait};
-use crate::hal::imp::inputs;
+use crate::hal::inputs;
 use crate::machine::{self, Alarm, ProbeState};
 use crate::status::Status;
 use crate::tasks::alarm;

@@ -16,7 +16,7 @@ use crate::dda::contact;
 use crate::gcode::command::Feed;
 use crate::hal::Thread;
 use crate::hal::event::{Event, wait};
-use crate::hal::imp::inputs;
+use crate::hal::inputs;
 use crate::machine;
 use crate::motion::block::{Action, Outputs};
 use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};

@@ -1,0 +1,223 @@
+//! What a chip has to have: a trait for each part of it, which says what its functions do, in which units, at which level they may be called, and
+//! what they cost.
+//!
+//! A chip is a folder beside `avr` and `host`, under the name [`imp`](super::imp): a module for each trait with the functions of the trait, a type
+//! `Chip`, and for an image what `main` calls at start-up. The compiler holds it against the traits: a function that is missing, or of
+//! another type, is an error here that names it. Everything outside `hal` calls the functions of the modules below, [`stepper`],
+//! [`uart`] and so on; it cannot tell chips apart. Which chip it is, is known when the image is built, so that a call costs what it
+//! costs without the trait.
+//!
+//! Arithmetic is in [`primitives`](super::primitives), memory without power in [`Memory`].
+//!
+//! Levels are those of [`avr_embassy`]; "exec" is interrupt mode. Costs are cycles of the ATmega2560, and said where a budget of
+//! ARCHITECTURE.md hangs on them.
+
+use super::imp;
+use super::resets::Cause;
+use super::ring::Producer;
+use super::serial::{AllEnds, Flow};
+use crate::boards::MOTORS;
+use crate::dda::{Dda, SEGMENTS, Segment, Ticks};
+use crate::realtime::Asked;
+use crate::store::Memory;
+
+/// Declares a trait, makes the chip's module have it, and makes a module of functions that call it.
+macro_rules! contract {
+    ($(
+        $(#[$about:meta])*
+        trait $trait:ident in $module:ident {$(
+            $(#[$says:meta])*
+            fn $name:ident($($arg:ident: $type:ty),*) $(-> $result:ty)?;
+        )+}
+    )+) => {$(
+        $(#[$about])*
+        pub trait $trait {$(
+            $(#[$says])*
+            fn $name($($arg: $type),*) $(-> $result)?;
+        )+}
+
+        impl $trait for imp::Chip {$(
+            #[inline(always)]
+            fn $name($($arg: $type),*) $(-> $result)? {
+                imp::$module::$name($($arg),*)
+            }
+        )+}
+
+        $(#[$about])*
+        pub mod $module {
+            #[allow(unused_imports)]
+            use super::*;
+            $(
+                $(#[$says])*
+                #[inline(always)]
+                pub fn $name($($arg: $type),*) $(-> $result)? {
+                    <imp::Chip as $trait>::$name($($arg),*)
+                }
+            )+
+        }
+    )+};
+}
+pub(super) use contract;
+
+contract! {
+    /// The step timer and its interrupt, which has the one [`Dda`] of the machine and takes segments out of a ring.
+    ///
+    /// The interrupt does at each tick what [`Dda::tick`] does, and waits for nobody. When the ring is empty at the end of a segment the
+    /// ticks stop.
+    trait Stepper in stepper {
+        /// Sets the timer up; the end of the ring is exec's. Start-up, before interrupts are on; `None` after the first time.
+        fn start() -> Option<Producer<Segment, SEGMENTS>>;
+        /// Starts the ticks if they have stopped. Exec, after it has queued a segment.
+        fn go();
+        /// Stops the ticks at once and until [`release`](Stepper::release), wherever the motors are. Any level.
+        fn stop();
+        /// Whether they have been stopped. Any level.
+        fn is_stopped() -> bool;
+        /// Ticks may come again. Thread mode, when the motors have [settled](Stepper::settle).
+        fn release();
+        /// Whether ticks are coming. Any level.
+        fn running() -> bool;
+        /// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have come first after those
+        /// that are queued. What they lack is taken off `position`, in steps. Exec, while no ticks come.
+        fn settle(held: Option<Segment>, position: &mut [i32; MOTORS]);
+        /// Where the generator is right now, between two ticks, and the slot of its segment. The look interrupt, which holds exec off.
+        fn moment() -> (Dda, u8);
+        /// Which direction pins are inverted: bit m for motor m. Thread mode, while nothing runs.
+        fn set_inverted(motors: u8);
+        /// How wide a step pulse is, in microseconds, and which step pins rest high (bit m for motor m). Thread mode; a change only while
+        /// nothing runs.
+        fn set_step_output(pulse_us: u8, inverted: u8);
+    }
+
+    /// The serial ports by number, [`USB`](super::serial::USB) first, and their interrupts, which fill and empty the rings of [`super::serial`] and take
+    /// real-time characters out.
+    trait Uart in uart {
+        /// Starts the lines, 8N1: USB at `rate` bits a second, the other at the board's. Start-up, before interrupts are on; `None` after the
+        /// first time.
+        fn start(rate: u32) -> Option<AllEnds>;
+        /// Goes on at `rate` bits a second. A byte on the line meanwhile, in either direction, is spoilt. Thread mode.
+        fn set_rate(port: u8, rate: u32);
+        /// Sends what the ring holds. Thread mode, or exec on a port that is no bus.
+        fn kick(port: u8);
+        /// Stops the sender, or lets it go on, in the way they have agreed upon; by a pin the receive interrupt does so too. A character may
+        /// wait for the end of a line if it `waits`. Thread mode.
+        fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool);
+        /// Whether the sender has been stopped by XOFF, by thread mode or by [`stop_late`](Uart::stop_late). Thread mode.
+        fn is_stopped(port: u8) -> bool;
+        /// Stops the sender of the second port by XOFF if its ring fills while thread mode has no turn. Exec, which never runs within an interrupt of
+        /// a port. Cost: 12.
+        fn stop_late();
+        /// How the other side may hold it back from now on. Thread mode.
+        fn set_flow(port: u8, flow: Flow);
+        /// Sends on what CTS has held back, and XOFF or XON that has waited for long enough. Thread mode, each millisecond.
+        fn look();
+        /// Line ends lost since start-up, modulo 2^16. Thread mode.
+        fn lost_ends(port: u8) -> u16;
+        /// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for. Thread mode.
+        fn room(port: u8) -> u8;
+        /// Whether half of the second port's receive ring is full: the other half lasts 3 ms, so that whoever has much to do gives way to the
+        /// reader. Thread mode.
+        fn presses() -> bool;
+        /// The slot of the receive ring with the byte that came last, if it still waits there. Thread mode.
+        fn newest(port: u8) -> Option<u8>;
+        /// The slot of the mark that stands for the last `%` or `^d`, if it has not been read. Thread mode. Cost: 12 a byte that waits.
+        fn last_cut(port: u8) -> Option<u8>;
+        /// Whether an exclamation mark has come that nobody has taken yet, on any port. Any level.
+        fn asks_hold() -> bool;
+        /// What characters have asked of overrides since the last call. Thread mode.
+        fn take_asked(port: u8) -> Asked;
+        /// The real-time characters since the last call, as bits (see [`realtime`](crate::realtime)). Thread mode.
+        fn take_realtime(port: u8) -> u8;
+    }
+
+    /// Outputs: drivers' enables, and what a program switches.
+    trait Gpio in gpio {
+        /// The motors whose drivers are on, as bits. Thread mode and exec.
+        fn powered() -> u8;
+        /// Switches the drivers of these motors (bits) on, and the others off as far as the board can: an enable that all drivers share is
+        /// on for any of them. Exec, or while it cannot run.
+        fn power(motors: u8);
+        /// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). The direction of a spindle that is off stays as
+        /// it is. Exec, or while it cannot run.
+        fn set_outputs(on: u8);
+        /// Which outputs are on when they are low, as bits, and which are on. From the first time on the spindle's enable is driven. Thread mode,
+        /// while exec cannot run.
+        fn set_low(outputs: u8, on: u8);
+    }
+
+    /// Switches by their numbers in [`inputs`](crate::boards::inputs), as bits of a word, and the look interrupt, which filters them.
+    trait Inputs in inputs {
+        /// Which inputs are worked when low, and which of them stop the steps. Thread mode.
+        fn set_up(low: u16, stops: u16);
+        /// These ends are no limits for now. Thread mode.
+        fn spare(ends: u8);
+        /// Has the first of the inputs `armed` that comes to be as in `awaited` end the move ([`contact`](crate::dda::contact)); none if `armed`
+        /// is 0. Thread mode.
+        fn arm(armed: u16, awaited: u16);
+        /// The inputs that are worked. Thread mode.
+        fn worked() -> u16;
+        /// What has stopped the steps since the last call. Thread mode.
+        fn take_hits() -> u16;
+    }
+
+    /// The pulses whose width says how fast the spindle is to turn.
+    trait Pwm in pwm {
+        /// Sets the frequency, in thousandths of a Hz. The share has to be set again; until then it is 0. Thread mode.
+        fn set_frequency(millihertz: u32);
+        /// Sets what part of the period the pin is high, in thousandths. Exec, or while it cannot run.
+        fn set_share(share: f32);
+    }
+
+    /// The count of milliseconds.
+    trait Time in time {
+        /// Milliseconds since start-up, modulo 2^32. Thread mode and exec. Cost: 24.
+        fn millis() -> u32;
+    }
+
+    /// The watchdog, which resets a machine that has got stuck.
+    trait Watchdog in watchdog {
+        /// Why the machine has started. Any level.
+        fn cause() -> Cause;
+        /// All is well. Thread mode and exec.
+        fn feed();
+    }
+
+    /// The ways to another program.
+    trait System in system {
+        /// Starts the firmware anew, as if the reset button had been pressed. Does not return, but on the host, where it is noted. Thread
+        /// mode.
+        fn reset();
+        /// Starts the boot loader, if the board has one; else as [`reset`](System::reset). Thread mode.
+        fn boot();
+    }
+}
+
+/// How fast a chip is: figures that are measured on it.
+pub trait Timing {
+    /// What [`Segment::period`] counts, in a second. It need not fit a period in a millisecond.
+    const TIMER_HZ: u32;
+    /// By the number of motors that move, less one.
+    const TICKS: [Ticks; MOTORS];
+}
+
+/// Those of the chip.
+pub const TIMER_HZ: u32 = <imp::Chip as Timing>::TIMER_HZ;
+/// Those of the chip. To be indexed in constants: as a table it would take RAM.
+pub const TICKS: [Ticks; MOTORS] = <imp::Chip as Timing>::TICKS;
+
+/// Memory that keeps its bytes without power.
+pub trait Keeps: Memory {
+    /// Access from thread mode. One task at most is to write each part.
+    fn take() -> Self;
+}
+
+impl Keeps for imp::eeprom::Eeprom {
+    fn take() -> Self {
+        imp::eeprom::Eeprom::take()
+    }
+}
+
+/// Memory that keeps its bytes without power: see [`Keeps`].
+pub mod eeprom {
+    pub use super::imp::eeprom::Eeprom;
+}
