@@ -335,6 +335,18 @@ fn there_is_no_circle() {
     assert!(open.is_empty(), "in a circle:\n{}", circle.collect::<Vec<_>>().join("\n"));
 }
 
+/// Which chip it is, is asked in the folder `hal` alone, and where an image begins.
+#[test]
+fn no_layer_asks_for_the_architecture() {
+    let mut files = Vec::new();
+    collect(&root().join("src"), &mut files);
+    let asks = |file: &&PathBuf| {
+        code(&std::fs::read_to_string(file).unwrap_or_default()).contains("target_arch")
+    };
+    let asking: BTreeSet<_> = files.iter().filter(asks).map(|file| unit(&modules(file))).collect();
+    assert_eq!(asking, ["hal", "main", "primitives"].map(str::to_owned).into());
+}
+
 /// But by the contract, `hal::contract` and `hal::primitives`. On the host there is also the machine, for tests.
 #[test]
 fn no_layer_knows_the_chip() {
