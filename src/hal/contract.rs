@@ -1,7 +1,7 @@
 //! What a chip has to have: a trait for each part of it, which says what its functions do, in which units, at which level they may be called, and
 //! what they cost.
 //!
-//! A chip is a folder beside `avr` and `host`, under the name [`imp`](super::imp): a module for each trait with the functions of the trait, a type
+//! A chip is a folder beside `avr` and `host`, under the name [`imp`]: a module for each trait with the functions of the trait, a type
 //! `Chip`, and for an image what `main` calls at start-up. The compiler holds it against the traits: a function that is missing, or of
 //! another type, is an error here that names it. Everything outside `hal` calls the functions of the modules below, [`stepper`],
 //! [`uart`] and so on; it cannot tell chips apart. Which chip it is, is known when the image is built, so that a call costs what it
