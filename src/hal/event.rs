@@ -72,7 +72,7 @@ pub fn set_asked(waits: bool) {
     asked().set(waits.into());
 }
 
-/// Whether somebody does, or may: bytes have come, and the main loop has had no turn since the last segment. Exec only.
+/// Whether somebody does, or may: bytes have come, and the main loop has had no turn since the last segment. Exec and thread mode.
 #[inline(always)]
 pub fn is_asked() -> bool {
     asked().get() != 0 || (passed_over().get() >= UNHEARD && is_unheard())

@@ -8,7 +8,7 @@
 //! | `{shutd:n}`, the emergency stop | 11 (g2core 12) | no step more | off | no axis homed | 205 | clear, when the stop is let go |
 //! | `{panic:n}` | 13 | no step more | off | no axis homed | 206 | `^x` |
 //!
-//! Whatever it is, what is queued is dropped and the lines that wait are refused. Motors keep their power: without it a
+//! Whatever it is, what is queued is dropped, and lines that have come before it are refused, also when it has been ended. Motors keep their power: without it a
 //! vertical axis falls. Steps that are made are counted, whenever they stop; but motors that stop at once
 //! may have gone on for some more, so that axes have to be homed again.
 //!

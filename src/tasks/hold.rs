@@ -27,10 +27,11 @@
 //! `serial::CUT`), and the reader knows what a comment is. The exclamation mark stops the machine wherever
 //! it stands, and at once.
 //!
-//! A line that is dropped is answered all the same, by [`Status::Terminated`](crate::status::Status): senders
+//! A line that is dropped is answered all the same, by [`Status::Terminated`], in an alarm by that of the alarm: senders
 //! count responses. Nothing here waits, and nothing can be full: all of it is states.
 
 use super::jog;
+use super::lines::LinePool;
 use super::links::Links;
 use super::ports::Port;
 use super::view::View;
@@ -39,8 +40,9 @@ use crate::hal::serial::{CUT, GO, USB};
 use crate::hal::system::reset;
 use crate::hal::time::millis;
 use crate::hal::{flags, uart};
-use crate::machine;
+use crate::machine::{self, Alarm};
 use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, LET_GO, RESET, RESUME, UNPLACED};
+use crate::status::Status;
 
 /// Whether a machine that is `running` is to come to rest: it does not wait for thread mode, which may have a report
 /// to put, to begin the hold. Exec only.
@@ -49,11 +51,53 @@ pub fn is_wanted(running: bool) -> bool {
     machine::is_held() || (running && uart::asks_hold())
 }
 
-/// An alarm has begun: what is queued is dropped when the machine has come to rest, which it does now.
-/// What waits to be interpreted is left to the parser.
+/// An alarm has begun: what is queued is dropped when the machine has come to rest, which it does now, and so are the lines of
+/// G-code that have come by then. A port whose pool is in use is left to who uses it: to the reader, which has found a line that
+/// begins the alarm there.
 pub fn abandon(links: &Links) {
     links.signs.clear();
+    for port in &links.ports {
+        if let Ok(mut lines) = port.lines.try_borrow_mut() {
+            lines.terminate(dropped());
+            cut_up_to(port, &mut lines, uart::newest(port.number));
+        }
+    }
     drop_queue(links);
+}
+
+/// A control line has come on a port in an alarm, whose pool this is: G-code that has come before it on any port is refused, also if
+/// the line ends the alarm. Behind a full pool of another port all that waits has come before it.
+#[cold]
+#[inline(never)]
+#[small]
+pub fn refuse_older(links: &Links, pool: &mut LinePool) {
+    pool.refuse(dropped());
+    for port in &links.ports {
+        if let Ok(mut lines) = port.lines.try_borrow_mut() {
+            lines.refuse(dropped());
+            if !lines.ready() {
+                cut_up_to(port, &mut lines, uart::newest(port.number));
+            }
+        }
+    }
+}
+
+/// Cuts the stream of a port at a slot of its receive ring, or at what the reader has got.
+fn cut_up_to(port: &Port, lines: &mut LinePool, slot: Option<u8>) {
+    match slot {
+        Some(_) => port.cut.set(slot),
+        None if port.cut.get().is_none() => lines.terminate_partial(dropped()),
+        None => {}
+    }
+}
+
+/// What lines are answered that are dropped now.
+#[inline(never)]
+pub fn dropped() -> Status {
+    match machine::alarm() {
+        Alarm::None => Status::Terminated,
+        alarm => alarm.status(),
+    }
 }
 
 /// The door has been opened: nothing moves. Or shut: what is held waits for a tilde, if there is anything.
@@ -153,12 +197,8 @@ fn cut(links: &Links, port: &Port, slot: Option<u8>, event: machine::Event) {
     for each in &links.ports {
         let slot = if each.number == port.number { slot } else { uart::newest(each.number) };
         let mut lines = each.lines.borrow_mut();
-        lines.terminate();
-        match slot {
-            Some(_) => each.cut.set(slot),
-            None if each.cut.get().is_none() => lines.terminate_partial(),
-            None => {}
-        }
+        lines.terminate(dropped());
+        cut_up_to(each, &mut lines, slot);
     }
     drop_queue(links);
 }

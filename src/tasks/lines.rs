@@ -17,6 +17,7 @@ use crate::hal::ring::Window;
 use crate::hal::serial::TAKEN_RETURN;
 use crate::hal::text::copy_printing;
 use crate::machine::Alarm;
+use crate::machine::alarm::is_program_end;
 use crate::protocol::{asks_alarm, is_control, may_be_control};
 use crate::status::Status;
 
@@ -355,27 +356,52 @@ impl LinePool {
         self.controls > 0
     }
 
+    /// Whether the line that has come last is a control line.
+    pub fn ends_with_control(&self) -> bool {
+        self.entries.last().is_some_and(|entry| entry.class == Class::Control)
+    }
+
     /// Whether a data line waits, or a fault.
     pub fn has_data(&self) -> bool {
         self.entries.len() > usize::from(self.controls)
     }
 
-    /// Drops all data lines: they will be answered with [`Status::Terminated`].
+    /// Drops all data lines: they will be answered with `status`.
     #[inline(never)]
-    pub fn terminate(&mut self) {
+    pub fn terminate(&mut self, status: Status) {
         for entry in &mut self.entries {
             if entry.class == Class::Data {
-                entry.class = Class::Fault(Status::Terminated);
+                entry.class = Class::Fault(status);
             }
         }
     }
 
-    /// The same for the line that is coming in.
+    /// As [`terminate`](Self::terminate) in an alarm, but for the end of a program, which ends an alarm, and what is behind it.
+    #[cold]
     #[inline(never)]
-    pub fn terminate_partial(&mut self) {
+    #[small]
+    pub fn refuse(&mut self, status: Status) {
+        for index in 0..self.entries.len() {
+            if is_program_end(self.text(LineId(index as u8))) {
+                break;
+            }
+            if let Some(entry) = self.entries.get_mut(index).filter(|e| e.class == Class::Data) {
+                entry.class = Class::Fault(status);
+            }
+        }
+    }
+
+    /// What has become of a line.
+    pub fn class(&self, id: LineId) -> Class {
+        self.entries.get(usize::from(id.0)).map_or(Class::Data, |entry| entry.class)
+    }
+
+    /// Drops the line that is coming in, if that is one of data.
+    #[inline(never)]
+    pub fn terminate_partial(&mut self, status: Status) {
         let text = self.slice(usize::from(self.end), self.partial);
         if !text.is_empty() && classify(text) == Class::Data {
-            self.spoil(Status::Terminated);
+            self.spoil(status);
         }
     }
 

@@ -20,6 +20,7 @@ use heapless::Vec;
 
 use super::Never;
 use super::alarm;
+use super::hold;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::ports::{Chosen, Port};
@@ -50,6 +51,10 @@ const STEPS_LATE: u8 = 5;
 /// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
 
+/// Answers of more turns are long: those on other ports come first, so many times in a row.
+const SHORT: u8 = 2;
+const PATIENCE: u8 = 8;
+
 /// A port's transmitter, while it is the parser's.
 type Line = MutexGuard<'static, NoopRawMutex, Tx>;
 
@@ -70,6 +75,8 @@ struct Answer {
     id: LineId,
     /// How much of the line has been sent back.
     echoed: u8,
+    /// How many turns it has had.
+    turns: u8,
     /// The line is to be sent back.
     echoes: bool,
     /// Tables have to be waited for.
@@ -106,12 +113,19 @@ struct Parser {
     lacking: u8,
     /// The port whose line was begun last: it is the other one's turn.
     last: u8,
+    /// How many turns in a row long answers have left to short ones.
+    waited: u8,
 }
 
 /// The task.
 pub fn run(links: &'static Links) -> impl Future<Output = Never> {
-    let mut parser =
-        Parser { links, sessions: [const { Session::Idle }; PORTS], lacking: 0, last: USB };
+    let mut parser = Parser {
+        links,
+        sessions: [const { Session::Idle }; PORTS],
+        lacking: 0,
+        last: USB,
+        waited: 0,
+    };
     async move {
         loop {
             if is_unheard() {
@@ -189,8 +203,14 @@ impl Parser {
     fn go_on(&mut self) -> bool {
         let links = self.links;
         let mut ended = false;
+        let asks: [bool; PORTS] = core::array::from_fn(|number| self.is_short(number));
         for (port, session) in links.ports.iter().zip(&mut self.sessions) {
-            if !matches!(session, Session::Idle) {
+            let others_ask =
+                asks.iter().enumerate().any(|(n, asks)| *asks && n != usize::from(port.number));
+            if others_ask && is_long(session) && self.waited < PATIENCE {
+                self.waited += 1;
+            } else if !matches!(session, Session::Idle) {
+                self.waited = 0;
                 ended |= go_on(links, port, session);
             } else if port.tells() {
                 let told = tell(links, port);
@@ -202,6 +222,16 @@ impl Parser {
             }
         }
         ended
+    }
+
+    /// Whether a control line of a port waits for its answer, or for the rest of one that has begun just now.
+    #[inline(never)]
+    fn is_short(&self, number: usize) -> bool {
+        let (Some(port), Some(session)) = (self.links.ports.get(number), self.sessions.get(number))
+        else {
+            return false;
+        };
+        !is_long(session) && port.lines.borrow().has_controls()
     }
 
     /// The line to begin with, of each port in turn.
@@ -305,6 +335,15 @@ fn tell(links: &Links, port: &Port) -> bool {
     told
 }
 
+/// Whether an answer has had its turns: those of other ports come first, a bounded number of times.
+fn is_long(session: &Session) -> bool {
+    match session {
+        Session::Idle => false,
+        Session::Answer(answer) => answer.turns >= SHORT,
+        Session::Leave(..) => true,
+    }
+}
+
 /// Goes on with what is under way on a port. Whether it has come to its end.
 #[inline(never)]
 fn go_on(links: &'static Links, port: &'static Port, session: &mut Session) -> bool {
@@ -369,6 +408,7 @@ impl Answer {
     /// Goes on as far as there is room.
     #[inline(never)]
     fn step(&mut self, links: &'static Links, port: &'static Port) -> Progress {
+        self.turns = self.turns.saturating_add(1);
         if self.waits && links.storage.is_awaited() {
             return Progress::Waits;
         }
@@ -391,7 +431,7 @@ impl Answer {
     fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
         let (mut begun, since) = (begun, millis());
         for done in 0..STEPS {
-            if !tx.has_room() || gives_way(done, since) {
+            if !tx.has_room() || (done > 0 && (gives_way(done, since) || others_ask(links, port))) {
                 break;
             }
             if self.echoes {
@@ -423,7 +463,13 @@ impl Answer {
 /// Whether others have their turn before a response goes on that has come so many steps on in this turn, which began then.
 fn gives_way(done: u8, since: u32) -> bool {
     let late = || done >= STEPS_LATE && flags::has(Event::Tick);
-    done > 0 && (uart::presses() || late() || millis().wrapping_sub(since) >= TURN_MS)
+    uart::presses() || is_unheard() || late() || millis().wrapping_sub(since) >= TURN_MS
+}
+
+/// Whether a control line waits on another port: a group of settings is not to keep its answer away.
+fn others_ask(links: &Links, port: &Port) -> bool {
+    let mut others = links.ports.iter().filter(|other| other.number != port.number);
+    others.any(|other| other.lines.borrow().has_controls())
 }
 
 /// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the
@@ -535,7 +581,15 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
         request.ran(status, commented);
     }
     let echoes = links.settings.borrow().echo();
-    *session = Session::Answer(Answer { request, id, echoed: 0, echoes, waits: false, tx: None });
+    *session = Session::Answer(Answer {
+        request,
+        id,
+        echoed: 0,
+        turns: 0,
+        echoes,
+        waits: false,
+        tx: None,
+    });
     Begun::Answer
 }
 
@@ -561,11 +615,15 @@ fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> boo
 #[inline(never)]
 fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Request) -> bool {
     if machine::is_flushing() {
-        let alarm = machine::alarm();
-        request.ran(if alarm == Alarm::None { Status::Terminated } else { alarm.status() }, false);
+        request.ran(hold::dropped(), false);
         return true;
     }
     let lines = port.lines.borrow();
+    if let Class::Fault(status) = lines.class(id) {
+        // It has been dropped since it was begun.
+        request.ran(status, false);
+        return true;
+    }
     if links.may_feed(port) && !is_free(links) {
         return false;
     }

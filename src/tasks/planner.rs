@@ -25,7 +25,7 @@ use super::parser;
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
 use crate::gcode::overrides::Change;
 use crate::gcode::steps::{Step, Steps};
-use crate::hal::event::{Event, wait};
+use crate::hal::event::{Event, is_asked, wait};
 use crate::jobs::Job;
 use crate::machine::{self, Cycle};
 use crate::motion::block::{Action, Block, Line as Move, Outputs};
@@ -130,7 +130,7 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
             planner.replan();
             if !links.commands_taken.get() {
                 planner.make_up();
-            } else if !planner.carry_out_at_once() {
+            } else if planner.owes_answers() || !planner.carry_out_at_once() {
                 planner.begin();
                 loop {
                     planner.room().await;
@@ -167,6 +167,12 @@ const ENOUGH: usize = CAPACITY / 2;
 const PATIENCE: u8 = 16;
 
 impl Planner {
+    /// Whether answers that are due come before the line: a long one takes up to 40,000 cycles.
+    #[inline(always)]
+    fn owes_answers(&self) -> bool {
+        is_asked() && queue::used() >= ENOUGH
+    }
+
     /// Most lines are a straight move for which there is room: no need to be prepared for a wait. False,
     /// and nothing done, for all others.
     #[inline(never)]

@@ -20,6 +20,7 @@ use super::view::{Seen, View};
 use crate::hal::event::is_unheard;
 use crate::hal::serial::{USB, is_shared};
 use crate::hal::uart;
+use crate::machine::Alarm;
 use crate::protocol::{Remembers, Speech};
 use crate::status::Status;
 
@@ -47,6 +48,8 @@ pub struct Port {
     pub speech: Cell<Speech>,
     /// The line that is being answered has begun the alarm that it asks for when it arrived ([`stop`](super::stop)).
     pub has_stopped: Cell<bool>,
+    /// The alarm that a line is to end which waits for the machine to come to rest.
+    pub clears: Cell<Alarm>,
     /// The sender asks whether anybody is there: control sets it, the parser answers.
     pub enquiry: Cell<bool>,
     /// How the machine stood when the report or group began that is being told on this port.
@@ -69,6 +72,7 @@ impl Port {
             tx: Mutex::new(tx),
             speech: Cell::default(),
             has_stopped: Cell::new(false),
+            clears: Cell::new(Alarm::None),
             enquiry: Cell::new(false),
             seen: Cell::default(),
             lost: Cell::new(false),

@@ -177,9 +177,12 @@ impl<const N: usize> Intake<N> {
             };
             if is_line {
                 if cuts {
-                    pool.terminate();
+                    pool.terminate(hold::dropped());
                 }
                 self.scan.serve(links, pool, looked);
+                if machine::is_alarmed() && pool.ends_with_control() {
+                    hold::refuse_older(links, pool);
+                }
                 if pool.has_controls() {
                     set_asked(true);
                 }
@@ -200,7 +203,7 @@ impl<const N: usize> Intake<N> {
     fn cuts_up_to(&self, last: u8, pool: &mut LinePool) -> bool {
         let cuts = self.received.taken() != last;
         if !cuts {
-            pool.terminate_partial();
+            pool.terminate_partial(hold::dropped());
             self.port.cut.set(None);
         }
         cuts
@@ -297,8 +300,13 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
     let mut pool = port.lines.borrow_mut();
     if scan.run(links, &mut pool, ring, closes) {
         links.parser_wake.signal();
+        if machine::is_alarmed() {
+            hold::refuse_older(links, &mut pool);
+            // What has been looked through came before the line, or with it.
+            port.cut.set(scan.looked.checked_sub(1).map(|last| ring.slot(last)).or(port.cut.get()));
+        }
     }
-    scan.look_for_stops(links, ring);
+    scan.look_for_stops(links, port, &mut pool, ring);
     waiting - ring.len()
 }
 

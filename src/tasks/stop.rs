@@ -12,9 +12,11 @@ use heapless::Vec;
 use kerf_macros::small;
 
 use super::alarm;
+use super::hold;
 use super::lines::LinePool;
 use super::links::Links;
 use super::overtake::Scan;
+use super::ports::Port;
 use crate::hal::ring::Window;
 use crate::hal::serial::{CLEAN, CUT, GO, MARKS, TAKEN};
 use crate::machine::Alarm;
@@ -29,7 +31,10 @@ impl Scan {
         match pool.take_stop() {
             Alarm::None => {}
             _ if looked && self.begun > 0 => self.begun -= 1,
-            alarm => alarm::raise(links, alarm),
+            alarm => {
+                alarm::raise(links, alarm);
+                pool.terminate(hold::dropped());
+            }
         }
     }
 
@@ -37,7 +42,13 @@ impl Scan {
     /// Cost: 40 cycles a byte.
     #[inline(never)]
     #[small]
-    pub fn look_for_stops(&mut self, links: &Links, ring: &Window<'_>) {
+    pub fn look_for_stops(
+        &mut self,
+        links: &Links,
+        port: &Port,
+        pool: &mut LinePool,
+        ring: &Window<'_>,
+    ) {
         if self.stops == 0 {
             self.begun = 0;
         }
@@ -51,6 +62,8 @@ impl Scan {
                 b'\n' | b'\r' => {
                     if let Some(alarm) = asks_alarm(&line).filter(|_| whole) {
                         alarm::raise(links, alarm);
+                        pool.terminate(hold::dropped());
+                        port.cut.set(Some(ring.slot(n)));
                         self.begun += 1;
                     }
                     line.clear();

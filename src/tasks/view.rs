@@ -421,7 +421,15 @@ impl Machine for View<'_> {
 
     fn clear(&mut self) -> Status {
         self.links.cleared_by.set(self.port.number);
-        alarm::clear(self.links, &self.settings)
+        // One that has begun while the line waits for rest is another one.
+        let meant = self.port.clears.get();
+        if meant.is_on() && meant.is_exceeded_by(machine::alarm()) {
+            self.port.clears.set(Alarm::None);
+            return machine::alarm().status();
+        }
+        let status = alarm::clear(self.links, &self.settings);
+        self.port.clears.set(if status == Status::Again { machine::alarm() } else { Alarm::None });
+        status
     }
 
     fn flush(&mut self) -> Status {

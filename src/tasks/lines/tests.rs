@@ -110,10 +110,10 @@ fn text_in_pieces_is_text_byte_by_byte() {
 fn dropped_lines_keep_their_place_and_control_lines_are_none_of_them() {
     let mut pool = pool();
     feed(&mut pool, b"g1x1\n{a:n}\ng1x2\ng1x");
-    pool.terminate_partial();
-    pool.terminate();
+    pool.terminate_partial(Status::Terminated);
+    pool.terminate(Status::Terminated);
     feed(&mut pool, b"3\ng1x4\n{b:");
-    pool.terminate_partial();
+    pool.terminate_partial(Status::Terminated);
     feed(&mut pool, b"n}\n");
     let dropped = Class::Fault(Status::Terminated);
     let classes = [Class::Control, Class::Control, dropped, dropped, dropped, Class::Data];
@@ -122,7 +122,7 @@ fn dropped_lines_keep_their_place_and_control_lines_are_none_of_them() {
     }
     assert!(!pool.has_data());
     // Between two lines there is none to drop.
-    pool.terminate_partial();
+    pool.terminate_partial(Status::Terminated);
     feed(&mut pool, b"\n");
     assert_eq!(pool.free(), 8);
 }
