@@ -94,6 +94,7 @@ pub enum Status {
     HomingTravel,
     HomingSwitches,
     HomingClosed,
+    NotHomed,
     ProbeFailed,
     ProbeTooShort,
 }

@@ -320,7 +320,8 @@ impl State {
     }
 
     /// G28 and G30: a traverse to the stored position, of the named axes and by way of where the words
-    /// say; of all axes without words.
+    /// say; of all axes without words. Where nothing was stored that is machine zero, which is a place on a homed
+    /// axis alone: a linear axis that is not homed has the line refused.
     #[inline(never)]
     pub(super) fn go_stored(
         &mut self,
@@ -335,10 +336,14 @@ impl State {
         }
         self.advance(block, false, setup)?;
         let via = self.position;
+        let places = if tables.is_stored(stored) { u8::MAX } else { self.homed };
         let stored = tables.row(stored);
         for axis in 0..units::AXES as u8 {
             let named = !block.has(AXES) || block.get(axis).is_some();
             if named && setup.mode(axis) != AxisMode::Disabled {
+                if usize::from(axis) < FIRST_ROTARY && places & 1 << axis == 0 {
+                    return Err(Status::NotHomed);
+                }
                 put(&mut self.position, axis, at(&stored, axis));
                 put(&mut self.residue, axis, 0);
             }

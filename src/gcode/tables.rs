@@ -83,6 +83,11 @@ pub trait Tables {
     /// What a row is. On AVR a search of the log: up to 2 ms, and 3.4 more while a byte is written.
     fn row(&self, row: Row) -> PerAxis<Length>;
 
+    /// Whether a stored position was ever stored. What has no memory of that says that it was.
+    fn is_stored(&self, _row: Row) -> bool {
+        true
+    }
+
     /// Whether a change of a row can be taken now. If not, the line that makes it is refused with [`Status::Again`]
     /// and is to be tried again later.
     fn takes(&self, row: Row) -> bool;

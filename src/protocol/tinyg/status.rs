@@ -124,6 +124,7 @@ rows! {
     HomingTravel = 244, "Homing Error - Travel min & max are the same";
     HomingSwitches = 246, "Homing Error - Homing switches misconfigured";
     HomingClosed = 247, "Homing Error - Homing switch stays closed";
+    NotHomed = 248, "Position was never stored - home first";
     ProbeFailed = 250, "Probe cycle failed";
     ProbeTooShort = 251, "Probe endpoint is starting point";
 }
