@@ -148,6 +148,11 @@ impl Settings {
         self.system(system::PSW) != 0
     }
 
+    /// Whether a probe goes back to the contact.
+    pub fn backs_off_probe(&self) -> bool {
+        self.system(system::PBO) != 0
+    }
+
     /// Whether moves beyond the travel are refused.
     pub fn soft_limits(&self) -> bool {
         self.system(system::SL) != 0

@@ -98,6 +98,9 @@ group! {
         PSW "psw": int(0, 1), 0,
             words(text!("program stop waits"), OFF_ON),
             "M0, M1, M60 and G88 wait for `~`.";
+        PBO "pbo": int(0, 1), 1,
+            words(text!("probe backs off"), OFF_ON),
+            "Whether a probe goes back to the contact. With 0 the machine stays where it came to rest, beyond the contact.";
         DIA "dia": int(0, 1), 0,
             words(text!("protocol dialect"), text!(" [0=TinyG,1=g2core]")),
             "Whom the sender takes the machine for. As a g2core it ends responses with `[1,status,length]` and has that one's `fb`, `fv`, `hp`, `hv`, prompts, and some status codes and texts.";

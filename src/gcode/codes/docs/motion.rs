@@ -115,5 +115,6 @@ pub const PROBES: Section = Section {
 };
 
 const PROBE: &str = "Straight towards the axis words at the feed rate, until the probe says stop. X, Y and Z \
-only, at least 0.254 mm. To come to the end without that is an alarm. Refused on machines without a probe.";
-const QUIET: &str = "The same, but to come to the end without that is none.";
+only, at least 0.254 mm. The machine comes to rest beyond the contact and goes back to it at the same feed, unless `pbo` is 0: G10 L20 \
+and G92 of the next line take the contact (`prb`) for the position. To come to the end without a contact is an alarm. Refused on machines without a probe.";
+const QUIET: &str = "The same, but to come to the end without a contact is none.";
