@@ -69,6 +69,7 @@ pub enum Status {
     ToolInvalid,
     HWordMissing,
     HWordInvalid,
+    NoToolLength,
     LWordMissing,
     LWordInvalid,
     QWordMissing,

@@ -30,6 +30,8 @@ pub struct Info {
     pub deleted: bool,
     /// There was a comment.
     pub commented: bool,
+    /// It asked for the length of a tool that has none: 0 is in force.
+    pub lacks_length: bool,
 }
 
 /// The state of the G-code interpreter, and who keeps its tables.
@@ -124,8 +126,9 @@ impl<T: Tables> Interpreter<T> {
         block.read(line, deletes)?;
         block.check(self.state.modal.motion)?;
         self.execute_or_undo(&block, setup, out)?;
+        let lacks_length = block.tool_length.is_some() && self.state.lacks_length(&block);
         let Block { message, slashed, commented, .. } = block;
-        Ok(Info { message, deleted: slashed && deletes, commented })
+        Ok(Info { message, deleted: slashed && deletes, commented, lacks_length })
     }
 
     #[inline(never)]

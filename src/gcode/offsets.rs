@@ -13,7 +13,7 @@ use super::command::{Commands, Motion};
 use super::modal::MotionMode;
 use super::setup::{AxisMode, Setup};
 use super::state::State;
-use super::tables::{Edit, Row, SYSTEMS, TOOL_AXES, Tables};
+use super::tables::{Edit, NUMBERED, Row, SYSTEMS, TOOL_AXES, TOOLS, Tables};
 use super::words::{AXES, H, L, P};
 use crate::status::Status;
 use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
@@ -98,15 +98,30 @@ impl State {
         Ok(())
     }
 
-    /// The lengths of tool H; without H, of the tool in the spindle. None are those of an empty spindle, 0.
+    /// The lengths of tool H; without H, of the tool in the spindle. Those of an empty spindle are 0, and so are
+    /// those of a tool up to [`NUMBERED`] that the tables lack: the line may have a move, and a program is not to
+    /// be refused in its midst. [`State::lacks_length`] says so.
     #[small]
     fn tool_named(&self, block: &Block, tables: &impl Tables) -> Result<PerAxis<Length>, Status> {
+        match self.tool_number(block) {
+            None => Err(Status::HWordInvalid),
+            Some(number) => {
+                Ok(Row::tool(number).map_or([Length::ZERO; units::AXES], |row| tables.row(row)))
+            }
+        }
+    }
+
+    /// The number of the tool whose lengths a line asks for.
+    fn tool_number(&self, block: &Block) -> Option<u8> {
         let number = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
         let number = number.ok().and_then(|number| u8::try_from(number).ok());
-        match number.ok_or(Status::HWordInvalid)? {
-            0 => Ok([Length::ZERO; units::AXES]),
-            number => Ok(tables.row(Row::tool(number).ok_or(Status::HWordInvalid)?)),
-        }
+        number.filter(|number| *number <= NUMBERED)
+    }
+
+    /// Whether a line that has been carried out asked for the lengths of a tool that has none.
+    pub(super) fn lacks_length(&self, block: &Block) -> bool {
+        let asks = matches!(block.tool_length, Some(ToolLength::Table | ToolLength::Add));
+        asks && self.tool_number(block).is_some_and(|number| number > TOOLS)
     }
 
     /// Group 0, but for the moves to stored positions.

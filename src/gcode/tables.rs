@@ -13,6 +13,8 @@ pub const SYSTEMS: u8 = 9;
 pub const STORED: u8 = 2;
 /// Tools with offsets, from number 1.
 pub const TOOLS: u8 = 10;
+/// Tools may have numbers up to this one; those above [`TOOLS`] are as long as none.
+pub const NUMBERED: u8 = 99;
 /// All rows: systems, stored positions, tools.
 pub const ROWS: u8 = SYSTEMS + STORED + TOOLS;
 

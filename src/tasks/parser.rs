@@ -641,6 +641,9 @@ fn carry_out(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
                 links.commands_taken.set(true);
                 links.planner_wake.signal();
             }
+            if info.lacks_length {
+                links.except(Status::NoToolLength);
+            }
             (Status::Ok, info.commented)
         }
         Err(status) => {

@@ -99,6 +99,7 @@ rows! {
     ToolInvalid = 165, "P word is not a valid tool number";
     HWordMissing = 170, "H word is missing";
     HWordInvalid = 171, "H word is invalid";
+    NoToolLength = 180, "Tool has no length - 0 in force";
     LWordMissing = 172, "L word is missing";
     LWordInvalid = 173, "L word is invalid";
     QWordMissing = 174, "Q word is missing";

@@ -17,7 +17,7 @@ macro_rules! arc {
             no(SWordMissing, &["M3 G95 F0.1", concat!($code, " X2 I1")]),
             no_on(On::DisabledX, AxisDisabled, &[concat!($code, " Y2 J1 F100")]),
             no(ArcSpecification, &[concat!($code, " X2 R1 I1 F100")]),
-            no(ArcSpecification, &[concat!($code, " X2 I1 K0 F100")]),
+            no(ArcSpecification, &[concat!($code, " X2 I1 K1 F100")]),
             no(ArcSpecification, &[concat!($code, " X5 I1 F100")]),
             no(ArcAxisMissing, &[concat!($code, " Z1 R5 F100")]),
             no(ArcOffsetsMissing, &[concat!($code, " X1 F100")]),
