@@ -30,8 +30,6 @@ pub struct Info {
     pub deleted: bool,
     /// There was a comment.
     pub commented: bool,
-    /// It asked for the length of a tool that has none: 0 is in force.
-    pub lacks_length: bool,
 }
 
 /// The state of the G-code interpreter, and who keeps its tables.
@@ -126,9 +124,8 @@ impl<T: Tables> Interpreter<T> {
         block.read(line, deletes)?;
         block.check(self.state.modal.motion)?;
         self.execute_or_undo(&block, setup, out)?;
-        let lacks_length = block.tool_length.is_some() && self.state.lacks_length(&block);
         let Block { message, slashed, commented, .. } = block;
-        Ok(Info { message, deleted: slashed && deletes, commented, lacks_length })
+        Ok(Info { message, deleted: slashed && deletes, commented })
     }
 
     #[inline(never)]
@@ -185,6 +182,7 @@ impl<T: Tables> Interpreter<T> {
             (Ok(()), None) => {}
             (Err(_), _) => {
                 before.restore(&mut self.state);
+                self.state.lacks_length = false;
                 self.restore_origin();
                 out.clear();
             }
@@ -303,6 +301,11 @@ impl<T> Interpreter<T> {
     /// The coordinate system: 1, which is G54, to 9, which is G59.3.
     pub fn coordinate_system(&self) -> u8 {
         self.state.modal.system + 1
+    }
+
+    /// Whether the line before asked for the length of a tool that has none, so that 0 is in force. Asked once.
+    pub fn take_lack(&mut self) -> bool {
+        core::mem::take(&mut self.state.lacks_length)
     }
 
     /// The tool in the spindle; 0 for none.

@@ -13,7 +13,7 @@ use super::command::{Commands, Motion};
 use super::modal::MotionMode;
 use super::setup::{AxisMode, Setup};
 use super::state::State;
-use super::tables::{Edit, NUMBERED, Row, SYSTEMS, TOOL_AXES, TOOLS, Tables};
+use super::tables::{Edit, NUMBERED, Row, SYSTEMS, TOOL_AXES, Tables};
 use super::words::{AXES, H, L, P};
 use crate::status::Status;
 use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
@@ -102,26 +102,19 @@ impl State {
     /// those of a tool up to [`NUMBERED`] that the tables lack: the line may have a move, and a program is not to
     /// be refused in its midst. [`State::lacks_length`] says so.
     #[small]
-    fn tool_named(&self, block: &Block, tables: &impl Tables) -> Result<PerAxis<Length>, Status> {
-        match self.tool_number(block) {
-            None => Err(Status::HWordInvalid),
-            Some(number) => {
-                Ok(Row::tool(number).map_or([Length::ZERO; units::AXES], |row| tables.row(row)))
-            }
-        }
-    }
-
-    /// The number of the tool whose lengths a line asks for.
-    fn tool_number(&self, block: &Block) -> Option<u8> {
+    fn tool_named(
+        &mut self,
+        block: &Block,
+        tables: &impl Tables,
+    ) -> Result<PerAxis<Length>, Status> {
         let number = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
         let number = number.ok().and_then(|number| u8::try_from(number).ok());
-        number.filter(|number| *number <= NUMBERED)
-    }
-
-    /// Whether a line that has been carried out asked for the lengths of a tool that has none.
-    pub(super) fn lacks_length(&self, block: &Block) -> bool {
-        let asks = matches!(block.tool_length, Some(ToolLength::Table | ToolLength::Add));
-        asks && self.tool_number(block).is_some_and(|number| number > TOOLS)
+        let number = number.filter(|number| *number <= NUMBERED).ok_or(Status::HWordInvalid)?;
+        let Some(row) = Row::tool(number) else {
+            self.lacks_length = number != 0;
+            return Ok([Length::ZERO; units::AXES]);
+        };
+        Ok(tables.row(row))
     }
 
     /// Group 0, but for the moves to stored positions.
