@@ -102,7 +102,14 @@ pub fn markdown() -> String {
             &[0, 1, 2, 3, 4, 5].map(Owner::Axis),
             &axis::MEANINGS,
         ),
-        ("PWM of the spindle", "The group `p1`: `p1frq`.", &[Owner::Pwm], &pwm::MEANINGS),
+        (
+            "PWM of the spindle",
+            "The group `p1`: `p1frq`. The defaults fit an inverter with a 0 to 10 V input behind a PWM converter: no pulses while \
+the spindle is off, S24000 is 10 V. A spindle of 12,000 RPM wants `{p1:{csh:12000,wsh:12000}}`. A hobby ESC wants \
+`{p1:{frq:100,csl:1000,csh:2000,cpl:0.125,cph:0.2,wsl:1000,wsh:2000,wpl:0.125,wph:0.2,pof:0.1}}`.",
+            &[Owner::Pwm],
+            &pwm::MEANINGS,
+        ),
         ("Spindle", "The group `sp`: `spde`.", &[Owner::Spindle], &spindle::MEANINGS),
         ("Coolant", "The group `co`: `coph`.", &[Owner::Coolant], &coolant::MEANINGS),
         (
