@@ -22,6 +22,7 @@ pub enum Status {
     ExceptionReport,
     PersistenceError,
     StepsLate,
+    ProgramStopped,
     UnrecognizedName,
     MalformedCommand,
     BadNumber,

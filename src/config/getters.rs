@@ -143,7 +143,7 @@ impl Settings {
         self.system_large(system::CT) as f32 * 1e-6
     }
 
-    /// Whether M0, M1 and M60 wait for cycle start.
+    /// Whether M0, M1, M6, M60 and G88 wait for cycle start.
     pub fn waits_at_stop(&self) -> bool {
         self.system(system::PSW) != 0
     }

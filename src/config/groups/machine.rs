@@ -95,9 +95,9 @@ group! {
         OST "ost": int(0, 1), 1,
             words(text!("optional stop"), OFF_ON),
             "M1 stops.";
-        PSW "psw": int(0, 1), 0,
+        PSW "psw": int(0, 1), 1,
             words(text!("program stop waits"), OFF_ON),
-            "M0, M1, M60 and G88 wait for `~`.";
+            "M0, M1, M6, M60 and G88 wait for `~`, and an exception (38) says so. Senders that see to stops and tools themselves want 0.";
         PBO "pbo": int(0, 1), 1,
             words(text!("probe backs off"), OFF_ON),
             "Whether a probe goes back to the contact. With 0 the machine stays where it came to rest, beyond the contact.";

@@ -52,6 +52,7 @@ rows! {
     ExceptionReport = 29, "Generic exception report";
     PersistenceError = 34, "Persistence error";
     StepsLate = 37, "Steps came late";
+    ProgramStopped = 38, "Program stopped [~ to resume]";
     UnrecognizedName = 100, "Unrecognized command or config name";
     MalformedCommand = 101, "Invalid or malformed command";
     BadNumber = 102, "Bad number format";
