@@ -63,7 +63,7 @@ fn every_axis_ends_on_its_step_from_wherever_it_comes() {
             }
             let at = host.ask(&mut machine, "{mpo:n}", 1_000).unwrap();
             assert!(at.raw.contains("\"x\":0.000,\"y\":0.000,\"z\":0.000"), "{}", at.raw);
-            set(&mut machine, &mut host, "g1 f800 x1.7 y0.9 z74.1");
+            set(&mut machine, &mut host, "g1 f800 x1.7 y0.9 z-0.9");
             assert_eq!(home(&mut machine, &mut host, "g28.2 x0 y0 z0"), None);
             assert_eq!(places(&machine), first, "on {}", board.name);
             assert_eq!([0, 1, 2].map(|axis| machine.mechanics().unwrap().lost(axis)), [0; 3]);
