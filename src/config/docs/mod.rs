@@ -291,6 +291,7 @@ fn defaults(settings: &[Setting]) -> String {
     let shown = |setting: Setting| {
         let row = setting.row();
         match row.kind {
+            Kind::Text if row.max != 0 => String::new(),
             Kind::Text => "`0000-KERF`".to_string(),
             Kind::Data | Kind::Job => "`\"0x0\"`".to_string(),
             _ if row.is(JERK) || row.stored > 0 => number(setting.default_value(), row.stored),

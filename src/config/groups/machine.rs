@@ -17,7 +17,7 @@ group! {
         HV "hv": constant(0), 8,
             bare(text!("hardware version")).with_decimals(2),
             "Revision of the hardware.";
-        ID "id": board_name(), 0,
+        ID "id": fixed_text(false), 0,
             bare(text!("TinyG ID")),
             "Name of the board.";
         JA "ja": fixed(2, 0, POSITIVE).with(UNIT), 10_000_000,
@@ -119,5 +119,8 @@ group! {
         MCH "mch": int(0, machines::COUNT as i32 - 1).with(IDLE), 0,
             words(text!("machine"), text!(" [0=careful,1=router,2=mill,3=printer,4=lathe]")),
             "Machine that was chosen last. Choosing one sets all settings of motors and axes, `ja`, `ct` and `gpl` to what they are on that machine: see Machines.";
+        KERF "kerf": fixed_text(true), 0,
+            bare(text!("Kerf version")),
+            "Version of Kerf, which the greeting tells, too. `fb` and `fv` are the protocol's.";
     }
 }
