@@ -44,6 +44,9 @@ is built with `--machine NAME` has that machine's values as defaults. They are a
 the travel against your machine before you trust them. It takes up to 5 s until all of them survive a power cut; one before that may
 leave some as they were: choose again.
 
+After homing an axis stands at the end of its travel: at the lower number if it homes down, at the upper if it homes up. Z homes up, and its
+top is machine zero, on all but the `printer`, where the bed is 0.
+
 ";
 
 const PLACES: &str = "\
