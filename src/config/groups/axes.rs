@@ -40,7 +40,7 @@ group! {
             "Switch at the upper end, likewise.";
         SV "sv": fixed(3, 0, 0).with(UNIT | HOMING), [500_000, 500_000, 400_000, 600_000, 0, 0],
             length(text!("search velocity"), SPEED),
-            "Speed towards a homing switch, at most `vm`: a message says so. `fr` does not limit it. 0: the axis cannot be homed (242).";
+            "Speed towards a homing switch, at most `vm`: a message says so. `fr` does not limit it. The axis must be able to stop between the switch and its hard end: `sv` 800 with `ac` 200 takes 0.5 mm and more. 0: the axis cannot be homed (242).";
         LV "lv": fixed(3, 0, 0).with(UNIT | HOMING), [100_000, 100_000, 100_000, 100_000, 0, 0],
             length(text!("latch velocity"), SPEED),
             "Speed off a homing switch, when its place is taken; 0: the axis cannot be homed (243).";

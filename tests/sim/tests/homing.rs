@@ -92,7 +92,7 @@ fn quick(search: f64, latch: f64) -> (Machine, Host) {
     let (mut machine, mut host) =
         standing(&MEGA2560_GRBL, Wiring::NormallyOpen, [14.0, 100.0, 50.0]);
     machine.tamper(|mechanics, _| mechanics.bounce(inputs::X_MIN, None));
-    let speeds = format!("{{x:{{vm:4000,jh:20000,sv:{search},lv:{latch},lb:3}}}}");
+    let speeds = format!("{{x:{{vm:4000,ac:3000,jh:50000,sv:{search},lv:{latch},lb:3}}}}");
     set(&mut machine, &mut host, &speeds);
     (machine, host)
 }
