@@ -30,9 +30,6 @@
 // An image has no `std`, and needs these of the compiler.
 #![cfg_attr(not(feature = "std"), feature(asm_experimental_arch, optimize_attribute))]
 
-/// The version of Kerf.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");
-
 #[cfg(feature = "std")]
 extern crate std;
 

@@ -39,7 +39,7 @@ const WHO: &str = "{\"r\":{\"fv\":0.970,\"fb\":440.20,\"hp\":1,\"hv\":8,\"id\":\
 
 /// What a machine says that is ready, from its version on to `end`.
 fn ready(end: &str) -> String {
-    format!(",\"kerf\":\"{}\",\"msg\":\"SYSTEM READY\"}},\"f\":[1,0,{end}", kerf::VERSION)
+    format!(",\"kerf\":\"{}\",\"msg\":\"SYSTEM READY\"}},\"f\":[1,0,{end}", kerf::config::VERSION)
 }
 
 #[test]

@@ -27,8 +27,8 @@ use std::collections::VecDeque;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use kerf::VERSION;
 use kerf::boards::inputs::PROBE;
+use kerf::config::VERSION;
 
 use crate::side::Side;
 
