@@ -13,6 +13,9 @@ pub const CAREFUL: Machine = Machine {
         set("xyz", "jh", 2_000.0),
         set("", "ja", 720_000.0),
         set("xyzabc", "jd", 0.01),
+        // Z is 0 at the top, where it homes
+        set("z", "tn", -75.0),
+        set("z", "tm", 0.0),
         // A table that turns: words are degrees
         set("a", "am", 1.0),
         set("abc", "vm", 7_200.0),

@@ -22,6 +22,5 @@ pub const LATHE: Machine = Machine {
         set("x", "sx", 1.0),
         set("x", "tm", 60.0),
         set("z", "tn", -250.0),
-        set("z", "tm", 0.0),
     ],
 };

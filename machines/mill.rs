@@ -20,10 +20,7 @@ pub const MILL: Machine = Machine {
         set("", "ja", 900_000.0),
         // Fine work
         set("", "ct", 0.005),
-        // Z is 0 at the top, where it homes
         set("x", "tm", 138.0),
         set("y", "tm", 115.0),
-        set("z", "tn", -75.0),
-        set("z", "tm", 0.0),
     ],
 };

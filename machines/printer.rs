@@ -37,6 +37,7 @@ pub const PRINTER: Machine = Machine {
         set("a", "sn", 0.0),
         // Z is 0 at the bed, where it homes
         set("xyz", "tm", 200.0),
+        set("z", "tn", 0.0),
         set("z", "sn", 1.0),
         set("z", "sx", 0.0),
         set("xy", "sv", 2_000.0),

@@ -26,11 +26,9 @@ pub const ROUTER: Machine = Machine {
         set("z", "ac", 100.0),
         set("z", "jm", 500.0),
         set("z", "jh", 1_000.0),
-        // Z is 0 at the top, where it homes
         set("x", "tm", 290.0),
         set("y", "tm", 320.0),
         set("z", "tn", -60.0),
-        set("z", "tm", 0.0),
         set("xy", "sv", 1_500.0),
         set("z", "sv", 300.0),
     ],

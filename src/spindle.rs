@@ -176,7 +176,24 @@ mod tests {
     use super::*;
     use crate::config::Name;
 
+    /// A hobby ESC.
+    const ESC: [(&str, i32); 9] = [
+        ("p1csl", 1_000_000),
+        ("p1csh", 2_000_000),
+        ("p1cpl", 125),
+        ("p1cph", 200),
+        ("p1wsl", 1_000_000),
+        ("p1wsh", 2_000_000),
+        ("p1wpl", 125),
+        ("p1wph", 200),
+        ("p1pof", 100),
+    ];
+
     fn spindle(settings: &[(&str, i32)]) -> Spindle {
+        with_defaults(&[&ESC, settings].concat())
+    }
+
+    fn with_defaults(settings: &[(&str, i32)]) -> Spindle {
         let mut spindle = Spindle::new();
         for setting in (Setting::WARM..Setting::COLD).filter_map(Setting::from_number) {
             spindle.set(setting, setting.default_value());
@@ -205,6 +222,21 @@ mod tests {
             (CCW, 500.0, 125.0),
             (CCW, 1_500.0, 162.5),
             (CCW, 6_000.0, 200.0),
+        ] {
+            assert!((spindle.share(on, speed) - share).abs() < 1e-4, "{on} {speed}");
+        }
+    }
+
+    #[test]
+    fn by_default_off_is_off_and_the_range_is_a_spindle_s() {
+        let spindle = with_defaults(&[]);
+        for (on, speed, share) in [
+            (0, 6_000.0, 0.0),
+            (SPINDLE, 0.0, 0.0),
+            (SPINDLE, 6_000.0, 250.0),
+            (CCW, 12_000.0, 500.0),
+            (SPINDLE, 24_000.0, 1_000.0),
+            (SPINDLE, 30_000.0, 1_000.0),
         ] {
             assert!((spindle.share(on, speed) - share).abs() < 1e-4, "{on} {speed}");
         }

@@ -22,6 +22,7 @@ pub enum Status {
     ExceptionReport,
     PersistenceError,
     StepsLate,
+    ProgramStopped,
     UnrecognizedName,
     MalformedCommand,
     BadNumber,
@@ -69,6 +70,7 @@ pub enum Status {
     ToolInvalid,
     HWordMissing,
     HWordInvalid,
+    NoToolLength,
     LWordMissing,
     LWordInvalid,
     QWordMissing,
@@ -94,6 +96,7 @@ pub enum Status {
     HomingTravel,
     HomingSwitches,
     HomingClosed,
+    NotHomed,
     ProbeFailed,
     ProbeTooShort,
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use kerf::hal::imp::{Machine, eeprom};
+use kerf::protocol::Checksum;
 
 /// What a machine says within some milliseconds of being sent something.
 fn ask(machine: &Machine, text: &str, ms: u64) -> String {
@@ -36,22 +37,30 @@ fn greeting_with(contents: Vec<u8>) -> String {
 
 const WHO: &str = "{\"r\":{\"fv\":0.970,\"fb\":440.20,\"hp\":1,\"hv\":8,\"id\":\"0000-KERF\"";
 
+/// What a machine says that is ready, from its version on to `end`.
+fn ready(end: &str) -> String {
+    format!(",\"kerf\":\"{}\",\"msg\":\"SYSTEM READY\"}},\"f\":[1,0,{end}", kerf::config::VERSION)
+}
+
 #[test]
 fn the_machine_says_who_it_is_as_the_settings_want() {
-    for (lines, rest) in [
-        ("", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"),
-        ("{ej:0}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\ntinyg [mm] ok> \n"),
-        ("{ej:0,gun:0}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\ntinyg [inch] ok> \n"),
-        ("{ej:0,tv:0}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"),
-        ("{jv:1}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"),
-        ("{ec:1}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n\r"),
-        ("{rxm:0}\n", ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0,6953]}\n"),
+    let mut sum = Checksum::default();
+    format!("{WHO}{}", ready("0")).bytes().for_each(|byte| sum.add(byte));
+    for (lines, end) in [
+        ("", "0]}\n"),
+        ("{ej:0}\n", "0]}\ntinyg [mm] ok> \n"),
+        ("{ej:0,gun:0}\n", "0]}\ntinyg [inch] ok> \n"),
+        ("{ej:0,tv:0}\n", "0]}\n"),
+        ("{jv:1}\n", "0]}\n"),
+        ("{ec:1}\n", "0]}\n\r"),
+        ("{rxm:0}\n", &format!("0,{}]}}\n", sum.value())),
     ] {
-        assert_eq!(greeting_with(kept_after(lines)), format!("{WHO}{rest}"), "{lines}");
+        let greeting = format!("{WHO}{}", ready(end));
+        assert_eq!(greeting_with(kept_after(lines)), greeting, "{lines}");
     }
     assert_eq!(greeting_with(kept_after("{jv:0}\n")), "");
-    let g2core = "{\"r\":{\"fv\":0.990,\"fb\":101.03,\"hp\":3,\"hv\":0,\"id\":\"0000-KERF\",\
-                  \"msg\":\"SYSTEM READY\"},\"f\":[1,0,1]}\n";
+    let who = "{\"r\":{\"fv\":0.990,\"fb\":101.03,\"hp\":3,\"hv\":0,\"id\":\"0000-KERF\"";
+    let g2core = format!("{who}{}", ready("1]}\n"));
     assert_eq!(greeting_with(kept_after("{dia:1}\n")), g2core);
     assert_eq!(greeting_with(kept_after("{dia:1,ej:0}\n")), format!("{g2core}g2core[mm] ok> \n"));
 }
@@ -59,7 +68,7 @@ fn the_machine_says_who_it_is_as_the_settings_want() {
 #[test]
 fn a_memory_full_of_rubbish_is_told() {
     let initializing = ",\"msg\":\"Initializing configs to default settings\"},\"f\":[1,15,0]}\n";
-    let ready = ",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n";
+    let ready = ready("0]}\n");
     for rubbish in [vec![0; 4_096], b"something else".repeat(100)] {
         assert_eq!(greeting_with(rubbish), format!("{WHO}{initializing}{WHO}{ready}"));
     }

@@ -272,8 +272,8 @@ fn a_kill_at_rest_is_no_hold() {
     sender.ask("g1 x10 f500\n", 200);
     let heard = sender.ask("!\x04", 500);
     assert!(heard.contains("\"stat\":6"), "{heard}");
-    // And a program stop stands still.
-    sender.ask("m0\n", 200);
+    // And a program stop that waits for nobody stands still.
+    sender.ask("{psw:0}\nm0\n", 200);
     let heard = sender.ask("!\x04", 200);
     assert!(heard.contains("\"st\":207") && !heard.contains("\"stat\":6"), "{heard}");
 }

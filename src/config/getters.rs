@@ -143,9 +143,14 @@ impl Settings {
         self.system_large(system::CT) as f32 * 1e-6
     }
 
-    /// Whether M0, M1 and M60 wait for cycle start.
+    /// Whether M0, M1, M6, M60 and G88 wait for cycle start.
     pub fn waits_at_stop(&self) -> bool {
         self.system(system::PSW) != 0
+    }
+
+    /// Whether a probe goes back to the contact.
+    pub fn backs_off_probe(&self) -> bool {
+        self.system(system::PBO) != 0
     }
 
     /// Whether moves beyond the travel are refused.

@@ -16,6 +16,9 @@ pub mod setting;
 pub mod table;
 pub mod words;
 
+/// The version of Kerf.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 pub use name::Name;
 pub use number::{Digits, Fixed, Number};
 pub use ratio::StepRatio;

@@ -8,9 +8,10 @@ use kerf_macros::small;
 
 use super::groups::axis;
 use super::setting::large_of;
+use super::table::Kind;
 use super::{Owner, Setting, Settings, StepRatio};
 use crate::boards::MOTORS;
-use crate::units::AXES;
+use crate::units::{AXES, FIRST_ROTARY};
 
 #[small]
 impl Settings {
@@ -29,6 +30,19 @@ impl Settings {
             Owner::Axis(axis) => self.limit_axis(axis, &rate),
             _ => false,
         }
+    }
+
+    /// Whether `setting` is the search velocity of an axis, or its traverse velocity, that leaves the search slower than it was asked for.
+    #[inline(never)]
+    #[small]
+    pub fn has_fast_search(&self, setting: Setting) -> bool {
+        let (Owner::Axis(owner), row) = (setting.owner(), setting.row()) else { return false };
+        if usize::from(owner) > FIRST_ROTARY || row.kind != Kind::Large {
+            return false;
+        }
+        let first = large_of(owner);
+        matches!(row.slot, axis::VM | axis::SV)
+            && self.large(first + axis::SV) > self.large(first + axis::VM)
     }
 
     #[inline(never)]

@@ -255,6 +255,9 @@ impl Setting {
     /// How many are kept, in RAM or in EEPROM alone; one or two of them are not.
     pub const KEPT: u16 = (SMALLS + LARGES - job::COUNT) as u16 + (Self::COLD - Self::WARM) as u16;
 
+    /// The number of Kerf's version.
+    pub const VERSION: u8 = row_of(&system::LIST, "kerf");
+
     /// Its number.
     pub fn number(self) -> u8 {
         self.0

@@ -139,9 +139,11 @@ pub(super) const fn constant(decimals: u8) -> Row {
     Row { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
-pub(super) const fn board_name() -> Row {
+/// A fixed text: of dialects the name of the board, or Kerf's version, which has a maximum of 1.
+pub(super) const fn fixed_text(is_version: bool) -> Row {
     let mut row = constant(0);
     row.kind = Kind::Text;
+    row.max = is_version as i32;
     row
 }
 

@@ -41,7 +41,7 @@ fn defaults_show_as_documented() {
         ("xvm", "800"),
         ("ajm", "2000"),
         ("ara", "0.199"),
-        ("ztm", "75.000"),
+        ("ztn", "-75.000"),
         ("atn", "-1.000"),
         ("cjd", "0.0100"),
         ("xac", "200.0"),
@@ -148,7 +148,7 @@ fn getters_have_their_units() {
     assert_eq!(settings.junction_deviation(0), 0.01);
     assert_eq!(settings.junction_acceleration(), 720_000.0);
     assert_eq!(settings.chordal_tolerance(), 0.01);
-    assert_eq!(settings.travel_max(2), Length(750_000));
+    assert_eq!(settings.travel_min(2), Length(-750_000));
     assert_eq!((settings.axis_mode(0), settings.axis_mode(3), settings.axis_mode(5)), (1, 1, 0));
     assert_eq!((settings.switch_min(0), settings.switch_max(2), settings.switch_max(5)), (1, 1, 0));
     assert_eq!(settings.status_interval_ms(), 500);

@@ -48,6 +48,10 @@ impl State {
         if [first, second].iter().any(|axis| setup.mode(*axis) == AxisMode::Disabled) {
             return Err(Status::AxisDisabled);
         }
+        // Posts write K0 in G17; only a way out of the plane is no arc.
+        if block.has(bit_of(I + linear)) && !block.get(I + linear).is_some_and(Decimal::is_zero) {
+            return Err(Status::ArcSpecification);
+        }
         let radius = self.radius(block, first, second)?;
         let turns = turns(block)?;
         let start = self.position;
@@ -75,7 +79,7 @@ impl State {
     /// R, in units; negative for the long way round.
     fn radius(&self, block: &Block, first: u8, second: u8) -> Result<Option<Length>, Status> {
         let Some(word) = block.get(R) else { return Ok(None) };
-        if block.has(OFFSETS) {
+        if block.has(bit_of(I + first) | bit_of(I + second)) {
             return Err(Status::ArcSpecification);
         }
         if !block.has(bit_of(first) | bit_of(second)) {
@@ -99,9 +103,6 @@ impl State {
         target: &PerAxis<Length>,
         arc: &Arc,
     ) -> Result<[Length; 2], Status> {
-        if block.has(bit_of(I + arc.linear)) {
-            return Err(Status::ArcSpecification);
-        }
         let from = match self.modal.arc_distance {
             ArcDistance::Absolute => in_plane(&self.origin, arc),
             ArcDistance::Incremental => in_plane(start, arc),

@@ -182,6 +182,7 @@ impl<T: Tables> Interpreter<T> {
             (Ok(()), None) => {}
             (Err(_), _) => {
                 before.restore(&mut self.state);
+                self.state.lacks_length = false;
                 self.restore_origin();
                 out.clear();
             }
@@ -300,6 +301,11 @@ impl<T> Interpreter<T> {
     /// The coordinate system: 1, which is G54, to 9, which is G59.3.
     pub fn coordinate_system(&self) -> u8 {
         self.state.modal.system + 1
+    }
+
+    /// Whether the line before asked for the length of a tool that has none, so that 0 is in force. Asked once.
+    pub fn take_lack(&mut self) -> bool {
+        core::mem::take(&mut self.state.lacks_length)
     }
 
     /// The tool in the spindle; 0 for none.

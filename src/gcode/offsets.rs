@@ -13,7 +13,7 @@ use super::command::{Commands, Motion};
 use super::modal::MotionMode;
 use super::setup::{AxisMode, Setup};
 use super::state::State;
-use super::tables::{Edit, Row, SYSTEMS, TOOL_AXES, Tables};
+use super::tables::{Edit, NUMBERED, Row, SYSTEMS, TOOL_AXES, Tables};
 use super::words::{AXES, H, L, P};
 use crate::status::Status;
 use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
@@ -98,15 +98,23 @@ impl State {
         Ok(())
     }
 
-    /// The lengths of tool H; without H, of the tool in the spindle. None are those of an empty spindle, 0.
+    /// The lengths of tool H; without H, of the tool in the spindle. Those of an empty spindle are 0, and so are
+    /// those of a tool up to [`NUMBERED`] that the tables lack: the line may have a move, and a program is not to
+    /// be refused in its midst. [`State::lacks_length`] says so.
     #[small]
-    fn tool_named(&self, block: &Block, tables: &impl Tables) -> Result<PerAxis<Length>, Status> {
+    fn tool_named(
+        &mut self,
+        block: &Block,
+        tables: &impl Tables,
+    ) -> Result<PerAxis<Length>, Status> {
         let number = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
         let number = number.ok().and_then(|number| u8::try_from(number).ok());
-        match number.ok_or(Status::HWordInvalid)? {
-            0 => Ok([Length::ZERO; units::AXES]),
-            number => Ok(tables.row(Row::tool(number).ok_or(Status::HWordInvalid)?)),
-        }
+        let number = number.filter(|number| *number <= NUMBERED).ok_or(Status::HWordInvalid)?;
+        let Some(row) = Row::tool(number) else {
+            self.lacks_length = number != 0;
+            return Ok([Length::ZERO; units::AXES]);
+        };
+        Ok(tables.row(row))
     }
 
     /// Group 0, but for the moves to stored positions.
@@ -320,7 +328,8 @@ impl State {
     }
 
     /// G28 and G30: a traverse to the stored position, of the named axes and by way of where the words
-    /// say; of all axes without words.
+    /// say; of all axes without words. Where nothing was stored that is machine zero, which is a place on a homed
+    /// axis alone: a linear axis that is not homed has the line refused.
     #[inline(never)]
     pub(super) fn go_stored(
         &mut self,
@@ -335,10 +344,14 @@ impl State {
         }
         self.advance(block, false, setup)?;
         let via = self.position;
+        let places = if tables.is_stored(stored) { u8::MAX } else { self.homed };
         let stored = tables.row(stored);
         for axis in 0..units::AXES as u8 {
             let named = !block.has(AXES) || block.get(axis).is_some();
             if named && setup.mode(axis) != AxisMode::Disabled {
+                if usize::from(axis) < FIRST_ROTARY && places & 1 << axis == 0 {
+                    return Err(Status::NotHomed);
+                }
                 put(&mut self.position, axis, at(&stored, axis));
                 put(&mut self.residue, axis, 0);
             }

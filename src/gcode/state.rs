@@ -42,6 +42,8 @@ pub struct State {
     pub shifted: bool,
     /// G43.
     pub tool_length: PerAxis<Length>,
+    /// A line has asked for the length of a tool that has none. Whoever carries lines out takes it.
+    pub lacks_length: bool,
     /// S.
     pub speed: f32,
     /// T, and the tool of the last M6.
@@ -67,6 +69,7 @@ impl State {
             shift: [Length::ZERO; AXES],
             shifted: false,
             tool_length: [Length::ZERO; AXES],
+            lacks_length: false,
             speed: 0.0,
             selected: 0,
             tool: 0,

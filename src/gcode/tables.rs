@@ -13,6 +13,8 @@ pub const SYSTEMS: u8 = 9;
 pub const STORED: u8 = 2;
 /// Tools with offsets, from number 1.
 pub const TOOLS: u8 = 10;
+/// Tools may have numbers up to this one; those above [`TOOLS`] are as long as none.
+pub const NUMBERED: u8 = 99;
 /// All rows: systems, stored positions, tools.
 pub const ROWS: u8 = SYSTEMS + STORED + TOOLS;
 
@@ -82,6 +84,11 @@ pub struct Edit {
 pub trait Tables {
     /// What a row is. On AVR a search of the log: up to 2 ms, and 3.4 more while a byte is written.
     fn row(&self, row: Row) -> PerAxis<Length>;
+
+    /// Whether a stored position was ever stored. What has no memory of that says that it was.
+    fn is_stored(&self, _row: Row) -> bool {
+        true
+    }
 
     /// Whether a change of a row can be taken now. If not, the line that makes it is refused with [`Status::Again`]
     /// and is to be tried again later.

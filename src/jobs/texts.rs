@@ -40,7 +40,7 @@ pieces!(27:
     11: 1 x "G4 P.5\nX0.01\nY0.01\nX-0.01\nY-0.01\nX0.01 Y-0.01\nX-0.01 Y0.01\nG90\nM30\n"
     12: 1 x "(MSG slow moves)\nG21 G90 G55 G94 F22\nG0 X0 Y0\nG1 X10\nY10\nX0\nY0\nG54\nM30\n"
     13: 1 x "(MSG offsets)\nG21 G90\nG92 X10 Y10\nG0 X20 Y20\nX10 Y10\nG92.1\nG10 L2 P2 X50 Y50\nG55\nG0 X0 Y0\nX10\nY10\nX0\nY0\n"
-    13: 1 x "G53 X0 Y0\nG53 X10\nG53 Y10\nG53 X0\nG53 Y0\nG28\nG54\nG10 L2 P2 X0 Y0\nM30\n"
+    13: 1 x "G53 X0 Y0\nG53 X10\nG53 Y10\nG53 X0\nG53 Y0\nG54\nG10 L2 P2 X0 Y0\nM30\n"
     51: 1 x "(MSG braid)\nG21 G91 G94 F1200\nG1\n"
     51: 250 x "X.2 Y.1\nX.1 Y.2\nX-.1 Y.2\nX-.2 Y.1\nX-.2 Y-.1\nX-.1 Y-.2\nX.1 Y-.2\nX.2 Y-.1\nX.05\nX-.05\n"
     51: 1 x "G90\nM30\n"

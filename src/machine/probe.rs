@@ -40,11 +40,15 @@ impl Probe {
         self.state.set(ProbeState::Waiting);
     }
 
-    /// It has come to an end, which is to be told.
-    pub fn tell(&self, state: ProbeState, at: &PerAxis<Length>) {
-        self.state.set(state);
+    /// Where it has come to an end, which is told when the machine is at rest: [`Self::tell`].
+    pub fn found(&self, at: &PerAxis<Length>) {
         let [x, y, z, ..] = *at;
         self.at.set([x, y, z]);
+    }
+
+    /// It has come to an end, which is to be told.
+    pub fn tell(&self, state: ProbeState) {
+        self.state.set(state);
         self.news.set(true);
     }
 

@@ -20,6 +20,8 @@ pub enum Warning {
     Velocity,
     /// A jerk limit of an axis is not in force beside its acceleration limit.
     Jerk,
+    /// An axis searches for its homing switch at its traverse velocity, which is below its search velocity.
+    Search,
 }
 
 /// How far a hold has come.

@@ -10,11 +10,17 @@ use crate::units::{AXES, Length, PerAxis};
 #[inline(never)]
 #[small]
 pub fn row<M: Memory>(log: &Log, memory: &M, row: Row) -> PerAxis<Length> {
+    find(log, memory, row).map(|value| Length(value.unwrap_or(0)))
+}
+
+#[inline(never)]
+#[small]
+fn find<M: Memory>(log: &Log, memory: &M, row: Row) -> [Option<i32>; AXES] {
     let mut keys = [0; AXES];
     for (axis, key) in (0..).zip(&mut keys) {
         *key = self::key(row, axis);
     }
-    log.find(memory, &keys).map(|value| Length(value.unwrap_or(0)))
+    log.find(memory, &keys)
 }
 
 /// A value of a row.
@@ -22,6 +28,13 @@ pub fn row<M: Memory>(log: &Log, memory: &M, row: Row) -> PerAxis<Length> {
 #[small]
 pub fn value<M: Memory>(log: &Log, memory: &M, row: Row, axis: u8) -> Length {
     Length(log.newest(memory, key(row, axis)).unwrap_or(0))
+}
+
+/// Whether a row was ever put away.
+#[inline(never)]
+#[small]
+pub fn is_stored<M: Memory>(log: &Log, memory: &M, row: Row) -> bool {
+    find(log, memory, row).iter().any(Option::is_some)
 }
 
 /// The key of a value of a row.

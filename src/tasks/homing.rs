@@ -180,7 +180,7 @@ mod tests {
         assert_eq!(lower.way, Length(1_750_000));
         assert_eq!(lower.towards(Length(5), Length(3)), Length(2));
         let upper = of(&settings(&[]), 2).unwrap();
-        assert_eq!((upper.end, upper.place), (5, Length(750_000)));
+        assert_eq!((upper.end, upper.place), (5, Length::ZERO));
         assert_eq!(upper.away(Length(5), Length(3)), Length(2));
         assert_eq!(upper.ends(), 0b11_0000);
         let none = of(&settings(&[("xtn", "150")]), 0).unwrap();

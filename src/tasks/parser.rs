@@ -699,6 +699,9 @@ fn carry_out(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
                 links.commands_taken.set(true);
                 links.planner_wake.signal();
             }
+            if model.take_lack() {
+                links.except(Status::NoToolLength);
+            }
             (Status::Ok, info.commented)
         }
         Err(status) => {

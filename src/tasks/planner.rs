@@ -299,17 +299,19 @@ impl Planner {
                 self.steps.repeat();
             }
             Step::Stop(Stop::End) => self.pause(Action::ProgramEnd),
-            Step::Stop(_) => {
-                self.pause(Action::ProgramStop);
-                if self.links.settings.borrow().waits_at_stop() {
+            Step::Stop(_) | Step::Tool(_) => {
+                let waits = self.links.settings.borrow().waits_at_stop();
+                // A tool is reported; a sender that changes it sees to the stop itself.
+                if waits || matches!(step, Step::Stop(_)) {
+                    self.pause(Action::ProgramStop);
+                }
+                if waits {
                     return Turn::Pause;
                 }
             }
             Step::Probe => return Turn::Probe,
             Step::Home => return Turn::Home,
             Step::Jog => return Turn::Jog,
-            // The tool is reported, but nothing moves.
-            Step::Tool(_) => {}
         }
         Turn::More
     }
@@ -455,7 +457,8 @@ impl Planner {
             return;
         }
         machine::carry_out(machine::Event::Stopped);
-        self.links.reporter_wake.signal();
+        // Who does not know of the stop would wait for ever.
+        self.links.except(Status::ProgramStopped);
         self.links.cycle_start.take();
         self.links.cycle_start.wait().await;
         machine::carry_out(machine::Event::Done);

@@ -30,7 +30,7 @@ use crate::units::{Length, PerAxis};
 
 /// Keys without a record if every setting and every value of all 21 rows on six axes has been set: then a line is refused with status
 /// 34. The program's area has the room.
-const LEFT_OUT: u16 = 11;
+const LEFT_OUT: u16 = 12;
 const _: () = assert!(
     kept::KEYS < Eeprom::LOG / record::SIZE + LEFT_OUT,
     "the log of the EEPROM has too few records for what is kept: make `AREA` of src/store/program.rs smaller by 11 bytes for each"
@@ -210,6 +210,12 @@ impl Tables for &Storage {
         }
     }
 
+    #[inline(never)]
+    fn is_stored(&self, row: Row) -> bool {
+        let comes = self.edit.get().is_some_and(|edit| edit.row == row);
+        comes || tables::is_stored(&self.log.get(), &Eeprom::take(), row)
+    }
+
     fn takes(&self, row: Row) -> bool {
         // The same row has only to be written once more.
         let takes = self.edit.get().is_none_or(|edit| edit.row == row);
@@ -295,11 +301,16 @@ fn differs(log: &Log, memory: &Eeprom, key: u16, value: i32, default: i32) -> Op
 #[small]
 fn changed(log: &Log, memory: &Eeprom, edit: &Edit) -> Option<(u16, i32)> {
     let kept = tables::row(log, memory, edit.row);
-    let (axis, value) = (0..)
-        .zip(&edit.values)
-        .zip(&kept)
-        .find(|((_, new), old)| new != old)
-        .map(|(new, _)| new)?;
+    let mut values = (0..).zip(&edit.values);
+    let differs = values.clone().zip(&kept).find(|((_, new), old)| new != old);
+    let (axis, value) = match differs {
+        Some((new, _)) => new,
+        // A position that is 0 leaves a trace of its own.
+        None if edit.row.is_stored() && !tables::is_stored(log, memory, edit.row) => {
+            values.next()?
+        }
+        None => return None,
+    };
     Some((tables::key(edit.row, axis), value.0))
 }
 

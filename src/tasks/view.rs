@@ -290,6 +290,7 @@ impl Machine for View<'_> {
         Ok(match lowered {
             true => Warning::Velocity,
             false if self.settings.has_idle_jerk(setting) => Warning::Jerk,
+            false if self.settings.has_fast_search(setting) => Warning::Search,
             false => Warning::None,
         })
     }

@@ -5,7 +5,8 @@
 //! ```text
 //! # what follows is for people
 //! -> g1 x10 f500              a line is sent; \x05 is the byte 5
-//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this; \x0d is a carriage return
+//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this; \x0d is a carriage return, $VERSION Kerf's version,
+//!                             which may be left out of JSON
 //! <~ {"qr":*}                 from here on such lines may come, any number of them; * is anything
 //! @ +50ms                     time passes
 //! baud 500000                 from here on the sender speaks and hears at this rate
@@ -27,6 +28,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use kerf::boards::inputs::PROBE;
+use kerf::config::VERSION;
 
 use crate::side::Side;
 
@@ -113,7 +115,7 @@ fn parse(line: &str) -> Option<Event> {
         "->" => unescape(rest).map(Event::Send),
         "2->" => unescape(rest).map(Event::SendAux),
         "2cts" => rest.parse().ok().map(|level: u8| Event::AuxCts(level != 0)),
-        "<-" => Some(Event::Hear(rest.replace("\\x0d", "\r"))),
+        "<-" => Some(Event::Hear(rest.replace("\\x0d", "\r").replace("$VERSION", VERSION))),
         "2<-" => Some(Event::HearAux(rest.to_string())),
         "<~" => Some(Event::Allow(rest.to_string())),
         "@" => rest.strip_prefix('+')?.strip_suffix("ms")?.parse().ok().map(Event::Pass),
@@ -243,6 +245,11 @@ impl Ear {
     }
 }
 
+/// A line without Kerf's version, which most transcripts leave out: it changes with each release.
+fn without_version(line: &str) -> String {
+    line.replace(&format!("\"kerf\":\"{VERSION}\","), "")
+}
+
 /// The greeting on the second port, which transcripts that do not use it pass over.
 const GREETING: &str = "{\"r\":{\"fv\":*\"SYSTEM READY\"},\"f\":[1,0,0]}";
 
@@ -279,7 +286,7 @@ impl<S: Side> Player<'_, S> {
         let mut waited = 0;
         loop {
             match self.next_line(port) {
-                Some(line) if line == wanted => return Ok(()),
+                Some(line) if line == wanted || without_version(&line) == wanted => return Ok(()),
                 Some(line) if self.may_come(port, &line) => {}
                 Some(line) => return Err(format!("heard    {line}\ninstead of {wanted}")),
                 None if waited == HEAR_MS => {

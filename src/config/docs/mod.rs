@@ -44,6 +44,9 @@ is built with `--machine NAME` has that machine's values as defaults. They are a
 the travel against your machine before you trust them. It takes up to 5 s until all of them survive a power cut; one before that may
 leave some as they were: choose again.
 
+After homing an axis stands at the end of its travel: at the lower number if it homes down, at the upper if it homes up. Z homes up, and its
+top is machine zero, on all but the `printer`, where the bed is 0.
+
 ";
 
 const PLACES: &str = "\
@@ -102,7 +105,14 @@ pub fn markdown() -> String {
             &[0, 1, 2, 3, 4, 5].map(Owner::Axis),
             &axis::MEANINGS,
         ),
-        ("PWM of the spindle", "The group `p1`: `p1frq`.", &[Owner::Pwm], &pwm::MEANINGS),
+        (
+            "PWM of the spindle",
+            "The group `p1`: `p1frq`. The defaults fit an inverter with a 0 to 10 V input behind a PWM converter: no pulses while \
+the spindle is off, S24000 is 10 V. A spindle of 12,000 RPM wants `{p1:{csh:12000,wsh:12000}}`. A hobby ESC wants \
+`{p1:{frq:100,csl:1000,csh:2000,cpl:0.125,cph:0.2,wsl:1000,wsh:2000,wpl:0.125,wph:0.2,pof:0.1}}`.",
+            &[Owner::Pwm],
+            &pwm::MEANINGS,
+        ),
         ("Spindle", "The group `sp`: `spde`.", &[Owner::Spindle], &spindle::MEANINGS),
         ("Coolant", "The group `co`: `coph`.", &[Owner::Coolant], &coolant::MEANINGS),
         (
@@ -284,6 +294,7 @@ fn defaults(settings: &[Setting]) -> String {
     let shown = |setting: Setting| {
         let row = setting.row();
         match row.kind {
+            Kind::Text if row.max != 0 => String::new(),
             Kind::Text => "`0000-KERF`".to_string(),
             Kind::Data | Kind::Job => "`\"0x0\"`".to_string(),
             _ if row.is(JERK) || row.stored > 0 => number(setting.default_value(), row.stored),

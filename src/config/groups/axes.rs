@@ -16,10 +16,10 @@ group! {
             "Speed of feeds at most. Lowered likewise.";
         TN "tn": fixed(4, 3, ANY).with(UNIT | CLAMP), [0, 0, 0, -1_0000, -1_0000, -1_0000],
             length(text!("travel minimum"), NONE),
-            "Lower end of travel, for `sl`. The lowest that can be set is none.";
+            "Lower end of travel, for `sl`, in machine coordinates; the position after homing at a lower switch. The lowest that can be set is none.";
         TM "tm": fixed(4, 3, ANY).with(UNIT | CLAMP), [150_0000, 150_0000, 75_0000, -1_0000, -1_0000, -1_0000],
             length(text!("travel maximum"), NONE),
-            "Upper end of travel, for `sl`. The lowest that can be set is none; an axis whose ends are the same has neither.";
+            "Upper end of travel, likewise; the position after homing at an upper switch. With 0 machine zero is there: the default of Z, whose zero is its top. The lowest that can be set is none; an axis whose ends are the same has neither.";
         JM "jm": fixed(3, 0, POSITIVE).with(UNIT | JERK), [20_000, 20_000, 20_000, 5_760_000, 20_000, 20_000],
             length(text!("jerk maximum"), JERK_UNIT),
             "Jerk at most. A value above 1000000 is divided by a million. A jerk that reaches `ac` within 1 ms has no effect: ramps are those of `ac` alone, and a message says so. That is `jm` of 216 times `ac` and more. About 6 times `ac` takes 36 ms.";
@@ -40,7 +40,7 @@ group! {
             "Switch at the upper end, likewise.";
         SV "sv": fixed(3, 0, 0).with(UNIT | HOMING), [500_000, 500_000, 400_000, 600_000, 0, 0],
             length(text!("search velocity"), SPEED),
-            "Speed towards a homing switch; 0: the axis cannot be homed (242).";
+            "Speed towards a homing switch, at most `vm`: a message says so. `fr` does not limit it. The axis must be able to stop between the switch and its hard end: `sv` 800 with `ac` 200 takes 0.5 mm and more. 0: the axis cannot be homed (242).";
         LV "lv": fixed(3, 0, 0).with(UNIT | HOMING), [100_000, 100_000, 100_000, 100_000, 0, 0],
             length(text!("latch velocity"), SPEED),
             "Speed off a homing switch, when its place is taken; 0: the axis cannot be homed (243).";

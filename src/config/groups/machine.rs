@@ -17,7 +17,7 @@ group! {
         HV "hv": constant(0), 8,
             bare(text!("hardware version")).with_decimals(2),
             "Revision of the hardware.";
-        ID "id": board_name(), 0,
+        ID "id": fixed_text(false), 0,
             bare(text!("TinyG ID")),
             "Name of the board.";
         JA "ja": fixed(2, 0, POSITIVE).with(UNIT), 10_000_000,
@@ -95,9 +95,12 @@ group! {
         OST "ost": int(0, 1), 1,
             words(text!("optional stop"), OFF_ON),
             "M1 stops.";
-        PSW "psw": int(0, 1), 0,
+        PSW "psw": int(0, 1), 1,
             words(text!("program stop waits"), OFF_ON),
-            "M0, M1, M60 and G88 wait for `~`.";
+            "M0, M1, M6, M60 and G88 wait for `~`, and an exception (38) says so. Senders that see to stops and tools themselves want 0.";
+        PBO "pbo": int(0, 1), 1,
+            words(text!("probe backs off"), OFF_ON),
+            "Whether a probe goes back to the contact. With 0 the machine stays where it came to rest, beyond the contact.";
         DIA "dia": int(0, 1), 0,
             words(text!("protocol dialect"), text!(" [0=TinyG,1=g2core]")),
             "Whom the sender takes the machine for. As a g2core it ends responses with `[1,status,length]` and has that one's `fb`, `fv`, `hp`, `hv`, prompts, and some status codes and texts.";
@@ -116,5 +119,8 @@ group! {
         MCH "mch": int(0, machines::COUNT as i32 - 1).with(IDLE), 0,
             words(text!("machine"), text!(" [0=careful,1=router,2=mill,3=printer,4=lathe]")),
             "Machine that was chosen last. Choosing one sets all settings of motors and axes, `ja`, `ct` and `gpl` to what they are on that machine: see Machines.";
+        KERF "kerf": fixed_text(true), 0,
+            bare(text!("Kerf version")),
+            "Version of Kerf, which the greeting tells, too. `fb` and `fv` are the protocol's.";
     }
 }

@@ -5,36 +5,36 @@ use super::group;
 group! {
     /// The group `p1`.
     pwm: i32, PLAIN => {
-        FRQ "frq": cold(0), 100_000,
+        FRQ "frq": cold(0), 1_000_000,
             words(text!("pwm frequency"), text!(" Hz")),
             "Frequency; 0.122 Hz is the lowest there is.";
-        CSL "csl": cold(0), 1_000_000,
+        CSL "csl": cold(0), 0,
             words(text!("pwm cw speed lo"), TURNS),
-            "Lowest speed, clockwise: a lower S has its share.";
-        CSH "csh": cold(0), 2_000_000,
+            "Speed that has the share `cpl`, clockwise. A lower S has it, too.";
+        CSH "csh": cold(0), 24_000_000,
             words(text!("pwm cw speed hi"), TURNS),
-            "Highest speed, clockwise: a higher S has its share.";
-        CPL "cpl": up_to(cold(3), 1_000), 125,
+            "Speed that has the share `cph`, clockwise. A higher S has it, too.";
+        CPL "cpl": up_to(cold(3), 1_000), 0,
             words(text!("pwm cw phase lo"), PHASE),
             "Share of the period at the lowest speed, clockwise.";
-        CPH "cph": up_to(cold(3), 1_000), 200,
+        CPH "cph": up_to(cold(3), 1_000), 1_000,
             words(text!("pwm cw phase hi"), PHASE),
             "Share of the period at the highest speed, clockwise.";
-        WSL "wsl": cold(0), 1_000_000,
+        WSL "wsl": cold(0), 0,
             words(text!("pwm ccw speed lo"), TURNS),
             "Lowest speed, counter-clockwise.";
-        WSH "wsh": cold(0), 2_000_000,
+        WSH "wsh": cold(0), 24_000_000,
             words(text!("pwm ccw speed hi"), TURNS),
             "Highest speed, counter-clockwise.";
-        WPL "wpl": up_to(cold(3), 1_000), 125,
+        WPL "wpl": up_to(cold(3), 1_000), 0,
             words(text!("pwm ccw phase lo"), PHASE),
             "Share of the period at the lowest speed, counter-clockwise.";
-        WPH "wph": up_to(cold(3), 1_000), 200,
+        WPH "wph": up_to(cold(3), 1_000), 1_000,
             words(text!("pwm ccw phase hi"), PHASE),
             "Share of the period at the highest speed, counter-clockwise.";
-        POF "pof": up_to(cold(3), 1_000), 100,
+        POF "pof": up_to(cold(3), 1_000), 0,
             words(text!("pwm phase off"), PHASE),
-            "Share of the period while the spindle is off, or S is 0.";
+            "Share of the period while the spindle is off, or S is 0. Keep 0 unless the drive needs pulses at rest, as a hobby ESC does.";
     }
 }
 

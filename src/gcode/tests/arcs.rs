@@ -73,8 +73,8 @@ fn incomplete_arcs() {
         ("G2 X0 Y10", Status::ArcOffsetsMissing),
         ("G2 Z5", Status::ArcOffsetsMissing),
         ("G2 X0 Y10 I0 J0", Status::ArcOffsetsMissing),
-        ("G2 X0 Y10 I-10 K0", Status::ArcSpecification),
-        ("G18 G2 X0 Z10 I-10 J0", Status::ArcSpecification),
+        ("G2 X0 Y10 I-10 K1", Status::ArcSpecification),
+        ("G18 G2 X0 Z10 I-10 J1", Status::ArcSpecification),
         ("G2 X0 Y10 I-10 R10", Status::ArcSpecification),
     ] {
         assert_eq!(refusal(&[AT_10_0, line]), status, "{line}");

@@ -142,11 +142,11 @@ impl Iterator for Bytes {
     }
 }
 
-/// A [`Text`] from a literal: `text!("SYSTEM READY")`.
+/// A [`Text`] from a literal or a constant: `text!("SYSTEM READY")`.
 #[macro_export]
 macro_rules! text {
-    ($literal:literal) => {{
-        const PACKED: ([u8; 255], usize) = $crate::progmem::pack($literal.as_bytes());
+    ($text:expr) => {{
+        const PACKED: ([u8; 255], usize) = $crate::progmem::pack($text.as_bytes());
         $crate::progmem! { static TEXT: [u8; PACKED.1] = *PACKED.0.first_chunk().unwrap(); }
         const {
             // SAFETY: `progmem!` placed it in program memory.

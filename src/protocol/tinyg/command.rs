@@ -1,5 +1,6 @@
 //! Text mode: what a line that begins with `$` asks for.
 
+use super::help::Hint;
 use super::json::{Kind, Pair};
 use super::listing::Series;
 use super::request::{Context, Phase, Request};
@@ -19,6 +20,9 @@ impl Request {
         let pair = divide(c.line, &pair).unwrap_or(pair);
         let name = Name::beginning(pair.name.of(c.line));
         let null = pair.kind == Kind::Null;
+        if let Some(hint) = Hint::of(pair.name.of(c.line), null) {
+            return self.hint(hint, Status::UnrecognizedName);
+        }
         let series = match name.bytes() {
             [letter] if null => Series::of_letter(*letter),
             _ => None,

@@ -7,10 +7,11 @@ use crate::capability::Capability;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::protocol::{Machine, Out, Span};
+use crate::status::Status;
 use crate::text;
 
 /// Lines of [`SCREENS`]; a screen is some of them.
-const LINES: usize = 61;
+const LINES: usize = 64;
 /// What `h` shows.
 pub const GENERAL: Span = Span { start: 0, end: 19 };
 /// What `$h` shows.
@@ -20,7 +21,36 @@ pub const DEFAULTS: Span = Span { start: 34, end: 39 };
 /// What `$test` shows.
 pub const TESTS: Span = Span { start: 39, end: 56 };
 /// What `$boot` shows.
-pub const BOOT: Span = Span { start: 56, end: LINES as u8 };
+pub const BOOT: Span = Span { start: 56, end: 61 };
+/// The first of the hints for what grbl's users type.
+const HINTS: u8 = 61;
+
+/// What grbl's users type, and what that is here. Capitals are grbl's: `$h` and `$x` are ours.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[repr(u8)]
+pub(super) enum Hint {
+    /// `$H`.
+    Home,
+    /// `$X`.
+    Unlock,
+    /// `$100=80`, `$1=25`.
+    Numbered,
+}
+
+#[small]
+impl Hint {
+    /// The hint for a name that is asked for, or given a value.
+    pub fn of(name: &[u8], asked: bool) -> Option<Hint> {
+        match name {
+            b"H" if asked => Some(Hint::Home),
+            b"X" if asked => Some(Hint::Unlock),
+            [_, ..] if !(asked && name.len() == 1) && name.iter().all(u8::is_ascii_digit) => {
+                Some(Hint::Numbered)
+            }
+            _ => None,
+        }
+    }
+}
 
 progmem! {
     static SCREENS: [Text; LINES] = [
@@ -28,21 +58,21 @@ progmem! {
         text!("Lines of G-code are run and answered with a prompt."),
         text!("These act as well:"),
         text!("  ?         status report"),
-        text!("  $         settings of the machine"),
-        text!("  $$        all settings"),
+        text!("  $  $$     settings of the machine, all settings"),
         text!("  $h        help with settings"),
         text!("  $defa=1   all settings back to their defaults"),
         text!("  $test     list of built-in jobs; $test=3 runs one"),
         text!("  $me $md   motors on, motors off"),
         text!("  h         this help"),
-        text!("  !         hold"),
-        text!("  ~         go on after a hold, or a program stop"),
-        text!("  %         in a hold: drop what is queued (^d: both)"),
+        text!("  !         stop: slow down and hold"),
+        text!("  ~         resume after a hold, or a program stop"),
+        text!("  !%        stop and discard what is queued"),
+        text!("  ^d        stop, discard, and end the program"),
+        text!("  $clear    clear an alarm"),
+        text!("  $home=1   home all axes that have a switch"),
         text!("  ^x        reset: the position is lost"),
         text!("  {...}     JSON; answers are JSON from then on"),
-        text!("To stop the machine at once, cut its power."),
-        text!("All codes: docs/gcode.md in the sources."),
-        text!("All settings: docs/settings.md in the sources."),
+        text!("All codes: docs/gcode.md. All settings: docs/settings.md"),
 
         text!("### Kerf Settings Help ###"),
         text!("To show:"),
@@ -89,6 +119,10 @@ progmem! {
         text!("It waits a second or so for a programmer, and"),
         text!("starts the machine anew then: the position is lost."),
         text!("It is refused while the machine moves."),
+
+        text!("To home as $H of grbl does: $home=1. Help: $h"),
+        text!("To unlock as $X of grbl does: $clear. Settings of X: $x"),
+        text!("grbl's numbers have names here: $xvm for $110. All: $$"),
     ];
 }
 
@@ -103,6 +137,13 @@ impl Request {
             }
             Err(status) => self.fail(status, Mode::Text),
         }
+    }
+
+    /// A hint for a `$` line of grbl, that is refused with `status`.
+    pub(super) fn hint(&mut self, hint: Hint, status: Status) {
+        let line = HINTS + hint as u8;
+        self.help(Span { start: line, end: line + 1 });
+        self.status = status;
     }
 
     /// A line of it.

@@ -5,7 +5,7 @@ use super::token::{Group, Token};
 use super::value::PROBED;
 use super::write::Writer;
 use crate::boards::inputs;
-use crate::config::{Fixed, Settings};
+use crate::config::{Fixed, Setting, Settings};
 use crate::progmem;
 use crate::progmem::Text;
 use crate::protocol::{Ending, Machine, Occasion, Out, Value};
@@ -13,14 +13,14 @@ use crate::status::Status;
 use crate::text;
 
 /// The greeting after a reset:
-/// `{"r":{"fv":0.970,"fb":440.20,"hp":1,"hv":8,"id":"...","msg":"SYSTEM READY"},"f":[1,0,0]}`.
+/// `{"r":{"fv":0.970,"fb":440.20,"hp":1,"hv":8,"id":"...","kerf":"0.1.0","msg":"SYSTEM READY"},"f":[1,0,0]}`.
 pub struct Banner {
     stage: u8,
     occasion: Occasion,
     format: Format,
 }
 
-/// The rows of `sys` that the greeting tells, in its order.
+/// The rows of `sys` that every greeting tells, in its order; one that is ready adds Kerf's version.
 pub(super) const BANNER_ROWS: u8 = 5;
 
 #[small]
@@ -42,6 +42,10 @@ impl Banner {
                 put_row(self.stage, machine, &mut writer);
             }
             BANNER_ROWS => {
+                // With the longer message the greeting would not fit the ring of a port.
+                if self.occasion == Occasion::Ready {
+                    put_row(Setting::VERSION, machine, &mut writer);
+                }
                 writer.key_text(text!("msg"));
                 writer.string(match self.occasion {
                     Occasion::Ready => text!("SYSTEM READY"),

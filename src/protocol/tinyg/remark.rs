@@ -17,6 +17,8 @@ pub enum Remark {
     Velocity,
     /// A jerk limit of an axis is not in force beside its acceleration limit.
     Jerk,
+    /// A search velocity is above the traverse velocity.
+    Search,
     /// The line has no such rate.
     Baud,
     /// There is no such built-in job.
@@ -42,11 +44,12 @@ impl Remark {
 
 progmem! {
     // A table, for what the compiler makes of a `match` would be in RAM.
-    static REMARKS: [Text; 11] = [
+    static REMARKS: [Text; 12] = [
         text!(""),
         text!("*** WARNING *** Setting non-standard microstep value"),
         text!("*** WARNING *** Velocity limited by the step rate"),
         text!("*** WARNING *** Jerk limit has no effect beside ac"),
+        text!("*** WARNING *** Search velocity limited by vm"),
         text!("*** WARNING *** Unsupported baud rate specified"),
         text!("Test not found"),
         text!("Send $h for help, {sys:n} for the settings"),
@@ -63,6 +66,7 @@ impl From<Warning> for Remark {
             Warning::None => Remark::None,
             Warning::Velocity => Remark::Velocity,
             Warning::Jerk => Remark::Jerk,
+            Warning::Search => Remark::Search,
         }
     }
 }

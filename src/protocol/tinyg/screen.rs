@@ -89,7 +89,7 @@ impl Label {
 fn choice<M: Machine>(token: Token, machine: &mut M) -> Option<(Text, i32)> {
     match token.subject() {
         Some(Subject::Single(single)) if !single.choices.is_empty() => {
-            Some((single.choices, single.source.read(machine)))
+            Some((single.choices, single.source.choice(machine)))
         }
         _ => None,
     }

@@ -42,6 +42,12 @@ pub fn stat(machine: &mut impl Machine) -> i32 {
     }
 }
 
+/// Whether the machine is shut down, by a number that means the door to a g2core.
+#[small]
+pub fn is_tinyg_shutdown(machine: &mut impl Machine) -> bool {
+    matches!(machine.doing(), Doing::Alarm(Alarm::Shutdown)) && !machine.settings().is_g2core()
+}
+
 /// `macs`: machine state.
 #[small]
 pub fn macs(machine: &mut impl Machine) -> i32 {

@@ -52,6 +52,7 @@ rows! {
     ExceptionReport = 29, "Generic exception report";
     PersistenceError = 34, "Persistence error";
     StepsLate = 37, "Steps came late";
+    ProgramStopped = 38, "Program stopped [~ to resume]";
     UnrecognizedName = 100, "Unrecognized command or config name";
     MalformedCommand = 101, "Invalid or malformed command";
     BadNumber = 102, "Bad number format";
@@ -99,6 +100,7 @@ rows! {
     ToolInvalid = 165, "P word is not a valid tool number";
     HWordMissing = 170, "H word is missing";
     HWordInvalid = 171, "H word is invalid";
+    NoToolLength = 180, "Tool has no length - 0 in force";
     LWordMissing = 172, "L word is missing";
     LWordInvalid = 173, "L word is invalid";
     QWordMissing = 174, "Q word is missing";
@@ -124,6 +126,7 @@ rows! {
     HomingTravel = 244, "Homing Error - Travel min & max are the same";
     HomingSwitches = 246, "Homing Error - Homing switches misconfigured";
     HomingClosed = 247, "Homing Error - Homing switch stays closed";
+    NotHomed = 248, "Position was never stored - home first";
     ProbeFailed = 250, "Probe cycle failed";
     ProbeTooShort = 251, "Probe endpoint is starting point";
 }

@@ -314,7 +314,8 @@ fn notices_are_as_documented() {
     assert_eq!(
         all(|out| banner.step(&mut Fake::new(), out)),
         "{\"r\":{\"fv\":0.970,\"fb\":440.20,\"hp\":1,\"hv\":8,\"id\":\"0000-KERF\",\
-         \"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"
+         \"kerf\":\"0.1.0\",\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"
+            .replace("0.1.0", crate::config::VERSION)
     );
     for (status, text) in [
         (Status::BufferFull, "{\"er\":{\"fb\":440.20,\"st\":13,\"msg\":\"Buffer full\"}}\n"),

@@ -167,7 +167,9 @@ impl Token {
         let inches = machine.inches();
         let (source, form) = match self.subject() {
             Some(Subject::Setting(setting)) => {
-                return match setting.row().kind {
+                let row = setting.row();
+                return match row.kind {
+                    Kind::Text if row.max != 0 => Shown::Text(text!(crate::config::VERSION)),
                     Kind::Text => Shown::Text(text!("0000-KERF")),
                     Kind::Data | Kind::Job => Shown::Data(machine.setting(setting)),
                     _ => {

@@ -34,6 +34,13 @@ pub enum Source {
 
 #[small]
 impl Source {
+    /// The place of its name among those of its numbers. TinyG has no interlock: its shutdown has the number of g2core's.
+    pub fn choice(self, machine: &mut impl Machine) -> i32 {
+        let number = self.read(machine);
+        let is_state = matches!(self, Source::State | Source::Machine);
+        if is_state && state::is_tinyg_shutdown(machine) { number + 1 } else { number }
+    }
+
     /// The number now.
     #[inline(never)]
     pub fn read(self, machine: &mut impl Machine) -> i32 {

@@ -264,6 +264,10 @@ impl Planner {
             self.links.model.borrow_mut().set_homed(at.axis, false);
         }
         self.brake_hard();
+        // A search is no feed: only the traverse velocity limits it.
+        if let Some(axis) = self.dynamics.axes.get_mut(usize::from(at.axis)) {
+            axis.feed = axis.velocity;
+        }
     }
 
     /// Where an axis is.

@@ -1,7 +1,8 @@
 //! Probing, G38.2 to G38.5: straight towards the work until the probe touches it, or away until it lets go.
 //!
-//! The result is the contact ([`seek`](super::seek)), in machine coordinates: `prbe` 1 and `prbx`.., which the
-//! reporter tells at once. The machine comes to rest behind it, and stays there. Without contact `prbe` is 0 and the
+//! The result is the contact ([`seek`](super::seek)), in machine coordinates: `prbe` 1 and `prbx`... The machine comes to
+//! rest behind it and goes back there, at the feed of the line, so that what G10 L20 and G92 of the next line take for the
+//! position is the contact; then the reporter tells the result. With `pbo` 0 it stays where it is. Without contact `prbe` is 0 and the
 //! place is where the move ended; G38.2 and G38.4 take that for a failure, and so is a probe that is as it is to
 //! become before anything moves, in which case nothing does. A failure is an alarm: what comes next in a program would
 //! go by a place that nobody knows.
@@ -10,6 +11,7 @@ use kerf_macros::small;
 
 use super::Planner;
 use super::seek::Sought;
+use crate::boards::MOTORS;
 use crate::boards::inputs::PROBE;
 use crate::gcode::command::Motion;
 use crate::gcode::modal::MotionMode;
@@ -27,13 +29,24 @@ impl Planner {
     pub(super) async fn probe(&mut self) {
         self.enter(machine::Event::Probe);
         if self.standstill().await && self.begin_probe() {
-            match self.sought().await {
-                Sought::Contact(steps) => {
-                    let at = self.located(&steps);
-                    self.links.probe.tell(ProbeState::Touched, &at);
+            let mut touched = false;
+            loop {
+                match self.sought().await {
+                    Sought::Contact(steps) => {
+                        touched = true;
+                        if !self.back_off(&steps) {
+                            break;
+                        }
+                    }
+                    Sought::End if !touched => {
+                        self.probe_failed();
+                        break;
+                    }
+                    _ => break,
                 }
-                Sought::End => self.probe_failed(),
-                Sought::Flushed => {}
+            }
+            if touched {
+                self.probe_touched();
             }
         }
         self.enter(machine::Event::Done);
@@ -67,10 +80,38 @@ impl Planner {
         true
     }
 
+    /// Goes back to the contact. False if it is to stay.
+    #[inline(never)]
+    #[small]
+    fn back_off(&mut self, contact: &[i32; MOTORS]) -> bool {
+        let links = self.links;
+        let at = self.located(contact);
+        links.probe.found(&at);
+        let commands = links.commands.borrow();
+        let Motion::Probe { feed, .. } = commands.motion else { return false };
+        if !links.settings.borrow().backs_off_probe() {
+            return false;
+        }
+        drop(commands);
+        self.seek(&at, feed, 0, 0);
+        true
+    }
+
+    /// There was a contact, whatever has become of the way back.
+    #[small]
+    fn probe_touched(&self) {
+        // In a flush it is not here yet.
+        if !self.is_flushed() {
+            self.links.model.borrow_mut().set_position(&self.position);
+        }
+        self.links.probe.tell(ProbeState::Touched);
+    }
+
     #[small]
     fn probe_failed(&self) {
         let links = self.links;
-        links.probe.tell(ProbeState::Failed, &self.position);
+        links.probe.found(&self.position);
+        links.probe.tell(ProbeState::Failed);
         let loudly = match &links.commands.borrow().motion {
             Motion::Probe { mode, .. } => {
                 matches!(mode, MotionMode::ProbeTowards | MotionMode::ProbeAway)

@@ -62,8 +62,8 @@ fn every_axis_ends_on_its_step_from_wherever_it_comes() {
                 assert!((*place as f64 - wanted).abs() <= 2.0, "{place} for {wanted}");
             }
             let at = host.ask(&mut machine, "{mpo:n}", 1_000).unwrap();
-            assert!(at.raw.contains("\"x\":0.000,\"y\":0.000,\"z\":75.000"), "{}", at.raw);
-            set(&mut machine, &mut host, "g1 f800 x1.7 y0.9 z74.1");
+            assert!(at.raw.contains("\"x\":0.000,\"y\":0.000,\"z\":0.000"), "{}", at.raw);
+            set(&mut machine, &mut host, "g1 f800 x1.7 y0.9 z-0.9");
             assert_eq!(home(&mut machine, &mut host, "g28.2 x0 y0 z0"), None);
             assert_eq!(places(&machine), first, "on {}", board.name);
             assert_eq!([0, 1, 2].map(|axis| machine.mechanics().unwrap().lost(axis)), [0; 3]);
@@ -92,7 +92,7 @@ fn quick(search: f64, latch: f64) -> (Machine, Host) {
     let (mut machine, mut host) =
         standing(&MEGA2560_GRBL, Wiring::NormallyOpen, [14.0, 100.0, 50.0]);
     machine.tamper(|mechanics, _| mechanics.bounce(inputs::X_MIN, None));
-    let speeds = format!("{{x:{{vm:4000,jh:20000,sv:{search},lv:{latch},lb:3}}}}");
+    let speeds = format!("{{x:{{vm:4000,ac:3000,jh:50000,sv:{search},lv:{latch},lb:3}}}}");
     set(&mut machine, &mut host, &speeds);
     (machine, host)
 }

@@ -217,3 +217,23 @@ fn two_axes_are_found_to_the_step() {
     println!("two axes: {worst} steps");
     assert!(worst <= 1, "{worst} steps");
 }
+
+#[test]
+fn it_ends_at_the_contact_unless_told_otherwise() {
+    for board in [&MEGA2560_GRBL, &RAMPS14] {
+        let mut bench = Bench::new(board);
+        for (backs_off, steps) in [(1, -700), (0, -931), (1, -1_331)] {
+            set(&mut bench.machine, &mut bench.host, &format!("{{pbo:{backs_off}}}"));
+            bench.begin(&format!("g38.2 z-40 f{FEED}"));
+            bench.machine.tamper(|mechanics, now| {
+                mechanics.place_plate(Some(START + steps as f64 / STEPS), now);
+            });
+            bench.host.run_for_ms(&mut bench.machine, 1_200).unwrap();
+            assert_eq!(bench.told()[Z], steps);
+            let rests = bench.positions()[Z];
+            println!("{} pbo {backs_off}: contact {steps}, rest {rests}", board.name);
+            assert_eq!(rests == steps, backs_off == 1);
+            assert!(rests <= steps, "on the side it came from");
+        }
+    }
+}

@@ -69,7 +69,7 @@ from Z. The spindle has to turn.",
             880,
             "Bore, spindle stop, up by hand",
             "Feeds to Z, dwells for P, stops the spindle, and stops as M0 does, for a hand to take the tool out \
-(with `{psw:1}`); then goes up by traverse, and turns it as before. The spindle has to turn.",
+(unless `psw` is 0); then goes up by traverse, and turns it as before. The spindle has to turn.",
             cycle!(
                 "G88",
                 "M3",

@@ -7,8 +7,8 @@ use crate::status::Status::{PWordInvalid, PWordMissing};
 pub const CHANGE: Doc = m(
     60,
     "Change the tool",
-    "Stops the spindle; from here on the tool of the last T is in it. Nothing waits: a program that wants a \
-hand has M0 behind it. Tool lengths stay as they are until G43.",
+    "Stops the spindle; from here on the tool of the last T is in it. The machine then waits for `~`, as with M0. \
+With `{psw:0}` nothing waits. Tool lengths stay as they are until G43.",
     &[],
 );
 
@@ -19,8 +19,8 @@ pub const PROGRAM: Section = Section {
         m(
             0,
             "Stop",
-            "The machine comes to rest and says so (`stat` 3). With `{psw:1}` it waits for `~` and then goes on, \
-otherwise it goes on at once.",
+            "The machine comes to rest and says so (`stat` 3, and an exception 38). It waits for `~` and then goes on. With \
+`{psw:0}` it goes on at once.",
             &[],
         ),
         m(10, "Stop if wanted", "The same as M0 with `{ost:1}`; without, nothing.", &[]),

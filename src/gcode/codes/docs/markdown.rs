@@ -201,7 +201,7 @@ fn settings() -> String {
         ("gdi", "distance mode at power-up and after M2", "0 G90, 1 G91"),
         ("bd", "block delete", "0 off, 1 on"),
         ("ost", "M1 stops", "0 no, 1 yes"),
-        ("psw", "M0, M1, M60 and G88 wait for `~`", "0 no, 1 yes"),
+        ("psw", "M0, M1, M6, M60 and G88 wait for `~`", "0 no, 1 yes"),
         ("sl", "soft limits", "0 off, 1 on"),
     ] {
         text += &format!("| `{name}` | {what} | {values} |\n");

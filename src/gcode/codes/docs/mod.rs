@@ -18,9 +18,10 @@ pub use markdown::markdown;
 use super::super::command::Commands;
 use super::super::interpreter::Interpreter;
 use super::super::setup::{AxisMode, Setup};
+use super::super::tables::{Edit, Ram, Row, Tables};
 use super::Code;
 use crate::status::Status;
-use crate::units::Length;
+use crate::units::{Length, PerAxis};
 
 /// What belongs together.
 pub struct Section {
@@ -108,10 +109,39 @@ impl Setup for On {
     }
 }
 
+/// Tables of a machine on which no position was ever stored.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Fresh(Ram);
+
+impl Fresh {
+    /// A machine that has just been started.
+    fn machine() -> Interpreter<Fresh> {
+        Interpreter::with(Fresh(Ram::new()))
+    }
+}
+
+impl Tables for Fresh {
+    fn row(&self, row: Row) -> PerAxis<Length> {
+        self.0.row(row)
+    }
+
+    fn is_stored(&self, _row: Row) -> bool {
+        false
+    }
+
+    fn takes(&self, row: Row) -> bool {
+        self.0.takes(row)
+    }
+
+    fn apply(&mut self, edit: &Edit) {
+        self.0.apply(edit);
+    }
+}
+
 impl Refusal {
     /// What the last line of the example is refused with by a machine; `None` if it is not.
     pub fn on(&self, setup: &impl Setup) -> Option<Status> {
-        let (mut interpreter, mut out) = (Interpreter::new(), Commands::default());
+        let (mut interpreter, mut out) = (Fresh::machine(), Commands::default());
         let mut last = None;
         for line in self.lines {
             last = interpreter.interpret(line.as_bytes(), setup, &mut out).err();

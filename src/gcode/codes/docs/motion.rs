@@ -17,7 +17,7 @@ macro_rules! arc {
             no(SWordMissing, &["M3 G95 F0.1", concat!($code, " X2 I1")]),
             no_on(On::DisabledX, AxisDisabled, &[concat!($code, " Y2 J1 F100")]),
             no(ArcSpecification, &[concat!($code, " X2 R1 I1 F100")]),
-            no(ArcSpecification, &[concat!($code, " X2 I1 K0 F100")]),
+            no(ArcSpecification, &[concat!($code, " X2 I1 K1 F100")]),
             no(ArcSpecification, &[concat!($code, " X5 I1 F100")]),
             no(ArcAxisMissing, &[concat!($code, " Z1 R5 F100")]),
             no(ArcOffsetsMissing, &[concat!($code, " X1 F100")]),
@@ -115,5 +115,6 @@ pub const PROBES: Section = Section {
 };
 
 const PROBE: &str = "Straight towards the axis words at the feed rate, until the probe says stop. X, Y and Z \
-only, at least 0.254 mm. To come to the end without that is an alarm. Refused on machines without a probe.";
-const QUIET: &str = "The same, but to come to the end without that is none.";
+only, at least 0.254 mm. The machine comes to rest beyond the contact and goes back to it at the same feed, unless `pbo` is 0: G10 L20 \
+and G92 of the next line take the contact (`prb`) for the position. To come to the end without a contact is an alarm. Refused on machines without a probe.";
+const QUIET: &str = "The same, but to come to the end without a contact is none.";

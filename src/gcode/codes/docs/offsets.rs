@@ -73,14 +73,14 @@ without a word keep theirs, if it is in force. Until G92.1, G92.2 or M2.",
 pub const TOOLS: Section = Section {
     title: "Tools",
     intro: "A tool shifts the origin along X and Z by its lengths, which are 0 until G10 sets them. Tools 1 to 10 \
-have some; tool 0 is an empty spindle.",
+have some; tool 0 is an empty spindle. Tools 11 to 99 have no length: G43 takes 0 for it, and an exception (180) says so.",
     docs: &[
         g(
             430,
             "Tool length",
             "The lengths of tool H are in force, without H those of the tool in the spindle; H0 is none. Stays \
 in force, after M2 too, whatever tool is changed.",
-            &[no(HWordInvalid, &["G43 H11"]), no(HWordInvalid, &["T20 M6", "G43"])],
+            &[no(HWordInvalid, &["G43 H100"]), no(HWordInvalid, &["T100 M6", "G43"])],
         ),
         g(
             431,
@@ -92,7 +92,7 @@ in force, after M2 too, whatever tool is changed.",
             432,
             "Another tool length",
             "The lengths of tool H are added to those in force.",
-            &[no(HWordMissing, &["G43.2"]), no(HWordInvalid, &["G43.2 H11"])],
+            &[no(HWordMissing, &["G43.2"]), no(HWordInvalid, &["G43.2 H100"])],
         ),
         g(490, "No tool length", "In force at power-up.", &[]),
         super::machine::CHANGE,

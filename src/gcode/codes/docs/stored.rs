@@ -1,7 +1,7 @@
 //! Places: stored positions, homing.
 
 use super::{On, Section, g, no, no_on};
-use crate::status::Status::{AxisInvalid, AxisWordMissing, HomingAxis, HomingSwitches};
+use crate::status::Status::{AxisInvalid, AxisWordMissing, HomingAxis, HomingSwitches, NotHomed};
 
 pub const PLACES: Section = Section {
     title: "Stored positions and homing",
@@ -10,9 +10,10 @@ pub const PLACES: Section = Section {
         g(
             280,
             "Go to the first stored position",
-            "Traverses to the position of G28.1, at first 0 in machine coordinates. With axis words: by way of \
-the words, and then the named axes only. Without: all axes, at once. The motion mode stays what it was.",
-            &[],
+            "Traverses to the position of G28.1. With axis words: first to the words, then the named axes only go to \
+the stored position. Without: all axes go straight there, at once. Before G28.1 was ever sent the position is 0 in machine \
+coordinates, and X, Y and Z have to be homed: an axis that is not has the line refused with 248. The motion mode stays what it was.",
+            &[no(NotHomed, &["G28 G91 Z0"])],
         ),
         g(
             281,
@@ -20,7 +21,12 @@ the words, and then the named axes only. Without: all axes, at once. The motion 
             "The present position, in machine coordinates, becomes that of G28.",
             &[no(AxisInvalid, &["G0", "G28.1 X1"])],
         ),
-        g(300, "Go to the second stored position", "As G28, to the position of G30.1.", &[]),
+        g(
+            300,
+            "Go to the second stored position",
+            "As G28, to the position of G30.1.",
+            &[no(NotHomed, &["G30 X0"])],
+        ),
         g(
             301,
             "Store the second position",

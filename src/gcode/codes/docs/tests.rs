@@ -36,7 +36,7 @@ fn every_row_has_one_entry_and_every_entry_a_row() {
 fn examples_are_refused_as_they_say_and_change_nothing() {
     let mut wrong = Vec::new();
     for refusal in refusals() {
-        let (mut interpreter, mut out) = (Interpreter::new(), Commands::default());
+        let (mut interpreter, mut out) = (Fresh::machine(), Commands::default());
         let (last, before) = refusal.lines.split_last().unwrap();
         for line in before {
             interpreter.interpret(line.as_bytes(), &refusal.on, &mut out).expect(line);
