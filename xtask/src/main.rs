@@ -80,7 +80,7 @@ enum Command {
     Flash(firmware::FlashArgs),
     /// Write the example jobs again
     Jobs,
-    /// Write `docs/gcode.md` and `docs/settings.md` again, from the tables
+    /// Write the pages of `docs` again that are made from tables: G-code, settings, codes, wiring
     Docs,
     /// Write the motions of `tests/nist` again, by a NIST-derived interpreter (Debian 12)
     Nist(nist::Args),
