@@ -1,11 +1,17 @@
 //! `kerf check`, and files as the posts of CAM programs write them.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+/// The folder of this build, in which the program lies. It is worked out at run time: the checkout may have been moved.
+fn target() -> PathBuf {
+    let test = std::env::current_exe().expect("a path");
+    test.ancestors().nth(2).expect("target/debug/deps/check").to_owned()
+}
+
 fn check(file: &Path, more: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_kerf"));
+    let mut command = Command::new(target().join("kerf"));
     command.arg("check").arg(file).args(more).output().expect("it runs")
 }
 
@@ -14,8 +20,10 @@ fn said(output: &Output) -> String {
 }
 
 /// A job in a file of its own.
-fn job(name: &str, text: &str) -> std::path::PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+fn job(name: &str, text: &str) -> PathBuf {
+    let folder = target().join("check");
+    fs::create_dir_all(&folder).expect("a folder");
+    let path = folder.join(name);
     fs::write(&path, text).expect("a file");
     path
 }

@@ -2,6 +2,8 @@
 
 #[path = "support/codes.rs"]
 mod codes;
+#[path = "support/schema.rs"]
+mod schema;
 #[path = "support/tables.rs"]
 mod tables;
 #[path = "support/wiring.rs"]
@@ -21,6 +23,7 @@ fn documents() -> Vec<(String, String)> {
         ("settings.md", tables::shorten(&settings::markdown())),
         ("codes.md", codes::markdown()),
         ("wiring.md", wiring::markdown()),
+        ("settings.schema.json", schema::json()),
     ];
     let pages = pages.into_iter().map(|(name, text)| (name.to_string(), text));
     let drawings = ALL.iter().map(|b| (format!("wiring-{}.svg", b.name), wiring::svg(b)));

@@ -4,10 +4,9 @@
 use std::collections::VecDeque;
 use std::fmt::{self, Display, Formatter};
 
-use kerf::canon::{advice, statuses};
+use kerf::canon::{advice, by_number, text as text_of};
 use kerf::config::machines;
 use kerf::hal::imp::Machine;
-use kerf::protocol::tinyg::{number, status_text};
 
 /// Lines that a sender has on their way.
 const IN_FLIGHT: usize = 4;
@@ -264,10 +263,7 @@ fn stream(run: &mut Run, text: &str) -> Result<Streamed, String> {
 
 /// The text of a status.
 fn says(code: u8) -> String {
-    let status = statuses().find(|status| number(*status) == code);
-    let text = status.and_then(status_text);
-    let text: String = text.into_iter().flat_map(|text| text.bytes()).map(char::from).collect();
-    format!("status {code} {text}")
+    format!("status {code} {}", by_number(code).map(text_of).unwrap_or_default())
 }
 
 impl Extent {
@@ -295,8 +291,7 @@ impl Display for Answer {
         for Refused { line, text, status } in &self.refused {
             writeln!(f, "line {line}: {text}")?;
             writeln!(f, "    {}", says(*status))?;
-            let of = statuses().find(|of| number(*of) == *status);
-            if let Some((cause, cure)) = of.and_then(advice) {
+            if let Some((cause, cure)) = by_number(*status).and_then(advice) {
                 writeln!(f, "    why: {cause}\n    do:  {cure}")?;
             }
         }

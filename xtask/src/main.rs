@@ -9,6 +9,7 @@
 //! | [`shrink`] | makes the image smaller before the link |
 //! | [`elf`] | what is in an image: sizes, stack, what must not be in it |
 //! | [`size`], [`caps`] | prints and limits what an image takes |
+//! | [`dist`] | writes the files of a release |
 //! | [`sim`] | runs the image on the simulated board |
 //! | [`fuzz`] | runs the fuzzers |
 //! | [`senders`] | runs real senders against the simulated board |
@@ -23,6 +24,7 @@ mod boards;
 mod caps;
 mod checks;
 mod chips;
+mod dist;
 #[cfg(test)]
 mod docs;
 mod elf;
@@ -78,6 +80,8 @@ enum Command {
     Test,
     /// Write the firmware to a board
     Flash(firmware::FlashArgs),
+    /// Write the files of a release to target/dist: a .hex for each board, the settings as a schema, licences, checksums
+    Dist,
     /// Write the example jobs again
     Jobs,
     /// Write the pages of `docs` again that are made from tables: G-code, settings, codes, wiring
@@ -122,6 +126,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Senders(args) => senders::run(&args)?,
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
+        Command::Dist => dist::run()?,
         Command::Jobs => jobs::write()?,
         Command::Docs => process::run(host_cargo().args(DESCRIBE))?,
         Command::Nist(args) => nist::run(&args)?,
