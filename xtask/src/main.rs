@@ -11,6 +11,7 @@
 //! | [`size`], [`caps`] | prints and limits what an image takes |
 //! | [`dist`] | writes the files of a release |
 //! | [`sim`] | runs the image on the simulated board |
+//! | [`settings`] | saves and loads the settings of a machine |
 //! | [`fuzz`] | runs the fuzzers |
 //! | [`senders`] | runs real senders against the simulated board |
 //! | [`checks`] | everything that must pass before a merge |
@@ -39,6 +40,7 @@ mod process;
 #[cfg(test)]
 mod seam;
 mod senders;
+mod settings;
 mod setup;
 mod shrink;
 mod sim;
@@ -80,6 +82,8 @@ enum Command {
     Test,
     /// Write the firmware to a board
     Flash(firmware::FlashArgs),
+    /// Save the settings of a machine to a file, or load them
+    Settings(settings::SettingsArgs),
     /// Write the files of a release to target/dist: a .hex for each board, the settings as a schema, licences, checksums
     Dist,
     /// Write the example jobs again
@@ -126,6 +130,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Senders(args) => senders::run(&args)?,
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
+        Command::Settings(args) => return settings::run(&args),
         Command::Dist => dist::run()?,
         Command::Jobs => jobs::write()?,
         Command::Docs => process::run(host_cargo().args(DESCRIBE))?,

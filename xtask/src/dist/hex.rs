@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, ensure};
 use object::read::elf::{ElfFile32, ProgramHeader};
-use object::{Endianness, Object};
+use object::Endianness;
 
 /// From here up addresses mean RAM, EEPROM and fuses.
 const FLASH_END: u64 = 0x4_0000;
