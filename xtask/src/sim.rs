@@ -10,7 +10,7 @@ use clap::Args;
 use crate::boards::Board;
 use crate::firmware;
 use crate::machines::Machine;
-use crate::process::{host_cargo, pass_through, root, run as run_child};
+use crate::process::{become_program, host_cargo, pass_through, root, run as run_child};
 use crate::setup::{self, Scope};
 
 /// `cargo xtask sim`
@@ -79,10 +79,11 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
     pass_through(&mut run_command(args, &elf))
 }
 
-/// Builds and offers the simulated board as a serial port.
+/// Builds and offers the simulated board as a serial port. The simulator takes this process's place: `cargo run` does so as well, so that
+/// the number by which it was started is that of the board.
 pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
     let elf = prepare(args.board, args.machine)?;
-    pass_through(&mut serve_command(args, &elf))
+    become_program(&mut serve_command(args, &elf))
 }
 
 /// Builds and measures, on the board that others were measured on.

@@ -24,6 +24,9 @@ const RESET_DELAY: Duration = Duration::from_millis(100);
 /// A machine further behind than this does not try to catch up.
 const MAX_LAG: Duration = Duration::from_millis(200);
 
+/// What is said when a sender opens the port.
+const OPENED: &str = "the port has been opened: the board resets, as a real one does, and no longer knows where it is";
+
 /// Where the plate is that can be probed: from the lower hard end of Z, mm.
 const PLATE_MM: f64 = 45.0;
 
@@ -142,6 +145,7 @@ impl Server {
     }
 
     fn reset(&mut self) -> Result<()> {
+        eprintln!("{OPENED}");
         let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
         fresh.build(&around(fresh.board()));
         fresh.set_baud(self.baud);

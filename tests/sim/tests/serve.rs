@@ -37,6 +37,34 @@ fn serve(more: &[&str]) -> (Server, File) {
     (server, port)
 }
 
+#[test]
+fn who_opens_the_port_is_told_that_the_board_resets() {
+    let mut command = kerf_sim();
+    command.arg("serve").arg("--elf").arg(image(&MEGA2560_GRBL));
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut server = Server(command.spawn().unwrap());
+    let mut path = String::new();
+    BufReader::new(server.0.stdout.as_mut().unwrap()).read_line(&mut path).unwrap();
+    let _port = OpenOptions::new().read(true).write(true).open(path.trim()).unwrap();
+    let mut said = String::new();
+    BufReader::new(server.0.stderr.as_mut().unwrap()).read_line(&mut said).unwrap();
+    assert!(said.contains("the board resets, as a real one does"), "{said}");
+}
+
+/// Also of a server that somebody has started by `cargo xtask serve`, which it takes the place of.
+#[cfg(unix)]
+#[test]
+fn who_ends_the_process_ends_the_board_and_its_link() {
+    let link = std::env::temp_dir().join(format!("kerf-serve-{}.tty", std::process::id()));
+    let (mut server, port) = serve(&["--link", link.to_str().unwrap()]);
+    assert!(link.is_symlink());
+    let pid = server.0.id().to_string();
+    assert!(std::process::Command::new("kill").arg(&pid).status().unwrap().success());
+    assert!(server.0.wait().unwrap().success());
+    drop(port);
+    assert!(!link.is_symlink());
+}
+
 /// Ends a server's standard input; what it says then, and whether it is content.
 fn end(server: &mut Server) -> (String, bool) {
     drop(server.0.stdin.take());
