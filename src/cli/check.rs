@@ -280,6 +280,12 @@ impl Extent {
 }
 
 impl Answer {
+    /// How long it takes, in seconds.
+    #[allow(dead_code)]
+    pub fn seconds(&self) -> f64 {
+        self.ms as f64 / 1e3
+    }
+
     /// Whether the machine would carry it out.
     pub fn is_good(&self) -> bool {
         self.refused.is_empty() && self.extents.iter().all(Extent::fits)

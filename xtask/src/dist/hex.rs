@@ -1,8 +1,8 @@
 //! From an image to Intel HEX, which avrdude takes: what of it lies in flash.
 
 use anyhow::{Context, Result, ensure};
-use object::read::elf::{ElfFile32, ProgramHeader};
 use object::Endianness;
+use object::read::elf::{ElfFile32, ProgramHeader};
 
 /// From here up addresses mean RAM, EEPROM and fuses.
 const FLASH_END: u64 = 0x4_0000;
