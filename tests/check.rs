@@ -57,6 +57,8 @@ fn it_tells_time_and_room() {
     let x = text.lines().find(|line| line.starts_with('X')).expect("X");
     let x: Vec<_> = x.split_whitespace().collect();
     assert_eq!(x, ["X", "0.000", "81.500", "81.500", "0.000", "to", "290.000"]);
+    let turned = ["--machine", "router", "--set", "{1po:1}"];
+    assert_eq!(said(&check(Path::new("examples/bracket.gcode"), &turned)), text);
     // 60 mm at 600 mm/min, and two short ramps.
     let output = check(&job("time.gcode", "G1 X60 F600\n"), &["--machine", "router"]);
     assert!(said(&output).contains("time 0:00:06.0"), "{}", said(&output));

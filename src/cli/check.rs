@@ -60,7 +60,7 @@ pub struct Answer {
 #[derive(Clone, Copy)]
 struct Motor {
     axis: usize,
-    /// Millimetres of a step, with the sign of its direction.
+    /// Millimetres of a step.
     step: f64,
 }
 
@@ -173,8 +173,8 @@ pub fn check(text: &str, question: &Question) -> Result<Answer, String> {
     for m in 1..=MOTORS {
         let heard = run.ask(&format!("{{{m}:n}}"))?;
         let of = |name| value(&heard, name);
-        let sign = if of("po")? == 0.0 { 1.0 } else { -1.0 };
-        let step = sign * of("tr")? * of("sa")? / 360.0 / of("mi")?;
+        // Steps are counted before the pins, so that the motor's direction is of no account.
+        let step = of("tr")? * of("sa")? / 360.0 / of("mi")?;
         motors.push(Motor { axis: of("ma")? as usize, step });
     }
     let mut travels = Vec::new();

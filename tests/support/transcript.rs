@@ -16,6 +16,7 @@
 //! outputs spindle ccw 12.50%  these are on by now, of `spindle ccw mist flood`, and the spindle's pulses that wide
 //! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
 //! 2cts 1                      the sender on the second port holds the machine back by that pin (0: no more)
+//! greeting                    the greeting is heard, whatever version it tells
 //! job examples/square.gcode   each line of a file is sent when the one before it has been taken, and none is refused
 //! ```
 //!
@@ -57,6 +58,7 @@ enum Event {
     Steps([i64; 4]),
     Outputs(String),
     Job(String),
+    Greeting,
 }
 
 /// A transcript, read.
@@ -129,6 +131,7 @@ fn parse(line: &str) -> Option<Event> {
         "near" => near(rest),
         "steps" => steps(rest).map(Event::Steps),
         "outputs" => Some(Event::Outputs(rest.to_string())),
+        "greeting" => Some(Event::Greeting),
         "job" => Some(Event::Job(rest.to_string())),
         _ => None,
     }
@@ -267,6 +270,7 @@ impl<S: Side> Player<'_, S> {
             Event::Baud(baud) => self.side.set_baud(*baud),
             Event::Input(input, closed) => self.side.set_input(*input, *closed),
             Event::Near(..) => {}
+            Event::Greeting => return self.wait(0, GREETING, |line| matches(GREETING, line)),
             Event::Job(file) => return self.run(file),
             Event::Steps(steps) => return self.rest_at(steps),
             Event::Outputs(wanted) => {
