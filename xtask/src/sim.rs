@@ -62,6 +62,9 @@ pub struct ServeArgs {
     /// Where to put a link to the serial port
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
+    /// Let avr-gdb in at this port of TCP
+    #[arg(long, value_name = "PORT")]
+    gdb: Option<u16>,
 }
 
 /// `cargo xtask bench`
@@ -121,6 +124,7 @@ fn serve_command(args: &ServeArgs, elf: &Path) -> Command {
     let mut command = simulator("serve", elf, args.board);
     option(&mut command, "--speed", args.speed.as_ref());
     option(&mut command, "--link", args.link.as_ref());
+    option(&mut command, "--gdb", args.gdb.map(|port| port.to_string()));
     command
 }
 
@@ -202,8 +206,9 @@ mod tests {
             machine: Machine::default(),
             speed: None,
             link: None,
+            gdb: Some(2345),
         };
         let command = serve_command(&args, Path::new("k.elf"));
-        assert_eq!(after_dashes(&command), "serve --elf k.elf --board mega2560-grbl");
+        assert_eq!(after_dashes(&command), "serve --elf k.elf --board mega2560-grbl --gdb 2345");
     }
 }
