@@ -8,7 +8,7 @@ const ADVICE: [(Status, &str, &str); Status::COUNT - 1] = [
     (
         Error,
         "Something that has no number of its own, such as a built-in job that does not exist.",
-        "Report it, with the line.",
+        "Check the number of the job (`$test`). Of anything else, report the line.",
     ),
     (
         Noop,

@@ -28,7 +28,7 @@ const EXCEPTIONS: &str = "\
 ## Exceptions
 
 Told once, unasked: `{\"er\":{\"fb\":440.20,\"st\":204,\"msg\":\"..\",\"sw\":\"xmin\"}}`. `st` is a status, `msg` its text. An exception goes to the port that
-feeds the machine; alarms go to both.
+feeds the machine, or that fed it last.
 
 | `st` | comes when | besides |
 |---|---|---|
@@ -60,8 +60,8 @@ ended), `{\"ack\":true}` (answer to the byte 5).
 | 3 | at rest, or waiting at M0, M6, M60 | 3 | at rest, or waiting |
 | 4 | at rest, the program has ended | 4 | at rest, ended |
 | 5 | runs | 5 | runs, probes, homes, jogs, or holds |
-| 6 | hold: `!`, or the door is open | 6 | with `dia` 1: the door is open, or stopped by 205 (7) |
-| 7 | probes | | |
+| 6 | hold: `!`, or the door is open | 6 | stopped by 205; with `dia` 1: the door is open |
+| 7 | probes | 7 | with `dia` 1: stopped by 205 |
 | 8 | not used | 8 | panic |
 | 9 | homes | | |
 | 10 | jogs | | |
