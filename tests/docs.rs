@@ -9,12 +9,14 @@ mod tables;
 #[path = "support/wiring.rs"]
 mod wiring;
 
+use std::collections::HashSet;
 use std::fs;
 use std::path::PathBuf;
 
 use kerf::boards::ALL;
 use kerf::config::docs as settings;
 use kerf::gcode::codes::docs as gcode;
+use kerf::protocol::tinyg::names;
 
 /// The documents, and what they should be.
 fn documents() -> Vec<(String, String)> {
@@ -129,4 +131,42 @@ fn no_page_tells_what_is_no_longer_so() {
             assert!(!text.contains(sentence), "{}: {sentence}", path.display());
         }
     }
+}
+
+/// Names in pages that are of no setting or value: groups, requests, keys of answers, words of G-code, signals, commands.
+const OTHER: [&str; 31] = [
+    "p1", "sq", "sys", "sr", "srs", "ax", "err", "ok", "xmin", "xmax", "ymin", "ymax", "zmin",
+    "zmax", "amin", "amax", "g10", "z0", "z12", "dir1", "step1", "steps", "load", "save", "grbl",
+    "jobs", "help", "er", "st", "msg", "sw",
+];
+/// Pages that are made from tables whole.
+const MADE: [&str; 2] = ["docs/gcode.md", "docs/settings.md"];
+
+/// Pages name settings and values by the names that the machine knows: whole ones, or without axis, motor or group.
+#[test]
+fn names_in_pages_are_known() {
+    let known: HashSet<String> = names().into_iter().collect();
+    let prefixes = ["", "x", "a", "1", "p1", "sp", "co", "sq", "pos", "in", "g54"];
+    let is_known = |span: &str| {
+        prefixes.iter().any(|prefix| known.contains(&format!("{prefix}{span}")))
+            || known.iter().any(|name| name[..name.len() - 1] == *span)
+            || OTHER.contains(&span)
+    };
+    let is_name = |span: &&str| {
+        (2..=5).contains(&span.len())
+            && span.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_')
+            && span.bytes().any(|b| b.is_ascii_lowercase())
+    };
+    let mut unknown = Vec::new();
+    let pages = pages().into_iter().filter(|path| path.starts_with("docs"));
+    for path in pages.filter(|path| MADE.iter().all(|made| !path.ends_with(made))) {
+        let text = fs::read_to_string(&path).expect("a page");
+        let lines = text.lines().filter(|line| !line.starts_with("```"));
+        let spans = lines.flat_map(|line| line.split('`').skip(1).step_by(2));
+        let wrong = spans.filter(is_name).filter(|span| !is_known(span));
+        unknown.extend(wrong.map(|span| format!("{}: {span}", path.display())));
+    }
+    unknown.sort();
+    unknown.dedup();
+    assert!(unknown.is_empty(), "unknown names:\n{}", unknown.join("\n"));
 }
