@@ -3,7 +3,7 @@
 use crate::status::Status::{self, *};
 
 /// Of a status, why it comes and what to do. `Status::Again` never leaves the machine.
-const ADVICE: [(Status, &str, &str); Status::COUNT - 1] = [
+const ADVICE: &[(Status, &str, &str)] = &[
     (Ok, "The line was carried out, or has been queued.", "Nothing."),
     (
         Error,
@@ -258,6 +258,7 @@ mod tests {
     #[test]
     fn every_status_has_its_advice_in_its_place() {
         let after = |status: Status| if (status as usize) < Again as usize { 0 } else { 1 };
+        assert_eq!(statuses().count(), Status::COUNT - 1);
         for (at, status) in statuses().enumerate() {
             assert_eq!(status as usize, at + after(status), "{status:?}");
         }
