@@ -63,13 +63,7 @@ fn every_name_is_told_somewhere() {
 fn pages() -> Vec<PathBuf> {
     let docs = fs::read_dir("docs").expect("docs").map(|entry| entry.expect("an entry").path());
     let docs = docs.filter(|path| path.extension().is_some_and(|e| e == "md"));
-    let others = [
-        "README.md",
-        "boards/README.md",
-        "machines/README.md",
-        "CONTRIBUTING.md",
-        "ARCHITECTURE.md",
-    ];
+    let others = ["README.md", "boards/README.md", "machines/README.md", "CONTRIBUTING.md"];
     docs.chain(others.map(PathBuf::from)).collect()
 }
 
