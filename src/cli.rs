@@ -1,7 +1,9 @@
-//! The command line: what Kerf's language makes of a program, on the host.
+//! The command line: what Kerf makes of a program, on the host.
+
+mod check;
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -19,6 +21,20 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Dry run: carry a job out on the host, and say which lines are refused, how far the axes go, and how long it takes
+    Check {
+        /// The job; `-` for standard input
+        file: PathBuf,
+        /// The profile of the machine: careful, router, mill, printer, lathe
+        #[arg(long, default_value = "careful")]
+        machine: String,
+        /// A setting sent before the job, as the sender would: '{"xvm":800}'
+        #[arg(long, value_name = "JSON")]
+        set: Vec<String>,
+        /// Where the work zero is in machine coordinates, mm: 50,50,-30
+        #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+        zero: Option<String>,
+    },
     /// Print what a G-code program asks of the machine, one canonical command on a line
     Canon {
         /// The program; `-` for standard input
@@ -28,7 +44,12 @@ enum Command {
 
 /// Does what the arguments say.
 pub fn run() -> ExitCode {
-    let Args { command: Command::Canon { file } } = Args::parse();
+    let file = match Args::parse().command {
+        Command::Check { file, machine, set, zero } => {
+            return check(&file, &machine, &set, zero.as_deref());
+        }
+        Command::Canon { file } => file,
+    };
     match canon(&file) {
         Ok(()) => ExitCode::SUCCESS,
         // Whoever reads has seen enough.
@@ -39,6 +60,36 @@ pub fn run() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Says what comes of a job; fails if the machine would not carry it out.
+fn check(file: &Path, machine: &str, settings: &[String], zero: Option<&str>) -> ExitCode {
+    let answer = read(file).map_err(|error| error.to_string()).and_then(|text| {
+        let zero = zero.map(place).transpose()?;
+        check::check(&text, &check::Question { machine, settings, zero })
+    });
+    match answer {
+        Ok(answer) => {
+            print!("{answer}");
+            if answer.is_good() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+        }
+        Err(error) => {
+            eprintln!("{}: {error}", file.display());
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// A place, as `X,Y,Z`.
+fn place(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+    numbers.try_into().map_err(|_| format!("{text} is no place: X,Y,Z"))
+}
+
+fn read(file: &Path) -> io::Result<String> {
+    let mut bytes = Vec::new();
+    open(file)?.read_to_end(&mut bytes)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 enum Failure {

@@ -27,10 +27,12 @@
 //! A canned cycle is told move by move; moves to where the machine stands are left out in cycles alone.
 //! The program is a stream: `%` means nothing, and lines after M2 or M30 are read.
 
+mod advice;
 mod command;
 mod program;
 mod reader;
 
+pub use advice::{advice, statuses};
 pub use command::Canon;
-pub use program::{Refusal, commands};
+pub use program::{Refusal, by_number, commands, text};
 pub use reader::Reader;

@@ -4,11 +4,22 @@ use core::fmt::{Display, Formatter};
 use std::string::String;
 use std::vec::Vec;
 
+use super::advice::statuses;
 use super::command::Canon;
 use super::reader::Reader;
 use crate::gcode::setup::Setup;
 use crate::protocol::tinyg::{number, status_text};
 use crate::status::Status;
+
+/// The text of a status, as the machine tells it.
+pub fn text(status: Status) -> String {
+    status_text(status).into_iter().flat_map(|text| text.bytes()).map(char::from).collect()
+}
+
+/// The status that the machine tells as this number.
+pub fn by_number(code: u8) -> Option<Status> {
+    statuses().find(|status| number(*status) == code)
+}
 
 /// A line that is refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,11 +42,8 @@ impl Refusal {
 impl Display for Refusal {
     /// `line: status code text: the line`.
     fn fmt(&self, to: &mut Formatter) -> core::fmt::Result {
-        write!(to, "{}: status {} ", self.number, number(self.status))?;
-        for byte in status_text(self.status).into_iter().flat_map(|text| text.bytes()) {
-            write!(to, "{}", char::from(byte))?;
-        }
-        write!(to, ": {}", self.text)
+        let (code, text) = (number(self.status), text(self.status));
+        write!(to, "{}: status {code} {text}: {}", self.number, self.text)
     }
 }
 

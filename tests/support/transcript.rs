@@ -17,6 +17,8 @@
 //! outputs spindle ccw 12.50%  these are on by now, of `spindle ccw mist flood`, and the spindle's pulses that wide
 //! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
 //! 2cts 1                      the sender on the second port holds the machine back by that pin (0: no more)
+//! greeting                    the greeting is heard, whatever version it tells
+//! job examples/square.gcode   each line of a file is sent when the one before it has been taken, and none is refused
 //! ```
 //!
 //! Automatic reports (`sr`, `qr`) are passed over unless they are the line expected next. Any other line
@@ -57,6 +59,8 @@ enum Event {
     Near(usize, i64, bool),
     Steps([i64; 4]),
     Outputs(String),
+    Job(String),
+    Greeting,
 }
 
 /// A transcript, read.
@@ -101,6 +105,11 @@ fn read(path: &Path) -> Transcript {
     let name = path.file_name().unwrap().to_string_lossy().into_owned();
     let text = fs::read_to_string(path).unwrap();
     assert!(text.starts_with("# "), "{name}: the first line says why it exists");
+    read_text(name, &text)
+}
+
+/// Reads a transcript from its text.
+pub fn read_text(name: String, text: &str) -> Transcript {
     let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line));
     let events = numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let event =
@@ -124,6 +133,8 @@ fn parse(line: &str) -> Option<Event> {
         "near" => near(rest),
         "steps" => steps(rest).map(Event::Steps),
         "outputs" => Some(Event::Outputs(rest.to_string())),
+        "greeting" => Some(Event::Greeting),
+        "job" => Some(Event::Job(rest.to_string())),
         _ => None,
     }
 }
@@ -266,6 +277,8 @@ impl<S: Side> Player<'_, S> {
             Event::Baud(baud) => self.side.set_baud(*baud),
             Event::Input(input, closed) => self.side.set_input(*input, *closed),
             Event::Near(..) => {}
+            Event::Greeting => return self.wait(0, GREETING, |line| matches(GREETING, line)),
+            Event::Job(file) => return self.run(file),
             Event::Steps(steps) => return self.rest_at(steps),
             Event::Outputs(wanted) => {
                 let are = (0..SWITCH_MS).find(|_| {
@@ -282,11 +295,33 @@ impl<S: Side> Player<'_, S> {
         Ok(())
     }
 
+    /// Sends a file as a sender does that waits for each answer.
+    fn run(&mut self, file: &str) -> Result<(), String> {
+        // Tests of the simulator run in their own folder.
+        let folder = if Path::new(file).exists() { "." } else { "../.." };
+        let job = fs::read_to_string(Path::new(folder).join(file)).expect(file);
+        for line in job.lines().filter(|line| !line.trim().is_empty()) {
+            self.side.send(format!("{line}\n").as_bytes());
+            let done = "{\"r\":{*},\"f\":[1,0,*]}";
+            self.wait(0, done, |heard| matches(done, heard)).map_err(|e| format!("{line}: {e}"))?;
+        }
+        Ok(())
+    }
+
     fn hear(&mut self, port: usize, wanted: &str) -> Result<(), String> {
+        self.wait(port, wanted, |line| line == wanted)
+    }
+
+    fn wait(
+        &mut self,
+        port: usize,
+        wanted: &str,
+        is_it: impl Fn(&str) -> bool,
+    ) -> Result<(), String> {
         let mut waited = 0;
         loop {
             match self.next_line(port) {
-                Some(line) if line == wanted || without_version(&line) == wanted => return Ok(()),
+                Some(line) if is_it(&line) || is_it(&without_version(&line)) => return Ok(()),
                 Some(line) if self.may_come(port, &line) => {}
                 Some(line) => return Err(format!("heard    {line}\ninstead of {wanted}")),
                 None if waited == HEAR_MS => {

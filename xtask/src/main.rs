@@ -9,7 +9,9 @@
 //! | [`shrink`] | makes the image smaller before the link |
 //! | [`elf`] | what is in an image: sizes, stack, what must not be in it |
 //! | [`size`], [`caps`] | prints and limits what an image takes |
+//! | [`dist`] | writes the files of a release |
 //! | [`sim`] | runs the image on the simulated board |
+//! | [`settings`] | saves and loads the settings of a machine |
 //! | [`fuzz`] | runs the fuzzers |
 //! | [`senders`] | runs real senders against the simulated board |
 //! | [`checks`] | everything that must pass before a merge |
@@ -23,6 +25,7 @@ mod boards;
 mod caps;
 mod checks;
 mod chips;
+mod dist;
 #[cfg(test)]
 mod docs;
 mod elf;
@@ -37,6 +40,7 @@ mod process;
 #[cfg(test)]
 mod seam;
 mod senders;
+mod settings;
 mod setup;
 mod shrink;
 mod sim;
@@ -78,9 +82,13 @@ enum Command {
     Test,
     /// Write the firmware to a board
     Flash(firmware::FlashArgs),
+    /// Save the settings of a machine to a file, or load them
+    Settings(settings::SettingsArgs),
+    /// Write the files of a release to target/dist: a .hex for each board, the settings as a schema, licences, checksums
+    Dist,
     /// Write the example jobs again
     Jobs,
-    /// Write `docs/gcode.md` and `docs/settings.md` again, from the tables
+    /// Write the pages of `docs` again that are made from tables: G-code, settings, codes, wiring
     Docs,
     /// Write the motions of `tests/nist` again, by a NIST-derived interpreter (Debian 12)
     Nist(nist::Args),
@@ -122,6 +130,8 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Senders(args) => senders::run(&args)?,
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
+        Command::Settings(args) => return settings::run(&args),
+        Command::Dist => dist::run()?,
         Command::Jobs => jobs::write()?,
         Command::Docs => process::run(host_cargo().args(DESCRIBE))?,
         Command::Nist(args) => nist::run(&args)?,

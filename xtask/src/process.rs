@@ -52,6 +52,17 @@ pub fn pass_through(command: &mut Command) -> Result<ExitCode> {
     Ok(code.map_or(ExitCode::FAILURE, ExitCode::from))
 }
 
+/// Becomes the program, where that can be done: who ends this process by its number ends the program then, and nothing stays behind.
+pub fn become_program(command: &mut Command) -> Result<ExitCode> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::process::CommandExt;
+        Err(command.exec()).with_context(|| format!("cannot run `{}`", shown(command)))
+    }
+    #[cfg(not(unix))]
+    pass_through(command)
+}
+
 /// What the program prints on its standard output.
 pub fn output(command: &mut Command) -> Result<String> {
     let output = command.stdin(Stdio::null()).stderr(Stdio::inherit()).output();

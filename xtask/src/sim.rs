@@ -10,7 +10,7 @@ use clap::Args;
 use crate::boards::Board;
 use crate::firmware;
 use crate::machines::Machine;
-use crate::process::{host_cargo, pass_through, root, run as run_child};
+use crate::process::{become_program, host_cargo, pass_through, root, run as run_child};
 use crate::setup::{self, Scope};
 
 /// `cargo xtask sim`
@@ -62,6 +62,9 @@ pub struct ServeArgs {
     /// Where to put a link to the serial port
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
+    /// Let avr-gdb in at this port of TCP
+    #[arg(long, value_name = "PORT")]
+    gdb: Option<u16>,
 }
 
 /// `cargo xtask bench`
@@ -79,10 +82,11 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
     pass_through(&mut run_command(args, &elf))
 }
 
-/// Builds and offers the simulated board as a serial port.
+/// Builds and offers the simulated board as a serial port. The simulator takes this process's place: `cargo run` does so as well, so that
+/// the number by which it was started is that of the board.
 pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
     let elf = prepare(args.board, args.machine)?;
-    pass_through(&mut serve_command(args, &elf))
+    become_program(&mut serve_command(args, &elf))
 }
 
 /// Builds and measures, on the board that others were measured on.
@@ -120,6 +124,7 @@ fn serve_command(args: &ServeArgs, elf: &Path) -> Command {
     let mut command = simulator("serve", elf, args.board);
     option(&mut command, "--speed", args.speed.as_ref());
     option(&mut command, "--link", args.link.as_ref());
+    option(&mut command, "--gdb", args.gdb.map(|port| port.to_string()));
     command
 }
 
@@ -201,8 +206,9 @@ mod tests {
             machine: Machine::default(),
             speed: None,
             link: None,
+            gdb: Some(2345),
         };
         let command = serve_command(&args, Path::new("k.elf"));
-        assert_eq!(after_dashes(&command), "serve --elf k.elf --board mega2560-grbl");
+        assert_eq!(after_dashes(&command), "serve --elf k.elf --board mega2560-grbl --gdb 2345");
     }
 }

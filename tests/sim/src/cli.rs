@@ -89,6 +89,9 @@ pub struct ServeArgs {
     /// Make a symbolic link to the pseudo-terminal.
     #[arg(long, value_name = "PATH")]
     pub link: Option<PathBuf>,
+    /// Let a debugger in at this port of TCP; 0 is any that is free. The second line printed is `gdb: PORT`.
+    #[arg(long, value_name = "PORT")]
+    pub gdb: Option<u16>,
     /// The job that senders send: at the end, which is that of the standard input, each motor must be
     /// where this ends, to the step.
     #[arg(long, value_name = "JOB")]

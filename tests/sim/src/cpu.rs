@@ -108,6 +108,19 @@ impl Cpu {
         unsafe { (*self.p()).pc }
     }
 
+    /// The status register.
+    pub fn sreg(self) -> u8 {
+        // SAFETY: the machine keeps the core alive; plain reads.
+        let flags = unsafe { (*self.p()).sreg };
+        (0..).zip(flags).fold(0, |bits, (n, flag)| bits | u8::from(flag != 0) << n)
+    }
+
+    /// The highest address of the data space.
+    pub fn data_end(self) -> usize {
+        // SAFETY: the machine keeps the core alive; plain read.
+        unsafe { (*self.p()).ramend as usize }
+    }
+
     #[inline]
     fn set_pc(self, pc: u32) {
         // SAFETY: the machine keeps the core alive; plain write.

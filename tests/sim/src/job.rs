@@ -83,6 +83,7 @@ struct Run<'a> {
     host: Host,
     setup: Setup,
     expected: Result<Outcome, Unclear>,
+    longest_dwell_ms: u64,
     acknowledged: usize,
     skipped: usize,
     rejected: Vec<Rejected>,
@@ -114,6 +115,18 @@ pub fn meter_pauses(machine: &mut Machine, lines: &Lines, setup: &Setup) {
     machine.recorder_mut().meter_pauses(scale);
 }
 
+/// What waits for a hand by default, which the simulator has not: it is told to go on by itself.
+const GO_ON: &str = "{psw:0}";
+
+/// Whether a line has a code that may wait for a hand.
+fn may_wait(line: &str) -> bool {
+    let line = line.split(['(', ';']).next().unwrap_or_default().to_ascii_uppercase();
+    let line: String = line.chars().filter(|c| !c.is_whitespace()).collect();
+    let codes = line.split('M').skip(1);
+    let numbers = codes.filter_map(|rest| rest.split(|c: char| !c.is_ascii_digit()).next());
+    numbers.filter_map(|digits| digits.parse::<u32>().ok()).any(|n| matches!(n, 0 | 1 | 6 | 60))
+}
+
 /// Boots the machine, runs a job on it and says how it went. An error means that the job could not
 /// begin; all that goes wrong later is in the report. `progress` gets the lines answered so far.
 pub fn run(
@@ -127,7 +140,9 @@ pub fn run(
     if let Some(baud) = options.baud {
         host.change_speed(machine, baud)?;
     }
-    for line in &options.settings {
+    let waits = lines.iter().any(|(_, line)| may_wait(line));
+    let go_on = waits.then(|| GO_ON.to_string());
+    for line in go_on.iter().chain(&options.settings) {
         let response = host.ask(machine, line, ASK_MS)?;
         if response.status != 0 {
             bail!("the firmware refuses {line} with status {}: {}", response.status, response.raw);
@@ -136,6 +151,8 @@ pub fn run(
     put_away(machine, &mut host)?;
     let setup = read_setup(machine, &mut host)?;
     let expected = oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup);
+    let longest_dwell_ms =
+        oracle::longest_dwell_ms(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup);
     let began = machine.cycle();
     for (ms, byte) in &options.interjections {
         host.interject(began + machine.cycles(*ms), *byte);
@@ -157,6 +174,7 @@ pub fn run(
         host,
         setup,
         expected,
+        longest_dwell_ms,
         acknowledged: 0,
         skipped: 0,
         rejected: Vec::new(),
@@ -177,7 +195,7 @@ impl Run<'_> {
         for (number, text) in lines {
             self.host.queue(*number, text);
         }
-        let mut watch = watch::Watch::new(self.longest_dwell_ms());
+        let mut watch = watch::Watch::new(self.longest_dwell_ms);
         loop {
             let slice = self.machine.cycle() + self.machine.cycles(100);
             while self.host.run_until_line(self.machine, slice)? {
@@ -213,12 +231,8 @@ impl Run<'_> {
 
     /// Waits for the end of motion.
     fn settle(&mut self) -> Result<()> {
-        let mut watch = watch::Watch::new(self.longest_dwell_ms());
+        let mut watch = watch::Watch::new(self.longest_dwell_ms);
         watch.settle(self.machine, &mut self.host)
-    }
-
-    fn longest_dwell_ms(&self) -> u64 {
-        self.expected.as_ref().map_or(0, |e| e.longest_dwell_ms)
     }
 
     /// What the firmware has counted itself; `None` if it does not answer.
@@ -257,7 +271,17 @@ impl Run<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::lines_of;
+    use super::{lines_of, may_wait};
+
+    #[test]
+    fn stops_are_found() {
+        for line in ["M0", "g0 x1 m06 t1", "N5 M 60", "M01"] {
+            assert!(may_wait(line), "{line}");
+        }
+        for line in ["M3 S100", "(M0)", "G0 X1 ; M6", "M8", "M30", "M02"] {
+            assert!(!may_wait(line), "{line}");
+        }
+    }
 
     #[test]
     fn only_what_a_sender_sends() {

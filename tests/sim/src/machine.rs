@@ -428,6 +428,31 @@ impl Machine {
         self.cpu.data(usize::from(addr))
     }
 
+    /// The same; `None` beyond the end of RAM.
+    pub fn data(&self, addr: u16) -> Option<u8> {
+        (usize::from(addr) <= self.cpu.data_end()).then(|| self.peek(addr))
+    }
+
+    /// A byte of the flash.
+    pub fn flash(&self, addr: u32) -> u8 {
+        self.cpu.opcode(addr & !1).to_le_bytes()[addr as usize & 1]
+    }
+
+    /// Byte address of the next instruction.
+    pub fn pc(&self) -> u32 {
+        self.cpu.pc()
+    }
+
+    /// The stack pointer.
+    pub fn sp(&self) -> u16 {
+        self.cpu.sp()
+    }
+
+    /// The status register.
+    pub fn sreg(&self) -> u8 {
+        self.cpu.sreg()
+    }
+
     /// Does what a store of the firmware would, to a register or to RAM: to break it, or to make it old.
     pub fn poke(&mut self, addr: u16, value: u8) {
         match addr >= self.chip.ram_start {

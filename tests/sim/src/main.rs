@@ -2,6 +2,7 @@
 
 mod arrival;
 mod cli;
+mod gdb;
 mod measure;
 mod pty;
 mod run;

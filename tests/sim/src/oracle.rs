@@ -144,6 +144,19 @@ pub fn ends<'a>(
     clear.collect()
 }
 
+/// The longest dwell of a job, in milliseconds, of the lines that can be read.
+pub fn longest_dwell_ms<'a>(
+    lines: impl IntoIterator<Item = (usize, &'a str)>,
+    setup: &Setup,
+) -> u64 {
+    let mut reader = Reader::new(setup);
+    for (_, text) in lines {
+        // What is not known of it is of no account here.
+        let _ = reader.line(text);
+    }
+    reader.longest_dwell_ms
+}
+
 /// What a line does once, G-code times ten.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Once {
@@ -234,8 +247,8 @@ impl<'a> Reader<'a> {
             910 => self.incremental = true,
             530 => *machine = true,
             540 | 550 | 560 | 570 | 580 | 590 => self.system = (tenths / 10 - 53) as usize,
-            // Planes, feed modes, path modes, arc distance, cutter compensation off.
-            170 | 180 | 190 | 930 | 940 | 610 | 611 | 640 | 901 | 911 | 400 => {}
+            // Planes, feed modes, path modes, arc distance, cutter compensation and tool length off, retract modes.
+            170 | 180 | 190 | 930 | 940 | 610 | 611 | 640 | 901 | 911 | 400 | 490 | 980 | 990 => {}
             _ => return Err(format!("G{}", tenths as f64 / 10.0)),
         }
         Ok(())

@@ -131,6 +131,8 @@ pub struct Report {
     pub ok: bool,
     /// What is not.
     pub problems: Vec<String>,
+    /// From where on, and why, nobody knows where the job should end: its ends are not checked, all else is.
+    pub unchecked: Option<String>,
     /// The board.
     pub board: &'static str,
     /// Lines in the job.
@@ -196,6 +198,7 @@ impl Report {
         let mut report = Report {
             ok: false,
             problems: Vec::new(),
+            unchecked: measured.expected.as_ref().err().map(ToString::to_string),
             board: machine.board().name,
             lines: measured.lines,
             acknowledged: measured.acknowledged,
@@ -260,10 +263,7 @@ impl Report {
             let n = strays.len();
             problems.push(format!("unasked-for lines ({n}), the first is {first}"));
         }
-        match &measured.expected {
-            Err(unclear) => problems.push(unclear.to_string()),
-            Ok(_) => problems.extend(self.wrong_motors()),
-        }
+        problems.extend(self.wrong_motors());
         problems.extend(self.pause_problems());
         if measured.restarts > 0 {
             problems.push(format!("the firmware restarted {} times", measured.restarts));

@@ -12,6 +12,7 @@ use kerf_sim::{Image, Machine};
 
 use crate::arrival::Arrival;
 use crate::cli::{ServeArgs, Speed};
+use crate::gdb::Gdb;
 use crate::pty::{Peer, Pty};
 use crate::run::board;
 
@@ -24,6 +25,9 @@ const RESET_DELAY: Duration = Duration::from_millis(100);
 /// A machine further behind than this does not try to catch up.
 const MAX_LAG: Duration = Duration::from_millis(200);
 
+/// What is said when a sender opens the port.
+const OPENED: &str = "the port has been opened: the board resets, as a real one does, and no longer knows where it is";
+
 /// Where the plate is that can be probed: from the lower hard end of Z, mm.
 const PLATE_MM: f64 = 45.0;
 
@@ -35,6 +39,7 @@ struct Server {
     image: Image,
     baud: u32,
     pty: Pty,
+    gdb: Option<Gdb>,
     speed: Speed,
     peer: Peer,
     reset_at: Option<Instant>,
@@ -56,6 +61,9 @@ pub fn serve(args: &ServeArgs) -> Result<bool> {
     }
     let mut server = Server::new(args)?;
     println!("{}", server.pty.path().display());
+    if let Some(gdb) = &server.gdb {
+        println!("gdb: {}", gdb.port()?);
+    }
     let mut end = Ok(());
     while !stop.load(Ordering::Relaxed) && end.is_ok() {
         end = server.turn();
@@ -100,6 +108,7 @@ impl Server {
             machine,
             image,
             baud: args.baud,
+            gdb: args.gdb.map(Gdb::listen).transpose()?,
             pty,
             speed: args.speed,
             peer: Peer::Closed,
@@ -142,6 +151,7 @@ impl Server {
     }
 
     fn reset(&mut self) -> Result<()> {
+        eprintln!("{OPENED}");
         let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
         fresh.build(&around(fresh.board()));
         fresh.set_baud(self.baud);
@@ -159,7 +169,13 @@ impl Server {
             Speed::Max => self.machine.cycle() + self.machine.cycles(SLICE_MS),
             Speed::Times(factor) => self.pace(factor),
         };
-        Ok(self.machine.run_until(until)?)
+        let Some(gdb) = &mut self.gdb else { return Ok(self.machine.run_until(until)?) };
+        gdb.turn(&mut self.machine)?;
+        gdb.run_until(&mut self.machine, until)?;
+        if gdb.is_halted() {
+            self.anchor = (Instant::now(), self.machine.cycle());
+        }
+        Ok(())
     }
 
     /// The cycle that it is now, or a little earlier for a machine that lags far behind.

@@ -19,6 +19,9 @@ impl Display for Report {
         )?;
         self.motors(f)?;
         self.axes(f)?;
+        if let Some(why) = &self.unchecked {
+            row(f, "ends not checked", why)?;
+        }
         pauses(f, "pauses", &self.pauses)?;
         pauses(f, "step timer starved", &self.starved)?;
         row(f, "late segments", or_dash(self.late_segments))?;

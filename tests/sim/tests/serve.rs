@@ -37,6 +37,34 @@ fn serve(more: &[&str]) -> (Server, File) {
     (server, port)
 }
 
+#[test]
+fn who_opens_the_port_is_told_that_the_board_resets() {
+    let mut command = kerf_sim();
+    command.arg("serve").arg("--elf").arg(image(&MEGA2560_GRBL));
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut server = Server(command.spawn().unwrap());
+    let mut path = String::new();
+    BufReader::new(server.0.stdout.as_mut().unwrap()).read_line(&mut path).unwrap();
+    let _port = OpenOptions::new().read(true).write(true).open(path.trim()).unwrap();
+    let mut said = String::new();
+    BufReader::new(server.0.stderr.as_mut().unwrap()).read_line(&mut said).unwrap();
+    assert!(said.contains("the board resets, as a real one does"), "{said}");
+}
+
+/// Also of a server that somebody has started by `cargo xtask serve`, which it takes the place of.
+#[cfg(unix)]
+#[test]
+fn who_ends_the_process_ends_the_board_and_its_link() {
+    let link = std::env::temp_dir().join(format!("kerf-serve-{}.tty", std::process::id()));
+    let (mut server, port) = serve(&["--link", link.to_str().unwrap()]);
+    assert!(link.is_symlink());
+    let pid = server.0.id().to_string();
+    assert!(std::process::Command::new("kill").arg(&pid).status().unwrap().success());
+    assert!(server.0.wait().unwrap().success());
+    drop(port);
+    assert!(!link.is_symlink());
+}
+
 /// Ends a server's standard input; what it says then, and whether it is content.
 fn end(server: &mut Server) -> (String, bool) {
     drop(server.0.stdin.take());
@@ -85,4 +113,64 @@ fn a_sender_opens_the_port_and_moves_the_machine() {
     assert_eq!(next(&mut lines), "X position:         10.000 mm");
     assert_eq!(lines.nth(9).unwrap().unwrap(), "Machine state:       Stop");
     assert_eq!(lines.next().unwrap().unwrap(), "tinyg [mm] ok> ");
+}
+
+/// A debugger, as far as it is needed here.
+struct Debugger(std::net::TcpStream);
+
+impl Debugger {
+    fn ask(&mut self, packet: &str) -> String {
+        let sum = packet.bytes().fold(0u8, u8::wrapping_add);
+        self.0.write_all(format!("${packet}#{sum:02x}").as_bytes()).unwrap();
+        self.hear()
+    }
+
+    /// What stands between `$` and `#`.
+    fn hear(&mut self) -> String {
+        let mut text = Vec::new();
+        let mut byte = [0];
+        while text.len() < 3 || text[text.len() - 3] != b'#' {
+            self.0.read_exact(&mut byte).unwrap();
+            if byte[0] != b'+' || !text.is_empty() {
+                text.push(byte[0]);
+            }
+        }
+        String::from_utf8(text[1..text.len() - 3].to_vec()).unwrap()
+    }
+}
+
+#[test]
+fn a_debugger_halts_the_board_and_looks_into_it() {
+    let mut command = kerf_sim();
+    command
+        .arg("serve")
+        .arg("--elf")
+        .arg(image(&MEGA2560_GRBL))
+        .args(["--gdb", "0", "--speed", "max"]);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut server = Server(command.spawn().unwrap());
+    let said = BufReader::new(server.0.stdout.as_mut().unwrap()).lines().nth(1).unwrap().unwrap();
+    let port: u16 = said.strip_prefix("gdb: ").unwrap().parse().unwrap();
+    let mut debugger = Debugger(std::net::TcpStream::connect(("127.0.0.1", port)).unwrap());
+    assert!(debugger.ask("qSupported:swbreak+").starts_with("PacketSize="));
+    assert_eq!(debugger.ask("?"), "S05");
+    // It stands: 32 registers, SREG, two bytes of the stack pointer and four of the program counter.
+    let registers = debugger.ask("g");
+    assert_eq!((registers.len(), debugger.ask("g")), (2 * 39, registers));
+    // The tick of the millisecond, vector 21, comes again and again.
+    let tick: u32 = 21 * 4;
+    assert_eq!(debugger.ask(&format!("Z0,{tick:x},2")), "OK");
+    for _ in 0..3 {
+        assert_eq!(debugger.ask("c"), "S05");
+        let pc = debugger.ask("p22");
+        let pc = u32::from_str_radix(&pc, 16).unwrap().swap_bytes();
+        assert_eq!(pc, tick);
+    }
+    assert_eq!(debugger.ask("s"), "S05");
+    assert_ne!(debugger.ask("p22"), format!("{:08x}", u32::swap_bytes(tick)));
+    // RAM can be read and written, flash read.
+    assert_eq!(debugger.ask("M8021f0,2:abcd"), "OK");
+    assert_eq!(debugger.ask("m8021f0,2"), "abcd");
+    assert_eq!(debugger.ask("m0,4").len(), 8);
+    assert_eq!(debugger.ask("D"), "OK");
 }

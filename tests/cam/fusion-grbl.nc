@@ -1,0 +1,37 @@
+(1001)
+(Machine)
+(  vendor: Autodesk)
+(  model: Generic 3-axis Router)
+(T1 D=3.175 CR=0 - ZMIN=-3 - flat end mill)
+G90 G94
+G17
+G21
+G28 G91 Z0.
+G90
+
+(2D Contour1)
+T1
+S10000 M3
+G54
+G0 X-1.588 Y10.
+Z15.
+G1 Z1. F333.
+Z-1.
+X-1.27 F800.
+G18 G3 X-0.953 Z-1.318 I0. K-0.317
+G1 X0.
+G17
+Y20.
+G2 X1.588 Y21.588 I1.588 J0.
+G1 X20.
+G2 X21.588 Y20. I0. J-1.588
+G1 Y10.
+X0.
+G0 Z15.
+
+G28 G91 Z0.
+G90
+G28 G91 X0. Y0.
+G90
+M5
+M30

@@ -1,0 +1,27 @@
+( Sign )
+( File created: Monday, January 05, 2026 - 10:00 AM)
+( for Grbl from Vectric )
+( Material Size)
+( X= 100.000, Y= 60.000, Z= 12.000)
+()
+(Toolpaths used in this file:)
+(Engrave)
+(Tools used in this file: )
+(1 = V-Bit {90.0 deg 12.7 mm})
+G21
+G90
+G0X0.000Y0.000Z20.320
+M3S12000
+G0X10.000Y10.000Z3.810
+G1Z-1.000F762.0
+G1X40.000Y10.000F1524.0
+G3X45.000Y15.000I0.000J5.000
+G1X45.000Y30.000Z-0.500
+G3X40.000Y35.000I-5.000J0.000
+G1X10.000
+G1X10.000Y10.000Z-1.000
+G0Z3.810
+G0Z20.320
+G0X0.000Y0.000
+M5
+M30

@@ -1,0 +1,83 @@
+//! The conversations that the pages in `docs` show, played to the firmware on the host.
+
+#[path = "support/host.rs"]
+mod host;
+#[path = "support/pages.rs"]
+mod pages;
+#[path = "support/side.rs"]
+mod side;
+#[path = "support/transcript.rs"]
+#[allow(dead_code)]
+mod transcript;
+
+use std::fs;
+use std::path::Path;
+
+use kerf::hal::imp::Machine;
+
+#[test]
+fn the_machine_does_what_the_pages_show() {
+    let boot = || Machine::boot(115_200).expect("one machine for each thread");
+    transcript::play_all(pages::read_all(Path::new("docs")), 16, boot);
+}
+
+/// What pages name that looks like a request: the machine's own lines, grbl's settings, what is told to be unknown, a part of `srs`.
+const NONE: [&str; 6] =
+    ["{\"ack\":true}", "{\"jog\":0}", "$100=250", "$1=255", "{ic:1}", "{set:{vel:t,posa:f}}"];
+
+/// Requests that pages name, in JSON or by a dollar, with the page: complete ones, that are for Kerf.
+fn requests() -> Vec<(String, String)> {
+    let mut all = Vec::new();
+    for entry in fs::read_dir("docs").expect("docs") {
+        let path = entry.expect("an entry").path();
+        if path.extension().is_none_or(|ending| ending != "md") {
+            continue;
+        }
+        let page = fs::read_to_string(&path).expect("a page");
+        let mut fenced = false;
+        for line in page.lines() {
+            fenced ^= line.starts_with("```");
+            // What another firmware has stands in a first column.
+            let own = line.strip_prefix("| `$").and_then(|rest| rest.split_once('|'));
+            let line = own.map_or(line, |(_, rest)| rest);
+            let spans = line.split('`').skip(1).step_by(2).filter(|_| !fenced);
+            let is_request = |span: &&str| {
+                let is_json = span.starts_with('{') && span.ends_with('}') && span.contains(':');
+                let is_none = NONE.contains(span) || span.starts_with("{\"r\":");
+                (is_json || span.starts_with('$'))
+                    && !is_none
+                    && !span.contains("..")
+                    && !span.contains('*')
+            };
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            all.extend(spans.filter(is_request).map(|span| (name.to_string(), span.to_string())));
+        }
+    }
+    all
+}
+
+/// What the machine answers to a line that it does not know.
+fn is_unknown(request: &str) -> bool {
+    let machine = Machine::boot(115_200).expect("one machine for each thread");
+    machine.run_ms(200);
+    machine.received();
+    machine.send(format!("{request}\n").as_bytes());
+    machine.run_ms(500);
+    let heard = String::from_utf8_lossy(&machine.received()).into_owned();
+    let json = [100, 101, 111].iter().any(|status| heard.contains(&format!("\"f\":[1,{status},")));
+    json || heard.contains("Unrecognized")
+}
+
+#[test]
+fn what_pages_ask_the_machine_for_it_knows() {
+    let mut requests = requests();
+    requests.sort();
+    requests.dedup();
+    assert!(requests.len() > 100, "{}", requests.len());
+    let unknown = requests.into_iter().filter(|(_, request)| {
+        let request = request.clone();
+        std::thread::spawn(move || is_unknown(&request)).join().expect("an answer")
+    });
+    let unknown: Vec<_> = unknown.collect();
+    assert!(unknown.is_empty(), "{unknown:#?}");
+}

@@ -1,0 +1,34 @@
+//! Tables that people can read: no cell is long.
+
+/// Longest cell of a table, in characters: more is not read.
+pub const CELL: usize = 160;
+
+/// A text in two: the sentences that a cell has room for, and those that follow.
+fn split(text: &str) -> (&str, &str) {
+    let ends = text.match_indices(". ").map(|(at, _)| at + 1).chain([text.len()]);
+    // A first sentence that is too long is for the test to tell.
+    let at = ends.take_while(|at| text[..*at].chars().count() <= CELL).last();
+    text.split_at(at.unwrap_or(text.len()))
+}
+
+/// Of each row whose last cell is too long, moves what the cell has no room for to a list behind the table.
+pub fn shorten(page: &str) -> String {
+    let (mut text, mut more) = (String::new(), String::new());
+    for line in page.lines() {
+        let cells: Vec<&str> = line.split('|').collect();
+        let is_row = line.starts_with('|') && cells.len() > 3;
+        if !is_row && !more.is_empty() {
+            text += &format!("\nMore about these:\n\n{more}");
+            more.clear();
+        }
+        match (is_row, is_row.then(|| split(cells[cells.len() - 2].trim()))) {
+            (true, Some((cell, rest))) if !rest.is_empty() => {
+                let before = &cells[..cells.len() - 2];
+                text += &format!("{}| {cell} |\n", before.join("|"));
+                more += &format!("- {}: {}\n", cells[1].trim(), rest.trim());
+            }
+            _ => text += &format!("{line}\n"),
+        }
+    }
+    text
+}

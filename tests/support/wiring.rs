@@ -1,0 +1,261 @@
+//! `docs/wiring.md` and its drawings, from the boards' files.
+
+use kerf::boards::{ALL, Board, MOTORS, Pin, Port, inputs};
+
+const PREFACE: &str = "\
+# Wiring
+
+<!-- Made from `boards/*.rs` by `cargo xtask docs`: change it there. -->
+
+Which wire goes where, for each board. Check it against your shield **before** you connect a spindle or a heater.
+
+- **A CNC Shield V3 for the Arduino Uno does not fit.** It plugs into a Mega, but its pins are others: motors would not move, and outputs would be switched
+  by chance. `mega2560-grbl` means the pins of grbl for the *Mega*: steps on D24 to D27.
+- **Switches** go between the input and ground. No resistor is needed. Normally open or closed: `st` for those at the axes, `saf` for the door, `est` for the
+  emergency stop. The probe closes.
+- **Outputs are 5 V logic**, a few milliamperes. Relays, coils and spindles need a driver. During a reset nobody drives the pins: fit pull-down resistors, 10 kOhm, where
+  something must stay off.
+- **The emergency stop input is an addition.** The emergency stop itself cuts the power of motors and spindle.
+- Long wires of switches pick up noise. Shield them, keep them away from those of the spindle, and prefer normally closed ones.
+
+";
+
+/// What a pin is called on an Arduino Mega 2560; by port and bit. D38 and on are of the double row.
+fn arduino(pin: Pin) -> String {
+    let digital: &[(Port, [u8; 8])] = &[
+        (Port::A, [22, 23, 24, 25, 26, 27, 28, 29]),
+        (Port::B, [53, 52, 51, 50, 10, 11, 12, 13]),
+        (Port::C, [37, 36, 35, 34, 33, 32, 31, 30]),
+        (Port::D, [21, 20, 19, 18, 0, 0, 0, 38]),
+        (Port::E, [0, 1, 0, 5, 2, 3, 0, 0]),
+        (Port::G, [41, 40, 39, 0, 0, 4, 0, 0]),
+        (Port::H, [17, 16, 0, 6, 7, 8, 9, 0]),
+        (Port::J, [15, 14, 0, 0, 0, 0, 0, 0]),
+        (Port::L, [49, 48, 47, 46, 45, 44, 43, 42]),
+    ];
+    match pin.port {
+        Port::F => format!("A{}", pin.bit),
+        Port::K => format!("A{}", 8 + pin.bit),
+        port => {
+            let row = digital.iter().find(|(of, _)| *of == port).expect("a port of the Mega");
+            format!("D{}", row.1[usize::from(pin.bit)])
+        }
+    }
+}
+
+/// The headers of RAMPS 1.4, by the Arduino's name of a pin; of the grbl shield there are many kinds.
+const RAMPS: [(&str, &str); 24] = [
+    ("A0", "X driver"),
+    ("A1", "X driver"),
+    ("D38", "X driver"),
+    ("A6", "Y driver"),
+    ("A7", "Y driver"),
+    ("A2", "Y driver"),
+    ("D46", "Z driver"),
+    ("D48", "Z driver"),
+    ("A8", "Z driver"),
+    ("D26", "E0 driver"),
+    ("D28", "E0 driver"),
+    ("D24", "E0 driver"),
+    ("D3", "endstops, X min"),
+    ("D2", "endstops, X max"),
+    ("D14", "endstops, Y min"),
+    ("D15", "endstops, Y max"),
+    ("D18", "endstops, Z min"),
+    ("D19", "endstops, Z max"),
+    ("D4", "servos"),
+    ("D5", "servos"),
+    ("D6", "servos"),
+    ("D11", "servos"),
+    ("A3", "AUX-1"),
+    ("", ""),
+];
+
+/// A row: what, the pin, the level that is on, the setting.
+struct Wire {
+    what: String,
+    pin: Pin,
+    level: &'static str,
+    setting: String,
+}
+
+fn wires(board: &Board) -> Vec<Wire> {
+    let mut wires = Vec::new();
+    let mut add = |what: String, pin: Option<Pin>, level, setting: String| {
+        wires.extend(pin.map(|pin| Wire { what, pin, level, setting }));
+    };
+    for m in 0..MOTORS {
+        let (n, pins) = (m + 1, board.motors[m]);
+        let axis = ["X", "Y", "Z", "A"][m];
+        add(
+            format!("motor {n} ({axis}), step"),
+            Some(pins.step),
+            "rising edge",
+            format!("`{n}sp`"),
+        );
+        add(
+            format!("motor {n} ({axis}), direction"),
+            Some(pins.dir),
+            "low is +",
+            format!("`{n}po`"),
+        );
+        add(format!("motor {n} ({axis}), enable"), pins.enable, "low is on", format!("`{n}pm`"));
+    }
+    add("all motors, enable".into(), board.enable_all, "low is on", "`1pm` to `4pm`".into());
+    let outputs = [
+        ("spindle, on", "high is on", "`spep`"),
+        ("spindle, direction", "high is counter-clockwise", "`spdp`"),
+        ("mist", "high is on", "M7"),
+        ("flood", "high is on", "M8"),
+    ];
+    for ((what, level, setting), pin) in outputs.into_iter().zip(board.outputs) {
+        add(what.into(), pin, level, setting.into());
+    }
+    add("spindle, speed (PWM)".into(), board.pwm.map(|pwm| pwm.pin()), "pulses", "`p1`".into());
+    let mut end = 0;
+    while end < inputs::ENDS {
+        let axis = ["X", "Y", "Z", "A"][end / 2];
+        let letter = axis.to_lowercase();
+        let (lower, upper) = (board.inputs[end], board.inputs[end + 1]);
+        if lower.is_some() && lower == upper {
+            let setting = format!("`{letter}sn`, `{letter}sx`");
+            add(format!("{axis} switches, both ends"), lower, "to ground", setting);
+        } else {
+            add(format!("{axis} switch, lower end"), lower, "to ground", format!("`{letter}sn`"));
+            add(format!("{axis} switch, upper end"), upper, "to ground", format!("`{letter}sx`"));
+        }
+        end += 2;
+    }
+    add("probe".into(), board.inputs[inputs::PROBE], "to ground", "G38.2".into());
+    add("door".into(), board.inputs[inputs::DOOR], "to ground", "`saf`".into());
+    add("emergency stop".into(), board.inputs[inputs::STOP], "to ground", "`est`".into());
+    for (port, name) in board.serial.iter().zip(["USB", "second port"]).skip(1) {
+        let [rx, tx] = port.usart.pins();
+        add(format!("{name}, receives"), Some(rx), "serial", "115,200 baud".into());
+        add(format!("{name}, sends"), Some(tx), "serial", "115,200 baud".into());
+        if let Some(handshake) = port.handshake {
+            add(format!("{name}, RTS"), Some(handshake.rts), "high is stop", "`ex` 2".into());
+            add(format!("{name}, CTS"), Some(handshake.cts), "high is stop", "`ex` 2".into());
+        }
+    }
+    wires
+}
+
+fn about(board: &Board) -> &'static str {
+    match board.name {
+        "mega2560-grbl" => {
+            "An Arduino Mega 2560 with a shield, or single wires, for the pins of grbl for the Mega. The default board."
+        }
+        "ramps14" => {
+            "An Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder (E0) as A."
+        }
+        _ => "",
+    }
+}
+
+fn header(board: &Board, pin: &str) -> &'static str {
+    let rows = if board.name == "ramps14" { &RAMPS[..] } else { &[] };
+    rows.iter().find(|(name, _)| *name == pin).map_or("", |(_, header)| header)
+}
+
+/// All of it.
+pub fn markdown() -> String {
+    let mut text = PREFACE.to_string();
+    for board in ALL {
+        let name = board.name;
+        text +=
+            &format!("## {name}\n\n{}\n\n![Pins of {name}](wiring-{name}.svg)\n\n", about(board));
+        let is_ramps = name == "ramps14";
+        text += "| what | Arduino pin |";
+        text += if is_ramps { " header |" } else { "" };
+        text += " chip | level | setting |\n|---|---|---|---|---|";
+        text += if is_ramps { "---|\n" } else { "\n" };
+        for wire in wires(board) {
+            let pin = arduino(wire.pin);
+            let header =
+                if is_ramps { format!(" {} |", header(board, &pin)) } else { String::new() };
+            let chip = format!("P{}{}", wire.pin.port.letter(), wire.pin.bit);
+            text += &format!(
+                "| {} | {pin} |{header} {chip} | {} | {} |\n",
+                wire.what, wire.level, wire.setting
+            );
+        }
+        text += "\n";
+        if is_ramps {
+            text += "D8, D9 and D10, the outputs for heaters and fan, are driven low and never switched. D16 is the firmware's own: leave it open.\n\n";
+        } else {
+            text += "D16 is the firmware's own: leave it open.\n\n";
+        }
+    }
+    text.trim_end().to_string() + "\n"
+}
+
+/// The headers of a Mega: their pins from left to right, as they lie, USB to the left, and the place of the first.
+fn headers() -> Vec<(f64, f64, Vec<String>)> {
+    let digital = |numbers: &[u8]| numbers.iter().map(|n| format!("D{n}")).collect::<Vec<_>>();
+    let analog = |from: u8| (from..from + 8).map(|n| format!("A{n}")).collect::<Vec<_>>();
+    let pairs = |first: u8| (0..16).map(|n| format!("D{}", first + 2 * n)).collect::<Vec<_>>();
+    vec![
+        (230.0, 0.0, digital(&[13, 12, 11, 10, 9, 8])),
+        (390.0, 0.0, digital(&[7, 6, 5, 4, 3, 2, 1, 0])),
+        (600.0, 0.0, digital(&[14, 15, 16, 17, 18, 19, 20, 21])),
+        (390.0, 1.0, analog(0)),
+        (600.0, 1.0, analog(8)),
+        (820.0, 2.0, pairs(22)),
+        (820.0, 3.0, pairs(23)),
+    ]
+}
+
+/// A drawing of the board with what is at its pins.
+pub fn svg(board: &Board) -> String {
+    const PITCH: f64 = 24.0;
+    let wires = wires(board);
+    let user = |pin: &str| wires.iter().find(|wire| arduino(wire.pin) == pin);
+    let mut text = String::from(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 1160 800\" font-family=\"sans-serif\" font-size=\"12\">\n\
+         <rect width=\"1160\" height=\"800\" fill=\"#fff\"/>\n\
+         <rect x=\"150\" y=\"190\" width=\"740\" height=\"420\" rx=\"10\" fill=\"#e8f1f5\" stroke=\"#356\" stroke-width=\"2\"/>\n\
+         <rect x=\"130\" y=\"250\" width=\"70\" height=\"80\" fill=\"#ccc\" stroke=\"#666\"/><text x=\"148\" y=\"295\">USB</text>\n\
+         <rect x=\"130\" y=\"500\" width=\"70\" height=\"60\" fill=\"#444\" stroke=\"#222\"/><text x=\"142\" y=\"535\" fill=\"#fff\">power</text>\n",
+    );
+    text += &format!(
+        "<text x=\"320\" y=\"390\" font-size=\"22\">{}</text>\n<text x=\"320\" y=\"420\">Arduino Mega 2560, seen from above</text>\n",
+        board.name
+    );
+    for (x, row, pins) in headers() {
+        for (n, pin) in pins.iter().enumerate() {
+            let along = n as f64 * PITCH;
+            // Double rows run down at the right edge; the others lie along the upper and the lower one.
+            let (px, py) = match row as u8 {
+                0 => (x + along, 205.0),
+                1 => (x + along, 595.0),
+                2 => (850.0, 205.0 + along),
+                _ => (874.0, 205.0 + along),
+            };
+            let wire = user(pin);
+            let fill = if wire.is_some() { "#d62" } else { "#999" };
+            text += &format!("<circle cx=\"{px}\" cy=\"{py}\" r=\"4\" fill=\"{fill}\"/>\n");
+            let what = wire.map_or_else(String::new, |wire| format!("  {}", wire.what));
+            let label = format!("{pin}{what}");
+            let colour = if wire.is_some() { "#000" } else { "#aaa" };
+            text += &match row as u8 {
+                0 => format!(
+                    "<text transform=\"translate({},190) rotate(-60)\" fill=\"{colour}\">{label}</text>\n",
+                    px + 4.0
+                ),
+                1 => format!(
+                    "<text transform=\"translate({},618) rotate(60)\" fill=\"{colour}\">{label}</text>\n",
+                    px - 2.0
+                ),
+                2 => format!(
+                    "<text x=\"838\" y=\"{}\" text-anchor=\"end\" fill=\"{colour}\">{label}</text>\n",
+                    py + 4.0
+                ),
+                _ => {
+                    format!("<text x=\"898\" y=\"{}\" fill=\"{colour}\">{label}</text>\n", py + 4.0)
+                }
+            };
+        }
+    }
+    text + "</svg>\n"
+}
