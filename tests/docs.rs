@@ -123,7 +123,13 @@ fn what_the_pages_name_exists() {
 /// Sentences that were true once.
 #[test]
 fn no_page_tells_what_is_no_longer_so() {
-    let gone = ["no PWM", "PWM no effect", "no effect yet"];
+    let gone = [
+        "forgotten when the power goes",
+        "until a reset.",
+        "no PWM",
+        "PWM no effect",
+        "no effect yet",
+    ];
     for path in pages() {
         let text = fs::read_to_string(&path).expect("a page");
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -16,10 +16,10 @@ group! {
             "Speed of feeds at most. Lowered likewise.";
         TN "tn": fixed(4, 3, ANY).with(UNIT | CLAMP), [0, 0, 0, -1_0000, -1_0000, -1_0000],
             length(text!("travel minimum"), NONE),
-            "Lower end of travel, for `sl`, in machine coordinates; the position after homing at a lower switch. The lowest that can be set is none.";
+            "Lower end of travel, for `sl`, in machine coordinates; the position after homing at a lower switch. -214748.3647 means no limit.";
         TM "tm": fixed(4, 3, ANY).with(UNIT | CLAMP), [150_0000, 150_0000, 75_0000, -1_0000, -1_0000, -1_0000],
             length(text!("travel maximum"), NONE),
-            "Upper end of travel, likewise; the position after homing at an upper switch. With 0 machine zero is there: the default of Z, whose zero is its top. The lowest that can be set is none; an axis whose ends are the same has neither.";
+            "Upper end of travel, likewise; the position after homing at an upper switch. With 0 machine zero is there: the default of Z, whose zero is its top. -214748.3647 means no limit; `tn` = `tm`: no limits at all.";
         JM "jm": fixed(3, 0, POSITIVE).with(UNIT | JERK), [20_000, 20_000, 20_000, 5_760_000, 20_000, 20_000],
             length(text!("jerk maximum"), JERK_UNIT),
             "Jerk at most. A value above 1000000 is divided by a million. A jerk that reaches `ac` within 1 ms has no effect: ramps are those of `ac` alone, and a message says so. That is `jm` of 216 times `ac` and more. About 6 times `ac` takes 36 ms.";
@@ -28,13 +28,13 @@ group! {
             "Jerk while homing and probing, likewise; `ac` holds there too.";
         JD "jd": fixed(6, 4, 0).with(UNIT), [50_000; 6],
             length(text!("junction deviation"), text!(" (larger is faster)")),
-            "How far a corner may be cut, as far as its speed goes; more makes corners faster.";
+            "Junction deviation: larger means faster corners. The path itself is never cut.";
         RA "ra": fixed(6, 3, POSITIVE).with(UNIT | RADIUS), [0, 0, 0, 198_944, 1_000_000, 1_000_000],
             length(text!("radius value"), NONE).with_decimals(4),
             "Radius that turns a length into an angle with `am` 3.";
         SN "sn": int(0, 3).with(HOMING), [1, 1, 0, 1, 0, 0],
             words(text!("switch min"), SWITCHES),
-            "Switch at the lower end. A limit that is hit stops everything, with exception 204, until a reset. One switch of an axis may be that of homing.";
+            "Switch at the lower end. A limit that is hit stops everything (exception 204) until `{clear:n}`. One switch of an axis may be that of homing.";
         SX "sx": int(0, 3).with(HOMING), [0, 0, 1, 0, 0, 0],
             words(text!("switch max"), SWITCHES),
             "Switch at the upper end, likewise.";
@@ -46,10 +46,10 @@ group! {
             "Speed off a homing switch, when its place is taken; 0: the axis cannot be homed (243).";
         LB "lb": fixed(4, 3, 0).with(UNIT | HOMING), [5_0000, 5_0000, 5_0000, 5_0000, 0, 0],
             length(text!("latch backoff"), NONE),
-            "Way off a homing switch, within which it must open. With 0 its place is taken as it closes.";
+            "Largest back-off from the homing switch; it must open within it. 0: the closing edge is used.";
         ZB "zb": fixed(4, 3, 0).with(UNIT | HOMING), [1_0000, 1_0000, 1_0000, 2_0000, 0, 0],
             length(text!("zero backoff"), NONE),
-            "Way from where a homing switch opens to the end of travel.";
+            "Distance from where a homing switch opens to the end of travel.";
         AC "ac": fixed(1, 1, 0).with(UNIT), [0; 6],
             length(text!("acceleration maximum"), text!("/s^2 (0 is none)")),
             "Acceleration at most; 0 is none, and the jerk alone limits. `jm` says how soon it is reached; within 1 ms `jm` has no effect, and a message says so.";

@@ -31,16 +31,16 @@ group! {
             "Moves of homed axes beyond `tn` and `tm` are refused (220).";
         ST "st": int(0, 1), 0,
             words(text!("switch type"), text!(" [0=NO,1=NC]")),
-            "Kind of switches at the ends of axes: open or closed unless worked. A probe closes.";
+            "Type of all limit and homing switches. The probe is always normally open.";
         MT "mt": up_to(fixed(2, 2, 10), 429_496_700).with(CLAMP), 200,
             words(text!("motor idle timeout"), text!(" Sec")),
-            "How long motors with `pm` 2 stay powered after a move.";
+            "Seconds after the last move until motors with `pm` 2 lose power.";
         EJ "ej": int(0, 2), 1,
             words(text!("enable json mode"), text!(" [0=text,1=JSON]")),
-            "Mode at power-up; after that answers are in the mode of the last line. With `dia` 1 that takes 2, and else lines of text mode are answered as `txt`.";
+            "Mode at power-up; afterwards each answer has the mode of the line. With `dia` 1, 2 gives plain text answers.";
         JV "jv": int(0, 5), 3,
             words(text!("json verbosity"), text!(" [0=silent,1=footer,2=messages,3=configs,4=linenum,5=verbose]")),
-            "What JSON responses show: nothing, the footer, messages, settings, line numbers, blocks of G-code; each includes what is before it.";
+            "How much JSON responses contain; each level adds to the one below.";
         JS "js": int(0, 1), 1,
             words(text!("json serialize style"), text!(" [0=relaxed,1=strict]")),
             "Whether keys are quoted.";
@@ -64,10 +64,10 @@ group! {
             "Whether each line is sent back before it is answered, as a line of its own.";
         EX "ex": int(0, if ACTIVE.has_handshake() { 2 } else { 1 }), 1,
             words(text!("enable flow control"), text!(" [0=off,1=XON/XOFF,2=RTS/CTS]")),
-            "Flow control. With 1 XOFF holds answers back until XON, and Kerf sends them likewise; 2 does the same with pins, on ports that have them, and is refused by boards without.";
+            "Flow control, in both directions. 2 needs a board with the pins.";
         RXM "rxm": int(0, 1), 1,
             words(text!("serial RX mode"), text!(" [0=char_mode,1=line_mode]")),
-            "What the sender counts, and footers say: 1 lines, `[1,status,free line slots]`; 0 characters, at most 254 unanswered, `[1,status,length,checksum]`. `rx` counts likewise.";
+            "How the sender paces itself: by lines (4 may be unanswered) or by characters (254).";
         BAUD "baud": up_to(fixed(0, 0, 1), 1_000_000).with(RANGE), 5,
             words(text!("USB baud rate"), text!(" [1=9600,2=19200,3=38400,4=57600,5=115200,6=230400]")),
             "Rate of the USB line: a code, or bits a second from 9600 to 1000000; above 500000 lines may be refused by 13 while motors move. In force when the response has left; 115200 after a reset.";

@@ -34,7 +34,7 @@ group! {
     squaring: i32, PLAIN => {
         SW "sw": whole(cold(0), inputs::COUNT as i32), 0,
             bare(text!("squaring switch")),
-            "Input of the second motor's own homing switch, as `in1`, `in2`..; 0 is none, and the axis is not squared. The motor is that of the highest number that drives the same axis as one before it.";
+            "Input of the second motor's own homing switch, as `in1`, `in2`..; 0 is none, and the axis is not squared. The second motor is the higher-numbered of the two with the same `ma`.";
         OF "of": shift(20_0000), 0,
             bare(text!("squaring offset")),
             "How much farther off its switch than the first motor it stands when the axis is square.";

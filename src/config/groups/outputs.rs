@@ -10,10 +10,10 @@ group! {
             "Frequency; 0.122 Hz is the lowest there is.";
         CSL "csl": cold(0), 0,
             words(text!("pwm cw speed lo"), TURNS),
-            "Speed that has the share `cpl`, clockwise. A lower S has it, too.";
+            "Speed (RPM) that gets duty `cpl`; any lower S gets the same.";
         CSH "csh": cold(0), 24_000_000,
             words(text!("pwm cw speed hi"), TURNS),
-            "Speed that has the share `cph`, clockwise. A higher S has it, too.";
+            "Speed (RPM) that gets duty `cph`; any higher S gets the same.";
         CPL "cpl": up_to(cold(3), 1_000), 0,
             words(text!("pwm cw phase lo"), PHASE),
             "Share of the period at the lowest speed, clockwise.";

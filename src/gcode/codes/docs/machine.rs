@@ -44,7 +44,7 @@ pub const SPINDLE: Section = Section {
         m(
             30,
             "Spindle clockwise",
-            "Turns until M4, M5, M6 or the end of the program. The outputs switch it on and off and say which way; \
+            "Turns until M4, M5, M6 or the end of the program. Sets the enable and direction pins, and the PWM for S (settings `p1`); \
 the speed S is reported, and G95 goes by it.",
             &[],
         ),

@@ -25,7 +25,7 @@ and their kin, motion, stop.
 Where others may do otherwise:
 
 - F is in the units of its own line: `G20 F10` is 10 inches a minute.
-- G53 is for G0 and G1 only, and with G91 it still means positions.
+- G53 is for G0 and G1 only; its words are absolute even in G91.
 - G28 and G30 with axis words move the named axes alone.
 - G43 without H takes the tool in the spindle; H0 is no tool.
 - M6 stops the spindle, and nothing waits for a hand.

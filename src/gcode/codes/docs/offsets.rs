@@ -9,8 +9,8 @@ use crate::status::Status::{
 pub const SYSTEMS: Section = Section {
     title: "Coordinate systems and offsets",
     intro: "The origin of axis words is that of the coordinate system, plus G92 if it is in force, plus the \
-length of the tool. A change of it moves nothing. Systems, stored positions and tools are forgotten when the \
-power goes, and kept by M2.",
+length of the tool. A change of it moves nothing. Systems, stored positions and tools \
+survive M2 and power cuts.",
     docs: &[
         g(
             100,

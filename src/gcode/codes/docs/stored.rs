@@ -10,9 +10,9 @@ pub const PLACES: Section = Section {
         g(
             280,
             "Go to the first stored position",
-            "Traverses to the position of G28.1. With axis words: first to the words, then the named axes only go to \
-the stored position. Without: all axes go straight there, at once. Before G28.1 was ever sent the position is 0 in machine \
-coordinates, and X, Y and Z have to be homed: an axis that is not has the line refused with 248. The motion mode stays what it was.",
+            "Traverses to the position of G28.1. `G28 X1` goes first to X1, then moves X to the stored position. `G28` alone moves all \
+axes straight there. Before G28.1 was ever sent the position is 0 in machine coordinates, and X, Y and Z have to be homed: \
+an axis that is not has the line refused with 248. The motion mode stays what it was.",
             &[no(NotHomed, &["G28 G91 Z0"])],
         ),
         g(
@@ -39,8 +39,8 @@ coordinates, and X, Y and Z have to be homed: an axis that is not has the line r
             "Homes the named axes, one by one in the order Z X Y A; the numbers mean nothing. An axis that stands on its \
 switch backs off it by `lb`; it then searches at `sv`, for its whole travel and `lb` at most, backs off at `lv` until the \
 switch opens, and stops `zb` from there. It is then at the end of its travel: `tn` at the lower switch, `tm` at the upper; 0 if \
-that is not set or both are the same. The jerk is `jh`, its own limits are none meanwhile. No motion mode is in force after it; other \
-modes stay. What follows waits. Also refused, before anything moves, with 242 if `sv` is 0, 243 if `lv` is, 244 if there is no way \
+that is not set or both are the same. It uses `jh`; the limit switches of the axis being homed are ignored. Afterwards give G0 or G1 again; other \
+modes stay. Later lines wait. Also refused, before anything moves, with 242 if `sv` is 0, 243 if `lv` is, 244 if there is no way \
 to search; 246: there must be one homing switch. An exception names the axis (`ax`), as it does if the switch is not found \
 or the homing is flushed (240), or if a switch stays closed (247): then the axis is not homed. `{home:1}` homes all axes that have a \
 switch for it.",
