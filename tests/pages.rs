@@ -22,8 +22,17 @@ fn the_machine_does_what_the_pages_show() {
 }
 
 /// What pages name that looks like a request: the machine's own lines, grbl's settings, what is told to be unknown, a part of `srs`.
-const NONE: [&str; 6] =
-    ["{\"ack\":true}", "{\"jog\":0}", "$100=250", "$1=255", "{ic:1}", "{set:{vel:t,posa:f}}"];
+const NONE: [&str; 9] = [
+    "$100=80",
+    "$H",
+    "$X",
+    "{\"ack\":true}",
+    "{\"jog\":0}",
+    "$100=250",
+    "$1=255",
+    "{ic:1}",
+    "{set:{vel:t,posa:f}}",
+];
 
 /// Requests that pages name, in JSON or by a dollar, with the page: complete ones, that are for Kerf.
 fn requests() -> Vec<(String, String)> {

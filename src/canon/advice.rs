@@ -54,6 +54,11 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "Stop, home, check the part. Lower `vm` or `fr`. Report the job.",
     ),
     (
+        ProgramStopped,
+        "The program has come to M0, M1, M6 or M60, and waits.",
+        "Do what it waits for, then `~`. `{psw:0}` has it go on by itself.",
+    ),
+    (
         UnrecognizedName,
         "There is no setting or value of that name.",
         "Check the name in settings.md, and below.",
@@ -192,6 +197,11 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "H is not a tool of the table.",
         "Tools are 1 to 10; 0 is none. Renumber the tools in the CAM program.",
     ),
+    (
+        NoToolLength,
+        "The tool of G43 has no length in the table: 0 is in force. A note; the job goes on.",
+        "Nothing if you zero Z with each tool; else `{tt1:{z:..}}`.",
+    ),
     (LWordMissing, "The code needs L.", "See G10 in gcode.md."),
     (LWordInvalid, "L is not one that the code knows.", "See the code in gcode.md."),
     (QWordMissing, "The cycle needs Q, the depth of a peck.", "Name it."),
@@ -233,6 +243,11 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "One of `sn` and `sx` is 1 or 3, the other 0 or 2.",
     ),
     (HomingClosed, "The homing switch stays closed.", "Check the switch and `st`; raise `lb`."),
+    (
+        NotHomed,
+        "G28 or G30 before the position was stored, or X, Y and Z were homed.",
+        "`{home:1}`; or G28.1 at a safe place.",
+    ),
     (
         ProbeFailed,
         "G38.2 or G38.4 has found nothing, or the probe was closed before.",

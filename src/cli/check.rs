@@ -19,6 +19,9 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// Status of a line that was passed over.
 const PASSED_OVER: u8 = 3;
 
+/// Statuses of exceptions after which a job goes on: a stop, a tool without a length.
+const NOTES: [u8; 2] = [38, 180];
+
 /// What is asked.
 pub struct Question<'a> {
     /// The machine's profile.
@@ -247,6 +250,7 @@ fn stream(run: &mut Run, text: &str) -> Result<Streamed, String> {
                     }
                 }
                 (_, Some(203)) => {}
+                (_, Some(st)) if NOTES.contains(&st) => notes.push((last, says(st))),
                 (_, Some(st)) => {
                     notes.push((last, format!("{}: it cannot be tried here", says(st))));
                     run.send("{clear:n}");

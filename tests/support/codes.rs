@@ -38,6 +38,8 @@ feeds the machine, or that fed it last.
 | 29 | `{er:n}` asked for it | |
 | 34 | EEPROM cannot be written | |
 | 37 | steps came late, the first time | `{stv:n}` counts |
+| 38 | the program has come to a stop and waits | `~` goes on |
+| 180 | a tool without a length: 0 is in force | a note |
 | 203 | `{alarm:n}`, or after 250 | |
 | 204 | a limit was hit | `sw`: `xmin` `xmax` `ymin` `ymax` `zmin` `zmax` `amin` `amax` |
 | 205 | the emergency stop input, or `{shutd:n}` | |

@@ -309,7 +309,7 @@ impl<S: Side> Player<'_, S> {
     }
 
     fn hear(&mut self, port: usize, wanted: &str) -> Result<(), String> {
-        self.wait(port, wanted, |line| line == wanted)
+        self.wait(port, wanted, |line| line == wanted || without_version(line) == wanted)
     }
 
     fn wait(
@@ -321,7 +321,7 @@ impl<S: Side> Player<'_, S> {
         let mut waited = 0;
         loop {
             match self.next_line(port) {
-                Some(line) if is_it(&line) || is_it(&without_version(&line)) => return Ok(()),
+                Some(line) if is_it(&line) => return Ok(()),
                 Some(line) if self.may_come(port, &line) => {}
                 Some(line) => return Err(format!("heard    {line}\ninstead of {wanted}")),
                 None if waited == HEAR_MS => {
