@@ -203,14 +203,15 @@ impl Parser {
     fn go_on(&mut self) -> bool {
         let links = self.links;
         let mut ended = false;
-        let asks: [bool; PORTS] = core::array::from_fn(|number| self.is_short(number));
-        for (port, session) in links.ports.iter().zip(&mut self.sessions) {
-            let others_ask =
-                asks.iter().enumerate().any(|(n, asks)| *asks && n != usize::from(port.number));
-            if others_ask && is_long(session) && self.waited < PATIENCE {
-                self.waited += 1;
-            } else if !matches!(session, Session::Idle) {
-                self.waited = 0;
+        for number in 0..PORTS {
+            if self.leaves_its_turn(number) {
+                continue;
+            }
+            let Some((port, session)) = links.ports.get(number).zip(self.sessions.get_mut(number))
+            else {
+                continue;
+            };
+            if !matches!(session, Session::Idle) {
                 ended |= go_on(links, port, session);
             } else if port.tells() {
                 let told = tell(links, port);
@@ -222,6 +223,21 @@ impl Parser {
             }
         }
         ended
+    }
+
+    /// Whether the answer on a port leaves its turn to that on another: a long one does to a short one, so many times in a row.
+    #[inline(never)]
+    fn leaves_its_turn(&mut self, number: usize) -> bool {
+        let is_long = self.sessions.get(number).is_some_and(is_long);
+        let leaves = is_long
+            && self.waited < PATIENCE
+            && (0..PORTS).any(|other| other != number && self.is_short(other));
+        if leaves {
+            self.waited += 1;
+        } else if is_long {
+            self.waited = 0;
+        }
+        leaves
     }
 
     /// Whether a control line of a port waits for its answer, or for the rest of one that has begun just now.
@@ -467,6 +483,7 @@ fn gives_way(done: u8, since: u32) -> bool {
 }
 
 /// Whether a control line waits on another port: a group of settings is not to keep its answer away.
+#[inline(never)]
 fn others_ask(links: &Links, port: &Port) -> bool {
     let mut others = links.ports.iter().filter(|other| other.number != port.number);
     others.any(|other| other.lines.borrow().has_controls())
