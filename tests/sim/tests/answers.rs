@@ -100,6 +100,56 @@ fn requests_on_both_ports_are_answered_in_arcs_at_the_highest_step_rate() {
     }
 }
 
+/// The longest wait for an answer on USB in a zigzag at the highest step rate, while the second port asks this one time after the
+/// other, ms of AVR time.
+fn longest_beside(other: &str) -> f64 {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    let axis = "vm:4680,fr:4680,jm:20000,ac:2000";
+    let axes = format!("{{x:{{{axis}}},y:{{{axis}}}}}");
+    for line in [&axes[..], "{sv:1,si:100}", "g91 g1 f9000 g64"] {
+        set(&mut machine, &mut host, line);
+    }
+    (0..4_000).for_each(|n| host.queue(n, if n % 2 == 0 { "g1x5y4" } else { "g1x-5y-4" }));
+    let ask = |machine: &mut Machine| machine.send_to(1, format!("{other}\n").as_bytes());
+    let mut heard = Vec::new();
+    let mut run = |machine: &mut Machine, host: &mut Host| {
+        let next = machine.cycle() + 1_600;
+        host.run_until(machine, next).unwrap();
+        heard.extend(machine.receive_from(1));
+        if heard.ends_with(b"\n") {
+            heard.clear();
+            ask(machine);
+        }
+    };
+    host.run_for_ms(&mut machine, 700).unwrap();
+    ask(&mut machine);
+    let mut longest = 0.0f64;
+    for n in 0..80 {
+        let until = machine.cycle() + machine.cycles(23 + n % 7);
+        while machine.cycle() < until {
+            run(&mut machine, &mut host);
+        }
+        let from = machine.cycle();
+        host.send(&mut machine, ASKED, "{stat:n}");
+        while !host.take_answered().iter().any(|answer| answer.number == ASKED) {
+            run(&mut machine, &mut host);
+            assert!(machine.cycle() - from < machine.cycles(500), "no answer");
+        }
+        longest = longest.max((machine.cycle() - from) as f64 / 16e3);
+    }
+    longest
+}
+
+#[test]
+fn groups_that_one_port_reads_do_not_hold_up_the_other() {
+    for other in ["{x:n}", "{sr:n}", "{stat:n}"] {
+        let ms = longest_beside(other);
+        println!("{other}: {ms:.1} ms");
+        // Steps take 63 % of the CPU. Measured: 25.8 ms at most; 50 when long answers did not leave turns to short ones.
+        assert!(ms <= 26.0, "{other}: {ms} ms");
+    }
+}
+
 /// Lines of USB that take much of thread mode, while the machine rests.
 const HEAVY: [&str; 8] = [
     "{mch:2}",
