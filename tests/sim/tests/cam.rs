@@ -13,12 +13,13 @@ use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::job::{self, Options};
 use kerf_sim::report::Report;
 
-/// The profile of a router.
-const ROUTER: &str = "{mch:1}";
+/// The profile of a router, and a machine that has been homed: G28 is refused before.
+const ROUTER: [&str; 2] = ["{mch:1}", "{gc:\"g28.3x0y0z0\"}"];
+
 fn run(path: &Path) -> Report {
     let mut machine = firmware(&MEGA2560_GRBL);
     let lines = job::read_lines(path).unwrap();
-    let options = Options { settings: vec![ROUTER.to_string()], ..Options::default() };
+    let options = Options { settings: ROUTER.map(String::from).to_vec(), ..Options::default() };
     job::run(&mut machine, &lines, &options, |_| {}).unwrap()
 }
 
