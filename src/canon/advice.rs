@@ -55,7 +55,7 @@ const ADVICE: &[(Status, &str, &str)] = &[
     ),
     (
         ProgramStopped,
-        "The program has come to M0, M1, M6 or M60, and waits.",
+        "The program has come to M0, M1, M6, M60 or G88, and waits.",
         "Do what it waits for, then `~`. `{psw:0}` has it go on by itself.",
     ),
     (
@@ -194,8 +194,8 @@ const ADVICE: &[(Status, &str, &str)] = &[
     (HWordMissing, "The code needs H.", "Name the tool."),
     (
         HWordInvalid,
-        "H is not a tool of the table.",
-        "Tools are 1 to 10; 0 is none. Renumber the tools in the CAM program.",
+        "H is above 99, or no whole number.",
+        "Tools with lengths are 1 to 10; 0 is none. Renumber the tools in the CAM program.",
     ),
     (
         NoToolLength,
@@ -245,8 +245,8 @@ const ADVICE: &[(Status, &str, &str)] = &[
     (HomingClosed, "The homing switch stays closed.", "Check the switch and `st`; raise `lb`."),
     (
         NotHomed,
-        "G28 or G30 before the position was stored, or X, Y and Z were homed.",
-        "`{home:1}`; or G28.1 at a safe place.",
+        "G28 or G30 moves an axis that is not homed, and no position was ever stored.",
+        "Home: `{home:1}`. G28.3 says where an axis without a switch is.",
     ),
     (
         ProbeFailed,

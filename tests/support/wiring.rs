@@ -13,7 +13,8 @@ Which wire goes where, for each board. Check it against your shield **before** y
   by chance. `mega2560-grbl` means the pins of grbl for the *Mega*: steps on D24 to D27.
 - **Switches** go between the input and ground. No resistor is needed. Normally open or closed: `st` for those at the axes, `saf` for the door, `est` for the
   emergency stop. The probe closes.
-- **Outputs are 5 V logic**, a few milliamperes. Relays, coils and spindles need a driver. During a reset nobody drives the pins: fit pull-down resistors, 10 kOhm, where
+- **Outputs are 5 V logic**, a few milliamperes. Relays, coils and spindles need a driver. An inverter with an input of 0 to 10 V
+  needs a converter from PWM to 0 to 10 V, and a common ground. During a reset nobody drives the pins: fit pull-down resistors, 10 kOhm, where
   something must stay off.
 - **The emergency stop input is an addition.** The emergency stop itself cuts the power of motors and spindle.
 - Long wires of switches pick up noise. Shield them, keep them away from those of the spindle, and prefer normally closed ones.
@@ -44,7 +45,7 @@ fn arduino(pin: Pin) -> String {
 }
 
 /// The headers of RAMPS 1.4, by the Arduino's name of a pin; of the grbl shield there are many kinds.
-const RAMPS: [(&str, &str); 24] = [
+const RAMPS: [(&str, &str); 26] = [
     ("A0", "X driver"),
     ("A1", "X driver"),
     ("D38", "X driver"),
@@ -68,7 +69,9 @@ const RAMPS: [(&str, &str); 24] = [
     ("D6", "servos"),
     ("D11", "servos"),
     ("A3", "AUX-1"),
-    ("", ""),
+    ("A10", "AUX-2"),
+    ("A12", "AUX-2"),
+    ("A9", "AUX-2"),
 ];
 
 /// A row: what, the pin, the level that is on, the setting.

@@ -115,7 +115,7 @@ group! {
             "Door switch: none, one that closes when the door is opened, or one that opens. An open door holds the machine; `~` resumes when it is shut.";
         EST "est": int(0, 2), 0,
             words(text!("emergency stop"), text!(" [0=off,1=NO,2=NC]")),
-            "Emergency stop: none, one that closes when it is hit, or one that opens, as a broken wire does. It shuts the machine down: no step more, spindle and coolant off, motors keep their power.";
+            "Emergency stop: none, one that closes when it is hit, or one that opens, as a broken wire does. It shuts the machine down: no step more, spindle and coolant off, motors keep their power until `mt` is over.";
         MCH "mch": int(0, machines::COUNT as i32 - 1).with(IDLE), 0,
             words(text!("machine"), text!(" [0=careful,1=router,2=mill,3=printer,4=lathe]")),
             "Machine that was chosen last. Choosing one sets all settings of motors and axes, `ja`, `ct` and `gpl` to what they are on that machine: see Machines.";

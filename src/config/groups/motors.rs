@@ -16,7 +16,7 @@ group! {
             "Travel of the axis in a turn. More than 10,000 steps in a millimetre or degree leave less room for positions: see [how far numbers go](protocol.md#how-far-numbers-go).";
         MI "mi": int(1, 255), [8; 4],
             words(text!("microsteps"), text!(" [1,2,4,8]")),
-            "Microsteps of the driver. Usual are 1, 2, 4 and 8; others are taken with a warning.";
+            "Microsteps of the driver. 1, 2, 4 and 8 are taken as they are. Others, such as 16, are taken with a warning, which is harmless.";
         PO "po": int(0, 1), [0; 4],
             words(text!("polarity"), POLARITY),
             "Direction.";

@@ -19,8 +19,8 @@ pub const PROGRAM: Section = Section {
         m(
             0,
             "Stop",
-            "The machine comes to rest and says so (`stat` 3, and an exception 38). It waits for `~` and then goes on. With \
-`{psw:0}` it goes on at once.",
+            "The machine comes to rest and says so (`stat` 3, and an exception 38). It waits for `~` and then goes on. \
+Lines of G-code that come meanwhile wait as well. The spindle goes on turning. With `{psw:0}` the machine goes on at once.",
             &[],
         ),
         m(10, "Stop if wanted", "The same as M0 with `{ost:1}`; without, nothing.", &[]),

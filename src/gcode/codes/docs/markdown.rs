@@ -28,7 +28,7 @@ Where others may do otherwise:
 - G53 is for G0 and G1 only; its words are absolute even in G91.
 - G28 and G30 with axis words move the named axes alone.
 - G43 without H takes the tool in the spindle; H0 is no tool.
-- M6 stops the spindle, and nothing waits for a hand.
+- M6 stops the spindle. The machine then waits for `~`; with `{psw:0}` it does not wait.
 - G88 goes back up by itself after its stop.
 - G95 goes by the speed that is programmed; none is measured.
 - Overrides act when the moves before them have been made, and stop nothing; requests (`mfo`) act at once.

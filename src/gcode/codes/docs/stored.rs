@@ -11,8 +11,8 @@ pub const PLACES: Section = Section {
             280,
             "Go to the first stored position",
             "Traverses to the position of G28.1. `G28 X1` goes first to X1, then moves X to the stored position. `G28` alone moves all \
-axes straight there. Before G28.1 was ever sent the position is 0 in machine coordinates, and X, Y and Z have to be homed: \
-an axis that is not has the line refused with 248. The motion mode stays what it was.",
+axes straight there. Before G28.1 was ever sent the position is 0 in machine coordinates. Each of X, Y and Z that G28 moves then has to be homed, or set by G28.3: \
+else the line is refused with 248. Once G28.1 was sent nothing has to be homed, not after a power cut either. The motion mode stays what it was.",
             &[no(NotHomed, &["G28 G91 Z0"])],
         ),
         g(
