@@ -51,8 +51,8 @@ const STEPS_LATE: u8 = 5;
 /// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
 
-/// Answers of more turns are long: those on other ports come first, so many times in a row.
-const SHORT: u8 = 2;
+/// Answers that have had so many turns are long: those on other ports come first, so many times in a row.
+const SHORT: u8 = 1;
 const PATIENCE: u8 = 8;
 
 /// A port's transmitter, while it is the parser's.
@@ -447,7 +447,9 @@ impl Answer {
     fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
         let (mut begun, since) = (begun, millis());
         for done in 0..STEPS {
-            if !tx.has_room() || (done > 0 && (gives_way(done, since) || others_ask(links, port))) {
+            let is_late =
+                || gives_way(done, since) || (self.turns > SHORT && is_wanted(links, port));
+            if !tx.has_room() || (done > 0 && is_late()) {
                 break;
             }
             if self.echoes {
@@ -479,14 +481,15 @@ impl Answer {
 /// Whether others have their turn before a response goes on that has come so many steps on in this turn, which began then.
 fn gives_way(done: u8, since: u32) -> bool {
     let late = || done >= STEPS_LATE && flags::has(Event::Tick);
-    uart::presses() || is_unheard() || late() || millis().wrapping_sub(since) >= TURN_MS
+    uart::presses() || late() || millis().wrapping_sub(since) >= TURN_MS
 }
 
-/// Whether a control line waits on another port: a group of settings is not to keep its answer away.
+/// Whether thread mode is wanted for something else than a long answer: a control line waits on another port, or bytes have come that may
+/// be one.
 #[inline(never)]
-fn others_ask(links: &Links, port: &Port) -> bool {
+fn is_wanted(links: &Links, port: &Port) -> bool {
     let mut others = links.ports.iter().filter(|other| other.number != port.number);
-    others.any(|other| other.lines.borrow().has_controls())
+    is_unheard() || others.any(|other| other.lines.borrow().has_controls())
 }
 
 /// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the
