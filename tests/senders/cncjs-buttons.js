@@ -7,9 +7,9 @@ const { NotYet, sleep, until, within, ensure } = require('./steps');
 const READY = [1, 3, 4];
 const HOMING = 9;
 const FAR = 40;
-/// Where Z is when it is homed, and where the plate is then.
-const Z_MAX = 75;
-const PLATE = 23.2;
+/// Where Z is when it is homed, at its top, and where the plate is then.
+const Z_TOP = 0;
+const PLATE = -51.8;
 
 /// The lines that come from the board from now on.
 function hear(server) {
@@ -57,7 +57,8 @@ async function override(server) {
 
 /// Stops a program in the middle of a long move.
 async function stop(server) {
-  await server.load('far', `G21 G90\nG1 X${FAR} F600\nM30\n`);
+  // Slow: the simulated board does not wait for the time to pass.
+  await server.load('far', `G21 G90\nG1 X${FAR} F60\nM30\n`);
   server.command('gcode:start');
   await until(() => server.sr.velocity > 0);
   server.command('gcode:stop', { force: true });
@@ -78,14 +79,14 @@ async function home(server) {
   await until(() => server.sr.machineState === HOMING);
   await until(() => READY.includes(server.sr.machineState));
   const { x, y, z } = server.sr.mpos;
-  ensure(Number(x) === 0 && Number(y) === 0 && Number(z) === Z_MAX, `at ${x} ${y} ${z}`);
+  ensure(Number(x) === 0 && Number(y) === 0 && Number(z) === Z_TOP, `at ${x} ${y} ${z}`);
   return `at ${x} ${y} ${z}`;
 }
 
 /// Probes the plate from above.
 async function probe(server) {
   const heard = hear(server);
-  server.command('gcode', `G38.2 Z0 F800`);
+  server.command('gcode', `G38.2 Z-70 F800`);
   const result = await until(() => heard('{"r":{"prb":'));
   const { e, z } = JSON.parse(result).r.prb;
   ensure(e === 1 && Math.abs(z - PLATE) < 0.01, result);
