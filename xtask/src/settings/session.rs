@@ -50,7 +50,7 @@ fn exchange(line: &mut impl Line, request: &str) -> Result<(Json, f64), String> 
     Ok((body.cloned().unwrap_or(Json::Object(Vec::new())), status))
 }
 
-/// The same of what has to be done.
+/// The body of the answer to a request that has to be carried out; an error if it is refused.
 fn done(line: &mut impl Line, request: &str) -> Result<Json, String> {
     match exchange(line, request)? {
         (body, 0.0) => Ok(body),
