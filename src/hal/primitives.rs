@@ -11,6 +11,8 @@ contract! {
         /// `a / b` and `a % b` if the quotient fits 16 bits: `a >> 16 < b`. Else something, without a panic. Cost: 195, 120 if the quotient
         /// fits eight bits.
         fn divide(a: u32, b: u16) -> (u16, u16);
+        /// `a / b` if the quotient fits 32 bits: `a >> 32 < b`. Else something, without a panic. Cost: 700.
+        fn wide_quotient(a: u64, b: u32) -> u32;
         /// `a * b`. Cost: 20.
         fn product(a: u16, b: u16) -> u32;
         /// `a * b`, modulo 2^32. Cost: 20.

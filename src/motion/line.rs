@@ -102,8 +102,10 @@ impl Builder {
             Way::Near => {}
         }
         out.way = [0; MOTORS];
-        let near = path.drive(&mut self.motors, line.to, dynamics, machine, &mut out.way);
+        let driven = path.drive(&mut self.motors, line.to, dynamics, machine, &mut out.way);
+        let near = driven == MOTORS as u8;
         if !near {
+            self.undo(driven, &path, line, dynamics, machine, &out.way);
             let parts = self.stride(&mut path, line, dynamics, machine, &mut out.way);
             if parts > 0 {
                 return Built::Parts(parts);
@@ -112,7 +114,7 @@ impl Builder {
         out.extent = Extent::new(path.length, !near);
         path.limit(line.feed, &mut self.feed, dynamics);
         if line.may_merge && path.is_brief() {
-            self.undo(&path, line, dynamics, machine, &out.way);
+            self.undo(driven, &path, line, dynamics, machine, &out.way);
             return Built::Merge;
         }
         path.limit_change(dynamics);
@@ -153,43 +155,38 @@ impl Builder {
         machine: &impl Motors,
         steps: &mut [i16; MOTORS],
     ) -> u16 {
-        self.undo(path, line, dynamics, machine, steps);
         *steps = [0; MOTORS];
         (path.most, path.moving, path.whole_steps) = (0, 0, true);
+        let before = self.motors;
         let mut parts = 0;
-        for done in [false, true] {
-            for (m, motor) in self.motors.iter_mut().enumerate() {
-                let axis = usize::from(dynamics.drives[m]);
-                let (Some(&from), Some(&to)) = (line.from.get(axis), line.to.get(axis)) else {
-                    continue;
-                };
-                if from == to {
-                    continue;
-                }
-                let mut there = *motor;
-                let way = there.stride(machine.ratio(m), to);
-                let size = way.unsigned_abs();
-                if size > STEPS_MAX.into() {
-                    parts = parts.max(parts_of(size));
-                }
-                if done {
-                    *motor = there;
-                    steps[m] = way as i16;
-                    path.go(size as u16);
-                }
+        for (m, motor) in self.motors.iter_mut().enumerate() {
+            let axis = usize::from(dynamics.drives[m]);
+            let (Some(&from), Some(&to)) = (line.from.get(axis), line.to.get(axis)) else {
+                continue;
+            };
+            if from == to {
+                continue;
             }
-            if parts > 0 {
-                break;
+            let way = motor.stride(machine.ratio(m), to);
+            let size = way.unsigned_abs();
+            if size > STEPS_MAX.into() {
+                parts = parts.max(parts_of(size));
             }
+            steps[m] = way as i16;
+            path.go(size as u16);
+        }
+        if parts > 0 {
+            self.motors = before;
         }
         parts
     }
 
-    /// Takes the motors back to where the move begins, from `ways`, in parts of a step. Cost: 1,000 to 5,000 each.
+    /// Takes the first `driven` motors back to where the move begins, from `ways`, in parts of a step. Cost: 1,500 each that has moved.
     #[inline(never)]
     #[small]
     fn undo(
         &mut self,
+        driven: u8,
         path: &Path,
         line: &Line,
         dynamics: &Dynamics,
@@ -197,7 +194,7 @@ impl Builder {
         ways: &[i16; MOTORS],
     ) {
         let all = self.motors.iter_mut().zip(ways).zip(&dynamics.drives);
-        for (m, ((motor, &way), &axis)) in all.enumerate() {
+        for (m, ((motor, &way), &axis)) in all.enumerate().take(driven.into()) {
             let axis = usize::from(axis);
             match (line.from.get(axis), path.travel.get(axis)) {
                 (Some(&from), Some(&travel)) if travel != 0 => {
@@ -247,8 +244,8 @@ fn parts_of(steps: u64) -> u16 {
 }
 
 impl Path {
-    /// Takes the motors to the end of the move, and says how far each goes, in parts of a step. False if that does not fit for
-    /// one of them, which has not been moved then.
+    /// Takes the motors to the end of the move, and says how far each goes, in parts of a step. Returns how many it has come to:
+    /// all, or those before the first for which that does not fit.
     #[inline(never)]
     fn drive(
         &mut self,
@@ -257,8 +254,7 @@ impl Path {
         dynamics: &Dynamics,
         machine: &impl Motors,
         ways: &mut [i16; MOTORS],
-    ) -> bool {
-        let mut near = true;
+    ) -> u8 {
         let all = motors.iter_mut().zip(ways).zip(&dynamics.drives);
         for (m, ((motor, way), &axis)) in all.enumerate() {
             let axis = usize::from(axis);
@@ -271,10 +267,10 @@ impl Path {
                     *way = parts;
                     self.go(parts.unsigned_abs());
                 }
-                None => near = false,
+                None => return m as u8,
             }
         }
-        near
+        MOTORS as u8
     }
 
     /// A motor goes so far.

@@ -25,6 +25,9 @@ const NONE: u16 = u16::MAX;
 /// The most parts of a short way: with what rounding adds at both ends it fits 16 bits.
 const PARTS_MAX: u16 = 0x7EFF;
 
+/// More steps than [`PARTS_MAX`] wherever the way begins.
+const STEPS_MAX: u16 = (PARTS_MAX >> PARTS_LOG2) + 3;
+
 /// A motor at the end of the last block.
 #[derive(Clone, Copy, Debug)]
 pub struct Motor {
@@ -45,7 +48,7 @@ impl Default for Motor {
 }
 
 impl Motor {
-    /// A motor whose axis is at `position`. Cost: 1,000 to 5,000.
+    /// A motor whose axis is at `position`. Cost: 1,500.
     #[inline(never)]
     #[small]
     pub fn at(ratio: StepRatio, position: Length) -> Self {
@@ -105,7 +108,7 @@ impl Motor {
         if let Some(way) = self.go_near(ratio, travel, position) {
             return Some(way);
         }
-        self.go_far(ratio, position)
+        self.go_far(ratio, travel, position)
     }
 
     /// As long as 32 and 16 bits will do; nothing done otherwise.
@@ -142,10 +145,14 @@ impl Motor {
         Some((to & !(i16::from(PARTS) - 1)) + i16::from(told) - i16::from(before))
     }
 
-    /// As [`Motor::go`], for ways of any size. Cost: 1,000 to 5,000.
+    /// As [`Motor::go`], for ways of any size. Cost: 2,000; 300 if it is too far by more than rounding.
     #[inline(never)]
     #[small]
-    fn go_far(&mut self, ratio: StepRatio, position: Length) -> Option<i16> {
+    fn go_far(&mut self, ratio: StepRatio, travel: i32, position: Length) -> Option<i16> {
+        let way = u64::from(travel.unsigned_abs()) * u64::from(ratio.num);
+        if way > u64::from(ratio.den) * u64::from(STEPS_MAX) {
+            return None;
+        }
         let to = Self::at(ratio, position);
         let steps = to.steps.checked_sub(self.steps)?;
         let way = steps.checked_mul(PARTS.into())? + i32::from(to.told) - i32::from(self.told);

@@ -67,7 +67,7 @@ pub trait Machine {
     fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status>;
     /// A value now, in the unit that [`Value`] states.
     fn value(&mut self, value: Value) -> i32;
-    /// What this step tells of motion is of now if `first`, else of the moment of the last `first`.
+    /// All steps of a report or group tell of one moment: that of the first step, from the `first` one on, that tells of motion.
     fn moment(&mut self, first: bool);
     /// What the dialects keep of their reports.
     fn memory(&mut self) -> &mut Memory;

@@ -52,8 +52,8 @@ pub fn is_wanted(running: bool) -> bool {
 }
 
 /// An alarm has begun: what is queued is dropped when the machine has come to rest, which it does now, and so are the lines of
-/// G-code that have come by then. A port whose pool is in use is left to who uses it: to the reader, which has found a line that
-/// begins the alarm there.
+/// G-code that have come by then. A pool that is in use is left to the task that uses it: the reader or the parser has found a line
+/// there that begins the alarm, and drops what that pool holds.
 pub fn abandon(links: &Links) {
     links.signs.clear();
     for port in &links.ports {

@@ -367,25 +367,28 @@ impl LinePool {
     }
 
     /// Drops all data lines: they will be answered with `status`.
-    #[inline(never)]
     pub fn terminate(&mut self, status: Status) {
-        for entry in &mut self.entries {
-            if entry.class == Class::Data {
-                entry.class = Class::Fault(status);
-            }
-        }
+        self.drop_data(status, false);
     }
 
     /// As [`terminate`](Self::terminate) in an alarm, but for the end of a program, which ends an alarm, and what is behind it.
+    pub fn refuse(&mut self, status: Status) {
+        self.drop_data(status, true);
+    }
+
     #[cold]
     #[inline(never)]
     #[small]
-    pub fn refuse(&mut self, status: Status) {
+    fn drop_data(&mut self, status: Status, spares_end: bool) {
         for index in 0..self.entries.len() {
-            if is_program_end(self.text(LineId(index as u8))) {
+            let id = LineId(index as u8);
+            if self.class(id) != Class::Data {
+                continue;
+            }
+            if spares_end && is_program_end(self.text(id)) {
                 break;
             }
-            if let Some(entry) = self.entries.get_mut(index).filter(|e| e.class == Class::Data) {
+            if let Some(entry) = self.entries.get_mut(index) {
                 entry.class = Class::Fault(status);
             }
         }

@@ -48,12 +48,17 @@ const ECHO: usize = 62;
 const STEPS: u8 = 8;
 /// Most steps in a turn in which a millisecond has ended.
 const STEPS_LATE: u8 = 5;
+/// A short answer takes no more steps. Behind them others have their turn if they want it.
+const STEPS_SHORT: u8 = 2;
 /// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
 
 /// Answers that have had so many turns are long: those on other ports come first, so many times in a row.
 const SHORT: u8 = 1;
 const PATIENCE: u8 = 8;
+
+/// So many turns in a row are left to a report that ends its line for an answer.
+const LEAVES: u8 = 2;
 
 /// A port's transmitter, while it is the parser's.
 type Line = MutexGuard<'static, NoopRawMutex, Tx>;
@@ -111,9 +116,11 @@ struct Parser {
     sessions: [Session; PORTS],
     /// The ports, as bits, that have something to say and lack room.
     lacking: u8,
-    /// The port whose line was begun last: it is the other one's turn.
+    /// The port whose line had its turn last, the first turn of G-code of the feeder aside: it is the other one's turn.
     last: u8,
-    /// How many turns in a row long answers have left to short ones.
+    /// A line of G-code was begun last: others come before the next one.
+    has_fed: bool,
+    /// How many turns in a row have been left to others: by a long answer to short ones, by a line that waits to a report.
     waited: u8,
 }
 
@@ -124,6 +131,7 @@ pub fn run(links: &'static Links) -> impl Future<Output = Never> {
         sessions: [const { Session::Idle }; PORTS],
         lacking: 0,
         last: USB,
+        has_fed: false,
         waited: 0,
     };
     async move {
@@ -156,6 +164,9 @@ impl Parser {
         }
         self.lacking = 0;
         if self.has_work() && self.go_on() {
+            return Turn::More;
+        }
+        if self.leaves_to_report() {
             return Turn::More;
         }
         match self.next_line(data) {
@@ -201,43 +212,58 @@ impl Parser {
     /// Goes on with what is under way, and tells what a port alone is told. Whether something has come to its end.
     #[inline(never)]
     fn go_on(&mut self) -> bool {
-        let links = self.links;
         let mut ended = false;
         for number in 0..PORTS {
-            if self.leaves_its_turn(number) {
-                continue;
-            }
-            let Some((port, session)) = links.ports.get(number).zip(self.sessions.get_mut(number))
-            else {
-                continue;
-            };
-            if !matches!(session, Session::Idle) {
-                ended |= go_on(links, port, session);
-            } else if port.tells() {
-                let told = tell(links, port);
-                self.lacking |= u8::from(!told) << port.number;
-                ended |= told;
-            } else if port.number == USB && links.rate.get().is_some() {
-                // The other port has asked for it.
-                leave(port.tx.try_lock().ok(), session);
+            if !self.leaves_its_turn(number) {
+                ended |= self.go_on_at(number);
             }
         }
         ended
     }
 
-    /// Whether the answer on a port leaves its turn to that on another: a long one does to a short one, so many times in a row.
+    /// The same on one port.
+    #[inline(never)]
+    fn go_on_at(&mut self, number: usize) -> bool {
+        let links = self.links;
+        let Some((port, session)) = links.ports.get(number).zip(self.sessions.get_mut(number))
+        else {
+            return false;
+        };
+        if !matches!(session, Session::Idle) {
+            return go_on(links, port, session);
+        }
+        if port.tells() {
+            let told = tell(links, port);
+            self.lacking |= u8::from(!told) << port.number;
+            return told;
+        }
+        if port.number == USB && links.rate.get().is_some() {
+            // The other port has asked for it.
+            leave(port.tx.try_lock().ok(), session);
+        }
+        false
+    }
+
+    /// Whether the answer on a port leaves its turn to that on another: a long one does to a short one, so many times in a row. If not,
+    /// the port has its turn.
     #[inline(never)]
     fn leaves_its_turn(&mut self, number: usize) -> bool {
-        let is_long = self.sessions.get(number).is_some_and(is_long);
+        let Some(session) = self.sessions.get(number) else { return true };
+        let is_long = is_long(session);
         let leaves = is_long
             && self.waited < PATIENCE
             && (0..PORTS).any(|other| other != number && self.is_short(other));
         if leaves {
             self.waited += 1;
-        } else if is_long {
+            return true;
+        }
+        if is_long {
             self.waited = 0;
         }
-        leaves
+        if !matches!(session, Session::Idle) {
+            self.last = number as u8;
+        }
+        false
     }
 
     /// Whether a control line of a port waits for its answer, or for the rest of one that has begun just now.
@@ -250,13 +276,39 @@ impl Parser {
         !is_long(session) && port.lines.borrow().has_controls()
     }
 
-    /// The line to begin with, of each port in turn.
+    /// Whether the report on the port whose turn it is gets a turn first: it ends its line for the answer that waits.
+    #[inline(never)]
+    fn leaves_to_report(&mut self) -> bool {
+        let number = (usize::from(self.last) + 1) % PORTS;
+        let reports = self.is_short(number)
+            && self.links.ports.get(number).is_some_and(|port| port.tx.try_lock().is_err());
+        let leaves = reports && self.waited < LEAVES;
+        if leaves {
+            self.waited += 1;
+        } else if self.is_quiet() {
+            self.waited = 0;
+        }
+        leaves
+    }
+
+    /// The line to begin with. Ports have their turn one after the other, and G-code has its own between two other lines.
     #[inline(never)]
     fn next_line(&mut self, data: bool) -> Option<Chosen> {
-        let after = usize::from(self.last) + 1;
-        let chosen = (after..after + PORTS).find_map(|n| self.line_of(n % PORTS, data))?;
-        self.last = chosen.port.number;
+        let first = if self.has_fed { self.in_turn(false) } else { None };
+        let chosen = first.or_else(|| self.in_turn(data))?;
+        self.has_fed =
+            chosen.class != Class::Control && chosen.port.number == self.links.feeder.get();
+        if !self.has_fed {
+            self.last = chosen.port.number;
+        }
         Some(chosen)
+    }
+
+    /// The next line of the first port that has one, beginning behind the one that was last.
+    #[inline(never)]
+    fn in_turn(&mut self, data: bool) -> Option<Chosen> {
+        let after = usize::from(self.last) + 1;
+        (after..after + PORTS).find_map(|n| self.line_of(n % PORTS, data))
     }
 
     /// The next line of a port. G-code of the feeder is taken only if `data` is wanted; G-code of another port is taken at any time, and
@@ -447,9 +499,7 @@ impl Answer {
     fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
         let (mut begun, since) = (begun, millis());
         for done in 0..STEPS {
-            let is_late =
-                || gives_way(done, since) || (self.turns > SHORT && is_wanted(links, port));
-            if !tx.has_room() || (done > 0 && is_late()) {
+            if !tx.has_room() || (done > 0 && self.is_late(links, port, done, since)) {
                 break;
             }
             if self.echoes {
@@ -476,20 +526,27 @@ impl Answer {
         }
         (Progress::Waits, begun)
     }
+
+    /// Whether others have their turn before the response goes on that has come so many steps on in this turn, which began then.
+    #[inline(never)]
+    #[small]
+    fn is_late(&self, links: &Links, port: &Port, done: u8, since: u32) -> bool {
+        let is_long = self.turns > SHORT || done >= STEPS_SHORT;
+        gives_way(done, since) || is_unheard() || (is_long && is_wanted(links, port))
+    }
 }
 
-/// Whether others have their turn before a response goes on that has come so many steps on in this turn, which began then.
+/// Whether others have their turn in any case.
 fn gives_way(done: u8, since: u32) -> bool {
     let late = || done >= STEPS_LATE && flags::has(Event::Tick);
     uart::presses() || late() || millis().wrapping_sub(since) >= TURN_MS
 }
 
-/// Whether thread mode is wanted for something else than a long answer: a control line waits on another port, or bytes have come that may
-/// be one.
+/// Whether a control line waits on another port.
 #[inline(never)]
 fn is_wanted(links: &Links, port: &Port) -> bool {
     let mut others = links.ports.iter().filter(|other| other.number != port.number);
-    is_unheard() || others.any(|other| other.lines.borrow().has_controls())
+    others.any(|other| other.lines.borrow().has_controls())
 }
 
 /// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the

@@ -52,8 +52,8 @@ pub struct Port {
     pub clears: Cell<Alarm>,
     /// The sender asks whether anybody is there: control sets it, the parser answers.
     pub enquiry: Cell<bool>,
-    /// How the machine stood when the report or group began that is being told on this port.
-    pub seen: Cell<Seen>,
+    /// How the machine stood when the report or group that is being told on this port first told of motion.
+    pub seen: Cell<Option<Seen>>,
     /// Bytes have been lost, which the parser tells.
     pub lost: Cell<bool>,
     /// The slot of the receive ring up to which lines of G-code are dropped, by a kill or flush that has come behind it.
@@ -74,7 +74,7 @@ impl Port {
             has_stopped: Cell::new(false),
             clears: Cell::new(Alarm::None),
             enquiry: Cell::new(false),
-            seen: Cell::default(),
+            seen: Cell::new(None),
             lost: Cell::new(false),
             cut: Cell::new(None),
         }

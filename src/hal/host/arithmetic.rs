@@ -16,6 +16,22 @@ pub fn divide(a: u32, b: u16) -> (u16, u16) {
     (low, rest)
 }
 
+/// `a / b` if the quotient fits 32 bits: `a >> 32 < b`. Else what the chip makes of it.
+pub fn wide_quotient(a: u64, b: u32) -> u32 {
+    let mut rest = (a >> 32) as u32;
+    let mut low = a as u32;
+    for _ in 0..32 {
+        let carry = rest >> 31 != 0;
+        rest = rest << 1 | low >> 31;
+        low <<= 1;
+        if carry || rest >= b {
+            rest = rest.wrapping_sub(b);
+            low |= 1;
+        }
+    }
+    low
+}
+
 /// `a * b`.
 pub fn product(a: u16, b: u16) -> u32 {
     u32::from(a) * u32::from(b)
