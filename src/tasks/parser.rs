@@ -48,14 +48,13 @@ const ECHO: usize = 62;
 const STEPS: u8 = 8;
 /// Most steps in a turn in which a millisecond has ended.
 const STEPS_LATE: u8 = 5;
-/// A short answer takes no more steps. Behind them others have their turn if they want it.
-const STEPS_SHORT: u8 = 2;
 /// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
 
-/// Answers that have had so many turns are long: those on other ports come first, so many times in a row.
-const SHORT: u8 = 1;
+/// Turns that an answer leaves in a row to those on other ports that have had fewer.
 const PATIENCE: u8 = 8;
+/// No answer waits for its turn.
+const NONE: u8 = u8::MAX;
 
 /// So many turns in a row are left to a report that ends its line for an answer.
 const LEAVES: u8 = 2;
@@ -212,8 +211,9 @@ impl Parser {
     /// Goes on with what is under way, and tells what a port alone is told. Whether something has come to its end.
     #[inline(never)]
     fn go_on(&mut self) -> bool {
-        let mut ended = false;
-        for number in 0..PORTS {
+        let (mut ended, after) = (false, usize::from(self.last) + 1);
+        for number in after..after + PORTS {
+            let number = number % PORTS;
             if !self.leaves_its_turn(number) {
                 ended |= self.go_on_at(number);
             }
@@ -224,13 +224,13 @@ impl Parser {
     /// The same on one port.
     #[inline(never)]
     fn go_on_at(&mut self, number: usize) -> bool {
-        let links = self.links;
+        let (links, awaited) = (self.links, self.is_awaited(number));
         let Some((port, session)) = links.ports.get(number).zip(self.sessions.get_mut(number))
         else {
             return false;
         };
         if !matches!(session, Session::Idle) {
-            return go_on(links, port, session);
+            return go_on(links, port, session, awaited);
         }
         if port.tells() {
             let told = tell(links, port);
@@ -244,43 +244,44 @@ impl Parser {
         false
     }
 
-    /// Whether the answer on a port leaves its turn to that on another: a long one does to a short one, so many times in a row. If not,
-    /// the port has its turn.
+    /// Whether the answer on a port leaves its turn to one on another that has had fewer, so many times in a row: short answers come
+    /// first. If not, the port has its turn.
     #[inline(never)]
     fn leaves_its_turn(&mut self, number: usize) -> bool {
-        let Some(session) = self.sessions.get(number) else { return true };
-        let is_long = is_long(session);
-        let leaves = is_long
-            && self.waited < PATIENCE
-            && (0..PORTS).any(|other| other != number && self.is_short(other));
-        if leaves {
+        let leaves = self.is_awaited(number);
+        if leaves && self.waited < PATIENCE {
             self.waited += 1;
             return true;
         }
-        if is_long {
+        if !matches!(self.sessions.get(number), Some(Session::Idle)) {
             self.waited = 0;
-        }
-        if !matches!(session, Session::Idle) {
             self.last = number as u8;
         }
         false
     }
 
-    /// Whether a control line of a port waits for its answer, or for the rest of one that has begun just now.
+    /// Whether an answer is under way on a port, and one on another has had fewer turns.
     #[inline(never)]
-    fn is_short(&self, number: usize) -> bool {
-        let (Some(port), Some(session)) = (self.links.ports.get(number), self.sessions.get(number))
-        else {
-            return false;
-        };
-        !is_long(session) && port.lines.borrow().has_controls()
+    fn is_awaited(&self, number: usize) -> bool {
+        let turns = self.turns(number);
+        turns != NONE && (0..PORTS).any(|other| other != number && self.turns(other) < turns)
+    }
+
+    /// How many turns the answer has had that is due on a port, also if it is to the next control line; [`NONE`] if none is.
+    #[inline(never)]
+    fn turns(&self, number: usize) -> u8 {
+        match self.links.ports.get(number).zip(self.sessions.get(number)) {
+            Some((_, Session::Answer(answer))) => answer.turns,
+            Some((port, Session::Idle)) if port.lines.borrow().has_controls() => 0,
+            _ => NONE,
+        }
     }
 
     /// Whether the report on the port whose turn it is gets a turn first: it ends its line for the answer that waits.
     #[inline(never)]
     fn leaves_to_report(&mut self) -> bool {
         let number = (usize::from(self.last) + 1) % PORTS;
-        let reports = self.is_short(number)
+        let reports = self.turns(number) == 0
             && self.links.ports.get(number).is_some_and(|port| port.tx.try_lock().is_err());
         let leaves = reports && self.waited < LEAVES;
         if leaves {
@@ -331,11 +332,12 @@ impl Parser {
     /// Takes a line: most are answered to the end at once.
     #[inline(never)]
     fn take(&mut self, chosen: Chosen, tried: Usual) {
-        let links = self.links;
-        let Some(session) = self.sessions.get_mut(usize::from(chosen.port.number)) else { return };
+        let (links, number) = (self.links, usize::from(chosen.port.number));
+        let awaited = self.is_awaited(number);
+        let Some(session) = self.sessions.get_mut(number) else { return };
         match begin(links, &chosen, tried, session) {
             Begun::Answer => {
-                go_on(links, chosen.port, session);
+                go_on(links, chosen.port, session, awaited);
             }
             Begun::Silent => finish(links, chosen.port, chosen.id),
             Begun::Again => {}
@@ -369,7 +371,9 @@ impl Parser {
                     Session::Answer(Answer { waits: true, .. }) => None,
                     Session::Answer(Answer { tx: Some(tx), .. }) => Some(tx.has_room()),
                     // While others talk, their end wakes it.
-                    _ if self.lacking & 1 << port.number != 0 => {
+                    _ if self.lacking & 1 << port.number != 0
+                        || matches!(session, Session::Answer(_)) =>
+                    {
                         port.tx.try_lock().ok().map(|tx| tx.has_room())
                     }
                     _ => None,
@@ -403,18 +407,9 @@ fn tell(links: &Links, port: &Port) -> bool {
     told
 }
 
-/// Whether an answer has had its turns: those of other ports come first, a bounded number of times.
-fn is_long(session: &Session) -> bool {
-    match session {
-        Session::Idle => false,
-        Session::Answer(answer) => answer.turns >= SHORT,
-        Session::Leave(..) => true,
-    }
-}
-
-/// Goes on with what is under way on a port. Whether it has come to its end.
+/// Goes on with what is under way on a port, step by step while another is `awaited`. Whether it has come to its end.
 #[inline(never)]
-fn go_on(links: &'static Links, port: &'static Port, session: &mut Session) -> bool {
+fn go_on(links: &'static Links, port: &'static Port, session: &mut Session, awaited: bool) -> bool {
     match session {
         Session::Idle => return false,
         Session::Leave(tx, since) => {
@@ -422,7 +417,7 @@ fn go_on(links: &'static Links, port: &'static Port, session: &mut Session) -> b
                 return false;
             }
         }
-        Session::Answer(answer) => match answer.step(links, port) {
+        Session::Answer(answer) => match answer.step(links, port, awaited) {
             Progress::Waits => return false,
             Progress::Done => {
                 finish(links, port, answer.id);
@@ -475,8 +470,8 @@ fn has_left(links: &Links, tx: &mut Tx, since: &mut Option<u16>) -> bool {
 impl Answer {
     /// Goes on as far as there is room.
     #[inline(never)]
-    fn step(&mut self, links: &'static Links, port: &'static Port) -> Progress {
-        self.turns = self.turns.saturating_add(1);
+    fn step(&mut self, links: &'static Links, port: &'static Port, awaited: bool) -> Progress {
+        self.turns = (self.turns + 1).min(NONE - 1);
         if self.waits && links.storage.is_awaited() {
             return Progress::Waits;
         }
@@ -485,7 +480,7 @@ impl Answer {
             return Progress::Waits;
         };
         self.waits = false;
-        let (progress, talks) = self.steps(links, port, &mut tx, begun);
+        let (progress, talks) = self.steps(links, port, &mut tx, begun, awaited);
         if talks {
             self.tx = Some(tx);
         }
@@ -496,10 +491,17 @@ impl Answer {
     /// transmitter is still needed.
     #[inline(never)]
     #[small]
-    fn steps(&mut self, links: &Links, port: &Port, tx: &mut Tx, begun: bool) -> (Progress, bool) {
+    fn steps(
+        &mut self,
+        links: &Links,
+        port: &Port,
+        tx: &mut Tx,
+        begun: bool,
+        awaited: bool,
+    ) -> (Progress, bool) {
         let (mut begun, since) = (begun, millis());
         for done in 0..STEPS {
-            if !tx.has_room() || (done > 0 && self.is_late(links, port, done, since)) {
+            if !tx.has_room() || (done > 0 && (awaited || gives_way(done, since))) {
                 break;
             }
             if self.echoes {
@@ -526,27 +528,14 @@ impl Answer {
         }
         (Progress::Waits, begun)
     }
-
-    /// Whether others have their turn before the response goes on that has come so many steps on in this turn, which began then.
-    #[inline(never)]
-    #[small]
-    fn is_late(&self, links: &Links, port: &Port, done: u8, since: u32) -> bool {
-        let is_long = self.turns > SHORT || done >= STEPS_SHORT;
-        gives_way(done, since) || is_unheard() || (is_long && is_wanted(links, port))
-    }
 }
 
-/// Whether others have their turn in any case.
+/// Whether others have their turn before a response goes on that has come so many steps on in this turn, which began then.
+#[inline(never)]
+#[small]
 fn gives_way(done: u8, since: u32) -> bool {
     let late = || done >= STEPS_LATE && flags::has(Event::Tick);
-    uart::presses() || late() || millis().wrapping_sub(since) >= TURN_MS
-}
-
-/// Whether a control line waits on another port.
-#[inline(never)]
-fn is_wanted(links: &Links, port: &Port) -> bool {
-    let mut others = links.ports.iter().filter(|other| other.number != port.number);
-    others.any(|other| other.lines.borrow().has_controls())
+    uart::presses() || is_unheard() || late() || millis().wrapping_sub(since) >= TURN_MS
 }
 
 /// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the
