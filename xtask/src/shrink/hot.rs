@@ -214,9 +214,10 @@ mod tests {
         assert!(is_hot(
             "<embassy_executor::raw::TaskStorage<kerf::tasks::exec::run::{closure#0}>>::poll"
         ));
-        assert!(is_hot("<kerf::tasks::planner::Planner>::begin"));
+        assert!(is_hot("<kerf::tasks::planner::Planner>::line"));
         for name in [
-            "<kerf::tasks::planner::Planner>::begin_arc",
+            "<kerf::tasks::planner::Planner>::line_of_arc",
+            "<kerf::motion::exec::Exec>::drop_all",
             "kerf::protocol::tinyg::json::check",
             "kerf::protocol::f::<kerf::motion::exec::Exec>",
             "main",

@@ -31,6 +31,7 @@ impl Place<'_> {
             Self::mask,
             Self::again,
             Self::compare,
+            Self::word,
             Self::truth,
             Self::copies,
             Self::zero,
@@ -113,6 +114,13 @@ impl Place<'_> {
         again.then(|| self.gone())?
     }
 
+    /// Copies what was copied, or reads a copy, by what holds on every way that leads here.
+    ///
+    /// As with a [`constant`](Self::constant), nothing else may be left out with it.
+    pub fn copy(&self) -> Option<Edit> {
+        self.again().or_else(|| self.copies())
+    }
+
     /// Compares a register with 0 whose value set the flags alike.
     fn compare(&self) -> Option<Edit> {
         let d = self.tested()?;
@@ -151,6 +159,32 @@ impl Place<'_> {
             _ => false,
         };
         is_test.then(|| register(first))?
+    }
+
+    /// Compares a pair with 0 byte by byte.
+    fn word(&self) -> Option<Edit> {
+        let high = self.insn_at(self.at + 1)?;
+        let of = |insn: &Insn, op: &str| {
+            let (first, second) = operands(insn);
+            register(first).filter(|_| insn.op == op && second == "r1")
+        };
+        let (low, high) = (of(self.insn, "cp")?, of(high, "cpc")?);
+        let is_zero = self.known().value(1) == Some(0);
+        if !is_zero || low == 1 || high == 1 || self.flow.may_be_skipped[self.at + 1] {
+            return None;
+        }
+        let needed = self.needed[self.at + 1];
+        let only_zero = needed & effect::FLAGS & !effect::Z == 0;
+        let insn = if only_zero && needed & bit(low) == 0 {
+            format!("or r{low}, r{high}")
+        } else if only_zero && needed & bit(high) == 0 {
+            format!("or r{high}, r{low}")
+        } else if needed & effect::H == 0 && low >= 24 && low % 2 == 0 && high == low + 1 {
+            format!("sbiw r{low}, 0")
+        } else {
+            return None;
+        };
+        Some(vec![(self.at, Some(Insn::new(&insn))), (self.at + 1, None)])
     }
 
     /// Makes 0 or 1 of a condition, and branches on that.

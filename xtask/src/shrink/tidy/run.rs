@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::super::text::{Insn, Line};
+use super::copies::Copies;
 use super::effect::{self, Set, bit, operands, register};
 use super::flow::{Flow, Known, immediate};
 
@@ -40,10 +41,15 @@ pub struct Run {
 
 impl Run {
     /// Registers hold anything that may be in them. Two with one `seed` find the same in memory.
-    pub fn new(seed: u64, registers: u64, known: &Known) -> Run {
+    pub fn new(seed: u64, registers: u64, (known, copies): (&Known, &Copies)) -> Run {
         let value = |number: usize| {
-            let bits = known.bits(number as u8);
-            usual(hash(&(registers, number)), seed) & !bits.zeros | bits.ones
+            let root = copies.root(number as u8);
+            let same = (0..32).filter(|other| copies.root(*other) == root);
+            let (zeros, ones) = same.fold((0, 0), |(zeros, ones), other| {
+                let bits = known.bits(other);
+                (zeros | bits.zeros, ones | bits.ones)
+            });
+            usual(hash(&(registers, root)), seed) & !zeros | ones
         };
         let flags = hash(&(registers, "flags")) & FLAGS;
         let (registers, memory) = (std::array::from_fn(value), HashMap::new());
@@ -79,14 +85,14 @@ impl Run {
             {
                 return End::At(label.clone());
             }
-            let taken = match line {
-                Line::Insn(insn) => self.step(insn),
-                Line::Fixed(text) => {
+            let taken = match (line, flow.insn(at)) {
+                (_, Some(insn)) => self.step(insn),
+                (Line::Fixed(text), None) => {
                     self.note(text, effect::ALL);
                     self.spoil(effect::ALL & !bit(1), text);
                     false
                 }
-                Line::Label(_) | Line::Note(_) => false,
+                _ => false,
             };
             at = match next[..] {
                 [] => return End::Left,
