@@ -32,6 +32,7 @@ use std::collections::HashSet;
 
 use anyhow::{Context, Result};
 
+use hot::Heat;
 use text::{Function, Insn, Line, Program};
 
 /// Two texts for the assembler.
@@ -56,10 +57,12 @@ pub fn shrink(text: &str) -> Result<Texts> {
     Ok(Texts { plain: plain.text(), small: small.text() })
 }
 
-/// Whether a function may become slower.
-fn is_cold(function: &Function) -> bool {
-    let name = format!("{:#}", rustc_demangle::demangle(&function.name));
-    !hot::is_hot(&name) && function.insns().all(|insn| insn.op != "reti")
+/// How much of a function may be shared.
+fn heat(function: &Function) -> Heat {
+    if function.insns().any(|insn| insn.op == "reti") {
+        return Heat::Hot;
+    }
+    hot::heat(&format!("{:#}", rustc_demangle::demangle(&function.name)))
 }
 
 /// The names that assembler of the source contains.
