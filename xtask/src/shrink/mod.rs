@@ -11,6 +11,7 @@
 //! | [`repeats`] | shares any other code that repeats, ends of functions above all | 5,400 |
 //! | [`branch`] | branches go where they lead, not round a jump | 1,300 |
 //! | [`order`] | puts functions near those they call, which shortens calls | 3,200 |
+//! | [`via`] | has calls over a long way go by one jump | 1,200 |
 //! | [`verify`] | puts back what is shared, and compares with the tidied text | |
 //! | [`link`] | assembles and links, as `rustc` did | |
 //!
@@ -27,6 +28,7 @@ mod repeats;
 pub mod text;
 mod tidy;
 mod verify;
+mod via;
 
 use std::collections::HashSet;
 
@@ -53,6 +55,7 @@ pub fn shrink(text: &str) -> Result<Texts> {
     repeats::share(&mut small);
     branch::shorten(&mut small);
     order::arrange(&mut small);
+    via::share(&mut small);
     verify::check(&tidy, &small).context("the program that was made smaller is another one")?;
     Ok(Texts { plain: plain.text(), small: small.text() })
 }

@@ -193,6 +193,8 @@ fn next(lines: &[&Line], labels: &HashMap<&str, usize>, at: usize) -> Option<Vec
     match insn.op.as_str() {
         "ret" | "jmp" => Some(Vec::new()),
         "rjmp" => Some(vec![to()?]),
+        // Were it to return, the next function would follow.
+        "call" if follows.is_none() => Some(Vec::new()),
         _ if effect::branch(&insn.op).is_some() => Some(vec![to()?, follows?]),
         "cpse" | "sbrc" | "sbrs" | "sbic" | "sbis" => {
             Some(vec![follows?, (at + 2 < lines.len()).then_some(at + 2)?])

@@ -326,6 +326,16 @@ mod tests {
     }
 
     #[test]
+    fn a_call_at_the_end_does_not_return() {
+        assert_eq!(
+            tidied(
+                "cpi r24, 0\nbreq .LBB0_1\nldi r26, 3\nret\n.LBB0_1:\nmovw r18, r24\nmovw r22, r18\ncall g"
+            ),
+            "cpi r24, 0; breq .LBB0_1; ret; .LBB0_1:; movw r18, r24; movw r22, r24; call g"
+        );
+    }
+
+    #[test]
     fn what_may_be_skipped_stays() {
         assert_eq!(
             tidied("sbrc r24, 0\nldi r25, 0\nmov r22, r25\nret"),
