@@ -232,6 +232,15 @@ mod tests {
     }
 
     #[test]
+    fn a_pair_of_constants_is_copied_from_another() {
+        let text = |high: &str| {
+            format!("ldi r20, 7\nldi r21, {high}\nldi r24, 7\nldi r25, 0\ncall g\nret")
+        };
+        assert_eq!(tidied(&text("0")), "ldi r20, 7; ldi r21, 0; movw r24, r20; call g; ret");
+        assert!(tidied(&text("1")).contains("ldi r24, 7; ldi r25, 0"));
+    }
+
+    #[test]
     fn assembler_of_the_source_may_use_register_1_meanwhile() {
         let asm = ";APP\nmul r24, r22\nmov r23, r1\nclr r1\n;NO_APP\nstd Z+1, r23\nmovw r24, r18\nmovw r22, r20\nret";
         assert!(tidied(asm).contains("std Z+1, r23"));

@@ -111,7 +111,34 @@ impl Place<'_> {
             "movw" => are_equal(d, register(second)?) && are_equal(d + 1, register(second)? + 1),
             _ => false,
         };
-        again.then(|| self.gone())?
+        if again { self.gone() } else { self.constant_pair() }
+    }
+
+    /// Gives a pair, byte by byte, values that another pair has.
+    fn constant_pair(&self) -> Option<Edit> {
+        let value = |at: usize| {
+            let insn = self.insn_at(at)?;
+            let (first, second) = operands(insn);
+            let is_free = !self.flow.may_be_skipped[at];
+            let value = match insn.op.as_str() {
+                "ldi" => immediate(second)?,
+                "mov" => self.known[at].value(register(second)?)?,
+                _ => return None,
+            };
+            is_free.then_some((register(first)?, value))
+        };
+        let (a, b) = (value(self.at)?, value(self.at + 1)?);
+        let (low, high) = if a.0 < b.0 { (a, b) } else { (b, a) };
+        if low.0 % 2 != 0 || high.0 != low.0 + 1 {
+            return None;
+        }
+        let holds = |pair: &u8| {
+            let value = |register| self.known().value(register);
+            *pair != low.0 && value(*pair) == Some(low.1) && value(*pair + 1) == Some(high.1)
+        };
+        let pair = (0..32).step_by(2).find(holds)?;
+        let copy = Insn::new(&format!("movw r{}, r{pair}", low.0));
+        Some(vec![(self.at, Some(copy)), (self.at + 1, None)])
     }
 
     /// Copies what was copied, or reads a copy, by what holds on every way that leads here.
