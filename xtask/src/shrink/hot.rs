@@ -4,9 +4,9 @@
 //! longest says how hot it is; what no row names is cold.
 //!
 //! The rows come from counts: `KERF_COUNTS=FOLDER cargo xtask bench` writes how often each instruction ran. To share all that repeats costs
-//! 25 cycles each time a function is called and 6 % of what it takes itself; to share its end costs 3. Where that is more than 3.5 millionths of
-//! the time of a job of the bench for each byte that it saves, half of that in `kerf::motion`, the function is warm or hot. `cargo xtask size` fails when a row names
-//! nothing any more.
+//! 25 cycles each time a function is called and 6 % of what it takes itself; to share its end costs 3. Where that is more than 3 millionths of
+//! the time of a job of the bench for each byte that it saves, the function is warm or hot; in what prepares segments, where it is more than
+//! one millionth. What finds keys for the queue is hot. `cargo xtask size` fails when a row names nothing any more.
 
 /// How much of a function may be shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,9 +39,11 @@ const HOT: &[&str] = &[
     "kerf::gcode::state::State>::carry_out",
     "kerf::gcode::state::State>::usual::",
     "kerf::gcode::usual::",
-    "kerf::motion::chain::",
-    "kerf::motion::divide::quotient_remainder",
+    "kerf::motion::block::Line>::",
+    "kerf::motion::chain::Slope>::is_above",
+    "kerf::motion::divide::",
     "kerf::motion::float::",
+    "kerf::motion::prep::",
     "kerf::motion::queue::BlockQueue>::",
     "kerf::motion::replan::",
     "kerf::motion::short::Log>::of",
@@ -50,7 +52,7 @@ const HOT: &[&str] = &[
     "kerf::protocol::tinyg::format::Format>::",
     "kerf::protocol::tinyg::request::Request",
     "kerf::protocol::tinyg::status::number",
-    "kerf::tasks::exec::Waiting>::has_room",
+    "kerf::tasks::exec::",
     "kerf::tasks::health::look_for_starvation",
     "kerf::tasks::lines::LinePool>::end_line",
     "kerf::tasks::lines::LinePool>::end_question",
@@ -107,7 +109,6 @@ pub const WARM: &[&str] = &[
     "kerf::store::kept::key",
     "kerf::store::log::",
     "kerf::tasks::common::snapshot",
-    "kerf::tasks::exec::run::",
     "kerf::tasks::links::Links>::may_feed",
     "kerf::tasks::parser::",
     "kerf::tasks::planner::Planner>::announce",
@@ -132,26 +133,13 @@ pub const WARM: &[&str] = &[
 /// Of these, what seldom runs.
 const COLD: &[&str] = &[
     "kerf::gcode::usual::Words>::feed",
-    "kerf::motion::block::Line>::key",
     "kerf::motion::chain::Chain>::closed",
     "kerf::motion::curve::Curve>::of",
     "kerf::motion::curve::acceleration",
     "kerf::motion::dynamics::",
-    "kerf::motion::exec::Exec>::drop_all",
     "kerf::motion::exec::Exec>::take_up",
-    "kerf::motion::float::cube_root",
-    "kerf::motion::governor::Governor>::arrive::",
-    "kerf::motion::governor::Governor>::bottom_out",
-    "kerf::motion::governor::Governor>::brake_harder",
     "kerf::motion::governor::Governor>::creep",
-    "kerf::motion::governor::Governor>::end_climb::",
-    "kerf::motion::governor::Governor>::finish",
-    "kerf::motion::governor::Governor>::go_down_to::",
     "kerf::motion::governor::Governor>::lay",
-    "kerf::motion::governor::Governor>::recover::",
-    "kerf::motion::governor::Governor>::slow_down::",
-    "kerf::motion::governor::Governor>::slow_for_clear",
-    "kerf::motion::governor::Governor>::try_bottom::",
     "kerf::motion::junction::mean_deviation",
     "kerf::motion::limits::",
     "kerf::motion::line::",
