@@ -5,6 +5,7 @@
 //! functions as well. [`rules`] has what is done, each by what [`flow`] and [`local`] know; [`equal`] holds every function against the one
 //! that the compiler wrote, by running both.
 
+mod base;
 mod copies;
 mod effect;
 mod equal;
@@ -44,6 +45,9 @@ pub fn tidy(program: &mut Program) -> Result<()> {
 fn tidy_function(function: &mut Function) -> Result<()> {
     let mut versions = vec![function.clone()];
     while versions.len() < SWEEPS && sweep(function) {
+        versions.push(function.clone());
+    }
+    if base::share(function) {
         versions.push(function.clone());
     }
     equal::check(&versions)
@@ -324,6 +328,25 @@ mod tests {
             tidied("std Y+1, r22\nldd r24, Y+1\nret").contains("ldd r24, Y+1"),
             "Y may point anywhere"
         );
+    }
+
+    #[test]
+    fn a_variable_is_reached_by_a_pointer() {
+        let stores = "sts V+3, r25\nsts V+2, r24\nmov r24, r22\nsts V+4, r24\n";
+        let by_z = "ldi r30, lo8(V+2); ldi r31, hi8(V+2); std Z+1, r25; st Z, r24; ";
+        let after = tidied(&format!("{stores}lds r24, V+7\nret"));
+        assert!(after.starts_with(by_z), "{after}");
+        assert!(after.ends_with("std Z+2, r22; ldd r24, Z+5; ret"), "{after}");
+        for text in [
+            format!("{stores}ret"),
+            format!("{stores}lds r24, V+70\nret"),
+            format!("{stores}lds r24, W+7\nret"),
+            format!("{stores}call g\nlds r24, V+7\nret"),
+            format!(";APP\ncli\n;NO_APP\n{stores}lds r24, V+7\nret"),
+            format!("movw r30, r20\n{stores}lds r24, V+7\nst Z, r24\nret"),
+        ] {
+            assert!(!tidied(&text).contains("lo8"), "{text}");
+        }
     }
 
     #[test]
