@@ -23,11 +23,6 @@ const FLAGS: &str = "-C target-cpu=CHIP -C llvm-args=-inline-threshold=30 -C llv
                      -C linker=target/avr/keep-gcc -C link-arg=-mmcu=CHIP -C link-arg=-Wl,--gc-sections -C link-arg=-Wl,--relax \
                      -C link-arg=-Wl,--defsym=__TEXT_REGION_LENGTH__=0x60000";
 
-/// What the whole program is optimized with besides: values that are spilled are split for size, and no copy of a computation is made so
-/// that it is made once. 400 bytes less, and no slower.
-const LAST: [&str; 4] =
-    ["-C", "llvm-args=-split-spill-mode=size", "-C", "llvm-args=-enable-pre=false"];
-
 /// The linker in `FLAGS`: a script that writes down how it was called. Its path does not name the checkout, for cargo would build all
 /// anew in a copy; `rustc` knows by the end of the name which options it takes.
 const LINKER: &str = "target/avr/keep-gcc";
@@ -88,8 +83,7 @@ pub fn build_without(board: Board, machine: Machine, without: &[String]) -> Resu
         .arg(&target);
     cargo.args(["--package", "kerf", "--bin", "kerf", "--no-default-features", "--features"]);
     cargo.arg(features);
-    cargo.args(["--", "--emit"]).arg(format!("asm={}", text.display()));
-    run(cargo.args(LAST))?;
+    run(cargo.args(["--", "--emit"]).arg(format!("asm={}", text.display())))?;
     make_small(&text, &linked, &image)
 }
 
