@@ -1,16 +1,16 @@
 //! Makes the image smaller: what the compiler wrote is rewritten before it is linked.
 //!
 //! Fat LTO gives one assembler text for the whole program, so that what repeats can be shared wherever it stands. LLVM does nothing of
-//! the kind for AVR. Only cold functions share ([`hot`] has the others); assembler of the source is never changed.
+//! the kind for AVR. Cold functions share all that repeats, warm ones their ends, hot ones nothing ([`hot`]); assembler of the source is never changed.
 //!
 //! | module | what it does | flash, bytes |
 //! |---|---|---|
 //! | [`text`], `dialect` | reads LLVM's text, writes it for `avr-as` | |
-//! | [`tidy`] | leaves out what the compiler need not have written, and runs both to compare them | 6,700 |
-//! | [`prologue`] | shares what functions begin with | 2,700 |
-//! | [`repeats`] | shares any other code that repeats, ends of functions above all | 5,400 |
-//! | [`branch`] | branches go where they lead, not round a jump | 1,300 |
-//! | [`order`] | puts functions near those they call, which shortens calls | 3,200 |
+//! | [`tidy`] | leaves out what the compiler need not have written, and runs both to compare them | 12,800 |
+//! | [`prologue`] | shares what functions begin with | 5,900 |
+//! | [`repeats`] | shares any other code that repeats, ends of functions above all | 14,500 |
+//! | [`branch`] | branches go where they lead, not round a jump | 2,700 |
+//! | [`order`] | puts functions near those they call, which shortens calls | 2,100 |
 //! | [`via`] | has calls over a long way go by one jump | 1,200 |
 //! | [`verify`] | puts back what is shared, and compares with the tidied text | |
 //! | [`link`] | assembles and links, as `rustc` did | |
