@@ -6,10 +6,24 @@
 //! .LBB0_1:                    .LBB0_1:
 //! ```
 //!
+//! Where that is too far, another jump to the same place may be near, and the branch goes to that:
+//!
+//! ```text
+//!   breq .LBB0_1                brne .Lway_0_0
+//!   rjmp .LBB0_7              .LBB0_1:
+//! .LBB0_1:         becomes      ...
+//!   ...                       .Lway_0_0:
+//!   rjmp .LBB0_7                rjmp .LBB0_7
+//! ```
+//!
+//! That costs a cycle on one way, and saves one on the other.
+//!
 //! LLVM writes a branch round a jump before it knows how far the way is. A branch reaches 63 words back or forth, and what is written
 //! here never lies further apart in the image: the linker only shortens. Were it otherwise, the linker would refuse the branch.
 
 use std::collections::HashMap;
+
+use anyhow::{Result, bail, ensure};
 
 use super::text::{Function, Insn, Line, Program};
 
@@ -18,8 +32,10 @@ const REACH: usize = 124;
 
 /// Makes branches of all functions short but those of interrupts: this costs no cycle.
 pub fn shorten(program: &mut Program) {
-    let functions = program.functions.iter_mut();
-    for function in functions.filter(|function| function.insns().all(|insn| insn.op != "reti")) {
+    let functions = program.functions.iter_mut().enumerate();
+    for (number, function) in
+        functions.filter(|(_, function)| function.insns().all(|insn| insn.op != "reti"))
+    {
         // What became shorter brings more within reach.
         loop {
             let before = function.lines.len();
@@ -28,14 +44,97 @@ pub fn shorten(program: &mut Program) {
                 break;
             }
         }
+        go_by_others(function, number);
     }
+}
+
+/// The labels of jumps that branches go by.
+const WAY: &str = ".Lway_";
+
+/// Has branches round a jump go to another jump to the same place.
+fn go_by_others(function: &mut Function, number: usize) {
+    let places = Places::of(function);
+    let code = code(function);
+    let jumps: Vec<(usize, String)> = code
+        .iter()
+        .filter_map(|at| match &function.lines[*at] {
+            Line::Insn(insn) if insn.op == "rjmp" => Some((*at, insn.args.clone())),
+            _ => None,
+        })
+        .collect();
+    let (mut gone, mut ways): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
+    for at in code.windows(2) {
+        let behind =
+            code.iter().skip_while(|line| **line <= at[1]).map(|line| &function.lines[*line]);
+        let (Line::Insn(branch), Line::Insn(jump)) =
+            (&function.lines[at[0]], &function.lines[at[1]])
+        else {
+            continue;
+        };
+        let Some(mut short) = short(branch, jump, behind).filter(|_| !ways.contains(&at[1])) else {
+            continue;
+        };
+        let is_way = |(way, to): &&(usize, String)| {
+            let distance = places.lines[*way].abs_diff(places.lines[at[0]]);
+            *to == short.args && *way != at[1] && !gone.contains(way) && distance <= REACH
+        };
+        // One that others go by is as good as one more.
+        let way = jumps.iter().filter(is_way).max_by_key(|(way, _)| ways.contains(way));
+        if let Some((way, _)) = way {
+            let name = ways.iter().position(|known| known == way).unwrap_or_else(|| {
+                ways.push(*way);
+                ways.len() - 1
+            });
+            short.args = format!("{WAY}{number}_{name}");
+            function.lines[at[0]] = Line::Insn(short);
+            gone.push(at[1]);
+        }
+    }
+    let mut lines = Vec::with_capacity(function.lines.len() + ways.len());
+    for (at, line) in function.lines.drain(..).enumerate() {
+        if let Some(name) = ways.iter().position(|way| *way == at) {
+            lines.push(Line::Label(format!("{WAY}{number}_{name}")));
+        }
+        if !gone.contains(&at) {
+            lines.push(line);
+        }
+    }
+    function.lines = lines;
+}
+
+/// Code in which branches go where the jumps lead that they go by.
+pub fn straight(code: Vec<Line>) -> Result<Vec<Line>> {
+    let mut leads = HashMap::new();
+    for (at, line) in code.iter().enumerate() {
+        if let Line::Label(way) = line
+            && way.starts_with(WAY)
+        {
+            let Some(Line::Insn(jump)) = code.get(at + 1).filter(|_| !leads.contains_key(way))
+            else {
+                bail!("{way} leads nowhere");
+            };
+            ensure!(jump.op == "rjmp", "{way} leads nowhere");
+            leads.insert(way.clone(), jump.args.clone());
+        }
+    }
+    let straight = |line| match line {
+        Line::Label(label) if leads.contains_key(&label) => None,
+        Line::Insn(Insn { op, args }) => {
+            Some(Line::Insn(Insn { op, args: leads.get(&args).cloned().unwrap_or(args) }))
+        }
+        line => Some(line),
+    };
+    Ok(code.into_iter().filter_map(straight).collect())
+}
+
+/// The lines of a function that make code, and labels.
+fn code(function: &Function) -> Vec<usize> {
+    (0..function.lines.len()).filter(|at| !matches!(function.lines[*at], Line::Note(_))).collect()
 }
 
 fn shorten_in(function: &mut Function) {
     let places = Places::of(function);
-    let code: Vec<usize> = (0..function.lines.len())
-        .filter(|at| !matches!(function.lines[*at], Line::Note(_)))
-        .collect();
+    let code = code(function);
     let mut gone = Vec::new();
     for at in code.windows(2) {
         let behind =
@@ -127,6 +226,31 @@ mod tests {
         assert_eq!(short, ".LBB0_7:; brne .LBB0_7; .LBB0_2:; .LBB0_1:; ret");
         let short = shortened("f", "brge .LBB0_1\nrjmp .LBB0_7\n.LBB0_1:\nnop\n.LBB0_7:\nret");
         assert_eq!(short, "brlt .LBB0_7; .LBB0_1:; nop; .LBB0_7:; ret");
+    }
+
+    #[test]
+    fn a_branch_that_cannot_reach_goes_by_another_jump() {
+        let away = "nop\n".repeat(70);
+        let pair = |n| format!("breq .LBB0_{n}\nrjmp .LBB0_9\n.LBB0_{n}:\nnop\n");
+        let short = shortened(
+            "f",
+            &format!("{}{}{}{away}{}{away}.LBB0_9:\nret", pair(1), pair(2), pair(3), pair(4)),
+        );
+        let begin = "brne .Lway_0_0; .LBB0_1:; nop; brne .Lway_0_0; .LBB0_2:; nop; \
+                     breq .LBB0_3; .Lway_0_0:; rjmp .LBB0_9; .LBB0_3:; nop; nop";
+        assert!(short.starts_with(begin), "{short}");
+        assert!(short.contains("breq .LBB0_4; rjmp .LBB0_9; .LBB0_4:"), "{short}");
+    }
+
+    #[test]
+    fn a_way_must_lead_to_a_jump() {
+        let way = |what: &str| {
+            let code = program(&[("f", &format!("brne .Lway_0_0\n.Lway_0_0:\n{what}"))]);
+            straight(code.functions[0].code().cloned().collect())
+        };
+        assert_eq!(way("rjmp .LBB0_9").unwrap()[0], Line::Insn(Insn::new("brne .LBB0_9")));
+        assert!(way("ret").is_err());
+        assert!(way("rjmp .LBB0_9\n.Lway_0_0:\nrjmp .LBB0_8").is_err());
     }
 
     #[test]

@@ -1,78 +1,183 @@
-//! Which code is hot: it stays as the compiler made it.
+//! Which code is hot: how much of it may be shared.
 //!
-//! A row is the beginning of names, up to the end of a word: a folder, a module, a type or a function. Shared code costs 10 to
-//! 25 cycles wherever it is shared, so that what runs for each step, segment, block or usual line of G-code is here. The example
-//! `lines` of `tests/sim` prints what a line of a job costs, by function. `cargo xtask size` fails when a row names nothing any
-//! more.
+//! A row is the beginning of names, up to the end of a word: a folder, a module, a type or a function. Of the rows that a name begins with the
+//! longest says how hot it is; what no row names is cold.
+//!
+//! The rows come from counts: `KERF_COUNTS=FOLDER cargo xtask bench` writes how often each instruction ran. To share all that repeats costs
+//! 25 cycles each time a function is called and 6 % of what it takes itself; to share its end costs 3. Where that is more than 3 millionths of
+//! the time of a job of the bench for each byte that it saves, the function is warm or hot; in what prepares segments, where it is more than
+//! one millionth. What finds keys for the queue is hot. `cargo xtask size` fails when a row names nothing any more.
 
-/// Beginnings of the names of hot functions.
-pub const ROWS: &[&str] = &[
-    // Every interrupt, and what they call.
+/// How much of a function may be shared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heat {
+    /// All that repeats.
+    Cold,
+    /// What it ends with.
+    Warm,
+    /// Nothing.
+    Hot,
+}
+
+/// Beginnings of the names of functions that stay as they are.
+const HOT: &[&str] = &[
+    // Every interrupt, the executors and their tick.
     "__vector_",
     "kerf::hal::",
-    // The executors and their tick.
     "avr_embassy::",
     "embassy_executor::",
     "embassy_time::",
     "kerf::image::",
-    // Each segment.
     "kerf::dda::",
-    "kerf::motion::",
-    "kerf::tasks::exec::",
-    // Each hold.
-    "kerf::tasks::control::",
-    "kerf::tasks::hold::",
-    "kerf::machine::",
-    // Each line.
-    "kerf::tasks::reader::",
-    "kerf::tasks::lines::",
-    "kerf::tasks::overtake::",
-    "kerf::tasks::parser::",
-    "kerf::tasks::ports::",
-    "kerf::tasks::tx::",
-    "kerf::tasks::wake::",
-    "kerf::gcode::",
-    "kerf::store::",
-    "kerf::protocol::tinyg::block::put_brief",
-    "kerf::protocol::tinyg::control::",
-    "kerf::protocol::tinyg::write::",
-    // Each block.
-    "kerf::tasks::planner::run::",
-    "kerf::tasks::planner::Planner>::announce",
-    "kerf::tasks::planner::Planner>::begin",
-    "kerf::tasks::planner::Planner>::carry_out_at_once",
-    "kerf::tasks::planner::Planner>::line",
-    "kerf::tasks::planner::Planner>::part",
-    "kerf::tasks::planner::Planner>::push",
-    "kerf::tasks::planner::Planner>::replan",
-    "kerf::tasks::planner::Planner>::straight",
-    "kerf::tasks::planner::Planner>::turn",
-    // Woken by all of these.
-    "kerf::tasks::reporter::run::",
-    "kerf::tasks::reporter::State>::now",
-    "kerf::tasks::reporter::tell",
-    "kerf::tasks::view::View>::modal",
-    "kerf::tasks::view::View>::of",
-    "kerf::tasks::view::View>::seen",
-    "kerf::tasks::common::snapshot",
-    "kerf::tasks::power::",
-    "kerf::motors::Motors>::pass",
-    "kerf::config::number::Fixed>::render",
     // Small, and called from everywhere.
     "memcpy",
     "memset",
     "core::",
+    // What runs many times for each segment, block, line or report.
+    "kerf::config::setting::Setting>::owner",
+    "kerf::gcode::axes::value::",
+    "kerf::gcode::block::Block>::",
+    "kerf::gcode::command::Commands>::is_motion_alone",
+    "kerf::gcode::decimal::Decimal>::",
+    "kerf::gcode::interpreter::Interpreter",
+    "kerf::gcode::lexer::comment",
+    "kerf::gcode::number::",
+    "kerf::gcode::state::State>::advance::",
+    "kerf::gcode::state::State>::carry_out",
+    "kerf::gcode::state::State>::usual::",
+    "kerf::gcode::usual::",
+    "kerf::motion::block::Line>::",
+    "kerf::motion::chain::Slope>::is_above",
+    "kerf::motion::divide::",
+    "kerf::motion::float::",
+    "kerf::motion::prep::",
+    "kerf::motion::queue::BlockQueue>::",
+    "kerf::motion::replan::",
+    "kerf::motion::short::Log>::of",
+    "kerf::motion::steps::Motor>::go",
+    "kerf::protocol::line::Span>::of",
+    "kerf::protocol::tinyg::format::Format>::",
+    "kerf::protocol::tinyg::request::Request",
+    "kerf::protocol::tinyg::status::number",
+    "kerf::tasks::exec::",
+    "kerf::tasks::health::look_for_starvation",
+    "kerf::tasks::lines::LinePool>::end_line",
+    "kerf::tasks::lines::LinePool>::end_question",
+    "kerf::tasks::lines::LinePool>::put",
+    "kerf::tasks::lines::LinePool>::put_text",
+    "kerf::tasks::lines::LinePool>::ready",
+    "kerf::tasks::lines::LinePool>::remove",
+    "kerf::tasks::lines::LinePool>::start_of",
+    "kerf::tasks::lines::LinePool>::text",
+    "kerf::tasks::overtake::Scan>::serve",
+    "kerf::tasks::parser::Parser>::line_of",
+    "kerf::tasks::parser::run::",
+    "kerf::tasks::planner::Planner>::carry_out_at_once",
+    "kerf::tasks::planner::Planner>::close_chain",
+    "kerf::tasks::planner::Planner>::is_due",
+    "kerf::tasks::planner::Planner>::replan",
+    "kerf::tasks::planner::run::",
+    "kerf::tasks::ports::Port>::promise",
+    "kerf::tasks::reader::run::",
+    "kerf::tasks::tx::Tx",
+    "kerf::tasks::tx::Tx>::has_room",
+    "kerf::tasks::view::View>::of",
+    "kerf::tasks::wake::Wake>::",
 ];
 
-/// Whether a function of this name is hot.
-pub fn is_hot(name: &str) -> bool {
-    ROWS.iter().any(|row| begins(name, row))
+/// What runs as often as a segment, a block or a line: ends are shared, two or three cycles each.
+pub const WARM: &[&str] = &[
+    "kerf::config::Settings>::get",
+    "kerf::config::Settings>::put",
+    "kerf::config::name::Name>::",
+    "kerf::config::setting::",
+    "kerf::gcode::limits::check_reach::",
+    "kerf::gcode::state::State>::begin",
+    "kerf::gcode::state::State>::end_motion::",
+    "kerf::gcode::state::State>::execute::",
+    "kerf::gcode::state::State>::finish::",
+    "kerf::gcode::state::State>::motion::",
+    "kerf::gcode::usual::Words>::integer",
+    "kerf::motion::",
+    "kerf::motion::limits::over",
+    "kerf::motion::line::Builder>::line::",
+    "kerf::protocol::tinyg::block::put_brief::",
+    "kerf::protocol::tinyg::json::Cursor>::blanks",
+    "kerf::protocol::tinyg::json::Cursor>::take",
+    "kerf::protocol::tinyg::request::Request>::footer::",
+    "kerf::protocol::tinyg::request::Request>::line_number::",
+    "kerf::protocol::tinyg::request::Request>::open::",
+    "kerf::protocol::tinyg::variation::Variation>::",
+    "kerf::protocol::tinyg::write::Writer",
+    "kerf::store::kept::Item>::",
+    "kerf::store::kept::key",
+    "kerf::store::log::",
+    "kerf::tasks::common::snapshot",
+    "kerf::tasks::links::Links>::may_feed",
+    "kerf::tasks::parser::",
+    "kerf::tasks::planner::Planner>::announce",
+    "kerf::tasks::planner::Planner>::begin",
+    "kerf::tasks::planner::Planner>::build_chain",
+    "kerf::tasks::planner::Planner>::end_chain",
+    "kerf::tasks::planner::Planner>::line",
+    "kerf::tasks::planner::Planner>::make_up",
+    "kerf::tasks::planner::Planner>::straight",
+    "kerf::tasks::planner::Planner>::take_up_changes",
+    "kerf::tasks::reader::Intake",
+    "kerf::tasks::reporter::State>::now",
+    "kerf::tasks::reporter::run::",
+    "kerf::tasks::storage::differs",
+    "kerf::tasks::storage::run::",
+    "kerf::tasks::switches::mode",
+    "kerf::tasks::view::View",
+    "kerf::tasks::view::View>::carries_out",
+    "kerf::tasks::view::View>::seen",
+];
+
+/// Of these, what seldom runs.
+const COLD: &[&str] = &[
+    "kerf::gcode::usual::Words>::feed",
+    "kerf::motion::chain::Chain>::closed",
+    "kerf::motion::curve::Curve>::of",
+    "kerf::motion::curve::acceleration",
+    "kerf::motion::dynamics::",
+    "kerf::motion::exec::Exec>::take_up",
+    "kerf::motion::governor::Governor>::creep",
+    "kerf::motion::governor::Governor>::lay",
+    "kerf::motion::junction::mean_deviation",
+    "kerf::motion::limits::",
+    "kerf::motion::line::",
+    "kerf::motion::pace::paces",
+    "kerf::motion::path::Path>::look_along",
+    "kerf::motion::prep::Prep>::begin_far",
+    "kerf::motion::prep::Prep>::cut",
+    "kerf::motion::prep::Prep>::left_of",
+    "kerf::motion::prep::Prep>::lengthen",
+    "kerf::motion::steps::Motor>::",
+    "kerf::store::log::Log>::append::",
+    "kerf::tasks::parser::echo",
+    "kerf::tasks::parser::has_left",
+    "kerf::tasks::parser::job_line",
+    "kerf::tasks::parser::ran",
+];
+
+/// How hot a function of this name is.
+pub fn heat(name: &str) -> Heat {
+    let longest = |rows: &[&str]| {
+        rows.iter().filter(|row| begins(name, row)).map(|row| row.len()).max().unwrap_or(0)
+    };
+    let (hot, warm, cold) = (longest(HOT), longest(WARM), longest(COLD));
+    match () {
+        () if hot > warm.max(cold) => Heat::Hot,
+        () if warm > cold => Heat::Warm,
+        () => Heat::Cold,
+    }
 }
 
 /// The rows that no function is named by.
 pub fn stale<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Vec<&'static str> {
     let stale = |row: &&&str| !names.clone().any(|name| begins(name, row));
-    ROWS.iter().filter(stale).copied().collect()
+    [HOT, WARM, COLD].into_iter().flatten().filter(stale).copied().collect()
 }
 
 /// `<kerf::motion::exec::Exec>::run` begins with `kerf::motion::`, and its poll with what the task is called.
@@ -91,26 +196,27 @@ mod tests {
 
     #[test]
     fn a_row_names_what_begins_with_it() {
-        for name in [
-            "<kerf::motion::exec::Exec>::run",
-            "kerf::motion::path::norm",
-            "__vector_17",
-            "<&kerf::motion::x::X as Y>::z",
+        for (name, heat) in [
+            ("__vector_17", Heat::Hot),
+            ("kerf::dda::Dda::settle", Heat::Hot),
+            ("<&kerf::dda::x::X as Y>::z", Heat::Hot),
+            ("<embassy_executor::raw::TaskStorage<kerf::dda::run::{closure#0}>>::poll", Heat::Hot),
+            ("kerf::dda_of_arc", Heat::Cold),
+            ("kerf::protocol::f::<kerf::dda::Dda>", Heat::Cold),
+            ("main", Heat::Cold),
         ] {
-            assert!(is_hot(name), "{name}");
+            assert_eq!(super::heat(name), heat, "{name}");
         }
-        assert!(is_hot(
-            "<embassy_executor::raw::TaskStorage<kerf::tasks::exec::run::{closure#0}>>::poll"
-        ));
-        assert!(is_hot("<kerf::tasks::planner::Planner>::begin"));
-        for name in [
-            "<kerf::tasks::planner::Planner>::begin_arc",
-            "kerf::protocol::tinyg::json::check",
-            "kerf::protocol::f::<kerf::motion::exec::Exec>",
-            "main",
-        ] {
-            assert!(!is_hot(name), "{name}");
+    }
+
+    #[test]
+    fn the_longest_row_says_how_hot_a_function_is() {
+        for (rows, kind) in [(HOT, Heat::Hot), (WARM, Heat::Warm), (COLD, Heat::Cold)] {
+            assert!(rows.iter().all(|row| heat(row) == kind));
         }
+        let inside =
+            |row: &&&str| WARM.iter().any(|warm| row.len() > warm.len() && row.starts_with(warm));
+        assert!(COLD.iter().any(|row| inside(&row)), "a row inside of another");
     }
 
     #[test]

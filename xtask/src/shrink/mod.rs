@@ -1,16 +1,17 @@
 //! Makes the image smaller: what the compiler wrote is rewritten before it is linked.
 //!
 //! Fat LTO gives one assembler text for the whole program, so that what repeats can be shared wherever it stands. LLVM does nothing of
-//! the kind for AVR. Only cold functions share ([`hot`] has the others); assembler of the source is never changed.
+//! the kind for AVR. Cold functions share all that repeats, warm ones their ends, hot ones nothing ([`hot`]); assembler of the source is never changed.
 //!
 //! | module | what it does | flash, bytes |
 //! |---|---|---|
 //! | [`text`], `dialect` | reads LLVM's text, writes it for `avr-as` | |
-//! | [`tidy`] | leaves out what the compiler need not have written, and runs both to compare them | 6,700 |
-//! | [`prologue`] | shares what functions begin with | 2,700 |
-//! | [`repeats`] | shares any other code that repeats, ends of functions above all | 5,400 |
-//! | [`branch`] | branches go where they lead, not round a jump | 1,300 |
-//! | [`order`] | puts functions near those they call, which shortens calls | 3,200 |
+//! | [`tidy`] | leaves out what the compiler need not have written, and runs both to compare them | 12,800 |
+//! | [`prologue`] | shares what functions begin with | 5,900 |
+//! | [`repeats`] | shares any other code that repeats, ends of functions above all | 14,500 |
+//! | [`branch`] | branches go where they lead, not round a jump | 2,700 |
+//! | [`order`] | puts functions near those they call, which shortens calls | 2,100 |
+//! | [`via`] | has calls over a long way go by one jump | 1,200 |
 //! | [`verify`] | puts back what is shared, and compares with the tidied text | |
 //! | [`link`] | assembles and links, as `rustc` did | |
 //!
@@ -27,11 +28,13 @@ mod repeats;
 pub mod text;
 mod tidy;
 mod verify;
+mod via;
 
 use std::collections::HashSet;
 
 use anyhow::{Context, Result};
 
+use hot::Heat;
 use text::{Function, Insn, Line, Program};
 
 /// Two texts for the assembler.
@@ -52,14 +55,17 @@ pub fn shrink(text: &str) -> Result<Texts> {
     repeats::share(&mut small);
     branch::shorten(&mut small);
     order::arrange(&mut small);
+    via::share(&mut small);
     verify::check(&tidy, &small).context("the program that was made smaller is another one")?;
     Ok(Texts { plain: plain.text(), small: small.text() })
 }
 
-/// Whether a function may become slower.
-fn is_cold(function: &Function) -> bool {
-    let name = format!("{:#}", rustc_demangle::demangle(&function.name));
-    !hot::is_hot(&name) && function.insns().all(|insn| insn.op != "reti")
+/// How much of a function may be shared.
+fn heat(function: &Function) -> Heat {
+    if function.insns().any(|insn| insn.op == "reti") {
+        return Heat::Hot;
+    }
+    hot::heat(&format!("{:#}", rustc_demangle::demangle(&function.name)))
 }
 
 /// The names that assembler of the source contains.

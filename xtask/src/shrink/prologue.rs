@@ -26,8 +26,9 @@
 
 use std::collections::BTreeMap;
 
+use super::hot::Heat;
 use super::text::{Function, Insn, Line, Program};
-use super::{is_cold, names_in_source};
+use super::{heat, names_in_source};
 
 /// What a function begins with.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,7 +63,7 @@ pub fn share(program: &mut Program) {
     let in_source = names_in_source(program);
     let mut groups: BTreeMap<Kind, Vec<(usize, Entry)>> = BTreeMap::new();
     for (at, function) in program.functions.iter().enumerate() {
-        if is_cold(function)
+        if heat(function) == Heat::Cold
             && !in_source.contains(&function.name)
             && let Some(entry) = entry(function)
         {

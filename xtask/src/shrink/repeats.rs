@@ -11,7 +11,7 @@
 //! ```
 //!
 //! What ends with `ret` is jumped to instead (`__tail_0`), which costs no stack, and may take anything off the stack: that shares
-//! the ends of functions.
+//! the ends of functions. It costs two or three cycles, so that warm functions share these, and nothing else.
 //!
 //! `call`, `jmp` and `ret` change no register and no flag, so that a part may begin and end anywhere; but
 //!
@@ -25,8 +25,9 @@
 
 use std::collections::{BinaryHeap, HashMap};
 
+use super::hot::Heat;
 use super::text::{Function, Insn, Line, Program};
-use super::{is_cold, prologue, quiet};
+use super::{heat, prologue, quiet};
 
 /// What a part is called whose end is a `ret` of its own.
 pub const PART: &str = "__part_";
@@ -132,9 +133,11 @@ impl Stream {
             insns: Vec::new(),
         };
         let mut known: HashMap<Insn, u32> = HashMap::new();
-        for (at, function) in
-            program.functions.iter().enumerate().filter(|(_, function)| is_cold(function))
-        {
+        for (at, function) in program.functions.iter().enumerate() {
+            let heat = heat(function);
+            if heat == Heat::Hot {
+                continue;
+            }
             let quiet = quiet(function);
             let mut may_be_skipped = false;
             for (line, what) in function.lines.iter().enumerate() {
@@ -145,7 +148,11 @@ impl Stream {
                             stream.insns.push(insn.clone());
                             stream.insns.len() as u32 - 1
                         });
-                        stream.push(number, class(insn), (at, line));
+                        let class = match class(insn) {
+                            Class::Plain if heat == Heat::Warm => Class::Tail,
+                            class => class,
+                        };
+                        stream.push(number, class, (at, line));
                     }
                     Line::Note(_) => {}
                     _ => stream.push(u32::MAX, Class::Barrier, (at, line)),
@@ -196,7 +203,11 @@ impl Stream {
                 same.into_values().filter(|places| places.len() > 1).collect();
             repeated.sort_unstable();
             starts.extend(repeated.iter().flatten());
-            let parts = repeated.into_iter().filter(|places| self.is_part(places[0], length));
+            // Only some places of a group may be in functions that share more than ends.
+            let parts = repeated.into_iter().map(|mut places| {
+                places.retain(|at| self.is_part(*at, length));
+                places
+            });
             let groups = parts.map(|places| Group { length, places });
             found.extend(groups.filter(|group| self.saving(&self.free(group), length).is_some()));
         }
@@ -397,6 +408,15 @@ mod tests {
             shared(&[("__vector_1", &(BODY.repeat(5) + "ret")), ("f", &(BODY.repeat(5) + "ret"))]);
         assert!(after.functions[0].insns().all(|insn| insn.op != "call"));
         assert!(after.functions[1].insns().any(|insn| insn.op == "call"));
+    }
+
+    #[test]
+    fn warm_code_shares_its_ends_alone() {
+        let warm = super::super::hot::WARM[0];
+        let body = format!("{BODY}inc r2\n").repeat(5) + BODY + "ret";
+        let after = shared(&[(warm, &body), ("f", &body), ("g", &format!("{BODY}ret"))]);
+        assert!(after.functions[0].insns().all(|insn| insn.op != "call"));
+        assert!(after.functions[0].insns().any(|insn| insn.op == "jmp"));
     }
 
     #[test]

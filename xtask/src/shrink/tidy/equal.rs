@@ -9,6 +9,7 @@ use std::collections::HashMap;
 use anyhow::{Context, Result, bail, ensure};
 
 use super::super::text::{Function, Line};
+use super::copies::Copies;
 use super::effect::{self, Set, bit};
 use super::flow::{Flow, Known};
 use super::run::{End, Run};
@@ -38,7 +39,14 @@ fn function(old: &Function, new: &Function) -> Result<()> {
     let (Some(old), Some(new)) = (Flow::of(old), Flow::of(new)) else {
         bail!("it goes where nobody knows");
     };
-    let pieces = Pieces { stops: stops(&new), needed: new.needed(), known: old.known(), old, new };
+    let pieces = Pieces {
+        stops: stops(&new),
+        needed: new.needed(),
+        known: old.known(),
+        copies: Copies::of(&old),
+        old,
+        new,
+    };
     pieces.piece(None)?;
     for label in pieces.new.labels.keys() {
         pieces.piece(Some(label)).with_context(|| format!("from {label}"))?;
@@ -63,6 +71,8 @@ struct Pieces<'a> {
     needed: Vec<Set>,
     /// Of the old one: what is known before each line.
     known: Vec<Known>,
+    /// Of the old one: which registers hold the same before each line.
+    copies: Vec<Copies>,
 }
 
 impl Pieces<'_> {
@@ -74,8 +84,9 @@ impl Pieces<'_> {
         );
         let needed = label.map_or(effect::ALL, |_| self.needed[to]);
         for trial in 0..TRIALS {
-            let mut first = Run::new(trial, trial, &self.known[from]);
-            let mut second = Run::new(trial, trial + 1_000, &self.known[from]);
+            let facts = (&self.known[from], &self.copies[from]);
+            let mut first = Run::new(trial, trial, facts);
+            let mut second = Run::new(trial, trial + 1_000, facts);
             second.take(&first, needed);
             let ends =
                 (first.run(&self.old, from, &self.stops), second.run(&self.new, to, &self.stops));
@@ -109,6 +120,8 @@ impl Pieces<'_> {
                 value & bits.zeros == 0 && value & bits.ones == bits.ones,
                 "r{register} is not as it should be"
             );
+            let root = self.copies[at.0].root(register);
+            ensure!(value == first.part(root), "r{register} is no copy of r{root}");
         }
         Ok(())
     }
@@ -139,6 +152,10 @@ mod tests {
             ("ldi r26, 1\nmov r24, r26\nret", "ldi r24, 1\nret"),
             ("movw r18, r22\nmovw r24, r18\nret", "movw r24, r22\nmovw r18, r22\nret"),
             ("mov r24, r1\nret", "ldi r24, 0\nret"),
+            (
+                "mov r26, r22\ncpi r24, 0\nbreq .LBB0_1\nwdr\n.LBB0_1:\nmov r24, r26\nret",
+                "cpi r24, 0\nbreq .LBB0_1\nwdr\n.LBB0_1:\nmov r24, r22\nret",
+            ),
             (
                 "add r24, r22\ncpi r24, 0\nbreq .LBB0_1\ninc r24\n.LBB0_1:\nret",
                 "add r24, r22\nbreq .LBB0_1\ninc r24\n.LBB0_1:\nret",
@@ -180,6 +197,10 @@ mod tests {
             ),
             ("ldd r24, Z+1\nldd r24, Z+2\nret", "ldd r24, Z+2\nret"),
             ("ldi r26, 1\n.LBB0_1:\nmov r24, r26\nret", ".LBB0_1:\nldi r24, 2\nret"),
+            (
+                "cpi r24, 0\nbreq .LBB0_1\nmov r26, r22\n.LBB0_1:\nmov r24, r26\nret",
+                "cpi r24, 0\nbreq .LBB0_1\nmov r26, r22\n.LBB0_1:\nmov r24, r22\nret",
+            ),
         ] {
             assert!(refused(before, after).is_some(), "{before} and {after}");
         }

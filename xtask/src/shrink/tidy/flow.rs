@@ -17,6 +17,10 @@ pub struct Flow<'a> {
     /// An instruction before may skip this one.
     pub may_be_skipped: Vec<bool>,
     pub labels: HashMap<&'a str, usize>,
+    /// Instructions in assembler of the source whose effect is known.
+    pub fixed: HashMap<usize, Insn>,
+    /// Of each line that keeps the status register: the line that puts it back.
+    restores: Vec<Option<usize>>,
 }
 
 impl<'a> Flow<'a> {
@@ -30,11 +34,71 @@ impl<'a> Flow<'a> {
             _ => None,
         };
         let labels: HashMap<&str, usize> = lines.iter().enumerate().filter_map(label).collect();
-        let effects = lines.iter().map(|line| effect::of_line(line)).collect();
+        let fixed = fixed(function);
+        let fixed: HashMap<usize, Insn> = (origins.iter().enumerate())
+            .filter_map(|(at, origin)| Some((at, fixed.get(origin)?.clone())))
+            .collect();
+        let effect = |(at, line): (usize, &&Line)| {
+            fixed.get(&at).and_then(effect::of).unwrap_or_else(|| effect::of_line(line))
+        };
+        let effects: Vec<Effect> = lines.iter().enumerate().map(effect).collect();
         let next =
             (0..lines.len()).map(|at| next(&lines, &labels, at)).collect::<Option<Vec<_>>>()?;
-        let may_be_skipped = (0..lines.len()).map(|at| at > 0 && is_skip(lines[at - 1])).collect();
-        Some(Flow { lines, origins, effects, next, may_be_skipped, labels })
+        let may_be_skipped: Vec<bool> =
+            (0..lines.len()).map(|at| at > 0 && is_skip(lines[at - 1])).collect();
+        let mut flow = Flow {
+            restores: vec![None; lines.len()],
+            lines,
+            origins,
+            effects,
+            next,
+            may_be_skipped,
+            labels,
+            fixed,
+        };
+        flow.restores = (0..flow.lines.len()).map(|at| flow.restored(at)).collect();
+        Some(flow)
+    }
+
+    /// The instruction of a line, also one of assembler of the source whose effect is known.
+    pub fn insn(&self, at: usize) -> Option<&Insn> {
+        match self.lines.get(at)? {
+            Line::Insn(insn) => Some(insn),
+            Line::Fixed(_) => self.fixed.get(&at),
+            Line::Label(_) | Line::Note(_) => None,
+        }
+    }
+
+    /// Where what `in r0, 63` keeps is put back: straight on, with nothing but that reading the register.
+    fn restored(&self, at: usize) -> Option<usize> {
+        let kept = kept_status(self.insn(at)?).filter(|_| !self.may_be_skipped[at])?;
+        for out in at + 1..self.lines.len() {
+            let (insn, effect) = (self.insn(out)?, &self.effects[out]);
+            let (first, second) = effect::operands(insn);
+            if insn.op == "out" && first == "63" && effect::register(second) == Some(kept) {
+                return (!self.may_be_skipped[out]).then_some(out);
+            }
+            if insn.is_jump()
+                || (effect.reads | effect.changes()) & effect::bit(kept) != 0
+                || effect.reads & effect::FLAGS != 0
+            {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// What a line reads, if that is needed which is needed behind each line.
+    ///
+    /// Flags that are kept and put back are read if they are needed then.
+    fn reads(&self, at: usize, needed: &[Set]) -> Set {
+        let reads = self.effects[at].reads;
+        let Some(out) = self.restores[at] else { return reads };
+        let kept = self.insn(at).and_then(kept_status).map_or(0, effect::bit);
+        if needed[out] & kept != 0 {
+            return reads;
+        }
+        reads & !effect::FLAGS | needed[out] & effect::FLAGS
     }
 
     /// The first line at or behind a line that is no label.
@@ -54,7 +118,7 @@ impl<'a> Flow<'a> {
                 behind[at] =
                     self.next[at].iter().map(|to| before[*to]).fold(0, |all, one| all | one);
                 let written = if self.may_be_skipped[at] { 0 } else { effect.writes };
-                let needed = behind[at] & !written | effect.reads;
+                let needed = behind[at] & !written | self.reads(at, &behind);
                 again |= needed != before[at];
                 before[at] = needed;
             }
@@ -72,7 +136,7 @@ impl<'a> Flow<'a> {
         }
         while let Some(at) = open.pop() {
             let Some(known) = before[at] else { continue };
-            let mut behind = known.behind(self.lines[at], &self.effects[at]);
+            let mut behind = known.behind(self.lines[at], self.insn(at), &self.effects[at]);
             if self.may_be_skipped[at] {
                 behind = behind.or(&known);
             }
@@ -88,6 +152,35 @@ impl<'a> Flow<'a> {
     }
 }
 
+/// The register that an instruction keeps the status register in.
+fn kept_status(insn: &Insn) -> Option<u8> {
+    let (first, second) = effect::operands(insn);
+    if insn.op == "in" && second == "63" { effect::register(first) } else { None }
+}
+
+/// Instructions in assembler of the source that runs straight on, by their lines.
+fn fixed(function: &Function) -> HashMap<usize, Insn> {
+    const STRAIGHT: [&str; 10] =
+        ["in", "out", "cli", "sei", "mul", "mov", "movw", "add", "adc", "clr"];
+    let mut known = HashMap::new();
+    let mut piece = Vec::new();
+    let mut is_straight = true;
+    for (at, line) in function.lines.iter().enumerate() {
+        let Line::Fixed(text) = line else {
+            if is_straight {
+                known.extend(piece.drain(..));
+            }
+            piece.clear();
+            is_straight = true;
+            continue;
+        };
+        let insn = Insn::new(text);
+        is_straight &= STRAIGHT.contains(&insn.op.as_str()) && effect::of(&insn).is_some();
+        piece.push((at, insn));
+    }
+    known
+}
+
 fn is_skip(line: &Line) -> bool {
     matches!(line, Line::Insn(insn) if insn.is_skip())
 }
@@ -100,6 +193,8 @@ fn next(lines: &[&Line], labels: &HashMap<&str, usize>, at: usize) -> Option<Vec
     match insn.op.as_str() {
         "ret" | "jmp" => Some(Vec::new()),
         "rjmp" => Some(vec![to()?]),
+        // Were it to return, the next function would follow.
+        "call" if follows.is_none() => Some(Vec::new()),
         _ if effect::branch(&insn.op).is_some() => Some(vec![to()?, follows?]),
         "cpse" | "sbrc" | "sbrs" | "sbic" | "sbis" => {
             Some(vec![follows?, (at + 2 < lines.len()).then_some(at + 2)?])
@@ -156,7 +251,7 @@ impl Known {
     }
 
     /// What is known behind a line.
-    pub fn behind(&self, line: &Line, effect: &Effect) -> Known {
+    pub fn behind(&self, line: &Line, insn: Option<&Insn>, effect: &Effect) -> Known {
         let mut known = *self;
         for (number, register) in known.registers.iter_mut().enumerate() {
             if effect.changes() & 1 << number != 0 {
@@ -164,10 +259,10 @@ impl Known {
             }
         }
         // Assembler of the source leaves register 1 as it was.
-        if matches!(line, Line::Fixed(_)) {
+        if matches!(line, Line::Fixed(_)) && insn.is_none() {
             known.registers[1] = self.registers[1];
         }
-        if let Line::Insn(insn) = line {
+        if let Some(insn) = insn {
             self.computed(insn, &mut known);
         }
         known

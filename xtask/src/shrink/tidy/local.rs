@@ -1,7 +1,8 @@
 //! What is known between two labels: which registers hold copies, and which hold what lies in the frame.
 
 use super::super::text::{Insn, Line};
-use super::effect::{self, Effect, bit, operands, register};
+use super::copies::Copies;
+use super::effect::{self, bit, operands, register};
 use super::flow::Flow;
 
 /// What is known before a line.
@@ -31,6 +32,14 @@ impl Local {
         self.frame.clear();
     }
 
+    /// Control comes from elsewhere: all that is known are the copies that hold on every way.
+    pub fn enter(&mut self, copies: &Copies) {
+        self.clear();
+        for register in 0..32 {
+            self.copy(register, copies.root(register));
+        }
+    }
+
     pub fn original(&self, copy: u8) -> Option<u8> {
         self.copies[usize::from(copy)]
     }
@@ -50,7 +59,9 @@ impl Local {
     }
 
     /// Goes past a line.
-    pub fn pass(&mut self, line: &Line, effect: &Effect, may_be_skipped: bool) {
+    pub fn pass(&mut self, flow: &Flow, at: usize) {
+        let (line, effect, may_be_skipped) =
+            (flow.lines[at], &flow.effects[at], flow.may_be_skipped[at]);
         let before = self.clone();
         for r in (0..32).filter(|r| effect.changes() & bit(*r) != 0) {
             self.forget(r);
@@ -59,6 +70,7 @@ impl Local {
             Line::Insn(insn) if !may_be_skipped => self.learn(insn, &before),
             Line::Insn(insn) if insn.op.starts_with("st") => self.frame.clear(),
             Line::Insn(_) | Line::Note(_) => {}
+            Line::Fixed(_) if flow.fixed.contains_key(&at) => self.frame.clear(),
             Line::Label(_) | Line::Fixed(_) => self.clear(),
         }
     }

@@ -5,6 +5,8 @@
 //! functions as well. [`rules`] has what is done, each by what [`flow`] and [`local`] know; [`equal`] holds every function against the one
 //! that the compiler wrote, by running both.
 
+mod base;
+mod copies;
 mod effect;
 mod equal;
 mod flow;
@@ -18,6 +20,7 @@ use anyhow::Result;
 
 use super::names_in_source;
 use super::text::{Function, Line, Program};
+use copies::Copies;
 use effect::Set;
 use flow::{Flow, Known};
 use local::Local;
@@ -44,6 +47,9 @@ fn tidy_function(function: &mut Function) -> Result<()> {
     while versions.len() < SWEEPS && sweep(function) {
         versions.push(function.clone());
     }
+    if base::share(function) {
+        versions.push(function.clone());
+    }
     equal::check(&versions)
 }
 
@@ -52,9 +58,12 @@ fn sweep(function: &mut Function) -> bool {
     let Some(flow) = Flow::of(function) else { return false };
     let sweep =
         Sweep { needed: flow.needed(), known: flow.known(), uses: uses(&flow), flow: &flow };
-    let mut edits = sweep.edits(|place| place.edit(), false);
+    let mut edits = sweep.edits(|place| place.edit(), None);
     if edits.is_empty() {
-        edits = sweep.edits(|place| place.constant(), true);
+        edits = sweep.edits(|place| place.constant(), Some(&[]));
+    }
+    if edits.is_empty() {
+        edits = sweep.edits(|place| place.copy(), Some(&Copies::of(&flow)));
     }
     let origins = flow.origins;
     let lost = edits.is_empty();
@@ -92,7 +101,8 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    fn edits(&self, rule: impl Fn(&Place) -> Option<Edit>, only_one: bool) -> Edit {
+    /// What a rule finds: all, or only the first, which may depend on what holds at labels.
+    fn edits(&self, rule: impl Fn(&Place) -> Option<Edit>, first: Option<&[Copies]>) -> Edit {
         let flow = self.flow;
         let calls = |label: &str| self.uses.get(label).copied().unwrap_or(0);
         let mut local = Local::of(flow);
@@ -103,8 +113,11 @@ impl Sweep<'_> {
         for (at, line) in flow.lines.iter().enumerate() {
             if let Line::Label(label) = line {
                 waits &= busy.is_some_and(|last| last > at);
-                local.clear();
-                if calls(label) == 0 && label.starts_with(".LBB") && !waits {
+                match first.and_then(|copies| copies.get(at)) {
+                    Some(copies) => local.enter(copies),
+                    None => local.clear(),
+                }
+                if first.is_none() && calls(label) == 0 && label.starts_with(".LBB") && !waits {
                     edits.push((at, None));
                 }
                 continue;
@@ -123,7 +136,7 @@ impl Sweep<'_> {
                     insn,
                 };
                 if let Some(edit) = rule(&place) {
-                    if only_one {
+                    if first.is_some() {
                         return edit;
                     }
                     busy = edit.iter().map(|(at, _)| *at).max();
@@ -131,7 +144,7 @@ impl Sweep<'_> {
                     edits.extend(edit);
                 }
             }
-            local.pass(line, &flow.effects[at], flow.may_be_skipped[at]);
+            local.pass(flow, at);
         }
         edits
     }
@@ -208,6 +221,36 @@ mod tests {
     }
 
     #[test]
+    fn what_every_way_has_copied_is_not_copied_again() {
+        let text = |between: &str| {
+            format!(
+                "movw r30, r24\nldd r18, Z+1\ncpi r18, 0\nbreq .LBB0_1\n{between}\n.LBB0_1:\nmovw r30, r24\nstd Z+2, r18\nret"
+            )
+        };
+        assert_eq!(tidied(&text("inc r18")).matches("movw").count(), 1);
+        for between in ["ld r18, Z+", "inc r24", "call g"] {
+            assert_eq!(tidied(&text(between)).matches("movw").count(), 2, "{between}");
+        }
+        let again = "wdr\nmovw r30, r24\n.LBB0_1:\nmovw r30, r24\nldd r18, Z+1\nsbiw r24, 1\nbrne .LBB0_1\nret";
+        assert!(tidied(again).contains(".LBB0_1:; movw r30, r24"));
+    }
+
+    #[test]
+    fn a_pair_of_constants_is_copied_from_another() {
+        let text = |high: &str| {
+            format!("ldi r20, 7\nldi r21, {high}\nldi r24, 7\nldi r25, 0\ncall g\nret")
+        };
+        assert_eq!(tidied(&text("0")), "ldi r20, 7; ldi r21, 0; movw r24, r20; call g; ret");
+        assert!(tidied(&text("1")).contains("ldi r24, 7; ldi r25, 0"));
+    }
+
+    #[test]
+    fn assembler_of_the_source_may_use_register_1_meanwhile() {
+        let asm = ";APP\nmul r24, r22\nmov r23, r1\nclr r1\n;NO_APP\nstd Z+1, r23\nmovw r24, r18\nmovw r22, r20\nret";
+        assert!(tidied(asm).contains("std Z+1, r23"));
+    }
+
+    #[test]
     fn a_zero_is_register_1() {
         assert_eq!(tidied("ldi r26, 0\nstd Z+1, r26\nret"), "std Z+1, r1; ret");
         assert_eq!(
@@ -237,6 +280,43 @@ mod tests {
     }
 
     #[test]
+    fn a_pair_is_compared_with_0_at_once() {
+        let text = |pair: &str, branch: &str| {
+            let (low, high) = pair.split_once(' ').unwrap();
+            format!("cp {low}, r1\ncpc {high}, r1\n{branch} .LBB0_1\nsts 500, r1\n.LBB0_1:\nret")
+        };
+        for (pair, branch, begins) in [
+            ("r24 r25", "breq", "sbiw r24, 0; breq"),
+            ("r24 r25", "brlt", "sbiw r24, 0; brlt"),
+            ("r24 r22", "breq", "cp r24, r1; cpc r22, r1; breq"),
+            ("r26 r27", "breq", "or r26, r27; breq"),
+            ("r26 r27", "brlt", "sbiw r26, 0; brlt"),
+            ("r24 r27", "brne", "or r27, r24; brne"),
+            ("r24 r27", "brlt", "cp r24, r1; cpc r27, r1; brlt"),
+            ("r18 r19", "breq", "cp r18, r1; cpc r19, r1; breq"),
+        ] {
+            let after = tidied(&text(pair, branch));
+            assert!(after.starts_with(begins), "{pair} {branch}: {after}");
+        }
+    }
+
+    #[test]
+    fn flags_that_are_kept_and_put_back_need_not_be_set() {
+        let text = |between: &str| {
+            format!("and r24, r22\ncpi r24, 0\nin r0, 63\ncli\n{between}out 63, r0\nret")
+        };
+        assert!(!tidied(&text("sts 500, r24\n")).contains("cpi"));
+        let asm = "and r24, r22\ncpi r24, 0\n;APP\nin r18, 63\ncli\n;NO_APP\nsts 500, r24\n;APP\nout 63, r18\n;NO_APP\n";
+        assert!(!tidied(&format!("{asm}ldi r18, 0\nret")).contains("cpi"));
+        // The register is read, or the flags are needed behind.
+        assert!(tidied(&text("sts 500, r0\n")).contains("cpi"));
+        assert!(tidied(&format!("{asm}sts 502, r18\nret")).contains("cpi"));
+        assert!(
+            tidied(&format!("{asm}brlo .LBB0_1\nwdr\n.LBB0_1:\nldi r18, 0\nret")).contains("cpi")
+        );
+    }
+
+    #[test]
     fn what_a_register_holds_is_not_loaded() {
         let frame = "push r28\npush r29\nin r28, 61\nin r29, 62\n";
         let after = |text: &str| tidied(&format!("{frame}{text}\npop r29\npop r28\nret"));
@@ -251,10 +331,39 @@ mod tests {
     }
 
     #[test]
+    fn a_variable_is_reached_by_a_pointer() {
+        let stores = "sts V+3, r25\nsts V+2, r24\nmov r24, r22\nsts V+4, r24\n";
+        let by_z = "ldi r30, lo8(V+2); ldi r31, hi8(V+2); std Z+1, r25; st Z, r24; ";
+        let after = tidied(&format!("{stores}lds r24, V+7\nret"));
+        assert!(after.starts_with(by_z), "{after}");
+        assert!(after.ends_with("std Z+2, r22; ldd r24, Z+5; ret"), "{after}");
+        for text in [
+            format!("{stores}ret"),
+            format!("{stores}lds r24, V+70\nret"),
+            format!("{stores}lds r24, W+7\nret"),
+            format!("{stores}call g\nlds r24, V+7\nret"),
+            format!(";APP\ncli\n;NO_APP\n{stores}lds r24, V+7\nret"),
+            format!("movw r30, r20\n{stores}lds r24, V+7\nst Z, r24\nret"),
+        ] {
+            assert!(!tidied(&text).contains("lo8"), "{text}");
+        }
+    }
+
+    #[test]
     fn jumps_go_where_jumps_lead() {
         assert_eq!(
             tidied("cpi r24, 1\nbreq .LBB0_2\nrjmp .LBB0_1\n.LBB0_2:\nwdr\n.LBB0_1:\nret"),
             "cpi r24, 1; breq .LBB0_2; ret; .LBB0_2:; wdr; ret"
+        );
+    }
+
+    #[test]
+    fn a_call_at_the_end_does_not_return() {
+        assert_eq!(
+            tidied(
+                "cpi r24, 0\nbreq .LBB0_1\nldi r26, 3\nret\n.LBB0_1:\nmovw r18, r24\nmovw r22, r18\ncall g"
+            ),
+            "cpi r24, 0; breq .LBB0_1; ret; .LBB0_1:; movw r18, r24; movw r22, r24; call g"
         );
     }
 

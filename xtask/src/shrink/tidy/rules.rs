@@ -31,6 +31,7 @@ impl Place<'_> {
             Self::mask,
             Self::again,
             Self::compare,
+            Self::word,
             Self::truth,
             Self::copies,
             Self::zero,
@@ -110,7 +111,41 @@ impl Place<'_> {
             "movw" => are_equal(d, register(second)?) && are_equal(d + 1, register(second)? + 1),
             _ => false,
         };
-        again.then(|| self.gone())?
+        if again { self.gone() } else { self.constant_pair() }
+    }
+
+    /// Gives a pair, byte by byte, values that another pair has.
+    fn constant_pair(&self) -> Option<Edit> {
+        let value = |at: usize| {
+            let insn = self.insn_at(at)?;
+            let (first, second) = operands(insn);
+            let is_free = !self.flow.may_be_skipped[at];
+            let value = match insn.op.as_str() {
+                "ldi" => immediate(second)?,
+                "mov" => self.known[at].value(register(second)?)?,
+                _ => return None,
+            };
+            is_free.then_some((register(first)?, value))
+        };
+        let (a, b) = (value(self.at)?, value(self.at + 1)?);
+        let (low, high) = if a.0 < b.0 { (a, b) } else { (b, a) };
+        if low.0 % 2 != 0 || high.0 != low.0 + 1 {
+            return None;
+        }
+        let holds = |pair: &u8| {
+            let value = |register| self.known().value(register);
+            *pair != low.0 && value(*pair) == Some(low.1) && value(*pair + 1) == Some(high.1)
+        };
+        let pair = (0..32).step_by(2).find(holds)?;
+        let copy = Insn::new(&format!("movw r{}, r{pair}", low.0));
+        Some(vec![(self.at, Some(copy)), (self.at + 1, None)])
+    }
+
+    /// Copies what was copied, or reads a copy, by what holds on every way that leads here.
+    ///
+    /// As with a [`constant`](Self::constant), nothing else may be left out with it.
+    pub fn copy(&self) -> Option<Edit> {
+        self.again().or_else(|| self.copies())
     }
 
     /// Compares a register with 0 whose value set the flags alike.
@@ -151,6 +186,32 @@ impl Place<'_> {
             _ => false,
         };
         is_test.then(|| register(first))?
+    }
+
+    /// Compares a pair with 0 byte by byte.
+    fn word(&self) -> Option<Edit> {
+        let high = self.insn_at(self.at + 1)?;
+        let of = |insn: &Insn, op: &str| {
+            let (first, second) = operands(insn);
+            register(first).filter(|_| insn.op == op && second == "r1")
+        };
+        let (low, high) = (of(self.insn, "cp")?, of(high, "cpc")?);
+        let is_zero = self.known().value(1) == Some(0);
+        if !is_zero || low == 1 || high == 1 || self.flow.may_be_skipped[self.at + 1] {
+            return None;
+        }
+        let needed = self.needed[self.at + 1];
+        let only_zero = needed & effect::FLAGS & !effect::Z == 0;
+        let insn = if only_zero && needed & bit(low) == 0 {
+            format!("or r{low}, r{high}")
+        } else if only_zero && needed & bit(high) == 0 {
+            format!("or r{high}, r{low}")
+        } else if needed & effect::H == 0 && low >= 24 && low % 2 == 0 && high == low + 1 {
+            format!("sbiw r{low}, 0")
+        } else {
+            return None;
+        };
+        Some(vec![(self.at, Some(Insn::new(&insn))), (self.at + 1, None)])
     }
 
     /// Makes 0 or 1 of a condition, and branches on that.

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::super::text::{Insn, Line};
+use super::copies::Copies;
 use super::effect::{self, Set, bit, operands, register};
 use super::flow::{Flow, Known, immediate};
 
@@ -40,10 +41,15 @@ pub struct Run {
 
 impl Run {
     /// Registers hold anything that may be in them. Two with one `seed` find the same in memory.
-    pub fn new(seed: u64, registers: u64, known: &Known) -> Run {
+    pub fn new(seed: u64, registers: u64, (known, copies): (&Known, &Copies)) -> Run {
         let value = |number: usize| {
-            let bits = known.bits(number as u8);
-            usual(hash(&(registers, number)), seed) & !bits.zeros | bits.ones
+            let root = copies.root(number as u8);
+            let same = (0..32).filter(|other| copies.root(*other) == root);
+            let (zeros, ones) = same.fold((0, 0), |(zeros, ones), other| {
+                let bits = known.bits(other);
+                (zeros | bits.zeros, ones | bits.ones)
+            });
+            usual(hash(&(registers, root)), seed) & !zeros | ones
         };
         let flags = hash(&(registers, "flags")) & FLAGS;
         let (registers, memory) = (std::array::from_fn(value), HashMap::new());
@@ -79,14 +85,14 @@ impl Run {
             {
                 return End::At(label.clone());
             }
-            let taken = match line {
-                Line::Insn(insn) => self.step(insn),
-                Line::Fixed(text) => {
+            let taken = match (line, flow.insn(at)) {
+                (_, Some(insn)) => self.step(insn),
+                (Line::Fixed(text), None) => {
                     self.note(text, effect::ALL);
                     self.spoil(effect::ALL & !bit(1), text);
                     false
                 }
-                Line::Label(_) | Line::Note(_) => false,
+                _ => false,
             };
             at = match next[..] {
                 [] => return End::Left,
@@ -194,7 +200,12 @@ impl Run {
             ("swap", Some(d), _) => self.set(d, self.get(d).rotate_left(4)),
             ("ld" | "ldd" | "lpm" | "elpm", Some(d), _) => self.load(op, d, second),
             ("st" | "std", _, Some(s)) => self.store(first, s),
-            ("lds" | "pop", Some(d), _) => self.read(insn, d),
+            ("lds", Some(d), _) => {
+                let value = self.loaded("lds", address(second));
+                self.set(d, value);
+            }
+            ("sts", _, Some(s)) => self.stored(address(first), s),
+            ("pop", Some(d), _) => self.read(insn, d),
             ("in", Some(d), _) if second == "63" => self.set(d, self.flags),
             ("in", Some(d), _) => self.read(insn, d),
             ("out", _, Some(s)) if first == "63" => self.flags = self.get(s) & FLAGS,
@@ -227,13 +238,11 @@ impl Run {
         let Some((base, offset)) = effect::place(from) else { return };
         let pointer = self.word(base);
         let address = pointer.wrapping_add(offset.trim_start_matches('+').parse().unwrap_or(0));
-        let found = self.memory.get(&address).copied().filter(|_| op.starts_with("ld"));
-        let value = found.unwrap_or_else(|| {
-            usual(hash(&(self.seed, self.touched, address, op.ends_with("pm"))), self.seed)
-        });
         // What lies in the frame nobody sees being read.
-        if base != 28 {
-            self.log.push((op.into(), address.to_le_bytes().to_vec()));
+        let times = self.log.len();
+        let value = self.loaded(op, address);
+        if base == 28 {
+            self.log.truncate(times);
         }
         if offset == "+" {
             self.set_word(base, pointer.wrapping_add(1));
@@ -241,17 +250,32 @@ impl Run {
         self.set(d, value);
     }
 
+    /// What lies in memory, or in flash.
+    fn loaded(&mut self, op: &str, address: u16) -> u8 {
+        let is_flash = op.ends_with("pm");
+        let found = self.memory.get(&address).copied().filter(|_| !is_flash);
+        let value = found.unwrap_or_else(|| {
+            usual(hash(&(self.seed, self.touched, address, is_flash)), self.seed)
+        });
+        let kind = if is_flash { op } else { "ld" };
+        self.log.push((kind.into(), address.to_le_bytes().to_vec()));
+        value
+    }
+
     fn store(&mut self, to: &str, s: u8) {
         let Some((base, offset)) = effect::place(to) else { return };
         let pointer = self.word(base);
-        let address = pointer.wrapping_add(offset.trim_start_matches('+').parse().unwrap_or(0));
+        self.stored(pointer.wrapping_add(offset.trim_start_matches('+').parse().unwrap_or(0)), s);
+        if offset == "+" {
+            self.set_word(base, pointer.wrapping_add(1));
+        }
+    }
+
+    fn stored(&mut self, address: u16, s: u8) {
         let value = self.get(s);
         let [low, high] = address.to_le_bytes();
         self.log.push(("st".into(), vec![low, high, value]));
         self.memory.insert(address, value);
-        if offset == "+" {
-            self.set_word(base, pointer.wrapping_add(1));
-        }
     }
 
     fn multiplied(&mut self, product: u16) {
@@ -362,7 +386,23 @@ impl Run {
 
 /// The value of an operand; of an address anything, but always the same.
 fn number(operand: &str) -> u8 {
-    immediate(operand).unwrap_or_else(|| hash(&operand))
+    let inside = |half: &str| {
+        operand.strip_prefix(half)?.strip_suffix(')').filter(|inside| !inside.contains('('))
+    };
+    let [low, high] = ["lo8(", "hi8("].map(|half| inside(half).map(address));
+    match (low, high) {
+        (Some(address), _) => address.to_le_bytes()[0],
+        (_, Some(address)) => address.to_le_bytes()[1],
+        _ => immediate(operand).unwrap_or_else(|| hash(&operand)),
+    }
+}
+
+/// An address: a number, or that of a variable, which may be any, and what is added to it.
+fn address(text: &str) -> u16 {
+    let (symbol, offset) = text.split_once('+').unwrap_or((text, "0"));
+    let base =
+        symbol.parse().unwrap_or_else(|_| u16::from_le_bytes([hash(&symbol), hash(&(symbol, 1))]));
+    base.wrapping_add(offset.parse().unwrap_or_else(|_| hash(&offset).into()))
 }
 
 fn hash(what: &impl Hash) -> u8 {

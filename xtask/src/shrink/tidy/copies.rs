@@ -1,0 +1,99 @@
+//! Which registers hold the same, wherever control comes from.
+
+use super::super::text::{Insn, Line};
+use super::effect::{Effect, Set, bit, operands, pair, register};
+use super::flow::Flow;
+
+/// Of each register: the one that stands for all that hold the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Copies {
+    roots: [u8; 32],
+}
+
+impl Default for Copies {
+    /// Any two may differ.
+    fn default() -> Copies {
+        Copies { roots: std::array::from_fn(|register| register as u8) }
+    }
+}
+
+impl Copies {
+    /// Of each line: what holds before it, on every way that leads there.
+    pub fn of(flow: &Flow) -> Vec<Copies> {
+        let mut before: Vec<Option<Copies>> = vec![None; flow.lines.len()];
+        let mut open = Vec::new();
+        if let Some(first) = before.first_mut() {
+            *first = Some(Copies::default());
+            open.push(0);
+        }
+        while let Some(at) = open.pop() {
+            let Some(copies) = before[at] else { continue };
+            let mut behind = copies.behind(flow.lines[at], flow.insn(at), &flow.effects[at]);
+            if flow.may_be_skipped[at] {
+                behind = behind.and(&copies);
+            }
+            for to in &flow.next[at] {
+                let joined = before[*to].map_or(behind, |old| old.and(&behind));
+                if before[*to] != Some(joined) {
+                    before[*to] = Some(joined);
+                    open.push(*to);
+                }
+            }
+        }
+        before.into_iter().map(Option::unwrap_or_default).collect()
+    }
+
+    /// The register that stands for all that hold the same as this.
+    pub fn root(&self, register: u8) -> u8 {
+        self.roots[usize::from(register)]
+    }
+
+    /// What holds in both.
+    fn and(&self, other: &Copies) -> Copies {
+        let mut both = Copies::default();
+        for register in 0..32 {
+            let same = |first: &u8| {
+                self.root(*first) == self.root(register)
+                    && other.root(*first) == other.root(register)
+            };
+            both.roots[usize::from(register)] = (0..register).find(same).unwrap_or(register);
+        }
+        both
+    }
+
+    fn behind(&self, line: &Line, insn: Option<&Insn>, effect: &Effect) -> Copies {
+        let mut behind = *self;
+        if insn.is_none() && matches!(line, Line::Fixed(_)) {
+            return Copies::default();
+        }
+        let Some((insn, changes)) = insn.map(|insn| (insn, effect.changes())) else {
+            return behind;
+        };
+        (0..32).filter(|register| changes & bit(*register) != 0).for_each(|r| behind.forget(r));
+        let (first, second) = operands(insn);
+        let (Some(d), Some(s)) = (register(first), register(second)) else { return behind };
+        let copied: &[(u8, u8)] = match insn.op.as_str() {
+            "mov" => &[(d, s)],
+            "movw" => &[(d, s), (d + 1, s + 1)],
+            _ => return behind,
+        };
+        let written: Set = if copied.len() == 1 { bit(d) } else { pair(d) };
+        for (d, s) in copied.iter().filter(|(_, s)| written & bit(*s) == 0) {
+            behind.roots[usize::from(*d)] = behind.root(*s);
+        }
+        behind
+    }
+
+    /// A register gets another value: one of the others stands for those that it stood for.
+    fn forget(&mut self, register: u8) {
+        self.roots[usize::from(register)] = register;
+        let next =
+            (0..32).find(|other| *other != register && self.roots[usize::from(*other)] == register);
+        let Some(next) = next else { return };
+        for (other, root) in self.roots.iter_mut().enumerate() {
+            if *root == register && other != usize::from(register) {
+                *root = next;
+            }
+        }
+    }
+}

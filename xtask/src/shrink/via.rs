@@ -1,0 +1,148 @@
+//! Calls over a long way share their way.
+//!
+//! ```text
+//!   call __mulsf3                       call __via_0      two bytes each, for it is near
+//!   ...               becomes           ...
+//!   call __mulsf3                       call __via_0
+//!                                     __via_0:
+//!                                       jmp  __mulsf3
+//! ```
+//!
+//! A call or jump takes two bytes within 4 KB and four elsewhere. Where three or more near each other go to one far function, they go
+//! to a jump that stands between them: two cycles each, no stack. Hot functions keep their way, and so does what functions begin with, for it
+//! returns with more on the stack.
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::hot::Heat;
+use super::text::{Function, Insn, Line, Program};
+use super::{heat, prologue};
+
+/// What the jumps are called.
+pub const NAME: &str = "__via_";
+
+/// How far a short call reaches, bytes, with some room for the jumps themselves.
+const REACH: usize = 3_900;
+
+/// A call or jump.
+#[derive(Clone, Copy, Debug)]
+struct Site {
+    function: usize,
+    line: usize,
+    /// Where it stands at most, bytes.
+    place: usize,
+}
+
+/// Shares the long ways of a program whose functions are in their order.
+pub fn share(program: &mut Program) {
+    let (starts, sites) = far(program);
+    let mut added: Vec<(usize, Function)> = Vec::new();
+    for (target, sites) in sites {
+        let mut rest = sites.as_slice();
+        while let Some(first) = rest.first() {
+            let near = rest.iter().take_while(|site| site.place - first.place <= 2 * REACH).count();
+            let (group, behind) = rest.split_at(near);
+            let middle = (first.place + group[near - 1].place) / 2;
+            let at = starts.partition_point(|start| *start < middle).min(starts.len() - 1);
+            let reached: Vec<_> =
+                group.iter().filter(|site| site.place.abs_diff(starts[at]) <= REACH).collect();
+            rest = behind;
+            if reached.len() < 3 {
+                continue;
+            }
+            let name = format!("{NAME}{}", added.len());
+            for site in reached {
+                if let Line::Insn(insn) = &mut program.functions[site.function].lines[site.line] {
+                    insn.args.clone_from(&name);
+                }
+            }
+            added.push((at, Function::new(&name, &[Insn::new(&format!("jmp {target}"))])));
+        }
+    }
+    // From behind, so that the places of those before stay.
+    added.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
+    added.into_iter().for_each(|(at, function)| program.functions.insert(at, function));
+}
+
+/// Where functions begin, and the calls and jumps that go far, by where they go to.
+fn far(program: &Program) -> (Vec<usize>, BTreeMap<String, Vec<Site>>) {
+    let size = |line: &Line| match line {
+        Line::Insn(insn) => insn.size(),
+        Line::Fixed(text) => Insn::new(text).size(),
+        Line::Label(_) | Line::Note(_) => 0,
+    };
+    let (mut starts, mut end) = (Vec::new(), 0);
+    for function in &program.functions {
+        starts.push(end);
+        end += function.lines.iter().map(size).sum::<usize>();
+    }
+    let places: HashMap<&str, usize> = (program.functions.iter())
+        .map(|function| function.name.as_str())
+        .zip(starts.iter().copied())
+        .collect();
+    let mut sites: BTreeMap<String, Vec<Site>> = BTreeMap::new();
+    for (function, code) in program.functions.iter().enumerate() {
+        let mut place = starts[function];
+        let is_hot = heat(code) == Heat::Hot;
+        for (line, what) in code.lines.iter().enumerate() {
+            if let Line::Insn(insn) = what
+                && matches!(insn.op.as_str(), "call" | "jmp")
+                && !insn.args.starts_with(prologue::NAME)
+                && !is_hot
+            {
+                // What is not here comes from a library, and stands behind it all.
+                let to = places.get(insn.args.as_str()).copied().unwrap_or(end);
+                if to.abs_diff(place) > REACH {
+                    let site = Site { function, line, place };
+                    sites.entry(insn.args.clone()).or_default().push(site);
+                }
+            }
+            place += size(what);
+        }
+    }
+    (starts, sites)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::text::tests::{code, program};
+    use super::super::verify;
+    use super::*;
+
+    fn shared(functions: &[(&str, &str)]) -> Program {
+        let before = program(functions);
+        let mut after = before.clone();
+        share(&mut after);
+        verify::check(&before, &after).unwrap();
+        after
+    }
+
+    #[test]
+    fn three_that_go_far_go_by_one_jump() {
+        let long = "nop\n".repeat(5_000);
+        let caller = "call g\nnop\njmp g";
+        let after = shared(&[("a", caller), ("b", "call g\nret"), ("x", &long), ("g", "ret")]);
+        assert_eq!(code(&after, "a"), "call __via_0; nop; jmp __via_0");
+        assert_eq!(code(&after, "b"), "call __via_0; ret");
+        assert_eq!(code(&after, "__via_0"), "jmp g");
+        let at = after.functions.iter().position(|f| f.name == "__via_0");
+        assert!(at < after.functions.iter().position(|f| f.name == "x"));
+    }
+
+    #[test]
+    fn two_or_near_or_hot_ones_go_straight() {
+        let long = "nop\n".repeat(5_000);
+        let three = "call g\ncall g\ncall g\nret";
+        for functions in [
+            [("a", "call g\ncall g\nret"), ("x", long.as_str()), ("g", "ret")],
+            [("a", three), ("x", "nop"), ("g", "ret")],
+            [("__vector_1", three), ("x", long.as_str()), ("g", "ret")],
+        ] {
+            assert_eq!(shared(&functions).functions.len(), 3);
+        }
+        let enters = three.replace('g', "__enter_0");
+        let mut entering = program(&[("a", &enters), ("x", &long), ("__enter_0", "ret")]);
+        share(&mut entering);
+        assert_eq!(entering.functions.len(), 3);
+    }
+}
