@@ -211,22 +211,23 @@ impl Parser {
     /// Goes on with what is under way, and tells what a port alone is told. Whether something has come to its end.
     #[inline(never)]
     fn go_on(&mut self) -> bool {
-        let (mut ended, after) = (false, usize::from(self.last) + 1);
-        for number in after..after + PORTS {
-            let number = number % PORTS;
+        let (mut ended, after) = (false, self.last + 1);
+        for n in 0..PORTS as u8 {
+            let number = (after + n) % PORTS as u8;
             if !self.leaves_its_turn(number) {
-                ended |= self.go_on_at(number);
+                let awaited = self.is_awaited(number);
+                ended |= self.go_on_at(number, awaited);
             }
         }
         ended
     }
 
-    /// The same on one port.
+    /// Goes on on one port, while another is `awaited` or not.
     #[inline(never)]
-    fn go_on_at(&mut self, number: usize) -> bool {
-        let (links, awaited) = (self.links, self.is_awaited(number));
-        let Some((port, session)) = links.ports.get(number).zip(self.sessions.get_mut(number))
-        else {
+    fn go_on_at(&mut self, number: u8, awaited: bool) -> bool {
+        let links = self.links;
+        let at = usize::from(number);
+        let Some((port, session)) = links.ports.get(at).zip(self.sessions.get_mut(at)) else {
             return false;
         };
         if !matches!(session, Session::Idle) {
@@ -247,30 +248,31 @@ impl Parser {
     /// Whether the answer on a port leaves its turn to one on another that has had fewer, so many times in a row: short answers come
     /// first. If not, the port has its turn.
     #[inline(never)]
-    fn leaves_its_turn(&mut self, number: usize) -> bool {
+    fn leaves_its_turn(&mut self, number: u8) -> bool {
         let leaves = self.is_awaited(number);
         if leaves && self.waited < PATIENCE {
             self.waited += 1;
             return true;
         }
-        if !matches!(self.sessions.get(number), Some(Session::Idle)) {
+        if !matches!(self.sessions.get(usize::from(number)), Some(Session::Idle)) {
             self.waited = 0;
-            self.last = number as u8;
+            self.last = number;
         }
         false
     }
 
     /// Whether an answer is under way on a port, and one on another has had fewer turns.
     #[inline(never)]
-    fn is_awaited(&self, number: usize) -> bool {
+    fn is_awaited(&self, number: u8) -> bool {
         let turns = self.turns(number);
-        turns != NONE && (0..PORTS).any(|other| other != number && self.turns(other) < turns)
+        turns != NONE && (0..PORTS as u8).any(|other| other != number && self.turns(other) < turns)
     }
 
     /// How many turns the answer has had that is due on a port, also if it is to the next control line; [`NONE`] if none is.
     #[inline(never)]
-    fn turns(&self, number: usize) -> u8 {
-        match self.links.ports.get(number).zip(self.sessions.get(number)) {
+    fn turns(&self, number: u8) -> u8 {
+        let at = usize::from(number);
+        match self.links.ports.get(at).zip(self.sessions.get(at)) {
             Some((_, Session::Answer(answer))) => answer.turns,
             Some((port, Session::Idle)) if port.lines.borrow().has_controls() => 0,
             _ => NONE,
@@ -280,9 +282,13 @@ impl Parser {
     /// Whether the report on the port whose turn it is gets a turn first: it ends its line for the answer that waits.
     #[inline(never)]
     fn leaves_to_report(&mut self) -> bool {
-        let number = (usize::from(self.last) + 1) % PORTS;
+        let number = (self.last + 1) % PORTS as u8;
         let reports = self.turns(number) == 0
-            && self.links.ports.get(number).is_some_and(|port| port.tx.try_lock().is_err());
+            && self
+                .links
+                .ports
+                .get(usize::from(number))
+                .is_some_and(|port| port.tx.try_lock().is_err());
         let leaves = reports && self.waited < LEAVES;
         if leaves {
             self.waited += 1;
@@ -332,9 +338,8 @@ impl Parser {
     /// Takes a line: most are answered to the end at once.
     #[inline(never)]
     fn take(&mut self, chosen: Chosen, tried: Usual) {
-        let (links, number) = (self.links, usize::from(chosen.port.number));
-        let awaited = self.is_awaited(number);
-        let Some(session) = self.sessions.get_mut(number) else { return };
+        let (links, awaited) = (self.links, self.is_awaited(chosen.port.number));
+        let Some(session) = self.sessions.get_mut(usize::from(chosen.port.number)) else { return };
         match begin(links, &chosen, tried, session) {
             Begun::Answer => {
                 go_on(links, chosen.port, session, awaited);
