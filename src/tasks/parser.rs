@@ -51,7 +51,7 @@ const STEPS_LATE: u8 = 5;
 /// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
 
-/// Turns that an answer leaves in a row to those on other ports that have had fewer.
+/// Turns that an answer leaves in a row to those on other ports that have had none.
 const PATIENCE: u8 = 8;
 /// No answer waits for its turn.
 const NONE: u8 = u8::MAX;
@@ -79,8 +79,8 @@ struct Answer {
     id: LineId,
     /// How much of the line has been sent back.
     echoed: u8,
-    /// How many turns it has had.
-    turns: u8,
+    /// It has had a turn.
+    has_stepped: bool,
     /// The line is to be sent back.
     echoes: bool,
     /// Tables have to be waited for.
@@ -245,7 +245,7 @@ impl Parser {
         false
     }
 
-    /// Whether the answer on a port leaves its turn to one on another that has had fewer, so many times in a row: short answers come
+    /// Whether the answer on a port leaves its turn to one on another that has had none, so many times in a row: short answers come
     /// first. If not, the port has its turn.
     #[inline(never)]
     fn leaves_its_turn(&mut self, number: u8) -> bool {
@@ -261,19 +261,19 @@ impl Parser {
         false
     }
 
-    /// Whether an answer is under way on a port, and one on another has had fewer turns.
+    /// Whether an answer is under way on a port, and one on another has had no turn yet.
     #[inline(never)]
     fn is_awaited(&self, number: u8) -> bool {
         let turns = self.turns(number);
         turns != NONE && (0..PORTS as u8).any(|other| other != number && self.turns(other) < turns)
     }
 
-    /// How many turns the answer has had that is due on a port, also if it is to the next control line; [`NONE`] if none is.
+    /// Whether the answer that is due on a port has had a turn, 0 or 1, also if it is to the next control line; [`NONE`] if none is due.
     #[inline(never)]
     fn turns(&self, number: u8) -> u8 {
         let at = usize::from(number);
         match self.links.ports.get(at).zip(self.sessions.get(at)) {
-            Some((_, Session::Answer(answer))) => answer.turns,
+            Some((_, Session::Answer(answer))) => answer.has_stepped.into(),
             Some((port, Session::Idle)) if port.lines.borrow().has_controls() => 0,
             _ => NONE,
         }
@@ -476,7 +476,7 @@ impl Answer {
     /// Goes on as far as there is room.
     #[inline(never)]
     fn step(&mut self, links: &'static Links, port: &'static Port, awaited: bool) -> Progress {
-        self.turns = (self.turns + 1).min(NONE - 1);
+        self.has_stepped = true;
         if self.waits && links.storage.is_awaited() {
             return Progress::Waits;
         }
@@ -656,7 +656,7 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
         request,
         id,
         echoed: 0,
-        turns: 0,
+        has_stepped: false,
         echoes,
         waits: false,
         tx: None,
