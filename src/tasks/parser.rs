@@ -268,13 +268,18 @@ impl Parser {
         turns != NONE && (0..PORTS as u8).any(|other| other != number && self.turns(other) < turns)
     }
 
-    /// Whether the answer that is due on a port has had a turn, 0 or 1, also if it is to the next control line; [`NONE`] if none is due.
+    /// Whether the answer that is due on a port has had a turn, 0 or 1, also if it is to the next control line; [`NONE`] if none is due, or
+    /// that port has no room for it.
     #[inline(never)]
     fn turns(&self, number: u8) -> u8 {
         let at = usize::from(number);
         match self.links.ports.get(at).zip(self.sessions.get(at)) {
             Some((_, Session::Answer(answer))) => answer.has_stepped.into(),
-            Some((port, Session::Idle)) if port.lines.borrow().has_controls() => 0,
+            Some((port, Session::Idle)) if port.lines.borrow().has_controls() => {
+                // A report that is being told there ends its line soon.
+                let lacks_room = port.tx.try_lock().is_ok_and(|tx| !tx.has_room());
+                if lacks_room { NONE } else { 0 }
+            }
             _ => NONE,
         }
     }
@@ -282,13 +287,12 @@ impl Parser {
     /// Whether the report on the port whose turn it is gets a turn first: it ends its line for the answer that waits.
     #[inline(never)]
     fn leaves_to_report(&mut self) -> bool {
-        let number = (self.last + 1) % PORTS as u8;
-        let reports = self.turns(number) == 0
-            && self
-                .links
-                .ports
-                .get(usize::from(number))
-                .is_some_and(|port| port.tx.try_lock().is_err());
+        let at = usize::from((self.last + 1) % PORTS as u8);
+        let is_idle = matches!(self.sessions.get(at), Some(Session::Idle));
+        let reports = is_idle
+            && self.links.ports.get(at).is_some_and(|port| {
+                port.tx.try_lock().is_err() && port.lines.borrow().has_controls()
+            });
         let leaves = reports && self.waited < LEAVES;
         if leaves {
             self.waited += 1;
