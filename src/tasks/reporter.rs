@@ -29,7 +29,7 @@ use crate::status::Status;
 
 /// How often a busy machine is looked at, ms.
 const POLL_MS: u64 = 10;
-/// How often room is looked for on a port that is greeted besides.
+/// How often room is looked for on a port that is told besides.
 const PATIENCE: u8 = 20;
 /// How many times a report ends its line early for an answer: each line of a report takes the serial line's time for its frame.
 const SPLITS: u8 = 2;
@@ -46,7 +46,9 @@ struct Told {
 pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
     let mut greeting = Some(occasion);
     while let Some(occasion) = greeting {
-        greet(links, occasion).await;
+        let notice = Notice::Greeting(occasion);
+        tell(links, links.told(), notice).await;
+        tell_others(links, notice).await;
         greeting = (occasion != Occasion::Ready).then_some(Occasion::Ready);
     }
     let mut told =
@@ -65,7 +67,12 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             links.parser_wake.signal();
         }
         if let Some(status) = links.notices.exception.take() {
-            tell(links, links.told(), Notice::Exception(status)).await;
+            let notice = Notice::Exception(status);
+            tell(links, links.told(), notice).await;
+            // Whoever is at hand may have it go on.
+            if status == Status::ProgramStopped {
+                tell_others(links, notice).await;
+            }
         }
         if links.probe.take_news() {
             // The planner waits for it.
@@ -190,12 +197,13 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
 }
 
 /// Tells something short on a port, if nobody else talks there and there is room for it: at most 64 bytes, or all of an
-/// empty ring for a greeting. Else returns false.
+/// empty ring for a greeting and a program stop. Else returns false.
 #[inline(never)]
 #[small]
 pub fn tell_at_once(links: &Links, port: &Port, notice: Notice) -> bool {
     let Ok(mut tx) = port.tx.try_lock() else { return false };
-    let fits = if matches!(notice, Notice::Greeting(_)) { tx.is_empty() } else { tx.has_room() };
+    let is_long = matches!(notice, Notice::Greeting(_) | Notice::Exception(Status::ProgramStopped));
+    let fits = if is_long { tx.is_empty() } else { tx.has_room() };
     if fits {
         let mut telling = begin(notice, links, port);
         while step(&mut telling, links, port, &mut tx) {}
@@ -203,14 +211,13 @@ pub fn tell_at_once(links: &Links, port: &Port, notice: Notice) -> bool {
     fits
 }
 
-/// Says who the machine is. The other port gets no greeting if it cannot talk for long: its sender may hold it back.
-async fn greet(links: &Links, occasion: Occasion) {
-    let told = links.told();
-    tell(links, told, Notice::Greeting(occasion)).await;
-    let others = links.ports.iter().filter(|port| port.number != told.number);
+/// Tells something on the ports that are not told everything. Not on one that cannot talk for long: its sender may hold it back.
+async fn tell_others(links: &Links, notice: Notice) {
+    let told = links.told().number;
+    let others = links.ports.iter().filter(|port| port.number != told);
     for port in others.filter(|port| !is_shared(port.number)) {
         for _ in 0..PATIENCE {
-            if tell_at_once(links, port, Notice::Greeting(occasion)) {
+            if tell_at_once(links, port, notice) {
                 break;
             }
             Timer::after_ticks(POLL_MS).await;
