@@ -23,6 +23,7 @@ pub enum Status {
     PersistenceError,
     StepsLate,
     ProgramStopped,
+    ProgramChecked,
     UnrecognizedName,
     MalformedCommand,
     BadNumber,

@@ -59,6 +59,11 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "Do what it waits for, then `~`. `{psw:0}` has it go on by itself.",
     ),
     (
+        ProgramChecked,
+        "In check mode the program has come to M2 or M30. Nothing has moved.",
+        "`{chk:0}` ends check mode. Until then nothing moves.",
+    ),
+    (
         UnrecognizedName,
         "There is no setting or value of that name.",
         "Check the name in settings.md, and below.",

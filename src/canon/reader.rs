@@ -78,7 +78,7 @@ impl<S: Setup> Reader<S> {
             Step::Dwell(ms) => self.ready.push_back(Canon::Dwell(ms)),
             Step::Line(target, None) => self.go(Canon::Traverse(target), target, None),
             Step::Line(target, feed) => self.go(Canon::Feed(target), target, feed),
-            Step::Arc | Step::Probe | Step::Home | Step::Jog => self.motion(),
+            Step::Arc | Step::Probe | Step::Home | Step::Jog | Step::Check => self.motion(),
             Step::SetPosition(position) => {
                 self.place = position;
                 self.ready.push_back(Canon::SetPosition(position));

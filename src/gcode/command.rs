@@ -154,6 +154,8 @@ pub enum Motion {
         /// Where to.
         target: PerAxis<Length>,
     },
+    /// `{chk:1}`, `{chk:0}`: from here on lines are checked only, or carried out again.
+    Check,
     /// G28.3: no motor moves; the present position is called this.
     SetPosition {
         /// All axes; those that the line does not name are where they were.

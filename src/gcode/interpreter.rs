@@ -17,6 +17,7 @@ use super::command::{Commands, Spindle};
 use super::modal::{Defaults, Modal, MotionMode, Turn, Units};
 use super::setup::Setup;
 use super::state::State;
+use super::sticky::Sticky;
 use super::tables::{Edit, Ram, Row, Tables};
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
@@ -255,6 +256,63 @@ impl RareBefore {
         state.tool_length = self.tool_length;
         state.speed = self.speed;
         (state.selected, state.tool) = (self.selected, self.tool);
+    }
+}
+
+/// Modes and words of the program, as they were before lines were checked: what [`Offsets`] do not have. Position and the words of canned
+/// cycles are not kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Modes {
+    modal: Modal,
+    feed: f32,
+    feed_units: Units,
+    line: u32,
+    homed: u8,
+    speed: f32,
+    selected: u8,
+    tool: u8,
+}
+
+/// Offsets that are in no table, as they were before lines were checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Offsets {
+    shift: PerAxis<Length>,
+    shifted: bool,
+    tool_length: PerAxis<Length>,
+}
+
+#[small]
+impl<T: Tables> Interpreter<T> {
+    /// What lines that are only checked may change, to [give it back](Self::give_back) afterwards.
+    #[inline(never)]
+    pub fn keep(&self) -> (Modes, Offsets) {
+        let State { modal, feed, feed_units, line, homed, speed, selected, tool, .. } = self.state;
+        let State { shift, shifted, tool_length, .. } = self.state;
+        (
+            Modes { modal, feed, feed_units, line, homed, speed, selected, tool },
+            Offsets { shift, shifted, tool_length },
+        )
+    }
+
+    /// Everything is as it was kept, and the machine at this place. A canned cycle that was in force is not any more; nor is an axis
+    /// homed that has lost its place meanwhile.
+    #[inline(never)]
+    pub fn give_back(&mut self, modes: &Modes, offsets: &Offsets, place: &PerAxis<Length>) {
+        let state = &mut self.state;
+        state.modal = modes.modal;
+        if modes.modal.motion.is_cycle() {
+            state.modal.motion = MotionMode::None;
+        }
+        (state.feed, state.feed_units) = (modes.feed, modes.feed_units);
+        state.line = modes.line;
+        state.homed &= modes.homed;
+        state.speed = modes.speed;
+        (state.selected, state.tool) = (modes.selected, modes.tool);
+        (state.shift, state.shifted) = (offsets.shift, offsets.shifted);
+        state.tool_length = offsets.tool_length;
+        state.sticky = Sticky::NONE;
+        self.set_position(place);
+        self.restore_origin();
     }
 }
 

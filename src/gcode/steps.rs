@@ -35,6 +35,8 @@ pub enum Step {
     Home,
     /// The jog of the commands' motion.
     Jog,
+    /// Lines are checked only from here on, or carried out again.
+    Check,
     /// The position is called this.
     SetPosition(PerAxis<Length>),
     /// The program stops or ends.
@@ -211,6 +213,7 @@ impl Steps {
             (Motion::Probe { .. }, _) => Some(Step::Probe),
             (Motion::Home { .. }, _) => Some(Step::Home),
             (Motion::Jog { .. }, _) => Some(Step::Jog),
+            (Motion::Check, _) => Some(Step::Check),
             (Motion::SetPosition { position }, _) => Some(Step::SetPosition(*position)),
             (Motion::Through { .. } | Motion::Cycle(_), _) => None,
         }

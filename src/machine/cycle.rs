@@ -17,23 +17,32 @@ pub enum Cycle {
     Homing,
     /// `{jogx:..}`.
     Jog,
+    /// `{chk:1}`: lines are checked, and nothing of them is carried out. Only a reset and `{chk:0}` end it.
+    Check,
 }
 
 impl Cycle {
     /// All of them, by their discriminants.
-    pub const ALL: [Cycle; Cycle::Jog as usize + 1] =
-        [Cycle::Lines, Cycle::Stopped, Cycle::Probe, Cycle::Homing, Cycle::Jog];
+    pub const ALL: [Cycle; Cycle::Check as usize + 1] =
+        [Cycle::Lines, Cycle::Stopped, Cycle::Probe, Cycle::Homing, Cycle::Jog, Cycle::Check];
 
     /// The state that an event leads to. None begins while the hold `drops` what is queued, or in an alarm. One that is
     /// flushed lasts until that has been dropped: who sees to it has to know what has been interrupted.
     pub const fn after(self, event: Event, drops: bool, alarmed: bool) -> Cycle {
         match event {
-            Event::Stopped | Event::Probe | Event::Homing | Event::Jog if drops || alarmed => self,
+            Event::Stopped | Event::Probe | Event::Homing | Event::Jog | Event::Check
+                if drops || alarmed =>
+            {
+                self
+            }
             Event::Stopped => Cycle::Stopped,
             Event::Probe => Cycle::Probe,
             Event::Homing => Cycle::Homing,
             Event::Jog => Cycle::Jog,
+            Event::Check => Cycle::Check,
             Event::Done if drops => self,
+            // What has been sent to be checked is not to move anything because some of it was dropped.
+            Event::Dropped if matches!(self, Cycle::Check) => self,
             Event::Done | Event::Dropped => Cycle::Lines,
             _ => self,
         }
@@ -46,7 +55,8 @@ impl Cycle {
             1 => Cycle::Stopped,
             2 => Cycle::Probe,
             3 => Cycle::Homing,
-            _ => Cycle::Jog,
+            4 => Cycle::Jog,
+            _ => Cycle::Check,
         }
     }
 }

@@ -40,7 +40,7 @@ pub fn doing(works: impl Fn() -> bool) -> Doing {
         Cycle::Homing => Doing::Homes,
         Cycle::Jog => Doing::Jogs,
         Cycle::Lines if works() => Doing::Runs,
-        Cycle::Lines | Cycle::Stopped => Doing::Rests,
+        Cycle::Lines | Cycle::Stopped | Cycle::Check => Doing::Rests,
     }
 }
 

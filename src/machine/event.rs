@@ -34,6 +34,8 @@ pub enum Event {
     Homing,
     /// A jog begins.
     Jog,
+    /// Lines are only checked from now on.
+    Check,
     /// The cycle has come to its end, or a program stop has been left.
     Done,
     /// Somebody asks for an alarm, or probing has failed.
@@ -70,6 +72,7 @@ impl Event {
             Probe,
             Homing,
             Jog,
+            Check,
             Done,
             Alarm,
             Limit,

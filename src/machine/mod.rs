@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | [`Alarm`] | none, alarm, limit, shutdown, panic | whether G-code is refused, and how that ends |
 //! | [`Hold`] | off, resuming, held, door, flush, drop, kill; the last three with the door open, too | whether motion goes on, and whether what is queued is being dropped |
-//! | [`Cycle`] | lines, program stop, probe, homing, jog | what is carried out |
+//! | [`Cycle`] | lines, program stop, probe, homing, jog, check | what is carried out |
 //!
 //! [`Doing`] is all three in one word, which is what `stat` tells. `Lines` is idle as well as run: whether anything is queued or
 //! moves is asked of the queue and of exec's snapshot, which count it anyway (`View::has_work`). Held is slowing as well as at
@@ -30,8 +30,8 @@
 //! Where events lead the others:
 //!
 //! ```text
-//!  Cycle   Lines   Probe, Homing, Jog, Stopped: not in an alarm, nor while Drop or Kill     that cycle
-//!          any     Done: not while Drop or Kill; Dropped                                    Lines
+//!  Cycle   Lines   Probe, Homing, Jog, Stopped, Check: not in an alarm, nor while Drop or Kill   that cycle
+//!          any     Done: not while Drop or Kill; Dropped, but for Check                          Lines
 //!  Alarm   any     Alarm, Limit, Shutdown, Panic: if it is worse                            that alarm
 //!          any     Cleared: not a Panic, nor while Flush, Drop or Kill                      None
 //! ```
@@ -47,8 +47,8 @@
 //! | `Dropped` | the planner, when exec has dropped its blocks | thread | the model starts from where the motors are |
 //! | `DoorOpened`, `DoorShut`, `DoorShutIdle` | the control task; the last if nothing is held | thread | |
 //! | `Stopped` | the planner, at rest at M0 | thread | it waits for `cycle_start` |
-//! | `Probe`, `Homing`, `Jog` | the planner; requests for homing and jogs | thread | |
-//! | `Done` | the planner: the cycle is over, the stop has been left | thread | |
+//! | `Probe`, `Homing`, `Jog`, `Check` | the planner; requests for homing, jogs and checks | thread | |
+//! | `Done` | the planner: the cycle is over, the stop has been left; the request that ends a check | thread | |
 //! | `Alarm`, `Limit`, `Shutdown`, `Panic` | switches, requests, a failed probing | thread | outputs off, the planner is woken |
 //! | `Cleared` | `{clear:n}`, M2, M30, as far as the alarm lets them | thread | steps may be made again |
 //!
@@ -185,6 +185,12 @@ pub fn is_stopped() -> bool {
     cycle_byte().get() == Cycle::Stopped as u8
 }
 
+/// Whether lines are checked only. Thread mode.
+#[inline(always)]
+pub fn is_checking() -> bool {
+    cycle_byte().get() == Cycle::Check as u8
+}
+
 /// Whether the door is open. Thread mode.
 #[inline(always)]
 pub fn has_open_door() -> bool {
@@ -234,7 +240,7 @@ pub fn carry_out(event: Event) {
 #[inline(always)]
 pub fn dropped() -> (Cycle, bool) {
     let before = (cycle(), is_killing());
-    cycle_byte().set(Cycle::Lines as u8);
+    cycle_byte().set(before.0.after(Event::Dropped, true, true) as u8);
     take(Event::Dropped);
     before
 }

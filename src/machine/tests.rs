@@ -27,15 +27,16 @@ const HOLD: [(Event, &str); 14] = [
 /// The holds as [`HOLD`] calls them: a lower-case letter with the door open.
 const LETTERS: &str = "ORHDFfXxKk";
 
-/// Of each [`Cycle`], in their order (lines, stopped, probe, homing, jog), the one after the event while nothing is dropped and
+/// Of each [`Cycle`], in their order (lines, stopped, probe, homing, jog, check), the one after the event while nothing is dropped and
 /// there is no alarm.
-const CYCLE: [(Event, &str); 6] = [
-    (Event::Stopped, "S S S S S"),
-    (Event::Probe, "P P P P P"),
-    (Event::Homing, "H H H H H"),
-    (Event::Jog, "J J J J J"),
-    (Event::Done, "- L L L L"),
-    (Event::Dropped, "- L L L L"),
+const CYCLE: [(Event, &str); 7] = [
+    (Event::Stopped, "S S S S S S"),
+    (Event::Probe, "P P P P P P"),
+    (Event::Homing, "H H H H H H"),
+    (Event::Jog, "J J J J J J"),
+    (Event::Check, "C C C C C C"),
+    (Event::Done, "- L L L L L"),
+    (Event::Dropped, "- L L L L -"),
 ];
 
 /// Of each [`Alarm`], in their order (none, alarm, limit, shutdown, panic), the one after the event while nothing is flushed.
@@ -67,7 +68,9 @@ fn written(state: State, event: Event) -> State {
     let flushes = !matches!(hold, Hold::Off | Hold::Resuming | Hold::Held | Hold::Door);
     let drops = flushes && !matches!(hold, Hold::Flush | Hold::FlushDoor);
     let is_refused = match event {
-        Event::Stopped | Event::Probe | Event::Homing | Event::Jog => drops || alarm != Alarm::None,
+        Event::Stopped | Event::Probe | Event::Homing | Event::Jog | Event::Check => {
+            drops || alarm != Alarm::None
+        }
         Event::Done => drops,
         Event::Cleared => flushes,
         _ => !counts,
@@ -78,7 +81,7 @@ fn written(state: State, event: Event) -> State {
     State {
         alarm: Alarm::ALL[row(&ALARM, "NALSP", event, alarm as usize)],
         hold: Hold::ALL[row(&HOLD, LETTERS, event, hold as usize)],
-        cycle: Cycle::ALL[row(&CYCLE, "LSPHJ", event, cycle as usize)],
+        cycle: Cycle::ALL[row(&CYCLE, "LSPHJC", event, cycle as usize)],
     }
 }
 
@@ -123,7 +126,7 @@ fn happen(event: Event) {
         Event::Rested => {
             rested();
         }
-        Event::Stopped | Event::Probe | Event::Homing | Event::Jog | Event::Done => {
+        Event::Stopped | Event::Probe | Event::Homing | Event::Jog | Event::Check | Event::Done => {
             carry_out(event)
         }
         Event::Cleared => {
@@ -164,6 +167,7 @@ fn questions_are_those_of_the_state() {
         assert_eq!(is_resuming(), hold == Hold::Resuming);
         assert_eq!(goes_on(), matches!(hold, Hold::Off | Hold::Resuming));
         assert_eq!(is_stopped(), state.cycle == Cycle::Stopped);
+        assert_eq!(is_checking(), state.cycle == Cycle::Check);
         assert_eq!(is_alarmed(), state.alarm != Alarm::None);
         assert_eq!((alarm(), cycle()), (state.alarm, state.cycle));
     }
@@ -183,6 +187,8 @@ fn one_word_says_what_the_machine_is_doing() {
             (Alarm::None, _, Cycle::Probe) => Doing::Probes,
             (Alarm::None, _, Cycle::Homing) => Doing::Homes,
             (Alarm::None, _, Cycle::Jog) => Doing::Jogs,
+            // Nothing is carried out then.
+            (Alarm::None, _, Cycle::Check) => Doing::Rests,
             (Alarm::None, _, _) if moves => Doing::Runs,
             (Alarm::None, _, _) => Doing::Rests,
             (alarm, _, _) => Doing::Alarm(alarm),
@@ -196,7 +202,8 @@ fn one_word_says_what_the_machine_is_doing() {
 #[test]
 fn in_an_alarm_nothing_is_carried_out_that_was_not_before_it() {
     for state in reachable().into_iter().filter(|state| state.alarm.is_on()) {
-        assert!(state.cycle == Cycle::Lines || state.hold.drops(), "{state:?}");
+        let lasts = matches!(state.cycle, Cycle::Lines | Cycle::Check);
+        assert!(lasts || state.hold.drops(), "{state:?}");
         for event in Event::ALL {
             let after = state.after(event);
             assert!(
@@ -234,7 +241,8 @@ fn a_flush_goes_on_to_its_end_and_ends() {
         }
         // The reader cuts, the planner drops.
         let end = state.after(Event::Cut).after(Event::Dropped);
-        assert_eq!(end, State { alarm: state.alarm, cycle: Cycle::Lines, hold: end.hold });
+        let cycle = if state.cycle == Cycle::Check { Cycle::Check } else { Cycle::Lines };
+        assert_eq!(end, State { alarm: state.alarm, cycle, hold: end.hold });
         assert!(matches!(end.hold, Hold::Off | Hold::Door), "{state:?}");
     }
 }
@@ -284,8 +292,8 @@ fn what_can_be_reached() {
     let reached = reachable();
     let without = all().filter(|state| !state.alarm.is_on()).collect::<BTreeSet<_>>();
     assert!(without.is_subset(&reached), "without an alarm each hold is possible in each cycle");
-    // In an alarm: each cycle while it is being dropped, and lines that are refused in each hold.
-    let alarmed = 4 * (4 * 5 + 6);
+    // In an alarm: each cycle while it is being dropped, and in each other hold lines that are refused, or check mode.
+    let alarmed = 4 * (4 * 6 + 6 * 2);
     assert_eq!(reached.len(), without.len() + alarmed);
 }
 

@@ -91,6 +91,8 @@ pub trait Machine {
     fn start_job(&mut self, number: u8) -> Status;
     /// Homes all axes that have a switch for it, or refuses to.
     fn home(&mut self) -> Status;
+    /// From now on lines of G-code are checked only, or carried out again; or refuses to.
+    fn check(&mut self, on: bool) -> Status;
     /// Begins to move an axis to a place in machine coordinates, or refuses to.
     fn jog(&mut self, axis: u8, place: Length) -> Status;
     /// Does something to the program that is kept. [`Status::Again`]: it is not done yet, and is to be asked for again.

@@ -56,6 +56,8 @@ pub enum Value {
     Tool,
     /// 0 not homed, 1 homed, 2 homing.
     Home,
+    /// 1 while lines are checked only.
+    Check,
     /// Free blocks of the planner; never told as less than six.
     QueueFree,
     /// Blocks added since this was last read.

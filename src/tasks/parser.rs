@@ -157,7 +157,8 @@ impl Parser {
         let free = is_free(links);
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
-        let tried = if data && !alarmed && self.is_idle() { usual(links) } else { Usual::NotTried };
+        let straight = !alarmed && !machine::is_checking();
+        let tried = if data && straight && self.is_idle() { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
             return if self.has_more() { Turn::Usual } else { Turn::Nothing };
         }
@@ -752,10 +753,14 @@ fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
         // The queue has been dropped, so that nothing is waited for.
         let _ = alarm::clear(links, &links.settings.borrow());
     }
-    carry_out(links, block, tried)
+    let done = carry_out(links, block, tried);
+    if machine::is_checking() && links.commands.borrow().stop == Stop::End {
+        links.except(Status::ProgramChecked);
+    }
+    done
 }
 
-/// Interprets a block and hands its commands to the planner. Returns also whether it may have a
+/// Interprets a block and hands its commands to the planner, but in check mode. Returns also whether it may have a
 /// comment.
 #[inline(never)]
 fn carry_out(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
@@ -770,7 +775,7 @@ fn carry_out(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
     match done {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
-            if !commands.is_empty() {
+            if !commands.is_empty() && !machine::is_checking() {
                 links.commands_taken.set(true);
                 links.planner_wake.signal();
             }

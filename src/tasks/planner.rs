@@ -4,6 +4,7 @@
 //! the queue, and at a program stop for cycle start if the settings say so. One turn builds one block.
 //! In a queue flush it forgets the line, has exec drop the blocks, and starts from where the motors are.
 
+mod check;
 mod home;
 mod jog;
 mod merge;
@@ -16,13 +17,14 @@ mod square;
 
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
-use parts::{ArcWalk, Parts};
+use parts::{ArcWalk, Ongoing, Parts};
 
 use super::Never;
 use super::common;
 use super::links::{self, Changes, Links};
 use super::parser;
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
+use crate::gcode::interpreter::Modes;
 use crate::gcode::overrides::Change;
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, is_asked, wait};
@@ -53,7 +55,7 @@ struct Planner {
     outputs: Outputs,
     /// How far the line has been carried out.
     steps: Steps,
-    walk: Option<ArcWalk>,
+    walk: Ongoing,
     begun: Begun,
     /// Since when a chain waits, ms.
     waits_since: u16,
@@ -69,6 +71,8 @@ enum Begun {
     Nothing,
     /// The rest of its parts.
     Parts(Parts),
+    /// Nothing, but lines are checked: these are the modes of before.
+    Check(Modes),
     /// All of it, and of those before it, from `position` on: more may go on with it.
     Chain(Chain),
 }
@@ -113,7 +117,7 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
         drivers: Drivers::USUAL,
         outputs: Outputs { on: 0, speed: 0.0 },
         steps: Steps::default(),
-        walk: None,
+        walk: Ongoing::None,
         begun: Begun::Nothing,
         waits_since: 0,
         alone: 0,
@@ -258,7 +262,7 @@ impl Planner {
             self.part(&commands);
             return Turn::More;
         }
-        if let Some(arc) = &mut self.walk
+        if let Ongoing::Arc(arc) = &mut self.walk
             && let Motion::Arc { target, arc: circle, .. } = &commands.motion
         {
             match arc.walk.next(circle, target) {
@@ -267,7 +271,7 @@ impl Planner {
                     self.straight(&end, Some(feed));
                 }
                 None => {
-                    self.walk = None;
+                    self.walk = Ongoing::None;
                     self.moved(&commands);
                 }
             }
@@ -312,6 +316,7 @@ impl Planner {
             Step::Probe => return Turn::Probe,
             Step::Home => return Turn::Home,
             Step::Jog => return Turn::Jog,
+            Step::Check => self.check(),
         }
         Turn::More
     }
@@ -343,7 +348,7 @@ impl Planner {
         parts.left -= 1;
         if parts.left == 0 {
             self.begun = Begun::Nothing;
-            if self.walk.is_none() {
+            if matches!(self.walk, Ongoing::None) {
                 self.moved(commands);
             }
         }
@@ -353,12 +358,15 @@ impl Planner {
     /// Queues a straight move, for which there is room, unless it is to be made in parts or merged.
     fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>, may_merge: bool) -> Built {
         let settings = self.links.settings.borrow();
-        let curve = self.walk.as_ref().map(|arc| &arc.curve);
+        let curve = match &self.walk {
+            Ongoing::Arc(ArcWalk { curve, .. }) => Some(curve),
+            _ => None,
+        };
         let line = Line { from: &self.position, to: target, feed, curve, may_merge };
         let mut block = Move::default();
         let built = self.builder.line(&line, &self.dynamics, &*settings, &mut block);
         if let Built::Line(entry) = built {
-            if let Some(arc) = &mut self.walk {
+            if let Ongoing::Arc(arc) = &mut self.walk {
                 arc.curve.go_on();
             }
             self.queue.push_line(&mut block, entry, self.line);
@@ -474,13 +482,17 @@ impl Planner {
     #[small]
     fn restart(&mut self) -> bool {
         let links = self.links;
-        let motion = common::snapshot(links.thread);
-        self.relocate(&motion);
-        self.news = News::None;
-        let mut model = links.model.borrow_mut();
-        let spindle = Spindle { turn: outputs::turn(motion.outputs), speed: motion.speed };
-        model.set_outputs(&spindle, outputs::coolant(motion.outputs));
-        drop(model);
+        if self.checks() {
+            // Nothing has moved. Check mode may just have ended.
+            self.check();
+        } else {
+            let motion = common::snapshot(links.thread);
+            self.relocate(&motion);
+            self.news = News::None;
+            let spindle = Spindle { turn: outputs::turn(motion.outputs), speed: motion.speed };
+            let coolant = outputs::coolant(motion.outputs);
+            links.model.borrow_mut().set_outputs(&spindle, coolant);
+        }
         links.job.set(Job::default());
         let (cycle, killed) = machine::dropped();
         match cycle {
@@ -488,7 +500,9 @@ impl Planner {
             // Motors of an axis may have moved apart.
             Cycle::Homing => links.changes.note(Changes::STEPS),
             Cycle::Probe => links.probe.abandon(),
-            Cycle::Lines | Cycle::Stopped => {}
+            // It was to begin.
+            Cycle::Check if !self.checks() => machine::carry_out(machine::Event::Done),
+            Cycle::Lines | Cycle::Stopped | Cycle::Check => {}
         }
         if killed {
             links.except(Status::KillJob);

@@ -20,6 +20,7 @@ use super::wake::Wake;
 use crate::config::Setting;
 use crate::gcode::tables::{Edit, Row, Tables};
 use crate::hal::eeprom::Eeprom;
+use crate::machine;
 use crate::protocol::Store;
 use crate::status::Status;
 use crate::store::kept::{self, ITEMS, Item};
@@ -224,6 +225,10 @@ impl Tables for &Storage {
     }
 
     fn apply(&mut self, edit: &Edit) {
+        // What is only checked changes no table.
+        if machine::is_checking() {
+            return;
+        }
         self.edit.set(Some(*edit));
         self.wake.signal();
     }

@@ -126,9 +126,9 @@ impl<'a> View<'a> {
         &self.seen().motion
     }
 
-    /// Whether anything is queued or runs, or a hold is on.
+    /// Whether anything is queued or runs, or a hold or check mode is on.
     pub fn is_busy(&self) -> bool {
-        machine::is_held() || self.has_work()
+        machine::is_held() || machine::is_checking() || self.has_work()
     }
 
     /// Whether anything is queued or runs.
@@ -189,6 +189,11 @@ impl<'a> View<'a> {
         }
         let busy = self.is_busy() || self.links.has_data();
         if busy { Err(Status::NotAccepted) } else { Ok(()) }
+    }
+
+    /// Whether settings and offsets may change: not in check mode, in which a file may set them.
+    fn may_set(&self) -> Result<(), Status> {
+        if machine::is_checking() { Err(Status::NotAccepted) } else { Ok(()) }
     }
 
     /// Hands something to the planner that no line asks for. The port that did feeds the machine now.
@@ -268,6 +273,7 @@ impl Machine for View<'_> {
     }
 
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
+        self.may_set()?;
         if setting.is_cold() {
             self.links.storage.set_cold(setting, value)?;
             spindle::set(self.links.thread, setting, value);
@@ -302,10 +308,12 @@ impl Machine for View<'_> {
     }
 
     fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {
+        self.may_set()?;
         self.links.model.borrow_mut().set(row, axis, value)
     }
 
     fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status> {
+        self.may_set()?;
         self.links.model.borrow_mut().set_tool_length(axis, length)
     }
 
@@ -364,6 +372,7 @@ impl Machine for View<'_> {
             Value::Starvations => health::starvations().into(),
             Value::Kept => self.links.storage.is_done().into(),
             Value::Home => self.home_state(),
+            Value::Check => machine::is_checking().into(),
             Value::Blamed => self.links.model.borrow().blamed().into(),
             modal => self.modal(modal),
         }
@@ -480,6 +489,27 @@ impl Machine for View<'_> {
         }
         self.links.model.borrow_mut().cancel_motion();
         self.begin(Motion::Home { axes, set: true }, machine::Event::Homing)
+    }
+
+    fn check(&mut self, on: bool) -> Status {
+        if on == machine::is_checking() {
+            return Status::Ok;
+        }
+        let alarm = machine::alarm();
+        if alarm != Alarm::None {
+            return alarm.status();
+        }
+        // Check mode is no work; a hold in it is.
+        let links = self.links;
+        let waits = links.has_data() || links.chain_waits.get();
+        let works = machine::is_held() || self.has_work() || waits;
+        // What an alarm or a `^d` switches off is off.
+        let runs =
+            self.modal(Value::SpindleOn) + self.modal(Value::Mist) + self.modal(Value::Flood);
+        if works || (on && runs != 0) {
+            return Status::NotAccepted;
+        }
+        self.begin(Motion::Check, if on { machine::Event::Check } else { machine::Event::Done })
     }
 
     fn jog(&mut self, axis: u8, place: Length) -> Status {

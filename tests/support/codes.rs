@@ -87,7 +87,7 @@ asked for as well: [settings.md](settings.md). Names that do something: [protoco
 ";
 
 /// Values of the machine: their name, or the group's with `x`, `1` or `e`, and what they are.
-const VALUES: [(&str, &str); 61] = [
+const VALUES: [(&str, &str); 62] = [
     ("n", "number (N) of the line that was finished last"),
     ("line", "number (N) of the line that moves"),
     ("vel", "speed now, units/min"),
@@ -109,6 +109,7 @@ const VALUES: [(&str, &str); 61] = [
     ("frmo", "0 G93, 1 G94, 2 G95"),
     ("tool", "tool in the spindle"),
     ("home", "0 not homed, 1 all axes with a homing switch are homed, 2 homes"),
+    ("chk", "1: check mode, in which nothing moves; can be set"),
     ("qr", "free blocks of the queue"),
     ("qi", "blocks added since it was asked last"),
     ("qo", "blocks done since it was asked last"),

@@ -43,11 +43,6 @@ impl Request {
                         let length = fixed(pair, c.line, Length::DECIMALS, false)?;
                         c.machine.set_tool_length(axis, Length(length))?;
                     }
-                    Some(Subject::Single(single)) if single.source == Source::Of(Value::Home) => {
-                        if is_sure(pair, c)? {
-                            done(c.machine.home())?;
-                        }
-                    }
                     Some(Subject::Single(single)) => set_value(single.source, pair, c)?,
                     _ => return Err(Status::ReadOnly),
                 }
@@ -141,7 +136,7 @@ fn jog<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Stat
     done(c.machine.jog(axis.ok_or(Status::UnrecognizedName)?, Length(place)))
 }
 
-/// Sets a value of the machine, of which only the overrides can be.
+/// Sets a value of the machine: an override; or homes, or checks lines from now on.
 #[small]
 fn set_value<M: Machine, O>(
     source: Source,
@@ -149,6 +144,14 @@ fn set_value<M: Machine, O>(
     c: &mut Context<'_, M, O>,
 ) -> Result<(), Status> {
     let change = match source {
+        Source::Of(Value::Home) => {
+            let sure = is_sure(pair, c)?;
+            return if sure { done(c.machine.home()) } else { Ok(()) };
+        }
+        Source::Of(Value::Check) => {
+            let on = is_sure(pair, c)?;
+            return done(c.machine.check(on));
+        }
         Source::Of(Value::Override(which)) => {
             let on = c.machine.value(Value::OverrideOn(which)) != 0;
             Change::new(which, on, factor(which, pair, c.line)?)

@@ -231,6 +231,10 @@ impl Machine for Fake {
         Status::HomingSwitches
     }
 
+    fn check(&mut self, on: bool) -> Status {
+        if on { Status::Ok } else { Status::NotAccepted }
+    }
+
     fn jog(&mut self, axis: u8, _place: Length) -> Status {
         if axis < 3 { Status::Ok } else { Status::AxisDisabled }
     }

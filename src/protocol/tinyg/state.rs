@@ -65,7 +65,7 @@ pub fn cycs(machine: &mut impl Machine) -> i32 {
         return 0;
     }
     match machine.cycle() {
-        Cycle::Lines | Cycle::Stopped => {
+        Cycle::Lines | Cycle::Stopped | Cycle::Check => {
             i32::from(machine.hold() != Hold::None || machine.value(Value::Working) != 0)
         }
         Cycle::Probe => 2,

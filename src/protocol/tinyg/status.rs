@@ -53,6 +53,7 @@ rows! {
     PersistenceError = 34, "Persistence error";
     StepsLate = 37, "Steps came late";
     ProgramStopped = 38, "Program stopped [~ to resume]";
+    ProgramChecked = 39, "Program checked [{chk:0} to end]";
     UnrecognizedName = 100, "Unrecognized command or config name";
     MalformedCommand = 101, "Invalid or malformed command";
     BadNumber = 102, "Bad number format";

@@ -159,7 +159,7 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 43;
+pub const SINGLE_COUNT: usize = 44;
 /// Entries of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
 /// The number of the vector `g92`.
@@ -246,6 +246,7 @@ progmem! {
         count("frmo", of(Value::FeedMode), text!("Feed rate mode:"), FEED),
         count("tool", of(Value::Tool), text!("Tool number"), NONE),
         count("home", of(Value::Home), text!("Homing state:"), text!("Not Homed|Homed|Homing")),
+        count("chk", of(Value::Check), text!("Check mode:"), ON),
         count("qr", of(Value::QueueFree), NONE, NONE),
         count("qi", of(Value::QueueAdded), NONE, NONE),
         count("qo", of(Value::QueueRemoved), NONE, NONE),

@@ -5,8 +5,19 @@ use kerf_macros::small;
 use super::Planner;
 use crate::gcode::arc::{Extent, Walk};
 use crate::gcode::command::{Feed, Motion};
+use crate::gcode::interpreter::Offsets;
 use crate::motion::curve::Curve;
 use crate::units::{Length, PerAxis};
+
+/// What lasts longer than a turn: one at a time, and one place in memory.
+pub(super) enum Ongoing {
+    /// Nothing.
+    None,
+    /// An arc.
+    Arc(ArcWalk),
+    /// Lines are checked: these are the offsets of before.
+    Check(Offsets),
+}
 
 /// An arc under way.
 pub(super) struct ArcWalk {
@@ -73,6 +84,6 @@ impl Planner {
         let (radius, slope) = (extent.radius(), extent.slope());
         let (curve, longest) = Curve::of(axes, radius, slope, feed, &self.dynamics);
         let walk = Walk::new(&self.position, arc, &extent, tolerance, longest);
-        self.walk = Some(ArcWalk { walk, feed, curve });
+        self.walk = Ongoing::Arc(ArcWalk { walk, feed, curve });
     }
 }

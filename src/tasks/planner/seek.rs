@@ -10,6 +10,7 @@
 use embassy_futures::yield_now;
 use kerf_macros::small;
 
+use super::parts::Ongoing;
 use super::{Begun, Planner, Turn};
 use crate::boards::MOTORS;
 use crate::dda::contact;
@@ -116,7 +117,7 @@ impl Planner {
         }
         self.builder.place(&motion.target);
         self.queue.restart();
-        (self.walk, self.begun) = (None, Begun::Nothing);
+        (self.walk, self.begun) = (Ongoing::None, Begun::Nothing);
         self.outputs = Outputs { on: motion.outputs, speed: motion.speed };
         self.links.model.borrow_mut().set_position(&self.position);
     }
