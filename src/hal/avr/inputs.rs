@@ -146,6 +146,9 @@ pub fn set_up(low: u16, stops: u16) {
     with(|state| {
         state.stops = stops;
         state.live = stops & !u16::from(state.spared);
+    });
+    // In two pieces: a step waits for 31 cycles at most.
+    with(|state| {
         if state.low != low {
             (state.low, state.fresh) = (low, true);
             // SAFETY: starts a look; one that is due does it all the same.
