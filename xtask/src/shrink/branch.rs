@@ -209,15 +209,11 @@ impl Places {
 #[cfg(test)]
 mod tests {
     use super::super::text::tests::{code, program};
-    use super::super::verify;
+    use super::super::verify::tests::checked;
     use super::*;
 
     fn shortened(name: &str, text: &str) -> String {
-        let before = program(&[(name, text)]);
-        let mut after = before.clone();
-        shorten(&mut after);
-        verify::check(&before, &after).unwrap();
-        code(&after, name)
+        code(&checked(&[(name, text)], shorten), name)
     }
 
     #[test]

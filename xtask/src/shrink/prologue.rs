@@ -213,7 +213,7 @@ pub fn put_back(routine: &[Insn], before: &[Insn]) -> Option<Vec<Insn>> {
 #[cfg(test)]
 mod tests {
     use super::super::text::tests::{code, program, text};
-    use super::super::verify;
+    use super::super::verify::tests::checked;
     use super::*;
 
     const SAVED: &str = "push r12\npush r13\npush r14\npush r15\npush r16\npush r17\n";
@@ -227,11 +227,7 @@ mod tests {
         let copies: Vec<_> = copies.collect();
         let copies: Vec<_> =
             copies.iter().map(|(name, code)| (name.as_str(), code.as_str())).collect();
-        let before = program(&copies);
-        let mut after = before.clone();
-        share(&mut after);
-        verify::check(&before, &after).unwrap();
-        after
+        checked(&copies, share)
     }
 
     #[test]

@@ -307,15 +307,11 @@ impl Change {
 #[cfg(test)]
 mod tests {
     use super::super::text::tests::{code, program};
-    use super::super::verify;
+    use super::super::verify::tests::checked;
     use super::*;
 
     fn shared(functions: &[(&str, &str)]) -> Program {
-        let before = program(functions);
-        let mut after = before.clone();
-        share(&mut after);
-        verify::check(&before, &after).unwrap();
-        after
+        checked(functions, share)
     }
 
     const BODY: &str = "ldi r18, 1\nldi r19, 2\nldi r20, 3\nsts 500, r18\n";

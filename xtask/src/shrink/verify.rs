@@ -144,9 +144,18 @@ fn insns(code: &[Line]) -> Result<Vec<Insn>> {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::super::text::tests::program;
     use super::*;
+
+    /// The functions after a pass, which has to be equal to what was written.
+    pub fn checked(functions: &[(&str, &str)], pass: fn(&mut Program)) -> Program {
+        let before = program(functions);
+        let mut after = before.clone();
+        pass(&mut after);
+        check(&before, &after).unwrap();
+        after
+    }
 
     const BEFORE: [(&str, &str); 2] =
         [("f", "ldi r24, 1\ninc r24\nret"), ("g", "ldi r24, 1\ninc r24\ninc r24\nret")];

@@ -106,15 +106,11 @@ fn far(program: &Program) -> (Vec<usize>, BTreeMap<String, Vec<Site>>) {
 #[cfg(test)]
 mod tests {
     use super::super::text::tests::{code, program};
-    use super::super::verify;
+    use super::super::verify::tests::checked;
     use super::*;
 
     fn shared(functions: &[(&str, &str)]) -> Program {
-        let before = program(functions);
-        let mut after = before.clone();
-        share(&mut after);
-        verify::check(&before, &after).unwrap();
-        after
+        checked(functions, share)
     }
 
     #[test]
