@@ -53,7 +53,7 @@ const TURN_MS: u32 = 4;
 
 /// Turns that an answer leaves in a row to those on other ports that have had none.
 const PATIENCE: u8 = 8;
-/// No answer waits for its turn.
+/// What [`Parser::turns`] returns for a port on which no answer can go on.
 const NONE: u8 = u8::MAX;
 
 /// So many turns in a row are left to a report that ends its line for an answer.
@@ -246,8 +246,8 @@ impl Parser {
         false
     }
 
-    /// Whether the answer on a port leaves its turn to one on another that has had none, so many times in a row: short answers come
-    /// first. If not, the port has its turn.
+    /// Whether the answer on a port leaves its turn to a control line that waits on another, [`PATIENCE`] times in a row at most: short
+    /// answers come first. If not, the port has its turn.
     #[inline(never)]
     fn leaves_its_turn(&mut self, number: u8) -> bool {
         let leaves = self.is_awaited(number);
@@ -269,8 +269,8 @@ impl Parser {
         turns != NONE && (0..PORTS as u8).any(|other| other != number && self.turns(other) < turns)
     }
 
-    /// Whether the answer that is due on a port has had a turn, 0 or 1, also if it is to the next control line; [`NONE`] if none is due, or
-    /// that port has no room for it.
+    /// How many turns the answer on a port has had. 0: a control line waits for its first. 1: the answer is under way. [`NONE`]: no control
+    /// line waits there, or the port has no room for an answer.
     #[inline(never)]
     fn turns(&self, number: u8) -> u8 {
         let at = usize::from(number);
