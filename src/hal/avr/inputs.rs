@@ -365,9 +365,11 @@ extern "C" fn __vector_13() -> ! {
             "pop  r25",
             "pop  r24",
             "reti",
+            // As it was: the tick counts it up while exec runs.
             "1:",
             "cli",
             "sts  0x70, r24",
+            "sts  {closed}, r25",
             "rjmp 2b",
             closed = sym assembly::CLOSED,
             missed = sym assembly::MISSED,

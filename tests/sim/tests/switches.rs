@@ -134,6 +134,40 @@ fn a_storm_of_noise_leaves_time_for_the_rest() {
     assert_eq!(machine.recorder().motors()[0].position, 60 * 1_280);
 }
 
+/// Not 0 while exec runs, or may not run.
+const CLOSED: &str = "avr_embassy::assembly::CLOSED";
+/// What the software interrupt runs.
+const POLL: &str = "avr_embassy::interrupt::avr::poll";
+
+/// Exec in the midst of exec would lose segments, or send them twice.
+#[test]
+fn a_look_within_the_tick_does_not_let_exec_interrupt_itself() {
+    for phase in 0..4 {
+        let (mut machine, _) =
+            running(&MEGA2560_GRBL, &Build::of(&MEGA2560_GRBL), &["{xsn:2,ysn:2}"]);
+        let closed = machine.image().variable(CLOSED).expect("the ceiling");
+        let poll = machine.image().function(POLL).expect("what exec runs in");
+        machine.run_until(machine.cycle() + phase * 1_117).unwrap();
+        machine.tamper(|mechanics, now| {
+            (0..20_000).for_each(|n| mechanics.disturb(inputs::X_MIN, now + n * 50 * US, 2 * US));
+        });
+        // The tick lets others in each 256 ms.
+        let end = machine.cycle() + machine.cycles(800);
+        let mut began = None;
+        while machine.cycle() < end {
+            machine.step(end).unwrap();
+            let sp = machine.sp();
+            if began.is_some_and(|began| sp > began) {
+                began = None;
+            }
+            if machine.pc() == poll {
+                assert_eq!(began.replace(sp), None, "exec interrupts itself");
+            }
+            assert!(began.is_none() || machine.peek(closed) > 0, "exec is let into itself");
+        }
+    }
+}
+
 #[test]
 fn each_event_is_told_once_and_the_state_is_right_after_it() {
     let (mut machine, mut host) = running(&RAMPS14, &Build::of(&RAMPS14), &["{xsn:1}"]);
