@@ -49,6 +49,18 @@ impl Short {
         Self(u16::from_le_bytes([mantissa, power]))
     }
 
+    /// A number that compares as it does.
+    #[inline(always)]
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    /// From [`Short::bits`].
+    #[inline(always)]
+    pub const fn of_bits(bits: u16) -> Self {
+        Self(bits)
+    }
+
     /// Its mantissa without the leading 1, and its exponent.
     #[inline(always)]
     pub fn parts(self) -> (u8, u8) {

@@ -243,6 +243,40 @@ pub fn root(x: u32) -> u16 {
     root
 }
 
+/// How many pairs of a mark and a value come before the first whose mark has its highest bit set, or whose value is below `least`; all of
+/// them, at most 255, if there is none. Cost: 14 each, where the compiler's loop takes 25.
+#[inline(always)]
+pub fn passed_over(marks: &[u8], values: &[u16], least: u16) -> u8 {
+    let count = marks.len().min(values.len()).min(255) as u8;
+    let mut left = count;
+    if left > 0 {
+        // SAFETY: reads `count` marks and values at most, which both slices have.
+        unsafe {
+            core::arch::asm!(
+                "1:",
+                "ld   {byte}, X+",
+                "tst  {byte}",
+                "brmi 2f",
+                "ld   {byte}, Z+",
+                "cp   {byte}, {least:l}",
+                "ld   {byte}, Z+",
+                "cpc  {byte}, {least:h}",
+                "brcs 2f",
+                "dec  {left}",
+                "brne 1b",
+                "2:",
+                byte = out(reg) _,
+                left = inout(reg) left,
+                least = in(reg_pair) least,
+                inout("X") marks.as_ptr() => _,
+                inout("Z") values.as_ptr() => _,
+                options(pure, readonly, nostack),
+            );
+        }
+    }
+    count - left
+}
+
 /// A number rounded down; one of 2^31 or more, or below 0, or a NaN, is 2^31. Cost: 120, where `as` takes 260.
 #[inline(never)]
 pub fn whole(x: f32) -> u32 {

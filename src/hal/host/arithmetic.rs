@@ -52,6 +52,13 @@ pub fn root(x: u32) -> u16 {
     x.isqrt() as u16
 }
 
+/// How many pairs of a mark and a value come before the first whose mark has its highest bit set, or whose value is below `least`; all of
+/// them, at most 255, if there is none.
+pub fn passed_over(marks: &[u8], values: &[u16], least: u16) -> u8 {
+    let passes = |(mark, value): &(&u8, &u16)| **mark < 0x80 && **value >= least;
+    marks.iter().zip(values).take(255).take_while(passes).count() as u8
+}
+
 /// A number rounded down; one of 2^31 or more, or below 0, or a NaN, is 2^31.
 pub fn whole(x: f32) -> u32 {
     // As the chip does: -0 is below 0.
