@@ -143,7 +143,6 @@ const COLD: &[&str] = &[
     "kerf::motion::dynamics::",
     "kerf::motion::exec::Exec>::take_up",
     "kerf::motion::governor::Governor>::creep",
-    "kerf::motion::governor::Governor>::lay",
     "kerf::motion::junction::mean_deviation",
     "kerf::motion::limits::",
     "kerf::motion::line::",

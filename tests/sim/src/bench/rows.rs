@@ -354,8 +354,8 @@ pub const ROWS: [Row; 44] = [
         better: Lower,
         peers: NONE,
         target: Some(24_000.0),
-        // A scan that tries three velocities, and a ramp that is laid out: 22,700 to 24,330, as blocks happen to lie.
-        floor: Some(24_500.0),
+        // A scan that tries three velocities, and a ramp that is laid out.
+        floor: Some(24_000.0),
         measure: costs::segment_jerk_worst,
     },
     Row {
