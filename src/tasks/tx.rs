@@ -108,6 +108,8 @@ impl crate::protocol::Out for Tx {
             }
         }
         self.sum_behind(before);
+        // What is worked out next takes longer than these bytes need to leave.
+        uart::kick(self.port);
     }
 
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
