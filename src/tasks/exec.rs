@@ -31,6 +31,9 @@ use crate::tasks::{Never, hold, links, overrides, power, spindle};
 /// After so many segments without a turn of thread mode they become longer, which takes less of the CPU.
 const PATIENCE: u8 = 6;
 
+/// After so many, while somebody asks, a jerk-limited motion makes no scans that may wait.
+const PATIENCE_ASKED: u8 = 1;
+
 /// While motion has just begun thread mode gets a turn after so many segments: what waits is built up from
 /// nothing, which would take 6 ms at a stretch.
 const FIRST_TURN: u8 = 2;
@@ -211,12 +214,16 @@ impl<'a> Runner<'a> {
         let Self { waiting, segments, rests, .. } = self;
         health::moves(waiting.count);
         waiting.update(segments.used());
-        waiting.fewest = if self.machine.has_jerk() { 2 } else { 1 };
+        let has_jerk = self.machine.has_jerk();
+        waiting.fewest = if has_jerk { 2 } else { 1 };
         let short = waiting.is_short(*rests);
         let passed_over = event::pass_over();
-        // While somebody asks, a ramp in usual stretches would keep the answer away for 9 ms.
-        waiting.coarse = event::is_asked() || passed_over > PATIENCE || waiting.is_busy();
-        self.machine.set_coarse(waiting.coarse, short);
+        // While somebody asks, a ramp in usual stretches would keep the answer away for 9 ms, and scans of one segment after the
+        // other for 14.
+        let asked = event::is_asked();
+        waiting.coarse = asked || passed_over > PATIENCE || waiting.is_busy();
+        let scans_too_long = asked && has_jerk && passed_over > PATIENCE_ASKED;
+        self.machine.set_coarse(waiting.coarse, short || scans_too_long);
         if !rested {
             health::look_for_starvation();
         }
