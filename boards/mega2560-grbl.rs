@@ -6,7 +6,7 @@ use super::{Board, Handshake, MotorPins, Pwm, Serial, Timer, USB, Usart, pin};
 /// Arduino Mega 2560 with a grbl-style shield.
 pub const MEGA2560_GRBL: Board = Board {
     name: "mega2560-grbl",
-    features: &["dialect-tinyg", "cycles", "probing", "jobs", "help"],
+    features: &["dialect-tinyg", "dialect-grbl", "cycles", "probing", "jobs", "help"],
     clock_hz: 16_000_000,
     motors: [
         MotorPins { step: pin(A, 2), dir: pin(C, 7), enable: None }, // D24, D30

@@ -35,7 +35,7 @@ use crate::tasks::{
 };
 
 /// Bytes for all lines of USB together.
-const LINES_USB: usize = 448;
+const LINES_USB: usize = 412;
 /// The same of the other port.
 const LINES_AUX: usize = 80 + AUX_RESERVE as usize;
 
@@ -91,6 +91,7 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
     let speech = Speech::at_start(&links.settings.borrow());
     links.ports.iter().for_each(|port| port.speech.set(speech));
+    wait_for_decision(links);
     set_hardware(thread, &links.settings.borrow());
     spindle::set_all(thread, links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
@@ -113,6 +114,16 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     main.spawn(control_task(links).ok()?);
     main.spawn(storage_task(links).ok()?);
     Some(())
+}
+
+/// What is said first decides between dialects, if the settings let it.
+#[inline(never)]
+#[small]
+fn wait_for_decision(links: &Links) {
+    let settings = links.settings.borrow();
+    let waits = settings.lets_senders_choose() && Speech::of_question(&settings).is_some();
+    links.ports.iter().for_each(|port| port.undecided.set(waits));
+    links.decided(&settings);
 }
 
 /// A machine on the host that runs the firmware.

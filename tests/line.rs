@@ -30,7 +30,8 @@ fn greeting_with(contents: Vec<u8>) -> String {
         let mut greeting = ask(&machine, "", 300);
         let report = greeting.find("{\"sr\"").or(greeting.find("posx:")).expect("a report");
         greeting.truncate(report);
-        greeting
+        // That of grbl's dialect comes first while nothing has decided between dialects.
+        greeting.trim_start_matches("\r\nGrbl 1.1h ['$' for help]\r\n").to_string()
     });
     greeted.join().expect("no panic")
 }

@@ -253,9 +253,34 @@ impl Settings {
         self.system(system::RXM) == 0
     }
 
+    /// In which dialect ports begin: 0 that which is decided by what is said, 1 g2core's, 2 TinyG's, 3 grbl's.
+    pub fn dialect(&self) -> u8 {
+        self.system(system::DIA)
+    }
+
+    /// Whether what a sender says first decides between dialects. Whoever has chosen text mode, or silence, has chosen TinyG's.
+    pub fn lets_senders_choose(&self) -> bool {
+        self.dialect() == 0 && self.starts_in_json() && self.json_verbosity() != 0
+    }
+
     /// Whether the machine passes for a g2core.
     pub fn is_g2core(&self) -> bool {
-        self.system(system::DIA) != 0
+        self.dialect() == 1
+    }
+
+    /// Whether grbl's status reports have machine positions.
+    pub fn reports_machine_position(&self) -> bool {
+        self.system(system::GRM) & 1 != 0
+    }
+
+    /// Whether grbl's status reports have free blocks and bytes.
+    pub fn reports_buffers(&self) -> bool {
+        self.system(system::GRM) & 2 != 0
+    }
+
+    /// Whether grbl's reports are in inches.
+    pub fn reports_in_inches(&self) -> bool {
+        self.system(system::GRM) & 4 != 0
     }
 
     /// Plane at power-up and program end: 0 G17, 1 G18, 2 G19.

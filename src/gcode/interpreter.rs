@@ -13,8 +13,9 @@
 //! a typical G1, in inches too (`tests/sim/tests/interpreter.rs`).
 
 use super::block::Block;
+use super::codes::NonModal;
 use super::command::{Commands, Spindle};
-use super::modal::{Defaults, Modal, MotionMode, Turn, Units};
+use super::modal::{Defaults, FeedMode, Modal, MotionMode, Turn, Units};
 use super::setup::Setup;
 use super::state::State;
 use super::sticky::Sticky;
@@ -127,6 +128,34 @@ impl<T: Tables> Interpreter<T> {
         self.execute_or_undo(&block, setup, out)?;
         let Block { message, slashed, commented, .. } = block;
         Ok(Info { message, deleted: slashed && deletes, commented })
+    }
+
+    /// Interprets the words of a jog: a move at their feed rate, in their units and distance mode or those in force, after which everything
+    /// modal is as it was.
+    #[inline(never)]
+    #[small]
+    pub fn jog(
+        &mut self,
+        words: &[u8],
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<Info, Status> {
+        out.clear();
+        let mut block = Block::new();
+        block.read(words, false)?;
+        block.check(MotionMode::Feed)?;
+        // Of what is rare a jog has G53 alone, which is a matter of its move.
+        if block.is_rare() && block.non_modal != Some(NonModal::MachineCoordinates) {
+            return Err(Status::GcodeUnsupported);
+        }
+        let State { modal, feed, feed_units, line, .. } = self.state;
+        self.state.modal.motion = MotionMode::Feed;
+        self.state.modal.feed_mode = FeedMode::PerMinute;
+        self.state.feed = 0.0;
+        let done = self.execute_usual(&block, setup, out);
+        let state = &mut self.state;
+        (state.modal, state.feed, state.feed_units, state.line) = (modal, feed, feed_units, line);
+        done.map(|()| Info::default())
     }
 
     #[inline(never)]

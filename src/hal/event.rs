@@ -63,8 +63,16 @@ machine_static! {
     fn transmitted() -> Waiter = Waiter::new();
     // Exec counts; the main loop, which never runs in between, begins anew.
     fn passed_over() -> SharedByte = SharedByte::new(0);
+    // Thread mode alone.
+    fn eager() -> SharedByte = SharedByte::new(0);
     // Thread mode says so, exec looks.
     fn asked() -> SharedByte = SharedByte::new(0);
+}
+
+/// Says whether bytes are to be looked for that act without the end of a line: then there is an [`Event::Received`] each [`EAGER_MS`], whether or
+/// not any byte has come. Thread mode.
+pub fn set_eager(on: bool) {
+    eager().set(on.into());
 }
 
 /// Says whether somebody waits for an answer that thread mode works on. Exec leaves it more of the CPU then.
@@ -84,6 +92,9 @@ pub fn pass_over() -> u8 {
     passed_over().set(count);
     count
 }
+
+/// See [`set_eager`]: a power of two.
+const EAGER_MS: u8 = 4;
 
 /// Waits until `ready` gives a value, asking again after each `event`.
 pub fn wait<R>(
@@ -135,5 +146,8 @@ pub fn turn(thread: Thread, bits: u8) {
     }
     if Event::Tick.is_in(bits) {
         imp::uart::look();
+        if eager().get() != 0 && imp::time::millis() as u8 & (EAGER_MS - 1) == 0 {
+            super::flags::set(Event::Received);
+        }
     }
 }

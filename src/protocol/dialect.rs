@@ -23,6 +23,24 @@ pub trait Dialect {
     /// What is kept between reports.
     type Memory: Remembers;
 
+    /// Whether lines are answered in their order, empty ones too, and `?` and bytes above 0x7F are taken out of lines wherever they stand.
+    const IN_ORDER: bool = false;
+
+    /// Whether the settings have ports begin in this dialect. If no dialect is chosen they begin in the first of the table.
+    fn is_chosen(settings: &Settings) -> bool {
+        let _ = settings;
+        false
+    }
+
+    /// Whether a line is said in this dialect alone, so that it decides for a port that waits for that.
+    fn is_decided_by(line: &[u8]) -> bool;
+
+    /// The words of a jog, if a block is one: G-code that moves and changes no mode.
+    fn jog(block: &[u8]) -> Option<&[u8]> {
+        let _ = block;
+        None
+    }
+
     /// How ports are spoken to after a start.
     fn speech(settings: &Settings) -> Self::Speech;
 
@@ -145,12 +163,45 @@ macro_rules! dialects {
         }
 
         impl Speech {
-            /// How ports are spoken to after a start: in the first dialect of the table that is built in.
+            /// How ports are spoken to after a start: in the dialect that is chosen, else in the first of the table that is built in.
             #[allow(unreachable_code)]
             #[inline(always)]
             pub fn at_start(settings: &Settings) -> Self {
                 $(#[cfg(feature = $feature)]
+                if <$dialect>::is_chosen(settings) {
+                    return Self::$name(<$dialect>::speech(settings));
+                })+
+                $(#[cfg(feature = $feature)]
                 { return Self::$name(<$dialect>::speech(settings)); })+
+            }
+
+            /// The dialect that a line decides for, if it is said in one alone; see [`Dialect::is_decided_by`].
+            #[small]
+            pub fn decided_by(line: &[u8], settings: &Settings) -> Option<Self> {
+                $(#[cfg(feature = $feature)]
+                if <$dialect>::is_decided_by(line) {
+                    return Some(Self::$name(<$dialect>::speech(settings)));
+                })+
+                None
+            }
+
+            /// The dialect whose senders ask by a `?` alone, if it is built in.
+            #[small]
+            pub fn of_question(settings: &Settings) -> Option<Self> {
+                $(#[cfg(feature = $feature)]
+                if <$dialect>::IN_ORDER {
+                    return Some(Self::$name(<$dialect>::speech(settings)));
+                })+
+                None
+            }
+
+            /// See [`Dialect::IN_ORDER`].
+            #[inline(always)]
+            pub fn is_in_order(self) -> bool {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(_) => <$dialect>::IN_ORDER,)+
+                }
             }
 
             /// See [`Dialect::brief`].
@@ -313,6 +364,15 @@ macro_rules! dialects {
             }
         }
 
+        /// See [`Dialect::jog`]: in any dialect that is built in.
+        #[inline(always)]
+        pub fn jog(block: &[u8]) -> Option<&[u8]> {
+            let mut words = None;
+            $(#[cfg(feature = $feature)]
+            { words = words.or_else(|| <$dialect>::jog(block)); })+
+            words
+        }
+
         /// See [`Dialect::may_be_control`]: in any dialect that is built in.
         #[inline(always)]
         pub fn may_be_control(first: u8) -> bool {
@@ -345,4 +405,6 @@ macro_rules! dialects {
 dialects! {
     /// TinyG's, and g2core's.
     tinyg: Tinyg(super::tinyg::Tinyg) if "dialect-tinyg";
+    /// grbl's, version 1.1.
+    grbl: Grbl(super::grbl::Grbl) if "dialect-grbl";
 }

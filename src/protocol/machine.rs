@@ -89,8 +89,8 @@ pub trait Machine {
     fn flush(&mut self) -> Status;
     /// Starts a built-in job, or ends the one that runs: 0.
     fn start_job(&mut self, number: u8) -> Status;
-    /// Homes all axes that have a switch for it, or refuses to.
-    fn home(&mut self) -> Status;
+    /// Homes those of these axes, as bits, that have a switch for it, or refuses to.
+    fn home(&mut self, axes: u8) -> Status;
     /// From now on lines of G-code are checked only, or carried out again; or refuses to.
     fn check(&mut self, on: bool) -> Status;
     /// Begins to move an axis to a place in machine coordinates, or refuses to.

@@ -11,7 +11,7 @@
 //! | [`machine`], [`value`] | what dialects ask of the machine |
 //! | [`notice`] | what is told unasked |
 //! | [`out`] | where dialects write to |
-//! | [`tinyg`] | TinyG's dialect |
+//! | [`tinyg`], [`grbl`] | TinyG's dialect, and grbl's |
 //!
 //! A dialect spells what is neutral here: the numbers and texts of a [`Status`](crate::status::Status), names of settings and values, what
 //! the machine is [doing](crate::machine::Doing). Which dialects an image has is a Cargo feature each; where there is one, nothing is left
@@ -19,6 +19,8 @@
 
 pub mod checksum;
 pub mod dialect;
+#[cfg(feature = "dialect-grbl")]
+pub mod grbl;
 pub mod line;
 pub mod machine;
 pub mod notice;
@@ -30,7 +32,7 @@ pub mod value;
 pub use checksum::Checksum;
 pub use dialect::{
     Answers, Dialect, Memory, Remembers, Request, Speech, Telling, Tells, asks_alarm, is_control,
-    may_be_control,
+    jog, may_be_control,
 };
 pub use line::{Ending, Next, Span};
 pub use machine::{Hold, Machine, Store, Warning};

@@ -15,6 +15,8 @@ pub enum Notice {
     Probing,
     /// How the machine stands: a status report.
     Status,
+    /// How the machine stands, which the sender has asked for by `?`.
+    Query,
     /// A jog has ended, or the queue has been flushed, or both.
     End {
         /// The first.

@@ -60,6 +60,8 @@ pub enum Value {
     Check,
     /// Free blocks of the planner; never told as less than six.
     QueueFree,
+    /// Free blocks of the planner, as they are.
+    BlocksFree,
     /// Blocks added since this was last read.
     QueueAdded,
     /// Blocks removed since this was last read.

@@ -19,7 +19,7 @@ use crc::{CRC_16_XMODEM, Crc, NoTable};
 use super::Memory;
 
 /// Bytes that it takes, with its head.
-pub const AREA: u16 = 896;
+pub const AREA: u16 = 885;
 /// What byte 0 is. Not what a record begins with.
 const VALID: u8 = 0x50;
 const ERASED: u8 = 0xFF;

@@ -33,8 +33,10 @@
 use super::jog;
 use super::lines::LinePool;
 use super::links::Links;
-use super::ports::Port;
+use super::overrides;
+use super::ports::{GREETING, INTERRUPTED, Port};
 use super::view::View;
+use crate::gcode::overrides::{Change, FULL, Override};
 use crate::hal::event::Event;
 use crate::hal::serial::{CUT, GO, USB};
 use crate::hal::system::reset;
@@ -134,6 +136,9 @@ pub fn serve(links: &Links) {
 #[small]
 fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
+        if port.speech.get().is_in_order() && machine::alarm() != Alarm::Panic {
+            return start_over(links, port);
+        }
         reset();
     }
     if characters & LET_GO != 0 {
@@ -170,6 +175,20 @@ fn act(links: &Links, port: &Port, characters: u8) {
         port.enquiry.set(true);
         links.parser_wake.signal();
     }
+    links.reporter_wake.urge();
+}
+
+/// A reset in a dialect that keeps the position: all that has come is dropped, the program ends, overrides are as programmed; the reporter greets
+/// when that is done, and begins an alarm before if something has been interrupted.
+#[inline(never)]
+#[small]
+fn start_over(links: &Links, port: &Port) {
+    let works = View::of(links, port).has_work() && !machine::is_checking();
+    cut(links, port, uart::newest(port.number), machine::Event::Kill);
+    for which in [Override::Feed, Override::Traverse, Override::Spindle] {
+        overrides::change(links.thread, Change::to(which, FULL));
+    }
+    port.ask(if works { GREETING | INTERRUPTED } else { GREETING });
     links.reporter_wake.urge();
 }
 

@@ -19,6 +19,7 @@ use crate::hal::text::copy_printing;
 use crate::machine::Alarm;
 use crate::machine::alarm::is_program_end;
 use crate::protocol::{asks_alarm, is_control, may_be_control};
+use crate::realtime::ASCII;
 use crate::status::Status;
 
 /// Line slots, beside the one for control lines that overtake. Senders count on eight.
@@ -97,6 +98,8 @@ pub struct LinePool {
     returned: bool,
     /// Empty lines are kept: in text mode they are answered by a prompt.
     keep_empty: bool,
+    /// No line is a control line: all are answered in their order.
+    in_order: bool,
     /// Longest line.
     longest: u8,
     /// Bytes left to control lines that overtake: as long as they may be.
@@ -120,6 +123,7 @@ impl LinePool {
             fault: None,
             returned: false,
             keep_empty: false,
+            in_order: false,
             longest: if room > LINE_MAX { LINE_MAX } else { room - 1 } as u8,
             reserve,
             stop: Alarm::None,
@@ -130,6 +134,22 @@ impl LinePool {
     /// Whether empty lines are lines, from now on.
     pub fn keep_empty(&mut self, keep: bool) {
         self.keep_empty = keep;
+    }
+
+    /// Whether this byte acts, and is no part of a line.
+    pub fn leaves(&self, byte: u8) -> bool {
+        self.in_order && acts(byte)
+    }
+
+    /// Whether all lines are answered in their order, from now on.
+    pub fn keep_order(&mut self, keep: bool) {
+        self.in_order = keep;
+    }
+
+    /// What to do with a line that has come whole.
+    #[inline(always)]
+    fn classify(&self, line: &[u8]) -> Class {
+        if !self.in_order && is_control(line) { Class::Control } else { Class::Data }
     }
 
     /// Free slots, not counting the one a line is coming into.
@@ -182,7 +202,8 @@ impl LinePool {
         if at + usize::from(len) > self.bytes.len() {
             at = self.move_down(at);
         }
-        classify(self.lay(ring, from, len, at)) == Class::Control
+        self.lay(ring, from, len, at);
+        self.classify(self.slice(at, len)) == Class::Control
     }
 
     /// Puts that control line before the line that is coming in; its sender counts so many bytes besides.
@@ -236,6 +257,7 @@ impl LinePool {
         {
             return 0;
         }
+        let bytes = if self.in_order { before_realtime(bytes) } else { bytes };
         let room = usize::from(self.room().min((self.longest - self.partial).into()));
         let at = self.room_at();
         let slots = self.bytes.get_mut(at..).unwrap_or(&mut []);
@@ -301,7 +323,7 @@ impl LinePool {
 
     /// Whether the line that is coming in is a question mark so far: whatever follows is another line.
     pub fn is_asking(&self) -> bool {
-        self.partial > 0 && self.bytes.get(usize::from(self.end)) == Some(&ASKS)
+        self.partial > 0 && !self.in_order && self.bytes.get(usize::from(self.end)) == Some(&ASKS)
     }
 
     /// Bytes have come that are not kept.
@@ -366,6 +388,11 @@ impl LinePool {
         self.entries.len() > usize::from(self.controls)
     }
 
+    /// Whether a line waits that could not be kept, or has been dropped.
+    pub fn has_faults(&self) -> bool {
+        self.entries.iter().any(|entry| matches!(entry.class, Class::Fault(_)))
+    }
+
     /// Drops all data lines: they will be answered with `status`.
     pub fn terminate(&mut self, status: Status) {
         self.drop_data(status, false);
@@ -403,7 +430,7 @@ impl LinePool {
     #[inline(never)]
     pub fn terminate_partial(&mut self, status: Status) {
         let text = self.slice(usize::from(self.end), self.partial);
-        if !text.is_empty() && classify(text) == Class::Data {
+        if !text.is_empty() && self.classify(text) == Class::Data {
             self.spoil(status);
         }
     }
@@ -427,7 +454,7 @@ impl LinePool {
                 self.pass(1);
                 return false;
             }
-            None => classify(self.slice(usize::from(self.end), len)),
+            None => self.classify(self.slice(usize::from(self.end), len)),
         };
         self.partial = 0;
         let besides = core::mem::take(&mut self.besides);
@@ -527,15 +554,22 @@ impl LinePool {
     }
 }
 
+/// Whether a byte acts where it stands, if all lines are answered in their order ([`realtime`](super::realtime)).
+pub fn acts(byte: u8) -> bool {
+    byte == ASKS || byte > ASCII
+}
+
+/// The bytes before the first that acts.
+#[inline(never)]
+#[small]
+fn before_realtime(bytes: &[u8]) -> &[u8] {
+    let end = bytes.iter().position(|byte| acts(*byte)).unwrap_or(bytes.len());
+    bytes.get(..end).unwrap_or(bytes)
+}
+
 /// Whether a byte is a blank.
 pub fn is_blank(byte: u8) -> bool {
     byte == b' ' || byte == b'\t'
-}
-
-/// What to do with a line that has come whole.
-#[inline(always)]
-fn classify(line: &[u8]) -> Class {
-    if is_control(line) { Class::Control } else { Class::Data }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! | link | carries | depth | RAM | from | to | when full |
 //! |---|---|---|---|---|---|---|
 //! | `uart` receive ring | bytes | 255; 63 | 259 B, 67 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
-//! | [`Port::lines`] | lines | 9 lines; 448 B, 96 B | 483 B, 131 B | reader | parser | bytes stay in the receive ring |
+//! | [`Port::lines`] | lines | 9 lines; 412 B, 96 B | 448 B, 132 B | reader | parser | bytes stay in the receive ring |
 //! | [`Links::commands`] | canonical commands | 1 | 98 B | parser | planner | the parser takes control lines only |
 //! | block ring | blocks | 64 | 1,912 B | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |

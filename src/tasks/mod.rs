@@ -21,6 +21,7 @@ pub mod planner;
 pub mod ports;
 pub mod power;
 pub mod reader;
+mod realtime;
 pub mod reporter;
 mod setup;
 pub mod spindle;

@@ -51,24 +51,30 @@ pub fn change_in_stream(overrides: &mut Overrides, change: Change, blocks: &mut 
 #[small]
 pub fn serve(links: &Links) {
     for port in &links.ports {
-        let asked = uart::take_asked(port.number);
-        if asked == Asked::NOTHING {
-            continue;
-        }
-        if asked.fixed & NO_JOG != 0 {
-            jog::end(links);
-        }
-        for (n, which) in [(0, Override::Feed), (1, Override::Spindle)] {
-            step(links.thread, which, asked.percent[n], asked.fixed & 1 << n != 0);
-        }
-        let traverse = match (asked.fixed & TRAVERSE) >> 2 {
-            0 => continue,
-            1 => FULL,
-            2 => FULL / 2,
-            _ => FULL / 4,
-        };
-        change(links.thread, Change::to(Override::Traverse, traverse));
+        apply(links, uart::take_asked(port.number));
     }
+}
+
+/// Does what characters ask for. Thread mode.
+#[inline(never)]
+#[small]
+pub fn apply(links: &Links, asked: Asked) {
+    if asked == Asked::NOTHING {
+        return;
+    }
+    if asked.fixed & NO_JOG != 0 {
+        jog::end(links);
+    }
+    for (n, which) in [(0, Override::Feed), (1, Override::Spindle)] {
+        step(links.thread, which, asked.percent[n], asked.fixed & 1 << n != 0);
+    }
+    let traverse = match (asked.fixed & TRAVERSE) >> 2 {
+        0 => return,
+        1 => FULL,
+        2 => FULL / 2,
+        _ => FULL / 4,
+    };
+    change(links.thread, Change::to(Override::Traverse, traverse));
 }
 
 /// So many percent more, or less; from 100 % if `anew`.

@@ -37,8 +37,8 @@ use crate::hal::time::millis;
 use crate::hal::uart;
 use crate::jobs::Job;
 use crate::machine::alarm::is_program_end;
-use crate::machine::{self, Alarm};
-use crate::protocol::{Answers, Ending, Next, Notice, Out, Request, Span, asks_alarm};
+use crate::machine::{self, Alarm, Cycle};
+use crate::protocol::{Answers, Ending, Next, Notice, Out, Request, Span, Speech, asks_alarm, jog};
 use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
@@ -637,6 +637,12 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
     let Chosen { port, id, class } = *chosen;
     let lines = port.lines.borrow();
     let (line, length) = (lines.text(id), lines.length(id));
+    if port.undecided.get() {
+        decide(links, port, line);
+    }
+    if port.is_resetting() && matches!(class, Class::Fault(_)) {
+        return Begun::Silent;
+    }
     let mut speech = port.speech.get();
     let settings = links.settings.borrow();
     let mut request = match class {
@@ -667,6 +673,18 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
         tx: None,
     });
     Begun::Answer
+}
+
+/// A line decides for a dialect if it is said in one alone.
+#[cold]
+#[inline(never)]
+#[small]
+fn decide(links: &Links, port: &Port, line: &[u8]) {
+    let settings = links.settings.borrow();
+    if let Some(speech) = Speech::decided_by(line, &settings) {
+        port.decide(speech);
+        links.decided(&settings);
+    }
 }
 
 /// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so
@@ -760,22 +778,46 @@ fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
     done
 }
 
+/// Whether moves are under way or queued.
+#[cold]
+#[inline(never)]
+#[small]
+fn is_working(links: &Links) -> bool {
+    View::of(links, links.feeder()).has_work()
+}
+
+/// A jog of G-code begins, or G-code comes behind one.
+#[cold]
+#[inline(never)]
+fn enter(jogs: bool) {
+    machine::carry_out(if jogs { machine::Event::Jog } else { machine::Event::Done });
+}
+
 /// Interprets a block and hands its commands to the planner, but in check mode. Returns also whether it may have a
 /// comment.
 #[inline(never)]
 fn carry_out(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
+    let words = jog(block);
+    if words.is_some() && machine::cycle() != Cycle::Jog && is_working(links) {
+        // It waits for nothing but other jogs.
+        return (Status::NotAccepted, true);
+    }
     let mut commands = links.commands.borrow_mut();
     let settings = links.settings.borrow();
     let mut model = links.model.borrow_mut();
-    let done = match tried {
+    let done = match (words, tried) {
+        (Some(words), _) => model.jog(words, &*settings, &mut commands),
         // No need to look twice.
-        Usual::No => model.general(block, &*settings, &mut commands),
+        (None, Usual::No) => model.general(block, &*settings, &mut commands),
         _ => model.interpret(block, &*settings, &mut commands),
     };
     match done {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
             if !commands.is_empty() && !machine::is_checking() {
+                if words.is_some() != (machine::cycle() == Cycle::Jog) {
+                    enter(words.is_some());
+                }
                 links.commands_taken.set(true);
                 links.planner_wake.signal();
             }

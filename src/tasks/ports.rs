@@ -17,8 +17,9 @@ use super::lines::{Class, LineId, LinePool};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::{Seen, View};
-use crate::hal::event::is_unheard;
-use crate::hal::serial::{USB, is_shared};
+use crate::config::Settings;
+use crate::hal::event::{is_unheard, set_eager};
+use crate::hal::serial::{Flow, USB, is_shared};
 use crate::hal::uart;
 use crate::machine::Alarm;
 use crate::protocol::{Remembers, Speech};
@@ -36,6 +37,13 @@ const AUX_PROMISED: u8 = 16;
 /// The turns that a report leaves to control lines before it begins, and that it leaves to others while it is told.
 pub const COURTESY: u8 = 8;
 
+/// Of [`Port::asked`]: a status report.
+pub const REPORT: u8 = 1;
+/// Of [`Port::asked`]: the greeting, for the machine has been reset by its sender. Lines that were dropped thereby are not answered.
+pub const GREETING: u8 = 2;
+/// Of [`Port::asked`]: before the greeting, that motion was interrupted.
+pub const INTERRUPTED: u8 = 4;
+
 /// What a port has to itself.
 pub struct Port {
     /// Which one it is.
@@ -52,6 +60,10 @@ pub struct Port {
     pub clears: Cell<Alarm>,
     /// The sender asks whether anybody is there: control sets it, the parser answers.
     pub enquiry: Cell<bool>,
+    /// What a sender has asked for by a byte, as bits: the reporter answers.
+    pub asked: Cell<u8>,
+    /// Nothing has been said that only one dialect says, so that the first such thing decides.
+    pub undecided: Cell<bool>,
     /// How the machine stood when the report or group that is being told on this port first told of motion.
     pub seen: Cell<Option<Seen>>,
     /// Bytes have been lost, which the parser tells.
@@ -74,10 +86,48 @@ impl Port {
             has_stopped: Cell::new(false),
             clears: Cell::new(Alarm::None),
             enquiry: Cell::new(false),
+            asked: Cell::new(0),
+            undecided: Cell::new(false),
             seen: Cell::new(None),
             lost: Cell::new(false),
             cut: Cell::new(None),
         }
+    }
+
+    /// A sender asks for something by a byte.
+    pub fn ask(&self, bits: u8) {
+        self.asked.set(self.asked.get() | bits);
+    }
+
+    /// Takes the first of these that is asked for.
+    pub fn take_asked(&self, bit: u8) -> bool {
+        let asked = self.asked.get();
+        self.asked.set(asked & !bit);
+        asked & bit != 0
+    }
+
+    /// Whether lines are dropped unanswered: the sender has reset the machine, and waits for the greeting.
+    pub fn is_resetting(&self) -> bool {
+        self.asked.get() & GREETING != 0
+    }
+
+    /// Whether `?` and bytes above 0x7F are looked for within lines.
+    pub fn is_eager(&self) -> bool {
+        self.undecided.get() || self.speech.get().is_in_order()
+    }
+
+    /// How the two sides stop each other: characters for it are for dialects whose senders know them.
+    pub fn flow(&self, settings: &Settings) -> Flow {
+        match Flow::of(self.number, settings.flow_control()) {
+            Flow::Characters if self.speech.get().is_in_order() => Flow::None,
+            flow => flow,
+        }
+    }
+
+    /// The port speaks so from now on, and does not wait for a decision any more.
+    pub fn decide(&self, speech: Speech) {
+        self.speech.set(speech);
+        self.undecided.set(false);
     }
 
     /// How many lines may come: what footers tell. Each may be [`PROMISED`] bytes long with its end, a longer one takes several.
@@ -142,6 +192,19 @@ impl Links {
     pub fn told(&self) -> &Port {
         let feeder = self.feeder.get();
         self.port(if is_shared(feeder) { USB } else { feeder })
+    }
+
+    /// Ports may have begun to speak otherwise: whether any is eager ([`Port::is_eager`]), and how the sides stop each other.
+    pub fn decided(&self, settings: &Settings) {
+        set_eager(self.ports.iter().any(Port::is_eager));
+        self.set_flow(settings);
+    }
+
+    /// How the sides of each line stop each other follows from the settings and the dialect.
+    #[inline(never)]
+    #[small]
+    pub fn set_flow(&self, settings: &Settings) {
+        self.ports.iter().for_each(|port| uart::set_flow(port.number, port.flow(settings)));
     }
 
     /// Reports an exception to whoever feeds the machine.

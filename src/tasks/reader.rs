@@ -16,6 +16,7 @@ use super::lines::{Aside, LinePool};
 use super::links::Links;
 use super::overtake::Scan;
 use super::ports::Port;
+use super::realtime;
 use crate::hal::event::{Event, next, set_asked};
 use crate::hal::ring::Window;
 use crate::hal::serial::{
@@ -115,6 +116,9 @@ impl<const N: usize> Intake<N> {
 
     /// Takes a turn's bytes, stops the sender or lets it go on, and sees to real-time characters where they stand.
     fn take(&mut self, links: &Links) -> Left {
+        if self.port.is_eager() {
+            realtime::pick(links, self.port, &mut self.received.window());
+        }
         let left = self.turn(links);
         self.control_flow(self.received.len(), N, links);
         match left {
@@ -135,7 +139,9 @@ impl<const N: usize> Intake<N> {
     fn turn(&mut self, links: &Links) -> Left {
         let mut pool = self.port.lines.borrow_mut();
         let pool = &mut *pool;
-        pool.keep_empty(self.port.speech.get().answers_empty());
+        let speech = self.port.speech.get();
+        pool.keep_empty(speech.answers_empty());
+        pool.keep_order(speech.is_in_order());
         for _ in 0..TURN {
             if self.refused > 0 && !self.refuse(pool, links) {
                 return Left::Full;
@@ -153,6 +159,10 @@ impl<const N: usize> Intake<N> {
                 return Left::Full;
             }
             let next = self.received.waiting().first().copied();
+            if next.is_some_and(|next| pool.leaves(next)) {
+                // It has come since the ring was looked through.
+                return Left::Bytes;
+            }
             if next.is_some_and(|next| pool.end_question(next)) {
                 // There may be no room for what it begins.
                 links.parser_wake.signal();
@@ -236,7 +246,7 @@ impl<const N: usize> Intake<N> {
     }
 
     fn flow(&self, links: &Links) -> Flow {
-        Flow::of(self.port.number, links.settings.borrow().flow_control())
+        self.port.flow(&links.settings.borrow())
     }
 
     /// Bytes were lost here. Returns whether the mark stands for the end of a whole line.

@@ -11,9 +11,10 @@ use embassy_futures::yield_now;
 use embassy_time::Timer;
 use kerf_macros::small;
 
+use super::alarm;
 use super::health;
 use super::links::Links;
-use super::ports::{COURTESY, Port};
+use super::ports::{COURTESY, GREETING, INTERRUPTED, Port, REPORT};
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
 use crate::hal::event::Event;
@@ -22,9 +23,9 @@ use crate::hal::serial::is_shared;
 use crate::hal::time::millis;
 use crate::hal::uart;
 use crate::jobs::Job;
-use crate::machine::Doing;
+use crate::machine::{self, Alarm, Doing};
 use crate::motion::snapshot::Program;
-use crate::protocol::{Hold, Machine, Notice, Occasion, Telling, Tells};
+use crate::protocol::{Hold, Machine, Notice, Occasion, Speech, Telling, Tells};
 use crate::status::Status;
 
 /// How often a busy machine is looked at, ms.
@@ -44,6 +45,7 @@ struct Told {
 
 /// The task; `occasion` is what has come of the start.
 pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
+    greet_undecided(links);
     let mut greeting = Some(occasion);
     while let Some(occasion) = greeting {
         let notice = Notice::Greeting(occasion);
@@ -65,6 +67,9 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             links.job.set(Job::default());
             links.except(Status::EndOfFile);
             links.parser_wake.signal();
+        }
+        while let Some((number, notice)) = asked(links) {
+            tell(links, links.port(number), notice).await;
         }
         if let Some(status) = links.notices.exception.take() {
             let notice = Notice::Exception(status);
@@ -194,6 +199,52 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
     // A line may wait for the transmitter.
     links.parser_wake.signal();
     telling.blocks_free()
+}
+
+/// What a sender has asked for by a byte, and on which port; `None` if nobody has.
+#[inline(never)]
+#[small]
+fn asked(links: &Links) -> Option<(u8, Notice)> {
+    links.ports.iter().find_map(|port| asked_on(links, port).map(|notice| (port.number, notice)))
+}
+
+#[inline(never)]
+#[small]
+fn asked_on(links: &Links, port: &Port) -> Option<Notice> {
+    if port.asked.get() == 0 {
+        return None;
+    }
+    if is_over(port) {
+        if port.take_asked(INTERRUPTED) {
+            alarm::raise(links, Alarm::Alarm);
+            return Some(Notice::Exception(Status::HardReset));
+        }
+        port.take_asked(GREETING);
+        return Some(Notice::Greeting(Occasion::Ready));
+    }
+    port.take_asked(REPORT).then_some(Notice::Query)
+}
+
+/// Whether a reset that a sender has asked for is over: all that had come has been dropped.
+#[inline(never)]
+#[small]
+fn is_over(port: &Port) -> bool {
+    let drops = || port.cut.get().is_some() || port.lines.borrow().has_faults();
+    port.is_resetting() && !machine::is_flushing() && !drops()
+}
+
+/// Greets in another dialect as well where it is not decided which one is spoken: each sender finds its own. At the start, when the rings are
+/// empty.
+#[inline(never)]
+#[small]
+fn greet_undecided(links: &Links) {
+    let Some(speech) = Speech::of_question(&links.settings.borrow()) else { return };
+    let notice = Notice::Greeting(Occasion::Ready);
+    for port in links.ports.iter().filter(|port| port.undecided.get() && !is_shared(port.number)) {
+        let Ok(mut tx) = port.tx.try_lock() else { continue };
+        let mut telling = Telling::begin(notice, speech, &mut View::of(links, port));
+        while step(&mut telling, links, port, &mut tx) {}
+    }
 }
 
 /// Tells something short on a port, if nobody else talks there and there is room for it: at most 64 bytes, or all of an

@@ -32,7 +32,6 @@ use crate::gcode::setup::{AxisMode, Setup};
 use crate::gcode::tables::Row;
 use crate::hal::Thread;
 use crate::hal::eeprom::Eeprom;
-use crate::hal::serial::{Flow, PORTS};
 use crate::hal::{gpio, inputs as pins, stepper, uart, watchdog};
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::machine::jog::Bar;
@@ -187,8 +186,16 @@ impl<'a> View<'a> {
         if alarm != Alarm::None {
             return Err(alarm.status());
         }
-        let busy = self.is_busy() || self.links.has_data();
+        let busy = self.is_busy() || self.has_others();
         if busy { Err(Status::NotAccepted) } else { Ok(()) }
+    }
+
+    /// Whether lines of G-code wait that are carried out first. Where lines are answered in their order those of the port come later.
+    fn has_others(&self) -> bool {
+        let in_order = self.port.speech.get().is_in_order();
+        self.links.ports.iter().any(|port| {
+            !(in_order && port.number == self.port.number) && port.lines.borrow().has_data()
+        })
     }
 
     /// Whether settings and offsets may change: not in check mode, in which a file may set them.
@@ -299,6 +306,7 @@ impl Machine for View<'_> {
         self.links.changes.note(Changes::SETTINGS);
         self.note(setting, lowered || is_machine);
         set_hardware(self.links.thread, &self.settings);
+        self.links.set_flow(&self.settings);
         Ok(match lowered {
             true => Warning::Velocity,
             false if self.settings.has_idle_jerk(setting) => Warning::Jerk,
@@ -332,6 +340,7 @@ impl Machine for View<'_> {
             Value::MotionLine => self.motion().line as i32,
             Value::Velocity => thousandths(self.motion().velocity * 60.0),
             Value::QueueFree => queue_free() as i32,
+            Value::BlocksFree => queue::free() as i32,
             Value::QueueAdded => self.links.queue_count.take_added(),
             Value::QueueRemoved => self.links.queue_count.take_removed(),
             Value::SlotsFree => self.port.promise(&self.port.lines.borrow()).into(),
@@ -391,6 +400,10 @@ impl Machine for View<'_> {
     }
 
     fn doing(&mut self) -> Doing {
+        // A jog of G-code ends when nothing is left of it.
+        if machine::cycle() == Cycle::Jog && !self.has_work() {
+            machine::carry_out(machine::Event::Done);
+        }
         machine::doing(|| self.has_work())
     }
 
@@ -425,6 +438,7 @@ impl Machine for View<'_> {
         spindle::set_all(self.links.thread, self.links.storage);
         self.links.storage.note(0, ITEMS);
         set_hardware(self.links.thread, &self.settings);
+        self.links.set_flow(&self.settings);
         Status::Ok
     }
 
@@ -472,8 +486,8 @@ impl Machine for View<'_> {
         Status::Ok
     }
 
-    fn home(&mut self) -> Status {
-        let axes = homing::axes(&self.settings);
+    fn home(&mut self, axes: u8) -> Status {
+        let axes = homing::axes(&self.settings) & axes;
         if axes == 0 {
             return Status::HomingSwitches;
         }
@@ -501,7 +515,7 @@ impl Machine for View<'_> {
         }
         // Check mode is no work; a hold in it is.
         let links = self.links;
-        let waits = links.has_data() || links.chain_waits.get();
+        let waits = self.has_others() || links.chain_waits.get();
         let works = machine::is_held() || self.has_work() || waits;
         // What an alarm or a `^d` switches off is off.
         let runs =
@@ -588,9 +602,6 @@ pub fn queue_free() -> usize {
 pub fn set_hardware(thread: Thread, settings: &Settings) {
     switches::set_up(settings);
     power::set_modes(thread, settings);
-    for port in 0..PORTS as u8 {
-        uart::set_flow(port, Flow::of(port, settings.flow_control()));
-    }
     stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
     stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));
 }

@@ -56,6 +56,8 @@ impl<S: Side> Crowd<S> {
         let mut crowd = Crowd { side, heard: Default::default() };
         let greeted = crowd.hears(USB, "SYSTEM READY", 3_000) && crowd.hears(AUX, "READY", 1_000);
         assert!(greeted, "no greeting");
+        // JSON decides between dialects: a question mark would, too.
+        (USB..=AUX).for_each(|port| crowd.send(port, "{fv:n}\n"));
         crowd.pass(50);
         crowd.forget();
         crowd

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use crate::process::root;
 
 /// Where a dialect may be named: its own folder, the table, and tools.
-const KNOWN: [&str; 5] = [
+const KNOWN: [&str; 6] = [
+    "src/protocol/grbl/",
     "src/protocol/tinyg/",
     "src/protocol/dialect.rs",
     "src/protocol/mod.rs",
@@ -25,8 +26,17 @@ fn collect(path: &Path, files: &mut Vec<PathBuf>) {
 /// The lines of a file that name a dialect.
 fn naming<'a>(text: &'a str, dialects: &[String]) -> Vec<&'a str> {
     let names = |line: &&str| {
+        // Not at the end of a longer word.
+        let is_word = |at: usize| {
+            at == 0
+                || !line.as_bytes()[at - 1].is_ascii_alphanumeric()
+                    && line.as_bytes()[at - 1] != b'_'
+        };
         dialects.iter().any(|name| {
-            [format!("{name}::"), format!("::{name}")].iter().any(|path| line.contains(path))
+            [format!("{name}::"), format!("::{name}")].iter().any(|path| {
+                line.match_indices(path.as_str())
+                    .any(|(at, _)| path.starts_with(':') || is_word(at))
+            })
         })
     };
     text.lines().filter(names).collect()
@@ -66,4 +76,5 @@ fn a_dialect_is_named_by_its_path() {
     let dialects = ["tinyg".to_owned()];
     let text = "use crate::protocol::tinyg::Mode;\nuse crate::protocol::Speech;\n// TinyG's\ntinyg::names()";
     assert_eq!(naming(text, &dialects).len(), 2);
+    assert!(naming("pub use board_tinyg::BOARD;", &dialects).is_empty());
 }

@@ -101,9 +101,12 @@ group! {
         PBO "pbo": int(0, 1), 1,
             words(text!("probe backs off"), OFF_ON),
             "Whether a probe goes back to the contact. With 0 the machine stays where it came to rest, beyond the contact.";
-        DIA "dia": int(0, 1), 0,
-            words(text!("protocol dialect"), text!(" [0=TinyG,1=g2core]")),
-            "Whom the sender takes the machine for. As a g2core it ends responses with `[1,status,length]` and has that one's `fb`, `fv`, `hp`, `hv`, prompts, and some status codes and texts.";
+        DIA "dia": int(0, 3), 0,
+            words(text!("protocol dialect"), text!(" [0=auto,1=g2core,2=TinyG,3=grbl]")),
+            "Whom the sender takes the machine for. With 0 a port speaks TinyG's dialect, or grbl's if the first that is said there in one alone is grbl's. 2 and 3 are one alone, from the next reset on. As a g2core it ends responses with `[1,status,length]` and has that one's `fb`, `fv`, `hp`, `hv`, prompts, and some status codes and texts.";
+        GRM "grm": int(0, 7), 1,
+            bare(text!("grbl report mask")),
+            "What grbl's reports have: 1 machine position (else work position), 2 free blocks and bytes; 4 inches. Its senders know the first two bits as number 10, the last as 13.";
         SPW "spw": int(1, 10).with(IDLE), 2,
             words(text!("step pulse width"), text!(" us")),
             "How long a step pulse lasts. Longer pulses may lower `vm` and `fr`.";

@@ -227,7 +227,7 @@ impl Machine for Fake {
         if number < 20 { Status::Ok } else { Status::Error }
     }
 
-    fn home(&mut self) -> Status {
+    fn home(&mut self, _axes: u8) -> Status {
         Status::HomingSwitches
     }
 

@@ -64,6 +64,16 @@ impl Dialect for Tinyg {
         if settings.starts_in_json() { Mode::Json } else { Mode::Text }
     }
 
+    /// JSON, and what text mode alone knows: a `$` with small letters or digits and letters.
+    fn is_decided_by(line: &[u8]) -> bool {
+        let line = line.trim_ascii();
+        match line {
+            [b'{', ..] => true,
+            [b'$', rest @ ..] => rest.iter().any(u8::is_ascii_lowercase),
+            _ => false,
+        }
+    }
+
     #[inline(always)]
     fn begin(line: &[u8], length: u16, mode: &mut Mode, settings: &Settings) -> Option<Request> {
         Request::begin(line, length, mode, settings)

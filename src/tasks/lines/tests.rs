@@ -265,7 +265,7 @@ fn json_that_holds_g_code_is_data() {
         r#"{tid:1,txt:" n1 g1"}"#,
         r#"{txt:"h1 g43"}"#,
     ] {
-        assert_eq!(classify(line.as_bytes()), Class::Data, "{line}");
+        assert_eq!(pool().classify(line.as_bytes()), Class::Data, "{line}");
     }
     for line in [
         "{gcx:n}",
@@ -279,7 +279,7 @@ fn json_that_holds_g_code_is_data() {
         "{tid",
         "{txt:",
     ] {
-        assert_eq!(classify(line.as_bytes()), Class::Control, "{line}");
+        assert_eq!(pool().classify(line.as_bytes()), Class::Control, "{line}");
     }
 }
 

@@ -1,0 +1,159 @@
+//! `$#`, `$G`, `$I`, `$N`: what there is beside settings.
+//!
+//! Each has parts, of at most a coordinate or a few words, that are put one after the other.
+
+use super::settings;
+use super::write::{close, fixed, int, length, line_end, text};
+use crate::config::Fixed;
+use crate::gcode::tables::Row;
+use crate::progmem;
+use crate::progmem::Text;
+use crate::protocol::{Machine, Out, Value};
+use crate::text;
+
+/// The rows of `$#`.
+const ROWS: u8 = 11;
+/// The last of them: the tool length, and what probing has found.
+const TOOL: u8 = 9;
+/// See [`TOOL`].
+pub const PROBED: u8 = 10;
+
+progmem! {
+    /// Their names.
+    static NAMES: [Text; ROWS as usize] = [
+        text!("[G54:"), text!("[G55:"), text!("[G56:"), text!("[G57:"), text!("[G58:"), text!("[G59:"),
+        text!("[G28:"), text!("[G30:"), text!("[G92:"), text!("[TLO:"), text!("[PRB:"),
+    ];
+}
+
+/// The value of a row of `$#` on an axis.
+#[small]
+fn offset(row: u8, axis: u8) -> Value {
+    match row {
+        0..=5 => Value::Row(Row::system(row), axis),
+        6 | 7 => Value::Row(Row::stored(row - 6), axis),
+        8 => Value::Shift(axis),
+        TOOL => Value::ToolOffset(2),
+        _ => Value::Probed(axis),
+    }
+}
+
+/// Puts part `at` of `$#` from row `from` on: an axis of a row. Returns the next part, `None` behind the last.
+#[inline(never)]
+#[small]
+pub fn offsets(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
+    let (row, axis) = (at >> 3, at & 7);
+    let name = NAMES.at(row.into())?;
+    let inches = settings::inches(machine);
+    let axes = if row == TOOL { 1 } else { settings::axes(machine) };
+    if axis == 0 {
+        text(out, name);
+    } else {
+        out.put(b',');
+    }
+    length(out, machine.value(offset(row, axis)), inches && axis < 3);
+    if axis + 1 < axes {
+        return Some(at + 1);
+    }
+    if row == PROBED {
+        out.put(b':');
+        int(out, (machine.value(Value::ProbeState) == 1).into());
+    }
+    close(out);
+    (row + 1 < ROWS).then_some((row + 1) << 3)
+}
+
+/// The part of [`offsets`] that `[PRB:]` begins with.
+pub const PROBING: u8 = PROBED << 3;
+
+progmem! {
+    /// The motion modes, in the order of their numbers.
+    static MOTIONS: [Text; 19] = [
+        text!("G0"), text!("G1"), text!("G2"), text!("G3"), text!("G80"), text!("G38.2"), text!("G81"), text!("G82"),
+        text!("G83"), text!("G84"), text!("G85"), text!("G86"), text!("G87"), text!("G88"), text!("G89"), text!("G73"),
+        text!("G38.3"), text!("G38.4"), text!("G38.5"),
+    ];
+
+    /// The coordinate systems, from 1.
+    static SYSTEMS: [Text; 9] = [
+        text!(" G54"), text!(" G55"), text!(" G56"), text!(" G57"), text!(" G58"), text!(" G59"),
+        text!(" G59.1"), text!(" G59.2"), text!(" G59.3"),
+    ];
+}
+
+/// Puts part `at` of `$G`. Returns the next part, `None` behind the last.
+#[inline(never)]
+#[small]
+pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
+    if at == 0 {
+        text(out, text!("[GC:"));
+        let motion = machine.value(Value::MotionMode) as usize;
+        text(out, MOTIONS.at(motion).unwrap_or(text!("G80")));
+        let system = machine.value(Value::Coordinates) as usize;
+        text(out, SYSTEMS.at(system.wrapping_sub(1)).unwrap_or(text!(" G54")));
+        text(out, text!(" G1"));
+        int(out, 7 + machine.value(Value::Plane));
+        text(out, text!(" G2"));
+        int(out, machine.value(Value::Units));
+        text(out, text!(" G9"));
+        int(out, machine.value(Value::Distance));
+        text(out, text!(" G9"));
+        int(out, 3 + machine.value(Value::FeedMode));
+        return Some(1);
+    }
+    let turns = machine.value(Value::SpindleOn) != 0;
+    let counter = machine.value(Value::SpindleDirection) != 0;
+    text(out, text!(" M"));
+    out.put(match (turns, counter) {
+        (false, _) => b'5',
+        (true, false) => b'3',
+        (true, true) => b'4',
+    });
+    let (mist, flood) = (machine.value(Value::Mist), machine.value(Value::Flood));
+    if mist != 0 {
+        text(out, text!(" M7"));
+    }
+    if flood != 0 {
+        text(out, text!(" M8"));
+    }
+    if mist + flood == 0 {
+        text(out, text!(" M9"));
+    }
+    text(out, text!(" T"));
+    int(out, machine.value(Value::Tool));
+    text(out, text!(" F"));
+    super::write::speed(out, machine.value(Value::Feed), machine.value(Value::Units) == 0);
+    text(out, text!(" S"));
+    int(out, machine.value(Value::SpindleSpeed));
+    close(out);
+    None
+}
+
+/// Puts `$I`: who the machine is. The letters say that there are a variable spindle, line numbers, mist, single axes to home, and overrides in
+/// probing; then the blocks and the bytes that are free.
+#[inline(never)]
+#[small]
+pub fn build(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
+    if at == 0 {
+        text(out, text!("[VER:1.1h.20190830:Kerf "));
+        out.put_all(crate::config::VERSION.bytes());
+        close(out);
+        return Some(1);
+    }
+    text(out, text!("[OPT:VNMHA,"));
+    int(out, machine.value(Value::BlocksFree));
+    out.put(b',');
+    int(out, machine.value(Value::BytesFree));
+    close(out);
+    None
+}
+
+/// Puts a startup line, of which there is none.
+#[small]
+pub fn startup(at: u8, out: &mut impl Out) -> Option<u8> {
+    text(out, text!("$N"));
+    fixed(out, Fixed::int(at.into()));
+    out.put(b'=');
+    line_end(out);
+    (at == 0).then_some(1)
+}

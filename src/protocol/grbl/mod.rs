@@ -1,0 +1,123 @@
+//! grbl's dialect, version 1.1: lines that are answered by `ok` or `error:N`, status reports on request, settings by number.
+//!
+//! Pure and synchronous, in thread mode, as every dialect. A line becomes a [`Request`], what the machine tells a [`Telling`]. Nothing
+//! is kept here but [`Reports`]: settings are views of Kerf's own ([`settings`]), in grbl's units.
+//!
+//! | module | what it has |
+//! |---|---|
+//! | [`command`] | which command a line is |
+//! | [`request`] | a line on its way to its answer |
+//! | [`settings`] | `$$` and `$x=v` |
+//! | [`lists`] | `$#`, `$G`, `$I`, `$N` |
+//! | [`report`] | the status report, `<Idle|MPos:..>` |
+//! | [`status`] | the numbers of errors and alarms |
+//! | [`telling`] | the greeting, alarms, what probing has found |
+//! | [`write`](mod@write) | numbers and texts |
+//!
+//! Lines are answered in their order, control lines too: senders that count characters go by it. Lines end in CR LF. A step costs at most
+//! 15,000 cycles, with a setting that is in EEPROM 3 ms. What is rubbish is answered by an error; nothing can be full.
+
+mod command;
+mod lists;
+mod report;
+mod request;
+mod settings;
+mod status;
+mod telling;
+mod write;
+
+use super::{Dialect, Ending, Machine, Notice, Out};
+use crate::config::Settings;
+use crate::machine::Alarm;
+use crate::plain;
+use crate::status::Status;
+
+pub use report::Reports;
+pub use request::Request;
+pub use status::{alarm_number, error_number};
+pub use telling::Telling;
+
+/// The value of the setting `dia` that has every port begin in this dialect.
+const CHOSEN: u8 = 3;
+
+/// The dialect.
+pub struct Grbl;
+
+impl Dialect for Grbl {
+    type Speech = ();
+    type Request = Request;
+    type Telling = Telling;
+    type Memory = Reports;
+
+    /// Real-time bytes are taken wherever they stand, and lines are answered in their order.
+    const IN_ORDER: bool = true;
+
+    fn speech(_settings: &Settings) {}
+
+    fn is_chosen(settings: &Settings) -> bool {
+        settings.dialect() == CHOSEN
+    }
+
+    fn is_decided_by(line: &[u8]) -> bool {
+        command::is_own(line)
+    }
+
+    fn jog(block: &[u8]) -> Option<&[u8]> {
+        command::jog(block)
+    }
+
+    fn begin(line: &[u8], _length: u16, _speech: &mut (), _settings: &Settings) -> Option<Request> {
+        Some(Request::begin(line))
+    }
+
+    fn refuse(
+        status: Status,
+        _line: &[u8],
+        _length: u16,
+        _speech: (),
+        _settings: &Settings,
+    ) -> Request {
+        Request::refused(status)
+    }
+
+    #[inline(always)]
+    fn tell(notice: Notice, _speech: (), machine: &mut impl Machine) -> Telling {
+        Telling::begin(notice, machine)
+    }
+
+    #[inline(always)]
+    fn brief(_speech: (), _settings: &Settings) -> Option<bool> {
+        Some(true)
+    }
+
+    #[inline(always)]
+    fn put_brief(_settings: &Settings, _ending: Ending, out: &mut impl Out) {
+        out.put_plain(plain!("ok\r\n"));
+    }
+
+    #[inline(always)]
+    fn put_line_end(_settings: &Settings, out: &mut impl Out) {
+        out.put_plain(plain!("\r\n"));
+    }
+
+    #[inline(always)]
+    fn answers_empty(_speech: ()) -> bool {
+        true
+    }
+
+    /// None: all lines are answered in their order.
+    #[inline(always)]
+    fn may_be_control(_first: u8) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn is_control(_line: &[u8]) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn asks_alarm(_line: &[u8]) -> Option<Alarm> {
+        None
+    }
+}

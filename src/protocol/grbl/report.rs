@@ -1,0 +1,309 @@
+//! The status report: `<Run|MPos:1.000,0.000,0.000|Bf:60,255|FS:800,0|WCO:0.000,0.000,0.000>`.
+//!
+//! Told when it is asked for by `?`, a field or an axis a step. `WCO` comes at once after a change, else with every 10th report, with
+//! every 30th while the machine moves; `Ov` in one of those in between, likewise, with `A` for what turns and flows. In the first report after a greeting there is `WCO`, in the second `Ov`.
+
+use super::settings;
+use super::write::{int, length, speed, text};
+use crate::boards::inputs;
+use crate::gcode::overrides::Override;
+use crate::machine::{Cycle, Doing};
+use crate::progmem;
+use crate::progmem::Text;
+use crate::protocol::{Hold, Machine, Out, Remembers, Value};
+use crate::text;
+
+/// Reports from one `WCO` or `Ov` to the next, at rest.
+const AT_REST: u8 = 10;
+/// The same while the machine moves: of `WCO`, and of `Ov`.
+const OFFSETS: u8 = 30;
+const OVERRIDES: u8 = 20;
+
+/// What is kept between reports, of all ports together.
+pub struct Reports {
+    /// So many reports until the next `WCO` and `Ov`.
+    offsets: u8,
+    overrides: u8,
+    /// What the offsets were that have been told last.
+    told: u16,
+    /// What the overrides and accessories were, likewise.
+    shown: u8,
+    /// `$SLP` has come.
+    pub(super) sleeps: bool,
+}
+
+impl Remembers for Reports {
+    fn new() -> Self {
+        Self { offsets: 0, overrides: 0, told: 0, shown: 0, sleeps: false }
+    }
+
+    fn restore(&mut self) {
+        self.refresh();
+    }
+
+    fn refresh(&mut self) {
+        (self.offsets, self.overrides) = (0, 0);
+    }
+}
+
+/// A report under way.
+pub struct Report {
+    field: Field,
+    axis: u8,
+    axes: u8,
+    inches: bool,
+    /// Whether `WCO` comes, and whether `Ov` does.
+    with: (bool, bool),
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Field {
+    State,
+    Position,
+    Buffers,
+    Feed,
+    Offset,
+    Overrides,
+    Accessories,
+    Pins,
+    Done,
+}
+
+#[small]
+impl Report {
+    /// Begins.
+    #[inline(never)]
+    pub fn begin(machine: &mut impl Machine) -> Self {
+        let axes = settings::axes(machine);
+        let inches = settings::inches(machine);
+        let sum = offsets(machine, axes);
+        let moves = machine.doing() != Doing::Rests;
+        let shown = accessories_sum(machine);
+        let reports = &mut machine.memory().grbl;
+        if reports.shown != shown {
+            (reports.shown, reports.overrides) = (shown, 0);
+        }
+        let due = reports.offsets == 0 || reports.told != sum;
+        let mut with = (false, false);
+        if due {
+            with.0 = true;
+            reports.told = sum;
+            reports.offsets = if moves { OFFSETS } else { AT_REST };
+        } else if reports.overrides == 0 {
+            with.1 = true;
+            reports.overrides = if moves { OVERRIDES } else { AT_REST };
+        }
+        reports.offsets = reports.offsets.saturating_sub(1);
+        reports.overrides = reports.overrides.saturating_sub(1);
+        Self { field: Field::State, axis: 0, axes, inches, with }
+    }
+
+    /// Puts the next part. Whether there is more.
+    #[inline(never)]
+    pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+        machine.moment(self.field == Field::State);
+        match self.field {
+            Field::State => {
+                out.put(b'<');
+                state(machine, out);
+                self.field = Field::Position;
+            }
+            Field::Position => {
+                let work = !machine.settings().reports_machine_position();
+                let name = if work { text!("|WPos:") } else { text!("|MPos:") };
+                let axis = self.axis;
+                let value = if work { Value::Position(axis) } else { Value::MachinePosition(axis) };
+                self.coordinate(name, value, Field::Buffers, machine, out);
+            }
+            Field::Buffers => {
+                if machine.settings().reports_buffers() {
+                    text(out, text!("|Bf:"));
+                    int(out, machine.value(Value::BlocksFree));
+                    out.put(b',');
+                    int(out, machine.value(Value::BytesFree));
+                }
+                let line = machine.value(Value::MotionLine);
+                if line != 0 && machine.value(Value::Running) != 0 {
+                    text(out, text!("|Ln:"));
+                    int(out, line);
+                }
+                self.field = Field::Feed;
+            }
+            Field::Feed => {
+                text(out, text!("|FS:"));
+                speed(out, machine.value(Value::Velocity), self.inches);
+                out.put(b',');
+                let on = machine.value(Value::SpindleOn);
+                int(out, on * machine.value(Value::SpindleSpeed));
+                self.field = Field::Offset;
+            }
+            Field::Offset if self.with.0 => {
+                let value = Value::Offset(self.axis);
+                self.coordinate(text!("|WCO:"), value, Field::Overrides, machine, out);
+            }
+            Field::Offset => self.field = Field::Overrides,
+            Field::Overrides => {
+                if self.with.1 {
+                    overrides(machine, out);
+                }
+                self.field = Field::Accessories;
+            }
+            Field::Accessories => {
+                if self.with.1 {
+                    accessories(machine, out);
+                }
+                self.field = Field::Pins;
+            }
+            Field::Pins => {
+                pins(machine, out);
+                out.put(b'>');
+                super::write::line_end(out);
+                self.field = Field::Done;
+            }
+            Field::Done => return false,
+        }
+        self.field != Field::Done
+    }
+
+    /// One axis of a vector, with its name before the first.
+    #[inline(never)]
+    fn coordinate(
+        &mut self,
+        name: Text,
+        value: Value,
+        next: Field,
+        machine: &mut impl Machine,
+        out: &mut impl Out,
+    ) {
+        if self.axis == 0 {
+            text(out, name);
+        } else {
+            out.put(b',');
+        }
+        length(out, machine.value(value), self.inches && self.axis < 3);
+        self.axis += 1;
+        if self.axis >= self.axes {
+            (self.axis, self.field) = (0, next);
+        }
+    }
+}
+
+/// A number that changes when an offset does.
+#[small]
+fn offsets(machine: &mut impl Machine, axes: u8) -> u16 {
+    let mut sum = 1u16;
+    for axis in 0..axes {
+        let value = machine.value(Value::Offset(axis)) as u32;
+        sum = sum.rotate_left(5) ^ value as u16 ^ (value >> 16) as u16;
+    }
+    sum
+}
+
+/// A number that changes when an override does, or the spindle or coolant.
+#[inline(never)]
+#[small]
+fn accessories_sum(machine: &mut impl Machine) -> u8 {
+    let mut sum = 1u8;
+    let mut add = |value| {
+        let value: i32 = machine.value(value);
+        sum = sum.rotate_left(3) ^ value as u8 ^ (value >> 8) as u8;
+    };
+    add(Value::Override(Override::Feed));
+    add(Value::Override(Override::Traverse));
+    add(Value::Override(Override::Spindle));
+    add(Value::SpindleOn);
+    add(Value::SpindleDirection);
+    add(Value::Flood);
+    add(Value::Mist);
+    sum
+}
+
+/// What the machine is doing, in grbl's words.
+#[inline(never)]
+#[small]
+fn state(machine: &mut impl Machine, out: &mut impl Out) {
+    let (doing, rests) = (machine.doing(), machine.hold() == Hold::Rests);
+    let sleeps = machine.memory().grbl.sleeps;
+    let stopped = machine.cycle() == Cycle::Stopped;
+    let checks = machine.value(Value::Check) != 0;
+    text(
+        out,
+        match doing {
+            _ if sleeps => text!("Sleep"),
+            Doing::Alarm(_) => text!("Alarm"),
+            Doing::Door if rests => text!("Door:1"),
+            Doing::Door => text!("Door:2"),
+            Doing::Holds if rests => text!("Hold:0"),
+            Doing::Holds => text!("Hold:1"),
+            // A program stop waits for cycle start.
+            _ if stopped => text!("Hold:0"),
+            Doing::Homes => text!("Home"),
+            Doing::Jogs => text!("Jog"),
+            Doing::Runs | Doing::Probes => text!("Run"),
+            Doing::Rests if checks => text!("Check"),
+            Doing::Rests => text!("Idle"),
+        },
+    );
+}
+
+#[small]
+fn overrides(machine: &mut impl Machine, out: &mut impl Out) {
+    let mut factor = |name, which| {
+        text(out, name);
+        int(out, (machine.value(Value::Override(which)) + 5) / 10);
+    };
+    factor(text!("|Ov:"), Override::Feed);
+    factor(text!(","), Override::Traverse);
+    factor(text!(","), Override::Spindle);
+}
+
+/// What turns and flows, if anything does.
+#[small]
+fn accessories(machine: &mut impl Machine, out: &mut impl Out) {
+    let mut begun = false;
+    if machine.value(Value::SpindleOn) != 0 {
+        let counter = machine.value(Value::SpindleDirection) != 0;
+        letter(text!("|A:"), &mut begun, if counter { b'C' } else { b'S' }, out);
+    }
+    if machine.value(Value::Flood) != 0 {
+        letter(text!("|A:"), &mut begun, b'F', out);
+    }
+    if machine.value(Value::Mist) != 0 {
+        letter(text!("|A:"), &mut begun, b'M', out);
+    }
+}
+
+progmem! {
+    /// The inputs in the order of grbl's letters, and these.
+    static PINS: [(u8, u8); 11] = [
+        (inputs::PROBE as u8, b'P'),
+        (inputs::X_MIN as u8, b'X'), (inputs::X_MAX as u8, b'X'),
+        (inputs::Y_MIN as u8, b'Y'), (inputs::Y_MAX as u8, b'Y'),
+        (inputs::Z_MIN as u8, b'Z'), (inputs::Z_MAX as u8, b'Z'),
+        (inputs::A_MIN as u8, b'A'), (inputs::A_MAX as u8, b'A'),
+        (inputs::DOOR as u8, b'D'), (inputs::STOP as u8, b'R'),
+    ];
+}
+
+/// The switches that are worked, if any is.
+#[small]
+fn pins(machine: &mut impl Machine, out: &mut impl Out) {
+    let (mut begun, mut last) = (false, 0);
+    let mut row = 0;
+    while let Some((input, name)) = PINS.at(row) {
+        row += 1;
+        if name != last && machine.value(Value::Input(input)) == 1 {
+            last = name;
+            letter(text!("|Pn:"), &mut begun, name, out);
+        }
+    }
+}
+
+/// A letter, with the name of its field before the first.
+#[inline(never)]
+fn letter(name: Text, begun: &mut bool, letter: u8, out: &mut impl Out) {
+    if !core::mem::replace(begun, true) {
+        text(out, name);
+    }
+    out.put(letter);
+}

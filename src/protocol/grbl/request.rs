@@ -1,0 +1,336 @@
+//! A line on its way to its answer.
+//!
+//! What is listed comes before `ok`, a part each step. A setting is answered when it is in memory, homing when the machine has homed,
+//! a probing when it is over: until then the step says [`Next::Wait`], which costs 2,000 cycles each millisecond.
+
+use super::command::{self, ALL, Command};
+use super::status::{BAD_JOG, BUSY, LOCKED, UNSUPPORTED, error_number};
+use super::write::{fixed, int, line_end, message, text};
+use super::{lists, settings};
+use crate::gcode::modal::MotionMode;
+use crate::gcode::tables::{Row, SYSTEMS};
+use crate::machine::{Alarm, Cycle, Doing};
+use crate::protocol::{Answers, Machine, Next, Out, Span, Value};
+use crate::status::Status;
+use crate::units::{AXES, Length};
+use crate::{plain, text};
+
+/// A line.
+pub struct Request {
+    command: Command,
+    /// How far it has come; what it says depends on the command.
+    at: u8,
+    /// Of G-code: what has become of it.
+    status: Status,
+    /// G-code that has not run yet.
+    block: Option<Span>,
+    begun: bool,
+}
+
+/// Behind the last part of a list.
+const END: u8 = u8::MAX;
+/// A setting, or all of them, are on their way to memory.
+const STORES: u8 = 1;
+
+/// How far a command has come.
+enum Step {
+    /// It goes on with this part.
+    At(u8),
+    /// It goes on later.
+    Later(u8),
+    /// `ok`.
+    Done,
+    /// An error of this number.
+    Error(u8),
+}
+
+impl Request {
+    /// Begins with a line.
+    #[inline(never)]
+    pub(super) fn begin(line: &[u8]) -> Self {
+        let command = command::of(line);
+        let is_gcode = command == Command::Gcode;
+        let block = is_gcode.then_some(Span { start: 0, end: line.len() as u8 });
+        Self { command, at: 0, status: Status::Ok, block, begun: false }
+    }
+
+    /// A line that could not be kept.
+    pub(super) fn refused(status: Status) -> Self {
+        Self { command: Command::Gcode, at: 1, status, block: None, begun: false }
+    }
+}
+
+#[small]
+impl Answers for Request {
+    fn gcode(&self) -> Option<Span> {
+        self.block
+    }
+
+    fn ran(&mut self, status: Status, _comment: bool) {
+        self.status = status;
+        self.block = None;
+    }
+
+    #[inline(never)]
+    fn step(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Next {
+        if let Some(Span { start, end }) = self.block {
+            return Next::Gcode { start, end };
+        }
+        match self.part(line, machine, out) {
+            Step::At(at) => {
+                (self.at, self.begun) = (at, true);
+                Next::More
+            }
+            Step::Later(at) => {
+                self.at = at;
+                Next::Wait
+            }
+            Step::Done => {
+                out.put_plain(plain!("ok\r\n"));
+                Next::Done(Status::Ok)
+            }
+            Step::Error(number) => {
+                text(out, text!("error:"));
+                int(out, number.into());
+                line_end(out);
+                Next::Done(self.status)
+            }
+        }
+    }
+
+    fn has_begun(&self) -> bool {
+        self.begun
+    }
+}
+
+#[small]
+impl Request {
+    #[inline(never)]
+    fn part(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
+        let at = self.at;
+        match self.command {
+            Command::Nothing => Step::Done,
+            Command::Unknown => Step::Error(UNSUPPORTED),
+            Command::BadJog => Step::Error(BAD_JOG),
+            Command::Gcode => self.gcode_done(machine),
+            Command::Modes => match at {
+                END => Step::Done,
+                _ => Step::At(lists::modes(at, machine, out).unwrap_or(END)),
+            },
+            Command::Help => {
+                text(
+                    out,
+                    text!("[HLP:$$ $# $G $I $N $x=val $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n"),
+                );
+                self.command = Command::Nothing;
+                Step::At(0)
+            }
+            // Only at rest, or in an alarm, from here on.
+            _ if at == 0 && self.command != Command::Unlock && !may_change(machine) => {
+                Step::Error(BUSY)
+            }
+            Command::Settings => list_setting(at, machine, out),
+            Command::Offsets => match at {
+                END => Step::Done,
+                _ => Step::At(lists::offsets(at, machine, out).unwrap_or(END)),
+            },
+            Command::Build => match at {
+                END => Step::Done,
+                _ => Step::At(lists::build(at, machine, out).unwrap_or(END)),
+            },
+            Command::Startup => match at {
+                END => Step::Done,
+                _ => Step::At(lists::startup(at, out).unwrap_or(END)),
+            },
+            Command::Set(number, from) => set(at, number, command::value(line, from), machine),
+            Command::Home(axis) => home(at, axis, machine),
+            Command::Unlock => unlock(machine, out),
+            Command::Check => check(machine, out),
+            Command::Sleep => sleep(machine, out),
+            Command::Restore(letter) => restore(at, letter, machine, out),
+        }
+    }
+
+    /// What G-code has come to. A probing is waited for, so that its `[PRB:]` comes before `ok`.
+    fn gcode_done(&mut self, machine: &mut impl Machine) -> Step {
+        let number = error_number(self.status);
+        if number != 0 {
+            return Step::Error(number);
+        }
+        let probes = self.at == 0 && is_probing(machine.value(Value::MotionMode));
+        if probes && machine.value(Value::Working) != 0 {
+            return Step::Later(0);
+        }
+        Step::Done
+    }
+}
+
+/// Whether a motion mode is a probing.
+fn is_probing(mode: i32) -> bool {
+    let first = MotionMode::ProbeTowards as i32;
+    let others = MotionMode::ProbeTowardsQuietly as i32..=MotionMode::ProbeAwayQuietly as i32;
+    mode == first || others.contains(&mode)
+}
+
+/// Whether settings may be asked for and changed: at rest, in check mode too, and in an alarm.
+#[small]
+fn may_change(machine: &mut impl Machine) -> bool {
+    let stopped = machine.cycle() == Cycle::Stopped;
+    matches!(machine.doing(), Doing::Rests | Doing::Alarm(_)) && !stopped
+}
+
+/// A row of `$$`.
+#[inline(never)]
+#[small]
+fn list_setting(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    let axes = settings::axes(machine);
+    let Some(number) = settings::number(at, axes) else { return Step::Done };
+    if let Some(value) = settings::value(number, machine) {
+        out.put(b'$');
+        int(out, number.into());
+        out.put(b'=');
+        fixed(out, value);
+        line_end(out);
+    }
+    Step::At(at + 1)
+}
+
+/// `$x=v`. Answered when it is in memory.
+#[inline(never)]
+#[small]
+fn set(at: u8, number: u8, value: &[u8], machine: &mut impl Machine) -> Step {
+    if at == STORES {
+        let kept = machine.value(Value::Kept) != 0;
+        return if kept { Step::Done } else { Step::Later(STORES) };
+    }
+    match settings::set(number, value, machine) {
+        Ok(()) => Step::Later(STORES),
+        Err(Status::Again) => Step::Later(0),
+        // Of a setting no target is meant.
+        Err(Status::OutOfRange) => Step::Error(UNSUPPORTED),
+        Err(status) => Step::Error(error_number(status)),
+    }
+}
+
+/// `$H`: ends the alarm, homes, and waits for the end of that.
+#[inline(never)]
+#[small]
+fn home(at: u8, axis: u8, machine: &mut impl Machine) -> Step {
+    const HOMES: u8 = 1;
+    const FAILED: u8 = 2;
+    const TOLD: u8 = 12;
+    if at == HOMES {
+        if matches!(machine.doing(), Doing::Homes | Doing::Holds | Doing::Door) {
+            return Step::Later(HOMES);
+        }
+        let done = match axis {
+            ALL => machine.value(Value::Home),
+            axis => machine.value(Value::Homed(axis)),
+        };
+        if done == 1 {
+            return Step::Done;
+        }
+        return Step::Later(FAILED);
+    }
+    if at >= FAILED {
+        // The reporter tells why, first.
+        if at < TOLD {
+            return Step::Later(at + 1);
+        }
+        // Nobody knows where the machine is.
+        machine.alarm(Alarm::Alarm);
+        return Step::Error(LOCKED);
+    }
+    match machine.clear() {
+        Status::Ok => {}
+        Status::Again => return Step::Later(0),
+        status => return Step::Error(error_number(status)),
+    }
+    machine.memory().grbl.sleeps = false;
+    let axes = if axis == ALL { ALL } else { 1 << axis };
+    match machine.home(axes) {
+        Status::Ok => Step::Later(HOMES),
+        Status::Again => Step::Later(0),
+        status => Step::Error(error_number(status)),
+    }
+}
+
+/// `$X`.
+#[inline(never)]
+#[small]
+fn unlock(machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    if !matches!(machine.doing(), Doing::Alarm(_)) {
+        return Step::Done;
+    }
+    match machine.clear() {
+        Status::Ok => {
+            machine.memory().grbl.sleeps = false;
+            message(out, text!("Caution: Unlocked"));
+            Step::Done
+        }
+        Status::Again => Step::Later(0),
+        status => Step::Error(error_number(status)),
+    }
+}
+
+/// `$C`.
+#[inline(never)]
+#[small]
+fn check(machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    let on = machine.value(Value::Check) == 0;
+    match machine.check(on) {
+        Status::Ok => {
+            message(out, if on { text!("Enabled") } else { text!("Disabled") });
+            Step::Done
+        }
+        status => Step::Error(error_number(status)),
+    }
+}
+
+/// `$SLP`: motors off, and nothing moves until a reset or `$X`.
+#[inline(never)]
+#[small]
+fn sleep(machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    machine.alarm(Alarm::Alarm);
+    if machine.energize(None, false) != Status::Ok {
+        return Step::Later(0);
+    }
+    machine.memory().grbl.sleeps = true;
+    message(out, text!("Sleeping"));
+    Step::Done
+}
+
+/// `$RST=`: settings, offsets, or both. Answered when they are in memory.
+#[inline(never)]
+#[small]
+fn restore(at: u8, letter: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    const SETTINGS: u8 = 2;
+    const TOLD: u8 = 3;
+    /// The first of the coordinates that are cleared: each is a part.
+    const ROWS: u8 = 8;
+    match at {
+        0 if letter == b'$' => Step::Later(SETTINGS),
+        0 => Step::Later(ROWS),
+        STORES if machine.value(Value::Kept) == 0 => Step::Later(STORES),
+        STORES => {
+            message(out, text!("Restoring defaults"));
+            Step::At(TOLD)
+        }
+        SETTINGS => match machine.restore() {
+            Status::Ok => Step::Later(STORES),
+            status => Step::Error(error_number(status)),
+        },
+        TOLD => Step::Done,
+        at => {
+            let (row, axis) = ((at - ROWS) / AXES as u8, (at - ROWS) % AXES as u8);
+            if row >= SYSTEMS {
+                return Step::Later(if letter == b'*' { SETTINGS } else { STORES });
+            }
+            match machine.set_row(Row::system(row), axis, Length::ZERO) {
+                Ok(()) => Step::Later(at + 1),
+                Err(Status::Again) => Step::Later(at),
+                Err(status) => Step::Error(error_number(status)),
+            }
+        }
+    }
+}

@@ -1,0 +1,388 @@
+//! `$$` and `$x=v`: Kerf's settings under grbl's numbers and in its units.
+//!
+//! Nothing is kept here. A number that stands for several settings reads the first of them and sets all. What Kerf has no setting for
+//! is shown as it is, and takes that value alone.
+
+use crate::boards::MOTORS;
+use crate::config::name::token;
+use crate::config::{Fixed, Number, Owner, Setting};
+use crate::progmem;
+use crate::protocol::Machine;
+use crate::status::Status;
+use crate::units::AXES;
+
+progmem! {
+    /// The numbers below 100 that there are.
+    static NUMBERS: [u8; 22] =
+        [0, 1, 2, 3, 4, 5, 6, 10, 11, 12, 13, 20, 21, 22, 23, 24, 25, 26, 27, 30, 31, 32];
+}
+const BASE: u8 = 22;
+
+/// Axes that may home.
+const HOMING: u8 = 4;
+/// `$26`, which is fixed, ms.
+const DEBOUNCE_MS: i32 = 10;
+/// Bits of `grm` that are `$10`, and the one that is `$13`.
+const REPORT: i32 = 3;
+const INCHES: i32 = 4;
+/// `$1` that keeps the motors on.
+const ALWAYS: i32 = 255;
+/// Steps per millimetre in thousandths, times what `sa` and `tr` are kept as, for one microstep: 360 degrees, 10^4, 10^6 and 10^3.
+const STEPS: u64 = 360 * 10_000_000_000_000;
+
+/// The number of row `row` of the list, of a machine with so many axes.
+#[small]
+pub fn number(row: u8, axes: u8) -> Option<u8> {
+    match row.checked_sub(BASE) {
+        None => NUMBERS.at(row.into()),
+        Some(row) if row < 4 * axes => Some(100 + 10 * (row / axes) + row % axes),
+        Some(_) => None,
+    }
+}
+
+/// How many axes are shown: up to the last that is not disabled, and three at least.
+#[inline(never)]
+#[small]
+pub fn axes(machine: &mut impl Machine) -> u8 {
+    let mut axes = 3;
+    for axis in 3..AXES as u8 {
+        if read(machine, of_axis(axis, token("am"))) != 0 {
+            axes = axis + 1;
+        }
+    }
+    axes
+}
+
+/// Whether reports are in inches.
+#[small]
+pub fn inches(machine: &mut impl Machine) -> bool {
+    machine.settings().reports_in_inches()
+}
+
+#[inline(never)]
+#[small]
+fn named(owner: Owner, token: [u8; 4]) -> Option<Setting> {
+    Setting::find(&owner.prefix().with_token(token)).filter(|found| found.owner() == owner)
+}
+
+fn of_system(token: [u8; 4]) -> Option<Setting> {
+    named(Owner::System, token)
+}
+
+fn of_axis(axis: u8, token: [u8; 4]) -> Option<Setting> {
+    named(Owner::Axis(axis), token)
+}
+
+fn of_motor(motor: u8, token: [u8; 4]) -> Option<Setting> {
+    named(Owner::Motor(motor), token)
+}
+
+#[inline(never)]
+#[small]
+fn read(machine: &mut impl Machine, setting: Option<Setting>) -> i32 {
+    setting.map_or(0, |setting| machine.setting(setting))
+}
+
+/// A setting with at most so many decimals, and at least as many.
+#[inline(never)]
+#[small]
+fn shown(machine: &mut impl Machine, setting: Option<Setting>, decimals: u8) -> Fixed {
+    let Some(setting) = setting else { return Fixed::int(0) };
+    let value = Fixed { value: machine.setting(setting), decimals: setting.row().stored };
+    value.rounded(decimals).padded(decimals)
+}
+
+/// The axes of whose switches a mode has one of these bits, as bits; at the lower ends alone, or at any.
+#[inline(never)]
+#[small]
+fn switches(machine: &mut impl Machine, bits: i32, lower: bool) -> i32 {
+    let mut axes = 0;
+    for axis in 0..HOMING {
+        let sn = read(machine, of_axis(axis, token("sn")));
+        let sx = read(machine, of_axis(axis, token("sx")));
+        if (sn | if lower { 0 } else { sx }) & bits != 0 {
+            axes |= 1 << axis;
+        }
+    }
+    axes
+}
+
+/// A bit for each axis whose motor has a setting that is not 0.
+#[inline(never)]
+#[small]
+fn mask(machine: &mut impl Machine, token: [u8; 4]) -> i32 {
+    let mut bits = 0;
+    for motor in 0..MOTORS as u8 {
+        if read(machine, of_motor(motor, token)) != 0 {
+            bits |= 1 << (read(machine, of_motor(motor, self::token("ma"))) & 15);
+        }
+    }
+    bits
+}
+
+/// The first motor of an axis.
+#[small]
+fn motor_of(machine: &mut impl Machine, axis: u8) -> Option<u8> {
+    (0..MOTORS as u8).find(|motor| moves(machine, *motor, axis))
+}
+
+fn moves(machine: &mut impl Machine, motor: u8, axis: u8) -> bool {
+    read(machine, of_motor(motor, token("ma"))) == i32::from(axis)
+}
+
+/// A hundred and more: of which axis it is, and which of its four.
+#[small]
+fn split(number: u8) -> Option<(u8, u8)> {
+    let number = number.checked_sub(100)?;
+    (number < 40 && usize::from(number % 10) < AXES).then_some((number / 10, number % 10))
+}
+
+/// The value of a number.
+#[inline(never)]
+#[small]
+pub fn value(number: u8, machine: &mut impl Machine) -> Option<Fixed> {
+    if let Some((what, axis)) = split(number) {
+        return Some(axis_value(what, axis, machine));
+    }
+    Some(match number {
+        0 => shown(machine, of_system(token("spw")), 0),
+        1 if read(machine, of_motor(0, token("pm"))) == 1 => Fixed::int(ALWAYS),
+        1 => Fixed::int(read(machine, of_system(token("mt"))).min(i32::MAX / 10).wrapping_mul(10)),
+        2 => Fixed::int(mask(machine, token("sp"))),
+        3 => Fixed::int(mask(machine, token("po"))),
+        4 | 6 | 32 => Fixed::int(0),
+        5 => shown(machine, of_system(token("st")), 0),
+        10 => Fixed::int(read(machine, of_system(token("grm"))) & REPORT),
+        11 => shown(machine, of_axis(0, token("jd")), 3),
+        12 => shown(machine, of_system(token("ct")), 3),
+        13 => Fixed::int(inches(machine).into()),
+        20 => shown(machine, of_system(token("sl")), 0),
+        21 => Fixed::int((switches(machine, 2, false) != 0).into()),
+        22 => Fixed::int((switches(machine, 1, false) != 0).into()),
+        23 => Fixed::int(switches(machine, 1, true)),
+        24 => shown(machine, of_axis(0, token("lv")), 3),
+        25 => shown(machine, of_axis(0, token("sv")), 3),
+        26 => Fixed::int(DEBOUNCE_MS),
+        27 => shown(machine, of_axis(0, token("zb")), 3),
+        30 => shown(machine, named(Owner::Pwm, token("csh")), 0),
+        31 => shown(machine, named(Owner::Pwm, token("csl")), 0),
+        _ => return None,
+    })
+}
+
+#[inline(never)]
+#[small]
+fn axis_value(what: u8, axis: u8, machine: &mut impl Machine) -> Fixed {
+    match what {
+        0 => Fixed { value: steps(axis, machine), decimals: 3 },
+        1 => shown(machine, of_axis(axis, token("vm")), 3),
+        2 => shown(machine, of_axis(axis, token("ac")), 3),
+        _ => {
+            let (low, high) = travel(axis, machine);
+            Fixed { value: high.saturating_sub(low), decimals: 4 }.rounded(3)
+        }
+    }
+}
+
+fn travel(axis: u8, machine: &mut impl Machine) -> (i32, i32) {
+    let low = read(machine, of_axis(axis, token("tn")));
+    (low, read(machine, of_axis(axis, token("tm"))))
+}
+
+/// 360 degrees by the angle of a step and the travel in a turn, or what the travel is of so many steps: it works both ways.
+#[small]
+fn turned(machine: &mut impl Machine, motor: u8, by: i32) -> i32 {
+    let angle = read(machine, of_motor(motor, token("sa"))).unsigned_abs();
+    let microsteps = read(machine, of_motor(motor, token("mi"))).unsigned_abs();
+    let divisor = (u64::from(angle) * u64::from(by.unsigned_abs())).max(1);
+    let quotient = (STEPS * u64::from(microsteps) + divisor / 2) / divisor;
+    i32::try_from(quotient).unwrap_or(i32::MAX)
+}
+
+/// Steps per millimetre, in thousandths.
+#[small]
+fn steps(axis: u8, machine: &mut impl Machine) -> i32 {
+    let Some(motor) = motor_of(machine, axis) else { return 0 };
+    let turn = read(machine, of_motor(motor, token("tr")));
+    turned(machine, motor, turn)
+}
+
+/// Sets a number to what `text` says. [`Status::Again`] as of `Machine::set_row`: all of it is to be done again.
+#[inline(never)]
+#[small]
+pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
+    let to = Number::parse(text).ok_or(Status::BadNumber)?;
+    if let Some((what, axis)) = split(number) {
+        if to.is_negative() {
+            return Err(Status::BelowMinimum);
+        }
+        return set_axis(what, axis, to, machine);
+    }
+    let whole = || to.fixed(0, false).ok_or(Status::BadNumber);
+    match number {
+        0 => put(machine, of_system(token("spw")), to),
+        1 => set_idle(whole()?, machine),
+        2 => set_mask(machine, token("sp"), whole()?),
+        3 => set_mask(machine, token("po"), whole()?),
+        5 => put(machine, of_system(token("st")), to),
+        // The whole of a byte is accepted: what it asks for beside is not known here.
+        10 => set_report(whole()? & REPORT, !REPORT, machine),
+        11 => each_axis(machine, AXES as u8, token("jd"), to),
+        12 => put(machine, of_system(token("ct")), to),
+        13 => set_report(i32::from(whole()? != 0) * INCHES, REPORT, machine),
+        20 => put(machine, of_system(token("sl")), to),
+        21 => set_switches(machine, 2, whole()? != 0),
+        22 if whole()? == 0 => set_switches(machine, 1, false),
+        23 => set_homing(whole()?, machine),
+        24 => each_axis(machine, HOMING, token("lv"), to),
+        25 => each_axis(machine, HOMING, token("sv"), to),
+        27 => each_axis(machine, HOMING, token("zb"), to),
+        30 => put(machine, named(Owner::Pwm, token("csh")), to),
+        31 => put(machine, named(Owner::Pwm, token("csl")), to),
+        // What is fixed may be said again.
+        _ => match value(number, machine) {
+            Some(fixed) if fixed.decimals == 0 && fixed.value == whole()? => Ok(()),
+            Some(_) => Err(Status::ReadOnly),
+            None => Err(Status::UnrecognizedName),
+        },
+    }
+}
+
+/// Sets some bits of `grm`, and keeps others.
+#[small]
+fn set_report(bits: i32, kept: i32, machine: &mut impl Machine) -> Result<(), Status> {
+    let mask = of_system(token("grm"));
+    let bits = bits | read(machine, mask) & kept;
+    put_value(machine, mask, bits)
+}
+
+/// Sets a setting to what has been said.
+#[inline(never)]
+#[small]
+fn put(machine: &mut impl Machine, setting: Option<Setting>, to: Number) -> Result<(), Status> {
+    let setting = setting.ok_or(Status::UnrecognizedName)?;
+    let value = machine.settings().check(setting, to, false)?;
+    put_value(machine, Some(setting), value)
+}
+
+/// The same, with the value as it is kept.
+#[inline(never)]
+#[small]
+fn put_value(
+    machine: &mut impl Machine,
+    setting: Option<Setting>,
+    value: i32,
+) -> Result<(), Status> {
+    let setting = setting.ok_or(Status::UnrecognizedName)?;
+    if !setting.accepts(value) {
+        return Err(Status::OutOfRange);
+    }
+    if machine.setting(setting) == value {
+        return Ok(());
+    }
+    machine.set(setting, value).map(|_| ())
+}
+
+#[small]
+fn each_axis(
+    machine: &mut impl Machine,
+    axes: u8,
+    token: [u8; 4],
+    to: Number,
+) -> Result<(), Status> {
+    (0..axes).try_for_each(|axis| put(machine, of_axis(axis, token), to))
+}
+
+#[small]
+fn set_mask(machine: &mut impl Machine, token: [u8; 4], bits: i32) -> Result<(), Status> {
+    (0..MOTORS as u8).try_for_each(|motor| {
+        let axis = read(machine, of_motor(motor, self::token("ma"))) & 15;
+        put_value(machine, of_motor(motor, token), bits >> axis & 1)
+    })
+}
+
+/// `$1`, ms.
+#[small]
+fn set_idle(ms: i32, machine: &mut impl Machine) -> Result<(), Status> {
+    if ms < 0 {
+        return Err(Status::BelowMinimum);
+    }
+    let mode = if ms == ALWAYS { 1 } else { 2 };
+    (0..MOTORS as u8)
+        .try_for_each(|motor| put_value(machine, of_motor(motor, token("pm")), mode))?;
+    if ms == ALWAYS {
+        return Ok(());
+    }
+    // Not less than a tenth of a second.
+    put_value(machine, of_system(token("mt")), (ms / 10).max(10))
+}
+
+/// Gives a bit to the mode of every switch that there is, or takes it from all.
+#[small]
+fn set_switches(machine: &mut impl Machine, bit: i32, on: bool) -> Result<(), Status> {
+    (0..2 * HOMING).try_for_each(|end| {
+        let token = if end & 1 == 0 { token("sn") } else { token("sx") };
+        let setting = of_axis(end / 2, token);
+        let mode = read(machine, setting);
+        // One that is off belongs to no axis.
+        let with = if on && mode != 0 {
+            mode | bit
+        } else if on {
+            mode
+        } else {
+            mode & !bit
+        };
+        put_value(machine, setting, with)
+    })
+}
+
+/// `$23`: which axes home at their lower ends.
+#[small]
+fn set_homing(bits: i32, machine: &mut impl Machine) -> Result<(), Status> {
+    let homes = switches(machine, 1, false);
+    (0..HOMING).filter(|axis| homes >> axis & 1 != 0).try_for_each(|axis| {
+        let lower = bits >> axis & 1;
+        let (sn, sx) = (of_axis(axis, token("sn")), of_axis(axis, token("sx")));
+        let modes = [read(machine, sn), read(machine, sx)];
+        // A limit goes with the switch.
+        let limits = (modes[0] | modes[1]) & 2;
+        put_value(machine, sn, if lower != 0 { 1 | limits } else { modes[0] & !1 })?;
+        put_value(machine, sx, if lower != 0 { modes[1] & !1 } else { 1 | limits })
+    })
+}
+
+#[small]
+fn set_axis(what: u8, axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
+    match what {
+        0 => set_steps(axis, to, machine),
+        1 => {
+            put(machine, of_axis(axis, token("vm")), to)?;
+            put(machine, of_axis(axis, token("fr")), to)
+        }
+        2 => put(machine, of_axis(axis, token("ac")), to),
+        _ => {
+            let length = to.fixed(4, false).ok_or(Status::OutOfRange)?;
+            // An axis whose zero is at its top keeps it there.
+            let (low, high) = travel(axis, machine);
+            if high == 0 && low <= 0 {
+                put_value(machine, of_axis(axis, token("tn")), -length)
+            } else {
+                let high = low.checked_add(length).ok_or(Status::OutOfRange)?;
+                put_value(machine, of_axis(axis, token("tm")), high)
+            }
+        }
+    }
+}
+
+/// Steps per millimetre become the travel in a turn of each motor of the axis.
+#[small]
+fn set_steps(axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
+    let to = to.fixed(3, false).filter(|to| *to > 0).ok_or(Status::OutOfRange)?;
+    (0..MOTORS as u8).try_for_each(|motor| {
+        if !moves(machine, motor, axis) {
+            return Ok(());
+        }
+        let turn = turned(machine, motor, to);
+        put_value(machine, of_motor(motor, token("tr")), turn)
+    })
+}

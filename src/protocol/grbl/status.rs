@@ -1,0 +1,161 @@
+//! The numbers of errors and alarms.
+
+use crate::progmem;
+use crate::status::Status;
+
+/// The number of an error that is no [`Status`]: a `$` command that there is not.
+pub const UNSUPPORTED: u8 = 3;
+/// The machine is not at rest.
+pub const BUSY: u8 = 8;
+/// G-code is locked out.
+pub const LOCKED: u8 = 9;
+/// `$J=` with other words than it may have.
+pub const BAD_JOG: u8 = 16;
+
+/// The number of the error that a status is; 0 for none.
+#[inline(never)]
+#[small]
+pub fn error_number(status: Status) -> u8 {
+    ERRORS.at(status as usize).unwrap_or(1)
+}
+
+/// The alarm that an exception is; `None` for one that is none.
+#[small]
+pub fn alarm_number(status: Status) -> Option<u8> {
+    Some(match status {
+        Status::LimitHit => 1,
+        // Steps were stopped at once, or the machine has started as nobody wanted.
+        Status::ShutDown | Status::Panicked | Status::HardReset => 3,
+        Status::ProbeFailed => 5,
+        Status::HomingClosed => 8,
+        Status::HomingFailed => 9,
+        _ => return None,
+    })
+}
+
+/// A row for each status, in the order of their variants.
+macro_rules! rows {
+    ($($name:ident = $number:literal;)+) => {
+        progmem! {
+            static ERRORS: [u8; Status::COUNT] = [$($number),+];
+        }
+
+        const _: () = {
+            let order = [$(Status::$name as usize),+];
+            let mut row = 0;
+            while row < order.len() {
+                assert!(order[row] == row, "a row of the table of errors is not in its place");
+                row += 1;
+            }
+        };
+    };
+}
+
+rows! {
+    Ok = 0;
+    Error = 3;
+    Again = 8;
+    Noop = 0;
+    Terminated = 0;
+    HardReset = 9;
+    EndOfFile = 0;
+    BufferFull = 11;
+    Initializing = 7;
+    BootLoader = 8;
+    InternalError = 3;
+    ExceptionReport = 3;
+    PersistenceError = 7;
+    StepsLate = 3;
+    ProgramStopped = 8;
+    ProgramChecked = 8;
+    UnrecognizedName = 3;
+    MalformedCommand = 1;
+    BadNumber = 2;
+    UnsupportedType = 2;
+    ReadOnly = 3;
+    CannotRead = 3;
+    NotAccepted = 8;
+    InputTooLong = 11;
+    BelowMinimum = 4;
+    AboveMaximum = 12;
+    OutOfRange = 33;
+    JsonSyntax = 1;
+    JsonTooManyPairs = 1;
+    TextNested = 1;
+    JsonTooDeep = 1;
+    Muted = 8;
+    NotBuiltIn = 20;
+    GcodeGeneric = 1;
+    GcodeUnsupported = 20;
+    McodeUnsupported = 20;
+    ModalGroupViolation = 21;
+    AxisWordMissing = 26;
+    AxisNotAllowed = 31;
+    AxisInvalid = 37;
+    AxisDisabled = 20;
+    AxisTargetMissing = 26;
+    PlaneMissing = 32;
+    FeedrateMissing = 22;
+    InverseTimeNotAllowed = 22;
+    RotaryNotAllowed = 33;
+    MachineCoordinatesMotion = 30;
+    VelocityExceeded = 12;
+    CutterCompensation = 20;
+    SWordMissing = 28;
+    SWordInvalid = 4;
+    SpindleMustTurn = 20;
+    ArcSpecification = 34;
+    ArcAxisMissing = 32;
+    ArcOffsetsMissing = 35;
+    ArcRadiusTolerance = 33;
+    ArcEndpointIsStart = 33;
+    PWordMissing = 28;
+    PWordInvalid = 29;
+    PWordNegative = 4;
+    ToolInvalid = 38;
+    HWordMissing = 28;
+    HWordInvalid = 38;
+    NoToolLength = 0;
+    LWordMissing = 28;
+    LWordInvalid = 20;
+    QWordMissing = 28;
+    QWordInvalid = 4;
+    RWordMissing = 28;
+    RWordInvalid = 33;
+    TWordMissing = 28;
+    TWordInvalid = 38;
+    WordUnused = 36;
+    WordRepeated = 25;
+    AxisConflict = 24;
+    WordConflict = 24;
+    Alarmed = 9;
+    LimitHit = 9;
+    ShutDown = 9;
+    Panicked = 9;
+    KillJob = 9;
+    SoftLimit = 15;
+    HomingFailed = 9;
+    HomingAxis = 5;
+    HomingSearch = 5;
+    HomingLatch = 5;
+    HomingTravel = 5;
+    HomingSwitches = 5;
+    HomingClosed = 9;
+    NotHomed = 10;
+    ProbeFailed = 9;
+    ProbeTooShort = 33;
+}
+
+#[cfg(test)]
+mod unit {
+    use super::*;
+
+    #[test]
+    fn errors_have_grbls_numbers() {
+        assert_eq!(error_number(Status::Ok), 0);
+        assert_eq!(error_number(Status::GcodeUnsupported), 20);
+        assert_eq!(error_number(Status::ProbeTooShort), 33);
+        assert_eq!(alarm_number(Status::LimitHit), Some(1));
+        assert_eq!(alarm_number(Status::Alarmed), None);
+    }
+}

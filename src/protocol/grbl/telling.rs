@@ -1,0 +1,106 @@
+//! A notice on its way out: the greeting, alarms and messages, what probing has found, and the status report.
+//!
+//! What TinyG's senders are told unasked, of the queue and how the machine stands, grbl's ask for.
+
+use super::lists;
+use super::report::Report;
+use super::status::alarm_number;
+use super::write::{int, line_end, message, text};
+use crate::machine::Doing;
+use crate::plain;
+use crate::protocol::{Machine, Notice, Occasion, Out, Tells};
+use crate::status::Status;
+use crate::text;
+
+/// What is being told, and how far.
+pub enum Telling {
+    /// Nothing.
+    Nothing,
+    /// The greeting; whether its first line has been put.
+    Greeting(bool),
+    /// An alarm, or a message.
+    Exception(Status),
+    /// `[PRB:]`, from this part on.
+    Probing(u8),
+    /// A status report.
+    Report(Report),
+}
+
+#[small]
+impl Telling {
+    /// Begins. What is told is what is so by now.
+    #[inline(never)]
+    pub(super) fn begin(notice: Notice, machine: &mut impl Machine) -> Self {
+        match notice {
+            Notice::Greeting(Occasion::Ready) => Self::Greeting(false),
+            Notice::Exception(status) => Self::Exception(status),
+            Notice::Probing => Self::Probing(lists::PROBING),
+            Notice::Query => Self::Report(Report::begin(machine)),
+            _ => Self::Nothing,
+        }
+    }
+}
+
+#[small]
+impl Tells for Telling {
+    #[inline(never)]
+    fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+        match self {
+            Self::Nothing => false,
+            Self::Greeting(false) => {
+                out.put_plain(plain!("\r\nGrbl 1.1h ['$' for help]\r\n"));
+                let alarmed = matches!(machine.doing(), Doing::Alarm(_));
+                *self = Self::Greeting(true);
+                alarmed
+            }
+            Self::Greeting(true) => {
+                message(out, text!("'$H'|'$X' to unlock"));
+                false
+            }
+            Self::Exception(status) => {
+                exception(*status, out);
+                false
+            }
+            Self::Probing(at) => match lists::offsets(*at, machine, out) {
+                Some(next) => {
+                    *at = next;
+                    true
+                }
+                None => false,
+            },
+            Self::Report(report) => report.step(machine, out),
+        }
+    }
+
+    /// A line of it never ends early.
+    fn split(&mut self, _out: &mut impl Out) -> bool {
+        false
+    }
+
+    fn blocks_free(&self) -> usize {
+        0
+    }
+}
+
+/// `ALARM:N`, or what people are to know.
+#[inline(never)]
+#[small]
+fn exception(status: Status, out: &mut impl Out) {
+    if let Some(number) = alarm_number(status) {
+        text(out, text!("ALARM:"));
+        int(out, number.into());
+        line_end(out);
+        if matches!(status, Status::ShutDown | Status::Panicked | Status::LimitHit) {
+            message(out, text!("Reset to continue"));
+        }
+        return;
+    }
+    match status {
+        Status::EndOfFile => message(out, text!("Pgm End")),
+        Status::BufferFull => message(out, text!("Buffer full")),
+        Status::ProgramStopped => message(out, text!("Program stopped [~ to resume]")),
+        Status::NoToolLength => message(out, text!("Tool has no length - 0 in force")),
+        Status::StepsLate => message(out, text!("Steps came late")),
+        _ => {}
+    }
+}

@@ -1,0 +1,64 @@
+//! Numbers and texts of this dialect.
+
+use crate::config::{Digits, Fixed};
+use crate::plain;
+use crate::progmem::Text;
+use crate::protocol::Out;
+
+/// Decimals in which a `Length` is kept.
+const KEPT: u8 = 4;
+
+/// A text.
+#[inline(never)]
+#[small]
+pub fn text(out: &mut impl Out, text: Text) {
+    text.bytes().for_each(|byte| out.put(byte));
+}
+
+/// A number, all its decimals.
+#[inline(never)]
+#[small]
+pub fn fixed(out: &mut impl Out, fixed: Fixed) {
+    let mut digits = Digits::default();
+    out.put_all(fixed.render(&mut digits).iter().copied());
+}
+
+/// An integer.
+pub fn int(out: &mut impl Out, value: i32) {
+    fixed(out, Fixed::int(value));
+}
+
+/// A length in units of a `Length`, in millimetres with three decimals or in inches with four.
+#[inline(never)]
+#[small]
+pub fn length(out: &mut impl Out, units: i32, inches: bool) {
+    let value = Fixed { value: units, decimals: KEPT };
+    fixed(out, if inches { value.inches(KEPT) } else { value.rounded(3) });
+}
+
+/// A speed in thousandths of mm/min: without decimals, or in inches with one.
+#[inline(never)]
+#[small]
+pub fn speed(out: &mut impl Out, thousandths: i32, inches: bool) {
+    let value = Fixed { value: thousandths, decimals: 3 };
+    fixed(out, if inches { value.inches(1) } else { value.rounded(0) });
+}
+
+/// The end of a line.
+pub fn line_end(out: &mut impl Out) {
+    out.put_plain(plain!("\r\n"));
+}
+
+/// The end of a line in brackets.
+pub fn close(out: &mut impl Out) {
+    out.put_plain(plain!("]\r\n"));
+}
+
+/// A line in brackets: `[MSG:text]`.
+#[inline(never)]
+#[small]
+pub fn message(out: &mut impl Out, what: Text) {
+    text(out, crate::text!("[MSG:"));
+    text(out, what);
+    close(out);
+}

@@ -1,0 +1,70 @@
+//! Bytes that act at once where they stand, on a port whose dialect has more of them than the receive interrupt knows: `?`, and those
+//! above 0x7F.
+//!
+//! Called by the reader before it takes a turn's bytes, 4 ms after they have come at the latest ([`set_eager`](crate::hal::event::set_eager)); it
+//! looks through the whole receive ring, also when the line pool is full. A byte that acts becomes a blank, which no line minds, and so does
+//! any other above 0x7F. Thread mode; 15 cycles a byte that waits.
+//!
+//! On a port that has not been decided ([`Port::undecided`]) a `?` at the beginning of a line decides, and acts.
+
+use kerf_macros::small;
+
+use super::hold;
+use super::lines::acts;
+use super::links::Links;
+use super::overrides;
+use super::ports::{Port, REPORT};
+use crate::hal::ring::Window;
+use crate::protocol::Speech;
+use crate::realtime::Asked;
+
+/// Opens and shuts the door: what moves is held, and waits for a tilde.
+const DOOR: u8 = 0x84;
+const ASKS: u8 = b'?';
+
+/// Takes such bytes out of a ring, and does what they ask for.
+#[inline(never)]
+#[small]
+pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) {
+    let mut within = port.lines.borrow().is_within_line();
+    for n in 0..ring.len() {
+        let byte = ring.get(n);
+        if port.undecided.get() && byte == ASKS && !within {
+            decide(links, port);
+        }
+        within = if byte < b' ' { false } else { within || byte != b' ' };
+        if acts(byte) && port.speech.get().is_in_order() && ring.replace(n, byte, b' ') {
+            act(links, port, byte);
+        }
+    }
+}
+
+/// A sender that asks so speaks another dialect.
+fn decide(links: &Links, port: &Port) {
+    let settings = links.settings.borrow();
+    if let Some(speech) = Speech::of_question(&settings) {
+        port.decide(speech);
+        links.decided(&settings);
+    }
+}
+
+#[inline(never)]
+#[small]
+fn act(links: &Links, port: &Port, byte: u8) {
+    match byte {
+        ASKS => {
+            port.ask(REPORT);
+            links.reporter_wake.urge();
+        }
+        DOOR => {
+            hold::door(links, true);
+            hold::door(links, false);
+        }
+        _ => {
+            if let Some(asked) = Asked::NOTHING.with(byte) {
+                overrides::apply(links, asked);
+                overrides::tell(links);
+            }
+        }
+    }
+}
