@@ -42,6 +42,7 @@ rows! {
     jitter_of_a_minor_motor = "jitter-minor";
     jitter_over_ends_of_blocks = "jitter-blocks";
     moves_of_a_tenth = "spiral-0.1";
+    moves_of_a_tenth_in_grbls_dialect = "spiral-0.1-grbl";
     moves_of_a_fifth = "spiral-0.2";
     moves_of_a_half = "spiral-0.5";
     moves_of_a_tenth_on_a_fast_line = "spiral-0.1-fast";

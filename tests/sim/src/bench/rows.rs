@@ -11,7 +11,7 @@ use super::{Row, beyond, costs, jitter, limits, pauses, rates, spirals};
 const NONE: [&str; 3] = ["-"; 3];
 
 /// The table.
-pub const ROWS: [Row; 44] = [
+pub const ROWS: [Row; 45] = [
     Row {
         name: "rate-1",
         what: "highest rate held, 1 motor",
@@ -133,6 +133,17 @@ pub const ROWS: [Row; 44] = [
         target: Some(1.6),
         floor: Some(1.69),
         measure: spirals::tenth,
+    },
+    Row {
+        name: "spiral-0.1-grbl",
+        what: "moves of 0.1 mm in grbl's dialect, over ideal",
+        unit: "x",
+        decimals: 3,
+        better: Lower,
+        peers: ["3.18", "-", "7.97"],
+        target: Some(1.5),
+        floor: Some(1.5),
+        measure: spirals::tenth_grbl,
     },
     Row {
         name: "spiral-0.2",

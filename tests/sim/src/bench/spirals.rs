@@ -1,6 +1,7 @@
 //! Jobs of 2,000 short moves along a spiral at 6,000 mm/min: time from the first step to the last, over
 //! the ideal. The ideal is unlimited look-ahead with trapezoids: way / v + v / a.
 
+use std::collections::VecDeque;
 use std::fmt::Write;
 
 use anyhow::{Result, ensure};
@@ -8,6 +9,7 @@ use anyhow::{Result, ensure};
 use super::Figure;
 use super::workload::{ACCELERATION, Bed, FAST_BAUD, How, NO_LIMIT, USUAL_JERK};
 use crate::host::{Host, LINES_IN_FLIGHT};
+use crate::machine::Machine;
 use crate::report::Report;
 
 const MOVES: u32 = 2_000;
@@ -20,9 +22,68 @@ const RADIUS: f64 = 30.0;
 /// Radial distance of two turns, mm.
 const PITCH: f64 = 1.0;
 
+/// Characters that a sender of grbl's has in flight, as most do.
+const GRBL_BYTES: usize = 128;
+/// No step for so long is the end of the job, ms.
+const GRBL_REST_MS: u64 = 500;
+/// Settings are in EEPROM after this, ms.
+const KEEPS_MS: u64 = 4_000;
+
 /// Moves of 0.1 mm at the usual speed of the line.
 pub fn tenth(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, 0.1, How::default())
+}
+
+/// Moves of 0.1 mm at the usual speed of the line, in grbl's dialect, sent by a sender that counts characters.
+pub fn tenth_grbl(bed: &Bed) -> Result<Figure> {
+    let mut machine = grbl_machine(bed)?;
+    let job = spiral(0.1);
+    let (mut lines, mut flying) = (job.lines(), VecDeque::new());
+    let (mut answered, mut tail) = (0, String::new());
+    let mut next = lines.next();
+    let (mut first, mut last, mut steps) = (None, 0, 0);
+    while answered <= MOVES || machine.cycle() < last + machine.cycles(GRBL_REST_MS) {
+        while let Some(line) = next
+            && flying.iter().sum::<usize>() + line.len() < GRBL_BYTES
+        {
+            machine.send(format!("{line}\n").as_bytes());
+            flying.push_back(line.len() + 1);
+            next = lines.next();
+        }
+        machine.run_for_ms(1)?;
+        tail += &String::from_utf8_lossy(&machine.receive());
+        while let Some((line, rest)) = tail.split_once("\r\n") {
+            ensure!(line == "ok", "answered {line}");
+            (tail, answered) = (rest.to_string(), answered + 1);
+            flying.pop_front();
+        }
+        let made: u64 = machine.recorder().motors().iter().map(|motor| motor.steps).sum();
+        if made != steps {
+            first = first.or(Some(machine.cycle()));
+            (steps, last) = (made, machine.cycle());
+        }
+        ensure!(machine.seconds(machine.cycle()) < 60.0, "no end: {answered} lines are answered");
+    }
+    let seconds = machine.seconds(last - first.unwrap_or(last));
+    let lines = f64::from(MOVES) / seconds;
+    Ok(Figure { value: seconds / ideal(0.1), note: format!("{lines:.0} lines/s") })
+}
+
+/// A machine with the settings of the others that speaks grbl's dialect, and has greeted.
+fn grbl_machine(bed: &Bed) -> Result<Machine> {
+    let mut machine = bed.machine()?;
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut machine, 1_000)?;
+    for line in bed.settings(How { more: &["{dia:3}"], ..How::default() }) {
+        host.ask(&mut machine, &line, 1_000)?;
+    }
+    host.run_for_ms(&mut machine, KEEPS_MS)?;
+    let mut fresh = bed.machine()?;
+    fresh.set_eeprom(machine.eeprom());
+    fresh.run_for_ms(500)?;
+    let greeting = String::from_utf8_lossy(&fresh.receive()).into_owned();
+    ensure!(greeting.contains("Grbl 1.1h"), "it greets by {greeting}");
+    Ok(fresh)
 }
 
 /// Moves of 0.2 mm.
@@ -123,10 +184,14 @@ fn fast() -> How {
 
 fn over_ideal(bed: &Bed, chord: f64, how: How) -> Result<Figure> {
     let (_, report) = bed.run(&spiral(chord), how)?;
-    let velocity = FEED / 60.0;
-    let ideal = f64::from(MOVES) * chord / velocity + velocity / ACCELERATION;
-    let value = report.seconds_moving / ideal;
+    let value = report.seconds_moving / ideal(chord);
     Ok(Figure { value, note: format!("{:.0} lines/s", lines_per_second(&report)) })
+}
+
+/// The shortest time of the job, s.
+fn ideal(chord: f64) -> f64 {
+    let velocity = FEED / 60.0;
+    f64::from(MOVES) * chord / velocity + velocity / ACCELERATION
 }
 
 /// Lines that were answered in a second.
