@@ -12,7 +12,6 @@ const installed = require('./installed');
 const { sleep, until } = require('./steps');
 
 const HOST = '127.0.0.1';
-const LOG = 'cncjs.log';
 
 /// A TCP port that nobody listens on.
 async function freePort() {
@@ -38,11 +37,16 @@ function post(url, body) {
 }
 
 module.exports = class Server {
-  constructor(port) {
+  constructor(port, controllerType = 'TinyG') {
     this.port = port;
+    this.controllerType = controllerType;
     /// Lines that came from the board.
     this.lines = [];
     this.reset();
+  }
+
+  log() {
+    return `cncjs-${this.controllerType}.log`;
   }
 
   /// Forgets what is known of the board.
@@ -60,9 +64,9 @@ module.exports = class Server {
 
   /// Starts the server and connects to it.
   async start() {
-    const home = path.join(process.cwd(), 'home');
+    const home = path.join(process.cwd(), `home-${this.controllerType}`);
     fs.mkdirSync(home, { recursive: true });
-    const log = fs.openSync(LOG, 'w');
+    const log = fs.openSync(this.log(), 'w');
     const tcp = await freePort();
     const program = path.join(path.dirname(installed.resolve('cncjs/package.json')), 'bin/cncjs');
     const args = [program, '--host', HOST, '--port', String(tcp), '--config', path.join(home, 'cncrc')];
@@ -104,10 +108,10 @@ module.exports = class Server {
     on('workflow:state', (state) => (this.workflow = state));
   }
 
-  /// Opens the serial port with the TinyG controller.
+  /// Opens the serial port with the controller.
   async open() {
     this.reset();
-    const options = { controllerType: 'TinyG', baudrate: 115200, rtscts: false };
+    const options = { controllerType: this.controllerType, baudrate: 115200, rtscts: false };
     await this.call('open', this.port, options);
     await until(() => this.isOpen);
   }
@@ -120,7 +124,7 @@ module.exports = class Server {
 
   /// What it has complained of in its log.
   complaints() {
-    const lines = fs.readFileSync(LOG, 'utf8').split('\n');
+    const lines = fs.readFileSync(this.log(), 'utf8').split('\n');
     return lines.filter((line) => /Expression:|error/.test(line));
   }
 

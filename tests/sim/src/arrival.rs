@@ -9,6 +9,8 @@ use kerf_sim::{Host, Machine, oracle};
 
 /// For what is under way when the sender has left, ms of AVR time.
 const SETTLE_MS: u64 = 1_000;
+/// Longest time from reset to the greeting, ms of AVR time.
+const BOOT_MS: u64 = 5_000;
 
 /// A motor at the end of a job.
 struct Motor {
@@ -24,12 +26,14 @@ struct Motor {
 pub struct Arrival(Vec<Motor>);
 
 impl Arrival {
-    /// Asks the firmware for its motors, and an independent reading of the job for the steps.
-    pub fn of(machine: &mut Machine, job: &Path) -> Result<Arrival> {
+    /// Asks the firmware for its motors, and an independent reading of the job for the steps. Asked is a twin with the memory of the machine, for
+    /// the port of that one may speak any dialect by now.
+    pub fn of(machine: &mut Machine, twin: &mut Machine, job: &Path) -> Result<Arrival> {
         let lines = read_lines(job)?;
+        Host::new(1).run_for_ms(machine, SETTLE_MS)?;
         let mut host = Host::new(1);
-        host.run_for_ms(machine, SETTLE_MS)?;
-        let setup = read_setup(machine, &mut host)?;
+        host.boot(twin, BOOT_MS)?;
+        let setup = read_setup(twin, &mut host)?;
         let expected = oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup)?;
         let motors = setup.motors.iter().zip(machine.recorder().motors());
         let motors = motors.zip(expected.steps).map(|((setup, motor), expected)| Motor {

@@ -152,16 +152,22 @@ impl Server {
 
     fn reset(&mut self) -> Result<()> {
         eprintln!("{OPENED}");
-        let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
-        fresh.build(&around(fresh.board()));
-        fresh.set_baud(self.baud);
-        fresh.follow_speed();
+        let mut fresh = self.fresh()?;
         fresh.set_eeprom(self.machine.eeprom());
         self.machine = fresh;
         self.anchor = (Instant::now(), 0);
         self.listens = false;
         self.boots += 1;
         Ok(())
+    }
+
+    /// Another machine, whose memory is empty.
+    fn fresh(&self) -> Result<Machine> {
+        let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
+        fresh.build(&around(fresh.board()));
+        fresh.set_baud(self.baud);
+        fresh.follow_speed();
+        Ok(fresh)
     }
 
     fn run(&mut self) -> Result<()> {
@@ -198,7 +204,9 @@ impl Server {
 
     /// Prints where the last sender's job has brought the motors.
     fn has_arrived(&mut self, job: &Path) -> Result<bool> {
-        let arrival = Arrival::of(&mut self.machine, job)?;
+        let mut twin = self.fresh()?;
+        twin.set_eeprom(self.machine.eeprom());
+        let arrival = Arrival::of(&mut self.machine, &mut twin, job)?;
         print!("{arrival}");
         Ok(arrival.is_exact())
     }

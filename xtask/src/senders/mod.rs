@@ -44,14 +44,16 @@ pub struct SendersArgs {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum Sender {
     Cncjs,
+    CncjsGrbl,
     G2coreApi,
 }
 
 impl Sender {
-    /// Its name, that of its npm package, and of its driver.
+    /// Its name, and that of its driver.
     fn name(self) -> &'static str {
         match self {
             Sender::Cncjs => "cncjs",
+            Sender::CncjsGrbl => "cncjs-grbl",
             Sender::G2coreApi => "g2core-api",
         }
     }
