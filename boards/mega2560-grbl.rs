@@ -1,7 +1,7 @@
 //! Arduino Mega 2560 with a grbl-style shield: the pinout of grbl-Mega.
 
 use super::Port::{A, B, C, E, H, K};
-use super::{Board, Handshake, MotorPins, Pwm, Serial, Timer, USB, Usart, pin};
+use super::{Board, Encoder, Handshake, MotorPins, Pwm, Serial, Timer, USB, Usart, pin};
 
 /// Arduino Mega 2560 with a grbl-style shield.
 pub const MEGA2560_GRBL: Board = Board {
@@ -44,6 +44,8 @@ pub const MEGA2560_GRBL: Board = Board {
         Some(pin(K, 3)),
         Some(pin(K, 0)),
     ],
+    // D11 and A15
+    encoder: Some(Encoder { index: pin(B, 5), sync: pin(K, 7) }),
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

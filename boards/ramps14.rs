@@ -1,7 +1,7 @@
 //! Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder.
 
 use super::Port::{A, B, D, E, F, G, H, J, K, L};
-use super::{Board, MotorPins, Pwm, Timer, USB, pin};
+use super::{Board, Encoder, MotorPins, Pwm, Timer, USB, pin};
 
 /// Arduino Mega 2560 with RAMPS 1.4.
 pub const RAMPS14: Board = Board {
@@ -46,6 +46,8 @@ pub const RAMPS14: Board = Board {
         Some(pin(K, 4)),
         Some(pin(K, 1)),
     ],
+    // D2 and D3
+    encoder: Some(Encoder { index: pin(E, 4), sync: pin(E, 5) }),
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

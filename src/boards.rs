@@ -265,6 +265,32 @@ pub mod inputs {
     pub const COUNT: usize = 11;
 }
 
+/// The sensors of a spindle, which pull their pins low: see [`encoder`](crate::encoder). A pin that is an input as well is no input while
+/// the encoder is set up. Each must be able to interrupt, by a vector of its own.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Encoder {
+    /// Once a turn.
+    pub index: Pin,
+    /// So many times a turn.
+    pub sync: Pin,
+}
+
+impl Encoder {
+    /// The vectors of its pins, index first.
+    pub const fn vectors(self) -> [u8; 2] {
+        [vector(self.index), vector(self.sync)]
+    }
+}
+
+/// The number of the vector of a pin's interrupt, 0 for none (ATmega2560 data sheet, interrupt vectors).
+const fn vector(pin: Pin) -> u8 {
+    match pin.interrupt() {
+        Some(Interrupt::External(n)) => n + 1,
+        Some(Interrupt::PinChange(n)) => n / 8 + 9,
+        None => 0,
+    }
+}
+
 /// A board.
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
@@ -290,6 +316,8 @@ pub struct Board {
     /// Switches between a pin and ground: see [`inputs`]. One pin may serve both ends of an axis. Each
     /// must be able to interrupt: see [`Pin::interrupt`].
     pub inputs: [Option<Pin>; inputs::COUNT],
+    /// The sensors of the spindle. Timer 5 tells the time of their pulses.
+    pub encoder: Option<Encoder>,
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,
     /// Timer of the 1 kHz tick.
@@ -398,6 +426,7 @@ impl Board {
         let first = !self.serial.is_empty() && matches!(self.serial[0].usart, Usart::U0);
         assert!(first, "the first serial port of this board is not USART0");
         self.check_pwm();
+        self.check_encoder();
         self.check_outputs();
         let mut s = 0;
         while s < inputs::COUNT {
@@ -406,6 +435,23 @@ impl Board {
             }
             s += 1;
         }
+    }
+
+    /// The inputs that share a pin with the sensors `lines` of the encoder (bit 0 index, bit 1 sync), as bits.
+    pub const fn shared_inputs(&self, lines: u8) -> u16 {
+        let Some(encoder) = self.encoder else { return 0 };
+        let (mut bits, mut i) = (0, 0);
+        while i < inputs::COUNT {
+            if let Some(pin) = self.inputs[i] {
+                let index = lines & 1 != 0 && pin.is(encoder.index);
+                let sync = lines & 2 != 0 && pin.is(encoder.sync);
+                if index || sync {
+                    bits |= 1 << i;
+                }
+            }
+            i += 1;
+        }
+        bits
     }
 
     /// Whether this input is the upper end of an axis on the pin of the lower one.
@@ -439,6 +485,23 @@ impl Board {
             pwm.timer as u8 != self.step_timer as u8 && pwm.timer as u8 != self.tick_timer as u8,
             "a timer of this board is used twice"
         );
+    }
+
+    /// Panics if a sensor of the spindle has no vector of its own, or another's pin, or if its timer is another's.
+    const fn check_encoder(&self) {
+        let Some(encoder) = self.encoder else { return };
+        let [index, sync] = encoder.vectors();
+        assert!(index != 0 && sync != 0, "a sensor of this board cannot interrupt");
+        assert!(index != sync, "the sensors of this board share a vector");
+        let pwm = matches!(self.pwm, Some(Pwm { timer: Timer::T5, .. }));
+        let taken = matches!(self.step_timer, Timer::T5) || matches!(self.tick_timer, Timer::T5);
+        assert!(!pwm && !taken, "the timer of the encoder is used twice");
+        let mut h = 0;
+        while h < self.hazards.len() {
+            let hazard = self.hazards[h];
+            assert!(!hazard.is(encoder.index) && !hazard.is(encoder.sync), "a sensor is an output");
+            h += 1;
+        }
     }
 
     /// Panics if an output would stay on after a panic, or is switched by two codes.
@@ -577,6 +640,20 @@ mod tests {
         let mut board = RAMPS14;
         board.inputs[inputs::A_MIN] = Some(pin(Port::C, 0));
         board.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "the sensors of this board share a vector")]
+    fn sensors_have_a_vector_each() {
+        let encoder = Some(Encoder { index: pin(Port::K, 1), sync: pin(Port::K, 7) });
+        Board { encoder, ..MEGA2560_GRBL }.check();
+    }
+
+    #[test]
+    #[should_panic(expected = "a sensor of this board cannot interrupt")]
+    fn sensors_interrupt() {
+        let encoder = Some(Encoder { index: pin(Port::L, 1), sync: pin(Port::K, 7) });
+        Board { encoder, ..MEGA2560_GRBL }.check();
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use kerf::boards::{Board, MOTORS, Pin};
 
+use super::line::Bounce;
+
 /// A machine around the chip. Lengths are in millimetres from the lower hard end of an axis.
 #[derive(Clone, Debug)]
 pub struct Build {
@@ -71,6 +73,48 @@ pub struct Spindle {
     pub pwm: Option<Pin>,
     /// The pin that sees a pulse a turn, high for a hundredth of a turn.
     pub index: Option<Pin>,
+    /// What its motor can do: turns a minute in a second; infinite if it is as strong as it need be.
+    pub torque: f64,
+    /// Its encoder.
+    pub sensors: Option<Sensors>,
+}
+
+/// Sensors that pull their pins low while marks pass. Angles are in turns.
+#[derive(Clone, Copy, Debug)]
+pub struct Sensors {
+    /// Sees a mark in a turn, at angle 0.
+    pub index: Pin,
+    /// Sees so many.
+    pub sync: Pin,
+    /// See `sync`.
+    pub per_turn: u32,
+    /// How wide the mark of the index is.
+    pub index_width: f64,
+    /// How wide the other marks are: a share of the way from one to the next.
+    pub width: f64,
+    /// Where the first of them is.
+    pub phase: f64,
+    /// Edges come late by up to so many cycles.
+    pub jitter: u64,
+    /// What edges do behind them.
+    pub bounce: Option<Bounce>,
+}
+
+impl Sensors {
+    /// Those of a board, with so many marks, the index half way between two of them.
+    pub fn of(board: &Board, per_turn: u32) -> Option<Sensors> {
+        let encoder = board.encoder?;
+        Some(Sensors {
+            index: encoder.index,
+            sync: encoder.sync,
+            per_turn,
+            index_width: 0.02,
+            width: 0.3,
+            phase: 0.5 / f64::from(per_turn),
+            jitter: 0,
+            bounce: None,
+        })
+    }
 }
 
 impl Build {
@@ -83,7 +127,14 @@ impl Build {
             probe: Wiring::NormallyOpen,
             door: Some(Wiring::NormallyOpen),
             stop: Some(Wiring::NormallyOpen),
-            spindle: Spindle { rpm: 12_000.0, time_constant: 0.5, pwm: None, index: None },
+            spindle: Spindle {
+                rpm: 12_000.0,
+                time_constant: 0.5,
+                pwm: None,
+                index: None,
+                torque: f64::INFINITY,
+                sensors: None,
+            },
             seed: 1,
         }
     }

@@ -10,6 +10,7 @@
 
 mod build;
 mod carriage;
+mod encoder;
 mod line;
 mod random;
 mod spindle;
@@ -18,7 +19,8 @@ mod tests;
 
 use kerf::boards::{Board, MOTORS, Pin, inputs};
 
-pub use build::{Axis, Build, Spindle as SpindleBuild, Switch, Wiring};
+pub use build::{Axis, Build, Sensors, Spindle as SpindleBuild, Switch, Wiring};
+pub use encoder::Encoder;
 pub use line::Bounce;
 pub use random::Random;
 
@@ -36,6 +38,8 @@ pub struct Mechanics {
     spindle: Spindle,
     index: Option<Pin>,
     random: Random,
+    /// When pulses of the encoder's index began, and where each carriage was, in steps.
+    indexed: Vec<(u64, [i64; MOTORS])>,
 }
 
 impl Mechanics {
@@ -49,6 +53,7 @@ impl Mechanics {
             spindle: Spindle::new(build.spindle, board.clock_hz),
             index: build.spindle.index,
             random: Random::new(build.seed),
+            indexed: Vec::new(),
         };
         for (a, axis) in build.axes.iter().enumerate() {
             for (end, switch) in [axis.min, axis.max].into_iter().enumerate() {
@@ -105,6 +110,31 @@ impl Mechanics {
     /// Leaves every so many index pulses out.
     pub fn miss_index_every(&mut self, pulses: Option<u64>) {
         self.spindle.miss_every(pulses);
+    }
+
+    /// Whatever drives it, the spindle turns so fast from now on, turns a minute.
+    pub fn force_spindle(&mut self, rpm: f64, now: u64) {
+        self.spindle.force(rpm, now);
+    }
+
+    /// The spindle is driven to another speed from now on.
+    pub fn drive_spindle_to(&mut self, rpm: f64, now: u64) {
+        self.spindle.drive_to(rpm, now);
+    }
+
+    /// A cut slows the spindle down by so many turns a minute in a second from now on, and by `swing` more and less so often in a second.
+    pub fn load_spindle(&mut self, load: f64, swing: f64, hertz: f64, now: u64) {
+        self.spindle.set_load(load, swing, hertz, now);
+    }
+
+    /// The spindle's encoder, if it has one.
+    pub fn encoder(&mut self) -> Option<&mut Encoder> {
+        self.spindle.encoder()
+    }
+
+    /// When pulses of the encoder's index began, and where each carriage was, in steps.
+    pub fn indexed(&self) -> &[(u64, [i64; MOTORS])] {
+        &self.indexed
     }
 
     /// Works the contact of an input by hand, or lets it go: the door, the emergency stop, any other.
@@ -197,6 +227,11 @@ impl Mechanics {
         }
         if let (Some(high), Some(pin)) = (self.spindle.advance(now), self.index) {
             changed.push((pin, high));
+        }
+        if let Some(encoder) = self.spindle.encoder()
+            && encoder.advance(now, changed)
+        {
+            self.indexed.push((now, self.carriages.each_ref().map(Carriage::steps)));
         }
     }
 }

@@ -1,0 +1,144 @@
+//! The sensors of a spindle: from its angle to edges on two pins, with what may be wrong with them.
+//!
+//! Each pulls its pin low while a mark passes it. Marks are the same way apart; the spindle may turn either way.
+
+use std::collections::VecDeque;
+
+use kerf::boards::Pin;
+
+use super::build::Sensors;
+use super::random::Random;
+
+const NEVER: u64 = u64::MAX;
+
+/// A sensor and its marks.
+struct Line {
+    pin: Pin,
+    /// Marks in a turn.
+    marks: f64,
+    /// Where the first is, and how wide each, in turns.
+    first: f64,
+    width: f64,
+    /// The level by the edges that are planned.
+    high: bool,
+    /// Edges to come, in their order.
+    edges: VecDeque<(u64, bool)>,
+    /// Pulses until one is left out.
+    miss: Option<u64>,
+}
+
+impl Line {
+    /// The edges on the way from one angle to another, as angles and levels, in their order.
+    fn crossed(&self, from: f64, to: f64) -> Vec<(f64, bool)> {
+        let (low, high) = (from.min(to), from.max(to));
+        let marks = ((low - self.first) * self.marks).floor() as i64 - 1
+            ..=((high - self.first) * self.marks).ceil() as i64;
+        let mut edges = Vec::new();
+        for mark in marks {
+            let begins = self.first + mark as f64 / self.marks;
+            for (at, level) in [(begins, from > to), (begins + self.width, from < to)] {
+                if low < at && at <= high {
+                    edges.push((at, level));
+                }
+            }
+        }
+        edges.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if from > to {
+            edges.reverse();
+        }
+        edges
+    }
+}
+
+/// Both sensors.
+pub struct Encoder {
+    build: Sensors,
+    lines: [Line; 2],
+}
+
+impl Encoder {
+    /// With the index at angle 0.
+    pub fn new(build: Sensors) -> Self {
+        let line = |pin, marks: f64, first, width| {
+            let (high, edges, miss) = (true, VecDeque::new(), None);
+            Line { pin, marks, first, width, high, edges, miss }
+        };
+        let marks = f64::from(build.per_turn);
+        let lines = [
+            line(build.index, 1.0, 0.0, build.index_width),
+            line(build.sync, marks, build.phase, build.width / marks),
+        ];
+        Encoder { build, lines }
+    }
+
+    /// Leaves out a pulse: the next but so many. Of the index if `index`, else of sync.
+    pub fn miss(&mut self, index: bool, after: u64) {
+        self.lines[usize::from(!index)].miss = Some(after);
+    }
+
+    /// A pulse too many, of so many cycles.
+    pub fn add(&mut self, index: bool, at: u64, cycles: u64) {
+        let line = &mut self.lines[usize::from(!index)];
+        let level =
+            line.edges.iter().take_while(|(edge, _)| *edge <= at).last().map(|(_, high)| *high);
+        if level.unwrap_or(true) {
+            line.edges.extend([(at, false), (at + cycles, true)]);
+            line.edges.make_contiguous().sort_by_key(|(at, _)| *at);
+        }
+    }
+
+    /// The spindle turns from one angle to another, in turns, in this time; plans the edges on the way.
+    pub fn turn(&mut self, from: f64, to: f64, began: u64, ended: u64, random: &mut Random) {
+        let jitter = self.build.jitter;
+        for line in &mut self.lines {
+            for (angle, high) in line.crossed(from, to) {
+                if !high && line.miss.is_some() {
+                    let left = line.miss.unwrap_or(0);
+                    line.miss = left.checked_sub(1);
+                    if left == 0 {
+                        continue;
+                    }
+                }
+                if line.high == high {
+                    continue;
+                }
+                line.high = high;
+                let share = (angle - from) / (to - from);
+                let at = began + (share * (ended - began) as f64) as u64;
+                let at = at + if jitter > 0 { random.below(jitter) } else { 0 };
+                line.edges.push_back((at, high));
+                if let Some(bounce) = self.build.bounce {
+                    let mut times: Vec<u64> = (0..2 * bounce.times)
+                        .map(|_| at + 1 + random.below(bounce.cycles.max(1)))
+                        .collect();
+                    times.sort_unstable();
+                    let flips = times.into_iter().enumerate();
+                    line.edges.extend(flips.map(|(i, at)| (at, (i % 2 == 1) == high)));
+                }
+            }
+            line.edges.make_contiguous().sort_by_key(|(at, _)| *at);
+        }
+    }
+
+    /// When a pin changes next.
+    pub fn due(&self) -> u64 {
+        let next = self.lines.iter().filter_map(|line| line.edges.front());
+        next.map(|(at, _)| *at).min().unwrap_or(NEVER)
+    }
+
+    /// Notes the pins that have changed by `now`. Whether a pulse of the index has begun.
+    pub fn advance(&mut self, now: u64, changed: &mut Vec<(Pin, bool)>) -> bool {
+        let mut begun = false;
+        for (n, line) in self.lines.iter_mut().enumerate() {
+            while let Some((at, high)) = line.edges.front().copied()
+                && at <= now
+            {
+                line.edges.pop_front();
+                // The last of them comes out first.
+                changed.insert(0, (line.pin, high));
+                begun |= n == 0 && !high;
+            }
+        }
+        begun
+    }
+}
