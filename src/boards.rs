@@ -6,10 +6,13 @@
 
 #[path = "../boards/mega2560-grbl.rs"]
 mod mega2560_grbl;
+#[path = "../boards/mega2560-lathe.rs"]
+mod mega2560_lathe;
 #[path = "../boards/ramps14.rs"]
 mod ramps14;
 
 pub use mega2560_grbl::MEGA2560_GRBL;
+pub use mega2560_lathe::MEGA2560_LATHE;
 pub use ramps14::RAMPS14;
 
 /// Motors a board drives.
@@ -534,7 +537,7 @@ impl Board {
 }
 
 /// Every board Kerf knows.
-pub const ALL: [&Board; 2] = [&MEGA2560_GRBL, &RAMPS14];
+pub const ALL: [&Board; 3] = [&MEGA2560_GRBL, &MEGA2560_LATHE, &RAMPS14];
 
 const _: () = {
     let mut i = 0;
@@ -553,7 +556,10 @@ pub fn by_name(name: &str) -> Option<&'static Board> {
 #[cfg(feature = "board-ramps14")]
 pub const ACTIVE: &Board = &RAMPS14;
 /// The board that this image is built for.
-#[cfg(not(feature = "board-ramps14"))]
+#[cfg(feature = "board-mega2560-lathe")]
+pub const ACTIVE: &Board = &MEGA2560_LATHE;
+/// The board that this image is built for.
+#[cfg(not(any(feature = "board-ramps14", feature = "board-mega2560-lathe")))]
 pub const ACTIVE: &Board = &MEGA2560_GRBL;
 
 #[cfg(test)]

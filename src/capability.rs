@@ -17,11 +17,13 @@ pub enum Capability {
     Jobs,
     /// Help for people at a terminal: `h`, `$h`, `$test` and so on.
     Help,
+    /// Turning: the encoder of the spindle, and the codes that go by it.
+    Lathe,
 }
 
 impl Capability {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Cycles, Self::Probing, Self::Jobs, Self::Help];
+    pub const ALL: [Self; 5] = [Self::Cycles, Self::Probing, Self::Jobs, Self::Help, Self::Lathe];
 
     /// Whether this image has it.
     #[inline(always)]
@@ -31,6 +33,7 @@ impl Capability {
             Self::Probing => cfg!(feature = "probing"),
             Self::Jobs => cfg!(feature = "jobs"),
             Self::Help => cfg!(feature = "help"),
+            Self::Lathe => cfg!(feature = "lathe"),
         }
     }
 
@@ -48,6 +51,7 @@ impl Capability {
             Self::Probing => "probing",
             Self::Jobs => "jobs",
             Self::Help => "help",
+            Self::Lathe => "lathe",
         }
     }
 }

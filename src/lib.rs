@@ -49,6 +49,7 @@ pub mod canon;
 pub mod capability;
 pub mod config;
 pub mod dda;
+pub mod encoder;
 pub mod gcode;
 pub mod jobs;
 pub mod machine;

@@ -24,6 +24,7 @@ fn lines() -> Vec<(Capability, String)> {
     };
     let own = |capability, number| match capability {
         Capability::Probing => format!("G{}.{} X10 F100", number / 10, number % 10),
+        Capability::Lathe => format!("G{} Z-5 K1", number / 10),
         _ => line(number),
     };
     modes.map(|(capability, number)| (capability, own(capability, number))).collect()
@@ -47,7 +48,7 @@ fn said_of(line: &str) -> Result<(), Status> {
 #[test]
 fn codes_are_refused_by_name_where_their_capability_is_not_built_in() {
     let lines = lines();
-    assert_eq!(lines.len(), 10 + 4, "G73, G81 to G89, G38.2 to G38.5");
+    assert_eq!(lines.len(), 10 + 4 + 2, "G73, G81 to G89, G38.2 to G38.5, G32, G33");
     for (capability, line) in lines {
         let refused = said_of(&line) == Err(Status::NotBuiltIn);
         assert_eq!(refused, !capability.is_built_in(), "{line}: {:?}", said_of(&line));
@@ -75,6 +76,8 @@ fn the_machine_says_that_it_lacks_something() {
     for (capability, line) in [
         (Capability::Cycles, "g81x1z-1r1f100"),
         (Capability::Probing, "g38.3x1f100"),
+        (Capability::Lathe, "g33z-1k1"),
+        (Capability::Lathe, "{spn:1}"),
         (Capability::Help, "{h:n}"),
         (Capability::Jobs, "{test:3}"),
     ] {

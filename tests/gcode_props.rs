@@ -52,6 +52,7 @@ fn carried_out(commands: &Commands, mut at: PerAxis<Length>) -> (PerAxis<Length>
             (None, _) => return (at, true),
             (Some(Step::Line(target, _) | Step::SetPosition(target)), _) => at = target,
             (Some(Step::Arc), Motion::Arc { target, .. })
+            | (Some(Step::Thread), Motion::Thread { target, .. })
             | (Some(Step::Probe), Motion::Probe { target, .. }) => at = *target,
             _ => {}
         }

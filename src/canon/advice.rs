@@ -64,6 +64,31 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "`{chk:0}` ends check mode. Until then nothing moves.",
     ),
     (
+        PulseMisfit,
+        "A pulse of the spindle's encoder is missing, or there is one too many; `spx` counts them.",
+        "Check `spn`, the sensors and their cables, and `spb` if contacts bounce.",
+    ),
+    (
+        NoEncoder,
+        "G33 needs an encoder at the spindle, and `spn` is 0.",
+        "Set `spn` to its sync pulses a turn, 1 for an index alone (lathe.md).",
+    ),
+    (
+        NoIndex,
+        "A thread was to begin, and the index gave no pulse for 6 seconds. Nothing has moved.",
+        "Start the spindle. Check the sensor and its cable; `{sps:n}` tells the speed.",
+    ),
+    (
+        NoSync,
+        "A thread was to begin, and sync gave no pulses while the index did. Nothing has moved.",
+        "Check the sync sensor and its cable, or set `{spn:1}` to go by the index alone.",
+    ),
+    (
+        SpindleLost,
+        "The pulses of the spindle ended in a thread. The axes have stopped, and know where they are.",
+        "Take the tool out of the cut, `{clear:n}`. Find out why the spindle stopped, or the pulses.",
+    ),
+    (
         UnrecognizedName,
         "There is no setting or value of that name.",
         "Check the name in settings.md, and below.",
@@ -195,7 +220,9 @@ const ADVICE: &[(Status, &str, &str)] = &[
     (PWordMissing, "The code needs P.", "See the code in gcode.md."),
     (PWordInvalid, "P is not one that the code knows.", "See the code in gcode.md."),
     (PWordNegative, "P is negative.", "A time is 0 or more."),
+    (KWordMissing, "G33 needs K, on each line.", "Put a K on the line."),
     (ToolInvalid, "P is not a tool of the table.", "Tools are 1 to 10."),
+    (KWordInvalid, "K of G33 is 0 or less.", "K is the lead of the thread, above 0."),
     (HWordMissing, "The code needs H.", "Name the tool."),
     (
         HWordInvalid,

@@ -23,6 +23,8 @@ pub enum Canon {
     Rate(Feed),
     /// Whether the next moves end at rest.
     ExactStop(bool),
+    /// A straight move in step with the spindle, with the way of the axis that moves farthest in a turn.
+    Thread(PerAxis<Length>, Length),
     /// Stand still, for milliseconds.
     Dwell(u32),
     /// How the spindle turns.
@@ -56,6 +58,7 @@ impl Display for Canon {
             Self::Traverse(place) => write!(to, "STRAIGHT_TRAVERSE({})", Place(place)),
             Self::Feed(place) => write!(to, "STRAIGHT_FEED({})", Place(place)),
             Self::Arc(place, arc, turns) => write_arc(to, place, arc, *turns),
+            Self::Thread(place, lead) => write!(to, "THREAD({}, {lead})", Place(place)),
             Self::Probe(place, mode) => {
                 write!(to, "STRAIGHT_PROBE({}, {})", Place(place), until(*mode))
             }

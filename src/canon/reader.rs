@@ -78,7 +78,9 @@ impl<S: Setup> Reader<S> {
             Step::Dwell(ms) => self.ready.push_back(Canon::Dwell(ms)),
             Step::Line(target, None) => self.go(Canon::Traverse(target), target, None),
             Step::Line(target, feed) => self.go(Canon::Feed(target), target, feed),
-            Step::Arc | Step::Probe | Step::Home | Step::Jog | Step::Check => self.motion(),
+            Step::Arc | Step::Probe | Step::Thread | Step::Home | Step::Jog | Step::Check => {
+                self.motion()
+            }
             Step::SetPosition(position) => {
                 self.place = position;
                 self.ready.push_back(Canon::SetPosition(position));
@@ -97,6 +99,7 @@ impl<S: Setup> Reader<S> {
             Motion::Probe { target, feed, mode } => {
                 self.go(Canon::Probe(target, mode), target, Some(feed));
             }
+            Motion::Thread { target, lead } => self.go(Canon::Thread(target, lead), target, None),
             Motion::Home { axes, set } => self.ready.push_back(Canon::Home(axes, set)),
             _ => {}
         }

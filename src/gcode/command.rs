@@ -140,6 +140,13 @@ pub enum Motion {
         /// Which of them.
         mode: MotionMode,
     },
+    /// G33: straight, in step with the spindle.
+    Thread {
+        /// Where to.
+        target: PerAxis<Length>,
+        /// How far the axis that moves farthest goes in a turn.
+        lead: Length,
+    },
     /// G73, G81 to G89.
     Cycle(Cycle),
     /// G28.2, G28.4: the homing cycle.

@@ -108,6 +108,7 @@ fn check_within(
         Motion::Traverse { target }
         | Motion::Jog { target }
         | Motion::Feed { target, .. }
+        | Motion::Thread { target, .. }
         | Motion::Probe { target, .. } => target,
         Motion::Arc { target, arc, .. } => {
             check_arc(start, target, arc, limits)?;

@@ -46,11 +46,13 @@ pub enum MotionMode {
     ProbeAway = 17,
     /// G38.5: until the probe lets go; it may not.
     ProbeAwayQuietly = 18,
+    /// G33, G32: in step with the spindle.
+    Thread = 19,
 }
 
 impl MotionMode {
     /// How many there are.
-    pub const COUNT: usize = 19;
+    pub const COUNT: usize = 20;
 
     /// G73, G81 to G89. Never in an image without them.
     pub fn is_cycle(self) -> bool {
@@ -63,6 +65,7 @@ impl MotionMode {
         match self as u8 {
             5 | 16..=18 => Some(Capability::Probing),
             6..=15 => Some(Capability::Cycles),
+            19 => Some(Capability::Lathe),
             _ => None,
         }
     }

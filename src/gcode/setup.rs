@@ -50,6 +50,10 @@ pub trait Setup {
     fn has_probe(&self) -> bool {
         true
     }
+    /// Whether an encoder tells how the spindle turns.
+    fn has_encoder(&self) -> bool {
+        true
+    }
     /// Whether an axis can be homed, or why not.
     fn homing(&self, _axis: u8) -> Result<(), Status> {
         Ok(())

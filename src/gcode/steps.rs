@@ -31,6 +31,8 @@ pub enum Step {
     Arc,
     /// The probing move of the commands' motion.
     Probe,
+    /// The pass in step with the spindle of the commands' motion.
+    Thread,
     /// The homing cycle of the commands' motion.
     Home,
     /// The jog of the commands' motion.
@@ -211,6 +213,7 @@ impl Steps {
             (Motion::Feed { target, feed }, _) => Some(Step::Line(*target, Some(*feed))),
             (Motion::Arc { .. }, _) => Some(Step::Arc),
             (Motion::Probe { .. }, _) => Some(Step::Probe),
+            (Motion::Thread { .. }, _) => Some(Step::Thread),
             (Motion::Home { .. }, _) => Some(Step::Home),
             (Motion::Jog { .. }, _) => Some(Step::Jog),
             (Motion::Check, _) => Some(Step::Check),

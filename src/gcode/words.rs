@@ -15,6 +15,8 @@ const _: () = assert!(COUNT <= 32, "a set of words is a `u32`");
 
 /// The slot of I, of I J K.
 pub const I: u8 = 6;
+/// The slot of K.
+pub const K: u8 = 8;
 #[allow(missing_docs)]
 mod names {
     pub const R: u8 = 9;
@@ -66,7 +68,7 @@ progmem! {
     static MISSING: [Status; COUNT] = [
         Status::AxisWordMissing, Status::AxisWordMissing, Status::AxisWordMissing,
         Status::AxisWordMissing, Status::AxisWordMissing, Status::AxisWordMissing,
-        Status::ArcOffsetsMissing, Status::ArcOffsetsMissing, Status::ArcOffsetsMissing,
+        Status::ArcOffsetsMissing, Status::ArcOffsetsMissing, Status::KWordMissing,
         Status::RWordMissing, Status::PWordMissing, Status::QWordMissing, Status::LWordMissing,
         Status::HWordMissing, Status::FeedrateMissing, Status::SWordMissing, Status::TWordMissing,
         Status::InternalError,

@@ -18,6 +18,7 @@ use super::ring::Producer;
 use super::serial::{AllEnds, Flow};
 use crate::boards::MOTORS;
 use crate::dda::{Dda, SEGMENTS, Segment, Ticks};
+use crate::encoder::Pulses;
 use crate::realtime::Asked;
 use crate::store::Memory;
 
@@ -149,6 +150,8 @@ contract! {
     trait Inputs in inputs {
         /// Which inputs are worked when low, and which of them stop the steps. Thread mode.
         fn set_up(low: u16, stops: u16);
+        /// The inputs whose pins are an encoder's for now ([`Sensors::set_up`]): they look as if not worked. Thread mode.
+        fn left_out() -> u16;
         /// These ends are no limits for now. Thread mode.
         fn spare(ends: u8);
         /// Has the first of the inputs `armed` that comes to be as in `awaited` end the move ([`contact`](crate::dda::contact)); none if `armed`
@@ -158,6 +161,17 @@ contract! {
         fn worked() -> u16;
         /// What has stopped the steps since the last call. Thread mode.
         fn take_hits() -> u16;
+    }
+
+    /// The sensors of the spindle, whose pulses are counted and timed. See [`crate::encoder`].
+    trait Sensors in encoder {
+        /// The sensors `lines` are read from now on (bit 0 index, bit 1 sync), whose contacts bounce for so many counts, up to half of 2^16.
+        /// Thread mode.
+        fn set_up(lines: u8, bounce: u16);
+        /// Whether any is read. Any level.
+        fn is_set_up() -> bool;
+        /// What they have seen so far. At least each 100 ms, or times cannot be told. Thread mode and exec. Cost: 300.
+        fn read() -> Pulses;
     }
 
     /// The pulses whose width says how fast the spindle is to turn.

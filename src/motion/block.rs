@@ -1,7 +1,7 @@
 //! A block: one straight move, dwell or synchronised command, as the planner leaves it for exec.
 //!
 //! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block decides how
-//! far Kerf looks ahead, and each byte of it is there 65 times. So limits take two bytes each, the line
+//! far Kerf looks ahead, and each byte of it is there 62 times. So limits take two bytes each, the line
 //! number three, the sign of a length tells what distances are counted in ([`Extent`]), and a line, which knows no [`Reserve`] of 0, has no tag:
 //! 30 bytes on AVR.
 
@@ -67,6 +67,8 @@ pub enum Action {
     Drivers(Drivers),
     /// M3 to M9, S: the outputs and the speed of the spindle are so from here on.
     Outputs(Outputs),
+    /// G33: from here on, at rest, lines follow the spindle by so many mm a turn along their path; 0 for no more.
+    Thread(f32),
     /// M48 to M51. The machine goes on.
     Override(Change),
     /// M0, M1, M60.

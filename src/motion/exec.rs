@@ -21,12 +21,14 @@
 //! interrupt; a third of them are the governor's floats.
 
 use super::block::{Action, Block, Body, Line};
-use super::float::{below, scaled, some, whole};
+use super::float::{below, least, scaled, some, whole};
 use super::governor::{Ahead, Governor, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
 use super::short::Short;
 use super::snapshot::{Program, Snapshot};
+use super::thread::Thread;
+use crate::capability::Capability;
 use crate::dda::Segment;
 use crate::gcode::overrides::Change;
 use crate::hal::TIMER_HZ;
@@ -123,9 +125,13 @@ pub struct Exec {
     coarse: bool,
     /// There too.
     hurry: bool,
+    /// A pass in step with the spindle is to end at once.
+    breaks_off: bool,
     dwell_ms: u32,
     governor: Governor,
     prep: Prep,
+    // But for what few lines need.
+    thread: Thread,
 }
 
 /// What the governor sees of the queue.
@@ -169,7 +175,9 @@ impl Exec {
             hold: false,
             coarse: false,
             hurry: false,
+            breaks_off: false,
             dwell_ms: 0,
+            thread: Thread::new(),
         }
     }
 
@@ -269,6 +277,7 @@ impl Exec {
         let held = self.prep.cut(&mut out.target);
         self.running.active = false;
         self.dwell_ms = 0;
+        self.thread.begin(0.0);
         out.left = 0.0;
         out.running = false;
         out.program = Program::Stopped;
@@ -325,6 +334,14 @@ impl Exec {
                 };
             }
             Action::Drivers(drivers) => self.prep.set_drivers(*drivers),
+            Action::Thread(lead) => {
+                self.halt(out);
+                if !standstill {
+                    return Step::Standstill;
+                }
+                self.prep.rest();
+                self.thread.begin(*lead);
+            }
             Action::Override(_) => {}
         }
         blocks.release();
@@ -403,6 +420,9 @@ impl Exec {
         if running.done {
             return self.end(0, false, blocks, segment);
         }
+        if Capability::Lathe.is_built_in() && self.thread.is_on() {
+            return self.follow(blocks, out, segment);
+        }
         let version = blocks.version();
         if version != running.version {
             running.version = version;
@@ -443,6 +463,70 @@ impl Exec {
         let steady = !running.jerk || self.governor.is_far_from_ramps();
         let short = if running.jerk { !running.long } else { running.short };
         self.prep.refine(running.long && steady, short && self.coarse);
+        step(self.prep.segment(left, cycles, segment))
+    }
+
+    /// The pass in step with the spindle, if there is one.
+    #[inline(always)]
+    pub fn thread(&mut self) -> Option<&mut Thread> {
+        let is_on = Capability::Lathe.is_built_in() && self.thread.is_on();
+        is_on.then_some(&mut self.thread)
+    }
+
+    /// Whether a pass in step with the spindle is to end at once, in the midst of the cut: for an alarm.
+    #[inline(always)]
+    pub fn break_off(&mut self, at_once: bool) {
+        self.breaks_off = at_once;
+    }
+
+    /// Prepares the next stretch of a line that follows the spindle. A feedhold waits for its end, and overrides do not count.
+    #[inline(never)]
+    #[small]
+    fn follow(
+        &mut self,
+        blocks: &mut BlockSource,
+        out: &mut Snapshot,
+        segment: &mut Segment,
+    ) -> Step {
+        let running = &mut self.running;
+        let version = blocks.version();
+        if version != running.version {
+            running.version = version;
+            running.cruise = blocks.feed();
+            blocks.take_changed();
+            running.headroom = blocks.headroom();
+        }
+        let velocity = self.governor.velocity();
+        let (kept, accel) = (self.prep.kept(), self.governor.accel());
+        let wanted = self.thread.velocity(kept, velocity, accel);
+        let breaks_off = self.breaks_off || self.thread.is_lost();
+        if self.governor.is_at_rest() && (breaks_off || !some(wanted)) {
+            let (ticks, period) = PAUSE;
+            self.prep.pause(ticks, period, segment);
+            return Step::Segment;
+        }
+        let stretch = if breaks_off {
+            self.governor.halt_sharply(running.left, running.headroom, SEGMENT_S)
+        } else {
+            self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
+        };
+        self.thread.handed(stretch.distance);
+        out.velocity = self.governor.velocity();
+        let cycles = cycles_of(stretch.seconds);
+        if stretch.ends {
+            out.left = 0.0;
+            running.done = true;
+            let whole = running.fresh;
+            return self.end(cycles, whole, blocks, segment);
+        }
+        if running.fresh {
+            running.fresh = false;
+            running.scale = self.prep.own() as f32 / running.left;
+        }
+        running.left -= stretch.distance;
+        out.left = running.left;
+        let left = whole(running.left * running.scale);
+        self.prep.refine(false, false);
         step(self.prep.segment(left, cycles, segment))
     }
 

@@ -161,6 +161,11 @@ impl Governor {
         (self.rest.seconds, self.rest.distance)
     }
 
+    /// The acceleration limit of the block that runs, mm/s^2.
+    pub fn accel(&self) -> f32 {
+        self.limits.accel
+    }
+
     /// Whether the machine stands still, and nothing is left to be handed out.
     pub fn is_at_rest(&self) -> bool {
         !some(self.velocity) && !some(self.rest.seconds)
@@ -224,6 +229,12 @@ impl Governor {
     /// What is ahead has changed.
     pub fn look_again(&mut self) {
         self.changed = true;
+    }
+
+    /// The next stretch of [`SEGMENT_S`] without a jerk limit, as `trapezoid`; nothing is left of another.
+    pub(super) fn sharply(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
+        (self.nominal, self.spares) = (SEGMENT_S, false);
+        self.trapezoid(left, cruise, headroom)
     }
 
     /// The next stretch, of about `seconds`, in a block with `left` mm to go at up to `cruise` mm/s.

@@ -32,7 +32,8 @@ impl Governor {
     }
 
     /// Without a jerk limit; with `headroom` as in `trapezoid`.
-    fn halt_sharply(&mut self, left: f32, headroom: f32, nominal: f32) -> Stretch {
+    #[inline(never)]
+    pub(super) fn halt_sharply(&mut self, left: f32, headroom: f32, nominal: f32) -> Stretch {
         let (v, accel) = (self.velocity, self.limits.accel);
         let longest = 1.5 * nominal;
         let way = 0.5 * v * v / accel;

@@ -35,4 +35,5 @@ mod slice;
 pub mod snapshot;
 pub mod source;
 pub mod steps;
+pub mod thread;
 mod trapezoid;

@@ -338,6 +338,12 @@ impl Prep {
         if sum > 0 { sum as u32 } else { 1 }
     }
 
+    /// Time that has not been used, CPU cycles.
+    #[inline(always)]
+    pub fn kept(&self) -> i32 {
+        self.time
+    }
+
     /// Forgets time that has not been used: the machine stands still.
     pub fn rest(&mut self) {
         self.time = 0;

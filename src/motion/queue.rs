@@ -19,7 +19,7 @@ use crate::math::sqrt;
 
 /// Blocks the planner can queue, plus one slot that stays empty. At most 128: sequence numbers have
 /// seven bits.
-pub const BLOCKS: usize = 65;
+pub const BLOCKS: usize = 62;
 
 /// Blocks that can wait at once; what `qr` shows of an idle machine.
 pub const CAPACITY: usize = BLOCKS - 1;

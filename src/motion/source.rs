@@ -108,6 +108,12 @@ impl BlockSource {
         self.line(self.oldest, |line| line.velocity(&factors)).unwrap_or_default()
     }
 
+    /// What the oldest block, a line, may be run at whatever overrides say, mm/s.
+    #[small]
+    pub fn feed(&self) -> f32 {
+        self.line(self.oldest, |line| line.cruise).unwrap_or_default()
+    }
+
     /// Whether other overrides were wanted when this was asked last. Cost: 15.
     #[inline(always)]
     pub fn take_changed(&mut self) -> bool {

@@ -40,12 +40,14 @@ pub enum Value {
     SpindleOn,
     /// 1 if it turns counter-clockwise.
     SpindleDirection,
-    /// S, in turns per minute.
+    /// What an encoder measures or, without one, S, in thousandths of a turn per minute.
     SpindleSpeed,
     /// 1 after M7.
     Mist,
     /// 1 after M8.
     Flood,
+    /// Pulses of the encoder that did not fit since the reset, 255 for more.
+    PulseMisfits,
     /// Why the machine has started, see [`Cause`](crate::hal::resets::Cause).
     Reset,
     /// How many times steps have waited for the planner in mid-motion since the reset, 255 for more.

@@ -3,6 +3,7 @@
 //! Exec has it, by its [end](avr_embassy::InterruptEnd), while it does one step; everybody else has it [`with`] exec locked out. What is
 //! done with the parts is in `overrides`, `power` and `spindle`.
 
+use crate::encoder::Encoder;
 use crate::gcode::overrides::Overrides;
 use crate::hal::Thread;
 use crate::hal::exec;
@@ -20,6 +21,8 @@ pub struct State {
     pub motors: Motors,
     /// What settings and override say of the outputs.
     pub spindle: Spindle,
+    /// What is known of the spindle by its encoder.
+    pub encoder: Encoder,
 }
 
 avr_embassy::shared_static! {
@@ -45,6 +48,7 @@ avr_embassy::shared_static! {
         overrides: Overrides::NONE,
         motors: Motors::new(),
         spindle: Spindle::new(),
+        encoder: Encoder::new(),
     };
 }
 

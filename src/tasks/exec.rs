@@ -10,16 +10,18 @@ use avr_embassy::InterruptEnd;
 
 use crate::dda::contact;
 use crate::dda::{SEGMENTS, Segment};
+use crate::encoder::Encoder;
 use crate::hal::Interrupt;
 use crate::hal::arithmetic::product;
 use crate::hal::event::{self, Event};
 use crate::hal::ring::Producer;
-use crate::hal::{TIMER_HZ, exec, flags, stepper, uart};
+use crate::hal::{TIMER_HZ, encoder as sensors, exec, flags, stepper, uart};
 use crate::machine::{self, Alarm};
 use crate::motion::exec::{Exec, Step};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
 use crate::motion::snapshot::{Program, Snapshot};
+use crate::motion::thread::Thread;
 use crate::tasks::health::{self, Sign};
 use kerf_macros::small;
 
@@ -63,6 +65,9 @@ pub fn run(
         }
     }
 }
+
+/// From the start of the steppers to their first tick, CPU cycles.
+const FIRST_TICK: u32 = 400;
 
 /// What the task goes on with.
 enum Next {
@@ -126,7 +131,13 @@ impl<'a> Runner<'a> {
             flags::set(Event::BlockDone);
         }
         match step {
-            Step::Segment => self.queued(rested),
+            Step::Segment => {
+                let next = self.queued(rested);
+                if standstill && let Some(thread) = self.machine.thread() {
+                    common.with(|common| start_thread(thread, &common.encoder));
+                }
+                next
+            }
             Step::Held if machine::rested() => Next::Turn,
             Step::Idle | Step::Standstill | Step::Held => Next::Block,
             Step::Again | Step::Switched | Step::Override(_) => Next::Turn,
@@ -136,8 +147,11 @@ impl<'a> Runner<'a> {
     /// The next step of the machine, and what follows from it; a segment is put into the ring.
     #[inline(always)]
     fn step(&mut self, standstill: bool, common: &mut State) -> Step {
-        let State { motion: out, overrides, motors, spindle } = common;
+        let State { motion: out, overrides, motors, spindle, encoder } = common;
         let used = self.segments.used();
+        if self.machine.thread().is_some() {
+            look_at_spindle(self.machine, encoder);
+        }
         self.machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
         // What has paused in a hold goes on before motion does.
         if out.outputs != spindle::on() {
@@ -181,7 +195,11 @@ impl<'a> Runner<'a> {
         let step = self.machine.step(&mut self.blocks, standstill, out, &mut slot);
         if step == Step::Segment {
             power::segment(motors, slot.moving);
-            self.waiting.push(product(slot.ticks, slot.period));
+            let cycles = product(slot.ticks, slot.period);
+            self.waiting.push(cycles);
+            if let Some(thread) = self.machine.thread() {
+                thread.queued(cycles, standstill);
+            }
             if contact::is_noted() {
                 contact::pushed(&slot);
             }
@@ -234,6 +252,29 @@ impl<'a> Runner<'a> {
         self.asked = true;
         if waiting.has_room() { Next::Idle } else { Next::Room }
     }
+}
+
+/// A pass follows what the encoder tells. Out of line: it needs the stack for itself.
+#[inline(never)]
+#[small]
+fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
+    let pulses = sensors::read();
+    encoder.look(&pulses);
+    let Some(thread) = exec.thread() else { return };
+    thread.note(encoder.time(), &pulses, encoder.per_turn(), encoder.turn());
+    encoder.lost = thread.is_lost();
+    if encoder.lost {
+        // The planner waits for it.
+        flags::set(Event::BlockDone);
+    }
+    exec.break_off(machine::is_alarmed());
+}
+
+/// The steppers have just been started in a pass.
+#[inline(never)]
+#[small]
+fn start_thread(thread: &mut Thread, encoder: &Encoder) {
+    thread.anchor(encoder.time_at(sensors::read().now), FIRST_TICK);
 }
 
 /// How long the segments last that wait in the ring, in units of 2^11 CPU cycles.

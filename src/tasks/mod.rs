@@ -28,6 +28,7 @@ pub mod spindle;
 mod stop;
 pub mod storage;
 pub mod switches;
+pub mod turning;
 pub mod tx;
 pub mod view;
 pub mod wake;

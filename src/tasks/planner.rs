@@ -14,6 +14,8 @@ mod parts;
 mod probe;
 mod seek;
 mod square;
+#[cfg(feature = "lathe")]
+mod thread;
 
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
@@ -97,6 +99,8 @@ enum Turn {
     Pause,
     /// The line probes.
     Probe,
+    /// The line cuts a thread.
+    Thread,
     /// The line homes.
     Home,
     /// The axis is jogged.
@@ -148,6 +152,11 @@ pub fn run(links: &'static Links, queue: BlockQueue) -> impl Future<Output = Nev
                         // No line asks for it.
                         #[cfg(not(feature = "probing"))]
                         Turn::Probe => {}
+                        #[cfg(feature = "lathe")]
+                        Turn::Thread => planner.thread().await,
+                        // No line asks for it.
+                        #[cfg(not(feature = "lathe"))]
+                        Turn::Thread => {}
                         Turn::Home => planner.home().await,
                         Turn::Jog => planner.jog().await,
                     }
@@ -314,6 +323,7 @@ impl Planner {
                 }
             }
             Step::Probe => return Turn::Probe,
+            Step::Thread => return Turn::Thread,
             Step::Home => return Turn::Home,
             Step::Jog => return Turn::Jog,
             Step::Check => self.check(),

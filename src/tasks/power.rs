@@ -9,6 +9,7 @@ use embassy_time::Timer;
 use super::common;
 use super::health;
 use super::links::Links;
+use super::turning;
 use crate::config::Settings;
 use crate::hal::Thread;
 use crate::hal::gpio;
@@ -25,6 +26,7 @@ pub async fn run(links: &'static Links) -> ! {
         health::look();
         links.signs.age(millis());
         look(links);
+        turning::look(links);
         if links.chain_waits.take() {
             // Perhaps for long enough.
             links.planner_wake.signal();

@@ -9,6 +9,7 @@ use crate::config::groups::system;
 use crate::config::{Settings, StepRatio};
 use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
 use crate::gcode::setup::{AxisMode, Setup};
+use crate::hal::{encoder, inputs as pins};
 use crate::motion::dynamics::Machine;
 use crate::motion::line::Motors;
 use crate::motion::pace::Drivers;
@@ -74,7 +75,11 @@ impl Setup for Settings {
     }
 
     fn has_probe(&self) -> bool {
-        ACTIVE.inputs[inputs::PROBE].is_some()
+        ACTIVE.inputs[inputs::PROBE].is_some() && pins::left_out() >> inputs::PROBE & 1 == 0
+    }
+
+    fn has_encoder(&self) -> bool {
+        encoder::is_set_up()
     }
 
     fn homing(&self, axis: u8) -> Result<(), Status> {

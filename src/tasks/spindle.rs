@@ -8,6 +8,7 @@
 
 use super::common;
 use super::storage::Storage;
+use super::turning;
 use crate::config::Setting;
 use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
@@ -67,6 +68,7 @@ pub fn set_all(thread: Thread, storage: &Storage) {
             Changed::Outputs | Changed::Nothing => {}
         });
     }
+    turning::set_up(thread, storage);
     tell(thread);
 }
 

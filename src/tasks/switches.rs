@@ -41,11 +41,12 @@ pub const WIRED: u16 = {
 /// The ends of axes, of the inputs.
 const ENDS: u16 = (1 << inputs::ENDS) - 1;
 
-/// What `sn` or `sx` says of the switch at an end: 0 off, 1 homing, 2 limit, 3 both.
+/// What `sn` or `sx` says of the switch at an end: 0 off, 1 homing, 2 limit, 3 both. One whose pin is an encoder's is off.
 pub fn mode(settings: &Settings, end: u8) -> u8 {
     let axis = end / 2;
     match end % 2 {
         _ if Setup::mode(settings, axis) == AxisMode::Disabled => 0,
+        _ if pins::left_out() >> end & 1 != 0 => 0,
         0 => settings.switch_min(axis.into()),
         _ => settings.switch_max(axis.into()),
     }

@@ -20,6 +20,7 @@ use super::power;
 use super::setup::moved_by;
 use super::spindle;
 use super::switches;
+use super::turning;
 use crate::baud;
 use crate::boards::{MOTORS, inputs};
 use crate::capability::Capability;
@@ -235,7 +236,7 @@ impl<'a> View<'a> {
     /// 1 if a switch is worked, 0 if not, -1 if there is none or it is off.
     fn input(&self, input: u8) -> i32 {
         let off = usize::from(input) < inputs::ENDS && switches::mode(&self.settings, input) == 0;
-        if off || switches::WIRED >> input & 1 == 0 {
+        if off || (switches::WIRED & !pins::left_out()) >> input & 1 == 0 {
             return -1;
         }
         (pins::worked() >> input & 1).into()
@@ -282,7 +283,18 @@ impl Machine for View<'_> {
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
         self.may_set()?;
         if setting.is_cold() {
+            let is_encoder = turning::is_own(setting);
+            if is_encoder {
+                Capability::Lathe.check()?;
+            }
+            if setting.needs_rest() && self.is_busy() {
+                return Err(Status::NotAccepted);
+            }
             self.links.storage.set_cold(setting, value)?;
+            if is_encoder {
+                turning::set_up(self.links.thread, self.links.storage);
+                return Ok(Warning::None);
+            }
             spindle::set(self.links.thread, setting, value);
             return Ok(Warning::None);
         }
@@ -378,6 +390,11 @@ impl Machine for View<'_> {
                 hit => hit.trailing_zeros() as i32,
             },
             Value::Reset => watchdog::cause() as i32,
+            Value::SpindleSpeed => match turning::speed(self.links.thread) {
+                Some(speed) => speed as i32,
+                None => self.modal(value).min(2_000_000) * 1_000,
+            },
+            Value::PulseMisfits => turning::misfits(self.links.thread).into(),
             Value::Starvations => health::starvations().into(),
             Value::Kept => self.links.storage.is_done().into(),
             Value::Home => self.home_state(),

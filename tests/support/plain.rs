@@ -33,6 +33,10 @@ impl Plain {
             Canon::Traverse(to) => format!("{} G0{}", self.path(), self.go(to)),
             Canon::Feed(to) => format!("{}{} G1{}", self.path(), self.feed(), self.go(to)),
             Canon::Arc(to, arc, turns) => self.arc(to, arc, *turns),
+            Canon::Thread(to, lead) => {
+                let path = self.path();
+                format!("{path} G33{} K{lead}", self.go(to))
+            }
             Canon::Probe(to, mode) => {
                 let code = probing(*mode);
                 let words = self.go(to);

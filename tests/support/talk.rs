@@ -23,7 +23,7 @@ const ENDED: f64 = 4.0;
 const ALARM: f64 = 2.0;
 const SHUTDOWN: f64 = 11.0;
 /// Free blocks of an empty queue.
-const BLOCKS: f64 = 64.0;
+const BLOCKS: f64 = 61.0;
 /// Three numbers with three places.
 const ROUNDED: f64 = 0.0016;
 

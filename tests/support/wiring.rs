@@ -147,7 +147,8 @@ fn wires(board: &Board) -> Vec<Wire> {
 fn about(board: &Board) -> &'static str {
     match board.name {
         "mega2560-grbl" => {
-            "An Arduino Mega 2560 with a shield, or single wires, for the pins of grbl for the Mega. The default board."
+            "An Arduino Mega 2560 with a shield, or single wires, for the pins of grbl for the Mega. The default board. `mega2560-lathe` has the same \
+             pins, and a [spindle's sensors](lathe.md)."
         }
         "ramps14" => {
             "An Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder (E0) as A."
@@ -161,10 +162,17 @@ fn header(board: &Board, pin: &str) -> &'static str {
     rows.iter().find(|(name, _)| *name == pin).map_or("", |(_, header)| header)
 }
 
+/// The boards with pins of their own.
+pub fn drawn() -> impl Iterator<Item = &'static Board> {
+    let pins = |board: &Board| wires(board).iter().map(|wire| arduino(wire.pin)).collect::<Vec<_>>();
+    let is_first = move |n: usize| !ALL[..n].iter().any(|other| pins(other) == pins(ALL[n]));
+    ALL.into_iter().enumerate().filter(move |(n, _)| is_first(*n)).map(|(_, board)| board)
+}
+
 /// All of it.
 pub fn markdown() -> String {
     let mut text = PREFACE.to_string();
-    for board in ALL {
+    for board in drawn() {
         let name = board.name;
         text +=
             &format!("## {name}\n\n{}\n\n![Pins of {name}](wiring-{name}.svg)\n\n", about(board));

@@ -15,6 +15,9 @@ pub enum Board {
     #[default]
     #[value(name = "mega2560-grbl")]
     Mega2560Grbl,
+    /// Arduino Mega 2560 with a grbl-style shield, on a lathe
+    #[value(name = "mega2560-lathe")]
+    Mega2560Lathe,
     /// Arduino Mega 2560 with RAMPS 1.4
     #[value(name = "ramps14")]
     Ramps14,
@@ -38,6 +41,7 @@ impl Board {
     pub fn name(self) -> &'static str {
         match self {
             Board::Mega2560Grbl => "mega2560-grbl",
+            Board::Mega2560Lathe => "mega2560-lathe",
             Board::Ramps14 => "ramps14",
         }
     }

@@ -5,7 +5,7 @@ use crate::gcode::modal::{
     ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, Turn, Units,
 };
 use crate::gcode::overrides::Override;
-use crate::gcode::words::{self, AXES, H, L, OFFSETS, P, Q, R, bit};
+use crate::gcode::words::{self, AXES, H, K, L, OFFSETS, P, Q, R, bit};
 
 /// A code without words of its own.
 const fn code(number: u16, action: Action) -> Code {
@@ -31,6 +31,11 @@ const fn probe(number: u16, mode: MotionMode) -> Code {
     needing(number, Action::Motion(mode), AXES, 0)
 }
 
+/// K is not in force for the next line: the code in force needs it as well.
+const fn thread(number: u16) -> Code {
+    with(number, Action::Motion(MotionMode::Thread), AXES | bit(K))
+}
+
 const ARC: u32 = AXES | OFFSETS | bit(R) | bit(P);
 
 /// From this whole number on codes are few, and are looked for one after the other: they take no room but their rows.
@@ -39,7 +44,7 @@ pub const DENSE: u16 = 100;
 pub const STARTS: usize = DENSE as usize + 1;
 
 /// Rows of G codes.
-pub const G_ROWS: usize = 66;
+pub const G_ROWS: usize = 68;
 /// Rows of M codes.
 pub const M_ROWS: usize = 21;
 
@@ -75,6 +80,8 @@ const G_TABLE: [Code; G_ROWS] = [
     needing(284, Action::NonModal(NonModal::Home { set: false }), AXES, 0),
     with(300, Action::NonModal(NonModal::GoStored(1)), AXES),
     code(301, Action::NonModal(NonModal::Store(1))),
+    thread(320),
+    thread(330),
     probe(382, MotionMode::ProbeTowards),
     probe(383, MotionMode::ProbeTowardsQuietly),
     probe(384, MotionMode::ProbeAway),

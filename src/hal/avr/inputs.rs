@@ -2,7 +2,7 @@
 //!
 //! | interrupt | does | cycles |
 //! |---|---|---|
-//! | INT0 to INT7, PCINT0 to PCINT2 | starts timer 2: someone has to look | 20, interrupts off |
+//! | INT0 to INT7, PCINT0 to PCINT2 (`edges`) | starts timer 2: someone has to look | 20, interrupts off |
 //! | TIMER2_COMPA | looks at all pins, as [`Switches`] wants it | 300, interrupts off for 26 and 26 |
 //!
 //! While no switch moves none of them comes. The look lets all interrupts in but itself and exec, which would run
@@ -39,7 +39,7 @@ const OCR2A: *mut u8 = 0xB3 as *mut u8;
 const TIMSK2: *mut u8 = 0x70 as *mut u8;
 /// Clear on compare match; a count each 8 cycles.
 const CTC: u8 = 1 << 1;
-const RUN: u8 = 1 << 1;
+pub(super) const RUN: u8 = 1 << 1;
 const OCIE2A: u8 = 1 << 1;
 
 /// The last count of a period of `us` microseconds.
@@ -48,11 +48,17 @@ const fn top(us: u32) -> u8 {
 }
 
 /// The interrupts to enable: EIMSK, and the PCMSKs.
-const MASKS: (u8, [u8; 3]) = {
+pub(super) const MASKS: (u8, [u8; 3]) = {
     let (mut external, mut change) = (0, [0; 3]);
     let mut i = 0;
-    while i < inputs::COUNT {
-        if let Some(pin) = ACTIVE.inputs[i] {
+    while i < inputs::COUNT + 2 {
+        let pin = match ACTIVE.encoder {
+            _ if i < inputs::COUNT => ACTIVE.inputs[i],
+            Some(encoder) if i == inputs::COUNT => Some(encoder.index),
+            Some(encoder) => Some(encoder.sync),
+            None => None,
+        };
+        if let Some(pin) = pin {
             match pin.interrupt() {
                 Some(Interrupt::External(n)) => external |= 1 << n,
                 Some(Interrupt::PinChange(n)) => change[n as usize / 8] |= 1 << (n % 8),
@@ -81,6 +87,8 @@ macro_rules! each_input {
 /// What the looks know and are told.
 struct State {
     switches: Switches,
+    /// Those that are looked at: the pins of the others are an encoder's.
+    used: u16,
     /// Low is worked.
     low: u16,
     /// What stops the steps.
@@ -97,6 +105,14 @@ struct State {
     fresh: bool,
 }
 
+impl State {
+    /// The inputs that look worked.
+    #[inline(always)]
+    fn found(&self) -> u16 {
+        (levels() ^ self.low) & self.used
+    }
+}
+
 struct Shared(UnsafeCell<State>);
 
 // SAFETY: the look, which does not nest, and thread mode with interrupts off, see `with`.
@@ -104,6 +120,7 @@ unsafe impl Sync for Shared {}
 
 static STATE: Shared = Shared(UnsafeCell::new(State {
     switches: Switches::new(),
+    used: u16::MAX,
     low: 0,
     stops: 0,
     live: 0,
@@ -123,6 +140,7 @@ fn with<R>(what: impl FnOnce(&mut State) -> R) -> R {
 /// Sets pins and interrupts up. Before interrupts are on.
 pub fn start() {
     each_input!(I, pin => super::gpio::high(pin));
+    super::encoder::start();
     let (external, change) = MASKS;
     // SAFETY: start-up; these registers are nobody else's.
     unsafe {
@@ -155,6 +173,20 @@ pub fn set_up(low: u16, stops: u16) {
             unsafe { TCCR2B.write_volatile(RUN) };
         }
     });
+}
+
+/// The pins of these inputs are an encoder's from now on. Thread mode.
+pub(super) fn leave_out(inputs: u16) {
+    with(|state| {
+        (state.used, state.fresh) = (!inputs, true);
+        // SAFETY: starts a look; one that is due does it all the same.
+        unsafe { TCCR2B.write_volatile(RUN) };
+    });
+}
+
+/// Those inputs. Thread mode.
+pub fn left_out() -> u16 {
+    with(|state| !state.used)
 }
 
 /// These ends are no limits for now. Thread mode.
@@ -217,7 +249,7 @@ fn mark() {
 extern "C" fn look() {
     // SAFETY: the look interrupt, which does not nest, runs this alone.
     let state = unsafe { &mut *STATE.0.get() };
-    let mut now = levels() ^ state.low;
+    let mut now = state.found();
     if core::mem::replace(&mut state.fresh, false) {
         state.switches.adopt(now);
         flags::set(Event::Realtime);
@@ -229,7 +261,7 @@ extern "C" fn look() {
             mark();
         }
         wait();
-        now = levels() ^ state.low;
+        now = state.found();
         // Before anything else: each cycle counts, and only two in five are ours.
         if state.switches.changed(now) & now & state.live != 0 {
             stepper::stop();
@@ -250,7 +282,7 @@ extern "C" fn look() {
     }
     plan(next);
     // An edge before the timer stood still has started nothing.
-    if next == Next::Edge && levels() ^ state.low != now {
+    if next == Next::Edge && state.found() != now {
         // SAFETY: starts a look.
         unsafe { TCCR2B.write_volatile(RUN) };
     }
@@ -271,32 +303,6 @@ fn plan(next: Next) {
         });
         TCNT2.write_volatile(0);
     }
-}
-
-/// The handlers of edges. They change no flags.
-macro_rules! edges {
-    ($($name:ident)+) => {$(
-        #[unsafe(no_mangle)]
-        extern "C" fn $name() -> ! {
-            // SAFETY: it restores the one register it changes, and returns by `reti`.
-            unsafe {
-                asm!(
-                    "push r24",
-                    "ldi  r24, {run}",
-                    "sts  0xB1, r24",
-                    "pop  r24",
-                    "reti",
-                    run = const RUN,
-                    options(noreturn),
-                );
-            }
-        }
-    )+};
-}
-
-edges! {
-    __vector_1 __vector_2 __vector_3 __vector_4 __vector_5 __vector_6 __vector_7 __vector_8
-    __vector_9 __vector_10 __vector_11
 }
 
 /// TIMER2_COMPA: runs a look, with interrupts on and exec held off.

@@ -5,7 +5,8 @@
 //! | TIMER1_COMPA | `step_isr` | 0 | one tick of the step generator |
 //! | USART0_RX, USART0_UDRE | `uart` | 1 | bytes between the line and the rings |
 //! | TIMER0_COMPA | [`avr_embassy::time`] | 1 | counts milliseconds |
-//! | INT, PCINT, TIMER2_COMPA | `inputs` | 1 | looks at the switches when one moves |
+//! | INT, PCINT, TIMER2_COMPA | `edges`, `inputs` | 1 | looks at the switches when one moves |
+//! | INT, PCINT of the encoder's pins | `edges`, `encoder` | 1 | takes the time of a pulse |
 //! | WDT | `watchdog` | 0 | resets a machine that has got stuck |
 //! | USART2_UDRE | [`avr_embassy::interrupt`] | 2 | software interrupt: polls the exec executor, interrupts on |
 //!
@@ -13,7 +14,9 @@
 //! Everything else runs in thread mode, from [`avr_embassy::Executor::run_with`].
 
 pub mod arithmetic;
+mod edges;
 pub mod eeprom;
+pub mod encoder;
 pub mod flash;
 pub mod float;
 pub mod gpio;

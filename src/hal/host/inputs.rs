@@ -2,7 +2,7 @@
 
 use core::cell::{Cell, RefCell};
 
-use super::{NEVER, flags, now, stepper};
+use super::{NEVER, encoder, flags, now, stepper};
 use crate::boards::{ACTIVE, inputs};
 use crate::dda::contact;
 use crate::hal::event::Event;
@@ -12,6 +12,7 @@ struct Inputs {
     /// High ones.
     levels: Cell<u16>,
     switches: RefCell<Switches>,
+    used: Cell<u16>,
     low: Cell<u16>,
     stops: Cell<u16>,
     spared: Cell<u8>,
@@ -25,6 +26,7 @@ machine_static! {
     fn all() -> Inputs = Inputs {
         levels: Cell::new(u16::MAX),
         switches: RefCell::new(Switches::new()),
+        used: Cell::new(u16::MAX),
         low: Cell::new(0),
         stops: Cell::new(0),
         spared: Cell::new(0),
@@ -46,6 +48,18 @@ pub fn set_up(low: u16, stops: u16) {
         all().fresh.set(true);
         edge();
     }
+}
+
+/// The pins of these inputs are an encoder's from now on.
+pub(super) fn leave_out(inputs: u16) {
+    all().used.set(!inputs);
+    all().fresh.set(true);
+    edge();
+}
+
+/// Those inputs.
+pub fn left_out() -> u16 {
+    !all().used.get()
 }
 
 /// These ends are no limits for now.
@@ -74,6 +88,9 @@ pub(super) fn set(input: usize, high: bool) {
     let pin = ACTIVE.inputs.get(input).copied().flatten();
     let same = |i: &usize| pin.is_some() && ACTIVE.inputs[*i] == pin;
     let bits = (0..inputs::COUNT).filter(same).fold(0, |bits, i| bits | 1 << i);
+    if let Some(pin) = pin {
+        encoder::drive(pin, high);
+    }
     let before = all().levels.get();
     let after = if high { before | bits } else { before & !bits };
     if after != before {
@@ -100,7 +117,7 @@ pub(super) fn look() {
     let wired = wired.fold(0, |bits, i| bits | 1 << i);
     let i = all();
     let mut switches = i.switches.borrow_mut();
-    let found = (i.levels.get() & wired) ^ i.low.get();
+    let found = ((i.levels.get() & wired) ^ i.low.get()) & i.used.get();
     if i.fresh.take() {
         switches.adopt(found);
         flags::set(Event::Realtime);

@@ -7,6 +7,7 @@
 
 pub mod arithmetic;
 pub mod eeprom;
+pub mod encoder;
 pub mod flash;
 pub mod float;
 pub mod gpio;

@@ -68,6 +68,11 @@ rows! {
     StepsLate = 3;
     ProgramStopped = 8;
     ProgramChecked = 8;
+    PulseMisfit = 19;
+    NoEncoder = 39;
+    NoIndex = 18;
+    NoSync = 19;
+    SpindleLost = 9;
     UnrecognizedName = 3;
     MalformedCommand = 1;
     BadNumber = 2;
@@ -112,7 +117,9 @@ rows! {
     PWordMissing = 28;
     PWordInvalid = 29;
     PWordNegative = 4;
+    KWordMissing = 28;
     ToolInvalid = 38;
+    KWordInvalid = 33;
     HWordMissing = 28;
     HWordInvalid = 38;
     NoToolLength = 0;

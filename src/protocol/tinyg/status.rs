@@ -54,6 +54,11 @@ rows! {
     StepsLate = 37, "Steps came late";
     ProgramStopped = 38, "Program stopped [~ to resume]";
     ProgramChecked = 39, "Program checked [{chk:0} to end]";
+    PulseMisfit = 40, "Spindle pulses do not fit";
+    NoEncoder = 41, "No spindle encoder is set up";
+    NoIndex = 42, "No index pulse of the spindle";
+    NoSync = 43, "No sync pulse of the spindle";
+    SpindleLost = 44, "Spindle lost in a thread";
     UnrecognizedName = 100, "Unrecognized command or config name";
     MalformedCommand = 101, "Invalid or malformed command";
     BadNumber = 102, "Bad number format";
@@ -98,7 +103,9 @@ rows! {
     PWordMissing = 160, "P word is missing";
     PWordInvalid = 161, "P word is invalid";
     PWordNegative = 163, "P word is negative";
+    KWordMissing = 164, "K word is missing";
     ToolInvalid = 165, "P word is not a valid tool number";
+    KWordInvalid = 166, "K word is invalid";
     HWordMissing = 170, "H word is missing";
     HWordInvalid = 171, "H word is invalid";
     NoToolLength = 180, "Tool has no length - 0 in force";

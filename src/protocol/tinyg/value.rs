@@ -86,6 +86,8 @@ pub enum Form {
     Rough,
     /// Steps, with two decimals.
     Steps,
+    /// Turns a minute, with two decimals unless it is a whole number.
+    Turns,
 }
 
 #[small]
@@ -99,6 +101,8 @@ impl Form {
                 let value = value.clamp(-STEPS_MAX, STEPS_MAX).wrapping_mul(100);
                 return Fixed { value, decimals: 2 };
             }
+            Form::Turns if value % 1_000 == 0 => (3, 0),
+            Form::Turns => (3, 2),
             Form::Rough => (4, 2),
             Form::Speed => (3, 2),
             Form::Length | Form::Millimetres => (4, 3),
@@ -159,7 +163,7 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 44;
+pub const SINGLE_COUNT: usize = 45;
 /// Entries of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
 /// The number of the vector `g92`.
@@ -183,7 +187,7 @@ const COORDINATES: Text = text!(
 const MOTION: Text = text!(
     "G0  - linear traverse|G1  - linear feed|G2  - clockwise arc feed|\
      G3  - counter clockwise arc feed|G80 - cancel motion mode (none active)|\
-     G38.2 - probe|G81|G82|G83|G84|G85|G86|G87|G88|G89|G73|G38.3|G38.4|G38.5"
+     G38.2 - probe|G81|G82|G83|G84|G85|G86|G87|G88|G89|G73|G38.3|G38.4|G38.5|G33"
 );
 const FEED: Text = text!(
     "G93 - inverse time mode|G94 - units-per-minute mode (i.e. feedrate mode)|\
@@ -207,6 +211,11 @@ const fn count(name: &str, source: Source, label: Text, choices: Text) -> Single
 #[small]
 const fn speed(name: &str, source: Source, label: Text) -> Single {
     Single { token: token(name), source, form: Form::Speed, label, choices: NONE }
+}
+
+#[small]
+const fn turns(name: &str, source: Source, label: Text) -> Single {
+    Single { token: token(name), source, form: Form::Turns, label, choices: NONE }
 }
 
 #[small]
@@ -254,7 +263,8 @@ progmem! {
         count("admo", of(Value::ArcDistance), text!("Arc Distance mode:"), ARC_DISTANCE),
         count("spe", of(Value::SpindleOn), text!("Spindle:"), ON),
         count("spd", of(Value::SpindleDirection), text!("Spindle direction:"), text!("CW|CCW")),
-        count("sps", of(Value::SpindleSpeed), text!("Spindle speed:"), NONE),
+        turns("sps", of(Value::SpindleSpeed), text!("Spindle speed:")),
+        count("spx", of(Value::PulseMisfits), text!("Encoder misfits:"), NONE),
         count("com", of(Value::Mist), text!("Mist coolant:"), ON),
         count("cof", of(Value::Flood), text!("Flood coolant:"), ON),
         factor("mfo", Override::Feed, text!("Feed override:")),

@@ -90,6 +90,7 @@ fn steps(before: &Interpreter, after: &Interpreter, out: &Commands) {
             (None, _) => return assert_eq!(at, *after.position(), "where the steps lead"),
             (Some(Step::Line(target, _) | Step::SetPosition(target)), _) => at = target,
             (Some(Step::Arc), Motion::Arc { target, .. })
+            | (Some(Step::Thread), Motion::Thread { target, .. })
             | (Some(Step::Probe), Motion::Probe { target, .. }) => at = *target,
             _ => {}
         }

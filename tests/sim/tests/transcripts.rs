@@ -13,12 +13,17 @@ mod transcript;
 use std::path::Path;
 
 use common::firmware;
-use kerf::boards::MEGA2560_GRBL;
+use kerf::boards::{MEGA2560_GRBL, MEGA2560_LATHE};
+
+/// What only the image of a lathe can do.
+const TURNING: [&str; 2] = ["encoder.txt", "thread.txt"];
 
 #[test]
 fn the_image_keeps_to_the_transcripts() {
-    let folder = Path::new("../transcripts");
-    transcript::play_all(transcript::read_all(folder), 2, || firmware(&MEGA2560_GRBL));
+    let all = transcript::read_all(Path::new("../transcripts"));
+    let (turning, others) = all.into_iter().partition(|one| TURNING.contains(&one.name.as_str()));
+    transcript::play_all(others, 2, || firmware(&MEGA2560_GRBL));
+    transcript::play_all(turning, 2, || firmware(&MEGA2560_LATHE));
 }
 
 #[test]

@@ -293,7 +293,7 @@ impl<S: Side> Dialogue<S> {
             let number = |name| answer.told(name).and_then(Value::number).unwrap_or(-1.0) as i32;
             match number("stat") {
                 2 => drop(self.ask("clear:n")?),
-                1 | 3 | 4 if number("qr") == 64 && number("hold") == 0 => rested += 1,
+                1 | 3 | 4 if number("qr") == 61 && number("hold") == 0 => rested += 1,
                 _ => rested = 0,
             }
         }

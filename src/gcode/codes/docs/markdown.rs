@@ -30,7 +30,7 @@ Where others may do otherwise:
 - G43 without H takes the tool in the spindle; H0 is no tool.
 - M6 stops the spindle. The machine then waits for `~`; with `{psw:0}` it does not wait.
 - G88 goes back up by itself after its stop.
-- G95 goes by the speed that is programmed; none is measured.
+- G95 goes by the speed that is programmed, not by the one that an encoder measures.
 - Overrides act when the moves before them have been made, and stop nothing; requests (`mfo`) act at once.
 - M2 and M30 reset more than the standard says; see M2.
 

@@ -72,7 +72,7 @@ pub struct Refusal {
 pub enum On {
     /// One that has everything, all axes standard.
     Usual,
-    /// The same without switches and probe.
+    /// The same without switches, probe and encoder.
     NoSwitches,
     /// The same with X disabled.
     DisabledX,
@@ -98,6 +98,10 @@ impl Setup for On {
     }
 
     fn has_probe(&self) -> bool {
+        *self != On::NoSwitches
+    }
+
+    fn has_encoder(&self) -> bool {
         *self != On::NoSwitches
     }
 

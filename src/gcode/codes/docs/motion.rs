@@ -4,8 +4,8 @@ use super::{On, Section, g, no, no_on};
 use crate::status::Status::{
     ArcAxisMissing, ArcEndpointIsStart, ArcOffsetsMissing, ArcRadiusTolerance, ArcSpecification,
     AxisDisabled, AxisNotAllowed, AxisWordMissing, FeedrateMissing, InverseTimeNotAllowed,
-    OutOfRange, PWordInvalid, PWordMissing, PWordNegative, ProbeFailed, ProbeTooShort,
-    RotaryNotAllowed, SWordMissing, SpindleMustTurn,
+    KWordInvalid, KWordMissing, NoEncoder, OutOfRange, PWordInvalid, PWordMissing, PWordNegative,
+    ProbeFailed, ProbeTooShort, RotaryNotAllowed, SWordMissing, SpindleMustTurn,
 };
 
 /// Refusals of an arc.
@@ -45,6 +45,20 @@ macro_rules! probe {
             no(SpindleMustTurn, &["G95 F0.1", concat!($code, " Z-5")]),
             no(SWordMissing, &["M3 G95 F0.1", concat!($code, " Z-5")]),
             no(ProbeTooShort, &[concat!($code, " Z-0.25 F100")]),
+        ]
+    };
+}
+
+/// Refusals of a thread.
+macro_rules! thread {
+    ($code:literal) => {
+        &[
+            no_on(On::NoSwitches, NoEncoder, &[concat!($code, " Z-5 K1")]),
+            no(AxisWordMissing, &[concat!($code, " K1")]),
+            no(RotaryNotAllowed, &[concat!($code, " A5 K1")]),
+            no(KWordMissing, &[concat!($code, " Z-5")]),
+            no(KWordInvalid, &[concat!($code, " Z-5 K0")]),
+            no(KWordInvalid, &[concat!($code, " Z-5 K-1")]),
         ]
     };
 }
@@ -92,6 +106,16 @@ the same line.",
             "Ends canned cycles. Until another code of the group comes, axis words move nothing and are \
 refused. Beside another code of the group it only ends them, as in `G0 G80 G90`. In force at power-up.",
             &[no(AxisNotAllowed, &["G80 X1"])],
+        ),
+        g(320, "Thread", "The same as G33.", thread!("G32")),
+        g(
+            330,
+            "Thread",
+            "Straight to the axis words in step with the spindle, by its encoder (`spn`); see lathe.md. K, on each line, is the way in a turn of the axis \
+that moves farthest: the lead. F does not count. The machine comes to rest, waits for the index, and goes so that each pass lies in the one \
+before, whatever the speed. Feed override and `!` wait for the end of the pass. If there are no pulses for 6 seconds (42, 43), or an axis would \
+be too fast (146), an alarm says so, and nothing moves. A spindle that is lost in the cut is an alarm (44): the axes come to rest.",
+            thread!("G33"),
         ),
     ],
 };

@@ -29,7 +29,7 @@ fn every_token_has_a_name_that_finds_it() {
     assert_eq!(
         count,
         system::COUNT
-            + 29
+            + 32
             + 3 * 15
             + 16
             + 2 * 9

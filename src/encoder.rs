@@ -1,0 +1,346 @@
+//! The encoder of the spindle: from pulses to turns a minute, and whether they fit one another.
+//!
+//! Two sensors: the *index* gives a pulse a turn, *sync* so many (`spn`). With `spn` 1 the index alone is read. The hardware counts pulses
+//! and takes their time ([`Pulses`], `hal::encoder`); [`Encoder::look`] makes of that what is known of the spindle. It is asked each 20 ms by
+//! the power task (`tasks::power`), under the ceiling lock. Nothing waits, and nothing can be full: between two looks any number of pulses may
+//! have come, of which the newest counts.
+//!
+//! **Fit.** At each index so many pulses of sync must have come as a turn has: one that is missing, or one more, is a *misfit*, and so
+//! is one of an index. With the index alone a pulse in less than 0.6 of the turn before is one; one that is
+//! missing looks like a slower spindle. Misfits are counted (`spx`), and the first is told (exception 40).
+//!
+//! **Stop.** No pulse for half a second, or for twice as long as between the last two if that is more, is a spindle that
+//! stands still: its speed is 0, and nothing is known of it any more.
+//!
+//! Units: counts of 4 us ([`COUNTS_PER_S`]), in 32 bits that wrap after 4.7 hours; differences are right across the wrap. Cost of a look:
+//! 300 cycles without a pulse, 1,000 with one. The speed is that of the last turn: as exact as the time of two pulses, each of which may be taken late by
+//! what a step interrupt lasts, 17 us.
+
+use kerf_macros::small;
+
+/// Counts of time in a second.
+pub const COUNTS_PER_S: u32 = 250_000;
+
+/// Half a second.
+const STILL: u32 = COUNTS_PER_S / 2;
+
+/// A turn that takes longer is none: three seconds.
+const SLOWEST: u32 = 3 * COUNTS_PER_S;
+
+/// What the sensors have seen. Times and counts modulo 2^16.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pulses {
+    /// The time now.
+    pub now: u16,
+    /// Pulses of the index, and the time of the last one.
+    pub index: u16,
+    /// See `index`.
+    pub index_at: u16,
+    /// Pulses of sync when that came.
+    pub at_index: u16,
+    /// Pulses of sync, and the time of the last one.
+    pub sync: u16,
+    /// See `sync`.
+    pub sync_at: u16,
+}
+
+impl Pulses {
+    /// None so far.
+    pub const NONE: Self = Self { now: 0, index: 0, index_at: 0, at_index: 0, sync: 0, sync_at: 0 };
+}
+
+/// What is known of the spindle.
+#[derive(Clone, Copy, Debug)]
+pub struct Encoder {
+    /// Pulses of sync in a turn; 0 for no encoder.
+    per_turn: u16,
+    /// The time of the last look.
+    time: u32,
+    /// The pulses by then.
+    index: u16,
+    sync: u16,
+    /// Those of sync at the last index.
+    at_index: u16,
+    /// When the last index came.
+    index_at: u32,
+    /// When the last pulse of sync came.
+    sync_at: u32,
+    /// How long the last turn took; 0 if it is not known.
+    turn: u32,
+    /// Index pulses in a row, up to [`SURE`].
+    seen: u8,
+    /// Misfits, up to 255.
+    misfits: u8,
+    /// Exec has lost the spindle in a pass ([`thread`](crate::motion::thread)).
+    pub lost: bool,
+}
+
+/// After so many index pulses in a row the time of a turn tells of its neighbours.
+const SURE: u8 = 4;
+
+#[small]
+impl Encoder {
+    /// None is set up.
+    pub const fn new() -> Self {
+        Self {
+            per_turn: 0,
+            time: 0,
+            index: 0,
+            sync: 0,
+            at_index: 0,
+            index_at: 0,
+            sync_at: 0,
+            turn: 0,
+            seen: 0,
+            misfits: 0,
+            lost: false,
+        }
+    }
+
+    /// Pulses of sync in a turn; 0 for no encoder.
+    pub fn per_turn(&self) -> u16 {
+        self.per_turn
+    }
+
+    /// An encoder with so many pulses of sync in a turn is set up; 0 for none. What was known is forgotten.
+    pub fn set_up(&mut self, per_turn: u16, pulses: &Pulses) {
+        *self = Self { per_turn, index: pulses.index, sync: pulses.sync, ..Self::new() };
+        self.time = pulses.now.into();
+    }
+
+    /// The time of the last look.
+    pub fn time(&self) -> u32 {
+        self.time
+    }
+
+    /// The time when the clock of the pulses said `now`, since the last look.
+    pub fn time_at(&self, now: u16) -> u32 {
+        self.time.wrapping_add(now.wrapping_sub(self.time as u16).into())
+    }
+
+    /// How long the last turn took; 0 if it is not known.
+    pub fn turn(&self) -> u32 {
+        self.turn
+    }
+
+    /// Index pulses in a row, up to a few; and whether sync has given any, which the index alone does not need.
+    pub fn seen(&self) -> (u8, bool) {
+        let synced =
+            self.per_turn == 1 || self.time.wrapping_sub(self.sync_at) < STILL.max(self.turn);
+        (self.seen, self.seen > 0 && synced)
+    }
+
+    /// Misfits so far, 255 for more.
+    pub fn misfits(&self) -> u8 {
+        self.misfits
+    }
+
+    /// Takes up what the sensors have seen since the last look. Whether pulses did not fit.
+    #[inline(never)]
+    pub fn look(&mut self, pulses: &Pulses) -> bool {
+        self.time = self.time_at(pulses.now);
+        if pulses.sync != self.sync {
+            self.sync = pulses.sync;
+            self.sync_at = self.time_of(pulses, pulses.sync_at);
+        }
+        let misfit = pulses.index != self.index && self.take_index(pulses);
+        if misfit {
+            self.misfits = self.misfits.saturating_add(1);
+        }
+        if self.is_still() {
+            (self.seen, self.turn) = (0, 0);
+        }
+        misfit
+    }
+
+    /// A time before the last look.
+    fn time_of(&self, pulses: &Pulses, at: u16) -> u32 {
+        self.time.wrapping_sub(pulses.now.wrapping_sub(at).into())
+    }
+
+    /// An index has come, or several. Whether it does not fit.
+    #[inline(never)]
+    fn take_index(&mut self, pulses: &Pulses) -> bool {
+        let turns = pulses.index.wrapping_sub(self.index);
+        let at = self.time_of(pulses, pulses.index_at);
+        let took = at.wrapping_sub(self.index_at) / u32::from(turns);
+        let synced = pulses.at_index.wrapping_sub(self.at_index);
+        self.index = pulses.index;
+        self.at_index = pulses.at_index;
+        self.index_at = at;
+        let (before, turn) = (self.seen, self.turn);
+        self.seen =
+            u8::try_from(turns).map_or(SURE, |turns| before.saturating_add(turns)).min(SURE);
+        if before == 0 {
+            return false;
+        }
+        self.turn = took;
+        match self.per_turn {
+            1 => before == SURE && took < turn / 8 * 5 - turn / 40,
+            n => synced != n.wrapping_mul(turns),
+        }
+    }
+
+    /// Whether the spindle stands still.
+    pub fn is_still(&self) -> bool {
+        if self.per_turn == 0 || self.seen == 0 {
+            return true;
+        }
+        // The second index tells how long a turn is.
+        let turn = if self.turn == 0 { SLOWEST } else { self.turn };
+        let between = turn / u32::from(self.per_turn);
+        let indexed = self.time.wrapping_sub(self.index_at);
+        let synced = self.time.wrapping_sub(self.sync_at);
+        let age = if self.per_turn == 1 { indexed } else { indexed.min(synced) };
+        age > STILL.max(2 * between)
+    }
+
+    /// How fast it turns, thousandths of a turn a minute; 0 if it stands still. Cost: 900.
+    pub fn speed(&self) -> u32 {
+        if self.turn == 0 {
+            return 0;
+        }
+        (COUNTS_PER_S as f32 * 60_000.0 / self.turn as f32 + 0.5) as u32
+    }
+}
+
+impl Default for Encoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A spindle that is looked at each 20 ms. Times in counts.
+    struct Spindle {
+        encoder: Encoder,
+        pulses: Pulses,
+        now: u64,
+        looked: u64,
+        misfits: u32,
+    }
+
+    const LOOK: u64 = 5_000;
+
+    impl Spindle {
+        fn new(per_turn: u16, now: u64) -> Self {
+            let (mut encoder, pulses) =
+                (Encoder::new(), Pulses { now: now as u16, ..Pulses::NONE });
+            encoder.set_up(per_turn, &pulses);
+            Self { encoder, pulses, now, looked: now, misfits: 0 }
+        }
+
+        fn pass(&mut self, counts: u64) {
+            let end = self.now + counts;
+            while self.looked + LOOK <= end {
+                self.looked += LOOK;
+                self.pulses.now = self.looked as u16;
+                self.misfits += u32::from(self.encoder.look(&self.pulses));
+            }
+            self.now = end;
+        }
+
+        fn index(&mut self) {
+            self.pulses.index = self.pulses.index.wrapping_add(1);
+            (self.pulses.index_at, self.pulses.at_index) = (self.now as u16, self.pulses.sync);
+        }
+
+        fn sync(&mut self) {
+            self.pulses.sync = self.pulses.sync.wrapping_add(1);
+            self.pulses.sync_at = self.now as u16;
+        }
+
+        /// A turn with so many pulses of sync.
+        fn turn(&mut self, pulses: u16, counts: u64) {
+            self.index();
+            for _ in 0..pulses {
+                self.pass(counts / u64::from(pulses) / 2);
+                self.sync();
+                self.pass(counts / u64::from(pulses) / 2);
+            }
+            if pulses == 0 {
+                self.pass(counts);
+            }
+        }
+    }
+
+    #[test]
+    fn the_speed_is_that_of_the_last_turn_across_wraps() {
+        for begin in [0, 65_000, u64::from(u32::MAX) - 700_000] {
+            for counts in [5_000u64, 15_000, 250_000, 700_000] {
+                for per_turn in [1u16, 4, 100] {
+                    let mut spindle = Spindle::new(per_turn, begin);
+                    let pulses = if per_turn == 1 { 0 } else { per_turn };
+                    let counts = counts / 200 * 200;
+                    (0..6).for_each(|_| spindle.turn(pulses, counts));
+                    let speed = 15e9 / counts as f64;
+                    let told = f64::from(spindle.encoder.speed());
+                    assert!(
+                        (told / speed - 1.0).abs() < 1e-4,
+                        "{per_turn}, {counts}: {told} {speed}"
+                    );
+                    assert_eq!(spindle.misfits, 0, "{per_turn}, {counts}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_spindle_that_stops_is_told_within_half_a_second() {
+        let mut spindle = Spindle::new(4, 0);
+        (0..5).for_each(|_| spindle.turn(4, 50_000));
+        spindle.pass(u64::from(STILL) - 10_000);
+        assert!(!spindle.encoder.is_still() && spindle.encoder.speed() > 0);
+        spindle.pass(20_000);
+        assert!(spindle.encoder.is_still());
+        assert_eq!(spindle.encoder.speed(), 0);
+        assert_eq!(spindle.misfits, 0);
+    }
+
+    #[test]
+    fn pulses_that_do_not_fit_are_found_at_the_next_index() {
+        let mut spindle = Spindle::new(8, 0);
+        (0..5).for_each(|_| spindle.turn(8, 40_000));
+        for pulses in [7, 9] {
+            let before = spindle.misfits;
+            spindle.turn(pulses, 40_000);
+            spindle.turn(8, 40_000);
+            spindle.turn(8, 40_000);
+            assert_eq!(spindle.misfits, before + 1);
+        }
+        assert_eq!(spindle.encoder.misfits(), 2);
+        // An index is missing.
+        (0..8).for_each(|_| {
+            spindle.pass(2_500);
+            spindle.sync();
+            spindle.pass(2_500);
+        });
+        spindle.turn(8, 40_000);
+        spindle.turn(8, 40_000);
+        assert_eq!(spindle.encoder.misfits(), 3);
+    }
+
+    #[test]
+    fn a_pulse_more_of_the_index_alone_is_found() {
+        let mut spindle = Spindle::new(1, 0);
+        (0..6).for_each(|_| spindle.turn(0, 50_000));
+        assert_eq!(spindle.misfits, 0);
+        spindle.index();
+        spindle.pass(20_000);
+        spindle.index();
+        spindle.pass(30_000);
+        spindle.index();
+        spindle.pass(LOOK);
+        assert_eq!(spindle.misfits, 1);
+        // From rest turns become shorter, but not so much.
+        let mut spindle = Spindle::new(1, 0);
+        for turn in 1..20u32 {
+            let taken = f64::from(turn).sqrt() - f64::from(turn - 1).sqrt();
+            spindle.turn(0, (taken * 250_000.0) as u64);
+        }
+        assert_eq!(spindle.misfits, 0);
+    }
+}

@@ -1,0 +1,168 @@
+//! The pulses of the spindle's sensors: timer 5 tells their time, the handlers in [`edges`](super::edges) take it.
+//!
+//! Timer 5 counts 4 us ([`Pulses`]) and stands still unless an encoder is set up. It has no interrupt: who reads knows the time since it was
+//! read last, which is to be less than 262 ms. Owns [`SHARED`]. A pulse is the falling edge of a pin that has been still for `bounce` before;
+//! so a contact that bounces is one pulse, and neither its end nor noise right behind another edge is any. That
+//! time is 16 bits, too, so that whoever reads says of a pin which has been still for longer that it is `quiet`.
+//!
+//! Each read costs 300 cycles, interrupts off for 20 of them. RAM: 20 bytes.
+
+use core::cell::UnsafeCell;
+use core::mem::offset_of;
+use kerf_macros::small;
+
+use super::{inputs, mask};
+use crate::boards::ACTIVE;
+use crate::capability::Capability;
+use crate::encoder::Pulses;
+
+const TCCR5B: *mut u8 = 0x121 as *mut u8;
+const TCNT5: *const u16 = 0x124 as *const u16;
+/// A count each 64 cycles.
+const RUN: u8 = 0b011;
+
+/// What is known of a sensor. The assembly knows its layout.
+#[repr(C)]
+pub(super) struct Line {
+    /// When its pin has changed last.
+    pub edge: u16,
+    /// When its last pulse began.
+    pub at: u16,
+    /// Its pulses, modulo 2^16.
+    pub count: u16,
+    /// Not 0: its pin has been still for so long that `edge` does not tell.
+    pub quiet: u8,
+}
+
+/// What handlers and readers share.
+#[repr(C)]
+pub(super) struct Shared {
+    lines: [Line; 2],
+    /// The pulses of the sync sensor at the last one of the index.
+    pub at_index: u16,
+    /// How long a pin must have been still before a pulse, in counts.
+    pub bounce: u16,
+    /// The port of each sensor as it was at the last change of a pin.
+    pub levels: [u8; 2],
+    /// Bits: the sensors that are used.
+    pub in_use: u8,
+}
+
+/// Where the lines are.
+pub(super) const LINES: [usize; 2] = {
+    let first = offset_of!(Shared, lines);
+    [first, first + size_of::<Line>()]
+};
+
+/// See [`Shared`].
+#[repr(transparent)]
+pub(super) struct Place(UnsafeCell<Shared>);
+
+// SAFETY: handlers write it; who reads does so volatile, and again if it has changed meanwhile. The rest is set with interrupts off.
+unsafe impl Sync for Place {}
+
+const LINE: Line = Line { edge: 0, at: 0, count: 0, quiet: 1 };
+
+pub(super) static SHARED: Place = Place(UnsafeCell::new(Shared {
+    lines: [LINE; 2],
+    at_index: 0,
+    bounce: 0,
+    levels: [0; 2],
+    in_use: 0,
+}));
+
+/// Pull-ups. Before interrupts are on.
+pub(super) fn start() {
+    if let Some(encoder) = ACTIVE.encoder
+        && Capability::Lathe.is_built_in()
+    {
+        super::gpio::high(encoder.index);
+        super::gpio::high(encoder.sync);
+    }
+}
+
+/// The sensors `lines` are read from now on (bit 0 index, bit 1 sync), whose contacts bounce for so many counts. Thread mode.
+#[inline(never)]
+#[small]
+pub fn set_up(lines: u8, bounce: u16) {
+    let shared = SHARED.0.get();
+    // SAFETY: interrupts are off for each; the timer's register is this module's.
+    mask(|| unsafe { (&raw mut (*shared).bounce).write_volatile(bounce) });
+    mask(|| unsafe {
+        (&raw mut (*shared).in_use).write_volatile(lines);
+        TCCR5B.write_volatile(if lines == 0 { 0 } else { RUN });
+    });
+    inputs::leave_out(match lines {
+        0 => 0,
+        1 => const { ACTIVE.shared_inputs(1) },
+        _ => const { ACTIVE.shared_inputs(3) },
+    });
+}
+
+/// Whether any sensor is read. Any level.
+#[small]
+pub fn is_set_up() -> bool {
+    // SAFETY: a single load.
+    unsafe { (&raw const (*SHARED.0.get()).in_use).read_volatile() != 0 }
+}
+
+/// The time now, counts.
+fn now() -> u16 {
+    // SAFETY: the high byte waits in a register of this timer, which handlers use as well: they are off.
+    mask(|| unsafe { TCNT5.read_volatile() })
+}
+
+/// What the sensors have seen so far. Thread mode and exec.
+#[inline(never)]
+#[small]
+pub fn read() -> Pulses {
+    let shared = SHARED.0.get();
+    // SAFETY: a field that is read while a handler writes it is read again.
+    let field = |at: *const u16| unsafe { at.read_volatile() };
+    let mut pulses = Pulses::NONE;
+    loop {
+        // SAFETY: no reference is made, these are places.
+        let (index, sync, at_index) = unsafe {
+            (
+                &raw mut (*shared).lines[0],
+                &raw mut (*shared).lines[1],
+                &raw const (*shared).at_index,
+            )
+        };
+        // SAFETY: as above.
+        unsafe {
+            pulses.index = field(&raw const (*index).count);
+            pulses.sync = field(&raw const (*sync).count);
+            pulses.index_at = field(&raw const (*index).at);
+            pulses.sync_at = field(&raw const (*sync).at);
+            pulses.at_index = field(at_index);
+            if field(&raw const (*index).count) == pulses.index
+                && field(&raw const (*sync).count) == pulses.sync
+            {
+                pulses.now = now();
+                settle(index, pulses.now);
+                settle(sync, pulses.now);
+                return pulses;
+            }
+        }
+    }
+}
+
+/// Says of a pin that it is quiet, if it has been still for longer than it bounces.
+///
+/// # Safety
+/// It is one of the lines.
+unsafe fn settle(line: *mut Line, now: u16) {
+    // SAFETY: as in `read`; `edge` and `quiet` go together, so they are compared and set with interrupts off.
+    unsafe {
+        let edge = mask(|| (&raw const (*line).edge).read_volatile());
+        let bounce = (&raw const (*SHARED.0.get()).bounce).read_volatile();
+        if now.wrapping_sub(edge) >= bounce {
+            mask(|| {
+                if (&raw const (*line).edge).read_volatile() == edge {
+                    (&raw mut (*line).quiet).write_volatile(1);
+                }
+            });
+        }
+    }
+}

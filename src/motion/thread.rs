@@ -1,0 +1,434 @@
+//! A move in step with the spindle: how fast the axes go, so that they are where its angle says.
+//!
+//! Owned by exec, which asks [`Thread::velocity`] for each stretch of a pass and tells what it has handed out; at the exec level. In a
+//! pass a line is no faster than this says. What it ends at, and that it ends at rest, is the governor's as for any line: the proof
+//! that every motion ends on its step does not know of threads. Units: mm along the path, s; time is in counts of the encoder and CPU cycles.
+//!
+//! **The phase line** is where the axes are to be: 0 at the first pulse of sync behind an index, and `lead` further on with each turn.
+//! Its place at the last pulse is known exactly. From there it is carried on at the speed of the last pulses to
+//! the moment at which all that has been queued ends: segments are queued 4 to 9 ms ahead of the pins, and since ticks are exact
+//! to the cycle, that moment is known, and so is where the axes are then. What remains of dead time is one stretch, 2 ms.
+//!
+//! **The law.** With `e` the way from the axes to the line, and `u` the speed of the line, the axes are to go at `u + c`, where `c` has the sign of `e` and is the
+//! lesser of [`GAIN`]` * e` and `sqrt(2 b e)`, with `b` seven tenths of the acceleration limit. The root is the ramp that meets the line
+//! at its speed. So the axes start before the line comes to them, by half the time of the ramp, and meet
+//! it wherever that is: the phase does not depend on the speed. It leaves them three tenths of the limit to correct what is left over.
+//!
+//! **The start.** A line that has passed the axes at rest comes again a turn later: it is taken back by `lead`.
+//!
+//! **Pulses that do not fit.** A pulse that comes after twice the time of the one before stands for two, one that comes too soon for none. The
+//! next index says whether that was right. A pulse that is overdue by more than a second one means that the
+//! [spindle is lost](Thread::is_lost); until then the line goes on at its speed. With a single pulse a turn there is nothing to tell a pulse that is missing from a
+//! spindle at half its speed: it is taken for missing.
+//!
+//! Cost on AVR: 2,500 cycles a stretch, 1,500 more with a pulse. RAM: 41 bytes.
+
+use kerf_macros::small;
+
+use super::float::{least, some};
+use crate::encoder::{COUNTS_PER_S, Pulses};
+use crate::hal::TIMER_HZ;
+use crate::math::sqrt;
+
+/// How much of the way to the line is made up in a second: half of it in a stretch.
+const GAIN: f32 = 250.0;
+
+/// The part of the acceleration limit that the ramp takes.
+const SHARE: f32 = 0.7;
+
+/// The speed is that of pulses at least so many counts apart: 16 ms.
+const WINDOW: u32 = COUNTS_PER_S / 1_000 * 16;
+
+/// The spindle is lost when no pulse has come for so many times as long as from one to the next.
+const OVERDUE: f32 = 2.05;
+
+/// And for so many counts more, 1 ms: pulses do not come quite evenly.
+const SLACK: f32 = COUNTS_PER_S as f32 * 0.001;
+
+/// CPU cycles of a count.
+const CYCLES: u32 = TIMER_HZ / COUNTS_PER_S;
+
+/// Slower is standing still, mm/s.
+const SLOWEST: f32 = 0.01;
+
+/// How far a pulse may be from its time, as a share of the time between two.
+const MISFIT: f32 = 0.6;
+
+/// How the pass stands.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Debug, Default)]
+enum Stage {
+    /// No pass.
+    #[default]
+    Off,
+    /// Waits for an index.
+    Armed,
+    /// Waits for the first pulse of sync behind it.
+    Indexed,
+    /// The line is known; the axes stand still.
+    Known,
+    /// The axes follow.
+    Follows,
+    /// The spindle was lost, and the axes come to rest.
+    Lost,
+}
+
+/// A pass.
+#[derive(Debug, Default)]
+pub struct Thread {
+    stage: Stage,
+    per_turn: u16,
+    lead: f32,
+    /// Where the line was at the last pulse, from where the axes are at the end of what is queued.
+    ahead: f32,
+    /// Counts from pulse to pulse.
+    interval: f32,
+    /// When the last pulse came, and since when the speed is being measured over how many pulses.
+    at: u32,
+    since: u32,
+    measured: u16,
+    /// Pulses by then, and those of sync that the last index is to have seen.
+    pulses: u16,
+    index: u16,
+    expected: u16,
+    /// Pulses that were put in since the last index, less those that were left out.
+    mended: i8,
+    /// When what is queued ends, CPU cycles.
+    end: u32,
+}
+
+#[small]
+impl Thread {
+    /// No pass.
+    pub const fn new() -> Self {
+        Self {
+            stage: Stage::Off,
+            per_turn: 0,
+            lead: 0.0,
+            ahead: 0.0,
+            interval: 0.0,
+            at: 0,
+            since: 0,
+            measured: 0,
+            pulses: 0,
+            index: 0,
+            expected: 0,
+            mended: 0,
+            end: 0,
+        }
+    }
+
+    /// Whether lines follow the spindle.
+    #[inline(always)]
+    pub fn is_on(&self) -> bool {
+        self.stage != Stage::Off
+    }
+
+    /// Whether the spindle was lost in the pass.
+    pub fn is_lost(&self) -> bool {
+        self.stage == Stage::Lost
+    }
+
+    /// A pass of so many mm a turn begins; 0 ends one.
+    pub fn begin(&mut self, lead: f32) {
+        self.stage = if some(lead) { Stage::Armed } else { Stage::Off };
+        (self.lead, self.mended) = (lead, 0);
+        self.per_turn = 0;
+    }
+
+    /// The steppers have been started, and make their first tick so many cycles after `time`, in counts. All that is queued since they stood
+    /// still has been [told](Thread::queued).
+    pub fn anchor(&mut self, time: u32, cycles: u32) {
+        self.end = self.end.wrapping_add(time.wrapping_mul(CYCLES)).wrapping_add(cycles);
+    }
+
+    /// So many cycles more are queued, to steppers at a `standstill` or not.
+    pub fn queued(&mut self, cycles: u32, standstill: bool) {
+        let before = if standstill { 0 } else { self.end };
+        self.end = before.wrapping_add(cycles);
+    }
+
+    /// What is queued goes so much further.
+    pub fn handed(&mut self, distance: f32) {
+        self.ahead -= distance;
+    }
+
+    /// Takes up what sensors have seen by `time`, of a spindle with so many pulses a turn, of which the last took `turn` counts.
+    #[inline(never)]
+    pub fn note(&mut self, time: u32, pulses: &Pulses, per_turn: u16, turn: u32) {
+        let before = |at: u16| time.wrapping_sub(pulses.now.wrapping_sub(at).into());
+        if self.per_turn == 0 {
+            (self.per_turn, self.index) = (per_turn, pulses.index);
+        }
+        let (count, at) = match per_turn {
+            1 => (pulses.index, before(pulses.index_at)),
+            _ => (pulses.sync, before(pulses.sync_at)),
+        };
+        if pulses.index != self.index {
+            let turns = pulses.index.wrapping_sub(self.index);
+            self.index = pulses.index;
+            if self.stage == Stage::Armed {
+                self.interval = turn as f32 / f32::from(per_turn);
+                self.expected = pulses.at_index;
+                self.pulses = if per_turn == 1 { count.wrapping_sub(1) } else { pulses.at_index };
+                self.stage = Stage::Indexed;
+            } else if per_turn > 1 {
+                self.check_turns(turns, pulses.at_index);
+            }
+        }
+        let new = count.wrapping_sub(self.pulses);
+        match self.stage {
+            Stage::Armed | Stage::Off => return,
+            _ if new == 0 => {}
+            Stage::Indexed => {
+                self.ahead = self.pitch() * f32::from(new - 1);
+                (self.at, self.since, self.measured) = (at, at, 0);
+                self.stage = Stage::Known;
+            }
+            _ => self.take(new, at),
+        }
+        self.pulses = count;
+        let age = time.wrapping_sub(self.at) as f32;
+        if self.stage == Stage::Follows && age > OVERDUE * self.interval + SLACK {
+            self.stage = Stage::Lost;
+        }
+    }
+
+    /// mm a pulse.
+    fn pitch(&self) -> f32 {
+        self.lead / f32::from(self.per_turn)
+    }
+
+    /// An index has come, `turns` after the last, when sync had given so many pulses.
+    fn check_turns(&mut self, turns: u16, at_index: u16) {
+        let expected = self.expected.wrapping_add(turns.wrapping_mul(self.per_turn));
+        // Too few by so many.
+        let short = expected.wrapping_sub(at_index) as i16;
+        let wrong = short - i16::from(self.mended);
+        if wrong != 0 && self.stage > Stage::Indexed {
+            self.ahead += self.pitch() * f32::from(wrong);
+        }
+        (self.expected, self.mended) = (at_index, 0);
+    }
+
+    /// So many pulses have come, the last of them `at` this time.
+    fn take(&mut self, new: u16, at: u32) {
+        let passed = at.wrapping_sub(self.at) as f32 / self.interval;
+        let mut true_count = f32::from(new);
+        let off = passed - true_count;
+        if !(-MISFIT..=MISFIT).contains(&off) && passed < 100.0 {
+            let fits = (passed + 0.5) as u16;
+            self.mended = self.mended.saturating_add(fits.wrapping_sub(new) as i8);
+            true_count = f32::from(fits);
+            if fits == 0 {
+                return;
+            }
+        }
+        self.ahead += self.pitch() * true_count;
+        self.at = at;
+        self.measured = self.measured.saturating_add(true_count as u16);
+        let window = at.wrapping_sub(self.since);
+        if window >= WINDOW {
+            self.interval = window as f32 / f32::from(self.measured);
+            (self.since, self.measured) = (at, 0);
+        }
+    }
+
+    /// The velocity to be reached in the next stretch, mm/s, from `velocity`; 0 for none. Time of which `kept` cycles have not been queued
+    /// belongs to what is.
+    #[inline(never)]
+    pub fn velocity(&mut self, kept: i32, velocity: f32, accel: f32) -> f32 {
+        if self.stage < Stage::Known {
+            return 0.0;
+        }
+        let speed = self.pitch() * COUNTS_PER_S as f32 / self.interval;
+        let end = self.end.wrapping_add(kept as u32);
+        let late = end.wrapping_sub(self.at.wrapping_mul(CYCLES)) as i32;
+        let mut way = self.ahead + speed * (late as f32 * (1.0 / TIMER_HZ as f32));
+        if self.stage == Stage::Known {
+            // What 4 ms bring is made up for.
+            while way > 0.004 * speed {
+                way -= self.lead;
+                self.ahead -= self.lead;
+            }
+        }
+        let size = f32::from_bits(way.to_bits() & 0x7FFF_FFFF);
+        let change = least(GAIN * size, sqrt(2.0 * SHARE * accel * size));
+        let wanted = if way.is_sign_negative() { speed - change } else { speed + change };
+        if wanted < SLOWEST {
+            return if some(velocity) { SLOWEST } else { 0.0 };
+        }
+        if self.stage == Stage::Known {
+            self.stage = Stage::Follows;
+        }
+        wanted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    const ACCEL: f32 = 500.0;
+    /// A stretch, counts and s.
+    const STRETCH: u32 = COUNTS_PER_S / 500;
+    /// How far what is queued is ahead of now, counts.
+    const QUEUED: u32 = 2_000;
+
+    /// A spindle at a steady speed, and axes that are as fast as they are told within their acceleration.
+    struct Pass {
+        thread: Thread,
+        per_turn: u16,
+        /// Counts of a turn.
+        turn: u32,
+        /// Counts, that do not wrap.
+        time: u64,
+        velocity: f32,
+        way: f64,
+        /// Sync pulses that do not come, and that come twice, by number.
+        missing: Option<u64>,
+        extra: Option<u64>,
+    }
+
+    impl Pass {
+        fn new(per_turn: u16, turn: u32, begin: u64) -> Self {
+            let mut thread = Thread::new();
+            thread.begin(1.0);
+            let (missing, extra) = (None, None);
+            let mut pass = Self {
+                thread,
+                per_turn,
+                turn,
+                time: begin,
+                velocity: 0.0,
+                way: 0.0,
+                missing,
+                extra,
+            };
+            pass.thread.anchor(begin as u32, QUEUED * CYCLES);
+            pass
+        }
+
+        /// What the sensors have seen by now; the spindle was at an index at time 0 of its own.
+        fn pulses(&self) -> Pulses {
+            let (time, turn, n) = (self.time, u64::from(self.turn), u64::from(self.per_turn));
+            let index = time / turn;
+            // Half of the way from pulse to pulse behind the index.
+            let half = turn / n / 2;
+            let sync_by = |time: u64| (time + half) * n / turn;
+            let bent = |count: u64| {
+                let missing = self.missing.is_some_and(|at| count >= at);
+                let extra = self.extra.is_some_and(|at| count >= at);
+                (count + u64::from(extra) - u64::from(missing)) as u16
+            };
+            let (mut sync, at_index) = (sync_by(time), sync_by(index * turn));
+            let told = bent(sync);
+            if self.missing == Some(sync) {
+                // The last that has come is the one before.
+                sync -= 1;
+            }
+            let sync_at = (sync * turn).div_ceil(n).saturating_sub(half);
+            Pulses {
+                now: time as u16,
+                index: index as u16,
+                index_at: (index * turn) as u16,
+                at_index: bent(at_index),
+                sync: told,
+                sync_at: sync_at as u16,
+            }
+        }
+
+        fn stretch(&mut self) {
+            let pulses = self.pulses();
+            self.thread.note(self.time as u32, &pulses, self.per_turn, self.turn);
+            let seconds = STRETCH as f32 / COUNTS_PER_S as f32;
+            let wanted = self.thread.velocity(0, self.velocity, ACCEL);
+            let gain = ACCEL * seconds;
+            let next = wanted.clamp(self.velocity - gain, self.velocity + gain);
+            let distance = 0.5 * (self.velocity + next) * seconds;
+            self.velocity = next;
+            self.thread.handed(distance);
+            self.thread.queued(STRETCH * CYCLES, false);
+            self.way += f64::from(distance);
+            self.time += u64::from(STRETCH);
+        }
+
+        /// Where the axes are against the line when what is queued ends, in turns.
+        fn phase(&self) -> f64 {
+            let angle = (self.time + u64::from(QUEUED)) as f64 / f64::from(self.turn);
+            let phase = self.way - angle;
+            phase - phase.round()
+        }
+
+        fn run(&mut self, stretches: usize) -> Vec<f64> {
+            (0..stretches)
+                .map(|_| {
+                    self.stretch();
+                    self.phase()
+                })
+                .collect()
+        }
+    }
+
+    fn spread(phases: &[f64]) -> f64 {
+        let first = phases[0];
+        let off = phases.iter().map(|phase| (phase - first) - (phase - first).round());
+        let (low, high) =
+            off.fold((0.0f64, 0.0f64), |(low, high), off| (low.min(off), high.max(off)));
+        high - low
+    }
+
+    #[test]
+    fn the_phase_does_not_depend_on_the_speed_nor_on_when_it_begins() {
+        for per_turn in [1u16, 4, 100, 400] {
+            let mut all = Vec::new();
+            for turn in [200_000u32, 50_000, 25_000, 15_000] {
+                for begin in [0, 12_345, (1 << 32) - 100_000] {
+                    let mut pass = Pass::new(per_turn, turn, begin);
+                    pass.run((3 * turn / STRETCH) as usize);
+                    let phases = pass.run((8 * turn / STRETCH) as usize);
+                    assert!(spread(&phases) < 0.002, "{per_turn} {turn}: {}", spread(&phases));
+                    assert!((pass.velocity - COUNTS_PER_S as f32 / turn as f32).abs() < 0.1);
+                    all.push(phases[0]);
+                }
+            }
+            assert!(spread(&all) < 0.002, "{per_turn}: {all:.4?}");
+        }
+    }
+
+    #[test]
+    fn a_pulse_that_is_missing_or_too_many_shifts_nothing() {
+        for per_turn in [4u16, 8, 100] {
+            for (missing, extra) in [(Some(9), None), (None, Some(9)), (Some(8), None)] {
+                let mut pass = Pass::new(per_turn, 50_000, 0);
+                pass.run(300);
+                let before = pass.phase();
+                // As if it had happened right now.
+                let base = pass.time * u64::from(per_turn) / 50_000;
+                pass.missing = missing.map(|n| base + n - 7);
+                pass.extra = extra.map(|n| base + n - 7);
+                pass.run(600);
+                let off = pass.phase() - before;
+                assert!(
+                    (off - off.round()).abs() < 0.002,
+                    "{per_turn} {missing:?} {extra:?}: {off}"
+                );
+                assert!(!pass.thread.is_lost());
+            }
+        }
+    }
+
+    #[test]
+    fn a_spindle_without_pulses_is_lost_behind_the_second() {
+        let mut pass = Pass::new(4, 50_000, 0);
+        pass.run(400);
+        let (pulses, from) = (pass.pulses(), pass.time);
+        while !pass.thread.is_lost() {
+            pass.time += u64::from(STRETCH);
+            let now = Pulses { now: pass.time as u16, ..pulses };
+            pass.thread.note(pass.time as u32, &now, 4, 50_000);
+        }
+        let took = pass.time - from;
+        assert!((12_500..2 * 12_500 + 3 * u64::from(STRETCH)).contains(&took), "{took}");
+    }
+}

@@ -1,0 +1,82 @@
+//! The encoder of the spindle, looked after in thread mode: its settings, its speed, pulses that do not fit.
+//!
+//! The power task calls [`look`] each 20 ms; it costs 1,500 cycles then, and nothing without an encoder. The state is an [`Encoder`] in
+//! `tasks::common`, under the ceiling. Nothing waits.
+
+use kerf_macros::small;
+
+use super::common;
+use super::links::Links;
+use super::storage::Storage;
+use crate::capability::Capability;
+use crate::config::groups::spindle;
+use crate::config::{Owner, Setting};
+use crate::hal::Thread;
+use crate::hal::event::Event;
+use crate::hal::{encoder, flags};
+use crate::status::Status;
+
+/// Microseconds of a count of time.
+const COUNT_US: i32 = 4;
+
+/// Whether it is a setting of the encoder.
+#[small]
+pub fn is_own(setting: Setting) -> bool {
+    setting.owner() == Owner::Spindle && matches!(setting.index(), spindle::N | spindle::B)
+}
+
+/// Takes over the settings.
+#[inline(never)]
+#[small]
+pub fn set_up(thread: Thread, storage: &Storage) {
+    if !Capability::Lathe.is_built_in() {
+        return;
+    }
+    let setting = |row| Setting::of(Owner::Spindle, row).map_or(0, |setting| storage.cold(setting));
+    let (per_turn, bounce) = (setting(spindle::N) as u16, setting(spindle::B) / COUNT_US);
+    let lines = match per_turn {
+        0 => 0,
+        1 => 1,
+        _ => 3,
+    };
+    encoder::set_up(lines, bounce as u16);
+    let pulses = encoder::read();
+    common::with(thread, |common| common.encoder.set_up(per_turn, &pulses));
+}
+
+/// Looks at what the sensors have seen.
+#[inline(never)]
+#[small]
+pub fn look(links: &Links) {
+    if !Capability::Lathe.is_built_in() || !encoder::is_set_up() {
+        return;
+    }
+    let first_misfit = common::with(links.thread, |common| {
+        let before = common.encoder.misfits();
+        // In here: exec must not have looked at newer ones.
+        common.encoder.look(&encoder::read()) && before == 0
+    });
+    // Who waits for the spindle asks again.
+    flags::set(Event::BlockDone);
+    if first_misfit {
+        links.except(Status::PulseMisfit);
+    }
+}
+
+/// How fast the spindle turns, thousandths of a turn a minute; `None` without an encoder.
+#[small]
+pub fn speed(thread: Thread) -> Option<u32> {
+    if !Capability::Lathe.is_built_in() {
+        return None;
+    }
+    common::with(thread, |common| {
+        let encoder = &common.encoder;
+        (encoder.per_turn() != 0).then(|| encoder.speed())
+    })
+}
+
+/// Pulses that did not fit so far, 255 for more.
+#[small]
+pub fn misfits(thread: Thread) -> u8 {
+    common::with(thread, |common| common.encoder.misfits())
+}

@@ -1,0 +1,366 @@
+//! The encoder of a spindle on the chip: its speed, pulses that do not fit, and what its interrupts cost.
+
+mod common;
+
+use common::{firmware, set};
+use kerf::boards::{Board, MEGA2560_LATHE, RAMPS14};
+use kerf_sim::mechanics::{Bounce, Build, Sensors};
+use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
+
+/// The longest time with interrupts off outside the step interrupt.
+const OFF: u64 = 31;
+
+/// The exception that tells of a spindle that is lost.
+const LOST: u64 = 44;
+/// The exception that tells of pulses which do not fit.
+const MISFIT: u64 = 40;
+
+/// A board with a spindle that has so many marks, and turns so fast.
+fn turning(
+    board: &'static Board,
+    marks: u32,
+    rpm: f64,
+    change: impl Fn(&mut Sensors),
+) -> (Machine, Host) {
+    let mut machine = firmware(board);
+    let mut build = Build::of(board);
+    // The pins of the sensors are theirs alone.
+    for axis in &mut build.axes {
+        (axis.min, axis.max) = (None, None);
+        (axis.travel, axis.start) = (f64::INFINITY, 0.0);
+    }
+    let mut sensors = Sensors::of(board, marks).unwrap();
+    change(&mut sensors);
+    build.spindle.sensors = Some(sensors);
+    machine.build(&build);
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut machine, 1_000).unwrap();
+    set(&mut machine, &mut host, &format!("{{spn:{marks}}}"));
+    machine.tamper(|mechanics, now| mechanics.force_spindle(rpm, now));
+    (machine, host)
+}
+
+/// A number that the machine tells.
+fn asked(machine: &mut Machine, host: &mut Host, name: &str) -> f64 {
+    let raw = host.ask(machine, &format!("{{{name}:n}}"), 1_000).unwrap().raw;
+    let (_, rest) = raw.split_once(&format!("\"{name}\":")).unwrap_or_else(|| panic!("{raw}"));
+    rest.split(['}', ',']).next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn the_speed_is_that_of_a_turn() {
+    for board in [&MEGA2560_LATHE, &RAMPS14] {
+        for (marks, rpm) in
+            [(1, 60.0), (1, 1_000.0), (4, 229.0), (8, 3_000.0), (100, 1_000.0), (100, -300.0)]
+        {
+            let (mut machine, mut host) = turning(board, marks, rpm, |_| {});
+            host.run_for_ms(&mut machine, 3_500).unwrap();
+            let measured = asked(&mut machine, &mut host, "sps");
+            assert!((measured / rpm.abs() - 1.0).abs() < 0.001, "{marks} at {rpm}: {measured}");
+            assert_eq!(asked(&mut machine, &mut host, "spx"), 0.0, "{marks} at {rpm}");
+            let window = machine.meters().window_outside();
+            assert!(
+                window.cycles <= OFF,
+                "{} cycles in {}",
+                window.cycles,
+                machine.describe(&window)
+            );
+        }
+    }
+}
+
+#[test]
+fn contacts_that_bounce_are_one_pulse_and_noise_is_none() {
+    let bounce = Some(Bounce { times: 3, cycles: 3_000 });
+    let (mut machine, mut host) =
+        turning(&MEGA2560_LATHE, 4, 300.0, |sensors| sensors.bounce = bounce);
+    set(&mut machine, &mut host, "{spb:500}");
+    host.run_for_ms(&mut machine, 2_000).unwrap();
+    // Spikes, each right behind an edge.
+    let measured = asked(&mut machine, &mut host, "sps");
+    assert!((measured / 300.0 - 1.0).abs() < 0.001, "{measured}");
+    assert_eq!(asked(&mut machine, &mut host, "spx"), 0.0);
+}
+
+#[test]
+fn pulses_that_are_missing_or_too_many_are_counted_and_the_first_is_told() {
+    for (marks, index) in [(4, false), (8, false), (100, false), (8, true)] {
+        let (mut machine, mut host) = turning(&MEGA2560_LATHE, marks, 600.0, |_| {});
+        host.run_for_ms(&mut machine, 1_000).unwrap();
+        machine.tamper(|mechanics, _| mechanics.encoder().unwrap().miss(index, 3));
+        host.run_for_ms(&mut machine, 1_000).unwrap();
+        let told = host.take_reports().iter().filter(|report| report["er"]["st"] == MISFIT).count();
+        assert_eq!(told, 1, "{marks}");
+        assert_eq!(asked(&mut machine, &mut host, "spx"), 1.0, "{marks}");
+        if marks > 8 {
+            // It might be within another.
+            continue;
+        }
+        machine
+            .tamper(|mechanics, now| mechanics.encoder().unwrap().add(false, now + 40_000, 1_600));
+        host.run_for_ms(&mut machine, 1_000).unwrap();
+        assert_eq!(asked(&mut machine, &mut host, "spx"), 2.0, "{marks}");
+    }
+}
+
+#[test]
+fn a_spindle_that_stops_is_told_within_half_a_second() {
+    let (mut machine, mut host) = turning(&MEGA2560_LATHE, 4, 300.0, |_| {});
+    host.run_for_ms(&mut machine, 1_000).unwrap();
+    machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
+    host.run_for_ms(&mut machine, 480).unwrap();
+    assert!(asked(&mut machine, &mut host, "sps") > 0.0);
+    host.run_for_ms(&mut machine, 60).unwrap();
+    assert_eq!(asked(&mut machine, &mut host, "sps"), 0.0);
+}
+
+/// Steps of Z in a millimetre.
+const STEPS: f64 = 200.0;
+const Z: usize = 2;
+
+/// A machine with 200 steps/mm on Z and 500 mm/s2, whose spindle turns.
+fn lathe(marks: u32, rpm: f64, change: impl Fn(&mut Sensors)) -> (Machine, Host) {
+    let (mut machine, mut host) = turning(&MEGA2560_LATHE, marks, rpm, change);
+    for line in
+        ["{3tr:4}", "{3sa:1.8}", "{3mi:4}", "{zfr:1500}", "{zvm:1500}", "{zac:500}", "{zjm:200000}"]
+    {
+        set(&mut machine, &mut host, line);
+    }
+    host.run_for_ms(&mut machine, if rpm < 100.0 { 3_500 } else { 800 }).unwrap();
+    (machine, host)
+}
+
+/// Where Z is against the thread at each index pulse from `from` to `to` mm of way, in mm modulo the lead.
+fn phases(machine: &Machine, since: usize, lead: f64, from: f64, to: f64) -> Vec<f64> {
+    let mechanics = machine.mechanics().unwrap();
+    let start = mechanics.indexed()[since].1[Z];
+    let ways =
+        mechanics.indexed()[since..].iter().map(|(_, steps)| (start - steps[Z]) as f64 / STEPS);
+    let inside = ways.filter(|way| (from..=to).contains(way));
+    inside.map(|way| (way / lead - (way / lead).round()) * lead).collect()
+}
+
+/// Cuts along Z and returns the phases in the middle of it.
+fn pass(machine: &mut Machine, host: &mut Host, length: f64, lead: f64) -> Vec<f64> {
+    let since = machine.mechanics().unwrap().indexed().len() - 1;
+    set(machine, host, &format!("g91 g33 z-{length} k{lead}"));
+    let before = machine.recorder().motors()[Z].position;
+    wait_for_rest(machine, host, 60_000);
+    let steps = (length * STEPS).round() as i64;
+    assert_eq!(before - machine.recorder().motors()[Z].position, steps, "the end");
+    phases(machine, since, lead, 1.5 * lead, length - 1.5 * lead)
+}
+
+/// Runs until the machine has moved and rests.
+fn wait_for_rest(machine: &mut Machine, host: &mut Host, most_ms: u64) {
+    let mut waited = 0;
+    while machine.recorder().steps() == 0 || host.stat() == Some(5) {
+        host.run_for_ms(machine, 50).unwrap();
+        waited += 50;
+        assert!(waited < most_ms, "it does not come to rest: {:?}", host.stat());
+    }
+    host.run_for_ms(machine, 300).unwrap();
+}
+
+fn spread(phases: &[f64]) -> f64 {
+    let most = phases.iter().copied().fold(f64::MIN, f64::max);
+    let least = phases.iter().copied().fold(f64::MAX, f64::min);
+    most - least
+}
+
+/// The most that a phase may be off: a step.
+const STEP: f64 = 1.0 / STEPS + 1e-9;
+
+#[test]
+fn z_is_where_the_spindle_says_at_each_index_whatever_its_speed() {
+    for marks in [1, 4, 8, 100] {
+        let mut all = Vec::new();
+        for rpm in [60.0, 300.0, 600.0, 1_000.0] {
+            let (mut machine, mut host) = lathe(marks, rpm, |_| {});
+            let phases = pass(&mut machine, &mut host, 10.0, 1.0);
+            println!("N {marks}, {rpm} rpm: spread {:.4}", spread(&phases));
+            assert!(phases.len() >= 6 && spread(&phases) < STEP, "{marks}, {rpm}: {phases:?}");
+            assert_eq!(machine.missed_tops(), 0);
+            let window = machine.meters().window_outside();
+            assert!(window.cycles <= OFF, "{} cycles", window.cycles);
+            all.extend(phases);
+        }
+        // Each pass lies in the others.
+        println!("N {marks}, all speeds: spread {:.4}", spread(&all));
+        assert!(spread(&all) < STEP, "{marks}: {all:?}");
+    }
+}
+
+/// Begins a pass and runs until it has come so far, mm. Where the index pulses of it begin.
+fn begin(machine: &mut Machine, host: &mut Host, line: &str, far: f64) -> usize {
+    let since = machine.mechanics().unwrap().indexed().len() - 1;
+    let start = machine.recorder().motors()[Z].position;
+    set(machine, host, line);
+    let mut waited = 0;
+    while ((start - machine.recorder().motors()[Z].position) as f64) < far * STEPS {
+        host.run_for_ms(machine, 2).unwrap();
+        waited += 2;
+        assert!(waited < 20_000, "it does not begin");
+    }
+    since
+}
+
+#[test]
+fn a_slower_spindle_is_followed() {
+    for (marks, most, after) in
+        [(1, 0.1, 0.03), (4, 0.02, 0.005), (8, 0.02, 0.005), (100, 0.005, 0.005)]
+    {
+        let (mut machine, mut host) = lathe(marks, 300.0, |_| {});
+        let since = begin(&mut machine, &mut host, "g91 g33 z-20 k1", 5.0);
+        let phase = *phases(&machine, since, 1.0, 1.5, 5.0).last().unwrap();
+        let turns = machine.mechanics().unwrap().indexed().len();
+        // 0.5 s to two thirds of the way.
+        machine.tamper(|mechanics, now| mechanics.drive_spindle_to(240.0, now));
+        wait_for_rest(&mut machine, &mut host, 20_000);
+        let off: Vec<f64> =
+            phases(&machine, since, 1.0, 1.5, 18.5).iter().map(|is| (is - phase).abs()).collect();
+        let peak = off.iter().copied().fold(0.0, f64::max);
+        let rest = off[turns - since + 6..].iter().copied().fold(0.0, f64::max);
+        println!("N {marks}, 300 to 240 rpm: peak {peak:.4}, later {rest:.4}");
+        assert!(peak < most + 1e-9 && rest < after + 1e-9, "{marks}: {off:.3?}");
+    }
+}
+
+#[test]
+fn a_pulse_that_is_missing_shifts_nothing() {
+    for marks in [4, 8, 100] {
+        let (mut machine, mut host) = lathe(marks, 300.0, |_| {});
+        let since = begin(&mut machine, &mut host, "g91 g33 z-12 k1", 3.0);
+        machine.tamper(|mechanics, _| mechanics.encoder().unwrap().miss(false, 1));
+        wait_for_rest(&mut machine, &mut host, 20_000);
+        let phases = phases(&machine, since, 1.0, 1.5, 10.5);
+        println!("N {marks}, a pulse lost: spread {:.4}", spread(&phases));
+        assert!(spread(&phases) < STEP, "{marks}: {phases:.3?}");
+        assert_eq!(asked(&mut machine, &mut host, "spx"), 1.0);
+    }
+}
+
+#[test]
+fn a_load_that_swings_is_followed() {
+    for (marks, most) in [(4, 0.015), (100, 0.01)] {
+        let (mut machine, mut host) = lathe(marks, 300.0, |_| {});
+        // 2 % of the speed at 3 Hz.
+        let swing = 6.0 * 3.0 * std::f64::consts::TAU;
+        machine.tamper(|mechanics, now| mechanics.load_spindle(0.0, swing, 3.0, now));
+        let phases = pass(&mut machine, &mut host, 20.0, 1.0);
+        println!("N {marks}, 2 % at 3 Hz: spread {:.4}", spread(&phases));
+        assert!(spread(&phases) < most, "{marks}: {phases:.3?}");
+        // It does swing.
+        let indexed = machine.mechanics().unwrap().indexed();
+        let last: Vec<u64> =
+            indexed[indexed.len() - 15..].windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+        let (least, most) = (last.iter().min().unwrap(), last.iter().max().unwrap());
+        assert!(*most as f64 / *least as f64 > 1.015, "{last:?}");
+    }
+}
+
+#[test]
+fn a_taper_is_in_step_along_the_axis_that_moves_farther() {
+    let (mut machine, mut host) = lathe(4, 300.0, |_| {});
+    let since = machine.mechanics().unwrap().indexed().len() - 1;
+    set(&mut machine, &mut host, "g91 g33 x1 z-10 k1");
+    wait_for_rest(&mut machine, &mut host, 20_000);
+    let phases = phases(&machine, since, 1.0, 2.0, 8.0);
+    assert!(phases.len() >= 5 && spread(&phases) < STEP, "{phases:.3?}");
+    assert_eq!(asked(&mut machine, &mut host, "mpox"), 1.0);
+    assert_eq!(asked(&mut machine, &mut host, "mpoz"), -10.0);
+    // In inches.
+    let since = begin(&mut machine, &mut host, "g20 g33 z-0.5 k0.05", 2.0);
+    wait_for_rest(&mut machine, &mut host, 20_000);
+    let phases = self::phases(&machine, since, 1.27, 2.0, 10.0);
+    assert!(phases.len() >= 5 && spread(&phases) < STEP, "{phases:.3?}");
+}
+
+#[test]
+fn a_spindle_that_stops_dead_stops_the_axis() {
+    for (marks, rpm) in [(1, 300.0), (4, 300.0), (4, 1_000.0), (100, 600.0)] {
+        let (mut machine, mut host) = lathe(marks, rpm, |_| {});
+        begin(&mut machine, &mut host, "g91 g33 z-20 k1", 4.0);
+        machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
+        let stopped = machine.cycle();
+        let mut last = machine.recorder().motors()[Z].position;
+        let mut at = stopped;
+        while machine.cycle() < stopped + machine.cycles(1_500) {
+            host.run_for_ms(&mut machine, 1).unwrap();
+            let now = machine.recorder().motors()[Z].position;
+            if now != last {
+                (last, at) = (now, machine.cycle());
+            }
+        }
+        let took = machine.seconds(at - stopped) * 1e3;
+        let two_pulses = 2.0 * 60_000.0 / rpm / f64::from(marks);
+        println!(
+            "N {marks}, {rpm} rpm: at rest {took:.0} ms after a dead stop, two pulses are {two_pulses:.0}"
+        );
+        // Till it is noticed, what is queued, and the ramp.
+        let ramp = rpm / 60.0 / 500.0 * 1e3;
+        assert!(took < 1.1 * two_pulses + 20.0 + ramp, "{marks}, {rpm}: {took} ms");
+        let told = host.take_reports().iter().any(|report| report["er"]["st"] == LOST);
+        assert!(told, "{marks}: nothing is told");
+        // The position is known to the step.
+        let position = asked(&mut machine, &mut host, "mpoz");
+        assert!((position - last as f64 / STEPS).abs() < 0.0011, "{position} {last}");
+    }
+}
+
+#[test]
+fn a_hold_waits_for_the_end_of_the_pass() {
+    let (mut machine, mut host) = lathe(4, 300.0, |_| {});
+    let since = begin(&mut machine, &mut host, "g91 g33 z-12 k1", 4.0);
+    machine.send_now(b'!');
+    host.run_for_ms(&mut machine, 3_000).unwrap();
+    assert_eq!(host.stat(), Some(6), "it holds");
+    let phases = phases(&machine, since, 1.0, 1.5, 10.5);
+    assert!(phases.len() >= 8 && spread(&phases) < STEP, "{phases:.3?}");
+    assert_eq!(machine.recorder().motors()[Z].position, (-12.0 * STEPS) as i64);
+    machine.send_now(b'~');
+    set(&mut machine, &mut host, "g0 z1");
+    host.run_for_ms(&mut machine, 500).unwrap();
+    assert_eq!(machine.recorder().motors()[Z].position, (-11.0 * STEPS) as i64);
+}
+
+#[test]
+fn an_alarm_does_not() {
+    let (mut machine, mut host) = lathe(4, 300.0, |_| {});
+    begin(&mut machine, &mut host, "g91 g33 z-12 k1", 4.0);
+    set(&mut machine, &mut host, "{alarm:n}");
+    let at = machine.recorder().motors()[Z].position;
+    host.run_for_ms(&mut machine, 500).unwrap();
+    let went = (at - machine.recorder().motors()[Z].position) as f64 / STEPS;
+    assert!(went < 0.15, "{went} mm");
+    set(&mut machine, &mut host, "{clear:n}");
+    set(&mut machine, &mut host, "g0 z1");
+}
+
+#[test]
+fn what_cannot_be_cut_moves_nothing() {
+    for (rpm, marks, status) in [(0.0, 4, 42), (2_000.0, 4, 146)] {
+        let (mut machine, mut host) = lathe(marks, rpm, |_| {});
+        let steps = machine.recorder().steps();
+        set(&mut machine, &mut host, "g91 g33 z-12 k1");
+        host.run_for_ms(&mut machine, 7_000).unwrap();
+        let told = host.take_reports().iter().any(|report| report["er"]["st"] == status);
+        assert!(told, "{status}: nothing is told");
+        assert_eq!(machine.recorder().steps(), steps);
+    }
+}
+
+#[test]
+fn threads_of_1_000_turns_and_100_pulses_leave_time_for_answers() {
+    let (mut machine, mut host) = lathe(100, 1_000.0, |_| {});
+    begin(&mut machine, &mut host, "g91 g33 z-30 k1", 2.0);
+    for _ in 0..20 {
+        let asked = machine.cycle();
+        let answer = host.ask(&mut machine, "{sps:n}", 1_000).unwrap();
+        assert_eq!(answer.status, 0);
+        let took = machine.seconds(machine.cycle() - asked) * 1e3;
+        assert!(took < 20.0, "{took} ms");
+    }
+    wait_for_rest(&mut machine, &mut host, 20_000);
+    assert_eq!(asked(&mut machine, &mut host, "stv"), 0.0, "late segments");
+}
