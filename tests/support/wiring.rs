@@ -164,7 +164,8 @@ fn header(board: &Board, pin: &str) -> &'static str {
 
 /// The boards with pins of their own.
 pub fn drawn() -> impl Iterator<Item = &'static Board> {
-    let pins = |board: &Board| wires(board).iter().map(|wire| arduino(wire.pin)).collect::<Vec<_>>();
+    let pins =
+        |board: &Board| wires(board).iter().map(|wire| arduino(wire.pin)).collect::<Vec<_>>();
     let is_first = move |n: usize| !ALL[..n].iter().any(|other| pins(other) == pins(ALL[n]));
     ALL.into_iter().enumerate().filter(move |(n, _)| is_first(*n)).map(|(_, board)| board)
 }

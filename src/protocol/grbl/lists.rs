@@ -124,7 +124,7 @@ pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
     text(out, text!(" F"));
     super::write::speed(out, machine.value(Value::Feed), machine.value(Value::Units) == 0);
     text(out, text!(" S"));
-    int(out, machine.value(Value::SpindleSpeed));
+    int(out, super::report::rpm(machine));
     close(out);
     None
 }

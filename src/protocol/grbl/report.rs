@@ -134,7 +134,7 @@ impl Report {
                 speed(out, machine.value(Value::Velocity), self.inches);
                 out.put(b',');
                 let on = machine.value(Value::SpindleOn);
-                int(out, on * machine.value(Value::SpindleSpeed));
+                int(out, on * rpm(machine));
                 self.field = Field::Offset;
             }
             Field::Offset if self.with.0 => {
@@ -186,6 +186,12 @@ impl Report {
             (self.axis, self.field) = (0, next);
         }
     }
+}
+
+/// The speed of the spindle, turns a minute.
+#[small]
+pub(super) fn rpm(machine: &mut impl Machine) -> i32 {
+    (machine.value(Value::SpindleSpeed) + 500) / 1_000
 }
 
 /// A number that changes when an offset does.

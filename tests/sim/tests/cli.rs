@@ -53,7 +53,12 @@ fn mistakes_are_explained() {
         (Path::new("/nowhere.elf"), &job, &[], "cannot read /nowhere.elf"),
         (&text, &job, &[], "text.elf is not an AVR program"),
         (&elf, &blank, &[], "blank.gcode has no lines to send"),
-        (&elf, &job, &["--board", "uno"], "no board uno; there are mega2560-grbl, mega2560-lathe, ramps14"),
+        (
+            &elf,
+            &job,
+            &["--board", "uno"],
+            "no board uno; there are mega2560-grbl, mega2560-lathe, ramps14",
+        ),
     ];
     for (elf, job, more, want) in cases {
         let output = run(elf, job, more);
