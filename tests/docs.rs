@@ -13,7 +13,6 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::PathBuf;
 
-use kerf::boards::ALL;
 use kerf::config::docs as settings;
 use kerf::gcode::codes::docs as gcode;
 use kerf::protocol::tinyg::names;
