@@ -1,6 +1,6 @@
 //! The encoder of the spindle, looked after in thread mode: its settings, its speed, pulses that do not fit.
 //!
-//! The power task calls [`look`] each 20 ms; it costs 1,500 cycles then, and nothing without an encoder. The state is an [`Encoder`] in
+//! The power task calls [`look`] each 20 ms; it costs 1,500 cycles then, and nothing without an encoder. The state is an [`Encoder`](crate::encoder::Encoder) in
 //! `tasks::common`, under the ceiling. Nothing waits.
 
 use kerf_macros::small;

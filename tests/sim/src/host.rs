@@ -242,6 +242,7 @@ impl Host {
                 self.reports.push(report);
             }
             Incoming::Response(response) => self.answer(response),
+            Incoming::OtherGreeting => {}
             Incoming::Other(line) => self.strays.push(line),
         }
     }

@@ -11,6 +11,8 @@ pub enum Incoming {
     Response(Response),
     /// A report that nobody asked for: `sr`, `qr`, `er` and so on.
     Report(Value),
+    /// The greeting in grbl's dialect, which comes where nothing has decided for a dialect yet.
+    OtherGreeting,
     /// Anything else.
     Other(String),
 }
@@ -28,6 +30,9 @@ pub struct Response {
     pub free: i64,
 }
 
+/// The greeting in grbl's dialect.
+const OTHER_GREETING: &str = "Grbl 1.1h ['$' for help]";
+
 /// Status of a line that asked for nothing, such as a deleted block.
 pub const STATUS_NOOP: i64 = 3;
 
@@ -40,6 +45,9 @@ impl Response {
 
 /// Tells what a line is.
 pub fn classify(line: &str) -> Incoming {
+    if line.trim_end() == OTHER_GREETING {
+        return Incoming::OtherGreeting;
+    }
     let strict = serde_json::from_str::<Value>(line);
     let Ok(value) = strict.or_else(|_| serde_json::from_str(&quoted(line))) else {
         return Incoming::Other(line.to_string());
@@ -118,6 +126,7 @@ mod tests {
         assert_eq!(classify(banner), Incoming::Banner);
         let Incoming::Report(sr) = classify(r#"{"sr":{"stat":3}}"#) else { panic!() };
         assert_eq!(state_of(&sr), Some(3));
+        assert_eq!(classify("Grbl 1.1h ['$' for help]\r"), Incoming::OtherGreeting);
         assert!(matches!(classify("ok"), Incoming::Other(_)));
         assert!(matches!(classify(r#"{"r":{}}"#), Incoming::Other(_)));
     }
