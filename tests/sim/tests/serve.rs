@@ -21,8 +21,12 @@ impl Drop for Server {
 
 /// The first line that is no automatic report.
 fn next(lines: &mut Lines<BufReader<File>>) -> String {
-    let is_report = |line: &String| line.starts_with("{\"sr\":") || line.starts_with("{\"qr\":");
-    lines.map(Result::unwrap).find(|line| !is_report(line)).unwrap()
+    // Reports, and what the greeting says to senders of the other dialect.
+    let others = ["{\"sr\":", "{\"qr\":", "Grbl 1.1h"];
+    let is_other = |line: &String| {
+        line.trim_end().is_empty() || others.iter().any(|other| line.starts_with(other))
+    };
+    lines.map(Result::unwrap).find(|line| !is_other(line)).unwrap()
 }
 
 /// Starts a server; its first line is the port.
