@@ -11,8 +11,8 @@ use super::lines::{End, Lines};
 const BAUD: u32 = 115_200;
 /// Events (bytes, steps, milliseconds) that an input may take.
 const EVENTS_MAX: u32 = 100_000;
-/// How long a machine may be silent, or stand still, that has something to do.
-const PATIENCE_MS: u64 = 2_000;
+/// How long a machine may be silent, or stand still, that has something to do: a thread waits for the spindle's index for 6 s.
+const PATIENCE_MS: u64 = 7_000;
 /// Time between two looks.
 const LOOK_MS: u64 = 20;
 /// The longest answer has left in this time.
@@ -38,8 +38,14 @@ impl Talk {
     pub fn begin(text: &[u8]) -> Self {
         let machine = Machine::boot(BAUD).expect("one machine in each thread");
         let mut talk = Self { machine, ears: Ears::default(), events: 0, mute: is_muting(text) };
+        // Greeted in both dialects.
+        talk.ears.deaf = true;
         let greeted = talk.run(LAST_MS, |ears| ears.answers == 1);
         assert!(matches!(greeted, Ok(true)), "no greeting");
+        // A line of JSON decides for TinyG's, whose answers are counted.
+        talk.machine.send(b"{fv:n}\n");
+        let decided = talk.run(LAST_MS, |ears| ears.answers == 2);
+        assert!(matches!(decided, Ok(true)), "no answer");
         talk.ears.answers = 0;
         talk.ears.deaf = talk.mute;
         talk
