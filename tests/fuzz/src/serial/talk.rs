@@ -11,12 +11,16 @@ use super::lines::{End, Lines};
 const BAUD: u32 = 115_200;
 /// Events (bytes, steps, milliseconds) that an input may take.
 const EVENTS_MAX: u32 = 100_000;
-/// How long a machine may be silent, or stand still, that has something to do: a thread waits for the spindle's index for 6 s.
-const PATIENCE_MS: u64 = 7_000;
+/// How long a machine may be silent, or stand still, that has something to do and waits for no spindle.
+const PATIENCE_MS: u64 = 2_000;
 /// Time between two looks.
 const LOOK_MS: u64 = 20;
 /// The longest answer has left in this time.
 const LAST_MS: u64 = 300;
+/// A thread waits so long for the spindle, which says nothing here.
+const SPINDLE_MS: u64 = 7_000;
+/// What a thread is called.
+const THREADS: [&[u8]; 2] = [b"g32", b"g33"];
 /// Settings after which the machine may say nothing, or say it at another rate, or says what it hears, or passes for
 /// another.
 const MUTING: [&[u8]; 7] = [b"jv", b"tv", b"baud", b"ee0", b"ee1", b"eet", b"dia"];
@@ -31,13 +35,21 @@ pub struct Talk {
     events: u32,
     /// Some lines may not be answered.
     mute: bool,
+    /// Lines may wait for the spindle.
+    turns: bool,
 }
 
 impl Talk {
     /// Boots a machine that is going to be sent `text`.
     pub fn begin(text: &[u8]) -> Self {
         let machine = Machine::boot(BAUD).expect("one machine in each thread");
-        let mut talk = Self { machine, ears: Ears::default(), events: 0, mute: is_muting(text) };
+        let mut talk = Self {
+            machine,
+            ears: Ears::default(),
+            events: 0,
+            mute: names_any(&MUTING, text),
+            turns: names_any(&THREADS, text),
+        };
         // Greeted in both dialects.
         talk.ears.deaf = true;
         let greeted = talk.run(LAST_MS, |ears| ears.answers == 1);
@@ -94,7 +106,7 @@ impl Talk {
                 break;
             }
             let heard = self.ears.answers;
-            assert!(silent < PATIENCE_MS, "{heard} of {expected} lines are answered");
+            assert!(silent < self.patience_ms(), "{heard} of {expected} lines are answered");
         }
         let heard = self.ears.answers;
         assert!(self.mute || heard == expected, "{heard} answers to {expected} lines");
@@ -120,7 +132,8 @@ impl Talk {
     /// Waits until all that was sent has arrived, been carried out and been answered.
     fn rest(&mut self) -> Result<(), TooLong> {
         let (mut idle, mut still) = (0, 0);
-        while idle < LAST_MS {
+        let enough = if self.turns { SPINDLE_MS } else { LAST_MS };
+        while idle < enough {
             let said = self.ears.answers;
             self.run(LOOK_MS, |_| false)?;
             let quiet = said == self.ears.answers && !self.ears.listening();
@@ -128,9 +141,13 @@ impl Talk {
             idle = if busy || stepper::running() || !quiet { 0 } else { idle + LOOK_MS };
             self.go_on();
             still = if busy && !stepper::running() { still + LOOK_MS } else { 0 };
-            assert!(still < PATIENCE_MS, "stands still with {} blocks to do", queue::used());
+            assert!(still < self.patience_ms(), "stands still with {} blocks to do", queue::used());
         }
         Ok(())
+    }
+
+    fn patience_ms(&self) -> u64 {
+        if self.turns { SPINDLE_MS } else { PATIENCE_MS }
     }
 
     /// Cycle start, should a program have stopped.
@@ -152,9 +169,9 @@ impl Talk {
     }
 }
 
-/// Whether `text` may contain a setting that makes the machine mute.
-fn is_muting(text: &[u8]) -> bool {
+/// Whether `text` may contain one of these names.
+fn names_any(names: &[&[u8]], text: &[u8]) -> bool {
     let letters = text.iter().filter(|byte| byte.is_ascii_alphanumeric());
     let letters: Vec<_> = letters.map(u8::to_ascii_lowercase).collect();
-    MUTING.iter().any(|name| letters.windows(name.len()).any(|part| part == *name))
+    names.iter().any(|name| letters.windows(name.len()).any(|part| part == *name))
 }
