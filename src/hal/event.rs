@@ -69,10 +69,10 @@ machine_static! {
     fn asked() -> SharedByte = SharedByte::new(0);
 }
 
-/// Says whether bytes are to be looked for that act without the end of a line: then there is an [`Event::Received`] each [`EAGER_MS`], whether or
-/// not any byte has come. Thread mode.
-pub fn set_eager(on: bool) {
-    eager().set(on.into());
+/// Says on which ports, as bits, bytes are looked for that act without the end of a line: while any byte waits there, there is an
+/// [`Event::Received`] each [`EAGER_MS`]. Thread mode.
+pub fn set_eager(ports: u8) {
+    eager().set(ports);
 }
 
 /// Says whether somebody waits for an answer that thread mode works on. Exec leaves it more of the CPU then.
@@ -138,6 +138,12 @@ pub fn next(thread: Thread, event: Event) -> impl Future<Output = ()> {
     event.bit().next(thread)
 }
 
+/// Whether a byte waits on a port where one may act without the end of a line.
+fn is_eager() -> bool {
+    let eager = eager().get();
+    (0..PORTS as u8).any(|port| eager & 1 << port != 0 && imp::uart::newest(port).is_some())
+}
+
 /// A turn of the main loop: what is too small for a task. `bits` are the events since the last.
 pub fn turn(thread: Thread, bits: u8) {
     passed_over().set(0);
@@ -146,7 +152,7 @@ pub fn turn(thread: Thread, bits: u8) {
     }
     if Event::Tick.is_in(bits) {
         imp::uart::look();
-        if eager().get() != 0 && imp::time::millis() as u8 & (EAGER_MS - 1) == 0 {
+        if imp::time::millis() as u8 & (EAGER_MS - 1) == 0 && is_eager() {
             super::flags::set(Event::Received);
         }
     }

@@ -194,9 +194,10 @@ impl Links {
         self.port(if is_shared(feeder) { USB } else { feeder })
     }
 
-    /// Ports may have begun to speak otherwise: whether any is eager ([`Port::is_eager`]), and how the sides stop each other.
+    /// Ports may have begun to speak otherwise: which are eager ([`Port::is_eager`]), and how the sides stop each other.
     pub fn decided(&self, settings: &Settings) {
-        set_eager(self.ports.iter().any(Port::is_eager));
+        let eager = self.ports.iter().filter(|port| port.is_eager());
+        set_eager(eager.fold(0, |ports, port| ports | 1 << port.number));
         self.set_flow(settings);
     }
 

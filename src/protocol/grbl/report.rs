@@ -15,7 +15,7 @@ use crate::text;
 
 /// Reports from one `WCO` or `Ov` to the next, at rest.
 const AT_REST: u8 = 10;
-/// The same while the machine moves: of `WCO`, and of `Ov`.
+/// Reports from one `WCO` to the next while the machine moves, and from one `Ov` to the next.
 const OFFSETS: u8 = 30;
 const OVERRIDES: u8 = 20;
 

@@ -265,7 +265,7 @@ fn put(machine: &mut impl Machine, setting: Option<Setting>, to: Number) -> Resu
     put_value(machine, Some(setting), value)
 }
 
-/// The same, with the value as it is kept.
+/// Sets a setting to a value as it is kept.
 #[inline(never)]
 #[small]
 fn put_value(

@@ -72,7 +72,7 @@ pub struct Refusal {
 pub enum On {
     /// One that has everything, all axes standard.
     Usual,
-    /// The same without switches, probe and encoder.
+    /// A machine that has neither switches nor a probe nor an encoder.
     NoSwitches,
     /// The same with X disabled.
     DisabledX,

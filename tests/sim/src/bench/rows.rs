@@ -175,8 +175,7 @@ pub const ROWS: [Row; 45] = [
         better: Lower,
         peers: NONE,
         target: Some(1.2),
-        // A second dialect in the image takes 2 to 3 % of a line: 1.268 without it.
-        floor: Some(1.32),
+        floor: Some(1.30),
         measure: spirals::tenth_fast,
     },
     Row {
@@ -220,8 +219,7 @@ pub const ROWS: [Row; 45] = [
         better: Lower,
         peers: NONE,
         target: Some(1.3),
-        // As above: 1.400.
-        floor: Some(1.47),
+        floor: Some(1.45),
         measure: spirals::tenth_smooth,
     },
     Row {
@@ -267,8 +265,7 @@ pub const ROWS: [Row; 45] = [
         better: Higher,
         peers: ["291 at 115,200", "-", "115 at 115,200"],
         target: Some(1_000.0),
-        // As above: 1,107.
-        floor: Some(1_050.0),
+        floor: Some(1_080.0),
         measure: costs::lines,
     },
     Row {
