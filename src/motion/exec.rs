@@ -22,7 +22,7 @@
 
 use super::block::{Action, Block, Body, Line};
 use super::float::{below, least, scaled, some, whole};
-use super::governor::{Ahead, Governor, same};
+use super::governor::{Ahead, Governor, Stretch, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
 use super::short::Short;
@@ -444,6 +444,27 @@ impl Exec {
             let seconds = if coarse { 2.0 * SEGMENT_S } else { SEGMENT_S };
             self.governor.stretch(running.left, running.cruise, &ahead, seconds)
         };
+        self.hand_out(&stretch, blocks, out, segment, |exec| {
+            let running = &exec.running;
+            // Fine ticks leave no time to lay out a ramp under a jerk limit.
+            let steady = !running.jerk || exec.governor.is_far_from_ramps();
+            let short = if running.jerk { !running.long } else { running.short };
+            (running.long && steady, short && exec.coarse)
+        })
+    }
+
+    /// Makes a segment of a stretch of the line being run. `ticks` says whether it may have fine ticks, and whether coarse ones
+    /// ([`Prep::refine`]).
+    #[inline(always)]
+    fn hand_out(
+        &mut self,
+        stretch: &Stretch,
+        blocks: &mut BlockSource,
+        out: &mut Snapshot,
+        segment: &mut Segment,
+        ticks: impl FnOnce(&Self) -> (bool, bool),
+    ) -> Step {
+        let running = &mut self.running;
         out.velocity = self.governor.velocity();
         let cycles = cycles_of(stretch.seconds);
         if stretch.ends {
@@ -459,10 +480,8 @@ impl Exec {
         running.left -= stretch.distance;
         out.left = running.left;
         let left = whole(running.left * running.scale);
-        // Fine ticks leave no time to lay out a ramp under a jerk limit.
-        let steady = !running.jerk || self.governor.is_far_from_ramps();
-        let short = if running.jerk { !running.long } else { running.short };
-        self.prep.refine(running.long && steady, short && self.coarse);
+        let (fine, coarse) = ticks(self);
+        self.prep.refine(fine, coarse);
         step(self.prep.segment(left, cycles, segment))
     }
 
@@ -511,23 +530,7 @@ impl Exec {
             self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
         };
         self.thread.handed(stretch.distance);
-        out.velocity = self.governor.velocity();
-        let cycles = cycles_of(stretch.seconds);
-        if stretch.ends {
-            out.left = 0.0;
-            running.done = true;
-            let whole = running.fresh;
-            return self.end(cycles, whole, blocks, segment);
-        }
-        if running.fresh {
-            running.fresh = false;
-            running.scale = self.prep.own() as f32 / running.left;
-        }
-        running.left -= stretch.distance;
-        out.left = running.left;
-        let left = whole(running.left * running.scale);
-        self.prep.refine(false, false);
-        step(self.prep.segment(left, cycles, segment))
+        self.hand_out(&stretch, blocks, out, segment, |_| (false, false))
     }
 
     /// Hands out what is left of the line being run.
