@@ -1,8 +1,8 @@
-//! The sensors of the spindle on the host: edges that tests make, and the same pulses of them as on the chip.
+//! The sensors of the spindle on the host: edges that tests or a turning spindle make, and the same pulses of them as on the chip.
 
 use core::cell::Cell;
 
-use super::{inputs, now};
+use super::{NEVER, inputs, now};
 use crate::boards::{ACTIVE, Pin};
 use crate::encoder::Pulses;
 
@@ -18,7 +18,21 @@ struct Sensors {
     levels: Cell<[(bool, u64); 2]>,
 }
 
+/// A spindle that turns by itself.
+#[derive(Clone, Copy)]
+struct Turning {
+    /// Cycles from an edge to the next; 0 while it stands.
+    half: u64,
+    /// Pulses of sync in a turn; with 1 the index alone.
+    per_turn: u16,
+    /// Edges of this turn.
+    edges: u16,
+    next: u64,
+}
+
 machine_static! {
+    fn turning() -> Cell<Turning> =
+        Cell::new(Turning { half: 0, per_turn: 1, edges: 0, next: NEVER });
     fn all() -> Sensors = Sensors {
         pulses: Cell::new(Pulses::NONE),
         in_use: Cell::new(0),
@@ -42,6 +56,35 @@ pub fn is_set_up() -> bool {
 /// What the sensors have seen so far.
 pub fn read() -> Pulses {
     Pulses { now: (now() / COUNT) as u16, ..all().pulses.get() }
+}
+
+/// The spindle turns at `rpm` turns a minute from now on, with `per_turn` pulses of sync in each; it stands if `rpm` is 0 or less.
+pub(super) fn turn(rpm: f64, per_turn: u16) {
+    let per_turn = per_turn.max(1);
+    let edges = rpm * f64::from(per_turn) * 2.0;
+    let half = if edges > 0.0 { (f64::from(ACTIVE.clock_hz) * 60.0 / edges) as u64 } else { 0 };
+    let edges = turning().get().edges % (per_turn * 2);
+    let next = if half > 0 { now() + half } else { NEVER };
+    turning().set(Turning { half, per_turn, edges, next });
+}
+
+/// When the spindle makes its next edge.
+pub(super) fn next_edge() -> u64 {
+    turning().get().next
+}
+
+/// An edge of the spindle, at its time: each pulse begins with a falling one, the first of a turn with that of the index, too.
+pub(super) fn advance() {
+    let spindle = turning().get();
+    let rises = spindle.edges % 2 == 1;
+    if spindle.per_turn > 1 {
+        edge(1, rises);
+    }
+    if spindle.edges < 2 {
+        edge(0, rises);
+    }
+    let edges = (spindle.edges + 1) % (spindle.per_turn * 2);
+    turning().set(Turning { edges, next: now() + spindle.half, ..spindle });
 }
 
 /// A pin is driven.

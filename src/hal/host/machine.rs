@@ -6,7 +6,7 @@ use avr_embassy::Thread;
 use avr_embassy::host::Runtime;
 use embassy_executor::Spawner;
 
-use super::{clock, inputs, now, stepper, time, uart};
+use super::{clock, encoder, inputs, now, stepper, time, uart};
 use crate::hal::event::{self, Event};
 use crate::hal::serial::{AUX, USB};
 
@@ -88,6 +88,11 @@ impl Machine {
         stepper::set_near(input, step, opens);
     }
 
+    /// The spindle turns at `rpm` turns a minute, with `per_turn` pulses of its encoder in each, until it is told otherwise.
+    pub fn turn_spindle(&self, rpm: f64, per_turn: u16) {
+        encoder::turn(rpm, per_turn);
+    }
+
     /// Runs for a time.
     pub fn run_ms(&self, ms: u64) {
         let end = now() + ms * time::CYCLES_PER_MS;
@@ -111,7 +116,8 @@ impl Machine {
         let bytes = uart::next_event();
         let tick = time::next_tick();
         let look = inputs::next_look();
-        let next = step.min(bytes).min(tick).min(look);
+        let edge = encoder::next_edge();
+        let next = step.min(bytes).min(tick).min(look).min(edge);
         if next > end {
             clock().set(end);
             return false;
@@ -128,6 +134,9 @@ impl Machine {
         }
         if look == next {
             inputs::look();
+        }
+        if edge == next {
+            encoder::advance();
         }
         self.settle();
         true
