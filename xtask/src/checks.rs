@@ -32,6 +32,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "sizes and stack of every board", run: size_all },
     Stage { name: "simulator tests", run: simulator_tests },
     Stage { name: "real senders", run: || crate::senders::run(&Default::default()) },
+    Stage { name: "the page in a browser", run: crate::web::test },
 ];
 
 /// Runs the stages; stops at the first that fails. The simulator and the senders that talk to it come last: they need the
@@ -86,9 +87,10 @@ fn has_component(subcommand: &str, component: &str) -> bool {
     found
 }
 
-/// With what the fuzzers do, done once.
+/// With what the fuzzers do, done once, and with what the page is made of.
 fn host_tests() -> Result<()> {
     cargo(&["test"])?;
+    cargo(&["test", "--package", "kerf-web"])?;
     cargo(&["test", "--package", "kerf-fuzz"])
 }
 

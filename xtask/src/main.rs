@@ -14,6 +14,8 @@
 //! | [`settings`] | saves and loads the settings of a machine |
 //! | [`fuzz`] | runs the fuzzers |
 //! | [`senders`] | runs real senders against the simulated board |
+//! | [`npm`] | installs packages of npm |
+//! | [`web`] | builds the page with the firmware in it, serves and tests it |
 //! | [`checks`] | everything that must pass before a merge |
 //! | [`jobs`] | writes the example jobs |
 //! | [`nist`] | what another interpreter makes of G-code, to compare with |
@@ -36,6 +38,7 @@ mod jobs;
 mod layers;
 mod machines;
 mod nist;
+mod npm;
 mod process;
 #[cfg(test)]
 mod seam;
@@ -46,6 +49,7 @@ mod shrink;
 mod sim;
 mod size;
 mod toolchain;
+mod web;
 
 use std::process::ExitCode;
 
@@ -78,6 +82,8 @@ enum Command {
     Fuzz(fuzz::FuzzArgs),
     /// Run real senders of G-code, CNCjs and g2core-api, against the simulated board
     Senders(senders::SendersArgs),
+    /// Build the page with the firmware in it: a folder of static files; the last line is `page: FOLDER`
+    Web(web::WebArgs),
     /// Run every check: format, lints, host tests, firmware, sizes, simulator
     Test,
     /// Write the firmware to a board
@@ -128,6 +134,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Serve(args) => return sim::serve(&args),
         Command::Fuzz(args) => return fuzz::run(&args),
         Command::Senders(args) => senders::run(&args)?,
+        Command::Web(args) => web::run(&args)?,
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
         Command::Settings(args) => return settings::run(&args),

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 
 use crate::boards::Board;
@@ -24,8 +24,8 @@ pub struct RunArgs {
     /// The machine whose settings are the defaults
     #[arg(long, value_enum, default_value_t)]
     machine: Machine,
-    /// A setting sent before the job, as the sender would: '{"xvm":800}'
-    #[arg(long, value_name = "JSON")]
+    /// A setting sent before the job, as the sender would: '{"xvm":800}'; with @FILE each line of a file
+    #[arg(long, value_name = "JSON|@FILE")]
     set: Vec<String>,
     /// The speed of the serial line, which the firmware is told to change to
     #[arg(long)]
@@ -79,7 +79,7 @@ pub struct BenchArgs {
 pub fn run(args: &RunArgs) -> Result<ExitCode> {
     ensure!(args.job.is_file(), "there is no job {}", args.job.display());
     let elf = prepare(args.board, args.machine)?;
-    pass_through(&mut run_command(args, &elf))
+    pass_through(&mut run_command(args, &elf)?)
 }
 
 /// Builds and offers the simulated board as a serial port. The simulator takes this process's place: `cargo run` does so as well, so that
@@ -105,11 +105,11 @@ pub fn prepare(board: Board, machine: Machine) -> Result<PathBuf> {
     Ok(elf)
 }
 
-fn run_command(args: &RunArgs, elf: &Path) -> Command {
+fn run_command(args: &RunArgs, elf: &Path) -> Result<Command> {
     let mut command = simulator("run", elf, args.board);
     command.arg(&args.job);
-    for set in &args.set {
-        command.args(["--set", set]);
+    for set in settings(&args.set)? {
+        command.arg("--set").arg(set);
     }
     option(&mut command, "--baud", args.baud.map(|baud| baud.to_string()));
     option(&mut command, "--report", args.report.as_ref());
@@ -117,7 +117,22 @@ fn run_command(args: &RunArgs, elf: &Path) -> Command {
     option(&mut command, "--plot", args.plot.as_ref());
     option(&mut command, "--span", args.span.as_ref());
     option(&mut command, "--smooth", args.smooth.map(|ms| ms.to_string()));
-    command
+    Ok(command)
+}
+
+/// The settings one by one: of `@FILE` each line that is not empty.
+fn settings(given: &[String]) -> Result<Vec<String>> {
+    let mut all = Vec::new();
+    for set in given {
+        let Some(file) = set.strip_prefix('@') else {
+            all.push(set.clone());
+            continue;
+        };
+        let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {file}"))?;
+        let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+        all.extend(lines.map(str::to_owned));
+    }
+    Ok(all)
 }
 
 fn serve_command(args: &ServeArgs, elf: &Path) -> Command {
@@ -134,6 +149,12 @@ fn bench_command(args: &BenchArgs, elf: &Path) -> Command {
         command.args(["--row", row]);
     }
     command
+}
+
+/// Runs a job without a word, and writes down what happened.
+pub fn report(elf: &Path, job: &Path, file: &Path) -> Result<()> {
+    let mut command = simulator("run", elf, Board::default());
+    run_child(command.arg(job).arg("--quiet").arg("--report").arg(file))
 }
 
 /// Builds the simulator; where it lies.
@@ -185,10 +206,21 @@ mod tests {
             smooth: Some(30),
         };
         assert_eq!(
-            after_dashes(&run_command(&args, Path::new("k.elf"))),
+            after_dashes(&run_command(&args, Path::new("k.elf")).unwrap()),
             "run --elf k.elf --board ramps14 a.gcode --set {\"xvm\":800} --set {\"yvm\":800} \
              --baud 250000 --report r.json --vcd v.vcd --plot p.svg --span 1..2 --smooth 30"
         );
+    }
+
+    #[test]
+    fn a_file_of_settings_is_as_its_lines() {
+        let folder = root().join("target/tmp/set");
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = folder.join("settings.txt");
+        std::fs::write(&file, "{xvm:1}\r\n\n {y:{vm:2}}\n").unwrap();
+        let given = ["{zvm:3}".to_owned(), format!("@{}", file.display())];
+        assert_eq!(settings(&given).unwrap(), ["{zvm:3}", "{xvm:1}", "{y:{vm:2}}"]);
+        assert!(settings(&["@/nonexistent".into()]).is_err());
     }
 
     #[test]

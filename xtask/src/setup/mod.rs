@@ -5,6 +5,7 @@
 
 mod install;
 mod needs;
+mod wasm;
 
 use anyhow::{Result, bail};
 
@@ -12,9 +13,15 @@ use crate::toolchain::Toolchain;
 use install::{Means, Step};
 use needs::Need;
 pub use needs::Scope;
+pub use wasm::TARGET;
 
 /// Makes sure that the tools are there; silent when they are.
 pub fn ensure(scope: Scope) -> Result<()> {
+    ensure_programs(scope)?;
+    if scope.covers(Scope::Web) { wasm::ensure(Means::here()) } else { Ok(()) }
+}
+
+fn ensure_programs(scope: Scope) -> Result<()> {
     let missing = needs::missing(scope);
     if missing.is_empty() {
         return Ok(());

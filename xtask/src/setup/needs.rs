@@ -17,16 +17,24 @@ pub enum Scope {
     Fuzzers,
     /// Running senders at the simulator.
     Senders,
+    /// Building the page.
+    Web,
+    /// Running the page in a browser.
+    WebTests,
     /// All of it.
     Everything,
 }
 
 impl Scope {
-    fn covers(self, need: Scope) -> bool {
+    pub(super) fn covers(self, need: Scope) -> bool {
         match self {
             Scope::Everything => true,
             Scope::Fuzzers => need == Scope::Fuzzers,
             Scope::Senders => need == Scope::Senders || Scope::Simulator.covers(need),
+            Scope::Web => matches!(need, Scope::Senders | Scope::Web),
+            Scope::WebTests => {
+                need == Scope::WebTests || Scope::Web.covers(need) || Scope::Simulator.covers(need)
+            }
             Scope::Firmware | Scope::Simulator => need <= self,
         }
     }
@@ -45,7 +53,7 @@ pub struct Need {
 }
 
 /// Everything, in the order in which it is reported.
-pub static NEEDS: [Need; 9] = [
+pub static NEEDS: [Need; 10] = [
     Need {
         what: "Rust with its library sources (rustup nightly with rust-src, or Debian's)",
         packages: &["rustc-web", "cargo-web", "rust-web-src"],
@@ -68,11 +76,12 @@ pub static NEEDS: [Need; 9] = [
     }),
     tool("a C++ compiler, for libFuzzer", &["g++"], Scope::Fuzzers, || has("c++")),
     tool(
-        "node and npm, for senders",
+        "node and npm, for senders and the page",
         &["nodejs", "npm", "ca-certificates"],
         Scope::Senders,
         || has("node") && has("npm"),
     ),
+    tool("Chromium, for tests of the page", &["chromium"], Scope::WebTests, || has("chromium")),
 ];
 
 const SIM: Scope = Scope::Simulator;
@@ -136,6 +145,8 @@ mod tests {
         assert_eq!(needs(Scope::Simulator), 7);
         assert_eq!(needs(Scope::Fuzzers), 1);
         assert_eq!(needs(Scope::Senders), 8);
+        assert_eq!(needs(Scope::Web), 1);
+        assert_eq!(needs(Scope::WebTests), 9);
         assert_eq!(needs(Scope::Everything), NEEDS.len());
     }
 

@@ -1,0 +1,252 @@
+// The machine that the page talks to: a simulated one in a Worker, or a real one behind Web Serial. Both have the same face.
+//
+// | member | |
+// |---|---|
+// | `send(text)` | characters, as they are |
+// | `ask(line)` | sends a line; its answer as `{ body, status }`, one question at a time |
+// | `stream(job)`, `stopStream()` | sends a job safely |
+// | events | `line` (`{ line, asked }`: whether it answers `ask`), `sent`, `state`, `trail`, `booted`, `progress`, `streamed`, `closed` |
+//
+// Answers belong to questions by their order. While a job is sent its answers are the job's: `ask` waits until it is over.
+
+import { Lines, answerStatus, parse } from './protocol.js';
+import { Sender, linesOf } from './sender.js';
+
+/// Longest wait for an answer, ms of the computer's time.
+const ANSWER_MS = 4_000;
+
+class Board extends EventTarget {
+  #lines = new Lines();
+  #asked = [];
+  streaming = false;
+  /// What the page says first decides: `tinyg` or `grbl`.
+  dialect = 'tinyg';
+
+  tell(name, detail) {
+    this.dispatchEvent(new CustomEvent(name, { detail }));
+  }
+
+  on(name, act) {
+    this.addEventListener(name, ({ detail }) => act(detail));
+  }
+
+  /// Characters from the machine.
+  hear(text) {
+    for (const line of this.#lines.add(text)) {
+      const status = answerStatus(line);
+      const waits = status === undefined || this.streaming ? undefined : this.#asked.shift();
+      this.tell('line', { line, asked: waits?.asked === true });
+      waits?.hear?.(line, status);
+    }
+  }
+
+  /// The lines that somebody types are answered too: they take their place in the order.
+  type(line) {
+    if (!this.streaming && line.trim() !== '' && !/^[!~%?]$/.test(line.trim())) this.#asked.push({});
+    this.tell('sent', line);
+    this.send(`${line}\n`);
+  }
+
+  ask(line) {
+    const answer = new Promise((resolve, reject) => {
+      if (this.streaming) return reject(new Error('a job is being sent'));
+      const late = setTimeout(() => {
+        this.#asked = [];
+        reject(new Error(`no answer to ${line}`));
+      }, ANSWER_MS);
+      const hear = (heard, status) => {
+        clearTimeout(late);
+        resolve({ body: parse(heard)?.r ?? {}, status });
+      };
+      this.#asked.push({ asked: true, hear });
+    });
+    this.send(`${line}\n`);
+    return answer;
+  }
+
+  /// Nobody waits any more.
+  forget() {
+    this.#asked = [];
+    this.#lines = new Lines();
+  }
+}
+
+/// The firmware in a Worker.
+export class SimulatedBoard extends Board {
+  name = 'Simulated';
+  simulated = true;
+  #worker;
+  #snapshots = new Map();
+  #count = 0;
+
+  constructor(module) {
+    super();
+    this.#worker = new Worker(new URL('./machine-worker.js', import.meta.url), { type: 'module' });
+    this.#worker.onmessage = ({ data }) => this.#told(data);
+    this.#worker.postMessage({ module });
+  }
+
+  #told(data) {
+    if ('heard' in data) {
+      if (data.port === 0) this.hear(data.heard);
+    } else if ('snapshot' in data) {
+      this.#snapshots.get(data.snapshot)?.(data.eeprom);
+      this.#snapshots.delete(data.snapshot);
+    } else if ('booted' in data) {
+      this.forget();
+      this.tell('booted');
+    } else if ('streamed' in data) {
+      this.streaming = false;
+      this.tell('streamed', data.streamed);
+    } else {
+      for (const name of ['state', 'trail', 'progress']) if (name in data) this.tell(name, data[name]);
+    }
+  }
+
+  send(text) {
+    this.#worker.postMessage({ send: text });
+  }
+
+  stream(job) {
+    this.streaming = true;
+    this.#worker.postMessage({ stream: job });
+  }
+
+  stopStream() {
+    this.#worker.postMessage({ stopStream: true });
+  }
+
+  /// What the EEPROM holds, once everything is stored.
+  eeprom() {
+    const id = (this.#count += 1);
+    return new Promise((resolve) => {
+      this.#snapshots.set(id, resolve);
+      this.#worker.postMessage({ snapshot: id });
+    });
+  }
+
+  /// Off and on again; what is stored stays.
+  power() {
+    this.#worker.postMessage({ power: true });
+  }
+
+  set speed(speed) {
+    this.#worker.postMessage({ speed });
+  }
+
+  press(input, closed) {
+    this.#worker.postMessage({ press: input, closed });
+  }
+
+  near(input, step) {
+    this.#worker.postMessage({ near: [input, step] });
+  }
+
+  turnSpindle(rpm, perTurn) {
+    this.#worker.postMessage({ spindle: { rpm, perTurn } });
+  }
+
+  close() {
+    this.#worker.terminate();
+    this.tell('closed');
+  }
+}
+
+/// A real board behind Web Serial.
+export class SerialBoard extends Board {
+  name = 'Real board';
+  simulated = false;
+  #port;
+  #writer;
+  #reader;
+  #sender;
+
+  /// Asks the user for a port and opens it: a board resets then.
+  static async open(baudRate = 115_200) {
+    const board = new SerialBoard();
+    board.#port = await navigator.serial.requestPort();
+    await board.#port.open({ baudRate, bufferSize: 4_096 });
+    board.#writer = board.#port.writable.getWriter();
+    board.#read();
+    return board;
+  }
+
+  async #read() {
+    const decoder = new TextDecoder('latin1');
+    try {
+      while (this.#port?.readable) {
+        this.#reader = this.#port.readable.getReader();
+        for (;;) {
+          const { value, done } = await this.#reader.read();
+          if (done) break;
+          this.#heard(decoder.decode(value, { stream: true }));
+        }
+        this.#reader.releaseLock();
+        break;
+      }
+    } catch {
+      // The cable is out: `closed` tells it.
+    }
+    this.#reader = undefined;
+    this.#port = undefined;
+    this.streaming = false;
+    this.tell('closed');
+  }
+
+  #jobLines = new Lines();
+
+  #heard(text) {
+    this.hear(text);
+    const sender = this.#sender;
+    const lines = this.#jobLines.add(text);
+    if (lines.some((line) => parse(line)?.r?.msg === 'SYSTEM READY')) {
+      this.#end('the machine has started anew');
+      this.forget();
+      this.tell('booted');
+    }
+    if (!sender || sender !== this.#sender) return;
+    for (const line of lines) sender.hear(line);
+    this.tell('progress', { sent: sender.last, total: sender.total });
+    if (sender.done) this.#end('');
+    else this.#feed();
+  }
+
+  #feed() {
+    const text = this.#sender?.take();
+    if (text) this.send(text);
+  }
+
+  #end(why) {
+    if (!this.#sender) return;
+    const { answered, refused, notes } = this.#sender;
+    this.#sender = undefined;
+    this.streaming = false;
+    this.tell('streamed', { answered, refused, notes, why });
+  }
+
+  send(text) {
+    this.#writer?.write(Uint8Array.from(text, (character) => character.charCodeAt(0))).catch(() => {});
+  }
+
+  stream(job) {
+    this.streaming = true;
+    this.#sender = new Sender(linesOf(job), job.split('\n').length);
+    this.#feed();
+  }
+
+  stopStream() {
+    this.#sender?.stop();
+    if (this.#sender?.done) this.#end('');
+  }
+
+  async close() {
+    const port = this.#port;
+    try {
+      await this.#reader?.cancel();
+      this.#writer?.releaseLock();
+      await port?.close();
+    } catch {
+      // It is closed already.
+    }
+  }
+}

@@ -1,0 +1,45 @@
+// Small helpers to make elements and to write numbers. No state.
+
+/// An element: `h('button', { class: 'primary', onclick }, 'Run')`. Attributes that are false or missing are left out.
+export function h(tag, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === false || value === undefined) continue;
+    if (name.startsWith('on')) element.addEventListener(name.slice(2), value);
+    else element.setAttribute(name, value === true ? '' : value);
+  }
+  element.append(...children.filter((child) => child !== undefined && child !== false));
+  return element;
+}
+
+export const byId = (id) => document.getElementById(id);
+
+/// Tells who cannot see the page.
+export function say(text) {
+  byId('say').textContent = text;
+}
+
+/// `1:02:03.4`, or `2:03.4`.
+export function clock(ms) {
+  const tenths = Math.round(ms / 100);
+  const [h_, m, s] = [Math.floor(tenths / 36_000), Math.floor(tenths / 600) % 60, (tenths % 600) / 10];
+  const seconds = s.toFixed(1).padStart(4, '0');
+  return h_ > 0 ? `${h_}:${String(m).padStart(2, '0')}:${seconds}` : `${m}:${seconds}`;
+}
+
+/// A number with thin groups: `12 345`.
+export function grouped(number) {
+  return Math.round(number).toLocaleString('en').replaceAll(',', ' ');
+}
+
+export function millimetres(mm) {
+  return mm >= 10_000 ? `${(mm / 1_000).toFixed(2)} m` : `${mm.toFixed(1)} mm`;
+}
+
+/// Has the browser save a file.
+export function download(name, text) {
+  const url = URL.createObjectURL(new Blob([text], { type: 'text/plain' }));
+  const link = h('a', { href: url, download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(url), 1_000);
+}

@@ -1,0 +1,117 @@
+// The firmware as a WebAssembly module: one instance is one machine. See web/src/lib.rs for what each call does.
+//
+// Owned by a Worker, or by a test in Node. Buffers that a call returns are copies.
+
+const encoder = new TextEncoder();
+/// Characters as bytes: those above 7F act at once.
+const bytesOf = (text) => Uint8Array.from(text, (character) => character.charCodeAt(0));
+const decoder = new TextDecoder('latin1');
+
+/// How many inputs a board has, and what they are called: the order of `boards::inputs`.
+export const INPUTS = ['xmin', 'xmax', 'ymin', 'ymax', 'zmin', 'zmax', 'amin', 'amax', 'probe', 'door', 'stop'];
+
+export class Firmware {
+  /// `module` is a compiled WebAssembly.Module.
+  constructor(module) {
+    this.wasm = new WebAssembly.Instance(module, {}).exports;
+  }
+
+  #give(bytes) {
+    const at = this.wasm.input(bytes.length);
+    new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
+    return bytes.length;
+  }
+
+  #take(length) {
+    const at = this.wasm.output();
+    return this.wasm.memory.buffer.slice(at, at + length);
+  }
+
+  /// Boots with the contents of an EEPROM, empty for a new machine; `asked` after a reset by the firmware.
+  boot(eeprom = new Uint8Array(), asked = false) {
+    const length = this.#give(eeprom);
+    if (this.wasm.boot(length, asked ? 1 : 0) !== 1) throw new Error('the firmware does not boot');
+  }
+
+  /// Puts text or bytes on the line of a port.
+  send(data, port = 0) {
+    this.wasm.send(port, this.#give(typeof data === 'string' ? bytesOf(data) : data));
+  }
+
+  /// What the firmware has sent since the last call.
+  heard(port = 0) {
+    return decoder.decode(this.#take(this.wasm.heard(port)));
+  }
+
+  /// Runs for `ms` of the machine's time; less if `stops` at the end of a line from the firmware. Returns how long.
+  run(ms, stops = false) {
+    return this.wasm.run(ms, stops ? 1 : 0);
+  }
+
+  state() {
+    const [ms, s0, s1, s2, s3, outputs, pulse, powered, worked, reset] =
+      new Float64Array(this.#take(this.wasm.state()));
+    return { ms, steps: [s0, s1, s2, s3], outputs, pulse, powered, worked, reset: reset !== 0 };
+  }
+
+  eeprom() {
+    return new Uint8Array(this.#take(this.wasm.eeprom()));
+  }
+
+  press(input, closed) {
+    this.wasm.press(input, closed ? 1 : 0);
+  }
+
+  near(input, step) {
+    this.wasm.near(input, step);
+  }
+
+  spindle(rpm, perTurn) {
+    this.wasm.spindle(rpm, perTurn);
+  }
+
+  beginSamples() {
+    this.wasm.begin_samples();
+  }
+
+  /// Four steps for each sample.
+  samples() {
+    return new Int32Array(this.#take(this.wasm.samples()));
+  }
+
+  sampleMs() {
+    return this.wasm.sample_ms();
+  }
+
+  /// Velocity, acceleration and jerk of the samples, in mm and s; `scale` is the millimetres of a step of each motor.
+  curves(scale) {
+    this.wasm.work_out_curves(this.#give(new Uint8Array(Float64Array.from(scale).buffer)));
+    const curve = (which) => new Float32Array(this.#take(this.wasm.curve(which)));
+    return { velocity: curve(0), acceleration: curve(1), jerk: curve(2) };
+  }
+
+  /// Lowest, highest and all steps of each motor since the samples began.
+  extremes() {
+    const all = new Float64Array(this.#take(this.wasm.extremes()));
+    return [0, 1, 2, 3].map((m) => ({ lowest: all[3 * m], highest: all[3 * m + 1], total: all[3 * m + 2] }));
+  }
+
+  /// Which lines ask for more than the limits allow: six feed limits, six velocities, per minute.
+  asked(limits, text) {
+    const job = encoder.encode(text);
+    const bytes = new Uint8Array(96 + job.length);
+    bytes.set(new Uint8Array(Float64Array.from(limits).buffer));
+    bytes.set(job, 96);
+    return JSON.parse(decoder.decode(this.#take(this.wasm.asked(this.#give(bytes)))));
+  }
+
+  /// Profiles and codes.
+  tables() {
+    return JSON.parse(new TextDecoder().decode(this.#take(this.wasm.tables())));
+  }
+
+  /// Bytes of memory that the machine and its samples take.
+  memory() {
+    return this.wasm.memory.buffer.byteLength;
+  }
+}

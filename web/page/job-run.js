@@ -1,0 +1,201 @@
+// Carries a job out on a machine of its own, as fast as the computer can, and tells what came of it.
+//
+// Runs in a Worker, or in Node for tests. The machine begins at the work zero, with the settings of the machine that is shown; it is at
+// rest and homed. Homing is taken for done, stops (M0) are passed over, for nobody is there. An error says why it could not begin.
+
+import { Firmware } from './firmware.js';
+import { Lines, answerStatus, parse } from './protocol.js';
+import { Sender, homes, linesOf } from './sender.js';
+import { pathOf } from './path.js';
+
+/// The longest wait for an answer, ms of the machine's time: more than any move takes.
+const LONGEST_MS = 24 * 3_600_000;
+/// Milliseconds of the computer's time after which others have their turn.
+const TURN_MS = 40;
+/// More lines than this in a second, and the board's CPU, which is not reckoned with here, may be the limit.
+const MOST_LINES = 464;
+/// Exceptions after which a job goes on.
+const HARMLESS = [37, 38, 39, 40, 180];
+const AXES = ['x', 'y', 'z'];
+
+const breath = () => new Promise((resolve) => setTimeout(resolve, 0));
+
+/// A conversation with the machine.
+class Talk {
+  #lines = new Lines();
+  #heard = [];
+
+  constructor(module, eeprom) {
+    this.firmware = new Firmware(module);
+    this.firmware.boot(eeprom);
+    this.ms = 0;
+    // The greeting.
+    this.pass(100);
+    this.#heard = [];
+  }
+
+  pass(ms, stops = false) {
+    this.ms += this.firmware.run(ms, stops);
+    this.#heard.push(...this.#lines.add(this.firmware.heard()));
+  }
+
+  line() {
+    return this.#heard.shift();
+  }
+
+  /// The answer to a line; an error if it is refused.
+  ask(line) {
+    this.firmware.send(`${line}\n`);
+    for (let waited = 0; waited < 60_000; waited += 1) {
+      for (let heard = this.line(); heard !== undefined; heard = this.line()) {
+        const status = answerStatus(heard);
+        if (status === undefined) continue;
+        if (status !== 0) throw new Error(`${line} is refused with status ${status}`);
+        return parse(heard)?.r ?? {};
+      }
+      this.pass(50, true);
+    }
+    throw new Error(`no answer to ${line}`);
+  }
+}
+
+/// What motors and axes are, as the machine tells it.
+function describe(talk) {
+  const motors = [1, 2, 3, 4].map((m) => talk.ask(`{${m}:n}`)[m]);
+  const axes = ['x', 'y', 'z', 'a', 'b', 'c'].map((axis) => talk.ask(`{${axis}:n}`)[axis]);
+  const scale = motors.map((motor) => (motor.tr * motor.sa) / 360 / motor.mi);
+  const motorOf = (axis) => motors.findIndex((motor) => motor.ma === axis);
+  return { axes, scale, motorOf };
+}
+
+/// Runs a job: `{ text, eeprom, settings, zero }`. `progress` is told `{ sent, total, ms }` now and then, and ends the run by returning false.
+export async function runJob(module, job, progress = () => true) {
+  const talk = new Talk(module, job.eeprom ?? new Uint8Array());
+  const { firmware } = talk;
+  for (const line of job.settings ?? []) talk.ask(line);
+  talk.ask('{psw:0,sv:0,qv:0,jv:3,ej:1}');
+  const { axes, scale, motorOf } = describe(talk);
+  const zero = job.zero ?? defaultZero(axes);
+  const inches = talk.ask('{unit:n}').unit === 0;
+  talk.ask(`G21 G28.3 X${zero[0]} Y${zero[1]} Z${zero[2]}`);
+  talk.ask(`G10 L2 P1 X${zero[0]} Y${zero[1]} Z${zero[2]}`);
+  if (inches) talk.ask('G20');
+  const limits = [...axes.map((axis) => axis.fr ?? 0), ...axes.map((axis) => axis.vm ?? 0)];
+  const asked = firmware.asked(limits, job.text);
+
+  const notes = [];
+  function* sent() {
+    for (const line of linesOf(job.text)) {
+      if (homes(line.text)) notes.push({ line: line.number, text: 'Homing is taken for done.' });
+      else yield line;
+    }
+  }
+  let total = 0;
+  for (let at = job.text.indexOf('\n'); at >= 0; at = job.text.indexOf('\n', at + 1)) total += 1;
+  const sender = new Sender(sent(), total);
+  firmware.beginSamples();
+  const began = talk.ms;
+  const pace = { times: [], busiest: 0 };
+  let turn = performance.now();
+  let silent = 0;
+  while (!sender.done) {
+    const text = sender.take();
+    if (text) firmware.send(text);
+    const before = talk.ms;
+    talk.pass(200, true);
+    silent += talk.ms - before;
+    for (let heard = talk.line(); heard !== undefined; heard = talk.line()) {
+      silent = 0;
+      const known = sender.notes.length;
+      if (sender.hear(heard)) count(pace, talk.ms);
+      const note = sender.notes[known];
+      if (note?.status !== undefined && !HARMLESS.includes(note.status)) {
+        note.text = 'It cannot be tried here: the alarm was cleared, and the job went on.';
+        firmware.send('{clear:n}\n');
+        // Its answer is no line's of the job.
+        await_clear(talk, sender, pace);
+      }
+    }
+    if (silent > LONGEST_MS) throw new Error(`no answer after line ${sender.last}`);
+    if (performance.now() - turn > TURN_MS) {
+      if (progress({ sent: sender.last, total, ms: talk.ms - began }) === false) return undefined;
+      await breath();
+      turn = performance.now();
+    }
+  }
+  while (talk.ask('{stat:n}').stat === 5) {
+    talk.pass(20);
+    if (performance.now() - turn > TURN_MS) {
+      if (progress({ sent: total, total, ms: talk.ms - began }) === false) return undefined;
+      await breath();
+      turn = performance.now();
+    }
+  }
+  const ms = talk.ms - began;
+  return finish({ firmware, axes, scale, motorOf, zero, ms, sender, notes, asked, pace });
+}
+
+/// The answer to `{clear:n}` is waited for, while lines before it are answered.
+function await_clear(talk, sender, pace) {
+  for (let waited = 0; waited < 10_000; waited += 1) {
+    talk.pass(20, true);
+    for (let heard = talk.line(); heard !== undefined; heard = talk.line()) {
+      if ('clear' in (parse(heard)?.r ?? {})) return;
+      if (sender.hear(heard)) count(pace, talk.ms);
+    }
+  }
+}
+
+/// Where work zero is if nobody says it: the lower ends of X and Y, the middle of Z.
+export function defaultZero(axes) {
+  const [x, y, z] = axes;
+  return [x.tn, y.tn, (z.tn + z.tm) / 2];
+}
+
+function count(pace, ms) {
+  pace.times.push(ms);
+  while (pace.times[0] + 1_000 <= ms) pace.times.shift();
+  pace.busiest = Math.max(pace.busiest, pace.times.length);
+}
+
+function finish({ firmware, axes, scale, motorOf, zero, ms, sender, notes, asked, pace }) {
+  const steps = firmware.samples();
+  const intervalMs = firmware.sampleMs();
+  const linear = [0, 1, 2].map(motorOf);
+  const curves = firmware.curves(scale.map((mm, motor) => (linear.includes(motor) ? mm : 0)));
+  const extremes = firmware.extremes();
+  const drawn = [0, 1, 2].map((axis) => {
+    const motor = motorOf(axis);
+    return motor < 0 ? undefined : { motor, scale: scale[motor], origin: 0 };
+  });
+  const path = pathOf(steps, drawn);
+  const extents = drawn.flatMap((axis, n) => {
+    if (!axis) return [];
+    const [from, to] = [extremes[axis.motor].lowest, extremes[axis.motor].highest].map((s) => s * axis.scale);
+    const { tn, tm } = axes[n];
+    return [{ axis: AXES[n], from: Math.min(from, to), to: Math.max(from, to), lower: tn - zero[n], upper: tm - zero[n] }];
+  });
+  let distance = 0;
+  for (const v of curves.velocity) distance += v;
+  const all = [...notes, ...sender.notes].sort((a, b) => a.line - b.line);
+  return {
+    ms,
+    lines: sender.answered,
+    refused: sender.refused,
+    notes: all,
+    asked,
+    busiest: pace.busiest,
+    rushed: pace.busiest > MOST_LINES,
+    distance: (distance * intervalMs) / 1_000,
+    extents,
+    finalSteps: firmware.state().steps,
+    totals: extremes.map((motor) => motor.total),
+    zero,
+    drawn,
+    intervalMs,
+    steps,
+    path,
+    curves,
+    memory: firmware.memory(),
+  };
+}

@@ -1,0 +1,25 @@
+// The Worker of a dry run: one job, on a machine of its own. Told `{ module, job }`, then perhaps `{ cancel: true }`; tells `{ progress }`,
+// and at the end `{ result }`, `{ cancelled: true }` or `{ error }`.
+
+import { runJob } from './job-run.js';
+
+let cancelled = false;
+
+async function run({ module, job }) {
+  const began = performance.now();
+  const progress = (progress) => {
+    postMessage({ progress });
+    return !cancelled;
+  };
+  const result = await runJob(module, job, progress);
+  if (!result) return postMessage({ cancelled: true });
+  result.tookMs = performance.now() - began;
+  const { steps, path, curves } = result;
+  const arrays = [steps, path.vertices, path.samples, curves.velocity, curves.acceleration, curves.jerk];
+  postMessage({ result }, arrays.map((array) => array.buffer));
+}
+
+onmessage = ({ data }) => {
+  if (data.cancel) cancelled = true;
+  else run(data).catch((error) => postMessage({ error: String(error.message ?? error) }));
+};

@@ -1,0 +1,156 @@
+// The Worker of the machine that one talks to: runs it at real time, faster, or as fast as it goes.
+//
+// | told | |
+// |---|---|
+// | `{ module }` | first of all: boots a new machine |
+// | `{ send, port }` | characters for a port |
+// | `{ speed }` | times real time; Infinity for as fast as it goes |
+// | `{ stream }`, `{ stopStream: true }` | a job to send safely; nothing more of it is sent |
+// | `{ press, closed }`, `{ near: [input, step] }`, `{ spindle: { rpm, perTurn } }` | contacts and the spindle |
+// | `{ snapshot: id }` | answered by `{ snapshot: id, eeprom }`, once everything is stored |
+// | `{ power: true, eeprom }` | power off and on, with this EEPROM |
+//
+// Tells `{ heard, port }`, `{ state }` thirty times a second while something changes, `{ trail }`, the steps between two states, `{ booted }`, and of
+// a job `{ progress }`, `{ streamed }`. A machine that is too fast for the computer falls behind; `state.behind` says so.
+
+import { Firmware } from './firmware.js';
+import { Lines } from './protocol.js';
+import { Sender, linesOf } from './sender.js';
+
+/// Milliseconds between two turns, and how much of one the machine may take.
+const TURN_MS = 16;
+const BUSY_MS = 12;
+/// Longest time to catch up with, ms.
+const LATEST_MS = 250;
+const TELL_MS = 33;
+/// A write to EEPROM takes 3.4 ms a byte; a settings change is kept within a second.
+const STORED_MS = 600;
+
+let module;
+let firmware;
+let speed = 1;
+let sender;
+let lines = new Lines();
+let switches = [];
+let due = 0;
+let last = performance.now();
+let told = 0;
+let before = '';
+/// How often nothing has changed between two states.
+let quiet = 0;
+
+function boot(eeprom, asked) {
+  firmware = new Firmware(module);
+  firmware.boot(eeprom, asked);
+  firmware.beginSamples();
+  lines = new Lines();
+  for (const [input, step] of switches) firmware.near(input, step);
+  endStream('the machine has started anew');
+  postMessage({ booted: true });
+}
+
+function endStream(why) {
+  if (!sender) return;
+  const { answered, refused, notes } = sender;
+  sender = undefined;
+  postMessage({ streamed: { answered, refused, notes, why } });
+}
+
+/// Runs for some of the machine's time while the computer has time. Returns how long.
+function run(ms) {
+  const end = performance.now() + BUSY_MS;
+  let passed = 0;
+  while (passed < ms && performance.now() < end) {
+    if (sender) {
+      const text = sender.take();
+      if (text) firmware.send(text);
+    }
+    const step = Math.min(ms - passed, sender ? 50 : 20);
+    const went = firmware.run(step, Boolean(sender));
+    passed += went;
+    listen();
+    if (firmware.state().reset) {
+      boot(firmware.eeprom(), true);
+      break;
+    }
+    if (went === 0) break;
+  }
+  return passed;
+}
+
+function listen() {
+  const heard = firmware.heard(0);
+  if (heard) {
+    postMessage({ heard, port: 0 });
+    if (sender) {
+      for (const line of lines.add(heard)) sender.hear(line);
+      if (sender.done) endStream('');
+    } else {
+      lines.add(heard);
+    }
+  }
+  const other = firmware.heard(1);
+  if (other) postMessage({ heard: other, port: 1 });
+}
+
+function turn() {
+  setTimeout(turn, TURN_MS);
+  const now = performance.now();
+  const passed = now - last;
+  last = now;
+  if (!firmware) return;
+  // As fast as it goes while there is something to do.
+  const idle = !sender && quiet > 30;
+  const wanted = speed === Infinity ? (idle ? passed : 1e6) : due + passed * speed;
+  const whole = Math.floor(wanted);
+  const went = whole > 0 ? run(whole) : 0;
+  due = speed === Infinity ? 0 : Math.min(wanted - went, LATEST_MS * speed);
+  if (now - told >= TELL_MS) tell(now, due >= LATEST_MS * speed);
+}
+
+function tell(now, behind) {
+  told = now;
+  const state = { ...firmware.state(), behind };
+  const key = JSON.stringify({ ...state, ms: 0 });
+  if (sender) postMessage({ progress: { sent: sender.last, total: sender.total } });
+  quiet = key === before ? quiet + 1 : 0;
+  if (key !== before) {
+    const trail = firmware.samples();
+    postMessage({ trail }, [trail.buffer]);
+  }
+  firmware.beginSamples();
+  before = key;
+  postMessage({ state });
+}
+
+/// The EEPROM, once what has been set is stored.
+function stored() {
+  for (let waited = 0, same = 0, then = ''; waited < 10_000 && same < STORED_MS; waited += 50) {
+    firmware.run(50);
+    const now = String(firmware.eeprom());
+    same = now === then ? same + 50 : 0;
+    then = now;
+  }
+  listen();
+  return firmware.eeprom();
+}
+
+onmessage = ({ data }) => {
+  if (data.module) {
+    module = data.module;
+    boot(data.eeprom ?? new Uint8Array(), false);
+    turn();
+  } else if ('send' in data) {
+    quiet = 0;
+    firmware.send(data.send, data.port ?? 0);
+  } else if ('speed' in data) [speed, due] = [data.speed, 0];
+  else if ('stream' in data) sender = new Sender(linesOf(data.stream), data.stream.split('\n').length);
+  else if (data.stopStream) sender?.stop();
+  else if ('press' in data) firmware.press(data.press, data.closed);
+  else if ('near' in data) {
+    switches.push(data.near);
+    firmware.near(...data.near);
+  } else if ('spindle' in data) firmware.spindle(data.spindle.rpm, data.spindle.perTurn);
+  else if ('snapshot' in data) postMessage({ snapshot: data.snapshot, eeprom: stored() });
+  else if (data.power) boot(data.eeprom ?? stored(), false);
+};

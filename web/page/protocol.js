@@ -1,0 +1,46 @@
+// What lines from a machine mean, in TinyG's dialect and in grbl's. Pure functions.
+
+/// Status of a line that was passed over, and of one that an alarm refused.
+export const PASSED_OVER = 3;
+export const ALARM = 203;
+
+/// A line as JSON, or nothing.
+export function parse(line) {
+  if (!line.startsWith('{')) return undefined;
+  try {
+    return JSON.parse(line);
+  } catch {
+    return undefined;
+  }
+}
+
+/// The status of the answer to a line; nothing of what answers no line: a greeting, a report, the end of a probing.
+export function answerStatus(line) {
+  if (line === 'ok') return 0;
+  const error = /^error:(\d+)/.exec(line);
+  if (error) return Number(error[1]);
+  const json = parse(line);
+  if (!json?.r || !Array.isArray(json.f)) return undefined;
+  if (json.r.msg === 'SYSTEM READY' || 'prb' in json.r) return undefined;
+  return json.f[1];
+}
+
+/// The status of an exception.
+export function exceptionStatus(line) {
+  return parse(line)?.er?.st;
+}
+
+/// What `stat` numbers are.
+export const STATES = ['starts', 'ready', 'alarm', 'at rest', 'program ended', 'runs', 'holds', 'probes', '', 'homes', 'jogs', 'stopped', '', 'panic'];
+
+/// Splits a stream of characters into lines; keeps what has no end yet.
+export class Lines {
+  #rest = '';
+
+  add(text) {
+    const lines = (this.#rest + text).split('\n');
+    this.#rest = lines.pop();
+    // XON and XOFF are no part of a line.
+    return lines.map((line) => line.replace(/[\r\x11\x13]/g, '')).filter((line) => line !== '');
+  }
+}

@@ -1,0 +1,104 @@
+// All settings of a machine as a file, and back. The file is that of `cargo xtask settings save`; as lines it is a request each, which
+// any sender sends like a job and `cargo xtask sim --set @FILE` understands.
+//
+// Owned by the settings panel, which shows what was refused. Sending goes on after a refusal; an answer that does not come is an error.
+
+/// The groups, in the order in which they are loaded.
+export const GROUPS = ['1', '2', '3', '4', 'x', 'y', 'z', 'a', 'b', 'c', 'p1', 'sp', 'co', 'sq', 'uda', 'udb', 'udc', 'udd', 'sys'];
+const SYSTEMS = ['g54', 'g55', 'g56', 'g57', 'g58', 'g59', 'g591', 'g592', 'g593'];
+const TOOLS = Array.from({ length: 10 }, (_, n) => `tt${n + 1}`);
+const STORED = ['g28', 'g30'];
+/// What the machine is; it is not sent back.
+const FIXED = ['fb', 'fv', 'hp', 'hv', 'id', 'net', 'baud', 'kerf'];
+/// These change how the machine answers, and these may stop it: last.
+const TALK = ['ej', 'js', 'tv', 'ec', 'ee', 'ex', 'rxm', 'sv', 'si', 'qv', 'dia', 'jv'];
+const STOPPING = ['saf', 'est'];
+/// Longest line.
+const LINE = 200;
+
+/// Reads all groups from a machine.
+export async function save(board) {
+  const all = {};
+  for (const group of [...GROUPS, ...SYSTEMS, ...TOOLS, ...STORED]) {
+    const { body, status } = await board.ask(`{${group}:n}`);
+    if (status !== 0) throw new Error(`{${group}:n} is refused with status ${status}`);
+    all[group] = body[group];
+  }
+  return all;
+}
+
+const spelled = (value) => (typeof value === 'string' ? `"${value}"` : String(value));
+
+/// The requests that set what a file says, in an order that a machine takes: profile, motors, axes, the rest, and last what changes the
+/// conversation. Stored positions cannot be set.
+export function requests(file) {
+  const system = Object.entries(file.sys ?? {});
+  const special = [...FIXED, ...TALK, ...STOPPING, 'mch'];
+  const lines = system.filter(([name]) => name === 'mch').map(([name, value]) => `{${name}:${spelled(value)}}`);
+  for (const group of [...GROUPS, ...SYSTEMS, ...TOOLS]) {
+    const members = Object.entries(file[group] ?? {}).filter(([name]) => group !== 'sys' || !special.includes(name));
+    lines.push(...packed(group, members));
+  }
+  const late = (names) => packed('sys', system.filter(([name]) => names.includes(name)));
+  return [...lines, ...late(STOPPING), ...late(TALK)];
+}
+
+/// Members of a group in as few lines as they fit.
+function packed(group, members) {
+  const wrap = (pairs) => (group === 'sys' ? `{${pairs}}` : `{${group}:{${pairs}}}`);
+  const lines = [];
+  let some = [];
+  for (const [name, value] of members) {
+    const pair = `${name}:${spelled(value)}`;
+    if (some.length > 0 && wrap([...some, pair].join(',')).length > LINE) {
+      lines.push(wrap(some.join(',')));
+      some = [];
+    }
+    some.push(pair);
+  }
+  if (some.length > 0) lines.push(wrap(some.join(',')));
+  return lines;
+}
+
+/// The file as lines for a sender.
+export function asLines(file) {
+  return `${requests(file).join('\n')}\n`;
+}
+
+/// Reads a file of either kind: the requests in it. An error says what is wrong with it.
+export function read(text) {
+  if (/^\s*\{\s*"/.test(text)) {
+    const file = JSON.parse(text);
+    const known = [...GROUPS, ...SYSTEMS, ...TOOLS, ...STORED];
+    if (!Object.keys(file).some((group) => known.includes(group))) throw new Error('no group of settings in this file');
+    return requests(file);
+  }
+  const lines = text.split('\n').map((line) => line.trim()).filter((line) => line !== '');
+  const wrong = lines.find((line) => !/^[{$]/.test(line));
+  if (wrong !== undefined || lines.length === 0) throw new Error(`no setting: ${wrong ?? 'the file is empty'}`);
+  return lines;
+}
+
+/// The status of a value that cannot be set, which a file may have all the same.
+const READ_ONLY = 104;
+
+/// Sends requests; those that were refused, each with its status. Each member of a refused line is tried by itself.
+export async function load(board, lines) {
+  const refused = [];
+  for (const line of lines) {
+    const { status } = await board.ask(line);
+    if (status === 0) continue;
+    for (const part of parts(line)) {
+      const again = await board.ask(part);
+      if (again.status !== 0 && again.status !== READ_ONLY) refused.push({ line: part, status: again.status });
+    }
+  }
+  return refused;
+}
+
+/// A request for each member of a line.
+function parts(line) {
+  const group = /^\{(\w+):\{(.*)\}\}$/.exec(line);
+  const pairs = (group ? group[2] : line.slice(1, -1)).split(',');
+  return pairs.map((pair) => (group ? `{${group[1]}:{${pair}}}` : `{${pair}}`));
+}

@@ -1,0 +1,44 @@
+//! The page in headless Chromium, driven by `tests/web/page.mjs`: what a visitor does, and where the motors end, held against the simulated chip.
+//!
+//! The stage takes a minute. What it leaves are `target/web-tests/*.png`, pictures of the page.
+
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result};
+
+use super::serve;
+use crate::boards::Board;
+use crate::machines::Machine;
+use crate::npm;
+use crate::process::{root, run as run_child};
+use crate::sim;
+
+/// Jobs whose last steps are compared.
+const COMPARED: [&str; 2] = ["square", "bracket"];
+
+/// Serves the page, and runs the tests.
+pub fn run(page: &Path) -> Result<()> {
+    let folder = npm::install("web-tests", &root().join("tests/web"))?;
+    let reports = reports(&folder)?;
+    let listener = TcpListener::bind("127.0.0.1:0").context("no port to serve at")?;
+    let address = format!("http://{}/", listener.local_addr()?);
+    let page = page.to_owned();
+    // It ends with this program.
+    std::thread::spawn(move || serve::forever(&listener, &page));
+    let mut node = Command::new("node");
+    node.current_dir(&folder).arg(root().join("tests/web/page.mjs")).arg(address).args(reports);
+    run_child(&mut node)
+}
+
+/// What the simulated chip makes of the jobs: `NAME.json` each.
+fn reports(folder: &Path) -> Result<Vec<PathBuf>> {
+    let elf = sim::prepare(Board::default(), Machine::default())?;
+    let report = |name: &&str| {
+        let file = folder.join(format!("{name}.json"));
+        sim::report(&elf, &root().join(format!("examples/{name}.gcode")), &file)?;
+        Ok(file)
+    };
+    COMPARED.iter().map(report).collect()
+}
