@@ -160,7 +160,7 @@ await step('a refused line is shown with code, text and place, and a limit with 
   const found = await text('#findings');
   assert.match(found, /Line 4: 131 .*G7/);
   assert.match(found, /Line 5: \d+ .*X=3/);
-  assert.match(found, /Slower than asked: 1 line.*line 3.*9 000 mm\/min, 800/);
+  assert.match(found, /Slower than asked: 1 line.*Line 3 asks for up to 9 000 mm\/min. X allows as little as 800/);
   await job('far.gcode', 'G21 G90\nG0 X200\n');
   assert.match(await text('#findings'), /X goes beyond the travel/);
 });
@@ -331,6 +331,52 @@ await step('a profile changes the machine', async () => {
   await shows('#log', '"mch":1');
   await tab('settings');
   await page.waitForFunction(() => document.getElementById('set-xvm')?.value === '5000');
+});
+
+/// A serial port with the firmware behind it, in the place of the browser's, ten times as fast as a board.
+function fakeSerial() {
+  const port = {
+    async open() {
+      const [{ Firmware }, module] = await Promise.all([import('/firmware.js'), WebAssembly.compileStreaming(fetch('/kerf.wasm'))]);
+      const board = new Firmware(module);
+      board.boot();
+      window.board = board;
+      let timer;
+      this.readable = new ReadableStream({
+        start(controller) {
+          timer = setInterval(() => {
+            board.run(100);
+            const heard = board.heard();
+            if (heard) controller.enqueue(Uint8Array.from(heard, (c) => c.charCodeAt(0)));
+          }, 10);
+        },
+        cancel: () => clearInterval(timer),
+      });
+      this.writable = new WritableStream({ write: (bytes) => board.send(bytes) });
+    },
+    async close() {},
+  };
+  Object.defineProperty(navigator, 'serial', { value: { requestPort: async () => port }, configurable: true });
+}
+
+await step('a board behind Web Serial: terminal, settings, a job', async () => {
+  await page.addInitScript(fakeSerial);
+  await page.reload();
+  await page.waitForSelector('html[data-ready]');
+  await example('square.gcode');
+  await page.click('#connect');
+  await shows('#link-state', '^Real board: ready');
+  await type('{yvm:700}', '"yvm":700');
+  await tab('job');
+  await page.click('#send-job');
+  await shows('#job-text', 'All lines are with the machine');
+  await shows('#link-state', 'program ended');
+  assert.deepEqual(await page.evaluate(() => window.board.state().steps), [0, 0, 2_560, 0]);
+  await tab('settings');
+  await page.selectOption('#group', 'y');
+  await page.waitForFunction(() => document.getElementById('set-yvm')?.value === '700');
+  await page.click('#connect');
+  await shows('#link-state', '^Simulated: ready');
 });
 
 await step('a keyboard reaches everything, and axe finds nothing', async () => {

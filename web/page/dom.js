@@ -29,7 +29,7 @@ export function clock(ms) {
 
 /// A number with thin groups: `12 345`.
 export function grouped(number) {
-  return Math.round(number).toLocaleString('en').replaceAll(',', ' ');
+  return (Math.round(number) || 0).toLocaleString('en').replaceAll(',', ' ');
 }
 
 export function millimetres(mm) {

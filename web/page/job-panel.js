@@ -13,7 +13,7 @@ const EXAMPLES = [
 ];
 /// Refusals and notes that are shown; the rest are counted.
 const SHOWN = 200;
-const LIMITS = { short: 'moves are too short for it: none takes less than 0.75 ms' };
+const LIMITS = { short: (least) => `A move takes at least 0.75 ms: the shortest goes at ${least}` };
 
 export class JobPanel {
   #job;
@@ -157,9 +157,10 @@ export class JobPanel {
     }
     for (const e of outside) items.push(h('li', { class: 'refused' }, h('b', {}, `${e.axis.toUpperCase()} goes beyond the travel`), h('p', {}, `${e.from.toFixed(2)} to ${e.to.toFixed(2)} mm, of ${e.lower.toFixed(2)} to ${e.upper.toFixed(2)} mm from the work zero.`)));
     for (const a of result.asked) {
-      const place = a.first === a.last ? `line ${a.first}` : `lines ${a.first} to ${a.last}`;
-      const why = LIMITS[a.limit] ?? `${a.limit.toUpperCase()} allows less (settings ${a.limit}fr and ${a.limit}vm)`;
-      items.push(h('li', {}, h('b', {}, `Slower than asked: ${grouped(a.lines)} ${a.lines === 1 ? 'line' : 'lines'}`), h('p', {}, `In ${place} the feed is up to ${grouped(a.asked)} mm/min, ${grouped(a.allowed)} at the least are possible; ${why}.`)));
+      const place = a.first === a.last ? `Line ${a.first} asks` : `Lines ${a.first} to ${a.last} ask`;
+      const least = `${grouped(a.allowed)} mm/min`;
+      const why = LIMITS[a.limit]?.(least) ?? `${a.limit.toUpperCase()} allows as little as ${least} (settings ${a.limit}fr and ${a.limit}vm)`;
+      items.push(h('li', {}, h('b', {}, `Slower than asked: ${grouped(a.lines)} ${a.lines === 1 ? 'line' : 'lines'}`), h('p', {}, `${place} for up to ${grouped(a.asked)} mm/min. ${why}.`)));
     }
     if (result.rushed) items.push(h('li', {}, h('b', {}, 'A board may take longer'), h('p', {}, `${result.busiest} lines in a second are about what a board can do: up to 8 % more time.`)));
     for (const { line, text, status } of result.notes.slice(0, SHOWN)) {

@@ -1,8 +1,9 @@
 //! Velocity, acceleration and jerk along the path, from samples of steps.
 //!
-//! A cubic is fitted to each coordinate over 30 ms before and behind a sample (least squares), so that the grid of the steps does not show; its
-//! derivatives in the middle are projected on the direction of motion. At rest all three are 0. Owned by the page, once a job is done. Cost: 150 ns
-//! a sample that moves. A job without samples has empty curves.
+//! First the way: the sum of the distances from sample to sample. Where steps are coarse, places are averaged before, over up to 8 ms before and behind, for
+//! the way along a staircase is longer than that along its slope. Then a cubic is fitted to the way over 30 ms before and behind a sample (least
+//! squares), so that the grid of the steps does not show; its derivatives in the middle are the curves. Owned by the page, once a job is done. Cost: 150
+//! ns a sample. A job without samples has empty curves.
 
 use kerf::boards::MOTORS;
 
@@ -12,8 +13,9 @@ use crate::samples::{Place, Samples};
 const HALF_MS: u32 = 30;
 /// Samples on each side that a cubic needs at the least.
 const LEAST: usize = 3;
-/// Slower than this is no direction to project on, mm/s.
-const STILL: f64 = 1e-3;
+/// Places are averaged over a sample more on each side for so many mm of the coarsest step, and over so many at the most.
+const COARSE: f64 = 0.006;
+const MOST_AVERAGED: usize = 4;
 
 /// A value for each sample: mm/s, mm/s^2, mm/s^3.
 #[derive(Default)]
@@ -30,16 +32,35 @@ impl Curves {
     /// Those of samples; `scale` is the millimetres of a step of each motor, 0 for one that does not count.
     pub fn of(samples: &Samples, scale: [f64; MOTORS]) -> Self {
         let fit = Fit::new(samples.interval_ms());
-        let places = samples.places();
+        let way = way(samples.places(), scale);
         let mut curves = Self::default();
-        for at in 0..places.len() {
-            let [v, a, j] = fit.along(places, at, scale);
+        for at in 0..way.len() {
+            let [v, a, j] = fit.derivatives(&way, at);
             curves.velocity.push(v as f32);
             curves.acceleration.push(a as f32);
             curves.jerk.push(j as f32);
         }
         curves
     }
+}
+
+/// How far the tool has gone at each sample, mm.
+fn way(places: &[Place], scale: [f64; MOTORS]) -> Vec<f64> {
+    let coarsest = scale.iter().fold(0.0, |most: f64, mm| most.max(mm.abs()));
+    let reach = ((coarsest / COARSE) as usize).min(MOST_AVERAGED);
+    let last = places.len().saturating_sub(1);
+    // The way of a motor from the average around one sample to that around the next.
+    let went = |at: usize, m: usize| {
+        let (new, old) = ((at + 1 + reach).min(last), at.saturating_sub(reach));
+        let steps = i64::from(places[new][m]) - i64::from(places[old][m]);
+        steps as f64 * scale[m] / (2 * reach + 1) as f64
+    };
+    let mut sum = 0.0;
+    let steps = (0..last).map(|at| {
+        sum += (0..MOTORS).map(|m| went(at, m).powi(2)).sum::<f64>().sqrt();
+        sum
+    });
+    std::iter::once(0.0).chain(steps).take(places.len()).collect()
 }
 
 /// Sums that the fit of a cubic over `-half..=half` needs, and the samples' distance in seconds.
@@ -63,29 +84,16 @@ impl Fit {
         Self { half, h, s0: 2.0 * half as f64 + 1.0, s2: sum(2), s4: sum(4), s6: sum(6) }
     }
 
-    /// Velocity, acceleration and jerk along the path.
-    fn along(&self, places: &[Place], at: usize, scale: [f64; MOTORS]) -> [f64; 3] {
-        let (first, last) = (at.saturating_sub(self.half), (at + self.half).min(places.len() - 1));
-        if places[first] == places[at] && places[last] == places[at] {
+    /// The three derivatives. Before the first sample and behind the last one the tool stands.
+    fn derivatives(&self, way: &[f64], at: usize) -> [f64; 3] {
+        let last = way.len() - 1;
+        if way[at.saturating_sub(self.half)] == way[(at + self.half).min(last)] {
             return [0.0; 3];
         }
-        let axes = [0, 1, 2, 3].map(|m| match scale[m] {
-            0.0 => [0.0; 3],
-            scale => self.derivatives(places, at, m).map(|d| d * scale),
-        });
-        let dot = |n: usize| axes.iter().map(|axis| axis[0] * axis[n]).sum::<f64>();
-        let speed = dot(0).sqrt();
-        if speed < STILL { [0.0; 3] } else { [speed, dot(1) / speed, dot(2) / speed] }
-    }
-
-    /// The three derivatives of a motor, in steps. Before the first sample and behind the last one the motor stands.
-    fn derivatives(&self, places: &[Place], at: usize, motor: usize) -> [f64; 3] {
-        let middle = i64::from(places[at][motor]);
-        let value = |at: usize| (i64::from(places[at][motor]) - middle) as f64;
+        let value = |other: usize| way[other] - way[at];
         let (mut odd, mut cubes, mut even, mut squares) = (0.0, 0.0, 0.0, 0.0);
         for i in 1..=self.half {
-            let (before, behind) =
-                (value(at.saturating_sub(i)), value((at + i).min(places.len() - 1)));
+            let (before, behind) = (value(at.saturating_sub(i)), value((at + i).min(last)));
             let (x, sum, difference) = (i as f64, behind + before, behind - before);
             odd += x * difference;
             cubes += x * x * x * difference;
@@ -135,6 +143,27 @@ mod tests {
         let curves = Curves::of(&samples(|t| [400.0 * t, 0.0]), [0.025, 0.025, 0.0, 0.0]);
         let steady = &curves.velocity[50..450];
         assert!(steady.iter().all(|v| (v - 10.0).abs() < 0.25), "{steady:?}");
+    }
+
+    #[test]
+    fn a_circle_at_a_steady_speed_has_no_acceleration_along_it() {
+        // A radius of 5 mm at 20 mm/s, on fine steps and on coarse ones.
+        for (steps, most) in [(1_280.0, 4.0), (40.0, 60.0)] {
+            let circle = |t: f64| [(4.0 * t).cos() * 5.0 * steps, (4.0 * t).sin() * 5.0 * steps];
+            let scale = 1.0 / steps;
+            let curves = Curves::of(&samples(circle), [scale, scale, 0.0, 0.0]);
+            assert!(curves.velocity[50..450].iter().all(|v| (v - 20.0).abs() < 0.6));
+            assert!(curves.acceleration[50..450].iter().all(|a| a.abs() < most));
+        }
+    }
+
+    #[test]
+    fn a_corner_is_no_stop() {
+        // Along X and then along Y, at 10 mm/s.
+        let corner = |t: f64| [t.min(0.5) * 12_800.0, (t - 0.5).max(0.0) * 12_800.0];
+        let scale = 1.0 / 1_280.0;
+        let curves = Curves::of(&samples(corner), [scale, scale, 0.0, 0.0]);
+        assert!(curves.velocity[50..450].iter().all(|v| (v - 10.0).abs() < 0.1));
     }
 
     #[test]
