@@ -293,6 +293,22 @@ await step('a job is sent to the machine', async () => {
   await shows('#dro-steps', `^${planned.slice(0, 3).join(' ')}$`);
 });
 
+await step('a refused line ends a job that is sent, and what is typed meanwhile does not disturb it', async () => {
+  await tab('job');
+  await job('refused.gcode', `G91\n${'G1 X.1 F600\n'.repeat(40)}G7\n${'G1 X9\n'.repeat(40)}`);
+  await tab('machine');
+  await page.selectOption('#speed', '1');
+  await tab('job');
+  await page.click('#send-job');
+  await type('{mfo:0.9}', '"mfo":0.9');
+  await type('$xvm', 'velocity maximum');
+  await shows('#job-text', 'ended early: line 42 was refused with 131');
+  assert.match(await text('#log'), /line 42: 131/);
+  await page.selectOption('#speed', '10');
+  await type('{mfo:1}', '"mfo":1');
+  await type('G90', '"f":[1,0');
+});
+
 await step('settings are a form, and a file that both sides understand', async () => {
   await tab('settings');
   await page.waitForSelector('#set-xvm');

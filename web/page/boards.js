@@ -7,9 +7,9 @@
 // | `stream(job)`, `stopStream()` | sends a job safely |
 // | events | `line` (`{ line, asked }`: whether it answers `ask`), `sent`, `state`, `trail`, `booted`, `progress`, `streamed`, `closed` |
 //
-// Answers belong to questions by their order. While a job is sent its answers are the job's: `ask` waits until it is over.
+// An answer belongs to the first question whose name it has. While a job is sent all answers are the job's, and `ask` is an error.
 
-import { Lines, answerStatus, parse } from './protocol.js';
+import { Lines, answerStatus, nameIn, parse } from './protocol.js';
 import { Sender, linesOf } from './sender.js';
 
 /// Longest wait for an answer, ms of the computer's time.
@@ -33,18 +33,30 @@ class Board extends EventTarget {
   /// Characters from the machine.
   hear(text) {
     for (const line of this.#lines.add(text)) {
-      const status = answerStatus(line);
-      const waits = status === undefined || this.streaming ? undefined : this.#asked.shift();
-      this.tell('line', { line, asked: waits?.asked === true });
-      waits?.hear?.(line, status);
+      const waits = this.streaming ? undefined : this.#questionOf(line);
+      this.tell('line', { line, asked: Boolean(waits) });
+      waits?.hear(line);
     }
   }
 
-  /// The lines that somebody types are answered too: they take their place in the order.
+  #questionOf(line) {
+    const body = answerStatus(line) === undefined ? undefined : parse(line)?.r;
+    const at = body ? this.#asked.findIndex(({ name }) => name in body) : -1;
+    return at < 0 ? undefined : this.#asked.splice(at, 1)[0];
+  }
+
+  /// Sends a line that somebody has typed.
   type(line) {
-    if (!this.streaming && line.trim() !== '' && !/^[!~%?]$/.test(line.trim())) this.#asked.push({});
     this.tell('sent', line);
-    this.send(`${line}\n`);
+    this.sendLine(line);
+  }
+
+  /// Sends a job. An error if the machine does not answer in a way by which lines can be counted.
+  async stream(job) {
+    // A question in JSON has answers in JSON follow.
+    if (this.dialect === 'tinyg') await this.ask('{qr:n}');
+    this.streaming = true;
+    this.begin(job);
   }
 
   ask(line) {
@@ -54,11 +66,11 @@ class Board extends EventTarget {
         this.#asked = [];
         reject(new Error(`no answer to ${line}`));
       }, ANSWER_MS);
-      const hear = (heard, status) => {
+      const hear = (heard) => {
         clearTimeout(late);
-        resolve({ body: parse(heard)?.r ?? {}, status });
+        resolve({ body: parse(heard).r, status: answerStatus(heard) });
       };
-      this.#asked.push({ asked: true, hear });
+      this.#asked.push({ name: nameIn(line), hear });
     });
     this.send(`${line}\n`);
     return answer;
@@ -107,8 +119,11 @@ export class SimulatedBoard extends Board {
     this.#worker.postMessage({ send: text });
   }
 
-  stream(job) {
-    this.streaming = true;
+  sendLine(line) {
+    this.#worker.postMessage({ line });
+  }
+
+  begin(job) {
     this.#worker.postMessage({ stream: job });
   }
 
@@ -207,7 +222,7 @@ export class SerialBoard extends Board {
     if (!sender || sender !== this.#sender) return;
     for (const line of lines) sender.hear(line);
     this.tell('progress', { sent: sender.last, total: sender.total });
-    if (sender.done) this.#end('');
+    if (sender.done) this.#end(sender.stopped);
     else this.#feed();
   }
 
@@ -228,9 +243,13 @@ export class SerialBoard extends Board {
     this.#writer?.write(Uint8Array.from(text, (character) => character.charCodeAt(0))).catch(() => {});
   }
 
-  stream(job) {
-    this.streaming = true;
-    this.#sender = new Sender(linesOf(job), job.split('\n').length);
+  sendLine(line) {
+    this.#sender?.foreign(line);
+    this.send(`${line}\n`);
+  }
+
+  begin(job) {
+    this.#sender = new Sender(linesOf(job), job.split('\n').length, true);
     this.#feed();
   }
 

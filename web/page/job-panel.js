@@ -19,6 +19,7 @@ export class JobPanel {
   #job;
   #worker;
   #began = 0;
+  #run = 0;
 
   /// `context` has `module`, `board()`, `codes` and `onResult(result)`.
   constructor(pane, context) {
@@ -77,11 +78,15 @@ export class JobPanel {
   async start() {
     if (!this.#job) return;
     this.#worker?.terminate();
+    this.#worker = undefined;
+    const run = (this.#run += 1);
     this.#began = performance.now();
     this.#busy(true);
     const board = this.context.board();
     const eeprom = board?.simulated ? await board.eeprom() : new Uint8Array();
     const settings = board?.simulated ? [] : await this.context.settingsOfBoard();
+    // Cancelled meanwhile, or begun anew.
+    if (run !== this.#run) return;
     const worker = new Worker(new URL('./job-worker.js', import.meta.url), { type: 'module' });
     this.#worker = worker;
     worker.onmessage = ({ data }) => {
@@ -95,6 +100,7 @@ export class JobPanel {
   }
 
   stop() {
+    this.#run += 1;
     this.#worker?.terminate();
     this.#ended({ cancelled: true });
   }

@@ -5,7 +5,7 @@
 
 import { Firmware } from './firmware.js';
 import { Lines, answerStatus, parse } from './protocol.js';
-import { Sender, homes, linesOf } from './sender.js';
+import { HARMLESS, Sender, homes, linesOf } from './sender.js';
 import { pathOf } from './path.js';
 
 /// The longest wait for an answer, ms of the machine's time: more than any move takes.
@@ -14,8 +14,6 @@ const LONGEST_MS = 24 * 3_600_000;
 const TURN_MS = 40;
 /// More lines than this in a second, and the board's CPU, which is not reckoned with here, may be the limit.
 const MOST_LINES = 464;
-/// Exceptions after which a job goes on.
-const HARMLESS = [37, 38, 39, 40, 180];
 const AXES = ['x', 'y', 'z'];
 
 const breath = () => new Promise((resolve) => setTimeout(resolve, 0));
@@ -113,7 +111,7 @@ export async function runJob(module, job, progress = () => true) {
         note.text = 'It cannot be tried here: the alarm was cleared, and the job went on.';
         firmware.send('{clear:n}\n');
         // Its answer is no line's of the job.
-        await_clear(talk, sender, pace);
+        awaitClear(talk, sender, pace);
       }
     }
     if (silent > LONGEST_MS) throw new Error(`no answer after line ${sender.last}`);
@@ -136,7 +134,7 @@ export async function runJob(module, job, progress = () => true) {
 }
 
 /// The answer to `{clear:n}` is waited for, while lines before it are answered.
-function await_clear(talk, sender, pace) {
+function awaitClear(talk, sender, pace) {
   for (let waited = 0; waited < 10_000; waited += 1) {
     talk.pass(20, true);
     for (let heard = talk.line(); heard !== undefined; heard = talk.line()) {

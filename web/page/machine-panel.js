@@ -239,7 +239,9 @@ export class MachinePanel {
     this.#write('out', `(job ${job.name})`);
     this.job.hidden = false;
     this.#progress(0, 1);
-    this.#board.stream(job.text);
+    this.#board.stream(job.text).catch((error) => {
+      byId('job-text').textContent = `Not sent: ${error.message}. {ej:1,jv:3} has the machine answer each line.`;
+    });
   }
 
   #progress(sent, total) {
@@ -249,7 +251,7 @@ export class MachinePanel {
 
   #streamed({ answered, refused, why }) {
     byId('job-progress').value = 1;
-    const end = why ? `The job has ended early: ${why}.` : `All lines are with the machine.`;
+    const end = why ? `The job has ended early: ${why}.` : 'All lines are with the machine.';
     byId('job-text').textContent = `${end} ${grouped(answered)} answered, ${refused.length} refused.`;
     for (const { line, text, status } of refused.slice(0, 50)) this.#write('error', `line ${line}: ${status} ${this.context.codes.get(status)?.text ?? ''}: ${text}`);
     say(byId('job-text').textContent);
@@ -262,7 +264,7 @@ export class MachinePanel {
     const grbl = /^<(\w+)[^>]*?(?:MPos|WPos):([-\d.,]+)/.exec(line);
     if (grbl) this.#grbl(grbl);
     const reports = (json?.sr || json?.qr || grbl) && !this.reports.checked;
-    const answers = this.#board.streaming && json?.r && json.f?.[1] === 0;
+    const answers = this.#board.streaming && json?.r && json.f?.[1] === 0 && Object.keys(json.r).length === 0;
     if (!asked && !reports && !answers) this.#write(json?.er || json?.f?.[1] > 0 || line.startsWith('error') ? 'error' : 'in', line);
   }
 

@@ -3,7 +3,7 @@
 // | told | |
 // |---|---|
 // | `{ module }` | first of all: boots a new machine |
-// | `{ send, port }` | characters for a port |
+// | `{ send, port }`, `{ line }` | characters for a port; a line that somebody has typed |
 // | `{ speed }` | times real time; Infinity for as fast as it goes |
 // | `{ stream }`, `{ stopStream: true }` | a job to send safely; nothing more of it is sent |
 // | `{ press, closed }`, `{ near: [input, step] }`, `{ spindle: { rpm, perTurn } }` | contacts and the spindle |
@@ -84,7 +84,7 @@ function listen() {
     postMessage({ heard, port: 0 });
     if (sender) {
       for (const line of lines.add(heard)) sender.hear(line);
-      if (sender.done) endStream('');
+      if (sender.done) endStream(sender.stopped);
     } else {
       lines.add(heard);
     }
@@ -143,8 +143,12 @@ onmessage = ({ data }) => {
   } else if ('send' in data) {
     quiet = 0;
     firmware.send(data.send, data.port ?? 0);
+  } else if ('line' in data) {
+    quiet = 0;
+    sender?.foreign(data.line);
+    firmware.send(`${data.line}\n`);
   } else if ('speed' in data) [speed, due] = [data.speed, 0];
-  else if ('stream' in data) sender = new Sender(linesOf(data.stream), data.stream.split('\n').length);
+  else if ('stream' in data) sender = new Sender(linesOf(data.stream), data.stream.split('\n').length, true);
   else if (data.stopStream) sender?.stop();
   else if ('press' in data) firmware.press(data.press, data.closed);
   else if ('near' in data) {

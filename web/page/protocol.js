@@ -14,11 +14,16 @@ export function parse(line) {
   }
 }
 
-/// The status of the answer to a line; nothing of what answers no line: a greeting, a report, the end of a probing.
+/// Status of a refusal in text mode, which tells no number.
+export const UNTOLD = -1;
+
+/// The status of the answer to a line; nothing of what answers no line: a greeting, a report, the end of a probing. In text mode a prompt answers.
 export function answerStatus(line) {
   if (line === 'ok') return 0;
   const error = /^error:(\d+)/.exec(line);
   if (error) return Number(error[1]);
+  const prompt = /^(?:tinyg|g2core) ?\[\w+\] (ok>|err:)/.exec(line);
+  if (prompt) return prompt[1] === 'ok>' ? 0 : UNTOLD;
   const json = parse(line);
   if (!json?.r || !Array.isArray(json.f)) return undefined;
   if (json.r.msg === 'SYSTEM READY' || 'prb' in json.r) return undefined;
@@ -28,6 +33,11 @@ export function answerStatus(line) {
 /// The status of an exception.
 export function exceptionStatus(line) {
   return parse(line)?.er?.st;
+}
+
+/// The first name in a line of JSON, typed strictly or not: `xvm` of `{xvm:n}`.
+export function nameIn(line) {
+  return /^\s*\{\s*"?(\w+)/.exec(line)?.[1];
 }
 
 /// What `stat` numbers are.

@@ -3,6 +3,7 @@
 // Owned by main.js. Fields show what the machine says; a change is sent at once, and what the machine makes of it is shown. Refusals stand
 // at the field. A group is read when it is chosen.
 
+import { choices } from './settings-choices.js';
 import { asLines, load, read, save } from './settings-file.js';
 import { download, h, say } from './dom.js';
 
@@ -10,18 +11,6 @@ const NAMES = {
   sys: 'The machine', 1: 'Motor 1', 2: 'Motor 2', 3: 'Motor 3', 4: 'Motor 4', x: 'Axis X', y: 'Axis Y', z: 'Axis Z', a: 'Axis A', b: 'Axis B', c: 'Axis C',
   p1: 'Pulses of the spindle', sp: 'Spindle', co: 'Coolant', sq: 'Squaring',
 };
-
-/// The words of a description such as `0 off, 1 homing, 2 limit`: a name for each whole number from `minimum` to `maximum`, or nothing.
-export function choices({ type, minimum, maximum, description = '' }) {
-  if (type !== 'integer' || maximum - minimum > 5) return undefined;
-  const names = [];
-  for (let n = minimum; n <= maximum; n++) {
-    const found = new RegExp(`(?:^|[ ,.(])${n} ([a-z][^,.:;]*)`, 'i').exec(description);
-    if (!found) return undefined;
-    names.push(found[1].trim());
-  }
-  return names;
-}
 
 /// From what to what a number may be; ends that no machine comes near are left out.
 function rangeOf(about) {

@@ -1,4 +1,5 @@
-//! The page in headless Chromium, driven by `tests/web/page.mjs`: what a visitor does, and where the motors end, held against the simulated chip.
+//! Modules of the page in Node, by `tests/web/modules.mjs`, and the page in headless Chromium, driven by `tests/web/page.mjs`: what a visitor does, and
+//! where the motors end, held against the simulated chip.
 //!
 //! The stage takes a minute. What it leaves are `target/web-tests/*.png`, pictures of the page.
 
@@ -22,6 +23,9 @@ const COMPARED: [&str; 2] = ["square", "bracket"];
 pub fn run(page: &Path) -> Result<()> {
     let folder = npm::install("web-tests", &root().join("tests/web"))?;
     let reports = reports(&folder)?;
+    let mut modules = Command::new("node");
+    modules.arg(root().join("tests/web/modules.mjs")).arg(page);
+    run_child(&mut modules)?;
     let listener = TcpListener::bind("127.0.0.1:0").context("no port to serve at")?;
     let address = format!("http://{}/", listener.local_addr()?);
     let page = page.to_owned();

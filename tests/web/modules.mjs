@@ -1,0 +1,133 @@
+// Modules of the page that need no browser, in Node: `node modules.mjs FOLDER`, the folder of the built page.
+
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import path from 'node:path';
+import { test } from 'node:test';
+import { pathToFileURL } from 'node:url';
+
+const folder = path.resolve(process.argv[2]);
+const load = (name) => import(pathToFileURL(path.join(folder, name)));
+const { Sender, linesOf } = await load('sender.js');
+const { Lines, answerStatus, nameIn } = await load('protocol.js');
+const { asLines, read, requests } = await load('settings-file.js');
+const { choices } = await load('settings-choices.js');
+const { pathOf } = await load('path.js');
+const { runJob } = await load('job-run.js');
+const module = new WebAssembly.Module(readFileSync(path.join(folder, 'kerf.wasm')));
+
+const OK = '{"r":{},"f":[1,0,7]}';
+const refusal = (status) => `{"r":{},"f":[1,${status},7]}`;
+const job = (count) => Array.from({ length: count }, (_, n) => `G1 X${n}`).join('\n');
+
+test('the module needs nothing of the page', () => assert.deepEqual(WebAssembly.Module.imports(module), []));
+
+test('four lines wait at the most, and 500 bytes', () => {
+  const sender = new Sender(linesOf(job(10)), 10);
+  assert.equal(sender.take().split('\n').length, 5);
+  assert.equal(sender.take(), '');
+  sender.hear('{"sr":{"posx":1}}');
+  sender.hear('{"r":{"msg":"SYSTEM READY"},"f":[1,0,0]}');
+  sender.hear('{"r":{"prb":{"e":1}},"f":[1,0,0]}');
+  assert.equal(sender.take(), '');
+  sender.hear(OK);
+  assert.equal(sender.take(), 'G1 X4\n');
+  const long = new Sender(linesOf(Array(4).fill(`(${'x'.repeat(240)})`).join('\n')), 4);
+  assert.equal(long.take().split('\n').length, 3);
+});
+
+test('what somebody types meanwhile is not taken for an answer of the job', () => {
+  const sender = new Sender(linesOf(job(10)), 10);
+  sender.take();
+  sender.foreign('{mfo:1.5}');
+  sender.foreign('$xvm');
+  assert.equal(sender.hear('{"r":{"mfo":1.500},"f":[1,0,7]}'), false);
+  assert.equal(sender.hear('tinyg [mm] ok> '), false);
+  assert.equal(sender.take(), '');
+  assert.equal(sender.hear('tinyg [mm] ok> '), true);
+  assert.equal(sender.take(), 'G1 X4\n');
+  sender.foreign('M8');
+  for (let n = 0; n < 5; n++) sender.hear(OK);
+  assert.equal(sender.take().split('\n').length, 5);
+});
+
+test('a strict sender stops at a refusal and at an alarm', () => {
+  const lines = () => linesOf(job(10));
+  const strict = new Sender(lines(), 10, true);
+  strict.take();
+  strict.hear(refusal(131));
+  assert.equal(strict.take(), '');
+  for (let n = 0; n < 3; n++) strict.hear(OK);
+  assert.ok(strict.done);
+  assert.match(strict.stopped, /line 1 was refused with 131/);
+  const alarmed = new Sender(lines(), 10, true);
+  alarmed.take();
+  alarmed.hear('{"er":{"fb":440.20,"st":204,"msg":"Limit","sw":"xmin"}}');
+  assert.match(alarmed.stopped, /204/);
+  const waiting = new Sender(lines(), 10, true);
+  waiting.take();
+  waiting.hear('{"er":{"fb":440.20,"st":38,"msg":"stop"}}');
+  assert.equal(waiting.stopped, '');
+});
+
+test('characters that act at once are left out of a job', () => {
+  const lines = [...linesOf('%\nG1 X1 (wow!)\r\n\n(\u2013 50 %)\x18\nG0\n')];
+  assert.deepEqual(lines.map(({ number, text }) => [number, text]), [[2, 'G1 X1 (wow)'], [4, '(  50 )'], [5, 'G0']]);
+  assert.deepEqual(lines.map(({ left }) => left), [true, true, false]);
+});
+
+test('answers in each manner of talking', () => {
+  const cases = [['ok', 0], ['error:20', 20], [OK, 0], [refusal(108), 108], ['tinyg [mm] ok> ', 0], ['tinyg [mm] err: x', -1], ['{"qr":5}', undefined], ['{"r', undefined], ['Grbl 1.1h', undefined]];
+  for (const [line, status] of cases) assert.equal(answerStatus(line), status, line);
+  assert.equal(nameIn('{"x":{vm:n}}'), 'x');
+  assert.equal(nameIn('g1'), undefined);
+  const lines = new Lines();
+  assert.deepEqual([...lines.add('a\r\nb'), ...lines.add('c\x13\n')], ['a', 'bc']);
+});
+
+test('settings are sent in an order that a machine takes', () => {
+  const file = { sys: { fb: 440.2, mch: 1, jv: 4, est: 1, ct: 0.01 }, x: { vm: 800 }, 1: { ma: 0 }, g54: { x: 1 }, g28: { x: 5 } };
+  assert.deepEqual(requests(file), ['{mch:1}', '{1:{ma:0}}', '{x:{vm:800}}', '{ct:0.01}', '{g54:{x:1}}', '{est:1}', '{jv:4}']);
+  assert.deepEqual(read(JSON.stringify(file)), requests(file));
+  assert.deepEqual(read(asLines(file)), requests(file));
+  assert.throws(() => read('G1 X1\n'), /no setting/);
+  assert.throws(() => read('{"a1":{}}'), /no group/);
+  assert.throws(() => read(''), /empty/);
+});
+
+test('choices come from the descriptions, or not at all', () => {
+  const of = (description, maximum = 1) => choices({ type: 'integer', minimum: 0, maximum, description });
+  assert.deepEqual(of('Reports. 0 off, 1 on.'), ['off', 'on']);
+  assert.equal(of('Reports: 0 is off.'), undefined);
+  assert.equal(of('0 off, 1 on, 2 both', 9), undefined);
+});
+
+test('a path keeps its corners', () => {
+  const steps = [];
+  for (let x = 0; x <= 1_000; x += 10) steps.push(x, 0, 0, 0);
+  for (let y = 10; y <= 1_000; y += 10) steps.push(1_000, y, 0, 0);
+  const axis = (motor) => ({ motor, scale: 0.01, origin: 0 });
+  const { vertices, samples } = pathOf(Int32Array.from(steps), [axis(0), axis(1), undefined]);
+  const places = [...samples].map((_, n) => `${vertices[3 * n].toFixed(2)},${vertices[3 * n + 1].toFixed(2)}`);
+  assert.ok(samples.length < 24 && places.includes('10.00,0.00'), places.join(' '));
+  assert.equal(places.at(-1), '10.00,10.00');
+  assert.equal(pathOf(new Int32Array(), [undefined, undefined, undefined]).samples.length, 0);
+});
+
+test('a job runs in Node as in the page: stops, homing, an alarm', async () => {
+  const text = 'G21\nM0\nG28.2 X0\nG38.2 Z-5 F200\nG1 X3 F500\nM2\n';
+  const result = await runJob(module, { text });
+  assert.deepEqual(result.refused, []);
+  assert.equal(result.finalSteps[0], 3_840);
+  assert.ok(result.notes.some(({ line, text }) => line === 3 && /Homing/.test(text)));
+  assert.ok(result.notes.some(({ status }) => status === 250), 'no contact');
+  const cancelled = await runJob(module, { text: job(50_000).replaceAll('X', 'F800 X') }, () => false);
+  assert.equal(cancelled, undefined);
+});
+
+test('a dry run has the settings that it is given', async () => {
+  const run = (settings) => runJob(module, { text: 'G0 X50', settings });
+  const [slow, fast] = [await run([]), await run(['{xvm:1600}'])];
+  assert.ok(fast.ms < slow.ms * 0.65, `${slow.ms} ms, ${fast.ms} ms`);
+  await assert.rejects(run(['{xvm:-1}']), /refused with status 108/);
+});
