@@ -10,7 +10,8 @@ const folder = path.resolve(process.argv[2]);
 const load = (name) => import(pathToFileURL(path.join(folder, name)));
 const { Sender, linesOf } = await load('sender.js');
 const { Lines, answerStatus, nameIn } = await load('protocol.js');
-const { asLines, read, requests } = await load('settings-file.js');
+const { Firmware } = await load('firmware.js');
+const { asLines, load: settingsLoad, read, requests, save } = await load('settings-file.js');
 const { choices } = await load('settings-choices.js');
 const { pathOf } = await load('path.js');
 const { runJob } = await load('job-run.js');
@@ -77,7 +78,7 @@ test('characters that act at once are left out of a job', () => {
 });
 
 test('answers in each manner of talking', () => {
-  const cases = [['ok', 0], ['error:20', 20], [OK, 0], [refusal(108), 108], ['tinyg [mm] ok> ', 0], ['tinyg [mm] err: x', -1], ['{"qr":5}', undefined], ['{"r', undefined], ['Grbl 1.1h', undefined]];
+  const cases = [['ok', 0], ['error:20', 20], [OK, 0], ['{r:{xvm:800},f:[1,0,7]}', 0], [refusal(108), 108], ['tinyg [mm] ok> ', 0], ['tinyg [mm] err: x', -1], ['{"qr":5}', undefined], ['{"r', undefined], ['Grbl 1.1h', undefined]];
   for (const [line, status] of cases) assert.equal(answerStatus(line), status, line);
   assert.equal(nameIn('{"x":{vm:n}}'), 'x');
   assert.equal(nameIn('g1'), undefined);
@@ -123,6 +124,42 @@ test('a job runs in Node as in the page: stops, homing, an alarm', async () => {
   assert.ok(result.notes.some(({ status }) => status === 250), 'no contact');
   const cancelled = await runJob(module, { text: job(50_000).replaceAll('X', 'F800 X') }, () => false);
   assert.equal(cancelled, undefined);
+});
+
+/// A machine as `settings-file.js` wants one.
+class Machine {
+  #firmware = new Firmware(module);
+  constructor() {
+    this.#firmware.boot();
+    this.#firmware.run(100);
+  }
+
+  async ask(line) {
+    this.#firmware.heard();
+    this.#firmware.send(`${line}\n`);
+    let heard = '';
+    for (let n = 0; n < 200 && !/"f":\[.*\n/.test(heard); n++) {
+      this.#firmware.run(10);
+      heard += this.#firmware.heard();
+    }
+    const answer = heard.split('\n').find((text) => text.includes('"f":['));
+    return { body: JSON.parse(answer).r, status: answerStatus(answer) };
+  }
+}
+
+test('settings go from one machine to another by either file', async () => {
+  const first = new Machine();
+  for (const line of ['{mch:1}', '{xvm:4321}', '{g55:{x:5,y:6}}', '{tt3:{z:7.5}}', '{est:1}', '{si:200}']) assert.equal((await first.ask(line)).status, 0, line);
+  const file = await save(first);
+  for (const text of [JSON.stringify(file), asLines(file)]) {
+    const second = new Machine();
+    assert.deepEqual(await settingsLoad(second, read(text)), []);
+    assert.deepEqual(await save(second), file);
+  }
+  const wrong = await settingsLoad(new Machine(), ['{x:{vm:-1,fr:500}}']);
+  assert.deepEqual(wrong, [{ line: '{x:{vm:-1}}', status: 108 }]);
+  const seen = await runJob(module, { text: 'G0 X1', settings: ['{g55:{x:5,y:6}}'], zero: [1, 2, 3] });
+  assert.deepEqual(seen.systems, [{ name: 'G55', place: [4, 4, -3] }]);
 });
 
 test('a dry run has the settings that it is given', async () => {

@@ -1,11 +1,11 @@
 // The page in headless Chromium: `node page.mjs ADDRESS REPORT.json...`, run where playwright-core and axe-core are installed.
 //
 // Each step does what a visitor does and looks at what the page shows. The reports are the simulated chip's (`cargo xtask sim --report`): the
-// motors of the page end at its steps. Pictures of the page are left in the working folder. Any message of the console that is a warning or an
+// motors of the page end at its steps. Pictures of the page and `exported.txt`, its settings, are left in the working folder. Any message of the console that is a warning or an
 // error fails the run. `KERF_CHROMIUM` names another browser than the first of `BROWSERS`.
 
 import assert from 'node:assert/strict';
-import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
@@ -326,6 +326,7 @@ await step('settings are a form, and a file that both sides understand', async (
   assert.equal(JSON.parse(file).x.vm, 1234);
   const lines = await fetched('#export-lines');
   assert.ok(lines.split('\n').every((line) => line === '' || (/^\{.*\}$/.test(line) && line.length <= 200)), lines);
+  writeFileSync('exported.txt', lines);
   // A new machine takes the file, and a dry run goes by it.
   await page.reload();
   await page.waitForSelector('html[data-ready]');

@@ -66,6 +66,14 @@ function describe(talk) {
   return { axes, scale, motorOf };
 }
 
+/// The other coordinate systems that have an offset: name and place in work coordinates.
+function offsets(talk, zero) {
+  return ['g55', 'g56', 'g57', 'g58', 'g59', 'g591', 'g592', 'g593'].flatMap((name) => {
+    const { x, y, z } = talk.ask(`{${name}:n}`)[name];
+    return x || y || z ? [{ name: name.replace(/^(g59)(\d)/, '$1.$2').toUpperCase(), place: [x - zero[0], y - zero[1], z - zero[2]] }] : [];
+  });
+}
+
 /// Runs a job: `{ text, eeprom, settings, zero }`. `progress` is told `{ sent, total, ms }` now and then, and ends the run by returning false.
 export async function runJob(module, job, progress = () => true) {
   const talk = new Talk(module, job.eeprom ?? new Uint8Array());
@@ -74,6 +82,7 @@ export async function runJob(module, job, progress = () => true) {
   talk.ask('{psw:0,sv:0,qv:0,jv:3,ej:1}');
   const { axes, scale, motorOf } = describe(talk);
   const zero = job.zero ?? defaultZero(axes);
+  const systems = offsets(talk, zero);
   const inches = talk.ask('{unit:n}').unit === 0;
   talk.ask(`G21 G28.3 X${zero[0]} Y${zero[1]} Z${zero[2]}`);
   talk.ask(`G10 L2 P1 X${zero[0]} Y${zero[1]} Z${zero[2]}`);
@@ -130,7 +139,7 @@ export async function runJob(module, job, progress = () => true) {
     }
   }
   const ms = talk.ms - began;
-  return finish({ firmware, axes, scale, motorOf, zero, ms, sender, notes, asked, pace });
+  return finish({ firmware, systems, axes, scale, motorOf, zero, ms, sender, notes, asked, pace });
 }
 
 /// The answer to `{clear:n}` is waited for, while lines before it are answered.
@@ -156,7 +165,7 @@ function count(pace, ms) {
   pace.busiest = Math.max(pace.busiest, pace.times.length);
 }
 
-function finish({ firmware, axes, scale, motorOf, zero, ms, sender, notes, asked, pace }) {
+function finish({ firmware, systems, axes, scale, motorOf, zero, ms, sender, notes, asked, pace }) {
   const steps = firmware.samples();
   const intervalMs = firmware.sampleMs();
   const linear = [0, 1, 2].map(motorOf);
@@ -189,6 +198,7 @@ function finish({ firmware, axes, scale, motorOf, zero, ms, sender, notes, asked
     finalSteps: firmware.state().steps,
     totals: extremes.map((motor) => motor.total),
     zero,
+    systems,
     drawn,
     intervalMs,
     steps,

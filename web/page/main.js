@@ -114,7 +114,7 @@ function showResult(result, name) {
   byId('scrub').max = result.ms;
   byId('canvas').setAttribute('aria-label', `Path of ${name} in 3D, coloured by speed; it takes ${clock(result.ms)}`);
   const limits = ['x', 'y', 'z'].map((axis) => result.extents.find((extent) => extent.axis === axis));
-  page.view.limits(limits.map((extent) => extent?.lower ?? 0), limits.map((extent) => extent?.upper ?? 0));
+  page.view.limits(limits.map((extent) => extent?.lower ?? 0), limits.map((extent) => extent?.upper ?? 0), result.systems);
   page.charts.show(result.curves, result.intervalMs, result.ms);
   page.view.show(result.path, result.curves.velocity, fastest);
   go(result.ms);

@@ -4,14 +4,18 @@
 export const PASSED_OVER = 3;
 export const ALARM = 203;
 
-/// A line as JSON, or nothing.
-export function parse(line) {
-  if (!line.startsWith('{')) return undefined;
+function json(text) {
   try {
-    return JSON.parse(line);
+    return JSON.parse(text);
   } catch {
     return undefined;
   }
+}
+
+/// A line as JSON, or nothing. With `js` 0 names have no quotes.
+export function parse(line) {
+  if (!line.startsWith('{')) return undefined;
+  return json(line) ?? json(line.replace(/([{,])(\w+):/g, '$1"$2":'));
 }
 
 /// Status of a refusal in text mode, which tells no number.
@@ -24,10 +28,10 @@ export function answerStatus(line) {
   if (error) return Number(error[1]);
   const prompt = /^(?:tinyg|g2core) ?\[\w+\] (ok>|err:)/.exec(line);
   if (prompt) return prompt[1] === 'ok>' ? 0 : UNTOLD;
-  const json = parse(line);
-  if (!json?.r || !Array.isArray(json.f)) return undefined;
-  if (json.r.msg === 'SYSTEM READY' || 'prb' in json.r) return undefined;
-  return json.f[1];
+  const { r: body, f: footer } = parse(line) ?? {};
+  if (!body || !Array.isArray(footer)) return undefined;
+  if (body.msg === 'SYSTEM READY' || 'prb' in body) return undefined;
+  return footer[1];
 }
 
 /// The status of an exception.

@@ -13,6 +13,8 @@ const FIXED = ['fb', 'fv', 'hp', 'hv', 'id', 'net', 'baud', 'kerf'];
 /// These change how the machine answers, and these may stop it: last.
 const TALK = ['ej', 'js', 'tv', 'ec', 'ee', 'ex', 'rxm', 'sv', 'si', 'qv', 'dia', 'jv'];
 const STOPPING = ['saf', 'est'];
+/// Settings that an image without their capability lacks, and what it does as if they were this: left out at that value.
+const OPTIONAL = { sp: { n: 0, b: 0 } };
 /// Longest line.
 const LINE = 200;
 
@@ -22,7 +24,8 @@ export async function save(board) {
   for (const group of [...GROUPS, ...SYSTEMS, ...TOOLS, ...STORED]) {
     const { body, status } = await board.ask(`{${group}:n}`);
     if (status !== 0) throw new Error(`{${group}:n} is refused with status ${status}`);
-    all[group] = body[group];
+    const isThere = ([name, value]) => OPTIONAL[group]?.[name] !== value;
+    all[group] = Object.fromEntries(Object.entries(body[group]).filter(isThere));
   }
   return all;
 }

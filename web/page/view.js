@@ -39,6 +39,7 @@ export class View {
   #trail;
   #trailCount = 0;
   #box = { lower: [0, 0, 0], upper: [100, 100, 30] };
+  #systems = [];
   #shown = new THREE.Box3(new THREE.Vector3(0, 0, -10), new THREE.Vector3(100, 100, 10));
   #asked = false;
 
@@ -83,9 +84,10 @@ export class View {
     });
   }
 
-  /// Where the machine's travel ends, in work coordinates.
-  limits(lower, upper) {
+  /// Where the machine's travel ends, in work coordinates, and where other coordinate systems have their zero: `{ name, place }` each.
+  limits(lower, upper, systems = []) {
     this.#box = { lower, upper };
+    this.#systems = systems;
     if (this.renderer) this.#makeFixed();
   }
 
@@ -101,7 +103,7 @@ export class View {
     const edges = new THREE.EdgesGeometry(new THREE.BoxGeometry(Math.max(size.x, 0.01), Math.max(size.y, 0.01), Math.max(size.z, 0.01)));
     const box = new THREE.LineSegments(edges, new THREE.LineBasicMaterial({ color: colour('quiet'), transparent: true, opacity: 0.45 }));
     box.position.copy(middle);
-    this.#fixed.add(box, this.#grid(lower, upper), ...this.#zero(size));
+    this.#fixed.add(box, this.#grid(lower, upper), ...this.#zero(size), ...this.#systems.flatMap((system) => this.#offset(system, size)));
     this.draw();
   }
 
@@ -123,6 +125,24 @@ export class View {
     const arrow = (x, y, z, tint) =>
       new THREE.ArrowHelper(new THREE.Vector3(x, y, z), new THREE.Vector3(), length, tint, length / 5, length / 9);
     return [arrow(1, 0, 0, 0xc8453b), arrow(0, 1, 0, 0x3d9a50), arrow(0, 0, 1, 0x3f6fd0)];
+  }
+
+  /// A cross and a name at the zero of another coordinate system.
+  #offset({ name, place: [x, y, z] }, size) {
+    const arm = Math.max(size.x, size.y) / 40;
+    const points = [x - arm, y, z, x + arm, y, z, x, y - arm, z, x, y + arm, z, x, y, z - arm, x, y, z + arm];
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', new THREE.Float32BufferAttribute(points, 3));
+    const cross = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour('quiet') }));
+    const canvas = new OffscreenCanvas(128, 48);
+    const context = canvas.getContext('2d');
+    context.font = '600 30px system-ui, sans-serif';
+    context.fillStyle = colour('quiet');
+    context.fillText(name, 4, 34);
+    const label = new THREE.Sprite(new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), depthTest: false }));
+    label.scale.set(arm * 4, arm * 1.5, 1);
+    label.position.set(x + arm * 2.2, y, z + arm);
+    return [cross, label];
   }
 
   #makeTool() {

@@ -151,9 +151,12 @@ fn bench_command(args: &BenchArgs, elf: &Path) -> Command {
     command
 }
 
-/// Runs a job without a word, and writes down what happened.
-pub fn report(elf: &Path, job: &Path, file: &Path) -> Result<()> {
+/// Runs a job with settings as `--set` takes them, and writes down what happened.
+pub fn report(elf: &Path, job: &Path, set: &[String], file: &Path) -> Result<()> {
     let mut command = simulator("run", elf, Board::default());
+    for set in settings(set)? {
+        command.arg("--set").arg(set);
+    }
     run_child(command.arg(job).arg("--quiet").arg("--report").arg(file))
 }
 

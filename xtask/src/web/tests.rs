@@ -19,10 +19,14 @@ use crate::sim;
 /// Jobs whose last steps are compared.
 const COMPARED: [&str; 2] = ["square", "bracket"];
 
+/// Settings as lines, which the page has exported.
+const EXPORTED: &str = "exported.txt";
+
 /// Serves the page, and runs the tests.
 pub fn run(page: &Path) -> Result<()> {
     let folder = npm::install("web-tests", &root().join("tests/web"))?;
-    let reports = reports(&folder)?;
+    let elf = sim::prepare(Board::default(), Machine::default())?;
+    let reports = reports(&elf, &folder)?;
     let mut modules = Command::new("node");
     modules.arg(root().join("tests/web/modules.mjs")).arg(page);
     run_child(&mut modules)?;
@@ -33,15 +37,17 @@ pub fn run(page: &Path) -> Result<()> {
     std::thread::spawn(move || serve::forever(&listener, &page));
     let mut node = Command::new("node");
     node.current_dir(&folder).arg(root().join("tests/web/page.mjs")).arg(address).args(reports);
-    run_child(&mut node)
+    run_child(&mut node)?;
+    // The simulated chip takes the settings that the page has exported.
+    let set = [format!("@{}", folder.join(EXPORTED).display())];
+    sim::report(&elf, &root().join("examples/square.gcode"), &set, &folder.join("exported.json"))
 }
 
 /// What the simulated chip makes of the jobs: `NAME.json` each.
-fn reports(folder: &Path) -> Result<Vec<PathBuf>> {
-    let elf = sim::prepare(Board::default(), Machine::default())?;
+fn reports(elf: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
     let report = |name: &&str| {
         let file = folder.join(format!("{name}.json"));
-        sim::report(&elf, &root().join(format!("examples/{name}.gcode")), &file)?;
+        sim::report(elf, &root().join(format!("examples/{name}.gcode")), &[], &file)?;
         Ok(file)
     };
     COMPARED.iter().map(report).collect()
