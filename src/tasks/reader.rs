@@ -151,9 +151,14 @@ impl<const N: usize> Intake<N> {
             }
             let cuts = self.cuts(pool);
             if !cuts {
-                let text = pool.put_text(self.received.waiting());
+                let looked = self.scan.has_looked();
+                let (text, ends) = pool.put_text(self.received.waiting());
                 self.received.release_many(text);
                 self.scan.pass(text);
+                if ends {
+                    self.ended(pool, looked, links);
+                    continue;
+                }
             }
             if !pool.ready() {
                 return Left::Full;
@@ -189,17 +194,23 @@ impl<const N: usize> Intake<N> {
                 if cuts {
                     pool.terminate(hold::dropped());
                 }
-                self.scan.serve(links, pool, looked);
-                if machine::is_alarmed() && pool.ends_with_control() {
-                    hold::refuse_older(links, pool);
-                }
-                if pool.has_controls() {
-                    set_asked(true);
-                }
-                links.parser_wake.signal();
+                self.ended(pool, looked, links);
             }
         }
         Left::Bytes
+    }
+
+    /// A line has come whole, in which alarms have been `looked` for in the ring, or not.
+    #[inline(always)]
+    fn ended(&mut self, pool: &mut LinePool, looked: bool, links: &Links) {
+        self.scan.serve(links, pool, looked);
+        if machine::is_alarmed() && pool.ends_with_control() {
+            hold::refuse_older(links, pool);
+        }
+        if pool.has_controls() {
+            set_asked(true);
+        }
+        links.parser_wake.signal();
     }
 
     /// Whether the next byte is one of those that are dropped. It is taken by itself then.

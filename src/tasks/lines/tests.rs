@@ -92,7 +92,8 @@ fn text_in_pieces_is_text_byte_by_byte() {
         let mut rest = line.as_bytes();
         while !rest.is_empty() {
             assert!(pieces.ready());
-            let count = usize::from(pieces.put_text(&rest[..rest.len().min(round % 9 + 1)]));
+            let (count, _) = pieces.put_text(&rest[..rest.len().min(round % 9 + 1)]);
+            let count = usize::from(count);
             rest = &rest[count..];
             if count == 0 {
                 pieces.put(rest[0]);
@@ -102,6 +103,39 @@ fn text_in_pieces_is_text_byte_by_byte() {
         feed(&mut bytes, line.as_bytes());
         for _ in 0..4 {
             assert_eq!(take(&mut pieces, true), take(&mut bytes, true));
+        }
+    }
+}
+
+#[test]
+fn lines_taken_whole_are_those_taken_byte_by_byte() {
+    for in_order in [false, true] {
+        let (mut whole, mut bytes) = (pool(), pool());
+        whole.keep_order(in_order);
+        bytes.keep_order(in_order);
+        for round in 0..200 {
+            let long = "x".repeat(round * 7 % 300);
+            let line = std::format!("g1x{round}{long}\n\ny2?\r\nm3\rz4\n");
+            let mut rest = line.as_bytes();
+            let mut at_once = 0u8;
+            while !rest.is_empty() {
+                // What has come so far.
+                let come = &rest[..rest.len().min(round % 40 + 1)];
+                let (count, ends) = whole.put_text(come);
+                at_once += u8::from(ends);
+                if count == 0 {
+                    whole.put(rest[0]);
+                }
+                rest = &rest[usize::from(count.max(1))..];
+            }
+            assert_eq!(at_once > 0, round % 40 >= 2, "{round}");
+            feed(&mut bytes, line.as_bytes());
+            for _ in 0..5 {
+                let id = LineId(0);
+                assert_eq!(whole.length(id), bytes.length(id));
+                assert_eq!(take(&mut whole, true), take(&mut bytes, true));
+            }
+            assert!(whole.is_empty());
         }
     }
 }
@@ -226,8 +260,8 @@ fn lines_in_order_leave_the_reserve() {
     feed(&mut pool, b"0123456789012345678901234567890123456789\n");
     assert!(pool.ready());
     feed(&mut pool, b"{a:n}\n0123456789012345");
-    assert_eq!(pool.put_text(b"456789"), 6);
-    assert_eq!(pool.put_text(b"0123456789012345"), 13);
+    assert_eq!(pool.put_text(b"456789"), (6, false));
+    assert_eq!(pool.put_text(b"0123456789012345"), (13, false));
     assert!(!pool.ready() && pool.room() == 0);
     assert!(pool.has_reserve(20) && !pool.has_reserve(21));
 }
@@ -289,6 +323,6 @@ fn a_control_line_comes_whole_or_stays_in_the_ring() {
     let mut pool = LinePool::new(Box::leak(Box::new([0; 40])), 16);
     feed(&mut pool, b"g1x1y1z1\n");
     assert_eq!((pool.room(), pool.ready()), (16, false), "a line end needs room too");
-    assert_eq!(pool.put_text(b"{stat:n}"), 0);
-    assert_eq!(pool.put_text(b"g1x2"), 4);
+    assert_eq!(pool.put_text(b"{stat:n}"), (0, false));
+    assert_eq!(pool.put_text(b"g1x2"), (4, false));
 }
