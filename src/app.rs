@@ -8,6 +8,7 @@ use core::cell::{Cell, RefCell};
 
 use avr_embassy::{Interrupt, InterruptEnd, Thread, interrupt};
 use embassy_executor::Spawner;
+use embassy_sync::mutex::Mutex;
 use heapless::Vec;
 
 use crate::config::Settings;
@@ -25,6 +26,7 @@ use crate::store::Log;
 use crate::store::kept;
 use crate::tasks::common::Common;
 use crate::tasks::links::{Changes, Links, QueueCount};
+use crate::tasks::planner::Planner;
 use crate::tasks::ports::{AUX_RESERVE, Port};
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
@@ -79,6 +81,13 @@ fn place(thread: Thread, ports: [Port; PORTS]) -> &'static Links {
     place!(Links, Links::new(thread, ports, storage))
 }
 
+/// Puts the planner into its place, which its task and the parser share.
+#[inline(never)]
+#[small]
+fn place_planner(links: &'static Links, queue: BlockQueue) -> &'static planner::Shared {
+    place!(planner::Shared, Mutex::new(Planner::new(links, queue)))
+}
+
 /// Starts the firmware: `main` is the thread-mode executor, of which `thread` is the token; the exec task has the interrupt executor to itself.
 ///
 /// Interrupts are off. `None` if it has been started before.
@@ -107,10 +116,11 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
         }
     })?;
     main.spawn(reader_task(links, received, aux).ok()?);
-    main.spawn(planner_task(links, queue).ok()?);
+    let planner: &'static planner::Shared = place_planner(links, queue);
+    main.spawn(planner_task(links, planner).ok()?);
     main.spawn(reporter_task(links, occasion).ok()?);
     main.spawn(power_task(links).ok()?);
-    main.spawn(parser_task(links).ok()?);
+    main.spawn(parser_task(links, planner).ok()?);
     main.spawn(control_task(links).ok()?);
     main.spawn(storage_task(links).ok()?);
     Some(())
@@ -188,10 +198,10 @@ tasks! {
         usb: Received<RX_RING>,
         aux: Option<Received<AUX_RING>>
     ) = reader::run;
-    fn planner_task(links: &'static Links, queue: BlockQueue) = planner::run;
+    fn planner_task(links: &'static Links, planner: &'static planner::Shared) = planner::run;
     fn reporter_task(links: &'static Links, occasion: Occasion) = reporter::run;
     fn control_task(links: &'static Links) = control::run;
     fn power_task(links: &'static Links) = power::run;
-    fn parser_task(links: &'static Links) = parser::run;
+    fn parser_task(links: &'static Links, planner: &'static planner::Shared) = parser::run;
     fn storage_task(links: &'static Links) = storage::run;
 }

@@ -55,6 +55,12 @@ pub fn is_unheard() -> bool {
     imp::flags::has(Event::Received) && imp::flags::has(Event::Tick)
 }
 
+/// Whether others should have their turn before a task goes on: see [`is_unheard`], or a real-time character or a switch has to be seen to.
+#[inline(always)]
+pub fn is_wanted() -> bool {
+    is_unheard() || imp::flags::has(Event::Realtime)
+}
+
 /// Segments without a turn of the main loop after which bytes that have come count as a question.
 const UNHEARD: u8 = 1;
 

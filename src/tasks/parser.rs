@@ -23,13 +23,16 @@ use super::alarm;
 use super::hold;
 use super::lines::{Class, LineId};
 use super::links::Links;
+use super::planner;
 use super::ports::{Chosen, Port};
 use super::reporter::tell_at_once;
 use super::tx::Tx;
 use super::view::View;
 use crate::gcode::command::Stop;
 use crate::hal::eeprom::Eeprom;
-use crate::hal::event::{Event, is_unheard, set_asked, wake_after, wake_after_transmitted};
+use crate::hal::event::{
+    Event, is_unheard, is_wanted, set_asked, wake_after, wake_after_transmitted,
+};
 use crate::hal::flags;
 use crate::hal::serial::{PORTS, USB};
 use crate::hal::system;
@@ -48,6 +51,8 @@ const ECHO: usize = 62;
 const STEPS: u8 = 8;
 /// Most steps in a turn in which a millisecond has ended.
 const STEPS_LATE: u8 = 5;
+/// Usual lines that are done with before others have their turn.
+const IN_A_ROW: u8 = 4;
 /// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
 
@@ -112,6 +117,7 @@ enum Turn {
 /// The parser's own state.
 struct Parser {
     links: &'static Links,
+    planner: &'static planner::Shared,
     sessions: [Session; PORTS],
     /// The ports, as bits, that have something to say and lack room.
     lacking: u8,
@@ -124,9 +130,13 @@ struct Parser {
 }
 
 /// The task.
-pub fn run(links: &'static Links) -> impl Future<Output = Never> {
+pub fn run(
+    links: &'static Links,
+    planner: &'static planner::Shared,
+) -> impl Future<Output = Never> {
     let mut parser = Parser {
         links,
+        planner,
         sessions: [const { Session::Idle }; PORTS],
         lacking: 0,
         last: USB,
@@ -134,12 +144,14 @@ pub fn run(links: &'static Links) -> impl Future<Output = Never> {
         waited: 0,
     };
     async move {
+        let mut in_a_row = 0;
         loop {
-            if is_unheard() {
+            if is_wanted() || in_a_row == IN_A_ROW {
+                in_a_row = 0;
                 yield_now().await;
             }
             match parser.turn() {
-                Turn::Usual => {}
+                Turn::Usual => in_a_row += 1,
                 // The reader has its turn, and stops the sender in time.
                 Turn::More => yield_now().await,
                 Turn::Nothing => parser.wait().await,
@@ -160,7 +172,8 @@ impl Parser {
         let straight = !alarmed && !machine::is_checking();
         let tried = if data && straight && self.is_idle() { usual(links) } else { Usual::NotTried };
         if tried == Usual::Done {
-            return if self.has_more() { Turn::Usual } else { Turn::Nothing };
+            let more = self.hand_over() || self.has_more();
+            return if more { Turn::Usual } else { Turn::Nothing };
         }
         self.lacking = 0;
         if self.has_work() && self.go_on() {
@@ -182,6 +195,17 @@ impl Parser {
     fn is_idle(&self) -> bool {
         let feeder = self.sessions.get(usize::from(self.links.feeder.get()));
         matches!(feeder, Some(Session::Idle))
+    }
+
+    /// Has the planner carry out the move of a usual line, at once if that can be. Whether it has, and the next line may be taken.
+    #[inline(always)]
+    fn hand_over(&self) -> bool {
+        let done = planner::take_at_once(self.planner);
+        if !done {
+            self.links.commands_taken.set(true);
+            self.links.planner_wake.signal();
+        }
+        done
     }
 
     /// Whether nothing is under way.
@@ -609,8 +633,6 @@ fn usual(links: &Links) -> Usual {
     if !links.model.borrow_mut().usual(line, numbered, &*settings, &mut commands) {
         return Usual::No;
     }
-    links.commands_taken.set(true);
-    links.planner_wake.signal();
     let ending = Ending { free: port.promise(&lines), length: lines.oldest_length() };
     speech.put_brief(&settings, ending, &mut *tx);
     tx.flush();

@@ -13,13 +13,14 @@
 //!
 //! **N words.** A block has that of its last line: it is finished when that is.
 
-use super::{Begun, News, Parts, Planner, Turn};
+use super::{Begun, News, Parts, Planner, Shared, Turn};
 use crate::gcode::command::{Commands, Feed};
 use crate::hal::event::{Event, wait};
 use crate::hal::time::millis;
 use crate::motion::chain::Chain;
 use crate::motion::line::Built;
 use crate::motion::queue;
+use crate::tasks::links::Links;
 use crate::units::{Length, PerAxis};
 
 /// So long after its last line a chain waits no more, ms.
@@ -124,11 +125,6 @@ impl Planner {
         Turn::More
     }
 
-    /// Waits until the chain is not to wait any longer.
-    pub(super) fn nothing_follows(&self) -> impl Future<Output = ()> {
-        wait(self.links.thread, Event::BlockDone, || self.is_due().then_some(()))
-    }
-
     /// Queues the chain if it is not to wait any longer.
     #[inline(never)]
     pub(super) fn make_up(&mut self) {
@@ -150,4 +146,10 @@ impl Planner {
         let is_due = queue::used() <= 1 || is_stale() && self.queue.free() >= BLOCKS;
         is_due && !self.is_flushed()
     }
+}
+
+/// Waits until the planner has a chain that is not to wait any longer.
+pub(super) fn nothing_follows(links: &Links, shared: &'static Shared) -> impl Future<Output = ()> {
+    let is_due = || shared.try_lock().is_ok_and(|planner| planner.is_due());
+    wait(links.thread, Event::BlockDone, move || is_due().then_some(()))
 }
