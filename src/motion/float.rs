@@ -79,7 +79,7 @@ pub const OCTAVE: i32 = 1 << 23;
 pub fn cube_root(x: f32) -> f32 {
     // A third of the logarithm: 4 % exact. Newton's steps then leave 0.1 % and 2e-6.
     let mut root = f32::from_bits(x.to_bits() / 3 + 0x2A51_4067);
-    for _ in 0..2 {
+    for _ in 0..2u8 {
         root = (root + root + x / (root * root)) * (1.0 / 3.0);
     }
     root

@@ -70,7 +70,7 @@ impl Governor {
         }
         (self.scanned, self.far) = (false, false);
         let mut span = Span { left, cruise, seconds: nominal };
-        for _ in 0..2 {
+        for _ in 0..2u8 {
             if !self.wanted(left, nominal, &mut span) || !self.slice(&span, ahead) {
                 break;
             }
@@ -120,7 +120,7 @@ impl Governor {
         if !self.halting {
             self.halt_ramp();
         }
-        for _ in 0..2 {
+        for _ in 0..2u8 {
             if self.ramp.is_none() {
                 break;
             }

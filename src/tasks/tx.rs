@@ -100,7 +100,7 @@ impl crate::protocol::Out for Tx {
         let before = self.ring.filled();
         let mut left = bytes;
         // The ring's end may come in between; there is room beyond it.
-        for _ in 0..2 {
+        for _ in 0..2u8 {
             let count = self.ring.fill(|slots| left.copy(slots));
             left = left.behind(count);
             if left.is_empty() {

@@ -183,7 +183,7 @@ impl<'a, O: Out> Writer<'a, O> {
     pub fn bits(&mut self, bits: i32) {
         self.text(text!("0x"));
         let mut begun = false;
-        for place in (0..8).rev() {
+        for place in (0..8u8).rev() {
             let digit = (bits >> (4 * place)) as u8 & 15;
             begun |= digit != 0 || place == 0;
             if begun {
