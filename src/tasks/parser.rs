@@ -197,10 +197,11 @@ impl Parser {
         matches!(feeder, Some(Session::Idle))
     }
 
-    /// Has the planner carry out the move of a usual line, at once if that can be. Whether it has, and the next line may be taken.
+    /// Has the planner carry out the move of a usual line, at once if that can be and no real-time character waits. Whether it has, and the next line
+    /// may be taken.
     #[inline(always)]
     fn hand_over(&self) -> bool {
-        let done = planner::take_at_once(self.planner);
+        let done = !flags::has(Event::Realtime) && planner::take_at_once(self.planner);
         if !done {
             self.links.commands_taken.set(true);
             self.links.planner_wake.signal();

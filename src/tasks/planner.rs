@@ -118,6 +118,7 @@ enum Turn {
 pub type Shared = Mutex<NoopRawMutex, Planner>;
 
 /// The task.
+#[allow(clippy::manual_async_fn)] // See `tasks`.
 pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output = Never> {
     async move {
         loop {
