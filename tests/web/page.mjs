@@ -270,6 +270,8 @@ await step('a spindle stalls in a thread', async () => {
   await page.click('#stall');
   await page.click('#do-clear-alarm');
   await type('m5 g90', '"f":[1,0');
+  // An image without threads has no such setting.
+  await type('{spn:0}', '"spn":0');
   await page.selectOption('#speed', '10');
 });
 

@@ -1,4 +1,4 @@
-//! Compiles the module and gathers the files of the page in `target/web`, which is emptied before.
+//! Compiles the module and gathers the files of the page in `target/page`, which is emptied before. (`target/web` is cargo's, of the profile.)
 //!
 //! Nothing is bundled or changed: modules of the browser and an import map do what a bundler would. What is copied from packages of npm is
 //! [`VENDOR`], with their licences.
@@ -36,7 +36,7 @@ const VENDOR: [(&str, &str); 13] = [
 pub fn page() -> Result<PathBuf> {
     let module = module()?;
     let packages = npm::install("web-packages", &root().join("web"))?.join("node_modules");
-    let folder = root().join("target/web");
+    let folder = root().join("target/page");
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
     }
