@@ -121,7 +121,8 @@ export class View {
 
   /// The axes at the work zero.
   #zero(size) {
-    const length = Math.min(Math.max(Math.max(size.x, size.y) / 8, 5), 60);
+    const shown = this.#shown.getSize(new THREE.Vector3()).length();
+    const length = Math.min(Math.max(size.x, size.y) / 8, Math.max(shown / 5, 4), 60);
     const arrow = (x, y, z, tint) =>
       new THREE.ArrowHelper(new THREE.Vector3(x, y, z), new THREE.Vector3(), length, tint, length / 5, length / 9);
     return [arrow(1, 0, 0, 0xc8453b), arrow(0, 1, 0, 0x3d9a50), arrow(0, 0, 1, 0x3f6fd0)];
@@ -186,6 +187,7 @@ export class View {
     const span = this.#shown.getSize(new THREE.Vector3());
     this.#tool.scale.setScalar(Math.max(span.length() / 22, 1.2));
     this.#tool.visible = true;
+    this.#makeFixed();
     this.#resize();
     this.look('iso');
   }

@@ -6,11 +6,11 @@
 //!
 //! | part | is |
 //! |---|---|
-//! | [`bench`] | the machine on its test bench: ports, clock, switches, spindle |
-//! | [`samples`] | where the motors were, at equal distances in time |
-//! | [`curves`] | velocity, acceleration and jerk, from those |
-//! | [`asked`] | which lines ask for more than the machine's limits allow |
-//! | [`tables`] | profiles and codes, as JSON |
+//! | [`mod@bench`] | the machine on its test bench: ports, clock, switches, spindle |
+//! | [`mod@samples`] | where the motors were, at equal distances in time |
+//! | [`mod@curves`] | velocity, acceleration and jerk, from those |
+//! | [`mod@asked`] | which lines ask for more than the machine's limits allow |
+//! | [`mod@tables`] | profiles and codes, as JSON |
 //!
 //! Bytes go in and out by two buffers: the page writes to [`input`] and says how many bytes are there; what a call returns as a length is at
 //! [`output`]. A pointer is good until the next call, for memory may grow. Lengths beyond a buffer are cut to it. Before [`boot`]

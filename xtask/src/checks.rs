@@ -69,7 +69,8 @@ fn lints() -> Result<()> {
 fn documentation() -> Result<()> {
     let mut doc = host_cargo();
     doc.current_dir(root()).env("RUSTDOCFLAGS", "-D warnings");
-    let packages = ["kerf", "avr-embassy", "kerf-macros"].map(|name| ["--package", name]).concat();
+    let packages =
+        ["kerf", "avr-embassy", "kerf-macros", "kerf-web"].map(|name| ["--package", name]).concat();
     run_child(doc.args(["doc", "--no-deps", "--document-private-items"]).args(packages))
 }
 
