@@ -15,7 +15,7 @@ pub struct Means {
     apt: bool,
     root: bool,
     sudo: bool,
-    pub(super) rustup: bool,
+    rustup: bool,
 }
 
 impl Means {
@@ -66,12 +66,6 @@ pub fn plan(missing: &[&Need], means: Means) -> Plan {
 fn install_line(needs: &[&Need]) -> String {
     let packages: Vec<_> = needs.iter().flat_map(|need| need.packages).copied().collect();
     format!("apt-get install -y --no-install-recommends {}", packages.join(" "))
-}
-
-/// Has Debian's tools install one package.
-pub fn of_debian(means: Means, package: &str) -> Option<Step> {
-    let line = format!("apt-get install -y --no-install-recommends {package}");
-    (means.apt && (means.root || means.sudo)).then(|| apt(means, &line, None))
 }
 
 fn apt(means: Means, command: &str, otherwise: Option<&'static str>) -> Step {

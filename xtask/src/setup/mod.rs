@@ -18,7 +18,7 @@ pub use wasm::TARGET;
 /// Makes sure that the tools are there; silent when they are.
 pub fn ensure(scope: Scope) -> Result<()> {
     ensure_programs(scope)?;
-    if scope.covers(Scope::Web) { wasm::ensure(Means::here()) } else { Ok(()) }
+    if scope.covers(Scope::Web) { wasm::ensure() } else { Ok(()) }
 }
 
 fn ensure_programs(scope: Scope) -> Result<()> {

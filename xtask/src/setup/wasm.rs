@@ -1,36 +1,33 @@
-//! Rust's library for WebAssembly, for the cargo that runs this: rustup brings it, which needs no rights, or Debian.
+//! Rust's library for WebAssembly, for the cargo that runs this: rustup brings it, which needs no rights. Without rustup it is named as missing, for Debian
+//! has none that is new enough.
 
 use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Result, ensure};
 
-use super::install::{self, Means, Step};
-use crate::process::probe;
+use crate::process::{probe, run, which};
 
 /// The target.
 pub const TARGET: &str = "wasm32-unknown-unknown";
 /// How rustup brings its library.
 const RUSTUP: &str = "rustup target add wasm32-unknown-unknown";
-/// What Debian calls it, beside its `rustc-web`.
-const PACKAGE: &str = "libstd-rust-web-dev-wasm32";
 
 /// Makes sure that it is there; silent when it is.
-pub fn ensure(means: Means) -> Result<()> {
+pub fn ensure() -> Result<()> {
     if is_there() {
         return Ok(());
     }
-    eprintln!("setup: missing:\n  Rust's library for {TARGET}");
-    install::execute(&steps(means));
-    ensure!(is_there(), "Rust's library for {TARGET} is missing; to install it:\n  {RUSTUP}");
-    Ok(())
-}
-
-fn steps(means: Means) -> Vec<Step> {
-    match means.rustup {
-        true => vec![Step { command: RUSTUP.into(), otherwise: None }],
-        false => install::of_debian(means, PACKAGE).into_iter().collect(),
+    if which("rustup").is_some() {
+        eprintln!("setup: {RUSTUP}");
+        // What counts is what is there afterwards.
+        let _ = run(Command::new("rustup").args(["target", "add", TARGET]));
     }
+    ensure!(
+        is_there(),
+        "Rust's library for {TARGET} is missing; with Rust from https://rustup.rs:\n  {RUSTUP}"
+    );
+    Ok(())
 }
 
 /// Whether the `rustc` of this cargo has it.
