@@ -534,6 +534,10 @@ impl Answer {
         begun: bool,
         awaited: bool,
     ) -> (Progress, bool) {
+        if port.is_resetting() && !begun {
+            // Nobody waits for it.
+            return (Progress::Done, false);
+        }
         let (mut begun, since) = (begun, millis());
         for done in 0..STEPS {
             if !tx.has_room() || (done > 0 && (awaited || gives_way(done, since))) {

@@ -146,10 +146,10 @@ impl<const N: usize> Intake<N> {
             if self.refused > 0 && !self.refuse(pool, links) {
                 return Left::Full;
             }
+            let cuts = self.cuts(pool, links);
             if self.received.is_empty() {
                 return Left::Nothing;
             }
-            let cuts = self.cuts(pool);
             if !cuts {
                 let looked = self.scan.has_looked();
                 let (text, ends) = pool.put_text(self.received.waiting());
@@ -215,17 +215,19 @@ impl<const N: usize> Intake<N> {
 
     /// Whether the next byte is one of those that are dropped. It is taken by itself then.
     #[inline(always)]
-    fn cuts(&self, pool: &mut LinePool) -> bool {
-        self.port.cut.get().is_some_and(|last| self.cuts_up_to(last, pool))
+    fn cuts(&self, pool: &mut LinePool, links: &Links) -> bool {
+        self.port.cut.get().is_some_and(|last| self.cuts_up_to(last, pool, links))
     }
 
     #[cold]
     #[inline(never)]
-    fn cuts_up_to(&self, last: u8, pool: &mut LinePool) -> bool {
+    fn cuts_up_to(&self, last: u8, pool: &mut LinePool, links: &Links) -> bool {
         let cuts = self.received.taken() != last;
         if !cuts {
             pool.terminate_partial(hold::dropped());
             self.port.cut.set(None);
+            // A greeting may wait for that.
+            links.reporter_wake.urge();
         }
         cuts
     }
