@@ -42,11 +42,14 @@ pub struct Spindle {
     factor: u16,
     /// How long moves wait when it has been started or turned round, ms.
     spin_up: u16,
-    /// Outputs that are off in a feedhold, as bits.
+    /// Outputs that are off in a feedhold, as bits, and [`STOPPED`].
     pauses: u8,
     /// Outputs that are on when they are low, as bits.
     low: u8,
 }
+
+/// Of [`Spindle::pauses`]: the sender has stopped the spindle in the hold that is on. No output has this bit.
+const STOPPED: u8 = 0x80;
 
 /// What a setting has changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -130,7 +133,18 @@ impl Spindle {
 
     /// Of the outputs that are `on` those that stay so while a feedhold is on.
     pub fn held(&self, on: u8) -> u8 {
-        on & !self.pauses
+        let stopped = if self.pauses & STOPPED != 0 { SPINDLE | COUNTERCLOCKWISE } else { 0 };
+        on & !(self.pauses | stopped)
+    }
+
+    /// Stops the spindle while the feedhold is on, or has it turn again.
+    pub fn pause(&mut self) {
+        self.pauses ^= STOPPED;
+    }
+
+    /// The feedhold is over.
+    pub fn go_on(&mut self) {
+        self.pauses &= !STOPPED;
     }
 
     /// Outputs that are on when they are low, as bits.

@@ -445,6 +445,11 @@ impl<T> Interpreter<T> {
         self.state.modal.coolant = coolant;
     }
 
+    /// The coolants that run are these: not a line has switched them.
+    pub fn set_coolant(&mut self, coolant: u8) {
+        self.state.modal.coolant = coolant;
+    }
+
     /// Moves the model to where the machine is: after homing, and after the queue was dropped.
     pub fn set_position(&mut self, machine: &PerAxis<Length>) {
         self.state.position = *machine;

@@ -16,6 +16,8 @@ pub struct Signs {
     pub resume: Cell<bool>,
     /// A percent sign in the hold that is on; perhaps in a comment, where it is none.
     pub percent: Cell<bool>,
+    /// A door has begun the hold that is on.
+    pub door: Cell<bool>,
     /// One that ends jogs.
     pub jogs: Cell<Bar>,
     /// When a percent sign came that was none, ms modulo 2^16.

@@ -93,6 +93,8 @@ pub trait Machine {
     fn home(&mut self, axes: u8) -> Status;
     /// From now on lines of G-code are checked only, or carried out again; or refuses to.
     fn check(&mut self, on: bool) -> Status;
+    /// Resets the machine when what is being put has been put: drops what has come, and greets.
+    fn start_over(&mut self);
     /// Begins to move an axis to a place in machine coordinates, or refuses to.
     fn jog(&mut self, axis: u8, place: Length) -> Status;
     /// Does something to the program that is kept. [`Status::Again`]: it is not done yet, and is to be asked for again.

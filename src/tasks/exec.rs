@@ -155,6 +155,9 @@ impl<'a> Runner<'a> {
         self.machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
         // What has paused in a hold goes on before motion does.
         if out.outputs != spindle::on() {
+            if !machine::is_held() {
+                spindle.go_on();
+            }
             self.machine.wait(spindle::switch(spindle, out, false), out);
         }
         if let Some(line) = self.finished.take(used) {
@@ -211,11 +214,12 @@ impl<'a> Runner<'a> {
     /// The machine stands still in a hold. Drops what is queued if that is wanted.
     #[inline(never)]
     #[small]
-    fn held(&mut self, out: &mut Snapshot, spindle: &Spindle) {
+    fn held(&mut self, out: &mut Snapshot, spindle: &mut Spindle) {
         spindle::switch(spindle, out, false);
         machine::drop_if_wanted(|| {
             // What has paused stays off. A kill switches off the rest: the end of the program may wait for a door.
             out.outputs = if machine::is_killing() { 0 } else { spindle::on() };
+            spindle.go_on();
             spindle::switch(spindle, out, false);
             let held = self.machine.drop_all(&mut self.blocks, out);
             stepper::settle(held, &mut out.target);

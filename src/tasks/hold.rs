@@ -34,7 +34,7 @@ use super::jog;
 use super::lines::LinePool;
 use super::links::Links;
 use super::overrides;
-use super::ports::{GREETING, INTERRUPTED, Port};
+use super::ports::{self, GREETING, INTERRUPTED, Port};
 use super::view::View;
 use crate::gcode::overrides::{Change, FULL, Override};
 use crate::hal::event::Event;
@@ -109,6 +109,9 @@ pub fn door(links: &Links, open: bool) {
         links.signs.percent.set(false);
     }
     let works = links.has_data() || View::of(links, links.feeder()).has_work();
+    if open {
+        links.signs.door.set(works);
+    }
     machine::take(match works {
         _ if open => machine::Event::DoorOpened,
         true => machine::Event::DoorShut,
@@ -122,12 +125,16 @@ pub fn serve(links: &Links) {
     if uart::asks_hold() && is_busy(links) {
         // Those of a hold before this one count for nothing.
         links.signs.percent.set(links.signs.percent.get() && machine::is_held());
+        links.signs.door.set(links.signs.door.get() && machine::is_held());
         machine::take(machine::Event::Hold);
     }
     for port in &links.ports {
         let characters = uart::take_realtime(port.number);
         if characters != 0 {
             act(links, port, characters);
+        }
+        if port.take_asked(ports::RESET) {
+            start_over(links, port, false);
         }
     }
 }
@@ -137,7 +144,8 @@ pub fn serve(links: &Links) {
 fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
         if port.speech.get().is_in_order() && machine::alarm() != Alarm::Panic {
-            return start_over(links, port);
+            let works = View::of(links, port).has_work() && !machine::is_checking();
+            return start_over(links, port, works);
         }
         reset();
     }
@@ -179,16 +187,17 @@ fn act(links: &Links, port: &Port, characters: u8) {
 }
 
 /// A reset in a dialect that keeps the position: all that has come is dropped, the program ends, overrides are as programmed; the reporter greets
-/// when that is done, and begins an alarm before if something has been interrupted.
+/// when that is done, and begins an alarm before if the machine `works`, which is interrupted.
 #[inline(never)]
 #[small]
-fn start_over(links: &Links, port: &Port) {
-    let works = View::of(links, port).has_work() && !machine::is_checking();
+fn start_over(links: &Links, port: &Port, works: bool) {
     cut(links, port, uart::newest(port.number), machine::Event::Kill);
     for which in [Override::Feed, Override::Traverse, Override::Spindle] {
         overrides::change(links.thread, Change::to(which, FULL));
     }
-    port.ask(if works { GREETING | INTERRUPTED } else { GREETING });
+    let homes = machine::cycle() == machine::Cycle::Homing;
+    let interrupted = if homes { INTERRUPTED | ports::HOMING } else { INTERRUPTED };
+    port.ask(if works { GREETING | interrupted } else { GREETING });
     links.reporter_wake.urge();
 }
 

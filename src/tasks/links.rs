@@ -34,6 +34,7 @@ use core::cell::{Cell, RefCell};
 use super::ports::Port;
 use super::storage::Storage;
 use super::wake::{News, Wake};
+use crate::boards::outputs;
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
@@ -106,6 +107,9 @@ impl Changes {
     /// A setting.
     pub const SETTINGS: u8 = 2;
 
+    /// Coolant has been switched, not by a line: which output, as bits of [`outputs`](crate::boards::outputs). Twice is as if it had not.
+    pub const COOLANT: u8 = outputs::MIST | outputs::FLOOD;
+
     /// With these.
     pub const fn new(bits: u8) -> Self {
         Self(Cell::new(bits))
@@ -114,6 +118,19 @@ impl Changes {
     /// These have changed.
     pub fn note(&self, bits: u8) {
         self.0.set(self.0.get() | bits);
+    }
+
+    /// These outputs have been switched.
+    pub fn flip(&self, outputs: u8) {
+        self.0.set(self.0.get() ^ outputs & Self::COOLANT);
+    }
+
+    /// The outputs that have been switched, since this was asked last.
+    #[inline(always)]
+    pub fn take_flipped(&self) -> u8 {
+        let bits = self.0.get();
+        self.0.set(bits & !Self::COOLANT);
+        bits & Self::COOLANT
     }
 
     /// Whether nothing has.

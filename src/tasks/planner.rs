@@ -280,6 +280,7 @@ impl Planner {
         if self.links.changes.take(Changes::SETTINGS) {
             self.dynamics.set(&*self.links.settings.borrow());
         }
+        self.outputs.on ^= self.links.changes.take_flipped();
         if self.links.changes.has(Changes::STEPS) {
             self.news = News::Position;
         }
@@ -533,7 +534,8 @@ impl Planner {
             self.relocate(&motion);
             self.news = News::None;
             let spindle = Spindle { turn: outputs::turn(motion.outputs), speed: motion.speed };
-            let coolant = outputs::coolant(motion.outputs);
+            let coolant = super::spindle::coolant(motion.outputs);
+            links.changes.take_flipped();
             links.model.borrow_mut().set_outputs(&spindle, coolant);
         }
         links.job.set(Job::default());

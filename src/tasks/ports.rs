@@ -44,6 +44,11 @@ pub const GREETING: u8 = 2;
 /// Of [`Port::asked`]: before the greeting, that motion was interrupted.
 pub const INTERRUPTED: u8 = 4;
 
+/// Of [`Port::asked`], beside [`INTERRUPTED`]: that was homing.
+pub const HOMING: u8 = 8;
+/// Of [`Port::asked`]: the machine is to be reset, which control does.
+pub const RESET: u8 = 16;
+
 /// What a port has to itself.
 pub struct Port {
     /// Which one it is.

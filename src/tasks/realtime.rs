@@ -14,12 +14,19 @@ use super::lines::acts;
 use super::links::Links;
 use super::overrides;
 use super::ports::{Port, REPORT};
+use super::spindle;
+use crate::boards::outputs;
 use crate::hal::ring::Window;
 use crate::protocol::Speech;
 use crate::realtime::Asked;
 
 /// Opens and shuts the door: what moves is held, and waits for a tilde.
 const DOOR: u8 = 0x84;
+/// Stops the spindle in a hold, or has it turn again.
+const SPINDLE_STOP: u8 = 0x9E;
+/// Switches flood and mist.
+const FLOOD: u8 = 0xA0;
+const MIST: u8 = 0xA1;
 const ASKS: u8 = b'?';
 
 /// Takes such bytes out of a ring, and does what they ask for.
@@ -60,6 +67,9 @@ fn act(links: &Links, port: &Port, byte: u8) {
             hold::door(links, true);
             hold::door(links, false);
         }
+        SPINDLE_STOP => spindle::pause(links),
+        FLOOD => spindle::flip(links, outputs::FLOOD),
+        MIST => spindle::flip(links, outputs::MIST),
         _ => {
             if let Some(asked) = Asked::NOTHING.with(byte) {
                 overrides::apply(links, asked);

@@ -14,7 +14,7 @@ use kerf_macros::small;
 use super::alarm;
 use super::health;
 use super::links::Links;
-use super::ports::{COURTESY, GREETING, INTERRUPTED, Port, REPORT};
+use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, Port, REPORT};
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
 use crate::hal::event::Event;
@@ -217,7 +217,9 @@ fn asked_on(links: &Links, port: &Port) -> Option<Notice> {
     if is_over(port) {
         if port.take_asked(INTERRUPTED) {
             alarm::raise(links, Alarm::Alarm);
-            return Some(Notice::Exception(Status::HardReset));
+            let homed = port.take_asked(HOMING);
+            let status = if homed { Status::Terminated } else { Status::HardReset };
+            return Some(Notice::Exception(status));
         }
         port.take_asked(GREETING);
         return Some(Notice::Greeting(Occasion::Ready));

@@ -4,12 +4,16 @@
 //! ([`Spindle`]). Exec calls [`switch`] when something of it may have changed, at rest, and waits as long as that
 //! says: a spindle that has been started takes its time. In a feedhold those outputs pause that the settings say,
 //! and are on again before motion goes on. Thread mode tells what settings ([`set`]) and the override ([`follow`])
-//! have changed; it is in force at once. Cost of a change: 4,000 cycles.
+//! have changed; it is in force at once. A sender may [switch the coolant](flip), and [stop the spindle](pause) for the hold that is on. Cost of
+//! a change: 4,000 cycles.
 
 use super::common;
+use super::links::Links;
 use super::storage::Storage;
 use super::turning;
+use crate::boards::outputs;
 use crate::config::Setting;
+use crate::gcode::modal::Coolant;
 use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
 use crate::hal::{exec, gpio, pwm, stepper};
@@ -105,4 +109,40 @@ fn tell(thread: Thread) {
         pwm::set_share(common.spindle.share(on(), common.motion.speed));
         gpio::set_low(common.spindle.low(), on());
     });
+}
+
+/// Switches a coolant output on, or off if it is on: at once, whatever lines have said. Not in an alarm, nor in check mode. A line that
+/// waits in the queue for its turn to switch an output switches all as they were when it was planned.
+#[inline(never)]
+#[small]
+pub fn flip(links: &Links, output: u8) {
+    if machine::is_alarmed() || machine::is_checking() {
+        return;
+    }
+    let now = common::with(links.thread, |common| {
+        common.motion.outputs ^= output;
+        switch(&common.spindle, &common.motion, true);
+        common.motion.outputs
+    });
+    links.changes.flip(output);
+    links.model.borrow_mut().set_coolant(coolant(now));
+}
+
+/// Stops the spindle while the hold is on, at rest, or has it turn again.
+#[inline(never)]
+#[small]
+pub fn pause(links: &Links) {
+    common::with(links.thread, |common| {
+        if common.motion.held && common.motion.outputs & outputs::SPINDLE != 0 {
+            common.spindle.pause();
+            switch(&common.spindle, &common.motion, true);
+        }
+    });
+}
+
+/// The coolant, by the outputs.
+#[small]
+pub fn coolant(on: u8) -> u8 {
+    let bit = |output, which: Coolant| if on & output != 0 { which as u8 } else { 0 };
+    bit(outputs::MIST, Coolant::Mist) | bit(outputs::FLOOD, Coolant::Flood)
 }

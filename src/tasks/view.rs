@@ -15,7 +15,7 @@ use super::hold;
 use super::homing;
 use super::links::{Changes, Links};
 use super::overrides;
-use super::ports::Port;
+use super::ports::{Port, RESET};
 use super::power;
 use super::setup::moved_by;
 use super::spindle;
@@ -33,7 +33,8 @@ use crate::gcode::setup::{AxisMode, Setup};
 use crate::gcode::tables::Row;
 use crate::hal::Thread;
 use crate::hal::eeprom::Eeprom;
-use crate::hal::{gpio, inputs as pins, stepper, uart, watchdog};
+use crate::hal::event::Event;
+use crate::hal::{flags, gpio, inputs as pins, stepper, uart, watchdog};
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::machine::jog::Bar;
 use crate::machine::{self, Alarm, Cycle, Doing};
@@ -398,6 +399,8 @@ impl Machine for View<'_> {
             Value::Starvations => health::starvations().into(),
             Value::Kept => self.links.storage.is_done().into(),
             Value::Home => self.home_state(),
+            Value::Door if !self.links.signs.door.get() => 0,
+            Value::Door => 1 + i32::from(machine::is_resuming()),
             Value::Check => machine::is_checking().into(),
             Value::Blamed => self.links.model.borrow().blamed().into(),
             modal => self.modal(modal),
@@ -541,6 +544,11 @@ impl Machine for View<'_> {
             return Status::NotAccepted;
         }
         self.begin(Motion::Check, if on { machine::Event::Check } else { machine::Event::Done })
+    }
+
+    fn start_over(&mut self) {
+        self.port.ask(RESET);
+        flags::set(Event::Realtime);
     }
 
     fn jog(&mut self, axis: u8, place: Length) -> Status {

@@ -5,7 +5,7 @@
 /// Flash: what today's capabilities take, and 1,500 bytes. grbl's dialect takes 17,000 of it. The chip has 253,952, which its largest boot loader, 8 KiB, leaves: the rest is
 /// for what is to come. Calls through a pointer reach 128 KiB; the linker leads those that go further through jumps at the beginning of
 /// the image (`.trampolines`).
-pub const FLASH: u64 = 249_500;
+pub const FLASH: u64 = 252_500;
 /// `.data`: constants that landed in RAM; tables and text belong in program memory.
 pub const DATA: u64 = 400;
 /// `.data` and `.bss` together, of the chip's 8192 bytes: the velocities beside the keys of the look-ahead take 130, and the

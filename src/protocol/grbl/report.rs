@@ -28,13 +28,28 @@ pub struct Reports {
     told: u16,
     /// What the overrides and accessories were, likewise.
     shown: u8,
-    /// `$SLP` has come.
-    pub(super) sleeps: bool,
+    /// [`SLEEPS`] and [`LOWERED`], as bits.
+    flags: u8,
+}
+
+/// Of [`Reports`]: `$SLP` has come.
+pub(super) const SLEEPS: u8 = 1;
+/// Of [`Reports`]: a setting has lowered the top speed of an axis.
+pub(super) const LOWERED: u8 = 2;
+
+#[small]
+impl Reports {
+    /// Sets a flag, or takes it back. Whether it was set.
+    pub(super) fn note(&mut self, flag: u8, on: bool) -> bool {
+        let before = self.flags & flag != 0;
+        self.flags = if on { self.flags | flag } else { self.flags & !flag };
+        before
+    }
 }
 
 impl Remembers for Reports {
     fn new() -> Self {
-        Self { offsets: 0, overrides: 0, told: 0, shown: 0, sleeps: false }
+        Self { offsets: 0, overrides: 0, told: 0, shown: 0, flags: 0 }
     }
 
     fn restore(&mut self) {
@@ -224,12 +239,16 @@ fn accessories_sum(machine: &mut impl Machine) -> u8 {
     sum
 }
 
+/// The [`Value::Door`] of a machine that goes on.
+const RESUMES: i32 = 2;
+
 /// What the machine is doing, in grbl's words.
 #[inline(never)]
 #[small]
 fn state(machine: &mut impl Machine, out: &mut impl Out) {
     let (doing, rests) = (machine.doing(), machine.hold() == Hold::Rests);
-    let sleeps = machine.memory().grbl.sleeps;
+    let sleeps = machine.memory().grbl.flags & SLEEPS != 0;
+    let door = machine.value(Value::Door);
     let stopped = machine.cycle() == Cycle::Stopped;
     let checks = machine.value(Value::Check) != 0;
     text(
@@ -238,7 +257,10 @@ fn state(machine: &mut impl Machine, out: &mut impl Out) {
             _ if sleeps => text!("Sleep"),
             Doing::Alarm(_) => text!("Alarm"),
             Doing::Door if rests => text!("Door:1"),
+            Doing::Holds if door == RESUMES => text!("Door:3"),
+            Doing::Holds if door != 0 && rests => text!("Door:0"),
             Doing::Door => text!("Door:2"),
+            Doing::Holds if door != 0 => text!("Door:2"),
             Doing::Holds if rests => text!("Hold:0"),
             Doing::Holds => text!("Hold:1"),
             // A program stop waits for cycle start.

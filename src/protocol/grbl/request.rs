@@ -4,6 +4,7 @@
 //! a probing when it is over: until then the step says [`Next::Wait`], which costs 2,000 cycles each millisecond.
 
 use super::command::{self, ALL, Command};
+use super::report::{LOWERED, SLEEPS};
 use super::status::{BAD_JOG, BUSY, LOCKED, UNSUPPORTED, error_number};
 use super::write::{fixed, int, line_end, message, text};
 use super::{lists, settings};
@@ -112,7 +113,7 @@ impl Request {
             Command::Nothing => Step::Done,
             Command::Unknown => Step::Error(UNSUPPORTED),
             Command::BadJog => Step::Error(BAD_JOG),
-            Command::Gcode => self.gcode_done(machine),
+            Command::Gcode => self.gcode_done(line, machine, out),
             Command::Modes => match at {
                 END => Step::Done,
                 _ => Step::At(lists::modes(at, machine, out).unwrap_or(END)),
@@ -142,17 +143,25 @@ impl Request {
                 END => Step::Done,
                 _ => Step::At(lists::startup(at, out).unwrap_or(END)),
             },
-            Command::Set(number, from) => set(at, number, command::value(line, from), machine),
+            Command::Set(number, from) => set(at, number, command::value(line, from), machine, out),
             Command::Home(axis) => home(at, axis, machine),
             Command::Unlock => unlock(machine, out),
-            Command::Check => check(machine, out),
+            Command::Check => check(at, machine, out),
             Command::Sleep => sleep(machine, out),
             Command::Restore(letter) => restore(at, letter, machine, out),
         }
     }
 
-    /// What G-code has come to. A probing is waited for, so that its `[PRB:]` comes before `ok`.
-    fn gcode_done(&mut self, machine: &mut impl Machine) -> Step {
+    /// What G-code has come to. A probing is waited for, so that its `[PRB:]` comes before `ok`. A target beyond the travel is an alarm,
+    /// but in a jog and in check mode.
+    fn gcode_done(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
+        let is_beyond = self.status == Status::SoftLimit && command::jog(line).is_none();
+        if is_beyond && machine.value(Value::Check) == 0 {
+            machine.alarm(Alarm::Alarm);
+            text(out, text!("ALARM:2\r\n"));
+            message(out, text!("Reset to continue"));
+            return Step::Error(LOCKED);
+        }
         let number = error_number(self.status);
         if number != 0 {
             return Step::Error(number);
@@ -198,16 +207,22 @@ fn list_setting(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step 
 /// `$x=v`. Answered when it is in memory.
 #[inline(never)]
 #[small]
-fn set(at: u8, number: u8, value: &[u8], machine: &mut impl Machine) -> Step {
+fn set(at: u8, number: u8, value: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
     if at == STORES {
-        let kept = machine.value(Value::Kept) != 0;
-        return if kept { Step::Done } else { Step::Later(STORES) };
+        if machine.value(Value::Kept) == 0 {
+            return Step::Later(STORES);
+        }
+        if machine.memory().grbl.note(LOWERED, false) {
+            message(out, text!("Max rate lowered to what the motors can do"));
+        }
+        return Step::Done;
     }
     match settings::set(number, value, machine) {
         Ok(()) => Step::Later(STORES),
         Err(Status::Again) => Step::Later(0),
-        // Of a setting no target is meant.
-        Err(Status::OutOfRange) => Step::Error(UNSUPPORTED),
+        // What the setting cannot have: no rate and no target is meant.
+        Err(Status::OutOfRange | Status::AboveMaximum) => Step::Error(UNSUPPORTED),
+        Err(Status::BelowMinimum) if value.first() != Some(&b'-') => Step::Error(UNSUPPORTED),
         Err(status) => Step::Error(error_number(status)),
     }
 }
@@ -246,7 +261,7 @@ fn home(at: u8, axis: u8, machine: &mut impl Machine) -> Step {
         Status::Again => return Step::Later(0),
         status => return Step::Error(error_number(status)),
     }
-    machine.memory().grbl.sleeps = false;
+    machine.memory().grbl.note(SLEEPS, false);
     let axes = if axis == ALL { ALL } else { 1 << axis };
     match machine.home(axes) {
         Status::Ok => Step::Later(HOMES),
@@ -264,7 +279,7 @@ fn unlock(machine: &mut impl Machine, out: &mut impl Out) -> Step {
     }
     match machine.clear() {
         Status::Ok => {
-            machine.memory().grbl.sleeps = false;
+            machine.memory().grbl.note(SLEEPS, false);
             message(out, text!("Caution: Unlocked"));
             Step::Done
         }
@@ -273,15 +288,20 @@ fn unlock(machine: &mut impl Machine, out: &mut impl Out) -> Step {
     }
 }
 
-/// `$C`.
+/// `$C`. A reset ends check mode.
 #[inline(never)]
 #[small]
-fn check(machine: &mut impl Machine, out: &mut impl Out) -> Step {
+fn check(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    const LEAVES: u8 = 1;
+    if at == LEAVES {
+        machine.start_over();
+        return Step::Done;
+    }
     let on = machine.value(Value::Check) == 0;
     match machine.check(on) {
         Status::Ok => {
             message(out, if on { text!("Enabled") } else { text!("Disabled") });
-            Step::Done
+            if on { Step::Done } else { Step::At(LEAVES) }
         }
         status => Step::Error(error_number(status)),
     }
@@ -295,7 +315,7 @@ fn sleep(machine: &mut impl Machine, out: &mut impl Out) -> Step {
     if machine.energize(None, false) != Status::Ok {
         return Step::Later(0);
     }
-    machine.memory().grbl.sleeps = true;
+    machine.memory().grbl.note(SLEEPS, true);
     message(out, text!("Sleeping"));
     Step::Done
 }

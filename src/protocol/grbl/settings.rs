@@ -3,11 +3,12 @@
 //! Nothing is kept here. A number that stands for several settings reads the first of them and sets all. What Kerf has no setting for
 //! is shown as it is, and takes that value alone.
 
+use super::report::LOWERED;
 use crate::boards::MOTORS;
 use crate::config::name::token;
 use crate::config::{Fixed, Number, Owner, Setting};
 use crate::progmem;
-use crate::protocol::Machine;
+use crate::protocol::{Machine, Warning};
 use crate::status::Status;
 use crate::units::AXES;
 
@@ -212,10 +213,10 @@ fn steps(axis: u8, machine: &mut impl Machine) -> i32 {
 #[small]
 pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
     let to = Number::parse(text).ok_or(Status::BadNumber)?;
+    if to.is_negative() {
+        return Err(Status::BelowMinimum);
+    }
     if let Some((what, axis)) = split(number) {
-        if to.is_negative() {
-            return Err(Status::BelowMinimum);
-        }
         return set_axis(what, axis, to, machine);
     }
     let whole = || to.fixed(0, false).ok_or(Status::BadNumber);
@@ -280,7 +281,11 @@ fn put_value(
     if machine.setting(setting) == value {
         return Ok(());
     }
-    machine.set(setting, value).map(|_| ())
+    let warning = machine.set(setting, value)?;
+    if warning == Warning::Velocity {
+        machine.memory().grbl.note(LOWERED, true);
+    }
+    Ok(())
 }
 
 #[small]
@@ -304,9 +309,6 @@ fn set_mask(machine: &mut impl Machine, token: [u8; 4], bits: i32) -> Result<(),
 /// `$1`, ms.
 #[small]
 fn set_idle(ms: i32, machine: &mut impl Machine) -> Result<(), Status> {
-    if ms < 0 {
-        return Err(Status::BelowMinimum);
-    }
     let mode = if ms == ALWAYS { 1 } else { 2 };
     (0..MOTORS as u8)
         .try_for_each(|motor| put_value(machine, of_motor(motor, token("pm")), mode))?;

@@ -12,6 +12,9 @@ pub const LOCKED: u8 = 9;
 /// `$J=` with other words than it may have.
 pub const BAD_JOG: u8 = 16;
 
+/// The alarm of a probe that is as it is to become before anything moves.
+pub const PROBE_CLOSED: u8 = 4;
+
 /// The number of the error that a status is; 0 for none.
 #[inline(never)]
 #[small]
@@ -27,6 +30,8 @@ pub fn alarm_number(status: Status) -> Option<u8> {
         // Steps were stopped at once, or the machine has started as nobody wanted.
         Status::ShutDown | Status::Panicked | Status::HardReset => 3,
         Status::ProbeFailed => 5,
+        // Homing was interrupted by a reset.
+        Status::Terminated => 6,
         Status::HomingClosed => 8,
         Status::HomingFailed => 9,
         _ => return None,

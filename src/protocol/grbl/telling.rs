@@ -3,12 +3,14 @@
 //! What TinyG's senders are told unasked, of the queue and how the machine stands, grbl's ask for.
 
 use super::lists;
-use super::report::Report;
-use super::status::alarm_number;
+use super::report::{Report, SLEEPS};
+use super::status::{PROBE_CLOSED, alarm_number};
 use super::write::{int, line_end, message, text};
+use crate::boards::inputs;
+use crate::gcode::modal::MotionMode;
 use crate::machine::Doing;
 use crate::plain;
-use crate::protocol::{Machine, Notice, Occasion, Out, Tells};
+use crate::protocol::{Machine, Notice, Occasion, Out, Tells, Value};
 use crate::status::Status;
 use crate::text;
 
@@ -32,7 +34,10 @@ impl Telling {
     #[inline(never)]
     pub(super) fn begin(notice: Notice, machine: &mut impl Machine) -> Self {
         match notice {
-            Notice::Greeting(Occasion::Ready) => Self::Greeting(false),
+            Notice::Greeting(Occasion::Ready) => {
+                machine.memory().grbl.note(SLEEPS, false);
+                Self::Greeting(false)
+            }
             Notice::Exception(status) => Self::Exception(status),
             Notice::Probing => Self::Probing(lists::PROBING),
             Notice::Query => Self::Report(Report::begin(machine)),
@@ -58,7 +63,7 @@ impl Tells for Telling {
                 false
             }
             Self::Exception(status) => {
-                exception(*status, out);
+                exception(*status, machine, out);
                 false
             }
             Self::Probing(at) => match lists::offsets(*at, machine, out) {
@@ -85,8 +90,10 @@ impl Tells for Telling {
 /// `ALARM:N`, or what people are to know.
 #[inline(never)]
 #[small]
-fn exception(status: Status, out: &mut impl Out) {
+fn exception(status: Status, machine: &mut impl Machine, out: &mut impl Out) {
     if let Some(number) = alarm_number(status) {
+        let closed = status == Status::ProbeFailed && is_contact(machine);
+        let number = if closed { PROBE_CLOSED } else { number };
         text(out, text!("ALARM:"));
         int(out, number.into());
         line_end(out);
@@ -103,4 +110,11 @@ fn exception(status: Status, out: &mut impl Out) {
         Status::StepsLate => message(out, text!("Steps came late")),
         _ => {}
     }
+}
+
+/// Whether the probe is as the probing waits for it to become: it has been so from the beginning.
+#[small]
+fn is_contact(machine: &mut impl Machine) -> bool {
+    let leaves = machine.value(Value::MotionMode) == MotionMode::ProbeAway as i32;
+    machine.value(Value::Input(inputs::PROBE as u8)) == i32::from(!leaves)
 }

@@ -235,6 +235,7 @@ impl Machine for Fake {
         if on { Status::Ok } else { Status::NotAccepted }
     }
 
+    fn start_over(&mut self) {}
     fn jog(&mut self, axis: u8, _place: Length) -> Status {
         if axis < 3 { Status::Ok } else { Status::AxisDisabled }
     }

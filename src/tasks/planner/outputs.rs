@@ -50,9 +50,3 @@ pub(super) fn turn(on: u8) -> modal::Turn {
         _ => modal::Turn::Counterclockwise,
     }
 }
-
-/// The coolant, by the outputs.
-pub(super) fn coolant(on: u8) -> u8 {
-    let bit = |output, which: Coolant| if on & output != 0 { which as u8 } else { 0 };
-    bit(outputs::MIST, Coolant::Mist) | bit(outputs::FLOOD, Coolant::Flood)
-}
