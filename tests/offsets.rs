@@ -206,3 +206,20 @@ fn a_power_cut_leaves_each_cold_setting_old_or_new() {
     }
     assert!(seen.is_sorted() && seen.contains(&1) && seen.last() == Some(&2), "{seen:?}");
 }
+
+#[test]
+fn startup_lines_survive_a_power_cut_and_are_carried_out() {
+    let left = with(Vec::new(), |sender| {
+        let heard = sender.ask("$I\n$N0=g20 g55\n", 2_000);
+        assert!(heard.ends_with("ok\r\nok\r\n"), "{heard}");
+        eeprom::contents()
+    });
+    let start = move || {
+        eeprom::put(&left);
+        let mut sender = Sender(Machine::boot(115_200).expect("one machine for each thread"));
+        (sender.ask("", 200), sender.ask("$G\n", 50))
+    };
+    let (greeting, modes) = thread::spawn(start).join().unwrap();
+    assert!(greeting.contains("Grbl 1.1h") && greeting.contains(">G20G55:ok\r\n"), "{greeting}");
+    assert!(modes.starts_with("[GC:G80 G55 G17 G20 "), "{modes}");
+}

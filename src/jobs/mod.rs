@@ -10,6 +10,7 @@ mod texts;
 use heapless::Vec;
 
 use crate::progmem::Plain;
+use crate::store::program::STARTUPS;
 use crate::store::{Memory, program};
 
 /// The longest line of a job, in bytes.
@@ -17,6 +18,9 @@ pub const LINE_MAX: usize = 48;
 
 /// The number of the program in EEPROM.
 pub const STORED: u8 = 100;
+
+/// The number of the lines that are carried out after a start.
+const STARTUP: u8 = STORED + 1;
 
 /// The round of a job that is over; no piece has as many.
 const OVER: u8 = u8::MAX;
@@ -50,6 +54,17 @@ impl Job {
         exists.then_some(Self { number, ..Self::default() })
     }
 
+    /// The lines that are carried out after a start; `None` if there is none.
+    pub fn of_startup(memory: &impl Memory) -> Option<Self> {
+        let any = (0..STARTUPS).any(|n| program::startup_len(memory, n) != 0);
+        any.then(|| Self { number: STARTUP, ..Self::default() })
+    }
+
+    /// Of those, which comes next; `None` for another job.
+    pub fn startup(&self) -> Option<u8> {
+        (self.number == STARTUP).then_some(self.piece)
+    }
+
     /// Whether there is none.
     pub fn is_none(&self) -> bool {
         self.number == 0
@@ -75,6 +90,9 @@ impl Job {
         if self.number == STORED {
             return self.stored_line(memory, line);
         }
+        if self.number == STARTUP {
+            return self.startup_line(memory, line);
+        }
         loop {
             let Some(piece) = texts::piece(self.number, self.piece) else { return false };
             line.clear();
@@ -98,6 +116,17 @@ impl Job {
 
 #[small]
 impl Job {
+    /// An empty line has none: it does nothing.
+    fn startup_line(&mut self, memory: &impl Memory, line: &mut Vec<u8, LINE_MAX>) -> bool {
+        let n = self.piece;
+        self.piece += 1;
+        line.clear();
+        for at in 0..program::startup_len(memory, n) {
+            let _ = line.push(program::startup_byte(memory, n, at));
+        }
+        n < STARTUPS
+    }
+
     fn stored_line(&mut self, memory: &impl Memory, line: &mut Vec<u8, LINE_MAX>) -> bool {
         line.clear();
         let len = program::len(memory).unwrap_or(0);

@@ -36,6 +36,9 @@ pub enum Hold {
     Rests,
 }
 
+/// How long a line may be that is carried out after a start.
+pub const STARTUP_MAX: usize = 40;
+
 /// What is done to the program that is kept.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Store<'a> {
@@ -45,6 +48,8 @@ pub enum Store<'a> {
     Line(&'a [u8]),
     /// It is complete.
     End,
+    /// A line that is carried out after a start: which of the two, and its text.
+    Startup(u8, &'a [u8]),
 }
 
 /// The machine behind the dialects. Nothing here waits.
@@ -101,6 +106,8 @@ pub trait Machine {
     fn store(&mut self, what: Store<'_>) -> Result<(), Status>;
     /// A byte of the program that is kept.
     fn program(&mut self, at: u16) -> Option<u8>;
+    /// Of a line that is carried out after a start: a byte, `None` behind its end.
+    fn startup(&mut self, line: u8, at: u8) -> Option<u8>;
     /// Starts the machine anew when the response has left, in its boot loader if `boot`, for which it has to be at
     /// rest. [`Status::Again`] while settings are on their way to memory.
     fn restart(&mut self, boot: bool) -> Status;

@@ -35,7 +35,7 @@ pub use dialect::{
     jog, may_be_control,
 };
 pub use line::{Ending, Next, Span};
-pub use machine::{Hold, Machine, Store, Warning};
+pub use machine::{Hold, Machine, STARTUP_MAX, Store, Warning};
 pub use notice::{Notice, Occasion};
 pub use out::Out;
 pub use value::{Value, thousandths};

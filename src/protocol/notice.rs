@@ -13,6 +13,8 @@ pub enum Notice {
     Exception(Status),
     /// What probing has found.
     Probing,
+    /// What has become of a line that is carried out after a start.
+    Startup(u8, Status),
     /// How the machine stands: a status report.
     Status,
     /// How the machine stands, which the sender has asked for by `?`.

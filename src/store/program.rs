@@ -1,4 +1,4 @@
-//! A program of G-code that a user keeps in EEPROM: 896 bytes behind the log.
+//! A program of G-code that a user keeps in EEPROM, behind the log: 885 bytes, and the last 86 of them are two lines for the start.
 //!
 //! ```text
 //! byte 0      VALID, written last; anything else: there is none
@@ -10,6 +10,8 @@
 //! nothing of it is in RAM. What is there already is not written again. [`begin`] makes the old program invalid, [`end`] the
 //! new one valid: when power fails, there is the old one, the new one or none. It is checked when it is started,
 //! 10 ms on AVR, and then read in place.
+//!
+//! A line for the start has 43 bytes: its length, a checksum of two bytes, and at most 40 of text. One that is cut off by a loss of power is none.
 //!
 //! A log of earlier firmware that has come as far as this area keeps it ([`Log::is_wide`](super::Log::is_wide)); then no program
 //! can be stored.
@@ -24,6 +26,14 @@ pub const AREA: u16 = 885;
 const VALID: u8 = 0x50;
 const ERASED: u8 = 0xFF;
 const HEAD: u16 = 5;
+/// Lines that are carried out after a start.
+pub const STARTUPS: u8 = 2;
+/// How long each may be.
+pub const STARTUP_MAX: u8 = 40;
+/// What one takes.
+const STARTUP: u16 = 3 + STARTUP_MAX as u16;
+/// What the program has.
+const PROGRAM: u16 = AREA - STARTUP * STARTUPS as u16;
 
 const CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_XMODEM);
 
@@ -54,7 +64,7 @@ pub fn byte<M: Memory>(memory: &M, len: u16, at: u16) -> Option<u8> {
 pub fn len<M: Memory>(memory: &M) -> Option<u16> {
     let head = |at| memory.read(base::<M>() + at);
     let len = u16::from_le_bytes([head(1), head(2)]);
-    (head(0) == VALID && len <= AREA - HEAD).then_some(len)
+    (head(0) == VALID && len <= PROGRAM - HEAD).then_some(len)
 }
 
 /// The same, and whether the text is what was stored.
@@ -85,7 +95,7 @@ pub fn begin<M: Memory>(memory: &mut M) -> Stored {
 #[small]
 pub fn line<M: Memory>(memory: &mut M, len: u16, text: &[u8]) -> Stored {
     let end = usize::from(HEAD + len) + text.len() + 1;
-    if end > usize::from(AREA) {
+    if end > usize::from(PROGRAM) {
         return Stored::Full;
     }
     let bytes = text.iter().chain(b"\n").copied();
@@ -106,6 +116,56 @@ pub fn end<M: Memory>(memory: &mut M, len: u16) -> Stored {
     let [sum0, sum1] = sum(memory, len).to_le_bytes();
     let head = [(1, len0), (2, len1), (3, sum0), (4, sum1), (0, VALID)];
     if put(memory, head.into_iter()) { Stored::Done(len) } else { Stored::Again }
+}
+
+/// Where a line for the start is, from [`base`] on.
+#[small]
+fn startup(n: u8) -> u16 {
+    PROGRAM + STARTUP * u16::from(n)
+}
+
+/// How long a line for the start is: 0 if there is none. 2,000 cycles for 10 bytes.
+#[inline(never)]
+#[small]
+pub fn startup_len<M: Memory>(memory: &M, n: u8) -> u8 {
+    if n >= STARTUPS {
+        return 0;
+    }
+    let at = base::<M>() + startup(n);
+    let len = memory.read(at);
+    if len > STARTUP_MAX {
+        return 0;
+    }
+    let mut digest = CRC.digest();
+    (0..u16::from(len)).for_each(|byte| digest.update(&[memory.read(at + 3 + byte)]));
+    let sum = u16::from_le_bytes([memory.read(at + 1), memory.read(at + 2)]);
+    if sum == digest.finalize() { len } else { 0 }
+}
+
+/// A byte of one.
+#[small]
+pub fn startup_byte<M: Memory>(memory: &M, n: u8, at: u8) -> u8 {
+    memory.read(base::<M>() + startup(n) + 3 + u16::from(at))
+}
+
+/// Keeps a line for the start: without blanks, in upper case. An empty one is none.
+#[inline(never)]
+#[small]
+pub fn put_startup<M: Memory>(memory: &mut M, n: u8, text: &[u8]) -> Stored {
+    let bytes = || text.iter().filter(|byte| **byte > b' ').map(u8::to_ascii_uppercase);
+    let mut digest = CRC.digest();
+    bytes().for_each(|byte| digest.update(&[byte]));
+    let [sum0, sum1] = digest.finalize().to_le_bytes();
+    let len = bytes().count();
+    if n >= STARTUPS || len > usize::from(STARTUP_MAX) {
+        return Stored::Full;
+    }
+    let at = startup(n);
+    let head = [(at + 1, sum0), (at + 2, sum1), (at, len as u8)];
+    match put(memory, (at + 3..).zip(bytes()).chain(head)) {
+        true => Stored::Done(len as u16),
+        false => Stored::Again,
+    }
 }
 
 /// Writes the first byte that is not as it is to be. Whether there is none, and nothing is being written.
@@ -210,6 +270,31 @@ mod tests {
     }
 
     #[test]
+    fn lines_for_the_start_are_beside_the_program() {
+        let mut cells = Cells { bytes: std::vec![0xFF; SIZE], left: usize::MAX, torn: 0 };
+        assert_eq!((startup_len(&cells, 0), startup_len(&cells, 2)), (0, 0));
+        let long = [b'x'; STARTUP_MAX as usize];
+        wait(&mut cells, |cells| put_startup(cells, 0, b"g54 g20"));
+        wait(&mut cells, |cells| put_startup(cells, 1, &long));
+        store(&mut cells, &["G0 X1"; 19]);
+        let text = |cells: &Cells, n| -> Vec<u8> {
+            (0..startup_len(cells, n)).map(|at| startup_byte(cells, n, at)).collect()
+        };
+        assert_eq!((text(&cells, 0), text(&cells, 1)), (b"G54G20".to_vec(), [b'X'; 40].to_vec()));
+        assert_eq!(put_startup(&mut cells, 1, &[b'x'; 41]), Stored::Full);
+        for torn in 0..=u8::MAX {
+            for left in 1..10 {
+                let mut cut = Cells { left, torn, ..cells.clone() };
+                wait(&mut cut, |cells| put_startup(cells, 0, b"G55"));
+                let text = text(&cut, 0);
+                assert!(matches!(&text[..], b"" | b"G54G20" | b"G55"), "{text:?}");
+            }
+        }
+        wait(&mut cells, |cells| put_startup(cells, 0, b""));
+        assert_eq!((startup_len(&cells, 0), stored(&cells).is_some()), (0, true));
+    }
+
+    #[test]
     fn it_has_its_room() {
         let mut cells = Cells { bytes: std::vec![0xFF; SIZE], left: usize::MAX, torn: 0 };
         let mut len = 0;
@@ -217,7 +302,7 @@ mod tests {
         while let Stored::Done(now) = wait(&mut cells, |cells| line(cells, len, &[b'x'; 39])) {
             (len, lines) = (now, lines + 1);
         }
-        assert_eq!(lines, 22);
+        assert_eq!(lines, 19);
         assert!(cells.bytes[..SIZE - usize::from(AREA)].iter().all(|byte| *byte == 0xFF));
     }
 }

@@ -25,7 +25,7 @@ use super::lines::{Class, LineId};
 use super::links::Links;
 use super::planner;
 use super::ports::{Chosen, Port};
-use super::reporter::tell_at_once;
+use super::reporter::{tell_at_once, tell_startup};
 use super::tx::Tx;
 use super::view::View;
 use crate::gcode::command::Stop;
@@ -184,7 +184,13 @@ impl Parser {
         }
         match self.next_line(data) {
             Some(chosen) => self.take(chosen, tried),
-            None if free && runs_job && !links.job.get().is_over() => job_line(links),
+            None if free && runs_job && !links.job.get().is_over() => {
+                if !has_room_for_startup(links) {
+                    self.lacking |= 1 << links.told().number;
+                    return Turn::Nothing;
+                }
+                job_line(links);
+            }
             None => return Turn::Nothing,
         }
         Turn::More
@@ -584,6 +590,14 @@ fn is_free(links: &Links) -> bool {
     !waits && !machine::is_flushing()
 }
 
+/// Whether what becomes of the job's next line can be told, if it is told.
+#[inline(never)]
+#[small]
+fn has_room_for_startup(links: &Links) -> bool {
+    let tells = links.job.get().startup().is_some();
+    !tells || links.told().tx.try_lock().is_ok_and(|tx| tx.has_room())
+}
+
 /// Carries out the next line of a built-in job. A line that is refused is told by an exception report. The end is told by
 /// the reporter, when everything is done.
 #[inline(never)]
@@ -591,11 +605,17 @@ fn is_free(links: &Links) -> bool {
 fn job_line(links: &Links) {
     let mut job = links.job.get();
     let mut line = Vec::new();
+    let startup = job.startup();
     if !job.next_line(&Eeprom::take(), &mut line) {
         job.end();
     } else {
         match interpret(links, &line, Usual::NotTried).0 {
             Status::Again => return,
+            status if startup.is_some() => {
+                if !line.is_empty() {
+                    tell_startup(links, startup.unwrap_or(0), status);
+                }
+            }
             Status::Ok if links.commands.borrow().stop == Stop::End => job.end(),
             Status::Ok | Status::Noop => {}
             status => {

@@ -17,6 +17,7 @@ use super::links::Links;
 use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, Port, REPORT};
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
+use crate::hal::eeprom::Eeprom;
 use crate::hal::event::Event;
 use crate::hal::flags;
 use crate::hal::serial::is_shared;
@@ -53,6 +54,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         tell_others(links, notice).await;
         greeting = (occasion != Occasion::Ready).then_some(Occasion::Ready);
     }
+    start_up(links);
     let mut told =
         Told { state: State::FIRST, blocks_free: queue_free(), at: millis(), starved: false };
     let mut due = true;
@@ -64,12 +66,18 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             exception.set(Some(Status::StepsLate));
         }
         if View::of(links, links.told()).has_done_job() {
+            let is_startup = links.job.get().startup().is_some();
             links.job.set(Job::default());
-            links.except(Status::EndOfFile);
+            if !is_startup {
+                links.except(Status::EndOfFile);
+            }
             links.parser_wake.signal();
         }
         while let Some((number, notice)) = asked(links) {
             tell(links, links.port(number), notice).await;
+            if matches!(notice, Notice::Greeting(_)) {
+                start_up(links);
+            }
         }
         if let Some(status) = links.notices.exception.take() {
             let notice = Notice::Exception(status);
@@ -247,6 +255,35 @@ fn greet_undecided(links: &Links) {
         let mut telling = Telling::begin(notice, speech, &mut View::of(links, port));
         while step(&mut telling, links, port, &mut tx) {}
     }
+}
+
+/// The lines that are kept for it are carried out, unless there is an alarm, before any other: they are the parser's. Of images without a dialect that
+/// keeps some there are none.
+#[inline(never)]
+#[small]
+fn start_up(links: &Links) {
+    let keeps = Speech::of_question(&links.settings.borrow()).is_some();
+    if !keeps || machine::is_alarmed() || !links.job.get().is_none() {
+        return;
+    }
+    if let Some(job) = Job::of_startup(&Eeprom::take()) {
+        links.job.set(job);
+        links.parser_wake.signal();
+    }
+}
+
+/// Tells what has become of such a line, if there is room for that, as the parser has seen to.
+#[inline(never)]
+#[small]
+pub fn tell_startup(links: &Links, line: u8, status: Status) {
+    let port = links.told();
+    let Ok(mut tx) = port.tx.try_lock() else { return };
+    let undecided = port.undecided.get();
+    let asks = if undecided { Speech::of_question(&links.settings.borrow()) } else { None };
+    let speech = asks.unwrap_or(port.speech.get());
+    let notice = Notice::Startup(line, status);
+    let mut telling = Telling::begin(notice, speech, &mut View::of(links, port));
+    while step(&mut telling, links, port, &mut tx) {}
 }
 
 /// Tells something short on a port, if nobody else talks there and there is room for it: at most 64 bytes, or all of an

@@ -21,7 +21,7 @@ use crate::config::Setting;
 use crate::gcode::tables::{Edit, Row, Tables};
 use crate::hal::eeprom::Eeprom;
 use crate::machine;
-use crate::protocol::Store;
+use crate::protocol::{STARTUP_MAX, Store};
 use crate::status::Status;
 use crate::store::kept::{self, ITEMS, Item};
 use crate::store::log::Put;
@@ -36,6 +36,8 @@ const _: () = assert!(
     kept::KEYS < Eeprom::LOG / record::SIZE + LEFT_OUT,
     "the log of the EEPROM has too few records for what is kept: make `AREA` of src/store/program.rs smaller by 11 bytes for each"
 );
+
+const _: () = assert!(program::STARTUP_MAX as usize == STARTUP_MAX);
 
 /// What the storage task shares with those for whom it keeps things.
 pub struct Storage {
@@ -172,11 +174,13 @@ impl Storage {
             Store::Begin => program::begin(&mut memory),
             Store::Line(line) => program::line(&mut memory, len?, line),
             Store::End => program::end(&mut memory, len?),
+            Store::Startup(n, line) => program::put_startup(&mut memory, n, line),
         };
         match stored {
             Stored::Again => return Err(Status::Again),
             Stored::Full => return Err(Status::PersistenceError),
             Stored::Done(_) if what == Store::End => self.program.set(None),
+            Stored::Done(_) if matches!(what, Store::Startup(..)) => {}
             Stored::Done(len) => self.program.set(Some(len)),
         }
         Ok(())

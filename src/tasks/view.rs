@@ -590,6 +590,11 @@ impl Machine for View<'_> {
         program::byte(&memory, program::len(&memory)?, at)
     }
 
+    fn startup(&mut self, line: u8, at: u8) -> Option<u8> {
+        let memory = Eeprom::take();
+        (at < program::startup_len(&memory, line)).then(|| program::startup_byte(&memory, line, at))
+    }
+
     fn restart(&mut self, boot: bool) -> Status {
         if boot && self.is_busy() {
             return Status::NotAccepted;

@@ -67,7 +67,7 @@ them, but for tools. Those that survive a power cut cannot be in status reports.
 
 ## A program of your own
 
-One program of G-code, of up to 890 bytes and lines of up to 48, is kept as well, for example to measure a tool or to
+One program of G-code, of up to 794 bytes and lines of up to 48, is kept as well, for example to measure a tool or to
 go to a place:
 
 | | JSON | Text |

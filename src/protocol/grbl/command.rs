@@ -21,6 +21,8 @@ pub enum Command {
     Build,
     /// `$N`.
     Startup,
+    /// `$N0=`, `$N1=`: which line; its text is behind these four bytes of the [trimmed](trim) line.
+    StoreStartup(u8),
     /// `$H`, of all axes, or of one.
     Home(u8),
     /// `$X`.
@@ -65,6 +67,9 @@ fn system(rest: &[u8]) -> Command {
         (1, b'G') => Command::Modes,
         (1, b'I') => Command::Build,
         (1, b'N') => Command::Startup,
+        (3.., b'N') if matches!(upper(1), b'0' | b'1') && upper(2) == b'=' => {
+            Command::StoreStartup(upper(1) - b'0')
+        }
         (1, b'H') => Command::Home(ALL),
         (2, b'H') => axis(upper(1)).map_or(Command::Unknown, Command::Home),
         (1, b'X') => Command::Unlock,
@@ -161,6 +166,7 @@ pub fn is_own(line: &[u8]) -> bool {
         | Command::Offsets
         | Command::Build
         | Command::Startup
+        | Command::StoreStartup(_)
         | Command::Sleep
         | Command::Restore(_)
         | Command::BadJog => true,
@@ -190,6 +196,8 @@ mod unit {
         assert_eq!(of(b"  "), Command::Nothing);
         assert_eq!(of(b"$"), Command::Help);
         assert_eq!(of(b"$hx"), Command::Home(0));
+        assert_eq!(of(b"$N1="), Command::StoreStartup(1));
+        assert_eq!(of(b"$N2=G54"), Command::Unknown);
         assert_eq!(of(b"$HQ"), Command::Unknown);
         assert_eq!(of(b"$110=500.5"), Command::Set(110, 5));
         assert_eq!(of(b"$999=1"), Command::Unknown);

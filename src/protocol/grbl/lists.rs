@@ -3,8 +3,7 @@
 //! Each has parts, of at most a coordinate or a few words, that are put one after the other.
 
 use super::settings;
-use super::write::{close, fixed, int, length, line_end, text};
-use crate::config::Fixed;
+use super::write::{close, int, length, line_end, text};
 use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
@@ -148,12 +147,24 @@ pub fn build(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
     None
 }
 
-/// Puts a startup line, of which there is none.
+/// Puts a line that is carried out after a start, `$N0=G54`. Returns the next part, `None` behind the last.
 #[small]
-pub fn startup(at: u8, out: &mut impl Out) -> Option<u8> {
+pub fn startup(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
     text(out, text!("$N"));
-    fixed(out, Fixed::int(at.into()));
+    int(out, at.into());
     out.put(b'=');
+    startup_text(at, machine, out);
     line_end(out);
     (at == 0).then_some(1)
+}
+
+/// Its text.
+#[inline(never)]
+#[small]
+pub fn startup_text(line: u8, machine: &mut impl Machine, out: &mut impl Out) {
+    let mut at = 0;
+    while let Some(byte) = machine.startup(line, at) {
+        out.put(byte);
+        at += 1;
+    }
 }

@@ -5,13 +5,13 @@
 
 use super::command::{self, ALL, Command};
 use super::report::{LOWERED, SLEEPS};
-use super::status::{BAD_JOG, BUSY, LOCKED, UNSUPPORTED, error_number};
+use super::status::{BAD_JOG, BUSY, LOCKED, TOO_LONG, UNSUPPORTED, error_number};
 use super::write::{fixed, int, line_end, message, text};
 use super::{lists, settings};
 use crate::gcode::modal::MotionMode;
 use crate::gcode::tables::{Row, SYSTEMS};
 use crate::machine::{Alarm, Cycle, Doing};
-use crate::protocol::{Answers, Machine, Next, Out, Span, Value};
+use crate::protocol::{Answers, Machine, Next, Out, STARTUP_MAX, Span, Store, Value};
 use crate::status::Status;
 use crate::units::{AXES, Length};
 use crate::{plain, text};
@@ -119,10 +119,11 @@ impl Request {
                 _ => Step::At(lists::modes(at, machine, out).unwrap_or(END)),
             },
             Command::Help => {
-                text(
-                    out,
-                    text!("[HLP:$$ $# $G $I $N $x=val $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n"),
-                );
+                if at == 0 {
+                    text(out, text!("[HLP:$$ $# $G $I $N $x=val $Nx=line "));
+                    return Step::At(END);
+                }
+                text(out, text!("$J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n"));
                 self.command = Command::Nothing;
                 Step::At(0)
             }
@@ -141,14 +142,44 @@ impl Request {
             },
             Command::Startup => match at {
                 END => Step::Done,
-                _ => Step::At(lists::startup(at, out).unwrap_or(END)),
+                _ => Step::At(lists::startup(at, machine, out).unwrap_or(END)),
             },
+            Command::StoreStartup(n) => self.store_startup(n, line, machine),
             Command::Set(number, from) => set(at, number, command::value(line, from), machine, out),
             Command::Home(axis) => home(at, axis, machine),
             Command::Unlock => unlock(machine, out),
             Command::Check => check(at, machine, out),
             Command::Sleep => sleep(machine, out),
             Command::Restore(letter) => restore(at, letter, machine, out),
+        }
+    }
+
+    /// `$N0=`. The line is carried out first, and kept if it is not refused.
+    fn store_startup(&mut self, n: u8, line: &[u8], machine: &mut impl Machine) -> Step {
+        const RUNS: u8 = 1;
+        let start = line.len() - line.trim_ascii_start().len() + 4;
+        let text = line.get(start..).unwrap_or(&[]);
+        if self.at == 0 {
+            if machine.doing() != Doing::Rests {
+                return Step::Error(BUSY);
+            }
+            if text.len() > STARTUP_MAX {
+                return Step::Error(TOO_LONG);
+            }
+            self.block = Some(Span { start: start as u8, end: line.len() as u8 });
+            return Step::Later(RUNS);
+        }
+        let number = error_number(self.status);
+        if number != 0 {
+            return Step::Error(number);
+        }
+        if machine.value(Value::Working) != 0 {
+            return Step::Later(RUNS);
+        }
+        match machine.store(Store::Startup(n, text)) {
+            Ok(()) => Step::Done,
+            Err(Status::Again) => Step::Later(RUNS),
+            Err(status) => Step::Error(error_number(status)),
         }
     }
 

@@ -9,6 +9,8 @@ pub const UNSUPPORTED: u8 = 3;
 pub const BUSY: u8 = 8;
 /// G-code is locked out.
 pub const LOCKED: u8 = 9;
+/// `$N0=` with a line that is too long.
+pub const TOO_LONG: u8 = 14;
 /// `$J=` with other words than it may have.
 pub const BAD_JOG: u8 = 16;
 

@@ -4,7 +4,7 @@
 
 use super::lists;
 use super::report::{Report, SLEEPS};
-use super::status::{PROBE_CLOSED, alarm_number};
+use super::status::{PROBE_CLOSED, alarm_number, error_number};
 use super::write::{int, line_end, message, text};
 use crate::boards::inputs;
 use crate::gcode::modal::MotionMode;
@@ -24,6 +24,8 @@ pub enum Telling {
     Exception(Status),
     /// `[PRB:]`, from this part on.
     Probing(u8),
+    /// What has become of a line that is carried out after a start.
+    Startup(u8, Status),
     /// A status report.
     Report(Report),
 }
@@ -39,6 +41,7 @@ impl Telling {
                 Self::Greeting(false)
             }
             Notice::Exception(status) => Self::Exception(status),
+            Notice::Startup(line, status) => Self::Startup(line, status),
             Notice::Probing => Self::Probing(lists::PROBING),
             Notice::Query => Self::Report(Report::begin(machine)),
             _ => Self::Nothing,
@@ -66,6 +69,10 @@ impl Tells for Telling {
                 exception(*status, machine, out);
                 false
             }
+            Self::Startup(line, status) => {
+                started(*line, *status, machine, out);
+                false
+            }
             Self::Probing(at) => match lists::offsets(*at, machine, out) {
                 Some(next) => {
                     *at = next;
@@ -85,6 +92,20 @@ impl Tells for Telling {
     fn blocks_free(&self) -> usize {
         0
     }
+}
+
+/// `>G54:ok`: in one line, so that it is nobody's answer.
+#[inline(never)]
+#[small]
+fn started(line: u8, status: Status, machine: &mut impl Machine, out: &mut impl Out) {
+    out.put(b'>');
+    lists::startup_text(line, machine, out);
+    let number = error_number(status);
+    text(out, if number == 0 { text!(":ok") } else { text!(":error:") });
+    if number != 0 {
+        int(out, number.into());
+    }
+    line_end(out);
 }
 
 /// `ALARM:N`, or what people are to know.

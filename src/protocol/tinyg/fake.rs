@@ -236,6 +236,9 @@ impl Machine for Fake {
     }
 
     fn start_over(&mut self) {}
+    fn startup(&mut self, _line: u8, _at: u8) -> Option<u8> {
+        None
+    }
     fn jog(&mut self, axis: u8, _place: Length) -> Status {
         if axis < 3 { Status::Ok } else { Status::AxisDisabled }
     }
@@ -246,6 +249,7 @@ impl Machine for Fake {
             _ if self.waits => return Err(Status::Again),
             Store::Begin => self.program.clear(),
             Store::Line(line) => self.program.extend([line, b"\n"].concat()),
+            Store::Startup(..) => {}
             Store::End => {}
         }
         Ok(())

@@ -40,8 +40,8 @@ impl Telling {
             Notice::Enquiry => Part::Enquiry,
             Notice::Exception(status) => Part::Exception(Exception::begin(status, settings)),
             Notice::Probing => Part::Probing(Probing::begin(settings)),
-            // Nobody asks so in this dialect.
-            Notice::Query => Part::Status(None),
+            // Nobody asks so in this dialect, nor keeps such lines.
+            Notice::Query | Notice::Startup(..) => Part::Status(None),
             Notice::Status => Part::Status(Report::begin(mode, machine)),
             Notice::End { jogged, flushed } => Part::End { jogged, flushed },
             Notice::Queue => Part::Queue(0),
