@@ -283,6 +283,11 @@ impl Settings {
         self.system(system::GRM) & 4 != 0
     }
 
+    /// Whether the machine holds behind a line of G-code that is refused in grbl's dialect.
+    pub fn holds_behind_errors(&self) -> bool {
+        self.system(system::GRM) & 8 != 0
+    }
+
     /// Plane at power-up and program end: 0 G17, 1 G18, 2 G19.
     pub fn default_plane(&self) -> u8 {
         self.system(system::GPL)

@@ -98,6 +98,8 @@ pub trait Machine {
     fn home(&mut self, axes: u8) -> Status;
     /// From now on lines of G-code are checked only, or carried out again; or refuses to.
     fn check(&mut self, on: bool) -> Status;
+    /// Nothing moves until somebody lets it go on, as after a feedhold; at rest, too.
+    fn hold_back(&mut self);
     /// Resets the machine when what is being put has been put: drops what has come, and greets.
     fn start_over(&mut self);
     /// Begins to move an axis to a place in machine coordinates, or refuses to.

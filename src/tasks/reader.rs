@@ -117,7 +117,9 @@ impl<const N: usize> Intake<N> {
     /// Takes a turn's bytes, stops the sender or lets it go on, and sees to real-time characters where they stand.
     fn take(&mut self, links: &Links) -> Left {
         if self.port.is_eager() {
-            realtime::pick(links, self.port, &mut self.received.window());
+            let taken = realtime::pick(links, self.port, &mut self.received.window());
+            self.received.release_many(taken);
+            self.scan.pass(taken);
         }
         let left = self.turn(links);
         self.control_flow(self.received.len(), N, links);

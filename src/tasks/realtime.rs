@@ -17,8 +17,12 @@ use super::ports::{Port, REPORT};
 use super::spindle;
 use crate::boards::outputs;
 use crate::hal::ring::Window;
+use crate::hal::serial::{GO, MARKS};
 use crate::protocol::Speech;
 use crate::realtime::Asked;
+
+/// With more bytes than this in it, a ring is filling.
+const ROOMY: u8 = 64;
 
 /// Opens and shuts the door: what moves is held, and waits for a tilde.
 const DOOR: u8 = 0x84;
@@ -29,21 +33,36 @@ const FLOOD: u8 = 0xA0;
 const MIST: u8 = 0xA1;
 const ASKS: u8 = b'?';
 
-/// Takes such bytes out of a ring, and does what they ask for.
+/// Takes such bytes out of a ring, and does what they ask for. Returns how many bytes are to be released: in a ring that is filling no blanks
+/// stay, for the sender does not count these bytes.
 #[inline(never)]
 #[small]
-pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) {
+pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
     let mut within = port.lines.borrow().is_within_line();
-    for n in 0..ring.len() {
+    let waiting = ring.len();
+    // The places of cuts stay what they are.
+    let mut closes = waiting > ROOMY && port.cut.get().is_none();
+    let mut n = 0;
+    while n < ring.len() {
         let byte = ring.get(n);
+        closes &= byte >= MARKS || byte == GO;
         if port.undecided.get() && byte == ASKS && !within {
             decide(links, port);
         }
         within = if byte < b' ' { false } else { within || byte != b' ' };
         if acts(byte) && port.speech.get().is_in_order() && ring.replace(n, byte, b' ') {
             act(links, port, byte);
+            let before = ring.len();
+            if closes {
+                ring.take_out(n, 1);
+            }
+            if ring.len() < before {
+                continue;
+            }
         }
+        n += 1;
     }
+    waiting - ring.len()
 }
 
 /// A sender that asks so speaks another dialect.

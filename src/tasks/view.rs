@@ -546,6 +546,13 @@ impl Machine for View<'_> {
         self.begin(Motion::Check, if on { machine::Event::Check } else { machine::Event::Done })
     }
 
+    fn hold_back(&mut self) {
+        // A tilde that has come before is not meant.
+        self.links.signs.clear();
+        self.links.signs.door.set(false);
+        machine::take(machine::Event::Hold);
+    }
+
     fn start_over(&mut self) {
         self.port.ask(RESET);
         flags::set(Event::Realtime);

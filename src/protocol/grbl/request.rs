@@ -91,6 +91,9 @@ impl Answers for Request {
                 Next::Done(Status::Ok)
             }
             Step::Error(number) => {
+                if self.command == Command::Gcode {
+                    hold_back(machine);
+                }
                 text(out, text!("error:"));
                 int(out, number.into());
                 line_end(out);
@@ -202,6 +205,17 @@ impl Request {
             return Step::Later(0);
         }
         Step::Done
+    }
+}
+
+/// A line has been refused: what is behind it waits for the sender, if that is wanted.
+#[inline(never)]
+#[small]
+fn hold_back(machine: &mut impl Machine) {
+    let carries_out =
+        !matches!(machine.doing(), Doing::Alarm(_)) && machine.value(Value::Check) == 0;
+    if carries_out && machine.settings().holds_behind_errors() {
+        machine.hold_back();
     }
 }
 

@@ -230,7 +230,7 @@ pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), St
         10 => set_report(whole()? & REPORT, !REPORT, machine),
         11 => each_axis(machine, AXES as u8, token("jd"), to),
         12 => put(machine, of_system(token("ct")), to),
-        13 => set_report(i32::from(whole()? != 0) * INCHES, REPORT, machine),
+        13 => set_report(i32::from(whole()? != 0) * INCHES, !INCHES, machine),
         20 => put(machine, of_system(token("sl")), to),
         21 => set_switches(machine, 2, whole()? != 0),
         22 if whole()? == 0 => set_switches(machine, 1, false),

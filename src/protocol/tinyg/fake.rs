@@ -235,6 +235,7 @@ impl Machine for Fake {
         if on { Status::Ok } else { Status::NotAccepted }
     }
 
+    fn hold_back(&mut self) {}
     fn start_over(&mut self) {}
     fn startup(&mut self, _line: u8, _at: u8) -> Option<u8> {
         None

@@ -1,0 +1,162 @@
+//! grbl's dialect as a sender sees it that counts characters: whatever it does, nothing is lost.
+
+use std::collections::VecDeque;
+
+use kerf::hal::imp::Machine;
+
+/// A sender that keeps as many bytes in flight as it has been told that there is room for.
+struct Sender {
+    machine: Machine,
+    /// The lengths of the lines that have not been answered.
+    waits: VecDeque<usize>,
+    heard: String,
+    reports: Vec<String>,
+    room: usize,
+}
+
+impl Sender {
+    fn boot() -> Self {
+        let machine = Machine::boot(115_200).expect("one machine for each thread");
+        let (waits, heard, reports) = (VecDeque::new(), String::new(), Vec::new());
+        let mut sender = Self { machine, waits, heard, reports, room: 128 };
+        sender.machine.run_ms(100);
+        sender.machine.received();
+        sender.machine.send(b"$I\n");
+        sender.machine.run_ms(50);
+        let build = String::from_utf8(sender.machine.received()).unwrap();
+        let options = build.split("[OPT:").nth(1).and_then(|rest| rest.split(']').next());
+        let room = options.and_then(|options| options.split(',').nth(2)).expect("bytes of room");
+        sender.room = room.parse().unwrap();
+        assert!(sender.room >= 128 && build.ends_with("ok\r\n"), "{build}");
+        sender
+    }
+
+    /// Lets time pass, and takes the answers.
+    fn run_ms(&mut self, ms: u64) {
+        self.machine.run_ms(ms);
+        self.heard += &String::from_utf8(self.machine.received()).unwrap();
+        while let Some((line, rest)) = self.heard.split_once("\r\n") {
+            match line {
+                "ok" => {
+                    self.waits.pop_front().expect("an answer to a line");
+                }
+                _ if line.starts_with('<') => self.reports.push(line.to_string()),
+                _ => panic!("{line}"),
+            }
+            self.heard = rest.to_string();
+        }
+    }
+
+    fn in_flight(&self) -> usize {
+        self.waits.iter().sum()
+    }
+
+    /// Sends a line if it fits.
+    fn send(&mut self, line: &str) -> bool {
+        let fits = self.in_flight() + line.len() <= self.room;
+        if fits {
+            self.machine.send(line.as_bytes());
+            self.waits.push_back(line.len());
+        }
+        fits
+    }
+
+    /// The blocks and bytes that the last report says are free.
+    fn free(&self) -> (usize, usize) {
+        let report = self.reports.last().expect("a report");
+        let field = report.split('|').find_map(|field| field.strip_prefix("Bf:")).expect("Bf");
+        let (blocks, bytes) = field.split_once(',').unwrap();
+        (blocks.parse().unwrap(), bytes.parse().unwrap())
+    }
+}
+
+#[test]
+fn a_sender_that_counts_characters_overruns_nothing() {
+    let mut sender = Sender::boot();
+    let mut seed = 20u32;
+    let mut random = |below: u32| {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 16) % below
+    };
+    let (mut x, mut lines) = (0i32, 0);
+    while lines < 3_000 {
+        let step = random(100) as i32 - 50;
+        let line = match random(5) {
+            0 => "\n".to_string(),
+            1 => format!(
+                "g1 x{}.{:02} f6000 (a line that is longer than most)\n",
+                (x + step) / 100,
+                (x + step).abs() % 100
+            ),
+            _ => format!("x{}\n", f64::from(x + step) / 100.0),
+        };
+        let line = if lines == 0 { "g1 x0 f6000\n".to_string() } else { line };
+        if line.contains('x') && x + step < 0 && lines > 0 {
+            continue;
+        }
+        if sender.send(&line) {
+            lines += 1;
+            if line.contains('x') && lines > 1 {
+                x += step;
+            }
+            continue;
+        }
+        sender.run_ms(1 + u64::from(random(30)));
+        if random(200) == 0 {
+            // A long hold, with everything full, and a sender that asks all the time.
+            sender.machine.send(b"!");
+            for _ in 0..300 {
+                sender.machine.send(b"?");
+                sender.run_ms(10);
+                while sender.send("\n") {}
+            }
+            sender.machine.send(b"~");
+        }
+    }
+    while sender.in_flight() > 0 {
+        sender.run_ms(10);
+    }
+    sender.run_ms(30_000);
+    sender.machine.send(b"?");
+    sender.run_ms(20);
+    let position = format!("<Idle|MPos:{:.3},", f64::from(x) / 100.0);
+    let report = sender.reports.last().unwrap();
+    assert!(report.starts_with(&position), "{report} instead of {position}");
+}
+
+#[test]
+fn the_room_that_a_report_tells_is_there() {
+    let mut sender = Sender::boot();
+    assert!(sender.send("$10=3\n") && sender.room == 254);
+    sender.run_ms(200);
+    let begun = ["g1 x0.01 f60\n", "g1 x5\n"];
+    for n in 0..200 {
+        while !sender.send(begun[usize::from(n > 0)]) {
+            sender.run_ms(5);
+            if sender.in_flight() > 200 {
+                break;
+            }
+        }
+        if sender.in_flight() > 200 {
+            break;
+        }
+    }
+    // Whatever it says may be sent, and is answered in the end.
+    for _ in 0..5 {
+        sender.machine.send(b"!?");
+        sender.run_ms(50);
+        let (blocks, bytes) = sender.free();
+        assert!(blocks <= 61 && bytes <= 254, "{blocks} {bytes}");
+        for _ in 0..bytes {
+            sender.machine.send(b"\n");
+            sender.waits.push_back(1);
+        }
+        sender.run_ms(100);
+        sender.machine.send(b"~");
+        sender.run_ms(2_000);
+    }
+    for _ in 0..3_000 {
+        sender.run_ms(20);
+    }
+    assert_eq!(sender.in_flight(), 0);
+}
