@@ -161,3 +161,59 @@ fn every_name_is_in_some_transcript() {
     }
     assert!(missing.is_empty(), "in no transcript:\n{}", missing.join("\n"));
 }
+
+/// What grbl's documents have, each as a line of a transcript begins: what is sent, or what is heard. Numbers of errors and alarms that cannot occur
+/// are in docs/protocol.md, each with its reason.
+fn contract() -> Vec<String> {
+    let errors = [1, 2, 3, 4, 5, 8, 9, 10, 11, 14, 15, 16, 20, 21, 22, 24, 25, 26, 28, 29, 30, 31];
+    let errors = errors.iter().chain(&[32, 33, 34, 35, 36, 38]).map(|n| format!("<- error:{n}"));
+    let alarms = [1, 2, 3, 4, 5, 6, 9].iter().map(|n| format!("<- ALARM:{n}"));
+    let settings =
+        [0, 1, 2, 3, 4, 5, 6, 10, 11, 12, 13, 20, 21, 22, 23, 24, 25, 26, 27, 30, 31, 32];
+    let axes = (10..14).flat_map(|tens| (0..3).map(move |axis| 10 * tens + axis));
+    let settings = settings.into_iter().chain(axes).map(|n| format!("<- ${n}="));
+    let bytes = (0x84..=0x85).chain(0x90..=0x97).chain(0x99..=0x9E).chain(0xA0..=0xA1);
+    let bytes = bytes.map(|byte| format!("\\x{byte:02x}")).chain(["\\x18".into()]);
+    let states = "Idle Run Hold:0 Hold:1 Jog Alarm Door:0 Door:1 Door:2 Door:3 Check Home Sleep";
+    let states = states.split(' ').map(|state| format!("<- <{state}|"));
+    let fields = "|MPos: |WPos: |Bf: |Ln: |FS: |Pn: |WCO: |Ov: |A:";
+    let commands = "$ $$ $# $G $I $N $N0= $N1= $H $HX $X $C $J= $SLP $RST=$ $RST=# $RST=* ? ! ~";
+    let commands = commands.split(' ').map(|command| format!("-> {command}"));
+    let told = "[HLP: [VER: [OPT: [GC: [G54: [G59: [G28: [G30: [G92: [TLO: [PRB: >G ok Grbl";
+    let told = told.split(' ').map(|told| format!("<- {told}"));
+    let messages = [
+        "Reset to continue",
+        "'$H'|'$X' to unlock",
+        "Caution: Unlocked",
+        "Enabled",
+        "Disabled",
+        "Pgm End",
+        "Restoring defaults",
+        "Sleeping",
+    ];
+    let messages = messages.iter().map(|text| format!("<- [MSG:{text}]"));
+    let fields = fields.split(' ').map(str::to_string);
+    let all = errors.chain(alarms).chain(settings).chain(bytes).chain(states).chain(fields);
+    all.chain(commands).chain(told).chain(messages).collect()
+}
+
+#[test]
+fn every_row_of_grbls_contract_is_in_some_transcript() {
+    let names = std::fs::read_dir("tests/transcripts").unwrap().map(|entry| entry.unwrap().path());
+    let is_grbl = |path: &std::path::PathBuf| {
+        path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("grbl"))
+    };
+    let texts = names.filter(is_grbl).map(|path| std::fs::read_to_string(path).unwrap());
+    let text: Vec<String> = texts.collect();
+    let lines: Vec<&str> = text.iter().flat_map(|text| text.lines()).collect();
+    let is_played = |row: &String| {
+        let whole = row.starts_with("<- error") || row.starts_with("<- ALARM");
+        lines.iter().any(|line| match row.as_bytes() {
+            _ if whole => line == row,
+            [b'-' | b'<', ..] => line.starts_with(row.as_str()),
+            _ => line.contains(row.as_str()),
+        })
+    };
+    let missing: Vec<_> = contract().into_iter().filter(|row| !is_played(row)).collect();
+    assert!(missing.is_empty(), "{missing:#?}");
+}

@@ -10,6 +10,7 @@ use super::write::{fixed, int, line_end, message, text};
 use super::{lists, settings};
 use crate::gcode::modal::MotionMode;
 use crate::gcode::tables::{Row, SYSTEMS};
+use crate::machine::alarm::is_program_end;
 use crate::machine::{Alarm, Cycle, Doing};
 use crate::protocol::{Answers, Machine, Next, Out, STARTUP_MAX, Span, Store, Value};
 use crate::status::Status;
@@ -186,7 +187,7 @@ impl Request {
         }
     }
 
-    /// What G-code has come to. A probing is waited for, so that its `[PRB:]` comes before `ok`. A target beyond the travel is an alarm,
+    /// What G-code has come to. A probing is waited for, so that its `[PRB:]` comes before `ok`, and so is the end of a program. A target beyond the travel is an alarm,
     /// but in a jog and in check mode.
     fn gcode_done(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
         let is_beyond = self.status == Status::SoftLimit && command::jog(line).is_none();
@@ -199,6 +200,13 @@ impl Request {
         let number = error_number(self.status);
         if number != 0 {
             return Step::Error(number);
+        }
+        if is_program_end(line) && machine.value(Value::Check) == 0 {
+            if machine.value(Value::Working) != 0 {
+                return Step::Later(0);
+            }
+            message(out, text!("Pgm End"));
+            return Step::Done;
         }
         let probes = self.at == 0 && is_probing(machine.value(Value::MotionMode));
         if probes && machine.value(Value::Working) != 0 {

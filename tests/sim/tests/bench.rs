@@ -54,6 +54,7 @@ rows! {
     moves_of_a_fifth_under_a_jerk_limit = "spiral-0.2-jerk";
     moves_of_a_half_under_a_jerk_limit = "spiral-0.5-jerk";
     lines_in_a_second = "lines";
+    lines_in_a_second_in_grbls_dialect = "lines-grbl";
     lines_in_a_second_under_a_jerk_limit = "lines-jerk";
     lines_in_a_second_on_a_curve = "lines-curve";
     cycles_of_a_line = "line-cycles";

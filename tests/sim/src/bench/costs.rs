@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 
 use super::Figure;
 use super::jitter;
-use super::spirals::{lines_per_second, spiral};
+use super::spirals::{self, lines_per_second, spiral};
 use super::workload::{Bed, FAST_BAUD, How, LOW_JERK, NO_LIMIT, USUAL_JERK, arcs, braid, straight};
 use crate::machine::Machine;
 use crate::report::Report;
@@ -24,6 +24,12 @@ pub fn lines(bed: &Bed) -> Result<Figure> {
     let how = How { baud: FAST_BAUD, acceleration: NO_LIMIT, ..How::default() };
     let (_, report) = bed.run(&short_moves(), how)?;
     Ok(lines_per_second(&report).into())
+}
+
+/// Short moves taken in a second on a fast line, in grbl's dialect.
+pub fn lines_grbl(bed: &Bed) -> Result<Figure> {
+    let how = How { baud: FAST_BAUD, acceleration: NO_LIMIT, ..How::default() };
+    spirals::lines_grbl(bed, &short_moves(), how)
 }
 
 /// Short moves taken in a second on a fast line, under a jerk limit.

@@ -11,7 +11,7 @@ use super::{Row, beyond, costs, jitter, limits, pauses, rates, spirals};
 const NONE: [&str; 3] = ["-"; 3];
 
 /// The table.
-pub const ROWS: [Row; 45] = [
+pub const ROWS: [Row; 46] = [
     Row {
         name: "rate-1",
         what: "highest rate held, 1 motor",
@@ -267,6 +267,17 @@ pub const ROWS: [Row; 45] = [
         target: Some(1_000.0),
         floor: Some(1_080.0),
         measure: costs::lines,
+    },
+    Row {
+        name: "lines-grbl",
+        what: "short moves taken in grbl's dialect, 500,000 baud",
+        unit: "lines/s",
+        decimals: 0,
+        better: Higher,
+        peers: ["291 at 115,200", "-", "115 at 115,200"],
+        target: Some(1_000.0),
+        floor: Some(1_000.0),
+        measure: costs::lines_grbl,
     },
     Row {
         name: "lines-jerk",

@@ -9,7 +9,7 @@ use anyhow::{Result, ensure};
 use super::Figure;
 use super::workload::{ACCELERATION, Bed, FAST_BAUD, How, NO_LIMIT, USUAL_JERK};
 use crate::host::{Host, LINES_IN_FLIGHT};
-use crate::machine::Machine;
+use crate::machine::{AUX, Machine};
 use crate::report::Report;
 
 const MOVES: u32 = 2_000;
@@ -36,13 +36,42 @@ pub fn tenth(bed: &Bed) -> Result<Figure> {
 
 /// Moves of 0.1 mm at the usual speed of the line, in grbl's dialect, sent by a sender that counts characters.
 pub fn tenth_grbl(bed: &Bed) -> Result<Figure> {
-    let mut machine = grbl_machine(bed)?;
-    let job = spiral(0.1);
-    let (mut lines, mut flying) = (job.lines(), VecDeque::new());
+    let mut machine = grbl_machine(bed, How { more: &["{dia:3}"], ..How::default() })?;
+    let sent = send_grbl(&mut machine, &spiral(0.1))?;
+    let lines = f64::from(MOVES) / sent.moves;
+    Ok(Figure { value: sent.moves / ideal(0.1), note: format!("{lines:.0} lines/s") })
+}
+
+/// Lines of a job that are taken in a second in grbl's dialect on a fast line.
+pub fn lines_grbl(bed: &Bed, job: &str, how: How) -> Result<Figure> {
+    let baud = how.baud;
+    let mut machine = grbl_machine(bed, how)?;
+    // TinyG's dialect on the other port has the rate of this one, which then decides for grbl's.
+    machine.send_to(AUX, format!("{{baud:{baud}}}\n").as_bytes());
+    machine.run_for_ms(100)?;
+    machine.set_baud(baud);
+    machine.send(b"$I\n");
+    machine.run_for_ms(100)?;
+    let build = String::from_utf8_lossy(&machine.receive()).into_owned();
+    ensure!(build.ends_with("ok\r\n"), "it answers {build}");
+    let sent = send_grbl(&mut machine, job)?;
+    Ok((job.lines().count() as f64 / sent.answers).into())
+}
+
+/// How long the answers to a job took, and its steps, seconds.
+struct Sent {
+    answers: f64,
+    moves: f64,
+}
+
+/// Sends a job as a sender that counts characters does.
+fn send_grbl(machine: &mut Machine, job: &str) -> Result<Sent> {
+    let (count, mut lines, mut flying) = (job.lines().count(), job.lines(), VecDeque::new());
     let (mut answered, mut tail) = (0, String::new());
     let mut next = lines.next();
+    let (begun, mut ended) = (machine.cycle(), 0);
     let (mut first, mut last, mut steps) = (None, 0, 0);
-    while answered <= MOVES || machine.cycle() < last + machine.cycles(GRBL_REST_MS) {
+    while answered < count || machine.cycle() < last + machine.cycles(GRBL_REST_MS) {
         while let Some(line) = next
             && flying.iter().sum::<usize>() + line.len() < GRBL_BYTES
         {
@@ -54,7 +83,7 @@ pub fn tenth_grbl(bed: &Bed) -> Result<Figure> {
         tail += &String::from_utf8_lossy(&machine.receive());
         while let Some((line, rest)) = tail.split_once("\r\n") {
             ensure!(line == "ok", "answered {line}");
-            (tail, answered) = (rest.to_string(), answered + 1);
+            (tail, answered, ended) = (rest.to_string(), answered + 1, machine.cycle());
             flying.pop_front();
         }
         let made: u64 = machine.recorder().motors().iter().map(|motor| motor.steps).sum();
@@ -64,17 +93,18 @@ pub fn tenth_grbl(bed: &Bed) -> Result<Figure> {
         }
         ensure!(machine.seconds(machine.cycle()) < 60.0, "no end: {answered} lines are answered");
     }
-    let seconds = machine.seconds(last - first.unwrap_or(last));
-    let lines = f64::from(MOVES) / seconds;
-    Ok(Figure { value: seconds / ideal(0.1), note: format!("{lines:.0} lines/s") })
+    Ok(Sent {
+        answers: machine.seconds(ended - begun),
+        moves: machine.seconds(last - first.unwrap_or(last)),
+    })
 }
 
 /// A machine with the settings of the others that speaks grbl's dialect, and has greeted.
-fn grbl_machine(bed: &Bed) -> Result<Machine> {
+fn grbl_machine(bed: &Bed, how: How) -> Result<Machine> {
     let mut machine = bed.machine()?;
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut machine, 1_000)?;
-    for line in bed.settings(How { more: &["{dia:3}"], ..How::default() }) {
+    for line in bed.settings(how) {
         host.ask(&mut machine, &line, 1_000)?;
     }
     host.run_for_ms(&mut machine, KEEPS_MS)?;
