@@ -98,9 +98,7 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     let queue = queue::store().queue(thread)?;
     let (links, received, aux) = connect(thread, rate)?;
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
-    let speech = Speech::at_start(&links.settings.borrow());
-    links.ports.iter().for_each(|port| port.speech.set(speech));
-    wait_for_decision(links);
+    choose_dialects(links);
     set_hardware(thread, &links.settings.borrow());
     spindle::set_all(thread, links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
@@ -126,13 +124,16 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     Some(())
 }
 
-/// What is said first decides between dialects, if the settings let it.
+/// How each port is spoken to; what is said first decides between dialects, if the settings let it.
 #[inline(never)]
 #[small]
-fn wait_for_decision(links: &Links) {
+fn choose_dialects(links: &Links) {
     let settings = links.settings.borrow();
-    let waits = settings.lets_senders_choose() && Speech::of_question(&settings).is_some();
-    links.ports.iter().for_each(|port| port.undecided.set(waits));
+    let chooses = Speech::of_question(&settings).is_some();
+    for port in &links.ports {
+        port.speech.set(Speech::at_start(&settings, port.number));
+        port.undecided.set(chooses && settings.lets_senders_choose(port.number));
+    }
     links.decided(&settings);
 }
 

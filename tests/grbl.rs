@@ -1,8 +1,9 @@
 //! grbl's dialect as a sender sees it that counts characters: whatever it does, nothing is lost.
 
 use std::collections::VecDeque;
+use std::thread;
 
-use kerf::hal::imp::Machine;
+use kerf::hal::imp::{Machine, eeprom};
 
 /// A sender that keeps as many bytes in flight as it has been told that there is room for.
 struct Sender {
@@ -159,4 +160,48 @@ fn the_room_that_a_report_tells_is_there() {
         sender.run_ms(20);
     }
     assert_eq!(sender.in_flight(), 0);
+}
+
+/// What the two ports say at a start with this setting of `dia`, and to an empty line: the second, and the first.
+fn spoken(dia: u8) -> [String; 2] {
+    let set = move || {
+        let machine = Machine::boot(115_200).expect("one machine for each thread");
+        machine.run_ms(100);
+        machine.send(format!("{{dia:{dia}}}\n").as_bytes());
+        machine.run_ms(500);
+        eeprom::contents()
+    };
+    let left = thread::spawn(set).join().unwrap();
+    let start = move || {
+        eeprom::put(&left);
+        let machine = Machine::boot(115_200).expect("one machine for each thread");
+        machine.run_ms(100);
+        machine.send(b"\n");
+        machine.send_aux(b"\n");
+        machine.run_ms(50);
+        [machine.received(), machine.received_aux()].map(|heard| String::from_utf8(heard).unwrap())
+    };
+    thread::spawn(start).join().unwrap()
+}
+
+#[test]
+fn each_port_has_the_dialect_that_is_set_for_it() {
+    for (dia, ports) in
+        [(3, "gg"), (2, "tt"), (0, "bb"), (11, "gt"), (14, "tg"), (7, "gb"), (12, "bg")]
+    {
+        for (heard, port) in spoken(dia).iter().zip(ports.chars()) {
+            let [grbl, tinyg] = ["Grbl 1.1h", "SYSTEM READY"].map(|text| heard.contains(text));
+            let said = if heard.ends_with("ok\r\n") {
+                'g'
+            } else if grbl && tinyg {
+                'b'
+            } else {
+                't'
+            };
+            assert!(
+                said == port && grbl == (port != 't') && tinyg == (port != 'g'),
+                "{dia}: {heard}"
+            );
+        }
+    }
 }

@@ -255,12 +255,21 @@ impl Settings {
 
     /// In which dialect ports begin: 0 that which is decided by what is said, 1 g2core's, 2 TinyG's, 3 grbl's.
     pub fn dialect(&self) -> u8 {
-        self.system(system::DIA)
+        self.system(system::DIA) & 3
     }
 
-    /// Whether what a sender says first decides between dialects. Whoever has chosen text mode, or silence, has chosen TinyG's.
-    pub fn lets_senders_choose(&self) -> bool {
-        self.dialect() == 0 && self.starts_in_json() && self.json_verbosity() != 0
+    /// The same of a port: the second may have a choice of its own, in the next two bits.
+    pub fn dialect_of(&self, port: u8) -> u8 {
+        match self.system(system::DIA) >> 2 {
+            own if port == 0 || own == 0 => self.dialect(),
+            1 => 0,
+            own => own,
+        }
+    }
+
+    /// Whether what a sender says first on a port decides between dialects. Whoever has chosen text mode, or silence, has chosen TinyG's.
+    pub fn lets_senders_choose(&self, port: u8) -> bool {
+        self.dialect_of(port) == 0 && self.starts_in_json() && self.json_verbosity() != 0
     }
 
     /// Whether the machine passes for a g2core.

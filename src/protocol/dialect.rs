@@ -26,9 +26,9 @@ pub trait Dialect {
     /// Whether lines are answered in their order, empty ones too, and `?` and bytes above 0x7F are taken out of lines wherever they stand.
     const IN_ORDER: bool = false;
 
-    /// Whether the settings have ports begin in this dialect. If no dialect is chosen they begin in the first of the table.
-    fn is_chosen(settings: &Settings) -> bool {
-        let _ = settings;
+    /// Whether the settings have a port begin in this dialect. If no dialect is chosen they begin in the first of the table.
+    fn is_chosen(settings: &Settings, port: u8) -> bool {
+        let _ = (settings, port);
         false
     }
 
@@ -163,12 +163,12 @@ macro_rules! dialects {
         }
 
         impl Speech {
-            /// How ports are spoken to after a start: in the dialect that is chosen, else in the first of the table that is built in.
+            /// How a port is spoken to after a start: in the dialect that is chosen, else in the first of the table that is built in.
             #[allow(unreachable_code)]
             #[inline(always)]
-            pub fn at_start(settings: &Settings) -> Self {
+            pub fn at_start(settings: &Settings, port: u8) -> Self {
                 $(#[cfg(feature = $feature)]
-                if <$dialect>::is_chosen(settings) {
+                if <$dialect>::is_chosen(settings, port) {
                     return Self::$name(<$dialect>::speech(settings));
                 })+
                 $(#[cfg(feature = $feature)]

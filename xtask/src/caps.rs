@@ -2,7 +2,7 @@
 //!
 //! Raise a cap only together with the reason for it.
 
-/// Flash: what today's capabilities take, and 1,500 bytes. grbl's dialect takes 17,000 of it. The chip has 253,952, which its largest boot loader, 8 KiB, leaves: the rest is
+/// Flash: what today's capabilities take. grbl's dialect takes 21,000 of it. The chip has 253,952, which its largest boot loader, 8 KiB, leaves: the rest is
 /// for what is to come. Calls through a pointer reach 128 KiB; the linker leads those that go further through jumps at the beginning of
 /// the image (`.trampolines`).
 pub const FLASH: u64 = 252_500;

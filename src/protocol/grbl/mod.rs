@@ -54,8 +54,8 @@ impl Dialect for Grbl {
 
     fn speech(_settings: &Settings) {}
 
-    fn is_chosen(settings: &Settings) -> bool {
-        settings.dialect() == CHOSEN
+    fn is_chosen(settings: &Settings, port: u8) -> bool {
+        settings.dialect_of(port) == CHOSEN
     }
 
     fn is_decided_by(line: &[u8]) -> bool {
