@@ -107,7 +107,7 @@ impl Changes {
     /// A setting.
     pub const SETTINGS: u8 = 2;
 
-    /// Coolant has been switched, not by a line: which output, as bits of [`outputs`](crate::boards::outputs). Twice is as if it had not.
+    /// Coolant has been switched, not by a line: which output, as bits of [`outputs`]. Twice is as if it had not.
     pub const COOLANT: u8 = outputs::MIST | outputs::FLOOD;
 
     /// With these.
