@@ -180,9 +180,13 @@ pub fn take_at_once(shared: &Shared) -> bool {
     planner.replan();
     let had_chain = planner.has_chain();
     let done = planner.carry_out_at_once();
-    if !had_chain && planner.has_chain() {
-        // The task sees to it that nothing waits long.
-        planner.links.planner_wake.signal();
+    if planner.has_chain() {
+        // Exec may have finished a block meanwhile, of which the task has not heard.
+        planner.make_up();
+        if !had_chain {
+            // The task sees to it that nothing waits long.
+            planner.links.planner_wake.signal();
+        }
     }
     done
 }

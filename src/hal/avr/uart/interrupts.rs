@@ -68,9 +68,9 @@ macro_rules! interrupts {
         $port:ident on $usart:ident: $shared:ident, $ring:ident,
         $rx:ident, $empty:ident, $complete:ident
     ) => {
-        /// USARTn_RX: takes a byte, in 81 cycles.
+        /// USARTn_RX: takes a byte, in 83 cycles.
         ///
-        /// Interrupts are off for 32 cycles on the way in and 25 on the way out, or 30 if exec has been held
+        /// Interrupts are off for 28 cycles on the way in and 25 on the way out, or 30 if exec has been held
         /// off. The transmit interrupt waits for it: a byte that is taken late may be lost, one that is sent late is not. The reader is told at the ends of lines and every `batch` bytes.
         #[unsafe(no_mangle)]
         extern "C" fn $rx() -> ! {
@@ -92,7 +92,10 @@ macro_rules! interrupts {
                     "sbic {flags}, {hold_exec}",
                     "ori  r25, 0x80",
                     "sbi  {flags}, {hold_exec}",
+                    // A step comes in here.
+                    "sei",
                     "push r31",
+                    "cli",
                     // The status goes with the byte that is read after it: nothing comes in between, for an
                     // instruction behind `sei` is executed first.
                     "lds  r31, {status}",
