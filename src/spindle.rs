@@ -107,6 +107,12 @@ impl Spindle {
         Changed::Outputs
     }
 
+    /// The speed that turns at `most` under the override, or slower.
+    pub fn limited(&self, speed: f32, most: f32) -> f32 {
+        let most = most * 1e3 / f32::from(self.factor);
+        if speed < most { speed } else { most }
+    }
+
     /// Multiplies S by so many thousandths from now on. Whether that is new.
     pub fn set_factor(&mut self, thousandths: u16) -> bool {
         core::mem::replace(&mut self.factor, thousandths) != thousandths

@@ -10,11 +10,17 @@ use super::codes::{self, Action, Code, NonModal, OverrideCode, StopCode, ToolLen
 use super::decimal::Decimal;
 use super::lexer::{self, Item};
 use super::modal::{
-    ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, Turn, Units,
+    ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, SpeedMode,
+    Turn, Units, XMode,
 };
 use super::words::{self, AXES};
+use crate::capability::Capability;
 use crate::status::Status;
 use crate::units;
+
+/// The most words with a number that a line may have. No codes take more together: an arc with all axes, its offsets and P, and besides G43, G96,
+/// F, S, T and N.
+const MOST: usize = 16;
 
 /// The parts of a line.
 pub struct Block {
@@ -30,6 +36,8 @@ pub struct Block {
     cutter: Option<()>,
     pub tool_length: Option<ToolLength>,
     pub retract: Option<Retract>,
+    pub speed_mode: Option<SpeedMode>,
+    pub x_mode: Option<XMode>,
     pub system: Option<u8>,
     pub path: Option<PathMode>,
     pub stop: Option<StopCode>,
@@ -46,7 +54,7 @@ pub struct Block {
     /// The words it has, as a set.
     present: u32,
     /// Their numbers, in the order of the line.
-    values: Vec<(u8, Decimal), { words::COUNT }>,
+    values: Vec<(u8, Decimal), MOST>,
     /// Begins with a slash: block delete.
     pub slashed: bool,
     /// Where in the line the text of a message lies.
@@ -72,6 +80,8 @@ impl Block {
             cutter: None,
             tool_length: None,
             retract: None,
+            speed_mode: None,
+            x_mode: None,
             system: None,
             path: None,
             stop: None,
@@ -163,6 +173,11 @@ impl Block {
             Action::CutterOn => return Err(Status::CutterCompensation),
             Action::ToolLength(code) => first(&mut self.tool_length, code),
             Action::Retract(mode) => first(&mut self.retract, mode),
+            Action::SpeedMode(_) | Action::XMode(_) if !Capability::Lathe.is_built_in() => {
+                return Err(Status::NotBuiltIn);
+            }
+            Action::SpeedMode(mode) => first(&mut self.speed_mode, mode),
+            Action::XMode(mode) => first(&mut self.x_mode, mode),
             Action::System(number) => first(&mut self.system, number),
             Action::Path(mode) => first(&mut self.path, mode),
             Action::Stop(stop) => first(&mut self.stop, stop),
@@ -181,8 +196,8 @@ impl Block {
             return Err(Status::WordRepeated);
         }
         self.present |= bit;
-        // No slot twice, so there is room for all.
-        self.values.push((slot, value)).map_err(|_| Status::InternalError)
+        // With more of them one is of no use.
+        self.values.push((slot, value)).map_err(|_| Status::WordUnused)
     }
 
     fn comment(&mut self, line: &[u8], text: &[u8]) {
@@ -210,6 +225,15 @@ impl Block {
         self.values.iter().find(|word| word.0 == slot).map(|word| &word.1)
     }
 
+    /// X is a diameter: its number becomes the radius.
+    #[inline(never)]
+    #[small]
+    pub fn halve_x(&mut self) {
+        if let Some((_, value)) = self.values.iter_mut().find(|word| word.0 == words::X) {
+            *value = value.half();
+        }
+    }
+
     /// The axis words, in the order of the line.
     pub fn axes(&self) -> impl Iterator<Item = (u8, &Decimal)> {
         let words = self.values.iter().map(|(slot, value)| (*slot, value));
@@ -229,6 +253,7 @@ impl Block {
             || self.stop.is_some()
             || self.overrides.is_some()
             || self.tool_change.is_some()
+            || self.speed_mode.is_some()
             || self.has(words::bit(words::S) | words::bit(words::T))
     }
 
@@ -336,8 +361,7 @@ mod tests {
 
     #[test]
     fn what_the_machine_does_not_have() {
-        for line in ["G5", "G256", "G28.35", "G61.2", "G59.4", "G-1", "D1", "E1", "O1", "U1", "V1"]
-        {
+        for line in ["G5", "G256", "G28.35", "G61.2", "G59.4", "G-1", "E1", "O1", "U1", "V1"] {
             assert_eq!(refusal(line), Status::GcodeUnsupported, "{line}");
         }
         for line in ["M10", "M256", "M30.1", "M3.1"] {

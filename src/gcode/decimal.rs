@@ -105,6 +105,17 @@ impl Decimal {
         })
     }
 
+    /// The half of it, exact to eight decimals.
+    #[small]
+    pub fn half(self) -> Self {
+        const CARRY: u16 = REST as u16 / 2;
+        let odd = |value: u16| if value & 1 == 0 { 0 } else { CARRY };
+        let (whole, frac) = (self.whole / 2, self.frac / 2 + odd(self.whole as u16));
+        let tail = self.tail / 2 + odd(self.frac);
+        let negative = self.negative && (whole != 0 || frac != 0 || tail != 0);
+        Self { whole, frac, tail, negative }
+    }
+
     /// Whether it is 0.
     pub fn is_zero(&self) -> bool {
         self.whole == 0 && self.frac == 0 && self.tail == 0
@@ -158,6 +169,21 @@ mod tests {
 
     fn inch(text: &str) -> Result<(i32, i16), Status> {
         read(text).inch().map(|exact| (exact.units.0, exact.rest))
+    }
+
+    #[test]
+    fn halves_are_exact() {
+        for (text, half) in [
+            ("1", "0.5"),
+            ("-7.0001", "-3.50005"),
+            ("4294967295", "2147483647.5"),
+            ("0.00000002", "0.00000001"),
+            ("-0.00000001", "0"),
+            ("19.99990001", "9.999950005"),
+            ("3.0003", "1.50015"),
+        ] {
+            assert_eq!(read(text).half(), read(half), "{text}");
+        }
     }
 
     #[test]

@@ -14,12 +14,13 @@
 
 use super::block::Block;
 use super::codes::NonModal;
-use super::command::{Commands, Spindle};
-use super::modal::{Defaults, FeedMode, Modal, MotionMode, Turn, Units};
+use super::command::{Commands, Spindle, Surface};
+use super::modal::{Defaults, FeedMode, Modal, MotionMode, SpeedMode, Turn, Units, XMode};
 use super::setup::Setup;
 use super::state::State;
 use super::sticky::Sticky;
 use super::tables::{Edit, Ram, Row, Tables};
+use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -125,6 +126,7 @@ impl<T: Tables> Interpreter<T> {
         let deletes = setup.deletes_blocks();
         block.read(line, deletes)?;
         block.check(self.state.modal.motion)?;
+        self.halve(&mut block);
         self.execute_or_undo(&block, setup, out)?;
         let Block { message, slashed, commented, .. } = block;
         Ok(Info { message, deleted: slashed && deletes, commented })
@@ -144,6 +146,7 @@ impl<T: Tables> Interpreter<T> {
         let mut block = Block::new();
         block.read(words, false)?;
         block.check(MotionMode::Feed)?;
+        self.halve(&mut block);
         // Of what is rare a jog has G53 alone, which is a matter of its move.
         if block.is_rare() && block.non_modal != Some(NonModal::MachineCoordinates) {
             return Err(Status::GcodeUnsupported);
@@ -156,6 +159,15 @@ impl<T: Tables> Interpreter<T> {
         let state = &mut self.state;
         (state.modal, state.feed, state.feed_units, state.line) = (modal, feed, feed_units, line);
         done.map(|()| Info::default())
+    }
+
+    /// Makes a radius of the X word if it is a diameter, for whatever it is used.
+    #[inline(always)]
+    fn halve(&self, block: &mut Block) {
+        let mode = block.x_mode.unwrap_or(self.state.modal.x_mode);
+        if Capability::Lathe.is_built_in() && mode == XMode::Diameter {
+            block.halve_x();
+        }
     }
 
     #[inline(never)]
@@ -266,6 +278,7 @@ struct RareBefore {
     shifted: bool,
     tool_length: PerAxis<Length>,
     speed: f32,
+    limit: u16,
     selected: u8,
     tool: u8,
 }
@@ -273,8 +286,9 @@ struct RareBefore {
 #[small]
 impl RareBefore {
     fn of(state: &State) -> Self {
-        let State { homed, shift, shifted, tool_length, speed, selected, tool, .. } = *state;
-        Self { usual: Before::of(state), homed, shift, shifted, tool_length, speed, selected, tool }
+        let State { homed, shift, shifted, tool_length, speed, limit, selected, tool, .. } = *state;
+        let usual = Before::of(state);
+        Self { usual, homed, shift, shifted, tool_length, speed, limit, selected, tool }
     }
 
     #[inline(never)]
@@ -283,7 +297,7 @@ impl RareBefore {
         state.homed = self.homed;
         (state.shift, state.shifted) = (self.shift, self.shifted);
         state.tool_length = self.tool_length;
-        state.speed = self.speed;
+        (state.speed, state.limit) = (self.speed, self.limit);
         (state.selected, state.tool) = (self.selected, self.tool);
     }
 }
@@ -298,6 +312,7 @@ pub struct Modes {
     line: u32,
     homed: u8,
     speed: f32,
+    limit: u16,
     selected: u8,
     tool: u8,
 }
@@ -315,10 +330,11 @@ impl<T: Tables> Interpreter<T> {
     /// What lines that are only checked may change, to [give it back](Self::give_back) afterwards.
     #[inline(never)]
     pub fn keep(&self) -> (Modes, Offsets) {
-        let State { modal, feed, feed_units, line, homed, speed, selected, tool, .. } = self.state;
+        let State { modal, feed, feed_units, line, homed, speed, limit, selected, tool, .. } =
+            self.state;
         let State { shift, shifted, tool_length, .. } = self.state;
         (
-            Modes { modal, feed, feed_units, line, homed, speed, selected, tool },
+            Modes { modal, feed, feed_units, line, homed, speed, limit, selected, tool },
             Offsets { shift, shifted, tool_length },
         )
     }
@@ -335,7 +351,7 @@ impl<T: Tables> Interpreter<T> {
         (state.feed, state.feed_units) = (modes.feed, modes.feed_units);
         state.line = modes.line;
         state.homed &= modes.homed;
-        state.speed = modes.speed;
+        (state.speed, state.limit) = (modes.speed, modes.limit);
         (state.selected, state.tool) = (modes.selected, modes.tool);
         (state.shift, state.shifted) = (offsets.shift, offsets.shifted);
         state.tool_length = offsets.tool_length;
@@ -383,6 +399,11 @@ impl<T> Interpreter<T> {
     /// S, in turns per minute.
     pub fn spindle_speed(&self) -> f32 {
         self.state.speed
+    }
+
+    /// G96, if it is in force.
+    pub fn surface(&self) -> Option<Surface> {
+        self.state.surface()
     }
 
     /// The coordinate system: 1, which is G54, to 9, which is G59.3.
@@ -437,12 +458,16 @@ impl<T> Interpreter<T> {
     }
 
     /// Spindle and coolant are so: commands to switch them have been dropped. S of a spindle that is off stays.
-    pub fn set_outputs(&mut self, spindle: &Spindle, coolant: u8) {
-        self.state.modal.spindle = spindle.turn;
+    pub fn set_outputs(&mut self, spindle: &Spindle, surface: Option<&Surface>, coolant: u8) {
+        let state = &mut self.state;
+        state.modal.spindle = spindle.turn;
         if spindle.turn != Turn::Off {
-            self.state.speed = spindle.speed;
+            let mode = surface.map(|_| SpeedMode::Surface);
+            state.modal.speed_mode = mode.unwrap_or(SpeedMode::Turns);
+            state.speed = surface.map_or(spindle.speed, |surface| surface.speed);
+            state.limit = surface.map_or(0, |surface| surface.limit);
         }
-        self.state.modal.coolant = coolant;
+        state.modal.coolant = coolant;
     }
 
     /// The coolants that run are these: not a line has switched them.

@@ -26,6 +26,7 @@ pub mod number;
 mod offsets;
 pub mod overrides;
 pub mod setup;
+mod speed;
 mod state;
 pub mod steps;
 mod sticky;

@@ -135,6 +135,26 @@ pub enum FeedMode {
     PerTurn = 2,
 }
 
+/// Group 14: what S means.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum SpeedMode {
+    /// G97: turns a minute.
+    Turns = 0,
+    /// G96: the speed of the surface that is cut, m/min, or feet a minute with G20.
+    Surface = 1,
+}
+
+/// Group 15: what X words mean.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum XMode {
+    /// G8: radii.
+    Radius = 0,
+    /// G7: diameters.
+    Diameter = 1,
+}
+
 /// Group 6: the length of 1.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
@@ -214,6 +234,10 @@ pub struct Modal {
     pub units: Units,
     /// Group 10.
     pub retract: Retract,
+    /// Group 14.
+    pub speed_mode: SpeedMode,
+    /// Group 15.
+    pub x_mode: XMode,
     /// Group 12: 0 to 8 for G54 to G59.3.
     pub system: u8,
     /// Group 13.
@@ -259,7 +283,7 @@ impl Modal {
         if self.path == PathMode::Continuous { self.tolerance + 1 } else { 0 }
     }
 
-    /// At power-up: the defaults, and G80 G91.1 G94 G98 M5 M9.
+    /// At power-up: the defaults, and G8 G80 G91.1 G94 G97 G98 M5 M9.
     pub const fn new(defaults: &Defaults) -> Self {
         let Defaults { plane, units, system, path, distance } = *defaults;
         Self {
@@ -270,6 +294,8 @@ impl Modal {
             feed_mode: FeedMode::PerMinute,
             units,
             retract: Retract::Initial,
+            speed_mode: SpeedMode::Turns,
+            x_mode: XMode::Radius,
             system,
             path,
             tolerance: TOLERANCE,

@@ -234,7 +234,9 @@ impl State {
         if self.speed.to_bits() == 0 {
             return Err(Status::SWordMissing);
         }
-        Ok(Feed::PerMinute(rate * self.speed))
+        let [x, ..] = self.position;
+        let turns = self.surface().map_or(self.speed, |surface| surface.turns(x));
+        Ok(Feed::PerMinute(rate * turns))
     }
 }
 

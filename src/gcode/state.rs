@@ -15,6 +15,7 @@ use super::setup::Setup;
 use super::sticky::Sticky;
 use super::tables::{Edit, Row, Tables};
 use super::words::{F, N, P, S, T};
+use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -44,8 +45,10 @@ pub struct State {
     pub tool_length: PerAxis<Length>,
     /// A line has asked for the length of a tool that has none. Whoever carries lines out takes it.
     pub lacks_length: bool,
-    /// S.
+    /// S: turns a minute, or m/min with G96.
     pub speed: f32,
+    /// D of G96: the most turns a minute; 0 for no limit.
+    pub limit: u16,
     /// T, and the tool of the last M6.
     pub selected: u8,
     pub tool: u8,
@@ -71,6 +74,7 @@ impl State {
             tool_length: [Length::ZERO; AXES],
             lacks_length: false,
             speed: 0.0,
+            limit: 0,
             selected: 0,
             tool: 0,
             sticky: Sticky::NONE,
@@ -110,6 +114,9 @@ impl State {
         Self::overrides(block, out)?;
         self.offsets(block, tables, setup)?;
         self.non_modal(block, tables, setup, out, edit)?;
+        if Capability::Lathe.is_built_in() && self.moves_axis_of_rotation(block) {
+            out.spindle = Some(self.spindle());
+        }
         if block.does().is_some_and(MotionMode::is_cycle) {
             return self.finish_cycle(block, start, tables, edit, setup, out);
         }
@@ -144,6 +151,9 @@ impl State {
         set(&mut modal.distance, block.distance);
         set(&mut modal.arc_distance, block.arc_distance);
         set(&mut modal.retract, block.retract);
+        if Capability::Lathe.is_built_in() {
+            set(&mut modal.x_mode, block.x_mode);
+        }
         set(&mut modal.path, block.path);
     }
 
@@ -163,11 +173,20 @@ impl State {
     /// S, T and M6.
     #[small]
     fn tools(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
+        if Capability::Lathe.is_built_in()
+            && let Some(mode) = block.speed_mode
+        {
+            self.set_speed_mode(block, mode)?;
+            if self.modal.spindle != Turn::Off {
+                out.spindle = Some(self.spindle());
+            }
+        }
         if let Some(value) = block.get(S) {
             if value.negative {
                 return Err(Status::SWordInvalid);
             }
             self.speed = value.to_f32();
+            self.take_feet();
             if self.modal.spindle != Turn::Off {
                 out.spindle = Some(self.spindle());
             }

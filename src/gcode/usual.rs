@@ -10,9 +10,10 @@
 use super::command::{Commands, Feed, Motion};
 use super::decimal::Decimal;
 use super::digits::decimal;
-use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units};
+use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units, XMode};
 use super::setup::{AxisMode, Setup};
 use super::state::State;
+use crate::capability::Capability;
 use crate::hal::arithmetic::product;
 use crate::hal::text::Cursor;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
@@ -60,6 +61,7 @@ impl State {
         if modal.units != Units::Mm
             || modal.feed_mode != FeedMode::PerMinute
             || setup.reach().is_some()
+            || Capability::Lathe.is_built_in() && modal.x_mode == XMode::Diameter
             || line.len() > usize::from(u8::MAX)
         {
             return false;

@@ -7,14 +7,18 @@ use crate::progmem;
 use crate::status::Status;
 
 /// The letter of each slot, axes first.
-pub const LETTERS: [u8; COUNT] = *b"XYZABCIJKRPQLHFSTN";
+pub const LETTERS: [u8; COUNT] = *b"XYZABCIJKRPQLHFSTND";
 /// How many slots there are.
-pub const COUNT: usize = 18;
+pub const COUNT: usize = 19;
 
 const _: () = assert!(COUNT <= 32, "a set of words is a `u32`");
 
+/// The slot of X.
+pub const X: u8 = 0;
 /// The slot of I, of I J K.
 pub const I: u8 = 6;
+/// The slot of J.
+pub const J: u8 = 7;
 /// The slot of K.
 pub const K: u8 = 8;
 #[allow(missing_docs)]
@@ -28,8 +32,9 @@ mod names {
     pub const S: u8 = 15;
     pub const T: u8 = 16;
     pub const N: u8 = 17;
+    pub const D: u8 = 18;
 }
-pub use names::{F, H, L, N, P, Q, R, S, T};
+pub use names::{D, F, H, L, N, P, Q, R, S, T};
 
 /// X Y Z A B C.
 pub const AXES: u32 = 0x3F;
@@ -71,7 +76,7 @@ progmem! {
         Status::ArcOffsetsMissing, Status::ArcOffsetsMissing, Status::KWordMissing,
         Status::RWordMissing, Status::PWordMissing, Status::QWordMissing, Status::LWordMissing,
         Status::HWordMissing, Status::FeedrateMissing, Status::SWordMissing, Status::TWordMissing,
-        Status::InternalError,
+        Status::InternalError, Status::OutOfRange,
     ];
 }
 

@@ -9,6 +9,7 @@ use super::factors::{Factors, Reserve};
 use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
+use crate::gcode::command::Surface;
 use crate::gcode::overrides::Change;
 
 /// Parts of a step to which blocks know where they end: the logarithm of their number.
@@ -67,6 +68,8 @@ pub enum Action {
     Drivers(Drivers),
     /// M3 to M9, S: the outputs and the speed of the spindle are so from here on.
     Outputs(Outputs),
+    /// The same with a surface speed (G96) by which the speed follows X from here on; [`Surface::NONE`] for none.
+    Surface(Outputs, Surface),
     /// G33: from here on, at rest, lines follow the spindle by so many mm a turn along their path; 0 for no more.
     Thread(f32),
     /// M48 to M51. The machine goes on.

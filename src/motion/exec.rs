@@ -313,12 +313,12 @@ impl Exec {
                 out.target = *steps;
                 out.left = 0.0;
             }
-            Action::Outputs(outputs) => {
+            Action::Outputs(outputs) | Action::Surface(outputs, _) => {
                 self.halt(out);
                 if !standstill {
                     return Step::Standstill;
                 }
-                (out.outputs, out.speed) = (outputs.on, outputs.speed);
+                out.switch(outputs, action);
                 blocks.release();
                 return Step::Switched;
             }

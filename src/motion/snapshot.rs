@@ -6,7 +6,13 @@
 
 use kerf_macros::small;
 
+use super::block::{Action, Outputs};
 use crate::boards::MOTORS;
+use crate::capability::Capability;
+use crate::gcode::command::Surface;
+
+/// How many surface speeds there are: none in an image that cannot turn.
+const LATHES: usize = Capability::Lathe.is_built_in() as usize;
 
 /// What reports show of the motion that is being prepared.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,6 +41,8 @@ pub struct Snapshot {
     pub outputs: u8,
     /// What the speed of the spindle is to be, turns per minute.
     pub speed: f32,
+    /// The surface speed by which that follows X, in an image with [`Capability::Lathe`].
+    pub surface: [Surface; LATHES],
 }
 
 impl Snapshot {
@@ -53,6 +61,7 @@ impl Snapshot {
             program: Program::Ready,
             outputs: 0,
             speed: 0.0,
+            surface: [Surface::NONE; LATHES],
         }
     }
 
@@ -71,6 +80,18 @@ impl Snapshot {
             }
         }
         positions
+    }
+
+    /// The program has switched outputs, S, or its surface speed. Under one S follows X, whatever else is switched.
+    #[inline(always)]
+    pub fn switch(&mut self, outputs: &Outputs, action: &Action) {
+        self.outputs = outputs.on;
+        if let (Some(surface), Action::Surface(_, new)) = (self.surface.first_mut(), action) {
+            *surface = *new;
+        } else if self.surface.first().is_some_and(Surface::is_on) {
+            return;
+        }
+        self.speed = outputs.speed;
     }
 
     /// What is told of it.

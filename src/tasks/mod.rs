@@ -27,6 +27,7 @@ mod setup;
 pub mod spindle;
 mod stop;
 pub mod storage;
+mod surface;
 pub mod switches;
 pub mod turning;
 pub mod tx;

@@ -59,6 +59,8 @@ pub struct Planner {
     drivers: Drivers,
     /// What exec has been told to switch.
     outputs: Outputs,
+    /// It has been told of a surface speed.
+    has_surface: bool,
     /// How far the line has been carried out.
     steps: Steps,
     walk: Ongoing,
@@ -208,6 +210,7 @@ impl Planner {
             line: 0,
             drivers: Drivers::USUAL,
             outputs: Outputs { on: 0, speed: 0.0 },
+            has_surface: false,
             steps: Steps::default(),
             walk: Ongoing::None,
             begun: Begun::Nothing,
@@ -540,7 +543,8 @@ impl Planner {
             let spindle = Spindle { turn: outputs::turn(motion.outputs), speed: motion.speed };
             let coolant = super::spindle::coolant(motion.outputs);
             links.changes.take_flipped();
-            links.model.borrow_mut().set_outputs(&spindle, coolant);
+            let surface = motion.surface.first().filter(|surface| surface.is_on());
+            links.model.borrow_mut().set_outputs(&spindle, surface, coolant);
         }
         links.job.set(Job::default());
         let (cycle, killed) = machine::dropped();

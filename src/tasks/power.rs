@@ -9,7 +9,7 @@ use embassy_time::Timer;
 use super::common;
 use super::health;
 use super::links::Links;
-use super::turning;
+use super::{surface, turning};
 use crate::config::Settings;
 use crate::hal::Thread;
 use crate::hal::gpio;
@@ -27,6 +27,7 @@ pub async fn run(links: &'static Links) -> ! {
         links.signs.age(millis());
         look(links);
         turning::look(links);
+        surface::look(links);
         if links.chain_waits.take() {
             // Perhaps for long enough.
             links.planner_wake.signal();

@@ -96,6 +96,18 @@ pub fn follow(thread: Thread, thousandths: u16) {
     }
 }
 
+/// S is so many turns a minute from now on, by a surface speed; at most `most` under the override.
+#[small]
+pub fn turn_at(thread: Thread, speed: f32, most: f32) {
+    common::with(thread, |common| {
+        let speed = common.spindle.limited(speed, most);
+        if common.motion.speed.to_bits() != speed.to_bits() {
+            common.motion.speed = speed;
+            pwm::set_share(common.spindle.share(on(), speed));
+        }
+    });
+}
+
 /// Changes the state while exec cannot run.
 #[small]
 fn with<R>(thread: Thread, what: impl FnOnce(&mut Spindle) -> R + Send) -> R {

@@ -7,7 +7,8 @@ pub mod docs;
 pub mod table;
 
 use super::modal::{
-    ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, Turn, Units,
+    ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, SpeedMode,
+    Turn, Units, XMode,
 };
 use super::overrides::Override;
 use crate::progmem::Progmem;
@@ -43,6 +44,10 @@ pub enum Action {
     System(u8),
     /// Group 13.
     Path(PathMode),
+    /// Group 14: what S is. G96: a surface speed.
+    SpeedMode(SpeedMode),
+    /// Group 15: what X is.
+    XMode(XMode),
     /// Group 4 of the M codes.
     Stop(StopCode),
     /// Group 6 of the M codes.

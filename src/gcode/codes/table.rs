@@ -2,10 +2,11 @@
 
 use super::{Action, Code, NonModal, OverrideCode, StopCode, Switch, ToolLength};
 use crate::gcode::modal::{
-    ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, Turn, Units,
+    ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, SpeedMode,
+    Turn, Units, XMode,
 };
 use crate::gcode::overrides::Override;
-use crate::gcode::words::{self, AXES, H, K, L, OFFSETS, P, Q, R, bit};
+use crate::gcode::words::{self, AXES, D, H, K, L, OFFSETS, P, Q, R, S, bit};
 
 /// A code without words of its own.
 const fn code(number: u16, action: Action) -> Code {
@@ -44,7 +45,7 @@ pub const DENSE: u16 = 100;
 pub const STARTS: usize = DENSE as usize + 1;
 
 /// Rows of G codes.
-pub const G_ROWS: usize = 68;
+pub const G_ROWS: usize = 72;
 /// Rows of M codes.
 pub const M_ROWS: usize = 21;
 
@@ -67,6 +68,8 @@ const G_TABLE: [Code; G_ROWS] = [
     with(20, Action::Motion(MotionMode::ClockwiseArc), ARC),
     with(30, Action::Motion(MotionMode::CounterclockwiseArc), ARC),
     needing(40, Action::NonModal(NonModal::Dwell), bit(P), 0),
+    code(70, Action::XMode(XMode::Diameter)),
+    code(80, Action::XMode(XMode::Radius)),
     needing(100, Action::NonModal(NonModal::SetData), bit(L) | bit(P) | AXES, 0),
     code(170, Action::Plane(Plane::Xy)),
     code(180, Action::Plane(Plane::Zx)),
@@ -128,6 +131,8 @@ const G_TABLE: [Code; G_ROWS] = [
     code(930, Action::FeedMode(FeedMode::InverseTime)),
     code(940, Action::FeedMode(FeedMode::PerMinute)),
     code(950, Action::FeedMode(FeedMode::PerTurn)),
+    needing(960, Action::SpeedMode(SpeedMode::Surface), bit(S), bit(D)),
+    code(970, Action::SpeedMode(SpeedMode::Turns)),
     code(980, Action::Retract(Retract::Initial)),
     code(990, Action::Retract(Retract::ToR)),
 ];

@@ -4,8 +4,8 @@ use super::{feed, position, refusal, run};
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
 use crate::gcode::interpreter::Interpreter;
 use crate::gcode::modal::{
-    ArcDistance, Defaults, Distance, FeedMode, Modal, MotionMode, PathMode, Plane, Retract, Turn,
-    Units,
+    ArcDistance, Defaults, Distance, FeedMode, Modal, MotionMode, PathMode, Plane, Retract,
+    SpeedMode, Turn, Units, XMode,
 };
 use crate::gcode::overrides::{Change, Override};
 use crate::gcode::setup::{AxisMode, Setup, Usual};
@@ -58,13 +58,16 @@ fn modes_stay_in_force() {
         feed_mode: FeedMode::InverseTime,
         units: Units::Inch,
         retract: Retract::ToR,
+        speed_mode: SpeedMode::Surface,
+        x_mode: XMode::Diameter,
         system: 8,
         path: PathMode::Exact,
         tolerance: 123,
         spindle: Turn::Counterclockwise,
         coolant: 3,
     };
-    let (state, _) = run(&["M7", "G64 P0.0123", "G0 G18 G20 G91 G90.1 G93 G99 G59.3 G61 M4 M8"]);
+    let (state, _) =
+        run(&["M7", "G7 G96 S0", "G64 P0.0123", "G0 G18 G20 G91 G90.1 G93 G99 G59.3 G61 M4 M8"]);
     assert_eq!(state.modal(), &set);
 }
 

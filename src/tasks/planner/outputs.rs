@@ -4,7 +4,8 @@ use kerf_macros::small;
 
 use super::Planner;
 use crate::boards::outputs;
-use crate::gcode::command::Spindle;
+use crate::capability::Capability;
+use crate::gcode::command::{Spindle, Surface};
 use crate::gcode::modal::{self, Coolant};
 use crate::motion::block::{Action, Outputs};
 
@@ -27,7 +28,29 @@ impl Planner {
                 (outputs::SPINDLE | outputs::COUNTERCLOCKWISE, spindle.speed)
             }
         };
-        self.switch(outputs::SPINDLE | outputs::COUNTERCLOCKWISE, turn, speed);
+        let which = outputs::SPINDLE | outputs::COUNTERCLOCKWISE;
+        if Capability::Lathe.is_built_in() {
+            // The model is where the line leads to, and no further.
+            let surface = self.links.model.borrow().surface();
+            if surface.is_some() || self.has_surface {
+                return self.turn_at_surface(which, turn, speed, surface);
+            }
+        }
+        self.switch(which, turn, speed);
+    }
+
+    /// Begins with a surface speed (G96), goes on with another, or ends it.
+    #[inline(never)]
+    #[small]
+    fn turn_at_surface(&mut self, which: u8, on: u8, speed: f32, surface: Option<Surface>) {
+        let [x, ..] = self.position;
+        let speed = match surface {
+            Some(surface) if on != 0 => surface.turns(x),
+            _ => speed,
+        };
+        self.has_surface = surface.is_some();
+        self.outputs = Outputs { on: self.outputs.on & !which | on, speed };
+        self.pause(Action::Surface(self.outputs, surface.unwrap_or(Surface::NONE)));
     }
 
     /// Switches those of `which` on that are in `on`, the others of `which` off; the spindle is to have this speed.

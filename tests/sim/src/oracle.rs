@@ -174,6 +174,7 @@ struct Reader<'a> {
     steps: Vec<i64>,
     moving: bool,
     inches: bool,
+    diameters: bool,
     incremental: bool,
     system: usize,
     systems: [[i64; AXES]; 7],
@@ -191,6 +192,7 @@ impl<'a> Reader<'a> {
             steps: vec![0; setup.motors.len()],
             moving: true,
             inches: false,
+            diameters: false,
             incremental: false,
             system: 1,
             systems: [[0; AXES]; 7],
@@ -210,7 +212,7 @@ impl<'a> Reader<'a> {
                 'G' => self.g_code(word.value.tenths(), &mut once, &mut machine_coordinates)?,
                 'M' => end |= self.m_code(word.value.tenths())?,
                 c if self.is_on_a_radius(c) => return Err(format!("{c} in radius mode")),
-                c if LETTERS.contains(&c) || "FIJKLNPRST".contains(c) => {}
+                c if LETTERS.contains(&c) || "DFIJKLNPRST".contains(c) => {}
                 c => return Err(format!("the letter {c}")),
             }
         }
@@ -235,12 +237,14 @@ impl<'a> Reader<'a> {
         machine: &mut bool,
     ) -> Result<(), String> {
         match tenths {
-            0 | 10 | 20 | 30 => self.moving = true,
+            0 | 10 | 20 | 30 | 320 | 330 => self.moving = true,
             800 => self.moving = false,
             40 => *once = Some(Once::Dwell),
             100 => *once = Some(Once::Offsets),
             283 => *once = Some(Once::SetPosition),
             920..=923 => *once = Some(Once::SetZero(tenths)),
+            70 => self.diameters = true,
+            80 => self.diameters = false,
             200 => self.inches = true,
             210 => self.inches = false,
             900 => self.incremental = false,
@@ -248,7 +252,10 @@ impl<'a> Reader<'a> {
             530 => *machine = true,
             540 | 550 | 560 | 570 | 580 | 590 => self.system = (tenths / 10 - 53) as usize,
             // Planes, feed modes, path modes, arc distance, cutter compensation and tool length off, retract modes.
-            170 | 180 | 190 | 930 | 940 | 610 | 611 | 640 | 901 | 911 | 400 | 490 | 980 | 990 => {}
+            170 | 180 | 190 | 930 | 940 | 950 | 610 | 611 | 640 | 901 | 911 | 400 | 490 | 980
+            | 990 => {}
+            // What S is.
+            960 | 970 => {}
             _ => return Err(format!("G{}", tenths as f64 / 10.0)),
         }
         Ok(())
@@ -279,6 +286,8 @@ impl<'a> Reader<'a> {
             }
             let inches = self.inches && axis < FIRST_ROTARY;
             let unit = if inches { UNITS_PER_INCH } else { UNITS };
+            // Half of a diameter.
+            let unit = if self.diameters && axis == 0 { unit / 2 } else { unit };
             values[axis] = Some(word.value.scaled(unit));
         }
         values

@@ -16,12 +16,13 @@ use common::firmware;
 use kerf::boards::{MEGA2560_GRBL, MEGA2560_LATHE};
 
 /// What only the image of a lathe can do.
-const TURNING: [&str; 2] = ["encoder.txt", "thread.txt"];
+const TURNING: [&str; 3] = ["encoder.", "thread.", "lathe-"];
 
 #[test]
 fn the_image_keeps_to_the_transcripts() {
     let all = transcript::read_all(Path::new("../transcripts"));
-    let (turning, others) = all.into_iter().partition(|one| TURNING.contains(&one.name.as_str()));
+    let (turning, others) =
+        all.into_iter().partition(|one| TURNING.iter().any(|name| one.name.starts_with(name)));
     transcript::play_all(others, 2, || firmware(&MEGA2560_GRBL));
     transcript::play_all(turning, 2, || firmware(&MEGA2560_LATHE));
 }

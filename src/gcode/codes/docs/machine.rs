@@ -1,7 +1,9 @@
 //! M codes.
 
-use super::{Doc, Section, m, no};
-use crate::status::Status::{PWordInvalid, PWordMissing};
+use super::{Doc, Section, g, m, no};
+use crate::status::Status::{
+    BadNumber, OutOfRange, PWordInvalid, PWordMissing, SWordInvalid, SWordMissing,
+};
 
 /// M6 stands with the tools.
 pub const CHANGE: Doc = m(
@@ -49,6 +51,27 @@ the speed S is reported, and G95 goes by it.",
             &[],
         ),
         m(40, "Spindle counter-clockwise", "The same the other way round.", &[]),
+        g(
+            960,
+            "Constant surface speed",
+            "S is the speed of the surface that is cut: m/min, or feet a minute with G20. The spindle turns as fast as that asks for at the radius \
+where X is, and follows X each 20 ms while it moves. X 0 of the coordinates in force, with their offsets, is the axis of rotation. D is the most turns a minute, \
+whatever the override; without D it is 65,535. S is needed on the line; a later S alone is a surface speed, too. The range of `p1` counts as ever.",
+            &[
+                no(SWordMissing, &["G96 D2000"]),
+                no(OutOfRange, &["G96 S100 D0"]),
+                no(OutOfRange, &["G96 S100 D-1"]),
+                no(OutOfRange, &["G96 S100 D65536"]),
+                no(BadNumber, &["G96 S100 D0.5"]),
+                no(SWordInvalid, &["G96 S-1"]),
+            ],
+        ),
+        g(
+            970,
+            "Turns a minute",
+            "S is turns a minute. Without S the spindle goes on as fast as G96 asks for where the program is. In force at power-up and after M2.",
+            &[],
+        ),
         m(50, "Spindle off", "S is remembered. In force at power-up and after M2.", &[]),
         m(
             70,

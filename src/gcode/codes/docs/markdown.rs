@@ -5,6 +5,7 @@ use std::string::{String, ToString};
 use std::vec::Vec;
 
 use super::{Doc, On, RULES, Refusal, SECTIONS, docs};
+use crate::capability::Capability;
 use crate::gcode::codes::Action;
 use crate::gcode::words::{AXES, COUNT, LETTERS};
 use crate::protocol::tinyg::{number, status_text};
@@ -111,6 +112,8 @@ fn group(doc: &Doc) -> &'static str {
         Action::Retract(_) => "10",
         Action::System(_) => "12",
         Action::Path(_) => "13",
+        Action::SpeedMode(_) => "14",
+        Action::XMode(_) => "15",
         Action::Stop(_) => "M 4",
         Action::ToolChange => "M 6",
         Action::Spindle(_) => "M 7",
@@ -125,6 +128,7 @@ fn capability(doc: &Doc) -> String {
         Some(Action::Motion(mode)) => {
             mode.capability().map_or(String::new(), |needed| format!("`{}`", needed.name()))
         }
+        Some(Action::SpeedMode(_) | Action::XMode(_)) => format!("`{}`", Capability::Lathe.name()),
         _ => String::new(),
     }
 }

@@ -52,6 +52,14 @@ a curve on which none can be made one with the next, only every eighth is looked
             &[no(PWordNegative, &["G64 P-0.001"])],
         ),
         g(
+            70,
+            "Diameters",
+            "X words are diameters from this line on, whatever they are for: moves, G10, G92 and the others. X moves by half of each. I of an arc is a \
+radius still, and so is X in reports and settings.",
+            &[],
+        ),
+        g(80, "Radii", "X words are radii. In force at power-up and after M2.", &[]),
+        g(
             900,
             "Absolute distances",
             "Axis words are positions in the coordinate system in force. In force at power-up and after M2, \
@@ -106,7 +114,7 @@ pub const FEEDS: Section = Section {
             950,
             "Units per turn",
             "F is the way for each turn of the spindle, at the speed S that has been programmed: it is not \
-measured, and the override of the spindle does not count.",
+measured, and the override of the spindle does not count. With G96 it is the speed at the end of the move.",
             &[
                 no(FeedrateMissing, &["M3 S1000", "F100", "G95 G1 X1"]),
                 no(SpindleMustTurn, &["G95 G1 X1 F0.1"]),

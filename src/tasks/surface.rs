@@ -1,0 +1,48 @@
+//! Constant surface speed (G96): while X moves, the spindle turns as fast as its radius asks for.
+//!
+//! The power task calls [`look`] each 20 ms; it costs 60 cycles without a surface speed, and 5,000 with one. It reads where X is from exec's
+//! snapshot and sets S in `tasks::common`, under the ceiling. Nothing waits. Where X is not moved by any motor S stays as the planner has set it. D is the most
+//! under the override, too.
+
+use kerf_macros::small;
+
+use super::links::Links;
+use super::setup::moved_by;
+use super::{common, spindle};
+use crate::boards::{MOTORS, outputs};
+use crate::capability::Capability;
+use crate::gcode::command::Surface;
+
+/// X among the axes.
+const X: u8 = 0;
+
+/// Has S follow X.
+#[inline(never)]
+#[small]
+pub fn look(links: &Links) {
+    if !Capability::Lathe.is_built_in() {
+        return;
+    }
+    let follows = common::with(links.thread, |common| {
+        let motion = &common.motion;
+        motion.surface.first().is_some_and(Surface::is_on) && motion.outputs & outputs::SPINDLE != 0
+    });
+    if follows {
+        follow(links);
+    }
+}
+
+#[inline(never)]
+#[small]
+fn follow(links: &Links) {
+    let motion = common::snapshot(links.thread);
+    let settings = links.settings.borrow();
+    let motor = (0..MOTORS).find(|motor| moved_by(&settings, *motor) == X);
+    let place = motor.and_then(|motor| {
+        let steps = *motion.positions().get(motor)?;
+        settings.step_ratio(motor).length(steps)
+    });
+    if let (Some(surface), Some(x)) = (motion.surface.first(), place) {
+        spindle::turn_at(links.thread, surface.turns(x), surface.most());
+    }
+}
