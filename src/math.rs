@@ -22,6 +22,11 @@ pub fn cos(x: f32) -> f32 {
     float::cosf(x)
 }
 
+/// A number above 0 to a power. Cost on AVR: 4,000 cycles.
+pub fn pow(x: f32, power: f32) -> f32 {
+    float::powf(x, power)
+}
+
 /// Angle of the point (x, y), -pi to pi radians.
 pub fn atan2(y: f32, x: f32) -> f32 {
     float::atan2f(y, x)

@@ -16,6 +16,7 @@ fn lines() -> Vec<(Capability, String)> {
     let rows = G.get();
     let modes = rows.iter().filter_map(|row| match row.action {
         Action::Motion(mode) => Some((mode.capability()?, row.number)),
+        Action::SpeedMode(_) | Action::XMode(_) => Some((Capability::Lathe, row.number)),
         _ => None,
     });
     let line = |number: u16| {
@@ -24,6 +25,9 @@ fn lines() -> Vec<(Capability, String)> {
     };
     let own = |capability, number| match capability {
         Capability::Probing => format!("G{}.{} X10 F100", number / 10, number % 10),
+        Capability::Lathe if matches!(number, 70 | 80 | 960 | 970) => {
+            format!("G{} S100", number / 10)
+        }
         Capability::Lathe => format!("G{} Z-5 K1", number / 10),
         _ => line(number),
     };
@@ -48,7 +52,11 @@ fn said_of(line: &str) -> Result<(), Status> {
 #[test]
 fn codes_are_refused_by_name_where_their_capability_is_not_built_in() {
     let lines = lines();
-    assert_eq!(lines.len(), 10 + 4 + 2, "G73, G81 to G89, G38.2 to G38.5, G32, G33");
+    assert_eq!(
+        lines.len(),
+        10 + 4 + 7,
+        "G73, G81 to G89, G38.2 to G38.5, G32, G33, G76, G7, G8, G96, G97"
+    );
     for (capability, line) in lines {
         let refused = said_of(&line) == Err(Status::NotBuiltIn);
         assert_eq!(refused, !capability.is_built_in(), "{line}: {:?}", said_of(&line));

@@ -78,9 +78,9 @@ impl<S: Setup> Reader<S> {
             Step::Dwell(ms) => self.ready.push_back(Canon::Dwell(ms)),
             Step::Line(target, None) => self.go(Canon::Traverse(target), target, None),
             Step::Line(target, feed) => self.go(Canon::Feed(target), target, feed),
-            Step::Arc | Step::Probe | Step::Thread | Step::Home | Step::Jog | Step::Check => {
-                self.motion()
-            }
+            Step::Thread => self.pass(),
+            Step::AwaitSpindle => {}
+            Step::Arc | Step::Probe | Step::Home | Step::Jog | Step::Check => self.motion(),
             Step::SetPosition(position) => {
                 self.place = position;
                 self.ready.push_back(Canon::SetPosition(position));
@@ -99,9 +99,17 @@ impl<S: Setup> Reader<S> {
             Motion::Probe { target, feed, mode } => {
                 self.go(Canon::Probe(target, mode), target, Some(feed));
             }
-            Motion::Thread { target, lead } => self.go(Canon::Thread(target, lead), target, None),
             Motion::Home { axes, set } => self.ready.push_back(Canon::Home(axes, set)),
             _ => {}
+        }
+    }
+
+    /// The lines of a pass.
+    fn pass(&mut self) {
+        let mut line = 0;
+        while let Some((target, lead)) = self.steps.pass(&self.commands.motion, &self.place, line) {
+            self.go(Canon::Thread(target, lead), target, None);
+            line += 1;
         }
     }
 

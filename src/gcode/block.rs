@@ -361,7 +361,7 @@ mod tests {
 
     #[test]
     fn what_the_machine_does_not_have() {
-        for line in ["G5", "G256", "G28.35", "G61.2", "G59.4", "G-1", "E1", "O1", "U1", "V1"] {
+        for line in ["G5", "G256", "G28.35", "G61.2", "G59.4", "G-1", "O1", "U1", "V1"] {
             assert_eq!(refusal(line), Status::GcodeUnsupported, "{line}");
         }
         for line in ["M10", "M256", "M30.1", "M3.1"] {

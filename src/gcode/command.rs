@@ -7,6 +7,7 @@
 use super::decimal::Exact;
 use super::modal::{MotionMode, Plane, Turn};
 use super::overrides::Change;
+use super::threading::ThreadCycle;
 use crate::units::{Length, PerAxis};
 
 /// The highest N word: blocks keep it in three bytes.
@@ -191,6 +192,8 @@ pub enum Motion {
         /// How far the axis that moves farthest goes in a turn.
         lead: Length,
     },
+    /// G76.
+    ThreadCycle(ThreadCycle),
     /// G73, G81 to G89.
     Cycle(Cycle),
     /// G28.2, G28.4: the homing cycle.

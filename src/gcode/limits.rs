@@ -10,6 +10,7 @@ use kerf_macros::small;
 use super::arc::{norm, part, round, spoke, turned};
 use super::command::{Arc, Cycle, Motion};
 use super::setup::Setup;
+use super::threading::ThreadCycle;
 use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
@@ -101,6 +102,8 @@ fn check_within(
         }
         Motion::Cycle(_) if !Capability::Cycles.is_built_in() => return Ok(()),
         Motion::Cycle(cycle) => return check_cycle(start, cycle, limits),
+        Motion::ThreadCycle(_) if !Capability::Lathe.is_built_in() => return Ok(()),
+        Motion::ThreadCycle(cycle) => return check_threads(start, cycle, limits),
         Motion::Through { via, target } => {
             check_straight(start, via, limits)?;
             return check_straight(via, target, limits);
@@ -144,6 +147,24 @@ fn check_straight(
             && !(low..=high).contains(to)
         {
             return Err(Status::SoftLimit);
+        }
+    }
+    Ok(())
+}
+
+/// The first and the last pass, of which the others lie between.
+#[inline(never)]
+#[small]
+fn check_threads(
+    start: &PerAxis<Length>,
+    cycle: &ThreadCycle,
+    limits: &Limits<'_, impl Setup>,
+) -> Result<(), Status> {
+    let mut target = *start;
+    for pass in [1, cycle.passes] {
+        for x in [cycle.bottom(pass), cycle.outside(pass)] {
+            [target[0], target[2]] = [x, cycle.end];
+            check_straight(start, &target, limits)?;
         }
     }
     Ok(())

@@ -33,6 +33,7 @@ mod sticky;
 pub mod tables;
 #[cfg(test)]
 mod tests;
+pub mod threading;
 mod usual;
 pub mod words;
 

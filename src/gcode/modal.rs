@@ -48,11 +48,13 @@ pub enum MotionMode {
     ProbeAwayQuietly = 18,
     /// G33, G32: in step with the spindle.
     Thread = 19,
+    /// G76: a thread in several passes.
+    ThreadCycle = 20,
 }
 
 impl MotionMode {
     /// How many there are.
-    pub const COUNT: usize = 20;
+    pub const COUNT: usize = 21;
 
     /// G73, G81 to G89. Never in an image without them.
     pub fn is_cycle(self) -> bool {
@@ -65,7 +67,7 @@ impl MotionMode {
         match self as u8 {
             5 | 16..=18 => Some(Capability::Probing),
             6..=15 => Some(Capability::Cycles),
-            19 => Some(Capability::Lathe),
+            19..=20 => Some(Capability::Lathe),
             _ => None,
         }
     }

@@ -7,7 +7,7 @@ use super::command::{Commands, Feed, Motion};
 use super::modal::{Distance, FeedMode, MotionMode, Turn, Units};
 use super::setup::Setup;
 use super::state::State;
-use super::words::{AXES, F, K, ROTARY};
+use super::words::{AXES, F, ROTARY};
 use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{FIRST_ROTARY, Length};
@@ -44,6 +44,7 @@ impl State {
             | MotionMode::ProbeAway
             | MotionMode::ProbeAwayQuietly => self.probe(block, mode, setup, out),
             MotionMode::Thread => self.thread(block, setup, out),
+            MotionMode::ThreadCycle => self.thread_cycle(block, setup, out),
             // Cycles go their own way.
             _ => Err(Status::InternalError),
         }
@@ -132,36 +133,6 @@ impl State {
             return Err(Status::ProbeTooShort);
         }
         out.motion = Motion::Probe { target, feed, mode };
-        Ok(())
-    }
-
-    /// G33 and G32: K is the way in a turn of the axis that moves farthest (LinuxCNC). F does not count.
-    #[inline(never)]
-    #[small]
-    fn thread(
-        &mut self,
-        block: &Block,
-        setup: &impl Setup,
-        out: &mut Commands,
-    ) -> Result<(), Status> {
-        Capability::Lathe.check()?;
-        if !setup.has_encoder() {
-            return Err(Status::NoEncoder);
-        }
-        if block.has(ROTARY) {
-            return Err(Status::RotaryNotAllowed);
-        }
-        if !block.has(AXES) {
-            return Err(Status::AxisWordMissing);
-        }
-        let word = block.get(K).ok_or(Status::KWordMissing)?;
-        let lead = if self.modal.units == Units::Inch { word.inch() } else { word.mm() };
-        let lead = lead.map_err(|_| Status::KWordInvalid)?.units;
-        if lead.0 <= 0 {
-            return Err(Status::KWordInvalid);
-        }
-        self.advance(block, false, setup)?;
-        out.motion = Motion::Thread { target: self.position, lead };
         Ok(())
     }
 

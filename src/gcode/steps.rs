@@ -8,6 +8,7 @@
 use super::command::{Commands, Cycle, Feed, Motion, Spindle, Stop};
 use super::modal::{MotionMode, Turn};
 use super::overrides::Change;
+use super::threading::ThreadCycle;
 use crate::capability::Capability;
 use crate::progmem;
 use crate::units::{Length, PerAxis};
@@ -31,7 +32,9 @@ pub enum Step {
     Arc,
     /// The probing move of the commands' motion.
     Probe,
-    /// The pass in step with the spindle of the commands' motion.
+    /// Stand still until the encoder of the spindle says how fast it turns.
+    AwaitSpindle,
+    /// A pass in step with the spindle: its [lines](Steps::pass).
     Thread,
     /// The homing cycle of the commands' motion.
     Home,
@@ -51,7 +54,7 @@ pub struct Steps {
     stage: Stage,
     /// In a motion of several steps: the number of the next one.
     part: u8,
-    /// In a cycle: the hole, from 1, and how deep it is.
+    /// In a cycle: the hole or the pass, from 1, and how deep it is.
     hole: u16,
     depth: Length,
     peck: Peck,
@@ -79,6 +82,10 @@ enum Peck {
     Up,
     Down,
 }
+
+/// X and Z among the axes.
+const X: usize = 0;
+const Z: usize = 2;
 
 /// So far above the last depth feeding begins again, or chips are broken: 0.254 mm.
 const PECK_CLEARANCE: i32 = 2_540;
@@ -204,6 +211,11 @@ impl Steps {
             let is_built_in = Capability::Cycles.is_built_in();
             return if is_built_in { self.cycle(cycle, position) } else { None };
         }
+        if Capability::Lathe.is_built_in()
+            && let Motion::ThreadCycle(cycle) = motion
+        {
+            return self.threading(cycle, position);
+        }
         self.part += 1;
         match (motion, self.part) {
             (Motion::Through { via, .. }, 1) => Some(Step::Line(*via, None)),
@@ -218,7 +230,52 @@ impl Steps {
             (Motion::Jog { .. }, _) => Some(Step::Jog),
             (Motion::Check, _) => Some(Step::Check),
             (Motion::SetPosition { position }, _) => Some(Step::SetPosition(*position)),
-            (Motion::Through { .. } | Motion::Cycle(_), _) => None,
+            (Motion::Through { .. } | Motion::Cycle(_) | Motion::ThreadCycle(_), _) => None,
+        }
+    }
+
+    /// G76: to where a pass begins, the pass, and back to the drive line.
+    #[inline(never)]
+    fn threading(&mut self, cycle: &ThreadCycle, position: &PerAxis<Length>) -> Option<Step> {
+        self.hole = self.hole.max(1);
+        while self.hole <= cycle.passes {
+            self.part += 1;
+            let (axis, to) = match self.part {
+                // Without a spindle nothing moves.
+                1 if self.hole == 1 => return Some(Step::AwaitSpindle),
+                1 => continue,
+                2 => (Z, cycle.begin(self.hole)),
+                3 => (X, cycle.entry(self.hole)),
+                4 => return Some(Step::Thread),
+                5 => (X, cycle.drive),
+                _ => {
+                    self.part = 0;
+                    self.hole += 1;
+                    continue;
+                }
+            };
+            match level(position, axis, to, None) {
+                // Nowhere to go.
+                Some(Step::Line(target, _)) if target == *position => {}
+                step => return step,
+            }
+        }
+        None
+    }
+
+    /// A line of the pass that [`Step::Thread`] asks for, counted from 0, the machine being at `position`: where it ends, and the way in a turn of the axis
+    /// that moves farthest. `None` beyond the last.
+    #[inline(never)]
+    pub fn pass(
+        &self,
+        motion: &Motion,
+        position: &PerAxis<Length>,
+        line: u8,
+    ) -> Option<(PerAxis<Length>, Length)> {
+        match motion {
+            Motion::Thread { target, lead } if line == 0 => Some((*target, *lead)),
+            Motion::ThreadCycle(cycle) => cycle.line(self.hole, line, position),
+            _ => None,
         }
     }
 

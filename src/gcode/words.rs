@@ -7,9 +7,9 @@ use crate::progmem;
 use crate::status::Status;
 
 /// The letter of each slot, axes first.
-pub const LETTERS: [u8; COUNT] = *b"XYZABCIJKRPQLHFSTND";
+pub const LETTERS: [u8; COUNT] = *b"XYZABCIJKRPQLHFSTNDE";
 /// How many slots there are.
-pub const COUNT: usize = 19;
+pub const COUNT: usize = 20;
 
 const _: () = assert!(COUNT <= 32, "a set of words is a `u32`");
 
@@ -33,8 +33,9 @@ mod names {
     pub const T: u8 = 16;
     pub const N: u8 = 17;
     pub const D: u8 = 18;
+    pub const E: u8 = 19;
 }
-pub use names::{D, F, H, L, N, P, Q, R, S, T};
+pub use names::{D, E, F, H, L, N, P, Q, R, S, T};
 
 /// X Y Z A B C.
 pub const AXES: u32 = 0x3F;
@@ -76,7 +77,7 @@ progmem! {
         Status::ArcOffsetsMissing, Status::ArcOffsetsMissing, Status::KWordMissing,
         Status::RWordMissing, Status::PWordMissing, Status::QWordMissing, Status::LWordMissing,
         Status::HWordMissing, Status::FeedrateMissing, Status::SWordMissing, Status::TWordMissing,
-        Status::InternalError, Status::OutOfRange,
+        Status::InternalError, Status::OutOfRange, Status::OutOfRange,
     ];
 }
 

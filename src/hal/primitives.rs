@@ -36,6 +36,8 @@ contract! {
         fn sinf(x: f32) -> f32;
         /// The cosine of an angle in radians. Cost: 1,800.
         fn cosf(x: f32) -> f32;
+        /// A number above 0 to a power. Cost: 4,000.
+        fn powf(x: f32, power: f32) -> f32;
         /// The angle of the point (x, y), -pi to pi radians. Cost: 3,000.
         fn atan2f(y: f32, x: f32) -> f32;
     }

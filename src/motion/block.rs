@@ -28,6 +28,12 @@ pub struct Block {
 }
 
 impl Block {
+    /// Whether the machine goes on over it, and it is no line.
+    #[small]
+    pub fn is_aside(&self) -> bool {
+        matches!(self.body, Body::Action(Action::Override(_) | Action::Lead(_)))
+    }
+
     /// A block of the line with this N word, 0 for none; at most [`N_MAX`](crate::gcode::command::N_MAX).
     #[inline(always)]
     pub fn new(body: Body, line: u32) -> Self {
@@ -72,6 +78,8 @@ pub enum Action {
     Surface(Outputs, Surface),
     /// G33: from here on, at rest, lines follow the spindle by so many mm a turn along their path; 0 for no more.
     Thread(f32),
+    /// The same for the lines from here on, in the midst of a pass: the machine goes on.
+    Lead(f32),
     /// M48 to M51. The machine goes on.
     Override(Change),
     /// M0, M1, M60.

@@ -249,8 +249,7 @@ impl Exec {
     #[inline(never)]
     fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
         let running = &self.running;
-        let is_line =
-            |block: &Block| matches!(block.body, Body::Line(_) | Body::Action(Action::Override(_)));
+        let is_line = |block: &Block| matches!(block.body, Body::Line(_)) || block.is_aside();
         let goes_on = if running.active {
             // What the end of a block has been planned as is handed out.
             running.done || !self.governor.is_at_rest()
@@ -285,7 +284,7 @@ impl Exec {
             match &block.body {
                 Body::Action(Action::Drivers(drivers)) => self.prep.set_drivers(*drivers),
                 Body::Action(Action::SetPosition(steps)) if !moved => out.target = *steps,
-                Body::Action(Action::SetPosition(_) | Action::Override(_)) => {}
+                Body::Action(Action::SetPosition(_) | Action::Override(_) | Action::Lead(_)) => {}
                 _ => moved = true,
             }
             blocks.enter();
@@ -342,6 +341,7 @@ impl Exec {
                 self.prep.rest();
                 self.thread.begin(*lead);
             }
+            Action::Lead(lead) => self.thread.set_lead(*lead),
             Action::Override(_) => {}
         }
         blocks.release();

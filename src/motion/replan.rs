@@ -9,7 +9,7 @@
 //! Cost on AVR: 800 cycles a line where the feed is steady, 2,000 at a corner that limits; all that is queued 52,000, or 127,000 if
 //! each line is a corner. Exec waits for 2,000 of them.
 
-use super::block::{Action, Block, Body, Line};
+use super::block::{Block, Body, Line};
 use super::factors::{Factors, Reserve};
 use super::float::{below, least};
 use super::horizon::{self, Keys, kappa};
@@ -179,7 +179,7 @@ impl BlockQueue {
 /// Whether the machine goes on over a block that is no line.
 #[small]
 fn is_aside(block: Option<&Block>) -> bool {
-    matches!(block, Some(Block { body: Body::Action(Action::Override(_)), .. }))
+    block.is_some_and(Block::is_aside)
 }
 
 /// The line that a block is.

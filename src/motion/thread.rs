@@ -135,6 +135,14 @@ impl Thread {
         self.per_turn = 0;
     }
 
+    /// From here on the path goes so many mm a turn: a taper, or the end of one.
+    pub fn set_lead(&mut self, lead: f32) {
+        if self.is_on() {
+            self.ahead *= lead / self.lead;
+            self.lead = lead;
+        }
+    }
+
     /// The steppers have been started, and make their first tick so many cycles after `time`, in counts. All that is queued since they stood
     /// still has been [told](Thread::queued).
     pub fn anchor(&mut self, time: u32, cycles: u32) {

@@ -105,6 +105,8 @@ enum Turn {
     Pause,
     /// The line probes.
     Probe,
+    /// The line waits for the spindle.
+    AwaitSpindle,
     /// The line cuts a thread.
     Thread,
     /// The line homes.
@@ -140,7 +142,8 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
                 loop {
                     planner.room().await;
                     links.give_way(PATIENCE, || queue::used() >= ENOUGH).await;
-                    match planner.turn() {
+                    let turn = planner.turn();
+                    match turn {
                         Turn::Done => break,
                         Turn::More => yield_now().await,
                         Turn::Pause => planner.cycle_start().await,
@@ -150,10 +153,12 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
                         #[cfg(not(feature = "probing"))]
                         Turn::Probe => {}
                         #[cfg(feature = "lathe")]
-                        Turn::Thread => planner.thread().await,
+                        Turn::AwaitSpindle | Turn::Thread => {
+                            planner.thread(turn == Turn::Thread).await
+                        }
                         // No line asks for it.
                         #[cfg(not(feature = "lathe"))]
-                        Turn::Thread => {}
+                        Turn::AwaitSpindle | Turn::Thread => {}
                         Turn::Home => planner.home().await,
                         Turn::Jog => planner.jog().await,
                     }
@@ -364,6 +369,7 @@ impl Planner {
                 }
             }
             Step::Probe => return Turn::Probe,
+            Step::AwaitSpindle => return Turn::AwaitSpindle,
             Step::Thread => return Turn::Thread,
             Step::Home => return Turn::Home,
             Step::Jog => return Turn::Jog,

@@ -6,7 +6,7 @@ use crate::gcode::modal::{
     Turn, Units, XMode,
 };
 use crate::gcode::overrides::Override;
-use crate::gcode::words::{self, AXES, D, H, K, L, OFFSETS, P, Q, R, S, bit};
+use crate::gcode::words::{self, AXES, D, E, H, K, L, OFFSETS, P, Q, R, S, bit};
 
 /// A code without words of its own.
 const fn code(number: u16, action: Action) -> Code {
@@ -37,6 +37,15 @@ const fn thread(number: u16) -> Code {
     with(number, Action::Motion(MotionMode::Thread), AXES | bit(K))
 }
 
+/// Its words are not in force for the next line, which needs them as well.
+const fn thread_cycle(number: u16) -> Code {
+    let words = Z_WORD | OFFSETS | bit(P) | bit(R) | bit(Q) | bit(H) | bit(E) | bit(L);
+    with(number, Action::Motion(MotionMode::ThreadCycle), words)
+}
+
+/// Z alone of the axes.
+const Z_WORD: u32 = 1 << 2;
+
 const ARC: u32 = AXES | OFFSETS | bit(R) | bit(P);
 
 /// From this whole number on codes are few, and are looked for one after the other: they take no room but their rows.
@@ -45,7 +54,7 @@ pub const DENSE: u16 = 100;
 pub const STARTS: usize = DENSE as usize + 1;
 
 /// Rows of G codes.
-pub const G_ROWS: usize = 72;
+pub const G_ROWS: usize = 73;
 /// Rows of M codes.
 pub const M_ROWS: usize = 21;
 
@@ -110,6 +119,7 @@ const G_TABLE: [Code; G_ROWS] = [
     code(611, Action::Path(PathMode::ExactStop)),
     with(640, Action::Path(PathMode::Continuous), bit(P)),
     cycle(730, MotionMode::ChipBreak, bit(Q)),
+    thread_cycle(760),
     code(800, Action::Motion(MotionMode::None)),
     cycle(810, MotionMode::Drill, 0),
     cycle(820, MotionMode::DrillDwell, bit(P)),

@@ -4,6 +4,7 @@ mod arcs;
 mod cycles;
 mod lines;
 mod tables;
+mod threads;
 mod usual;
 
 use super::command::{Commands, Feed, Motion};

@@ -1,6 +1,6 @@
 //! The float functions of avr-libc.
 //!
-//! Cost, cycles: `sqrtf` 490, `sinf` and `cosf` about 1,800, `atan2f` 3,000. Thread mode and exec.
+//! Cost, cycles: `sqrtf` 490, `sinf` and `cosf` about 1,800, `atan2f` 3,000, `powf` 4,000. Thread mode and exec.
 
 // avr-libc's `double` is 32 bits wide, and most of its functions go by the name without the `f`.
 unsafe extern "C" {
@@ -13,6 +13,9 @@ unsafe extern "C" {
     /// The cosine of an angle in radians.
     #[link_name = "cos"]
     pub safe fn cosf(x: f32) -> f32;
+    /// A number above 0 to a power.
+    #[link_name = "pow"]
+    pub safe fn powf(x: f32, power: f32) -> f32;
     /// The angle of the point (x, y), -pi to pi radians.
     #[link_name = "atan2"]
     pub safe fn atan2f(y: f32, x: f32) -> f32;

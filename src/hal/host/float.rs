@@ -15,6 +15,11 @@ pub fn cosf(x: f32) -> f32 {
     x.cos()
 }
 
+/// A number above 0 to a power.
+pub fn powf(x: f32, power: f32) -> f32 {
+    x.powf(power)
+}
+
 /// The angle of the point (x, y), -pi to pi radians.
 pub fn atan2f(y: f32, x: f32) -> f32 {
     y.atan2(x)

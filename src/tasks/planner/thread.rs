@@ -1,7 +1,7 @@
-//! G33: a pass in step with the spindle ([`crate::motion::thread`]).
+//! G33, and each pass of G76: in step with the spindle ([`crate::motion::thread`]).
 //!
 //! The machine stands still. [`Planner::thread`] waits until the encoder tells how fast the spindle turns, sees that no axis would have to go faster
-//! than it may, and queues the pass: what exec is to follow, the line, and its end. Nothing has moved before, and when something is not
+//! than it may, and queues the pass: what exec is to follow, its lines, and its end. A pass of G76 has a line for each taper; exec is told the lead of each. Nothing has moved before, and when something is not
 //! as it should be, nothing does: an alarm says what it is. In the pass the planner waits. If exec loses the spindle, the axes come to rest, and an alarm
 //! says so; the position is known to the step. A feedhold waits for the end of the pass, an alarm does not.
 //!
@@ -15,18 +15,19 @@ use kerf_macros::small;
 
 use super::Planner;
 use crate::encoder::COUNTS_PER_S;
-use crate::gcode::command::{Feed, Motion};
+use crate::gcode::command::Feed;
 use crate::hal::event::{Event, wait};
 use crate::hal::time::millis;
 use crate::machine::Alarm;
 use crate::math::sqrt;
 use crate::motion::block::{Action, Block};
 use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};
+use crate::motion::float::{greater, some};
 use crate::motion::queue;
 use crate::status::Status;
 use crate::tasks::links::Changes;
 use crate::tasks::{alarm, common};
-use crate::units::{AXES, FIRST_ROTARY};
+use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// How long a pulse may take to come, ms.
 const PATIENCE_MS: u32 = 6_000;
@@ -37,9 +38,22 @@ const ENOUGH: u8 = 3;
 /// Faster than any axis, mm/min.
 const ANY_FEED: f32 = 1e6;
 
+/// Corners as sharp as any are taken at speed, mm/s^2.
+const ANY_CORNER: f32 = 1e7;
+
+/// A line of a pass.
+struct Piece {
+    target: PerAxis<Length>,
+    /// The ways of the axes and along the path, mm.
+    ways: [f32; FIRST_ROTARY],
+    length: f32,
+    /// mm a turn along the path.
+    lead: f32,
+}
+
 impl Planner {
-    /// Cuts the thread of the line, or says why not.
-    pub(super) async fn thread(&mut self) {
+    /// Waits until the encoder says how fast the spindle turns, and then, if it `cuts`, makes the pass of the line; or says why not.
+    pub(super) async fn thread(&mut self, cuts: bool) {
         if !self.standstill().await {
             return;
         }
@@ -48,18 +62,28 @@ impl Planner {
             Ok(None) => return,
             Err(status) => return self.refuse(status),
         };
+        if !cuts {
+            return;
+        }
         match self.begin_pass(turn) {
             Ok(true) => {}
             Ok(false) => return,
             Err(status) => return self.refuse(status),
         }
+        let mut line = 0;
         self.room().await;
-        self.queue_pass();
-        while self.has_begun() && !self.is_flushed() {
+        while self.queue_line(line) {
+            while self.has_begun() && !self.is_flushed() {
+                self.room().await;
+                yield_now().await;
+                if !self.is_flushed() {
+                    let _: super::Turn = self.turn();
+                }
+            }
+            line += 1;
             self.room().await;
-            yield_now().await;
-            if !self.is_flushed() {
-                let _: super::Turn = self.turn();
+            if self.queue_lead(line) {
+                self.room().await;
             }
         }
         self.room().await;
@@ -74,6 +98,8 @@ impl Planner {
         if lost && !self.is_flushed() {
             alarm::raise_for(self.links, Alarm::Alarm, Status::SpindleLost);
         }
+        // G76 goes on with its usual limits.
+        self.take_up_changes();
     }
 
     /// Waits until the encoder tells how long a turn takes, in counts. `None` if what is queued is to be dropped.
@@ -103,62 +129,94 @@ impl Planner {
         .await
     }
 
-    /// Tells exec of the pass, with so many counts a turn, and puts its limits into force. False if the line goes nowhere.
+    /// Tells exec of the pass, with so many counts a turn, and puts its limits into force. False if it goes nowhere.
     #[inline(never)]
     #[small]
     fn begin_pass(&mut self, turn: u32) -> Result<bool, Status> {
         let links = self.links;
-        let commands = links.commands.borrow();
-        let Motion::Thread { target, lead } = &commands.motion else { return Ok(false) };
-        let mut ways = [0.0; AXES];
-        let (mut most, mut square) = (0.0f32, 0.0);
-        for ((way, to), from) in ways.iter_mut().zip(target).zip(&self.position) {
-            let size = (to.0 as f32 - from.0 as f32) * 1e-4;
-            let size = if size < 0.0 { -size } else { size };
-            *way = size;
-            square += size * size;
-            if size > most {
-                most = size;
+        let turns_per_s = COUNTS_PER_S as f32 / turn as f32;
+        let mut speeds = [0.0f32; FIRST_ROTARY];
+        let (mut place, mut line) = (self.position, 0);
+        while let Some(piece) = self.piece(line, &place) {
+            for (most, way) in speeds.iter_mut().zip(piece.ways) {
+                *most = greater(*most, piece.lead * turns_per_s * way / piece.length);
             }
+            (place, line) = (piece.target, line + 1);
         }
-        if most == 0.0 {
+        if speeds.iter().all(|speed| !some(*speed)) {
             return Ok(false);
         }
-        let lead = lead.0 as f32 * 1e-4;
-        let turns_per_s = COUNTS_PER_S as f32 / turn as f32;
         let settings = links.settings.borrow();
-        for (n, (axis, way)) in
-            self.dynamics.axes.iter_mut().zip(ways).enumerate().take(FIRST_ROTARY)
-        {
-            let speed = lead * turns_per_s * way / most;
+        for (axis, speed) in self.dynamics.axes.iter().zip(speeds) {
             if speed > axis.feed {
                 return Err(Status::VelocityExceeded);
             }
+        }
+        for (n, (axis, speed)) in self.dynamics.axes.iter_mut().zip(speeds).enumerate() {
             let jerk = Machine::jerk_max(&*settings, n) * PER_SECOND_CUBED;
             let mut accel = Machine::accel_max(&*settings, n) * PER_SECOND_SQUARED;
-            if jerk > 0.0 && way > 0.0 {
+            if jerk > 0.0 && some(speed) {
                 let mean = 0.5 * sqrt(jerk * speed);
                 accel = if accel > 0.0 && accel < mean { accel } else { mean };
             }
             axis.limit_change(accel, 0.0);
         }
+        // The corner of a taper is no limit: a slower axis would not be in step.
+        self.dynamics.junction = ANY_CORNER;
         // They are the settings' again for the next line.
         links.changes.note(Changes::SETTINGS);
         common::with(links.thread, |common| common.encoder.lost = false);
-        let lead = lead * sqrt(square) / most;
-        self.push(Block::action(Action::Thread(lead), self.line));
+        if let Some(piece) = self.piece(0, &self.position) {
+            self.push(Block::action(Action::Thread(piece.lead), self.line));
+        }
         Ok(true)
     }
 
-    /// Queues the line, or begins with its parts.
+    /// A line of the pass, counted from 0, from a place; `None` if there is none, or it goes nowhere.
     #[inline(never)]
     #[small]
-    fn queue_pass(&mut self) {
-        let links = self.links;
-        let commands = links.commands.borrow();
-        if let Motion::Thread { target, .. } = &commands.motion {
-            self.straight(target, Some(Feed::PerMinute(ANY_FEED)));
+    fn piece(&self, line: u8, from: &PerAxis<Length>) -> Option<Piece> {
+        let commands = self.links.commands.borrow();
+        let (target, lead) = self.steps.pass(&commands.motion, from, line)?;
+        let mut ways = [0.0; FIRST_ROTARY];
+        let (mut most, mut square) = (0.0f32, 0.0);
+        for ((way, to), from) in ways.iter_mut().zip(&target).zip(from) {
+            *way = to.0.abs_diff(from.0) as f32 * 1e-4;
+            square += *way * *way;
+            most = greater(most, *way);
         }
+        let length = sqrt(square);
+        some(most).then(|| Piece {
+            target,
+            ways,
+            length,
+            lead: lead.0 as f32 * 1e-4 * length / most,
+        })
+    }
+
+    /// Queues a line of the pass, or begins with its parts. False if there is none.
+    #[inline(never)]
+    #[small]
+    fn queue_line(&mut self, line: u8) -> bool {
+        if self.is_flushed() {
+            return false;
+        }
+        let Some(Piece { target, .. }) = self.piece(line, &self.position) else { return false };
+        self.straight(&target, Some(Feed::PerMinute(ANY_FEED)));
+        true
+    }
+
+    /// Tells exec the lead of a line further on, if there is one.
+    #[inline(never)]
+    #[small]
+    fn queue_lead(&mut self, line: u8) -> bool {
+        if self.is_flushed() {
+            return false;
+        }
+        let Some(Piece { lead, .. }) = self.piece(line, &self.position) else { return false };
+        let _ = self.queue.push_aside(Block::action(Action::Lead(lead), self.line));
+        self.announce();
+        true
     }
 
     /// Nothing has moved, and nothing will.

@@ -212,7 +212,7 @@ impl<'a> Reader<'a> {
                 'G' => self.g_code(word.value.tenths(), &mut once, &mut machine_coordinates)?,
                 'M' => end |= self.m_code(word.value.tenths())?,
                 c if self.is_on_a_radius(c) => return Err(format!("{c} in radius mode")),
-                c if LETTERS.contains(&c) || "DFIJKLNPRST".contains(c) => {}
+                c if LETTERS.contains(&c) || "DEFHIJKLNPQRST".contains(c) => {}
                 c => return Err(format!("the letter {c}")),
             }
         }
@@ -237,7 +237,7 @@ impl<'a> Reader<'a> {
         machine: &mut bool,
     ) -> Result<(), String> {
         match tenths {
-            0 | 10 | 20 | 30 | 320 | 330 => self.moving = true,
+            0 | 10 | 20 | 30 | 320 | 330 | 760 => self.moving = true,
             800 => self.moving = false,
             40 => *once = Some(Once::Dwell),
             100 => *once = Some(Once::Offsets),

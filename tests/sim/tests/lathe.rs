@@ -276,6 +276,73 @@ fn a_taper_is_in_step_along_the_axis_that_moves_farther() {
     assert!(phases.len() >= 5 && spread(&phases) < STEP, "{phases:.3?}");
 }
 
+/// Z at each index pulse of the passes of a threading cycle, in mm modulo the lead, pass by pass: at the middle of the thread.
+fn cycle(machine: &mut Machine, host: &mut Host, line: &str, lead: f64) -> Vec<Vec<f64>> {
+    let since = machine.mechanics().unwrap().indexed().len() - 1;
+    set(machine, host, line);
+    // Till a report says that it runs.
+    host.run_for_ms(machine, 1_000).unwrap();
+    wait_for_rest(machine, host, 120_000);
+    let end = machine.recorder().motors()[Z].position as f64 / STEPS;
+    let indexed = &machine.mechanics().unwrap().indexed()[since..];
+    let mut passes: Vec<Vec<f64>> = Vec::new();
+    for pair in indexed.windows(2) {
+        let (before, at) = (pair[0].1[Z] as f64 / STEPS, pair[1].1[Z] as f64 / STEPS);
+        let turned = before - at;
+        // In the cut a turn is a lead; on the way back and at rest it is not.
+        if (turned - lead).abs() < 0.02 && at > end + 0.3 {
+            if passes.is_empty() || before > -1.5 {
+                passes.push(Vec::new());
+            }
+            passes.last_mut().unwrap().push((at / lead - (at / lead).round()) * lead);
+        }
+    }
+    passes
+}
+
+#[test]
+fn the_passes_of_a_cycle_lie_in_one_another() {
+    let (mut machine, mut host) = lathe(4, 300.0, |_| {});
+    set(&mut machine, &mut host, "g0 x5");
+    host.run_for_ms(&mut machine, 2_000).unwrap();
+    // Each pass has one turn that begins less than 1.5 mm along.
+    let passes = cycle(&mut machine, &mut host, "g76 p1 z-8 i-1 j0.05 k0.75 h5", 1.0);
+    let all: Vec<f64> = passes.iter().flatten().copied().collect();
+    println!("{} passes, {} turns: spread {:.4}", passes.len(), all.len(), spread(&all));
+    assert_eq!(passes.len(), 20);
+    assert!(passes.iter().all(|pass| pass.len() >= 4), "{passes:.3?}");
+    assert!(spread(&all) < STEP, "{passes:.3?}");
+    assert_eq!(asked(&mut machine, &mut host, "mpox"), 5.0);
+    assert_eq!(asked(&mut machine, &mut host, "mpoz"), -8.0);
+    assert_eq!(machine.missed_tops(), 0);
+}
+
+#[test]
+fn tapers_and_the_compound_slide_stay_in_step() {
+    let (mut machine, mut host) = lathe(100, 300.0, |_| {});
+    for line in ["{1mi:4}", "{xvm:1500}", "{xac:1000}", "g0 x5"] {
+        set(&mut machine, &mut host, line);
+    }
+    host.run_for_ms(&mut machine, 2_000).unwrap();
+    let since = machine.mechanics().unwrap().indexed().len() - 1;
+    // The second pass begins half a lead further on.
+    let passes = cycle(&mut machine, &mut host, "g76 p1 z-12 i-1 j0.5 k1 q45 e3 l3", 1.0);
+    let all: Vec<f64> = passes.iter().flatten().map(|at| at - (2.0 * at).round() / 2.0).collect();
+    println!("tapers: {} turns, spread {:.4}", all.len(), spread(&all));
+    assert!(all.len() >= 18 && spread(&all) < STEP, "{passes:.3?}");
+    // On the tapers X is where Z says.
+    let per_mm = machine.recorder().motors()[0].position as f64 / 5.0;
+    let indexed = &machine.mechanics().unwrap().indexed()[since..];
+    for (_, steps) in indexed {
+        let (x, z) = (steps[0] as f64 / per_mm, steps[Z] as f64 / STEPS);
+        if (-11.5..-9.2).contains(&z) && x < 3.9 {
+            let along = (z + 9.0) / -3.0;
+            let (first, second) = (3.5 + along, 3.0 + along);
+            assert!((x - first).abs() < 0.01 || (x - second).abs() < 0.01, "{x} {z}");
+        }
+    }
+}
+
 #[test]
 fn a_spindle_that_stops_dead_stops_the_axis() {
     for (marks, rpm) in [(1, 300.0), (4, 300.0), (4, 1_000.0), (100, 600.0)] {

@@ -3,9 +3,10 @@
 use super::{On, Section, g, no, no_on};
 use crate::status::Status::{
     ArcAxisMissing, ArcEndpointIsStart, ArcOffsetsMissing, ArcRadiusTolerance, ArcSpecification,
-    AxisDisabled, AxisNotAllowed, AxisWordMissing, FeedrateMissing, InverseTimeNotAllowed,
-    KWordInvalid, KWordMissing, NoEncoder, OutOfRange, PWordInvalid, PWordMissing, PWordNegative,
-    ProbeFailed, ProbeTooShort, RotaryNotAllowed, SWordMissing, SpindleMustTurn,
+    AxisDisabled, AxisNotAllowed, AxisWordMissing, FeedrateMissing, HWordInvalid,
+    InverseTimeNotAllowed, KWordInvalid, KWordMissing, LWordInvalid, NoEncoder, OutOfRange,
+    PWordInvalid, PWordMissing, PWordNegative, ProbeFailed, ProbeTooShort, QWordInvalid,
+    RWordInvalid, RotaryNotAllowed, SWordMissing, SpindleMustTurn,
 };
 
 /// Refusals of an arc.
@@ -116,6 +117,34 @@ that moves farthest: the lead. F does not count. The machine comes to rest, wait
 before, whatever the speed. Feed override and `!` wait for the end of the pass. If there are no pulses for 6 seconds (42, 43), or an axis would \
 be too fast (146), an alarm says so, and nothing moves. A spindle that is lost in the cut is an alarm (44): the axes come to rest.",
             thread!("G33"),
+        ),
+        g(
+            760,
+            "Threading cycle",
+            "A thread along Z in several passes, each as G33 and in the one before. The drive line is parallel to Z through where X is. Z is where passes end; P the \
+lead; I from the drive line to the peak of the thread, negative for an outer thread, positive for an inner one; J the depth of the first pass and K of the last, from the peak. \
+The n-th pass is J n^(1/R) deep: R1, if it is not given, as much each time, R2 the same area. Q is the compound slide angle, 0 to 80 degrees: a pass begins depth tan Q further on. H more \
+passes are made at the full depth. E is how long a taper is along Z, where L says: L1 at the entry, L2 at the exit, L3 both. With G7, I, J and K are diameters. The tool ends on the drive line at Z. \
+Before the first index pulse nothing moves (42, 43). Words are for their line.",
+            &[
+                no_on(On::NoSwitches, NoEncoder, &["G76 P1 Z-10 I-1 J0.2 K0.6"]),
+                no(AxisWordMissing, &["G76 P1 I-1 J0.2 K0.6"]),
+                no(AxisNotAllowed, &["G76 P1 X1 Z-10 I-1 J0.2 K0.6"]),
+                no(PWordMissing, &["G76 Z-10 I-1 J0.2 K0.6"]),
+                no(PWordInvalid, &["G76 P0 Z-10 I-1 J0.2 K0.6"]),
+                no(ArcOffsetsMissing, &["G76 P1 Z-10 J0.2 K0.6"]),
+                no(ArcOffsetsMissing, &["G76 P1 Z-10 I-1 K0.6"]),
+                no(OutOfRange, &["G76 P1 Z-10 I-1 J0 K0.6"]),
+                no(KWordMissing, &["G76 P1 Z-10 I-1 J0.2"]),
+                no(KWordInvalid, &["G76 P1 Z-10 I-1 J0.2 K-0.6"]),
+                no(RWordInvalid, &["G76 P1 Z-10 I-1 J0.2 K0.6 R0.9"]),
+                no(RWordInvalid, &["G76 P1 Z-10 I-1 J0.01 K0.6 R2"]),
+                no(QWordInvalid, &["G76 P1 Z-10 I-1 J0.2 K0.6 Q81"]),
+                no(HWordInvalid, &["G76 P1 Z-10 I-1 J0.2 K0.6 H256"]),
+                no(LWordInvalid, &["G76 P1 Z-10 I-1 J0.2 K0.6 E1 L4"]),
+                no(OutOfRange, &["G76 P1 Z-10 I-1 J0.2 K0.6 L1"]),
+                no(OutOfRange, &["G76 P1 Z-10 I-1 J0.2 K0.6 E5 L1"]),
+            ],
         ),
     ],
 };
