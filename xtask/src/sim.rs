@@ -18,10 +18,10 @@ use crate::setup::{self, Scope};
 pub struct RunArgs {
     /// The job, a file of G-code
     job: PathBuf,
-    /// The board to simulate
-    #[arg(long, value_enum, default_value_t)]
-    board: Board,
-    /// The machine whose settings are the defaults
+    /// The board to simulate; mega2560-grbl, or mega2560-lathe with `--machine lathe`
+    #[arg(long, value_enum)]
+    board: Option<Board>,
+    /// The machine whose settings are the defaults. The lathe has a spindle with an encoder, and its threads are checked
     #[arg(long, value_enum, default_value_t)]
     machine: Machine,
     /// A setting sent before the job, as the sender would: '{"xvm":800}'; with @FILE each line of a file
@@ -75,10 +75,23 @@ pub struct BenchArgs {
     row: Vec<String>,
 }
 
+/// Pulses a turn of the encoder at the spindle of the lathe.
+const SPINDLE_PULSES: u32 = 4;
+
+impl RunArgs {
+    /// The board to simulate.
+    fn board(&self) -> Board {
+        self.board.unwrap_or(match self.machine {
+            Machine::Lathe => Board::Mega2560Lathe,
+            _ => Board::default(),
+        })
+    }
+}
+
 /// Builds and runs a job; the simulator's exit code is ours.
 pub fn run(args: &RunArgs) -> Result<ExitCode> {
     ensure!(args.job.is_file(), "there is no job {}", args.job.display());
-    let elf = prepare(args.board, args.machine)?;
+    let elf = prepare(args.board(), args.machine)?;
     pass_through(&mut run_command(args, &elf)?)
 }
 
@@ -106,11 +119,13 @@ pub fn prepare(board: Board, machine: Machine) -> Result<PathBuf> {
 }
 
 fn run_command(args: &RunArgs, elf: &Path) -> Result<Command> {
-    let mut command = simulator("run", elf, args.board);
+    let mut command = simulator("run", elf, args.board());
     command.arg(&args.job);
     for set in settings(&args.set)? {
         command.arg("--set").arg(set);
     }
+    let spindle = (args.machine == Machine::Lathe).then(|| SPINDLE_PULSES.to_string());
+    option(&mut command, "--spindle", spindle);
     option(&mut command, "--baud", args.baud.map(|baud| baud.to_string()));
     option(&mut command, "--report", args.report.as_ref());
     option(&mut command, "--vcd", args.vcd.as_ref());

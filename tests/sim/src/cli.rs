@@ -57,6 +57,9 @@ pub struct RunArgs {
     /// Lines in flight.
     #[arg(long, value_name = "N", default_value_t = kerf_sim::LINES_IN_FLIGHT)]
     pub in_flight: usize,
+    /// A spindle with an encoder of so many pulses a turn stands beside the board; threads of the job are checked.
+    #[arg(long, value_name = "PULSES")]
+    pub spindle: Option<u32>,
     /// Write the summary as JSON too.
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,

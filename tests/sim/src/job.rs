@@ -197,6 +197,7 @@ impl Run<'_> {
         }
         let mut watch = watch::Watch::new(self.longest_dwell_ms);
         loop {
+            self.machine.follow_pulses();
             let slice = self.machine.cycle() + self.machine.cycles(100);
             while self.host.run_until_line(self.machine, slice)? {
                 self.collect(progress);

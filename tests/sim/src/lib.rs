@@ -30,6 +30,7 @@ mod recorder;
 pub mod report;
 mod stopwatch;
 mod summary;
+pub mod threads;
 mod timer;
 mod trace;
 mod uart;

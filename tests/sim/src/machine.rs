@@ -492,6 +492,12 @@ impl Machine {
         self.bus_mut().refresh_due();
     }
 
+    /// A spindle that is driven by the width of pulses goes by it, as it has been: nobody sees each of them.
+    pub fn follow_pulses(&mut self) {
+        let share = self.pulses().share;
+        self.tamper(|mechanics, now| mechanics.drive_spindle(share, now));
+    }
+
     /// The machine around the chip, if there is one.
     pub fn mechanics(&self) -> Option<&Mechanics> {
         self.bus().mechanics.as_deref()

@@ -9,6 +9,7 @@ use crate::meters::Window;
 use crate::oracle::{AXES, MotorSetup, Outcome, Setup, UNITS, Unclear};
 use crate::pauses::Pause;
 use crate::recorder::Motor;
+use crate::threads::Threads;
 
 const AXIS_NAMES: [char; AXES] = ['X', 'Y', 'Z', 'A', 'B', 'C'];
 
@@ -175,6 +176,8 @@ pub struct Report {
     pub missed_tops: u64,
     /// Resets by the watchdog.
     pub resets: u64,
+    /// Threads that were cut beside a spindle with an encoder.
+    pub threads: Option<Threads>,
     /// The interrupts that were served.
     pub vectors: Vec<VectorReport>,
     /// Motors and axes, as the firmware has them.
@@ -220,12 +223,20 @@ impl Report {
             late_segments: measured.late_segments,
             missed_tops: machine.missed_tops(),
             resets: machine.resets(),
+            threads: None,
             vectors: vector_reports(machine),
             setup: measured.setup.clone(),
         };
         report.problems = report.find_problems(&measured);
         report.ok = report.problems.is_empty();
         report
+    }
+
+    /// Threads of the job, if it has any: what is wrong with them is a problem of the job.
+    pub fn add_threads(&mut self, threads: Option<Threads>) {
+        self.problems.extend(threads.as_ref().and_then(Threads::problem));
+        self.ok = self.problems.is_empty();
+        self.threads = threads;
     }
 
     /// Pauses and stops of the step timer, whichever are more.

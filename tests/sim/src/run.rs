@@ -8,8 +8,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use kerf::boards::{self, Board};
 use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
+use kerf_sim::mechanics::Build;
 use kerf_sim::plot::{self, Look};
 use kerf_sim::report::Report;
+use kerf_sim::threads::Threads;
 
 use crate::cli::RunArgs;
 
@@ -24,26 +26,38 @@ pub fn board(name: &str) -> Result<&'static Board> {
 /// Runs a job. True when all went well.
 pub fn run(args: &RunArgs) -> Result<bool> {
     let lines = job::read_lines(&args.job)?;
-    let mut machine = Machine::load(&args.target.elf, board(&args.target.board)?)?;
+    let board = board(&args.target.board)?;
+    let mut machine = Machine::load(&args.target.elf, board)?;
+    let mut settings = Vec::new();
+    if let Some(pulses) = args.spindle {
+        let lathe = Build::lathe(board, pulses);
+        machine.build(&lathe.ok_or_else(|| anyhow!("the board {} has no encoder", board.name))?);
+        settings.push(format!("{{spn:{pulses}}}"));
+    }
+    settings.extend_from_slice(&args.settings);
     let options = Options {
         baud: args.baud,
-        settings: args.settings.clone(),
+        settings,
         in_flight: args.in_flight,
         vcd: args.vcd.clone(),
         interjections: Vec::new(),
     };
-    if args.plot.is_some() {
+    if args.plot.is_some() || args.spindle.is_some() {
         machine.recorder_mut().keep_log();
     }
     let bar = progress_bar(lines.len(), args.quiet)?;
-    let report = job::run(&mut machine, &lines, &options, |done| bar.set_position(done as u64))?;
+    let mut report =
+        job::run(&mut machine, &lines, &options, |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
+    if args.spindle.is_some() {
+        report.add_threads(Threads::of(&machine, &report.setup, &lines));
+    }
     if let Some(path) = &args.report {
         write_report(path, &report)?;
     }
     if let Some(path) = &args.plot {
         let look = Look { span: args.span.clone(), window_ms: args.smooth };
-        plot::write(path, &machine, &report.setup, &look)?;
+        plot::write(path, &machine, &report.setup, &look, report.threads.as_ref())?;
     }
     let text = report.to_string();
     match args.quiet {

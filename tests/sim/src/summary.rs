@@ -3,6 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 
 use crate::report::{PauseReport, Report, WindowReport};
+use crate::threads::Threads;
 
 /// Refused lines that are shown; the rest is only counted.
 const REJECTED_SHOWN: usize = 20;
@@ -19,6 +20,13 @@ impl Display for Report {
         )?;
         self.motors(f)?;
         self.axes(f)?;
+        if let Some(threads) = &self.threads {
+            let Threads { passes, turns, spread_mm, most_mm, .. } = threads;
+            let what = format!(
+                "{passes} passes, {turns} turns, {spread_mm:.4} mm apart at the index (at most {most_mm:.4})"
+            );
+            row(f, "threads", what)?;
+        }
         if let Some(why) = &self.unchecked {
             row(f, "ends not checked", why)?;
         }

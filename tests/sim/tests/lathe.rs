@@ -4,7 +4,12 @@ mod common;
 
 use common::{firmware, set};
 use kerf::boards::{Board, MEGA2560_LATHE, RAMPS14};
+use std::path::Path;
+
+use kerf_sim::job::{self, Options};
 use kerf_sim::mechanics::{Bounce, Build, Sensors};
+use kerf_sim::plot::{self, Look};
+use kerf_sim::threads::Threads;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
 /// The longest time with interrupts off outside the step interrupt.
@@ -341,6 +346,30 @@ fn tapers_and_the_compound_slide_stay_in_step() {
             assert!((x - first).abs() < 0.01 || (x - second).abs() < 0.01, "{x} {z}");
         }
     }
+}
+
+#[test]
+fn the_example_cuts_a_thread() {
+    let mut machine = firmware(&MEGA2560_LATHE);
+    machine.build(&Build::lathe(&MEGA2560_LATHE, 4).unwrap());
+    machine.recorder_mut().keep_log();
+    let lines = job::read_lines(Path::new("../../examples/thread.gcode")).unwrap();
+    let settings = vec!["{mch:4}".to_string(), "{spn:4}".to_string()];
+    let options = Options { settings, ..Options::default() };
+    let report = job::run(&mut machine, &lines, &options, |_| {}).unwrap();
+    assert!(report.ok, "{report}");
+    let threads = Threads::of(&machine, &report.setup, &lines).unwrap();
+    assert_eq!((threads.passes, threads.problem()), (11, None), "{threads:?}");
+    // Z stays with the spindle between two index pulses, too.
+    let most = threads.errors.iter().flatten().map(|(_, off)| off.abs()).fold(0.0, f64::max);
+    println!(
+        "{} turns, {:.4} mm at the index, {most:.4} between",
+        threads.turns, threads.spread_mm
+    );
+    assert!(threads.turns >= 100 && most < 0.02, "{most}");
+    let file = common::scratch("thread.svg");
+    plot::write(&file, &machine, &report.setup, &Look::default(), Some(&threads)).unwrap();
+    assert!(std::fs::read_to_string(file).unwrap().contains("error of the thread"));
 }
 
 #[test]

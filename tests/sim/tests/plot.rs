@@ -60,7 +60,7 @@ fn an_s_curve_is_seen_in_the_steps() {
 fn the_plot_is_complete_and_small() {
     let (machine, report) = run("g0 x10 y10\ng1 x20 f600\ny20\ng0 x0 y0", &Options::default());
     let file = scratch("plot.svg");
-    plot::write(&file, &machine, &report.setup, &Look::default()).unwrap();
+    plot::write(&file, &machine, &report.setup, &Look::default(), None).unwrap();
     let svg = fs::read_to_string(&file).unwrap();
     assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
     assert!(svg.len() < 500_000, "{} bytes", svg.len());
@@ -79,7 +79,7 @@ fn the_plot_is_complete_and_small() {
     }
     assert!(most > 1_000, "{most} points in a curve");
     let part = Look { span: Some(0.5..0.6), ..Look::default() };
-    plot::write(&file, &machine, &report.setup, &part).unwrap();
+    plot::write(&file, &machine, &report.setup, &part, None).unwrap();
     assert!(fs::read_to_string(&file).unwrap().len() < svg.len());
 }
 
@@ -87,7 +87,7 @@ fn the_plot_is_complete_and_small() {
 fn a_job_without_a_step_can_be_drawn() {
     let (machine, report) = run("g4 p0.1", &Options::default());
     let file = scratch("still.svg");
-    plot::write(&file, &machine, &report.setup, &Look::default()).unwrap();
+    plot::write(&file, &machine, &report.setup, &Look::default(), None).unwrap();
 }
 
 #[test]

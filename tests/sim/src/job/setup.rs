@@ -31,11 +31,13 @@ pub fn read_setup(machine: &mut Machine, host: &mut Host) -> Result<Setup> {
 fn motor_of(group: &Value) -> Option<MotorSetup> {
     let number = |key| Decimal::parse(&group.get(key)?.as_number()?.to_string());
     let whole = |key| number(key)?.as_whole();
-    let axis = usize::try_from(whole("ma")?).ok().filter(|a| *a < AXES)?;
+    let axis = usize::try_from(whole("ma")?).ok()?;
+    let moves = axis < AXES;
     Some(MotorSetup {
-        axis,
+        // One that moves no axis counts as the last one's, and makes no steps.
+        axis: axis.min(AXES - 1),
         step_angle: number("sa")?,
-        travel: number("tr")?,
+        travel: if moves { number("tr")? } else { Decimal::whole(0) },
         microsteps: u32::try_from(whole("mi")?).ok()?,
         inverted: whole("po")? != 0,
         // Not every firmware has it.
@@ -59,11 +61,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_motor_may_move_nothing() {
+        let motor = motor_of(&serde_json::json!({"ma":255,"sa":1.8,"tr":5,"mi":8,"po":0})).unwrap();
+        assert_eq!(motor.steps(10_000), 0);
+    }
+
+    #[test]
     fn reads_a_motor_group() {
         let group = serde_json::json!({"ma":2,"sa":1.8,"tr":1.25,"mi":8,"po":1,"pm":2,"sp":0});
         let motor = motor_of(&group).unwrap();
         assert_eq!((motor.axis, motor.microsteps, motor.inverted), (2, 8, true));
         assert_eq!(motor.steps(10_000), 1280);
-        assert!(motor_of(&serde_json::json!({"ma":9})).is_none());
+        assert!(motor_of(&serde_json::json!({"ma":1})).is_none());
     }
 }

@@ -117,7 +117,25 @@ impl Sensors {
     }
 }
 
+/// S that is the whole width of the spindle's pulses, by default.
+const FULL_DRIVE: f64 = 24_000.0;
+
 impl Build {
+    /// A machine without ends and switches, with a spindle that turns as fast as S says by the default settings, and has an encoder of so many pulses a turn.
+    /// `None` if the board has no pins for that.
+    pub fn lathe(board: &Board, pulses: u32) -> Option<Build> {
+        let mut build = Build::of(board);
+        for axis in &mut build.axes {
+            // The pins of the sensors are theirs alone.
+            (axis.min, axis.max) = (None, None);
+            (axis.travel, axis.start) = (f64::INFINITY, 0.0);
+        }
+        build.spindle.sensors = Some(Sensors::of(board, pulses)?);
+        build.spindle.pwm = board.pwm.map(|pwm| pwm.pin());
+        build.spindle.rpm = FULL_DRIVE;
+        Some(build)
+    }
+
     /// A machine of 200 by 200 by 100 mm that stands in the middle, with switches at both ends of X, Y and Z, and
     /// motors as the firmware's defaults have them.
     pub fn of(_: &Board) -> Build {

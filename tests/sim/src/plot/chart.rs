@@ -12,6 +12,11 @@ use super::track::SAMPLE_S;
 const WIDTH: u32 = 1_100;
 const PATH_HEIGHT: u32 = 640;
 const CURVE_HEIGHT: u32 = 220;
+const THREADS_HEIGHT: u32 = 300;
+/// What the scale of errors shows at least, micrometres to each side.
+const THREAD_SCALE: f64 = 10.0;
+/// Each so many of the samples of a thread is drawn.
+const THREAD_EVERY: usize = 4;
 const MARGIN: u32 = 12;
 const LABELS_BELOW: u32 = 38;
 const LABELS_LEFT: u32 = 76;
@@ -28,19 +33,36 @@ const FONT: (&str, u32) = ("sans-serif", 13);
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Draws all panels; the curves for `span` only, in s, if that is given.
-pub fn draw(motion: &Motion, span: Option<Range<f64>>) -> Result<String> {
+///
+/// Below them, if there are any, `threads`: pass by pass where along Z and how far off, mm.
+pub fn draw(
+    motion: &Motion,
+    span: Option<Range<f64>>,
+    threads: &[Vec<(f64, f64)>],
+) -> Result<String> {
     let mut svg = String::new();
-    panels(&mut svg, motion, span).map_err(|e| anyhow!("cannot draw: {e}"))?;
+    panels(&mut svg, motion, span, threads).map_err(|e| anyhow!("cannot draw: {e}"))?;
     Ok(svg)
 }
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-fn panels(svg: &mut String, motion: &Motion, span: Option<Range<f64>>) -> Drawn {
-    let size = (WIDTH, PATH_HEIGHT + 3 * CURVE_HEIGHT);
+fn panels(
+    svg: &mut String,
+    motion: &Motion,
+    span: Option<Range<f64>>,
+    threads: &[Vec<(f64, f64)>],
+) -> Drawn {
+    let curves_height = 3 * CURVE_HEIGHT;
+    let below = if threads.is_empty() { 0 } else { THREADS_HEIGHT };
+    let size = (WIDTH, PATH_HEIGHT + curves_height + below);
     let root = SVGBackend::with_string(svg, size).into_drawing_area();
     root.fill(&WHITE)?;
     let (top, rest) = root.split_vertically(PATH_HEIGHT);
+    let (rest, errors) = rest.split_vertically(curves_height);
+    if !threads.is_empty() {
+        thread_errors(&errors, threads)?;
+    }
     let (plane, scale) = top.split_horizontally(WIDTH - SCALE);
     let fastest = motion.velocity.iter().copied().fold(0.0, f64::max).max(1e-9);
     path(&plane, motion, fastest)?;
@@ -59,7 +81,30 @@ fn panels(svg: &mut String, motion: &Motion, span: Option<Range<f64>>) -> Drawn 
     Ok(())
 }
 
-/// The path in the plane of X and Y, to scale.
+/// How far off a thread is over its length, in micrometres.
+fn thread_errors(area: &Area<'_>, passes: &[Vec<(f64, f64)>]) -> Drawn {
+    let all = || passes.iter().flatten();
+    let along = extent(all().map(|point| point.0));
+    let off = extent(all().map(|point| 1e3 * point.1).chain([-THREAD_SCALE, THREAD_SCALE]));
+    let mut chart = ChartBuilder::on(area)
+        .margin(MARGIN)
+        .margin_right(2 * MARGIN)
+        .x_label_area_size(LABELS_BELOW)
+        .y_label_area_size(LABELS_LEFT)
+        .build_cartesian_2d(along, off)?;
+    let mut mesh = chart.configure_mesh();
+    mesh.x_desc("Z, mm").y_desc("error of the thread, µm").label_style(FONT).y_labels(7);
+    mesh.max_light_lines(0).draw()?;
+    let most = passes.len().max(2) - 1;
+    for (n, pass) in passes.iter().enumerate() {
+        let colour = colour(n * (COLOURS - 1) / most);
+        let points = pass.iter().step_by(THREAD_EVERY).map(|(z, off)| (*z, 1e3 * off));
+        chart.draw_series(LineSeries::new(points, &colour))?;
+    }
+    Ok(())
+}
+
+/// The path in the plane of X and Y, or Z and X, to scale.
 fn path(area: &Area<'_>, motion: &Motion, fastest: f64) -> Drawn {
     let (x, y) = frame(area, &motion.path);
     let tolerance = (x.end - x.start) * SIMPLER;
@@ -69,7 +114,8 @@ fn path(area: &Area<'_>, motion: &Motion, fastest: f64) -> Drawn {
         .y_label_area_size(LABELS_LEFT)
         .build_cartesian_2d(x, y)?;
     let mut mesh = chart.configure_mesh();
-    mesh.x_desc("X, mm").y_desc("Y, mm").label_style(FONT).max_light_lines(0).draw()?;
+    let [across, up] = motion.plane.map(|name| format!("{name}, mm"));
+    mesh.x_desc(across).y_desc(up).label_style(FONT).max_light_lines(0).draw()?;
     for (colour, points) in pieces(motion, fastest) {
         let line = simplified(&points, tolerance);
         chart.draw_series(LineSeries::new(line, colour.stroke_width(2)))?;

@@ -8,6 +8,8 @@ mod chart;
 mod smooth;
 mod track;
 
+pub use track::{Position, SAMPLE_S, positions};
+
 use std::fs;
 use std::ops::Range;
 use std::path::Path;
@@ -16,6 +18,12 @@ use anyhow::{Context, Result};
 
 use crate::machine::Machine;
 use crate::oracle::Setup;
+use crate::threads::Threads;
+
+/// X, Y and Z among the axes.
+const X: usize = 0;
+const Y: usize = 1;
+const Z: usize = 2;
 
 /// Width of the window that a cubic is fitted to, ms, unless asked otherwise: some ten segments of the
 /// firmware, so that their steps in velocity do not show.
@@ -39,8 +47,10 @@ impl Default for Look {
 /// The job as it was carried out, sampled each millisecond.
 #[derive(Clone, Default, Debug)]
 pub struct Motion {
-    /// Where the tool is in the plane of X and Y.
+    /// Where the tool is in the plane of X and Y; of a machine without Y, of Z and X.
     pub path: Vec<(f64, f64)>,
+    /// The names of these two axes.
+    pub plane: [char; 2],
     /// Units a second, along the path.
     pub velocity: Vec<f64>,
     /// Units a second squared.
@@ -54,15 +64,26 @@ impl Motion {
     pub fn of(machine: &Machine, setup: &Setup, window_ms: u32) -> Motion {
         let positions = track::positions(machine, setup);
         let curves = smooth::derivatives(&track::way(&positions), window_ms, track::SAMPLE_S);
-        let path = positions.iter().map(|p| (p[0], p[1])).collect();
+        let turns = setup.motors.iter().all(|motor| motor.axis != Y);
+        let (across, up) = if turns { (Z, X) } else { (X, Y) };
+        let plane = [across, up].map(|axis| ['X', 'Y', 'Z'][axis]);
+        let path = positions.iter().map(|p| (p[across], p[up])).collect();
         let [velocity, acceleration, jerk] = curves;
-        Motion { path, velocity, acceleration, jerk }
+        Motion { path, plane, velocity, acceleration, jerk }
     }
 }
 
 /// Draws the steps that were kept into an SVG file. An error says that it cannot be written.
-pub fn write(path: &Path, machine: &Machine, setup: &Setup, look: &Look) -> Result<()> {
+///
+/// Of threads it shows the error over their length as well, each pass in a colour of its own.
+pub fn write(
+    path: &Path,
+    machine: &Machine,
+    setup: &Setup,
+    look: &Look,
+    threads: Option<&Threads>,
+) -> Result<()> {
     let motion = Motion::of(machine, setup, look.window_ms);
-    let svg = chart::draw(&motion, look.span.clone())?;
+    let svg = chart::draw(&motion, look.span.clone(), threads.map_or(&[], |of| &of.errors))?;
     fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))
 }
