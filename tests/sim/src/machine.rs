@@ -494,6 +494,9 @@ impl Machine {
 
     /// A spindle that is driven by the width of pulses goes by it, as it has been: nobody sees each of them.
     pub fn follow_pulses(&mut self) {
+        if self.mechanics().is_none() {
+            return;
+        }
         let share = self.pulses().share;
         self.tamper(|mechanics, now| mechanics.drive_spindle(share, now));
     }
