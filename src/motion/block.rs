@@ -31,7 +31,10 @@ impl Block {
     /// Whether the machine goes on over it, and it is no line.
     #[small]
     pub fn is_aside(&self) -> bool {
-        matches!(self.body, Body::Action(Action::Override(_) | Action::Lead(_)))
+        matches!(
+            self.body,
+            Body::Action(Action::Override(_) | Action::Lead(_) | Action::PerTurn(_))
+        )
     }
 
     /// A block of the line with this N word, 0 for none; at most [`N_MAX`](crate::gcode::command::N_MAX).
@@ -80,6 +83,8 @@ pub enum Action {
     Thread(f32),
     /// The same for the lines from here on, in the midst of a pass: the machine goes on.
     Lead(f32),
+    /// G95, or its end: from here on feeds go by the measured speed of the spindle, or not. The machine goes on.
+    PerTurn(bool),
     /// M48 to M51. The machine goes on.
     Override(Change),
     /// M0, M1, M60.

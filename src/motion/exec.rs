@@ -54,6 +54,9 @@ pub const BLOCK_S_MIN: f32 = 0.000_75;
 /// Faster than this no line ends but at another one, mm/s.
 const SLOW: f32 = 5.0;
 
+/// A share of the spindle's speed has to change by so much to count.
+const CHANGE: f32 = 0.005;
+
 /// A dwell's segment lasts so many milliseconds.
 const DWELL_MS: u16 = 2;
 
@@ -127,6 +130,9 @@ pub struct Exec {
     hurry: bool,
     /// A pass in step with the spindle is to end at once.
     breaks_off: bool,
+    /// Feeds go by the measured speed of the spindle: that share of what they were planned for.
+    per_turn: bool,
+    share: f32,
     dwell_ms: u32,
     governor: Governor,
     prep: Prep,
@@ -176,6 +182,8 @@ impl Exec {
             coarse: false,
             hurry: false,
             breaks_off: false,
+            per_turn: false,
+            share: 1.0,
             dwell_ms: 0,
             thread: Thread::new(),
         }
@@ -283,6 +291,7 @@ impl Exec {
         while let Some(block) = blocks.oldest() {
             match &block.body {
                 Body::Action(Action::Drivers(drivers)) => self.prep.set_drivers(*drivers),
+                Body::Action(Action::PerTurn(on)) => self.per_turn = *on,
                 Body::Action(Action::SetPosition(steps)) if !moved => out.target = *steps,
                 Body::Action(Action::SetPosition(_) | Action::Override(_) | Action::Lead(_)) => {}
                 _ => moved = true,
@@ -341,6 +350,7 @@ impl Exec {
                 self.prep.rest();
                 self.thread.begin(*lead);
             }
+            Action::PerTurn(on) => self.per_turn = *on,
             Action::Lead(lead) => self.thread.set_lead(*lead),
             Action::Override(_) => {}
         }
@@ -436,13 +446,24 @@ impl Exec {
                 running.headroom = blocks.headroom();
             }
         }
+        let (mut cruise, mut holds) = (running.cruise, self.hold);
+        if Capability::Lathe.is_built_in() && self.per_turn && !blocks.is_traverse() {
+            cruise *= self.share;
+            // The spindle stands still.
+            holds |= !some(self.share);
+            if self.governor.is_at_rest() && holds && !self.hold {
+                let (ticks, period) = PAUSE;
+                self.prep.pause(ticks, period, segment);
+                return Step::Segment;
+            }
+        }
         let ahead = View { headroom: running.headroom, blocks };
-        let stretch = if self.hold {
+        let stretch = if holds {
             self.governor.halt(running.left, &ahead, SEGMENT_S)
         } else {
             let coarse = self.coarse && (running.jerk || running.short) || self.hurry;
             let seconds = if coarse { 2.0 * SEGMENT_S } else { SEGMENT_S };
-            self.governor.stretch(running.left, running.cruise, &ahead, seconds)
+            self.governor.stretch(running.left, cruise, &ahead, seconds)
         };
         self.hand_out(&stretch, blocks, out, segment, |exec| {
             let running = &exec.running;
@@ -490,6 +511,28 @@ impl Exec {
     pub fn thread(&mut self) -> Option<&mut Thread> {
         let is_on = Capability::Lathe.is_built_in() && self.thread.is_on();
         is_on.then_some(&mut self.thread)
+    }
+
+    /// Whether feeds go by the measured speed of the spindle (G95).
+    #[inline(always)]
+    pub fn is_per_turn(&self) -> bool {
+        Capability::Lathe.is_built_in() && self.per_turn
+    }
+
+    /// The spindle turns at this share of the speed that feeds were planned for; what is more than 1 is 1. A change of less than 0.5 % does
+    /// not count: each has ramps laid out anew.
+    #[inline(never)]
+    #[small]
+    pub fn set_share(&mut self, share: f32) {
+        let share = least(share, 1.0);
+        let off = share - self.share;
+        if !(-CHANGE..=CHANGE).contains(&off)
+            || (share.to_bits() == 0) != (self.share.to_bits() == 0)
+        {
+            self.share = share;
+            self.governor.change_feed();
+            self.governor.look_again();
+        }
     }
 
     /// Whether a pass in step with the spindle is to end at once, in the midst of the cut: for an alarm.

@@ -10,7 +10,7 @@ use avr_embassy::{InterruptEnd, Shared};
 use kerf_macros::small;
 
 use super::block::{Block, Body, Line};
-use super::factors::Factors;
+use super::factors::{Factors, Reserve};
 use super::float::lesser;
 use super::horizon::Horizon;
 use super::queue::{BLOCKS, FIRM, SEQ};
@@ -106,6 +106,12 @@ impl BlockSource {
     pub fn cruise(&self) -> f32 {
         let factors = self.horizon.look(Horizon::factors);
         self.line(self.oldest, |line| line.velocity(&factors)).unwrap_or_default()
+    }
+
+    /// Whether the oldest block is a traverse.
+    #[small]
+    pub fn is_traverse(&self) -> bool {
+        self.line(self.oldest, |line| line.reserve == Reserve::TRAVERSE).unwrap_or_default()
     }
 
     /// What the oldest block, a line, may be run at whatever overrides say, mm/s.

@@ -40,10 +40,10 @@ const SHARE: f32 = 0.7;
 const WINDOW: u32 = COUNTS_PER_S / 1_000 * 16;
 
 /// The spindle is lost when no pulse has come for so many times as long as from one to the next.
-const OVERDUE: f32 = 2.05;
+const OVERDUE: f32 = 2.02;
 
-/// And for so many counts more, 1 ms: pulses do not come quite evenly.
-const SLACK: f32 = COUNTS_PER_S as f32 * 0.001;
+/// And for so many counts more, 0.5 ms: pulses do not come quite evenly.
+const SLACK: f32 = COUNTS_PER_S as f32 * 0.0005;
 
 /// CPU cycles of a count.
 const CYCLES: u32 = TIMER_HZ / COUNTS_PER_S;

@@ -152,6 +152,9 @@ impl<'a> Runner<'a> {
         if self.machine.thread().is_some() {
             look_at_spindle(self.machine, encoder);
         }
+        if self.machine.is_per_turn() {
+            follow_speed(self.machine, encoder, out);
+        }
         self.machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
         // What has paused in a hold goes on before motion does.
         if out.outputs != spindle::on() {
@@ -272,6 +275,17 @@ fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
         flags::set(Event::BlockDone);
     }
     exec.break_off(machine::is_alarmed());
+}
+
+/// Feeds a turn go by the measured speed, if there is an encoder: S is what they were planned for.
+#[inline(never)]
+#[small]
+fn follow_speed(exec: &mut Exec, encoder: &Encoder, out: &Snapshot) {
+    let share = match encoder.per_turn() {
+        0 => 1.0,
+        _ => encoder.speed() as f32 / (out.speed * 1e3),
+    };
+    exec.set_share(share);
 }
 
 /// The steppers have just been started in a pass.

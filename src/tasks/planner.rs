@@ -29,8 +29,10 @@ use super::Never;
 use super::common;
 use super::links::{self, Changes, Links};
 use super::parser;
+use crate::capability::Capability;
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
 use crate::gcode::interpreter::Modes;
+use crate::gcode::modal::FeedMode;
 use crate::gcode::overrides::Change;
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, is_asked, wait};
@@ -59,8 +61,9 @@ pub struct Planner {
     drivers: Drivers,
     /// What exec has been told to switch.
     outputs: Outputs,
-    /// It has been told of a surface speed.
+    /// It has been told of a surface speed, and that feeds are a turn.
     has_surface: bool,
+    per_turn: bool,
     /// How far the line has been carried out.
     steps: Steps,
     walk: Ongoing,
@@ -216,6 +219,7 @@ impl Planner {
             drivers: Drivers::USUAL,
             outputs: Outputs { on: 0, speed: 0.0 },
             has_surface: false,
+            per_turn: false,
             steps: Steps::default(),
             walk: Ongoing::None,
             begun: Begun::Nothing,
@@ -242,6 +246,9 @@ impl Planner {
             _ => return false,
         };
         if !commands.is_motion_alone() || !self.links.changes.is_empty() {
+            return false;
+        }
+        if Capability::Lathe.is_built_in() && self.turns_otherwise(&commands.motion) {
             return false;
         }
         if let Begun::Chain(chain) = &mut self.begun {
@@ -313,6 +320,13 @@ impl Planner {
         if self.has_chain() {
             return self.end_chain(&commands);
         }
+        if Capability::Lathe.is_built_in() && self.turns_otherwise(&commands.motion) {
+            self.per_turn = !self.per_turn;
+            let block = Block::action(Action::PerTurn(self.per_turn), self.line);
+            let _ = self.queue.push_aside(block);
+            self.announce();
+            return Turn::More;
+        }
         if matches!(self.begun, Begun::Parts(_)) {
             self.part(&commands);
             return Turn::More;
@@ -376,6 +390,21 @@ impl Planner {
             Step::Check => self.check(),
         }
         Turn::More
+    }
+
+    /// Whether feeds of this motion are a turn of the spindle (G95), and exec does not know of it; or the other way round. The model is where the line leads
+    /// to, and no further.
+    #[inline(never)]
+    #[small]
+    fn turns_otherwise(&self, motion: &Motion) -> bool {
+        let per_turn = match motion {
+            Motion::None | Motion::Traverse { .. } | Motion::Through { .. } => return false,
+            Motion::Feed { .. } | Motion::Arc { .. } | Motion::Probe { .. } | Motion::Cycle(_) => {
+                self.links.model.borrow().modal().feed_mode == FeedMode::PerTurn
+            }
+            _ => false,
+        };
+        per_turn != self.per_turn
     }
 
     /// Queues a straight move, or begins with its parts.

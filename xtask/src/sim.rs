@@ -213,7 +213,7 @@ mod tests {
     fn every_option_reaches_the_simulator() {
         let args = RunArgs {
             job: "a.gcode".into(),
-            board: Board::Ramps14,
+            board: Some(Board::Ramps14),
             machine: Machine::Careful,
             set: vec!["{\"xvm\":800}".into(), "{\"yvm\":800}".into()],
             baud: Some(250_000),

@@ -349,6 +349,43 @@ fn tapers_and_the_compound_slide_stay_in_step() {
 }
 
 #[test]
+fn feeds_a_turn_go_by_the_measured_speed() {
+    // S is 300, and the spindle turns at 240: 0.1 mm a turn are 24 mm/min.
+    let (mut machine, mut host) = lathe(4, 240.0, |_| {});
+    set(&mut machine, &mut host, "g95 f0.2 m3 s300");
+    machine.tamper(|mechanics, now| mechanics.force_spindle(240.0, now));
+    let way = |machine: &Machine| machine.recorder().motors()[Z].position as f64 / STEPS;
+    let went = |machine: &mut Machine, host: &mut Host, ms: u64| {
+        let before = way(machine);
+        host.run_for_ms(machine, ms).unwrap();
+        way(machine) - before
+    };
+    set(&mut machine, &mut host, "g91 g1 z20");
+    host.run_for_ms(&mut machine, 1_000).unwrap();
+    let feed = went(&mut machine, &mut host, 3_000) / 12.0;
+    println!("G95 F0.2: {feed:.4} mm a turn at 240 rpm, of S300");
+    assert!((feed / 0.2 - 1.0).abs() < 0.01, "{feed}");
+    // It follows a change, and waits for a spindle that stands still.
+    machine.tamper(|mechanics, now| mechanics.force_spindle(120.0, now));
+    host.run_for_ms(&mut machine, 1_200).unwrap();
+    let feed = went(&mut machine, &mut host, 3_000) / 6.0;
+    assert!((feed / 0.2 - 1.0).abs() < 0.01, "{feed}");
+    machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
+    host.run_for_ms(&mut machine, 1_200).unwrap();
+    assert_eq!(went(&mut machine, &mut host, 1_000), 0.0);
+    // A traverse does not wait, and feeds a minute do not.
+    machine.tamper(|mechanics, now| mechanics.force_spindle(300.0, now));
+    wait_for_rest(&mut machine, &mut host, 60_000);
+    assert_eq!(way(&machine), 20.0);
+    machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
+    host.run_for_ms(&mut machine, 1_000).unwrap();
+    set(&mut machine, &mut host, "g0 z1");
+    set(&mut machine, &mut host, "g94 g1 z1 f300");
+    host.run_for_ms(&mut machine, 3_000).unwrap();
+    assert_eq!(way(&machine), 22.0);
+}
+
+#[test]
 fn the_example_cuts_a_thread() {
     let mut machine = firmware(&MEGA2560_LATHE);
     machine.build(&Build::lathe(&MEGA2560_LATHE, 4).unwrap());
@@ -393,9 +430,10 @@ fn a_spindle_that_stops_dead_stops_the_axis() {
         println!(
             "N {marks}, {rpm} rpm: at rest {took:.0} ms after a dead stop, two pulses are {two_pulses:.0}"
         );
-        // Till it is noticed, what is queued, and the ramp.
+        // 20 ms are for what is queued and the ramp; from 5 mm/s on the ramp alone takes longer within the limits.
         let ramp = rpm / 60.0 / 500.0 * 1e3;
-        assert!(took < 1.1 * two_pulses + 20.0 + ramp, "{marks}, {rpm}: {took} ms");
+        let rest = 20.0f64.max(9.0 + 0.02 * two_pulses + ramp);
+        assert!(took <= two_pulses + rest, "{marks}, {rpm}: {took} ms");
         let told = host.take_reports().iter().any(|report| report["er"]["st"] == LOST);
         assert!(told, "{marks}: nothing is told");
         // The position is known to the step.

@@ -113,8 +113,9 @@ pub const FEEDS: Section = Section {
         g(
             950,
             "Units per turn",
-            "F is the way for each turn of the spindle, at the speed S that has been programmed: it is not \
-measured, and the override of the spindle does not count. With G96 it is the speed at the end of the move.",
+            "F is the way for each turn of the spindle. Feeds are planned for the speed S that has been programmed, with G96 that at the end of the move. \
+With an encoder (`spn`) they follow the speed that it measures, to 0.5 %, each 20 ms, up to S: a spindle that is slower has slower feeds, and one that stands still none. A faster one, as by \
+its override, does not count, nor does any without an encoder.",
             &[
                 no(FeedrateMissing, &["M3 S1000", "F100", "G95 G1 X1"]),
                 no(SpindleMustTurn, &["G95 G1 X1 F0.1"]),
