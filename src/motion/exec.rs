@@ -130,14 +130,14 @@ pub struct Exec {
     hurry: bool,
     /// A pass in step with the spindle is to end at once.
     breaks_off: bool,
-    /// Feeds go by the measured speed of the spindle: that share of what they were planned for.
-    per_turn: bool,
-    share: f32,
     dwell_ms: u32,
     governor: Governor,
     prep: Prep,
     // But for what few lines need.
     thread: Thread,
+    /// Feeds go by the measured speed of the spindle: that share of what they were planned for.
+    per_turn: bool,
+    share: f32,
 }
 
 /// What the governor sees of the queue.
@@ -182,10 +182,10 @@ impl Exec {
             coarse: false,
             hurry: false,
             breaks_off: false,
-            per_turn: false,
-            share: 1.0,
             dwell_ms: 0,
             thread: Thread::new(),
+            per_turn: false,
+            share: 1.0,
         }
     }
 
