@@ -34,7 +34,7 @@ use super::jog;
 use super::lines::LinePool;
 use super::links::Links;
 use super::overrides;
-use super::ports::{self, GREETING, INTERRUPTED, Port};
+use super::ports::{self, GREETING, INTERRUPTED, OTHERS, Port};
 use super::view::View;
 use crate::gcode::overrides::{Change, FULL, Override};
 use crate::hal::event::Event;
@@ -143,7 +143,7 @@ pub fn serve(links: &Links) {
 #[small]
 fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
-        if port.speech.get().is_in_order() && machine::alarm() != Alarm::Panic {
+        if starts_over(links, port) {
             let works = View::of(links, port).has_work() && !machine::is_checking();
             return start_over(links, port, works);
         }
@@ -186,6 +186,17 @@ fn act(links: &Links, port: &Port, characters: u8) {
     links.reporter_wake.urge();
 }
 
+/// Whether a reset starts over instead of starting the board anew: in a dialect in which it does, and on a port that is undecided while the machine
+/// has nothing to do. There a sender may begin so, and goes on with lines that the start of a board would lose.
+#[inline(never)]
+#[small]
+fn starts_over(links: &Links, port: &Port) -> bool {
+    if port.undecided.get() {
+        return machine::alarm() == Alarm::None && !is_busy(links) && !links.has_data();
+    }
+    port.speech.get().is_in_order() && machine::alarm() != Alarm::Panic
+}
+
 /// A reset in a dialect that keeps the position: all that has come is dropped, the program ends, overrides are as programmed; the reporter greets
 /// when that is done, and begins an alarm before if the machine `works`, which is interrupted.
 #[inline(never)]
@@ -198,6 +209,9 @@ fn start_over(links: &Links, port: &Port, works: bool) {
     let homes = machine::cycle() == machine::Cycle::Homing;
     let interrupted = if homes { INTERRUPTED | ports::HOMING } else { INTERRUPTED };
     port.ask(if works { GREETING | interrupted } else { GREETING });
+    if port.undecided.get() {
+        port.ask(OTHERS);
+    }
     links.reporter_wake.urge();
 }
 

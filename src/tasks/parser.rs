@@ -363,7 +363,10 @@ impl Parser {
         let flushes = machine::is_flushing();
         let any = data || flushes || port.number != links.feeder.get();
         let (id, class) = port.lines.borrow().next(any)?;
-        if !matches!(session, Session::Idle) || (flushes && class == Class::Data) {
+        // What follows a reset waits for the greeting.
+        let waits = (flushes && class == Class::Data)
+            || (port.is_resetting() && !matches!(class, Class::Fault(_)));
+        if !matches!(session, Session::Idle) || waits {
             return None;
         }
         let has_room = port.tx.try_lock().is_ok_and(|tx| tx.has_room());
@@ -651,7 +654,7 @@ fn usual(links: &Links) -> Usual {
     let mut lines = port.lines.borrow_mut();
     let Some(line) = lines.oldest() else { return Usual::NotTried };
     // What the port is told at once goes first: an acknowledgement is not to wait for a move.
-    if !tx.has_room() || settings.echo() || port.tells() {
+    if !tx.has_room() || settings.echo() || port.tells() || port.is_resetting() {
         return Usual::NotTried;
     }
     let mut commands = links.commands.borrow_mut();

@@ -30,6 +30,7 @@ use super::common;
 use super::links::{self, Changes, Links};
 use super::parser;
 use crate::capability::Capability;
+use super::ports::OTHERS;
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
 use crate::gcode::interpreter::Modes;
 use crate::gcode::modal::FeedMode;
@@ -592,10 +593,12 @@ impl Planner {
             Cycle::Check if !self.checks() => machine::carry_out(machine::Event::Done),
             Cycle::Lines | Cycle::Stopped | Cycle::Check => {}
         }
-        if killed {
+        // Of a reset that a sender begins with nobody is told: there was no job.
+        let ended = !links.ports.iter().any(|port| port.asked.get() & OTHERS != 0);
+        if killed && ended {
             links.except(Status::KillJob);
         }
-        links.notices.flushed.set(!machine::is_alarmed());
+        links.notices.flushed.set(ended && !machine::is_alarmed());
         links.reporter_wake.urge();
         killed
     }

@@ -43,6 +43,8 @@ pub const REPORT: u8 = 1;
 pub const GREETING: u8 = 2;
 /// Of [`Port::asked`]: before the greeting, that motion was interrupted.
 pub const INTERRUPTED: u8 = 4;
+/// Of [`Port::asked`]: before the greeting, the greeting in the other dialect, for it is not decided which one is spoken.
+pub const OTHERS: u8 = 32;
 
 /// Of [`Port::asked`], beside [`INTERRUPTED`]: that was homing.
 pub const HOMING: u8 = 8;

@@ -14,7 +14,7 @@ use kerf_macros::small;
 use super::alarm;
 use super::health;
 use super::links::Links;
-use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, Port, REPORT};
+use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, OTHERS, Port, REPORT};
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
 use crate::hal::eeprom::Eeprom;
@@ -182,6 +182,10 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
         Notice::Status | Notice::Exception(_) => port.tx_behind_answers().await,
         _ => port.tx.lock().await,
     };
+    if matches!(notice, Notice::Greeting(_)) && port.take_asked(OTHERS) {
+        tx.room().await;
+        greet_otherwise(links, port, &mut tx);
+    }
     let mut telling = begin(notice, links, port);
     // For all of it: while it is being told, the port is not answered.
     let (mut turns, mut splits) = (COURTESY, SPLITS);
@@ -248,12 +252,9 @@ fn is_over(port: &Port) -> bool {
 #[inline(never)]
 #[small]
 fn greet_undecided(links: &Links) {
-    let Some(speech) = Speech::of_question(&links.settings.borrow()) else { return };
-    let notice = Notice::Greeting(Occasion::Ready);
     for port in links.ports.iter().filter(|port| port.undecided.get() && !is_shared(port.number)) {
         let Ok(mut tx) = port.tx.try_lock() else { continue };
-        let mut telling = Telling::begin(notice, speech, &mut View::of(links, port));
-        while step(&mut telling, links, port, &mut tx) {}
+        greet_otherwise(links, port, &mut tx);
     }
 }
 
@@ -284,6 +285,16 @@ pub fn tell_startup(links: &Links, line: u8, status: Status) {
     let notice = Notice::Startup(line, status);
     let mut telling = Telling::begin(notice, speech, &mut View::of(links, port));
     while step(&mut telling, links, port, &mut tx) {}
+}
+
+/// The greeting of the dialect whose senders ask by a `?` alone: 30 bytes.
+#[inline(never)]
+#[small]
+fn greet_otherwise(links: &Links, port: &Port, tx: &mut Tx) {
+    let Some(speech) = Speech::of_question(&links.settings.borrow()) else { return };
+    let notice = Notice::Greeting(Occasion::Ready);
+    let mut telling = Telling::begin(notice, speech, &mut View::of(links, port));
+    while step(&mut telling, links, port, tx) {}
 }
 
 /// Tells something short on a port, if nobody else talks there and there is room for it: at most 64 bytes, or all of an

@@ -73,7 +73,8 @@ impl<S: Side> Talk<S> {
             }
         }
         self.whereabouts = Whereabouts::at_start(self.side.steps());
-        Ok(())
+        // Its port is decided for TinyG's dialect, in which a reset starts the board anew.
+        self.line(0, "{stat:n}")
     }
 
     /// Does all that. After a reset it is the rest of it that is still to be done.
