@@ -80,7 +80,7 @@ enum Command {
     /// Look for inputs that break the interpreter or the machine, by fuzzing; fail on a finding.
     /// Corpus and findings are kept in target/fuzz, and the next run goes on from there
     Fuzz(fuzz::FuzzArgs),
-    /// Run real senders of G-code, CNCjs and g2core-api, against the simulated board
+    /// Run real senders of G-code, such as CNCjs and bCNC, against the simulated board
     Senders(senders::SendersArgs),
     /// Build the page with the firmware in it: a folder of static files; the last line is `page: FOLDER`
     Web(web::WebArgs),

@@ -2,13 +2,13 @@
 //!
 //! | module | for |
 //! |---|---|
-//! | [`install`] | gets the senders by npm |
+//! | [`install`] | gets the senders by npm and pip |
 //! | [`board`] | the simulated board behind a serial port, and where its motors end |
 //! | [`session`] | one sender at one board |
 //! | [`step`] | what a sender's driver tells of its steps |
 //! | [`table`] | what came of it all |
 //!
-//! The drivers are `tests/senders/*.js`. Each has a board of its own, as fast as the computer can make
+//! The drivers are `tests/senders/*.js` and `*.py`. Each has a board of its own, as fast as the computer can make
 //! it, and sends the whole job; then every motor has to be where the job ends, to the step.
 
 mod board;
@@ -46,15 +46,33 @@ enum Sender {
     Cncjs,
     CncjsGrbl,
     G2coreApi,
+    BcncGrbl,
+    BcncG2core,
+    GrblStreamer,
 }
 
 impl Sender {
-    /// Its name, and that of its driver.
+    /// Its name.
     fn name(self) -> &'static str {
         match self {
             Sender::Cncjs => "cncjs",
             Sender::CncjsGrbl => "cncjs-grbl",
             Sender::G2coreApi => "g2core-api",
+            Sender::BcncGrbl => "bcnc-grbl",
+            Sender::BcncG2core => "bcnc-g2core",
+            Sender::GrblStreamer => "grbl-streamer",
+        }
+    }
+
+    /// Its driver, and what that is told besides port and job.
+    fn driver(self) -> (&'static str, Option<&'static str>) {
+        match self {
+            Sender::Cncjs => ("cncjs.js", None),
+            Sender::CncjsGrbl => ("cncjs-grbl.js", None),
+            Sender::G2coreApi => ("g2core-api.js", None),
+            Sender::BcncGrbl => ("bcnc.py", Some("GRBL1")),
+            Sender::BcncG2core => ("bcnc.py", Some("G2Core")),
+            Sender::GrblStreamer => ("grbl-streamer.py", None),
         }
     }
 }

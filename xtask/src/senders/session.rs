@@ -1,8 +1,9 @@
 //! One sender at one board.
 
+use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::os::unix::process::CommandExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
@@ -38,6 +39,11 @@ pub struct Done {
 }
 
 impl Session<'_> {
+    /// What the driver says besides its steps.
+    fn log(&self) -> PathBuf {
+        self.folder.join(self.sender.name()).with_extension("log")
+    }
+
     /// Runs it and shows its steps as they come. Whatever goes wrong is a step that has failed.
     pub fn run(&self) -> Done {
         let began = Instant::now();
@@ -68,7 +74,7 @@ impl Session<'_> {
         let outcome = if exact { Outcome::Passed } else { Outcome::Failed };
         tell(Step { name: ARRIVAL.to_owned(), outcome, details });
         if !status.success() {
-            bail!("the driver ends with {status}");
+            bail!("the driver ends with {status}; see {}", self.log().display());
         }
         Ok(())
     }
@@ -82,12 +88,19 @@ struct Driver {
 
 impl Driver {
     fn start(session: &Session, port: &str) -> Result<Driver> {
-        let script = install::drivers().join(session.sender.name()).with_extension("js");
-        let mut command = Command::new("node");
-        command.arg(script).arg(port).arg(session.job).current_dir(session.folder);
+        let (script, word) = session.sender.driver();
+        let program = match script.ends_with(".py") {
+            true => install::python_of(session.folder),
+            false => "node".into(),
+        };
+        let mut command = Command::new(&program);
+        command.arg(install::drivers().join(script)).arg(port).arg(session.job).args(word);
+        command.current_dir(session.folder);
         // A driver gives up when its standard input ends, which it does with us, however that comes.
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
-        let mut child = command.spawn().context("cannot start node")?;
+        command.stderr(File::create(session.log()).context("no log")?);
+        let child = command.spawn();
+        let mut child = child.with_context(|| format!("cannot start {}", program.display()))?;
         let output = BufReader::new(child.stdout.take().context("no output")?);
         let (sender, lines) = channel();
         std::thread::spawn(move || {

@@ -5,10 +5,10 @@ use super::step::{Outcome, Step};
 
 /// Prints every step of every sender. Returns whether all has passed.
 pub fn show(sessions: &[Done]) -> bool {
-    println!("\n{:<12}{:<20}{:<10}details", "sender", "step", "result");
+    println!("\n{:<14}{:<20}{:<10}details", "sender", "step", "result");
     for (done, step) in steps(sessions) {
         let Step { name, outcome, details } = step;
-        println!("{:<12}{name:<20}{:<10}{details}", done.sender, outcome.name());
+        println!("{:<14}{name:<20}{:<10}{details}", done.sender, outcome.name());
     }
     println!();
     for done in sessions {

@@ -12,7 +12,7 @@ use anyhow::{Result, bail};
 use crate::toolchain::Toolchain;
 use install::{Means, Step};
 use needs::Need;
-pub use needs::Scope;
+pub use needs::{Scope, python};
 pub use wasm::TARGET;
 
 /// Makes sure that the tools are there; silent when they are.

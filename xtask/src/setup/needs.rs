@@ -17,6 +17,8 @@ pub enum Scope {
     Fuzzers,
     /// Running senders at the simulator.
     Senders,
+    /// Those of them that are written in Python.
+    Python,
     /// Building the page.
     Web,
     /// Running the page in a browser.
@@ -30,7 +32,10 @@ impl Scope {
         match self {
             Scope::Everything => true,
             Scope::Fuzzers => need == Scope::Fuzzers,
-            Scope::Senders => need == Scope::Senders || Scope::Simulator.covers(need),
+            Scope::Senders => {
+                matches!(need, Scope::Senders | Scope::Python) || Scope::Simulator.covers(need)
+            }
+            Scope::Python => need == Scope::Python,
             Scope::Web => matches!(need, Scope::Senders | Scope::Web),
             Scope::WebTests => {
                 need == Scope::WebTests || Scope::Web.covers(need) || Scope::Simulator.covers(need)
@@ -53,7 +58,7 @@ pub struct Need {
 }
 
 /// Everything, in the order in which it is reported.
-pub static NEEDS: [Need; 10] = [
+pub static NEEDS: [Need; 11] = [
     Need {
         what: "Rust with its library sources (rustup nightly with rust-src, or Debian's)",
         packages: &["rustc-web", "cargo-web", "rust-web-src"],
@@ -82,6 +87,12 @@ pub static NEEDS: [Need; 10] = [
         || has("node") && has("npm"),
     ),
     tool("Chromium, for tests of the page", &["chromium"], Scope::WebTests, || has("chromium")),
+    tool(
+        "Python with venv, for senders",
+        &["python3", "python3-venv", "ca-certificates"],
+        Scope::Python,
+        || python().is_some(),
+    ),
 ];
 
 const SIM: Scope = Scope::Simulator;
@@ -99,6 +110,12 @@ const fn tool(
 /// What is not there.
 pub fn missing(scope: Scope) -> Vec<&'static Need> {
     NEEDS.iter().filter(|need| scope.covers(need.scope) && !(need.present)()).collect()
+}
+
+/// The first Python that can make environments; Debian's own lacks that unless `python3-venv` is there.
+pub fn python() -> Option<&'static str> {
+    let mut known = ["python3", "/usr/bin/python3"].into_iter();
+    known.find(|name| probe(Command::new(name).args(["-c", "import ensurepip, venv"])).is_some())
 }
 
 fn has(program: &str) -> bool {
@@ -144,7 +161,7 @@ mod tests {
         assert_eq!(needs(Scope::Firmware), 4);
         assert_eq!(needs(Scope::Simulator), 7);
         assert_eq!(needs(Scope::Fuzzers), 1);
-        assert_eq!(needs(Scope::Senders), 8);
+        assert_eq!(needs(Scope::Senders), 9);
         assert_eq!(needs(Scope::Web), 1);
         assert_eq!(needs(Scope::WebTests), 9);
         assert_eq!(needs(Scope::Everything), NEEDS.len());

@@ -1,0 +1,202 @@
+"""bCNC: bcnc.py PORT JOB CONTROLLER, one of GRBL1 and G2Core."""
+
+import sys
+import time
+
+from steps import ensure, main, step, until  # first: what bCNC prints is no step
+from bcnc_sender import Bcnc, VERSION
+
+PORT, JOB, CONTROLLER = sys.argv[1:]
+GRBL = CONTROLLER == "GRBL1"
+FAR = 40
+# Where the plate is when Z is homed, at its top.
+PLATE = -51.8
+
+bcnc = Bcnc(PORT, CONTROLLER)
+
+
+def state():
+    return bcnc.get("state").split(":")[0]
+
+
+def x():
+    return bcnc.get("mx")
+
+
+def idle_at(place):
+    return until(lambda: state() == "Idle" and abs(x() - place) < 0.0005)
+
+
+def hear():
+    """The first line with this beginning that comes from the board from now on."""
+    begin = len(bcnc.heard)
+    return lambda text: next((line for line in bcnc.heard[begin:] if line.startswith(text)), None)
+
+
+def ask(line, answer):
+    heard = hear()
+    bcnc.sendGCode(line)
+    return until(lambda: heard(answer))
+
+
+def connect():
+    """Opens the port, which resets the board, as DTR does; it finds its dialect by itself."""
+    bcnc.openClose()
+    if GRBL:
+        until(lambda: state() == "Idle")
+        # The greeting is gone when it begins to listen.
+        heard = hear()
+        bcnc.softReset()
+        until(lambda: heard("Grbl 1.1h"))
+        bcnc.viewBuild()
+        return f"{until(lambda: heard('[VER:'))}, controller {bcnc.controller}"
+    # It reads lines as they are, and does not know XOFF.
+    ask('{"EX":0}', '{"r":{"ex":0}')
+    bcnc.viewState()
+    until(lambda: state() == "Idle")
+    return f"state {state()}, controller {bcnc.controller}, flow control off"
+
+
+def close():
+    bcnc.openClose()
+    ensure(bcnc.serial is None, "it is open")
+    time.sleep(0.3)  # The simulated board looks now and then whether somebody has the port open.
+    return "port closed"
+
+
+def setting(value=None):
+    """The top speed of X, read or written."""
+    if value is not None:
+        ask(f"$110={value}" if GRBL else f'{{"XVM":{value}}}', "ok" if GRBL else '{"r":{"xvm":')
+    if GRBL:
+        bcnc.put("grbl_110", "")
+        bcnc.viewSettings()
+        return float(until(lambda: bcnc.get("grbl_110")))
+    return float(ask('{"XVM":null}', '{"r":{"xvm":').split(":")[2].split("}")[0])
+
+
+def settings():
+    before = setting()
+    ensure(setting(700) == 700, "the new value is not taken")
+    close()
+    connect()
+    ensure(setting() == 700, "the new value is not kept")
+    ensure(setting(before) == before, "the old value is not taken")
+    return f"{before}, written 700, kept over a reset, written back"
+
+
+def jog():
+    bcnc.mcontrol.jog("X2")
+    idle_at(2)
+    bcnc.mcontrol.jog("X-2")
+    idle_at(0)
+    return "X by 2 mm and back"
+
+
+def overrides():
+    """Its sliders, one at a time, for it forgets the others. Characters above 7F it sends as UTF-8: two bytes."""
+    for name, value in [("Feed", 113), ("Rapid", 50), ("Spindle", 88), ("Feed", 100), ("Rapid", 100), ("Spindle", 100)]:
+        bcnc.put(f"_Ov{name}", value)
+        bcnc.put("_OvChanged", True)
+        until(lambda: bcnc.get(f"Ov{name}") == value)
+    return "113, 50, 88 % and back"
+
+
+def home():
+    if GRBL:
+        for axis in "XYZ":
+            ask(f"$H{axis}", "ok")
+    else:
+        ask("G28.2 X0 Y0 Z0", '{"r":')
+    until(lambda: state() == "Idle")
+    place = [bcnc.get(name) for name in ("mx", "my", "mz")]
+    ensure(place == [0, 0, 0], f"at {place}")
+    return f"at {place}"
+
+
+def probe():
+    heard = hear()
+    bcnc.sendGCode("G38.2 Z-70 F800")
+    if GRBL:
+        at = float(until(lambda: heard("[PRB:")).split(",")[2])
+    else:
+        at = until(lambda: heard('{"prb":') or heard('{"r":{"prb":'))
+        at = float(at.split('"z":')[1].split(",")[0].split("}")[0])
+    ensure(abs(at - PLATE) < 0.01, f"at {at}")
+    until(lambda: state() == "Idle")
+    return f"contact at {at}"
+
+
+def stop():
+    """The button "Stop" in the middle of a long move: a hold, and a reset in it."""
+    # Up from the plate, which a sender of its user would not forget.
+    bcnc.sendGCode("G90 G0 Z0")
+    until(lambda: state() == "Idle" and abs(bcnc.get("mz")) < 0.0005)
+    bcnc.start([f"G1 X{FAR} F60", "G1 X0"])
+    until(lambda: state() == "Run" and x() > 1)
+    bcnc.stopRun()
+    ensure(not bcnc.running, "it runs on")
+    until(lambda: state() == "Idle" and bcnc.queue.empty())
+    there = x()
+    ensure(1 < there < FAR, f"at {there}")
+    time.sleep(0.5)
+    ensure(x() == there, f"it has moved on from {there} to {x()}")
+    bcnc.sendGCode("G0 X0")
+    idle_at(0)
+    return f"at X {there} of {FAR}, back at 0"
+
+
+def start():
+    del bcnc.errors[:]
+    bcnc.load(JOB)
+    return f"{bcnc.start()} lines"
+
+
+def not_refused():
+    ensure(not bcnc.errors, f"it is told {bcnc.errors[:1]}")
+    return True
+
+
+def hold():
+    until(lambda: not_refused() and bcnc._gcount > bcnc._runLines / 10 and state() == "Run")
+    bcnc.pause()
+    until(lambda: bcnc.get("state") == ("Hold:0" if GRBL else "Hold"))
+    place = lambda: [bcnc.get(name) for name in ("mx", "my", "mz")]
+    if not GRBL:
+        time.sleep(1)
+    there = place()
+    time.sleep(1)
+    ensure(there == place() and state() == "Hold", "it moves in hold")
+    bcnc.resume()
+    until(lambda: state() == "Run")
+    return f"stands in {'Hold:0' if GRBL else 'Hold'}, goes on"
+
+
+def finish():
+    """It takes a job for ended when the machine is in another state than these."""
+    lines = bcnc._runLines
+    until(lambda: not_refused() and not bcnc.running)
+    until(lambda: state() == "Idle")
+    place = [bcnc.get(name) for name in ("mx", "my", "mz")]
+    return f"{lines} counted, {state()} at {place}"
+
+
+def test():
+    step("start", 60, lambda: f"bCNC {VERSION}, Python {sys.version.split()[0]}")
+    step("connect", 20, connect)
+    step("settings", 60, settings)
+    step("jog", 60, jog)
+    if GRBL:
+        step("override", 30, overrides)
+    step("home", 60, home)
+    step("probe", 60, probe)
+    step("stop", 60, stop)
+    step("close", 20, close)
+    step("reconnect", 20, connect)
+    step("stream", 20, start)
+    step("hold", 120, hold)
+    step("finish", 600, finish)
+    step("close", 20, close)
+
+
+main(test)

@@ -1,0 +1,74 @@
+"""The steps of a test of a sender in Python, told as `steps.js` tells them: a line each, `step`, `passed` or
+`failed`, its name, details, parted by tabs."""
+
+import os
+import sys
+import threading
+import time
+
+# What a sender itself prints is no step.
+_out = os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)
+
+
+def tell(result, name, details):
+    print("step", result, name, " ".join(str(details).split()), sep="\t", file=_out, flush=True)
+
+
+class Late(Exception):
+    """A step takes longer than it may."""
+
+
+_end = None
+
+
+def step(name, seconds, run):
+    """Runs a step and tells what came of it; what it returns are details for people."""
+    global _end
+    _end = time.monotonic() + seconds
+    watchdog = threading.Timer(seconds + 10, _give_up, [name])
+    watchdog.daemon = True
+    watchdog.start()
+    try:
+        details = run()
+    except Late:
+        tell("failed", name, f"not done within {seconds} s")
+        leave(1)
+    except BaseException as error:  # pylint: disable=broad-except
+        tell("failed", name, f"{type(error).__name__}: {error}")
+        leave(1)
+    watchdog.cancel()
+    tell("passed", name, details)
+
+
+def until(condition):
+    """Waits until the condition holds; the step's own limit ends a wait that would never end."""
+    while not (value := condition()):
+        if time.monotonic() > _end:
+            raise Late
+        time.sleep(0.01)
+    return value
+
+
+def ensure(condition, text):
+    if not condition:
+        raise AssertionError(text)
+
+
+def main(test):
+    """Runs the test and ends the process, also when nobody waits for it any more: then its standard input ends."""
+    watcher = threading.Thread(target=lambda: (sys.stdin.read(), leave(1)), daemon=True)
+    watcher.start()
+    test()
+    leave(0)
+
+
+def leave(code):
+    """Ends the process without waiting for threads of the sender."""
+    _out.flush()
+    os._exit(code)
+
+
+def _give_up(name):
+    tell("failed", name, "it hangs")
+    leave(1)
