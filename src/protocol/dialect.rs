@@ -101,6 +101,11 @@ pub trait Answers {
 
     /// Whether something of the answer has been put.
     fn has_begun(&self) -> bool;
+
+    /// Whether a line of it has just ended, so that something else may be told before the next.
+    fn is_between_lines(&self) -> bool {
+        false
+    }
 }
 
 /// A notice that is being told.
@@ -306,6 +311,14 @@ macro_rules! dialects {
                 match self {
                     $(#[cfg(feature = $feature)]
                     Self::$name(request) => request.has_begun(),)+
+                }
+            }
+
+            #[inline(always)]
+            fn is_between_lines(&self) -> bool {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(request) => request.is_between_lines(),)+
                 }
             }
         }

@@ -203,6 +203,10 @@ fn starts_over(links: &Links, port: &Port) -> bool {
 #[small]
 fn start_over(links: &Links, port: &Port, works: bool) {
     cut(links, port, uart::newest(port.number), machine::Event::Kill);
+    if port.cut.get().is_none() {
+        // What comes next begins a line.
+        port.lines.borrow_mut().forget();
+    }
     for which in [Override::Feed, Override::Traverse, Override::Spindle] {
         overrides::change(links.thread, Change::to(which, FULL));
     }

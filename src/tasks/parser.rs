@@ -24,7 +24,7 @@ use super::hold;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::planner;
-use super::ports::{Chosen, Port};
+use super::ports::{Chosen, Port, REPORT};
 use super::reporter::{tell_at_once, tell_startup};
 use super::tx::Tx;
 use super::view::View;
@@ -549,6 +549,10 @@ impl Answer {
         }
         let (mut begun, since) = (begun, millis());
         for done in 0..STEPS {
+            if port.asked.get() & REPORT != 0 && self.request.is_between_lines() {
+                // A list takes 50 ms and more.
+                return (Progress::Waits, false);
+            }
             if !tx.has_room() || (done > 0 && (awaited || gives_way(done, since))) {
                 break;
             }

@@ -226,7 +226,11 @@ impl<const N: usize> Intake<N> {
     fn cuts_up_to(&self, last: u8, pool: &mut LinePool, links: &Links) -> bool {
         let cuts = self.received.taken() != last;
         if !cuts {
-            pool.terminate_partial(hold::dropped());
+            if self.port.is_resetting() {
+                pool.forget();
+            } else {
+                pool.terminate_partial(hold::dropped());
+            }
             self.port.cut.set(None);
             // A greeting may wait for that.
             links.reporter_wake.urge();

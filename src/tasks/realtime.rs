@@ -2,8 +2,8 @@
 //! above 0x7F.
 //!
 //! Called by the reader before it takes a turn's bytes, 4 ms after they have come at the latest ([`set_eager`](crate::hal::event::set_eager)); it
-//! looks through the whole receive ring, also when the line pool is full. A byte that acts becomes a blank, which no line minds, and so does
-//! any other above 0x7F. Thread mode; 15 cycles a byte that waits.
+//! looks through the whole receive ring, also when the line pool is full. A byte that acts leaves the ring, and so does any other above 0x7F, so that
+//! questions take no room from lines that wait. Thread mode; 15 cycles a byte that waits.
 //!
 //! On a port that has not been decided ([`Port::undecided`]) a `?` at the beginning of a line decides, and acts.
 

@@ -104,7 +104,10 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         let interval = u32::from(links.settings.borrow().status_interval_ms());
         let moves = moves(state.doing, state.hold);
         due |= moves;
-        if state != told.state || (due && elapsed >= interval) {
+        let changed = state != told.state;
+        if (changed || (due && elapsed >= interval)) && !is_clear(links) {
+            due = true;
+        } else if changed || (due && elapsed >= interval) {
             told.state = state;
             told.at = millis();
             due = false;
@@ -119,6 +122,21 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             due = true;
         }
     }
+}
+
+/// Whether a report may begin: not while its port is busy, if somebody may ask elsewhere.
+#[inline(never)]
+#[small]
+fn is_clear(links: &Links) -> bool {
+    let told = links.told();
+    !may_ask_elsewhere(links, told) || told.tx.try_lock().is_ok_and(|tx| tx.is_empty())
+}
+
+/// Whether somebody may ask by a `?` on another port, which is not to wait behind what is said on this.
+#[inline(never)]
+#[small]
+fn may_ask_elsewhere(links: &Links, port: &Port) -> bool {
+    links.ports.iter().any(|other| other.number != port.number && other.speech.get().is_in_order())
 }
 
 /// A change of this is told at once.
@@ -178,17 +196,21 @@ fn split(telling: &mut Telling, port: &Port, tx: &mut Tx) -> bool {
 /// report returns how many blocks are free in it, which may have changed during the wait for the
 /// transmitter.
 async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
+    let elsewhere = may_ask_elsewhere(links, port);
     let mut tx = match notice {
-        Notice::Status | Notice::Exception(_) => port.tx_behind_answers().await,
+        Notice::Status | Notice::Exception(_) if !elsewhere => port.tx_behind_answers().await,
         _ => port.tx.lock().await,
     };
+    if matches!(notice, Notice::Query) {
+        port.take_asked(REPORT);
+    }
     if matches!(notice, Notice::Greeting(_)) && port.take_asked(OTHERS) {
         tx.room().await;
         greet_otherwise(links, port, &mut tx);
     }
     let mut telling = begin(notice, links, port);
     // For all of it: while it is being told, the port is not answered.
-    let (mut turns, mut splits) = (COURTESY, SPLITS);
+    let (mut turns, mut splits) = (COURTESY, if elsewhere { 0 } else { SPLITS });
     loop {
         tx.room().await;
         if splits > 0 && split(&mut telling, port, &mut tx) {
@@ -236,7 +258,8 @@ fn asked_on(links: &Links, port: &Port) -> Option<Notice> {
         port.take_asked(GREETING);
         return Some(Notice::Greeting(Occasion::Ready));
     }
-    port.take_asked(REPORT).then_some(Notice::Query)
+    // It is taken when nobody else talks: an answer is to see that it is asked for.
+    (port.asked.get() & REPORT != 0).then_some(Notice::Query)
 }
 
 /// Whether a reset that a sender has asked for is over: all that had come has been dropped.

@@ -30,7 +30,9 @@ def idle_at(place):
 def hear():
     """The first line with this beginning that comes from the board from now on."""
     begin = len(bcnc.heard)
-    return lambda text: next((line for line in bcnc.heard[begin:] if line.startswith(text)), None)
+    return lambda text, end="": next(
+        (line for line in bcnc.heard[begin:] if line.startswith(text) and line.endswith(end)), None
+    )
 
 
 def ask(line, answer):
@@ -118,7 +120,8 @@ def probe():
     heard = hear()
     bcnc.sendGCode("G38.2 Z-70 F800")
     if GRBL:
-        at = float(until(lambda: heard("[PRB:")).split(",")[2])
+        # Its own `$#` lists the last contact too, of which there is none.
+        at = float(until(lambda: heard("[PRB:", ":1]")).split(",")[2])
     else:
         at = until(lambda: heard('{"prb":') or heard('{"r":{"prb":'))
         at = float(at.split('"z":')[1].split(",")[0].split("}")[0])

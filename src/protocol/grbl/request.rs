@@ -106,6 +106,16 @@ impl Answers for Request {
     fn has_begun(&self) -> bool {
         self.begun
     }
+
+    fn is_between_lines(&self) -> bool {
+        let ended = match self.command {
+            Command::Settings => true,
+            // The places of an axis each are parts of one.
+            Command::Offsets => self.at & 7 == 0,
+            _ => false,
+        };
+        self.begun && ended
+    }
 }
 
 #[small]
@@ -364,6 +374,9 @@ fn check(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
 #[inline(never)]
 #[small]
 fn sleep(machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    if machine.value(Value::Check) != 0 {
+        return Step::Error(BUSY);
+    }
     machine.alarm(Alarm::Alarm);
     if machine.energize(None, false) != Status::Ok {
         return Step::Later(0);

@@ -1,0 +1,37 @@
+//! Random conversations in grbl's dialect with the image on the simulated chip: those of `tests/grbl_random.rs`, and shorter; what is judged is in
+//! `tests/support/grbl_talk.rs`.
+//!
+//! One machine has them all, one after the other: `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim --profile sim --test grbl` has one.
+
+mod common;
+#[path = "../../support/grbl_deeds.rs"]
+mod grbl_deeds;
+#[path = "../../support/grbl_talk.rs"]
+mod grbl_talk;
+#[path = "../../support/seeds.rs"]
+mod seeds;
+#[path = "../../support/side.rs"]
+mod side;
+#[path = "common/simulated.rs"]
+mod simulated;
+
+use common::firmware;
+use grbl_talk::Talk;
+use kerf::boards::MEGA2560_GRBL;
+use proptest::strategy::ValueTree;
+
+/// See [`Talk`]; 52 is the longest seen.
+const REPORT_MS: u64 = 60;
+
+#[test]
+fn any_conversation_keeps_to_the_dialect() {
+    let mut talk = Talk::new(firmware(&MEGA2560_GRBL), REPORT_MS);
+    let mut played = talk.begin();
+    for seed in seeds::seeds(60) {
+        let (tree, _) = seeds::case(seed, &grbl_deeds::conversation(20, 300));
+        played = played.and_then(|()| talk.play(&tree.current()));
+        if let Err(why) = &played {
+            panic!("seed {seed}: {why}\n{}", talk.story());
+        }
+    }
+}

@@ -1,0 +1,486 @@
+//! A random conversation in grbl's dialect as it is had and judged, on the host or on the simulated chip: the first port
+//! speaks grbl's, the second TinyG's.
+//!
+//! What has to hold: the lines that are answered are answered once each, in their order, by `ok` or `error:N`; whatever else is heard
+//! keeps to grbl's grammar; each `?` is answered by a whole report `report_ms` later at most, also in a hold, an alarm, in sleep and in a
+//! list; bytes that act are no part of a line; a sender that counts characters for a buffer of [`BUFFER`] bytes
+//! loses nothing; `Bf` is true; at rest `MPos` is what the steps say, and X is where the moves that were taken lead.
+
+use std::collections::VecDeque;
+
+use crate::grbl_deeds::Deed;
+use crate::side::Side;
+
+/// What a sender that counts characters takes for the size of the buffer.
+const BUFFER: usize = 128;
+/// The size that is told.
+const TOLD: usize = 254;
+/// Blocks of an empty queue.
+const BLOCKS: usize = 61;
+/// Longest until the machine is at rest, ms.
+const REST_MS: u64 = 60_000;
+const STEPS: f64 = 1280.0;
+
+type Outcome<T> = Result<T, String>;
+
+/// A status report.
+#[derive(Clone, Debug, Default)]
+struct Report {
+    state: String,
+    places: Vec<f64>,
+    buffer: Option<(usize, usize)>,
+}
+
+/// A line whose answer has not come.
+#[derive(Debug)]
+struct Sent {
+    bytes: usize,
+    /// The way of X that it adds if it is taken; `None` if it may lead anywhere.
+    way: Option<f64>,
+}
+
+/// A sender's side of a conversation, and what is known of the machine.
+pub struct Talk<S> {
+    side: S,
+    /// Longest until a report has come, ms: 10 of these on the wire. What has begun on the other port comes first, up to 20 of its own.
+    report_ms: u64,
+    ms: u64,
+    partial: String,
+    in_flight: VecDeque<Sent>,
+    /// When the oldest `?` was sent that is not answered.
+    asked: Option<u64>,
+    /// A reset has been sent, and the greeting has not come.
+    resets: bool,
+    /// The end of check mode has been told, which a greeting follows.
+    greets: bool,
+    report: Report,
+    /// Tildes since the buffer was empty.
+    tildes: usize,
+    /// Where X is by what has been taken, mm; `None` if nobody can tell.
+    x: Option<f64>,
+    /// Where it began, steps.
+    base: [i64; 4],
+    /// Lines on the second port whose answers have not come, and what has come there of the next.
+    aside: usize,
+    heard_aside: String,
+    log: Vec<String>,
+}
+
+impl<S: Side> Talk<S> {
+    /// With a machine that is about to boot.
+    pub fn new(side: S, report_ms: u64) -> Self {
+        let base = side.steps();
+        Talk {
+            side,
+            report_ms,
+            ms: 0,
+            partial: String::new(),
+            in_flight: VecDeque::new(),
+            asked: None,
+            resets: false,
+            greets: false,
+            report: Report::default(),
+            tildes: 0,
+            x: None,
+            base,
+            aside: 0,
+            heard_aside: String::new(),
+            log: Vec::new(),
+        }
+    }
+
+    /// Boots a machine that has never been used, and makes it fast.
+    pub fn begin(&mut self) -> Outcome<()> {
+        self.side.run_ms(1_500);
+        for setting in [
+            "{x:{vm:3000,fr:3000,jm:2000,ac:0}}",
+            "{y:{vm:3000,fr:3000,jm:2000,ac:0}}",
+            "{z:{vm:3000,fr:3000,jm:2000,ac:0}}",
+        ] {
+            self.side.send_aux(format!("{setting}\n").as_bytes());
+            self.side.run_ms(1_000);
+        }
+        self.side.heard();
+        self.side.heard_aux();
+        for line in ["$$", "$10=3"] {
+            self.line(line, &[])?;
+        }
+        self.rest()
+    }
+
+    /// Has the conversation, to a rest.
+    pub fn play(&mut self, deeds: &[Deed]) -> Outcome<()> {
+        for deed in deeds {
+            self.log.push(format!("{deed:?}"));
+            match deed {
+                Deed::Line(line, within) => self.line(line, within)?,
+                Deed::Bytes(bytes) => bytes.iter().for_each(|byte| self.act(*byte)),
+                Deed::Aside(line) => self.aside(line)?,
+                Deed::Wait(ms) => self.run(*ms)?,
+                Deed::Rest => self.rest()?,
+                Deed::Reset => {
+                    self.side.send(b"G91 G0 X5");
+                    self.reset()?;
+                }
+            }
+        }
+        self.rest()?;
+        self.log.clear();
+        Ok(())
+    }
+
+    /// All that was done and heard.
+    pub fn story(&self) -> String {
+        self.log.iter().map(|line| format!("  {line}\n")).collect()
+    }
+
+    /// A job fills the buffer, is held for a minute and asked eight times a second, as senders do, and goes on.
+    #[allow(dead_code)]
+    pub fn hold_long(&mut self) -> Outcome<()> {
+        for line in ["G21G94G91G1F3000X0", "X5"] {
+            self.line(line, &[])?;
+        }
+        self.run(50)?;
+        self.side.send(b"!");
+        // The queue of blocks fills, and then the buffer.
+        while self.in_flight.len() < BUFFER / 5 {
+            self.line("X-.1", &[])?;
+            self.run(10)?;
+        }
+        for _ in 0..480 {
+            self.ask()?;
+            self.run(120)?;
+        }
+        if !self.report.state.starts_with("Hold") {
+            return Err(format!("it does not hold: {:?}", self.report));
+        }
+        self.rest()
+    }
+
+    fn act(&mut self, byte: u8) {
+        self.side.send(&[byte]);
+        self.tildes += usize::from(byte == b'~');
+        if byte == b'?' && self.asked.is_none() {
+            self.asked = Some(self.ms);
+        }
+        if matches!(byte, 0x84 | 0x85 | b'!') {
+            // A jog may end by it.
+            self.doubt();
+        }
+    }
+
+    /// Nobody can tell any more where the moves lead that have been taken.
+    fn doubt(&mut self) {
+        self.x = None;
+        self.in_flight.iter_mut().for_each(|sent| sent.way = None);
+    }
+
+    /// Sends a line when the buffer has room for it, and bytes that act within it.
+    fn line(&mut self, line: &str, within: &[(usize, u8)]) -> Outcome<()> {
+        let bytes = line.len() + 1;
+        let mut waited = 0;
+        while self.in_flight.iter().map(|sent| sent.bytes).sum::<usize>() + bytes > BUFFER {
+            self.run(10)?;
+            waited += 10;
+            if waited % 500 == 0 {
+                self.relieve()?;
+            }
+            if waited > REST_MS {
+                return Err(format!("{line} finds no room behind {:?}", self.in_flight));
+            }
+        }
+        let way = line.strip_prefix("G21G94G91G1F3000X").map(|way| way.parse().expect("a number"));
+        let way = way.or(is_still(line).then_some(0.0));
+        for (at, byte) in line.bytes().chain([b'\n']).enumerate() {
+            let acting = within.iter().filter(|(place, _)| *place == at);
+            acting.for_each(|(_, acting)| self.act(*acting));
+            self.side.send(&[byte]);
+        }
+        self.in_flight.push_back(Sent { bytes, way });
+        match line {
+            "$C" => self.settle(),
+            _ => self.run(0),
+        }
+    }
+
+    /// Waits until all lines are answered, and for the greeting if check mode ends by that: what comes before that is dropped.
+    fn settle(&mut self) -> Outcome<()> {
+        let end = self.ms + REST_MS;
+        while self.greets || !self.in_flight.is_empty() {
+            self.run(20)?;
+            self.act(b'~');
+            if self.ms > end {
+                return Err(format!("{:?} unanswered", self.in_flight));
+            }
+        }
+        Ok(())
+    }
+
+    fn aside(&mut self, line: &str) -> Outcome<()> {
+        let mut waited = 0;
+        while self.aside > 1 {
+            self.run(10)?;
+            waited += 10;
+            if waited > REST_MS {
+                return Err("no answer on the second port".to_string());
+            }
+        }
+        self.side.send_aux(format!("{line}\n").as_bytes());
+        self.aside += 1;
+        Ok(())
+    }
+
+    /// Lets time pass, and takes what comes.
+    fn run(&mut self, ms: u64) -> Outcome<()> {
+        self.hear()?;
+        for _ in 0..ms {
+            self.side.run_ms(1);
+            self.ms += 1;
+            self.hear()?;
+            if let Some(at) = self.asked
+                && !self.resets
+                && self.ms > at + self.report_ms
+            {
+                return Err(format!(
+                    "a ? has no answer after {} ms, in {:?}",
+                    self.report_ms, self.report
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn hear(&mut self) -> Outcome<()> {
+        self.heard_aside += &String::from_utf8_lossy(&self.side.heard_aux());
+        while let Some((line, rest)) = self.heard_aside.split_once('\n') {
+            self.aside -= usize::from(line.starts_with("{\"r\":")).min(self.aside);
+            self.heard_aside = rest.to_string();
+        }
+        self.partial += &String::from_utf8_lossy(&self.side.heard());
+        while let Some((line, rest)) = self.partial.split_once('\n') {
+            let line =
+                line.strip_suffix('\r').ok_or_else(|| format!("{line:?} has no CR"))?.to_string();
+            self.partial = rest.to_string();
+            self.log.push(format!("    < {line}"));
+            self.judge(&line)?;
+        }
+        Ok(())
+    }
+
+    fn judge(&mut self, line: &str) -> Outcome<()> {
+        match line {
+            "ok" => return self.answered(true),
+            "" => {}
+            "[MSG:Disabled]" => self.greets = true,
+            "Grbl 1.1h ['$' for help]" if self.resets || self.greets => {
+                (self.resets, self.greets) = (false, false);
+                self.doubt();
+                self.in_flight.clear();
+                self.asked = self.asked.map(|_| self.ms);
+            }
+            _ if line.starts_with("error:") => {
+                number(&line[6..], 1..=40)?;
+                return self.answered(false);
+            }
+            _ if line.starts_with("ALARM:") => {
+                number(&line[6..], 1..=10)?;
+                self.doubt();
+            }
+            _ if line.starts_with('<') => {
+                self.report = report(line).ok_or_else(|| format!("{line} is no report"))?;
+                self.asked = None;
+                self.check_buffer(line)?;
+            }
+            _ if line.starts_with('[') && line.ends_with(']') => {
+                let name = line[1..].split(':').next().unwrap_or_default();
+                if !BRACKETS.contains(&name) {
+                    return Err(format!("{line} is no message of grbl's"));
+                }
+            }
+            _ if line.starts_with('$') && line.contains('=') => {}
+            _ if line.starts_with('>') && line.contains(':') => {}
+            _ => return Err(format!("{line} is no line of grbl's")),
+        }
+        Ok(())
+    }
+
+    fn answered(&mut self, taken: bool) -> Outcome<()> {
+        let Some(sent) = self.in_flight.pop_front() else {
+            return Err("an answer to nothing".to_string());
+        };
+        if taken {
+            self.x = self.x.zip(sent.way).map(|(x, way)| x + way);
+        }
+        Ok(())
+    }
+
+    /// What has not been answered takes as much of the buffer as it can at most.
+    fn check_buffer(&self, line: &str) -> Outcome<()> {
+        let Some((blocks, free)) = self.report.buffer else { return Ok(()) };
+        let waits: usize = self.in_flight.iter().map(|sent| sent.bytes).sum();
+        // A line that was dropped by a reset has not come to its end, and a tilde has its place among the lines.
+        match blocks <= BLOCKS && free <= TOLD && free + waits + 12 + self.tildes >= TOLD {
+            true => Ok(()),
+            false => Err(format!("{line} while {waits} bytes wait")),
+        }
+    }
+
+    fn reset(&mut self) -> Outcome<()> {
+        self.resets = true;
+        self.side.send(b"\x18");
+        self.doubt();
+        let mut waited = 0;
+        while self.resets {
+            self.run(1)?;
+            waited += 1;
+            if waited > 5_000 {
+                return Err("no greeting".to_string());
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets go of all that keeps the machine from moving.
+    fn relieve(&mut self) -> Outcome<()> {
+        if self.in_flight.is_empty() {
+            self.tildes = 0;
+        }
+        self.act(b'~');
+        self.run(5)?;
+        self.ask()?;
+        if self.report.state == "Sleep" {
+            self.reset()?;
+        }
+        Ok(())
+    }
+
+    fn ask(&mut self) -> Outcome<()> {
+        self.act(b'?');
+        while self.asked.is_some() {
+            self.run(1)?;
+        }
+        Ok(())
+    }
+
+    /// Waits until the machine is at rest, and looks whether it is where it says, and where it has been told to go.
+    fn rest(&mut self) -> Outcome<()> {
+        let end = self.ms + REST_MS;
+        loop {
+            self.relieve()?;
+            let before = self.side.steps();
+            self.run(60)?;
+            self.ask()?;
+            let still = before == self.side.steps() && self.in_flight.is_empty();
+            match self.report.state.as_str() {
+                "Idle" if still => break,
+                "Alarm" if still => self.line("$X", &[])?,
+                "Check" if still => self.line("$C", &[])?,
+                _ => {}
+            }
+            if self.ms > end {
+                return Err(format!("no rest: {:?}, {:?} unanswered", self.report, self.in_flight));
+            }
+        }
+        if self.report.buffer.is_some_and(|buffer| buffer != (BLOCKS, TOLD)) {
+            return Err(format!("at rest it is {:?}", self.report));
+        }
+        let steps = self.side.steps();
+        for (n, place) in self.report.places.iter().take(3).enumerate() {
+            let is = (steps[n] - self.base[n]) as f64 / STEPS;
+            if (is - place).abs() > 0.0016 {
+                return Err(format!("axis {n} is at {is}, and {:?}", self.report));
+            }
+        }
+        let is = (steps[0] - self.base[0]) as f64 / STEPS;
+        if self.x.is_some_and(|x| (x - is).abs() > 1.5 / STEPS) {
+            return Err(format!("X is at {is}, and was sent to {:?}", self.x));
+        }
+        self.x = Some(is);
+        Ok(())
+    }
+}
+
+const BRACKETS: &[&str] = &[
+    "MSG", "GC", "HLP", "VER", "OPT", "PRB", "TLO", "G54", "G55", "G56", "G57", "G58", "G59",
+    "G28", "G30", "G92", "echo",
+];
+
+/// Whether a line moves nothing, whatever comes of it, and changes no mode that a counted move goes by.
+fn is_still(line: &str) -> bool {
+    let stills = [
+        "",
+        "  ",
+        "(a comment)",
+        "$",
+        "$$",
+        "$#",
+        "$G",
+        "$I",
+        "$N",
+        "M5",
+        "M9",
+        "G4P0.05",
+        "G4P0",
+        "G1X",
+        "G99.9",
+        "M99",
+        "garbage",
+        "$999=1",
+    ];
+    stills.contains(&line)
+}
+
+fn number(text: &str, range: std::ops::RangeInclusive<u32>) -> Outcome<()> {
+    match text.parse() {
+        Ok(number) if range.contains(&number) => Ok(()),
+        _ => Err(format!("{text} is no number of grbl's")),
+    }
+}
+
+/// Reads a status report, if it keeps to the grammar.
+fn report(line: &str) -> Option<Report> {
+    let mut fields = line.strip_prefix('<')?.strip_suffix('>')?.split('|');
+    let state = fields.next()?.to_string();
+    let (name, sub) = state.split_once(':').unwrap_or((&state, ""));
+    match name {
+        "Hold" => ["0", "1"].contains(&sub),
+        "Door" => ["0", "1", "2", "3"].contains(&sub),
+        "Idle" | "Run" | "Jog" | "Alarm" | "Check" | "Home" | "Sleep" => sub.is_empty(),
+        _ => false,
+    }
+    .then_some(())?;
+    let places = numbers(fields.next()?.strip_prefix("MPos:")?, 3)?;
+    let mut report = Report { state, places: places.clone(), buffer: None };
+    let mut order = 0;
+    for field in fields {
+        let (name, value) = field.split_once(':')?;
+        let at =
+            ["Bf", "Ln", "FS", "Pn", "WCO", "Ov", "A"].iter().position(|known| *known == name)? + 1;
+        // Each once; the order is grbl's but for `Pn`, which no sender goes by.
+        (at > order || name == "Pn" || order == 4).then_some(())?;
+        order = at;
+        match name {
+            "Bf" => {
+                let two = numbers(value, 0)?;
+                let [blocks, bytes] = two[..] else { return None };
+                report.buffer = Some((blocks as usize, bytes as usize));
+            }
+            "FS" => (numbers(value, 0)?.len() == 2).then_some(())?,
+            "Ov" => (numbers(value, 0)?.len() == 3).then_some(())?,
+            "WCO" => (numbers(value, 3)?.len() == places.len()).then_some(())?,
+            "Pn" => value.chars().all(|c| "PXYZADRHS".contains(c)).then_some(())?,
+            "A" => value.chars().all(|c| "SCFM".contains(c)).then_some(())?,
+            _ => drop(value.parse::<u32>().ok()?),
+        }
+    }
+    Some(report)
+}
+
+/// Numbers parted by commas, each with so many decimals.
+fn numbers(text: &str, decimals: usize) -> Option<Vec<f64>> {
+    let number = |text: &str| {
+        let places = text.split_once('.').map_or(0, |(_, places)| places.len());
+        (places == decimals).then(|| text.parse().ok())?
+    };
+    text.split(',').map(number).collect()
+}
