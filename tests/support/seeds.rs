@@ -84,6 +84,7 @@ pub fn case<S: Strategy>(seed: u64, strategy: &S) -> (S::Tree, TestRunner) {
 }
 
 /// Plays the case of a seed. One that fails is made as small as it can be, and told.
+#[allow(dead_code, reason = "each test uses a part")]
 pub fn smallest<S: Strategy>(
     seed: u64,
     strategy: &S,

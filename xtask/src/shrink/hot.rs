@@ -36,11 +36,8 @@ const HOT: &[&str] = &[
     // What runs many times for each segment, block, line or report.
     "kerf::config::setting::Setting>::owner",
     "kerf::gcode::axes::value::",
-    "kerf::gcode::block::Block>::",
     "kerf::gcode::command::Commands>::is_motion_alone",
     "kerf::gcode::decimal::Decimal>::",
-    "kerf::gcode::interpreter::Interpreter",
-    "kerf::gcode::lexer::comment",
     "kerf::gcode::number::",
     "kerf::gcode::state::State>::advance::",
     "kerf::gcode::state::State>::carry_out",
@@ -52,12 +49,10 @@ const HOT: &[&str] = &[
     "kerf::motion::float::",
     "kerf::motion::prep::",
     "kerf::motion::queue::BlockQueue>::",
-    "kerf::motion::replan::",
     "kerf::motion::short::Log>::of",
     "kerf::motion::steps::Motor>::go",
     "kerf::protocol::line::Span>::of",
     "kerf::protocol::tinyg::format::Format>::",
-    "kerf::protocol::tinyg::request::Request",
     "kerf::protocol::tinyg::status::number",
     "kerf::tasks::exec::",
     "kerf::tasks::health::look_for_starvation",
@@ -87,6 +82,11 @@ const HOT: &[&str] = &[
 
 /// What runs as often as a segment, a block or a line: ends are shared, two or three cycles each.
 pub const WARM: &[&str] = &[
+    "kerf::gcode::lexer::comment",
+    "kerf::gcode::interpreter::Interpreter",
+    "kerf::motion::replan::",
+    "kerf::protocol::tinyg::request::Request",
+    "kerf::gcode::block::Block>::",
     "kerf::config::Settings>::get",
     "kerf::config::Settings>::put",
     "kerf::config::name::Name>::",
