@@ -4,7 +4,7 @@
 
 /// Flash: what today's capabilities take. grbl's dialect takes 21,000 of it, and turning 15,000 of that of the lathe's board: G76 alone 6,000, for its
 /// words, its geometry and powers of floats. The chip has 253,952, which its largest boot loader, 8 KiB, leaves: the rest is
-/// for what is to come. Calls through a pointer reach 128 KiB; the linker leads those that go further through jumps at the beginning of
+/// not for what is to come: that has to find its room. Calls through a pointer reach 128 KiB; the linker leads those that go further through jumps at the beginning of
 /// the image (`.trampolines`).
 pub const FLASH: u64 = 253_400;
 /// `.data`: constants that landed in RAM; tables and text belong in program memory.
