@@ -20,7 +20,7 @@ const LAST_MS: u64 = 300;
 /// A thread waits so long for the spindle, which says nothing here.
 const SPINDLE_MS: u64 = 7_000;
 /// What a thread is called.
-const THREADS: [&[u8]; 2] = [b"g32", b"g33"];
+const THREADS: [&[u8]; 3] = [b"g32", b"g33", b"g76"];
 /// Settings after which the machine may say nothing, or say it at another rate, or says what it hears, or passes for
 /// another.
 const MUTING: [&[u8]; 7] = [b"jv", b"tv", b"baud", b"ee0", b"ee1", b"eet", b"dia"];
