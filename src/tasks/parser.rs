@@ -52,7 +52,7 @@ const STEPS: u8 = 8;
 /// Most steps in a turn in which a millisecond has ended.
 const STEPS_LATE: u8 = 5;
 /// Usual lines that are done with before others have their turn.
-const IN_A_ROW: u8 = 2;
+const IN_A_ROW: u8 = 4;
 /// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
 
