@@ -155,10 +155,10 @@ await step('the path is drawn, and the time bar moves tool and numbers', async (
 });
 
 await step('a refused line is shown with code, text and place, and a limit with its lines', async () => {
-  await job('wrong.gcode', 'G21 G90\nG1 X5 F500\nG1 X10 F9000\nG7\nX=3\nG0 X0\n');
+  await job('wrong.gcode', 'G21 G90\nG1 X5 F500\nG1 X10 F9000\nG6\nX=3\nG0 X0\n');
   assert.match(await text('#verdict'), /^2 of 6 lines refused/);
   const found = await text('#findings');
-  assert.match(found, /Line 4: 131 .*G7/);
+  assert.match(found, /Line 4: 131 .*G6/);
   assert.match(found, /Line 5: \d+ .*X=3/);
   assert.match(found, /Slower than asked: 1 line.*Line 3 asks for up to 9 000 mm\/min. X allows as little as 800/);
   await job('far.gcode', 'G21 G90\nG0 X200\n');
@@ -297,7 +297,7 @@ await step('a job is sent to the machine', async () => {
 
 await step('a refused line ends a job that is sent, and what is typed meanwhile does not disturb it', async () => {
   await tab('job');
-  await job('refused.gcode', `G91\n${'G1 X.1 F600\n'.repeat(40)}G7\n${'G1 X9\n'.repeat(40)}`);
+  await job('refused.gcode', `G91\n${'G1 X.1 F600\n'.repeat(40)}G6\n${'G1 X9\n'.repeat(40)}`);
   await tab('machine');
   await page.selectOption('#speed', '1');
   await tab('job');
