@@ -9,7 +9,8 @@ use kerf_sim::job::{self, Options};
 use kerf_sim::{Image, Machine, Stopwatch};
 
 /// What a typical G1 line may cost.
-const BUDGET: f64 = 6_000.0;
+// Its functions share their ends, which takes 60 of them: flash is full.
+const BUDGET: f64 = 6_100.0;
 const REPEATS: usize = 20;
 
 /// Cycles for one such line, mean of many. The lines before it set its modes.
