@@ -3,7 +3,7 @@
 import sys
 import time
 
-from steps import ensure, main, step, until  # first: what bCNC prints is no step
+from steps import ensure, main, session, step, until  # first: what bCNC prints is no step
 from bcnc_sender import Bcnc, VERSION
 
 PORT, JOB, CONTROLLER = sys.argv[1:]
@@ -186,20 +186,19 @@ def finish():
 
 def test():
     step("start", 60, lambda: f"bCNC {VERSION}, Python {sys.version.split()[0]}")
-    step("connect", 20, connect)
-    step("settings", 60, settings)
-    step("jog", 60, jog)
-    if GRBL:
-        step("override", 30, overrides)
-    step("home", 60, home)
-    step("probe", 60, probe)
-    step("stop", 60, stop)
-    step("close", 20, close)
-    step("reconnect", 20, connect)
-    step("stream", 20, start)
-    step("hold", 120, hold)
-    step("finish", 600, finish)
-    step("close", 20, close)
+    session(
+        connect=connect,
+        settings=settings,
+        jog=jog,
+        overrides=overrides if GRBL else None,
+        home=home,
+        probe=probe,
+        stop=stop,
+        close=close,
+        start=start,
+        hold=hold,
+        finish=finish,
+    )
 
 
 main(test)

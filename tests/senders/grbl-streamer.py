@@ -4,7 +4,7 @@ import importlib.metadata
 import sys
 import time
 
-from steps import ensure, main, step, until  # first: what the library prints is no step
+from steps import ensure, main, session, step, until  # first: what the library prints is no step
 import grbl_streamer
 
 PORT, JOB = sys.argv[1:]
@@ -216,19 +216,19 @@ def finish():
 def test():
     version = importlib.metadata.version("grbl-streamer")
     step("start", 10, lambda: f"grbl-streamer {version}, Python {sys.version.split()[0]}")
-    step("connect", 20, connect)
-    step("settings", 60, settings)
-    step("jog", 60, jog)
-    step("override", 30, overrides)
-    step("home", 60, home)
-    step("probe", 60, probe)
-    step("stop", 60, stop)
-    step("close", 20, close)
-    step("reconnect", 20, connect)
-    step("stream", 20, start)
-    step("hold", 120, hold)
-    step("finish", 600, finish)
-    step("close", 20, close)
+    session(
+        connect=connect,
+        settings=settings,
+        jog=jog,
+        overrides=overrides,
+        home=home,
+        probe=probe,
+        stop=stop,
+        close=close,
+        start=start,
+        hold=hold,
+        finish=finish,
+    )
 
 
 main(test)

@@ -63,6 +63,24 @@ def main(test):
     leave(0)
 
 
+def session(*, connect, settings, jog, home, probe, stop, close, start, hold, finish, overrides=None):
+    """Runs the steps that every sender has: from the first connection to the end of the whole job, over a reconnection."""
+    step("connect", 20, connect)
+    step("settings", 60, settings)
+    step("jog", 60, jog)
+    if overrides:
+        step("override", 30, overrides)
+    step("home", 60, home)
+    step("probe", 60, probe)
+    step("stop", 60, stop)
+    step("close", 20, close)
+    step("reconnect", 20, connect)
+    step("stream", 20, start)
+    step("hold", 120, hold)
+    step("finish", 600, finish)
+    step("close", 20, close)
+
+
 def leave(code):
     """Ends the process without waiting for threads of the sender."""
     _out.flush()
