@@ -53,14 +53,7 @@ fn carried_out(commands: &Commands, mut at: PerAxis<Length>) -> (PerAxis<Length>
         match (steps.next(commands, &at), &commands.motion) {
             (None, _) => return (at, true),
             (Some(Step::Line(target, _) | Step::SetPosition(target)), _) => at = target,
-            (Some(Step::Thread), motion) => {
-                (0..3)
-                    .filter_map(|line| {
-                        at = steps.pass(motion, &at, line)?.0;
-                        Some(())
-                    })
-                    .count();
-            }
+            (Some(Step::Thread), motion) => at = steps.end_of_pass(motion, &at),
             (Some(Step::Arc), Motion::Arc { target, .. })
             | (Some(Step::Probe), Motion::Probe { target, .. }) => at = *target,
             _ => {}

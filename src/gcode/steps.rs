@@ -279,6 +279,15 @@ impl Steps {
         }
     }
 
+    /// Where the pass that [`Step::Thread`] asks for ends, the machine being at `position`: for those who do not carry it out.
+    pub fn end_of_pass(&self, motion: &Motion, position: &PerAxis<Length>) -> PerAxis<Length> {
+        let (mut at, mut line) = (*position, 0);
+        while let Some((end, _)) = self.pass(motion, &at, line) {
+            (at, line) = (end, line + 1);
+        }
+        at
+    }
+
     #[inline(never)]
     fn cycle(&mut self, cycle: &Cycle, position: &PerAxis<Length>) -> Option<Step> {
         if self.hole == 0 {

@@ -89,14 +89,7 @@ fn steps(before: &Interpreter, after: &Interpreter, out: &Commands) {
             (None, Motion::Home { .. }) => return,
             (None, _) => return assert_eq!(at, *after.position(), "where the steps lead"),
             (Some(Step::Line(target, _) | Step::SetPosition(target)), _) => at = target,
-            (Some(Step::Thread), motion) => {
-                (0..3)
-                    .filter_map(|line| {
-                        at = steps.pass(motion, &at, line)?.0;
-                        Some(())
-                    })
-                    .count();
-            }
+            (Some(Step::Thread), motion) => at = steps.end_of_pass(motion, &at),
             (Some(Step::Arc), Motion::Arc { target, .. })
             | (Some(Step::Probe), Motion::Probe { target, .. }) => at = *target,
             _ => {}
