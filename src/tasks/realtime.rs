@@ -52,12 +52,12 @@ pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
         within = if byte < b' ' { false } else { within || byte != b' ' };
         if acts(byte) && port.speech.get().is_in_order() && ring.replace(n, byte, b' ') {
             act(links, port, byte);
-            let before = ring.len();
             if closes {
+                let before = ring.len();
                 ring.take_out(n, 1);
-            }
-            if ring.len() < before {
-                continue;
+                if ring.len() < before {
+                    continue;
+                }
             }
         }
         n += 1;

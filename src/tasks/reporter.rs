@@ -104,10 +104,10 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         let interval = u32::from(links.settings.borrow().status_interval_ms());
         let moves = moves(state.doing, state.hold);
         due |= moves;
-        let changed = state != told.state;
-        if (changed || (due && elapsed >= interval)) && !is_clear(links) {
+        let wanted = state != told.state || (due && elapsed >= interval);
+        if wanted && !is_clear(links) {
             due = true;
-        } else if changed || (due && elapsed >= interval) {
+        } else if wanted {
             told.state = state;
             told.at = millis();
             due = false;
