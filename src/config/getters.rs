@@ -258,7 +258,8 @@ impl Settings {
         self.system(system::DIA) & 3
     }
 
-    /// The same of a port: the second may have a choice of its own, in the next two bits.
+    /// In which dialect a port begins, as [`dialect`](Self::dialect) has it. The next two bits of the setting are the second port's own choice; 0 there is the
+    /// first port's.
     pub fn dialect_of(&self, port: u8) -> u8 {
         match self.system(system::DIA) >> 2 {
             own if port == 0 || own == 0 => self.dialect(),

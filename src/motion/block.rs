@@ -77,11 +77,11 @@ pub enum Action {
     Drivers(Drivers),
     /// M3 to M9, S: the outputs and the speed of the spindle are so from here on.
     Outputs(Outputs),
-    /// The same with a surface speed (G96) by which the speed follows X from here on; [`Surface::NONE`] for none.
+    /// M3 to M9, S, under G96: the outputs are so from here on, and the speed of the spindle follows X by this surface speed. [`Surface::NONE`] ends that.
     Surface(Outputs, Surface),
     /// G33: from here on, at rest, lines follow the spindle by so many mm a turn along their path; 0 for no more.
     Thread(f32),
-    /// The same for the lines from here on, in the midst of a pass: the machine goes on.
+    /// In the midst of a pass of G33 or G76: the lines from here on have this lead, mm a turn. The machine goes on.
     Lead(f32),
     /// G95, or its end: from here on feeds go by the measured speed of the spindle, or not. The machine goes on.
     PerTurn(bool),

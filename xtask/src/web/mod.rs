@@ -27,7 +27,7 @@ pub struct WebArgs {
     /// Serve the page on this computer and open the browser
     #[arg(long)]
     open: bool,
-    /// The port of the server; any free one when none is named
+    /// The TCP port that the page is served at; 0 takes one that is free
     #[arg(long, value_name = "PORT", default_value_t = 0)]
     port: u16,
     /// Run the tests of the page in headless Chromium
