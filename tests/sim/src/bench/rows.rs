@@ -376,8 +376,8 @@ pub const ROWS: [Row; 46] = [
         better: Lower,
         peers: NONE,
         target: Some(24_000.0),
-        // A scan that tries three velocities, and a ramp that is laid out; and the factor of G95, looked at for each segment, takes 60 more.
-        floor: Some(24_200.0),
+        // A scan that tries three velocities, and a ramp that is laid out.
+        floor: Some(24_000.0),
         measure: costs::segment_jerk_worst,
     },
     Row {
