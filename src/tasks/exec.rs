@@ -339,8 +339,8 @@ struct Amount {
 /// 4.1 ms, or an override.
 const USUAL: Amount = Amount { most: units(88), least: units(38) };
 
-/// For a while after too little has been waiting: a feedhold begins within 14 ms.
-const PRESSED: Amount = Amount { most: units(108), least: units(65) };
+/// For a while after too little has been waiting: more is prepared at a stretch. A feedhold begins within 10 ms still.
+const PRESSED: Amount = Amount { most: units(94), least: units(65) };
 
 /// That while, in segments.
 const PRESSED_FOR: u8 = 100;

@@ -28,7 +28,7 @@ use anyhow::{Result, bail, ensure};
 use super::text::{Function, Insn, Line, Program};
 
 /// How far a branch reaches, bytes, less the two of the jump that goes.
-const REACH: usize = 124;
+pub const REACH: usize = 124;
 
 /// Makes branches of all functions short but those of interrupts: this costs no cycle.
 pub fn shorten(program: &mut Program) {

@@ -1,6 +1,6 @@
 //! The compiler's assembler text of a whole program: its functions, line by line, and what stands around them.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 
 use super::dialect;
 
@@ -148,8 +148,21 @@ impl Program {
         text
     }
 
+    /// The words outside of calls: what they name others than these functions may call, by its name.
+    pub fn names_elsewhere(&self) -> HashSet<String> {
+        let fixed = self.functions.iter().flat_map(Function::fixed);
+        let around = self.head.iter().chain(&self.rest).map(String::as_str);
+        let around = around.filter(|line| !names_nothing(line) && address(line).is_none());
+        let operands = self.functions.iter().flat_map(Function::insns);
+        let operands = operands.filter(|insn| insn.op != "call").map(|insn| insn.args.as_str());
+        let operands = operands.filter(|args| address(args).is_none());
+        let lines = fixed.chain(around).chain(operands);
+        let is_name = |c: char| c.is_alphanumeric() || "_.$".contains(c);
+        lines.flat_map(|line| line.split(|c| !is_name(c))).map(str::to_owned).collect()
+    }
+
     /// The functions whose address is taken: in the image nothing tells. The analysis of the stack finds them by other names.
-    fn taken(&self) -> BTreeSet<&str> {
+    pub fn taken(&self) -> BTreeSet<&str> {
         let code = self
             .functions
             .iter()
@@ -157,13 +170,21 @@ impl Program {
             .map(|insn| insn.args.as_str());
         let words =
             code.chain(self.rest.iter().map(String::as_str).filter(|line| line.starts_with('\t')));
-        let address = |word| {
-            let (_, inside) =
-                ["gs(", "pm("].iter().find_map(|start| str::split_once(word, start))?;
-            inside.split(')').next()
-        };
         words.filter_map(address).collect()
     }
+}
+
+/// The function whose address a line takes.
+fn address(line: &str) -> Option<&str> {
+    let (_, inside) = ["gs(", "pm("].iter().find_map(|start| line.split_once(start))?;
+    inside.split(')').next()
+}
+
+/// Whether a directive only tells a debugger or the linker of what it names, or holds text.
+fn names_nothing(line: &str) -> bool {
+    const DIRECTIVES: [&str; 5] = [".asciz", ".ascii", ".size", ".type", ".section"];
+    let word = line.split_whitespace().next();
+    word.is_some_and(|word| DIRECTIVES.contains(&word))
 }
 
 /// Where the reader stands.

@@ -16,6 +16,7 @@ use super::super::quiet;
 use super::super::text::{Function, Insn, Line};
 use super::effect::{operands, pair, register};
 use super::flow::Flow;
+use super::needs::Needs;
 
 /// Fewer are not worth a pointer.
 const FEWEST: usize = 4;
@@ -31,8 +32,8 @@ struct Access {
 }
 
 /// Has all runs of accesses to a variable go by a pointer; whether there was one.
-pub fn share(function: &mut Function) -> bool {
-    let Some(flow) = Flow::of(function) else { return false };
+pub fn share(function: &mut Function, needs: &Needs) -> bool {
+    let Some(flow) = Flow::of(function, needs) else { return false };
     let needed = flow.needed();
     let quiet = quiet(function);
     let mut changes: Vec<(usize, Vec<Insn>)> = Vec::new();

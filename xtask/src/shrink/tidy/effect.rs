@@ -24,11 +24,11 @@ pub const REGISTERS: Set = u32::MAX as Set;
 pub const ALL: Set = REGISTERS | FLAGS;
 
 /// Registers that a function hands back as they were.
-const KEPT: Set = range(2, 17) | range(28, 29);
+pub const KEPT: Set = range(2, 17) | range(28, 29);
 /// Where arguments lie.
-const ARGUMENTS: Set = range(8, 25);
+pub const ARGUMENTS: Set = range(8, 25);
 /// Where results lie.
-const RESULTS: Set = range(18, 25);
+pub const RESULTS: Set = range(18, 25);
 /// What a call leaves undefined.
 const LOST: Set = bit(0) | range(26, 27) | range(30, 31) | FLAGS;
 
@@ -176,7 +176,7 @@ pub fn branch(op: &str) -> Option<Set> {
 
 fn call(besides: Set) -> Option<Effect> {
     let reads = ARGUMENTS | bit(1) | besides;
-    Some(Effect { reads, writes: LOST, spoils: RESULTS, acts: true })
+    Some(Effect { reads, writes: LOST | RESULTS, spoils: 0, acts: true })
 }
 
 fn load(into: u8, from: &str) -> Option<Effect> {

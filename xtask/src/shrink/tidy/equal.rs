@@ -12,6 +12,7 @@ use super::super::text::{Function, Line};
 use super::copies::Copies;
 use super::effect::{self, Set, bit};
 use super::flow::{Flow, Known};
+use super::needs::Needs;
 use super::run::{End, Run};
 
 /// How often each piece runs.
@@ -21,9 +22,9 @@ const TRIALS: u64 = 12;
 ///
 /// What is true of a version may follow from what became of it on the way: where the last does not match the first, those between
 /// are compared, too.
-pub fn check(versions: &[Function]) -> Result<()> {
+pub fn check(versions: &[Function], needs: &Needs) -> Result<()> {
     let [first, .., last] = versions else { return Ok(()) };
-    let refused = match function(first, last) {
+    let refused = match function(first, last, needs) {
         Ok(()) => return Ok(()),
         Err(refused) => refused.context(format!("in {}", first.name)),
     };
@@ -31,12 +32,12 @@ pub fn check(versions: &[Function]) -> Result<()> {
         return Err(refused);
     }
     let middle = versions.len() / 2;
-    check(&versions[..=middle])?;
-    check(&versions[middle..])
+    check(&versions[..=middle], needs)?;
+    check(&versions[middle..], needs)
 }
 
-fn function(old: &Function, new: &Function) -> Result<()> {
-    let (Some(old), Some(new)) = (Flow::of(old), Flow::of(new)) else {
+fn function(old: &Function, new: &Function, needs: &Needs) -> Result<()> {
+    let (Some(old), Some(new)) = (Flow::of(old, needs), Flow::of(new, needs)) else {
         bail!("it goes where nobody knows");
     };
     let pieces = Pieces {
@@ -103,8 +104,8 @@ impl Pieces<'_> {
         ensure!(all == made, "{made} things are done instead of {all}, {:?}", first.log.last());
         let at = match ends {
             (End::At(a), End::At(b)) => {
-                // Two labels may stand at one place.
-                let place = |label: &str| self.old.skip_labels(self.old.labels[label]);
+                // Two labels may stand at one place, or one lead to the other.
+                let place = |label: &str| self.old.destination(label);
                 ensure!(place(&a) == place(&b), "it goes to {b} instead of {a}");
                 (self.old.labels[a.as_str()], self.new.labels[a.as_str()])
             }
@@ -142,7 +143,7 @@ mod tests {
 
     fn refused(before: &str, after: &str) -> Option<String> {
         let versions = [before, after].map(|code| program(&[("f", code)]).functions.remove(0));
-        check(&versions).err().map(|error| format!("{error:#}"))
+        check(&versions, &Needs::default()).err().map(|error| format!("{error:#}"))
     }
 
     #[test]

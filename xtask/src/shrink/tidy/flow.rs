@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::super::text::{Function, Insn, Line};
 use super::effect::{self, Effect, Set};
+use super::needs::Needs;
 
 /// The code of a function, line by line, and where it goes.
 pub struct Flow<'a> {
@@ -20,12 +21,12 @@ pub struct Flow<'a> {
     /// Instructions in assembler of the source whose effect is known.
     pub fixed: HashMap<usize, Insn>,
     /// Of each line that keeps the status register: the line that puts it back.
-    restores: Vec<Option<usize>>,
+    pub restores: Vec<Option<usize>>,
 }
 
 impl<'a> Flow<'a> {
-    /// None if the function goes where nobody knows.
-    pub fn of(function: &'a Function) -> Option<Flow<'a>> {
+    /// None if the function goes where nobody knows. `needs` are those of all functions.
+    pub fn of(function: &'a Function, needs: &Needs) -> Option<Flow<'a>> {
         let code =
             function.lines.iter().enumerate().filter(|(_, line)| !matches!(line, Line::Note(_)));
         let (origins, lines): (Vec<usize>, Vec<&Line>) = code.unzip();
@@ -34,12 +35,14 @@ impl<'a> Flow<'a> {
             _ => None,
         };
         let labels: HashMap<&str, usize> = lines.iter().enumerate().filter_map(label).collect();
-        let fixed = fixed(function);
+        let pieces = Pieces::of(function);
         let fixed: HashMap<usize, Insn> = (origins.iter().enumerate())
-            .filter_map(|(at, origin)| Some((at, fixed.get(origin)?.clone())))
+            .filter_map(|(at, origin)| Some((at, pieces.straight.get(origin)?.clone())))
             .collect();
         let effect = |(at, line): (usize, &&Line)| {
-            fixed.get(&at).and_then(effect::of).unwrap_or_else(|| effect::of_line(line))
+            let whole = pieces.winding.get(&origins[at]).copied();
+            let effect = fixed.get(&at).and_then(effect::of).or(whole);
+            as_needed(effect.unwrap_or_else(|| effect::of_line(line)), line, &function.name, needs)
         };
         let effects: Vec<Effect> = lines.iter().enumerate().map(effect).collect();
         let next =
@@ -106,6 +109,20 @@ impl<'a> Flow<'a> {
         self.lines[at..].iter().take_while(|line| matches!(line, Line::Label(_))).count() + at
     }
 
+    /// The line that runs first at a label and is no jump. Where jumps lead in a circle it is one of them.
+    pub fn destination(&self, label: &str) -> usize {
+        let mut at = self.skip_labels(self.labels[label]);
+        for _ in 0..self.labels.len() {
+            match self.lines.get(at) {
+                Some(Line::Insn(insn)) if insn.op == "rjmp" => {
+                    at = self.skip_labels(self.labels[insn.args.as_str()]);
+                }
+                _ => break,
+            }
+        }
+        at
+    }
+
     /// Of each line: what is needed behind it.
     pub fn needed(&self) -> Vec<Set> {
         let mut before = vec![0; self.lines.len()];
@@ -114,16 +131,21 @@ impl<'a> Flow<'a> {
         while again {
             again = false;
             for at in (0..self.lines.len()).rev() {
-                let effect = &self.effects[at];
                 behind[at] =
                     self.next[at].iter().map(|to| before[*to]).fold(0, |all, one| all | one);
-                let written = if self.may_be_skipped[at] { 0 } else { effect.writes };
-                let needed = behind[at] & !written | self.reads(at, &behind);
+                let needed = self.needed_before(at, &behind);
                 again |= needed != before[at];
                 before[at] = needed;
             }
         }
         behind
+    }
+
+    /// What is needed before a line, if that is needed which is needed behind each line.
+    pub fn needed_before(&self, at: usize, needed: &[Set]) -> Set {
+        let Some(effect) = self.effects.get(at) else { return 0 };
+        let written = if self.may_be_skipped[at] { 0 } else { effect.writes };
+        needed[at] & !written | self.reads(at, needed)
     }
 
     /// Of each line: what is known of the registers before it.
@@ -152,33 +174,69 @@ impl<'a> Flow<'a> {
     }
 }
 
+/// The effect of a line: a call reads what that function needs, a return what callers need of this one.
+fn as_needed(effect: Effect, line: &Line, name: &str, needs: &Needs) -> Effect {
+    let Line::Insn(insn) = line else { return effect };
+    let reads = match insn.op.as_str() {
+        "call" => needs.arguments(&insn.args),
+        "ret" => effect.reads & !effect::RESULTS | needs.results(name),
+        _ => effect.reads,
+    };
+    Effect { reads, ..effect }
+}
+
 /// The register that an instruction keeps the status register in.
 fn kept_status(insn: &Insn) -> Option<u8> {
     let (first, second) = effect::operands(insn);
     if insn.op == "in" && second == "63" { effect::register(first) } else { None }
 }
 
-/// Instructions in assembler of the source that runs straight on, by their lines.
-fn fixed(function: &Function) -> HashMap<usize, Insn> {
-    const STRAIGHT: [&str; 10] =
-        ["in", "out", "cli", "sei", "mul", "mov", "movw", "add", "adc", "clr"];
-    let mut known = HashMap::new();
-    let mut piece = Vec::new();
-    let mut is_straight = true;
-    for (at, line) in function.lines.iter().enumerate() {
-        let Line::Fixed(text) = line else {
-            if is_straight {
-                known.extend(piece.drain(..));
+/// Pieces of assembler of the source whose effect is known.
+#[derive(Default)]
+struct Pieces {
+    /// Instructions of those that run straight on, by their lines.
+    straight: HashMap<usize, Insn>,
+    /// Of each line of those that go to places of their own: what the whole piece may do.
+    winding: HashMap<usize, Effect>,
+}
+
+impl Pieces {
+    fn of(function: &Function) -> Pieces {
+        let mut pieces = Pieces::default();
+        let mut piece = Vec::new();
+        for (at, line) in function.lines.iter().enumerate() {
+            match line {
+                Line::Fixed(text) => piece.push((at, Insn::new(text))),
+                _ => pieces.take(std::mem::take(&mut piece)),
             }
-            piece.clear();
-            is_straight = true;
-            continue;
-        };
-        let insn = Insn::new(text);
-        is_straight &= STRAIGHT.contains(&insn.op.as_str()) && effect::of(&insn).is_some();
-        piece.push((at, insn));
+        }
+        pieces.take(piece);
+        pieces
     }
-    known
+
+    fn take(&mut self, piece: Vec<(usize, Insn)>) {
+        const STRAIGHT: [&str; 15] = [
+            "in", "out", "cli", "sei", "mul", "mov", "movw", "add", "adc", "clr", "lpm", "wdr",
+            "nop", "ldi", "swap",
+        ];
+        if piece.iter().all(|(_, insn)| STRAIGHT.contains(&insn.op.as_str())) {
+            self.straight.extend(piece);
+            return;
+        }
+        let mut whole = Effect { reads: 0, writes: 0, spoils: 0, acts: true };
+        for (_, insn) in piece.iter().filter(|(_, insn)| !insn.op.ends_with(':')) {
+            let goes_within = effect::branch(&insn.op).is_some();
+            let Some(effect) = effect::of(insn).filter(|_| goes_within || !insn.is_jump()) else {
+                return;
+            };
+            if insn.op.ends_with("call") || matches!(insn.op.as_str(), "push" | "pop") {
+                return;
+            }
+            whole.reads |= effect.reads;
+            whole.spoils |= effect.changes();
+        }
+        self.winding.extend(piece.into_iter().map(|(at, _)| (at, whole)));
+    }
 }
 
 fn is_skip(line: &Line) -> bool {

@@ -4,6 +4,7 @@ use super::super::text::{Insn, Line};
 use super::copies::Copies;
 use super::effect::{self, bit, operands, register};
 use super::flow::Flow;
+use super::offsets::Offsets;
 
 /// What is known before a line.
 #[derive(Clone, Default)]
@@ -12,6 +13,8 @@ pub struct Local {
     copies: [Option<u8>; 32],
     /// Places in the frame and the registers that hold what is there.
     frame: Vec<(String, u8)>,
+    /// What pairs hold.
+    pub offsets: Offsets,
     /// Y points to the frame, and nowhere else.
     pub has_frame: bool,
 }
@@ -30,6 +33,7 @@ impl Local {
     pub fn clear(&mut self) {
         self.copies = [None; 32];
         self.frame.clear();
+        self.offsets.clear();
     }
 
     /// Control comes from elsewhere: all that is known are the copies that hold on every way.
@@ -63,6 +67,8 @@ impl Local {
         let (line, effect, may_be_skipped) =
             (flow.lines[at], &flow.effects[at], flow.may_be_skipped[at]);
         let before = self.clone();
+        let insn = flow.insn(at).filter(|_| !may_be_skipped);
+        self.offsets.pass(insn, flow.insn(at + 1), effect.changes());
         for r in (0..32).filter(|r| effect.changes() & bit(*r) != 0) {
             self.forget(r);
         }

@@ -2,21 +2,27 @@
 //!
 //! LLVM's back end for AVR makes 0 or 1 of a condition and tests that, copies registers to and fro, loads from the frame what a
 //! register holds still, and compares with 0 what has set the flags. What goes here takes flash and time, so it goes from hot
-//! functions as well. [`rules`] has what is done, each by what [`flow`] and [`local`] know; [`equal`] holds every function against the one
+//! functions as well. [`rules`], [`conditions`] and [`addresses`] have what is done, each by what [`flow`] and [`local`] know, and
+//! [`needs`] of other functions; [`layout`] puts code behind the jumps to it; [`equal`] holds every function against the one
 //! that the compiler wrote, by running both.
 
+mod addresses;
 mod base;
+mod conditions;
 mod copies;
 mod effect;
 mod equal;
 mod flow;
+mod layout;
 mod local;
+mod needs;
+mod offsets;
 mod rules;
 mod run;
 
 use std::collections::HashMap;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use super::names_in_source;
 use super::text::{Function, Line, Program};
@@ -24,6 +30,7 @@ use copies::Copies;
 use effect::Set;
 use flow::{Flow, Known};
 use local::Local;
+use needs::Needs;
 use rules::{Edit, Place};
 
 /// How often a function is looked at.
@@ -32,30 +39,35 @@ const SWEEPS: usize = 1_000;
 /// Tidies all functions that follow the compiler's own conventions.
 pub fn tidy(program: &mut Program) -> Result<()> {
     let in_source = names_in_source(program);
+    let needs = Needs::of(program);
     for function in &mut program.functions {
         let has_convention =
             !in_source.contains(&function.name) && function.insns().all(|insn| insn.op != "reti");
         if has_convention {
-            tidy_function(function)?;
+            tidy_function(function, &needs)?;
         }
     }
+    ensure!(Needs::of(program).are_within(&needs), "a function needs more than before");
     Ok(())
 }
 
-fn tidy_function(function: &mut Function) -> Result<()> {
+fn tidy_function(function: &mut Function, needs: &Needs) -> Result<()> {
     let mut versions = vec![function.clone()];
-    while versions.len() < SWEEPS && sweep(function) {
+    while versions.len() < SWEEPS && sweep(function, needs) {
         versions.push(function.clone());
     }
-    if base::share(function) {
+    if base::share(function, needs) {
         versions.push(function.clone());
     }
-    equal::check(&versions)
+    if layout::arrange(function) {
+        versions.push(function.clone());
+    }
+    equal::check(&versions, needs)
 }
 
 /// Applies one rule between each two labels; whether there was one.
-fn sweep(function: &mut Function) -> bool {
-    let Some(flow) = Flow::of(function) else { return false };
+fn sweep(function: &mut Function, needs: &Needs) -> bool {
+    let Some(flow) = Flow::of(function, needs) else { return false };
     let sweep =
         Sweep { needed: flow.needed(), known: flow.known(), uses: uses(&flow), flow: &flow };
     let mut edits = sweep.edits(|place| place.edit(), None);
@@ -373,6 +385,82 @@ mod tests {
             tidied("sbrc r24, 0\nldi r25, 0\nmov r22, r25\nret"),
             "sbrc r24, 0; ldi r25, 0; mov r22, r25; ret"
         );
+    }
+
+    #[test]
+    fn a_call_reads_what_the_function_needs() {
+        let f = ("f", "ldi r20, 1\nldi r22, 2\ncall g\nsts 500, r24\n.LBB0_1:\nrjmp .LBB0_1");
+        let g = ("g", "mov r24, r22\nldi r25, 1\nret");
+        let mut both = program(&[f, g]);
+        tidy(&mut both).unwrap();
+        assert_eq!(code(&both, "f"), "ldi r22, 2; call g; sts 500, r24; .LBB0_1:; rjmp .LBB0_1");
+        assert_eq!(code(&both, "g"), "mov r24, r22; ret");
+    }
+
+    #[test]
+    fn a_condition_that_one_way_needs_is_branched_on() {
+        // Where the branch goes the register holds 1, as it did before.
+        let text = |read: &str| {
+            format!(
+                "ldi r18, 1\ncp r24, r22\nbrlt .LBB0_1\nmov r18, r1\n.LBB0_1:\ncpi r18, 0\nbreq .LBB0_2\n{read}\n\
+                 ldi r18, 5\nret\n.LBB0_2:\nldi r18, 4\nret"
+            )
+        };
+        let after = tidied(&text("sts 500, r18"));
+        assert!(
+            after.starts_with("ldi r18, 1; cp r24, r22; brge .LBB0_2; sts 500, r18"),
+            "{after}"
+        );
+        let after = tidied(&text("wdr").replace(".LBB0_2:\n", ".LBB0_2:\nsts 500, r18\n"));
+        assert!(after.contains("brlt .LBB0_1"), "{after}");
+    }
+
+    #[test]
+    fn what_is_joined_with_nothing_is_copied() {
+        assert_eq!(
+            tidied("clr r30\nor r30, r18\nmov r24, r30\ninc r18\nret"),
+            "mov r24, r18; inc r18; ret"
+        );
+        assert_eq!(tidied("ldi r26, 0\nadd r24, r26\nret"), "ret");
+        assert!(tidied("ldi r26, 0\nadd r24, r26\nadc r25, r22\nret").contains("add r24, r1"));
+    }
+
+    #[test]
+    fn flags_that_nobody_needs_are_not_kept() {
+        let far = "in r0, 63\nadiw r28, 9\nstd Y+63, r24\nsbiw r28, 9\nout 63, r0\n";
+        assert_eq!(tidied(&format!("{far}ret")), "adiw r28, 9; std Y+63, r24; sbiw r28, 9; ret");
+        let twice = tidied(&format!("{far}{}ret", far.replace('9', "10")));
+        assert_eq!(
+            twice,
+            "adiw r28, 9; std Y+63, r24; adiw r28, 1; std Y+63, r24; sbiw r28, 10; ret"
+        );
+        let kept = format!("cp r24, r22\n{far}brlo .LBB0_1\nwdr\n.LBB0_1:\nret");
+        assert!(tidied(&kept).contains("in r0, 63"));
+        assert!(
+            tidied(&format!("{}ret", far.replace("std Y+63, r24", "cli"))).contains("in r0, 63")
+        );
+    }
+
+    #[test]
+    fn an_address_is_made_of_one_that_is_near() {
+        let far = |offset: u8| format!("movw r30, r24\nsubi r30, {offset}\nsbci r31, 255\n");
+        let text =
+            |offset| format!("{}ld r22, Z\n{}st Z, r22\nst Z, r20\nret", far(80), far(offset));
+        assert!(tidied(&text(74)).ends_with("ld r22, Z; std Z+6, r22; std Z+6, r20; ret"));
+        assert!(tidied(&text(90)).contains("ld r22, Z; sbiw r30, 10; st Z, r22"));
+        assert!(tidied(&text(1)).contains("subi r30, 1"), "79 is too far");
+        let changed = text(74).replace("ld r22, Z", "ld r22, Z\ninc r24");
+        assert!(tidied(&changed).contains("subi r30, 74"));
+    }
+
+    #[test]
+    fn assembler_of_the_source_needs_what_it_reads() {
+        let asm = |piece: &str| format!("ldi r18, 1\n;APP\n{piece}\n;NO_APP\nldi r18, 2\nret");
+        assert!(!tidied(&asm("lpm r25, Z+")).contains("ldi r18, 1"));
+        let copy = ".Ltmp1:\nlpm r24, Z+\nst X+, r24\ndec r25\nbrne .Ltmp1";
+        assert!(!tidied(&asm(copy)).contains("ldi r18, 1"));
+        assert!(tidied(&asm(&copy.replace("dec r25", "dec r18"))).contains("ldi r18, 1"));
+        assert!(tidied(&asm("push r25\nrcall 1\npop r25")).contains("ldi r18, 1"));
     }
 
     #[test]

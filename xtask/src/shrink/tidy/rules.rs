@@ -35,6 +35,11 @@ impl Place<'_> {
             Self::truth,
             Self::copies,
             Self::zero,
+            Self::neutral,
+            Self::kept,
+            Self::moved,
+            Self::near,
+            Self::fold,
             Self::pairs,
             Self::reload,
             Self::origin,
@@ -43,22 +48,22 @@ impl Place<'_> {
         rules.iter().find_map(|rule| rule(self))
     }
 
-    fn insn_at(&self, at: usize) -> Option<&Insn> {
+    pub(super) fn insn_at(&self, at: usize) -> Option<&Insn> {
         match self.flow.lines.get(at)? {
             Line::Insn(insn) => Some(insn),
             _ => None,
         }
     }
 
-    fn gone(&self) -> Option<Edit> {
+    pub(super) fn gone(&self) -> Option<Edit> {
         Some(vec![(self.at, None)])
     }
 
-    fn becomes(&self, insn: Insn) -> Option<Edit> {
+    pub(super) fn becomes(&self, insn: Insn) -> Option<Edit> {
         (insn != *self.insn).then(|| vec![(self.at, Some(insn))])
     }
 
-    fn known(&self) -> &Known {
+    pub(super) fn known(&self) -> &Known {
         &self.known[self.at]
     }
 
@@ -148,150 +153,6 @@ impl Place<'_> {
         self.again().or_else(|| self.copies())
     }
 
-    /// Compares a register with 0 whose value set the flags alike.
-    fn compare(&self) -> Option<Edit> {
-        let d = self.tested()?;
-        let needed = self.needed[self.at] & effect::FLAGS;
-        for before in (0..self.at).rev() {
-            let insn = self.insn_at(before)?;
-            let effect = &self.flow.effects[before];
-            if self.flow.may_be_skipped[before] || insn.is_jump() {
-                return None;
-            }
-            if effect.changes() & (bit(d) | effect::FLAGS) == 0 {
-                continue;
-            }
-            let alike = match insn.op.as_str() {
-                "and" | "andi" | "or" | "ori" | "eor" => {
-                    effect::Z | effect::N | effect::V | effect::S
-                }
-                "add" | "adc" | "sub" | "subi" | "neg" | "inc" | "dec" | "lsl" | "rol" | "lsr"
-                | "asr" | "ror" | "com" => effect::Z | effect::N,
-                _ => return None,
-            };
-            let is_result = register(operands(insn).0) == Some(d);
-            return (is_result && needed & !alike == 0).then(|| self.gone())?;
-        }
-        None
-    }
-
-    /// The register that is compared with 0 here.
-    fn tested(&self) -> Option<u8> {
-        let (first, second) = operands(self.insn);
-        let is_test = match self.insn.op.as_str() {
-            "cpi" => second == "0",
-            "cp" => second == "r1" && self.known().value(1) == Some(0),
-            "tst" => true,
-            "and" => first == second,
-            _ => false,
-        };
-        is_test.then(|| register(first))?
-    }
-
-    /// Compares a pair with 0 byte by byte.
-    fn word(&self) -> Option<Edit> {
-        let high = self.insn_at(self.at + 1)?;
-        let of = |insn: &Insn, op: &str| {
-            let (first, second) = operands(insn);
-            register(first).filter(|_| insn.op == op && second == "r1")
-        };
-        let (low, high) = (of(self.insn, "cp")?, of(high, "cpc")?);
-        let is_zero = self.known().value(1) == Some(0);
-        if !is_zero || low == 1 || high == 1 || self.flow.may_be_skipped[self.at + 1] {
-            return None;
-        }
-        let needed = self.needed[self.at + 1];
-        let only_zero = needed & effect::FLAGS & !effect::Z == 0;
-        let insn = if only_zero && needed & bit(low) == 0 {
-            format!("or r{low}, r{high}")
-        } else if only_zero && needed & bit(high) == 0 {
-            format!("or r{high}, r{low}")
-        } else if needed & effect::H == 0 && low >= 24 && low % 2 == 0 && high == low + 1 {
-            format!("sbiw r{low}, 0")
-        } else {
-            return None;
-        };
-        Some(vec![(self.at, Some(Insn::new(&insn))), (self.at + 1, None)])
-    }
-
-    /// Makes 0 or 1 of a condition, and branches on that.
-    ///
-    /// ```text
-    ///   ldi  r24, 1
-    ///   brlt .L1
-    ///   mov  r24, r1     becomes  brge .L2
-    /// .L1:
-    ///   andi r24, 1
-    ///   breq .L2
-    /// ```
-    fn truth(&self) -> Option<Edit> {
-        effect::branch(&self.insn.op)?;
-        let set = self.insn_at(self.at + 1)?;
-        let (first, second) = operands(set);
-        let x = register(first)?;
-        let if_not = match set.op.as_str() {
-            "mov" => self.known[self.at + 1].value(register(second)?)?,
-            "ldi" => immediate(second)?,
-            _ => return None,
-        };
-        let if_so = self.known().value(x)?;
-        let mut edit = vec![(self.at, None), (self.at + 1, None)];
-        let mut at = self.at + 2;
-        let mut seen = false;
-        while let Line::Label(label) = self.flow.lines.get(at)? {
-            seen |= *label == self.insn.args;
-            if (self.calls)(label) != usize::from(*label == self.insn.args) {
-                return None;
-            }
-            edit.push((at, None));
-            at += 1;
-        }
-        let mut mask = u8::MAX;
-        let mut tests = false;
-        loop {
-            let insn = self.insn_at(at)?;
-            let effect = &self.flow.effects[at];
-            let (first, second) = operands(insn);
-            match insn.op.as_str() {
-                "andi" if register(first) == Some(x) => {
-                    mask &= immediate(second)?;
-                    tests = true;
-                    edit.push((at, None));
-                }
-                "cpi" if register(first) == Some(x) && second == "0" => {
-                    tests = true;
-                    edit.push((at, None));
-                }
-                "tst" if register(first) == Some(x) => {
-                    tests = true;
-                    edit.push((at, None));
-                }
-                "breq" | "brne" => break,
-                _ if insn.is_jump()
-                    || (effect.reads | effect.changes()) & (bit(x) | effect::FLAGS) != 0 =>
-                {
-                    return None;
-                }
-                _ => {}
-            }
-            at += 1;
-        }
-        let branch = self.insn_at(at)?;
-        let (if_so, if_not) = (if_so & mask != 0, if_not & mask != 0);
-        let is_free = self.needed[at] & (bit(x) | effect::FLAGS) == 0;
-        if !seen || !tests || !is_free || if_so == if_not {
-            return None;
-        }
-        let on_so = (branch.op == "brne") == if_so;
-        let op = if on_so {
-            self.insn.op.as_str()
-        } else {
-            super::super::branch::inverse(&self.insn.op)?
-        };
-        edit.push((at, Some(Insn { op: op.into(), args: branch.args.clone() })));
-        Some(edit)
-    }
-
     /// Reads a copy where the original is.
     fn copies(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
@@ -342,6 +203,21 @@ impl Place<'_> {
             return None;
         }
         self.becomes(Insn { op: op.into(), args: format!("{}, {}", args.0, args.1) })
+    }
+
+    /// Adds nothing, or to nothing: that is no work, or a copy.
+    fn neutral(&self) -> Option<Edit> {
+        let (first, second) = operands(self.insn);
+        let (d, s) = (register(first)?, register(second)?);
+        let joins = matches!(self.insn.op.as_str(), "or" | "eor" | "add");
+        if !joins || d == s || self.needed[self.at] & effect::FLAGS != 0 {
+            return None;
+        }
+        let is_zero = |register: u8| self.known().value(register) == Some(0);
+        if is_zero(s) {
+            return self.gone();
+        }
+        if is_zero(d) { self.becomes(Insn::new(&format!("mov r{d}, r{s}"))) } else { None }
     }
 
     /// Copies a pair byte by byte.

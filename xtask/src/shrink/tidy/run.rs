@@ -5,7 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::super::text::{Insn, Line};
 use super::copies::Copies;
-use super::effect::{self, Set, bit, operands, register};
+use super::effect::{self, Effect, Set, bit, operands, register};
 use super::flow::{Flow, Known, immediate};
 
 /// A piece that goes on longer never ends.
@@ -86,10 +86,11 @@ impl Run {
                 return End::At(label.clone());
             }
             let taken = match (line, flow.insn(at)) {
-                (_, Some(insn)) => self.step(insn),
+                (_, Some(insn)) => self.step(insn, &flow.effects[at]),
                 (Line::Fixed(text), None) => {
-                    self.note(text, effect::ALL);
-                    self.spoil(effect::ALL & !bit(1), text);
+                    let effect = &flow.effects[at];
+                    self.note(text, effect.reads);
+                    self.spoil(effect.changes() & !bit(1), text);
                     false
                 }
                 _ => false,
@@ -158,7 +159,7 @@ impl Run {
     }
 
     /// Executes an instruction; returns whether a condition is true.
-    fn step(&mut self, insn: &Insn) -> bool {
+    fn step(&mut self, insn: &Insn, effect: &Effect) -> bool {
         let (first, second) = operands(insn);
         let (d, s) = (register(first), register(second));
         let op = insn.op.as_str();
@@ -210,7 +211,6 @@ impl Run {
             ("in", Some(d), _) => self.read(insn, d),
             ("out", _, Some(s)) if first == "63" => self.flags = self.get(s) & FLAGS,
             ("call" | "eicall", ..) => {
-                let effect = effect::of(insn).unwrap_or(effect::Effect::UNKNOWN);
                 self.note(&insn.args, effect.reads);
                 self.spoil(effect.changes(), &insn.args);
             }
@@ -220,7 +220,6 @@ impl Run {
                     Some(_) if s.is_some() => format!("{op} {first}"),
                     _ => format!("{op} {}", if d.is_some() { "" } else { &insn.args }),
                 };
-                let effect = effect::of(insn).unwrap_or(effect::Effect::UNKNOWN);
                 self.note(&what, effect.reads);
             }
             _ => {}
