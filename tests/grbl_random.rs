@@ -22,7 +22,7 @@ use grbl_talk::Talk;
 use kerf::hal::imp::Machine;
 
 /// See [`Talk`].
-const REPORT_MS: u64 = 40;
+const REPORT_MS: u64 = 20;
 
 /// Has a conversation, with a machine in a thread of its own.
 fn play(deeds: &[Deed]) -> Result<(), String> {

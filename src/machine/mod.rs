@@ -268,7 +268,7 @@ pub fn clear() -> bool {
     ends
 }
 
-/// The machine has been reset by nobody: [`State::AFTER_FAULT`]. Before anything runs.
+/// The machine has been reset by nobody, or in motion by its sender: [`State::AFTER_FAULT`]. When nothing is queued.
 pub fn start_alarmed() {
     alarm_byte().set(State::AFTER_FAULT.alarm as u8);
 }

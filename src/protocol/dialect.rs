@@ -53,6 +53,11 @@ pub trait Dialect {
         settings: &Settings,
     ) -> Option<Self::Request>;
 
+    /// The answer to a `?` alone, where such bytes are taken out of lines: a status report.
+    fn question() -> Option<Self::Request> {
+        None
+    }
+
     /// Answers a line that could not be kept with a status; `line` is what is left of it.
     fn refuse(
         status: Status,
@@ -102,8 +107,13 @@ pub trait Answers {
     /// Whether something of the answer has been put.
     fn has_begun(&self) -> bool;
 
-    /// Whether a line of it has just ended, so that something else may be told before the next.
-    fn is_between_lines(&self) -> bool {
+    /// A status report comes before what is next, if no line of the answer is open. Whether it does.
+    fn interject(&mut self) -> bool {
+        false
+    }
+
+    /// Whether the answer is a list, in which a `?` is not to wait for what has been put.
+    fn is_list(&self) -> bool {
         false
     }
 }
@@ -263,6 +273,15 @@ macro_rules! dialects {
                 }
             }
 
+            /// See [`Dialect::question`].
+            #[inline(always)]
+            pub fn question(speech: Speech) -> Option<Self> {
+                match speech {
+                    $(#[cfg(feature = $feature)]
+                    Speech::$name(_) => <$dialect>::question().map(Self::$name),)+
+                }
+            }
+
             /// See [`Dialect::refuse`].
             #[inline(always)]
             pub fn refused(
@@ -315,10 +334,18 @@ macro_rules! dialects {
             }
 
             #[inline(always)]
-            fn is_between_lines(&self) -> bool {
+            fn interject(&mut self) -> bool {
                 match self {
                     $(#[cfg(feature = $feature)]
-                    Self::$name(request) => request.is_between_lines(),)+
+                    Self::$name(request) => request.interject(),)+
+                }
+            }
+
+            #[inline(always)]
+            fn is_list(&self) -> bool {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(request) => request.is_list(),)+
                 }
             }
         }

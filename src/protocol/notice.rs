@@ -17,8 +17,6 @@ pub enum Notice {
     Startup(u8, Status),
     /// How the machine stands: a status report.
     Status,
-    /// How the machine stands, which the sender has asked for by `?`.
-    Query,
     /// A jog has ended, or the queue has been flushed, or both.
     End {
         /// The first.

@@ -54,6 +54,11 @@ struct Entry {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct LineId(u8);
 
+impl LineId {
+    /// No line: it has no text, and to remove it does nothing.
+    pub const NONE: Self = Self(u8::MAX);
+}
+
 /// Whether a place in a line is in a comment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Aside {

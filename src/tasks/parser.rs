@@ -170,7 +170,12 @@ impl Parser {
         let runs_job = !links.job.get().is_none();
         let data = free && !runs_job;
         let straight = !alarmed && !machine::is_checking();
-        let tried = if data && straight && self.is_idle() { usual(links) } else { Usual::NotTried };
+        // What a port is told at once goes first: an acknowledgement is not to wait for a move.
+        let tells = links.ports.iter().any(Port::tells);
+        let tried = match data && straight && !tells && self.is_idle() {
+            true => usual(links),
+            false => Usual::NotTried,
+        };
         if tried == Usual::Done {
             let more = self.hand_over() || self.has_more();
             return if more { Turn::Usual } else { Turn::Nothing };
@@ -265,6 +270,13 @@ impl Parser {
         if !matches!(session, Session::Idle) {
             return go_on(links, port, session, awaited);
         }
+        if port.asks_report() {
+            if begin_report(port, session) {
+                return go_on(links, port, session, false);
+            }
+            self.lacking |= 1 << port.number;
+            return false;
+        }
         if port.tells() {
             let told = tell(links, port);
             self.lacking |= u8::from(!told) << port.number;
@@ -300,17 +312,21 @@ impl Parser {
         turns != NONE && (0..PORTS as u8).any(|other| other != number && self.turns(other) < turns)
     }
 
-    /// How many turns the answer on a port has had. 0: a control line waits for its first. 1: the answer is under way. [`NONE`]: no control
-    /// line waits there, or the port has no room for an answer.
+    /// How many turns the answer on a port has had. 0: a control line waits for its first, or a `?` is being answered. 1: another answer is
+    /// under way. [`NONE`]: nothing of that waits there, or the port has no room for an answer.
     #[inline(never)]
     fn turns(&self, number: u8) -> u8 {
         let at = usize::from(number);
         match self.links.ports.get(at).zip(self.sessions.get(at)) {
-            Some((_, Session::Answer(answer))) => answer.has_stepped.into(),
-            Some((port, Session::Idle)) if port.lines.borrow().has_controls() => {
+            Some((_, Session::Answer(answer))) => {
+                let lacks_room = answer.tx.as_ref().is_some_and(|tx| !tx.has_room());
+                (answer.has_stepped || lacks_room).into()
+            }
+            Some((port, Session::Idle))
+                if port.asks_report() || port.lines.borrow().has_controls() =>
+            {
                 // A report that is being told there ends its line soon.
-                let lacks_room = port.tx.try_lock().is_ok_and(|tx| !tx.has_room());
-                if lacks_room { NONE } else { 0 }
+                if has_room(port) == Some(false) { NONE } else { 0 }
             }
             _ => NONE,
         }
@@ -369,7 +385,7 @@ impl Parser {
         if !matches!(session, Session::Idle) || waits {
             return None;
         }
-        let has_room = port.tx.try_lock().is_ok_and(|tx| tx.has_room());
+        let has_room = has_room(port) == Some(true);
         self.lacking |= u8::from(!has_room) << port.number;
         has_room.then_some(Chosen { port, id, class })
     }
@@ -412,14 +428,8 @@ impl Parser {
                     wake_after(links.thread, Event::Tick, cx.waker());
                 }
                 let has_room = match session {
-                    Session::Answer(Answer { waits: true, .. }) => None,
-                    Session::Answer(Answer { tx: Some(tx), .. }) => Some(tx.has_room()),
-                    // While others talk, their end wakes it.
-                    _ if self.lacking & 1 << port.number != 0
-                        || matches!(session, Session::Answer(_)) =>
-                    {
-                        port.tx.try_lock().ok().map(|tx| tx.has_room())
-                    }
+                    Session::Answer(answer) => answer.may_go_on(port),
+                    _ if self.lacking & 1 << port.number != 0 => has_room(port),
                     _ => None,
                 };
                 match has_room {
@@ -512,11 +522,25 @@ fn has_left(links: &Links, tx: &mut Tx, since: &mut Option<u16>) -> bool {
 }
 
 impl Answer {
+    /// Whether there is room for the next part of it, of a list only little ahead of what has left: a `?` is answered behind that. `None` if
+    /// it does not wait for room.
+    #[inline(never)]
+    #[small]
+    fn may_go_on(&self, port: &Port) -> Option<bool> {
+        match &self.tx {
+            _ if self.waits => None,
+            Some(tx) if self.request.is_list() => Some(tx.is_low()),
+            Some(tx) => Some(tx.has_room()),
+            None => has_room(port),
+        }
+    }
+
     /// Goes on as far as there is room.
     #[inline(never)]
     fn step(&mut self, links: &'static Links, port: &'static Port, awaited: bool) -> Progress {
-        self.has_stepped = true;
-        if self.waits && links.storage.is_awaited() {
+        // A `?` is answered first.
+        self.has_stepped = self.id != LineId::NONE;
+        if self.waits && links.storage.is_awaited() && !port.asks_report() {
             return Progress::Waits;
         }
         let begun = self.tx.is_some();
@@ -543,17 +567,22 @@ impl Answer {
         begun: bool,
         awaited: bool,
     ) -> (Progress, bool) {
-        if port.is_resetting() && !begun {
+        if port.is_resetting() && !begun && self.id != LineId::NONE {
             // Nobody waits for it.
             return (Progress::Done, false);
         }
         let (mut begun, since) = (begun, millis());
-        for done in 0..STEPS {
-            if port.asked.get() & REPORT != 0 && self.request.is_between_lines() {
-                // A list takes 50 ms and more.
-                return (Progress::Waits, false);
+        // A `?` is answered in one turn, if that is short enough.
+        let asks = self.id == LineId::NONE;
+        for done in 0..if asks { 2 * STEPS } else { STEPS } {
+            // A list takes 50 ms and more.
+            if port.asks_report() && self.request.interject() {
+                port.take_asked(REPORT);
             }
-            if !tx.has_room() || (done > 0 && (awaited || gives_way(done, since))) {
+            if !tx.has_room()
+                || (begun && self.request.is_list() && !tx.is_low())
+                || (done > 0 && (awaited || gives_way(if asks { 1 } else { done }, since)))
+            {
                 break;
             }
             if self.echoes {
@@ -602,7 +631,7 @@ fn is_free(links: &Links) -> bool {
 #[small]
 fn has_room_for_startup(links: &Links) -> bool {
     let tells = links.job.get().startup().is_some();
-    !tells || links.told().tx.try_lock().is_ok_and(|tx| tx.has_room())
+    !tells || has_room(links.told()) == Some(true)
 }
 
 /// Carries out the next line of a built-in job. A line that is refused is told by an exception report. The end is told by
@@ -657,8 +686,7 @@ fn usual(links: &Links) -> Usual {
     let Ok(mut tx) = port.tx.try_lock() else { return Usual::NotTried };
     let mut lines = port.lines.borrow_mut();
     let Some(line) = lines.oldest() else { return Usual::NotTried };
-    // What the port is told at once goes first: an acknowledgement is not to wait for a move.
-    if !tx.has_room() || settings.echo() || port.tells() || port.is_resetting() {
+    if !tx.has_room() || settings.echo() || port.is_resetting() {
         return Usual::NotTried;
     }
     let mut commands = links.commands.borrow_mut();
@@ -727,6 +755,34 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
         tx: None,
     });
     Begun::Answer
+}
+
+/// Begins to answer a `?`, which is no line, if there is room for that.
+#[inline(never)]
+#[small]
+fn begin_report(port: &Port, session: &mut Session) -> bool {
+    if has_room(port) != Some(true) {
+        return false;
+    }
+    port.take_asked(REPORT);
+    let Some(request) = Request::question(port.speech.get()) else { return false };
+    *session = Session::Answer(Answer {
+        request,
+        id: LineId::NONE,
+        echoed: 0,
+        has_stepped: false,
+        echoes: false,
+        waits: false,
+        tx: None,
+    });
+    true
+}
+
+/// Whether there is room for the first part of an answer; `None` while somebody else talks on the port, whose end wakes the parser.
+#[inline(never)]
+#[small]
+fn has_room(port: &Port) -> Option<bool> {
+    port.tx.try_lock().ok().map(|tx| tx.has_room())
 }
 
 /// A line decides for a dialect if it is said in one alone.

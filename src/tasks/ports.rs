@@ -67,7 +67,7 @@ pub struct Port {
     pub clears: Cell<Alarm>,
     /// The sender asks whether anybody is there: control sets it, the parser answers.
     pub enquiry: Cell<bool>,
-    /// What a sender has asked for by a byte, as bits: the reporter answers.
+    /// What a sender has asked for by a byte, as bits: the reporter answers, a [`REPORT`] the parser.
     pub asked: Cell<u8>,
     /// Nothing has been said that only one dialect says, so that the first such thing decides.
     pub undecided: Cell<bool>,
@@ -167,7 +167,13 @@ impl Port {
     /// Whether there is something to tell on this port alone.
     #[inline(always)]
     pub fn tells(&self) -> bool {
-        self.enquiry.get() || self.lost.get()
+        self.enquiry.get() || self.lost.get() || self.asks_report()
+    }
+
+    /// Whether a status report is asked for by a byte.
+    #[inline(always)]
+    pub fn asks_report(&self) -> bool {
+        self.asked.get() & REPORT != 0
     }
 }
 

@@ -80,7 +80,7 @@ fn act(links: &Links, port: &Port, byte: u8) {
     match byte {
         ASKS => {
             port.ask(REPORT);
-            links.reporter_wake.urge();
+            links.parser_wake.signal();
         }
         DOOR => {
             hold::door(links, true);

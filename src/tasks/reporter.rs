@@ -11,10 +11,9 @@ use embassy_futures::yield_now;
 use embassy_time::Timer;
 use kerf_macros::small;
 
-use super::alarm;
 use super::health;
 use super::links::Links;
-use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, OTHERS, Port, REPORT};
+use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, OTHERS, Port};
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
 use crate::hal::eeprom::Eeprom;
@@ -24,7 +23,7 @@ use crate::hal::serial::is_shared;
 use crate::hal::time::millis;
 use crate::hal::uart;
 use crate::jobs::Job;
-use crate::machine::{self, Alarm, Doing};
+use crate::machine::{self, Doing};
 use crate::motion::snapshot::Program;
 use crate::protocol::{Hold, Machine, Notice, Occasion, Speech, Telling, Tells};
 use crate::status::Status;
@@ -104,10 +103,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         let interval = u32::from(links.settings.borrow().status_interval_ms());
         let moves = moves(state.doing, state.hold);
         due |= moves;
-        let wanted = state != told.state || (due && elapsed >= interval);
-        if wanted && !is_clear(links) {
-            due = true;
-        } else if wanted {
+        if state != told.state || (due && elapsed >= interval) {
             told.state = state;
             told.at = millis();
             due = false;
@@ -122,21 +118,6 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             due = true;
         }
     }
-}
-
-/// Whether a report may begin: not while its port is busy, if somebody may ask elsewhere.
-#[inline(never)]
-#[small]
-fn is_clear(links: &Links) -> bool {
-    let told = links.told();
-    !may_ask_elsewhere(links, told) || told.tx.try_lock().is_ok_and(|tx| tx.is_empty())
-}
-
-/// Whether somebody may ask by a `?` on another port, which is not to wait behind what is said on this.
-#[inline(never)]
-#[small]
-fn may_ask_elsewhere(links: &Links, port: &Port) -> bool {
-    links.ports.iter().any(|other| other.number != port.number && other.speech.get().is_in_order())
 }
 
 /// A change of this is told at once.
@@ -196,21 +177,17 @@ fn split(telling: &mut Telling, port: &Port, tx: &mut Tx) -> bool {
 /// report returns how many blocks are free in it, which may have changed during the wait for the
 /// transmitter.
 async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
-    let elsewhere = may_ask_elsewhere(links, port);
     let mut tx = match notice {
-        Notice::Status | Notice::Exception(_) if !elsewhere => port.tx_behind_answers().await,
+        Notice::Status | Notice::Exception(_) => port.tx_behind_answers().await,
         _ => port.tx.lock().await,
     };
-    if matches!(notice, Notice::Query) {
-        port.take_asked(REPORT);
-    }
     if matches!(notice, Notice::Greeting(_)) && port.take_asked(OTHERS) {
         tx.room().await;
         greet_otherwise(links, port, &mut tx);
     }
     let mut telling = begin(notice, links, port);
     // For all of it: while it is being told, the port is not answered.
-    let (mut turns, mut splits) = (COURTESY, if elsewhere { 0 } else { SPLITS });
+    let (mut turns, mut splits) = (COURTESY, SPLITS);
     loop {
         tx.room().await;
         if splits > 0 && split(&mut telling, port, &mut tx) {
@@ -235,31 +212,30 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
     telling.blocks_free()
 }
 
-/// What a sender has asked for by a byte, and on which port; `None` if nobody has.
+/// What a sender is told that has reset the machine, and on which port; `None` if nobody has.
 #[inline(never)]
 #[small]
 fn asked(links: &Links) -> Option<(u8, Notice)> {
-    links.ports.iter().find_map(|port| asked_on(links, port).map(|notice| (port.number, notice)))
+    links.ports.iter().find_map(|port| asked_on(port).map(|notice| (port.number, notice)))
 }
 
 #[inline(never)]
 #[small]
-fn asked_on(links: &Links, port: &Port) -> Option<Notice> {
-    if port.asked.get() == 0 {
+fn asked_on(port: &Port) -> Option<Notice> {
+    if !is_over(port) {
         return None;
     }
-    if is_over(port) {
-        if port.take_asked(INTERRUPTED) {
-            alarm::raise(links, Alarm::Alarm);
-            let homed = port.take_asked(HOMING);
-            let status = if homed { Status::Terminated } else { Status::HardReset };
-            return Some(Notice::Exception(status));
+    if port.take_asked(INTERRUPTED) {
+        if !machine::is_alarmed() {
+            // All that came before has been dropped; what has come since is refused.
+            machine::start_alarmed();
         }
-        port.take_asked(GREETING);
-        return Some(Notice::Greeting(Occasion::Ready));
+        let homed = port.take_asked(HOMING);
+        let status = if homed { Status::Terminated } else { Status::HardReset };
+        return Some(Notice::Exception(status));
     }
-    // It is taken when nobody else talks: an answer is to see that it is asked for.
-    (port.asked.get() & REPORT != 0).then_some(Notice::Query)
+    port.take_asked(GREETING);
+    Some(Notice::Greeting(Occasion::Ready))
 }
 
 /// Whether a reset that a sender has asked for is over: all that had come has been dropped.

@@ -37,8 +37,13 @@ impl Tx {
 
     /// Waits until the next piece of a report may be put.
     pub fn room(&mut self) -> impl Future<Output = ()> {
-        let is_due = || (self.ring.free() >= TX_RING - 1 - AHEAD).then_some(());
+        let is_due = || self.is_low().then_some(());
         wait_transmitted(self.thread, self.port, is_due)
+    }
+
+    /// Whether that may be put now.
+    pub fn is_low(&self) -> bool {
+        self.ring.free() >= TX_RING - 1 - AHEAD
     }
 
     /// Whether a piece fits now.

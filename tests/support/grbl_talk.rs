@@ -13,8 +13,12 @@ use crate::side::Side;
 
 /// What a sender that counts characters takes for the size of the buffer.
 const BUFFER: usize = 128;
+/// How soon reports come, but for one in a hundred, ms.
+const PROMPT_MS: u64 = 20;
 /// The size that is told.
 const TOLD: usize = 254;
+/// Bytes that may be on their way to the sender.
+const RING: usize = 128;
 /// Blocks of an empty queue.
 const BLOCKS: usize = 61;
 /// Longest until the machine is at rest, ms.
@@ -42,13 +46,19 @@ struct Sent {
 /// A sender's side of a conversation, and what is known of the machine.
 pub struct Talk<S> {
     side: S,
-    /// Longest until a report has come, ms: 10 of these on the wire. What has begun on the other port comes first, up to 20 of its own.
+    /// Longest until a report has come, ms: 10 of these on the wire. What its port has been told before takes its time besides.
     report_ms: u64,
+    /// The longest so far, how many there were, and how many have taken more than [`PROMPT_MS`].
+    longest_ms: u64,
+    reports: usize,
+    late: usize,
     ms: u64,
     partial: String,
     in_flight: VecDeque<Sent>,
     /// When the oldest `?` was sent that is not answered.
     asked: Option<u64>,
+    /// Bytes that have come since, of what was on its way.
+    before: usize,
     /// A reset has been sent, and the greeting has not come.
     resets: bool,
     /// The end of check mode has been told, which a greeting follows.
@@ -73,10 +83,14 @@ impl<S: Side> Talk<S> {
         Talk {
             side,
             report_ms,
+            longest_ms: 0,
+            reports: 0,
+            late: 0,
             ms: 0,
             partial: String::new(),
             in_flight: VecDeque::new(),
             asked: None,
+            before: 0,
             resets: false,
             greets: false,
             report: Report::default(),
@@ -134,6 +148,14 @@ impl<S: Side> Talk<S> {
         self.log.iter().map(|line| format!("  {line}\n")).collect()
     }
 
+    /// Nearly all reports have come promptly.
+    #[allow(dead_code)]
+    pub fn check_prompt(&self) {
+        let Self { longest_ms, reports, late, .. } = self;
+        println!("{reports} reports, {late} later than {PROMPT_MS} ms, the last at {longest_ms}");
+        assert!(late * 100 <= *reports, "{late} of {reports} reports are late");
+    }
+
     /// A job fills the buffer, is held for a minute and asked eight times a second, as senders do, and goes on.
     #[allow(dead_code)]
     pub fn hold_long(&mut self) -> Outcome<()> {
@@ -161,7 +183,7 @@ impl<S: Side> Talk<S> {
         self.side.send(&[byte]);
         self.tildes += usize::from(byte == b'~');
         if byte == b'?' && self.asked.is_none() {
-            self.asked = Some(self.ms);
+            (self.asked, self.before) = (Some(self.ms), 0);
         }
         if matches!(byte, 0x84 | 0x85 | b'!') {
             // A jog may end by it.
@@ -237,17 +259,17 @@ impl<S: Side> Talk<S> {
             self.side.run_ms(1);
             self.ms += 1;
             self.hear()?;
-            if let Some(at) = self.asked
-                && !self.resets
-                && self.ms > at + self.report_ms
-            {
-                return Err(format!(
-                    "a ? has no answer after {} ms, in {:?}",
-                    self.report_ms, self.report
-                ));
+            if let Some(waits) = self.waits().filter(|waits| *waits > self.report_ms) {
+                return Err(format!("a ? has no answer after {waits} ms, in {:?}", self.report));
             }
         }
         Ok(())
+    }
+
+    /// How long a `?` has waited, beside what was on its way before it, ms.
+    fn waits(&self) -> Option<u64> {
+        let before = self.before.min(RING) as u64 * 10 / 115;
+        self.asked.filter(|_| !self.resets).map(|at| (self.ms - at).saturating_sub(before))
     }
 
     fn hear(&mut self) -> Outcome<()> {
@@ -262,6 +284,9 @@ impl<S: Side> Talk<S> {
                 line.strip_suffix('\r').ok_or_else(|| format!("{line:?} has no CR"))?.to_string();
             self.partial = rest.to_string();
             self.log.push(format!("    < {line}"));
+            if !line.starts_with('<') {
+                self.before += line.len() + 2;
+            }
             self.judge(&line)?;
         }
         Ok(())
@@ -288,6 +313,10 @@ impl<S: Side> Talk<S> {
             }
             _ if line.starts_with('<') => {
                 self.report = report(line).ok_or_else(|| format!("{line} is no report"))?;
+                let waited = self.waits().unwrap_or(0);
+                self.longest_ms = self.longest_ms.max(waited);
+                self.reports += 1;
+                self.late += usize::from(waited > PROMPT_MS);
                 self.asked = None;
                 self.check_buffer(line)?;
             }

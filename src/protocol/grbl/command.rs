@@ -9,6 +9,8 @@ pub enum Command {
     Gcode,
     /// Nothing: an empty line.
     Nothing,
+    /// No line, but a `?`.
+    Question,
     /// `$`.
     Help,
     /// `$$`.

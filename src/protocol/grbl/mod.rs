@@ -70,6 +70,10 @@ impl Dialect for Grbl {
         Some(Request::begin(line))
     }
 
+    fn question() -> Option<Request> {
+        Some(Request::question())
+    }
+
     fn refuse(
         status: Status,
         _line: &[u8],

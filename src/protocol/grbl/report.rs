@@ -1,6 +1,6 @@
 //! The status report: `<Run|MPos:1.000,0.000,0.000|Bf:60,255|FS:800,0|WCO:0.000,0.000,0.000>`.
 //!
-//! Told when it is asked for by `?`, a field or an axis a step. `WCO` comes at once after a change, else with every 10th report, with
+//! The answer to `?`, a field or an axis a step. `WCO` comes at once after a change, else with every 10th report, with
 //! every 30th while the machine moves; `Ov` in one of those in between, likewise, with `A` for what turns and flows. In the first report after a greeting there is `WCO`, in the second `Ov`.
 
 use super::settings;
@@ -61,7 +61,8 @@ impl Remembers for Reports {
     }
 }
 
-/// A report under way.
+/// A report under way; by default, one that has not begun.
+#[derive(Default)]
 pub struct Report {
     field: Field,
     axis: u8,
@@ -71,8 +72,9 @@ pub struct Report {
     with: (bool, bool),
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
 enum Field {
+    #[default]
     State,
     Position,
     Buffers,
@@ -86,9 +88,9 @@ enum Field {
 
 #[small]
 impl Report {
-    /// Begins.
+    /// Begins: what is told is what is so by now.
     #[inline(never)]
-    pub fn begin(machine: &mut impl Machine) -> Self {
+    fn begin(machine: &mut impl Machine) -> Self {
         let axes = settings::axes(machine);
         let inches = settings::inches(machine);
         let sum = offsets(machine, axes);
@@ -119,6 +121,7 @@ impl Report {
         machine.moment(self.field == Field::State);
         match self.field {
             Field::State => {
+                *self = Self::begin(machine);
                 out.put(b'<');
                 state(machine, out);
                 self.field = Field::Position;

@@ -4,7 +4,7 @@
 //! a probing when it is over: until then the step says [`Next::Wait`], which costs 2,000 cycles each millisecond.
 
 use super::command::{self, ALL, Command};
-use super::report::{LOWERED, SLEEPS};
+use super::report::{LOWERED, Report, SLEEPS};
 use super::status::{BAD_JOG, BUSY, LOCKED, TOO_LONG, UNSUPPORTED, error_number};
 use super::write::{fixed, int, line_end, message, text};
 use super::{lists, settings};
@@ -27,6 +27,8 @@ pub struct Request {
     /// G-code that has not run yet.
     block: Option<Span>,
     begun: bool,
+    /// The status report that comes before what is next.
+    report: Option<Report>,
 }
 
 /// Behind the last part of a list.
@@ -53,12 +55,18 @@ impl Request {
         let command = command::of(line);
         let is_gcode = command == Command::Gcode;
         let block = is_gcode.then_some(Span { start: 0, end: line.len() as u8 });
-        Self { command, at: 0, status: Status::Ok, block, begun: false }
+        Self { command, at: 0, status: Status::Ok, block, begun: false, report: None }
     }
 
     /// A line that could not be kept.
     pub(super) fn refused(status: Status) -> Self {
-        Self { command: Command::Gcode, at: 1, status, block: None, begun: false }
+        Self { command: Command::Gcode, at: 1, status, block: None, begun: false, report: None }
+    }
+
+    /// A `?` alone.
+    pub(super) fn question() -> Self {
+        let (command, report) = (Command::Question, Some(Report::default()));
+        Self { command, at: 0, status: Status::Ok, block: None, begun: false, report }
     }
 }
 
@@ -75,6 +83,15 @@ impl Answers for Request {
 
     #[inline(never)]
     fn step(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Next {
+        if let Some(report) = &mut self.report {
+            if !report.step(machine, out) {
+                self.report = None;
+            }
+            return match (&self.report, self.command) {
+                (None, Command::Question) => Next::Done(Status::Ok),
+                _ => Next::More,
+            };
+        }
         if let Some(Span { start, end }) = self.block {
             return Next::Gcode { start, end };
         }
@@ -107,14 +124,22 @@ impl Answers for Request {
         self.begun
     }
 
-    fn is_between_lines(&self) -> bool {
+    fn interject(&mut self) -> bool {
         let ended = match self.command {
-            Command::Settings => true,
+            Command::Settings | Command::Startup => true,
             // The places of an axis each are parts of one.
             Command::Offsets => self.at & 7 == 0,
-            _ => false,
+            _ => !self.begun,
         };
-        self.begun && ended
+        let free = ended && self.report.is_none();
+        if free {
+            self.report = Some(Report::default());
+        }
+        free
+    }
+
+    fn is_list(&self) -> bool {
+        matches!(self.command, Command::Settings | Command::Offsets)
     }
 }
 
@@ -124,7 +149,7 @@ impl Request {
     fn part(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
         let at = self.at;
         match self.command {
-            Command::Nothing => Step::Done,
+            Command::Nothing | Command::Question => Step::Done,
             Command::Unknown => Step::Error(UNSUPPORTED),
             Command::BadJog => Step::Error(BAD_JOG),
             Command::Gcode => self.gcode_done(line, machine, out),

@@ -45,13 +45,9 @@ pub fn number(row: u8, axes: u8) -> Option<u8> {
 #[inline(never)]
 #[small]
 pub fn axes(machine: &mut impl Machine) -> u8 {
-    let mut axes = 3;
-    for axis in 3..AXES as u8 {
-        if read(machine, of_axis(axis, token("am"))) != 0 {
-            axes = axis + 1;
-        }
-    }
-    axes
+    let settings = machine.settings();
+    let last = (3..AXES).rev().find(|axis| settings.axis_mode(*axis) != 0);
+    last.map_or(3, |axis| axis as u8 + 1)
 }
 
 /// Whether reports are in inches.

@@ -1,9 +1,9 @@
-//! A notice on its way out: the greeting, alarms and messages, what probing has found, and the status report.
+//! A notice on its way out: the greeting, alarms and messages, what probing has found.
 //!
 //! What TinyG's senders are told unasked, of the queue and how the machine stands, grbl's ask for.
 
 use super::lists;
-use super::report::{Report, SLEEPS};
+use super::report::SLEEPS;
 use super::status::{PROBE_CLOSED, alarm_number, error_number};
 use super::write::{int, line_end, message, text};
 use crate::boards::inputs;
@@ -26,8 +26,6 @@ pub enum Telling {
     Probing(u8),
     /// What has become of a line that is carried out after a start.
     Startup(u8, Status),
-    /// A status report.
-    Report(Report),
 }
 
 #[small]
@@ -43,7 +41,6 @@ impl Telling {
             Notice::Exception(status) => Self::Exception(status),
             Notice::Startup(line, status) => Self::Startup(line, status),
             Notice::Probing => Self::Probing(lists::PROBING),
-            Notice::Query => Self::Report(Report::begin(machine)),
             _ => Self::Nothing,
         }
     }
@@ -80,7 +77,6 @@ impl Tells for Telling {
                 }
                 None => false,
             },
-            Self::Report(report) => report.step(machine, out),
         }
     }
 

@@ -41,7 +41,7 @@ impl Telling {
             Notice::Exception(status) => Part::Exception(Exception::begin(status, settings)),
             Notice::Probing => Part::Probing(Probing::begin(settings)),
             // Nobody asks so in this dialect, nor keeps such lines.
-            Notice::Query | Notice::Startup(..) => Part::Status(None),
+            Notice::Startup(..) => Part::Status(None),
             Notice::Status => Part::Status(Report::begin(mode, machine)),
             Notice::End { jogged, flushed } => Part::End { jogged, flushed },
             Notice::Queue => Part::Queue(0),
