@@ -98,10 +98,10 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     let queue = queue::store().queue(thread)?;
     let (links, received, aux) = connect(thread, rate)?;
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
-    choose_dialects(links);
     set_hardware(thread, &links.settings.borrow());
     spindle::set_all(thread, links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
+    choose_dialects(links);
     if watchdog::cause().is_fault() {
         alarm::wake_up_in(links);
     }

@@ -23,7 +23,7 @@ pub const LET_GO: u8 = 1 << 7;
 
 /// Those of which the place in the stream counts: there the receive ring gets a
 /// [`CUT`](crate::hal::serial::CUT) or [`GO`](crate::hal::serial::GO).
-pub const PLACED: u8 = FLUSH | KILL | RESUME;
+pub const PLACED: u8 = FLUSH | KILL | RESUME | RESET;
 
 /// The characters that are pending when one more comes: who says hold does not say resume any more.
 #[inline(always)]

@@ -64,6 +64,26 @@ impl<T: Tables> Interpreter<T> {
         self.restore_origin();
     }
 
+    /// G0 is in force unless another motion mode is: where grbl's dialect begins.
+    pub fn begin_with_rapids(&mut self) {
+        if self.state.modal.motion == MotionMode::None {
+            self.state.modal.motion = MotionMode::Traverse;
+        }
+    }
+
+    /// What a reset of grbl does besides the end of a program: G0, T0, S0, no tool length.
+    #[inline(never)]
+    #[small]
+    pub fn reset(&mut self) {
+        let state = &mut self.state;
+        state.modal.motion = MotionMode::Traverse;
+        (state.selected, state.speed) = (0, 0.0);
+        for axis in 0..AXES as u8 {
+            // The sum of what is left is within the range.
+            let _ = state.set_tool_length(axis, Length::ZERO);
+        }
+    }
+
     /// Sets a value of a row as G10 does: it is in force when this returns. [`Status::Again`] as of
     /// [`Self::interpret`]; after an error everything is what it was.
     #[inline(never)]
@@ -419,6 +439,11 @@ impl<T> Interpreter<T> {
     /// The tool in the spindle; 0 for none.
     pub fn tool(&self) -> u8 {
         self.state.tool
+    }
+
+    /// The tool of the last T.
+    pub fn selected_tool(&self) -> u8 {
+        self.state.selected
     }
 
     /// Whether an axis is homed: soft limits are for such axes alone.

@@ -56,6 +56,8 @@ pub enum Value {
     Kept,
     /// Tool number.
     Tool,
+    /// The tool of the last T.
+    SelectedTool,
     /// 0 not homed, 1 homed, 2 homing.
     Home,
     /// Of a hold: 0 if no door has begun it, 1 if one has, 2 if one has and it is over as soon as the machine stands.

@@ -109,14 +109,28 @@ pub fn door(links: &Links, open: bool) {
         links.signs.percent.set(false);
     }
     let works = links.has_data() || View::of(links, links.feeder()).has_work();
-    if open {
-        links.signs.door.set(works);
-    }
+    links.signs.door.set(works);
     machine::take(match works {
         _ if open => machine::Event::DoorOpened,
         true => machine::Event::DoorShut,
         false => machine::Event::DoorShutIdle,
     });
+}
+
+/// Opens the door and shuts it at once: nothing moves until a tilde, at rest too. While the door is open it does nothing.
+#[inline(never)]
+#[small]
+pub fn knock(links: &Links) {
+    if may_hold_at_rest() && !machine::has_open_door() {
+        door(links, true);
+        links.signs.door.set(true);
+        machine::take(machine::Event::DoorShut);
+    }
+}
+
+/// Whether a machine that rests may be held: not in an alarm, and not while lines are checked alone.
+fn may_hold_at_rest() -> bool {
+    !machine::is_alarmed() && !machine::is_checking()
 }
 
 /// Acts upon the real-time characters that have come, on any port.
@@ -134,7 +148,7 @@ pub fn serve(links: &Links) {
             act(links, port, characters);
         }
         if port.take_asked(ports::RESET) {
-            start_over(links, port, false);
+            start_over(links, port, uart::newest(port.number), false);
         }
     }
 }
@@ -145,14 +159,16 @@ fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
         if starts_over(links, port) {
             let works = View::of(links, port).has_work() && !machine::is_checking();
-            return start_over(links, port, works);
+            return start_over(links, port, uart::last_cut(port.number), works);
         }
         reset();
     }
     if characters & LET_GO != 0 {
         uart::kick(port.number);
     }
-    let (holds, cuts) = (characters & HOLD != 0, characters & FLUSH != 0);
+    // Programs begin and end with a percent sign, and grbl's senders drop nothing by one.
+    let cuts = characters & FLUSH != 0 && !port.speech.get().is_in_order();
+    let holds = characters & HOLD != 0;
     let (kills, busy) = (characters & KILL != 0, holds && is_busy(links));
     let signs = &links.signs;
     if holds {
@@ -162,6 +178,9 @@ fn act(links: &Links, port: &Port, characters: u8) {
         machine::take(machine::Event::Hold);
     } else if holds && !kills {
         jog::bar(links);
+        if port.speech.get().is_in_order() && may_hold_at_rest() {
+            machine::take(machine::Event::Hold);
+        }
     }
     if kills {
         cut(links, port, uart::last_cut(port.number), machine::Event::Kill);
@@ -197,12 +216,12 @@ fn starts_over(links: &Links, port: &Port) -> bool {
     port.speech.get().is_in_order() && machine::alarm() != Alarm::Panic
 }
 
-/// A reset in a dialect that keeps the position: all that has come is dropped, the program ends, overrides are as programmed; the reporter greets
+/// A reset in a dialect that keeps the position: what has come up to a slot of the receive ring is dropped, the program ends, overrides are as programmed; the reporter greets
 /// when that is done, and begins an alarm before if the machine `works`, which is interrupted.
 #[inline(never)]
 #[small]
-fn start_over(links: &Links, port: &Port, works: bool) {
-    cut(links, port, uart::newest(port.number), machine::Event::Kill);
+fn start_over(links: &Links, port: &Port, slot: Option<u8>, works: bool) {
+    cut(links, port, slot, machine::Event::Kill);
     if port.cut.get().is_none() {
         // What comes next begins a line.
         port.lines.borrow_mut().forget();
@@ -254,7 +273,7 @@ pub fn placed(links: &Links, port: &Port, mark: u8) {
     serve(links);
     if mark == GO {
         go_on(links);
-    } else if machine::is_held() && links.signs.percent.get() {
+    } else if machine::is_held() && links.signs.percent.get() && !port.speech.get().is_in_order() {
         cut(links, port, None, machine::Event::Cut);
     }
 }
@@ -266,7 +285,8 @@ pub fn ahead(links: &Links, port: &Port, mark: u8, slot: u8) {
     if mark != CUT {
         go_on(links);
     }
-    if machine::is_held() && mark != GO && links.signs.percent.get() {
+    let counts = mark != GO && !port.speech.get().is_in_order();
+    if machine::is_held() && counts && links.signs.percent.get() {
         cut(links, port, Some(slot), machine::Event::Cut);
     }
 }

@@ -10,6 +10,7 @@
 use super::common::{self, Common};
 use super::jog;
 use super::links::Links;
+use super::ports::Port;
 use super::spindle;
 use crate::gcode::overrides::{Change, FULL, LEAST, Override, Overrides};
 use crate::hal::Thread;
@@ -18,6 +19,9 @@ use crate::hal::{exec, flags, uart};
 use crate::motion::factors::Factors;
 use crate::motion::queue::{self, BlockSource};
 use crate::realtime::{Asked, NO_JOG, TRAVERSE};
+
+/// The least that characters ask for in grbl's dialect.
+const LEAST_IN_ORDER: u16 = 100;
 
 /// The overrides as they are.
 #[small]
@@ -51,22 +55,23 @@ pub fn change_in_stream(overrides: &mut Overrides, change: Change, blocks: &mut 
 #[small]
 pub fn serve(links: &Links) {
     for port in &links.ports {
-        apply(links, uart::take_asked(port.number));
+        apply(links, port, uart::take_asked(port.number));
     }
 }
 
-/// Does what characters ask for. Thread mode.
+/// Does what characters on a port ask for. Thread mode.
 #[inline(never)]
 #[small]
-pub fn apply(links: &Links, asked: Asked) {
+pub fn apply(links: &Links, port: &Port, asked: Asked) {
     if asked == Asked::NOTHING {
         return;
     }
     if asked.fixed & NO_JOG != 0 {
         jog::end(links);
     }
+    let least = if port.speech.get().is_in_order() { LEAST_IN_ORDER } else { LEAST };
     for (n, which) in [(0, Override::Feed), (1, Override::Spindle)] {
-        step(links.thread, which, asked.percent[n], asked.fixed & 1 << n != 0);
+        step(links.thread, which, asked.percent[n], asked.fixed & 1 << n != 0, least);
     }
     let traverse = match (asked.fixed & TRAVERSE) >> 2 {
         0 => return,
@@ -79,13 +84,13 @@ pub fn apply(links: &Links, asked: Asked) {
 
 /// So many percent more, or less; from 100 % if `anew`.
 #[small]
-fn step(thread: Thread, which: Override, percent: i8, anew: bool) {
+fn step(thread: Thread, which: Override, percent: i8, anew: bool, least: u16) {
     if percent == 0 && !anew {
         return;
     }
     let before = if anew { FULL } else { now(thread).factor(which) };
     // One that has been set lower is not raised by asking for less.
-    let least = LEAST.min(before).cast_signed();
+    let least = least.min(before).cast_signed();
     let factor = (before.cast_signed() + 10 * i16::from(percent)).max(least);
     change(thread, Change::to(which, factor.cast_unsigned().min(which.most())));
 }

@@ -792,8 +792,7 @@ fn has_room(port: &Port) -> Option<bool> {
 fn decide(links: &Links, port: &Port, line: &[u8]) {
     let settings = links.settings.borrow();
     if let Some(speech) = Speech::decided_by(line, &settings) {
-        port.decide(speech);
-        links.decided(&settings);
+        links.decide(port, speech, &settings);
     }
 }
 
@@ -865,10 +864,13 @@ fn run_block(links: &Links, port: &Port, block: &[u8], tried: Usual) -> (Status,
     }
 }
 
-/// Ends the program, as M2 does, for one that has been killed. The planner is free.
-pub fn end_program(links: &Links) {
+/// Ends the program, as M2 does, for one that has been killed, or reset. The planner is free.
+pub fn end_program(links: &Links, resets: bool) {
     // It is never refused, not in an alarm either, and changes no table.
     let _ = carry_out(links, b"M2", Usual::NotTried);
+    if resets {
+        links.model.borrow_mut().reset();
+    }
 }
 
 /// Refuses a block in an alarm, unless it ends that, and else carries it out.
@@ -908,7 +910,8 @@ fn enter(jogs: bool) {
 #[inline(never)]
 fn carry_out(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
     let words = jog(block);
-    if words.is_some() && machine::cycle() != Cycle::Jog && is_working(links) {
+    let waits = || machine::is_held() || (machine::cycle() != Cycle::Jog && is_working(links));
+    if words.is_some() && waits() {
         // It waits for nothing but other jogs.
         return (Status::NotAccepted, true);
     }

@@ -172,7 +172,11 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
             if planner.is_flushed() {
                 seek::drop_blocks(links.thread).await;
                 if planner.restart() {
-                    parser::end_program(links);
+                    let resets = links.is_resetting();
+                    if resets {
+                        planner.stop_checks();
+                    }
+                    parser::end_program(links, resets);
                 }
             }
             links.parser_wake.signal();

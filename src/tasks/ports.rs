@@ -131,12 +131,6 @@ impl Port {
         }
     }
 
-    /// The port speaks so from now on, and does not wait for a decision any more.
-    pub fn decide(&self, speech: Speech) {
-        self.speech.set(speech);
-        self.undecided.set(false);
-    }
-
     /// How many lines may come: what footers tell. Each may be [`PROMISED`] bytes long with its end, a longer one takes several.
     #[inline(never)]
     pub fn promise(&self, lines: &LinePool) -> u8 {
@@ -164,7 +158,7 @@ impl Port {
         self.tx.lock().await
     }
 
-    /// Whether there is something to tell on this port alone.
+    /// Whether there is something to tell on this port alone, or to answer that is no line.
     #[inline(always)]
     pub fn tells(&self) -> bool {
         self.enquiry.get() || self.lost.get() || self.asks_report()
@@ -207,11 +201,26 @@ impl Links {
         self.port(if is_shared(feeder) { USB } else { feeder })
     }
 
-    /// Ports may have begun to speak otherwise: which are eager ([`Port::is_eager`]), and how the sides stop each other.
+    /// A port speaks so from now on, and does not wait for a decision any more.
+    #[inline(never)]
+    #[small]
+    pub fn decide(&self, port: &Port, speech: Speech, settings: &Settings) {
+        port.speech.set(speech);
+        port.undecided.set(false);
+        self.decided(settings);
+    }
+
+    /// Ports may have begun to speak otherwise: which are eager ([`Port::is_eager`]), how the sides stop each other, and which motion mode there
+    /// is at first.
+    #[inline(never)]
+    #[small]
     pub fn decided(&self, settings: &Settings) {
         let eager = self.ports.iter().filter(|port| port.is_eager());
         set_eager(eager.fold(0, |ports, port| ports | 1 << port.number));
         self.set_flow(settings);
+        if self.ports.iter().any(|port| port.speech.get().is_in_order()) {
+            self.model.borrow_mut().begin_with_rapids();
+        }
     }
 
     /// How the sides of each line stop each other follows from the settings and the dialect.
@@ -219,6 +228,11 @@ impl Links {
     #[small]
     pub fn set_flow(&self, settings: &Settings) {
         self.ports.iter().for_each(|port| uart::set_flow(port.number, port.flow(settings)));
+    }
+
+    /// Whether a sender has reset the machine, and waits for the greeting.
+    pub fn is_resetting(&self) -> bool {
+        self.ports.iter().any(Port::is_resetting)
     }
 
     /// Reports an exception to whoever feeds the machine.

@@ -69,8 +69,7 @@ pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
 fn decide(links: &Links, port: &Port) {
     let settings = links.settings.borrow();
     if let Some(speech) = Speech::of_question(&settings) {
-        port.decide(speech);
-        links.decided(&settings);
+        links.decide(port, speech, &settings);
     }
 }
 
@@ -82,16 +81,13 @@ fn act(links: &Links, port: &Port, byte: u8) {
             port.ask(REPORT);
             links.parser_wake.signal();
         }
-        DOOR => {
-            hold::door(links, true);
-            hold::door(links, false);
-        }
+        DOOR => hold::knock(links),
         SPINDLE_STOP => spindle::pause(links),
         FLOOD => spindle::flip(links, outputs::FLOOD),
         MIST => spindle::flip(links, outputs::MIST),
         _ => {
             if let Some(asked) = Asked::NOTHING.with(byte) {
-                overrides::apply(links, asked);
+                overrides::apply(links, port, asked);
                 overrides::tell(links);
             }
         }

@@ -98,7 +98,7 @@ fn system(rest: &[u8]) -> Command {
 fn setting(rest: &[u8]) -> Option<Command> {
     let equals = rest.iter().position(|byte| *byte == b'=')?;
     let mut number = 0u8;
-    for digit in rest.get(..equals)? {
+    for digit in trim(rest.get(..equals)?) {
         let digit = digit.wrapping_sub(b'0');
         if digit > 9 {
             return None;
@@ -130,6 +130,11 @@ fn is_jog(words: &[u8]) -> bool {
         let letter = byte.to_ascii_uppercase();
         match letter {
             b' ' | b'\t' | b'0'..=b'9' | b'.' | b'-' | b'+' | b'N' => {}
+            b';' => break,
+            b'(' => {
+                let rest = words.get(at..).unwrap_or(&[]);
+                at += rest.iter().position(|byte| *byte == b')').map_or(rest.len(), |end| end + 1);
+            }
             b'F' => feeds = true,
             b'G' => {
                 let digits = [words.get(at).copied(), words.get(at + 1).copied()];

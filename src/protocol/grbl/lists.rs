@@ -119,7 +119,7 @@ pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
         text(out, text!(" M9"));
     }
     text(out, text!(" T"));
-    int(out, machine.value(Value::Tool));
+    int(out, machine.value(Value::SelectedTool));
     text(out, text!(" F"));
     super::write::speed(out, machine.value(Value::Feed), machine.value(Value::Units) == 0);
     text(out, text!(" S"));

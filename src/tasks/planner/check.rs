@@ -18,6 +18,12 @@ impl Planner {
         matches!(self.begun, Begun::Check(_))
     }
 
+    /// Ends check mode, for a reset.
+    pub(super) fn stop_checks(&mut self) {
+        machine::carry_out(machine::Event::Done);
+        self.check();
+    }
+
     /// Keeps the model's state when check mode begins, and gives it back when that has ended.
     #[inline(never)]
     #[small]
