@@ -7,6 +7,7 @@ use super::{Board, Encoder, Handshake, MotorPins, Pwm, Serial, Timer, USB, Usart
 pub const MEGA2560_GRBL: Board = Board {
     name: "mega2560-grbl",
     features: &["dialect-tinyg", "dialect-grbl", "cycles", "probing", "jobs", "help"],
+    dialect: 0,
     clock_hz: 16_000_000,
     motors: [
         MotorPins { step: pin(A, 2), dir: pin(C, 7), enable: None }, // D24, D30

@@ -7,6 +7,7 @@ use super::{Board, Encoder, MotorPins, Pwm, Timer, USB, pin};
 pub const RAMPS14: Board = Board {
     name: "ramps14",
     features: &["dialect-tinyg", "cycles", "probing", "jobs", "help", "lathe"],
+    dialect: 0,
     clock_hz: 16_000_000,
     motors: [
         MotorPins { step: pin(F, 0), dir: pin(F, 1), enable: Some(pin(D, 7)) }, // X: A0, A1, D38

@@ -27,7 +27,7 @@ use crate::store::kept;
 use crate::tasks::common::Common;
 use crate::tasks::links::{Changes, Links, QueueCount};
 use crate::tasks::planner::Planner;
-use crate::tasks::ports::{AUX_RESERVE, Port};
+use crate::tasks::ports::{AUX_RESERVE, Choice, Port};
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
@@ -132,7 +132,11 @@ fn choose_dialects(links: &Links) {
     let chooses = Speech::of_question(&settings).is_some();
     for port in &links.ports {
         port.speech.set(Speech::at_start(&settings, port.number));
-        port.undecided.set(chooses && settings.lets_senders_choose(port.number));
+        port.choice.set(match chooses {
+            false => Choice::None,
+            true if settings.lets_senders_choose(port.number) => Choice::Open,
+            true => Choice::Set,
+        });
     }
     links.decided(&settings);
 }

@@ -302,6 +302,8 @@ pub struct Board {
     /// The Cargo features that its image has: dialects and [capabilities](crate::capability::Capability). `cargo xtask` reads them in
     /// the board's file.
     pub features: &'static [&'static str],
+    /// In which dialect its ports begin by default: the default of the setting `dia`. With 0 what is said first decides.
+    pub dialect: u8,
     /// CPU clock, Hz.
     pub clock_hz: u32,
     /// The four stepper drivers, motor 1 first.

@@ -162,8 +162,8 @@ fn the_room_that_a_report_tells_is_there() {
     assert_eq!(sender.in_flight(), 0);
 }
 
-/// What the two ports say at a start with this setting of `dia`, and to an empty line: the second, and the first.
-fn spoken(dia: u8) -> [String; 2] {
+/// What the two ports say at a start with this setting of `dia`, and to these bytes: the second, and the first.
+fn spoken(dia: u8, bytes: &'static [u8]) -> [String; 2] {
     let set = move || {
         let machine = Machine::boot(115_200).expect("one machine for each thread");
         machine.run_ms(100);
@@ -176,8 +176,8 @@ fn spoken(dia: u8) -> [String; 2] {
         eeprom::put(&left);
         let machine = Machine::boot(115_200).expect("one machine for each thread");
         machine.run_ms(100);
-        machine.send(b"\n");
-        machine.send_aux(b"\n");
+        machine.send(bytes);
+        machine.send_aux(bytes);
         machine.run_ms(50);
         [machine.received(), machine.received_aux()].map(|heard| String::from_utf8(heard).unwrap())
     };
@@ -189,7 +189,7 @@ fn each_port_has_the_dialect_that_is_set_for_it() {
     for (dia, ports) in
         [(3, "gg"), (2, "tt"), (0, "bb"), (11, "gt"), (14, "tg"), (7, "gb"), (12, "bg")]
     {
-        for (heard, port) in spoken(dia).iter().zip(ports.chars()) {
+        for (heard, port) in spoken(dia, b"\n").iter().zip(ports.chars()) {
             let [grbl, tinyg] = ["Grbl 1.1h", "SYSTEM READY"].map(|text| heard.contains(text));
             let said = if heard.ends_with("ok\r\n") {
                 'g'
@@ -202,6 +202,26 @@ fn each_port_has_the_dialect_that_is_set_for_it() {
                 said == port && grbl == (port != 't') && tinyg == (port != 'g'),
                 "{dia}: {heard}"
             );
+        }
+    }
+}
+
+#[test]
+fn each_port_tells_what_has_decided_for_its_dialect() {
+    let questions = ["$I\n", "{dia:n}\n"];
+    // What each answers: in which dialect, and why.
+    let told = ["[MSG:grbl's dialect, ", "\"msg\":\"TinyG's dialect on this port, "];
+    for (dia, question, dialect, why) in [
+        (0, 0, 0, "for it was said first"),
+        (0, 1, 1, "for it was said first"),
+        (3, 0, 0, "as is set"),
+        (2, 1, 1, "as is set"),
+        (1, 1, 1, "as is set"),
+    ] {
+        let question: &'static str = questions[question];
+        for heard in spoken(dia, question.as_bytes()) {
+            let wanted = format!("{}{why}", told[dialect]);
+            assert!(heard.contains(&wanted), "{dia}: {heard} instead of {wanted}");
         }
     }
 }

@@ -221,5 +221,5 @@ fn startup_lines_survive_a_power_cut_and_are_carried_out() {
     };
     let (greeting, modes) = thread::spawn(start).join().unwrap();
     assert!(greeting.contains("Grbl 1.1h") && greeting.contains(">G20G55:ok\r\n"), "{greeting}");
-    assert!(modes.starts_with("[GC:G80 G55 G17 G20 "), "{modes}");
+    assert!(modes.starts_with("[GC:G0 G55 G17 G20 "), "{modes}");
 }

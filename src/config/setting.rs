@@ -323,6 +323,11 @@ impl Setting {
         self.0 == const { row_of(&system::LIST, "baud") }
     }
 
+    /// Whether it is the dialect of the ports.
+    pub fn is_dialect(self) -> bool {
+        self.0 == const { row_of(&system::LIST, "dia") }
+    }
+
     /// Whether it is in EEPROM alone.
     pub fn is_cold(self) -> bool {
         (Self::WARM..Self::COLD).contains(&self.0)

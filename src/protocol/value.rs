@@ -58,6 +58,8 @@ pub enum Value {
     Tool,
     /// The tool of the last T.
     SelectedTool,
+    /// What has decided in which dialect the port is spoken to: 1 a setting, 2 what was said, 0 nothing, for there is one alone.
+    Choice,
     /// 0 not homed, 1 homed, 2 homing.
     Home,
     /// Of a hold: 0 if no door has begun it, 1 if one has, 2 if one has and it is over as soon as the machine stands.

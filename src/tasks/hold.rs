@@ -210,7 +210,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
 #[inline(never)]
 #[small]
 fn starts_over(links: &Links, port: &Port) -> bool {
-    if port.undecided.get() {
+    if port.is_undecided() {
         return machine::alarm() == Alarm::None && !is_busy(links) && !links.has_data();
     }
     port.speech.get().is_in_order() && machine::alarm() != Alarm::Panic
@@ -232,7 +232,7 @@ fn start_over(links: &Links, port: &Port, slot: Option<u8>, works: bool) {
     let homes = machine::cycle() == machine::Cycle::Homing;
     let interrupted = if homes { INTERRUPTED | ports::HOMING } else { INTERRUPTED };
     port.ask(if works { GREETING | interrupted } else { GREETING });
-    if port.undecided.get() {
+    if port.is_undecided() {
         port.ask(OTHERS);
     }
     links.reporter_wake.urge();

@@ -719,7 +719,7 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
     let Chosen { port, id, class } = *chosen;
     let lines = port.lines.borrow();
     let (line, length) = (lines.text(id), lines.length(id));
-    if port.undecided.get() {
+    if port.is_undecided() {
         decide(links, port, line);
     }
     if port.is_resetting() && matches!(class, Class::Fault(_)) {

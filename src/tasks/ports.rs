@@ -51,6 +51,20 @@ pub const HOMING: u8 = 8;
 /// Of [`Port::asked`]: the machine is to be reset, which control does.
 pub const RESET: u8 = 16;
 
+/// What has decided in which dialect a port is spoken to.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+pub enum Choice {
+    /// The image has one alone.
+    #[default]
+    None = 0,
+    /// The setting.
+    Set = 1,
+    /// What was said first.
+    Said = 2,
+    /// Nothing so far: the first that is said in one alone will.
+    Open = 3,
+}
+
 /// What a port has to itself.
 pub struct Port {
     /// Which one it is.
@@ -69,8 +83,8 @@ pub struct Port {
     pub enquiry: Cell<bool>,
     /// What a sender has asked for by a byte, as bits: the reporter answers, a [`REPORT`] the parser.
     pub asked: Cell<u8>,
-    /// Nothing has been said that only one dialect says, so that the first such thing decides.
-    pub undecided: Cell<bool>,
+    /// What has decided in which dialect it is spoken.
+    pub choice: Cell<Choice>,
     /// How the machine stood when the report or group that is being told on this port first told of motion.
     pub seen: Cell<Option<Seen>>,
     /// Bytes have been lost, which the parser tells.
@@ -94,7 +108,7 @@ impl Port {
             clears: Cell::new(Alarm::None),
             enquiry: Cell::new(false),
             asked: Cell::new(0),
-            undecided: Cell::new(false),
+            choice: Cell::default(),
             seen: Cell::new(None),
             lost: Cell::new(false),
             cut: Cell::new(None),
@@ -118,9 +132,14 @@ impl Port {
         self.asked.get() & GREETING != 0
     }
 
+    /// Whether nothing has been said that only one dialect says, so that the first such thing decides.
+    pub fn is_undecided(&self) -> bool {
+        self.choice.get() == Choice::Open
+    }
+
     /// Whether `?` and bytes above 0x7F are looked for within lines.
     pub fn is_eager(&self) -> bool {
-        self.undecided.get() || self.speech.get().is_in_order()
+        self.is_undecided() || self.speech.get().is_in_order()
     }
 
     /// How the two sides stop each other: characters for it are for dialects whose senders know them.
@@ -206,7 +225,7 @@ impl Links {
     #[small]
     pub fn decide(&self, port: &Port, speech: Speech, settings: &Settings) {
         port.speech.set(speech);
-        port.undecided.set(false);
+        port.choice.set(Choice::Said);
         self.decided(settings);
     }
 

@@ -5,7 +5,7 @@
 //! looks through the whole receive ring, also when the line pool is full. A byte that acts leaves the ring, and so does any other above 0x7F, so that
 //! questions take no room from lines that wait. Thread mode; 15 cycles a byte that waits.
 //!
-//! On a port that has not been decided ([`Port::undecided`]) a `?` at the beginning of a line decides, and acts.
+//! On a port that has not been decided ([`Port::is_undecided`]) a `?` at the beginning of a line decides, and acts.
 
 use kerf_macros::small;
 
@@ -46,7 +46,7 @@ pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
     while n < ring.len() {
         let byte = ring.get(n);
         closes &= byte >= MARKS || byte == GO;
-        if port.undecided.get() && byte == ASKS && !within {
+        if port.is_undecided() && byte == ASKS && !within {
             decide(links, port);
         }
         within = if byte < b' ' { false } else { within || byte != b' ' };

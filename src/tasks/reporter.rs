@@ -251,7 +251,7 @@ fn is_over(port: &Port) -> bool {
 #[inline(never)]
 #[small]
 fn greet_undecided(links: &Links) {
-    for port in links.ports.iter().filter(|port| port.undecided.get() && !is_shared(port.number)) {
+    for port in links.ports.iter().filter(|port| port.is_undecided() && !is_shared(port.number)) {
         let Ok(mut tx) = port.tx.try_lock() else { continue };
         greet_otherwise(links, port, &mut tx);
     }
@@ -278,7 +278,7 @@ fn start_up(links: &Links) {
 pub fn tell_startup(links: &Links, line: u8, status: Status) {
     let port = links.told();
     let Ok(mut tx) = port.tx.try_lock() else { return };
-    let undecided = port.undecided.get();
+    let undecided = port.is_undecided();
     let asks = if undecided { Speech::of_question(&links.settings.borrow()) } else { None };
     let speech = asks.unwrap_or(port.speech.get());
     let notice = Notice::Startup(line, status);

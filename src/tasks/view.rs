@@ -379,6 +379,7 @@ impl Machine for View<'_> {
             Value::Override(which) => overrides::now(self.links.thread).factor(which).into(),
             Value::OverrideOn(which) => overrides::now(self.links.thread).is_on(which).into(),
             Value::Tool => self.links.model.borrow().tool().into(),
+            Value::Choice => self.port.choice.get() as i32,
             Value::SelectedTool => self.links.model.borrow().selected_tool().into(),
             Value::Input(input) => self.input(input),
             Value::ProbeState => self.links.probe.state() as i32,

@@ -3,7 +3,7 @@
 //! Each has parts, of at most a coordinate or a few words, that are put one after the other.
 
 use super::settings;
-use super::write::{close, int, length, line_end, text};
+use super::write::{close, int, length, line_end, message, text};
 use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
@@ -139,11 +139,23 @@ pub fn build(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
         close(out);
         return Some(1);
     }
-    text(out, text!("[OPT:VNMHA,"));
-    int(out, machine.value(Value::BlocksFree));
-    out.put(b',');
-    int(out, machine.value(Value::BytesFree));
-    close(out);
+    if at == 1 {
+        text(out, text!("[OPT:VNMHA,"));
+        int(out, machine.value(Value::BlocksFree));
+        out.put(b',');
+        int(out, machine.value(Value::BytesFree));
+        close(out);
+        return Some(2);
+    }
+    let said = machine.value(Value::Choice) > 1;
+    message(
+        out,
+        if said {
+            text!("grbl's dialect, for it was said first")
+        } else {
+            text!("grbl's dialect, as is set")
+        },
+    );
     None
 }
 

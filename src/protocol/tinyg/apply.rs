@@ -29,7 +29,13 @@ impl Request {
         match (target, pair.kind) {
             (Target::Unknown, _) => Err(Status::UnrecognizedName),
             (_, Kind::Object) | (Target::Group(_), _) => Err(Status::UnsupportedType),
-            (Target::Token(token), Kind::Null) => Ok(Some(token)),
+            (Target::Token(token), Kind::Null) => {
+                if matches!(token.subject(), Some(Subject::Setting(setting)) if setting.is_dialect())
+                {
+                    self.tell_choice(c);
+                }
+                Ok(Some(token))
+            }
             (Target::Token(token), _) => {
                 match token.subject() {
                     Some(Subject::Setting(setting)) => self.set(setting, pair, c)?,
@@ -62,6 +68,17 @@ impl Request {
                 done.map(|()| None)
             }
         }
+    }
+
+    /// What has decided for the dialect of the port, if there are several.
+    #[inline(never)]
+    fn tell_choice<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let remark = match c.machine.value(Value::Choice) {
+            0 => return,
+            1 => Remark::Set,
+            _ => Remark::Said,
+        };
+        self.remark = self.remark.max(remark);
     }
 
     #[inline(never)]

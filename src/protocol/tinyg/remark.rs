@@ -23,6 +23,10 @@ pub enum Remark {
     Baud,
     /// There is no such built-in job.
     Test,
+    /// The port is spoken to so for it is set.
+    Set,
+    /// The port is spoken to so for it was spoken to so first.
+    Said,
     /// Where help is.
     Help,
     /// How to get into the boot loader.
@@ -44,7 +48,7 @@ impl Remark {
 
 progmem! {
     // A table, for what the compiler makes of a `match` would be in RAM.
-    static REMARKS: [Text; 12] = [
+    static REMARKS: [Text; 14] = [
         text!(""),
         text!("*** WARNING *** Setting non-standard microstep value"),
         text!("*** WARNING *** Velocity limited by the step rate"),
@@ -52,6 +56,8 @@ progmem! {
         text!("*** WARNING *** Search velocity limited by vm"),
         text!("*** WARNING *** Unsupported baud rate specified"),
         text!("Test not found"),
+        text!("TinyG's dialect on this port, as is set"),
+        text!("TinyG's dialect on this port, for it was said first"),
         text!("Send $h for help, {sys:n} for the settings"),
         text!("Send {boot:true} to enter boot loader"),
         text!("Entering boot loader"),
