@@ -142,7 +142,12 @@ impl<'a> View<'a> {
         if self.shares || self.seen.get().is_some() {
             return self.seen().carries_out;
         }
-        // Without positions, which take 6,000 cycles.
+        self.works_now()
+    }
+
+    /// Whether a line is being carried out at the moment, without positions, which take 6,000 cycles.
+    #[inline(never)]
+    fn works_now(&self) -> bool {
         is_queued(self.links) || with(self.links.thread, |state| state.motion.running)
     }
 
@@ -422,8 +427,8 @@ impl Machine for View<'_> {
     }
 
     fn doing(&mut self) -> Doing {
-        // A jog of G-code ends when nothing is left of it.
-        if machine::cycle() == Cycle::Jog && !self.has_work() {
+        // A jog of G-code ends when nothing is left of it: by now, not at the moment that a report is about.
+        if machine::cycle() == Cycle::Jog && !self.works_now() {
             machine::carry_out(machine::Event::Done);
         }
         machine::doing(|| self.has_work())
