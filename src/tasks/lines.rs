@@ -146,9 +146,29 @@ impl LinePool {
         self.in_order && acts(byte)
     }
 
-    /// Whether all lines are answered in their order, from now on.
+    /// Whether all lines are answered in their order, from now on: those that have come, too.
     pub fn keep_order(&mut self, keep: bool) {
         self.in_order = keep;
+        if keep && self.controls > 0 {
+            self.put_in_order();
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    #[small]
+    fn put_in_order(&mut self) {
+        self.controls = 0;
+        for entry in &mut self.entries {
+            if entry.class == Class::Control {
+                entry.class = Class::Data;
+            }
+        }
+    }
+
+    /// The line that has come last.
+    pub fn newest(&self) -> &[u8] {
+        self.text(LineId((self.entries.len() as u8).wrapping_sub(1)))
     }
 
     /// What to do with a line that has come whole.

@@ -41,7 +41,7 @@ use crate::hal::uart;
 use crate::jobs::Job;
 use crate::machine::alarm::is_program_end;
 use crate::machine::{self, Alarm, Cycle};
-use crate::protocol::{Answers, Ending, Next, Notice, Out, Request, Span, Speech, asks_alarm, jog};
+use crate::protocol::{Answers, Ending, Next, Notice, Out, Request, Span, asks_alarm, jog};
 use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
@@ -720,7 +720,7 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
     let lines = port.lines.borrow();
     let (line, length) = (lines.text(id), lines.length(id));
     if port.is_undecided() {
-        decide(links, port, line);
+        links.decide_by(port, line);
     }
     if port.is_resetting() && matches!(class, Class::Fault(_)) {
         return Begun::Silent;
@@ -783,17 +783,6 @@ fn begin_report(port: &Port, session: &mut Session) -> bool {
 #[small]
 fn has_room(port: &Port) -> Option<bool> {
     port.tx.try_lock().ok().map(|tx| tx.has_room())
-}
-
-/// A line decides for a dialect if it is said in one alone.
-#[cold]
-#[inline(never)]
-#[small]
-fn decide(links: &Links, port: &Port, line: &[u8]) {
-    let settings = links.settings.borrow();
-    if let Some(speech) = Speech::decided_by(line, &settings) {
-        links.decide(port, speech, &settings);
-    }
 }
 
 /// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so

@@ -220,6 +220,16 @@ impl Links {
         self.port(if is_shared(feeder) { USB } else { feeder })
     }
 
+    /// A line decides for a dialect on a port if it is said in one alone.
+    #[inline(never)]
+    #[small]
+    pub fn decide_by(&self, port: &Port, line: &[u8]) {
+        let settings = self.settings.borrow();
+        if let Some(speech) = Speech::decided_by(line, &settings) {
+            self.decide(port, speech, &settings);
+        }
+    }
+
     /// A port speaks so from now on, and does not wait for a decision any more.
     #[inline(never)]
     #[small]

@@ -141,9 +141,7 @@ impl<const N: usize> Intake<N> {
     fn turn(&mut self, links: &Links) -> Left {
         let mut pool = self.port.lines.borrow_mut();
         let pool = &mut *pool;
-        let speech = self.port.speech.get();
-        pool.keep_empty(speech.answers_empty());
-        pool.keep_order(speech.is_in_order());
+        self.speak(pool);
         for _ in 0..TURN {
             if self.refused > 0 && !self.refuse(pool, links) {
                 return Left::Full;
@@ -206,6 +204,9 @@ impl<const N: usize> Intake<N> {
     #[inline(always)]
     fn ended(&mut self, pool: &mut LinePool, looked: bool, links: &Links) {
         self.scan.serve(links, pool, looked);
+        if self.port.is_undecided() {
+            self.decide(pool, links);
+        }
         if machine::is_alarmed() && pool.ends_with_control() {
             hold::refuse_older(links, pool);
         }
@@ -213,6 +214,23 @@ impl<const N: usize> Intake<N> {
             set_asked(true);
         }
         links.parser_wake.signal();
+    }
+
+    /// How lines are taken follows from the dialect.
+    #[inline(never)]
+    fn speak(&self, pool: &mut LinePool) {
+        let speech = self.port.speech.get();
+        pool.keep_empty(speech.answers_empty());
+        pool.keep_order(speech.is_in_order());
+    }
+
+    /// The line that has come last may decide for a dialect: those right behind it are taken as it has them.
+    #[cold]
+    #[inline(never)]
+    #[small]
+    fn decide(&self, pool: &mut LinePool, links: &Links) {
+        links.decide_by(self.port, pool.newest());
+        self.speak(pool);
     }
 
     /// Whether the next byte is one of those that are dropped. It is taken by itself then.

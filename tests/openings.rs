@@ -1,0 +1,33 @@
+//! How senders that cannot run here open a conversation, with the firmware on the host: `tests/support/openings.rs` has them;
+//! `tests/sim/tests/openings.rs` has the same with the image.
+
+#[path = "support/host.rs"]
+mod host;
+#[path = "support/openings.rs"]
+mod openings;
+#[path = "support/side.rs"]
+mod side;
+
+use std::thread;
+
+use kerf::hal::imp::{Machine, eeprom};
+
+#[test]
+fn every_sender_finds_its_own() {
+    openings::all(boot);
+}
+
+/// A machine that begins with this value of `dia`: its memory is filled by one in a thread of its own.
+fn boot(dia: u8) -> Machine {
+    let set = move || {
+        let machine = Machine::boot(115_200).expect("one machine for each thread");
+        machine.run_ms(100);
+        machine.send(format!("{{dia:{dia}}}\n").as_bytes());
+        machine.run_ms(500);
+        eeprom::contents()
+    };
+    eeprom::put(&thread::spawn(set).join().unwrap());
+    let machine = Machine::boot(115_200).expect("one machine for each thread");
+    machine.run_ms(100);
+    machine
+}

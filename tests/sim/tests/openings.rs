@@ -1,0 +1,35 @@
+//! How senders that cannot run here open a conversation, with the image on the simulated chip: those of `tests/openings.rs`.
+
+mod common;
+#[path = "../../support/openings.rs"]
+mod openings;
+#[path = "../../support/side.rs"]
+mod side;
+#[path = "common/simulated.rs"]
+mod simulated;
+
+use common::firmware;
+use kerf::boards::MEGA2560_GRBL;
+use kerf_sim::Machine;
+use side::Side;
+
+#[test]
+fn every_sender_finds_its_own() {
+    openings::all(boot);
+}
+
+/// A machine that begins with this value of `dia`: it has been started anew.
+fn boot(dia: u8) -> Machine {
+    let mut machine = firmware(&MEGA2560_GRBL);
+    machine.run_ms(1_500);
+    if dia != 0 {
+        Side::send(&mut machine, format!("{{dia:{dia}}}\n").as_bytes());
+        machine.run_ms(500);
+        Side::send(&mut machine, b"\x18");
+        machine.run_ms(1_500);
+        // What it said before.
+        let heard = String::from_utf8_lossy(&machine.heard()).into_owned();
+        assert!(heard.contains("Grbl"), "{heard}");
+    }
+    machine
+}

@@ -1,0 +1,267 @@
+//! How senders that cannot run here open a conversation: what each says, byte for byte, and what it takes for an answer, by its own
+//! regular expressions and timeouts.
+//!
+//! Each is had on a port where nothing is decided and on one that is set to grbl's dialect, while the other port is quiet and while it is told reports
+//! in TinyG's. A [`Step`] is over when its expressions have been matched by lines in their order. Any other line has to match one of those that
+//! every sender of grbl's knows ([`KNOWN`]); the JSON of an undecided port may come until an answer shows that it is decided.
+//!
+//! Bytes and expressions are facts of the senders' sources: the names of their own are told at each.
+
+use std::thread;
+
+use regex::Regex;
+
+use crate::side::Side;
+
+/// What is sent at once, what is to be heard, and within how many ms.
+struct Step {
+    says: &'static [u8],
+    hears: &'static [&'static str],
+    within: u64,
+}
+
+/// A sender, and its steps.
+struct Sender {
+    name: &'static str,
+    steps: &'static [Step],
+}
+
+/// A step.
+const fn step(says: &'static [u8], hears: &'static [&'static str], within: u64) -> Step {
+    Step { says, hears, within }
+}
+
+const OK: &str = "^ok$";
+const GREETING: &str = r"^Grbl 1\.1[a-z]? \['\$' for help\]$";
+
+/// Lines that any of them passes over or shows.
+const KNOWN: [&str; 6] = [
+    OK,
+    GREETING,
+    "^$",
+    r"^<[A-Z][a-z]+(:\d)?\|.*>$",
+    r"^\[(MSG|VER|OPT|GC|PRB|TLO|HLP):.*\]$",
+    r"^\$\d+=-?[\d.]+$",
+];
+
+/// State, position in machine coordinates second, more fields behind it.
+const REPORT: &str = r"^<(Idle|Run|Hold:[01]|Jog|Alarm|Door:[0-3]|Check|Home|Sleep)\|MPos:-?\d+\.\d{3},-?\d+\.\d{3},-?\d+\.\d{3}(,-?\d+\.\d{3})*\|";
+const VERSION: &str = r"^\[VER:[v]?([0-9]*)\.([0-9]*)(\w?).*:.*\]$";
+/// Letters, blocks, bytes: at least 128 of these.
+const OPTIONS: &str = r"^\[OPT:[A-Z0-9+*$#]*,\d+,(1[2-9]\d|[2-9]\d\d)\]$";
+const MODES: &str = r"^\[(?:GC:)?((?:[a-zA-Z][0-9]+(?:\.[0-9]*)?\s*)+)\]$";
+const ERROR: &str = r"^error:\d+$";
+/// Settings that each of them looks for.
+const SETTINGS: [&str; 8] = [
+    r"^\$10=[0-3]$",
+    r"^\$13=[01]$",
+    r"^\$20=[01]$",
+    r"^\$22=[01]$",
+    r"^\$30=\d+(\.\d+)?$",
+    r"^\$32=[01]$",
+    r"^\$110=\d+\.\d{3}$",
+    r"^\$130=\d+\.\d{3}$",
+];
+
+const SENDERS: [Sender; 8] = [
+    // GrblControllerInitializer: a question until there is a status, an empty line, version and options, settings, modes; then `?` 5 times a
+    // second. `isOkResponse` is `ok` alone. It gives up 12 s after the port was opened, and 4 s after each line.
+    Sender {
+        name: "Universal G-Code Sender",
+        steps: &[
+            step(b"?", &[REPORT], 4_000),
+            step(b"\n", &[OK], 4_000),
+            step(b"$I\n", &[VERSION, OPTIONS, OK], 4_000),
+            step(b"$$\n", &[SETTINGS[0], SETTINGS[6], SETTINGS[7], OK], 4_000),
+            step(b"$G\n", &[MODES, OK], 4_000),
+            step(b"?", &[REPORT], 200),
+            step(b"?", &[REPORT], 200),
+            // Its jog, the restoring of modes, and its way to zero an axis.
+            step(b"$J=G21G91X1F600\n", &[OK], 1_000),
+            step(b"?", &[r"^<(Run|Jog)\|"], 200),
+            step(b"\x85", &[], 500),
+            step(b"G10P0L20X0\n$G\n", &[OK, MODES, OK], 4_000),
+            step(b"?", &[r"^<Idle\|"], 200),
+        ],
+    },
+    // The one before the initializer: a reset, and nothing before the greeting, which has a version behind its first blank.
+    Sender {
+        name: "Universal G-Code Sender, older",
+        steps: &[
+            step(b"\x18", &["^Grbl [0-9]*\\.[0-9]*[a-z]"], 5_000),
+            step(b"$I\n$G\n$$\n", &[VERSION, OPTIONS, OK, MODES, OK, SETTINGS[6], OK], 4_000),
+            step(b"?", &[REPORT], 200),
+        ],
+    },
+    // frmMain: `grblReset` sends 18 and takes what begins so for the answer (`dataIsReset`); then what is shown, all at once, within 127
+    // characters; states have to be of its list; a question each 250 ms, of which the next waits for the report.
+    Sender {
+        name: "Candle",
+        steps: &[
+            step(b"\x18", &[r"(?i)^GRBL\s\d\.\d."], 5_000),
+            step(b"?", &[r"^<(Idle|Alarm|Run|Home|Hold:0|Hold:1|Check|Door:[0-3]|Jog|Sleep)[|>].*MPos:([^,]*),([^,]*),([^,^>^|]*)"], 250),
+            step(b"$$\n$#\n$G\n", &[SETTINGS[0], OK, r"^\[G54:", r"^\[G59:", r"^\[G28:", r"^\[G92:", r"^\[TLO:", r"^\[PRB:", OK, r"^\[GC:.*G5[4-9]", OK], 2_000),
+            step(b"?", &[r"\|FS:([^,]*),([^,^|^>]*)"], 250),
+            step(b"?", &[REPORT], 250),
+            // Its jog, its zero, and a probing that begins from its own program.
+            step(b"$J=G21G91X1F300\n", &[OK], 1_000),
+            step(b"\x85", &[], 500),
+            step(b"G92X0Y0\n$#\n", &[OK, r"^\[G92:-?[\d.]+,-?[\d.]+,", OK], 2_000),
+            step(b"G92.1\nG21G90\n", &[OK, OK], 1_000),
+        ],
+    },
+    // Of CNCjs's kind, whose GrblRunner it has: 18 half a second behind the opening, then all that it shows at once; `?` each 250 ms, and
+    // `$G` each 500.
+    Sender {
+        name: "gSender",
+        steps: &[
+            step(b"\x18", &[r"^([a-zA-Z0-9]+)\s+((?:\d+\.){1,2}\d+[a-zA-Z0-9\-\.]*)([^\[]*\[[^\]]+\].*)?$"], 3_000),
+            step(b"$I\n$$\n$#\n$G\n?", &[ r"^\[(?:VER:)(.+)\]$", r"^\[(?:OPT:)(.+)\]$", OK, r"^(\$[^=]+)=([^ ]*)\s*$", OK, r"^\[(G54|G55|G56|G57|G58|G59|G28|G30|G92|TLO|PRB):(.+)\]$", OK, MODES, OK], 5_000),
+            step(b"?$G\n", &[REPORT, MODES, OK], 500),
+            step(b"$J=G21G91 X1 F1000\n", &[OK], 1_000),
+            step(b"\x85?", &[REPORT], 500),
+            step(b"", &[], 500),
+            step(b"G10 L20 P1 X0 Y0 Z0\n$#\n", &[OK, r"^\[G54:", OK], 2_000),
+        ],
+    },
+    // GrblCore: 18, up to the greeting, whose numbers and letter it reads; settings; then `?` each 200 ms. `ok` in small letters alone, an error by its
+    // beginning. Its programs begin with these lines, and are streamed within 127 characters.
+    Sender {
+        name: "LaserGRBL",
+        steps: &[
+            step(b"\x18", &[r"^Grbl (\d)\.(\d)([a-z])"], 5_000),
+            step(b"$I\n", &[VERSION, OPTIONS, OK], 2_000),
+            step(b"$$\n", &[SETTINGS[0], SETTINGS[1], SETTINGS[2], SETTINGS[3], SETTINGS[4], SETTINGS[5], SETTINGS[6], SETTINGS[7], OK], 2_000),
+            step(b"?", &[REPORT], 300),
+            step(b"G92 X0 Y0 Z0\nG90\nM5 S0\nG1 F1000\nM4\nG0 X0.1 Y0.1 S0\nG1 X0.2 F600 S100\nM5\n", &[OK, OK, OK, OK, OK, OK, OK, OK], 5_000),
+            step(b"", &[], 1_000),
+            step(b"$J=G91X1F1000\n", &[OK], 1_000),
+            step(b"\x85", &[], 1_000),
+            step(b"G92.1\n", &[OK], 1_000),
+        ],
+    },
+    // Its back end: a line end, `$I` and 18 without an answer, then `$$`, `$I`, `$G` at once. The greeting begins a line, and its
+    // version is the four characters behind the blank. `?` each 250 ms; jogs have their words glued.
+    Sender {
+        name: "OpenBuilds CONTROL",
+        steps: &[
+            step(b"\n\x18", &["^Grbl 1\\.1[a-z]"], 2_000),
+            step(b"$$\n$I\n$G\n?", &[SETTINGS[6], OK, VERSION, OPTIONS, OK, MODES, OK], 5_000),
+            step(b"?", &[REPORT], 250),
+            step(b"$J=G91G21X1F100000\n$J=G91G21X-1F100000\n", &[OK, OK], 2_000),
+            step(b"\x85", &[], 1_000),
+            step(b"G54\nG21 G90\nM3 S100\nM5\n", &[OK, OK, OK, OK], 2_000),
+        ],
+    },
+    // As its console shows: it waits for a greeting, asks for `$I` and `$$`, and takes the size of the buffer from `OPT`. A job begins so.
+    Sender {
+        name: "LightBurn",
+        steps: &[
+            step(b"", &[], 100),
+            step(b"$I\n", &[VERSION, OPTIONS, OK], 2_000),
+            step(b"$$\n", &[SETTINGS[0], SETTINGS[4], SETTINGS[5], SETTINGS[7], OK], 2_000),
+            step(b"?", &[REPORT], 250),
+            step(b"G00 G17 G40 G21 G54\nG90\nM4\nM8\nG0X0.1Y0.1S0\nG91\nG1X0.1S100F600\nM9\nG1S0\nM5\nG90\n", &[OK, OK, OK, OK, OK, OK, OK, OK, OK, OK, OK], 5_000),
+            step(b"; a comment\nM2\n", &[OK, OK], 5_000),
+            step(b"$#\n", &[r"^\[G54:", r"^\[PRB:", OK], 2_000),
+            step(b"$J=G91X1F3000\n", &[OK], 1_000),
+            step(b"\x85", &[], 1_000),
+        ],
+    },
+    // What is left for others: everything in one write, with errors in it, in CR LF, and lines that are nothing.
+    Sender {
+        name: "all at once",
+        steps: &[
+            step(b"\r\n\r\n\x18", &[GREETING], 5_000),
+            step(b"$I\r\n$$\r\n$#\r\n$G\r\n$N\r\n$\r\n\r\n$foo\r\nG6\r\n", &[VERSION, OPTIONS, OK, SETTINGS[0], SETTINGS[7], OK, r"^\[G54:", r"^\[PRB:", OK, MODES, OK, r"^\$N0=", r"^\$N1=", OK, r"^\[HLP:", OK, OK, ERROR, ERROR], 5_000),
+            step(b"???", &[REPORT], 100),
+            step(b"?", &[r"^<Idle\|"], 100),
+        ],
+    },
+];
+
+/// A conversation.
+struct Talk<S> {
+    side: S,
+    heard: String,
+    /// The other port is told reports.
+    aside: bool,
+    /// JSON may come still.
+    json: bool,
+    known: Vec<Regex>,
+}
+
+impl<S: Side> Talk<S> {
+    fn run(&mut self) {
+        self.side.run_ms(1);
+        self.heard += &String::from_utf8_lossy(&self.side.heard());
+    }
+
+    fn play(&mut self, step: &Step) -> Result<(), String> {
+        self.side.send(step.says);
+        if self.aside {
+            self.side.send_aux(b"{sr:n}\n");
+        }
+        let said = String::from_utf8_lossy(step.says).into_owned();
+        let mut wanted =
+            step.hears.iter().map(|text| Regex::new(text).expect("an expression")).peekable();
+        for _ in 0..step.within {
+            self.run();
+            while let Some((line, rest)) = self.heard.clone().split_once('\n') {
+                self.heard = rest.to_string();
+                let line = line.strip_suffix('\r').unwrap_or(line);
+                if wanted.next_if(|one| one.is_match(line)).is_some() {
+                    // Neither decides.
+                    self.json &= line == "ok" || line.starts_with("Grbl");
+                } else if !self.passes_over(line) {
+                    return Err(format!("{said:?} is answered by {line:?}"));
+                }
+            }
+            if wanted.peek().is_none() && !step.hears.is_empty() {
+                return Ok(());
+            }
+        }
+        match wanted.next() {
+            Some(missing) => {
+                Err(format!("{said:?} has no answer like {missing} after {} ms", step.within))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn passes_over(&self, line: &str) -> bool {
+        let of_list = line.starts_with('[') || line.starts_with('$');
+        of_list
+            || (self.json && line.starts_with('{'))
+            || self.known.iter().any(|one| one.is_match(line))
+    }
+}
+
+/// Has all of them, each with machines that `boot` starts with this value of `dia`.
+pub fn all<S: Side>(boot: impl Fn(u8) -> S + Sync) {
+    let known = || KNOWN.iter().map(|text| Regex::new(text).expect("an expression")).collect();
+    let mut failed = Vec::new();
+    for (dia, aside) in [(0, false), (0, true), (3, false), (11, true)] {
+        for sender in &SENDERS {
+            let play = || {
+                let side = boot(dia);
+                let mut talk =
+                    Talk { side, heard: String::new(), aside, json: dia == 0, known: known() };
+                if aside {
+                    talk.side.send_aux(b"{sr:{posx:t,posy:t,posz:t,vel:t,feed:t,stat:t,line:t,unit:t,coor:t,dist:t}}\n{sv:2}\n{si:100}\n");
+                    (0..400).for_each(|_| talk.run());
+                }
+                sender.steps.iter().try_for_each(|step| talk.play(step))
+            };
+            let played = thread::scope(|scope| scope.spawn(play).join());
+            match played {
+                Ok(Ok(())) => {}
+                Ok(Err(why)) => {
+                    failed.push(format!("{}, dia {dia}, aside {aside}: {why}", sender.name))
+                }
+                Err(_) => failed.push(format!("{} panics", sender.name)),
+            }
+        }
+    }
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
