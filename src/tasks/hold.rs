@@ -43,6 +43,7 @@ use crate::hal::system::reset;
 use crate::hal::time::millis;
 use crate::hal::{flags, uart};
 use crate::machine::{self, Alarm};
+use crate::protocol::{Hold, Machine};
 use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, LET_GO, RESET, RESUME, UNPLACED};
 use crate::status::Status;
 
@@ -158,7 +159,7 @@ pub fn serve(links: &Links) {
 fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
         if starts_over(links, port) {
-            let works = View::of(links, port).has_work() && !machine::is_checking();
+            let works = is_moving(links, port);
             return start_over(links, port, uart::last_cut(port.number), works);
         }
         reset();
@@ -308,6 +309,15 @@ fn drop_queue(links: &Links) {
     links.planner_wake.signal();
     links.cycle_start.signal();
     flags::set(Event::BlockDone);
+}
+
+/// Whether anything is carried out that is not held at rest, at a program stop, or only checked.
+#[inline(never)]
+#[small]
+fn is_moving(links: &Links, port: &Port) -> bool {
+    let mut view = View::of(links, port);
+    let rests = machine::is_stopped() || machine::is_checking() || view.hold() == Hold::Rests;
+    !rests && view.has_work()
 }
 
 /// Whether there is anything to hold.
