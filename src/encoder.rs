@@ -18,6 +18,8 @@
 
 use kerf_macros::small;
 
+use crate::status::Status;
+
 /// Counts of time in a second.
 pub const COUNTS_PER_S: u32 = 250_000;
 
@@ -71,8 +73,13 @@ pub struct Encoder {
     seen: u8,
     /// Misfits, up to 255.
     misfits: u8,
-    /// Exec has lost the spindle in a pass ([`thread`](crate::motion::thread)).
-    pub lost: bool,
+    /// How far the axes are ahead of the spindle in a pass, um, at the last index.
+    error: i16,
+    /// Nobody has been told of it.
+    is_new: bool,
+    /// How the pass stands in step with the spindle ([`thread`](crate::motion::thread)): [`Status::Again`] for none that has begun,
+    /// [`Status::Ok`] while it goes on, else why it did not begin, or has ended. The planner and exec write it.
+    pub pass: Status,
 }
 
 /// After so many index pulses in a row the time of a turn tells of its neighbours.
@@ -93,7 +100,9 @@ impl Encoder {
             turn: 0,
             seen: 0,
             misfits: 0,
-            lost: false,
+            error: 0,
+            is_new: false,
+            pass: Status::Again,
         }
     }
 
@@ -133,6 +142,21 @@ impl Encoder {
     /// Misfits so far, 255 for more.
     pub fn misfits(&self) -> u8 {
         self.misfits
+    }
+
+    /// In a pass the axes were so far ahead of the spindle at an index, mm. Exec.
+    pub fn note_error(&mut self, mm: f32) {
+        (self.error, self.is_new) = ((mm * 1e3) as i16, true);
+    }
+
+    /// How far the axes are ahead of the spindle, um, at the last index of the pass; 0 without one.
+    pub fn error(&self) -> i16 {
+        if self.pass == Status::Ok { self.error } else { 0 }
+    }
+
+    /// Whether there has been another index in a pass since this was asked last.
+    pub fn take_news(&mut self) -> bool {
+        core::mem::take(&mut self.is_new)
     }
 
     /// Takes up what the sensors have seen since the last look. Whether pulses did not fit.

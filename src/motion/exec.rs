@@ -513,6 +513,11 @@ impl Exec {
         is_on.then_some(&mut self.thread)
     }
 
+    /// Along the path at the end of what is queued, mm/s.
+    pub fn velocity(&self) -> f32 {
+        self.governor.velocity()
+    }
+
     /// Whether feeds go by the measured speed of the spindle (G95).
     #[inline(always)]
     pub fn is_per_turn(&self) -> bool {

@@ -94,6 +94,8 @@ pub struct Thread {
     mended: i8,
     /// When what is queued ends, CPU cycles.
     end: u32,
+    /// There has been an index since [`Thread::error`] was asked last.
+    indexed: bool,
 }
 
 #[small]
@@ -114,6 +116,7 @@ impl Thread {
             expected: 0,
             mended: 0,
             end: 0,
+            indexed: false,
         }
     }
 
@@ -174,6 +177,7 @@ impl Thread {
         if pulses.index != self.index {
             let turns = pulses.index.wrapping_sub(self.index);
             self.index = pulses.index;
+            self.indexed = true;
             if self.stage == Stage::Armed {
                 self.interval = turn as f32 / f32::from(per_turn);
                 self.expected = pulses.at_index;
@@ -199,6 +203,14 @@ impl Thread {
         if self.stage == Stage::Follows && age > OVERDUE * self.interval + SLACK {
             self.stage = Stage::Lost;
         }
+    }
+
+    /// How far the axes, which go at `velocity` at the end of what is queued, were ahead of the line at the last pulse, mm: behind an
+    /// index, and while they follow.
+    pub fn error(&mut self, velocity: f32) -> Option<f32> {
+        let indexed = core::mem::take(&mut self.indexed) && self.stage == Stage::Follows;
+        let late = self.end.wrapping_sub(self.at.wrapping_mul(CYCLES)) as i32;
+        indexed.then(|| -(self.ahead + velocity * (late as f32 * (1.0 / TIMER_HZ as f32))))
     }
 
     /// mm a pulse.

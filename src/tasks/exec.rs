@@ -27,6 +27,7 @@ use kerf_macros::small;
 
 use crate::motors::Motors;
 use crate::spindle::Spindle;
+use crate::status::Status;
 use crate::tasks::common::{Common, State};
 use crate::tasks::{Never, hold, links, overrides, power, spindle};
 
@@ -267,10 +268,14 @@ impl<'a> Runner<'a> {
 fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
     let pulses = sensors::read();
     encoder.look(&pulses);
+    let velocity = exec.velocity();
     let Some(thread) = exec.thread() else { return };
     thread.note(encoder.time(), &pulses, encoder.per_turn(), encoder.turn());
-    encoder.lost = thread.is_lost();
-    if encoder.lost {
+    if let Some(error) = thread.error(velocity) {
+        encoder.note_error(error);
+    }
+    if thread.is_lost() {
+        encoder.pass = Status::SpindleLost;
         // The planner waits for it.
         flags::set(Event::BlockDone);
     }

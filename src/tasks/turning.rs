@@ -75,6 +75,37 @@ pub fn speed(thread: Thread) -> Option<u32> {
     })
 }
 
+/// How the pass in step with the spindle stands, of [`Encoder::pass`](crate::encoder::Encoder::pass). A refusal is told once.
+#[small]
+pub fn pass(thread: Thread) -> Status {
+    common::with(thread, |common| {
+        let pass = common.encoder.pass;
+        if matches!(pass, Status::NoIndex | Status::NoSync | Status::VelocityExceeded) {
+            common.encoder.pass = Status::Again;
+        }
+        pass
+    })
+}
+
+/// How far the axes are ahead of the spindle in the pass, um.
+#[small]
+pub fn error(thread: Thread) -> i16 {
+    common::with(thread, |common| common.encoder.error())
+}
+
+/// Whether the pass has come to another index since this was asked last.
+#[inline(never)]
+#[small]
+pub fn take_news(thread: Thread) -> bool {
+    Capability::Lathe.is_built_in() && common::with(thread, |common| common.encoder.take_news())
+}
+
+/// Pulses of the encoder in a turn; 0 without one.
+#[small]
+pub fn per_turn(thread: Thread) -> u16 {
+    common::with(thread, |common| common.encoder.per_turn())
+}
+
 /// Pulses that did not fit so far, 255 for more.
 #[small]
 pub fn misfits(thread: Thread) -> u8 {

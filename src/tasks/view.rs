@@ -393,8 +393,12 @@ impl Machine for View<'_> {
             Value::Reset => watchdog::cause() as i32,
             Value::SpindleSpeed => match turning::speed(self.links.thread) {
                 Some(speed) => speed as i32,
-                None => self.modal(value).min(2_000_000) * 1_000,
+                None => self.value(Value::SpindleProgrammed),
             },
+            Value::SpindleProgrammed => self.modal(Value::SpindleSpeed).min(2_000_000) * 1_000,
+            Value::PulsesPerTurn => turning::per_turn(self.links.thread).into(),
+            Value::SyncError => turning::error(self.links.thread).into(),
+            Value::Pass => turning::pass(self.links.thread) as i32,
             Value::PulseMisfits => turning::misfits(self.links.thread).into(),
             Value::Starvations => health::starvations().into(),
             Value::Kept => self.links.storage.is_done().into(),

@@ -56,7 +56,7 @@ group! {
         N "n": whole(cold(0), 400).with(IDLE), 0,
             words(text!("spindle pulses per turn"), text!(" [0=no encoder,1=index only]")),
             "Sync pulses of the encoder in a turn. With 1 the index alone is read, with 0 nothing. Its pins are no switches then (wiring.md).";
-        B "b": whole(cold(0), 100_000).with(IDLE), 0,
+        B "b": whole(cold(0), 200_000).with(IDLE), 0,
             words(text!("spindle pulse bounce"), text!(" us")),
             "How long contacts of the encoder bounce: a pulse counts if its pin has been still for so long before.";
     }

@@ -3,9 +3,9 @@
 //! What TinyG's senders are told unasked, of the queue and how the machine stands, grbl's ask for.
 
 use super::lists;
-use super::report::{Report, SLEEPS};
+use super::report::{Report, SLEEPS, sync_error};
 use super::status::{PROBE_CLOSED, alarm_number, error_number};
-use super::write::{int, line_end, message, text};
+use super::write::{close, int, line_end, message, text};
 use crate::boards::inputs;
 use crate::gcode::modal::MotionMode;
 use crate::machine::Doing;
@@ -28,6 +28,8 @@ pub enum Telling {
     Startup(u8, Status),
     /// A status report.
     Report(Report),
+    /// `[Se:]`.
+    SyncError,
 }
 
 #[small]
@@ -43,6 +45,7 @@ impl Telling {
             Notice::Exception(status) => Self::Exception(status),
             Notice::Startup(line, status) => Self::Startup(line, status),
             Notice::Probing => Self::Probing(lists::PROBING),
+            Notice::SyncError => Self::SyncError,
             Notice::Query => Self::Report(Report::begin(machine)),
             _ => Self::Nothing,
         }
@@ -81,6 +84,12 @@ impl Tells for Telling {
                 None => false,
             },
             Self::Report(report) => report.step(machine, out),
+            Self::SyncError => {
+                text(out, text!("[Se:"));
+                sync_error(machine, out);
+                close(out);
+                false
+            }
         }
     }
 

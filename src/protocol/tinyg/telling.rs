@@ -3,7 +3,7 @@
 use super::Mode;
 use super::notice::{Banner, Exception, Probing, acknowledge, jog_ended};
 use super::prompt::put_ready_prompt;
-use super::report::{Report, queue_report, receive_report};
+use super::report::{Report, queue_report, receive_report, sync_report};
 use crate::protocol::{Machine, Notice, Occasion, Out, Tells, Value};
 
 /// How far it has been told, and how.
@@ -23,6 +23,7 @@ enum Part {
         jogged: bool,
         flushed: bool,
     },
+    SyncError,
     /// How many blocks are free, as it was told.
     Queue(usize),
 }
@@ -44,6 +45,7 @@ impl Telling {
             Notice::Query | Notice::Startup(..) => Part::Status(None),
             Notice::Status => Part::Status(Report::begin(mode, machine)),
             Notice::End { jogged, flushed } => Part::End { jogged, flushed },
+            Notice::SyncError => Part::SyncError,
             Notice::Queue => Part::Queue(0),
         };
         Self { part, mode }
@@ -79,6 +81,10 @@ impl Tells for Telling {
                     receive_report(mode, machine, out);
                     false
                 }
+            }
+            Part::SyncError => {
+                sync_report(mode, machine, out);
+                false
             }
             Part::Queue(free) => {
                 *free = machine.value(Value::QueueFree) as usize;

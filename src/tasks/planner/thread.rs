@@ -90,13 +90,14 @@ impl Planner {
         if !self.is_flushed() {
             self.pause(Action::Thread(0.0));
         }
-        let lost = wait(self.links.thread, Event::BlockDone, || {
-            let lost = common::with(self.links.thread, |common| common.encoder.lost);
-            (lost || queue::used() == 0 || self.is_flushed()).then_some(lost)
+        let pass = wait(self.links.thread, Event::BlockDone, || {
+            let pass = common::with(self.links.thread, |common| common.encoder.pass);
+            (pass != Status::Ok || queue::used() == 0 || self.is_flushed()).then_some(pass)
         })
         .await;
-        if lost && !self.is_flushed() {
-            alarm::raise_for(self.links, Alarm::Alarm, Status::SpindleLost);
+        self.set_pass(Status::Again);
+        if pass != Status::Ok && !self.is_flushed() {
+            alarm::raise_for(self.links, Alarm::Alarm, pass);
         }
         // G76 goes on with its usual limits.
         self.take_up_changes();
@@ -165,7 +166,7 @@ impl Planner {
         self.dynamics.junction = ANY_CORNER;
         // They are the settings' again for the next line.
         links.changes.note(Changes::SETTINGS);
-        common::with(links.thread, |common| common.encoder.lost = false);
+        self.set_pass(Status::Ok);
         if let Some(piece) = self.piece(0, &self.position) {
             self.push(Block::action(Action::Thread(piece.lead), self.line));
         }
@@ -219,12 +220,19 @@ impl Planner {
         true
     }
 
+    /// How the pass stands.
+    #[small]
+    fn set_pass(&self, status: Status) {
+        common::with(self.links.thread, |common| common.encoder.pass = status);
+    }
+
     /// Nothing has moved, and nothing will.
     #[inline(never)]
     #[small]
     fn refuse(&mut self, status: Status) {
         // The line says that the machine is at its end.
         self.links.model.borrow_mut().set_position(&self.position);
+        self.set_pass(status);
         alarm::raise_for(self.links, Alarm::Alarm, status);
     }
 }
