@@ -25,6 +25,7 @@ use super::float::{below, least, scaled, some, whole};
 use super::governor::{Ahead, Governor, Stretch, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
+use super::retract::Retreat;
 use super::short::Short;
 use super::snapshot::{Program, Snapshot};
 use super::thread::Thread;
@@ -32,6 +33,7 @@ use crate::capability::Capability;
 use crate::dda::Segment;
 use crate::gcode::overrides::Change;
 use crate::hal::TIMER_HZ;
+use crate::status::Status;
 
 /// Half CPU cycles in a second.
 const HALVES_PER_S: f32 = 2.0 * TIMER_HZ as f32;
@@ -134,10 +136,21 @@ pub struct Exec {
     governor: Governor,
     prep: Prep,
     // But for what few lines need.
-    thread: Thread,
-    /// Feeds go by the measured speed of the spindle: that share of what they were planned for.
-    per_turn: bool,
-    share: f32,
+    follows: Follows,
+}
+
+/// What lines have to do with the spindle.
+#[derive(Debug, Default)]
+enum Follows {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// G95. Feeds go by its measured speed: that share of what they were planned for.
+    Speed(f32),
+    /// G33, a pass of G76: they follow its angle.
+    Angle(Thread),
+    /// Such a pass has ended before its time: X leaves the cut while the axes come to rest, and then all waits to be dropped.
+    Retreats(Retreat),
 }
 
 /// What the governor sees of the queue.
@@ -183,9 +196,7 @@ impl Exec {
             hurry: false,
             breaks_off: false,
             dwell_ms: 0,
-            thread: Thread::new(),
-            per_turn: false,
-            share: 1.0,
+            follows: Follows::Nothing,
         }
     }
 
@@ -208,6 +219,9 @@ impl Exec {
         if self.dwell_ms > 0 {
             self.dwell(segment);
             return Step::Segment;
+        }
+        if Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Retreats(_)) {
+            return self.retreat(blocks, out, segment);
         }
         if !self.running.active {
             if blocks.is_empty() {
@@ -258,7 +272,13 @@ impl Exec {
     fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
         let running = &self.running;
         let is_line = |block: &Block| matches!(block.body, Body::Line(_)) || block.is_aside();
-        let goes_on = if running.active {
+        let retreats = match &self.follows {
+            Follows::Retreats(retreat) => !retreat.is_done(),
+            _ => false,
+        };
+        let goes_on = if retreats {
+            true
+        } else if running.active {
             // What the end of a block has been planned as is handed out.
             running.done || !self.governor.is_at_rest()
         } else {
@@ -284,14 +304,16 @@ impl Exec {
         let held = self.prep.cut(&mut out.target);
         self.running.active = false;
         self.dwell_ms = 0;
-        self.thread.begin(0.0);
+        if !matches!(self.follows, Follows::Speed(_)) {
+            self.follows = Follows::Nothing;
+        }
         out.left = 0.0;
         out.running = false;
         out.program = Program::Stopped;
         while let Some(block) = blocks.oldest() {
             match &block.body {
                 Body::Action(Action::Drivers(drivers)) => self.prep.set_drivers(*drivers),
-                Body::Action(Action::PerTurn(on)) => self.per_turn = *on,
+                Body::Action(Action::PerTurn(on)) => self.go_by_speed(*on),
                 Body::Action(Action::SetPosition(steps)) if !moved => out.target = *steps,
                 Body::Action(Action::SetPosition(_) | Action::Override(_) | Action::Lead(_)) => {}
                 _ => moved = true,
@@ -342,16 +364,23 @@ impl Exec {
                 };
             }
             Action::Drivers(drivers) => self.prep.set_drivers(*drivers),
-            Action::Thread(lead) => {
+            Action::Thread(_) | Action::EndThread => {
                 self.halt(out);
                 if !standstill {
                     return Step::Standstill;
                 }
                 self.prep.rest();
-                self.thread.begin(*lead);
+                self.follows = match action {
+                    Action::Thread(pass) => Follows::Angle(Thread::begin(pass)),
+                    _ => Follows::Nothing,
+                };
             }
-            Action::PerTurn(on) => self.per_turn = *on,
-            Action::Lead(lead) => self.thread.set_lead(*lead),
+            Action::PerTurn(on) => self.go_by_speed(*on),
+            Action::Lead(lead) => {
+                if let Follows::Angle(thread) = &mut self.follows {
+                    thread.set_lead(*lead);
+                }
+            }
             Action::Override(_) => {}
         }
         blocks.release();
@@ -430,7 +459,7 @@ impl Exec {
         if running.done {
             return self.end(0, false, blocks, segment);
         }
-        if Capability::Lathe.is_built_in() && self.thread.is_on() {
+        if Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Angle(_)) {
             return self.follow(blocks, out, segment);
         }
         let version = blocks.version();
@@ -447,10 +476,13 @@ impl Exec {
             }
         }
         let (mut cruise, mut holds) = (running.cruise, self.hold);
-        if Capability::Lathe.is_built_in() && self.per_turn && !blocks.is_traverse() {
-            cruise *= self.share;
+        if Capability::Lathe.is_built_in()
+            && let Follows::Speed(share) = self.follows
+            && !blocks.is_traverse()
+        {
+            cruise *= share;
             // The spindle stands still.
-            holds |= !some(self.share);
+            holds |= !some(share);
             if self.governor.is_at_rest() && holds && !self.hold {
                 let (ticks, period) = PAUSE;
                 self.prep.pause(ticks, period, segment);
@@ -509,8 +541,19 @@ impl Exec {
     /// The pass in step with the spindle, if there is one.
     #[inline(always)]
     pub fn thread(&mut self) -> Option<&mut Thread> {
-        let is_on = Capability::Lathe.is_built_in() && self.thread.is_on();
-        is_on.then_some(&mut self.thread)
+        match &mut self.follows {
+            Follows::Angle(thread) if Capability::Lathe.is_built_in() => Some(thread),
+            _ => None,
+        }
+    }
+
+    /// Why a pass has been left before its end, if one has, and the rest of it waits to be dropped: a hold of its own.
+    #[inline(always)]
+    pub fn has_left(&self) -> Option<Status> {
+        match &self.follows {
+            Follows::Retreats(retreat) if Capability::Lathe.is_built_in() => Some(retreat.why),
+            _ => None,
+        }
     }
 
     /// Along the path at the end of what is queued, mm/s.
@@ -521,7 +564,12 @@ impl Exec {
     /// Whether feeds go by the measured speed of the spindle (G95).
     #[inline(always)]
     pub fn is_per_turn(&self) -> bool {
-        Capability::Lathe.is_built_in() && self.per_turn
+        Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Speed(_))
+    }
+
+    /// G95 is in force for the lines from here on, or no more.
+    fn go_by_speed(&mut self, on: bool) {
+        self.follows = if on { Follows::Speed(1.0) } else { Follows::Nothing };
     }
 
     /// The spindle turns at this share of the speed that feeds were planned for; what is more than 1 is 1. A change of less than 0.5 % does
@@ -529,12 +577,11 @@ impl Exec {
     #[inline(never)]
     #[small]
     pub fn set_share(&mut self, share: f32) {
+        let Follows::Speed(before) = &mut self.follows else { return };
         let share = least(share, 1.0);
-        let off = share - self.share;
-        if !(-CHANGE..=CHANGE).contains(&off)
-            || (share.to_bits() == 0) != (self.share.to_bits() == 0)
-        {
-            self.share = share;
+        let off = share - *before;
+        if !(-CHANGE..=CHANGE).contains(&off) || (share.to_bits() == 0) != (before.to_bits() == 0) {
+            *before = share;
             self.governor.change_feed();
             self.governor.look_again();
         }
@@ -546,7 +593,8 @@ impl Exec {
         self.breaks_off = at_once;
     }
 
-    /// Prepares the next stretch of a line that follows the spindle. A feedhold waits for its end, and overrides do not count.
+    /// Prepares the next stretch of a line that follows the spindle. A feedhold leaves the cut if there is a retract, else it waits for the end, and
+    /// overrides do not count.
     #[inline(never)]
     #[small]
     fn follow(
@@ -555,30 +603,89 @@ impl Exec {
         out: &mut Snapshot,
         segment: &mut Segment,
     ) -> Step {
-        let running = &mut self.running;
+        self.take_limits(blocks);
+        let velocity = self.governor.velocity();
+        let (kept, accel) = (self.prep.kept(), self.governor.accel());
+        let brakes = self.brakes_for_end(velocity, accel);
+        let at_rest = self.governor.is_at_rest();
+        let Follows::Angle(thread) = &mut self.follows else { return Step::Again };
+        let wanted = thread.velocity(kept, velocity, accel, brakes);
+        let breaks_off = self.breaks_off || thread.fault().is_some();
+        if at_rest && (breaks_off || !some(wanted)) {
+            let (ticks, period) = PAUSE;
+            self.prep.pause(ticks, period, segment);
+            return Step::Segment;
+        }
+        let retract = thread.retract();
+        // The axes come to rest in this line, in which X stands still.
+        let fits = velocity * velocity < 2.0 * accel * self.running.left;
+        let leaves = (breaks_off || self.hold) && retract.is_some() && fits;
+        if leaves && self.prep.rest_of(retract.motors) {
+            let why = thread.fault().unwrap_or(Status::Terminated);
+            self.follows = Follows::Retreats(Retreat::new(retract, why));
+            return self.retreat(blocks, out, segment);
+        }
+        let running = &self.running;
+        let stretch = if breaks_off {
+            self.governor.halt_sharply(running.left, running.headroom, SEGMENT_S)
+        } else {
+            self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
+        };
+        thread.handed(stretch.distance);
+        self.hand_out(&stretch, blocks, out, segment, |_| (false, false))
+    }
+
+    /// What a line that follows the spindle may do, as far as that has changed.
+    fn take_limits(&mut self, blocks: &mut BlockSource) {
         let version = blocks.version();
+        let running = &mut self.running;
         if version != running.version {
             running.version = version;
             running.cruise = blocks.feed();
             blocks.take_changed();
             running.headroom = blocks.headroom();
         }
-        let velocity = self.governor.velocity();
-        let (kept, accel) = (self.prep.kept(), self.governor.accel());
-        let wanted = self.thread.velocity(kept, velocity, accel);
-        let breaks_off = self.breaks_off || self.thread.is_lost();
-        if self.governor.is_at_rest() && (breaks_off || !some(wanted)) {
-            let (ticks, period) = PAUSE;
-            self.prep.pause(ticks, period, segment);
-            return Step::Segment;
-        }
-        let stretch = if breaks_off {
-            self.governor.halt_sharply(running.left, running.headroom, SEGMENT_S)
+    }
+
+    /// Whether the line slows down for its end within the next stretches.
+    fn brakes_for_end(&self, velocity: f32, accel: f32) -> bool {
+        let running = &self.running;
+        let far = running.left - 2.0 * SEGMENT_S * velocity;
+        velocity * velocity - running.headroom > 2.0 * accel * far
+    }
+
+    /// Prepares the next stretch of a pass that has ended before its time: its axes slow down, and X leaves the cut.
+    #[inline(never)]
+    #[small]
+    fn retreat(
+        &mut self,
+        blocks: &mut BlockSource,
+        out: &mut Snapshot,
+        segment: &mut Segment,
+    ) -> Step {
+        let Follows::Retreats(retreat) = &self.follows else { return Step::Again };
+        let (motors, backwards) = (retreat.motors(), retreat.is_backwards());
+        if self.running.active && (self.running.done || !self.governor.is_at_rest()) {
+            self.take_limits(blocks);
+            self.prep.join(motors, backwards);
+            let step = if self.running.done {
+                self.end(0, false, blocks, segment)
+            } else {
+                let (left, headroom) = (self.running.left, self.running.headroom);
+                let stretch = self.governor.halt_sharply(left, headroom, SEGMENT_S);
+                self.hand_out(&stretch, blocks, out, segment, |_| (false, false))
+            };
+            if step != Step::Segment {
+                return step;
+            }
         } else {
-            self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
-        };
-        self.thread.handed(stretch.distance);
-        self.hand_out(&stretch, blocks, out, segment, |_| (false, false))
+            self.halt(out);
+            self.prep.join(motors, backwards);
+            self.prep.stand(motors, segment);
+        }
+        let Follows::Retreats(retreat) = &mut self.follows else { return Step::Segment };
+        self.prep.add(retreat, segment, &mut out.target);
+        Step::Segment
     }
 
     /// Hands out what is left of the line being run.

@@ -18,17 +18,21 @@
 //!
 //! **Pulses that do not fit.** A pulse that comes after twice the time of the one before stands for two, one that comes too soon for none. The
 //! next index says whether that was right. A pulse that is overdue by more than a second one means that the
-//! [spindle is lost](Thread::is_lost); until then the line goes on at its speed. With a single pulse a turn there is nothing to tell a pulse that is missing from a
+//! [spindle is lost](Thread::fault); until then the line goes on at its speed. With a single pulse a turn there is nothing to tell a pulse that is missing from a
 //! spindle at half its speed: it is taken for missing.
 //!
 //! Cost on AVR: 2,500 cycles a stretch, 1,500 more with a pulse. RAM: 41 bytes.
 
 use kerf_macros::small;
 
+use super::block::Pass;
 use super::float::{least, some};
+use super::retract::Retract;
+use super::short::Short;
 use crate::encoder::{COUNTS_PER_S, Pulses};
 use crate::hal::TIMER_HZ;
 use crate::math::sqrt;
+use crate::status::Status;
 
 /// How much of the way to the line is made up in a second: half of it in a stretch.
 const GAIN: f32 = 250.0;
@@ -68,8 +72,12 @@ enum Stage {
     Known,
     /// The axes follow.
     Follows,
+    /// They have been within the limit of the error.
+    Met,
     /// The spindle was lost, and the axes come to rest.
     Lost,
+    /// The error was above its limit, and the axes come to rest.
+    Astray,
 }
 
 /// A pass.
@@ -96,6 +104,10 @@ pub struct Thread {
     end: u32,
     /// There has been an index since [`Thread::error`] was asked last.
     indexed: bool,
+    /// How far the axes may be off, mm; 0 for no limit.
+    limit: Short,
+    /// How the pass is left.
+    retract: Retract,
 }
 
 #[small]
@@ -117,33 +129,35 @@ impl Thread {
             mended: 0,
             end: 0,
             indexed: false,
+            limit: Short::ZERO,
+            retract: Retract::NONE,
         }
     }
 
-    /// Whether lines follow the spindle.
-    #[inline(always)]
-    pub fn is_on(&self) -> bool {
-        self.stage != Stage::Off
+    /// Why the pass is to end at once, if it is.
+    pub fn fault(&self) -> Option<Status> {
+        match self.stage {
+            Stage::Lost => Some(Status::SpindleLost),
+            Stage::Astray => Some(Status::SpindleError),
+            _ => None,
+        }
     }
 
-    /// Whether the spindle was lost in the pass.
-    pub fn is_lost(&self) -> bool {
-        self.stage == Stage::Lost
+    /// A pass begins.
+    pub fn begin(pass: &Pass) -> Self {
+        let Pass { lead, limit, retract } = *pass;
+        Self { stage: Stage::Armed, lead, limit, retract, ..Self::new() }
     }
 
-    /// A pass of so many mm a turn begins; 0 ends one.
-    pub fn begin(&mut self, lead: f32) {
-        self.stage = if some(lead) { Stage::Armed } else { Stage::Off };
-        (self.lead, self.mended) = (lead, 0);
-        self.per_turn = 0;
+    /// How the pass is left before its end, if the axes have begun to follow.
+    pub fn retract(&self) -> Retract {
+        if self.stage < Stage::Follows { Retract::NONE } else { self.retract }
     }
 
     /// From here on the path goes so many mm a turn: a taper, or the end of one.
     pub fn set_lead(&mut self, lead: f32) {
-        if self.is_on() {
-            self.ahead *= lead / self.lead;
-            self.lead = lead;
-        }
+        self.ahead *= lead / self.lead;
+        self.lead = lead;
     }
 
     /// The steppers have been started, and make their first tick so many cycles after `time`, in counts. All that is queued since they stood
@@ -200,7 +214,7 @@ impl Thread {
         }
         self.pulses = count;
         let age = time.wrapping_sub(self.at) as f32;
-        if self.stage == Stage::Follows && age > OVERDUE * self.interval + SLACK {
+        if self.follows() && age > OVERDUE * self.interval + SLACK {
             self.stage = Stage::Lost;
         }
     }
@@ -208,9 +222,13 @@ impl Thread {
     /// How far the axes, which go at `velocity` at the end of what is queued, were ahead of the line at the last pulse, mm: behind an
     /// index, and while they follow.
     pub fn error(&mut self, velocity: f32) -> Option<f32> {
-        let indexed = core::mem::take(&mut self.indexed) && self.stage == Stage::Follows;
+        let indexed = core::mem::take(&mut self.indexed) && self.follows();
         let late = self.end.wrapping_sub(self.at.wrapping_mul(CYCLES)) as i32;
         indexed.then(|| -(self.ahead + velocity * (late as f32 * (1.0 / TIMER_HZ as f32))))
+    }
+
+    fn follows(&self) -> bool {
+        matches!(self.stage, Stage::Follows | Stage::Met)
     }
 
     /// mm a pulse.
@@ -254,9 +272,9 @@ impl Thread {
     }
 
     /// The velocity to be reached in the next stretch, mm/s, from `velocity`; 0 for none. Time of which `kept` cycles have not been queued
-    /// belongs to what is.
+    /// belongs to what is. The error is held against its limit unless the axes slow down for the end, `brakes`.
     #[inline(never)]
-    pub fn velocity(&mut self, kept: i32, velocity: f32, accel: f32) -> f32 {
+    pub fn velocity(&mut self, kept: i32, velocity: f32, accel: f32, brakes: bool) -> f32 {
         if self.stage < Stage::Known {
             return 0.0;
         }
@@ -272,6 +290,7 @@ impl Thread {
             }
         }
         let size = f32::from_bits(way.to_bits() & 0x7FFF_FFFF);
+        self.hold_against_limit(size, brakes);
         let change = least(GAIN * size, sqrt(2.0 * SHARE * accel * size));
         let wanted = if way.is_sign_negative() { speed - change } else { speed + change };
         if wanted < SLOWEST {
@@ -281,6 +300,19 @@ impl Thread {
             self.stage = Stage::Follows;
         }
         wanted
+    }
+
+    /// The axes are off by `size` mm.
+    fn hold_against_limit(&mut self, size: f32, brakes: bool) {
+        let limit = self.limit.get();
+        if !some(limit) || brakes {
+            return;
+        }
+        match (self.stage, size > limit) {
+            (Stage::Follows, false) => self.stage = Stage::Met,
+            (Stage::Met, true) => self.stage = Stage::Astray,
+            _ => {}
+        }
     }
 }
 
@@ -312,8 +344,7 @@ mod tests {
 
     impl Pass {
         fn new(per_turn: u16, turn: u32, begin: u64) -> Self {
-            let mut thread = Thread::new();
-            thread.begin(1.0);
+            let thread = Thread::begin(&super::Pass { lead: 1.0, ..super::Pass::default() });
             let (missing, extra) = (None, None);
             let mut pass = Self {
                 thread,
@@ -362,7 +393,7 @@ mod tests {
             let pulses = self.pulses();
             self.thread.note(self.time as u32, &pulses, self.per_turn, self.turn);
             let seconds = STRETCH as f32 / COUNTS_PER_S as f32;
-            let wanted = self.thread.velocity(0, self.velocity, ACCEL);
+            let wanted = self.thread.velocity(0, self.velocity, ACCEL, false);
             let gain = ACCEL * seconds;
             let next = wanted.clamp(self.velocity - gain, self.velocity + gain);
             let distance = 0.5 * (self.velocity + next) * seconds;
@@ -433,7 +464,7 @@ mod tests {
                     (off - off.round()).abs() < 0.002,
                     "{per_turn} {missing:?} {extra:?}: {off}"
                 );
-                assert!(!pass.thread.is_lost());
+                assert!(pass.thread.fault().is_none());
             }
         }
     }
@@ -443,7 +474,7 @@ mod tests {
         let mut pass = Pass::new(4, 50_000, 0);
         pass.run(400);
         let (pulses, from) = (pass.pulses(), pass.time);
-        while !pass.thread.is_lost() {
+        while pass.thread.fault().is_none() {
             pass.time += u64::from(STRETCH);
             let now = Pulses { now: pass.time as u16, ..pulses };
             pass.thread.note(pass.time as u32, &now, 4, 50_000);

@@ -156,7 +156,12 @@ impl<'a> Runner<'a> {
         if self.machine.is_per_turn() {
             follow_speed(self.machine, encoder, out);
         }
-        self.machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
+        let has_left = self.machine.has_left();
+        if let Some(why) = has_left {
+            note_left(encoder, why);
+        }
+        let holds = hold::is_wanted(out.running) || contact::is_noted() || has_left.is_some();
+        self.machine.set_hold(holds, out);
         // What has paused in a hold goes on before motion does.
         if out.outputs != spindle::on() {
             if !machine::is_held() {
@@ -274,12 +279,22 @@ fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
     if let Some(error) = thread.error(velocity) {
         encoder.note_error(error);
     }
-    if thread.is_lost() {
-        encoder.pass = Status::SpindleLost;
+    if let Some(fault) = thread.fault() {
+        encoder.pass = fault;
         // The planner waits for it.
         flags::set(Event::BlockDone);
     }
     exec.break_off(machine::is_alarmed());
+}
+
+/// The pass has been left, for this reason.
+#[inline(never)]
+#[small]
+fn note_left(encoder: &mut Encoder, why: Status) {
+    if encoder.pass == Status::Ok {
+        encoder.pass = why;
+        flags::set(Event::BlockDone);
+    }
 }
 
 /// Feeds a turn go by the measured speed, if there is an encoder: S is what they were planned for.

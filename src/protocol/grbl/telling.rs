@@ -138,6 +138,9 @@ fn exception(status: Status, machine: &mut impl Machine, out: &mut impl Out) {
         Status::ProgramStopped => message(out, text!("Program stopped [~ to resume]")),
         Status::NoToolLength => message(out, text!("Tool has no length - 0 in force")),
         Status::StepsLate => message(out, text!("Steps came late")),
+        Status::SpindleLost => message(out, text!("Spindle lost in a thread")),
+        Status::SpindleError => message(out, text!("Thread too far off")),
+        Status::NotReversed => message(out, text!("Spindle did not turn round")),
         _ => {}
     }
 }

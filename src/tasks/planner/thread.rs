@@ -14,18 +14,26 @@ use embassy_futures::yield_now;
 use kerf_macros::small;
 
 use super::Planner;
+use super::seek::drop_blocks;
+use crate::boards::MOTORS;
+use crate::config::groups::spindle;
+use crate::config::{Owner, Setting};
 use crate::encoder::COUNTS_PER_S;
-use crate::gcode::command::Feed;
+use crate::gcode::command::{Feed, Motion};
+use crate::gcode::setup::Setup;
 use crate::hal::event::{Event, wait};
 use crate::hal::time::millis;
 use crate::machine::Alarm;
 use crate::math::sqrt;
-use crate::motion::block::{Action, Block};
+use crate::motion::block::{Action, Block, Pass};
 use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};
 use crate::motion::float::{greater, some};
 use crate::motion::queue;
+use crate::motion::retract::Retract;
+use crate::motion::short::Short;
 use crate::status::Status;
 use crate::tasks::links::Changes;
+use crate::tasks::setup::moved_by;
 use crate::tasks::{alarm, common};
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
@@ -51,56 +59,187 @@ struct Piece {
     lead: f32,
 }
 
+/// The way back to the start of a pass has so many parts.
+const PARTS_BACK: u8 = 3;
+
+/// X among the axes.
+const X: u8 = 0;
+
+/// The acceleration limit of an axis without its jerk limit: at most that of a ramp to `speed` under it, in the mean.
+#[small]
+fn mean_accel(accel: f32, jerk: f32, speed: f32) -> f32 {
+    if jerk > 0.0 && some(speed) {
+        let mean = 0.5 * sqrt(jerk * speed);
+        return if accel > 0.0 && accel < mean { accel } else { mean };
+    }
+    accel
+}
+
 impl Planner {
-    /// Waits until the encoder says how fast the spindle turns, and then, if it `cuts`, makes the pass of the line; or says why not.
+    /// Waits until the encoder says how fast the spindle turns, and then, if it `cuts`, makes the pass of the line; or says why not. A pass that a
+    /// feedhold has left is made once more, from its beginning, when the hold is over.
     pub(super) async fn thread(&mut self, cuts: bool) {
-        if !self.standstill().await {
-            return;
-        }
-        let turn = match self.spindle_turns().await {
-            Ok(Some(turn)) => turn,
-            Ok(None) => return,
-            Err(status) => return self.refuse(status),
-        };
-        if !cuts {
-            return;
-        }
-        match self.begin_pass(turn) {
-            Ok(true) => {}
-            Ok(false) => return,
-            Err(status) => return self.refuse(status),
-        }
-        let mut line = 0;
-        self.room().await;
-        while self.queue_line(line) {
-            while self.has_begun() && !self.is_flushed() {
-                self.room().await;
-                yield_now().await;
-                if !self.is_flushed() {
-                    let _: super::Turn = self.turn();
+        loop {
+            if !self.standstill().await {
+                return;
+            }
+            let turn = match self.spindle_turns().await {
+                Ok(Some(turn)) => turn,
+                Ok(None) => return,
+                Err(status) => return self.refuse(status),
+            };
+            if !cuts {
+                return;
+            }
+            let [x, y, z, ..] = self.position;
+            let start = [x, y, z];
+            match self.begin_pass(turn) {
+                Ok(true) => {}
+                Ok(false) => return,
+                Err(status) => return self.refuse(status),
+            }
+            let mut line = 0;
+            self.pass_room().await;
+            while self.queue_line(line) {
+                self.finish_parts().await;
+                line += 1;
+                self.pass_room().await;
+                if self.queue_lead(line) {
+                    self.pass_room().await;
                 }
             }
-            line += 1;
-            self.room().await;
-            if self.queue_lead(line) {
-                self.room().await;
+            self.pass_room().await;
+            if !self.is_cut_short() {
+                self.pause(Action::EndThread);
             }
-        }
-        self.room().await;
-        if !self.is_flushed() {
-            self.pause(Action::Thread(0.0));
-        }
-        let pass = wait(self.links.thread, Event::BlockDone, || {
-            let pass = common::with(self.links.thread, |common| common.encoder.pass);
-            (pass != Status::Ok || queue::used() == 0 || self.is_flushed()).then_some(pass)
-        })
-        .await;
-        self.set_pass(Status::Again);
-        if pass != Status::Ok && !self.is_flushed() {
-            alarm::raise_for(self.links, Alarm::Alarm, pass);
+            wait(self.links.thread, Event::BlockDone, || {
+                (queue::used() == 0 || self.is_cut_short()).then_some(())
+            })
+            .await;
+            let pass = self.pass();
+            self.set_pass(Status::Again);
+            if pass == Status::Ok || self.is_flushed() {
+                break;
+            }
+            if pass != Status::Terminated {
+                alarm::raise_for(self.links, Alarm::Alarm, pass);
+                break;
+            }
+            drop_blocks(self.links.thread).await;
+            self.leave();
+            for part in 0..PARTS_BACK {
+                self.room().await;
+                self.go_back(part, &start);
+                self.finish_parts().await;
+            }
         }
         // G76 goes on with its usual limits.
         self.take_up_changes();
+    }
+
+    /// Queues the rest of a long line.
+    async fn finish_parts(&mut self) {
+        while self.has_begun() && !self.is_flushed() {
+            self.pass_room().await;
+            yield_now().await;
+            if !self.is_flushed() {
+                let _: super::Turn = self.turn();
+            }
+        }
+    }
+
+    /// How the pass stands.
+    #[small]
+    fn pass(&self) -> Status {
+        common::with(self.links.thread, |common| common.encoder.pass)
+    }
+
+    /// Whether nothing more of the pass is to be queued.
+    #[small]
+    fn is_cut_short(&self) -> bool {
+        self.is_flushed() || !matches!(self.pass(), Status::Ok | Status::Again)
+    }
+
+    fn pass_room(&mut self) -> impl Future<Output = ()> {
+        wait(self.links.thread, Event::BlockDone, || {
+            (self.queue.free() > 0 || self.is_cut_short()).then_some(())
+        })
+    }
+
+    /// The pass has been left, and what was queued of it dropped. The line still leads to where it does.
+    #[inline(never)]
+    #[small]
+    fn leave(&mut self) {
+        let end = *self.links.model.borrow().position();
+        let motion = common::snapshot(self.links.thread);
+        self.relocate(&motion);
+        self.links.model.borrow_mut().set_position(&end);
+        self.take_up_changes();
+    }
+
+    /// Queues a part of the way back to the start of a pass: X out of the cut, along it, and X back.
+    #[inline(never)]
+    #[small]
+    fn go_back(&mut self, part: u8, start: &[Length; FIRST_ROTARY]) {
+        if self.is_flushed() {
+            return;
+        }
+        let ([x, y, z], mut target) = (*start, self.position);
+        let out = self.retract_length();
+        let beside = Length(x.0.saturating_add(out.0));
+        let [to_x, to_y, to_z, ..] = &mut target;
+        match part {
+            0 => *to_x = if out.0 < 0 { beside.min(*to_x) } else { beside.max(*to_x) },
+            1 => (*to_y, *to_z) = (y, z),
+            _ => *to_x = x,
+        }
+        self.straight(&target, None);
+    }
+
+    /// How far X leaves the cut before the end of a pass, by the setting.
+    #[small]
+    fn retract_length(&self) -> Length {
+        let length =
+            |row| Setting::of(Owner::Spindle, row).map_or(0, |row| self.links.storage.cold(row));
+        let length = length(spindle::R);
+        match &self.links.commands.borrow().motion {
+            // To the drive line.
+            Motion::ThreadCycle(cycle) if cycle.peak.0 < 0 => Length(length.abs()),
+            Motion::ThreadCycle(_) => Length(-length.abs()),
+            _ => Length(length),
+        }
+    }
+
+    /// How X leaves the cut, with the limits of the axis as they are now.
+    #[inline(never)]
+    #[small]
+    fn retract(&self) -> Retract {
+        let length = self.retract_length();
+        let settings = self.links.settings.borrow();
+        let [x, ..] = self.position;
+        let mut end = x.0.saturating_add(length.0);
+        if let Some((low, high)) = Setup::travel(&*settings, X) {
+            end = end.max(low.0).min(high.0);
+        }
+        let mut retract = Retract::NONE;
+        for motor in (0..MOTORS).filter(|motor| moved_by(&settings, *motor) == X) {
+            let ratio = settings.step_ratio(motor);
+            let way = ratio.steps(Length(end)).wrapping_sub(ratio.steps(x));
+            let Ok(way) = i16::try_from(way) else { return Retract::NONE };
+            // Motors of an axis go alike, or the axis stays.
+            if way == 0 || retract.is_some() && retract.way != way {
+                return Retract::NONE;
+            }
+            (retract.way, retract.motors) = (way, retract.motors | 1 << motor);
+        }
+        let per_mm = f32::from(retract.way.unsigned_abs()) / (end.abs_diff(x.0) as f32 * 1e-4);
+        let velocity = Machine::velocity_max(&*settings, 0) * (1.0 / 60.0);
+        let jerk = Machine::jerk_max(&*settings, 0) * PER_SECOND_CUBED;
+        let accel =
+            mean_accel(Machine::accel_max(&*settings, 0) * PER_SECOND_SQUARED, jerk, velocity);
+        retract.accel = Short::new(accel * per_mm);
+        retract.velocity = Short::new(velocity * per_mm);
+        retract
     }
 
     /// Waits until the encoder tells how long a turn takes, in counts. `None` if what is queued is to be dropped.
@@ -155,11 +294,8 @@ impl Planner {
         }
         for (n, (axis, speed)) in self.dynamics.axes.iter_mut().zip(speeds).enumerate() {
             let jerk = Machine::jerk_max(&*settings, n) * PER_SECOND_CUBED;
-            let mut accel = Machine::accel_max(&*settings, n) * PER_SECOND_SQUARED;
-            if jerk > 0.0 && some(speed) {
-                let mean = 0.5 * sqrt(jerk * speed);
-                accel = if accel > 0.0 && accel < mean { accel } else { mean };
-            }
+            let accel = Machine::accel_max(&*settings, n) * PER_SECOND_SQUARED;
+            let accel = mean_accel(accel, jerk, speed);
             axis.limit_change(accel, 0.0);
         }
         // The corner of a taper is no limit: a slower axis would not be in step.
@@ -168,9 +304,19 @@ impl Planner {
         links.changes.note(Changes::SETTINGS);
         self.set_pass(Status::Ok);
         if let Some(piece) = self.piece(0, &self.position) {
-            self.push(Block::action(Action::Thread(piece.lead), self.line));
+            let pass =
+                Pass { lead: piece.lead, limit: self.error_limit(), retract: self.retract() };
+            self.push(Block::action(Action::Thread(pass), self.line));
         }
         Ok(true)
+    }
+
+    /// How far the axes may be off, mm.
+    #[small]
+    fn error_limit(&self) -> Short {
+        let limit = Setting::of(Owner::Spindle, spindle::L);
+        let limit = limit.map_or(0, |limit| self.links.storage.cold(limit));
+        Short::new(limit as f32 * 1e-3)
     }
 
     /// A line of the pass, counted from 0, from a place; `None` if there is none, or it goes nowhere.
@@ -199,7 +345,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn queue_line(&mut self, line: u8) -> bool {
-        if self.is_flushed() {
+        if self.is_cut_short() {
             return false;
         }
         let Some(Piece { target, .. }) = self.piece(line, &self.position) else { return false };
@@ -211,7 +357,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn queue_lead(&mut self, line: u8) -> bool {
-        if self.is_flushed() {
+        if self.is_cut_short() {
             return false;
         }
         let Some(Piece { lead, .. }) = self.piece(line, &self.position) else { return false };
