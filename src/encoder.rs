@@ -26,6 +26,9 @@ pub const COUNTS_PER_S: u32 = 250_000;
 /// Half a second.
 const STILL: u32 = COUNTS_PER_S / 2;
 
+/// Pulses do not come quite evenly: half a millisecond.
+const SLACK: u32 = COUNTS_PER_S / 2_000;
+
 /// A turn that takes longer is none: three seconds.
 const SLOWEST: u32 = 3 * COUNTS_PER_S;
 
@@ -210,13 +213,27 @@ impl Encoder {
         if self.per_turn == 0 || self.seen == 0 {
             return true;
         }
+        let (age, two) = self.age();
+        age > STILL.max(two)
+    }
+
+    /// How long ago the last pulse was, and how long two take.
+    fn age(&self) -> (u32, u32) {
         // The second index tells how long a turn is.
         let turn = if self.turn == 0 { SLOWEST } else { self.turn };
-        let between = turn / u32::from(self.per_turn);
         let indexed = self.time.wrapping_sub(self.index_at);
         let synced = self.time.wrapping_sub(self.sync_at);
         let age = if self.per_turn == 1 { indexed } else { indexed.min(synced) };
-        age > STILL.max(2 * between)
+        (age, 2 * turn / u32::from(self.per_turn))
+    }
+
+    /// How fast feeds may take it to turn, thousandths of a turn a minute: 0 as soon as no pulse has come for longer than two of them take.
+    pub fn feeds(&self) -> u32 {
+        if self.turn == 0 {
+            return 0;
+        }
+        let (age, two) = self.age();
+        if age > two + two / 64 + SLACK { 0 } else { self.speed() }
     }
 
     /// How fast it turns, thousandths of a turn a minute; 0 if it stands still. Cost: 900.
@@ -322,6 +339,18 @@ mod tests {
         assert!(spindle.encoder.is_still());
         assert_eq!(spindle.encoder.speed(), 0);
         assert_eq!(spindle.misfits, 0);
+    }
+
+    #[test]
+    fn feeds_end_when_two_pulses_are_missing() {
+        for (per_turn, turn) in [(4u16, 50_000u64), (100, 50_000), (8, 250_000)] {
+            let mut spindle = Spindle::new(per_turn, 0);
+            (0..5).for_each(|_| spindle.turn(per_turn, turn));
+            assert!(spindle.encoder.feeds() > 0);
+            let two = 2 * turn / u64::from(per_turn);
+            spindle.pass(two + two / 32 + 2 * LOOK);
+            assert_eq!(spindle.encoder.feeds(), 0, "{per_turn}");
+        }
     }
 
     #[test]

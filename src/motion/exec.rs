@@ -59,6 +59,12 @@ const SLOW: f32 = 5.0;
 /// A share of the spindle's speed has to change by so much to count.
 const CHANGE: f32 = 0.005;
 
+/// A feed waits so long for a spindle that stands still, s.
+const PATIENCE_S: f32 = 6.0;
+
+/// How long a pause is, s.
+const PAUSE_S: f32 = 0.001;
+
 /// A dwell's segment lasts so many milliseconds.
 const DWELL_MS: u16 = 2;
 
@@ -145,7 +151,8 @@ enum Follows {
     /// Nothing.
     #[default]
     Nothing,
-    /// G95. Feeds go by its measured speed: that share of what they were planned for.
+    /// G95. Feeds go by its measured speed: that share of what they were planned for. 0 or less if it stands still: minus the seconds for
+    /// which a feed has waited for it.
     Speed(f32),
     /// G33, a pass of G76: they follow its angle.
     Angle(Thread),
@@ -480,13 +487,15 @@ impl Exec {
             && let Follows::Speed(share) = self.follows
             && !blocks.is_traverse()
         {
-            cruise *= share;
             // The spindle stands still.
-            holds |= !some(share);
+            let stands = share <= 0.0;
+            holds |= stands;
+            if !stands {
+                cruise *= share;
+            }
             if self.governor.is_at_rest() && holds && !self.hold {
-                let (ticks, period) = PAUSE;
-                self.prep.pause(ticks, period, segment);
-                return Step::Segment;
+                self.follows = Follows::Speed(share - PAUSE_S);
+                return self.await_spindle(out, segment);
             }
         }
         let ahead = View { headroom: running.headroom, blocks };
@@ -580,10 +589,23 @@ impl Exec {
         let Follows::Speed(before) = &mut self.follows else { return };
         let share = least(share, 1.0);
         let off = share - *before;
-        if !(-CHANGE..=CHANGE).contains(&off) || (share.to_bits() == 0) != (before.to_bits() == 0) {
+        let (stands, stood) = (!some(share), *before <= 0.0);
+        if stands != stood || !stands && !(-CHANGE..=CHANGE).contains(&off) {
             *before = share;
             self.governor.change_feed();
             self.governor.look_again();
+        }
+    }
+
+    /// Whether a feed has waited for the spindle for too long. It says so once.
+    #[small]
+    pub fn takes_too_long(&mut self) -> bool {
+        match &mut self.follows {
+            Follows::Speed(share) if *share < -PATIENCE_S => {
+                *share = 0.0;
+                true
+            }
+            _ => false,
         }
     }
 
@@ -612,9 +634,7 @@ impl Exec {
         let wanted = thread.velocity(kept, velocity, accel, brakes);
         let breaks_off = self.breaks_off || thread.fault().is_some();
         if at_rest && (breaks_off || !some(wanted)) {
-            let (ticks, period) = PAUSE;
-            self.prep.pause(ticks, period, segment);
-            return Step::Segment;
+            return self.await_spindle(out, segment);
         }
         let retract = thread.retract();
         // The axes come to rest in this line, in which X stands still.
@@ -633,6 +653,16 @@ impl Exec {
         };
         thread.handed(stretch.distance);
         self.hand_out(&stretch, blocks, out, segment, |_| (false, false))
+    }
+
+    /// The line waits for the spindle.
+    #[inline(never)]
+    #[small]
+    fn await_spindle(&mut self, out: &mut Snapshot, segment: &mut Segment) -> Step {
+        let (ticks, period) = PAUSE;
+        self.prep.pause(ticks, period, segment);
+        out.left = self.running.left;
+        Step::Segment
     }
 
     /// What a line that follows the spindle may do, as far as that has changed.

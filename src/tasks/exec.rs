@@ -300,12 +300,15 @@ fn note_left(encoder: &mut Encoder, why: Status) {
 /// Feeds a turn go by the measured speed, if there is an encoder: S is what they were planned for.
 #[inline(never)]
 #[small]
-fn follow_speed(exec: &mut Exec, encoder: &Encoder, out: &Snapshot) {
+fn follow_speed(exec: &mut Exec, encoder: &mut Encoder, out: &Snapshot) {
     let share = match encoder.per_turn() {
         0 => 1.0,
-        _ => encoder.speed() as f32 / (out.speed * 1e3),
+        _ => encoder.feeds() as f32 / (out.speed * 1e3),
     };
     exec.set_share(share);
+    if exec.takes_too_long() {
+        encoder.pass = Status::SpindleMustTurn;
+    }
 }
 
 /// The steppers have just been started in a pass.

@@ -5,6 +5,7 @@
 
 use kerf_macros::small;
 
+use super::alarm;
 use super::common;
 use super::links::Links;
 use super::storage::Storage;
@@ -14,6 +15,7 @@ use crate::config::{Owner, Setting};
 use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::{encoder, flags};
+use crate::machine::Alarm;
 use crate::status::Status;
 
 /// Microseconds of a count of time.
@@ -60,6 +62,16 @@ pub fn look(links: &Links) {
     flags::set(Event::BlockDone);
     if first_misfit {
         links.except(Status::PulseMisfit);
+    }
+    let waits_in_vain = common::with(links.thread, |common| {
+        let waits = common.encoder.pass == Status::SpindleMustTurn;
+        if waits {
+            common.encoder.pass = Status::Again;
+        }
+        waits
+    });
+    if waits_in_vain {
+        alarm::raise_for(links, Alarm::Alarm, Status::SpindleMustTurn);
     }
 }
 
