@@ -72,18 +72,19 @@ pub struct Encoder {
     sync_at: u32,
     /// How long the last turn took; 0 if it is not known.
     turn: u32,
-    /// Index pulses in a row, up to [`SURE`].
+    /// Index pulses in a row, up to [`SURE`], and [`NEWS`].
     seen: u8,
     /// Misfits, up to 255.
     misfits: u8,
     /// How far the axes are ahead of the spindle in a pass, um, at the last index.
     error: i16,
-    /// Nobody has been told of it.
-    is_new: bool,
     /// How the pass stands in step with the spindle ([`thread`](crate::motion::thread)): [`Status::Again`] for none that has begun,
     /// [`Status::Ok`] while it goes on, else why it did not begin, or has ended. The planner and exec write it.
     pub pass: Status,
 }
+
+/// Of [`Encoder::seen`]: nobody has been told of [`Encoder::error`] yet.
+const NEWS: u8 = 0x80;
 
 /// After so many index pulses in a row the time of a turn tells of its neighbours.
 const SURE: u8 = 4;
@@ -104,7 +105,6 @@ impl Encoder {
             seen: 0,
             misfits: 0,
             error: 0,
-            is_new: false,
             pass: Status::Again,
         }
     }
@@ -139,7 +139,8 @@ impl Encoder {
     pub fn seen(&self) -> (u8, bool) {
         let synced =
             self.per_turn == 1 || self.time.wrapping_sub(self.sync_at) < STILL.max(self.turn);
-        (self.seen, self.seen > 0 && synced)
+        let seen = self.seen & !NEWS;
+        (seen, seen > 0 && synced)
     }
 
     /// Misfits so far, 255 for more.
@@ -149,7 +150,8 @@ impl Encoder {
 
     /// In a pass the axes were so far ahead of the spindle at an index, mm. Exec.
     pub fn note_error(&mut self, mm: f32) {
-        (self.error, self.is_new) = ((mm * 1e3) as i16, true);
+        self.error = (mm * 1e3) as i16;
+        self.seen |= NEWS;
     }
 
     /// How far the axes are ahead of the spindle, um, at the last index of the pass; 0 without one.
@@ -159,7 +161,9 @@ impl Encoder {
 
     /// Whether there has been another index in a pass since this was asked last.
     pub fn take_news(&mut self) -> bool {
-        core::mem::take(&mut self.is_new)
+        let is_new = self.seen & NEWS != 0;
+        self.seen &= !NEWS;
+        is_new
     }
 
     /// Takes up what the sensors have seen since the last look. Whether pulses did not fit.
@@ -175,7 +179,7 @@ impl Encoder {
             self.misfits = self.misfits.saturating_add(1);
         }
         if self.is_still() {
-            (self.seen, self.turn) = (0, 0);
+            (self.seen, self.turn) = (self.seen & NEWS, 0);
         }
         misfit
     }
@@ -195,9 +199,9 @@ impl Encoder {
         self.index = pulses.index;
         self.at_index = pulses.at_index;
         self.index_at = at;
-        let (before, turn) = (self.seen, self.turn);
-        self.seen =
-            u8::try_from(turns).map_or(SURE, |turns| before.saturating_add(turns)).min(SURE);
+        let (before, turn) = (self.seen & !NEWS, self.turn);
+        let seen = u8::try_from(turns).map_or(SURE, |turns| before.saturating_add(turns));
+        self.seen = self.seen & NEWS | seen.min(SURE);
         if before == 0 {
             return false;
         }
@@ -210,7 +214,7 @@ impl Encoder {
 
     /// Whether the spindle stands still.
     pub fn is_still(&self) -> bool {
-        if self.per_turn == 0 || self.seen == 0 {
+        if self.per_turn == 0 || self.seen & !NEWS == 0 {
             return true;
         }
         let (age, two) = self.age();

@@ -94,10 +94,10 @@ pub struct Thread {
     at: u32,
     since: u32,
     measured: u16,
-    /// Pulses by then, and those of sync that the last index is to have seen.
-    pulses: u16,
-    index: u16,
-    expected: u16,
+    /// Pulses by then, and those of sync that the last index has seen, modulo 256: they are looked at every few ms.
+    pulses: u8,
+    index: u8,
+    expected: u8,
     /// Pulses that were put in since the last index, less those that were left out.
     mended: i8,
     /// When what is queued ends, CPU cycles.
@@ -182,23 +182,24 @@ impl Thread {
     pub fn note(&mut self, time: u32, pulses: &Pulses, per_turn: u16, turn: u32) {
         let before = |at: u16| time.wrapping_sub(pulses.now.wrapping_sub(at).into());
         if self.per_turn == 0 {
-            (self.per_turn, self.index) = (per_turn, pulses.index);
+            (self.per_turn, self.index) = (per_turn, pulses.index as u8);
         }
         let (count, at) = match per_turn {
             1 => (pulses.index, before(pulses.index_at)),
             _ => (pulses.sync, before(pulses.sync_at)),
         };
-        if pulses.index != self.index {
-            let turns = pulses.index.wrapping_sub(self.index);
-            self.index = pulses.index;
+        let (count, at_index) = (count as u8, pulses.at_index as u8);
+        let turns = (pulses.index as u8).wrapping_sub(self.index);
+        if turns != 0 {
+            self.index = pulses.index as u8;
             self.indexed = true;
             if self.stage == Stage::Armed {
                 self.interval = turn as f32 / f32::from(per_turn);
-                self.expected = pulses.at_index;
-                self.pulses = if per_turn == 1 { count.wrapping_sub(1) } else { pulses.at_index };
+                self.expected = at_index;
+                self.pulses = if per_turn == 1 { count.wrapping_sub(1) } else { at_index };
                 self.stage = Stage::Indexed;
             } else if per_turn > 1 {
-                self.check_turns(turns, pulses.at_index);
+                self.check_turns(turns, at_index);
             }
         }
         let new = count.wrapping_sub(self.pulses);
@@ -237,11 +238,11 @@ impl Thread {
     }
 
     /// An index has come, `turns` after the last, when sync had given so many pulses.
-    fn check_turns(&mut self, turns: u16, at_index: u16) {
-        let expected = self.expected.wrapping_add(turns.wrapping_mul(self.per_turn));
+    fn check_turns(&mut self, turns: u8, at_index: u8) {
+        let expected = self.expected.wrapping_add(turns.wrapping_mul(self.per_turn as u8));
         // Too few by so many.
-        let short = expected.wrapping_sub(at_index) as i16;
-        let wrong = short - i16::from(self.mended);
+        let short = expected.wrapping_sub(at_index) as i8;
+        let wrong = i16::from(short) - i16::from(self.mended);
         if wrong != 0 && self.stage > Stage::Indexed {
             self.ahead += self.pitch() * f32::from(wrong);
         }
@@ -249,13 +250,13 @@ impl Thread {
     }
 
     /// So many pulses have come, the last of them `at` this time.
-    fn take(&mut self, new: u16, at: u32) {
+    fn take(&mut self, new: u8, at: u32) {
         let passed = at.wrapping_sub(self.at) as f32 / self.interval;
         let mut true_count = f32::from(new);
         let off = passed - true_count;
         if !(-MISFIT..=MISFIT).contains(&off) && passed < 100.0 {
             let fits = (passed + 0.5) as u16;
-            self.mended = self.mended.saturating_add(fits.wrapping_sub(new) as i8);
+            self.mended = self.mended.saturating_add((fits as u8).wrapping_sub(new) as i8);
             true_count = f32::from(fits);
             if fits == 0 {
                 return;

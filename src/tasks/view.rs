@@ -243,6 +243,11 @@ impl<'a> View<'a> {
         (pins::worked() >> input & 1).into()
     }
 
+    /// S, thousandths of a turn a minute.
+    fn programmed_speed(&self) -> i32 {
+        self.modal(Value::SpindleSpeed).min(2_000_000) * 1_000
+    }
+
     #[small]
     fn modal(&self, value: Value) -> i32 {
         let model = self.links.model.borrow();
@@ -393,9 +398,9 @@ impl Machine for View<'_> {
             Value::Reset => watchdog::cause() as i32,
             Value::SpindleSpeed => match turning::speed(self.links.thread) {
                 Some(speed) => speed as i32,
-                None => self.value(Value::SpindleProgrammed),
+                None => self.programmed_speed(),
             },
-            Value::SpindleProgrammed => self.modal(Value::SpindleSpeed).min(2_000_000) * 1_000,
+            Value::SpindleProgrammed => self.programmed_speed(),
             Value::PulsesPerTurn => turning::per_turn(self.links.thread).into(),
             Value::SyncError => turning::error(self.links.thread).into(),
             Value::Pass => turning::pass(self.links.thread) as i32,

@@ -7,7 +7,7 @@ use crate::gcode::arc::{Extent, Walk};
 use crate::gcode::command::{Feed, Motion};
 use crate::gcode::interpreter::Offsets;
 use crate::motion::curve::Curve;
-use crate::units::{Length, PerAxis};
+use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// What lasts longer than a turn: one at a time, and one place in memory.
 pub(super) enum Ongoing {
@@ -15,6 +15,8 @@ pub(super) enum Ongoing {
     None,
     /// An arc.
     Arc(ArcWalk),
+    /// A pass in step with the spindle, from here.
+    Pass([Length; FIRST_ROTARY]),
     /// Lines are checked: these are the offsets of before.
     Check(Offsets),
 }

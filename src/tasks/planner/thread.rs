@@ -14,6 +14,7 @@ use embassy_futures::yield_now;
 use kerf_macros::small;
 
 use super::Planner;
+use super::parts::Ongoing;
 use super::seek::drop_blocks;
 use crate::boards::MOTORS;
 use crate::config::groups::spindle;
@@ -80,6 +81,7 @@ impl Planner {
     /// feedhold has left is made once more, from its beginning, when the hold is over.
     pub(super) async fn thread(&mut self, cuts: bool) {
         loop {
+            self.walk = Ongoing::None;
             if !self.standstill().await {
                 return;
             }
@@ -91,8 +93,6 @@ impl Planner {
             if !cuts {
                 return;
             }
-            let [x, y, z, ..] = self.position;
-            let start = [x, y, z];
             match self.begin_pass(turn) {
                 Ok(true) => {}
                 Ok(false) => return,
@@ -129,11 +129,12 @@ impl Planner {
             self.leave();
             for part in 0..PARTS_BACK {
                 self.room().await;
-                self.go_back(part, &start);
+                self.go_back(part);
                 self.finish_parts().await;
             }
         }
         // G76 goes on with its usual limits.
+        self.walk = Ongoing::None;
         self.take_up_changes();
     }
 
@@ -172,7 +173,9 @@ impl Planner {
     fn leave(&mut self) {
         let end = *self.links.model.borrow().position();
         let motion = common::snapshot(self.links.thread);
+        let start = core::mem::replace(&mut self.walk, Ongoing::None);
         self.relocate(&motion);
+        self.walk = start;
         self.links.model.borrow_mut().set_position(&end);
         self.take_up_changes();
     }
@@ -180,11 +183,12 @@ impl Planner {
     /// Queues a part of the way back to the start of a pass: X out of the cut, along it, and X back.
     #[inline(never)]
     #[small]
-    fn go_back(&mut self, part: u8, start: &[Length; FIRST_ROTARY]) {
+    fn go_back(&mut self, part: u8) {
+        let Ongoing::Pass([x, y, z]) = self.walk else { return };
         if self.is_flushed() {
             return;
         }
-        let ([x, y, z], mut target) = (*start, self.position);
+        let mut target = self.position;
         let out = self.retract_length();
         let beside = Length(x.0.saturating_add(out.0));
         let [to_x, to_y, to_z, ..] = &mut target;
@@ -303,6 +307,8 @@ impl Planner {
         // They are the settings' again for the next line.
         links.changes.note(Changes::SETTINGS);
         self.set_pass(Status::Ok);
+        let [x, y, z, ..] = self.position;
+        self.walk = Ongoing::Pass([x, y, z]);
         if let Some(piece) = self.piece(0, &self.position) {
             let pass =
                 Pass { lead: piece.lead, limit: self.error_limit(), retract: self.retract() };

@@ -442,6 +442,144 @@ fn a_spindle_that_stops_dead_stops_the_axis() {
     }
 }
 
+/// Runs for a quarter of a millisecond.
+fn run_for_quarter(machine: &mut Machine) {
+    machine.run_until(machine.cycle() + machine.cycles(1) / 4).unwrap();
+}
+
+/// A lathe whose X leaves the cut by 2 mm: 200 steps/mm and 500 mm/s2 there, too.
+fn retracting(marks: u32, rpm: f64) -> (Machine, Host) {
+    let (mut machine, mut host) = lathe(marks, rpm, |_| {});
+    for line in [
+        "{1tr:4}",
+        "{1sa:1.8}",
+        "{1mi:4}",
+        "{xfr:1500}",
+        "{xvm:1500}",
+        "{xac:500}",
+        "{xjm:200000}",
+        "{spr:2}",
+    ] {
+        set(&mut machine, &mut host, line);
+    }
+    (machine, host)
+}
+
+#[test]
+fn with_a_retract_a_spindle_that_stops_dead_has_x_leave_at_once() {
+    const DEPTHS: [f64; 3] = [0.1, 0.3, 0.6];
+    for (marks, rpm) in [(1, 300.0), (4, 300.0), (4, 1_000.0), (100, 600.0), (100, 1_000.0)] {
+        let (mut machine, mut host) = retracting(marks, rpm);
+        begin(&mut machine, &mut host, "g91 g33 z-20 k1", 4.0);
+        machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
+        let stopped = machine.cycle();
+        let (mut out, mut rest, mut last) = ([None; DEPTHS.len()], stopped, 0);
+        while machine.cycle() < stopped + machine.cycles(1_500) {
+            run_for_quarter(&mut machine);
+            let [x, _, z, _] = machine.recorder().motors().each_ref().map(|motor| motor.position);
+            for (out, depth) in out.iter_mut().zip(DEPTHS) {
+                if out.is_none() && x as f64 / STEPS >= depth - 1e-9 {
+                    *out = Some(machine.cycle());
+                }
+            }
+            if z != last {
+                (last, rest) = (z, machine.cycle());
+            }
+        }
+        host.run_for_ms(&mut machine, 10).unwrap();
+        let ms = |at: u64| machine.seconds(at - stopped) * 1e3;
+        let two_pulses = 2.0 * 60_000.0 / rpm / f64::from(marks);
+        let out = out.map(|at| ms(at.expect("it is out")));
+        println!(
+            "N {marks}, {rpm} rpm, two pulses are {two_pulses:.0} ms: out by 0.1, 0.3, 0.6 mm after {:.0}, {:.0}, {:.0} ms; Z at rest after {:.0}",
+            out[0],
+            out[1],
+            out[2],
+            ms(rest)
+        );
+        for (out, depth) in out.iter().zip(DEPTHS) {
+            // What is queued, a stretch, and the ramp of X.
+            let most = 1.02 * two_pulses + 12.0 + (2.0 * depth / 500.0).sqrt() * 1e3;
+            assert!(*out <= most, "{marks}, {rpm}, {depth}: {out} ms of {most}");
+        }
+        let told = host.take_reports().iter().any(|report| report["er"]["st"] == LOST);
+        assert!(told, "{marks}: nothing is told");
+        // The position is known to the step.
+        assert_eq!(machine.recorder().motors()[0].position, (2.0 * STEPS) as i64);
+        assert_eq!(asked(&mut machine, &mut host, "mpox"), 2.0);
+        let position = asked(&mut machine, &mut host, "mpoz");
+        assert!((position - last as f64 / STEPS).abs() < 0.0011, "{position} {last}");
+        set(&mut machine, &mut host, "{clear:n}");
+        set(&mut machine, &mut host, "g90 g0 x0 z0");
+        wait_for_rest(&mut machine, &mut host, 20_000);
+        let motors = machine.recorder().motors();
+        assert_eq!([motors[0].position, motors[Z].position], [0, 0]);
+    }
+}
+
+#[test]
+fn with_a_retract_a_hold_leaves_the_cut_and_the_pass_is_made_once_more() {
+    for (marks, rpm) in [(4, 300.0), (4, 1_000.0), (100, 600.0)] {
+        let (mut machine, mut host) = retracting(marks, rpm);
+        let since = begin(&mut machine, &mut host, "g91 g33 z-16 k1", 6.0);
+        machine.send_now(b'!');
+        let held = machine.cycle();
+        let mut out = None;
+        while machine.cycle() < held + machine.cycles(600) {
+            run_for_quarter(&mut machine);
+            if out.is_none() && machine.recorder().motors()[0].position >= (0.1 * STEPS) as i64 {
+                out = Some(machine.cycle());
+            }
+        }
+        host.run_for_ms(&mut machine, 10).unwrap();
+        let out = machine.seconds(out.expect("it is out") - held) * 1e3;
+        println!("N {marks}, {rpm} rpm: out by 0.1 mm {out:.0} ms after the hold");
+        assert!(out < 34.0, "{out} ms");
+        assert_eq!(host.stat(), Some(6), "it holds");
+        assert_eq!(machine.recorder().motors()[0].position, (2.0 * STEPS) as i64);
+        let first = phases(&machine, since, 1.0, 1.5, 5.5);
+        let since = machine.mechanics().unwrap().indexed().len();
+        machine.send_now(b'~');
+        host.run_for_ms(&mut machine, 500).unwrap();
+        wait_for_rest(&mut machine, &mut host, 20_000);
+        let motors = machine.recorder().motors();
+        assert_eq!([motors[0].position, motors[Z].position], [0, (-16.0 * STEPS) as i64]);
+        // Where X is back at its place it cuts.
+        let indexed = &machine.mechanics().unwrap().indexed()[since..];
+        let cuts = indexed.iter().filter(|(_, steps)| steps[0] == 0);
+        let ways = cuts.map(|(_, steps)| -steps[Z] as f64 / STEPS);
+        let second = ways.filter(|way| (1.5..=14.5).contains(way)).map(|way| way - way.round());
+        let all: Vec<f64> = first.iter().copied().chain(second).collect();
+        println!(
+            "N {marks}, {rpm} rpm: {} turns of both passes, spread {:.4}",
+            all.len(),
+            spread(&all)
+        );
+        assert!(all.len() >= 14 && spread(&all) < STEP, "{all:.3?}");
+    }
+}
+
+#[test]
+fn an_error_above_its_limit_ends_the_pass() {
+    // Told by the exception of its own.
+    const ASTRAY: u64 = 46;
+    let (mut machine, mut host) = retracting(4, 600.0);
+    set(&mut machine, &mut host, "{spl:0.1}");
+    // Steady, and with a load that swings, nothing is amiss.
+    let swing = 12.0 * 3.0 * std::f64::consts::TAU;
+    machine.tamper(|mechanics, now| mechanics.load_spindle(0.0, swing, 3.0, now));
+    pass(&mut machine, &mut host, 12.0, 2.0);
+    machine.tamper(|mechanics, now| mechanics.load_spindle(0.0, 0.0, 1.0, now));
+    assert!(host.take_reports().iter().all(|report| report["er"]["st"].is_null()));
+    // Faster than the axis: 1,500 mm/min are 750 turns.
+    begin(&mut machine, &mut host, "g33 z-20 k2", 4.0);
+    machine.tamper(|mechanics, now| mechanics.drive_spindle_to(1_000.0, now));
+    host.run_for_ms(&mut machine, 800).unwrap();
+    let told = host.take_reports().iter().any(|report| report["er"]["st"] == ASTRAY);
+    assert!(told, "nothing is told");
+    assert_eq!(machine.recorder().motors()[0].position, (2.0 * STEPS) as i64);
+}
+
 #[test]
 fn a_hold_waits_for_the_end_of_the_pass() {
     let (mut machine, mut host) = lathe(4, 300.0, |_| {});
