@@ -84,6 +84,8 @@ pub enum Action {
     Thread(Pass),
     /// They do no more.
     EndThread,
+    /// G33.1, at rest: the spindle has turned round, and lines follow it back. It is to turn again as far before the end of the line.
+    Return,
     /// In the midst of a pass of G33 or G76: the lines from here on have this lead, mm a turn. The machine goes on.
     Lead(f32),
     /// G95, or its end: from here on feeds go by the measured speed of the spindle, or not. The machine goes on.
@@ -105,6 +107,8 @@ pub struct Pass {
     pub limit: Short,
     /// How it is left before its end.
     pub retract: Retract,
+    /// G33.1: the spindle is to turn round so many mm before the end of the line; 0 for a pass that does not return.
+    pub turn_at: f32,
 }
 
 /// What a program switches.

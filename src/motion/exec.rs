@@ -29,6 +29,7 @@ use super::retract::Retreat;
 use super::short::Short;
 use super::snapshot::{Program, Snapshot};
 use super::thread::Thread;
+use crate::boards::outputs;
 use crate::capability::Capability;
 use crate::dda::Segment;
 use crate::gcode::overrides::Change;
@@ -279,11 +280,16 @@ impl Exec {
     fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
         let running = &self.running;
         let is_line = |block: &Block| matches!(block.body, Body::Line(_)) || block.is_aside();
-        let retreats = match &self.follows {
+        let must_go_on = match &self.follows {
             Follows::Retreats(retreat) => !retreat.is_done(),
+            // The spindle does not wait.
+            Follows::Angle(thread) => {
+                let ends = self.breaks_off || thread.fault().is_some() || thread.has_turned();
+                thread.is_tapping() && !ends
+            }
             _ => false,
         };
-        let goes_on = if retreats {
+        let goes_on = if must_go_on {
             true
         } else if running.active {
             // What the end of a block has been planned as is handed out.
@@ -311,7 +317,12 @@ impl Exec {
         let held = self.prep.cut(&mut out.target);
         self.running.active = false;
         self.dwell_ms = 0;
-        if !matches!(self.follows, Follows::Speed(_)) {
+        let keeps = match &mut self.follows {
+            Follows::Angle(thread) => thread.drop_rest(),
+            Follows::Speed(_) => true,
+            _ => false,
+        };
+        if !keeps {
             self.follows = Follows::Nothing;
         }
         out.left = 0.0;
@@ -329,6 +340,15 @@ impl Exec {
             blocks.release();
         }
         held
+    }
+
+    /// What was queued has been dropped for good: no line follows the spindle.
+    pub fn end_pass(&mut self) {
+        if let Follows::Angle(thread) = &self.follows
+            && thread.waits()
+        {
+            self.follows = Follows::Nothing;
+        }
     }
 
     /// Does what the oldest block asks for, which is no line.
@@ -371,16 +391,17 @@ impl Exec {
                 };
             }
             Action::Drivers(drivers) => self.prep.set_drivers(*drivers),
-            Action::Thread(_) | Action::EndThread => {
+            Action::Thread(_) | Action::EndThread | Action::Return => {
                 self.halt(out);
                 if !standstill {
                     return Step::Standstill;
                 }
                 self.prep.rest();
-                self.follows = match action {
-                    Action::Thread(pass) => Follows::Angle(Thread::begin(pass)),
-                    _ => Follows::Nothing,
-                };
+                match (action, &mut self.follows) {
+                    (Action::Thread(pass), _) => self.follows = Follows::Angle(Thread::begin(pass)),
+                    (Action::Return, Follows::Angle(thread)) => thread.turn_back(),
+                    _ => self.follows = Follows::Nothing,
+                }
             }
             Action::PerTurn(on) => self.go_by_speed(*on),
             Action::Lead(lead) => {
@@ -556,6 +577,14 @@ impl Exec {
         }
     }
 
+    /// Whether the axes of G33.1 rest where the spindle has turned round, and what is left of the line is to be dropped.
+    pub fn has_turned(&self) -> bool {
+        match &self.follows {
+            Follows::Angle(thread) => thread.has_turned() && self.governor.is_at_rest(),
+            _ => false,
+        }
+    }
+
     /// Why a pass has been left before its end, if one has, and the rest of it waits to be dropped: a hold of its own.
     #[inline(always)]
     pub fn has_left(&self) -> Option<Status> {
@@ -632,7 +661,11 @@ impl Exec {
         let at_rest = self.governor.is_at_rest();
         let Follows::Angle(thread) = &mut self.follows else { return Step::Again };
         let wanted = thread.velocity(kept, velocity, accel, brakes);
-        let breaks_off = self.breaks_off || thread.fault().is_some();
+        if thread.is_to_turn(self.running.left) {
+            // The task switches it.
+            out.outputs ^= outputs::COUNTERCLOCKWISE;
+        }
+        let breaks_off = self.breaks_off || thread.fault().is_some() || thread.rests();
         if at_rest && (breaks_off || !some(wanted)) {
             return self.await_spindle(out, segment);
         }

@@ -26,7 +26,7 @@
 use kerf_macros::small;
 
 use super::block::Pass;
-use super::float::{least, some};
+use super::float::{greater, least, some};
 use super::retract::Retract;
 use super::short::Short;
 use crate::encoder::{COUNTS_PER_S, Pulses};
@@ -48,6 +48,9 @@ const OVERDUE: f32 = 2.02;
 
 /// And for so many counts more, 0.5 ms: pulses do not come quite evenly.
 const SLACK: f32 = COUNTS_PER_S as f32 * 0.0005;
+
+/// A spindle that turns round has so long between two pulses, counts: 6 s.
+const PATIENCE: f32 = COUNTS_PER_S as f32 * 6.0;
 
 /// CPU cycles of a count.
 const CYCLES: u32 = TIMER_HZ / COUNTS_PER_S;
@@ -74,6 +77,14 @@ enum Stage {
     Follows,
     /// They have been within the limit of the error.
     Met,
+    /// G33.1: the spindle has been told to turn round.
+    Turning,
+    /// It is about to, or has: the axes come to rest.
+    Top,
+    /// It has.
+    Turned,
+    /// What was left of the line has been dropped: the way back is to come.
+    Waits,
     /// The spindle was lost, and the axes come to rest.
     Lost,
     /// The error was above its limit, and the axes come to rest.
@@ -104,10 +115,36 @@ pub struct Thread {
     end: u32,
     /// There has been an index since [`Thread::error`] was asked last.
     indexed: bool,
-    /// How far the axes may be off, mm; 0 for no limit.
-    limit: Short,
-    /// How the pass is left.
-    retract: Retract,
+    kind: Kind,
+}
+
+/// What becomes of the pass.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    /// It ends with its lines.
+    Pass {
+        /// How far the axes may be off, mm; 0 for no limit.
+        limit: Short,
+        /// How it is left before its end.
+        retract: Retract,
+    },
+    /// G33.1.
+    Tap {
+        /// So many mm before the end of the line the spindle is to turn round.
+        turn_at: f32,
+        /// By how much the spindle slows down: pulses a count, in a count.
+        decel: f32,
+    },
+}
+
+impl Default for Kind {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+impl Kind {
+    const NONE: Self = Self::Pass { limit: Short::ZERO, retract: Retract::NONE };
 }
 
 #[small]
@@ -129,8 +166,7 @@ impl Thread {
             mended: 0,
             end: 0,
             indexed: false,
-            limit: Short::ZERO,
-            retract: Retract::NONE,
+            kind: Kind::NONE,
         }
     }
 
@@ -145,13 +181,74 @@ impl Thread {
 
     /// A pass begins.
     pub fn begin(pass: &Pass) -> Self {
-        let Pass { lead, limit, retract } = *pass;
-        Self { stage: Stage::Armed, lead, limit, retract, ..Self::new() }
+        let Pass { lead, limit, retract, turn_at } = *pass;
+        let kind = match some(turn_at) {
+            true => Kind::Tap { turn_at, decel: 0.0 },
+            false => Kind::Pass { limit, retract },
+        };
+        Self { stage: Stage::Armed, lead, kind, ..Self::new() }
+    }
+
+    /// Whether it is G33.1, and the axes have begun to follow: it must not rest but where the spindle does.
+    pub fn is_tapping(&self) -> bool {
+        matches!(self.kind, Kind::Tap { .. }) && self.stage >= Stage::Follows
+    }
+
+    /// Whether the spindle is to be told now to turn round, with so many mm of the line left. It says so once.
+    pub fn is_to_turn(&mut self, left: f32) -> bool {
+        let turns = match self.kind {
+            Kind::Tap { turn_at, .. } => self.stage == Stage::Follows && left <= turn_at,
+            Kind::Pass { .. } => false,
+        };
+        if turns {
+            self.stage = Stage::Turning;
+        }
+        turns
+    }
+
+    /// Whether the axes are to rest, for the spindle turns round.
+    pub fn rests(&self) -> bool {
+        matches!(self.stage, Stage::Top | Stage::Turned | Stage::Waits)
+    }
+
+    /// Whether it has turned round, and the way back may begin.
+    pub fn has_turned(&self) -> bool {
+        self.stage == Stage::Turned
+    }
+
+    /// What was left of the line has been dropped. Whether the way back is to come.
+    pub fn drop_rest(&mut self) -> bool {
+        let waits = self.stage == Stage::Turned;
+        if waits {
+            self.stage = Stage::Waits;
+        }
+        waits
+    }
+
+    /// Whether the way back is to come.
+    pub fn waits(&self) -> bool {
+        self.stage == Stage::Waits
+    }
+
+    /// It begins, with the phase of the way there.
+    pub fn turn_back(&mut self) {
+        self.ahead = -self.ahead;
+        self.stage = Stage::Follows;
+    }
+
+    fn decel(&self) -> f32 {
+        match self.kind {
+            Kind::Tap { decel, .. } => decel,
+            Kind::Pass { .. } => 0.0,
+        }
     }
 
     /// How the pass is left before its end, if the axes have begun to follow.
     pub fn retract(&self) -> Retract {
-        if self.stage < Stage::Follows { Retract::NONE } else { self.retract }
+        match self.kind {
+            Kind::Pass { retract, .. } if self.stage >= Stage::Follows => retract,
+            _ => Retract::NONE,
+        }
     }
 
     /// From here on the path goes so many mm a turn: a taper, or the end of one.
@@ -198,7 +295,7 @@ impl Thread {
                 self.expected = at_index;
                 self.pulses = if per_turn == 1 { count.wrapping_sub(1) } else { at_index };
                 self.stage = Stage::Indexed;
-            } else if per_turn > 1 {
+            } else if per_turn > 1 && !matches!(self.kind, Kind::Tap { .. }) {
                 self.check_turns(turns, at_index);
             }
         }
@@ -211,11 +308,20 @@ impl Thread {
                 (self.at, self.since, self.measured) = (at, at, 0);
                 self.stage = Stage::Known;
             }
+            Stage::Turning | Stage::Top => self.take_turning(new, at),
+            Stage::Turned | Stage::Waits => {
+                self.ahead -= self.pitch() * f32::from(new);
+                self.keep_pace(f32::from(new), at);
+            }
             _ => self.take(new, at),
         }
         self.pulses = count;
         let age = time.wrapping_sub(self.at) as f32;
-        if self.follows() && age > OVERDUE * self.interval + SLACK {
+        let overdue = match self.stage {
+            Stage::Turning | Stage::Top | Stage::Turned | Stage::Waits => PATIENCE,
+            _ => OVERDUE * self.interval + SLACK,
+        };
+        if self.stage >= Stage::Follows && self.stage < Stage::Lost && age > overdue {
             self.stage = Stage::Lost;
         }
     }
@@ -233,6 +339,7 @@ impl Thread {
     }
 
     /// mm a pulse.
+    #[inline(never)]
     fn pitch(&self) -> f32 {
         self.lead / f32::from(self.per_turn)
     }
@@ -250,6 +357,7 @@ impl Thread {
     }
 
     /// So many pulses have come, the last of them `at` this time.
+    #[inline(never)]
     fn take(&mut self, new: u8, at: u32) {
         let passed = at.wrapping_sub(self.at) as f32 / self.interval;
         let mut true_count = f32::from(new);
@@ -263,13 +371,60 @@ impl Thread {
             }
         }
         self.ahead += self.pitch() * true_count;
+        self.keep_pace(true_count, at);
+    }
+
+    /// So many pulses more are counted, the last of them `at` this time: how fast they come.
+    #[inline(never)]
+    fn keep_pace(&mut self, count: f32, at: u32) {
         self.at = at;
-        self.measured = self.measured.saturating_add(true_count as u16);
+        self.measured = self.measured.saturating_add(count as u16);
         let window = at.wrapping_sub(self.since);
-        if window >= WINDOW {
-            self.interval = window as f32 / f32::from(self.measured);
-            (self.since, self.measured) = (at, 0);
+        if window < WINDOW {
+            return;
         }
+        let window = window as f32;
+        let interval = window / f32::from(self.measured);
+        if let Kind::Tap { decel, .. } = &mut self.kind {
+            *decel = (1.0 / self.interval - 1.0 / interval) / window;
+        }
+        self.interval = interval;
+        (self.since, self.measured) = (at, 0);
+    }
+
+    /// Pulses of a spindle that is about to turn round. One that comes after the time when it stands is of the way back, over the mark of the last one; where the
+    /// spindle is then follows from how it has slowed down.
+    #[inline(never)]
+    fn take_turning(&mut self, new: u8, at: u32) {
+        let after = at.wrapping_sub(self.at) as f32;
+        let (rate, decel) = self.pace();
+        if self.stage != Stage::Top && (decel <= 0.0 || after * decel <= rate) {
+            let count = f32::from(new);
+            self.ahead += self.pitch() * count;
+            return self.keep_pace(count, at);
+        }
+        let back = decel * after - rate;
+        self.ahead += self.pitch() * (rate - 0.5 * decel * after) * after;
+        // No slower than a pulse in the time that it took.
+        self.interval = least(after, 1.0 / greater(back, 1e-9));
+        (self.at, self.since, self.measured) = (at, at, 0);
+        if let Kind::Tap { decel, .. } = &mut self.kind {
+            *decel = -*decel;
+        }
+        self.stage = Stage::Turned;
+    }
+
+    /// Pulses a count at the last pulse, and by how much that falls in a count.
+    #[inline(never)]
+    fn pace(&self) -> (f32, f32) {
+        let (mean, decel) = (1.0 / self.interval, self.decel());
+        if !some(decel) {
+            return (mean, 0.0);
+        }
+        // The mean is that of the middle of the last window.
+        let since =
+            0.5 * greater(self.interval, WINDOW as f32) + self.at.wrapping_sub(self.since) as f32;
+        (greater(mean - decel * since, 0.0), decel)
     }
 
     /// The velocity to be reached in the next stretch, mm/s, from `velocity`; 0 for none. Time of which `kept` cycles have not been queued
@@ -279,10 +434,18 @@ impl Thread {
         if self.stage < Stage::Known {
             return 0.0;
         }
-        let speed = self.pitch() * COUNTS_PER_S as f32 / self.interval;
         let end = self.end.wrapping_add(kept as u32);
         let late = end.wrapping_sub(self.at.wrapping_mul(CYCLES)) as i32;
-        let mut way = self.ahead + speed * (late as f32 * (1.0 / TIMER_HZ as f32));
+        let counts = late as f32 * (1.0 / CYCLES as f32);
+        let (rate, decel) = self.pace();
+        let speed = self.pitch() * COUNTS_PER_S as f32 * (rate - decel * counts);
+        let mut way = self.ahead + self.pitch() * (rate - 0.5 * decel * counts) * counts;
+        if self.stage == Stage::Turning && speed < SLOWEST {
+            self.stage = Stage::Top;
+        }
+        if self.rests() {
+            return 0.0;
+        }
         if self.stage == Stage::Known {
             // What 4 ms bring is made up for.
             while way > 0.004 * speed {
@@ -305,7 +468,8 @@ impl Thread {
 
     /// The axes are off by `size` mm.
     fn hold_against_limit(&mut self, size: f32, brakes: bool) {
-        let limit = self.limit.get();
+        let Kind::Pass { limit, .. } = self.kind else { return };
+        let limit = limit.get();
         if !some(limit) || brakes {
             return;
         }

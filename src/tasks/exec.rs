@@ -160,14 +160,19 @@ impl<'a> Runner<'a> {
         if let Some(why) = has_left {
             note_left(encoder, why);
         }
-        let holds = hold::is_wanted(out.running) || contact::is_noted() || has_left.is_some();
+        let left = has_left.is_some() || encoder.pass == Status::Noop;
+        let holds = hold::is_wanted(out.running) || contact::is_noted() || left;
         self.machine.set_hold(holds, out);
         // What has paused in a hold goes on before motion does.
         if out.outputs != spindle::on() {
             if !machine::is_held() {
                 spindle.go_on();
             }
-            self.machine.wait(spindle::switch(spindle, out, false), out);
+            let ms = spindle::switch(spindle, out, false);
+            // In the midst of G33.1 the axes go by the encoder.
+            if self.machine.thread().is_none() {
+                self.machine.wait(ms, out);
+            }
         }
         if let Some(line) = self.finished.take(used) {
             out.finished = line;
@@ -232,6 +237,9 @@ impl<'a> Runner<'a> {
             spindle::switch(spindle, out, false);
             let held = self.machine.drop_all(&mut self.blocks, out);
             stepper::settle(held, &mut out.target);
+            if machine::is_dropping() {
+                self.machine.end_pass();
+            }
             self.finished.rest();
             if machine::alarm() >= Alarm::Shutdown {
                 out.program = Program::Ready;
@@ -279,6 +287,11 @@ fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
     if let Some(error) = thread.error(velocity) {
         encoder.note_error(error);
     }
+    if encoder.pass == Status::Ok && exec.has_turned() {
+        encoder.pass = Status::Noop;
+        flags::set(Event::BlockDone);
+    }
+    let Some(thread) = exec.thread() else { return };
     if let Some(fault) = thread.fault() {
         encoder.pass = fault;
         // The planner waits for it.

@@ -68,10 +68,10 @@ pub const PROBING: u8 = PROBED << 3;
 
 progmem! {
     /// The motion modes, in the order of their numbers.
-    static MOTIONS: [Text; 21] = [
+    static MOTIONS: [Text; 22] = [
         text!("G0"), text!("G1"), text!("G2"), text!("G3"), text!("G80"), text!("G38.2"), text!("G81"), text!("G82"),
         text!("G83"), text!("G84"), text!("G85"), text!("G86"), text!("G87"), text!("G88"), text!("G89"), text!("G73"),
-        text!("G38.3"), text!("G38.4"), text!("G38.5"), text!("G33"), text!("G76"),
+        text!("G38.3"), text!("G38.4"), text!("G38.5"), text!("G33"), text!("G76"), text!("G33.1"),
     ];
 
     /// The coordinate systems, from 1.

@@ -250,7 +250,7 @@ fn is_probing(mode: i32) -> bool {
 
 /// Whether a motion mode is a thread.
 fn is_threading(mode: i32) -> bool {
-    (MotionMode::Thread as i32..=MotionMode::ThreadCycle as i32).contains(&mode)
+    (MotionMode::Thread as i32..=MotionMode::RigidTap as i32).contains(&mode)
 }
 
 /// Whether the pass of a thread has begun: until then its line is not answered, so that it can be refused.

@@ -192,7 +192,7 @@ const COORDINATES: Text = text!(
 const MOTION: Text = text!(
     "G0  - linear traverse|G1  - linear feed|G2  - clockwise arc feed|\
      G3  - counter clockwise arc feed|G80 - cancel motion mode (none active)|\
-     G38.2 - probe|G81|G82|G83|G84|G85|G86|G87|G88|G89|G73|G38.3|G38.4|G38.5|G33|G76"
+     G38.2 - probe|G81|G82|G83|G84|G85|G86|G87|G88|G89|G73|G38.3|G38.4|G38.5|G33|G76|G33.1"
 );
 const FEED: Text = text!(
     "G93 - inverse time mode|G94 - units-per-minute mode (i.e. feedrate mode)|\

@@ -51,17 +51,29 @@ const ANY_FEED: f32 = 1e6;
 const ANY_CORNER: f32 = 1e7;
 
 /// A line of a pass.
-struct Piece {
-    target: PerAxis<Length>,
+pub(super) struct Piece {
+    pub target: PerAxis<Length>,
     /// The ways of the axes and along the path, mm.
     ways: [f32; FIRST_ROTARY],
-    length: f32,
+    pub length: f32,
     /// mm a turn along the path.
-    lead: f32,
+    pub lead: f32,
 }
 
-/// The way back to the start of a pass has so many parts.
-const PARTS_BACK: u8 = 3;
+/// The way back to the start of a pass that has been left has so many parts; that of G33.1 those from there to here.
+const BACK_IN: u8 = 3;
+const BACK_OUT: u8 = 5;
+
+/// What has become of the lines of a pass.
+#[derive(Clone, Copy, PartialEq)]
+enum End {
+    /// They are done, or what is queued is dropped.
+    Done,
+    /// A feedhold has left the cut.
+    Left,
+    /// G33.1: the spindle has turned round.
+    Turned,
+}
 
 /// X among the axes.
 const X: u8 = 0;
@@ -98,39 +110,47 @@ impl Planner {
                 Ok(false) => return,
                 Err(status) => return self.refuse(status),
             }
-            let mut line = 0;
-            self.pass_room().await;
-            while self.queue_line(line) {
-                self.finish_parts().await;
-                line += 1;
+            let mut back = false;
+            let end = loop {
+                let mut line = 0;
                 self.pass_room().await;
-                if self.queue_lead(line) {
+                while self.queue_line(line, turn, back) {
+                    self.finish_parts().await;
+                    line += 1;
                     self.pass_room().await;
+                    if self.queue_lead(line) {
+                        self.pass_room().await;
+                    }
                 }
-            }
-            self.pass_room().await;
-            if !self.is_cut_short() {
-                self.pause(Action::EndThread);
-            }
-            wait(self.links.thread, Event::BlockDone, || {
-                (queue::used() == 0 || self.is_cut_short()).then_some(())
-            })
-            .await;
-            let pass = self.pass();
-            self.set_pass(Status::Again);
-            if pass == Status::Ok || self.is_flushed() {
-                break;
-            }
-            if pass != Status::Terminated {
-                alarm::raise_for(self.links, Alarm::Alarm, pass);
-                break;
-            }
-            drop_blocks(self.links.thread).await;
-            self.leave();
-            for part in 0..PARTS_BACK {
+                self.queue_end();
+                wait(self.links.thread, Event::BlockDone, || {
+                    (queue::used() == 0 || self.is_cut_short()).then_some(())
+                })
+                .await;
+                let end = self.end();
+                if matches!(end, End::Left | End::Turned) {
+                    drop_blocks(self.links.thread).await;
+                    self.relocate_within();
+                }
+                if end != End::Turned || back {
+                    break end;
+                }
+                back = true;
+                self.set_pass(Status::Ok);
+                self.queue_return();
+            };
+            let parts = match end {
+                End::Done => break,
+                End::Left => 0..BACK_IN,
+                End::Turned => BACK_IN..BACK_OUT,
+            };
+            for part in parts {
                 self.room().await;
                 self.go_back(part);
                 self.finish_parts().await;
+            }
+            if end == End::Turned {
+                break;
             }
         }
         // G76 goes on with its usual limits.
@@ -138,8 +158,36 @@ impl Planner {
         self.take_up_changes();
     }
 
+    /// What has become of the lines that were queued. An alarm is begun here.
+    #[inline(never)]
+    #[small]
+    fn end(&mut self) -> End {
+        let pass = self.pass();
+        let returns = self.returns();
+        if !(returns && pass == Status::Noop) {
+            self.set_pass(Status::Again);
+        }
+        match pass {
+            _ if self.is_flushed() => return End::Done,
+            Status::Noop => return End::Turned,
+            Status::Terminated => return End::Left,
+            Status::Ok if !returns => return End::Done,
+            Status::Ok => alarm::raise_for(self.links, Alarm::Alarm, Status::NotReversed),
+            why => alarm::raise_for(self.links, Alarm::Alarm, why),
+        }
+        End::Done
+    }
+
+    /// Queues the end of a pass. There is room.
+    #[small]
+    fn queue_end(&mut self) {
+        if !self.returns() && !self.is_cut_short() {
+            self.pause(Action::EndThread);
+        }
+    }
+
     /// Queues the rest of a long line.
-    async fn finish_parts(&mut self) {
+    pub(super) async fn finish_parts(&mut self) {
         while self.has_begun() && !self.is_flushed() {
             self.pass_room().await;
             yield_now().await;
@@ -151,13 +199,13 @@ impl Planner {
 
     /// How the pass stands.
     #[small]
-    fn pass(&self) -> Status {
+    pub(super) fn pass(&self) -> Status {
         common::with(self.links.thread, |common| common.encoder.pass)
     }
 
     /// Whether nothing more of the pass is to be queued.
     #[small]
-    fn is_cut_short(&self) -> bool {
+    pub(super) fn is_cut_short(&self) -> bool {
         self.is_flushed() || !matches!(self.pass(), Status::Ok | Status::Again)
     }
 
@@ -167,20 +215,19 @@ impl Planner {
         })
     }
 
-    /// The pass has been left, and what was queued of it dropped. The line still leads to where it does.
+    /// Exec has dropped its blocks within a pass, of which the line and its start are what they were.
     #[inline(never)]
     #[small]
-    fn leave(&mut self) {
+    pub(super) fn relocate_within(&mut self) {
         let end = *self.links.model.borrow().position();
         let motion = common::snapshot(self.links.thread);
         let start = core::mem::replace(&mut self.walk, Ongoing::None);
         self.relocate(&motion);
         self.walk = start;
         self.links.model.borrow_mut().set_position(&end);
-        self.take_up_changes();
     }
 
-    /// Queues a part of the way back to the start of a pass: X out of the cut, along it, and X back.
+    /// Queues a part of the way back to the start of a pass: X out of the cut, along it, and X back; or, of G33.1, the end of it and all at once.
     #[inline(never)]
     #[small]
     fn go_back(&mut self, part: u8) {
@@ -193,7 +240,17 @@ impl Planner {
         let beside = Length(x.0.saturating_add(out.0));
         let [to_x, to_y, to_z, ..] = &mut target;
         match part {
-            0 => *to_x = if out.0 < 0 { beside.min(*to_x) } else { beside.max(*to_x) },
+            BACK_IN => {
+                self.set_pass(Status::Again);
+                self.pause(Action::EndThread);
+                self.take_up_changes();
+                return;
+            }
+            BACK_IN.. => (*to_x, *to_y, *to_z) = (x, y, z),
+            0 => {
+                self.take_up_changes();
+                *to_x = if out.0 < 0 { beside.min(*to_x) } else { beside.max(*to_x) };
+            }
             1 => (*to_y, *to_z) = (y, z),
             _ => *to_x = x,
         }
@@ -310,8 +367,9 @@ impl Planner {
         let [x, y, z, ..] = self.position;
         self.walk = Ongoing::Pass([x, y, z]);
         if let Some(piece) = self.piece(0, &self.position) {
-            let pass =
-                Pass { lead: piece.lead, limit: self.error_limit(), retract: self.retract() };
+            let turn_at = if self.returns() { Self::overrun(turn, piece.lead) } else { 0.0 };
+            let (limit, retract) = (self.error_limit(), self.retract());
+            let pass = Pass { lead: piece.lead, limit, retract, turn_at };
             self.push(Block::action(Action::Thread(pass), self.line));
         }
         Ok(true)
@@ -328,7 +386,7 @@ impl Planner {
     /// A line of the pass, counted from 0, from a place; `None` if there is none, or it goes nowhere.
     #[inline(never)]
     #[small]
-    fn piece(&self, line: u8, from: &PerAxis<Length>) -> Option<Piece> {
+    pub(super) fn piece(&self, line: u8, from: &PerAxis<Length>) -> Option<Piece> {
         let commands = self.links.commands.borrow();
         let (target, lead) = self.steps.pass(&commands.motion, from, line)?;
         let mut ways = [0.0; FIRST_ROTARY];
@@ -350,9 +408,12 @@ impl Planner {
     /// Queues a line of the pass, or begins with its parts. False if there is none.
     #[inline(never)]
     #[small]
-    fn queue_line(&mut self, line: u8) -> bool {
+    fn queue_line(&mut self, line: u8, turn: u32, back: bool) -> bool {
         if self.is_cut_short() {
             return false;
+        }
+        if self.returns() {
+            return line == 0 && self.queue_leg(turn, back);
         }
         let Some(Piece { target, .. }) = self.piece(line, &self.position) else { return false };
         self.straight(&target, Some(Feed::PerMinute(ANY_FEED)));
@@ -374,7 +435,7 @@ impl Planner {
 
     /// How the pass stands.
     #[small]
-    fn set_pass(&self, status: Status) {
+    pub(super) fn set_pass(&self, status: Status) {
         common::with(self.links.thread, |common| common.encoder.pass = status);
     }
 

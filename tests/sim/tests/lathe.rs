@@ -580,6 +580,122 @@ fn an_error_above_its_limit_ends_the_pass() {
     assert_eq!(machine.recorder().motors()[0].position, (2.0 * STEPS) as i64);
 }
 
+/// A lathe whose outputs drive the spindle, one way or the other; it gains or loses at most so many turns a minute in a second.
+fn driven(marks: u32, rpm: f64, torque: f64) -> (Machine, Host) {
+    let mut machine = firmware(&MEGA2560_LATHE);
+    let mut build = Build::lathe(&MEGA2560_LATHE, marks).unwrap();
+    (build.spindle.rpm, build.spindle.pwm) = (rpm, None);
+    build.spindle.torque = torque;
+    machine.build(&build);
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut machine, 1_000).unwrap();
+    set(&mut machine, &mut host, &format!("{{spn:{marks}}}"));
+    for line in
+        ["{3tr:4}", "{3sa:1.8}", "{3mi:4}", "{zfr:1500}", "{zvm:1500}", "{zac:500}", "{zjm:200000}"]
+    {
+        set(&mut machine, &mut host, line);
+    }
+    (machine, host)
+}
+
+#[test]
+fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
+    // At most so far off: near the turn there are no pulses to go by.
+    for (marks, rpm, torque, most) in [
+        (4, 300.0, 600.0, 0.25),
+        (20, 300.0, 600.0, 0.06),
+        (100, 300.0, 600.0, 0.03),
+        (100, 600.0, 900.0, 0.03),
+    ] {
+        let (mut machine, mut host) = driven(marks, rpm, torque);
+        set(&mut machine, &mut host, &format!("m3 s{rpm}"));
+        host.run_for_ms(&mut machine, 3_000).unwrap();
+        set(&mut machine, &mut host, "g91 g33.1 z-10 k1");
+        let (mut phases, mut deepest, mut still) = (Vec::new(), 0.0f64, 0);
+        let mut last = 0;
+        while still < 4_000 {
+            run_for_quarter(&mut machine);
+            let z = machine.recorder().motors()[Z].position;
+            still = if z == last && z == 0 && deepest < 0.0 { still + 1 } else { 0 };
+            last = z;
+            let z = z as f64 / STEPS;
+            deepest = deepest.min(z);
+            let turns = machine.mechanics().unwrap().spindle_turns();
+            // From two turns in, where it is in step, to two turns before the end.
+            phases.push((z, z + turns));
+            assert!(
+                phases.len() < 80_000,
+                "{marks}: it does not come to its end: {z} of {deepest}, {:?}",
+                host.take_reports()
+            );
+        }
+        host.run_for_ms(&mut machine, 10).unwrap();
+        let began = phases.iter().position(|(z, _)| *z < -2.0).unwrap();
+        let ended = phases.iter().rposition(|(z, _)| *z < -0.5).unwrap();
+        let inside: Vec<f64> = phases[began..ended].iter().map(|(_, phase)| *phase).collect();
+        let there = phases[began..].iter().position(|(z, _)| *z < -9.5).unwrap();
+        let steady: Vec<f64> = inside[..there].to_vec();
+        println!(
+            "N {marks}, {rpm} rpm: deepest {deepest:.3}, spread on the way in {:.4}, there and back {:.4}",
+            spread(&steady),
+            spread(&inside)
+        );
+        assert!(spread(&steady) < 0.011, "{}", spread(&steady));
+        assert!(spread(&inside) < most, "{}", spread(&inside));
+        // The way in which the spindle comes to rest, and no more.
+        let stops = rpm / 60.0 * rpm / torque / 2.0;
+        assert!((-10.0 - stops - 0.3..=-10.0).contains(&deepest), "{deepest}");
+        // It turns as before, and nothing is told.
+        assert!(host.take_reports().iter().all(|report| report["er"]["st"].is_null()));
+        let turning = machine.mechanics().unwrap().spindle_rpm(machine.cycle());
+        assert!(turning > 0.7 * rpm, "{turning}");
+        assert_eq!(asked(&mut machine, &mut host, "posz"), 0.0);
+        set(&mut machine, &mut host, "g0 z1");
+        host.run_for_ms(&mut machine, 1_000).unwrap();
+        assert_eq!(machine.recorder().motors()[Z].position, STEPS as i64);
+    }
+}
+
+#[test]
+fn a_tap_whose_spindle_does_not_turn_round_is_an_alarm() {
+    const NOT_REVERSED: u64 = 47;
+    let (mut machine, mut host) = driven(20, 300.0, 600.0);
+    set(&mut machine, &mut host, "m3 s300");
+    host.run_for_ms(&mut machine, 3_000).unwrap();
+    set(&mut machine, &mut host, "g91 g33.1 z-5 k1");
+    for _ in 0..6_000 {
+        machine.tamper(|mechanics, now| mechanics.drive_spindle_to(300.0, now));
+        machine.run_for_ms(1).unwrap();
+    }
+    host.run_for_ms(&mut machine, 10).unwrap();
+    let told = host.take_reports().iter().any(|report| report["er"]["st"] == NOT_REVERSED);
+    assert!(told, "nothing is told");
+    // The way of a second beyond the bottom, and no further.
+    let z = machine.recorder().motors()[Z].position as f64 / STEPS;
+    assert!((-10.05..=-9.9).contains(&z), "{z}");
+    let position = asked(&mut machine, &mut host, "mpoz");
+    assert!((position - z).abs() < 0.0011, "{position} {z}");
+}
+
+#[test]
+fn a_hold_in_a_tap_waits_for_its_end() {
+    let (mut machine, mut host) = driven(20, 300.0, 600.0);
+    set(&mut machine, &mut host, "m3 s300");
+    host.run_for_ms(&mut machine, 3_000).unwrap();
+    begin(&mut machine, &mut host, "g91 g33.1 z-5 k1", 2.0);
+    machine.send_now(b'!');
+    host.run_for_ms(&mut machine, 6_000).unwrap();
+    assert_eq!(host.stat(), Some(6), "it holds");
+    // It is out of the hole.
+    assert!(machine.recorder().motors()[Z].position >= 0);
+    machine.send_now(b'~');
+    host.run_for_ms(&mut machine, 1_000).unwrap();
+    assert_eq!(machine.recorder().motors()[Z].position, 0);
+    set(&mut machine, &mut host, "g0 z1");
+    host.run_for_ms(&mut machine, 500).unwrap();
+    assert_eq!(machine.recorder().motors()[Z].position, STEPS as i64);
+}
+
 #[test]
 fn a_hold_waits_for_the_end_of_the_pass() {
     let (mut machine, mut host) = lathe(4, 300.0, |_| {});
