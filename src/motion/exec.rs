@@ -281,6 +281,7 @@ impl Exec {
         let running = &self.running;
         let is_line = |block: &Block| matches!(block.body, Body::Line(_)) || block.is_aside();
         let must_go_on = match &self.follows {
+            _ if !Capability::Lathe.is_built_in() => false,
             Follows::Retreats(retreat) => !retreat.is_done(),
             // The spindle does not wait.
             Follows::Angle(thread) => {
@@ -318,6 +319,7 @@ impl Exec {
         self.running.active = false;
         self.dwell_ms = 0;
         let keeps = match &mut self.follows {
+            _ if !Capability::Lathe.is_built_in() => true,
             Follows::Angle(thread) => thread.drop_rest(),
             Follows::Speed(_) => true,
             _ => false,
@@ -331,7 +333,9 @@ impl Exec {
         while let Some(block) = blocks.oldest() {
             match &block.body {
                 Body::Action(Action::Drivers(drivers)) => self.prep.set_drivers(*drivers),
-                Body::Action(Action::PerTurn(on)) => self.go_by_speed(*on),
+                Body::Action(Action::PerTurn(on)) if Capability::Lathe.is_built_in() => {
+                    self.go_by_speed(*on)
+                }
                 Body::Action(Action::SetPosition(steps)) if !moved => out.target = *steps,
                 Body::Action(Action::SetPosition(_) | Action::Override(_) | Action::Lead(_)) => {}
                 _ => moved = true,
@@ -391,7 +395,9 @@ impl Exec {
                 };
             }
             Action::Drivers(drivers) => self.prep.set_drivers(*drivers),
-            Action::Thread(_) | Action::EndThread | Action::Return => {
+            Action::Thread(_) | Action::EndThread | Action::Return
+                if Capability::Lathe.is_built_in() =>
+            {
                 self.halt(out);
                 if !standstill {
                     return Step::Standstill;
@@ -403,13 +409,14 @@ impl Exec {
                     _ => self.follows = Follows::Nothing,
                 }
             }
-            Action::PerTurn(on) => self.go_by_speed(*on),
-            Action::Lead(lead) => {
+            Action::PerTurn(on) if Capability::Lathe.is_built_in() => self.go_by_speed(*on),
+            Action::Lead(lead) if Capability::Lathe.is_built_in() => {
                 if let Follows::Angle(thread) = &mut self.follows {
                     thread.set_lead(*lead);
                 }
             }
-            Action::Override(_) => {}
+            // Nothing more to do; and what an image without a lathe is never asked for.
+            _ => {}
         }
         blocks.release();
         match action {

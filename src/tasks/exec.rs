@@ -25,6 +25,7 @@ use crate::motion::thread::Thread;
 use crate::tasks::health::{self, Sign};
 use kerf_macros::small;
 
+use crate::capability::Capability;
 use crate::motors::Motors;
 use crate::spindle::Spindle;
 use crate::status::Status;
@@ -160,7 +161,8 @@ impl<'a> Runner<'a> {
         if let Some(why) = has_left {
             note_left(encoder, why);
         }
-        let left = has_left.is_some() || encoder.pass == Status::Noop;
+        let left =
+            Capability::Lathe.is_built_in() && (has_left.is_some() || encoder.pass == Status::Noop);
         let holds = hold::is_wanted(out.running) || contact::is_noted() || left;
         self.machine.set_hold(holds, out);
         // What has paused in a hold goes on before motion does.
@@ -237,7 +239,7 @@ impl<'a> Runner<'a> {
             spindle::switch(spindle, out, false);
             let held = self.machine.drop_all(&mut self.blocks, out);
             stepper::settle(held, &mut out.target);
-            if machine::is_dropping() {
+            if Capability::Lathe.is_built_in() && machine::is_dropping() {
                 self.machine.end_pass();
             }
             self.finished.rest();

@@ -24,7 +24,7 @@ const COUNT_US: i32 = 4;
 /// Whether it is a setting of the encoder.
 #[small]
 pub fn is_own(setting: Setting) -> bool {
-    setting.owner() == Owner::Spindle && matches!(setting.index(), spindle::N | spindle::B)
+    setting.owner() == Owner::Spindle && setting.index() >= spindle::N
 }
 
 /// Takes over the settings.
@@ -90,6 +90,9 @@ pub fn speed(thread: Thread) -> Option<u32> {
 /// How the pass in step with the spindle stands, of [`Encoder::pass`](crate::encoder::Encoder::pass). A refusal is told once.
 #[small]
 pub fn pass(thread: Thread) -> Status {
+    if !Capability::Lathe.is_built_in() {
+        return Status::Ok;
+    }
     common::with(thread, |common| {
         let pass = common.encoder.pass;
         if matches!(pass, Status::NoIndex | Status::NoSync | Status::VelocityExceeded) {
@@ -102,6 +105,9 @@ pub fn pass(thread: Thread) -> Status {
 /// How far the axes are ahead of the spindle in the pass, um.
 #[small]
 pub fn error(thread: Thread) -> i16 {
+    if !Capability::Lathe.is_built_in() {
+        return 0;
+    }
     common::with(thread, |common| common.encoder.error())
 }
 
@@ -115,11 +121,17 @@ pub fn take_news(thread: Thread) -> bool {
 /// Pulses of the encoder in a turn; 0 without one.
 #[small]
 pub fn per_turn(thread: Thread) -> u16 {
+    if !Capability::Lathe.is_built_in() {
+        return 0;
+    }
     common::with(thread, |common| common.encoder.per_turn())
 }
 
 /// Pulses that did not fit so far, 255 for more.
 #[small]
 pub fn misfits(thread: Thread) -> u8 {
+    if !Capability::Lathe.is_built_in() {
+        return 0;
+    }
     common::with(thread, |common| common.encoder.misfits())
 }

@@ -400,7 +400,7 @@ impl Machine for View<'_> {
                 Some(speed) => speed as i32,
                 None => self.programmed_speed(),
             },
-            Value::SpindleProgrammed => self.programmed_speed(),
+            Value::SpindleProgrammed if Capability::Lathe.is_built_in() => self.programmed_speed(),
             Value::PulsesPerTurn => turning::per_turn(self.links.thread).into(),
             Value::SyncError => turning::error(self.links.thread).into(),
             Value::Pass => turning::pass(self.links.thread) as i32,

@@ -124,7 +124,9 @@ pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
     text(out, text!(" F"));
     super::write::speed(out, machine.value(Value::Feed), machine.value(Value::Units) == 0);
     text(out, text!(" S"));
-    int(out, (machine.value(Value::SpindleProgrammed) + 500) / 1_000);
+    let measures = Capability::Lathe.is_built_in();
+    let speed = if measures { Value::SpindleProgrammed } else { Value::SpindleSpeed };
+    int(out, (machine.value(speed) + 500) / 1_000);
     close(out);
     None
 }

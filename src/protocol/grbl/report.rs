@@ -151,9 +151,10 @@ impl Report {
                 speed(out, machine.value(Value::Velocity), self.inches);
                 out.put(b',');
                 // An encoder tells how fast it turns, whatever has been programmed.
-                let turns = machine.value(Value::SpindleOn) + machine.value(Value::PulsesPerTurn);
-                let speed = if turns == 0 { 0 } else { rpm(machine) };
-                int(out, speed);
+                let measures =
+                    Capability::Lathe.is_built_in() && machine.value(Value::PulsesPerTurn) != 0;
+                let on = i32::from(measures || machine.value(Value::SpindleOn) != 0);
+                int(out, on * rpm(machine));
                 self.field = Field::Offset;
             }
             Field::Offset if self.with.0 => {

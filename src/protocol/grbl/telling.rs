@@ -7,6 +7,7 @@ use super::report::{Report, SLEEPS, sync_error};
 use super::status::{PROBE_CLOSED, alarm_number, error_number};
 use super::write::{close, int, line_end, message, text};
 use crate::boards::inputs;
+use crate::capability::Capability;
 use crate::gcode::modal::MotionMode;
 use crate::machine::Doing;
 use crate::plain;
@@ -45,7 +46,7 @@ impl Telling {
             Notice::Exception(status) => Self::Exception(status),
             Notice::Startup(line, status) => Self::Startup(line, status),
             Notice::Probing => Self::Probing(lists::PROBING),
-            Notice::SyncError => Self::SyncError,
+            Notice::SyncError if Capability::Lathe.is_built_in() => Self::SyncError,
             Notice::Query => Self::Report(Report::begin(machine)),
             _ => Self::Nothing,
         }
@@ -85,9 +86,11 @@ impl Tells for Telling {
             },
             Self::Report(report) => report.step(machine, out),
             Self::SyncError => {
-                text(out, text!("[Se:"));
-                sync_error(machine, out);
-                close(out);
+                if Capability::Lathe.is_built_in() {
+                    text(out, text!("[Se:"));
+                    sync_error(machine, out);
+                    close(out);
+                }
                 false
             }
         }
@@ -138,9 +141,20 @@ fn exception(status: Status, machine: &mut impl Machine, out: &mut impl Out) {
         Status::ProgramStopped => message(out, text!("Program stopped [~ to resume]")),
         Status::NoToolLength => message(out, text!("Tool has no length - 0 in force")),
         Status::StepsLate => message(out, text!("Steps came late")),
+        lost if Capability::Lathe.is_built_in() => spindle(lost, out),
+        _ => {}
+    }
+}
+
+/// What has become of a thread.
+#[inline(never)]
+#[small]
+fn spindle(status: Status, out: &mut impl Out) {
+    match status {
         Status::SpindleLost => message(out, text!("Spindle lost in a thread")),
         Status::SpindleError => message(out, text!("Thread too far off")),
         Status::NotReversed => message(out, text!("Spindle did not turn round")),
+        Status::SpindleMustTurn => message(out, text!("Spindle stands still")),
         _ => {}
     }
 }

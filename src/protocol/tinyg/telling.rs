@@ -4,6 +4,7 @@ use super::Mode;
 use super::notice::{Banner, Exception, Probing, acknowledge, jog_ended};
 use super::prompt::put_ready_prompt;
 use super::report::{Report, queue_report, receive_report, sync_report};
+use crate::capability::Capability;
 use crate::protocol::{Machine, Notice, Occasion, Out, Tells, Value};
 
 /// How far it has been told, and how.
@@ -45,7 +46,8 @@ impl Telling {
             Notice::Query | Notice::Startup(..) => Part::Status(None),
             Notice::Status => Part::Status(Report::begin(mode, machine)),
             Notice::End { jogged, flushed } => Part::End { jogged, flushed },
-            Notice::SyncError => Part::SyncError,
+            Notice::SyncError if Capability::Lathe.is_built_in() => Part::SyncError,
+            Notice::SyncError => Part::Status(None),
             Notice::Queue => Part::Queue(0),
         };
         Self { part, mode }
@@ -83,7 +85,9 @@ impl Tells for Telling {
                 }
             }
             Part::SyncError => {
-                sync_report(mode, machine, out);
+                if Capability::Lathe.is_built_in() {
+                    sync_report(mode, machine, out);
+                }
                 false
             }
             Part::Queue(free) => {

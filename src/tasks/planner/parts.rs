@@ -7,7 +7,9 @@ use crate::gcode::arc::{Extent, Walk};
 use crate::gcode::command::{Feed, Motion};
 use crate::gcode::interpreter::Offsets;
 use crate::motion::curve::Curve;
-use crate::units::{FIRST_ROTARY, Length, PerAxis};
+#[cfg(feature = "lathe")]
+use crate::units::FIRST_ROTARY;
+use crate::units::{Length, PerAxis};
 
 /// What lasts longer than a turn: one at a time, and one place in memory.
 pub(super) enum Ongoing {
@@ -16,6 +18,7 @@ pub(super) enum Ongoing {
     /// An arc.
     Arc(ArcWalk),
     /// A pass in step with the spindle, from here.
+    #[cfg(feature = "lathe")]
     Pass([Length; FIRST_ROTARY]),
     /// Lines are checked: these are the offsets of before.
     Check(Offsets),

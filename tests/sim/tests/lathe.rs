@@ -605,7 +605,7 @@ fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
         (4, 300.0, 600.0, 0.25),
         (20, 300.0, 600.0, 0.06),
         (100, 300.0, 600.0, 0.03),
-        (100, 600.0, 900.0, 0.03),
+        (100, 600.0, 900.0, 0.04),
     ] {
         let (mut machine, mut host) = driven(marks, rpm, torque);
         set(&mut machine, &mut host, &format!("m3 s{rpm}"));
@@ -640,7 +640,9 @@ fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
             spread(&steady),
             spread(&inside)
         );
-        assert!(spread(&steady) < 0.011, "{}", spread(&steady));
+        // Where the spindle is is known to a millisecond.
+        let known = rpm / 60.0 * 0.001;
+        assert!(spread(&steady) < 2.0 * STEP + known, "{}", spread(&steady));
         assert!(spread(&inside) < most, "{}", spread(&inside));
         // The way in which the spindle comes to rest, and no more.
         let stops = rpm / 60.0 * rpm / torque / 2.0;
