@@ -21,7 +21,7 @@
 //! interrupt; a third of them are the governor's floats.
 
 use super::block::{Action, Block, Body, Line};
-use super::float::{below, least, scaled, some, whole};
+use super::float::{below, greater, least, scaled, some, whole};
 use super::governor::{Ahead, Governor, Stretch, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
@@ -321,7 +321,10 @@ impl Exec {
         let keeps = match &mut self.follows {
             _ if !Capability::Lathe.is_built_in() => true,
             Follows::Angle(thread) => thread.drop_rest(),
-            Follows::Speed(_) => true,
+            Follows::Speed(share) => {
+                *share = greater(*share, 0.0);
+                true
+            }
             _ => false,
         };
         if !keeps {

@@ -246,7 +246,7 @@ impl Planner {
                 self.take_up_changes();
                 return;
             }
-            BACK_IN.. => (*to_x, *to_y, *to_z) = (x, y, z),
+            part if part > BACK_IN => (*to_x, *to_y, *to_z) = (x, y, z),
             0 => {
                 self.take_up_changes();
                 *to_x = if out.0 < 0 { beside.min(*to_x) } else { beside.max(*to_x) };
@@ -281,6 +281,10 @@ impl Planner {
         let mut end = x.0.saturating_add(length.0);
         if let Some((low, high)) = Setup::travel(&*settings, X) {
             end = end.max(low.0).min(high.0);
+        }
+        // Beyond its travel X does not leave the cut through the work.
+        if (end < x.0) != (length.0 < 0) {
+            return Retract::NONE;
         }
         let mut retract = Retract::NONE;
         for motor in (0..MOTORS).filter(|motor| moved_by(&settings, *motor) == X) {

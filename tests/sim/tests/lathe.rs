@@ -371,7 +371,19 @@ fn feeds_a_turn_go_by_the_measured_speed() {
     let feed = went(&mut machine, &mut host, 3_000) / 6.0;
     assert!((feed / 0.2 - 1.0).abs() < 0.01, "{feed}");
     machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
-    host.run_for_ms(&mut machine, 1_200).unwrap();
+    let (stopped, mut last) = (machine.cycle(), (0, 0));
+    while machine.cycle() < stopped + machine.cycles(1_200) {
+        run_for_quarter(&mut machine);
+        let z = machine.recorder().motors()[Z].position;
+        if z != last.0 {
+            last = (z, machine.cycle());
+        }
+    }
+    // Two pulses are 250 ms.
+    let took = machine.seconds(last.1 - stopped) * 1e3;
+    println!("G95: at rest {took:.0} ms after a dead stop, two pulses are 250");
+    assert!(took < 250.0 * 1.03 + 40.0, "{took} ms");
+    host.run_for_ms(&mut machine, 10).unwrap();
     assert_eq!(went(&mut machine, &mut host, 1_000), 0.0);
     // A traverse does not wait, and feeds a minute do not.
     machine.tamper(|mechanics, now| mechanics.force_spindle(300.0, now));
