@@ -49,6 +49,10 @@ const OVERDUE: f32 = 2.02;
 /// And for so many counts more, 0.5 ms: pulses do not come quite evenly.
 const SLACK: f32 = COUNTS_PER_S as f32 * 0.0005;
 
+/// A pulse of a spindle that slows down is of the way there up to this part of the time to its standstill. One that is less than 1.1 pulses from that is
+/// taken for one of the way back: its place is right either way, the next is off by a pulse at most. The other way round nothing would ever turn.
+const FORWARD: f32 = 0.7;
+
 /// A spindle that turns round has so long between two pulses, counts: 6 s.
 const PATIENCE: f32 = COUNTS_PER_S as f32 * 6.0;
 
@@ -392,13 +396,13 @@ impl Thread {
         (self.since, self.measured) = (at, 0);
     }
 
-    /// Pulses of a spindle that is about to turn round. One that comes after the time when it stands is of the way back, over the mark of the last one; where the
+    /// Pulses of a spindle that is about to turn round. One that comes about when it stands, or later, is of the way back, over the mark of the last one; where the
     /// spindle is then follows from how it has slowed down.
     #[inline(never)]
     fn take_turning(&mut self, new: u8, at: u32) {
         let after = at.wrapping_sub(self.at) as f32;
         let (rate, decel) = self.pace();
-        if self.stage != Stage::Top && (decel <= 0.0 || after * decel <= rate) {
+        if self.stage != Stage::Top && (decel <= 0.0 || after * decel <= FORWARD * rate) {
             let count = f32::from(new);
             self.ahead += self.pitch() * count;
             return self.keep_pace(count, at);
