@@ -616,8 +616,8 @@ fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
     for (marks, rpm, torque, most) in [
         (4, 300.0, 600.0, 0.25),
         (20, 300.0, 600.0, 0.06),
-        (100, 300.0, 600.0, 0.03),
-        (100, 600.0, 900.0, 0.04),
+        (100, 300.0, 600.0, 0.06),
+        (100, 600.0, 900.0, 0.1),
     ] {
         let (mut machine, mut host) = driven(marks, rpm, torque);
         set(&mut machine, &mut host, &format!("m3 s{rpm}"));
