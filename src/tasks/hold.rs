@@ -134,7 +134,7 @@ pub fn serve(links: &Links) {
             act(links, port, characters);
         }
         if port.take_asked(ports::RESET) {
-            start_over(links, port, false);
+            start_over(links, port, uart::newest(port.number), false);
         }
     }
 }
@@ -143,9 +143,11 @@ pub fn serve(links: &Links) {
 #[small]
 fn act(links: &Links, port: &Port, characters: u8) {
     if characters & RESET != 0 {
+        // At once: what comes from here on is behind it.
+        let newest = uart::newest(port.number);
         if starts_over(links, port) {
             let works = View::of(links, port).has_work() && !machine::is_checking();
-            return start_over(links, port, works);
+            return start_over(links, port, newest, works);
         }
         reset();
     }
@@ -197,12 +199,12 @@ fn starts_over(links: &Links, port: &Port) -> bool {
     port.speech.get().is_in_order() && machine::alarm() != Alarm::Panic
 }
 
-/// A reset in a dialect that keeps the position: all that has come is dropped, the program ends, overrides are as programmed; the reporter greets
+/// A reset in a dialect that keeps the position: all that has come up to the `newest` byte is dropped, the program ends, overrides are as programmed; the reporter greets
 /// when that is done, and begins an alarm before if the machine `works`, which is interrupted.
 #[inline(never)]
 #[small]
-fn start_over(links: &Links, port: &Port, works: bool) {
-    cut(links, port, uart::newest(port.number), machine::Event::Kill);
+fn start_over(links: &Links, port: &Port, newest: Option<u8>, works: bool) {
+    cut(links, port, newest, machine::Event::Kill);
     if port.cut.get().is_none() {
         // What comes next begins a line.
         port.lines.borrow_mut().forget();
