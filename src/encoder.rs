@@ -18,11 +18,16 @@
 
 use kerf_macros::small;
 
+use crate::status::Status;
+
 /// Counts of time in a second.
 pub const COUNTS_PER_S: u32 = 250_000;
 
 /// Half a second.
 const STILL: u32 = COUNTS_PER_S / 2;
+
+/// Pulses do not come quite evenly: half a millisecond.
+const SLACK: u32 = COUNTS_PER_S / 2_000;
 
 /// A turn that takes longer is none: three seconds.
 const SLOWEST: u32 = 3 * COUNTS_PER_S;
@@ -67,13 +72,19 @@ pub struct Encoder {
     sync_at: u32,
     /// How long the last turn took; 0 if it is not known.
     turn: u32,
-    /// Index pulses in a row, up to [`SURE`].
+    /// Index pulses in a row, up to [`SURE`], and [`NEWS`].
     seen: u8,
     /// Misfits, up to 255.
     misfits: u8,
-    /// Exec has lost the spindle in a pass ([`thread`](crate::motion::thread)).
-    pub lost: bool,
+    /// How far the axes are ahead of the spindle in a pass, um, at the last index.
+    error: i16,
+    /// How the pass stands in step with the spindle ([`thread`](crate::motion::thread)): [`Status::Again`] for none that has begun,
+    /// [`Status::Ok`] while it goes on, else why it did not begin, or has ended. The planner and exec write it.
+    pub pass: Status,
 }
+
+/// Of [`Encoder::seen`]: nobody has been told of [`Encoder::error`] yet.
+const NEWS: u8 = 0x80;
 
 /// After so many index pulses in a row the time of a turn tells of its neighbours.
 const SURE: u8 = 4;
@@ -93,7 +104,8 @@ impl Encoder {
             turn: 0,
             seen: 0,
             misfits: 0,
-            lost: false,
+            error: 0,
+            pass: Status::Again,
         }
     }
 
@@ -127,12 +139,31 @@ impl Encoder {
     pub fn seen(&self) -> (u8, bool) {
         let synced =
             self.per_turn == 1 || self.time.wrapping_sub(self.sync_at) < STILL.max(self.turn);
-        (self.seen, self.seen > 0 && synced)
+        let seen = self.seen & !NEWS;
+        (seen, seen > 0 && synced)
     }
 
     /// Misfits so far, 255 for more.
     pub fn misfits(&self) -> u8 {
         self.misfits
+    }
+
+    /// In a pass the axes were so far ahead of the spindle at an index, mm. Exec.
+    pub fn note_error(&mut self, mm: f32) {
+        self.error = (mm * 1e3) as i16;
+        self.seen |= NEWS;
+    }
+
+    /// How far the axes are ahead of the spindle, um, at the last index of the pass; 0 without one.
+    pub fn error(&self) -> i16 {
+        if self.pass == Status::Ok { self.error } else { 0 }
+    }
+
+    /// Whether there has been another index in a pass since this was asked last.
+    pub fn take_news(&mut self) -> bool {
+        let is_new = self.seen & NEWS != 0;
+        self.seen &= !NEWS;
+        is_new
     }
 
     /// Takes up what the sensors have seen since the last look. Whether pulses did not fit.
@@ -148,7 +179,7 @@ impl Encoder {
             self.misfits = self.misfits.saturating_add(1);
         }
         if self.is_still() {
-            (self.seen, self.turn) = (0, 0);
+            (self.seen, self.turn) = (self.seen & NEWS, 0);
         }
         misfit
     }
@@ -168,9 +199,9 @@ impl Encoder {
         self.index = pulses.index;
         self.at_index = pulses.at_index;
         self.index_at = at;
-        let (before, turn) = (self.seen, self.turn);
-        self.seen =
-            u8::try_from(turns).map_or(SURE, |turns| before.saturating_add(turns)).min(SURE);
+        let (before, turn) = (self.seen & !NEWS, self.turn);
+        let seen = u8::try_from(turns).map_or(SURE, |turns| before.saturating_add(turns));
+        self.seen = self.seen & NEWS | seen.min(SURE);
         if before == 0 {
             return false;
         }
@@ -183,16 +214,30 @@ impl Encoder {
 
     /// Whether the spindle stands still.
     pub fn is_still(&self) -> bool {
-        if self.per_turn == 0 || self.seen == 0 {
+        if self.per_turn == 0 || self.seen & !NEWS == 0 {
             return true;
         }
+        let (age, two) = self.age();
+        age > STILL.max(two)
+    }
+
+    /// How long ago the last pulse was, and how long two take.
+    fn age(&self) -> (u32, u32) {
         // The second index tells how long a turn is.
         let turn = if self.turn == 0 { SLOWEST } else { self.turn };
-        let between = turn / u32::from(self.per_turn);
         let indexed = self.time.wrapping_sub(self.index_at);
         let synced = self.time.wrapping_sub(self.sync_at);
         let age = if self.per_turn == 1 { indexed } else { indexed.min(synced) };
-        age > STILL.max(2 * between)
+        (age, 2 * turn / u32::from(self.per_turn))
+    }
+
+    /// How fast feeds may take it to turn, thousandths of a turn a minute: 0 as soon as no pulse has come for longer than two of them take.
+    pub fn feeds(&self) -> u32 {
+        if self.turn == 0 {
+            return 0;
+        }
+        let (age, two) = self.age();
+        if age > two + two / 64 + SLACK { 0 } else { self.speed() }
     }
 
     /// How fast it turns, thousandths of a turn a minute; 0 if it stands still. Cost: 900.
@@ -298,6 +343,18 @@ mod tests {
         assert!(spindle.encoder.is_still());
         assert_eq!(spindle.encoder.speed(), 0);
         assert_eq!(spindle.misfits, 0);
+    }
+
+    #[test]
+    fn feeds_end_when_two_pulses_are_missing() {
+        for (per_turn, turn) in [(4u16, 50_000u64), (100, 50_000), (8, 250_000)] {
+            let mut spindle = Spindle::new(per_turn, 0);
+            (0..5).for_each(|_| spindle.turn(per_turn, turn));
+            assert!(spindle.encoder.feeds() > 0);
+            let two = 2 * turn / u64::from(per_turn);
+            spindle.pass(two + two / 32 + 2 * LOOK);
+            assert_eq!(spindle.encoder.feeds(), 0, "{per_turn}");
+        }
     }
 
     #[test]

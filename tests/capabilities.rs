@@ -28,7 +28,7 @@ fn lines() -> Vec<(Capability, String)> {
         Capability::Lathe if matches!(number, 70 | 80 | 960 | 970) => {
             format!("G{} S100", number / 10)
         }
-        Capability::Lathe => format!("G{} Z-5 K1", number / 10),
+        Capability::Lathe => format!("M3 G{}.{} Z-5 K1", number / 10, number % 10),
         _ => line(number),
     };
     modes.map(|(capability, number)| (capability, own(capability, number))).collect()
@@ -54,8 +54,8 @@ fn codes_are_refused_by_name_where_their_capability_is_not_built_in() {
     let lines = lines();
     assert_eq!(
         lines.len(),
-        10 + 4 + 7,
-        "G73, G81 to G89, G38.2 to G38.5, G32, G33, G76, G7, G8, G96, G97"
+        10 + 4 + 8,
+        "G73, G81 to G89, G38.2 to G38.5, G32, G33, G33.1, G76, G7, G8, G96, G97"
     );
     for (capability, line) in lines {
         let refused = said_of(&line) == Err(Status::NotBuiltIn);

@@ -89,6 +89,21 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "Take the tool out of the cut, `{clear:n}`. Find out why the spindle stopped, or the pulses.",
     ),
     (
+        NoEncoderInput,
+        "The board has no pins for the sensors of a spindle.",
+        "Take a board that has (lathe.md).",
+    ),
+    (
+        SpindleError,
+        "In a thread the axes were further from where the spindle says than `spl`. They have stopped, and know where they are.",
+        "`{clear:n}`. Turn slower, or raise `fr` and `ac` of the axis, if the axis can; else `spl`.",
+    ),
+    (
+        NotReversed,
+        "G33.1 has told the spindle to turn round, and it has not within the way that it has for that.",
+        "Free the tap by hand, `{clear:n}`. Check that M4 turns the spindle backwards; turn slower.",
+    ),
+    (
         UnrecognizedName,
         "There is no setting or value of that name.",
         "Check the name in settings.md, and below.",

@@ -106,10 +106,13 @@ impl<S: Setup> Reader<S> {
 
     /// The lines of a pass.
     fn pass(&mut self) {
-        let mut line = 0;
+        let (start, mut line) = (self.place, 0);
         while let Some((target, lead)) = self.steps.pass(&self.commands.motion, &self.place, line) {
             self.go(Canon::Thread(target, lead), target, None);
             line += 1;
+        }
+        if let Motion::Thread { lead, returns: true, .. } = self.commands.motion {
+            self.go(Canon::Thread(start, lead), start, None);
         }
     }
 

@@ -298,6 +298,16 @@ impl Settings {
         self.system(system::GRM) & 8 != 0
     }
 
+    /// Whether reports of grbl's dialect have the error of a thread.
+    pub fn reports_sync_error(&self) -> bool {
+        self.system(system::GRM) & 16 != 0
+    }
+
+    /// Whether each index pulse in a thread tells it.
+    pub fn reports_each_turn(&self) -> bool {
+        self.system(system::GRM) & 32 != 0
+    }
+
     /// Plane at power-up and program end: 0 G17, 1 G18, 2 G19.
     pub fn default_plane(&self) -> u8 {
         self.system(system::GPL)

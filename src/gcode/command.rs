@@ -185,12 +185,14 @@ pub enum Motion {
         /// Which of them.
         mode: MotionMode,
     },
-    /// G33: straight, in step with the spindle.
+    /// G33 and G33.1: straight, in step with the spindle.
     Thread {
         /// Where to.
         target: PerAxis<Length>,
         /// How far the axis that moves farthest goes in a turn.
         lead: Length,
+        /// G33.1: the spindle turns round there, and they come back in step.
+        returns: bool,
     },
     /// G76.
     ThreadCycle(ThreadCycle),

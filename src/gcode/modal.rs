@@ -50,11 +50,13 @@ pub enum MotionMode {
     Thread = 19,
     /// G76: a thread in several passes.
     ThreadCycle = 20,
+    /// G33.1: in step with the spindle, there and back.
+    RigidTap = 21,
 }
 
 impl MotionMode {
     /// How many there are.
-    pub const COUNT: usize = 21;
+    pub const COUNT: usize = 22;
 
     /// G73, G81 to G89. Never in an image without them.
     pub fn is_cycle(self) -> bool {
@@ -67,7 +69,7 @@ impl MotionMode {
         match self as u8 {
             5 | 16..=18 => Some(Capability::Probing),
             6..=15 => Some(Capability::Cycles),
-            19..=20 => Some(Capability::Lathe),
+            19..=21 => Some(Capability::Lathe),
             _ => None,
         }
     }

@@ -43,7 +43,8 @@ impl State {
             | MotionMode::ProbeTowardsQuietly
             | MotionMode::ProbeAway
             | MotionMode::ProbeAwayQuietly => self.probe(block, mode, setup, out),
-            MotionMode::Thread => self.thread(block, setup, out),
+            MotionMode::Thread => self.thread(block, false, setup, out),
+            MotionMode::RigidTap => self.thread(block, true, setup, out),
             MotionMode::ThreadCycle => self.thread_cycle(block, setup, out),
             // Cycles go their own way.
             _ => Err(Status::InternalError),

@@ -50,9 +50,9 @@ pub trait Setup {
     fn has_probe(&self) -> bool {
         true
     }
-    /// Whether an encoder tells how the spindle turns.
-    fn has_encoder(&self) -> bool {
-        true
+    /// Whether an encoder tells how the spindle turns, or why not.
+    fn encoder(&self) -> Result<(), Status> {
+        Ok(())
     }
     /// Whether an axis can be homed, or why not.
     fn homing(&self, _axis: u8) -> Result<(), Status> {

@@ -273,7 +273,7 @@ impl Steps {
         line: u8,
     ) -> Option<(PerAxis<Length>, Length)> {
         match motion {
-            Motion::Thread { target, lead } if line == 0 => Some((*target, *lead)),
+            Motion::Thread { target, lead, .. } if line == 0 => Some((*target, *lead)),
             Motion::ThreadCycle(cycle) => cycle.line(self.hole, line, position),
             _ => None,
         }
@@ -282,6 +282,9 @@ impl Steps {
     /// Where the pass that [`Step::Thread`] asks for ends, the machine being at `position`: for those who do not carry it out.
     pub fn end_of_pass(&self, motion: &Motion, position: &PerAxis<Length>) -> PerAxis<Length> {
         let (mut at, mut line) = (*position, 0);
+        if matches!(motion, Motion::Thread { returns: true, .. }) {
+            return at;
+        }
         while let Some((end, _)) = self.pass(motion, &at, line) {
             (at, line) = (end, line + 1);
         }

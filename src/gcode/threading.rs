@@ -1,4 +1,4 @@
-//! Threads: G33 and G32, a pass in step with the spindle; G76, a thread in several passes (LinuxCNC).
+//! Threads: G33 and G32, a pass in step with the spindle; G33.1, there and back, which taps a hole; G76, a thread in several passes (LinuxCNC).
 //!
 //! A [`ThreadCycle`] goes along Z. Its *drive line* is parallel to Z through where X is when it begins. Each pass goes from the drive line to its depth, cuts
 //! in step with the spindle, and goes back to the drive line. `steps` spells it out; one pass is up to three [lines](ThreadCycle::line), with a taper at
@@ -14,7 +14,7 @@ use kerf_macros::small;
 use super::axes;
 use super::block::Block;
 use super::command::{Commands, Motion};
-use super::modal::XMode;
+use super::modal::{Turn, XMode};
 use super::setup::Setup;
 use super::state::State;
 use super::words::{self, AXES, E, H, I, J, K, L, P, Q, R, ROTARY};
@@ -156,11 +156,12 @@ impl ThreadCycle {
 
 #[small]
 impl State {
-    /// G33 and G32: K is the way in a turn of the axis that moves farthest (LinuxCNC). F does not count.
+    /// G33 and G32, and G33.1, which `returns`: K is the way in a turn of the axis that moves farthest (LinuxCNC). F does not count.
     #[inline(never)]
     pub(super) fn thread(
         &mut self,
         block: &Block,
+        returns: bool,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
@@ -172,8 +173,15 @@ impl State {
             return Err(Status::AxisWordMissing);
         }
         let lead = self.above_0(block, K, Status::KWordMissing, Status::KWordInvalid)?;
+        if returns && self.modal.spindle == Turn::Off {
+            return Err(Status::SpindleMustTurn);
+        }
+        let before = (self.position, self.residue);
         self.advance(block, false, setup)?;
-        out.motion = Motion::Thread { target: self.position, lead };
+        out.motion = Motion::Thread { target: self.position, lead, returns };
+        if returns {
+            (self.position, self.residue) = before;
+        }
         Ok(())
     }
 
@@ -299,7 +307,7 @@ impl State {
 #[small]
 fn can_turn(setup: &impl Setup) -> Result<(), Status> {
     Capability::Lathe.check()?;
-    if setup.has_encoder() { Ok(()) } else { Err(Status::NoEncoder) }
+    setup.encoder()
 }
 
 /// More than 50 m.

@@ -7,6 +7,7 @@
 
 use super::factors::{Factors, Reserve};
 use super::pace::Drivers;
+use super::retract::Retract;
 use super::short::Short;
 use crate::boards::MOTORS;
 use crate::gcode::command::Surface;
@@ -79,8 +80,12 @@ pub enum Action {
     Outputs(Outputs),
     /// M3 to M9, S, under G96: the outputs are so from here on, and the speed of the spindle follows X by this surface speed. [`Surface::NONE`] ends that.
     Surface(Outputs, Surface),
-    /// G33: from here on, at rest, lines follow the spindle by so many mm a turn along their path; 0 for no more.
-    Thread(f32),
+    /// G33: from here on, at rest, lines follow the spindle.
+    Thread(Pass),
+    /// They do no more.
+    EndThread,
+    /// G33.1, at rest: the spindle has turned round, and lines follow it back. It is to turn again as far before the end of the line.
+    Return,
     /// In the midst of a pass of G33 or G76: the lines from here on have this lead, mm a turn. The machine goes on.
     Lead(f32),
     /// G95, or its end: from here on feeds go by the measured speed of the spindle, or not. The machine goes on.
@@ -91,6 +96,19 @@ pub enum Action {
     ProgramStop,
     /// M2, M30.
     ProgramEnd,
+}
+
+/// A pass in step with the spindle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pass {
+    /// How far its first line goes in a turn, along its path, mm.
+    pub lead: f32,
+    /// How far the axes may be off, once they have been in step, mm; 0 for no limit.
+    pub limit: Short,
+    /// How it is left before its end.
+    pub retract: Retract,
+    /// G33.1: the spindle is to turn round so many mm before the end of the line; 0 for a pass that does not return.
+    pub turn_at: f32,
 }
 
 /// What a program switches.

@@ -77,9 +77,9 @@ pub(super) struct Clear {
 const AGE_MOST: u8 = 64;
 
 impl Clear {
-    /// Nothing is known.
-    pub const NONE: Self = Self {
-        top: -1.0,
+    /// Before the first block, whose limits have it [forgotten](Self::forget). All zeros: anything else would be copied, from RAM.
+    pub const START: Self = Self {
+        top: 0.0,
         distance: 0.0,
         target: 0.0,
         place: 0.0,
@@ -88,6 +88,15 @@ impl Clear {
         binds: false,
         age: 0,
     };
+
+    /// Nothing is known any more. Field by field: a constant would be copied, from RAM.
+    #[inline(never)]
+    pub fn forget(&mut self) {
+        let Self { top, distance, target, place, from, closed, binds, age } = self;
+        *top = -1.0;
+        (*distance, *target, *place, *from) = (0.0, 0.0, 0.0, 0.0);
+        (*closed, *binds, *age) = (false, false, 0);
+    }
 
     /// How far on the target is kept from.
     pub fn place(&self) -> f32 {

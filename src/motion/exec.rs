@@ -21,17 +21,20 @@
 //! interrupt; a third of them are the governor's floats.
 
 use super::block::{Action, Block, Body, Line};
-use super::float::{below, least, scaled, some, whole};
+use super::float::{below, greater, least, scaled, some, whole};
 use super::governor::{Ahead, Governor, Stretch, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{Anchor, BlockSource};
+use super::retract::Retreat;
 use super::short::Short;
 use super::snapshot::{Program, Snapshot};
 use super::thread::Thread;
+use crate::boards::outputs;
 use crate::capability::Capability;
 use crate::dda::Segment;
 use crate::gcode::overrides::Change;
 use crate::hal::TIMER_HZ;
+use crate::status::Status;
 
 /// Half CPU cycles in a second.
 const HALVES_PER_S: f32 = 2.0 * TIMER_HZ as f32;
@@ -56,6 +59,12 @@ const SLOW: f32 = 5.0;
 
 /// A share of the spindle's speed has to change by so much to count.
 const CHANGE: f32 = 0.005;
+
+/// A feed waits so long for a spindle that stands still, s.
+const PATIENCE_S: f32 = 6.0;
+
+/// How long a pause is, s.
+const PAUSE_S: f32 = 0.001;
 
 /// A dwell's segment lasts so many milliseconds.
 const DWELL_MS: u16 = 2;
@@ -134,10 +143,22 @@ pub struct Exec {
     governor: Governor,
     prep: Prep,
     // But for what few lines need.
-    thread: Thread,
-    /// Feeds go by the measured speed of the spindle: that share of what they were planned for.
-    per_turn: bool,
-    share: f32,
+    follows: Follows,
+}
+
+/// What lines have to do with the spindle.
+#[derive(Debug, Default)]
+enum Follows {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// G95. Feeds go by its measured speed: that share of what they were planned for. 0 or less if it stands still: minus the seconds for
+    /// which a feed has waited for it.
+    Speed(f32),
+    /// G33, a pass of G76: they follow its angle.
+    Angle(Thread),
+    /// Such a pass has ended before its time: X leaves the cut while the axes come to rest, and then all waits to be dropped.
+    Retreats(Retreat),
 }
 
 /// What the governor sees of the queue.
@@ -183,9 +204,7 @@ impl Exec {
             hurry: false,
             breaks_off: false,
             dwell_ms: 0,
-            thread: Thread::new(),
-            per_turn: false,
-            share: 1.0,
+            follows: Follows::Nothing,
         }
     }
 
@@ -208,6 +227,9 @@ impl Exec {
         if self.dwell_ms > 0 {
             self.dwell(segment);
             return Step::Segment;
+        }
+        if Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Retreats(_)) {
+            return self.retreat(blocks, out, segment);
         }
         if !self.running.active {
             if blocks.is_empty() {
@@ -258,7 +280,19 @@ impl Exec {
     fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
         let running = &self.running;
         let is_line = |block: &Block| matches!(block.body, Body::Line(_)) || block.is_aside();
-        let goes_on = if running.active {
+        let must_go_on = match &self.follows {
+            _ if !Capability::Lathe.is_built_in() => false,
+            Follows::Retreats(retreat) => !retreat.is_done(),
+            // The spindle does not wait.
+            Follows::Angle(thread) => {
+                let ends = self.breaks_off || thread.fault().is_some() || thread.has_turned();
+                thread.is_tapping() && !ends
+            }
+            _ => false,
+        };
+        let goes_on = if must_go_on {
+            true
+        } else if running.active {
             // What the end of a block has been planned as is handed out.
             running.done || !self.governor.is_at_rest()
         } else {
@@ -284,14 +318,27 @@ impl Exec {
         let held = self.prep.cut(&mut out.target);
         self.running.active = false;
         self.dwell_ms = 0;
-        self.thread.begin(0.0);
+        let keeps = match &mut self.follows {
+            _ if !Capability::Lathe.is_built_in() => true,
+            Follows::Angle(thread) => thread.drop_rest(),
+            Follows::Speed(share) => {
+                *share = greater(*share, 0.0);
+                true
+            }
+            _ => false,
+        };
+        if !keeps {
+            self.follows = Follows::Nothing;
+        }
         out.left = 0.0;
         out.running = false;
         out.program = Program::Stopped;
         while let Some(block) = blocks.oldest() {
             match &block.body {
                 Body::Action(Action::Drivers(drivers)) => self.prep.set_drivers(*drivers),
-                Body::Action(Action::PerTurn(on)) => self.per_turn = *on,
+                Body::Action(Action::PerTurn(on)) if Capability::Lathe.is_built_in() => {
+                    self.go_by_speed(*on)
+                }
                 Body::Action(Action::SetPosition(steps)) if !moved => out.target = *steps,
                 Body::Action(Action::SetPosition(_) | Action::Override(_) | Action::Lead(_)) => {}
                 _ => moved = true,
@@ -300,6 +347,15 @@ impl Exec {
             blocks.release();
         }
         held
+    }
+
+    /// What was queued has been dropped for good: no line follows the spindle.
+    pub fn end_pass(&mut self) {
+        if let Follows::Angle(thread) = &self.follows
+            && thread.waits()
+        {
+            self.follows = Follows::Nothing;
+        }
     }
 
     /// Does what the oldest block asks for, which is no line.
@@ -342,17 +398,28 @@ impl Exec {
                 };
             }
             Action::Drivers(drivers) => self.prep.set_drivers(*drivers),
-            Action::Thread(lead) => {
+            Action::Thread(_) | Action::EndThread | Action::Return
+                if Capability::Lathe.is_built_in() =>
+            {
                 self.halt(out);
                 if !standstill {
                     return Step::Standstill;
                 }
                 self.prep.rest();
-                self.thread.begin(*lead);
+                match (action, &mut self.follows) {
+                    (Action::Thread(pass), _) => self.follows = Follows::Angle(Thread::begin(pass)),
+                    (Action::Return, Follows::Angle(thread)) => thread.turn_back(),
+                    _ => self.follows = Follows::Nothing,
+                }
             }
-            Action::PerTurn(on) => self.per_turn = *on,
-            Action::Lead(lead) => self.thread.set_lead(*lead),
-            Action::Override(_) => {}
+            Action::PerTurn(on) if Capability::Lathe.is_built_in() => self.go_by_speed(*on),
+            Action::Lead(lead) if Capability::Lathe.is_built_in() => {
+                if let Follows::Angle(thread) = &mut self.follows {
+                    thread.set_lead(*lead);
+                }
+            }
+            // Nothing more to do; and what an image without a lathe is never asked for.
+            _ => {}
         }
         blocks.release();
         match action {
@@ -430,7 +497,7 @@ impl Exec {
         if running.done {
             return self.end(0, false, blocks, segment);
         }
-        if Capability::Lathe.is_built_in() && self.thread.is_on() {
+        if Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Angle(_)) {
             return self.follow(blocks, out, segment);
         }
         let version = blocks.version();
@@ -447,14 +514,19 @@ impl Exec {
             }
         }
         let (mut cruise, mut holds) = (running.cruise, self.hold);
-        if Capability::Lathe.is_built_in() && self.per_turn && !blocks.is_traverse() {
-            cruise *= self.share;
+        if Capability::Lathe.is_built_in()
+            && let Follows::Speed(share) = self.follows
+            && !blocks.is_traverse()
+        {
             // The spindle stands still.
-            holds |= !some(self.share);
+            let stands = share <= 0.0;
+            holds |= stands;
+            if !stands {
+                cruise *= share;
+            }
             if self.governor.is_at_rest() && holds && !self.hold {
-                let (ticks, period) = PAUSE;
-                self.prep.pause(ticks, period, segment);
-                return Step::Segment;
+                self.follows = Follows::Speed(share - PAUSE_S);
+                return self.await_spindle(out, segment);
             }
         }
         let ahead = View { headroom: running.headroom, blocks };
@@ -509,14 +581,43 @@ impl Exec {
     /// The pass in step with the spindle, if there is one.
     #[inline(always)]
     pub fn thread(&mut self) -> Option<&mut Thread> {
-        let is_on = Capability::Lathe.is_built_in() && self.thread.is_on();
-        is_on.then_some(&mut self.thread)
+        match &mut self.follows {
+            Follows::Angle(thread) if Capability::Lathe.is_built_in() => Some(thread),
+            _ => None,
+        }
+    }
+
+    /// Whether the axes of G33.1 rest where the spindle has turned round, and what is left of the line is to be dropped.
+    pub fn has_turned(&self) -> bool {
+        match &self.follows {
+            Follows::Angle(thread) => thread.has_turned() && self.governor.is_at_rest(),
+            _ => false,
+        }
+    }
+
+    /// Why a pass has been left before its end, if one has, and the rest of it waits to be dropped: a hold of its own.
+    #[inline(always)]
+    pub fn has_left(&self) -> Option<Status> {
+        match &self.follows {
+            Follows::Retreats(retreat) if Capability::Lathe.is_built_in() => Some(retreat.why),
+            _ => None,
+        }
+    }
+
+    /// Along the path at the end of what is queued, mm/s.
+    pub fn velocity(&self) -> f32 {
+        self.governor.velocity()
     }
 
     /// Whether feeds go by the measured speed of the spindle (G95).
     #[inline(always)]
     pub fn is_per_turn(&self) -> bool {
-        Capability::Lathe.is_built_in() && self.per_turn
+        Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Speed(_))
+    }
+
+    /// G95 is in force for the lines from here on, or no more.
+    fn go_by_speed(&mut self, on: bool) {
+        self.follows = if on { Follows::Speed(1.0) } else { Follows::Nothing };
     }
 
     /// The spindle turns at this share of the speed that feeds were planned for; what is more than 1 is 1. A change of less than 0.5 % does
@@ -524,14 +625,26 @@ impl Exec {
     #[inline(never)]
     #[small]
     pub fn set_share(&mut self, share: f32) {
+        let Follows::Speed(before) = &mut self.follows else { return };
         let share = least(share, 1.0);
-        let off = share - self.share;
-        if !(-CHANGE..=CHANGE).contains(&off)
-            || (share.to_bits() == 0) != (self.share.to_bits() == 0)
-        {
-            self.share = share;
+        let off = share - *before;
+        let (stands, stood) = (!some(share), *before <= 0.0);
+        if stands != stood || !stands && !(-CHANGE..=CHANGE).contains(&off) {
+            *before = share;
             self.governor.change_feed();
             self.governor.look_again();
+        }
+    }
+
+    /// Whether a feed has waited for the spindle for too long. It says so once.
+    #[small]
+    pub fn takes_too_long(&mut self) -> bool {
+        match &mut self.follows {
+            Follows::Speed(share) if *share < -PATIENCE_S => {
+                *share = 0.0;
+                true
+            }
+            _ => false,
         }
     }
 
@@ -541,7 +654,8 @@ impl Exec {
         self.breaks_off = at_once;
     }
 
-    /// Prepares the next stretch of a line that follows the spindle. A feedhold waits for its end, and overrides do not count.
+    /// Prepares the next stretch of a line that follows the spindle. A feedhold leaves the cut if there is a retract, else it waits for the end, and
+    /// overrides do not count.
     #[inline(never)]
     #[small]
     fn follow(
@@ -550,30 +664,101 @@ impl Exec {
         out: &mut Snapshot,
         segment: &mut Segment,
     ) -> Step {
-        let running = &mut self.running;
+        self.take_limits(blocks);
+        let velocity = self.governor.velocity();
+        let (kept, accel) = (self.prep.kept(), self.governor.accel());
+        let brakes = self.brakes_for_end(velocity, accel);
+        let at_rest = self.governor.is_at_rest();
+        let Follows::Angle(thread) = &mut self.follows else { return Step::Again };
+        let wanted = thread.velocity(kept, velocity, accel, brakes);
+        if thread.is_to_turn(self.running.left) {
+            // The task switches it.
+            out.outputs ^= outputs::COUNTERCLOCKWISE;
+        }
+        let breaks_off = self.breaks_off || thread.fault().is_some() || thread.rests();
+        if at_rest && (breaks_off || !some(wanted)) {
+            return self.await_spindle(out, segment);
+        }
+        let retract = thread.retract();
+        // The axes come to rest in this line, in which X stands still.
+        let fits = velocity * velocity < 2.0 * accel * self.running.left;
+        let leaves = (breaks_off || self.hold) && retract.is_some() && fits;
+        if leaves && self.prep.rest_of(retract.motors) {
+            let why = thread.fault().unwrap_or(Status::Terminated);
+            self.follows = Follows::Retreats(Retreat::new(retract, why));
+            return self.retreat(blocks, out, segment);
+        }
+        let running = &self.running;
+        let stretch = if breaks_off {
+            self.governor.halt_sharply(running.left, running.headroom, SEGMENT_S)
+        } else {
+            self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
+        };
+        thread.handed(stretch.distance);
+        self.hand_out(&stretch, blocks, out, segment, |_| (false, false))
+    }
+
+    /// The line waits for the spindle.
+    #[inline(never)]
+    #[small]
+    fn await_spindle(&mut self, out: &mut Snapshot, segment: &mut Segment) -> Step {
+        let (ticks, period) = PAUSE;
+        self.prep.pause(ticks, period, segment);
+        out.left = self.running.left;
+        Step::Segment
+    }
+
+    /// What a line that follows the spindle may do, as far as that has changed.
+    fn take_limits(&mut self, blocks: &mut BlockSource) {
         let version = blocks.version();
+        let running = &mut self.running;
         if version != running.version {
             running.version = version;
             running.cruise = blocks.feed();
             blocks.take_changed();
             running.headroom = blocks.headroom();
         }
-        let velocity = self.governor.velocity();
-        let (kept, accel) = (self.prep.kept(), self.governor.accel());
-        let wanted = self.thread.velocity(kept, velocity, accel);
-        let breaks_off = self.breaks_off || self.thread.is_lost();
-        if self.governor.is_at_rest() && (breaks_off || !some(wanted)) {
-            let (ticks, period) = PAUSE;
-            self.prep.pause(ticks, period, segment);
-            return Step::Segment;
-        }
-        let stretch = if breaks_off {
-            self.governor.halt_sharply(running.left, running.headroom, SEGMENT_S)
+    }
+
+    /// Whether the line slows down for its end within the next stretches.
+    fn brakes_for_end(&self, velocity: f32, accel: f32) -> bool {
+        let running = &self.running;
+        let far = running.left - 2.0 * SEGMENT_S * velocity;
+        velocity * velocity - running.headroom > 2.0 * accel * far
+    }
+
+    /// Prepares the next stretch of a pass that has ended before its time: its axes slow down, and X leaves the cut.
+    #[inline(never)]
+    #[small]
+    fn retreat(
+        &mut self,
+        blocks: &mut BlockSource,
+        out: &mut Snapshot,
+        segment: &mut Segment,
+    ) -> Step {
+        let Follows::Retreats(retreat) = &self.follows else { return Step::Again };
+        let (motors, backwards) = (retreat.motors(), retreat.is_backwards());
+        if self.running.active && (self.running.done || !self.governor.is_at_rest()) {
+            self.take_limits(blocks);
+            self.prep.join(motors, backwards);
+            let step = if self.running.done {
+                self.end(0, false, blocks, segment)
+            } else {
+                let (left, headroom) = (self.running.left, self.running.headroom);
+                let stretch = self.governor.halt_sharply(left, headroom, SEGMENT_S);
+                self.hand_out(&stretch, blocks, out, segment, |_| (false, false))
+            };
+            if step != Step::Segment {
+                return step;
+            }
         } else {
-            self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
-        };
-        self.thread.handed(stretch.distance);
-        self.hand_out(&stretch, blocks, out, segment, |_| (false, false))
+            self.halt(out);
+            self.prep.join(motors, backwards);
+            self.prep.stand(motors, segment);
+        }
+        let Follows::Retreats(retreat) = &mut self.follows else { return Step::Segment };
+        self.prep.add(retreat, segment, &mut out.target);
+        Step::Segment
     }
 
     /// Hands out what is left of the line being run.

@@ -134,7 +134,7 @@ impl Governor {
             limits: Limits::NONE,
             ramp: None,
             rest: Rest::NONE,
-            clear: Clear::NONE,
+            clear: Clear::START,
             changed: false,
             halting: false,
             scanned: false,
@@ -175,7 +175,7 @@ impl Governor {
     pub fn stop(&mut self) {
         (self.velocity, self.alpha) = (0.0, 0.0);
         self.rest = Rest::NONE;
-        self.clear = Clear::NONE;
+        self.clear.forget();
         self.ramp = None;
         self.halting = false;
         (self.wait, self.margin, self.closing) = (0, MARGIN_FIRST, false);
@@ -193,7 +193,7 @@ impl Governor {
     fn change_limits(&mut self, accel: f32, jerk: f32) {
         self.leave_ramp();
         self.halting = false;
-        self.clear = Clear::NONE;
+        self.clear.forget();
         (self.wait, self.margin, self.closing) = (0, MARGIN_FIRST, false);
         let mut alpha = 0.0;
         if some(jerk) && self.alpha < 0.0 {
@@ -208,7 +208,7 @@ impl Governor {
     /// An override has changed feeds, of what runs and of what is ahead.
     pub fn change_feed(&mut self) {
         (self.late, self.changed) = (true, true);
-        self.clear = Clear::NONE;
+        self.clear.forget();
         self.wait = 0;
         if !self.halting && self.ramp.as_ref().is_some_and(|ramp| ramp.phase() == Phase::Up) {
             self.leave_ramp();

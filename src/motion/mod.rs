@@ -29,6 +29,7 @@ pub mod prep;
 pub mod queue;
 mod ramp;
 mod replan;
+pub mod retract;
 mod rise;
 pub mod short;
 mod slice;

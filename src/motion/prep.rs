@@ -37,6 +37,7 @@
 use super::block::{Line, PARTS_LOG2};
 use super::divide::{quotient, quotient_remainder};
 use super::pace::{COARSEST, Drivers, Pace, paces};
+use super::retract::Retreat;
 use crate::boards::{MOTORS, each_motor};
 use crate::dda::{PHASE_START, STEP, Segment};
 use crate::hal::arithmetic::product;
@@ -72,6 +73,9 @@ const SETTLE: u8 = 68;
 
 /// Latest cycle behind its tick at which a segment's directions stand.
 const TURNED: u16 = 150;
+
+/// Ticks and period of a segment for motors beside a block that stands still.
+const ASIDE: (u16, u16) = (64, 500);
 
 /// A lockstep segment has at least half as many ticks, if it is shorter than as many steps.
 const LOCKSTEP_TICKS: u16 = 16;
@@ -316,6 +320,56 @@ impl Prep {
             let way = self.minors[m].way;
             self.minors[m].owed = times(debt, self.most) - times(due, way);
             bit <<= 1;
+        }
+    }
+
+    /// Whether these motors have no part in the block.
+    #[small]
+    pub fn rest_of(&self, motors: u8) -> bool {
+        (self.full | self.minor) & motors == 0
+    }
+
+    /// These motors, which the block lets stand, are about to move this way, beside it. Segments have ticks for them from here on.
+    #[inline(never)]
+    #[small]
+    pub fn join(&mut self, motors: u8, backwards: bool) {
+        let turned = if backwards { !self.backwards & motors } else { self.backwards & motors };
+        if turned != 0 {
+            self.backwards ^= turned;
+            self.turned = true;
+        }
+        let mut bit = 1;
+        for minor in &mut self.minors {
+            if motors & bit != 0 {
+                *minor = Minor::default();
+                if self.minor & bit == 0 {
+                    self.minor |= bit;
+                    self.others = self.others.wrapping_add(1);
+                }
+            }
+            bit <<= 1;
+        }
+    }
+
+    /// A segment in which these motors may move, and no others: 2 ms.
+    #[small]
+    pub fn stand(&mut self, motors: u8, out: &mut Segment) {
+        self.pause(ASIDE.0, ASIDE.1, out);
+        out.moving = motors;
+        out.seal(0, 0);
+        if self.turned {
+            self.behind_turn(out);
+        }
+    }
+
+    /// Motors beside the block move in its segment, which has room for that.
+    #[inline(never)]
+    #[small]
+    pub fn add(&mut self, retreat: &mut Retreat, out: &mut Segment, target: &mut [i32; MOTORS]) {
+        // Of two segments the second one is in `held`.
+        if self.held.is_none() && !retreat.is_done() {
+            retreat.add(out, target, &mut self.debt);
+            out.settle = 0;
         }
     }
 

@@ -521,7 +521,7 @@ impl Governor {
     pub(super) fn halt_ramp(&mut self) {
         self.leave_ramp();
         self.halting = true;
-        self.clear = Clear::NONE;
+        self.clear.forget();
         if some(self.velocity) {
             self.lay(0.0, 0.0, true);
         }

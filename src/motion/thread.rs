@@ -18,17 +18,21 @@
 //!
 //! **Pulses that do not fit.** A pulse that comes after twice the time of the one before stands for two, one that comes too soon for none. The
 //! next index says whether that was right. A pulse that is overdue by more than a second one means that the
-//! [spindle is lost](Thread::is_lost); until then the line goes on at its speed. With a single pulse a turn there is nothing to tell a pulse that is missing from a
+//! [spindle is lost](Thread::fault); until then the line goes on at its speed. With a single pulse a turn there is nothing to tell a pulse that is missing from a
 //! spindle at half its speed: it is taken for missing.
 //!
 //! Cost on AVR: 2,500 cycles a stretch, 1,500 more with a pulse. RAM: 41 bytes.
 
 use kerf_macros::small;
 
-use super::float::{least, some};
+use super::block::Pass;
+use super::float::{greater, least, some};
+use super::retract::Retract;
+use super::short::Short;
 use crate::encoder::{COUNTS_PER_S, Pulses};
 use crate::hal::TIMER_HZ;
 use crate::math::sqrt;
+use crate::status::Status;
 
 /// How much of the way to the line is made up in a second: half of it in a stretch.
 const GAIN: f32 = 250.0;
@@ -44,6 +48,13 @@ const OVERDUE: f32 = 2.02;
 
 /// And for so many counts more, 0.5 ms: pulses do not come quite evenly.
 const SLACK: f32 = COUNTS_PER_S as f32 * 0.0005;
+
+/// A pulse of a spindle that slows down is of the way there up to this part of the time to its standstill. One that is less than 1.1 pulses from that is
+/// taken for one of the way back: its place is right either way, the next is off by a pulse at most. The other way round nothing would ever turn.
+const FORWARD: f32 = 0.7;
+
+/// A spindle that turns round has so long between two pulses, counts: 6 s.
+const PATIENCE: f32 = COUNTS_PER_S as f32 * 6.0;
 
 /// CPU cycles of a count.
 const CYCLES: u32 = TIMER_HZ / COUNTS_PER_S;
@@ -68,8 +79,20 @@ enum Stage {
     Known,
     /// The axes follow.
     Follows,
+    /// They have been within the limit of the error.
+    Met,
+    /// G33.1: the spindle has been told to turn round.
+    Turning,
+    /// It is about to, or has: the axes come to rest.
+    Top,
+    /// It has.
+    Turned,
+    /// What was left of the line has been dropped: the way back is to come.
+    Waits,
     /// The spindle was lost, and the axes come to rest.
     Lost,
+    /// The error was above its limit, and the axes come to rest.
+    Astray,
 }
 
 /// A pass.
@@ -86,14 +109,46 @@ pub struct Thread {
     at: u32,
     since: u32,
     measured: u16,
-    /// Pulses by then, and those of sync that the last index is to have seen.
-    pulses: u16,
-    index: u16,
-    expected: u16,
+    /// Pulses by then, and those of sync that the last index has seen, modulo 256: they are looked at every few ms.
+    pulses: u8,
+    index: u8,
+    expected: u8,
     /// Pulses that were put in since the last index, less those that were left out.
     mended: i8,
     /// When what is queued ends, CPU cycles.
     end: u32,
+    /// There has been an index since [`Thread::error`] was asked last.
+    indexed: bool,
+    kind: Kind,
+}
+
+/// What becomes of the pass.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    /// It ends with its lines.
+    Pass {
+        /// How far the axes may be off, mm; 0 for no limit.
+        limit: Short,
+        /// How it is left before its end.
+        retract: Retract,
+    },
+    /// G33.1.
+    Tap {
+        /// So many mm before the end of the line the spindle is to turn round.
+        turn_at: f32,
+        /// By how much the spindle slows down: pulses a count, in a count.
+        decel: f32,
+    },
+}
+
+impl Default for Kind {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+impl Kind {
+    const NONE: Self = Self::Pass { limit: Short::ZERO, retract: Retract::NONE };
 }
 
 #[small]
@@ -114,33 +169,96 @@ impl Thread {
             expected: 0,
             mended: 0,
             end: 0,
+            indexed: false,
+            kind: Kind::NONE,
         }
     }
 
-    /// Whether lines follow the spindle.
-    #[inline(always)]
-    pub fn is_on(&self) -> bool {
-        self.stage != Stage::Off
+    /// Why the pass is to end at once, if it is.
+    pub fn fault(&self) -> Option<Status> {
+        match self.stage {
+            Stage::Lost => Some(Status::SpindleLost),
+            Stage::Astray => Some(Status::SpindleError),
+            _ => None,
+        }
     }
 
-    /// Whether the spindle was lost in the pass.
-    pub fn is_lost(&self) -> bool {
-        self.stage == Stage::Lost
+    /// A pass begins.
+    pub fn begin(pass: &Pass) -> Self {
+        let Pass { lead, limit, retract, turn_at } = *pass;
+        let kind = match some(turn_at) {
+            true => Kind::Tap { turn_at, decel: 0.0 },
+            false => Kind::Pass { limit, retract },
+        };
+        Self { stage: Stage::Armed, lead, kind, ..Self::new() }
     }
 
-    /// A pass of so many mm a turn begins; 0 ends one.
-    pub fn begin(&mut self, lead: f32) {
-        self.stage = if some(lead) { Stage::Armed } else { Stage::Off };
-        (self.lead, self.mended) = (lead, 0);
-        self.per_turn = 0;
+    /// Whether it is G33.1, and the axes have begun to follow: it must not rest but where the spindle does.
+    pub fn is_tapping(&self) -> bool {
+        matches!(self.kind, Kind::Tap { .. }) && self.stage >= Stage::Follows
+    }
+
+    /// Whether the spindle is to be told now to turn round, with so many mm of the line left. It says so once.
+    pub fn is_to_turn(&mut self, left: f32) -> bool {
+        let turns = match self.kind {
+            Kind::Tap { turn_at, .. } => self.stage == Stage::Follows && left <= turn_at,
+            Kind::Pass { .. } => false,
+        };
+        if turns {
+            self.stage = Stage::Turning;
+        }
+        turns
+    }
+
+    /// Whether the axes are to rest, for the spindle turns round.
+    pub fn rests(&self) -> bool {
+        matches!(self.stage, Stage::Top | Stage::Turned | Stage::Waits)
+    }
+
+    /// Whether it has turned round, and the way back may begin.
+    pub fn has_turned(&self) -> bool {
+        self.stage == Stage::Turned
+    }
+
+    /// What was left of the line has been dropped. Whether the way back is to come.
+    pub fn drop_rest(&mut self) -> bool {
+        let waits = self.stage == Stage::Turned;
+        if waits {
+            self.stage = Stage::Waits;
+        }
+        waits
+    }
+
+    /// Whether the way back is to come.
+    pub fn waits(&self) -> bool {
+        self.stage == Stage::Waits
+    }
+
+    /// It begins, with the phase of the way there.
+    pub fn turn_back(&mut self) {
+        self.ahead = -self.ahead;
+        self.stage = Stage::Follows;
+    }
+
+    fn decel(&self) -> f32 {
+        match self.kind {
+            Kind::Tap { decel, .. } => decel,
+            Kind::Pass { .. } => 0.0,
+        }
+    }
+
+    /// How the pass is left before its end, if the axes have begun to follow.
+    pub fn retract(&self) -> Retract {
+        match self.kind {
+            Kind::Pass { retract, .. } if self.stage >= Stage::Follows => retract,
+            _ => Retract::NONE,
+        }
     }
 
     /// From here on the path goes so many mm a turn: a taper, or the end of one.
     pub fn set_lead(&mut self, lead: f32) {
-        if self.is_on() {
-            self.ahead *= lead / self.lead;
-            self.lead = lead;
-        }
+        self.ahead *= lead / self.lead;
+        self.lead = lead;
     }
 
     /// The steppers have been started, and make their first tick so many cycles after `time`, in counts. All that is queued since they stood
@@ -165,22 +283,24 @@ impl Thread {
     pub fn note(&mut self, time: u32, pulses: &Pulses, per_turn: u16, turn: u32) {
         let before = |at: u16| time.wrapping_sub(pulses.now.wrapping_sub(at).into());
         if self.per_turn == 0 {
-            (self.per_turn, self.index) = (per_turn, pulses.index);
+            (self.per_turn, self.index) = (per_turn, pulses.index as u8);
         }
         let (count, at) = match per_turn {
             1 => (pulses.index, before(pulses.index_at)),
             _ => (pulses.sync, before(pulses.sync_at)),
         };
-        if pulses.index != self.index {
-            let turns = pulses.index.wrapping_sub(self.index);
-            self.index = pulses.index;
+        let (count, at_index) = (count as u8, pulses.at_index as u8);
+        let turns = (pulses.index as u8).wrapping_sub(self.index);
+        if turns != 0 {
+            self.index = pulses.index as u8;
+            self.indexed = true;
             if self.stage == Stage::Armed {
                 self.interval = turn as f32 / f32::from(per_turn);
-                self.expected = pulses.at_index;
-                self.pulses = if per_turn == 1 { count.wrapping_sub(1) } else { pulses.at_index };
+                self.expected = at_index;
+                self.pulses = if per_turn == 1 { count.wrapping_sub(1) } else { at_index };
                 self.stage = Stage::Indexed;
-            } else if per_turn > 1 {
-                self.check_turns(turns, pulses.at_index);
+            } else if per_turn > 1 && !matches!(self.kind, Kind::Tap { .. }) {
+                self.check_turns(turns, at_index);
             }
         }
         let new = count.wrapping_sub(self.pulses);
@@ -192,26 +312,48 @@ impl Thread {
                 (self.at, self.since, self.measured) = (at, at, 0);
                 self.stage = Stage::Known;
             }
+            Stage::Turning | Stage::Top => self.take_turning(new, at),
+            Stage::Turned | Stage::Waits => {
+                self.ahead -= self.pitch() * f32::from(new);
+                self.keep_pace(f32::from(new), at);
+            }
             _ => self.take(new, at),
         }
         self.pulses = count;
         let age = time.wrapping_sub(self.at) as f32;
-        if self.stage == Stage::Follows && age > OVERDUE * self.interval + SLACK {
+        let overdue = match self.stage {
+            Stage::Turning | Stage::Top | Stage::Turned | Stage::Waits => PATIENCE,
+            _ => OVERDUE * self.interval + SLACK,
+        };
+        if self.stage >= Stage::Follows && self.stage < Stage::Lost && age > overdue {
             self.stage = Stage::Lost;
         }
     }
 
+    /// How far the axes, which go at `velocity` at the end of what is queued, were ahead of the line at the last pulse, mm: behind an
+    /// index, and while they follow.
+    pub fn error(&mut self, velocity: f32) -> Option<f32> {
+        let indexed = core::mem::take(&mut self.indexed) && self.follows();
+        let late = self.end.wrapping_sub(self.at.wrapping_mul(CYCLES)) as i32;
+        indexed.then(|| -(self.ahead + velocity * (late as f32 * (1.0 / TIMER_HZ as f32))))
+    }
+
+    fn follows(&self) -> bool {
+        matches!(self.stage, Stage::Follows | Stage::Met)
+    }
+
     /// mm a pulse.
+    #[inline(never)]
     fn pitch(&self) -> f32 {
         self.lead / f32::from(self.per_turn)
     }
 
     /// An index has come, `turns` after the last, when sync had given so many pulses.
-    fn check_turns(&mut self, turns: u16, at_index: u16) {
-        let expected = self.expected.wrapping_add(turns.wrapping_mul(self.per_turn));
+    fn check_turns(&mut self, turns: u8, at_index: u8) {
+        let expected = self.expected.wrapping_add(turns.wrapping_mul(self.per_turn as u8));
         // Too few by so many.
-        let short = expected.wrapping_sub(at_index) as i16;
-        let wrong = short - i16::from(self.mended);
+        let short = expected.wrapping_sub(at_index) as i8;
+        let wrong = i16::from(short) - i16::from(self.mended);
         if wrong != 0 && self.stage > Stage::Indexed {
             self.ahead += self.pitch() * f32::from(wrong);
         }
@@ -219,39 +361,95 @@ impl Thread {
     }
 
     /// So many pulses have come, the last of them `at` this time.
-    fn take(&mut self, new: u16, at: u32) {
+    #[inline(never)]
+    fn take(&mut self, new: u8, at: u32) {
         let passed = at.wrapping_sub(self.at) as f32 / self.interval;
         let mut true_count = f32::from(new);
         let off = passed - true_count;
         if !(-MISFIT..=MISFIT).contains(&off) && passed < 100.0 {
             let fits = (passed + 0.5) as u16;
-            self.mended = self.mended.saturating_add(fits.wrapping_sub(new) as i8);
+            self.mended = self.mended.saturating_add((fits as u8).wrapping_sub(new) as i8);
             true_count = f32::from(fits);
             if fits == 0 {
                 return;
             }
         }
         self.ahead += self.pitch() * true_count;
+        self.keep_pace(true_count, at);
+    }
+
+    /// So many pulses more are counted, the last of them `at` this time: how fast they come.
+    #[inline(never)]
+    fn keep_pace(&mut self, count: f32, at: u32) {
         self.at = at;
-        self.measured = self.measured.saturating_add(true_count as u16);
+        self.measured = self.measured.saturating_add(count as u16);
         let window = at.wrapping_sub(self.since);
-        if window >= WINDOW {
-            self.interval = window as f32 / f32::from(self.measured);
-            (self.since, self.measured) = (at, 0);
+        if window < WINDOW {
+            return;
         }
+        let window = window as f32;
+        let interval = window / f32::from(self.measured);
+        if let Kind::Tap { decel, .. } = &mut self.kind {
+            *decel = (1.0 / self.interval - 1.0 / interval) / window;
+        }
+        self.interval = interval;
+        (self.since, self.measured) = (at, 0);
+    }
+
+    /// Pulses of a spindle that is about to turn round. One that comes about when it stands, or later, is of the way back, over the mark of the last one; where the
+    /// spindle is then follows from how it has slowed down.
+    #[inline(never)]
+    fn take_turning(&mut self, new: u8, at: u32) {
+        let after = at.wrapping_sub(self.at) as f32;
+        let (rate, decel) = self.pace();
+        if self.stage != Stage::Top && (decel <= 0.0 || after * decel <= FORWARD * rate) {
+            let count = f32::from(new);
+            self.ahead += self.pitch() * count;
+            return self.keep_pace(count, at);
+        }
+        let back = decel * after - rate;
+        self.ahead += self.pitch() * (rate - 0.5 * decel * after) * after;
+        // No slower than a pulse in the time that it took.
+        self.interval = least(after, 1.0 / greater(back, 1e-9));
+        (self.at, self.since, self.measured) = (at, at, 0);
+        if let Kind::Tap { decel, .. } = &mut self.kind {
+            *decel = -*decel;
+        }
+        self.stage = Stage::Turned;
+    }
+
+    /// Pulses a count at the last pulse, and by how much that falls in a count.
+    #[inline(never)]
+    fn pace(&self) -> (f32, f32) {
+        let (mean, decel) = (1.0 / self.interval, self.decel());
+        if !some(decel) {
+            return (mean, 0.0);
+        }
+        // The mean is that of the middle of the last window.
+        let since =
+            0.5 * greater(self.interval, WINDOW as f32) + self.at.wrapping_sub(self.since) as f32;
+        (greater(mean - decel * since, 0.0), decel)
     }
 
     /// The velocity to be reached in the next stretch, mm/s, from `velocity`; 0 for none. Time of which `kept` cycles have not been queued
-    /// belongs to what is.
+    /// belongs to what is. The error is held against its limit unless the axes slow down for the end, `brakes`.
     #[inline(never)]
-    pub fn velocity(&mut self, kept: i32, velocity: f32, accel: f32) -> f32 {
+    pub fn velocity(&mut self, kept: i32, velocity: f32, accel: f32, brakes: bool) -> f32 {
         if self.stage < Stage::Known {
             return 0.0;
         }
-        let speed = self.pitch() * COUNTS_PER_S as f32 / self.interval;
         let end = self.end.wrapping_add(kept as u32);
         let late = end.wrapping_sub(self.at.wrapping_mul(CYCLES)) as i32;
-        let mut way = self.ahead + speed * (late as f32 * (1.0 / TIMER_HZ as f32));
+        let counts = late as f32 * (1.0 / CYCLES as f32);
+        let (rate, decel) = self.pace();
+        let speed = self.pitch() * COUNTS_PER_S as f32 * (rate - decel * counts);
+        let mut way = self.ahead + self.pitch() * (rate - 0.5 * decel * counts) * counts;
+        if self.stage == Stage::Turning && speed < SLOWEST {
+            self.stage = Stage::Top;
+        }
+        if self.rests() {
+            return 0.0;
+        }
         if self.stage == Stage::Known {
             // What 4 ms bring is made up for.
             while way > 0.004 * speed {
@@ -260,6 +458,7 @@ impl Thread {
             }
         }
         let size = f32::from_bits(way.to_bits() & 0x7FFF_FFFF);
+        self.hold_against_limit(size, brakes);
         let change = least(GAIN * size, sqrt(2.0 * SHARE * accel * size));
         let wanted = if way.is_sign_negative() { speed - change } else { speed + change };
         if wanted < SLOWEST {
@@ -269,6 +468,20 @@ impl Thread {
             self.stage = Stage::Follows;
         }
         wanted
+    }
+
+    /// The axes are off by `size` mm.
+    fn hold_against_limit(&mut self, size: f32, brakes: bool) {
+        let Kind::Pass { limit, .. } = self.kind else { return };
+        let limit = limit.get();
+        if !some(limit) || brakes {
+            return;
+        }
+        match (self.stage, size > limit) {
+            (Stage::Follows, false) => self.stage = Stage::Met,
+            (Stage::Met, true) => self.stage = Stage::Astray,
+            _ => {}
+        }
     }
 }
 
@@ -300,8 +513,7 @@ mod tests {
 
     impl Pass {
         fn new(per_turn: u16, turn: u32, begin: u64) -> Self {
-            let mut thread = Thread::new();
-            thread.begin(1.0);
+            let thread = Thread::begin(&super::Pass { lead: 1.0, ..super::Pass::default() });
             let (missing, extra) = (None, None);
             let mut pass = Self {
                 thread,
@@ -350,7 +562,7 @@ mod tests {
             let pulses = self.pulses();
             self.thread.note(self.time as u32, &pulses, self.per_turn, self.turn);
             let seconds = STRETCH as f32 / COUNTS_PER_S as f32;
-            let wanted = self.thread.velocity(0, self.velocity, ACCEL);
+            let wanted = self.thread.velocity(0, self.velocity, ACCEL, false);
             let gain = ACCEL * seconds;
             let next = wanted.clamp(self.velocity - gain, self.velocity + gain);
             let distance = 0.5 * (self.velocity + next) * seconds;
@@ -421,7 +633,7 @@ mod tests {
                     (off - off.round()).abs() < 0.002,
                     "{per_turn} {missing:?} {extra:?}: {off}"
                 );
-                assert!(!pass.thread.is_lost());
+                assert!(pass.thread.fault().is_none());
             }
         }
     }
@@ -431,7 +643,7 @@ mod tests {
         let mut pass = Pass::new(4, 50_000, 0);
         pass.run(400);
         let (pulses, from) = (pass.pulses(), pass.time);
-        while !pass.thread.is_lost() {
+        while pass.thread.fault().is_none() {
             pass.time += u64::from(STRETCH);
             let now = Pulses { now: pass.time as u16, ..pulses };
             pass.thread.note(pass.time as u32, &now, 4, 50_000);

@@ -24,6 +24,8 @@ pub enum Notice {
         /// The second.
         flushed: bool,
     },
+    /// How far the axes are ahead of the spindle in a pass, at an index.
+    SyncError,
     /// How many blocks are free: a queue report.
     Queue,
 }

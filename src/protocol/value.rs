@@ -46,6 +46,14 @@ pub enum Value {
     Mist,
     /// 1 after M8.
     Flood,
+    /// S, in thousandths of a turn per minute.
+    SpindleProgrammed,
+    /// Pulses of the encoder in a turn; 0 without one.
+    PulsesPerTurn,
+    /// How far the axes of a pass in step with the spindle are ahead of it, um, at the last index; 0 without a pass.
+    SyncError,
+    /// Whether the pass of the line has begun: a [`Status`](crate::status::Status) as a number, as `Encoder::pass` has it.
+    Pass,
     /// Pulses of the encoder that did not fit since the reset, 255 for more.
     PulseMisfits,
     /// Why the machine has started, see [`Cause`](crate::hal::resets::Cause).

@@ -100,6 +100,6 @@ mod tests {
             assert_ne!(key, NO_KEY);
         }
         assert!(keys.len() <= usize::from(KEYS));
-        assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + 10 + 7 + 2 + 16);
+        assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + 10 + 9 + 2 + 16);
     }
 }

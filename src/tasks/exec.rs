@@ -25,8 +25,10 @@ use crate::motion::thread::Thread;
 use crate::tasks::health::{self, Sign};
 use kerf_macros::small;
 
+use crate::capability::Capability;
 use crate::motors::Motors;
 use crate::spindle::Spindle;
+use crate::status::Status;
 use crate::tasks::common::{Common, State};
 use crate::tasks::{Never, hold, links, overrides, power, spindle};
 
@@ -155,13 +157,24 @@ impl<'a> Runner<'a> {
         if self.machine.is_per_turn() {
             follow_speed(self.machine, encoder, out);
         }
-        self.machine.set_hold(hold::is_wanted(out.running) || contact::is_noted(), out);
+        let has_left = self.machine.has_left();
+        if let Some(why) = has_left {
+            note_left(encoder, why);
+        }
+        let left =
+            Capability::Lathe.is_built_in() && (has_left.is_some() || encoder.pass == Status::Noop);
+        let holds = hold::is_wanted(out.running) || contact::is_noted() || left;
+        self.machine.set_hold(holds, out);
         // What has paused in a hold goes on before motion does.
         if out.outputs != spindle::on() {
             if !machine::is_held() {
                 spindle.go_on();
             }
-            self.machine.wait(spindle::switch(spindle, out, false), out);
+            let ms = spindle::switch(spindle, out, false);
+            // In the midst of G33.1 the axes go by the encoder.
+            if self.machine.thread().is_none() {
+                self.machine.wait(ms, out);
+            }
         }
         if let Some(line) = self.finished.take(used) {
             out.finished = line;
@@ -226,6 +239,9 @@ impl<'a> Runner<'a> {
             spindle::switch(spindle, out, false);
             let held = self.machine.drop_all(&mut self.blocks, out);
             stepper::settle(held, &mut out.target);
+            if Capability::Lathe.is_built_in() && machine::is_dropping() {
+                self.machine.end_pass();
+            }
             self.finished.rest();
             if machine::alarm() >= Alarm::Shutdown {
                 out.program = Program::Ready;
@@ -267,25 +283,47 @@ impl<'a> Runner<'a> {
 fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
     let pulses = sensors::read();
     encoder.look(&pulses);
+    let velocity = exec.velocity();
     let Some(thread) = exec.thread() else { return };
     thread.note(encoder.time(), &pulses, encoder.per_turn(), encoder.turn());
-    encoder.lost = thread.is_lost();
-    if encoder.lost {
+    if let Some(error) = thread.error(velocity) {
+        encoder.note_error(error);
+    }
+    if encoder.pass == Status::Ok && exec.has_turned() {
+        encoder.pass = Status::Noop;
+        flags::set(Event::BlockDone);
+    }
+    let Some(thread) = exec.thread() else { return };
+    if let Some(fault) = thread.fault() {
+        encoder.pass = fault;
         // The planner waits for it.
         flags::set(Event::BlockDone);
     }
     exec.break_off(machine::is_alarmed());
 }
 
+/// The pass has been left, for this reason.
+#[inline(never)]
+#[small]
+fn note_left(encoder: &mut Encoder, why: Status) {
+    if encoder.pass == Status::Ok {
+        encoder.pass = why;
+        flags::set(Event::BlockDone);
+    }
+}
+
 /// Feeds a turn go by the measured speed, if there is an encoder: S is what they were planned for.
 #[inline(never)]
 #[small]
-fn follow_speed(exec: &mut Exec, encoder: &Encoder, out: &Snapshot) {
+fn follow_speed(exec: &mut Exec, encoder: &mut Encoder, out: &Snapshot) {
     let share = match encoder.per_turn() {
         0 => 1.0,
-        _ => encoder.speed() as f32 / (out.speed * 1e3),
+        _ => encoder.feeds() as f32 / (out.speed * 1e3),
     };
     exec.set_share(share);
+    if exec.takes_too_long() {
+        encoder.pass = Status::SpindleMustTurn;
+    }
 }
 
 /// The steppers have just been started in a pass.

@@ -16,6 +16,8 @@ mod probe;
 mod seek;
 mod square;
 #[cfg(feature = "lathe")]
+mod tap;
+#[cfg(feature = "lathe")]
 mod thread;
 
 use embassy_futures::select::select;

@@ -14,6 +14,7 @@ use kerf_macros::small;
 use super::health;
 use super::links::Links;
 use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, OTHERS, Port};
+use super::turning;
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
 use crate::hal::eeprom::Eeprom;
@@ -90,6 +91,9 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             // The planner waits for it.
             flags::set(Event::BlockDone);
             tell(links, links.told(), Notice::Probing).await;
+        }
+        if turning::take_news(links.thread) && links.settings.borrow().reports_each_turn() {
+            tell(links, links.told(), Notice::SyncError).await;
         }
         let state = State::now(links);
         let (jogged, flushed) = (links.notices.jogged.take(), links.notices.flushed.take());

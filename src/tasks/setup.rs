@@ -78,8 +78,12 @@ impl Setup for Settings {
         ACTIVE.inputs[inputs::PROBE].is_some() && pins::left_out() >> inputs::PROBE & 1 == 0
     }
 
-    fn has_encoder(&self) -> bool {
-        encoder::is_set_up()
+    fn encoder(&self) -> Result<(), Status> {
+        match ACTIVE.encoder {
+            None => Err(Status::NoEncoderInput),
+            Some(_) if encoder::is_set_up() => Ok(()),
+            Some(_) => Err(Status::NoEncoder),
+        }
     }
 
     fn homing(&self, axis: u8) -> Result<(), Status> {

@@ -5,6 +5,7 @@
 
 use kerf_macros::small;
 
+use super::alarm;
 use super::common;
 use super::links::Links;
 use super::storage::Storage;
@@ -14,6 +15,7 @@ use crate::config::{Owner, Setting};
 use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::{encoder, flags};
+use crate::machine::Alarm;
 use crate::status::Status;
 
 /// Microseconds of a count of time.
@@ -22,7 +24,7 @@ const COUNT_US: i32 = 4;
 /// Whether it is a setting of the encoder.
 #[small]
 pub fn is_own(setting: Setting) -> bool {
-    setting.owner() == Owner::Spindle && matches!(setting.index(), spindle::N | spindle::B)
+    setting.owner() == Owner::Spindle && setting.index() >= spindle::N
 }
 
 /// Takes over the settings.
@@ -61,6 +63,16 @@ pub fn look(links: &Links) {
     if first_misfit {
         links.except(Status::PulseMisfit);
     }
+    let waits_in_vain = common::with(links.thread, |common| {
+        let waits = common.encoder.pass == Status::SpindleMustTurn;
+        if waits {
+            common.encoder.pass = Status::Again;
+        }
+        waits
+    });
+    if waits_in_vain {
+        alarm::raise_for(links, Alarm::Alarm, Status::SpindleMustTurn);
+    }
 }
 
 /// How fast the spindle turns, thousandths of a turn a minute; `None` without an encoder.
@@ -75,8 +87,51 @@ pub fn speed(thread: Thread) -> Option<u32> {
     })
 }
 
+/// How the pass in step with the spindle stands, of [`Encoder::pass`](crate::encoder::Encoder::pass). A refusal is told once.
+#[small]
+pub fn pass(thread: Thread) -> Status {
+    if !Capability::Lathe.is_built_in() {
+        return Status::Ok;
+    }
+    common::with(thread, |common| {
+        let pass = common.encoder.pass;
+        if matches!(pass, Status::NoIndex | Status::NoSync | Status::VelocityExceeded) {
+            common.encoder.pass = Status::Again;
+        }
+        pass
+    })
+}
+
+/// How far the axes are ahead of the spindle in the pass, um.
+#[small]
+pub fn error(thread: Thread) -> i16 {
+    if !Capability::Lathe.is_built_in() {
+        return 0;
+    }
+    common::with(thread, |common| common.encoder.error())
+}
+
+/// Whether the pass has come to another index since this was asked last.
+#[inline(never)]
+#[small]
+pub fn take_news(thread: Thread) -> bool {
+    Capability::Lathe.is_built_in() && common::with(thread, |common| common.encoder.take_news())
+}
+
+/// Pulses of the encoder in a turn; 0 without one.
+#[small]
+pub fn per_turn(thread: Thread) -> u16 {
+    if !Capability::Lathe.is_built_in() {
+        return 0;
+    }
+    common::with(thread, |common| common.encoder.per_turn())
+}
+
 /// Pulses that did not fit so far, 255 for more.
 #[small]
 pub fn misfits(thread: Thread) -> u8 {
+    if !Capability::Lathe.is_built_in() {
+        return 0;
+    }
     common::with(thread, |common| common.encoder.misfits())
 }

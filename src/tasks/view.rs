@@ -248,6 +248,11 @@ impl<'a> View<'a> {
         (pins::worked() >> input & 1).into()
     }
 
+    /// S, thousandths of a turn a minute.
+    fn programmed_speed(&self) -> i32 {
+        self.modal(Value::SpindleSpeed).min(2_000_000) * 1_000
+    }
+
     #[small]
     fn modal(&self, value: Value) -> i32 {
         let model = self.links.model.borrow();
@@ -400,8 +405,12 @@ impl Machine for View<'_> {
             Value::Reset => watchdog::cause() as i32,
             Value::SpindleSpeed => match turning::speed(self.links.thread) {
                 Some(speed) => speed as i32,
-                None => self.modal(value).min(2_000_000) * 1_000,
+                None => self.programmed_speed(),
             },
+            Value::SpindleProgrammed if Capability::Lathe.is_built_in() => self.programmed_speed(),
+            Value::PulsesPerTurn => turning::per_turn(self.links.thread).into(),
+            Value::SyncError => turning::error(self.links.thread).into(),
+            Value::Pass => turning::pass(self.links.thread) as i32,
             Value::PulseMisfits => turning::misfits(self.links.thread).into(),
             Value::Starvations => health::starvations().into(),
             Value::Kept => self.links.storage.is_done().into(),

@@ -52,7 +52,7 @@ pub struct Crowd<S> {
 impl<S: Side> Crowd<S> {
     /// Waits for the greeting.
     pub fn new(mut side: S) -> Self {
-        side.wire(&[]);
+        side.wire(&[], 0);
         let mut crowd = Crowd { side, heard: Default::default() };
         let greeted = crowd.hears(USB, "SYSTEM READY", 3_000) && crowd.hears(AUX, "READY", 1_000);
         assert!(greeted, "no greeting");

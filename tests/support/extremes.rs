@@ -142,7 +142,7 @@ type Outcome<T> = Result<T, String>;
 
 impl<S: Side> Bench<S> {
     pub fn new(mut side: S) -> Outcome<Self> {
-        side.wire(&[]);
+        side.wire(&[], 0);
         let mut bench = Self { side, motion: Motion::of(0), heard: String::new(), between: false };
         bench.pass(100);
         let settings = "{sv:0,xsn:0,xsx:0,ysn:0,ysx:0,zsn:0,zsx:0,asn:0,asx:0}";

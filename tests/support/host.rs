@@ -41,8 +41,12 @@ impl Side for Machine {
         Machine::set_input(self, input, closed);
     }
 
-    fn wire(&mut self, switches: &[(usize, i64, bool)]) {
+    fn wire(&mut self, switches: &[(usize, i64, bool)], _: u32) {
         switches.iter().for_each(|(input, step, opens)| self.set_near(*input, *step, *opens));
+    }
+
+    fn turn_spindle(&mut self, rpm: f64, pulses: u32) {
+        Machine::turn_spindle(self, rpm, pulses as u16);
     }
 
     fn steps(&self) -> [i64; 4] {

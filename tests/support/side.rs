@@ -22,8 +22,10 @@ pub trait Side {
     /// The contact at an input closes or opens; see `kerf::boards::inputs`.
     fn set_input(&mut self, input: usize, closed: bool);
     /// The contact at each of these inputs is closed while the motor of its axis is at or beyond a step, or
-    /// open (`true`).
-    fn wire(&mut self, switches: &[(usize, i64, bool)]);
+    /// open (`true`). The encoder of the spindle gives so many pulses a turn, 0 if there is none.
+    fn wire(&mut self, switches: &[(usize, i64, bool)], pulses: u32);
+    /// The spindle turns at so many turns a minute, whatever its outputs say.
+    fn turn_spindle(&mut self, rpm: f64, pulses: u32);
     /// Where the motors are, in steps.
     fn steps(&self) -> [i64; 4];
     /// The outputs that are on, as bits of `kerf::boards::outputs`; and what part of its period the spindle's

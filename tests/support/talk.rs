@@ -43,7 +43,7 @@ type Outcome<T> = Result<T, String>;
 impl<S: Side> Talk<S> {
     /// With a machine that has not booted, or is about to say that it has.
     pub fn new(mut side: S) -> Self {
-        side.wire(&SWITCHES);
+        side.wire(&SWITCHES, 0);
         let ports = [Sender::new(0), Sender::new(1)];
         let whereabouts = Whereabouts::at_start(side.steps());
         Self { side, ports, whereabouts, closed: 0, log: Vec::new() }

@@ -104,9 +104,9 @@ group! {
         DIA "dia": int(0, 15), ACTIVE.dialect as i32,
             words(text!("protocol dialect"), text!(" [0=auto,1=g2core,2=TinyG,3=grbl]")),
             "Whom the sender takes the machine for. With 0 a port speaks TinyG's dialect, or grbl's if the first that is said there in one alone is grbl's. 2 and 3 are one alone, from the next reset on. The second port is as the first, or by itself with 4 more (as 0), 8 more (as 2) or 12 more (as 3): 11 is grbl on the first and TinyG on the second. As a g2core it ends responses with `[1,status,length]` and has that one's `fb`, `fv`, `hp`, `hv`, prompts, and some status codes and texts.";
-        GRM "grm": int(0, 15), 1,
+        GRM "grm": int(0, 63), 1,
             bare(text!("grbl report mask")),
-            "What grbl's reports have: 1 machine position (else work position), 2 free blocks and bytes; 4 inches. Its senders know the first two bits as number 10, the third as 13. 8 holds the machine behind a line of G-code that is refused, until `~` or a reset.";
+            "What grbl's reports have: 1 machine position (else work position), 2 free blocks and bytes; 4 inches. Its senders know the first two bits as number 10, the third as 13. 8 holds the machine behind a line of G-code that is refused, until `~` or a reset. 16 has reports tell in a thread how far the axes are ahead of the spindle (`Se`), and 32 has each index pulse tell it, in TinyG's dialect too (`spf`): 4 and 8 of number 10.";
         SPW "spw": int(1, 10).with(IDLE), 2,
             words(text!("step pulse width"), text!(" us")),
             "How long a step pulse lasts. Longer pulses may lower `vm` and `fr`.";

@@ -33,8 +33,8 @@ const fn probe(number: u16, mode: MotionMode) -> Code {
 }
 
 /// K is not in force for the next line: the code in force needs it as well.
-const fn thread(number: u16) -> Code {
-    with(number, Action::Motion(MotionMode::Thread), AXES | bit(K))
+const fn thread(number: u16, mode: MotionMode) -> Code {
+    with(number, Action::Motion(mode), AXES | bit(K))
 }
 
 /// Its words are not in force for the next line, which needs them as well.
@@ -54,7 +54,7 @@ pub const DENSE: u16 = 100;
 pub const STARTS: usize = DENSE as usize + 1;
 
 /// Rows of G codes.
-pub const G_ROWS: usize = 73;
+pub const G_ROWS: usize = 74;
 /// Rows of M codes.
 pub const M_ROWS: usize = 21;
 
@@ -92,8 +92,9 @@ const G_TABLE: [Code; G_ROWS] = [
     needing(284, Action::NonModal(NonModal::Home { set: false }), AXES, 0),
     with(300, Action::NonModal(NonModal::GoStored(1)), AXES),
     code(301, Action::NonModal(NonModal::Store(1))),
-    thread(320),
-    thread(330),
+    thread(320, MotionMode::Thread),
+    thread(330, MotionMode::Thread),
+    thread(331, MotionMode::RigidTap),
     probe(382, MotionMode::ProbeTowards),
     probe(383, MotionMode::ProbeTowardsQuietly),
     probe(384, MotionMode::ProbeAway),

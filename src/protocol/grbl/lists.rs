@@ -4,6 +4,7 @@
 
 use super::settings;
 use super::write::{close, int, length, line_end, message, text};
+use crate::capability::Capability;
 use crate::gcode::tables::Row;
 use crate::progmem;
 use crate::progmem::Text;
@@ -67,10 +68,10 @@ pub const PROBING: u8 = PROBED << 3;
 
 progmem! {
     /// The motion modes, in the order of their numbers.
-    static MOTIONS: [Text; 19] = [
+    static MOTIONS: [Text; 22] = [
         text!("G0"), text!("G1"), text!("G2"), text!("G3"), text!("G80"), text!("G38.2"), text!("G81"), text!("G82"),
         text!("G83"), text!("G84"), text!("G85"), text!("G86"), text!("G87"), text!("G88"), text!("G89"), text!("G73"),
-        text!("G38.3"), text!("G38.4"), text!("G38.5"),
+        text!("G38.3"), text!("G38.4"), text!("G38.5"), text!("G33"), text!("G76"), text!("G33.1"),
     ];
 
     /// The coordinate systems, from 1.
@@ -123,13 +124,15 @@ pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
     text(out, text!(" F"));
     super::write::speed(out, machine.value(Value::Feed), machine.value(Value::Units) == 0);
     text(out, text!(" S"));
-    int(out, super::report::rpm(machine));
+    let measures = Capability::Lathe.is_built_in();
+    let speed = if measures { Value::SpindleProgrammed } else { Value::SpindleSpeed };
+    int(out, (machine.value(speed) + 500) / 1_000);
     close(out);
     None
 }
 
-/// Puts `$I`: who the machine is. The letters say that there are a variable spindle, line numbers, mist, single axes to home, and overrides in
-/// probing; then the blocks and the bytes that are free.
+/// Puts `$I`: who the machine is. The letters say that there are a variable spindle, line numbers, mist, single axes to home, a lathe's codes (X1),
+/// and overrides in probing; then the blocks and the bytes that are free.
 #[inline(never)]
 #[small]
 pub fn build(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
@@ -140,7 +143,11 @@ pub fn build(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
         return Some(1);
     }
     if at == 1 {
-        text(out, text!("[OPT:VNMHA,"));
+        text(out, text!("[OPT:VNMH"));
+        if Capability::Lathe.is_built_in() {
+            text(out, text!("X1"));
+        }
+        text(out, text!("A,"));
         int(out, machine.value(Value::BlocksFree));
         out.put(b',');
         int(out, machine.value(Value::BytesFree));

@@ -6,6 +6,7 @@
 use super::settings;
 use super::write::{int, length, speed, text};
 use crate::boards::inputs;
+use crate::capability::Capability;
 use crate::gcode::overrides::Override;
 use crate::machine::{Cycle, Doing};
 use crate::progmem;
@@ -83,6 +84,7 @@ enum Field {
     Overrides,
     Accessories,
     Pins,
+    Sync,
     Done,
 }
 
@@ -151,7 +153,10 @@ impl Report {
                 text(out, text!("|FS:"));
                 speed(out, machine.value(Value::Velocity), self.inches);
                 out.put(b',');
-                let on = machine.value(Value::SpindleOn);
+                // An encoder tells how fast it turns, whatever has been programmed.
+                let measures =
+                    Capability::Lathe.is_built_in() && machine.value(Value::PulsesPerTurn) != 0;
+                let on = i32::from(measures || machine.value(Value::SpindleOn) != 0);
                 int(out, on * rpm(machine));
                 self.field = Field::Offset;
             }
@@ -174,6 +179,13 @@ impl Report {
             }
             Field::Pins => {
                 pins(machine, out);
+                self.field = Field::Sync;
+            }
+            Field::Sync => {
+                if Capability::Lathe.is_built_in() && machine.value(Value::PulsesPerTurn) != 0 {
+                    text(out, text!("|Se:"));
+                    reported_error(machine, out);
+                }
                 out.put(b'>');
                 super::write::line_end(out);
                 self.field = Field::Done;
@@ -203,6 +215,27 @@ impl Report {
         if self.axis >= self.axes {
             (self.axis, self.field) = (0, next);
         }
+    }
+}
+
+/// How far the axes are ahead of the spindle in a pass, at the last index.
+#[inline(never)]
+#[small]
+pub(super) fn sync_error(machine: &mut impl Machine, out: &mut impl Out) {
+    let inches = settings::inches(machine);
+    // From um to what a length is kept in.
+    length(out, machine.value(Value::SyncError) * 10, inches);
+}
+
+/// The same in a pass, if reports are to tell it; else a zero that says so.
+#[inline(never)]
+#[small]
+fn reported_error(machine: &mut impl Machine, out: &mut impl Out) {
+    let error = machine.value(Value::SyncError);
+    if error != 0 && machine.settings().reports_sync_error() {
+        sync_error(machine, out);
+    } else {
+        text(out, text!("0.00"));
     }
 }
 

@@ -8,6 +8,7 @@ use super::report::{LOWERED, Report, SLEEPS};
 use super::status::{BAD_JOG, BUSY, LOCKED, TOO_LONG, UNSUPPORTED, error_number};
 use super::write::{fixed, int, line_end, message, text};
 use super::{lists, settings};
+use crate::capability::Capability;
 use crate::gcode::modal::MotionMode;
 use crate::gcode::tables::{Row, SYSTEMS};
 use crate::machine::alarm::is_program_end;
@@ -243,6 +244,9 @@ impl Request {
             message(out, text!("Pgm End"));
             return Step::Done;
         }
+        if Capability::Lathe.is_built_in() && is_threading(machine.value(Value::MotionMode)) {
+            return begins(machine);
+        }
         let probes = self.at == 0 && is_probing(machine.value(Value::MotionMode));
         if probes && machine.value(Value::Working) != 0 {
             return Step::Later(0);
@@ -267,6 +271,27 @@ fn is_probing(mode: i32) -> bool {
     let first = MotionMode::ProbeTowards as i32;
     let others = MotionMode::ProbeTowardsQuietly as i32..=MotionMode::ProbeAwayQuietly as i32;
     mode == first || others.contains(&mode)
+}
+
+/// Whether a motion mode is a thread.
+fn is_threading(mode: i32) -> bool {
+    (MotionMode::Thread as i32..=MotionMode::RigidTap as i32).contains(&mode)
+}
+
+/// Whether the pass of a thread has begun: until then its line is not answered, so that it can be refused.
+#[inline(never)]
+#[small]
+fn begins(machine: &mut impl Machine) -> Step {
+    let pass = machine.value(Value::Pass);
+    if pass == Status::Ok as i32 {
+        return Step::Done;
+    }
+    let refusal = [Status::NoIndex, Status::NoSync, Status::VelocityExceeded];
+    if let Some(status) = refusal.into_iter().find(|status| *status as i32 == pass) {
+        return Step::Error(error_number(status));
+    }
+    let waits = machine.value(Value::Working) != 0 && machine.value(Value::Check) == 0;
+    if waits { Step::Later(0) } else { Step::Done }
 }
 
 /// Whether settings may be asked for and changed: at rest, in check mode too, and in an alarm.

@@ -5,6 +5,7 @@
 
 use super::report::LOWERED;
 use crate::boards::MOTORS;
+use crate::capability::Capability;
 use crate::config::name::token;
 use crate::config::{Fixed, Number, Owner, Setting};
 use crate::progmem;
@@ -14,18 +15,31 @@ use crate::units::AXES;
 
 progmem! {
     /// The numbers below 100 that there are.
-    static NUMBERS: [u8; 22] =
-        [0, 1, 2, 3, 4, 5, 6, 10, 11, 12, 13, 20, 21, 22, 23, 24, 25, 26, 27, 30, 31, 32];
+    static NUMBERS: [u8; BASE as usize] = {
+        let all = [0, 1, 2, 3, 4, 5, 6, 10, 11, 12, 13, 20, 21, 22, 23, 24, 25, 26, 27, 30, 31, 32, 40, 41];
+        let (mut some, mut row) = ([0; BASE as usize], 0);
+        while row < some.len() {
+            some[row] = all[row];
+            row += 1;
+        }
+        some
+    };
 }
-const BASE: u8 = 22;
+/// How many: those of a lathe are the last two.
+const BASE: u8 = if Capability::Lathe.is_built_in() { 24 } else { 22 };
 
 /// Axes that may home.
 const HOMING: u8 = 4;
 /// `$26`, which is fixed, ms.
 const DEBOUNCE_MS: i32 = 10;
-/// Bits of `grm` that are `$10`, and the one that is `$13`.
+/// Bits of `grm` that are the lower two of `$10`, the one that is `$13`, and the two that are the next of `$10`.
 const REPORT: i32 = 3;
 const INCHES: i32 = 4;
+const SYNC: i32 = 48;
+/// From those to their place in `$10`.
+const SYNC_SHIFT: u8 = 2;
+/// Microseconds of `$41`'s unit.
+const DEBOUNCE_US: i32 = 4;
 /// `$1` that keeps the motors on.
 const ALWAYS: i32 = 255;
 /// Steps per millimetre in thousandths, times what `sa` and `tr` are kept as, for one microstep: 360 degrees, 10^4, 10^6 and 10^3.
@@ -68,6 +82,10 @@ fn of_system(token: [u8; 4]) -> Option<Setting> {
 
 fn of_axis(axis: u8, token: [u8; 4]) -> Option<Setting> {
     named(Owner::Axis(axis), token)
+}
+
+fn of_spindle(token: [u8; 4]) -> Option<Setting> {
+    named(Owner::Spindle, token)
 }
 
 fn of_motor(motor: u8, token: [u8; 4]) -> Option<Setting> {
@@ -149,7 +167,10 @@ pub fn value(number: u8, machine: &mut impl Machine) -> Option<Fixed> {
         3 => Fixed::int(mask(machine, token("po"))),
         4 | 6 | 32 => Fixed::int(0),
         5 => shown(machine, of_system(token("st")), 0),
-        10 => Fixed::int(read(machine, of_system(token("grm"))) & REPORT),
+        10 => {
+            let mask = read(machine, of_system(token("grm")));
+            Fixed::int(mask & REPORT | (mask & SYNC) >> SYNC_SHIFT)
+        }
         11 => shown(machine, of_axis(0, token("jd")), 3),
         12 => shown(machine, of_system(token("ct")), 3),
         13 => Fixed::int(inches(machine).into()),
@@ -163,6 +184,10 @@ pub fn value(number: u8, machine: &mut impl Machine) -> Option<Fixed> {
         27 => shown(machine, of_axis(0, token("zb")), 3),
         30 => shown(machine, named(Owner::Pwm, token("csh")), 0),
         31 => shown(machine, named(Owner::Pwm, token("csl")), 0),
+        40 if Capability::Lathe.is_built_in() => shown(machine, of_spindle(token("n")), 0),
+        41 if Capability::Lathe.is_built_in() => {
+            Fixed::int(read(machine, of_spindle(token("b"))) / DEBOUNCE_US)
+        }
         _ => return None,
     })
 }
@@ -223,7 +248,11 @@ pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), St
         3 => set_mask(machine, token("po"), whole()?),
         5 => put(machine, of_system(token("st")), to),
         // The whole of a byte is accepted: what it asks for beside is not known here.
-        10 => set_report(whole()? & REPORT, !REPORT, machine),
+        10 => {
+            let bits = whole()?;
+            let bits = bits & REPORT | bits << SYNC_SHIFT & SYNC;
+            set_report(bits, !(REPORT | SYNC), machine)
+        }
         11 => each_axis(machine, AXES as u8, token("jd"), to),
         12 => put(machine, of_system(token("ct")), to),
         13 => set_report(i32::from(whole()? != 0) * INCHES, !INCHES, machine),
@@ -236,6 +265,11 @@ pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), St
         27 => each_axis(machine, HOMING, token("zb"), to),
         30 => put(machine, named(Owner::Pwm, token("csh")), to),
         31 => put(machine, named(Owner::Pwm, token("csl")), to),
+        40 if Capability::Lathe.is_built_in() => put(machine, of_spindle(token("n")), to),
+        41 if Capability::Lathe.is_built_in() => {
+            let counts = whole()?.min(i32::MAX / DEBOUNCE_US);
+            put_value(machine, of_spindle(token("b")), counts * DEBOUNCE_US)
+        }
         // What is fixed may be said again.
         _ => match value(number, machine) {
             Some(fixed) if fixed.decimals == 0 && fixed.value == whole()? => Ok(()),

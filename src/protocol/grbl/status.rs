@@ -80,6 +80,9 @@ rows! {
     NoIndex = 18;
     NoSync = 19;
     SpindleLost = 9;
+    NoEncoderInput = 40;
+    SpindleError = 9;
+    NotReversed = 9;
     UnrecognizedName = 3;
     MalformedCommand = 1;
     BadNumber = 2;

@@ -3,10 +3,11 @@
 //! What TinyG's senders are told unasked, of the queue and how the machine stands, grbl's ask for.
 
 use super::lists;
-use super::report::SLEEPS;
+use super::report::{SLEEPS, sync_error};
 use super::status::{PROBE_CLOSED, alarm_number, error_number};
-use super::write::{int, line_end, message, text};
+use super::write::{close, int, line_end, message, text};
 use crate::boards::inputs;
+use crate::capability::Capability;
 use crate::gcode::modal::MotionMode;
 use crate::machine::Doing;
 use crate::plain;
@@ -26,6 +27,8 @@ pub enum Telling {
     Probing(u8),
     /// What has become of a line that is carried out after a start.
     Startup(u8, Status),
+    /// `[Se:]`.
+    SyncError,
 }
 
 #[small]
@@ -41,6 +44,7 @@ impl Telling {
             Notice::Exception(status) => Self::Exception(status),
             Notice::Startup(line, status) => Self::Startup(line, status),
             Notice::Probing => Self::Probing(lists::PROBING),
+            Notice::SyncError if Capability::Lathe.is_built_in() => Self::SyncError,
             _ => Self::Nothing,
         }
     }
@@ -77,6 +81,14 @@ impl Tells for Telling {
                 }
                 None => false,
             },
+            Self::SyncError => {
+                if Capability::Lathe.is_built_in() {
+                    text(out, text!("[Se:"));
+                    sync_error(machine, out);
+                    close(out);
+                }
+                false
+            }
         }
     }
 
@@ -125,6 +137,20 @@ fn exception(status: Status, machine: &mut impl Machine, out: &mut impl Out) {
         Status::ProgramStopped => message(out, text!("Program stopped [~ to resume]")),
         Status::NoToolLength => message(out, text!("Tool has no length - 0 in force")),
         Status::StepsLate => message(out, text!("Steps came late")),
+        lost if Capability::Lathe.is_built_in() => spindle(lost, out),
+        _ => {}
+    }
+}
+
+/// What has become of a thread.
+#[inline(never)]
+#[small]
+fn spindle(status: Status, out: &mut impl Out) {
+    match status {
+        Status::SpindleLost => message(out, text!("Spindle lost in a thread")),
+        Status::SpindleError => message(out, text!("Thread too far off")),
+        Status::NotReversed => message(out, text!("Spindle did not turn round")),
+        Status::SpindleMustTurn => message(out, text!("Spindle stands still")),
         _ => {}
     }
 }

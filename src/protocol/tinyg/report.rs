@@ -7,7 +7,7 @@
 use super::Format;
 use super::Mode;
 use super::token::{DEFAULT_TOKENS, Shown, Token};
-use super::value::Source;
+use super::value::{SYNC_ERROR, Source};
 use super::write::Writer;
 use crate::config::Fixed;
 use crate::progmem::Text;
@@ -216,6 +216,20 @@ pub fn queue_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) 
         writer.count(text!("qo"), machine.value(Value::QueueRemoved));
     }
     writer.end_object();
+}
+
+/// Sends how far the axes are ahead of the spindle: a status report of that alone.
+#[small]
+#[inline(never)]
+pub fn sync_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) {
+    let mut format = mode.format(machine);
+    let mut writer = Writer::body(out, &mut format);
+    let token = Token::single(SYNC_ERROR);
+    let shown = token.read(machine);
+    writer.head(text!("sr"));
+    writer.key(token.name().bytes());
+    writer.shown(shown);
+    writer.tail();
 }
 
 /// Sends what is free for lines, after a queue flush, whatever the verbosity.

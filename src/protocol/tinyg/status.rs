@@ -59,6 +59,9 @@ rows! {
     NoIndex = 42, "No index pulse of the spindle";
     NoSync = 43, "No sync pulse of the spindle";
     SpindleLost = 44, "Spindle lost in a thread";
+    NoEncoderInput = 45, "The board has no input for a spindle encoder";
+    SpindleError = 46, "Thread further off than spl";
+    NotReversed = 47, "Spindle did not turn round";
     UnrecognizedName = 100, "Unrecognized command or config name";
     MalformedCommand = 101, "Invalid or malformed command";
     BadNumber = 102, "Bad number format";

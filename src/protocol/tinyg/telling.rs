@@ -3,7 +3,8 @@
 use super::Mode;
 use super::notice::{Banner, Exception, Probing, acknowledge, jog_ended};
 use super::prompt::put_ready_prompt;
-use super::report::{Report, queue_report, receive_report};
+use super::report::{Report, queue_report, receive_report, sync_report};
+use crate::capability::Capability;
 use crate::protocol::{Machine, Notice, Occasion, Out, Tells, Value};
 
 /// How far it has been told, and how.
@@ -23,6 +24,7 @@ enum Part {
         jogged: bool,
         flushed: bool,
     },
+    SyncError,
     /// How many blocks are free, as it was told.
     Queue(usize),
 }
@@ -44,6 +46,8 @@ impl Telling {
             Notice::Startup(..) => Part::Status(None),
             Notice::Status => Part::Status(Report::begin(mode, machine)),
             Notice::End { jogged, flushed } => Part::End { jogged, flushed },
+            Notice::SyncError if Capability::Lathe.is_built_in() => Part::SyncError,
+            Notice::SyncError => Part::Status(None),
             Notice::Queue => Part::Queue(0),
         };
         Self { part, mode }
@@ -79,6 +83,12 @@ impl Tells for Telling {
                     receive_report(mode, machine, out);
                     false
                 }
+            }
+            Part::SyncError => {
+                if Capability::Lathe.is_built_in() {
+                    sync_report(mode, machine, out);
+                }
+                false
             }
             Part::Queue(free) => {
                 *free = machine.value(Value::QueueFree) as usize;

@@ -76,7 +76,7 @@ impl Token {
     }
 
     /// The token of a value in the table of [`SINGLES`].
-    const fn single(index: u8) -> Token {
+    pub const fn single(index: u8) -> Token {
         Token(FIRST_SINGLE + index as u16)
     }
 

@@ -84,6 +84,8 @@ pub enum Form {
     Millimetres,
     /// A length in millimetres whatever the units, or an angle, shown with two decimals.
     Rough,
+    /// Thousandths of a millimetre, shown in the units in force.
+    Micrometres,
     /// Steps, with two decimals.
     Steps,
     /// Turns a minute, with two decimals unless it is a whole number.
@@ -105,10 +107,11 @@ impl Form {
             Form::Turns => (3, 2),
             Form::Rough => (4, 2),
             Form::Speed => (3, 2),
+            Form::Micrometres => (3, 3),
             Form::Length | Form::Millimetres => (4, 3),
         };
         let value = Fixed { value, decimals: stored };
-        if inches && matches!(self, Form::Speed | Form::Length) {
+        if inches && matches!(self, Form::Speed | Form::Length | Form::Micrometres) {
             value.inches(shown)
         } else {
             value.rounded(shown)
@@ -163,13 +166,15 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 45;
+pub const SINGLE_COUNT: usize = 46;
 /// Entries of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
 /// The number of the vector `g92`.
 pub const SHIFT: u8 = 5;
 /// The number of the vector `prb`, whose group begins with `prbe`.
 pub const PROBED: u8 = 15;
+/// The number of `spf`.
+pub const SYNC_ERROR: u8 = 28;
 /// The number of `prbe`.
 pub const PROBE_STATE: u8 = SINGLE_COUNT as u8 - 1;
 
@@ -187,7 +192,7 @@ const COORDINATES: Text = text!(
 const MOTION: Text = text!(
     "G0  - linear traverse|G1  - linear feed|G2  - clockwise arc feed|\
      G3  - counter clockwise arc feed|G80 - cancel motion mode (none active)|\
-     G38.2 - probe|G81|G82|G83|G84|G85|G86|G87|G88|G89|G73|G38.3|G38.4|G38.5|G33|G76"
+     G38.2 - probe|G81|G82|G83|G84|G85|G86|G87|G88|G89|G73|G38.3|G38.4|G38.5|G33|G76|G33.1"
 );
 const FEED: Text = text!(
     "G93 - inverse time mode|G94 - units-per-minute mode (i.e. feedrate mode)|\
@@ -265,6 +270,7 @@ progmem! {
         count("spd", of(Value::SpindleDirection), text!("Spindle direction:"), text!("CW|CCW")),
         turns("sps", of(Value::SpindleSpeed), text!("Spindle speed:")),
         count("spx", of(Value::PulseMisfits), text!("Encoder misfits:"), NONE),
+        single("spf", of(Value::SyncError), Form::Micrometres),
         count("com", of(Value::Mist), text!("Mist coolant:"), ON),
         count("cof", of(Value::Flood), text!("Flood coolant:"), ON),
         factor("mfo", Override::Feed, text!("Feed override:")),

@@ -7,6 +7,8 @@ use crate::gcode::arc::{Extent, Walk};
 use crate::gcode::command::{Feed, Motion};
 use crate::gcode::interpreter::Offsets;
 use crate::motion::curve::Curve;
+#[cfg(feature = "lathe")]
+use crate::units::FIRST_ROTARY;
 use crate::units::{Length, PerAxis};
 
 /// What lasts longer than a turn: one at a time, and one place in memory.
@@ -15,6 +17,9 @@ pub(super) enum Ongoing {
     None,
     /// An arc.
     Arc(ArcWalk),
+    /// A pass in step with the spindle, from here.
+    #[cfg(feature = "lathe")]
+    Pass([Length; FIRST_ROTARY]),
     /// Lines are checked: these are the offsets of before.
     Check(Offsets),
 }

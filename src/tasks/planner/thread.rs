@@ -14,18 +14,27 @@ use embassy_futures::yield_now;
 use kerf_macros::small;
 
 use super::Planner;
+use super::parts::Ongoing;
+use super::seek::drop_blocks;
+use crate::boards::MOTORS;
+use crate::config::groups::spindle;
+use crate::config::{Owner, Setting};
 use crate::encoder::COUNTS_PER_S;
-use crate::gcode::command::Feed;
+use crate::gcode::command::{Feed, Motion};
+use crate::gcode::setup::Setup;
 use crate::hal::event::{Event, wait};
 use crate::hal::time::millis;
 use crate::machine::Alarm;
 use crate::math::sqrt;
-use crate::motion::block::{Action, Block};
+use crate::motion::block::{Action, Block, Pass};
 use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};
 use crate::motion::float::{greater, some};
 use crate::motion::queue;
+use crate::motion::retract::Retract;
+use crate::motion::short::Short;
 use crate::status::Status;
 use crate::tasks::links::Changes;
+use crate::tasks::setup::moved_by;
 use crate::tasks::{alarm, common};
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
@@ -42,64 +51,260 @@ const ANY_FEED: f32 = 1e6;
 const ANY_CORNER: f32 = 1e7;
 
 /// A line of a pass.
-struct Piece {
-    target: PerAxis<Length>,
+pub(super) struct Piece {
+    pub target: PerAxis<Length>,
     /// The ways of the axes and along the path, mm.
     ways: [f32; FIRST_ROTARY],
-    length: f32,
+    pub length: f32,
     /// mm a turn along the path.
-    lead: f32,
+    pub lead: f32,
+}
+
+/// The way back to the start of a pass that has been left has so many parts; that of G33.1 those from there to here.
+const BACK_IN: u8 = 3;
+const BACK_OUT: u8 = 5;
+
+/// What has become of the lines of a pass.
+#[derive(Clone, Copy, PartialEq)]
+enum End {
+    /// They are done, or what is queued is dropped.
+    Done,
+    /// A feedhold has left the cut.
+    Left,
+    /// G33.1: the spindle has turned round.
+    Turned,
+}
+
+/// X among the axes.
+const X: u8 = 0;
+
+/// The acceleration limit of an axis without its jerk limit: at most that of a ramp to `speed` under it, in the mean.
+#[small]
+fn mean_accel(accel: f32, jerk: f32, speed: f32) -> f32 {
+    if jerk > 0.0 && some(speed) {
+        let mean = 0.5 * sqrt(jerk * speed);
+        return if accel > 0.0 && accel < mean { accel } else { mean };
+    }
+    accel
 }
 
 impl Planner {
-    /// Waits until the encoder says how fast the spindle turns, and then, if it `cuts`, makes the pass of the line; or says why not.
+    /// Waits until the encoder says how fast the spindle turns, and then, if it `cuts`, makes the pass of the line; or says why not. A pass that a
+    /// feedhold has left is made once more, from its beginning, when the hold is over.
     pub(super) async fn thread(&mut self, cuts: bool) {
-        if !self.standstill().await {
-            return;
-        }
-        let turn = match self.spindle_turns().await {
-            Ok(Some(turn)) => turn,
-            Ok(None) => return,
-            Err(status) => return self.refuse(status),
-        };
-        if !cuts {
-            return;
-        }
-        match self.begin_pass(turn) {
-            Ok(true) => {}
-            Ok(false) => return,
-            Err(status) => return self.refuse(status),
-        }
-        let mut line = 0;
-        self.room().await;
-        while self.queue_line(line) {
-            while self.has_begun() && !self.is_flushed() {
-                self.room().await;
-                yield_now().await;
-                if !self.is_flushed() {
-                    let _: super::Turn = self.turn();
+        loop {
+            self.walk = Ongoing::None;
+            if !self.standstill().await {
+                return;
+            }
+            let turn = match self.spindle_turns().await {
+                Ok(Some(turn)) => turn,
+                Ok(None) => return,
+                Err(status) => return self.refuse(status),
+            };
+            if !cuts {
+                return;
+            }
+            match self.begin_pass(turn) {
+                Ok(true) => {}
+                Ok(false) => return,
+                Err(status) => return self.refuse(status),
+            }
+            let mut back = false;
+            let end = loop {
+                let mut line = 0;
+                self.pass_room().await;
+                while self.queue_line(line, turn, back) {
+                    self.finish_parts().await;
+                    line += 1;
+                    self.pass_room().await;
+                    if self.queue_lead(line) {
+                        self.pass_room().await;
+                    }
                 }
-            }
-            line += 1;
-            self.room().await;
-            if self.queue_lead(line) {
+                self.queue_end();
+                wait(self.links.thread, Event::BlockDone, || {
+                    (queue::used() == 0 || self.is_cut_short()).then_some(())
+                })
+                .await;
+                let end = self.end();
+                if matches!(end, End::Left | End::Turned) {
+                    drop_blocks(self.links.thread).await;
+                    self.relocate_within();
+                }
+                if end != End::Turned || back {
+                    break end;
+                }
+                back = true;
+                self.set_pass(Status::Ok);
+                self.queue_return();
+            };
+            let parts = match end {
+                End::Done => break,
+                End::Left => 0..BACK_IN,
+                End::Turned => BACK_IN..BACK_OUT,
+            };
+            for part in parts {
                 self.room().await;
+                self.go_back(part);
+                self.finish_parts().await;
             }
-        }
-        self.room().await;
-        if !self.is_flushed() {
-            self.pause(Action::Thread(0.0));
-        }
-        let lost = wait(self.links.thread, Event::BlockDone, || {
-            let lost = common::with(self.links.thread, |common| common.encoder.lost);
-            (lost || queue::used() == 0 || self.is_flushed()).then_some(lost)
-        })
-        .await;
-        if lost && !self.is_flushed() {
-            alarm::raise_for(self.links, Alarm::Alarm, Status::SpindleLost);
+            if end == End::Turned {
+                break;
+            }
         }
         // G76 goes on with its usual limits.
+        self.walk = Ongoing::None;
         self.take_up_changes();
+    }
+
+    /// What has become of the lines that were queued. An alarm is begun here.
+    #[inline(never)]
+    #[small]
+    fn end(&mut self) -> End {
+        let pass = self.pass();
+        let returns = self.returns();
+        if !(returns && pass == Status::Noop) {
+            self.set_pass(Status::Again);
+        }
+        match pass {
+            _ if self.is_flushed() => return End::Done,
+            Status::Noop => return End::Turned,
+            Status::Terminated => return End::Left,
+            Status::Ok if !returns => return End::Done,
+            Status::Ok => alarm::raise_for(self.links, Alarm::Alarm, Status::NotReversed),
+            why => alarm::raise_for(self.links, Alarm::Alarm, why),
+        }
+        End::Done
+    }
+
+    /// Queues the end of a pass. There is room.
+    #[small]
+    fn queue_end(&mut self) {
+        if !self.returns() && !self.is_cut_short() {
+            self.pause(Action::EndThread);
+        }
+    }
+
+    /// Queues the rest of a long line.
+    pub(super) async fn finish_parts(&mut self) {
+        while self.has_begun() && !self.is_flushed() {
+            self.pass_room().await;
+            yield_now().await;
+            if !self.is_flushed() {
+                let _: super::Turn = self.turn();
+            }
+        }
+    }
+
+    /// How the pass stands.
+    #[small]
+    pub(super) fn pass(&self) -> Status {
+        common::with(self.links.thread, |common| common.encoder.pass)
+    }
+
+    /// Whether nothing more of the pass is to be queued.
+    #[small]
+    pub(super) fn is_cut_short(&self) -> bool {
+        self.is_flushed() || !matches!(self.pass(), Status::Ok | Status::Again)
+    }
+
+    fn pass_room(&mut self) -> impl Future<Output = ()> {
+        wait(self.links.thread, Event::BlockDone, || {
+            (self.queue.free() > 0 || self.is_cut_short()).then_some(())
+        })
+    }
+
+    /// Exec has dropped its blocks within a pass, of which the line and its start are what they were.
+    #[inline(never)]
+    #[small]
+    pub(super) fn relocate_within(&mut self) {
+        let end = *self.links.model.borrow().position();
+        let motion = common::snapshot(self.links.thread);
+        let start = core::mem::replace(&mut self.walk, Ongoing::None);
+        self.relocate(&motion);
+        self.walk = start;
+        self.links.model.borrow_mut().set_position(&end);
+    }
+
+    /// Queues a part of the way back to the start of a pass: X out of the cut, along it, and X back; or, of G33.1, the end of it and all at once.
+    #[inline(never)]
+    #[small]
+    fn go_back(&mut self, part: u8) {
+        let Ongoing::Pass([x, y, z]) = self.walk else { return };
+        if self.is_flushed() {
+            return;
+        }
+        let mut target = self.position;
+        let out = self.retract_length();
+        let beside = Length(x.0.saturating_add(out.0));
+        let [to_x, to_y, to_z, ..] = &mut target;
+        match part {
+            BACK_IN => {
+                self.set_pass(Status::Again);
+                self.pause(Action::EndThread);
+                self.take_up_changes();
+                return;
+            }
+            part if part > BACK_IN => (*to_x, *to_y, *to_z) = (x, y, z),
+            0 => {
+                self.take_up_changes();
+                *to_x = if out.0 < 0 { beside.min(*to_x) } else { beside.max(*to_x) };
+            }
+            1 => (*to_y, *to_z) = (y, z),
+            _ => *to_x = x,
+        }
+        self.straight(&target, None);
+    }
+
+    /// How far X leaves the cut before the end of a pass, by the setting.
+    #[small]
+    fn retract_length(&self) -> Length {
+        let length =
+            |row| Setting::of(Owner::Spindle, row).map_or(0, |row| self.links.storage.cold(row));
+        let length = length(spindle::R);
+        match &self.links.commands.borrow().motion {
+            // To the drive line.
+            Motion::ThreadCycle(cycle) if cycle.peak.0 < 0 => Length(length.abs()),
+            Motion::ThreadCycle(_) => Length(-length.abs()),
+            _ => Length(length),
+        }
+    }
+
+    /// How X leaves the cut, with the limits of the axis as they are now.
+    #[inline(never)]
+    #[small]
+    fn retract(&self) -> Retract {
+        let length = self.retract_length();
+        let settings = self.links.settings.borrow();
+        let [x, ..] = self.position;
+        let mut end = x.0.saturating_add(length.0);
+        if let Some((low, high)) = Setup::travel(&*settings, X) {
+            end = end.max(low.0).min(high.0);
+        }
+        // Beyond its travel X does not leave the cut through the work.
+        if (end < x.0) != (length.0 < 0) {
+            return Retract::NONE;
+        }
+        let mut retract = Retract::NONE;
+        for motor in (0..MOTORS).filter(|motor| moved_by(&settings, *motor) == X) {
+            let ratio = settings.step_ratio(motor);
+            let way = ratio.steps(Length(end)).wrapping_sub(ratio.steps(x));
+            let Ok(way) = i16::try_from(way) else { return Retract::NONE };
+            // Motors of an axis go alike, or the axis stays.
+            if way == 0 || retract.is_some() && retract.way != way {
+                return Retract::NONE;
+            }
+            (retract.way, retract.motors) = (way, retract.motors | 1 << motor);
+        }
+        let per_mm = f32::from(retract.way.unsigned_abs()) / (end.abs_diff(x.0) as f32 * 1e-4);
+        let velocity = Machine::velocity_max(&*settings, 0) * (1.0 / 60.0);
+        let jerk = Machine::jerk_max(&*settings, 0) * PER_SECOND_CUBED;
+        let accel =
+            mean_accel(Machine::accel_max(&*settings, 0) * PER_SECOND_SQUARED, jerk, velocity);
+        retract.accel = Short::new(accel * per_mm);
+        retract.velocity = Short::new(velocity * per_mm);
+        retract
     }
 
     /// Waits until the encoder tells how long a turn takes, in counts. `None` if what is queued is to be dropped.
@@ -154,28 +359,38 @@ impl Planner {
         }
         for (n, (axis, speed)) in self.dynamics.axes.iter_mut().zip(speeds).enumerate() {
             let jerk = Machine::jerk_max(&*settings, n) * PER_SECOND_CUBED;
-            let mut accel = Machine::accel_max(&*settings, n) * PER_SECOND_SQUARED;
-            if jerk > 0.0 && some(speed) {
-                let mean = 0.5 * sqrt(jerk * speed);
-                accel = if accel > 0.0 && accel < mean { accel } else { mean };
-            }
+            let accel = Machine::accel_max(&*settings, n) * PER_SECOND_SQUARED;
+            let accel = mean_accel(accel, jerk, speed);
             axis.limit_change(accel, 0.0);
         }
         // The corner of a taper is no limit: a slower axis would not be in step.
         self.dynamics.junction = ANY_CORNER;
         // They are the settings' again for the next line.
         links.changes.note(Changes::SETTINGS);
-        common::with(links.thread, |common| common.encoder.lost = false);
+        self.set_pass(Status::Ok);
+        let [x, y, z, ..] = self.position;
+        self.walk = Ongoing::Pass([x, y, z]);
         if let Some(piece) = self.piece(0, &self.position) {
-            self.push(Block::action(Action::Thread(piece.lead), self.line));
+            let turn_at = if self.returns() { Self::overrun(turn, piece.lead) } else { 0.0 };
+            let (limit, retract) = (self.error_limit(), self.retract());
+            let pass = Pass { lead: piece.lead, limit, retract, turn_at };
+            self.push(Block::action(Action::Thread(pass), self.line));
         }
         Ok(true)
+    }
+
+    /// How far the axes may be off, mm.
+    #[small]
+    fn error_limit(&self) -> Short {
+        let limit = Setting::of(Owner::Spindle, spindle::L);
+        let limit = limit.map_or(0, |limit| self.links.storage.cold(limit));
+        Short::new(limit as f32 * 1e-3)
     }
 
     /// A line of the pass, counted from 0, from a place; `None` if there is none, or it goes nowhere.
     #[inline(never)]
     #[small]
-    fn piece(&self, line: u8, from: &PerAxis<Length>) -> Option<Piece> {
+    pub(super) fn piece(&self, line: u8, from: &PerAxis<Length>) -> Option<Piece> {
         let commands = self.links.commands.borrow();
         let (target, lead) = self.steps.pass(&commands.motion, from, line)?;
         let mut ways = [0.0; FIRST_ROTARY];
@@ -197,9 +412,12 @@ impl Planner {
     /// Queues a line of the pass, or begins with its parts. False if there is none.
     #[inline(never)]
     #[small]
-    fn queue_line(&mut self, line: u8) -> bool {
-        if self.is_flushed() {
+    fn queue_line(&mut self, line: u8, turn: u32, back: bool) -> bool {
+        if self.is_cut_short() {
             return false;
+        }
+        if self.returns() {
+            return line == 0 && self.queue_leg(turn, back);
         }
         let Some(Piece { target, .. }) = self.piece(line, &self.position) else { return false };
         self.straight(&target, Some(Feed::PerMinute(ANY_FEED)));
@@ -210,7 +428,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn queue_lead(&mut self, line: u8) -> bool {
-        if self.is_flushed() {
+        if self.is_cut_short() {
             return false;
         }
         let Some(Piece { lead, .. }) = self.piece(line, &self.position) else { return false };
@@ -219,12 +437,19 @@ impl Planner {
         true
     }
 
+    /// How the pass stands.
+    #[small]
+    pub(super) fn set_pass(&self, status: Status) {
+        common::with(self.links.thread, |common| common.encoder.pass = status);
+    }
+
     /// Nothing has moved, and nothing will.
     #[inline(never)]
     #[small]
     fn refuse(&mut self, status: Status) {
         // The line says that the machine is at its end.
         self.links.model.borrow_mut().set_position(&self.position);
+        self.set_pass(status);
         alarm::raise_for(self.links, Alarm::Alarm, status);
     }
 }

@@ -371,7 +371,19 @@ fn feeds_a_turn_go_by_the_measured_speed() {
     let feed = went(&mut machine, &mut host, 3_000) / 6.0;
     assert!((feed / 0.2 - 1.0).abs() < 0.01, "{feed}");
     machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
-    host.run_for_ms(&mut machine, 1_200).unwrap();
+    let (stopped, mut last) = (machine.cycle(), (0, 0));
+    while machine.cycle() < stopped + machine.cycles(1_200) {
+        run_for_quarter(&mut machine);
+        let z = machine.recorder().motors()[Z].position;
+        if z != last.0 {
+            last = (z, machine.cycle());
+        }
+    }
+    // Two pulses are 250 ms.
+    let took = machine.seconds(last.1 - stopped) * 1e3;
+    println!("G95: at rest {took:.0} ms after a dead stop, two pulses are 250");
+    assert!(took < 250.0 * 1.03 + 40.0, "{took} ms");
+    host.run_for_ms(&mut machine, 10).unwrap();
     assert_eq!(went(&mut machine, &mut host, 1_000), 0.0);
     // A traverse does not wait, and feeds a minute do not.
     machine.tamper(|mechanics, now| mechanics.force_spindle(300.0, now));
@@ -440,6 +452,262 @@ fn a_spindle_that_stops_dead_stops_the_axis() {
         let position = asked(&mut machine, &mut host, "mpoz");
         assert!((position - last as f64 / STEPS).abs() < 0.0011, "{position} {last}");
     }
+}
+
+/// Runs for a quarter of a millisecond.
+fn run_for_quarter(machine: &mut Machine) {
+    machine.run_until(machine.cycle() + machine.cycles(1) / 4).unwrap();
+}
+
+/// A lathe whose X leaves the cut by 2 mm: 200 steps/mm and 500 mm/s2 there, too.
+fn retracting(marks: u32, rpm: f64) -> (Machine, Host) {
+    let (mut machine, mut host) = lathe(marks, rpm, |_| {});
+    for line in [
+        "{1tr:4}",
+        "{1sa:1.8}",
+        "{1mi:4}",
+        "{xfr:1500}",
+        "{xvm:1500}",
+        "{xac:500}",
+        "{xjm:200000}",
+        "{spr:2}",
+    ] {
+        set(&mut machine, &mut host, line);
+    }
+    (machine, host)
+}
+
+#[test]
+fn with_a_retract_a_spindle_that_stops_dead_has_x_leave_at_once() {
+    const DEPTHS: [f64; 3] = [0.1, 0.3, 0.6];
+    for (marks, rpm) in [(1, 300.0), (4, 300.0), (4, 1_000.0), (100, 600.0), (100, 1_000.0)] {
+        let (mut machine, mut host) = retracting(marks, rpm);
+        begin(&mut machine, &mut host, "g91 g33 z-20 k1", 4.0);
+        machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
+        let stopped = machine.cycle();
+        let (mut out, mut rest, mut last) = ([None; DEPTHS.len()], stopped, 0);
+        while machine.cycle() < stopped + machine.cycles(1_500) {
+            run_for_quarter(&mut machine);
+            let [x, _, z, _] = machine.recorder().motors().each_ref().map(|motor| motor.position);
+            for (out, depth) in out.iter_mut().zip(DEPTHS) {
+                if out.is_none() && x as f64 / STEPS >= depth - 1e-9 {
+                    *out = Some(machine.cycle());
+                }
+            }
+            if z != last {
+                (last, rest) = (z, machine.cycle());
+            }
+        }
+        host.run_for_ms(&mut machine, 10).unwrap();
+        let ms = |at: u64| machine.seconds(at - stopped) * 1e3;
+        let two_pulses = 2.0 * 60_000.0 / rpm / f64::from(marks);
+        let out = out.map(|at| ms(at.expect("it is out")));
+        println!(
+            "N {marks}, {rpm} rpm, two pulses are {two_pulses:.0} ms: out by 0.1, 0.3, 0.6 mm after {:.0}, {:.0}, {:.0} ms; Z at rest after {:.0}",
+            out[0],
+            out[1],
+            out[2],
+            ms(rest)
+        );
+        for (out, depth) in out.iter().zip(DEPTHS) {
+            // What is queued, a stretch, and the ramp of X.
+            let most = 1.02 * two_pulses + 12.0 + (2.0 * depth / 500.0).sqrt() * 1e3;
+            assert!(*out <= most, "{marks}, {rpm}, {depth}: {out} ms of {most}");
+        }
+        let told = host.take_reports().iter().any(|report| report["er"]["st"] == LOST);
+        assert!(told, "{marks}: nothing is told");
+        // The position is known to the step.
+        assert_eq!(machine.recorder().motors()[0].position, (2.0 * STEPS) as i64);
+        assert_eq!(asked(&mut machine, &mut host, "mpox"), 2.0);
+        let position = asked(&mut machine, &mut host, "mpoz");
+        assert!((position - last as f64 / STEPS).abs() < 0.0011, "{position} {last}");
+        set(&mut machine, &mut host, "{clear:n}");
+        set(&mut machine, &mut host, "g90 g0 x0 z0");
+        wait_for_rest(&mut machine, &mut host, 20_000);
+        let motors = machine.recorder().motors();
+        assert_eq!([motors[0].position, motors[Z].position], [0, 0]);
+    }
+}
+
+#[test]
+fn with_a_retract_a_hold_leaves_the_cut_and_the_pass_is_made_once_more() {
+    for (marks, rpm) in [(4, 300.0), (4, 1_000.0), (100, 600.0)] {
+        let (mut machine, mut host) = retracting(marks, rpm);
+        let since = begin(&mut machine, &mut host, "g91 g33 z-16 k1", 6.0);
+        machine.send_now(b'!');
+        let held = machine.cycle();
+        let mut out = None;
+        while machine.cycle() < held + machine.cycles(600) {
+            run_for_quarter(&mut machine);
+            if out.is_none() && machine.recorder().motors()[0].position >= (0.1 * STEPS) as i64 {
+                out = Some(machine.cycle());
+            }
+        }
+        host.run_for_ms(&mut machine, 10).unwrap();
+        let out = machine.seconds(out.expect("it is out") - held) * 1e3;
+        println!("N {marks}, {rpm} rpm: out by 0.1 mm {out:.0} ms after the hold");
+        assert!(out < 34.0, "{out} ms");
+        assert_eq!(host.stat(), Some(6), "it holds");
+        assert_eq!(machine.recorder().motors()[0].position, (2.0 * STEPS) as i64);
+        let first = phases(&machine, since, 1.0, 1.5, 5.5);
+        let since = machine.mechanics().unwrap().indexed().len();
+        machine.send_now(b'~');
+        host.run_for_ms(&mut machine, 500).unwrap();
+        wait_for_rest(&mut machine, &mut host, 20_000);
+        let motors = machine.recorder().motors();
+        assert_eq!([motors[0].position, motors[Z].position], [0, (-16.0 * STEPS) as i64]);
+        // Where X is back at its place it cuts.
+        let indexed = &machine.mechanics().unwrap().indexed()[since..];
+        let cuts = indexed.iter().filter(|(_, steps)| steps[0] == 0);
+        let ways = cuts.map(|(_, steps)| -steps[Z] as f64 / STEPS);
+        let second = ways.filter(|way| (1.5..=14.5).contains(way)).map(|way| way - way.round());
+        let all: Vec<f64> = first.iter().copied().chain(second).collect();
+        println!(
+            "N {marks}, {rpm} rpm: {} turns of both passes, spread {:.4}",
+            all.len(),
+            spread(&all)
+        );
+        assert!(all.len() >= 14 && spread(&all) < STEP, "{all:.3?}");
+    }
+}
+
+#[test]
+fn an_error_above_its_limit_ends_the_pass() {
+    // Told by the exception of its own.
+    const ASTRAY: u64 = 46;
+    let (mut machine, mut host) = retracting(4, 600.0);
+    set(&mut machine, &mut host, "{spl:0.1}");
+    // Steady, and with a load that swings, nothing is amiss.
+    let swing = 12.0 * 3.0 * std::f64::consts::TAU;
+    machine.tamper(|mechanics, now| mechanics.load_spindle(0.0, swing, 3.0, now));
+    pass(&mut machine, &mut host, 12.0, 2.0);
+    machine.tamper(|mechanics, now| mechanics.load_spindle(0.0, 0.0, 1.0, now));
+    assert!(host.take_reports().iter().all(|report| report["er"]["st"].is_null()));
+    // Faster than the axis: 1,500 mm/min are 750 turns.
+    begin(&mut machine, &mut host, "g33 z-20 k2", 4.0);
+    machine.tamper(|mechanics, now| mechanics.drive_spindle_to(1_000.0, now));
+    host.run_for_ms(&mut machine, 800).unwrap();
+    let told = host.take_reports().iter().any(|report| report["er"]["st"] == ASTRAY);
+    assert!(told, "nothing is told");
+    assert_eq!(machine.recorder().motors()[0].position, (2.0 * STEPS) as i64);
+}
+
+/// A lathe whose outputs drive the spindle, one way or the other; it gains or loses at most so many turns a minute in a second.
+fn driven(marks: u32, rpm: f64, torque: f64) -> (Machine, Host) {
+    let mut machine = firmware(&MEGA2560_LATHE);
+    let mut build = Build::lathe(&MEGA2560_LATHE, marks).unwrap();
+    (build.spindle.rpm, build.spindle.pwm) = (rpm, None);
+    build.spindle.torque = torque;
+    machine.build(&build);
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut machine, 1_000).unwrap();
+    set(&mut machine, &mut host, &format!("{{spn:{marks}}}"));
+    for line in
+        ["{3tr:4}", "{3sa:1.8}", "{3mi:4}", "{zfr:1500}", "{zvm:1500}", "{zac:500}", "{zjm:200000}"]
+    {
+        set(&mut machine, &mut host, line);
+    }
+    (machine, host)
+}
+
+#[test]
+fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
+    // At most so far off: near the turn there are no pulses to go by.
+    for (marks, rpm, torque, most) in [
+        (4, 300.0, 600.0, 0.25),
+        (20, 300.0, 600.0, 0.06),
+        (100, 300.0, 600.0, 0.06),
+        (100, 600.0, 900.0, 0.1),
+    ] {
+        let (mut machine, mut host) = driven(marks, rpm, torque);
+        set(&mut machine, &mut host, &format!("m3 s{rpm}"));
+        host.run_for_ms(&mut machine, 3_000).unwrap();
+        set(&mut machine, &mut host, "g91 g33.1 z-10 k1");
+        let (mut phases, mut deepest, mut still) = (Vec::new(), 0.0f64, 0);
+        let mut last = 0;
+        while still < 4_000 {
+            run_for_quarter(&mut machine);
+            let z = machine.recorder().motors()[Z].position;
+            still = if z == last && z == 0 && deepest < 0.0 { still + 1 } else { 0 };
+            last = z;
+            let z = z as f64 / STEPS;
+            deepest = deepest.min(z);
+            let turns = machine.mechanics().unwrap().spindle_turns();
+            // From two turns in, where it is in step, to two turns before the end.
+            phases.push((z, z + turns));
+            assert!(
+                phases.len() < 80_000,
+                "{marks}: it does not come to its end: {z} of {deepest}, {:?}",
+                host.take_reports()
+            );
+        }
+        host.run_for_ms(&mut machine, 10).unwrap();
+        let began = phases.iter().position(|(z, _)| *z < -2.0).unwrap();
+        let ended = phases.iter().rposition(|(z, _)| *z < -0.5).unwrap();
+        let inside: Vec<f64> = phases[began..ended].iter().map(|(_, phase)| *phase).collect();
+        let there = phases[began..].iter().position(|(z, _)| *z < -9.5).unwrap();
+        let steady: Vec<f64> = inside[..there].to_vec();
+        println!(
+            "N {marks}, {rpm} rpm: deepest {deepest:.3}, spread on the way in {:.4}, there and back {:.4}",
+            spread(&steady),
+            spread(&inside)
+        );
+        // Where the spindle is is known to a millisecond.
+        let known = rpm / 60.0 * 0.001;
+        assert!(spread(&steady) < 2.0 * STEP + known, "{}", spread(&steady));
+        assert!(spread(&inside) < most, "{}", spread(&inside));
+        // The way in which the spindle comes to rest, and no more.
+        let stops = rpm / 60.0 * rpm / torque / 2.0;
+        assert!((-10.0 - stops - 0.3..=-10.0).contains(&deepest), "{deepest}");
+        // It turns as before, and nothing is told.
+        assert!(host.take_reports().iter().all(|report| report["er"]["st"].is_null()));
+        let turning = machine.mechanics().unwrap().spindle_rpm(machine.cycle());
+        assert!(turning > 0.7 * rpm, "{turning}");
+        assert_eq!(asked(&mut machine, &mut host, "posz"), 0.0);
+        set(&mut machine, &mut host, "g0 z1");
+        host.run_for_ms(&mut machine, 1_000).unwrap();
+        assert_eq!(machine.recorder().motors()[Z].position, STEPS as i64);
+    }
+}
+
+#[test]
+fn a_tap_whose_spindle_does_not_turn_round_is_an_alarm() {
+    const NOT_REVERSED: u64 = 47;
+    let (mut machine, mut host) = driven(20, 300.0, 600.0);
+    set(&mut machine, &mut host, "m3 s300");
+    host.run_for_ms(&mut machine, 3_000).unwrap();
+    set(&mut machine, &mut host, "g91 g33.1 z-5 k1");
+    for _ in 0..6_000 {
+        machine.tamper(|mechanics, now| mechanics.drive_spindle_to(300.0, now));
+        machine.run_for_ms(1).unwrap();
+    }
+    host.run_for_ms(&mut machine, 10).unwrap();
+    let told = host.take_reports().iter().any(|report| report["er"]["st"] == NOT_REVERSED);
+    assert!(told, "nothing is told");
+    // The way of a second beyond the bottom, and no further.
+    let z = machine.recorder().motors()[Z].position as f64 / STEPS;
+    assert!((-10.05..=-9.9).contains(&z), "{z}");
+    let position = asked(&mut machine, &mut host, "mpoz");
+    assert!((position - z).abs() < 0.0011, "{position} {z}");
+}
+
+#[test]
+fn a_hold_in_a_tap_waits_for_its_end() {
+    let (mut machine, mut host) = driven(20, 300.0, 600.0);
+    set(&mut machine, &mut host, "m3 s300");
+    host.run_for_ms(&mut machine, 3_000).unwrap();
+    begin(&mut machine, &mut host, "g91 g33.1 z-5 k1", 2.0);
+    machine.send_now(b'!');
+    host.run_for_ms(&mut machine, 6_000).unwrap();
+    assert_eq!(host.stat(), Some(6), "it holds");
+    // It is out of the hole.
+    assert!(machine.recorder().motors()[Z].position >= 0);
+    machine.send_now(b'~');
+    host.run_for_ms(&mut machine, 1_000).unwrap();
+    assert_eq!(machine.recorder().motors()[Z].position, 0);
+    set(&mut machine, &mut host, "g0 z1");
+    host.run_for_ms(&mut machine, 500).unwrap();
+    assert_eq!(machine.recorder().motors()[Z].position, STEPS as i64);
 }
 
 #[test]

@@ -90,7 +90,7 @@ impl<S: Side> Dialogue<S> {
 
     /// A machine that has never been used boots, and is set up to move.
     pub fn begin(&mut self) -> Outcome<()> {
-        self.side.wire(&[]);
+        self.side.wire(&[], 0);
         self.side.set_aux_cts(false);
         while self.banners < 2 {
             self.tick()?;

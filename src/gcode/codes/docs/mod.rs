@@ -101,8 +101,8 @@ impl Setup for On {
         *self != On::NoSwitches
     }
 
-    fn has_encoder(&self) -> bool {
-        *self != On::NoSwitches
+    fn encoder(&self) -> Result<(), Status> {
+        if *self == On::NoSwitches { Err(Status::NoEncoder) } else { Ok(()) }
     }
 
     fn homing(&self, _axis: u8) -> Result<(), Status> {

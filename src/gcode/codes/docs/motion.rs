@@ -119,6 +119,21 @@ be too fast (146), an alarm says so, and nothing moves. A spindle that is lost i
             thread!("G33"),
         ),
         g(
+            331,
+            "Rigid tapping",
+            "As G33 to the axis words, where the spindle is told to turn round; the axes follow it until it stands, and back in step. Where the \
+line began the spindle is told to turn as before, and when it has turned round the axes go back to there. So the tap goes on beyond the axis words while the spindle \
+slows down: leave room for it. If it has not turned round within the way of a second, that is an alarm (47). It needs M3 or M4. `!` waits for the end.",
+            &[
+                no_on(On::NoSwitches, NoEncoder, &["M3 S100 G33.1 Z-5 K1"]),
+                no(AxisWordMissing, &["M3 S100 G33.1 K1"]),
+                no(RotaryNotAllowed, &["M3 S100 G33.1 A5 K1"]),
+                no(KWordMissing, &["M3 S100 G33.1 Z-5"]),
+                no(KWordInvalid, &["M3 S100 G33.1 Z-5 K0"]),
+                no(SpindleMustTurn, &["G33.1 Z-5 K1"]),
+            ],
+        ),
+        g(
             760,
             "Threading cycle",
             "A thread along Z in several passes, each as G33 and in the one before. The drive line is parallel to Z through where X is. Z is where passes end; P the \

@@ -31,10 +31,10 @@ fn every_token_has_a_name_that_finds_it() {
         system::COUNT
             + 32
             + 3 * 15
-            + 16
+            + 18
             + 2 * 9
             + 42
-            + 46
+            + 47
             + 2 * 6
             + 2
             + 6 * 4

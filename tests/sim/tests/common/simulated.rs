@@ -2,7 +2,7 @@
 
 use kerf::boards::Pin;
 use kerf::boards::inputs::PROBE;
-use kerf_sim::mechanics::{Build, Switch, Wiring};
+use kerf_sim::mechanics::{Build, Sensors, Switch, Wiring};
 use kerf_sim::{AUX, Machine};
 
 use crate::side::Side;
@@ -52,8 +52,8 @@ impl Side for Machine {
         self.drive_pin(pin.port.letter(), pin.bit, !closed);
     }
 
-    fn wire(&mut self, switches: &[(usize, i64, bool)]) {
-        if switches.is_empty() {
+    fn wire(&mut self, switches: &[(usize, i64, bool)], pulses: u32) {
+        if switches.is_empty() && pulses == 0 {
             return;
         }
         // Lengths are steps, from far off any hard end.
@@ -72,7 +72,14 @@ impl Side for Machine {
                 (axis, _) => build.axes[axis].max = switch,
             }
         }
+        if pulses > 0 {
+            build.spindle.sensors = Sensors::of(self.board(), pulses);
+        }
         self.build(&build);
+    }
+
+    fn turn_spindle(&mut self, rpm: f64, _: u32) {
+        self.tamper(|mechanics, now| mechanics.force_spindle(rpm, now));
     }
 
     fn steps(&self) -> [i64; 4] {

@@ -1,0 +1,190 @@
+//! The way out of the cut: X moves away at once while the axes of a thread come to rest.
+//!
+//! Owned by exec, which begins it when a pass in step with the spindle ends before its time: the spindle is lost, the error is above its
+//! limit, a feedhold or an alarm has come ([`Exec`](super::exec::Exec)). Exec asks [`Retreat::add`] for each segment while the axes slow down,
+//! and for segments of its own when they stand; at the exec level. The motors of X stand still in the pass, so that the two motions do not meet
+//! in a motor. X has a ramp up, a cruise and a ramp down of its own.
+//!
+//! Units: steps of X, s. What is handed out is counted in whole phase units, so that nothing is lost; the end is within half a step, and a
+//! ten-thousandth, of the way that was asked for. Cost on AVR: 6,000 cycles a segment. RAM: that of the pass, which is over.
+
+use kerf_macros::small;
+
+use super::float::{greater, least, some};
+use super::short::Short;
+use crate::boards::MOTORS;
+use crate::dda::{STEP, Segment};
+use crate::hal::TIMER_HZ;
+use crate::math::sqrt;
+use crate::status::Status;
+
+/// How a pass is left.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Retract {
+    /// The motors of X, as bits; none if the tool stays in the cut.
+    pub motors: u8,
+    /// How far they go, steps.
+    pub way: i16,
+    /// Their acceleration limit, steps/s^2.
+    pub accel: Short,
+    /// Their velocity limit, steps/s.
+    pub velocity: Short,
+}
+
+impl Retract {
+    /// The tool stays in the cut.
+    pub const NONE: Self = Self { motors: 0, way: 0, accel: Short::ZERO, velocity: Short::ZERO };
+
+    /// Whether there is one.
+    pub fn is_some(&self) -> bool {
+        self.motors != 0
+    }
+}
+
+/// X on its way out.
+#[derive(Clone, Copy, Debug)]
+pub struct Retreat {
+    how: Retract,
+    /// Why.
+    pub why: Status,
+    /// What is left of the way, steps.
+    left: f32,
+    /// steps/s.
+    velocity: f32,
+    /// What has been handed out and is no whole step yet, phase units.
+    part: u16,
+}
+
+#[small]
+impl Retreat {
+    /// At rest, in the cut, for this reason.
+    pub fn new(how: Retract, why: Status) -> Self {
+        let left = f32::from(how.way.unsigned_abs());
+        Self { how, why, left, velocity: 0.0, part: 0 }
+    }
+
+    /// Whether X is out of the cut, at rest.
+    pub fn is_done(&self) -> bool {
+        !some(self.left)
+    }
+
+    /// The motors that move.
+    pub fn motors(&self) -> u8 {
+        self.how.motors
+    }
+
+    /// Whether they move backwards.
+    pub fn is_backwards(&self) -> bool {
+        self.how.way < 0
+    }
+
+    /// Has X go on in a segment in which it would stand. Whole steps are added to `target`, and what is handed out besides is a `debt` below
+    /// a step, as of `Prep`.
+    #[inline(never)]
+    pub fn add(
+        &mut self,
+        segment: &mut Segment,
+        target: &mut [i32; MOTORS],
+        debt: &mut [i16; MOTORS],
+    ) {
+        let ticks = f32::from(segment.ticks);
+        let seconds = ticks * f32::from(segment.period) * (1.0 / TIMER_HZ as f32);
+        let distance = self.distance(seconds);
+        let most = f32::from(STEP);
+        let increment = least(distance * most / ticks + 0.5, most) as u16;
+        let travel = u32::from(increment) * u32::from(segment.ticks);
+        let gone = travel as f32 * (1.0 / f32::from(STEP));
+        // The last half step is none.
+        self.left = if self.left - gone < 0.5 { 0.0 } else { self.left - gone };
+        let sum = travel + u32::from(self.part);
+        self.part = sum as u16 & (STEP - 1);
+        let steps = (sum >> 15) as i32;
+        // What it has been told to go, less what it goes, modulo 2^16.
+        let owed = ((steps as u16) << 15).wrapping_sub(travel as u16);
+        let (steps, owed) =
+            if self.is_backwards() { (-steps, owed.wrapping_neg()) } else { (steps, owed) };
+        let mut bit = 1;
+        for ((increments, target), debt) in
+            segment.increment.iter_mut().zip(target.iter_mut()).zip(debt.iter_mut())
+        {
+            if self.how.motors & bit != 0 {
+                *increments = increment;
+                *target = target.wrapping_add(steps);
+                *debt = debt.wrapping_add_unsigned(owed);
+            }
+            bit <<= 1;
+        }
+    }
+
+    /// How far X goes in so many seconds, steps.
+    fn distance(&mut self, seconds: f32) -> f32 {
+        let accel = self.how.accel.get();
+        let gain = accel * seconds;
+        let before = self.velocity;
+        // The velocity at the end from which the rest of the way stops it.
+        let half = 0.5 * gain;
+        let square = half * half + 2.0 * accel * self.left - gain * before;
+        let stops = if square > 0.0 { sqrt(square) - half } else { 0.0 };
+        let after = least(before + gain, least(self.how.velocity.get(), greater(stops, 0.0)));
+        self.velocity = greater(after, before - 1.5 * gain);
+        if some(self.velocity) {
+            least(0.5 * (before + self.velocity) * seconds, self.left)
+        } else {
+            self.left
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: u16 = 400;
+    const TICKS: u16 = 80;
+
+    /// The velocity of each segment until it is out, steps/s, and how far it has gone.
+    fn run(how: Retract) -> (std::vec::Vec<f64>, i32, i16) {
+        let (mut target, mut debt) = ([0; MOTORS], [0; MOTORS]);
+        let mut retreat = Retreat::new(how, Status::Terminated);
+        let mut speeds = std::vec::Vec::new();
+        while !retreat.is_done() {
+            let mut segment = Segment { ticks: TICKS, period: PERIOD, ..Segment::default() };
+            retreat.add(&mut segment, &mut target, &mut debt);
+            let seconds = f64::from(TICKS) * f64::from(PERIOD) / 16e6;
+            let steps = f64::from(segment.increment[0]) * f64::from(TICKS) / f64::from(STEP);
+            speeds.push(steps / seconds);
+            assert!(speeds.len() < 20_000, "it does not come to its end");
+        }
+        (speeds, target[0], debt[0])
+    }
+
+    #[test]
+    fn it_is_out_as_soon_as_may_be_and_within_its_limits() {
+        for way in [640i16, -640, 20, 1, 32_000] {
+            for (accel, velocity) in [(160_000.0, 6_400.0), (50_000.0, 30_000.0), (1e6, 1_000.0)] {
+                let limits = (Short::new(accel), Short::new(velocity));
+                let how = Retract { motors: 1, way, accel: limits.0, velocity: limits.1 };
+                let (speeds, steps, debt) = run(how);
+                let went = f64::from(steps) - f64::from(debt) / 32_768.0;
+                assert!(
+                    (went - f64::from(way)).abs() <= 0.55 + f64::from(way).abs() * 3e-4,
+                    "{way}: {went}"
+                );
+                let (mut before, mut most) = (0.0f64, 0.0f64);
+                for speed in &speeds {
+                    // Of means of neighbours.
+                    most = most.max((speed - before).abs() / 0.002);
+                    before = *speed;
+                    assert!(*speed <= f64::from(velocity) * 1.01, "{way}: {speed}");
+                }
+                let single = 1.0 / 0.002 / 0.002;
+                assert!(most <= f64::from(accel) * 1.6 + single, "{way} {accel}: {most}");
+                let (far, accel, v) = (f64::from(way).abs(), f64::from(accel), f64::from(velocity));
+                let peak = (accel * far).sqrt();
+                let best = if peak < v { 2.0 * peak / accel } else { far / v + v / accel };
+                let took = speeds.len() as f64 * 0.002;
+                assert!(took <= best * 1.1 + 0.008, "{way} {accel} {v}: {took} s of {best}");
+            }
+        }
+    }
+}
