@@ -2,9 +2,9 @@
 //
 // MOTORS is JSON, [[step, dir], ...]. Each line of the input is a request in JSON, each line of the output its answer:
 //
-//   {"send": [[port, "hex"]], "now": byte, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "until": cycle, "line": true}
+//   {"cut": true, "send": [[port, "hex"]], "now": byte, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "until": cycle, "line": true}
 //
-// What is sent and driven comes first; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
+// With `cut` the supply fails, and comes again. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
 import { createInterface } from 'node:readline';
 import { Machine } from './machine.mjs';
 import { Motors } from './pins.mjs';
@@ -13,8 +13,10 @@ const [elf, pins] = process.argv.slice(2);
 const machine = new Machine(elf);
 const motors = new Motors(machine, JSON.parse(pins).map(([step, dir]) => ({ step, dir })));
 const PWM = 0x40050000;
+const FUNCTION_PWM = 4;
 
 function act(request) {
+  if (request.cut) machine.cutPower();
   for (const [port, rate] of request.baud ?? []) machine.senders[port].rate = rate;
   for (const [port, hex] of request.send ?? []) machine.send(port, Buffer.from(hex, 'hex'));
   for (const byte of request.now ?? []) machine.sendNow(0, byte);
@@ -24,13 +26,15 @@ function act(request) {
   machine.runUntil(request.until ?? 0, () => request.line && machine.lines !== lines);
 }
 
-// What part of its period a pin is high that pulses, by the registers of its slice.
-function share(gpio) {
-  const slice = PWM + 0x14 * (gpio >> 1 & 7);
+// What part of its period each pin is high that pulses, by the registers of its slice.
+function shares() {
   const { mcu } = machine;
-  if (mcu.gpio[gpio].functionSelect !== 4) return machine.levels[gpio];
-  const compare = mcu.readUint32(slice + 0xc) >>> (gpio & 1 ? 16 : 0) & 0xffff;
-  return Math.min(1, compare / mcu.readUint32(slice + 0x10));
+  const pulsing = [...mcu.gpio.keys()].filter((gpio) => mcu.gpio[gpio].functionSelect === FUNCTION_PWM);
+  return pulsing.map((gpio) => {
+    const slice = PWM + 0x14 * (gpio >> 1 & 7);
+    const compare = mcu.readUint32(slice + 0xc) >>> (gpio & 1 ? 16 : 0) & 0xffff;
+    return [gpio, Math.min(1, compare / mcu.readUint32(slice + 0x10))];
+  });
 }
 
 function answer() {
@@ -44,7 +48,7 @@ function answer() {
     gaps: motors.gaps.map((gap) => (Number.isFinite(gap) ? gap : null)),
     last: motors.lastStep,
     levels: machine.levels.reduce((bits, level, gpio) => bits + (level === 1 ? 2 ** gpio : 0), 0),
-    share: [...Array(30).keys()].map(share),
+    shares: shares(),
     asleep: machine.asleep,
     resets: machine.resets,
   };

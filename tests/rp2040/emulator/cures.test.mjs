@@ -92,6 +92,15 @@ test('long waits are as long as if they were counted', () => {
   for (const count of [0, 1, 2, 1_000, 100_000]) assert.equal(high(count), count + 3, `${count}`);
 });
 
+test('a FIFO that is joined or parted is empty', () => {
+  const m = machine(LOOP);
+  const at = 0x50200000;
+  m.mcu.writeUint32(at + 0x10, 1);
+  assert.equal(m.mcu.readUint32(at + 0xc) & 0xf, 1);
+  m.mcu.writeUint32(at + 0xd0, 0x80000000);
+  assert.equal(m.mcu.readUint32(at + 0xc) & 0xf, 0);
+});
+
 test('a byte takes its time on the line, and then interrupts', () => {
   const m = machine(SLEEP);
   m.run(100);
@@ -124,6 +133,12 @@ test('a byte that is not taken in time is lost, and said to be', () => {
   assert.equal(m.mcu.readUint32(0x40034018) & 1 << 4, 1 << 4, 'empty');
 });
 
+test('the DMA has aborted what it was told to', () => {
+  const m = machine(LOOP);
+  m.mcu.writeUint32(0x50000444, 3);
+  assert.equal(m.mcu.readUint32(0x50000444), 0);
+});
+
 test('the boot ROM has the functions of the flash', () => {
   const m = machine(LOOP);
   const { mcu } = m;
@@ -131,6 +146,22 @@ test('the boot ROM has the functions of the flash', () => {
   const names = [];
   for (let at = table; mcu.readUint16(at); at += 4) names.push(String.fromCharCode(mcu.readUint8(at), mcu.readUint8(at + 1)));
   assert.deepEqual(names, ['IF', 'EX', 'FC', 'CX', 'RE', 'RP', 'MC', 'C4']);
+});
+
+test('to write to flash clears bits alone', () => {
+  const m = machine(LOOP);
+  const { mcu } = m;
+  const { core } = mcu;
+  const write = (word) => {
+    mcu.writeUint32(0x20000000, word);
+    [core.registers[0], core.registers[1], core.registers[2]] = [0x1000, 0x20000000, 4];
+    core.LR = 0x10000000 + CODE | 1;
+    core.PC = 0x180;
+    m.run(100);
+  };
+  write(0xffffff00);
+  write(0xff00ffff);
+  assert.equal(mcu.readUint32(0x10001000), 0xff00ff00);
 });
 
 test('a reset by the watchdog keeps scratch registers and flash', () => {

@@ -21,6 +21,7 @@ const WATCHDOG = 0x40058;
 const GARBLES = 0.045;
 // Bits of a frame: start, eight, stop.
 const FRAME = 10;
+const CHAN_ABORT = 0x444;
 const UARTS = [[0x40034, 'UART0', 20], [0x40038, 'UART1', 21]];
 
 // XIP_CTRL, which rp2040js lacks: never streaming.
@@ -93,6 +94,11 @@ export class Machine {
     this.boot();
   }
 
+  // The supply fails, and is there again.
+  cutPower() {
+    this.boot({ flash: this.mcu.flash });
+  }
+
   // A chip as it is at power-up, or behind a reset by the watchdog, with the flash as it was.
   boot(before) {
     const mcu = new RP2040();
@@ -108,7 +114,7 @@ export class Machine {
       return uart;
     });
     const watchdog = mcu.peripherals[WATCHDOG];
-    if (before) {
+    if (before?.peripherals) {
       const old = before.peripherals[WATCHDOG];
       watchdog.scratchData.set(old.scratchData);
       watchdog.reason = old.reason;
@@ -120,10 +126,18 @@ export class Machine {
       pin.addListener((state) => this.changed(gpio, state));
       pin.setInputValue(this.inputs.get(gpio) ?? true);
     }
+    this.endAborts();
     this.timeInterrupts();
     mcu.core.VTOR = VECTORS;
     mcu.core.reset();
     mcu.core.PC = (mcu.core.PC & ~1) >>> 0;
+  }
+
+  // The DMA says when it has aborted what it was told to, which is at once; rp2040js never says it.
+  endAborts() {
+    const { dma } = this.mcu;
+    const read = dma.readUint32.bind(dma);
+    dma.readUint32 = (offset) => (offset === CHAN_ABORT ? 0 : read(offset));
   }
 
   // What is said above; and a handler begins at an even address: rp2040js leaves the lowest bit of its vector in the program counter, where it puts

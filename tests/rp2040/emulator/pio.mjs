@@ -16,6 +16,22 @@ function skip(pio, sm) {
   return rounds - 1;
 }
 
+// To join FIFOs, or to part them, empties them.
+const SHIFTCTRL = 0x8;
+const JOINS = 3 << 30;
+function emptiesFifos(sm) {
+  const write = sm.writeUint32.bind(sm);
+  sm.writeUint32 = (offset, value) => {
+    if (offset === SHIFTCTRL && (sm.shiftCtrl ^ value) & JOINS) {
+      sm.txFIFO.reset();
+      sm.rxFIFO.reset();
+      sm.updateDMATx();
+      sm.updateDMARx();
+    }
+    write(offset, value);
+  };
+}
+
 export class Pio {
   constructor(pio) {
     this.pio = pio;
@@ -30,6 +46,7 @@ export class Pio {
     // Whoever writes to it may have something to do for it.
     const write = pio.writeUint32.bind(pio);
     pio.writeUint32 = (offset, value) => { this.first = 0; write(offset, value); };
+    pio.machines.forEach(emptiesFifos);
   }
 
   // Runs all that is due before the cycle `until`.

@@ -1,4 +1,5 @@
-// What stands for the boot ROM: a table of functions, and the functions that embassy-rp looks up. Flash is written as if it were memory.
+// What stands for the boot ROM: a table of functions, and the functions that embassy-rp looks up. To write to flash clears bits of it; to erase
+// it sets all.
 
 // Thumb code, by hand: see the comments.
 const LOOKUP = 0x100;
@@ -42,17 +43,20 @@ export function bootRom() {
     0x4770, // bx lr
   ]);
   put(PROGRAM, [
-    0x2310, // r0 offset, r1 from, r2 count; movs r3, #0x10
+    0xb510, // r0 offset, r1 from, r2 count; push {r4, lr}
+    0x2310, // movs r3, #0x10
     0x061b, // lsls r3, r3, #24
     0x18c0, // adds r0, r0, r3
     0x3a04, // next: subs r2, #4
     0x588b, // ldr r3, [r1, r2]
+    0x5884, // ldr r4, [r0, r2]
+    0x4023, // ands r3, r4
     0x5083, // str r3, [r0, r2]
     0x2a00, // cmp r2, #0
-    0xd1fa, // bne next
-    0x4770, // bx lr
+    0xd1f8, // bne next
+    0xbd10, // pop {r4, pc}
   ]);
-  // r0 to, r1 from, r2 count: the loop of PROGRAM.
+  // r0 to, r1 from, r2 count: a word each, from the last one on.
   put(COPY, [0x3a04, 0x588b, 0x5083, 0x2a00, 0xd1fa, 0x4770]);
   const code = (name) => name.charCodeAt(0) | name.charCodeAt(1) << 8;
   const functions = { IF: NOP, EX: NOP, FC: NOP, CX: NOP, RE: ERASE, RP: PROGRAM, MC: COPY, C4: COPY };

@@ -21,6 +21,7 @@ const PROGRAM: &str = "rp2040-emulator/bridge.mjs";
 /// A request.
 #[derive(Serialize, Default, Debug)]
 struct Request {
+    cut: bool,
     send: Vec<(usize, String)>,
     now: Vec<u8>,
     baud: Vec<(usize, u32)>,
@@ -66,7 +67,7 @@ struct Answer {
     #[serde(default)]
     levels: u32,
     #[serde(default)]
-    share: Vec<f64>,
+    shares: Vec<(u8, f64)>,
     #[serde(default)]
     asleep: f64,
     #[serde(default)]
@@ -167,6 +168,11 @@ impl Emulated {
         std::mem::take(&mut self.heard[port])
     }
 
+    /// The supply fails, and is there again.
+    pub fn cut_power(&mut self) {
+        self.request.cut = true;
+    }
+
     /// Drives an input.
     pub fn drive(&mut self, pin: Pin, high: bool) {
         self.request.drive.push((pin.bit, high));
@@ -200,7 +206,8 @@ impl Emulated {
 
     /// What part of its period a pin that pulses is high.
     pub fn share(&self, pin: Pin) -> f64 {
-        self.answer.share.get(usize::from(pin.bit)).copied().unwrap_or(0.0)
+        let found = self.answer.shares.iter().find(|(gpio, _)| *gpio == pin.bit);
+        found.map_or(f64::from(u8::from(self.is_high(pin))), |(_, share)| *share)
     }
 
     /// Cycles that the CPU has slept.
