@@ -29,6 +29,8 @@
 #![no_std]
 // An image has no `std`, and needs these of the compiler.
 #![cfg_attr(not(feature = "std"), feature(asm_experimental_arch, optimize_attribute))]
+// On some chips.
+#![cfg_attr(not(feature = "std"), allow(unused_features))]
 
 #[cfg(feature = "std")]
 extern crate std;

@@ -19,7 +19,7 @@ use embassy_rp::peripherals::FLASH;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 
-use super::{stepper, time, uart};
+use super::{stepper, time, uart, watchdog};
 use crate::store::Memory;
 use crate::store::program::AREA;
 
@@ -91,6 +91,8 @@ impl State {
         let (Some(number), Some(map)) = (self.waiting.take(), self.map.as_mut()) else { return };
         let at = usize::from(number) * PIECE;
         let Some(piece) = self.bytes.get(at..at + PIECE) else { return };
+        // Erasing takes as long as the flash pleases, at worst longer than the watchdog waits.
+        watchdog::off();
         let mut room = [0; ITEM];
         let mut store = || block_on(map.store_item(&mut room, &number, &piece)).is_ok();
         // A part of the flash that makes no sense is begun anew: all pieces follow, a turn each.
@@ -102,6 +104,7 @@ impl State {
                 }
             }
         }
+        watchdog::start();
     }
 }
 
