@@ -1,6 +1,6 @@
 //! Boards as data: which pin does what, and which timer belongs to whom.
 //!
-//! A board is one constant in one file under `boards/`. The AVR image is built for [`ACTIVE`];
+//! A board is one constant in one file under `boards/`. The image is built for [`ACTIVE`];
 //! host tools see them all through [`by_name`]. A pin or a timer that is used twice fails the
 //! build (see [`Board::check`]).
 
@@ -8,11 +8,14 @@
 mod mega2560_grbl;
 #[path = "../boards/mega2560-lathe.rs"]
 mod mega2560_lathe;
+#[path = "../boards/pico-cnc.rs"]
+mod pico_cnc;
 #[path = "../boards/ramps14.rs"]
 mod ramps14;
 
 pub use mega2560_grbl::MEGA2560_GRBL;
 pub use mega2560_lathe::MEGA2560_LATHE;
+pub use pico_cnc::PICO_CNC;
 pub use ramps14::RAMPS14;
 
 /// Motors a board drives.
@@ -32,7 +35,7 @@ macro_rules! each_motor {
 
 pub(crate) use each_motor;
 
-/// An I/O port of the ATmega2560, by its letter.
+/// An I/O port of the ATmega2560, by its letter; or the only one of the RP2040.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Port {
@@ -47,6 +50,8 @@ pub enum Port {
     J,
     K,
     L,
+    /// Of the RP2040: its pins GP0 to GP29, of which the number is the bit.
+    Gpio,
 }
 
 impl Port {
@@ -64,13 +69,15 @@ impl Port {
             Port::J => 'J',
             Port::K => 'K',
             Port::L => 'L',
+            Port::Gpio => 'P',
         }
     }
 
     /// Data-space address of the PORT register; PIN is two below it and DDR one below
-    /// (ATmega2560 data sheet, register summary).
+    /// (ATmega2560 data sheet, register summary). The RP2040's port has none.
     pub const fn address(self) -> usize {
         match self {
+            Port::Gpio => 0,
             Port::A => 0x22,
             Port::B => 0x25,
             Port::C => 0x28,
@@ -91,13 +98,18 @@ impl Port {
 pub struct Pin {
     /// Its port.
     pub port: Port,
-    /// Its bit in the port, 0 to 7.
+    /// Its bit in the port, 0 to 7; on the RP2040 0 to 29.
     pub bit: u8,
 }
 
 /// Shorthand that board files use.
 pub const fn pin(port: Port, bit: u8) -> Pin {
     Pin { port, bit }
+}
+
+/// Shorthand for a pin of the RP2040, by its number.
+pub const fn gp(number: u8) -> Pin {
+    pin(Port::Gpio, number)
 }
 
 /// The interrupt that an edge on a pin raises.
@@ -107,6 +119,8 @@ pub enum Interrupt {
     External(u8),
     /// A pin change by its number: PCINT0 to PCINT23, of which eight share a vector.
     PinChange(u8),
+    /// That of a pin of the RP2040 by its number, each with a note of its own.
+    Gpio(u8),
 }
 
 impl Pin {
@@ -123,6 +137,7 @@ impl Pin {
             (Port::E, 0) => Some(Interrupt::PinChange(8)),
             (Port::J, bit @ 0..7) => Some(Interrupt::PinChange(9 + bit)),
             (Port::K, bit) => Some(Interrupt::PinChange(16 + bit)),
+            (Port::Gpio, bit) => Some(Interrupt::Gpio(bit)),
             _ => None,
         }
     }
@@ -139,7 +154,7 @@ pub struct MotorPins {
     pub enable: Option<Pin>,
 }
 
-/// A 16-bit or 8-bit timer of the ATmega2560.
+/// A 16-bit or 8-bit timer of the ATmega2560, or what stands for one on the RP2040.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Timer {
@@ -149,14 +164,20 @@ pub enum Timer {
     T3,
     T4,
     T5,
+    /// Of the RP2040: a state machine of its PIO.
+    Pio,
+    /// Of the RP2040: the timer of its core.
+    SysTick,
+    /// Of the RP2040: its slices of pulse-width outputs.
+    Slices,
 }
 
 /// An output of a 16-bit timer that drives a pin by pulses of some width.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Pwm {
-    /// Its timer: 3, 4 or 5.
+    /// Its timer: 3, 4 or 5; [`Timer::Slices`] on the RP2040.
     pub timer: Timer,
-    /// Its channel, 0 to 2 for A to C.
+    /// Its channel, 0 to 2 for A to C; on the RP2040 the number of the pin.
     pub channel: u8,
 }
 
@@ -164,6 +185,7 @@ impl Pwm {
     /// The pin (ATmega2560 data sheet, pin configurations).
     pub const fn pin(self) -> Pin {
         let (port, first) = match self.timer {
+            Timer::Slices => (Port::Gpio, 0),
             Timer::T4 => (Port::H, 3),
             Timer::T5 => (Port::L, 3),
             _ => (Port::E, 3),
@@ -181,22 +203,25 @@ impl Pwm {
     }
 }
 
-/// A USART of the ATmega2560. The third, USART2, is the firmware's own (`avr_embassy::interrupt`).
+/// A USART of the ATmega2560, of which the third, USART2, is the firmware's own (`avr_embassy::interrupt`); or a UART of the RP2040.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Usart {
     U0,
     U1,
     U3,
+    Uart0,
+    Uart1,
 }
 
 impl Usart {
-    /// Data-space address of its first register, UCSRnA (ATmega2560 data sheet, register summary).
+    /// Data-space address of its first register, UCSRnA (ATmega2560 data sheet, register summary). Those of the RP2040 have none.
     pub const fn address(self) -> usize {
         match self {
             Usart::U0 => 0xC0,
             Usart::U1 => 0xC8,
             Usart::U3 => 0x130,
+            Usart::Uart0 | Usart::Uart1 => 0,
         }
     }
 
@@ -206,6 +231,8 @@ impl Usart {
             Usart::U0 => [pin(Port::E, 0), pin(Port::E, 1)],
             Usart::U1 => [pin(Port::D, 2), pin(Port::D, 3)],
             Usart::U3 => [pin(Port::J, 0), pin(Port::J, 1)],
+            Usart::Uart0 => [gp(1), gp(0)],
+            Usart::Uart1 => [gp(21), gp(20)],
         }
     }
 }
@@ -233,7 +260,7 @@ pub struct Serial {
     pub driver_enable: Option<Pin>,
 }
 
-/// The first port of every board: USART0, which is USB on most.
+/// The first port of every board with an ATmega2560: USART0, which is USB on most.
 pub const USB: Serial =
     Serial { usart: Usart::U0, rate: 115_200, handshake: None, driver_enable: None };
 
@@ -290,6 +317,7 @@ const fn vector(pin: Pin) -> u8 {
     match pin.interrupt() {
         Some(Interrupt::External(n)) => n + 1,
         Some(Interrupt::PinChange(n)) => n / 8 + 9,
+        Some(Interrupt::Gpio(n)) => n + 1,
         None => 0,
     }
 }
@@ -428,7 +456,8 @@ impl Board {
             self.step_timer as u8 != self.tick_timer as u8,
             "a timer of this board is used twice"
         );
-        let first = !self.serial.is_empty() && matches!(self.serial[0].usart, Usart::U0);
+        let first =
+            !self.serial.is_empty() && matches!(self.serial[0].usart, Usart::U0 | Usart::Uart0);
         assert!(first, "the first serial port of this board is not USART0");
         self.check_pwm();
         self.check_encoder();
@@ -485,7 +514,8 @@ impl Board {
     const fn check_pwm(&self) {
         let Some(pwm) = self.pwm else { return };
         let wide = matches!(pwm.timer, Timer::T3 | Timer::T4 | Timer::T5);
-        assert!(wide && pwm.channel < 3, "a timer of this board has no such output");
+        let has_output = (wide && pwm.channel < 3) || matches!(pwm.timer, Timer::Slices);
+        assert!(has_output, "a timer of this board has no such output");
         assert!(
             pwm.timer as u8 != self.step_timer as u8 && pwm.timer as u8 != self.tick_timer as u8,
             "a timer of this board is used twice"
@@ -539,7 +569,7 @@ impl Board {
 }
 
 /// Every board Kerf knows.
-pub const ALL: [&Board; 3] = [&MEGA2560_GRBL, &MEGA2560_LATHE, &RAMPS14];
+pub const ALL: [&Board; 4] = [&MEGA2560_GRBL, &MEGA2560_LATHE, &PICO_CNC, &RAMPS14];
 
 const _: () = {
     let mut i = 0;
@@ -561,7 +591,14 @@ pub const ACTIVE: &Board = &RAMPS14;
 #[cfg(feature = "board-mega2560-lathe")]
 pub const ACTIVE: &Board = &MEGA2560_LATHE;
 /// The board that this image is built for.
-#[cfg(not(any(feature = "board-ramps14", feature = "board-mega2560-lathe")))]
+#[cfg(feature = "board-pico-cnc")]
+pub const ACTIVE: &Board = &PICO_CNC;
+/// The board that this image is built for.
+#[cfg(not(any(
+    feature = "board-ramps14",
+    feature = "board-mega2560-lathe",
+    feature = "board-pico-cnc"
+)))]
 pub const ACTIVE: &Board = &MEGA2560_GRBL;
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
-//! Kerf: motion-control firmware for 8-bit AVR boards, in async Rust on Embassy.
+//! Kerf: motion-control firmware in async Rust on Embassy, for 8-bit AVR boards and the RP2040.
 //!
 //! This library is the whole firmware but for the image's entry point. It is `no_std` and runs on
-//! the ATmega2560 and, for tests and tools, on the host. `ARCHITECTURE.md` is the tour of the house.
+//! the ATmega2560, the RP2040 and, for tests and tools, on the host. `ARCHITECTURE.md` is the tour of the house.
 //!
 //! # The way of a line
 //!
@@ -29,6 +29,8 @@
 #![no_std]
 // An image has no `std`, and needs these of the compiler.
 #![cfg_attr(not(feature = "std"), feature(asm_experimental_arch, optimize_attribute))]
+// On some chips.
+#![cfg_attr(not(feature = "std"), allow(unused_features))]
 
 #[cfg(feature = "std")]
 extern crate std;

@@ -1,5 +1,5 @@
-//! The AVR image. On the host, the command line.
-#![cfg_attr(target_arch = "avr", no_std, no_main)]
+//! The image. On the host, the command line.
+#![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_arch = "avr")]
 mod image {
@@ -30,10 +30,34 @@ mod image {
     }
 }
 
-#[cfg(not(target_arch = "avr"))]
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+mod image {
+    use avr_embassy::Executor;
+    use kerf::baud;
+    use kerf::hal::event;
+    use kerf::hal::imp::{self, panic};
+    use static_cell::StaticCell;
+
+    #[cortex_m_rt::entry]
+    fn main() -> ! {
+        static MAIN: StaticCell<Executor> = StaticCell::new();
+        imp::begin();
+        MAIN.init(Executor::new()).run_with(
+            |main, thread| {
+                if kerf::app::start(main, thread, baud::DEFAULT).is_none() {
+                    panic::halt();
+                }
+                imp::start();
+            },
+            event::turn,
+        )
+    }
+}
+
+#[cfg(not(target_os = "none"))]
 mod cli;
 
-#[cfg(not(target_arch = "avr"))]
+#[cfg(not(target_os = "none"))]
 fn main() -> std::process::ExitCode {
     cli::run()
 }

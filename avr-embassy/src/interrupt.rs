@@ -29,13 +29,22 @@ pub use avr::start;
 #[cfg(target_arch = "avr")]
 pub(crate) use avr::{handler, idle};
 
-#[cfg(not(target_arch = "avr"))]
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+mod cortex_m;
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+use cortex_m as imp;
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub use cortex_m::start;
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub(crate) use cortex_m::{idle, run};
+
+#[cfg(not(target_os = "none"))]
 mod host;
-#[cfg(not(target_arch = "avr"))]
+#[cfg(not(target_os = "none"))]
 use host as imp;
-#[cfg(not(target_arch = "avr"))]
+#[cfg(not(target_os = "none"))]
 pub use host::start;
-#[cfg(not(target_arch = "avr"))]
+#[cfg(not(target_os = "none"))]
 pub(crate) use host::{executor, idle, take_request};
 
 pub(crate) use imp::woken;

@@ -54,13 +54,13 @@
 #![no_std]
 #![cfg_attr(target_arch = "avr", feature(asm_experimental_arch, optimize_attribute))]
 
-#[cfg(not(target_arch = "avr"))]
+#[cfg(not(target_os = "none"))]
 #[doc(hidden)]
 pub extern crate std;
 
 /// Declares a value that a machine has one of, as a function that returns `&'static` to it.
 ///
-/// On AVR it is a static. On the host each thread is a machine of its own, so that tests run side
+/// In an image it is a static. On the host each thread is a machine of its own, so that tests run side
 /// by side: the value is made on the thread's first use.
 ///
 /// ```
@@ -80,12 +80,12 @@ macro_rules! machine_static {
         $(#[$meta])*
         #[inline(always)]
         $vis fn $name() -> &'static $type {
-            #[cfg(target_arch = "avr")]
+            #[cfg(target_os = "none")]
             {
                 static VALUE: $type = $init;
                 &VALUE
             }
-            #[cfg(not(target_arch = "avr"))]
+            #[cfg(not(target_os = "none"))]
             {
                 $crate::std::thread_local!(static VALUE: &'static $type =
                     $crate::std::boxed::Box::leak($crate::std::boxed::Box::new($init)));
@@ -101,10 +101,16 @@ mod baton;
 pub mod byte;
 #[cfg(target_arch = "avr")]
 mod chip;
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[path = "chip/rp2040.rs"]
+mod chip;
 pub mod event;
 #[cfg(target_arch = "avr")]
 mod executor;
-#[cfg(not(target_arch = "avr"))]
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[path = "executor/cortex_m.rs"]
+mod executor;
+#[cfg(not(target_os = "none"))]
 pub mod host;
 pub mod interrupt;
 mod level;
@@ -120,7 +126,7 @@ mod value;
 
 pub use baton::Baton;
 pub use event::{Event, Waiter};
-#[cfg(target_arch = "avr")]
+#[cfg(target_os = "none")]
 pub use executor::Executor;
 pub use level::{Ceiling, Interrupt, Thread};
 pub use shared::{InterruptEnd, Place, Shared};
@@ -140,6 +146,8 @@ pub fn mask<R>(act: impl FnOnce() -> R) -> R {
         unsafe { core::arch::asm!("out 0x3F, {status}", status = in(reg) status) };
         result
     }
-    #[cfg(not(target_arch = "avr"))]
+    #[cfg(all(target_arch = "arm", target_os = "none"))]
+    return cortex_m::interrupt::free(|_| act());
+    #[cfg(not(target_os = "none"))]
     act()
 }

@@ -2,7 +2,7 @@
 
 pub use imp::Value;
 
-#[cfg(target_arch = "avr")]
+#[cfg(target_os = "none")]
 mod imp {
     use core::cell::UnsafeCell;
 
@@ -34,7 +34,7 @@ mod imp {
     }
 }
 
-#[cfg(not(target_arch = "avr"))]
+#[cfg(not(target_os = "none"))]
 mod imp {
     use std::sync::RwLock;
 

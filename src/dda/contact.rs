@@ -46,6 +46,15 @@ pub fn mark(dda: &Dda, tail: u8) {
     });
 }
 
+/// As [`mark`] where the generator is ahead of the pins, by so many steps of each motor.
+pub fn mark_behind(dda: &Dda, tail: u8, ahead: &[i32; MOTORS]) {
+    contact().pass(NONE, NONE, |contact| {
+        contact.follow.begin(dda);
+        contact.follow.add(ahead);
+        contact.tail = tail;
+    });
+}
+
 /// It was a contact, where the generator was marked. Look interrupt only.
 #[small]
 pub fn note() {

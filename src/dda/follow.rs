@@ -37,6 +37,13 @@ impl Follow {
         self.advance(&dda.increment, dda.ticks);
     }
 
+    /// The generator had made so many steps more than the motors.
+    pub fn add(&mut self, steps: &[i32; MOTORS]) {
+        for (steps, more) in self.steps.iter_mut().zip(steps) {
+            *steps = steps.wrapping_add(*more);
+        }
+    }
+
     /// The generator runs a segment.
     pub fn run(&mut self, segment: &Segment) {
         let turned = segment.backwards ^ self.backwards;

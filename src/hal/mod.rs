@@ -1,8 +1,8 @@
 //! The hardware, and what stands in for it on the host.
 //!
 //! Executors, rings, event bits and the ceiling lock are those of [`avr_embassy`]; this module says what Kerf
-//! uses them for. `avr` owns all the registers and nearly all the `unsafe`; `host` is the same over
-//! mocked time. Exactly one of the two is compiled, under the name [`imp`]. What both have is written down as traits in [`contract`] and
+//! uses them for. `avr` and `rp2040` own all the registers of their chips and nearly all the `unsafe`; `host` is the same over
+//! mocked time. Exactly one of the three is compiled, under the name [`imp`]. What both have is written down as traits in [`contract`] and
 //! [`primitives`]; all other code calls that, as `hal::stepper::go()`, and does not know which it is.
 
 pub use avr_embassy::{Ceiling, Interrupt, Thread, byte, ring};
@@ -16,6 +16,12 @@ pub use contract::{
 pub use place::Never;
 pub use primitives::{arithmetic, float, text};
 
+/// Waits so many milliseconds. The tick of `embassy-time` is the chip's.
+#[inline(always)]
+pub fn after_ms(ms: u64) -> embassy_time::Timer {
+    embassy_time::Timer::after_ticks(ms * (embassy_time::TICK_HZ / 1_000))
+}
+
 pub mod contract;
 pub mod event;
 pub mod exec;
@@ -28,6 +34,15 @@ pub mod serial;
 #[cfg(target_arch = "avr")]
 #[path = "avr/mod.rs"]
 pub mod imp;
-#[cfg(not(target_arch = "avr"))]
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[path = "rp2040/mod.rs"]
+pub mod imp;
+#[cfg(not(target_os = "none"))]
 #[path = "host/mod.rs"]
 pub mod imp;
+
+/// A part of `rp2040` that is plain Rust, for its tests.
+#[cfg(test)]
+#[allow(dead_code)]
+#[path = "rp2040/stepper/words.rs"]
+mod words;

@@ -127,7 +127,7 @@ impl Chain {
         let [x, y, z, ..] = self.way.map(i16::unsigned_abs);
         self.dominant = if z > x && z > y { 2 } else { u8::from(y > x) };
         let far = whole(scaled(feed, FEED_LOG2));
-        self.most = if far < MOST.into() { far as u16 } else { MOST };
+        self.most = if far < u32::from(MOST) { far as u16 } else { MOST };
         let (way, ends) = turned(&self.way, self.dominant);
         let over = way.unsigned_abs();
         if over == 0 || over >= self.most {

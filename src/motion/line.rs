@@ -169,7 +169,7 @@ impl Builder {
             }
             let way = motor.stride(machine.ratio(m), to);
             let size = way.unsigned_abs();
-            if size > STEPS_MAX.into() {
+            if size > u64::from(STEPS_MAX) {
                 parts = parts.max(parts_of(size));
             }
             steps[m] = way as i16;

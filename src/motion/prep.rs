@@ -427,7 +427,7 @@ impl Prep {
         let mut ticks = whole_ticks(fine, shift);
         let grain = grain(ticks, shift);
         let short = (travel as u16).wrapping_sub(at & !rest) & (bit(grain) - 1);
-        if travel <= short.into() {
+        if travel <= u32::from(short) {
             return self.idle(cycles, out);
         }
         // Whole ticks of the travel without what is short.
@@ -435,7 +435,7 @@ impl Prep {
         if short > part {
             ticks -= u32::from((short - part + rest) >> shift);
         }
-        let ticks = if ticks > TICKS_MAX.into() { TICKS_MAX } else { ticks as u16 };
+        let ticks = if ticks > u32::from(TICKS_MAX) { TICKS_MAX } else { ticks as u16 };
         let period = self.period(cycles, fine, shift);
         if period > PERIOD_MAX {
             return self.idle(cycles, out);
@@ -465,7 +465,7 @@ impl Prep {
         if exact || most == 0 || !self.parts || cycles >> 24 != 0 {
             return self.last_of(cycles, limit, exact, out);
         }
-        if most < HALF.into() {
+        if most < u16::from(HALF) {
             // Nothing moves yet: the next block goes all the way.
             self.left = 0;
             return self.last_of(cycles, limit, exact, out);
@@ -560,7 +560,7 @@ impl Prep {
             return false;
         }
         let (mut fine, mut shift) = coarsen(left, limit);
-        if exact && left < STEP.into() {
+        if exact && left < u32::from(STEP) {
             let fits = left.trailing_zeros() as u8;
             if fits > shift {
                 // The rest of it, in no more ticks than need be.
@@ -595,7 +595,7 @@ impl Prep {
     fn most_ticks(&self, cycles: u32, travel: u32) -> u16 {
         if self.fine {
             let fine = self.limit(cycles, self.paces().fine);
-            if travel >> (STEP_LOG2 - 2) <= fine.into() {
+            if travel >> (STEP_LOG2 - 2) <= u32::from(fine) {
                 return fine;
             }
         }
@@ -846,11 +846,11 @@ const _: () = assert!(limit_in_parts(TICKS_MAX) >> FINE == TICKS_MAX);
 #[inline(never)]
 fn coarsen(travel: u32, limit: u16) -> (u32, u8) {
     let limit = limit_in_parts(limit);
-    if travel <= limit.into() {
+    if travel <= u32::from(limit) {
         return coarsen_little(travel, limit);
     }
     let (mut fine, mut shift) = (travel, FINE);
-    if fine >> 8 > limit.into() {
+    if fine >> 8 > u32::from(limit) {
         (fine, shift) = (fine >> 8, FINE + 8);
     }
     while fine > 0xFFFF && shift < STEP_LOG2 {

@@ -156,7 +156,7 @@ impl Motor {
         let to = Self::at(ratio, position);
         let steps = to.steps.checked_sub(self.steps)?;
         let way = steps.checked_mul(PARTS.into())? + i32::from(to.told) - i32::from(self.told);
-        if way.unsigned_abs() > PARTS_MAX.into() {
+        if way.unsigned_abs() > u32::from(PARTS_MAX) {
             return None;
         }
         *self = to;

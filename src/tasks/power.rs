@@ -4,14 +4,13 @@
 //! [`LOOK_MS`] between looks, and sees to the [`health`] of all besides. Exec calls [`segment`] before it queues one, so that a driver is on before
 //! its step; that costs 40 cycles a segment. Everyone else changes the state under the ceiling.
 
-use embassy_time::Timer;
-
 use super::common;
 use super::health;
 use super::links::Links;
 use super::{surface, turning};
 use crate::config::Settings;
 use crate::hal::Thread;
+use crate::hal::after_ms;
 use crate::hal::gpio;
 use crate::hal::time::millis;
 use crate::machine;
@@ -32,7 +31,7 @@ pub async fn run(links: &'static Links) -> ! {
             // Perhaps for long enough.
             links.planner_wake.signal();
         }
-        Timer::after_ticks(LOOK_MS).await;
+        after_ms(LOOK_MS).await;
     }
 }
 

@@ -8,7 +8,6 @@
 
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
-use embassy_time::Timer;
 use kerf_macros::small;
 
 use super::health;
@@ -17,6 +16,7 @@ use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, OTHERS, Port};
 use super::turning;
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
+use crate::hal::after_ms;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::event::Event;
 use crate::hal::flags;
@@ -115,7 +115,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         }
         links.reporter_wake.set_polling(moves && !reports_queue(links));
         if due || moves {
-            let pause = Timer::after_ticks(POLL_MS);
+            let pause = after_ms(POLL_MS);
             select(pause, links.reporter_wake.wait()).await;
         } else {
             links.reporter_wake.wait().await;
@@ -324,7 +324,7 @@ async fn tell_others(links: &Links, notice: Notice) {
             if tell_at_once(links, port, notice) {
                 break;
             }
-            Timer::after_ticks(POLL_MS).await;
+            after_ms(POLL_MS).await;
         }
     }
 }

@@ -12,13 +12,12 @@
 
 use core::cell::Cell;
 
-use embassy_time::Timer;
-
 use super::links::Links;
 use super::ports::COURTESY;
 use super::wake::Wake;
 use crate::config::Setting;
 use crate::gcode::tables::{Edit, Row, Tables};
+use crate::hal::after_ms;
 use crate::hal::eeprom::Eeprom;
 use crate::machine;
 use crate::protocol::{STARTUP_MAX, Store};
@@ -259,7 +258,7 @@ pub async fn run(links: &'static Links) -> ! {
                 };
                 while write.step(&mut memory) {
                     while memory.is_busy() {
-                        Timer::after_ticks(1).await;
+                        after_ms(1).await;
                     }
                 }
             }

@@ -132,7 +132,9 @@ fn wires(board: &Board) -> Vec<Wire> {
     add("probe".into(), board.inputs[inputs::PROBE], "to ground", "G38.2".into());
     add("door".into(), board.inputs[inputs::DOOR], "to ground", "`saf`".into());
     add("emergency stop".into(), board.inputs[inputs::STOP], "to ground", "`est`".into());
-    for (port, name) in board.serial.iter().zip(["USB", "second port"]).skip(1) {
+    // The first port of an Arduino is its USB.
+    let wired = usize::from(!is_numbered(board));
+    for (port, name) in board.serial.iter().zip(["first port", "second port"]).skip(wired) {
         let [rx, tx] = port.usart.pins();
         add(format!("{name}, receives"), Some(rx), "serial", "115,200 baud".into());
         add(format!("{name}, sends"), Some(tx), "serial", "115,200 baud".into());
@@ -153,6 +155,9 @@ fn about(board: &Board) -> &'static str {
         "ramps14" => {
             "An Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder (E0) as A."
         }
+        "pico-cnc" => {
+            "A Raspberry Pi Pico on a breakout board, with four drivers. **Its pins are 3.3 V** and take no more: see [the RP2040](rp2040.md)."
+        }
         _ => "",
     }
 }
@@ -162,12 +167,17 @@ fn header(board: &Board, pin: &str) -> &'static str {
     rows.iter().find(|(name, _)| *name == pin).map_or("", |(_, header)| header)
 }
 
-/// The boards with pins of their own.
+/// Whether a board has the RP2040, whose pins have numbers.
+fn is_numbered(board: &Board) -> bool {
+    board.motors[0].step.port == Port::Gpio
+}
+
+/// The Arduinos with pins of their own.
 pub fn drawn() -> impl Iterator<Item = &'static Board> {
-    let pins =
-        |board: &Board| wires(board).iter().map(|wire| arduino(wire.pin)).collect::<Vec<_>>();
+    let pins = |board: &Board| wires(board).iter().map(|wire| wire.pin).collect::<Vec<_>>();
     let is_first = move |n: usize| !ALL[..n].iter().any(|other| pins(other) == pins(ALL[n]));
-    ALL.into_iter().enumerate().filter(move |(n, _)| is_first(*n)).map(|(_, board)| board)
+    let boards = ALL.into_iter().enumerate().filter(|(_, board)| !is_numbered(board));
+    boards.filter(move |(n, _)| is_first(*n)).map(|(_, board)| board)
 }
 
 /// All of it.
@@ -199,7 +209,18 @@ pub fn markdown() -> String {
             text += "D16 is the firmware's own: leave it open.\n\n";
         }
     }
+    text += &ALL.into_iter().filter(|board| is_numbered(board)).map(numbered).collect::<String>();
     text.trim_end().to_string() + "\n"
+}
+
+/// A board with numbered pins.
+fn numbered(board: &Board) -> String {
+    let mut text = format!("## {}\n\n{}\n\n", board.name, about(board));
+    text += "| what | pin | level | setting |\n|---|---|---|---|\n";
+    for Wire { what, pin, level, setting } in wires(board) {
+        text += &format!("| {what} | GP{} | {level} | {setting} |\n", pin.bit);
+    }
+    text + "\n"
 }
 
 /// The headers of a Mega: their pins from left to right, as they lie, USB to the left, and the place of the first.

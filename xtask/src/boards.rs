@@ -18,6 +18,9 @@ pub enum Board {
     /// Arduino Mega 2560 with a grbl-style shield, on a lathe
     #[value(name = "mega2560-lathe")]
     Mega2560Lathe,
+    /// Raspberry Pi Pico on a breakout board
+    #[value(name = "pico-cnc")]
+    PicoCnc,
     /// Arduino Mega 2560 with RAMPS 1.4
     #[value(name = "ramps14")]
     Ramps14,
@@ -37,11 +40,17 @@ impl Board {
         listed(&text).with_context(|| format!("no line `features: &[...]` in {}", file.display()))
     }
 
+    /// Whether its chip is the RP2040; of the others it is the ATmega2560.
+    pub fn is_rp2040(self) -> bool {
+        matches!(self, Board::PicoCnc)
+    }
+
     /// The name in `boards/`, on the command line and after `board-` in the package's features.
     pub fn name(self) -> &'static str {
         match self {
             Board::Mega2560Grbl => "mega2560-grbl",
             Board::Mega2560Lathe => "mega2560-lathe",
+            Board::PicoCnc => "pico-cnc",
             Board::Ramps14 => "ramps14",
         }
     }

@@ -11,6 +11,7 @@ use crate::elf;
 use crate::firmware;
 use crate::machines::Machine;
 use crate::process::{host_cargo, probe, root, run as run_child, which};
+use crate::rp2040::emulator;
 use crate::setup::{self, Scope};
 use crate::size;
 
@@ -21,7 +22,7 @@ struct Stage {
 }
 
 const STAGES: &[Stage] = &[
-    Stage { name: "tools", run: || setup::ensure(Scope::Simulator) },
+    Stage { name: "tools", run: || setup::ensure(Scope::Emulator) },
     Stage { name: "format", run: format },
     Stage { name: "lints", run: lints },
     Stage { name: "documentation", run: documentation },
@@ -30,6 +31,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "an image without capabilities", run: build_without },
     Stage { name: "examples of avr-embassy", run: || firmware::build_examples().map(drop) },
     Stage { name: "sizes and stack of every board", run: size_all },
+    Stage { name: "the emulated RP2040", run: emulated },
     Stage { name: "simulator tests", run: simulator_tests },
     Stage { name: "real senders", run: || crate::senders::run(&Default::default()) },
     Stage { name: "the page in a browser", run: crate::web::test },
@@ -120,9 +122,18 @@ fn build_without() -> Result<()> {
 }
 
 fn size_all() -> Result<()> {
-    Board::all()
-        .iter()
-        .try_for_each(|board| size::show(&firmware::image(*board, Machine::default())))
+    Board::all().iter().try_for_each(|board| {
+        size::show_board(*board, &firmware::image(*board, Machine::default()))
+    })
+}
+
+/// The board whose chip is emulated: what is put right in the emulator, and the image in it.
+fn emulated() -> Result<()> {
+    emulator::test()?;
+    let mut test = host_cargo();
+    test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());
+    test.args(["test", "--package", "kerf-sim", "--profile", "sim", "--test", "pico"]);
+    run_child(test.args(["--", "--ignored"]))
 }
 
 fn simulator_tests() -> Result<()> {

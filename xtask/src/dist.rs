@@ -1,6 +1,6 @@
 //! `cargo xtask dist`: the files of a release, in `target/dist`.
 //!
-//! For each board a `.hex` that avrdude takes, made from the image that the tests run; the settings as a JSON schema; the licences; and
+//! For each board a `.hex` that avrdude takes, or the `.uf2` of a boot loader, made from the image that the tests run; the settings as a JSON schema; the licences; and
 //! checksums of all of them.
 
 mod hex;
@@ -15,6 +15,7 @@ use crate::boards::Board;
 use crate::firmware;
 use crate::machines::Machine;
 use crate::process::root;
+use crate::rp2040::uf2;
 use crate::setup::{self, Scope};
 
 /// Files that are as they are in the repository.
@@ -25,7 +26,7 @@ const SUMS: &str = "SHA256SUMS";
 
 /// Builds the images, and writes the files.
 pub fn run() -> Result<()> {
-    setup::ensure(Scope::Firmware)?;
+    setup::ensure(Scope::Arm)?;
     let folder = root().join("target/dist");
     if folder.exists() {
         fs::remove_dir_all(&folder)
@@ -35,9 +36,13 @@ pub fn run() -> Result<()> {
     let mut written = Vec::new();
     for board in Board::all() {
         let elf = firmware::build(*board, Machine::default())?;
-        let path = folder.join(format!("kerf-{board}.hex"));
         let image = fs::read(&elf)?;
-        fs::write(&path, hex::of_elf(&image)?)?;
+        let (kind, bytes) = match board.is_rp2040() {
+            true => ("uf2", uf2::of_elf(&image)?),
+            false => ("hex", hex::of_elf(&image)?.into()),
+        };
+        let path = folder.join(format!("kerf-{board}.{kind}"));
+        fs::write(&path, bytes)?;
         written.push(path);
     }
     for file in COPIED {

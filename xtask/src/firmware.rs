@@ -10,6 +10,7 @@ use crate::chips::{ATMEGA1284P, ATMEGA2560, Chip};
 use crate::elf;
 use crate::machines::Machine;
 use crate::process::{self, root, run};
+use crate::rp2040;
 use crate::setup::{self, Scope};
 use crate::shrink::{self, link};
 use crate::toolchain::Toolchain;
@@ -70,6 +71,9 @@ pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
 pub fn build_without(board: Board, machine: Machine, without: &[String]) -> Result<PathBuf> {
     let features = features(board, machine, without)?;
     let image = image_without(board, machine, without);
+    if board.is_rp2040() {
+        return rp2040::build(&features, &image);
+    }
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
     let target = target(&ATMEGA2560);
     let kept = target.join("kept").join(image.with_extension("").file_name().unwrap_or_default());
@@ -180,7 +184,7 @@ pub struct FlashArgs {
     /// The machine whose settings are the defaults
     #[arg(long, value_enum, default_value_t)]
     machine: Machine,
-    /// The board's serial port, such as /dev/ttyACM0
+    /// The board's serial port, such as /dev/ttyACM0; of a Pico in its boot loader the drive that it shows, such as /media/me/RPI-RP2
     #[arg(long)]
     port: String,
     /// Only print the command
@@ -188,10 +192,24 @@ pub struct FlashArgs {
     dry_run: bool,
 }
 
+/// Copies an image to the drive of a boot loader, which writes it and starts it.
+fn copy_to_drive(image: &Path, args: &FlashArgs) -> Result<()> {
+    let to = Path::new(&args.port).join("kerf.uf2");
+    println!("cp {} {}", image.display(), to.display());
+    if args.dry_run {
+        return Ok(());
+    }
+    std::fs::copy(image, &to).context("is the board in its boot loader, and the drive right?")?;
+    Ok(())
+}
+
 /// Builds, then writes the image through the boot loader of the board.
 pub fn flash(args: &FlashArgs) -> Result<()> {
-    setup::ensure(Scope::Firmware)?;
+    setup::ensure(if args.board.is_rp2040() { Scope::Arm } else { Scope::Firmware })?;
     let elf = build(args.board, args.machine)?;
+    if args.board.is_rp2040() {
+        return copy_to_drive(&elf.with_extension("uf2"), args);
+    }
     let mut avrdude = avrdude(&args.port, &elf);
     println!("{}", process::shown(&avrdude));
     if args.dry_run {

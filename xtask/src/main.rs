@@ -9,6 +9,7 @@
 //! | [`shrink`] | makes the image smaller before the link |
 //! | [`elf`] | what is in an image: sizes, stack, what must not be in it |
 //! | [`size`], [`caps`] | prints and limits what an image takes |
+//! | [`rp2040`] | boards with another chip: images, UF2, the emulator |
 //! | [`dist`] | writes the files of a release |
 //! | [`sim`] | runs the image on the simulated board |
 //! | [`settings`] | saves and loads the settings of a machine |
@@ -40,6 +41,7 @@ mod machines;
 mod nist;
 mod npm;
 mod process;
+mod rp2040;
 #[cfg(test)]
 mod seam;
 mod senders;
@@ -151,7 +153,7 @@ const DESCRIBE: [&str; 8] =
     ["test", "--quiet", "--package", "kerf", "--test", "docs", "--", "--ignored"];
 
 fn build(args: &BuildArgs) -> anyhow::Result<()> {
-    setup::ensure(Scope::Firmware)?;
+    setup::ensure(if args.board.is_rp2040() { Scope::Arm } else { Scope::Firmware })?;
     let elf = firmware::build_without(args.board, args.machine, &args.without)?;
     println!("elf: {}", elf.display());
     Ok(())

@@ -11,6 +11,7 @@ use crate::boards::Board;
 use crate::firmware;
 use crate::machines::Machine;
 use crate::process::{become_program, host_cargo, pass_through, root, run as run_child};
+use crate::rp2040::emulator;
 use crate::setup::{self, Scope};
 
 /// `cargo xtask sim`
@@ -110,7 +111,12 @@ pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
 
 /// Gets everything that the simulator needs, and builds the firmware; where that lies.
 pub fn prepare(board: Board, machine: Machine) -> Result<PathBuf> {
-    setup::ensure(Scope::Simulator)?;
+    if board.is_rp2040() {
+        setup::ensure(Scope::Emulator)?;
+        emulator::install()?;
+    } else {
+        setup::ensure(Scope::Simulator)?;
+    }
     let elf = firmware::build(board, machine)?;
     if !root().join("target/sim/kerf-sim").exists() {
         eprintln!("building the simulator: some minutes, this once");

@@ -12,6 +12,7 @@ use crate::elf::stack::{Chain, Stack};
 use crate::elf::{self, Image, Sizes, Symbol};
 use crate::firmware;
 use crate::machines::Machine;
+use crate::rp2040;
 use crate::setup::{self, Scope};
 use crate::shrink::hot;
 
@@ -31,14 +32,19 @@ pub struct SizeArgs {
 
 /// Builds, prints, and fails past a cap.
 pub fn run(args: &SizeArgs) -> Result<()> {
-    setup::ensure(Scope::Firmware)?;
+    setup::ensure(if args.board.is_rp2040() { Scope::Arm } else { Scope::Firmware })?;
     match &args.elf {
         Some(path) => {
             elf::check(path)?;
             show(path)
         }
-        None => show(&firmware::build(args.board, Machine::default())?),
+        None => show_board(args.board, &firmware::build(args.board, Machine::default())?),
     }
+}
+
+/// As [`show`], for the image of a board.
+pub fn show_board(board: Board, elf: &Path) -> Result<()> {
+    if board.is_rp2040() { rp2040::show(elf) } else { show(elf) }
 }
 
 /// Prints what an image takes, and fails past a cap, or if the stack has no bound.

@@ -62,7 +62,7 @@ pub(super) const MASKS: (u8, [u8; 3]) = {
             match pin.interrupt() {
                 Some(Interrupt::External(n)) => external |= 1 << n,
                 Some(Interrupt::PinChange(n)) => change[n as usize / 8] |= 1 << (n % 8),
-                None => {}
+                Some(Interrupt::Gpio(_)) | None => {}
             }
         }
         i += 1;

@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
-use crate::machine::Machine;
 use crate::protocol::{Incoming, Response, classify, control_name, is_idle, state_of};
+use crate::runs::Runs;
 
 /// Lines in flight unless asked otherwise.
 pub const LINES_IN_FLIGHT: usize = 4;
@@ -131,18 +131,18 @@ impl Host {
     }
 
     /// Runs the machine to a cycle, sending and listening.
-    pub fn run_until(&mut self, machine: &mut Machine, cycle: u64) -> Result<()> {
+    pub fn run_until(&mut self, machine: &mut impl Runs, cycle: u64) -> Result<()> {
         while self.run_until_line(machine, cycle)? {}
         Ok(())
     }
 
     /// Runs the machine for a time, sending and listening.
-    pub fn run_for_ms(&mut self, machine: &mut Machine, ms: u64) -> Result<()> {
+    pub fn run_for_ms(&mut self, machine: &mut impl Runs, ms: u64) -> Result<()> {
         self.run_until(machine, machine.cycle() + machine.cycles(ms))
     }
 
     /// Like `run_until`, but stops after any line from the firmware. False when time is up.
-    pub fn run_until_line(&mut self, machine: &mut Machine, cycle: u64) -> Result<bool> {
+    pub fn run_until_line(&mut self, machine: &mut impl Runs, cycle: u64) -> Result<bool> {
         self.fill(machine);
         while let Some((at, byte)) = self.interjections.front().copied()
             && at <= machine.cycle()
@@ -158,7 +158,7 @@ impl Host {
     }
 
     /// Runs until the banner comes, then a little for the line to fall silent.
-    pub fn boot(&mut self, machine: &mut Machine, timeout_ms: u64) -> Result<()> {
+    pub fn boot(&mut self, machine: &mut impl Runs, timeout_ms: u64) -> Result<()> {
         let seen = self.banners;
         let end = machine.cycle() + machine.cycles(timeout_ms);
         while self.banners == seen {
@@ -169,8 +169,8 @@ impl Host {
         self.run_for_ms(machine, 50)
     }
 
-    fn no_banner(&self, machine: &Machine, timeout_ms: u64) -> String {
-        let garbled = machine.wire().garbled();
+    fn no_banner(&self, machine: &impl Runs, timeout_ms: u64) -> String {
+        let garbled = machine.garbled();
         let heard = match self.strays.last() {
             _ if garbled > 0 => format!("{garbled} bytes came at another speed"),
             Some(line) => format!("last heard: {line}"),
@@ -180,7 +180,7 @@ impl Host {
     }
 
     /// Sends a line at once, ahead of those queued and whatever is in flight.
-    pub fn send(&mut self, machine: &mut Machine, number: usize, text: &str) {
+    pub fn send(&mut self, machine: &mut impl Runs, number: usize, text: &str) {
         machine.send(text.as_bytes());
         machine.send(b"\n");
         let name = control_name(text);
@@ -188,7 +188,12 @@ impl Host {
     }
 
     /// Sends a line at once and waits for its answer.
-    pub fn ask(&mut self, machine: &mut Machine, text: &str, timeout_ms: u64) -> Result<Response> {
+    pub fn ask(
+        &mut self,
+        machine: &mut impl Runs,
+        text: &str,
+        timeout_ms: u64,
+    ) -> Result<Response> {
         const ASKED: usize = usize::MAX;
         self.send(machine, ASKED, text);
         let end = machine.cycle() + machine.cycles(timeout_ms);
@@ -204,7 +209,7 @@ impl Host {
     }
 
     /// Has the firmware change to another speed and follows it.
-    pub fn change_speed(&mut self, machine: &mut Machine, baud: u32) -> Result<()> {
+    pub fn change_speed(&mut self, machine: &mut impl Runs, baud: u32) -> Result<()> {
         let response = self.ask(machine, &format!("{{baud:{baud}}}"), 1_000)?;
         if response.status != 0 {
             bail!("the firmware refuses {baud} baud with status {}", response.status);
@@ -214,14 +219,14 @@ impl Host {
         Ok(())
     }
 
-    fn fill(&mut self, machine: &mut Machine) {
+    fn fill(&mut self, machine: &mut impl Runs) {
         while self.awaiting.len() < self.limit {
             let Some((number, text)) = self.queue.pop_front() else { return };
             self.send(machine, number, &text);
         }
     }
 
-    fn listen(&mut self, machine: &mut Machine) {
+    fn listen(&mut self, machine: &mut impl Runs) {
         for byte in machine.receive() {
             if byte != b'\n' && byte != b'\r' {
                 self.partial.push(byte);

@@ -15,12 +15,14 @@ use crate::oracle::{self, Outcome, Setup, Unclear};
 use crate::pauses::Scale;
 use crate::protocol::STATUS_NOOP;
 use crate::report::{Measured, Rejected, Report};
+use crate::runs::Runs;
 use crate::trace::Trace;
 
 pub use setup::read_setup;
+pub(crate) use watch::{POLL, Watch};
 
 /// How long a reset may take, ms of AVR time.
-const BOOT_MS: u64 = 5_000;
+pub(crate) const BOOT_MS: u64 = 5_000;
 /// How long a setting may take.
 const ASK_MS: u64 = 5_000;
 /// Longer than between two bytes that are written to the EEPROM.
@@ -127,6 +129,24 @@ fn may_wait(line: &str) -> bool {
     numbers.filter_map(|digits| digits.parse::<u32>().ok()).any(|n| matches!(n, 0 | 1 | 6 | 60))
 }
 
+/// Sends settings, each of which must be taken, and what lets a job of these lines go on by itself.
+pub(crate) fn ask_settings(
+    machine: &mut impl Runs,
+    host: &mut Host,
+    lines: &Lines,
+    settings: &[String],
+) -> Result<()> {
+    let waits = lines.iter().any(|(_, line)| may_wait(line));
+    let go_on = waits.then(|| GO_ON.to_string());
+    for line in go_on.iter().chain(settings) {
+        let response = host.ask(machine, line, ASK_MS)?;
+        if response.status != 0 {
+            bail!("the firmware refuses {line} with status {}: {}", response.status, response.raw);
+        }
+    }
+    Ok(())
+}
+
 /// Boots the machine, runs a job on it and says how it went. An error means that the job could not
 /// begin; all that goes wrong later is in the report. `progress` gets the lines answered so far.
 pub fn run(
@@ -140,14 +160,7 @@ pub fn run(
     if let Some(baud) = options.baud {
         host.change_speed(machine, baud)?;
     }
-    let waits = lines.iter().any(|(_, line)| may_wait(line));
-    let go_on = waits.then(|| GO_ON.to_string());
-    for line in go_on.iter().chain(&options.settings) {
-        let response = host.ask(machine, line, ASK_MS)?;
-        if response.status != 0 {
-            bail!("the firmware refuses {line} with status {}: {}", response.status, response.raw);
-        }
-    }
+    ask_settings(machine, &mut host, lines, &options.settings)?;
     put_away(machine, &mut host)?;
     let setup = read_setup(machine, &mut host)?;
     let expected = oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup);

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 use std::ptr::NonNull;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use kerf::boards::{Board, Pin, Usart};
 
 use crate::bus::Bus;
@@ -12,6 +12,7 @@ use crate::chip::{ATMEGA2560, Chip};
 use crate::counts::Counts;
 use crate::cpu::{Cpu, Mode};
 use crate::eeprom;
+use crate::emulated::is_emulated;
 use crate::image::Image;
 use crate::mechanics::{Build, Mechanics};
 use crate::meters::{Meters, Window};
@@ -96,11 +97,14 @@ pub struct Machine {
 impl Machine {
     /// A board, with this image in its chip's flash, at cycle 0. Its serial line runs at 115200 baud.
     pub fn new(image: Image, board: &'static Board) -> Result<Self> {
+        ensure!(!is_emulated(board), "the board {} is emulated, not simulated", board.name);
         let wires = board.serial.iter().map(|serial| {
             let usart = match serial.usart {
                 Usart::U0 => 0,
                 Usart::U1 => 1,
                 Usart::U3 => 3,
+                // Of the RP2040, which is emulated: see above.
+                Usart::Uart0 | Usart::Uart1 => 0,
             };
             (usart, Wire::new(board.clock_hz, serial.rate))
         });

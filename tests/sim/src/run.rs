@@ -7,6 +7,7 @@ use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use kerf::boards::{self, Board};
 use kerf_sim::Machine;
+use kerf_sim::emulated::{self, Emulated};
 use kerf_sim::job::{self, Options};
 use kerf_sim::mechanics::Build;
 use kerf_sim::plot::{self, Look};
@@ -27,6 +28,9 @@ pub fn board(name: &str) -> Result<&'static Board> {
 pub fn run(args: &RunArgs) -> Result<bool> {
     let lines = job::read_lines(&args.job)?;
     let board = board(&args.target.board)?;
+    if emulated::is_emulated(board) {
+        return run_emulated(args, board, &lines);
+    }
     let mut machine = Machine::load(&args.target.elf, board)?;
     let mut settings = Vec::new();
     if let Some(pulses) = args.spindle {
@@ -65,6 +69,28 @@ pub fn run(args: &RunArgs) -> Result<bool> {
         false => print!("{text}"),
     }
     Ok(report.ok)
+}
+
+/// Runs a job on a board whose chip is emulated.
+fn run_emulated(args: &RunArgs, board: &'static Board, lines: &job::Lines) -> Result<bool> {
+    emulated::job::check(&[
+        ("--baud", args.baud.is_some()),
+        ("--spindle", args.spindle.is_some()),
+        ("--report", args.report.is_some()),
+        ("--vcd", args.vcd.is_some()),
+        ("--plot", args.plot.is_some()),
+    ])?;
+    let mut machine = Emulated::load(&args.target.elf, board)?;
+    let bar = progress_bar(lines.len(), args.quiet)?;
+    let progress = |done| bar.set_position(done as u64);
+    let report = emulated::job::run(&mut machine, lines, &args.settings, args.in_flight, progress)?;
+    bar.finish_and_clear();
+    let text = report.to_string();
+    match args.quiet {
+        true => println!("{}", text.lines().last().unwrap_or_default()),
+        false => print!("{text}"),
+    }
+    Ok(report.problems.is_empty())
 }
 
 /// A bar on a terminal, nothing elsewhere.

@@ -13,6 +13,10 @@ pub enum Scope {
     Firmware,
     /// Building the simulator as well.
     Simulator,
+    /// Building for the RP2040.
+    Arm,
+    /// Running its emulator, beside the simulator.
+    Emulator,
     /// Building the fuzzers, and nothing else.
     Fuzzers,
     /// Running senders at the simulator.
@@ -31,6 +35,10 @@ impl Scope {
     pub(super) fn covers(self, need: Scope) -> bool {
         match self {
             Scope::Everything => true,
+            Scope::Arm => need == Scope::Arm || Scope::Firmware.covers(need),
+            Scope::Emulator => {
+                matches!(need, Scope::Arm | Scope::Senders) || Scope::Simulator.covers(need)
+            }
             Scope::Fuzzers => need == Scope::Fuzzers,
             Scope::Senders => {
                 matches!(need, Scope::Senders | Scope::Python) || Scope::Simulator.covers(need)
@@ -58,7 +66,7 @@ pub struct Need {
 }
 
 /// Everything, in the order in which it is reported.
-pub static NEEDS: [Need; 11] = [
+pub static NEEDS: [Need; 12] = [
     Need {
         what: "Rust with its library sources (rustup nightly with rust-src, or Debian's)",
         packages: &["rustc-web", "cargo-web", "rust-web-src"],
@@ -79,6 +87,7 @@ pub static NEEDS: [Need; 11] = [
         let libraries = ["--exists", "libelf", "zlib", "libzstd"];
         probe(Command::new("pkg-config").args(libraries)).is_some()
     }),
+    tool("LLD, which links the firmware of the RP2040", &["lld"], Scope::Arm, || has("ld.lld")),
     tool("a C++ compiler, for libFuzzer", &["g++"], Scope::Fuzzers, || has("c++")),
     tool(
         "node and npm, for senders and the page",
@@ -160,6 +169,8 @@ mod tests {
         let needs = |scope: Scope| NEEDS.iter().filter(|n| scope.covers(n.scope)).count();
         assert_eq!(needs(Scope::Firmware), 4);
         assert_eq!(needs(Scope::Simulator), 7);
+        assert_eq!(needs(Scope::Arm), 5);
+        assert_eq!(needs(Scope::Emulator), 9);
         assert_eq!(needs(Scope::Fuzzers), 1);
         assert_eq!(needs(Scope::Senders), 9);
         assert_eq!(needs(Scope::Web), 1);

@@ -6,13 +6,13 @@ use serde_json::Value;
 
 use super::ASK_MS;
 use crate::host::Host;
-use crate::machine::Machine;
 use crate::oracle::{AXES, AxisMode, Decimal, MotorSetup, Setup};
+use crate::runs::Runs;
 
 const AXIS_NAMES: [char; AXES] = ['x', 'y', 'z', 'a', 'b', 'c'];
 
 /// Reads motors and axes from the firmware.
-pub fn read_setup(machine: &mut Machine, host: &mut Host) -> Result<Setup> {
+pub fn read_setup(machine: &mut impl Runs, host: &mut Host) -> Result<Setup> {
     let mut motors = Vec::with_capacity(MOTORS);
     for n in 1..=MOTORS {
         let response = host.ask(machine, &format!("{{{n}:n}}"), ASK_MS)?;
@@ -45,7 +45,7 @@ fn motor_of(group: &Value) -> Option<MotorSetup> {
     })
 }
 
-fn mode_of(machine: &mut Machine, host: &mut Host, axis: usize) -> Result<AxisMode> {
+fn mode_of(machine: &mut impl Runs, host: &mut Host, axis: usize) -> Result<AxisMode> {
     let name = format!("{}am", AXIS_NAMES[axis]);
     let response = host.ask(machine, &format!("{{{name}:n}}"), ASK_MS)?;
     Ok(match response.body.get(&name).and_then(Value::as_i64) {

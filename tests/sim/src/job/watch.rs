@@ -3,8 +3,8 @@
 use anyhow::{Result, bail};
 
 use crate::host::Host;
-use crate::machine::Machine;
 use crate::protocol::is_idle;
+use crate::runs::Runs;
 
 /// Number of the lines that only ask for the machine state.
 pub const POLL: usize = usize::MAX - 1;
@@ -33,9 +33,9 @@ impl Watch {
     }
 
     /// Called now and then while lines are unanswered.
-    pub fn check(&mut self, machine: &mut Machine, host: &mut Host, progress: u64) -> Result<()> {
+    pub fn check(&mut self, machine: &mut impl Runs, host: &mut Host, progress: u64) -> Result<()> {
         let now = machine.cycle();
-        let moved = machine.recorder().last_step().unwrap_or(0);
+        let moved = machine.last_step().unwrap_or(0);
         let since = |then: u64| now.saturating_sub(then);
         if since(moved.max(host.heard_at()).max(progress)) > machine.cycles(DEAD_MS) {
             let line = host.oldest().unwrap_or("nothing");
@@ -57,11 +57,11 @@ impl Watch {
     }
 
     /// Waits until nothing moves and the firmware says so too.
-    pub fn settle(&mut self, machine: &mut Machine, host: &mut Host) -> Result<()> {
+    pub fn settle(&mut self, machine: &mut impl Runs, host: &mut Host) -> Result<()> {
         let began = machine.cycle();
         loop {
             host.run_for_ms(machine, STILL_MS / 4)?;
-            let moved = machine.recorder().last_step().unwrap_or(0).max(began);
+            let moved = machine.last_step().unwrap_or(0).max(began);
             let still = machine.cycle() - moved;
             if still < machine.cycles(STILL_MS) {
                 continue;
@@ -83,7 +83,7 @@ impl Watch {
         }
     }
 
-    fn poll(&mut self, machine: &mut Machine, host: &mut Host) {
+    fn poll(&mut self, machine: &mut impl Runs, host: &mut Host) {
         self.polled_at = Some(machine.cycle());
         host.send(machine, POLL, "{stat:n}");
     }

@@ -1,0 +1,58 @@
+//! The thread-mode executor and its loop on Cortex-M.
+//!
+//! It is `embassy_executor::raw`'s. The loop is our own, for it does what `embassy_executor::Executor` has no place for: it turns event bits into
+//! wake-ups, and tells interrupt mode when thread mode has nothing left to do.
+
+use cortex_m::asm::wfe;
+use embassy_executor::{Spawner, raw};
+
+use crate::event::{self, flags};
+use crate::{Thread, interrupt, pender};
+
+/// The thread-mode executor. It lives in a `static_cell::StaticCell`, for example.
+pub struct Executor(raw::Executor);
+
+impl Executor {
+    /// An executor without tasks.
+    #[expect(clippy::new_without_default, reason = "as Embassy's own executors")]
+    pub fn new() -> Self {
+        Self(raw::Executor::new(pender::THREAD))
+    }
+
+    /// Runs for ever: `init` spawns the tasks, with interrupts off; then interrupts are on, and the CPU sleeps whenever there is nothing to do.
+    pub fn run(&'static mut self, init: impl FnOnce(Spawner, Thread)) -> ! {
+        self.run_with(init, |_, _| ())
+    }
+
+    /// As [`Executor::run`]; besides, `turn` is called with the bits of the events that have happened, each time before
+    /// tasks are polled. It is for what is too small for a task.
+    pub fn run_with(
+        &'static mut self,
+        init: impl FnOnce(Spawner, Thread),
+        mut turn: impl FnMut(Thread, u8),
+    ) -> ! {
+        let executor = &self.0;
+        // SAFETY: this is thread mode.
+        let thread = unsafe { Thread::assume() };
+        cortex_m::interrupt::disable();
+        init(executor.spawner(), thread);
+        // SAFETY: tasks have been spawned and no critical section is open: interrupts may come.
+        unsafe { cortex_m::interrupt::enable() };
+        loop {
+            if flags::all() != 0 {
+                let bits = flags::take();
+                event::dispatch(thread, bits);
+                turn(thread, bits);
+                // SAFETY: called from here only, so never reentered.
+                unsafe { executor.poll() };
+                continue;
+            }
+            // The interrupt executor runs right here if it wants to.
+            interrupt::idle();
+            if flags::all() == 0 {
+                // An event that is set after this look leaves a mark by which `wfe` does not sleep.
+                wfe();
+            }
+        }
+    }
+}

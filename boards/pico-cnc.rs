@@ -1,0 +1,45 @@
+//! Raspberry Pi Pico on a breakout board: four drivers, spindle, switches.
+
+use super::{Board, Encoder, MotorPins, Pwm, Serial, Timer, Usart, gp};
+
+/// Raspberry Pi Pico on a breakout board.
+pub const PICO_CNC: Board = Board {
+    name: "pico-cnc",
+    features: &["dialect-tinyg", "dialect-grbl", "cycles", "probing", "jobs", "help", "lathe"],
+    clock_hz: 128_000_000,
+    // Steps side by side, and directions right behind them: one state machine of the PIO has them all.
+    motors: [
+        MotorPins { step: gp(2), dir: gp(6), enable: None },
+        MotorPins { step: gp(3), dir: gp(7), enable: None },
+        MotorPins { step: gp(4), dir: gp(8), enable: None },
+        MotorPins { step: gp(5), dir: gp(9), enable: None },
+    ],
+    enable_all: Some(gp(10)),
+    // Spindle enable, direction and pulses, mist, flood
+    hazards: &[gp(11), gp(12), gp(13), gp(14), gp(15)],
+    outputs: [Some(gp(11)), Some(gp(12)), Some(gp(14)), Some(gp(15))],
+    pwm: Some(Pwm { timer: Timer::Slices, channel: 13 }),
+    // GP0 and GP1; GP20 and GP21
+    serial: &[
+        Serial { usart: Usart::Uart0, rate: 115_200, handshake: None, driver_enable: None },
+        Serial { usart: Usart::Uart1, rate: 115_200, handshake: None, driver_enable: None },
+    ],
+    inputs: [
+        // One for both ends of an axis
+        Some(gp(16)),
+        Some(gp(16)),
+        Some(gp(17)),
+        Some(gp(17)),
+        Some(gp(18)),
+        Some(gp(18)),
+        None,
+        None,
+        // Probe, door, emergency stop
+        Some(gp(19)),
+        Some(gp(22)),
+        Some(gp(26)),
+    ],
+    encoder: Some(Encoder { index: gp(27), sync: gp(28) }),
+    step_timer: Timer::Pio,
+    tick_timer: Timer::SysTick,
+};

@@ -1,0 +1,102 @@
+//! The pulses of the spindle's sensors: the handler of edges ([`super::inputs`]) takes their time, in counts of 4 us.
+//!
+//! A pulse is the falling edge of a pin that has been still for `bounce` before, so that a contact that bounces is one pulse. Who reads does so
+//! with interrupts off for some cycles.
+
+use core::cell::UnsafeCell;
+
+use embassy_rp::pac::TIMER;
+
+use super::{gpio, inputs, mask};
+use crate::boards::{ACTIVE, Pin};
+use crate::capability::Capability;
+use crate::encoder::Pulses;
+
+/// What handler and readers share.
+struct State {
+    pulses: Pulses,
+    in_use: u8,
+    /// How long contacts bounce, counts.
+    bounce: u16,
+    /// When each pin has changed last, counts.
+    edges: [u32; 2],
+}
+
+struct Shared(UnsafeCell<State>);
+
+// SAFETY: the handler of edges, which nothing of ours preempts, and others with interrupts off: see `with`.
+unsafe impl Sync for Shared {}
+
+static STATE: Shared =
+    Shared(UnsafeCell::new(State { pulses: Pulses::NONE, in_use: 0, bounce: 0, edges: [0; 2] }));
+
+fn with<R>(act: impl FnOnce(&mut State) -> R) -> R {
+    // SAFETY: interrupts are off.
+    mask(|| act(unsafe { &mut *STATE.0.get() }))
+}
+
+/// Counts of 4 us since start-up.
+fn counts() -> u32 {
+    TIMER.timerawl().read() / 4
+}
+
+/// The pins of the sensors, index first, if the image can use them.
+fn pins() -> Option<[Pin; 2]> {
+    let encoder = ACTIVE.encoder.filter(|_| Capability::Lathe.is_built_in())?;
+    Some([encoder.index, encoder.sync])
+}
+
+/// Pull-ups. Start-up.
+pub(super) fn start() {
+    pins().into_iter().flatten().for_each(gpio::pull_up);
+}
+
+/// The pins whose edges are a sensor's, as bits of their numbers.
+pub(super) fn watched() -> u32 {
+    pins().into_iter().flatten().fold(0, |bits, pin| bits | 1 << pin.bit)
+}
+
+/// The sensors `lines` are read from now on (bit 0 index, bit 1 sync), whose contacts bounce for so many counts. Thread mode.
+pub fn set_up(lines: u8, bounce: u16) {
+    with(|state| (state.in_use, state.bounce) = (lines, bounce));
+    inputs::leave_out(ACTIVE.shared_inputs(lines));
+}
+
+/// Whether any sensor is read. Any level.
+pub fn is_set_up() -> bool {
+    with(|state| state.in_use != 0)
+}
+
+/// What the sensors have seen so far. Thread mode and exec.
+pub fn read() -> Pulses {
+    with(|state| Pulses { now: counts() as u16, ..state.pulses })
+}
+
+/// Edges at pins, as bits of their numbers. The handler of edges.
+pub(super) fn edges(changed: u32) {
+    let Some(pins) = pins() else { return };
+    let levels = gpio::levels();
+    for (line, pin) in pins.into_iter().enumerate() {
+        if changed & 1 << pin.bit != 0 {
+            edge(line, levels & 1 << pin.bit != 0);
+        }
+    }
+}
+
+fn edge(line: usize, high: bool) {
+    let at = counts();
+    with(|state| {
+        let still = at.wrapping_sub(core::mem::replace(&mut state.edges[line], at));
+        if high || state.in_use & 1 << line == 0 || still < u32::from(state.bounce) {
+            return;
+        }
+        let pulses = &mut state.pulses;
+        if line == 0 {
+            pulses.index = pulses.index.wrapping_add(1);
+            (pulses.index_at, pulses.at_index) = (at as u16, pulses.sync);
+        } else {
+            pulses.sync = pulses.sync.wrapping_add(1);
+            pulses.sync_at = at as u16;
+        }
+    });
+}

@@ -1,0 +1,3 @@
+//! Floats, by `libm`.
+
+pub use libm::{atan2f, cosf, powf, sinf, sqrtf};

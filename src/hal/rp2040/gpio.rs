@@ -1,0 +1,151 @@
+//! Pins of the board: outputs that are not steps, and what connects a pin to a unit of the chip.
+//!
+//! Setting a pin is one store that disturbs no other.
+
+use embassy_rp::pac::io::vals::{Inover, Outover};
+use embassy_rp::pac::{IO_BANK0, PADS_BANK0, SIO};
+
+use crate::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
+use crate::boards::{ACTIVE, Pin};
+use crate::hal::byte::SharedByte;
+
+/// What a pin is connected to (RP2040 data sheet, 2.19.2).
+#[derive(Clone, Copy)]
+#[repr(u8)]
+pub(super) enum Unit {
+    Uart = 2,
+    Pwm = 4,
+    Cpu = 5,
+    Pio0 = 6,
+}
+
+/// Connects a pin. Start-up.
+pub(super) fn connect(pin: Pin, unit: Unit) {
+    PADS_BANK0.gpio(pin.bit.into()).modify(|w| {
+        w.set_ie(true);
+        w.set_od(false);
+        w.set_pue(false);
+        w.set_pde(false);
+    });
+    IO_BANK0.gpio(pin.bit.into()).ctrl().write(|w| {
+        w.set_funcsel(unit as u8);
+        w.set_inover(Inover::NORMAL);
+    });
+}
+
+/// An input with a pull-up. Start-up.
+pub(super) fn pull_up(pin: Pin) {
+    connect_pulled(pin, Unit::Cpu);
+}
+
+/// Connects an input that keeps its pull-up. Start-up.
+pub(super) fn connect_pulled(pin: Pin, unit: Unit) {
+    connect(pin, unit);
+    PADS_BANK0.gpio(pin.bit.into()).modify(|w| w.set_pue(true));
+}
+
+/// Has an output of a unit inverted, or not.
+pub(super) fn invert(pin: Pin, inverted: bool) {
+    IO_BANK0.gpio(pin.bit.into()).ctrl().modify(|w| {
+        w.set_outover(if inverted { Outover::INVERT } else { Outover::NORMAL });
+    });
+}
+
+/// The levels of all pins.
+pub(super) fn levels() -> u32 {
+    SIO.gpio_in(0).read()
+}
+
+/// Drives a pin high or low.
+pub(super) fn set(pin: Pin, high: bool) {
+    let out = SIO.gpio_out(0);
+    let one = if high { out.value_set() } else { out.value_clr() };
+    one.write_value(1 << pin.bit);
+}
+
+/// Makes an output of a pin.
+fn output(pin: Pin) {
+    connect(pin, Unit::Cpu);
+    drive(pin);
+}
+
+fn drive(pin: Pin) {
+    SIO.gpio_oe(0).value_set().write_value(1 << pin.bit);
+}
+
+/// Makes outputs of the board's outputs: drivers off, hazards off. Of the spindle's enable it is not known yet which level is off: see
+/// [`set_low`].
+pub(super) fn start() {
+    let enables = ACTIVE.motors.iter().filter_map(|motor| motor.enable);
+    enables.chain(ACTIVE.enable_all).for_each(|enable| {
+        set(enable, true);
+        output(enable);
+    });
+    for hazard in ACTIVE.hazards {
+        set(*hazard, false);
+        if ACTIVE.outputs[0] == Some(*hazard) {
+            connect(*hazard, Unit::Cpu);
+        } else {
+            output(*hazard);
+        }
+    }
+}
+
+/// The motors whose drivers are wanted on, as bits.
+static WANTED: SharedByte = SharedByte::new(0);
+
+/// The motors whose drivers are on, as bits.
+pub fn powered() -> u8 {
+    ACTIVE.powered(WANTED.get())
+}
+
+/// Switches the drivers of these motors (bits) on, and the others off as far as the board can: an
+/// enable that all drivers share is on for any of them. Exec, or while it cannot run.
+pub fn power(motors: u8) {
+    WANTED.set(motors);
+    for (m, motor) in ACTIVE.motors.iter().enumerate() {
+        if let Some(enable) = motor.enable {
+            set(enable, motors & 1 << m == 0);
+        }
+    }
+    if let Some(enable) = ACTIVE.enable_all {
+        set(enable, motors == 0);
+    }
+}
+
+/// The outputs that are on when they are low, as bits.
+static LOW: SharedByte = SharedByte::new(0);
+
+/// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). The direction of a spindle that is
+/// off stays as it is. Exec, or while it cannot run.
+pub fn set_outputs(on: u8) {
+    let high = on ^ LOW.get();
+    // The direction before the enable.
+    for o in [1, 0, 2, 3] {
+        if let Some(pin) = ACTIVE.outputs[o]
+            && (1 << o != COUNTERCLOCKWISE || on & SPINDLE != 0)
+        {
+            set(pin, high & (1 << o) != 0);
+        }
+    }
+}
+
+/// Which outputs are on when they are low. From the first time on the spindle's enable is driven. Thread mode, while
+/// exec cannot run.
+pub fn set_low(outputs: u8, on: u8) {
+    LOW.set(outputs);
+    if let Some(direction) = ACTIVE.outputs[1] {
+        set(direction, (on ^ outputs) & COUNTERCLOCKWISE != 0);
+    }
+    set_outputs(on);
+    if let Some(enable) = ACTIVE.outputs[0] {
+        drive(enable);
+    }
+}
+
+/// Stops the spindle for good. Interrupts are off.
+pub(super) fn stop_spindle() {
+    if let Some(enable) = ACTIVE.outputs[0] {
+        set(enable, LOW.get() & SPINDLE != 0);
+    }
+}

@@ -1,0 +1,29 @@
+//! The last resort. No panic is meant to be reachable after start-up; should one be, motion and outputs stop and the machine stays still until
+//! it is reset.
+
+use super::{gpio, pwm, stepper, watchdog};
+use crate::boards::ACTIVE;
+
+/// Stops the steps, switches drivers and hazardous outputs off, and stays.
+pub fn halt() -> ! {
+    cortex_m::interrupt::disable();
+    make_safe();
+    watchdog::off();
+    loop {
+        cortex_m::asm::nop();
+    }
+}
+
+/// Stops the steps, switches drivers and hazardous outputs off. Interrupts are off.
+pub fn make_safe() {
+    stepper::kill();
+    pwm::kill();
+    ACTIVE.hazards.iter().for_each(|hazard| gpio::set(*hazard, false));
+    gpio::stop_spindle();
+    gpio::power(0);
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    halt()
+}

@@ -1,0 +1,63 @@
+//! The spindle's pulse-width output: a slice of the chip's that counts up and down, and its pin.
+//!
+//! The pin is high while the count is below the compare value; a new value counts from the next period on. Exec, or thread mode while exec cannot
+//! run. On a board without one nothing happens.
+
+use embassy_rp::pac::PWM;
+
+use super::gpio::{self, Unit};
+use crate::boards::ACTIVE;
+use crate::spindle::WHOLE;
+
+/// The highest count.
+const MOST: u32 = u16::MAX as u32 - 1;
+
+/// The pin, and its slice and channel (RP2040 data sheet, 4.5.2).
+fn place() -> Option<(crate::boards::Pin, usize, bool)> {
+    let pin = ACTIVE.pwm?.pin();
+    Some((pin, usize::from(pin.bit / 2 % 8), pin.bit % 2 == 1))
+}
+
+/// The divider, in sixteenths, and the top for a frequency in thousandths of a Hz: the finest that fits.
+fn divide(millihertz: u32) -> (u32, u32) {
+    // A period is twice the top: up and down. 64 bits, once for a setting.
+    let counts = u64::from(ACTIVE.clock_hz) * 500 / u64::from(millihertz.max(1));
+    let sixteenths = (counts * 16 / u64::from(MOST) + 1).clamp(16, 0xFFF) as u32;
+    let top = (counts * 16 / u64::from(sixteenths)).clamp(1, MOST.into()) as u32;
+    (sixteenths, top)
+}
+
+/// Sets the frequency, in thousandths of a Hz. The share has to be set again; until then it is 0.
+pub fn set_frequency(millihertz: u32) {
+    let Some((pin, slice, _)) = place() else { return };
+    let (sixteenths, top) = divide(millihertz);
+    let channel = PWM.ch(slice);
+    channel.csr().write(|w| w.set_en(false));
+    channel.div().write(|w| w.0 = sixteenths);
+    channel.top().write(|w| w.set_top(top as u16));
+    channel.cc().write(|w| w.0 = 0);
+    channel.ctr().write(|w| w.0 = 0);
+    gpio::connect(pin, Unit::Pwm);
+    channel.csr().write(|w| {
+        w.set_ph_correct(true);
+        w.set_en(true);
+    });
+}
+
+/// Sets what part of the period the pin is high, in thousandths.
+pub fn set_share(share: f32) {
+    let Some((_, slice, is_b)) = place() else { return };
+    let channel = PWM.ch(slice);
+    let top = channel.top().read().top();
+    let counts = share * (1.0 / WHOLE as f32) * f32::from(top) + 0.5;
+    // A share of all is beyond the top: no pulses, always high.
+    let counts = if share >= f32::from(WHOLE) { u32::from(top) + 1 } else { counts as u32 };
+    channel.cc().write(|w| if is_b { w.set_b(counts as u16) } else { w.set_a(counts as u16) });
+}
+
+/// Disconnects the pin, which is low from then on. For the panic handler.
+pub(super) fn kill() {
+    if let Some((pin, ..)) = place() {
+        gpio::connect(pin, Unit::Cpu);
+    }
+}

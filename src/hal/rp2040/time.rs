@@ -1,0 +1,41 @@
+//! The count of milliseconds, which SysTick counts, and its event. Tasks wait by `embassy-rp`'s time driver.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m::peripheral::SYST;
+use cortex_m::peripheral::scb::SystemHandler;
+use cortex_m::peripheral::syst::SystClkSource;
+
+use crate::boards::ACTIVE;
+use crate::hal::event::Event;
+use crate::hal::flags;
+
+static MILLIS: AtomicU32 = AtomicU32::new(0);
+
+/// Priority 1, of the two highest bits.
+const PRIORITY: u8 = 1 << 6;
+
+/// Starts the count. Start-up.
+pub(super) fn start() {
+    // SAFETY: the core's peripherals are nobody else's.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    // SAFETY: start-up.
+    unsafe { core.SCB.set_priority(SystemHandler::SysTick, PRIORITY) };
+    let syst: &mut SYST = &mut core.SYST;
+    syst.set_clock_source(SystClkSource::Core);
+    syst.set_reload(ACTIVE.clock_hz / 1_000 - 1);
+    syst.clear_current();
+    syst.enable_counter();
+    syst.enable_interrupt();
+}
+
+#[cortex_m_rt::exception]
+fn SysTick() {
+    MILLIS.store(millis().wrapping_add(1), Ordering::Relaxed);
+    flags::set(Event::Tick);
+}
+
+/// Milliseconds since start-up, modulo 2^32.
+pub fn millis() -> u32 {
+    MILLIS.load(Ordering::Relaxed)
+}

@@ -1,0 +1,479 @@
+//! The serial ports: bytes between their lines and two rings each.
+//!
+//! The first port is UART0; the other, on boards that have it, UART1. Neither uses its FIFOs, so that a byte acts when it comes, not when others have
+//! come behind it: real-time characters are taken out right in the handler. A byte has to be taken within the time of the next one, 87 us at
+//! 115,200 baud.
+//!
+//! `embassy-rp`'s buffered driver has rings of its own, out of which a task takes bytes: a `!` would wait for the turn of a task, 10 ms of a
+//! busy CPU. So the handlers are our own; thread mode and exec share the state of a port with them with interrupts off.
+//!
+//! Where bytes are lost, because a ring was full or the hardware overran, a mark says so to the reader: see [`serial`](crate::hal::serial).
+
+use core::cell::UnsafeCell;
+
+use embassy_rp::interrupt;
+use embassy_rp::interrupt::{InterruptExt, Priority};
+use embassy_rp::pac;
+use embassy_rp::pac::uart::Uart as Registers;
+
+use super::gpio::{self, Unit};
+use super::{eeprom, exec, flags, mask, time};
+use crate::baud;
+use crate::boards::{ACTIVE, Usart};
+use crate::hal::Thread;
+use crate::hal::event::Event;
+use crate::hal::ring::{Consumer, Producer, Ring};
+use crate::hal::serial::{
+    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS, RX_RING, STRAY,
+    TX_RING, USB, XOFF, XON, batch, hardware, last_mark, lose, mark, wait_ms,
+};
+use crate::realtime::{self, Asked};
+
+/// The filling end of a receive ring.
+enum Filling {
+    Usb(Producer<u8, RX_RING>),
+    Aux(Producer<u8, AUX_RING>),
+}
+
+/// Does something with either end.
+macro_rules! either {
+    ($end:expr, $ring:ident => $act:expr) => {
+        match $end {
+            Filling::Usb($ring) => $act,
+            Filling::Aux($ring) => $act,
+        }
+    };
+}
+
+impl Filling {
+    fn is_full(&self) -> bool {
+        either!(self, ring => ring.free() == 0)
+    }
+
+    fn push(&mut self, byte: u8) {
+        let _ = either!(self, ring => ring.push(byte));
+    }
+
+    fn newest(&self) -> u8 {
+        either!(self, ring => ring.pushed(0).copied().unwrap_or(0))
+    }
+
+    fn batch(&self) -> u8 {
+        match self {
+            Filling::Usb(_) => batch(RX_RING),
+            Filling::Aux(_) => batch(AUX_RING),
+        }
+    }
+
+    /// Puts a mark where there is room, else over the newest byte.
+    fn mark(&mut self, mark: u8) {
+        if self.is_full() {
+            // SAFETY: the reader, which is a task of thread mode, does not run within the handler.
+            let thread = unsafe { Thread::assume() };
+            exec::lock(
+                thread,
+                |ceiling| either!(self, ring => ring.amend(ceiling, 0, |newest| *newest = mark)),
+            );
+        } else {
+            self.push(mark);
+        }
+    }
+}
+
+/// What the handler of a port and the others share.
+struct Line {
+    rx: Option<Filling>,
+    tx: Option<Consumer<u8, TX_RING>>,
+    /// A byte to send before all others.
+    ahead: Option<u8>,
+    /// For how many ms it waits for the end of a line, and whether a line is open.
+    wait_ms: u8,
+    open: bool,
+    /// The other side has sent XOFF.
+    held: bool,
+    /// Whether XOFF and XON count.
+    heeds_xoff: bool,
+    /// The sender has been stopped by XOFF.
+    stopped: bool,
+    lost_ends: u16,
+    /// Bytes queued, modulo 256.
+    queued: u8,
+    realtime: u8,
+    asked: Asked,
+    /// The byte queued last.
+    last: u8,
+    rate: u32,
+    /// The millisecond in which a byte came.
+    heard_at: u32,
+}
+
+impl Line {
+    const fn new() -> Self {
+        Self {
+            rx: None,
+            tx: None,
+            ahead: None,
+            wait_ms: 0,
+            open: false,
+            held: false,
+            heeds_xoff: false,
+            stopped: false,
+            lost_ends: 0,
+            queued: 0,
+            realtime: 0,
+            asked: Asked::NOTHING,
+            last: 0,
+            rate: baud::DEFAULT,
+            heard_at: 0,
+        }
+    }
+}
+
+struct Shared(UnsafeCell<Line>);
+
+// SAFETY: touched with interrupts off only: see `with`.
+unsafe impl Sync for Shared {}
+
+static LINES: [Shared; PORTS] = [const { Shared(UnsafeCell::new(Line::new())) }; PORTS];
+
+static USB_RX: Ring<u8, RX_RING> = Ring::new();
+static USB_TX: Ring<u8, TX_RING> = Ring::new();
+static AUX_RX: Ring<u8, AUX_RING> = Ring::new();
+static AUX_TX: Ring<u8, TX_RING> = Ring::new();
+
+/// Does something with a port. Any level.
+fn with<R>(port: u8, act: impl FnOnce(&mut Line) -> R) -> R {
+    let line = &LINES[usize::from(port) % PORTS];
+    // SAFETY: interrupts are off.
+    mask(|| act(unsafe { &mut *line.0.get() }))
+}
+
+/// The registers of a port.
+fn registers(port: u8) -> Registers {
+    match hardware(port).map(|serial| serial.usart) {
+        Some(Usart::Uart1) => pac::UART1,
+        _ => pac::UART0,
+    }
+}
+
+/// Starts the lines, 8N1: the first at `rate` bits a second, the other at the board's. Start-up; `None` after the first time.
+pub fn start(rate: u32) -> Option<AllEnds> {
+    let usb = split(USB, &USB_RX, &USB_TX, Filling::Usb)?;
+    begin(USB, rate);
+    let aux = match hardware(AUX) {
+        Some(board) => {
+            let ends = split(AUX, &AUX_RX, &AUX_TX, Filling::Aux)?;
+            begin(AUX, board.rate);
+            Some(ends)
+        }
+        None => None,
+    };
+    for interrupt in [interrupt::UART0_IRQ, interrupt::UART1_IRQ].into_iter().take(PORTS) {
+        interrupt.set_priority(Priority::P1);
+        // SAFETY: what the handlers touch is there.
+        unsafe { interrupt.enable() };
+    }
+    Some(AllEnds { usb, aux })
+}
+
+fn split<const N: usize>(
+    port: u8,
+    rx: &'static Ring<u8, N>,
+    tx: &'static Ring<u8, TX_RING>,
+    filling: impl FnOnce(Producer<u8, N>) -> Filling,
+) -> Option<Ends<N>> {
+    let (rx_in, rx_out) = rx.split()?;
+    let (tx_in, tx_out) = tx.split()?;
+    with(port, |line| (line.rx, line.tx) = (Some(filling(rx_in)), Some(tx_out)));
+    Some((rx_out, tx_in))
+}
+
+fn begin(port: u8, rate: u32) {
+    if let Some(serial) = hardware(port) {
+        let [rx, tx] = serial.usart.pins();
+        gpio::connect_pulled(rx, Unit::Uart);
+        gpio::connect(tx, Unit::Uart);
+    }
+    set_rate(port, rate);
+    registers(port).uartcr().write(|w| {
+        w.set_uarten(true);
+        w.set_txe(true);
+        w.set_rxe(true);
+    });
+    registers(port).uartimsc().write(|w| {
+        w.set_rxim(true);
+        w.set_txim(true);
+        w.set_oeim(true);
+    });
+}
+
+/// Goes on at `rate` bits a second. A byte on the line meanwhile, in either direction, is spoilt. Thread mode.
+pub fn set_rate(port: u8, rate: u32) {
+    // In 64ths, rounded.
+    let divisor = (ACTIVE.clock_hz * 8 / rate.max(1)).div_ceil(2);
+    let uart = registers(port);
+    with(port, |line| {
+        line.rate = rate;
+        uart.uartibrd().write(|w| w.set_baud_divint((divisor >> 6) as u16));
+        uart.uartfbrd().write(|w| w.set_baud_divfrac(divisor as u8 & 63));
+        // The divisor counts from this write on. Eight bits, no FIFO.
+        uart.uartlcr_h().write(|w| w.set_wlen(0b11));
+    });
+}
+
+#[interrupt]
+fn UART0_IRQ() {
+    handle(USB);
+}
+
+#[interrupt]
+fn UART1_IRQ() {
+    handle(AUX);
+}
+
+/// What both handlers do: the byte that has come, and the next one that leaves.
+fn handle(port: u8) {
+    let uart = registers(port);
+    uart.uarticr().write(|w| {
+        w.set_txic(true);
+        w.set_oeic(true);
+    });
+    while !uart.uartfr().read().rxfe() {
+        let data = uart.uartdr().read();
+        let whole = !(data.fe() || data.pe() || data.be());
+        with(port, |line| {
+            line.arrive(data.data(), whole);
+            if data.oe() {
+                line.lose(0);
+            }
+        });
+    }
+    if with(port, |line| line.send(uart)) {
+        flags::set(Event::Transmitted);
+    }
+}
+
+impl Line {
+    /// Sends as long as the transmitter takes bytes. Whether it took any.
+    fn send(&mut self, uart: Registers) -> bool {
+        let mut sent = false;
+        while !uart.uartfr().read().txff() {
+            let Some(byte) = self.next() else { break };
+            uart.uartdr().write(|w| w.set_data(byte));
+            sent = true;
+        }
+        sent
+    }
+
+    /// The byte that leaves next.
+    fn next(&mut self) -> Option<u8> {
+        let may_pass = self.wait_ms == 0 || !self.open;
+        if let Some(ahead) = self.ahead.take_if(|_| may_pass) {
+            return Some(ahead);
+        }
+        if self.held {
+            return None;
+        }
+        let byte = self.tx.as_mut()?.pop()?;
+        self.open = byte >= LINE_END;
+        Some(byte)
+    }
+
+    /// A byte is lost.
+    fn lose(&mut self, byte: u8) {
+        let Some(ring) = self.rx.as_mut() else { return };
+        let begun = if ring.is_full() { mark(ring.newest()) } else { 0 };
+        let (mark, is_end) = lose(begun, byte);
+        ring.mark(mark);
+        self.lost_ends = self.lost_ends.wrapping_add(is_end.into());
+        flags::set(Event::Received);
+    }
+
+    /// Queues the mark of a real-time character: that of a loss if there is no room, but none for a resume.
+    fn place(&mut self, character: u8) {
+        let Some(ring) = self.rx.as_mut() else { return };
+        match ring.is_full() {
+            false => ring.push(character),
+            true if character == GO => self.realtime |= realtime::UNPLACED,
+            true => self.lose(character),
+        }
+        self.queued = self.queued.wrapping_add(1);
+        flags::set(Event::Received);
+    }
+
+    fn arrive(&mut self, byte: u8, whole: bool) {
+        self.heard_at = time::millis();
+        if self.heeds_xoff && (byte == XOFF || byte == XON) {
+            self.held = byte == XOFF;
+            if byte == XON {
+                self.realtime |= realtime::LET_GO;
+                flags::set(Event::Realtime);
+            }
+            return;
+        }
+        let special = realtime::bit(byte);
+        if special != 0 {
+            self.realtime = realtime::with(self.realtime, special);
+            flags::set(Event::Realtime);
+            if special & realtime::PLACED != 0 {
+                self.place(if special == realtime::RESUME { GO } else { CUT });
+            }
+            return;
+        }
+        if self.last <= realtime::ASCII
+            && whole
+            && let Some(asked) = self.asked.with(byte)
+        {
+            self.asked = asked;
+            flags::set(Event::Realtime);
+            return;
+        }
+        self.queue(byte, whole);
+    }
+
+    fn queue(&mut self, byte: u8, whole: bool) {
+        let byte = if byte < MARKS { STRAY } else { byte };
+        let full = self.rx.as_ref().is_none_or(Filling::is_full);
+        if full || !whole {
+            self.lose(byte);
+        } else if let Some(ring) = self.rx.as_mut() {
+            ring.push(byte);
+        }
+        let Some(ring) = self.rx.as_ref() else { return };
+        self.last = ring.newest();
+        self.queued = self.queued.wrapping_add(1);
+        if full || byte < b' ' || self.queued.is_multiple_of(ring.batch()) {
+            flags::set(Event::Received);
+        }
+    }
+}
+
+/// Sends what the ring holds. Thread mode, or exec on a port that is no bus.
+pub fn kick(port: u8) {
+    let uart = registers(port);
+    if with(port, |line| line.send(uart)) {
+        flags::set(Event::Transmitted);
+    }
+}
+
+/// Stops the sender, or lets it go on, in the way they have agreed upon. A character may wait for the end of a line if it `waits`. Thread mode.
+pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
+    if flow == Flow::Characters {
+        with(port, |line| {
+            line.ahead = Some(if stop { XOFF } else { XON });
+            line.stopped = stop;
+            line.wait_ms =
+                if waits { wait_ms(port, (2_000_000 / line.rate.max(1)) as u8) } else { 0 };
+        });
+        kick(port);
+    }
+}
+
+/// Whether the sender has been stopped by XOFF, by thread mode or by [`stop_late`].
+pub fn is_stopped(port: u8) -> bool {
+    with(port, |line| line.stopped)
+}
+
+/// Stops the sender of the second port by XOFF if its ring fills while thread mode has no turn. Exec.
+pub fn stop_late() {
+    if PORTS < 2 || AUX_RX.used() < LATE {
+        return;
+    }
+    let stops = with(AUX, |line| {
+        let waits = line.wait_ms > 0 && line.ahead == Some(XOFF);
+        let stops = line.heeds_xoff && (!line.stopped || waits);
+        if stops {
+            (line.stopped, line.ahead, line.wait_ms) = (true, Some(XOFF), 0);
+        }
+        stops
+    });
+    if stops {
+        kick(AUX);
+    }
+}
+
+/// How the other side may hold it back from now on. Thread mode.
+pub fn set_flow(port: u8, flow: Flow) {
+    with(port, |line| {
+        line.heeds_xoff = flow == Flow::Characters;
+        line.held &= line.heeds_xoff;
+    });
+    kick(port);
+}
+
+/// Sends XOFF or XON that has waited for long enough; has what is to be kept written. Thread mode, each millisecond.
+pub fn look() {
+    for port in 0..PORTS as u8 {
+        with(port, |line| line.wait_ms = line.wait_ms.saturating_sub(1));
+        kick(port);
+    }
+    eeprom::look();
+}
+
+/// The millisecond in which the last byte came, on any port.
+pub(super) fn heard_at() -> u32 {
+    let now = time::millis();
+    let ages = (0..PORTS as u8).map(|port| now.wrapping_sub(with(port, |line| line.heard_at)));
+    now.wrapping_sub(ages.min().unwrap_or(0))
+}
+
+/// Line ends lost since start-up, modulo 2^16. Thread mode.
+pub fn lost_ends(port: u8) -> u16 {
+    with(port, |line| line.lost_ends)
+}
+
+/// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for. Thread mode.
+pub fn room(port: u8) -> u8 {
+    let (size, used) = match port {
+        AUX => (AUX_RING, AUX_RX.used()),
+        _ => (RX_RING, USB_RX.used()),
+    };
+    (size - 2).saturating_sub(used) as u8
+}
+
+/// Whether half of the second port's receive ring is full. Thread mode.
+pub fn presses() -> bool {
+    PORTS > 1 && AUX_RX.used() >= AUX_RING / 2
+}
+
+/// The slot of the receive ring with the byte that came last, if it still waits there. Thread mode.
+pub fn newest(port: u8) -> Option<u8> {
+    match port {
+        AUX => AUX_RX.newest(),
+        _ => USB_RX.newest(),
+    }
+}
+
+/// The slot of the mark that stands for the last `%` or `^d`, if it has not been read. Thread mode.
+pub fn last_cut(port: u8) -> Option<u8> {
+    // SAFETY: the reader does not run meanwhile.
+    let ring = unsafe { if port == AUX { AUX_RX.window() } else { USB_RX.window() } };
+    last_mark(&ring)
+}
+
+/// Whether an exclamation mark has come that nobody has taken yet, on any port. Any level.
+pub fn asks_hold() -> bool {
+    (0..PORTS as u8).any(|port| with(port, |line| line.realtime & realtime::HOLD != 0))
+}
+
+/// What characters have asked of overrides since the last call. Thread mode.
+pub fn take_asked(port: u8) -> Asked {
+    with(port, |line| core::mem::replace(&mut line.asked, Asked::NOTHING))
+}
+
+/// The real-time characters since the last call, as bits (see [`realtime`]). Thread mode.
+pub fn take_realtime(port: u8) -> u8 {
+    with(port, |line| core::mem::take(&mut line.realtime))
+}
+
+/// Ends the lines of which a part has been sent; what else the rings hold is never sent. Interrupts are off, and stay so.
+pub(super) fn end_lines() {
+    for port in 0..PORTS as u8 {
+        let uart = registers(port);
+        if with(port, |line| line.open) {
+            while uart.uartfr().read().txff() {}
+            uart.uartdr().write(|w| w.set_data(b'\n'));
+        }
+        while uart.uartfr().read().busy() {}
+    }
+}

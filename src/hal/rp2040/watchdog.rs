@@ -1,0 +1,91 @@
+//! The watchdog, and why the machine has started.
+//!
+//! [`start`] gives the firmware [`TIME_US`] between two calls of [`feed`]; if it is late, the chip resets. A scratch register, which such a reset
+//! leaves alone, keeps a [`Mark`] over it. After a reset all pins are inputs.
+
+use embassy_rp::pac::watchdog::regs::Load;
+use embassy_rp::pac::{PSM, VREG_AND_CHIP_RESET, WATCHDOG};
+
+use crate::hal::resets::{self, Cause, Mark};
+
+/// 0.5 s. The counter goes down twice a microsecond (erratum E1).
+const TIME_US: u32 = 500_000;
+
+/// Bits of a reset's cause as [`resets::cause`] takes them.
+const POWER_ON: u8 = 1;
+/// See [`POWER_ON`].
+const EXTERNAL: u8 = 1 << 1;
+/// See [`POWER_ON`].
+const WATCHDOG_BIT: u8 = 1 << 3;
+
+/// What is reset: all but the oscillators.
+const RESETS: u32 = 0x0001_FFFC;
+
+fn leave(mark: Mark) {
+    WATCHDOG.scratch0().write_value(mark.0.into());
+}
+
+fn left() -> Mark {
+    Mark(WATCHDOG.scratch0().read() as u16)
+}
+
+/// Notes why the machine has started. First thing at start-up.
+pub(super) fn begin() {
+    off();
+    let reason = WATCHDOG.reason().read();
+    let chip = VREG_AND_CHIP_RESET.chip_reset().read();
+    let bits = if reason.timer() || reason.force() {
+        WATCHDOG_BIT
+    } else if chip.had_por() {
+        POWER_ON
+    } else {
+        EXTERNAL
+    };
+    leave(Mark::running(resets::cause(bits, left())));
+}
+
+/// Why the machine has started.
+pub fn cause() -> Cause {
+    left().cause().unwrap_or(Cause::PowerOn)
+}
+
+/// Has the watchdog on from now on.
+pub(super) fn start() {
+    PSM.wdsel().write_value(embassy_rp::pac::psm::regs::Wdsel(RESETS));
+    feed();
+    WATCHDOG.ctrl().modify(|w| w.set_enable(true));
+}
+
+/// All is well. Thread mode, and exec.
+pub fn feed() {
+    WATCHDOG.load().write_value(Load(2 * TIME_US));
+}
+
+/// Takes it off.
+pub(super) fn off() {
+    WATCHDOG.ctrl().modify(|w| w.set_enable(false));
+}
+
+/// Starts the firmware anew, as if the reset button had been pressed.
+pub fn reset() -> ! {
+    cortex_m::interrupt::disable();
+    super::panic::make_safe();
+    super::uart::end_lines();
+    leave(Mark::ASKED);
+    PSM.wdsel().write_value(embassy_rp::pac::psm::regs::Wdsel(RESETS));
+    WATCHDOG.ctrl().write(|w| w.set_trigger(true));
+    loop {
+        cortex_m::asm::nop();
+    }
+}
+
+/// Starts the boot loader in ROM, which shows a drive for a new image.
+pub fn boot() -> ! {
+    cortex_m::interrupt::disable();
+    super::panic::make_safe();
+    off();
+    embassy_rp::rom_data::reset_to_usb_boot(0, 0);
+    loop {
+        cortex_m::asm::nop();
+    }
+}

@@ -1,0 +1,66 @@
+// node bridge.mjs ELF MOTORS: an emulated board for a program that talks to it over standard input and output.
+//
+// MOTORS is JSON, [[step, dir], ...]. Each line of the input is a request in JSON, each line of the output its answer:
+//
+//   {"cut": true, "send": [[port, "hex"]], "now": byte, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "until": cycle, "line": true}
+//
+// With `cut` the supply fails, and comes again. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
+import { createInterface } from 'node:readline';
+import { Machine } from './machine.mjs';
+import { Motors } from './pins.mjs';
+
+const [elf, pins] = process.argv.slice(2);
+const machine = new Machine(elf);
+const motors = new Motors(machine, JSON.parse(pins).map(([step, dir]) => ({ step, dir })));
+const PWM = 0x40050000;
+const FUNCTION_PWM = 4;
+
+function act(request) {
+  if (request.cut) machine.cutPower();
+  for (const [port, rate] of request.baud ?? []) machine.senders[port].rate = rate;
+  for (const [port, hex] of request.send ?? []) machine.send(port, Buffer.from(hex, 'hex'));
+  for (const byte of request.now ?? []) machine.sendNow(0, byte);
+  for (const [gpio, high] of request.drive ?? []) machine.drive(gpio, high);
+  if (request.wire) motors.wire(request.wire);
+  const lines = machine.lines;
+  machine.runUntil(request.until ?? 0, () => request.line && machine.lines !== lines);
+}
+
+// What part of its period each pin is high that pulses, by the registers of its slice.
+function shares() {
+  const { mcu } = machine;
+  const pulsing = [...mcu.gpio.keys()].filter((gpio) => mcu.gpio[gpio].functionSelect === FUNCTION_PWM);
+  return pulsing.map((gpio) => {
+    const slice = PWM + 0x14 * (gpio >> 1 & 7);
+    const compare = mcu.readUint32(slice + 0xc) >>> (gpio & 1 ? 16 : 0) & 0xffff;
+    return [gpio, Math.min(1, compare / mcu.readUint32(slice + 0x10))];
+  });
+}
+
+function answer() {
+  const heard = machine.heard.map((bytes) => Buffer.from(bytes).toString('hex'));
+  machine.heard = [[], []];
+  return {
+    cycle: machine.cycle,
+    heard,
+    steps: motors.positions,
+    totals: motors.totals,
+    gaps: motors.gaps.map((gap) => (Number.isFinite(gap) ? gap : null)),
+    last: motors.lastStep,
+    levels: machine.levels.reduce((bits, level, gpio) => bits + (level === 1 ? 2 ** gpio : 0), 0),
+    shares: shares(),
+    asleep: machine.asleep,
+    resets: machine.resets,
+  };
+}
+
+for await (const line of createInterface({ input: process.stdin })) {
+  let result;
+  try {
+    act(JSON.parse(line));
+    result = answer();
+  } catch (error) {
+    result = { fault: String(error.stack ?? error) };
+  }
+  process.stdout.write(`${JSON.stringify(result)}\n`);
+}

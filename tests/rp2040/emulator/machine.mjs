@@ -1,0 +1,239 @@
+// An RP2040 of rp2040js with what tests of an image need: an ELF, one clock for CPU and PIO, time of interrupts, pins, two serial lines.
+//
+// What rp2040js lacks is put right here and in the files beside; `cures.test.mjs` has a test for each.
+import { readFileSync } from 'node:fs';
+import { BasePeripheral, ConsoleLogger, LogLevel, RP2040 } from 'rp2040js';
+import { Pio } from './pio.mjs';
+import { bootRom } from './rom.mjs';
+import { Uart } from './uart.mjs';
+
+// The system clock of Kerf's image.
+export const CLOCK_HZ = 128e6;
+const NANOS = 1e9 / CLOCK_HZ;
+const FLASH = 0x10000000;
+// Behind the second stage of the boot loader, which is as good as run.
+const VECTORS = FLASH + 0x100;
+// A Cortex-M0+ takes 15 cycles and more to enter an interrupt, and 11 to leave it; rp2040js none.
+const ENTRY = 15;
+const EXIT = 11;
+const WATCHDOG = 0x40058;
+// Ends whose rates differ by more do not understand each other.
+const GARBLES = 0.045;
+// Bits of a frame: start, eight, stop.
+const FRAME = 10;
+const CHAN_ABORT = 0x444;
+const UARTS = [[0x40034, 'UART0', 20], [0x40038, 'UART1', 21]];
+
+// XIP_CTRL, which rp2040js lacks: never streaming.
+class XipControl extends BasePeripheral {
+  readUint32() { return 0; }
+  writeUint32() {}
+}
+
+// A sender: bytes that are under way to a port, one behind the other.
+class Sender {
+  constructor() {
+    this.bytes = [];
+    this.head = 0;
+    this.rate = 115200;
+    // When the byte that is on the line is through.
+    this.due = Infinity;
+  }
+  // Puts bytes on the line, or one ahead of those that wait.
+  send(bytes, now) {
+    for (const byte of bytes) this.bytes.push(byte);
+    this.begin(now);
+  }
+  sendNow(byte, now) {
+    const isBusy = this.due !== Infinity;
+    this.bytes.splice(this.head + (isBusy ? 1 : 0), 0, byte);
+    this.begin(now);
+  }
+  begin(now) {
+    if (this.due === Infinity && this.head < this.bytes.length) this.due = now + FRAME * CLOCK_HZ / this.rate;
+  }
+  // The byte that is through; the next one begins.
+  take() {
+    const byte = this.bytes[this.head++];
+    const now = this.due;
+    this.due = Infinity;
+    if (this.head > 4096) { this.bytes.splice(0, this.head); this.head = 0; }
+    this.begin(now);
+    return byte;
+  }
+}
+
+// Puts what an ELF has for the flash there.
+function loadElf(elf, flash) {
+  const [count, size] = [elf.readUInt16LE(44), elf.readUInt16LE(42)];
+  for (let i = 0, p = elf.readUInt32LE(28); i < count; i++, p += size) {
+    const [type, offset, , physical, bytes] = [0, 4, 8, 12, 16].map((o) => elf.readUInt32LE(p + o));
+    if (type !== 1 || !bytes || physical >>> 28 !== 1) continue;
+    flash.set(elf.subarray(offset, offset + bytes), physical - FLASH);
+  }
+}
+
+export class Machine {
+  // With an ELF in its flash, or what `load` puts there.
+  constructor(elf, load = (flash) => loadElf(readFileSync(elf), flash)) {
+    this.load = load;
+    this.cycle = 0;
+    this.edgeListeners = [];
+    this.resetListeners = [];
+    this.heard = [[], []];
+    this.senders = [new Sender(), new Sender()];
+    this.inputs = new Map();
+    this.levels = new Array(30).fill(0);
+    this.resets = 0;
+    // Line ends that have been heard.
+    this.lines = 0;
+    // Bytes that have been heard.
+    this.said = 0;
+    this.instructions = 0;
+    this.asleep = 0;
+    this.boot();
+  }
+
+  // The supply fails, and is there again.
+  cutPower() {
+    this.boot({ flash: this.mcu.flash });
+  }
+
+  // A chip as it is at power-up, or behind a reset by the watchdog, with the flash as it was.
+  boot(before) {
+    const mcu = new RP2040();
+    this.mcu = mcu;
+    mcu.logger = new ConsoleLogger(LogLevel.Error, true);
+    mcu.peripherals[0x14000] = new XipControl(mcu, 'XIP_CTRL');
+    mcu.loadBootrom(bootRom());
+    if (before) mcu.flash.set(before.flash);
+    else this.load(mcu.flash);
+    this.uarts = UARTS.map(([at, name, irq], port) => {
+      const uart = mcu.peripherals[at] = new Uart(mcu, name, irq);
+      uart.onByte = (byte) => this.hear(port, byte, 1e9 / uart.bit);
+      return uart;
+    });
+    const watchdog = mcu.peripherals[WATCHDOG];
+    if (before?.peripherals) {
+      const old = before.peripherals[WATCHDOG];
+      watchdog.scratchData.set(old.scratchData);
+      watchdog.reason = old.reason;
+    }
+    watchdog.onWatchdogTrigger = () => { this.isResetting = true; };
+    mcu.onBreak = (code) => { throw new Error(`bkpt ${code} at ${mcu.core.PC.toString(16)}`); };
+    this.pios = mcu.pio.map((pio) => new Pio(pio));
+    for (const [gpio, pin] of mcu.gpio.entries()) {
+      pin.addListener((state) => this.changed(gpio, state));
+      pin.setInputValue(this.inputs.get(gpio) ?? true);
+    }
+    this.endAborts();
+    this.timeInterrupts();
+    mcu.core.VTOR = VECTORS;
+    mcu.core.reset();
+    mcu.core.PC = (mcu.core.PC & ~1) >>> 0;
+  }
+
+  // The DMA says when it has aborted what it was told to, which is at once; rp2040js never says it.
+  endAborts() {
+    const { dma } = this.mcu;
+    const read = dma.readUint32.bind(dma);
+    dma.readUint32 = (offset) => (offset === CHAN_ABORT ? 0 : read(offset));
+  }
+
+  // What is said above; and a handler begins at an even address: rp2040js leaves the lowest bit of its vector in the program counter, where it puts
+  // tables of jumps off by one.
+  timeInterrupts() {
+    const { core } = this.mcu;
+    const [enter, leave] = [core.exceptionEntry.bind(core), core.exceptionReturn.bind(core)];
+    this.extra = 0;
+    core.exceptionEntry = (n) => { this.extra += ENTRY; enter(n); core.PC = (core.PC & ~1) >>> 0; };
+    core.exceptionReturn = (n) => { this.extra += EXIT; leave(n); };
+  }
+
+  // An output has changed.
+  changed(gpio, state) {
+    if (state > 1 || this.levels[gpio] === state) return;
+    this.levels[gpio] = state;
+    const cycle = this.pios[0].now ?? this.cycle;
+    for (const listener of this.edgeListeners) listener(gpio, state, cycle);
+  }
+
+  // Drives an input.
+  drive(gpio, high) {
+    if ((this.inputs.get(gpio) ?? true) === high) return;
+    this.inputs.set(gpio, high);
+    this.mcu.gpio[gpio].setInputValue(high);
+  }
+
+  send(port, bytes) { this.senders[port].send(bytes, this.cycle); }
+  sendNow(port, byte) { this.senders[port].sendNow(byte, this.cycle); }
+
+  // A byte has left. One at another speed is not understood.
+  hear(port, byte, rate) {
+    const wanted = this.senders[port].rate;
+    const garbled = Math.abs(wanted - rate) > GARBLES * wanted;
+    this.heard[port].push(garbled ? byte ^ 0xff : byte);
+    this.said++;
+    if (byte === 10) this.lines++;
+  }
+
+  receive() {
+    for (const [port, sender] of this.senders.entries()) {
+      while (sender.due <= this.cycle) this.arrive(port, sender.take(), sender.rate);
+    }
+  }
+
+  // A byte is through.
+  arrive(port, byte, rate) {
+    const uart = this.uarts[port];
+    const own = 1e9 / uart.bit;
+    const garbled = Math.abs(own - rate) > GARBLES * rate;
+    uart.feed(byte, !garbled);
+  }
+
+  // Runs for so many cycles.
+  run(cycles) { this.runUntil(this.cycle + cycles, () => false); }
+
+  // Runs to a cycle, or until something is so; that is looked at after each byte that it says.
+  runUntil(end, isDone) {
+    let said = -1;
+    while (this.cycle < end) {
+      if (said !== this.said) {
+        said = this.said;
+        if (isDone()) return;
+      }
+      this.step(end);
+    }
+  }
+
+  step(end) {
+    const { mcu } = this;
+    const { clock, core } = mcu;
+    if (this.cycle >= this.senders[0].due || this.cycle >= this.senders[1].due) this.receive();
+    let spent;
+    if (core.waiting) {
+      spent = end - this.cycle;
+      if (clock.nextAlarm) spent = Math.min(spent, clock.nanosToNextAlarm / NANOS);
+      const due = Math.min(this.senders[0].due, this.senders[1].due, this.pios[0].due());
+      spent = Math.max(1, Math.ceil(Math.min(spent, due - this.cycle)));
+      this.asleep += spent;
+      clock.tick(spent * NANOS);
+      // A pending SysTick does not wake the core of rp2040js.
+      if (core.interruptsUpdated && core.checkForInterrupts()) core.waiting = false;
+    } else {
+      spent = core.executeInstruction() + this.extra;
+      this.extra = 0;
+      this.instructions++;
+      clock.tick(spent * NANOS);
+    }
+    this.cycle += spent;
+    this.pios[0].run(this.cycle);
+    this.pios[1].run(this.cycle);
+    if (this.isResetting) {
+      this.isResetting = false;
+      this.resets++;
+      for (const listener of this.resetListeners) listener();
+      this.boot(mcu);
+    }
+  }
+}

@@ -1,0 +1,291 @@
+//! A board whose chip is emulated by a program in JavaScript: the RP2040, by rp2040js with what it lacks (`tests/rp2040/emulator`).
+//!
+//! The program answers a request by a line of JSON each: see its `bridge.mjs`. What is sent and driven here is gathered, and goes along with the
+//! next request to run.
+
+pub mod job;
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+use anyhow::{Context, Result, bail, ensure};
+use kerf::boards::{Board, MOTORS, Pin, Port};
+use serde::{Deserialize, Serialize};
+
+use crate::runs::Runs;
+
+/// Where the program lies once `cargo xtask` has put it there: beside the folder of the images.
+const PROGRAM: &str = "rp2040-emulator/bridge.mjs";
+
+/// A request.
+#[derive(Serialize, Default, Debug)]
+struct Request {
+    cut: bool,
+    send: Vec<(usize, String)>,
+    now: Vec<u8>,
+    baud: Vec<(usize, u32)>,
+    drive: Vec<(u8, bool)>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    wire: Option<Vec<Near>>,
+    until: u64,
+    line: bool,
+}
+
+/// A switch at a pin, closed while a motor is at or beyond a step; or open there.
+#[derive(Serialize, Clone, Copy, Debug)]
+pub struct Near {
+    /// Its pin.
+    pub gpio: u8,
+    /// The motor, from 0.
+    pub motor: usize,
+    /// The step.
+    pub step: i64,
+    /// Beyond is above.
+    pub above: bool,
+    /// It opens there.
+    pub opens: bool,
+}
+
+/// How the board stands after a request.
+#[derive(Deserialize, Clone, Default, Debug)]
+struct Answer {
+    #[serde(default)]
+    fault: Option<String>,
+    #[serde(default)]
+    cycle: u64,
+    #[serde(default)]
+    heard: Vec<String>,
+    #[serde(default)]
+    steps: Vec<i64>,
+    #[serde(default)]
+    totals: Vec<u64>,
+    #[serde(default)]
+    gaps: Vec<Option<f64>>,
+    #[serde(default)]
+    last: f64,
+    #[serde(default)]
+    levels: u32,
+    #[serde(default)]
+    shares: Vec<(u8, f64)>,
+    #[serde(default)]
+    asleep: f64,
+    #[serde(default)]
+    resets: u64,
+}
+
+/// The board.
+pub struct Emulated {
+    board: &'static Board,
+    child: Child,
+    input: ChildStdin,
+    output: BufReader<ChildStdout>,
+    request: Request,
+    answer: Answer,
+    heard: [Vec<u8>; 2],
+}
+
+/// Whether a board's chip is emulated, not simulated.
+pub fn is_emulated(board: &Board) -> bool {
+    board.motors[0].step.port == Port::Gpio
+}
+
+/// Where the emulator of an image lies.
+fn program(elf: &Path) -> PathBuf {
+    let folder = elf.parent().and_then(Path::parent).unwrap_or(Path::new("."));
+    folder.join(PROGRAM)
+}
+
+impl Emulated {
+    /// A board that has just been powered up.
+    pub fn load(elf: &Path, board: &'static Board) -> Result<Self> {
+        ensure!(is_emulated(board), "the board {} is simulated, not emulated", board.name);
+        let program = program(elf);
+        ensure!(
+            program.exists(),
+            "no {}: `cargo xtask sim --board pico-cnc` puts it there",
+            program.display()
+        );
+        let pins = board.motors.map(|motor| (motor.step.bit, motor.dir.bit));
+        let mut child = Command::new("node")
+            .arg(program)
+            .arg(elf)
+            .arg(serde_json::to_string(&pins)?)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .context("cannot start node")?;
+        let (input, output) = (child.stdin.take(), child.stdout.take());
+        let mut board = Emulated {
+            board,
+            child,
+            input: input.context("no standard input")?,
+            output: BufReader::new(output.context("no standard output")?),
+            request: Request::default(),
+            answer: Answer::default(),
+            heard: [Vec::new(), Vec::new()],
+        };
+        board.run(0, false)?;
+        Ok(board)
+    }
+
+    /// What it is.
+    pub fn board(&self) -> &'static Board {
+        self.board
+    }
+
+    /// Sends the request, and takes the answer.
+    fn run(&mut self, until: u64, line: bool) -> Result<()> {
+        (self.request.until, self.request.line) = (until, line);
+        let text = serde_json::to_string(&std::mem::take(&mut self.request))?;
+        writeln!(self.input, "{text}").context("the emulator has ended")?;
+        self.input.flush()?;
+        let mut text = String::new();
+        self.output.read_line(&mut text)?;
+        self.answer = serde_json::from_str(&text).context("the emulator has ended")?;
+        if let Some(fault) = &self.answer.fault {
+            bail!("the emulator fails: {fault}");
+        }
+        for (port, hex) in self.answer.heard.iter().enumerate().take(2) {
+            self.heard[port].extend(bytes(hex));
+        }
+        Ok(())
+    }
+
+    /// Runs for a time.
+    pub fn run_for_ms(&mut self, ms: u64) -> Result<()> {
+        self.run(self.cycle() + self.cycles(ms), false)
+    }
+
+    /// Puts bytes on the line of a port.
+    pub fn send_to(&mut self, port: usize, bytes: &[u8]) {
+        let hex = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        self.request.send.push((port, hex));
+    }
+
+    /// Takes what it has said on a port.
+    pub fn receive_from(&mut self, port: usize) -> Vec<u8> {
+        std::mem::take(&mut self.heard[port])
+    }
+
+    /// The supply fails, and is there again.
+    pub fn cut_power(&mut self) {
+        self.request.cut = true;
+    }
+
+    /// Drives an input.
+    pub fn drive(&mut self, pin: Pin, high: bool) {
+        self.request.drive.push((pin.bit, high));
+    }
+
+    /// Puts switches where motors work them.
+    pub fn wire(&mut self, switches: &[Near]) {
+        self.request.wire = Some(switches.to_vec());
+    }
+
+    /// Steps up minus steps down of each motor; a low direction pin is up.
+    pub fn steps(&self) -> [i64; MOTORS] {
+        std::array::from_fn(|m| self.answer.steps.get(m).copied().unwrap_or(0))
+    }
+
+    /// All steps of each motor.
+    pub fn totals(&self) -> [u64; MOTORS] {
+        std::array::from_fn(|m| self.answer.totals.get(m).copied().unwrap_or(0))
+    }
+
+    /// The shortest time between two steps of each motor, s.
+    pub fn gaps(&self) -> [Option<f64>; MOTORS] {
+        let hz = f64::from(self.board.clock_hz);
+        std::array::from_fn(|m| Some(self.answer.gaps.get(m).copied()?? / hz))
+    }
+
+    /// Whether an output is high.
+    pub fn is_high(&self, pin: Pin) -> bool {
+        self.answer.levels >> pin.bit & 1 != 0
+    }
+
+    /// What part of its period a pin that pulses is high.
+    pub fn share(&self, pin: Pin) -> f64 {
+        let found = self.answer.shares.iter().find(|(gpio, _)| *gpio == pin.bit);
+        found.map_or(f64::from(u8::from(self.is_high(pin))), |(_, share)| *share)
+    }
+
+    /// Cycles that the CPU has slept.
+    pub fn asleep(&self) -> f64 {
+        self.answer.asleep
+    }
+
+    /// Resets by the watchdog.
+    pub fn resets(&self) -> u64 {
+        self.answer.resets
+    }
+}
+
+impl Drop for Emulated {
+    fn drop(&mut self) {
+        // It has nothing to put away.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Runs for Emulated {
+    fn cycle(&self) -> u64 {
+        self.answer.cycle
+    }
+
+    fn cycles(&self, ms: u64) -> u64 {
+        ms * u64::from(self.board.clock_hz) / 1_000
+    }
+
+    fn run_until_line(&mut self, cycle: u64) -> Result<()> {
+        self.run(cycle, true)
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        self.send_to(0, bytes);
+    }
+
+    fn send_now(&mut self, byte: u8) {
+        self.request.now.push(byte);
+    }
+
+    fn receive(&mut self) -> Vec<u8> {
+        self.receive_from(0)
+    }
+
+    fn set_baud(&mut self, baud: u32) {
+        self.request.baud.push((0, baud));
+    }
+
+    fn garbled(&self) -> u64 {
+        0
+    }
+
+    fn last_step(&self) -> Option<u64> {
+        (self.answer.last > 0.0).then_some(self.answer.last as u64)
+    }
+}
+
+/// Bytes of hexadecimal digits.
+fn bytes(hex: &str) -> Vec<u8> {
+    let digits = |at: usize| u8::from_str_radix(hex.get(at..at + 2)?, 16).ok();
+    (0..hex.len()).step_by(2).filter_map(digits).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_read() {
+        assert_eq!(bytes("00ff7b0a"), [0, 0xFF, 0x7B, 0x0A]);
+        assert_eq!(bytes(""), [0; 0]);
+    }
+
+    #[test]
+    fn the_emulator_lies_beside_the_images() {
+        let program = program(Path::new("target/firmware/pico-cnc.elf"));
+        assert_eq!(program, Path::new("target/rp2040-emulator/bridge.mjs"));
+    }
+}

@@ -1,0 +1,85 @@
+//! Boards with an RP2040: builds their images, makes what the chip's boot loader takes, and puts their emulator where it is looked for.
+
+pub mod emulator;
+pub mod uf2;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use object::{File, Object, ObjectSection, SectionFlags, SectionKind};
+
+use crate::process::{root, run};
+use crate::toolchain::Toolchain;
+
+/// The instruction set of its cores.
+const TARGET: &str = "thumbv6m-none-eabi";
+
+/// Scripts of `cortex-m-rt` and `embassy-rp`, which find `memory.x` beside the chip's sources; `--nmagic`: sections are not moved to pages.
+const FLAGS: &str = "-C linker=ld.lld -C link-arg=-Tlink.x -C link-arg=-Tlink-rp.x -C link-arg=-Lsrc/hal/rp2040 -C link-arg=--nmagic";
+
+/// Flash that the image may take: 2 MiB without the part of `memory.x` that keeps settings.
+const FLASH: u64 = (2 << 20) - (64 << 10);
+/// RAM for statics, of 256 KiB; the rest is the stack's.
+const STATIC_RAM: u64 = 192 << 10;
+
+/// What an image takes, bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sizes {
+    /// Code, constants and initial values.
+    pub flash: u64,
+    /// Statics.
+    pub ram: u64,
+}
+
+/// Builds an image with these features, and keeps it under its name.
+pub fn build(features: &str, image: &Path) -> Result<PathBuf> {
+    let rust = Toolchain::find().context("no Rust that can build for it; `cargo xtask setup`")?;
+    let target = root().join("target/rp2040");
+    let mut cargo = rust.cargo();
+    cargo.current_dir(root()).env("RUSTFLAGS", FLAGS);
+    cargo.args(["build", "--release", "-Zbuild-std=core", "--target", TARGET, "--target-dir"]);
+    cargo.arg(&target).args(["--package", "kerf", "--bin", "kerf", "--no-default-features"]);
+    run(cargo.arg("--features").arg(features))?;
+    let built = target.join(TARGET).join("release/kerf");
+    std::fs::create_dir_all(image.parent().unwrap_or(image))?;
+    std::fs::copy(&built, image).with_context(|| format!("cannot copy {}", built.display()))?;
+    check(image)?;
+    std::fs::write(image.with_extension("uf2"), uf2::of_elf(&std::fs::read(image)?)?)?;
+    Ok(image.to_owned())
+}
+
+/// Prints what an image takes, and fails past a cap.
+pub fn show(image: &Path) -> Result<()> {
+    let sizes = check(image)?;
+    println!("{}", image.display());
+    println!("flash        {:>7} of {FLASH}", sizes.flash);
+    println!("static RAM   {:>7} of {STATIC_RAM}", sizes.ram);
+    Ok(())
+}
+
+/// Refuses an image for which there is no room.
+fn check(image: &Path) -> Result<Sizes> {
+    let sizes = sizes(&std::fs::read(image)?)?;
+    ensure!(sizes.flash <= FLASH, "flash {} > {FLASH}", sizes.flash);
+    ensure!(sizes.ram <= STATIC_RAM, "static RAM {} > {STATIC_RAM}", sizes.ram);
+    Ok(sizes)
+}
+
+/// What an ELF file puts into flash, and into RAM.
+fn sizes(elf: &[u8]) -> Result<Sizes> {
+    /// From here up it is RAM.
+    const RAM: u64 = 0x2000_0000;
+    const ALLOCATED: u64 = object::elf::SHF_ALLOC as u64;
+    let file = File::parse(elf)?;
+    let mut sizes = Sizes::default();
+    for section in file.sections() {
+        let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
+        if sh_flags & ALLOCATED == 0 {
+            continue;
+        }
+        let has_bytes = section.kind() != SectionKind::UninitializedData;
+        sizes.flash += if has_bytes { section.size() } else { 0 };
+        sizes.ram += if section.address() >= RAM { section.size() } else { 0 };
+    }
+    Ok(sizes)
+}
