@@ -74,6 +74,8 @@ impl Side for Machine {
         }
         if pulses > 0 {
             build.spindle.sensors = Sensors::of(self.board(), pulses);
+            // It turns by `turn_spindle` alone.
+            build.spindle.rpm = 0.0;
         }
         self.build(&build);
     }
