@@ -164,7 +164,8 @@ impl<const N: usize> Intake<N> {
                 return Left::Full;
             }
             let next = self.received.waiting().first().copied();
-            if next.is_some_and(|next| pool.leaves(next)) {
+            let decides = next == Some(b'?') && self.port.is_undecided() && !pool.is_within_line();
+            if decides || next.is_some_and(|next| pool.leaves(next)) {
                 // It has come since the ring was looked through.
                 return Left::Bytes;
             }
