@@ -57,7 +57,7 @@ fn mistakes_are_explained() {
             &elf,
             &job,
             &["--board", "uno"],
-            "no board uno; there are mega2560-grbl, mega2560-lathe, ramps14",
+            "no board uno; there are mega2560-grbl, mega2560-lathe, pico-cnc, ramps14",
         ),
     ];
     for (elf, job, more, want) in cases {
