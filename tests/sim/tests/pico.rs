@@ -234,11 +234,19 @@ fn settings_may_change_often() {
     assert_eq!(value(&mut board, &mut host, "xvm"), 519.0);
 }
 
-/// What is not so here, by the beginnings of names. More rates of the line can be made (`baud`), steps may come faster (`rates`, `settings-motor`), no
-/// port has RTS and CTS (`ports-pins`), the sensors of a spindle have pins of their own
+/// What is not so here, by the beginnings of names. More rates of the line can be made (`baud`), steps may come faster (`rates`, `settings-motor`,
+/// `grbl-settings`), no port has RTS and CTS (`ports-pins`), the sensors of a spindle have pins of their own
 /// (`encoder`), settings are kept sooner (`stored`), and the boot loader, which is in ROM, is not emulated (`boot-loader`).
-const DIFFERS: [&str; 7] =
-    ["baud", "boot-loader", "encoder", "ports-pins", "rates", "settings-motor", "stored"];
+const DIFFERS: [&str; 8] = [
+    "baud",
+    "boot-loader",
+    "encoder",
+    "grbl-settings",
+    "ports-pins",
+    "rates",
+    "settings-motor",
+    "stored",
+];
 /// Those with a spindle that turns: the emulated board has none.
 const TURNING: [&str; 4] = ["grbl-thread", "lathe-feed", "thread-reports", "thread-retract"];
 /// Those that move for long, minutes of the emulator's time each: `KERF_TRANSCRIPT` plays one.
