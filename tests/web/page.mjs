@@ -100,7 +100,9 @@ async function type(line, heard) {
 }
 
 const shows = (selector, wanted) =>
-  page.waitForFunction(([selector, wanted]) => new RegExp(wanted).test(document.querySelector(selector).textContent), [selector, wanted]);
+  page.waitForFunction(([selector, wanted]) => new RegExp(wanted).test(document.querySelector(selector).textContent), [selector, wanted],
+    // Frames may not come while a page has nothing to draw.
+    { polling: 100 });
 
 const steps = async () => (await text('#dro-steps')).split(' ').map(Number);
 
