@@ -20,6 +20,9 @@ use embassy_executor::raw::{TaskRef, task_from_waker, wake_task};
 
 use crate::{Ceiling, Interrupt, Thread};
 
+#[cfg(target_os = "none")]
+mod asked;
+
 #[cfg(target_arch = "avr")]
 mod avr;
 #[cfg(target_arch = "avr")]

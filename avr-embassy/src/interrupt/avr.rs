@@ -9,17 +9,10 @@ use embassy_executor::raw::{Executor, TaskRef, wake_task_no_pend};
 use embassy_executor::{SendSpawner, Spawner};
 
 use crate::assembly::{CLOSED, FLAGS, HELD, HOLD, MISSED, NOT_STARTED, PEND, PENDED};
-use crate::byte::SharedByte;
 use crate::chip::{self, WITHDRAWN};
 use crate::{Interrupt, pender};
 
-/// What was asked for last, for when thread mode has nothing left to do: a number, and whether to go on then
-/// ([`GO_ON`]). Written by interrupt mode only.
-static ASKED: SharedByte = SharedByte::new(0);
-const GO_ON: u8 = 1;
-const NEXT: u8 = 2;
-/// What of that thread mode, the only writer, has seen with nothing left to do.
-static SEEN: SharedByte = SharedByte::new(0);
+pub use super::asked::{idle, note_idle, pend_when_idle, was_idle};
 
 struct Context {
     executor: UnsafeCell<MaybeUninit<Executor>>,
@@ -43,31 +36,6 @@ pub fn pend() {
 #[inline(always)]
 pub fn woken() {
     MISSED.set(1);
-}
-
-pub fn pend_when_idle() {
-    ASKED.set(ASKED.get().wrapping_add(NEXT) | GO_ON);
-}
-
-pub fn note_idle() {
-    ASKED.set(ASKED.get().wrapping_add(NEXT) & !GO_ON);
-}
-
-pub fn was_idle() -> bool {
-    SEEN.get() == ASKED.get()
-}
-
-/// Thread mode has nothing left to do.
-#[inline(always)]
-pub fn idle() {
-    // Something else may be asked for in between: it is seen the next time.
-    let asked = ASKED.get();
-    if SEEN.get() != asked {
-        SEEN.set(asked);
-        if asked & GO_ON != 0 {
-            pend();
-        }
-    }
 }
 
 /// Starts the interrupt executor: `init` spawns its first tasks, and the result spawns more, from any task. `None` if it

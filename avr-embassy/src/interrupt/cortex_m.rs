@@ -16,13 +16,8 @@ use crate::byte::SharedByte;
 use crate::chip::Software;
 use crate::{Interrupt, pender};
 
-/// What was asked for last, for when thread mode has nothing left to do: a number, and whether to go on then
-/// ([`GO_ON`]). Written by interrupt mode only.
-static ASKED: SharedByte = SharedByte::new(0);
-const GO_ON: u8 = 1;
-const NEXT: u8 = 2;
-/// What of that thread mode, the only writer, has seen with nothing left to do.
-static SEEN: SharedByte = SharedByte::new(0);
+pub use super::asked::{idle, note_idle, pend_when_idle, was_idle};
+
 /// Not 0: it has been started.
 static STARTED: SharedByte = SharedByte::new(0);
 
@@ -47,31 +42,6 @@ pub fn pend() {
 #[inline(always)]
 pub fn woken() {
     pend();
-}
-
-pub fn pend_when_idle() {
-    ASKED.set(ASKED.get().wrapping_add(NEXT) | GO_ON);
-}
-
-pub fn note_idle() {
-    ASKED.set(ASKED.get().wrapping_add(NEXT) & !GO_ON);
-}
-
-pub fn was_idle() -> bool {
-    SEEN.get() == ASKED.get()
-}
-
-/// Thread mode has nothing left to do.
-#[inline(always)]
-pub fn idle() {
-    // Something else may be asked for in between: it is seen the next time.
-    let asked = ASKED.get();
-    if SEEN.get() != asked {
-        SEEN.set(asked);
-        if asked & GO_ON != 0 {
-            pend();
-        }
-    }
 }
 
 /// Starts the interrupt executor: `init` spawns its first tasks, and the result spawns more, from any task. `None` if it
