@@ -9,7 +9,7 @@
 //
 // An answer belongs to the first question whose name it has. While a job is sent all answers are the job's, and `ask` is an error.
 
-import { Lines, answerStatus, nameIn, parse } from './protocol.js';
+import { Lines, answerStatus, isText, nameIn, parse } from './protocol.js';
 import { Sender, linesOf } from './sender.js';
 
 /// Longest wait for an answer, ms of the computer's time.
@@ -49,6 +49,8 @@ class Board extends EventTarget {
   type(line) {
     this.tell('sent', line);
     this.sendLine(line);
+    // Answers in text tell no status: a question in JSON has those of a job in JSON again.
+    if (this.streaming && this.dialect === 'tinyg' && isText(line)) this.sendLine('{qr:n}');
   }
 
   /// Sends a job. An error if the machine does not answer in a way by which lines can be counted.

@@ -34,6 +34,11 @@ export function answerStatus(line) {
   return footer[1];
 }
 
+/// Whether a line is of text mode, in which the machine answers from then on: `$xvm`, `?`, `h`.
+export function isText(line) {
+  return /^\s*[$?h]/.test(line);
+}
+
 /// The status of an exception.
 export function exceptionStatus(line) {
   return parse(line)?.er?.st;

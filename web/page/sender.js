@@ -7,7 +7,7 @@
 /// Exceptions after which a job goes on.
 export const HARMLESS = [37, 38, 39, 40, 180];
 
-import { answerStatus, exceptionStatus, nameIn, parse, ALARM, PASSED_OVER } from './protocol.js';
+import { answerStatus, exceptionStatus, isText, nameIn, parse, ALARM, PASSED_OVER } from './protocol.js';
 
 /// Lines that may wait for their answers, and their bytes together: 587 fit the machine.
 const IN_FLIGHT = 4;
@@ -95,7 +95,7 @@ export class Sender {
   foreign(line) {
     const name = nameIn(line);
     if (name !== undefined) this.#foreign.push(name);
-    else if (/^\s*[$?h]/.test(line)) this.#prompts += 1;
+    else if (isText(line)) this.#prompts += 1;
     else if (line.trim() !== '') {
       this.#waiting.push({ number: this.last, text: line });
       this.#bytes += line.length + 1;
