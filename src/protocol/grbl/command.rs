@@ -37,6 +37,8 @@ pub enum Command {
     Restore(u8),
     /// `$x=v`: the number of the setting; its value begins with this byte of the [trimmed](trim) line.
     Set(u8, u8),
+    /// `$name`, `$name=v`: a setting by Kerf's own name; its value begins with this byte of the [trimmed](trim) line, 0 if it is asked for.
+    Named(u8),
     /// `$J=` with a word that is not allowed there, or without one that has to be.
     BadJog,
     /// A `$` with anything else behind it.
@@ -88,8 +90,8 @@ fn system(rest: &[u8]) -> Command {
                 Command::BadJog
             }
         }
-        (_, b'0'..=b'9') => setting(rest).unwrap_or(Command::Unknown),
-        _ => Command::Unknown,
+        (_, b'0'..=b'9') => setting(rest).or_else(|| named(rest)).unwrap_or(Command::Unknown),
+        _ => named(rest).unwrap_or(Command::Unknown),
     }
 }
 
@@ -107,6 +109,15 @@ fn setting(rest: &[u8]) -> Option<Command> {
     }
     // The `$` counts.
     Some(Command::Set(number, equals as u8 + 2))
+}
+
+/// `name`, `name=v`.
+#[small]
+fn named(rest: &[u8]) -> Option<Command> {
+    let equals = rest.iter().position(|byte| *byte == b'=');
+    let name = trim(rest.get(..equals.unwrap_or(rest.len()))?);
+    let is_name = name.len() > 1 && name.iter().all(u8::is_ascii_alphanumeric);
+    is_name.then_some(Command::Named(equals.map_or(0, |equals| equals as u8 + 2)))
 }
 
 /// The axis of a letter in upper case.
@@ -184,7 +195,14 @@ pub fn is_own(line: &[u8]) -> bool {
     }
 }
 
-/// The value of [`Command::Set`].
+/// The name of [`Command::Named`].
+pub fn name(line: &[u8], from: u8) -> &[u8] {
+    let line = trim(line);
+    let end = if from == 0 { line.len() } else { usize::from(from) - 1 };
+    trim(line.get(1..end).unwrap_or(&[]))
+}
+
+/// The value of [`Command::Set`] and [`Command::Named`].
 pub fn value(line: &[u8], from: u8) -> &[u8] {
     trim(trim(line).get(from.into()..).unwrap_or(&[]))
 }
@@ -204,10 +222,16 @@ mod unit {
         assert_eq!(of(b"$"), Command::Help);
         assert_eq!(of(b"$hx"), Command::Home(0));
         assert_eq!(of(b"$N1="), Command::StoreStartup(1));
-        assert_eq!(of(b"$N2=G54"), Command::Unknown);
+        assert_eq!(of(b"$N2=G54"), Command::Named(4));
         assert_eq!(of(b"$HQ"), Command::Unknown);
         assert_eq!(of(b"$110=500.5"), Command::Set(110, 5));
-        assert_eq!(of(b"$999=1"), Command::Unknown);
+        assert_eq!(of(b"$999=1"), Command::Named(5));
+        assert_eq!(of(b" $spr = -2 "), Command::Named(6));
+        assert_eq!((name(b" $spr = -2 ", 6), value(b" $spr = -2 ", 6)), (&b"spr"[..], &b"-2"[..]));
+        assert_eq!((of(b"$1sa"), name(b"$1sa", 0)), (Command::Named(0), &b"1sa"[..]));
+        for none in ["$q", "$q=1", "$x y=1", "$\"xvm\"=1", "$=1"] {
+            assert_eq!(of(none.as_bytes()), Command::Unknown, "{none}");
+        }
         assert_eq!(of(b"$rst=*"), Command::Restore(b'*'));
         assert_eq!(of(b"$RST=x"), Command::Unknown);
         assert_eq!(of(b"$J=G91 G21 X1.5 F100"), Command::Gcode);

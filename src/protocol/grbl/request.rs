@@ -9,6 +9,7 @@ use super::status::{BAD_JOG, BUSY, LOCKED, TOO_LONG, UNSUPPORTED, error_number};
 use super::write::{fixed, int, line_end, message, text};
 use super::{lists, settings};
 use crate::capability::Capability;
+use crate::config::Fixed;
 use crate::gcode::modal::MotionMode;
 use crate::gcode::tables::{Row, SYSTEMS};
 use crate::machine::alarm::is_program_end;
@@ -167,6 +168,9 @@ impl Request {
                 self.command = Command::Nothing;
                 Step::At(0)
             }
+            Command::Named(from) if settings::by_name(command::name(line, from)).is_none() => {
+                Step::Error(UNSUPPORTED)
+            }
             // Only at rest, or in an alarm, from here on.
             _ if at == 0 && self.command != Command::Unlock && !may_change(machine) => {
                 Step::Error(BUSY)
@@ -185,7 +189,11 @@ impl Request {
                 _ => Step::At(lists::startup(at, machine, out).unwrap_or(END)),
             },
             Command::StoreStartup(n) => self.store_startup(n, line, machine),
-            Command::Set(number, from) => set(at, number, command::value(line, from), machine, out),
+            Command::Set(number, from) => {
+                let to = command::value(line, from);
+                set(at, machine, out, |machine| settings::set(number, to, machine))
+            }
+            Command::Named(from) => named(at, line, from, machine, out),
             Command::Home(axis) => home(at, axis, machine),
             Command::Unlock => unlock(machine, out),
             Command::Check => check(at, machine, out),
@@ -310,17 +318,44 @@ fn list_setting(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step 
     if let Some(value) = settings::value(number, machine) {
         out.put(b'$');
         int(out, number.into());
-        out.put(b'=');
-        fixed(out, value);
-        line_end(out);
+        equals(value, out);
     }
     Step::At(at + 1)
 }
 
-/// `$x=v`. Answered when it is in memory.
+/// Ends a line with a value.
+#[small]
+fn equals(value: Fixed, out: &mut impl Out) {
+    out.put(b'=');
+    fixed(out, value);
+    line_end(out);
+}
+
+/// `$name`, `$name=v`.
 #[inline(never)]
 #[small]
-fn set(at: u8, number: u8, value: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
+fn named(at: u8, line: &[u8], from: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    let name = command::name(line, from);
+    let Some(setting) = settings::by_name(name) else { return Step::Error(UNSUPPORTED) };
+    if from != 0 {
+        let to = command::value(line, from);
+        return set(at, machine, out, |machine| settings::set_named(setting, to, machine));
+    }
+    out.put(b'$');
+    out.put_all(name.iter().map(u8::to_ascii_lowercase));
+    equals(settings::value_of(setting, machine), out);
+    Step::Done
+}
+
+/// `$x=v`, `$name=v`, set by `set`. Answered when it is in memory.
+#[inline(never)]
+#[small]
+fn set<M: Machine>(
+    at: u8,
+    machine: &mut M,
+    out: &mut impl Out,
+    set: impl FnOnce(&mut M) -> Result<(), Status>,
+) -> Step {
     if at == STORES {
         if machine.value(Value::Kept) == 0 {
             return Step::Later(STORES);
@@ -330,12 +365,11 @@ fn set(at: u8, number: u8, value: &[u8], machine: &mut impl Machine, out: &mut i
         }
         return Step::Done;
     }
-    match settings::set(number, value, machine) {
+    match set(machine) {
         Ok(()) => Step::Later(STORES),
         Err(Status::Again) => Step::Later(0),
         // What the setting cannot have: no rate and no target is meant.
         Err(Status::OutOfRange | Status::AboveMaximum) => Step::Error(UNSUPPORTED),
-        Err(Status::BelowMinimum) if value.first() != Some(&b'-') => Step::Error(UNSUPPORTED),
         Err(status) => Step::Error(error_number(status)),
     }
 }

@@ -6,7 +6,7 @@
 use super::report::LOWERED;
 use crate::boards::MOTORS;
 use crate::capability::Capability;
-use crate::config::name::token;
+use crate::config::name::{Name, token};
 use crate::config::{Fixed, Number, Owner, Setting};
 use crate::progmem;
 use crate::protocol::{Machine, Warning};
@@ -279,6 +279,26 @@ pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), St
     }
 }
 
+/// The setting with a name of its own.
+#[inline(never)]
+#[small]
+pub fn by_name(name: &[u8]) -> Option<Setting> {
+    Setting::find(&Name::new().with(name)?)
+}
+
+/// Its value, in the unit of TinyG's dialect.
+#[small]
+pub fn value_of(setting: Setting, machine: &mut impl Machine) -> Fixed {
+    Fixed { value: machine.setting(setting), decimals: setting.row().stored }
+}
+
+/// Sets it to what `text` says. [`Status::Again`] as of [`set`].
+#[inline(never)]
+#[small]
+pub fn set_named(setting: Setting, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
+    put(machine, Some(setting), Number::parse(text).ok_or(Status::BadNumber)?)
+}
+
 /// Sets some bits of `grm`, and keeps others.
 #[small]
 fn set_report(bits: i32, kept: i32, machine: &mut impl Machine) -> Result<(), Status> {
@@ -292,7 +312,11 @@ fn set_report(bits: i32, kept: i32, machine: &mut impl Machine) -> Result<(), St
 #[small]
 fn put(machine: &mut impl Machine, setting: Option<Setting>, to: Number) -> Result<(), Status> {
     let setting = setting.ok_or(Status::UnrecognizedName)?;
-    let value = machine.settings().check(setting, to, false)?;
+    let value = machine.settings().check(setting, to, false).map_err(|status| match status {
+        // Error 4 is said of negative values alone.
+        Status::BelowMinimum => Status::OutOfRange,
+        other => other,
+    })?;
     put_value(machine, Some(setting), value)
 }
 
