@@ -129,10 +129,9 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
 #[small]
 fn choose_dialects(links: &Links) {
     let settings = links.settings.borrow();
-    let chooses = Speech::of_question(&settings).is_some();
     for port in &links.ports {
         port.speech.set(Speech::at_start(&settings, port.number));
-        port.choice.set(match chooses {
+        port.choice.set(match Speech::IS_CHOSEN {
             false => Choice::None,
             true if settings.lets_senders_choose(port.number) => Choice::Open,
             true => Choice::Set,

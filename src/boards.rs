@@ -6,6 +6,8 @@
 
 #[path = "../boards/mega2560-grbl.rs"]
 mod mega2560_grbl;
+#[path = "../boards/mega2560-grbl-lathe.rs"]
+mod mega2560_grbl_lathe;
 #[path = "../boards/mega2560-lathe.rs"]
 mod mega2560_lathe;
 #[path = "../boards/pico-cnc.rs"]
@@ -14,6 +16,7 @@ mod pico_cnc;
 mod ramps14;
 
 pub use mega2560_grbl::MEGA2560_GRBL;
+pub use mega2560_grbl_lathe::MEGA2560_GRBL_LATHE;
 pub use mega2560_lathe::MEGA2560_LATHE;
 pub use pico_cnc::PICO_CNC;
 pub use ramps14::RAMPS14;
@@ -569,7 +572,8 @@ impl Board {
 }
 
 /// Every board Kerf knows.
-pub const ALL: [&Board; 4] = [&MEGA2560_GRBL, &MEGA2560_LATHE, &PICO_CNC, &RAMPS14];
+pub const ALL: [&Board; 5] =
+    [&MEGA2560_GRBL, &MEGA2560_GRBL_LATHE, &MEGA2560_LATHE, &PICO_CNC, &RAMPS14];
 
 const _: () = {
     let mut i = 0;
@@ -588,6 +592,9 @@ pub fn by_name(name: &str) -> Option<&'static Board> {
 #[cfg(feature = "board-ramps14")]
 pub const ACTIVE: &Board = &RAMPS14;
 /// The board that this image is built for.
+#[cfg(feature = "board-mega2560-grbl-lathe")]
+pub const ACTIVE: &Board = &MEGA2560_GRBL_LATHE;
+/// The board that this image is built for.
 #[cfg(feature = "board-mega2560-lathe")]
 pub const ACTIVE: &Board = &MEGA2560_LATHE;
 /// The board that this image is built for.
@@ -596,6 +603,7 @@ pub const ACTIVE: &Board = &PICO_CNC;
 /// The board that this image is built for.
 #[cfg(not(any(
     feature = "board-ramps14",
+    feature = "board-mega2560-grbl-lathe",
     feature = "board-mega2560-lathe",
     feature = "board-pico-cnc"
 )))]

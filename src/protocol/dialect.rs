@@ -178,6 +178,9 @@ macro_rules! dialects {
         }
 
         impl Speech {
+            /// Whether the image has several dialects, of which a sender may choose.
+            pub const IS_CHOSEN: bool = 1 < 0 $(+ cfg!(feature = $feature) as usize)+;
+
             /// How a port is spoken to after a start: in the dialect that is chosen, else in the first of the table that is built in.
             #[allow(unreachable_code)]
             #[inline(always)]

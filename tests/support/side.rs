@@ -7,6 +7,10 @@ pub trait Side {
     fn send(&mut self, bytes: &[u8]);
     /// Puts bytes on the line of the second port.
     fn send_aux(&mut self, bytes: &[u8]);
+    /// Whether it greets in TinyG's dialect; else in grbl's alone.
+    fn speaks_tinyg(&self) -> bool {
+        true
+    }
     /// Drives the pin with which its sender holds the machine back.
     fn set_aux_cts(&mut self, stop: bool);
     /// Whether the machine stops that sender by the other pin.

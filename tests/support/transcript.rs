@@ -66,10 +66,26 @@ enum Event {
 }
 
 /// A transcript, read.
+#[derive(Clone)]
 pub struct Transcript {
     /// The name of its file.
     pub name: String,
     events: Vec<(usize, Event)>,
+}
+
+impl Transcript {
+    /// Whether it is about grbl's dialect, and asks for nothing in TinyG's.
+    #[allow(dead_code)]
+    pub fn is_grbl_alone(&self) -> bool {
+        let is_json = |bytes: &[u8]| bytes.starts_with(b"{");
+        self.name.starts_with("grbl")
+            && !self.events.iter().any(|(_, event)| match event {
+                Event::Send(bytes) => is_json(bytes),
+                Event::SendAux(_) | Event::HearAux(_) | Event::Job(_) => true,
+                Event::Hear(line) => is_json(line.as_bytes()),
+                _ => false,
+            })
+    }
 }
 
 /// Reads every transcript in a folder; those alone whose name contains `KERF_TRANSCRIPT`, if that is set.
@@ -234,7 +250,8 @@ impl Transcript {
         };
         let pulses = self.events.iter().find_map(pulses).unwrap_or(0);
         side.wire(&self.events.iter().filter_map(near).collect::<Vec<_>>(), pulses);
-        let mut player = Player { side, ears: Default::default(), allowed: Vec::new() };
+        let (ears, allowed) = Default::default();
+        let mut player = Player { side, ears, allowed, greeted: false };
         for (line, event) in &self.events {
             player.play(event).map_err(|what| format!("{}:{line}: {what}", self.name))?;
         }
@@ -249,6 +266,8 @@ struct Player<'a, S> {
     /// What has been heard on each port.
     ears: [Ear; 2],
     allowed: Vec<String>,
+    /// The last line heard on the first port that was expected by itself was grbl's greeting.
+    greeted: bool,
 }
 
 /// What has been heard on a port.
@@ -286,7 +305,10 @@ impl<S: Side> Player<'_, S> {
             Event::Send(bytes) => self.side.send(bytes),
             Event::SendAux(bytes) => self.side.send_aux(bytes),
             Event::AuxCts(stop) => self.side.set_aux_cts(*stop),
-            Event::Hear(line) => return self.hear(0, line),
+            Event::Hear(line) => {
+                self.greeted = line == OTHER_GREETING;
+                return self.hear(0, line);
+            }
             Event::HearAux(line) => return self.hear(1, line),
             Event::Allow(pattern) => self.allowed.push(pattern.clone()),
             Event::Pass(ms) => self.side.run_ms(*ms),
@@ -294,7 +316,7 @@ impl<S: Side> Player<'_, S> {
             Event::Input(input, closed) => self.side.set_input(*input, *closed),
             Event::Near(..) => {}
             Event::Spindle(rpm, pulses) => self.side.turn_spindle(*rpm, *pulses),
-            Event::Greeting => return self.wait(0, GREETING, |line| matches(GREETING, line)),
+            Event::Greeting => return self.greeting(),
             Event::Job(file) => return self.run(file),
             Event::Steps(steps) => return self.rest_at(steps),
             Event::Outputs(wanted) => {
@@ -310,6 +332,14 @@ impl<S: Side> Player<'_, S> {
             }
         }
         Ok(())
+    }
+
+    /// Hears the greeting of TinyG's dialect; of an image without it that of grbl's, which may have been heard.
+    fn greeting(&mut self) -> Result<(), String> {
+        if self.side.speaks_tinyg() {
+            return self.wait(0, GREETING, |line| matches(GREETING, line));
+        }
+        if std::mem::take(&mut self.greeted) { Ok(()) } else { self.hear(0, OTHER_GREETING) }
     }
 
     /// Sends a file as a sender does that waits for each answer.

@@ -149,8 +149,8 @@ fn wires(board: &Board) -> Vec<Wire> {
 fn about(board: &Board) -> &'static str {
     match board.name {
         "mega2560-grbl" => {
-            "An Arduino Mega 2560 with a shield, or single wires, for the pins of grbl for the Mega. The default board. `mega2560-lathe` has the same \
-             pins, and a [spindle's sensors](lathe.md)."
+            "An Arduino Mega 2560 with a shield, or single wires, for the pins of grbl for the Mega. The default board. `mega2560-lathe` and \
+             `mega2560-grbl-lathe` have the same pins, and a [spindle's sensors](lathe.md)."
         }
         "ramps14" => {
             "An Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder (E0) as A."

@@ -15,6 +15,9 @@ pub enum Board {
     #[default]
     #[value(name = "mega2560-grbl")]
     Mega2560Grbl,
+    /// Arduino Mega 2560 with a grbl-style shield, on a lathe, for senders that speak grbl's dialect
+    #[value(name = "mega2560-grbl-lathe")]
+    Mega2560GrblLathe,
     /// Arduino Mega 2560 with a grbl-style shield, on a lathe
     #[value(name = "mega2560-lathe")]
     Mega2560Lathe,
@@ -49,6 +52,7 @@ impl Board {
     pub fn name(self) -> &'static str {
         match self {
             Board::Mega2560Grbl => "mega2560-grbl",
+            Board::Mega2560GrblLathe => "mega2560-grbl-lathe",
             Board::Mega2560Lathe => "mega2560-lathe",
             Board::PicoCnc => "pico-cnc",
             Board::Ramps14 => "ramps14",

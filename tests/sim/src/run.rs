@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use kerf::boards::{self, Board};
 use kerf_sim::Machine;
@@ -28,6 +28,8 @@ pub fn board(name: &str) -> Result<&'static Board> {
 pub fn run(args: &RunArgs) -> Result<bool> {
     let lines = job::read_lines(&args.job)?;
     let board = board(&args.target.board)?;
+    let speaks = board.features.contains(&"dialect-tinyg");
+    ensure!(speaks, "jobs are sent in TinyG's dialect, which the board {} lacks", board.name);
     if emulated::is_emulated(board) {
         return run_emulated(args, board, &lines);
     }

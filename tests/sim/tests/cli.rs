@@ -49,15 +49,21 @@ fn mistakes_are_explained() {
     let job = scratch("some.gcode", "G0 X1\n");
     let blank = scratch("blank.gcode", "\n%\n");
     let text = scratch("text.elf", "no program");
-    let cases: [(&Path, &Path, &[&str], &str); 4] = [
+    let cases: [(&Path, &Path, &[&str], &str); 5] = [
         (Path::new("/nowhere.elf"), &job, &[], "cannot read /nowhere.elf"),
+        (
+            &elf,
+            &job,
+            &["--board", "mega2560-grbl-lathe"],
+            "jobs are sent in TinyG's dialect, which the board mega2560-grbl-lathe lacks",
+        ),
         (&text, &job, &[], "text.elf is not an AVR program"),
         (&elf, &blank, &[], "blank.gcode has no lines to send"),
         (
             &elf,
             &job,
             &["--board", "uno"],
-            "no board uno; there are mega2560-grbl, mega2560-lathe, pico-cnc, ramps14",
+            "no board uno; there are mega2560-grbl, mega2560-grbl-lathe, mega2560-lathe, pico-cnc, ramps14",
         ),
     ];
     for (elf, job, more, want) in cases {

@@ -248,7 +248,8 @@ const DIFFERS: [&str; 8] = [
     "stored",
 ];
 /// Those with a spindle that turns: the emulated board has none.
-const TURNING: [&str; 4] = ["grbl-thread", "lathe-feed", "thread-reports", "thread-retract"];
+const TURNING: [&str; 5] =
+    ["grbl-lathe", "grbl-thread", "lathe-feed", "thread-reports", "thread-retract"];
 /// Those that move for long, minutes of the emulator's time each: `KERF_TRANSCRIPT` plays one.
 const LONG: [&str; 2] = ["far", "axis-modes"];
 

@@ -13,26 +13,25 @@ mod transcript;
 use std::path::Path;
 
 use common::firmware;
-use kerf::boards::{MEGA2560_GRBL, MEGA2560_LATHE};
+use kerf::boards::{MEGA2560_GRBL, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
 
 /// What only the image of a lathe can do.
 const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];
-/// What needs grbl's dialect besides: today only the host has both.
-const BOTH: &str = "grbl-thread";
+/// What needs grbl's dialect besides.
+const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 
 #[test]
 fn the_image_keeps_to_the_transcripts() {
     let all = transcript::read_all(Path::new("../transcripts"));
-    let is_built = |one: &transcript::Transcript| {
-        let both = MEGA2560_GRBL.features.contains(&"lathe");
-        both || !one.name.starts_with(BOTH)
+    let begins = |names: &[&str], one: &transcript::Transcript| {
+        names.iter().any(|name| one.name.starts_with(name))
     };
-    let (turning, others) = all
-        .into_iter()
-        .filter(is_built)
-        .partition(|one| TURNING.iter().any(|name| one.name.starts_with(name)));
+    let both: Vec<_> = all.iter().filter(|one| one.is_grbl_alone()).cloned().collect();
+    let (turning, others): (Vec<_>, Vec<_>) =
+        all.into_iter().filter(|one| !begins(&BOTH, one)).partition(|one| begins(&TURNING, one));
     transcript::play_all(others, 2, || firmware(&MEGA2560_GRBL));
     transcript::play_all(turning, 2, || firmware(&MEGA2560_LATHE));
+    transcript::play_all(both, 2, || firmware(&MEGA2560_GRBL_LATHE));
 }
 
 #[test]

@@ -176,10 +176,17 @@ pub fn heat(name: &str) -> Heat {
     }
 }
 
-/// The rows that no function is named by.
+/// The rows that no function is named by, but for those of a dialect that the image lacks.
 pub fn stale<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Vec<&'static str> {
-    let stale = |row: &&&str| !names.clone().any(|name| begins(name, row));
+    let names_nothing = |row: &str| !names.clone().any(|name| begins(name, row));
+    let stale = |row: &&&str| names_nothing(row) && !dialect(row).is_some_and(names_nothing);
     [HOT, WARM, COLD].into_iter().flatten().filter(stale).copied().collect()
+}
+
+/// The module of `kerf::protocol` that a row is in, as a row: `kerf::protocol::tinyg::`.
+fn dialect(row: &str) -> Option<&str> {
+    let (name, _) = row.strip_prefix("kerf::protocol::")?.split_once("::")?;
+    row.find(name).and_then(|at| row.get(..at + name.len() + 2))
 }
 
 /// `<kerf::motion::exec::Exec>::run` begins with `kerf::motion::`, and its poll with what the task is called.
@@ -227,5 +234,14 @@ mod tests {
         let stale = stale(names.iter().copied());
         assert!(!stale.contains(&"kerf::motion::"));
         assert!(stale.contains(&"__vector_"));
+    }
+
+    #[test]
+    fn rows_of_a_dialect_that_is_left_out_are_not_stale() {
+        let row = "kerf::protocol::tinyg::status::number";
+        let is_stale = |names: &[&'static str]| stale(names.iter().copied()).contains(&row);
+        assert!(!is_stale(&["kerf::protocol::grbl::status::put"]));
+        assert!(is_stale(&["kerf::protocol::tinyg::status::text"]));
+        assert!(!is_stale(&[row]));
     }
 }

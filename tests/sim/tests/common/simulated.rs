@@ -19,6 +19,10 @@ impl Side for Machine {
         Machine::send_to(self, AUX, bytes);
     }
 
+    fn speaks_tinyg(&self) -> bool {
+        self.board().features.contains(&"dialect-tinyg")
+    }
+
     fn set_aux_cts(&mut self, stop: bool) {
         self.set_cts(AUX, stop);
     }
