@@ -227,7 +227,7 @@ pub(super) fn sync_error(machine: &mut impl Machine, out: &mut impl Out) {
     length(out, machine.value(Value::SyncError) * 10, inches);
 }
 
-/// The same in a pass, if reports are to tell it; else a zero that says so.
+/// How far the axes of a thread are ahead of the spindle. `0.00` between passes, and where reports are not to tell it.
 #[inline(never)]
 #[small]
 fn reported_error(machine: &mut impl Machine, out: &mut impl Out) {

@@ -37,9 +37,7 @@ impl Place<'_> {
         if pair != other || !is_free || sum.abs() > 63 {
             return None;
         }
-        let op = if sum < 0 { "sbiw" } else { "adiw" };
-        let whole = (sum != 0).then(|| Insn::new(&format!("{op} {pair}, {}", sum.abs())));
-        Some(vec![(self.at, whole), (self.at + 1, None)])
+        Some(vec![(self.at, moving(&pair, sum)), (self.at + 1, None)])
     }
 
     /// Makes an address of one that is far, where another pair is near.
@@ -65,11 +63,7 @@ impl Place<'_> {
         }
         let wanted = self.local.offsets.of(s).plus(number);
         let gone = |from: usize| (from..=last).map(|at| (at, None));
-        let step = |way: i16| match way {
-            0 => None,
-            _ if way < 0 => Some(Insn::new(&format!("sbiw r{d}, {}", -way))),
-            _ => Some(Insn::new(&format!("adiw r{d}, {way}"))),
-        };
+        let step = |way: i16| moving(&format!("r{d}"), way.into());
         let way = |pair: u8| wanted.beyond(self.local.offsets.of(pair));
         let is_near = |way: &i16| *way == 0 || d >= 24 && way.abs() <= 63;
         if let Some(way) = way(d).filter(is_near) {
@@ -141,4 +135,10 @@ fn further(insn: &Insn, number: i32) -> Option<Insn> {
 /// Whether a register is none of Z.
 fn pointer_free(operand: &str) -> bool {
     register(operand).is_some_and(|register| register < 30)
+}
+
+/// What moves a pair by so much, 63 at most either way; nothing for 0.
+fn moving(pair: &str, way: i32) -> Option<Insn> {
+    let op = if way < 0 { "sbiw" } else { "adiw" };
+    (way != 0).then(|| Insn::new(&format!("{op} {pair}, {}", way.abs())))
 }
