@@ -148,13 +148,14 @@ impl Program {
         text
     }
 
-    /// The words outside of calls: what they name others than these functions may call, by its name.
+    /// The words outside of calls and jumps: what they name others than these functions may call, by its name.
     pub fn names_elsewhere(&self) -> HashSet<String> {
         let fixed = self.functions.iter().flat_map(Function::fixed);
         let around = self.head.iter().chain(&self.rest).map(String::as_str);
         let around = around.filter(|line| !names_nothing(line) && address(line).is_none());
         let operands = self.functions.iter().flat_map(Function::insns);
-        let operands = operands.filter(|insn| insn.op != "call").map(|insn| insn.args.as_str());
+        let operands = operands.filter(|insn| insn.op != "call" && insn.op != "jmp");
+        let operands = operands.map(|insn| insn.args.as_str());
         let operands = operands.filter(|args| address(args).is_none());
         let lines = fixed.chain(around).chain(operands);
         let is_name = |c: char| c.is_alphanumeric() || "_.$".contains(c);

@@ -24,7 +24,7 @@ pub const REGISTERS: Set = u32::MAX as Set;
 pub const ALL: Set = REGISTERS | FLAGS;
 
 /// Registers that a function hands back as they were.
-const KEPT: Set = range(2, 17) | range(28, 29);
+pub const KEPT: Set = range(2, 17) | range(28, 29);
 /// Where arguments lie.
 pub const ARGUMENTS: Set = range(8, 25);
 /// Where results lie.

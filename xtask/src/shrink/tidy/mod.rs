@@ -19,6 +19,7 @@ mod needs;
 mod offsets;
 mod rules;
 mod run;
+mod saves;
 
 use std::collections::HashMap;
 
@@ -47,8 +48,9 @@ pub fn tidy(program: &mut Program) -> Result<()> {
             tidy_function(function, &needs)?;
         }
     }
-    ensure!(Needs::of(program).are_within(&needs), "a function needs more than before");
-    Ok(())
+    let after = Needs::of(program);
+    ensure!(after.are_within(&needs), "a function needs more than before");
+    saves::leave_out(program, &after)
 }
 
 fn tidy_function(function: &mut Function, needs: &Needs) -> Result<()> {

@@ -1,0 +1,423 @@
+//! Functions save no register that nobody has a use for when they return.
+//!
+//! The convention has a function hand back 18 registers as it found them: each that it uses it pushes first and pops at its end, four cycles and
+//! four bytes. Most callers have nothing in most of these registers, nor have their callers. Which ones hold something that is read behind
+//! a call is found for all functions together: what a function hands back is what is needed behind some call of it, and what those that call it
+//! hand back themselves. A register that is not among these need not be saved.
+//!
+//! What is called from outside, from assembler of the source or from start-up code, keeps to the convention. What is called by a pointer hands back
+//! what is needed behind any such call.
+//!
+//! Cold functions keep what they save: it is alike in many of them, and they share it.
+//!
+//! [`check`] holds the result against another question, from the other side: which registers has a call changed when it returns? None of these
+//! may be needed behind it.
+
+use std::collections::{HashMap, HashSet};
+
+use anyhow::{Result, ensure};
+
+use super::super::hot::Heat;
+use super::super::text::{Function, Insn, Line, Program};
+use super::super::{heat, names_in_source};
+use super::effect::{self, KEPT, Set};
+use super::flow::Flow;
+use super::needs::Needs;
+
+/// What calls by a pointer call.
+const ANY: &str = "";
+
+/// Leaves out what need not be saved.
+pub fn leave_out(program: &mut Program, needs: &Needs) -> Result<()> {
+    leave_out_of(program, needs, |function| heat(function) != Heat::Cold)
+}
+
+fn leave_out_of(
+    program: &mut Program,
+    needs: &Needs,
+    is_meant: impl Fn(&Function) -> bool,
+) -> Result<()> {
+    let calls = Calls::of(program, needs);
+    let before = Changed::by(program, &calls);
+    let handed = Handed::back(program, &calls);
+    for function in program.functions.iter_mut().filter(|function| is_meant(function)) {
+        let Some(saves) = Saves::of(function) else { continue };
+        let wanted = handed.by(&function.name);
+        let gone: HashSet<usize> = (saves.pairs.iter())
+            .filter(|pair| wanted & effect::bit(pair.register) == 0)
+            .flat_map(|pair| pair.lines.iter().copied())
+            .collect();
+        let mut line = 0..;
+        function.lines.retain(|_| !gone.contains(&line.next().expect("lines are finite")));
+    }
+    check(program, &calls, &before)
+}
+
+/// A register that a function saves: the lines that push and pop it.
+struct Pair {
+    register: u8,
+    lines: Vec<usize>,
+}
+
+/// What a function saves.
+struct Saves {
+    pairs: Vec<Pair>,
+}
+
+impl Saves {
+    /// Those of a function that begins with pushes and pops the same in front of each of its ends, and nowhere else.
+    fn of(function: &Function) -> Option<Saves> {
+        let code: Vec<(usize, &Line)> = (function.lines.iter().enumerate())
+            .filter(|(_, line)| !matches!(line, Line::Note(_)))
+            .collect();
+        let register = |line: &Line, op: &str| match line {
+            Line::Insn(insn) if insn.op == op => effect::register(&insn.args),
+            _ => None,
+        };
+        let pushed = code.iter().map_while(|(at, line)| Some((*at, register(line, "push")?)));
+        let mut pairs: Vec<Pair> = pushed
+            .map(|(at, register)| Pair { register, lines: vec![at] })
+            .take_while(|pair| effect::bit(pair.register) & KEPT != 0)
+            .collect();
+        let all: Set = pairs.iter().fold(0, |all, pair| all | effect::bit(pair.register));
+        let pushes = code.iter().filter(|(_, line)| {
+            register(line, "push").is_some_and(|register| effect::bit(register) & all != 0)
+        });
+        if pairs.is_empty()
+            || pushes.count() != pairs.len()
+            || all.count_ones() as usize != pairs.len()
+        {
+            return None;
+        }
+        let pops = |line: &Line| {
+            register(line, "pop").is_some_and(|register| effect::bit(register) & all != 0)
+        };
+        let mut popped = 0;
+        for end in (0..code.len()).filter(|at| is_end(code[*at].1)) {
+            let from = end.checked_sub(pairs.len())?;
+            for (pair, (at, line)) in pairs.iter_mut().rev().zip(&code[from..end]) {
+                if register(line, "pop") != Some(pair.register) {
+                    return None;
+                }
+                pair.lines.push(*at);
+                popped += 1;
+            }
+        }
+        (code.iter().filter(|(_, line)| pops(line)).count() == popped).then_some(Saves { pairs })
+    }
+
+    fn registers(&self) -> Set {
+        self.pairs.iter().fold(0, |all, pair| all | effect::bit(pair.register))
+    }
+}
+
+fn is_end(line: &Line) -> bool {
+    matches!(line, Line::Insn(insn) if insn.op == "ret" || insn.op == "jmp")
+}
+
+/// What each function has to hand back.
+struct Handed {
+    back: HashMap<String, Set>,
+    /// Functions that are called by a pointer.
+    taken: HashSet<String>,
+}
+
+impl Handed {
+    fn back(program: &Program, reads: &Calls) -> Handed {
+        let (outside, taken) = (outside(program), taken(program));
+        let inside = program.functions.iter().map(|function| function.name.clone());
+        let back = inside.filter(|name| !outside.contains(name)).map(|name| (name, 0));
+        let back = back.chain([(ANY.into(), 0)]).collect();
+        let mut handed = Handed { back, taken };
+        let mut is_new = true;
+        while is_new {
+            is_new = false;
+            for function in &program.functions {
+                is_new |= handed.look(function, reads);
+            }
+        }
+        handed
+    }
+
+    fn by(&self, name: &str) -> Set {
+        let by_name = self.back.get(name).copied().unwrap_or(KEPT);
+        if self.taken.contains(name) { by_name | self.back[ANY] } else { by_name }
+    }
+
+    /// Adds what this function needs of those that it calls; whether that is new.
+    fn look(&mut self, function: &Function, reads: &Calls) -> bool {
+        let own = self.by(&function.name);
+        let mut is_new = false;
+        for call in reads.of_function(function, own) {
+            if let Some(known) = self.back.get_mut(call.to) {
+                is_new |= call.behind & !*known != 0;
+                *known |= call.behind;
+            }
+        }
+        is_new
+    }
+}
+
+/// A call, and which registers that functions hand back are needed behind it.
+struct Call<'a> {
+    to: &'a str,
+    behind: Set,
+}
+
+/// What calls read of the registers that functions hand back, which may have arguments as well.
+struct Calls<'a> {
+    needs: &'a Needs,
+    read: HashMap<String, Set>,
+}
+
+impl Calls<'_> {
+    fn of<'a>(program: &Program, needs: &'a Needs) -> Calls<'a> {
+        let taken = taken(program);
+        let names = program.functions.iter().map(|function| function.name.clone());
+        let read = names.chain([ANY.into()]).map(|name| (name, 0)).collect();
+        let mut calls = Calls { needs, read };
+        let mut is_new = true;
+        while is_new {
+            is_new = false;
+            for function in &program.functions {
+                // To save a register is not to read it.
+                let saves = Saves::of(function).map_or(Vec::new(), |saves| saves.pairs);
+                let read = calls.flow(function, 0).map_or(KEPT, |mut flow| {
+                    for pushed in saves.iter().filter_map(|pair| pair.lines.first()) {
+                        if let Ok(at) = flow.origins.binary_search(pushed) {
+                            flow.effects[at].reads = 0;
+                        }
+                    }
+                    let needed = flow.needed();
+                    flow.needed_before(0, &needed) & KEPT
+                });
+                for name in [function.name.as_str(), ANY] {
+                    if name != ANY || taken.contains(&function.name) {
+                        is_new |= add(&mut calls.read, name, read);
+                    }
+                }
+            }
+        }
+        calls
+    }
+
+    /// The calls of a function that has to hand back `own`.
+    fn of_function<'f>(&self, function: &'f Function, own: Set) -> Vec<Call<'f>> {
+        let Some(flow) = self.flow(function, own) else {
+            let insns = function.insns().filter_map(called);
+            return insns.map(|to| Call { to, behind: KEPT }).collect();
+        };
+        let needed = flow.needed();
+        let call = |(at, behind): (usize, &Set)| {
+            let Line::Insn(insn) = function.lines.get(flow.origins[at])? else { return None };
+            let behind = if insn.op == "jmp" { own } else { behind & KEPT };
+            called(insn).map(|to| Call { to, behind })
+        };
+        needed.iter().enumerate().filter_map(call).collect()
+    }
+
+    /// The flow of a function that hands back `own` alone.
+    fn flow<'f>(&self, function: &'f Function, own: Set) -> Option<Flow<'f>> {
+        let mut flow = Flow::of(function, self.needs)?;
+        let saved = Saves::of(function).map_or(0, |saves| saves.registers());
+        for (at, line) in flow.lines.iter().enumerate() {
+            let effect = &mut flow.effects[at];
+            match line {
+                Line::Insn(insn) => {
+                    let read = called(insn).and_then(|to| self.read.get(to));
+                    if let Some(read) = read {
+                        effect.reads = effect.reads & !KEPT | read;
+                    }
+                    match insn.op.as_str() {
+                        "ret" => effect.reads = effect.reads & !KEPT | own,
+                        "jmp" => effect.reads |= own,
+                        _ => {}
+                    }
+                }
+                // It uses no register of these that the function has not saved for it.
+                Line::Fixed(_) if *effect == effect::Effect::UNKNOWN => {
+                    effect.reads &= !KEPT | saved;
+                    effect.spoils &= !KEPT | saved;
+                }
+                _ => {}
+            }
+        }
+        Some(flow)
+    }
+}
+
+/// What an instruction calls, or goes on with in another function.
+fn called(insn: &Insn) -> Option<&str> {
+    match insn.op.as_str() {
+        "call" | "jmp" => Some(&insn.args),
+        "eicall" => Some(ANY),
+        _ => None,
+    }
+}
+
+/// Adds to a set; whether that is new.
+fn add(sets: &mut HashMap<String, Set>, name: &str, set: Set) -> bool {
+    let known = sets.entry(name.into()).or_default();
+    let is_new = set & !*known != 0;
+    *known |= set;
+    is_new
+}
+
+/// Functions that others than those of the program may call.
+fn outside(program: &Program) -> HashSet<String> {
+    let called: HashSet<&str> = (program.functions.iter().flat_map(Function::insns))
+        .filter(|insn| insn.op == "call" || insn.op == "jmp")
+        .map(|insn| insn.args.as_str())
+        .collect();
+    let taken = program.taken();
+    let mut outside = program.names_elsewhere();
+    outside.extend(names_in_source(program));
+    let inside = |name: &str| called.contains(name) || taken.contains(name);
+    let uncalled = program.functions.iter().filter(|function| !inside(&function.name));
+    outside.extend(uncalled.map(|function| function.name.clone()));
+    outside
+}
+
+fn taken(program: &Program) -> HashSet<String> {
+    program.taken().into_iter().map(str::to_owned).collect()
+}
+
+/// Fails if a call may change a register that is needed behind it, and did not `before`.
+fn check(program: &Program, calls: &Calls, before: &Changed) -> Result<()> {
+    let handed = Handed::back(program, calls);
+    let after = Changed::by(program, calls);
+    let newly = |name: &str| after.when_it_returns(name) & !before.when_it_returns(name);
+    for function in &program.functions {
+        let name = &function.name;
+        let lost = handed.by(name) & newly(name);
+        ensure!(lost == 0, "{name} does not hand back {lost:#x}");
+        for call in calls.of_function(function, handed.by(name)) {
+            let lost = call.behind & newly(call.to);
+            ensure!(lost == 0, "{} takes {lost:#x} of {name}", call.to);
+        }
+    }
+    Ok(())
+}
+
+/// The registers that each function may have changed when it returns, of those that the convention has it hand back.
+struct Changed {
+    by: HashMap<String, Set>,
+}
+
+impl Changed {
+    fn by(program: &Program, calls: &Calls) -> Changed {
+        let taken = taken(program);
+        let mut changed = Changed { by: HashMap::new() };
+        let mut is_new = true;
+        while is_new {
+            is_new = false;
+            for function in &program.functions {
+                let all = changed.of(function, calls);
+                for name in [function.name.as_str(), ANY] {
+                    if name != ANY || taken.contains(&function.name) {
+                        is_new |= add(&mut changed.by, name, all);
+                    }
+                }
+            }
+        }
+        changed
+    }
+
+    fn when_it_returns(&self, name: &str) -> Set {
+        self.by.get(name).copied().unwrap_or(0)
+    }
+
+    fn of(&self, function: &Function, calls: &Calls) -> Set {
+        if !function.lines.iter().any(is_end) {
+            return 0;
+        }
+        let saved = Saves::of(function).map_or(0, |saves| saves.registers());
+        let own = |flow: Flow| flow.effects.iter().fold(0, |all, effect| all | effect.changes());
+        let own = calls.flow(function, 0).map_or(KEPT, own);
+        let called = function.insns().filter_map(called).map(|to| self.when_it_returns(to));
+        (called.fold(own, |all, one| all | one) & KEPT) & !saved
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::text::tests::{code, program};
+    use super::*;
+
+    fn without(functions: &[(&str, &str)]) -> Program {
+        let mut program = program(functions);
+        let needs = Needs::of(&program);
+        leave_out_of(&mut program, &needs, |_| true).unwrap();
+        program
+    }
+
+    /// Saves 16 and 17, and changes both.
+    const SAVES: &str = "push r16\npush r17\nldi r16, 1\nldi r17, 2\npop r17\npop r16\nret";
+
+    #[test]
+    fn what_no_caller_holds_is_not_saved() {
+        let main = "ldi r17, 5\n.LBB0_1:\ncall f\nsts 500, r17\nrjmp .LBB0_1";
+        let after = without(&[("main", main), ("f", SAVES)]);
+        assert_eq!(code(&after, "f"), "push r17; ldi r16, 1; ldi r17, 2; pop r17; ret");
+    }
+
+    #[test]
+    fn what_is_held_two_calls_away_is_saved() {
+        let main = "ldi r16, 5\n.LBB0_1:\ncall g\nsts 500, r16\nrjmp .LBB0_1";
+        for g in ["call f\nwdr\nret", "jmp f"] {
+            let after = without(&[("main", main), ("g", g), ("f", SAVES)]);
+            let saved = "push r16; ldi r16, 1; ldi r17, 2; pop r16; ret";
+            assert_eq!(code(&after, "f"), saved, "{g}");
+        }
+        // Who saves it himself leaves it to those that he calls.
+        let g = "push r16\nldi r16, 3\ncall f\npop r16\nret";
+        let after = without(&[("main", main), ("g", g), ("f", SAVES)]);
+        assert_eq!(code(&after, "f"), "ldi r16, 1; ldi r17, 2; ret");
+        assert!(code(&after, "g").starts_with("push r16"));
+    }
+
+    #[test]
+    fn what_others_may_call_saves_all() {
+        let main = ".LBB0_1:\ncall f\nrjmp .LBB0_1";
+        for other in [";APP\ncall f\n;NO_APP\nret", "ldi r24, lo8(f)\nret"] {
+            let after = without(&[("main", main), ("g", other), ("f", SAVES)]);
+            assert!(code(&after, "f").starts_with("push r16; push r17"), "{other}");
+        }
+        assert!(code(&without(&[("f", SAVES)]), "f").starts_with("push r16; push r17"));
+    }
+
+    #[test]
+    fn who_is_called_by_a_pointer_saves_what_is_needed_behind_such_calls() {
+        let main = "ldi r30, lo8_gs(f)\nldi r31, hi8_gs(f)\nldi r16, 5\n.LBB0_1:\neicall\nsts 500, r16\nrjmp .LBB0_1";
+        let after = without(&[("main", main), ("f", SAVES)]);
+        assert_eq!(code(&after, "f"), "push r16; ldi r16, 1; ldi r17, 2; pop r16; ret");
+    }
+
+    #[test]
+    fn ends_that_differ_stay() {
+        let main = ".LBB0_1:\ncall f\nrjmp .LBB0_1";
+        for f in [
+            "push r16\nldi r16, 1\ncpi r24, 0\nbreq .LBB0_2\npop r16\nret\n.LBB0_2:\nret",
+            "push r16\npush r17\npop r16\npop r17\nret",
+            "push r16\nldi r16, 1\npush r16\npop r16\npop r16\nret",
+        ] {
+            let after = without(&[("main", main), ("f", f)]);
+            assert_eq!(code(&after, "f"), f.replace('\n', "; "));
+        }
+    }
+
+    #[test]
+    fn a_register_that_is_lost_is_found() {
+        let main = "ldi r16, 5\n.LBB0_1:\ncall f\nsts 500, r16\nrjmp .LBB0_1";
+        let before = program(&[("main", main), ("f", SAVES)]);
+        let needs = Needs::of(&before);
+        let calls = Calls::of(&before, &needs);
+        let changed = Changed::by(&before, &calls);
+        check(&before, &calls, &changed).unwrap();
+        let lost = program(&[
+            ("main", main),
+            ("f", &SAVES.replace("push r16\n", "").replace("pop r16\n", "")),
+        ]);
+        assert!(check(&lost, &calls, &changed).is_err());
+    }
+}
