@@ -250,21 +250,24 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         &mut self,
         fill: impl for<'a> FnOnce(&'a mut [MaybeUninit<T>]) -> &'a mut [T],
     ) -> u8 {
-        let start = next::<N>(self.0.head.get());
-        let len = self.free().min(N - usize::from(start));
+        let (start, tail) = (next::<N>(self.0.head.get()), self.0.tail.get());
+        // Up to the consumer, which one slot stays vacant before, or to the end. In bytes: that is half the time of words.
+        let len = if tail >= start { tail - start } else { (N - usize::from(start)) as u8 };
         let slots = self.0.slot(start);
         // SAFETY: the slots behind `head` are the producer's, as many as are free, and these do not
         // go beyond the end; `MaybeUninit` may lie there whatever was written.
-        let vacant = unsafe { core::slice::from_raw_parts_mut(slots.cast(), len) };
+        let vacant = unsafe { core::slice::from_raw_parts_mut(slots.cast(), len.into()) };
         let filled = fill(vacant);
         // Values that lie elsewhere have filled no slot.
         if filled.as_ptr() != slots.cast_const() {
             return 0;
         }
-        let count = filled.len();
-        let head = usize::from(self.0.head.get()) + count;
-        self.0.head.set(if head >= N { head - N } else { head } as u8);
-        count as u8
+        let count = filled.len() as u8;
+        if count > 0 {
+            // The last of them: not beyond the end.
+            self.0.head.set(start + (count - 1));
+        }
+        count
     }
 
     /// Changes a value pushed earlier; `back` 0 is the newest. False if it has been released.

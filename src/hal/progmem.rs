@@ -118,6 +118,14 @@ impl<T: Copy> Slice<T> {
     }
 }
 
+impl<const N: usize> Progmem<[u8; N]> {
+    /// The bytes, to be copied.
+    pub const fn plain(&'static self) -> Plain {
+        // SAFETY: whoever made it has placed it in program memory.
+        unsafe { Plain::new(self) }
+    }
+}
+
 /// A copy of a value that is part of a [`Progmem`].
 fn load<T: Copy>(from: *const T) -> T {
     // SAFETY: the callers in this module pass a pointer into a `Progmem` of theirs.
@@ -167,6 +175,12 @@ impl Plain {
             }
             core::slice::from_raw_parts_mut(start, count.into())
         }
+    }
+
+    /// The first `count` bytes.
+    #[inline(always)]
+    pub fn first(self, count: u8) -> Self {
+        Self { len: count.min(self.len), ..self }
     }
 
     /// What is behind the first `count` bytes.

@@ -74,6 +74,19 @@ impl Tx {
         (TWO_BYTES_MS / self.rate) as u16 + 2
     }
 
+    /// Puts bytes up to the ring's end. What is left of them.
+    #[inline(always)]
+    fn fill(&mut self, bytes: Plain) -> Plain {
+        let count = self.ring.fill(|slots| bytes.copy(slots));
+        bytes.behind(count)
+    }
+
+    /// Puts what is left when the ring's end came in between: there is room beyond it.
+    #[inline(never)]
+    fn fill_again(&mut self, bytes: Plain) {
+        self.fill(bytes);
+    }
+
     /// Takes what has been put behind a slot of the ring into the checksum, if the response under way ends with one.
     #[inline(always)]
     fn sum_behind(&mut self, slot: u8) {
@@ -103,14 +116,9 @@ impl crate::protocol::Out for Tx {
     #[inline(never)]
     fn put_plain(&mut self, bytes: Plain) {
         let before = self.ring.filled();
-        let mut left = bytes;
-        // The ring's end may come in between; there is room beyond it.
-        for _ in 0..2u8 {
-            let count = self.ring.fill(|slots| left.copy(slots));
-            left = left.behind(count);
-            if left.is_empty() {
-                break;
-            }
+        let left = self.fill(bytes);
+        if !left.is_empty() {
+            self.fill_again(left);
         }
         self.sum_behind(before);
         // What is worked out next takes longer than these bytes need to leave.

@@ -8,7 +8,7 @@ use super::write::Writer;
 use crate::config::{Fixed, Settings};
 use crate::protocol::{Ending, Machine, Out, Value};
 use crate::status::Status;
-use crate::{plain, text};
+use crate::{plain, progmem, text};
 
 /// Verbosities from which the parts show.
 const FRAMES: u8 = 1;
@@ -33,11 +33,34 @@ pub fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out) {
     if Variation::of(settings) != Variation::Lines || settings.expand_line_feeds() {
         return put_other(settings, ending, out);
     }
-    let strict = settings.json_strict();
-    out.put_plain(if strict { plain!("{\"r\":{},\"f\":[1,0,") } else { plain!("{r:{},f:[1,0,") });
     // There are fewer than ten.
-    out.put(b'0' + ending.free % 10);
+    let free = ending.free % 10;
+    if settings.json_strict() {
+        return out.put_plain(BRIEF.plain().behind(free * BRIEF_LEN).first(BRIEF_LEN));
+    }
+    out.put_plain(plain!("{r:{},f:[1,0,"));
+    out.put(b'0' + free);
     out.put_plain(plain!("]}\n"));
+}
+
+/// The response of which nothing is to be shown.
+const BRIEF_0: [u8; BRIEF_LEN as usize] = *b"{\"r\":{},\"f\":[1,0,0]}\n";
+const BRIEF_LEN: u8 = 21;
+
+progmem! {
+    /// It ten times, with 0 to 9 free lines: copied at once, which half of short lines wait for.
+    static BRIEF: [u8; 10 * BRIEF_LEN as usize] = {
+        let (mut all, mut at) = ([0; 10 * BRIEF_LEN as usize], 0);
+        while at < all.len() {
+            let (free, byte) = (at / BRIEF_0.len(), at % BRIEF_0.len());
+            all[at] = BRIEF_0[byte];
+            if byte == BRIEF_0.len() - 4 {
+                all[at] += free as u8;
+            }
+            at += 1;
+        }
+        all
+    };
 }
 
 /// The response of [`put_brief`] in a variation that does not count lines, or with `ec` 1.
