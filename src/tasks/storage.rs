@@ -237,6 +237,9 @@ impl Tables for &Storage {
     }
 }
 
+/// A byte is not written sooner than that: 3.4 ms.
+const BYTE_MS: u64 = 3;
+
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     let mut memory = Eeprom::take();
@@ -257,8 +260,10 @@ pub async fn run(links: &'static Links) -> ! {
                     Put::Full => break,
                 };
                 while write.step(&mut memory) {
+                    let mut pause = BYTE_MS;
                     while memory.is_busy() {
-                        after_ms(1).await;
+                        after_ms(pause).await;
+                        pause = 1;
                     }
                 }
             }
