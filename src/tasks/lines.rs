@@ -500,14 +500,23 @@ impl LinePool {
     }
 
     /// The line to process next; data lines (and faults, which keep their place among them) only if
-    /// `data` is wanted.
+    /// `data` is wanted. Where lines keep their order, one that asks or sets something is none of these.
     pub fn next(&self, data: bool) -> Option<(LineId, Class)> {
         let index = match self.controls {
-            0 if !data => return None,
+            0 if !data && !self.is_command() => return None,
             0 => 0,
             _ => self.entries.iter().position(|e| e.class == Class::Control)?,
         };
         self.entries.get(index).map(|e| (LineId(index as u8), e.class))
+    }
+
+    /// Whether lines keep their order, and the oldest begins with a dollar and is no jog: it waits for no motion.
+    fn is_command(&self) -> bool {
+        let mut text = self.text(LineId(0)).iter().filter(|byte| **byte != b' ');
+        self.in_order
+            && text.next() == Some(&b'$')
+            && !matches!(text.next(), Some(b'J' | b'j'))
+            && self.entries.first().is_some_and(|first| first.class == Class::Data)
     }
 
     /// The text of the oldest line, if that is next, and data.

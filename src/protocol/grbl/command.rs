@@ -23,7 +23,7 @@ pub enum Command {
     Build,
     /// `$N`.
     Startup,
-    /// `$N0=`, `$N1=`: which line; its text is behind these four bytes of the [trimmed](trim) line.
+    /// `$N0=`, `$N1=`: which line; its text is [behind](behind_equals) the sign.
     StoreStartup(u8),
     /// `$H`, of all axes, or of one.
     Home(u8),
@@ -35,9 +35,9 @@ pub enum Command {
     Sleep,
     /// `$RST=`, with its letter: `$`, `#` or `*`.
     Restore(u8),
-    /// `$x=v`: the number of the setting; its value begins with this byte of the [trimmed](trim) line.
+    /// `$x=v`: the number of the setting; its value begins with this byte behind the `$`.
     Set(u8, u8),
-    /// `$name`, `$name=v`: a setting by Kerf's own name; its value begins with this byte of the [trimmed](trim) line, 0 if it is asked for.
+    /// `$name`, `$name=v`: a setting by Kerf's own name; its value begins with this byte behind the `$`, 0 if it is asked for.
     Named(u8),
     /// `$J=` with a word that is not allowed there, or without one that has to be.
     BadJog,
@@ -60,39 +60,59 @@ pub fn of(line: &[u8]) -> Command {
     }
 }
 
-/// That of a line behind its `$`.
+/// That of a line behind its `$`. Comments and blanks mean nothing.
 #[small]
 fn system(rest: &[u8]) -> Command {
-    let upper = |at: usize| rest.get(at).copied().unwrap_or(0).to_ascii_uppercase();
-    match (rest.len(), upper(0)) {
-        (0, _) => Command::Help,
-        (1, b'$') => Command::Settings,
-        (1, b'#') => Command::Offsets,
-        (1, b'G') => Command::Modes,
-        (1, b'I') => Command::Build,
-        (1, b'N') => Command::Startup,
-        (3.., b'N') if matches!(upper(1), b'0' | b'1') && upper(2) == b'=' => {
-            Command::StoreStartup(upper(1) - b'0')
+    let words = without_comment(rest);
+    let (mut count, mut letters) = (0usize, [0; 5]);
+    for byte in words.iter().filter(|byte| !is_blank(**byte)) {
+        if let Some(letter) = letters.get_mut(count) {
+            *letter = byte.to_ascii_uppercase();
         }
-        (1, b'H') => Command::Home(ALL),
-        (2, b'H') => axis(upper(1)).map_or(Command::Unknown, Command::Home),
-        (1, b'X') => Command::Unlock,
-        (1, b'C') => Command::Check,
-        (3, b'S') if upper(1) == b'L' && upper(2) == b'P' => Command::Sleep,
-        (5, b'R') if upper(1) == b'S' && upper(2) == b'T' && upper(3) == b'=' => match upper(4) {
-            letter @ (b'$' | b'#' | b'*') => Command::Restore(letter),
+        count += 1;
+    }
+    match (count, letters) {
+        (0, _) => Command::Help,
+        (1, [b'$', ..]) => Command::Settings,
+        (1, [b'#', ..]) => Command::Offsets,
+        (1, [b'G', ..]) => Command::Modes,
+        (1, [b'I', ..]) => Command::Build,
+        (1, [b'N', ..]) => Command::Startup,
+        (3.., [b'N', line @ (b'0' | b'1'), b'=', ..]) => Command::StoreStartup(line - b'0'),
+        (1, [b'H', ..]) => Command::Home(ALL),
+        (2, [b'H', letter, ..]) => axis(letter).map_or(Command::Unknown, Command::Home),
+        (1, [b'X', ..]) => Command::Unlock,
+        (1, [b'C', ..]) => Command::Check,
+        (3, [b'S', b'L', b'P', ..]) => Command::Sleep,
+        (5, [b'R', b'S', b'T', b'=', letter]) => match letter {
+            b'$' | b'#' | b'*' => Command::Restore(letter),
             _ => Command::Unknown,
         },
-        (_, b'J') if upper(1) == b'=' => {
-            if is_jog(rest.get(2..).unwrap_or(&[])) {
-                Command::Gcode
-            } else {
-                Command::BadJog
-            }
+        (_, [b'J', b'=', ..]) if is_jog(behind_equals(rest)) => Command::Gcode,
+        (_, [b'J', b'=', ..]) => Command::BadJog,
+        (_, [b'0'..=b'9', ..]) => {
+            setting(words).or_else(|| named(words)).unwrap_or(Command::Unknown)
         }
-        (_, b'0'..=b'9') => setting(rest).or_else(|| named(rest)).unwrap_or(Command::Unknown),
-        _ => named(rest).unwrap_or(Command::Unknown),
+        _ => named(words).unwrap_or(Command::Unknown),
     }
+}
+
+fn is_blank(byte: u8) -> bool {
+    byte == b' ' || byte == b'\t'
+}
+
+/// Up to a comment, without blanks at its ends.
+#[small]
+fn without_comment(text: &[u8]) -> &[u8] {
+    let end = text.iter().position(|byte| matches!(byte, b'(' | b';'));
+    trim(text.get(..end.unwrap_or(text.len())).unwrap_or(&[]))
+}
+
+/// What is behind the first `=`.
+#[small]
+pub fn behind_equals(text: &[u8]) -> &[u8] {
+    let equals = text.iter().position(|byte| *byte == b'=');
+    equals.and_then(|equals| text.get(equals + 1..)).unwrap_or(&[])
 }
 
 /// `x=v`.
@@ -100,15 +120,14 @@ fn system(rest: &[u8]) -> Command {
 fn setting(rest: &[u8]) -> Option<Command> {
     let equals = rest.iter().position(|byte| *byte == b'=')?;
     let mut number = 0u8;
-    for digit in trim(rest.get(..equals)?) {
+    for digit in rest.get(..equals)?.iter().filter(|byte| !is_blank(**byte)) {
         let digit = digit.wrapping_sub(b'0');
         if digit > 9 {
             return None;
         }
         number = number.checked_mul(10)?.checked_add(digit)?;
     }
-    // The `$` counts.
-    Some(Command::Set(number, equals as u8 + 2))
+    Some(Command::Set(number, equals as u8 + 1))
 }
 
 /// `name`, `name=v`.
@@ -117,7 +136,7 @@ fn named(rest: &[u8]) -> Option<Command> {
     let equals = rest.iter().position(|byte| *byte == b'=');
     let name = trim(rest.get(..equals.unwrap_or(rest.len()))?);
     let is_name = name.len() > 1 && name.iter().all(u8::is_ascii_alphanumeric);
-    is_name.then_some(Command::Named(equals.map_or(0, |equals| equals as u8 + 2)))
+    is_name.then_some(Command::Named(equals.map_or(0, |equals| equals as u8 + 1)))
 }
 
 /// The axis of a letter in upper case.
@@ -165,14 +184,20 @@ fn is_jog(words: &[u8]) -> bool {
     moves && feeds
 }
 
+/// Whether a line of G-code has the word of an axis, and is no jog; a comment may seem to be one.
+#[small]
+pub fn moves(line: &[u8]) -> bool {
+    line.iter().any(|byte| axis(byte.to_ascii_uppercase()).is_some()) && jog(line).is_none()
+}
+
 /// The words of a jog.
 #[inline(never)]
 #[small]
 pub fn jog(block: &[u8]) -> Option<&[u8]> {
-    match trim(block) {
-        [b'$', b'J' | b'j', b'=', words @ ..] => Some(words),
-        _ => None,
-    }
+    let mut letters = block.iter().filter(|byte| !is_blank(**byte));
+    let mut next = || letters.next().map(u8::to_ascii_uppercase);
+    let is_jog = next() == Some(b'$') && next() == Some(b'J') && next() == Some(b'=');
+    is_jog.then(|| behind_equals(block))
 }
 
 /// Whether a line is said in this dialect alone. `$H`, `$X` and `$x=v` are not: TinyG's text mode answers them by a hint.
@@ -189,7 +214,9 @@ pub fn is_own(line: &[u8]) -> bool {
         | Command::Restore(_)
         | Command::BadJog => true,
         // In small letters they are TinyG's.
-        Command::Modes | Command::Check => trim(line).last().is_some_and(u8::is_ascii_uppercase),
+        Command::Modes | Command::Check => {
+            without_comment(line).last().is_some_and(u8::is_ascii_uppercase)
+        }
         Command::Gcode => jog(line).is_some(),
         _ => false,
     }
@@ -197,14 +224,18 @@ pub fn is_own(line: &[u8]) -> bool {
 
 /// The name of [`Command::Named`].
 pub fn name(line: &[u8], from: u8) -> &[u8] {
-    let line = trim(line);
-    let end = if from == 0 { line.len() } else { usize::from(from) - 1 };
-    trim(line.get(1..end).unwrap_or(&[]))
+    let words = behind_dollar(line);
+    let end = if from == 0 { words.len() } else { usize::from(from) - 1 };
+    trim(words.get(..end).unwrap_or(&[]))
 }
 
 /// The value of [`Command::Set`] and [`Command::Named`].
 pub fn value(line: &[u8], from: u8) -> &[u8] {
-    trim(trim(line).get(from.into()..).unwrap_or(&[]))
+    trim(behind_dollar(line).get(from.into()..).unwrap_or(&[]))
+}
+
+fn behind_dollar(line: &[u8]) -> &[u8] {
+    without_comment(trim(line).get(1..).unwrap_or(&[]))
 }
 
 /// Without blanks at its ends.
@@ -222,12 +253,13 @@ mod unit {
         assert_eq!(of(b"$"), Command::Help);
         assert_eq!(of(b"$hx"), Command::Home(0));
         assert_eq!(of(b"$N1="), Command::StoreStartup(1));
-        assert_eq!(of(b"$N2=G54"), Command::Named(4));
+        assert_eq!(of(b"$N2=G54"), Command::Named(3));
         assert_eq!(of(b"$HQ"), Command::Unknown);
-        assert_eq!(of(b"$110=500.5"), Command::Set(110, 5));
-        assert_eq!(of(b"$999=1"), Command::Named(5));
-        assert_eq!(of(b" $spr = -2 "), Command::Named(6));
-        assert_eq!((name(b" $spr = -2 ", 6), value(b" $spr = -2 ", 6)), (&b"spr"[..], &b"-2"[..]));
+        assert_eq!(of(b"$110=500.5"), Command::Set(110, 4));
+        assert_eq!(of(b"$999=1"), Command::Named(4));
+        assert_eq!(of(b" $ spr = -2 ; down"), Command::Named(5));
+        let line = b" $ spr = -2 ; down";
+        assert_eq!((name(line, 5), value(line, 5)), (&b"spr"[..], &b"-2"[..]));
         assert_eq!((of(b"$1sa"), name(b"$1sa", 0)), (Command::Named(0), &b"1sa"[..]));
         for none in ["$q", "$q=1", "$x y=1", "$\"xvm\"=1", "$=1"] {
             assert_eq!(of(none.as_bytes()), Command::Unknown, "{none}");
@@ -239,6 +271,22 @@ mod unit {
             assert_eq!(of(bad.as_bytes()), Command::BadJog, "{bad}");
         }
         assert_eq!(jog(b"$j=x1 f2"), Some(&b"x1 f2"[..]));
+        assert_eq!(jog(b" $ J = X1 F2"), Some(&b" X1 F2"[..]));
+        for (line, command) in [
+            ("$X (Use current location.)", Command::Unlock),
+            ("$ X", Command::Unlock),
+            ("$G ; modes", Command::Modes),
+            ("$#;c", Command::Offsets),
+            ("$ (help)", Command::Help),
+            ("$h (Home)", Command::Home(ALL)),
+            ("$ H x", Command::Home(0)),
+            ("$ 1 1 1 = 1500 (c)", Command::Set(111, 7)),
+            ("$ R S T = *", Command::Restore(b'*')),
+            ("$ J = G91 X1 F1000", Command::Gcode),
+            ("$N 0 = G54 (c)", Command::StoreStartup(0)),
+        ] {
+            assert_eq!(of(line.as_bytes()), command, "{line}");
+        }
     }
 
     #[test]

@@ -205,8 +205,8 @@ impl Request {
     /// `$N0=`. The line is carried out first, and kept if it is not refused.
     fn store_startup(&mut self, n: u8, line: &[u8], machine: &mut impl Machine) -> Step {
         const RUNS: u8 = 1;
-        let start = line.len() - line.trim_ascii_start().len() + 4;
-        let text = line.get(start..).unwrap_or(&[]);
+        let text = command::behind_equals(line);
+        let start = line.len() - text.len();
         if self.at == 0 {
             if machine.doing() != Doing::Rests {
                 return Step::Error(BUSY);
@@ -255,7 +255,9 @@ impl Request {
         if Capability::Lathe.is_built_in() && is_threading(machine.value(Value::MotionMode)) {
             return begins(machine);
         }
-        let probes = self.at == 0 && is_probing(machine.value(Value::MotionMode));
+        // A mode that is still in force without a move of this line is none of it.
+        let probes =
+            self.at == 0 && command::moves(line) && is_probing(machine.value(Value::MotionMode));
         if probes && machine.value(Value::Working) != 0 {
             return Step::Later(0);
         }

@@ -233,7 +233,7 @@ fn steps(axis: u8, machine: &mut impl Machine) -> i32 {
 #[inline(never)]
 #[small]
 pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
-    let to = Number::parse(text).ok_or(Status::BadNumber)?;
+    let to = parse(text)?;
     if to.is_negative() {
         return Err(Status::BelowMinimum);
     }
@@ -259,6 +259,7 @@ pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), St
         20 => put(machine, of_system(token("sl")), to),
         21 => set_switches(machine, 2, whole()? != 0),
         22 if whole()? == 0 => set_switches(machine, 1, false),
+        22 => home_again(machine),
         23 => set_homing(whole()?, machine),
         24 => each_axis(machine, HOMING, token("lv"), to),
         25 => each_axis(machine, HOMING, token("sv"), to),
@@ -296,7 +297,13 @@ pub fn value_of(setting: Setting, machine: &mut impl Machine) -> Fixed {
 #[inline(never)]
 #[small]
 pub fn set_named(setting: Setting, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
-    put(machine, Some(setting), Number::parse(text).ok_or(Status::BadNumber)?)
+    put(machine, Some(setting), parse(text)?)
+}
+
+/// A number. A comma is no part of it here: 1,5 is not 15.
+#[small]
+fn parse(text: &[u8]) -> Result<Number, Status> {
+    Number::parse(text).filter(|_| !text.contains(&b',')).ok_or(Status::BadNumber)
 }
 
 /// Sets some bits of `grm`, and keeps others.
@@ -389,6 +396,21 @@ fn set_switches(machine: &mut impl Machine, bit: i32, on: bool) -> Result<(), St
             mode & !bit
         };
         put_value(machine, setting, with)
+    })
+}
+
+/// `$22=1`: the switches are those for homing that are so by default, if there is none.
+#[small]
+fn home_again(machine: &mut impl Machine) -> Result<(), Status> {
+    if switches(machine, 1, false) != 0 {
+        return Ok(());
+    }
+    (0..2 * HOMING).try_for_each(|end| {
+        let token = if end & 1 == 0 { token("sn") } else { token("sx") };
+        let setting = of_axis(end / 2, token);
+        let default = setting.map_or(0, Setting::default_value);
+        let mode = read(machine, setting);
+        put_value(machine, setting, mode | default & 1)
     })
 }
 
