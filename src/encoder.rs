@@ -72,7 +72,7 @@ pub struct Encoder {
     sync_at: u32,
     /// How long the last turn took; 0 if it is not known.
     turn: u32,
-    /// Index pulses in a row, up to [`SURE`], and [`NEWS`].
+    /// Index pulses in a row, up to [`SURE`], [`NEWS`] and [`ROUND`].
     seen: u8,
     /// Misfits, up to 255.
     misfits: u8,
@@ -85,6 +85,12 @@ pub struct Encoder {
 
 /// Of [`Encoder::seen`]: nobody has been told of [`Encoder::error`] yet.
 const NEWS: u8 = 0x80;
+
+/// Of [`Encoder::seen`]: it turns round, so that the pulses of sync before the next index do not tell.
+const ROUND: u8 = 0x40;
+
+/// Of [`Encoder::seen`]: the index pulses.
+const COUNT: u8 = 0x3F;
 
 /// After so many index pulses in a row the time of a turn tells of its neighbours.
 const SURE: u8 = 4;
@@ -139,8 +145,13 @@ impl Encoder {
     pub fn seen(&self) -> (u8, bool) {
         let synced =
             self.per_turn == 1 || self.time.wrapping_sub(self.sync_at) < STILL.max(self.turn);
-        let seen = self.seen & !NEWS;
+        let seen = self.seen & COUNT;
         (seen, seen > 0 && synced)
+    }
+
+    /// The spindle is about to turn round, or does (G33.1). Exec.
+    pub fn note_turning(&mut self) {
+        self.seen |= ROUND;
     }
 
     /// Misfits so far, 255 for more.
@@ -179,7 +190,7 @@ impl Encoder {
             self.misfits = self.misfits.saturating_add(1);
         }
         if self.is_still() {
-            (self.seen, self.turn) = (self.seen & NEWS, 0);
+            (self.seen, self.turn) = (self.seen & !COUNT, 0);
         }
         misfit
     }
@@ -199,10 +210,11 @@ impl Encoder {
         self.index = pulses.index;
         self.at_index = pulses.at_index;
         self.index_at = at;
-        let (before, turn) = (self.seen & !NEWS, self.turn);
+        let (before, turn) = (self.seen & COUNT, self.turn);
+        let turns_round = self.seen & ROUND != 0;
         let seen = u8::try_from(turns).map_or(SURE, |turns| before.saturating_add(turns));
         self.seen = self.seen & NEWS | seen.min(SURE);
-        if before == 0 {
+        if before == 0 || turns_round {
             return false;
         }
         self.turn = took;
@@ -214,7 +226,7 @@ impl Encoder {
 
     /// Whether the spindle stands still.
     pub fn is_still(&self) -> bool {
-        if self.per_turn == 0 || self.seen & !NEWS == 0 {
+        if self.per_turn == 0 || self.seen & COUNT == 0 {
             return true;
         }
         let (age, two) = self.age();
@@ -378,6 +390,25 @@ mod tests {
         spindle.turn(8, 40_000);
         spindle.turn(8, 40_000);
         assert_eq!(spindle.encoder.misfits(), 3);
+    }
+
+    #[test]
+    fn pulses_fit_where_the_spindle_turns_round() {
+        let mut spindle = Spindle::new(8, 0);
+        (0..5).for_each(|_| spindle.turn(8, 40_000));
+        spindle.index();
+        // Half a turn there, and back over the mark of the index.
+        (0..7).for_each(|_| {
+            spindle.encoder.note_turning();
+            spindle.pass(2_500);
+            spindle.sync();
+            spindle.pass(2_500);
+        });
+        (0..3).for_each(|_| spindle.turn(8, 40_000));
+        assert_eq!(spindle.misfits, 0);
+        spindle.turn(7, 40_000);
+        (0..2).for_each(|_| spindle.turn(8, 40_000));
+        assert_eq!(spindle.misfits, 1);
     }
 
     #[test]

@@ -97,11 +97,15 @@ impl Segment {
     pub fn seal(&mut self, full: u8, step: u16) {
         self.mode = if step == STEP && self.moving == full {
             LOCKSTEP | full
-        } else if self.moving & !0b11 != 0 {
-            WIDE
         } else {
-            NARROW
+            Self::mode_of(self.moving)
         };
+    }
+
+    /// The mode of a segment in which these motors (bits) move at rates of their own.
+    #[inline(always)]
+    pub fn mode_of(moving: u8) -> u8 {
+        if moving & !0b11 != 0 { WIDE } else { NARROW }
     }
 
     /// Adds the way that it takes each motor, in phase units.

@@ -89,6 +89,8 @@ pub enum Step {
     Again,
     /// The outputs or the speed of the spindle are others, at a standstill: ask again.
     Switched,
+    /// X is to leave the cut, in what is queued already too ([`Exec::lead`]): ask again.
+    Leaves,
     /// As `Again`; and an override is to change.
     Override(Change),
     /// A program stop, end or change of outputs is due: ask again when the steppers stand still.
@@ -578,6 +580,19 @@ impl Exec {
         step(self.prep.segment(left, cycles, segment))
     }
 
+    /// Makes a segment of a stretch of a pass: its ticks are neither fine nor coarse.
+    #[inline(never)]
+    #[small]
+    fn hand_out_plainly(
+        &mut self,
+        stretch: &Stretch,
+        blocks: &mut BlockSource,
+        out: &mut Snapshot,
+        segment: &mut Segment,
+    ) -> Step {
+        self.hand_out(stretch, blocks, out, segment, |_| (false, false))
+    }
+
     /// The pass in step with the spindle, if there is one.
     #[inline(always)]
     pub fn thread(&mut self) -> Option<&mut Thread> {
@@ -685,8 +700,10 @@ impl Exec {
         let leaves = (breaks_off || self.hold) && retract.is_some() && fits;
         if leaves && self.prep.rest_of(retract.motors) {
             let why = thread.fault().unwrap_or(Status::Terminated);
-            self.follows = Follows::Retreats(Retreat::new(retract, why));
-            return self.retreat(blocks, out, segment);
+            let retreat = Retreat::new(retract, why);
+            self.prep.join(retract.motors, retreat.is_backwards());
+            self.follows = Follows::Retreats(retreat);
+            return Step::Leaves;
         }
         let running = &self.running;
         let stretch = if breaks_off {
@@ -695,7 +712,7 @@ impl Exec {
             self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
         };
         thread.handed(stretch.distance);
-        self.hand_out(&stretch, blocks, out, segment, |_| (false, false))
+        self.hand_out_plainly(&stretch, blocks, out, segment)
     }
 
     /// The line waits for the spindle.
@@ -746,7 +763,7 @@ impl Exec {
             } else {
                 let (left, headroom) = (self.running.left, self.running.headroom);
                 let stretch = self.governor.halt_sharply(left, headroom, SEGMENT_S);
-                self.hand_out(&stretch, blocks, out, segment, |_| (false, false))
+                self.hand_out_plainly(&stretch, blocks, out, segment)
             };
             if step != Step::Segment {
                 return step;
@@ -759,6 +776,32 @@ impl Exec {
         let Follows::Retreats(retreat) = &mut self.follows else { return Step::Segment };
         self.prep.add(retreat, segment, &mut out.target);
         Step::Segment
+    }
+
+    /// Has X go on in a segment of such ticks that is queued already: `write` is told how far in each tick, and is false if it is too late.
+    #[inline(always)]
+    pub fn lead(
+        &mut self,
+        (ticks, period): (u16, u16),
+        out: &mut Snapshot,
+        write: impl FnOnce(u16) -> bool,
+    ) {
+        let Follows::Retreats(retreat) = &mut self.follows else { return };
+        let increment = self.prep.plan_lead(retreat, ticks, period);
+        if increment != 0 && write(increment) {
+            self.prep.note_lead(retreat, increment, ticks, &mut out.target);
+        } else {
+            retreat.pause();
+        }
+    }
+
+    /// The motors of X that leave the cut, as bits, and whether they go backwards.
+    #[small]
+    pub fn leaving(&self) -> (u8, bool) {
+        match &self.follows {
+            Follows::Retreats(retreat) => (retreat.motors(), retreat.is_backwards()),
+            _ => (0, false),
+        }
     }
 
     /// Hands out what is left of the line being run.

@@ -373,6 +373,27 @@ impl Prep {
         }
     }
 
+    /// How far motors that have [joined](Prep::join) are to go in each tick of a segment that is queued already; 0 if there is no time for them.
+    #[inline(never)]
+    #[small]
+    pub fn plan_lead(&self, retreat: &mut Retreat, ticks: u16, period: u16) -> u16 {
+        let stands = !self.turned || period >= self.setup.saturating_add(TURNED);
+        if stands && period >= self.paces().settles { retreat.plan(ticks, period) } else { 0 }
+    }
+
+    /// They have been told to go so far.
+    #[small]
+    pub fn note_lead(
+        &mut self,
+        retreat: &mut Retreat,
+        increment: u16,
+        ticks: u16,
+        target: &mut [i32; MOTORS],
+    ) {
+        self.turned = false;
+        retreat.note(increment, ticks, target, &mut self.debt);
+    }
+
     /// Phase units of the dominant motor in the block that no segment has covered yet.
     pub fn left(&self) -> u32 {
         self.left

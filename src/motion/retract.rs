@@ -2,7 +2,8 @@
 //!
 //! Owned by exec, which begins it when a pass in step with the spindle ends before its time: the spindle is lost, the error is above its
 //! limit, a feedhold or an alarm has come ([`Exec`](super::exec::Exec)). Exec asks [`Retreat::add`] for each segment while the axes slow down,
-//! and for segments of its own when they stand; at the exec level. The motors of X stand still in the pass, so that the two motions do not meet
+//! and for segments of its own when they stand; at the exec level. It begins in segments that are queued already ([`Exec::lead`](super::exec::Exec::lead)): these are 9 ms, which
+//! X need not wait for. The motors of X stand still in the pass, so that the two motions do not meet
 //! in a motor. X has a ramp up, a cruise and a ramp down of its own.
 //!
 //! Units: steps of X, s. What is handed out is counted in whole phase units, so that nothing is lost; the end is within half a step, and a
@@ -10,11 +11,12 @@
 
 use kerf_macros::small;
 
-use super::float::{greater, least, some};
+use super::float::{least, some};
 use super::short::Short;
 use crate::boards::MOTORS;
 use crate::dda::{STEP, Segment};
 use crate::hal::TIMER_HZ;
+use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::status::Status;
 
@@ -78,8 +80,7 @@ impl Retreat {
         self.how.way < 0
     }
 
-    /// Has X go on in a segment in which it would stand. Whole steps are added to `target`, and what is handed out besides is a `debt` below
-    /// a step, as of `Prep`.
+    /// Has X go on in a segment in which it would stand.
     #[inline(never)]
     pub fn add(
         &mut self,
@@ -87,15 +88,46 @@ impl Retreat {
         target: &mut [i32; MOTORS],
         debt: &mut [i16; MOTORS],
     ) {
-        let ticks = f32::from(segment.ticks);
-        let seconds = ticks * f32::from(segment.period) * (1.0 / TIMER_HZ as f32);
-        let distance = self.distance(seconds);
-        let most = f32::from(STEP);
-        let increment = least(distance * most / ticks + 0.5, most) as u16;
-        let travel = u32::from(increment) * u32::from(segment.ticks);
-        let gone = travel as f32 * (1.0 / f32::from(STEP));
+        let increment = self.plan(segment.ticks, segment.period);
+        let mut bit = 1;
+        for of in &mut segment.increment {
+            if self.how.motors & bit != 0 {
+                *of = increment;
+            }
+            bit <<= 1;
+        }
+        self.note(increment, segment.ticks, target, debt);
+    }
+
+    /// How far X is to go in each of so many ticks, the next ones, phase units.
+    #[inline(never)]
+    pub fn plan(&mut self, ticks: u16, period: u16) -> u16 {
+        const HZ: f32 = TIMER_HZ as f32;
+        let accel = self.how.accel.get();
+        let gain = accel * (product(ticks, period) as f32 * (1.0 / HZ));
+        // From there it loses a gain at most in each segment behind this one.
+        let stops = sqrt(gain * gain + 2.0 * accel * self.left) - gain;
+        let period = f32::from(period);
+        let wanted = least(self.velocity + gain, least(self.how.velocity.get(), stops));
+        // A step in each tick at most.
+        self.velocity = least(wanted, HZ / period);
+        (self.velocity * period * (f32::from(STEP) / HZ) + 0.5) as u16
+    }
+
+    /// X goes so far in each of so many ticks: whole steps are added to `target`, and what is handed out besides is a `debt` below
+    /// a step, as of `Prep`.
+    #[inline(never)]
+    pub fn note(
+        &mut self,
+        increment: u16,
+        ticks: u16,
+        target: &mut [i32; MOTORS],
+        debt: &mut [i16; MOTORS],
+    ) {
+        let travel = product(increment, ticks);
         // The last half step is none.
-        self.left = if self.left - gone < 0.5 { 0.0 } else { self.left - gone };
+        let left = self.left - travel as f32 * (1.0 / f32::from(STEP));
+        self.left = if left < 0.5 { 0.0 } else { left };
         let sum = travel + u32::from(self.part);
         self.part = sum as u16 & (STEP - 1);
         let steps = (sum >> 15) as i32;
@@ -104,11 +136,8 @@ impl Retreat {
         let (steps, owed) =
             if self.is_backwards() { (-steps, owed.wrapping_neg()) } else { (steps, owed) };
         let mut bit = 1;
-        for ((increments, target), debt) in
-            segment.increment.iter_mut().zip(target.iter_mut()).zip(debt.iter_mut())
-        {
+        for (target, debt) in target.iter_mut().zip(debt.iter_mut()) {
             if self.how.motors & bit != 0 {
-                *increments = increment;
                 *target = target.wrapping_add(steps);
                 *debt = debt.wrapping_add_unsigned(owed);
             }
@@ -116,22 +145,9 @@ impl Retreat {
         }
     }
 
-    /// How far X goes in so many seconds, steps.
-    fn distance(&mut self, seconds: f32) -> f32 {
-        let accel = self.how.accel.get();
-        let gain = accel * seconds;
-        let before = self.velocity;
-        // The velocity at the end from which the rest of the way stops it.
-        let half = 0.5 * gain;
-        let square = half * half + 2.0 * accel * self.left - gain * before;
-        let stops = if square > 0.0 { sqrt(square) - half } else { 0.0 };
-        let after = least(before + gain, least(self.how.velocity.get(), greater(stops, 0.0)));
-        self.velocity = greater(after, before - 1.5 * gain);
-        if some(self.velocity) {
-            least(0.5 * (before + self.velocity) * seconds, self.left)
-        } else {
-            self.left
-        }
+    /// A segment has run without X: it begins again from rest.
+    pub fn pause(&mut self) {
+        self.velocity = 0.0;
     }
 }
 

@@ -44,14 +44,14 @@ const SHARE: f32 = 0.7;
 const WINDOW: u32 = COUNTS_PER_S / 1_000 * 16;
 
 /// The spindle is lost when no pulse has come for so many times as long as from one to the next.
-const OVERDUE: f32 = 2.02;
+const OVERDUE: f32 = 2.01;
 
 /// And for so many counts more, 0.5 ms: pulses do not come quite evenly.
 const SLACK: f32 = COUNTS_PER_S as f32 * 0.0005;
 
-/// A pulse of a spindle that slows down is of the way there up to this part of the time to its standstill. One that is less than 1.1 pulses from that is
-/// taken for one of the way back: its place is right either way, the next is off by a pulse at most. The other way round nothing would ever turn.
-const FORWARD: f32 = 0.7;
+/// A pulse of a spindle that slows down is of the way there up to this part of the time to its standstill; a later one is of the way back. A forward
+/// one that is taken for that is off by a pulse; the other way round nothing would ever turn.
+const FORWARD: f32 = 0.85;
 
 /// A spindle that turns round has so long between two pulses, counts: 6 s.
 const PATIENCE: f32 = COUNTS_PER_S as f32 * 6.0;
@@ -138,6 +138,8 @@ enum Kind {
         turn_at: f32,
         /// By how much the spindle slows down: pulses a count, in a count.
         decel: f32,
+        /// How long the speed has been measured last, counts.
+        window: u16,
     },
 }
 
@@ -187,7 +189,7 @@ impl Thread {
     pub fn begin(pass: &Pass) -> Self {
         let Pass { lead, limit, retract, turn_at } = *pass;
         let kind = match some(turn_at) {
-            true => Kind::Tap { turn_at, decel: 0.0 },
+            true => Kind::Tap { turn_at, decel: 0.0, window: WINDOW as u16 },
             false => Kind::Pass { limit, retract },
         };
         Self { stage: Stage::Armed, lead, kind, ..Self::new() }
@@ -208,6 +210,11 @@ impl Thread {
             self.stage = Stage::Turning;
         }
         turns
+    }
+
+    /// Whether the spindle has been told to turn round, and the way back has not begun.
+    pub fn turns_round(&self) -> bool {
+        self.stage >= Stage::Turning && self.stage < Stage::Lost
     }
 
     /// Whether the axes are to rest, for the spindle turns round.
@@ -238,13 +245,6 @@ impl Thread {
     pub fn turn_back(&mut self) {
         self.ahead = -self.ahead;
         self.stage = Stage::Follows;
-    }
-
-    fn decel(&self) -> f32 {
-        match self.kind {
-            Kind::Tap { decel, .. } => decel,
-            Kind::Pass { .. } => 0.0,
-        }
     }
 
     /// How the pass is left before its end, if the axes have begun to follow.
@@ -387,10 +387,13 @@ impl Thread {
         if window < WINDOW {
             return;
         }
-        let window = window as f32;
-        let interval = window / f32::from(self.measured);
-        if let Kind::Tap { decel, .. } = &mut self.kind {
-            *decel = (1.0 / self.interval - 1.0 / interval) / window;
+        let counts = window as f32;
+        let interval = counts / f32::from(self.measured);
+        if let Kind::Tap { decel, window: before, .. } = &mut self.kind {
+            // From the middle of one time to that of the other.
+            let apart = 0.5 * (counts + f32::from(*before));
+            *decel = (1.0 / self.interval - 1.0 / interval) / apart;
+            *before = u16::try_from(window).unwrap_or(u16::MAX);
         }
         self.interval = interval;
         (self.since, self.measured) = (at, 0);
@@ -412,8 +415,9 @@ impl Thread {
         // No slower than a pulse in the time that it took.
         self.interval = least(after, 1.0 / greater(back, 1e-9));
         (self.at, self.since, self.measured) = (at, at, 0);
-        if let Kind::Tap { decel, .. } = &mut self.kind {
-            *decel = -*decel;
+        if let Kind::Tap { decel, window, .. } = &mut self.kind {
+            // The speed is that of this moment.
+            (*decel, *window) = (-*decel, 0);
         }
         self.stage = Stage::Turned;
     }
@@ -421,13 +425,10 @@ impl Thread {
     /// Pulses a count at the last pulse, and by how much that falls in a count.
     #[inline(never)]
     fn pace(&self) -> (f32, f32) {
-        let (mean, decel) = (1.0 / self.interval, self.decel());
-        if !some(decel) {
-            return (mean, 0.0);
-        }
+        let mean = 1.0 / self.interval;
+        let Kind::Tap { decel, window, .. } = self.kind else { return (mean, 0.0) };
         // The mean is that of the middle of the last window.
-        let since =
-            0.5 * greater(self.interval, WINDOW as f32) + self.at.wrapping_sub(self.since) as f32;
+        let since = 0.5 * f32::from(window) + self.at.wrapping_sub(self.since) as f32;
         (greater(mean - decel * since, 0.0), decel)
     }
 

@@ -142,7 +142,7 @@ impl<'a> Runner<'a> {
             }
             Step::Held if machine::rested() => Next::Turn,
             Step::Idle | Step::Standstill | Step::Held => Next::Block,
-            Step::Again | Step::Switched | Step::Override(_) => Next::Turn,
+            Step::Again | Step::Leaves | Step::Switched | Step::Override(_) => Next::Turn,
         }
     }
 
@@ -194,8 +194,9 @@ impl<'a> Runner<'a> {
                 out.finished = out.line;
             }
             Step::Held => self.held(out, spindle),
+            Step::Leaves if Capability::Lathe.is_built_in() => self.lead(out, motors),
             Step::Switched => self.machine.wait(spindle::switch(spindle, out, true), out),
-            Step::Again | Step::Idle | Step::Standstill => {}
+            Step::Again | Step::Leaves | Step::Idle | Step::Standstill => {}
         }
         // A standstill stays one until a segment leads out of it; velocity is ahead of the segments.
         self.rests = out.velocity.to_bits() == 0 || (self.rests && step != Step::Segment);
@@ -249,6 +250,42 @@ impl<'a> Runner<'a> {
         });
     }
 
+    /// X leaves the cut in the segments that wait.
+    #[inline(never)]
+    #[small]
+    fn lead(&mut self, out: &mut Snapshot, motors: &mut Motors) {
+        let Self { segments, machine, .. } = self;
+        let (leaving, is_backwards) = machine.leaving();
+        // A single motor: more would take too long, and begin in segments of their own.
+        let motor = match leaving {
+            1 => 0,
+            2 => 1,
+            4 => 2,
+            8 => 3,
+            _ => return,
+        };
+        power::segment(motors, leaving);
+        let mut back = segments.used();
+        while back > 0 {
+            back -= 1;
+            let Some(waits) = segments.copy_of(back) else { continue };
+            let moving = waits.moving | leaving;
+            let turned = if is_backwards { leaving } else { 0 };
+            let backwards = core::hint::black_box(waits.backwards & !leaving | turned);
+            let mode = Segment::mode_of(moving);
+            machine.lead((waits.ticks, waits.period), out, |increment| {
+                // In two pieces: a step waits for 31 cycles at most. The first moves nothing.
+                segments.amend_masked(back, |segment| {
+                    (segment.backwards, segment.mode) = (backwards, mode);
+                }) && segments.amend_masked(back, |segment| {
+                    if let Some(of) = segment.increment.get_mut(motor) {
+                        *of = increment;
+                    }
+                })
+            });
+        }
+    }
+
     /// A segment is in the ring: the steppers go, or go on.
     #[inline(always)]
     fn queued(&mut self, rested: bool) -> Next {
@@ -282,9 +319,12 @@ impl<'a> Runner<'a> {
 #[small]
 fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
     let pulses = sensors::read();
-    encoder.look(&pulses);
     let velocity = exec.velocity();
     let Some(thread) = exec.thread() else { return };
+    if thread.turns_round() {
+        encoder.note_turning();
+    }
+    encoder.look(&pulses);
     thread.note(encoder.time(), &pulses, encoder.per_turn(), encoder.turn());
     if let Some(error) = thread.error(velocity) {
         encoder.note_error(error);

@@ -79,6 +79,7 @@ enum End {
 const X: u8 = 0;
 
 /// The acceleration limit of an axis without its jerk limit: at most that of a ramp to `speed` under it, in the mean.
+#[inline(never)]
 #[small]
 fn mean_accel(accel: f32, jerk: f32, speed: f32) -> f32 {
     if jerk > 0.0 && some(speed) {
@@ -260,9 +261,7 @@ impl Planner {
     /// How far X leaves the cut before the end of a pass, by the setting.
     #[small]
     fn retract_length(&self) -> Length {
-        let length =
-            |row| Setting::of(Owner::Spindle, row).map_or(0, |row| self.links.storage.cold(row));
-        let length = length(spindle::R);
+        let length = self.spindle_setting(spindle::R);
         match &self.links.commands.borrow().motion {
             // To the drive line.
             Motion::ThreadCycle(cycle) if cycle.peak.0 < 0 => Length(length.abs()),
@@ -382,9 +381,13 @@ impl Planner {
     /// How far the axes may be off, mm.
     #[small]
     fn error_limit(&self) -> Short {
-        let limit = Setting::of(Owner::Spindle, spindle::L);
-        let limit = limit.map_or(0, |limit| self.links.storage.cold(limit));
-        Short::new(limit as f32 * 1e-3)
+        Short::new(self.spindle_setting(spindle::L) as f32 * 1e-3)
+    }
+
+    #[inline(never)]
+    #[small]
+    fn spindle_setting(&self, row: u8) -> i32 {
+        Setting::of(Owner::Spindle, row).map_or(0, |row| self.links.storage.cold(row))
     }
 
     /// A line of the pass, counted from 0, from a place; `None` if there is none, or it goes nowhere.
