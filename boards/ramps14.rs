@@ -9,7 +9,7 @@ pub const RAMPS14: Board = Board {
     features: &["dialect-tinyg", "cycles", "probing", "jobs", "help", "lathe"],
     dialect: 0,
     clock_hz: 16_000_000,
-    motors: [
+    motors: &[
         MotorPins { step: pin(F, 0), dir: pin(F, 1), enable: Some(pin(D, 7)) }, // X: A0, A1, D38
         MotorPins { step: pin(F, 6), dir: pin(F, 7), enable: Some(pin(F, 2)) }, // Y: A6, A7, A2
         MotorPins { step: pin(L, 3), dir: pin(L, 1), enable: Some(pin(K, 0)) }, // Z: D46, D48, A8

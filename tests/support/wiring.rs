@@ -158,6 +158,9 @@ fn about(board: &Board) -> &'static str {
         "pico-cnc" => {
             "A Raspberry Pi Pico on a breakout board, with four drivers. **Its pins are 3.3 V** and take no more: see [the RP2040](rp2040.md)."
         }
+        "pico-cnc6" => {
+            "A Raspberry Pi Pico with six drivers: two more motors may share an axis with another, or move B and C. **3.3 V**, as `pico-cnc`."
+        }
         _ => "",
     }
 }

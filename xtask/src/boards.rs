@@ -24,6 +24,9 @@ pub enum Board {
     /// Raspberry Pi Pico on a breakout board
     #[value(name = "pico-cnc")]
     PicoCnc,
+    /// Raspberry Pi Pico on a breakout board with six drivers
+    #[value(name = "pico-cnc6")]
+    PicoCnc6,
     /// Arduino Mega 2560 with RAMPS 1.4
     #[value(name = "ramps14")]
     Ramps14,
@@ -45,7 +48,7 @@ impl Board {
 
     /// Whether its chip is the RP2040; of the others it is the ATmega2560.
     pub fn is_rp2040(self) -> bool {
-        matches!(self, Board::PicoCnc)
+        matches!(self, Board::PicoCnc | Board::PicoCnc6)
     }
 
     /// The name in `boards/`, on the command line and after `board-` in the package's features.
@@ -55,6 +58,7 @@ impl Board {
             Board::Mega2560GrblLathe => "mega2560-grbl-lathe",
             Board::Mega2560Lathe => "mega2560-lathe",
             Board::PicoCnc => "pico-cnc",
+            Board::PicoCnc6 => "pico-cnc6",
             Board::Ramps14 => "ramps14",
         }
     }
