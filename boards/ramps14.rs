@@ -49,6 +49,7 @@ pub const RAMPS14: Board = Board {
     ],
     // D2 and D3
     encoder: Some(Encoder { index: pin(E, 4), sync: pin(E, 5) }),
+    drivers: None,
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

@@ -16,6 +16,8 @@ mod pico_cnc;
 mod pico_cnc6;
 #[path = "../boards/ramps14.rs"]
 mod ramps14;
+#[path = "../boards/skr-pico.rs"]
+mod skr_pico;
 
 pub use mega2560_grbl::MEGA2560_GRBL;
 pub use mega2560_grbl_lathe::MEGA2560_GRBL_LATHE;
@@ -23,6 +25,7 @@ pub use mega2560_lathe::MEGA2560_LATHE;
 pub use pico_cnc::PICO_CNC;
 pub use pico_cnc6::PICO_CNC6;
 pub use ramps14::RAMPS14;
+pub use skr_pico::SKR_PICO;
 
 /// Motors that the board of this image drives.
 pub const MOTORS: usize = ACTIVE.motors.len();
@@ -360,6 +363,21 @@ const fn vector(pin: Pin) -> u8 {
     }
 }
 
+/// TMC2209 drivers on one line, with 0.11 ohms: their currents are 31 mA (RMS) for each count above -1.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Tmc2209 {
+    /// Where the UART sends and, over the same line, receives.
+    pub tx: Pin,
+    /// See `tx`.
+    pub rx: Pin,
+    /// The address of each motor's driver, motor 1 first.
+    pub addresses: &'static [u8],
+    /// The current of motion, 0 to 31.
+    pub run: u8,
+    /// The current at rest, 0 to 31.
+    pub hold: u8,
+}
+
 /// A board.
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
@@ -389,6 +407,8 @@ pub struct Board {
     pub inputs: [Option<Pin>; inputs::COUNT],
     /// The sensors of the spindle. Timer 5 tells the time of their pulses.
     pub encoder: Option<Encoder>,
+    /// Drivers that are told their current and microsteps by UART1 of the RP2040.
+    pub drivers: Option<Tmc2209>,
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,
     /// Timer of the 1 kHz tick.
@@ -403,7 +423,7 @@ const OWN_PIN: Pin = pin(Port::H, 1);
 const MAX_PORTS: usize = 2;
 const SERIAL_PINS: usize = 5;
 
-const MAX_PINS: usize = 3 * MOST_MOTORS + 1 + 8 + MAX_PORTS * SERIAL_PINS + 1 + inputs::COUNT;
+const MAX_PINS: usize = 3 * MOST_MOTORS + 1 + 8 + MAX_PORTS * SERIAL_PINS + 1 + inputs::COUNT + 2;
 
 impl Serial {
     const fn pins(&self) -> [Option<Pin>; SERIAL_PINS] {
@@ -462,6 +482,11 @@ impl Board {
         }
         pins[n] = Some(OWN_PIN);
         n += 1;
+        if let Some(drivers) = self.drivers {
+            (pins[n], pins[n + 1]) = (Some(drivers.tx), Some(drivers.rx));
+            n += 2;
+            assert!(drivers.addresses.len() == self.motors.len(), "a driver for each motor");
+        }
         let mut s = 0;
         while s < self.serial.len() {
             self.serial[s].check();
@@ -608,8 +633,15 @@ impl Board {
 }
 
 /// Every board Kerf knows.
-pub const ALL: [&Board; 6] =
-    [&MEGA2560_GRBL, &MEGA2560_GRBL_LATHE, &MEGA2560_LATHE, &PICO_CNC, &PICO_CNC6, &RAMPS14];
+pub const ALL: [&Board; 7] = [
+    &MEGA2560_GRBL,
+    &MEGA2560_GRBL_LATHE,
+    &MEGA2560_LATHE,
+    &PICO_CNC,
+    &PICO_CNC6,
+    &RAMPS14,
+    &SKR_PICO,
+];
 
 const _: () = {
     let mut i = 0;
@@ -640,12 +672,16 @@ pub const ACTIVE: &Board = &PICO_CNC;
 #[cfg(feature = "board-pico-cnc6")]
 pub const ACTIVE: &Board = &PICO_CNC6;
 /// The board that this image is built for.
+#[cfg(feature = "board-skr-pico")]
+pub const ACTIVE: &Board = &SKR_PICO;
+/// The board that this image is built for.
 #[cfg(not(any(
     feature = "board-ramps14",
     feature = "board-mega2560-grbl-lathe",
     feature = "board-mega2560-lathe",
     feature = "board-pico-cnc",
-    feature = "board-pico-cnc6"
+    feature = "board-pico-cnc6",
+    feature = "board-skr-pico"
 )))]
 pub const ACTIVE: &Board = &MEGA2560_GRBL;
 

@@ -30,6 +30,9 @@ pub enum Board {
     /// Arduino Mega 2560 with RAMPS 1.4
     #[value(name = "ramps14")]
     Ramps14,
+    /// BTT SKR Pico v1.0
+    #[value(name = "skr-pico")]
+    SkrPico,
 }
 
 impl Board {
@@ -48,7 +51,7 @@ impl Board {
 
     /// Whether its chip is the RP2040; of the others it is the ATmega2560.
     pub fn is_rp2040(self) -> bool {
-        matches!(self, Board::PicoCnc | Board::PicoCnc6)
+        matches!(self, Board::PicoCnc | Board::PicoCnc6 | Board::SkrPico)
     }
 
     /// The name in `boards/`, on the command line and after `board-` in the package's features.
@@ -60,6 +63,7 @@ impl Board {
             Board::PicoCnc => "pico-cnc",
             Board::PicoCnc6 => "pico-cnc6",
             Board::Ramps14 => "ramps14",
+            Board::SkrPico => "skr-pico",
         }
     }
 }

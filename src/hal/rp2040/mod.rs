@@ -25,6 +25,7 @@
 
 #[path = "../host/arithmetic.rs"]
 pub mod arithmetic;
+mod drivers;
 pub mod eeprom;
 pub mod encoder;
 #[path = "../host/flash.rs"]
@@ -81,6 +82,7 @@ pub fn begin() {
     TIMER_IRQ_0.set_priority(Priority::P2);
     gpio::start();
     inputs::start();
+    drivers::start();
     eeprom::start(peripherals.FLASH);
 }
 

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use common::image;
 use kerf::boards::inputs::{ENDS, PROBE};
-use kerf::boards::{Board, PICO_CNC, PICO_CNC6};
+use kerf::boards::{Board, PICO_CNC, PICO_CNC6, SKR_PICO, gp};
 use kerf::switches::{FIRST_US, SOON_US};
 use kerf_sim::emulated::{Emulated, Near, job};
 use kerf_sim::job::lines_of;
@@ -241,8 +241,41 @@ fn half_a_million_steps_a_second_of_six_motors() {
     assert_eq!(board.positions(), [76_800, 76_800, 76_800, 66_560, 76_800, 76_800]);
 }
 
+/// What the drivers of the SKR Pico are told: address, register, value; each datagram with its checksum.
+fn told(bytes: &[u8]) -> Vec<(u8, u8, u32)> {
+    let crc = |bytes: &[u8]| {
+        let bits = bytes.iter().flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1));
+        bits.fold(0u8, |crc, bit| crc << 1 ^ if crc >> 7 != bit { 7 } else { 0 })
+    };
+    let datagrams = bytes.chunks_exact(8).map(|datagram| {
+        assert_eq!((datagram[0], datagram[7]), (5, crc(&datagram[..7])), "{datagram:x?}");
+        let value = u32::from_be_bytes(datagram[3..7].try_into().unwrap());
+        (datagram[1], datagram[2], value)
+    });
+    datagrams.collect()
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn an_skr_pico_tells_its_drivers_and_moves() {
+    let mut board = Emulated::load(&image(&SKR_PICO), &SKR_PICO).unwrap();
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut board, 1_000).unwrap();
+    host.run_for_ms(&mut board, 100).unwrap();
+    let told = told(&board.receive_from(AUX));
+    for address in 0..4 {
+        for wanted in [(0x80, 0x1C0), (0xEC, 0x1503_0053), (0x90, 0x0008_1209)] {
+            assert!(told.contains(&(address, wanted.0, wanted.1)), "{address}: {told:x?}");
+        }
+    }
+    set(&mut board, &mut host, "g1 x5 y-3 z1 f1000");
+    host.run_for_ms(&mut board, 3_000).unwrap();
+    assert_eq!(board.positions(), [6_400, -3_840, 1_280, 0]);
+    assert!([21, 23].iter().all(|heater| !board.is_high(gp(*heater))));
+}
+
 /// From the edge of a limit switch to the last step, beside the looks at it.
-const STOP_US: f64 = 6.0;
+const STOP_US: f64 = 8.0;
 
 #[test]
 #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
