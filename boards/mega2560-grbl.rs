@@ -9,7 +9,7 @@ pub const MEGA2560_GRBL: Board = Board {
     features: &["dialect-tinyg", "dialect-grbl", "cycles", "probing", "jobs", "help"],
     dialect: 0,
     clock_hz: 16_000_000,
-    motors: [
+    motors: &[
         MotorPins { step: pin(A, 2), dir: pin(C, 7), enable: None }, // D24, D30
         MotorPins { step: pin(A, 3), dir: pin(C, 6), enable: None }, // D25, D31
         MotorPins { step: pin(A, 4), dir: pin(C, 5), enable: None }, // D26, D32
@@ -47,6 +47,7 @@ pub const MEGA2560_GRBL: Board = Board {
     ],
     // D11 and A15
     encoder: Some(Encoder { index: pin(B, 5), sync: pin(K, 7) }),
+    drivers: None,
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

@@ -9,7 +9,7 @@ pub const PICO_CNC: Board = Board {
     dialect: 0,
     clock_hz: 128_000_000,
     // Steps side by side, and directions right behind them: one state machine of the PIO has them all.
-    motors: [
+    motors: &[
         MotorPins { step: gp(2), dir: gp(6), enable: None },
         MotorPins { step: gp(3), dir: gp(7), enable: None },
         MotorPins { step: gp(4), dir: gp(8), enable: None },
@@ -41,6 +41,7 @@ pub const PICO_CNC: Board = Board {
         Some(gp(26)),
     ],
     encoder: Some(Encoder { index: gp(27), sync: gp(28) }),
+    drivers: None,
     step_timer: Timer::Pio,
     tick_timer: Timer::SysTick,
 };

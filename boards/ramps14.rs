@@ -9,7 +9,7 @@ pub const RAMPS14: Board = Board {
     features: &["dialect-tinyg", "cycles", "probing", "jobs", "help", "lathe"],
     dialect: 0,
     clock_hz: 16_000_000,
-    motors: [
+    motors: &[
         MotorPins { step: pin(F, 0), dir: pin(F, 1), enable: Some(pin(D, 7)) }, // X: A0, A1, D38
         MotorPins { step: pin(F, 6), dir: pin(F, 7), enable: Some(pin(F, 2)) }, // Y: A6, A7, A2
         MotorPins { step: pin(L, 3), dir: pin(L, 1), enable: Some(pin(K, 0)) }, // Z: D46, D48, A8
@@ -49,6 +49,7 @@ pub const RAMPS14: Board = Board {
     ],
     // D2 and D3
     encoder: Some(Encoder { index: pin(E, 4), sync: pin(E, 5) }),
+    drivers: None,
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

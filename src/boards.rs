@@ -12,23 +12,38 @@ mod mega2560_grbl_lathe;
 mod mega2560_lathe;
 #[path = "../boards/pico-cnc.rs"]
 mod pico_cnc;
+#[path = "../boards/pico-cnc6.rs"]
+mod pico_cnc6;
 #[path = "../boards/ramps14.rs"]
 mod ramps14;
+#[path = "../boards/skr-pico.rs"]
+mod skr_pico;
 
 pub use mega2560_grbl::MEGA2560_GRBL;
 pub use mega2560_grbl_lathe::MEGA2560_GRBL_LATHE;
 pub use mega2560_lathe::MEGA2560_LATHE;
 pub use pico_cnc::PICO_CNC;
+pub use pico_cnc6::PICO_CNC6;
 pub use ramps14::RAMPS14;
+pub use skr_pico::SKR_PICO;
 
-/// Motors a board drives.
-pub const MOTORS: usize = 4;
+/// Motors that the board of this image drives.
+pub const MOTORS: usize = ACTIVE.motors.len();
+
+/// Most motors of a board that an image can be built for.
+const MOST_MOTORS: usize = 6;
+
+/// Whether steps are made by a unit of the chip which takes entries from memory: pulses take no time of the CPU then.
+pub const STEPS_BY_UNIT: bool = matches!(ACTIVE.step_timer, Timer::Pio);
+
+/// The shortest step pulse, us. 0 stands for half a microsecond.
+pub const SHORTEST_PULSE_US: i32 = if STEPS_BY_UNIT { 0 } else { 1 };
 
 /// Does the same for each motor with its number as a constant: what is found by it is found when the image is
 /// built, which is worth its flash where each segment goes and where pins become single instructions.
 macro_rules! each_motor {
     ($m:ident => $body:expr) => {
-        each_motor!($m => $body; 0 1 2 3)
+        $crate::boards::motor_numbers!(each_motor, $m => $body)
     };
     ($m:ident => $body:expr; $($i:literal)+) => {{$({
         const $m: usize = $i;
@@ -37,6 +52,29 @@ macro_rules! each_motor {
 }
 
 pub(crate) use each_motor;
+
+/// Calls a macro with what it is given and the numbers of all motors.
+#[cfg(not(feature = "board-pico-cnc6"))]
+macro_rules! motor_numbers {
+    ($call:ident, $($given:tt)*) => {
+        $call!($($given)*; 0 1 2 3)
+    };
+}
+#[cfg(feature = "board-pico-cnc6")]
+macro_rules! motor_numbers {
+    ($call:ident, $($given:tt)*) => {
+        $call!($($given)*; 0 1 2 3 4 5)
+    };
+}
+
+pub(crate) use motor_numbers;
+
+/// As many as [`each_motor`] has.
+const _: () = {
+    let mut motors = 0;
+    each_motor!(M => if M == motors { motors += 1 });
+    assert!(motors == MOTORS, "`motor_numbers` has as many as the board");
+};
 
 /// An I/O port of the ATmega2560, by its letter; or the only one of the RP2040.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -325,6 +363,21 @@ const fn vector(pin: Pin) -> u8 {
     }
 }
 
+/// TMC2209 drivers on one line, with 0.11 ohms: their currents are 31 mA (RMS) for each count above -1.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Tmc2209 {
+    /// Where the UART sends and, over the same line, receives.
+    pub tx: Pin,
+    /// See `tx`.
+    pub rx: Pin,
+    /// The address of each motor's driver, motor 1 first.
+    pub addresses: &'static [u8],
+    /// The current of motion, 0 to 31.
+    pub run: u8,
+    /// The current at rest, 0 to 31.
+    pub hold: u8,
+}
+
 /// A board.
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
@@ -337,8 +390,8 @@ pub struct Board {
     pub dialect: u8,
     /// CPU clock, Hz.
     pub clock_hz: u32,
-    /// The four stepper drivers, motor 1 first.
-    pub motors: [MotorPins; MOTORS],
+    /// The stepper drivers, motor 1 first: four, on an RP2040 up to six.
+    pub motors: &'static [MotorPins],
     /// An enable shared by all drivers, active low.
     pub enable_all: Option<Pin>,
     /// Outputs that the panic handler drives low: spindles, heaters, fans.
@@ -354,6 +407,8 @@ pub struct Board {
     pub inputs: [Option<Pin>; inputs::COUNT],
     /// The sensors of the spindle. Timer 5 tells the time of their pulses.
     pub encoder: Option<Encoder>,
+    /// Drivers that are told their current and microsteps by UART1 of the RP2040.
+    pub drivers: Option<Tmc2209>,
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,
     /// Timer of the 1 kHz tick.
@@ -368,7 +423,7 @@ const OWN_PIN: Pin = pin(Port::H, 1);
 const MAX_PORTS: usize = 2;
 const SERIAL_PINS: usize = 5;
 
-const MAX_PINS: usize = 3 * MOTORS + 1 + 8 + MAX_PORTS * SERIAL_PINS + 1 + inputs::COUNT;
+const MAX_PINS: usize = 3 * MOST_MOTORS + 1 + 8 + MAX_PORTS * SERIAL_PINS + 1 + inputs::COUNT + 2;
 
 impl Serial {
     const fn pins(&self) -> [Option<Pin>; SERIAL_PINS] {
@@ -409,7 +464,8 @@ impl Board {
         let mut pins = [None; MAX_PINS];
         let mut n = 0;
         let mut m = 0;
-        while m < MOTORS {
+        assert!(self.motors.len() >= 4, "a board has four motors at least");
+        while m < self.motors.len() {
             pins[n] = Some(self.motors[m].step);
             pins[n + 1] = Some(self.motors[m].dir);
             pins[n + 2] = self.motors[m].enable;
@@ -426,6 +482,11 @@ impl Board {
         }
         pins[n] = Some(OWN_PIN);
         n += 1;
+        if let Some(drivers) = self.drivers {
+            (pins[n], pins[n + 1]) = (Some(drivers.tx), Some(drivers.rx));
+            n += 2;
+            assert!(drivers.addresses.len() == self.motors.len(), "a driver for each motor");
+        }
         let mut s = 0;
         while s < self.serial.len() {
             self.serial[s].check();
@@ -572,8 +633,15 @@ impl Board {
 }
 
 /// Every board Kerf knows.
-pub const ALL: [&Board; 5] =
-    [&MEGA2560_GRBL, &MEGA2560_GRBL_LATHE, &MEGA2560_LATHE, &PICO_CNC, &RAMPS14];
+pub const ALL: [&Board; 7] = [
+    &MEGA2560_GRBL,
+    &MEGA2560_GRBL_LATHE,
+    &MEGA2560_LATHE,
+    &PICO_CNC,
+    &PICO_CNC6,
+    &RAMPS14,
+    &SKR_PICO,
+];
 
 const _: () = {
     let mut i = 0;
@@ -601,11 +669,19 @@ pub const ACTIVE: &Board = &MEGA2560_LATHE;
 #[cfg(feature = "board-pico-cnc")]
 pub const ACTIVE: &Board = &PICO_CNC;
 /// The board that this image is built for.
+#[cfg(feature = "board-pico-cnc6")]
+pub const ACTIVE: &Board = &PICO_CNC6;
+/// The board that this image is built for.
+#[cfg(feature = "board-skr-pico")]
+pub const ACTIVE: &Board = &SKR_PICO;
+/// The board that this image is built for.
 #[cfg(not(any(
     feature = "board-ramps14",
     feature = "board-mega2560-grbl-lathe",
     feature = "board-mega2560-lathe",
-    feature = "board-pico-cnc"
+    feature = "board-pico-cnc",
+    feature = "board-pico-cnc6",
+    feature = "board-skr-pico"
 )))]
 pub const ACTIVE: &Board = &MEGA2560_GRBL;
 

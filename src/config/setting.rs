@@ -10,6 +10,8 @@ use crate::progmem::Slice;
 use crate::units::{AXES, FIRST_ROTARY};
 
 const FIRST_MOTOR: u8 = system::COUNT as u8;
+/// What the group of the last motor is called.
+const LAST_MOTOR: u8 = b'0' + MOTORS as u8;
 const FIRST_AXIS: u8 = FIRST_MOTOR + (MOTORS * motor::COUNT) as u8;
 const FIRST_PWM: u8 = FIRST_AXIS + (AXES * axis::COUNT) as u8;
 const FIRST_SPINDLE: u8 = FIRST_PWM + pwm::COUNT as u8;
@@ -79,7 +81,7 @@ impl Owner {
     /// Whose prefix `name` begins with, but for the system's.
     pub fn of_name(name: &Name) -> Option<Owner> {
         match *name.bytes() {
-            [motor @ b'1'..=b'4', ..] => Some(Owner::Motor(motor - b'1')),
+            [motor @ b'1'..=LAST_MOTOR, ..] => Some(Owner::Motor(motor - b'1')),
             [b'p', b'1', ..] => Some(Owner::Pwm),
             [b's', b'p', ..] => Some(Owner::Spindle),
             [b'c', b'o', ..] => Some(Owner::Coolant),

@@ -37,7 +37,7 @@ use kerf_macros::small;
 
 use avr_embassy::ring::Consumer;
 
-use crate::boards::MOTORS;
+use crate::boards::{MOTORS, STEPS_BY_UNIT};
 
 pub mod contact;
 pub mod follow;
@@ -51,7 +51,10 @@ pub const STEP: u16 = 0x8000;
 pub const PHASE_START: u16 = STEP / 2 + PHASE_MARGIN;
 
 /// See [`PHASE_START`].
-pub const PHASE_MARGIN: u16 = 1024;
+pub const PHASE_MARGIN: u16 = if STEPS_BY_UNIT { 2200 } else { 1024 };
+
+/// Most ticks of a segment: keeps the rounding rest below [`PHASE_MARGIN`].
+pub const TICKS_MAX: u16 = if STEPS_BY_UNIT { 4200 } else { 2000 };
 
 /// The phase of a motor that is at a whole step, in the direction in which it counts.
 pub const fn start(backwards: bool) -> u16 {
@@ -129,6 +132,8 @@ pub struct Ticks {
     pub fine: u16,
     /// Of short blocks, for which they need more.
     pub coarse: u16,
+    /// Of blocks so short that they are a single segment.
+    pub coarsest: u16,
     /// From this period on pulses wait for the interrupt's worst latency ([`Segment::settle`]).
     pub settles: u16,
 }

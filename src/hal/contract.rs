@@ -210,12 +210,16 @@ contract! {
 pub trait Timing {
     /// What [`Segment::period`] counts, in a second. It need not fit a period in a millisecond.
     const TIMER_HZ: u32;
+    /// How long pulses are that [`Timing::TICKS`] are measured with, us.
+    const PULSE_US: u8;
     /// By the number of motors that move, less one.
     const TICKS: [Ticks; MOTORS];
 }
 
 /// Those of the chip.
 pub const TIMER_HZ: u32 = <imp::Chip as Timing>::TIMER_HZ;
+/// That of the chip.
+pub const PULSE_US: u8 = <imp::Chip as Timing>::PULSE_US;
 /// Those of the chip. To be indexed in constants: as a table it would take RAM.
 pub const TICKS: [Ticks; MOTORS] = <imp::Chip as Timing>::TICKS;
 

@@ -4,9 +4,9 @@
 //! interrupt waits out each pulse, so that ticks keep the more distance the wider a pulse is. Times are
 //! CPU cycles unless they are named otherwise.
 
-use crate::boards::MOTORS;
+use crate::boards::{MOTORS, STEPS_BY_UNIT};
 use crate::dda::Ticks;
-use crate::hal::{TICKS, TIMER_HZ};
+use crate::hal::{PULSE_US, TICKS, TIMER_HZ};
 
 const CYCLES_PER_US: u16 = (TIMER_HZ / 1_000_000) as u16;
 const _: () = assert!(TIMER_HZ / 1_000_000 < 256, "255 us take more than a tick period holds");
@@ -14,14 +14,30 @@ const _: () = assert!(TIMER_HZ / 1_000_000 < 256, "255 us take more than a tick 
 pub use crate::dda::Drivers;
 
 impl Drivers {
-    /// What the settings have by default, and what the interrupt's times are measured with.
+    /// What the settings have by default.
     pub const USUAL: Self = Self { pulse_us: 2, setup_us: 1 };
 
     /// By how much ticks are longer than usual: by what the interrupt waits, and half of it, so that as large a part of the time
     /// is left to the others.
     const fn extra(self) -> u16 {
-        let waits = self.pulse_us.saturating_sub(Self::USUAL.pulse_us) as u16 * CYCLES_PER_US;
+        let waits = self.waits();
         waits + waits / 2
+    }
+
+    /// By how much pulses are longer than those that the ticks are measured with.
+    const fn waits(self) -> u16 {
+        self.pulse_us.saturating_sub(PULSE_US) as u16 * CYCLES_PER_US
+    }
+
+    /// By how much ticks between steps are longer: shortest ones, fine ones and coarse ones. A unit that makes pulses by itself is ready for the next one half a
+    /// microsecond behind a pulse.
+    const fn spread(self) -> [u16; 3] {
+        let extra = self.extra();
+        if STEPS_BY_UNIT {
+            [self.waits().saturating_sub(CYCLES_PER_US / 2); 3]
+        } else {
+            [extra, extra + extra / 2, 2 * extra]
+        }
     }
 
     /// How long a direction stands before the first step.
@@ -48,7 +64,7 @@ const fn usual(motors: usize) -> Ticks {
 }
 
 /// Ticks of blocks so short that they are a single segment: 2^22 / the tick period.
-pub const COARSEST: u16 = per(800);
+pub const COARSEST: u16 = per(TICKS[0].coarsest);
 
 /// How close ticks may come.
 #[derive(Clone, Copy, Debug)]
@@ -67,16 +83,16 @@ pub struct Pace {
 /// The paces for such drivers, by the number of motors that move, less one. Cost: 6,000.
 #[small]
 pub const fn paces(drivers: Drivers) -> [Pace; MOTORS] {
-    let extra = drivers.extra();
+    let [shortest, fine, coarse] = drivers.spread();
     let mut paces = [Pace { shortest: 0, fine: 0, coarse: 0, settles: 0 }; MOTORS];
     let mut m = 0;
     while m < MOTORS {
         let usual = usual(m);
         paces[m] = Pace {
-            shortest: usual.shortest + extra,
-            fine: per(usual.fine + extra + extra / 2),
-            coarse: per(usual.coarse + 2 * extra),
-            settles: usual.settles + extra,
+            shortest: usual.shortest + shortest,
+            fine: per(usual.fine + fine),
+            coarse: per(usual.coarse + coarse),
+            settles: usual.settles + shortest,
         };
         m += 1;
     }

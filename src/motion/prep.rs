@@ -39,7 +39,7 @@ use super::divide::{quotient, quotient_remainder};
 use super::pace::{COARSEST, Drivers, Pace, paces};
 use super::retract::Retreat;
 use crate::boards::{MOTORS, each_motor};
-use crate::dda::{PHASE_START, STEP, Segment};
+use crate::dda::{PHASE_START, STEP, Segment, TICKS_MAX};
 use crate::hal::arithmetic::product;
 
 const STEP_LOG2: u8 = 15;
@@ -53,8 +53,8 @@ const PART_LOG2: u8 = STEP_LOG2 - PARTS_LOG2;
 /// Half a step, in such parts.
 const HALF: u8 = 1 << (PARTS_LOG2 - 1);
 
-/// Most ticks of a segment: keeps the rounding rest below [`crate::dda::PHASE_MARGIN`].
-pub const TICKS_MAX: u16 = 2000;
+/// Most ticks of a segment that has more than steps ask for.
+const LIMIT_MAX: u16 = 2000;
 
 /// Longest stretch, CPU cycles.
 pub const CYCLES_MAX: u32 = 1 << 20;
@@ -632,7 +632,7 @@ impl Prep {
         let cycles = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
         // Of 22 bits, 16 are dropped for nothing.
         let limit = (product(cycles, pace) >> 16) as u16 >> 6;
-        limit.clamp(1, TICKS_MAX)
+        limit.clamp(1, LIMIT_MAX)
     }
 
     /// Cycles from tick to tick when a stretch of so many parts of a tick ([`coarsen`]) takes `cycles`; no less than
@@ -861,7 +861,7 @@ const fn limit_in_parts(limit: u16) -> u16 {
     limit << FINE | ((1 << FINE) - 1)
 }
 
-const _: () = assert!(limit_in_parts(TICKS_MAX) >> FINE == TICKS_MAX);
+const _: () = assert!(limit_in_parts(LIMIT_MAX) >> FINE == LIMIT_MAX);
 
 /// A travel in parts of ticks, of which there are no more than `limit` if steps allow, and the exponent of a tick. Cost: 100.
 #[inline(never)]

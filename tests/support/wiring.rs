@@ -158,6 +158,12 @@ fn about(board: &Board) -> &'static str {
         "pico-cnc" => {
             "A Raspberry Pi Pico on a breakout board, with four drivers. **Its pins are 3.3 V** and take no more: see [the RP2040](rp2040.md)."
         }
+        "pico-cnc6" => {
+            "A Raspberry Pi Pico with six drivers: two more motors may share an axis with another, or move B and C. **3.3 V**, as `pico-cnc`."
+        }
+        "skr-pico" => {
+            "A BTT SKR Pico v1.0: motor 4 is its driver E. Fans 1 to 3 are spindle, mist and flood, the servo's pin is the spindle's speed. **3.3 V**, as `pico-cnc`."
+        }
         _ => "",
     }
 }

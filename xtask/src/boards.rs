@@ -24,9 +24,15 @@ pub enum Board {
     /// Raspberry Pi Pico on a breakout board
     #[value(name = "pico-cnc")]
     PicoCnc,
+    /// Raspberry Pi Pico on a breakout board with six drivers
+    #[value(name = "pico-cnc6")]
+    PicoCnc6,
     /// Arduino Mega 2560 with RAMPS 1.4
     #[value(name = "ramps14")]
     Ramps14,
+    /// BTT SKR Pico v1.0
+    #[value(name = "skr-pico")]
+    SkrPico,
 }
 
 impl Board {
@@ -45,7 +51,7 @@ impl Board {
 
     /// Whether its chip is the RP2040; of the others it is the ATmega2560.
     pub fn is_rp2040(self) -> bool {
-        matches!(self, Board::PicoCnc)
+        matches!(self, Board::PicoCnc | Board::PicoCnc6 | Board::SkrPico)
     }
 
     /// The name in `boards/`, on the command line and after `board-` in the package's features.
@@ -55,7 +61,9 @@ impl Board {
             Board::Mega2560GrblLathe => "mega2560-grbl-lathe",
             Board::Mega2560Lathe => "mega2560-lathe",
             Board::PicoCnc => "pico-cnc",
+            Board::PicoCnc6 => "pico-cnc6",
             Board::Ramps14 => "ramps14",
+            Board::SkrPico => "skr-pico",
         }
     }
 }

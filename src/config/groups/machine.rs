@@ -107,9 +107,9 @@ group! {
         GRM "grm": int(0, 63), 1,
             bare(text!("grbl report mask")),
             "What grbl's reports have: 1 machine position (else work position), 2 free blocks and bytes; 4 inches. Its senders know the first two bits as number 10, the third as 13. 8 holds the machine behind a line of G-code that is refused, until `~` or a reset. 16 has reports tell in a thread how far the axes are ahead of the spindle (`Se`), and 32 has each index pulse tell it, in TinyG's dialect too (`spf`): 4 and 8 of number 10.";
-        SPW "spw": int(1, 10).with(IDLE), 2,
+        SPW "spw": int(SHORTEST_PULSE_US, 10).with(IDLE), 2,
             words(text!("step pulse width"), text!(" us")),
-            "How long a step pulse lasts. Longer pulses may lower `vm` and `fr`.";
+            "How long a step pulse lasts. Longer pulses may lower `vm` and `fr`. On boards with an RP2040 0 is half a microsecond.";
         DSU "dsu": int(0, 100).with(IDLE), 1,
             words(text!("direction setup time"), text!(" us")),
             "How long a direction pin stands before a step.";

@@ -82,7 +82,7 @@ use group;
 
 /// What rows are written with.
 mod names {
-    pub use crate::boards::{ACTIVE, MOTORS, inputs};
+    pub use crate::boards::{ACTIVE, MOTORS, SHORTEST_PULSE_US, inputs};
     pub use crate::config::machines;
     pub use crate::config::table::*;
     pub use crate::config::words::*;

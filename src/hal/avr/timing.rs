@@ -8,6 +8,7 @@ use crate::hal::contract::Timing;
 impl Timing for Chip {
     /// The step timer counts the clock itself.
     const TIMER_HZ: u32 = ACTIVE.clock_hz;
+    const PULSE_US: u8 = 2;
     const TICKS: [Ticks; MOTORS] = [
         ticks(160, 160, 200, 400, 200),
         ticks(240, 200, 200, 400, 200),
@@ -17,5 +18,5 @@ impl Timing for Chip {
 }
 
 const fn ticks(step: u16, shortest: u16, fine: u16, coarse: u16, settles: u16) -> Ticks {
-    Ticks { step, shortest, fine, coarse, settles }
+    Ticks { step, shortest, fine, coarse, coarsest: 800, settles }
 }

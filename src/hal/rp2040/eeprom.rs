@@ -7,7 +7,7 @@
 //! until the motors rest and no byte has come for [`QUIET_MS`]; [`Memory::is_busy`] says so until then. One piece waits at most: who writes to
 //! another one before its turn has it written at once.
 //!
-//! Thread mode alone uses it, after start-up. RAM: 4.3 KB.
+//! Thread mode alone uses it, after start-up. RAM: 8.4 KB.
 
 use core::cell::UnsafeCell;
 use core::ops::Range;
@@ -24,7 +24,7 @@ use crate::store::Memory;
 use crate::store::program::AREA;
 
 /// Bytes that are kept.
-const BYTES: usize = 4_096;
+const BYTES: usize = 8_192;
 /// Bytes of a piece.
 const PIECE: usize = 32;
 /// Of the flash, and where pieces are in it: `memory.x` leaves that part free.

@@ -5,7 +5,7 @@
 //! | IO_IRQ_BANK0, priority 0 | an edge: a look is due in a microsecond; edges of the encoder |
 //! | TIMER_IRQ_1, priority 0 | a look at all pins, as [`Switches`] wants it |
 //!
-//! While no switch moves none of them comes. A limit stops the steps right there, 12 us after its edge at most. The place of a contact is where the
+//! While no switch moves none of them comes. A limit stops the steps right there, 18 us after its edge at most, of which 11 pass between the edge and the second look. The place of a contact is where the
 //! generator's words were at the first of two looks; the feeder works it out ([`stepper::contact`]).
 
 use core::cell::UnsafeCell;

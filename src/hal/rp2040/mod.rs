@@ -18,13 +18,14 @@
 //!
 //! # When full or late
 //!
-//! - **Words** last for 1 to 2 ms. A feeder that comes later than that is a pause of all motors between two words: no step is lost, and
+//! - **Words** last for half a millisecond to one. A feeder that comes later than that is a pause of all motors between two words: no step is lost, and
 //!   none is doubled.
 //! - **A byte** that is not taken within the time of the next one is lost, and marked ([`serial`](super::serial)).
 //! - **What a stop finds** in buffers is counted, not made: see [`stepper::settle`].
 
 #[path = "../host/arithmetic.rs"]
 pub mod arithmetic;
+mod drivers;
 pub mod eeprom;
 pub mod encoder;
 #[path = "../host/flash.rs"]
@@ -81,6 +82,7 @@ pub fn begin() {
     TIMER_IRQ_0.set_priority(Priority::P2);
     gpio::start();
     inputs::start();
+    drivers::start();
     eeprom::start(peripherals.FLASH);
 }
 

@@ -5,12 +5,13 @@ use crate::boards::MOTORS;
 use crate::dda::Ticks;
 use crate::hal::contract::Timing;
 
-/// A pulse of 2 us and as long a pause; ticks beside steps as fine as the feeder takes a fifth of the CPU for.
+/// A pulse of half a microsecond and as long a pause; ticks beside steps as fine as the feeder takes a quarter of the CPU for.
 const USUAL: Ticks =
-    Ticks { step: 256, shortest: 160, fine: 160, coarse: 320, settles: u16::MAX / 4 };
+    Ticks { step: 64, shortest: 64, fine: 66, coarse: 66, coarsest: 66, settles: u16::MAX / 4 };
 
 impl Timing for Chip {
     /// Half the system clock.
     const TIMER_HZ: u32 = 64_000_000;
+    const PULSE_US: u8 = 0;
     const TICKS: [Ticks; MOTORS] = [USUAL; MOTORS];
 }

@@ -17,7 +17,7 @@ use embassy_rp::pac;
 use embassy_rp::pac::uart::Uart as Registers;
 
 use super::gpio::{self, Unit};
-use super::{eeprom, exec, flags, mask, time};
+use super::{drivers, eeprom, exec, flags, mask, time};
 use crate::baud;
 use crate::boards::{ACTIVE, Usart};
 use crate::hal::Thread;
@@ -408,6 +408,7 @@ pub fn look() {
         kick(port);
     }
     eeprom::look();
+    drivers::look(time::millis());
 }
 
 /// The millisecond in which the last byte came, on any port.

@@ -8,6 +8,7 @@ use super::remark::Remark;
 use super::request::{Context, Request};
 use super::token::{Action, Group, Subject, Target};
 use super::value::{Form, Source, place_form};
+use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::config::name::axis_of;
 use crate::config::table;
@@ -17,6 +18,9 @@ use crate::gcode::tables::Row;
 use crate::protocol::{Machine, Out, Value};
 use crate::status::Status;
 use crate::units::Length;
+
+/// The number of the last motor.
+const LAST_MOTOR: i32 = MOTORS as i32;
 
 #[small]
 impl Request {
@@ -276,7 +280,7 @@ fn act<M: Machine, O>(
     };
     match motor {
         0 => done(c.machine.energize(None, on)),
-        1..=4 => done(c.machine.energize(Some(motor as u8 - 1), on)),
+        1..=LAST_MOTOR => done(c.machine.energize(Some(motor as u8 - 1), on)),
         _ => Err(Status::OutOfRange),
     }
 }

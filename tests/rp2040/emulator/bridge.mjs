@@ -2,9 +2,9 @@
 //
 // MOTORS is JSON, [[step, dir], ...]. Each line of the input is a request in JSON, each line of the output its answer:
 //
-//   {"cut": true, "send": [[port, "hex"]], "now": byte, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "until": cycle, "line": true}
+//   {"cut": true, "send": [[port, "hex"]], "now": byte, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "record": bool, "until": cycle, "line": true}
 //
-// With `cut` the supply fails, and comes again. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
+// With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
 import { createInterface } from 'node:readline';
 import { Machine } from './machine.mjs';
 import { Motors } from './pins.mjs';
@@ -15,6 +15,9 @@ const motors = new Motors(machine, JSON.parse(pins).map(([step, dir]) => ({ step
 const PWM = 0x40050000;
 const FUNCTION_PWM = 4;
 
+// What the answer tells of edges.
+let recorded;
+
 function act(request) {
   if (request.cut) machine.cutPower();
   for (const [port, rate] of request.baud ?? []) machine.senders[port].rate = rate;
@@ -22,6 +25,7 @@ function act(request) {
   for (const byte of request.now ?? []) machine.sendNow(0, byte);
   for (const [gpio, high] of request.drive ?? []) machine.drive(gpio, high);
   if (request.wire) motors.wire(request.wire);
+  recorded = request.record === undefined ? undefined : motors.record(request.record);
   const lines = machine.lines;
   machine.runUntil(request.until ?? 0, () => request.line && machine.lines !== lines);
 }
@@ -51,6 +55,7 @@ function answer() {
     shares: shares(),
     asleep: machine.asleep,
     resets: machine.resets,
+    recorded,
   };
 }
 

@@ -23,7 +23,23 @@ export class Motors {
     this.last = pins.map(() => undefined);
     this.lastStep = 0;
     this.near = [];
-    machine.edgeListeners.push((gpio, level, cycle) => { if (level) this.rose(gpio, cycle); });
+    // While someone records: when each motor's steps rise, and the shortest pulse.
+    this.times = undefined;
+    this.shortest = Infinity;
+    machine.edgeListeners.push((gpio, level, cycle) => { level ? this.rose(gpio, cycle) : this.fell(gpio, cycle); });
+  }
+
+  // Begins to record, or ends: then all that has been recorded.
+  record(on) {
+    const { times, shortest } = this;
+    this.times = on ? this.pins.map(() => []) : undefined;
+    this.shortest = Infinity;
+    return { times, shortest };
+  }
+
+  fell(gpio, cycle) {
+    const motor = this.times ? this.pins.findIndex((pins) => pins.step === gpio) : -1;
+    if (motor >= 0) this.shortest = Math.min(this.shortest, cycle - (this.last[motor] ?? -Infinity));
   }
 
   rose(gpio, cycle) {
@@ -34,6 +50,7 @@ export class Motors {
     this.gaps[motor] = Math.min(this.gaps[motor], cycle - (this.last[motor] ?? -Infinity));
     this.last[motor] = cycle;
     this.lastStep = cycle;
+    this.times?.[motor].push(cycle);
     for (const near of this.near) if (near.motor === motor) this.work(near);
   }
 

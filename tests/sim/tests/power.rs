@@ -42,7 +42,8 @@ fn a_motor_that_stands_still_stays_off() {
     set(&mut machine, &mut host, "{1pm:3,2pm:3,3pm:2,4pm:0,mt:0.2}");
     set(&mut machine, &mut host, "g1 f500 y1 a1");
     machine.run_for_ms(60).unwrap();
-    let on = |machine: &Machine| RAMPS14.motors.map(|motor| is_on(machine, motor.enable.unwrap()));
+    let on =
+        |machine: &Machine| [0, 1, 2, 3].map(|m| is_on(machine, RAMPS14.motors[m].enable.unwrap()));
     assert_eq!(on(&machine), [false, true, true, false]);
     machine.run_for_ms(2_000).unwrap();
     assert_eq!(on(&machine), [false; 4]);

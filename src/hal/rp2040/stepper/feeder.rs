@@ -1,7 +1,7 @@
-//! The feeder: writes chunks of words ahead of time. Owns the step generator, and the ring's end that reads.
+//! The feeder: writes chunks of entries ahead of time. Owns the step generator, and the ring's end that reads.
 //!
-//! It runs in the handlers of DMA_IRQ_0 and PIO0_IRQ_0, of one priority: at the end of each chunk, when exec starts the steps, at the mark of the last word, and
-//! when a contact is to be worked out. Cost of a tick: 60 to 130 cycles with its words.
+//! It runs in the handlers of DMA_IRQ_0 and PIO0_IRQ_0, of one priority: at the end of each chunk, when exec starts the steps, at the mark of the last entry, and
+//! when a contact is to be worked out. Cost: see [`Writer::run`].
 
 use core::cell::{Cell, UnsafeCell};
 use core::sync::atomic::Ordering::Relaxed;
@@ -9,8 +9,8 @@ use core::sync::atomic::Ordering::Relaxed;
 use embassy_rp::interrupt;
 use embassy_rp::interrupt::InterruptExt;
 
-use super::machine::{self, Chunk, Place};
-use super::words::{CYCLES_PER_COUNT, OF_A_TICK, OF_THE_END, Out, Writer};
+use super::machine::{self, Chunk, Place, WIRING};
+use super::words::{CYCLES_PER_COUNT, OF_A_SEGMENT, OF_THE_END, Out, Writer};
 use super::{BEGINS, CHUNK_CYCLES, PULSE_US, RING, RUNNING, STOPPED, exec, mask};
 use crate::boards::MOTORS;
 use crate::dda::{Dda, SEGMENTS, Segment, contact};
@@ -26,9 +26,11 @@ pub(super) struct Feeder {
     dda: Dda,
     writer: Writer,
     segments: Option<Consumer<Segment, SEGMENTS>>,
+    /// The next entry is the first of a motion.
+    begins: bool,
     /// Chunks that are sent or wait.
     flying: u8,
-    /// The last word has been written: its mark is to come.
+    /// The last entry has been written: its mark is to come.
     ended: bool,
 }
 
@@ -45,8 +47,9 @@ unsafe impl Sync for Shared {}
 pub(super) static FEEDER: Shared = Shared {
     feeder: UnsafeCell::new(Feeder {
         dda: Dda::new(),
-        writer: Writer::new(),
+        writer: Writer::new(&WIRING),
         segments: None,
+        begins: false,
         flying: 0,
         ended: false,
     }),
@@ -113,11 +116,11 @@ impl Feeder {
 
     fn begin(&mut self) {
         self.writer.set_pulse(PULSE_US.load(Relaxed) as u8);
-        self.writer.begin(FIRST_TICK * CYCLES_PER_COUNT);
-        self.ended = false;
+        machine::set_pulse(self.writer.pulse_count());
+        (self.begins, self.ended) = (true, false);
     }
 
-    /// The last word has been carried out.
+    /// The last entry has been carried out.
     fn rest(&mut self) {
         self.ended = false;
         let waits = self.segments.as_ref().is_some_and(|segments| !segments.is_empty());
@@ -150,40 +153,47 @@ impl Feeder {
         self.dda.ticks > 0 || self.segments.as_ref().is_some_and(|segments| !segments.is_empty())
     }
 
-    /// Writes ticks for about a millisecond.
+    /// Writes ticks for about [`CHUNK_CYCLES`].
     fn fill(&mut self, chunk: &mut Chunk) {
         let mut cycles = 0i32;
-        while cycles < CHUNK_CYCLES && chunk.room() > OF_A_TICK + OF_THE_END && self.has_tick() {
-            self.tick(chunk);
-            cycles = cycles.saturating_add(self.writer.pass());
+        while cycles < CHUNK_CYCLES
+            && chunk.list.left() > OF_A_SEGMENT + OF_THE_END + 1
+            && self.has_tick()
+        {
+            if self.begins {
+                self.begins = false;
+                self.writer.begin(FIRST_TICK * CYCLES_PER_COUNT, &mut chunk.list);
+            }
+            if self.dda.ticks == 0 && !self.load(chunk) {
+                break;
+            }
+            let period = self.writer.period().max(1);
+            let room = chunk.list.left() - OF_THE_END;
+            let ticks = ((CHUNK_CYCLES - cycles) / period + 1).min(room as i32) as u32;
+            let ticks = ticks.min(self.dda.ticks.into()) as u16;
+            self.writer.run(&mut self.dda, ticks, &mut chunk.list);
+            cycles = cycles.saturating_add(i32::from(ticks).saturating_mul(period));
         }
-        if cycles > 0 {
-            self.writer.close(chunk);
+        if cycles >= CHUNK_CYCLES && chunk.is_empty() {
+            self.writer.close(&mut chunk.list);
         }
     }
 
-    /// Writes a tick. Whether there was none, for there is no segment.
-    fn tick(&mut self, chunk: &mut Chunk) -> bool {
-        let Some(segments) = self.segments.as_mut() else { return true };
-        let mut out = Out { writer: &mut self.writer, to: chunk, freed: false, stopped: false };
-        self.dda.tick(&mut out, segments);
-        let stopped = out.stopped;
-        if out.freed {
+    /// Takes the next segment up. False when there is none.
+    fn load(&mut self, chunk: &mut Chunk) -> bool {
+        let Some(segments) = self.segments.as_mut() else { return false };
+        let mut out = Out { writer: &mut self.writer, to: &mut chunk.list };
+        let loaded = self.dda.load(&mut out, segments);
+        if loaded {
             exec::pend();
         }
-        stopped
+        loaded
     }
 
-    /// The last pulse, and the mark.
+    /// The last entry, with its mark.
     fn end(&mut self, chunk: &mut Chunk) {
-        self.ended = self.tick(chunk);
-        if self.ended {
-            self.writer.end(chunk);
-        } else {
-            // A segment has come in the nick of time.
-            self.writer.pass();
-            self.writer.close(chunk);
-        }
+        self.writer.end(&mut chunk.list);
+        self.ended = true;
     }
 
     /// Everything that has not been carried out is forgotten: see [`Dda::settle`].
@@ -192,8 +202,8 @@ impl Feeder {
         let queued = || segments.as_mut().and_then(Consumer::pop).or_else(|| held.take());
         self.dda.settle(queued, position);
         (self.flying, self.ended) = (0, false);
-        self.writer.begin(0);
-        machine::show(self.writer.pins());
+        self.writer.rest();
+        machine::show(self.writer.low());
     }
 
     /// Works out where the motors were when the pins were at `place`.

@@ -11,7 +11,7 @@ use embassy_rp::interrupt::{DMA_IRQ_0, InterruptExt, PIO0_IRQ_0, Priority};
 use embassy_rp::pac::{DMA, PIO0};
 use embassy_rp::pio::program::pio_asm;
 
-use super::words::{Count, Put};
+use super::words::{CHANGES, Count, Entry, List, Wiring};
 use super::{CHUNK, CHUNKS, STOPPED, gpio, mask};
 use crate::boards::{ACTIVE, MOTORS, Port};
 
@@ -19,10 +19,15 @@ use crate::boards::{ACTIVE, MOTORS, Port};
 const SM: usize = 0;
 /// Where its program lies: wherever it is loaded, jumps are as in the text.
 const ORIGIN: u8 = 0;
-/// The instruction behind the one that takes a word: the word's pins are not out yet.
-const TAKEN: u8 = ORIGIN + 1;
-/// The interrupt flag that a marked word raises.
+/// Where the program has taken an entry's first word, and both, and not carried them out.
+const HALF_TAKEN: [core::ops::RangeInclusive<u8>; 2] = [1..=4, 10..=12];
+const TAKEN: u8 = 13;
+/// The interrupt flag that a marked entry raises.
 const MARKED: u32 = 1;
+/// So often a place is looked for that moves on meanwhile.
+const TRIES: u8 = 8;
+/// Words of an entry.
+const WORDS: u32 = 2;
 
 /// What the channels do: words from memory, one for each place in the FIFO (request 0 is that of the first state machine of PIO0).
 const CONTROL: u32 = 1 | 2 << 2 | 1 << 4;
@@ -31,31 +36,35 @@ const CHAIN: u32 = 11;
 /// Of a channel: it is at work.
 const BUSY: u32 = 1 << 24;
 
+/// The pins of the chip.
+const PINS: u8 = 30;
+
+/// The motors' pins.
+pub(super) static WIRING: Wiring = Wiring::new(ACTIVE.motors);
+
 const _: () = {
-    let base = ACTIVE.motors[0].step.bit;
     let mut m = 0;
     while m < MOTORS {
         let (step, dir) = (ACTIVE.motors[m].step, ACTIVE.motors[m].dir);
         assert!(step.port as u8 == Port::Gpio as u8 && dir.port as u8 == Port::Gpio as u8);
-        assert!(step.bit == base + m as u8, "step pins are side by side");
-        assert!(dir.bit == base + (MOTORS + m) as u8, "direction pins are right behind step pins");
+        assert!(step.bit < PINS && dir.bit < PINS);
         m += 1;
     }
 };
 
-struct Buffer(UnsafeCell<[[u32; CHUNK]; CHUNKS]>);
+struct Buffer(UnsafeCell<[[Entry; CHUNK]; CHUNKS]>);
 
 // SAFETY: the feeder alone writes it, and never a chunk that the DMA reads.
 unsafe impl Sync for Buffer {}
 
-static BUFFER: Buffer = Buffer(UnsafeCell::new([[0; CHUNK]; CHUNKS]));
+static BUFFER: Buffer = Buffer(UnsafeCell::new([[[0; 2]; CHUNK]; CHUNKS]));
 
 /// Words in each chunk, by its number modulo [`CHUNKS`].
 static LENGTHS: [AtomicU32; CHUNKS] = [const { AtomicU32::new(0) }; CHUNKS];
 /// Chunks that have been handed to the DMA.
 static SENT: AtomicU32 = AtomicU32::new(0);
 
-/// How far words have been carried out: so many of this chunk, and all before it.
+/// How far entries have been carried out: so many words of this chunk, and all before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     chunk: u32,
@@ -69,7 +78,7 @@ impl Place {
 
 /// The address of a chunk.
 fn address(chunk: u32) -> u32 {
-    BUFFER.0.get() as u32 + (chunk as usize % CHUNKS * CHUNK * 4) as u32
+    BUFFER.0.get() as u32 + chunk % CHUNKS as u32 * size_of::<[Entry; CHUNK]>() as u32
 }
 
 fn length(chunk: u32) -> u32 {
@@ -83,20 +92,31 @@ pub(super) fn start() {
         ".wrap_target",
         "start:",
         "    pull block",
-        "    out pins, 8",
-        "    out y, 1",
-        "    out x, 23",
-        "hold:",
-        "    jmp x-- hold",
-        "    jmp !y start",
+        "    out x, 1",
+        "    jmp !x tick",
+        // Pins change.
+        "    out x, 1",
+        "    pull block",
+        "    out y, 32",
+        "    mov pins, y",
+        "    jmp !x start",
         "    irq nowait 0",
+        "    jmp start",
+        "tick:",
+        "    out x, 31",
+        "rest:",
+        "    jmp x-- rest",
+        "    pull block",
+        "    out pins, 32",
+        "    mov x, isr",
+        "pulse:",
+        "    jmp x-- pulse",
+        "    mov pins, y",
         ".wrap",
     );
-    const { assert!(super::words::PINS == 8, "the program has as many pins") };
     for (i, instruction) in program.program.code.iter().enumerate() {
         PIO0.instr_mem(i).write(|w| w.set_instr_mem(*instruction));
     }
-    let base = ACTIVE.motors[0].step.bit;
     let sm = PIO0.sm(SM);
     sm.clkdiv().write(|w| w.set_int(1));
     sm.execctrl().write(|w| {
@@ -108,7 +128,7 @@ pub(super) fn start() {
         w.set_in_shiftdir(true);
     });
     // Pins become outputs by instructions that are carried out at once.
-    for motor in &ACTIVE.motors {
+    for motor in ACTIVE.motors {
         for pin in [motor.step, motor.dir] {
             sm.pinctrl().write(|w| {
                 w.set_set_base(pin.bit);
@@ -119,10 +139,8 @@ pub(super) fn start() {
             gpio::connect(pin, gpio::Unit::Pio0);
         }
     }
-    sm.pinctrl().write(|w| {
-        w.set_out_base(base);
-        w.set_out_count(super::words::PINS as u8);
-    });
+    // All pins of the chip: those that are connected to it are the motors'.
+    sm.pinctrl().write(|w| w.set_out_count(PINS));
     PIO0.irqs(0).inte().write(|w| w.0 = MARKED << 8);
     DMA.inte(0).write_value(0b11);
     for interrupt in [DMA_IRQ_0, PIO0_IRQ_0] {
@@ -132,10 +150,12 @@ pub(super) fn start() {
     }
 }
 
-/// `set pins, 0`, `set pindirs, 1`, `jmp 0`.
+/// `set pins, 0`, `set pindirs, 1`, `jmp 0`, `pull block`, `mov isr, osr`.
 const SET_PINS: u16 = 0b111_00000_000_00000;
 const SET_PINDIRS: u16 = 0b111_00000_100_00001;
 const JMP_START: u16 = ORIGIN as u16;
+const PULL: u16 = 0b100_00000_1010_0000;
+const TO_PULSE: u16 = 0b101_00000_110_00_111;
 
 fn execute(instruction: u16) {
     PIO0.sm(SM).instr().write(|w| w.set_instr(instruction));
@@ -149,6 +169,21 @@ pub(super) fn halt() {
 
 fn run() {
     PIO0.ctrl().write(|w| w.0 = 1 << SM);
+}
+
+/// From the next entry on pulses count so many cycles. The feeder, while nothing is sent.
+pub(super) fn set_pulse(count: u32) {
+    halt();
+    begin_anew();
+    PIO0.txf(SM).write_value(count);
+    execute(PULL);
+    execute(TO_PULSE);
+}
+
+/// The program begins at its start. While it stands still.
+fn begin_anew() {
+    PIO0.ctrl().write(|w| w.set_sm_restart(1 << SM));
+    execute(JMP_START);
 }
 
 /// The channels whose chunks have gone to the FIFO since the last call, as bits.
@@ -170,26 +205,22 @@ pub(super) fn take_mark() -> bool {
 /// The next chunk, to be filled. The feeder.
 pub(super) struct Chunk {
     number: u32,
-    words: usize,
+    /// What has been put there.
+    pub list: List<'static>,
 }
 
 impl Chunk {
+    /// The feeder alone, one at a time.
     pub(super) fn next() -> Self {
-        Self { number: SENT.load(Relaxed), words: 0 }
-    }
-
-    /// How many words there is room for.
-    pub(super) fn room(&self) -> usize {
-        CHUNK - self.words
+        let number = SENT.load(Relaxed);
+        let chunks = BUFFER.0.get().cast::<[Entry; CHUNK]>();
+        // SAFETY: inside the buffer; the DMA does not read this chunk now, and the one before that was filled has been handed over.
+        let room = unsafe { &mut *chunks.wrapping_add(number as usize % CHUNKS) };
+        Self { number, list: List::new(room) }
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.words == 0
-    }
-
-    fn slot(&self, word: usize) -> *mut u32 {
-        // Inside the buffer: `word` is below `CHUNK`.
-        (address(self.number) as *mut u32).wrapping_add(word)
+        self.list.len() == 0
     }
 
     /// Hands it to the DMA, behind the chunk that is sent if `follows`.
@@ -197,14 +228,15 @@ impl Chunk {
         let (own, other) = (self.number as usize % 2, (self.number as usize + 1) % 2);
         let start = address(self.number);
         let (channel, before) = (DMA.ch(own), DMA.ch(other));
-        LENGTHS[self.number as usize % CHUNKS].store(self.words as u32, Relaxed);
+        let words = self.list.len() as u32 * WORDS;
+        LENGTHS[self.number as usize % CHUNKS].store(words, Relaxed);
         // The words are in memory before the DMA reads them.
         cortex_m::asm::dmb();
         mask(|| {
             channel.al1_ctrl().write_value(CONTROL | (own as u32) << CHAIN);
             channel.al1_read_addr().write_value(start);
             channel.al1_write_addr().write_value(PIO0.txf(SM).as_ptr() as u32);
-            channel.trans_count().write_value(self.words as u32);
+            channel.trans_count().write_value(words);
             SENT.store(self.number.wrapping_add(1), Relaxed);
             if STOPPED.load(Relaxed) {
                 return;
@@ -225,77 +257,84 @@ impl Chunk {
     }
 }
 
-impl Put for Chunk {
-    fn put(&mut self, word: u32) {
-        if self.words < CHUNK {
-            // SAFETY: inside the chunk, which the DMA does not read now.
-            unsafe { self.slot(self.words).write_volatile(word) };
-            self.words += 1;
+/// How far entries have been carried out right now. Any level. Cost: 80 cycles.
+pub fn place() -> Place {
+    let mut found = Place::NONE;
+    if SENT.load(Relaxed) == 0 {
+        return found;
+    }
+    // What moves on meanwhile is looked at again; it does so for a moment in each entry.
+    for _ in 0..TRIES {
+        let (place, waiting) = (sent(), waiting());
+        let at = PIO0.sm(SM).addr().read().addr();
+        let taken = match at {
+            TAKEN => WORDS,
+            at if HALF_TAKEN.iter().any(|range| range.contains(&at)) => 1,
+            _ => 0,
+        };
+        found = back(place, waiting + taken);
+        if found.words.is_multiple_of(WORDS) && sent_is(found, waiting + taken) {
+            break;
         }
     }
-
-    fn change_last(&mut self, change: impl FnOnce(&mut u32)) {
-        if self.words > 0 {
-            let slot = self.slot(self.words - 1);
-            // SAFETY: as in `put`.
-            unsafe {
-                let mut word = slot.read_volatile();
-                change(&mut word);
-                slot.write_volatile(word);
-            }
-        }
-    }
+    found
 }
 
-/// How far words have been carried out right now. Any level. Cost: 60 cycles.
-pub fn place() -> Place {
+/// Whether this place is so many words behind what has been sent.
+fn sent_is(place: Place, behind: u32) -> bool {
+    back(sent(), behind) == place && waiting() <= behind
+}
+
+/// Words in the FIFO.
+fn waiting() -> u32 {
+    PIO0.flevel().read().0 >> (8 * SM) & 0xF
+}
+
+/// How far the DMA has read.
+fn sent() -> Place {
     let newest = SENT.load(Relaxed).wrapping_sub(1);
     let gone = |chunk: u32| {
         let read = DMA.ch(chunk as usize % 2).al1_read_addr().read();
         read.wrapping_sub(address(chunk)) / 4
     };
-    let sent = match gone(newest) {
+    match gone(newest) {
         0 => {
             let before = newest.wrapping_sub(1);
             Place { chunk: before, words: gone(before) }
         }
         words => Place { chunk: newest, words },
-    };
-    let waiting = PIO0.flevel().read().0 >> (8 * SM) & 0xF;
-    let taken = PIO0.sm(SM).addr().read().addr() == TAKEN;
-    back(sent, waiting + u32::from(taken))
-}
-
-/// So many words before a place.
-fn back(place: Place, words: u32) -> Place {
-    match place.words.checked_sub(words) {
-        Some(words) => Place { words, ..place },
-        None => {
-            let chunk = place.chunk.wrapping_sub(1);
-            let rest = words - place.words;
-            Place { chunk, words: length(chunk).saturating_sub(rest) }
-        }
     }
 }
 
-fn word(place: Place) -> u32 {
-    let at = address(place.chunk) as *const u32;
-    // SAFETY: inside the buffer; the feeder, which writes it, does not run meanwhile or calls this.
-    unsafe { at.wrapping_add(place.words as usize % CHUNK).read_volatile() }
+/// So many words before a place.
+fn back(mut place: Place, mut words: u32) -> Place {
+    for _ in 0..CHUNKS {
+        if let Some(left) = place.words.checked_sub(words) {
+            return Place { words: left, ..place };
+        }
+        words -= place.words;
+        let chunk = place.chunk.wrapping_sub(1);
+        place = Place { chunk, words: length(chunk) };
+    }
+    place
 }
 
-/// The steps of the words behind a place, backwards ones negative. The feeder, or while it cannot run.
+fn entry(chunk: u32, number: u32) -> Entry {
+    let at = address(chunk) as *const Entry;
+    // SAFETY: inside the buffer; the feeder, which writes it, does not run meanwhile or calls this.
+    unsafe { at.wrapping_add(number as usize % CHUNK).read_volatile() }
+}
+
+/// The steps of the entries behind a place, backwards ones negative. The feeder, or while it cannot run.
 pub(super) fn steps_behind(place: Place) -> [i32; MOTORS] {
-    let before = if length(place.chunk) == 0 { 0 } else { word(back(place, 1)) };
-    let mut count = Count::behind(super::words::pins_of(before));
+    let mut count = Count::default();
     let (mut at, end) = (place, SENT.load(Relaxed));
-    // Two chunks wait at most; the place may be in the two before them.
     for _ in 0..CHUNKS {
         if at.chunk == end {
             break;
         }
-        for words in at.words..length(at.chunk) {
-            count.add(word(Place { words, ..at }));
+        for number in at.words / WORDS..length(at.chunk) / WORDS {
+            count.add(&WIRING, entry(at.chunk, number));
         }
         at = Place { chunk: at.chunk.wrapping_add(1), words: 0 };
     }
@@ -321,13 +360,14 @@ pub(super) fn drop_words() -> [i32; MOTORS] {
     for _ in 0..2 {
         sm.shiftctrl().modify(|w| w.set_fjoin_rx(!w.fjoin_rx()));
     }
-    PIO0.ctrl().write(|w| w.set_sm_restart(1 << SM));
-    execute(JMP_START);
+    begin_anew();
     steps
 }
 
 /// Puts the pins out, while nothing else is sent.
 pub(super) fn show(pins: u32) {
-    PIO0.txf(SM).write_value(pins);
+    for word in [CHANGES, pins] {
+        PIO0.txf(SM).write_value(word);
+    }
     run();
 }

@@ -1,14 +1,14 @@
 //! Steps: a state machine of PIO0, which two channels of the DMA feed in turn with words out of RAM.
 //!
-//! A word is the levels of all step and direction pins and for how long they stand ([`words`]); the state machine runs at the system clock. So each
-//! edge is where it should be to a cycle, whatever the CPU does, and all motors keep to one time.
+//! An entry of two words is a rest, a pulse, and the pins for it ([`words`]); the state machine runs at the system clock. So each
+//! edge is where it should be to a cycle, whatever the CPU does, and all motors keep to one time. Pins may be anywhere: entries have all of the chip.
 //!
-//! The **feeder**, the handler of DMA_IRQ_0 and PIO0_IRQ_0, runs [`Dda::tick`] ahead of time and writes chunks of words, each about a millisecond
-//! long. While one chunk is sent the next one waits behind it, chained by the hardware. Where no segment is left, the last word has a mark, upon which the
-//! state machine raises its interrupt: the machine stands still.
+//! The **feeder**, the handler of DMA_IRQ_0 and PIO0_IRQ_0, runs the step generator ([`Dda`]) ahead of time and writes chunks of entries, each about half a
+//! millisecond long. While one chunk is sent the next one waits behind it, chained by the hardware. Where no segment is left, the last entry has a mark, upon
+//! which the state machine raises its interrupt: the machine stands still.
 //!
 //! **Counting.** Chunks are numbered. How many words have been carried out follows from the read address of the channels, the level of the FIFO and the
-//! instruction that the state machine is at ([`place`]). Words behind that are steps that have not been made: after a stop [`settle`] takes them
+//! instruction that the state machine is at ([`place`]). Entries behind that are steps that have not been made: after a stop [`settle`] takes them
 //! off the position, and a contact's place is worked out from them.
 //!
 //! **When late.** Two chunks last for at least [`CHUNK_CYCLES`] each, unless segments come late. If the feeder comes later, all pins stand as they are
@@ -29,12 +29,12 @@ use crate::hal::ring::{Producer, Ring};
 use feeder::FEEDER;
 pub use machine::{Place, place};
 
-/// Words of a chunk.
-const CHUNK: usize = 256;
-/// Chunks in RAM: two that are sent or wait, and two that have been, for a contact that is told later.
-const CHUNKS: usize = 4;
-/// About how long a chunk lasts, cycles: a millisecond.
-const CHUNK_CYCLES: i32 = 128_000;
+/// Entries of a chunk: a step each microsecond, and some.
+const CHUNK: usize = 512;
+/// Chunks in RAM. Two are sent or wait; three more may have entries in the FIFO and in the state machine, and a contact is told later.
+const CHUNKS: usize = 8;
+/// About how long a chunk lasts, cycles: half a millisecond.
+const CHUNK_CYCLES: i32 = 64_000;
 
 static RING: Ring<Segment, SEGMENTS> = Ring::new();
 /// Steps are coming, or will. Exec sets it, the feeder clears it.

@@ -1,51 +1,134 @@
-//! From ticks of the step generator to words of the state machine: plain Rust, without any register.
+//! Ticks as entries for the state machine: each is a rest, a pulse and the pins for it, two words of 32 bits.
 //!
-//! A word is the levels of all step and direction pins, and how long they stand. The feeder runs [`Dda::tick`](crate::dda::Dda::tick) ahead of time;
-//! what the ticks do to pins, [`Writer`] writes down. Two words are a pulse; a tick without a pulse lengthens the word before.
+//! ```text
+//! bit 0     0                         bit 0     1
+//! bits 1..  cycles that pins rest     bit 1     tell that it has been reached
+//! word 2    all pins in the pulse     word 2    all pins between pulses from now on: directions
+//! ```
 //!
-//! Time is in cycles of the system clock. No word is shorter than [`LEAST`]: what asks for less is as long, and what follows comes as
-//! much later.
+//! Ticks without a step have no entry: they make the rest before the next one longer. Directions change behind the last pulse of the old ones, and a tick before
+//! the first of the new ones.
+//!
+//! Time is counted in cycles of the system clock. An entry lasts [`Writer::least`] at least: what asks for less is as long, and what follows makes up for it.
 
-use crate::boards::MOTORS;
-use crate::dda::{Pins, SEGMENTS};
+use crate::boards::{MOTORS, MotorPins};
+use crate::dda::{Dda, Pins, SEGMENTS, STEP};
 
-/// Bits of a word: steps, then directions.
-pub const PINS: u32 = 2 * MOTORS as u32;
-/// Set in the word whose end is to be told.
-pub const MARK: u32 = 1 << PINS;
-/// Where the delay begins.
-const DELAY: u32 = PINS + 1;
-/// Cycles of a word whose delay is 0; a marked one takes one more.
-pub const LEAST: i32 = 6;
-/// Cycles of the longest word.
-const LONGEST: i32 = (1 << (32 - DELAY)) - 1 + LEAST;
+/// What the state machine takes at a time.
+pub type Entry = [u32; 2];
 
-/// Words that one tick writes at most.
-pub const OF_A_TICK: usize = 8;
-/// Words that the end of motion takes.
-pub const OF_THE_END: usize = 4;
+/// Set in entries that change what pins are between pulses.
+pub const CHANGES: u32 = 1;
+/// Set in those of them that are told.
+pub const MARK: u32 = 2;
+/// Where the rest begins.
+const REST: u32 = 1;
 
-/// After so many cycles of a pulse that is longer directions change: 2 us.
-const TURNED: i32 = 2 * CYCLES_PER_US as i32;
+/// Cycles of a pulse, of an entry beside its rest and its pulse, and of an entry that changes pins: what the program takes at least.
+const PULSE_LEAST: i32 = 3;
+const AROUND: i32 = 7;
+const CHANGE: i32 = 8;
+
+/// Entries that a segment makes beside those of its ticks.
+pub const OF_A_SEGMENT: usize = 1;
+/// Entries that the end of a chunk, or of motion, takes.
+pub const OF_THE_END: usize = 2;
 
 /// Cycles of a microsecond, and of a count of [`TIMER_HZ`](crate::hal::TIMER_HZ).
 pub const CYCLES_PER_US: u32 = 128;
 /// See [`CYCLES_PER_US`].
 pub const CYCLES_PER_COUNT: u32 = 2;
 
-/// Where words are put.
-pub trait Put {
-    /// Takes one more word. There is room for it.
-    fn put(&mut self, word: u32);
-    /// Changes the word that was put last.
-    fn change_last(&mut self, change: impl FnOnce(&mut u32));
+/// The shortest pulse, cycles: what the setting calls 0 us.
+const SHORTEST: i32 = CYCLES_PER_US as i32 / 2;
+
+/// Pairs of motors: two phases are added at once.
+const PAIRS: usize = MOTORS.div_ceil(2);
+/// What is carried out of both phases of a pair.
+const CARRIES: u32 = (STEP as u32) << 16 | STEP as u32;
+
+/// Which pins motors have.
+pub struct Wiring {
+    /// Pins of each set of motors that step.
+    steps: [u32; 1 << MOTORS],
+    /// The direction pin of each motor.
+    dirs: [u32; MOTORS],
+}
+
+impl Wiring {
+    /// Of these motors: bits are numbers of pins.
+    pub const fn new(motors: &[MotorPins]) -> Self {
+        let mut wiring = Self { steps: [0; 1 << MOTORS], dirs: [0; MOTORS] };
+        let mut m = 0;
+        while m < MOTORS {
+            wiring.dirs[m] = 1 << motors[m].dir.bit;
+            let mut set = 0;
+            while set < 1 << MOTORS {
+                if set >> m & 1 != 0 {
+                    wiring.steps[set] |= 1 << motors[m].step.bit;
+                }
+                set += 1;
+            }
+            m += 1;
+        }
+        wiring
+    }
+
+    /// The direction pins that are high.
+    fn turned(&self, backwards: u8) -> u32 {
+        let dirs = self.dirs.iter().enumerate();
+        dirs.fold(0, |pins, (m, dir)| if backwards >> m & 1 != 0 { pins | dir } else { pins })
+    }
+}
+
+/// Where entries are put.
+pub struct List<'a> {
+    room: &'a mut [Entry],
+    used: usize,
+}
+
+impl<'a> List<'a> {
+    /// An empty one.
+    pub fn new(room: &'a mut [Entry]) -> Self {
+        Self { room, used: 0 }
+    }
+
+    /// Entries in it.
+    pub fn len(&self) -> usize {
+        self.used
+    }
+
+    /// How many more there is room for.
+    pub fn left(&self) -> usize {
+        self.room.len() - self.used
+    }
+
+    /// The places of so many entries, which are used from now on.
+    fn take(&mut self, entries: usize) -> &mut [Entry] {
+        let from = self.used;
+        self.used = self.room.len().min(from + entries);
+        self.room.get_mut(from..self.used).unwrap_or_default()
+    }
+
+    /// So many of them were not needed.
+    fn give_back(&mut self, entries: usize) {
+        self.used = self.used.saturating_sub(entries);
+    }
+
+    fn put(&mut self, entry: Entry) {
+        if let Some(place) = self.room.get_mut(self.used) {
+            *place = entry;
+            self.used += 1;
+        }
+    }
 }
 
 /// What stands at the pins, and since when.
 pub struct Writer {
-    /// The pins of the word that is not put yet.
-    open: u32,
-    /// For how long they have stood by the tick that is written; below 0 while a pulse lasts.
+    wiring: &'static Wiring,
+    /// The pins between pulses.
+    low: u32,
+    /// How long ago the last pulse rose at the tick that is written, less what entries have taken since; below 0 if that was more.
     age: i32,
     /// From a tick to the next.
     period: i32,
@@ -55,146 +138,195 @@ pub struct Writer {
 
 impl Writer {
     /// All pins low.
-    pub const fn new() -> Self {
-        Self { open: 0, age: 0, period: 0, pulse: 2 * CYCLES_PER_US as i32 }
+    pub const fn new(wiring: &'static Wiring) -> Self {
+        Self { wiring, low: 0, age: 0, period: 0, pulse: 2 * CYCLES_PER_US as i32 }
     }
 
-    /// From now on pulses last so many microseconds.
+    /// From now on pulses last so many microseconds, with 0 half of one.
     pub fn set_pulse(&mut self, us: u8) {
-        self.pulse = i32::from(us.max(1)) * CYCLES_PER_US as i32;
+        self.pulse = (i32::from(us) * CYCLES_PER_US as i32).max(SHORTEST);
     }
 
-    /// The first tick comes after so many cycles.
-    pub fn begin(&mut self, cycles: u32) {
+    /// What the program counts in a pulse.
+    pub fn pulse_count(&self) -> u32 {
+        (self.pulse - PULSE_LEAST) as u32
+    }
+
+    /// Motion begins: the first tick comes after so many cycles.
+    pub fn begin(&mut self, cycles: u32, to: &mut List) {
         self.age = cycles as i32;
+        to.put([CHANGES, self.low]);
     }
 
-    /// The tick that has been written is over. How long it was.
-    pub fn pass(&mut self) -> i32 {
-        self.age = self.age.saturating_add(self.period);
-        self.period
-    }
-
-    /// Puts the word that is in the making. What follows begins behind it.
-    pub fn close(&mut self, to: &mut impl Put) {
-        while self.age > LONGEST {
-            to.put(word(self.open, LONGEST));
-            self.age -= LONGEST;
-        }
-        if self.age > 0 {
-            to.put(word(self.open, self.age));
-            self.age = 0;
-        }
-    }
-
-    /// The last word: its end is told.
-    pub fn end(&mut self, to: &mut impl Put) {
-        // The low time behind the last pulse.
-        to.put(word(self.open, self.pulse) | MARK);
+    /// Forgets time that has passed.
+    pub fn rest(&mut self) {
         self.age = 0;
     }
 
-    /// What the pins were after the last word that was put, as if all had been carried out.
-    pub fn pins(&self) -> u32 {
-        self.open
+    /// Cycles of the shortest entry with a pulse.
+    fn least(&self) -> i32 {
+        self.pulse + AROUND
     }
-}
 
-/// A word of so many cycles.
-fn word(pins: u32, cycles: i32) -> u32 {
-    pins | ((cycles.clamp(LEAST, LONGEST) - LEAST) as u32) << DELAY
-}
+    /// From a tick to the next, cycles.
+    pub fn period(&self) -> i32 {
+        self.period
+    }
 
-/// The pins of a word.
-pub const fn pins_of(word: u32) -> u32 {
-    word & (MARK - 1)
-}
+    /// The pins between pulses, when all entries have been carried out.
+    pub fn low(&self) -> u32 {
+        self.low
+    }
 
-/// The ticks' way to the words.
-pub struct Out<'a, P: Put> {
-    /// What stands at the pins.
-    pub writer: &'a mut Writer,
-    /// Where words go.
-    pub to: &'a mut P,
-    /// A slot of the ring of segments has become free.
-    pub freed: bool,
-    /// There was no segment.
-    pub stopped: bool,
-}
+    /// Runs so many ticks, of those that the generator's segment has left. There is room for as many entries.
+    /// Cost: 25 cycles a tick, 15 more with a step; in lockstep 15.
+    pub fn run(&mut self, dda: &mut Dda, ticks: u16, to: &mut List) {
+        if dda.increment.iter().all(|increment| *increment & !STEP == 0) {
+            self.run_even(dda, ticks, to);
+        } else {
+            self.run_mixed(dda, ticks, to);
+        }
+        dda.ticks -= ticks;
+    }
 
-impl<P: Put> Pins for Out<'_, P> {
-    fn rise(&mut self, motors: u8) {
-        if motors != 0 {
-            self.writer.close(self.to);
-            let pulse = self.writer.pulse;
-            self.to.put(word(self.writer.open | u32::from(motors), pulse));
-            self.writer.age = -pulse;
+    /// Motors step on every tick, or never: phases stay.
+    fn run_even(&mut self, dda: &Dda, ticks: u16, to: &mut List) {
+        let full = dda.increment.iter().enumerate();
+        let full = full.fold(0, |set, (m, increment)| set | usize::from(*increment != 0) << m);
+        if full == 0 {
+            self.age = self.age.saturating_add(i32::from(ticks).saturating_mul(self.period));
+            return;
+        }
+        let pins = self.wiring.steps[full] | self.low;
+        let (period, least) = (self.period, self.least());
+        let mut rest = self.age - least;
+        for place in to.take(ticks.into()) {
+            rest += period;
+            *place = [head(rest), pins];
+            rest = rest.min(0) - least;
+        }
+        self.age = rest + least;
+    }
+
+    // A function of its own has registers for what the loop needs.
+    #[inline(never)]
+    fn run_mixed(&mut self, dda: &mut Dda, ticks: u16, to: &mut List) {
+        let (mut phases, steps) = (pairs(&dda.phase), pairs(&dda.increment));
+        let (period, least, sets) = (self.period, self.least(), &self.wiring.steps);
+        let (mut rest, mut left, mut used) = (self.age - least, u32::from(ticks), 0);
+        let places = to.take(ticks.into());
+        for place in &mut *places {
+            let mut due = 0;
+            while due == 0 && left > 0 {
+                left -= 1;
+                rest += period;
+                due = advance(&mut phases, &steps);
+            }
+            if due == 0 {
+                break;
+            }
+            let set = (due | due >> (16 - PAIRS)) as usize & ((1 << MOTORS) - 1);
+            *place = [head(rest), sets[set] | self.low];
+            rest = rest.min(0) - least;
+            used += 1;
+        }
+        let over = places.len() - used;
+        to.give_back(over);
+        self.age = rest + least;
+        for (m, phase) in dda.phase.iter_mut().enumerate() {
+            *phase = (phases[m % PAIRS] >> (m / PAIRS * 16)) as u16;
         }
     }
+
+    /// Puts an entry without a pulse for the time that has passed. What follows begins behind it.
+    pub fn close(&mut self, to: &mut List) {
+        if self.age > 0 {
+            let rest = self.age - self.least();
+            to.put([head(rest), self.low]);
+            self.age = rest.min(0);
+        }
+    }
+
+    /// The end of motion, which is told.
+    pub fn end(&mut self, to: &mut List) {
+        self.close(to);
+        to.put([CHANGES | MARK, self.low]);
+        self.age = 0;
+    }
+}
+
+/// The first word of an entry whose pulse rises after a rest: the shortest if time is over.
+#[inline(always)]
+fn head(rest: i32) -> u32 {
+    (rest.max(0) as u32) << REST
+}
+
+/// A tick: motors that step, as bits; the second one of pair i is bit 16 + i.
+#[inline(always)]
+fn advance(phases: &mut [u32; PAIRS], steps: &[u32; PAIRS]) -> u32 {
+    let mut due = 0;
+    for (i, (phase, step)) in phases.iter_mut().zip(steps).enumerate() {
+        let sum = *phase + *step;
+        let carries = sum & CARRIES;
+        *phase = sum ^ carries;
+        due |= carries >> (15 - i);
+    }
+    due
+}
+
+/// The values of motors by pairs: motor i, and in the upper half motor i + [`PAIRS`].
+fn pairs(values: &[u16; MOTORS]) -> [u32; PAIRS] {
+    let mut pairs = [0; PAIRS];
+    for (m, value) in values.iter().enumerate() {
+        pairs[m % PAIRS] |= u32::from(*value) << (m / PAIRS * 16);
+    }
+    pairs
+}
+
+/// A segment's way to the entries.
+pub struct Out<'a, 'b> {
+    /// What stands at the pins.
+    pub writer: &'a mut Writer,
+    /// Where entries go.
+    pub to: &'a mut List<'b>,
+}
+
+impl Pins for Out<'_, '_> {
+    fn rise(&mut self, _motors: u8) {}
 
     fn fall(&mut self, _motors: u8) {}
 
     fn direction(&mut self, backwards: u8) {
-        let turned = u32::from(backwards) << MOTORS;
-        let Writer { open, age, pulse, .. } = self.writer;
-        let high = *open & !turned_bits();
-        if *age < 0 {
-            // While the last pulse of the old direction lasts.
-            if *pulse > TURNED {
-                let rest = *pulse - TURNED;
-                let mut steps = 0;
-                self.to.change_last(|last| {
-                    steps = pins_of(*last) & !turned_bits();
-                    *last = word(pins_of(*last), TURNED);
-                });
-                self.to.put(word(steps | turned, rest));
-            }
-            *open = high | turned;
-        } else {
-            self.writer.close(self.to);
-            self.writer.open = high | turned;
-        }
+        self.writer.low = self.writer.wiring.turned(backwards);
+        self.writer.age -= CHANGE;
+        self.to.put([CHANGES, self.writer.low]);
     }
 
     fn period(&mut self, counts: u16) {
         self.writer.period = i32::from(counts) * CYCLES_PER_COUNT as i32;
     }
 
-    fn slot_free(&mut self) {
-        self.freed = true;
-    }
+    fn slot_free(&mut self) {}
 
-    fn stop(&mut self) {
-        self.stopped = true;
-    }
+    fn stop(&mut self) {}
 }
 
-/// The bits of directions.
-const fn turned_bits() -> u32 {
-    ((1 << MOTORS) - 1) << MOTORS
-}
-
-/// Counts the steps of words that follow one another, from the pins before them.
+/// Counts the steps of entries.
+#[derive(Default)]
 pub struct Count {
-    before: u32,
     /// Steps of each motor, backwards ones negative.
     pub steps: [i32; MOTORS],
 }
 
 impl Count {
-    /// Behind a word with these pins.
-    pub const fn behind(pins: u32) -> Self {
-        Self { before: pins, steps: [0; MOTORS] }
-    }
-
-    /// One more word is carried out.
-    pub fn add(&mut self, word: u32) {
-        let pins = pins_of(word);
-        let rises = pins & !self.before;
-        self.before = pins;
+    /// One more entry is carried out.
+    pub fn add(&mut self, wiring: &Wiring, [head, pins]: Entry) {
+        if head & CHANGES != 0 {
+            return;
+        }
         for (m, steps) in self.steps.iter_mut().enumerate() {
-            if rises >> m & 1 != 0 {
-                *steps += if pins >> (MOTORS + m) & 1 != 0 { -1 } else { 1 };
+            if pins & wiring.steps[1 << m] != 0 {
+                *steps += if pins & wiring.dirs[m] != 0 { -1 } else { 1 };
             }
         }
     }
@@ -206,38 +338,39 @@ const _: () = assert!(SEGMENTS > 1);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dda::{Dda, STEP, Segment};
+    use crate::boards::gp;
+    use crate::dda::Segment;
     use avr_embassy::ring::Ring;
     use proptest::prelude::*;
     use std::boxed::Box;
     use std::vec::Vec;
 
-    #[derive(Default)]
-    struct Kept(Vec<u32>);
+    /// Pins in no order.
+    static WIRING: Wiring = Wiring::new(&[
+        MotorPins { step: gp(11), dir: gp(10), enable: None },
+        MotorPins { step: gp(6), dir: gp(5), enable: None },
+        MotorPins { step: gp(19), dir: gp(28), enable: None },
+        MotorPins { step: gp(14), dir: gp(13), enable: None },
+    ]);
 
-    impl Put for Kept {
-        fn put(&mut self, word: u32) {
-            self.0.push(word);
-        }
-        fn change_last(&mut self, change: impl FnOnce(&mut u32)) {
-            change(self.0.last_mut().unwrap());
-        }
-    }
+    /// Steps: when, of which motors, and which go backwards.
+    type Rises = Vec<(i64, u8, u8)>;
 
-    /// Pins by ticks: when each motor's pin rises, with its direction then; and when directions change.
+    /// What ticks do by themselves.
     #[derive(Default)]
     struct Plan {
-        now: u64,
-        period: u64,
+        now: i64,
+        period: i64,
         backwards: u8,
-        rises: Vec<(u64, u8, u8)>,
+        rises: Rises,
         stopped: bool,
     }
 
     impl Pins for Plan {
         fn rise(&mut self, motors: u8) {
             if motors != 0 {
-                self.rises.push((self.now, motors, self.backwards));
+                let backwards = self.backwards & motors;
+                self.rises.push((self.now, motors, backwards));
             }
         }
         fn fall(&mut self, _motors: u8) {}
@@ -245,7 +378,7 @@ mod tests {
             self.backwards = backwards;
         }
         fn period(&mut self, counts: u16) {
-            self.period = u64::from(counts) * u64::from(CYCLES_PER_COUNT);
+            self.period = i64::from(counts) * i64::from(CYCLES_PER_COUNT);
         }
         fn slot_free(&mut self) {}
         fn stop(&mut self) {
@@ -262,72 +395,94 @@ mod tests {
 
     const FIRST: u32 = 800;
 
-    /// The words of segments, `chunk` ticks at a time.
-    fn written(segments: &[Segment], chunk: usize, pulse_us: u8) -> (Vec<u32>, usize) {
+    /// The entries of segments, `chunk` ticks at a time, and what the pulse counts.
+    fn written(segments: &[Segment], chunk: u16, pulse_us: u8) -> (Vec<Entry>, i64) {
         let ring: &'static Ring<Segment, 8> = Box::leak(Box::default());
         let (mut producer, mut consumer) = ring.split().unwrap();
         segments.iter().for_each(|segment| producer.push(*segment).unwrap());
-        let (mut dda, mut writer, mut kept) = (Dda::new(), Writer::new(), Kept::default());
+        let (mut dda, mut writer) = (Dda::new(), Writer::new(&WIRING));
+        let mut room = std::vec![[0; 2]; 4_000];
+        let mut list = List::new(&mut room);
         writer.set_pulse(pulse_us);
-        writer.begin(FIRST);
-        let mut most = 0;
-        for n in 1.. {
-            let before = kept.0.len();
-            let mut out = Out { writer: &mut writer, to: &mut kept, freed: false, stopped: false };
-            dda.tick(&mut out, &mut consumer);
-            let stopped = out.stopped;
-            most = most.max(kept.0.len() - before);
-            if stopped {
-                writer.end(&mut kept);
-                return (kept.0, most);
+        writer.begin(FIRST, &mut list);
+        loop {
+            if dda.ticks == 0
+                && !dda.load(&mut Out { writer: &mut writer, to: &mut list }, &mut consumer)
+            {
+                break;
             }
-            writer.pass();
-            if n % chunk == 0 {
-                writer.close(&mut kept);
+            let ticks = dda.ticks.min(chunk);
+            let before = list.len();
+            writer.run(&mut dda, ticks, &mut list);
+            assert!(list.len() - before <= ticks.into());
+            if list.len() == before {
+                writer.close(&mut list);
             }
         }
-        unreachable!()
+        writer.end(&mut list);
+        let used = list.len();
+        room.truncate(used);
+        (room, writer.pulse_count().into())
     }
 
-    /// When steps rise, by the words.
-    fn rises(words: &[u32]) -> Vec<(u64, u8, u8)> {
-        let (mut now, mut before, mut all) = (0, 0, Vec::new());
-        for word in words {
-            let pins = pins_of(*word);
-            let up = (pins & !before) as u8 & 15;
-            if up != 0 {
-                all.push((now, up, (pins >> MOTORS) as u8));
+    /// When steps rise: what the program does.
+    fn rises(entries: &[Entry], pulse: i64) -> Rises {
+        let (mut now, mut low, mut all) = (0, 0, Vec::new());
+        for [head, pins] in entries {
+            if head & CHANGES != 0 {
+                low = *pins;
+                now += 8;
+                continue;
             }
-            before = pins;
-            now += u64::from(*word >> DELAY) + LEAST as u64;
+            now += 7 + i64::from(head >> REST);
+            let high = |m: &usize| pins & WIRING.steps[1 << m] != 0;
+            let motors = (0..MOTORS).filter(high).fold(0, |set, m| set | 1 << m);
+            let turned = |m: &usize| pins & WIRING.dirs[*m] != 0;
+            let backwards = (0..MOTORS).filter(turned).fold(0, |set, m| set | 1 << m);
+            // Directions have stood before.
+            assert_eq!(pins & !WIRING.steps[15], low);
+            if motors != 0 {
+                all.push((now, motors, backwards & motors));
+            }
+            now += pulse + 3;
         }
         all
+    }
+
+    /// Times from the first one on.
+    fn from_the_first(rises: &Rises) -> Rises {
+        let first = rises.first().map_or(0, |rise| rise.0);
+        rises.iter().map(|(at, motors, backwards)| (at - first, *motors, *backwards)).collect()
     }
 
     proptest! {
         /// Whatever runs, and wherever chunks end: each pulse is at its cycle, in its direction.
         #[test]
-        fn words_do_what_ticks_do(
+        fn entries_do_what_ticks_do(
             segments in prop::collection::vec(
-                ([0u16..=STEP, 0u16..=STEP, 0u16..=STEP, 0u16..=STEP], 1u16..60, 300u16..5_000, 0u8..16), 1..7),
-            chunk in 1usize..40,
-            pulse_us in 1u8..4,
+                (
+                    prop::array::uniform4(prop_oneof![Just(0), Just(STEP), 0u16..=STEP]),
+                    1u16..60, 90u16..5_000, 0u8..16,
+                ),
+                1..7,
+            ),
+            chunk in 1u16..40,
         ) {
             let segments: Vec<_> =
                 segments.into_iter().map(|(i, t, p, b)| segment(i, t, p, b)).collect();
             let ring: &'static Ring<Segment, 8> = Box::leak(Box::default());
             let (mut producer, mut consumer) = ring.split().unwrap();
             segments.iter().for_each(|segment| producer.push(*segment).unwrap());
-            let (mut dda, mut plan) = (Dda::new(), Plan { now: FIRST.into(), ..Plan::default() });
+            let (mut dda, mut plan) = (Dda::new(), Plan::default());
             while !plan.stopped {
                 dda.tick(&mut plan, &mut consumer);
                 plan.now += plan.period;
             }
-            let (words, most) = written(&segments, chunk, pulse_us);
-            prop_assert!(most <= OF_A_TICK);
-            prop_assert_eq!(rises(&words), plan.rises.clone());
-            let mut count = Count::behind(0);
-            words.iter().for_each(|word| count.add(*word));
+            let (entries, pulse) = written(&segments, chunk, 0);
+            let found = rises(&entries, pulse);
+            prop_assert_eq!(from_the_first(&found), from_the_first(&plan.rises));
+            let mut count = Count::default();
+            entries.iter().for_each(|entry| count.add(&WIRING, *entry));
             let mut expected = [0; MOTORS];
             for (_, motors, backwards) in plan.rises {
                 for (m, steps) in expected.iter_mut().enumerate() {
@@ -339,25 +494,25 @@ mod tests {
         }
     }
 
+    /// A step each microsecond, with pulses of half of one.
     #[test]
-    fn long_pulses_turn_after_two_microseconds() {
-        let there = segment([STEP, 0, 0, 0], 2, 4_000, 0);
-        let back = segment([STEP, 0, 0, 0], 2, 4_000, 1);
-        let (words, _) = written(&[there, back], 1_000, 10);
-        let high: Vec<_> = words.iter().filter(|word| pins_of(**word) & 1 != 0).collect();
-        // Three pulses of one word, and the second of two words.
-        assert_eq!(high.len(), 5);
-        assert_eq!(high[1] >> DELAY, TURNED as u32 - LEAST as u32);
-        assert_eq!((pins_of(*high[1]), pins_of(*high[2])), (1, 1 | 1 << MOTORS));
-        let all: u32 = high[1..3].iter().map(|word| (**word >> DELAY) + LEAST as u32).sum();
-        assert_eq!(all, 10 * CYCLES_PER_US);
+    fn a_million_steps_a_second() {
+        let (entries, pulse) = written(&[segment([STEP; 4], 1_000, 64, 0)], 500, 0);
+        let rises = rises(&entries, pulse);
+        assert_eq!(rises.len(), 1_000);
+        assert!(rises.windows(2).all(|pair| pair[1].0 - pair[0].0 == 128));
+        assert_eq!(pulse + 3, 64);
     }
 
+    /// What is too close for its pulses comes late, and what follows in time.
     #[test]
-    fn longer_than_a_word_is_several() {
-        let (mut writer, mut kept) = (Writer::new(), Kept::default());
-        writer.begin(2 * LONGEST as u32 + 100);
-        writer.close(&mut kept);
-        assert_eq!(kept.0.len(), 3);
+    fn late_pulses_are_made_up_for() {
+        let close = segment([STEP, 0, 0, 0], 4, 64, 0);
+        let wide = segment([STEP, 0, 0, 0], 4, 1_000, 0);
+        let (entries, pulse) = written(&[wide, close, wide], 100, 2);
+        let rises = from_the_first(&rises(&entries, pulse));
+        assert_eq!(rises.len(), 12);
+        assert_eq!(rises[7].0 - rises[3].0, 4 * (256 + 7), "as fast as pulses can");
+        assert_eq!(rises[11].0 - rises[3].0, 4 * 128 + 4 * 2_000);
     }
 }

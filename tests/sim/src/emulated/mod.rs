@@ -28,6 +28,8 @@ struct Request {
     drive: Vec<(u8, bool)>,
     #[serde(skip_serializing_if = "Option::is_none")]
     wire: Option<Vec<Near>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    record: Option<bool>,
     until: u64,
     line: bool,
 }
@@ -72,6 +74,19 @@ struct Answer {
     asleep: f64,
     #[serde(default)]
     resets: u64,
+    #[serde(default)]
+    recorded: Option<Recorded>,
+}
+
+/// Edges of steps.
+#[derive(Deserialize, Clone, Default, Debug)]
+pub struct Recorded {
+    /// The cycles at which each motor's steps rise.
+    #[serde(default)]
+    pub times: Vec<Vec<u64>>,
+    /// The shortest pulse, cycles.
+    #[serde(default)]
+    pub shortest: Option<f64>,
 }
 
 /// The board.
@@ -106,7 +121,8 @@ impl Emulated {
             "no {}: `cargo xtask sim --board pico-cnc` puts it there",
             program.display()
         );
-        let pins = board.motors.map(|motor| (motor.step.bit, motor.dir.bit));
+        let pins = board.motors.iter().map(|motor| (motor.step.bit, motor.dir.bit));
+        let pins: Vec<_> = pins.collect();
         let mut child = Command::new("node")
             .arg(program)
             .arg(elf)
@@ -183,9 +199,23 @@ impl Emulated {
         self.request.wire = Some(switches.to_vec());
     }
 
+    /// The edges of steps in the next milliseconds.
+    pub fn record_for_ms(&mut self, ms: u64) -> Result<Recorded> {
+        self.request.record = Some(true);
+        self.run_for_ms(ms)?;
+        self.request.record = Some(false);
+        self.run_for_ms(0)?;
+        Ok(self.answer.recorded.take().unwrap_or_default())
+    }
+
     /// Steps up minus steps down of each motor; a low direction pin is up.
     pub fn steps(&self) -> [i64; MOTORS] {
         std::array::from_fn(|m| self.answer.steps.get(m).copied().unwrap_or(0))
+    }
+
+    /// As [`Emulated::steps`], of a board with any number of motors.
+    pub fn positions(&self) -> &[i64] {
+        &self.answer.steps
     }
 
     /// All steps of each motor.

@@ -1,0 +1,42 @@
+//! Raspberry Pi Pico on a breakout board with six drivers, as for two motors of Y and two of Z beside X and A: the pins of `pico-cnc` move up, and there is no second
+//! port.
+
+use super::{Board, Encoder, MotorPins, PICO_CNC, Pwm, Timer, gp};
+
+/// Raspberry Pi Pico with six drivers.
+pub const PICO_CNC6: Board = Board {
+    name: "pico-cnc6",
+    features: &["dialect-tinyg", "dialect-grbl", "cycles", "probing", "jobs", "help", "lathe"],
+    motors: &[
+        MotorPins { step: gp(2), dir: gp(8), enable: None },
+        MotorPins { step: gp(3), dir: gp(9), enable: None },
+        MotorPins { step: gp(4), dir: gp(10), enable: None },
+        MotorPins { step: gp(5), dir: gp(11), enable: None },
+        MotorPins { step: gp(6), dir: gp(12), enable: None },
+        MotorPins { step: gp(7), dir: gp(13), enable: None },
+    ],
+    enable_all: Some(gp(14)),
+    // Spindle enable and pulses, flood
+    hazards: &[gp(15), gp(16), gp(17)],
+    outputs: [Some(gp(15)), None, None, Some(gp(17))],
+    pwm: Some(Pwm { timer: Timer::Slices, channel: 16 }),
+    // GP0 and GP1
+    serial: PICO_CNC.serial.split_at(1).0,
+    inputs: [
+        // One for both ends of an axis
+        Some(gp(18)),
+        Some(gp(18)),
+        Some(gp(19)),
+        Some(gp(19)),
+        Some(gp(20)),
+        Some(gp(20)),
+        None,
+        None,
+        // Probe, door, emergency stop
+        Some(gp(21)),
+        Some(gp(22)),
+        Some(gp(26)),
+    ],
+    encoder: Some(Encoder { index: gp(27), sync: gp(28) }),
+    ..PICO_CNC
+};

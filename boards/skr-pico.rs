@@ -1,0 +1,43 @@
+//! BTT SKR Pico v1.0: four TMC2209 on board, which are told their current and microsteps by one UART.
+
+use super::{Board, MotorPins, Pwm, Serial, Timer, Tmc2209, Usart, gp};
+
+/// BTT SKR Pico v1.0; its driver E is motor 4.
+pub const SKR_PICO: Board = Board {
+    name: "skr-pico",
+    features: &["dialect-tinyg", "dialect-grbl", "cycles", "probing", "jobs", "help", "lathe"],
+    dialect: 0,
+    clock_hz: 128_000_000,
+    motors: &[
+        MotorPins { step: gp(11), dir: gp(10), enable: Some(gp(12)) },
+        MotorPins { step: gp(6), dir: gp(5), enable: Some(gp(7)) },
+        MotorPins { step: gp(19), dir: gp(28), enable: Some(gp(2)) },
+        MotorPins { step: gp(14), dir: gp(13), enable: Some(gp(15)) },
+    ],
+    enable_all: None,
+    // Fans 1 to 3, servo; heaters of the bed and of the hot end, which stay off
+    hazards: &[gp(17), gp(18), gp(20), gp(29), gp(21), gp(23)],
+    outputs: [Some(gp(17)), None, Some(gp(18)), Some(gp(20))],
+    pwm: Some(Pwm { timer: Timer::Slices, channel: 29 }),
+    // GP0 and GP1
+    serial: &[Serial { usart: Usart::Uart0, rate: 115_200, handshake: None, driver_enable: None }],
+    inputs: [
+        // X-STOP, Y-STOP, Z-STOP: one for both ends of an axis
+        Some(gp(4)),
+        Some(gp(4)),
+        Some(gp(3)),
+        Some(gp(3)),
+        Some(gp(25)),
+        Some(gp(25)),
+        None,
+        None,
+        // PROBE; E0-STOP is the emergency stop
+        Some(gp(22)),
+        None,
+        Some(gp(16)),
+    ],
+    encoder: None,
+    drivers: Some(Tmc2209 { tx: gp(8), rx: gp(9), addresses: &[0, 2, 1, 3], run: 18, hold: 9 }),
+    step_timer: Timer::Pio,
+    tick_timer: Timer::SysTick,
+};
