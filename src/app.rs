@@ -25,6 +25,7 @@ use crate::protocol::{Memory, Occasion, Remembers, Speech};
 use crate::store::Log;
 use crate::store::kept;
 use crate::tasks::common::Common;
+use crate::tasks::heat::Heaters;
 use crate::tasks::links::{Changes, Links, QueueCount};
 use crate::tasks::planner::Planner;
 use crate::tasks::ports::{AUX_RESERVE, Choice, Port};
@@ -61,6 +62,7 @@ impl Links {
             rate: Cell::new(None),
             restart: Cell::new(None),
             cleared_by: Cell::new(USB),
+            heat: Heaters::new(),
             probe: Probe::default(),
             signs: Signs::default(),
             job: Cell::default(),

@@ -17,6 +17,7 @@ pub mod command;
 mod cycle;
 pub mod decimal;
 mod digits;
+pub mod heating;
 pub mod interpreter;
 mod lexer;
 pub mod limits;

@@ -181,6 +181,9 @@ impl State {
                 out.spindle = Some(self.spindle());
             }
         }
+        if block.heats() {
+            return Ok(());
+        }
         if let Some(value) = block.get(S) {
             if value.negative {
                 return Err(Status::SWordInvalid);

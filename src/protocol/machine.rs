@@ -5,6 +5,7 @@ use super::value::Value;
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::Change;
 use crate::gcode::tables::Row;
+use crate::heat::Standing;
 use crate::machine::{Alarm, Cycle, Doing};
 use crate::motion::snapshot::Program;
 use crate::status::Status;
@@ -117,6 +118,15 @@ pub trait Machine {
     fn change_override(&mut self, change: Change);
     /// Powers a motor, or takes its power; all of them for `None`.
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status;
+
+    /// How a heater stands: 0 the hot end, 1 the bed. `None` in an image without [`Capability::Printer`](crate::capability::Capability).
+    fn heater(&mut self, heater: u8) -> Option<Standing>;
+    /// Whether a line waits for a temperature (M109, M190, M116).
+    fn waits_for_heat(&mut self) -> bool;
+    /// Ends that wait (M108): the lines behind it are carried out.
+    fn skip_wait(&mut self);
+    /// Heaters that a fault has locked may be switched on again (M999). The alarm is [cleared](Self::clear) by itself.
+    fn unlock_heaters(&mut self);
 
     /// Whether lengths are in inches.
     fn inches(&mut self) -> bool {

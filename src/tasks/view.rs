@@ -11,6 +11,7 @@ use core::cell::{OnceCell, RefMut};
 use super::alarm;
 use super::common::{snapshot, with};
 use super::health;
+use super::heat;
 use super::hold;
 use super::homing;
 use super::links::{Changes, Links};
@@ -35,6 +36,7 @@ use crate::hal::Thread;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::event::Event;
 use crate::hal::{flags, gpio, inputs as pins, stepper, uart, watchdog};
+use crate::heat::Standing;
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::machine::jog::Bar;
 use crate::machine::{self, Alarm, Cycle, Doing};
@@ -560,6 +562,24 @@ impl Machine for View<'_> {
             return Status::NotAccepted;
         }
         self.begin(Motion::Check, if on { machine::Event::Check } else { machine::Event::Done })
+    }
+
+    fn heater(&mut self, heater: u8) -> Option<Standing> {
+        heat::standing(self.links, heater)
+    }
+
+    fn waits_for_heat(&mut self) -> bool {
+        self.links.heat.waits()
+    }
+
+    fn skip_wait(&mut self) {
+        self.links.heat.skip();
+    }
+
+    fn unlock_heaters(&mut self) {
+        if let Some(heating) = self.settings.heating.first_mut() {
+            heating.refused = Status::Ok;
+        }
     }
 
     fn hold_back(&mut self) {
