@@ -41,6 +41,7 @@ pub const PICO_CNC: Board = Board {
         Some(gp(26)),
     ],
     encoder: Some(Encoder { index: gp(27), sync: gp(28) }),
+    heaters: None,
     step_timer: Timer::Pio,
     tick_timer: Timer::SysTick,
 };

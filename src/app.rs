@@ -34,7 +34,7 @@ use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
 use crate::tasks::wake::{News, Wake};
 use crate::tasks::{
-    alarm, control, exec, parser, planner, power, reader, reporter, spindle, storage,
+    alarm, control, exec, heat, parser, planner, power, reader, reporter, spindle, storage,
 };
 
 /// Bytes for all lines of USB together.
@@ -102,6 +102,7 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
     set_hardware(thread, &links.settings.borrow());
     spindle::set_all(thread, links.storage);
+    heat::set_all(&links.heat, &mut links.settings.borrow_mut(), links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
     choose_dialects(links);
     if watchdog::cause().is_fault() {

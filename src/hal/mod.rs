@@ -11,7 +11,8 @@ pub use avr_embassy::{Ceiling, Interrupt, Thread, byte, ring};
 mod place;
 
 pub use contract::{
-    TICKS, TIMER_HZ, eeprom, encoder, gpio, inputs, pwm, stepper, system, time, uart, watchdog,
+    TICKS, TIMER_HZ, eeprom, encoder, gpio, heaters, inputs, pwm, stepper, system, time, uart,
+    watchdog,
 };
 pub use place::Never;
 pub use primitives::{arithmetic, float, text};

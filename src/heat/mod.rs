@@ -3,6 +3,11 @@
 //! A printer has a hot end, a bed and a fan that cools what has been printed. What they are to be is said by lines ([`Orders`], which exec
 //! changes in step with motion). Temperatures are integers, in eighths of a degree Celsius.
 
+pub mod control;
+pub mod fault;
+pub mod heater;
+pub mod sensor;
+
 use crate::capability::Capability;
 use crate::gcode::heating::{Heat, Part};
 

@@ -620,7 +620,7 @@ impl Planner {
         }
         #[cfg(feature = "printer")]
         if machine::is_killing() {
-            super::heat::switch_off(links.thread);
+            super::heat::forget_orders(links.thread);
         }
         links.job.set(Job::default());
         let (cycle, killed) = machine::dropped();

@@ -304,6 +304,9 @@ impl Machine for View<'_> {
                 return Err(Status::NotAccepted);
             }
             self.links.storage.set_cold(setting, value)?;
+            if Capability::Printer.is_built_in() {
+                heat::set(&self.links.heat, &mut self.settings, setting, value);
+            }
             if is_encoder {
                 turning::set_up(self.links.thread, self.links.storage);
                 return Ok(Warning::None);
@@ -474,6 +477,7 @@ impl Machine for View<'_> {
         self.links.changes.note(Changes::STEPS | Changes::SETTINGS);
         self.links.storage.forget_cold();
         spindle::set_all(self.links.thread, self.links.storage);
+        heat::set_all(&self.links.heat, &mut self.settings, self.links.storage);
         self.links.storage.note(0, ITEMS);
         set_hardware(self.links.thread, &self.settings);
         self.links.set_flow(&self.settings);
@@ -573,13 +577,11 @@ impl Machine for View<'_> {
     }
 
     fn skip_wait(&mut self) {
-        self.links.heat.skip();
+        self.links.heat.end_wait();
     }
 
     fn unlock_heaters(&mut self) {
-        if let Some(heating) = self.settings.heating.first_mut() {
-            heating.refused = Status::Ok;
-        }
+        heat::unlock(&mut self.settings);
     }
 
     fn hold_back(&mut self) {

@@ -1,7 +1,7 @@
 //! Heaters and the fan: switched where they stand in the program, by blocks that the machine goes on over; and waits for them.
 //!
 //! A wait begins when all moves before it have been made. It keeps the lines behind it back, and nothing else: a stop, a flush and questions
-//! have their effect at once, and [`Heaters::skip`](crate::tasks::heat::Heaters::skip) ends it.
+//! have their effect at once, and [`Heaters::end_wait`](crate::tasks::heat::Heaters::end_wait) ends it.
 
 use kerf_macros::small;
 

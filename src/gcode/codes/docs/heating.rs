@@ -1,6 +1,6 @@
 //! M codes of printers.
 
-use super::{Doc, Section, m, no};
+use super::{Section, m, no};
 use crate::status::Status::{
     AboveMaximum, ModalGroupViolation, OutOfRange, PWordInvalid, SWordInvalid, SWordMissing,
     TWordInvalid, WordConflict,
