@@ -13,11 +13,11 @@ pub struct Heating {
     pub hottest: [u16; 2],
     /// Why none may be switched on, or `Ok`.
     pub refused: Status,
-    /// Whether the hot end is too cold for filament to be moved.
-    pub cold: bool,
+    /// Whether the hot end is hot enough for filament to be moved.
+    pub extrudes: bool,
 }
 
 impl Heating {
     /// Nothing is hot, and nothing may be made so.
-    pub const NONE: Self = Self { hottest: [0; 2], refused: Status::Ok, cold: true };
+    pub const NONE: Self = Self { hottest: [0; 2], refused: Status::Ok, extrudes: false };
 }

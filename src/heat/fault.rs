@@ -68,7 +68,7 @@ pub struct Watch {
 #[small]
 impl Watch {
     /// At start-up.
-    pub const OFF: Self = Self { phase: Phase::Off, mark: i16::MAX, left: 0, wanted: 0 };
+    pub const OFF: Self = Self { phase: Phase::Off, mark: 0, left: 0, wanted: 0 };
 
     /// The phase it is in.
     pub fn phase(&self) -> Phase {
@@ -88,6 +88,10 @@ impl Watch {
         }
         match self.phase {
             Phase::Off | Phase::Cools => {
+                if self.left == 0 {
+                    // The first of all.
+                    (self.mark, self.left) = (now, 1);
+                }
                 self.mark = self.mark.min(now);
                 let most = self.mark.saturating_add(BY_ITSELF);
                 if now > most && (self.phase == Phase::Cools || now > WARM) {

@@ -61,10 +61,10 @@ struct Parts {
 impl Parts {
     const OFF: Self = Self {
         heaters: RefCell::new([Heater::OFF; HEATERS]),
-        awaited: Cell::new(Heat { part: Part::All, to: None, wait: Wait::Nothing }),
+        awaited: Cell::new(Heat { part: Part::HotEnd, to: None, wait: Wait::Nothing }),
         stays: Cell::new(0),
         next: Cell::new(0),
-        kick: Cell::new(KICK),
+        kick: Cell::new(0),
         owed: Cell::new(0),
     };
 
@@ -285,7 +285,7 @@ fn look_at(
 fn note_cold(links: &Links, parts: &Parts) {
     let [hot_end, _] = &*parts.heaters.borrow();
     if let Some(heating) = links.settings.borrow_mut().heating.first_mut() {
-        heating.cold = hot_end.is_cold();
+        heating.extrudes = !hot_end.is_cold();
     }
 }
 

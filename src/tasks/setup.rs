@@ -101,7 +101,7 @@ impl Setup for Settings {
 
     fn extrudes(&self) -> Result<(), Status> {
         match self.heating.first() {
-            Some(heating) if heating.cold => Err(Status::TooCold),
+            Some(heating) if !heating.extrudes => Err(Status::TooCold),
             _ => Ok(()),
         }
     }
