@@ -250,6 +250,10 @@ impl<'a> View<'a> {
         (pins::worked() >> input & 1).into()
     }
 
+    fn standing(&self, heater: u8) -> Standing {
+        heat::standing(self.links, heater).unwrap_or_default()
+    }
+
     /// S, thousandths of a turn a minute.
     fn programmed_speed(&self) -> i32 {
         self.modal(Value::SpindleSpeed).min(2_000_000) * 1_000
@@ -418,6 +422,9 @@ impl Machine for View<'_> {
             Value::Pass => turning::pass(self.links.thread) as i32,
             Value::PulseMisfits => turning::misfits(self.links.thread).into(),
             Value::Starvations => health::starvations().into(),
+            Value::Temperature(heater) => self.standing(heater).now.into(),
+            Value::WantedTemperature(heater) => self.standing(heater).to.into(),
+            Value::HeaterPower(heater) => i32::from(self.standing(heater).power) * 1_000 / 255,
             Value::Kept => self.links.storage.is_done().into(),
             Value::Home => self.home_state(),
             Value::Door if !self.links.signs.door.get() => 0,
