@@ -5,7 +5,7 @@ mod plant;
 
 use kerf::capability::Capability;
 use kerf::hal::imp::Machine;
-use kerf::heat::sensor::{Kind, SAMPLES, share};
+use kerf::heat::sensor::{Kind, SAMPLES, reading};
 use plant::{AIR, Plant};
 
 /// What is wrong with a sensor.
@@ -65,7 +65,7 @@ impl Printer {
     /// What the converter reads: half a count of noise in each conversion, of which the sum keeps a sixth.
     fn read(&mut self, degrees: f64) -> u16 {
         let (full, noise) = (f64::from(SAMPLES) * 1_023.0, self.noise() * 6.0);
-        (share(Kind::Semitec, degrees) * full + noise).clamp(0.0, full) as u16
+        (reading(Kind::Semitec, degrees) + noise).clamp(0.0, full) as u16
     }
 
     /// Runs for a time, and looks at each step.
