@@ -255,6 +255,22 @@ fn an_alarm_switches_off_and_a_wait_keeps_nobody_waiting() {
 }
 
 #[test]
+fn nothing_is_waited_for_where_nothing_is_to_be_hot() {
+    for line in ["m109", "m109 s0", "m190 r0", "m116"] {
+        let join = std::thread::spawn(move || {
+            let Some(mut printer) = Printer::new() else { return };
+            // Not even with a sensor that is broken, which is no fault of a heater that is off.
+            printer.wire = Wire::Open;
+            printer.send(line);
+            printer.send("g0 x1");
+            printer.run(1_000, |_| {});
+            assert_ne!(printer.machine.emitted().steps[0], 0, "{line}: {}", printer.said);
+        });
+        join.join().expect("no panic");
+    }
+}
+
+#[test]
 fn motion_goes_on_when_the_temperature_is_there() {
     let Some(mut printer) = Printer::new() else { return };
     for line in ["{sv:0}", "m140 s40", "m109 s200", "g0 x5"] {

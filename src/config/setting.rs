@@ -87,7 +87,7 @@ impl Owner {
             Owner::Coolant => named(token("co")),
             Owner::Squaring => named(token("sq")),
             Owner::HotEnd => named(token("he1")),
-            Owner::Bed => named(token("he2")),
+            Owner::Bed => named(token("he3")),
             Owner::User(group) => named([b'u', b'd', b'a' + group, 0]),
             Owner::Job => named(token("jid")),
         }
@@ -102,7 +102,7 @@ impl Owner {
             [b'c', b'o', ..] => Some(Owner::Coolant),
             [b's', b'q', ..] => Some(Owner::Squaring),
             [b'h', b'e', b'1', ..] if HOT_END != 0 => Some(Owner::HotEnd),
-            [b'h', b'e', b'2', ..] if BED != 0 => Some(Owner::Bed),
+            [b'h', b'e', b'3', ..] if BED != 0 => Some(Owner::Bed),
             [b'u', b'd', group @ b'a'..=b'd', ..] => Some(Owner::User(group - b'a')),
             [b'j', b'i', b'd', ..] => Some(Owner::Job),
             [letter, ..] => axis_of(letter).map(Owner::Axis),

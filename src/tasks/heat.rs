@@ -100,8 +100,21 @@ impl Parts {
         }
         let stays = if self.has_come(orders) { self.stays.get() + 1 } else { 0 };
         self.stays.set(stays);
-        let nothing = orders.to.iter().all(|to| *to == 0);
-        if stays >= STAYS || nothing {
+        if stays >= STAYS {
+            self.end_wait();
+        }
+    }
+
+    /// A wait for what is off is over, whatever its sensor says.
+    fn end_idle_wait(&self, orders: &Orders) {
+        let awaited = self.awaited.get();
+        let [hot_end, bed] = orders.to;
+        let off = match awaited.part {
+            Part::HotEnd => hot_end == 0,
+            Part::Bed => bed == 0,
+            Part::All | Part::Fan => hot_end | bed == 0,
+        };
+        if off && awaited.wait != Wait::Nothing {
             self.end_wait();
         }
     }
@@ -251,6 +264,7 @@ pub fn look(links: &Links) {
         on |= if heater.is_on() { bit } else { 0 };
     }
     heaters::switch(on);
+    parts.end_idle_wait(&orders);
     match seen {
         Ok(Seen::Look) => {}
         Ok(Seen::Step) => {

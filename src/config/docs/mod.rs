@@ -131,7 +131,7 @@ the spindle is off, S24000 is 10 V. A spindle of 12,000 RPM wants `{p1:{csh:1200
         ),
         (
             "Bed",
-            "The group `he2`: `he2p`. Of images that can print.",
+            "The group `he3`: `he3p`. Of images that can print.",
             &[Owner::Bed],
             &bed::MEANINGS,
         ),

@@ -33,7 +33,7 @@ group! {
 }
 
 group! {
-    /// The group `he2`, the bed.
+    /// The group `he3`, the bed.
     bed: i32, PLAIN => {
         K "k": whole(cold(0), 3), 1,
             words(text!("bed sensor"), SENSORS),
@@ -52,7 +52,7 @@ group! {
             "Power that the fan at full takes away.";
         HY "hy": up_to(cold(1), 20_000), 1_000,
             words(text!("bed hysteresis"), DEGREES),
-            "With `he2p` 0: degrees between on and off.";
+            "With `he3p` 0: degrees between on and off.";
         MX "mx": whole(cold(0), 150), 120,
             words(text!("bed max"), DEGREES),
             "How hot it may be made, degrees; 15 more are a fault (52).";

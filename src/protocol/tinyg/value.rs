@@ -294,15 +294,15 @@ progmem! {
         #[cfg(feature = "printer")]
         single("he1t", of(Value::Temperature(0)), Form::Degrees),
         #[cfg(feature = "printer")]
-        single("he2t", of(Value::Temperature(1)), Form::Degrees),
+        single("he3t", of(Value::Temperature(1)), Form::Degrees),
         #[cfg(feature = "printer")]
         single("he1s", of(Value::WantedTemperature(0)), Form::Degrees),
         #[cfg(feature = "printer")]
-        single("he2s", of(Value::WantedTemperature(1)), Form::Degrees),
+        single("he3s", of(Value::WantedTemperature(1)), Form::Degrees),
         #[cfg(feature = "printer")]
         single("he1o", of(Value::HeaterPower(0)), Form::Factor),
         #[cfg(feature = "printer")]
-        single("he2o", of(Value::HeaterPower(1)), Form::Factor),
+        single("he3o", of(Value::HeaterPower(1)), Form::Factor),
         count("prbe", of(Value::ProbeState), text!("Probe state:"), text!("Failed|Succeeded|Waiting")),
     ];
 

@@ -100,7 +100,7 @@ fn temperatures_are_those_of_the_sensors() {
         printer.run(450, |_| {});
         let (is, wanted) = (printer.value("he1t"), printer.hot_end.sensor);
         assert!((is - wanted).abs() < 1.0, "hot end {is}, not {wanted}");
-        let (is, wanted) = (printer.value("he2t"), printer.bed.sensor);
+        let (is, wanted) = (printer.value("he3t"), printer.bed.sensor);
         assert!((is - wanted).abs() < 1.0, "bed {is}, not {wanted}");
     }
 }

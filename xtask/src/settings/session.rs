@@ -21,11 +21,11 @@ const KEPT: usize = 2_000;
 
 /// The groups of settings, in the order in which they are loaded.
 const GROUPS: [&str; 21] = [
-    "1", "2", "3", "4", "x", "y", "z", "a", "b", "c", "p1", "sp", "co", "sq", "he1", "he2", "uda",
+    "1", "2", "3", "4", "x", "y", "z", "a", "b", "c", "p1", "sp", "co", "sq", "he1", "he3", "uda",
     "udb", "udc", "udd", "sys",
 ];
 /// Those that an image may lack, and what it refuses them with.
-const HEATERS: [&str; 2] = ["he1", "he2"];
+const HEATERS: [&str; 2] = ["he1", "he3"];
 const UNKNOWN: f64 = 100.0;
 /// Coordinate systems.
 const SYSTEMS: [&str; 9] = ["g54", "g55", "g56", "g57", "g58", "g59", "g591", "g592", "g593"];
