@@ -59,14 +59,16 @@ struct Parts {
 
 #[small]
 impl Parts {
-    const OFF: Self = Self {
-        heaters: RefCell::new([Heater::OFF; HEATERS]),
-        awaited: Cell::new(Heat { part: Part::HotEnd, to: None, wait: Wait::Nothing }),
-        stays: Cell::new(0),
-        next: Cell::new(0),
-        kick: Cell::new(0),
-        owed: Cell::new(0),
-    };
+    const fn new() -> Self {
+        Self {
+            heaters: RefCell::new([Heater::OFF; HEATERS]),
+            awaited: Cell::new(Heat { part: Part::HotEnd, to: None, wait: Wait::Nothing }),
+            stays: Cell::new(0),
+            next: Cell::new(0),
+            kick: Cell::new(0),
+            owed: Cell::new(0),
+        }
+    }
 
     /// Whether the fan is on until the next turn.
     fn turn_fan(&self, speed: u8) -> bool {
@@ -129,7 +131,7 @@ impl Parts {
 impl Heaters {
     /// Everything is off.
     pub const fn new() -> Self {
-        Self { parts: [const { Parts::OFF }; PRINTERS] }
+        Self { parts: [const { Parts::new() }; PRINTERS] }
     }
 
     /// The planner waits for this from now on.
