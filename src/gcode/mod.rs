@@ -26,6 +26,7 @@ mod motion;
 pub mod number;
 mod offsets;
 pub mod overrides;
+pub mod printing;
 pub mod setup;
 mod speed;
 mod state;

@@ -11,6 +11,7 @@ use super::modal::{
     Coolant, Defaults, FeedMode, Modal, MotionMode, PathMode, TOLERANCE, TOLERANCE_MAX, Turn, Units,
 };
 use super::overrides::{Change, Override};
+use super::printing::Printing;
 use super::setup::Setup;
 use super::sticky::Sticky;
 use super::tables::{Edit, Row, Tables};
@@ -52,6 +53,8 @@ pub struct State {
     /// T, and the tool of the last M6.
     pub selected: u8,
     pub tool: u8,
+    /// How the extruder of a printer takes its words.
+    pub printing: Printing,
     /// The words of canned cycles.
     pub sticky: Sticky,
 }
@@ -77,6 +80,7 @@ impl State {
             limit: 0,
             selected: 0,
             tool: 0,
+            printing: Printing::NONE,
             sticky: Sticky::NONE,
         }
     }

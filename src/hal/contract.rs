@@ -110,6 +110,8 @@ contract! {
         fn stop_late();
         /// How the other side may hold it back from now on. Thread mode.
         fn set_flow(port: u8, flow: Flow);
+        /// Whether `!`, `~`, `%` and bytes above 0x7F are text, from now on. Thread mode.
+        fn set_plain(port: u8, plain: bool);
         /// Sends on what CTS has held back, and XOFF or XON that has waited for long enough. Thread mode, each millisecond.
         fn look();
         /// Line ends lost since start-up, modulo 2^16. Thread mode.

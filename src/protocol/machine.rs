@@ -53,6 +53,22 @@ pub enum Store<'a> {
     Startup(u8, &'a [u8]),
 }
 
+/// What becomes of a printer's extruder, which is the A axis.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Extruder {
+    /// Its words are measured from where it is, whatever the others are measured from; or no more.
+    Relative(bool),
+    /// It moves so many thousandths of what its words say.
+    Flow(u16),
+    /// It moves by itself, and what its words are measured from moves along with it.
+    Move {
+        /// How far.
+        by: Length,
+        /// mm/min.
+        feed: i32,
+    },
+}
+
 /// The machine behind the dialects. Nothing here waits.
 pub trait Machine {
     /// The settings in force.
@@ -127,6 +143,15 @@ pub trait Machine {
     fn skip_wait(&mut self);
     /// Heaters that a fault has locked may be switched on again (M999). The alarm is [cleared](Self::clear) by itself.
     fn unlock_heaters(&mut self);
+
+    /// Changes how the extruder moves, or moves it. [`Status::Again`]: nothing is done, and it is to be tried again when the planner is free.
+    fn extruder(&mut self, what: Extruder) -> Status {
+        let _ = what;
+        Status::NotBuiltIn
+    }
+
+    /// What is held, or stopped by a program, goes on.
+    fn go_on(&mut self) {}
 
     /// Whether lengths are in inches.
     fn inches(&mut self) -> bool {

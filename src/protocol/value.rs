@@ -16,6 +16,8 @@ pub enum Value {
     Velocity,
     /// Feed rate, in 0.001 mm/min.
     Feed,
+    /// How far the extruder moves, in thousandths of what its words say.
+    Flow,
     /// 1 if anything is queued or runs.
     Working,
     /// 1 if a block is being carried out.

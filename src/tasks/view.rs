@@ -43,6 +43,8 @@ use crate::machine::{self, Alarm, Cycle, Doing};
 use crate::motion::dynamics;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Program};
+#[cfg(feature = "dialect-reprap")]
+use crate::protocol::Extruder;
 use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
@@ -201,7 +203,7 @@ impl<'a> View<'a> {
 
     /// Whether lines of G-code wait that are carried out first. Where lines are answered in their order those of the port come later.
     fn has_others(&self) -> bool {
-        let in_order = self.port.speech.get().is_in_order();
+        let in_order = self.port.speech.get().is_in_order() || self.port.is_plain();
         self.links.ports.iter().any(|port| {
             !(in_order && port.number == self.port.number) && port.lines.borrow().has_data()
         })
@@ -368,6 +370,7 @@ impl Machine for View<'_> {
             Value::Running => self.motion().running.into(),
             // Lines that move nothing are finished when all before them are.
             Value::FinishedLine if !self.is_busy() => self.modal(Value::BlockLine),
+            Value::Flow => self.links.model.borrow().flow().into(),
             Value::FinishedLine => self.motion().finished as i32,
             Value::MotionLine => self.motion().line as i32,
             Value::Velocity => thousandths(self.motion().velocity * 60.0),
@@ -601,6 +604,34 @@ impl Machine for View<'_> {
     fn start_over(&mut self) {
         self.port.ask(RESET);
         flags::set(Event::Realtime);
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn extruder(&mut self, what: Extruder) -> Status {
+        let (links, alarm) = (self.links, machine::alarm());
+        let mut model = links.model.borrow_mut();
+        match what {
+            Extruder::Relative(relative) => model.set_relative(relative),
+            Extruder::Flow(flow) => model.set_flow(flow),
+            _ if alarm != Alarm::None => return alarm.status(),
+            _ if machine::is_checking() => {}
+            _ if links.commands_taken.get() || machine::is_flushing() => return Status::Again,
+            Extruder::Move { by, feed } => {
+                let status = model.extrude(by, feed as f32, &mut links.commands.borrow_mut());
+                if status == Status::Ok {
+                    links.commands_taken.set(true);
+                    links.planner_wake.signal();
+                }
+                return status;
+            }
+        }
+        Status::Ok
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn go_on(&mut self) {
+        self.links.signs.resume.set(true);
+        hold::go_on(self.links);
     }
 
     fn jog(&mut self, axis: u8, place: Length) -> Status {
