@@ -4,11 +4,11 @@
 //! enum of each of its types, with a variant for each dialect that is built in. Of an image with one dialect the variants
 //! take neither room nor time.
 
+use super::Rewritten;
 use super::line::{Ending, Next, Span};
 use super::machine::Machine;
 use super::notice::Notice;
 use super::out::Out;
-use super::Rewritten;
 use crate::config::Settings;
 use crate::machine::Alarm;
 use crate::status::Status;

@@ -197,7 +197,11 @@ impl LinePool {
     /// What to do with a line that has come whole.
     #[inline(always)]
     fn classify(&self, line: &[u8]) -> Class {
-        if !self.in_order && is_control(line, self.is_plain()) { Class::Control } else { Class::Data }
+        if !self.in_order && is_control(line, self.is_plain()) {
+            Class::Control
+        } else {
+            Class::Data
+        }
     }
 
     /// Free slots, not counting the one a line is coming into.
@@ -373,7 +377,10 @@ impl LinePool {
 
     /// Whether the line that is coming in is a question mark so far: whatever follows is another line.
     pub fn is_asking(&self) -> bool {
-        self.partial > 0 && !self.in_order && !self.is_plain() && self.bytes.get(usize::from(self.end)) == Some(&ASKS)
+        self.partial > 0
+            && !self.in_order
+            && !self.is_plain()
+            && self.bytes.get(usize::from(self.end)) == Some(&ASKS)
     }
 
     /// Bytes have come that are not kept.

@@ -165,7 +165,8 @@ impl<const N: usize> Intake<N> {
                 return Left::Full;
             }
             let next = self.received.waiting().first().copied();
-            let decides = next == Some(b'?') && self.port.waits_for_question() && !pool.is_within_line();
+            let decides =
+                next == Some(b'?') && self.port.waits_for_question() && !pool.is_within_line();
             if decides || next.is_some_and(|next| pool.leaves(next)) {
                 // It has come since the ring was looked through.
                 return Left::Bytes;

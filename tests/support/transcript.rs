@@ -363,7 +363,8 @@ impl<S: Side> Player<'_, S> {
             line == wanted
                 || without_version(line) == wanted
                 || (wanted.contains('*')
-                    && (wanted.starts_with(['<', '[']) || wanted.starts_with("{\"sr\":"))
+                    && (wanted.starts_with(['<', '[', 'X', 'F', 'E'])
+                        || wanted.starts_with("{\"sr\":"))
                     && matches(wanted, line))
         })
     }

@@ -79,8 +79,7 @@ impl Frame {
                 behind += 1;
             }
             let first = behind;
-            while behind < end
-                && line.get(behind).is_some_and(|b| b.is_ascii_digit() || *b == b'-')
+            while behind < end && line.get(behind).is_some_and(|b| b.is_ascii_digit() || *b == b'-')
             {
                 behind += 1;
             }

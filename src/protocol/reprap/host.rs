@@ -138,7 +138,8 @@ fn retract(back: bool, machine: &mut impl Machine) -> Step {
     if kept.retracted == back {
         return Step::Done;
     }
-    let far = if back { kept.length.saturating_neg() } else { kept.length.saturating_add(kept.extra) };
+    let far =
+        if back { kept.length.saturating_neg() } else { kept.length.saturating_add(kept.extra) };
     let by = Extruder::Move { by: Length(far), feed: kept.feed };
     match machine.extruder(by) {
         Status::Again => Step::Later(0),

@@ -177,12 +177,7 @@ pub fn set(
 
 #[inline(never)]
 #[small]
-fn set_axis(
-    code: u16,
-    axis: u8,
-    to: Number,
-    machine: &mut impl Machine,
-) -> Result<(), Status> {
+fn set_axis(code: u16, axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
     if machine.value(crate::protocol::Value::Working) != 0 {
         return Err(Status::Again);
     }

@@ -14,8 +14,8 @@ use core::mem::offset_of;
 use avr_embassy::assembly;
 
 use super::{
-    AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, PLAIN, RXCIE, STOPPED, Shared, TXC, TXCIE, U2X, UDRIE,
-    USB_SHARED,
+    AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, PLAIN, RXCIE, STOPPED, Shared, TXC, TXCIE, U2X,
+    UDRIE, USB_SHARED,
 };
 use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::event::Event;
