@@ -18,6 +18,9 @@ pub struct Session {
     pub lines: u8,
 }
 
+/// A tenth of the highest number.
+const MOST: i32 = 99_999_999;
+
 /// What a line has for a checksum.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Sum {
@@ -119,10 +122,10 @@ pub fn integer(text: &[u8]) -> Option<i32> {
     let mut value = 0i32;
     for byte in digits {
         let digit = byte.wrapping_sub(b'0');
-        if digit > 9 {
+        if digit > 9 || value > MOST {
             return None;
         }
-        value = value.checked_mul(10)?.checked_add(digit.into())?;
+        value = value * 10 + i32::from(digit);
     }
     (!digits.is_empty()).then_some(if negative { -value } else { value })
 }

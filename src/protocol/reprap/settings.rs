@@ -185,9 +185,9 @@ fn set_axis(code: u16, axis: u8, to: Number, machine: &mut impl Machine) -> Resu
         92 => set_steps(axis, to, machine),
         203 => {
             // In mm/s.
-            let by_minute = to.fixed(3, false).and_then(|value| value.checked_mul(60));
-            let by_minute = u32::try_from(by_minute.ok_or(Status::OutOfRange)?);
-            let to = Number::int(by_minute.map_err(|_| Status::OutOfRange)?).thousandth();
+            let by_second = to.fixed(3, false).filter(|to| (0..=i32::MAX / 60).contains(to));
+            let by_second = by_second.ok_or(Status::OutOfRange)?;
+            let to = Number::int(by_second.unsigned_abs() * 60).thousandth();
             put_number(machine, Owner::Axis(axis), token("vm"), to)?;
             put_number(machine, Owner::Axis(axis), token("fr"), to)
         }
