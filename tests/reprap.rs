@@ -184,3 +184,44 @@ fn ten_kilometres_of_filament() {
     let after = host.steps();
     assert_eq!(after[3] - before[3], 100 * 2 * 50_000, "{before:?} {after:?}");
 }
+
+#[test]
+fn a_stop_of_the_program_waits_for_m108() {
+    let mut host = Host::boot(0);
+    for line in ["G1 X1 F3000", "M0 Change the filament"] {
+        assert_eq!(host.ask(line), "ok\n");
+    }
+    host.machine.send(b"G1 X2\n");
+    host.machine.run_ms(5_000);
+    let heard = String::from_utf8(host.machine.received()).unwrap();
+    assert!(heard.contains("echo:busy: paused for user\n"), "{heard}");
+    assert!(heard.contains("echo:busy: processing\n") && !heard.contains("ok"), "{heard}");
+    // Its own answer, and that of the move.
+    assert_eq!(host.ask("M108"), "ok\n");
+    assert_eq!(host.hear(), "ok\n");
+    assert_eq!(host.steps()[0], 2 * 1_280);
+}
+
+#[test]
+fn polls_overtake_a_full_queue() {
+    let mut host = Host::boot(0);
+    for n in 1..=70 {
+        host.machine.send(format!("G1 X{} F600\n", n * 20).as_bytes());
+        host.machine.run_ms(5);
+    }
+    let heard = String::from_utf8(host.machine.received()).unwrap();
+    assert!(heard.lines().count() < 68, "lines wait");
+    host.machine.send(b"M105\n");
+    host.machine.run_ms(20);
+    let heard = String::from_utf8(host.machine.received()).unwrap();
+    assert!(heard.starts_with("ok T:") && heard.lines().count() == 1, "{heard}");
+    host.machine.send(b"N9 M112*");
+    let sum = b"N9 M112".iter().fold(0, |sum, byte| sum ^ byte);
+    host.machine.send(format!("{sum}\n").as_bytes());
+    host.machine.run_ms(100);
+    let heard = String::from_utf8(host.machine.received()).unwrap();
+    assert!(heard.contains("Error:stopped"), "{heard}");
+    let at = host.machine.emitted().position[0];
+    host.machine.run_ms(1_000);
+    assert_eq!(host.machine.emitted().position[0], at);
+}

@@ -153,6 +153,18 @@ impl<T> Interpreter<T> {
         out.motion = Motion::SetPosition { position: state.position };
     }
 
+    /// No G92 counts on these axes any more, as bits.
+    #[small]
+    pub fn clear_shift(&mut self, axes: u8) {
+        let state = &mut self.state;
+        for (axis, (origin, shift)) in state.origin.iter_mut().zip(&mut state.shift).enumerate() {
+            if axes >> axis & 1 != 0 && state.shifted {
+                origin.0 = origin.0.wrapping_sub(shift.0);
+                *shift = Length::ZERO;
+            }
+        }
+    }
+
     /// The extruder alone moves, and so does what its words are measured from.
     #[inline(never)]
     #[small]

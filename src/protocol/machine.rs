@@ -150,6 +150,11 @@ pub trait Machine {
         Status::NotBuiltIn
     }
 
+    /// The origin of these axes, as bits, is no more where G92 has put it: it is where homing has.
+    fn clear_shift(&mut self, axes: u8) {
+        let _ = axes;
+    }
+
     /// What is held, or stopped by a program, goes on.
     fn go_on(&mut self) {}
 

@@ -629,6 +629,11 @@ impl Machine for View<'_> {
     }
 
     #[cfg(feature = "dialect-reprap")]
+    fn clear_shift(&mut self, axes: u8) {
+        self.links.model.borrow_mut().clear_shift(axes);
+    }
+
+    #[cfg(feature = "dialect-reprap")]
     fn go_on(&mut self) {
         self.links.signs.resume.set(true);
         hold::go_on(self.links);

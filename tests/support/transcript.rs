@@ -363,7 +363,7 @@ impl<S: Side> Player<'_, S> {
             line == wanted
                 || without_version(line) == wanted
                 || (wanted.contains('*')
-                    && (wanted.starts_with(['<', '[', 'X', 'F', 'E', 'o'])
+                    && (wanted.starts_with(['<', '[', 'X', 'F', 'E', 'o', '*'])
                         || wanted.starts_with("{\"sr\":"))
                     && matches(wanted, line))
         })

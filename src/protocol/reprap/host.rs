@@ -5,7 +5,7 @@ use super::write::{fixed, int, line_end, text};
 use super::{report, settings};
 use crate::config::Fixed;
 use crate::gcode::overrides::{Change, Override};
-use crate::machine::{Alarm, Cycle};
+use crate::machine::{Alarm, Cycle, Doing};
 use crate::progmem::Text;
 use crate::protocol::{Extruder, Machine, Out, Value};
 use crate::status::Status;
@@ -105,7 +105,7 @@ pub fn part(
         }
         220 => speed(block, machine, out),
         221 => flow(block, machine, out),
-        400 if machine.value(Value::Working) != 0 => Step::Later(0),
+        400 => finished(machine),
         500 if machine.value(Value::Kept) == 0 => Step::Later(0),
         502 => restore(at, machine),
         503 => settings::list(at, machine, out).map_or(Step::Done, Step::At),
@@ -118,6 +118,16 @@ pub fn part(
             }
             status => Step::Refused(status),
         },
+        _ => Step::Done,
+    }
+}
+
+/// M400: what has been asked for is done, or an alarm has dropped it.
+#[small]
+fn finished(machine: &mut impl Machine) -> Step {
+    match machine.doing() {
+        Doing::Alarm(alarm) => Step::Refused(alarm.status()),
+        _ if machine.value(Value::Working) != 0 => Step::Later(0),
         _ => Step::Done,
     }
 }
@@ -206,8 +216,9 @@ fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
     let named = (0..HOMED.len() as u8).filter(|axis| axes & 1 << axis != 0);
     let mut homed = 0;
     for axis in named {
-        homed |= machine.value(Value::Homed(axis));
+        homed |= u8::from(machine.value(Value::Homed(axis)) != 0) << axis;
     }
+    machine.clear_shift(homed);
     if homed == 0 { Step::Refused(Status::HomingFailed) } else { Step::Done }
 }
 
