@@ -2,8 +2,10 @@
 //!
 //! Of an image without a dialect of printing hosts there is nothing of this.
 
+#[cfg(feature = "dialect-reprap")]
 use super::command::{Commands, Feed, Motion};
 use super::interpreter::Interpreter;
+#[cfg(feature = "dialect-reprap")]
 use super::modal::{MotionMode, Units};
 use super::state::State;
 use crate::status::Status;
@@ -13,8 +15,10 @@ use crate::units::{FIRST_ROTARY, Length};
 pub const EXTRUDER: usize = FIRST_ROTARY;
 /// As much filament as programmed.
 const FULL: u16 = 1_000;
+#[cfg(feature = "dialect-reprap")]
 /// The feed rate until there is another, mm/min.
 const FEED: f32 = 1_500.0;
+#[cfg(feature = "dialect-reprap")]
 /// How far from the origin the extruder gets before it is moved back, which is half of what a [`Length`] holds: 100 m.
 const FAR: i32 = 1_000_000_000;
 

@@ -33,6 +33,7 @@ use crate::status::Status;
 const POLL_MS: u64 = 10;
 /// How often a machine at rest is looked at for a printing host, ms.
 const LOOK_MS: u64 = 100;
+#[cfg(feature = "dialect-reprap")]
 /// A line that takes longer is told so, again and again, ms.
 const BUSY_MS: u32 = 2_000;
 /// How often room is looked for on a port that is told besides.
