@@ -193,7 +193,7 @@ mod tests {
     fn numbers_and_checksums() {
         assert_eq!(parts("N-1 M110 N-1*125"), (Some(-1), Sum::Right, "M110 N-1"));
         assert_eq!(parts("N0 M110 N0*125"), (Some(0), Sum::Right, "M110 N0"));
-        assert_eq!(parts(" n2G28 *17 "), (Some(2), Sum::Wrong, "G28"));
+        assert_eq!(parts(" n2G28 *18 "), (Some(2), Sum::Wrong, "G28"));
         assert_eq!(parts("N2 G28*17"), (Some(2), Sum::Right, "G28"));
         assert_eq!(parts("N2 G28*1j"), (Some(2), Sum::Wrong, "G28"));
         assert_eq!(parts("M117 5*x"), (None, Sum::None, "M117 5*x"));

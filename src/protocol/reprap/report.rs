@@ -90,8 +90,7 @@ pub fn identity(at: u8, out: &mut impl Out) -> Option<u8> {
             text(out, text!(" PROTOCOL_VERSION:1.0 MACHINE_TYPE:"));
         }
         2 => {
-            out.put_all(crate::boards::ACTIVE.name.bytes());
-            text(out, text!(" EXTRUDER_COUNT:1\n"));
+            text(out, text!("RepRap EXTRUDER_COUNT:1\n"));
         }
         3 => text(out, text!("Cap:AUTOREPORT_TEMP:1\nCap:EMERGENCY_PARSER:1\n")),
         _ => {
