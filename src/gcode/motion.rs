@@ -156,9 +156,9 @@ impl State {
             };
             let Some(mut by) = axes::value(word, axis, self.modal.units, setup)? else { continue };
             let extrudes = i == EXTRUDER && !self.printing.is_usual();
-            let distance = match extrudes && self.printing.is_relative() {
-                true => Distance::Incremental,
-                false => self.modal.distance,
+            let distance = match self.printing.distance() {
+                Some(own) if extrudes => own,
+                _ => self.modal.distance,
             };
             let from = match distance {
                 _ if absolute => Length::ZERO,

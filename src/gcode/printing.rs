@@ -5,6 +5,7 @@
 #[cfg(feature = "dialect-reprap")]
 use super::command::{Commands, Feed, Motion};
 use super::interpreter::Interpreter;
+use super::modal::Distance;
 #[cfg(feature = "dialect-reprap")]
 use super::modal::{MotionMode, Units};
 use super::state::State;
@@ -26,8 +27,8 @@ const FAR: i32 = 1_000_000_000;
 #[cfg(feature = "dialect-reprap")]
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Printing {
-    /// M83.
-    relative: bool,
+    /// M82 and M83; `None`: as the other axes.
+    own: Option<Distance>,
     /// M221, thousandths.
     flow: u16,
 }
@@ -40,12 +41,18 @@ pub struct Printing;
 #[cfg(feature = "dialect-reprap")]
 impl Printing {
     /// As any axis.
-    pub const NONE: Self = Self { relative: false, flow: FULL };
+    pub const NONE: Self = Self { own: None, flow: FULL };
 
-    /// M83.
+    /// What its words are measured from, if that is not what those of the others are.
     #[inline(always)]
-    pub fn is_relative(self) -> bool {
-        self.relative
+    pub fn distance(self) -> Option<Distance> {
+        self.own
+    }
+
+    /// G90 and G91 are for the extruder, too.
+    #[inline(always)]
+    pub fn follow(&mut self) {
+        self.own = None;
     }
 
     /// M221, thousandths.
@@ -62,9 +69,13 @@ impl Printing {
 
     /// Never.
     #[inline(always)]
-    pub fn is_relative(self) -> bool {
-        false
+    pub fn distance(self) -> Option<Distance> {
+        None
     }
+
+    /// It does.
+    #[inline(always)]
+    pub fn follow(&mut self) {}
 
     /// All of it.
     #[inline(always)]
@@ -77,7 +88,7 @@ impl Printing {
     /// Whether the extruder takes its words as any axis does.
     #[inline(always)]
     pub fn is_usual(self) -> bool {
-        !self.is_relative() && self.flow() == FULL
+        self.distance().is_none() && self.flow() == FULL
     }
 }
 
@@ -113,9 +124,10 @@ impl State {
 
 #[cfg(feature = "dialect-reprap")]
 impl<T> Interpreter<T> {
-    /// Words of the extruder are measured from where it is, or no more.
+    /// Words of the extruder are measured from where it is, or not, whatever those of the others are measured from; until G90 or G91.
     pub fn set_relative(&mut self, relative: bool) {
-        self.state.printing.relative = relative;
+        let own = if relative { Distance::Incremental } else { Distance::Absolute };
+        self.state.printing.own = Some(own).filter(|own| *own != self.state.modal.distance);
     }
 
     /// The extruder moves so many thousandths of what its words say.

@@ -152,6 +152,9 @@ impl State {
         set(&mut modal.feed_mode, block.feed_mode);
         set(&mut modal.plane, block.plane);
         set(&mut modal.units, block.units);
+        if block.distance.is_some() {
+            self.printing.follow();
+        }
         set(&mut modal.distance, block.distance);
         set(&mut modal.arc_distance, block.arc_distance);
         set(&mut modal.retract, block.retract);
