@@ -237,9 +237,6 @@ macro_rules! dialects {
                 None
             }
 
-            /// How many dialects there are.
-            pub const COUNT: usize = 0 $(+ cfg!(feature = $feature) as usize)+;
-
             /// The greeting that an undecided port tells beside that of its dialect: of the dialect whose senders ask by a `?`, else of
             /// printing hosts.
             #[small]
