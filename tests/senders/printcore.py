@@ -106,9 +106,9 @@ def prints():
 
 def pause():
     """Pauses in the middle of a print of its own, which goes on."""
-    lines = ["G91"] + ["G1 X0.5 F1200", "G1 X-0.5"] * 40 + ["G90"]
+    lines = ["G91"] + ["G1 X0.5 F1200", "G1 X-0.5"] * 500 + ["G90"]
     host.startprint(LightGCode(lines))
-    time.sleep(1)
+    until(lambda: host.queueindex > 10)
     host.pause()
     ensure(host.paused, "it is not paused")
     host.resume()
