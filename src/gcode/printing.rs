@@ -184,12 +184,12 @@ impl<T> Interpreter<T> {
     /// The extruder alone moves, and so does what its words are measured from.
     #[inline(never)]
     #[small]
-    pub fn extrude(&mut self, by: Length, feed: f32, out: &mut Commands) -> Status {
+    pub fn extrude(&mut self, by: Length, feed: f32, out: &mut Commands) -> Result<(), Status> {
         let state = &mut self.state;
-        let Some(at) = state.position.get(EXTRUDER) else { return Status::AxisInvalid };
-        let Some(end) = at.checked_add(by) else { return Status::OutOfRange };
+        let Some(at) = state.position.get(EXTRUDER) else { return Err(Status::AxisInvalid) };
+        let Some(end) = at.checked_add(by) else { return Err(Status::OutOfRange) };
         if state.shift_extruder(by.0).is_none() {
-            return Status::OutOfRange;
+            return Err(Status::OutOfRange);
         }
         if let Some(at) = state.position.get_mut(EXTRUDER) {
             *at = end;
@@ -198,7 +198,7 @@ impl<T> Interpreter<T> {
         out.line = state.line;
         out.blend = state.modal.blend();
         out.motion = Motion::Feed { target: state.position, feed: Feed::PerMinute(feed) };
-        Status::Ok
+        Ok(())
     }
 }
 

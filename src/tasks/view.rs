@@ -617,12 +617,12 @@ impl Machine for View<'_> {
             _ if machine::is_checking() => {}
             _ if links.commands_taken.get() || machine::is_flushing() => return Status::Again,
             Extruder::Move { by, feed } => {
-                let status = model.extrude(by, feed as f32, &mut links.commands.borrow_mut());
-                if status == Status::Ok {
-                    links.commands_taken.set(true);
-                    links.planner_wake.signal();
+                let done = model.extrude(by, feed as f32, &mut links.commands.borrow_mut());
+                if let Err(status) = done {
+                    return status;
                 }
-                return status;
+                links.commands_taken.set(true);
+                links.planner_wake.signal();
             }
         }
         Status::Ok
