@@ -48,6 +48,7 @@ pub const MEGA2560_GRBL: Board = Board {
     // D11 and A15
     encoder: Some(Encoder { index: pin(B, 5), sync: pin(K, 7) }),
     drivers: None,
+    heaters: None,
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

@@ -1,12 +1,12 @@
 //! Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder.
 
 use super::Port::{A, B, D, E, F, G, H, J, K, L};
-use super::{Board, Encoder, MotorPins, Pwm, Timer, USB, pin};
+use super::{Board, Encoder, Heater, Heaters, MotorPins, Pwm, Timer, USB, pin};
 
 /// Arduino Mega 2560 with RAMPS 1.4.
 pub const RAMPS14: Board = Board {
     name: "ramps14",
-    features: &["dialect-tinyg", "cycles", "probing", "jobs", "help", "lathe"],
+    features: &["dialect-tinyg", "dialect-reprap", "probing", "printer"],
     dialect: 0,
     clock_hz: 16_000_000,
     motors: &[
@@ -50,6 +50,11 @@ pub const RAMPS14: Board = Board {
     // D2 and D3
     encoder: Some(Encoder { index: pin(E, 4), sync: pin(E, 5) }),
     drivers: None,
+    // D10 and A13, D8 and A14; D9
+    heaters: Some(Heaters {
+        heaters: [Heater { pin: pin(B, 4), channel: 13 }, Heater { pin: pin(H, 5), channel: 14 }],
+        fan: pin(H, 6),
+    }),
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

@@ -37,6 +37,7 @@ pub const SKR_PICO: Board = Board {
         Some(gp(16)),
     ],
     encoder: None,
+    heaters: None,
     drivers: Some(Tmc2209 { tx: gp(8), rx: gp(9), addresses: &[0, 2, 1, 3], run: 18, hold: 9 }),
     step_timer: Timer::Pio,
     tick_timer: Timer::SysTick,

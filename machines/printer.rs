@@ -12,9 +12,8 @@ pub const PRINTER: Machine = Machine {
         // turn, which some have, need `3tr` 0.8.
         set("12", "tr", 40.0),
         set("3", "tr", 8.0),
-        // A drive gear of 11 mm: 93 steps/mm of filament
-        set("a", "am", 3.0),
-        set("a", "ra", 5.5),
+        // A drive gear of 11 mm: 93 steps/mm of filament, which is the A axis, in mm
+        set("4", "tr", 34.4086),
         set("xy", "vm", 12_000.0),
         set("xy", "fr", 12_000.0),
         set("z", "vm", 720.0),
@@ -29,11 +28,11 @@ pub const PRINTER: Machine = Machine {
         set("z", "jm", 500.0),
         set("z", "jh", 1_000.0),
         // 48 mm/s of filament and 960 mm/s^2, reached in 30 ms
-        set("a", "vm", 30_000.0),
-        set("a", "fr", 30_000.0),
-        set("a", "ac", 10_000.0),
-        set("a", "jm", 72_000.0),
-        set("a", "jh", 144_000.0),
+        set("a", "vm", 2_880.0),
+        set("a", "fr", 2_880.0),
+        set("a", "ac", 960.0),
+        set("a", "jm", 6_912.0),
+        set("a", "jh", 13_824.0),
         set("a", "sn", 0.0),
         // Z is 0 at the bed, where it homes
         set("xyz", "tm", 200.0),

@@ -25,6 +25,7 @@ use crate::protocol::{Memory, Occasion, Remembers, Speech};
 use crate::store::Log;
 use crate::store::kept;
 use crate::tasks::common::Common;
+use crate::tasks::heat::Heaters;
 use crate::tasks::links::{Changes, Links, QueueCount};
 use crate::tasks::planner::Planner;
 use crate::tasks::ports::{AUX_RESERVE, Choice, Port};
@@ -33,7 +34,7 @@ use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
 use crate::tasks::wake::{News, Wake};
 use crate::tasks::{
-    alarm, control, exec, parser, planner, power, reader, reporter, spindle, storage,
+    alarm, control, exec, heat, parser, planner, power, reader, reporter, spindle, storage,
 };
 
 /// Bytes for all lines of USB together.
@@ -61,6 +62,7 @@ impl Links {
             rate: Cell::new(None),
             restart: Cell::new(None),
             cleared_by: Cell::new(USB),
+            heat: Heaters::new(),
             probe: Probe::default(),
             signs: Signs::default(),
             job: Cell::default(),
@@ -100,6 +102,7 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
     set_hardware(thread, &links.settings.borrow());
     spindle::set_all(thread, links.storage);
+    heat::set_all(&links.heat, &mut links.settings.borrow_mut(), links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
     choose_dialects(links);
     if watchdog::cause().is_fault() {

@@ -378,6 +378,24 @@ pub struct Tmc2209 {
     pub hold: u8,
 }
 
+/// A heater: its pin, high for on, which is a hazard; and the channel of the converter that its sensor is on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Heater {
+    /// Switches its transistor.
+    pub pin: Pin,
+    /// 0 to 15: A0 to A15.
+    pub channel: u8,
+}
+
+/// Heaters and fan of a printer.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Heaters {
+    /// The hot end and the bed.
+    pub heaters: [Heater; 2],
+    /// The fan for what has been printed. A hazard.
+    pub fan: Pin,
+}
+
 /// A board.
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
@@ -409,6 +427,8 @@ pub struct Board {
     pub encoder: Option<Encoder>,
     /// Drivers that are told their current and microsteps by UART1 of the RP2040.
     pub drivers: Option<Tmc2209>,
+    /// Its heaters, of an image that can print.
+    pub heaters: Option<Heaters>,
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,
     /// Timer of the 1 kHz tick.
@@ -526,6 +546,7 @@ impl Board {
         self.check_pwm();
         self.check_encoder();
         self.check_outputs();
+        self.check_heaters();
         let mut s = 0;
         while s < inputs::COUNT {
             if let Some(pin) = self.inputs[s] {
@@ -600,6 +621,52 @@ impl Board {
             let hazard = self.hazards[h];
             assert!(!hazard.is(encoder.index) && !hazard.is(encoder.sync), "a sensor is an output");
             h += 1;
+        }
+    }
+
+    /// Panics if a heater would stay on after a panic, is an output of M3 to M9, or its sensor is not on a pin of the converter, or on one of
+    /// another's.
+    const fn check_heaters(&self) {
+        let Some(Heaters { heaters: [hot_end, bed], fan }) = self.heaters else { return };
+        let pins = [hot_end.pin, bed.pin, fan];
+        let mut p = 0;
+        while p < pins.len() {
+            assert!(self.is_hazard(pins[p]), "a heater of this board is not among its hazards");
+            let mut o = 0;
+            while o < outputs::COUNT {
+                if let Some(output) = self.outputs[o] {
+                    assert!(!output.is(pins[p]), "a heater of this board is an output");
+                }
+                o += 1;
+            }
+            p += 1;
+        }
+        assert!(hot_end.channel < 16 && bed.channel < 16, "a sensor is on no channel");
+        assert!(hot_end.channel != bed.channel, "two sensors of this board share a channel");
+        self.check_channel(hot_end.channel);
+        self.check_channel(bed.channel);
+    }
+
+    const fn is_hazard(&self, pin: Pin) -> bool {
+        let mut h = 0;
+        while h < self.hazards.len() {
+            if self.hazards[h].is(pin) {
+                return true;
+            }
+            h += 1;
+        }
+        false
+    }
+
+    /// Panics if the pin of a channel is a switch.
+    const fn check_channel(&self, channel: u8) {
+        let pin = if channel < 8 { pin(Port::F, channel) } else { pin(Port::K, channel - 8) };
+        let mut i = 0;
+        while i < inputs::COUNT {
+            if let Some(input) = self.inputs[i] {
+                assert!(!input.is(pin), "a sensor of this board is a switch");
+            }
+            i += 1;
         }
     }
 

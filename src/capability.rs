@@ -19,11 +19,14 @@ pub enum Capability {
     Help,
     /// Turning: the encoder of the spindle, and the codes that go by it.
     Lathe,
+    /// Printing: heaters, their sensors and fans, and the codes for them.
+    Printer,
 }
 
 impl Capability {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Cycles, Self::Probing, Self::Jobs, Self::Help, Self::Lathe];
+    pub const ALL: [Self; 6] =
+        [Self::Cycles, Self::Probing, Self::Jobs, Self::Help, Self::Lathe, Self::Printer];
 
     /// Whether this image has it.
     #[inline(always)]
@@ -34,6 +37,7 @@ impl Capability {
             Self::Jobs => cfg!(feature = "jobs"),
             Self::Help => cfg!(feature = "help"),
             Self::Lathe => cfg!(feature = "lathe"),
+            Self::Printer => cfg!(feature = "printer"),
         }
     }
 
@@ -52,6 +56,7 @@ impl Capability {
             Self::Jobs => "jobs",
             Self::Help => "help",
             Self::Lathe => "lathe",
+            Self::Printer => "printer",
         }
     }
 }

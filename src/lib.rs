@@ -53,6 +53,7 @@ pub mod config;
 pub mod dda;
 pub mod encoder;
 pub mod gcode;
+pub mod heat;
 pub mod jobs;
 pub mod machine;
 pub mod math;

@@ -86,6 +86,8 @@ fn the_machine_says_that_it_lacks_something() {
         (Capability::Probing, "g38.3x1f100"),
         (Capability::Lathe, "g33z-1k1"),
         (Capability::Lathe, "{spn:1}"),
+        (Capability::Printer, "m104s0"),
+        (Capability::Printer, "m107"),
         (Capability::Help, "{h:n}"),
         (Capability::Jobs, "{test:3}"),
     ] {

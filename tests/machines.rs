@@ -113,7 +113,7 @@ fn a_machine_survives_a_power_cut() {
         eeprom::put(&contents);
         let chip = boot();
         let answer = ask(&chip, asked);
-        let kept = "{\"mch\":3,\"xvm\":9000,\"yvm\":12000,\"aam\":3,\"1mi\":16}";
+        let kept = "{\"mch\":3,\"xvm\":9000,\"yvm\":12000,\"aam\":1,\"1mi\":16}";
         assert!(answer.contains(kept), "{answer}");
         ask(&chip, "{defa:1}");
         chip.run_ms(10_000);

@@ -104,6 +104,41 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "Free the tap by hand, `{clear:n}`. Check that M4 turns the spindle backwards; turn slower.",
     ),
     (
+        SensorOpen,
+        "The sensor of a heater reads as if its wire were broken. All heaters are off and locked.",
+        "Look at plug and wire of the sensor (printing.md). `^x`, then heat again.",
+    ),
+    (
+        SensorShort,
+        "The sensor of a heater reads as if its wires touched. All heaters are off and locked.",
+        "Look at plug and wire of the sensor (printing.md). `^x`, then heat again.",
+    ),
+    (
+        HeatRunaway,
+        "A heater that was hot has got far from where it was to be: its sensor may have come loose. All heaters are off and locked.",
+        "Fix the sensor to its heater; tune it again (printing.md). `^x`, then heat again.",
+    ),
+    (
+        HeatTooSlow,
+        "A heater with all its power has not got hotter. All heaters are off and locked.",
+        "Check heater, its wires, its supply, and whether the sensor sits in it. `^x`, then heat again.",
+    ),
+    (
+        TooHot,
+        "A heater is hotter than its maximum allows. All heaters are off and locked.",
+        "Pull the plug if it goes on heating: its transistor has failed. Else `^x`.",
+    ),
+    (
+        TooCold,
+        "The line moves filament, and the hot end is colder than its setting allows.",
+        "Heat it first: `M109 S200`.",
+    ),
+    (
+        HeatersLocked,
+        "The line switches a heater on, and a fault has locked them.",
+        "Look for the cause; `^x` unlocks them.",
+    ),
+    (
         UnrecognizedName,
         "There is no setting or value of that name.",
         "Check the name in settings.md, and below.",

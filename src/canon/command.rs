@@ -4,6 +4,7 @@ use core::fmt::{Display, Formatter, Result};
 use std::string::String;
 
 use crate::gcode::command::{Arc, Feed, Spindle};
+use crate::gcode::heating::{Heat, Part};
 use crate::gcode::modal::{MotionMode, Turn};
 use crate::gcode::overrides::{Override, Overrides};
 use crate::units::{AXES, AXIS_LETTERS, Length, PerAxis};
@@ -43,6 +44,8 @@ pub enum Canon {
     Home(u8, bool),
     /// For who looks at the machine.
     Message(String),
+    /// Heaters and the fan are to be so.
+    Heat(Heat),
     /// The program stops.
     Stop,
     /// The program ends.
@@ -76,6 +79,7 @@ impl Display for Canon {
             Self::Home(axes, true) => write!(to, "HOME({})", Letters(*axes)),
             Self::Home(axes, false) => write!(to, "HOME_ONLY({})", Letters(*axes)),
             Self::Message(text) => write!(to, "MESSAGE({text})"),
+            Self::Heat(heat) => write_heat(to, heat),
             Self::Stop => to.write_str("PROGRAM_STOP"),
             Self::End => to.write_str("PROGRAM_END"),
         }
@@ -97,6 +101,21 @@ fn write_spindle(to: &mut Formatter, spindle: &Spindle) -> Result {
         Turn::Off => to.write_str("STOP_SPINDLE_TURNING"),
         Turn::Clockwise => write!(to, "START_SPINDLE_CLOCKWISE({})", spindle.speed),
         Turn::Counterclockwise => write!(to, "START_SPINDLE_COUNTERCLOCKWISE({})", spindle.speed),
+    }
+}
+
+fn write_heat(to: &mut Formatter, heat: &Heat) -> Result {
+    let name = match heat.part {
+        Part::HotEnd => "HOT_END",
+        Part::Bed => "BED",
+        Part::All => "HEATERS",
+        Part::Fan => "FAN",
+    };
+    let waits = heat.wait;
+    match heat.to {
+        Some(fan) if heat.part == Part::Fan => write!(to, "{name}({fan})"),
+        Some(eighths) => write!(to, "{name}({}, {waits:?})", f32::from(eighths) / 8.0),
+        None => write!(to, "{name}({waits:?})"),
     }
 }
 

@@ -81,6 +81,7 @@ impl<S: Setup> Reader<S> {
             Step::Thread => self.pass(),
             Step::AwaitSpindle => {}
             Step::Arc | Step::Probe | Step::Home | Step::Jog | Step::Check => self.motion(),
+            Step::Heat(heat) => self.ready.push_back(Canon::Heat(heat)),
             Step::SetPosition(position) => {
                 self.place = position;
                 self.ready.push_back(Canon::SetPosition(position));

@@ -259,9 +259,12 @@ impl Settings {
     }
 
     /// In which dialect a port begins, as [`dialect`](Self::dialect) has it. The next two bits of the setting are the second port's own choice; 0 there is the
-    /// first port's.
+    /// first port's. 4 is RepRap's, of which the setting has a bit for each port.
     pub fn dialect_of(&self, port: u8) -> u8 {
-        match self.system(system::DIA) >> 2 {
+        if cfg!(feature = "dialect-reprap") && self.system(system::DIA) & (16 << port) != 0 {
+            return 4;
+        }
+        match self.system(system::DIA) >> 2 & 3 {
             own if port == 0 || own == 0 => self.dialect(),
             1 => 0,
             own => own,

@@ -7,6 +7,7 @@
 #[cfg(feature = "std")]
 pub mod docs;
 pub mod groups;
+pub mod heating;
 pub mod machines;
 pub mod name;
 pub mod number;
@@ -30,6 +31,7 @@ use crate::boards::MOTORS;
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
 use groups::motor;
+use heating::Heating;
 use setting::{LARGES, SMALLS, large_of, small_of};
 use table::{CLAMP, JERK, Kind, MODE, RADIUS, RANGE, Row, UNIT};
 
@@ -41,6 +43,8 @@ pub struct Settings {
     ratios: [StepRatio; MOTORS],
     /// Of the motor with the finest steps: see [`StepRatio::octaves`].
     octaves: u8,
+    /// What lines may ask of heaters, in an image that has them.
+    pub heating: [Heating; heating::PRINTERS],
 }
 
 impl Default for Settings {
@@ -60,7 +64,13 @@ impl Settings {
     /// Nothing set, for [`Settings::set_defaults`].
     pub const fn blank() -> Settings {
         let ratios = [StepRatio::NONE; MOTORS];
-        Settings { small: [0; SMALLS], large: [0; LARGES], ratios, octaves: 0 }
+        Settings {
+            small: [0; SMALLS],
+            large: [0; LARGES],
+            ratios,
+            octaves: 0,
+            heating: [Heating::NONE; heating::PRINTERS],
+        }
     }
 
     /// The value of a setting, scaled as kept.

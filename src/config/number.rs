@@ -186,6 +186,11 @@ impl Number {
         self.negative && self.digits != 0
     }
 
+    /// A thousandth of it.
+    pub fn thousandth(self) -> Number {
+        Number { exponent: self.exponent - 3, ..self }
+    }
+
     /// A millionth of it.
     pub fn millionth(self) -> Number {
         Number { exponent: self.exponent - 6, ..self }

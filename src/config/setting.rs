@@ -1,11 +1,14 @@
 //! A setting's handle: its row of the table and whose it is.
 
-use super::groups::{axis, coolant, job, motor, pwm, spindle, squaring, system, user};
+use super::groups::{
+    axis, bed, coolant, hot_end, job, motor, pwm, spindle, squaring, system, user,
+};
 use super::machines;
 use super::name::{Name, axis_letter, axis_of, token};
 use super::table::{HOMING, IDLE, Kind, MODE, RADIUS, Row, row_of};
 use super::words::Words;
 use crate::boards::MOTORS;
+use crate::capability::Capability;
 use crate::progmem::Slice;
 use crate::units::{AXES, FIRST_ROTARY};
 
@@ -17,8 +20,14 @@ const FIRST_PWM: u8 = FIRST_AXIS + (AXES * axis::COUNT) as u8;
 const FIRST_SPINDLE: u8 = FIRST_PWM + pwm::COUNT as u8;
 const FIRST_COOLANT: u8 = FIRST_SPINDLE + spindle::COUNT as u8;
 const FIRST_SQUARING: u8 = FIRST_COOLANT + coolant::COUNT as u8;
-const FIRST_USER: u8 = FIRST_SQUARING + squaring::COUNT as u8;
+const FIRST_HOT_END: u8 = FIRST_SQUARING + squaring::COUNT as u8;
+const FIRST_BED: u8 = FIRST_HOT_END + HOT_END;
+const FIRST_USER: u8 = FIRST_BED + BED;
 const FIRST_JOB: u8 = FIRST_USER + USERS * user::COUNT as u8;
+
+/// The rows of heaters: none in an image that cannot print.
+const HOT_END: u8 = if Capability::Printer.is_built_in() { hot_end::COUNT as u8 } else { 0 };
+const BED: u8 = if Capability::Printer.is_built_in() { bed::COUNT as u8 } else { 0 };
 
 /// The groups of user data, `uda` to `udd`.
 pub const USERS: u8 = 4;
@@ -40,6 +49,10 @@ pub enum Owner {
     Coolant,
     /// That of an axis with two motors.
     Squaring,
+    /// The hot end.
+    HotEnd,
+    /// The bed.
+    Bed,
     /// A sender's own, 0 to 3.
     User(u8),
     /// A job's.
@@ -58,6 +71,8 @@ impl Owner {
             Owner::Spindle => spindle::COUNT as u8,
             Owner::Coolant => coolant::COUNT as u8,
             Owner::Squaring => squaring::COUNT as u8,
+            Owner::HotEnd => HOT_END,
+            Owner::Bed => BED,
             Owner::User(_) => user::COUNT as u8,
             Owner::Job => job::COUNT as u8,
         }
@@ -73,6 +88,8 @@ impl Owner {
             Owner::Spindle => named(token("sp")),
             Owner::Coolant => named(token("co")),
             Owner::Squaring => named(token("sq")),
+            Owner::HotEnd => named(token("he1")),
+            Owner::Bed => named(token("he3")),
             Owner::User(group) => named([b'u', b'd', b'a' + group, 0]),
             Owner::Job => named(token("jid")),
         }
@@ -86,6 +103,8 @@ impl Owner {
             [b's', b'p', ..] => Some(Owner::Spindle),
             [b'c', b'o', ..] => Some(Owner::Coolant),
             [b's', b'q', ..] => Some(Owner::Squaring),
+            [b'h', b'e', b'1', ..] if HOT_END != 0 => Some(Owner::HotEnd),
+            [b'h', b'e', b'3', ..] if BED != 0 => Some(Owner::Bed),
             [b'u', b'd', group @ b'a'..=b'd', ..] => Some(Owner::User(group - b'a')),
             [b'j', b'i', b'd', ..] => Some(Owner::Job),
             [letter, ..] => axis_of(letter).map(Owner::Axis),
@@ -121,6 +140,8 @@ impl Owner {
             Owner::Spindle => spindle::ROWS.slice(),
             Owner::Coolant => coolant::ROWS.slice(),
             Owner::Squaring => squaring::ROWS.slice(),
+            Owner::HotEnd if HOT_END != 0 => hot_end::ROWS.slice(),
+            Owner::Bed if BED != 0 => bed::ROWS.slice(),
             Owner::User(group) if group < USERS => user::ROWS.slice(),
             Owner::Job => job::ROWS.slice(),
             _ => return None,
@@ -163,6 +184,9 @@ impl Owner {
             Owner::Spindle => spindle::WORDS.slice(),
             Owner::Coolant => coolant::WORDS.slice(),
             Owner::Squaring => squaring::WORDS.slice(),
+            Owner::HotEnd if HOT_END != 0 => hot_end::WORDS.slice(),
+            Owner::Bed if BED != 0 => bed::WORDS.slice(),
+            Owner::HotEnd | Owner::Bed => squaring::WORDS.slice(),
             Owner::User(_) => user::WORDS.slice(),
             Owner::Job => job::WORDS.slice(),
         }
@@ -224,6 +248,8 @@ const NUMBERS: usize = system::COUNT
     + spindle::COUNT
     + coolant::COUNT
     + squaring::COUNT
+    + HOT_END as usize
+    + BED as usize
     + USERS as usize * user::COUNT
     + job::COUNT;
 const _: () = assert!(
@@ -286,6 +312,8 @@ impl Setting {
             Owner::Spindle => FIRST_SPINDLE,
             Owner::Coolant => FIRST_COOLANT,
             Owner::Squaring => FIRST_SQUARING,
+            Owner::HotEnd => FIRST_HOT_END,
+            Owner::Bed => FIRST_BED,
             Owner::User(group) => FIRST_USER + group * user::COUNT as u8,
             Owner::Job => FIRST_JOB,
         };
@@ -377,8 +405,12 @@ impl Setting {
             Owner::Spindle
         } else if self.0 < FIRST_SQUARING {
             Owner::Coolant
-        } else if self.0 < FIRST_USER {
+        } else if self.0 < FIRST_HOT_END {
             Owner::Squaring
+        } else if self.0 < FIRST_BED {
+            Owner::HotEnd
+        } else if self.0 < FIRST_USER {
+            Owner::Bed
         } else if self.0 < FIRST_JOB {
             Owner::User((self.0 - FIRST_USER) / user::COUNT as u8)
         } else {
@@ -401,6 +433,8 @@ impl Setting {
             Owner::Spindle => self.0 - FIRST_SPINDLE,
             Owner::Coolant => self.0 - FIRST_COOLANT,
             Owner::Squaring => self.0 - FIRST_SQUARING,
+            Owner::HotEnd => self.0 - FIRST_HOT_END,
+            Owner::Bed => self.0 - FIRST_BED,
             Owner::User(_) => (self.0 - FIRST_USER) % user::COUNT as u8,
             Owner::Job => self.0 - FIRST_JOB,
         }
@@ -450,6 +484,9 @@ impl Setting {
             }
             Owner::Pwm => pwm::DEFAULTS.at(index),
             Owner::Spindle => spindle::DEFAULTS.at(index),
+            Owner::HotEnd if HOT_END != 0 => hot_end::DEFAULTS.at(index),
+            Owner::Bed if BED != 0 => bed::DEFAULTS.at(index),
+            Owner::HotEnd | Owner::Bed => None,
             Owner::Coolant | Owner::Squaring | Owner::User(_) | Owner::Job => None,
         };
         value.unwrap_or(0)

@@ -160,6 +160,9 @@ impl Block {
         self.taken |= code.takes;
         self.needed |= code.needs;
         let is_first = match code.action {
+            Action::NonModal(NonModal::Heat(_)) if !Capability::Printer.is_built_in() => {
+                return Err(Status::NotBuiltIn);
+            }
             Action::NonModal(code) => first(&mut self.non_modal, code),
             Action::Motion(mode) if !mode.is_built_in() => return Err(Status::NotBuiltIn),
             Action::Motion(MotionMode::None) => first(&mut self.cancel, ()),
@@ -238,6 +241,11 @@ impl Block {
     pub fn axes(&self) -> impl Iterator<Item = (u8, &Decimal)> {
         let words = self.values.iter().map(|(slot, value)| (*slot, value));
         words.filter(|(slot, _)| usize::from(*slot) < units::AXES)
+    }
+
+    /// M104 to M190, whose S and T are its own.
+    pub fn heats(&self) -> bool {
+        Capability::Printer.is_built_in() && matches!(self.non_modal, Some(NonModal::Heat(_)))
     }
 
     /// M6.

@@ -5,6 +5,7 @@
 //! offsets, planes) has been resolved.
 
 use super::decimal::Exact;
+use super::heating::Heat;
 use super::modal::{MotionMode, Plane, Turn};
 use super::overrides::Change;
 use super::threading::ThreadCycle;
@@ -212,6 +213,8 @@ pub enum Motion {
     },
     /// `{chk:1}`, `{chk:0}`: from here on lines are checked only, or carried out again.
     Check,
+    /// M104 to M190: heaters and the fan.
+    Heat(Heat),
     /// G28.3: no motor moves; the present position is called this.
     SetPosition {
         /// All axes; those that the line does not name are where they were.

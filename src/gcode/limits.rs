@@ -47,7 +47,7 @@ pub(super) fn check_reach(
         return Ok(());
     }
     let from = match motion {
-        Motion::None | Motion::Home { .. } | Motion::Check => return Ok(()),
+        Motion::None | Motion::Home { .. } | Motion::Check | Motion::Heat(_) => return Ok(()),
         Motion::SetPosition { .. } => end,
         _ => start,
     };
@@ -97,9 +97,11 @@ fn check_within(
     limits: &Limits<'_, impl Setup>,
 ) -> Result<(), Status> {
     let target = match motion {
-        Motion::None | Motion::Home { .. } | Motion::Check | Motion::SetPosition { .. } => {
-            return Ok(());
-        }
+        Motion::None
+        | Motion::Home { .. }
+        | Motion::Check
+        | Motion::Heat(_)
+        | Motion::SetPosition { .. } => return Ok(()),
         Motion::Cycle(_) if !Capability::Cycles.is_built_in() => return Ok(()),
         Motion::Cycle(cycle) => return check_cycle(start, cycle, limits),
         Motion::ThreadCycle(_) if !Capability::Lathe.is_built_in() => return Ok(()),

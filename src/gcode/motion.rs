@@ -5,6 +5,7 @@ use super::block::Block;
 use super::codes::NonModal;
 use super::command::{Commands, Feed, Motion};
 use super::modal::{Distance, FeedMode, MotionMode, Turn, Units};
+use super::printing::EXTRUDER;
 use super::setup::Setup;
 use super::state::State;
 use super::words::{AXES, F, ROTARY};
@@ -154,7 +155,12 @@ impl State {
                 break;
             };
             let Some(mut by) = axes::value(word, axis, self.modal.units, setup)? else { continue };
-            let from = match self.modal.distance {
+            let extrudes = i == EXTRUDER && !self.printing.is_usual();
+            let distance = match self.printing.distance() {
+                Some(own) if extrudes => own,
+                _ => self.modal.distance,
+            };
+            let from = match distance {
                 _ if absolute => Length::ZERO,
                 Distance::Absolute => self.origin.get(i).copied().unwrap_or_default(),
                 Distance::Incremental => {
@@ -163,6 +169,16 @@ impl State {
                 }
             };
             let target = from.checked_add(by.units).ok_or(Status::OutOfRange)?;
+            if extrudes {
+                let end = self.flow_to(target)?;
+                if let (Some(position), Some(residue)) =
+                    (self.position.get_mut(i), self.residue.get_mut(i))
+                {
+                    moved.rotary |= end != *position;
+                    (*position, *residue) = (end, by.rest);
+                }
+                continue;
+            }
             if target != *position {
                 match i {
                     ..FIRST_ROTARY => moved.linear = true,

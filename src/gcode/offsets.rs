@@ -145,6 +145,7 @@ impl State {
                 self.shift_is(false)?;
                 self.shift = [Length::ZERO; units::AXES];
             }
+            Some(NonModal::Heat(code)) => Self::heat(block, code, setup, out)?,
             Some(NonModal::SuspendOffset) => self.shift_is(false)?,
             Some(NonModal::ResumeOffset) => self.shift_is(true)?,
         }

@@ -1,6 +1,7 @@
 //! What the interpreter asks about the machine that a program is for. The settings answer
 //! (`tasks::setup`).
 
+use super::heating::Part;
 use super::modal::Defaults;
 use crate::status::Status;
 use crate::units::Length;
@@ -52,6 +53,18 @@ pub trait Setup {
     }
     /// Whether an encoder tells how the spindle turns, or why not.
     fn encoder(&self) -> Result<(), Status> {
+        Ok(())
+    }
+    /// How hot a heater may be made, eighths of a degree; 0 if there is none.
+    fn hottest(&self, _part: Part) -> u16 {
+        275 * 8
+    }
+    /// Whether a heater may be switched on, or why not.
+    fn heats(&self, _part: Part) -> Result<(), Status> {
+        Ok(())
+    }
+    /// Whether the hot end is hot enough for filament to be moved, or why not.
+    fn extrudes(&self) -> Result<(), Status> {
         Ok(())
     }
     /// Whether an axis can be homed, or why not.

@@ -11,6 +11,7 @@ use super::modal::{
     Coolant, Defaults, FeedMode, Modal, MotionMode, PathMode, TOLERANCE, TOLERANCE_MAX, Turn, Units,
 };
 use super::overrides::{Change, Override};
+use super::printing::Printing;
 use super::setup::Setup;
 use super::sticky::Sticky;
 use super::tables::{Edit, Row, Tables};
@@ -52,6 +53,8 @@ pub struct State {
     /// T, and the tool of the last M6.
     pub selected: u8,
     pub tool: u8,
+    /// How the extruder of a printer takes its words.
+    pub printing: Printing,
     /// The words of canned cycles.
     pub sticky: Sticky,
 }
@@ -77,6 +80,7 @@ impl State {
             limit: 0,
             selected: 0,
             tool: 0,
+            printing: Printing::NONE,
             sticky: Sticky::NONE,
         }
     }
@@ -148,6 +152,9 @@ impl State {
         set(&mut modal.feed_mode, block.feed_mode);
         set(&mut modal.plane, block.plane);
         set(&mut modal.units, block.units);
+        if block.distance.is_some() {
+            self.printing.follow();
+        }
         set(&mut modal.distance, block.distance);
         set(&mut modal.arc_distance, block.arc_distance);
         set(&mut modal.retract, block.retract);
@@ -180,6 +187,9 @@ impl State {
             if self.modal.spindle != Turn::Off {
                 out.spindle = Some(self.spindle());
             }
+        }
+        if block.heats() {
+            return Ok(());
         }
         if let Some(value) = block.get(S) {
             if value.negative {

@@ -6,6 +6,7 @@
 //! Who asks for a step has carried out the one before and says where that has led to.
 
 use super::command::{Commands, Cycle, Feed, Motion, Spindle, Stop};
+use super::heating::Heat;
 use super::modal::{MotionMode, Turn};
 use super::overrides::Change;
 use super::threading::ThreadCycle;
@@ -42,6 +43,8 @@ pub enum Step {
     Jog,
     /// Lines are checked only from here on, or carried out again.
     Check,
+    /// Heaters and the fan are to be so.
+    Heat(Heat),
     /// The position is called this.
     SetPosition(PerAxis<Length>),
     /// The program stops or ends.
@@ -229,6 +232,7 @@ impl Steps {
             (Motion::Home { .. }, _) => Some(Step::Home),
             (Motion::Jog { .. }, _) => Some(Step::Jog),
             (Motion::Check, _) => Some(Step::Check),
+            (Motion::Heat(heat), _) => Some(Step::Heat(*heat)),
             (Motion::SetPosition { position }, _) => Some(Step::SetPosition(*position)),
             (Motion::Through { .. } | Motion::Cycle(_) | Motion::ThreadCycle(_), _) => None,
         }

@@ -61,6 +61,7 @@ impl State {
         if modal.units != Units::Mm
             || modal.feed_mode != FeedMode::PerMinute
             || setup.reach().is_some()
+            || !self.printing.is_usual()
             || Capability::Lathe.is_built_in() && modal.x_mode == XMode::Diameter
             || line.len() > usize::from(u8::MAX)
         {

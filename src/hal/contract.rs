@@ -110,6 +110,8 @@ contract! {
         fn stop_late();
         /// How the other side may hold it back from now on. Thread mode.
         fn set_flow(port: u8, flow: Flow);
+        /// Whether `!`, `~`, `%` and bytes above 0x7F are text, from now on. Thread mode.
+        fn set_plain(port: u8, plain: bool);
         /// Sends on what CTS has held back, and XOFF or XON that has waited for long enough. Thread mode, each millisecond.
         fn look();
         /// Line ends lost since start-up, modulo 2^16. Thread mode.
@@ -180,6 +182,17 @@ contract! {
         fn set_frequency(millihertz: u32);
         /// Sets what part of the period the pin is high, in thousandths. Exec, or while it cannot run.
         fn set_share(share: f32);
+    }
+
+    /// Heaters, the sensors of their temperature, and the fan; of boards that have them.
+    trait Heaters in heaters {
+        /// Begins a [reading](crate::heat::sensor) of a heater's sensor: 0 the hot end, 1 the bed. One that is under way goes on instead: it
+        /// takes 4 ms at most. Thread mode. Cost: 30, and 60 cycles of an interrupt each 104 us.
+        fn begin(heater: u8);
+        /// The reading that has been begun last, if it is complete. Thread mode. Cost: 12.
+        fn reading() -> Option<u16>;
+        /// Switches heaters and the fan: bits 0 hot end, 1 bed, 2 fan. Thread mode. Cost: 40.
+        fn switch(on: u8);
     }
 
     /// The count of milliseconds.

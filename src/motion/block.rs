@@ -11,6 +11,7 @@ use super::retract::Retract;
 use super::short::Short;
 use crate::boards::MOTORS;
 use crate::gcode::command::Surface;
+use crate::gcode::heating::Heat;
 use crate::gcode::overrides::Change;
 
 /// Parts of a step to which blocks know where they end: the logarithm of their number.
@@ -34,7 +35,9 @@ impl Block {
     pub fn is_aside(&self) -> bool {
         matches!(
             self.body,
-            Body::Action(Action::Override(_) | Action::Lead(_) | Action::PerTurn(_))
+            Body::Action(
+                Action::Override(_) | Action::Lead(_) | Action::PerTurn(_) | Action::Heat(_)
+            )
         )
     }
 
@@ -92,6 +95,8 @@ pub enum Action {
     PerTurn(bool),
     /// M48 to M51. The machine goes on.
     Override(Change),
+    /// M104 to M190: heaters and the fan are to be so. The machine goes on.
+    Heat(Heat),
     /// M0, M1, M60.
     ProgramStop,
     /// M2, M30.

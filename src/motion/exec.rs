@@ -32,6 +32,7 @@ use super::thread::Thread;
 use crate::boards::outputs;
 use crate::capability::Capability;
 use crate::dda::Segment;
+use crate::gcode::heating::Heat;
 use crate::gcode::overrides::Change;
 use crate::hal::TIMER_HZ;
 use crate::status::Status;
@@ -93,6 +94,8 @@ pub enum Step {
     Leaves,
     /// As `Again`; and an override is to change.
     Override(Change),
+    /// As `Again`; and heaters and the fan are to be so.
+    Heat(Heat),
     /// A program stop, end or change of outputs is due: ask again when the steppers stand still.
     Standstill,
     /// No block.
@@ -342,7 +345,12 @@ impl Exec {
                     self.go_by_speed(*on)
                 }
                 Body::Action(Action::SetPosition(steps)) if !moved => out.target = *steps,
-                Body::Action(Action::SetPosition(_) | Action::Override(_) | Action::Lead(_)) => {}
+                Body::Action(
+                    Action::SetPosition(_)
+                    | Action::Override(_)
+                    | Action::Lead(_)
+                    | Action::Heat(_),
+                ) => {}
                 _ => moved = true,
             }
             blocks.enter();
@@ -426,6 +434,7 @@ impl Exec {
         blocks.release();
         match action {
             Action::Override(change) => Step::Override(*change),
+            Action::Heat(heat) if Capability::Printer.is_built_in() => Step::Heat(*heat),
             Action::ProgramEnd => Step::Override(Change::ALL_ON),
             _ => Step::Again,
         }

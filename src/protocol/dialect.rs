@@ -4,6 +4,7 @@
 //! enum of each of its types, with a variant for each dialect that is built in. Of an image with one dialect the variants
 //! take neither room nor time.
 
+use super::Rewritten;
 use super::line::{Ending, Next, Span};
 use super::machine::Machine;
 use super::notice::Notice;
@@ -25,6 +26,10 @@ pub trait Dialect {
 
     /// Whether lines are answered in their order, empty ones too, and `?` and bytes above 0x7F are taken out of lines wherever they stand.
     const IN_ORDER: bool = false;
+
+    /// Whether a printing host speaks so: `!`, `~`, `%` and bytes above 0x7F are text wherever they stand, blocks are [rewritten](Dialect::rewrite), and only
+    /// lines that are control lines in this dialect overtake.
+    const IS_PLAIN: bool = false;
 
     /// Whether the settings have a port begin in this dialect. If no dialect is chosen they begin in the first of the table.
     fn is_chosen(settings: &Settings, port: u8) -> bool {
@@ -63,9 +68,28 @@ pub trait Dialect {
         status: Status,
         line: &[u8],
         length: u16,
-        speech: Self::Speech,
+        speech: &mut Self::Speech,
         settings: &Settings,
     ) -> Self::Request;
+
+    /// A block of a [plain](Dialect::IS_PLAIN) dialect in the words of the interpreter.
+    fn rewrite<'a>(block: &[u8], out: &'a mut Rewritten) -> Result<&'a [u8], Status> {
+        out.clear();
+        out.extend_from_slice(block).map_err(|_| Status::InputTooLong)?;
+        Ok(out)
+    }
+
+    /// A count of the lines that have been begun, if a line that takes long is told so: [`Notice::Busy`].
+    fn activity(speech: Self::Speech) -> Option<u8> {
+        let _ = speech;
+        None
+    }
+
+    /// Seconds from one [`Notice::Temperatures`] to the next; 0 for none.
+    fn interval_s(memory: &Self::Memory) -> u8 {
+        let _ = memory;
+        0
+    }
 
     /// Begins to tell what is so by now.
     fn tell(notice: Notice, speech: Self::Speech, machine: &mut impl Machine) -> Self::Telling;
@@ -213,6 +237,70 @@ macro_rules! dialects {
                 None
             }
 
+            /// The greeting that an undecided port tells beside that of its dialect: of the dialect whose senders ask by a `?`, else of
+            /// printing hosts.
+            #[small]
+            pub fn of_other_greeting(settings: &Settings) -> Option<Self> {
+                let mut other = Self::of_question(settings);
+                $(#[cfg(feature = $feature)]
+                if <$dialect>::IS_PLAIN && other.is_none() {
+                    other = Some(Self::$name(<$dialect>::speech(settings)));
+                })+
+                other
+            }
+
+            /// Whether an image has a dialect whose senders ask by a `?` alone.
+            pub const HAS_QUESTION: bool = {
+                let mut has = false;
+                $(#[cfg(feature = $feature)]
+                { has |= <$dialect>::IN_ORDER; })+
+                has
+            };
+
+            /// Whether an image has a dialect that is [plain](Dialect::IS_PLAIN).
+            pub const HAS_PLAIN: bool = {
+                let mut has = false;
+                $(#[cfg(feature = $feature)]
+                { has |= <$dialect>::IS_PLAIN; })+
+                has
+            };
+
+            /// See [`Dialect::IS_PLAIN`].
+            #[inline(always)]
+            pub fn is_plain(self) -> bool {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(_) => <$dialect>::IS_PLAIN,)+
+                }
+            }
+
+            /// See [`Dialect::rewrite`].
+            #[inline(always)]
+            pub fn rewrite<'a>(self, block: &[u8], out: &'a mut Rewritten) -> Result<&'a [u8], Status> {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(_) => <$dialect>::rewrite(block, out),)+
+                }
+            }
+
+            /// See [`Dialect::activity`].
+            #[inline(always)]
+            pub fn activity(self) -> Option<u8> {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(speech) => <$dialect>::activity(speech),)+
+                }
+            }
+
+            /// See [`Dialect::interval_s`].
+            #[inline(always)]
+            pub fn interval_s(self, memory: &Memory) -> u8 {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(_) => <$dialect>::interval_s(&memory.$field),)+
+                }
+            }
+
             /// See [`Dialect::IN_ORDER`].
             #[inline(always)]
             pub fn is_in_order(self) -> bool {
@@ -291,7 +379,7 @@ macro_rules! dialects {
                 status: Status,
                 line: &[u8],
                 length: u16,
-                speech: Speech,
+                speech: &mut Speech,
                 settings: &Settings,
             ) -> Self {
                 match speech {
@@ -425,21 +513,23 @@ macro_rules! dialects {
             may
         }
 
-        /// See [`Dialect::is_control`]: in any dialect that is built in.
+        /// See [`Dialect::is_control`]: in any dialect that is built in and is `plain`, or is not.
         #[inline(always)]
-        pub fn is_control(line: &[u8]) -> bool {
+        pub fn is_control(line: &[u8], plain: bool) -> bool {
             let mut is = false;
             $(#[cfg(feature = $feature)]
-            { is = is || <$dialect>::is_control(line); })+
+            { is = is || (<$dialect>::IS_PLAIN == plain && <$dialect>::is_control(line)); })+
             is
         }
 
-        /// See [`Dialect::asks_alarm`]: in any dialect that is built in.
+        /// See [`Dialect::asks_alarm`]: in any dialect that is built in and is `plain`, or is not.
         #[inline(always)]
-        pub fn asks_alarm(line: &[u8]) -> Option<Alarm> {
+        pub fn asks_alarm(line: &[u8], plain: bool) -> Option<Alarm> {
             let mut alarm = None;
             $(#[cfg(feature = $feature)]
-            { alarm = alarm.or_else(|| <$dialect>::asks_alarm(line)); })+
+            if <$dialect>::IS_PLAIN == plain {
+                alarm = alarm.or_else(|| <$dialect>::asks_alarm(line));
+            })+
             alarm
         }
     };
@@ -450,4 +540,6 @@ dialects! {
     tinyg: Tinyg(super::tinyg::Tinyg) if "dialect-tinyg";
     /// grbl's, version 1.1.
     grbl: Grbl(super::grbl::Grbl) if "dialect-grbl";
+    /// That of printing hosts.
+    reprap: RepRap(super::reprap::RepRap) if "dialect-reprap";
 }

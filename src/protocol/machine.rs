@@ -5,6 +5,7 @@ use super::value::Value;
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::Change;
 use crate::gcode::tables::Row;
+use crate::heat::Standing;
 use crate::machine::{Alarm, Cycle, Doing};
 use crate::motion::snapshot::Program;
 use crate::status::Status;
@@ -50,6 +51,22 @@ pub enum Store<'a> {
     End,
     /// A line that is carried out after a start: which of the two, and its text.
     Startup(u8, &'a [u8]),
+}
+
+/// What becomes of a printer's extruder, which is the A axis.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Extruder {
+    /// Its words are measured from where it is, whatever the others are measured from; or no more.
+    Relative(bool),
+    /// It moves so many thousandths of what its words say.
+    Flow(u16),
+    /// It moves by itself, and what its words are measured from moves along with it.
+    Move {
+        /// How far.
+        by: Length,
+        /// mm/min.
+        feed: i32,
+    },
 }
 
 /// The machine behind the dialects. Nothing here waits.
@@ -117,6 +134,29 @@ pub trait Machine {
     fn change_override(&mut self, change: Change);
     /// Powers a motor, or takes its power; all of them for `None`.
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status;
+
+    /// How a heater stands: 0 the hot end, 1 the bed. `None` in an image without [`Capability::Printer`](crate::capability::Capability).
+    fn heater(&mut self, heater: u8) -> Option<Standing>;
+    /// Whether a line waits for a temperature (M109, M190, M116).
+    fn waits_for_heat(&mut self) -> bool;
+    /// Ends that wait (M108): the lines behind it are carried out.
+    fn skip_wait(&mut self);
+    /// Heaters that a fault has locked may be switched on again (M999). The alarm is [cleared](Self::clear) by itself.
+    fn unlock_heaters(&mut self);
+
+    /// Changes how the extruder moves, or moves it. [`Status::Again`]: nothing is done, and it is to be tried again when the planner is free.
+    fn extruder(&mut self, what: Extruder) -> Status {
+        let _ = what;
+        Status::NotBuiltIn
+    }
+
+    /// The origin of these axes, as bits, is no more where G92 has put it: it is where homing has.
+    fn clear_shift(&mut self, axes: u8) {
+        let _ = axes;
+    }
+
+    /// What is held, or stopped by a program, goes on.
+    fn go_on(&mut self) {}
 
     /// Whether lengths are in inches.
     fn inches(&mut self) -> bool {

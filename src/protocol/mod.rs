@@ -11,7 +11,7 @@
 //! | [`machine`], [`value`] | what dialects ask of the machine |
 //! | [`notice`] | what is told unasked |
 //! | [`out`] | where dialects write to |
-//! | [`tinyg`], [`grbl`] | TinyG's dialect, and grbl's |
+//! | [`tinyg`], [`grbl`], `reprap` | TinyG's dialect, grbl's, and that of printing hosts |
 //!
 //! A dialect spells what is neutral here: the numbers and texts of a [`Status`](crate::status::Status), names of settings and values, what
 //! the machine is [doing](crate::machine::Doing). Which dialects an image has is a Cargo feature each; where there is one, nothing is left
@@ -25,6 +25,8 @@ pub mod line;
 pub mod machine;
 pub mod notice;
 pub mod out;
+#[cfg(feature = "dialect-reprap")]
+pub mod reprap;
 #[cfg(feature = "dialect-tinyg")]
 pub mod tinyg;
 pub mod value;
@@ -35,13 +37,16 @@ pub use dialect::{
     jog, may_be_control,
 };
 pub use line::{Ending, Next, Span};
-pub use machine::{Hold, Machine, STARTUP_MAX, Store, Warning};
+pub use machine::{Extruder, Hold, Machine, STARTUP_MAX, Store, Warning};
 pub use notice::{Notice, Occasion};
 pub use out::Out;
 pub use value::{Value, thousandths};
 
 /// Bytes that one step puts at most.
 pub const CHUNK: usize = 64;
+
+/// A block that a dialect has [rewritten](Dialect::rewrite).
+pub type Rewritten = heapless::Vec<u8, 96>;
 
 /// Longest line that may begin an alarm when it arrives: see [`asks_alarm`].
 pub const STOP_MAX: usize = 32;

@@ -26,6 +26,10 @@ pub enum Notice {
     },
     /// How far the axes are ahead of the spindle in a pass, at an index.
     SyncError,
+    /// A line has been waiting for two seconds.
+    Busy,
+    /// Temperatures, which the sender wants to be told of again and again.
+    Temperatures,
     /// How many blocks are free: a queue report.
     Queue,
 }

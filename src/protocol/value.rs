@@ -16,6 +16,8 @@ pub enum Value {
     Velocity,
     /// Feed rate, in 0.001 mm/min.
     Feed,
+    /// How far the extruder moves, in thousandths of what its words say.
+    Flow,
     /// 1 if anything is queued or runs.
     Working,
     /// 1 if a block is being carried out.
@@ -117,6 +119,12 @@ pub enum Value {
     ProbeState,
     /// Where the contact was, in units of a `Length`.
     Probed(u8),
+    /// How hot a heater is, eighths of a degree Celsius: 0 the hot end, 1 the bed. 0 without it.
+    Temperature(u8),
+    /// How hot it is to be, likewise; 0 for off.
+    WantedTemperature(u8),
+    /// How much of its power it has, in thousandths.
+    HeaterPower(u8),
     /// The end whose limit has been hit, which exceptions tell; -1 for none.
     LimitHit,
     /// The axis that could not be homed, which exceptions tell.

@@ -84,6 +84,7 @@ pub fn load<M: Memory>(log: &Log, memory: &M, settings: &mut Settings) {
 mod tests {
     use super::super::tables;
     use super::*;
+    use crate::capability::Capability;
     use std::collections::HashMap;
 
     #[test]
@@ -99,7 +100,8 @@ mod tests {
             assert_eq!(keys.insert(key, Item(Setting::from_number(0).unwrap())), None);
             assert_ne!(key, NO_KEY);
         }
+        let heaters = if Capability::Printer.is_built_in() { 15 } else { 0 };
         assert!(keys.len() <= usize::from(KEYS));
-        assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + 10 + 9 + 2 + 16);
+        assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + 10 + 9 + 2 + 16 + heaters);
     }
 }

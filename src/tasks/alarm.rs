@@ -12,6 +12,7 @@
 
 use kerf_macros::small;
 
+use super::heat;
 use super::hold;
 use super::links::Links;
 use super::spindle;
@@ -42,6 +43,7 @@ pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
     }
     hold::abandon(links);
     spindle::stop(links.thread);
+    heat::stop(links);
     links.except(reason);
 }
 

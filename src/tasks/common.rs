@@ -7,6 +7,7 @@ use crate::encoder::Encoder;
 use crate::gcode::overrides::Overrides;
 use crate::hal::Thread;
 use crate::hal::exec;
+use crate::heat::{Orders, PRINTERS};
 use crate::motion::snapshot::Snapshot;
 use crate::motors::Motors;
 use crate::spindle::Spindle;
@@ -23,6 +24,8 @@ pub struct State {
     pub spindle: Spindle,
     /// What is known of the spindle by its encoder.
     pub encoder: Encoder,
+    /// What heaters are to be, in an image that has them.
+    pub heat: [Orders; PRINTERS],
 }
 
 avr_embassy::shared_static! {
@@ -49,6 +52,7 @@ avr_embassy::shared_static! {
         motors: Motors::new(),
         spindle: Spindle::new(),
         encoder: Encoder::new(),
+        heat: [Orders::OFF; PRINTERS],
     };
 }
 

@@ -142,14 +142,16 @@ impl<'a> Runner<'a> {
             }
             Step::Held if machine::rested() => Next::Turn,
             Step::Idle | Step::Standstill | Step::Held => Next::Block,
-            Step::Again | Step::Leaves | Step::Switched | Step::Override(_) => Next::Turn,
+            Step::Again | Step::Leaves | Step::Switched | Step::Override(_) | Step::Heat(_) => {
+                Next::Turn
+            }
         }
     }
 
     /// The next step of the machine, and what follows from it; a segment is put into the ring.
     #[inline(always)]
     fn step(&mut self, standstill: bool, common: &mut State) -> Step {
-        let State { motion: out, overrides, motors, spindle, encoder } = common;
+        let State { motion: out, overrides, motors, spindle, encoder, heat } = common;
         let used = self.segments.used();
         if self.machine.thread().is_some() {
             look_at_spindle(self.machine, encoder);
@@ -189,6 +191,11 @@ impl<'a> Runner<'a> {
             Step::Override(change) => {
                 overrides::change_in_stream(overrides, change, &mut self.blocks)
             }
+            Step::Heat(wanted) if Capability::Printer.is_built_in() => {
+                if let Some(orders) = heat.first_mut() {
+                    orders.carry_out(&wanted);
+                }
+            }
             Step::Idle if standstill => {
                 self.finished.rest();
                 out.finished = out.line;
@@ -196,7 +203,7 @@ impl<'a> Runner<'a> {
             Step::Held => self.held(out, spindle),
             Step::Leaves if Capability::Lathe.is_built_in() => self.lead(out, motors),
             Step::Switched => self.machine.wait(spindle::switch(spindle, out, true), out),
-            Step::Again | Step::Leaves | Step::Idle | Step::Standstill => {}
+            Step::Again | Step::Leaves | Step::Idle | Step::Standstill | Step::Heat(_) => {}
         }
         // A standstill stays one until a segment leads out of it; velocity is ahead of the segments.
         self.rests = out.velocity.to_bits() == 0 || (self.rests && step != Step::Segment);

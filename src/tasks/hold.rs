@@ -157,6 +157,15 @@ pub fn serve(links: &Links) {
 #[inline(never)]
 #[small]
 fn act(links: &Links, port: &Port, characters: u8) {
+    // A byte of a printing host that became one on its way is missing in its line, which is sent again.
+    let resets = characters & RESET != 0 && machine::is_alarmed();
+    let characters = match port.is_plain() && !resets {
+        true => characters & LET_GO,
+        false => characters,
+    };
+    if port.is_plain() && characters == 0 {
+        return;
+    }
     if characters & RESET != 0 {
         if starts_over(links, port) {
             let works = is_moving(links, port);
@@ -293,7 +302,7 @@ pub fn ahead(links: &Links, port: &Port, mark: u8, slot: u8) {
 }
 
 /// What is held goes on; and what waits at a program stop.
-fn go_on(links: &Links) {
+pub(super) fn go_on(links: &Links) {
     if links.signs.resume.take() && machine::may_resume() {
         machine::take(machine::Event::Resume);
         links.cycle_start.signal();

@@ -105,6 +105,9 @@ pub struct LinePool {
     keep_empty: bool,
     /// No line is a control line: all are answered in their order.
     in_order: bool,
+    /// A printing host speaks: other lines are control lines.
+    #[cfg(feature = "dialect-reprap")]
+    plain: bool,
     /// Longest line.
     longest: u8,
     /// Bytes left to control lines that overtake: as long as they may be.
@@ -129,6 +132,8 @@ impl LinePool {
             returned: false,
             keep_empty: false,
             in_order: false,
+            #[cfg(feature = "dialect-reprap")]
+            plain: false,
             longest: if room > LINE_MAX { LINE_MAX } else { room - 1 } as u8,
             reserve,
             stop: Alarm::None,
@@ -144,6 +149,24 @@ impl LinePool {
     /// Whether this byte acts, and is no part of a line.
     pub fn leaves(&self, byte: u8) -> bool {
         self.in_order && acts(byte)
+    }
+
+    /// Whether a printing host speaks, from now on.
+    pub fn keep_plain(&mut self, keep: bool) {
+        #[cfg(feature = "dialect-reprap")]
+        {
+            self.plain = keep;
+        }
+        let _ = keep;
+    }
+
+    /// Whether a printing host speaks.
+    #[inline(always)]
+    pub fn is_plain(&self) -> bool {
+        #[cfg(feature = "dialect-reprap")]
+        return self.plain;
+        #[cfg(not(feature = "dialect-reprap"))]
+        false
     }
 
     /// Whether all lines are answered in their order, from now on: those that have come, too.
@@ -174,7 +197,11 @@ impl LinePool {
     /// What to do with a line that has come whole.
     #[inline(always)]
     fn classify(&self, line: &[u8]) -> Class {
-        if !self.in_order && is_control(line) { Class::Control } else { Class::Data }
+        if !self.in_order && is_control(line, self.is_plain()) {
+            Class::Control
+        } else {
+            Class::Data
+        }
     }
 
     /// Free slots, not counting the one a line is coming into.
@@ -261,7 +288,7 @@ impl LinePool {
     #[small]
     fn note_control(&mut self, start: usize, len: u8) {
         self.controls += 1;
-        let asked = asks_alarm(self.slice(start, len));
+        let asked = asks_alarm(self.slice(start, len), self.is_plain());
         self.stop = self.stop.max(asked.unwrap_or(Alarm::None));
     }
 
@@ -350,7 +377,10 @@ impl LinePool {
 
     /// Whether the line that is coming in is a question mark so far: whatever follows is another line.
     pub fn is_asking(&self) -> bool {
-        self.partial > 0 && !self.in_order && self.bytes.get(usize::from(self.end)) == Some(&ASKS)
+        self.partial > 0
+            && !self.in_order
+            && !self.is_plain()
+            && self.bytes.get(usize::from(self.end)) == Some(&ASKS)
     }
 
     /// Bytes have come that are not kept.

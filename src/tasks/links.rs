@@ -31,6 +31,7 @@
 
 use core::cell::{Cell, RefCell};
 
+use super::heat::Heaters;
 use super::ports::Port;
 use super::storage::Storage;
 use super::wake::{News, Wake};
@@ -80,6 +81,8 @@ pub struct Links {
     pub rate: Cell<Option<u32>>,
     /// The number of the port that has asked last for the end of an alarm.
     pub cleared_by: Cell<u8>,
+    /// How heaters stand, and what the planner waits for.
+    pub heat: Heaters,
     /// What probing has found.
     pub probe: Probe,
     /// Real-time characters that have not had all their effect yet. Of the control task and the reader, with `tasks::hold`.

@@ -9,6 +9,7 @@ pub mod common;
 pub mod control;
 pub mod exec;
 pub mod health;
+pub mod heat;
 pub mod hold;
 mod homing;
 mod jog;

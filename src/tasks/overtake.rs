@@ -158,7 +158,7 @@ fn find(ring: &Window<'_>, at: u8, most: u8) -> Found {
 #[inline(never)]
 #[small]
 fn take(pool: &mut LinePool, ring: &mut Window<'_>, at: u8, len: u8, ends: bool) -> bool {
-    if !pool.is_control(ring, at, len) || (ends && !take_end(ring, at + len)) {
+    if !pool.is_control(ring, at, len) || (ends && !take_end(ring, at + len, pool.is_plain())) {
         return false;
     }
     pool.put_before(ring, at, len, if ends { 0 } else { u16::MAX });
@@ -185,10 +185,12 @@ fn close(ring: &mut Window<'_>, at: u8, len: u8, closes: bool) -> u8 {
 
 /// Takes the end of a line. It is the only byte that may change meanwhile: if it is the newest, and the ring is full, it becomes the
 /// mark of what is lost behind it. A line feed that is lost there behind a carriage return must not count as an end.
-fn take_end(ring: &mut Window<'_>, at: u8) -> bool {
+fn take_end(ring: &mut Window<'_>, at: u8, plain: bool) -> bool {
     match ring.get(at) {
         b'\n' => ring.replace(at, b'\n', TAKEN),
         b'\r' if ring.is_full() && at + 1 == ring.len() => false,
+        // There TAKEN_RETURN is text.
+        b'\r' if plain => false,
         b'\r' => ring.replace(at, b'\r', TAKEN_RETURN),
         _ => false,
     }

@@ -728,7 +728,7 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
     let mut speech = port.speech.get();
     let settings = links.settings.borrow();
     let mut request = match class {
-        Class::Fault(status) => Request::refused(status, line, length, speech, &settings),
+        Class::Fault(status) => Request::refused(status, line, length, &mut speech, &settings),
         _ => match Request::begin(line, length, &mut speech, &settings) {
             Some(request) => request,
             None => return Begun::Silent,
@@ -736,7 +736,7 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
     };
     drop(settings);
     port.speech.set(speech);
-    port.has_stopped.set(class == Class::Control && asks_alarm(line).is_some());
+    port.has_stopped.set(class == Class::Control && asks_alarm(line, port.is_plain()).is_some());
     if let Some(block) = request.gcode() {
         let (status, commented) = run_block(links, port, block.of(line), tried);
         if status == Status::Again {
@@ -848,9 +848,43 @@ fn step(links: &Links, port: &Port, id: LineId, request: &mut Request, tx: &mut 
 #[inline(never)]
 fn run_block(links: &Links, port: &Port, block: &[u8], tried: Usual) -> (Status, bool) {
     match links.may_feed(port) {
+        #[cfg(feature = "dialect-reprap")]
+        true if port.is_plain() => interpret_rewritten(links, port, block),
         true => interpret(links, block, tried),
         false => (Status::Muted, true),
     }
+}
+
+/// Interprets a block of a printing host.
+#[cfg(feature = "dialect-reprap")]
+#[inline(never)]
+#[small]
+fn interpret_rewritten(links: &Links, port: &Port, block: &[u8]) -> (Status, bool) {
+    let mut text = crate::protocol::Rewritten::new();
+    let mut model = links.model.borrow_mut();
+    model.begin_printing();
+    if model.is_far() && !machine::is_alarmed() && !machine::is_checking() {
+        drop(model);
+        return (move_back(links), true);
+    }
+    drop(model);
+    match port.speech.get().rewrite(block, &mut text) {
+        Ok(block) => interpret(links, block, Usual::NotTried),
+        Err(status) => (status, true),
+    }
+}
+
+/// Of a printer the extruder goes on and on: before it gets too far from the origin the place where it is gets a nearer one's name. [`Status::Again`]: the line is
+/// carried out then.
+#[cfg(feature = "dialect-reprap")]
+#[inline(never)]
+#[small]
+fn move_back(links: &Links) -> Status {
+    let mut commands = links.commands.borrow_mut();
+    links.model.borrow_mut().move_back(&mut commands);
+    links.commands_taken.set(true);
+    links.planner_wake.signal();
+    Status::Again
 }
 
 /// Ends the program, as M2 does, for one that has been killed, or reset. The planner is free.

@@ -6,6 +6,8 @@
 //! In a queue flush it forgets the line, has exec drop the blocks, and starts from where the motors are.
 
 mod check;
+#[cfg(feature = "printer")]
+mod heat;
 mod home;
 mod jog;
 mod merge;
@@ -34,6 +36,8 @@ use super::parser;
 use super::ports::OTHERS;
 use crate::capability::Capability;
 use crate::gcode::command::{Commands, Feed, Motion, Spindle, Stop};
+#[cfg(feature = "printer")]
+use crate::gcode::heating::Heat;
 use crate::gcode::interpreter::Modes;
 use crate::gcode::modal::FeedMode;
 use crate::gcode::overrides::Change;
@@ -67,6 +71,9 @@ pub struct Planner {
     /// It has been told of a surface speed, and that feeds are a turn.
     has_surface: bool,
     per_turn: bool,
+    /// A heater or the fan has been switched on since the last end of a program.
+    #[cfg(feature = "printer")]
+    heats: bool,
     /// How far the line has been carried out.
     steps: Steps,
     walk: Ongoing,
@@ -117,6 +124,8 @@ enum Turn {
     Thread,
     /// The line homes.
     Home,
+    /// The line waits for a temperature.
+    Heat,
     /// The axis is jogged.
     Jog,
     /// The line is done.
@@ -167,6 +176,11 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
                         Turn::AwaitSpindle | Turn::Thread => {}
                         Turn::Home => planner.home().await,
                         Turn::Jog => planner.jog().await,
+                        #[cfg(feature = "printer")]
+                        Turn::Heat => planner.await_heat().await,
+                        // No line asks for it.
+                        #[cfg(not(feature = "printer"))]
+                        Turn::Heat => {}
                     }
                 }
             }
@@ -227,6 +241,8 @@ impl Planner {
             outputs: Outputs { on: 0, speed: 0.0 },
             has_surface: false,
             per_turn: false,
+            #[cfg(feature = "printer")]
+            heats: false,
             steps: Steps::default(),
             walk: Ongoing::None,
             begun: Begun::Nothing,
@@ -378,6 +394,11 @@ impl Planner {
                 self.switch(u8::MAX, 0, 0.0);
                 self.steps.repeat();
             }
+            #[cfg(feature = "printer")]
+            Step::Stop(Stop::End) if self.heats => {
+                self.heat(&Heat::OFF);
+                self.steps.repeat();
+            }
             Step::Stop(Stop::End) => self.pause(Action::ProgramEnd),
             Step::Stop(_) | Step::Tool(_) => {
                 let waits = self.links.settings.borrow().waits_at_stop();
@@ -395,6 +416,15 @@ impl Planner {
             Step::Home => return Turn::Home,
             Step::Jog => return Turn::Jog,
             Step::Check => self.check(),
+            #[cfg(feature = "printer")]
+            Step::Heat(heat) => {
+                if self.heat(heat) {
+                    return Turn::Heat;
+                }
+            }
+            // No line asks for it.
+            #[cfg(not(feature = "printer"))]
+            Step::Heat(_) => {}
         }
         Turn::More
     }
@@ -587,6 +617,10 @@ impl Planner {
             links.changes.take_flipped();
             let surface = motion.surface.first().filter(|surface| surface.is_on());
             links.model.borrow_mut().set_outputs(&spindle, surface, coolant);
+        }
+        #[cfg(feature = "printer")]
+        if machine::is_killing() {
+            super::heat::forget_orders(links.thread);
         }
         links.job.set(Job::default());
         let (cycle, killed) = machine::dropped();

@@ -139,13 +139,24 @@ impl Port {
 
     /// Whether `?` and bytes above 0x7F are looked for within lines.
     pub fn is_eager(&self) -> bool {
-        self.is_undecided() || self.speech.get().is_in_order()
+        self.waits_for_question() || self.speech.get().is_in_order()
+    }
+
+    /// Whether a `?` at the beginning of a line decides.
+    pub fn waits_for_question(&self) -> bool {
+        Speech::HAS_QUESTION && self.is_undecided()
+    }
+
+    /// Whether a printing host speaks there.
+    #[inline(always)]
+    pub fn is_plain(&self) -> bool {
+        Speech::HAS_PLAIN && self.speech.get().is_plain()
     }
 
     /// How the two sides stop each other: characters for it are for dialects whose senders know them.
     pub fn flow(&self, settings: &Settings) -> Flow {
         match Flow::of(self.number, settings.flow_control()) {
-            Flow::Characters if self.speech.get().is_in_order() => Flow::None,
+            Flow::Characters if self.speech.get().is_in_order() || self.is_plain() => Flow::None,
             flow => flow,
         }
     }
@@ -246,6 +257,9 @@ impl Links {
     pub fn decided(&self, settings: &Settings) {
         let eager = self.ports.iter().filter(|port| port.is_eager());
         set_eager(eager.fold(0, |ports, port| ports | 1 << port.number));
+        if Speech::HAS_PLAIN {
+            self.ports.iter().for_each(|port| uart::set_plain(port.number, port.is_plain()));
+        }
         self.set_flow(settings);
         if self.ports.iter().any(|port| port.speech.get().is_in_order()) {
             self.model.borrow_mut().begin_with_rapids();

@@ -6,6 +6,7 @@
 
 use super::common;
 use super::health;
+use super::heat;
 use super::links::Links;
 use super::{surface, turning};
 use crate::config::Settings;
@@ -22,6 +23,7 @@ const LOOK_MS: u64 = 20;
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
     loop {
+        heat::look(links);
         health::look();
         links.signs.age(millis());
         look(links);

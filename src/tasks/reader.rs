@@ -25,6 +25,7 @@ use crate::hal::serial::{
 };
 use crate::hal::uart::{self, lost_ends};
 use crate::machine;
+use crate::protocol::Speech;
 use crate::status::Status;
 
 /// Pieces taken before others get a turn: a piece is a line, or a part of one, and its end.
@@ -164,7 +165,8 @@ impl<const N: usize> Intake<N> {
                 return Left::Full;
             }
             let next = self.received.waiting().first().copied();
-            let decides = next == Some(b'?') && self.port.is_undecided() && !pool.is_within_line();
+            let decides =
+                next == Some(b'?') && self.port.waits_for_question() && !pool.is_within_line();
             if decides || next.is_some_and(|next| pool.leaves(next)) {
                 // It has come since the ring was looked through.
                 return Left::Bytes;
@@ -185,6 +187,7 @@ impl<const N: usize> Intake<N> {
                 CUT | GO => return Left::Placed(byte),
                 ..MARKS => self.loss(pool, byte, links),
                 // A line was here that has overtaken. It counts already.
+                TAKEN_RETURN if pool.is_plain() => pool.put(byte),
                 TAKEN | TAKEN_RETURN => {
                     pool.follow(byte == TAKEN_RETURN);
                     false
@@ -223,6 +226,9 @@ impl<const N: usize> Intake<N> {
         let speech = self.port.speech.get();
         pool.keep_empty(speech.answers_empty());
         pool.keep_order(speech.is_in_order());
+        if Speech::HAS_PLAIN {
+            pool.keep_plain(speech.is_plain());
+        }
     }
 
     /// The line that has come last may decide for a dialect: those right behind it are taken as it has them.

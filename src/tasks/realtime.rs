@@ -46,7 +46,7 @@ pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
     while n < ring.len() {
         let byte = ring.get(n);
         closes &= byte >= MARKS || byte == GO;
-        if port.is_undecided() && byte == ASKS && !within {
+        if port.waits_for_question() && byte == ASKS && !within {
             decide(links, port);
         }
         within = if byte < b' ' { false } else { within || byte != b' ' };

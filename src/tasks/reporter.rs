@@ -31,6 +31,11 @@ use crate::status::Status;
 
 /// How often a busy machine is looked at, ms.
 const POLL_MS: u64 = 10;
+/// How often a machine at rest is looked at for a printing host, ms.
+const LOOK_MS: u64 = 100;
+#[cfg(feature = "dialect-reprap")]
+/// A line that takes longer is told so, again and again, ms.
+const BUSY_MS: u32 = 2_000;
 /// How often room is looked for on a port that is told besides.
 const PATIENCE: u8 = 20;
 /// How many times a report ends its line early for an answer: each line of a report takes the serial line's time for its frame.
@@ -58,6 +63,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
     let mut told =
         Told { state: State::FIRST, blocks_free: queue_free(), at: millis(), starved: false };
     let mut due = true;
+    let mut clock = Clock::new();
     loop {
         // Once: `stv` counts the others.
         let exception = &links.notices.exception;
@@ -95,6 +101,11 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         if turning::take_news(links.thread) && links.settings.borrow().reports_each_turn() {
             tell(links, links.told(), Notice::SyncError).await;
         }
+        if Speech::HAS_PLAIN
+            && let Some(notice) = clock.due(links)
+        {
+            tell(links, links.told(), notice).await;
+        }
         let state = State::now(links);
         let (jogged, flushed) = (links.notices.jogged.take(), links.notices.flushed.take());
         if jogged || flushed {
@@ -117,10 +128,68 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         if due || moves {
             let pause = after_ms(POLL_MS);
             select(pause, links.reporter_wake.wait()).await;
+        } else if Speech::HAS_PLAIN && links.told().is_plain() {
+            let pause = after_ms(LOOK_MS);
+            select(pause, links.reporter_wake.wait()).await;
+            due = true;
         } else {
             links.reporter_wake.wait().await;
             due = true;
         }
+    }
+}
+
+/// What a printing host is told again and again.
+#[cfg(feature = "dialect-reprap")]
+struct Clock {
+    /// Since when no line has been begun, and how many had been.
+    since: u32,
+    lines: u8,
+    /// When temperatures were told last.
+    told: u32,
+}
+
+#[cfg(feature = "dialect-reprap")]
+impl Clock {
+    fn new() -> Self {
+        Self { since: millis(), lines: 0, told: millis() }
+    }
+
+    /// What is due by now: temperatures where the host wants them, and that a line takes long.
+    #[inline(never)]
+    #[small]
+    fn due(&mut self, links: &Links) -> Option<Notice> {
+        let (port, now) = (links.told(), millis());
+        let speech = port.speech.get();
+        let lines = speech.activity()?;
+        let interval_ms = u32::from(speech.interval_s(&links.report.borrow())) * 1_000;
+        if interval_ms != 0 && now.wrapping_sub(self.told) >= interval_ms {
+            self.told = now;
+            return Some(Notice::Temperatures);
+        }
+        if lines != self.lines || !port.lines.borrow().has_data() {
+            (self.lines, self.since) = (lines, now);
+        }
+        if now.wrapping_sub(self.since) < BUSY_MS {
+            return None;
+        }
+        self.since = now;
+        Some(Notice::Busy)
+    }
+}
+
+/// Nobody is told anything again and again.
+#[cfg(not(feature = "dialect-reprap"))]
+struct Clock;
+
+#[cfg(not(feature = "dialect-reprap"))]
+impl Clock {
+    fn new() -> Self {
+        Self
+    }
+
+    fn due(&mut self, _links: &Links) -> Option<Notice> {
+        None
     }
 }
 
@@ -294,7 +363,7 @@ pub fn tell_startup(links: &Links, line: u8, status: Status) {
 #[inline(never)]
 #[small]
 fn greet_otherwise(links: &Links, port: &Port, tx: &mut Tx) {
-    let Some(speech) = Speech::of_question(&links.settings.borrow()) else { return };
+    let Some(speech) = Speech::of_other_greeting(&links.settings.borrow()) else { return };
     let notice = Notice::Greeting(Occasion::Ready);
     let mut telling = Telling::begin(notice, speech, &mut View::of(links, port));
     while step(&mut telling, links, port, tx) {}

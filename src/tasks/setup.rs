@@ -7,6 +7,7 @@ use crate::boards::{ACTIVE, inputs};
 use crate::config::getters::TRAVEL_NONE;
 use crate::config::groups::system;
 use crate::config::{Settings, StepRatio};
+use crate::gcode::heating::Part;
 use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::hal::{encoder, inputs as pins};
@@ -83,6 +84,25 @@ impl Setup for Settings {
             None => Err(Status::NoEncoderInput),
             Some(_) if encoder::is_set_up() => Ok(()),
             Some(_) => Err(Status::NoEncoder),
+        }
+    }
+
+    fn hottest(&self, part: Part) -> u16 {
+        let heating = self.heating.first();
+        heating.and_then(|heating| heating.hottest.get(part as usize).copied()).unwrap_or(0)
+    }
+
+    fn heats(&self, _part: Part) -> Result<(), Status> {
+        match self.heating.first().map(|heating| heating.refused) {
+            None | Some(Status::Ok) => Ok(()),
+            Some(refused) => Err(refused),
+        }
+    }
+
+    fn extrudes(&self) -> Result<(), Status> {
+        match self.heating.first() {
+            Some(heating) if !heating.extrudes => Err(Status::TooCold),
+            _ => Ok(()),
         }
     }
 

@@ -60,7 +60,7 @@ impl Scan {
         for n in from..ring.len() {
             match ring.get(n) {
                 b'\n' | b'\r' => {
-                    if let Some(alarm) = asks_alarm(&line).filter(|_| whole) {
+                    if let Some(alarm) = asks_alarm(&line, port.is_plain()).filter(|_| whole) {
                         alarm::raise(links, alarm);
                         pool.terminate(hold::dropped());
                         port.cut.set(Some(ring.slot(n)));

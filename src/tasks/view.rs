@@ -11,6 +11,7 @@ use core::cell::{OnceCell, RefMut};
 use super::alarm;
 use super::common::{snapshot, with};
 use super::health;
+use super::heat;
 use super::hold;
 use super::homing;
 use super::links::{Changes, Links};
@@ -35,12 +36,15 @@ use crate::hal::Thread;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::event::Event;
 use crate::hal::{flags, gpio, inputs as pins, stepper, uart, watchdog};
+use crate::heat::Standing;
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::machine::jog::Bar;
 use crate::machine::{self, Alarm, Cycle, Doing};
 use crate::motion::dynamics;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Program};
+#[cfg(feature = "dialect-reprap")]
+use crate::protocol::Extruder;
 use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
@@ -199,7 +203,7 @@ impl<'a> View<'a> {
 
     /// Whether lines of G-code wait that are carried out first. Where lines are answered in their order those of the port come later.
     fn has_others(&self) -> bool {
-        let in_order = self.port.speech.get().is_in_order();
+        let in_order = self.port.speech.get().is_in_order() || self.port.is_plain();
         self.links.ports.iter().any(|port| {
             !(in_order && port.number == self.port.number) && port.lines.borrow().has_data()
         })
@@ -246,6 +250,10 @@ impl<'a> View<'a> {
             return -1;
         }
         (pins::worked() >> input & 1).into()
+    }
+
+    fn standing(&self, heater: u8) -> Standing {
+        heat::standing(self.links, heater).unwrap_or_default()
     }
 
     /// S, thousandths of a turn a minute.
@@ -302,6 +310,9 @@ impl Machine for View<'_> {
                 return Err(Status::NotAccepted);
             }
             self.links.storage.set_cold(setting, value)?;
+            if Capability::Printer.is_built_in() {
+                heat::set(&self.links.heat, &mut self.settings, setting, value);
+            }
             if is_encoder {
                 turning::set_up(self.links.thread, self.links.storage);
                 return Ok(Warning::None);
@@ -359,6 +370,7 @@ impl Machine for View<'_> {
             Value::Running => self.motion().running.into(),
             // Lines that move nothing are finished when all before them are.
             Value::FinishedLine if !self.is_busy() => self.modal(Value::BlockLine),
+            Value::Flow => self.links.model.borrow().flow().into(),
             Value::FinishedLine => self.motion().finished as i32,
             Value::MotionLine => self.motion().line as i32,
             Value::Velocity => thousandths(self.motion().velocity * 60.0),
@@ -413,6 +425,9 @@ impl Machine for View<'_> {
             Value::Pass => turning::pass(self.links.thread) as i32,
             Value::PulseMisfits => turning::misfits(self.links.thread).into(),
             Value::Starvations => health::starvations().into(),
+            Value::Temperature(heater) => self.standing(heater).now.into(),
+            Value::WantedTemperature(heater) => self.standing(heater).to.into(),
+            Value::HeaterPower(heater) => i32::from(self.standing(heater).power) * 1_000 / 255,
             Value::Kept => self.links.storage.is_done().into(),
             Value::Home => self.home_state(),
             Value::Door if !self.links.signs.door.get() => 0,
@@ -472,6 +487,7 @@ impl Machine for View<'_> {
         self.links.changes.note(Changes::STEPS | Changes::SETTINGS);
         self.links.storage.forget_cold();
         spindle::set_all(self.links.thread, self.links.storage);
+        heat::set_all(&self.links.heat, &mut self.settings, self.links.storage);
         self.links.storage.note(0, ITEMS);
         set_hardware(self.links.thread, &self.settings);
         self.links.set_flow(&self.settings);
@@ -562,6 +578,22 @@ impl Machine for View<'_> {
         self.begin(Motion::Check, if on { machine::Event::Check } else { machine::Event::Done })
     }
 
+    fn heater(&mut self, heater: u8) -> Option<Standing> {
+        heat::standing(self.links, heater)
+    }
+
+    fn waits_for_heat(&mut self) -> bool {
+        self.links.heat.waits()
+    }
+
+    fn skip_wait(&mut self) {
+        self.links.heat.end_wait();
+    }
+
+    fn unlock_heaters(&mut self) {
+        heat::unlock(&mut self.settings);
+    }
+
     fn hold_back(&mut self) {
         // A tilde that has come before is not meant.
         self.links.signs.clear();
@@ -572,6 +604,39 @@ impl Machine for View<'_> {
     fn start_over(&mut self) {
         self.port.ask(RESET);
         flags::set(Event::Realtime);
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn extruder(&mut self, what: Extruder) -> Status {
+        let (links, alarm) = (self.links, machine::alarm());
+        let mut model = links.model.borrow_mut();
+        match what {
+            Extruder::Relative(relative) => model.set_relative(relative),
+            Extruder::Flow(flow) => model.set_flow(flow),
+            _ if alarm != Alarm::None => return alarm.status(),
+            _ if machine::is_checking() => {}
+            _ if links.commands_taken.get() || machine::is_flushing() => return Status::Again,
+            Extruder::Move { by, feed } => {
+                let done = model.extrude(by, feed as f32, &mut links.commands.borrow_mut());
+                if let Err(status) = done {
+                    return status;
+                }
+                links.commands_taken.set(true);
+                links.planner_wake.signal();
+            }
+        }
+        Status::Ok
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn clear_shift(&mut self, axes: u8) {
+        self.links.model.borrow_mut().clear_shift(axes);
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn go_on(&mut self) {
+        self.links.signs.resume.set(true);
+        hold::go_on(self.links);
     }
 
     fn jog(&mut self, axis: u8, place: Length) -> Status {

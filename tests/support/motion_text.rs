@@ -38,7 +38,7 @@ impl MotionText {
             Canon::Tool(number) => self.say(format!("TOOL {number}")),
             Canon::Stop => self.say("STOP".into()),
             Canon::End => self.say("END".into()),
-            Canon::SetPosition(_) | Canon::Home(..) | Canon::Thread(..) => {
+            Canon::SetPosition(_) | Canon::Home(..) | Canon::Thread(..) | Canon::Heat(_) => {
                 panic!("the other interpreter has no {command}")
             }
             Canon::Rate(_) | Canon::ExactStop(_) | Canon::Overrides(_) | Canon::Message(_) => {}

@@ -69,6 +69,7 @@ impl Plain {
             Canon::Stop => "M0".into(),
             Canon::End => "M2".into(),
             Canon::Overrides(_) => unreachable!("they are written one by one"),
+            Canon::Heat(_) => unreachable!("no program of these tests heats"),
         };
         self.text += &line;
         self.text.push('\n');

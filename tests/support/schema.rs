@@ -14,7 +14,8 @@ fn owners() -> Vec<(String, Owner)> {
     };
     let motors = (0..4).map(Owner::Motor);
     let axes = (0..6).map(Owner::Axis);
-    let outputs = [Owner::Pwm, Owner::Spindle, Owner::Coolant, Owner::Squaring];
+    let outputs =
+        [Owner::Pwm, Owner::Spindle, Owner::Coolant, Owner::Squaring, Owner::HotEnd, Owner::Bed];
     let user = (0..4).map(Owner::User);
     [Owner::System]
         .into_iter()
@@ -55,6 +56,8 @@ fn title(owner: Owner) -> &'static str {
         Owner::Spindle => "Spindle",
         Owner::Coolant => "Coolant",
         Owner::Squaring => "Squaring",
+        Owner::HotEnd => "Hot end",
+        Owner::Bed => "Bed",
         Owner::User(_) => "User data",
         Owner::Job => "Job",
     }

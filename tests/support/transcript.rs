@@ -22,7 +22,7 @@
 //! job examples/square.gcode   each line of a file is sent when the one before it has been taken, and none is refused
 //! ```
 //!
-//! Automatic reports (`sr`, `qr`), empty lines and grbl's greeting are passed over unless they are the line expected next. Any other line
+//! Automatic reports (`sr`, `qr`), empty lines, `start` and grbl's greeting are passed over unless they are the line expected next. Any other line
 //! that nobody expects fails the transcript, and so does silence where a line is expected. Motors 1 to 4
 //! are `M1` to `M4`, or `X Y Z A`, which is what they move by default.
 
@@ -298,6 +298,8 @@ const GREETING: &str = "{\"r\":{\"fv\":*\"SYSTEM READY\"},\"f\":[1,0,0]}";
 
 /// The greeting of grbl's dialect, likewise.
 const OTHER_GREETING: &str = "Grbl 1.1h ['$' for help]";
+/// The greeting of printing hosts, likewise.
+const START: &str = "start";
 
 impl<S: Side> Player<'_, S> {
     fn play(&mut self, event: &Event) -> Result<(), String> {
@@ -363,7 +365,8 @@ impl<S: Side> Player<'_, S> {
             line == wanted
                 || without_version(line) == wanted
                 || (wanted.contains('*')
-                    && (wanted.starts_with(['<', '[']) || wanted.starts_with("{\"sr\":"))
+                    && (wanted.starts_with(['<', '[', 'X', 'F', 'E', 'o', '*'])
+                        || wanted.starts_with("{\"sr\":"))
                     && matches(wanted, line))
         })
     }
@@ -398,7 +401,7 @@ impl<S: Side> Player<'_, S> {
         }
         // Where nothing decides between dialects yet each sender finds its own greeting.
         let other = line.trim_end_matches('\r');
-        if other.is_empty() || other == OTHER_GREETING {
+        if other.is_empty() || [OTHER_GREETING, START].contains(&other) {
             return true;
         }
         let report = line.starts_with("{\"sr\":") || line.starts_with("{\"qr\":");

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use crate::process::root;
 
 /// Where a dialect may be named: its own folder, the table, and tools.
-const KNOWN: [&str; 6] = [
+const KNOWN: [&str; 7] = [
     "src/protocol/grbl/",
+    "src/protocol/reprap/",
     "src/protocol/tinyg/",
     "src/protocol/dialect.rs",
     "src/protocol/mod.rs",

@@ -4,7 +4,9 @@ use std::format;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
-use super::groups::{Meaning, axis, coolant, job, motor, pwm, spindle, squaring, system, user};
+use super::groups::{
+    Meaning, axis, bed, coolant, hot_end, job, motor, pwm, spindle, squaring, system, user,
+};
 use super::name::token;
 use super::table::{CLAMP, HOMING, IDLE, JERK, Kind, MODE, RADIUS, Row};
 use super::{Digits, Fixed, Name, Owner, Setting, Words, machines};
@@ -86,7 +88,7 @@ refused. A line is looked at when it is carried out, not before.
 
 /// All of it.
 pub fn markdown() -> String {
-    let groups: [(&str, &str, &[Owner], &[Meaning]); 9] = [
+    let groups: [(&str, &str, &[Owner], &[Meaning]); 11] = [
         (
             "The machine",
             "The group `sys`; names have no prefix.",
@@ -120,6 +122,18 @@ the spindle is off, S24000 is 10 V. A spindle of 12,000 RPM wants `{p1:{csh:1200
             "The group `sq`: `sqsw`. Homing squares an axis whose two motors have a switch each.",
             &[Owner::Squaring],
             &squaring::MEANINGS,
+        ),
+        (
+            "Hot end",
+            "The group `he1`: `he1p`. Of images that can print.",
+            &[Owner::HotEnd],
+            &hot_end::MEANINGS,
+        ),
+        (
+            "Bed",
+            "The group `he3`: `he3p`. Of images that can print.",
+            &[Owner::Bed],
+            &bed::MEANINGS,
         ),
         (
             "User data",
@@ -344,6 +358,10 @@ mod tests {
             (Owner::Spindle, &spindle::MEANINGS),
             (Owner::Coolant, &coolant::MEANINGS),
             (Owner::Squaring, &squaring::MEANINGS),
+            #[cfg(feature = "printer")]
+            (Owner::HotEnd, &hot_end::MEANINGS),
+            #[cfg(feature = "printer")]
+            (Owner::Bed, &bed::MEANINGS),
             (Owner::User(0), &user::MEANINGS),
             (Owner::Job, &job::MEANINGS),
         ] {

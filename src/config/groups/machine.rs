@@ -101,9 +101,9 @@ group! {
         PBO "pbo": int(0, 1), 1,
             words(text!("probe backs off"), OFF_ON),
             "Whether a probe goes back to the contact. With 0 the machine stays where it came to rest, beyond the contact.";
-        DIA "dia": int(0, 15), ACTIVE.dialect as i32,
+        DIA "dia": int(0, if cfg!(feature = "dialect-reprap") { 63 } else { 15 }), ACTIVE.dialect as i32,
             words(text!("protocol dialect"), text!(" [0=auto,1=g2core,2=TinyG,3=grbl]")),
-            "Whom the sender takes the machine for. With 0 a port speaks TinyG's dialect, or grbl's if the first that is said there in one alone is grbl's. 2 and 3 are one alone, from the next reset on. The second port is as the first, or by itself with 4 more (as 0), 8 more (as 2) or 12 more (as 3): 11 is grbl on the first and TinyG on the second. As a g2core it ends responses with `[1,status,length]` and has that one's `fb`, `fv`, `hp`, `hv`, prompts, and some status codes and texts.";
+            "Whom the sender takes the machine for. With 0 a port speaks TinyG's dialect, or grbl's if the first that is said there in one alone is grbl's. 2 and 3 are one alone, from the next reset on. The second port is as the first, or by itself with 4 more (as 0), 8 more (as 2) or 12 more (as 3): 11 is grbl on the first and TinyG on the second. 16 more is RepRap's on the first, 32 more on the second, in images that have it. As a g2core it ends responses with `[1,status,length]` and has that one's `fb`, `fv`, `hp`, `hv`, prompts, and some status codes and texts.";
         GRM "grm": int(0, 63), 1,
             bare(text!("grbl report mask")),
             "What grbl's reports have: 1 machine position (else work position), 2 free blocks and bytes; 4 inches. Its senders know the first two bits as number 10, the third as 13. 8 holds the machine behind a line of G-code that is refused, until `~` or a reset. 16 has reports tell in a thread how far the axes are ahead of the spindle (`Se`), and 32 has each index pulse tell it, in TinyG's dialect too (`spf`): 4 and 8 of number 10.";

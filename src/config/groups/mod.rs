@@ -16,12 +16,14 @@
 //! To add a setting, add its row, and a getter in `getters.rs`. A machine that wants another default has it in its file under `machines/`.
 
 mod axes;
+mod heaters;
 mod machine;
 mod motors;
 mod outputs;
 mod sender;
 
 pub use axes::axis;
+pub use heaters::{bed, hot_end};
 pub use machine::system;
 pub use motors::{motor, squaring};
 pub use outputs::{coolant, pwm, spindle};

@@ -88,6 +88,27 @@ pub enum NonModal {
     SuspendOffset,
     /// G92.3.
     ResumeOffset,
+    /// M104 to M190.
+    Heat(HeatCode),
+}
+
+/// Heaters and fans.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum HeatCode {
+    /// M104.
+    SetHotEnd,
+    /// M109.
+    ReachHotEnd,
+    /// M140.
+    SetBed,
+    /// M190.
+    ReachBed,
+    /// M116.
+    ReachAll,
+    /// M106.
+    Fan,
+    /// M107.
+    FanOff,
 }
 
 /// Group 8.

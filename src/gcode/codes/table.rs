@@ -1,12 +1,12 @@
 //! The rows of the language.
 
-use super::{Action, Code, NonModal, OverrideCode, StopCode, Switch, ToolLength};
+use super::{Action, Code, HeatCode, NonModal, OverrideCode, StopCode, Switch, ToolLength};
 use crate::gcode::modal::{
     ArcDistance, Coolant, Distance, FeedMode, MotionMode, PathMode, Plane, Retract, SpeedMode,
     Turn, Units, XMode,
 };
 use crate::gcode::overrides::Override;
-use crate::gcode::words::{self, AXES, D, E, H, K, L, OFFSETS, P, Q, R, S, bit};
+use crate::gcode::words::{self, AXES, D, E, H, K, L, OFFSETS, P, Q, R, S, T, bit};
 
 /// A code without words of its own.
 const fn code(number: u16, action: Action) -> Code {
@@ -56,7 +56,7 @@ pub const STARTS: usize = DENSE as usize + 1;
 /// Rows of G codes.
 pub const G_ROWS: usize = 74;
 /// Rows of M codes.
-pub const M_ROWS: usize = 21;
+pub const M_ROWS: usize = 28;
 
 crate::progmem! {
     /// G codes, by number.
@@ -174,7 +174,18 @@ const M_TABLE: [Code; M_ROWS] = [
     with(501, set(Override::Traverse, Switch::Maybe), bit(P)),
     with(510, set(Override::Spindle, Switch::Maybe), bit(P)),
     code(600, Action::Stop(StopCode::Program)),
+    heat(1_040, HeatCode::SetHotEnd, bit(S) | bit(T)),
+    heat(1_060, HeatCode::Fan, bit(S) | bit(P)),
+    heat(1_070, HeatCode::FanOff, bit(P)),
+    heat(1_090, HeatCode::ReachHotEnd, bit(S) | bit(R) | bit(T)),
+    heat(1_160, HeatCode::ReachAll, 0),
+    heat(1_400, HeatCode::SetBed, bit(S)),
+    heat(1_900, HeatCode::ReachBed, bit(S) | bit(R)),
 ];
+
+const fn heat(number: u16, code: HeatCode, takes: u32) -> Code {
+    with(number, Action::NonModal(NonModal::Heat(code)), takes)
+}
 
 const fn starts<const N: usize>(rows: &[Code; N]) -> [u8; STARTS] {
     assert!(N <= u8::MAX as usize, "more rows than a byte can count: make the starts `u16`");

@@ -7,6 +7,7 @@
 //! | TIMER0_COMPA | [`avr_embassy::time`] | 1 | counts milliseconds |
 //! | INT, PCINT, TIMER2_COMPA | `edges`, `inputs` | 1 | looks at the switches when one moves |
 //! | INT, PCINT of the encoder's pins | `edges`, `encoder` | 1 | takes the time of a pulse |
+//! | ADC | `heaters` | 1 | adds up a reading of a temperature |
 //! | WDT | `watchdog` | 0 | resets a machine that has got stuck |
 //! | USART2_UDRE | [`avr_embassy::interrupt`] | 2 | software interrupt: polls the exec executor, interrupts on |
 //!
@@ -20,6 +21,7 @@ pub mod encoder;
 pub mod flash;
 pub mod float;
 pub mod gpio;
+pub mod heaters;
 pub mod inputs;
 mod mem;
 pub mod panic;

@@ -41,7 +41,7 @@ struct Flags {
     /// A byte to send before all others, if it is not 0; [`WAIT_MS`] and above: when the line that is being sent is at
     /// its end.
     ahead: SharedByte,
-    /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`], [`HEEDS_XOFF`]. The receive interrupt
+    /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`], [`HEEDS_XOFF`]; and [`PLAIN`]. The receive interrupt
     /// changes the first.
     held: SharedByte,
     /// Not 0 if the sender has been stopped by XOFF. Exec sets it too, thread mode clears it.
@@ -56,6 +56,8 @@ const STOPPED: u8 = 1 << 0;
 const HEEDS_CTS: u8 = 1 << 1;
 /// XOFF and XON are obeyed.
 const HEEDS_XOFF: u8 = 1 << 2;
+/// Real-time characters that print are text.
+const PLAIN: u8 = 1 << 3;
 
 impl<const N: usize> Shared<N> {
     const fn new() -> Self {
@@ -273,6 +275,15 @@ fn set_rts(port: u8, stop: bool) {
     }
 }
 
+/// Whether `!`, `~`, `%` and bytes above 0x7F are text, from now on. Thread mode.
+pub fn set_plain(port: u8, plain: bool) {
+    // XOFF does not count on such a port, so that the receive interrupt writes nothing here.
+    if plain {
+        flags(port).held.set(PLAIN);
+        kick(port);
+    }
+}
+
 /// How the other side may hold it back from now on. Thread mode.
 pub fn set_flow(port: u8, flow: Flow) {
     let heeds = match flow {
@@ -280,7 +291,9 @@ pub fn set_flow(port: u8, flow: Flow) {
         Flow::Characters => HEEDS_XOFF,
         Flow::Pins => HEEDS_CTS,
     };
-    if flags(port).held.get() & !STOPPED != heeds {
+    let held = flags(port).held.get();
+    let heeds = if cfg!(feature = "dialect-reprap") { heeds | held & PLAIN } else { heeds };
+    if held & !STOPPED != heeds {
         // An XOFF that has come does not count any more.
         flags(port).held.set(heeds);
         set_rts(port, false);

@@ -6,7 +6,7 @@ use avr_embassy::Thread;
 use avr_embassy::host::Runtime;
 use embassy_executor::Spawner;
 
-use super::{clock, encoder, inputs, now, stepper, time, uart};
+use super::{clock, encoder, heaters, inputs, now, stepper, time, uart};
 use crate::hal::event::{self, Event};
 use crate::hal::serial::{AUX, USB};
 
@@ -91,6 +91,16 @@ impl Machine {
     /// The spindle turns at `rpm` turns a minute, with `per_turn` pulses of its encoder in each, until it is told otherwise.
     pub fn turn_spindle(&self, rpm: f64, per_turn: u16) {
         encoder::turn(rpm, per_turn);
+    }
+
+    /// The converter reads this of a heater's sensor (0 hot end, 1 bed) from now on.
+    pub fn set_sensor(&self, heater: usize, reading: u16) {
+        heaters::set(heater, reading);
+    }
+
+    /// Which heaters are on: bits 0 hot end, 1 bed, 2 fan.
+    pub fn heaters_on(&self) -> u8 {
+        heaters::on()
     }
 
     /// Runs for a time.

@@ -11,6 +11,7 @@ pub mod encoder;
 pub mod flash;
 pub mod float;
 pub mod gpio;
+pub mod heaters;
 pub mod inputs;
 mod machine;
 pub mod pwm;

@@ -78,6 +78,8 @@ struct Line {
     stopped: bool,
     /// Whether XOFF and XON count.
     heeds_xoff: bool,
+    /// Whether real-time characters that print are text.
+    plain: bool,
     /// Whether CTS counts, and holds them back.
     heeds_cts: bool,
     cts: bool,
@@ -112,6 +114,7 @@ impl Line {
             held: false,
             stopped: false,
             heeds_xoff: false,
+            plain: false,
             heeds_cts: false,
             cts: false,
             rts: false,
@@ -223,6 +226,11 @@ pub fn stop_late() {
             line.kick();
         }
     });
+}
+
+/// Whether `!`, `~`, `%` and bytes above 0x7F are text, from now on.
+pub fn set_plain(port: u8, plain: bool) {
+    with(port, |line| line.plain = plain);
 }
 
 /// How the other side may hold it back from now on.
@@ -410,7 +418,7 @@ impl Line {
             return;
         }
         let special = realtime::bit(byte);
-        if special != 0 {
+        if special != 0 && !(self.plain && byte >= b' ') {
             self.realtime = realtime::with(self.realtime, special);
             flags::set(Event::Realtime);
             if special & realtime::PLACED != 0 {
@@ -419,7 +427,8 @@ impl Line {
             return;
         }
         let garbles = self.garbles() || !whole;
-        if self.last <= realtime::ASCII
+        if !self.plain
+            && self.last <= realtime::ASCII
             && !garbles
             && let Some(asked) = self.asked.with(byte)
         {

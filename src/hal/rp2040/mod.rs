@@ -32,6 +32,7 @@ pub mod encoder;
 pub mod flash;
 pub mod float;
 pub mod gpio;
+pub mod heaters;
 pub mod inputs;
 pub mod panic;
 pub mod pwm;

@@ -392,6 +392,9 @@ pub fn stop_late() {
     }
 }
 
+/// Nothing: images of this chip have no dialect of printing hosts.
+pub fn set_plain(_port: u8, _plain: bool) {}
+
 /// How the other side may hold it back from now on. Thread mode.
 pub fn set_flow(port: u8, flow: Flow) {
     with(port, |line| {

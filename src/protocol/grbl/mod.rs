@@ -78,7 +78,7 @@ impl Dialect for Grbl {
         status: Status,
         _line: &[u8],
         _length: u16,
-        _speech: (),
+        _speech: &mut (),
         _settings: &Settings,
     ) -> Request {
         Request::refused(status)

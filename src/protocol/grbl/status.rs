@@ -83,6 +83,13 @@ rows! {
     NoEncoderInput = 40;
     SpindleError = 9;
     NotReversed = 9;
+    SensorOpen = 9;
+    SensorShort = 9;
+    HeatRunaway = 9;
+    HeatTooSlow = 9;
+    TooHot = 9;
+    TooCold = 9;
+    HeatersLocked = 9;
     UnrecognizedName = 3;
     MalformedCommand = 1;
     BadNumber = 2;

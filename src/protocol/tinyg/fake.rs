@@ -4,6 +4,7 @@ use super::{Mode, Request};
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::{Change, Overrides};
 use crate::gcode::tables::Row;
+use crate::heat::Standing;
 use crate::machine::{Alarm, Cycle, Doing};
 use crate::motion::snapshot::Program;
 use crate::protocol::{
@@ -235,6 +236,16 @@ impl Machine for Fake {
         if on { Status::Ok } else { Status::NotAccepted }
     }
 
+    fn heater(&mut self, _heater: u8) -> Option<Standing> {
+        None
+    }
+
+    fn waits_for_heat(&mut self) -> bool {
+        false
+    }
+
+    fn skip_wait(&mut self) {}
+    fn unlock_heaters(&mut self) {}
     fn hold_back(&mut self) {}
     fn start_over(&mut self) {}
     fn startup(&mut self, _line: u8, _at: u8) -> Option<u8> {

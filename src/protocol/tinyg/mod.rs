@@ -84,10 +84,10 @@ impl Dialect for Tinyg {
         status: Status,
         line: &[u8],
         length: u16,
-        mode: Mode,
+        mode: &mut Mode,
         settings: &Settings,
     ) -> Request {
-        Request::refused(status, line, length, mode, settings)
+        Request::refused(status, line, length, *mode, settings)
     }
 
     #[inline(always)]

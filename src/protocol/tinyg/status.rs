@@ -62,6 +62,13 @@ rows! {
     NoEncoderInput = 45, "The board has no input for a spindle encoder";
     SpindleError = 46, "Thread further off than spl";
     NotReversed = 47, "Spindle did not turn round";
+    SensorOpen = 48, "Temperature sensor open";
+    SensorShort = 49, "Temperature sensor shorted";
+    HeatRunaway = 50, "Heater out of control";
+    HeatTooSlow = 51, "Heater does not heat";
+    TooHot = 52, "Heater too hot";
+    TooCold = 53, "Too cold to extrude";
+    HeatersLocked = 54, "Heaters are locked [^x to reset]";
     UnrecognizedName = 100, "Unrecognized command or config name";
     MalformedCommand = 101, "Invalid or malformed command";
     BadNumber = 102, "Bad number format";

@@ -3,6 +3,7 @@
 use super::state;
 use super::variation::Variation;
 use crate::boards::inputs;
+use crate::capability::Capability;
 use crate::config::Fixed;
 use crate::config::name::token;
 use crate::gcode::overrides::Override;
@@ -86,6 +87,8 @@ pub enum Form {
     Rough,
     /// Thousandths of a millimetre, shown in the units in force.
     Micrometres,
+    /// Eighths of a degree Celsius, shown with two decimals.
+    Degrees,
     /// Steps, with two decimals.
     Steps,
     /// Turns a minute, with two decimals unless it is a whole number.
@@ -99,6 +102,7 @@ impl Form {
         let (stored, shown) = match self {
             Form::Count => return Fixed::int(value),
             Form::Factor => return Fixed { value, decimals: 3 },
+            Form::Degrees => return Fixed { value: value * 125, decimals: 3 }.rounded(2),
             Form::Steps => {
                 let value = value.clamp(-STEPS_MAX, STEPS_MAX).wrapping_mul(100);
                 return Fixed { value, decimals: 2 };
@@ -166,7 +170,7 @@ impl Vector {
 }
 
 /// Entries of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 46;
+pub const SINGLE_COUNT: usize = 46 + if Capability::Printer.is_built_in() { 6 } else { 0 };
 /// Entries of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
 /// The number of the vector `g92`.
@@ -287,6 +291,18 @@ progmem! {
         count("inp", of(PROBE), text!("Probe:"), NONE),
         count("ind", of(DOOR), text!("Door:"), NONE),
         count("ine", of(STOP), text!("Emergency stop:"), NONE),
+        #[cfg(feature = "printer")]
+        single("he1t", of(Value::Temperature(0)), Form::Degrees),
+        #[cfg(feature = "printer")]
+        single("he3t", of(Value::Temperature(1)), Form::Degrees),
+        #[cfg(feature = "printer")]
+        single("he1s", of(Value::WantedTemperature(0)), Form::Degrees),
+        #[cfg(feature = "printer")]
+        single("he3s", of(Value::WantedTemperature(1)), Form::Degrees),
+        #[cfg(feature = "printer")]
+        single("he1o", of(Value::HeaterPower(0)), Form::Factor),
+        #[cfg(feature = "printer")]
+        single("he3o", of(Value::HeaterPower(1)), Form::Factor),
         count("prbe", of(Value::ProbeState), text!("Probe state:"), text!("Failed|Succeeded|Waiting")),
     ];
 

@@ -65,6 +65,7 @@ impl Cpu {
             ffi::avr_init(p);
             (*p).frequency = clock_hz;
             (*p).sleep = Some(no_sleep);
+            (*p).avcc = 5_000;
             (*p).set_log(0);
             let bad = (*p).irq.add(ffi::AVR_CORE_BAD_OPCODE as usize);
             ffi::avr_irq_register_notify(bad, Some(bad_instruction), p.cast());
@@ -372,6 +373,14 @@ impl Cpu {
     pub fn watch_pin(self, port: char, bit: u8, notify: ffi::avr_irq_notify_t, param: *mut c_void) {
         // SAFETY: the caller keeps `param` valid as long as the core.
         unsafe { ffi::avr_irq_register_notify(self.pin(port, bit), notify, param) }
+    }
+
+    /// The voltage at a channel of the converter, of a supply of 5,000 mV.
+    pub fn set_millivolts(self, channel: u8, millivolts: u32) {
+        let ctl = u32::from_be_bytes(*b"adc0");
+        let index = ffi::ADC_IRQ_ADC0 as c_int + c_int::from(channel);
+        // SAFETY: simavr returns null for what it does not know, which it ignores.
+        unsafe { ffi::avr_raise_irq(ffi::avr_io_getirq(self.p(), ctl, index), millivolts) }
     }
 
     /// Drives an input pin from outside. `driven` are the pins of its port that are driven at all, and `levels` what

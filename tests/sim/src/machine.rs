@@ -487,6 +487,11 @@ impl Machine {
         }
     }
 
+    /// The voltage at a channel of the converter, A0 to A15, of a supply of 5,000 mV.
+    pub fn set_millivolts(&mut self, channel: u8, millivolts: u32) {
+        self.cpu.set_millivolts(channel, millivolts);
+    }
+
     /// Builds a machine around the chip, best before the first instruction.
     pub fn build(&mut self, build: &Build) {
         let mechanics = Mechanics::new(build, self.board());

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{firmware, set};
-use kerf::boards::{Board, MEGA2560_LATHE, RAMPS14};
+use kerf::boards::{Board, MEGA2560_LATHE};
 use std::path::Path;
 
 use kerf_sim::job::{self, Options};
@@ -56,7 +56,7 @@ fn asked(machine: &mut Machine, host: &mut Host, name: &str) -> f64 {
 
 #[test]
 fn the_speed_is_that_of_a_turn() {
-    for board in [&MEGA2560_LATHE, &RAMPS14] {
+    for board in [&MEGA2560_LATHE] {
         for (marks, rpm) in
             [(1, 60.0), (1, 1_000.0), (4, 229.0), (8, 3_000.0), (100, 1_000.0), (100, -300.0)]
         {

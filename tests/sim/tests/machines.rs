@@ -66,7 +66,7 @@ fn a_machine_survives_a_power_cut() {
     let (mut machine, mut host) = (firmware(&MEGA2560_GRBL), Host::new(LINES_IN_FLIGHT));
     machine.set_eeprom(&left);
     host.boot(&mut machine, 1_000).unwrap();
-    for (name, expected) in [("mch", 3.0), ("xvm", 12_000.0), ("2mi", 16.0), ("aam", 3.0)] {
+    for (name, expected) in [("mch", 3.0), ("xvm", 12_000.0), ("2mi", 16.0), ("avm", 2_880.0)] {
         assert_eq!(value(&mut machine, &mut host, name), expected, "{name}");
     }
 }

@@ -13,10 +13,12 @@ mod transcript;
 use std::path::Path;
 
 use common::firmware;
-use kerf::boards::{MEGA2560_GRBL, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
+use kerf::boards::{MEGA2560_GRBL, MEGA2560_GRBL_LATHE, MEGA2560_LATHE, RAMPS14};
 
 /// What only the image of a lathe can do.
 const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];
+/// What only the image of a printer can do.
+const PRINTING: [&str; 2] = ["heat", "reprap"];
 /// What needs grbl's dialect besides.
 const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 
@@ -29,6 +31,9 @@ fn the_image_keeps_to_the_transcripts() {
     let both: Vec<_> = all.iter().filter(|one| one.is_grbl_alone()).cloned().collect();
     let (turning, others): (Vec<_>, Vec<_>) =
         all.into_iter().filter(|one| !begins(&BOTH, one)).partition(|one| begins(&TURNING, one));
+    let (printing, others): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|one| begins(&PRINTING, one));
+    transcript::play_all(printing, 2, || firmware(&RAMPS14));
     transcript::play_all(others, 2, || firmware(&MEGA2560_GRBL));
     transcript::play_all(turning, 2, || firmware(&MEGA2560_LATHE));
     transcript::play_all(both, 2, || firmware(&MEGA2560_GRBL_LATHE));

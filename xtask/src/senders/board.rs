@@ -16,9 +16,10 @@ pub struct Board {
 
 impl Board {
     /// Starts it.
-    pub fn start(program: &Path, elf: &Path, job: &Path) -> Result<Board> {
+    pub fn start(program: &Path, elf: &Path, board: &str, job: &Path) -> Result<Board> {
         let mut command = Command::new(program);
-        command.args(["serve", "--speed", "max", "--elf"]).arg(elf).arg("--expect").arg(job);
+        command.args(["serve", "--speed", "max", "--elf"]).arg(elf).args(["--board", board]);
+        command.arg("--expect").arg(job);
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.spawn().context("cannot start the simulator")?;
         let mut output = BufReader::new(child.stdout.take().context("no output")?);

@@ -49,6 +49,7 @@ enum Sender {
     BcncGrbl,
     BcncG2core,
     GrblStreamer,
+    Printcore,
 }
 
 impl Sender {
@@ -61,6 +62,7 @@ impl Sender {
             Sender::BcncGrbl => "bcnc-grbl",
             Sender::BcncG2core => "bcnc-g2core",
             Sender::GrblStreamer => "grbl-streamer",
+            Sender::Printcore => "printcore",
         }
     }
 
@@ -73,7 +75,15 @@ impl Sender {
             Sender::BcncGrbl => ("bcnc.py", Some("GRBL1")),
             Sender::BcncG2core => ("bcnc.py", Some("G2Core")),
             Sender::GrblStreamer => ("grbl-streamer.py", None),
+            Sender::Printcore => ("printcore.py", None),
         }
+    }
+}
+
+impl Sender {
+    /// The board whose image it speaks to.
+    fn board(self) -> Board {
+        if self == Sender::Printcore { Board::Ramps14 } else { Board::default() }
     }
 }
 
@@ -84,13 +94,22 @@ pub fn run(args: &SendersArgs) -> Result<()> {
     let job = job.canonicalize()?;
     setup::ensure(Scope::Senders)?;
     let folder = install::senders()?;
-    let elf = sim::prepare(Board::default(), Machine::default())?;
     let program = sim::build()?;
     let senders = args.sender.map_or_else(|| Sender::value_variants().to_vec(), |one| vec![one]);
-    let session =
-        |sender| Session { sender, program: &program, elf: &elf, job: &job, folder: &folder };
+    let mut elves = Vec::new();
+    for &sender in &senders {
+        elves.push(sim::prepare(sender.board(), Machine::default())?);
+    }
+    // A printer's host sends what a printer prints.
+    let print = root().join("tests/senders/print.gcode");
+    let session = &|(sender, elf): (Sender, &PathBuf)| {
+        let job = if sender == Sender::Printcore { &print } else { &job };
+        let board = sender.board();
+        Session { sender, program: &program, elf, board, job, folder: &folder }.run()
+    };
     let results: Vec<_> = std::thread::scope(|scope| {
-        let runs = senders.iter().map(|&sender| scope.spawn(move || session(sender).run()));
+        let pairs = senders.iter().copied().zip(&elves);
+        let runs = pairs.map(|pair| scope.spawn(move || session(pair)));
         let runs: Vec<_> = runs.collect();
         runs.into_iter().map(|run| run.join().expect("a session does not panic")).collect()
     });

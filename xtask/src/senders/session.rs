@@ -26,6 +26,8 @@ pub struct Session<'a> {
     /// The simulator.
     pub program: &'a Path,
     pub elf: &'a Path,
+    /// The board that the image is for.
+    pub board: crate::boards::Board,
     pub job: &'a Path,
     /// Where the senders are installed.
     pub folder: &'a Path,
@@ -60,7 +62,7 @@ impl Session<'_> {
     }
 
     fn attempt(&self, tell: &mut impl FnMut(Step)) -> Result<()> {
-        let board = Board::start(self.program, self.elf, self.job)?;
+        let board = Board::start(self.program, self.elf, self.board.name(), self.job)?;
         let mut driver = Driver::start(self, &board.port)?;
         let end = Instant::now() + LIMIT;
         while let Some(line) = driver.line(end)? {

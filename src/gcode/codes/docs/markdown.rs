@@ -6,7 +6,7 @@ use std::vec::Vec;
 
 use super::{Doc, On, RULES, Refusal, SECTIONS, docs};
 use crate::capability::Capability;
-use crate::gcode::codes::Action;
+use crate::gcode::codes::{Action, NonModal};
 use crate::gcode::words::{AXES, COUNT, LETTERS};
 use crate::protocol::tinyg::{number, status_text};
 use crate::status::Status;
@@ -128,6 +128,7 @@ fn capability(doc: &Doc) -> String {
         Some(Action::Motion(mode)) => {
             mode.capability().map_or(String::new(), |needed| format!("`{}`", needed.name()))
         }
+        Some(Action::NonModal(NonModal::Heat(_))) => format!("`{}`", Capability::Printer.name()),
         Some(Action::SpeedMode(_) | Action::XMode(_)) => format!("`{}`", Capability::Lathe.name()),
         _ => String::new(),
     }

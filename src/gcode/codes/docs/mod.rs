@@ -3,6 +3,7 @@
 
 mod bores;
 mod cycles;
+mod heating;
 mod lines;
 mod machine;
 mod markdown;
@@ -184,6 +185,7 @@ pub const SECTIONS: &[Section] = &[
     machine::PROGRAM,
     machine::SPINDLE,
     machine::OVERRIDES,
+    heating::HEATING,
 ];
 
 /// Everything that is said of lines.

@@ -14,8 +14,8 @@ use core::mem::offset_of;
 use avr_embassy::assembly;
 
 use super::{
-    AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, RXCIE, STOPPED, Shared, TXC, TXCIE, U2X, UDRIE,
-    USB_SHARED,
+    AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, PLAIN, RXCIE, STOPPED, Shared, TXC, TXCIE, U2X,
+    UDRIE, USB_SHARED,
 };
 use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::event::Event;
@@ -171,6 +171,11 @@ macro_rules! interrupts {
                     "80:",
                     "rjmp 8f",
                     "12:",
+                    ".if {has_plain}",
+                    "lds  r30, {shared} + {held}",
+                    "sbrc r30, {plain}",
+                    "rjmp 1b",
+                    ".endif",
                     "rjmp 40f",
                     // Up to a percent sign.
                     "5:",
@@ -201,6 +206,11 @@ macro_rules! interrupts {
                     "rjmp 1b",
                     "sbrc r24, 1",
                     "rjmp 1b",
+                    ".if {has_plain}",
+                    "lds  r30, {shared} + {held}",
+                    "sbrc r30, {plain}",
+                    "rjmp 1b",
+                    ".endif",
                     "ldi  r30, {hold}",
                     "sbrc r24, 2",
                     "ldi  r30, {flush}",
@@ -453,6 +463,8 @@ macro_rules! interrupts {
                     held = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, held),
                     heeds_xoff = const HEEDS_XOFF.trailing_zeros(),
                     stopped = const STOPPED,
+                    has_plain = const cfg!(feature = "dialect-reprap") as u8,
+                    plain = const PLAIN.trailing_zeros(),
                     not_stopped = const !STOPPED,
                     xon = const XON,
                     xoff = const XOFF,

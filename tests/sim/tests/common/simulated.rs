@@ -33,7 +33,7 @@ impl Side for Machine {
     }
 
     fn heard_aux(&mut self) -> Vec<u8> {
-        self.receive_from(AUX)
+        if self.board().serial.len() > AUX { self.receive_from(AUX) } else { Vec::new() }
     }
 
     fn set_baud(&mut self, baud: u32) {

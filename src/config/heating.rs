@@ -1,0 +1,23 @@
+//! What lines may ask of heaters: kept beside the settings, for who interprets lines asks there.
+
+use crate::capability::Capability;
+use crate::status::Status;
+
+/// How many machines have heaters.
+pub const PRINTERS: usize = Capability::Printer.is_built_in() as usize;
+
+/// What lines may ask for, the hot end first. The heat task keeps it up to date.
+#[derive(Clone, Copy, Debug)]
+pub struct Heating {
+    /// How hot each may be made, eighths of a degree; 0 if there is none.
+    pub hottest: [u16; 2],
+    /// Why none may be switched on, or `Ok`.
+    pub refused: Status,
+    /// Whether the hot end is hot enough for filament to be moved.
+    pub extrudes: bool,
+}
+
+impl Heating {
+    /// Nothing is hot, and nothing may be made so.
+    pub const NONE: Self = Self { hottest: [0; 2], refused: Status::Ok, extrudes: false };
+}

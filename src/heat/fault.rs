@@ -1,0 +1,239 @@
+//! What may be wrong with a heater, by its temperature alone.
+//!
+//! | phase | it is | leads on | is a fault |
+//! |---|---|---|---|
+//! | off | wanted cold | wanted hot: heats, or cools if it is hotter | 20 degrees hotter than it has been since, and above 70: [`HeatRunaway`](Status::HeatRunaway), a transistor that stays on |
+//! | heats | more than [`NEAR`] colder than wanted | near: holds | less than [`RISE`] hotter in the time for it: [`HeatTooSlow`](Status::HeatTooSlow) |
+//! | holds | near, or has been | another temperature is wanted | [`FAR`] colder or hotter than wanted for [`AWAY_S`]: [`HeatRunaway`](Status::HeatRunaway) |
+//! | cools | more than [`NEAR`] hotter than wanted | near: holds | 20 degrees hotter than it has been since: [`HeatRunaway`](Status::HeatRunaway) |
+//! | any | hotter than its maximum and [`BEYOND`] | | [`TooHot`](Status::TooHot) |
+//!
+//! A sensor that is broken is a fault before that ([`Broken`](super::sensor::Broken)). Stepped five times a second. Temperatures are in 1/64 degree.
+//! Cost: 150 cycles.
+
+use super::control::STEPS;
+use super::sensor::UNIT;
+use crate::status::Status;
+
+/// So near it counts as there.
+pub const NEAR: i16 = 3 * UNIT;
+/// So far it has got away.
+pub const FAR: i16 = 10 * UNIT;
+/// How long it may, seconds.
+pub const AWAY_S: u16 = 30;
+/// It has to get so much hotter in [`Rule::rise_s`].
+pub const RISE: i16 = 2 * UNIT;
+/// Beyond the maximum.
+pub const BEYOND: i16 = 15 * UNIT;
+/// A heater that is off may get so much hotter, by what is beside it and what it held.
+const BY_ITSELF: i16 = 20 * UNIT;
+/// And up to this whatever it was.
+const WARM: i16 = 70 * UNIT;
+
+/// What holds for a heater.
+#[derive(Clone, Copy, Debug)]
+pub struct Rule {
+    /// How long [`RISE`] may take, seconds.
+    pub rise_s: u16,
+    /// How hot it may be made, 1/64 degree.
+    pub hottest: i16,
+}
+
+/// See the table above.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Phase {
+    /// Wanted cold.
+    #[default]
+    Off,
+    /// On its way up.
+    Heats,
+    /// There.
+    Holds,
+    /// On its way down.
+    Cools,
+}
+
+/// What is known of a heater's way.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Watch {
+    phase: Phase,
+    /// Where it began to heat, or the coldest since.
+    mark: i16,
+    /// Steps left until it has to be better.
+    left: u16,
+    /// What was wanted in the step before.
+    wanted: i16,
+}
+
+#[small]
+impl Watch {
+    /// At start-up.
+    pub const OFF: Self = Self { phase: Phase::Off, mark: 0, left: 0, wanted: 0 };
+
+    /// The phase it is in.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Looks at the temperature `now`, where `wanted` is wanted, 0 for off.
+    #[inline(never)]
+    pub fn step(&mut self, now: i16, wanted: i16, rule: &Rule) -> Result<(), Status> {
+        if now > rule.hottest.saturating_add(BEYOND) {
+            return Err(Status::TooHot);
+        }
+        let error = wanted.saturating_sub(now);
+        if wanted != self.wanted {
+            self.wanted = wanted;
+            self.begin(now, error, rule);
+        }
+        match self.phase {
+            Phase::Off | Phase::Cools => {
+                if self.left == 0 {
+                    // The first of all.
+                    (self.mark, self.left) = (now, 1);
+                }
+                self.mark = self.mark.min(now);
+                let most = self.mark.saturating_add(BY_ITSELF);
+                if now > most && (self.phase == Phase::Cools || now > WARM) {
+                    return Err(Status::HeatRunaway);
+                }
+                if self.phase == Phase::Cools && error >= -NEAR {
+                    self.hold();
+                }
+            }
+            Phase::Heats if error <= NEAR => self.hold(),
+            Phase::Heats if now.saturating_sub(self.mark) >= RISE => {
+                (self.mark, self.left) = (now, steps(rule.rise_s));
+            }
+            Phase::Heats => self.pass(Status::HeatTooSlow)?,
+            Phase::Holds if (-FAR..=FAR).contains(&error) => self.left = steps(AWAY_S),
+            Phase::Holds => self.pass(Status::HeatRunaway)?,
+        }
+        Ok(())
+    }
+
+    /// Another temperature is wanted.
+    fn begin(&mut self, now: i16, error: i16, rule: &Rule) {
+        (self.mark, self.left) = (now, steps(rule.rise_s));
+        self.phase = match () {
+            () if self.wanted == 0 => Phase::Off,
+            () if error > NEAR => Phase::Heats,
+            () if error < -NEAR => Phase::Cools,
+            () => Phase::Holds,
+        };
+        if self.phase == Phase::Holds {
+            self.hold();
+        }
+    }
+
+    fn hold(&mut self) {
+        (self.phase, self.left) = (Phase::Holds, steps(AWAY_S));
+    }
+
+    /// A step without getting better.
+    fn pass(&mut self, fault: Status) -> Result<(), Status> {
+        match self.left {
+            0 => Err(fault),
+            left => {
+                self.left = left - 1;
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Steps in so many seconds.
+const fn steps(seconds: u16) -> u16 {
+    seconds * STEPS as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RULE: Rule = Rule { rise_s: 20, hottest: 275 * UNIT };
+
+    fn degrees(at: f64) -> i16 {
+        (at * f64::from(UNIT)) as i16
+    }
+
+    /// A heater that has come to a phase.
+    fn in_phase(phase: Phase) -> Watch {
+        let mut watch = Watch::OFF;
+        let way: &[(f64, f64)] = match phase {
+            Phase::Off => &[(25.0, 0.0)],
+            Phase::Heats => &[(25.0, 200.0), (100.0, 200.0)],
+            Phase::Holds => &[(25.0, 200.0), (199.0, 200.0)],
+            Phase::Cools => &[(200.0, 200.0), (200.0, 150.0)],
+        };
+        for (now, wanted) in way {
+            watch.step(degrees(*now), degrees(*wanted), &RULE).unwrap();
+        }
+        assert_eq!(watch.phase(), phase);
+        watch
+    }
+
+    /// What comes of a temperature that stays, in each phase, and after how many seconds at most.
+    #[test]
+    fn every_phase_knows_its_faults() {
+        use Phase::{Cools, Heats, Holds, Off};
+        let (slow, away, hot) = (Status::HeatTooSlow, Status::HeatRunaway, Status::TooHot);
+        for (phase, wanted, now, fault) in [
+            (Off, 0.0, 25.0, None),
+            (Off, 0.0, 60.0, None),
+            (Off, 0.0, 71.0, Some((away, 0.2))),
+            (Off, 0.0, 291.0, Some((hot, 0.2))),
+            (Heats, 200.0, 100.0, Some((slow, 20.4))),
+            (Heats, 200.0, 101.0, Some((slow, 20.4))),
+            (Heats, 200.0, 50.0, Some((slow, 20.4))),
+            (Heats, 200.0, 199.0, None),
+            (Heats, 200.0, 205.0, None),
+            (Heats, 200.0, 291.0, Some((hot, 0.2))),
+            (Holds, 200.0, 200.0, None),
+            (Holds, 200.0, 190.5, None),
+            (Holds, 200.0, 189.0, Some((away, 30.4))),
+            (Holds, 200.0, 25.0, Some((away, 30.4))),
+            (Holds, 200.0, 211.0, Some((away, 30.4))),
+            (Holds, 200.0, 291.0, Some((hot, 0.2))),
+            (Cools, 150.0, 200.0, None),
+            (Cools, 150.0, 219.0, None),
+            (Cools, 150.0, 221.0, Some((away, 0.2))),
+            (Cools, 150.0, 150.0, None),
+            (Cools, 150.0, 291.0, Some((hot, 0.2))),
+        ] {
+            let mut watch = in_phase(phase);
+            let mut seen = None;
+            for step in 1..=600 {
+                if let Err(status) = watch.step(degrees(now), degrees(wanted), &RULE) {
+                    seen = Some((status, f64::from(step) / f64::from(STEPS)));
+                    break;
+                }
+            }
+            let label = std::format!("{phase:?} at {now}, wanted {wanted}: {seen:?}");
+            match (fault, seen) {
+                (None, None) => {}
+                (Some((fault, most)), Some((status, after))) => {
+                    assert!(fault == status && after <= most, "{label}");
+                }
+                _ => panic!("{label}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_heater_that_gets_hotter_slowly_is_well() {
+        let mut watch = in_phase(Phase::Heats);
+        for step in 0..4_000 {
+            let now = 100.0 + f64::from(step) * 0.025;
+            watch.step(degrees(now.min(200.0)), degrees(200.0), &RULE).unwrap();
+        }
+        assert_eq!(watch.phase(), Phase::Holds);
+    }
+
+    #[test]
+    fn after_a_fault_off_is_off() {
+        let mut watch = in_phase(Phase::Holds);
+        watch.step(degrees(25.0), 0, &RULE).unwrap();
+        assert_eq!(watch.phase(), Phase::Off);
+    }
+}

@@ -1,0 +1,199 @@
+//! A heater with its sensor: readings in, power out.
+//!
+//! Looked at each 40 ms; five looks make a [step](super::control), of their mean. Cost of a look: 3,000 cycles, of one with a step 6,000.
+
+use super::control::{Control, Factors, STEPS, spread};
+use super::fault::{Rule, Watch};
+use super::sensor::{Broken, Kind, UNIT};
+use super::{HEATERS, Standing};
+use crate::config::groups::hot_end;
+use crate::status::Status;
+
+/// Readings that may be missing one after the other.
+const MISSING: u8 = 3;
+/// How long the hot end and the bed may take for two degrees, seconds.
+const RISE_S: [u16; HEATERS] = [20, 90];
+
+/// One of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Heater {
+    kind: Kind,
+    factors: Factors,
+    /// How hot it may be made, 1/64 degree.
+    hottest: i16,
+    /// How hot it must be to extrude, 1/64 degree.
+    least: i16,
+    control: Control,
+    watch: Watch,
+    /// Of the looks since the last step.
+    sum: i32,
+    looks: u8,
+    missing: u8,
+    owed: u8,
+    /// How hot it is, 1/64 degree.
+    now: i16,
+    on: bool,
+}
+
+/// What a look has found.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Seen {
+    /// A look between two steps.
+    Look,
+    /// A step.
+    Step,
+}
+
+#[small]
+impl Heater {
+    /// Off, without settings.
+    pub const OFF: Self = Self {
+        kind: Kind::None,
+        factors: Factors { p: 0, i: 0, d: 0, fan: 0, hysteresis: 0 },
+        hottest: 0,
+        least: 0,
+        control: Control::OFF,
+        watch: Watch::OFF,
+        sum: 0,
+        looks: 0,
+        missing: 0,
+        owed: 0,
+        now: 0,
+        on: false,
+    };
+
+    /// Takes over the value of a setting, scaled as kept: a row of the hot end, with which those of the bed agree.
+    #[inline(never)]
+    pub fn set(&mut self, row: u8, value: i32) {
+        let degrees = |value: i32| (value * i32::from(UNIT)) as i16;
+        let factor = |value: i32| (value / 10) as u16;
+        match row {
+            hot_end::K => self.kind = Kind::of(value as u8),
+            hot_end::P => self.factors.p = factor(value),
+            hot_end::I => self.factors.i = factor(value),
+            hot_end::D => self.factors.d = factor(value),
+            hot_end::F => self.factors.fan = value as u8,
+            hot_end::HY => self.factors.hysteresis = (value * i32::from(UNIT) / 1_000) as u16,
+            hot_end::MX => self.hottest = degrees(value),
+            hot_end::MN => self.least = degrees(value),
+            _ => {}
+        }
+    }
+
+    /// How hot lines may make it, eighths of a degree; 0 without a sensor.
+    pub fn hottest(&self) -> u16 {
+        if self.kind == Kind::None { 0 } else { self.hottest.unsigned_abs() / 8 }
+    }
+
+    /// Whether it is too cold for filament.
+    pub fn is_cold(&self) -> bool {
+        self.now < self.least
+    }
+
+    /// Whether it is on until the next look.
+    pub fn is_on(&self) -> bool {
+        self.on
+    }
+
+    /// Off at once.
+    pub fn stop(&mut self) {
+        self.on = false;
+        self.control.stop(self.now);
+    }
+
+    /// How it stands, where this is wanted.
+    pub fn standing(&self, to: u16) -> Standing {
+        Standing { now: self.now / 8, to, power: self.control.power() }
+    }
+
+    /// How far it is from what is wanted, 1/64 degree; above 0 if it is too cold.
+    pub fn error(&self, to: u16) -> i16 {
+        in_units(to).saturating_sub(self.now)
+    }
+
+    /// Takes a reading, `None` if it is not there in time. `number` is 0 for the hot end, `to` what is wanted, eighths of a degree. A fault
+    /// leaves it off.
+    #[inline(never)]
+    pub fn look(
+        &mut self,
+        number: u8,
+        reading: Option<u16>,
+        to: u16,
+        fan: u8,
+    ) -> Result<Seen, Status> {
+        let wanted = if self.kind == Kind::None { 0 } else { in_units(to) };
+        let seen = self.read(reading, wanted).and_then(|mean| match mean {
+            None => Ok(Seen::Look),
+            Some(mean) => self.step(number, mean, wanted, fan).map(|()| Seen::Step),
+        });
+        self.on = seen.is_ok() && wanted != 0 && spread(&mut self.owed, self.control.power());
+        if seen.is_err() {
+            self.stop();
+        }
+        seen
+    }
+
+    /// The mean temperature, when it is due. A broken sensor of a heater that is off is none.
+    fn read(&mut self, reading: Option<u16>, wanted: i16) -> Result<Option<i16>, Status> {
+        let read = match reading {
+            Some(reading) => {
+                self.missing = 0;
+                self.kind.temperature(reading)
+            }
+            None => {
+                self.missing = self.missing.saturating_add(1);
+                if self.missing < MISSING {
+                    return Ok(None);
+                }
+                Err(Broken::Open)
+            }
+        };
+        match read {
+            Ok(now) => {
+                self.sum += i32::from(now);
+                self.looks += 1;
+                if i32::from(self.looks) < STEPS {
+                    return Ok(None);
+                }
+                let mean = (self.sum / STEPS) as i16;
+                (self.sum, self.looks) = (0, 0);
+                Ok(Some(mean))
+            }
+            Err(_) if wanted == 0 => {
+                (self.sum, self.looks, self.now) = (0, 0, 0);
+                Ok(None)
+            }
+            Err(Broken::Open) => Err(Status::SensorOpen),
+            Err(Broken::Short) => Err(Status::SensorShort),
+        }
+    }
+
+    fn step(&mut self, number: u8, mean: i16, wanted: i16, fan: u8) -> Result<(), Status> {
+        self.now = mean;
+        let rise_s = if number == 0 { RISE_S[0] } else { RISE_S[1] };
+        if self.kind != Kind::None {
+            self.watch.step(mean, wanted, &Rule { rise_s, hottest: self.hottest })?;
+        }
+        match wanted {
+            0 => self.control.stop(mean),
+            _ => {
+                self.control.step(mean, wanted, fan, &self.factors);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Eighths of a degree in 1/64.
+#[small]
+fn in_units(to: u16) -> i16 {
+    (to.min(4_000) * 8) as i16
+}
+
+/// The rows of both heaters that mean the same have the same number.
+const _: () = {
+    use crate::config::groups::bed;
+    assert!(bed::K == hot_end::K && bed::P == hot_end::P && bed::I == hot_end::I);
+    assert!(bed::D == hot_end::D && bed::F == hot_end::F && bed::HY == hot_end::HY);
+    assert!(bed::MX == hot_end::MX);
+};

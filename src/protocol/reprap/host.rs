@@ -1,0 +1,321 @@
+//! The codes that are not for the interpreter: they ask something, set something, or wait.
+
+use super::command::{has, value, words};
+use super::write::{fixed, int, line_end, text};
+use super::{report, settings};
+use crate::config::Fixed;
+use crate::gcode::overrides::{Change, Override};
+use crate::machine::{Alarm, Cycle, Doing};
+use crate::progmem::Text;
+use crate::protocol::{Extruder, Machine, Out, Value};
+use crate::status::Status;
+use crate::text;
+use crate::units::Length;
+
+/// A letter in upper case, and a number.
+pub type Code = (u8, u16);
+
+/// How far a code has come.
+pub enum Step {
+    /// It goes on with this part.
+    At(u8),
+    /// It goes on later.
+    Later(u8),
+    /// `ok`.
+    Done,
+    /// It has said `ok` itself.
+    Answered,
+    /// It has not been carried out.
+    Refused(Status),
+}
+
+/// Bytes of a text that are put in a step.
+const PART: usize = 60;
+/// All axes, as bits.
+const ALL: u8 = u8::MAX;
+/// The axes of a printer that may be homed.
+const HOMED: [u8; 3] = *b"XYZ";
+/// The axis of the extruder.
+const EXTRUDER: u8 = 3;
+
+/// The code, if it is one of those here.
+#[inline(never)]
+#[small]
+pub fn of(code: Option<Code>) -> Option<Code> {
+    let is_own = match code? {
+        (b'G', 10 | 11 | 28 | 161 | 162) => true,
+        (b'M', number) => matches!(
+            number,
+            17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 155
+                | 201 | 203..=208 | 220 | 221 | 400 | 500..=503 | 999
+        ),
+        (b'T', _) => true,
+        _ => false,
+    };
+    code.filter(|_| is_own)
+}
+
+/// Does part `at` of a code.
+#[inline(never)]
+#[small]
+pub fn part(
+    code: Code,
+    at: u8,
+    block: &[u8],
+    machine: &mut impl Machine,
+    out: &mut impl Out,
+) -> Step {
+    let number = match code {
+        (b'T', tool) if tool == 0 => return Step::Done,
+        (b'T', _) => return Step::Refused(Status::ToolInvalid),
+        (b'G', 10) => return retract(true, machine),
+        (b'G', 11) => return retract(false, machine),
+        (b'G', number) => return home(at, number, block, machine),
+        (_, number) => number,
+    };
+    match number {
+        18 | 84 => motors_off(block, machine),
+        17 => done(machine.energize(None, true)),
+        82 | 83 => done(machine.extruder(Extruder::Relative(number == 83))),
+        105 => report::answer(at, machine, out),
+        108 => {
+            machine.skip_wait();
+            machine.go_on();
+            Step::Done
+        }
+        112 => {
+            machine.alarm(Alarm::Shutdown);
+            Step::Refused(Status::ShutDown)
+        }
+        114 => listed(report::position(at, machine, out)),
+        115 => listed(report::identity(at, out)),
+        118 => echo(at, block, out),
+        119 => listed(report::switches(at, machine, out)),
+        155 => {
+            let seconds = value(block, b'S', 0).unwrap_or(0).clamp(0, 60);
+            machine.memory().reprap.interval_s = seconds as u8;
+            Step::Done
+        }
+        207 => set_retraction(block, machine),
+        208 => {
+            if let Some(length) = value(block, b'S', 4) {
+                machine.memory().reprap.extra = length;
+            }
+            Step::Done
+        }
+        220 => speed(block, machine, out),
+        221 => flow(block, machine, out),
+        400 => finished(machine),
+        500 if machine.value(Value::Kept) == 0 => Step::Later(0),
+        502 => restore(at, machine),
+        503 => settings::list(at, machine, out).map_or(Step::Done, Step::At),
+        92 | 201 | 203..=206 => settings::set(number, at, block, machine, out),
+        999 => match machine.clear() {
+            Status::Again => Step::Later(0),
+            Status::Ok => {
+                machine.unlock_heaters();
+                Step::Done
+            }
+            status => Step::Refused(status),
+        },
+        _ => Step::Done,
+    }
+}
+
+/// M400: what has been asked for is done, or an alarm has dropped it.
+#[small]
+fn finished(machine: &mut impl Machine) -> Step {
+    match machine.doing() {
+        Doing::Alarm(alarm) => Step::Refused(alarm.status()),
+        _ if machine.value(Value::Working) != 0 => Step::Later(0),
+        _ => Step::Done,
+    }
+}
+
+fn done(status: Status) -> Step {
+    if status == Status::Ok { Step::Done } else { Step::Refused(status) }
+}
+
+fn listed(next: Option<u8>) -> Step {
+    next.map_or(Step::Done, Step::At)
+}
+
+/// G10 and G11. One that has been carried out already does nothing.
+#[inline(never)]
+#[small]
+fn retract(back: bool, machine: &mut impl Machine) -> Step {
+    let kept = &machine.memory().reprap;
+    if kept.retracted == back {
+        return Step::Done;
+    }
+    let far =
+        if back { kept.length.saturating_neg() } else { kept.length.saturating_add(kept.extra) };
+    let by = Extruder::Move { by: Length(far), feed: kept.feed };
+    match machine.extruder(by) {
+        Status::Again => Step::Later(0),
+        status => {
+            if status == Status::Ok {
+                machine.memory().reprap.retracted = back;
+            }
+            done(status)
+        }
+    }
+}
+
+/// M207: S is the length, F the speed.
+#[small]
+fn set_retraction(block: &[u8], machine: &mut impl Machine) -> Step {
+    let (length, feed) = (value(block, b'S', 4), value(block, b'F', 0));
+    // A meter would be no retraction.
+    if length.is_some_and(|length| !(0..10_000_000).contains(&length))
+        || feed.is_some_and(|feed| !(1..=60_000).contains(&feed))
+    {
+        return Step::Refused(Status::OutOfRange);
+    }
+    let kept = &mut machine.memory().reprap;
+    kept.length = length.unwrap_or(kept.length);
+    kept.feed = feed.unwrap_or(kept.feed);
+    Step::Done
+}
+
+/// The axes that a block names, as bits; all if it names none.
+#[inline(never)]
+#[small]
+fn axes(block: &[u8]) -> u8 {
+    let mut axes = 0;
+    for (axis, letter) in HOMED.iter().enumerate() {
+        axes |= u8::from(has(block, *letter)) << axis;
+    }
+    if axes == 0 { ALL } else { axes }
+}
+
+/// G28, and G161 and G162 where the switch is at the end that they name: at rest, and answered when the axes are homed.
+#[inline(never)]
+#[small]
+fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
+    const HOMES: u8 = 1;
+    let axes = axes(block);
+    if machine.value(Value::Working) != 0 || machine.cycle() == Cycle::Homing {
+        return Step::Later(at);
+    }
+    if at != HOMES {
+        let upper = settings::homed_at_upper_end(axes, machine);
+        let wrong = match number {
+            161 => upper != 0,
+            162 => upper == 0,
+            _ => false,
+        };
+        if wrong {
+            return Step::Refused(Status::HomingSwitches);
+        }
+        return match machine.home(axes) {
+            Status::Ok => Step::Later(HOMES),
+            status => Step::Refused(status),
+        };
+    }
+    let named = (0..HOMED.len() as u8).filter(|axis| axes & 1 << axis != 0);
+    let mut homed = 0;
+    for axis in named {
+        homed |= u8::from(machine.value(Value::Homed(axis)) != 0) << axis;
+    }
+    machine.clear_shift(homed);
+    if homed == 0 { Step::Refused(Status::HomingFailed) } else { Step::Done }
+}
+
+/// M84, M18: the motors of the axes that are named, or all, lose their power when the machine rests.
+#[inline(never)]
+#[small]
+fn motors_off(block: &[u8], machine: &mut impl Machine) -> Step {
+    if machine.value(Value::Working) != 0 {
+        return Step::Later(0);
+    }
+    let named = axes(block);
+    let extruder = has(block, b'E');
+    if named == ALL && !extruder {
+        return done(machine.energize(None, false));
+    }
+    let axes = if named == ALL { 0 } else { named } | u8::from(extruder) << EXTRUDER;
+    for motor in 0..crate::boards::MOTORS as u8 {
+        if settings::axis_of(motor, machine).is_some_and(|axis| axes & 1 << axis != 0) {
+            machine.energize(Some(motor), false);
+        }
+    }
+    Step::Done
+}
+
+/// M118: the text comes back.
+#[small]
+fn echo(at: u8, block: &[u8], out: &mut impl Out) -> Step {
+    let rest = words(block).get(usize::from(at)..).unwrap_or(&[]);
+    let part = rest.get(..PART).unwrap_or(rest);
+    out.put_all(part.iter().copied());
+    if part.len() == PART {
+        return Step::At(at + PART as u8);
+    }
+    line_end(out);
+    Step::Done
+}
+
+/// M220: S percent of the feed rates that are programmed.
+#[small]
+fn speed(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    let Some(factor) = value(block, b'S', 1) else {
+        let now = machine.value(Value::Override(Override::Feed));
+        return percent(text!("FR:"), now, out);
+    };
+    match u32::try_from(factor).ok().and_then(|factor| Override::Feed.checked(factor)) {
+        Some(factor) => {
+            machine.change_override(Change::to(Override::Feed, factor));
+            Step::Done
+        }
+        None => Step::Refused(Status::OutOfRange),
+    }
+}
+
+/// M221: S percent of the filament that is programmed.
+#[small]
+fn flow(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    match value(block, b'S', 1) {
+        None => {
+            let now = machine.value(Value::Flow);
+            percent(text!("Flow:"), now, out)
+        }
+        Some(factor) => match u16::try_from(factor) {
+            Ok(factor @ 10..=5_000) => done(machine.extruder(Extruder::Flow(factor))),
+            _ => Step::Refused(Status::OutOfRange),
+        },
+    }
+}
+
+#[small]
+fn percent(what: Text, thousandths: i32, out: &mut impl Out) -> Step {
+    text(out, what);
+    fixed(out, Fixed { value: thousandths, decimals: 1 }.rounded(0));
+    out.put(b'%');
+    line_end(out);
+    Step::Done
+}
+
+/// M502.
+#[small]
+fn restore(at: u8, machine: &mut impl Machine) -> Step {
+    if at == 0 && machine.value(Value::Working) != 0 {
+        return Step::Later(0);
+    }
+    if at == 0 {
+        return match machine.restore() {
+            Status::Ok => Step::Later(1),
+            status => Step::Refused(status),
+        };
+    }
+    if machine.value(Value::Kept) == 0 { Step::Later(1) } else { Step::Done }
+}
+
+/// A count behind a letter.
+#[small]
+pub fn count(letter: u8, value: i32, out: &mut impl Out) {
+    out.put(b' ');
+    out.put(letter);
+    out.put(b':');
+    int(out, value);
+}

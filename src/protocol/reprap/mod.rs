@@ -1,0 +1,169 @@
+//! The RepRap dialect: one `ok` for each line, line numbers and checksums, M codes for everything.
+//!
+//! Pure and synchronous, in thread mode, as every dialect. A line becomes a [`Request`], what the machine tells a [`Telling`]. A port keeps
+//! the number of its last line ([`Session`]); settings are views of Kerf's own ([`settings`]).
+//!
+//! | module | what it has |
+//! |---|---|
+//! | [`frame`] | `N12 ... *34`: line number, checksum and what is between them |
+//! | [`command`] | which code a line has, and its words |
+//! | [`translate`] | moves and modes in the words of the interpreter: E is its A |
+//! | [`request`] | a line on its way to its answer |
+//! | [`host`] | the codes that ask or set something |
+//! | [`settings`] | M92, M201 to M206, M503 |
+//! | [`report`] | M105, M114, M115, M119 |
+//! | [`telling`] | what is told unasked |
+//! | [`write`](mod@write) | numbers and texts |
+//!
+//! A line is answered in its order, when the planner has taken what it asks for. M105, M108, M112 and M114 overtake where they have no line number;
+//! M108 and M112 overtake with one, too. A damaged line is never carried out: its sender is asked to send it again. A step
+//! costs at most 15,000 cycles, with a setting that is in EEPROM 3 ms. Nothing here can be full.
+
+mod command;
+mod frame;
+mod host;
+mod report;
+mod request;
+mod settings;
+mod status;
+mod telling;
+mod translate;
+mod write;
+
+use super::{Dialect, Ending, Machine, Notice, Out, Remembers, Rewritten};
+use crate::config::Settings;
+use crate::machine::Alarm;
+use crate::plain;
+use crate::status::Status;
+use frame::Frame;
+
+pub use frame::Session;
+pub use request::Request;
+pub use telling::Telling;
+
+/// What [`Settings::dialect_of`] says of a port that begins in this dialect.
+const CHOSEN: u8 = 4;
+
+/// The dialect.
+pub struct RepRap;
+
+/// What the machine keeps for its senders.
+pub struct Retraction {
+    /// M207 S: how far G10 pulls the filament back, in units of a `Length`.
+    length: i32,
+    /// M208 S: how much farther G11 pushes it.
+    extra: i32,
+    /// M207 F, mm/min.
+    feed: i32,
+    /// G10 has been carried out, and no G11 since.
+    retracted: bool,
+    /// M155 S: seconds between two reports of temperatures; 0 for none.
+    interval_s: u8,
+}
+
+impl Remembers for Retraction {
+    fn new() -> Self {
+        Self { length: 20_000, extra: 0, feed: 2_100, retracted: false, interval_s: 0 }
+    }
+
+    fn restore(&mut self) {
+        *self = Self { retracted: self.retracted, ..Self::new() };
+    }
+
+    fn refresh(&mut self) {}
+}
+
+impl Dialect for RepRap {
+    type Speech = Session;
+    type Request = Request;
+    type Telling = Telling;
+    type Memory = Retraction;
+
+    /// A `!` in M117 is text, and a `?` is.
+    const IS_PLAIN: bool = true;
+
+    fn speech(_settings: &Settings) -> Session {
+        Session::default()
+    }
+
+    fn is_chosen(settings: &Settings, port: u8) -> bool {
+        settings.dialect_of(port) == CHOSEN
+    }
+
+    fn is_decided_by(line: &[u8]) -> bool {
+        frame::is_own(line)
+    }
+
+    fn begin(
+        line: &[u8],
+        _length: u16,
+        session: &mut Session,
+        _settings: &Settings,
+    ) -> Option<Request> {
+        Some(Request::begin(line, session))
+    }
+
+    fn refuse(
+        status: Status,
+        line: &[u8],
+        _length: u16,
+        session: &mut Session,
+        _settings: &Settings,
+    ) -> Request {
+        Request::refused(status, line, session)
+    }
+
+    fn rewrite<'a>(block: &[u8], out: &'a mut Rewritten) -> Result<&'a [u8], Status> {
+        translate::block(block, out)
+    }
+
+    fn tell(notice: Notice, _session: Session, machine: &mut impl Machine) -> Telling {
+        Telling::begin(notice, machine)
+    }
+
+    /// None: a line has to be looked through for its checksum first.
+    #[inline(always)]
+    fn brief(_session: Session, _settings: &Settings) -> Option<bool> {
+        None
+    }
+
+    #[inline(always)]
+    fn put_brief(_settings: &Settings, _ending: Ending, out: &mut impl Out) {
+        out.put_plain(plain!("ok\n"));
+    }
+
+    #[inline(always)]
+    fn put_line_end(_settings: &Settings, out: &mut impl Out) {
+        out.put_plain(plain!("\n"));
+    }
+
+    #[inline(always)]
+    fn answers_empty(_session: Session) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn may_be_control(first: u8) -> bool {
+        matches!(first, b'M' | b'm' | b'N' | b'n')
+    }
+
+    #[inline(always)]
+    fn is_control(line: &[u8]) -> bool {
+        command::overtakes(&Frame::of(line), line)
+    }
+
+    #[inline(always)]
+    fn asks_alarm(line: &[u8]) -> Option<Alarm> {
+        let frame = Frame::of(line);
+        let stops = command::is_stop(&frame, line);
+        stops.then_some(Alarm::Shutdown)
+    }
+
+    fn interval_s(kept: &Retraction) -> u8 {
+        kept.interval_s
+    }
+
+    fn activity(session: Session) -> Option<u8> {
+        Some(session.lines)
+    }
+}

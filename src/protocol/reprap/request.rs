@@ -1,0 +1,185 @@
+//! A line on its way to its answer.
+//!
+//! What a code tells comes before `ok`, a part each step. What has to be waited for (rest, homing, memory) is asked for each millisecond,
+//! 2,000 cycles; nothing of the answer has been put then, so that others may talk.
+
+use super::command;
+use super::frame::{Fault, Frame, Session};
+use super::host::{self, Code, Step};
+use super::status::{is_unknown, reason};
+use super::write::{int, line_end, text};
+use crate::progmem::Text;
+use crate::protocol::{Answers, Machine, Next, Out, Span};
+use crate::status::Status;
+use crate::{plain, text};
+
+/// A line.
+pub struct Request {
+    what: What,
+    /// How far it has come; what it says depends on `what`.
+    at: u8,
+    block: Span,
+    begun: bool,
+}
+
+/// What is to be done.
+#[derive(Clone, Copy)]
+enum What {
+    /// To say `ok`.
+    Nothing,
+    /// To carry out G-code.
+    Gcode,
+    /// To do what a code says that is not for the interpreter.
+    Host(Code),
+    /// To ask for a line behind this one.
+    Resend(Fault, i32),
+    /// To say why the line was not carried out.
+    Refused(Status),
+}
+
+/// Bytes of a line that are told in a step.
+const PART: usize = 40;
+
+impl Request {
+    /// Begins with a line.
+    #[inline(never)]
+    #[small]
+    pub(super) fn begin(line: &[u8], session: &mut Session) -> Self {
+        let frame = Frame::of(line);
+        let block = frame.block.of(line);
+        let code = command::code(block);
+        let what = match take(&frame, code, line, session) {
+            Err(fault) => What::Resend(fault, session.last),
+            Ok(()) if block.is_empty() => What::Nothing,
+            Ok(()) => host::of(code).map_or(What::Gcode, What::Host),
+        };
+        Self { what, at: 0, block: frame.block, begun: false }
+    }
+
+    /// A line that could not be kept, or has been dropped.
+    #[small]
+    pub(super) fn refused(status: Status, line: &[u8], session: &mut Session) -> Self {
+        let frame = Frame::of(line);
+        let code = command::code(frame.block.of(line));
+        let is_whole = !matches!(status, Status::BufferFull | Status::InputTooLong);
+        let what = match is_whole.then(|| take(&frame, code, line, session)) {
+            Some(Err(fault)) => What::Resend(fault, session.last),
+            None if session.sums => What::Resend(Fault::Sum, session.last),
+            _ => What::Refused(status),
+        };
+        Self { what, at: 0, block: frame.block, begun: false }
+    }
+}
+
+/// The line takes its place in the order.
+#[small]
+fn take(
+    frame: &Frame,
+    code: Option<Code>,
+    line: &[u8],
+    session: &mut Session,
+) -> Result<(), Fault> {
+    let block = frame.block.of(line);
+    let sets = match code {
+        Some((b'M', 110)) => command::value(block, b'N', 0).or(frame.number),
+        _ => None,
+    };
+    session.take(frame, sets, command::overtakes(frame, line))
+}
+
+#[small]
+impl Answers for Request {
+    /// None at once: G-code runs in the first step.
+    fn gcode(&self) -> Option<Span> {
+        None
+    }
+
+    fn ran(&mut self, status: Status, _comment: bool) {
+        self.what = match status {
+            Status::Ok | Status::Noop => What::Nothing,
+            status => What::Refused(status),
+        };
+    }
+
+    #[inline(never)]
+    fn step(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Next {
+        let block = self.block.of(line);
+        match self.what {
+            What::Gcode => {
+                let Span { start, end } = self.block;
+                return Next::Gcode { start, end };
+            }
+            What::Nothing => {
+                out.put_plain(plain!("ok\n"));
+                return Next::Done(Status::Ok);
+            }
+            What::Host(code) => match host::part(code, self.at, block, machine, out) {
+                Step::At(at) => (self.at, self.begun) = (at, true),
+                Step::Later(at) => {
+                    self.at = at;
+                    return Next::Wait;
+                }
+                Step::Done => self.what = What::Nothing,
+                Step::Answered => return Next::Done(Status::Ok),
+                Step::Refused(status) => (self.what, self.at) = (What::Refused(status), 0),
+            },
+            What::Resend(fault, last) => {
+                self.begun = true;
+                self.resend(fault, last, out);
+            }
+            What::Refused(status) if is_unknown(status) => {
+                self.begun = true;
+                self.unknown(block, out);
+            }
+            What::Refused(status) => {
+                self.begun = true;
+                text(out, text!("Error:"));
+                text(out, reason(status));
+                line_end(out);
+                self.what = What::Nothing;
+            }
+        }
+        Next::More
+    }
+
+    fn has_begun(&self) -> bool {
+        self.begun
+    }
+}
+
+#[small]
+impl Request {
+    /// `Error:checksum mismatch, Last Line: 3`, and `Resend: 4`.
+    fn resend(&mut self, fault: Fault, last: i32, out: &mut impl Out) {
+        if self.at == 0 {
+            self.at = 1;
+            let why: Text = match fault {
+                Fault::Sum => text!("Error:checksum mismatch"),
+                Fault::NoSum => text!("Error:checksum missing"),
+                Fault::Number => text!("Error:wrong line number"),
+            };
+            text(out, why);
+            text(out, text!(", Last Line: "));
+            int(out, last);
+        } else {
+            text(out, text!("Resend: "));
+            int(out, last.wrapping_add(1));
+            self.what = What::Nothing;
+        }
+        line_end(out);
+    }
+
+    /// `echo:Unknown command: "M777"`.
+    fn unknown(&mut self, block: &[u8], out: &mut impl Out) {
+        if self.at == 0 {
+            text(out, text!("echo:Unknown command: \""));
+            self.at = 1;
+            return;
+        }
+        let part = block.get(..PART.min(block.len())).unwrap_or(&[]);
+        out.put_all(part.iter().copied());
+        out.put(b'"');
+        line_end(out);
+        self.what = What::Nothing;
+    }
+}

@@ -1,0 +1,234 @@
+//! M92, M201, M203 to M206, M503: Kerf's settings under the codes of this dialect, in its units.
+//!
+//! Nothing is kept here. A setting is in memory by itself: M500 waits for that alone.
+
+use super::command::number;
+use super::host::Step;
+use super::write::{fixed, line_end, text};
+use crate::boards::MOTORS;
+use crate::config::name::token;
+use crate::config::{Fixed, Number, Owner, Setting};
+use crate::gcode::tables::Row;
+use crate::progmem::Text;
+use crate::protocol::{Machine, Out};
+use crate::status::Status;
+use crate::text;
+use crate::units::Length;
+
+/// The letters of the axes: E is the interpreter's A.
+const LETTERS: [u8; 4] = *b"XYZE";
+/// Steps per millimetre in thousandths, times what `sa` and `tr` are kept as, for one microstep: 360 degrees, 10^4, 10^6 and 10^3.
+const STEPS: u64 = 360 * 10_000_000_000_000;
+/// The codes of M503, in its order.
+const LISTED: [u16; 5] = [92, 203, 201, 205, 206];
+
+#[inline(never)]
+#[small]
+fn named(owner: Owner, token: [u8; 4]) -> Option<Setting> {
+    Setting::find(&owner.prefix().with_token(token)).filter(|found| found.owner() == owner)
+}
+
+#[inline(never)]
+#[small]
+fn read(machine: &mut impl Machine, owner: Owner, token: [u8; 4]) -> i32 {
+    named(owner, token).map_or(0, |setting| machine.setting(setting))
+}
+
+/// The axis that a motor moves.
+#[small]
+pub fn axis_of(motor: u8, machine: &mut impl Machine) -> Option<u8> {
+    u8::try_from(read(machine, Owner::Motor(motor), token("ma"))).ok().filter(|axis| *axis < 6)
+}
+
+/// The first motor of an axis.
+#[small]
+pub fn motor_of(axis: u8, machine: &mut impl Machine) -> Option<u8> {
+    (0..MOTORS as u8).find(|motor| axis_of(*motor, machine) == Some(axis))
+}
+
+/// Of these axes those that home at their upper ends, as bits.
+#[small]
+pub fn homed_at_upper_end(axes: u8, machine: &mut impl Machine) -> u8 {
+    let mut upper = 0;
+    for axis in (0..3).filter(|axis| axes & 1 << axis != 0) {
+        upper |= (read(machine, Owner::Axis(axis), token("sx")) as u8 & 1) << axis;
+    }
+    upper
+}
+
+/// 360 degrees by the angle of a step and the travel in a turn, or what the travel is of so many steps: it works both ways.
+#[small]
+fn turned(machine: &mut impl Machine, motor: u8, by: i32) -> i32 {
+    let angle = read(machine, Owner::Motor(motor), token("sa")).unsigned_abs();
+    let microsteps = read(machine, Owner::Motor(motor), token("mi")).unsigned_abs();
+    let divisor = (u64::from(angle) * u64::from(by.unsigned_abs())).max(1);
+    let quotient = (STEPS * u64::from(microsteps) + divisor / 2) / divisor;
+    i32::try_from(quotient).unwrap_or(i32::MAX)
+}
+
+/// The setting of an axis behind a code, and its factor: of M203, which is in mm/s.
+fn setting(code: u16) -> Option<([u8; 4], i32)> {
+    match code {
+        201 => Some((token("ac"), 1)),
+        203 => Some((token("vm"), 60)),
+        205 => Some((token("jd"), 1)),
+        _ => None,
+    }
+}
+
+/// The value of a code on an axis.
+#[inline(never)]
+#[small]
+fn value(code: u16, axis: u8, machine: &mut impl Machine) -> Fixed {
+    match (setting(code), motor_of(axis, machine)) {
+        (Some((token, factor)), _) => {
+            let found = named(Owner::Axis(axis), token);
+            let decimals = found.map_or(0, |found| found.row().stored);
+            let value = read(machine, Owner::Axis(axis), token) / factor;
+            Fixed { value, decimals }.rounded(3)
+        }
+        (None, Some(motor)) if code == 92 => {
+            let turn = read(machine, Owner::Motor(motor), token("tr"));
+            Fixed { value: turned(machine, motor, turn), decimals: 3 }
+        }
+        (None, _) if code == 206 => {
+            let at = machine.value(crate::protocol::Value::Row(Row::system(0), axis));
+            Fixed { value: at, decimals: 4 }.rounded(3)
+        }
+        _ => Fixed::int(0),
+    }
+}
+
+/// What a code is called in M503.
+fn name(code: u16) -> Text {
+    match code {
+        92 => text!("echo:  M92"),
+        201 => text!("echo:  M201"),
+        203 => text!("echo:  M203"),
+        205 => text!("echo:  M205"),
+        _ => text!("echo:  M206"),
+    }
+}
+
+/// Puts the value of a code on an axis, part `at` of its line. Whether there is more.
+#[small]
+fn put(code: u16, at: u8, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+    if at == 0 {
+        text(out, name(code));
+    }
+    out.put(b' ');
+    out.put(LETTERS.get(usize::from(at)).copied().unwrap_or(b'E'));
+    fixed(out, value(code, at, machine));
+    // The extruder has no offset.
+    let last = if code == 206 { 2 } else { 3 };
+    if at == last {
+        line_end(out);
+    }
+    at < last
+}
+
+/// Puts part `at` of M503. Returns the next part, `None` behind the last.
+#[inline(never)]
+#[small]
+pub fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
+    let (row, axis) = (at >> 2, at & 3);
+    let code = LISTED.get(usize::from(row)).copied()?;
+    if put(code, axis, machine, out) {
+        return Some(at + 1);
+    }
+    (usize::from(row) + 1 < LISTED.len()).then_some((row + 1) << 2)
+}
+
+/// Sets what a code names, axis by axis, or tells it if it names none.
+#[inline(never)]
+#[small]
+pub fn set(
+    code: u16,
+    at: u8,
+    block: &[u8],
+    machine: &mut impl Machine,
+    out: &mut impl Out,
+) -> Step {
+    const TELLS: u8 = 8;
+    if code == 204 {
+        // An axis has one acceleration: M201.
+        return Step::Done;
+    }
+    if at >= TELLS {
+        let more = put(code, at - TELLS, machine, out);
+        return if more { Step::At(at + 1) } else { Step::Done };
+    }
+    let names = |letter: &u8| number(block, *letter).is_some();
+    if at == 0 && !LETTERS.iter().any(names) && !(code == 205 && names(&b'J')) {
+        return Step::At(TELLS);
+    }
+    let Some(letter) = LETTERS.get(usize::from(at)) else { return Step::Done };
+    let to = number(block, *letter);
+    // J of M205 is for all axes.
+    let all = if code == 205 { number(block, b'J') } else { None };
+    let Some(to) = to.or(all) else { return Step::Later(at + 1) };
+    match set_axis(code, at, to, machine) {
+        Ok(()) => Step::Later(at + 1),
+        // Settings of motors change at rest.
+        Err(Status::Again) => Step::Later(at),
+        Err(status) => Step::Refused(status),
+    }
+}
+
+#[inline(never)]
+#[small]
+fn set_axis(code: u16, axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
+    if machine.value(crate::protocol::Value::Working) != 0 {
+        return Err(Status::Again);
+    }
+    match code {
+        92 => set_steps(axis, to, machine),
+        203 => {
+            // In mm/s.
+            let by_second = to.fixed(3, false).filter(|to| (0..=i32::MAX / 60).contains(to));
+            let by_second = by_second.ok_or(Status::OutOfRange)?;
+            let to = Number::int(by_second.unsigned_abs() * 60).thousandth();
+            put_number(machine, Owner::Axis(axis), token("vm"), to)?;
+            put_number(machine, Owner::Axis(axis), token("fr"), to)
+        }
+        201 => put_number(machine, Owner::Axis(axis), token("ac"), to),
+        205 => put_number(machine, Owner::Axis(axis), token("jd"), to),
+        _ => {
+            let to = to.fixed(4, false).ok_or(Status::OutOfRange)?;
+            machine.set_row(Row::system(0), axis, Length(to))
+        }
+    }
+}
+
+#[inline(never)]
+#[small]
+fn put_number(
+    machine: &mut impl Machine,
+    owner: Owner,
+    token: [u8; 4],
+    to: Number,
+) -> Result<(), Status> {
+    let setting = named(owner, token).ok_or(Status::UnrecognizedName)?;
+    let value = machine.settings().check(setting, to, false)?;
+    machine.set(setting, value).map(|_| ())
+}
+
+/// Steps per millimetre become the travel in a turn of each motor of the axis.
+#[small]
+fn set_steps(axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
+    let to = to.fixed(3, false).filter(|to| *to > 0).ok_or(Status::OutOfRange)?;
+    for motor in 0..MOTORS as u8 {
+        if axis_of(motor, machine) == Some(axis) {
+            let turn = turned(machine, motor, to);
+            let setting = named(Owner::Motor(motor), token("tr"));
+            let setting = setting.ok_or(Status::UnrecognizedName)?;
+            if !setting.accepts(turn) {
+                return Err(Status::OutOfRange);
+            }
+            if machine.setting(setting) != turn {
+                machine.set(setting, turn)?;
+            }
+        }
+    }
+    Ok(())
+}

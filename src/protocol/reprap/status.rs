@@ -1,0 +1,52 @@
+//! Why a line was not carried out, for people.
+
+use crate::progmem::Text;
+use crate::status::Status;
+use crate::text;
+
+/// Whether there is no such code.
+#[small]
+pub fn is_unknown(status: Status) -> bool {
+    matches!(
+        status,
+        Status::GcodeUnsupported
+            | Status::McodeUnsupported
+            | Status::MalformedCommand
+            | Status::BadNumber
+            | Status::NotBuiltIn
+    )
+}
+
+/// The reason.
+#[inline(never)]
+#[small]
+pub fn reason(status: Status) -> Text {
+    match status {
+        Status::ShutDown => text!("stopped; M999 goes on"),
+        Status::Alarmed => text!("alarm; M999 goes on"),
+        Status::LimitHit => text!("limit switch hit; M999 goes on"),
+        Status::Panicked => text!("internal fault; reset"),
+        Status::SoftLimit => text!("beyond a soft limit, not carried out"),
+        Status::OutOfRange | Status::BelowMinimum | Status::AboveMaximum => {
+            text!("number out of range, not carried out")
+        }
+        Status::HomingSwitches => text!("no homing switch"),
+        Status::HomingFailed | Status::HomingClosed => text!("homing failed"),
+        Status::NotAccepted => text!("not possible now"),
+        Status::Terminated | Status::KillJob => text!("dropped"),
+        Status::InputTooLong => text!("line too long"),
+        Status::BufferFull => text!("bytes were lost"),
+        Status::Muted => text!("another port prints"),
+        Status::WordUnused | Status::AxisNotAllowed => text!("a word belongs to no code"),
+        Status::ToolInvalid => text!("no such extruder"),
+        Status::SensorOpen => text!("temperature sensor open"),
+        Status::SensorShort => text!("temperature sensor shorted"),
+        Status::HeatRunaway => text!("heater out of control"),
+        Status::HeatTooSlow => text!("heater does not heat"),
+        Status::TooHot => text!("heater too hot"),
+        Status::TooCold => text!("too cold to extrude"),
+        Status::HeatersLocked => text!("heaters are locked; M999 unlocks them"),
+        Status::ProbeFailed => text!("probing failed"),
+        _ => text!("not carried out"),
+    }
+}

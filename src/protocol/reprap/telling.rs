@@ -1,0 +1,86 @@
+//! A notice on its way out: the greeting, what has gone wrong, temperatures, and that a line takes long.
+
+use super::report;
+use super::status::reason;
+use super::write::{line_end, text};
+use crate::protocol::{Machine, Notice, Occasion, Out, Tells};
+use crate::status::Status;
+use crate::text;
+
+/// What is being told.
+pub enum Telling {
+    /// Nothing.
+    Nothing,
+    /// `start`.
+    Greeting,
+    /// Something has gone wrong, or has ended.
+    Exception(Status),
+    /// A line takes long.
+    Busy,
+    /// Temperatures, from this part on.
+    Temperatures(u8),
+}
+
+#[small]
+impl Telling {
+    /// Begins. What is told is what is so by now.
+    #[inline(never)]
+    pub(super) fn begin(notice: Notice, machine: &mut impl Machine) -> Self {
+        match notice {
+            Notice::Greeting(Occasion::Ready) => {
+                machine.memory().reprap.retracted = false;
+                Self::Greeting
+            }
+            Notice::Exception(status) => Self::Exception(status),
+            Notice::Busy => Self::Busy,
+            Notice::Temperatures => Self::Temperatures(0),
+            _ => Self::Nothing,
+        }
+    }
+}
+
+#[small]
+impl Tells for Telling {
+    #[inline(never)]
+    fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+        match self {
+            Self::Nothing => {}
+            Self::Greeting => text(out, text!("start\n")),
+            Self::Busy => text(out, text!("echo:busy: processing\n")),
+            Self::Exception(status) => exception(*status, out),
+            Self::Temperatures(at) => match report::temperatures(*at, machine, out) {
+                Some(next) => {
+                    *at = next;
+                    return true;
+                }
+                None => line_end(out),
+            },
+        }
+        false
+    }
+
+    /// A line of it never ends early.
+    fn split(&mut self, _out: &mut impl Out) -> bool {
+        false
+    }
+
+    fn blocks_free(&self) -> usize {
+        0
+    }
+}
+
+#[inline(never)]
+#[small]
+fn exception(status: Status, out: &mut impl Out) {
+    match status {
+        Status::ProgramStopped => text(out, text!("echo:busy: paused for user\n")),
+        Status::EndOfFile | Status::ProgramChecked | Status::NoToolLength => {}
+        Status::StepsLate => text(out, text!("echo:steps came late\n")),
+        Status::BufferFull => text(out, text!("echo:bytes were lost\n")),
+        status => {
+            text(out, text!("Error:"));
+            text(out, reason(status));
+            line_end(out);
+        }
+    }
+}

@@ -1,0 +1,332 @@
+//! Heaters and the fan, looked at within the turns of the power task.
+//!
+//! Owns the converter, the pins of heaters and fan, and [`Heaters`]. Reads what exec has been told by lines ([`Orders`] in `tasks::common`).
+//! Each turn, 20 ms, takes the reading of one heater and begins that of the other; so each has one in 40 ms, and a step of its control in
+//! 200. Heaters are switched at these turns alone: power is spread over them. The power task feeds the watchdog in the same turn: if it
+//! gets none, the chip resets in half a second with its heaters off.
+//!
+//! A fault ([`heater`](crate::heat::heater), [`fault`](crate::heat::fault)) switches all of them off in its turn, [locks](lock) them, and
+//! raises an alarm. Any alarm switches them off. While a wait is on ([`Heaters::begin_wait`]) the planner is woken when it is over.
+//!
+//! Thread mode. Cost of a turn: 3,500 cycles, of every fifth 7,000. A turn that comes late switches late: thread mode has half a second under
+//! the hardest of motion.
+
+use core::cell::{Cell, RefCell};
+
+use kerf_macros::small;
+
+use super::alarm;
+use super::common;
+use super::links::Links;
+use super::storage::Storage;
+use crate::capability::Capability;
+use crate::config::{Owner, Setting, Settings};
+use crate::gcode::heating::{Heat, Part, Wait};
+use crate::hal::Thread;
+use crate::hal::event::Event;
+use crate::hal::{flags, heaters};
+use crate::heat::heater::{Heater, Seen};
+use crate::heat::sensor::UNIT;
+use crate::heat::{HEATERS, Orders, PRINTERS, Standing};
+use crate::machine::{self, Alarm};
+use crate::status::Status;
+
+/// So near a temperature counts as reached, 1/64 degree.
+const NEAR: i16 = UNIT + UNIT / 2;
+/// For so many steps it has to be: 3 s.
+const STAYS: u8 = 15;
+/// How long a fan that is switched on has all of its power: 200 ms.
+const KICK: u8 = 10;
+
+/// What tasks share of heaters. Thread mode.
+pub struct Heaters {
+    parts: [Parts; PRINTERS],
+}
+
+/// Of a machine that has them.
+struct Parts {
+    heaters: RefCell<[Heater; HEATERS]>,
+    /// What the planner waits for.
+    awaited: Cell<Heat>,
+    /// Steps for which it has been so.
+    stays: Cell<u8>,
+    /// The heater whose reading has been begun.
+    next: Cell<u8>,
+    /// Turns for which the fan still has all its power, and what is owed to it.
+    kick: Cell<u8>,
+    owed: Cell<u8>,
+}
+
+#[small]
+impl Parts {
+    const fn new() -> Self {
+        Self {
+            heaters: RefCell::new([Heater::OFF; HEATERS]),
+            awaited: Cell::new(Heat { part: Part::HotEnd, to: None, wait: Wait::Nothing }),
+            stays: Cell::new(0),
+            next: Cell::new(0),
+            kick: Cell::new(0),
+            owed: Cell::new(0),
+        }
+    }
+
+    /// Whether the fan is on until the next turn.
+    fn turn_fan(&self, speed: u8) -> bool {
+        if speed == 0 {
+            self.kick.set(KICK);
+            return false;
+        }
+        let (left, mut owed) = (self.kick.get(), self.owed.get());
+        self.kick.set(left.saturating_sub(1));
+        let on = crate::heat::control::spread(&mut owed, speed);
+        self.owed.set(owed);
+        on || left > 0
+    }
+
+    /// Whether what is waited for has come.
+    fn has_come(&self, orders: &Orders) -> bool {
+        let awaited = self.awaited.get();
+        let heaters = self.heaters.borrow();
+        let mut parts = [Part::HotEnd, Part::Bed].into_iter().zip(heaters.iter().zip(orders.to));
+        parts.all(|(part, (heater, to))| {
+            let counts = awaited.part == part || awaited.part == Part::All;
+            let error = heater.error(to);
+            !counts || to == 0 || error <= NEAR && (awaited.wait == Wait::Hot || error >= -NEAR)
+        })
+    }
+
+    /// After a step: the planner goes on if what it waits for has come, and stays.
+    fn see_to_wait(&self, orders: &Orders) {
+        if self.awaited.get().wait == Wait::Nothing {
+            return;
+        }
+        let stays = if self.has_come(orders) { self.stays.get() + 1 } else { 0 };
+        self.stays.set(stays);
+        if stays >= STAYS {
+            self.end_wait();
+        }
+    }
+
+    /// A wait for what is off is over, whatever its sensor says.
+    fn end_idle_wait(&self, orders: &Orders) {
+        let awaited = self.awaited.get();
+        let [hot_end, bed] = orders.to;
+        let off = match awaited.part {
+            Part::HotEnd => hot_end == 0,
+            Part::Bed => bed == 0,
+            Part::All | Part::Fan => hot_end | bed == 0,
+        };
+        if off && awaited.wait != Wait::Nothing {
+            self.end_wait();
+        }
+    }
+
+    fn end_wait(&self) {
+        self.awaited.set(Heat::default());
+        flags::set(Event::BlockDone);
+    }
+}
+
+#[small]
+impl Heaters {
+    /// Everything is off.
+    pub const fn new() -> Self {
+        Self { parts: [const { Parts::new() }; PRINTERS] }
+    }
+
+    /// The planner waits for this from now on.
+    pub fn begin_wait(&self, heat: Heat) {
+        if let Some(parts) = self.parts.first() {
+            parts.stays.set(0);
+            parts.awaited.set(heat);
+        }
+    }
+
+    /// Whether it waits still.
+    pub fn waits(&self) -> bool {
+        self.parts.first().is_some_and(|parts| parts.awaited.get().wait != Wait::Nothing)
+    }
+
+    /// It waits no more: motion goes on (M108, or the lines have been dropped).
+    pub fn end_wait(&self) {
+        if let Some(parts) = self.parts.first() {
+            parts.end_wait();
+        }
+    }
+}
+
+#[small]
+impl Default for Heaters {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What lines have asked for.
+#[small]
+fn orders(thread: Thread) -> Orders {
+    common::with(thread, |common| common.heat.first().copied()).unwrap_or(Orders::OFF)
+}
+
+/// Forgets what lines have asked for: everything is to be off.
+#[small]
+pub fn forget_orders(thread: Thread) {
+    common::with(thread, |common| {
+        if let Some(orders) = common.heat.first_mut() {
+            *orders = Orders::OFF;
+        }
+    });
+}
+
+/// Switches all heaters and the fan off, at once.
+#[inline(never)]
+#[small]
+pub fn stop(links: &Links) {
+    if !Capability::Printer.is_built_in() {
+        return;
+    }
+    forget_orders(links.thread);
+    heaters::switch(0);
+    if let Some(parts) = links.heat.parts.first() {
+        for heater in parts.heaters.borrow_mut().iter_mut() {
+            heater.stop();
+        }
+    }
+}
+
+/// How a heater stands: 0 the hot end, 1 the bed. None without the capability.
+#[small]
+pub fn standing(links: &Links, heater: u8) -> Option<Standing> {
+    let parts = links.heat.parts.first()?;
+    let heater = usize::from(heater);
+    let to = *orders(links.thread).to.get(heater)?;
+    Some(parts.heaters.borrow().get(heater)?.standing(to))
+}
+
+/// How fast the fan is to be, 255 for all it can.
+#[small]
+pub fn fan(thread: Thread) -> u8 {
+    orders(thread).fan
+}
+
+/// Takes over a setting, if it is a heater's. Whether it is.
+#[inline(never)]
+#[small]
+pub fn set(heaters: &Heaters, settings: &mut Settings, setting: Setting, value: i32) -> bool {
+    let number = match setting.owner() {
+        Owner::HotEnd => 0,
+        Owner::Bed => 1,
+        _ => return false,
+    };
+    let Some(parts) = heaters.parts.first() else { return false };
+    let mut heaters = parts.heaters.borrow_mut();
+    let (Some(heater), Some(heating)) = (heaters.get_mut(number), settings.heating.first_mut())
+    else {
+        return false;
+    };
+    heater.set(setting.index(), value);
+    if let Some(hottest) = heating.hottest.get_mut(number) {
+        *hottest = heater.hottest();
+    }
+    true
+}
+
+/// Takes over all of them.
+#[inline(never)]
+#[small]
+pub fn set_all(heaters: &Heaters, settings: &mut Settings, storage: &Storage) {
+    if !Capability::Printer.is_built_in() {
+        return;
+    }
+    for setting in (Setting::WARM..Setting::COLD).filter_map(Setting::from_number) {
+        if matches!(setting.owner(), Owner::HotEnd | Owner::Bed) {
+            set(heaters, settings, setting, storage.cold(setting));
+        }
+    }
+}
+
+/// A turn: see the module's text.
+#[inline(never)]
+#[small]
+pub fn look(links: &Links) {
+    if !Capability::Printer.is_built_in() {
+        return;
+    }
+    if machine::is_alarmed() {
+        forget_orders(links.thread);
+    }
+    let Some(parts) = links.heat.parts.first() else { return };
+    let orders = orders(links.thread);
+    let number = parts.next.replace(parts.next.get() ^ 1);
+    let reading = heaters::reading();
+    heaters::begin(parts.next.get());
+    let seen = look_at(parts, number, reading, &orders);
+    let mut on = if parts.turn_fan(orders.fan) { 4 } else { 0 };
+    for (bit, heater) in [1, 2].into_iter().zip(parts.heaters.borrow().iter()) {
+        on |= if heater.is_on() { bit } else { 0 };
+    }
+    heaters::switch(on);
+    parts.end_idle_wait(&orders);
+    match seen {
+        Ok(Seen::Look) => {}
+        Ok(Seen::Step) => {
+            if number == 0 {
+                note_cold(links, parts);
+            }
+            parts.see_to_wait(&orders);
+        }
+        Err(fault) => lock(links, fault),
+    }
+}
+
+#[inline(never)]
+#[small]
+fn look_at(
+    parts: &Parts,
+    number: u8,
+    reading: Option<u16>,
+    orders: &Orders,
+) -> Result<Seen, Status> {
+    let mut heaters = parts.heaters.borrow_mut();
+    let [hot_end, bed] = &mut *heaters;
+    let [first, second] = orders.to;
+    match number {
+        0 => hot_end.look(number, reading, first, orders.fan),
+        _ => bed.look(number, reading, second, orders.fan),
+    }
+}
+
+/// Whether filament may be moved.
+#[small]
+fn note_cold(links: &Links, parts: &Parts) {
+    let [hot_end, _] = &*parts.heaters.borrow();
+    if let Some(heating) = links.settings.borrow_mut().heating.first_mut() {
+        heating.extrudes = !hot_end.is_cold();
+    }
+}
+
+/// A fault: everything is off, and no line may heat again until a reset, or until somebody [unlocks](unlock) the heaters.
+#[inline(never)]
+#[small]
+fn lock(links: &Links, fault: Status) {
+    stop(links);
+    let locked = match links.settings.borrow_mut().heating.first_mut() {
+        Some(heating) => core::mem::replace(&mut heating.refused, Status::HeatersLocked),
+        None => return,
+    };
+    if locked != Status::Ok {
+        return;
+    }
+    match machine::is_alarmed() {
+        true => links.except(fault),
+        false => alarm::raise_for(links, Alarm::Alarm, fault),
+    }
+}
+
+/// Lines may heat again.
+#[small]
+pub fn unlock(settings: &mut Settings) {
+    if let Some(heating) = settings.heating.first_mut() {
+        heating.refused = Status::Ok;
+    }
+}

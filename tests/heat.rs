@@ -1,0 +1,299 @@
+//! Heaters of the whole firmware, on simulated plants in mocked time.
+
+#[path = "support/plant.rs"]
+mod plant;
+
+use kerf::capability::Capability;
+use kerf::hal::imp::Machine;
+use kerf::heat::sensor::{Kind, SAMPLES, reading};
+use plant::{AIR, Plant};
+
+/// What is wrong with a sensor.
+#[derive(Clone, Copy, PartialEq)]
+enum Wire {
+    Well,
+    Open,
+    Short,
+    /// It has fallen out of its heater.
+    Loose,
+}
+
+struct Printer {
+    machine: Machine,
+    hot_end: Plant,
+    bed: Plant,
+    wire: Wire,
+    /// The transistor of the hot end conducts whatever it is told.
+    stuck: bool,
+    noise: u32,
+    loose: f64,
+    ms: u64,
+    said: String,
+}
+
+/// How often the plants are worked out, ms.
+const STEP: u64 = 10;
+
+impl Printer {
+    fn new() -> Option<Self> {
+        if !Capability::Printer.is_built_in() {
+            return None;
+        }
+        let machine = Machine::boot(115_200).expect("one machine for each thread");
+        let (hot_end, bed) = (Plant::hot_end(), Plant::bed());
+        let mut printer = Self {
+            machine,
+            hot_end,
+            bed,
+            wire: Wire::Well,
+            stuck: false,
+            noise: 1,
+            loose: AIR,
+            ms: 0,
+            said: String::new(),
+        };
+        printer.run(1_000, |_| {});
+        printer.said.clear();
+        Some(printer)
+    }
+
+    fn noise(&mut self) -> f64 {
+        self.noise = self.noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(self.noise >> 16) / 65_536.0 - 0.5
+    }
+
+    /// What the converter reads: half a count of noise in each conversion, of which the sum keeps a sixth.
+    fn read(&mut self, degrees: f64) -> u16 {
+        let (full, noise) = (f64::from(SAMPLES) * 1_023.0, self.noise() * 6.0);
+        (reading(Kind::Semitec, degrees) + noise).clamp(0.0, full) as u16
+    }
+
+    /// Runs for a time, and looks at each step.
+    fn run(&mut self, ms: u64, mut look: impl FnMut(&Self)) {
+        for _ in 0..ms / STEP {
+            let on = self.machine.heaters_on();
+            let (seconds, fan) = (STEP as f64 / 1_000.0, on & 4 != 0);
+            self.hot_end.pass(seconds, on & 1 != 0 || self.stuck, fan);
+            self.bed.pass(seconds, on & 2 != 0, fan);
+            self.loose += (AIR - self.loose) * seconds / 5.0;
+            let hot_end = match self.wire {
+                Wire::Well => self.read(self.hot_end.sensor),
+                Wire::Loose => self.read(self.loose),
+                Wire::Open => SAMPLES * 1_023,
+                Wire::Short => 0,
+            };
+            let bed = self.read(self.bed.sensor);
+            self.machine.set_sensor(0, hot_end);
+            self.machine.set_sensor(1, bed);
+            self.machine.run_ms(STEP);
+            self.ms += STEP;
+            self.said += &String::from_utf8(self.machine.received()).expect("ASCII");
+            look(self);
+        }
+    }
+
+    fn send(&mut self, line: &str) {
+        self.machine.send(line.as_bytes());
+        self.machine.send(b"\n");
+    }
+
+    /// Sends a line and runs until it has been answered.
+    fn ask(&mut self, line: &str) -> String {
+        self.said.clear();
+        self.send(line);
+        self.run(200, |_| {});
+        self.said.clone()
+    }
+
+    /// How long it takes until all heaters are off, at most `ms`.
+    fn off_after(&mut self, ms: u64) -> Option<u64> {
+        let (from, mut off) = (self.ms, None);
+        self.run(ms, |printer| match printer.machine.heaters_on() & 3 {
+            0 => off = off.or(Some(printer.ms - from)),
+            _ => off = None,
+        });
+        off
+    }
+
+    /// With the hot end at 200 degrees.
+    fn hot() -> Option<Self> {
+        let mut printer = Self::new()?;
+        let answer = printer.ask("m104 s200");
+        assert!(answer.contains("\"f\":[1,0,"), "{answer}");
+        printer.run(240_000, |_| {});
+        assert!((printer.hot_end.block - 200.0).abs() < 1.0, "{}", printer.hot_end.block);
+        Some(printer)
+    }
+}
+
+#[test]
+fn the_hot_end_comes_to_its_temperature_and_keeps_it() {
+    let Some(mut printer) = Printer::new() else { return };
+    printer.ask("m104 s200");
+    let (mut most, mut reached) = (0f64, None);
+    printer.run(240_000, |printer| {
+        most = most.max(printer.hot_end.sensor);
+        if printer.hot_end.sensor > 199.0 {
+            reached = reached.or(Some(printer.ms));
+        }
+    });
+    assert!(reached.is_some_and(|ms| ms < 150_000), "200 degrees after {reached:?} ms");
+    assert!(most < 202.0, "overshoot to {most}");
+    let (mut low, mut high) = (1e9f64, 0f64);
+    printer.run(600_000, |printer| {
+        low = low.min(printer.hot_end.sensor);
+        high = high.max(printer.hot_end.sensor);
+    });
+    println!("reached after {reached:?} ms, most {most:.2}, held from {low:.2} to {high:.2}");
+    assert!(low > 199.5 && high < 200.5, "held from {low} to {high}");
+}
+
+#[test]
+fn the_fan_at_full_is_made_up_for() {
+    let Some(mut printer) = Printer::hot() else { return };
+    printer.ask("m106");
+    let (mut low, mut below) = (1e9f64, 0);
+    printer.run(180_000, |printer| {
+        low = low.min(printer.hot_end.sensor);
+        below += if printer.hot_end.sensor < 199.0 { STEP } else { 0 };
+    });
+    println!("fan: down to {low:.2}, below 199 for {below} ms");
+    assert!(low > 198.0 && below < 25_000, "down to {low}, below 199 for {below} ms");
+}
+
+#[test]
+fn the_bed_is_switched_within_its_hysteresis() {
+    let Some(mut printer) = Printer::new() else { return };
+    printer.ask("m140 s60");
+    printer.run(600_000, |_| {});
+    let (mut low, mut high) = (1e9f64, 0f64);
+    printer.run(600_000, |printer| {
+        low = low.min(printer.bed.sensor);
+        high = high.max(printer.bed.sensor);
+    });
+    println!("bed from {low:.2} to {high:.2}");
+    assert!(low > 58.0 && high < 62.5, "from {low} to {high}");
+}
+
+#[test]
+fn broken_wires_switch_off_within_100_ms() {
+    for (wire, code) in [(Wire::Open, 48), (Wire::Short, 49)] {
+        let join = std::thread::spawn(move || {
+            let Some(mut printer) = Printer::hot() else { return };
+            printer.send("m140 s60");
+            printer.run(2_000, |_| {});
+            printer.said.clear();
+            printer.wire = wire;
+            let off = printer.off_after(10_000);
+            assert!(off.is_some_and(|ms| ms <= 100), "off after {off:?} ms");
+            assert!(printer.said.contains(&format!("\"st\":{code}")), "{}", printer.said);
+            printer.wire = Wire::Well;
+            printer.ask("{clear:n}");
+            let answer = printer.ask("m104 s200");
+            assert!(answer.contains("\"f\":[1,54,"), "{answer}");
+            let answer = printer.ask("m140 s60");
+            assert!(answer.contains("\"f\":[1,54,"), "{answer}");
+            assert!(printer.ask("m104 s0").contains("\"f\":[1,0,"));
+            assert_eq!(printer.off_after(5_000), Some(STEP));
+        });
+        join.join().expect("no panic");
+    }
+}
+
+#[test]
+fn a_sensor_that_has_come_loose_is_noticed_by_the_rule() {
+    let Some(mut printer) = Printer::hot() else { return };
+    printer.said.clear();
+    printer.loose = printer.hot_end.sensor;
+    printer.wire = Wire::Loose;
+    let off = printer.off_after(60_000);
+    println!("loose: off after {off:?} ms, block at {:.0}", printer.hot_end.block);
+    assert!(off.is_some_and(|ms| ms < 40_000), "{off:?}");
+    assert!(printer.said.contains("\"st\":50"), "{}", printer.said);
+}
+
+#[test]
+fn a_heater_that_does_not_heat_is_noticed_by_the_rule() {
+    let Some(mut printer) = Printer::new() else { return };
+    printer.hot_end.watts = 0.0;
+    printer.ask("m104 s200");
+    printer.said.clear();
+    let off = printer.off_after(60_000);
+    assert!(off.is_some_and(|ms| ms < 25_000), "{off:?}");
+    assert!(printer.said.contains("\"st\":51"), "{}", printer.said);
+}
+
+#[test]
+fn a_transistor_that_stays_on_is_told() {
+    let Some(mut printer) = Printer::new() else { return };
+    printer.stuck = true;
+    printer.run(120_000, |_| {});
+    assert!(printer.said.contains("\"st\":50"), "{}", printer.said);
+    printer.said.clear();
+    // And once it has got hotter than it may be, on top of that nothing more: they are locked.
+    printer.run(120_000, |_| {});
+    assert!(printer.hot_end.block > 275.0);
+}
+
+#[test]
+fn an_alarm_switches_off_and_a_wait_keeps_nobody_waiting() {
+    let Some(mut printer) = Printer::new() else { return };
+    printer.send("m109 s200");
+    printer.send("g0 x5");
+    printer.run(20_000, |_| {});
+    assert!(printer.said.matches("\"f\":[1,0,").count() >= 1, "{}", printer.said);
+    printer.said.clear();
+    printer.send("{sr:n}");
+    printer.run(100, |_| {});
+    assert!(!printer.said.is_empty(), "a question is answered while a line waits");
+    printer.send("{alarm:n}");
+    let off = printer.off_after(1_000);
+    assert!(off.is_some_and(|ms| ms <= 50), "{off:?}: {}", printer.said);
+    printer.ask("{clear:n}");
+    assert!(printer.ask("g0 x1").contains("\"f\":[1,0,"), "the wait is over: {}", printer.said);
+    assert_eq!(printer.off_after(5_000), Some(STEP));
+}
+
+#[test]
+fn nothing_is_waited_for_where_nothing_is_to_be_hot() {
+    for line in ["m109", "m109 s0", "m190 r0", "m116"] {
+        let join = std::thread::spawn(move || {
+            let Some(mut printer) = Printer::new() else { return };
+            // Not even with a sensor that is broken, which is no fault of a heater that is off.
+            printer.wire = Wire::Open;
+            printer.send(line);
+            printer.send("g0 x1");
+            printer.run(1_000, |_| {});
+            assert_ne!(printer.machine.emitted().steps[0], 0, "{line}: {}", printer.said);
+        });
+        join.join().expect("no panic");
+    }
+}
+
+#[test]
+fn motion_goes_on_when_the_temperature_is_there() {
+    let Some(mut printer) = Printer::new() else { return };
+    for line in ["{sv:0}", "m140 s40", "m109 s200", "g0 x5"] {
+        printer.send(line);
+    }
+    let mut moved_at = None;
+    printer.run(200_000, |printer| {
+        if printer.machine.emitted().steps[0] != 0 && moved_at.is_none() {
+            moved_at = Some((printer.ms, printer.hot_end.sensor));
+        }
+    });
+    let Some((_, degrees)) = moved_at else { panic!("no step: {}", printer.said) };
+    assert!((198.0..202.0).contains(&degrees), "moved at {degrees}");
+}
+
+#[test]
+fn the_end_of_a_program_switches_off() {
+    let Some(mut printer) = Printer::hot() else { return };
+    printer.ask("m106 s255");
+    assert!(printer.machine.heaters_on() & 4 != 0);
+    printer.ask("m2");
+    printer.run(100, |_| {});
+    let mut on = 0;
+    printer.run(5_000, |printer| on |= printer.machine.heaters_on());
+    assert_eq!(on, 0);
+}

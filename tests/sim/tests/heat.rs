@@ -1,0 +1,185 @@
+//! Heaters on the chip: the converter, the pins, faults, and steps meanwhile.
+
+mod common;
+#[path = "../../support/plant.rs"]
+mod plant;
+
+use common::{booted, set};
+use kerf::boards::{Heater, Heaters, RAMPS14};
+use kerf::heat::sensor::{Kind, share};
+use kerf_sim::{Host, Machine};
+use plant::Plant;
+
+/// The board's heaters.
+fn heaters() -> Heaters {
+    RAMPS14.heaters.expect("RAMPS has heaters")
+}
+
+/// A printer on the chip.
+struct Printer {
+    machine: Machine,
+    host: Host,
+    hot_end: Plant,
+    bed: Plant,
+    noise: u32,
+    /// What a wire that is off, or shorted, makes of the hot end's sensor.
+    broken: Option<u32>,
+}
+
+impl Printer {
+    fn new() -> Self {
+        let (machine, host) = booted(&RAMPS14);
+        let (hot_end, bed) = (Plant::hot_end(), Plant::bed());
+        let mut printer = Self { machine, host, hot_end, bed, noise: 1, broken: None };
+        printer.run(500, |_| {});
+        printer
+    }
+
+    fn is_on(&self, heater: Heater) -> bool {
+        self.machine.is_high(heater.pin)
+    }
+
+    /// Of a sensor, with noise.
+    fn millivolts(&mut self, degrees: f64) -> u32 {
+        self.noise = self.noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let noise = f64::from(self.noise >> 16) / 65_536.0 - 0.5;
+        (share(Kind::Semitec, degrees) * 5_000.0 + noise * 8.0).round().clamp(0.0, 5_000.0) as u32
+    }
+
+    /// Runs for so many ms, and looks after each.
+    fn run(&mut self, ms: u64, mut look: impl FnMut(&Self)) {
+        let Heaters { heaters: [hot_end, bed], fan } = heaters();
+        for _ in 0..ms {
+            let fan = self.machine.is_high(fan);
+            self.hot_end.pass(0.001, self.is_on(hot_end), fan);
+            self.bed.pass(0.001, self.is_on(bed), fan);
+            let read = self.millivolts(self.hot_end.sensor);
+            self.machine.set_millivolts(hot_end.channel, self.broken.unwrap_or(read));
+            let read = self.millivolts(self.bed.sensor);
+            self.machine.set_millivolts(bed.channel, read);
+            self.host.run_for_ms(&mut self.machine, 1).unwrap();
+            look(self);
+        }
+    }
+
+    fn ask(&mut self, line: &str) {
+        set(&mut self.machine, &mut self.host, line);
+    }
+
+    /// The number that a question is answered with.
+    fn value(&mut self, name: &str) -> f64 {
+        let text = format!("{{{name}:n}}");
+        let answer = self.host.ask(&mut self.machine, &text, 1_000).unwrap();
+        answer.body[name].as_f64().unwrap_or_else(|| panic!("{name}: {:?}", answer.body))
+    }
+
+    /// How long after the wire breaks the hot end is off for good, ms.
+    fn off_after(&mut self, millivolts: u32) -> u64 {
+        self.broken = Some(millivolts);
+        let (mut ms, mut off) = (0, None);
+        let [hot_end, bed] = heaters().heaters;
+        self.run(1_000, |printer| {
+            ms += 1;
+            match printer.is_on(hot_end) || printer.is_on(bed) {
+                true => off = None,
+                false => off = off.or(Some(ms)),
+            }
+        });
+        off.expect("it goes off")
+    }
+}
+
+#[test]
+fn temperatures_are_those_of_the_sensors() {
+    let mut printer = Printer::new();
+    for (hot_end, bed) in [(22.0, 22.0), (60.0, 100.0), (200.0, 60.0), (250.0, 110.0)] {
+        printer.hot_end.block = hot_end;
+        printer.hot_end.sensor = hot_end;
+        printer.bed.block = bed;
+        printer.bed.sensor = bed;
+        printer.run(450, |_| {});
+        let (is, wanted) = (printer.value("he1t"), printer.hot_end.sensor);
+        assert!((is - wanted).abs() < 1.0, "hot end {is}, not {wanted}");
+        let (is, wanted) = (printer.value("he3t"), printer.bed.sensor);
+        assert!((is - wanted).abs() < 1.0, "bed {is}, not {wanted}");
+    }
+}
+
+#[test]
+fn it_heats_to_200_degrees_and_keeps_to_them() {
+    let mut printer = Printer::new();
+    printer.hot_end.block = 150.0;
+    printer.hot_end.sensor = 150.0;
+    printer.ask("m104 s200");
+    let mut most = 0f64;
+    printer.run(60_000, |printer| most = most.max(printer.hot_end.sensor));
+    let (mut low, mut high) = (1e9f64, 0f64);
+    printer.run(20_000, |printer| {
+        low = low.min(printer.hot_end.sensor);
+        high = high.max(printer.hot_end.sensor);
+    });
+    println!("at most {most:.2}, then {low:.2} to {high:.2}");
+    assert!(most < 202.0 && low > 199.5 && high < 200.5, "at most {most}, {low} to {high}");
+}
+
+#[test]
+fn a_broken_wire_switches_off_in_100_ms() {
+    for (millivolts, status) in [(5_000, 48), (0, 49)] {
+        let mut printer = Printer::new();
+        printer.ask("m104 s200");
+        printer.ask("m140 s60");
+        printer.run(3_000, |_| {});
+        let [hot_end, bed] = heaters().heaters;
+        assert!(printer.is_on(hot_end) && printer.is_on(bed));
+        let ms = printer.off_after(millivolts);
+        println!("off after {ms} ms");
+        assert!(ms <= 100, "off after {ms} ms");
+        let told = printer.host.take_reports();
+        assert!(told.iter().any(|report| report["er"]["st"] == status), "{told:?}");
+    }
+}
+
+#[test]
+fn a_broken_wire_switches_off_in_100_ms_while_motors_move_fast() {
+    let mut printer = Printer::new();
+    for line in ["{xvm:30000}", "{xfr:30000}", "{xjm:5000000}", "{sv:2}", "{si:100}"] {
+        printer.ask(line);
+    }
+    printer.ask("m104 s200");
+    printer.host.send(&mut printer.machine, 1, "g1 x1000 y300 z20 f20000");
+    printer.run(2_000, |_| {});
+    let ms = printer.off_after(5_000);
+    println!("off after {ms} ms while motors move");
+    assert!(ms <= 100, "off after {ms} ms");
+}
+
+#[test]
+fn a_reset_and_a_stuck_machine_leave_heaters_off() {
+    let mut printer = Printer::new();
+    printer.ask("m104 s200");
+    printer.run(1_000, |_| {});
+    let [hot_end, _] = heaters().heaters;
+    assert!(printer.is_on(hot_end));
+    // Thread mode has no turn any more: no tick wakes it.
+    printer.machine.withhold(21, true);
+    let (mut ms, mut off) = (0, None);
+    printer.run(1_200, |printer| {
+        ms += 1;
+        if !printer.is_on(hot_end) {
+            off = off.or(Some(ms));
+        }
+    });
+    assert!(off.is_some_and(|ms| ms < 700), "off after {off:?} ms");
+    assert!(printer.machine.resets() >= 1);
+}
+
+#[test]
+fn no_step_is_late_while_heaters_work() {
+    let mut printer = Printer::new();
+    for line in ["{sv:0}", "m104 s200", "m140 s60", "m106 s128"] {
+        printer.ask(line);
+    }
+    printer.host.send(&mut printer.machine, 1, "g1 x40 y30 f4000");
+    printer.run(4_000, |_| {});
+    assert_eq!(printer.value("stv"), 0.0);
+}
