@@ -66,7 +66,7 @@ pub fn part(
     out: &mut impl Out,
 ) -> Step {
     let number = match code {
-        (b'T', tool) if tool == 0 => return Step::Done,
+        (b'T', 0) => return Step::Done,
         (b'T', _) => return Step::Refused(Status::ToolInvalid),
         (b'G', 10) => return retract(true, machine),
         (b'G', 11) => return retract(false, machine),
