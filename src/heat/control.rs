@@ -110,7 +110,7 @@ impl Control {
         let sum = (self.sum + i * error).clamp(0, SUM_MAX);
         let power = wanted + ahead + sum / (HUNDREDTHS * UNIT as i32 * STEPS);
         let grows = sum > self.sum;
-        if (power < FULL.into() || !grows) && (power > 0 || grows) {
+        if (power < i32::from(FULL) || !grows) && (power > 0 || grows) {
             self.sum = sum;
         }
         power.clamp(0, FULL.into()) as u8
