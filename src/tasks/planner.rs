@@ -125,6 +125,7 @@ enum Turn {
     /// The line homes.
     Home,
     /// The line waits for a temperature.
+    #[cfg(feature = "printer")]
     Heat,
     /// The axis is jogged.
     Jog,
@@ -178,9 +179,6 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
                         Turn::Jog => planner.jog().await,
                         #[cfg(feature = "printer")]
                         Turn::Heat => planner.await_heat().await,
-                        // No line asks for it.
-                        #[cfg(not(feature = "printer"))]
-                        Turn::Heat => {}
                     }
                 }
             }
