@@ -11,7 +11,7 @@ pub enum Incoming {
     Response(Response),
     /// A report that nobody asked for: `sr`, `qr`, `er` and so on.
     Report(Value),
-    /// The greeting in grbl's dialect, which comes where nothing has decided for a dialect yet.
+    /// The greeting in another dialect, which comes where nothing has decided for one yet.
     OtherGreeting,
     /// Anything else.
     Other(String),
@@ -30,8 +30,8 @@ pub struct Response {
     pub free: i64,
 }
 
-/// The greeting in grbl's dialect.
-const OTHER_GREETING: &str = "Grbl 1.1h ['$' for help]";
+/// The greetings in grbl's dialect and in that of printing hosts.
+const OTHER_GREETINGS: [&str; 2] = ["Grbl 1.1h ['$' for help]", "start"];
 
 /// Status of a line that asked for nothing, such as a deleted block.
 pub const STATUS_NOOP: i64 = 3;
@@ -45,7 +45,7 @@ impl Response {
 
 /// Tells what a line is.
 pub fn classify(line: &str) -> Incoming {
-    if line.trim_end() == OTHER_GREETING {
+    if OTHER_GREETINGS.contains(&line.trim_end()) {
         return Incoming::OtherGreeting;
     }
     let strict = serde_json::from_str::<Value>(line);

@@ -63,7 +63,8 @@ fn mistakes_are_explained() {
             &elf,
             &job,
             &["--board", "uno"],
-            "no board uno; there are mega2560-grbl, mega2560-grbl-lathe, mega2560-lathe, pico-cnc, ramps14",
+            "no board uno; there are mega2560-grbl, mega2560-grbl-lathe, mega2560-lathe, pico-cnc, pico-cnc6, ramps14, \
+             skr-pico",
         ),
     ];
     for (elf, job, more, want) in cases {
