@@ -422,7 +422,7 @@ struct Amount {
 
 /// A feedhold begins within 10 ms. Less would not outlast a ramp that is laid out while ticks take two thirds of the CPU, which takes up to
 /// 4.1 ms, or an override.
-const USUAL: Amount = Amount { most: units(88), least: units(38) };
+const USUAL: Amount = Amount { most: units(88), least: units(42) };
 
 /// For a while after too little has been waiting: more is prepared at a stretch. A feedhold begins within 10 ms still.
 const PRESSED: Amount = Amount { most: units(94), least: units(65) };
