@@ -21,9 +21,13 @@ pub fn show(sessions: &[Done]) -> bool {
     agree && steps(sessions).all(|(_, step)| step.outcome == Outcome::Passed)
 }
 
+/// Senders with a job of their own.
+const OWN_JOB: [&str; 1] = ["printcore"];
+
 /// Whether the motors have made the same steps, not only the same way on balance, for every sender.
 fn agree(sessions: &[Done]) -> bool {
-    let motors = steps(sessions).filter(|(_, step)| step.name == ARRIVAL);
+    let motors = steps(sessions).filter(|(done, _)| !OWN_JOB.contains(&done.sender));
+    let motors = motors.filter(|(_, step)| step.name == ARRIVAL);
     let mut motors = motors.map(|(_, step)| &step.details);
     let first = motors.next();
     motors.all(|other| Some(other) == first)
