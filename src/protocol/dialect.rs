@@ -148,10 +148,15 @@ pub trait Tells {
     fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool;
 
     /// Ends the line here, so that an answer can be sent: the rest follows in a line of its own. False if a line of it can't end here.
-    fn split(&mut self, out: &mut impl Out) -> bool;
+    fn split(&mut self, out: &mut impl Out) -> bool {
+        let _ = out;
+        false
+    }
 
     /// Of a queue report: how many free blocks it has told.
-    fn blocks_free(&self) -> usize;
+    fn blocks_free(&self) -> usize {
+        0
+    }
 }
 
 /// What is kept between reports.

@@ -12,6 +12,7 @@
 //! | [`notice`] | what is told unasked |
 //! | [`out`] | where dialects write to |
 //! | [`tinyg`], [`grbl`], `reprap` | TinyG's dialect, grbl's, and that of printing hosts |
+//! | `write`, `steps` | what grbl's dialect and that of printing hosts share: numbers and texts, steps per millimetre |
 //!
 //! A dialect spells what is neutral here: the numbers and texts of a [`Status`](crate::status::Status), names of settings and values, what
 //! the machine is [doing](crate::machine::Doing). Which dialects an image has is a Cargo feature each; where there is one, nothing is left
@@ -27,9 +28,13 @@ pub mod notice;
 pub mod out;
 #[cfg(feature = "dialect-reprap")]
 pub mod reprap;
+#[cfg(any(feature = "dialect-grbl", feature = "dialect-reprap"))]
+mod steps;
 #[cfg(feature = "dialect-tinyg")]
 pub mod tinyg;
 pub mod value;
+#[cfg(any(feature = "dialect-grbl", feature = "dialect-reprap"))]
+mod write;
 
 pub use checksum::Checksum;
 pub use dialect::{

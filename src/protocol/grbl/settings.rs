@@ -9,6 +9,7 @@ use crate::capability::Capability;
 use crate::config::name::{Name, token};
 use crate::config::{Fixed, Number, Owner, Setting};
 use crate::progmem;
+use crate::protocol::steps::{named, turned};
 use crate::protocol::{Machine, Warning};
 use crate::status::Status;
 use crate::units::AXES;
@@ -42,8 +43,6 @@ const SYNC_SHIFT: u8 = 2;
 const DEBOUNCE_US: i32 = 4;
 /// `$1` that keeps the motors on.
 const ALWAYS: i32 = 255;
-/// Steps per millimetre in thousandths, times what `sa` and `tr` are kept as, for one microstep: 360 degrees, 10^4, 10^6 and 10^3.
-const STEPS: u64 = 360 * 10_000_000_000_000;
 
 /// The number of row `row` of the list, of a machine with so many axes.
 #[small]
@@ -68,12 +67,6 @@ pub fn axes(machine: &mut impl Machine) -> u8 {
 #[small]
 pub fn inches(machine: &mut impl Machine) -> bool {
     machine.settings().reports_in_inches()
-}
-
-#[inline(never)]
-#[small]
-fn named(owner: Owner, token: [u8; 4]) -> Option<Setting> {
-    Setting::find(&owner.prefix().with_token(token)).filter(|found| found.owner() == owner)
 }
 
 fn of_system(token: [u8; 4]) -> Option<Setting> {
@@ -209,16 +202,6 @@ fn axis_value(what: u8, axis: u8, machine: &mut impl Machine) -> Fixed {
 fn travel(axis: u8, machine: &mut impl Machine) -> (i32, i32) {
     let low = read(machine, of_axis(axis, token("tn")));
     (low, read(machine, of_axis(axis, token("tm"))))
-}
-
-/// 360 degrees by the angle of a step and the travel in a turn, or what the travel is of so many steps: it works both ways.
-#[small]
-fn turned(machine: &mut impl Machine, motor: u8, by: i32) -> i32 {
-    let angle = read(machine, of_motor(motor, token("sa"))).unsigned_abs();
-    let microsteps = read(machine, of_motor(motor, token("mi"))).unsigned_abs();
-    let divisor = (u64::from(angle) * u64::from(by.unsigned_abs())).max(1);
-    let quotient = (STEPS * u64::from(microsteps) + divisor / 2) / divisor;
-    i32::try_from(quotient).unwrap_or(i32::MAX)
 }
 
 /// Steps per millimetre, in thousandths.

@@ -91,15 +91,6 @@ impl Tells for Telling {
             }
         }
     }
-
-    /// A line of it never ends early.
-    fn split(&mut self, _out: &mut impl Out) -> bool {
-        false
-    }
-
-    fn blocks_free(&self) -> usize {
-        0
-    }
 }
 
 /// `>G54:ok`: in one line, so that it is nobody's answer.

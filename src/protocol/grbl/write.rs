@@ -1,32 +1,14 @@
 //! Numbers and texts of this dialect.
 
-use crate::config::{Digits, Fixed};
+use crate::config::Fixed;
 use crate::plain;
 use crate::progmem::Text;
 use crate::protocol::Out;
 
+pub use crate::protocol::write::{fixed, int, text};
+
 /// Decimals in which a `Length` is kept.
 const KEPT: u8 = 4;
-
-/// A text.
-#[inline(never)]
-#[small]
-pub fn text(out: &mut impl Out, text: Text) {
-    text.bytes().for_each(|byte| out.put(byte));
-}
-
-/// A number, all its decimals.
-#[inline(never)]
-#[small]
-pub fn fixed(out: &mut impl Out, fixed: Fixed) {
-    let mut digits = Digits::default();
-    out.put_all(fixed.render(&mut digits).iter().copied());
-}
-
-/// An integer.
-pub fn int(out: &mut impl Out, value: i32) {
-    fixed(out, Fixed::int(value));
-}
 
 /// A length in units of a `Length`, in millimetres with three decimals or in inches with four.
 #[inline(never)]

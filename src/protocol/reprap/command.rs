@@ -59,18 +59,20 @@ pub fn words(block: &[u8]) -> &[u8] {
 #[inline(never)]
 #[small]
 pub fn has(block: &[u8], letter: u8) -> bool {
-    let text = words(block);
-    let end = text.iter().position(|byte| *byte == b';').unwrap_or(text.len());
-    text.get(..end).unwrap_or(&[]).iter().any(|byte| byte.to_ascii_uppercase() == letter)
+    without_comment(block).iter().any(|byte| byte.to_ascii_uppercase() == letter)
+}
+
+/// What is behind the code of a block, up to a comment.
+#[small]
+fn without_comment(block: &[u8]) -> &[u8] {
+    words(block).split(|byte| *byte == b';').next().unwrap_or(&[])
 }
 
 /// The number behind a letter, if there is one.
 #[inline(never)]
 #[small]
 pub fn number(block: &[u8], letter: u8) -> Option<Number> {
-    let text = words(block);
-    let end = text.iter().position(|byte| *byte == b';').unwrap_or(text.len());
-    let text = text.get(..end)?;
+    let text = without_comment(block);
     let at = text.iter().position(|byte| byte.to_ascii_uppercase() == letter)?;
     let text = text.get(at + 1..)?.trim_ascii_start();
     let is_digit = |byte: &u8| matches!(byte, b'0'..=b'9' | b'.' | b'-');
@@ -78,7 +80,7 @@ pub fn number(block: &[u8], letter: u8) -> Option<Number> {
     Number::parse(text.get(..end)?)
 }
 
-/// The same with so many decimals.
+/// The number behind a letter, kept with so many decimals.
 #[inline(never)]
 #[small]
 pub fn value(block: &[u8], letter: u8, decimals: u8) -> Option<i32> {

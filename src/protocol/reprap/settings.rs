@@ -7,9 +7,10 @@ use super::host::Step;
 use super::write::{fixed, line_end, text};
 use crate::boards::MOTORS;
 use crate::config::name::token;
-use crate::config::{Fixed, Number, Owner, Setting};
+use crate::config::{Fixed, Number, Owner};
 use crate::gcode::tables::Row;
 use crate::progmem::Text;
+use crate::protocol::steps::{named, turned};
 use crate::protocol::{Machine, Out};
 use crate::status::Status;
 use crate::text;
@@ -17,16 +18,8 @@ use crate::units::Length;
 
 /// The letters of the axes: E is the interpreter's A.
 const LETTERS: [u8; 4] = *b"XYZE";
-/// Steps per millimetre in thousandths, times what `sa` and `tr` are kept as, for one microstep: 360 degrees, 10^4, 10^6 and 10^3.
-const STEPS: u64 = 360 * 10_000_000_000_000;
 /// The codes of M503, in its order.
 const LISTED: [u16; 5] = [92, 203, 201, 205, 206];
-
-#[inline(never)]
-#[small]
-fn named(owner: Owner, token: [u8; 4]) -> Option<Setting> {
-    Setting::find(&owner.prefix().with_token(token)).filter(|found| found.owner() == owner)
-}
 
 #[inline(never)]
 #[small]
@@ -54,16 +47,6 @@ pub fn homed_at_upper_end(axes: u8, machine: &mut impl Machine) -> u8 {
         upper |= (read(machine, Owner::Axis(axis), token("sx")) as u8 & 1) << axis;
     }
     upper
-}
-
-/// 360 degrees by the angle of a step and the travel in a turn, or what the travel is of so many steps: it works both ways.
-#[small]
-fn turned(machine: &mut impl Machine, motor: u8, by: i32) -> i32 {
-    let angle = read(machine, Owner::Motor(motor), token("sa")).unsigned_abs();
-    let microsteps = read(machine, Owner::Motor(motor), token("mi")).unsigned_abs();
-    let divisor = (u64::from(angle) * u64::from(by.unsigned_abs())).max(1);
-    let quotient = (STEPS * u64::from(microsteps) + divisor / 2) / divisor;
-    i32::try_from(quotient).unwrap_or(i32::MAX)
 }
 
 /// The setting of an axis behind a code, and its factor: of M203, which is in mm/s.

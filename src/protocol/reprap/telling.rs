@@ -58,15 +58,6 @@ impl Tells for Telling {
         }
         false
     }
-
-    /// A line of it never ends early.
-    fn split(&mut self, _out: &mut impl Out) -> bool {
-        false
-    }
-
-    fn blocks_free(&self) -> usize {
-        0
-    }
 }
 
 #[inline(never)]
