@@ -43,7 +43,7 @@ use crate::hal::system::reset;
 use crate::hal::time::millis;
 use crate::hal::{flags, uart};
 use crate::machine::{self, Alarm};
-use crate::protocol::{Hold, Machine, Speech};
+use crate::protocol::{Hold, Machine};
 use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, LET_GO, RESET, RESUME, UNPLACED};
 use crate::status::Status;
 
@@ -220,9 +220,8 @@ fn act(links: &Links, port: &Port, characters: u8) {
 #[inline(never)]
 #[small]
 fn starts_over(links: &Links, port: &Port) -> bool {
-    if port.is_undecided() {
-        let may = Speech::HAS_QUESTION && machine::alarm() == Alarm::None;
-        return may && !is_busy(links) && !links.has_data();
+    if port.waits_for_question() {
+        return machine::alarm() == Alarm::None && !is_busy(links) && !links.has_data();
     }
     port.speech.get().is_in_order() && machine::alarm() != Alarm::Panic
 }

@@ -542,9 +542,11 @@ impl LinePool {
 
     /// Whether lines keep their order, and the oldest begins with a dollar and is no jog: it waits for no motion.
     fn is_command(&self) -> bool {
+        if !self.in_order {
+            return false;
+        }
         let mut text = self.text(LineId(0)).iter().filter(|byte| **byte != b' ');
-        self.in_order
-            && text.next() == Some(&b'$')
+        text.next() == Some(&b'$')
             && !matches!(text.next(), Some(b'J' | b'j'))
             && self.entries.first().is_some_and(|first| first.class == Class::Data)
     }
