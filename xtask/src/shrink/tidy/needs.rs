@@ -10,7 +10,7 @@ use super::effect::{ARGUMENTS, RESULTS, Set, bit};
 use super::flow::Flow;
 
 /// What calls by a pointer call.
-const ANY: &str = "";
+pub const ANY: &str = "";
 
 /// Of functions by their names. Of others all is needed that the convention has.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -101,8 +101,8 @@ impl Needs {
     }
 }
 
-/// Adds to what is needed of a function, unless it is one of which all is; whether that is new.
-fn add(sets: &mut HashMap<String, Set>, name: &str, set: Set) -> bool {
+/// Adds to what is known of a function, unless it is one of which nothing is kept; whether that is new.
+pub fn add(sets: &mut HashMap<String, Set>, name: &str, set: Set) -> bool {
     let Some(known) = sets.get_mut(name) else { return false };
     let is_new = set & !*known != 0;
     *known |= set;

@@ -22,10 +22,7 @@ use super::super::text::{Function, Insn, Line, Program};
 use super::super::{heat, names_in_source};
 use super::effect::{self, KEPT, Set};
 use super::flow::Flow;
-use super::needs::Needs;
-
-/// What calls by a pointer call.
-const ANY: &str = "";
+use super::needs::{ANY, Needs, add};
 
 /// Leaves out what need not be saved.
 pub fn leave_out(program: &mut Program, needs: &Needs) -> Result<()> {
@@ -125,9 +122,8 @@ struct Handed {
 impl Handed {
     fn back(program: &Program, reads: &Calls) -> Handed {
         let (outside, taken) = (outside(program), taken(program));
-        let inside = program.functions.iter().map(|function| function.name.clone());
-        let back = inside.filter(|name| !outside.contains(name)).map(|name| (name, 0));
-        let back = back.chain([(ANY.into(), 0)]).collect();
+        let mut back = none(program);
+        back.retain(|name, _| name == ANY || !outside.contains(name));
         let mut handed = Handed { back, taken };
         let mut is_new = true;
         while is_new {
@@ -149,10 +145,7 @@ impl Handed {
         let own = self.by(&function.name);
         let mut is_new = false;
         for call in reads.of_function(function, own) {
-            if let Some(known) = self.back.get_mut(call.to) {
-                is_new |= call.behind & !*known != 0;
-                *known |= call.behind;
-            }
+            is_new |= add(&mut self.back, call.to, call.behind);
         }
         is_new
     }
@@ -173,9 +166,7 @@ struct Calls<'a> {
 impl Calls<'_> {
     fn of<'a>(program: &Program, needs: &'a Needs) -> Calls<'a> {
         let taken = taken(program);
-        let names = program.functions.iter().map(|function| function.name.clone());
-        let read = names.chain([ANY.into()]).map(|name| (name, 0)).collect();
-        let mut calls = Calls { needs, read };
+        let mut calls = Calls { needs, read: none(program) };
         let mut is_new = true;
         while is_new {
             is_new = false;
@@ -255,12 +246,10 @@ fn called(insn: &Insn) -> Option<&str> {
     }
 }
 
-/// Adds to a set; whether that is new.
-fn add(sets: &mut HashMap<String, Set>, name: &str, set: Set) -> bool {
-    let known = sets.entry(name.into()).or_default();
-    let is_new = set & !*known != 0;
-    *known |= set;
-    is_new
+/// An empty set for each function, and for calls by a pointer.
+fn none(program: &Program) -> HashMap<String, Set> {
+    let names = program.functions.iter().map(|function| function.name.clone());
+    names.chain([ANY.into()]).map(|name| (name, 0)).collect()
 }
 
 /// Functions that others than those of the program may call.
@@ -307,7 +296,7 @@ struct Changed {
 impl Changed {
     fn by(program: &Program, calls: &Calls) -> Changed {
         let taken = taken(program);
-        let mut changed = Changed { by: HashMap::new() };
+        let mut changed = Changed { by: none(program) };
         let mut is_new = true;
         while is_new {
             is_new = false;
