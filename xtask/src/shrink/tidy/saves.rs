@@ -210,7 +210,7 @@ impl Calls<'_> {
     /// The flow of a function that hands back `own` alone.
     fn flow<'f>(&self, function: &'f Function, own: Set) -> Option<Flow<'f>> {
         let mut flow = Flow::of(function, self.needs)?;
-        let saved = Saves::of(function).map_or(0, |saves| saves.registers());
+        let own_asm = Saves::of(function).map_or(0, |saves| saves.registers()) | named(function);
         for (at, line) in flow.lines.iter().enumerate() {
             let effect = &mut flow.effects[at];
             match line {
@@ -225,16 +225,23 @@ impl Calls<'_> {
                         _ => {}
                     }
                 }
-                // It uses no register of these that the function has not saved for it.
+                // It uses no register of these but those that it names and those that the function has saved for it.
                 Line::Fixed(_) if *effect == effect::Effect::UNKNOWN => {
-                    effect.reads &= !KEPT | saved;
-                    effect.spoils &= !KEPT | saved;
+                    effect.reads &= !KEPT | own_asm;
+                    effect.spoils &= !KEPT | own_asm;
                 }
                 _ => {}
             }
         }
         Some(flow)
     }
+}
+
+/// The registers that assembler of the source names in a function, with those that make pairs with them.
+fn named(function: &Function) -> Set {
+    let words = function.fixed().flat_map(|line| line.split(|c: char| !c.is_alphanumeric()));
+    let registers = words.filter_map(effect::register);
+    registers.fold(0, |all, register| all | effect::pair(register & !1))
 }
 
 /// What an instruction calls, or goes on with in another function.
@@ -393,6 +400,15 @@ mod tests {
             let after = without(&[("main", main), ("f", f)]);
             assert_eq!(code(&after, "f"), f.replace('\n', "; "));
         }
+    }
+
+    #[test]
+    fn what_assembler_of_the_source_reads_is_an_argument() {
+        // It goes to a place of its own and calls, so that nobody knows what it does.
+        let g = ";APP\nrcall 1f\ncp r24, r16\n1: ret\n;NO_APP\nret";
+        let main = ".LBB0_1:\nldi r16, 5\ncall f\ncall g\nrjmp .LBB0_1";
+        let after = without(&[("main", main), ("g", g), ("f", SAVES)]);
+        assert!(code(&after, "f").starts_with("push r16; push r17"));
     }
 
     #[test]
