@@ -16,13 +16,17 @@ heard = []
 errors = []
 alarms = []
 done = 0
+wanted = False
 
 
 def tell(event, *data):
     """What the library tells; lines of the board that are no `ok` come by `on_read`."""
-    global done
+    global done, wanted
     if event == "on_read":
         heard.append(data[0])
+    elif event == "on_rx_buffer_percent" and wanted:
+        grbl.job_run()
+        wanted = False
     elif event == "on_error":
         errors.append(data[:2])
     elif event == "on_alarm":
@@ -93,6 +97,19 @@ def setting():
     said = hear()
     grbl.request_settings()
     return float(until(lambda: said("$110=")).split("=")[1])
+
+
+def run():
+    """Runs the job on the thread on which the library hears the board.
+
+    The library fills the board's buffer there at each `ok`, and has no lock: a second thread
+    that fills it takes up a line which then neither of them writes. The `ok` to a question
+    brings that thread here.
+    """
+    global wanted
+    wanted = True
+    grbl.get_gcode_parser_state()
+    until(lambda: not wanted)
 
 
 def send(lines):
@@ -166,7 +183,7 @@ def stop():
     until(lambda: state() == "Idle")
     grbl.job_new()
     grbl.write([f"G1 X{FAR} F60", "G1 X0"])
-    grbl.job_run()
+    run()
     until(lambda: state() == "Run" and x() > 1)
     said = hear()
     grbl.abort()
@@ -189,7 +206,7 @@ def start():
     grbl.job_new()
     grbl.load_file(JOB)
     quiet()
-    grbl.job_run()
+    run()
     return f"{grbl.buffer_size} lines, counting characters"
 
 
