@@ -5,7 +5,16 @@ use super::{Board, Encoder, MotorPins, Pwm, Serial, Timer, Usart, gp};
 /// Raspberry Pi Pico on a breakout board.
 pub const PICO_CNC: Board = Board {
     name: "pico-cnc",
-    features: &["dialect-tinyg", "dialect-grbl", "cycles", "probing", "jobs", "help", "lathe"],
+    features: &[
+        "dialect-tinyg",
+        "dialect-grbl",
+        "cycles",
+        "probing",
+        "jobs",
+        "help",
+        "lathe",
+        "corexy",
+    ],
     dialect: 0,
     clock_hz: 128_000_000,
     // Steps side by side, and directions right behind them: one state machine of the PIO has them all.

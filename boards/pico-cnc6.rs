@@ -6,7 +6,16 @@ use super::{Board, Encoder, MotorPins, PICO_CNC, Pwm, Timer, gp};
 /// Raspberry Pi Pico with six drivers.
 pub const PICO_CNC6: Board = Board {
     name: "pico-cnc6",
-    features: &["dialect-tinyg", "dialect-grbl", "cycles", "probing", "jobs", "help", "lathe"],
+    features: &[
+        "dialect-tinyg",
+        "dialect-grbl",
+        "cycles",
+        "probing",
+        "jobs",
+        "help",
+        "lathe",
+        "corexy",
+    ],
     motors: &[
         MotorPins { step: gp(2), dir: gp(8), enable: None },
         MotorPins { step: gp(3), dir: gp(9), enable: None },

@@ -5,7 +5,16 @@ use super::{Board, MotorPins, Pwm, Serial, Timer, Tmc2209, Usart, gp};
 /// BTT SKR Pico v1.0; its driver E is motor 4.
 pub const SKR_PICO: Board = Board {
     name: "skr-pico",
-    features: &["dialect-tinyg", "dialect-grbl", "cycles", "probing", "jobs", "help", "lathe"],
+    features: &[
+        "dialect-tinyg",
+        "dialect-grbl",
+        "cycles",
+        "probing",
+        "jobs",
+        "help",
+        "lathe",
+        "corexy",
+    ],
     dialect: 0,
     clock_hz: 128_000_000,
     motors: &[

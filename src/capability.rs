@@ -21,12 +21,21 @@ pub enum Capability {
     Lathe,
     /// Printing: heaters, their sensors and fans, and the codes for them.
     Printer,
+    /// Motors that drive X and Y together, as those of a CoreXY machine do.
+    CoreXy,
 }
 
 impl Capability {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Cycles, Self::Probing, Self::Jobs, Self::Help, Self::Lathe, Self::Printer];
+    pub const ALL: [Self; 7] = [
+        Self::Cycles,
+        Self::Probing,
+        Self::Jobs,
+        Self::Help,
+        Self::Lathe,
+        Self::Printer,
+        Self::CoreXy,
+    ];
 
     /// Whether this image has it.
     #[inline(always)]
@@ -38,6 +47,7 @@ impl Capability {
             Self::Help => cfg!(feature = "help"),
             Self::Lathe => cfg!(feature = "lathe"),
             Self::Printer => cfg!(feature = "printer"),
+            Self::CoreXy => cfg!(feature = "corexy"),
         }
     }
 
@@ -57,6 +67,7 @@ impl Capability {
             Self::Help => "help",
             Self::Lathe => "lathe",
             Self::Printer => "printer",
+            Self::CoreXy => "corexy",
         }
     }
 }

@@ -55,6 +55,7 @@ pub mod encoder;
 pub mod gcode;
 pub mod heat;
 pub mod jobs;
+pub mod kinematics;
 pub mod machine;
 pub mod math;
 pub mod motion;

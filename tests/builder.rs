@@ -16,7 +16,8 @@ use kerf::motion::line::STEPS_MAX;
 use kerf::motion::line::{Builder, Built, Line};
 use kerf::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 use proptest::prelude::*;
-use rig::{Config, at};
+use proptest::sample::select;
+use rig::{CORE_XY, Config, STRAIGHT, at};
 
 /// Limits are kept in two bytes, rounded down by at most so much.
 const SHORT: f64 = 1.0 / 256.0;
@@ -50,10 +51,11 @@ prop_compose! {
         jerk in prop::array::uniform6(prop_oneof![3 => decades(1e3, 1e8), 2 => Just(0.0)]),
         sharp in any::<bool>(),
         den in prop::array::uniform4(5u32..10_000),
+        drives in select(vec![STRAIGHT, CORE_XY]),
     ) -> Config {
         let ratio = den.map(|den| StepRatio { num: 1, den });
         let jerk = if sharp { [0.0; AXES] } else { jerk };
-        Config { velocity, accel, jerk, ratio, ..Config::new(1.0, 1.0, 1.0) }
+        Config { velocity, accel, jerk, ratio, drives, ..Config::new(1.0, 1.0, 1.0) }
     }
 }
 
@@ -168,16 +170,15 @@ proptest! {
                 // As if it had not been asked for either: the next one begins where it did.
                 Built::Merge => {
                     prop_assert!(may_merge);
-                    for m in 0..MOTORS {
-                        let steps = config.ratio[m].steps(to[m]);
-                        prop_assert!((i64::from(steps) - motors[m]).abs() <= 1);
+                    for (m, at) in motors.iter().enumerate() {
+                        prop_assert!((i64::from(config.steps(m, &to)) - at).abs() <= 1);
                     }
                     continue;
                 }
                 // Nothing has changed: as if it had not been asked for.
                 Built::Parts(parts) => {
                     let steps =
-                        |m: usize| (i64::from(config.ratio[m].steps(to[m])) - motors[m]).unsigned_abs();
+                        |m: usize| (i64::from(config.steps(m, &to)) - motors[m]).unsigned_abs();
                     let most = (0..MOTORS).map(steps).max().unwrap();
                     let long = Some(most).filter(|&steps| steps > STEPS_MAX.into());
                     let far = (0..AXES).any(|axis| to[axis].checked_sub(from[axis]).is_none());
@@ -208,7 +209,7 @@ proptest! {
                         let parts = if block.extent.has_whole_steps() { 16 } else { 1 };
                         places[m] += i64::from(block.way[m]) * parts;
                         motors[m] = (places[m] + 8).div_euclid(16);
-                        prop_assert_eq!(motors[m], i64::from(config.ratio[m].steps(to[m])));
+                        prop_assert_eq!(motors[m], i64::from(config.steps(m, &to)));
                     }
                 }
             }

@@ -88,6 +88,7 @@ fn the_machine_says_that_it_lacks_something() {
         (Capability::Lathe, "{spn:1}"),
         (Capability::Printer, "m104s0"),
         (Capability::Printer, "m107"),
+        (Capability::CoreXy, "{1ma:6}"),
         (Capability::Help, "{h:n}"),
         (Capability::Jobs, "{test:3}"),
     ] {

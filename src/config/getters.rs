@@ -9,7 +9,7 @@ use crate::units::Length;
 
 /// Motors.
 impl Settings {
-    /// The axis that a motor drives; none above 5.
+    /// What a motor drives: an axis, or X and Y together ([`kinematics`](crate::kinematics)).
     pub fn motor_axis(&self, motor: usize) -> u8 {
         self.motor(motor, motor::MA)
     }
@@ -34,7 +34,8 @@ impl Settings {
         self.motor(motor, motor::MI)
     }
 
-    /// How many times the steps of the shortest length have to be halved until no motor makes more than one; 15 for more than 14.
+    /// How many times the steps of the shortest length have to be halved until no motor makes more than one, and once more if a motor
+    /// drives X and Y together; 15 or more for more than 14.
     pub fn octaves(&self) -> u8 {
         self.octaves
     }

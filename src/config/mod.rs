@@ -28,6 +28,7 @@ pub use words::Words;
 
 use crate::baud;
 use crate::boards::MOTORS;
+use crate::kinematics;
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
 use groups::motor;
@@ -41,7 +42,7 @@ pub struct Settings {
     large: [i32; LARGES],
     /// Derived from a motor's angle, travel and microsteps; used for every block.
     ratios: [StepRatio; MOTORS],
-    /// Of the motor with the finest steps: see [`StepRatio::octaves`].
+    /// Of the motor with the finest steps: see [`StepRatio::octaves`]. One more if a motor drives X and Y together.
     octaves: u8,
     /// What lines may ask of heaters, in an image that has them.
     pub heating: [Heating; heating::PRINTERS],
@@ -120,6 +121,9 @@ impl Settings {
         if setting.is_baud() && baud::rate(value).is_none() {
             return Err(Status::OutOfRange);
         }
+        if matches!(setting.owner(), Owner::Motor(_)) && row.is_place(Kind::Small, motor::MA) {
+            kinematics::check(value)?;
+        }
         Ok(value)
     }
 
@@ -188,7 +192,10 @@ impl Settings {
         if let Some(ratio) = self.ratios.get_mut(usize::from(motor)) {
             *ratio = StepRatio::new(angle, travel, microsteps);
         }
-        self.octaves = self.ratios.iter().map(|ratio| ratio.octaves()).max().unwrap_or(0);
+        let finest = self.ratios.iter().map(|ratio| ratio.octaves()).max().unwrap_or(0);
+        let shares = |motor| kinematics::is_shared(self.motor_axis(motor));
+        // A sum of two lengths is twice as long.
+        self.octaves = finest + u8::from((0..MOTORS).any(shares));
     }
 
     fn small(&self, slot: u8) -> u8 {

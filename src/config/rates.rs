@@ -11,6 +11,7 @@ use super::setting::large_of;
 use super::table::Kind;
 use super::{Owner, Setting, Settings, StepRatio};
 use crate::boards::MOTORS;
+use crate::kinematics;
 use crate::units::{AXES, FIRST_ROTARY};
 
 #[small]
@@ -26,7 +27,13 @@ impl Settings {
                 }
                 lowered
             }
-            Owner::Motor(motor) => self.limit_axis(self.motor_axis(motor.into()), &rate),
+            Owner::Motor(motor) => {
+                let drives = self.motor_axis(motor.into());
+                if kinematics::is_shared(drives) {
+                    return self.limit_axis(0, &rate) | self.limit_axis(1, &rate);
+                }
+                self.limit_axis(drives, &rate)
+            }
             Owner::Axis(axis) => self.limit_axis(axis, &rate),
             _ => false,
         }
@@ -51,7 +58,7 @@ impl Settings {
         if usize::from(axis) >= AXES {
             return false;
         }
-        let motors = (0..MOTORS).filter(|motor| self.motor_axis(*motor) == axis);
+        let motors = (0..MOTORS).filter(|motor| kinematics::turns(self.motor_axis(*motor), axis));
         let rate = rate(motors.clone().count());
         let most = motors.filter_map(|motor| fastest(self.step_ratio(motor), rate)).min();
         let Some(most) = most else { return false };

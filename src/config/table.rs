@@ -82,6 +82,11 @@ impl Row {
     pub const fn is(&self, flags: u8) -> bool {
         self.flags & flags == flags
     }
+
+    /// Whether it is the one with this slot among those of its kind; whose, it does not say.
+    pub(super) fn is_place(&self, kind: Kind, slot: u8) -> bool {
+        self.kind == kind && self.slot == slot
+    }
 }
 
 /// The lowest value of a setting that has no lower limit.

@@ -10,6 +10,7 @@
 use super::command::{Commands, Feed, Motion};
 use super::decimal::Decimal;
 use super::digits::decimal;
+use super::limits::is_near;
 use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units, XMode};
 use super::setup::{AxisMode, Setup};
 use super::state::State;
@@ -60,7 +61,7 @@ impl State {
         }
         if modal.units != Units::Mm
             || modal.feed_mode != FeedMode::PerMinute
-            || setup.reach().is_some()
+            || setup.reach().is_some() && !self.reaches(setup)
             || !self.printing.is_usual()
             || Capability::Lathe.is_built_in() && modal.x_mode == XMode::Diameter
             || line.len() > usize::from(u8::MAX)
@@ -74,7 +75,17 @@ impl State {
             // What rounding has taken would have to be carried on.
             Distance::Incremental => return false,
         };
-        words.read(from) && are_usual(words.seen & AXES_SEEN, setup) && self.carry_out(&words, out)
+        words.read(from)
+            && are_usual(words.seen & AXES_SEEN, setup)
+            && (!Capability::CoreXy.is_built_in() || is_near(&words.target, setup))
+            && self.carry_out(&words, out)
+    }
+
+    /// Whether all that a line from here has to be asked is where it ends, for steps to be counted: so it is on a CoreXY machine, where
+    /// nothing else bounds them. Fine motors are left to the others.
+    #[inline(always)]
+    fn reaches(&self, setup: &impl Setup) -> bool {
+        Capability::CoreXy.is_built_in() && is_near(&self.position, setup)
     }
 
     #[inline(never)]

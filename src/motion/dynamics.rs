@@ -80,7 +80,7 @@ pub struct Dynamics {
     pub axes: PerAxis<Axis>,
     /// Junction acceleration, mm/s^2.
     pub junction: f32,
-    /// The axis that each motor drives; [`AXES`](crate::units::AXES) or more if none.
+    /// What each motor drives: an axis, or X and Y together ([`kinematics`](crate::kinematics)).
     pub drives: [u8; MOTORS],
     /// Highest step rate of each motor when so many move, less one; steps/s.
     pub rates: [f32; MOTORS],

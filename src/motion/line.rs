@@ -25,6 +25,7 @@ use super::steps::Motor;
 use crate::boards::MOTORS;
 use crate::config::StepRatio;
 use crate::gcode::command::Feed;
+use crate::kinematics;
 use crate::units::{Length, PerAxis};
 
 /// Most steps of a motor in a block: phase units of a block fit 30 bits.
@@ -32,9 +33,9 @@ pub const STEPS_MAX: u16 = 0x7FFF;
 
 /// What the builder needs to know of the motors.
 pub trait Motors {
-    /// The axis that a motor drives; [`AXES`](crate::units::AXES) or more if none.
+    /// What a motor drives: an axis, or X and Y together ([`kinematics`]).
     fn motor_axis(&self, motor: usize) -> u8;
-    /// Steps of a motor for its axis' travel.
+    /// Steps of a motor for the travel of what it drives.
     fn ratio(&self, motor: usize) -> StepRatio;
 }
 
@@ -160,10 +161,9 @@ impl Builder {
         let before = self.motors;
         let mut parts = 0;
         for (m, motor) in self.motors.iter_mut().enumerate() {
-            let axis = usize::from(dynamics.drives[m]);
-            let (Some(&from), Some(&to)) = (line.from.get(axis), line.to.get(axis)) else {
-                continue;
-            };
+            let drives = dynamics.drives[m];
+            let place = |at| kinematics::place(drives, at);
+            let (Some(from), Some(to)) = (place(line.from), place(line.to)) else { continue };
             if from == to {
                 continue;
             }
@@ -194,10 +194,10 @@ impl Builder {
         ways: &[i16; MOTORS],
     ) {
         let all = self.motors.iter_mut().zip(ways).zip(&dynamics.drives);
-        for (m, ((motor, &way), &axis)) in all.enumerate().take(driven.into()) {
-            let axis = usize::from(axis);
-            match (line.from.get(axis), path.travel.get(axis)) {
-                (Some(&from), Some(&travel)) if travel != 0 => {
+        for (m, ((motor, &way), &drives)) in all.enumerate().take(driven.into()) {
+            let from = kinematics::place(drives, line.from);
+            match (from, kinematics::travel(drives, &path.travel)) {
+                (Some(from), Some(travel)) if travel != 0 => {
                     motor.put_back(machine.ratio(m), from, way);
                 }
                 _ => {}
@@ -214,7 +214,7 @@ impl Builder {
     #[small]
     pub fn set_position(&mut self, position: &PerAxis<Length>, machine: &impl Motors) -> Action {
         for (m, motor) in self.motors.iter_mut().enumerate() {
-            if let Some(&position) = position.get(usize::from(machine.motor_axis(m))) {
+            if let Some(position) = kinematics::place(machine.motor_axis(m), position) {
                 motor.rename(machine.ratio(m), position);
             }
         }
@@ -256,13 +256,15 @@ impl Path {
         ways: &mut [i16; MOTORS],
     ) -> u8 {
         let all = motors.iter_mut().zip(ways).zip(&dynamics.drives);
-        for (m, ((motor, way), &axis)) in all.enumerate() {
-            let axis = usize::from(axis);
-            let Some(&travel) = self.travel.get(axis) else { continue };
+        for (m, ((motor, way), &drives)) in all.enumerate() {
+            let travel = kinematics::travel(drives, &self.travel);
+            let (Some(travel), Some(to)) = (travel, kinematics::place(drives, to)) else {
+                continue;
+            };
             if travel == 0 {
                 continue;
             }
-            match motor.go(machine.ratio(m), travel, to[axis]) {
+            match motor.go(machine.ratio(m), travel, to) {
                 Some(parts) => {
                     *way = parts;
                     self.go(parts.unsigned_abs());

@@ -3,7 +3,8 @@
 use kerf_macros::small;
 
 use super::homing;
-use crate::boards::{ACTIVE, inputs};
+use crate::boards::{ACTIVE, MOTORS, inputs};
+use crate::capability::Capability;
 use crate::config::getters::TRAVEL_NONE;
 use crate::config::groups::system;
 use crate::config::{Settings, StepRatio};
@@ -11,11 +12,12 @@ use crate::gcode::heating::Part;
 use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::hal::{encoder, inputs as pins};
+use crate::kinematics::{self, DIFFERENCE, SUM};
 use crate::motion::dynamics::Machine;
 use crate::motion::line::Motors;
 use crate::motion::pace::Drivers;
 use crate::status::Status;
-use crate::units::{AXES, Length};
+use crate::units::{AXES, Length, PerAxis};
 
 /// An arc may bulge beyond the reach by this much at most: see `gcode::limits`.
 const REACH_SLACK: i32 = 256;
@@ -111,12 +113,54 @@ impl Setup for Settings {
     }
 }
 
-/// The axis whose position moves a motor; none above 5: that of an inhibited axis stands still, and there may be no axis.
+/// What moves a motor: the position of an axis, or those of X and Y together ([`kinematics`]). One of an inhibited
+/// axis stands still.
 #[small]
 pub fn moved_by(settings: &Settings, motor: usize) -> u8 {
-    let axis = settings.motor_axis(motor);
-    let is_axis = usize::from(axis) < AXES;
-    if is_axis && settings.mode(axis) != AxisMode::Inhibited { axis } else { u8::MAX }
+    let drives = settings.motor_axis(motor);
+    let moves = |axis| settings.mode(axis) != AxisMode::Inhibited;
+    let moved = match kinematics::is_shared(drives) {
+        true => moves(0) && moves(1),
+        false => usize::from(drives) < AXES && moves(drives),
+    };
+    if moved { drives } else { kinematics::NOTHING }
+}
+
+/// Where an axis is when the motors are at these steps, the first of several; none if none moves it. Motors at the steps of `end` are
+/// there: what is less than a step is not lost. Cost: 3,000 cycles.
+#[inline(never)]
+#[small]
+pub fn counted(
+    settings: &Settings,
+    steps: &[i32; MOTORS],
+    axis: usize,
+    end: Option<&PerAxis<Length>>,
+) -> Option<Length> {
+    let of = |drives| coordinate(settings, steps, drives, end);
+    if Capability::CoreXy.is_built_in()
+        && axis < 2
+        && let (Some(sum), Some(difference)) = (of(SUM), of(DIFFERENCE))
+    {
+        return Some(kinematics::axis(axis, sum, difference));
+    }
+    of(axis as u8)
+}
+
+/// Where the first motor is that drives this.
+#[inline(never)]
+#[small]
+fn coordinate(
+    settings: &Settings,
+    steps: &[i32; MOTORS],
+    drives: u8,
+    end: Option<&PerAxis<Length>>,
+) -> Option<Length> {
+    let motor = (0..MOTORS).find(|motor| moved_by(settings, *motor) == drives)?;
+    let (ratio, steps) = (settings.step_ratio(motor), *steps.get(motor)?);
+    match end.and_then(|end| kinematics::place(drives, end)) {
+        Some(end) if ratio.steps(end) == steps => Some(end),
+        _ => ratio.length(steps),
+    }
 }
 
 impl Motors for Settings {

@@ -7,14 +7,14 @@
 use kerf_macros::small;
 
 use super::links::Links;
-use super::setup::moved_by;
+use super::setup::counted;
 use super::{common, spindle};
-use crate::boards::{MOTORS, outputs};
+use crate::boards::outputs;
 use crate::capability::Capability;
 use crate::gcode::command::Surface;
 
 /// X among the axes.
-const X: u8 = 0;
+const X: usize = 0;
 
 /// Has S follow X.
 #[inline(never)]
@@ -37,11 +37,7 @@ pub fn look(links: &Links) {
 fn follow(links: &Links) {
     let motion = common::snapshot(links.thread);
     let settings = links.settings.borrow();
-    let motor = (0..MOTORS).find(|motor| moved_by(&settings, *motor) == X);
-    let place = motor.and_then(|motor| {
-        let steps = *motion.positions().get(motor)?;
-        settings.step_ratio(motor).length(steps)
-    });
+    let place = counted(&settings, &motion.positions(), X, None);
     if let (Some(surface), Some(x)) = (motion.surface.first(), place) {
         spindle::turn_at(links.thread, surface.turns(x), surface.most());
     }

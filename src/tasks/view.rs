@@ -18,7 +18,7 @@ use super::links::{Changes, Links};
 use super::overrides;
 use super::ports::{Port, RESET};
 use super::power;
-use super::setup::moved_by;
+use super::setup::counted;
 use super::spindle;
 use super::switches;
 use super::turning;
@@ -173,11 +173,8 @@ impl<'a> View<'a> {
         if !self.is_busy() || self.links.changes.has(Changes::STEPS) {
             return programmed;
         }
-        // Of several motors on an axis the first tells; an axis that moves none is where it should be.
-        (0..MOTORS)
-            .find(|m| usize::from(moved_by(&self.settings, *m)) == axis)
-            .and_then(|m| self.settings.step_ratio(m).length(*self.motion().position.get(m)?))
-            .unwrap_or(programmed)
+        // An axis that moves no motor is where it should be.
+        counted(&self.settings, &self.motion().position, axis, None).unwrap_or(programmed)
     }
 
     /// `home`: 2 while homing, 1 when all axes that have a switch for it are homed.

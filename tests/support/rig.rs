@@ -6,6 +6,7 @@ use kerf::config::StepRatio;
 use kerf::dda::{Dda, PHASE_MARGIN, Pins, SEGMENTS, STEP, Segment};
 use kerf::gcode::command::Feed;
 use kerf::hal::ring::{Consumer, Producer, Ring};
+use kerf::kinematics::{self, DIFFERENCE, SUM};
 use kerf::motion::block::{Block, Line as Move};
 use kerf::motion::dynamics::{Dynamics, Machine};
 use kerf::motion::exec::{Exec, Step};
@@ -24,7 +25,14 @@ pub struct Config {
     pub deviation: f32,
     pub junction: f32,
     pub ratio: [StepRatio; MOTORS],
+    /// What each motor drives.
+    pub drives: [u8; MOTORS],
 }
+
+/// Each motor an axis.
+pub const STRAIGHT: [u8; MOTORS] = [0, 1, 2, 3];
+/// The first two drive X and Y together.
+pub const CORE_XY: [u8; MOTORS] = [SUM, DIFFERENCE, 2, 3];
 
 impl Config {
     pub fn new(velocity: f32, accel: f32, jerk: f32) -> Self {
@@ -36,7 +44,14 @@ impl Config {
             junction: 500.0,
             // 80 steps a mm.
             ratio: [StepRatio { num: 1, den: 125 }; MOTORS],
+            drives: STRAIGHT,
         }
+    }
+
+    /// The step of a motor when the axes are there.
+    pub fn steps(&self, motor: usize, place: &PerAxis<Length>) -> i32 {
+        let place = kinematics::place(self.drives[motor], place);
+        self.ratio[motor].steps(place.unwrap_or_default())
     }
 }
 
@@ -63,7 +78,7 @@ impl Machine for Config {
 
 impl Motors for Config {
     fn motor_axis(&self, motor: usize) -> u8 {
-        motor as u8
+        self.drives[motor]
     }
     fn ratio(&self, motor: usize) -> StepRatio {
         self.ratio[motor]
@@ -351,7 +366,7 @@ impl Rig {
 
     /// Where the motors should be.
     pub fn target(&self) -> [i64; MOTORS] {
-        core::array::from_fn(|m| self.config.ratio[m].steps(self.position[m]).into())
+        core::array::from_fn(|m| self.config.steps(m, &self.position).into())
     }
 
     /// Seconds so far.

@@ -19,7 +19,7 @@ group! {
     motor: [i32; MOTORS], CAREFUL.motor => {
         MA "ma": int(0, 255), super::motors([0, 1, 2, 3], [4, 5]),
             words(text!("map to axis"), text!(" [0=X,1=Y,2=Z...]")),
-            "Axis that it moves: 0 X, 1 Y, 2 Z, 3 A, 4 B, 5 C; above that none. Several may move one axis.";
+            "Axis that it moves: 0 X, 1 Y, 2 Z, 3 A, 4 B, 5 C; above 7 none. Several may move one axis. 6 is X + Y and 7 is X - Y, for the two motors of a CoreXY machine, in images that have `corexy`.";
         SA "sa": fixed(4, 3, POSITIVE), [1_8000; MOTORS],
             words(text!("step angle"), text!(" deg")),
             "Angle of a full step.";

@@ -8,6 +8,7 @@ use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::config::name::{Name, token};
 use crate::config::{Fixed, Number, Owner, Setting};
+use crate::kinematics;
 use crate::progmem;
 use crate::protocol::steps::{named, turned};
 use crate::protocol::{Machine, Warning};
@@ -135,7 +136,8 @@ fn motor_of(machine: &mut impl Machine, axis: u8) -> Option<u8> {
 }
 
 fn moves(machine: &mut impl Machine, motor: u8, axis: u8) -> bool {
-    read(machine, of_motor(motor, token("ma"))) == i32::from(axis)
+    let drives = read(machine, of_motor(motor, token("ma"))) as u8;
+    kinematics::stands_for(drives) == axis
 }
 
 /// A hundred and more: of which axis it is, and which of its four.

@@ -9,6 +9,7 @@ use crate::boards::MOTORS;
 use crate::config::name::token;
 use crate::config::{Fixed, Number, Owner};
 use crate::gcode::tables::Row;
+use crate::kinematics;
 use crate::progmem::Text;
 use crate::protocol::steps::{named, turned};
 use crate::protocol::{Machine, Out};
@@ -27,10 +28,11 @@ fn read(machine: &mut impl Machine, owner: Owner, token: [u8; 4]) -> i32 {
     named(owner, token).map_or(0, |setting| machine.setting(setting))
 }
 
-/// The axis that a motor moves.
+/// The axis that a motor moves; of X and Y together the one that the motor has in its place.
 #[small]
 pub fn axis_of(motor: u8, machine: &mut impl Machine) -> Option<u8> {
-    u8::try_from(read(machine, Owner::Motor(motor), token("ma"))).ok().filter(|axis| *axis < 6)
+    let drives = u8::try_from(read(machine, Owner::Motor(motor), token("ma"))).ok()?;
+    Some(kinematics::stands_for(drives)).filter(|axis| *axis < 6)
 }
 
 /// The first motor of an axis.

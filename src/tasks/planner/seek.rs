@@ -25,7 +25,7 @@ use crate::motion::queue;
 use crate::motion::snapshot::Snapshot;
 use crate::tasks::common;
 use crate::tasks::links::Changes;
-use crate::tasks::setup::moved_by;
+use crate::tasks::setup::counted;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// What has come of a move that is to end at a switch.
@@ -127,16 +127,8 @@ impl Planner {
     pub(super) fn located(&self, steps: &[i32; MOTORS]) -> PerAxis<Length> {
         let settings = self.links.settings.borrow();
         let mut located = self.position;
-        // Of several motors on an axis the first tells.
-        for (m, steps) in steps.iter().enumerate().rev() {
-            let ratio = settings.step_ratio(m);
-            let axis = usize::from(moved_by(&settings, m));
-            if let (Some(place), Some(now)) = (located.get_mut(axis), self.position.get(axis)) {
-                *place = match ratio.steps(*now) == *steps {
-                    true => *now,
-                    false => ratio.length(*steps).unwrap_or(*now),
-                };
-            }
+        for (axis, place) in located.iter_mut().enumerate() {
+            *place = counted(&settings, steps, axis, Some(&self.position)).unwrap_or(*place);
         }
         located
     }

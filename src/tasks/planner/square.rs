@@ -24,6 +24,7 @@ use super::Planner;
 use crate::boards::{MOTORS, inputs};
 use crate::config::groups::squaring;
 use crate::config::{Owner, Setting};
+use crate::kinematics;
 use crate::status::Status;
 use crate::tasks::homing::Homing;
 use crate::tasks::setup::moved_by;
@@ -91,7 +92,7 @@ impl Planner {
     pub(super) fn alone(&mut self, axis: u8, second: Second, moves: bool) {
         for (m, drives) in (0..).zip(self.dynamics.drives.iter_mut()) {
             if *drives == axis && (m == second.motor) != moves {
-                *drives = AXES as u8;
+                *drives = kinematics::NOTHING;
             }
         }
     }

@@ -7,6 +7,7 @@
 mod exact;
 mod words;
 
+use std::f64::consts::FRAC_1_SQRT_2;
 use std::fmt;
 
 use kerf::boards::MOTORS;
@@ -29,8 +30,10 @@ const LETTERS: [char; AXES] = ['X', 'Y', 'Z', 'A', 'B', 'C'];
 /// A motor's settings.
 #[derive(Clone, Copy, Debug)]
 pub struct MotorSetup {
-    /// The axis it moves (`ma`), counted from 0.
+    /// The axis it moves (`ma`), counted from 0. X if it drives X and Y together.
     pub axis: usize,
+    /// How much of Y it drives besides: the whole of it, less the whole, or nothing.
+    pub besides: i64,
     /// Degrees per full step (`sa`).
     pub step_angle: Decimal,
     /// Travel per turn (`tr`).
@@ -54,14 +57,32 @@ impl MotorSetup {
     }
 }
 
+impl MotorSetup {
+    /// Where it is when the axes are there.
+    fn place(&self, position: &[i64; AXES]) -> i64 {
+        position[self.axis] + self.besides * position[1]
+    }
+
+    /// Whether all that it drives is to move.
+    fn moves(&self, modes: &[AxisMode; AXES]) -> bool {
+        let standard = |axis: usize| modes[axis] == AxisMode::Standard;
+        standard(self.axis) && (self.besides == 0 || standard(1))
+    }
+}
+
 impl Setup {
-    /// What each motor moves, for the meter of pauses.
+    /// What each motor moves, for the meter of pauses. Two that drive X and Y together go as far as two axes do that are turned by 45
+    /// degrees, times the root of 2.
     pub fn travels(&self) -> [Travel; MOTORS] {
         std::array::from_fn(|m| {
             let motor = &self.motors[m];
             let per_unit = motor.steps(1_000_000 * UNITS as i64) as f64 / 1e6;
             let step = if per_unit == 0.0 { 0.0 } else { 1.0 / per_unit };
-            Travel { axis: motor.axis, step, rotary: motor.axis >= FIRST_ROTARY }
+            let (axis, step) = match motor.besides {
+                0 => (motor.axis, step),
+                besides => (usize::from(besides < 0), step * FRAC_1_SQRT_2),
+            };
+            Travel { axis, step, rotary: axis >= FIRST_ROTARY }
         })
     }
 }
@@ -374,12 +395,12 @@ impl<'a> Reader<'a> {
     /// The steps made so far, with those from `origin` to the position.
     fn steps_here(&self) -> Vec<i64> {
         let counted = self.setup.motors.iter().zip(&self.steps);
-        let here = counted.map(|(motor, steps)| match self.setup.modes[motor.axis] {
-            AxisMode::Standard => {
-                let (from, to) = (self.origin[motor.axis], self.position[motor.axis]);
-                *steps + motor.steps(to) - motor.steps(from)
+        let here = counted.map(|(motor, steps)| {
+            if !motor.moves(&self.setup.modes) {
+                return *steps;
             }
-            _ => *steps,
+            let (from, to) = (motor.place(&self.origin), motor.place(&self.position));
+            *steps + motor.steps(to) - motor.steps(from)
         });
         here.collect()
     }

@@ -335,7 +335,8 @@ fn motor_report(
     let us = |cycles| microseconds(machine, cycles);
     MotorReport {
         motor: index + 1,
-        axis: AXIS_NAMES[setup.axis],
+        // Of two that drive X and Y together the second stands for Y.
+        axis: AXIS_NAMES[setup.axis.max(usize::from(setup.besides < 0))],
         steps: if setup.inverted { -motor.position } else { motor.position },
         expected: expected.map(|e| e.steps[index]),
         total: motor.steps,
@@ -352,7 +353,8 @@ fn axis_reports(motors: &[MotorReport], setup: &Setup, expected: &Outcome) -> Ve
         if axes.iter().any(|a| a.axis == motor.axis) {
             continue;
         }
-        let want = expected.position[of.axis] as f64 / UNITS as f64;
+        let named = AXIS_NAMES.iter().position(|name| *name == motor.axis).unwrap_or(of.axis);
+        let want = expected.position[named] as f64 / UNITS as f64;
         let per_unit = of.steps(1_000_000 * UNITS as i64) as f64 / 1e6;
         let off = motor.steps - motor.expected.unwrap_or(motor.steps);
         let error = if per_unit == 0.0 { 0.0 } else { off as f64 / per_unit };

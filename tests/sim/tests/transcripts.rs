@@ -18,7 +18,7 @@ use kerf::boards::{MEGA2560_GRBL, MEGA2560_GRBL_LATHE, MEGA2560_LATHE, RAMPS14};
 /// What only the image of a lathe can do.
 const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];
 /// What only the image of a printer can do.
-const PRINTING: [&str; 2] = ["heat", "reprap"];
+const PRINTING: [&str; 3] = ["corexy", "heat", "reprap"];
 /// What needs grbl's dialect besides.
 const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 

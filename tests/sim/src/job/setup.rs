@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result};
 use kerf::boards::MOTORS;
+use kerf::kinematics::{DIFFERENCE, SUM};
 use serde_json::Value;
 
 use super::ASK_MS;
@@ -23,7 +24,9 @@ pub fn read_setup(machine: &mut impl Runs, host: &mut Host) -> Result<Setup> {
     }
     let mut modes = [AxisMode::Standard; AXES];
     for motor in &motors {
-        modes[motor.axis] = mode_of(machine, host, motor.axis)?;
+        for axis in [motor.axis, if motor.besides == 0 { motor.axis } else { 1 }] {
+            modes[axis] = mode_of(machine, host, axis)?;
+        }
     }
     Ok(Setup { motors, modes })
 }
@@ -31,11 +34,18 @@ pub fn read_setup(machine: &mut impl Runs, host: &mut Host) -> Result<Setup> {
 fn motor_of(group: &Value) -> Option<MotorSetup> {
     let number = |key| Decimal::parse(&group.get(key)?.as_number()?.to_string());
     let whole = |key| number(key)?.as_whole();
-    let axis = usize::try_from(whole("ma")?).ok()?;
+    let drives = usize::try_from(whole("ma")?).ok()?;
+    let besides = match u8::try_from(drives) {
+        Ok(SUM) => 1,
+        Ok(DIFFERENCE) => -1,
+        _ => 0,
+    };
+    let axis = if besides == 0 { drives } else { 0 };
     let moves = axis < AXES;
     Some(MotorSetup {
         // One that moves no axis counts as the last one's, and makes no steps.
         axis: axis.min(AXES - 1),
+        besides,
         step_angle: number("sa")?,
         travel: if moves { number("tr")? } else { Decimal::whole(0) },
         microsteps: u32::try_from(whole("mi")?).ok()?,
@@ -64,6 +74,16 @@ mod tests {
     fn a_motor_may_move_nothing() {
         let motor = motor_of(&serde_json::json!({"ma":255,"sa":1.8,"tr":5,"mi":8,"po":0})).unwrap();
         assert_eq!(motor.steps(10_000), 0);
+    }
+
+    #[test]
+    fn a_motor_may_drive_two_axes() {
+        let motor = |ma: u8| {
+            motor_of(&serde_json::json!({"ma":ma,"sa":1.8,"tr":40,"mi":16,"po":0})).unwrap()
+        };
+        assert_eq!((motor(SUM).axis, motor(SUM).besides), (0, 1));
+        assert_eq!((motor(DIFFERENCE).axis, motor(DIFFERENCE).besides), (0, -1));
+        assert_eq!(motor(SUM).steps(10_000), 80);
     }
 
     #[test]

@@ -3,7 +3,15 @@ use super::*;
 fn motor(axis: usize, angle: &str, travel: &str, microsteps: u32) -> MotorSetup {
     let decimal = |text| Decimal::parse(text).unwrap();
     let (step_angle, travel) = (decimal(angle), decimal(travel));
-    MotorSetup { axis, step_angle, travel, microsteps, inverted: false, active_low: false }
+    MotorSetup {
+        axis,
+        besides: 0,
+        step_angle,
+        travel,
+        microsteps,
+        inverted: false,
+        active_low: false,
+    }
 }
 
 /// 80 steps/mm on X and Y, 2560/3 on Z, 100/9 steps/degree on A.
