@@ -121,14 +121,17 @@ impl Chain {
         blend: u8,
     ) -> bool {
         let Some(&Feed::PerMinute(feed)) = feed else { return false };
-        if blend == 0 || !way(from, to, &mut self.way) {
+        let mut way = [0; FIRST_ROTARY];
+        if blend == 0 || !go(from, to, &mut way) {
             return false;
         }
-        let [x, y, z, ..] = self.way.map(i16::unsigned_abs);
+        self.way = [0; AXES];
+        self.take(way);
+        let [x, y, z] = way.map(i16::unsigned_abs);
         self.dominant = if z > x && z > y { 2 } else { u8::from(y > x) };
         let far = whole(scaled(feed, FEED_LOG2));
         self.most = if far < u32::from(MOST) { far as u16 } else { MOST };
-        let (way, ends) = turned(&self.way, self.dominant);
+        let (way, ends) = turned(way, self.dominant);
         let over = way.unsigned_abs();
         if over == 0 || over >= self.most {
             return false;
@@ -200,12 +203,13 @@ impl Chain {
     ) -> bool {
         let Some(Feed::PerMinute(feed)) = feed else { return false };
         let differs = feed.to_bits() != self.feed.to_bits() || blend != self.blend;
-        let mut next = [0; AXES];
-        if differs || blend == 0 || !way(from, to, &mut next) {
+        let mut next = [0; FIRST_ROTARY];
+        if differs || blend == 0 || !go(from, to, &mut next) {
             return false;
         }
-        let (before, _) = turned(&self.way, self.dominant);
-        let (now, ends) = turned(&next, self.dominant);
+        let [x, y, z, ..] = self.way;
+        let (before, _) = turned([x, y, z], self.dominant);
+        let (now, ends) = turned(next, self.dominant);
         let (passed, over) = (before.unsigned_abs(), now.unsigned_abs());
         if (now ^ before) < 0 || over < passed || over > self.most {
             return false;
@@ -230,15 +234,22 @@ impl Chain {
             }
             bit <<= 1;
         }
-        self.way = next;
+        self.take(next);
         true
+    }
+
+    /// Its way, of which the axes that turn have none.
+    #[inline(always)]
+    fn take(&mut self, way: [i16; FIRST_ROTARY]) {
+        for (place, way) in self.way.iter_mut().zip(way) {
+            *place = way;
+        }
     }
 }
 
 /// The ways of the dominant axis and of those behind it.
 #[inline(always)]
-fn turned(way: &PerAxis<i16>, dominant: u8) -> (i16, [i16; MINORS]) {
-    let [x, y, z, ..] = *way;
+fn turned([x, y, z]: [i16; FIRST_ROTARY], dominant: u8) -> (i16, [i16; MINORS]) {
     match dominant {
         0 => (x, [y, z]),
         1 => (y, [z, x]),
@@ -248,20 +259,16 @@ fn turned(way: &PerAxis<i16>, dominant: u8) -> (i16, [i16; MINORS]) {
 
 /// The way from here to there. False if an axis goes far, or one turns.
 #[inline(never)]
-fn way(from: &PerAxis<Length>, to: &PerAxis<Length>, ways: &mut PerAxis<i16>) -> bool {
-    let mut linear = FIRST_ROTARY as u8;
-    for ((from, to), way) in from.iter().zip(to).zip(ways) {
-        *way = 0;
-        if from != to {
-            let far = to.0.wrapping_sub(from.0);
-            *way = far as i16;
-            if i32::from(*way) != far || way.unsigned_abs() > MOST || linear == 0 {
-                return false;
-            }
+fn go(from: &PerAxis<Length>, to: &PerAxis<Length>, ways: &mut [i16; FIRST_ROTARY]) -> bool {
+    let mut axes = from.iter().zip(to);
+    for (way, (from, to)) in ways.iter_mut().zip(axes.by_ref()) {
+        let far = to.0.wrapping_sub(from.0);
+        *way = far as i16;
+        if i32::from(*way) != far || way.unsigned_abs() > MOST {
+            return false;
         }
-        linear = linear.saturating_sub(1);
     }
-    true
+    axes.all(|(from, to)| from == to)
 }
 
 /// A product with a number below 2^15.
