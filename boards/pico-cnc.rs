@@ -1,6 +1,6 @@
 //! Raspberry Pi Pico on a breakout board: four drivers, spindle, switches.
 
-use super::{Board, Encoder, MotorPins, Pwm, Serial, Timer, Usart, gp};
+use super::{Board, Encoder, MotorPins, NATIVE_USB, Pwm, Serial, Timer, Usart, gp};
 
 /// Raspberry Pi Pico on a breakout board.
 pub const PICO_CNC: Board = Board {
@@ -29,10 +29,10 @@ pub const PICO_CNC: Board = Board {
     hazards: &[gp(11), gp(12), gp(13), gp(14), gp(15)],
     outputs: [Some(gp(11)), Some(gp(12)), Some(gp(14)), Some(gp(15))],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 13 }),
-    // GP0 and GP1; GP20 and GP21
+    // USB; GP0 and GP1
     serial: &[
+        NATIVE_USB,
         Serial { usart: Usart::Uart0, rate: 115_200, handshake: None, driver_enable: None },
-        Serial { usart: Usart::Uart1, rate: 115_200, handshake: None, driver_enable: None },
     ],
     inputs: [
         // One for both ends of an axis

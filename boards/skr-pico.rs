@@ -1,6 +1,6 @@
 //! BTT SKR Pico v1.0: four TMC2209 on board, which are told their current and microsteps by one UART.
 
-use super::{Board, MotorPins, Pwm, Serial, Timer, Tmc2209, Usart, gp};
+use super::{Board, MotorPins, NATIVE_USB, Pwm, Serial, Timer, Tmc2209, Usart, gp};
 
 /// BTT SKR Pico v1.0; its driver E is motor 4.
 pub const SKR_PICO: Board = Board {
@@ -28,8 +28,11 @@ pub const SKR_PICO: Board = Board {
     hazards: &[gp(17), gp(18), gp(20), gp(29), gp(21), gp(23)],
     outputs: [Some(gp(17)), None, Some(gp(18)), Some(gp(20))],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 29 }),
-    // GP0 and GP1
-    serial: &[Serial { usart: Usart::Uart0, rate: 115_200, handshake: None, driver_enable: None }],
+    // USB; GP0 and GP1
+    serial: &[
+        NATIVE_USB,
+        Serial { usart: Usart::Uart0, rate: 115_200, handshake: None, driver_enable: None },
+    ],
     inputs: [
         // X-STOP, Y-STOP, Z-STOP: one for both ends of an axis
         Some(gp(4)),

@@ -244,7 +244,7 @@ impl Pwm {
     }
 }
 
-/// A USART of the ATmega2560, of which the third, USART2, is the firmware's own (`avr_embassy::interrupt`); or a UART of the RP2040.
+/// A USART of the ATmega2560, of which the third, USART2, is the firmware's own (`avr_embassy::interrupt`); or a UART of the RP2040, or its USB.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Usart {
@@ -253,6 +253,7 @@ pub enum Usart {
     U3,
     Uart0,
     Uart1,
+    Usb,
 }
 
 impl Usart {
@@ -262,19 +263,20 @@ impl Usart {
             Usart::U0 => 0xC0,
             Usart::U1 => 0xC8,
             Usart::U3 => 0x130,
-            Usart::Uart0 | Usart::Uart1 => 0,
+            Usart::Uart0 | Usart::Uart1 | Usart::Usb => 0,
         }
     }
 
-    /// Its receiver's and its transmitter's pin.
-    pub const fn pins(self) -> [Pin; 2] {
-        match self {
+    /// Its receiver's and its transmitter's pin. USB has pins of its own.
+    pub const fn pins(self) -> Option<[Pin; 2]> {
+        Some(match self {
             Usart::U0 => [pin(Port::E, 0), pin(Port::E, 1)],
             Usart::U1 => [pin(Port::D, 2), pin(Port::D, 3)],
             Usart::U3 => [pin(Port::J, 0), pin(Port::J, 1)],
             Usart::Uart0 => [gp(1), gp(0)],
             Usart::Uart1 => [gp(21), gp(20)],
-        }
+            Usart::Usb => return None,
+        })
     }
 }
 
@@ -304,6 +306,9 @@ pub struct Serial {
 /// The first port of every board with an ATmega2560: USART0, which is USB on most.
 pub const USB: Serial =
     Serial { usart: Usart::U0, rate: 115_200, handshake: None, driver_enable: None };
+
+/// The first port of every board with an RP2040: its USB, which has no rate.
+pub const NATIVE_USB: Serial = Serial { usart: Usart::Usb, ..USB };
 
 /// Outputs that a program switches, as bits; of [`Board::outputs`] the index is the number of the bit.
 #[allow(missing_docs)]
@@ -447,12 +452,15 @@ const MAX_PINS: usize = 3 * MOST_MOTORS + 1 + 8 + MAX_PORTS * SERIAL_PINS + 1 + 
 
 impl Serial {
     const fn pins(&self) -> [Option<Pin>; SERIAL_PINS] {
-        let [rx, tx] = self.usart.pins();
+        let (rx, tx) = match self.usart.pins() {
+            Some([rx, tx]) => (Some(rx), Some(tx)),
+            None => (None, None),
+        };
         let (rts, cts) = match self.handshake {
             Some(Handshake { rts, cts }) => (Some(rts), Some(cts)),
             None => (None, None),
         };
-        [Some(rx), Some(tx), self.driver_enable, rts, cts]
+        [rx, tx, self.driver_enable, rts, cts]
     }
 
     /// Panics if one of its own pins is not where one instruction reaches it.
@@ -541,8 +549,8 @@ impl Board {
             "a timer of this board is used twice"
         );
         let first =
-            !self.serial.is_empty() && matches!(self.serial[0].usart, Usart::U0 | Usart::Uart0);
-        assert!(first, "the first serial port of this board is not USART0");
+            !self.serial.is_empty() && matches!(self.serial[0].usart, Usart::U0 | Usart::Usb);
+        assert!(first, "the first serial port of this board is not USART0, or its chip's USB");
         self.check_pwm();
         self.check_encoder();
         self.check_outputs();

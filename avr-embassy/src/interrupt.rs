@@ -52,6 +52,18 @@ pub(crate) use host::{executor, idle, take_request};
 
 pub(crate) use imp::woken;
 
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub mod prompt;
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub(crate) use prompt::is_prompt;
+
+/// Whether a task of the prompt executor has been woken: this chip has none.
+#[cfg(not(all(target_arch = "arm", target_os = "none")))]
+#[inline(always)]
+pub(crate) fn is_prompt(_context: *mut ()) -> bool {
+    false
+}
+
 /// Asks for the interrupt executor to run. Any level. Cost: 3 cycles.
 ///
 /// In thread mode it runs before the next instruction but one; above, when the handlers that run have ended. However often it was

@@ -12,7 +12,7 @@ pub const INTERRUPT: *mut () = core::ptr::dangling_mut();
 fn pender(context: *mut ()) {
     if context == THREAD {
         flags::set(POLL);
-    } else {
+    } else if !interrupt::is_prompt(context) {
         interrupt::woken();
     }
 }

@@ -114,6 +114,8 @@ contract! {
         fn set_plain(port: u8, plain: bool);
         /// Sends on what CTS has held back, and XOFF or XON that has waited for long enough. Thread mode, each millisecond.
         fn look();
+        /// Queues what has come and had no room. Thread mode, each turn of the main loop on a chip whose first port is its own USB.
+        fn go_on();
         /// Line ends lost since start-up, modulo 2^16. Thread mode.
         fn lost_ends(port: u8) -> u16;
         /// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for. Thread mode.

@@ -9,7 +9,7 @@ use avr_embassy::{Thread, Waiter};
 
 use super::byte::SharedByte;
 use super::imp;
-use super::serial::{PORTS, USB};
+use super::serial::{NATIVE, PORTS, USB};
 
 /// What happened. The discriminant is the bit; of events that happen in one turn of the main loop the one with the highest bit is
 /// seen to first: control before the reader, and that before the planner and the reporter, whose turns may take 10 ms of a busy CPU.
@@ -153,6 +153,9 @@ fn is_eager() -> bool {
 /// A turn of the main loop: what is too small for a task. `bits` are the events since the last.
 pub fn turn(thread: Thread, bits: u8) {
     passed_over().set(0);
+    if NATIVE {
+        imp::uart::go_on();
+    }
     if PORTS > 1 && Event::Transmitted.is_in(bits) {
         transmitted().wake(thread);
     }

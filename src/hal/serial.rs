@@ -6,7 +6,7 @@
 //! so that each lost line is answered.
 
 use super::ring::{Consumer, Producer, Window};
-use crate::boards::{ACTIVE, Serial};
+use crate::boards::{ACTIVE, Serial, Usart};
 
 /// How many ports there are, and the numbers of the one that every board has and of the other.
 pub const PORTS: usize = ACTIVE.serial.len();
@@ -98,8 +98,8 @@ impl Flow {
     pub const fn of(port: u8, ex: u8) -> Flow {
         let has_pins = matches!(hardware(port), Some(Serial { handshake: Some(_), .. }));
         match ex {
-            // A bus belongs to others too, who would heed it.
-            1 if !is_shared(port) => Flow::Characters,
+            // A bus belongs to others too, who would heed it; the chip's own USB holds the other side back by itself.
+            1 if !is_shared(port) && !is_native(port) => Flow::Characters,
             2 if has_pins => Flow::Pins,
             _ => Flow::None,
         }
@@ -131,6 +131,15 @@ pub struct AllEnds {
 /// Whether others share the line of a port, so that it must not speak unasked.
 pub const fn is_shared(port: u8) -> bool {
     matches!(hardware(port), Some(Serial { driver_enable: Some(_), .. }))
+}
+
+/// The first port is USB of the chip's own: what it has no room for waits in the computer.
+pub const NATIVE: bool = matches!(ACTIVE.serial[USB as usize].usart, Usart::Usb);
+
+/// Whether a port is that.
+#[inline(always)]
+pub const fn is_native(port: u8) -> bool {
+    NATIVE && port == USB
 }
 
 /// The mark that replaces `newest`, if it is none yet. The receive interrupt of the AVR has the twins of

@@ -135,7 +135,7 @@ fn wires(board: &Board) -> Vec<Wire> {
     // The first port of an Arduino is its USB.
     let wired = usize::from(!is_numbered(board));
     for (port, name) in board.serial.iter().zip(["first port", "second port"]).skip(wired) {
-        let [rx, tx] = port.usart.pins();
+        let Some([rx, tx]) = port.usart.pins() else { continue };
         add(format!("{name}, receives"), Some(rx), "serial", "115,200 baud".into());
         add(format!("{name}, sends"), Some(tx), "serial", "115,200 baud".into());
         if let Some(handshake) = port.handshake {

@@ -132,7 +132,8 @@ fn emulated() -> Result<()> {
     emulator::test()?;
     let mut test = host_cargo();
     test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());
-    test.args(["test", "--package", "kerf-sim", "--profile", "sim", "--test", "pico"]);
+    test.args(["test", "--package", "kerf-sim", "--profile", "sim"]);
+    test.args(["--test", "pico", "--test", "pico_usb"]);
     run_child(test.args(["--", "--ignored"]))
 }
 

@@ -1,6 +1,6 @@
-//! The RP2040: which interrupt stands for the interrupt executor.
+//! The RP2040: which interrupts stand for the interrupt executor and the prompt one.
 //!
-//! It is the second of the six that no peripheral raises (RP2040 data sheet, 2.3.2).
+//! They are the second and the third of the six that no peripheral raises (RP2040 data sheet, 2.3.2).
 
 use cortex_m::interrupt::InterruptNumber;
 
@@ -15,8 +15,25 @@ unsafe impl InterruptNumber for Software {
     }
 }
 
-/// Its handler, by the name that the vector table of `rp-pac` gives it.
+/// The software interrupt of the prompt executor: the third.
+#[derive(Clone, Copy)]
+pub struct Prompt;
+
+// SAFETY: the number is that of SWI_IRQ_2.
+unsafe impl InterruptNumber for Prompt {
+    fn number(self) -> u16 {
+        28
+    }
+}
+
+/// Handler of the interrupt executor, by the name that the vector table of `rp-pac` gives it.
 #[unsafe(no_mangle)]
 extern "C" fn SWI_IRQ_1() {
     crate::interrupt::run();
+}
+
+/// Handler of the prompt executor.
+#[unsafe(no_mangle)]
+extern "C" fn SWI_IRQ_2() {
+    crate::interrupt::prompt::run();
 }

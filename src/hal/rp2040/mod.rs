@@ -10,6 +10,7 @@
 //! | 1 | UART0_IRQ, UART1_IRQ | `uart` | bytes between the line and the rings |
 //! | 1 | SysTick | `time` | counts milliseconds |
 //! | 2 | DMA_IRQ_0, PIO0_IRQ_0 | `stepper` | the feeder: runs the step generator ahead of time, and writes words |
+//! | 2 | SWI_IRQ_2, USBCTRL_IRQ | `usb` | the tasks of USB: packets between the bus and the rings |
 //! | 2 | TIMER_IRQ_0 | `embassy-rp` | wakes tasks whose time has come |
 //! | 3 | SWI_IRQ_1 | [`avr_embassy::interrupt`] | polls the exec executor |
 //! | thread | | [`avr_embassy::Executor`] | everything else |
@@ -42,6 +43,7 @@ pub mod text;
 pub mod time;
 mod timing;
 pub mod uart;
+mod usb;
 mod vectors;
 pub mod watchdog;
 

@@ -1,8 +1,11 @@
 //! The serial ports: bytes between their lines and two rings each.
 //!
-//! The first port is UART0; the other, on boards that have it, UART1. Neither uses its FIFOs, so that a byte acts when it comes, not when others have
+//! The first port is [USB](super::usb); the other a UART without its FIFOs, so that a byte acts when it comes, not when others have
 //! come behind it: real-time characters are taken out right in the handler. A byte has to be taken within the time of the next one, 87 us at
 //! 115,200 baud.
+//!
+//! USB brings up to 64 bytes at once. Real-time characters among them act when they come, even if there is no room for those before them; these
+//! wait ([`Line::behind`]), and the computer with the next ones.
 //!
 //! `embassy-rp`'s buffered driver has rings of its own, out of which a task takes bytes: a `!` would wait for the turn of a task, 10 ms of a
 //! busy CPU. So the handlers are our own; thread mode and exec share the state of a port with them with interrupts off.
@@ -15,8 +18,10 @@ use embassy_rp::interrupt;
 use embassy_rp::interrupt::{InterruptExt, Priority};
 use embassy_rp::pac;
 use embassy_rp::pac::uart::Uart as Registers;
+use heapless::Deque;
 
 use super::gpio::{self, Unit};
+use super::usb::{self, PACKET};
 use super::{drivers, eeprom, exec, flags, mask, time};
 use crate::baud;
 use crate::boards::{ACTIVE, Usart};
@@ -105,6 +110,10 @@ struct Line {
     rate: u32,
     /// The millisecond in which a byte came.
     heard_at: u32,
+    /// `!`, `~`, `%` and bytes above 0x7F are text.
+    plain: bool,
+    /// Of USB: what the receive ring had no room for.
+    behind: Deque<u8, PACKET>,
 }
 
 impl Line {
@@ -125,6 +134,8 @@ impl Line {
             last: 0,
             rate: baud::DEFAULT,
             heard_at: 0,
+            plain: false,
+            behind: Deque::new(),
         }
     }
 }
@@ -148,11 +159,12 @@ fn with<R>(port: u8, act: impl FnOnce(&mut Line) -> R) -> R {
     mask(|| act(unsafe { &mut *line.0.get() }))
 }
 
-/// The registers of a port.
-fn registers(port: u8) -> Registers {
-    match hardware(port).map(|serial| serial.usart) {
-        Some(Usart::Uart1) => pac::UART1,
-        _ => pac::UART0,
+/// The registers of a port; USB has none of this kind.
+fn registers(port: u8) -> Option<Registers> {
+    match hardware(port)?.usart {
+        Usart::Uart0 => Some(pac::UART0),
+        Usart::Uart1 => Some(pac::UART1),
+        _ => None,
     }
 }
 
@@ -168,11 +180,6 @@ pub fn start(rate: u32) -> Option<AllEnds> {
         }
         None => None,
     };
-    for interrupt in [interrupt::UART0_IRQ, interrupt::UART1_IRQ].into_iter().take(PORTS) {
-        interrupt.set_priority(Priority::P1);
-        // SAFETY: what the handlers touch is there.
-        unsafe { interrupt.enable() };
-    }
     Some(AllEnds { usb, aux })
 }
 
@@ -189,29 +196,34 @@ fn split<const N: usize>(
 }
 
 fn begin(port: u8, rate: u32) {
-    if let Some(serial) = hardware(port) {
-        let [rx, tx] = serial.usart.pins();
+    let Some(uart) = registers(port) else { return usb::start() };
+    if let Some([rx, tx]) = hardware(port).and_then(|serial| serial.usart.pins()) {
         gpio::connect_pulled(rx, Unit::Uart);
         gpio::connect(tx, Unit::Uart);
     }
     set_rate(port, rate);
-    registers(port).uartcr().write(|w| {
+    uart.uartcr().write(|w| {
         w.set_uarten(true);
         w.set_txe(true);
         w.set_rxe(true);
     });
-    registers(port).uartimsc().write(|w| {
+    uart.uartimsc().write(|w| {
         w.set_rxim(true);
         w.set_txim(true);
         w.set_oeim(true);
     });
+    let interrupt =
+        if uart == pac::UART0 { interrupt::UART0_IRQ } else { interrupt::UART1_IRQ };
+    interrupt.set_priority(Priority::P1);
+    // SAFETY: what the handlers touch is there.
+    unsafe { interrupt.enable() };
 }
 
 /// Goes on at `rate` bits a second. A byte on the line meanwhile, in either direction, is spoilt. Thread mode.
 pub fn set_rate(port: u8, rate: u32) {
     // In 64ths, rounded.
     let divisor = (ACTIVE.clock_hz * 8 / rate.max(1)).div_ceil(2);
-    let uart = registers(port);
+    let Some(uart) = registers(port) else { return };
     with(port, |line| {
         line.rate = rate;
         uart.uartibrd().write(|w| w.set_baud_divint((divisor >> 6) as u16));
@@ -223,17 +235,19 @@ pub fn set_rate(port: u8, rate: u32) {
 
 #[interrupt]
 fn UART0_IRQ() {
-    handle(USB);
+    handle(Usart::Uart0);
 }
 
 #[interrupt]
 fn UART1_IRQ() {
-    handle(AUX);
+    handle(Usart::Uart1);
 }
 
 /// What both handlers do: the byte that has come, and the next one that leaves.
-fn handle(port: u8) {
-    let uart = registers(port);
+fn handle(usart: Usart) {
+    let is_here = |port: &u8| hardware(*port).is_some_and(|serial| serial.usart == usart);
+    let Some(port) = (0..PORTS as u8).find(is_here) else { return };
+    let Some(uart) = registers(port) else { return };
     uart.uarticr().write(|w| {
         w.set_txic(true);
         w.set_oeic(true);
@@ -251,6 +265,16 @@ fn handle(port: u8) {
     if with(port, |line| line.send(uart)) {
         flags::set(Event::Transmitted);
     }
+}
+
+/// What a byte that has come is.
+enum Came {
+    /// It has acted, and is no part of a line.
+    Nothing,
+    /// It has acted; this stands where it was.
+    Mark(u8),
+    /// A part of a line.
+    Text,
 }
 
 impl Line {
@@ -302,6 +326,15 @@ impl Line {
     }
 
     fn arrive(&mut self, byte: u8, whole: bool) {
+        match self.act(byte, whole) {
+            Came::Nothing => {}
+            Came::Mark(mark) => self.place(mark),
+            Came::Text => self.queue(byte, whole),
+        }
+    }
+
+    /// A byte has come: one that acts does so here and now.
+    fn act(&mut self, byte: u8, whole: bool) -> Came {
         self.heard_at = time::millis();
         if self.heeds_xoff && (byte == XOFF || byte == XON) {
             self.held = byte == XOFF;
@@ -309,26 +342,60 @@ impl Line {
                 self.realtime |= realtime::LET_GO;
                 flags::set(Event::Realtime);
             }
-            return;
+            return Came::Nothing;
         }
         let special = realtime::bit(byte);
-        if special != 0 {
+        if special != 0 && !(self.plain && byte >= b' ') {
             self.realtime = realtime::with(self.realtime, special);
             flags::set(Event::Realtime);
-            if special & realtime::PLACED != 0 {
-                self.place(if special == realtime::RESUME { GO } else { CUT });
-            }
-            return;
+            return match special {
+                realtime::RESUME => Came::Mark(GO),
+                _ if special & realtime::PLACED != 0 => Came::Mark(CUT),
+                _ => Came::Nothing,
+            };
         }
         if self.last <= realtime::ASCII
             && whole
+            && !self.plain
             && let Some(asked) = self.asked.with(byte)
         {
             self.asked = asked;
             flags::set(Event::Realtime);
-            return;
+            return Came::Nothing;
         }
-        self.queue(byte, whole);
+        Came::Text
+    }
+
+    /// A byte has come by USB. What there is no room for waits, but for marks: they are placed as if what waits had been lost, or is lost then.
+    fn bring(&mut self, byte: u8) {
+        let waits = !self.behind.is_empty() || self.rx.as_ref().is_none_or(Filling::is_full);
+        match self.act(byte, true) {
+            Came::Nothing => {}
+            Came::Mark(GO) if waits => self.realtime |= realtime::UNPLACED,
+            Came::Mark(mark) => {
+                while let Some(byte) = self.behind.pop_front() {
+                    self.queue(byte, true);
+                }
+                self.place(mark);
+            }
+            Came::Text if waits => {
+                self.last = byte;
+                // A packet fits: none is read before the last one has gone.
+                let _ = self.behind.push_back(byte);
+            }
+            Came::Text => self.queue(byte, true),
+        }
+    }
+
+    /// Queues what waits, as far as there is room. Whether nothing waits any more.
+    fn go_on(&mut self) -> bool {
+        while self.rx.as_ref().is_some_and(|ring| !ring.is_full()) {
+            let Some(byte) = self.behind.pop_front() else { break };
+            let last = self.last;
+            self.queue(byte, true);
+            self.last = last;
+        }
+        self.behind.is_empty()
     }
 
     fn queue(&mut self, byte: u8, whole: bool) {
@@ -350,7 +417,7 @@ impl Line {
 
 /// Sends what the ring holds. Thread mode, or exec on a port that is no bus.
 pub fn kick(port: u8) {
-    let uart = registers(port);
+    let Some(uart) = registers(port) else { return usb::kick() };
     if with(port, |line| line.send(uart)) {
         flags::set(Event::Transmitted);
     }
@@ -392,8 +459,37 @@ pub fn stop_late() {
     }
 }
 
-/// Nothing: images of this chip have no dialect of printing hosts.
-pub fn set_plain(_port: u8, _plain: bool) {}
+/// Whether `!`, `~`, `%` and bytes above 0x7F are text, from now on. Thread mode.
+pub fn set_plain(port: u8, plain: bool) {
+    with(port, |line| line.plain = plain);
+}
+
+/// A packet has come by USB. Whether another one may: else [`usb::ROOM`] says when. Costs 60 cycles a byte.
+pub(super) fn bring(packet: &[u8]) -> bool {
+    packet.iter().for_each(|byte| with(USB, |line| line.bring(*byte)));
+    with(USB, |line| line.behind.is_empty())
+}
+
+/// Queues what has come by USB when there was no room. Thread mode, each turn.
+pub fn go_on() {
+    if with(USB, |line| !line.behind.is_empty() && line.go_on()) {
+        usb::ROOM.signal(());
+    }
+}
+
+/// Takes what is to leave by USB next. How much that is.
+pub(super) fn take(packet: &mut [u8]) -> usize {
+    let bytes = packet.iter_mut();
+    let taken = bytes.map_while(|byte| {
+        *byte = with(USB, Line::next)?;
+        Some(())
+    });
+    let count = taken.count();
+    if count > 0 {
+        flags::set(Event::Transmitted);
+    }
+    count
+}
 
 /// How the other side may hold it back from now on. Thread mode.
 pub fn set_flow(port: u8, flow: Flow) {
@@ -473,7 +569,7 @@ pub fn take_realtime(port: u8) -> u8 {
 /// Ends the lines of which a part has been sent; what else the rings hold is never sent. Interrupts are off, and stay so.
 pub(super) fn end_lines() {
     for port in 0..PORTS as u8 {
-        let uart = registers(port);
+        let Some(uart) = registers(port) else { continue };
         if with(port, |line| line.open) {
             while uart.uartfr().read().txff() {}
             uart.uartdr().write(|w| w.set_data(b'\n'));

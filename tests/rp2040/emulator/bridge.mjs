@@ -2,8 +2,9 @@
 //
 // MOTORS is JSON, [[step, dir], ...]. Each line of the input is a request in JSON, each line of the output its answer:
 //
-//   {"cut": true, "send": [[port, "hex"]], "now": byte, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "record": bool, "until": cycle, "line": true}
+//   {"cut": true, "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "record": bool, "until": cycle, "line": true}
 //
+// Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does.
 // With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
 import { createInterface } from 'node:readline';
 import { Machine } from './machine.mjs';
@@ -20,9 +21,10 @@ let recorded;
 
 function act(request) {
   if (request.cut) machine.cutPower();
-  for (const [port, rate] of request.baud ?? []) machine.senders[port].rate = rate;
+  for (const [port, rate] of request.baud ?? []) if (machine.senders[port]) machine.senders[port].rate = rate;
   for (const [port, hex] of request.send ?? []) machine.send(port, Buffer.from(hex, 'hex'));
-  for (const byte of request.now ?? []) machine.sendNow(0, byte);
+  for (const [port, byte] of request.now ?? []) machine.sendNow(port, byte);
+  if (request.usb) machine.talk(request.usb);
   for (const [gpio, high] of request.drive ?? []) machine.drive(gpio, high);
   if (request.wire) motors.wire(request.wire);
   recorded = request.record === undefined ? undefined : motors.record(request.record);
@@ -43,7 +45,7 @@ function shares() {
 
 function answer() {
   const heard = machine.heard.map((bytes) => Buffer.from(bytes).toString('hex'));
-  machine.heard = [[], []];
+  machine.heard = [[], [], []];
   return {
     cycle: machine.cycle,
     heard,
@@ -55,6 +57,7 @@ function answer() {
     shares: shares(),
     asleep: machine.asleep,
     resets: machine.resets,
+    waiting: machine.computer.bytes.length,
     recorded,
   };
 }

@@ -1,4 +1,4 @@
-// An RP2040 of rp2040js with what tests of an image need: an ELF, one clock for CPU and PIO, time of interrupts, pins, two serial lines.
+// An RP2040 of rp2040js with what tests of an image need: an ELF, one clock for CPU and PIO, time of interrupts, pins, two serial lines, USB.
 //
 // What rp2040js lacks is put right here and in the files beside; `cures.test.mjs` has a test for each.
 import { readFileSync } from 'node:fs';
@@ -6,6 +6,7 @@ import { BasePeripheral, ConsoleLogger, LogLevel, RP2040 } from 'rp2040js';
 import { Pio } from './pio.mjs';
 import { bootRom } from './rom.mjs';
 import { Uart } from './uart.mjs';
+import { Computer, Usb } from './usb.mjs';
 
 // The system clock of Kerf's image.
 export const CLOCK_HZ = 128e6;
@@ -22,6 +23,9 @@ const GARBLES = 0.045;
 // Bits of a frame: start, eight, stop.
 const FRAME = 10;
 const CHAN_ABORT = 0x444;
+const USB = 0x50110;
+// The port of USB, behind those of the UARTs.
+export const USB_PORT = 2;
 const UARTS = [[0x40034, 'UART0', 20], [0x40038, 'UART1', 21]];
 
 // XIP_CTRL, which rp2040js lacks: never streaming.
@@ -80,7 +84,8 @@ export class Machine {
     this.cycle = 0;
     this.edgeListeners = [];
     this.resetListeners = [];
-    this.heard = [[], []];
+    this.heard = [[], [], []];
+    this.computer = new Computer((byte) => this.listen(USB_PORT, byte));
     this.senders = [new Sender(), new Sender()];
     this.inputs = new Map();
     this.levels = new Array(30).fill(0);
@@ -113,6 +118,7 @@ export class Machine {
       uart.onByte = (byte) => this.hear(port, byte, 1e9 / uart.bit);
       return uart;
     });
+    this.usb = mcu.usbCtrl = mcu.peripherals[USB] = new Usb(mcu, this.computer);
     const watchdog = mcu.peripherals[WATCHDOG];
     if (before?.peripherals) {
       const old = before.peripherals[WATCHDOG];
@@ -165,14 +171,33 @@ export class Machine {
     this.mcu.gpio[gpio].setInputValue(high);
   }
 
-  send(port, bytes) { this.senders[port].send(bytes, this.cycle); }
-  sendNow(port, byte) { this.senders[port].sendNow(byte, this.cycle); }
+  send(port, bytes) {
+    if (port !== USB_PORT) return this.senders[port].send(bytes, this.cycle);
+    for (const byte of bytes) this.computer.bytes.push(byte);
+    this.usb.wake();
+  }
+  // Sends a byte ahead of those that wait.
+  sendNow(port, byte) {
+    if (port !== USB_PORT) return this.senders[port].sendNow(byte, this.cycle);
+    this.computer.bytes.unshift(byte);
+    this.usb.wake();
+  }
+  // What the program at the other end of USB does: whether it has the port open, and reads.
+  talk({ open, reads }) {
+    this.computer.open = open ?? this.computer.open;
+    this.computer.reads = reads ?? this.computer.reads;
+    this.usb.wake();
+  }
 
   // A byte has left. One at another speed is not understood.
   hear(port, byte, rate) {
     const wanted = this.senders[port].rate;
     const garbled = Math.abs(wanted - rate) > GARBLES * wanted;
-    this.heard[port].push(garbled ? byte ^ 0xff : byte);
+    this.listen(port, garbled ? byte ^ 0xff : byte);
+  }
+
+  listen(port, byte) {
+    this.heard[port].push(byte);
     this.said++;
     if (byte === 10) this.lines++;
   }

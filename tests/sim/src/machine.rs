@@ -104,7 +104,7 @@ impl Machine {
                 Usart::U1 => 1,
                 Usart::U3 => 3,
                 // Of the RP2040, which is emulated: see above.
-                Usart::Uart0 | Usart::Uart1 => 0,
+                Usart::Uart0 | Usart::Uart1 | Usart::Usb => 0,
             };
             (usart, Wire::new(board.clock_hz, serial.rate))
         });

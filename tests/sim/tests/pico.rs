@@ -13,7 +13,7 @@ use common::image;
 use kerf::boards::inputs::{ENDS, PROBE};
 use kerf::boards::{Board, PICO_CNC, PICO_CNC6, SKR_PICO, gp};
 use kerf::switches::{FIRST_US, SOON_US};
-use kerf_sim::emulated::{Emulated, Near, job};
+use kerf_sim::emulated::{DRIVERS, Emulated, Near, job};
 use kerf_sim::job::lines_of;
 use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Runs, USB};
 
@@ -262,7 +262,7 @@ fn an_skr_pico_tells_its_drivers_and_moves() {
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut board, 1_000).unwrap();
     host.run_for_ms(&mut board, 100).unwrap();
-    let told = told(&board.receive_from(AUX));
+    let told = told(&board.receive_line(DRIVERS));
     for address in 0..4 {
         for wanted in [(0x80, 0x1C0), (0xEC, 0x1503_0053), (0x90, 0x0008_1209)] {
             assert!(told.contains(&(address, wanted.0, wanted.1)), "{address}: {told:x?}");

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
-use kerf::boards::{Board, MOTORS, Pin, Port};
+use kerf::boards::{Board, MOTORS, Pin, Port, Usart};
 use serde::{Deserialize, Serialize};
 
 use crate::runs::Runs;
@@ -23,7 +23,9 @@ const PROGRAM: &str = "rp2040-emulator/bridge.mjs";
 struct Request {
     cut: bool,
     send: Vec<(usize, String)>,
-    now: Vec<u8>,
+    now: Vec<(usize, u8)>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    usb: Option<Talks>,
     baud: Vec<(usize, u32)>,
     drive: Vec<(u8, bool)>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -32,6 +34,29 @@ struct Request {
     record: Option<bool>,
     until: u64,
     line: bool,
+}
+
+/// What the program at the other end of USB does.
+#[derive(Serialize, Clone, Copy, Debug)]
+pub struct Talks {
+    /// It has the port open.
+    pub open: bool,
+    /// It takes what comes.
+    pub reads: bool,
+}
+
+/// Lines that the emulator has: two of UARTs, and USB.
+const LINES: usize = 3;
+/// What listens to the drivers of a board on UART1.
+pub const DRIVERS: usize = 1;
+
+/// The line of a board's port.
+fn line(board: &Board, port: usize) -> usize {
+    match board.serial.get(port).map(|serial| serial.usart) {
+        Some(Usart::Usb) => 2,
+        Some(Usart::Uart1) => 1,
+        _ => 0,
+    }
 }
 
 /// A switch at a pin, closed while a motor is at or beyond a step; or open there.
@@ -75,6 +100,8 @@ struct Answer {
     #[serde(default)]
     resets: u64,
     #[serde(default)]
+    waiting: usize,
+    #[serde(default)]
     recorded: Option<Recorded>,
 }
 
@@ -97,7 +124,7 @@ pub struct Emulated {
     output: BufReader<ChildStdout>,
     request: Request,
     answer: Answer,
-    heard: [Vec<u8>; 2],
+    heard: [Vec<u8>; LINES],
 }
 
 /// Whether a board's chip is emulated, not simulated.
@@ -139,7 +166,7 @@ impl Emulated {
             output: BufReader::new(output.context("no standard output")?),
             request: Request::default(),
             answer: Answer::default(),
-            heard: [Vec::new(), Vec::new()],
+            heard: Default::default(),
         };
         board.run(0, false)?;
         Ok(board)
@@ -162,8 +189,8 @@ impl Emulated {
         if let Some(fault) = &self.answer.fault {
             bail!("the emulator fails: {fault}");
         }
-        for (port, hex) in self.answer.heard.iter().enumerate().take(2) {
-            self.heard[port].extend(bytes(hex));
+        for (line, hex) in self.answer.heard.iter().enumerate().take(LINES) {
+            self.heard[line].extend(bytes(hex));
         }
         Ok(())
     }
@@ -176,12 +203,22 @@ impl Emulated {
     /// Puts bytes on the line of a port.
     pub fn send_to(&mut self, port: usize, bytes: &[u8]) {
         let hex = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        self.request.send.push((port, hex));
+        self.request.send.push((line(self.board, port), hex));
     }
 
     /// Takes what it has said on a port.
     pub fn receive_from(&mut self, port: usize) -> Vec<u8> {
-        std::mem::take(&mut self.heard[port])
+        self.receive_line(line(self.board, port))
+    }
+
+    /// As [`Emulated::receive_from`], of a line that may be no port's.
+    pub fn receive_line(&mut self, line: usize) -> Vec<u8> {
+        std::mem::take(&mut self.heard[line])
+    }
+
+    /// The program at the other end of USB goes on like this.
+    pub fn talk(&mut self, talks: Talks) {
+        self.request.usb = Some(talks);
     }
 
     /// The supply fails, and is there again.
@@ -245,6 +282,11 @@ impl Emulated {
         self.answer.asleep
     }
 
+    /// Bytes for USB that the board has not taken yet.
+    pub fn waiting(&self) -> usize {
+        self.answer.waiting
+    }
+
     /// Resets by the watchdog.
     pub fn resets(&self) -> u64 {
         self.answer.resets
@@ -277,7 +319,7 @@ impl Runs for Emulated {
     }
 
     fn send_now(&mut self, byte: u8) {
-        self.request.now.push(byte);
+        self.request.now.push((line(self.board, 0), byte));
     }
 
     fn receive(&mut self) -> Vec<u8> {
@@ -285,7 +327,7 @@ impl Runs for Emulated {
     }
 
     fn set_baud(&mut self, baud: u32) {
-        self.request.baud.push((0, baud));
+        self.request.baud.push((line(self.board, 0), baud));
     }
 
     fn garbled(&self) -> u64 {

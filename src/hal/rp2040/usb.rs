@@ -1,0 +1,186 @@
+//! USB: a serial port of the class CDC ACM, by `embassy-usb` on `embassy-rp`'s driver.
+//!
+//! Its tasks run on the [prompt executor](avr_embassy::interrupt::prompt), above thread mode and exec, so that a `!` acts when its packet comes. A
+//! packet that the receive ring has no room for is the last: the computer is told to wait (NAK) until it has gone.
+//!
+//! Nobody listens while no program has the port open, or the bus sleeps. What is said then is dropped, so that no task waits for it; but the
+//! first [`KEPT`] bytes after start-up, with the greeting, are kept for the first who opens it.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use avr_embassy::interrupt::prompt;
+use embassy_futures::select::select;
+use embassy_rp::bind_interrupts;
+use embassy_rp::interrupt::{self, InterruptExt, Priority};
+use embassy_rp::peripherals::USB;
+use embassy_rp::usb::{self, InterruptHandler};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_usb::class::cdc_acm::{CdcAcmClass, ControlChanged, Receiver, Sender, State};
+use embassy_usb::{Builder, Config, Handler, UsbDevice};
+use heapless::Deque;
+use static_cell::StaticCell;
+
+use super::uart;
+use crate::boards::ACTIVE;
+
+/// The longest packet of a full-speed bus.
+pub(super) const PACKET: usize = 64;
+/// What is said is cut into pieces that are shorter than a packet: none needs an empty one behind it.
+const PIECE: usize = PACKET - 1;
+/// Bytes kept for the first who opens the port.
+const KEPT: usize = 256;
+/// A pair of numbers for tests, of pid.codes; nobody sells boards with it.
+const VENDOR: u16 = 0x1209;
+/// See [`VENDOR`].
+const PRODUCT: u16 = 0x0001;
+
+type Driver = usb::Driver<'static, USB>;
+
+bind_interrupts!(struct Handlers {
+    USBCTRL_IRQ => InterruptHandler<USB>;
+});
+
+/// What has come has been queued: the next packet may.
+pub(super) static ROOM: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+/// There may be something to send, or somebody to send it to.
+static NEWS: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+/// The bus sleeps, or its cable is out.
+static ASLEEP: AtomicBool = AtomicBool::new(false);
+
+/// Notices when the bus sleeps.
+struct Sleep;
+
+impl Handler for Sleep {
+    fn suspended(&mut self, suspended: bool) {
+        ASLEEP.store(suspended, Ordering::Relaxed);
+        NEWS.signal(());
+    }
+
+    fn reset(&mut self) {
+        self.suspended(false);
+    }
+}
+
+/// Starts it: the computer notices. Start-up.
+pub(super) fn start() {
+    static DESCRIPTORS: StaticCell<[u8; 256]> = StaticCell::new();
+    static BOS: StaticCell<[u8; 32]> = StaticCell::new();
+    static CONTROL: StaticCell<[u8; 64]> = StaticCell::new();
+    static STATE: StaticCell<State<'static>> = StaticCell::new();
+    static SLEEP: StaticCell<Sleep> = StaticCell::new();
+    let mut config = Config::new(VENDOR, PRODUCT);
+    config.manufacturer = Some("Kerf");
+    config.product = Some(ACTIVE.name);
+    // SAFETY: start-up comes here once, and nobody else uses the unit.
+    let unit = unsafe { USB::steal() };
+    let mut builder = Builder::new(
+        Driver::new(unit, Handlers),
+        config,
+        DESCRIPTORS.init([0; 256]),
+        BOS.init([0; 32]),
+        &mut [],
+        CONTROL.init([0; 64]),
+    );
+    builder.handler(SLEEP.init(Sleep));
+    let class = CdcAcmClass::new(&mut builder, STATE.init(State::new()), PACKET as u16);
+    let (sender, receiver, control) = class.split_with_control();
+    let device = builder.build();
+    interrupt::SWI_IRQ_2.set_priority(Priority::P2);
+    interrupt::USBCTRL_IRQ.set_priority(Priority::P2);
+    prompt::start(|spawner| {
+        // None has been spawned before.
+        if let (Ok(serve), Ok(hear), Ok(tell)) =
+            (serve(device), hear(receiver), tell(sender, control))
+        {
+            spawner.spawn(serve);
+            spawner.spawn(hear);
+            spawner.spawn(tell);
+        }
+    });
+}
+
+/// There may be something to send. Any level.
+pub(super) fn kick() {
+    NEWS.signal(());
+}
+
+#[embassy_executor::task]
+async fn serve(mut device: UsbDevice<'static, Driver>) {
+    device.run().await;
+}
+
+#[embassy_executor::task]
+async fn hear(mut receiver: Receiver<'static, Driver>) {
+    let mut packet = [0; PACKET];
+    loop {
+        receiver.wait_connection().await;
+        while let Ok(count) = receiver.read_packet(&mut packet).await {
+            ROOM.reset();
+            if !uart::bring(packet.get(..count).unwrap_or_default()) {
+                ROOM.wait().await;
+            }
+        }
+    }
+}
+
+#[embassy_executor::task]
+async fn tell(mut sender: Sender<'static, Driver>, control: ControlChanged<'static>) {
+    let mut first = First { bytes: Deque::new(), keeps: true };
+    let mut packet = [0; PIECE];
+    loop {
+        let hears = hears(&control);
+        let kept = if hears { first.take(&mut packet) } else { 0 };
+        let count = if kept > 0 { kept } else { uart::take(&mut packet) };
+        let piece = packet.get(..count).unwrap_or_default();
+        if piece.is_empty() {
+            select(NEWS.wait(), control.control_changed()).await;
+        } else if hears {
+            // If nobody listens any more, nobody takes it.
+            select(sender.write_packet(piece), silence(&control)).await;
+        } else {
+            first.keep(piece);
+        }
+    }
+}
+
+/// Whether a program has the port open.
+fn hears(control: &ControlChanged<'_>) -> bool {
+    control.dtr() && !ASLEEP.load(Ordering::Relaxed)
+}
+
+/// Waits until nobody listens any more.
+async fn silence(control: &ControlChanged<'_>) {
+    while hears(control) {
+        select(NEWS.wait(), control.control_changed()).await;
+    }
+}
+
+/// What was said before anybody listened.
+struct First {
+    bytes: Deque<u8, KEPT>,
+    keeps: bool,
+}
+
+impl First {
+    /// Keeps a piece; of what is too long whole lines alone.
+    fn keep(&mut self, piece: &[u8]) {
+        self.keeps &= self.bytes.len() + piece.len() <= KEPT;
+        if self.keeps {
+            piece.iter().for_each(|byte| {
+                let _ = self.bytes.push_back(*byte);
+            });
+            return;
+        }
+        while self.bytes.back().is_some_and(|byte| *byte != b'\n') {
+            self.bytes.pop_back();
+        }
+    }
+
+    /// Takes the next piece. How long it is.
+    fn take(&mut self, piece: &mut [u8]) -> usize {
+        self.keeps = false;
+        let bytes = piece.iter_mut();
+        bytes.map_while(|byte| self.bytes.pop_front().map(|first| *byte = first)).count()
+    }
+}

@@ -1,0 +1,124 @@
+//! USB of the emulated RP2040: the port, back-pressure, a program that does not listen, both ports at once. Run as `pico.rs` is.
+
+mod common;
+
+use common::image;
+use kerf::boards::PICO_CNC;
+use kerf_sim::emulated::{Emulated, Talks};
+use kerf_sim::{AUX, Host, USB};
+
+/// A board that has just been powered up.
+fn board() -> Emulated {
+    Emulated::load(&image(&PICO_CNC), &PICO_CNC).unwrap()
+}
+
+/// One that has greeted, and speaks TinyG's dialect on both ports.
+fn booted() -> Emulated {
+    let mut board = board();
+    Host::new(1).boot(&mut board, 1_000).unwrap();
+    let answer = ask(&mut board, AUX, "{fv:n}\n", 100);
+    assert!(answer.contains("\"fv\":0.97"), "{answer}");
+    board
+}
+
+/// What a port says within so many milliseconds after this.
+fn ask(board: &mut Emulated, port: usize, text: &str, ms: u64) -> String {
+    board.send_to(port, text.as_bytes());
+    board.run_for_ms(ms).unwrap();
+    String::from_utf8(board.receive_from(port)).unwrap()
+}
+
+const DEAF: Talks = Talks { open: true, reads: false };
+const CLOSED: Talks = Talks { open: false, reads: true };
+const LISTENS: Talks = Talks { open: true, reads: true };
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn the_first_program_that_opens_the_port_is_greeted() {
+    let mut board = board();
+    board.talk(CLOSED);
+    board.run_for_ms(300).unwrap();
+    assert!(board.receive_from(USB).is_empty());
+    board.talk(LISTENS);
+    board.run_for_ms(20).unwrap();
+    let heard = String::from_utf8(board.receive_from(USB)).unwrap();
+    assert!(heard.contains("SYSTEM READY") && heard.ends_with('\n'), "{heard}");
+    board.talk(CLOSED);
+    board.run_for_ms(20).unwrap();
+    board.talk(LISTENS);
+    assert_eq!(ask(&mut board, USB, "", 20), "", "no other one is");
+    assert!(ask(&mut board, USB, "{xvm:n}\n", 20).contains("xvm"));
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn nothing_is_lost_though_nobody_waits_for_answers() {
+    let mut board = booted();
+    let lines = 400;
+    let text: String = (1..=lines).map(|n| format!("n{n} g1 f600 x{}\n", n % 2)).collect();
+    let heard = ask(&mut board, USB, &text, 1_000);
+    assert!(heard.matches("\"r\":").count() < lines / 2, "the computer is held back");
+    let mut heard = heard;
+    for _ in 0..100 {
+        heard += &ask(&mut board, USB, "", 1_000);
+    }
+    let answers: Vec<_> = heard.lines().filter(|line| line.contains("\"r\":")).collect();
+    assert_eq!(answers.len(), lines);
+    assert!(answers.iter().all(|line| line.contains("\"f\":[1,0,")), "{answers:?}");
+    assert_eq!(Emulated::steps(&board)[0], 0);
+}
+
+/// The moves fill blocks, pool and ring; what stops comes behind them, in a packet of its own or in their last one. Beyond that the computer is
+/// held back, with what it has to say.
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn a_stop_acts_at_once_however_much_waits_before_it() {
+    for (moves, behind) in [(4, "!"), (80, "!"), (95, "!"), (94, ""), (97, ""), (99, "")] {
+        let mut board = booted();
+        let mut text: String = (1..=moves).map(|n| format!("g1f400x{}\n", 10 * (n % 2))).collect();
+        if behind.is_empty() {
+            text.push('!');
+        }
+        ask(&mut board, USB, &text, 500);
+        ask(&mut board, USB, behind, 5);
+        let takes = board.waiting() == 0;
+        board.run_for_ms(300).unwrap();
+        let held = Emulated::steps(&board);
+        board.run_for_ms(200).unwrap();
+        println!("{moves} moves: {held:?}, {takes}");
+        assert!(takes && Emulated::steps(&board) == held, "{moves} moves");
+    }
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn a_program_that_does_not_listen_keeps_nobody_else_waiting() {
+    for talks in [DEAF, CLOSED] {
+        let mut board = booted();
+        board.talk(talks);
+        board.send_to(USB, "{xvm:n}\n{yvm:n}\n{zvm:n}\n{avm:n}\n{sys:n}\n".as_bytes());
+        board.run_for_ms(100).unwrap();
+        let answer = ask(&mut board, AUX, "{xvm:n}\n", 100);
+        assert!(answer.contains("xvm"), "{talks:?}: {answer}");
+    }
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn both_ports_are_answered_while_a_job_runs() {
+    let mut board = booted();
+    let mut answers = [0, 0];
+    for n in 0..100 {
+        board.send_to(USB, format!("g1 f1000 x{}\n", n % 5).as_bytes());
+        board.send_to(AUX, b"{posx:n}\n");
+        board.run_for_ms(20).unwrap();
+        for port in [USB, AUX] {
+            let heard = String::from_utf8(board.receive_from(port)).unwrap();
+            answers[port] += heard.matches("\"r\":").count();
+        }
+    }
+    println!("{answers:?}");
+    assert!(answers[AUX] >= 98 && answers[USB] >= 60, "{answers:?}");
+    let refused = ask(&mut board, AUX, "g1 x1\n", 100);
+    assert!(refused.contains("\"f\":[1,117,"), "{refused}");
+}
