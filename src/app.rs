@@ -18,7 +18,7 @@ use crate::gcode::interpreter::Interpreter;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::ring::Producer;
 use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
-use crate::hal::{stepper, uart, watchdog};
+use crate::hal::{LINE_BYTES, stepper, uart, watchdog};
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Memory, Occasion, Remembers, Speech};
@@ -37,10 +37,11 @@ use crate::tasks::{
     alarm, control, exec, heat, parser, planner, power, reader, reporter, spindle, storage,
 };
 
-/// Bytes for all lines of USB together.
-const LINES_USB: usize = 412;
-/// The same of the other port.
-const LINES_AUX: usize = 80 + AUX_RESERVE as usize;
+/// Bytes for all lines of USB together, and of the other port.
+const LINES_USB: usize = LINE_BYTES[0];
+/// See [`LINES_USB`].
+const LINES_AUX: usize = LINE_BYTES[1];
+const _: () = assert!(LINES_AUX >= 80 + AUX_RESERVE as usize);
 
 impl Links {
     fn new(thread: Thread, ports: [Port; PORTS], storage: &'static Storage) -> Self {

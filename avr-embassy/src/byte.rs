@@ -67,3 +67,41 @@ mod imp {
 }
 
 pub use imp::SharedByte;
+
+/// The number of a slot of a [ring](crate::ring): of as many bits as the CPU reads and writes in one instruction, up to 16.
+#[cfg(not(all(target_arch = "arm", target_os = "none")))]
+pub type Index = u8;
+/// See the other.
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub type Index = u16;
+
+/// One that two levels share.
+#[cfg(not(all(target_arch = "arm", target_os = "none")))]
+pub type SharedIndex = SharedByte;
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub use wide::SharedIndex;
+
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+mod wide {
+    use core::sync::atomic::{AtomicU16, Ordering};
+
+    /// As [`SharedByte`](super::SharedByte).
+    pub struct SharedIndex(AtomicU16);
+
+    impl SharedIndex {
+        /// With a value.
+        pub const fn new(value: u16) -> Self {
+            Self(AtomicU16::new(value))
+        }
+
+        /// The value; what was written before it was set is visible.
+        pub fn get(&self) -> u16 {
+            self.0.load(Ordering::Acquire)
+        }
+
+        /// Sets the value, after everything written before.
+        pub fn set(&self, value: u16) {
+            self.0.store(value, Ordering::Release);
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! A ring between one producer and one consumer that may preempt each other.
 //!
-//! The indices are single bytes, which an 8-bit CPU reads and writes in one instruction, so neither
-//! side ever masks interrupts. Slots are filled and read in place. One slot stays empty to tell full
+//! The indices are as wide as the CPU reads and writes in one instruction, single bytes on one of 8 bits, so neither
+//! side ever masks interrupts. Functions that tell slots as bytes are for rings of up to 256. Slots are filled and read in place. One slot stays empty to tell full
 //! from empty: a `Ring<T, N>` holds `N - 1`.
 //!
 //! When full, [`Producer::slot`] is `None`; the producer waits, or counts the loss.
@@ -15,15 +15,16 @@ mod window;
 pub use window::Window;
 
 pub use crate::Ceiling;
-use crate::byte::SharedByte;
+pub use crate::byte::Index;
+use crate::byte::{SharedByte, SharedIndex};
 
-/// The storage. `N` is 2 to 256.
+/// The storage. `N` is 2 to 256, or to 65,536 where an [`Index`] has 16 bits.
 pub struct Ring<T, const N: usize> {
     slots: UnsafeCell<[MaybeUninit<T>; N]>,
     /// The slot filled last; written by the producer only.
-    head: SharedByte,
+    head: SharedIndex,
     /// The slot read last; written by the consumer only.
-    tail: SharedByte,
+    tail: SharedIndex,
     /// Which ends have been taken.
     taken: SharedByte,
 }
@@ -50,7 +51,7 @@ fn take(taken: &SharedByte, ends: u8) -> bool {
 // `tail` has; `split` hands out one of each, once.
 unsafe impl<T: Send, const N: usize> Sync for Ring<T, N> {}
 
-const fn next<const N: usize>(index: u8) -> u8 {
+const fn next<const N: usize>(index: Index) -> Index {
     let next = index.wrapping_add(1);
     if next as usize == N { 0 } else { next }
 }
@@ -63,15 +64,15 @@ impl<T: Copy, const N: usize> Ring<T, N> {
     /// See [`Ring::SLOTS`].
     pub const TAIL: usize = core::mem::offset_of!(Self, tail);
 
-    const SIZE_OK: () = assert!(N >= 2 && N <= 256);
+    const SIZE_OK: () = assert!(N >= 2 && N <= Index::MAX as usize + 1);
 
     /// An empty ring.
     pub const fn new() -> Self {
         const { Self::SIZE_OK };
         Self {
             slots: UnsafeCell::new([MaybeUninit::uninit(); N]),
-            head: SharedByte::new(0),
-            tail: SharedByte::new(0),
+            head: SharedIndex::new(0),
+            tail: SharedIndex::new(0),
             taken: SharedByte::new(0),
         }
     }
@@ -109,12 +110,12 @@ impl<T: Copy, const N: usize> Ring<T, N> {
     /// The slot filled last, if it has not been taken.
     pub fn newest(&self) -> Option<u8> {
         let head = self.head.get();
-        (head != self.tail.get()).then_some(head)
+        (head != self.tail.get()).then_some(head as u8)
     }
 
     /// The slot taken last.
     pub fn tail(&self) -> u8 {
-        self.tail.get()
+        self.tail.get() as u8
     }
 
     /// The value in a slot.
@@ -124,7 +125,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
     /// It has been filled, and the producer is held off.
     pub unsafe fn at(&self, index: u8) -> T {
         // SAFETY: the caller says so.
-        unsafe { self.slot(index).read() }
+        unsafe { self.slot(index.into()).read() }
     }
 
     /// The value taken last. `None` if nobody knows: at first, and each time the ring has gone round.
@@ -134,7 +135,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         (tail != 0).then(|| unsafe { self.slot(tail).read() })
     }
 
-    fn slot(&self, index: u8) -> *mut T {
+    fn slot(&self, index: Index) -> *mut T {
         // Stays inside the array: indices are below N by construction.
         self.slots.get().cast::<T>().wrapping_add(index as usize)
     }
@@ -165,7 +166,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
     /// The slot filled last.
     #[inline]
     pub fn filled(&self) -> u8 {
-        self.0.head.get()
+        self.0.head.get() as u8
     }
 
     /// Puts a value in. Gives it back if the ring is full.
@@ -215,7 +216,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
     /// The values behind slot `index`, which the consumer has released or not; none of them may have been
     /// overwritten since.
     pub fn behind(&self, index: u8) -> impl Iterator<Item = &T> {
-        let (mut at, head) = (index, self.0.head.get());
+        let (mut at, head) = (Index::from(index), self.0.head.get());
         core::iter::from_fn(move || {
             if at == head {
                 return None;
@@ -252,7 +253,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
     ) -> u8 {
         let (start, tail) = (next::<N>(self.0.head.get()), self.0.tail.get());
         // Up to the consumer, which one slot stays vacant before, or to the end. In bytes: that is half the time of words.
-        let len = if tail >= start { tail - start } else { (N - usize::from(start)) as u8 };
+        let len = if tail >= start { tail - start } else { (N - usize::from(start)) as Index };
         let slots = self.0.slot(start);
         // SAFETY: the slots behind `head` are the producer's, as many as are free, and these do not
         // go beyond the end; `MaybeUninit` may lie there whatever was written.
@@ -262,12 +263,12 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         if filled.as_ptr() != slots.cast_const() {
             return 0;
         }
-        let count = filled.len() as u8;
+        let count = filled.len() as Index;
         if count > 0 {
             // The last of them: not beyond the end.
             self.0.head.set(start + (count - 1));
         }
-        count
+        count as u8
     }
 
     /// Changes a value pushed earlier; `back` 0 is the newest. False if it has been released.
@@ -306,7 +307,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
     /// Where a value pushed earlier is, if it has not been released.
     #[inline(never)]
     #[cfg_attr(target_arch = "avr", optimize(size))]
-    fn waiting(&self, back: usize) -> Option<u8> {
+    fn waiting(&self, back: usize) -> Option<Index> {
         (back < self.0.used()).then(|| self.index_of(back))
     }
 
@@ -316,10 +317,10 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         self.waiting(back).map(|index| unsafe { self.0.slot(index).read() })
     }
 
-    fn index_of(&self, back: usize) -> u8 {
+    fn index_of(&self, back: usize) -> Index {
         let head = self.0.head.get() as usize;
         let index = if head >= back { head - back } else { head + N - back };
-        index as u8
+        index as Index
     }
 }
 
@@ -355,7 +356,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         let index = tail + 1 + ahead;
         let index = if index >= N { index - N } else { index };
         // SAFETY: the slot is the consumer's until `tail` moves onto it and the producer wraps.
-        Some(look(unsafe { &*self.0.slot(index as u8) }))
+        Some(look(unsafe { &*self.0.slot(index as Index) }))
     }
 
     /// Releases the oldest value.
@@ -389,7 +390,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
     pub fn release_many(&mut self, count: u8) {
         let count = usize::from(count).min(self.0.used());
         let tail = usize::from(self.0.tail.get()) + count;
-        self.0.tail.set(if tail >= N { tail - N } else { tail } as u8);
+        self.0.tail.set(if tail >= N { tail - N } else { tail } as Index);
     }
 
     /// Takes the oldest value.
@@ -410,7 +411,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
 /// A value that the consumer does not see before it is published.
 pub struct Slot<'a, T: 'static, const N: usize> {
     ring: &'static Ring<T, N>,
-    after: u8,
+    after: Index,
     /// Nothing else goes into the ring meanwhile.
     producer: PhantomData<&'a mut Producer<T, N>>,
 }

@@ -221,7 +221,7 @@ contract! {
     }
 }
 
-/// How fast a chip is: figures that are measured on it.
+/// How fast a chip is, figures that are measured on it; and how much its RAM has room for.
 pub trait Timing {
     /// What [`Segment::period`] counts, in a second. It need not fit a period in a millisecond.
     const TIMER_HZ: u32;
@@ -229,12 +229,24 @@ pub trait Timing {
     const PULSE_US: u8;
     /// By the number of motors that move, less one.
     const TICKS: [Ticks; MOTORS];
+    /// Blocks that can wait at once: what RAM has room for.
+    const LOOK_AHEAD: usize = 61;
+    /// Lines that can wait on a port.
+    const LINES: usize = 8;
+    /// Bytes for all lines of USB together, and of the other port.
+    const LINE_BYTES: [usize; 2] = [412, 96];
 }
 
 /// Those of the chip.
 pub const TIMER_HZ: u32 = <imp::Chip as Timing>::TIMER_HZ;
 /// That of the chip.
 pub const PULSE_US: u8 = <imp::Chip as Timing>::PULSE_US;
+/// That of the chip.
+pub const LOOK_AHEAD: usize = <imp::Chip as Timing>::LOOK_AHEAD;
+/// That of the chip.
+pub const LINES: usize = <imp::Chip as Timing>::LINES;
+/// Those of the chip.
+pub const LINE_BYTES: [usize; 2] = <imp::Chip as Timing>::LINE_BYTES;
 /// Those of the chip. To be indexed in constants: as a table it would take RAM.
 pub const TICKS: [Ticks; MOTORS] = <imp::Chip as Timing>::TICKS;
 

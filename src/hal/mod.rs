@@ -11,8 +11,8 @@ pub use avr_embassy::{Ceiling, Interrupt, Thread, byte, ring};
 mod place;
 
 pub use contract::{
-    PULSE_US, TICKS, TIMER_HZ, eeprom, encoder, gpio, heaters, inputs, pwm, stepper, system, time,
-    uart, watchdog,
+    LINE_BYTES, LINES, LOOK_AHEAD, PULSE_US, TICKS, TIMER_HZ, eeprom, encoder, gpio, heaters,
+    inputs, pwm, stepper, system, time, uart, watchdog,
 };
 pub use place::Never;
 pub use primitives::{arithmetic, float, text};

@@ -4,6 +4,7 @@
 
 use super::contract::contract;
 use super::imp;
+use super::ring::Index;
 
 contract! {
     /// Arithmetic where the compiler's takes several times as long on a small chip.
@@ -22,8 +23,8 @@ contract! {
         /// The square root, rounded down. Cost: 320.
         fn root(x: u32) -> u16;
         /// How many pairs of a mark and a value come before the first whose mark has its highest bit set, or whose value is below `least`;
-        /// all of them, at most 255, if there is none. Cost: 14 each.
-        fn passed_over(marks: &[u8], values: &[u16], least: u16) -> u8;
+        /// all of them, at most [`Index::MAX`], if there is none. Cost: 14 each.
+        fn passed_over(marks: &[Index], values: &[u16], least: u16) -> Index;
         /// A number rounded down; one of 2^31 or more, or below 0, or a NaN, is 2^31. Cost: 120.
         fn whole(x: f32) -> u32;
     }

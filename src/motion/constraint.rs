@@ -34,6 +34,7 @@ use super::governor::{Governor, Limits};
 use super::need::Scale;
 use super::queue::Anchor;
 use super::short::Short;
+use crate::hal::ring::Index;
 use crate::math::sqrt;
 
 /// What is ahead of the block that runs.
@@ -42,7 +43,7 @@ pub trait Ahead {
     fn headroom(&self) -> f32;
     /// The first constraint from the `n`th on that is slower than `velocity`, or firm: nothing beyond that counts. With its
     /// number.
-    fn slower(&self, n: u8, velocity: Short) -> (u8, Anchor);
+    fn slower(&self, n: Index, velocity: Short) -> (Index, Anchor);
     /// Brake potential from the end of the block to that of the queue.
     fn end(&self) -> f32;
 }

@@ -35,6 +35,7 @@ use crate::dda::Segment;
 use crate::gcode::heating::Heat;
 use crate::gcode::overrides::Change;
 use crate::hal::TIMER_HZ;
+use crate::hal::ring::Index;
 use crate::status::Status;
 
 /// Half CPU cycles in a second.
@@ -176,7 +177,7 @@ impl Ahead for View<'_> {
     fn headroom(&self) -> f32 {
         self.headroom
     }
-    fn slower(&self, n: u8, velocity: Short) -> (u8, Anchor) {
+    fn slower(&self, n: Index, velocity: Short) -> (Index, Anchor) {
         self.blocks.slower(n, velocity)
     }
     fn end(&self) -> f32 {

@@ -64,6 +64,7 @@ impl Governor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::hal::ring::Index;
     use crate::motion::exec::SEGMENT_S;
     use crate::motion::queue::Anchor;
     use crate::motion::short::Short;
@@ -76,7 +77,7 @@ mod tests {
         fn headroom(&self) -> f32 {
             0.0
         }
-        fn slower(&self, _: u8, _: Short) -> (u8, Anchor) {
+        fn slower(&self, _: Index, _: Short) -> (Index, Anchor) {
             (0, Anchor { velocity: Short::ZERO, ahead: 0.0, firm: true })
         }
         fn end(&self) -> f32 {

@@ -55,9 +55,10 @@ use super::float::{OCTAVE, least, lesser, log, scaled, some};
 use super::queue::{BLOCKS, FIRM, SEQ};
 use super::short::Short;
 use crate::hal::arithmetic;
+use crate::hal::ring::Index;
 
 // `arithmetic::passed_over` ends at it.
-const _: () = assert!(FIRM == 0x80);
+const _: () = assert!(FIRM == 1 << (Index::BITS - 1));
 
 /// Half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`,
 /// 0 without one. Cost: 650.
@@ -114,12 +115,12 @@ impl Line {
 #[repr(C)]
 pub struct Horizon {
     // What is used most comes first: the CPU reaches 64 bytes from a pointer.
-    front: u8,
-    len: u8,
+    front: Index,
+    len: Index,
     /// Potential at the end of the newest block.
     pub end: f32,
     /// From this block on potentials are counted anew; `left_out` is 0 if no block before it is left.
-    anew: u8,
+    anew: Index,
     /// Potential where they are.
     left_out: f32,
     /// Changes with every push, and with the factors.
@@ -131,7 +132,7 @@ pub struct Horizon {
     /// Those that the keys are for, or for more: faster than by these nothing may be run.
     pub planned: Factors,
     /// Sequence numbers of blocks with rising keys: a ring.
-    seqs: [u8; BLOCKS],
+    seqs: [Index; BLOCKS],
     /// The velocity at which each of them may be entered, with the factors that keys are for: [`Short::bits`].
     entries: [u16; BLOCKS],
 }
@@ -159,33 +160,33 @@ impl Horizon {
 
     /// The block with the `n`th key.
     #[inline]
-    pub fn nth(&self, n: u8) -> Option<u8> {
+    pub fn nth(&self, n: Index) -> Option<Index> {
         (n < self.len).then(|| self.seqs[self.slot(n)])
     }
 
     /// The block with the last key but `back`.
-    pub fn nth_last(&self, back: u8) -> Option<u8> {
+    pub fn nth_last(&self, back: Index) -> Option<Index> {
         self.nth(self.len.checked_sub(back)?.wrapping_sub(1))
     }
 
     /// Drops the last `count` keys, as many as there are.
-    pub fn drop_last(&mut self, count: u8) {
+    pub fn drop_last(&mut self, count: Index) {
         self.len = self.len.saturating_sub(count);
     }
 
     /// The velocity of the `n`th key.
     #[inline]
-    pub fn entry(&self, n: u8) -> Short {
+    pub fn entry(&self, n: Index) -> Short {
         Short::of_bits(self.entries[self.slot(n)])
     }
 
     /// The first key from the `n`th on that is slower than `velocity`, or firm, or one more than the last. Cost: 110, and 14 for
     /// each that is passed over.
     #[inline(never)]
-    pub fn slower(&self, n: u8, velocity: Short) -> u8 {
+    pub fn slower(&self, n: Index, velocity: Short) -> Index {
         let left = self.len.saturating_sub(n);
-        let slot = self.slot(n) as u8;
-        let before_end = left.min((BLOCKS as u8).saturating_sub(slot));
+        let slot = self.slot(n) as Index;
+        let before_end = left.min((BLOCKS as Index).saturating_sub(slot));
         let passed = self.passed_over(slot, before_end, velocity);
         if passed < before_end || before_end == left {
             return n + passed;
@@ -196,14 +197,14 @@ impl Horizon {
 
     /// How many of `count` keys from a slot on are neither slower than `velocity` nor firm.
     #[inline(always)]
-    fn passed_over(&self, slot: u8, count: u8, velocity: Short) -> u8 {
+    fn passed_over(&self, slot: Index, count: Index, velocity: Short) -> Index {
         let slots = usize::from(slot)..usize::from(slot) + usize::from(count);
         let all = self.seqs.get(slots.clone()).zip(self.entries.get(slots));
         all.map_or(0, |(seqs, entries)| arithmetic::passed_over(seqs, entries, velocity.bits()))
     }
 
     /// Adds a block whose key is above all others, that may be entered at `entry`.
-    pub fn add(&mut self, seq: u8, entry: Short) {
+    pub fn add(&mut self, seq: Index, entry: Short) {
         if usize::from(self.len) < BLOCKS {
             let slot = self.slot(self.len);
             self.seqs[slot] = seq;
@@ -215,20 +216,20 @@ impl Horizon {
     /// Drops the first key.
     pub fn pass(&mut self) {
         if self.len > 0 {
-            self.front = self.slot(1) as u8;
+            self.front = self.slot(1) as Index;
             self.len -= 1;
         }
     }
 
     /// Counts potentials anew from block `seq` on, the next one, unless they are from another block in the queue already.
-    pub fn count_anew(&mut self, seq: u8) {
+    pub fn count_anew(&mut self, seq: Index) {
         if !some(self.left_out) {
             (self.anew, self.left_out, self.end) = (seq, self.end, 0.0);
         }
     }
 
     /// Block `seq` is the oldest from now on.
-    pub fn oldest_is(&mut self, seq: u8) {
+    pub fn oldest_is(&mut self, seq: Index) {
         if self.anew == seq {
             self.left_out = 0.0;
         }
@@ -241,14 +242,14 @@ impl Horizon {
     }
 
     /// A potential at block `seq`, counted as at the `oldest` one. Cost: 150.
-    pub fn lifted(&self, potential: f32, seq: u8, oldest: u8) -> f32 {
-        let place = |seq: u8| seq.wrapping_sub(oldest) & SEQ;
+    pub fn lifted(&self, potential: f32, seq: Index, oldest: Index) -> f32 {
+        let place = |seq: Index| seq.wrapping_sub(oldest) & SEQ;
         if place(seq) >= place(self.anew) { potential + self.left_out } else { potential }
     }
 
     /// What potentials of older blocks than that from which they are counted anew have more; `next` is the block to be
     /// queued next.
-    pub fn older(&self, next: u8) -> Older {
+    pub fn older(&self, next: Index) -> Older {
         Older { behind: next.wrapping_sub(self.anew) & SEQ, more: self.left_out }
     }
 
@@ -267,7 +268,7 @@ impl Horizon {
     /// Other keys in the place of all. Cost: 1,500.
     pub fn replace(&mut self, keys: &Keys) {
         (self.seqs, self.entries) = (keys.seqs, keys.entries);
-        (self.front, self.len) = (keys.front, BLOCKS as u8 - keys.front);
+        (self.front, self.len) = (keys.front, BLOCKS as Index - keys.front);
     }
 
     /// The overrides in force: those that are wanted, as far as the keys allow.
@@ -276,7 +277,7 @@ impl Horizon {
         self.wanted.least(&self.planned)
     }
 
-    fn slot(&self, n: u8) -> usize {
+    fn slot(&self, n: Index) -> usize {
         let slot = usize::from(self.front) + usize::from(n);
         if slot >= BLOCKS { slot - BLOCKS } else { slot }
     }
@@ -284,24 +285,24 @@ impl Horizon {
 
 /// Keys that are to be those of the horizon, made from the last one to the first.
 pub struct Keys {
-    front: u8,
-    seqs: [u8; BLOCKS],
+    front: Index,
+    seqs: [Index; BLOCKS],
     entries: [u16; BLOCKS],
 }
 
 impl Keys {
     /// No keys.
     pub const fn none() -> Self {
-        Self { front: BLOCKS as u8, seqs: [0; BLOCKS], entries: [0; BLOCKS] }
+        Self { front: BLOCKS as Index, seqs: [0; BLOCKS], entries: [0; BLOCKS] }
     }
 
     /// Adds the key of a block that comes before all others, if there is room.
-    pub fn add_before(&mut self, seq: u8, entry: Short) {
+    pub fn add_before(&mut self, seq: Index, entry: Short) {
         let front = usize::from(self.front.wrapping_sub(1));
         if let (Some(to), Some(velocity)) = (self.seqs.get_mut(front), self.entries.get_mut(front))
         {
             (*to, *velocity) = (seq, entry.bits());
-            self.front = front as u8;
+            self.front = front as Index;
         }
     }
 }
@@ -310,14 +311,14 @@ impl Keys {
 #[derive(Clone, Copy)]
 pub struct Older {
     /// How many blocks are counted anew.
-    behind: u8,
+    behind: Index,
     more: f32,
 }
 
 impl Older {
     /// For the block that so many have been queued after.
     #[inline(always)]
-    pub fn of(&self, back: u8) -> f32 {
+    pub fn of(&self, back: Index) -> f32 {
         if back >= self.behind { self.more } else { 0.0 }
     }
 }

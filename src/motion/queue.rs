@@ -13,22 +13,22 @@ use super::horizon::{self, Horizon, kappa};
 use super::short::Short;
 pub use super::source::{Anchor, BlockSource};
 use crate::hal::exec;
-use crate::hal::ring::{Ceiling, Producer, Ring};
-use crate::hal::{Interrupt, Thread};
+use crate::hal::ring::{Ceiling, Index, Producer, Ring};
+use crate::hal::{Interrupt, LOOK_AHEAD, Thread};
 use crate::math::sqrt;
 
-/// Blocks the planner can queue, plus one slot that stays empty. At most 128: sequence numbers have
-/// seven bits.
-pub const BLOCKS: usize = 62;
+/// Blocks the planner can queue, plus one slot that stays empty. Sequence numbers have a bit less than an [`Index`].
+pub const BLOCKS: usize = LOOK_AHEAD + 1;
+const _: () = assert!(BLOCKS <= SEQ as usize + 1);
 
 /// Blocks that can wait at once; what `qr` shows of an idle machine.
 pub const CAPACITY: usize = BLOCKS - 1;
 
 /// Sequence numbers.
-pub(super) const SEQ: u8 = 0x7F;
+pub(super) const SEQ: Index = Index::MAX >> 1;
 
 /// Marks a key that stays even before a lower one.
-pub(super) const FIRM: u8 = 0x80;
+pub(super) const FIRM: Index = !SEQ;
 
 /// A corner is worth a key if it is slower than this share of what holds on both sides.
 pub(super) const WORTH: f32 = 0.999;
@@ -141,7 +141,7 @@ pub struct BlockQueue {
     pub(super) ring: Producer<Block, BLOCKS>,
     pub(super) horizon: &'static Shared<Horizon>,
     /// Sequence number of the block pushed last.
-    pub(super) newest: u8,
+    pub(super) newest: Index,
     /// The line that the next one may follow without a stop.
     pub(super) last: Option<Last>,
     /// The overrides that keys are made for.
@@ -206,7 +206,7 @@ impl BlockQueue {
 
     /// The key of a line that does not simply go on, if it needs one.
     #[inline(never)]
-    fn corner(&mut self, line: &mut Line, cruise: f32, entry: f32) -> Option<(f32, u8)> {
+    fn corner(&mut self, line: &mut Line, cruise: f32, entry: f32) -> Option<(f32, Index)> {
         let limits = (line.accel, line.jerk);
         let kappa =
             if line.jerk == Short::ZERO { 0.0 } else { kappa(line.accel.get(), line.jerk.get()) };
@@ -280,7 +280,7 @@ impl BlockQueue {
     fn put(
         &mut self,
         make: impl FnOnce() -> Block,
-        key: Option<(f32, u8, Short)>,
+        key: Option<(f32, Index, Short)>,
         end: impl FnOnce(&mut Horizon) + Send,
     ) -> bool {
         if self.ring.free() == 0 {
@@ -307,7 +307,7 @@ impl BlockQueue {
     /// How many of the last keys a lower one makes needless. Exec goes on meanwhile, which only passes the first ones: it
     /// must not wait for the mathematics of a whole queue.
     #[inline(never)]
-    fn needless(&self, key: f32) -> u8 {
+    fn needless(&self, key: f32) -> Index {
         let newest = self.newest;
         let next = newest.wrapping_add(1) & SEQ;
         let mut count = 0;
@@ -326,7 +326,7 @@ impl BlockQueue {
         }
     }
 
-    fn key(&self, seq: u8) -> f32 {
+    fn key(&self, seq: Index) -> f32 {
         let back = usize::from(self.newest.wrapping_sub(seq) & SEQ);
         match self.ring.pushed(back) {
             Some(Block { body: Body::Line(line), .. }) => line.key(&self.factors),

@@ -16,6 +16,7 @@ use super::horizon::{self, Keys, kappa};
 use super::queue::{BlockQueue, FIRM, SEQ, WORTH};
 use super::short::Short;
 use crate::hal::exec;
+use crate::hal::ring::Index;
 
 /// What limits a line, of all that is behind it.
 struct Behind {
@@ -54,7 +55,7 @@ impl Behind {
         this: &Line,
         before: Option<&Line>,
         factors: &Factors,
-    ) -> Option<(Short, u8)> {
+    ) -> Option<(Short, Index)> {
         let velocity = self.known.velocity(this, factors);
         let low = least(self.low, velocity);
         let entry = least(velocity, this.entry.get());
@@ -141,9 +142,9 @@ impl BlockQueue {
             }
             let before = line(block);
             if let Some((back, this)) = last {
-                behind.count_from(older.of(back as u8));
+                behind.count_from(older.of(back as Index));
                 if let Some((entry, firm)) = behind.key(this, before, &self.factors) {
-                    let seq = self.newest.wrapping_sub(back as u8) & SEQ;
+                    let seq = self.newest.wrapping_sub(back as Index) & SEQ;
                     keys.add_before(seq | firm, entry);
                 }
             }
@@ -155,7 +156,7 @@ impl BlockQueue {
     #[inline(never)]
     fn install(&self, keys: &Keys) {
         exec::lock(self.thread, |ceiling| {
-            let (used, factors) = (self.ring.used() as u8, self.factors);
+            let (used, factors) = (self.ring.used() as Index, self.factors);
             let oldest = self.newest.wrapping_sub(used).wrapping_add(1) & SEQ;
             self.horizon.with(ceiling, |horizon| {
                 // What has begun has no key any more, nor what has been run meanwhile.

@@ -15,7 +15,7 @@ use super::float::lesser;
 use super::horizon::Horizon;
 use super::queue::{BLOCKS, FIRM, SEQ};
 use super::short::Short;
-use crate::hal::ring::Consumer;
+use crate::hal::ring::{Consumer, Index};
 
 /// A limit ahead of exec.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +33,7 @@ pub struct BlockSource {
     ring: Consumer<Block, BLOCKS>,
     horizon: InterruptEnd<&'static Shared<Horizon>>,
     /// Sequence number of the oldest block.
-    oldest: u8,
+    oldest: Index,
     /// Potential at its end, and the version of the horizon it is of.
     end: Cell<Option<(u8, f32)>>,
 }
@@ -151,7 +151,7 @@ impl BlockSource {
 
     /// The first constraint ahead from the `n`th on that is slower than `velocity`, or firm; with its number. The last is the
     /// end of the queue. Cost: 450, 25 for each that is passed over, and 1,500 more the first time after a change.
-    pub fn slower(&self, n: u8, velocity: Short) -> (u8, Anchor) {
+    pub fn slower(&self, n: Index, velocity: Short) -> (Index, Anchor) {
         self.horizon.look(|horizon| {
             let found = horizon.slower(n, velocity);
             let Some(seq) = horizon.nth(found) else {
@@ -177,7 +177,7 @@ impl BlockSource {
 
     /// A potential at block `seq`, counted as at the oldest one.
     #[inline(always)]
-    fn lifted(&self, seq: u8, potential: f32) -> f32 {
+    fn lifted(&self, seq: Index, potential: f32) -> f32 {
         if self.horizon.look(Horizon::is_mixed) {
             self.lifted_anew(seq, potential)
         } else {
@@ -186,7 +186,7 @@ impl BlockSource {
     }
 
     #[inline(never)]
-    fn lifted_anew(&self, seq: u8, potential: f32) -> f32 {
+    fn lifted_anew(&self, seq: Index, potential: f32) -> f32 {
         self.horizon.look(|horizon| horizon.lifted(potential, seq, self.oldest))
     }
 
@@ -211,7 +211,7 @@ impl BlockSource {
     }
 
     /// Something of a line in the queue.
-    fn line<R: Copy>(&self, seq: u8, look: impl FnOnce(&Line) -> R) -> Option<R> {
+    fn line<R: Copy>(&self, seq: Index, look: impl FnOnce(&Line) -> R) -> Option<R> {
         let ahead = usize::from(seq.wrapping_sub(self.oldest) & SEQ);
         self.ring.peek(ahead, |block| match &block.body {
             Body::Line(line) => Some(look(line)),

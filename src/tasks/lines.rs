@@ -13,6 +13,7 @@
 
 use heapless::Vec;
 
+use crate::hal::LINES;
 use crate::hal::ring::Window;
 use crate::hal::serial::TAKEN_RETURN;
 use crate::hal::text::copy_printing;
@@ -23,7 +24,7 @@ use crate::realtime::ASCII;
 use crate::status::Status;
 
 /// Line slots, beside the one for control lines that overtake. Senders count on eight.
-pub const SLOTS: usize = 8;
+pub const SLOTS: usize = LINES;
 /// Longest line, in bytes without its end; less in a pool that has no more.
 pub const LINE_MAX: usize = 254;
 /// Asks for a status report. Senders of other firmwares say it without a line end, and then go on with their job.

@@ -88,6 +88,18 @@ impl Transcript {
     }
 }
 
+#[allow(dead_code)]
+impl Transcript {
+    /// Lines that are expected are so where the transcript says otherwise.
+    pub fn expect(&mut self, as_here: impl Fn(&str) -> String) {
+        for (_, event) in &mut self.events {
+            if let Event::Hear(line) | Event::HearAux(line) | Event::Allow(line) = event {
+                *line = as_here(line);
+            }
+        }
+    }
+}
+
 /// Reads every transcript in a folder; those alone whose name contains `KERF_TRANSCRIPT`, if that is set.
 pub fn read_all(folder: &Path) -> Vec<Transcript> {
     let entries = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));

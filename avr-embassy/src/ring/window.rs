@@ -25,7 +25,7 @@ impl<const N: usize> Ring<u8, N> {
         Window {
             slots: self.slots.get().cast(),
             last: (N - 1) as u8,
-            tail: self.tail.get(),
+            tail: self.tail.get() as u8,
             len: self.used() as u8,
             consumer: PhantomData,
         }

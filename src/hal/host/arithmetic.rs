@@ -1,5 +1,7 @@
 //! What `avr/arithmetic.rs` does, as the language does it.
 
+use crate::hal::ring::Index;
+
 /// `a / b` and `a % b` if the quotient fits 16 bits: `a >> 16 < b`. Else what the chip makes of it.
 pub fn divide(a: u32, b: u16) -> (u16, u16) {
     let mut rest = (a >> 16) as u16;
@@ -53,10 +55,10 @@ pub fn root(x: u32) -> u16 {
 }
 
 /// How many pairs of a mark and a value come before the first whose mark has its highest bit set, or whose value is below `least`; all of
-/// them, at most 255, if there is none.
-pub fn passed_over(marks: &[u8], values: &[u16], least: u16) -> u8 {
-    let passes = |(mark, value): &(&u8, &u16)| **mark < 0x80 && **value >= least;
-    marks.iter().zip(values).take(255).take_while(passes).count() as u8
+/// them, at most [`Index::MAX`], if there is none.
+pub fn passed_over(marks: &[Index], values: &[u16], least: u16) -> Index {
+    let passes = |(mark, value): &(&Index, &u16)| **mark <= Index::MAX >> 1 && **value >= least;
+    marks.iter().zip(values).take(Index::MAX.into()).take_while(passes).count() as Index
 }
 
 /// A number rounded down; one of 2^31 or more, or below 0, or a NaN, is 2^31.

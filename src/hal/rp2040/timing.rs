@@ -14,4 +14,7 @@ impl Timing for Chip {
     const TIMER_HZ: u32 = 64_000_000;
     const PULSE_US: u8 = 0;
     const TICKS: [Ticks; MOTORS] = [USUAL; MOTORS];
+    const LOOK_AHEAD: usize = 1_024;
+    const LINES: usize = 64;
+    const LINE_BYTES: [usize; 2] = [2_088, 1_040];
 }

@@ -363,6 +363,22 @@ const PRINTING: [&str; 2] = ["heat", "reprap"];
 /// Those that move for long, minutes of the emulator's time each: `KERF_TRANSCRIPT` plays one.
 const LONG: [&str; 2] = ["far", "axis-modes"];
 
+/// An answer of a machine with 61 blocks and 8 lines as this one gives it, with 1,024 and 64.
+fn with_more_room(line: &str) -> String {
+    let mut line = line.replace("Bf:61,", "Bf:1024,");
+    for (before, most, more) in [("\"qr\":", 61, 963), ("\"f\":[1,", 7, 56)] {
+        let Some(at) = line.find(before).map(|at| at + before.len()) else { continue };
+        // Of a footer the last number.
+        let at = if more == 56 { line[at..].find(',').map_or(at, |comma| at + comma + 1) } else { at };
+        let digits = line[at..].bytes().take_while(u8::is_ascii_digit).count();
+        let number = line[at..at + digits].parse().unwrap_or(0);
+        if (1..=most).contains(&number) {
+            line.replace_range(at..at + digits, &(number + more).to_string());
+        }
+    }
+    line
+}
+
 #[test]
 #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
 fn the_image_keeps_to_the_transcripts() {
@@ -374,5 +390,6 @@ fn the_image_keeps_to_the_transcripts() {
         .chain(LONG.iter().filter(|_| all.len() > 1));
     let left_out: Vec<_> = left_out.collect();
     all.retain(|one| !left_out.iter().any(|name| one.name.starts_with(**name)));
+    all.iter_mut().for_each(|one| one.expect(with_more_room));
     transcript::play_all(all, 2, board);
 }
