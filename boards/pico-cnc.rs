@@ -8,6 +8,7 @@ pub const PICO_CNC: Board = Board {
     features: &[
         "dialect-tinyg",
         "dialect-grbl",
+        "dialect-reprap",
         "cycles",
         "probing",
         "jobs",

@@ -1,5 +1,4 @@
-//! Raspberry Pi Pico on a breakout board with six drivers, as for two motors of Y and two of Z beside X and A: the pins of `pico-cnc` move up, and there is no second
-//! port.
+//! Raspberry Pi Pico on a breakout board with six drivers, as for two motors of Y and two of Z beside X and A: the pins of `pico-cnc` move up.
 
 use super::{Board, Encoder, MotorPins, PICO_CNC, Pwm, Timer, gp};
 
@@ -9,6 +8,7 @@ pub const PICO_CNC6: Board = Board {
     features: &[
         "dialect-tinyg",
         "dialect-grbl",
+        "dialect-reprap",
         "cycles",
         "probing",
         "jobs",
@@ -30,7 +30,7 @@ pub const PICO_CNC6: Board = Board {
     outputs: [Some(gp(15)), None, None, Some(gp(17))],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 16 }),
     // GP0 and GP1
-    serial: PICO_CNC.serial.split_at(1).0,
+    serial: PICO_CNC.serial,
     inputs: [
         // One for both ends of an axis
         Some(gp(18)),

@@ -1,6 +1,8 @@
 //! BTT SKR Pico v1.0: four TMC2209 on board, which are told their current and microsteps by one UART.
 
-use super::{Board, MotorPins, NATIVE_USB, Pwm, Serial, Timer, Tmc2209, Usart, gp};
+use super::{
+    Board, Heater, Heaters, MotorPins, NATIVE_USB, Pwm, Serial, Timer, Tmc2209, Usart, gp,
+};
 
 /// BTT SKR Pico v1.0; its driver E is motor 4.
 pub const SKR_PICO: Board = Board {
@@ -8,12 +10,14 @@ pub const SKR_PICO: Board = Board {
     features: &[
         "dialect-tinyg",
         "dialect-grbl",
+        "dialect-reprap",
         "cycles",
         "probing",
         "jobs",
         "help",
         "lathe",
         "corexy",
+        "printer",
     ],
     dialect: 0,
     clock_hz: 128_000_000,
@@ -24,9 +28,10 @@ pub const SKR_PICO: Board = Board {
         MotorPins { step: gp(14), dir: gp(13), enable: Some(gp(15)) },
     ],
     enable_all: None,
-    // Fans 1 to 3, servo; heaters of the bed and of the hot end, which stay off
+    // Fans 1 to 3, servo; heaters of the bed and of the hot end
     hazards: &[gp(17), gp(18), gp(20), gp(29), gp(21), gp(23)],
-    outputs: [Some(gp(17)), None, Some(gp(18)), Some(gp(20))],
+    // FAN2, FAN3: spindle and mist
+    outputs: [Some(gp(18)), None, Some(gp(20)), None],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 29 }),
     // USB; GP0 and GP1
     serial: &[
@@ -49,7 +54,11 @@ pub const SKR_PICO: Board = Board {
         Some(gp(16)),
     ],
     encoder: None,
-    heaters: None,
+    // HE and TH0, HB and THB; FAN1
+    heaters: Some(Heaters {
+        heaters: [Heater { pin: gp(23), channel: 1 }, Heater { pin: gp(21), channel: 0 }],
+        fan: gp(17),
+    }),
     drivers: Some(Tmc2209 { tx: gp(8), rx: gp(9), addresses: &[0, 2, 1, 3], run: 18, hold: 9 }),
     step_timer: Timer::Pio,
     tick_timer: Timer::SysTick,

@@ -388,7 +388,7 @@ pub struct Tmc2209 {
 pub struct Heater {
     /// Switches its transistor.
     pub pin: Pin,
-    /// 0 to 15: A0 to A15.
+    /// 0 to 15: A0 to A15; of the RP2040 0 to 2, GP26 to GP28.
     pub channel: u8,
 }
 
@@ -668,7 +668,13 @@ impl Board {
 
     /// Panics if the pin of a channel is a switch.
     const fn check_channel(&self, channel: u8) {
-        let pin = if channel < 8 { pin(Port::F, channel) } else { pin(Port::K, channel - 8) };
+        let is_rp2040 = matches!(self.motors[0].step.port, Port::Gpio);
+        let pin = match channel {
+            0..3 if is_rp2040 => gp(26 + channel),
+            _ if is_rp2040 => panic!("a sensor is on no channel"),
+            ..8 => pin(Port::F, channel),
+            _ => pin(Port::K, channel - 8),
+        };
         let mut i = 0;
         while i < inputs::COUNT {
             if let Some(input) = self.inputs[i] {

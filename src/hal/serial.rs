@@ -98,8 +98,8 @@ impl Flow {
     pub const fn of(port: u8, ex: u8) -> Flow {
         let has_pins = matches!(hardware(port), Some(Serial { handshake: Some(_), .. }));
         match ex {
-            // A bus belongs to others too, who would heed it; the chip's own USB holds the other side back by itself.
-            1 if !is_shared(port) && !is_native(port) => Flow::Characters,
+            // A bus belongs to others too, who would heed it.
+            1 if !is_shared(port) => Flow::Characters,
             2 if has_pins => Flow::Pins,
             _ => Flow::None,
         }
@@ -135,12 +135,6 @@ pub const fn is_shared(port: u8) -> bool {
 
 /// The first port is USB of the chip's own: what it has no room for waits in the computer.
 pub const NATIVE: bool = matches!(ACTIVE.serial[USB as usize].usart, Usart::Usb);
-
-/// Whether a port is that.
-#[inline(always)]
-pub const fn is_native(port: u8) -> bool {
-    NATIVE && port == USB
-}
 
 /// The mark that replaces `newest`, if it is none yet. The receive interrupt of the AVR has the twins of
 /// these two in assembly.

@@ -1,6 +1,6 @@
 //! `docs/wiring.md` and its drawings, from the boards' files.
 
-use kerf::boards::{ALL, Board, MOTORS, Pin, Port, inputs};
+use kerf::boards::{ALL, Board, MOTORS, Pin, Port, gp, inputs};
 
 const PREFACE: &str = "\
 # Wiring
@@ -132,7 +132,16 @@ fn wires(board: &Board) -> Vec<Wire> {
     add("probe".into(), board.inputs[inputs::PROBE], "to ground", "G38.2".into());
     add("door".into(), board.inputs[inputs::DOOR], "to ground", "`saf`".into());
     add("emergency stop".into(), board.inputs[inputs::STOP], "to ground", "`est`".into());
-    // The first port of an Arduino is its USB.
+    if let Some(heaters) = board.heaters.filter(|_| is_numbered(board)) {
+        let named = ["hot end", "bed"].into_iter().zip(["`he1`", "`he3`"]).zip(heaters.heaters);
+        for ((name, setting), heater) in named {
+            add(format!("{name}, heater"), Some(heater.pin), "high is on", setting.into());
+            let sensor = Some(gp(26 + heater.channel));
+            add(format!("{name}, sensor"), sensor, "thermistor to ground", setting.into());
+        }
+        add("fan".into(), Some(heaters.fan), "high is on", "M106".into());
+    }
+    // The first port of an Arduino is its USB; one that is the chip's own has no pins.
     let wired = usize::from(!is_numbered(board));
     for (port, name) in board.serial.iter().zip(["first port", "second port"]).skip(wired) {
         let Some([rx, tx]) = port.usart.pins() else { continue };
@@ -162,7 +171,7 @@ fn about(board: &Board) -> &'static str {
             "A Raspberry Pi Pico with six drivers: two more motors may share an axis with another, or move B and C. **3.3 V**, as `pico-cnc`."
         }
         "skr-pico" => {
-            "A BTT SKR Pico v1.0: motor 4 is its driver E. Fans 1 to 3 are spindle, mist and flood, the servo's pin is the spindle's speed. **3.3 V**, as `pico-cnc`."
+            "A BTT SKR Pico v1.0: motor 4 is its driver E. FAN1 cools the print, FAN2 and FAN3 are spindle and mist, the servo's pin is the spindle's speed. **3.3 V**, as `pico-cnc`."
         }
         _ => "",
     }

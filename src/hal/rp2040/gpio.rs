@@ -19,6 +19,11 @@ pub(super) enum Unit {
     Pio0 = 6,
 }
 
+/// The pin of the first channel of the converter.
+const FIRST_SENSED: u8 = 26;
+/// Connects a pin to nobody.
+const NOBODY: u8 = 0x1F;
+
 /// Connects a pin. Start-up.
 pub(super) fn connect(pin: Pin, unit: Unit) {
     PADS_BANK0.gpio(pin.bit.into()).modify(|w| {
@@ -42,6 +47,13 @@ pub(super) fn pull_up(pin: Pin) {
 pub(super) fn connect_pulled(pin: Pin, unit: Unit) {
     connect(pin, unit);
     PADS_BANK0.gpio(pin.bit.into()).modify(|w| w.set_pue(true));
+}
+
+/// Leaves the pin of a channel of the converter to that. Start-up.
+pub(super) fn sense(channel: u8) {
+    let pin = usize::from(FIRST_SENSED + channel);
+    IO_BANK0.gpio(pin).ctrl().write(|w| w.set_funcsel(NOBODY));
+    PADS_BANK0.gpio(pin).write(|w| w.set_od(true));
 }
 
 /// Has an output of a unit inverted, or not.

@@ -1,12 +1,66 @@
-//! Heaters and their sensors: no board with this chip has any.
+//! Heaters and their sensors: the converter, and the pins.
+//!
+//! A reading is [`SAMPLES`] conversions of 12 bits one after the other, 2 us each, whose sum is as if each had 10. [`begin`] waits for them,
+//! 64 us of thread mode each 20 ms: no interrupt, and nobody else uses the converter. One that does not answer leaves no reading.
 
-/// Does nothing.
-pub fn begin(_heater: u8) {}
+use core::sync::atomic::{AtomicU16, Ordering};
 
-/// None is ever complete.
-pub fn reading() -> Option<u16> {
-    None
+use embassy_rp::pac::ADC;
+
+use super::gpio;
+use crate::boards::{ACTIVE, Heaters};
+use crate::heat::sensor::SAMPLES;
+
+#[cfg(feature = "printer")]
+const _: () = assert!(
+    ACTIVE.heaters.is_some(),
+    "this board has no heaters: leave `printer` out of its features"
+);
+
+/// No reading.
+const NONE: u16 = u16::MAX;
+/// Looks at the converter until it counts as broken: some ten times the time of a conversion.
+const PATIENCE: usize = 1_000;
+/// So many bits the sum has more than those of 10 bits.
+const FINER: u32 = 2;
+
+static READING: AtomicU16 = AtomicU16::new(NONE);
+
+/// Connects the sensors. Start-up.
+pub(super) fn start() {
+    let Some(Heaters { heaters, .. }) = ACTIVE.heaters else { return };
+    heaters.iter().for_each(|heater| gpio::sense(heater.channel));
+    ADC.cs().write(|w| w.set_en(true));
 }
 
-/// Does nothing.
-pub fn switch(_on: u8) {}
+/// Takes a reading of a heater's sensor. Thread mode.
+pub fn begin(heater: u8) {
+    let Some(Heaters { heaters: [hot_end, bed], .. }) = ACTIVE.heaters else { return };
+    let channel = if heater == 0 { hot_end.channel } else { bed.channel };
+    ADC.cs().modify(|w| w.set_ainsel(channel));
+    let sum = (0..SAMPLES).try_fold(0, |sum, _| Some(sum + u32::from(convert()?)));
+    READING.store(sum.map_or(NONE, |sum| (sum >> FINER) as u16), Ordering::Relaxed);
+}
+
+/// A conversion.
+fn convert() -> Option<u16> {
+    let is_ready = || (0..PATIENCE).any(|_| ADC.cs().read().ready());
+    if !is_ready() {
+        return None;
+    }
+    ADC.cs().modify(|w| w.set_start_once(true));
+    is_ready().then(|| ADC.result().read().result())
+}
+
+/// The reading that has been begun last. Thread mode.
+pub fn reading() -> Option<u16> {
+    Some(READING.load(Ordering::Relaxed)).filter(|reading| *reading != NONE)
+}
+
+/// Switches heaters and the fan: bits 0 hot end, 1 bed, 2 fan. Thread mode.
+pub fn switch(on: u8) {
+    let Some(Heaters { heaters: [hot_end, bed], fan }) = ACTIVE.heaters else { return };
+    gpio::set(hot_end.pin, on & 1 != 0);
+    gpio::set(bed.pin, on & 2 != 0);
+    gpio::set(fan, on & 4 != 0);
+}

@@ -35,6 +35,7 @@ pub mod float;
 pub mod gpio;
 pub mod heaters;
 pub mod inputs;
+mod last_words;
 pub mod panic;
 pub mod pwm;
 pub mod stepper;
@@ -85,6 +86,7 @@ pub fn begin() {
     TIMER_IRQ_0.set_priority(Priority::P2);
     gpio::start();
     inputs::start();
+    heaters::start();
     drivers::start();
     eeprom::start(peripherals.FLASH);
 }

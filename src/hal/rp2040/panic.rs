@@ -1,7 +1,7 @@
 //! The last resort. No panic is meant to be reachable after start-up; should one be, motion and outputs stop and the machine stays still until
-//! it is reset.
+//! it is reset. What the panic says is told [after that](super::last_words).
 
-use super::{gpio, pwm, stepper, watchdog};
+use super::{gpio, last_words, pwm, stepper, watchdog};
 use crate::boards::ACTIVE;
 
 /// Stops the steps, switches drivers and hazardous outputs off, and stays.
@@ -24,6 +24,9 @@ pub fn make_safe() {
 }
 
 #[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
+fn panic(info: &core::panic::PanicInfo) -> ! {
+    cortex_m::interrupt::disable();
+    make_safe();
+    last_words::leave(info);
     halt()
 }

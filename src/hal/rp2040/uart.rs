@@ -85,6 +85,13 @@ impl Filling {
     }
 }
 
+/// Bytes of a packet that are seen to with interrupts off: some microseconds.
+const AT_ONCE: usize = 8;
+/// So many of what characters ask at once: more than a packet of 64 asks.
+const ASKED: usize = 8;
+/// Percent beyond which one more character might not fit.
+const FAR: u8 = 110;
+
 /// What the handler of a port and the others share.
 struct Line {
     rx: Option<Filling>,
@@ -104,7 +111,8 @@ struct Line {
     /// Bytes queued, modulo 256.
     queued: u8,
     realtime: u8,
-    asked: Asked,
+    /// What characters have asked of overrides: one more each time that a number might not fit. Packets bring many at once.
+    asked: Deque<Asked, ASKED>,
     /// The byte queued last.
     last: u8,
     rate: u32,
@@ -130,7 +138,7 @@ impl Line {
             lost_ends: 0,
             queued: 0,
             realtime: 0,
-            asked: Asked::NOTHING,
+            asked: Deque::new(),
             last: 0,
             rate: baud::DEFAULT,
             heard_at: 0,
@@ -212,8 +220,7 @@ fn begin(port: u8, rate: u32) {
         w.set_txim(true);
         w.set_oeim(true);
     });
-    let interrupt =
-        if uart == pac::UART0 { interrupt::UART0_IRQ } else { interrupt::UART1_IRQ };
+    let interrupt = if uart == pac::UART0 { interrupt::UART0_IRQ } else { interrupt::UART1_IRQ };
     interrupt.set_priority(Priority::P1);
     // SAFETY: what the handlers touch is there.
     unsafe { interrupt.enable() };
@@ -354,16 +361,27 @@ impl Line {
                 _ => Came::Nothing,
             };
         }
-        if self.last <= realtime::ASCII
-            && whole
-            && !self.plain
-            && let Some(asked) = self.asked.with(byte)
-        {
-            self.asked = asked;
+        if self.last <= realtime::ASCII && whole && !self.plain && self.ask(byte) {
             flags::set(Event::Realtime);
             return Came::Nothing;
         }
         Came::Text
+    }
+
+    /// Whether a character asks something of the overrides.
+    fn ask(&mut self, byte: u8) -> bool {
+        let last = self.asked.back().copied().unwrap_or(Asked::NOTHING);
+        let is_far = last.percent.iter().any(|percent| percent.unsigned_abs() > FAR);
+        let begins = self.asked.is_empty() || is_far && !self.asked.is_full();
+        let before = if begins { Asked::NOTHING } else { last };
+        let Some(asked) = before.with(byte) else { return false };
+        if begins {
+            // There is room.
+            let _ = self.asked.push_back(asked);
+        } else if let Some(last) = self.asked.back_mut() {
+            *last = asked;
+        }
+        true
     }
 
     /// A byte has come by USB. What there is no room for waits, but for marks: they are placed as if what waits had been lost, or is lost then.
@@ -425,7 +443,8 @@ pub fn kick(port: u8) {
 
 /// Stops the sender, or lets it go on, in the way they have agreed upon. A character may wait for the end of a line if it `waits`. Thread mode.
 pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
-    if flow == Flow::Characters {
+    // USB holds it back by itself.
+    if flow == Flow::Characters && registers(port).is_some() {
         with(port, |line| {
             line.ahead = Some(if stop { XOFF } else { XON });
             line.stopped = stop;
@@ -466,7 +485,9 @@ pub fn set_plain(port: u8, plain: bool) {
 
 /// A packet has come by USB. Whether another one may: else [`usb::ROOM`] says when. Costs 60 cycles a byte.
 pub(super) fn bring(packet: &[u8]) -> bool {
-    packet.iter().for_each(|byte| with(USB, |line| line.bring(*byte)));
+    for bytes in packet.chunks(AT_ONCE) {
+        with(USB, |line| bytes.iter().for_each(|byte| line.bring(*byte)));
+    }
     with(USB, |line| line.behind.is_empty())
 }
 
@@ -479,12 +500,17 @@ pub fn go_on() {
 
 /// Takes what is to leave by USB next. How much that is.
 pub(super) fn take(packet: &mut [u8]) -> usize {
-    let bytes = packet.iter_mut();
-    let taken = bytes.map_while(|byte| {
-        *byte = with(USB, Line::next)?;
-        Some(())
-    });
-    let count = taken.count();
+    let mut count = 0;
+    for bytes in packet.chunks_mut(AT_ONCE) {
+        let wanted = bytes.len();
+        let bytes = bytes.iter_mut();
+        let taken =
+            with(USB, |line| bytes.map_while(|byte| line.next().map(|next| *byte = next)).count());
+        count += taken;
+        if taken < wanted {
+            break;
+        }
+    }
     if count > 0 {
         flags::set(Event::Transmitted);
     }
@@ -558,7 +584,11 @@ pub fn asks_hold() -> bool {
 
 /// What characters have asked of overrides since the last call. Thread mode.
 pub fn take_asked(port: u8) -> Asked {
-    with(port, |line| core::mem::replace(&mut line.asked, Asked::NOTHING))
+    let (asked, more) = with(port, |line| (line.asked.pop_front(), !line.asked.is_empty()));
+    if more {
+        flags::set(Event::Realtime);
+    }
+    asked.unwrap_or(Asked::NOTHING)
 }
 
 /// The real-time characters since the last call, as bits (see [`realtime`]). Thread mode.

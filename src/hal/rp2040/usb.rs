@@ -21,7 +21,7 @@ use embassy_usb::{Builder, Config, Handler, UsbDevice};
 use heapless::Deque;
 use static_cell::StaticCell;
 
-use super::uart;
+use super::{last_words, uart};
 use crate::boards::ACTIVE;
 
 /// The longest packet of a full-speed bus.
@@ -29,7 +29,7 @@ pub(super) const PACKET: usize = 64;
 /// What is said is cut into pieces that are shorter than a packet: none needs an empty one behind it.
 const PIECE: usize = PACKET - 1;
 /// Bytes kept for the first who opens the port.
-const KEPT: usize = 256;
+const KEPT: usize = 256 + last_words::LINE;
 /// A pair of numbers for tests, of pid.codes; nobody sells boards with it.
 const VENDOR: u16 = 0x1209;
 /// See [`VENDOR`].
@@ -45,6 +45,8 @@ bind_interrupts!(struct Handlers {
 pub(super) static ROOM: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// There may be something to send, or somebody to send it to.
 static NEWS: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+/// A piece waits for the one before it to leave; what is put meanwhile leaves behind it.
+static SENDS: AtomicBool = AtomicBool::new(false);
 /// The bus sleeps, or its cable is out.
 static ASLEEP: AtomicBool = AtomicBool::new(false);
 
@@ -102,7 +104,9 @@ pub(super) fn start() {
 
 /// There may be something to send. Any level.
 pub(super) fn kick() {
-    NEWS.signal(());
+    if !SENDS.load(Ordering::Relaxed) {
+        NEWS.signal(());
+    }
 }
 
 #[embassy_executor::task]
@@ -127,6 +131,9 @@ async fn hear(mut receiver: Receiver<'static, Driver>) {
 #[embassy_executor::task]
 async fn tell(mut sender: Sender<'static, Driver>, control: ControlChanged<'static>) {
     let mut first = First { bytes: Deque::new(), keeps: true };
+    if let Some(line) = last_words::take() {
+        first.keep(line.as_bytes());
+    }
     let mut packet = [0; PIECE];
     loop {
         let hears = hears(&control);
@@ -137,7 +144,9 @@ async fn tell(mut sender: Sender<'static, Driver>, control: ControlChanged<'stat
             select(NEWS.wait(), control.control_changed()).await;
         } else if hears {
             // If nobody listens any more, nobody takes it.
+            SENDS.store(true, Ordering::Relaxed);
             select(sender.write_packet(piece), silence(&control)).await;
+            SENDS.store(false, Ordering::Relaxed);
         } else {
             first.keep(piece);
         }

@@ -175,3 +175,44 @@ test('a reset by the watchdog keeps scratch registers and flash', () => {
   assert.equal(m.mcu.readUint32(0x40058008), 2, 'the reason');
   assert.equal(m.mcu.flash[0x1000], 7);
 });
+
+// A device on the bus that has been asked for its descriptor.
+function device() {
+  const m = machine(SLEEP);
+  const [unit, memory] = [0x50110000, 0x50100000];
+  m.run(100);
+  m.mcu.writeUint32(unit + 0x40, 1);
+  m.mcu.writeUint32(unit + 0x4c, 1 << 16);
+  m.run(3 * 128_000);
+  assert.equal(m.mcu.readUint32(unit + 0x50) >>> 19 & 1, 1, 'the bus is reset');
+  m.mcu.writeUint32(unit + 0x50, 1 << 19);
+  m.run(12 * 128_000);
+  assert.equal(m.mcu.readUint32(unit + 0x50) >>> 17 & 1, 1, 'a request has come');
+  assert.equal(m.mcu.readUint32(memory), 0x01000680);
+  return { m, unit, memory };
+}
+
+test('USB has a buffer for as long as its packet needs', () => {
+  const { m, unit, memory } = device();
+  const control = (word) => {
+    m.mcu.writeUint32(memory + 0x80, word);
+    return m.mcu.readUint32(memory + 0x80);
+  };
+  const [FULL, DATA1, AVAILABLE] = [1 << 15, 1 << 13, 1 << 10];
+  assert.equal(control(FULL | DATA1 | AVAILABLE | 18) & AVAILABLE, AVAILABLE);
+  m.run(128 * 60);
+  assert.equal(m.mcu.readUint32(memory + 0x80) & (FULL | AVAILABLE), 0);
+  assert.equal(m.mcu.readUint32(unit + 0x58), 1);
+  // Its acknowledgement waits for a buffer.
+  m.run(128_000);
+  assert.equal(m.mcu.readUint32(unit + 0x58), 1);
+  m.mcu.writeUint32(memory + 0x84, DATA1 | AVAILABLE);
+  m.run(128 * 60);
+  assert.equal(m.mcu.readUint32(unit + 0x58), 3);
+});
+
+test('packets of USB out of turn are faults', () => {
+  const { m, memory } = device();
+  m.mcu.writeUint32(memory + 0x80, 1 << 15 | 1 << 10 | 18);
+  assert.throws(() => m.run(128 * 60), /out of turn/);
+});

@@ -77,6 +77,22 @@ function loadElf(elf, flash) {
   }
 }
 
+// The value of the symbol whose name has this in it.
+function symbol(elf, part) {
+  const [table, size, count] = [elf.readUInt32LE(32), elf.readUInt16LE(46), elf.readUInt16LE(48)];
+  const section = (i) => [4, 16, 20, 24].map((o) => elf.readUInt32LE(table + i * size + o));
+  for (let i = 0; i < count; i++) {
+    const [type, offset, bytes, link] = section(i);
+    if (type !== 2) continue;
+    const [, names] = section(link);
+    for (let at = offset; at < offset + bytes; at += 16) {
+      const name = names + elf.readUInt32LE(at);
+      if (elf.toString('latin1', name, elf.indexOf(0, name)).includes(part)) return elf.readUInt32LE(at + 4);
+    }
+  }
+  throw new Error(`no ${part} in the image`);
+}
+
 export class Machine {
   // With an ELF in its flash, or what `load` puts there.
   constructor(elf, load = (flash) => loadElf(readFileSync(elf), flash)) {
@@ -88,6 +104,7 @@ export class Machine {
     this.computer = new Computer((byte) => this.listen(USB_PORT, byte));
     this.senders = [new Sender(), new Sender()];
     this.inputs = new Map();
+    this.sensed = [0, 0, 0, 0, 0];
     this.levels = new Array(30).fill(0);
     this.resets = 0;
     // Line ends that have been heard.
@@ -104,13 +121,40 @@ export class Machine {
     this.boot({ flash: this.mcu.flash });
   }
 
-  // A chip as it is at power-up, or behind a reset by the watchdog, with the flash as it was.
-  boot(before) {
+  // The CPU is in a loop from now on, with interrupts off.
+  stick() {
+    const [{ core }, at] = [this.mcu, 0x20030000];
+    this.mcu.writeUint16(at, 0xe7fe);
+    core.PC = at;
+    core.PM = true;
+    core.waiting = false;
+  }
+
+  // A panic: a cell is borrowed twice, in a file of that name.
+  panic(elf, file) {
+    const { core, sram } = this.mcu;
+    const [at, name] = [0x20030000, 0x20030100];
+    Buffer.from(file).copy(sram, name - 0x20000000);
+    [name, file.length, 7, 9].forEach((word, i) => this.mcu.writeUint32(at + 4 * i, word));
+    core.registers[0] = at;
+    core.PC = (symbol(readFileSync(elf), 'panic_already_borrowed') & ~1) >>> 0;
+    core.waiting = false;
+  }
+
+  // The reset button.
+  reset() { this.boot(this.mcu, this.mcu.sram); }
+
+  // What a channel of the converter reads, of 4095.
+  sense(channel, value) { this.sensed[channel] = value; }
+
+  // A chip as it is at power-up, or behind a reset, with the flash and perhaps RAM as it was.
+  boot(before, sram) {
     const mcu = new RP2040();
     this.mcu = mcu;
     mcu.logger = new ConsoleLogger(LogLevel.Error, true);
     mcu.peripherals[0x14000] = new XipControl(mcu, 'XIP_CTRL');
     mcu.loadBootrom(bootRom());
+    if (sram) mcu.sram.set(sram);
     if (before) mcu.flash.set(before.flash);
     else this.load(mcu.flash);
     this.uarts = UARTS.map(([at, name, irq], port) => {
@@ -119,6 +163,7 @@ export class Machine {
       return uart;
     });
     this.usb = mcu.usbCtrl = mcu.peripherals[USB] = new Usb(mcu, this.computer);
+    mcu.adc.channelValues = this.sensed;
     const watchdog = mcu.peripherals[WATCHDOG];
     if (before?.peripherals) {
       const old = before.peripherals[WATCHDOG];
@@ -258,7 +303,7 @@ export class Machine {
       this.isResetting = false;
       this.resets++;
       for (const listener of this.resetListeners) listener();
-      this.boot(mcu);
+      this.boot(mcu, mcu.sram);
     }
   }
 }

@@ -24,8 +24,10 @@ fn board() -> Emulated {
 }
 
 impl Side for Emulated {
+    // As fast as on the line of other boards: USB would bring two lines at once, of which one may overtake the other.
     fn send(&mut self, bytes: &[u8]) {
         self.send_to(USB, bytes);
+        self.run_for_ms(1 + bytes.len() as u64 * 87 / 1_000).unwrap();
     }
 
     fn send_aux(&mut self, bytes: &[u8]) {
@@ -274,6 +276,78 @@ fn an_skr_pico_tells_its_drivers_and_moves() {
     assert!([21, 23].iter().all(|heater| !board.is_high(gp(*heater))));
 }
 
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn a_stuck_chip_is_bitten_and_says_so() {
+    let (mut board, mut host) = booted();
+    set(&mut board, &mut host, "m3 s1000");
+    set(&mut board, &mut host, "g1 x100 f1000");
+    host.run_for_ms(&mut board, 300).unwrap();
+    board.stick();
+    board.run_for_ms(490).unwrap();
+    assert_eq!(board.resets(), 0);
+    board.run_for_ms(30).unwrap();
+    assert_eq!(board.resets(), 1, "half a second has passed");
+    assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()));
+    board.run_for_ms(300).unwrap();
+    let said = String::from_utf8(board.receive_from(USB)).unwrap();
+    assert!(said.contains("SYSTEM READY") && said.contains("\"er\""), "{said}");
+    host = Host::new(LINES_IN_FLIGHT);
+    assert_eq!(value(&mut board, &mut host, "rst"), 3.0);
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn a_panic_stops_everything_and_is_told_after_the_reset() {
+    let (mut board, mut host) = booted();
+    set(&mut board, &mut host, "m3 s1000");
+    set(&mut board, &mut host, "g1 x100 f1000");
+    host.run_for_ms(&mut board, 300).unwrap();
+    board.panic("src/some.rs");
+    board.run_for_ms(1).unwrap();
+    let stands = Emulated::steps(&board);
+    board.run_for_ms(2_000).unwrap();
+    assert_eq!((Emulated::steps(&board), board.resets()), (stands, 0), "it waits");
+    assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()));
+    board.reset();
+    board.run_for_ms(300).unwrap();
+    let said = String::from_utf8(board.receive_from(USB)).unwrap();
+    assert!(said.contains("{\"er\":{\"panic\":\"") && said.contains("src/some.rs:7:9"), "{said}");
+    board.reset();
+    board.run_for_ms(300).unwrap();
+    let said = String::from_utf8(board.receive_from(USB)).unwrap();
+    assert!(said.contains("SYSTEM READY") && !said.contains("panic"), "once: {said}");
+}
+
+/// What the converter reads at a thermistor's resistance with 4,700 ohms to the supply.
+fn reading(ohms: f64) -> u16 {
+    (4_095.0 * ohms / (ohms + 4_700.0)) as u16
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn an_skr_pico_heats() {
+    let mut board = Emulated::load(&image(&SKR_PICO), &SKR_PICO).unwrap();
+    // A bed of 25 degrees, and a hot end of 150 (beta 4,267).
+    board.sense(0, reading(100_000.0));
+    board.sense(1, reading(100_000.0 * (4_267.0 * (1.0 / 423.15 - 1.0 / 298.15_f64)).exp()));
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut board, 1_000).unwrap();
+    for line in ["{he1k:1,he3k:1}", "m104 s200", "m106 s255"] {
+        set(&mut board, &mut host, line);
+    }
+    host.run_for_ms(&mut board, 1_000).unwrap();
+    let is = [value(&mut board, &mut host, "he1t"), value(&mut board, &mut host, "he3t")];
+    assert!((is[0] - 150.0).abs() < 1.0 && (is[1] - 25.0).abs() < 1.0, "{is:?}");
+    let on = [23, 21, 17].map(|pin| board.is_high(gp(pin)));
+    assert_eq!(on, [true, false, true], "hot end, bed, fan");
+    // A wire of the sensor is off.
+    board.sense(1, 4_095);
+    host.run_for_ms(&mut board, 500).unwrap();
+    assert!(!board.is_high(gp(23)), "a fault switches it off");
+    assert_eq!(value(&mut board, &mut host, "stat"), 2.0);
+}
+
 /// From the edge of a limit switch to the last step, beside the looks at it.
 const STOP_US: f64 = 8.0;
 
@@ -344,8 +418,8 @@ fn settings_may_change_often() {
 
 /// What is not so here, by the beginnings of names. More rates of the line can be made (`baud`), steps may come faster (`rates`, `settings-motor`,
 /// `grbl-settings`), no port has RTS and CTS (`ports-pins`), the sensors of a spindle have pins of their own
-/// (`encoder`), settings are kept sooner (`stored`), and the boot loader, which is in ROM, is not emulated (`boot-loader`).
-const DIFFERS: [&str; 8] = [
+/// (`encoder`), settings are kept sooner (`stored`), a reset cuts off the slower port's greeting (`start-anew`), and the boot loader, which is in ROM, is not emulated (`boot-loader`).
+const DIFFERS: [&str; 9] = [
     "baud",
     "boot-loader",
     "encoder",
@@ -353,6 +427,7 @@ const DIFFERS: [&str; 8] = [
     "ports-pins",
     "rates",
     "settings-motor",
+    "start-anew",
     "stored",
 ];
 /// Those with a spindle that turns: the emulated board has none.
@@ -369,7 +444,8 @@ fn with_more_room(line: &str) -> String {
     for (before, most, more) in [("\"qr\":", 61, 963), ("\"f\":[1,", 7, 56)] {
         let Some(at) = line.find(before).map(|at| at + before.len()) else { continue };
         // Of a footer the last number.
-        let at = if more == 56 { line[at..].find(',').map_or(at, |comma| at + comma + 1) } else { at };
+        let at =
+            if more == 56 { line[at..].find(',').map_or(at, |comma| at + comma + 1) } else { at };
         let digits = line[at..].bytes().take_while(u8::is_ascii_digit).count();
         let number = line[at..at + digits].parse().unwrap_or(0);
         if (1..=most).contains(&number) {

@@ -18,6 +18,8 @@ mod spirals;
 mod table;
 mod workload;
 
+pub use spirals::{ideal, spiral};
+
 pub use rows::ROWS;
 pub use table::print;
 pub use workload::Bed;

@@ -219,7 +219,8 @@ fn over_ideal(bed: &Bed, chord: f64, how: How) -> Result<Figure> {
 }
 
 /// The shortest time of the job, s.
-fn ideal(chord: f64) -> f64 {
+/// How long it takes at best, s.
+pub fn ideal(chord: f64) -> f64 {
     let velocity = FEED / 60.0;
     f64::from(MOVES) * chord / velocity + velocity / ACCELERATION
 }

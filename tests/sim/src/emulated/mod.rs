@@ -22,6 +22,11 @@ const PROGRAM: &str = "rp2040-emulator/bridge.mjs";
 #[derive(Serialize, Default, Debug)]
 struct Request {
     cut: bool,
+    stick: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    panic: Option<String>,
+    reset: bool,
+    sense: Vec<(u8, u16)>,
     send: Vec<(usize, String)>,
     now: Vec<(usize, u8)>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -224,6 +229,26 @@ impl Emulated {
     /// The supply fails, and is there again.
     pub fn cut_power(&mut self) {
         self.request.cut = true;
+    }
+
+    /// The CPU gets stuck, with interrupts off.
+    pub fn stick(&mut self) {
+        self.request.stick = true;
+    }
+
+    /// A cell turns out to be borrowed twice, in a file of that name: a panic.
+    pub fn panic(&mut self, file: &str) {
+        self.request.panic = Some(file.to_string());
+    }
+
+    /// Its reset button is pressed.
+    pub fn reset(&mut self) {
+        self.request.reset = true;
+    }
+
+    /// What a channel of the converter reads from now on, of 4,095.
+    pub fn sense(&mut self, channel: u8, value: u16) {
+        self.request.sense.push((channel, value));
     }
 
     /// Drives an input.
