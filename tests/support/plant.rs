@@ -2,15 +2,19 @@
 
 /// A heater with its sensor: heat flows from the heater into the block, from the block to the air, and the sensor follows the block.
 pub struct Plant {
-    /// Joules for a degree, watts of the heater, watts a degree to the air, and with the fan besides.
+    /// Joules for a degree.
     capacity: f64,
+    /// Of the heater.
     pub watts: f64,
+    /// Watts a degree to the air, and with the fan besides.
     loss: f64,
     fan: f64,
     /// How far the heater is behind its current, and the sensor behind the block, seconds.
     delay: [f64; 2],
     heater: f64,
+    /// How hot the block is, degrees.
     pub block: f64,
+    /// How hot the sensor is, degrees.
     pub sensor: f64,
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use kerf_sim::job::{read_lines, read_setup};
-use kerf_sim::{Host, Machine, oracle};
+use kerf_sim::{Host, Machine, oracle, print};
 
 /// For what is under way when the sender has left, ms of AVR time.
 const SETTLE_MS: u64 = 1_000;
@@ -34,9 +34,12 @@ impl Arrival {
         let mut host = Host::new(1);
         host.boot(twin, BOOT_MS)?;
         let setup = read_setup(twin, &mut host)?;
-        let expected = oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup)?;
+        let expected = match print::is_print(machine.board(), &lines) {
+            true => print::end_of(&lines, &setup)?,
+            false => oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup)?.steps,
+        };
         let motors = setup.motors.iter().zip(machine.recorder().motors());
-        let motors = motors.zip(expected.steps).map(|((setup, motor), expected)| Motor {
+        let motors = motors.zip(expected).map(|((setup, motor), expected)| Motor {
             steps: if setup.inverted { -motor.position } else { motor.position },
             expected,
             total: motor.steps,

@@ -44,6 +44,12 @@ pub struct Bus {
     pins: PinInterrupts,
     pub(crate) recorder: Recorder,
     pub(crate) mechanics: Option<Box<Mechanics>>,
+    /// When the temperatures are worked out next, and how many cycles after that again; never without heaters.
+    pub(crate) heat_due: u64,
+    /// See `heat_due`.
+    pub(crate) heat_every: u64,
+    /// How often they have become due; the machine works them out.
+    pub(crate) heats: u32,
     /// Pins that the mechanics has changed; the machine drives them.
     pub(crate) changed: Vec<(Pin, bool)>,
     pub(crate) sums: Sums,
@@ -77,6 +83,9 @@ impl Bus {
             pins: PinInterrupts::new(&chip.pins),
             recorder: Recorder::new(),
             mechanics: None,
+            heat_due: u64::MAX,
+            heat_every: 0,
+            heats: 0,
             changed: Vec::new(),
             sums: Sums::default(),
             pending: 0,
@@ -142,6 +151,10 @@ impl Bus {
             if let Some(mechanics) = &mut self.mechanics {
                 mechanics.advance(now, &mut self.changed);
             }
+            if self.heat_due <= now {
+                self.heat_due += self.heat_every;
+                self.heats += 1;
+            }
             self.refresh_due();
         }
     }
@@ -200,7 +213,7 @@ impl Bus {
         let uarts = self.uarts.iter().map(Uart::due);
         let wires = self.wires.iter().map(|(_, wire)| wire.due());
         let mechanics = self.mechanics.as_ref().map_or(u64::MAX, |m| m.due());
-        let others = [self.eeprom.due(), mechanics];
+        let others = [self.eeprom.due(), mechanics, self.heat_due];
         self.due = timers.chain(uarts).chain(wires).chain(others).min().unwrap_or(u64::MAX);
     }
 

@@ -95,7 +95,7 @@ struct Run<'a> {
 
 /// Waits until the settings are in the EEPROM, so that all jobs begin alike. While they are put away, a motor
 /// that is not the dominant one may step 0.7 us off its usual place: each read of the EEPROM halts the CPU.
-fn put_away(machine: &mut Machine, host: &mut Host) -> Result<()> {
+pub(crate) fn put_away(machine: &mut Machine, host: &mut Host) -> Result<()> {
     let mut writes = None;
     while writes.replace(machine.eeprom_writes()) != Some(machine.eeprom_writes()) {
         host.run_for_ms(machine, PUT_AWAY_MS)?;

@@ -18,6 +18,7 @@ use crate::mechanics::{Build, Mechanics};
 use crate::meters::{Meters, Window};
 use crate::recorder::{self, Probe, Recorder};
 use crate::stopwatch::Stopwatch;
+use crate::thermal::{EVERY_MS, Thermal};
 use crate::timer::COMPARE;
 use crate::trace::Trace;
 use crate::uart::Uart;
@@ -92,6 +93,7 @@ pub struct Machine {
     /// How often each word of flash ran, if the environment asks for it.
     counts: Option<Counts>,
     stopwatches: Vec<Stopwatch>,
+    thermal: Option<Box<Thermal>>,
 }
 
 impl Machine {
@@ -142,6 +144,7 @@ impl Machine {
             profile: None,
             counts: Counts::wanted(),
             stopwatches: Vec::new(),
+            thermal: None,
         })
     }
 
@@ -189,6 +192,7 @@ impl Machine {
         if cpu.cycle() >= self.bus().due {
             self.bus_mut().run(cpu.cycle());
             self.drive_changed();
+            self.pass_heat();
         }
         if cpu.cycle() >= cpu.native_due() && cpu.run_native() {
             self.was_reset();
@@ -319,6 +323,20 @@ impl Machine {
         while let Some((pin, high)) = self.bus_mut().changed.pop() {
             self.drive_pin(pin.port.letter(), pin.bit, high);
         }
+    }
+
+    /// Works the temperatures out as often as they have become due.
+    fn pass_heat(&mut self) {
+        let heats = std::mem::take(&mut self.bus_mut().heats);
+        let Some(mut thermal) = self.thermal.take_if(|_| heats > 0) else { return };
+        let on = thermal.pins().heaters.map(|heater| self.is_high(heater.pin));
+        let fan = self.is_high(thermal.pins().fan);
+        for _ in 0..heats {
+            for (channel, millivolts) in thermal.pass(on, fan, self.cpu.cycle()) {
+                self.cpu.set_millivolts(channel, millivolts);
+            }
+        }
+        self.thermal = Some(thermal);
     }
 
     /// The reset has made the core forget what the world outside does to its pins.
@@ -499,6 +517,28 @@ impl Machine {
         self.probes.push(spindle);
         self.bus_mut().mechanics = Some(Box::new(mechanics));
         self.bus_mut().refresh_due();
+    }
+
+    /// Puts heaters, their sensors and a fan at the pins that the board has for them, best before the first instruction. A board without such pins
+    /// stays as it is.
+    pub fn build_heaters(&mut self) {
+        let Some(pins) = self.board().heaters else { return };
+        self.thermal = Some(Box::new(Thermal::new(pins)));
+        let every = self.cycles(EVERY_MS);
+        let due = self.cycle();
+        let bus = self.bus_mut();
+        (bus.heat_every, bus.heat_due) = (every, due);
+        bus.refresh_due();
+    }
+
+    /// The heaters at the board's pins, if there are any.
+    pub fn thermal(&self) -> Option<&Thermal> {
+        self.thermal.as_deref()
+    }
+
+    /// The heaters, to be tampered with.
+    pub fn thermal_mut(&mut self) -> Option<&mut Thermal> {
+        self.thermal.as_deref_mut()
     }
 
     /// A spindle that is driven by the width of pulses goes by it, as it has been: nobody sees each of them.

@@ -8,6 +8,7 @@ use crate::machine::Machine;
 use crate::meters::Window;
 use crate::oracle::{AXES, MotorSetup, Outcome, Setup, UNITS, Unclear};
 use crate::pauses::Pause;
+use crate::print::{Followed, Heat};
 use crate::recorder::Motor;
 use crate::threads::Threads;
 
@@ -178,6 +179,10 @@ pub struct Report {
     pub resets: u64,
     /// Threads that were cut beside a spindle with an encoder.
     pub threads: Option<Threads>,
+    /// How the steps of a print followed its file.
+    pub followed: Option<Followed>,
+    /// The heaters of a print.
+    pub heat: Vec<Heat>,
     /// The interrupts that were served.
     pub vectors: Vec<VectorReport>,
     /// Motors and axes, as the firmware has them.
@@ -224,6 +229,8 @@ impl Report {
             missed_tops: machine.missed_tops(),
             resets: machine.resets(),
             threads: None,
+            followed: None,
+            heat: Vec::new(),
             vectors: vector_reports(machine),
             setup: measured.setup.clone(),
         };
@@ -237,6 +244,13 @@ impl Report {
         self.problems.extend(threads.as_ref().and_then(Threads::problem));
         self.ok = self.problems.is_empty();
         self.threads = threads;
+    }
+
+    /// What only prints have: steps that do not follow the file are a problem of the job.
+    pub fn add_print(&mut self, followed: Option<Followed>, heat: Vec<Heat>) {
+        self.problems.extend(followed.as_ref().and_then(Followed::problem));
+        self.ok = self.problems.is_empty();
+        (self.followed, self.heat) = (followed, heat);
     }
 
     /// Pauses and stops of the step timer, whichever are more.

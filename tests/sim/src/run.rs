@@ -11,6 +11,7 @@ use kerf_sim::emulated::{self, Emulated};
 use kerf_sim::job::{self, Options};
 use kerf_sim::mechanics::Build;
 use kerf_sim::plot::{self, Look};
+use kerf_sim::print;
 use kerf_sim::report::Report;
 use kerf_sim::threads::Threads;
 
@@ -52,8 +53,11 @@ pub fn run(args: &RunArgs) -> Result<bool> {
         machine.recorder_mut().keep_log();
     }
     let bar = progress_bar(lines.len(), args.quiet)?;
-    let mut report =
-        job::run(&mut machine, &lines, &options, |done| bar.set_position(done as u64))?;
+    let progress = |done| bar.set_position(done as u64);
+    let mut report = match print::is_print(board, &lines) {
+        true => print::run(&mut machine, &lines, &options, progress)?,
+        false => job::run(&mut machine, &lines, &options, progress)?,
+    };
     bar.finish_and_clear();
     if args.spindle.is_some() {
         report.add_threads(Threads::of(&machine, &report.setup, &lines));

@@ -97,6 +97,7 @@ impl Server {
         let image = Image::read(&args.target.elf)?;
         let mut machine = Machine::new(image.clone(), board(&args.target.board)?)?;
         machine.build(&around(machine.board()));
+        machine.build_heaters();
         machine.set_baud(args.baud);
         machine.follow_speed();
         let mut pty = Pty::new()?;
@@ -165,6 +166,7 @@ impl Server {
     fn fresh(&self) -> Result<Machine> {
         let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
         fresh.build(&around(fresh.board()));
+        fresh.build_heaters();
         fresh.set_baud(self.baud);
         fresh.follow_speed();
         Ok(fresh)

@@ -27,6 +27,12 @@ impl Display for Report {
             );
             row(f, "threads", what)?;
         }
+        if let Some(followed) = &self.followed {
+            row(f, "steps", followed)?;
+        }
+        for heat in &self.heat {
+            row(f, heat.heater, heat)?;
+        }
         if let Some(why) = &self.unchecked {
             row(f, "ends not checked", why)?;
         }

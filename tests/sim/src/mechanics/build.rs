@@ -3,6 +3,7 @@
 use kerf::boards::{Board, MOTORS, Pin};
 
 use super::line::Bounce;
+use crate::oracle::{Setup, UNITS};
 
 /// A machine around the chip. Lengths are in millimetres from the lower hard end of an axis.
 #[derive(Clone, Debug)]
@@ -155,6 +156,21 @@ impl Build {
             },
             seed: 1,
         }
+    }
+
+    /// A printer of 200 by 200 by 200 mm whose motors are as the firmware has them, not far from its lower ends, with switches there.
+    pub fn printer(board: &Board, setup: &Setup) -> Build {
+        const START: [f64; 3] = [20.0, 15.0, 5.0];
+        let mut build = Build::of(board);
+        for (motor, of) in setup.motors.iter().enumerate() {
+            let Some(axis) = build.axes.get_mut(of.axis) else { continue };
+            axis.steps_per_mm = of.steps(1_000 * UNITS as i64) as f64 / 1e3;
+            (axis.motor, axis.reversed, axis.max) = (motor, of.inverted, None);
+            if let Some(start) = START.get(of.axis) {
+                (axis.travel, axis.start) = (200.0, *start);
+            }
+        }
+        build
     }
 
     /// The same with all switches of axes wired so.

@@ -34,16 +34,21 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Draws all panels; the curves for `span` only, in s, if that is given.
 ///
-/// Below them, if there are any, `threads`: pass by pass where along Z and how far off, mm.
+/// Below them, if there are any, `threads`: pass by pass where along Z and how far off, mm. At the end, if there are any, `heat`: temperatures of each
+/// heater in degrees, over seconds from the start.
 pub fn draw(
     motion: &Motion,
     span: Option<Range<f64>>,
-    threads: &[Vec<(f64, f64)>],
+    threads: &[Points],
+    heat: &[Points],
 ) -> Result<String> {
     let mut svg = String::new();
-    panels(&mut svg, motion, span, threads).map_err(|e| anyhow!("cannot draw: {e}"))?;
+    panels(&mut svg, motion, span, threads, heat).map_err(|e| anyhow!("cannot draw: {e}"))?;
     Ok(svg)
 }
+
+/// Corners of a curve.
+pub type Points = Vec<(f64, f64)>;
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
@@ -51,15 +56,21 @@ fn panels(
     svg: &mut String,
     motion: &Motion,
     span: Option<Range<f64>>,
-    threads: &[Vec<(f64, f64)>],
+    threads: &[Points],
+    heat: &[Points],
 ) -> Drawn {
     let curves_height = 3 * CURVE_HEIGHT;
     let below = if threads.is_empty() { 0 } else { THREADS_HEIGHT };
-    let size = (WIDTH, PATH_HEIGHT + curves_height + below);
+    let heat_height = if heat.is_empty() { 0 } else { CURVE_HEIGHT };
+    let size = (WIDTH, PATH_HEIGHT + curves_height + below + heat_height);
     let root = SVGBackend::with_string(svg, size).into_drawing_area();
     root.fill(&WHITE)?;
     let (top, rest) = root.split_vertically(PATH_HEIGHT);
     let (rest, errors) = rest.split_vertically(curves_height);
+    let (errors, temperatures) = errors.split_vertically(below);
+    if !heat.is_empty() {
+        temperature(&temperatures, heat)?;
+    }
     if !threads.is_empty() {
         thread_errors(&errors, threads)?;
     }
@@ -81,8 +92,30 @@ fn panels(
     Ok(())
 }
 
+/// How hot each heater is over time: the first in red, others in blue.
+fn temperature(area: &Area<'_>, heaters: &[Points]) -> Drawn {
+    let all = || heaters.iter().flatten();
+    let time = extent(all().map(|point| point.0));
+    let degrees = extent(all().map(|point| point.1).chain([0.0]));
+    let mut chart = ChartBuilder::on(area)
+        .margin(MARGIN)
+        .margin_right(2 * MARGIN)
+        .x_label_area_size(LABELS_BELOW)
+        .y_label_area_size(LABELS_LEFT)
+        .build_cartesian_2d(time, degrees.start..degrees.end * 1.06)?;
+    let mut mesh = chart.configure_mesh();
+    mesh.x_desc("time from the start, s").y_desc("temperature, °C").label_style(FONT);
+    mesh.y_labels(7).max_light_lines(0).draw()?;
+    for (n, points) in heaters.iter().enumerate() {
+        let colour = if n == 0 { RED } else { BLUE };
+        let points = points.iter().step_by(points.len() / COLUMNS + 1).copied();
+        chart.draw_series(LineSeries::new(points, &colour))?;
+    }
+    Ok(())
+}
+
 /// How far off a thread is over its length, in micrometres.
-fn thread_errors(area: &Area<'_>, passes: &[Vec<(f64, f64)>]) -> Drawn {
+fn thread_errors(area: &Area<'_>, passes: &[Points]) -> Drawn {
     let all = || passes.iter().flatten();
     let along = extent(all().map(|point| point.0));
     let off = extent(all().map(|point| 1e3 * point.1).chain([-THREAD_SCALE, THREAD_SCALE]));

@@ -18,6 +18,7 @@ use anyhow::{Context, Result};
 
 use crate::machine::Machine;
 use crate::oracle::Setup;
+use crate::thermal::{BED, HOT_END, Sample};
 use crate::threads::Threads;
 
 /// X, Y and Z among the axes.
@@ -73,9 +74,19 @@ impl Motion {
     }
 }
 
+/// The temperatures of each heater over time, if there are heaters.
+fn temperatures(machine: &Machine) -> Vec<chart::Points> {
+    let Some(thermal) = machine.thermal() else { return Vec::new() };
+    let of = |heater: usize| {
+        let point = |s: &Sample| (machine.seconds(s.cycle), s.degrees[heater]);
+        thermal.samples().iter().map(point).collect()
+    };
+    [HOT_END, BED].map(of).to_vec()
+}
+
 /// Draws the steps that were kept into an SVG file. An error says that it cannot be written.
 ///
-/// Of threads it shows the error over their length as well, each pass in a colour of its own.
+/// Of threads it shows the error over their length as well, each pass in a colour of its own; of heaters their temperatures.
 pub fn write(
     path: &Path,
     machine: &Machine,
@@ -84,6 +95,7 @@ pub fn write(
     threads: Option<&Threads>,
 ) -> Result<()> {
     let motion = Motion::of(machine, setup, look.window_ms);
-    let svg = chart::draw(&motion, look.span.clone(), threads.map_or(&[], |of| &of.errors))?;
+    let threads = threads.map_or(&[][..], |of| &of.errors);
+    let svg = chart::draw(&motion, look.span.clone(), threads, &temperatures(machine))?;
     fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))
 }

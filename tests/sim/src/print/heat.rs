@@ -1,0 +1,91 @@
+//! How hot a print was, and how well that was held.
+
+use std::fmt::{self, Display, Formatter};
+
+use serde::Serialize;
+
+use crate::machine::Machine;
+use crate::thermal::{BED, HOT_END};
+
+/// A heater of a print.
+#[derive(Clone, PartialEq, Serialize, Debug)]
+pub struct Heat {
+    /// Which one.
+    pub heater: &'static str,
+    /// The highest temperature that was asked for, degrees.
+    pub asked: f64,
+    /// The highest that its sensor has felt.
+    pub peak: f64,
+    /// From the first line until it was within a degree of that, s.
+    pub seconds_to_reach: Option<f64>,
+    /// The lowest and highest of what its sensor felt from the first step behind homing on, until it was switched off.
+    pub held: Option<(f64, f64)>,
+    /// What its sensor feels at the end.
+    pub last: f64,
+}
+
+/// What is measured of one.
+#[derive(Clone, Copy, Default)]
+struct One {
+    asked: f64,
+    /// When it was switched off behind that.
+    off: Option<u64>,
+}
+
+/// Measures while a print runs.
+#[derive(Default)]
+pub struct Meter {
+    heaters: [One; 2],
+}
+
+/// So near what is asked for it is reached, degrees.
+const NEAR: f64 = 1.0;
+
+impl Meter {
+    /// A line that is sent at a cycle asks for so many degrees.
+    pub fn asked(&mut self, heater: usize, degrees: i64, cycle: u64) {
+        let one = &mut self.heaters[heater];
+        one.asked = one.asked.max(degrees as f64);
+        one.off = (degrees == 0 && one.asked > 0.0).then_some(cycle);
+    }
+
+    /// What came of the heaters that lines have asked for.
+    pub fn heat(&self, machine: &Machine, began: u64) -> Vec<Heat> {
+        let Some(thermal) = machine.thermal() else { return Vec::new() };
+        let printing = machine.recorder().span().map_or(u64::MAX, |((first, _), _)| first);
+        let of = |heater: usize| {
+            let One { asked, off } = self.heaters[heater];
+            let felt = || thermal.samples().iter().map(|s| (s.cycle, s.degrees[heater]));
+            let reached = felt().find(|(_, degrees)| *degrees >= asked - NEAR);
+            let held = printing..off.unwrap_or(u64::MAX);
+            let during = felt().filter(|(cycle, _)| held.contains(cycle)).map(|(_, d)| d);
+            let (low, high) =
+                during.fold((f64::MAX, f64::MIN), |(low, high), d| (low.min(d), high.max(d)));
+            let heat = Heat {
+                heater: ["hot end", "bed"][heater],
+                asked,
+                peak: felt().map(|(_, degrees)| degrees).fold(0.0, f64::max),
+                seconds_to_reach: reached
+                    .map(|(cycle, _)| machine.seconds(cycle.saturating_sub(began))),
+                held: (low <= high).then_some((low, high)),
+                last: thermal.plant(heater).sensor,
+            };
+            (asked > 0.0).then_some(heat)
+        };
+        [HOT_END, BED].into_iter().filter_map(of).collect()
+    }
+}
+
+impl Display for Heat {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Heat { asked, peak, last, .. } = self;
+        write!(f, "{peak:.1} °C at most, {:+.1} of the {asked:.0} asked for", peak - asked)?;
+        if let Some(seconds) = self.seconds_to_reach {
+            write!(f, "; there after {seconds:.0} s")?;
+        }
+        if let Some((low, high)) = self.held {
+            write!(f, ", {low:.1} to {high:.1} while it moved")?;
+        }
+        write!(f, "; {last:.1} at the end")
+    }
+}

@@ -1,0 +1,252 @@
+//! A print from boot to rest: a file of a slicer, sent as printing hosts send it, to a printer that heats.
+//!
+//! | module | what it has |
+//! |---|---|
+//! | [`reading`] | where each line must end, and what it asks of heaters |
+//! | [`path`] | whether every step is on the way from line to line |
+//! | [`talk`] | a printing host: line numbers, checksums, one line in flight |
+//! | [`heat`] | how hot it was, and how well that was held |
+//!
+//! Settings are asked of a twin, in TinyG's dialect: the port that prints speaks that of printing hosts from its first line on. Steps count from the
+//! last G28 on.
+
+mod heat;
+mod path;
+pub mod reading;
+mod talk;
+
+use anyhow::{Context, Result, bail, ensure};
+use kerf::boards::{Board, MOTORS};
+
+use crate::host::Host;
+use crate::job::{self, BOOT_MS, Lines, Options};
+use crate::machine::Machine;
+use crate::oracle::{Outcome, Setup, Unclear};
+use crate::pauses::Scale;
+use crate::report::{Measured, Report};
+use crate::thermal::{BED, HOT_END};
+use crate::trace::Trace;
+
+pub use heat::Heat;
+pub use path::{Followed, Place};
+use reading::{Asked, Corner};
+use talk::Talk;
+
+/// The machine whose settings a print has unless its image has another than `careful`.
+const PRINTER: &str = "{mch:3}";
+/// How long an answer may take, and that of a line behind one that waits for a temperature, ms.
+const LINE_MS: u64 = 120_000;
+const HEAT_MS: u64 = 20 * 60_000;
+/// Time without a step after which motion has ended.
+const STILL_MS: u64 = 200;
+
+/// Whether lines are a print, on a board that can print.
+pub fn is_print(board: &Board, lines: &Lines) -> bool {
+    let has = |feature| board.features.contains(&feature);
+    let prints = has("dialect-reprap") && board.heaters.is_some();
+    prints && lines.iter().any(|(_, line)| reading::is_printing(line))
+}
+
+/// A machine like this one at power-up, and what settings leave behind in its memory.
+fn twin(machine: &Machine, lines: &Lines, settings: &[String]) -> Result<(Machine, Setup)> {
+    let mut twin = Machine::new(machine.image().clone(), machine.board())?;
+    let mut host = Host::new(1);
+    host.boot(&mut twin, BOOT_MS)?;
+    let machine = host.ask(&mut twin, "{mch:n}", LINE_MS)?;
+    let careful = machine.body["mch"].as_i64() == Some(0);
+    let all: Vec<_> =
+        careful.then(|| PRINTER.to_owned()).into_iter().chain(settings.iter().cloned()).collect();
+    // What may wait for a hand waits in a print, too: M0 says so.
+    job::ask_settings(&mut twin, &mut host, lines, &all)?;
+    job::put_away(&mut twin, &mut host)?;
+    let setup = job::read_setup(&mut twin, &mut host)?;
+    Ok((twin, setup))
+}
+
+/// What is known of a print while it runs.
+struct Run<'a> {
+    machine: &'a mut Machine,
+    talk: Talk,
+    setup: Setup,
+    corners: Result<Vec<Corner>, Unclear>,
+    heat: heat::Meter,
+    /// The corner that steps count from.
+    home: usize,
+    began: u64,
+    progress_at: u64,
+}
+
+/// Boots the machine, prints and says how it went. An error means that the print could not begin; all that goes wrong later is in the report.
+/// `progress` gets the lines answered so far.
+pub fn run(
+    machine: &mut Machine,
+    lines: &Lines,
+    options: &Options,
+    mut progress: impl FnMut(usize),
+) -> Result<Report> {
+    ensure!(options.baud.is_none(), "a print is sent at 115,200 baud");
+    let (twin, setup) = twin(machine, lines, &options.settings)?;
+    machine.set_eeprom(twin.eeprom());
+    machine.build(&crate::mechanics::Build::printer(machine.board(), &setup));
+    machine.build_heaters();
+    machine.recorder_mut().keep_log();
+    let mut talk = Talk::new();
+    talk.boot(machine, BOOT_MS)?;
+    let began = machine.cycle();
+    let trace = options.vcd.as_deref().map(|path| {
+        let clock_hz = machine.board().clock_hz;
+        Trace::create(path, clock_hz, began)
+    });
+    machine.set_trace(trace.transpose()?);
+    machine.meters_mut().clear();
+    let corners = reading::read(lines);
+    let heat = heat::Meter::default();
+    let (home, progress_at) = (0, began);
+    let mut run = Run { machine, talk, setup, corners, heat, home, began, progress_at };
+    run.count_from(0);
+    let end = run.stream(lines, &mut progress).and_then(|()| run.settle());
+    if let Some(trace) = run.machine.set_trace(None) {
+        trace.finish()?;
+    }
+    Ok(run.report(lines.len(), end))
+}
+
+impl Run<'_> {
+    fn stream(&mut self, lines: &Lines, progress: &mut impl FnMut(usize)) -> Result<()> {
+        self.talk.set_number(self.machine, LINE_MS)?;
+        for (n, (number, text)) in lines.iter().enumerate() {
+            let line = reading::without_comment(text);
+            if !line.is_empty() {
+                self.asked(line);
+                self.talk.say(self.machine, *number, line, HEAT_MS)?;
+                self.progress_at = self.machine.cycle();
+                self.answered(n);
+            }
+            progress(n + 1);
+        }
+        self.talk.say(self.machine, 0, "M400", LINE_MS)
+    }
+
+    fn asked(&mut self, line: &str) {
+        let now = self.machine.cycle();
+        match reading::asked(line) {
+            Asked::HotEnd(degrees) => self.heat.asked(HOT_END, degrees, now),
+            Asked::Bed(degrees) => self.heat.asked(BED, degrees, now),
+            Asked::Nothing => {}
+        }
+    }
+
+    /// Line `n` has been answered: behind a homing steps count anew.
+    fn answered(&mut self, n: usize) {
+        if self.corners.as_ref().is_ok_and(|corners| corners[n].homes) {
+            self.count_from(n);
+        }
+    }
+
+    /// The machine stands where a line ends: its steps count from there.
+    fn count_from(&mut self, corner: usize) {
+        self.home = corner;
+        let ends = self.ends();
+        let motors = self.setup.motors.iter().enumerate();
+        let active_low = motors.fold(0, |bits, (m, motor)| bits | u8::from(motor.active_low) << m);
+        let scale = Scale {
+            clock_hz: f64::from(self.machine.board().clock_hz),
+            motors: self.setup.travels(),
+            ends: ends.into_iter().map(|(line, place)| (line, self.at_pins(place))).collect(),
+        };
+        let recorder = self.machine.recorder_mut();
+        recorder.set_active_low(active_low);
+        recorder.clear();
+        recorder.meter_pauses(scale);
+    }
+
+    fn at_pins(&self, place: Place) -> Place {
+        let inverted = |m: usize| self.setup.motors[m].inverted;
+        std::array::from_fn(|m| if inverted(m) { -place[m] } else { place[m] })
+    }
+
+    /// Where the lines behind the last homing end, in steps from there.
+    fn ends(&self) -> Vec<(usize, Place)> {
+        let corners = self.corners.as_deref().unwrap_or_default();
+        let Some(home) = corners.get(self.home) else { return Vec::new() };
+        // A print that homes begins there; one that does not begins at 0.
+        let from = |m: usize| {
+            let motor = &self.setup.motors[m];
+            if home.homes { motor.steps(home.position[motor.axis]) } else { 0 }
+        };
+        let first = if home.homes { self.home + 1 } else { 0 };
+        let end = |corner: &Corner| {
+            let steps = |m: usize| {
+                let motor = &self.setup.motors[m];
+                motor.steps(corner.position[motor.axis]) - from(m)
+            };
+            (corner.line, std::array::from_fn(steps))
+        };
+        corners.iter().skip(first).map(end).collect()
+    }
+
+    /// Waits until no motor steps any more.
+    fn settle(&mut self) -> Result<()> {
+        let end = self.machine.cycle() + self.machine.cycles(LINE_MS);
+        let still = self.machine.cycles(STILL_MS);
+        loop {
+            self.talk.run_for_ms(self.machine, STILL_MS / 4)?;
+            let now = self.machine.cycle();
+            let moved = self.machine.recorder().last_step().unwrap_or(0);
+            if now - moved.max(self.progress_at) > still {
+                return Ok(());
+            }
+            if now > end {
+                bail!("does not come to rest");
+            }
+        }
+    }
+
+    fn expected(&self) -> Result<Outcome, Unclear> {
+        let corners = self.corners.as_ref().map_err(Clone::clone)?;
+        let steps = self.ends().last().map_or(Place::default(), |(_, place)| *place);
+        Ok(Outcome {
+            position: corners.last().map(|corner| corner.position).unwrap_or_default(),
+            steps: steps.to_vec(),
+            longest_dwell_ms: 0,
+        })
+    }
+
+    fn report(mut self, lines: usize, end: Result<()>) -> Report {
+        let moved = self.machine.recorder().last_step().unwrap_or(self.began);
+        let idle_at = moved.max(self.progress_at);
+        let up: [bool; MOTORS] = std::array::from_fn(|m| !self.setup.motors[m].inverted);
+        let log = self.machine.recorder().log();
+        let followed = path::follow(log, Place::default(), &self.ends(), up);
+        let seconds = |cycle: u64| self.machine.seconds(cycle.saturating_sub(self.began));
+        let (to_idle, to_answer) = (seconds(idle_at), seconds(self.progress_at));
+        let mut report = Report::new(
+            self.machine,
+            Measured {
+                lines,
+                acknowledged: if end.is_ok() { lines } else { self.talk.answered() },
+                skipped: 0,
+                rejected: self.talk.take_rejected(),
+                restarts: self.talk.starts(),
+                late_segments: Some(self.talk.late()),
+                strays: self.talk.strays().to_vec(),
+                seconds_to_idle: to_idle,
+                seconds_to_answer: to_answer,
+                setup: self.setup.clone(),
+                expected: self.expected(),
+                fault: end.err().map(|e| format!("{e:#}")),
+            },
+        );
+        let heat = self.heat.heat(self.machine, self.began);
+        let followed = self.corners.is_ok().then_some(followed);
+        report.add_print(followed, heat);
+        report
+    }
+}
+
+/// Where a print that does not home ends, in steps of each motor from where it began.
+pub fn end_of(lines: &Lines, setup: &Setup) -> Result<Vec<i64>> {
+    let corners = reading::read(lines)?;
+    let last = corners.last().context("a print without lines")?;
+    Ok(setup.motors.iter().map(|motor| motor.steps(last.position[motor.axis])).collect())
+}

@@ -1,0 +1,144 @@
+//! Whether every step of a print is on the way from one line's end to the next.
+//!
+//! The steps are followed in the order in which the pins made them. Where the motors are then has to be on the stretch of a line, each motor
+//! within [`MOST`] steps of where the motor with the most steps of that line has it; and lines follow in their order.
+
+use std::fmt::{self, Display, Formatter};
+
+use kerf::boards::MOTORS;
+use serde::Serialize;
+
+use crate::recorder::Step;
+
+/// How far a motor may be off a line, steps. Ends of lines are rounded to steps here, half a step at most; the motors that do not lead are up to
+/// two steps behind or ahead where short lines join.
+const MOST: f64 = 2.5;
+/// Lines that may be left out one after the other, for each is shorter than a step.
+const AHEAD: usize = 12;
+
+/// Where the motors are, in steps.
+pub type Place = [i64; MOTORS];
+
+/// What following the steps has found.
+#[derive(Clone, Serialize, Debug)]
+pub struct Followed {
+    /// The steps that were looked at.
+    pub steps: usize,
+    /// The stretches that they had to follow.
+    pub stretches: usize,
+    /// How far a motor was off its line at worst, steps.
+    pub most: f64,
+    /// The line of the file that was left first, if one was.
+    pub left: Option<usize>,
+    /// Steps of each motor, both ways, and how many the file asks for.
+    pub totals: [(u64, u64); MOTORS],
+}
+
+impl Followed {
+    /// What is wrong.
+    pub fn problem(&self) -> Option<String> {
+        if let Some(line) = self.left {
+            return Some(format!("steps leave the way of line {line}"));
+        }
+        // Where a curve turns round less than the tolerance of the path behind a step, that step is left out there and back.
+        let is_right = |(made, asked): &(u64, u64)| {
+            made <= asked && (asked - made).is_multiple_of(2) && (asked - made) * 1_000 <= *asked
+        };
+        let wrong = self.totals.iter().position(|totals| !is_right(totals))?;
+        let (made, asked) = self.totals[wrong];
+        Some(format!("motor {} has made {made} steps instead of {asked}", wrong + 1))
+    }
+}
+
+impl Display for Followed {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Followed { steps, stretches, most, .. } = self;
+        write!(f, "{steps} on {stretches} stretches of the file, {most:.2} steps beside it at most")
+    }
+}
+
+/// Follows steps along the ends of lines, from `from` on. `up` says of a motor whether a step that counts upwards at the pin does so in the job.
+pub fn follow(log: &[Step], from: Place, ends: &[(usize, Place)], up: [bool; MOTORS]) -> Followed {
+    let mut stretches = vec![(0, from, from)];
+    for (line, end) in ends {
+        let (_, _, last) = stretches[stretches.len() - 1];
+        if *end != last {
+            stretches.push((*line, last, *end));
+        }
+    }
+    let made = |m: usize| log.iter().filter(|step| usize::from(step.motor) == m).count() as u64;
+    let asked = |m: usize| stretches.iter().map(|(_, a, b)| a[m].abs_diff(b[m])).sum();
+    let mut followed = Followed {
+        steps: log.len(),
+        stretches: stretches.len() - 1,
+        most: 0.0,
+        left: None,
+        totals: std::array::from_fn(|m| (made(m), asked(m))),
+    };
+    let (mut at, mut now) = (from, 0);
+    for step in log {
+        let motor = usize::from(step.motor);
+        at[motor] += if step.positive == up[motor] { 1 } else { -1 };
+        // The nearest one, of those that are as near the first.
+        let ahead = stretches.iter().enumerate().skip(now).take(AHEAD);
+        let offs = ahead.map(|(n, (_, a, b))| (n, off(at, *a, *b)));
+        let Some((n, off)) = offs.min_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+        if off > MOST {
+            followed.left = Some(stretches[now].0);
+            return followed;
+        }
+        now = n;
+        followed.most = followed.most.max(off);
+    }
+    if now + AHEAD < stretches.len() {
+        followed.left = Some(stretches[now].0);
+    }
+    followed
+}
+
+/// How far the worst motor is from the stretch between two places, in steps.
+fn off(at: Place, from: Place, to: Place) -> f64 {
+    let way = |motor: usize| (to[motor] - from[motor]) as f64;
+    let leads = (0..MOTORS).max_by(|a, b| way(*a).abs().total_cmp(&way(*b).abs())).unwrap_or(0);
+    let share = match way(leads) {
+        0.0 => 0.0,
+        way => ((at[leads] - from[leads]) as f64 / way).clamp(0.0, 1.0),
+    };
+    let off = |motor: usize| (at[motor] as f64 - from[motor] as f64 - share * way(motor)).abs();
+    (0..MOTORS).map(off).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps of motors, upwards or downwards.
+    fn steps(text: &str) -> Vec<Step> {
+        let step = |c: char| Step {
+            cycle: 0,
+            motor: u8::from(!matches!(c, 'x' | 'X')),
+            positive: c.is_uppercase(),
+        };
+        text.chars().map(step).collect()
+    }
+
+    fn place(x: i64, y: i64) -> Place {
+        let mut place = Place::default();
+        (place[0], place[1]) = (x, y);
+        place
+    }
+
+    #[test]
+    fn steps_on_the_way_and_off_it() {
+        let ends = [(1, place(4, 2)), (2, place(0, 2)), (3, place(0, 0))];
+        let way = |text: &str| follow(&steps(text), Place::default(), &ends, [true; MOTORS]);
+        assert_eq!(way("XYXXYXxxxxyy").left, None);
+        assert_eq!(way("XXXXXXXYY").left, Some(1));
+        assert!(way("XXXY").most > 1.0);
+        let right = follow(&steps("xyxx"), Place::default(), &ends, [false; MOTORS]);
+        assert_eq!(right.left, None);
+        assert_eq!(way("XYXXYXxxxxyy").problem(), None);
+        // A line that was never carried out.
+        assert!(way("XYXXYXxxxx").problem().unwrap().contains("motor 2"));
+    }
+}
