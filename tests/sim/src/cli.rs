@@ -99,6 +99,9 @@ pub struct ServeArgs {
     /// where this ends, to the step.
     #[arg(long, value_name = "JOB")]
     pub expect: Option<PathBuf>,
+    /// Damage one numbered line of so many on its way to the board, by this seed.
+    #[arg(long, value_name = "ONE_IN:SEED", value_parser = damage)]
+    pub damage: Option<(u64, u64)>,
     /// Speed of the serial line at power-up; it goes along when the firmware changes its own.
     #[arg(long, default_value_t = 115_200, value_parser = baud())]
     pub baud: u32,
@@ -144,6 +147,15 @@ fn span(text: &str) -> Result<Range<f64>, String> {
     match ends {
         Some((Ok(from), Ok(to))) if 0.0 <= from && from < to => Ok(from..to),
         _ => Err("two times with .. between them, the later one last".to_string()),
+    }
+}
+
+/// One line of how many is damaged, and a seed.
+fn damage(text: &str) -> Result<(u64, u64), String> {
+    let parts = text.split_once(':').map(|(one_in, seed)| (one_in.parse(), seed.parse()));
+    match parts {
+        Some((Ok(one_in), Ok(seed))) if one_in > 0 => Ok((one_in, seed)),
+        _ => Err("two whole numbers with a colon between them".to_string()),
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod arrival;
 mod cli;
+mod damage;
 mod gdb;
 mod measure;
 mod pty;

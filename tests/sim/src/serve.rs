@@ -12,6 +12,7 @@ use kerf_sim::{Image, Machine};
 
 use crate::arrival::Arrival;
 use crate::cli::{ServeArgs, Speed};
+use crate::damage::Damage;
 use crate::gdb::Gdb;
 use crate::pty::{Peer, Pty};
 use crate::run::board;
@@ -40,6 +41,7 @@ struct Server {
     baud: u32,
     pty: Pty,
     gdb: Option<Gdb>,
+    damage: Option<Damage>,
     speed: Speed,
     peer: Peer,
     reset_at: Option<Instant>,
@@ -111,6 +113,7 @@ impl Server {
             baud: args.baud,
             gdb: args.gdb.map(Gdb::listen).transpose()?,
             pty,
+            damage: args.damage.map(|(one_in, seed)| Damage::new(one_in, seed)),
             speed: args.speed,
             peer: Peer::Closed,
             reset_at: None,
@@ -132,6 +135,10 @@ impl Server {
         }
         if self.takes_bytes() {
             let bytes = self.pty.read()?;
+            let bytes = match &mut self.damage {
+                Some(damage) => damage.pass(&bytes),
+                None => bytes,
+            };
             self.machine.send(&bytes);
         }
         self.run()?;
@@ -229,6 +236,10 @@ impl Server {
         let off = m.meters().window_outside();
         let stack = m.free_stack().map_or("unknown".to_string(), |n| format!("{n} bytes"));
         text += &format!("interrupts off for up to {} cycles: {}\n", off.cycles, m.describe(&off));
+        if let Some(damage) = &self.damage {
+            let (numbered, damaged) = damage.counts();
+            text += &format!("damaged {damaged} of {numbered} numbered lines\n");
+        }
         text += &format!("free stack {stack}, UART overruns {}\n", m.uart(0).overruns());
         text
     }

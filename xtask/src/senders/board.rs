@@ -15,11 +15,20 @@ pub struct Board {
 }
 
 impl Board {
-    /// Starts it.
-    pub fn start(program: &Path, elf: &Path, board: &str, job: &Path) -> Result<Board> {
+    /// Starts it. `damage` is what the simulator takes for `--damage`.
+    pub fn start(
+        program: &Path,
+        elf: &Path,
+        board: &str,
+        job: &Path,
+        damage: Option<&str>,
+    ) -> Result<Board> {
         let mut command = Command::new(program);
         command.args(["serve", "--speed", "max", "--elf"]).arg(elf).args(["--board", board]);
         command.arg("--expect").arg(job);
+        if let Some(damage) = damage {
+            command.args(["--damage", damage]);
+        }
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.spawn().context("cannot start the simulator")?;
         let mut output = BufReader::new(child.stdout.take().context("no output")?);
@@ -59,7 +68,8 @@ fn motors(text: &str) -> String {
         (total != "0")
             .then(|| format!("motor {motor} at {steps}, right is {expected}, {total} steps"))
     };
-    let motors: Vec<_> = text.lines().filter_map(shown).collect();
+    let damaged = text.lines().find(|line| line.starts_with("damaged ")).map(str::to_owned);
+    let motors: Vec<_> = text.lines().filter_map(shown).chain(damaged).collect();
     match motors.is_empty() {
         true if text.contains("arrival ") => "no motor has moved".to_owned(),
         true => "the simulator does not tell where the motors are".to_owned(),

@@ -3,6 +3,7 @@
 //! | module | for |
 //! |---|---|
 //! | [`install`] | gets the senders by npm and pip |
+//! | [`job`] | what hosts of printers send |
 //! | [`board`] | the simulated board behind a serial port, and where its motors end |
 //! | [`session`] | one sender at one board |
 //! | [`step`] | what a sender's driver tells of its steps |
@@ -13,6 +14,7 @@
 
 mod board;
 mod install;
+mod job;
 mod session;
 mod step;
 mod table;
@@ -50,6 +52,7 @@ enum Sender {
     BcncG2core,
     GrblStreamer,
     Printcore,
+    CncjsMarlin,
 }
 
 impl Sender {
@@ -63,6 +66,7 @@ impl Sender {
             Sender::BcncG2core => "bcnc-g2core",
             Sender::GrblStreamer => "grbl-streamer",
             Sender::Printcore => "printcore",
+            Sender::CncjsMarlin => "cncjs-marlin",
         }
     }
 
@@ -76,14 +80,25 @@ impl Sender {
             Sender::BcncG2core => ("bcnc.py", Some("G2Core")),
             Sender::GrblStreamer => ("grbl-streamer.py", None),
             Sender::Printcore => ("printcore.py", None),
+            Sender::CncjsMarlin => ("cncjs-marlin.js", None),
         }
     }
 }
 
 impl Sender {
+    /// Whether it is a host of printers.
+    fn prints(self) -> bool {
+        matches!(self, Sender::Printcore | Sender::CncjsMarlin)
+    }
+
     /// The board whose image it speaks to.
     fn board(self) -> Board {
-        if self == Sender::Printcore { Board::Ramps14 } else { Board::default() }
+        if self.prints() { Board::Ramps14 } else { Board::default() }
+    }
+
+    /// One line in a hundred of a host that sends checksums is damaged on its way, by a seed.
+    fn damage(self) -> Option<&'static str> {
+        (self == Sender::Printcore).then_some("100:21")
     }
 }
 
@@ -101,9 +116,10 @@ pub fn run(args: &SendersArgs) -> Result<()> {
         elves.push(sim::prepare(sender.board(), Machine::default())?);
     }
     // A printer's host sends what a printer prints.
-    let print = root().join("tests/senders/print.gcode");
+    let print = folder.join("print.gcode");
+    std::fs::write(&print, job::prints())?;
     let session = &|(sender, elf): (Sender, &PathBuf)| {
-        let job = if sender == Sender::Printcore { &print } else { &job };
+        let job = if sender.prints() { &print } else { &job };
         let board = sender.board();
         Session { sender, program: &program, elf, board, job, folder: &folder }.run()
     };

@@ -62,7 +62,8 @@ impl Session<'_> {
     }
 
     fn attempt(&self, tell: &mut impl FnMut(Step)) -> Result<()> {
-        let board = Board::start(self.program, self.elf, self.board.name(), self.job)?;
+        let damage = self.sender.damage();
+        let board = Board::start(self.program, self.elf, self.board.name(), self.job, damage)?;
         let mut driver = Driver::start(self, &board.port)?;
         let end = Instant::now() + LIMIT;
         while let Some(line) = driver.line(end)? {
