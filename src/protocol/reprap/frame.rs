@@ -1,7 +1,8 @@
 //! `N12 G1 X10*34`: the number of a line and its checksum, and what is between them.
 //!
-//! The checksum is the exclusive or of all bytes before the asterisk. It is checked where there is one. A port whose lines have had numbers and checksums
-//! takes a line without one of the two for damaged, if it has the other: a byte of it may have been changed on its way.
+//! The checksum is the exclusive or of all bytes before the asterisk. It is checked in a line that begins with N, and in every line of a port whose lines
+//! have had numbers and checksums; else an asterisk is text. Such a port takes a line without one of the two for damaged, if it has the other: a byte of it
+//! may have been changed on its way. So is a line whose number cannot be read, or that has a byte 0, which changes no checksum.
 
 use crate::protocol::Span;
 
@@ -37,6 +38,8 @@ pub enum Sum {
 pub struct Frame {
     /// N.
     pub number: Option<i32>,
+    /// It begins with N, whether a number can be read there or not.
+    pub numbered: bool,
     /// Its checksum.
     pub sum: Sum,
     /// What is between them, without blanks at its ends.
@@ -67,7 +70,8 @@ impl Frame {
                 let (text, stated) = line.split_at_checked(at).unwrap_or((line, &[]));
                 let sum = text.iter().fold(0, |sum, byte| sum ^ byte);
                 let stated = stated.get(1..).and_then(|digits| integer(digits.trim_ascii()));
-                if stated == Some(sum.into()) { Sum::Right } else { Sum::Wrong }
+                let whole = stated == Some(sum.into()) && !text.contains(&0);
+                if whole { Sum::Right } else { Sum::Wrong }
             }
         };
         let blank = |at: usize| line.get(at).is_some_and(u8::is_ascii_whitespace);
@@ -76,7 +80,8 @@ impl Frame {
             start += 1;
         }
         let mut number = None;
-        if matches!(line.get(start), Some(b'N' | b'n')) {
+        let numbered = matches!(line.get(start), Some(b'N' | b'n'));
+        if numbered {
             let mut behind = start + 1;
             while behind < end && blank(behind) {
                 behind += 1;
@@ -86,7 +91,9 @@ impl Frame {
             {
                 behind += 1;
             }
-            number = line.get(first..behind).and_then(integer);
+            // No fraction.
+            let ends = line.get(behind) != Some(&b'.');
+            number = line.get(first..behind).filter(|_| ends).and_then(integer);
             if number.is_some() {
                 start = behind;
             }
@@ -97,7 +104,15 @@ impl Frame {
         while start < end && blank(end - 1) {
             end -= 1;
         }
-        Self { number, sum, block: Span { start: start as u8, end: end as u8 } }
+        Self { number, numbered, sum, block: Span { start: start as u8, end: end as u8 } }
+    }
+
+    /// What is between number and checksum; of a line whose asterisk is text, what is behind the number.
+    #[small]
+    pub fn text(&self, line: &[u8]) -> Span {
+        let Span { start, end } = self.block;
+        let end = if self.sum == Sum::Wrong { line.trim_ascii_end().len() as u8 } else { end };
+        Span { start, end }
     }
 }
 
@@ -136,12 +151,15 @@ impl Session {
     #[inline(never)]
     pub fn take(&mut self, frame: &Frame, sets: Option<i32>, overtakes: bool) -> Result<(), Fault> {
         self.lines = self.lines.wrapping_add(1);
-        if frame.sum == Sum::Wrong {
+        let counts = frame.numbered || self.sums;
+        if counts && frame.sum == Sum::Wrong {
             return Err(Fault::Sum);
         }
         let Some(number) = frame.number else {
             if let Some(set) = sets {
                 self.last = set;
+            } else if frame.numbered || (counts && frame.sum == Sum::Right) {
+                return Err(Fault::Number);
             }
             return Ok(());
         };
@@ -199,12 +217,19 @@ mod tests {
         assert_eq!(parts("M117 5*x"), (None, Sum::None, "M117 5*x"));
         assert_eq!(parts("  "), (None, Sum::None, ""));
         assert_eq!(parts("N M105"), (None, Sum::None, "N M105"));
+        assert_eq!(parts("N1.5 M105"), (None, Sum::None, "N1.5 M105"));
+        assert_eq!(parts("N2 G28\0*17").1, Sum::Wrong);
     }
 
     #[test]
     fn lines_are_taken_once() {
         let mut session = Session::default();
-        let frame = |number, sum| Frame { number: Some(number), sum, block: Span::default() };
+        let frame = |number, sum| Frame {
+            number: Some(number),
+            numbered: true,
+            sum,
+            block: Span::default(),
+        };
         assert_eq!(session.take(&frame(-1, Sum::Right), Some(-1), false), Ok(()));
         assert_eq!(session.take(&frame(0, Sum::Right), None, false), Ok(()));
         assert_eq!(session.take(&frame(0, Sum::Right), None, false), Err(Fault::Number));

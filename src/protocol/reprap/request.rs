@@ -53,7 +53,7 @@ impl Request {
             Ok(()) if block.is_empty() => What::Nothing,
             Ok(()) => host::of(code).map_or(What::Gcode, What::Host),
         };
-        Self { what, at: 0, block: frame.block, begun: false }
+        Self { what, at: 0, block: frame.text(line), begun: false }
     }
 
     /// A line that could not be kept, or has been dropped.

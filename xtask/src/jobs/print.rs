@@ -106,7 +106,7 @@ impl Print {
             self.circle(radius, feed(PERIMETER));
         }
         self.line(";TYPE:Fill");
-        let angle = if layer % 2 == 0 { 45.0 } else { 135.0 };
+        let angle = if layer.is_multiple_of(2) { 45.0 } else { 135.0 };
         for (from, to) in fill(angle, INNER + inset(1.5), OUTER - inset(1.5)) {
             self.travel(from);
             self.extrude(to, feed(FILLING));
