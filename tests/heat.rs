@@ -36,11 +36,17 @@ const STEP: u64 = 10;
 
 impl Printer {
     fn new() -> Option<Self> {
+        Self::at(AIR)
+    }
+
+    /// With the hot end that hot at power-up.
+    fn at(degrees: f64) -> Option<Self> {
         if !Capability::Printer.is_built_in() {
             return None;
         }
         let machine = Machine::boot(115_200).expect("one machine for each thread");
-        let (hot_end, bed) = (Plant::hot_end(), Plant::bed());
+        let (mut hot_end, bed) = (Plant::hot_end(), Plant::bed());
+        (hot_end.block, hot_end.sensor) = (degrees, degrees);
         let mut printer = Self {
             machine,
             hot_end,
@@ -296,4 +302,55 @@ fn the_end_of_a_program_switches_off() {
     let mut on = 0;
     printer.run(5_000, |printer| on |= printer.machine.heaters_on());
     assert_eq!(on, 0);
+}
+
+/// Of a printing host, with the hot end at so many degrees.
+fn prints(at: f64) -> Option<Printer> {
+    let mut printer = Printer::at(at)?;
+    printer.ask("M105");
+    printer.ask("M92 E100");
+    Some(printer)
+}
+
+#[test]
+fn filament_moves_where_it_is_hot_enough() {
+    for (at, steps) in [(167.0, 0), (176.0, -100)] {
+        let join = std::thread::spawn(move || {
+            let Some(mut printer) = prints(at) else { return };
+            let answer = printer.ask("G1 E-1 F600");
+            assert_eq!(answer.contains("cold extrusion prevented"), steps == 0, "{answer}");
+            printer.run(1_000, |_| {});
+            assert_eq!(printer.machine.emitted().position[3], steps, "at {at} degrees");
+        });
+        join.join().expect("no panic");
+    }
+}
+
+/// What has been planned hot is stopped where it begins cold.
+#[test]
+fn filament_that_gets_cold_in_the_queue_is_not_moved() {
+    let Some(mut printer) = prints(180.0) else { return };
+    printer.send("G4 S300");
+    printer.send("G1 X1 F3000");
+    printer.send("G1 E300 F600");
+    printer.run(310_000, |_| {});
+    let said = printer.said.clone();
+    assert!(said.contains("Error:too cold to extrude"), "{said}");
+    let steps = printer.machine.emitted().position;
+    assert_eq!(steps[0], 1_280);
+    assert!(steps[3] < 400, "{steps:?}");
+    printer.ask("M999");
+    assert!(printer.ask("G1 X2").contains("ok"));
+}
+
+/// A temperature that swings around the limit stops nothing that is under way.
+#[test]
+fn a_few_degrees_less_stop_nothing() {
+    let Some(mut printer) = prints(174.0) else { return };
+    printer.send("G1 E200 F600");
+    printer.run(10_000, |printer| {
+        assert!(!printer.said.contains("cold"), "{}", printer.said);
+    });
+    assert!(printer.hot_end.sensor < 168.0, "{}", printer.hot_end.sensor);
+    assert!(printer.machine.emitted().position[3] > 9_000);
 }

@@ -24,6 +24,8 @@ impl Host {
         host.machine.received();
         host.machine.send(b"M105\n");
         host.hear();
+        // Nothing is hot.
+        assert_eq!(host.ask("M302 P1"), "ok\n");
         host
     }
 

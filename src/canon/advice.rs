@@ -130,8 +130,8 @@ const ADVICE: &[(Status, &str, &str)] = &[
     ),
     (
         TooCold,
-        "The line moves filament, and the hot end is colder than its setting allows.",
-        "Heat it first: `M109 S200`.",
+        "The line moves filament, and the hot end is colder than `he1mn` says. As an alarm: it has got colder, by 10 degrees, than filament that is being moved asks for.",
+        "Heat it first: `M109 S200`. Where A is no extruder: `{he1k:0}`.",
     ),
     (
         HeatersLocked,

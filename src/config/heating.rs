@@ -1,5 +1,6 @@
 //! What lines may ask of heaters: kept beside the settings, for who interprets lines asks there.
 
+use crate::boards::ACTIVE;
 use crate::capability::Capability;
 use crate::status::Status;
 
@@ -13,11 +14,26 @@ pub struct Heating {
     pub hottest: [u16; 2],
     /// Why none may be switched on, or `Ok`.
     pub refused: Status,
+    /// Whether the A axis is an extruder: the board has heaters, or a printing host has been heard.
+    pub extruder: bool,
     /// Whether the hot end is hot enough for filament to be moved.
-    pub extrudes: bool,
+    pub warm: bool,
+    /// Whether filament may be moved however cold it is, until the next start.
+    pub allows_cold: bool,
 }
 
 impl Heating {
     /// Nothing is hot, and nothing may be made so.
-    pub const NONE: Self = Self { hottest: [0; 2], refused: Status::Ok, extrudes: false };
+    pub const NONE: Self = Self {
+        hottest: [0; 2],
+        refused: Status::Ok,
+        extruder: ACTIVE.heaters.is_some(),
+        warm: false,
+        allows_cold: false,
+    };
+
+    /// Whether the A axis may be moved.
+    pub fn extrudes(&self) -> bool {
+        !self.extruder || self.warm || self.allows_cold
+    }
 }

@@ -213,6 +213,7 @@ impl<T: Tables> Interpreter<T> {
     ) -> Result<(), Status> {
         let before = Before::of(&self.state);
         let done = self.state.execute(block, &before.position, &self.tables, setup, out);
+        self.state.carry_flow(done.is_ok());
         if done.is_err() {
             before.restore(&mut self.state);
             out.clear();
@@ -239,6 +240,7 @@ impl<T: Tables> Interpreter<T> {
             out,
             &mut edit,
         );
+        self.state.carry_flow(done.is_ok());
         match (&done, &edit) {
             (Ok(()), Some(edit)) => self.tables.apply(edit),
             (Ok(()), None) => {}

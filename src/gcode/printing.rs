@@ -2,15 +2,17 @@
 //!
 //! Of an image without a dialect of printing hosts there is nothing of this.
 
+use super::command::Motion;
 #[cfg(feature = "dialect-reprap")]
-use super::command::{Commands, Feed, Motion};
+use super::command::{Commands, Feed};
 use super::interpreter::Interpreter;
 use super::modal::Distance;
 #[cfg(feature = "dialect-reprap")]
 use super::modal::{MotionMode, Units};
+use super::setup::Setup;
 use super::state::State;
 use crate::status::Status;
-use crate::units::{FIRST_ROTARY, Length};
+use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// The axis of the extruder.
 pub const EXTRUDER: usize = FIRST_ROTARY;
@@ -31,6 +33,10 @@ pub struct Printing {
     own: Option<Distance>,
     /// M221, thousandths.
     flow: u16,
+    /// The line moves no filament: that is too cold.
+    dry: bool,
+    /// How much farther the origin is to move along with what flows, once the line is carried out.
+    more: i32,
 }
 
 /// How the extruder takes its words: as any axis.
@@ -41,7 +47,7 @@ pub struct Printing;
 #[cfg(feature = "dialect-reprap")]
 impl Printing {
     /// As any axis.
-    pub const NONE: Self = Self { own: None, flow: FULL };
+    pub const NONE: Self = Self { own: None, flow: FULL, dry: false, more: 0 };
 
     /// What its words are measured from, if that is not what those of the others are.
     #[inline(always)]
@@ -59,6 +65,12 @@ impl Printing {
     #[inline(always)]
     pub fn flow(self) -> u16 {
         self.flow
+    }
+
+    /// How much of the filament flows, thousandths.
+    #[inline(always)]
+    fn flows(self) -> u16 {
+        if self.dry { 0 } else { self.flow }
     }
 }
 
@@ -82,22 +94,48 @@ impl Printing {
     pub fn flow(self) -> u16 {
         FULL
     }
+
+    /// All of it.
+    #[inline(always)]
+    fn flows(self) -> u16 {
+        FULL
+    }
 }
 
 impl Printing {
     /// Whether the extruder takes its words as any axis does.
     #[inline(always)]
     pub fn is_usual(self) -> bool {
-        self.distance().is_none() && self.flow() == FULL
+        self.distance().is_none() && self.flows() == FULL
     }
 }
 
 impl State {
-    /// Where a move of the extruder to `target` ends: its origin moves along with what flows more or less.
+    /// Refuses a move of the extruder where filament is too cold for that.
+    #[inline(never)]
+    #[small]
+    pub(super) fn check_extrusion(
+        &self,
+        start: &PerAxis<Length>,
+        motion: &Motion,
+        setup: &impl Setup,
+    ) -> Result<(), Status> {
+        let via = match motion {
+            Motion::None | Motion::SetPosition { .. } | Motion::Heat(_) => return Ok(()),
+            Motion::Through { via, .. } => via,
+            _ => &self.position,
+        };
+        let at = |place: &PerAxis<Length>| place.get(EXTRUDER).copied();
+        let moves = at(start) != at(&self.position) || at(start) != at(via);
+        if moves { setup.extrudes() } else { Ok(()) }
+    }
+
+    /// Where a move of the extruder to `target` ends. Its origin moves along with what flows more or less, once the line is
+    /// [carried out](Self::carry_flow).
     #[inline(never)]
     #[small]
     pub(super) fn flow_to(&mut self, target: Length) -> Result<Length, Status> {
-        let flow = self.printing.flow();
+        let flow = self.printing.flows();
         let from = self.position.get(EXTRUDER).copied().unwrap_or_default();
         if flow == FULL {
             return Ok(target);
@@ -107,15 +145,48 @@ impl State {
         let flows = (way * i64::from(flow) + half) / 1_000;
         let more = i32::try_from(flows - way).map_err(|_| Status::OutOfRange)?;
         let end = target.checked_add(Length(more)).ok_or(Status::OutOfRange)?;
-        self.shift_extruder(more).ok_or(Status::OutOfRange)?;
+        self.shifted_extruder(more).ok_or(Status::OutOfRange)?;
+        self.owe_flow(more);
         Ok(end)
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn owe_flow(&mut self, more: i32) {
+        self.printing.more = more;
+    }
+
+    #[cfg(not(feature = "dialect-reprap"))]
+    fn owe_flow(&mut self, _more: i32) {}
+
+    /// The line is carried out, or refused: what its filament flows more or less counts, or does not.
+    #[cfg(feature = "dialect-reprap")]
+    #[inline(always)]
+    pub(super) fn carry_flow(&mut self, done: bool) {
+        if self.printing.more != 0 {
+            let more = core::mem::take(&mut self.printing.more);
+            if done {
+                let _ = self.shift_extruder(more);
+            }
+        }
+    }
+
+    /// Nothing flows more or less.
+    #[cfg(not(feature = "dialect-reprap"))]
+    #[inline(always)]
+    pub(super) fn carry_flow(&mut self, _done: bool) {}
+
+    /// Origin and G92 of the extruder, moved.
+    #[small]
+    fn shifted_extruder(&self, by: i32) -> Option<(Length, Length)> {
+        let (origin, shift) = (self.origin.get(EXTRUDER)?, self.shift.get(EXTRUDER)?);
+        Some((origin.checked_add(Length(by))?, shift.checked_add(Length(by))?))
     }
 
     /// Moves what the words of the extruder are measured from, as G92 does.
     #[small]
     fn shift_extruder(&mut self, by: i32) -> Option<()> {
+        let moved = self.shifted_extruder(by)?;
         let (origin, shift) = (self.origin.get_mut(EXTRUDER)?, self.shift.get_mut(EXTRUDER)?);
-        let moved = (origin.checked_add(Length(by))?, shift.checked_add(Length(by))?);
         (*origin, *shift) = moved;
         self.shifted = true;
         Some(())
@@ -133,6 +204,11 @@ impl<T> Interpreter<T> {
     /// The extruder moves so many thousandths of what its words say.
     pub fn set_flow(&mut self, flow: u16) {
         self.state.printing.flow = flow;
+    }
+
+    /// The next line moves no filament, whatever it says: its words count as if it had.
+    pub fn leave_out(&mut self, dry: bool) {
+        self.state.printing.dry = dry;
     }
 
     /// A block of a printing host is next: there are a motion mode and a feed rate from the beginning.

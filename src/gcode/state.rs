@@ -294,6 +294,9 @@ impl State {
         out: &mut Commands,
     ) -> Result<(), Status> {
         limits::check_reach(start, &self.position, &out.motion, setup)?;
+        if Capability::Printer.is_built_in() {
+            self.check_extrusion(start, &out.motion, setup)?;
+        }
         // Limits are for homed axes alone.
         if self.homed != 0 {
             limits::check(start, &out.motion, self.homed, setup)?;

@@ -12,6 +12,7 @@ use super::decimal::Decimal;
 use super::digits::decimal;
 use super::limits::is_near;
 use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units, XMode};
+use super::printing::EXTRUDER;
 use super::setup::{AxisMode, Setup};
 use super::state::State;
 use crate::capability::Capability;
@@ -78,6 +79,9 @@ impl State {
         words.read(from)
             && are_usual(words.seen & AXES_SEEN, setup)
             && (!Capability::CoreXy.is_built_in() || is_near(&words.target, setup))
+            && !(Capability::Printer.is_built_in()
+                && words.seen & 1 << EXTRUDER != 0
+                && setup.extrudes().is_err())
             && self.carry_out(&words, out)
     }
 

@@ -85,9 +85,14 @@ impl Heater {
         if self.kind == Kind::None { 0 } else { self.hottest.unsigned_abs() / 8 }
     }
 
-    /// Whether it is too cold for filament.
-    pub fn is_cold(&self) -> bool {
-        self.now < self.least
+    /// How hot it must be for filament to be moved, degrees.
+    pub fn least(&self) -> i16 {
+        self.least / UNIT
+    }
+
+    /// Whether it is colder than filament asks for by more than this, 1/64 degree. None is too cold where there is no sensor.
+    pub fn is_cold(&self, by: i16) -> bool {
+        self.kind != Kind::None && self.now < self.least.saturating_sub(by)
     }
 
     /// Whether it is on until the next look.

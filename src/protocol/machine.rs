@@ -60,6 +60,8 @@ pub enum Extruder {
     Relative(bool),
     /// It moves so many thousandths of what its words say.
     Flow(u16),
+    /// The next line does not move it; its words count as if it did.
+    LeaveOut,
     /// It moves by itself, and what its words are measured from moves along with it.
     Move {
         /// How far.
@@ -67,6 +69,17 @@ pub enum Extruder {
         /// mm/min.
         feed: i32,
     },
+}
+
+/// What becomes of the temperature below which filament is not moved, until the next start.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Cold {
+    /// Nothing: it is asked for.
+    Asked,
+    /// It does not matter, or it does.
+    Allowed(bool),
+    /// It is this, degrees.
+    Least(i16),
 }
 
 /// The machine behind the dialects. Nothing here waits.
@@ -148,6 +161,12 @@ pub trait Machine {
     fn extruder(&mut self, what: Extruder) -> Status {
         let _ = what;
         Status::NotBuiltIn
+    }
+
+    /// How cold filament may be moved: how hot it must be, degrees, and whether it may be colder all the same.
+    fn extrude_cold(&mut self, change: Cold) -> (i16, bool) {
+        let _ = change;
+        (0, true)
     }
 
     /// The origin of these axes, as bits, is no more where G92 has put it: it is where homing has.

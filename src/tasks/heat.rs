@@ -5,6 +5,8 @@
 //! 200. Heaters are switched at these turns alone: power is spread over them. The power task feeds the watchdog in the same turn: if it
 //! gets none, the chip resets in half a second with its heaters off.
 //!
+//! Filament that is being moved although the hot end has got colder than it must be, by more than 10 degrees, is an alarm.
+//!
 //! A fault ([`heater`](crate::heat::heater), [`fault`](crate::heat::fault)) switches all of them off in its turn, [locks](lock) them, and
 //! raises an alarm. Any alarm switches them off. While a wait is on ([`Heaters::begin_wait`]) the planner is woken when it is over.
 //!
@@ -18,10 +20,14 @@ use kerf_macros::small;
 use super::alarm;
 use super::common;
 use super::links::Links;
+use super::setup::moved_by;
 use super::storage::Storage;
 use crate::capability::Capability;
+#[cfg(feature = "dialect-reprap")]
+use crate::config::groups::hot_end;
 use crate::config::{Owner, Setting, Settings};
 use crate::gcode::heating::{Heat, Part, Wait};
+use crate::gcode::printing::EXTRUDER;
 use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::{flags, heaters};
@@ -29,12 +35,16 @@ use crate::heat::heater::{Heater, Seen};
 use crate::heat::sensor::UNIT;
 use crate::heat::{HEATERS, Orders, PRINTERS, Standing};
 use crate::machine::{self, Alarm};
+#[cfg(feature = "dialect-reprap")]
+use crate::protocol::Cold;
 use crate::status::Status;
 
 /// So near a temperature counts as reached, 1/64 degree.
 const NEAR: i16 = UNIT + UNIT / 2;
 /// For so many steps it has to be: 3 s.
 const STAYS: u8 = 15;
+/// So much colder than filament may be planned it may be moved, 1/64 degree: what is queued already is not stopped by a temperature that swings.
+const GRACE: i16 = 10 * UNIT;
 /// How long a fan that is switched on has all of its power: 200 ms.
 const KICK: u8 = 10;
 
@@ -225,6 +235,9 @@ pub fn set(heaters: &Heaters, settings: &mut Settings, setting: Setting, value: 
         return false;
     };
     heater.set(setting.index(), value);
+    if number == 0 {
+        heating.warm = !heater.is_cold(0);
+    }
     if let Some(hottest) = heating.hottest.get_mut(number) {
         *hottest = heater.hottest();
     }
@@ -270,8 +283,8 @@ pub fn look(links: &Links) {
     match seen {
         Ok(Seen::Look) => {}
         Ok(Seen::Step) => {
-            if number == 0 {
-                note_cold(links, parts);
+            if number == 0 && note_cold(links, parts) {
+                alarm::raise_for(links, Alarm::Alarm, Status::TooCold);
             }
             parts.see_to_wait(&orders);
         }
@@ -296,12 +309,53 @@ fn look_at(
     }
 }
 
-/// Whether filament may be moved.
+/// Notes whether filament may be moved. Whether it is being moved although it has got far too cold.
+#[inline(never)]
 #[small]
-fn note_cold(links: &Links, parts: &Parts) {
+fn note_cold(links: &Links, parts: &Parts) -> bool {
     let [hot_end, _] = &*parts.heaters.borrow();
-    if let Some(heating) = links.settings.borrow_mut().heating.first_mut() {
-        heating.extrudes = !hot_end.is_cold();
+    let mut settings = links.settings.borrow_mut();
+    let Some(heating) = settings.heating.first_mut() else { return false };
+    heating.warm = !hot_end.is_cold(0);
+    let refused = hot_end.is_cold(GRACE) && !heating.extrudes();
+    refused && !machine::is_alarmed() && moves_filament(links.thread, &settings)
+}
+
+/// Whether the block that runs moves the extruder.
+#[small]
+fn moves_filament(thread: Thread, settings: &Settings) -> bool {
+    let motion = common::snapshot(thread);
+    let mut motors = motion.steps.iter().enumerate();
+    motion.running
+        && motion.left > 0.0
+        && motors
+            .any(|(motor, steps)| *steps != 0 && usize::from(moved_by(settings, motor)) == EXTRUDER)
+}
+
+/// How cold filament may be moved: as `change` says, until the next start. How hot it must be, degrees, and whether it may be colder all the same.
+#[cfg(feature = "dialect-reprap")]
+#[inline(never)]
+#[small]
+pub fn extrude_cold(heaters: &Heaters, settings: &mut Settings, change: Cold) -> (i16, bool) {
+    let (Some(parts), Some(heating)) = (heaters.parts.first(), settings.heating.first_mut()) else {
+        return (0, true);
+    };
+    let [hot_end, _] = &mut *parts.heaters.borrow_mut();
+    match change {
+        Cold::Asked => {}
+        Cold::Allowed(allows) => heating.allows_cold = allows,
+        Cold::Least(degrees) => hot_end.set(hot_end::MN, degrees.into()),
+    }
+    heating.warm = !hot_end.is_cold(0);
+    (hot_end.least(), heating.allows_cold)
+}
+
+/// A printing host has been heard: the A axis is an extruder.
+#[cfg(feature = "dialect-reprap")]
+#[small]
+pub fn has_extruder(settings: &mut Settings) {
+    if let Some(heating) = settings.heating.first_mut() {
+        heating.extruder = true;
     }
 }
 

@@ -20,6 +20,8 @@ use heapless::Vec;
 
 use super::Never;
 use super::alarm;
+#[cfg(feature = "dialect-reprap")]
+use super::heat;
 use super::hold;
 use super::lines::{Class, LineId};
 use super::links::Links;
@@ -863,15 +865,20 @@ fn interpret_rewritten(links: &Links, port: &Port, block: &[u8]) -> (Status, boo
     let mut text = crate::protocol::Rewritten::new();
     let mut model = links.model.borrow_mut();
     model.begin_printing();
+    heat::has_extruder(&mut links.settings.borrow_mut());
     if model.is_far() && !machine::is_alarmed() && !machine::is_checking() {
         drop(model);
         return (move_back(links), true);
     }
     drop(model);
-    match port.speech.get().rewrite(block, &mut text) {
+    let done = match port.speech.get().rewrite(block, &mut text) {
         Ok(block) => interpret(links, block, Usual::NotTried),
         Err(status) => (status, true),
+    };
+    if done.0 != Status::Again {
+        links.model.borrow_mut().leave_out(false);
     }
+    done
 }
 
 /// Of a printer the extruder goes on and on: before it gets too far from the origin the place where it is gets a nearer one's name. [`Status::Again`]: the line is

@@ -103,7 +103,7 @@ impl Setup for Settings {
 
     fn extrudes(&self) -> Result<(), Status> {
         match self.heating.first() {
-            Some(heating) if !heating.extrudes => Err(Status::TooCold),
+            Some(heating) if !heating.extrudes() => Err(Status::TooCold),
             _ => Ok(()),
         }
     }

@@ -30,6 +30,7 @@ use crate::gcode::command::Motion;
 use crate::gcode::limits::is_near;
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::overrides::Change;
+use crate::gcode::printing::EXTRUDER;
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::gcode::tables::Row;
 use crate::hal::Thread;
@@ -44,7 +45,7 @@ use crate::motion::dynamics;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Program};
 #[cfg(feature = "dialect-reprap")]
-use crate::protocol::Extruder;
+use crate::protocol::{Cold, Extruder};
 use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
@@ -610,10 +611,15 @@ impl Machine for View<'_> {
         match what {
             Extruder::Relative(relative) => model.set_relative(relative),
             Extruder::Flow(flow) => model.set_flow(flow),
+            Extruder::LeaveOut => model.leave_out(true),
             _ if alarm != Alarm::None => return alarm.status(),
             _ if machine::is_checking() => {}
             _ if links.commands_taken.get() || machine::is_flushing() => return Status::Again,
             Extruder::Move { by, feed } => {
+                heat::has_extruder(&mut self.settings);
+                if let Err(status) = Setup::extrudes(&*self.settings) {
+                    return status;
+                }
                 let done = model.extrude(by, feed as f32, &mut links.commands.borrow_mut());
                 if let Err(status) = done {
                     return status;
@@ -623,6 +629,11 @@ impl Machine for View<'_> {
             }
         }
         Status::Ok
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn extrude_cold(&mut self, change: Cold) -> (i16, bool) {
+        heat::extrude_cold(&self.links.heat, &mut self.settings, change)
     }
 
     #[cfg(feature = "dialect-reprap")]
@@ -642,6 +653,11 @@ impl Machine for View<'_> {
         }
         if self.links.signs.jogs.get() != Bar::Open {
             return Status::Terminated;
+        }
+        if usize::from(axis) == EXTRUDER
+            && let Err(status) = Setup::extrudes(&*self.settings)
+        {
+            return status;
         }
         if let Err(status) = self.may_begin() {
             return status;

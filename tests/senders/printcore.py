@@ -91,6 +91,8 @@ def degrees(line):
 def prints():
     with open(JOB, encoding="ascii") as job:
         lines = [line.strip() for line in job]
+    # Nothing is hot here.
+    ask("M302 P1", "ok")
     begin = len(heard)
     ensure(host.startprint(LightGCode(lines)), "it does not begin")
     until(lambda: not host.printing)

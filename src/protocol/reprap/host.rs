@@ -1,13 +1,13 @@
 //! The codes that are not for the interpreter: they ask something, set something, or wait.
 
 use super::command::{has, value, words};
-use super::write::{fixed, int, line_end, text};
+use super::write::{cold, fixed, int, line_end, text};
 use super::{report, settings};
 use crate::config::Fixed;
 use crate::gcode::overrides::{Change, Override};
 use crate::machine::{Alarm, Cycle, Doing};
 use crate::progmem::Text;
-use crate::protocol::{Extruder, Machine, Out, Value};
+use crate::protocol::{Cold, Extruder, Machine, Out, Value};
 use crate::status::Status;
 use crate::text;
 use crate::units::Length;
@@ -47,7 +47,7 @@ pub fn of(code: Option<Code>) -> Option<Code> {
         (b'M', number) => matches!(
             number,
             17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 155
-                | 201 | 203..=208 | 220 | 221 | 400 | 500..=503 | 999
+                | 201 | 203..=208 | 220 | 221 | 302 | 400 | 500..=503 | 999
         ),
         (b'T', _) => true,
         _ => false,
@@ -68,8 +68,7 @@ pub fn part(
     let number = match code {
         (b'T', 0) => return Step::Done,
         (b'T', _) => return Step::Refused(Status::ToolInvalid),
-        (b'G', 10) => return retract(true, machine),
-        (b'G', 11) => return retract(false, machine),
+        (b'G', 10 | 11) => return retract(code.1 == 10, machine, out),
         (b'G', number) => return home(at, number, block, machine),
         (_, number) => number,
     };
@@ -105,6 +104,7 @@ pub fn part(
         }
         220 => speed(block, machine, out),
         221 => flow(block, machine, out),
+        302 => extrude_cold(block, machine, out),
         400 => finished(machine),
         500 if machine.value(Value::Kept) == 0 => Step::Later(0),
         502 => restore(at, machine),
@@ -143,7 +143,7 @@ fn listed(next: Option<u8>) -> Step {
 /// G10 and G11. One that has been carried out already does nothing.
 #[inline(never)]
 #[small]
-fn retract(back: bool, machine: &mut impl Machine) -> Step {
+fn retract(back: bool, machine: &mut impl Machine, out: &mut impl Out) -> Step {
     let kept = &machine.memory().reprap;
     if kept.retracted == back {
         return Step::Done;
@@ -153,6 +153,10 @@ fn retract(back: bool, machine: &mut impl Machine) -> Step {
     let by = Extruder::Move { by: Length(far), feed: kept.feed };
     match machine.extruder(by) {
         Status::Again => Step::Later(0),
+        Status::TooCold => {
+            cold(out);
+            Step::Done
+        }
         status => {
             if status == Status::Ok {
                 machine.memory().reprap.retracted = back;
@@ -285,6 +289,31 @@ fn flow(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
             _ => Step::Refused(Status::OutOfRange),
         },
     }
+}
+
+/// M302: S is how hot filament must be to be moved, with 0 and P1 it may be cold; without both they are told.
+#[inline(never)]
+#[small]
+fn extrude_cold(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    let (least, allows) = (value(block, b'S', 0), value(block, b'P', 0));
+    if least.is_some_and(|least| !(0..=330).contains(&least)) {
+        return Step::Refused(Status::OutOfRange);
+    }
+    if let Some(least) = least {
+        machine.extrude_cold(Cold::Least(least as i16));
+        machine.extrude_cold(Cold::Allowed(least == 0));
+    }
+    if let Some(allows) = allows {
+        machine.extrude_cold(Cold::Allowed(allows != 0));
+    } else if least.is_none() {
+        let (least, allows) = machine.extrude_cold(Cold::Asked);
+        text(out, text!("echo:Cold extrudes are "));
+        text(out, if allows { text!("en") } else { text!("dis") });
+        text(out, text!("abled (min temp "));
+        int(out, least.into());
+        text(out, text!("C)\n"));
+    }
+    Step::Done
 }
 
 #[small]

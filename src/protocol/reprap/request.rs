@@ -7,9 +7,9 @@ use super::command;
 use super::frame::{Fault, Frame, Session};
 use super::host::{self, Code, Step};
 use super::status::{is_unknown, reason};
-use super::write::{int, line_end, text};
+use super::write::{cold, int, line_end, text};
 use crate::progmem::Text;
-use crate::protocol::{Answers, Machine, Next, Out, Span};
+use crate::protocol::{Answers, Extruder, Machine, Next, Out, Span};
 use crate::status::Status;
 use crate::{plain, text};
 
@@ -29,6 +29,10 @@ enum What {
     Nothing,
     /// To carry out G-code.
     Gcode,
+    /// To say that filament is too cold to be moved, and to carry out the rest of the line.
+    Cold,
+    /// To carry out what is left of it.
+    Rest,
     /// To do what a code says that is not for the interpreter.
     Host(Code),
     /// To ask for a line behind this one.
@@ -97,6 +101,7 @@ impl Answers for Request {
     fn ran(&mut self, status: Status, _comment: bool) {
         self.what = match status {
             Status::Ok | Status::Noop => What::Nothing,
+            Status::TooCold if matches!(self.what, What::Gcode) => What::Cold,
             status => What::Refused(status),
         };
     }
@@ -105,7 +110,12 @@ impl Answers for Request {
     fn step(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Next {
         let block = self.block.of(line);
         match self.what {
-            What::Gcode => {
+            What::Cold => {
+                cold(out);
+                machine.extruder(Extruder::LeaveOut);
+                self.what = What::Rest;
+            }
+            What::Gcode | What::Rest => {
                 let Span { start, end } = self.block;
                 return Next::Gcode { start, end };
             }

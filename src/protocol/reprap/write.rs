@@ -2,6 +2,7 @@
 
 use crate::config::Fixed;
 use crate::protocol::Out;
+use crate::text;
 
 pub use crate::protocol::write::{fixed, int, text};
 
@@ -15,4 +16,10 @@ pub fn length(out: &mut impl Out, units: i32) {
 /// The end of a line.
 pub fn line_end(out: &mut impl Out) {
     out.put(b'\n');
+}
+
+/// Filament is too cold to be moved.
+#[small]
+pub fn cold(out: &mut impl Out) {
+    text(out, text!("echo: cold extrusion prevented\n"));
 }

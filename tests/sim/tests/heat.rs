@@ -183,3 +183,22 @@ fn no_step_is_late_while_heaters_work() {
     printer.run(4_000, |_| {});
     assert_eq!(printer.value("stv"), 0.0);
 }
+
+#[test]
+fn cold_filament_is_not_moved() {
+    let mut printer = Printer::new();
+    let status = |printer: &mut Printer, line: &str| {
+        printer.host.ask(&mut printer.machine, line, 1_000).unwrap().status
+    };
+    for line in ["g0 a1", "g1 a1 f100", "g1 x1 a1 f100", "g2 x2 i1 a1 f100", "g28 a5"] {
+        assert_eq!(status(&mut printer, line), 53, "{line}");
+    }
+    assert_eq!(status(&mut printer, "g1 x1 f1000"), 0);
+    printer.ask("{he1mn:20}");
+    assert_eq!(status(&mut printer, "g1 x1 a1 f1000"), 0);
+    printer.ask("{he1mn:170}");
+    assert_eq!(status(&mut printer, "g1 x1 a2 f1000"), 53);
+    // A rotary axis on a board without a hot end.
+    printer.ask("{he1k:0}");
+    assert_eq!(status(&mut printer, "g1 x1 a2 f1000"), 0);
+}
