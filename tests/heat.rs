@@ -354,3 +354,91 @@ fn a_few_degrees_less_stop_nothing() {
     assert!(printer.hot_end.sensor < 168.0, "{}", printer.hot_end.sensor);
     assert!(printer.machine.emitted().position[3] > 9_000);
 }
+
+/// Runs until a text has been said, at most so long.
+fn until(printer: &mut Printer, text: &str, ms: u64) -> bool {
+    for _ in 0..ms / 100 {
+        if printer.said.contains(text) {
+            return true;
+        }
+        printer.run(100, |_| {});
+    }
+    false
+}
+
+#[test]
+fn an_autotune_finds_factors_that_keep_to_the_temperature() {
+    let Some(mut printer) = prints(AIR) else { return };
+    printer.said.clear();
+    printer.send("M303 E0 S200 C8 U1");
+    printer.send("M301");
+    assert!(until(&mut printer, "echo:busy: processing", 30_000), "{}", printer.said);
+    // Questions are answered meanwhile.
+    assert!(!printer.said.contains("M301"), "{}", printer.said);
+    printer.send("M105");
+    assert!(until(&mut printer, "ok T:", 1_000), "{}", printer.said);
+    assert!(until(&mut printer, "PID Autotune finished!", 600_000), "{}", printer.said);
+    printer.run(500, |_| {});
+    let said = printer.said.clone();
+    assert_eq!(said.matches(" bias: ").count(), 8, "{said}");
+    let told: Vec<_> = said.lines().filter(|line| line.starts_with("echo:  M301")).collect();
+    assert!(told.len() == 2 && told[0] == told[1] && !told[0].contains("P20.00"), "{said}");
+    assert_eq!(printer.off_after(10_000), Some(STEP), "it is off then");
+    printer.run(400_000, |_| {});
+    printer.ask("M104 S200");
+    let mut most = 0f64;
+    printer.run(240_000, |printer| most = most.max(printer.hot_end.sensor));
+    assert!(most < 202.0, "overshoot to {most}");
+    let (mut low, mut high) = (1e9f64, 0f64);
+    printer.run(600_000, |printer| {
+        low = low.min(printer.hot_end.sensor);
+        high = high.max(printer.hot_end.sensor);
+    });
+    println!("{told:?}: most {most:.2}, held from {low:.2} to {high:.2}");
+    assert!(low > 199.5 && high < 200.5, "held from {low} to {high}");
+}
+
+#[test]
+fn an_autotune_ends_by_m108_an_alarm_and_a_fault() {
+    for (ends, said) in [
+        ("M108", "PID Autotune stopped"),
+        ("M112", "PID Autotune stopped"),
+        ("open", "PID Autotune stopped"),
+    ] {
+        let join = std::thread::spawn(move || {
+            let Some(mut printer) = prints(AIR) else { return };
+            printer.send("M303 E0 S200 C8 U1");
+            printer.send("G1 X1 F3000");
+            printer.run(60_000, |_| {});
+            assert!(printer.machine.heaters_on() & 1 != 0, "{}", printer.said);
+            printer.said.clear();
+            match ends {
+                "open" => printer.wire = Wire::Open,
+                line => printer.send(line),
+            }
+            let off = printer.off_after(5_000);
+            assert!(off.is_some_and(|ms| ms <= 300), "{ends}: off after {off:?} ms");
+            assert!(printer.said.contains(said), "{ends}: {}", printer.said);
+            printer.wire = Wire::Well;
+            printer.ask("M999");
+            printer.run(500, |_| {});
+            let answer = printer.ask("M301");
+            assert!(answer.contains("M301 P20.00 I0.80 D80.00"), "{ends}: {answer}");
+            let answer = printer.ask("G1 X2 F3000");
+            assert!(answer.starts_with("ok"), "{ends}: {answer}");
+        });
+        join.join().expect("no panic");
+    }
+}
+
+#[test]
+fn a_bed_is_tuned_as_well() {
+    let Some(mut printer) = prints(AIR) else { return };
+    printer.said.clear();
+    printer.send("M303 E-1 S60 C5");
+    assert!(until(&mut printer, "PID Autotune finished!", 1_200_000), "{}", printer.said);
+    printer.run(500, |_| {});
+    assert!(printer.said.contains("echo:  M304 P"), "{}", printer.said);
+    // Nobody has asked for it to be used.
+    assert!(printer.ask("M304").contains("M304 P0.00 I0.00 D0.00"), "{}", printer.said);
+}

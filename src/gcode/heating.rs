@@ -37,6 +37,8 @@ pub enum Wait {
     Hot,
     /// That it is as hot as it is to be, and no hotter.
     Reached,
+    /// That its factors have been found (M303).
+    Tuned,
 }
 
 /// What a line asks for.

@@ -66,6 +66,12 @@ impl Control {
         (self.sum, self.power) = (0, 0);
     }
 
+    /// The power of the next step is this.
+    pub fn drive(&mut self, now: i16, power: u8) {
+        self.measure(now);
+        (self.sum, self.power) = (0, power);
+    }
+
     /// The power of the next step, to get from `now` to `wanted`.
     #[inline(never)]
     pub fn step(&mut self, now: i16, wanted: i16, fan: u8, factors: &Factors) -> u8 {

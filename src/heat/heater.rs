@@ -5,6 +5,7 @@
 use super::control::{Control, Factors, STEPS, spread};
 use super::fault::{Rule, Watch};
 use super::sensor::{Broken, Kind, UNIT};
+use super::tune::Tune;
 use super::{HEATERS, Standing};
 use crate::config::groups::hot_end;
 use crate::status::Status;
@@ -117,7 +118,7 @@ impl Heater {
     }
 
     /// Takes a reading, `None` if it is not there in time. `number` is 0 for the hot end, `to` what is wanted, eighths of a degree. A fault
-    /// leaves it off.
+    /// leaves it off. A `tune` that is under way says how much power it has.
     #[inline(never)]
     pub fn look(
         &mut self,
@@ -125,11 +126,12 @@ impl Heater {
         reading: Option<u16>,
         to: u16,
         fan: u8,
+        tune: Option<&mut Tune>,
     ) -> Result<Seen, Status> {
         let wanted = if self.kind == Kind::None { 0 } else { in_units(to) };
         let seen = self.read(reading, wanted).and_then(|mean| match mean {
             None => Ok(Seen::Look),
-            Some(mean) => self.step(number, mean, wanted, fan).map(|()| Seen::Step),
+            Some(mean) => self.step(number, mean, wanted, fan, tune).map(|()| Seen::Step),
         });
         self.on = seen.is_ok() && wanted != 0 && spread(&mut self.owed, self.control.power());
         if seen.is_err() {
@@ -173,14 +175,22 @@ impl Heater {
         }
     }
 
-    fn step(&mut self, number: u8, mean: i16, wanted: i16, fan: u8) -> Result<(), Status> {
+    fn step(
+        &mut self,
+        number: u8,
+        mean: i16,
+        wanted: i16,
+        fan: u8,
+        tune: Option<&mut Tune>,
+    ) -> Result<(), Status> {
         self.now = mean;
         let rise_s = if number == 0 { RISE_S[0] } else { RISE_S[1] };
         if self.kind != Kind::None {
             self.watch.step(mean, wanted, &Rule { rise_s, hottest: self.hottest })?;
         }
-        match wanted {
-            0 => self.control.stop(mean),
+        match (wanted, tune) {
+            (0, _) => self.control.stop(mean),
+            (_, Some(tune)) => self.control.drive(mean, tune.step(mean)),
             _ => {
                 self.control.step(mean, wanted, fan, &self.factors);
             }
@@ -191,7 +201,7 @@ impl Heater {
 
 /// Eighths of a degree in 1/64.
 #[small]
-fn in_units(to: u16) -> i16 {
+pub fn in_units(to: u16) -> i16 {
     (to.min(4_000) * 8) as i16
 }
 

@@ -7,6 +7,7 @@ pub mod control;
 pub mod fault;
 pub mod heater;
 pub mod sensor;
+pub mod tune;
 
 use crate::capability::Capability;
 use crate::gcode::heating::{Heat, Part};

@@ -6,6 +6,7 @@ use crate::config::{Setting, Settings};
 use crate::gcode::overrides::Change;
 use crate::gcode::tables::Row;
 use crate::heat::Standing;
+use crate::heat::tune::Tune;
 use crate::machine::{Alarm, Cycle, Doing};
 use crate::motion::snapshot::Program;
 use crate::status::Status;
@@ -161,6 +162,18 @@ pub trait Machine {
     fn extruder(&mut self, what: Extruder) -> Status {
         let _ = what;
         Status::NotBuiltIn
+    }
+
+    /// Begins to tune a heater, 0 the hot end, 1 the bed, at so many eighths of a degree, in so many cycles; it has what is found then if it `uses` it.
+    /// [`Status::Again`] as of [`Self::extruder`].
+    fn tune(&mut self, heater: u8, to: u16, cycles: u8, uses: bool) -> Status {
+        let _ = (heater, to, cycles, uses);
+        Status::NotBuiltIn
+    }
+
+    /// The autotune that is under way, or was last.
+    fn tuned(&mut self) -> Tune {
+        Tune::IDLE
     }
 
     /// How cold filament may be moved: how hot it must be, degrees, and whether it may be colder all the same.

@@ -30,6 +30,8 @@ pub enum Notice {
     Busy,
     /// Temperatures, which the sender wants to be told of again and again.
     Temperatures,
+    /// How far an autotune is.
+    Tuning,
     /// How many blocks are free: a queue report.
     Queue,
 }

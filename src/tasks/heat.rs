@@ -5,6 +5,7 @@
 //! 200. Heaters are switched at these turns alone: power is spread over them. The power task feeds the watchdog in the same turn: if it
 //! gets none, the chip resets in half a second with its heaters off.
 //!
+//! An autotune ([`tune`](crate::heat::tune)) is a wait: the lines behind it wait for its end, which M108, a flush or an alarm make.
 //! Filament that is being moved although the hot end has got colder than it must be, by more than 10 degrees, is an alarm.
 //!
 //! A fault ([`heater`](crate::heat::heater), [`fault`](crate::heat::fault)) switches all of them off in its turn, [locks](lock) them, and
@@ -23,7 +24,6 @@ use super::links::Links;
 use super::setup::moved_by;
 use super::storage::Storage;
 use crate::capability::Capability;
-#[cfg(feature = "dialect-reprap")]
 use crate::config::groups::hot_end;
 use crate::config::{Owner, Setting, Settings};
 use crate::gcode::heating::{Heat, Part, Wait};
@@ -31,8 +31,9 @@ use crate::gcode::printing::EXTRUDER;
 use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::{flags, heaters};
-use crate::heat::heater::{Heater, Seen};
+use crate::heat::heater::{Heater, Seen, in_units};
 use crate::heat::sensor::UNIT;
+use crate::heat::tune::{Found, Stage, Tune};
 use crate::heat::{HEATERS, Orders, PRINTERS, Standing};
 use crate::machine::{self, Alarm};
 #[cfg(feature = "dialect-reprap")]
@@ -65,6 +66,16 @@ struct Parts {
     /// Turns for which the fan still has all its power, and what is owed to it.
     kick: Cell<u8>,
     owed: Cell<u8>,
+    /// Cycles that an autotune is to have, and whether the heater is to have its factors.
+    asked: Cell<(u8, bool)>,
+    /// The autotune that is under way, or was last.
+    tune: RefCell<Tune>,
+    /// The number of the heater that is tuned, and 1; 0 when all that belongs to that is done.
+    tuned: Cell<u8>,
+    /// Factors of it that the settings have.
+    kept: Cell<u8>,
+    /// What has been told of it.
+    told: Cell<(u8, Stage)>,
 }
 
 #[small]
@@ -77,6 +88,11 @@ impl Parts {
             next: Cell::new(0),
             kick: Cell::new(0),
             owed: Cell::new(0),
+            asked: Cell::new((0, false)),
+            tune: RefCell::new(Tune::IDLE),
+            tuned: Cell::new(0),
+            kept: Cell::new(0),
+            told: Cell::new((0, Stage::Idle)),
         }
     }
 
@@ -107,7 +123,7 @@ impl Parts {
 
     /// After a step: the planner goes on if what it waits for has come, and stays.
     fn see_to_wait(&self, orders: &Orders) {
-        if self.awaited.get().wait == Wait::Nothing {
+        if matches!(self.awaited.get().wait, Wait::Nothing | Wait::Tuned) {
             return;
         }
         let stays = if self.has_come(orders) { self.stays.get() + 1 } else { 0 };
@@ -126,9 +142,19 @@ impl Parts {
             Part::Bed => bed == 0,
             Part::All | Part::Fan => hot_end | bed == 0,
         };
-        if off && awaited.wait != Wait::Nothing {
+        if off && !matches!(awaited.wait, Wait::Nothing | Wait::Tuned) {
             self.end_wait();
         }
+    }
+
+    /// What the planner waits for is an autotune, whose heater has been switched on.
+    fn begin_tune(&self, heat: &Heat) {
+        let (cycles, _) = self.asked.get();
+        *self.tune.borrow_mut() =
+            Tune::begin(heat.part == Part::Bed, in_units(heat.to.unwrap_or(0)), cycles);
+        self.tuned.set(heat.part as u8 + 1);
+        self.kept.set(0);
+        self.told.set((0, Stage::Swings));
     }
 
     fn end_wait(&self) {
@@ -149,6 +175,9 @@ impl Heaters {
         if let Some(parts) = self.parts.first() {
             parts.stays.set(0);
             parts.awaited.set(heat);
+            if heat.wait == Wait::Tuned {
+                parts.begin_tune(&heat);
+            }
         }
     }
 
@@ -160,6 +189,7 @@ impl Heaters {
     /// It waits no more: motion goes on (M108, or the lines have been dropped).
     pub fn end_wait(&self) {
         if let Some(parts) = self.parts.first() {
+            parts.tune.borrow_mut().stop();
             parts.end_wait();
         }
     }
@@ -280,6 +310,9 @@ pub fn look(links: &Links) {
     }
     heaters::switch(on);
     parts.end_idle_wait(&orders);
+    if parts.tuned.get() != 0 {
+        see_to_tune(links, parts, &orders);
+    }
     match seen {
         Ok(Seen::Look) => {}
         Ok(Seen::Step) => {
@@ -303,10 +336,82 @@ fn look_at(
     let mut heaters = parts.heaters.borrow_mut();
     let [hot_end, bed] = &mut *heaters;
     let [first, second] = orders.to;
+    let mut tune = parts.tune.borrow_mut();
+    let tune = Some(&mut *tune).filter(|_| parts.tuned.get() == number + 1);
     match number {
-        0 => hot_end.look(number, reading, first, orders.fan),
-        _ => bed.look(number, reading, second, orders.fan),
+        0 => hot_end.look(number, reading, first, orders.fan, tune),
+        _ => bed.look(number, reading, second, orders.fan, tune),
     }
+}
+
+/// Ends an autotune whose heater has been switched off. After the end of one switches the heater off, puts what has been found into the settings if that
+/// has been asked for, one at a time, and lets the planner go on.
+#[inline(never)]
+#[small]
+fn see_to_tune(links: &Links, parts: &Parts, orders: &Orders) {
+    let number = parts.tuned.get().saturating_sub(1);
+    let mut tune = parts.tune.borrow_mut();
+    if orders.to.get(usize::from(number)).is_none_or(|to| *to == 0) {
+        tune.stop();
+    }
+    if tune.is_on() {
+        return;
+    }
+    common::with(links.thread, |common| {
+        let order =
+            common.heat.first_mut().and_then(|orders| orders.to.get_mut(usize::from(number)));
+        if let Some(to) = order {
+            *to = 0;
+        }
+    });
+    let Found { p, i, d } = tune.found;
+    let (_, uses) = parts.asked.get();
+    let row = parts.kept.get();
+    let found = [(hot_end::P, p), (hot_end::I, i), (hot_end::D, d)];
+    if let Some((row, value)) =
+        found.get(usize::from(row)).filter(|_| uses && tune.stage == Stage::Done)
+    {
+        let owner = if number == 0 { Owner::HotEnd } else { Owner::Bed };
+        let Some(setting) = Setting::of(owner, *row) else { return };
+        let value = i32::from(*value) * 10;
+        if links.storage.set_cold(setting, value).is_ok() {
+            drop(tune);
+            set(&links.heat, &mut links.settings.borrow_mut(), setting, value);
+            parts.kept.set(parts.kept.get() + 1);
+        }
+        return;
+    }
+    drop(tune);
+    parts.tuned.set(0);
+    if parts.awaited.get().wait == Wait::Tuned {
+        parts.end_wait();
+    }
+}
+
+/// What the next autotune is to be like: so many cycles, and whether its heater is to have what is found.
+#[cfg(feature = "dialect-reprap")]
+#[small]
+pub fn ask_tune(heaters: &Heaters, cycles: u8, uses: bool) {
+    if let Some(parts) = heaters.parts.first() {
+        parts.asked.set((cycles, uses));
+    }
+}
+
+/// The autotune that is under way, or was last.
+#[cfg(feature = "dialect-reprap")]
+#[small]
+pub fn tune(heaters: &Heaters) -> Tune {
+    heaters.parts.first().map_or(Tune::IDLE, |parts| *parts.tune.borrow())
+}
+
+/// Whether there is something new to tell of an autotune.
+#[cfg(feature = "dialect-reprap")]
+#[small]
+pub fn takes_news(heaters: &Heaters) -> bool {
+    let Some(parts) = heaters.parts.first() else { return false };
+    let tune = parts.tune.borrow();
+    let now = (tune.cycle, tune.stage);
+    parts.told.replace(now) != now
 }
 
 /// Notes whether filament may be moved. Whether it is being moved although it has got far too cold.

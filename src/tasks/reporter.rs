@@ -11,6 +11,8 @@ use embassy_futures::yield_now;
 use kerf_macros::small;
 
 use super::health;
+#[cfg(feature = "dialect-reprap")]
+use super::heat;
 use super::links::Links;
 use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, OTHERS, Port};
 use super::turning;
@@ -162,6 +164,9 @@ impl Clock {
         let (port, now) = (links.told(), millis());
         let speech = port.speech.get();
         let lines = speech.activity()?;
+        if heat::takes_news(&links.heat) {
+            return Some(Notice::Tuning);
+        }
         let interval_ms = u32::from(speech.interval_s(&links.report.borrow())) * 1_000;
         if interval_ms != 0 && now.wrapping_sub(self.told) >= interval_ms {
             self.told = now;

@@ -27,6 +27,8 @@ use crate::boards::{MOTORS, inputs};
 use crate::capability::Capability;
 use crate::config::{Setting, Settings};
 use crate::gcode::command::Motion;
+#[cfg(feature = "dialect-reprap")]
+use crate::gcode::heating::{Heat, Part, Wait};
 use crate::gcode::limits::is_near;
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::overrides::Change;
@@ -38,6 +40,8 @@ use crate::hal::eeprom::Eeprom;
 use crate::hal::event::Event;
 use crate::hal::{flags, gpio, inputs as pins, stepper, uart, watchdog};
 use crate::heat::Standing;
+#[cfg(feature = "dialect-reprap")]
+use crate::heat::tune::Tune;
 use crate::jobs::{Job, LINE_MAX, STORED};
 use crate::machine::jog::Bar;
 use crate::machine::{self, Alarm, Cycle, Doing};
@@ -99,6 +103,10 @@ impl Seen {
 fn is_queued(links: &Links) -> bool {
     links.commands_taken.get() || queue::used() > 0
 }
+
+/// So much hotter than it is to be a heater may get in an autotune, eighths of a degree.
+#[cfg(feature = "dialect-reprap")]
+const OVERSHOOT: u16 = 80;
 
 #[small]
 impl<'a> View<'a> {
@@ -629,6 +637,42 @@ impl Machine for View<'_> {
             }
         }
         Status::Ok
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn tune(&mut self, heater: u8, to: u16, cycles: u8, uses: bool) -> Status {
+        let (links, alarm) = (self.links, machine::alarm());
+        let part = if heater == 0 { Part::HotEnd } else { Part::Bed };
+        if alarm != Alarm::None {
+            return alarm.status();
+        }
+        if !links.may_feed(self.port) {
+            return Status::Muted;
+        }
+        if let Err(status) = Setup::heats(&*self.settings, part) {
+            return status;
+        }
+        if to.saturating_add(OVERSHOOT) > Setup::hottest(&*self.settings, part) {
+            return Status::AboveMaximum;
+        }
+        if machine::is_checking() {
+            return Status::Ok;
+        }
+        if links.commands_taken.get() || machine::is_flushing() {
+            return Status::Again;
+        }
+        heat::ask_tune(&links.heat, cycles, uses);
+        let mut commands = links.commands.borrow_mut();
+        commands.clear();
+        commands.motion = Motion::Heat(Heat { part, to: Some(to), wait: Wait::Tuned });
+        links.commands_taken.set(true);
+        links.planner_wake.signal();
+        Status::Ok
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn tuned(&mut self) -> Tune {
+        heat::tune(&self.links.heat)
     }
 
     #[cfg(feature = "dialect-reprap")]

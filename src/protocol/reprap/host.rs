@@ -2,7 +2,7 @@
 
 use super::command::{has, value, words};
 use super::write::{cold, fixed, int, line_end, text};
-use super::{report, settings};
+use super::{report, settings, tuning};
 use crate::config::Fixed;
 use crate::gcode::overrides::{Change, Override};
 use crate::machine::{Alarm, Cycle, Doing};
@@ -47,7 +47,7 @@ pub fn of(code: Option<Code>) -> Option<Code> {
         (b'M', number) => matches!(
             number,
             17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 155
-                | 201 | 203..=208 | 220 | 221 | 302 | 400 | 500..=503 | 999
+                | 201 | 203..=208 | 220 | 221 | 301..=304 | 400 | 500..=503 | 999
         ),
         (b'T', _) => true,
         _ => false,
@@ -104,7 +104,9 @@ pub fn part(
         }
         220 => speed(block, machine, out),
         221 => flow(block, machine, out),
+        301 | 304 => tuning::set(number == 304, at, block, machine, out),
         302 => extrude_cold(block, machine, out),
+        303 => tuning::begin(block, machine, out),
         400 => finished(machine),
         500 if machine.value(Value::Kept) == 0 => Step::Later(0),
         502 => restore(at, machine),

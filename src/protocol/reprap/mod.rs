@@ -12,6 +12,7 @@
 //! | [`host`] | the codes that ask or set something |
 //! | [`settings`] | M92, M201 to M206, M503 |
 //! | [`report`] | M105, M114, M115, M119 |
+//! | [`tuning`] | M301, M303, M304 |
 //! | [`telling`] | what is told unasked |
 //! | [`write`](mod@write) | numbers and texts |
 //!
@@ -28,6 +29,7 @@ mod settings;
 mod status;
 mod telling;
 mod translate;
+mod tuning;
 mod write;
 
 use super::{Dialect, Ending, Machine, Notice, Out, Remembers, Rewritten};

@@ -4,6 +4,7 @@
 
 use super::command::number;
 use super::host::Step;
+use super::tuning;
 use super::write::{fixed, line_end, text};
 use crate::boards::MOTORS;
 use crate::config::name::token;
@@ -24,7 +25,7 @@ const LISTED: [u16; 5] = [92, 203, 201, 205, 206];
 
 #[inline(never)]
 #[small]
-fn read(machine: &mut impl Machine, owner: Owner, token: [u8; 4]) -> i32 {
+pub fn read(machine: &mut impl Machine, owner: Owner, token: [u8; 4]) -> i32 {
     named(owner, token).map_or(0, |setting| machine.setting(setting))
 }
 
@@ -117,11 +118,17 @@ fn put(code: u16, at: u8, machine: &mut impl Machine, out: &mut impl Out) -> boo
 #[small]
 pub fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
     let (row, axis) = (at >> 2, at & 3);
-    let code = LISTED.get(usize::from(row)).copied()?;
+    let Some(code) = LISTED.get(usize::from(row)).copied() else {
+        let bed = usize::from(row) > LISTED.len();
+        let more = tuning::list(bed, axis, machine, out);
+        let next = if more { at + 1 } else { (row + 1) << 2 };
+        return (more || !bed).then_some(next);
+    };
     if put(code, axis, machine, out) {
         return Some(at + 1);
     }
-    (usize::from(row) + 1 < LISTED.len()).then_some((row + 1) << 2)
+    let heats = machine.heater(0).is_some();
+    (heats || usize::from(row) + 1 < LISTED.len()).then_some((row + 1) << 2)
 }
 
 /// Sets what a code names, axis by axis, or tells it if it names none.
@@ -187,7 +194,7 @@ fn set_axis(code: u16, axis: u8, to: Number, machine: &mut impl Machine) -> Resu
 
 #[inline(never)]
 #[small]
-fn put_number(
+pub fn put_number(
     machine: &mut impl Machine,
     owner: Owner,
     token: [u8; 4],

@@ -1,8 +1,8 @@
 //! A notice on its way out: the greeting, what has gone wrong, temperatures, and that a line takes long.
 
-use super::report;
 use super::status::reason;
 use super::write::{line_end, text};
+use super::{report, tuning};
 use crate::protocol::{Machine, Notice, Occasion, Out, Tells};
 use crate::status::Status;
 use crate::text;
@@ -19,6 +19,8 @@ pub enum Telling {
     Busy,
     /// Temperatures, from this part on.
     Temperatures(u8),
+    /// How far an autotune is, from this part on.
+    Tuning(u8),
 }
 
 #[small]
@@ -34,6 +36,7 @@ impl Telling {
             Notice::Exception(status) => Self::Exception(status),
             Notice::Busy => Self::Busy,
             Notice::Temperatures => Self::Temperatures(0),
+            Notice::Tuning => Self::Tuning(0),
             _ => Self::Nothing,
         }
     }
@@ -55,6 +58,12 @@ impl Tells for Telling {
                 }
                 None => line_end(out),
             },
+            Self::Tuning(at) => {
+                if let Some(next) = tuning::put(*at, machine, out) {
+                    *at = next;
+                    return true;
+                }
+            }
         }
         false
     }

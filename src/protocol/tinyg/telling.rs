@@ -43,7 +43,9 @@ impl Telling {
             Notice::Exception(status) => Part::Exception(Exception::begin(status, settings)),
             Notice::Probing => Part::Probing(Probing::begin(settings)),
             // Nobody asks so in this dialect, nor keeps such lines.
-            Notice::Startup(..) | Notice::Busy | Notice::Temperatures => Part::Status(None),
+            Notice::Startup(..) | Notice::Busy | Notice::Temperatures | Notice::Tuning => {
+                Part::Status(None)
+            }
             Notice::Status => Part::Status(Report::begin(mode, machine)),
             Notice::End { jogged, flushed } => Part::End { jogged, flushed },
             Notice::SyncError if Capability::Lathe.is_built_in() => Part::SyncError,
