@@ -106,6 +106,10 @@ pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
 /// Builds and measures, on the board that others were measured on.
 pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
     let elf = prepare(Board::default(), Machine::default())?;
+    if args.row.is_empty() || args.row.iter().any(|row| row.starts_with("print")) {
+        // Of what a printer does.
+        firmware::build(Board::Ramps14, Machine::default())?;
+    }
     pass_through(&mut bench_command(args, &elf))
 }
 

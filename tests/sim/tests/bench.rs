@@ -3,12 +3,16 @@
 mod common;
 
 use common::image;
-use kerf::boards::MEGA2560_GRBL;
+use kerf::boards::{MEGA2560_GRBL, RAMPS14};
 use kerf_sim::bench::{Bed, ROWS, row};
 
 fn keeps_to_its_floor(name: &str) {
     let row = row(name).unwrap();
     let bed = Bed::new(&image(&MEGA2560_GRBL), &MEGA2560_GRBL).unwrap();
+    if name.starts_with("print") {
+        // It is looked for beside the other one.
+        image(&RAMPS14);
+    }
     let figure = (row.measure)(&bed).unwrap();
     let said = format!("{}: {} {} ({})", row.what, figure.value, row.unit, figure.note);
     println!("{said}");
@@ -77,4 +81,6 @@ rows! {
     a_hold_begins = "hold-begins";
     a_hold_stops = "hold-stops";
     acceleration_on_arcs = "arcs-ac";
+    a_printers_moves = "print-0.2";
+    a_printers_moves_with_checksums = "print-0.2-numbered";
 }

@@ -12,6 +12,7 @@ mod limits;
 mod optimum;
 mod pauses;
 mod places;
+mod printing;
 mod rates;
 mod rows;
 mod spirals;

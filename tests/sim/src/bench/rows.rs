@@ -6,12 +6,12 @@
 //! ATxmega192 at 32 MHz. Floors are raised when the firmware has become better.
 
 use super::Better::{Higher, Lower};
-use super::{Row, beyond, costs, jitter, limits, pauses, rates, spirals};
+use super::{Row, beyond, costs, jitter, limits, pauses, printing, rates, spirals};
 
 const NONE: [&str; 3] = ["-"; 3];
 
 /// The table.
-pub const ROWS: [Row; 46] = [
+pub const ROWS: [Row; 48] = [
     Row {
         name: "rate-1",
         what: "highest rate held, 1 motor",
@@ -523,5 +523,27 @@ pub const ROWS: [Row; 46] = [
         target: Some(1.1),
         floor: Some(1.1),
         measure: limits::arcs_acceleration,
+    },
+    Row {
+        name: "print-0.2",
+        what: "a printer's moves of 0.2 mm, over ideal",
+        unit: "x",
+        decimals: 3,
+        better: Lower,
+        peers: ["-", "-", "5.80"],
+        target: Some(1.1),
+        floor: None,
+        measure: printing::plain,
+    },
+    Row {
+        name: "print-0.2-numbered",
+        what: "the same, lines with checksums",
+        unit: "x",
+        decimals: 3,
+        better: Lower,
+        peers: NONE,
+        target: Some(1.1),
+        floor: None,
+        measure: printing::numbered,
     },
 ];

@@ -1,7 +1,7 @@
 //! The firmware on its board, set up as the others were, and jobs for it.
 
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use kerf::boards::Board;
@@ -60,6 +60,7 @@ const NO_JERK_LIMIT: f64 = 1_000_000.0;
 
 /// The firmware and the board under it.
 pub struct Bed {
+    path: PathBuf,
     image: Image,
     board: &'static Board,
     /// Whether there is an acceleration limit to be set.
@@ -99,12 +100,18 @@ impl Default for How {
 impl Bed {
     /// A bed for the ELF file at `path`.
     pub fn new(path: &Path, board: &'static Board) -> Result<Self> {
-        let mut bed = Bed { image: Image::read(path)?, board, has_acceleration: true };
+        let image = Image::read(path)?;
+        let mut bed = Bed { path: path.to_path_buf(), image, board, has_acceleration: true };
         let mut machine = bed.machine()?;
         let mut host = Host::new(LINES_IN_FLIGHT);
         host.boot(&mut machine, 1_000)?;
         bed.has_acceleration = host.ask(&mut machine, "{xac:n}", 1_000)?.status == 0;
         Ok(bed)
+    }
+
+    /// A bed for another board, whose image is in the same folder.
+    pub fn beside(&self, board: &'static Board) -> Result<Self> {
+        Self::new(&self.path.with_file_name(format!("{}.elf", board.name)), board)
     }
 
     /// A machine as it leaves the factory.
