@@ -727,7 +727,8 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
     if port.is_resetting() && matches!(class, Class::Fault(_)) {
         return Begun::Silent;
     }
-    let mut speech = port.speech.get();
+    let before = port.speech.get();
+    let mut speech = before;
     let settings = links.settings.borrow();
     let mut request = match class {
         Class::Fault(status) => Request::refused(status, line, length, &mut speech, &settings),
@@ -742,6 +743,8 @@ fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) ->
     if let Some(block) = request.gcode() {
         let (status, commented) = run_block(links, port, block.of(line), tried);
         if status == Status::Again {
+            // Its number counts when it is begun for good.
+            port.speech.set(before);
             return Begun::Again;
         }
         request.ran(status, commented);

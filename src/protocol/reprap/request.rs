@@ -93,9 +93,8 @@ fn take(
 
 #[small]
 impl Answers for Request {
-    /// None at once: G-code runs in the first step.
     fn gcode(&self) -> Option<Span> {
-        None
+        matches!(self.what, What::Gcode).then_some(self.block)
     }
 
     fn ran(&mut self, status: Status, _comment: bool) {
