@@ -121,10 +121,10 @@ export class Machine {
     this.boot({ flash: this.mcu.flash });
   }
 
-  // The CPU is in a loop from now on, with interrupts off.
+  // The CPU sleeps from now on, with interrupts off: it wakes for nobody.
   stick() {
     const [{ core }, at] = [this.mcu, 0x20030000];
-    this.mcu.writeUint16(at, 0xe7fe);
+    [0xbf30, 0xe7fd].forEach((op, i) => this.mcu.writeUint16(at + 2 * i, op));
     core.PC = at;
     core.PM = true;
     core.waiting = false;
