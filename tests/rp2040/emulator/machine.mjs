@@ -121,15 +121,6 @@ export class Machine {
     this.boot({ flash: this.mcu.flash });
   }
 
-  // The CPU sleeps from now on, with interrupts off: it wakes for nobody.
-  stick() {
-    const [{ core }, at] = [this.mcu, 0x20030000];
-    [0xbf30, 0xe7fd].forEach((op, i) => this.mcu.writeUint16(at + 2 * i, op));
-    core.PC = at;
-    core.PM = true;
-    core.waiting = false;
-  }
-
   // A panic: a cell is borrowed twice, in a file of that name.
   panic(elf, file) {
     const { core, sram } = this.mcu;

@@ -278,26 +278,6 @@ fn an_skr_pico_tells_its_drivers_and_moves() {
 
 #[test]
 #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
-fn a_stuck_chip_is_bitten_and_says_so() {
-    let (mut board, mut host) = booted();
-    set(&mut board, &mut host, "m3 s1000");
-    set(&mut board, &mut host, "g1 x100 f1000");
-    host.run_for_ms(&mut board, 300).unwrap();
-    board.stick();
-    board.run_for_ms(490).unwrap();
-    assert_eq!(board.resets(), 0);
-    board.run_for_ms(30).unwrap();
-    assert_eq!(board.resets(), 1, "half a second has passed");
-    assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()));
-    board.run_for_ms(300).unwrap();
-    let said = String::from_utf8(board.receive_from(USB)).unwrap();
-    assert!(said.contains("SYSTEM READY") && said.contains("\"er\""), "{said}");
-    host = Host::new(LINES_IN_FLIGHT);
-    assert_eq!(value(&mut board, &mut host, "rst"), 3.0);
-}
-
-#[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
 fn a_panic_stops_everything_and_is_told_after_the_reset() {
     let (mut board, mut host) = booted();
     set(&mut board, &mut host, "m3 s1000");

@@ -22,7 +22,6 @@ const PROGRAM: &str = "rp2040-emulator/bridge.mjs";
 #[derive(Serialize, Default, Debug)]
 struct Request {
     cut: bool,
-    stick: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     panic: Option<String>,
     reset: bool,
@@ -229,11 +228,6 @@ impl Emulated {
     /// The supply fails, and is there again.
     pub fn cut_power(&mut self) {
         self.request.cut = true;
-    }
-
-    /// The CPU gets stuck, with interrupts off.
-    pub fn stick(&mut self) {
-        self.request.stick = true;
     }
 
     /// A cell turns out to be borrowed twice, in a file of that name: a panic.
