@@ -418,14 +418,14 @@ const PRINTING: [&str; 2] = ["heat", "reprap"];
 /// Those that move for long, minutes of the emulator's time each: `KERF_TRANSCRIPT` plays one.
 const LONG: [&str; 2] = ["far", "axis-modes"];
 
-/// An answer of a machine with 61 blocks and 8 lines as this one gives it, with 1,024 and 64.
+/// An answer of a machine with 61 blocks and 8 lines as this one gives it, with 1,024 and 10.
 fn with_more_room(line: &str) -> String {
     let mut line = line.replace("Bf:61,", "Bf:1024,");
-    for (before, most, more) in [("\"qr\":", 61, 963), ("\"f\":[1,", 7, 56)] {
+    for (before, most, more) in [("\"qr\":", 61, 963), ("\"f\":[1,", 7, 2)] {
         let Some(at) = line.find(before).map(|at| at + before.len()) else { continue };
         // Of a footer the last number.
         let at =
-            if more == 56 { line[at..].find(',').map_or(at, |comma| at + comma + 1) } else { at };
+            if more == 2 { line[at..].find(',').map_or(at, |comma| at + comma + 1) } else { at };
         let digits = line[at..].bytes().take_while(u8::is_ascii_digit).count();
         let number = line[at..at + digits].parse().unwrap_or(0);
         if (1..=most).contains(&number) {
