@@ -38,15 +38,24 @@ fn the_example_is_printed_exact_to_the_step() {
 
 #[test]
 fn a_line_that_is_refused_is_named() {
-    let lines = job::lines_of("M83\nG1 X5 E1 F3000\nG1 X6 E1 J5\nG1 X7 E1");
+    let lines = job::lines_of("M302 P1\nM83\nG1 X5 E1 F3000\nG1 X6 E1 J5\nG1 X7 E1");
     let mut machine = firmware(&RAMPS14);
     let report = print::run(&mut machine, &lines, &Options::default(), |_| {}).unwrap();
     assert!(!report.ok);
     assert_eq!(report.rejected.len(), 1, "{report}");
-    assert_eq!(report.rejected[0].line, 3);
+    assert_eq!(report.rejected[0].line, 4);
     // It was not carried out, but the file asks for its filament.
     let extruder = &report.motors[3];
     assert_ne!(Some(extruder.steps), extruder.expected);
+}
+
+#[test]
+fn cold_filament_is_a_refusal() {
+    let lines = job::lines_of("M83\nG1 X5 E1 F3000");
+    let mut machine = firmware(&RAMPS14);
+    let report = print::run(&mut machine, &lines, &Options::default(), |_| {}).unwrap();
+    assert_eq!(report.rejected.len(), 1, "{report}");
+    assert_eq!((report.rejected[0].line, report.motors[3].total), (2, 0), "{report}");
 }
 
 #[test]
