@@ -442,3 +442,17 @@ fn a_bed_is_tuned_as_well() {
     // Nobody has asked for it to be used.
     assert!(printer.ask("M304").contains("M304 P0.00 I0.00 D0.00"), "{}", printer.said);
 }
+
+/// A line behind an autotune that is ended has its effect: what the tuning leaves off is off before.
+#[test]
+fn what_comes_behind_an_ended_autotune_heats() {
+    let Some(mut printer) = prints(AIR) else { return };
+    for line in ["M303 E0 S150 C8", "M104 S100"] {
+        printer.send(line);
+    }
+    printer.run(10_000, |_| {});
+    printer.send("M108");
+    printer.run(1_000, |_| {});
+    let answer = printer.ask("M105");
+    assert!(answer.contains("/100.00"), "{answer}");
+}

@@ -188,9 +188,11 @@ impl Heaters {
 
     /// It waits no more: motion goes on (M108, or the lines have been dropped).
     pub fn end_wait(&self) {
-        if let Some(parts) = self.parts.first() {
-            parts.tune.borrow_mut().stop();
-            parts.end_wait();
+        let Some(parts) = self.parts.first() else { return };
+        match parts.tuned.get() {
+            0 => parts.end_wait(),
+            // In the next turn, when its heater has been switched off: a line behind it may heat.
+            _ => parts.tune.borrow_mut().stop(),
         }
     }
 }
