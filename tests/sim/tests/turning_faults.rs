@@ -1,0 +1,253 @@
+//! Faults at random moments of a thread, on the image: the spindle stops, slows down, or races, pulses are missing or too many, the pass
+//! is held, ended, or reset, and both ports ask meanwhile. The machine comes to rest where it says that it is, and goes on from there.
+//!
+//! `KERF_SEED` and `KERF_CASES` choose the cases.
+
+mod common;
+#[path = "../../support/seeds.rs"]
+#[allow(dead_code)]
+mod seeds;
+
+use common::{firmware, set};
+use kerf::boards::MEGA2560_LATHE;
+use kerf_sim::mechanics::{Build, Random, Sensors};
+use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Machine};
+
+/// Steps of X and Z in a millimetre.
+const STEPS: f64 = 200.0;
+const X: usize = 0;
+const Z: usize = 2;
+/// The longest way from a question's last byte to its answer, ms.
+const ANSWERED_MS: f64 = 20.0;
+/// The state while the machine runs, and the one of an alarm.
+const RUNS: Option<i64> = Some(5);
+const ALARM: Option<i64> = Some(2);
+
+/// What happens in the pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fault {
+    Nothing,
+    Stops,
+    To(f64),
+    Misses(u64),
+    Extra,
+    Hold,
+    HoldAndGo,
+    Alarm,
+    Reset,
+}
+
+#[derive(Debug)]
+struct Case {
+    marks: u32,
+    rpm: f64,
+    retract: f64,
+    limit: f64,
+    taper: bool,
+    /// Microseconds from the begin of the line.
+    after_us: u64,
+    faults: [Fault; 2],
+}
+
+fn one_of<T: Copy>(random: &mut Random, all: &[T]) -> T {
+    all[random.below(all.len() as u64) as usize]
+}
+
+fn fault(random: &mut Random) -> Fault {
+    let pulses = 1 + random.below(3);
+    let all = [
+        Fault::Nothing,
+        Fault::Stops,
+        Fault::To(30.0),
+        Fault::To(1_400.0),
+        Fault::Misses(pulses),
+        Fault::Extra,
+        Fault::Hold,
+        Fault::HoldAndGo,
+        Fault::Alarm,
+        Fault::Reset,
+    ];
+    one_of(random, &all)
+}
+
+impl Case {
+    fn of(seed: u64) -> Case {
+        let mut random = Random::new(seed);
+        let random = &mut random;
+        let marks = one_of(random, &[1, 2, 4, 8, 100, 400]);
+        let most = if marks == 400 { 600.0 } else { 1_000.0 };
+        let rpm = one_of(random, &[60.0, 300.0, 600.0, most]);
+        Case {
+            marks,
+            rpm,
+            retract: one_of(random, &[0.0, 0.0001, 2.0, -2.0, 100.0]),
+            limit: one_of(random, &[0.0, 0.001, 0.1, 100.0]),
+            taper: random.below(4) == 0,
+            after_us: random.below(3_000_000),
+            faults: [fault(random), fault(random)],
+        }
+    }
+}
+
+/// The board beside a spindle that turns.
+fn lathe(case: &Case) -> (Machine, Host) {
+    let mut machine = firmware(&MEGA2560_LATHE);
+    let mut build = Build::of(&MEGA2560_LATHE);
+    for axis in &mut build.axes {
+        (axis.min, axis.max) = (None, None);
+        (axis.travel, axis.start) = (f64::INFINITY, 0.0);
+    }
+    build.spindle.sensors = Sensors::of(&MEGA2560_LATHE, case.marks);
+    machine.build(&build);
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut machine, 1_000).unwrap();
+    for (motor, axis) in [(1, 'x'), (3, 'z')] {
+        let lines = [
+            format!("{{{motor}tr:4}}"),
+            format!("{{{motor}sa:1.8}}"),
+            format!("{{{motor}mi:4}}"),
+            format!("{{{axis}fr:1500}}"),
+            format!("{{{axis}vm:1500}}"),
+            format!("{{{axis}ac:500}}"),
+            format!("{{{axis}jm:200000}}"),
+        ];
+        lines.iter().for_each(|line| set(&mut machine, &mut host, line));
+    }
+    let (marks, retract, limit) = (case.marks, case.retract, case.limit);
+    for line in
+        [format!("{{spn:{marks}}}"), format!("{{spr:{retract}}}"), format!("{{spl:{limit}}}")]
+    {
+        set(&mut machine, &mut host, &line);
+    }
+    machine.tamper(|mechanics, now| mechanics.force_spindle(case.rpm, now));
+    let settled = if case.rpm < 100.0 { 3_500 } else { 800 };
+    host.run_for_ms(&mut machine, settled).unwrap();
+    (machine, host)
+}
+
+/// A number that the machine tells.
+fn asked(machine: &mut Machine, host: &mut Host, name: &str) -> f64 {
+    let raw = host.ask(machine, &format!("{{{name}:n}}"), 1_000).unwrap().raw;
+    let (_, rest) = raw.split_once(&format!("\"{name}\":")).unwrap_or_else(|| panic!("{raw}"));
+    rest.split(['}', ',']).next().unwrap().parse().unwrap()
+}
+
+/// Asks on both ports for so long. Returns the longest that an answer took on the first, ms.
+fn ask_for_ms(machine: &mut Machine, host: &mut Host, ms: u64) -> f64 {
+    let end = machine.cycle() + machine.cycles(ms);
+    let mut longest = 0.0f64;
+    while machine.cycle() < end {
+        machine.send_to(AUX, b"{mpoz:n}\n");
+        let began = machine.cycle();
+        assert_eq!(host.ask(machine, "{sps:n}", 1_000).unwrap().status, 0);
+        // The question and its answer are about 45 bytes, 4 ms.
+        longest = longest.max(machine.seconds(host.heard_at() - began) * 1e3 - 4.0);
+        host.run_for_ms(machine, 37).unwrap();
+        let heard = String::from_utf8(machine.receive_from(AUX)).unwrap();
+        assert!(heard.contains("mpoz"), "the second port hears {heard:?}");
+    }
+    longest
+}
+
+fn happen(machine: &mut Machine, host: &mut Host, fault: Fault) {
+    match fault {
+        Fault::Nothing => {}
+        Fault::Stops => machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now)),
+        Fault::To(rpm) => machine.tamper(|mechanics, now| mechanics.drive_spindle_to(rpm, now)),
+        Fault::Misses(n) => {
+            machine.tamper(|mechanics, _| mechanics.encoder().unwrap().miss(false, n));
+        }
+        Fault::Extra => machine
+            .tamper(|mechanics, now| mechanics.encoder().unwrap().add(false, now + 4_000, 1_600)),
+        Fault::Hold => machine.send_now(b'!'),
+        Fault::HoldAndGo => {
+            machine.send_now(b'!');
+            host.run_for_ms(machine, 60).unwrap();
+            machine.send_now(b'~');
+        }
+        Fault::Alarm => drop(host.ask(machine, "{alarm:n}", 1_000).unwrap()),
+        Fault::Reset => {
+            machine.send_now(0x18);
+            host.boot(machine, 1_000).unwrap();
+        }
+    }
+}
+
+/// The motors of X and Z, in steps.
+fn motors(machine: &Machine) -> [i64; 2] {
+    [X, Z].map(|motor| machine.recorder().motors()[motor].position)
+}
+
+/// Runs until no step has come for half a second, and nothing runs.
+fn rest(machine: &mut Machine, host: &mut Host, why: &Case) {
+    let mut quiet = 0;
+    for _ in 0..240 {
+        let before = machine.recorder().steps();
+        host.run_for_ms(machine, 250).unwrap();
+        quiet = if machine.recorder().steps() == before { quiet + 1 } else { 0 };
+        if quiet >= 2 && host.stat() != RUNS {
+            return;
+        }
+    }
+    panic!("it does not come to rest: {:?} {why:?}", host.stat());
+}
+
+fn agrees(machine: &mut Machine, host: &mut Host, zero: [i64; 2], why: &Case) {
+    let steps = motors(machine);
+    for (n, name) in ["mpox", "mpoz"].into_iter().enumerate() {
+        let (is, told) = ((steps[n] - zero[n]) as f64 / STEPS, asked(machine, host, name));
+        assert!((told - is).abs() < 0.0011, "{name} is {told}, the motor at {is}: {why:?}");
+    }
+}
+
+/// Leads the machine out of whatever state it is in, and the axes back to where the board counts from.
+fn recover(machine: &mut Machine, host: &mut Host, zero: [i64; 2], why: &Case) {
+    machine.tamper(|mechanics, now| mechanics.force_spindle(300.0, now));
+    machine.send_now(b'%');
+    host.run_for_ms(machine, 300).unwrap();
+    let _ = host.ask(machine, "{clear:n}", 1_000).unwrap();
+    rest(machine, host, why);
+    set(machine, host, "g90 g0 x0 z0");
+    host.run_for_ms(machine, 200).unwrap();
+    rest(machine, host, why);
+    assert_eq!(motors(machine), zero, "the way back: {why:?}");
+}
+
+fn play(seed: u64) -> Result<(), String> {
+    let case = Case::of(seed);
+    let (mut machine, mut host) = lathe(&case);
+    let (machine, host) = (&mut machine, &mut host);
+    let start = motors(machine);
+    let mut zero = start;
+    let taper = if case.taper { "x0.5" } else { "" };
+    set(machine, host, &format!("g91 g33 {taper} z-8 k1"));
+    machine.run_until(machine.cycle() + case.after_us * 16).unwrap();
+    let mut longest = 0.0f64;
+    for fault in case.faults {
+        let resets = machine.resets();
+        happen(machine, host, fault);
+        if machine.resets() != resets {
+            zero = motors(machine);
+        }
+        longest = longest.max(ask_for_ms(machine, host, 400));
+    }
+    rest(machine, host, &case);
+    agrees(machine, host, zero, &case);
+    let steady = |fault| matches!(fault, Fault::Nothing);
+    if case.faults.into_iter().all(steady) && case.limit != 0.001 {
+        assert_eq!(motors(machine)[1] - start[1], -1_600, "the end: {case:?}");
+        assert_ne!(host.stat(), ALARM, "{case:?}");
+    }
+    recover(machine, host, zero, &case);
+    assert_eq!(machine.missed_tops(), 0, "{case:?}");
+    if longest > ANSWERED_MS {
+        return Err(format!("an answer took {longest:.1} ms: {case:?}"));
+    }
+    println!("seed {seed}: {longest:.1} ms, {case:?}");
+    Ok(())
+}
+
+#[test]
+fn a_thread_ends_where_the_machine_says_whatever_happens_in_it() {
+    seeds::try_all(12, play);
+}
