@@ -6,6 +6,12 @@
 //!
 //! When full, [`Producer::slot`] is `None`; the producer waits, or counts the loss.
 
+#![allow(
+    clippy::unnecessary_cast,
+    clippy::useless_conversion,
+    reason = "an `Index` is a byte on some chips, and wider on others"
+)]
+
 use core::cell::UnsafeCell;
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;

@@ -4,7 +4,7 @@
 
 use super::contract::contract;
 use super::imp;
-use super::ring::Index;
+use avr_embassy::ring::Index;
 
 contract! {
     /// Arithmetic where the compiler's takes several times as long on a small chip.

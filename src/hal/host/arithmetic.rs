@@ -1,6 +1,6 @@
 //! What `avr/arithmetic.rs` does, as the language does it.
 
-use crate::hal::ring::Index;
+use avr_embassy::ring::Index;
 
 /// `a / b` and `a % b` if the quotient fits 16 bits: `a >> 16 < b`. Else what the chip makes of it.
 pub fn divide(a: u32, b: u16) -> (u16, u16) {
