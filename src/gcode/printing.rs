@@ -183,6 +183,7 @@ impl State {
     }
 
     /// Moves what the words of the extruder are measured from, as G92 does.
+    #[cfg(feature = "dialect-reprap")]
     #[small]
     fn shift_extruder(&mut self, by: i32) -> Option<()> {
         let moved = self.shifted_extruder(by)?;
