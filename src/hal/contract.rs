@@ -231,7 +231,7 @@ pub trait Timing {
     const TICKS: [Ticks; MOTORS];
     /// Blocks that can wait at once: what RAM has room for.
     const LOOK_AHEAD: usize = 61;
-    /// Lines that can wait on a port.
+    /// Lines that can wait on a port: at most 9, for brief answers tell by one digit how many more may come.
     const LINES: usize = 8;
     /// Bytes for all lines of USB together, and of the other port.
     const LINE_BYTES: [usize; 2] = [412, 96];

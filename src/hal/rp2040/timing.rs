@@ -15,7 +15,5 @@ impl Timing for Chip {
     const PULSE_US: u8 = 0;
     const TICKS: [Ticks; MOTORS] = [USUAL; MOTORS];
     const LOOK_AHEAD: usize = 1_024;
-    /// Brief answers tell how many more may come by one digit.
-    const LINES: usize = 10;
     const LINE_BYTES: [usize; 2] = [2_088, 1_040];
 }

@@ -418,19 +418,18 @@ const PRINTING: [&str; 2] = ["heat", "reprap"];
 /// Those that move for long, minutes of the emulator's time each: `KERF_TRANSCRIPT` plays one.
 const LONG: [&str; 2] = ["far", "axis-modes"];
 
-/// An answer of a machine with 61 blocks and 8 lines as this one gives it, with 1,024 and 10.
+/// An answer of a machine with 61 blocks as this one gives it, with 1,024.
 fn with_more_room(line: &str) -> String {
-    let mut line = line.replace("Bf:61,", "Bf:1024,");
-    for (before, most, more) in [("\"qr\":", 61, 963), ("\"f\":[1,", 7, 2)] {
-        let Some(at) = line.find(before).map(|at| at + before.len()) else { continue };
-        // Of a footer the last number.
-        let at =
-            if more == 2 { line[at..].find(',').map_or(at, |comma| at + comma + 1) } else { at };
-        let digits = line[at..].bytes().take_while(u8::is_ascii_digit).count();
-        let number = line[at..at + digits].parse().unwrap_or(0);
-        if (1..=most).contains(&number) {
-            line.replace_range(at..at + digits, &(number + more).to_string());
-        }
+    let mut line = line.replace("Bf:61,", "Bf:1024,").replace("A,61,", "A,1024,");
+    let is_refused = line.contains("\"f\":") && !line.contains("\"f\":[1,0,");
+    let before = "\"qr\":";
+    let Some(at) = line.find(before).map(|at| at + before.len()).filter(|_| !is_refused) else {
+        return line;
+    };
+    let digits = line[at..].bytes().take_while(u8::is_ascii_digit).count();
+    let number = line[at..at + digits].parse().unwrap_or(0);
+    if (1..=61).contains(&number) {
+        line.replace_range(at..at + digits, &(number + 963).to_string());
     }
     line
 }

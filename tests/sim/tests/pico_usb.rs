@@ -62,7 +62,7 @@ fn nothing_is_lost_though_nobody_waits_for_answers() {
     let heard = ask(&mut board, USB, &text, 1_000);
     assert!(heard.matches("\"r\":").count() < lines && board.waiting() > 0, "held back");
     let mut heard = heard;
-    for _ in 0..100 {
+    for _ in 0..200 {
         heard += &ask(&mut board, USB, "", 1_000);
     }
     let answers: Vec<_> = heard.lines().filter(|line| line.contains("\"r\":")).collect();
