@@ -78,7 +78,9 @@ impl State {
         };
         words.read(from)
             && are_usual(words.seen & AXES_SEEN, setup)
-            && (!Capability::CoreXy.is_built_in() || is_near(&words.target, setup))
+            && (!Capability::CoreXy.is_built_in()
+                || setup.reach().is_none()
+                || is_near(&words.target, setup))
             && !(Capability::Printer.is_built_in()
                 && words.seen & 1 << EXTRUDER != 0
                 && setup.extrudes().is_err())

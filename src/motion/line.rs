@@ -257,13 +257,9 @@ impl Path {
     ) -> u8 {
         let all = motors.iter_mut().zip(ways).zip(&dynamics.drives);
         for (m, ((motor, way), &drives)) in all.enumerate() {
-            let travel = kinematics::travel(drives, &self.travel);
-            let (Some(travel), Some(to)) = (travel, kinematics::place(drives, to)) else {
-                continue;
-            };
-            if travel == 0 {
-                continue;
-            }
+            let travel = kinematics::travel(drives, &self.travel).filter(|way| *way != 0);
+            let Some(travel) = travel else { continue };
+            let Some(to) = kinematics::place(drives, to) else { continue };
             match motor.go(machine.ratio(m), travel, to) {
                 Some(parts) => {
                     *way = parts;

@@ -68,9 +68,13 @@ impl Frame {
             None => Sum::None,
             Some(at) => {
                 let (text, stated) = line.split_at_checked(at).unwrap_or((line, &[]));
-                let sum = text.iter().fold(0, |sum, byte| sum ^ byte);
+                let (mut sum, mut has_zero) = (0, false);
+                for byte in text {
+                    sum ^= byte;
+                    has_zero |= *byte == 0;
+                }
                 let stated = stated.get(1..).and_then(|digits| integer(digits.trim_ascii()));
-                let whole = stated == Some(sum.into()) && !text.contains(&0);
+                let whole = stated == Some(sum.into()) && !has_zero;
                 if whole { Sum::Right } else { Sum::Wrong }
             }
         };

@@ -420,7 +420,12 @@ const LONG: [&str; 2] = ["far", "axis-modes"];
 
 /// An answer of a machine with 61 blocks as this one gives it, with 1,024.
 fn with_more_room(line: &str) -> String {
-    let mut line = line.replace("Bf:61,", "Bf:1024,").replace("A,61,", "A,1024,");
+    let text = [
+        ("Bf:61,", "Bf:1024,"),
+        ("A,61,", "A,1024,"),
+        ("qr:                 61", "qr:               1024"),
+    ];
+    let mut line = text.iter().fold(line.to_string(), |line, (few, more)| line.replace(few, more));
     let is_refused = line.contains("\"f\":") && !line.contains("\"f\":[1,0,");
     let before = "\"qr\":";
     let Some(at) = line.find(before).map(|at| at + before.len()).filter(|_| !is_refused) else {

@@ -174,8 +174,8 @@ pub const ROWS: [Row; 48] = [
         decimals: 3,
         better: Lower,
         peers: NONE,
-        target: Some(1.2),
-        floor: Some(1.30),
+        target: Some(1.15),
+        floor: Some(1.2),
         measure: spirals::tenth_fast,
     },
     Row {
@@ -532,7 +532,7 @@ pub const ROWS: [Row; 48] = [
         better: Lower,
         peers: ["-", "-", "5.80"],
         target: Some(1.1),
-        floor: Some(1.1),
+        floor: Some(1.12),
         measure: printing::plain,
     },
     Row {
@@ -543,7 +543,7 @@ pub const ROWS: [Row; 48] = [
         better: Lower,
         peers: NONE,
         target: Some(1.1),
-        floor: Some(1.135),
+        floor: Some(1.165),
         measure: printing::numbered,
     },
 ];
