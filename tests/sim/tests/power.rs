@@ -6,6 +6,9 @@ use common::{booted, set};
 use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14};
 use kerf_sim::Machine;
 
+/// Without a hot end axis A is no extruder, whose filament would have to be hot.
+const NO_SENSOR: &str = "{he1k:0}";
+
 /// Whether an enable, which is active low, is on.
 fn is_on(machine: &Machine, pin: Pin) -> bool {
     machine.peek(pin.port.address() as u16) & 1 << pin.bit == 0
@@ -15,6 +18,9 @@ fn is_on(machine: &Machine, pin: Pin) -> bool {
 /// `enable` came on.
 fn lead(board: &'static Board, line: &str, enable: Pin) -> u64 {
     let (mut machine, mut host) = booted(board);
+    if board.heaters.is_some() {
+        set(&mut machine, &mut host, NO_SENSOR);
+    }
     set(&mut machine, &mut host, "{1pm:3,2pm:3,3pm:3,4pm:3}");
     assert!(!is_on(&machine, enable));
     machine.send(format!("{line}\n").as_bytes());
@@ -39,6 +45,7 @@ fn power_comes_before_the_first_step() {
 #[test]
 fn a_motor_that_stands_still_stays_off() {
     let (mut machine, mut host) = booted(&RAMPS14);
+    set(&mut machine, &mut host, NO_SENSOR);
     set(&mut machine, &mut host, "{1pm:3,2pm:3,3pm:2,4pm:0,mt:0.2}");
     set(&mut machine, &mut host, "g1 f500 y1 a1");
     machine.run_for_ms(60).unwrap();
