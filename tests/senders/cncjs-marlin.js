@@ -109,7 +109,9 @@ async function finish() {
   ensure(server.answered === total, `answered ${server.answered} of ${total}`);
   const wrong = server.lines.find((line) => /^(Error|echo:Unknown)/.test(line) && !/stopped/.test(line));
   ensure(!wrong, wrong);
-  await ask('M400', 'ok');
+  // A poll's answer begins with ok as M400's does; M118 has a text of its own and waits behind it.
+  server.type('M400');
+  await ask('M118 all printed', 'all printed');
   return `${total} of ${total} lines answered, at ${Object.values(pos()).join(' ')}`;
 }
 
