@@ -1,6 +1,6 @@
 //! Putting it together: makes the links, hands every end to its task, starts the hardware.
 //!
-//! The same on AVR and on the host; what differs is in `hal`.
+//! This code runs on every chip and on the host; what differs between them is in `hal`.
 
 use kerf_macros::small;
 

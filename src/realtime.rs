@@ -65,7 +65,7 @@ pub const JOG_END: u8 = 0x85;
 
 /// Begins the steps anew, from 100 %.
 pub const FULL: u8 = 0;
-/// The same, of the second of two.
+/// [`FULL`] of the spindle: the second of the two ranges of steps.
 const SPINDLE: u8 = 9;
 
 /// What characters ask of the overrides, and of a jog, since it was taken last: however many there are, it is as much.

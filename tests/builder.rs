@@ -138,7 +138,7 @@ fn check_limits(
     check_override(block, unit, feed.is_some(), config, shortest);
 }
 
-/// The same of what an override makes of it: as much faster as the axes can.
+/// Checks the velocity under an override: the commanded one times the factor, as far as the axes can.
 fn check_override(block: &Move, unit: &PerAxis<f64>, is_feed: bool, config: &Config, most: f64) {
     let doubled = f64::from(block.velocity(&Factors { feed: 2.0, traverse: 1.0 }));
     let axes = (0..AXES).filter(|&axis| unit[axis] > 0.0);

@@ -132,7 +132,7 @@ impl Settings {
         self.show_as(setting, value, inches, setting.row().shown)
     }
 
-    /// The same with at most so many decimals.
+    /// A value of a setting as shown, with at most `decimals` decimals.
     #[small]
     pub fn show_as(&self, setting: Setting, value: i32, inches: bool, decimals: u8) -> Fixed {
         let row = setting.row();

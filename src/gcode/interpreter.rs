@@ -50,7 +50,7 @@ impl Interpreter {
 }
 
 impl<T> Interpreter<T> {
-    /// The same, with tables that are kept elsewhere.
+    /// An interpreter at power-up whose tables are kept elsewhere.
     pub const fn with(tables: T) -> Self {
         Self { state: State::new(&Defaults::USUAL), tables }
     }
@@ -133,7 +133,7 @@ impl<T: Tables> Interpreter<T> {
         self.state.usual(line, numbered, setup, out)
     }
 
-    /// The same as [`Self::interpret`], and to be used in its place if [`Self::usual`] has declined the line.
+    /// Interprets a line as [`Self::interpret`] does, without trying [`Self::usual`] first. Call it when that has declined the line.
     #[inline(never)]
     pub fn general(
         &mut self,
@@ -221,7 +221,7 @@ impl<T: Tables> Interpreter<T> {
         done
     }
 
-    /// The same for a block that may change more than modes, the feed and the position of its axes.
+    /// Executes a block that may change more than modes, the feed and the position of its axes.
     #[inline(never)]
     #[small]
     fn execute_rarity(
@@ -291,7 +291,7 @@ impl Before {
     }
 }
 
-/// The same of a block of whatever there is, but for the words of a cycle, which `State` sees to, and the origin:
+/// What a block of any kind may change, but for the words of a cycle, which `State` sees to, and the origin:
 /// the less of it there is the better, for the deepest stack is below it.
 struct RareBefore {
     usual: Before,

@@ -86,7 +86,7 @@ pub const fn bit(slot: u8) -> u32 {
     1 << slot
 }
 
-/// The same, for a slot that is not known beforehand; empty beyond the last.
+/// The set of one slot that is known only at run time; empty for a number beyond the last slot.
 pub fn bit_of(slot: u8) -> u32 {
     BIT.at(slot.into()).unwrap_or(0)
 }

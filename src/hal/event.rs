@@ -111,7 +111,7 @@ pub fn wait<R>(
     event.bit().wait(thread, ready)
 }
 
-/// The same after each byte that any port has sent, for the task that waits for this one.
+/// Waits until `ready` gives a value, asking again after each byte that any port has sent.
 pub fn wait_transmitted<R>(
     thread: Thread,
     port: u8,

@@ -17,7 +17,7 @@ pub const AUX: u8 = 1;
 
 /// Size of the receive ring of USB, a power of two.
 pub const RX_RING: usize = 256;
-/// The same of the other port.
+/// Size of the receive ring of the second port, a power of two.
 pub const AUX_RING: usize = 64;
 /// Size of each transmit ring, a power of two.
 pub const TX_RING: usize = 128;
@@ -35,7 +35,7 @@ pub const RETURNED: u8 = 4;
 
 /// No mark of a loss (none has this bit without [`CLEAN`]): here a `%` or `^d` stood in the stream.
 pub const CUT: u8 = RETURNED;
-/// The same: here a `~` stood.
+/// No mark of a loss either: here a `~` stood in the stream.
 pub const GO: u8 = RETURNED | BEHIND_END;
 
 /// Stands where a line was that has been taken out of its turn. No such byte comes into the ring from outside: it resets.

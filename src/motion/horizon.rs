@@ -88,7 +88,7 @@ impl Line {
         self.start + key(self.entry(factors), kappa(self.accel.get(), self.jerk.get()))
     }
 
-    /// The same for a block before it that has no jerk limit. Cost: 400.
+    /// Its key for a block before it that has no jerk limit. Cost: 400.
     pub fn sharp_key(&self, factors: &Factors) -> f32 {
         let entry = self.entry(factors);
         self.start + entry * entry

@@ -100,7 +100,7 @@ impl Path {
         Way::Near
     }
 
-    /// The same for a move of one axis, or of none.
+    /// Length and direction of a move of one axis, or of none; `way` is the size of its travel.
     #[inline(never)]
     fn measure_axis(&mut self, way: u32) -> Way {
         if self.moved == 0 {

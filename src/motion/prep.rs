@@ -476,7 +476,7 @@ impl Prep {
     /// Prepares the whole of a block that begins: `cycles` for it, no more than a few milliseconds. False,
     /// and no segment, when it has no steps; the time is kept then.
     ///
-    /// The same as `last` for it, but short and simple. Cost: 700, and 400 for each motor but the dominant.
+    /// What `last` gives for such a block, in fewer cycles. Cost: 700, and 400 for each motor but the dominant.
     #[inline(never)]
     pub fn whole(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);

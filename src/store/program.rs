@@ -69,7 +69,7 @@ pub fn len<M: Memory>(memory: &M) -> Option<u16> {
     (head(0) == VALID && len <= PROGRAM - HEAD).then_some(len)
 }
 
-/// The same, and whether the text is what was stored.
+/// The length of the program, if there is one and its text is still what was stored.
 #[inline(never)]
 #[small]
 pub fn check<M: Memory>(memory: &M) -> Option<u16> {

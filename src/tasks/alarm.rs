@@ -28,7 +28,7 @@ pub fn raise(links: &Links, alarm: Alarm) {
     raise_for(links, alarm, alarm.status());
 }
 
-/// The same for this reason, which is what it is told as.
+/// Begins an alarm, if there is none as bad, and reports it with `reason` as its status.
 #[inline(never)]
 #[small]
 pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {

@@ -72,7 +72,7 @@ pub enum Aside {
 }
 
 impl Aside {
-    /// The same behind one more byte.
+    /// Where the text stands after one more byte.
     pub fn after(self, byte: u8) -> Self {
         match (self, byte) {
             (_, b'\n' | b'\r') => Self::None,
@@ -582,7 +582,7 @@ impl LinePool {
         self.entries.get(usize::from(id.0)).map_or(0, length)
     }
 
-    /// The same of the oldest line.
+    /// How many bytes its sender counts for the oldest line, with its end.
     pub fn oldest_length(&self) -> u16 {
         self.length(LineId(0))
     }

@@ -48,7 +48,7 @@ async function until(condition) {
   }
 }
 
-/// The same for up to `ms`: whether it has come to hold.
+/// Waits up to `ms` until the condition holds; returns whether it does.
 async function within(ms, condition) {
   const end = Date.now() + ms;
   while (!condition()) {

@@ -3,7 +3,7 @@
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
 
-/// The same cases each time, unless `PROPTEST_RNG_SEED` names others.
+/// A fixed set of cases, unless `PROPTEST_RNG_SEED` names others.
 pub fn cases(count: u32) -> ProptestConfig {
     let wanted = std::env::var("KERF_CASES").ok().and_then(|n| n.parse().ok());
     let mut config = ProptestConfig::with_cases(wanted.unwrap_or(count));

@@ -148,13 +148,13 @@ pub fn plan(job: &Job) -> Vec<Planned> {
     plan_held(job, |_, _| false)
 }
 
-/// The same, with feedholds: `held` tells before each stretch whether there is one, asked with the number of
-/// stretches so far and whether the machine stands still. At rest it is asked until there is none.
+/// Runs a job with feedholds through queue and governor alone: `held` tells before each stretch whether there is one, asked
+/// with the number of stretches so far and whether the machine stands still. At rest it is asked until there is none.
 pub fn plan_held(job: &Job, held: impl FnMut(usize, bool) -> bool) -> Vec<Planned> {
     plan_changed(job, held, |_, _| {})
 }
 
-/// The same, with `change` called before each stretch, with their number.
+/// Runs a job with feedholds through queue and governor alone; `change` is called before each stretch, with its number.
 pub fn plan_changed(
     job: &Job,
     mut held: impl FnMut(usize, bool) -> bool,

@@ -252,7 +252,7 @@ impl Rig {
         self.forget_all();
     }
 
-    /// The same wherever the motors are: their ticks have been stopped.
+    /// Forgets all that is queued, wherever the motors are: their ticks have been stopped.
     pub fn forget_all(&mut self) {
         let mut held = self.exec.drop_all(&mut self.source, &mut self.snapshot);
         let queued = || self.drain.pop().or_else(|| held.take());

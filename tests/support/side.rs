@@ -21,7 +21,7 @@ pub trait Side {
     fn run_ms(&mut self, ms: u64);
     /// The bytes heard since the last call.
     fn heard(&mut self) -> Vec<u8>;
-    /// The same on the second port.
+    /// The bytes heard on the second port since the last call.
     fn heard_aux(&mut self) -> Vec<u8>;
     /// The contact at an input closes or opens; see `kerf::boards::inputs`.
     fn set_input(&mut self, input: usize, closed: bool);

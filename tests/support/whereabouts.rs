@@ -97,7 +97,7 @@ impl Whereabouts {
         Ok(())
     }
 
-    /// The same for an axis that is `at` this offset by what is told. The error is how far it is off.
+    /// Compares an axis that is reported `at` this offset, in steps, with where it is. The error is how far it is off.
     fn compare_axis(&mut self, m: usize, at: f64) -> Result<(), f64> {
         let disturbed = self.disturbed;
         let axis = &mut self.axes[m];

@@ -65,7 +65,7 @@ crate::progmem! {
     pub static M: [Code; M_ROWS] = M_TABLE;
     /// For each whole number up to [`DENSE`], the first row of that number or a greater one.
     pub static G_START: [u8; STARTS] = starts(&G_TABLE);
-    /// The same for M codes.
+    /// For each whole number up to [`DENSE`], the first row of an M code of that number or a greater one.
     pub static M_START: [u8; STARTS] = starts(&M_TABLE);
     /// The words that the code of each motion mode takes.
     pub static MOTION: [u32; MotionMode::COUNT] = motions();

@@ -95,7 +95,7 @@ struct State {
     stops: u16,
     /// Those of them that have been hit.
     hits: u16,
-    /// The same without the ends that are spared for now.
+    /// `stops` without the ends that are ignored for now.
     live: u16,
     spared: u8,
     /// Those that end a move, and what they must be for it.

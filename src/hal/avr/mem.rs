@@ -50,7 +50,7 @@ extern "C" fn memcpy() -> ! {
     }
 }
 
-/// The same.
+/// `memset` of the C library, by its calling convention.
 #[unsafe(no_mangle)]
 extern "C" fn memset() -> ! {
     // SAFETY: fills what the caller asks for, changes no register but those above, and returns.

@@ -25,7 +25,7 @@ const TIMSK1: *mut u8 = 0x6F as *mut u8;
 const TICKS: [*mut u8; 2] = [0x4A as *mut u8, 0x4B as *mut u8];
 /// CTC with OCR1A as top, clock not divided.
 const RUN: u8 = 1 << 3 | 1;
-/// The same, stopped.
+/// CTC with OCR1A as top, clock stopped.
 pub(super) const HALT: u8 = 1 << 3;
 const OCF1A: u8 = 1 << 1;
 const GPIOR1: *const u8 = 0x4A as *const u8;

@@ -182,8 +182,8 @@ pub fn kick(port: u8) {
     unsafe { register(port, 1).write_volatile(IDLE | UDRIE) };
 }
 
-/// The same on a bus. Both transmit interrupts are off while the driver is enabled, so that the one does not
-/// let it go for the end of what was sent before.
+/// Sends what the ring holds, on a bus. Both transmit interrupts are off while the driver of the bus is switched on: the
+/// interrupt at the end of an earlier transmission would switch it off again.
 fn kick_bus(port: u8) {
     let control = register(port, 1);
     // SAFETY: written whole; thread mode does not run while an interrupt has masked its own bit.

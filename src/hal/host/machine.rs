@@ -67,7 +67,7 @@ impl Machine {
         uart::received(USB)
     }
 
-    /// The same to the second port.
+    /// What the firmware has sent to the second port since the last call.
     pub fn received_aux(&self) -> Vec<u8> {
         uart::received(AUX)
     }

@@ -93,7 +93,7 @@ impl Fake {
         panic!("no end to {line:?}");
     }
 
-    /// The same as text, without the last line feed.
+    /// Sends a line and returns the answer as text, without the last line feed.
     pub fn ask(&mut self, line: &str) -> String {
         let answer = String::from_utf8(self.send(line.as_bytes())).unwrap();
         String::from(answer.strip_suffix('\n').unwrap_or(&answer))

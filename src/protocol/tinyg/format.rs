@@ -48,7 +48,7 @@ impl Format {
         Format { flags: format.flags | hidden & !shown, ..format }
     }
 
-    /// The same with all of it, unless the verbosity is 0.
+    /// How JSON is written for an announcement: every part of it, unless the verbosity is 0.
     pub fn announcement(settings: &Settings) -> Format {
         let format = Format::json(settings);
         let hidden = if settings.json_verbosity() == 0 { SILENT | MUTE | HUSHED } else { 0 };

@@ -51,7 +51,7 @@ fn answers_as_documented() {
     }
 }
 
-/// The same for what the exchanges above leave open.
+/// Answers whose form the exchanges above do not show.
 #[test]
 fn answers_as_senders_expect() {
     for (line, answer) in [

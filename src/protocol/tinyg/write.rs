@@ -130,7 +130,7 @@ impl<'a, O: Out> Writer<'a, O> {
         self.after_key();
     }
 
-    /// The same with a key of ours.
+    /// Begins a member whose key is a text of the firmware's own.
     pub fn key_text(&mut self, name: Text) {
         self.before_key();
         self.text(name);

@@ -369,7 +369,7 @@ unsafe extern "C" fn tifr_bit<const TIMER: usize>(
     1
 }
 
-/// The same on a register of pin interrupts' flags.
+/// A bit of a register of pin interrupts' flags is written: a 1 clears the flag.
 unsafe extern "C" fn pin_flag_bit<const REGISTER: usize>(
     _: *mut ffi::avr_t,
     bit: u8,

@@ -450,7 +450,7 @@ impl Machine {
         self.cpu.data(usize::from(addr))
     }
 
-    /// The same; `None` beyond the end of RAM.
+    /// A byte of the data space, as memory holds it; `None` beyond the end of RAM.
     pub fn data(&self, addr: u16) -> Option<u8> {
         (usize::from(addr) <= self.cpu.data_end()).then(|| self.peek(addr))
     }

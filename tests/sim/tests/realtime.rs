@@ -48,7 +48,7 @@ fn play(talk: &mut Talk<Machine>, deeds: &[Deed]) -> Result<(), String> {
     talk.finish()
 }
 
-/// The same, if the simulator gives up as well.
+/// Plays the deeds; a crash of the simulated chip is an error as well.
 fn try_to_play(talk: &mut Talk<Machine>, deeds: &[Deed]) -> Result<(), String> {
     let played = catch_unwind(AssertUnwindSafe(|| play(talk, deeds)));
     let played = played.unwrap_or_else(|_| Err("the chip crashes".to_string()));

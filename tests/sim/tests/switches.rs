@@ -11,7 +11,7 @@ use kerf_sim::{Host, Machine};
 const US: u64 = 16;
 /// From the edge to the last step, at 50,000 steps a second.
 const STOP_US: u64 = 50;
-/// The same where the step interrupt leaves a fifth of the CPU, at 85,000.
+/// From the edge to the last step, at 85,000 steps a second, where the step interrupt leaves a fifth of the CPU.
 const STOP_FAST_US: u64 = 125;
 /// The longest time with interrupts off outside the step interrupt.
 const WINDOW: u64 = 31;

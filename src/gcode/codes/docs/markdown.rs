@@ -70,7 +70,7 @@ pub fn markdown() -> String {
     text + &settings()
 }
 
-/// The same in lines of no more than 110 characters.
+/// The text, broken into lines of no more than 110 characters.
 fn wrapped(text: &str) -> String {
     let (mut lines, mut column) = (String::new(), 0);
     for word in text.split(' ') {

@@ -75,9 +75,9 @@ pub enum On {
     Usual,
     /// A machine that has neither switches nor a probe nor an encoder.
     NoSwitches,
-    /// The same with X disabled.
+    /// The machine of `Usual` with X disabled.
     DisabledX,
-    /// The same with soft limits, X from 0 to 150.
+    /// The machine of `Usual` with soft limits, X from 0 to 150.
     SoftLimits,
 }
 

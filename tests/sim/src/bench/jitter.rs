@@ -26,7 +26,7 @@ pub fn quiet(bed: &Bed) -> Result<Figure> {
     Ok(in_cycles(&machine, peak_to_peak(&machine, 0)))
 }
 
-/// The same while lines stream in and answers out.
+/// Peak to peak of the dominant motor's interval, cycles, while lines stream in and answers out.
 pub fn busy(bed: &Bed) -> Result<Figure> {
     let machine = run(bed, LINES)?;
     Ok(in_cycles(&machine, peak_to_peak(&machine, 0)))

@@ -218,8 +218,7 @@ fn over_ideal(bed: &Bed, chord: f64, how: How) -> Result<Figure> {
     Ok(Figure { value, note: format!("{:.0} lines/s", lines_per_second(&report)) })
 }
 
-/// The shortest time of the job, s.
-/// How long it takes at best, s.
+/// The shortest time that the job can take, s.
 pub fn ideal(chord: f64) -> f64 {
     let velocity = FEED / 60.0;
     f64::from(MOVES) * chord / velocity + velocity / ACCELERATION
@@ -235,7 +234,7 @@ pub fn spiral(chord: f64) -> String {
     spiral_at(chord, FEED)
 }
 
-/// The same at another feed, mm/min.
+/// The job at another feed, mm/min.
 fn spiral_at(chord: f64, feed: f64) -> String {
     let mut job = format!("G1 F{feed}\n");
     let mut angle = 0.0f64;

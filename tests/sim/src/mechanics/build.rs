@@ -173,7 +173,7 @@ impl Build {
         build
     }
 
-    /// The same with all switches of axes wired so.
+    /// This machine with all switches of axes wired as `wiring` says.
     pub fn wired(mut self, wiring: Wiring) -> Build {
         let ends = self.axes.iter_mut().flat_map(|axis| [&mut axis.min, &mut axis.max]);
         ends.flatten().for_each(|switch| switch.wiring = wiring);
