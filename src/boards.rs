@@ -69,7 +69,7 @@ macro_rules! motor_numbers {
 
 pub(crate) use motor_numbers;
 
-/// As many as [`each_motor`] has.
+/// [`each_motor`] has an arm for each motor that an image may have.
 const _: () = {
     let mut motors = 0;
     each_motor!(M => if M == motors { motors += 1 });
@@ -91,7 +91,7 @@ pub enum Port {
     J,
     K,
     L,
-    /// Of the RP2040: its pins GP0 to GP29, of which the number is the bit.
+    /// The pins GP0 to GP29 of the RP2040; the number of a pin is its bit.
     Gpio,
 }
 
@@ -134,12 +134,12 @@ impl Port {
     }
 }
 
-/// One pin.
+/// A pin of the chip.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Pin {
-    /// Its port.
+    /// The port of the pin.
     pub port: Port,
-    /// Its bit in the port, 0 to 7; on the RP2040 0 to 29.
+    /// The bit of the pin in its port, 0 to 7; on the RP2040 0 to 29.
     pub bit: u8,
 }
 
@@ -160,7 +160,7 @@ pub enum Interrupt {
     External(u8),
     /// A pin change by its number: PCINT0 to PCINT23, of which eight share a vector.
     PinChange(u8),
-    /// That of a pin of the RP2040 by its number, each with a note of its own.
+    /// The interrupt of a pin of the RP2040, by the pin's number; each pin is told apart.
     Gpio(u8),
 }
 
@@ -205,20 +205,20 @@ pub enum Timer {
     T3,
     T4,
     T5,
-    /// Of the RP2040: a state machine of its PIO.
+    /// A state machine of the RP2040's PIO.
     Pio,
-    /// Of the RP2040: the timer of its core.
+    /// The timer of the RP2040's core.
     SysTick,
-    /// Of the RP2040: its slices of pulse-width outputs.
+    /// The RP2040's slices of pulse-width outputs.
     Slices,
 }
 
 /// An output of a 16-bit timer that drives a pin by pulses of some width.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Pwm {
-    /// Its timer: 3, 4 or 5; [`Timer::Slices`] on the RP2040.
+    /// The timer of the output: 3, 4 or 5; [`Timer::Slices`] on the RP2040.
     pub timer: Timer,
-    /// Its channel, 0 to 2 for A to C; on the RP2040 the number of the pin.
+    /// The channel of the timer, 0 to 2 for A to C; on the RP2040 the number of the pin.
     pub channel: u8,
 }
 
@@ -267,7 +267,7 @@ impl Usart {
         }
     }
 
-    /// Its receiver's and its transmitter's pin. USB has pins of its own.
+    /// The pins of receiver and transmitter. USB has pins of its own.
     pub const fn pins(self) -> Option<[Pin; 2]> {
         Some(match self {
             Usart::U0 => [pin(Port::E, 0), pin(Port::E, 1)],
@@ -294,9 +294,9 @@ pub struct Handshake {
 pub struct Serial {
     /// The USART behind it.
     pub usart: Usart,
-    /// Its rate at power-up, bits a second. That of USB can be changed (`{baud:n}`).
+    /// The rate at power-up, bits a second. The rate of USB can be changed (`{baud:n}`).
     pub rate: u32,
-    /// Its pins for flow control.
+    /// The pins for flow control.
     pub handshake: Option<Handshake>,
     /// High while Kerf sends, for a transceiver of RS-485 (tie its /RE to this pin too). On a port that has
     /// it Kerf only answers, for others share the line.
@@ -332,7 +332,7 @@ pub mod inputs {
     pub const Z_MAX: usize = 5;
     pub const A_MIN: usize = 6;
     pub const A_MAX: usize = 7;
-    /// Those below this are ends of axes: two for each, the lower one first.
+    /// Inputs below this number are ends of axes: two for each axis, the lower end first.
     pub const ENDS: usize = 8;
     pub const PROBE: usize = 8;
     pub const DOOR: usize = 9;
@@ -347,7 +347,7 @@ pub mod inputs {
 pub struct Encoder {
     /// Once a turn.
     pub index: Pin,
-    /// So many times a turn.
+    /// The pin of the sensor that pulses several times a turn.
     pub sync: Pin,
 }
 
@@ -423,7 +423,7 @@ pub struct Board {
     pub outputs: [Option<Pin>; outputs::COUNT],
     /// Says how fast the spindle is to turn. Its pin is a hazard.
     pub pwm: Option<Pwm>,
-    /// Its serial ports: [`USB`], and a second one if there is room for it.
+    /// The serial ports: [`USB`], and a second one if there is room for it.
     pub serial: &'static [Serial],
     /// Switches between a pin and ground: see [`inputs`]. One pin may serve both ends of an axis. Each
     /// must be able to interrupt: see [`Pin::interrupt`].
@@ -432,7 +432,7 @@ pub struct Board {
     pub encoder: Option<Encoder>,
     /// Drivers that are told their current and microsteps by UART1 of the RP2040.
     pub drivers: Option<Tmc2209>,
-    /// Its heaters, of an image that can print.
+    /// The heaters, for an image that can print.
     pub heaters: Option<Heaters>,
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,

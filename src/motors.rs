@@ -50,11 +50,11 @@ impl Modes {
 #[derive(Clone, Copy, Debug)]
 pub struct Motors {
     modes: Modes,
-    /// They have power.
+    /// Motors that have power, as bits.
     on: u8,
-    /// They are in use by the segment that was queued last.
+    /// Motors that the segment queued last moves, as bits.
     busy: u8,
-    /// They have been used since the last look at the clock.
+    /// Motors that have moved since the last look at the clock, as bits.
     used: u8,
     /// When each was used last.
     last: [u32; MOTORS],

@@ -21,7 +21,7 @@ pub const UNPLACED: u8 = 1 << 6;
 /// No character that asks for something: XON has come, and what was held back may leave.
 pub const LET_GO: u8 = 1 << 7;
 
-/// Those of which the place in the stream counts: there the receive ring gets a
+/// Characters whose place in the stream counts: there the receive ring gets a
 /// [`CUT`](crate::hal::serial::CUT) or [`GO`](crate::hal::serial::GO).
 pub const PLACED: u8 = FLUSH | KILL | RESUME | RESET;
 
@@ -85,7 +85,7 @@ pub const TRAVERSE: u8 = 0x0C;
 pub const NO_JOG: u8 = 0x10;
 
 impl Asked {
-    /// Nothing.
+    /// No character has come.
     pub const NOTHING: Self = Self { percent: [0; 2], fixed: 0 };
 
     /// With one more character, if it is one of these. The receive interrupt of the AVR has its twin in assembly.

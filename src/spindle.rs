@@ -48,23 +48,23 @@ pub struct Spindle {
     low: u8,
 }
 
-/// Of [`Spindle::pauses`]: the sender has stopped the spindle in the hold that is on. No output has this bit.
+/// A bit of [`Spindle::pauses`]: the sender has stopped the spindle in the hold that is on. No output has this bit.
 const STOPPED: u8 = 0x80;
 
 /// What a setting has changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Changed {
-    /// Nothing of the outputs.
+    /// The outputs stay as they are.
     Nothing,
-    /// What they are to be.
+    /// The outputs change to what they are to be now.
     Outputs,
-    /// The frequency: so many thousandths of a Hz.
+    /// The frequency changes to this, thousandths of a Hz.
     Frequency(u32),
 }
 
 #[small]
 impl Spindle {
-    /// Nothing set. All zeros but for the factor.
+    /// A spindle without settings. All zeros but for the factor.
     pub const fn new() -> Self {
         let range = Range { low: 0.0, high: 0.0, low_share: 0, high_share: 0 };
         Self { ranges: [range; 2], off: 0, factor: 1_000, spin_up: 0, pauses: 0, low: 0 }
@@ -137,7 +137,7 @@ impl Spindle {
         }
     }
 
-    /// Of the outputs that are `on` those that stay so while a feedhold is on.
+    /// The outputs among those that are `on` which stay on while a feedhold is on.
     pub fn held(&self, on: u8) -> u8 {
         let stopped = if self.pauses & STOPPED != 0 { SPINDLE | COUNTERCLOCKWISE } else { 0 };
         on & !(self.pauses | stopped)

@@ -50,7 +50,7 @@ pub struct Switches {
 }
 
 impl Switches {
-    /// None is worked.
+    /// Switches of which none is worked.
     pub const fn new() -> Self {
         Self { worked: 0, last: 0, locked: 0, left: 0, paused: false }
     }
@@ -75,7 +75,7 @@ impl Switches {
         self.last = now;
     }
 
-    /// Those that have changed, should this be the second look that finds the switches `now` worked.
+    /// The switches that have changed, if this is the second look that finds the switches `now` worked.
     #[inline(always)]
     pub fn changed(&self, now: u16) -> u16 {
         (now ^ self.worked) & !(now ^ self.last) & !self.locked

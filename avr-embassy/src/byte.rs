@@ -75,7 +75,7 @@ pub type Index = u8;
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 pub type Index = u16;
 
-/// One that two levels share.
+/// An index of a ring that two levels share: a byte on AVR.
 #[cfg(not(all(target_arch = "arm", target_os = "none")))]
 pub type SharedIndex = SharedByte;
 #[cfg(all(target_arch = "arm", target_os = "none"))]
@@ -85,7 +85,7 @@ pub use wide::SharedIndex;
 mod wide {
     use core::sync::atomic::{AtomicU16, Ordering};
 
-    /// As [`SharedByte`](super::SharedByte).
+    /// An index of a ring that two levels share, as [`SharedByte`](super::SharedByte) of 16 bits.
     pub struct SharedIndex(AtomicU16);
 
     impl SharedIndex {

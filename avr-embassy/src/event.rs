@@ -62,12 +62,12 @@ impl Event {
         Event(BIT)
     }
 
-    /// Its bit, for handlers in assembly.
+    /// The bit of this event, for handlers in assembly.
     pub const fn bit(self) -> u8 {
         self.0
     }
 
-    /// It has happened. Any level. Cost: 2 cycles, if the event is a constant.
+    /// Marks the event as happened. Any level. Cost: 2 cycles, if the event is a constant.
     #[inline(always)]
     pub fn set(self) {
         flags::set(self.0);

@@ -9,7 +9,7 @@ pub struct Period {
     pub counts: u8,
     /// What is left beside them, in parts of a count.
     pub parts: u8,
-    /// Such parts in a count: 128 at the most, so that two sums of parts fit a byte.
+    /// How many parts a count has: 128 at the most, so that two sums of parts fit a byte.
     pub of: u8,
 }
 

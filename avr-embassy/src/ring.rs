@@ -83,7 +83,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         }
     }
 
-    /// Its two ends. `None` if one has been taken. Any level.
+    /// The two ends of the ring. `None` if one has been taken. Any level.
     pub fn split(&'static self) -> Option<(Producer<T, N>, Consumer<T, N>)> {
         take(&self.taken, FILLS | READS).then_some((Producer(self), Consumer(self)))
     }
@@ -197,7 +197,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         self.slot_with(|| value)
     }
 
-    /// As [`Producer::slot`], with what `make` makes. It is not called if the ring is full.
+    /// A free slot as [`Producer::slot`] gives, holding what `make` makes. `make` is not called if the ring is full.
     #[inline(always)]
     pub fn slot_with(&mut self, make: impl FnOnce() -> T) -> Option<Slot<'_, T, N>> {
         let after = next::<N>(self.0.head.get());
@@ -418,7 +418,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
 pub struct Slot<'a, T: 'static, const N: usize> {
     ring: &'static Ring<T, N>,
     after: Index,
-    /// Nothing else goes into the ring meanwhile.
+    /// The slot borrows the producer: nothing else goes into the ring while the slot exists.
     producer: PhantomData<&'a mut Producer<T, N>>,
 }
 

@@ -181,7 +181,7 @@ macro_rules! shared_static {
 pub struct InterruptEnd<P: Place>(P, PhantomData<*mut ()>);
 
 impl<P: Place> InterruptEnd<P> {
-    /// That of what is at a place. `None` after the first time.
+    /// The end in interrupt mode of what is at a place. `None` after the first time.
     pub fn of(place: P, _: Interrupt) -> Option<Self> {
         let taken = &place.shared().taken;
         if taken.get() != 0 {

@@ -2,7 +2,7 @@
 
 use crate::status::Status::{self, *};
 
-/// Of a status, why it comes and what to do. `Status::Again` never leaves the machine.
+/// For each status why it comes and what to do. `Status::Again` is missing: it never leaves the machine.
 const ADVICE: &[(Status, &str, &str)] = &[
     (Ok, "The line was carried out, or has been queued.", "Nothing."),
     (

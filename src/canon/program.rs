@@ -24,7 +24,7 @@ pub fn by_number(code: u8) -> Option<Status> {
 /// A line that is refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {
-    /// Its number in the program, from 1.
+    /// The number of the line in the program, from 1.
     pub number: usize,
     /// Why.
     pub status: Status,

@@ -29,7 +29,7 @@ impl Settings {
         self.motor(motor, motor::PM)
     }
 
-    /// Its microsteps.
+    /// The microsteps of a motor.
     pub fn motor_microsteps(&self, motor: usize) -> u8 {
         self.motor(motor, motor::MI)
     }
@@ -40,7 +40,7 @@ impl Settings {
         self.octaves
     }
 
-    /// Its steps for a length.
+    /// The steps of a motor for a length.
     pub fn step_ratio(&self, motor: usize) -> StepRatio {
         self.ratios.get(motor).copied().unwrap_or(StepRatio::NONE)
     }

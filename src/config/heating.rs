@@ -23,7 +23,7 @@ pub struct Heating {
 }
 
 impl Heating {
-    /// Nothing is hot, and nothing may be made so.
+    /// Nothing is hot, and nothing may be heated.
     pub const NONE: Self = Self {
         hottest: [0; 2],
         refused: Status::Ok,

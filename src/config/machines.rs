@@ -40,7 +40,7 @@ pub struct Machine {
     pub name: &'static str,
     /// What it is, in some words.
     pub about: &'static str,
-    /// Its settings, where they are not the careful machine's.
+    /// The settings of this machine that differ from those of the careful machine.
     pub entries: &'static [Entry],
 }
 

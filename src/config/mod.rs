@@ -42,7 +42,7 @@ pub struct Settings {
     large: [i32; LARGES],
     /// Derived from a motor's angle, travel and microsteps; used for every block.
     ratios: [StepRatio; MOTORS],
-    /// Of the motor with the finest steps: see [`StepRatio::octaves`]. One more if a motor drives X and Y together.
+    /// The octaves of the motor with the finest steps: see [`StepRatio::octaves`]. One more if a motor drives X and Y together.
     octaves: u8,
     /// What lines may ask of heaters, in an image that has them.
     pub heating: [Heating; heating::PRINTERS],
@@ -62,7 +62,7 @@ impl Settings {
         settings
     }
 
-    /// Nothing set, for [`Settings::set_defaults`].
+    /// Settings without values, for [`Settings::set_defaults`].
     pub const fn blank() -> Settings {
         let ratios = [StepRatio::NONE; MOTORS];
         Settings {

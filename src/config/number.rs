@@ -62,7 +62,7 @@ impl Fixed {
         self
     }
 
-    /// As text, every decimal shown. Cost on AVR: 300 cycles up to 9,999, else 700; and 70 for each digit that is not 0.
+    /// The number as text, every decimal shown. Cost on AVR: 300 cycles up to 9,999, else 700; and 70 for each digit that is not 0.
     pub fn render(self, buffer: &mut Digits) -> &[u8] {
         let decimals = self.decimals.min(9);
         let mut rest = self.value.unsigned_abs();
@@ -196,7 +196,7 @@ impl Number {
         Number { exponent: self.exponent - 6, ..self }
     }
 
-    /// As a fixed-point integer, `None` beyond its range. With `inches` the text is in inches and
+    /// The number as a fixed-point integer, `None` beyond its range. With `inches` the text is in inches and
     /// the result in millimetres.
     pub fn fixed(self, decimals: u8, inches: bool) -> Option<i32> {
         let mut value = self.digits;

@@ -47,7 +47,7 @@ pub enum Owner {
     Spindle,
     /// The coolant.
     Coolant,
-    /// That of an axis with two motors.
+    /// The second motor of an axis with two.
     Squaring,
     /// The hot end.
     HotEnd,
@@ -130,7 +130,7 @@ impl Owner {
         }
     }
 
-    /// Its table.
+    /// The table of the owner's settings.
     fn table(self) -> Option<Slice<Row>> {
         Some(match self {
             Owner::System => system::ROWS.slice(),
@@ -286,7 +286,7 @@ impl Setting {
     /// The number of Kerf's version.
     pub const VERSION: u8 = row_of(&system::LIST, "kerf");
 
-    /// Its number.
+    /// The number of the setting.
     pub fn number(self) -> u8 {
         self.0
     }
@@ -418,7 +418,7 @@ impl Setting {
         }
     }
 
-    /// Its full name.
+    /// The full name of the setting.
     pub fn name(self) -> Name {
         self.owner().prefix().with_token(self.row().token)
     }
@@ -440,13 +440,13 @@ impl Setting {
         }
     }
 
-    /// Its row of the table.
+    /// The row of the setting in its table.
     pub fn row(self) -> Row {
         // A handle is only made of a number that has a row.
         self.owner().load(self.index()).unwrap_or(Row::NONE)
     }
 
-    /// That of the first motor or axis in its row, and its own motor or axis as a bit.
+    /// The setting of the first motor or axis in this row, and this setting's motor or axis as a bit.
     pub(super) fn first_of_row(self) -> (Setting, u8) {
         match self.owner() {
             Owner::Motor(motor) => (Setting(self.0 - motor * motor::COUNT as u8), 1 << motor),
@@ -455,7 +455,7 @@ impl Setting {
         }
     }
 
-    /// Its default, scaled as kept.
+    /// The default of the setting, scaled as kept.
     pub fn default_value(self) -> i32 {
         match machines::ACTIVE {
             0 => self.careful_value(),

@@ -37,9 +37,9 @@ pub const RANGE: u8 = 2;
 pub const CLAMP: u8 = 4;
 /// In millions: a value over a million is divided by one.
 pub const JERK: u8 = 8;
-/// Only axes that turn have it; it is a length even there.
+/// Only rotary axes have this setting; it is a length even there.
 pub const RADIUS: u8 = 16;
-/// Only axes that home have it: X Y Z A.
+/// Only axes that home have this setting: X Y Z A.
 pub const HOMING: u8 = 32;
 /// The axis mode: a linear axis lacks the last one.
 pub const MODE: u8 = 64;
@@ -49,9 +49,9 @@ pub const IDLE: u8 = 128;
 /// A setting, or the same setting of every motor or axis.
 #[derive(Clone, Copy)]
 pub struct Row {
-    /// Its name, without the group; zero padded.
+    /// The name of the setting without the group, padded with zeros.
     pub token: [u8; 4],
-    /// Its place among the small or large ones of the system, the motor, the axis; that of one which is not in RAM is its row.
+    /// The place of the setting among the small or large ones of the system, the motor, the axis; a setting that is not in RAM has its row here.
     pub slot: u8,
     /// How it is kept.
     pub kind: Kind,

@@ -46,7 +46,7 @@ pub fn mark(dda: &Dda, tail: u8) {
     });
 }
 
-/// As [`mark`] where the generator is ahead of the pins, by so many steps of each motor.
+/// Marks as [`mark`] does where the generator is ahead of the pins, by `ahead` steps of each motor.
 pub fn mark_behind(dda: &Dda, tail: u8, ahead: &[i32; MOTORS]) {
     contact().pass(NONE, NONE, |contact| {
         contact.follow.begin(dda);
@@ -55,7 +55,7 @@ pub fn mark_behind(dda: &Dda, tail: u8, ahead: &[i32; MOTORS]) {
     });
 }
 
-/// It was a contact, where the generator was marked. Look interrupt only.
+/// Records that the contact closed where the generator was marked. Look interrupt only.
 #[small]
 pub fn note() {
     if contact().stage() == NONE {
@@ -80,7 +80,7 @@ pub fn catch_up(segments: &Producer<Segment, SEGMENTS>) {
     });
 }
 
-/// Another segment is pushed. Exec only, before it does: behind that the generator may take it at once.
+/// Counts a segment that is about to be pushed. Exec only, before the push: after the push the generator may take it at once.
 #[inline(never)]
 #[small]
 pub fn pushed(segment: &Segment) {

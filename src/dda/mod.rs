@@ -42,7 +42,7 @@ use crate::boards::{MOTORS, STEPS_BY_UNIT};
 pub mod contact;
 pub mod follow;
 
-/// One step, in phase units.
+/// A step, in phase units.
 pub const STEP: u16 = 0x8000;
 
 /// Where phases start: a little past half a step, so that a position is rounded to the nearest step
@@ -86,7 +86,7 @@ pub struct Segment {
     pub moving: u8,
 }
 
-/// None but the first two motors move.
+/// Only the first two motors move.
 pub const NARROW: u8 = 0;
 /// Others do.
 pub const WIDE: u8 = 1;
@@ -128,11 +128,11 @@ pub struct Ticks {
     pub step: u16,
     /// The shortest: the step interrupt, a short interrupt before it, and some time for everything else.
     pub shortest: u16,
-    /// Of steady motion: as fine as leaves exec and the planner a third of the CPU.
+    /// The ticks of steady motion: as fine as leaves exec and the planner a third of the CPU.
     pub fine: u16,
-    /// Of short blocks, for which they need more.
+    /// The ticks of short blocks, which leave exec and the planner more of the CPU.
     pub coarse: u16,
-    /// Of blocks so short that they are a single segment.
+    /// The ticks of blocks so short that they are a single segment.
     pub coarsest: u16,
     /// From this period on pulses wait for the interrupt's worst latency ([`Segment::settle`]).
     pub settles: u16,
@@ -175,9 +175,9 @@ pub struct Dda {
     /// Steps due at the next tick, bit m for motor m.
     pub(crate) due: u8,
     pub(crate) backwards: u8,
-    /// As in the segment.
+    /// The settling time, as in the segment.
     pub(crate) settle: u8,
-    /// As in the segment.
+    /// The mode, as in the segment.
     pub(crate) mode: u8,
 }
 
@@ -239,7 +239,7 @@ impl Dda {
         Segment { increment, ticks, backwards, ..Segment::default() }
     }
 
-    /// One tick.
+    /// Carries out a tick.
     #[inline(always)]
     pub fn tick(&mut self, pins: &mut impl Pins, segments: &mut Consumer<Segment, SEGMENTS>) {
         let due = self.due;

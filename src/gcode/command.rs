@@ -146,7 +146,7 @@ impl Surface {
 /// What axes do. Targets are machine coordinates.
 #[derive(Clone, Copy, Default, Debug, PartialEq)]
 pub enum Motion {
-    /// Nothing.
+    /// No motion.
     #[default]
     None,
     /// G0: straight, each axis within its traverse limit.
@@ -285,7 +285,7 @@ pub struct Cycle {
 /// What ends or interrupts a program.
 #[derive(Clone, Copy, Default, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// Nothing does.
+    /// No stop.
     #[default]
     None,
     /// M0, M1, M60: program stop.

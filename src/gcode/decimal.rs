@@ -47,7 +47,7 @@ impl Exact {
 }
 
 impl Decimal {
-    /// As millimetres or degrees.
+    /// The number as millimetres or degrees.
     #[inline(always)]
     pub fn mm(&self) -> Result<Exact, Status> {
         // Most lengths are below 65 m and have four decimals at most: nothing to round, and a product
@@ -70,7 +70,7 @@ impl Decimal {
         self.exact(self.whole * Length::PER_MM as u32 + u32::from(self.frac), self.tail)
     }
 
-    /// As inches, exact to seven decimals.
+    /// The number as inches, exact to seven decimals.
     ///
     /// 254,000 units per inch, piece by piece: a fourth decimal is 25.4 units, a seventh 0.0254. Cost on AVR: 400 cycles;
     /// with more than four decimals two 32-bit divisions more, 1,200.
@@ -121,7 +121,7 @@ impl Decimal {
         self.whole == 0 && self.frac == 0 && self.tail == 0
     }
 
-    /// As a whole number: 110 if negative, 102 with decimals.
+    /// The number as a whole number: 110 if negative, 102 with decimals.
     pub fn integer(&self) -> Result<u32, Status> {
         match self {
             Decimal { negative: true, .. } => Err(Status::OutOfRange),
@@ -130,7 +130,7 @@ impl Decimal {
         }
     }
 
-    /// As the number of a G or M code: 28 and 3 of `G28.3`. `None` if no code has such a number: the highest is 999.9.
+    /// The number as that of a G or M code: 28 and 3 of `G28.3`. `None` if no code has such a number: the highest is 999.9.
     pub fn code(&self) -> Option<(u16, u8)> {
         let whole = u16::try_from(self.whole).ok().filter(|whole| *whole < 1_000)?;
         let tenth = if self.frac == 0 { 0 } else { (self.frac / 1_000) as u8 };
@@ -138,7 +138,7 @@ impl Decimal {
         (exact && !self.negative).then_some((whole, tenth))
     }
 
-    /// As seconds, in milliseconds: 163 if negative, 110 beyond 32 bits.
+    /// The number as seconds, in milliseconds: 163 if negative, 110 beyond 32 bits.
     pub fn milliseconds(&self) -> Result<u32, Status> {
         if self.negative {
             return Err(Status::PWordNegative);

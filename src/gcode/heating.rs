@@ -30,21 +30,21 @@ pub enum Part {
 /// What motion waits for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Wait {
-    /// Nothing.
+    /// No wait.
     #[default]
     Nothing,
-    /// That it is as hot as it is to be, or hotter.
+    /// Waits until the heater is at its target or hotter.
     Hot,
-    /// That it is as hot as it is to be, and no hotter.
+    /// Waits until the heater is at its target, from above as well.
     Reached,
-    /// That its factors have been found (M303).
+    /// Waits until the factors of the heater have been found (M303).
     Tuned,
 }
 
 /// What a line asks for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Heat {
-    /// Of which part.
+    /// The part that is heated.
     pub part: Part,
     /// What it is to be from here on: eighths of a degree Celsius, 0 for off; of the fan 0 to 255. `None` leaves it.
     pub to: Option<u16>,

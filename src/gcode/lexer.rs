@@ -36,7 +36,7 @@ pub fn failure(status: Status) -> nom::Err<Fault> {
     nom::Err::Failure(Fault(status))
 }
 
-/// One item of a line.
+/// An item of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Item<'a> {
     /// A letter, upper case, and its number.

@@ -77,7 +77,7 @@ struct Limits<'a, S> {
 }
 
 impl<S: Setup> Limits<'_, S> {
-    /// Those of an axis, if it has any.
+    /// The limits of an axis, if it has any.
     #[inline(never)]
     #[small]
     fn of(&self, axis: u8) -> Option<(Length, Length)> {

@@ -46,7 +46,7 @@ fn usual(input: &[u8]) -> Option<(&[u8], Decimal)> {
     Some((rest, Decimal { whole: whole.into(), frac, tail: 0, negative }))
 }
 
-/// One to four digits: bytes by pairs, for AVR multiplies bytes.
+/// Reads one to four digits, two at a time, for AVR multiplies bytes.
 #[inline(always)]
 fn usual_whole(at: &mut slice::Iter<u8>) -> Option<u16> {
     let first = digit(at)?;

@@ -34,7 +34,7 @@ impl Override {
 
 /// The least factor of the spindle, and the least that real-time characters ask for.
 pub const LEAST: u16 = 50;
-/// As programmed.
+/// The override of 100 %, in thousandths.
 pub const FULL: u16 = 1_000;
 
 /// All of them, as bits.
@@ -78,7 +78,7 @@ impl Change {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overrides {
     factors: [u16; 3],
-    /// Those that count, as bits.
+    /// The overrides that count, as bits.
     on: u8,
 }
 

@@ -16,7 +16,7 @@ use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// The axis of the extruder.
 pub const EXTRUDER: usize = FIRST_ROTARY;
-/// As much filament as programmed.
+/// As much filament as programmed, in thousandths.
 const FULL: u16 = 1_000;
 #[cfg(feature = "dialect-reprap")]
 /// The feed rate until there is another, mm/min.
@@ -46,7 +46,7 @@ pub struct Printing;
 
 #[cfg(feature = "dialect-reprap")]
 impl Printing {
-    /// As any axis.
+    /// The state at power-up: E moves as any other axis.
     pub const NONE: Self = Self { own: None, flow: FULL, dry: false, more: 0 };
 
     /// What its words are measured from, if that is not what those of the others are.
@@ -76,7 +76,7 @@ impl Printing {
 
 #[cfg(not(feature = "dialect-reprap"))]
 impl Printing {
-    /// As any axis.
+    /// The state at power-up, in an image that cannot print.
     pub const NONE: Self = Self;
 
     /// Never.
@@ -85,7 +85,7 @@ impl Printing {
         None
     }
 
-    /// It does.
+    /// Does nothing in an image that cannot print.
     #[inline(always)]
     pub fn follow(&mut self) {}
 
@@ -170,7 +170,7 @@ impl State {
         }
     }
 
-    /// Nothing flows more or less.
+    /// Does nothing in an image that cannot print.
     #[cfg(not(feature = "dialect-reprap"))]
     #[inline(always)]
     pub(super) fn carry_flow(&mut self, _done: bool) {}

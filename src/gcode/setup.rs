@@ -14,9 +14,9 @@ pub enum AxisMode {
     Disabled = 0,
     /// Lengths, or degrees of an axis that turns.
     Standard = 1,
-    /// As standard; the position goes on, the motors stand still.
+    /// The position moves as that of a standard axis, the motors stand still.
     Inhibited = 2,
-    /// Of an axis that turns: lengths along a circumference.
+    /// A rotary axis whose words are lengths along a circumference.
     Radius = 3,
 }
 

@@ -14,10 +14,10 @@ use crate::capability::Capability;
 use crate::progmem;
 use crate::units::{Length, PerAxis};
 
-/// One step.
+/// A step of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// This tool is in the spindle.
+    /// The tool that is in the spindle now.
     Tool(u8),
     /// The spindle turns so.
     Spindle(Spindle),
@@ -90,10 +90,10 @@ enum Peck {
 const X: usize = 0;
 const Z: usize = 2;
 
-/// So far above the last depth feeding begins again, or chips are broken: 0.254 mm.
+/// How far above the last depth feeding begins again, and how far chips are broken: 0.254 mm.
 const PECK_CLEARANCE: i32 = 2_540;
 
-/// One thing that is done at a hole.
+/// An operation at a hole.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Op {
     /// The hole is done.

@@ -15,7 +15,7 @@ use crate::units::Length;
 pub struct Sticky {
     /// Whose they are: none of another mode counts.
     mode: MotionMode,
-    /// And in which plane.
+    /// The plane of the cycle.
     plane: Plane,
     /// Where the axis stood before the first cycle of the series, machine coordinates.
     pub initial: Length,

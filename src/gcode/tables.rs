@@ -45,7 +45,7 @@ impl Row {
         }
     }
 
-    /// Its number among all [`ROWS`].
+    /// The number of the row among all [`ROWS`].
     pub const fn number(self) -> u8 {
         self.0
     }

@@ -237,17 +237,17 @@ pub trait Timing {
     const LINE_BYTES: [usize; 2] = [412, 96];
 }
 
-/// Those of the chip.
+/// [`Timing::TIMER_HZ`] of the chip of this image.
 pub const TIMER_HZ: u32 = <imp::Chip as Timing>::TIMER_HZ;
-/// That of the chip.
+/// [`Timing::PULSE_US`] of the chip of this image.
 pub const PULSE_US: u8 = <imp::Chip as Timing>::PULSE_US;
-/// That of the chip.
+/// [`Timing::LOOK_AHEAD`] of the chip of this image.
 pub const LOOK_AHEAD: usize = <imp::Chip as Timing>::LOOK_AHEAD;
-/// That of the chip.
+/// [`Timing::LINES`] of the chip of this image.
 pub const LINES: usize = <imp::Chip as Timing>::LINES;
-/// Those of the chip.
+/// [`Timing::LINE_BYTES`] of the chip of this image.
 pub const LINE_BYTES: [usize; 2] = <imp::Chip as Timing>::LINE_BYTES;
-/// Those of the chip. To be indexed in constants: as a table it would take RAM.
+/// [`Timing::TICKS`] of the chip of this image. Index it in constants only: as a table it would take RAM.
 pub const TICKS: [Ticks; MOTORS] = <imp::Chip as Timing>::TICKS;
 
 /// Memory that keeps its bytes without power.

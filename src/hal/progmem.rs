@@ -143,7 +143,7 @@ pub struct Plain {
 unsafe impl Sync for Plain {}
 
 impl Plain {
-    /// Those at `bytes`.
+    /// The table at `bytes`.
     ///
     /// # Safety
     /// On AVR, `bytes` must lie in program memory. [`plain!`](crate::plain!) sees to that.

@@ -58,7 +58,7 @@ impl Mark {
     /// About to reset, for something has got stuck.
     pub const STARVED: Mark = Mark(0x4BC3);
 
-    /// It runs, having been started so.
+    /// The mark of a firmware that runs after a start by `cause`.
     pub fn running(cause: Cause) -> Mark {
         Mark(Self::RUNNING | cause as u16)
     }

@@ -26,11 +26,11 @@ pub const TX_RING: usize = 128;
 pub const MARKS: u8 = 8;
 /// A byte that no line may hold, and no mark.
 pub const STRAY: u8 = 8;
-/// Of a mark: it replaced the end of a whole line.
+/// A bit of a mark: the mark replaced the end of a whole line.
 pub const BEHIND_END: u8 = 1;
-/// Of a mark: the byte lost last was the end of a line.
+/// A bit of a mark: the byte lost last was the end of a line.
 pub const CLEAN: u8 = 2;
-/// Of a mark: that was a carriage return, which a line feed may follow.
+/// A bit of a mark: the byte lost last was a carriage return, which a line feed may follow.
 pub const RETURNED: u8 = 4;
 
 /// No mark of a loss (none has this bit without [`CLEAN`]): here a `%` or `^d` stood in the stream.
@@ -74,10 +74,10 @@ pub const fn high_water(flow: Flow, ring: usize) -> usize {
         _ => ring / 2,
     }
 }
-/// With so many bytes in the ring of the second port thread mode is late, and exec stops the sender.
+/// Thread mode is late when the ring of the second port holds this many bytes: exec stops the sender.
 pub const LATE: usize = AUX_RING / 4;
 
-/// And goes on when it holds less.
+/// The sender may go on when the ring holds less than this many bytes.
 pub const fn low_water(ring: usize) -> usize {
     if ring < RX_RING { ring / 16 } else { ring / 8 }
 }
@@ -94,7 +94,7 @@ pub enum Flow {
 }
 
 impl Flow {
-    /// That of a port by the setting `ex`.
+    /// The flow control of a port by the setting `ex`.
     pub const fn of(port: u8, ex: u8) -> Flow {
         let has_pins = matches!(hardware(port), Some(Serial { handshake: Some(_), .. }));
         match ex {
@@ -120,11 +120,11 @@ pub type Outgoing = Producer<u8, TX_RING>;
 /// The ends of a port's rings that tasks have.
 pub type Ends<const N: usize> = (Received<N>, Outgoing);
 
-/// Those of all ports.
+/// The ends of all ports.
 pub struct AllEnds {
-    /// Of USB.
+    /// The ends of USB.
     pub usb: Ends<RX_RING>,
-    /// Of the other port, if the board has one.
+    /// The ends of the second port, if the board has one.
     pub aux: Option<Ends<AUX_RING>>,
 }
 

@@ -14,7 +14,7 @@ use super::sensor::UNIT;
 pub const STEPS: i32 = 5;
 /// All there is.
 pub const FULL: u8 = 255;
-/// So near what is wanted the factors count, 1/64 degree.
+/// The factors count when the temperature is within this distance of the target, 1/64 degree.
 const RANGE: i16 = 12 * UNIT;
 /// What factors are counted in: hundredths.
 const HUNDREDTHS: i32 = 100;

@@ -15,19 +15,19 @@ use super::control::STEPS;
 use super::sensor::UNIT;
 use crate::status::Status;
 
-/// So near it counts as there.
+/// Within this distance of the target the heater counts as there.
 pub const NEAR: i16 = 3 * UNIT;
-/// So far it has got away.
+/// At this distance from the target the heater counts as run away, after [`AWAY_S`].
 pub const FAR: i16 = 10 * UNIT;
-/// How long it may, seconds.
+/// How long a heater may be [`FAR`] from its target, seconds.
 pub const AWAY_S: u16 = 30;
-/// It has to get so much hotter in [`Rule::rise_s`].
+/// A heater must get this much hotter within [`Rule::rise_s`].
 pub const RISE: i16 = 2 * UNIT;
-/// Beyond the maximum.
+/// How far above its maximum a heater may get.
 pub const BEYOND: i16 = 15 * UNIT;
-/// A heater that is off may get so much hotter, by what is beside it and what it held.
+/// A heater that is off may get this much hotter, by the heat beside it and the heat that it held.
 const BY_ITSELF: i16 = 20 * UNIT;
-/// And up to this whatever it was.
+/// A heater that is off may get up to this temperature, however cold it was.
 const WARM: i16 = 70 * UNIT;
 
 /// What holds for a heater.
@@ -112,7 +112,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Another temperature is wanted.
+    /// Begins to watch for another target.
     fn begin(&mut self, now: i16, error: i16, rule: &Rule) {
         (self.mark, self.left) = (now, steps(rule.rise_s));
         self.phase = match () {

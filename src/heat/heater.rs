@@ -15,7 +15,7 @@ const MISSING: u8 = 3;
 /// How long the hot end and the bed may take for two degrees, seconds.
 const RISE_S: [u16; HEATERS] = [20, 90];
 
-/// One of them.
+/// A heater with its sensor.
 #[derive(Clone, Copy, Debug)]
 pub struct Heater {
     kind: Kind,
@@ -26,7 +26,7 @@ pub struct Heater {
     least: i16,
     control: Control,
     watch: Watch,
-    /// Of the looks since the last step.
+    /// The sum of the sensor's readings since the last step.
     sum: i32,
     looks: u8,
     missing: u8,

@@ -18,7 +18,7 @@ pub const UNIT: i16 = 64;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(u8)]
 pub enum Kind {
-    /// None: there is no such heater.
+    /// There is no such heater.
     #[default]
     None = 0,
     /// Semitec 104GT-2: 100,000 ohms, beta 4267.
@@ -32,9 +32,9 @@ pub enum Kind {
 /// What is wrong with a sensor.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Broken {
-    /// It reads as if a wire were off.
+    /// The sensor reads as if a wire were off.
     Open,
-    /// It reads as if its wires touched.
+    /// The sensor reads as if its wires touched.
     Short,
 }
 

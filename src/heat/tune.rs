@@ -11,19 +11,19 @@
 use super::control::{FULL, STEPS};
 use super::sensor::UNIT;
 
-/// So far from what is wanted the power changes.
+/// The power is switched when the temperature is this far from the target.
 const BAND: i16 = UNIT / 4;
-/// So far above what is wanted it fails.
+/// The autotune fails when the temperature is this far above the target.
 const FAR: i16 = 25 * UNIT;
 /// How long a half of a cycle may take, seconds.
 const HALF_S: u16 = 1_200;
-/// The least power, and the most, around which it swings.
+/// The least and the greatest power around which the autotune swings.
 const BIAS: (u8, u8) = (20, FULL - 20);
-/// Cycles that are not measured: it comes from the cold, and the power is not in the middle yet.
+/// The least cycles. The first ones are not measured: the heater comes from the cold, and the power is not in the middle yet.
 pub const CYCLES_MIN: u8 = 3;
-/// The most.
+/// The most cycles.
 pub const CYCLES_MAX: u8 = 50;
-/// Shares: `p` is so many hundredths of `ku`, `i` so many of `p` by a period, `d` so many of `p` times a period.
+/// The share of `ku` that `p` is, in hundredths; of `p` by a period that `i` is; and of `p` times a period that `d` is.
 const RULE: (u32, u32, u32) = (60, 100, 30);
 
 /// What is known of a heater's factors by its swing: hundredths, as settings have them.
@@ -37,19 +37,19 @@ pub struct Found {
     pub d: u16,
 }
 
-/// How far it is.
+/// How far an autotune is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Stage {
     /// There is nothing to tell of.
     #[default]
     Idle,
-    /// It swings.
+    /// The temperature swings around the target.
     Swings,
-    /// It has found factors.
+    /// The factors have been found.
     Done,
     /// A half of a cycle has taken too long.
     TooSlow,
-    /// It has got too hot.
+    /// The heater has got too hot.
     TooHot,
     /// Somebody has ended it.
     Stopped,
@@ -60,7 +60,7 @@ pub enum Stage {
 pub struct Tune {
     /// How far it is.
     pub stage: Stage,
-    /// Of the bed, not of the hot end.
+    /// The bed is tuned, not the hot end.
     pub bed: bool,
     /// How many cycles it has made.
     pub cycle: u8,
@@ -73,7 +73,7 @@ pub struct Tune {
     /// What has been found so far.
     pub found: Found,
     cycles: u8,
-    /// It has more power.
+    /// The power is in its upper half.
     more: bool,
     wanted: i16,
     low: i16,
@@ -85,7 +85,7 @@ pub struct Tune {
 
 #[small]
 impl Tune {
-    /// None. All bytes are 0: it is part of a static.
+    /// No autotune. All bytes are 0, for it is part of a static.
     pub const IDLE: Self = Self {
         stage: Stage::Idle,
         bed: false,

@@ -37,9 +37,9 @@ pub struct Piece {
 /// Where a job has come to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Job {
-    /// Its number; 0 is none.
+    /// The number of the job; 0 is none.
     number: u8,
-    /// Of the program in EEPROM: the higher byte of `at`.
+    /// Of the program in EEPROM, the higher byte of `at`.
     piece: u8,
     round: u8,
     at: u8,
@@ -60,7 +60,7 @@ impl Job {
         any.then(|| Self { number: STARTUP, ..Self::default() })
     }
 
-    /// Of those, which comes next; `None` for another job.
+    /// The number of the startup line that comes next; `None` for another job.
     pub fn startup(&self) -> Option<u8> {
         (self.number == STARTUP).then_some(self.piece)
     }
@@ -80,7 +80,7 @@ impl Job {
         self.round == OVER
     }
 
-    /// Its number.
+    /// The number of the job.
     pub fn number(&self) -> u8 {
         self.number
     }

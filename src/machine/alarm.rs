@@ -21,7 +21,7 @@ use crate::status::Status;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Alarm {
-    /// It is not.
+    /// There is no alarm.
     #[default]
     None,
     /// Somebody asked for it.

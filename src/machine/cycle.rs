@@ -9,7 +9,7 @@ pub enum Cycle {
     /// Lines, if there are any.
     #[default]
     Lines,
-    /// It has come to a program stop, and waits for cycle start.
+    /// The machine has come to a program stop, and waits for cycle start.
     Stopped,
     /// G38.2 to G38.5.
     Probe,

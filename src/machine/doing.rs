@@ -8,19 +8,19 @@ use crate::machine;
 /// What the machine is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doing {
-    /// Nothing: nothing is queued, or it waits at a program stop.
+    /// The machine rests: nothing is queued, or it waits at a program stop.
     Rests,
-    /// It carries lines out.
+    /// The machine carries lines out.
     Runs,
-    /// It probes.
+    /// The machine probes.
     Probes,
-    /// It homes.
+    /// The machine homes.
     Homes,
-    /// It is jogged.
+    /// The machine is jogged.
     Jogs,
-    /// It is held, or what is queued is being dropped.
+    /// The machine is held, or what is queued is being dropped.
     Holds,
-    /// It is held, or what is queued is being dropped, and the door is open.
+    /// The machine is held, or what is queued is being dropped, and the door is open.
     Door,
     /// An alarm is on.
     Alarm(Alarm),

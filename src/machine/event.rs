@@ -14,15 +14,15 @@ pub enum Event {
     Flush,
     /// What has come is dropped, from the pools; the queue is to be dropped.
     Cut,
-    /// As `Cut`; and the program is to end.
+    /// What has come is dropped and the queue is to be dropped, as by `Cut`; and the program is to end.
     Kill,
     /// The queue has been dropped.
     Dropped,
     /// The door has been opened.
     DoorOpened,
-    /// It has been shut, and there is something to go on with.
+    /// The door has been shut, and there is something to go on with.
     DoorShut,
-    /// It has been shut, and there is nothing.
+    /// The door has been shut, and there is nothing to go on with.
     DoorShutIdle,
     /// The machine has come to rest in a hold.
     Rested,

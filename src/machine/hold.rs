@@ -12,23 +12,23 @@ pub enum Hold {
     /// Motion goes on.
     #[default]
     Off,
-    /// It is held, and goes on when it has come to rest.
+    /// Motion is held, and goes on when the machine has come to rest.
     Resuming,
-    /// It is held, or slows down.
+    /// Motion is held, or slows down.
     Held,
-    /// It is held as long as the door is open.
+    /// Motion is held as long as the door is open.
     Door,
-    /// It is held; the reader is to drop the lines that have come.
+    /// Motion is held; the reader is to drop the lines that have come.
     Flush,
-    /// As `Flush`, with the door open.
+    /// The state `Flush` with the door open.
     FlushDoor,
-    /// It is held; the planner is to drop what is queued.
+    /// Motion is held; the planner is to drop what is queued.
     Drop,
-    /// As `Drop`, with the door open.
+    /// The state `Drop` with the door open.
     DropDoor,
-    /// As `Drop`; the program ends then.
+    /// The state `Drop`, after which the program ends.
     Kill,
-    /// As `Kill`, with the door open.
+    /// The state `Kill` with the door open.
     KillDoor,
 }
 
@@ -94,7 +94,7 @@ impl Hold {
     }
 }
 
-/// Of each state the state after each event of [`Event::OF_HOLD`].
+/// The state after each event of [`Event::OF_HOLD`], for each state.
 pub(super) const fn table() -> [u8; Event::OF_HOLD * Hold::ALL.len()] {
     let mut table = [0; Event::OF_HOLD * Hold::ALL.len()];
     let mut at = 0;

@@ -12,8 +12,8 @@ pub enum Bar {
     /// A jog may begin.
     #[default]
     Open,
-    /// It may not: its line may be in the receive ring still.
+    /// No jog may begin: a line that came before may be in the receive ring still.
     Barred,
-    /// It may not: its line is in the pool.
+    /// No jog may begin: a line that came before is in the pool.
     Passed,
 }

@@ -12,7 +12,7 @@ pub enum ProbeState {
     Failed,
     /// There was one.
     Touched,
-    /// It is under way.
+    /// A probing move is under way.
     Waiting,
 }
 
@@ -35,7 +35,7 @@ impl Probe {
         self.at.get().get(usize::from(axis)).copied()
     }
 
-    /// It begins.
+    /// Records that a probing move begins.
     pub fn begin(&self) {
         self.state.set(ProbeState::Waiting);
     }
@@ -46,13 +46,13 @@ impl Probe {
         self.at.set([x, y, z]);
     }
 
-    /// It has come to an end, which is to be told.
+    /// Records that the probing move has come to its end, which is to be reported.
     pub fn tell(&self, state: ProbeState) {
         self.state.set(state);
         self.news.set(true);
     }
 
-    /// It has been flushed, if it was under way: it has found nothing, and nobody is told.
+    /// Records that a probing move has been flushed, if one was under way: no contact was found, and nothing is reported.
     pub fn abandon(&self) {
         if self.state.get() == ProbeState::Waiting {
             self.state.set(ProbeState::Failed);

@@ -18,7 +18,7 @@ pub struct Signs {
     pub percent: Cell<bool>,
     /// A door has begun the hold that is on.
     pub door: Cell<bool>,
-    /// One that ends jogs.
+    /// Whether a jog may begin, by a character that ends jogs.
     pub jogs: Cell<Bar>,
     /// When a percent sign came that was none, ms modulo 2^16.
     lone: Cell<Option<u16>>,

@@ -5,7 +5,7 @@ use std::vec::Vec;
 
 use super::*;
 
-/// Of each [`Hold`], in their order, the one after the event; `-` where it stays.
+/// The state after an event for each [`Hold`], in their order; `-` where it stays.
 const HOLD: [(Event, &str); 14] = [
     //                     O R H D F f X x K k
     (Event::Hold, /*     */ "H H - - - - - - - -"),
@@ -27,7 +27,7 @@ const HOLD: [(Event, &str); 14] = [
 /// The holds as [`HOLD`] calls them: a lower-case letter with the door open.
 const LETTERS: &str = "ORHDFfXxKk";
 
-/// Of each [`Cycle`], in their order (lines, stopped, probe, homing, jog, check), the one after the event while nothing is dropped and
+/// The state after an event for each [`Cycle`], in their order (lines, stopped, probe, homing, jog, check), while nothing is dropped and
 /// there is no alarm.
 const CYCLE: [(Event, &str); 7] = [
     (Event::Stopped, "S S S S S S"),
@@ -39,7 +39,7 @@ const CYCLE: [(Event, &str); 7] = [
     (Event::Dropped, "- L L L L -"),
 ];
 
-/// Of each [`Alarm`], in their order (none, alarm, limit, shutdown, panic), the one after the event while nothing is flushed.
+/// The state after an event for each [`Alarm`], in their order (none, alarm, limit, shutdown, panic), while nothing is flushed.
 const ALARM: [(Event, &str); 5] = [
     (Event::Alarm, "A - - - -"),
     (Event::Limit, "L L - - -"),

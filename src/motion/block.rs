@@ -21,7 +21,7 @@ pub const PARTS_LOG2: u8 = 4;
 /// rounding leaves must not tell which one is next.
 pub const FRACTIONS: (i8, i8) = (-7, 6);
 
-/// One block.
+/// A block of the queue.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
     /// What it does.
@@ -85,7 +85,7 @@ pub enum Action {
     Surface(Outputs, Surface),
     /// G33: from here on, at rest, lines follow the spindle.
     Thread(Pass),
-    /// They do no more.
+    /// From here on lines do not follow the spindle any more.
     EndThread,
     /// G33.1, at rest: the spindle has turned round, and lines follow it back. It is to turn again as far before the end of the line.
     Return,
@@ -130,7 +130,7 @@ pub struct Outputs {
 pub struct Extent(f32);
 
 impl Extent {
-    /// So many mm, with a way in whole steps or in 1/16 step.
+    /// The extent of a line `length` mm long, with a way in whole steps or in 1/16 step.
     #[inline(always)]
     pub fn new(length: f32, whole_steps: bool) -> Self {
         Self(if whole_steps { -length } else { length })

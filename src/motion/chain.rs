@@ -106,7 +106,7 @@ pub struct Chain {
     dominant: u8,
     /// Which minors have moved, a bit each.
     moved: u8,
-    /// Of the axes behind the dominant one, in a ring.
+    /// The axes behind the dominant one, in a ring.
     minors: [Minor; MINORS],
 }
 
@@ -169,7 +169,7 @@ impl Chain {
         self.blend == 0
     }
 
-    /// Nothing goes on with it any more.
+    /// Closes the chain: no line goes on with it any more.
     pub fn close(&mut self) {
         self.blend = 0;
     }
@@ -186,7 +186,7 @@ impl Chain {
         end
     }
 
-    /// Its feed; none if nothing goes on with it.
+    /// The feed of the chain; `None` if no line may go on with it.
     pub fn feed(&self) -> Option<Feed> {
         (!self.is_closed()).then_some(Feed::PerMinute(self.feed))
     }
@@ -238,7 +238,7 @@ impl Chain {
         true
     }
 
-    /// Its way, of which the axes that turn have none.
+    /// Sets the way of the chain; rotary axes have none.
     #[inline(always)]
     fn take(&mut self, way: [i16; FIRST_ROTARY]) {
         for (place, way) in self.way.iter_mut().zip(way) {

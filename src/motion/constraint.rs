@@ -57,7 +57,7 @@ const PASSED: u8 = 4;
 /// How far on a velocity may be kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Clear {
-    /// This velocity, or any below it,
+    /// The velocity `top`, or any below it,
     pub top: f32,
     /// may be steady until so much further on.
     pub distance: f32,
@@ -68,7 +68,7 @@ pub(super) struct Clear {
     from: f32,
     /// From the target on nothing else is too near.
     pub closed: bool,
-    /// It is the target that asks for that.
+    /// The velocity is bounded by the target.
     binds: bool,
     /// Slices since: what has been driven is subtracted in floats, so it gets less exact.
     pub age: u8,
@@ -90,7 +90,7 @@ impl Clear {
         age: 0,
     };
 
-    /// Nothing is known any more. Field by field: a constant would be copied, from RAM.
+    /// Forgets what is known. Field by field: a constant would be copied, from RAM.
     #[inline(never)]
     pub fn forget(&mut self) {
         let Self { top, distance, target, place, from, closed, binds, age } = self;
@@ -134,7 +134,7 @@ pub(super) struct Ask {
     pub level: f32,
     /// Distance from the state to the end of the block.
     pub here: f32,
-    /// It is taken in any case: what is wanted is how long it may be kept.
+    /// The velocity is taken in any case, and the question is how long it may be kept.
     pub taken: bool,
 }
 

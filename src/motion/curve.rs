@@ -24,7 +24,7 @@ use crate::units::FIRST_ROTARY;
 const TURNING: f32 = 0.75;
 /// See [`TURNING`].
 const BOTH: f32 = 0.95;
-/// As [`TURNING`] under a jerk limit, where slowing down may take all of the acceleration.
+/// [`TURNING`] under a jerk limit, where slowing down may take all of the acceleration.
 const TURNING_JERK: f32 = 0.65;
 /// A corner between two chords changes the velocity by no more than the acceleration does in this time, s.
 const CORNER_S: f32 = 0.01;

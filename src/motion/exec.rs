@@ -87,15 +87,15 @@ const fn pause(timer_hz: u32) -> (u16, u16) {
 pub enum Step {
     /// A segment to queue.
     Segment,
-    /// Nothing to queue, but something was done: ask again.
+    /// Nothing is to be queued, but something was done: ask again.
     Again,
     /// The outputs or the speed of the spindle are others, at a standstill: ask again.
     Switched,
     /// X is to leave the cut, in what is queued already too ([`Exec::lead`]): ask again.
     Leaves,
-    /// As `Again`; and an override is to change.
+    /// An override is to change, and nothing is to be queued: ask again.
     Override(Change),
-    /// As `Again`; and heaters and the fan are to be so.
+    /// Heaters and the fan are to change, and nothing is to be queued: ask again.
     Heat(Heat),
     /// A program stop, end or change of outputs is due: ask again when the steppers stand still.
     Standstill,
@@ -110,7 +110,7 @@ pub enum Step {
 struct Running {
     /// There is one.
     active: bool,
-    /// It takes long enough for fine ticks.
+    /// The line takes long enough for fine ticks.
     long: bool,
     /// Without a jerk limit: another one follows soon.
     short: bool,
@@ -155,7 +155,7 @@ pub struct Exec {
 /// What lines have to do with the spindle.
 #[derive(Debug, Default)]
 enum Follows {
-    /// Nothing.
+    /// Lines do not depend on the spindle.
     #[default]
     Nothing,
     /// G95. Feeds go by its measured speed: that share of what they were planned for. 0 or less if it stands still: minus the seconds for
@@ -163,7 +163,7 @@ enum Follows {
     Speed(f32),
     /// G33, a pass of G76: they follow its angle.
     Angle(Thread),
-    /// Such a pass has ended before its time: X leaves the cut while the axes come to rest, and then all waits to be dropped.
+    /// A pass of G33 or G76 has ended before its time: X leaves the cut while the axes come to rest, and then what is queued waits to be dropped.
     Retreats(Retreat),
 }
 

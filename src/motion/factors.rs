@@ -15,14 +15,14 @@ use super::float::{least, scaled};
 /// What feeds and traverses are multiplied by, both above 0, feeds at most 2, traverses 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factors {
-    /// Of lines with a feed.
+    /// The factor of lines with a feed.
     pub feed: f32,
-    /// Of the others.
+    /// The factor of traverses.
     pub traverse: f32,
 }
 
 impl Factors {
-    /// As programmed.
+    /// The factors of 1: everything as programmed.
     pub const ONE: Self = Self { feed: 1.0, traverse: 1.0 };
 
     /// The lesser of each.
@@ -52,10 +52,10 @@ impl Reserve {
     /// A traverse, which nothing speeds up.
     pub const TRAVERSE: Self = Self(NonZero::<u8>::MAX);
 
-    /// Nothing above cruise.
+    /// A line that may not be run faster than its cruise velocity.
     const NONE: Self = Self(NonZero::<u8>::MIN);
 
-    /// Of a line at `cruise` that may be run at `top`, no less than that and at most twice as much.
+    /// The reserve of a line at `cruise` that may be run at `top`, no less than that and at most twice as much.
     /// Cost: 30; 300 between the two.
     #[inline(always)]
     pub fn new(cruise: f32, top: f32) -> Self {
@@ -82,7 +82,7 @@ impl Reserve {
         Self::parts(quotient(more, mantissa(low).saturating_add(1)) as u8)
     }
 
-    /// So many 1/128 above cruise.
+    /// The reserve of a line that may be run `parts` 1/128 faster than its cruise velocity.
     #[inline(always)]
     fn parts(parts: u8) -> Self {
         Self::NONE.0.checked_add(parts).map_or(Self::NONE, Self)

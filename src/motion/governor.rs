@@ -31,7 +31,7 @@ pub struct Stretch {
     pub seconds: f32,
     /// How far it goes, mm; to the end of the block if `ends`.
     pub distance: f32,
-    /// It is the last of the block.
+    /// The stretch is the last of the block.
     pub ends: bool,
 }
 

@@ -82,13 +82,13 @@ impl Line {
         Short::new(least(self.entry.get(), self.velocity(factors))).get()
     }
 
-    /// Its key: what potential and square of velocity before its start must not exceed together.
+    /// The key of the line: what potential and square of velocity before its start must not exceed together.
     /// Cost: 500, 1,300 with a jerk limit.
     pub fn key(&self, factors: &Factors) -> f32 {
         self.start + key(self.entry(factors), kappa(self.accel.get(), self.jerk.get()))
     }
 
-    /// Its key for a block before it that has no jerk limit. Cost: 400.
+    /// The key of the line for a block before it that has no jerk limit. Cost: 400.
     pub fn sharp_key(&self, factors: &Factors) -> f32 {
         let entry = self.entry(factors);
         self.start + entry * entry
@@ -129,7 +129,7 @@ pub struct Horizon {
     pub wanted: Factors,
     /// Others were wanted, or planned for, when exec looked last.
     pub changed: bool,
-    /// Those that the keys are for, or for more: faster than by these nothing may be run.
+    /// The overrides that the keys are for, or greater ones: nothing may be run faster than by these.
     pub planned: Factors,
     /// Sequence numbers of blocks with rising keys: a ring.
     seqs: [Index; BLOCKS],
@@ -138,7 +138,7 @@ pub struct Horizon {
 }
 
 impl Horizon {
-    /// Of an empty queue.
+    /// The horizon of an empty queue.
     pub const fn new() -> Self {
         // All zero, so that it is not in flash as well: `begin` comes before anything else.
         let none = Factors { feed: 0.0, traverse: 0.0 };
@@ -260,7 +260,7 @@ impl Horizon {
         self.version = self.version.wrapping_add(1);
     }
 
-    /// Nothing is overridden so far.
+    /// Begins without overrides.
     pub fn begin(&mut self) {
         (self.wanted, self.planned) = (Factors::ONE, Factors::ONE);
     }

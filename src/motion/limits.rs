@@ -136,7 +136,7 @@ impl Path {
         }
     }
 
-    /// Of lengths and angles together each limit is measured along the way.
+    /// Limits a move of lengths and angles together: each limit is measured along the way.
     #[inline(never)]
     #[small]
     fn look_along(&self, slowest: &mut Slowest, dynamics: &Dynamics) {
@@ -263,7 +263,7 @@ pub(super) struct Slowest {
 }
 
 impl Slowest {
-    /// As [`Slowest::look`], where it is not called as often. Cost: 130.
+    /// Looks as [`Slowest::look`] does, without being inlined: for callers that are not hot. Cost: 130.
     #[inline(never)]
     pub(super) fn look_at(&mut self, u: u16, accel: Short, jerk: Short) {
         self.look(u, accel, jerk);

@@ -50,14 +50,14 @@ pub struct Line<'a> {
     pub feed: Option<Feed>,
     /// The arc that it is a chord of.
     pub curve: Option<&'a Curve>,
-    /// It may be merged with the next move.
+    /// The move may be merged with the next one.
     pub may_merge: bool,
 }
 
 /// What becomes of a move.
 #[derive(Clone, Copy, Debug)]
 pub enum Built {
-    /// Nothing: it has no length.
+    /// Nothing becomes of the move: it has no length.
     Nothing,
     /// A block, into which the corner may be taken at so many mm/s, or so much faster than it can be run
     /// that it is no limit.

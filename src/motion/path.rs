@@ -38,7 +38,7 @@ pub(super) struct Path {
     /// How far the motor goes that goes farthest, in parts of a step, and how many motors move.
     pub(super) most: u16,
     pub(super) moving: u8,
-    /// That way is in whole steps.
+    /// `most` is in whole steps.
     pub(super) whole_steps: bool,
     pub(super) cruise: f32,
     /// What the machine could do, at most twice the feed, mm/s.

@@ -83,7 +83,7 @@ const LOCKSTEP_TICKS: u16 = 16;
 /// A motor that moves but does not step on every tick of the dominant one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Minor {
-    /// Its way in the block, in parts of a step or in whole steps.
+    /// The way of the motor in the block, in parts of a step or in whole steps.
     way: u16,
     /// Travel in a tick, rounded down, and what that leaves, in 1 / most.
     increment: u16,
@@ -116,7 +116,7 @@ pub struct Prep {
     backwards: u8,
     /// Ticks are to be as fine as can be.
     fine: bool,
-    /// As few as in a block of one segment.
+    /// Ticks are to be as few as in a block of one segment.
     coarse: bool,
     /// A motor has turned round, and no segment tells of it yet.
     turned: bool,
@@ -139,7 +139,7 @@ pub struct Prep {
 }
 
 impl Prep {
-    /// Nothing to prepare.
+    /// A preparation without a block.
     pub const fn new() -> Self {
         const MINOR: Minor = Minor { way: 0, increment: 0, remainder: 0, owed: 0 };
         Self {
@@ -381,7 +381,7 @@ impl Prep {
         if stands && period >= self.paces().settles { retreat.plan(ticks, period) } else { 0 }
     }
 
-    /// They have been told to go so far.
+    /// Counts what motors have been told to go for the lead of a retreat.
     #[small]
     pub fn note_lead(
         &mut self,
@@ -652,7 +652,7 @@ impl Prep {
         u32::from(period.max(self.paces().shortest))
     }
 
-    /// Nothing moves: the next step is too far off. A tick of the time there is, at most; short times
+    /// Prepares a pause: the next step is too far off. A tick of the time there is, at most; short times
     /// are kept.
     fn idle(&mut self, cycles: u32, out: &mut Segment) -> bool {
         if cycles < PERIOD_MAX / 2 {

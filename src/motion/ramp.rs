@@ -31,7 +31,7 @@ pub(super) struct Ramp {
     pace: f32,
     /// Distance to the end where the deceleration begins.
     begin: f32,
-    /// It is known what comes after it; else it ends in a standstill.
+    /// What comes after the ramp is known; else the ramp ends in a standstill.
     pub closed: bool,
 }
 

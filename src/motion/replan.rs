@@ -29,7 +29,7 @@ struct Behind {
     known: Known,
 }
 
-/// Of the line that was asked about last, which mostly is as the next one: its velocity, and how it brakes.
+/// The line that was asked about last, which the next one mostly equals: its velocity, and how it brakes.
 #[derive(Default)]
 struct Known {
     cruise: f32,

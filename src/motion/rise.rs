@@ -60,11 +60,11 @@ struct Next {
 /// Whether an acceleration can end at the feed.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Arrives {
-    /// It ends so.
+    /// The acceleration ends at the feed.
     Safely,
-    /// That is not safe.
+    /// It is not safe to end at the feed.
     Unsafe,
-    /// It would take a second look in this stretch to know.
+    /// Only a second scan in this stretch could tell.
     Unknown,
 }
 
@@ -74,7 +74,7 @@ struct Steady {
     distance: f32,
     /// The distance, brake potential.
     at: f32,
-    /// It is known that the velocity may be kept for the slice and as long again. If it is not, it is the first thing to find out:
+    /// The velocity is known to be safe for the slice and as long again. If it is not known, this is the first thing to find out:
     /// whatever is faster is safe for a shorter time.
     known: bool,
 }
@@ -322,7 +322,7 @@ impl Governor {
         }
     }
 
-    /// It goes no faster: a slice of the ramp that there is, or of one that there is then.
+    /// Goes no faster: a slice of the ramp that there is, or of the one that begins now.
     fn go_on(&mut self, span: &Span, ahead: &impl Ahead) {
         if self.ramp.is_some() {
             self.follow(span.seconds);
@@ -399,7 +399,7 @@ impl Governor {
         Arrives::Safely
     }
 
-    /// It is faster than the feed, or will be.
+    /// Slows down, for the velocity is above the feed or will be.
     #[inline(never)]
     fn slow_down(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let (cruise, seconds) = (span.cruise, span.seconds);
@@ -432,7 +432,7 @@ impl Governor {
         }
     }
 
-    /// It decelerates without a ramp: after a feedhold, or where limits change. Or a ramp is not what it has to be any more.
+    /// Decelerates without a ramp: after a feedhold, or where limits change, or where the ramp no longer fits.
     #[inline(never)]
     fn recover(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         if self.scanned {
@@ -451,7 +451,7 @@ impl Governor {
         true
     }
 
-    /// It decelerates, and has to go on: to the constraint that the scan has found, or, if that is too near for a deceleration that
+    /// Decelerates harder: to the constraint that the scan has found, or, if that is too near for a deceleration that
     /// ends there, to a standstill.
     #[inline(never)]
     fn brake_harder(&mut self) {

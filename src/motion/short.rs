@@ -23,20 +23,20 @@ impl Short {
     /// Zero.
     pub const ZERO: Self = Short(0);
 
-    /// As a float again. Cost: 15.
+    /// The number as a float. Cost: 15.
     #[inline]
     pub fn get(self) -> f32 {
         f32::from_bits(u32::from(self.0) << 15)
     }
 
-    /// Its logarithm. The number is not 0. Cost: 20.
+    /// The logarithm of the number, which is not 0. Cost: 20.
     #[inline(always)]
     pub fn log(self) -> Log {
         let (mantissa, power) = self.parts();
         Log::new(power.wrapping_sub(ONE), mantissa)
     }
 
-    /// Its logarithm, or up to 0.09 octaves less. Cost: 5.
+    /// The logarithm of the number, or up to 0.09 octaves less. Cost: 5.
     #[inline(always)]
     pub fn rough(self) -> Log {
         let (mantissa, power) = self.parts();
@@ -61,7 +61,7 @@ impl Short {
         Self(bits)
     }
 
-    /// Its mantissa without the leading 1, and its exponent.
+    /// The mantissa of the number without the leading 1, and its exponent.
     #[inline(always)]
     pub fn parts(self) -> (u8, u8) {
         let [mantissa, power] = self.0.to_le_bytes();
@@ -86,7 +86,7 @@ impl Log {
         Self(i16::from_le_bytes([mantissa.wrapping_add(bulge(mantissa)), power]))
     }
 
-    /// Of an integer, not 0. Cost: 45 to 85.
+    /// The logarithm of an integer, not 0. Cost: 45 to 85.
     #[inline(never)]
     pub fn of(n: u16) -> Self {
         // The last bit of the first one ends the search, whatever there is.
@@ -99,7 +99,7 @@ impl Log {
         Self::new(power, mantissa)
     }
 
-    /// Of a larger integer, not 0. Cost: 60 to 100.
+    /// The logarithm of a larger integer, not 0. Cost: 60 to 100.
     #[inline(never)]
     pub fn of_wide(n: u32) -> Self {
         let [_, _, low, high] = n.to_le_bytes();

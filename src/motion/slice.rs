@@ -36,7 +36,7 @@ pub(super) struct Span {
     pub seconds: f32,
 }
 
-/// So many stretches before a ramp begins, as a power of two, segments are no longer made for a steady velocity.
+/// Segments for a steady velocity end this many stretches before a ramp begins; a power of two.
 const FAR_LOG2: i8 = 3;
 
 /// Longest stretch, s, where most are `nominal` seconds long. A feedhold begins behind those that are handed out.
@@ -218,7 +218,7 @@ impl Governor {
         self.part(left)
     }
 
-    /// So much of the slice.
+    /// A stretch of the slice, `left` mm long.
     #[inline(always)]
     fn part(&mut self, left: f32) -> Stretch {
         let seconds = left * self.rest.inverse;

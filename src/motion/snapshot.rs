@@ -23,7 +23,7 @@ pub struct Snapshot {
     pub steps: [i16; MOTORS],
     /// What is still to be run of that block, mm.
     pub left: f32,
-    /// Its length, mm.
+    /// The length of that block, mm.
     pub length: f32,
     /// Velocity along the path, mm/s.
     pub velocity: f32,
@@ -131,7 +131,7 @@ pub struct Moment {
 /// How the program stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Program {
-    /// Nothing has run since reset.
+    /// Nothing has run since the reset.
     #[default]
     Ready,
     /// The queue ran empty, or M0.

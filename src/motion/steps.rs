@@ -101,7 +101,7 @@ impl Motor {
         self.told = (self.told & !(PARTS as i8 - 1)) + fraction;
     }
 
-    /// Its axis has gone `travel` to `position`. The way of the motor, in parts of a step, or nothing done if that does not fit.
+    /// Moves the axis by `travel` to `position`. The way of the motor, in parts of a step; `None`, and nothing done, if that does not fit.
     /// Cost: 400 for short moves.
     #[inline(never)]
     pub fn go(&mut self, ratio: StepRatio, travel: i32, position: Length) -> Option<i16> {
@@ -111,7 +111,7 @@ impl Motor {
         self.go_far(ratio, travel, position)
     }
 
-    /// As long as 32 and 16 bits will do; nothing done otherwise.
+    /// Moves the axis where 32 and 16 bits are enough for the arithmetic; `None`, and nothing done, otherwise.
     #[inline(always)]
     fn go_near(&mut self, ratio: StepRatio, travel: i32, position: Length) -> Option<i16> {
         let way = travel.unsigned_abs();
@@ -145,7 +145,7 @@ impl Motor {
         Some((to & !(i16::from(PARTS) - 1)) + i16::from(told) - i16::from(before))
     }
 
-    /// As [`Motor::go`], for ways of any size. Cost: 2,000; 300 if it is too far by more than rounding.
+    /// Moves the axis as [`Motor::go`] does, for ways of any size. Cost: 2,000; 300 if it is too far by more than rounding.
     #[inline(never)]
     #[small]
     fn go_far(&mut self, ratio: StepRatio, travel: i32, position: Length) -> Option<i16> {
@@ -163,7 +163,7 @@ impl Motor {
         Some(way as i16)
     }
 
-    /// Its axis goes to `position`, in whole steps: so many.
+    /// Moves the axis to `position` in whole steps, and returns how many.
     #[inline(never)]
     #[small]
     pub fn stride(&mut self, ratio: StepRatio, position: Length) -> i64 {

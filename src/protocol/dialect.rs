@@ -122,7 +122,7 @@ pub trait Answers {
     /// The G-code that the next step would ask for with [`Next::Gcode`], if that is so already.
     fn gcode(&self) -> Option<Span>;
 
-    /// That G-code has run, with this status; whether it may have a `comment`.
+    /// Takes the status with which that G-code has run, and whether it may have a `comment`.
     fn ran(&mut self, status: Status, comment: bool);
 
     /// Does the next bit of work and puts at most [`CHUNK`](super::CHUNK) bytes. The line is handed in anew each time.
@@ -153,7 +153,7 @@ pub trait Tells {
         false
     }
 
-    /// Of a queue report: how many free blocks it has told.
+    /// How many free blocks a queue report has told.
     fn blocks_free(&self) -> usize {
         0
     }
@@ -541,10 +541,10 @@ macro_rules! dialects {
 }
 
 dialects! {
-    /// TinyG's, and g2core's.
+    /// The dialect of TinyG and g2core.
     tinyg: Tinyg(super::tinyg::Tinyg) if "dialect-tinyg";
-    /// grbl's, version 1.1.
+    /// The dialect of grbl 1.1.
     grbl: Grbl(super::grbl::Grbl) if "dialect-grbl";
-    /// That of printing hosts.
+    /// The dialect of printing hosts.
     reprap: RepRap(super::reprap::RepRap) if "dialect-reprap";
 }

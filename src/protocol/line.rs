@@ -3,15 +3,15 @@
 /// A part of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Span {
-    /// Its first byte.
+    /// The first byte of the part.
     pub start: u8,
-    /// The byte behind it.
+    /// The byte behind the last one.
     pub end: u8,
 }
 
 #[small]
 impl Span {
-    /// Its bytes.
+    /// The bytes of the part.
     #[inline(never)]
     pub fn of(self, line: &[u8]) -> &[u8] {
         line.get(usize::from(self.start)..usize::from(self.end)).unwrap_or(&[])
@@ -25,9 +25,9 @@ pub enum Next {
     More,
     /// Run this part of the line as G-code, call [`Answers::ran`](super::Answers::ran), and step again.
     Gcode {
-        /// Its first byte.
+        /// The first byte of that part.
         start: u8,
-        /// The byte behind it.
+        /// The byte behind the last one.
         end: u8,
     },
     /// What is to be changed is still on its way to memory: step again later.

@@ -15,7 +15,7 @@ use crate::units::Length;
 /// What storing a setting has brought about besides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Warning {
-    /// Nothing.
+    /// Nothing besides.
     #[default]
     None,
     /// The velocity limits of an axis were lowered to what its motors can follow.
@@ -34,7 +34,7 @@ pub enum Hold {
     None,
     /// The machine slows down, or goes on again.
     Slows,
-    /// It stands still.
+    /// The machine stands still.
     Rests,
 }
 
@@ -48,7 +48,7 @@ pub enum Store<'a> {
     Begin,
     /// A line of it.
     Line(&'a [u8]),
-    /// It is complete.
+    /// The program is complete.
     End,
     /// A line that is carried out after a start: which of the two, and its text.
     Startup(u8, &'a [u8]),
@@ -57,13 +57,13 @@ pub enum Store<'a> {
 /// What becomes of a printer's extruder, which is the A axis.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Extruder {
-    /// Its words are measured from where it is, whatever the others are measured from; or no more.
+    /// The extruder's words are relative to where it is, whatever the others are relative to; or no longer.
     Relative(bool),
-    /// It moves so many thousandths of what its words say.
+    /// The extruder moves this many thousandths of what its words say.
     Flow(u16),
     /// The next line does not move it; its words count as if it did.
     LeaveOut,
-    /// It moves by itself, and what its words are measured from moves along with it.
+    /// The extruder moves by itself, and the origin of its words moves along with it.
     Move {
         /// How far.
         by: Length,
@@ -75,11 +75,11 @@ pub enum Extruder {
 /// What becomes of the temperature below which filament is not moved, until the next start.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Cold {
-    /// Nothing: it is asked for.
+    /// The temperature is only asked for.
     Asked,
-    /// It does not matter, or it does.
+    /// Filament may be moved at any temperature, or no longer.
     Allowed(bool),
-    /// It is this, degrees.
+    /// The temperature is set to this, degrees.
     Least(i16),
 }
 
@@ -129,7 +129,7 @@ pub trait Machine {
     fn home(&mut self, axes: u8) -> Status;
     /// From now on lines of G-code are checked only, or carried out again; or refuses to.
     fn check(&mut self, on: bool) -> Status;
-    /// Nothing moves until somebody lets it go on, as after a feedhold; at rest, too.
+    /// Holds motion as after a feedhold, at rest too, until somebody lets it go on.
     fn hold_back(&mut self);
     /// Resets the machine when what is being put has been put: drops what has come, and greets.
     fn start_over(&mut self);
@@ -139,7 +139,7 @@ pub trait Machine {
     fn store(&mut self, what: Store<'_>) -> Result<(), Status>;
     /// A byte of the program that is kept.
     fn program(&mut self, at: u16) -> Option<u8>;
-    /// Of a line that is carried out after a start: a byte, `None` behind its end.
+    /// A byte of a line that is carried out after a start; `None` behind the line's end.
     fn startup(&mut self, line: u8, at: u8) -> Option<u8>;
     /// Starts the machine anew when the response has left, in its boot loader if `boot`, for which it has to be at
     /// rest. [`Status::Again`] while settings are on their way to memory.

@@ -41,6 +41,6 @@ pub enum Notice {
 pub enum Occasion {
     /// Nobody can read its memory of settings: it has taken the defaults.
     Defaults,
-    /// It is ready.
+    /// The machine is ready.
     Ready,
 }

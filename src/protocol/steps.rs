@@ -14,7 +14,7 @@ pub fn named(owner: Owner, token: [u8; 4]) -> Option<Setting> {
     Setting::find(&owner.prefix().with_token(token)).filter(|found| found.owner() == owner)
 }
 
-/// Of a motor: steps per millimetre in thousandths, if the travel in a turn is `by` as it is kept; or that travel, if there are `by` steps
+/// The steps per millimetre of a motor in thousandths, if the travel in a turn is `by` as it is kept; or that travel, if there are `by` steps
 /// per millimetre, in thousandths.
 #[small]
 pub fn turned(machine: &mut impl Machine, motor: u8, by: i32) -> i32 {

@@ -72,7 +72,7 @@ pub enum Value {
     Choice,
     /// 0 not homed, 1 homed, 2 homing.
     Home,
-    /// Of a hold: 0 if no door has begun it, 1 if one has, 2 if one has and it is over as soon as the machine stands.
+    /// How the hold came about: 0 if no door has begun it, 1 if one has, 2 if one has and it is over as soon as the machine stands.
     Door,
     /// 1 while lines are checked only.
     Check,

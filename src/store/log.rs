@@ -20,7 +20,7 @@ pub struct Log {
     next: u16,
     /// Slots that were ever used: those before this one.
     used: u16,
-    /// It has all of the memory.
+    /// The log has all of the memory.
     wide: bool,
 }
 
@@ -36,9 +36,9 @@ pub struct Write {
 /// What is needed to put an item away.
 #[derive(Clone, Copy, Debug)]
 pub enum Put {
-    /// This record makes room; then ask again.
+    /// This record makes room: write it, and ask again.
     Room(Write),
-    /// This one is the item's.
+    /// This record is that of the item: write it.
     Last(Write),
     /// Every slot has been moved, so each holds the newest record of some item.
     Full,

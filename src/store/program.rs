@@ -46,7 +46,7 @@ pub enum Stored {
     Again,
     /// There is no room.
     Full,
-    /// It is there; this is how long the text is now.
+    /// The line is stored; the text is this long now.
     Done(u16),
 }
 

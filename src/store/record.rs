@@ -43,7 +43,7 @@ pub fn key(name: &[u8]) -> u16 {
 
 #[small]
 impl Record {
-    /// Its bytes; byte 0 is what makes it valid.
+    /// The bytes of the record; byte 0 is the one that makes it valid.
     pub fn bytes(&self) -> [u8; SIZE as usize] {
         let mut bytes = [VALID; SIZE as usize];
         bytes[1..3].copy_from_slice(&self.key.to_le_bytes());

@@ -89,7 +89,7 @@ struct Runner<'a> {
     finished: Finished,
     /// The machine stands still at the end of what has been queued.
     rests: bool,
-    /// It is to be told whether thread mode has been idle since the last segment.
+    /// The reporter is to be told whether thread mode has been idle since the last segment.
     asked: bool,
     segments: Producer<Segment, SEGMENTS>,
     blocks: BlockSource,
@@ -382,7 +382,7 @@ fn start_thread(thread: &mut Thread, encoder: &Encoder) {
 
 /// How long the segments last that wait in the ring, in units of 2^11 CPU cycles.
 struct Waiting {
-    /// Those of the last segments, the newest at `count - 1`, modulo their number.
+    /// The lengths of the last segments, the newest at `count - 1`, modulo their number.
     lengths: [u8; SEGMENTS],
     /// Segments queued, modulo 256.
     count: u8,
@@ -401,10 +401,10 @@ struct Waiting {
     busy: u8,
 }
 
-/// So many of them say that thread mode has no time left.
+/// After this many of them in a row thread mode has no time left.
 const BUSY: u8 = 3;
 
-/// The unit: shifts are cheaper than divisions.
+/// The unit of lengths as a power of two: shifts are cheaper than divisions.
 const UNIT_LOG2: u8 = 11;
 
 /// Units in so many tenths of a millisecond.
@@ -427,7 +427,7 @@ const USUAL: Amount = Amount { most: units(88), least: units(42) };
 /// For a while after too little has been waiting: more is prepared at a stretch. A feedhold begins within 10 ms still.
 const PRESSED: Amount = Amount { most: units(94), least: units(65) };
 
-/// That while, in segments.
+/// How long [`PRESSED`] is in force, in segments.
 const PRESSED_FOR: u8 = 100;
 
 /// With less than this exec is late, and makes longer stretches.

@@ -21,7 +21,7 @@ use crate::config::getters::TRAVEL_NONE;
 use crate::status::Status;
 use crate::units::Length;
 
-/// Of `sn` and `sx`: a homing switch.
+/// A bit of the settings `sn` and `sx`: the switch is a homing switch.
 const HOMING: u8 = 1;
 
 /// The axes that may have switches: X Y Z A.
@@ -79,13 +79,13 @@ impl Homing {
         3 << (self.end & !1)
     }
 
-    /// So far towards the switch.
+    /// The place that is `way` from `from` towards the switch.
     pub fn towards(&self, from: Length, way: Length) -> Length {
         let upper = self.end & 1 != 0;
         Length(if upper { from.0.saturating_add(way.0) } else { from.0.saturating_sub(way.0) })
     }
 
-    /// So far away from it.
+    /// The place that is `way` from `from` away from the switch.
     pub fn away(&self, from: Length, way: Length) -> Length {
         self.towards(from, Length(-way.0))
     }

@@ -63,11 +63,11 @@ impl LineId {
 /// Whether a place in a line is in a comment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Aside {
-    /// It is not.
+    /// The place is in no comment.
     None,
-    /// In parentheses.
+    /// The place is in parentheses.
     Parentheses,
-    /// Behind a semicolon.
+    /// The place is behind a semicolon.
     Rest,
 }
 
@@ -456,7 +456,7 @@ impl LinePool {
         self.drop_data(status, false);
     }
 
-    /// As [`terminate`](Self::terminate) in an alarm, but for the end of a program, which ends an alarm, and what is behind it.
+    /// Drops data lines as [`terminate`](Self::terminate) does, in an alarm, but keeps the end of a program, which ends an alarm, and what is behind it.
     pub fn refuse(&mut self, status: Status) {
         self.drop_data(status, true);
     }

@@ -82,7 +82,7 @@ pub fn apply(links: &Links, port: &Port, asked: Asked) {
     change(links.thread, Change::to(Override::Traverse, traverse));
 }
 
-/// So many percent more, or less; from 100 % if `anew`.
+/// Changes an override by `percent`; from 100 % if `anew`.
 #[small]
 fn step(thread: Thread, which: Override, percent: i8, anew: bool, least: u16) {
     if percent == 0 && !anew {

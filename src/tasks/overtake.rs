@@ -24,13 +24,13 @@ use crate::protocol::may_be_control;
 
 /// How far a ring has been looked through.
 pub struct Scan {
-    /// So many of the bytes that wait.
+    /// How many of the bytes that wait have been looked at.
     pub(super) looked: u8,
     /// What follows is a part of a line that does not overtake.
     pub(super) within: bool,
-    /// Alarms have been looked for in so many of the bytes that wait: 0, or at the beginning of a line.
+    /// How many of the bytes that wait have been searched for alarms: 0, or up to the beginning of a line.
     pub(super) stops: u8,
-    /// So many of the lines there have begun theirs.
+    /// How many of the lines there have begun an alarm.
     pub(super) begun: u8,
 }
 
@@ -40,14 +40,14 @@ enum Found {
     Line(u8),
     /// A question mark, which needs no end.
     Question,
-    /// One whose end has not come.
+    /// A line that may overtake whose end has not come.
     Unfinished,
     /// Something else.
     Other,
 }
 
 impl Scan {
-    /// Nothing has been looked at.
+    /// A scan that has looked at nothing.
     pub const NONE: Self = Self { looked: 0, within: false, stops: 0, begun: 0 };
 
     /// The reader has taken so many bytes in order.

@@ -63,7 +63,7 @@ const PATIENCE: u8 = 8;
 /// What [`Parser::turns`] returns for a port on which no answer can go on.
 const NONE: u8 = u8::MAX;
 
-/// So many turns in a row are left to a report that ends its line for an answer.
+/// How many turns in a row an answer leaves to a report that ends its line for it.
 const LEAVES: u8 = 2;
 
 /// A port's transmitter, while it is the parser's.
@@ -71,9 +71,9 @@ type Line = MutexGuard<'static, NoopRawMutex, Tx>;
 
 /// What the parser is about on a port.
 enum Session {
-    /// Nothing.
+    /// The parser does nothing on the port.
     Idle,
-    /// It answers a line.
+    /// The parser answers a line.
     Answer(Answer),
     /// The line has been answered; it changes the rate, or resets the machine, when the response has left: since when
     /// there is nothing more of that in the ring, ms.
@@ -86,7 +86,7 @@ struct Answer {
     id: LineId,
     /// How much of the line has been sent back.
     echoed: u8,
-    /// It has had a turn.
+    /// The answer has had a turn.
     has_stepped: bool,
     /// The line is to be sent back.
     echoes: bool,
@@ -99,9 +99,9 @@ struct Answer {
 /// How far it has come.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Progress {
-    /// To its end.
+    /// The answer is at its end.
     Done,
-    /// It goes on later.
+    /// The answer goes on later.
     Waits,
 }
 
@@ -112,7 +112,7 @@ enum Turn {
     Usual,
     /// Something else; there may be more.
     More,
-    /// Nothing.
+    /// Nothing has been done.
     Nothing,
 }
 
@@ -669,11 +669,11 @@ fn job_line(links: &Links) {
 /// Whether the next line was a usual one.
 #[derive(Clone, Copy, PartialEq)]
 enum Usual {
-    /// It was, and is done with.
+    /// The line was a usual one, and has been answered.
     Done,
-    /// It is none.
+    /// The line is no usual one.
     No,
-    /// Nobody has looked.
+    /// The line has not been looked at.
     NotTried,
 }
 
@@ -706,11 +706,11 @@ fn usual(links: &Links) -> Usual {
 
 /// How it goes on with a line.
 enum Begun {
-    /// It is being answered.
+    /// The line is being answered.
     Answer,
-    /// It gets no answer.
+    /// The line gets no answer.
     Silent,
-    /// It has to wait.
+    /// The line has to wait.
     Again,
 }
 

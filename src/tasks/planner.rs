@@ -68,7 +68,7 @@ pub struct Planner {
     drivers: Drivers,
     /// What exec has been told to switch.
     outputs: Outputs,
-    /// It has been told of a surface speed, and that feeds are a turn.
+    /// Exec has been told of a surface speed, and in `per_turn` whether feeds are per turn.
     has_surface: bool,
     per_turn: bool,
     /// A heater or the fan has been switched on since the last end of a program.
@@ -88,20 +88,20 @@ pub struct Planner {
 
 /// What a line has left to be done.
 enum Begun {
-    /// Nothing.
+    /// Nothing is left.
     Nothing,
-    /// The rest of its parts.
+    /// The rest of the line's parts.
     Parts(Parts),
-    /// Nothing, but lines are checked: these are the modes of before.
+    /// Nothing is left, but lines are checked only: these are the modes before the line.
     Check(Modes),
-    /// All of it, and of those before it, from `position` on: more may go on with it.
+    /// The line and those before it, from `position` on: the next line may go on with them.
     Chain(Chain),
 }
 
 /// What has changed beside the line.
 #[derive(Clone, Copy, PartialEq)]
 enum News {
-    /// Nothing.
+    /// Nothing has changed.
     None,
     /// What steps mean: they are counted anew.
     Position,
@@ -220,9 +220,9 @@ pub fn take_at_once(shared: &Shared) -> bool {
     done
 }
 
-/// With so many blocks answers come before another one.
+/// With this many blocks queued answers come before another block.
 const ENOUGH: usize = CAPACITY / 2;
-/// So many turns they have: two answers and what else thread mode does meanwhile.
+/// How many turns answers have then: two answers, and what else thread mode does meanwhile.
 const PATIENCE: u8 = 16;
 
 impl Planner {

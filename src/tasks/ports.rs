@@ -37,31 +37,31 @@ const AUX_PROMISED: u8 = 16;
 /// The turns that a report leaves to control lines before it begins, and that it leaves to others while it is told.
 pub const COURTESY: u8 = 8;
 
-/// Of [`Port::asked`]: a status report.
+/// A bit of [`Port::asked`]: a status report.
 pub const REPORT: u8 = 1;
-/// Of [`Port::asked`]: the greeting, for the machine has been reset by its sender. Lines that were dropped thereby are not answered.
+/// A bit of [`Port::asked`]: the greeting, for the machine has been reset by its sender. Lines that were dropped thereby are not answered.
 pub const GREETING: u8 = 2;
-/// Of [`Port::asked`]: before the greeting, that motion was interrupted.
+/// A bit of [`Port::asked`]: before the greeting, the report that motion was interrupted.
 pub const INTERRUPTED: u8 = 4;
-/// Of [`Port::asked`]: before the greeting, the greeting in the other dialect, for it is not decided which one is spoken.
+/// A bit of [`Port::asked`]: before the greeting, the greeting in the other dialect, for it is not decided which one is spoken.
 pub const OTHERS: u8 = 32;
 
-/// Of [`Port::asked`], beside [`INTERRUPTED`]: that was homing.
+/// A bit of [`Port::asked`], beside [`INTERRUPTED`]: the motion was homing.
 pub const HOMING: u8 = 8;
-/// Of [`Port::asked`]: the machine is to be reset, which control does.
+/// A bit of [`Port::asked`]: the machine is to be reset, which control does.
 pub const RESET: u8 = 16;
 
 /// What has decided in which dialect a port is spoken to.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub enum Choice {
-    /// The image has one alone.
+    /// The image has one dialect alone.
     #[default]
     None = 0,
-    /// The setting.
+    /// The setting has decided.
     Set = 1,
-    /// What was said first.
+    /// The first line that is in one dialect alone has decided.
     Said = 2,
-    /// Nothing so far: the first that is said in one alone will.
+    /// Nothing has decided: the first line that is in one dialect alone will.
     Open = 3,
 }
 

@@ -208,7 +208,7 @@ struct State {
 }
 
 impl State {
-    /// Another one than ever is.
+    /// A state that never occurs, so that the first look at the machine finds a change.
     const FIRST: Self = Self { doing: Doing::Rests, hold: Hold::Slows, rest: Program::Ready };
 
     #[inline(never)]

@@ -48,7 +48,7 @@ pub struct Storage {
     edit: Cell<Option<Edit>>,
     /// The setting in EEPROM alone that is on its way: its number, and its value.
     cold: Cell<Option<(u8, i32)>>,
-    /// Such settings from this number on are to have their defaults.
+    /// Settings in EEPROM alone are to have their defaults from this number on.
     forgotten: Cell<u8>,
     /// How long the program is that is being stored, if one is.
     program: Cell<Option<u16>>,
@@ -70,7 +70,7 @@ enum Work {
 
 #[small]
 impl Storage {
-    /// Nothing to do, and this log.
+    /// A storage with this log and nothing to write.
     pub fn new(log: Log) -> Self {
         Self {
             log: Cell::new(log),

@@ -21,9 +21,9 @@ use crate::hal::event::Event;
 use crate::hal::{flags, inputs as pins};
 use crate::machine::{self, Alarm};
 
-/// Of `sn` and `sx`: a limit.
+/// A bit of the settings `sn` and `sx`: the switch is a limit.
 const LIMIT: u8 = 2;
-/// Of `saf` and `est`: it opens when it is worked.
+/// The value of the settings `saf` and `est` for a switch that opens when it is worked.
 const OPENS: u8 = 2;
 
 /// The inputs that the board has.

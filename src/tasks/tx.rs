@@ -25,7 +25,7 @@ pub struct Tx {
     port: u8,
     /// Bits a second.
     rate: u32,
-    /// Of the response under way, if it ends with one.
+    /// The checksum of the response under way, if the response ends with one.
     sum: Option<Checksum>,
 }
 

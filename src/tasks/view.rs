@@ -77,7 +77,7 @@ pub struct View<'a> {
     settings: RefMut<'a, Settings>,
     report: RefMut<'a, Memory>,
     seen: OnceCell<Seen>,
-    /// It tells of the moment of the report or group.
+    /// Values are those of the moment at which the report or group began.
     shares: bool,
 }
 
@@ -104,7 +104,7 @@ fn is_queued(links: &Links) -> bool {
     links.commands_taken.get() || queue::used() > 0
 }
 
-/// So much hotter than it is to be a heater may get in an autotune, eighths of a degree.
+/// How much hotter than its target a heater may get in an autotune, eighths of a degree.
 #[cfg(feature = "dialect-reprap")]
 const OVERSHOOT: u16 = 80;
 

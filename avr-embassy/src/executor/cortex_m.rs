@@ -24,7 +24,7 @@ impl Executor {
         self.run_with(init, |_, _| ())
     }
 
-    /// As [`Executor::run`]; besides, `turn` is called with the bits of the events that have happened, each time before
+    /// Runs the tasks as [`Executor::run`] does; besides, `turn` is called with the bits of the events that have happened, each time before
     /// tasks are polled. It is for what is too small for a task.
     pub fn run_with(
         &'static mut self,

@@ -200,7 +200,7 @@ fn value_on(machine: u8, name: &str) -> String {
     setting.map_or_else(String::new, |s| number(s.value_on(machine), s.row().stored))
 }
 
-/// One setting, of all its owners.
+/// The line of a setting in a table of settings, for all its owners.
 fn line(owners: &[Owner], row: u8, meaning: &Meaning) -> String {
     let settings: Vec<_> = owners.iter().filter_map(|o| Setting::of(*o, row)).collect();
     let Some(first) = settings.first() else { return String::new() };

@@ -158,13 +158,13 @@ pub enum Switch {
 /// A row of the tables.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Code {
-    /// Its number in tenths: 283 for G28.3.
+    /// The number of the code in tenths: 283 for G28.3.
     pub number: u16,
     /// What it does.
     pub action: Action,
     /// The words it may use, as a set.
     pub takes: u32,
-    /// Those it cannot be without; axes: at least one.
+    /// The words that the code cannot be without, as bits; for axes, at least one of them.
     pub needs: u32,
 }
 

@@ -37,7 +37,7 @@ const fn thread(number: u16, mode: MotionMode) -> Code {
     with(number, Action::Motion(mode), AXES | bit(K))
 }
 
-/// Its words are not in force for the next line, which needs them as well.
+/// A threading cycle. Its words are not in force for the next line, which needs them as well.
 const fn thread_cycle(number: u16) -> Code {
     let words = Z_WORD | OFFSETS | bit(P) | bit(R) | bit(Q) | bit(H) | bit(E) | bit(L);
     with(number, Action::Motion(MotionMode::ThreadCycle), words)

@@ -28,7 +28,7 @@ pub(super) struct Line {
     pub edge: u16,
     /// When its last pulse began.
     pub at: u16,
-    /// Its pulses, modulo 2^16.
+    /// The pulses on the line, modulo 2^16.
     pub count: u16,
     /// Not 0: its pin has been still for so long that `edge` does not tell.
     pub quiet: u8,

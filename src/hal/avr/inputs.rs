@@ -87,18 +87,18 @@ macro_rules! each_input {
 /// What the looks know and are told.
 struct State {
     switches: Switches,
-    /// Those that are looked at: the pins of the others are an encoder's.
+    /// Inputs that are read, as bits. The pins of the others belong to an encoder.
     used: u16,
-    /// Low is worked.
+    /// Inputs that are active when low.
     low: u16,
-    /// What stops the steps.
+    /// Inputs that stop the steps.
     stops: u16,
-    /// Those of them that have been hit.
+    /// Inputs that have stopped the steps since they were asked for last.
     hits: u16,
     /// `stops` without the ends that are ignored for now.
     live: u16,
     spared: u8,
-    /// Those that end a move, and what they must be for it.
+    /// Inputs that end a move, and in `awaited` the state of each that ends it.
     armed: u16,
     awaited: u16,
     /// The next look is to believe what it finds.
@@ -184,7 +184,7 @@ pub(super) fn leave_out(inputs: u16) {
     });
 }
 
-/// Those inputs. Thread mode.
+/// The inputs that are not read because an encoder has their pins. Thread mode.
 pub fn left_out() -> u16 {
     with(|state| !state.used)
 }

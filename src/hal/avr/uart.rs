@@ -31,7 +31,7 @@ struct Shared<const N: usize> {
     flags: Flags,
 }
 
-/// Of that, what has one size.
+/// The parts of [`Shared`] whose size does not depend on the ring's.
 #[repr(C)]
 struct Flags {
     /// Counts line ends that were lost, low byte first. The receive interrupt writes it.
@@ -326,7 +326,7 @@ fn wait_less(port: u8) {
     kick(port);
 }
 
-/// Nothing: what has no room is lost.
+/// Does nothing: bytes that find no room in the ring are lost.
 pub fn go_on() {}
 
 /// Line ends lost since start-up, modulo 2^16.

@@ -57,7 +57,7 @@ pub(super) fn leave_out(inputs: u16) {
     edge();
 }
 
-/// Those inputs.
+/// The inputs that are not read because an encoder has their pins.
 pub fn left_out() -> u16 {
     !all().used.get()
 }

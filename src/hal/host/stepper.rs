@@ -24,7 +24,7 @@ struct Near {
     input: usize,
     motor: usize,
     step: i64,
-    /// It opens there instead of closing.
+    /// The contact opens there instead of closing.
     opens: bool,
     closed: bool,
 }
@@ -198,7 +198,7 @@ pub(super) fn next_tick() -> u64 {
     stepper().next_tick.get()
 }
 
-/// One tick, at its time.
+/// Carries out a tick, at its time.
 pub(super) fn tick() {
     let s = stepper();
     let mut pins = s.pins.borrow_mut();

@@ -253,7 +253,7 @@ pub fn look() {
     }
 }
 
-/// Nothing: what has no room is lost.
+/// Does nothing: bytes that find no room in the ring are lost.
 pub fn go_on() {}
 
 /// Line ends lost since start-up, modulo 2^16.

@@ -104,7 +104,7 @@ impl Text {
         self.0.is_empty()
     }
 
-    /// Its bytes, one by one. Cost on AVR: about 60 cycles a byte.
+    /// The bytes of the text, one by one. Cost on AVR: about 60 cycles a byte.
     pub fn bytes(self) -> Bytes {
         Bytes { packed: self.0, pending: Vec::new() }
     }

@@ -7,7 +7,7 @@ use crate::units::AXES;
 pub enum Command {
     /// A block of G-code, or `$J=`.
     Gcode,
-    /// Nothing: an empty line.
+    /// No command: an empty line.
     Nothing,
     /// No line, but a `?`.
     Question,
@@ -60,7 +60,7 @@ pub fn of(line: &[u8]) -> Command {
     }
 }
 
-/// That of a line behind its `$`. Comments and blanks mean nothing.
+/// The command of a line behind its `$`. Comments and blanks mean nothing.
 #[small]
 fn system(rest: &[u8]) -> Command {
     let words = without_comment(rest);

@@ -177,7 +177,7 @@ pub fn startup(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option
     (at == 0).then_some(1)
 }
 
-/// Its text.
+/// Puts the text of a startup line.
 #[inline(never)]
 #[small]
 pub fn startup_text(line: u8, machine: &mut impl Machine, out: &mut impl Out) {

@@ -109,7 +109,7 @@ impl Dialect for Grbl {
         true
     }
 
-    /// None: all lines are answered in their order.
+    /// No line may overtake: all lines are answered in their order.
     #[inline(always)]
     fn may_be_control(_first: u8) -> bool {
         false

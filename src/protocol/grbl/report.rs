@@ -22,7 +22,7 @@ const OVERRIDES: u8 = 20;
 
 /// What is kept between reports, of all ports together.
 pub struct Reports {
-    /// So many reports until the next `WCO` and `Ov`.
+    /// How many reports there are until the next `WCO` and `Ov`.
     offsets: u8,
     overrides: u8,
     /// What the offsets were that have been told last.
@@ -33,9 +33,9 @@ pub struct Reports {
     flags: u8,
 }
 
-/// Of [`Reports`]: `$SLP` has come.
+/// A bit of [`Reports::flags`]: `$SLP` has come.
 pub(super) const SLEEPS: u8 = 1;
-/// Of [`Reports`]: a setting has lowered the top speed of an axis.
+/// A bit of [`Reports::flags`]: a setting has lowered the top speed of an axis.
 pub(super) const LOWERED: u8 = 2;
 
 #[small]
@@ -195,7 +195,7 @@ impl Report {
         self.field != Field::Done
     }
 
-    /// One axis of a vector, with its name before the first.
+    /// Puts one axis of a vector, with its name before the first.
     #[inline(never)]
     fn coordinate(
         &mut self,

@@ -24,7 +24,7 @@ pub struct Request {
     command: Command,
     /// How far it has come; what it says depends on the command.
     at: u8,
-    /// Of G-code: what has become of it.
+    /// The status with which G-code has run.
     status: Status,
     /// G-code that has not run yet.
     block: Option<Span>,
@@ -40,9 +40,9 @@ const STORES: u8 = 1;
 
 /// How far a command has come.
 enum Step {
-    /// It goes on with this part.
+    /// The command goes on with this part.
     At(u8),
-    /// It goes on later.
+    /// The command goes on with this part, later.
     Later(u8),
     /// `ok`.
     Done,

@@ -272,7 +272,7 @@ pub fn by_name(name: &[u8]) -> Option<Setting> {
     Setting::find(&Name::new().with(name)?)
 }
 
-/// Its value, in the unit of TinyG's dialect.
+/// The value of a setting, in the unit of TinyG's dialect.
 #[small]
 pub fn value_of(setting: Setting, machine: &mut impl Machine) -> Fixed {
     Fixed { value: machine.setting(setting), decimals: setting.row().stored }

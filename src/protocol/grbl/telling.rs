@@ -17,7 +17,7 @@ use crate::text;
 
 /// What is being told, and how far.
 pub enum Telling {
-    /// Nothing.
+    /// Nothing is being told.
     Nothing,
     /// The greeting; whether its first line has been put.
     Greeting(bool),

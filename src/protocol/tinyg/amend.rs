@@ -19,7 +19,7 @@ pub(super) fn is_amended(name: &[u8]) -> bool {
 
 #[small]
 impl Request {
-    /// One pair. `selected` is set in the inner object.
+    /// Carries out one pair of the object. `selected` is set in the inner object.
     #[inline(never)]
     pub(super) fn amend<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let Some(pair) = json::pair(c.line, self.at) else {

@@ -48,7 +48,7 @@ const BRIEF_0: [u8; BRIEF_LEN as usize] = *b"{\"r\":{},\"f\":[1,0,0]}\n";
 const BRIEF_LEN: u8 = 21;
 
 progmem! {
-    /// It ten times, with 0 to 9 free lines: copied at once, which half of short lines wait for.
+    /// [`BRIEF_0`] ten times, with 0 to 9 free lines, so that an answer is a single copy.
     static BRIEF: [u8; 10 * BRIEF_LEN as usize] = {
         let (mut all, mut at) = ([0; 10 * BRIEF_LEN as usize], 0);
         while at < all.len() {

@@ -66,7 +66,7 @@ impl Banner {
     }
 }
 
-/// One of the rows that tell who we are.
+/// Puts one of the rows that tell what firmware this is.
 #[small]
 pub(super) fn put_row<O: Out>(row: u8, machine: &mut impl Machine, writer: &mut Writer<'_, O>) {
     // The version comes before the build.

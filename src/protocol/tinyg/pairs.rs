@@ -122,7 +122,7 @@ impl Request {
         self.carry_out(&pair, target, c);
     }
 
-    /// One member of the group, in its order.
+    /// Puts one member of the group, in its order.
     #[inline(never)]
     pub(super) fn list<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let member =
@@ -139,7 +139,7 @@ impl Request {
         writer.shown(shown);
     }
 
-    /// One entry of a new status report. Names that mean nothing here are passed over; a report
+    /// Selects one entry of a new status report. Names that mean nothing here are passed over; a report
     /// that would hold nothing is refused.
     #[inline(never)]
     pub(super) fn select<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {

@@ -8,7 +8,7 @@ use crate::text;
 /// What is told beside what has been done; the last one counts most.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
 pub enum Remark {
-    /// Nothing.
+    /// No message.
     #[default]
     None,
     /// Drivers with so many microsteps are unusual.

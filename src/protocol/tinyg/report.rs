@@ -25,7 +25,7 @@ pub struct StatusReport {
     /// The lower eight bits of their numbers, and the ninth.
     low: [u8; LONGEST_REPORT],
     high: [u8; HIGH],
-    /// Of each the low 24 bits, which saves 38 bytes: a change would have to be a multiple of 16,777,216, for
+    /// The low 24 bits of each value, which saves 38 bytes: a change would have to be a multiple of 16,777,216, for
     /// positions 1.6777216 m between two reports, to pass unseen.
     sent: [[u8; 3]; LONGEST_REPORT],
     len: u8,

@@ -32,7 +32,7 @@ use crate::status::Status;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Phase {
-    /// Of a malformed line: give it back.
+    /// A malformed line is given back.
     Echo,
     EchoText,
     /// At a pair of the line's object.
@@ -85,7 +85,7 @@ pub struct Request {
     pub(super) phase: Phase,
     pub(super) status: Status,
     pub(super) format: Format,
-    /// Of the response, fixed when it begins.
+    /// The verbosity of the response, fixed when it begins.
     pub(super) verbosity: u8,
     /// The group whose object is open.
     pub(super) group: Option<Group>,
@@ -109,7 +109,7 @@ pub struct Request {
     pub(super) commented: bool,
     /// The message that is due.
     pub(super) remark: Remark,
-    /// Of the phase `Select`: something has been selected.
+    /// Something has been selected in the phase `Select`.
     pub(super) selected: bool,
     /// What the last step was to do has to wait.
     pub(super) waits: bool,

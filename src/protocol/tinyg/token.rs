@@ -60,7 +60,7 @@ impl Token {
         self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
     }
 
-    /// Its number; of those that are not [far](Self::is_far) below 512.
+    /// The number of the token; below 512 unless it is [far](Self::is_far).
     pub const fn number(self) -> u16 {
         self.0
     }
@@ -146,7 +146,7 @@ impl Token {
         u8::try_from(self.0).ok().and_then(Setting::from_number)
     }
 
-    /// Its full name.
+    /// The full name of the token.
     pub fn name(self) -> Name {
         match self.subject() {
             Some(Subject::Setting(setting)) => setting.name(),
@@ -162,7 +162,7 @@ impl Token {
         }
     }
 
-    /// Its value now.
+    /// The value of the token now.
     pub fn read(self, machine: &mut impl Machine) -> Shown {
         let inches = machine.inches();
         let (source, form) = match self.subject() {
@@ -389,7 +389,7 @@ pub enum Target {
     Action(Action),
     /// Several settings or values.
     Group(Group),
-    /// Nothing.
+    /// The name means nothing.
     Unknown,
 }
 

@@ -15,7 +15,7 @@ use crate::{named, progmem, text};
 /// Where a number comes from that is told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Source {
-    /// It is a value of the machine.
+    /// A value of the machine.
     Of(Value),
     /// `stat`.
     State,
@@ -132,7 +132,7 @@ pub fn place_form(axis: u8) -> Form {
 /// A value with a name of its own.
 #[derive(Clone, Copy)]
 pub struct Single {
-    /// Its name, zero padded.
+    /// The name of the value, padded with zeros.
     pub token: [u8; 4],
     /// What it is.
     pub source: Source,

@@ -20,11 +20,11 @@ use crate::text;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Variation {
-    /// It counts lines.
+    /// The sender counts lines.
     Lines,
-    /// It counts characters.
+    /// The sender counts characters.
     Characters,
-    /// It knows g2core.
+    /// The sender knows g2core.
     G2core,
 }
 

@@ -52,7 +52,7 @@ impl<'a, O: Out> Writer<'a, O> {
         self.format.is_plain()
     }
 
-    /// One byte.
+    /// Puts a byte.
     pub fn byte(&mut self, byte: u8) {
         if !self.shown {
             return;
@@ -75,12 +75,12 @@ impl<'a, O: Out> Writer<'a, O> {
         self.out.put_plain(if expand { plain!("\n\r") } else { plain!("\n") });
     }
 
-    /// One byte of somebody else's text; what does not print becomes `?`.
+    /// Puts a byte of text that came from outside; what does not print becomes `?`.
     pub fn printable(&mut self, byte: u8) {
         self.byte(if matches!(byte, b' '..=b'~') { byte } else { b'?' });
     }
 
-    /// One byte of somebody else's text within a string. At most two bytes come out.
+    /// Puts a byte of text that came from outside within a string. At most two bytes come out.
     pub fn escaped(&mut self, byte: u8) {
         if matches!(byte, b'"' | b'\\') {
             self.byte(b'\\');

@@ -317,7 +317,7 @@ fn json_that_holds_g_code_is_data() {
     }
 }
 
-/// It would wait in half, and those behind it would overtake it.
+/// A control line that were taken in part would wait, and those behind it would overtake it.
 #[test]
 fn a_control_line_comes_whole_or_stays_in_the_ring() {
     let mut pool = LinePool::new(Box::leak(Box::new([0; 40])), 16);

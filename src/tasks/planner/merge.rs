@@ -23,7 +23,7 @@ use crate::motion::queue;
 use crate::tasks::links::Links;
 use crate::units::{Length, PerAxis};
 
-/// So long after its last line a chain waits no more, ms.
+/// How long after its last line a chain is closed, ms.
 const STALE_MS: u16 = 8;
 
 /// A chain, where the machine is and what drivers ask for.

@@ -13,7 +13,7 @@ use crate::units::{Length, PerAxis};
 
 /// What lasts longer than a turn: one at a time, and one place in memory.
 pub(super) enum Ongoing {
-    /// Nothing.
+    /// Nothing is going on.
     None,
     /// An arc.
     Arc(ArcWalk),

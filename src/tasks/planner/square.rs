@@ -34,14 +34,14 @@ use crate::units::{AXES, Length};
 /// The second motor of an axis that is squared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Second {
-    /// Its number, from 0.
+    /// The number of the motor, from 0.
     motor: u8,
     /// The input of its switch.
     input: u8,
 }
 
 impl Second {
-    /// Its part of what all motors have.
+    /// The steps of this motor among those of all motors.
     pub fn of(self, steps: &[i32; MOTORS]) -> i32 {
         steps.get(usize::from(self.motor)).copied().unwrap_or_default()
     }

@@ -67,7 +67,7 @@ const BACK_OUT: u8 = 5;
 /// What has become of the lines of a pass.
 #[derive(Clone, Copy, PartialEq)]
 enum End {
-    /// They are done, or what is queued is dropped.
+    /// The lines are done, or what is queued is dropped.
     Done,
     /// A feedhold has left the cut.
     Left,

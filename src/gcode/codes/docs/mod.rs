@@ -26,11 +26,11 @@ use crate::units::{Length, PerAxis};
 
 /// What belongs together.
 pub struct Section {
-    /// Its heading.
+    /// The heading of the section.
     pub title: &'static str,
     /// What holds for all of it; may be empty.
     pub intro: &'static str,
-    /// Its codes.
+    /// The codes of the section.
     pub docs: &'static [Doc],
 }
 
@@ -38,7 +38,7 @@ pub struct Section {
 pub struct Doc {
     /// `G` or `M`.
     pub letter: char,
-    /// Its number in tenths.
+    /// The number of the code in tenths.
     pub number: u16,
     /// What it is called.
     pub title: &'static str,
@@ -71,7 +71,7 @@ pub struct Refusal {
 /// The machine of an example.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum On {
-    /// One that has everything, all axes standard.
+    /// A machine that has everything, all axes standard.
     Usual,
     /// A machine that has neither switches nor a probe nor an encoder.
     NoSwitches,
@@ -156,7 +156,7 @@ impl Refusal {
 }
 
 impl Doc {
-    /// Its name: `G28.3`.
+    /// The name of the code: `G28.3`.
     pub fn name(&self) -> std::string::String {
         match (self.number / 10, self.number % 10) {
             (whole, 0) => std::format!("{}{whole}", self.letter),
@@ -164,7 +164,7 @@ impl Doc {
         }
     }
 
-    /// Its row of the tables.
+    /// The row of the code in the tables.
     pub fn row(&self) -> Option<Code> {
         let (whole, tenth) = (self.number / 10, (self.number % 10) as u8);
         if self.letter == 'G' { super::g(whole, tenth) } else { super::m(whole, tenth) }
