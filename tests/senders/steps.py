@@ -55,8 +55,14 @@ def ensure(condition, text):
         raise AssertionError(text)
 
 
-def main(test):
-    """Runs the test and ends the process, also when nobody waits for it any more: then its standard input ends."""
+_stop = None
+
+
+def main(test, stop=None):
+    """Runs the test and ends the process, also when nobody waits for it any more: then its standard input ends. `stop` ends
+    what the test has started, however the process ends."""
+    global _stop
+    _stop = stop
     watcher = threading.Thread(target=lambda: (sys.stdin.read(), leave(1)), daemon=True)
     watcher.start()
     test()
@@ -84,6 +90,8 @@ def session(*, connect, settings, jog, home, probe, stop, close, start, hold, fi
 def leave(code):
     """Ends the process without waiting for threads of the sender."""
     _out.flush()
+    if _stop:
+        _stop()
     os._exit(code)
 
 

@@ -9,41 +9,63 @@ use crate::npm;
 use crate::process::{root, run};
 use crate::setup::python;
 
-/// What is to be installed, as pip reads it.
-const REQUIREMENTS: &str = "requirements.txt";
-/// The folder of the Python that has it.
+/// The folder of the Python that most of the senders in Python are installed for.
 const PYTHON: &str = "python";
+
+/// A Python with packages of PyPI.
+struct Packages {
+    /// The list of the packages, as pip reads it, among the drivers.
+    list: &'static str,
+    /// The folder of the Python.
+    folder: &'static str,
+    /// Whether pip installs what the packages ask for, besides the list.
+    with_all: bool,
+}
+
+const PACKAGES: [Packages; 2] = [
+    // bCNC asks for packages that only its window needs.
+    Packages { list: "requirements.txt", folder: PYTHON, with_all: false },
+    // OctoPrint asks for versions of its own.
+    Packages { list: "requirements-octoprint.txt", folder: "octoprint", with_all: true },
+];
 
 /// The folder that the senders are installed in, which they are unless an earlier run did it. No scripts of npm's run: `g2core-api` has one that builds a
 /// serial port too old to build.
 pub fn senders() -> Result<PathBuf> {
     let folder = npm::install("senders", &drivers())?;
-    install_for_python(&folder)?;
+    for packages in &PACKAGES {
+        packages.install(&folder)?;
+    }
     Ok(folder)
 }
 
-/// The Python that the senders in Python are installed for, in the folder of [`senders`].
+/// The Python that drivers in Python run with, in the folder of [`senders`].
 pub fn python_of(folder: &Path) -> PathBuf {
     folder.join(PYTHON).join("bin/python")
 }
 
-/// Installs what the drivers' list for pip names, unless an earlier run did it.
-fn install_for_python(folder: &Path) -> Result<()> {
-    let wanted = drivers().join(REQUIREMENTS);
-    let wanted = std::fs::read_to_string(&wanted).with_context(|| wanted.display().to_string())?;
-    let stamp = folder.join("installed.txt");
-    if std::fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
-        return Ok(());
+impl Packages {
+    /// Installs the packages, unless an earlier run did it.
+    fn install(&self, folder: &Path) -> Result<()> {
+        let wanted = drivers().join(self.list);
+        let wanted =
+            std::fs::read_to_string(&wanted).with_context(|| wanted.display().to_string())?;
+        let stamp = folder.join(format!("installed-{}", self.list));
+        if std::fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
+            return Ok(());
+        }
+        eprintln!("installing packages of PyPI into {}: this once", folder.display());
+        std::fs::write(folder.join(self.list), &wanted)?;
+        let python = python().context("no Python with venv")?;
+        run(Command::new(python).args(["-m", "venv", "--clear", self.folder]).current_dir(folder))?;
+        let mut pip = Command::new(folder.join(self.folder).join("bin/python"));
+        pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
+        if !self.with_all {
+            pip.arg("--no-deps");
+        }
+        run(pip.args(["-r", self.list]).current_dir(folder))?;
+        Ok(std::fs::write(stamp, wanted)?)
     }
-    eprintln!("installing packages of PyPI into {}: this once", folder.display());
-    std::fs::write(folder.join(REQUIREMENTS), &wanted)?;
-    let python = python().context("no Python with venv")?;
-    run(Command::new(python).args(["-m", "venv", "--clear", PYTHON]).current_dir(folder))?;
-    let mut pip = Command::new(python_of(folder));
-    pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
-    // bCNC asks for packages that only its window needs.
-    run(pip.args(["--no-deps", "-r", REQUIREMENTS]).current_dir(folder))?;
-    Ok(std::fs::write(stamp, wanted)?)
 }
 
 /// Where the drivers lie.

@@ -53,6 +53,7 @@ enum Sender {
     GrblStreamer,
     Printcore,
     CncjsMarlin,
+    Octoprint,
 }
 
 impl Sender {
@@ -67,6 +68,7 @@ impl Sender {
             Sender::GrblStreamer => "grbl-streamer",
             Sender::Printcore => "printcore",
             Sender::CncjsMarlin => "cncjs-marlin",
+            Sender::Octoprint => "octoprint",
         }
     }
 
@@ -81,6 +83,7 @@ impl Sender {
             Sender::GrblStreamer => ("grbl-streamer.py", None),
             Sender::Printcore => ("printcore.py", None),
             Sender::CncjsMarlin => ("cncjs-marlin.js", None),
+            Sender::Octoprint => ("octoprint-server.py", None),
         }
     }
 }
@@ -88,7 +91,7 @@ impl Sender {
 impl Sender {
     /// Whether it is a host of printers.
     fn prints(self) -> bool {
-        matches!(self, Sender::Printcore | Sender::CncjsMarlin)
+        matches!(self, Sender::Printcore | Sender::CncjsMarlin | Sender::Octoprint)
     }
 
     /// The board whose image it speaks to.

@@ -1,0 +1,254 @@
+"""OctoPrint, its server, by its API over HTTP: octoprint-server.py PORT JOB"""
+
+import http.client
+import json
+import os
+import secrets
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+
+from steps import ensure, main, step, until
+
+PORT, JOB = sys.argv[1:]
+FAR = 40
+HERE = os.path.abspath("octoprint-home")
+KEY = secrets.token_hex(16)
+
+# What OctoPrint would ask of a new user, and what it does besides printing, is left out.
+CONFIG = f"""\
+accessControl: {{autologinLocal: true}}
+api: {{key: {KEY}}}
+gcodeAnalysis: {{runAt: never}}
+plugins: {{_disabled: [announcements, backup, discovery, errortracking, pluginmanager, softwareupdate, tracking]}}
+serial: {{additionalPorts: ['{PORT}'], log: true}}
+server:
+  firstRun: false
+  onlineCheck: {{enabled: false}}
+  pluginBlacklist: {{enabled: false}}
+"""
+
+url = None
+server = None
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def call(path, body=None, kind="application/json"):
+    """Asks the server: GET, or POST of a body. None where it says that this cannot be now."""
+    if isinstance(body, dict):
+        body = json.dumps(body).encode()
+    request = urllib.request.Request(f"{url}/api/{path}", body, {"X-Api-Key": KEY, "Content-Type": kind})
+    try:
+        with urllib.request.urlopen(request, timeout=20) as answer:
+            text = answer.read()
+    except urllib.error.HTTPError as error:
+        if error.code == 409:
+            return None
+        raise
+    return json.loads(text) if text else {}
+
+
+def upload(name, text):
+    """Puts a file into the server's folder and prints it."""
+    edge = "edge-of-a-part"
+    part = f'--{edge}\r\nContent-Disposition: form-data; name="{{}}"{{}}\r\n\r\n{{}}\r\n'
+    body = part.format("file", f'; filename="{name}"', text) + part.format("print", "", "true") + f"--{edge}--\r\n"
+    ensure(call("files/local", body.encode(), f"multipart/form-data; boundary={edge}"), f"{name} is refused")
+
+
+def state():
+    return call("connection")["current"]["state"]
+
+
+def heard():
+    """What came from the board, as the server has written it down."""
+    try:
+        with open(os.path.join(HERE, "logs", "serial.log"), encoding="utf-8", errors="replace") as log:
+            return [line.split("Recv: ", 1)[1].strip() for line in log if "Recv: " in line]
+    except FileNotFoundError:
+        return []
+
+
+def send(*lines):
+    call("printer/command", {"commands": list(lines)})
+
+
+def ask(line, text):
+    begin = len(heard())
+    send(line)
+    return until(lambda: next((said for said in heard()[begin:] if text in said), None))
+
+
+def settle(name):
+    """Waits until all that has been sent is carried out: the text comes back behind the last move."""
+    send("M400")
+    ask(f"M118 {name}", name)
+
+
+def place():
+    words = ask("M114", "Count").split()
+    return {word[0]: float(word[2:]) for word in words[:4]}
+
+
+def hot_end():
+    now = call("printer")
+    return (now or {}).get("temperature", {}).get("tool0", {}).get("actual") or 0
+
+
+def start():
+    global server, url
+    shutil.rmtree(HERE, ignore_errors=True)
+    os.mkdir(HERE)
+    with open(os.path.join(HERE, "config.yaml"), "w", encoding="ascii") as config:
+        config.write(CONFIG)
+    port = free_port()
+    program = os.path.abspath("octoprint/bin/octoprint")
+    where = ["--basedir", HERE, "--host", "127.0.0.1", "--port", str(port)]
+    command = [program, "serve", "--iknowwhatimdoing", *where]
+    server = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr)
+    url = f"http://127.0.0.1:{port}"
+
+    def version():
+        try:
+            return call("version")
+        except (OSError, ValueError, http.client.HTTPException):
+            return None
+
+    return until(version)["text"]
+
+
+def connect():
+    call("connection", {"command": "connect", "port": PORT, "baudrate": 115200, "printerProfile": "_default"})
+    until(lambda: state() == "Operational")
+    return ask("M115", "FIRMWARE_NAME")
+
+
+def temperatures():
+    """It asks by itself."""
+    return f"hot end {until(hot_end)}"
+
+
+def settings():
+    """Steps and limits of a printer."""
+    for line in ["M92 X80 Y80 Z400 E93", "M203 X150 Y150 Z10 E50", "M201 X1000 Y1000 Z100 E5000"]:
+        ask(line, "ok")
+    text = ask("M503", "M92")
+    ensure("X80.000 Y80.000 Z400.000 E93.000" in text, text)
+    return text
+
+
+def heat():
+    """By the button for the hot end's temperature."""
+    target = lambda degrees: call("printer/tool", {"command": "target", "targets": {"tool0": degrees}})
+    target(60)
+    until(lambda: hot_end() > 58)
+    target(0)
+    return f"hot end {hot_end()}"
+
+
+def jog():
+    head = lambda x: call("printer/printhead", {"command": "jog", "x": x, "speed": 3000})
+    head(2)
+    until(lambda: place()["X"] == 2)
+    head(-2)
+    until(lambda: place()["X"] == 0)
+    return "X by 2 mm and back"
+
+
+def there_and_back(moves):
+    return "G91\n" + "G1 X0.5 F1200\nG1 X-0.5\n" * moves + "G90\n"
+
+
+def progress():
+    return call("job")["progress"]["filepos"] or 0
+
+
+def pause():
+    """Pauses in the middle of a print of its own: the machine comes to rest, and goes on."""
+    upload("pause.gcode", there_and_back(300))
+    until(lambda: progress() > 200)
+    call("job", {"command": "pause", "action": "pause"})
+    until(lambda: state() == "Paused")
+    there, at = progress(), place()
+    time.sleep(0.5)
+    ensure(progress() == there and place() == at, f"it goes on, at {place()}")
+    call("job", {"command": "pause", "action": "resume"})
+    until(lambda: state() == "Operational")
+    settle("paused and resumed")
+    ensure(place()["X"] == 0, place())
+    return f"stood at byte {there}, went on to the end"
+
+
+def cancel():
+    """Gives up a print of its own in the middle, and goes back to where it began."""
+    upload("cancel.gcode", there_and_back(300))
+    until(lambda: progress() > 400)
+    there = progress()
+    call("job", {"command": "cancel"})
+    until(lambda: state() == "Operational")
+    send("G90", "G1 X0 F3000")
+    settle("cancelled")
+    ensure(place()["X"] == 0, place())
+    return f"at byte {there}, back at 0"
+
+
+def stop():
+    """M112: OctoPrint leaves the port as well; the machine is in an alarm until it is connected to again."""
+    send("M112")
+    until(lambda: state().startswith(("Offline", "Closed", "Error")))
+    what = state()
+    connect()
+    return f"{what}; connected again"
+
+
+def prints():
+    with open(JOB, encoding="ascii") as job:
+        text = job.read()
+    # Nothing is hot here.
+    ask("M302 P1", "ok")
+    begin = len(heard())
+    upload("print.gcode", text)
+    until(lambda: progress() > 10_000)
+    until(lambda: state() == "Operational")
+    settle("all printed")
+    wrong = [line for line in heard()[begin:] if line.startswith(("Error", "Resend", "echo:Unknown"))]
+    ensure(not wrong, wrong)
+    return f"{len(text.splitlines())} lines, at {place()}"
+
+
+def close():
+    call("connection", {"command": "disconnect"})
+    until(lambda: state() == "Closed")
+    return "port closed"
+
+
+def test():
+    step("start", 60, start)
+    step("connect", 30, connect)
+    step("temperatures", 20, temperatures)
+    step("stop", 60, stop)
+    step("settings", 20, settings)
+    step("jog", 30, jog)
+    step("heat", 60, heat)
+    step("pause", 90, pause)
+    step("cancel", 60, cancel)
+    step("print", 600, prints)
+    step("close", 20, close)
+
+
+def end():
+    if server:
+        server.kill()
+        server.wait()
+
+
+main(test, end)
