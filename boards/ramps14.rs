@@ -50,9 +50,12 @@ pub const RAMPS14: Board = Board {
     // D2 and D3
     encoder: Some(Encoder { index: pin(E, 4), sync: pin(E, 5) }),
     drivers: None,
-    // D10 and A13, D8 and A14; D9
+    // D10 and A13, or a MAX6675 at D50, D52 and, of AUX-2, D40; D8 and A14; D9
     heaters: Some(Heaters {
-        heaters: [Heater { pin: pin(B, 4), channel: 13 }, Heater { pin: pin(H, 5), channel: 14 }],
+        heaters: [
+            Heater { pin: pin(B, 4), channel: 13, select: Some(pin(G, 1)) },
+            Heater { pin: pin(H, 5), channel: 14, select: None },
+        ],
         fan: pin(H, 6),
     }),
     step_timer: Timer::T1,

@@ -56,7 +56,10 @@ pub const SKR_PICO: Board = Board {
     encoder: None,
     // HE and TH0, HB and THB; FAN1
     heaters: Some(Heaters {
-        heaters: [Heater { pin: gp(23), channel: 1 }, Heater { pin: gp(21), channel: 0 }],
+        heaters: [
+            Heater { pin: gp(23), channel: 1, select: None },
+            Heater { pin: gp(21), channel: 0, select: None },
+        ],
         fan: gp(17),
     }),
     drivers: Some(Tmc2209 { tx: gp(8), rx: gp(9), addresses: &[0, 2, 1, 3], run: 18, hold: 9 }),

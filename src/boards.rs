@@ -390,6 +390,8 @@ pub struct Heater {
     pub pin: Pin,
     /// 0 to 15: A0 to A15; of the RP2040 0 to 2, GP26 to GP28.
     pub channel: u8,
+    /// Selects the MAX6675 that its sensor may be instead, on the SPI of the ATmega2560; low for selected.
+    pub select: Option<Pin>,
 }
 
 /// Heaters and fan of a printer.
@@ -448,7 +450,13 @@ const OWN_PIN: Pin = pin(Port::H, 1);
 const MAX_PORTS: usize = 2;
 const SERIAL_PINS: usize = 5;
 
-const MAX_PINS: usize = 3 * MOST_MOTORS + 1 + 8 + MAX_PORTS * SERIAL_PINS + 1 + inputs::COUNT + 2;
+/// SS, SCK, MOSI, MISO of the ATmega2560. SS is an output, or its SPI is no master.
+pub(crate) const SPI: [Pin; 4] =
+    [pin(Port::B, 0), pin(Port::B, 1), pin(Port::B, 2), pin(Port::B, 3)];
+
+/// Beside those of motors and ports: of enables, hazards, the firmware, inputs, drivers, and SPI with what it selects.
+const OTHER_PINS: usize = 1 + 8 + 1 + inputs::COUNT + 2 + SPI.len() + 2;
+const MAX_PINS: usize = 3 * MOST_MOTORS + MAX_PORTS * SERIAL_PINS + OTHER_PINS;
 
 impl Serial {
     const fn pins(&self) -> [Option<Pin>; SERIAL_PINS] {
@@ -514,6 +522,16 @@ impl Board {
             (pins[n], pins[n + 1]) = (Some(drivers.tx), Some(drivers.rx));
             n += 2;
             assert!(drivers.addresses.len() == self.motors.len(), "a driver for each motor");
+        }
+        if let Some(Heaters { heaters: [hot_end, bed], .. }) = self.heaters {
+            (pins[n], pins[n + 1]) = (hot_end.select, bed.select);
+            n += 2;
+        }
+        let mut s = 0;
+        while s < SPI.len() && self.has_spi() {
+            pins[n] = Some(SPI[s]);
+            n += 1;
+            s += 1;
         }
         let mut s = 0;
         while s < self.serial.len() {
@@ -589,6 +607,19 @@ impl Board {
         match (self.inputs[input - 1], self.inputs[input]) {
             (Some(min), Some(max)) => min.is(max),
             _ => false,
+        }
+    }
+
+    /// Whether something on it is spoken to over SPI.
+    pub const fn has_spi(&self) -> bool {
+        self.has_max6675(0) || self.has_max6675(1)
+    }
+
+    /// Whether a heater (0 hot end, 1 bed) may have a MAX6675.
+    pub const fn has_max6675(&self, heater: usize) -> bool {
+        match self.heaters {
+            Some(Heaters { heaters, .. }) => heaters[heater].select.is_some(),
+            None => false,
         }
     }
 

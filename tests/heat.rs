@@ -27,12 +27,17 @@ struct Printer {
     stuck: bool,
     noise: u32,
     loose: f64,
+    /// The hot end's sensor, and what a MAX6675 has converted last.
+    kind: Kind,
+    word: u16,
     ms: u64,
     said: String,
 }
 
 /// How often the plants are worked out, ms.
 const STEP: u64 = 10;
+/// How long a MAX6675 takes, ms.
+const CONVERTS: u64 = 220;
 
 impl Printer {
     fn new() -> Option<Self> {
@@ -55,6 +60,8 @@ impl Printer {
             stuck: false,
             noise: 1,
             loose: AIR,
+            kind: Kind::Semitec,
+            word: 0,
             ms: 0,
             said: String::new(),
         };
@@ -69,9 +76,15 @@ impl Printer {
     }
 
     /// What the converter reads: half a count of noise in each conversion, of which the sum keeps a sixth.
-    fn read(&mut self, degrees: f64) -> u16 {
+    fn read(&mut self, kind: Kind, degrees: f64) -> u16 {
+        if kind == Kind::Max6675 {
+            if self.ms.is_multiple_of(CONVERTS) {
+                self.word = reading(kind, degrees) as u16;
+            }
+            return self.word;
+        }
         let (full, noise) = (f64::from(SAMPLES) * 1_023.0, self.noise() * 6.0);
-        (reading(Kind::Semitec, degrees) + noise).clamp(0.0, full) as u16
+        (reading(kind, degrees) + noise).clamp(0.0, full) as u16
     }
 
     /// Runs for a time, and looks at each step.
@@ -83,12 +96,12 @@ impl Printer {
             self.bed.pass(seconds, on & 2 != 0, fan);
             self.loose += (AIR - self.loose) * seconds / 5.0;
             let hot_end = match self.wire {
-                Wire::Well => self.read(self.hot_end.sensor),
-                Wire::Loose => self.read(self.loose),
+                Wire::Well => self.read(self.kind, self.hot_end.sensor),
+                Wire::Loose => self.read(self.kind, self.loose),
                 Wire::Open => SAMPLES * 1_023,
                 Wire::Short => 0,
             };
-            let bed = self.read(self.bed.sensor);
+            let bed = self.read(Kind::Semitec, self.bed.sensor);
             self.machine.set_sensor(0, hot_end);
             self.machine.set_sensor(1, bed);
             self.machine.run_ms(STEP);
@@ -455,4 +468,30 @@ fn what_comes_behind_an_ended_autotune_heats() {
     printer.run(1_000, |_| {});
     let answer = printer.ask("M105");
     assert!(answer.contains("/100.00"), "{answer}");
+}
+
+/// With every sensor the hot end gets as hot as with a thermistor, and stays so.
+#[test]
+fn every_sensor_holds_the_temperature() {
+    let kinds = [Kind::Epcos, Kind::Ad595, Kind::Pt100, Kind::Ad8495, Kind::Max6675];
+    // One machine for each thread.
+    std::thread::scope(|scope| kinds.map(|kind| scope.spawn(move || holds(kind))).map(drop));
+}
+
+fn holds(kind: Kind) {
+    let Some(mut printer) = Printer::new() else { return };
+    printer.kind = kind;
+    let answer = printer.ask(&format!("{{he1k:{}}}", kind as u8));
+    assert!(answer.contains("\"f\":[1,0,"), "{answer}");
+    printer.run(2_000, |_| {});
+    printer.ask("m104 s200");
+    let mut most = 0f64;
+    printer.run(240_000, |printer| most = most.max(printer.hot_end.block));
+    let (mut low, mut high) = (1e9f64, 0f64);
+    printer.run(120_000, |printer| {
+        low = low.min(printer.hot_end.block);
+        high = high.max(printer.hot_end.block);
+    });
+    println!("{kind:?}: at most {most:.2}, then {low:.2} to {high:.2}");
+    assert!(most < 202.0 && low > 199.5 && high < 200.5, "{kind:?}: {most}, {low} to {high}");
 }

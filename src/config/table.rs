@@ -5,7 +5,7 @@
 use super::groups::{axis, motor, system};
 use super::machines;
 use super::name::token;
-use crate::boards::MOTORS;
+use crate::boards::{ACTIVE, MOTORS};
 use crate::units::AXES;
 use crate::{named, progmem};
 
@@ -122,6 +122,12 @@ pub(super) const fn whole(row: Row, max: i32) -> Row {
     let mut row = up_to(row, max).with(RANGE);
     row.stored = 0;
     row
+}
+
+/// The sensor of a heater (0 hot end, 1 bed): a MAX6675 where the board has a pin to select it; on the host, where no board is, always.
+pub(super) const fn sensor(heater: usize) -> Row {
+    let has_max6675 = cfg!(feature = "std") || ACTIVE.has_max6675(heater);
+    whole(cold(0), if has_max6675 { 6 } else { 5 })
 }
 
 /// A length of either sign, in EEPROM.

@@ -47,7 +47,8 @@ pub(super) const PHASE: Text = text!(" [0..1]");
 pub(super) const LEVEL: Text = text!(" [0=active low,1=active high]");
 pub(super) const USER_DATA: Text = text!("user data");
 pub(super) const JOB_ID: Text = text!("job id");
-pub(super) const SENSORS: Text = text!(" [0=none,1=Semitec,2=EPCOS,3=AD595]");
+pub(super) const SENSORS: Text =
+    text!(" [0=none,1=Semitec,2=EPCOS,3=AD595,4=PT100,5=AD8495,6=MAX6675]");
 pub(super) const DEGREES: Text = text!(" C");
 pub(super) const NONE: Text = text!("");
 

@@ -193,6 +193,8 @@ contract! {
         fn begin(heater: u8);
         /// The reading that has been begun last, if it is complete. Thread mode. Cost: 12.
         fn reading() -> Option<u16>;
+        /// What the MAX6675 of a heater sends, where it may have one: its reading. Thread mode. Cost: 500.
+        fn word(heater: u8) -> Option<u16>;
         /// Switches heaters and the fan: bits 0 hot end, 1 bed, 2 fan. Thread mode. Cost: 40.
         fn switch(on: u8);
     }

@@ -12,6 +12,8 @@ use crate::status::Status;
 
 /// Readings that may be missing one after the other.
 const MISSING: u8 = 3;
+/// Looks from one reading of a MAX6675 to the next: 240 ms.
+const ASKED_EVERY: u8 = 6;
 /// How long the hot end and the bed may take for two degrees, seconds.
 const RISE_S: [u16; HEATERS] = [20, 90];
 
@@ -30,6 +32,9 @@ pub struct Heater {
     sum: i32,
     looks: u8,
     missing: u8,
+    /// What a MAX6675 has sent last, and looks until it is asked again.
+    word: u16,
+    rests: u8,
     owed: u8,
     /// How hot it is, 1/64 degree.
     now: i16,
@@ -58,6 +63,8 @@ impl Heater {
         sum: 0,
         looks: 0,
         missing: 0,
+        word: 0,
+        rests: 0,
         owed: 0,
         now: 0,
         on: false,
@@ -69,7 +76,7 @@ impl Heater {
         let degrees = |value: i32| (value * i32::from(UNIT)) as i16;
         let factor = |value: i32| (value / 10) as u16;
         match row {
-            hot_end::K => self.kind = Kind::of(value as u8),
+            hot_end::K => (self.kind, self.rests) = (Kind::of(value as u8), 0),
             hot_end::P => self.factors.p = factor(value),
             hot_end::I => self.factors.i = factor(value),
             hot_end::D => self.factors.d = factor(value),
@@ -115,6 +122,25 @@ impl Heater {
     /// How far it is from what is wanted, 1/64 degree; above 0 if it is too cold.
     pub fn error(&self, to: u16) -> i16 {
         in_units(to).saturating_sub(self.now)
+    }
+
+    /// The reading of its sensor: what the converter has, or of a MAX6675 what `ask` has been sent, each sixth look.
+    pub fn reading(
+        &mut self,
+        converted: Option<u16>,
+        ask: impl FnOnce() -> Option<u16>,
+    ) -> Option<u16> {
+        if self.kind != Kind::Max6675 {
+            return converted;
+        }
+        self.rests = match self.rests {
+            0 => {
+                self.word = ask().unwrap_or(u16::MAX);
+                ASKED_EVERY - 1
+            }
+            rests => rests - 1,
+        };
+        Some(self.word)
     }
 
     /// Takes a reading, `None` if it is not there in time. `number` is 0 for the hot end, `to` what is wanted, eighths of a degree. A fault

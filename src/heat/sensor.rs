@@ -3,7 +3,11 @@
 //! A reading is the sum of [`SAMPLES`] conversions of 10 bits, taken one after the other: noise of the wires makes it finer than one
 //! conversion. A thermistor hangs between pin and ground, with 4,700 ohms from the pin to the supply, as on RAMPS; its table is worked out
 //! when the firmware is built, from its resistance at 25 degrees and its beta. Between two entries, 5 degrees apart, it is a straight line:
-//! 0.15 degrees off at most. An AD595 gives 10 mV a degree. Cost of a reading: 2,500 cycles.
+//! 0.15 degrees off at most. An AD595 gives 10 mV a degree, an AD8495 5 mV. A PT100 has an amplifier (E3D's): ten times what it has of 5 V
+//! behind 4,400 ohms. Cost of a reading: 2,500 cycles.
+//!
+//! A MAX6675 is read over SPI, and its reading is the word that it sends: quarters of a degree from bit 3 on, bit 2 for a thermocouple that is
+//! open. It converts for 220 ms after each reading.
 
 use crate::progmem::Progmem;
 
@@ -25,9 +29,18 @@ pub enum Kind {
     Semitec = 1,
     /// EPCOS B57560G104F: 100,000 ohms, beta 4092.
     Epcos = 2,
-    /// Thermocouple of type K with an AD595.
+    /// Thermocouple of type K with an AD595: 10 mV a degree.
     Ad595 = 3,
+    /// PT100 with E3D's amplifier.
+    Pt100 = 4,
+    /// Thermocouple of type K with an AD8495: 5 mV a degree.
+    Ad8495 = 5,
+    /// Thermocouple of type K with a MAX6675, over SPI.
+    Max6675 = 6,
 }
+
+/// Bits of a MAX6675's word that are 0: its first, that of an open thermocouple, and that of its kind. A line without the chip is high.
+const MAX6675_FAULT: u16 = 1 << 15 | 1 << 2 | 1 << 1;
 
 /// What is wrong with a sensor.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -50,6 +63,8 @@ crate::progmem! {
     /// The reading at each temperature, falling.
     static SEMITEC: [u16; ENTRIES] = thermistor(100_000.0, 4_267.0);
     static EPCOS: [u16; ENTRIES] = thermistor(100_000.0, 4_092.0);
+    /// How far the reading is from the highest.
+    static PT100: [u16; ENTRIES] = pt100();
 }
 
 const _: () = assert!(SAMPLES as u32 * 1_023 <= i16::MAX as u32 + 1);
@@ -70,6 +85,25 @@ const fn thermistor(at_25: f64, beta: f64) -> [u16; ENTRIES] {
         n += 1;
     }
     table
+}
+
+/// The table of a PT100 with its amplifier, by what IEC 60751 says of its resistance.
+const fn pt100() -> [u16; ENTRIES] {
+    let mut table = [0; ENTRIES];
+    let mut n = 0;
+    while n < ENTRIES {
+        let reading =
+            SAMPLES as f64 * (1_024.0 * pt100_share(LOW as f64 + n as f64 * STEP as f64) - 0.5);
+        table[n] = FULL - (reading + 0.5) as u16;
+        n += 1;
+    }
+    table
+}
+
+/// The part of the supply at its amplifier's output.
+const fn pt100_share(degrees: f64) -> f64 {
+    let ohms = 100.0 * (1.0 + degrees * (3.9083e-3 - 5.775e-7 * degrees));
+    10.0 * ohms / (ohms + 4_400.0)
 }
 
 /// The exponential function, for tables that are made when the firmware is built.
@@ -93,6 +127,9 @@ impl Kind {
             1 => Self::Semitec,
             2 => Self::Epcos,
             3 => Self::Ad595,
+            4 => Self::Pt100,
+            5 => Self::Ad8495,
+            6 => Self::Max6675,
             _ => Self::None,
         }
     }
@@ -104,15 +141,34 @@ impl Kind {
             Self::None => Ok(0),
             Self::Semitec => of_table(&SEMITEC, reading),
             Self::Epcos => of_table(&EPCOS, reading),
-            // 500 degrees are all that the converter can read: an amplifier without its thermocouple gives that.
-            Self::Ad595 if reading > FULL - MARGIN => Err(Broken::Open),
-            Self::Ad595 => {
-                // Half of a step, by which each conversion is too little.
-                let product = (u32::from(reading) + u32::from(SAMPLES / 2)) * (500 * UNIT as u32);
-                Ok((product / (u32::from(SAMPLES) * 1_024)) as i16)
+            Self::Pt100 => {
+                of_table(&PT100, FULL.saturating_sub(reading)).map_err(|broken| match broken {
+                    // It rises with the temperature.
+                    Broken::Open => Broken::Short,
+                    Broken::Short => Broken::Open,
+                })
             }
+            Self::Ad595 => of_line(reading, 500),
+            Self::Ad8495 => of_line(reading, 1_000),
+            Self::Max6675 if reading & MAX6675_FAULT != 0 => Err(Broken::Open),
+            // A chip without supply holds the line low.
+            Self::Max6675 if reading >> 3 == 0 => Err(Broken::Short),
+            Self::Max6675 => Ok(((reading >> 3).min(2_047) * 16) as i16),
         }
     }
+}
+
+/// A voltage that is in proportion to the temperature, the supply at `full` degrees. All that can be read is an amplifier without its thermocouple.
+#[inline(never)]
+#[small]
+fn of_line(reading: u16, full: u16) -> Result<i16, Broken> {
+    if reading > FULL - MARGIN {
+        return Err(Broken::Open);
+    }
+    // Half of a step, by which each conversion is too little. 510 degrees are the most that a number holds.
+    let sum = u32::from(reading) + u32::from(SAMPLES / 2);
+    let degrees = sum * (u32::from(full) * UNIT as u32) / (u32::from(SAMPLES) * 1_024);
+    Ok(degrees.min(510 * UNIT as u32) as i16)
 }
 
 /// Looks a reading up in a falling table.
@@ -136,9 +192,12 @@ fn of_table(table: &Progmem<[u16; ENTRIES]>, reading: u16) -> Result<i16, Broken
     Err(Broken::Short)
 }
 
-/// What the converter reads on average at a temperature in degrees, without noise; for tests.
+/// What is read on average at a temperature in degrees, without noise; for tests.
 #[cfg(feature = "std")]
 pub fn reading(kind: Kind, degrees: f64) -> f64 {
+    if kind == Kind::Max6675 {
+        return f64::from((degrees.clamp(0.0, 1_023.75) * 4.0) as u16) * 8.0;
+    }
     (f64::from(SAMPLES) * (1_024.0 * share(kind, degrees) - 0.5)).clamp(0.0, FULL.into())
 }
 
@@ -146,10 +205,12 @@ pub fn reading(kind: Kind, degrees: f64) -> f64 {
 #[cfg(feature = "std")]
 pub fn share(kind: Kind, degrees: f64) -> f64 {
     let beta = match kind {
-        Kind::None => return 1.0,
+        Kind::None | Kind::Max6675 => return 1.0,
         Kind::Semitec => 4_267.0,
         Kind::Epcos => 4_092.0,
         Kind::Ad595 => return (degrees / 500.0).clamp(0.0, 1.0),
+        Kind::Ad8495 => return (degrees / 1_000.0).clamp(0.0, 1.0),
+        Kind::Pt100 => return pt100_share(degrees).clamp(0.0, 1.0),
     };
     let ohms = 100_000.0 * (beta * (1.0 / (degrees + 273.15) - 1.0 / 298.15)).exp();
     ohms / (ohms + PULL_UP)
@@ -159,14 +220,21 @@ pub fn share(kind: Kind, degrees: f64) -> f64 {
 mod tests {
     use super::*;
 
+    const ALL: [Kind; 6] =
+        [Kind::Semitec, Kind::Epcos, Kind::Ad595, Kind::Pt100, Kind::Ad8495, Kind::Max6675];
+
+    fn rises(kind: Kind) -> bool {
+        !matches!(kind, Kind::Semitec | Kind::Epcos)
+    }
+
     #[test]
     fn every_temperature_is_read_within_a_quarter_of_a_degree() {
-        for kind in [Kind::Semitec, Kind::Epcos, Kind::Ad595] {
-            let from = if kind == Kind::Ad595 { 0 } else { -15 };
-            for degrees in from..300 {
+        for kind in ALL {
+            let from = if rises(kind) { 1 } else { -15 };
+            for degrees in from..340 {
                 let reading = reading(kind, degrees.into()).round() as u16;
                 let read = f64::from(kind.temperature(reading).unwrap()) / f64::from(UNIT);
-                assert!((read - f64::from(degrees)).abs() < 0.25, "{kind:?} {degrees}: {read}");
+                assert!((read - f64::from(degrees)).abs() <= 0.25, "{kind:?} {degrees}: {read}");
             }
         }
     }
@@ -178,18 +246,29 @@ mod tests {
             assert_eq!(kind.temperature(0), Err(Broken::Short));
             assert_eq!(kind.temperature(SAMPLES * 5), Err(Broken::Short));
         }
-        assert_eq!(Kind::Ad595.temperature(FULL), Err(Broken::Open));
+        for kind in [Kind::Ad595, Kind::Ad8495, Kind::Pt100] {
+            assert_eq!(kind.temperature(FULL), Err(Broken::Open));
+        }
+        assert_eq!(Kind::Pt100.temperature(0), Err(Broken::Short));
+        let max6675 = |word| Kind::Max6675.temperature(word);
+        let at_25 = reading(Kind::Max6675, 25.0) as u16;
+        assert_eq!(max6675(at_25), Ok(25 * UNIT));
+        // The thermocouple is open; the chip is not there; it has no supply.
+        assert_eq!(max6675(at_25 | 4), Err(Broken::Open));
+        assert_eq!(max6675(u16::MAX), Err(Broken::Open));
+        assert_eq!(max6675(0), Err(Broken::Short));
         assert_eq!(Kind::None.temperature(FULL), Ok(0));
     }
 
     #[test]
     fn any_reading_is_a_temperature_or_a_fault() {
-        for kind in [Kind::Semitec, Kind::Epcos, Kind::Ad595] {
+        for kind in ALL {
             let mut last = None;
-            for reading in 0..=u16::MAX {
+            let step = if kind == Kind::Max6675 { 8 } else { 1 };
+            for reading in (0..=u16::MAX).step_by(step) {
                 let now = kind.temperature(reading);
                 if let (Some(Ok(last)), Ok(now)) = (last, now) {
-                    let falls = kind != Kind::Ad595;
+                    let falls = !rises(kind);
                     assert!(if falls { now <= last } else { now >= last }, "{kind:?} {reading}");
                 }
                 last = Some(now);

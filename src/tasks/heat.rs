@@ -335,15 +335,14 @@ fn look_at(
     reading: Option<u16>,
     orders: &Orders,
 ) -> Result<Seen, Status> {
-    let mut heaters = parts.heaters.borrow_mut();
-    let [hot_end, bed] = &mut *heaters;
+    let mut both = parts.heaters.borrow_mut();
+    let [hot_end, bed] = &mut *both;
     let [first, second] = orders.to;
     let mut tune = parts.tune.borrow_mut();
     let tune = Some(&mut *tune).filter(|_| parts.tuned.get() == number + 1);
-    match number {
-        0 => hot_end.look(number, reading, first, orders.fan, tune),
-        _ => bed.look(number, reading, second, orders.fan, tune),
-    }
+    let (heater, to) = if number == 0 { (hot_end, first) } else { (bed, second) };
+    let reading = heater.reading(reading, || heaters::word(number));
+    heater.look(number, reading, to, orders.fan, tune)
 }
 
 /// Ends an autotune whose heater has been switched off. After the end of one switches the heater off, puts what has been found into the settings if that

@@ -5,9 +5,9 @@ use super::group;
 group! {
     /// The group `he1`, the hot end.
     hot_end: i32, PLAIN => {
-        K "k": whole(cold(0), 3), 1,
+        K "k": sensor(0), 1,
             words(text!("hot end sensor"), SENSORS),
-            "Sensor: 1 thermistor Semitec 104GT-2 (100k, beta 4267), 2 EPCOS B57560G104F (100k, beta 4092), 3 thermocouple K with AD595. With 0 there is no such heater.";
+            "Sensor, see printing.md; 6, a MAX6675, on boards with a pin for it. With 0 there is no such heater.";
         P "p": up_to(cold(2), 600_000), 20_000,
             words(text!("hot end p"), NONE),
             "Power, of 255, for a degree that it is too cold. With 0 it is switched on and off.";
@@ -35,7 +35,7 @@ group! {
 group! {
     /// The group `he3`, the bed.
     bed: i32, PLAIN => {
-        K "k": whole(cold(0), 3), 1,
+        K "k": sensor(1), 1,
             words(text!("bed sensor"), SENSORS),
             "Sensor, as `he1k`.";
         P "p": up_to(cold(2), 600_000), 0,

@@ -33,7 +33,7 @@ pub fn toggle(pin: Pin) {
 }
 
 #[inline(always)]
-fn output(pin: Pin) {
+pub(super) fn output(pin: Pin) {
     let direction = (pin.port.address() - 1) as *mut u8;
     // SAFETY: the data direction register lies one below the port register; thread mode alone writes it.
     unsafe { direction.write_volatile(direction.read_volatile() | 1 << pin.bit) };
@@ -92,6 +92,7 @@ pub fn start() {
             output(driver);
         }
     });
+    super::heaters::start();
 }
 
 /// The motors whose drivers are wanted on, as bits.

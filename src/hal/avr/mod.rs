@@ -26,6 +26,7 @@ pub mod inputs;
 mod mem;
 pub mod panic;
 pub mod pwm;
+mod spi;
 mod step_isr;
 pub mod stepper;
 pub mod text;

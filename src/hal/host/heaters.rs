@@ -4,7 +4,7 @@ use super::Local;
 use crate::heat::sensor::SAMPLES;
 
 machine_static! {
-    fn readings() -> Local<[u16; 2]> = Local::new([SAMPLES * 1_023; 2]);
+    fn readings() -> Local<[Option<u16>; 2]> = Local::new([None; 2]);
 }
 
 machine_static! {
@@ -20,9 +20,14 @@ pub fn begin(heater: u8) {
     begun().set(heater);
 }
 
-/// The reading that has been begun last.
+/// The reading that has been begun last; the highest if no sensor is there.
 pub fn reading() -> Option<u16> {
-    readings().get().get(usize::from(begun().get())).copied()
+    Some(word(begun().get()).unwrap_or(SAMPLES * 1_023))
+}
+
+/// What a heater's MAX6675 sends, if one is there.
+pub fn word(heater: u8) -> Option<u16> {
+    readings().get().get(usize::from(heater)).copied().flatten()
 }
 
 /// Switches heaters and the fan: bits 0 hot end, 1 bed, 2 fan.
@@ -34,7 +39,7 @@ pub fn switch(on: u8) {
 pub fn set(heater: usize, reading: u16) {
     let mut all = readings().get();
     if let Some(place) = all.get_mut(heater) {
-        *place = reading;
+        *place = Some(reading);
     }
     readings().set(all);
 }

@@ -57,6 +57,11 @@ pub fn reading() -> Option<u16> {
     Some(READING.load(Ordering::Relaxed)).filter(|reading| *reading != NONE)
 }
 
+/// What a heater's MAX6675 sends: these boards have none.
+pub fn word(_: u8) -> Option<u16> {
+    None
+}
+
 /// Switches heaters and the fan: bits 0 hot end, 1 bed, 2 fan. Thread mode.
 pub fn switch(on: u8) {
     let Some(Heaters { heaters: [hot_end, bed], fan }) = ACTIVE.heaters else { return };

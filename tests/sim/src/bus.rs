@@ -12,6 +12,7 @@ use crate::eeprom::Eeprom;
 use crate::mechanics::Mechanics;
 use crate::pins::PinInterrupts;
 use crate::recorder::{Recorder, Sums};
+use crate::spi::Spi;
 use crate::timer::Timer;
 use crate::uart::{OFFSETS, Uart};
 use crate::wire::Wire;
@@ -24,6 +25,7 @@ enum Owner {
     Uart(usize),
     Eeprom,
     Pins,
+    Spi,
 }
 
 /// First address after the I/O registers.
@@ -42,6 +44,7 @@ pub struct Bus {
     /// A line for each serial port of the board, and the USART it leads to.
     pub(crate) wires: Vec<(usize, Wire)>,
     pins: PinInterrupts,
+    pub(crate) spi: Spi,
     pub(crate) recorder: Recorder,
     pub(crate) mechanics: Option<Box<Mechanics>>,
     /// When the temperatures are worked out next, and how many cycles after that again; never without heaters.
@@ -81,6 +84,7 @@ impl Bus {
             eeprom: Eeprom::new(),
             wires,
             pins: PinInterrupts::new(&chip.pins),
+            spi: Spi::new(),
             recorder: Recorder::new(),
             mechanics: None,
             heat_due: u64::MAX,
@@ -114,6 +118,7 @@ impl Bus {
         self.timers = self.chip.timers.iter().map(Timer::new).collect();
         self.uarts = self.chip.usarts.iter().copied().map(Uart::new).collect();
         self.eeprom.reset();
+        self.spi.reset();
         self.pins = PinInterrupts::new(&self.chip.pins);
         self.recorder.pins_released();
         self.pending = 0;
@@ -274,6 +279,7 @@ impl Bus {
                 self.pins.write(addr, value);
                 self.update_pins(now);
             }
+            Owner::Spi => self.spi.write(addr, value, now, self.cpu),
             Owner::Nobody => {}
         }
         self.refresh_due();
@@ -295,6 +301,7 @@ impl Bus {
             }
             Owner::Eeprom => self.eeprom.read(addr, now),
             Owner::Pins => Some(self.pins.read(addr)),
+            Owner::Spi => Some(self.spi.read(addr, now)),
             Owner::Nobody => None,
         };
         self.refresh_due();
@@ -328,6 +335,9 @@ fn owners(chip: &Chip) -> [Owner; IO_END] {
     }
     for addr in chip.pins.registers() {
         owners[usize::from(addr)] = Owner::Pins;
+    }
+    for addr in Spi::REGISTERS {
+        owners[usize::from(addr)] = Owner::Spi;
     }
     for addr in Eeprom::REGISTERS {
         owners[usize::from(addr)] = Owner::Eeprom;

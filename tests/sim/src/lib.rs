@@ -31,6 +31,7 @@ mod pulses;
 mod recorder;
 pub mod report;
 mod runs;
+pub mod spi;
 mod stopwatch;
 mod summary;
 pub mod thermal;

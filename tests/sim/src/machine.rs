@@ -17,6 +17,7 @@ use crate::image::Image;
 use crate::mechanics::{Build, Mechanics};
 use crate::meters::{Meters, Window};
 use crate::recorder::{self, Probe, Recorder};
+use crate::spi::Max6675;
 use crate::stopwatch::Stopwatch;
 use crate::thermal::{EVERY_MS, Thermal};
 use crate::timer::COMPARE;
@@ -529,6 +530,18 @@ impl Machine {
         let bus = self.bus_mut();
         (bus.heat_every, bus.heat_due) = (every, due);
         bus.refresh_due();
+    }
+
+    /// Puts a MAX6675 on SPI, selected by a pin, best before the first instruction.
+    pub fn build_max6675(&mut self, select: Pin) {
+        let clock_hz = self.clock_hz;
+        self.bus_mut().spi.add_max6675(select, clock_hz);
+        self.probes.push(recorder::attach_select(self.bus, self.cpu, select));
+    }
+
+    /// The MAX6675 that a pin selects, if there is one.
+    pub fn max6675(&mut self, select: Pin) -> Option<&mut Max6675> {
+        self.bus_mut().spi.max6675(select)
     }
 
     /// The heaters at the board's pins, if there are any.

@@ -266,6 +266,8 @@ enum What {
     Step(usize),
     Dir(usize),
     Spindle(SpindlePin),
+    /// Selects something on SPI.
+    Select(Pin),
 }
 
 /// Listens to the motors' pins of a board. The probes must live as long as the CPU.
@@ -287,6 +289,11 @@ pub(crate) fn attach_spindle(
         [(enable, SpindlePin::Enable), (reverse, SpindlePin::Reverse), (pulse, SpindlePin::Pulse)];
     let pins = pins.into_iter().filter_map(|(pin, what)| Some((pin?, What::Spindle(what))));
     watch(bus, cpu, &pins.collect::<Vec<_>>())
+}
+
+/// Listens to a pin that selects something on SPI. As `attach`.
+pub(crate) fn attach_select(bus: NonNull<Bus>, cpu: Cpu, pin: Pin) -> Vec<Probe> {
+    watch(bus, cpu, &[(pin, What::Select(pin))])
 }
 
 fn watch(bus: NonNull<Bus>, cpu: Cpu, pins: &[(Pin, What)]) -> Vec<Probe> {
@@ -316,6 +323,7 @@ unsafe extern "C" fn pin_changed(_: *mut ffi::avr_irq_t, value: u32, param: *mut
             }
         }
         What::Dir(motor) => bus.recorder.dir_edge(motor, high, now),
+        What::Select(pin) => bus.spi.select(pin, high, now),
         What::Spindle(pin) => {
             if let Some(mechanics) = &mut bus.mechanics {
                 mechanics.spindle(pin, high, now);

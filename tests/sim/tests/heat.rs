@@ -5,7 +5,7 @@ mod common;
 mod plant;
 
 use common::{booted, set};
-use kerf::boards::{Heater, Heaters, RAMPS14};
+use kerf::boards::{Heater, Heaters, Pin, RAMPS14};
 use kerf::heat::sensor::{Kind, share};
 use kerf_sim::{Host, Machine};
 use plant::Plant;
@@ -13,6 +13,11 @@ use plant::Plant;
 /// The board's heaters.
 fn heaters() -> Heaters {
     RAMPS14.heaters.expect("RAMPS has heaters")
+}
+
+/// What selects the hot end's MAX6675.
+fn select() -> Pin {
+    heaters().heaters[0].select.expect("RAMPS has a pin for it")
 }
 
 /// A printer on the chip.
@@ -24,13 +29,17 @@ struct Printer {
     noise: u32,
     /// What a wire that is off, or shorted, makes of the hot end's sensor.
     broken: Option<u32>,
+    /// Its sensor is a MAX6675.
+    digital: bool,
 }
 
 impl Printer {
     fn new() -> Self {
-        let (machine, host) = booted(&RAMPS14);
+        let (mut machine, host) = booted(&RAMPS14);
+        machine.build_max6675(select());
         let (hot_end, bed) = (Plant::hot_end(), Plant::bed());
-        let mut printer = Self { machine, host, hot_end, bed, noise: 1, broken: None };
+        let mut printer =
+            Self { machine, host, hot_end, bed, noise: 1, broken: None, digital: false };
         printer.run(500, |_| {});
         printer
     }
@@ -55,6 +64,9 @@ impl Printer {
             self.bed.pass(0.001, self.is_on(bed), fan);
             let read = self.millivolts(self.hot_end.sensor);
             self.machine.set_millivolts(hot_end.channel, self.broken.unwrap_or(read));
+            if let Some(chip) = self.machine.max6675(select()).filter(|_| self.digital) {
+                chip.degrees = self.broken.is_none().then_some(self.hot_end.sensor);
+            }
             let read = self.millivolts(self.bed.sensor);
             self.machine.set_millivolts(bed.channel, read);
             self.host.run_for_ms(&mut self.machine, 1).unwrap();
@@ -201,4 +213,46 @@ fn cold_filament_is_not_moved() {
     // A rotary axis on a board without a hot end.
     printer.ask("{he1k:0}");
     assert_eq!(status(&mut printer, "g1 x1 a2 f1000"), 0);
+}
+
+/// A MAX6675 takes 220 ms for a reading, and is asked each 240: no reading is spoilt, and an open thermocouple is seen with the second.
+#[test]
+fn a_thermocouple_over_spi_is_read_and_its_break_is_seen() {
+    let mut printer = Printer::new();
+    printer.digital = true;
+    printer.ask("{he1k:6}");
+    for degrees in [22.0, 41.0, 60.0] {
+        (printer.hot_end.block, printer.hot_end.sensor) = (degrees, degrees);
+        printer.run(700, |_| {});
+        let (is, wanted) = (printer.value("he1t"), printer.hot_end.sensor);
+        assert!((is - wanted).abs() < 1.5, "{is}, not {wanted}");
+    }
+    let chip = printer.machine.max6675(select()).expect("it is there");
+    assert!(chip.read >= 6 && chip.spoilt == 0, "{} read, {} spoilt", chip.read, chip.spoilt);
+    for line in ["{sv:0}", "{xvm:30000}", "{xfr:30000}", "m104 s200"] {
+        printer.ask(line);
+    }
+    printer.host.send(&mut printer.machine, 1, "g1 x1000 y300 f20000");
+    printer.run(2_000, |_| {});
+    assert!(printer.is_on(heaters().heaters[0]));
+    let ms = printer.off_after(5_000);
+    println!("off after {ms} ms");
+    assert!(ms <= 500, "off after {ms} ms");
+    let told = printer.host.take_reports();
+    assert!(told.iter().any(|report| report["er"]["st"] == 48), "{told:?}");
+    assert_eq!(printer.value("stv"), 0.0);
+}
+
+/// Where no chip is, the line is high.
+#[test]
+fn a_missing_thermocouple_does_not_heat() {
+    let mut printer = Printer::new();
+    printer.ask("{he1k:6}");
+    printer.machine.max6675(select()).expect("it is there").unplug();
+    printer.run(500, |_| {});
+    printer.ask("m104 s200");
+    printer.run(500, |_| {});
+    assert!(!printer.is_on(heaters().heaters[0]));
+    let told = printer.host.take_reports();
+    assert!(told.iter().any(|report| report["er"]["st"] == 48), "{told:?}");
 }
