@@ -30,6 +30,17 @@ pub use skr_pico::SKR_PICO;
 /// Motors that the board of this image drives.
 pub const MOTORS: usize = ACTIVE.motors.len();
 
+/// The timer of the looks at the switches, on the ATmega2560. Of a printer timer 2 drives heaters.
+pub const LOOKS: Timer = if cfg!(feature = "printer") { Timer::T3 } else { Timer::T2 };
+
+/// Whether the chip itself makes the pulses of the hot end, the bed and the fan: those on pins of timer 2.
+pub const PULSED: [bool; 3] = match ACTIVE.heaters {
+    Some(Heaters { heaters: [hot_end, bed], fan }) => {
+        [hot_end.pin.channel().is_some(), bed.pin.channel().is_some(), fan.channel().is_some()]
+    }
+    None => [false; 3],
+};
+
 /// Most motors of a board that an image can be built for.
 const MOST_MOTORS: usize = 6;
 
@@ -168,6 +179,15 @@ impl Pin {
     /// Whether it is the same pin.
     pub const fn is(self, other: Pin) -> bool {
         self.port as u8 == other.port as u8 && self.bit == other.bit
+    }
+
+    /// The output of timer 2 that it is: 0 for A, 1 for B (ATmega2560 data sheet, pin configurations).
+    pub const fn channel(self) -> Option<u8> {
+        match (self.port, self.bit) {
+            (Port::B, 4) => Some(0),
+            (Port::H, 6) => Some(1),
+            _ => None,
+        }
     }
 
     /// The interrupt that an edge on it raises; `None` on ports A, C, F, G, H, L and some pins more.

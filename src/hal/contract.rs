@@ -195,8 +195,9 @@ contract! {
         fn reading() -> Option<u16>;
         /// What the MAX6675 of a heater sends, where it may have one: its reading. Thread mode. Cost: 500.
         fn word(heater: u8) -> Option<u16>;
-        /// Switches heaters and the fan: bits 0 hot end, 1 bed, 2 fan. Thread mode. Cost: 40.
-        fn switch(on: u8);
+        /// Gives the hot end, the bed and the fan their power, 255 for all: pulses where [`PULSED`](crate::boards::PULSED) says so, elsewhere
+        /// on or, with 0, off. Thread mode. Cost: 60.
+        fn drive(power: [u8; 3]);
     }
 
     /// The count of milliseconds.

@@ -123,6 +123,16 @@ impl Control {
     }
 }
 
+/// The power of a pin until the next look: what is asked for where the chip makes pulses of it, else all or nothing, [spread].
+#[small]
+pub fn level(pulsed: bool, owed: &mut u8, power: u8) -> u8 {
+    match pulsed {
+        true => power,
+        false if spread(owed, power) => FULL,
+        false => 0,
+    }
+}
+
 /// Spreads power over looks: on so often that it is on for its share of the time.
 #[small]
 pub fn spread(owed: &mut u8, power: u8) -> bool {

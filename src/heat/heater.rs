@@ -2,11 +2,12 @@
 //!
 //! Looked at each 40 ms; five looks make a [step](super::control), of their mean. Cost of a look: 3,000 cycles, of one with a step 6,000.
 
-use super::control::{Control, Factors, STEPS, spread};
+use super::control::{Control, Factors, STEPS, level};
 use super::fault::{Rule, Watch};
 use super::sensor::{Broken, Kind, UNIT};
 use super::tune::Tune;
 use super::{HEATERS, Standing};
+use crate::boards::PULSED;
 use crate::config::groups::hot_end;
 use crate::status::Status;
 
@@ -38,7 +39,7 @@ pub struct Heater {
     owed: u8,
     /// How hot it is, 1/64 degree.
     now: i16,
-    on: bool,
+    level: u8,
 }
 
 /// What a look has found.
@@ -67,7 +68,7 @@ impl Heater {
         rests: 0,
         owed: 0,
         now: 0,
-        on: false,
+        level: 0,
     };
 
     /// Takes over the value of a setting, scaled as kept: a row of the hot end, with which those of the bed agree.
@@ -103,14 +104,14 @@ impl Heater {
         self.kind != Kind::None && self.now < self.least.saturating_sub(by)
     }
 
-    /// Whether it is on until the next look.
-    pub fn is_on(&self) -> bool {
-        self.on
+    /// The power of its pin until the next look, 255 for all.
+    pub fn level(&self) -> u8 {
+        self.level
     }
 
     /// Off at once.
     pub fn stop(&mut self) {
-        self.on = false;
+        self.level = 0;
         self.control.stop(self.now);
     }
 
@@ -159,9 +160,12 @@ impl Heater {
             None => Ok(Seen::Look),
             Some(mean) => self.step(number, mean, wanted, fan, tune).map(|()| Seen::Step),
         });
-        self.on = seen.is_ok() && wanted != 0 && spread(&mut self.owed, self.control.power());
         if seen.is_err() {
             self.stop();
+        } else {
+            let power = if wanted == 0 { 0 } else { self.control.power() };
+            let pulsed = PULSED.get(usize::from(number)) == Some(&true);
+            self.level = level(pulsed, &mut self.owed, power);
         }
         seen
     }

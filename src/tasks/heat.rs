@@ -2,7 +2,7 @@
 //!
 //! Owns the converter, the pins of heaters and fan, and [`Heaters`]. Reads what exec has been told by lines ([`Orders`] in `tasks::common`).
 //! Each turn, 20 ms, takes the reading of one heater and begins that of the other; so each has one in 40 ms, and a step of its control in
-//! 200. Heaters are switched at these turns alone: power is spread over them. The power task feeds the watchdog in the same turn: if it
+//! 200. Heaters are driven at these turns alone: their power is that of pulses which the chip makes ([`PULSED`]), or it is spread over the turns. The power task feeds the watchdog in the same turn: if it
 //! gets none, the chip resets in half a second with its heaters off.
 //!
 //! An autotune ([`tune`](crate::heat::tune)) is a wait: the lines behind it wait for its end, which M108, a flush or an alarm make.
@@ -23,6 +23,7 @@ use super::common;
 use super::links::Links;
 use super::setup::moved_by;
 use super::storage::Storage;
+use crate::boards::PULSED;
 use crate::capability::Capability;
 use crate::config::groups::hot_end;
 use crate::config::{Owner, Setting, Settings};
@@ -31,6 +32,7 @@ use crate::gcode::printing::EXTRUDER;
 use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::{flags, heaters};
+use crate::heat::control::{FULL, level};
 use crate::heat::heater::{Heater, Seen, in_units};
 use crate::heat::sensor::UNIT;
 use crate::heat::tune::{Found, Stage, Tune};
@@ -96,17 +98,18 @@ impl Parts {
         }
     }
 
-    /// Whether the fan is on until the next turn.
-    fn turn_fan(&self, speed: u8) -> bool {
+    /// The power of the fan's pin until the next turn.
+    fn turn_fan(&self, speed: u8) -> u8 {
         if speed == 0 {
             self.kick.set(KICK);
-            return false;
+            return 0;
         }
         let (left, mut owed) = (self.kick.get(), self.owed.get());
         self.kick.set(left.saturating_sub(1));
-        let on = crate::heat::control::spread(&mut owed, speed);
+        let [_, _, pulsed] = PULSED;
+        let power = level(pulsed, &mut owed, speed);
         self.owed.set(owed);
-        on || left > 0
+        if left > 0 { FULL } else { power }
     }
 
     /// Whether what is waited for has come.
@@ -228,7 +231,7 @@ pub fn stop(links: &Links) {
         return;
     }
     forget_orders(links.thread);
-    heaters::switch(0);
+    heaters::drive([0; 3]);
     if let Some(parts) = links.heat.parts.first() {
         for heater in parts.heaters.borrow_mut().iter_mut() {
             heater.stop();
@@ -306,11 +309,9 @@ pub fn look(links: &Links) {
     let reading = heaters::reading();
     heaters::begin(parts.next.get());
     let seen = look_at(parts, number, reading, &orders);
-    let mut on = if parts.turn_fan(orders.fan) { 4 } else { 0 };
-    for (bit, heater) in [1, 2].into_iter().zip(parts.heaters.borrow().iter()) {
-        on |= if heater.is_on() { bit } else { 0 };
-    }
-    heaters::switch(on);
+    let fan = parts.turn_fan(orders.fan);
+    let [hot_end, bed] = parts.heaters.borrow().each_ref().map(Heater::level);
+    heaters::drive([hot_end, bed, fan]);
     parts.end_idle_wait(&orders);
     if parts.tuned.get() != 0 {
         see_to_tune(links, parts, &orders);

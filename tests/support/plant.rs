@@ -52,11 +52,11 @@ impl Plant {
         }
     }
 
-    /// Time passes with the heater on or off, and the fan.
-    pub fn pass(&mut self, seconds: f64, on: bool, fan: bool) {
-        let watts = if on { self.watts } else { 0.0 };
+    /// Time passes with some part of the heater's power, or with it on or off, and of the fan's.
+    pub fn pass(&mut self, seconds: f64, power: impl Into<f64>, fan: impl Into<f64>) {
+        let watts = self.watts * power.into();
         self.heater += (watts - self.heater) * seconds / self.delay[0];
-        let loss = self.loss + if fan { self.fan } else { 0.0 };
+        let loss = self.loss + self.fan * fan.into();
         self.block += (self.heater - loss * (self.block - AIR)) * seconds / self.capacity;
         self.sensor += (self.block - self.sensor) * seconds / self.delay[1];
     }

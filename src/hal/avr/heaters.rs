@@ -9,13 +9,16 @@
 //! | ADC | adds a conversion, and starts the next | 60, interrupts off for 12 and 22 |
 //!
 //! A reading each 20 ms is 0.6 % of the CPU. RAM: 3 bytes.
+//!
+//! What hangs at an output of timer 2 (D10 and D9) has pulses of that timer, 122 a second, up and down (mode 1): a power of 0 has no pulse,
+//! one of 255 no gap. Its interrupts are off.
 
 #[cfg(feature = "printer")]
 use core::arch::asm;
 use core::cell::UnsafeCell;
 
 use super::{gpio, spi};
-use crate::boards::{ACTIVE, Heaters};
+use crate::boards::{ACTIVE, Heaters, PULSED, Pin};
 use crate::heat::sensor::SAMPLES;
 
 const ADCSRA: *mut u8 = 0x7A as *mut u8;
@@ -25,6 +28,16 @@ const ADMUX: *mut u8 = 0x7C as *mut u8;
 const START: u8 = 1 << 7 | 1 << 6 | 1 << 3 | 0b111;
 /// Against the supply, as the sensors are.
 const SUPPLY: u8 = 1 << 6;
+
+const TCCR2A: *mut u8 = 0xB0 as *mut u8;
+const TCCR2B: *mut u8 = 0xB1 as *mut u8;
+const OCR2: [*mut u8; 2] = [0xB3 as *mut u8, 0xB4 as *mut u8];
+/// Mode 1: up to 255 and down again.
+const UP_AND_DOWN: u8 = 1;
+/// A count each 256 cycles.
+const PACE: u8 = 0b110;
+/// Whether timer 2 drives anything.
+const HAS_PULSES: bool = cfg!(feature = "printer") && (PULSED[0] || PULSED[1] || PULSED[2]);
 
 /// What the interrupt adds up, and how many conversions are left.
 #[repr(C)]
@@ -139,7 +152,7 @@ fn ask(select: impl Fn(bool)) -> u16 {
     word
 }
 
-/// Makes outputs of what selects sensors. Start-up.
+/// Makes outputs of what selects sensors, and has timer 2 run. Start-up.
 pub fn start() {
     let Some(Heaters { heaters: [hot_end, bed], .. }) = ACTIVE.heaters else { return };
     for select in [hot_end.select, bed.select].into_iter().flatten() {
@@ -147,13 +160,45 @@ pub fn start() {
         gpio::output(select);
     }
     spi::start();
+    if HAS_PULSES {
+        // SAFETY: the registers of the timer are this module's.
+        unsafe {
+            TCCR2A.write_volatile(UP_AND_DOWN);
+            TCCR2B.write_volatile(PACE);
+        }
+    }
 }
 
-/// Switches heaters and the fan: bits 0 hot end, 1 bed, 2 fan. Thread mode.
-pub fn switch(on: u8) {
+/// Gives the hot end, the bed and the fan their power, 255 for all: pulses where [`PULSED`] says so, elsewhere on or, with 0, off. Thread mode.
+pub fn drive(power: [u8; 3]) {
     let Some(heaters) = ACTIVE.heaters else { return };
     let [hot_end, bed] = heaters.heaters;
-    gpio::set(hot_end.pin, on & 1 != 0);
-    gpio::set(bed.pin, on & 2 != 0);
-    gpio::set(heaters.fan, on & 4 != 0);
+    let [of_hot_end, of_bed, of_fan] = power;
+    drive_pin(hot_end.pin, of_hot_end);
+    drive_pin(bed.pin, of_bed);
+    drive_pin(heaters.fan, of_fan);
+}
+
+/// The timer drives its pin while it is connected to it. The port's bit stays low, so that the pin is low whenever it is not.
+#[inline(always)]
+fn drive_pin(pin: Pin, power: u8) {
+    let Some(channel) = pin.channel().filter(|_| HAS_PULSES) else {
+        return gpio::set(pin, power != 0);
+    };
+    let connected = 1 << (7 - 2 * channel);
+    // SAFETY: the registers of the timer are this module's; what stops it for good, with interrupts off, does not come back.
+    unsafe {
+        OCR2[usize::from(channel)].write_volatile(power);
+        let others = TCCR2A.read_volatile() & !connected;
+        TCCR2A.write_volatile(if power == 0 { others } else { others | connected });
+    }
+}
+
+/// Disconnects the pins of heaters, which are low from then on. For the panic handler.
+#[small]
+pub fn kill() {
+    if HAS_PULSES {
+        // SAFETY: a single store; the machine stops for good.
+        unsafe { TCCR2A.write_volatile(0) };
+    }
 }

@@ -2,8 +2,10 @@
 //!
 //! | interrupt | does | cycles |
 //! |---|---|---|
-//! | INT0 to INT7, PCINT0 to PCINT2 (`edges`) | starts timer 2: someone has to look | 20, interrupts off |
-//! | TIMER2_COMPA | looks at all pins, as [`Switches`] wants it | 300, interrupts off for 26 and 26 |
+//! | INT0 to INT7, PCINT0 to PCINT2 (`edges`) | starts the timer of the looks: someone has to look | 20, interrupts off |
+//! | TIMER2_COMPA, of printers TIMER3_COMPA | looks at all pins, as [`Switches`] wants it | 300, interrupts off for 26 and 26 |
+//!
+//! The timer is timer 2, in an image that can print timer 3: timer 2 makes pulses for heaters then ([`heaters`](super::heaters)).
 //!
 //! While no switch moves none of them comes. The look lets all interrupts in but itself and exec, which would run
 //! far too long inside it. Where a limit is hit it stops the steps right there: 20 us after the edge and its own
@@ -17,30 +19,57 @@ use core::cell::UnsafeCell;
 use avr_embassy::assembly;
 
 use super::{flags, stepper};
-use crate::boards::{ACTIVE, Interrupt, Timer, inputs};
+use crate::boards::{ACTIVE, Interrupt, LOOKS, inputs};
 use crate::dda::contact;
 use crate::hal::event::Event;
 use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
 
-const _: () = assert!(
-    !matches!(ACTIVE.step_timer, Timer::T2) && !matches!(ACTIVE.tick_timer, Timer::T2),
-    "the looks at the switches are on timer 2"
-);
+const _: () = {
+    let looks = LOOKS as u8;
+    assert!(
+        ACTIVE.step_timer as u8 != looks && ACTIVE.tick_timer as u8 != looks,
+        "the timer of the looks at the switches is used twice"
+    );
+    if let Some(pwm) = ACTIVE.pwm {
+        assert!(pwm.timer as u8 != looks, "the timer of the looks at the switches is used twice");
+    }
+};
 
 const EICRA: *mut u8 = 0x69 as *mut u8;
 const EICRB: *mut u8 = 0x6A as *mut u8;
 const EIMSK: *mut u8 = 0x3D as *mut u8;
 const PCICR: *mut u8 = 0x68 as *mut u8;
 const PCMSK: [*mut u8; 3] = [0x6B as *mut u8, 0x6C as *mut u8, 0x6D as *mut u8];
-const TCCR2A: *mut u8 = 0xB0 as *mut u8;
-const TCCR2B: *mut u8 = 0xB1 as *mut u8;
-const TCNT2: *mut u8 = 0xB2 as *mut u8;
-const OCR2A: *mut u8 = 0xB3 as *mut u8;
-const TIMSK2: *mut u8 = 0x70 as *mut u8;
-/// Clear on compare match; a count each 8 cycles.
-const CTC: u8 = 1 << 1;
-pub(super) const RUN: u8 = 1 << 1;
-const OCIE2A: u8 = 1 << 1;
+/// Timer 2 has 8 bits, timer 3 has 16; what is written to a count fits 8.
+#[cfg(not(feature = "printer"))]
+mod timer {
+    pub const CONTROL_A: *mut u8 = 0xB0 as *mut u8;
+    pub const CONTROL_B: *mut u8 = 0xB1 as *mut u8;
+    pub const COUNT: *mut u8 = 0xB2 as *mut u8;
+    pub const COMPARE: *mut u8 = 0xB3 as *mut u8;
+    pub const MASK: usize = 0x70;
+    /// Clear on compare match, in each of the two; a count each 8 cycles.
+    pub const CTC: u8 = 1 << 1;
+    pub const RUN: u8 = 1 << 1;
+}
+#[cfg(feature = "printer")]
+mod timer {
+    pub const CONTROL_A: *mut u8 = 0x90 as *mut u8;
+    pub const CONTROL_B: *mut u8 = 0x91 as *mut u8;
+    pub const COUNT: *mut u16 = 0x94 as *mut u16;
+    pub const COMPARE: *mut u16 = 0x98 as *mut u16;
+    pub const MASK: usize = 0x71;
+    /// See the other.
+    pub const CTC: u8 = 0;
+    pub const RUN: u8 = 1 << 3 | 1 << 1;
+}
+use timer::{COMPARE, CONTROL_A, CONTROL_B, COUNT, CTC, MASK, RUN};
+
+/// What starts the timer: the address, and the value.
+pub(super) const START: usize = if cfg!(feature = "printer") { 0x91 } else { 0xB1 };
+pub(super) const STARTED: u8 = RUN;
+/// The interrupt at the compare value.
+const OCIE: u8 = 1 << 1;
 
 /// The last count of a period of `us` microseconds.
 const fn top(us: u32) -> u8 {
@@ -152,10 +181,10 @@ pub fn start() {
             register.write_volatile(mask);
         }
         PCICR.write_volatile(0b111);
-        TCCR2A.write_volatile(CTC);
-        OCR2A.write_volatile(top(LATER_US));
-        TIMSK2.write_volatile(OCIE2A);
-        TCCR2B.write_volatile(RUN);
+        CONTROL_A.write_volatile(CTC);
+        COMPARE.write_volatile(top(LATER_US).into());
+        (MASK as *mut u8).write_volatile(OCIE);
+        CONTROL_B.write_volatile(RUN);
     }
 }
 
@@ -170,7 +199,7 @@ pub fn set_up(low: u16, stops: u16) {
         if state.low != low {
             (state.low, state.fresh) = (low, true);
             // SAFETY: starts a look; one that is due does it all the same.
-            unsafe { TCCR2B.write_volatile(RUN) };
+            unsafe { CONTROL_B.write_volatile(RUN) };
         }
     });
 }
@@ -180,7 +209,7 @@ pub(super) fn leave_out(inputs: u16) {
     with(|state| {
         (state.used, state.fresh) = (!inputs, true);
         // SAFETY: starts a look; one that is due does it all the same.
-        unsafe { TCCR2B.write_volatile(RUN) };
+        unsafe { CONTROL_B.write_volatile(RUN) };
     });
 }
 
@@ -232,8 +261,8 @@ fn levels() -> u16 {
 fn wait() {
     // SAFETY: the timer is this interrupt's; it counts from 0 since it was due.
     unsafe {
-        OCR2A.write_volatile(u8::MAX);
-        while TCNT2.read_volatile() < top(SOON_US) {}
+        COMPARE.write_volatile(u8::MAX.into());
+        while COUNT.read_volatile() < top(SOON_US).into() {}
     }
 }
 
@@ -284,7 +313,7 @@ extern "C" fn look() {
     // An edge before the timer stood still has started nothing.
     if next == Next::Edge && state.found() != now {
         // SAFETY: starts a look.
-        unsafe { TCCR2B.write_volatile(RUN) };
+        unsafe { CONTROL_B.write_volatile(RUN) };
     }
 }
 
@@ -293,21 +322,23 @@ fn plan(next: Next) {
     // SAFETY: these registers are the look's, but for starts.
     unsafe {
         if next == Next::Edge {
-            TCCR2B.write_volatile(0);
+            CONTROL_B.write_volatile(0);
         }
         // In this order: a count that is past its top already would go all the way round.
-        OCR2A.write_volatile(match next {
+        let top = match next {
             Next::Edge => top(FIRST_US),
             Next::Soon => top(SOON_US),
             Next::Later => top(LATER_US),
-        });
-        TCNT2.write_volatile(0);
+        };
+        COMPARE.write_volatile(top.into());
+        COUNT.write_volatile(0);
     }
 }
 
-/// TIMER2_COMPA: runs a look, with interrupts on and exec held off.
-#[unsafe(no_mangle)]
-extern "C" fn __vector_13() -> ! {
+/// TIMER2_COMPA or TIMER3_COMPA: runs a look, with interrupts on and exec held off.
+#[cfg_attr(not(feature = "printer"), unsafe(export_name = "__vector_13"))]
+#[cfg_attr(feature = "printer", unsafe(export_name = "__vector_32"))]
+extern "C" fn look_is_due() -> ! {
     // SAFETY: it restores what it changes and what a called function may change, and returns by
     // `reti`. Its own source is off, so it does not nest. What it does to `CLOSED` is what `exec::lock`
     // does, and nothing where that is closed already.
@@ -318,7 +349,7 @@ extern "C" fn __vector_13() -> ! {
             "in   r24, 0x3F",
             "push r24",
             "ldi  r24, 0",
-            "sts  0x70, r24",
+            "sts  {mask}, r24",
             "lds  r25, {closed}",
             "ldi  r24, 1",
             "sts  {closed}, r24",
@@ -357,7 +388,7 @@ extern "C" fn __vector_13() -> ! {
             "tst  r25",
             "brne 1f",
             "cli",
-            "sts  0x70, r24",
+            "sts  {mask}, r24",
             "sts  {closed}, r25",
             "lds  r24, {missed}",
             "tst  r24",
@@ -374,14 +405,15 @@ extern "C" fn __vector_13() -> ! {
             // As it was: the tick counts it up while exec runs.
             "1:",
             "cli",
-            "sts  0x70, r24",
+            "sts  {mask}, r24",
             "sts  {closed}, r25",
             "rjmp 2b",
             closed = sym assembly::CLOSED,
             missed = sym assembly::MISSED,
             pend = const assembly::PEND,
             pended = const assembly::PENDED,
-            unmask = const OCIE2A,
+            mask = const MASK,
+            unmask = const OCIE,
             look = sym look,
             options(noreturn),
         );

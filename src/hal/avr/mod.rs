@@ -5,7 +5,7 @@
 //! | TIMER1_COMPA | `step_isr` | 0 | one tick of the step generator |
 //! | USART0_RX, USART0_UDRE | `uart` | 1 | bytes between the line and the rings |
 //! | TIMER0_COMPA | [`avr_embassy::time`] | 1 | counts milliseconds |
-//! | INT, PCINT, TIMER2_COMPA | `edges`, `inputs` | 1 | looks at the switches when one moves |
+//! | INT, PCINT, TIMER2_COMPA or TIMER3_COMPA | `edges`, `inputs` | 1 | looks at the switches when one moves |
 //! | INT, PCINT of the encoder's pins | `edges`, `encoder` | 1 | takes the time of a pulse |
 //! | ADC | `heaters` | 1 | adds up a reading of a temperature |
 //! | WDT | `watchdog` | 0 | resets a machine that has got stuck |

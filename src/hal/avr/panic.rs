@@ -18,6 +18,7 @@ pub fn halt() -> ! {
 pub fn make_safe() {
     super::stepper::kill();
     super::pwm::kill();
+    super::heaters::kill();
     each!(ACTIVE.hazards, hazard => gpio::low(hazard));
     gpio::stop_spindle();
     gpio::power(0);

@@ -30,9 +30,10 @@ pub fn word(heater: u8) -> Option<u16> {
     readings().get().get(usize::from(heater)).copied().flatten()
 }
 
-/// Switches heaters and the fan: bits 0 hot end, 1 bed, 2 fan.
-pub fn switch(on: u8) {
-    switched().set(on);
+/// Switches the hot end, the bed and the fan: off with 0.
+pub fn drive(power: [u8; 3]) {
+    let [hot_end, bed, fan] = power.map(|power| u8::from(power != 0));
+    switched().set(hot_end | bed << 1 | fan << 2);
 }
 
 /// The converter reads this of a heater's sensor from now on.
@@ -44,7 +45,7 @@ pub fn set(heater: usize, reading: u16) {
     readings().set(all);
 }
 
-/// What [`switch`] was told last.
+/// What [`drive`] was told last: bits 0 hot end, 1 bed, 2 fan.
 pub fn on() -> u8 {
     switched().get()
 }

@@ -62,10 +62,11 @@ pub fn word(_: u8) -> Option<u16> {
     None
 }
 
-/// Switches heaters and the fan: bits 0 hot end, 1 bed, 2 fan. Thread mode.
-pub fn switch(on: u8) {
+/// Switches the hot end, the bed and the fan: off with 0. Thread mode.
+pub fn drive(power: [u8; 3]) {
     let Some(Heaters { heaters: [hot_end, bed], fan }) = ACTIVE.heaters else { return };
-    gpio::set(hot_end.pin, on & 1 != 0);
-    gpio::set(bed.pin, on & 2 != 0);
-    gpio::set(fan, on & 4 != 0);
+    let [of_hot_end, of_bed, of_fan] = power.map(|power| power != 0);
+    gpio::set(hot_end.pin, of_hot_end);
+    gpio::set(bed.pin, of_bed);
+    gpio::set(fan, of_fan);
 }

@@ -330,10 +330,10 @@ impl Machine {
     fn pass_heat(&mut self) {
         let heats = std::mem::take(&mut self.bus_mut().heats);
         let Some(mut thermal) = self.thermal.take_if(|_| heats > 0) else { return };
-        let on = thermal.pins().heaters.map(|heater| self.is_high(heater.pin));
-        let fan = self.is_high(thermal.pins().fan);
+        let power = thermal.pins().heaters.map(|heater| self.power_at(heater.pin));
+        let fan = self.power_at(thermal.pins().fan);
         for _ in 0..heats {
-            for (channel, millivolts) in thermal.pass(on, fan, self.cpu.cycle()) {
+            for (channel, millivolts) in thermal.pass(power, fan, self.cpu.cycle()) {
                 self.cpu.set_millivolts(channel, millivolts);
             }
         }

@@ -1,8 +1,11 @@
 //! What the registers of a 16-bit timer say of the pulses on one of its pins (data sheet, 17.9 to 17.11).
 
-use kerf::boards::Pwm;
+use kerf::boards::{Pin, Pwm};
 
 use crate::machine::Machine;
+
+/// The first register of timer 2.
+const TCCR2A: u16 = 0xB0;
 
 /// Pulses on a pin.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -24,6 +27,21 @@ impl Machine {
             hertz: 0.0,
             share: f64::from(u8::from(self.is_high(pwm.pin()))),
         })
+    }
+
+    /// The part of the time that an output is high: that of timer 2's pulses while it drives the pin, else 0 or 1 as of the port.
+    pub fn power_at(&self, pin: Pin) -> f64 {
+        let is_output = self.peek(pin.port.address() as u16 - 1) >> pin.bit & 1 != 0;
+        let (a, b) = (self.peek(TCCR2A), self.peek(TCCR2A + 1));
+        let connection = pin.channel().map_or(0, |channel| a >> (6 - 2 * channel) & 3);
+        if !is_output || connection == 0 {
+            return f64::from(u8::from(is_output && self.is_high(pin)));
+        }
+        // Up to 255 and down again, cleared on the way up, and running: the only mode that is known here.
+        assert_eq!((a & 3, connection), (1, 0b10), "TCCR2A {a:#x}");
+        assert!(b & 7 != 0 && b & 8 == 0, "TCCR2B {b:#x}");
+        let compare = self.peek(TCCR2A + 3 + u16::from(pin.channel().unwrap_or(0)));
+        f64::from(compare) / 255.0
     }
 
     fn timed(&self, pwm: Pwm) -> Option<Pulses> {

@@ -88,10 +88,13 @@ impl Thermal {
         &self.pins
     }
 
-    /// Time passes with the heaters on or off, and the fan; what the converter's channels are at from then on, mV.
-    pub(crate) fn pass(&mut self, on: [bool; 2], fan: bool, cycle: u64) -> [(u8, u32); 2] {
+    /// Time passes with so much of their power at the heaters and the fan, 1 for all; what the converter's channels are at from then on, mV.
+    pub(crate) fn pass(&mut self, power: [f64; 2], fan: f64, cycle: u64) -> [(u8, u32); 2] {
         let seconds = EVERY_MS as f64 / 1e3;
-        self.plants.iter_mut().zip(on).for_each(|(plant, on)| plant.pass(seconds, on, fan));
+        self.plants
+            .iter_mut()
+            .zip(power)
+            .for_each(|(plant, power)| plant.pass(seconds, power, fan));
         if self.looks.is_multiple_of(SAMPLE) {
             let degrees = self.plants.each_ref().map(|plant| plant.sensor);
             self.samples.push(Sample { cycle, degrees });

@@ -45,7 +45,7 @@ impl Printer {
     }
 
     fn is_on(&self, heater: Heater) -> bool {
-        self.machine.is_high(heater.pin)
+        self.machine.power_at(heater.pin) > 0.0
     }
 
     /// Of a sensor, with noise.
@@ -59,9 +59,9 @@ impl Printer {
     fn run(&mut self, ms: u64, mut look: impl FnMut(&Self)) {
         let Heaters { heaters: [hot_end, bed], fan } = heaters();
         for _ in 0..ms {
-            let fan = self.machine.is_high(fan);
-            self.hot_end.pass(0.001, self.is_on(hot_end), fan);
-            self.bed.pass(0.001, self.is_on(bed), fan);
+            let fan = self.machine.power_at(fan);
+            self.hot_end.pass(0.001, self.machine.power_at(hot_end.pin), fan);
+            self.bed.pass(0.001, self.machine.power_at(bed.pin), fan);
             let read = self.millivolts(self.hot_end.sensor);
             self.machine.set_millivolts(hot_end.channel, self.broken.unwrap_or(read));
             if let Some(chip) = self.machine.max6675(select()).filter(|_| self.digital) {
@@ -255,4 +255,73 @@ fn a_missing_thermocouple_does_not_heat() {
     assert!(!printer.is_on(heaters().heaters[0]));
     let told = printer.host.take_reports();
     assert!(told.iter().any(|report| report["er"]["st"] == 48), "{told:?}");
+}
+
+/// Timer 2 makes the pulses of the hot end and the fan. Their ports' bits stay low, so that the pins are low once the timer has let go of them.
+#[test]
+fn power_is_pulses_of_a_timer_and_off_lets_go_of_the_pin() {
+    let mut printer = Printer::new();
+    let Heaters { heaters: [hot_end, bed], fan } = heaters();
+    let connected = |printer: &Printer| printer.machine.peek(0xB0) & 0xF0;
+    assert_eq!(connected(&printer), 0);
+    (printer.hot_end.block, printer.hot_end.sensor) = (60.0, 60.0);
+    for line in ["m104 s65", "m106 s64", "m140 s60"] {
+        printer.ask(line);
+    }
+    // All at first, so that the fan begins to turn.
+    assert_eq!(printer.machine.power_at(fan), 1.0);
+    printer.run(30_000, |printer| {
+        assert!(!printer.machine.is_high(hot_end.pin) && !printer.machine.is_high(fan));
+    });
+    assert!((printer.machine.power_at(fan) - 64.0 / 255.0).abs() < 1e-9);
+    let (mut low, mut high) = (1f64, 0f64);
+    printer.run(2_000, |printer| {
+        let power = printer.machine.power_at(hot_end.pin);
+        (low, high) = (low.min(power), high.max(power));
+    });
+    assert!(low > 0.0 && high < 1.0, "{low} to {high}");
+    let told = printer.value("he1o");
+    assert!((told - printer.machine.power_at(hot_end.pin)).abs() < 0.05, "{told}");
+    assert_eq!(printer.machine.power_at(bed.pin), 1.0);
+    for line in ["m104 s0", "m107", "m140 s0"] {
+        printer.ask(line);
+    }
+    printer.run(100, |_| {});
+    assert_eq!(connected(&printer), 0);
+    assert!(!printer.is_on(hot_end) && !printer.is_on(bed));
+}
+
+/// A fault, an alarm, a reset and what makes the machine safe let go of the pins.
+#[test]
+fn every_way_off_lets_go_of_the_pins() {
+    let ways: [(&str, fn(&mut Printer)); 5] = [
+        ("a sensor", |printer| printer.broken = Some(5_000)),
+        ("an alarm", |printer| printer.machine.send_now(0x04)),
+        ("a reset", |printer| printer.machine.send_now(0x18)),
+        ("the end of the program", |printer| printer.host.send(&mut printer.machine, 9, "m2")),
+        ("the watchdog", |printer| printer.machine.withhold(21, true)),
+    ];
+    for (name, way) in ways {
+        let mut printer = Printer::new();
+        for line in ["m104 s200", "m106 s128", "m140 s60"] {
+            printer.ask(line);
+        }
+        printer.run(500, |_| {});
+        let [hot_end, bed] = heaters().heaters;
+        assert!(printer.is_on(hot_end) && printer.is_on(bed), "{name}");
+        way(&mut printer);
+        let (mut ms, mut off) = (0u64, None);
+        printer.run(900, |printer| {
+            ms += 1;
+            let pins = [hot_end.pin, bed.pin, heaters().fan];
+            let connected = printer.machine.peek(0xB0) & 0xF0 != 0;
+            match connected || pins.iter().any(|pin| printer.machine.power_at(*pin) > 0.0) {
+                true => off = None,
+                false => off = off.or(Some(ms)),
+            }
+        });
+        println!("{name}: off after {off:?} ms");
+        let most = if name == "the watchdog" { 700 } else { 100 };
+        assert!(off.is_some_and(|ms| ms <= most), "{name}: off after {off:?} ms");
+    }
 }
