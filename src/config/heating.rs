@@ -20,6 +20,8 @@ pub struct Heating {
     pub warm: bool,
     /// Whether filament may be moved however cold it is, until the next start.
     pub allows_cold: bool,
+    /// Pressure advance: K that is in force, 0.1 ms.
+    pub advance: u16,
 }
 
 impl Heating {
@@ -30,6 +32,7 @@ impl Heating {
         extruder: ACTIVE.heaters.is_some(),
         warm: false,
         allows_cold: false,
+        advance: 0,
     };
 
     /// Whether the A axis may be moved.

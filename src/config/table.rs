@@ -112,6 +112,13 @@ pub(super) const fn cold(shown: u8) -> Row {
     Row { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
+/// Seconds of which four decimals are kept, in EEPROM.
+pub(super) const fn seconds(most: i32) -> Row {
+    let mut row = up_to(cold(4), most).with(RANGE);
+    row.stored = 4;
+    row
+}
+
 /// Yes or no, in EEPROM.
 pub(super) const fn choice() -> Row {
     whole(cold(0), 1)

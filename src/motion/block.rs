@@ -5,6 +5,7 @@
 //! number three, the sign of a length tells what distances are counted in ([`Extent`]), and a line, which knows no [`Reserve`] of 0, has no tag:
 //! 30 bytes on AVR.
 
+use super::advance::Lead;
 use super::factors::{Factors, Reserve};
 use super::pace::Drivers;
 use super::retract::Retract;
@@ -36,7 +37,11 @@ impl Block {
         matches!(
             self.body,
             Body::Action(
-                Action::Override(_) | Action::Lead(_) | Action::PerTurn(_) | Action::Heat(_)
+                Action::Override(_)
+                    | Action::Lead(_)
+                    | Action::PerTurn(_)
+                    | Action::Heat(_)
+                    | Action::Advance(_)
             )
         )
     }
@@ -97,6 +102,8 @@ pub enum Action {
     Override(Change),
     /// M104 to M190: heaters and the fan are to be so. The machine goes on.
     Heat(Heat),
+    /// M900: from here on this is the extruder's lead. The machine goes on.
+    Advance(Lead),
     /// M0, M1, M60.
     ProgramStop,
     /// M2, M30.

@@ -227,11 +227,16 @@ impl Exec {
             return Step::Segment;
         }
         if self.hold && self.rests(blocks, out) {
+            if self.prep.relax(segment) {
+                return Step::Segment;
+            }
             out.held = standstill;
             return if standstill { Step::Held } else { Step::Standstill };
         }
         if self.dwell_ms > 0 {
-            self.dwell(segment);
+            if !self.prep.relax(segment) {
+                self.dwell(segment);
+            }
             return Step::Segment;
         }
         if Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Retreats(_)) {
@@ -239,11 +244,20 @@ impl Exec {
         }
         if !self.running.active {
             if blocks.is_empty() {
+                if self.prep.relax(segment) {
+                    self.halt(out);
+                    return Step::Segment;
+                }
                 return self.idle(standstill, out);
             }
             if !self.begin(blocks, out)
-                && let Some(Block { body: Body::Action(action), .. }) = blocks.oldest()
+                && let Some(block) = blocks.oldest()
+                && let Body::Action(action) = block.body
             {
+                if !block.is_aside() && self.prep.relax(segment) {
+                    self.halt(out);
+                    return Step::Segment;
+                }
                 return self.take_up(&action, blocks, standstill, out);
             }
         }
@@ -342,6 +356,9 @@ impl Exec {
         while let Some(block) = blocks.oldest() {
             match &block.body {
                 Body::Action(Action::Drivers(drivers)) => self.prep.set_drivers(*drivers),
+                Body::Action(Action::Advance(lead)) if Capability::Printer.is_built_in() => {
+                    self.prep.set_lead(lead);
+                }
                 Body::Action(Action::PerTurn(on)) if Capability::Lathe.is_built_in() => {
                     self.go_by_speed(*on)
                 }
@@ -350,6 +367,7 @@ impl Exec {
                     Action::SetPosition(_)
                     | Action::Override(_)
                     | Action::Lead(_)
+                    | Action::Advance(_)
                     | Action::Heat(_),
                 ) => {}
                 _ => moved = true,
@@ -409,6 +427,7 @@ impl Exec {
                 };
             }
             Action::Drivers(drivers) => self.prep.set_drivers(*drivers),
+            Action::Advance(lead) if Capability::Printer.is_built_in() => self.prep.set_lead(lead),
             Action::Thread(_) | Action::EndThread | Action::Return
                 if Capability::Lathe.is_built_in() =>
             {
@@ -572,6 +591,9 @@ impl Exec {
         let running = &mut self.running;
         out.velocity = self.governor.velocity();
         let cycles = cycles_of(stretch.seconds);
+        if self.prep.leads() {
+            self.prep.aim(out.velocity, stretch.seconds, self.governor.pending().0);
+        }
         if stretch.ends {
             out.left = 0.0;
             running.done = true;

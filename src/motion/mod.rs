@@ -6,6 +6,7 @@
 //!                      horizon      slice, rise, ramp, constraint, need
 //! ```
 
+pub mod advance;
 pub mod block;
 pub mod chain;
 mod constraint;

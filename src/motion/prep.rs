@@ -31,9 +31,14 @@
 //! is in time when a later segment has one tick a step. A segment with more ticks a step ends in the middle between two steps: a tick without
 //! a pulse leaves the interrupt time to load the next segment.
 //!
+//! **Pressure advance.** An extruder is ahead of its line by what [`advance`](super::advance) says. Its lead is added to segments that are complete but for
+//! that, and counted apart from the line, which knows nothing of it. So all that is said here of ends holds for what the line asks for, and at rest
+//! there is no lead ([`Prep::relax`]).
+//!
 //! Cost on AVR: 600 cycles a segment and 200 for each motor that moves; 400 for `begin`, and 300 for each
 //! motor when `k` changes.
 
+use super::advance::{Advance, EXTRUDERS, Lead};
 use super::block::{Line, PARTS_LOG2};
 use super::divide::{quotient, quotient_remainder};
 use super::pace::{COARSEST, Drivers, Pace, paces};
@@ -76,6 +81,9 @@ const TURNED: u16 = 150;
 
 /// Ticks and period of a segment for motors beside a block that stands still.
 const ASIDE: (u16, u16) = (64, 500);
+
+/// Of one in which they go no farther than 1/32 step.
+const ASIDE_LITTLE: (u16, u16) = (1, 16_000);
 
 /// A lockstep segment has at least half as many ticks, if it is shorter than as many steps.
 const LOCKSTEP_TICKS: u16 = 16;
@@ -136,6 +144,7 @@ pub struct Prep {
     paces: [Pace; MOTORS],
     /// A segment that comes behind one in which directions settle.
     held: Option<Segment>,
+    extruder: [Advance; EXTRUDERS],
 }
 
 impl Prep {
@@ -163,6 +172,7 @@ impl Prep {
             paces: paces(Drivers::USUAL),
             setup: Drivers::USUAL.setup(),
             held: None,
+            extruder: [Advance::NONE; EXTRUDERS],
         }
     }
 
@@ -202,7 +212,11 @@ impl Prep {
         (self.full, self.minor, self.most, self.others) = (0, 0, 0, u8::MAX);
         self.parts = !line.extent.has_whole_steps();
         if !self.parts {
-            return self.begin_far(&line.way, steps, target);
+            self.begin_far(&line.way, steps, target);
+            if self.has_advance() {
+                self.begin_lead(line);
+            }
+            return;
         }
         each_motor!(M => {
             let mut way = line.way[M];
@@ -229,6 +243,148 @@ impl Prep {
             // Without motors there are no ticks to pace.
             self.others = 0;
         }
+        if self.has_advance() {
+            self.begin_lead(line);
+        }
+    }
+
+    /// Whether there is a lead of the extruder, or may be one. Cost: 5.
+    #[inline(always)]
+    fn has_advance(&self) -> bool {
+        self.extruder.first().is_some_and(|extruder| extruder.on)
+    }
+
+    /// Whether the extruder has a lead in the block, or takes one back: then exec says how fast the machine is ([`Prep::aim`]).
+    #[inline(always)]
+    pub fn leads(&self) -> bool {
+        self.extruder.first().is_some_and(|extruder| extruder.leads)
+    }
+
+    /// From the next block on this is the extruder's lead.
+    #[small]
+    pub fn set_lead(&mut self, lead: &Lead) {
+        if let Some(extruder) = self.extruder.first_mut() {
+            extruder.set(lead);
+        }
+    }
+
+    /// The machine is that fast, mm/s, at the end of a slice: see [`Advance::aim`].
+    #[inline(never)]
+    pub fn aim(&mut self, velocity: f32, seconds: f32, pending: f32) {
+        if let Some(extruder) = self.extruder.first_mut() {
+            extruder.aim(velocity, seconds, pending);
+        }
+    }
+
+    /// A block begins. If it pushes filament while others travel, the extruder has a lead in it. Its increments are its own then: it is no motor
+    /// that goes as far as others.
+    #[inline(never)]
+    #[small]
+    fn begin_lead(&mut self, line: &Line) {
+        let Some(extruder) = self.extruder.first_mut() else { return };
+        let m = usize::from(extruder.motor);
+        let bit = 1 << extruder.motor;
+        let own = line.way.get(m).copied().unwrap_or(0);
+        let travels = line.way.iter().enumerate().any(|(other, way)| other != m && *way != 0);
+        let way = match own > 0 && travels {
+            true => product(own as u16, if self.parts { PART } else { STEP }),
+            false => 0,
+        };
+        let leads = extruder.begin(way, line.extent.length()) && self.most != 0;
+        if !leads {
+            extruder.end();
+            return self.end_lead();
+        }
+        if !extruder.leads {
+            extruder.leads = true;
+            extruder.backwards = self.backwards & bit != 0;
+        }
+        if self.full & bit != 0 && self.full != bit {
+            self.full &= !bit;
+            self.minor |= bit;
+        } else if (self.full | self.minor) & bit == 0 {
+            self.minor |= bit;
+            self.others += 1;
+            if let Some(minor) = self.minors.get_mut(m) {
+                *minor = Minor::default();
+            }
+        } else if self.others == 0 {
+            // Alone: ticks are those of motors whose increments are not a step.
+            self.others = 1;
+        }
+    }
+
+    /// The extruder's lead is added to a segment that is complete but for its mode.
+    #[inline(never)]
+    fn lead(&mut self, out: &mut Segment) {
+        let Some(extruder) = self.extruder.first_mut() else { return };
+        let more = extruder.travel(out.ticks, out.period);
+        let bit = 1 << extruder.motor;
+        let Some(increment) = out.increment.get_mut(usize::from(extruder.motor)) else { return };
+        let size = i32::from(*increment);
+        let own = if out.backwards & bit != 0 { -size } else { size };
+        let most = extruder.most(out.period).max(size);
+        let mut goes = (own + more).clamp(-most, most);
+        if goes != 0 && (goes < 0) != extruder.backwards {
+            extruder.backwards = goes < 0;
+            if out.period.saturating_sub(TURNED) < self.setup {
+                // The direction stands from here on, and the motor goes in the next segment.
+                goes = 0;
+            }
+        }
+        *increment = goes.unsigned_abs() as u16;
+        out.backwards = out.backwards & !bit | if extruder.backwards { bit } else { 0 };
+        extruder.note(goes - own, more, (out.ticks, out.period));
+        if extruder.is_done() {
+            self.end_lead();
+        }
+    }
+
+    /// The extruder is where its line is, but for little, and the block has no lead.
+    #[inline(never)]
+    #[small]
+    fn end_lead(&mut self) {
+        let Some(extruder) = self.extruder.first_mut() else { return };
+        let bit = 1 << extruder.motor;
+        if core::mem::take(&mut extruder.leads) {
+            // The next segment turns it round.
+            self.turned |= extruder.backwards != (self.backwards & bit != 0);
+        }
+        if self.full == bit && self.minor == 0 {
+            self.others = 0;
+        } else if self.minor & bit != 0
+            && self.minors.get(usize::from(extruder.motor)).is_some_and(Minor::stands)
+        {
+            self.minor &= !bit;
+            self.others = self.others.saturating_sub(1);
+        }
+    }
+
+    /// The machine rests at the end of its lines, or in a hold: a segment in which the extruder takes back what is left of its lead. False, and no
+    /// segment, if there is none.
+    #[inline(always)]
+    pub fn relax(&mut self, out: &mut Segment) -> bool {
+        self.has_advance() && self.takes_back(out)
+    }
+
+    #[inline(never)]
+    #[small]
+    fn takes_back(&mut self, out: &mut Segment) -> bool {
+        let Some(extruder) = self.extruder.first_mut() else { return false };
+        if extruder.made() == 0 {
+            return false;
+        }
+        let bit = 1 << extruder.motor;
+        if !extruder.leads {
+            extruder.leads = true;
+            extruder.backwards = self.backwards & bit != 0;
+        }
+        let (ticks, period) = if extruder.rest() { ASIDE_LITTLE } else { ASIDE };
+        self.pause(ticks, period, out);
+        out.moving = bit;
+        self.lead(out);
+        out.mode = Segment::mode_of(bit);
+        true
     }
 
     /// Starts a block whose ways are in whole steps. Else as [`Prep::begin`].
@@ -559,7 +715,12 @@ impl Prep {
             }
             out.increment[M] = increment;
         });
-        out.seal(self.full, step);
+        if self.leads() {
+            out.mode = Segment::mode_of(moving);
+            self.lead(out);
+        } else {
+            out.seal(self.full, step);
+        }
         if self.turned {
             self.behind_turn(out);
         }
@@ -626,7 +787,7 @@ impl Prep {
     /// Most ticks for a stretch.
     #[inline(always)]
     fn limit(&self, cycles: u32, pace: u16) -> u16 {
-        if self.minor == 0 {
+        if self.minor == 0 && !self.leads() {
             return LOCKSTEP_TICKS;
         }
         let cycles = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
@@ -681,7 +842,11 @@ impl Prep {
             let left = self.left_of(m, bit);
             let left = if self.backwards & bit != 0 { -left } else { left };
             // The debt has that as well, modulo 2^16.
-            let short = left + i32::from(self.debt[m].wrapping_sub(left as i16)) - beyond;
+            let ahead = match self.extruder.first() {
+                Some(extruder) if usize::from(extruder.motor) == m => extruder.made(),
+                _ => 0,
+            };
+            let short = left + i32::from(self.debt[m].wrapping_sub(left as i16)) - beyond - ahead;
             *target = target.wrapping_add((i32::from(PHASE_START) - short) >> STEP_LOG2);
             bit <<= 1;
         }
@@ -689,6 +854,9 @@ impl Prep {
         self.time = 0;
         self.debt = [0; MOTORS];
         self.fraction = [HALF; MOTORS];
+        if let Some(extruder) = self.extruder.first_mut() {
+            extruder.cut();
+        }
         // The segment that was to tell of it may be among those that are lost.
         self.turned = true;
         self.held.take()
@@ -776,6 +944,11 @@ impl Default for Prep {
 }
 
 impl Minor {
+    /// Whether it has no way, and owes nothing.
+    fn stands(&self) -> bool {
+        self.way == 0 && self.owed == 0
+    }
+
     /// The increment for the next `ticks`, and what it owes then.
     fn advance(&mut self, ticks: u16, most: u16) -> u16 {
         let unit = product(ticks, most);

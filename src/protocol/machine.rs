@@ -61,6 +61,8 @@ pub enum Extruder {
     Relative(bool),
     /// The extruder moves this many thousandths of what its words say.
     Flow(u16),
+    /// M900 K, 0.1 ms: how far it is ahead in the lines that follow.
+    Advance(u16),
     /// The next line does not move it; its words count as if it did.
     LeaveOut,
     /// The extruder moves by itself, and the origin of its words moves along with it.

@@ -100,7 +100,7 @@ mod tests {
             assert_eq!(keys.insert(key, Item(Setting::from_number(0).unwrap())), None);
             assert_ne!(key, NO_KEY);
         }
-        let heaters = if Capability::Printer.is_built_in() { 15 } else { 0 };
+        let heaters = if Capability::Printer.is_built_in() { 16 } else { 0 };
         assert!(keys.len() <= usize::from(KEYS));
         assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + 10 + 9 + 2 + 16 + heaters);
     }

@@ -270,6 +270,9 @@ pub fn set(heaters: &Heaters, settings: &mut Settings, setting: Setting, value: 
         return false;
     };
     heater.set(setting.index(), value);
+    if number == 0 && setting.index() == hot_end::PA {
+        heating.advance = value as u16;
+    }
     if number == 0 {
         heating.warm = !heater.is_cold(0);
     }

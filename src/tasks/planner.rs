@@ -45,6 +45,8 @@ use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, is_asked, wait};
 use crate::jobs::Job;
 use crate::machine::{self, Cycle};
+#[cfg(feature = "printer")]
+use crate::motion::advance::Lead;
 use crate::motion::block::{Action, Block, Line as Move, Outputs};
 use crate::motion::chain::Chain;
 use crate::motion::dynamics::{Dynamics, Machine};
@@ -74,6 +76,9 @@ pub struct Planner {
     /// A heater or the fan has been switched on since the last end of a program.
     #[cfg(feature = "printer")]
     heats: bool,
+    /// What exec has been told of the extruder's lead.
+    #[cfg(feature = "printer")]
+    lead: Lead,
     /// How far the line has been carried out.
     steps: Steps,
     walk: Ongoing,
@@ -107,6 +112,8 @@ enum News {
     Position,
     /// What the drivers ask for, perhaps.
     Drivers,
+    /// The extruder's lead, perhaps.
+    Lead,
 }
 
 /// What a turn of the planner led to.
@@ -241,6 +248,8 @@ impl Planner {
             per_turn: false,
             #[cfg(feature = "printer")]
             heats: false,
+            #[cfg(feature = "printer")]
+            lead: Lead::NONE,
             steps: Steps::default(),
             walk: Ongoing::None,
             begun: Begun::Nothing,
@@ -319,6 +328,10 @@ impl Planner {
     fn take_up_changes(&mut self) {
         if self.links.changes.take(Changes::SETTINGS) {
             self.dynamics.set(&*self.links.settings.borrow());
+            #[cfg(feature = "printer")]
+            if self.wanted_lead() != self.lead {
+                self.news = News::Lead;
+            }
         }
         self.outputs.on ^= self.links.changes.take_flipped();
         if self.links.changes.has(Changes::STEPS) {
@@ -512,9 +525,14 @@ impl Planner {
                 self.set_position(&position);
                 self.news = News::Drivers;
             }
-            _ => {
+            News::Drivers => {
                 self.set_drivers();
                 self.links.changes.take(Changes::STEPS);
+                self.news = News::Lead;
+            }
+            _ => {
+                #[cfg(feature = "printer")]
+                self.set_lead();
                 self.news = News::None;
             }
         }
@@ -609,7 +627,8 @@ impl Planner {
         } else {
             let motion = common::snapshot(links.thread);
             self.relocate(&motion);
-            self.news = News::None;
+            // The line that was dropped may have been to tell of it.
+            self.news = if Capability::Printer.is_built_in() { News::Lead } else { News::None };
             let spindle = Spindle { turn: outputs::turn(motion.outputs), speed: motion.speed };
             let coolant = super::spindle::coolant(motion.outputs);
             links.changes.take_flipped();

@@ -318,6 +318,8 @@ impl Machine for View<'_> {
             self.links.storage.set_cold(setting, value)?;
             if Capability::Printer.is_built_in() {
                 heat::set(&self.links.heat, &mut self.settings, setting, value);
+                // The planner asks for the extruder's lead.
+                self.links.changes.note(Changes::SETTINGS);
             }
             if is_encoder {
                 turning::set_up(self.links.thread, self.links.storage);
@@ -623,6 +625,14 @@ impl Machine for View<'_> {
             _ if alarm != Alarm::None => return alarm.status(),
             _ if machine::is_checking() => {}
             _ if links.commands_taken.get() || machine::is_flushing() => return Status::Again,
+            Extruder::Advance(time) => {
+                let Some(heating) = self.settings.heating.first_mut() else {
+                    return Status::NotBuiltIn;
+                };
+                heating.advance = time;
+                // The planner tells exec before the next line.
+                links.changes.note(Changes::SETTINGS);
+            }
             Extruder::Move { by, feed } => {
                 heat::has_extruder(&mut self.settings);
                 if let Err(status) = Setup::extrudes(&*self.settings) {

@@ -29,6 +29,9 @@ group! {
         MN "mn": whole(cold(0), 330), 170,
             words(text!("hot end min to extrude"), DEGREES),
             "How hot it must be for filament to be moved, degrees.";
+        PA "pa": seconds(20_000), 0,
+            words(text!("pressure advance"), SECONDS),
+            "Pressure advance K from the start on, s: how far the extruder is ahead of its line, for each mm/s of filament. M900 K changes it until the next start.";
     }
 }
 

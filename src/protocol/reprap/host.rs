@@ -47,7 +47,7 @@ pub fn of(code: Option<Code>) -> Option<Code> {
         (b'M', number) => matches!(
             number,
             17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 155
-                | 201 | 203..=208 | 220 | 221 | 301..=304 | 400 | 500..=503 | 999
+                | 201 | 203..=208 | 220 | 221 | 301..=304 | 400 | 500..=503 | 900 | 999
         ),
         (b'T', _) => true,
         _ => false,
@@ -112,6 +112,7 @@ pub fn part(
         502 => restore(at, machine),
         503 => settings::list(at, machine, out).map_or(Step::Done, Step::At),
         92 | 201 | 203..=206 => settings::set(number, at, block, machine, out),
+        900 => advance(block, machine, out),
         999 => match machine.clear() {
             Status::Again => Step::Later(0),
             Status::Ok => {
@@ -316,6 +317,26 @@ fn extrude_cold(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) ->
         text(out, text!("C)\n"));
     }
     Step::Done
+}
+
+/// M900: K is the pressure advance, s; without it that is told.
+#[small]
+fn advance(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    const MOST: u16 = 20_000;
+    let Some(time) = value(block, b'K', 4) else {
+        let now = machine.settings().heating.first().map_or(0, |heating| heating.advance);
+        text(out, text!("Advance K="));
+        fixed(out, Fixed { value: now.into(), decimals: 4 });
+        line_end(out);
+        return Step::Done;
+    };
+    match u16::try_from(time) {
+        Ok(time @ 0..=MOST) => match machine.extruder(Extruder::Advance(time)) {
+            Status::Again => Step::Later(0),
+            status => done(status),
+        },
+        _ => Step::Refused(Status::OutOfRange),
+    }
 }
 
 #[small]

@@ -6,11 +6,24 @@
 use kerf_macros::small;
 
 use super::Planner;
+use crate::boards::MOTORS;
 use crate::gcode::command::Motion;
 use crate::gcode::heating::{Heat, Wait};
+use crate::gcode::printing::EXTRUDER;
 use crate::hal::event::{Event, wait};
+use crate::motion::advance::Lead;
 use crate::motion::block::{Action, Block};
+use crate::motion::float::greater;
 use crate::motion::queue;
+use crate::motion::short::Short;
+use crate::units::Length;
+
+/// No lead is slower, steps/s^2 and steps/s, whatever the limits of the axis: it would take minutes to come back. None is faster than [`MOST`].
+const ACCEL_LEAST: f32 = 1_000.0;
+/// See [`ACCEL_LEAST`].
+const VELOCITY_LEAST: f32 = 100.0;
+/// See [`ACCEL_LEAST`].
+const MOST: f32 = 1e9;
 
 impl Planner {
     /// Queues what a line asks for. Whether motion is to wait for it.
@@ -23,6 +36,45 @@ impl Planner {
             self.announce();
         }
         heat.wait != Wait::Nothing
+    }
+
+    /// What the extruder's lead is to be, which is that of the first motor of the axis.
+    #[inline(never)]
+    #[small]
+    pub(super) fn wanted_lead(&self) -> Lead {
+        let settings = self.links.settings.borrow();
+        let time = settings.heating.first().map_or(0, |heating| heating.advance);
+        let motor = (0..MOTORS).find(|motor| settings.motor_axis(*motor) == EXTRUDER as u8);
+        let mut lead = Lead::NONE;
+        if time != 0
+            && let (Some(motor), Some(axis)) = (motor, self.dynamics.axes.get(EXTRUDER))
+        {
+            let ratio = settings.step_ratio(motor);
+            let steps = ratio.num as f32 / ratio.den as f32 * Length::PER_MM as f32;
+            let of = |limit: f32, least| {
+                let limit = if limit > 0.0 { limit * steps } else { f32::MAX };
+                Short::new(greater(least, if limit < MOST { limit } else { MOST }))
+            };
+            lead = Lead {
+                motor: motor as u8,
+                time,
+                accel: of(axis.accel.get(), ACCEL_LEAST),
+                velocity: of(axis.feed, VELOCITY_LEAST),
+            };
+        }
+        lead
+    }
+
+    /// Tells exec of the extruder's lead, if that has changed.
+    #[inline(never)]
+    #[small]
+    pub(super) fn set_lead(&mut self) {
+        let lead = self.wanted_lead();
+        if lead != self.lead {
+            self.lead = lead;
+            let _ = self.queue.push_aside(Block::action(Action::Advance(lead), self.line));
+            self.announce();
+        }
     }
 
     /// Waits until the heaters that the line names are as hot as it asks for, or somebody ends that.
