@@ -294,7 +294,8 @@ fn power_is_pulses_of_a_timer_and_off_lets_go_of_the_pin() {
 /// A fault, an alarm, a reset and what makes the machine safe let go of the pins.
 #[test]
 fn every_way_off_lets_go_of_the_pins() {
-    let ways: [(&str, fn(&mut Printer)); 5] = [
+    type Way = (&'static str, fn(&mut Printer));
+    let ways: [Way; 5] = [
         ("a sensor", |printer| printer.broken = Some(5_000)),
         ("an alarm", |printer| printer.machine.send_now(0x04)),
         ("a reset", |printer| printer.machine.send_now(0x18)),
