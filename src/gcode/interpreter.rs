@@ -20,6 +20,7 @@ use super::setup::Setup;
 use super::state::State;
 use super::sticky::Sticky;
 use super::tables::{Edit, Ram, Row, Tables};
+use super::usual::Writer;
 use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
@@ -116,7 +117,7 @@ impl<T: Tables> Interpreter<T> {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<Info, Status> {
-        if self.usual(line, true, setup, out) {
+        if self.usual(line, Writer::Numbers, setup, out) {
             return Ok(Info::default());
         }
         self.general(line, setup, out)
@@ -126,11 +127,11 @@ impl<T: Tables> Interpreter<T> {
     pub fn usual(
         &mut self,
         line: &[u8],
-        numbered: bool,
+        writer: Writer,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> bool {
-        self.state.usual(line, numbered, setup, out)
+        self.state.usual(line, writer, setup, out)
     }
 
     /// Interprets a line as [`Self::interpret`] does, without trying [`Self::usual`] first. Call it when that has declined the line.

@@ -36,7 +36,7 @@ pub mod tables;
 #[cfg(test)]
 mod tests;
 pub mod threading;
-mod usual;
+pub mod usual;
 pub mod words;
 
 pub use interpreter::{Info, Interpreter};

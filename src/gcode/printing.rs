@@ -72,6 +72,12 @@ impl Printing {
     fn flows(self) -> u16 {
         if self.dry { 0 } else { self.flow }
     }
+
+    /// Whether as much flows as programmed.
+    #[inline(always)]
+    pub fn flows_as_programmed(self) -> bool {
+        self.flows() == FULL
+    }
 }
 
 #[cfg(not(feature = "dialect-reprap"))]
@@ -99,6 +105,12 @@ impl Printing {
     #[inline(always)]
     fn flows(self) -> u16 {
         FULL
+    }
+
+    /// It does.
+    #[inline(always)]
+    pub fn flows_as_programmed(self) -> bool {
+        true
     }
 }
 
@@ -175,6 +187,20 @@ impl State {
     #[inline(always)]
     pub(super) fn carry_flow(&mut self, _done: bool) {}
 
+    /// Whether the extruder has got far from the origin.
+    #[cfg(feature = "dialect-reprap")]
+    #[inline(always)]
+    pub(super) fn is_far(&self) -> bool {
+        self.position.get(EXTRUDER).is_some_and(|at| at.0.unsigned_abs() > FAR as u32)
+    }
+
+    /// There is no dialect in which it does.
+    #[cfg(not(feature = "dialect-reprap"))]
+    #[inline(always)]
+    pub(super) fn is_far(&self) -> bool {
+        false
+    }
+
     /// Origin and G92 of the extruder, moved.
     #[small]
     fn shifted_extruder(&self, by: i32) -> Option<(Length, Length)> {
@@ -225,7 +251,7 @@ impl<T> Interpreter<T> {
 
     /// Whether the extruder has got far from the origin.
     pub fn is_far(&self) -> bool {
-        self.state.position.get(EXTRUDER).is_some_and(|at| at.0.unsigned_abs() > FAR as u32)
+        self.state.is_far()
     }
 
     /// Gives the place where the machine is another name, at which the extruder is nearer to the origin.

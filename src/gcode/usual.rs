@@ -5,10 +5,12 @@
 //! and goes through `lexer`, `block` and `motion`, which say what is wrong with it, too. The result is
 //! theirs to the bit: a property of `tests` holds the two against each other.
 //!
+//! Of a printing host lines have E for A, with five decimals, and G0 is G1: that is [`Writer::Prints`].
+//!
 //! Cost on AVR: `X10.375` 1,250 cycles, `G1 X12.345 Y-3.21 F1500` 3,300 (`tests/sim/tests/interpreter.rs`).
 
 use super::command::{Commands, Feed, Motion};
-use super::decimal::Decimal;
+use super::decimal::{Decimal, Exact};
 use super::digits::decimal;
 use super::limits::is_near;
 use super::modal::{Distance, FeedMode, MotionMode, PathMode, Units, XMode};
@@ -22,12 +24,25 @@ use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
 /// What tells upper from lower case.
 const CASE: u8 = 0x20;
+/// Whether there is a dialect of printing hosts.
+const PRINTS: bool = cfg!(feature = "dialect-reprap");
 /// What no line has where a word may begin: reading ends there.
 const BAD: u8 = 0x7F;
 /// Words that were seen: an axis has the bit of its number, N and F have these. G is in `mode`.
 const AXES_SEEN: u8 = (1 << AXES) - 1;
 const N_SEEN: u8 = 1 << 6;
 const F_SEEN: u8 = 1 << 7;
+
+/// Who has written a line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Writer {
+    /// It may have an N word.
+    Numbers,
+    /// It may not.
+    Plain,
+    /// A printing host, and there is no N word either.
+    Prints,
+}
 
 /// A line that is being read, and what it has said so far.
 struct Words<'a> {
@@ -40,22 +55,30 @@ struct Words<'a> {
     mode: Option<MotionMode>,
     feed: f32,
     line: u32,
+    /// A printing host has written it.
+    prints: bool,
+    /// Of a relative E word: what rounding took from those before.
+    carried: Option<i16>,
+    /// What rounding takes from the E word.
+    rest: i16,
     /// Where to, machine coordinates, on the axes that were seen.
     target: PerAxis<Length>,
 }
 
 impl State {
     /// Carries a usual line out: with [`Interpreter::interpret`](super::Interpreter::interpret) it would be `Ok`,
-    /// without a comment, and a move. False, and nothing done, if it is none; `numbered` says whether it may have an N word.
+    /// without a comment, and a move. False, and nothing done, if it is none. A line of a printing host is one that is written for the
+    /// interpreter already but for E and G0.
     #[inline(never)]
     pub fn usual(
         &mut self,
         line: &[u8],
-        numbered: bool,
+        writer: Writer,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> bool {
         let modal = &self.modal;
+        let prints = PRINTS && writer == Writer::Prints;
         // Most of the others end in a comment.
         if line.last() == Some(&b')') {
             return false;
@@ -63,19 +86,37 @@ impl State {
         if modal.units != Units::Mm
             || modal.feed_mode != FeedMode::PerMinute
             || setup.reach().is_some() && !self.reaches(setup)
-            || !self.printing.is_usual()
+            || !self.printing.flows_as_programmed()
+            || !prints && self.printing.distance().is_some()
             || Capability::Lathe.is_built_in() && modal.x_mode == XMode::Diameter
             || line.len() > usize::from(u8::MAX)
         {
             return false;
         }
-        let mut words = Words::new(line, numbered);
+        let mut words = Words::new(line, writer == Writer::Numbers);
+        let own;
         let from = match modal.distance {
+            Distance::Absolute if prints && self.printing.distance().is_some() => {
+                own = self.with_own_extruder();
+                &own
+            }
+            _ if prints && self.printing.distance().is_some() => return false,
             Distance::Absolute => &self.origin,
             Distance::Incremental if self.residue.iter().all(|rest| *rest == 0) => &self.position,
             // What rounding has taken would have to be carried on.
             Distance::Incremental => return false,
         };
+        if prints {
+            if self.is_far() {
+                return false;
+            }
+            words.prints = true;
+            let relative = self.printing.distance().unwrap_or(modal.distance);
+            words.carried = match (relative, self.residue.get(EXTRUDER)) {
+                (Distance::Incremental, Some(rest)) => Some(*rest),
+                _ => None,
+            };
+        }
         words.read(from)
             && are_usual(words.seen & AXES_SEEN, setup)
             && (!Capability::CoreXy.is_built_in()
@@ -92,6 +133,16 @@ impl State {
     #[inline(always)]
     fn reaches(&self, setup: &impl Setup) -> bool {
         Capability::CoreXy.is_built_in() && is_near(&self.position, setup)
+    }
+
+    /// What words are measured from, those of the extruder from where it is.
+    #[inline(never)]
+    fn with_own_extruder(&self) -> PerAxis<Length> {
+        let mut from = self.origin;
+        if let (Some(from), Some(at)) = (from.get_mut(EXTRUDER), self.position.get(EXTRUDER)) {
+            *from = *at;
+        }
+        from
     }
 
     #[inline(never)]
@@ -111,6 +162,12 @@ impl State {
         (self.feed, self.feed_units) = (feed, units);
         self.line = words.line;
         self.go(words.seen & AXES_SEEN, &words.target);
+        if PRINTS
+            && words.rest != 0
+            && let Some(residue) = self.residue.get_mut(EXTRUDER)
+        {
+            *residue = words.rest;
+        }
         out.clear();
         out.line = words.line;
         out.exact_stop = self.modal.path == PathMode::ExactStop;
@@ -167,7 +224,20 @@ impl<'a> Words<'a> {
         // A byte 0 would pass for the end of the line.
         let byte = if text.last() == Some(&0) { BAD } else { b' ' };
         let target = [Length::ZERO; AXES];
-        Words { byte, text, next: 0, seen, mode: None, feed: 0.0, line: 0, target }
+        let (prints, carried, rest) = (false, None, 0);
+        Words {
+            byte,
+            text,
+            next: 0,
+            seen,
+            mode: None,
+            feed: 0.0,
+            line: 0,
+            prints,
+            carried,
+            rest,
+            target,
+        }
     }
 
     /// Reads the line, whose lengths count from `from`. False if it is not usual.
@@ -178,6 +248,7 @@ impl<'a> Words<'a> {
             let axis = match letter {
                 b'X'..=b'Z' => letter - b'X',
                 b'A'..=b'C' => letter - b'A' + FIRST_ROTARY as u8,
+                b'E' if PRINTS && self.prints => EXTRUDER as u8,
                 // A blank is that without `CASE`, too.
                 0 if self.byte == b' ' => {
                     self.step();
@@ -195,7 +266,10 @@ impl<'a> Words<'a> {
             }
             self.seen |= bit;
             self.step();
-            let value = Length(self.number());
+            let mut value = Length(self.number());
+            if PRINTS && self.prints && usize::from(axis) == EXTRUDER {
+                value = self.filament(value);
+            }
             let i = usize::from(axis);
             let (Some(target), Some(origin)) = (self.target.get_mut(i), from.get(i)) else {
                 return false;
@@ -214,6 +288,7 @@ impl<'a> Words<'a> {
         match letter {
             b'G' if self.mode.is_none() => {
                 self.mode = match self.number() {
+                    0 if PRINTS && self.prints => Some(MotionMode::Feed),
                     0 => Some(MotionMode::Traverse),
                     Length::PER_MM => Some(MotionMode::Feed),
                     _ => return false,
@@ -243,6 +318,39 @@ impl<'a> Words<'a> {
         // 65,535.9999 at most: that fits.
         let value = (product(whole, 10_000) + u32::from(frac)) as i32;
         if negative { -value } else { value }
+    }
+
+    /// An E word, whose first four decimals have been read, with a fifth one and what those before have left.
+    #[inline(never)]
+    fn filament(&mut self, value: Length) -> Length {
+        let mut by = Exact { units: value, rest: 0 };
+        let point = usize::from(self.next).checked_sub(6).and_then(|at| self.text.get(at));
+        if self.byte.is_ascii_digit() && point == Some(&b'.') {
+            by = self.fifth(value);
+        }
+        match self.carried {
+            None => {}
+            Some(carried) => match by.carry(carried) {
+                Some(sum) => by = sum,
+                None => self.byte = BAD,
+            },
+        }
+        self.rest = by.rest;
+        by.units
+    }
+
+    /// With the fifth decimal; a sixth is left, where no word can begin with it.
+    fn fifth(&mut self, value: Length) -> Exact {
+        let digit = i16::from(self.byte - b'0');
+        self.step();
+        let start = usize::from(self.next).saturating_sub(1);
+        let word = self.text.get(..start).unwrap_or(&[]);
+        let negative =
+            word.iter().rev().find(|byte| !matches!(byte, b'0'..=b'9' | b'.')) == Some(&b'-');
+        let up = digit >= 5;
+        let rest = 1_000 * if up { digit - 10 } else { digit };
+        let (step, rest) = if negative { (-i32::from(up), -rest) } else { (i32::from(up), rest) };
+        Exact { units: Length(value.0 + step), rest }
     }
 
     /// The number of an F word.

@@ -98,6 +98,14 @@ pub trait Dialect {
     /// `Some(false)` those without a line number, `None` none. Asked before each line: a few cycles.
     fn brief(speech: Self::Speech, settings: &Settings) -> Option<bool>;
 
+    /// The block of a line that is as most lines of a [plain](Dialect::IS_PLAIN) dialect are, and takes its place in the order. `None`, and nothing done,
+    /// for one that has to be looked at closer. If the block is a usual move, it is answered by [`Dialect::put_brief`].
+    #[inline(always)]
+    fn usual(line: &[u8], speech: &mut Self::Speech) -> Option<Span> {
+        let _ = (line, speech);
+        None
+    }
+
     /// Puts the whole answer to such a block. Called for each usual move: part of its budget.
     fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out);
 
@@ -321,6 +329,15 @@ macro_rules! dialects {
                 match self {
                     $(#[cfg(feature = $feature)]
                     Self::$name(speech) => <$dialect>::brief(speech, settings),)+
+                }
+            }
+
+            /// See [`Dialect::usual`].
+            #[inline(always)]
+            pub fn usual(&mut self, line: &[u8]) -> Option<Span> {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(speech) => <$dialect>::usual(line, speech),)+
                 }
             }
 

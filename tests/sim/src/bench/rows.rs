@@ -532,7 +532,7 @@ pub const ROWS: [Row; 48] = [
         better: Lower,
         peers: ["-", "-", "5.80"],
         target: Some(1.1),
-        floor: Some(1.12),
+        floor: Some(1.01),
         measure: printing::plain,
     },
     Row {
@@ -543,7 +543,7 @@ pub const ROWS: [Row; 48] = [
         better: Lower,
         peers: NONE,
         target: Some(1.1),
-        floor: Some(1.165),
+        floor: Some(1.01),
         measure: printing::numbered,
     },
 ];
