@@ -46,7 +46,7 @@ pub fn of(code: Option<Code>) -> Option<Code> {
         (b'G', 10 | 11 | 28 | 161 | 162) => true,
         (b'M', number) => matches!(
             number,
-            17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 155
+            17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 130..=134 | 155
                 | 201 | 203..=208 | 220 | 221 | 301..=304 | 400 | 500..=503 | 900 | 999
         ),
         (b'T', _) => true,
@@ -90,6 +90,7 @@ pub fn part(
         115 => listed(report::identity(at, out)),
         118 => echo(at, block, out),
         119 => listed(report::switches(at, machine, out)),
+        130..=132 => tuning::set_teacup(number, at, block, machine, out),
         155 => {
             let seconds = value(block, b'S', 0).unwrap_or(0).clamp(0, 60);
             machine.memory().reprap.interval_s = seconds as u8;
@@ -108,7 +109,7 @@ pub fn part(
         302 => extrude_cold(block, machine, out),
         303 => tuning::begin(block, machine, out),
         400 => finished(machine),
-        500 if machine.value(Value::Kept) == 0 => Step::Later(0),
+        134 | 500 if machine.value(Value::Kept) == 0 => Step::Later(0),
         502 => restore(at, machine),
         503 => settings::list(at, machine, out).map_or(Step::Done, Step::At),
         92 | 201 | 203..=206 => settings::set(number, at, block, machine, out),
@@ -324,6 +325,9 @@ fn extrude_cold(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) ->
 fn advance(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
     const MOST: u16 = 20_000;
     let Some(time) = value(block, b'K', 4) else {
+        if has(block, b'K') {
+            return Step::Refused(Status::OutOfRange);
+        }
         let now = machine.settings().heating.first().map_or(0, |heating| heating.advance);
         text(out, text!("Advance K="));
         fixed(out, Fixed { value: now.into(), decimals: 4 });

@@ -1,10 +1,10 @@
-//! M303, and the factors of heaters: M301, M304.
+//! M303, and the factors of heaters: M301, M304, and in Teacup's units M130 to M132.
 
-use super::command::{number, value};
+use super::command::{has, number, value};
 use super::host::Step;
 use super::settings::{put_number, read};
 use super::write::{fixed, int, line_end, text};
-use crate::config::{Fixed, Owner};
+use crate::config::{Fixed, Number, Owner};
 use crate::heat::tune::{CYCLES_MAX, Stage, Tune};
 use crate::progmem::Text;
 use crate::protocol::{Machine, Out};
@@ -134,6 +134,44 @@ pub fn list(bed: bool, letter: u8, machine: &mut impl Machine, out: &mut impl Ou
     let value = read(machine, owner(bed), name(letter));
     factor(bed, letter, Fixed { value, decimals: 3 }.rounded(2), out);
     letter < 2
+}
+
+/// M130, M131, M132: S is a factor as Teacup has it, for quarters of a degree four times a second; P 1 is the bed. Without S the factors are
+/// told as M301 tells them.
+#[inline(never)]
+#[small]
+pub fn set_teacup(
+    code: u16,
+    at: u8,
+    block: &[u8],
+    machine: &mut impl Machine,
+    out: &mut impl Out,
+) -> Step {
+    let bed = match value(block, b'P', 0).unwrap_or(0) {
+        0 => false,
+        1 => true,
+        _ => return Step::Refused(Status::ToolInvalid),
+    };
+    let Some(to) = value(block, b'S', 4) else {
+        if has(block, b'S') {
+            return Step::Refused(Status::OutOfRange);
+        }
+        return if list(bed, at, machine, out) { Step::At(at + 1) } else { Step::Done };
+    };
+    // Power for a degree, for a degree and second, and for a degree a second, over two seconds.
+    let (letter, factor) = match code {
+        130 => (0, 4),
+        131 => (1, 16),
+        _ => (2, 8),
+    };
+    let Some(to) = u32::try_from(to).ok().and_then(|to| to.checked_mul(factor)) else {
+        return Step::Refused(Status::OutOfRange);
+    };
+    match put_number(machine, owner(bed), name(letter), Number::int(to / 10).thousandth()) {
+        Ok(()) => Step::Done,
+        Err(Status::Again) => Step::Later(0),
+        Err(status) => Step::Refused(status),
+    }
 }
 
 /// M301, of the bed M304: sets the factors that are named, or tells all if none is.
