@@ -209,13 +209,14 @@ pub fn usual(line: &[u8], session: &mut Session) -> Option<Span> {
         behind = rest;
     };
     end -= stated.len() + 1;
-    let mut says = 0u8;
+    // In 16 bits: on AVR a checked product of 8 bits does not tell of its overflow.
+    let mut says = 0u16;
     for byte in stated {
         let digit = byte.wrapping_sub(b'0');
-        if digit > 9 {
+        if digit > 9 || says > u8::MAX.into() {
             return None;
         }
-        says = says.checked_mul(10)?.checked_add(digit)?;
+        says = says * 10 + u16::from(digit);
     }
     // More than nine digits are none that is taken.
     let (mut number, mut start) = (0u32, 1u8);
@@ -230,7 +231,7 @@ pub fn usual(line: &[u8], session: &mut Session) -> Option<Span> {
     }
     let ends = matches!(digits.first(), Some(b' ' | b'G'));
     let is_next = (2..=8).contains(&start) && number as i32 == session.last.wrapping_add(1);
-    if stated.is_empty() || says != sum || !ends || !is_next || session.ahead != 0 {
+    if stated.is_empty() || says != u16::from(sum) || !ends || !is_next || session.ahead != 0 {
         return None;
     }
     session.last = number as i32;
@@ -316,7 +317,17 @@ mod tests {
         ]
         .map(with_sum)
         .into();
-        let others = ["G1 X1", "N7 G1 X1", "N7 G1 X1*", "N7 G1*1 ", "N7 G1*300", "N7*", "N", ""];
+        let others = [
+            "G1 X1",
+            "N7 G1 X1",
+            "N7 G1 X1*",
+            "N7 G1*1 ",
+            "N7 G1*300",
+            "N7 G1 X1*358",
+            "N7*",
+            "N",
+            "",
+        ];
         lines.extend(others.map(std::string::String::from));
         for (ahead, sums) in [(0, false), (0, true), (9, true)] {
             let before = Session { last: 6, ahead, sums, lines: 255 };

@@ -25,17 +25,22 @@ const KEEPS_MS: u64 = 4_000;
 
 /// Lines as they are in a file.
 pub fn plain(bed: &Bed) -> Result<Figure> {
-    over_ideal(bed, false)
+    over_ideal(bed, false, &["{dia:16}"])
+}
+
+/// The same with pressure advance.
+pub fn advanced(bed: &Bed) -> Result<Figure> {
+    over_ideal(bed, false, &["{he1pa:0.05}", "{dia:16}"])
 }
 
 /// Lines with their numbers and checksums, along X and Y.
 pub fn numbered(bed: &Bed) -> Result<Figure> {
-    over_ideal(bed, true)
+    over_ideal(bed, true, &["{dia:16}"])
 }
 
-fn over_ideal(bed: &Bed, numbered: bool) -> Result<Figure> {
+fn over_ideal(bed: &Bed, numbered: bool, more: &'static [&'static str]) -> Result<Figure> {
     let bed = bed.beside(&RAMPS14)?;
-    let how = How { jerk: Some(USUAL_JERK), more: &["{dia:16}"], ..How::default() };
+    let how = How { jerk: Some(USUAL_JERK), more, ..How::default() };
     let mut machine = bed.machine()?;
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut machine, 1_000)?;

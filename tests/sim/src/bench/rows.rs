@@ -11,7 +11,7 @@ use super::{Row, beyond, costs, jitter, limits, pauses, printing, rates, spirals
 const NONE: [&str; 3] = ["-"; 3];
 
 /// The table.
-pub const ROWS: [Row; 48] = [
+pub const ROWS: [Row; 49] = [
     Row {
         name: "rate-1",
         what: "highest rate held, 1 motor",
@@ -534,6 +534,17 @@ pub const ROWS: [Row; 48] = [
         target: Some(1.1),
         floor: Some(1.01),
         measure: printing::plain,
+    },
+    Row {
+        name: "print-0.2-advance",
+        what: "the same, with pressure advance",
+        unit: "x",
+        decimals: 3,
+        better: Lower,
+        peers: NONE,
+        target: Some(1.1),
+        floor: Some(1.01),
+        measure: printing::advanced,
     },
     Row {
         name: "print-0.2-numbered",
