@@ -119,15 +119,19 @@ pub fn behind_equals(text: &[u8]) -> &[u8] {
 #[small]
 fn setting(rest: &[u8]) -> Option<Command> {
     let equals = rest.iter().position(|byte| *byte == b'=')?;
-    let mut number = 0u8;
+    // In 16 bits: on AVR a checked product of 8 bits does not tell of its overflow.
+    let mut number = 0u16;
     for digit in rest.get(..equals)?.iter().filter(|byte| !is_blank(**byte)) {
         let digit = digit.wrapping_sub(b'0');
         if digit > 9 {
             return None;
         }
-        number = number.checked_mul(10)?.checked_add(digit)?;
+        number = number * 10 + u16::from(digit);
+        if number > u8::MAX.into() {
+            return None;
+        }
     }
-    Some(Command::Set(number, equals as u8 + 1))
+    Some(Command::Set(number as u8, equals as u8 + 1))
 }
 
 /// `name`, `name=v`.

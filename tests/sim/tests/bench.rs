@@ -82,5 +82,6 @@ rows! {
     a_hold_stops = "hold-stops";
     acceleration_on_arcs = "arcs-ac";
     a_printers_moves = "print-0.2";
+    a_printers_moves_with_pressure_advance = "print-0.2-advance";
     a_printers_moves_with_checksums = "print-0.2-numbered";
 }
