@@ -49,6 +49,7 @@ pub const MEGA2560_GRBL: Board = Board {
     encoder: Some(Encoder { index: pin(B, 5), sync: pin(K, 7) }),
     drivers: None,
     heaters: None,
+    card: None,
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

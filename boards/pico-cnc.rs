@@ -53,6 +53,7 @@ pub const PICO_CNC: Board = Board {
     encoder: Some(Encoder { index: gp(27), sync: gp(28) }),
     drivers: None,
     heaters: None,
+    card: None,
     step_timer: Timer::Pio,
     tick_timer: Timer::SysTick,
 };

@@ -58,6 +58,8 @@ pub const RAMPS14: Board = Board {
         ],
         fan: pin(H, 6),
     }),
+    // D53, as on the displays for RAMPS
+    card: Some(pin(B, 0)),
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

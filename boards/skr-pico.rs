@@ -63,6 +63,7 @@ pub const SKR_PICO: Board = Board {
         fan: gp(17),
     }),
     drivers: Some(Tmc2209 { tx: gp(8), rx: gp(9), addresses: &[0, 2, 1, 3], run: 18, hold: 9 }),
+    card: None,
     step_timer: Timer::Pio,
     tick_timer: Timer::SysTick,
 };

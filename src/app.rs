@@ -64,6 +64,8 @@ impl Links {
             restart: Cell::new(None),
             cleared_by: Cell::new(USB),
             heat: Heaters::new(),
+            #[cfg(feature = "sd")]
+            card: RefCell::new(crate::card::Card::new()),
             probe: Probe::default(),
             signs: Signs::default(),
             job: Cell::default(),

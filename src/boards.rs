@@ -16,6 +16,8 @@ mod pico_cnc;
 mod pico_cnc6;
 #[path = "../boards/ramps14.rs"]
 mod ramps14;
+#[path = "../boards/ramps14-sd.rs"]
+mod ramps14_sd;
 #[path = "../boards/skr-pico.rs"]
 mod skr_pico;
 
@@ -25,6 +27,7 @@ pub use mega2560_lathe::MEGA2560_LATHE;
 pub use pico_cnc::PICO_CNC;
 pub use pico_cnc6::PICO_CNC6;
 pub use ramps14::RAMPS14;
+pub use ramps14_sd::RAMPS14_SD;
 pub use skr_pico::SKR_PICO;
 
 /// Motors that the board of this image drives.
@@ -456,6 +459,8 @@ pub struct Board {
     pub drivers: Option<Tmc2209>,
     /// The heaters, for an image that can print.
     pub heaters: Option<Heaters>,
+    /// Selects an SD card, on the SPI of the ATmega2560; its SS may do that. Low for selected.
+    pub card: Option<Pin>,
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,
     /// Timer of the 1 kHz tick.
@@ -475,7 +480,7 @@ pub(crate) const SPI: [Pin; 4] =
     [pin(Port::B, 0), pin(Port::B, 1), pin(Port::B, 2), pin(Port::B, 3)];
 
 /// Beside those of motors and ports: of enables, hazards, the firmware, inputs, drivers, and SPI with what it selects.
-const OTHER_PINS: usize = 1 + 8 + 1 + inputs::COUNT + 2 + SPI.len() + 2;
+const OTHER_PINS: usize = 1 + 8 + 1 + inputs::COUNT + 2 + SPI.len() + 3;
 const MAX_PINS: usize = 3 * MOST_MOTORS + MAX_PORTS * SERIAL_PINS + OTHER_PINS;
 
 impl Serial {
@@ -546,6 +551,12 @@ impl Board {
         if let Some(Heaters { heaters: [hot_end, bed], .. }) = self.heaters {
             (pins[n], pins[n + 1]) = (hot_end.select, bed.select);
             n += 2;
+        }
+        if let Some(card) = self.card
+            && !card.is(SPI[0])
+        {
+            pins[n] = Some(card);
+            n += 1;
         }
         let mut s = 0;
         while s < SPI.len() && self.has_spi() {
@@ -632,7 +643,7 @@ impl Board {
 
     /// Whether something on it is spoken to over SPI.
     pub const fn has_spi(&self) -> bool {
-        self.has_max6675(0) || self.has_max6675(1)
+        self.card.is_some() || self.has_max6675(0) || self.has_max6675(1)
     }
 
     /// Whether a heater (0 hot end, 1 bed) may have a MAX6675.
@@ -765,13 +776,14 @@ impl Board {
 }
 
 /// Every board Kerf knows.
-pub const ALL: [&Board; 7] = [
+pub const ALL: [&Board; 8] = [
     &MEGA2560_GRBL,
     &MEGA2560_GRBL_LATHE,
     &MEGA2560_LATHE,
     &PICO_CNC,
     &PICO_CNC6,
     &RAMPS14,
+    &RAMPS14_SD,
     &SKR_PICO,
 ];
 
@@ -792,6 +804,9 @@ pub fn by_name(name: &str) -> Option<&'static Board> {
 #[cfg(feature = "board-ramps14")]
 pub const ACTIVE: &Board = &RAMPS14;
 /// The board that this image is built for.
+#[cfg(feature = "board-ramps14-sd")]
+pub const ACTIVE: &Board = &RAMPS14_SD;
+/// The board that this image is built for.
 #[cfg(feature = "board-mega2560-grbl-lathe")]
 pub const ACTIVE: &Board = &MEGA2560_GRBL_LATHE;
 /// The board that this image is built for.
@@ -809,6 +824,7 @@ pub const ACTIVE: &Board = &SKR_PICO;
 /// The board that this image is built for.
 #[cfg(not(any(
     feature = "board-ramps14",
+    feature = "board-ramps14-sd",
     feature = "board-mega2560-grbl-lathe",
     feature = "board-mega2560-lathe",
     feature = "board-pico-cnc",

@@ -23,11 +23,13 @@ pub enum Capability {
     Printer,
     /// Motors that drive X and Y together, as those of a CoreXY machine do.
     CoreXy,
+    /// Printing from an SD card.
+    Sd,
 }
 
 impl Capability {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Cycles,
         Self::Probing,
         Self::Jobs,
@@ -35,6 +37,7 @@ impl Capability {
         Self::Lathe,
         Self::Printer,
         Self::CoreXy,
+        Self::Sd,
     ];
 
     /// Whether this image has it.
@@ -48,6 +51,7 @@ impl Capability {
             Self::Lathe => cfg!(feature = "lathe"),
             Self::Printer => cfg!(feature = "printer"),
             Self::CoreXy => cfg!(feature = "corexy"),
+            Self::Sd => cfg!(feature = "sd"),
         }
     }
 
@@ -68,6 +72,7 @@ impl Capability {
             Self::Lathe => "lathe",
             Self::Printer => "printer",
             Self::CoreXy => "corexy",
+            Self::Sd => "sd",
         }
     }
 }

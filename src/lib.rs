@@ -49,6 +49,7 @@ pub mod boards;
 #[cfg(feature = "std")]
 pub mod canon;
 pub mod capability;
+pub mod card;
 pub mod config;
 pub mod dda;
 pub mod encoder;

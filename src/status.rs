@@ -39,6 +39,7 @@ pub enum Status {
     TooHot,
     TooCold,
     HeatersLocked,
+    CardError,
     UnrecognizedName,
     MalformedCommand,
     BadNumber,

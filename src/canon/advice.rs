@@ -139,6 +139,11 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "Look for the cause; `^x` unlocks them.",
     ),
     (
+        CardError,
+        "The SD card, or the file that is printed from it, cannot be read. The print has ended.",
+        "Look at card and wires (printing.md); M21, then M23 and M24 again.",
+    ),
+    (
         UnrecognizedName,
         "There is no setting or value of that name.",
         "Check the name in settings.md, and below.",

@@ -193,11 +193,25 @@ contract! {
         fn begin(heater: u8);
         /// The reading that has been begun last, if it is complete. Thread mode. Cost: 12.
         fn reading() -> Option<u16>;
-        /// What the MAX6675 of a heater sends, where it may have one: its reading. Thread mode. Cost: 500.
+        /// What the MAX6675 of a heater sends, where it may have one and no card is spoken to: its reading. Thread mode. Cost: 500.
         fn word(heater: u8) -> Option<u16>;
         /// Gives the hot end, the bed and the fan their power, 255 for all: pulses where [`PULSED`](crate::boards::PULSED) says so, elsewhere
         /// on or, with 0, off. Thread mode. Cost: 60.
         fn drive(power: [u8; 3]);
+    }
+
+    /// The lines of an SD card: SPI, and the pin that selects it. On a chip without one a line that nobody drives is high.
+    trait Card in card {
+        /// Selects the card: nobody else is spoken to until it is let go. Thread mode.
+        fn select();
+        /// Lets the card go, with a byte more in which it lets go of the line. Thread mode.
+        fn release();
+        /// Has the clock be 4 MHz, or, for a card that is new, 250 kHz. Thread mode.
+        fn set_fast(fast: bool);
+        /// Sends a byte; what came meanwhile. Thread mode. Cost: 60 at 4 MHz, 550 at 250 kHz.
+        fn exchange(byte: u8) -> u8;
+        /// Reads a block. Thread mode. Cost: 25,000.
+        fn read(block: &mut [u8; 512]);
     }
 
     /// The count of milliseconds.
@@ -233,7 +247,7 @@ pub trait Timing {
     /// By the number of motors that move, less one.
     const TICKS: [Ticks; MOTORS];
     /// Blocks that can wait at once: what RAM has room for.
-    const LOOK_AHEAD: usize = 61;
+    const LOOK_AHEAD: usize = if cfg!(feature = "sd") && !cfg!(feature = "std") { 38 } else { 61 };
     /// Lines that can wait on a port: at most 9, for brief answers tell by one digit how many more may come.
     const LINES: usize = 8;
     /// Bytes for all lines of USB together, and of the other port.

@@ -125,7 +125,7 @@ impl Heater {
         in_units(to).saturating_sub(self.now)
     }
 
-    /// The reading of its sensor: what the converter has, or of a MAX6675 what `ask` has been sent, each sixth look.
+    /// The reading of its sensor: what the converter has, or of a MAX6675 what `ask` has been sent, each sixth look. `None` is asked for again at the next.
     pub fn reading(
         &mut self,
         converted: Option<u16>,
@@ -134,13 +134,11 @@ impl Heater {
         if self.kind != Kind::Max6675 {
             return converted;
         }
-        self.rests = match self.rests {
-            0 => {
-                self.word = ask().unwrap_or(u16::MAX);
-                ASKED_EVERY - 1
-            }
-            rests => rests - 1,
-        };
+        if self.rests == 0 {
+            self.word = ask()?;
+            self.rests = ASKED_EVERY;
+        }
+        self.rests -= 1;
         Some(self.word)
     }
 

@@ -144,6 +144,9 @@ pub trait Answers {
         false
     }
 
+    /// Nothing more is put than what the line tells: it comes from a file, whose sender waits for no answer.
+    fn silence(&mut self) {}
+
     /// Whether the answer is a list, in which a `?` is not to wait for what has been put.
     fn is_list(&self) -> bool {
         false
@@ -277,6 +280,15 @@ macro_rules! dialects {
                 { has |= <$dialect>::IS_PLAIN; })+
                 has
             };
+
+            /// In the same dialect, as after a start.
+            #[cfg(feature = "sd")]
+            pub fn fresh(self, settings: &Settings) -> Self {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(_) => Self::$name(<$dialect>::speech(settings)),)+
+                }
+            }
 
             /// See [`Dialect::IS_PLAIN`].
             #[inline(always)]
@@ -451,6 +463,14 @@ macro_rules! dialects {
                 match self {
                     $(#[cfg(feature = $feature)]
                     Self::$name(request) => request.interject(),)+
+                }
+            }
+
+            #[inline(always)]
+            fn silence(&mut self) {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(request) => request.silence(),)+
                 }
             }
 

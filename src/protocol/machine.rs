@@ -2,6 +2,7 @@
 
 use super::dialect::Memory;
 use super::value::Value;
+use crate::card::{Entry, Op};
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::Change;
 use crate::gcode::tables::Row;
@@ -182,6 +183,23 @@ pub trait Machine {
     fn extrude_cold(&mut self, change: Cold) -> (i16, bool) {
         let _ = change;
         (0, true)
+    }
+
+    /// Asks something of the SD card.
+    fn card(&mut self, what: Op<'_>) -> Status {
+        let _ = what;
+        Status::NotBuiltIn
+    }
+
+    /// The next byte of the file that is chosen on the SD card, and how many it has.
+    fn card_progress(&mut self) -> Option<(u32, u32)> {
+        None
+    }
+
+    /// The file of that number on the SD card. `Err`: it cannot be read.
+    fn card_entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
+        let _ = number;
+        Err(Status::NotBuiltIn)
     }
 
     /// The origin of these axes, as bits, is no more where G92 has put it: it is where homing has.

@@ -596,6 +596,7 @@ impl LinePool {
     }
 
     /// Removes a line. The oldest costs next to nothing, any other about 8 cycles for each byte behind it.
+    #[inline(never)]
     pub fn remove(&mut self, id: LineId) {
         let index = usize::from(id.0);
         let Some(Entry { len, class, .. }) = self.entries.get(index).copied() else {

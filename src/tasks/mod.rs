@@ -5,6 +5,8 @@
 //! a function that returns an async block instead, which keeps what it uses.
 
 pub mod alarm;
+#[cfg(feature = "sd")]
+pub mod card;
 pub mod common;
 pub mod control;
 pub mod exec;

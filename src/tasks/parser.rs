@@ -69,7 +69,7 @@ const NONE: u8 = u8::MAX;
 const LEAVES: u8 = 2;
 
 /// A port's transmitter, while it is the parser's.
-type Line = MutexGuard<'static, NoopRawMutex, Tx>;
+pub(super) type Line = MutexGuard<'static, NoopRawMutex, Tx>;
 
 /// What the parser is about on a port.
 enum Session {
@@ -131,6 +131,9 @@ struct Parser {
     has_fed: bool,
     /// How many turns in a row have been left to others: by a long answer to short ones, by a line that waits to a report.
     waited: u8,
+    /// The line of a file on the SD card.
+    #[cfg(feature = "sd")]
+    feed: super::card::Feed,
 }
 
 /// The task.
@@ -146,6 +149,8 @@ pub fn run(
         last: USB,
         has_fed: false,
         waited: 0,
+        #[cfg(feature = "sd")]
+        feed: super::card::Feed::new(),
     };
     async move {
         let mut in_a_row = 0;
@@ -172,7 +177,7 @@ impl Parser {
         let alarmed = machine::is_alarmed();
         let free = is_free(links);
         let runs_job = !links.job.get().is_none();
-        let data = free && !runs_job;
+        let data = free && !runs_job && !self.is_feeding();
         let straight = !alarmed && !machine::is_checking();
         // What a port is told at once goes first: an acknowledgement is not to wait for a move.
         let tells = links.ports.iter().any(Port::tells);
@@ -200,9 +205,35 @@ impl Parser {
                 }
                 job_line(links);
             }
+            None if self.feed() => {}
             None => return Turn::Nothing,
         }
         Turn::More
+    }
+
+    /// Whether a line of the SD card is under way.
+    #[cfg(feature = "sd")]
+    #[inline(always)]
+    fn is_feeding(&self) -> bool {
+        self.feed.is_busy()
+    }
+
+    /// Goes on with the line of the SD card, or begins with the next one. Whether there may be more to do at once.
+    #[cfg(feature = "sd")]
+    fn feed(&mut self) -> bool {
+        self.is_quiet() && self.feed.turn(self.links)
+    }
+
+    #[cfg(not(feature = "sd"))]
+    #[inline(always)]
+    fn is_feeding(&self) -> bool {
+        false
+    }
+
+    #[cfg(not(feature = "sd"))]
+    #[inline(always)]
+    fn feed(&mut self) -> bool {
+        false
     }
 
     /// Whether no line of the port that feeds the machine is being answered.
@@ -417,10 +448,15 @@ impl Parser {
         poll_fn(move |cx| {
             let waited = core::mem::replace(&mut asked, true);
             let woken = links.parser_wake.poll(cx);
-            if self.lacking == 0 && self.is_quiet() {
-                return woken;
-            }
             let mut ready = woken.is_ready();
+            #[cfg(feature = "sd")]
+            if self.feed.waits() {
+                ready |= waited;
+                wake_after(links.thread, Event::Tick, cx.waker());
+            }
+            if self.lacking == 0 && self.is_quiet() {
+                return if ready { Poll::Ready(()) } else { woken };
+            }
             for (port, session) in links.ports.iter().zip(&self.sessions) {
                 let ticks = match session {
                     Session::Leave(..) => true,
@@ -625,7 +661,7 @@ fn gives_way(done: u8, since: u32) -> bool {
 
 /// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the
 /// tables, and nothing is being dropped.
-fn is_free(links: &Links) -> bool {
+pub(super) fn is_free(links: &Links) -> bool {
     let waits = links.commands_taken.get() || links.storage.is_awaited();
     !waits && !machine::is_flushing()
 }
@@ -670,7 +706,7 @@ fn job_line(links: &Links) {
 
 /// Whether the next line was a usual one.
 #[derive(Clone, Copy, PartialEq)]
-enum Usual {
+pub(super) enum Usual {
     /// The line was a usual one, and has been answered.
     Done,
     /// The line is no usual one.
@@ -874,7 +910,7 @@ fn step(links: &Links, port: &Port, id: LineId, request: &mut Request, tx: &mut 
 
 /// Interprets a block of a port's, if that feeds the machine.
 #[inline(never)]
-fn run_block(links: &Links, port: &Port, block: &[u8], tried: Usual) -> (Status, bool) {
+pub(super) fn run_block(links: &Links, port: &Port, block: &[u8], tried: Usual) -> (Status, bool) {
     match links.may_feed(port) {
         #[cfg(feature = "dialect-reprap")]
         true if port.is_plain() => interpret_rewritten(links, port, block),

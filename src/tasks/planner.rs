@@ -640,6 +640,8 @@ impl Planner {
             super::heat::forget_orders(links.thread);
         }
         links.job.set(Job::default());
+        #[cfg(feature = "sd")]
+        let _ = links.card.borrow_mut().print(false);
         let (cycle, killed) = machine::dropped();
         match cycle {
             Cycle::Jog => links.notices.jogged.set(true),

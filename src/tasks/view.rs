@@ -25,6 +25,8 @@ use super::turning;
 use crate::baud;
 use crate::boards::{MOTORS, inputs};
 use crate::capability::Capability;
+#[cfg(feature = "sd")]
+use crate::card::{Entry, Op};
 use crate::config::{Setting, Settings};
 use crate::gcode::command::Motion;
 #[cfg(feature = "dialect-reprap")]
@@ -688,6 +690,41 @@ impl Machine for View<'_> {
     #[cfg(feature = "dialect-reprap")]
     fn extrude_cold(&mut self, change: Cold) -> (i16, bool) {
         heat::extrude_cold(&self.links.heat, &mut self.settings, change)
+    }
+
+    #[cfg(feature = "sd")]
+    fn card(&mut self, what: Op<'_>) -> Status {
+        let mut card = self.links.card.borrow_mut();
+        let disturbs = matches!(what, Op::Begin | Op::Release | Op::Open(_) | Op::Delete(_));
+        if disturbs && card.prints() {
+            return Status::NotAccepted;
+        }
+        match what {
+            Op::Begin => card.begin(),
+            Op::Release => {
+                card.release();
+                Status::Ok
+            }
+            Op::Open(name) => card.open(name),
+            Op::Seek(at) => card.seek(at),
+            Op::Delete(name) => card.delete(name),
+            Op::Print(true) if machine::is_alarmed() => machine::alarm().status(),
+            Op::Print(prints) => {
+                self.links.parser_wake.signal();
+                card.print(prints)
+            }
+        }
+    }
+
+    #[cfg(feature = "sd")]
+    fn card_progress(&mut self) -> Option<(u32, u32)> {
+        self.links.card.borrow().progress()
+    }
+
+    #[cfg(feature = "sd")]
+    fn card_entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
+        let mut card = self.links.card.borrow_mut();
+        if card.prints() { Err(Status::NotAccepted) } else { card.entry(number) }
     }
 
     #[cfg(feature = "dialect-reprap")]

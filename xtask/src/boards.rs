@@ -30,6 +30,9 @@ pub enum Board {
     /// Arduino Mega 2560 with RAMPS 1.4
     #[value(name = "ramps14")]
     Ramps14,
+    /// Arduino Mega 2560 with RAMPS 1.4 and an SD card
+    #[value(name = "ramps14-sd")]
+    Ramps14Sd,
     /// BTT SKR Pico v1.0
     #[value(name = "skr-pico")]
     SkrPico,
@@ -63,6 +66,7 @@ impl Board {
             Board::PicoCnc => "pico-cnc",
             Board::PicoCnc6 => "pico-cnc6",
             Board::Ramps14 => "ramps14",
+            Board::Ramps14Sd => "ramps14-sd",
             Board::SkrPico => "skr-pico",
         }
     }

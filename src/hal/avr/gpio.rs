@@ -93,6 +93,11 @@ pub fn start() {
         }
     });
     super::heaters::start();
+    super::spi::start();
+    if let Some(select) = ACTIVE.card {
+        high(select);
+        output(select);
+    }
 }
 
 /// The motors whose drivers are wanted on, as bits.

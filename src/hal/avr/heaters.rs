@@ -132,10 +132,13 @@ pub fn reading() -> Option<u16> {
     }
 }
 
-/// What a heater's MAX6675 sends, if the board has one: see [`sensor`](crate::heat::sensor). It begins to convert then. Thread mode. Cost: 500 cycles.
+/// What a heater's MAX6675 sends, if the board has one and no card is spoken to: see [`sensor`](crate::heat::sensor). It begins to convert then. Thread mode. Cost: 500 cycles.
 #[small]
 pub fn word(heater: u8) -> Option<u16> {
     let Heaters { heaters: [hot_end, bed], .. } = ACTIVE.heaters?;
+    if super::card::is_taken() {
+        return None;
+    }
     // Each with its pin as a constant.
     match heater {
         0 => hot_end.select.map(|select| ask(|level| gpio::set(select, level))),
@@ -159,7 +162,6 @@ pub fn start() {
         gpio::high(select);
         gpio::output(select);
     }
-    spi::start();
     if HAS_PULSES {
         // SAFETY: the registers of the timer are this module's.
         unsafe {

@@ -15,6 +15,7 @@
 //! Everything else runs in thread mode, from [`avr_embassy::Executor::run_with`].
 
 pub mod arithmetic;
+pub mod card;
 mod edges;
 pub mod eeprom;
 pub mod encoder;

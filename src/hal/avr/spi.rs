@@ -19,8 +19,12 @@ const PATIENCE: u16 = 400;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Clock {
+    /// 4 MHz: 4 cycles a bit.
+    Mhz4 = 0b00,
     /// A MHz: 16 cycles a bit.
     Mhz1 = 0b01,
+    /// 250 kHz: 64 cycles a bit.
+    Khz250 = 0b10,
 }
 
 /// Makes outputs of the pins. Start-up.

@@ -6,6 +6,7 @@
 //! generator as the image.
 
 pub mod arithmetic;
+pub mod card;
 pub mod eeprom;
 pub mod encoder;
 pub mod flash;

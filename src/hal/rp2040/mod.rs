@@ -26,6 +26,7 @@
 
 #[path = "../host/arithmetic.rs"]
 pub mod arithmetic;
+pub mod card;
 mod drivers;
 pub mod eeprom;
 pub mod encoder;

@@ -90,6 +90,7 @@ rows! {
     TooHot = 9;
     TooCold = 9;
     HeatersLocked = 9;
+    CardError = 9;
     UnrecognizedName = 3;
     MalformedCommand = 1;
     BadNumber = 2;

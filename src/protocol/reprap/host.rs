@@ -2,7 +2,7 @@
 
 use super::command::{has, value, words};
 use super::write::{cold, fixed, int, line_end, text};
-use super::{report, settings, tuning};
+use super::{card, report, settings, tuning};
 use crate::config::Fixed;
 use crate::gcode::overrides::{Change, Override};
 use crate::machine::{Alarm, Cycle, Doing};
@@ -41,8 +41,11 @@ const EXTRUDER: u8 = 3;
 /// The code, if it is one of those here.
 #[inline(never)]
 #[small]
-pub fn of(code: Option<Code>) -> Option<Code> {
+pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
     let is_own = match code? {
+        (b'M', 20..=27 | 32) => true,
+        // Without a name it ends the program.
+        (b'M', 30) => !words(block).is_empty(),
         (b'G', 10 | 11 | 28 | 161 | 162) => true,
         (b'M', number) => matches!(
             number,
@@ -73,6 +76,7 @@ pub fn part(
         (_, number) => number,
     };
     match number {
+        20..=27 | 30 | 32 => card::part(number, at, block, machine, out),
         18 | 84 => motors_off(block, machine),
         17 => done(machine.energize(None, true)),
         82 | 83 => done(machine.extruder(Extruder::Relative(number == 83))),

@@ -11,6 +11,7 @@
 //! | [`request`] | a line on its way to its answer |
 //! | [`host`] | the codes that ask or set something |
 //! | [`settings`] | M92, M201 to M206, M503 |
+//! | [`card`] | M20 to M27, M30, M32: the SD card |
 //! | [`report`] | M105, M114, M115, M119 |
 //! | [`tuning`] | M301, M303, M304 |
 //! | [`telling`] | what is told unasked |
@@ -21,6 +22,7 @@
 //! costs at most 15,000 cycles, with a setting that is in EEPROM 3 ms. Nothing here can be full. A plain move takes none of these steps: [`frame::usual`] looks at its number and
 //! checksum, and the interpreter reads it as it is.
 
+mod card;
 mod command;
 mod frame;
 mod host;

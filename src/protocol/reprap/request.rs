@@ -20,6 +20,7 @@ pub struct Request {
     at: u8,
     block: Span,
     begun: bool,
+    silent: bool,
 }
 
 /// What is to be done.
@@ -55,9 +56,9 @@ impl Request {
         let what = match take(&frame, code, line, session) {
             Err(fault) => What::Resend(fault, session.last),
             Ok(()) if block.is_empty() => What::Nothing,
-            Ok(()) => host::of(code).map_or(What::Gcode, What::Host),
+            Ok(()) => host::of(code, block).map_or(What::Gcode, What::Host),
         };
-        Self { what, at: 0, block: frame.text(line), begun: false }
+        Self { what, at: 0, block: frame.text(line), begun: false, silent: false }
     }
 
     /// A line that could not be kept, or has been dropped.
@@ -71,7 +72,7 @@ impl Request {
             None if session.sums => What::Resend(Fault::Sum, session.last),
             _ => What::Refused(status),
         };
-        Self { what, at: 0, block: frame.block, begun: false }
+        Self { what, at: 0, block: frame.block, begun: false, silent: false }
     }
 }
 
@@ -119,7 +120,9 @@ impl Answers for Request {
                 return Next::Gcode { start, end };
             }
             What::Nothing => {
-                out.put_plain(plain!("ok\n"));
+                if !self.silent {
+                    out.put_plain(plain!("ok\n"));
+                }
                 return Next::Done(Status::Ok);
             }
             What::Host(code) => match host::part(code, self.at, block, machine, out) {
@@ -153,6 +156,10 @@ impl Answers for Request {
 
     fn has_begun(&self) -> bool {
         self.begun
+    }
+
+    fn silence(&mut self) {
+        self.silent = true;
     }
 }
 

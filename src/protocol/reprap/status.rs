@@ -46,6 +46,7 @@ pub fn reason(status: Status) -> Text {
         Status::TooHot => text!("heater too hot"),
         Status::TooCold => text!("too cold to extrude"),
         Status::HeatersLocked => text!("heaters are locked; M999 unlocks them"),
+        Status::CardError => text!("SD card cannot be read"),
         Status::ProbeFailed => text!("probing failed"),
         _ => text!("not carried out"),
     }

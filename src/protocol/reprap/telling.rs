@@ -3,6 +3,7 @@
 use super::status::reason;
 use super::write::{line_end, text};
 use super::{report, tuning};
+use crate::capability::Capability;
 use crate::protocol::{Machine, Notice, Occasion, Out, Tells};
 use crate::status::Status;
 use crate::text;
@@ -74,6 +75,9 @@ impl Tells for Telling {
 fn exception(status: Status, out: &mut impl Out) {
     match status {
         Status::ProgramStopped => text(out, text!("echo:busy: paused for user\n")),
+        Status::EndOfFile if Capability::Sd.is_built_in() => {
+            text(out, text!("Done printing file\n"));
+        }
         Status::EndOfFile | Status::ProgramChecked | Status::NoToolLength => {}
         Status::StepsLate => text(out, text!("echo:steps came late\n")),
         Status::BufferFull => text(out, text!("echo:bytes were lost\n")),

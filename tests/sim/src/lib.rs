@@ -10,6 +10,7 @@
 
 pub mod bench;
 mod bus;
+pub mod card;
 pub mod chip;
 mod counts;
 mod cpu;

@@ -8,6 +8,7 @@ use anyhow::{Result, ensure};
 use kerf::boards::{Board, Pin, Usart};
 
 use crate::bus::Bus;
+use crate::card::SdCard;
 use crate::chip::{ATMEGA2560, Chip};
 use crate::counts::Counts;
 use crate::cpu::{Cpu, Mode};
@@ -537,6 +538,19 @@ impl Machine {
         let clock_hz = self.clock_hz;
         self.bus_mut().spi.add_max6675(select, clock_hz);
         self.probes.push(recorder::attach_select(self.bus, self.cpu, select));
+    }
+
+    /// Puts an SD card with these contents on SPI, if the board has a pin to select it.
+    pub fn insert_card(&mut self, image: Vec<u8>, is_high: bool) {
+        let Some(select) = self.board().card else { return };
+        let card = SdCard::new(image, is_high, self.clock_hz);
+        self.bus_mut().spi.add_card(select, card);
+        self.probes.push(recorder::attach_select(self.bus, self.cpu, select));
+    }
+
+    /// The SD card, if there is one.
+    pub fn card(&mut self) -> Option<&mut SdCard> {
+        self.bus_mut().spi.card()
     }
 
     /// The MAX6675 that a pin selects, if there is one.

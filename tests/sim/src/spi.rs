@@ -1,10 +1,11 @@
-//! SPI as a master, and what is on it: MAX6675s.
+//! SPI as a master, and what is on it: MAX6675s, and an SD card.
 //!
 //! A byte takes eight bits of the clock that the registers ask for. A byte that is written before the one before it is done sets WCOL and is lost.
 //! Nothing is exchanged while the pins of the clock, of MOSI and of SS are no outputs. Not modelled: the interrupt, a slave, modes but 0.
 
 use kerf::boards::Pin;
 
+use crate::card::SdCard;
 use crate::cpu::Cpu;
 
 const SPCR: u16 = 0x4C;
@@ -114,6 +115,7 @@ pub struct Spi {
     /// The status has been read with the flag set: the next look at the data clears it.
     seen: bool,
     thermocouples: Vec<(Pin, Max6675)>,
+    card: Option<(Pin, SdCard)>,
 }
 
 impl Spi {
@@ -128,12 +130,22 @@ impl Spi {
     /// A reset; what is on the lines keeps its state.
     pub fn reset(&mut self) {
         let thermocouples = std::mem::take(&mut self.thermocouples);
-        *self = Self { thermocouples, ..Self::new() };
+        *self = Self { thermocouples, card: self.card.take(), ..Self::new() };
     }
 
     /// Puts a MAX6675 there, selected by a pin.
     pub fn add_max6675(&mut self, select: Pin, clock_hz: u32) {
         self.thermocouples.push((select, Max6675::new(clock_hz)));
+    }
+
+    /// Puts an SD card there, selected by a pin.
+    pub fn add_card(&mut self, select: Pin, card: SdCard) {
+        self.card = Some((select, card));
+    }
+
+    /// The SD card.
+    pub fn card(&mut self) -> Option<&mut SdCard> {
+        self.card.as_mut().map(|(_, card)| card)
     }
 
     /// The MAX6675 that a pin selects.
@@ -145,6 +157,9 @@ impl Spi {
     pub fn select(&mut self, pin: Pin, high: bool, cycle: u64) {
         for (_, device) in self.thermocouples.iter_mut().filter(|(select, _)| *select == pin) {
             device.select(!high, cycle);
+        }
+        if let Some((_, card)) = self.card.as_mut().filter(|(select, _)| *select == pin) {
+            card.select(!high);
         }
     }
 
@@ -209,5 +224,8 @@ impl Spi {
             .iter_mut()
             .filter(|(pin, _)| selected(*pin))
             .fold(IDLE, |line, (_, device)| line & device.exchange(byte, cycle));
+        if let Some((_, card)) = self.card.as_mut().filter(|(pin, _)| selected(*pin)) {
+            self.received &= card.exchange(byte, cycle);
+        }
     }
 }

@@ -1,0 +1,136 @@
+//! Files on an SD card: M20 to M27, M30 with a name, M32. While one is printed M25 to M27 and M24 alone are carried out.
+
+use super::command::{value, words};
+use super::host::Step;
+use super::write::{int, line_end, text};
+use crate::capability::Capability;
+use crate::card::{Entry, NAME_MAX, Op};
+use crate::protocol::{Machine, Out};
+use crate::status::Status;
+use crate::text;
+
+/// Does part `at` of a code.
+#[inline(never)]
+#[small]
+pub fn part(
+    number: u16,
+    at: u8,
+    block: &[u8],
+    machine: &mut impl Machine,
+    out: &mut impl Out,
+) -> Step {
+    if let Err(status) = Capability::Sd.check() {
+        return Step::Refused(status);
+    }
+    match number {
+        20 => return list(at, machine, out),
+        21 => match machine.card(Op::Begin) {
+            Status::Again => return Step::Later(0),
+            Status::Ok => text(out, text!("echo:SD card ok\n")),
+            status => return Step::Refused(status),
+        },
+        22 => return done(machine.card(Op::Release)),
+        23 | 32 => return open(number, at, block, machine, out),
+        24 | 25 => return done(machine.card(Op::Print(number == 24))),
+        26 => {
+            let at = value(block, b'S', 0).unwrap_or(0).max(0);
+            return done(machine.card(Op::Seek(at.unsigned_abs())));
+        }
+        27 => progress(machine, out),
+        _ => match machine.card(Op::Delete(name(block))) {
+            Status::Ok => named(text!("File deleted:"), block, out),
+            status => return Step::Refused(status),
+        },
+    }
+    Step::Done
+}
+
+#[small]
+fn done(status: Status) -> Step {
+    if status == Status::Ok { Step::Done } else { Step::Refused(status) }
+}
+
+/// The name of a file, without what hosts put around it.
+#[small]
+fn name(block: &[u8]) -> &[u8] {
+    let name = words(block);
+    let from = name.iter().position(|byte| !matches!(byte, b'!' | b'/')).unwrap_or(name.len());
+    let name = name.get(from..).unwrap_or(&[]);
+    let end = name.iter().position(|byte| matches!(byte, b'#' | b' ' | b';')).unwrap_or(name.len());
+    name.get(..end).unwrap_or(&[])
+}
+
+/// The files, one in each part.
+#[small]
+fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    if at == 0 {
+        return match machine.card_entry(0) {
+            Err(status) => Step::Refused(status),
+            Ok(_) => {
+                text(out, text!("Begin file list\n"));
+                Step::At(1)
+            }
+        };
+    }
+    match machine.card_entry(at - 1) {
+        Ok(Some(entry)) if at < u8::MAX => {
+            put(&entry, out);
+            Step::At(at + 1)
+        }
+        _ => {
+            text(out, text!("End file list\n"));
+            Step::Done
+        }
+    }
+}
+
+#[small]
+fn put(entry: &Entry, out: &mut impl Out) {
+    out.put_all(entry.name.iter().copied().take_while(|letter| *letter != 0));
+    out.put(b' ');
+    size(entry.size, out);
+    line_end(out);
+}
+
+#[small]
+fn size(bytes: u32, out: &mut impl Out) {
+    int(out, i32::try_from(bytes).unwrap_or(i32::MAX));
+}
+
+#[small]
+fn named(what: crate::progmem::Text, block: &[u8], out: &mut impl Out) {
+    text(out, what);
+    out.put_all(name(block).iter().copied().take(NAME_MAX));
+    line_end(out);
+}
+
+#[small]
+fn open(number: u16, at: u8, block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    if at == 0 {
+        return match machine.card(Op::Open(name(block))) {
+            Status::Ok => {
+                text(out, text!("File opened: "));
+                out.put_all(name(block).iter().copied().take(NAME_MAX));
+                text(out, text!(" Size: "));
+                size(machine.card_progress().map_or(0, |(_, size)| size), out);
+                line_end(out);
+                Step::At(1)
+            }
+            status => Step::Refused(status),
+        };
+    }
+    text(out, text!("File selected\n"));
+    if number == 32 { done(machine.card(Op::Print(true))) } else { Step::Done }
+}
+
+#[small]
+fn progress(machine: &mut impl Machine, out: &mut impl Out) {
+    let Some((at, of)) = machine.card_progress() else {
+        return text(out, text!("Not SD printing\n"));
+    };
+    text(out, text!("SD printing byte "));
+    size(at, out);
+    out.put(b'/');
+    size(of, out);
+    line_end(out);
+}

@@ -1,0 +1,296 @@
+//! A print from an SD card on the chip: files of a card that another program has formatted, steps at the pins, faults of the card.
+
+mod common;
+
+use std::io::{Cursor, Read, Seek, SeekFrom, Write};
+
+use common::{booted, firmware, set};
+use fatfs::{FatType, FileSystem, FormatVolumeOptions, FsOptions, format_volume};
+use kerf::boards::{RAMPS14, RAMPS14_SD};
+use kerf_sim::Machine;
+
+/// Where the partition begins, blocks.
+const FIRST: usize = 63;
+const BLOCK: usize = 512;
+
+/// A part of a file that is a volume.
+struct Volume<'a>(Cursor<&'a mut [u8]>);
+
+impl Read for Volume<'_> {
+    fn read(&mut self, to: &mut [u8]) -> std::io::Result<usize> {
+        self.0.read(to)
+    }
+}
+
+impl Write for Volume<'_> {
+    fn write(&mut self, from: &[u8]) -> std::io::Result<usize> {
+        self.0.write(from)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for Volume<'_> {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.0.seek(to)
+    }
+}
+
+/// A card with a partition and these files.
+fn image(fat: FatType, files: &[(&str, String)]) -> Vec<u8> {
+    // Small clusters, so that the chain of a file is long.
+    let (kind, blocks, cluster) = match fat {
+        FatType::Fat32 => (0x0C, 80_000, 512),
+        _ => (0x06, 20_000, 1_024),
+    };
+    let mut image = vec![0; (FIRST + blocks) * BLOCK];
+    image[446 + 4] = kind;
+    image[446 + 8..446 + 12].copy_from_slice(&(FIRST as u32).to_le_bytes());
+    image[446 + 12..446 + 16].copy_from_slice(&(blocks as u32).to_le_bytes());
+    image[510..512].copy_from_slice(&[0x55, 0xAA]);
+    let options = FormatVolumeOptions::new().fat_type(fat).bytes_per_cluster(cluster);
+    let mut volume = Volume(Cursor::new(&mut image[FIRST * BLOCK..]));
+    format_volume(&mut volume, options).unwrap();
+    let system = FileSystem::new(volume, FsOptions::new()).unwrap();
+    system.root_dir().create_dir("folder").unwrap();
+    for (name, text) in files {
+        system.root_dir().create_file(name).unwrap().write_all(text.as_bytes()).unwrap();
+    }
+    system.unmount().unwrap();
+    image
+}
+
+/// The names on a card.
+fn names(image: &[u8]) -> Vec<String> {
+    let mut image = image.to_vec();
+    let volume = Volume(Cursor::new(&mut image[FIRST * BLOCK..]));
+    let system = FileSystem::new(volume, FsOptions::new()).unwrap();
+    system.root_dir().iter().map(|entry| entry.unwrap().file_name()).collect()
+}
+
+struct Printer {
+    machine: Machine,
+    said: String,
+}
+
+impl Printer {
+    fn new(fat: FatType, is_high: bool, files: &[(&str, String)]) -> Self {
+        let mut machine = firmware(&RAMPS14_SD);
+        machine.insert_card(image(fat, files), is_high);
+        Self::started(machine)
+    }
+
+    fn started(machine: Machine) -> Self {
+        let mut printer = Self { machine, said: String::new() };
+        printer.run(1_000);
+        printer
+    }
+
+    fn run(&mut self, ms: u64) {
+        self.machine.run_for_ms(ms).unwrap();
+        self.said += &String::from_utf8(self.machine.receive()).unwrap();
+    }
+
+    fn until(&mut self, text: &str, ms: u64) -> u64 {
+        for n in 0..ms {
+            if self.said.contains(text) {
+                return n;
+            }
+            self.run(1);
+        }
+        panic!("no {text:?} in {ms} ms: {:?}", self.said);
+    }
+
+    /// Sends a line and waits for `ok`: what came before it.
+    fn ask(&mut self, line: &str) -> String {
+        self.said.clear();
+        self.machine.send(line.as_bytes());
+        self.machine.send(b"\n");
+        self.until("ok", 5_000);
+        // The rest of a line that begins so.
+        self.run(2);
+        let said = std::mem::take(&mut self.said);
+        said.trim_end().trim_end_matches("ok").to_owned()
+    }
+
+    fn begin(&mut self, name: &str) {
+        for (line, answer) in [("M21", "echo:SD card ok\n"), ("M302 P1", "")] {
+            assert_eq!(self.ask(line), answer, "{line}");
+        }
+        let opened = self.ask(&format!("M23 {name}"));
+        assert!(opened.ends_with("File selected\n"), "{opened}");
+    }
+
+    fn steps(&self) -> [i64; 4] {
+        self.machine.recorder().motors().each_ref().map(|motor| motor.position)
+    }
+}
+
+/// A zigzag of so many moves of 0.2 mm, with E, and comments.
+fn zigzag(moves: usize) -> String {
+    let mut text = String::from("; a slicer's\nG90\nM83\nG92 X0 Y0 E0\nG1 F3600\n");
+    for n in 1..=moves {
+        let (x, y) = (n as f64 * 0.2, (n / 50 % 2) as f64);
+        text += &format!("G1 X{x:.3} Y{y:.3} E0.01000 ; {n}\r\n");
+    }
+    text + "M73 P100\nG4 P10\n"
+}
+
+#[test]
+fn a_card_is_listed_printed_and_told() {
+    for (fat, is_high) in [(FatType::Fat16, false), (FatType::Fat32, true)] {
+        let moves = 300;
+        let files = [("RING.GCO", zigzag(moves)), ("a long name.gcode", "G4 P1\n".into())];
+        let mut printer = Printer::new(fat, is_high, &files);
+        assert!(printer.ask("M20").contains("SD card cannot be read"), "M21 comes first");
+        assert_eq!(printer.ask("M27"), "Not SD printing\n");
+        printer.begin("ring.gco");
+        let list = printer.ask("M20");
+        let size = files[0].1.len();
+        assert_eq!(
+            list,
+            format!("Begin file list\nRING.GCO {size}\nALONGN~1.GCO 6\nEnd file list\n")
+        );
+        assert_eq!(printer.ask("M27"), format!("SD printing byte 0/{size}\n"));
+        assert_eq!(printer.ask("M24"), "");
+        let ms = printer.until("Done printing file\n", 60_000);
+        assert!(printer.said.contains("echo:Unknown command: \"M73 P100\"\n"), "{}", printer.said);
+        assert!(!printer.said.contains("ok"), "{}", printer.said);
+        println!("{fat:?}: {moves} moves in {ms} ms");
+        let place = printer.ask("M114");
+        assert!(place.contains("X:60.000 Y:0.000") && place.contains("E:3.00"), "{place}");
+        assert_eq!(printer.ask("M27"), "Not SD printing\n");
+        assert!(printer.ask("M23 none.gco").contains("cannot be read"));
+        assert_eq!(printer.ask("M30 /ALONGN~1.GCO"), "File deleted:ALONGN~1.GCO\n");
+        let names = names(printer.machine.card().unwrap().image());
+        assert!(!names.contains(&"a long name.gcode".to_owned()), "{names:?}");
+        assert!(printer.ask("M22").is_empty());
+    }
+}
+
+/// Moves of 0.2 mm with E along a circle of 40 mm, at 60 mm/s.
+fn circle(moves: usize) -> String {
+    let mut text = String::from("G90\nM83\nG92 X40 Y0 E0\nG1 F3600\n");
+    for n in 1..=moves {
+        let (y, x) = (n as f64 * 0.2 / 40.0).sin_cos();
+        text += &format!("G1 X{:.3} Y{:.3} E0.00900\n", x * 40.0, y * 40.0);
+    }
+    text
+}
+
+/// What the image `ramps14` keeps of these settings.
+fn settings(lines: &[&str]) -> [u8; 4096] {
+    let (mut machine, mut host) = booted(&RAMPS14);
+    lines.iter().for_each(|line| set(&mut machine, &mut host, line));
+    host.run_for_ms(&mut machine, 6_000).unwrap();
+    *machine.eeprom()
+}
+
+/// How long a host that has four lines on their way takes for a file, s.
+fn over_the_wire(kept: &[u8; 4096], text: &str) -> f64 {
+    let mut machine = firmware(&RAMPS14_SD);
+    machine.set_eeprom(kept);
+    let mut printer = Printer::started(machine);
+    printer.ask("M302 P1");
+    printer.said.clear();
+    let mut sent = 0;
+    for line in text.lines() {
+        while sent - printer.said.matches("ok").count() >= 4 {
+            printer.run(1);
+        }
+        printer.machine.send(format!("{line}\n").as_bytes());
+        sent += 1;
+    }
+    printer.run(2_000);
+    let ((first, _), (last, _)) = printer.machine.recorder().span().unwrap();
+    printer.machine.seconds(last - first)
+}
+
+/// At the speed of a host at 115,200 baud, unless the card is slow; and who asks for temperatures is answered. Settings are those that the image `ramps14` has kept.
+#[test]
+fn a_print_from_a_card_is_as_fast_as_the_planner() {
+    let kept = settings(&["{mch:3}", "{xjm:100000}", "{yjm:100000}", "{ajm:100000}", "{he1k:6}"]);
+    let moves = 1_000;
+    let wire = over_the_wire(&kept, &circle(moves));
+    println!("over the wire {wire:.2} s");
+    for (access_us, most) in [(100, 1.1), (2_000, 1.1), (20_000, 1.2), (90_000, 2.5)] {
+        let mut machine = firmware(&RAMPS14_SD);
+        machine.set_eeprom(&kept);
+        machine.insert_card(image(FatType::Fat16, &[("A.G", circle(moves))]), true);
+        let select = RAMPS14_SD.heaters.unwrap().heaters[0].select.unwrap();
+        machine.build_max6675(select);
+        let mut printer = Printer::started(machine);
+        let settings = printer.ask("M503");
+        assert!(settings.contains("M92 X80.000 Y80.000"), "{settings}");
+        printer.begin("A.G");
+        printer.ask("M104 S30");
+        printer.machine.card().unwrap().access_us = access_us;
+        printer.ask("M24");
+        let mut slowest = 0;
+        for _ in 0..20 {
+            printer.run(50);
+            printer.said.clear();
+            printer.machine.send(b"M105\n");
+            slowest = slowest.max(printer.until("ok T:", 1_000));
+        }
+        printer.until("Done printing file\n", 60_000);
+        let ((first, _), (last, _)) = printer.machine.recorder().span().unwrap();
+        let seconds = printer.machine.seconds(last - first);
+        let ratio = seconds / wire;
+        println!("{access_us} us: {seconds:.2} s, {ratio:.3} of the wire; M105 after {slowest} ms");
+        assert!(slowest <= 20, "M105 is answered after {slowest} ms");
+        assert!(ratio < most, "{access_us} us: {seconds:.2} s, {ratio:.3}");
+        assert!(
+            !printer.said.contains("Error") && !printer.said.contains("late"),
+            "{}",
+            printer.said
+        );
+        let chip = printer.machine.max6675(select).unwrap();
+        assert!(chip.read > 10 && chip.spoilt == 0, "{} read, {} spoilt", chip.read, chip.spoilt);
+        let place = printer.ask("M114");
+        let x = 40.0 * (moves as f64 * 0.2 / 40.0).cos();
+        assert!(place.contains(&format!("X:{x:.3} ")) && place.contains("E:9.00"), "{place}");
+    }
+}
+
+#[test]
+fn a_pause_a_flush_and_a_card_that_is_pulled_end_it() {
+    let mut printer = Printer::new(FatType::Fat16, true, &[("A.G", zigzag(1_000))]);
+    printer.begin("A.G");
+    printer.ask("M24");
+    printer.run(500);
+    printer.ask("M25");
+    printer.run(2_000);
+    let (paused, at) = (printer.steps(), printer.ask("M27"));
+    printer.run(1_000);
+    assert_eq!((printer.steps(), printer.ask("M27")), (paused, at));
+    for line in ["M20", "M24"] {
+        assert!(!printer.ask(line).contains("Error"), "{line}");
+    }
+    for line in ["M20", "M21", "M22", "M23 A.G", "M30 A.G"] {
+        assert!(printer.ask(line).contains("Error:not possible now"), "{line}");
+    }
+    printer.run(300);
+    assert_ne!(printer.steps(), paused);
+    // The host's lines come between.
+    printer.ask("M117 hello");
+    printer.ask("M112");
+    printer.run(500);
+    let stopped = printer.steps();
+    printer.ask("M999");
+    printer.run(500);
+    assert_eq!(printer.steps(), stopped);
+    // From the start again, and the card is pulled.
+    printer.begin("A.G");
+    printer.ask("M24");
+    printer.run(500);
+    printer.machine.card().unwrap().is_there = false;
+    printer.until("Error:SD card cannot be read\n", 2_000);
+    assert!(printer.ask("M21").contains("cannot be read"));
+    printer.machine.card().unwrap().is_there = true;
+    printer.begin("A.G");
+    assert!(printer.ask("M24").is_empty());
+    printer.until("Done printing file\n", 60_000);
+}
