@@ -45,8 +45,8 @@ pub const MEGA2560_GRBL: Board = Board {
         Some(pin(K, 3)),
         Some(pin(K, 0)),
     ],
-    // D11 and A15
-    encoder: Some(Encoder { index: pin(B, 5), sync: pin(K, 7) }),
+    // D11, A15 and A14
+    encoder: Some(Encoder { index: pin(B, 5), sync: pin(K, 7), second: Some(pin(K, 6)) }),
     drivers: None,
     heaters: None,
     card: None,

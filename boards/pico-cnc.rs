@@ -50,7 +50,7 @@ pub const PICO_CNC: Board = Board {
         Some(gp(22)),
         Some(gp(26)),
     ],
-    encoder: Some(Encoder { index: gp(27), sync: gp(28) }),
+    encoder: Some(Encoder { index: gp(27), sync: gp(28), second: None }),
     drivers: None,
     heaters: None,
     card: None,

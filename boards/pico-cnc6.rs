@@ -46,6 +46,6 @@ pub const PICO_CNC6: Board = Board {
         Some(gp(22)),
         Some(gp(26)),
     ],
-    encoder: Some(Encoder { index: gp(27), sync: gp(28) }),
+    encoder: Some(Encoder { index: gp(27), sync: gp(28), second: None }),
     ..PICO_CNC
 };

@@ -48,7 +48,7 @@ pub const RAMPS14: Board = Board {
         Some(pin(K, 1)),
     ],
     // D2 and D3
-    encoder: Some(Encoder { index: pin(E, 4), sync: pin(E, 5) }),
+    encoder: Some(Encoder { index: pin(E, 4), sync: pin(E, 5), second: None }),
     drivers: None,
     // D10 and A13, or a MAX6675 at D50, D52 and, of AUX-2, D40; D8 and A14; D9
     heaters: Some(Heaters {

@@ -372,6 +372,8 @@ pub struct Encoder {
     pub index: Pin,
     /// The pin of the sensor that pulses several times a turn.
     pub sync: Pin,
+    /// A quarter of the way to the next mark behind `sync`, where the board has a pin for it; on an AVR one of the same port.
+    pub second: Option<Pin>,
 }
 
 impl Encoder {
@@ -683,6 +685,12 @@ impl Board {
         let [index, sync] = encoder.vectors();
         assert!(index != 0 && sync != 0, "a sensor of this board cannot interrupt");
         assert!(index != sync, "the sensors of this board share a vector");
+        if let Some(second) = encoder.second {
+            assert!(
+                second.port as u8 == encoder.sync.port as u8,
+                "the level of a sensor is on another port"
+            );
+        }
         let pwm = matches!(self.pwm, Some(Pwm { timer: Timer::T5, .. }));
         let taken = matches!(self.step_timer, Timer::T5) || matches!(self.tick_timer, Timer::T5);
         assert!(!pwm && !taken, "the timer of the encoder is used twice");
@@ -922,14 +930,14 @@ mod tests {
     #[test]
     #[should_panic(expected = "the sensors of this board share a vector")]
     fn sensors_have_a_vector_each() {
-        let encoder = Some(Encoder { index: pin(Port::K, 1), sync: pin(Port::K, 7) });
+        let encoder = Some(Encoder { index: pin(Port::K, 1), sync: pin(Port::K, 7), second: None });
         Board { encoder, ..MEGA2560_GRBL }.check();
     }
 
     #[test]
     #[should_panic(expected = "a sensor of this board cannot interrupt")]
     fn sensors_interrupt() {
-        let encoder = Some(Encoder { index: pin(Port::L, 1), sync: pin(Port::K, 7) });
+        let encoder = Some(Encoder { index: pin(Port::L, 1), sync: pin(Port::K, 7), second: None });
         Board { encoder, ..MEGA2560_GRBL }.check();
     }
 

@@ -9,6 +9,9 @@
 //! is one of an index. With the index alone a pulse in less than 0.6 of the turn before is one; one that is
 //! missing looks like a slower spindle. Misfits are counted (`spx`), and the first is told (exception 40).
 //!
+//! **Direction.** A second sensor of sync, if there is one and `spq` says so, has pulses count down when the spindle turns backwards. One that turns round
+//! outside of G33.1 is measured anew. A pass is told pulses that count up, whichever way it goes ([`Encoder::of_pass`]).
+//!
 //! **Stop.** No pulse for half a second, or for twice as long as between the last two if that is more, is a spindle that
 //! stands still: its speed is 0, and nothing is known of it any more.
 //!
@@ -43,7 +46,7 @@ pub struct Pulses {
     pub index_at: u16,
     /// Pulses of sync when that came.
     pub at_index: u16,
-    /// Pulses of sync, and the time of the last one.
+    /// Pulses of sync, less those of the way back if the direction is told; and the time of the last one.
     pub sync: u16,
     /// See `sync`.
     pub sync_at: u16,
@@ -72,10 +75,12 @@ pub struct Encoder {
     sync_at: u32,
     /// How long the last turn took; 0 if it is not known.
     turn: u32,
-    /// Index pulses in a row, up to [`SURE`], [`NEWS`] and [`ROUND`].
+    /// Index pulses in a row, up to [`SURE`], and the bits below.
     seen: u8,
     /// Misfits, up to 255.
     misfits: u8,
+    /// The first has been told.
+    told: bool,
     /// How far the axes are ahead of the spindle in a pass, um, at the last index.
     error: i16,
     /// How the pass stands in step with the spindle ([`thread`](crate::motion::thread)): [`Status::Again`] for none that has begun,
@@ -89,8 +94,17 @@ const NEWS: u8 = 0x80;
 /// Of [`Encoder::seen`]: it turns round, so that the pulses of sync before the next index do not tell.
 const ROUND: u8 = 0x40;
 
+/// Of [`Encoder::seen`]: it turns backwards.
+const BACK: u8 = 0x20;
+
+/// Of [`Encoder::seen`]: pulses of the pass count down.
+const MIRRORS: u8 = 0x10;
+
+/// Of [`Encoder::seen`]: pulses tell the direction.
+const TELLS: u8 = 0x08;
+
 /// Of [`Encoder::seen`]: the index pulses.
-const COUNT: u8 = 0x3F;
+const COUNT: u8 = 0x07;
 
 /// After so many index pulses in a row the time of a turn tells of its neighbours.
 const SURE: u8 = 4;
@@ -110,9 +124,16 @@ impl Encoder {
             turn: 0,
             seen: 0,
             misfits: 0,
+            told: false,
             error: 0,
             pass: Status::Again,
         }
+    }
+
+    /// One that knows a spindle at a steady speed.
+    #[cfg(test)]
+    pub fn at(time: u32, per_turn: u16, turn: u32) -> Self {
+        Self { per_turn, time, turn, ..Self::new() }
     }
 
     /// Pulses of sync in a turn; 0 for no encoder.
@@ -120,9 +141,10 @@ impl Encoder {
         self.per_turn
     }
 
-    /// An encoder with so many pulses of sync in a turn is set up; 0 for none. What was known is forgotten.
-    pub fn set_up(&mut self, per_turn: u16, pulses: &Pulses) {
-        *self = Self { per_turn, index: pulses.index, sync: pulses.sync, ..Self::new() };
+    /// An encoder with so many pulses of sync in a turn is set up, 0 for none, whose pulses may tell the direction. What was known is forgotten.
+    pub fn set_up(&mut self, per_turn: u16, tells: bool, pulses: &Pulses) {
+        let seen = if tells { TELLS } else { 0 };
+        *self = Self { per_turn, seen, index: pulses.index, sync: pulses.sync, ..Self::new() };
         self.time = pulses.now.into();
     }
 
@@ -154,9 +176,49 @@ impl Encoder {
         self.seen |= ROUND;
     }
 
+    /// Whether pulses tell the direction.
+    pub fn tells(&self) -> bool {
+        self.seen & TELLS != 0
+    }
+
+    /// Whether it turns backwards, as far as that is told.
+    pub fn turns_back(&self) -> bool {
+        self.seen & BACK != 0
+    }
+
+    /// A pass begins, of a spindle that is told to turn backwards or not; `None` if nobody knows. False if it turns the other way.
+    pub fn begin(&mut self, backwards: Option<bool>) -> bool {
+        let turns_back = self.turns_back();
+        self.seen = self.seen & !MIRRORS | if turns_back { MIRRORS } else { 0 };
+        !self.tells() || backwards.is_none_or(|backwards| backwards == turns_back)
+    }
+
+    /// The way back of G33.1 begins: pulses of the pass count the other way. Exec.
+    pub fn turn_pass(&mut self) {
+        if self.tells() {
+            self.seen ^= MIRRORS;
+        }
+    }
+
+    /// The pulses as the pass sees them: they count up on the way that it has begun with.
+    pub fn of_pass(&self, pulses: Pulses) -> Pulses {
+        if self.seen & MIRRORS == 0 {
+            return pulses;
+        }
+        let (sync, at_index) = (pulses.sync.wrapping_neg(), pulses.at_index.wrapping_neg());
+        Pulses { sync, at_index, ..pulses }
+    }
+
     /// Misfits so far, 255 for more.
     pub fn misfits(&self) -> u8 {
         self.misfits
+    }
+
+    /// Whether there has been a misfit that nobody has been told of: the first alone.
+    pub fn take_misfit(&mut self) -> bool {
+        let is_new = self.misfits != 0 && !self.told;
+        self.told |= is_new;
+        is_new
     }
 
     /// In a pass the axes were so far ahead of the spindle at an index, mm. Exec.
@@ -182,6 +244,9 @@ impl Encoder {
     pub fn look(&mut self, pulses: &Pulses) -> bool {
         self.time = self.time_at(pulses.now);
         if pulses.sync != self.sync {
+            if self.tells() {
+                self.take_direction(pulses.sync.wrapping_sub(self.sync) as i16);
+            }
             self.sync = pulses.sync;
             self.sync_at = self.time_of(pulses, pulses.sync_at);
         }
@@ -193,6 +258,17 @@ impl Encoder {
             (self.seen, self.turn) = (self.seen & !COUNT, 0);
         }
         misfit
+    }
+
+    /// So many pulses have come, or were taken back.
+    fn take_direction(&mut self, change: i16) {
+        let turns_back = if change < 0 { BACK } else { 0 };
+        if self.seen & BACK != turns_back {
+            self.seen ^= BACK;
+            if self.seen & ROUND == 0 {
+                (self.seen, self.turn) = (self.seen & !COUNT, 0);
+            }
+        }
     }
 
     /// A time before the last look.
@@ -207,13 +283,14 @@ impl Encoder {
         let at = self.time_of(pulses, pulses.index_at);
         let took = at.wrapping_sub(self.index_at) / u32::from(turns);
         let synced = pulses.at_index.wrapping_sub(self.at_index);
+        let synced = if self.turns_back() { synced.wrapping_neg() } else { synced };
         self.index = pulses.index;
         self.at_index = pulses.at_index;
         self.index_at = at;
         let (before, turn) = (self.seen & COUNT, self.turn);
         let turns_round = self.seen & ROUND != 0;
         let seen = u8::try_from(turns).map_or(SURE, |turns| before.saturating_add(turns));
-        self.seen = self.seen & NEWS | seen.min(SURE);
+        self.seen = self.seen & !(COUNT | ROUND) | seen.min(SURE);
         if before == 0 || turns_round {
             return false;
         }
@@ -286,7 +363,7 @@ mod tests {
         fn new(per_turn: u16, now: u64) -> Self {
             let (mut encoder, pulses) =
                 (Encoder::new(), Pulses { now: now as u16, ..Pulses::NONE });
-            encoder.set_up(per_turn, &pulses);
+            encoder.set_up(per_turn, false, &pulses);
             Self { encoder, pulses, now, looked: now, misfits: 0 }
         }
 
@@ -409,6 +486,31 @@ mod tests {
         spindle.turn(7, 40_000);
         (0..2).for_each(|_| spindle.turn(8, 40_000));
         assert_eq!(spindle.misfits, 1);
+    }
+
+    #[test]
+    fn a_second_sensor_tells_the_direction() {
+        let mut spindle = Spindle::new(8, 0);
+        spindle.encoder.set_up(8, true, &Pulses::NONE);
+        (0..5).for_each(|_| spindle.turn(8, 40_000));
+        assert!(!spindle.encoder.turns_back() && spindle.encoder.speed() > 0);
+        assert!(spindle.encoder.begin(Some(false)) && spindle.encoder.begin(None));
+        assert!(!spindle.encoder.begin(Some(true)));
+        // Backwards: measured anew, and none is missing.
+        for turn in 0..5 {
+            spindle.index();
+            for _ in 0..8 {
+                spindle.pass(2_500);
+                spindle.pulses.sync = spindle.pulses.sync.wrapping_sub(1);
+                spindle.pulses.sync_at = spindle.now as u16;
+                spindle.pass(2_500);
+            }
+            assert!(spindle.encoder.turns_back(), "{turn}");
+        }
+        assert!(spindle.encoder.begin(Some(true)) && spindle.encoder.speed() > 0);
+        let seen = spindle.encoder.of_pass(spindle.pulses);
+        assert_eq!(seen.sync, spindle.pulses.sync.wrapping_neg());
+        assert_eq!(spindle.misfits, 0);
     }
 
     #[test]

@@ -32,6 +32,7 @@ pub enum Status {
     NoEncoderInput,
     SpindleError,
     NotReversed,
+    WrongWay,
     SensorOpen,
     SensorShort,
     HeatRunaway,

@@ -104,6 +104,11 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "Free the tap by hand, `{clear:n}`. Check that M4 turns the spindle backwards; turn slower.",
     ),
     (
+        WrongWay,
+        "A thread was to begin, and the second sync sensor says that the spindle turns the other way than M3 or M4 has asked for. Nothing has moved.",
+        "Swap the sync sensors, or the spindle's wires; see `spdp`. `{spq:0}` has the direction not looked at.",
+    ),
+    (
         SensorOpen,
         "The sensor of a heater reads as if its wire were broken. All heaters are off and locked.",
         "Look at plug and wire of the sensor (printing.md). `^x`, then heat again.",

@@ -169,7 +169,7 @@ contract! {
 
     /// The sensors of the spindle, whose pulses are counted and timed. See [`crate::encoder`].
     trait Sensors in encoder {
-        /// The sensors `lines` are read from now on (bit 0 index, bit 1 sync), whose contacts bounce for so many counts, up to half of 2^16.
+        /// The sensors `lines` are read from now on (bit 0 index, bit 1 sync, bit 2 the second one of sync), whose contacts bounce for so many counts, up to half of 2^16.
         /// Thread mode.
         fn set_up(lines: u8, bounce: u16);
         /// Whether any is read. Any level.

@@ -29,7 +29,7 @@ use super::block::Pass;
 use super::float::{greater, least, some};
 use super::retract::Retract;
 use super::short::Short;
-use crate::encoder::{COUNTS_PER_S, Pulses};
+use crate::encoder::{COUNTS_PER_S, Encoder, Pulses};
 use crate::hal::TIMER_HZ;
 use crate::math::sqrt;
 use crate::status::Status;
@@ -241,6 +241,11 @@ impl Thread {
         self.stage == Stage::Waits
     }
 
+    /// Pulses are told the other way round from here on.
+    pub fn mirror(&mut self) {
+        self.pulses = self.pulses.wrapping_neg();
+    }
+
     /// It begins, with the phase of the way there.
     pub fn turn_back(&mut self) {
         self.ahead = -self.ahead;
@@ -278,9 +283,12 @@ impl Thread {
         self.ahead -= distance;
     }
 
-    /// Takes up what sensors have seen by `time`, of a spindle with so many pulses a turn, of which the last took `turn` counts.
+    /// Takes up what sensors have seen by `time`, of a spindle that the encoder knows. Whether it has turned round just now.
     #[inline(never)]
-    pub fn note(&mut self, time: u32, pulses: &Pulses, per_turn: u16, turn: u32) {
+    pub fn note(&mut self, pulses: &Pulses, encoder: &Encoder) -> bool {
+        let (time, per_turn, turn) = (encoder.time(), encoder.per_turn(), encoder.turn());
+        let tells = encoder.tells();
+        let had_turned = self.has_turned();
         let before = |at: u16| time.wrapping_sub(pulses.now.wrapping_sub(at).into());
         if self.per_turn == 0 {
             (self.per_turn, self.index) = (per_turn, pulses.index as u8);
@@ -305,18 +313,20 @@ impl Thread {
         }
         let new = count.wrapping_sub(self.pulses);
         match self.stage {
-            Stage::Armed | Stage::Off => return,
+            Stage::Armed | Stage::Off => return false,
             _ if new == 0 => {}
-            Stage::Indexed => {
+            Stage::Indexed if !(tells && (new as i8) < 0) => {
                 self.ahead = self.pitch() * f32::from(new - 1);
                 (self.at, self.since, self.measured) = (at, at, 0);
                 self.stage = Stage::Known;
             }
-            Stage::Turning | Stage::Top => self.take_turning(new, at),
+            Stage::Turning | Stage::Top => self.take_turning(new, tells, at),
             Stage::Turned | Stage::Waits => {
-                self.ahead -= self.pitch() * f32::from(new);
-                self.keep_pace(f32::from(new), at);
+                let count = if tells { f32::from(new as i8) } else { f32::from(new) };
+                self.ahead -= self.pitch() * count;
+                self.keep_pace(count, at);
             }
+            _ if tells && (new as i8) < 0 => self.stage = Stage::Lost,
             _ => self.take(new, at),
         }
         self.pulses = count;
@@ -328,6 +338,7 @@ impl Thread {
         if self.stage >= Stage::Follows && self.stage < Stage::Lost && age > overdue {
             self.stage = Stage::Lost;
         }
+        self.has_turned() && !had_turned
     }
 
     /// How far the axes, which go at `velocity` at the end of what is queued, were ahead of the line at the last pulse, mm: behind an
@@ -384,7 +395,7 @@ impl Thread {
         self.at = at;
         self.measured = self.measured.saturating_add(count as u16);
         let window = at.wrapping_sub(self.since);
-        if window < WINDOW {
+        if window < WINDOW || self.measured == 0 {
             return;
         }
         let counts = window as f32;
@@ -399,19 +410,26 @@ impl Thread {
         (self.since, self.measured) = (at, 0);
     }
 
-    /// Pulses of a spindle that is about to turn round. One that comes about when it stands, or later, is of the way back, over the mark of the last one; where the
+    /// Pulses of a spindle that is about to turn round. If they tell the direction, it has when they count down. Else one that comes about when it stands, or later, is of the way back, over the mark of the last one; where the
     /// spindle is then follows from how it has slowed down.
     #[inline(never)]
-    fn take_turning(&mut self, new: u8, at: u32) {
+    fn take_turning(&mut self, new: u8, tells: bool, at: u32) {
         let after = at.wrapping_sub(self.at) as f32;
         let (rate, decel) = self.pace();
-        if self.stage != Stage::Top && (decel <= 0.0 || after * decel <= FORWARD * rate) {
+        let is_forward = match tells {
+            true => new as i8 >= 0,
+            false => self.stage != Stage::Top && (decel <= 0.0 || after * decel <= FORWARD * rate),
+        };
+        if is_forward {
             let count = f32::from(new);
             self.ahead += self.pitch() * count;
             return self.keep_pace(count, at);
         }
         let back = decel * after - rate;
-        self.ahead += self.pitch() * (rate - 0.5 * decel * after) * after;
+        // The first on the way back is at the mark of the last on the way there.
+        let way =
+            if tells { f32::from(new as i8) + 1.0 } else { (rate - 0.5 * decel * after) * after };
+        self.ahead += self.pitch() * way;
         // No slower than a pulse in the time that it took.
         self.interval = least(after, 1.0 / greater(back, 1e-9));
         (self.at, self.since, self.measured) = (at, at, 0);
@@ -559,9 +577,14 @@ mod tests {
             }
         }
 
+        fn note(&mut self, pulses: &Pulses) {
+            let encoder = Encoder::at(self.time as u32, self.per_turn, self.turn);
+            self.thread.note(pulses, &encoder);
+        }
+
         fn stretch(&mut self) {
             let pulses = self.pulses();
-            self.thread.note(self.time as u32, &pulses, self.per_turn, self.turn);
+            self.note(&pulses);
             let seconds = STRETCH as f32 / COUNTS_PER_S as f32;
             let wanted = self.thread.velocity(0, self.velocity, ACCEL, false);
             let gain = ACCEL * seconds;
@@ -647,7 +670,7 @@ mod tests {
         while pass.thread.fault().is_none() {
             pass.time += u64::from(STRETCH);
             let now = Pulses { now: pass.time as u16, ..pulses };
-            pass.thread.note(pass.time as u32, &now, 4, 50_000);
+            pass.note(&now);
         }
         let took = pass.time - from;
         assert!((12_500..2 * 12_500 + 3 * u64::from(STRETCH)).contains(&took), "{took}");

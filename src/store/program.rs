@@ -23,7 +23,7 @@ use crate::capability::Capability;
 
 /// Bytes that it takes, with its head.
 /// The settings of a printer take the room of 16 records.
-pub const AREA: u16 = if Capability::Printer.is_built_in() { 709 } else { 885 };
+pub const AREA: u16 = if Capability::Printer.is_built_in() { 698 } else { 874 };
 /// What byte 0 is. Not what a record begins with.
 const VALID: u8 = 0x50;
 const ERASED: u8 = 0xFF;

@@ -332,7 +332,10 @@ fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
         encoder.note_turning();
     }
     encoder.look(&pulses);
-    thread.note(encoder.time(), &pulses, encoder.per_turn(), encoder.turn());
+    if thread.note(&encoder.of_pass(pulses), encoder) && encoder.tells() {
+        encoder.turn_pass();
+        thread.mirror();
+    }
     if let Some(error) = thread.error(velocity) {
         encoder.note_error(error);
     }

@@ -9,6 +9,7 @@ use super::alarm;
 use super::common;
 use super::links::Links;
 use super::storage::Storage;
+use crate::boards::ACTIVE;
 use crate::capability::Capability;
 use crate::config::groups::spindle;
 use crate::config::{Owner, Setting};
@@ -36,14 +37,22 @@ pub fn set_up(thread: Thread, storage: &Storage) {
     }
     let setting = |row| Setting::of(Owner::Spindle, row).map_or(0, |setting| storage.cold(setting));
     let (per_turn, bounce) = (setting(spindle::N) as u16, setting(spindle::B) / COUNT_US);
+    let has_second = const {
+        match ACTIVE.encoder {
+            Some(encoder) => encoder.second.is_some(),
+            None => false,
+        }
+    };
+    let tells = has_second && per_turn > 1 && setting(spindle::Q) != 0;
     let lines = match per_turn {
         0 => 0,
         1 => 1,
+        _ if tells => 7,
         _ => 3,
     };
     encoder::set_up(lines, bounce as u16);
     let pulses = encoder::read();
-    common::with(thread, |common| common.encoder.set_up(per_turn, &pulses));
+    common::with(thread, |common| common.encoder.set_up(per_turn, tells, &pulses));
 }
 
 /// Looks at what the sensors have seen.
@@ -54,9 +63,9 @@ pub fn look(links: &Links) {
         return;
     }
     let first_misfit = common::with(links.thread, |common| {
-        let before = common.encoder.misfits();
-        // In here: exec must not have looked at newer ones.
-        common.encoder.look(&encoder::read()) && before == 0
+        // In here: exec must not have looked at newer ones. In a pass it is exec that finds a misfit.
+        common.encoder.look(&encoder::read());
+        common.encoder.take_misfit()
     });
     // Who waits for the spindle asks again.
     flags::set(Event::BlockDone);
@@ -75,15 +84,18 @@ pub fn look(links: &Links) {
     }
 }
 
-/// How fast the spindle turns, thousandths of a turn a minute; `None` without an encoder.
+/// How fast the spindle turns, thousandths of a turn a minute, below 0 backwards if that is told; `None` without an encoder.
 #[small]
-pub fn speed(thread: Thread) -> Option<u32> {
+pub fn speed(thread: Thread) -> Option<i32> {
     if !Capability::Lathe.is_built_in() {
         return None;
     }
     common::with(thread, |common| {
         let encoder = &common.encoder;
-        (encoder.per_turn() != 0).then(|| encoder.speed())
+        (encoder.per_turn() != 0).then(|| {
+            let speed = encoder.speed() as i32;
+            if encoder.turns_back() { -speed } else { speed }
+        })
     })
 }
 
@@ -95,7 +107,10 @@ pub fn pass(thread: Thread) -> Status {
     }
     common::with(thread, |common| {
         let pass = common.encoder.pass;
-        if matches!(pass, Status::NoIndex | Status::NoSync | Status::VelocityExceeded) {
+        if matches!(
+            pass,
+            Status::NoIndex | Status::NoSync | Status::WrongWay | Status::VelocityExceeded
+        ) {
             common.encoder.pass = Status::Again;
         }
         pass

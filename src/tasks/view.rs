@@ -426,7 +426,7 @@ impl Machine for View<'_> {
             },
             Value::Reset => watchdog::cause() as i32,
             Value::SpindleSpeed => match turning::speed(self.links.thread) {
-                Some(speed) => speed as i32,
+                Some(speed) => speed,
                 None => self.programmed_speed(),
             },
             Value::SpindleProgrammed if Capability::Lathe.is_built_in() => self.programmed_speed(),

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | a switch's pin | has someone look at all switches ([`inputs`]) | 20, interrupts off |
 //! | an encoder's pin, none set up | the same | 25, interrupts off |
-//! | an encoder's pin | takes the time of a pulse ([`encoder`](super::encoder)) | 105 at most, interrupts off for 31 and 25 |
+//! | an encoder's pin | takes the time of a pulse ([`encoder`](super::encoder)) | 105 at most, 118 with a second one of sync, interrupts off for 31 and 25 |
 //!
 //! A handler of an encoder's pin reads timer 5 first, 20 cycles after it has been entered. It masks both pins of the encoder and lets
 //! all other interrupts in but exec, as those of the serial ports do: it nests neither in itself nor in the other. An edge that comes
@@ -17,7 +17,7 @@ use avr_embassy::assembly;
 
 use super::encoder::{LINES, Line, SHARED, Shared};
 use super::inputs::{self, MASKS};
-use crate::boards::{ACTIVE, Pin};
+use crate::boards::{ACTIVE, Encoder, Pin};
 use crate::capability::Capability;
 
 /// INT0.
@@ -57,6 +57,14 @@ const fn place(vector: u8) -> (usize, u8) {
     }
 }
 
+/// The bit of the second pin of sync in the port of the first; 8 without one.
+const fn second(vector: u8) -> u8 {
+    match (sensor(vector), ACTIVE.encoder) {
+        (Some((_, 1)), Some(Encoder { second: Some(pin), .. })) => pin.bit,
+        _ => 8,
+    }
+}
+
 /// Whether the vectors of the encoder are those of pin changes.
 const fn changes(vector: u8) -> bool {
     vector >= FIRST_CHANGE
@@ -92,7 +100,7 @@ macro_rules! edges {
     ($($name:ident = $vector:literal;)+) => {$(
         #[unsafe(no_mangle)]
         extern "C" fn $name() -> ! {
-            // SAFETY: it restores every register it changes, and returns by `reti`. With a sensor it is the only one to write the
+            // SAFETY: it restores every register it changes, T with the status, and returns by `reti`. With a sensor it is the only one to write the
             // sensor's `Line`, but for `quiet`, which thread mode and exec set with interrupts off; the mask that it changes is
             // written by handlers of sensors alone, which do not nest. `HOLD` is set and cleared as the handlers of ports do.
             unsafe {
@@ -138,6 +146,18 @@ macro_rules! edges {
                     "rjmp 5f",
                     "1:",
                     ".endif",
+                    ".if {second} < 8",
+                    // With a second pin that one's level says whether the edge counts, and the pin's own which way.
+                    "clt",
+                    "lds  r26, {state} + {in_use}",
+                    "sbrs r26, 2",
+                    "rjmp 3f",
+                    "bst  r31, {bit}",
+                    "andi r31, 0xFF - (1 << {bit})",
+                    "sbrs r31, {second}",
+                    "ori  r31, 1 << {bit}",
+                    "3:",
+                    ".endif",
                     // How long ago the last edge was.
                     "lds  r26, {state} + {place} + {edge}",
                     "lds  r27, {state} + {place} + {edge} + 1",
@@ -170,6 +190,11 @@ macro_rules! edges {
                     "lds  r26, {state} + {place} + {count}",
                     "lds  r27, {state} + {place} + {count} + 1",
                     "adiw r26, 1",
+                    ".if {second} < 8",
+                    "brtc 3f",
+                    "sbiw r26, 2",
+                    "3:",
+                    ".endif",
                     "sts  {state} + {place} + {count}, r26",
                     "sts  {state} + {place} + {count} + 1, r27",
                     "4:",
@@ -218,6 +243,7 @@ macro_rules! edges {
                     line = const line($vector),
                     pins = const place($vector).0,
                     bit = const place($vector).1,
+                    second = const second($vector),
                     mask = const mask($vector).0,
                     masked = const mask($vector).1,
                     unmasked = const mask($vector).2,

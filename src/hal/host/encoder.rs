@@ -16,6 +16,8 @@ struct Sensors {
     bounce: Cell<u16>,
     /// The level of each pin, and when it has changed last, cycles.
     levels: Cell<[(bool, u64); 2]>,
+    /// The level of the second pin of sync.
+    second: Cell<bool>,
 }
 
 /// A spindle that turns by itself.
@@ -23,6 +25,8 @@ struct Sensors {
 struct Turning {
     /// Cycles from an edge to the next; 0 while it stands.
     half: u64,
+    /// It turns backwards.
+    reversed: bool,
     /// Pulses of sync in a turn; with 1 the index alone.
     per_turn: u16,
     /// Edges of this turn.
@@ -32,16 +36,17 @@ struct Turning {
 
 machine_static! {
     fn turning() -> Cell<Turning> =
-        Cell::new(Turning { half: 0, per_turn: 1, edges: 0, next: NEVER });
+        Cell::new(Turning { half: 0, reversed: false, per_turn: 1, edges: 0, next: NEVER });
     fn all() -> Sensors = Sensors {
         pulses: Cell::new(Pulses::NONE),
         in_use: Cell::new(0),
         bounce: Cell::new(0),
         levels: Cell::new([(true, 0); 2]),
+        second: Cell::new(true),
     };
 }
 
-/// The sensors `lines` are read from now on (bit 0 index, bit 1 sync), whose contacts bounce for so many counts.
+/// The sensors `lines` are read from now on (bit 0 index, bit 1 sync, bit 2 the second one of sync), whose contacts bounce for so many counts.
 pub fn set_up(lines: u8, bounce: u16) {
     all().in_use.set(lines);
     all().bounce.set(bounce);
@@ -58,14 +63,14 @@ pub fn read() -> Pulses {
     Pulses { now: (now() / COUNT) as u16, ..all().pulses.get() }
 }
 
-/// The spindle turns at `rpm` turns a minute from now on, with `per_turn` pulses of sync in each; it stands if `rpm` is 0 or less.
+/// The spindle turns at `rpm` turns a minute from now on, with `per_turn` pulses of sync in each; backwards below 0.
 pub(super) fn turn(rpm: f64, per_turn: u16) {
     let per_turn = per_turn.max(1);
-    let edges = rpm * f64::from(per_turn) * 2.0;
+    let edges = rpm.abs() * f64::from(per_turn) * 2.0;
     let half = if edges > 0.0 { (f64::from(ACTIVE.clock_hz) * 60.0 / edges) as u64 } else { 0 };
     let edges = turning().get().edges % (per_turn * 2);
     let next = if half > 0 { now() + half } else { NEVER };
-    turning().set(Turning { half, per_turn, edges, next });
+    turning().set(Turning { half, reversed: rpm < 0.0, per_turn, edges, next });
 }
 
 /// When the spindle makes its next edge.
@@ -78,6 +83,8 @@ pub(super) fn advance() {
     let spindle = turning().get();
     let rises = spindle.edges % 2 == 1;
     if spindle.per_turn > 1 {
+        // The second sensor is a quarter of the way to the next mark behind.
+        all().second.set(rises == spindle.reversed);
         edge(1, rises);
     }
     if spindle.edges < 2 {
@@ -104,8 +111,12 @@ pub(super) fn edge(line: usize, high: bool) {
     let (was, since) = core::mem::replace(&mut levels[line], (high, now()));
     sensors.levels.set(levels);
     let still = (now() - since) / COUNT;
+    let (counts, back) = match sensors.in_use.get() & 4 != 0 && line == 1 {
+        true => (sensors.second.get(), high),
+        false => (!high, false),
+    };
     if was == high
-        || high
+        || !counts
         || sensors.in_use.get() & 1 << line == 0
         || still < sensors.bounce.get().into()
     {
@@ -116,7 +127,7 @@ pub(super) fn edge(line: usize, high: bool) {
         pulses.index = pulses.index.wrapping_add(1);
         (pulses.index_at, pulses.at_index) = (at, pulses.sync);
     } else {
-        pulses.sync = pulses.sync.wrapping_add(1);
+        pulses.sync = pulses.sync.wrapping_add_signed(if back { -1 } else { 1 });
         pulses.sync_at = at;
     }
     sensors.pulses.set(pulses);

@@ -88,7 +88,7 @@ impl Machine {
         stepper::set_near(input, step, opens);
     }
 
-    /// The spindle turns at `rpm` turns a minute, with `per_turn` pulses of its encoder in each, until it is told otherwise.
+    /// The spindle turns at `rpm` turns a minute, with `per_turn` pulses of its encoder in each, backwards below 0, until it is told otherwise.
     pub fn turn_spindle(&self, rpm: f64, per_turn: u16) {
         encoder::turn(rpm, per_turn);
     }

@@ -242,7 +242,7 @@ fn reported_error(machine: &mut impl Machine, out: &mut impl Out) {
 /// The speed of the spindle, turns a minute.
 #[small]
 pub(super) fn rpm(machine: &mut impl Machine) -> i32 {
-    (machine.value(Value::SpindleSpeed) + 500) / 1_000
+    (machine.value(Value::SpindleSpeed).abs() + 500) / 1_000
 }
 
 /// A number that changes when an offset does.

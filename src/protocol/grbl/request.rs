@@ -296,7 +296,7 @@ fn begins(machine: &mut impl Machine) -> Step {
     if pass == Status::Ok as i32 {
         return Step::Done;
     }
-    let refusal = [Status::NoIndex, Status::NoSync, Status::VelocityExceeded];
+    let refusal = [Status::NoIndex, Status::NoSync, Status::WrongWay, Status::VelocityExceeded];
     if let Some(status) = refusal.into_iter().find(|status| *status as i32 == pass) {
         return Step::Error(error_number(status));
     }

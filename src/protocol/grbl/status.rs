@@ -83,6 +83,7 @@ rows! {
     NoEncoderInput = 40;
     SpindleError = 9;
     NotReversed = 9;
+    WrongWay = 19;
     SensorOpen = 9;
     SensorShort = 9;
     HeatRunaway = 9;

@@ -140,6 +140,7 @@ fn spindle(status: Status, out: &mut impl Out) {
     match status {
         Status::SpindleLost => message(out, text!("Spindle lost in a thread")),
         Status::SpindleError => message(out, text!("Thread too far off")),
+        Status::WrongWay => message(out, text!("Spindle turns the wrong way")),
         Status::NotReversed => message(out, text!("Spindle did not turn round")),
         Status::SpindleMustTurn => message(out, text!("Spindle stands still")),
         _ => {}

@@ -62,6 +62,7 @@ rows! {
     NoEncoderInput = 45, "The board has no input for a spindle encoder";
     SpindleError = 46, "Thread further off than spl";
     NotReversed = 47, "Spindle did not turn round";
+    WrongWay = 55, "Spindle turns the wrong way";
     SensorOpen = 48, "Temperature sensor open";
     SensorShort = 49, "Temperature sensor shorted";
     HeatRunaway = 50, "Heater out of control";

@@ -16,7 +16,7 @@ use kerf_macros::small;
 use super::Planner;
 use super::parts::Ongoing;
 use super::seek::drop_blocks;
-use crate::boards::MOTORS;
+use crate::boards::{MOTORS, outputs};
 use crate::config::groups::spindle;
 use crate::config::{Owner, Setting};
 use crate::encoder::COUNTS_PER_S;
@@ -350,6 +350,9 @@ impl Planner {
         if speeds.iter().all(|speed| !some(*speed)) {
             return Ok(false);
         }
+        if !self.turns_as_told() {
+            return Err(Status::WrongWay);
+        }
         let settings = links.settings.borrow();
         for (axis, speed) in self.dynamics.axes.iter().zip(speeds) {
             if speed > axis.feed {
@@ -376,6 +379,17 @@ impl Planner {
             self.push(Block::action(Action::Thread(pass), self.line));
         }
         Ok(true)
+    }
+
+    /// Whether the spindle turns as M3 or M4 has it, as far as that is told.
+    #[inline(never)]
+    #[small]
+    fn turns_as_told(&self) -> bool {
+        common::with(self.links.thread, |common| {
+            let outputs = common.motion.outputs;
+            let is_on = outputs & outputs::SPINDLE != 0;
+            common.encoder.begin(is_on.then_some(outputs & outputs::COUNTERCLOCKWISE != 0))
+        })
     }
 
     /// How far the axes may be off, mm.

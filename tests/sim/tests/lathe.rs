@@ -77,6 +77,40 @@ fn the_speed_is_that_of_a_turn() {
 }
 
 #[test]
+fn a_second_sensor_tells_the_direction() {
+    for (marks, rpm) in [(8, 300.0), (8, -300.0), (100, 1_000.0), (100, -1_000.0), (400, -600.0)] {
+        let (mut machine, mut host) = turning(&MEGA2560_LATHE, marks, rpm, |_| {});
+        set(&mut machine, &mut host, "{spq:1}");
+        host.run_for_ms(&mut machine, 1_500).unwrap();
+        let measured = asked(&mut machine, &mut host, "sps");
+        assert!((measured / rpm - 1.0).abs() < 0.001, "{marks} at {rpm}: {measured}");
+        // It turns round, and is measured anew.
+        machine.tamper(|mechanics, now| mechanics.force_spindle(-rpm, now));
+        host.run_for_ms(&mut machine, 1_500).unwrap();
+        let measured = asked(&mut machine, &mut host, "sps");
+        assert!((measured / -rpm - 1.0).abs() < 0.001, "{marks} at {rpm}: {measured}");
+        assert_eq!(asked(&mut machine, &mut host, "spx"), 0.0, "{marks} at {rpm}");
+        let window = machine.meters().window_outside();
+        assert!(window.cycles <= OFF, "{} cycles in {}", window.cycles, machine.describe(&window));
+    }
+}
+
+#[test]
+fn contacts_that_bounce_tell_the_direction_too() {
+    let bounce = Some(Bounce { times: 3, cycles: 3_000 });
+    for rpm in [300.0, -300.0] {
+        let (mut machine, mut host) =
+            turning(&MEGA2560_LATHE, 4, rpm, |sensors| sensors.bounce = bounce);
+        set(&mut machine, &mut host, "{spb:500}");
+        set(&mut machine, &mut host, "{spq:1}");
+        host.run_for_ms(&mut machine, 2_000).unwrap();
+        let measured = asked(&mut machine, &mut host, "sps");
+        assert!((measured / rpm - 1.0).abs() < 0.001, "{measured}");
+        assert_eq!(asked(&mut machine, &mut host, "spx"), 0.0);
+    }
+}
+
+#[test]
 fn contacts_that_bounce_are_one_pulse_and_noise_is_none() {
     let bounce = Some(Bounce { times: 3, cycles: 3_000 });
     let (mut machine, mut host) =
@@ -244,6 +278,8 @@ fn a_pulse_that_is_missing_shifts_nothing() {
         println!("N {marks}, a pulse lost: spread {:.4}", spread(&phases));
         assert!(spread(&phases) < STEP, "{marks}: {phases:.3?}");
         assert_eq!(asked(&mut machine, &mut host, "spx"), 1.0);
+        let told = host.take_reports().iter().filter(|report| report["er"]["st"] == MISFIT).count();
+        assert_eq!(told, 1, "{marks}: it is told");
     }
 }
 
@@ -639,20 +675,28 @@ fn driven(marks: u32, rpm: f64, torque: f64) -> (Machine, Host) {
 #[test]
 fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
     // At most so far off: near the turn there are no pulses to go by. And how deep, so that the turn is anywhere between two pulses.
-    for (marks, rpm, torque, most, deep) in [
-        (4, 300.0, 600.0, 0.45, 10.0),
-        (4, 300.0, 600.0, 0.45, 10.074),
-        (4, 300.0, 600.0, 0.45, 10.185),
-        (20, 300.0, 600.0, 0.1, 10.0),
-        (20, 300.0, 600.0, 0.1, 10.111),
-        (100, 300.0, 600.0, 0.06, 10.0),
-        (100, 300.0, 600.0, 0.06, 10.037),
-        (100, 600.0, 900.0, 0.06, 10.0),
-        (100, 600.0, 900.0, 0.06, 10.0025),
-        (100, 600.0, 900.0, 0.06, 10.005),
-        (100, 600.0, 900.0, 0.06, 10.0075),
+    for (marks, rpm, torque, most, deep, tells) in [
+        (4, 300.0, 600.0, 0.45, 10.0, false),
+        (4, 300.0, 600.0, 0.45, 10.074, false),
+        (4, 300.0, 600.0, 0.45, 10.185, false),
+        (20, 300.0, 600.0, 0.1, 10.0, false),
+        (20, 300.0, 600.0, 0.1, 10.111, false),
+        (100, 300.0, 600.0, 0.06, 10.0, false),
+        (100, 300.0, 600.0, 0.06, 10.037, false),
+        (100, 600.0, 900.0, 0.06, 10.0, false),
+        (100, 600.0, 900.0, 0.06, 10.0025, false),
+        (100, 600.0, 900.0, 0.06, 10.005, false),
+        (100, 600.0, 900.0, 0.06, 10.0075, false),
+        (4, 300.0, 600.0, 0.45, 10.0, true),
+        (4, 300.0, 600.0, 0.45, 10.074, true),
+        (4, 300.0, 600.0, 0.45, 10.185, true),
+        (20, 300.0, 600.0, 0.1, 10.0, true),
+        (20, 300.0, 600.0, 0.1, 10.111, true),
+        (100, 300.0, 600.0, 0.06, 10.0, true),
+        (100, 600.0, 900.0, 0.06, 10.005, true),
     ] {
         let (mut machine, mut host) = driven(marks, rpm, torque);
+        set(&mut machine, &mut host, &format!("{{spq:{}}}", u8::from(tells)));
         set(&mut machine, &mut host, &format!("m3 s{rpm}"));
         host.run_for_ms(&mut machine, 3_000).unwrap();
         set(&mut machine, &mut host, &format!("g91 g33.1 z-{deep} k1"));
@@ -681,7 +725,7 @@ fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
         let there = phases[began..].iter().position(|(z, _)| *z < -9.5).unwrap();
         let steady: Vec<f64> = inside[..there].to_vec();
         println!(
-            "N {marks}, {rpm} rpm: deepest {deepest:.3}, spread on the way in {:.4}, there and back {:.4}",
+            "N {marks}, {rpm} rpm, direction {tells}: deepest {deepest:.3}, spread on the way in {:.4}, there and back {:.4}",
             spread(&steady),
             spread(&inside)
         );
@@ -784,6 +828,50 @@ fn what_cannot_be_cut_moves_nothing() {
         assert!(told, "{status}: nothing is told");
         assert_eq!(machine.recorder().steps(), steps);
     }
+}
+
+#[test]
+fn a_spindle_that_turns_the_wrong_way_cuts_nothing() {
+    const WRONG_WAY: u64 = 55;
+    let begins = |rpm: f64, word: &str| {
+        let (mut machine, mut host) = lathe(8, rpm, |_| {});
+        set(&mut machine, &mut host, "{spq:1}");
+        host.run_for_ms(&mut machine, 1_000).unwrap();
+        // The simulated spindle is driven by hand.
+        set(&mut machine, &mut host, word);
+        host.run_for_ms(&mut machine, 200).unwrap();
+        machine.tamper(|mechanics, now| mechanics.force_spindle(rpm, now));
+        host.run_for_ms(&mut machine, 1_000).unwrap();
+        let steps = machine.recorder().steps();
+        set(&mut machine, &mut host, "g91 g33 z-8 k1");
+        host.run_for_ms(&mut machine, 4_000).unwrap();
+        let told = host.take_reports().iter().any(|report| report["er"]["st"] == WRONG_WAY);
+        (told, machine.recorder().steps() != steps)
+    };
+    for (rpm, word) in [(-300.0, "m3"), (300.0, "m4")] {
+        assert_eq!(begins(rpm, word), (true, false), "{rpm} {word}");
+    }
+    for (rpm, word) in [(300.0, "m3"), (-300.0, "m4"), (300.0, "m5"), (-300.0, "m5")] {
+        assert_eq!(begins(rpm, word), (false, true), "{rpm} {word}");
+    }
+}
+
+#[test]
+fn a_spindle_that_turns_round_in_the_pass_is_lost() {
+    let (mut machine, mut host) = lathe(100, 300.0, |_| {});
+    set(&mut machine, &mut host, "{spq:1}");
+    host.run_for_ms(&mut machine, 1_000).unwrap();
+    begin(&mut machine, &mut host, "g91 g33 z-12 k1", 4.0);
+    machine.tamper(|mechanics, now| mechanics.force_spindle(-300.0, now));
+    let at = machine.recorder().motors()[Z].position;
+    host.run_for_ms(&mut machine, 300).unwrap();
+    let went = (at - machine.recorder().motors()[Z].position) as f64 / STEPS;
+    assert!(went < 0.15, "{went} mm");
+    let told = host.take_reports().iter().any(|report| report["er"]["st"] == LOST);
+    assert!(told, "nothing is told");
+    let z = machine.recorder().motors()[Z].position as f64 / STEPS;
+    let position = asked(&mut machine, &mut host, "mpoz");
+    assert!((position - z).abs() < 0.0011, "{position} {z}");
 }
 
 #[test]

@@ -87,6 +87,8 @@ pub struct Sensors {
     pub index: Pin,
     /// Sees so many.
     pub sync: Pin,
+    /// Sees the same marks half of their width behind it.
+    pub second: Option<Pin>,
     /// See `sync`.
     pub per_turn: u32,
     /// How wide the mark of the index is.
@@ -108,6 +110,7 @@ impl Sensors {
         Some(Sensors {
             index: encoder.index,
             sync: encoder.sync,
+            second: encoder.second,
             per_turn,
             index_width: 0.02,
             width: 0.3,

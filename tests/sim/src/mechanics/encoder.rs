@@ -1,5 +1,7 @@
 //! The sensors of a spindle: from its angle to edges on two pins, with what may be wrong with them.
 //!
+//! The marks of sync may be seen by a second sensor half of their width behind the first: where an edge of the first finds that one says which way the spindle turns.
+//!
 //! Each pulls its pin low while a mark passes it. Marks are the same way apart; the spindle may turn either way.
 
 use std::collections::VecDeque;
@@ -50,10 +52,10 @@ impl Line {
     }
 }
 
-/// Both sensors.
+/// The sensors: index, sync, and the second one of sync.
 pub struct Encoder {
     build: Sensors,
-    lines: [Line; 2],
+    lines: Vec<Line>,
 }
 
 impl Encoder {
@@ -64,10 +66,14 @@ impl Encoder {
             Line { pin, marks, first, width, high, edges, miss }
         };
         let marks = f64::from(build.per_turn);
-        let lines = [
+        let mut lines = vec![
             line(build.index, 1.0, 0.0, build.index_width),
             line(build.sync, marks, build.phase, build.width / marks),
         ];
+        if let Some(second) = build.second {
+            let behind = build.phase + 0.5 * build.width / marks;
+            lines.push(line(second, marks, behind, build.width / marks));
+        }
         Encoder { build, lines }
     }
 
