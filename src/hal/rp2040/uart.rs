@@ -52,11 +52,19 @@ macro_rules! either {
 
 impl Filling {
     fn is_full(&self) -> bool {
-        either!(self, ring => ring.free() == 0)
+        self.free() == 0
+    }
+
+    fn free(&self) -> usize {
+        either!(self, ring => ring.free())
     }
 
     fn push(&mut self, byte: u8) {
         let _ = either!(self, ring => ring.push(byte));
+    }
+
+    fn push_all(&mut self, bytes: impl Iterator<Item = u8>) {
+        either!(self, ring => ring.push_all(bytes));
     }
 
     fn newest(&self) -> u8 {
@@ -86,7 +94,9 @@ impl Filling {
 }
 
 /// Bytes of a packet that are seen to with interrupts off: some microseconds.
-const AT_ONCE: usize = 8;
+const AT_ONCE: usize = 32;
+/// As [`AT_ONCE`], of bytes that are looked at one by one.
+const ONE_BY_ONE: usize = 8;
 /// So many of what characters ask at once: more than a packet of 64 asks.
 const ASKED: usize = 8;
 /// Percent beyond which one more character might not fit.
@@ -274,6 +284,11 @@ fn handle(usart: Usart) {
     }
 }
 
+/// Whether a byte is text wherever it comes: it never acts, and is no mark.
+fn is_text(byte: u8) -> bool {
+    matches!(byte, b'\n' | b' '..=b'}') && realtime::bit(byte) == 0
+}
+
 /// What a byte that has come is.
 enum Came {
     /// It has acted, and is no part of a line.
@@ -405,15 +420,49 @@ impl Line {
         }
     }
 
-    /// Queues what waits, as far as there is room. Whether nothing waits any more.
+    /// Text has come by USB, of which no byte acts. How long it is. Costs 20 cycles a byte.
+    fn bring_text(&mut self, bytes: &[u8]) -> usize {
+        let count = bytes.iter().take_while(|byte| is_text(**byte)).count();
+        let text = bytes.get(..count).unwrap_or_default();
+        let (Some(last), Some(ring)) = (text.last(), self.rx.as_mut()) else { return 0 };
+        (self.heard_at, self.last) = (time::millis(), *last);
+        let room = if self.behind.is_empty() { ring.free().min(count) } else { 0 };
+        let (now, later) = text.split_at(room);
+        ring.push_all(now.iter().copied());
+        self.queued = self.queued.wrapping_add(room as u8);
+        // A packet fits: none is read before the last one has gone.
+        self.behind.extend(later.iter().copied().take(PACKET - self.behind.len()));
+        flags::set(Event::Received);
+        count
+    }
+
+    /// Queues some of what waits, as far as there is room. Whether it was the last.
     fn go_on(&mut self) -> bool {
-        while self.rx.as_ref().is_some_and(|ring| !ring.is_full()) {
-            let Some(byte) = self.behind.pop_front() else { break };
-            let last = self.last;
-            self.queue(byte, true);
-            self.last = last;
+        let Some(ring) = self.rx.as_mut() else { return false };
+        let count = ring.free().min(AT_ONCE).min(self.behind.len());
+        let cleaned = |byte| if byte < MARKS { STRAY } else { byte };
+        ring.push_all((0..count).map_while(|_| self.behind.pop_front()).map(cleaned));
+        self.queued = self.queued.wrapping_add(count as u8);
+        if count > 0 {
+            flags::set(Event::Received);
         }
-        self.behind.is_empty()
+        count > 0 && self.behind.is_empty()
+    }
+
+    /// Takes bytes that leave next and lie side by side. How many: none also if one is to leave ahead of them.
+    fn take_run(&mut self, to: &mut [u8]) -> usize {
+        if self.held || self.ahead.is_some() {
+            return 0;
+        }
+        let Some(ring) = self.tx.as_mut() else { return 0 };
+        let run = ring.waiting();
+        let count = run.len().min(to.len());
+        to.iter_mut().zip(run).for_each(|(to, byte)| *to = *byte);
+        ring.release_many(count as u8);
+        if let Some(last) = count.checked_sub(1).and_then(|last| to.get(last)) {
+            self.open = *last >= LINE_END;
+        }
+        count
     }
 
     fn queue(&mut self, byte: u8, whole: bool) {
@@ -483,17 +532,27 @@ pub fn set_plain(port: u8, plain: bool) {
     with(port, |line| line.plain = plain);
 }
 
-/// A packet has come by USB. Whether another one may: else [`usb::ROOM`] says when. Costs 60 cycles a byte.
+/// A packet has come by USB. Whether another one may: else [`usb::ROOM`] says when.
 pub(super) fn bring(packet: &[u8]) -> bool {
-    for bytes in packet.chunks(AT_ONCE) {
-        with(USB, |line| bytes.iter().for_each(|byte| line.bring(*byte)));
+    let mut left = packet;
+    while !left.is_empty() {
+        let head = left.get(..AT_ONCE).unwrap_or(left);
+        let mut count = with(USB, |line| line.bring_text(head));
+        if count == 0 {
+            let few = left.get(..ONE_BY_ONE).unwrap_or(left);
+            let some = few.iter().position(|byte| is_text(*byte)).unwrap_or(few.len()).max(1);
+            let few = few.get(..some).unwrap_or(few);
+            with(USB, |line| few.iter().for_each(|byte| line.bring(*byte)));
+            count = few.len();
+        }
+        left = left.get(count..).unwrap_or_default();
     }
     with(USB, |line| line.behind.is_empty())
 }
 
 /// Queues what has come by USB when there was no room. Thread mode, each turn.
 pub fn go_on() {
-    if with(USB, |line| !line.behind.is_empty() && line.go_on()) {
+    if with(USB, Line::go_on) {
         usb::ROOM.signal(());
     }
 }
@@ -501,20 +560,28 @@ pub fn go_on() {
 /// Takes what is to leave by USB next. How much that is.
 pub(super) fn take(packet: &mut [u8]) -> usize {
     let mut count = 0;
-    for bytes in packet.chunks_mut(AT_ONCE) {
-        let wanted = bytes.len();
-        let bytes = bytes.iter_mut();
-        let taken =
-            with(USB, |line| bytes.map_while(|byte| line.next().map(|next| *byte = next)).count());
-        count += taken;
-        if taken < wanted {
+    while let Some(to) = packet.get_mut(count..).filter(|to| !to.is_empty()) {
+        let most = to.len().min(AT_ONCE);
+        let to = to.get_mut(..most).unwrap_or_default();
+        let taken = with(USB, |line| match line.take_run(to) {
+            0 => to.iter_mut().map_while(|byte| line.next().map(|next| *byte = next)).count(),
+            taken => taken,
+        });
+        if taken == 0 {
             break;
         }
+        count += taken;
     }
     if count > 0 {
         flags::set(Event::Transmitted);
     }
     count
+}
+
+/// Whether what is to leave by USB had better leave now: it makes a packet, or is a whole answer behind which no line waits for its own.
+pub(super) fn is_due() -> bool {
+    let used = USB_TX.used();
+    used >= PACKET - 1 || used > 0 && USB_RX.used() == 0
 }
 
 /// How the other side may hold it back from now on. Thread mode.
@@ -530,6 +597,9 @@ pub fn set_flow(port: u8, flow: Flow) {
 pub fn look() {
     for port in 0..PORTS as u8 {
         with(port, |line| line.wait_ms = line.wait_ms.saturating_sub(1));
+        if port == USB && registers(port).is_none() {
+            usb::flush();
+        }
         kick(port);
     }
     eeprom::look();

@@ -102,8 +102,16 @@ pub(super) fn start() {
     });
 }
 
-/// There may be something to send. Any level.
+/// There may be something to send. While lines wait their answers are gathered into full packets, for a millisecond at most: see [`flush`].
+/// Any level.
 pub(super) fn kick() {
+    if uart::is_due() {
+        flush();
+    }
+}
+
+/// What is there may leave. Any level.
+pub(super) fn flush() {
     if !SENDS.load(Ordering::Relaxed) {
         NEWS.signal(());
     }
