@@ -34,6 +34,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "the emulated RP2040", run: emulated },
     Stage { name: "simulator tests", run: simulator_tests },
     Stage { name: "real senders", run: || crate::senders::run(&Default::default()) },
+    Stage { name: "real senders at the emulated RP2040", run: crate::senders::run_emulated },
     Stage { name: "the page in a browser", run: crate::web::test },
 ];
 

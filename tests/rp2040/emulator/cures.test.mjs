@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { CLOCK_HZ, Machine } from './machine.mjs';
+import { Motors } from './pins.mjs';
 
 const RAM_END = 0x20042000;
 const CODE = 0x200;
@@ -215,4 +216,23 @@ test('packets of USB out of turn are faults', () => {
   const { m, memory } = device();
   m.mcu.writeUint32(memory + 0x80, 1 << 15 | 1 << 10 | 18);
   assert.throws(() => m.run(128 * 60), /out of turn/);
+});
+
+test('switches share a pin, and let go some steps back', () => {
+  const [levels, edgeListeners, is] = [[0, 0], [], {}];
+  const motors = new Motors({ levels, edgeListeners, drive: (gpio, high) => { is[gpio] = high; } }, [{ step: 0, dir: 1 }]);
+  const ends = (gpio, opens) => [
+    { gpio, opens, motor: 0, step: -2, above: false, back: 2 },
+    { gpio, opens, motor: 0, step: 2, above: true, back: 2 },
+  ];
+  motors.wire([...ends(5, false), ...ends(6, true)]);
+  const high = [is[5]];
+  for (const down of [1, 1, 1, 0, 0, 0, 0, 0, 1, 1]) {
+    levels[1] = down;
+    edgeListeners[0](0, 1, 0);
+    high.push(is[5]);
+    assert.equal(is[6], !is[5]);
+  }
+  //                       0     -1    -2     -3     -2     -1     0     1     2      1      0
+  assert.deepEqual(high, [true, true, false, false, false, false, true, true, false, false, true]);
 });

@@ -1,14 +1,29 @@
 // What is wired to the pins of the board: motors that count their steps, and switches that they work.
 
-// A switch at a pin, closed while a motor is at or beyond a step, or open there.
-class Near {
-  constructor({ gpio, motor, step, above, opens }) {
-    Object.assign(this, { gpio, motor, step, above, opens });
+// A switch that is worked while a motor is at or beyond a step, and until it is `back` steps back.
+class Switch {
+  constructor({ motor, step, above, back }) {
+    Object.assign(this, { motor, step, sign: above ? 1 : -1, back: back ?? 0, worked: false });
   }
-  // Whether the pin is high: closed is low.
-  isHigh(position) {
-    const worked = this.above ? position >= this.step : position <= this.step;
-    return worked === this.opens;
+  isWorked(positions) {
+    const beyond = this.sign * (positions[this.motor] - this.step);
+    this.worked = beyond >= 0 || (this.worked && beyond > -this.back);
+    return this.worked;
+  }
+}
+
+// A pin and its switches, which close when they are worked, side by side; or open, one behind the other.
+class Pin {
+  constructor(gpio, switches) {
+    this.gpio = gpio;
+    this.opens = switches[0].opens;
+    this.switches = switches.map((one) => new Switch(one));
+    this.motors = this.switches.map(({ motor }) => motor);
+  }
+  // Whether it is high: closed is low.
+  isHigh(positions) {
+    const worked = this.switches.map((one) => one.isWorked(positions));
+    return worked.includes(true) === this.opens;
   }
 }
 
@@ -22,7 +37,7 @@ export class Motors {
     this.gaps = pins.map(() => Infinity);
     this.last = pins.map(() => undefined);
     this.lastStep = 0;
-    this.near = [];
+    this.wired = [];
     // While someone records: when each motor's steps rise, and the shortest pulse.
     this.times = undefined;
     this.shortest = Infinity;
@@ -51,13 +66,14 @@ export class Motors {
     this.last[motor] = cycle;
     this.lastStep = cycle;
     this.times?.[motor].push(cycle);
-    for (const near of this.near) if (near.motor === motor) this.work(near);
+    for (const pin of this.wired) if (pin.motors.includes(motor)) this.work(pin);
   }
 
   wire(switches) {
-    this.near = switches.map((one) => new Near(one));
-    this.near.forEach((near) => this.work(near));
+    const gpios = [...new Set(switches.map(({ gpio }) => gpio))];
+    this.wired = gpios.map((gpio) => new Pin(gpio, switches.filter((one) => one.gpio === gpio)));
+    this.wired.forEach((pin) => this.work(pin));
   }
 
-  work(near) { this.machine.drive(near.gpio, near.isHigh(this.positions[near.motor])); }
+  work(pin) { this.machine.drive(pin.gpio, pin.isHigh(this.positions)); }
 }

@@ -4,7 +4,9 @@ use std::fmt::{self, Display, Formatter};
 use std::path::Path;
 
 use anyhow::Result;
+use kerf_sim::emulated::{Emulated, Talks};
 use kerf_sim::job::{read_lines, read_setup};
+use kerf_sim::oracle::Setup;
 use kerf_sim::{Host, Machine, oracle, print};
 
 /// For what is under way when the sender has left, ms of AVR time.
@@ -38,13 +40,35 @@ impl Arrival {
             true => print::end_of(&lines, &setup)?,
             false => oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup)?.steps,
         };
-        let motors = setup.motors.iter().zip(machine.recorder().motors());
-        let motors = motors.zip(expected).map(|((setup, motor), expected)| Motor {
-            steps: if setup.inverted { -motor.position } else { motor.position },
-            expected,
-            total: motor.steps,
+        let motors = machine.recorder().motors().iter();
+        let ends: Vec<_> = motors.map(|motor| (motor.position, motor.steps)).collect();
+        Ok(Self::at(&setup, &ends, &expected))
+    }
+
+    /// As [`Arrival::of`], with steps counted from `begun`. The board itself is asked, after a power cut.
+    pub fn of_emulated(board: &mut Emulated, begun: &[(i64, u64)], job: &Path) -> Result<Arrival> {
+        let lines = read_lines(job)?;
+        board.talk(Talks { open: true, reads: true });
+        board.run_for_ms(SETTLE_MS)?;
+        let ends = board.steps().into_iter().zip(board.totals()).zip(begun);
+        let ends: Vec<_> = ends.map(|((at, total), from)| (at - from.0, total - from.1)).collect();
+        board.cut_power();
+        let mut host = Host::new(1);
+        host.boot(board, BOOT_MS)?;
+        let setup = read_setup(board, &mut host)?;
+        let expected = oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup)?.steps;
+        Ok(Self::at(&setup, &ends, &expected))
+    }
+
+    /// Motors by their setup, where each ends with how many steps, and where it should.
+    fn at(setup: &Setup, ends: &[(i64, u64)], expected: &[i64]) -> Arrival {
+        let motors = setup.motors.iter().zip(ends).zip(expected);
+        let motors = motors.map(|((setup, (position, total)), expected)| Motor {
+            steps: if setup.inverted { -position } else { *position },
+            expected: *expected,
+            total: *total,
         });
-        Ok(Arrival(motors.collect()))
+        Arrival(motors.collect())
     }
 
     /// Whether every motor is where it should be, to the step.

@@ -1,5 +1,7 @@
 //! `kerf-sim serve`: the machine behind a pseudo-terminal, at the pace of real time.
 
+mod emulated;
+
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use kerf::boards::Board;
+use kerf_sim::emulated::is_emulated;
 use kerf_sim::mechanics::Build;
 use kerf_sim::{Image, Machine};
 
@@ -60,6 +63,10 @@ pub fn serve(args: &ServeArgs) -> Result<bool> {
         .context("cannot handle interrupts")?;
     if args.expect.is_some() {
         stop_with_input(Arc::clone(&stop));
+    }
+    let board = board(&args.target.board)?;
+    if is_emulated(board) {
+        return emulated::serve(args, board, &stop);
     }
     let mut server = Server::new(args)?;
     println!("{}", server.pty.path().display());

@@ -70,6 +70,7 @@ impl Side for Emulated {
                 motor: if *input == PROBE { 2 } else { input / 2 },
                 step: *step,
                 above: *input < ENDS && input % 2 == 1,
+                back: 0,
                 opens: *opens,
             })
         };

@@ -40,6 +40,9 @@ pub struct SendersArgs {
     /// The job that they send, a file of G-code
     #[arg(long, value_name = "JOB")]
     job: Option<PathBuf>,
+    /// The board: of those whose chip is emulated pico-cnc, which senders that print are not for
+    #[arg(long, value_enum)]
+    board: Option<Board>,
 }
 
 /// A sender that there is a driver for.
@@ -94,7 +97,7 @@ impl Sender {
         matches!(self, Sender::Printcore | Sender::CncjsMarlin | Sender::Octoprint)
     }
 
-    /// The board whose image it speaks to.
+    /// The board whose image it speaks to, if none is asked for.
     fn board(self) -> Board {
         if self.prints() { Board::Ramps14 } else { Board::default() }
     }
@@ -105,6 +108,15 @@ impl Sender {
     }
 }
 
+/// A sender of TinyG's dialect and one of grbl's at the emulated RP2040, one after the other: an emulator has a core of the computer to itself.
+pub fn run_emulated() -> Result<()> {
+    for sender in [Sender::Cncjs, Sender::GrblStreamer] {
+        let job = Some(root().join("examples/square.gcode"));
+        run(&SendersArgs { sender: Some(sender), job, board: Some(Board::PicoCnc) })?;
+    }
+    Ok(())
+}
+
 /// Runs the senders, all at once, and shows what came of it. Fails if anything did.
 pub fn run(args: &SendersArgs) -> Result<()> {
     let job = args.job.clone().unwrap_or_else(|| root().join("examples/bracket.gcode"));
@@ -113,17 +125,23 @@ pub fn run(args: &SendersArgs) -> Result<()> {
     setup::ensure(Scope::Senders)?;
     let folder = install::senders()?;
     let program = sim::build()?;
-    let senders = args.sender.map_or_else(|| Sender::value_variants().to_vec(), |one| vec![one]);
+    let mut senders = args.sender.map_or(Sender::value_variants().to_vec(), |one| vec![one]);
+    if let Some(board) = args.board {
+        ensure!(board == Board::PicoCnc, "senders have boards of their own, or pico-cnc");
+        senders.retain(|sender| !sender.prints());
+        ensure!(!senders.is_empty(), "a host of printers is not for {board}");
+    }
+    let board_of = |sender: Sender| args.board.unwrap_or(sender.board());
     let mut elves = Vec::new();
     for &sender in &senders {
-        elves.push(sim::prepare(sender.board(), Machine::default())?);
+        elves.push(sim::prepare(board_of(sender), Machine::default())?);
     }
     // A printer's host sends what a printer prints.
     let print = folder.join("print.gcode");
     std::fs::write(&print, job::prints())?;
     let session = &|(sender, elf): (Sender, &PathBuf)| {
         let job = if sender.prints() { &print } else { &job };
-        let board = sender.board();
+        let board = board_of(sender);
         Session { sender, program: &program, elf, board, job, folder: &folder }.run()
     };
     let results: Vec<_> = std::thread::scope(|scope| {

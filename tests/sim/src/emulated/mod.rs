@@ -74,6 +74,8 @@ pub struct Near {
     pub step: i64,
     /// Beyond is above.
     pub above: bool,
+    /// So many steps back it lets go.
+    pub back: u32,
     /// It opens there.
     pub opens: bool,
 }
