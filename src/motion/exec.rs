@@ -34,6 +34,7 @@ use crate::capability::Capability;
 use crate::dda::Segment;
 use crate::gcode::heating::Heat;
 use crate::gcode::overrides::Change;
+pub use crate::hal::BLOCK_S_MIN;
 use crate::hal::TIMER_HZ;
 use crate::hal::ring::Index;
 use crate::status::Status;
@@ -52,9 +53,6 @@ const SHORT_LOG2: i8 = -5;
 
 /// CPU cycles in [`SEGMENT_S`].
 const SEGMENT_CYCLES: u32 = (TIMER_HZ as f32 * SEGMENT_S) as u32;
-
-/// Shortest block with steps, s: twice what exec takes for it while the step interrupt is busy.
-pub const BLOCK_S_MIN: f32 = 0.000_75;
 
 /// Faster than this no line ends but at another one, mm/s.
 const SLOW: f32 = 5.0;

@@ -14,6 +14,8 @@ impl Timing for Chip {
     const TIMER_HZ: u32 = 64_000_000;
     const PULSE_US: u8 = 0;
     const TICKS: [Ticks; MOTORS] = [USUAL; MOTORS];
+    /// Seven in the ring are the millisecond that the feeder is ahead, and most of another.
+    const BLOCK_S_MIN: f32 = 0.000_25;
     const LOOK_AHEAD: usize = 1_024;
     const LINE_BYTES: [usize; 2] = [2_088, 1_040];
 }

@@ -13,6 +13,7 @@ use common::image;
 use kerf::boards::inputs::{ENDS, PROBE};
 use kerf::boards::{Board, PICO_CNC, PICO_CNC6, SKR_PICO, gp};
 use kerf::switches::{FIRST_US, SOON_US};
+use kerf_sim::bench::{ideal, spiral};
 use kerf_sim::emulated::{DRIVERS, Emulated, Near, job};
 use kerf_sim::job::lines_of;
 use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Runs, USB};
@@ -453,4 +454,65 @@ fn the_image_keeps_to_the_transcripts() {
     all.retain(|one| !left_out.iter().any(|name| one.name.starts_with(**name)));
     all.iter_mut().for_each(|one| one.expect(with_more_room));
     transcript::play_all(all, 2, board);
+}
+
+/// Moves of 0.03 mm at 100 mm/s: 3,333 blocks a second. With a jerk limit they are as many, and none comes late.
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn tiny_moves_are_as_fast_as_could_be() {
+    let [free, limited] = [1e6, 5e3].map(tiny_moves);
+    println!("{free:.3}, {limited:.3}");
+    assert!(free < 1.05 && limited < 1.15, "{free}, {limited}");
+}
+
+/// How long they take under a jerk limit, over the ideal without one.
+fn tiny_moves(jerk: f64) -> f64 {
+    let (mut board, mut host) = booted();
+    set(&mut board, &mut host, "{ja:1800000,sv:0,qv:0}");
+    set(&mut board, &mut host, "{1:{tr:20},2:{tr:20}}");
+    for axis in ["x", "y"] {
+        let line = format!("{{{axis}:{{vm:16000,fr:16000,jd:0.01,jm:{jerk},ac:500}}}}");
+        set(&mut board, &mut host, &line);
+    }
+    board.send_to(USB, spiral(0.03).as_bytes());
+    while Emulated::totals(&board) == [0; 4] {
+        board.run_for_ms(1).unwrap();
+    }
+    let begun = board.cycle();
+    board.run_for_ms(2_500).unwrap();
+    let over = (board.last_step().unwrap() - begun) as f64 / 128e6 / ideal(0.03);
+    let heard = String::from_utf8(board.receive_from(USB)).unwrap();
+    let taken = heard.lines().filter(|line| line.contains("\"f\":[1,0,")).count();
+    assert_eq!(taken, spiral(0.03).lines().count(), "lines are refused");
+    assert_eq!(value(&mut board, &mut host, "stv"), 0.0, "late segments");
+    let steps = Emulated::steps(&board);
+    for (m, token) in ["mpox", "mpoy"].into_iter().enumerate() {
+        let said = value(&mut board, &mut host, token) * 80.0;
+        assert!((said - steps[m] as f64).abs() < 0.7, "{token}: {said} and {} steps", steps[m]);
+    }
+    over
+}
+
+/// Four motors, each at a rate of its own up to 700,000 steps a second, by blocks of a quarter of a millisecond.
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn tiny_moves_of_fast_motors_come_in_time() {
+    let (mut board, mut host) = booted();
+    FAST.iter().for_each(|line| set(&mut board, &mut host, line));
+    set(&mut board, &mut host, "g1f33000");
+    let place = |n: usize| {
+        let turn = (n as f64 * 0.01).sin();
+        [0.14 * n as f64, 5.0 * turn, 0.09 * n as f64, 3.0 * turn * turn]
+    };
+    let line = |n: usize| {
+        let [x, y, z, a] = place(n);
+        format!("x{x:.3}y{y:.3}z{z:.3}a{a:.3}\n")
+    };
+    board.send_to(USB, (1..=1_500).map(line).collect::<String>().as_bytes());
+    board.run_for_ms(4_000).unwrap();
+    board.receive_from(USB);
+    let end = place(1_500).map(|at| ((at * 1e3).round() * 1.28).round() as i64);
+    assert_eq!(Emulated::steps(&board), end);
+    assert_eq!(value(&mut board, &mut host, "stv"), 0.0, "late segments");
+    println!("{:?} s between steps", board.gaps());
 }
