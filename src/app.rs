@@ -65,7 +65,7 @@ impl Links {
             cleared_by: Cell::new(USB),
             heat: Heaters::new(),
             #[cfg(feature = "sd")]
-            card: RefCell::new(crate::card::Card::new()),
+            card: place_card(),
             probe: Probe::default(),
             signs: Signs::default(),
             job: Cell::default(),
@@ -84,6 +84,14 @@ impl Links {
 fn place(thread: Thread, ports: [Port; PORTS]) -> &'static Links {
     let storage: &'static Storage = place!(Storage, Storage::new(Log::open(&Eeprom::take())));
     place!(Links, Links::new(thread, ports, storage))
+}
+
+/// Puts the card into its place. Not inlined, for it takes much of the stack.
+#[cfg(feature = "sd")]
+#[inline(never)]
+#[small]
+fn place_card() -> &'static RefCell<crate::card::Card> {
+    place!(RefCell<crate::card::Card>, RefCell::new(crate::card::Card::new()))
 }
 
 /// Puts the planner into its place, which its task and the parser share.

