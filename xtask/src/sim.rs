@@ -74,6 +74,9 @@ pub struct BenchArgs {
     /// Measure this row only; may be given more than once
     #[arg(long, value_name = "NAME")]
     row: Vec<String>,
+    /// The board: the one that others were measured on, or `pico-cnc`
+    #[arg(long, value_enum, default_value_t)]
+    board: Board,
 }
 
 /// Pulses a turn of the encoder at the spindle of the lathe.
@@ -105,7 +108,13 @@ pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
 
 /// Builds and measures, on the board that others were measured on.
 pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
-    let elf = prepare(Board::default(), Machine::default())?;
+    let elf = prepare(args.board, Machine::default())?;
+    if args.board == Board::PicoCnc {
+        // Of six motors.
+        firmware::build(Board::PicoCnc6, Machine::default())?;
+        return pass_through(&mut bench_command(args, &elf));
+    }
+    ensure!(args.board == Board::default(), "there are no rows of {}", args.board.name());
     if args.row.is_empty() || args.row.iter().any(|row| row.starts_with("print")) {
         // Of what a printer does.
         firmware::build(Board::Ramps14, Machine::default())?;
@@ -169,7 +178,7 @@ fn serve_command(args: &ServeArgs, elf: &Path) -> Command {
 }
 
 fn bench_command(args: &BenchArgs, elf: &Path) -> Command {
-    let mut command = simulator("bench", elf, Board::default());
+    let mut command = simulator("bench", elf, args.board);
     for row in &args.row {
         command.args(["--row", row]);
     }
@@ -253,7 +262,8 @@ mod tests {
 
     #[test]
     fn rows_reach_the_simulator() {
-        let args = BenchArgs { row: vec!["rate-1".into(), "lines".into()] };
+        let args =
+            BenchArgs { row: vec!["rate-1".into(), "lines".into()], board: Board::default() };
         let command = bench_command(&args, Path::new("k.elf"));
         let want = "bench --elf k.elf --board mega2560-grbl --row rate-1 --row lines";
         assert_eq!(after_dashes(&command), want);

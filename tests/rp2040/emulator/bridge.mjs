@@ -2,10 +2,10 @@
 //
 // MOTORS is JSON, [[step, dir], ...]. Each line of the input is a request in JSON, each line of the output its answer:
 //
-//   {"cut": true, "panic": "file", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "record": bool, "until": cycle, "line": true}
+//   {"cut": true, "stick": true, "panic": "file", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "record": bool, "until": cycle, "line": true}
 //
 // Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does.
-// With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again; with `panic` the image panics, with `reset` its button is pressed. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
+// With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again; with `stick` the CPU gets stuck. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
 import { createInterface } from 'node:readline';
 import { Machine } from './machine.mjs';
 import { Motors } from './pins.mjs';
@@ -21,6 +21,7 @@ let recorded;
 
 function act(request) {
   if (request.cut) machine.cutPower();
+  if (request.stick) machine.stick();
   if (request.panic) machine.panic(elf, request.panic);
   if (request.reset) machine.reset();
   for (const [channel, value] of request.sense ?? []) machine.sense(channel, value);
@@ -59,6 +60,7 @@ function answer() {
     levels: machine.levels.reduce((bits, level, gpio) => bits + (level === 1 ? 2 ** gpio : 0), 0),
     shares: shares(),
     asleep: machine.asleep,
+    spent: machine.spent,
     resets: machine.resets,
     waiting: machine.computer.bytes.length,
     recorded,

@@ -177,6 +177,20 @@ test('a reset by the watchdog keeps scratch registers and flash', () => {
   assert.equal(m.mcu.flash[0x1000], 7);
 });
 
+test('a CPU that is stuck is bitten once', () => {
+  const m = machine(LOOP);
+  m.mcu.writeUint32(0x40058004, 2_000);
+  m.mcu.writeUint32(0x40058000, 1 << 30);
+  m.stick();
+  m.run(990 * 128);
+  assert.equal(m.resets, 0);
+  m.run(20 * 128);
+  assert.equal(m.resets, 1);
+  assert.equal(m.mcu.readUint32(0x40058008), 1, 'the reason');
+  m.run(10 * 128_000);
+  assert.equal(m.resets, 1);
+});
+
 // A device on the bus that has been asked for its descriptor.
 function device() {
   const m = machine(SLEEP);

@@ -113,12 +113,21 @@ export class Machine {
     this.said = 0;
     this.instructions = 0;
     this.asleep = 0;
+    // Cycles of each exception's handler by itself, by its number; 0 is thread mode.
+    this.spent = new Array(48).fill(0);
     this.boot();
   }
 
   // The supply fails, and is there again.
   cutPower() {
     this.boot({ flash: this.mcu.flash });
+  }
+
+  // The CPU sleeps from now on, and wakes for nobody, until a reset gives it another core.
+  stick() {
+    const { core } = this.mcu;
+    core.checkForInterrupts = () => false;
+    core.waiting = true;
   }
 
   // A panic: a cell is borrowed twice, in a file of that name.
@@ -161,7 +170,8 @@ export class Machine {
       watchdog.scratchData.set(old.scratchData);
       watchdog.reason = old.reason;
     }
-    watchdog.onWatchdogTrigger = () => { this.isResetting = true; };
+    // It bites once: that of rp2040js would go on at the same instant for ever.
+    watchdog.onWatchdogTrigger = () => { watchdog.alarm.enable = false; this.isResetting = true; };
     mcu.onBreak = (code) => { throw new Error(`bkpt ${code} at ${mcu.core.PC.toString(16)}`); };
     this.pios = mcu.pio.map((pio) => new Pio(pio));
     for (const [gpio, pin] of mcu.gpio.entries()) {
@@ -272,6 +282,7 @@ export class Machine {
     const { clock, core } = mcu;
     if (this.cycle >= this.senders[0].due || this.cycle >= this.senders[1].due) this.receive();
     let spent;
+    const level = core.IPSR;
     if (core.waiting) {
       spent = end - this.cycle;
       if (clock.nextAlarm) spent = Math.min(spent, clock.nanosToNextAlarm / NANOS);
@@ -284,6 +295,7 @@ export class Machine {
     } else {
       spent = core.executeInstruction() + this.extra;
       this.extra = 0;
+      this.spent[level] += spent;
       this.instructions++;
       clock.tick(spent * NANOS);
     }

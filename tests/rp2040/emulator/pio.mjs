@@ -1,10 +1,12 @@
 // The PIO on the clock of the chip. That of rp2040js runs from `setTimeout`, with no relation to the clock, and without delays.
 // Here each state machine has its next cycle.
 
-// It can go on only when the CPU or the DMA gives it a word.
+// It can go on only when the CPU or the DMA gives it a word, or someone changes a flag that is not yet as it waits for.
 const TX_FIFO = 3;
+const IRQ = 4;
 const OUT = 5;
-const isStalled = (sm) => sm.waiting && (sm.waitType === TX_FIFO || sm.waitType === OUT);
+const waitsForFlag = (sm) => sm.waitType === IRQ && !!(sm.pio.irq & 1 << sm.waitIndex) !== sm.waitPolarity;
+const isStalled = (sm) => sm.waiting && (sm.waitType === TX_FIFO || sm.waitType === OUT || waitsForFlag(sm));
 
 // `jmp x-- here`, without a delay: all rounds but the first and the last, in one go. How many cycles that is.
 function skip(pio, sm) {

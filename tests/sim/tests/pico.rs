@@ -14,6 +14,7 @@ use kerf::boards::inputs::{ENDS, PROBE};
 use kerf::boards::{Board, PICO_CNC, PICO_CNC6, SKR_PICO, gp};
 use kerf::switches::{FIRST_US, SOON_US};
 use kerf_sim::bench::{ideal, spiral};
+use kerf_sim::emulated::even::{FAST, evenness};
 use kerf_sim::emulated::{DRIVERS, Emulated, Near, job};
 use kerf_sim::job::lines_of;
 use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Runs, USB};
@@ -171,30 +172,6 @@ fn a_hold_loses_no_step_and_a_flush_counts_them() {
     assert_eq!(Emulated::steps(&board), [0; 4], "from where it stood");
 }
 
-/// How a motor steps: how many steps a second, by how much two gaps between steps differ, and how far a step is from where even ones are, us.
-fn evenness(times: &[u64]) -> (f64, u64, f64) {
-    let gaps = || times.windows(2).map(|pair| pair[1] - pair[0]);
-    let spread = gaps().max().unwrap_or(0) - gaps().min().unwrap_or(0);
-    let n = times.len() as f64;
-    let first = times.first().copied().unwrap_or(0);
-    let points = || times.iter().enumerate().map(|(i, t)| (i as f64, (t - first) as f64));
-    let (mean_i, mean_t) = ((n - 1.0) / 2.0, points().map(|(_, t)| t).sum::<f64>() / n);
-    let slope = points().map(|(i, t)| (i - mean_i) * (t - mean_t)).sum::<f64>()
-        / points().map(|(i, _)| (i - mean_i).powi(2)).sum::<f64>();
-    let off = |(i, t): (f64, f64)| (t - mean_t - slope * (i - mean_i)).abs();
-    let worst = points().map(off).fold(0.0, f64::max);
-    (128e6 / slope, spread, worst / 128.0)
-}
-
-/// Settings for a million steps a second: 1,280 steps a millimetre, pulses of half a microsecond.
-const FAST: [&str; 5] = [
-    "{spw:0,sv:0,4tr:1.25}",
-    "{x:{vm:46875,fr:46875,jm:1e6,ac:20000}}",
-    "{y:{vm:46875,fr:46875,jm:1e6,ac:20000}}",
-    "{z:{vm:46875,fr:46875,jm:1e6,ac:20000}}",
-    "{a:{vm:46875,fr:46875,jm:1e6,ac:20000}}",
-];
-
 #[test]
 #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
 fn a_million_steps_a_second_of_each_motor() {
@@ -276,6 +253,26 @@ fn an_skr_pico_tells_its_drivers_and_moves() {
     host.run_for_ms(&mut board, 3_000).unwrap();
     assert_eq!(board.positions(), [6_400, -3_840, 1_280, 0]);
     assert!([21, 23].iter().all(|heater| !board.is_high(gp(*heater))));
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn a_stuck_chip_is_bitten_and_says_so() {
+    let (mut board, mut host) = booted();
+    set(&mut board, &mut host, "m3 s1000");
+    set(&mut board, &mut host, "g1 x100 f1000");
+    host.run_for_ms(&mut board, 300).unwrap();
+    board.stick();
+    board.run_for_ms(490).unwrap();
+    assert_eq!(board.resets(), 0);
+    board.run_for_ms(30).unwrap();
+    assert_eq!(board.resets(), 1, "half a second has passed");
+    assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()));
+    board.run_for_ms(300).unwrap();
+    let said = String::from_utf8(board.receive_from(USB)).unwrap();
+    assert!(said.contains("SYSTEM READY") && said.contains("\"er\""), "{said}");
+    host = Host::new(LINES_IN_FLIGHT);
+    assert_eq!(value(&mut board, &mut host, "rst"), 3.0);
 }
 
 #[test]

@@ -4,9 +4,8 @@ mod common;
 
 use common::image;
 use kerf::boards::PICO_CNC;
-use kerf_sim::bench::{ideal, spiral};
 use kerf_sim::emulated::{Emulated, Talks};
-use kerf_sim::{AUX, Host, Runs, USB};
+use kerf_sim::{AUX, Host, USB};
 
 /// A board that has just been powered up.
 fn board() -> Emulated {
@@ -124,63 +123,4 @@ fn both_ports_are_answered_while_a_job_runs() {
     assert!(answers[AUX] >= 98 && answers[USB] >= 60, "{answers:?}");
     let refused = ask(&mut board, AUX, "g1 x1\n", 100);
     assert!(refused.contains("\"f\":[1,117,"), "{refused}");
-}
-
-/// How many lines a second are taken, of moves that are too short to be a limit.
-#[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
-fn short_lines_a_second() {
-    const LINES: usize = 2_000;
-    let mut board = booted();
-    for line in ["{spw:0,sv:0}\n", "{x:{vm:46875,fr:46875,jm:1e6,ac:20000}}\n", "g1f40000\n"] {
-        ask(&mut board, USB, line, 50);
-    }
-    let text: String = (1..=LINES).map(|n| format!("x{:.2}\n", n as f64 * 0.05)).collect();
-    let (begun, mut answers) = (board.cycle(), 0);
-    board.send_to(USB, text.as_bytes());
-    while answers < LINES {
-        board.run_for_ms(2).unwrap();
-        answers += board.receive_from(USB).iter().filter(|byte| **byte == b'\n').count();
-        assert!(board.cycle() < begun + 128_000_000, "{answers} answers in a second");
-    }
-    let rate = LINES as f64 / ((board.cycle() - begun) as f64 / 128e6);
-    println!("{rate:.0} lines/s");
-    assert!(rate > LEAST_LINES, "{rate:.0} lines/s");
-}
-
-/// See [`short_lines_a_second`].
-const LEAST_LINES: f64 = 8_000.0;
-
-/// Moves of 0.1 mm at 6,000 mm/min, without a jerk limit over ideal, and with one over without.
-#[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
-fn short_moves_are_nearly_as_fast_as_could_be() {
-    let [free, limited] = [1e6, 5e3].map(|jerk| std::thread::spawn(move || spiral_s(jerk)));
-    let (free, limited) = (free.join().unwrap(), limited.join().unwrap());
-    let over = [free / ideal(0.1), limited / free];
-    println!("{over:.4?}");
-    assert!(over[0] < 1.01 && over[1] < 1.02, "{over:?}");
-}
-
-/// How long the steps of a spiral take, s.
-fn spiral_s(jerk: f64) -> f64 {
-    let mut board = booted();
-    let more = format!("{{x:{{jm:{jerk},ac:500}},y:{{jm:{jerk},ac:500}}}}\n");
-    let settings = [
-        "{ja:1800000,sv:0,qv:0}\n",
-        "{1:{tr:20},2:{tr:20}}\n",
-        "{x:{vm:16000,fr:16000,jd:0.01},y:{vm:16000,fr:16000,jd:0.01}}\n",
-        &more,
-    ];
-    for line in settings {
-        let answer = ask(&mut board, USB, line, 50);
-        assert!(answer.contains("\"f\":[1,0,"), "{answer}");
-    }
-    board.send_to(USB, spiral(0.1).as_bytes());
-    while Emulated::totals(&board) == [0; 4] {
-        board.run_for_ms(1).unwrap();
-    }
-    let begun = board.cycle();
-    board.run_for_ms(26_000).unwrap();
-    (board.last_step().unwrap() - begun) as f64 / 128e6
 }

@@ -6,6 +6,7 @@
 
 mod beyond;
 mod costs;
+pub mod emulated;
 mod jitter;
 mod limits;
 #[path = "../../../support/optimum.rs"]
@@ -22,7 +23,7 @@ mod workload;
 pub use spirals::{ideal, spiral};
 
 pub use rows::ROWS;
-pub use table::print;
+pub use table::{print, print_rows};
 pub use workload::Bed;
 
 use anyhow::Result;
@@ -62,7 +63,7 @@ impl From<f64> for Figure {
 }
 
 /// A row of the table.
-pub struct Row {
+pub struct Row<B = Bed> {
     /// What it is asked for by.
     pub name: &'static str,
     /// What is measured.
@@ -80,7 +81,7 @@ pub struct Row {
     /// What it must not fall below, or rise above: raised when the firmware has become better.
     pub floor: Option<f64>,
     /// Measures it.
-    pub measure: fn(&Bed) -> Result<Figure>,
+    pub measure: fn(&B) -> Result<Figure>,
 }
 
 /// The row of this name.

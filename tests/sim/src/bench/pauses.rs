@@ -31,21 +31,25 @@ pub fn high(bed: &Bed) -> Result<Figure> {
     pauses(bed, Some(50_000.0), &[])
 }
 
-/// The pauses of all jobs, those of `long` left alone, the others with holds and overrides too.
-fn pauses(bed: &Bed, jerk: Option<f64>, long: &[(&str, &str)]) -> Result<Figure> {
-    let jobs = [
+/// The jobs that take seconds.
+pub(super) fn jobs() -> [(&'static str, String); 6] {
+    [
         ("arcs", arcs()),
         ("braid of 0.33 mm", braid(0.33, 3_000.0)),
         ("braid of 0.1 mm", braid(0.1, 1_500.0)),
         ("pocket", pocket()),
         ("spiral", SPIRAL.to_string()),
         ("square", SQUARE.to_string()),
-    ];
+    ]
+}
+
+/// The pauses of all jobs, those of `long` left alone, the others with holds and overrides too.
+fn pauses(bed: &Bed, jerk: Option<f64>, long: &[(&str, &str)]) -> Result<Figure> {
     let (mut sum, mut worst, mut seed) = (0, String::from("none"), 0);
     let mut most = 0;
     let long = long.iter().map(|(name, job)| (*name, job.to_string(), false));
     let jobs =
-        jobs.into_iter().flat_map(|(name, job)| [(name, job.clone(), false), (name, job, true)]);
+        jobs().into_iter().flat_map(|(name, job)| [(name, job.clone(), false), (name, job, true)]);
     for (name, job, disturbed) in jobs.chain(long) {
         seed += 1;
         let how = How { jerk, disturbed: disturbed.then_some(seed), ..How::default() };

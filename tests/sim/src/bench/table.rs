@@ -17,8 +17,15 @@ look-ahead with trapezoids, way / v + v / a. Kerf runs with a jerk limit out of 
 but for the rows that name one: 5,000 million mm/min3 unless they say another. The floor is what the tests insist on; * marks targets that are not reached.
 ";
 
-/// Measures the rows and prints each as it is there. True when all was measured.
+/// Measures the rows and prints each as it is there, and the footer. True when all was measured.
 pub fn print(bed: &Bed, rows: &[&Row], out: &mut impl Write) -> Result<bool> {
+    let complete = print_rows(bed, rows, out)?;
+    write!(out, "{FOOTER}")?;
+    Ok(complete)
+}
+
+/// As [`print`], of any board, without the footer.
+pub fn print_rows<B>(bed: &B, rows: &[&Row<B>], out: &mut impl Write) -> Result<bool> {
     line(out, &["what", "grbl-Mega", "TinyG", "Teacup", "Kerf", "target", "floor", "unit"], "")?;
     writeln!(out, "{}", "-".repeat(146))?;
     let mut complete = true;
@@ -27,11 +34,10 @@ pub fn print(bed: &Bed, rows: &[&Row], out: &mut impl Write) -> Result<bool> {
         complete &= measured.is_ok();
         print_row(out, row, measured)?;
     }
-    write!(out, "{FOOTER}")?;
     Ok(complete)
 }
 
-fn print_row(out: &mut impl Write, row: &Row, measured: Result<Figure>) -> io::Result<()> {
+fn print_row<B>(out: &mut impl Write, row: &Row<B>, measured: Result<Figure>) -> io::Result<()> {
     let number = |value: f64| grouped(value, row.decimals);
     let limit = |value: Option<f64>| value.map_or("-".to_string(), number);
     let (kerf, note) = match measured {

@@ -121,15 +121,7 @@ impl Bed {
 
     /// What makes the firmware comparable.
     pub fn settings(&self, how: How) -> Vec<String> {
-        let mut all: Vec<String> = SETTINGS.iter().chain(&MORE).map(|s| s.to_string()).collect();
-        let jerk = how.jerk.unwrap_or(NO_JERK_LIMIT);
-        all.extend(["x", "y", "z", "a"].map(|axis| format!("{{{axis}jm:{jerk}}}")));
-        if self.has_acceleration {
-            let limit = |axis| format!("{{{axis}ac:{}}}", how.acceleration);
-            all.extend(["x", "y", "z", "a"].map(limit));
-        }
-        all.extend(how.more.iter().map(|s| s.to_string()));
-        all
+        settings(how, self.has_acceleration)
     }
 
     /// A stopwatch for the calls of a function.
@@ -175,6 +167,19 @@ impl Bed {
         let report = job::run(&mut machine, &lines, &options, |_| {})?;
         Ok((machine, report))
     }
+}
+
+/// What makes a firmware comparable that has a setting for acceleration, or has none.
+pub fn settings(how: How, has_acceleration: bool) -> Vec<String> {
+    let mut all: Vec<String> = SETTINGS.iter().chain(&MORE).map(|s| s.to_string()).collect();
+    let jerk = how.jerk.unwrap_or(NO_JERK_LIMIT);
+    all.extend(["x", "y", "z", "a"].map(|axis| format!("{{{axis}jm:{jerk}}}")));
+    if has_acceleration {
+        let limit = |axis| format!("{{{axis}ac:{}}}", how.acceleration);
+        all.extend(["x", "y", "z", "a"].map(limit));
+    }
+    all.extend(how.more.iter().map(|s| s.to_string()));
+    all
 }
 
 /// Holds that are resumed, and overrides of feed and traverse, at random times.

@@ -15,6 +15,8 @@ use crate::runs::Runs;
 pub struct Report {
     /// What is wrong.
     pub problems: Vec<String>,
+    /// Segments that came late, by the firmware's own count.
+    pub late: u64,
     lines: usize,
     motors: Vec<Motor>,
     unchecked: Option<String>,
@@ -53,12 +55,14 @@ pub fn run(
     if host.banners() > banners || board.resets() > 0 {
         problems.push("the firmware has restarted".to_string());
     }
-    if late_segments(board, &mut host) != Some(0) {
+    let late = late_segments(board, &mut host);
+    if late != Some(0) {
         problems.push("segments came late".to_string());
     }
     let cycles = (board.cycle() - began) as f64;
     let mut report = Report {
         problems,
+        late: late.unwrap_or(0),
         lines: lines.len(),
         motors: motors(board, &setup.motors, &expected),
         unchecked: expected.err().map(|unclear| unclear.to_string()),

@@ -3,6 +3,7 @@
 //! The program answers a request by a line of JSON each: see its `bridge.mjs`. What is sent and driven here is gathered, and goes along with the
 //! next request to run.
 
+pub mod even;
 pub mod job;
 
 use std::io::{BufRead, BufReader, Write};
@@ -22,6 +23,7 @@ const PROGRAM: &str = "rp2040-emulator/bridge.mjs";
 #[derive(Serialize, Default, Debug)]
 struct Request {
     cut: bool,
+    stick: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     panic: Option<String>,
     reset: bool,
@@ -103,6 +105,8 @@ struct Answer {
     shares: Vec<(u8, f64)>,
     #[serde(default)]
     asleep: f64,
+    #[serde(default)]
+    spent: Vec<f64>,
     #[serde(default)]
     resets: u64,
     #[serde(default)]
@@ -232,6 +236,11 @@ impl Emulated {
         self.request.cut = true;
     }
 
+    /// The CPU gets stuck, with interrupts off.
+    pub fn stick(&mut self) {
+        self.request.stick = true;
+    }
+
     /// A cell turns out to be borrowed twice, in a file of that name: a panic.
     pub fn panic(&mut self, file: &str) {
         self.request.panic = Some(file.to_string());
@@ -301,6 +310,11 @@ impl Emulated {
     /// Cycles that the CPU has slept.
     pub fn asleep(&self) -> f64 {
         self.answer.asleep
+    }
+
+    /// Cycles of an exception's handler without those that interrupt it; 0 is thread mode, 16 the first interrupt.
+    pub fn spent(&self, exception: usize) -> f64 {
+        self.answer.spent.get(exception).copied().unwrap_or(0.0)
     }
 
     /// Bytes for USB that the board has not taken yet.

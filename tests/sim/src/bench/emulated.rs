@@ -1,0 +1,292 @@
+//! The rows of `pico-cnc`, whose chip is emulated. Their targets are what its users may expect of such a chip.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use kerf::boards::{Board, PICO_CNC, PICO_CNC6};
+
+use super::Better::{Higher, Lower};
+use super::workload::{How, USUAL_JERK, settings};
+use super::{Figure, Row, ideal, pauses, spiral};
+use crate::emulated::even::{FAST, evenness};
+use crate::emulated::{Emulated, Recorded, job};
+use crate::host::{Host, LINES_IN_FLIGHT};
+use crate::job::lines_of;
+use crate::machine::USB;
+use crate::runs::Runs;
+
+/// Cycles in a microsecond.
+const PER_US: f64 = 128.0;
+/// The exception that exec runs in: SWI_IRQ_1.
+const EXEC: usize = 16 + 27;
+const NONE: [&str; 3] = ["-"; 3];
+
+/// A row with a target that is its floor as well.
+const fn row(
+    name: &'static str,
+    what: &'static str,
+    unit: &'static str,
+    measure: fn(&PicoBed) -> Result<Figure>,
+) -> Row<PicoBed> {
+    Row {
+        name,
+        what,
+        unit,
+        decimals: 0,
+        better: Higher,
+        peers: NONE,
+        target: None,
+        floor: None,
+        measure,
+    }
+}
+
+/// The table.
+pub const ROWS: [Row<PicoBed>; 11] = [
+    Row {
+        target: Some(1e6),
+        floor: Some(1e6),
+        ..row("rate-1", "rate held, 1 motor", "steps/s", one)
+    },
+    Row {
+        target: Some(1e6),
+        floor: Some(1e6),
+        ..row("rate-4", "rate held, 4 motors, each", "steps/s", four)
+    },
+    Row {
+        target: Some(500e3),
+        floor: Some(500e3),
+        ..row("rate-6", "rate held, 6 motors, each (pico-cnc6)", "steps/s", six)
+    },
+    Row {
+        better: Lower,
+        target: Some(8.0),
+        floor: Some(0.0),
+        ..row("jitter", "jitter of the leading motor at 1,000,000", "ns", leading)
+    },
+    Row {
+        better: Lower,
+        decimals: 2,
+        target: Some(1.0),
+        floor: Some(1.0),
+        ..row("jitter-minor", "a step of another motor is off by", "us", minor)
+    },
+    Row {
+        target: Some(10e3),
+        floor: Some(15e3),
+        ..row("lines", "lines of 0.05 mm in a second by USB", "lines/s", lines)
+    },
+    Row {
+        better: Lower,
+        decimals: 3,
+        target: Some(1.01),
+        floor: Some(1.01),
+        ..row("spiral-0.1", "moves of 0.1 mm, over ideal", "", tenth)
+    },
+    Row {
+        better: Lower,
+        decimals: 3,
+        target: Some(1.02),
+        floor: Some(1.02),
+        ..row("spiral-0.1-jerk", "moves of 0.1 mm under a jerk limit, over none", "", tenth_jerk)
+    },
+    Row {
+        better: Lower,
+        decimals: 1,
+        target: Some(10.0),
+        floor: Some(3.0),
+        ..row("exec", "exec's share of the CPU, 1,000 slices a second", "%", exec)
+    },
+    Row {
+        better: Lower,
+        target: Some(0.0),
+        floor: Some(0.0),
+        ..row("pauses-none", "late segments of jobs without a jerk limit", "", pauses_none)
+    },
+    Row {
+        better: Lower,
+        target: Some(0.0),
+        floor: Some(0.0),
+        ..row("pauses-5000", "late segments of jobs under a jerk limit", "", pauses_usual)
+    },
+];
+
+/// The row of this name.
+pub fn named(name: &str) -> Option<&'static Row<PicoBed>> {
+    ROWS.iter().find(|row| row.name == name)
+}
+
+/// The image, and that of the board with six motors in the same folder.
+pub struct PicoBed {
+    elf: PathBuf,
+}
+
+impl PicoBed {
+    /// A bed for the ELF file at `path`.
+    pub fn new(path: &Path) -> Self {
+        PicoBed { elf: path.to_path_buf() }
+    }
+
+    /// A board that has greeted, with settings.
+    fn board(&self, board: &'static Board, settings: &[String]) -> Result<(Emulated, Host)> {
+        let elf = self.elf.with_file_name(format!("{}.elf", board.name));
+        let (mut board, mut host) = (Emulated::load(&elf, board)?, Host::new(LINES_IN_FLIGHT));
+        host.boot(&mut board, 1_000)?;
+        for line in settings {
+            ask(&mut board, &mut host, line)?;
+        }
+        Ok((board, host))
+    }
+}
+
+/// Sends a line that must be taken.
+fn ask(board: &mut Emulated, host: &mut Host, line: &str) -> Result<()> {
+    let response = host.ask(board, line, 5_000)?;
+    ensure!(response.is_ok(), "{line} is answered by {}", response.raw);
+    Ok(())
+}
+
+fn fast() -> Vec<String> {
+    FAST.map(str::to_owned).to_vec()
+}
+
+/// Edges of steps in 5 ms of the cruise of a move.
+fn cruise(bed: &PicoBed, board: &'static Board, more: &[&str], line: &str) -> Result<Recorded> {
+    let settings: Vec<_> = fast().into_iter().chain(more.iter().map(|s| s.to_string())).collect();
+    let (mut board, mut host) = bed.board(board, &settings)?;
+    ask(&mut board, &mut host, line)?;
+    host.run_for_ms(&mut board, 108)?;
+    board.record_for_ms(5)
+}
+
+/// The lowest rate of the motors that move, as many as are wanted.
+fn rate(recorded: &Recorded, motors: usize) -> Result<Figure> {
+    let moving = recorded.times.iter().filter(|times| times.len() > 1);
+    let rates: Vec<_> = moving.map(|times| evenness(times).0).collect();
+    ensure!(rates.len() == motors, "{} motors move", rates.len());
+    let lowest = rates.into_iter().fold(f64::INFINITY, f64::min);
+    // By 10: what the slope of so few steps tells.
+    Ok(Figure { value: (lowest / 10.0).round() * 10.0, note: String::new() })
+}
+
+fn one(bed: &PicoBed) -> Result<Figure> {
+    rate(&cruise(bed, &PICO_CNC, &[], "g0 x100")?, 1)
+}
+
+fn four(bed: &PicoBed) -> Result<Figure> {
+    rate(&cruise(bed, &PICO_CNC, &[], "g0 x100 y100 z100 a100")?, 4)
+}
+
+/// X, A, and two motors each of Y and Z.
+fn six(bed: &PicoBed) -> Result<Figure> {
+    let more = ["{5ma:1,5tr:1.25,6ma:2,6tr:1.25}"];
+    rate(&cruise(bed, &PICO_CNC6, &more, "g1 f46875 x60 y60 z60 a60")?, 6)
+}
+
+/// Four motors, each at a rate of its own.
+const UNLIKE: &str = "g0 x100 y87.3 z-61.8 a29";
+
+fn leading(bed: &PicoBed) -> Result<Figure> {
+    let recorded = cruise(bed, &PICO_CNC, &[], UNLIKE)?;
+    let first = recorded.times.first().context("no motor")?;
+    Ok((evenness(first).1 as f64 * 1e3 / PER_US).into())
+}
+
+fn minor(bed: &PicoBed) -> Result<Figure> {
+    let recorded = cruise(bed, &PICO_CNC, &[], UNLIKE)?;
+    Ok(recorded.times.iter().map(|times| evenness(times).2).fold(0.0, f64::max).into())
+}
+
+/// Lines that are taken in a second, of moves that are too short to be a limit. Each must be taken, and be made.
+fn lines(bed: &PicoBed) -> Result<Figure> {
+    const LINES: usize = 2_000;
+    /// Steps of 0.05 mm.
+    const STEPS: i64 = 64;
+    let (mut board, mut host) = bed.board(&PICO_CNC, &fast())?;
+    ask(&mut board, &mut host, "g1f40000")?;
+    let text: String = (1..=LINES).map(|n| format!("x{:.2}\n", n as f64 * 0.05)).collect();
+    let (begun, mut heard) = (board.cycle(), Vec::new());
+    let thread = board.spent(0);
+    board.send_to(USB, text.as_bytes());
+    while heard.iter().filter(|byte| **byte == b'\n').count() < LINES {
+        board.run_for_ms(1)?;
+        heard.extend(board.receive_from(USB));
+        ensure!(board.cycle() < begun + board.cycles(1_000), "{} bytes", heard.len());
+    }
+    let cycles = (board.cycle() - begun) as f64;
+    let busy = 100.0 * (board.spent(0) - thread) / cycles;
+    let heard = String::from_utf8(heard)?;
+    let taken = |line: &&str| line.starts_with("{\"r\":") && line.contains("\"f\":[1,0,");
+    let taken = heard.lines().filter(taken).count();
+    ensure!(taken == LINES, "{taken} lines are taken");
+    board.run_for_ms(3_000)?;
+    let steps = board.positions()[0];
+    ensure!(steps == LINES as i64 * STEPS, "{steps} steps");
+    let value = LINES as f64 / (cycles / PER_US / 1e6);
+    Ok(Figure { value, note: format!("thread mode takes {busy:.0} % of the CPU") })
+}
+
+/// A board that has just begun a spiral of 2,000 moves of 0.1 mm at 6,000 mm/min.
+fn begun(bed: &PicoBed, jerk: Option<f64>) -> Result<Emulated> {
+    let (mut board, _) = bed.board(&PICO_CNC, &settings(How { jerk, ..How::default() }, true))?;
+    board.send_to(USB, spiral(0.1).as_bytes());
+    while board.totals() == [0; 4] {
+        board.run_for_ms(1)?;
+        ensure!(board.cycle() < board.cycles(10_000), "nothing moves");
+    }
+    Ok(board)
+}
+
+/// How long the steps of that take, s.
+fn seconds(bed: &PicoBed, jerk: Option<f64>) -> Result<f64> {
+    let mut board = begun(bed, jerk)?;
+    let start = board.cycle();
+    board.run_for_ms(3_000)?;
+    let last = board.last_step().context("no step")?;
+    ensure!(board.cycle() - last > board.cycles(100), "it has not ended");
+    Ok((last - start) as f64 / PER_US / 1e6)
+}
+
+fn tenth(bed: &PicoBed) -> Result<Figure> {
+    Ok((seconds(bed, None)? / ideal(0.1)).into())
+}
+
+fn tenth_jerk(bed: &PicoBed) -> Result<Figure> {
+    Ok((seconds(bed, Some(USUAL_JERK))? / seconds(bed, None)?).into())
+}
+
+/// By the cycles of its handler, without those that interrupt it. A move of 0.1 mm is a slice of a millisecond.
+fn exec(bed: &PicoBed) -> Result<Figure> {
+    let mut board = begun(bed, None)?;
+    board.run_for_ms(500)?;
+    let (from, before) = (board.cycle(), board.spent(EXEC));
+    board.run_for_ms(1_000)?;
+    let value = 100.0 * (board.spent(EXEC) - before) / (board.cycle() - from) as f64;
+    ensure!(value > 0.1, "exec does not run");
+    Ok(value.into())
+}
+
+fn pauses_none(bed: &PicoBed) -> Result<Figure> {
+    late(bed, None)
+}
+
+fn pauses_usual(bed: &PicoBed) -> Result<Figure> {
+    late(bed, Some(USUAL_JERK))
+}
+
+/// Segments that came late in the jobs, which must end on their exact steps.
+fn late(bed: &PicoBed, jerk: Option<f64>) -> Result<Figure> {
+    let settings = settings(How { jerk, ..How::default() }, true);
+    let (mut sum, mut note) = (0, String::new());
+    for (name, text) in pauses::jobs() {
+        let mut board = Emulated::load(&bed.elf, &PICO_CNC)?;
+        let report = job::run(&mut board, &lines_of(&text), &settings, LINES_IN_FLIGHT, |_| ())?;
+        let problems = report.problems.join("; ");
+        ensure!(problems.is_empty() || report.late > 0, "{name}: {problems}");
+        sum += report.late;
+        if report.late > 0 {
+            note += &format!("{name} {}, ", report.late);
+        }
+    }
+    Ok(Figure { value: sum as f64, note })
+}

@@ -1,0 +1,47 @@
+//! Every row of the bench of `pico-cnc` keeps to its floor. Run as `pico.rs` is.
+
+mod common;
+
+use common::image;
+use kerf::boards::{PICO_CNC, PICO_CNC6};
+use kerf_sim::bench::emulated::{PicoBed, ROWS, named};
+
+fn keeps_to_its_floor(name: &str) {
+    let row = named(name).unwrap();
+    // It is looked for beside the other one.
+    image(&PICO_CNC6);
+    let figure = (row.measure)(&PicoBed::new(&image(&PICO_CNC))).unwrap();
+    let said = format!("{}: {} {} ({})", row.what, figure.value, row.unit, figure.note);
+    println!("{said}");
+    let floor = row.floor.unwrap_or(figure.value);
+    assert!(row.better.reaches(figure.value, floor), "{said}, but the floor is {floor}");
+}
+
+macro_rules! rows {
+    ($($test:ident = $name:literal;)+) => {
+        $(#[test]
+        #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+        fn $test() {
+            keeps_to_its_floor($name);
+        })+
+
+        #[test]
+        fn every_row_is_tested() {
+            assert_eq!(ROWS.each_ref().map(|row| row.name), [$($name),+]);
+        }
+    };
+}
+
+rows! {
+    one_motor = "rate-1";
+    four_motors = "rate-4";
+    six_motors = "rate-6";
+    jitter_of_the_leading_motor = "jitter";
+    jitter_of_another_motor = "jitter-minor";
+    lines_in_a_second = "lines";
+    moves_of_a_tenth = "spiral-0.1";
+    moves_of_a_tenth_under_a_jerk_limit = "spiral-0.1-jerk";
+    share_of_exec = "exec";
+    pauses_without_a_jerk_limit = "pauses-none";
+    pauses_under_a_jerk_limit = "pauses-5000";
+}
