@@ -70,7 +70,7 @@ rows! {
     TooHot = 52, "Heater too hot";
     TooCold = 53, "Too cold to extrude";
     HeatersLocked = 54, "Heaters are locked [^x to reset]";
-    CardError = 55, "SD card cannot be read";
+    CardError = 56, "SD card cannot be read";
     UnrecognizedName = 100, "Unrecognized command or config name";
     MalformedCommand = 101, "Invalid or malformed command";
     BadNumber = 102, "Bad number format";
