@@ -181,8 +181,8 @@ mod tests {
     fn one_byte_more_is_not() {
         let over = past_caps(Sizes { flash: caps::FLASH + 1, ..SIZES }, 0);
         assert_eq!(over, [format!("flash {} > {}", caps::FLASH + 1, caps::FLASH)]);
-        let over = past_caps(Sizes { data: 401, bss: 0, ..SIZES }, 0);
-        assert_eq!(over, [".data 401 > 400"]);
+        let over = past_caps(Sizes { data: caps::DATA + 1, bss: 0, ..SIZES }, 0);
+        assert_eq!(over, [format!(".data {} > {}", caps::DATA + 1, caps::DATA)]);
         let over = past_caps(Sizes { bss: SIZES.bss + 1, ..SIZES }, 0);
         assert_eq!(over, [format!("static RAM {} > {}", caps::STATIC_RAM + 1, caps::STATIC_RAM)]);
         let stack = caps::RAM - caps::STATIC_RAM - caps::FREE_STACK.cast_unsigned();
