@@ -80,6 +80,17 @@ fn links(text: &str) -> Vec<(usize, &str)> {
     targets.filter(|(_, target)| !target.contains("://") && !target.starts_with('#')).collect()
 }
 
+/// Whether the file of a link is there, and the heading that it names behind `#`.
+fn leads_somewhere(folder: &Path, target: &str) -> bool {
+    let Some((file, heading)) = target.split_once('#') else { return folder.join(target).exists() };
+    let text = std::fs::read_to_string(folder.join(file)).unwrap_or_default();
+    let is_kept = |c: &char| c.is_alphanumeric() || " -_".contains(*c);
+    let name = |line: &str| -> String {
+        line.trim_start_matches('#').trim().to_lowercase().chars().filter(is_kept).collect()
+    };
+    text.lines().any(|line| line.starts_with('#') && name(line).replace(' ', "-") == heading)
+}
+
 fn is_path(span: &str) -> bool {
     const ENDINGS: [&str; 4] = [".rs", ".md", ".toml", ".gcode"];
     let is_one = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);
@@ -124,7 +135,8 @@ fn what_the_documents_name_exists() {
         let folder = root().join(document).parent().expect("a folder").to_owned();
         let spans = spans(&text).into_iter().filter(|(_, span)| !exists(span, &sources));
         wrong.extend(spans.map(|(line, span)| format!("{document}:{line}: `{span}`")));
-        let links = links(&text).into_iter().filter(|(_, target)| !folder.join(target).exists());
+        let links =
+            links(&text).into_iter().filter(|(_, target)| !leads_somewhere(&folder, target));
         wrong.extend(links.map(|(line, target)| format!("{document}:{line}: link to {target}")));
     }
     assert!(wrong.is_empty(), "named in a document but not there:\n{}", wrong.join("\n"));
