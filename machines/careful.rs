@@ -1,9 +1,9 @@
 //! A machine that nobody has told Kerf anything about: TinyG's screws, and ramps that stall no stepper and need no patience.
 
-use super::{Machine, set};
+use super::{MachineProfile, set};
 
 /// The machine that an image is built for unless another is asked for.
-pub const CAREFUL: Machine = Machine {
+pub const CAREFUL: MachineProfile = MachineProfile {
     name: "careful",
     about: "a machine that nothing is known of",
     entries: &[

@@ -1,9 +1,9 @@
 //! A lathe: X across, in radius, and Z along the spindle, on ball screws. No Y, no A; arcs are in XZ.
 
-use super::{Machine, set};
+use super::{MachineProfile, set};
 
 /// A lathe.
-pub const LATHE: Machine = Machine {
+pub const LATHE: MachineProfile = MachineProfile {
     name: "lathe",
     about: "a lathe",
     entries: &[

@@ -1,9 +1,9 @@
 //! A desktop mill of the Zen and Othermill class: lead screws everywhere.
 
-use super::{Machine, set};
+use super::{MachineProfile, set};
 
 /// A desktop mill of the Zen and Othermill class.
-pub const MILL: Machine = Machine {
+pub const MILL: MachineProfile = MachineProfile {
     name: "mill",
     about: "a desktop mill of the Zen and Othermill class",
     entries: &[

@@ -1,9 +1,9 @@
 //! A 3D printer of the Mendel class: belts on X and Y, a screw on Z, and the extruder as A, in mm of filament.
 
-use super::{Machine, set};
+use super::{MachineProfile, set};
 
 /// A 3D printer of the Mendel class.
-pub const PRINTER: Machine = Machine {
+pub const PRINTER: MachineProfile = MachineProfile {
     name: "printer",
     about: "a 3D printer of the Mendel class",
     entries: &[

@@ -1,9 +1,9 @@
 //! A router of the Shapeoko class: belts on X and Y, a threaded rod on Z, a motor at each side of Y.
 
-use super::{Machine, set};
+use super::{MachineProfile, set};
 
 /// A router of the Shapeoko class.
-pub const ROUTER: Machine = Machine {
+pub const ROUTER: MachineProfile = MachineProfile {
     name: "router",
     about: "a router of the Shapeoko class",
     entries: &[

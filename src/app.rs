@@ -32,7 +32,7 @@ use crate::tasks::ports::{AUX_RESERVE, Choice, Port};
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
-use crate::tasks::wake::{News, Wake};
+use crate::tasks::wake::{ReporterWake, Wake};
 use crate::tasks::{
     alarm, control, exec, heat, parser, planner, power, reader, reporter, spindle, storage,
 };
@@ -57,7 +57,7 @@ impl Links {
             chain_waits: Cell::new(false),
             cycle_start: Wake::default(),
             notices: Notices::default(),
-            reporter_wake: News::default(),
+            reporter_wake: ReporterWake::default(),
             queue_count: QueueCount::default(),
             changes: Changes::new(Changes::SETTINGS),
             rate: Cell::new(None),

@@ -2,7 +2,7 @@
 //!
 //! Two sensors: the *index* gives a pulse a turn, *sync* so many (`spn`). With `spn` 1 the index alone is read. The hardware counts pulses
 //! and takes their time ([`Pulses`], `hal::encoder`); [`Encoder::look`] makes of that what is known of the spindle. It is asked each 20 ms by
-//! the power task (`tasks::power`), under the ceiling lock. Nothing waits, and nothing can be full: between two looks any number of pulses may
+//! the power task (`tasks::power`), under the ceiling lock. Nothing waits, and nothing can be full: between two samples any number of pulses may
 //! have come, of which the newest counts.
 //!
 //! **Fit.** At each index so many pulses of sync must have come as a turn has: one that is missing, or one more, is a *misfit*, and so
@@ -15,7 +15,7 @@
 //! **Stop.** No pulse for half a second, or for twice as long as between the last two if that is more, is a spindle that
 //! stands still: its speed is 0, and nothing is known of it any more.
 //!
-//! Units: counts of 4 us ([`COUNTS_PER_S`]), in 32 bits that wrap after 4.7 hours; differences are right across the wrap. Cost of a look:
+//! Units: counts of 4 us ([`COUNTS_PER_S`]), in 32 bits that wrap after 4.7 hours; differences are right across the wrap. Cost of a sample:
 //! 300 cycles without a pulse, 1,000 with one. The speed is that of the last turn: as exact as the time of two pulses, each of which may be taken late by
 //! what a step interrupt lasts, 17 us.
 
@@ -62,7 +62,7 @@ impl Pulses {
 pub struct Encoder {
     /// Pulses of sync in a turn; 0 for no encoder.
     per_turn: u16,
-    /// The time of the last look.
+    /// The time of the last sample.
     time: u32,
     /// The pulses by then.
     index: u16,
@@ -148,12 +148,12 @@ impl Encoder {
         self.time = pulses.now.into();
     }
 
-    /// The time of the last look.
+    /// The time of the last sample.
     pub fn time(&self) -> u32 {
         self.time
     }
 
-    /// The time when the clock of the pulses said `now`, since the last look.
+    /// The time when the clock of the pulses said `now`, since the last sample.
     pub fn time_at(&self, now: u16) -> u32 {
         self.time.wrapping_add(now.wrapping_sub(self.time as u16).into())
     }
@@ -239,9 +239,9 @@ impl Encoder {
         is_new
     }
 
-    /// Takes up what the sensors have seen since the last look. Whether pulses did not fit.
+    /// Takes up what the sensors have seen since the last sample. Whether pulses did not fit.
     #[inline(never)]
-    pub fn look(&mut self, pulses: &Pulses) -> bool {
+    pub fn sample(&mut self, pulses: &Pulses) -> bool {
         self.time = self.time_at(pulses.now);
         if pulses.sync != self.sync {
             if self.tells() {
@@ -271,7 +271,7 @@ impl Encoder {
         }
     }
 
-    /// A time before the last look.
+    /// A time before the last sample.
     fn time_of(&self, pulses: &Pulses, at: u16) -> u32 {
         self.time.wrapping_sub(pulses.now.wrapping_sub(at).into())
     }
@@ -372,7 +372,7 @@ mod tests {
             while self.looked + LOOK <= end {
                 self.looked += LOOK;
                 self.pulses.now = self.looked as u16;
-                self.misfits += u32::from(self.encoder.look(&self.pulses));
+                self.misfits += u32::from(self.encoder.sample(&self.pulses));
             }
             self.now = end;
         }

@@ -1,7 +1,7 @@
 //! Switches: from the levels of pins to what is believed of them, without any pin.
 //!
-//! The hardware has someone look at all pins at once, and each look says when the next one is due. An edge
-//! asks for a first look after [`FIRST_US`]; two looks in a row that agree, [`SOON_US`] apart, are believed. So
+//! The hardware has someone look at all pins at once, and each sample says when the next one is due. An edge
+//! asks for a first sample after [`FIRST_US`]; two samples in a row that agree, [`SOON_US`] apart, are believed. So
 //!
 //! - a pulse shorter than [`SOON_US`] is never believed, one longer than both times always;
 //! - a switch is believed 11 us after its edge, if nothing else has happened in the last [`LATER_US`], and
@@ -9,22 +9,22 @@
 //! - it is not asked again for [`LOCK_MS`] after that, so that its bouncing is one event, and then believed
 //!   as it stands.
 //!
-//! Where noise keeps coming, looks that found nothing are followed by a pause: it costs at most a fifth of
+//! Where noise keeps coming, samples that found nothing are followed by a pause: it costs at most a fifth of
 //! the CPU. While no switch moves nobody looks. Sets of switches are bits, as in
 //! [`inputs`](crate::boards::inputs).
 
-/// From an edge to a look, microseconds.
+/// From an edge to a sample, microseconds.
 pub const FIRST_US: u32 = 1;
 /// From there to the next.
 pub const SOON_US: u32 = 10;
-/// Between looks while a switch is locked, and after one that found nothing.
+/// Between samples while a switch is locked, and after one that found nothing.
 pub const LATER_US: u32 = 125;
 /// How long a switch that has changed is not asked again; up to twice that if others change meanwhile.
 pub const LOCK_MS: u32 = 10;
 
 const LOCK_LOOKS: u8 = (LOCK_MS * 1_000 / LATER_US) as u8;
 
-/// When the next look is due.
+/// When the next sample is due.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Next {
     /// After an edge.
@@ -39,13 +39,13 @@ pub enum Next {
 #[derive(Clone, Debug)]
 pub struct Switches {
     worked: u16,
-    /// What the last look found.
+    /// What the last sample found.
     last: u16,
     /// Changed lately.
     locked: u16,
-    /// Looks until these are asked again.
+    /// Samples until these are asked again.
     left: u8,
-    /// The last look found nothing, and is not followed by a pause any more.
+    /// The last sample found nothing, and is not followed by a pause any more.
     paused: bool,
 }
 
@@ -60,29 +60,29 @@ impl Switches {
         self.worked
     }
 
-    /// Believes what a look finds, without more ado: at power-up, and when switches are told anew.
+    /// Believes what a sample finds, without more ado: at power-up, and when switches are told anew.
     pub fn adopt(&mut self, now: u16) {
         *self = Self { worked: now, last: now, ..Self::new() };
     }
 
-    /// Whether a look that finds the switches `now` worked wants another.
+    /// Whether a sample that finds the switches `now` worked wants another.
     pub fn is_news(&self, now: u16) -> bool {
         (now ^ self.worked) & !self.locked != 0
     }
 
-    /// The first of two looks, of which the second decides.
+    /// The first of two samples, of which the second decides.
     pub fn note(&mut self, now: u16) {
         self.last = now;
     }
 
-    /// The switches that have changed, if this is the second look that finds the switches `now` worked.
+    /// The switches that have changed, if this is the second sample that finds the switches `now` worked.
     #[inline(always)]
     pub fn changed(&self, now: u16) -> u16 {
         (now ^ self.worked) & !(now ^ self.last) & !self.locked
     }
 
-    /// A look finds the switches `now` worked. Returns those that have changed, and when to look again.
-    pub fn look(&mut self, now: u16) -> (u16, Next) {
+    /// A sample finds the switches `now` worked. Returns those that have changed, and when to look again.
+    pub fn sample(&mut self, now: u16) -> (u16, Next) {
         let changed = self.changed(now);
         self.last = now;
         self.worked ^= changed;
@@ -133,7 +133,7 @@ mod tests {
             at = match next {
                 Next::Soon => at + SOON_US,
                 Next::Later => at + LATER_US,
-                // One that came since the last look asks for another.
+                // One that came since the last sample asks for another.
                 Next::Edge => match edge.find(|e| *e > at) {
                     Some(edge) => edge + FIRST_US,
                     None => return events,
@@ -142,7 +142,7 @@ mod tests {
             if at > until {
                 return events;
             }
-            let (changed, then) = switches.look(level(at).into());
+            let (changed, then) = switches.sample(level(at).into());
             next = then;
             if changed != 0 {
                 events.push((at, switches.worked() != 0));
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_is_believed_after_two_looks() {
+    fn an_edge_is_believed_after_two_samples() {
         assert_eq!(watched(&[1_000], 100_000), [(1_011, true)]);
         assert_eq!(watched(&[1_000, 50_000], 100_000), [(1_011, true), (50_011, false)]);
     }
@@ -173,10 +173,10 @@ mod tests {
     fn a_switch_need_not_wait_for_another() {
         let mut switches = Switches::new();
         for now in [1, 1] {
-            switches.look(now);
+            switches.sample(now);
         }
-        assert_eq!(switches.look(3), (0, Next::Soon));
-        assert_eq!(switches.look(3), (2, Next::Later));
+        assert_eq!(switches.sample(3), (0, Next::Soon));
+        assert_eq!(switches.sample(3), (2, Next::Later));
         assert_eq!(switches.worked(), 3);
     }
 
@@ -185,8 +185,8 @@ mod tests {
         let mut switches = Switches::new();
         switches.adopt(0b101);
         assert_eq!(switches.worked(), 0b101);
-        assert_eq!(switches.look(0b101), (0, Next::Later));
-        assert_eq!(switches.look(0b101), (0, Next::Edge));
+        assert_eq!(switches.sample(0b101), (0, Next::Later));
+        assert_eq!(switches.sample(0b101), (0, Next::Edge));
     }
 
     proptest! {

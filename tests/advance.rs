@@ -10,7 +10,7 @@ mod rig;
 use cases::cases;
 use kerf::config::StepRatio;
 use kerf::motion::advance::Lead;
-use kerf::motion::block::{Action, Block};
+use kerf::motion::block::{Block, QueuedAction};
 use kerf::motion::exec::Step;
 use kerf::motion::short::Short;
 use proptest::prelude::*;
@@ -44,7 +44,7 @@ fn rig(jerk: f32, k: f64) -> Rig {
     rig.keep = false;
     rig.leads = Some(E);
     if k > 0.0 {
-        rig.aside(Block::action(Action::Advance(lead(k)), 0));
+        rig.aside(Block::action(QueuedAction::Advance(lead(k)), 0));
     }
     rig
 }
@@ -142,14 +142,14 @@ fn travels_and_retractions_have_no_lead() {
 fn what_is_off_costs_nothing() {
     let lines = along_x(40, 2.0, &[60.0, 20.0], 0.0333);
     let (mut without, mut zero) = (rig(33_333.0, 0.0), rig(33_333.0, 0.0));
-    zero.aside(Block::action(Action::Advance(lead(0.0)), 0));
+    zero.aside(Block::action(QueuedAction::Advance(lead(0.0)), 0));
     run(&mut without, &lines);
     run(&mut zero, &lines);
     assert_eq!(without.pins.edges, zero.pins.edges);
 }
 
 #[derive(Clone, Debug)]
-enum Deed {
+enum Op {
     Line([f64; 4], f32),
     K(f64),
     Dwell,
@@ -158,27 +158,27 @@ enum Deed {
     Turns(u16),
 }
 
-fn any_deed() -> impl Strategy<Value = Deed> {
+fn any_deed() -> impl Strategy<Value = Op> {
     let way = || prop_oneof![3 => Just(0.0), 5 => -3.0..3.0f64, 1 => -60.0..60.0f64];
     let filament = prop_oneof![2 => Just(0.0), 5 => 0.0..0.2f64, 1 => -5.0..8.0f64];
     let speed = prop_oneof![1f32..20.0, 20f32..200.0];
     prop_oneof![
         20 => (way(), way(), prop_oneof![9 => Just(0.0), 1 => -0.4..0.4f64], filament, speed)
-            .prop_map(|(x, y, z, e, speed)| Deed::Line([x, y, z, e], speed)),
-        2 => prop_oneof![Just(0.0), 0.01..0.2f64, Just(2.0)].prop_map(Deed::K),
-        1 => Just(Deed::Dwell),
-        1 => (0u16..200, prop::bool::weighted(0.4)).prop_map(|(turns, drop)| Deed::Hold(turns, drop)),
-        1 => (0u16..100, 0usize..6, 0usize..400).prop_map(|(a, b, c)| Deed::Stop(a, b, c)),
-        4 => (0u16..60).prop_map(Deed::Turns),
+            .prop_map(|(x, y, z, e, speed)| Op::Line([x, y, z, e], speed)),
+        2 => prop_oneof![Just(0.0), 0.01..0.2f64, Just(2.0)].prop_map(Op::K),
+        1 => Just(Op::Dwell),
+        1 => (0u16..200, prop::bool::weighted(0.4)).prop_map(|(turns, drop)| Op::Hold(turns, drop)),
+        1 => (0u16..100, 0usize..6, 0usize..400).prop_map(|(a, b, c)| Op::Stop(a, b, c)),
+        4 => (0u16..60).prop_map(Op::Turns),
     ]
 }
 
-fn carry_out(rig: &mut Rig, deed: &Deed, place: &mut [f64; 4]) {
+fn carry_out(rig: &mut Rig, op: &Op, place: &mut [f64; 4]) {
     while rig.free() < 2 {
         rig.turn();
     }
-    match deed {
-        Deed::Line(way, speed) => {
+    match op {
+        Op::Line(way, speed) => {
             for (place, way) in place.iter_mut().zip(way) {
                 *place += way;
             }
@@ -187,10 +187,10 @@ fn carry_out(rig: &mut Rig, deed: &Deed, place: &mut [f64; 4]) {
                 rig.line(to, *speed, 1);
             }
         }
-        Deed::K(k) => rig.aside(Block::action(Action::Advance(lead(*k)), 0)),
-        Deed::Dwell => rig.push(Block::action(Action::Dwell(5), 0)),
-        Deed::Turns(turns) => (0..*turns).for_each(|_| _ = rig.turn()),
-        Deed::Hold(turns, drop) => {
+        Op::K(k) => rig.aside(Block::action(QueuedAction::Advance(lead(*k)), 0)),
+        Op::Dwell => rig.push(Block::action(QueuedAction::Dwell(5), 0)),
+        Op::Turns(turns) => (0..*turns).for_each(|_| _ = rig.turn()),
+        Op::Hold(turns, drop) => {
             (0..*turns).for_each(|_| _ = rig.turn());
             rig.hold(true);
             let mut turns = 0;
@@ -205,7 +205,7 @@ fn carry_out(rig: &mut Rig, deed: &Deed, place: &mut [f64; 4]) {
             }
             rig.hold(false);
         }
-        Deed::Stop(turns, segments, ticks) => {
+        Op::Stop(turns, segments, ticks) => {
             (0..*turns).for_each(|_| _ = rig.turn());
             rig.stop_short(*segments, *ticks);
             assert_eq!(rig.pins.position, rig.snapshot.target.map(i64::from));
@@ -220,12 +220,12 @@ proptest! {
     #[test]
     fn at_rest_the_extruder_is_where_its_line_ends(
         jerk in prop_oneof![Just(0f32), Just(33_333f32), 2_000f32..100_000.0],
-        deeds in prop::collection::vec(any_deed(), 1..150),
+        ops in prop::collection::vec(any_deed(), 1..150),
     ) {
         let mut rig = rig(jerk, 0.05);
         let mut place = [0.0; 4];
-        for deed in &deeds {
-            carry_out(&mut rig, deed, &mut place);
+        for op in &ops {
+            carry_out(&mut rig, op, &mut place);
         }
         rig.finish();
         let at_rest = rig.target();

@@ -7,7 +7,7 @@ mod rig;
 use kerf::boards::MOTORS;
 use kerf::config::StepRatio;
 use kerf::gcode::command::Feed;
-use kerf::motion::block::{Action, Line as Move};
+use kerf::motion::block::{Line as Move, QueuedAction};
 use kerf::motion::dynamics::Dynamics;
 use kerf::motion::exec::BLOCK_S_MIN;
 use kerf::motion::factors::Factors;
@@ -373,12 +373,12 @@ fn stops() {
     assert_eq!(next(&mut builder, None).1, 0.0);
     let (block, entry) = next(&mut builder, None);
     assert!(entry > block.cruise && (block.cruise - 100.0).abs() < 1e-3, "{entry}");
-    assert_eq!(builder.pause(Action::Dwell(1500), 3).line(), 3);
+    assert_eq!(builder.pause(QueuedAction::Dwell(1500), 3).line(), 3);
     assert_eq!(next(&mut builder, None).1, 0.0);
     builder.stopped();
     assert_eq!(next(&mut builder, None).1, 0.0);
     let body = builder.set_position(&at([1.0]), &config);
-    assert!(matches!(body, Action::SetPosition([80, 0, 0, 0])), "{body:?}");
+    assert!(matches!(body, QueuedAction::SetPosition([80, 0, 0, 0])), "{body:?}");
     let (block, entry) = next(&mut builder, Some(1.0));
     assert_eq!((block.way, entry), ([800 * 16, 0, 0, 0], 0.0));
 }

@@ -8,9 +8,9 @@ mod optimum;
 use std::cell::Cell;
 
 use kerf::motion::governor::{Ahead, Governor};
-use kerf::motion::horizon;
-use kerf::motion::queue::Anchor;
+use kerf::motion::queue::Constraint;
 use kerf::motion::short::Short;
+use kerf::motion::speed_constraints;
 use optimum::rest_to_rest;
 
 /// Nominal time of a slice.
@@ -68,14 +68,14 @@ impl Ahead for Queue<'_> {
     fn headroom(&self) -> f32 {
         0.0
     }
-    fn slower(&self, n: u8, velocity: Short) -> (u8, Anchor) {
+    fn slower(&self, n: u8, velocity: Short) -> (u8, Constraint) {
         self.asked.set(self.asked.get() + 1);
         let last = self.constraints.len() - 1;
         let slower = |at: &usize| *at == last || Short::new(self.constraints[*at].0) < velocity;
         let at = (usize::from(n)..last).find(slower).unwrap_or(last);
         let (velocity, ahead) = self.constraints[at];
         let velocity = Short::new(velocity);
-        (at as u8, Anchor { velocity, ahead, firm: at == last })
+        (at as u8, Constraint { velocity, ahead, firm: at == last })
     }
     fn end(&self) -> f32 {
         self.constraints[self.constraints.len() - 1].1
@@ -108,10 +108,10 @@ impl Path {
         Self { accel, jerk, blocks, queue, holds }
     }
 
-    /// The constraints behind block `at`, of blocks up to `end`, with rising keys as the horizon keeps them.
+    /// The constraints behind block `at`, of blocks up to `end`, with rising keys as the speed constraints keep them.
     fn ahead<'a>(&self, at: usize, end: usize, asked: &'a Cell<u32>) -> Queue<'a> {
-        let kappa = horizon::kappa(self.accel as f32, self.jerk as f32);
-        let key = |w: f32, ahead: f32| horizon::key(w, kappa) + ahead;
+        let kappa = speed_constraints::kappa(self.accel as f32, self.jerk as f32);
+        let key = |w: f32, ahead: f32| speed_constraints::key(w, kappa) + ahead;
         let mut constraints: Vec<(f32, f32)> = Vec::new();
         let mut ahead = 0.0;
         for n in at + 1..=end {

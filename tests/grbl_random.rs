@@ -1,13 +1,13 @@
 //! Random conversations in grbl's dialect with the whole firmware on the host, in mocked time: lines, bytes that act anywhere in them,
-//! resets, and TinyG's dialect on the second port. What is judged is in `tests/support/grbl_talk.rs`; `tests/sim/tests/grbl.rs` has the
+//! resets, and TinyG's dialect on the second port. What is judged is in `tests/support/grbl_session.rs`; `tests/sim/tests/grbl.rs` has the
 //! same conversations with the image, and shorter ones.
 //!
 //! One that fails is made as small as it can be, and its seed is told: `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test grbl_random`.
 
-#[path = "support/grbl_deeds.rs"]
-mod grbl_deeds;
-#[path = "support/grbl_talk.rs"]
-mod grbl_talk;
+#[path = "support/grbl_ops.rs"]
+mod grbl_ops;
+#[path = "support/grbl_session.rs"]
+mod grbl_session;
 #[path = "support/host.rs"]
 mod host;
 #[path = "support/seeds.rs"]
@@ -17,20 +17,20 @@ mod side;
 
 use std::thread;
 
-use grbl_deeds::Deed;
-use grbl_talk::Talk;
+use grbl_ops::Op;
+use grbl_session::Session;
 use kerf::hal::imp::Machine;
 
-/// See [`Talk`].
+/// See [`Session`].
 const REPORT_MS: u64 = 20;
 
 /// Has a conversation, with a machine in a thread of its own.
-fn play(deeds: &[Deed]) -> Result<(), String> {
+fn play(ops: &[Op]) -> Result<(), String> {
     let life = || {
-        let mut talk =
-            Talk::new(Machine::boot(115_200).expect("one machine for each thread"), REPORT_MS);
-        let played = talk.begin().and_then(|()| talk.play(deeds));
-        played.map_err(|why| format!("{why}\n{}", talk.story()))
+        let mut session =
+            Session::new(Machine::boot(115_200).expect("one machine for each thread"), REPORT_MS);
+        let played = session.begin().and_then(|()| session.play(ops));
+        played.map_err(|why| format!("{why}\n{}", session.story()))
     };
     let lived = thread::scope(|scope| scope.spawn(life).join());
     lived.map_err(|_| "the firmware panics".to_string())?
@@ -39,14 +39,14 @@ fn play(deeds: &[Deed]) -> Result<(), String> {
 #[test]
 fn any_conversation_keeps_to_the_dialect() {
     seeds::try_all(300, |seed| {
-        seeds::smallest(seed, &grbl_deeds::conversation(40, 1_000), |deeds| play(&deeds))
+        seeds::smallest(seed, &grbl_ops::conversation(40, 1_000), |ops| play(&ops))
     });
 }
 
 /// Questions are no part of lines, and take no room from them.
 #[test]
 fn questions_in_a_long_hold_take_no_room() {
-    let mut talk = Talk::new(Machine::boot(115_200).expect("one machine"), REPORT_MS);
-    let played = talk.begin().and_then(|()| talk.hold_long());
-    played.unwrap_or_else(|why| panic!("{why}\n{}", talk.story()));
+    let mut session = Session::new(Machine::boot(115_200).expect("one machine"), REPORT_MS);
+    let played = session.begin().and_then(|()| session.hold_long());
+    played.unwrap_or_else(|why| panic!("{why}\n{}", session.story()));
 }

@@ -17,7 +17,7 @@ use jobs::{Job, any_job, plan_held};
 use keeps::check_limits;
 use kerf::boards::MOTORS;
 use kerf::dda::SEGMENTS;
-use kerf::motion::block::{Action, Block, Outputs};
+use kerf::motion::block::{Block, Outputs, QueuedAction};
 use kerf::motion::exec::Step;
 use proptest::prelude::*;
 use rig::{Config, Rig, at};
@@ -197,7 +197,7 @@ fn until_held(rig: &mut Rig) {
 #[test]
 fn a_dwell_pauses() {
     let mut rig = Rig::new(Config::new(100.0, 1_000.0, 0.0));
-    rig.push(Block::action(Action::Dwell(500), 1));
+    rig.push(Block::action(QueuedAction::Dwell(500), 1));
     (0..100).for_each(|_| _ = rig.turn());
     until_held(&mut rig);
     let before = rig.seconds();
@@ -210,9 +210,11 @@ fn a_dwell_pauses() {
 
 #[test]
 fn nothing_begins_in_a_hold() {
-    for action in
-        [Action::Dwell(100), Action::Outputs(Outputs { on: 1, speed: 0.0 }), Action::ProgramStop]
-    {
+    for action in [
+        QueuedAction::Dwell(100),
+        QueuedAction::Outputs(Outputs { on: 1, speed: 0.0 }),
+        QueuedAction::ProgramStop,
+    ] {
         let mut rig = Rig::new(Config::new(100.0, 1_000.0, 0.0));
         rig.line(at([1.0]), 50.0, 1);
         rig.push(Block::action(action, 2));
@@ -237,7 +239,7 @@ fn what_was_said_of_positions_before_the_first_move_holds() {
         if moved {
             rig.line(at([1.0]), 50.0, 1);
         }
-        rig.push(Block::action(Action::SetPosition([7; MOTORS]), 2));
+        rig.push(Block::action(QueuedAction::SetPosition([7; MOTORS]), 2));
         until_held(&mut rig);
         rig.pins.position = [if moved { 0 } else { 7 }; MOTORS];
         rig.drop_all();

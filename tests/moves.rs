@@ -11,7 +11,7 @@ mod optimum;
 mod rig;
 
 use jobs::{Job, Move, plan};
-use kerf::motion::block::{Action, Block};
+use kerf::motion::block::{Block, QueuedAction};
 use kerf::motion::factors::Factors;
 use optimum::rest_to_rest;
 use rig::{Config, Rig, at};
@@ -135,7 +135,7 @@ fn blocks_without_a_step_keep_their_time() {
 #[test]
 fn a_dwell_lasts_as_long_as_asked() {
     let mut rig = Rig::new(Config::new(100.0, 500.0, 1e5));
-    rig.push(Block::action(Action::Dwell(1235), 0));
+    rig.push(Block::action(QueuedAction::Dwell(1235), 0));
     rig.finish();
     let ms = rig.seconds() * 1e3;
     assert!((ms - 1235.0).abs() < 1.5, "{ms} ms");
@@ -148,7 +148,7 @@ fn moves_stop_for_a_dwell() {
         let mut rig = Rig::new(Config::new(100.0, 500.0, 1e5));
         rig.line(at([10.0]), 50.0, 1);
         if dwell {
-            rig.push(Block::action(Action::Dwell(500), 0));
+            rig.push(Block::action(QueuedAction::Dwell(500), 0));
         } else {
             rig.stop();
         }

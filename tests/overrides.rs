@@ -17,7 +17,7 @@ use cases::cases;
 use jobs::{Job, Planned, any_job, plan_changed};
 use keeps::{check_changes, check_corners};
 use kerf::gcode::overrides::{Change, Override};
-use kerf::motion::block::{Action, Block};
+use kerf::motion::block::{Block, QueuedAction};
 use kerf::motion::exec::Step;
 use kerf::motion::factors::Factors;
 use proptest::prelude::*;
@@ -25,21 +25,21 @@ use rig::{Config, Rig, at};
 
 /// What happens, and how many turns after the thing before.
 #[derive(Clone, Copy, Debug)]
-enum Deed {
+enum Op {
     Feed(f32),
     Replan,
     Hold,
 }
 
-fn any_deeds() -> impl Strategy<Value = Vec<(u16, Deed)>> {
+fn any_deeds() -> impl Strategy<Value = Vec<(u16, Op)>> {
     let factor = prop_oneof![Just(1.0f32), Just(2.0), Just(0.3), 0.3f32..2.0];
-    let deed = prop_oneof![
-        3 => factor.prop_map(Deed::Feed),
-        3 => Just(Deed::Replan),
-        1 => Just(Deed::Hold),
+    let op = prop_oneof![
+        3 => factor.prop_map(Op::Feed),
+        3 => Just(Op::Replan),
+        1 => Just(Op::Hold),
     ];
     let after = prop_oneof![2 => 0u16..20, 1 => 0u16..500];
-    prop::collection::vec((after, deed), 1..30)
+    prop::collection::vec((after, op), 1..30)
 }
 
 fn feed(factor: f32) -> Factors {
@@ -48,24 +48,24 @@ fn feed(factor: f32) -> Factors {
 
 /// Does things when they are due.
 struct Script {
-    deeds: std::vec::IntoIter<(u16, Deed)>,
-    next: Option<(u16, Deed)>,
+    ops: std::vec::IntoIter<(u16, Op)>,
+    next: Option<(u16, Op)>,
 }
 
 impl Script {
-    fn new(deeds: &[(u16, Deed)]) -> Self {
+    fn new(ops: &[(u16, Op)]) -> Self {
         #[allow(clippy::unnecessary_to_owned, reason = "it outlives what it is made from")]
-        let mut deeds = deeds.to_vec().into_iter();
-        let next = deeds.next();
-        Self { deeds, next }
+        let mut ops = ops.to_vec().into_iter();
+        let next = ops.next();
+        Self { ops, next }
     }
 
-    fn due(&mut self) -> Option<Deed> {
+    fn due(&mut self) -> Option<Op> {
         match &mut self.next {
-            Some((0, deed)) => {
-                let deed = *deed;
-                self.next = self.deeds.next();
-                Some(deed)
+            Some((0, op)) => {
+                let op = *op;
+                self.next = self.ops.next();
+                Some(op)
             }
             Some((left, _)) => {
                 *left -= 1;
@@ -76,14 +76,14 @@ impl Script {
     }
 }
 
-fn run(job: &Job, deeds: &[(u16, Deed)]) -> Rig {
+fn run(job: &Job, ops: &[(u16, Op)]) -> Rig {
     let mut rig = Rig::new(job.config.clone());
-    let mut script = Script::new(deeds);
+    let mut script = Script::new(ops);
     let mut turn = |rig: &mut Rig| {
         match script.due() {
-            Some(Deed::Feed(factor)) => rig.want(feed(factor)),
-            Some(Deed::Replan) => rig.replan(),
-            Some(Deed::Hold) => {
+            Some(Op::Feed(factor)) => rig.want(feed(factor)),
+            Some(Op::Replan) => rig.replan(),
+            Some(Op::Hold) => {
                 rig.hold(true);
                 while rig.turn() != Step::Held {}
                 rig.hold(false);
@@ -132,14 +132,14 @@ proptest! {
     #![proptest_config(cases(1_000))]
 
     #[test]
-    fn any_job_ends_on_its_steps(job in any_job(), deeds in any_deeds()) {
-        let rig = run(&job, &deeds);
+    fn any_job_ends_on_its_steps(job in any_job(), ops in any_deeds()) {
+        let rig = run(&job, &ops);
         prop_assert_eq!(rig.pins.position, rig.target());
     }
 
     #[test]
-    fn any_job_keeps_the_limits_of_the_machine(job in any_job(), deeds in any_deeds()) {
-        let script = core::cell::RefCell::new(Script::new(&deeds));
+    fn any_job_keeps_the_limits_of_the_machine(job in any_job(), ops in any_deeds()) {
+        let script = core::cell::RefCell::new(Script::new(&ops));
         let holding = core::cell::Cell::new(false);
         let held = |_, at_rest| {
             if at_rest {
@@ -148,9 +148,9 @@ proptest! {
             holding.get()
         };
         let change = |_, rig: &mut Rig| match script.borrow_mut().due() {
-            Some(Deed::Feed(factor)) => rig.want(feed(factor)),
-            Some(Deed::Replan) => rig.replan(),
-            Some(Deed::Hold) => holding.set(true),
+            Some(Op::Feed(factor)) => rig.want(feed(factor)),
+            Some(Op::Replan) => rig.replan(),
+            Some(Op::Hold) => holding.set(true),
             None => {}
         };
         check_machine(&plan_changed(&job, held, change));
@@ -223,7 +223,7 @@ fn a_traverse_has_its_own_factor_and_no_feed_exceeds_the_axes() {
 fn what_stands_in_the_stream_acts_in_its_place_and_stops_nothing() {
     let mut rig = Rig::new(Config::new(100.0, 1_000.0, 0.0));
     rig.line(at([10.0]), 40.0, 1);
-    rig.aside(Block::action(Action::Override(Change::to(Override::Feed, 500)), 2));
+    rig.aside(Block::action(QueuedAction::Override(Change::to(Override::Feed, 500)), 2));
     rig.line(at([20.0]), 40.0, 2);
     let mut step = rig.turn();
     while !matches!(step, Step::Override(_)) {

@@ -17,27 +17,27 @@ mod stream;
 use std::thread;
 
 use kerf::hal::imp::Machine;
-use stream::deeds::{Deed, Scale, Setup, conversation};
 use stream::dialogue::Dialogue;
+use stream::ops::{Op, Scale, Setup, conversation};
 
 /// Up to a minute of the machine's time.
-const SCALE: Scale = Scale { deeds: 40, lines: 12, wait: 1_500, wrap: 20_000 };
+const SCALE: Scale = Scale { ops: 40, lines: 12, wait: 1_500, wrap: 20_000 };
 
 /// Within which questions are answered, ms; a ms of it is that of the test.
 const PROMPT_MS: f64 = 21.0;
 
 /// A conversation from power-up to its end.
-fn live(setup: &Setup, deeds: &[Deed]) -> Result<(), String> {
+fn live(setup: &Setup, ops: &[Op]) -> Result<(), String> {
     let start = (1 << 32) - u64::from(setup.wrap);
     let machine = Machine::boot_at(115_200, start).expect("one machine for each thread");
     let mut dialogue = Dialogue::new(machine, PROMPT_MS);
-    let played = dialogue.begin().and_then(|()| dialogue.play(setup, deeds));
+    let played = dialogue.begin().and_then(|()| dialogue.play(setup, ops));
     played.map_err(|why| format!("{why}\n{}", dialogue.story()))
 }
 
 /// Has a conversation, with a machine in a thread of its own.
-fn play((setup, deeds): (Setup, Vec<Deed>)) -> Result<(), String> {
-    let lived = thread::scope(|scope| scope.spawn(|| live(&setup, &deeds)).join());
+fn play((setup, ops): (Setup, Vec<Op>)) -> Result<(), String> {
+    let lived = thread::scope(|scope| scope.spawn(|| live(&setup, &ops)).join());
     lived.map_err(|_| "the firmware panics".to_string())?
 }
 

@@ -7,7 +7,7 @@ use super::Settings;
 use super::groups::{axis, job, motor, system};
 use super::machines::{self, CHOICE, Entry};
 use super::setting::{Owner, Setting};
-use super::table::Row;
+use super::table::SettingRow;
 use crate::boards::MOTORS;
 
 #[small]
@@ -70,7 +70,7 @@ impl Settings {
     }
 
     #[inline(never)]
-    fn put_row(&mut self, row: &Row, first: Owner, values: &[i32]) {
+    fn put_row(&mut self, row: &SettingRow, first: Owner, values: &[i32]) {
         for (number, value) in (0..).zip(values) {
             let owner = first.numbered(number);
             if owner.has(row) {

@@ -11,7 +11,7 @@ use core::ops::Range;
 
 use super::groups::{axis, motor, system};
 use super::setting::{Owner, Setting};
-use super::table::{HOMING, RADIUS, Row, Values, row_of};
+use super::table::{HOMING, RADIUS, SettingRow, Values, row_of};
 use crate::boards::MOTORS;
 use crate::progmem;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -35,7 +35,7 @@ use router::ROUTER;
 
 /// A machine.
 #[derive(Debug)]
-pub struct Machine {
+pub struct MachineProfile {
     /// The name that `--machine` takes.
     pub name: &'static str,
     /// What it is, in some words.
@@ -45,7 +45,7 @@ pub struct Machine {
 }
 
 /// The machines, by their numbers: what `mch` is.
-pub const ALL: [&Machine; COUNT] = [&CAREFUL, &ROUTER, &MILL, &PRINTER, &LATHE];
+pub const ALL: [&MachineProfile; COUNT] = [&CAREFUL, &ROUTER, &MILL, &PRINTER, &LATHE];
 /// How many there are.
 pub const COUNT: usize = 5;
 
@@ -120,7 +120,7 @@ const fn set(owners: &str, name: &str, value: f64) -> Entry {
     entry(system::COUNT + MOTORS * motor::COUNT + row, bits, &axis::LIST[row], value)
 }
 
-const fn entry(setting: usize, owners: u8, row: &Row, value: f64) -> Entry {
+const fn entry(setting: usize, owners: u8, row: &SettingRow, value: f64) -> Entry {
     let mut scaled = value;
     let mut decimals = row.stored;
     while decimals > 0 {

@@ -34,7 +34,7 @@ use crate::units::{AXES, FIRST_ROTARY};
 use groups::motor;
 use heating::Heating;
 use setting::{LARGES, SMALLS, large_of, small_of};
-use table::{CLAMP, JERK, Kind, MODE, RADIUS, RANGE, Row, UNIT};
+use table::{CLAMP, JERK, Kind, MODE, RADIUS, RANGE, SettingRow, UNIT};
 
 /// The values in force.
 pub struct Settings {
@@ -150,7 +150,7 @@ impl Settings {
     }
 
     #[small]
-    fn is_length(&self, setting: Setting, row: &Row) -> bool {
+    fn is_length(&self, setting: Setting, row: &SettingRow) -> bool {
         let rotary = match setting.owner() {
             Owner::Motor(motor) => {
                 (FIRST_ROTARY..AXES).contains(&usize::from(self.motor_axis(motor.into())))
@@ -233,7 +233,7 @@ impl Settings {
 }
 
 /// `number` scaled as kept and within the limits of `row` with upper limit `max`.
-fn limit(row: &Row, max: i32, number: Number, inches: bool) -> Result<i32, Status> {
+fn limit(row: &SettingRow, max: i32, number: Number, inches: bool) -> Result<i32, Status> {
     let clamp = row.is(CLAMP);
     let (below, above) = if row.is(RANGE) && !row.is(MODE) {
         (Status::OutOfRange, Status::OutOfRange)

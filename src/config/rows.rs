@@ -2,10 +2,10 @@
 //! `tt1` to `tt10`; and their values: `g54x`, `tt10z`.
 
 use super::name::{Name, axis_letter};
-use crate::gcode::tables::{ROWS, Row, STORED, SYSTEMS};
+use crate::gcode::tables::{ROWS, STORED, SYSTEMS, TableRow};
 
 /// The name of a row. Spelled out, for text in a table would be in RAM.
-pub fn row_name(row: Row) -> Name {
+pub fn row_name(row: TableRow) -> Name {
     const FIRST_TOOL: u8 = SYSTEMS + STORED;
     let named = |bytes: &[u8]| Name::new().with(bytes).unwrap_or_default();
     match row.number() {
@@ -20,18 +20,18 @@ pub fn row_name(row: Row) -> Name {
 }
 
 /// The name of a value of a row.
-pub fn value_name(row: Row, axis: u8) -> Name {
+pub fn value_name(row: TableRow, axis: u8) -> Name {
     let name = row_name(row);
     name.with(&[axis_letter(axis)]).unwrap_or(name)
 }
 
 /// The row of that name. About 5,000 cycles on AVR for one that begins as they do.
 #[small]
-pub fn find_row(name: &Name) -> Option<Row> {
+pub fn find_row(name: &Name) -> Option<TableRow> {
     if !matches!(name.first(), b'g' | b't') {
         return None;
     }
-    (0..ROWS).filter_map(Row::from_number).find(|row| row_name(*row) == *name)
+    (0..ROWS).filter_map(TableRow::from_number).find(|row| row_name(*row) == *name)
 }
 
 #[cfg(test)]
@@ -43,15 +43,15 @@ mod tests {
         let name = |row, axis| {
             std::string::String::from_utf8(value_name(row, axis).bytes().to_vec()).unwrap()
         };
-        let tool = |number| Row::tool(number).unwrap();
+        let tool = |number| TableRow::tool(number).unwrap();
         for (row, axis, expected) in [
-            (Row::system(0), 0, "g54x"),
-            (Row::system(0), 5, "g54c"),
-            (Row::system(1), 0, "g55x"),
-            (Row::system(6), 0, "g591x"),
-            (Row::system(8), 5, "g593c"),
-            (Row::stored(0), 0, "g28x"),
-            (Row::stored(1), 5, "g30c"),
+            (TableRow::system(0), 0, "g54x"),
+            (TableRow::system(0), 5, "g54c"),
+            (TableRow::system(1), 0, "g55x"),
+            (TableRow::system(6), 0, "g591x"),
+            (TableRow::system(8), 5, "g593c"),
+            (TableRow::stored(0), 0, "g28x"),
+            (TableRow::stored(1), 5, "g30c"),
             (tool(1), 0, "tt1x"),
             (tool(2), 2, "tt2z"),
             (tool(10), 2, "tt10z"),
@@ -62,7 +62,7 @@ mod tests {
 
     #[test]
     fn rows_are_found_by_their_names() {
-        for row in (0..ROWS).filter_map(Row::from_number) {
+        for row in (0..ROWS).filter_map(TableRow::from_number) {
             assert_eq!(find_row(&row_name(row)), Some(row));
         }
         for name in ["g53", "g594", "tt0", "tt11", "g", "tt", ""] {

@@ -5,7 +5,7 @@ use super::groups::{
 };
 use super::machines;
 use super::name::{Name, axis_letter, axis_of, token};
-use super::table::{HOMING, IDLE, Kind, MODE, RADIUS, Row, row_of};
+use super::table::{HOMING, IDLE, Kind, MODE, RADIUS, SettingRow, row_of};
 use super::words::Words;
 use crate::boards::MOTORS;
 use crate::capability::Capability;
@@ -122,7 +122,7 @@ impl Owner {
         matches!(self, Owner::Axis(axis) if usize::from(axis) >= FIRST_ROTARY)
     }
 
-    pub(super) fn has(self, row: &Row) -> bool {
+    pub(super) fn has(self, row: &SettingRow) -> bool {
         match self {
             Owner::Axis(axis) if row.is(HOMING) => usize::from(axis) <= FIRST_ROTARY,
             Owner::Axis(_) if row.is(RADIUS) => self.is_rotary(),
@@ -131,7 +131,7 @@ impl Owner {
     }
 
     /// The table of the owner's settings.
-    fn table(self) -> Option<Slice<Row>> {
+    fn table(self) -> Option<Slice<SettingRow>> {
         Some(match self {
             Owner::System => system::ROWS.slice(),
             Owner::Motor(motor) if usize::from(motor) < MOTORS => motor::ROWS.slice(),
@@ -159,7 +159,7 @@ impl Owner {
 
     /// Where its setting of this row is kept.
     #[inline(never)]
-    pub(super) fn place(self, row: &Row) -> Place {
+    pub(super) fn place(self, row: &SettingRow) -> Place {
         let (small, large) = match self {
             Owner::Motor(motor) => (motor * motor::SMALLS[0] as u8, motor * motor::LARGES[0] as u8),
             Owner::Axis(axis) => (small_of(axis), large_of(axis)),
@@ -193,7 +193,7 @@ impl Owner {
     }
 
     /// Row `row` of its table, if it has that.
-    pub(super) fn load(self, row: u8) -> Option<Row> {
+    pub(super) fn load(self, row: u8) -> Option<SettingRow> {
         self.table()?.at(row.into()).filter(|row| self.has(row))
     }
 }
@@ -441,9 +441,9 @@ impl Setting {
     }
 
     /// The row of the setting in its table.
-    pub fn row(self) -> Row {
+    pub fn row(self) -> SettingRow {
         // A handle is only made of a number that has a row.
-        self.owner().load(self.index()).unwrap_or(Row::NONE)
+        self.owner().load(self.index()).unwrap_or(SettingRow::NONE)
     }
 
     /// The setting of the first motor or axis in this row, and this setting's motor or axis as a bit.

@@ -48,7 +48,7 @@ pub const IDLE: u8 = 128;
 
 /// A setting, or the same setting of every motor or axis.
 #[derive(Clone, Copy)]
-pub struct Row {
+pub struct SettingRow {
     /// The name of the setting without the group, padded with zeros.
     pub token: [u8; 4],
     /// The place of the setting among the small or large ones of the system, the motor, the axis; a setting that is not in RAM has its row here.
@@ -67,13 +67,13 @@ pub struct Row {
     pub max: i32,
 }
 
-named! { Row, 4 }
+named! { SettingRow, 4 }
 
-impl Row {
+impl SettingRow {
     /// No setting's. All zeros, so that it needs no memory.
-    pub const NONE: Row = constant(0);
+    pub const NONE: SettingRow = constant(0);
 
-    pub(super) const fn with(mut self, flags: u8) -> Row {
+    pub(super) const fn with(mut self, flags: u8) -> SettingRow {
         self.flags |= flags;
         self
     }
@@ -95,89 +95,89 @@ pub(super) const ANY: i32 = -i32::MAX;
 pub(super) const POSITIVE: i32 = 1;
 
 /// An integer of one byte.
-pub(super) const fn int(min: i32, max: i32) -> Row {
+pub(super) const fn int(min: i32, max: i32) -> SettingRow {
     let (kind, flags, stored, shown) = (Kind::Small, RANGE, 0, 0);
-    Row { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
+    SettingRow { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
 /// A fixed-point number of `stored` decimals, of which `shown` are shown.
-pub(super) const fn fixed(stored: u8, shown: u8, min: i32) -> Row {
+pub(super) const fn fixed(stored: u8, shown: u8, min: i32) -> SettingRow {
     let (kind, flags, max) = (Kind::Large, 0, i32::MAX);
-    Row { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
+    SettingRow { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
 /// A number from 0 on of which three decimals are kept, in EEPROM.
-pub(super) const fn cold(shown: u8) -> Row {
+pub(super) const fn cold(shown: u8) -> SettingRow {
     let (kind, flags, stored, min, max) = (Kind::Cold, 0, 3, 0, i32::MAX);
-    Row { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
+    SettingRow { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
 /// Seconds of which four decimals are kept, in EEPROM.
-pub(super) const fn seconds(most: i32) -> Row {
+pub(super) const fn seconds(most: i32) -> SettingRow {
     let mut row = up_to(cold(4), most).with(RANGE);
     row.stored = 4;
     row
 }
 
 /// Yes or no, in EEPROM.
-pub(super) const fn choice() -> Row {
+pub(super) const fn choice() -> SettingRow {
     whole(cold(0), 1)
 }
 
 /// A whole number up to `max`.
-pub(super) const fn whole(row: Row, max: i32) -> Row {
+pub(super) const fn whole(row: SettingRow, max: i32) -> SettingRow {
     let mut row = up_to(row, max).with(RANGE);
     row.stored = 0;
     row
 }
 
 /// The sensor of a heater (0 hot end, 1 bed): a MAX6675 where the board has a pin to select it; on the host, where no board is, always.
-pub(super) const fn sensor(heater: usize) -> Row {
+pub(super) const fn sensor(heater: usize) -> SettingRow {
     let has_max6675 = cfg!(feature = "std") || ACTIVE.has_max6675(heater);
     whole(cold(0), if has_max6675 { 6 } else { 5 })
 }
 
 /// A length of either sign, in EEPROM.
-pub(super) const fn shift(most: i32) -> Row {
+pub(super) const fn shift(most: i32) -> SettingRow {
     let mut row = up_to(cold(3), most).with(UNIT);
     (row.stored, row.min) = (4, -most);
     row
 }
 
 /// 32 bits.
-pub(super) const fn bits(kind: Kind) -> Row {
+pub(super) const fn bits(kind: Kind) -> SettingRow {
     let (flags, stored, shown, min, max) = (0, 0, 0, i32::MIN, i32::MAX);
-    Row { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
+    SettingRow { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
 /// A number that never changes.
-pub(super) const fn constant(decimals: u8) -> Row {
+pub(super) const fn constant(decimals: u8) -> SettingRow {
     let (kind, flags) = (Kind::Constant, 0);
     let (stored, shown, min, max) = (decimals, decimals, 0, 0);
-    Row { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
+    SettingRow { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
 /// A fixed text: of dialects the name of the board, or Kerf's version, which has a maximum of 1.
-pub(super) const fn fixed_text(is_version: bool) -> Row {
+pub(super) const fn fixed_text(is_version: bool) -> SettingRow {
     let mut row = constant(0);
     row.kind = Kind::Text;
     row.max = is_version as i32;
     row
 }
 
-pub(super) const fn up_to(mut row: Row, max: i32) -> Row {
+pub(super) const fn up_to(mut row: SettingRow, max: i32) -> SettingRow {
     row.max = max;
     row
 }
 
 /// A row with its name.
-pub(super) const fn named(mut row: Row, name: &str) -> Row {
+pub(super) const fn named(mut row: SettingRow, name: &str) -> SettingRow {
     row.token = token(name);
     row
 }
 
 /// Rows with their places. Those that not every owner has come last in RAM.
-pub(super) const fn numbered<const N: usize>(mut rows: [Row; N]) -> [Row; N] {
+pub(super) const fn numbered<const N: usize>(mut rows: [SettingRow; N]) -> [SettingRow; N] {
     let mut row = 0;
     while row < N {
         rows[row].slot = match rows[row].kind {
@@ -190,7 +190,7 @@ pub(super) const fn numbered<const N: usize>(mut rows: [Row; N]) -> [Row; N] {
 }
 
 /// How many rows of the same kind have their places before this one.
-const fn rows_before(rows: &[Row], row: usize) -> usize {
+const fn rows_before(rows: &[SettingRow], row: usize) -> usize {
     let (this, mut before, mut other) = (&rows[row], 0, 0);
     while other < rows.len() {
         let is_alike = rows[other].kind as u8 == this.kind as u8;
@@ -206,7 +206,7 @@ const fn rows_before(rows: &[Row], row: usize) -> usize {
 }
 
 /// How many rows are of a kind: of those that every owner has, and of those with [`HOMING`].
-pub(super) const fn count(rows: &[Row], kind: Kind) -> [usize; 2] {
+pub(super) const fn count(rows: &[SettingRow], kind: Kind) -> [usize; 2] {
     let (mut counts, mut row) = ([0; 2], 0);
     while row < rows.len() {
         if rows[row].kind as u8 == kind as u8 {
@@ -218,14 +218,14 @@ pub(super) const fn count(rows: &[Row], kind: Kind) -> [usize; 2] {
 }
 
 /// The place of the row of that name.
-pub(super) const fn slot(rows: &[Row], name: &str) -> u8 {
+pub(super) const fn slot(rows: &[SettingRow], name: &str) -> u8 {
     rows[row_of(rows, name) as usize].slot
 }
 
 /// The number of the row of that name.
 ///
 /// Panics, so fails the build, if there is none.
-pub(super) const fn row_of(rows: &[Row], name: &str) -> u8 {
+pub(super) const fn row_of(rows: &[SettingRow], name: &str) -> u8 {
     let mut row = 0;
     while !is_called(&rows[row].token, name.as_bytes()) {
         row += 1;

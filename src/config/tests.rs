@@ -166,7 +166,7 @@ fn getters_have_their_units() {
 fn ram_is_accounted_for() {
     let heating = if heating::PRINTERS == 0 { 0 } else { 12 };
     assert_eq!(size_of::<Settings>(), 436 + heating);
-    assert!(size_of::<Row>() * 51 + (28 + 7 * 4 + 16 * 6) * 4 < 2048);
+    assert!(size_of::<SettingRow>() * 51 + (28 + 7 * 4 + 16 * 6) * 4 < 2048);
 }
 
 proptest! {

@@ -1,7 +1,7 @@
 //! The moment at which a switch is reached that ends a move, and where the motors were then.
 //!
 //! ```text
-//! look interrupt   mark     the generator as it is: there may be a contact
+//! sampling interrupt   mark     the generator as it is: there may be a contact
 //!                  note     there is; from now on exec comes to rest, as in a feedhold
 //! exec             catch_up, pushed     what the generator does from there, segment by segment
 //! planner          take     when exec has dropped its blocks; or clear
@@ -14,12 +14,12 @@
 
 use avr_embassy::Baton;
 
-use super::follow::Follow;
+use super::step_replay::StepReplay;
 use super::{Dda, SEGMENTS, Segment};
 use crate::boards::MOTORS;
 use avr_embassy::ring::Producer;
 
-/// There is none. The look has the value.
+/// There is none. The sampling interrupt has the value.
 const NONE: u8 = 0;
 /// There has been one; exec has not seen it yet.
 const NOTED: u8 = 1;
@@ -29,19 +29,19 @@ const FOLLOWED: u8 = 2;
 struct Contact {
     /// The slot of the segment that ran.
     tail: u8,
-    follow: Follow,
+    replay: StepReplay,
 }
 
 machine_static! {
-    fn contact() -> Baton<Contact> = Baton::new(Contact { tail: 0, follow: Follow::new() });
+    fn contact() -> Baton<Contact> = Baton::new(Contact { tail: 0, replay: StepReplay::new() });
 }
 
-/// If there is a contact it is now, while the generator is `dda` in the segment of slot `tail`. Look interrupt only, which
+/// If there is a contact it is now, while the generator is `dda` in the segment of slot `tail`. Sampling interrupt only, which
 /// holds exec off until it calls [`note`] or ends.
 #[small]
 pub fn mark(dda: &Dda, tail: u8) {
     contact().pass(NONE, NONE, |contact| {
-        contact.follow.begin(dda);
+        contact.replay.begin(dda);
         contact.tail = tail;
     });
 }
@@ -49,13 +49,13 @@ pub fn mark(dda: &Dda, tail: u8) {
 /// Marks as [`mark`] does where the generator is ahead of the pins, by `ahead` steps of each motor.
 pub fn mark_behind(dda: &Dda, tail: u8, ahead: &[i32; MOTORS]) {
     contact().pass(NONE, NONE, |contact| {
-        contact.follow.begin(dda);
-        contact.follow.add(ahead);
+        contact.replay.begin(dda);
+        contact.replay.add(ahead);
         contact.tail = tail;
     });
 }
 
-/// Records that the contact closed where the generator was marked. Look interrupt only.
+/// Records that the contact closed where the generator was marked. Sampling interrupt only.
 #[small]
 pub fn note() {
     if contact().stage() == NONE {
@@ -76,7 +76,7 @@ pub fn is_noted() -> bool {
 #[small]
 pub fn catch_up(segments: &Producer<Segment, SEGMENTS>) {
     contact().pass(NOTED, FOLLOWED, |contact| {
-        segments.behind(contact.tail).for_each(|segment| contact.follow.run(segment));
+        segments.behind(contact.tail).for_each(|segment| contact.replay.run(segment));
     });
 }
 
@@ -84,14 +84,14 @@ pub fn catch_up(segments: &Producer<Segment, SEGMENTS>) {
 #[inline(never)]
 #[small]
 pub fn pushed(segment: &Segment) {
-    contact().pass(FOLLOWED, FOLLOWED, |contact| contact.follow.run(segment));
+    contact().pass(FOLLOWED, FOLLOWED, |contact| contact.replay.run(segment));
 }
 
 /// Where the motors were at the contact, that have come to rest `at`, and forgets it. Thread mode, when exec has dropped
 /// its blocks because of it: it has caught up before.
 #[small]
 pub fn take(at: &[i32; MOTORS]) -> Option<[i32; MOTORS]> {
-    contact().pass(FOLLOWED, NONE, |contact| contact.follow.before(at))
+    contact().pass(FOLLOWED, NONE, |contact| contact.replay.before(at))
 }
 
 /// Forgets it. Thread mode, when exec has dropped its blocks or no switch is armed.

@@ -40,7 +40,7 @@ use avr_embassy::ring::Consumer;
 use crate::boards::{MOTORS, STEPS_BY_UNIT};
 
 pub mod contact;
-pub mod follow;
+pub mod step_replay;
 
 /// A step, in phase units.
 pub const STEP: u16 = 0x8000;

@@ -1,4 +1,4 @@
-//! The digits of a usual number, for `usual`: up to four decimals, no blanks, no sign.
+//! The digits of a plain number, for the fast path: up to four decimals, no blanks, no sign.
 //!
 //! Cost on AVR: 22 cycles a digit, and 80 for a number; of the loop the compiler makes twice as much.
 

@@ -9,18 +9,18 @@
 //! `G20 F10` in the units of the line before, which is 25.4 times too fast or too slow, and which their
 //! users keep reporting.
 //!
-//! Cost on AVR: of a usual line see `usual`; of others, words and comments included, at most 6,000 cycles for
+//! Cost on AVR: of a usual line see `fast_path`; of others, words and comments included, at most 6,000 cycles for
 //! a typical G1, in inches too (`tests/sim/tests/interpreter.rs`).
 
 use super::block::Block;
 use super::codes::NonModal;
 use super::command::{Commands, Spindle, Surface};
+use super::fast_path::Writer;
 use super::modal::{Defaults, FeedMode, Modal, MotionMode, SpeedMode, Turn, Units, XMode};
 use super::setup::Setup;
 use super::state::State;
 use super::sticky::Sticky;
-use super::tables::{Edit, Ram, Row, Tables};
-use super::usual::Writer;
+use super::tables::{Edit, Ram, TableRow, Tables};
 use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
@@ -88,11 +88,11 @@ impl<T: Tables> Interpreter<T> {
     /// Sets a value of a row as G10 does: it is in force when this returns. [`Status::Again`] as of
     /// [`Self::interpret`]; after an error everything is what it was.
     #[inline(never)]
-    pub fn set(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {
+    pub fn set(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status> {
         let mut values = self.tables.row(row);
         *values.get_mut(usize::from(axis)).ok_or(Status::AxisInvalid)? = value;
         let edit = Edit::new(row, values, &self.tables)?;
-        if row == Row::system(self.state.modal.system) {
+        if row == TableRow::system(self.state.modal.system) {
             let before = self.state.origin;
             self.state.update_origin(&values).inspect_err(|_| self.state.origin = before)?;
         }
@@ -117,26 +117,26 @@ impl<T: Tables> Interpreter<T> {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<Info, Status> {
-        if self.usual(line, Writer::Numbers, setup, out) {
+        if self.fast_path(line, Writer::Numbers, setup, out) {
             return Ok(Info::default());
         }
-        self.general(line, setup, out)
+        self.slow_path(line, setup, out)
     }
 
-    /// Carries a usual line out: see [`State::usual`].
-    pub fn usual(
+    /// Carries a line out by the fast path: see [`State::fast_path`].
+    pub fn fast_path(
         &mut self,
         line: &[u8],
         writer: Writer,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> bool {
-        self.state.usual(line, writer, setup, out)
+        self.state.fast_path(line, writer, setup, out)
     }
 
-    /// Interprets a line as [`Self::interpret`] does, without trying [`Self::usual`] first. Call it when that has declined the line.
+    /// Interprets a line as [`Self::interpret`] does, without trying [`Self::fast_path`] first. Call it when that has declined the line.
     #[inline(never)]
-    pub fn general(
+    pub fn slow_path(
         &mut self,
         line: &[u8],
         setup: &impl Setup,
@@ -176,7 +176,7 @@ impl<T: Tables> Interpreter<T> {
         self.state.modal.motion = MotionMode::Feed;
         self.state.modal.feed_mode = FeedMode::PerMinute;
         self.state.feed = 0.0;
-        let done = self.execute_usual(&block, setup, out);
+        let done = self.execute_common(&block, setup, out);
         let state = &mut self.state;
         (state.modal, state.feed, state.feed_units, state.line) = (modal, feed, feed_units, line);
         done.map(|()| Info::default())
@@ -199,14 +199,14 @@ impl<T: Tables> Interpreter<T> {
         out: &mut Commands,
     ) -> Result<(), Status> {
         if block.is_rare() || block.does().is_some_and(MotionMode::is_cycle) {
-            return self.execute_rarity(block, setup, out);
+            return self.execute_rare(block, setup, out);
         }
-        self.execute_usual(block, setup, out)
+        self.execute_common(block, setup, out)
     }
 
     /// Executes a block of modes, the feed, and the position of the axes that it names, or nothing of it.
     #[inline(never)]
-    fn execute_usual(
+    fn execute_common(
         &mut self,
         block: &Block,
         setup: &impl Setup,
@@ -225,7 +225,7 @@ impl<T: Tables> Interpreter<T> {
     /// Executes a block that may change more than modes, the feed and the position of its axes.
     #[inline(never)]
     #[small]
-    fn execute_rarity(
+    fn execute_rare(
         &mut self,
         block: &Block,
         setup: &impl Setup,
@@ -233,7 +233,7 @@ impl<T: Tables> Interpreter<T> {
     ) -> Result<(), Status> {
         let before = RareBefore::of(&self.state);
         let mut edit = None;
-        let done = self.state.execute_rarity(
+        let done = self.state.execute_rare(
             block,
             &before.usual.position,
             &self.tables,
@@ -259,7 +259,8 @@ impl<T: Tables> Interpreter<T> {
     #[inline(never)]
     #[small]
     fn restore_origin(&mut self) {
-        let _ = self.state.update_origin(&self.tables.row(Row::system(self.state.modal.system)));
+        let _ =
+            self.state.update_origin(&self.tables.row(TableRow::system(self.state.modal.system)));
     }
 }
 

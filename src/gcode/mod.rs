@@ -5,7 +5,7 @@
 //!       -> interpreter (modal state, position; order of execution) -> Commands
 //!                                   Commands with an arc -> arc (chords) -> planner
 //! ```
-//! A plain move takes none of these steps: `usual` reads and carries it out in one pass.
+//! A plain move takes none of these steps: `fast_path` reads and carries it out in one pass.
 //! [`codes`] is the language: one table row per code. Everything here is pure and never waits.
 
 pub mod arc;
@@ -17,6 +17,7 @@ pub mod command;
 mod cycle;
 pub mod decimal;
 mod digits;
+pub mod fast_path;
 pub mod heating;
 pub mod interpreter;
 mod lexer;
@@ -36,7 +37,6 @@ pub mod tables;
 #[cfg(test)]
 mod tests;
 pub mod threading;
-pub mod usual;
 pub mod words;
 
 pub use interpreter::{Info, Interpreter};

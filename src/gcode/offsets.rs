@@ -13,7 +13,7 @@ use super::command::{Commands, Motion};
 use super::modal::MotionMode;
 use super::setup::{AxisMode, Setup};
 use super::state::State;
-use super::tables::{Edit, NUMBERED, Row, SYSTEMS, TOOL_AXES, Tables};
+use super::tables::{Edit, NUMBERED, SYSTEMS, TOOL_AXES, TableRow, Tables};
 use super::words::{AXES, H, L, P};
 use crate::status::Status;
 use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
@@ -37,7 +37,7 @@ impl State {
     pub(super) fn system(&self, number: u8, tables: &impl Tables) -> PerAxis<Length> {
         match number == self.modal.system {
             true => self.system_in_force(),
-            false => tables.row(Row::system(number)),
+            false => tables.row(TableRow::system(number)),
         }
     }
 
@@ -110,7 +110,7 @@ impl State {
         let number = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
         let number = number.ok().and_then(|number| u8::try_from(number).ok());
         let number = number.filter(|number| *number <= NUMBERED).ok_or(Status::HWordInvalid)?;
-        let Some(row) = Row::tool(number) else {
+        let Some(row) = TableRow::tool(number) else {
             self.lacks_length = number != 0;
             return Ok([Length::ZERO; units::AXES]);
         };
@@ -136,7 +136,7 @@ impl State {
                 if block.has(AXES) {
                     return Err(Status::AxisInvalid);
                 }
-                *edit = Some(Edit::new(Row::stored(which), self.position, tables)?);
+                *edit = Some(Edit::new(TableRow::stored(which), self.position, tables)?);
             }
             Some(NonModal::Home { set }) => self.home(block, set, setup, out)?,
             Some(NonModal::SetPosition) => self.redefine_position(block, setup, out)?,
@@ -233,7 +233,7 @@ impl State {
             }
             (Some(2 | 20), _) => Err(Status::PWordInvalid),
             (Some(l @ (1 | 10)), number) => {
-                let row = number.and_then(Row::tool).ok_or(Status::ToolInvalid)?;
+                let row = number.and_then(TableRow::tool).ok_or(Status::ToolInvalid)?;
                 self.set_tool(block, row, l == 10, tables, setup, edit)
             }
             _ => Err(Status::LWordInvalid),
@@ -266,7 +266,7 @@ impl State {
         if number == self.modal.system {
             self.update_origin(&system)?;
         }
-        *edit = Some(Edit::new(Row::system(number), system, tables)?);
+        *edit = Some(Edit::new(TableRow::system(number), system, tables)?);
         Ok(())
     }
 
@@ -275,7 +275,7 @@ impl State {
     fn set_tool(
         &mut self,
         block: &Block,
-        row: Row,
+        row: TableRow,
         here: bool,
         tables: &impl Tables,
         setup: &impl Setup,
@@ -336,7 +336,7 @@ impl State {
         &mut self,
         block: &Block,
         tables: &impl Tables,
-        stored: Row,
+        stored: TableRow,
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {

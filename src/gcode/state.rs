@@ -14,7 +14,7 @@ use super::overrides::{Change, Override};
 use super::printing::Printing;
 use super::setup::Setup;
 use super::sticky::Sticky;
-use super::tables::{Edit, Row, Tables};
+use super::tables::{Edit, TableRow, Tables};
 use super::words::{F, N, P, S, T};
 use crate::capability::Capability;
 use crate::status::Status;
@@ -103,7 +103,7 @@ impl State {
     /// Carries out a block with whatever it has.
     #[inline(never)]
     #[small]
-    pub fn execute_rarity(
+    pub fn execute_rare(
         &mut self,
         block: &Block,
         start: &PerAxis<Length>,
@@ -259,7 +259,7 @@ impl State {
     ) -> Result<(), Status> {
         match block.non_modal {
             Some(NonModal::GoStored(which)) => {
-                self.go_stored(block, tables, Row::stored(which), setup, out)?
+                self.go_stored(block, tables, TableRow::stored(which), setup, out)?
             }
             _ => self.motion(block, setup, out)?,
         }
@@ -340,7 +340,7 @@ impl State {
     ) -> Result<(), Status> {
         let defaults = setup.defaults();
         let system = match edit {
-            Some(edit) if edit.row == Row::system(defaults.system) => edit.values,
+            Some(edit) if edit.row == TableRow::system(defaults.system) => edit.values,
             _ => self.system(defaults.system, tables),
         };
         self.modal = Modal { motion: MotionMode::Feed, ..Modal::new(&defaults) };

@@ -1,6 +1,6 @@
 //! What stays from program to program: coordinate systems, stored positions, tools.
 //!
-//! The interpreter has none of it: what is in force is in its state, and a line that needs another [`Row`] asks
+//! The interpreter has none of it: what is in force is in its state, and a line that needs another [`TableRow`] asks
 //! [`Tables`] for it. In the firmware that is the log in EEPROM (`tasks::storage`), elsewhere [`Ram`]. A line
 //! changes one row at most, and only after nothing on it can fail any more: an [`Edit`] says which.
 
@@ -23,10 +23,10 @@ pub const TOOL_AXES: [u8; 2] = [0, 2];
 
 /// The number of a row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Row(u8);
+pub struct TableRow(u8);
 
 #[small]
-impl Row {
+impl TableRow {
     /// The origin of a coordinate system, from 0; machine coordinates.
     pub const fn system(number: u8) -> Self {
         Self(if number < SYSTEMS { number } else { 0 })
@@ -75,7 +75,7 @@ impl Row {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Edit {
     /// Which one.
-    pub row: Row,
+    pub row: TableRow,
     /// What it is to be.
     pub values: PerAxis<Length>,
 }
@@ -83,16 +83,16 @@ pub struct Edit {
 /// Who keeps the rows.
 pub trait Tables {
     /// What a row is. On AVR a search of the log: up to 2 ms, and 3.4 more while a byte is written.
-    fn row(&self, row: Row) -> PerAxis<Length>;
+    fn row(&self, row: TableRow) -> PerAxis<Length>;
 
     /// Whether a stored position was ever stored. What has no memory of that says that it was.
-    fn is_stored(&self, _row: Row) -> bool {
+    fn is_stored(&self, _row: TableRow) -> bool {
         true
     }
 
     /// Whether a change of a row can be taken now. If not, the line that makes it is refused with [`Status::Again`]
     /// and is to be tried again later.
-    fn takes(&self, row: Row) -> bool;
+    fn takes(&self, row: TableRow) -> bool;
 
     /// Takes a change; [`Self::takes`] has been asked.
     fn apply(&mut self, edit: &Edit);
@@ -101,7 +101,11 @@ pub trait Tables {
 #[small]
 impl Edit {
     /// A change that can be taken now.
-    pub fn new(row: Row, values: PerAxis<Length>, tables: &impl Tables) -> Result<Self, Status> {
+    pub fn new(
+        row: TableRow,
+        values: PerAxis<Length>,
+        tables: &impl Tables,
+    ) -> Result<Self, Status> {
         if !tables.takes(row) {
             return Err(Status::Again);
         }
@@ -130,11 +134,11 @@ impl Default for Ram {
 
 #[small]
 impl Tables for Ram {
-    fn row(&self, row: Row) -> PerAxis<Length> {
+    fn row(&self, row: TableRow) -> PerAxis<Length> {
         self.0.get(usize::from(row.number())).copied().unwrap_or_default()
     }
 
-    fn takes(&self, _row: Row) -> bool {
+    fn takes(&self, _row: TableRow) -> bool {
         true
     }
 

@@ -81,7 +81,7 @@ contract! {
         /// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have come first after those
         /// that are queued. What they lack is taken off `position`, in steps. Exec, while no ticks come.
         fn settle(held: Option<Segment>, position: &mut [i32; MOTORS]);
-        /// Where the generator is right now, between two ticks, and the slot of its segment. The look interrupt, which holds exec off.
+        /// Where the generator is right now, between two ticks, and the slot of its segment. The sampling interrupt, which holds exec off.
         fn moment() -> (Dda, u8);
         /// Which direction pins are inverted: bit m for motor m. Thread mode, while nothing runs.
         fn set_inverted(motors: u8);
@@ -150,7 +150,7 @@ contract! {
         fn set_low(outputs: u8, on: u8);
     }
 
-    /// Switches by their numbers in [`inputs`](crate::boards::inputs), as bits of a word, and the look interrupt, which filters them.
+    /// Switches by their numbers in [`inputs`](crate::boards::inputs), as bits of a word, and the sampling interrupt, which filters them.
     trait Inputs in inputs {
         /// Which inputs are worked when low, and which of them stop the steps. Thread mode.
         fn set_up(low: u16, stops: u16);

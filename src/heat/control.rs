@@ -123,7 +123,7 @@ impl Control {
     }
 }
 
-/// The power of a pin until the next look: what is asked for where the chip makes pulses of it, else all or nothing, [spread].
+/// The power of a pin until the next sample: what is asked for where the chip makes pulses of it, else all or nothing, [spread].
 #[small]
 pub fn level(pulsed: bool, owed: &mut u8, power: u8) -> u8 {
     match pulsed {
@@ -133,7 +133,7 @@ pub fn level(pulsed: bool, owed: &mut u8, power: u8) -> u8 {
     }
 }
 
-/// Spreads power over looks: on so often that it is on for its share of the time.
+/// Spreads power over samples: on so often that it is on for its share of the time.
 #[small]
 pub fn spread(owed: &mut u8, power: u8) -> bool {
     if power == FULL {

@@ -1,6 +1,6 @@
 //! A heater with its sensor: readings in, power out.
 //!
-//! Looked at each 40 ms; five looks make a [step](super::control), of their mean. Cost of a look: 3,000 cycles, of one with a step 6,000.
+//! Sampled each 40 ms; five samples make a [step](super::control), of their mean. Cost of a sample: 3,000 cycles, of one with a step 6,000.
 
 use super::control::{Control, Factors, STEPS, level};
 use super::fault::{Rule, Watch};
@@ -31,7 +31,7 @@ pub struct Heater {
     watch: Watch,
     /// The sum of the sensor's readings since the last step.
     sum: i32,
-    looks: u8,
+    samples: u8,
     missing: u8,
     /// What a MAX6675 has sent last, and looks until it is asked again.
     word: u16,
@@ -42,11 +42,11 @@ pub struct Heater {
     level: u8,
 }
 
-/// What a look has found.
+/// What a sample has found.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Seen {
-    /// A look between two steps.
-    Look,
+    /// A sample between two steps.
+    Sample,
     /// A step.
     Step,
 }
@@ -62,7 +62,7 @@ impl Heater {
         control: Control::OFF,
         watch: Watch::OFF,
         sum: 0,
-        looks: 0,
+        samples: 0,
         missing: 0,
         word: 0,
         rests: 0,
@@ -104,7 +104,7 @@ impl Heater {
         self.kind != Kind::None && self.now < self.least.saturating_sub(by)
     }
 
-    /// The power of its pin until the next look, 255 for all.
+    /// The power of its pin until the next sample, 255 for all.
     pub fn level(&self) -> u8 {
         self.level
     }
@@ -145,7 +145,7 @@ impl Heater {
     /// Takes a reading, `None` if it is not there in time. `number` is 0 for the hot end, `to` what is wanted, eighths of a degree. A fault
     /// leaves it off. A `tune` that is under way says how much power it has.
     #[inline(never)]
-    pub fn look(
+    pub fn sample(
         &mut self,
         number: u8,
         reading: Option<u16>,
@@ -155,7 +155,7 @@ impl Heater {
     ) -> Result<Seen, Status> {
         let wanted = if self.kind == Kind::None { 0 } else { in_units(to) };
         let seen = self.read(reading, wanted).and_then(|mean| match mean {
-            None => Ok(Seen::Look),
+            None => Ok(Seen::Sample),
             Some(mean) => self.step(number, mean, wanted, fan, tune).map(|()| Seen::Step),
         });
         if seen.is_err() {
@@ -186,16 +186,16 @@ impl Heater {
         match read {
             Ok(now) => {
                 self.sum += i32::from(now);
-                self.looks += 1;
-                if i32::from(self.looks) < STEPS {
+                self.samples += 1;
+                if i32::from(self.samples) < STEPS {
                     return Ok(None);
                 }
                 let mean = (self.sum / STEPS) as i16;
-                (self.sum, self.looks) = (0, 0);
+                (self.sum, self.samples) = (0, 0);
                 Ok(Some(mean))
             }
             Err(_) if wanted == 0 => {
-                (self.sum, self.looks, self.now) = (0, 0, 0);
+                (self.sum, self.samples, self.now) = (0, 0, 0);
                 Ok(None)
             }
             Err(Broken::Open) => Err(Status::SensorOpen),

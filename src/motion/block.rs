@@ -36,12 +36,12 @@ impl Block {
     pub fn is_aside(&self) -> bool {
         matches!(
             self.body,
-            Body::Action(
-                Action::Override(_)
-                    | Action::Lead(_)
-                    | Action::PerTurn(_)
-                    | Action::Heat(_)
-                    | Action::Advance(_)
+            Body::QueuedAction(
+                QueuedAction::Override(_)
+                    | QueuedAction::Lead(_)
+                    | QueuedAction::PerTurn(_)
+                    | QueuedAction::Heat(_)
+                    | QueuedAction::Advance(_)
             )
         )
     }
@@ -54,8 +54,8 @@ impl Block {
     }
 
     /// A block that does something other than move.
-    pub fn action(action: Action, line: u32) -> Self {
-        Self::new(Body::Action(action), line)
+    pub fn action(action: QueuedAction, line: u32) -> Self {
+        Self::new(Body::QueuedAction(action), line)
     }
 
     /// The N word, 0 for none.
@@ -66,18 +66,18 @@ impl Block {
     }
 }
 
-/// What a block does. Not one enum with [`Action`]: there is one value that a line cannot have.
+/// What a block does. Not one enum with [`QueuedAction`]: there is one value that a line cannot have.
 #[derive(Clone, Copy, Debug)]
 pub enum Body {
     /// Moves the motors.
     Line(Line),
     /// Does something else.
-    Action(Action),
+    QueuedAction(QueuedAction),
 }
 
 /// What a block does that moves nothing.
 #[derive(Clone, Copy, Debug)]
-pub enum Action {
+pub enum QueuedAction {
     /// Stands still for so many milliseconds.
     Dwell(u32),
     /// G28.3: from here on the motor positions are these.
@@ -167,7 +167,7 @@ pub struct Line {
     pub reserve: Reserve,
     /// Velocity limit on the path, mm/s, at 100 %: the feed, or what the slowest axis or motor allows.
     pub cruise: f32,
-    /// Brake potential where it starts; see `horizon`.
+    /// Brake potential where it starts; see `speed_constraints`.
     pub start: f32,
     /// Highest velocity at which it may be entered, mm/s: the corner with the line before, whatever feeds are.
     pub entry: Short,

@@ -4,7 +4,7 @@
 //!
 //! # Units
 //!
-//! Velocities are mm/s. Distances are brake potential, (mm/s)^2: 2 A for each mm (`horizon`). With
+//! Velocities are mm/s. Distances are brake potential, (mm/s)^2: 2 A for each mm (`speed_constraints`). With
 //! k = A^2 / 2J the distance that a change of velocity takes depends on neither A nor J.
 //!
 //! # The distance to slow down
@@ -32,7 +32,7 @@
 use super::float::{below, greater, least, scaled};
 use super::governor::{Governor, Limits};
 use super::need::Scale;
-use super::queue::Anchor;
+use super::queue::Constraint;
 use super::short::Short;
 use crate::hal::ring::Index;
 use crate::math::sqrt;
@@ -43,7 +43,7 @@ pub trait Ahead {
     fn headroom(&self) -> f32;
     /// The first constraint from the `n`th on that is slower than `velocity`, or firm: nothing beyond that counts. With its
     /// number.
-    fn slower(&self, n: Index, velocity: Short) -> (Index, Anchor);
+    fn slower(&self, n: Index, velocity: Short) -> (Index, Constraint);
     /// Brake potential from the end of the block to that of the queue.
     fn end(&self) -> f32;
 }
@@ -191,10 +191,10 @@ impl Scan {
         let (mut next, mut passed, mut budget) = (0, 0, EXACT);
         let mut low = Short::above(greater(ask.top, ask.level));
         loop {
-            let (found, anchor) = ahead.slower(next, low);
+            let (found, constraint) = ahead.slower(next, low);
             next = found + 1;
-            let place = anchor.ahead + ask.here;
-            if !anchor.firm && passed < PASSED && below(place, behind) {
+            let place = constraint.ahead + ask.here;
+            if !constraint.firm && passed < PASSED && below(place, behind) {
                 passed += 1;
                 continue;
             }
@@ -203,14 +203,14 @@ impl Scan {
                 break;
             }
             // A firm one may be faster than those before it.
-            low = anchor.velocity.min(low);
+            low = constraint.velocity.min(low);
             if budget == 0 {
                 self.look_no_further(low, place, ahead.end() + ask.here);
                 break;
             }
             budget -= 1;
             self.take_in(low, place, ask.taken);
-            if anchor.firm || !ask.taken && self.distance < self.at {
+            if constraint.firm || !ask.taken && self.distance < self.at {
                 break;
             }
         }

@@ -17,7 +17,7 @@ const JERKY_S: f32 = 1.0625 * JERK_TIME_MIN;
 
 /// Where the limits come from: the settings, in their units. Axes are 0 to 5 for X Y Z A B C; a limit that
 /// is not positive is none; mm are degrees for rotary axes.
-pub trait Machine {
+pub trait MachineLimits {
     /// Traverse velocity of an axis, mm/min.
     fn velocity_max(&self, axis: usize) -> f32;
     /// Feed velocity of an axis, mm/min.
@@ -60,7 +60,7 @@ pub struct Axis {
 impl Axis {
     /// Takes acceleration and jerk over, mm/s^2 and mm/s^3; 0 or less for none. The velocities are known. Cost: 3,000.
     ///
-    /// An acceleration far beyond what any ramp reaches under the jerk limit would make the potentials of `horizon` coarse. Between 0
+    /// An acceleration far beyond what any ramp reaches under the jerk limit would make the potentials of `speed_constraints` coarse. Between 0
     /// and v a ramp reaches `sqrt(J v)`, in a direction between three axes a third more: half more is kept. The least that is kept has
     /// its jerk limit still ([`effective_jerk`](super::governor::effective_jerk)).
     #[inline(never)]
@@ -88,7 +88,7 @@ pub struct Dynamics {
 
 impl Dynamics {
     /// Cost: 5,000 an axis, 600 for each number of motors.
-    pub fn new(machine: &(impl Machine + Motors)) -> Self {
+    pub fn new(machine: &(impl MachineLimits + Motors)) -> Self {
         let mut dynamics = Self::default();
         dynamics.set(machine);
         dynamics
@@ -97,7 +97,7 @@ impl Dynamics {
     /// Takes the limits of `machine` over.
     #[inline(never)]
     #[small]
-    pub fn set(&mut self, machine: &(impl Machine + Motors)) {
+    pub fn set(&mut self, machine: &(impl MachineLimits + Motors)) {
         for (n, axis) in self.axes.iter_mut().enumerate() {
             axis.velocity = machine.velocity_max(n) * (1.0 / 60.0);
             axis.feed = machine.feedrate_max(n) * (1.0 / 60.0);

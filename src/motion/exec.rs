@@ -5,7 +5,7 @@
 //! segment of it. A stretch ends where its block ends: a block that takes less than [`SEGMENT_S`] is one
 //! segment. Times are seconds, distances mm.
 //!
-//! Nothing is planned ahead but what the [horizon](super::horizon) knows: how fast the machine is, and how
+//! Nothing is planned ahead but what the [speed constraints](super::speed_constraints) know: how fast the machine is, and how
 //! fast it may be at the end of the block, settle each stretch. More blocks in the queue tell at the
 //! next one.
 //!
@@ -20,11 +20,11 @@
 //! Cost on AVR: 6,300 cycles for a short block without a jerk limit, with [`Prep`], the task and its
 //! interrupt; a third of them are the governor's floats.
 
-use super::block::{Action, Block, Body, Line};
+use super::block::{Block, Body, Line, QueuedAction};
 use super::float::{below, greater, least, scaled, some, whole};
 use super::governor::{Ahead, Governor, Stretch, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
-use super::queue::{Anchor, BlockSource};
+use super::queue::{BlockSource, Constraint};
 use super::retract::Retreat;
 use super::short::Short;
 use super::snapshot::{Program, Snapshot};
@@ -166,16 +166,16 @@ enum Follows {
 }
 
 /// What the governor sees of the queue.
-struct View<'a> {
+struct QueueView<'a> {
     headroom: f32,
     blocks: &'a BlockSource,
 }
 
-impl Ahead for View<'_> {
+impl Ahead for QueueView<'_> {
     fn headroom(&self) -> f32 {
         self.headroom
     }
-    fn slower(&self, n: Index, velocity: Short) -> (Index, Anchor) {
+    fn slower(&self, n: Index, velocity: Short) -> (Index, Constraint) {
         self.blocks.slower(n, velocity)
     }
     fn end(&self) -> f32 {
@@ -250,7 +250,7 @@ impl Exec {
             }
             if !self.begin(blocks, out)
                 && let Some(block) = blocks.oldest()
-                && let Body::Action(action) = block.body
+                && let Body::QueuedAction(action) = block.body
             {
                 if !block.is_aside() && self.prep.relax(segment) {
                     self.halt(out);
@@ -353,20 +353,28 @@ impl Exec {
         out.program = Program::Stopped;
         while let Some(block) = blocks.oldest() {
             match &block.body {
-                Body::Action(Action::Drivers(drivers)) => self.prep.set_drivers(*drivers),
-                Body::Action(Action::Advance(lead)) if Capability::Printer.is_built_in() => {
+                Body::QueuedAction(QueuedAction::Drivers(drivers)) => {
+                    self.prep.set_drivers(*drivers)
+                }
+                Body::QueuedAction(QueuedAction::Advance(lead))
+                    if Capability::Printer.is_built_in() =>
+                {
                     self.prep.set_lead(lead);
                 }
-                Body::Action(Action::PerTurn(on)) if Capability::Lathe.is_built_in() => {
+                Body::QueuedAction(QueuedAction::PerTurn(on))
+                    if Capability::Lathe.is_built_in() =>
+                {
                     self.go_by_speed(*on)
                 }
-                Body::Action(Action::SetPosition(steps)) if !moved => out.target = *steps,
-                Body::Action(
-                    Action::SetPosition(_)
-                    | Action::Override(_)
-                    | Action::Lead(_)
-                    | Action::Advance(_)
-                    | Action::Heat(_),
+                Body::QueuedAction(QueuedAction::SetPosition(steps)) if !moved => {
+                    out.target = *steps
+                }
+                Body::QueuedAction(
+                    QueuedAction::SetPosition(_)
+                    | QueuedAction::Override(_)
+                    | QueuedAction::Lead(_)
+                    | QueuedAction::Advance(_)
+                    | QueuedAction::Heat(_),
                 ) => {}
                 _ => moved = true,
             }
@@ -389,22 +397,22 @@ impl Exec {
     #[inline(never)]
     fn take_up(
         &mut self,
-        action: &Action,
+        action: &QueuedAction,
         blocks: &mut BlockSource,
         standstill: bool,
         out: &mut Snapshot,
     ) -> Step {
         match action {
-            Action::Dwell(ms) => {
+            QueuedAction::Dwell(ms) => {
                 self.dwell_ms = *ms;
                 self.halt(out);
                 out.running = true;
             }
-            Action::SetPosition(steps) => {
+            QueuedAction::SetPosition(steps) => {
                 out.target = *steps;
                 out.left = 0.0;
             }
-            Action::Outputs(outputs) | Action::Surface(outputs, _) => {
+            QueuedAction::Outputs(outputs) | QueuedAction::Surface(outputs, _) => {
                 self.halt(out);
                 if !standstill {
                     return Step::Standstill;
@@ -413,20 +421,22 @@ impl Exec {
                 blocks.release();
                 return Step::Switched;
             }
-            Action::ProgramStop | Action::ProgramEnd => {
+            QueuedAction::ProgramStop | QueuedAction::ProgramEnd => {
                 self.halt(out);
                 if !standstill {
                     return Step::Standstill;
                 }
                 out.running = false;
                 out.program = match action {
-                    Action::ProgramEnd => Program::Ended,
+                    QueuedAction::ProgramEnd => Program::Ended,
                     _ => Program::Stopped,
                 };
             }
-            Action::Drivers(drivers) => self.prep.set_drivers(*drivers),
-            Action::Advance(lead) if Capability::Printer.is_built_in() => self.prep.set_lead(lead),
-            Action::Thread(_) | Action::EndThread | Action::Return
+            QueuedAction::Drivers(drivers) => self.prep.set_drivers(*drivers),
+            QueuedAction::Advance(lead) if Capability::Printer.is_built_in() => {
+                self.prep.set_lead(lead)
+            }
+            QueuedAction::Thread(_) | QueuedAction::EndThread | QueuedAction::Return
                 if Capability::Lathe.is_built_in() =>
             {
                 self.halt(out);
@@ -435,13 +445,15 @@ impl Exec {
                 }
                 self.prep.rest();
                 match (action, &mut self.follows) {
-                    (Action::Thread(pass), _) => self.follows = Follows::Angle(Thread::begin(pass)),
-                    (Action::Return, Follows::Angle(thread)) => thread.turn_back(),
+                    (QueuedAction::Thread(pass), _) => {
+                        self.follows = Follows::Angle(Thread::begin(pass))
+                    }
+                    (QueuedAction::Return, Follows::Angle(thread)) => thread.turn_back(),
                     _ => self.follows = Follows::Nothing,
                 }
             }
-            Action::PerTurn(on) if Capability::Lathe.is_built_in() => self.go_by_speed(*on),
-            Action::Lead(lead) if Capability::Lathe.is_built_in() => {
+            QueuedAction::PerTurn(on) if Capability::Lathe.is_built_in() => self.go_by_speed(*on),
+            QueuedAction::Lead(lead) if Capability::Lathe.is_built_in() => {
                 if let Follows::Angle(thread) = &mut self.follows {
                     thread.set_lead(*lead);
                 }
@@ -451,9 +463,9 @@ impl Exec {
         }
         blocks.release();
         match action {
-            Action::Override(change) => Step::Override(*change),
-            Action::Heat(heat) if Capability::Printer.is_built_in() => Step::Heat(*heat),
-            Action::ProgramEnd => Step::Override(Change::ALL_ON),
+            QueuedAction::Override(change) => Step::Override(*change),
+            QueuedAction::Heat(heat) if Capability::Printer.is_built_in() => Step::Heat(*heat),
+            QueuedAction::ProgramEnd => Step::Override(Change::ALL_ON),
             _ => Step::Again,
         }
     }
@@ -558,7 +570,7 @@ impl Exec {
                 return self.await_spindle(out, segment);
             }
         }
-        let ahead = View { headroom: running.headroom, blocks };
+        let ahead = QueueView { headroom: running.headroom, blocks };
         let stretch = if holds {
             self.governor.halt(running.left, &ahead, SEGMENT_S)
         } else {

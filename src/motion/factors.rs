@@ -1,8 +1,8 @@
 //! Overrides as motion sees them: by what velocities are multiplied, and how far a line may be sped up.
 //!
-//! Blocks are planned for twice their feed: corners, and what potentials need (`horizon`). How much faster
+//! Blocks are planned for twice their feed: corners, and what potentials need (`speed_constraints`). How much faster
 //! than asked a line may be run, [`Reserve`], takes a byte. So a
-//! factor can change at any time, for what is queued too; only the keys of the horizon depend on it
+//! factor can change at any time, for what is queued too; only the keys of the speed constraints depend on it
 //! (`replan`).
 //!
 //! Cost on AVR: 40 cycles for a velocity at 100 %, else 250.

@@ -18,10 +18,10 @@ pub use super::constraint::Ahead;
 use super::constraint::Clear;
 use super::exec::SEGMENT_S;
 use super::float::{greater, scaled, some};
-use super::horizon::kappa;
 use super::ramp::{Phase, Ramp};
 use super::rise::MARGIN_FIRST;
 use super::slice::Rest;
+use super::speed_constraints::kappa;
 use crate::math::sqrt;
 
 /// A part of a block, all of it that is left or less.

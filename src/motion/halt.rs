@@ -2,7 +2,7 @@
 //!
 //! Called by exec instead of [`Governor::stretch`] while a hold is on. Without a jerk limit that is plain deceleration; with one it is
 //! a ramp that is laid out when the hold begins (`ramp`). It goes on over any number of
-//! blocks, each with its own limits. What is planned can be braked for by braking as hard as may be (`horizon`,
+//! blocks, each with its own limits. What is planned can be braked for by braking as hard as may be (`speed_constraints`,
 //! `constraint`), so velocities are nowhere above those of the plan, and no corner ahead is too fast.
 //!
 //! At rest the governor is as if it had never moved: to go on is ordinary governing, from the middle of a
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
     use crate::hal::ring::Index;
     use crate::motion::exec::SEGMENT_S;
-    use crate::motion::queue::Anchor;
+    use crate::motion::queue::Constraint;
     use crate::motion::short::Short;
     use proptest::prelude::*;
 
@@ -77,8 +77,8 @@ mod tests {
         fn headroom(&self) -> f32 {
             0.0
         }
-        fn slower(&self, _: Index, _: Short) -> (Index, Anchor) {
-            (0, Anchor { velocity: Short::ZERO, ahead: 0.0, firm: true })
+        fn slower(&self, _: Index, _: Short) -> (Index, Constraint) {
+            (0, Constraint { velocity: Short::ZERO, ahead: 0.0, firm: true })
         }
         fn end(&self) -> f32 {
             0.0

@@ -13,7 +13,7 @@
 //! its axes allow in its direction. With one, acceleration and jerk must be alike for as long as
 //! possible: then they are those of the slowest axis that moves, whatever the direction.
 
-use super::block::{Action, Block, Extent, Line as Move};
+use super::block::{Block, Extent, Line as Move, QueuedAction};
 use super::curve::{Bend, Curve};
 use super::dynamics::Dynamics;
 use super::factors::Reserve;
@@ -212,14 +212,18 @@ impl Builder {
 
     /// The block that renames the present position. Motors without an axis keep theirs.
     #[small]
-    pub fn set_position(&mut self, position: &PerAxis<Length>, machine: &impl Motors) -> Action {
+    pub fn set_position(
+        &mut self,
+        position: &PerAxis<Length>,
+        machine: &impl Motors,
+    ) -> QueuedAction {
         for (m, motor) in self.motors.iter_mut().enumerate() {
             if let Some(position) = kinematics::place(machine.motor_axis(m), position) {
                 motor.rename(machine.ratio(m), position);
             }
         }
         self.stopped();
-        Action::SetPosition(self.motors.map(|motor| motor.steps()))
+        QueuedAction::SetPosition(self.motors.map(|motor| motor.steps()))
     }
 
     /// The machine stands still, and its motors are at these steps.
@@ -230,7 +234,7 @@ impl Builder {
     }
 
     /// The block for something that is done at rest.
-    pub fn pause(&mut self, action: Action, line: u32) -> Block {
+    pub fn pause(&mut self, action: QueuedAction, line: u32) -> Block {
         self.stopped();
         Block::action(action, line)
     }

@@ -3,7 +3,7 @@
 //! ```text
 //! target -> line -> block queue -> exec -> segment ring -> dda -> pins
 //!    junction, curve   |   ^        governor, prep
-//!                      horizon      slice, rise, ramp, constraint, need
+//!                speed_constraints  slice, rise, ramp, constraint, need
 //! ```
 
 pub mod advance;
@@ -19,7 +19,6 @@ pub mod finished;
 pub mod float;
 pub mod governor;
 mod halt;
-pub mod horizon;
 pub mod junction;
 mod limits;
 pub mod line;
@@ -36,6 +35,7 @@ pub mod short;
 mod slice;
 pub mod snapshot;
 pub mod source;
+pub mod speed_constraints;
 pub mod steps;
 pub mod thread;
 mod trapezoid;

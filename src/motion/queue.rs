@@ -1,7 +1,7 @@
-//! The block queue, seen from the planner's side: a ring of blocks, and the horizon that says how fast they
+//! The block queue, seen from the planner's side: a ring of blocks, and the speed constraints that say how fast they
 //! may be run. Exec's side is `source`.
 //!
-//! The planner changes the horizon under the ceiling lock only, exec at any time. When the ring is
+//! The planner changes the speed constraints under the ceiling lock only, exec at any time. When the ring is
 //! full the planner waits ([`BlockQueue::free`]).
 
 use avr_embassy::{InterruptEnd, Shared};
@@ -9,9 +9,9 @@ use avr_embassy::{InterruptEnd, Shared};
 use super::block::{Block, Body, Line};
 use super::factors::Factors;
 use super::float::{OCTAVE, below, greater, least, lesser, log, some};
-use super::horizon::{self, Horizon, kappa};
 use super::short::Short;
-pub use super::source::{Anchor, BlockSource};
+pub use super::source::{BlockSource, Constraint};
+use super::speed_constraints::{self, SpeedConstraints, kappa};
 use crate::hal::exec;
 use crate::hal::ring::{Ceiling, Index, Producer, Ring};
 use crate::hal::{Interrupt, LOOK_AHEAD, Thread};
@@ -42,23 +42,23 @@ const FINE: i32 = 9 * OCTAVE;
 /// The storage.
 pub struct BlockStore {
     ring: Ring<Block, BLOCKS>,
-    horizon: Shared<Horizon>,
+    constraints: Shared<SpeedConstraints>,
 }
 
 impl BlockStore {
     /// Without blocks.
     pub const fn new() -> Self {
-        Self { ring: Ring::new(), horizon: Shared::new(Horizon::new()) }
+        Self { ring: Ring::new(), constraints: Shared::new(SpeedConstraints::new()) }
     }
 
     /// The planner's end. `None` after the first time.
     pub fn queue(&'static self, thread: Thread) -> Option<BlockQueue> {
         let ring = self.ring.producer()?;
-        exec::lock(thread, |ceiling| self.horizon.with(ceiling, Horizon::begin));
+        exec::lock(thread, |ceiling| self.constraints.with(ceiling, SpeedConstraints::begin));
         Some(BlockQueue {
             thread,
             ring,
-            horizon: &self.horizon,
+            constraints: &self.constraints,
             newest: SEQ,
             last: None,
             factors: Factors::ONE,
@@ -80,12 +80,12 @@ impl BlockStore {
     /// is_send::<kerf::motion::queue::BlockSource>();
     /// ```
     pub fn source(&'static self, level: Interrupt) -> Option<BlockSource> {
-        Some(BlockSource::new(self.ring.consumer()?, InterruptEnd::of(&self.horizon, level)?))
+        Some(BlockSource::new(self.ring.consumer()?, InterruptEnd::of(&self.constraints, level)?))
     }
 
     /// These overrides are wanted: in force at once, but for what is more than the keys are for.
     pub fn want(&self, factors: Factors, ceiling: &Ceiling) {
-        self.horizon.with(ceiling, |horizon| horizon.want(factors));
+        self.constraints.with(ceiling, |constraints| constraints.want(factors));
     }
 }
 
@@ -139,7 +139,7 @@ impl Last {
 pub struct BlockQueue {
     pub(super) thread: Thread,
     pub(super) ring: Producer<Block, BLOCKS>,
-    pub(super) horizon: &'static Shared<Horizon>,
+    pub(super) constraints: &'static Shared<SpeedConstraints>,
     /// Sequence number of the block pushed last.
     pub(super) newest: Index,
     /// The line that the next one may follow without a stop.
@@ -189,12 +189,16 @@ impl BlockQueue {
         let end = line.start + line.gain();
         let make = || Block::new(Body::Line(*line), number);
         let entry = Short::new(least(line.entry.get(), cruise));
-        self.put(make, key.map(|(key, firm)| (key, firm, entry)), |horizon| horizon.end = end)
+        self.put(make, key.map(|(key, firm)| (key, firm, entry)), |constraints| {
+            constraints.end = end
+        })
     }
 
     /// Potential at the end of the queue.
     fn end(&self) -> f32 {
-        exec::lock(self.thread, |ceiling| self.horizon.with(ceiling, |horizon| horizon.end))
+        exec::lock(self.thread, |ceiling| {
+            self.constraints.with(ceiling, |constraints| constraints.end)
+        })
     }
 
     /// Whether the line is as fast as the one before, and the corner between them no limit.
@@ -224,8 +228,10 @@ impl BlockQueue {
         match &self.last {
             // What comes before brakes with its own limits.
             Some(last) if last.jerk_limits_change(line, kappa) => {
-                key =
-                    Some((line.start + horizon::key(line.entry(&self.factors), last.kappa), FIRM));
+                key = Some((
+                    line.start + speed_constraints::key(line.entry(&self.factors), last.kappa),
+                    FIRM,
+                ));
             }
             Some(last) => {
                 let limit = lesser(last.cruise, cruise) * WORTH;
@@ -265,10 +271,10 @@ impl BlockQueue {
             exec::lock(self.thread, |ceiling| {
                 let next = self.newest.wrapping_add(1) & SEQ;
                 let used = self.ring.used();
-                self.horizon.with(ceiling, |horizon| {
-                    horizon.count_anew(next);
+                self.constraints.with(ceiling, |constraints| {
+                    constraints.count_anew(next);
                     if used == 0 {
-                        horizon.oldest_is(next);
+                        constraints.oldest_is(next);
                     }
                 });
             });
@@ -276,12 +282,12 @@ impl BlockQueue {
         self.end()
     }
 
-    /// Puts a block, which `make` makes, into the ring and what follows from it into the horizon, all at once for exec.
+    /// Puts a block, which `make` makes, into the ring and what follows from it into the speed constraints, all at once for exec.
     fn put(
         &mut self,
         make: impl FnOnce() -> Block,
         key: Option<(f32, Index, Short)>,
-        end: impl FnOnce(&mut Horizon) + Send,
+        end: impl FnOnce(&mut SpeedConstraints) + Send,
     ) -> bool {
         if self.ring.free() == 0 {
             return false;
@@ -290,13 +296,13 @@ impl BlockQueue {
         let needless = key.map_or(0, |(key, ..)| self.needless(key));
         let Some(slot) = self.ring.slot_with(make) else { return false };
         exec::lock(self.thread, |ceiling| {
-            self.horizon.with(ceiling, |horizon| {
+            self.constraints.with(ceiling, |constraints| {
                 if let Some((_, firm, entry)) = key {
-                    horizon.drop_last(needless);
-                    horizon.add(seq | firm, entry);
+                    constraints.drop_last(needless);
+                    constraints.add(seq | firm, entry);
                 }
-                end(horizon);
-                horizon.version = horizon.version.wrapping_add(1);
+                end(constraints);
+                constraints.version = constraints.version.wrapping_add(1);
             });
             slot.publish();
         });
@@ -313,9 +319,9 @@ impl BlockQueue {
         let mut count = 0;
         loop {
             let last = exec::lock(self.thread, |ceiling| {
-                self.horizon.with(ceiling, move |horizon| {
-                    let seq = horizon.nth_last(count)?;
-                    Some((seq, horizon.older(next).of(newest.wrapping_sub(seq) & SEQ)))
+                self.constraints.with(ceiling, move |constraints| {
+                    let seq = constraints.nth_last(count)?;
+                    Some((seq, constraints.older(next).of(newest.wrapping_sub(seq) & SEQ)))
                 })
             });
             let needless = |(last, more)| last & FIRM == 0 && self.key(last) - more >= key;

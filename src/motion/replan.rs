@@ -12,9 +12,9 @@
 use super::block::{Block, Body, Line};
 use super::factors::{Factors, Reserve};
 use super::float::{below, least};
-use super::horizon::{self, Keys, kappa};
 use super::queue::{BlockQueue, FIRM, SEQ, WORTH};
 use super::short::Short;
+use super::speed_constraints::{self, Keys, kappa};
 use crate::hal::exec;
 use crate::hal::ring::Index;
 
@@ -76,7 +76,7 @@ impl Behind {
         }
         self.low = f32::MAX;
         let entry = Short::new(entry);
-        let key = this.start + horizon::key(entry.get(), self.known.kappa(brakes));
+        let key = this.start + speed_constraints::key(entry.get(), self.known.kappa(brakes));
         if firm == 0 && key >= self.key {
             return None;
         }
@@ -109,7 +109,8 @@ impl Known {
 impl BlockQueue {
     /// The overrides that are wanted, if the keys are for others. Cost: 60.
     pub fn wanted(&self) -> Option<Factors> {
-        let wanted = exec::lock(self.thread, |ceiling| self.horizon.with(ceiling, |h| h.wanted));
+        let wanted =
+            exec::lock(self.thread, |ceiling| self.constraints.with(ceiling, |h| h.wanted));
         (!wanted.same(&self.factors)).then_some(wanted)
     }
 
@@ -134,7 +135,7 @@ impl BlockQueue {
         let mut last: Option<(usize, &Line)> = None;
         let next = self.newest.wrapping_add(1) & SEQ;
         let older =
-            exec::lock(self.thread, |ceiling| self.horizon.with(ceiling, |h| h.older(next)));
+            exec::lock(self.thread, |ceiling| self.constraints.with(ceiling, |h| h.older(next)));
         for back in 0..=self.ring.used() {
             let block = self.ring.pushed(back);
             if is_aside(block) {
@@ -158,20 +159,20 @@ impl BlockQueue {
         exec::lock(self.thread, |ceiling| {
             let (used, factors) = (self.ring.used() as Index, self.factors);
             let oldest = self.newest.wrapping_sub(used).wrapping_add(1) & SEQ;
-            self.horizon.with(ceiling, |horizon| {
+            self.constraints.with(ceiling, |constraints| {
                 // What has begun has no key any more, nor what has been run meanwhile.
-                let begun = horizon.nth(0).is_none_or(|first| first & SEQ != oldest);
-                horizon.replace(keys);
-                while let Some(first) = horizon.nth(0) {
+                let begun = constraints.nth(0).is_none_or(|first| first & SEQ != oldest);
+                constraints.replace(keys);
+                while let Some(first) = constraints.nth(0) {
                     let place = (first & SEQ).wrapping_sub(oldest) & SEQ;
                     if place < used && !(begun && place == 0) {
                         break;
                     }
-                    horizon.pass();
+                    constraints.pass();
                 }
-                horizon.planned = factors;
-                horizon.changed = true;
-                horizon.version = horizon.version.wrapping_add(1);
+                constraints.planned = factors;
+                constraints.changed = true;
+                constraints.version = constraints.version.wrapping_add(1);
             });
         });
     }

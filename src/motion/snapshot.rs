@@ -6,7 +6,7 @@
 
 use kerf_macros::small;
 
-use super::block::{Action, Outputs};
+use super::block::{Outputs, QueuedAction};
 use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::gcode::command::Surface;
@@ -84,9 +84,9 @@ impl Snapshot {
 
     /// The program has switched outputs, S, or its surface speed. Under one S follows X, whatever else is switched.
     #[inline(always)]
-    pub fn switch(&mut self, outputs: &Outputs, action: &Action) {
+    pub fn switch(&mut self, outputs: &Outputs, action: &QueuedAction) {
         self.outputs = outputs.on;
-        if let (Some(surface), Action::Surface(_, new)) = (self.surface.first_mut(), action) {
+        if let (Some(surface), QueuedAction::Surface(_, new)) = (self.surface.first_mut(), action) {
             *surface = *new;
         } else if self.surface.first().is_some_and(Surface::is_on) {
             return;

@@ -1,8 +1,8 @@
 //! The block queue, seen from exec's side: the oldest block, and how fast it may be left.
 //!
-//! Owned by exec, which takes block after block, and asks for the limits ahead whenever the horizon has
+//! Owned by exec, which takes block after block, and asks for the limits ahead whenever the speed constraints have
 //! changed. Never waits: an empty queue is one that ends here. Units: mm, s; brake potentials as in
-//! `horizon`.
+//! `speed_constraints`.
 
 use core::cell::Cell;
 
@@ -12,14 +12,14 @@ use kerf_macros::small;
 use super::block::{Block, Body, Line};
 use super::factors::{Factors, Reserve};
 use super::float::lesser;
-use super::horizon::Horizon;
 use super::queue::{BLOCKS, FIRM, SEQ};
 use super::short::Short;
+use super::speed_constraints::SpeedConstraints;
 use crate::hal::ring::{Consumer, Index};
 
 /// A limit ahead of exec.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Anchor {
+pub struct Constraint {
     /// Velocity there, mm/s.
     pub velocity: Short,
     /// Brake potential from the end of the oldest block to there.
@@ -31,10 +31,10 @@ pub struct Anchor {
 /// Exec's end.
 pub struct BlockSource {
     ring: Consumer<Block, BLOCKS>,
-    horizon: InterruptEnd<&'static Shared<Horizon>>,
+    constraints: InterruptEnd<&'static Shared<SpeedConstraints>>,
     /// Sequence number of the oldest block.
     oldest: Index,
-    /// Potential at its end, and the version of the horizon it is of.
+    /// Potential at its end, and the version of the speed constraints that it was read from.
     end: Cell<Option<(u8, f32)>>,
 }
 
@@ -42,9 +42,9 @@ impl BlockSource {
     /// With the ends of a store that are exec's.
     pub(super) fn new(
         ring: Consumer<Block, BLOCKS>,
-        horizon: InterruptEnd<&'static Shared<Horizon>>,
+        constraints: InterruptEnd<&'static Shared<SpeedConstraints>>,
     ) -> Self {
-        Self { ring, horizon, oldest: 0, end: Cell::new(None) }
+        Self { ring, constraints, oldest: 0, end: Cell::new(None) }
     }
 
     /// Blocks waiting, with the one that runs.
@@ -82,29 +82,29 @@ impl BlockSource {
             self.end.set(None);
             self.oldest = self.oldest.wrapping_add(1) & SEQ;
             let oldest = self.oldest;
-            self.horizon.with(|horizon| horizon.oldest_is(oldest));
+            self.constraints.with(|constraints| constraints.oldest_is(oldest));
         }
     }
 
     /// The oldest block begins: what limited its start is of the past.
     pub fn enter(&mut self) {
         let oldest = self.oldest;
-        self.horizon.with(|horizon| {
-            if horizon.nth(0).is_some_and(|seq| seq & SEQ == oldest) {
-                horizon.pass();
+        self.constraints.with(|constraints| {
+            if constraints.nth(0).is_some_and(|seq| seq & SEQ == oldest) {
+                constraints.pass();
             }
         });
     }
 
     /// Changes when what is ahead changes.
     pub fn version(&self) -> u8 {
-        self.horizon.look(|horizon| horizon.version)
+        self.constraints.look(|constraints| constraints.version)
     }
 
     /// What the oldest block, a line, is run at, mm/s; it changes with the version. Cost: 100.
     #[inline(always)]
     pub fn cruise(&self) -> f32 {
-        let factors = self.horizon.look(Horizon::factors);
+        let factors = self.constraints.look(SpeedConstraints::factors);
         self.line(self.oldest, |line| line.velocity(&factors)).unwrap_or_default()
     }
 
@@ -123,21 +123,21 @@ impl BlockSource {
     /// Whether other overrides were wanted when this was asked last. Cost: 15.
     #[inline(always)]
     pub fn take_changed(&mut self) -> bool {
-        self.horizon.with(|horizon| core::mem::take(&mut horizon.changed))
+        self.constraints.with(|constraints| core::mem::take(&mut constraints.changed))
     }
 
     /// These overrides are wanted: the planner hears of it if they are not those of the keys.
     pub fn want(&mut self, factors: Factors) {
-        self.horizon.with(|horizon| horizon.want(factors));
+        self.constraints.with(|constraints| constraints.want(factors));
     }
 
     /// The square of the velocity, (mm/s)^2, at which the oldest block, a line, may be left for the
     /// sake of all that follow, if there is no jerk limit. Cost: 900.
     pub fn headroom(&self) -> f32 {
         let end = self.queue_end();
-        let first = self.horizon.look(|horizon| {
-            let seq = horizon.nth(0)?;
-            let key = self.line(seq, |line| line.sharp_key(&horizon.factors()))?;
+        let first = self.constraints.look(|constraints| {
+            let seq = constraints.nth(0)?;
+            let key = self.line(seq, |line| line.sharp_key(&constraints.factors()))?;
             Some(self.lifted(seq, key))
         });
         let key = match first {
@@ -151,16 +151,16 @@ impl BlockSource {
 
     /// The first constraint ahead from the `n`th on that is slower than `velocity`, or firm; with its number. The last is the
     /// end of the queue. Cost: 450, 25 for each that is passed over, and 1,500 more the first time after a change.
-    pub fn slower(&self, n: Index, velocity: Short) -> (Index, Anchor) {
-        self.horizon.look(|horizon| {
-            let found = horizon.slower(n, velocity);
-            let Some(seq) = horizon.nth(found) else {
+    pub fn slower(&self, n: Index, velocity: Short) -> (Index, Constraint) {
+        self.constraints.look(|constraints| {
+            let found = constraints.slower(n, velocity);
+            let Some(seq) = constraints.nth(found) else {
                 let ahead = self.end_of_queue();
-                return (found, Anchor { velocity: Short::ZERO, ahead, firm: true });
+                return (found, Constraint { velocity: Short::ZERO, ahead, firm: true });
             };
-            let start = self.line(seq, |line| line.start).unwrap_or(horizon.end);
-            let (velocity, firm) = (horizon.entry(found), seq & FIRM != 0);
-            (found, Anchor { velocity, ahead: self.lifted(seq, start) - self.end(), firm })
+            let start = self.line(seq, |line| line.start).unwrap_or(constraints.end);
+            let (velocity, firm) = (constraints.entry(found), seq & FIRM != 0);
+            (found, Constraint { velocity, ahead: self.lifted(seq, start) - self.end(), firm })
         })
     }
 
@@ -172,13 +172,16 @@ impl BlockSource {
     /// Potential at the end of the queue, counted as at the oldest block.
     fn queue_end(&self) -> f32 {
         // Behind all blocks, of which the last number is that before the oldest.
-        self.lifted(self.oldest.wrapping_sub(1), self.horizon.look(|horizon| horizon.end))
+        self.lifted(
+            self.oldest.wrapping_sub(1),
+            self.constraints.look(|constraints| constraints.end),
+        )
     }
 
     /// A potential at block `seq`, counted as at the oldest one.
     #[inline(always)]
     fn lifted(&self, seq: Index, potential: f32) -> f32 {
-        if self.horizon.look(Horizon::is_mixed) {
+        if self.constraints.look(SpeedConstraints::is_mixed) {
             self.lifted_anew(seq, potential)
         } else {
             potential
@@ -187,7 +190,7 @@ impl BlockSource {
 
     #[inline(never)]
     fn lifted_anew(&self, seq: Index, potential: f32) -> f32 {
-        self.horizon.look(|horizon| horizon.lifted(potential, seq, self.oldest))
+        self.constraints.look(|constraints| constraints.lifted(potential, seq, self.oldest))
     }
 
     /// Potential at the end of the oldest block.

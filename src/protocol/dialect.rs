@@ -101,7 +101,7 @@ pub trait Dialect {
     /// The block of a line that is as most lines of a [plain](Dialect::IS_PLAIN) dialect are, and takes its place in the order. `None`, and nothing done,
     /// for one that has to be looked at closer. If the block is a usual move, it is answered by [`Dialect::put_brief`].
     #[inline(always)]
-    fn usual(line: &[u8], speech: &mut Self::Speech) -> Option<Span> {
+    fn fast_path(line: &[u8], speech: &mut Self::Speech) -> Option<Span> {
         let _ = (line, speech);
         None
     }
@@ -344,12 +344,12 @@ macro_rules! dialects {
                 }
             }
 
-            /// See [`Dialect::usual`].
+            /// See [`Dialect::fast_path`].
             #[inline(always)]
-            pub fn usual(&mut self, line: &[u8]) -> Option<Span> {
+            pub fn fast_path(&mut self, line: &[u8]) -> Option<Span> {
                 match self {
                     $(#[cfg(feature = $feature)]
-                    Self::$name(speech) => <$dialect>::usual(line, speech),)+
+                    Self::$name(speech) => <$dialect>::fast_path(line, speech),)+
                 }
             }
 

@@ -5,7 +5,7 @@ use super::value::Value;
 use crate::card::{Entry, Op};
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::Change;
-use crate::gcode::tables::Row;
+use crate::gcode::tables::TableRow;
 use crate::heat::Standing;
 use crate::heat::tune::Tune;
 use crate::machine::{Alarm, Cycle, Doing};
@@ -101,7 +101,7 @@ pub trait Machine {
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status>;
     /// Sets a value of the interpreter's tables. [`Status::Again`]: nothing is done, and it is to be tried again when
     /// the tables are ready.
-    fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status>;
+    fn set_row(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status>;
     /// Sets the tool length on one axis, as G43.1 does.
     fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status>;
     /// A value now, in the unit that [`Value`] states.

@@ -1,7 +1,7 @@
 //! What can be asked of the machine beside its settings.
 
 use crate::gcode::overrides::Override;
-use crate::gcode::tables::Row;
+use crate::gcode::tables::TableRow;
 
 /// A value of the machine, and what [`Machine::value`](super::Machine::value) returns for it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -101,7 +101,7 @@ pub enum Value {
     /// G92, in force or not, in units of a `Length`.
     Shift(u8),
     /// A value of the interpreter's tables, in units of a `Length`.
-    Row(Row, u8),
+    TableRow(TableRow, u8),
     /// An override's factor, in thousandths.
     Override(Override),
     /// 1 if it counts.

@@ -3,19 +3,19 @@
 
 use super::{Log, Memory, record};
 use crate::config::rows::value_name;
-use crate::gcode::tables::Row;
+use crate::gcode::tables::TableRow;
 use crate::units::{AXES, Length, PerAxis};
 
 /// What a row is. Cost on AVR: see [`Log::find`].
 #[inline(never)]
 #[small]
-pub fn row<M: Memory>(log: &Log, memory: &M, row: Row) -> PerAxis<Length> {
+pub fn row<M: Memory>(log: &Log, memory: &M, row: TableRow) -> PerAxis<Length> {
     find(log, memory, row).map(|value| Length(value.unwrap_or(0)))
 }
 
 #[inline(never)]
 #[small]
-fn find<M: Memory>(log: &Log, memory: &M, row: Row) -> [Option<i32>; AXES] {
+fn find<M: Memory>(log: &Log, memory: &M, row: TableRow) -> [Option<i32>; AXES] {
     let mut keys = [0; AXES];
     for (axis, key) in (0..).zip(&mut keys) {
         *key = self::key(row, axis);
@@ -26,21 +26,21 @@ fn find<M: Memory>(log: &Log, memory: &M, row: Row) -> [Option<i32>; AXES] {
 /// A value of a row.
 #[inline(never)]
 #[small]
-pub fn value<M: Memory>(log: &Log, memory: &M, row: Row, axis: u8) -> Length {
+pub fn value<M: Memory>(log: &Log, memory: &M, row: TableRow, axis: u8) -> Length {
     Length(log.newest(memory, key(row, axis)).unwrap_or(0))
 }
 
 /// Whether a row was ever put away.
 #[inline(never)]
 #[small]
-pub fn is_stored<M: Memory>(log: &Log, memory: &M, row: Row) -> bool {
+pub fn is_stored<M: Memory>(log: &Log, memory: &M, row: TableRow) -> bool {
     find(log, memory, row).iter().any(Option::is_some)
 }
 
 /// The key of a value of a row.
 #[inline(never)]
 #[small]
-pub fn key(row: Row, axis: u8) -> u16 {
+pub fn key(row: TableRow, axis: u8) -> u16 {
     record::key(value_name(row, axis).bytes())
 }
 
@@ -51,7 +51,7 @@ pub(super) mod tests {
 
     /// The keys of all values.
     pub fn keys() -> impl Iterator<Item = u16> {
-        let rows = (0..ROWS).filter_map(Row::from_number);
+        let rows = (0..ROWS).filter_map(TableRow::from_number);
         rows.flat_map(|row| (0..AXES as u8).map(move |axis| key(row, axis)))
     }
 }

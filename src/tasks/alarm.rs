@@ -70,6 +70,6 @@ pub fn clear(links: &Links, settings: &Settings) -> Status {
     links.notices.limits_hit.set(0);
     // One that was hit meanwhile has stopped what stood still.
     stepper::release();
-    links.reporter_wake.urge();
+    links.reporter_wake.notify_now();
     Status::Ok
 }

@@ -9,7 +9,7 @@
 use heapless::Vec;
 
 use super::links::Links;
-use super::parser::{Line as Sender, Usual, is_free, run_block};
+use super::parser::{FastPath, Line as Sender, is_free, run_block};
 use super::view::View;
 use crate::card::{LINE_MAX, Line};
 use crate::machine;
@@ -161,7 +161,7 @@ impl Feed {
                         self.waits = true;
                         break;
                     }
-                    match run_block(links, port, block, Usual::NotTried) {
+                    match run_block(links, port, block, FastPath::NotTried) {
                         (Status::Again, _) => {
                             self.waits = true;
                             break;

@@ -331,7 +331,7 @@ fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
     if thread.turns_round() {
         encoder.note_turning();
     }
-    encoder.look(&pulses);
+    encoder.sample(&pulses);
     if thread.note(&encoder.of_pass(pulses), encoder) && encoder.tells() {
         encoder.turn_pass();
         thread.mirror();

@@ -320,7 +320,7 @@ pub fn look(links: &Links) {
         see_to_tune(links, parts, &orders);
     }
     match seen {
-        Ok(Seen::Look) => {}
+        Ok(Seen::Sample) => {}
         Ok(Seen::Step) => {
             if number == 0 && note_cold(links, parts) {
                 alarm::raise_for(links, Alarm::Alarm, Status::TooCold);
@@ -346,7 +346,7 @@ fn look_at(
     let tune = Some(&mut *tune).filter(|_| parts.tuned.get() == number + 1);
     let (heater, to) = if number == 0 { (hot_end, first) } else { (bed, second) };
     let reading = heater.reading(reading, || heaters::word(number));
-    heater.look(number, reading, to, orders.fan, tune)
+    heater.sample(number, reading, to, orders.fan, tune)
 }
 
 /// Ends an autotune whose heater has been switched off. After the end of one switches the heater off, puts what has been found into the settings if that

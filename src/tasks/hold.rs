@@ -212,7 +212,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
         port.enquiry.set(true);
         links.parser_wake.signal();
     }
-    links.reporter_wake.urge();
+    links.reporter_wake.notify_now();
 }
 
 /// Whether a reset starts over instead of starting the board anew: in a dialect in which it does, and on a port that is undecided while the machine
@@ -245,7 +245,7 @@ fn start_over(links: &Links, port: &Port, slot: Option<u8>, works: bool) {
     if port.is_undecided() {
         port.ask(OTHERS);
     }
-    links.reporter_wake.urge();
+    links.reporter_wake.notify_now();
 }
 
 /// Drops what is queued, as a `%` does: `{qf:1}`, unless the machine is busy without a hold.
@@ -307,7 +307,7 @@ pub(super) fn go_on(links: &Links) {
         machine::take(machine::Event::Resume);
         links.cycle_start.signal();
         // It may have looked already, when the character came, and sleep again.
-        links.reporter_wake.urge();
+        links.reporter_wake.notify_now();
     }
 }
 

@@ -34,7 +34,7 @@ use core::cell::{Cell, RefCell};
 use super::heat::Heaters;
 use super::ports::Port;
 use super::storage::Storage;
-use super::wake::{News, Wake};
+use super::wake::{ReporterWake, Wake};
 use crate::boards::outputs;
 use crate::config::Settings;
 use crate::gcode::command::Commands;
@@ -72,7 +72,7 @@ pub struct Links {
     /// What is still to be told. Any task writes, the reporter takes.
     pub notices: Notices,
     /// Something that reports show may have changed.
-    pub reporter_wake: News,
+    pub reporter_wake: ReporterWake,
     /// Blocks that came and went, for queue reports.
     pub queue_count: QueueCount,
     /// What the planner has to look at before the next line.

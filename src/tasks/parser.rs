@@ -4,7 +4,7 @@
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
 //! data lines of the port that feeds the machine only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
 //! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
-//! keeps its slot until its response has been written. A usual move is done with at once, by [`usual`]. In an
+//! keeps its slot until its response has been written. A plain move is done with at once, by [`fast_path`]. In an
 //! alarm lines of G-code are refused.
 //!
 //! Each port has a [`Session`] of its own, so that no port waits for the other's line: no line is begun before the first part
@@ -32,7 +32,7 @@ use super::tx::Tx;
 use super::view::View;
 use crate::config::Settings;
 use crate::gcode::command::Stop;
-use crate::gcode::usual::Writer;
+use crate::gcode::fast_path::Writer;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::event::{
     Event, is_unheard, is_wanted, set_asked, wake_after, wake_after_transmitted,
@@ -55,7 +55,7 @@ const ECHO: usize = 62;
 const STEPS: u8 = 8;
 /// Most steps in a turn in which a millisecond has ended.
 const STEPS_LATE: u8 = 5;
-/// Usual lines that are done with before others have their turn.
+/// Lines of the fast path that are answered before others have their turn.
 const IN_A_ROW: u8 = 4;
 /// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
@@ -110,8 +110,8 @@ enum Progress {
 /// What has been done at once.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
-    /// A usual line.
-    Usual,
+    /// A line of the fast path.
+    FastPath,
     /// Something else; there may be more.
     More,
     /// Nothing has been done.
@@ -160,7 +160,7 @@ pub fn run(
                 yield_now().await;
             }
             match parser.turn() {
-                Turn::Usual => in_a_row += 1,
+                Turn::FastPath => in_a_row += 1,
                 // The reader has its turn, and stops the sender in time.
                 Turn::More => yield_now().await,
                 Turn::Nothing => parser.wait().await,
@@ -182,12 +182,12 @@ impl Parser {
         // What a port is told at once goes first: an acknowledgement is not to wait for a move.
         let tells = links.ports.iter().any(Port::tells);
         let tried = match data && straight && !tells && self.is_idle() {
-            true => usual(links),
-            false => Usual::NotTried,
+            true => fast_path(links),
+            false => FastPath::NotTried,
         };
-        if tried == Usual::Done {
+        if tried == FastPath::Done {
             let more = self.hand_over() || self.has_more();
-            return if more { Turn::Usual } else { Turn::Nothing };
+            return if more { Turn::FastPath } else { Turn::Nothing };
         }
         self.lacking = 0;
         if self.has_work() && self.go_on() {
@@ -243,7 +243,7 @@ impl Parser {
         matches!(feeder, Some(Session::Idle))
     }
 
-    /// Has the planner carry out the move of a usual line, at once if that can be and no real-time character waits. Whether it has, and the next line
+    /// Has the planner carry out the move of a line of the fast path, at once if that can be and no real-time character waits. Whether it has, and the next line
     /// may be taken.
     #[inline(always)]
     fn hand_over(&self) -> bool {
@@ -269,7 +269,7 @@ impl Parser {
             || self.links.rate.get().is_some()
     }
 
-    /// Whether there is anything to do before the planner has taken up the move of a usual line.
+    /// Whether there is anything to do before the planner has taken up the move of a line of the fast path.
     #[inline(always)]
     fn has_more(&self) -> bool {
         let feeder = self.links.feeder.get();
@@ -427,7 +427,7 @@ impl Parser {
 
     /// Takes a line: most are answered to the end at once.
     #[inline(never)]
-    fn take(&mut self, chosen: Chosen, tried: Usual) {
+    fn take(&mut self, chosen: Chosen, tried: FastPath) {
         let (links, awaited) = (self.links, self.is_awaited(chosen.port.number));
         let Some(session) = self.sessions.get_mut(usize::from(chosen.port.number)) else { return };
         match begin(links, &chosen, tried, session) {
@@ -685,7 +685,7 @@ fn job_line(links: &Links) {
     if !job.next_line(&Eeprom::take(), &mut line) {
         job.end();
     } else {
-        match interpret(links, &line, Usual::NotTried).0 {
+        match interpret(links, &line, FastPath::NotTried).0 {
             Status::Again => return,
             status if startup.is_some() => {
                 if !line.is_empty() {
@@ -704,22 +704,22 @@ fn job_line(links: &Links) {
     links.reporter_wake.signal();
 }
 
-/// Whether the next line was a usual one.
+/// Whether the next line was one for the fast path.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Usual {
-    /// The line was a usual one, and has been answered.
+pub(super) enum FastPath {
+    /// The line was one for the fast path, and has been answered.
     Done,
-    /// The line is no usual one.
+    /// The line is not for the fast path.
     No,
     /// The line has not been looked at.
     NotTried,
 }
 
-/// Does all there is to do for a usual line: a move that is answered with a brief response. Nothing is
+/// Does all there is to do for a line of the fast path: a move that is answered with a brief response. Nothing is
 /// done if the next line is none, or if it has to wait for room to transmit. What the others do in
 /// four steps and with a [`Request`], in half the time.
 #[inline(never)]
-fn usual(links: &Links) -> Usual {
+fn fast_path(links: &Links) -> FastPath {
     let port = links.feeder();
     let (mut speech, settings) = (port.speech.get(), links.settings.borrow());
     let prints = is_printing(port, &settings);
@@ -727,21 +727,21 @@ fn usual(links: &Links) -> Usual {
         _ if prints => Writer::Prints,
         Some(true) => Writer::Numbers,
         Some(false) => Writer::Plain,
-        None => return Usual::NotTried,
+        None => return FastPath::NotTried,
     };
-    let Ok(mut tx) = port.tx.try_lock() else { return Usual::NotTried };
+    let Ok(mut tx) = port.tx.try_lock() else { return FastPath::NotTried };
     let mut lines = port.lines.borrow_mut();
-    let Some(mut line) = lines.oldest() else { return Usual::NotTried };
+    let Some(mut line) = lines.oldest() else { return FastPath::NotTried };
     if !tx.has_room() || settings.echo() || port.is_resetting() {
-        return Usual::NotTried;
+        return FastPath::NotTried;
     }
     if prints {
-        let Some(block) = speech.usual(line) else { return Usual::NotTried };
+        let Some(block) = speech.fast_path(line) else { return FastPath::NotTried };
         line = block.of(line);
     }
     let mut commands = links.commands.borrow_mut();
-    if !links.model.borrow_mut().usual(line, writer, &*settings, &mut commands) {
-        return Usual::No;
+    if !links.model.borrow_mut().fast_path(line, writer, &*settings, &mut commands) {
+        return FastPath::No;
     }
     if prints {
         port.speech.set(speech);
@@ -752,7 +752,7 @@ fn usual(links: &Links) -> Usual {
     lines.remove_oldest();
     links.pool_space.signal();
     links.reporter_wake.signal();
-    Usual::Done
+    FastPath::Done
 }
 
 /// Whether the lines of a port are a printing host's, whose extruder is known to be one.
@@ -776,7 +776,7 @@ enum Begun {
 /// Begins with a line. One of G-code has run after that, for data lines are taken only while the
 /// planner is free.
 #[inline(never)]
-fn begin(links: &Links, chosen: &Chosen, tried: Usual, session: &mut Session) -> Begun {
+fn begin(links: &Links, chosen: &Chosen, tried: FastPath, session: &mut Session) -> Begun {
     let Chosen { port, id, class } = *chosen;
     let lines = port.lines.borrow();
     let (line, length) = (lines.text(id), lines.length(id));
@@ -883,7 +883,7 @@ fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Reques
     if links.may_feed(port) && !is_free(links) {
         return false;
     }
-    let (status, commented) = run_block(links, port, block.of(lines.text(id)), Usual::NotTried);
+    let (status, commented) = run_block(links, port, block.of(lines.text(id)), FastPath::NotTried);
     if status == Status::Again {
         return false;
     }
@@ -910,7 +910,12 @@ fn step(links: &Links, port: &Port, id: LineId, request: &mut Request, tx: &mut 
 
 /// Interprets a block of a port's, if that feeds the machine.
 #[inline(never)]
-pub(super) fn run_block(links: &Links, port: &Port, block: &[u8], tried: Usual) -> (Status, bool) {
+pub(super) fn run_block(
+    links: &Links,
+    port: &Port,
+    block: &[u8],
+    tried: FastPath,
+) -> (Status, bool) {
     match links.may_feed(port) {
         #[cfg(feature = "dialect-reprap")]
         true if port.is_plain() => interpret_rewritten(links, port, block),
@@ -934,7 +939,7 @@ fn interpret_rewritten(links: &Links, port: &Port, block: &[u8]) -> (Status, boo
     }
     drop(model);
     let done = match port.speech.get().rewrite(block, &mut text) {
-        Ok(block) => interpret(links, block, Usual::NotTried),
+        Ok(block) => interpret(links, block, FastPath::NotTried),
         Err(status) => (status, true),
     };
     if done.0 != Status::Again {
@@ -959,14 +964,14 @@ fn move_back(links: &Links) -> Status {
 /// Ends the program, as M2 does, for one that has been killed, or reset. The planner is free.
 pub fn end_program(links: &Links, resets: bool) {
     // It is never refused, not in an alarm either, and changes no table.
-    let _ = carry_out(links, b"M2", Usual::NotTried);
+    let _ = carry_out(links, b"M2", FastPath::NotTried);
     if resets {
         links.model.borrow_mut().reset();
     }
 }
 
 /// Refuses a block in an alarm, unless it ends that, and else carries it out.
-fn interpret(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
+fn interpret(links: &Links, block: &[u8], tried: FastPath) -> (Status, bool) {
     let alarm = machine::alarm();
     if alarm != Alarm::None {
         if !(alarm.ends_with_program() && is_program_end(block)) {
@@ -1000,7 +1005,7 @@ fn enter(jogs: bool) {
 /// Interprets a block and hands its commands to the planner, but in check mode. Returns also whether it may have a
 /// comment.
 #[inline(never)]
-fn carry_out(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
+fn carry_out(links: &Links, block: &[u8], tried: FastPath) -> (Status, bool) {
     let words = jog(block);
     let waits = || machine::is_held() || (machine::cycle() != Cycle::Jog && is_working(links));
     if words.is_some() && waits() {
@@ -1013,7 +1018,7 @@ fn carry_out(links: &Links, block: &[u8], tried: Usual) -> (Status, bool) {
     let done = match (words, tried) {
         (Some(words), _) => model.jog(words, &*settings, &mut commands),
         // No need to look twice.
-        (None, Usual::No) => model.general(block, &*settings, &mut commands),
+        (None, FastPath::No) => model.slow_path(block, &*settings, &mut commands),
         _ => model.interpret(block, &*settings, &mut commands),
     };
     match done {

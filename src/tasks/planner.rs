@@ -47,9 +47,9 @@ use crate::jobs::Job;
 use crate::machine::{self, Cycle};
 #[cfg(feature = "printer")]
 use crate::motion::advance::Lead;
-use crate::motion::block::{Action, Block, Line as Move, Outputs};
+use crate::motion::block::{Block, Line as Move, Outputs, QueuedAction};
 use crate::motion::chain::Chain;
-use crate::motion::dynamics::{Dynamics, Machine};
+use crate::motion::dynamics::{Dynamics, MachineLimits};
 use crate::motion::line::{Builder, Built, Line};
 use crate::motion::pace::Drivers;
 use crate::motion::queue::{self, BlockQueue, CAPACITY};
@@ -88,7 +88,7 @@ pub struct Planner {
     /// Chains in a row that nothing went on with.
     alone: u8,
     /// What is told before anything else of the line.
-    news: News,
+    announcement: Announcement,
 }
 
 /// What a line has left to be done.
@@ -105,7 +105,7 @@ enum Begun {
 
 /// What has changed beside the line.
 #[derive(Clone, Copy, PartialEq)]
-enum News {
+enum Announcement {
     /// Nothing has changed.
     None,
     /// What steps mean: they are counted anew.
@@ -255,7 +255,7 @@ impl Planner {
             begun: Begun::Nothing,
             waits_since: 0,
             alone: 0,
-            news: News::None,
+            announcement: Announcement::None,
         }
     }
 
@@ -330,12 +330,12 @@ impl Planner {
             self.dynamics.set(&*self.links.settings.borrow());
             #[cfg(feature = "printer")]
             if self.wanted_lead() != self.lead {
-                self.news = News::Lead;
+                self.announcement = Announcement::Lead;
             }
         }
         self.outputs.on ^= self.links.changes.take_flipped();
         if self.links.changes.has(Changes::STEPS) {
-            self.news = News::Position;
+            self.announcement = Announcement::Position;
         }
     }
 
@@ -345,7 +345,7 @@ impl Planner {
         if self.is_flushed() {
             return Turn::Done;
         }
-        if self.news != News::None {
+        if self.announcement != Announcement::None {
             self.tell();
             return Turn::More;
         }
@@ -356,7 +356,7 @@ impl Planner {
         }
         if Capability::Lathe.is_built_in() && self.turns_otherwise(&commands.motion) {
             self.per_turn = !self.per_turn;
-            let block = Block::action(Action::PerTurn(self.per_turn), self.line);
+            let block = Block::action(QueuedAction::PerTurn(self.per_turn), self.line);
             let _ = self.queue.push_aside(block);
             self.announce();
             return Turn::More;
@@ -395,7 +395,7 @@ impl Planner {
                 }
             }
             Step::Arc => self.begin_arc(&commands.motion),
-            Step::Dwell(ms) => self.pause(Action::Dwell(*ms)),
+            Step::Dwell(ms) => self.pause(QueuedAction::Dwell(*ms)),
             Step::SetPosition(position) => self.set_position(position),
             Step::Override(change) => self.set_override(*change),
             Step::Spindle(spindle) => self.set_spindle(spindle),
@@ -410,12 +410,12 @@ impl Planner {
                 self.heat(&Heat::OFF);
                 self.steps.repeat();
             }
-            Step::Stop(Stop::End) => self.pause(Action::ProgramEnd),
+            Step::Stop(Stop::End) => self.pause(QueuedAction::ProgramEnd),
             Step::Stop(_) | Step::Tool(_) => {
                 let waits = self.links.settings.borrow().waits_at_stop();
                 // A tool is reported; a sender that changes it sees to the stop itself.
                 if waits || matches!(step, Step::Stop(_)) {
-                    self.pause(Action::ProgramStop);
+                    self.pause(QueuedAction::ProgramStop);
                 }
                 if waits {
                     return Turn::Pause;
@@ -519,21 +519,21 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn tell(&mut self) {
-        match self.news {
-            News::Position => {
+        match self.announcement {
+            Announcement::Position => {
                 let position = self.position;
                 self.set_position(&position);
-                self.news = News::Drivers;
+                self.announcement = Announcement::Drivers;
             }
-            News::Drivers => {
+            Announcement::Drivers => {
                 self.set_drivers();
                 self.links.changes.take(Changes::STEPS);
-                self.news = News::Lead;
+                self.announcement = Announcement::Lead;
             }
             _ => {
                 #[cfg(feature = "printer")]
                 self.set_lead();
-                self.news = News::None;
+                self.announcement = Announcement::None;
             }
         }
     }
@@ -549,10 +549,10 @@ impl Planner {
 
     /// Tells exec what the drivers ask for, if that has changed.
     fn set_drivers(&mut self) {
-        let drivers = Machine::drivers(&*self.links.settings.borrow());
+        let drivers = MachineLimits::drivers(&*self.links.settings.borrow());
         if drivers != self.drivers {
             self.drivers = drivers;
-            self.push(Block::action(Action::Drivers(drivers), self.line));
+            self.push(Block::action(QueuedAction::Drivers(drivers), self.line));
         }
     }
 
@@ -566,7 +566,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn set_override(&mut self, change: Change) {
-        let block = Block::action(Action::Override(change), self.line);
+        let block = Block::action(QueuedAction::Override(change), self.line);
         let _ = self.queue.push_aside(block);
         self.announce();
     }
@@ -574,7 +574,7 @@ impl Planner {
     /// Something that is done at rest.
     #[inline(never)]
     #[small]
-    fn pause(&mut self, action: Action) {
+    fn pause(&mut self, action: QueuedAction) {
         let block = self.builder.pause(action, self.line);
         self.push(block);
     }
@@ -628,7 +628,11 @@ impl Planner {
             let motion = common::snapshot(links.thread);
             self.relocate(&motion);
             // The line that was dropped may have been to tell of it.
-            self.news = if Capability::Printer.is_built_in() { News::Lead } else { News::None };
+            self.announcement = if Capability::Printer.is_built_in() {
+                Announcement::Lead
+            } else {
+                Announcement::None
+            };
             let spindle = Spindle { turn: outputs::turn(motion.outputs), speed: motion.speed };
             let coolant = super::spindle::coolant(motion.outputs);
             links.changes.take_flipped();
@@ -658,14 +662,14 @@ impl Planner {
             links.except(Status::KillJob);
         }
         links.notices.flushed.set(ended && !machine::is_alarmed());
-        links.reporter_wake.urge();
+        links.reporter_wake.notify_now();
         killed
     }
 
     /// Says what the machine does besides carrying out lines.
     fn enter(&self, cycle: machine::Event) {
         machine::carry_out(cycle);
-        self.links.reporter_wake.urge();
+        self.links.reporter_wake.notify_now();
     }
 
     /// Tells the others that a block has been queued.

@@ -258,7 +258,7 @@ impl<const N: usize> Intake<N> {
             }
             self.port.cut.set(None);
             // A greeting may wait for that.
-            links.reporter_wake.urge();
+            links.reporter_wake.notify_now();
         }
         cuts
     }

@@ -13,7 +13,7 @@ use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::hal::{encoder, inputs as pins};
 use crate::kinematics::{self, DIFFERENCE, SUM};
-use crate::motion::dynamics::Machine;
+use crate::motion::dynamics::MachineLimits;
 use crate::motion::line::Motors;
 use crate::motion::pace::Drivers;
 use crate::status::Status;
@@ -172,7 +172,7 @@ impl Motors for Settings {
     }
 }
 
-impl Machine for Settings {
+impl MachineLimits for Settings {
     fn velocity_max(&self, axis: usize) -> f32 {
         Settings::velocity_max(self, axis)
     }

@@ -16,7 +16,7 @@ use super::links::Links;
 use super::ports::COURTESY;
 use super::wake::Wake;
 use crate::config::Setting;
-use crate::gcode::tables::{Edit, Row, Tables};
+use crate::gcode::tables::{Edit, TableRow, Tables};
 use crate::hal::after_ms;
 use crate::hal::eeprom::Eeprom;
 use crate::machine;
@@ -111,7 +111,7 @@ impl Storage {
 
     /// A value of a row. Cost as of [`Tables::row`].
     #[inline(never)]
-    pub fn value(&self, row: Row, axis: u8) -> Length {
+    pub fn value(&self, row: TableRow, axis: u8) -> Length {
         match self.edit.get() {
             Some(edit) if edit.row == row => {
                 edit.values.get(usize::from(axis)).copied().unwrap_or_default()
@@ -207,7 +207,7 @@ impl Storage {
 #[small]
 impl Tables for &Storage {
     #[inline(never)]
-    fn row(&self, row: Row) -> PerAxis<Length> {
+    fn row(&self, row: TableRow) -> PerAxis<Length> {
         match self.edit.get() {
             Some(edit) if edit.row == row => edit.values,
             _ => tables::row(&self.log.get(), &Eeprom::take(), row),
@@ -215,12 +215,12 @@ impl Tables for &Storage {
     }
 
     #[inline(never)]
-    fn is_stored(&self, row: Row) -> bool {
+    fn is_stored(&self, row: TableRow) -> bool {
         let comes = self.edit.get().is_some_and(|edit| edit.row == row);
         comes || tables::is_stored(&self.log.get(), &Eeprom::take(), row)
     }
 
-    fn takes(&self, row: Row) -> bool {
+    fn takes(&self, row: TableRow) -> bool {
         // The same row has only to be written once more.
         let takes = self.edit.get().is_none_or(|edit| edit.row == row);
         self.awaited.set(!takes);

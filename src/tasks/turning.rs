@@ -64,7 +64,7 @@ pub fn look(links: &Links) {
     }
     let first_misfit = common::with(links.thread, |common| {
         // In here: exec must not have looked at newer ones. In a pass it is exec that finds a misfit.
-        common.encoder.look(&encoder::read());
+        common.encoder.sample(&encoder::read());
         common.encoder.take_misfit()
     });
     // Who waits for the spindle asks again.

@@ -36,7 +36,7 @@ use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::overrides::Change;
 use crate::gcode::printing::EXTRUDER;
 use crate::gcode::setup::{AxisMode, Setup};
-use crate::gcode::tables::Row;
+use crate::gcode::tables::TableRow;
 use crate::hal::Thread;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::event::Event;
@@ -344,7 +344,7 @@ impl Machine for View<'_> {
         if is_machine {
             self.settings.take_over(value as u8);
         }
-        let drivers = dynamics::Machine::drivers(&*self.settings);
+        let drivers = dynamics::MachineLimits::drivers(&*self.settings);
         let rate = |motors| drivers.step_rate_max(motors) as u32;
         let lowered = self.settings.limit_velocity(setting, rate);
         self.links.changes.note(Changes::SETTINGS);
@@ -359,7 +359,7 @@ impl Machine for View<'_> {
         })
     }
 
-    fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {
+    fn set_row(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status> {
         self.may_set()?;
         self.links.model.borrow_mut().set(row, axis, value)
     }
@@ -399,7 +399,7 @@ impl Machine for View<'_> {
             Value::Shift(axis) => {
                 self.links.model.borrow().shift().get(usize::from(axis)).map_or(0, |shift| shift.0)
             }
-            Value::Row(row, axis) => self.links.storage.value(row, axis).0,
+            Value::TableRow(row, axis) => self.links.storage.value(row, axis).0,
             Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
             Value::Target(axis) => {
                 self.links.model.borrow().position().get(usize::from(axis)).map_or(0, |at| at.0)

@@ -48,12 +48,12 @@ impl Wake {
 
 /// Wakes the reporter, unless it looks every few milliseconds anyway and nobody asked for more.
 #[derive(Default)]
-pub struct News {
+pub struct ReporterWake {
     wake: Wake,
     polling: Cell<bool>,
 }
 
-impl News {
+impl ReporterWake {
     /// Something that reports show may have changed.
     pub fn signal(&self) {
         if !self.polling.get() {
@@ -62,7 +62,7 @@ impl News {
     }
 
     /// Something that must not wait.
-    pub fn urge(&self) {
+    pub fn notify_now(&self) {
         self.wake.signal();
     }
 
@@ -99,11 +99,11 @@ mod tests {
 
     #[test]
     fn a_polling_reporter_is_not_woken() {
-        let news = News::default();
+        let news = ReporterWake::default();
         news.set_polling(true);
         news.signal();
         assert!(!is_ready(&news.wake));
-        news.urge();
+        news.notify_now();
         assert!(is_ready(&news.wake));
         news.set_polling(false);
         news.signal();

@@ -4,7 +4,7 @@ use kerf::motion::block::{Body, Line};
 use kerf::motion::exec::{SEGMENT_S, Step};
 use kerf::motion::factors::Factors;
 use kerf::motion::governor::{Ahead, Governor, Stretch};
-use kerf::motion::queue::{Anchor, BlockSource};
+use kerf::motion::queue::{BlockSource, Constraint};
 use kerf::units::{Length, PerAxis};
 use proptest::prelude::*;
 
@@ -193,12 +193,12 @@ pub fn plan_changed(
             }
             governor.look_again();
         }
-        struct View<'a>(f32, &'a BlockSource);
-        impl Ahead for View<'_> {
+        struct QueueView<'a>(f32, &'a BlockSource);
+        impl Ahead for QueueView<'_> {
             fn headroom(&self) -> f32 {
                 self.0
             }
-            fn slower(&self, n: u8, velocity: kerf::motion::short::Short) -> (u8, Anchor) {
+            fn slower(&self, n: u8, velocity: kerf::motion::short::Short) -> (u8, Constraint) {
                 self.1.slower(n, velocity)
             }
             fn end(&self) -> f32 {
@@ -206,7 +206,7 @@ pub fn plan_changed(
             }
         }
         let cruise = rig.source.cruise();
-        let view = View(rig.source.headroom(), &rig.source);
+        let view = QueueView(rig.source.headroom(), &rig.source);
         let before = governor.velocity().into();
         let mut hold = held(planned.len(), governor.is_at_rest());
         while hold && governor.is_at_rest() {

@@ -181,7 +181,7 @@ const SENDERS: [Sender; 8] = [
 ];
 
 /// A conversation.
-struct Talk<S> {
+struct Session<S> {
     side: S,
     heard: String,
     /// The other port is told reports.
@@ -191,7 +191,7 @@ struct Talk<S> {
     known: Vec<Regex>,
 }
 
-impl<S: Side> Talk<S> {
+impl<S: Side> Session<S> {
     fn run(&mut self) {
         self.side.run_ms(1);
         self.heard += &String::from_utf8_lossy(&self.side.heard());
@@ -245,13 +245,13 @@ pub fn all<S: Side>(boot: impl Fn(u8) -> S + Sync) {
         for sender in &SENDERS {
             let play = || {
                 let side = boot(dia);
-                let mut talk =
-                    Talk { side, heard: String::new(), aside, json: dia == 0, known: known() };
+                let mut session =
+                    Session { side, heard: String::new(), aside, json: dia == 0, known: known() };
                 if aside {
-                    talk.side.send_aux(b"{sr:{posx:t,posy:t,posz:t,vel:t,feed:t,stat:t,line:t,unit:t,coor:t,dist:t}}\n{sv:2}\n{si:100}\n");
-                    (0..400).for_each(|_| talk.run());
+                    session.side.send_aux(b"{sr:{posx:t,posy:t,posz:t,vel:t,feed:t,stat:t,line:t,unit:t,coor:t,dist:t}}\n{sv:2}\n{si:100}\n");
+                    (0..400).for_each(|_| session.run());
                 }
-                sender.steps.iter().try_for_each(|step| talk.play(step))
+                sender.steps.iter().try_for_each(|step| session.play(step))
             };
             let played = thread::scope(|scope| scope.spawn(play).join());
             match played {

@@ -8,7 +8,7 @@ use kerf::gcode::command::Feed;
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf::kinematics::{self, DIFFERENCE, SUM};
 use kerf::motion::block::{Block, Line as Move};
-use kerf::motion::dynamics::{Dynamics, Machine};
+use kerf::motion::dynamics::{Dynamics, MachineLimits};
 use kerf::motion::exec::{Exec, Step};
 use kerf::motion::factors::Factors;
 use kerf::motion::line::{Builder, Built, Line, Motors};
@@ -55,7 +55,7 @@ impl Config {
     }
 }
 
-impl Machine for Config {
+impl MachineLimits for Config {
     fn velocity_max(&self, axis: usize) -> f32 {
         self.velocity[axis] * 60.0
     }

@@ -27,7 +27,7 @@ fn list(items: impl Iterator<Item = String>) -> String {
 /// `{"version":..,"board":..,"machines":[{"name":..,"about":..}],"codes":[{"code":..,"text":..,"cause":..,"cure":..}]}`: machines by their
 /// numbers, codes of the statuses that a sender may see.
 pub fn json() -> String {
-    let machine = |machine: &&machines::Machine| {
+    let machine = |machine: &&machines::MachineProfile| {
         format!("{{\"name\":{},\"about\":{}}}", quoted(machine.name), quoted(machine.about))
     };
     let code = |status| {

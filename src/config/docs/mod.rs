@@ -8,7 +8,7 @@ use super::groups::{
     Meaning, axis, bed, coolant, hot_end, job, motor, pwm, spindle, squaring, system, user,
 };
 use super::name::token;
-use super::table::{CLAMP, HOMING, IDLE, JERK, Kind, MODE, RADIUS, Row};
+use super::table::{CLAMP, HOMING, IDLE, JERK, Kind, MODE, RADIUS, SettingRow};
 use super::{Digits, Fixed, Name, Owner, Setting, Words, machines};
 use crate::progmem::Text;
 
@@ -217,7 +217,7 @@ fn line(owners: &[Owner], row: u8, meaning: &Meaning) -> String {
     format!("| {} |\n", fields.join(" | "))
 }
 
-fn kind(row: &Row) -> &'static str {
+fn kind(row: &SettingRow) -> &'static str {
     match row.kind {
         Kind::Constant => "fixed",
         Kind::Text => "fixed text",
@@ -238,7 +238,7 @@ fn tail(words: &Words) -> (String, String) {
     (tail[..split].to_string(), tail[split..].to_string())
 }
 
-fn unit(owners: &[Owner], row: &Row, words: &Words) -> String {
+fn unit(owners: &[Owner], row: &SettingRow, words: &Words) -> String {
     // Text mode shows them as TinyG does.
     if row.is(RADIUS) {
         return "mm".to_string();
@@ -268,7 +268,7 @@ fn choices(words: &Words) -> String {
 }
 
 /// What holds beside the range.
-fn remarks(row: &Row) -> String {
+fn remarks(row: &SettingRow) -> String {
     let mut text = String::new();
     for (flag, remark) in [
         (CLAMP, "Out of range is the nearest that is not."),
@@ -291,7 +291,7 @@ fn number(value: i32, decimals: u8) -> String {
     if decimals == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_string() }
 }
 
-fn range(setting: Setting, row: &Row) -> String {
+fn range(setting: Setting, row: &SettingRow) -> String {
     let shown = |value| number(value, row.stored);
     match row.kind {
         Kind::Constant | Kind::Text => String::new(),

@@ -121,7 +121,7 @@ group! {
             "Emergency stop: none, one that closes when it is hit, or one that opens, as a broken wire does. It shuts the machine down: no step more, spindle and coolant off, motors keep their power until `mt` is over.";
         MCH "mch": int(0, machines::COUNT as i32 - 1).with(IDLE), 0,
             words(text!("machine"), text!(" [0=careful,1=router,2=mill,3=printer,4=lathe]")),
-            "Machine that was chosen last. Choosing one sets all settings of motors and axes, `ja`, `ct` and `gpl` to what they are on that machine: see Machines.";
+            "MachineProfile that was chosen last. Choosing one sets all settings of motors and axes, `ja`, `ct` and `gpl` to what they are on that machine: see Machines.";
         KERF "kerf": fixed_text(true), 0,
             bare(text!("Kerf version")),
             "Version of Kerf, which the greeting tells, too. `fb` and `fv` are the protocol's.";

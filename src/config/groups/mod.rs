@@ -50,7 +50,7 @@ macro_rules! group {
             /// How many rows there are.
             pub const COUNT: usize = [$($name),*].len();
             /// The rows.
-            pub const LIST: [Row; COUNT] = numbered([$(named($row, $name)),*]);
+            pub const LIST: [SettingRow; COUNT] = numbered([$(named($row, $name)),*]);
             /// Their defaults, scaled as kept, where no profile says otherwise.
             pub const PLAIN: [$value; COUNT] = [$($default),*];
             /// What they mean.
@@ -62,13 +62,13 @@ macro_rules! group {
             pub const LARGES: [usize; 2] = count(&LIST, Kind::Large);
 
             $(
-                #[doc = concat!("Where `", $name, "` is: see [`Row::slot`].")]
+                #[doc = concat!("Where `", $name, "` is: see [`SettingRow::slot`].")]
                 pub const $place: u8 = slot(&LIST, $name);
             )*
 
             crate::progmem! {
                 /// The rows.
-                pub static ROWS: [Row; COUNT] = LIST;
+                pub static ROWS: [SettingRow; COUNT] = LIST;
 
                 /// Their defaults, scaled as kept.
                 pub static DEFAULTS: [$value; COUNT] = $defaults;

@@ -2,10 +2,10 @@
 
 mod arcs;
 mod cycles;
+mod fast_path;
 mod lines;
 mod tables;
 mod threads;
-mod usual;
 
 use super::command::{Commands, Feed, Motion};
 use super::interpreter::Interpreter;

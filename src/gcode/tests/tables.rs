@@ -1,6 +1,6 @@
 //! Tables that are kept elsewhere, and slowly.
 
-use super::super::tables::{Edit, Ram, Row, Tables};
+use super::super::tables::{Edit, Ram, TableRow, Tables};
 use super::*;
 use crate::units::{Length, PerAxis};
 
@@ -8,14 +8,14 @@ use crate::units::{Length, PerAxis};
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Slow {
     kept: Ram,
-    on_its_way: Option<Row>,
+    on_its_way: Option<TableRow>,
 }
 
 impl Tables for Slow {
-    fn row(&self, row: Row) -> PerAxis<Length> {
+    fn row(&self, row: TableRow) -> PerAxis<Length> {
         self.kept.row(row)
     }
-    fn takes(&self, row: Row) -> bool {
+    fn takes(&self, row: TableRow) -> bool {
         self.on_its_way.is_none_or(|other| other == row)
     }
     fn apply(&mut self, edit: &Edit) {
@@ -54,10 +54,10 @@ fn the_system_in_force_is_known_without_the_tables() {
     #[derive(Clone, Copy)]
     struct Deaf;
     impl Tables for Deaf {
-        fn row(&self, row: Row) -> PerAxis<Length> {
+        fn row(&self, row: TableRow) -> PerAxis<Length> {
             panic!("asked for {row:?}")
         }
-        fn takes(&self, _row: Row) -> bool {
+        fn takes(&self, _row: TableRow) -> bool {
             true
         }
         fn apply(&mut self, _edit: &Edit) {}

@@ -2,16 +2,16 @@
 //!
 //! | interrupt | does | cycles |
 //! |---|---|---|
-//! | INT0 to INT7, PCINT0 to PCINT2 (`edges`) | starts the timer of the looks: someone has to look | 20, interrupts off |
+//! | INT0 to INT7, PCINT0 to PCINT2 (`edges`) | starts the timer of the samples: someone has to look | 20, interrupts off |
 //! | TIMER2_COMPA, of printers TIMER3_COMPA | looks at all pins, as [`Switches`] wants it | 300, interrupts off for 26 and 26 |
 //!
 //! The timer is timer 2, in an image that can print timer 3: timer 2 makes pulses for heaters then ([`heaters`](super::heaters)).
 //!
-//! While no switch moves none of them comes. The look lets all interrupts in but itself and exec, which would run
+//! While no switch moves none of them comes. The sampling interrupt lets all interrupts in but itself and exec, which would run
 //! far too long inside it. Where a limit is hit it stops the steps right there: 20 us after the edge and its own
 //! 300 cycles, for which it competes with the step interrupt. That is 50 us in all at 50,000 steps a second, and
 //! 120 at 85,000, which leave it a sixth of the CPU. The place of a probe's contact is that at the
-//! first of two looks, 20 us behind its edge at 10,000: a fifth of a step.
+//! first of two samples, 20 us behind its edge at 10,000: a fifth of a step.
 
 use core::arch::asm;
 use core::cell::UnsafeCell;
@@ -28,10 +28,10 @@ const _: () = {
     let looks = LOOKS as u8;
     assert!(
         ACTIVE.step_timer as u8 != looks && ACTIVE.tick_timer as u8 != looks,
-        "the timer of the looks at the switches is used twice"
+        "the timer of the samples at the switches is used twice"
     );
     if let Some(pwm) = ACTIVE.pwm {
-        assert!(pwm.timer as u8 != looks, "the timer of the looks at the switches is used twice");
+        assert!(pwm.timer as u8 != looks, "the timer of the samples at the switches is used twice");
     }
 };
 
@@ -113,7 +113,7 @@ macro_rules! each_input {
     )+};
 }
 
-/// What the looks know and are told.
+/// What sampling knows and is told.
 struct State {
     switches: Switches,
     /// Inputs that are read, as bits. The pins of the others belong to an encoder.
@@ -130,7 +130,7 @@ struct State {
     /// Inputs that end a move, and in `awaited` the state of each that ends it.
     armed: u16,
     awaited: u16,
-    /// The next look is to believe what it finds.
+    /// The next sample is to believe what it finds.
     fresh: bool,
 }
 
@@ -144,7 +144,7 @@ impl State {
 
 struct Shared(UnsafeCell<State>);
 
-// SAFETY: the look, which does not nest, and thread mode with interrupts off, see `with`.
+// SAFETY: the sampling interrupt, which does not nest, and thread mode with interrupts off, see `with`.
 unsafe impl Sync for Shared {}
 
 static STATE: Shared = Shared(UnsafeCell::new(State {
@@ -198,7 +198,7 @@ pub fn set_up(low: u16, stops: u16) {
     with(|state| {
         if state.low != low {
             (state.low, state.fresh) = (low, true);
-            // SAFETY: starts a look; one that is due does it all the same.
+            // SAFETY: starts a sample; one that is due does it all the same.
             unsafe { CONTROL_B.write_volatile(RUN) };
         }
     });
@@ -208,7 +208,7 @@ pub fn set_up(low: u16, stops: u16) {
 pub(super) fn leave_out(inputs: u16) {
     with(|state| {
         (state.used, state.fresh) = (!inputs, true);
-        // SAFETY: starts a look; one that is due does it all the same.
+        // SAFETY: starts a sample; one that is due does it all the same.
         unsafe { CONTROL_B.write_volatile(RUN) };
     });
 }
@@ -257,7 +257,7 @@ fn levels() -> u16 {
     u16::from_le_bytes(bytes)
 }
 
-/// Waits until [`SOON_US`] after the interrupt was due. A look so soon is not worth another interrupt.
+/// Waits until [`SOON_US`] after the interrupt was due. A sample so soon is not worth another interrupt.
 fn wait() {
     // SAFETY: the timer is this interrupt's; it counts from 0 since it was due.
     unsafe {
@@ -274,9 +274,9 @@ fn mark() {
     contact::mark(&dda, tail);
 }
 
-/// A look, or two.
-extern "C" fn look() {
-    // SAFETY: the look interrupt, which does not nest, runs this alone.
+/// A sample, or two.
+extern "C" fn sample() {
+    // SAFETY: the sampling interrupt, which does not nest, runs this alone.
     let state = unsafe { &mut *STATE.0.get() };
     let mut now = state.found();
     if core::mem::replace(&mut state.fresh, false) {
@@ -296,7 +296,7 @@ extern "C" fn look() {
             stepper::stop();
         }
     }
-    let (changed, next) = state.switches.look(now);
+    let (changed, next) = state.switches.sample(now);
     if changed != 0 {
         let hits = changed & now & state.live;
         if hits != 0 {
@@ -312,14 +312,14 @@ extern "C" fn look() {
     plan(next);
     // An edge before the timer stood still has started nothing.
     if next == Next::Edge && state.found() != now {
-        // SAFETY: starts a look.
+        // SAFETY: starts a sample.
         unsafe { CONTROL_B.write_volatile(RUN) };
     }
 }
 
-/// Sets the timer for the next look.
+/// Sets the timer for the next sample.
 fn plan(next: Next) {
-    // SAFETY: these registers are the look's, but for starts.
+    // SAFETY: these registers belong to the sampling interrupt, but for starts.
     unsafe {
         if next == Next::Edge {
             CONTROL_B.write_volatile(0);
@@ -335,7 +335,7 @@ fn plan(next: Next) {
     }
 }
 
-/// TIMER2_COMPA or TIMER3_COMPA: runs a look, with interrupts on and exec held off.
+/// TIMER2_COMPA or TIMER3_COMPA: runs a sample, with interrupts on and exec held off.
 #[cfg_attr(not(feature = "printer"), unsafe(export_name = "__vector_13"))]
 #[cfg_attr(feature = "printer", unsafe(export_name = "__vector_32"))]
 extern "C" fn look_is_due() -> ! {
@@ -368,7 +368,7 @@ extern "C" fn look_is_due() -> ! {
             "push r30",
             "push r31",
             "clr  r1",
-            "call {look}",
+            "call {sample}",
             "pop  r31",
             "pop  r30",
             "pop  r27",
@@ -382,7 +382,7 @@ extern "C" fn look_is_due() -> ! {
             "pop  r1",
             "pop  r0",
             "pop  r25",
-            // Lets exec in again if it was not closed before. Not before looks may come again: it
+            // Lets exec in again if it was not closed before. Not before samples may come again: it
             // runs for milliseconds.
             "ldi  r24, {unmask}",
             "tst  r25",
@@ -414,7 +414,7 @@ extern "C" fn look_is_due() -> ! {
             pended = const assembly::PENDED,
             mask = const MASK,
             unmask = const OCIE,
-            look = sym look,
+            sample = sym sample,
             options(noreturn),
         );
     }

@@ -148,7 +148,7 @@ pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     RUNNING.set(0);
 }
 
-/// Where the generator is right now, between two ticks, and the slot of its segment. For the look interrupt, which
+/// Where the generator is right now, between two ticks, and the slot of its segment. For the sampling interrupt, which
 /// holds exec off.
 pub fn moment() -> (Dda, u8) {
     let mut dda = Dda::new();

@@ -19,7 +19,7 @@ struct Inputs {
     hits: Cell<u16>,
     armed: Cell<(u16, u16)>,
     fresh: Cell<bool>,
-    next_look: Cell<u64>,
+    next_sample: Cell<u64>,
 }
 
 machine_static! {
@@ -33,7 +33,7 @@ machine_static! {
         hits: Cell::new(0),
         armed: Cell::new((0, 0)),
         fresh: Cell::new(true),
-        next_look: Cell::new(now() + cycles(LATER_US)),
+        next_sample: Cell::new(now() + cycles(LATER_US)),
     };
 }
 
@@ -101,18 +101,18 @@ pub(super) fn set(input: usize, high: bool) {
 
 /// An edge, or what is to be looked at like one.
 fn edge() {
-    if all().next_look.get() == NEVER {
-        all().next_look.set(now() + cycles(FIRST_US));
+    if all().next_sample.get() == NEVER {
+        all().next_sample.set(now() + cycles(FIRST_US));
     }
 }
 
-/// When the next look is due.
-pub(super) fn next_look() -> u64 {
-    all().next_look.get()
+/// When the next sample is due.
+pub(super) fn next_sample() -> u64 {
+    all().next_sample.get()
 }
 
-/// A look, at its time.
-pub(super) fn look() {
+/// A sample, at its time.
+pub(super) fn sample() {
     let wired = (0..inputs::COUNT).filter(|i| ACTIVE.inputs[*i].is_some());
     let wired = wired.fold(0, |bits, i| bits | 1 << i);
     let i = all();
@@ -122,7 +122,7 @@ pub(super) fn look() {
         switches.adopt(found);
         flags::set(Event::Realtime);
     }
-    let (changed, next) = switches.look(found);
+    let (changed, next) = switches.sample(found);
     if changed != 0 {
         let hits = changed & found & i.stops.get() & !u16::from(i.spared.get());
         if hits != 0 {
@@ -138,7 +138,7 @@ pub(super) fn look() {
         }
         flags::set(Event::Realtime);
     }
-    i.next_look.set(match next {
+    i.next_sample.set(match next {
         Next::Edge => NEVER,
         Next::Soon => now() + cycles(SOON_US),
         Next::Later => now() + cycles(LATER_US),

@@ -125,9 +125,9 @@ impl Machine {
         let step = stepper::next_tick();
         let bytes = uart::next_event();
         let tick = time::next_tick();
-        let look = inputs::next_look();
+        let sample = inputs::next_sample();
         let edge = encoder::next_edge();
-        let next = step.min(bytes).min(tick).min(look).min(edge);
+        let next = step.min(bytes).min(tick).min(sample).min(edge);
         if next > end {
             clock().set(end);
             return false;
@@ -142,8 +142,8 @@ impl Machine {
         if tick == next {
             time::tick();
         }
-        if look == next {
-            inputs::look();
+        if sample == next {
+            inputs::sample();
         }
         if edge == next {
             encoder::advance();

@@ -2,11 +2,11 @@
 //!
 //! | interrupt | does |
 //! |---|---|
-//! | IO_IRQ_BANK0, priority 0 | an edge: a look is due in a microsecond; edges of the encoder |
-//! | TIMER_IRQ_1, priority 0 | a look at all pins, as [`Switches`] wants it |
+//! | IO_IRQ_BANK0, priority 0 | an edge: a sample is due in a microsecond; edges of the encoder |
+//! | TIMER_IRQ_1, priority 0 | a sample of all pins, as [`Switches`] wants it |
 //!
-//! While no switch moves none of them comes. A limit stops the steps right there, 18 us after its edge at most, of which 11 pass between the edge and the second look. The place of a contact is where the
-//! generator's words were at the first of two looks; the feeder works it out ([`stepper::contact`]).
+//! While no switch moves none of them comes. A limit stops the steps right there, 18 us after its edge at most, of which 11 pass between the edge and the second sample. The place of a contact is where the
+//! generator's words were at the first of two samples; the feeder works it out ([`stepper::contact`]).
 
 use core::cell::UnsafeCell;
 
@@ -20,14 +20,14 @@ use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
 
-/// The alarm of the looks.
+/// The alarm of the samples.
 const ALARM: usize = 1;
 /// An alarm that is due at once is missed if the time has passed before it is set.
 const SOONEST_US: u32 = 2;
 /// Edges of a pin among its four events: low and high edge.
 const EDGES: u32 = 0b1100;
 
-/// What the looks know and are told.
+/// What sampling knows and is told.
 struct State {
     switches: Switches,
     /// Those that are looked at: the pins of the others are an encoder's.
@@ -43,11 +43,11 @@ struct State {
     /// Those that end a move, and what they must be for it.
     armed: u16,
     awaited: u16,
-    /// Where the generator was at the first of two looks.
+    /// Where the generator was at the first of two samples.
     place: Place,
-    /// The next look is to believe what it finds.
+    /// The next sample is to believe what it finds.
     fresh: bool,
-    /// A look is due.
+    /// A sample is due.
     due: bool,
 }
 
@@ -148,14 +148,14 @@ pub(super) extern "C" fn edges() {
     }
 }
 
-/// A look.
+/// A sample.
 #[interrupt]
 fn TIMER_IRQ_1() {
     TIMER.intr().write(|w| w.set_alarm(ALARM, true));
-    with(look);
+    with(sample);
 }
 
-fn look(state: &mut State) {
+fn sample(state: &mut State) {
     state.due = false;
     let now = state.found();
     if core::mem::replace(&mut state.fresh, false) {
@@ -165,7 +165,7 @@ fn look(state: &mut State) {
     if state.armed != 0 && state.switches.changed(now) == 0 && state.switches.is_news(now) {
         state.place = stepper::place();
     }
-    let (changed, next) = state.switches.look(now);
+    let (changed, next) = state.switches.sample(now);
     if changed != 0 {
         let hits = changed & now & state.stops & !u16::from(state.spared);
         if hits != 0 {
@@ -178,7 +178,7 @@ fn look(state: &mut State) {
         flags::set(Event::Realtime);
     }
     match next {
-        // An edge that came before this look has been seen by it; one that comes later asks again.
+        // An edge that came before this sample has been seen by it; one that comes later asks again.
         Next::Edge if state.found() == now => {}
         Next::Edge => state.ask(),
         Next::Soon => state.plan(SOON_US),

@@ -5,7 +5,7 @@
 use super::settings;
 use super::write::{close, int, length, line_end, message, text};
 use crate::capability::Capability;
-use crate::gcode::tables::Row;
+use crate::gcode::tables::TableRow;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::protocol::{Machine, Out, Value};
@@ -30,8 +30,8 @@ progmem! {
 #[small]
 fn offset(row: u8, axis: u8) -> Value {
     match row {
-        0..=5 => Value::Row(Row::system(row), axis),
-        6 | 7 => Value::Row(Row::stored(row - 6), axis),
+        0..=5 => Value::TableRow(TableRow::system(row), axis),
+        6 | 7 => Value::TableRow(TableRow::stored(row - 6), axis),
         8 => Value::Shift(axis),
         TOOL => Value::ToolOffset(2),
         _ => Value::Probed(axis),

@@ -11,7 +11,7 @@ use super::{lists, settings};
 use crate::capability::Capability;
 use crate::config::Fixed;
 use crate::gcode::modal::MotionMode;
-use crate::gcode::tables::{Row, SYSTEMS};
+use crate::gcode::tables::{SYSTEMS, TableRow};
 use crate::machine::alarm::is_program_end;
 use crate::machine::{Alarm, Cycle, Doing};
 use crate::protocol::{Answers, Machine, Next, Out, STARTUP_MAX, Span, Store, Value};
@@ -498,7 +498,7 @@ fn restore(at: u8, letter: u8, machine: &mut impl Machine, out: &mut impl Out) -
             if row >= SYSTEMS {
                 return Step::Later(if letter == b'*' { SETTINGS } else { STORES });
             }
-            match machine.set_row(Row::system(row), axis, Length::ZERO) {
+            match machine.set_row(TableRow::system(row), axis, Length::ZERO) {
                 Ok(()) => Step::Later(at + 1),
                 Err(Status::Again) => Step::Later(at),
                 Err(status) => Step::Error(error_number(status)),

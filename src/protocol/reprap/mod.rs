@@ -19,7 +19,7 @@
 //!
 //! A line is answered in its order, when the planner has taken what it asks for. M105, M108, M112 and M114 overtake where they have no line number;
 //! M108 and M112 overtake with one, too. A damaged line is never carried out: its sender is asked to send it again. A step
-//! costs at most 15,000 cycles, with a setting that is in EEPROM 3 ms. Nothing here can be full. A plain move takes none of these steps: [`frame::usual`] looks at its number and
+//! costs at most 15,000 cycles, with a setting that is in EEPROM 3 ms. Nothing here can be full. A plain move takes none of these steps: [`frame::fast_path`] looks at its number and
 //! checksum, and the interpreter reads it as it is.
 
 mod card;
@@ -126,15 +126,15 @@ impl Dialect for RepRap {
         Telling::begin(notice, machine)
     }
 
-    /// None: [`Dialect::usual`] looks through a line for its checksum first.
+    /// None: [`Dialect::fast_path`] looks through a line for its checksum first.
     #[inline(always)]
     fn brief(_session: Session, _settings: &Settings) -> Option<bool> {
         None
     }
 
     #[inline(always)]
-    fn usual(line: &[u8], session: &mut Session) -> Option<Span> {
-        frame::usual(line, session)
+    fn fast_path(line: &[u8], session: &mut Session) -> Option<Span> {
+        frame::fast_path(line, session)
     }
 
     #[inline(always)]

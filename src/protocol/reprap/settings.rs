@@ -9,7 +9,7 @@ use super::write::{fixed, line_end, text};
 use crate::boards::MOTORS;
 use crate::config::name::token;
 use crate::config::{Fixed, Number, Owner};
-use crate::gcode::tables::Row;
+use crate::gcode::tables::TableRow;
 use crate::kinematics;
 use crate::progmem::Text;
 use crate::protocol::steps::{named, turned};
@@ -78,7 +78,7 @@ fn value(code: u16, axis: u8, machine: &mut impl Machine) -> Fixed {
             Fixed { value: turned(machine, motor, turn), decimals: 3 }
         }
         (None, _) if code == 206 => {
-            let at = machine.value(crate::protocol::Value::Row(Row::system(0), axis));
+            let at = machine.value(crate::protocol::Value::TableRow(TableRow::system(0), axis));
             Fixed { value: at, decimals: 4 }.rounded(3)
         }
         _ => Fixed::int(0),
@@ -187,7 +187,7 @@ fn set_axis(code: u16, axis: u8, to: Number, machine: &mut impl Machine) -> Resu
         205 => put_number(machine, Owner::Axis(axis), token("jd"), to),
         _ => {
             let to = to.fixed(4, false).ok_or(Status::OutOfRange)?;
-            machine.set_row(Row::system(0), axis, Length(to))
+            machine.set_row(TableRow::system(0), axis, Length(to))
         }
     }
 }

@@ -6,7 +6,7 @@ use super::pairs::Outcome;
 use super::program;
 use super::remark::Remark;
 use super::request::{Context, Request};
-use super::token::{Action, Group, Subject, Target};
+use super::token::{Group, Operation, Subject, Target};
 use super::value::{Form, Source, place_form};
 use crate::boards::MOTORS;
 use crate::capability::Capability;
@@ -14,7 +14,7 @@ use crate::config::name::axis_of;
 use crate::config::table;
 use crate::config::{Number, Setting};
 use crate::gcode::overrides::{Change, Override};
-use crate::gcode::tables::Row;
+use crate::gcode::tables::TableRow;
 use crate::protocol::{Machine, Out, Value};
 use crate::status::Status;
 use crate::units::Length;
@@ -43,7 +43,7 @@ impl Request {
             (Target::Token(token), _) => {
                 match token.subject() {
                     Some(Subject::Setting(setting)) => self.set(setting, pair, c)?,
-                    Some(Subject::Row(row, axis)) if !row.is_stored() => {
+                    Some(Subject::TableRow(row, axis)) if !row.is_stored() => {
                         set_row(row, axis, pair, c)?
                     }
                     Some(Subject::Member(vector, _, axis))
@@ -58,15 +58,15 @@ impl Request {
                 }
                 Ok(Some(token))
             }
-            (Target::Action(Action::Help), _) => {
+            (Target::Operation(Operation::Help), _) => {
                 Capability::Help.check()?;
                 self.advise(Remark::Help)
             }
-            (Target::Action(Action::Defaults), _) => self.restore(pair, c),
-            (Target::Action(Action::Boot), _) => self.boot(pair, c),
-            (Target::Action(action), _) => {
+            (Target::Operation(Operation::Defaults), _) => self.restore(pair, c),
+            (Target::Operation(Operation::Boot), _) => self.boot(pair, c),
+            (Target::Operation(action), _) => {
                 let done = act(action, pair, c);
-                if action == Action::Test && done == Err(Status::Error) {
+                if action == Operation::Test && done == Err(Status::Error) {
                     self.remark = self.remark.max(Remark::Test);
                 }
                 done.map(|()| None)
@@ -138,7 +138,7 @@ fn bits(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
 /// Sets a value of the interpreter's tables.
 #[small]
 fn set_row<M: Machine, O>(
-    row: Row,
+    row: TableRow,
     axis: u8,
     pair: &Pair,
     c: &mut Context<'_, M, O>,
@@ -235,44 +235,44 @@ fn whole(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
 
 #[small]
 fn act<M: Machine, O>(
-    action: Action,
+    action: Operation,
     pair: &Pair,
     c: &mut Context<'_, M, O>,
 ) -> Result<(), Status> {
     let on = match action {
         // A block is run only where nothing of the response is out yet.
-        Action::Block if pair.kind == Kind::Null => return Ok(()),
-        Action::Block if pair.kind == Kind::Text => return Err(Status::NotAccepted),
-        Action::Block => return Err(Status::UnsupportedType),
-        Action::Clear => return done(c.machine.clear()),
-        Action::Raise(alarm) => {
+        Operation::Block if pair.kind == Kind::Null => return Ok(()),
+        Operation::Block if pair.kind == Kind::Text => return Err(Status::NotAccepted),
+        Operation::Block => return Err(Status::UnsupportedType),
+        Operation::Clear => return done(c.machine.clear()),
+        Operation::Raise(alarm) => {
             c.machine.alarm(alarm);
             return Ok(());
         }
-        Action::Test if pair.kind == Kind::Null => return Ok(()),
-        Action::Test => {
+        Operation::Test if pair.kind == Kind::Null => return Ok(()),
+        Operation::Test => {
             let number = whole(pair, c.line)?;
             let number = u8::try_from(number).map_err(|_| Status::OutOfRange)?;
             return done(c.machine.start_job(number));
         }
-        Action::Jog if pair.kind == Kind::Null => return Ok(()),
-        Action::Jog => return jog(pair, c),
-        Action::Text if pair.kind != Kind::Null => return Err(Status::UnsupportedType),
-        Action::Program => return program::store(pair, c),
-        Action::Flush => {
+        Operation::Jog if pair.kind == Kind::Null => return Ok(()),
+        Operation::Jog => return jog(pair, c),
+        Operation::Text if pair.kind != Kind::Null => return Err(Status::UnsupportedType),
+        Operation::Program => return program::store(pair, c),
+        Operation::Flush => {
             let sure = is_sure(pair, c)?;
             return if sure { done(c.machine.flush()) } else { Ok(()) };
         }
-        Action::Reset => {
+        Operation::Reset => {
             let sure = is_sure(pair, c)?;
             return if sure { done(c.machine.restart(false)) } else { Ok(()) };
         }
         // Its report would stand in the midst of the response.
-        Action::Exception => return Err(Status::NotAccepted),
-        Action::Energize => true,
-        Action::Release => false,
-        Action::Defaults | Action::Help | Action::Boot => return Ok(()),
-        Action::Text | Action::Message | Action::Id => return Ok(()),
+        Operation::Exception => return Err(Status::NotAccepted),
+        Operation::Energize => true,
+        Operation::Release => false,
+        Operation::Defaults | Operation::Help | Operation::Boot => return Ok(()),
+        Operation::Text | Operation::Message | Operation::Id => return Ok(()),
     };
     let motor = match pair.kind {
         Kind::Null | Kind::True => 0,

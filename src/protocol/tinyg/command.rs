@@ -4,7 +4,7 @@ use super::help::Hint;
 use super::json::{Kind, Pair};
 use super::listing::Series;
 use super::request::{Context, Phase, Request};
-use super::token::{Action, Group, Target, resolve};
+use super::token::{Group, Operation, Target, resolve};
 use super::{Mode, help};
 use crate::capability::Capability;
 use crate::config::{Name, Owner};
@@ -38,21 +38,25 @@ impl Request {
             Target::Group(group) if null => self.enlist(Some(group), None),
             // Neither groups nor blocks can be given a value here.
             Target::Group(_)
-            | Target::Action(Action::Block | Action::Text | Action::Message | Action::Id) => {
+            | Target::Operation(
+                Operation::Block | Operation::Text | Operation::Message | Operation::Id,
+            ) => {
                 self.refuse();
             }
-            Target::Action(Action::Exception) => self.fail(Status::ExceptionReport, Mode::Text),
-            Target::Action(Action::Help) => self.help(help::SETTINGS),
-            Target::Action(Action::Test) if null => match Capability::Jobs.check() {
+            Target::Operation(Operation::Exception) => {
+                self.fail(Status::ExceptionReport, Mode::Text)
+            }
+            Target::Operation(Operation::Help) => self.help(help::SETTINGS),
+            Target::Operation(Operation::Test) if null => match Capability::Jobs.check() {
                 Ok(()) => self.help(help::TESTS),
                 Err(status) => self.fail(status, Mode::Text),
             },
-            Target::Action(Action::Program) if null => {
+            Target::Operation(Operation::Program) if null => {
                 self.item = 0;
                 self.phase = Phase::Program;
             }
-            Target::Action(Action::Defaults) if null => self.help(help::DEFAULTS),
-            Target::Action(Action::Boot) if null => self.help(help::BOOT),
+            Target::Operation(Operation::Defaults) if null => self.help(help::DEFAULTS),
+            Target::Operation(Operation::Boot) if null => self.help(help::BOOT),
             _ => self.execute(&pair, target, c),
         }
     }

@@ -3,7 +3,7 @@
 use super::{Mode, Request};
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::{Change, Overrides};
-use crate::gcode::tables::Row;
+use crate::gcode::tables::TableRow;
 use crate::heat::Standing;
 use crate::machine::{Alarm, Cycle, Doing};
 use crate::motion::snapshot::Program;
@@ -152,7 +152,7 @@ impl Machine for Fake {
         Ok(())
     }
 
-    fn set_row(&mut self, row: Row, axis: u8, value: Length) -> Result<(), Status> {
+    fn set_row(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status> {
         // Every other time, as if another row were on its way.
         self.waits = !self.waits;
         if self.waits {
@@ -166,7 +166,7 @@ impl Machine for Fake {
         match value {
             Value::Override(which) => self.overrides.factor(which).into(),
             Value::OverrideOn(which) => self.overrides.is_on(which).into(),
-            Value::Row(row, axis) => {
+            Value::TableRow(row, axis) => {
                 self.rows.get(&(row.number(), axis)).copied().unwrap_or_default()
             }
             Value::Units => i32::from(!self.inches),

@@ -15,7 +15,7 @@ use super::token::{Group, Shown, Token};
 use super::write::Writer;
 use crate::config::table::{MODE, RADIUS};
 use crate::config::{Fixed, Owner, Setting, Words};
-use crate::gcode::tables::Row;
+use crate::gcode::tables::TableRow;
 use crate::progmem;
 use crate::progmem::Text;
 use crate::protocol::{Machine, Out, Span};
@@ -70,9 +70,9 @@ impl Series {
             12 => Group::Settings(Owner::Spindle),
             13 => Group::Settings(Owner::Coolant),
             14 => Group::Settings(Owner::Squaring),
-            15..24 => Group::Row(Row::system(number - 15)),
+            15..24 => Group::TableRow(TableRow::system(number - 15)),
             24 => Group::SHIFT,
-            25 | 26 => Group::Row(Row::stored(number - 25)),
+            25 | 26 => Group::TableRow(TableRow::stored(number - 25)),
             27 => Group::OFFSETS,
             _ => Group::TOOL_OFFSETS,
         }

@@ -5,7 +5,7 @@ use super::amend::is_amended;
 use super::json::{self, Kind, Pair};
 use super::notice::put_exception;
 use super::request::{Context, Phase, Request};
-use super::token::{Action, Group, Target, Token, resolve};
+use super::token::{Group, Operation, Target, Token, resolve};
 use super::write::Writer;
 use crate::config::Name;
 use crate::protocol::{Machine, Out};
@@ -35,25 +35,25 @@ impl Request {
                 self.selected = false;
             }
             (Target::Group(group), Kind::Object) => self.enter(group, &pair, Phase::Member, c),
-            (Target::Action(Action::Block), Kind::Text) if !self.begun => {
+            (Target::Operation(Operation::Block), Kind::Text) if !self.begun => {
                 self.block = pair.value;
                 self.phase = Phase::Gcode;
             }
-            (Target::Action(Action::Program), Kind::Null) => self.show_program(&pair, c),
-            (Target::Action(Action::Text), Kind::Text) => {
+            (Target::Operation(Operation::Program), Kind::Null) => self.show_program(&pair, c),
+            (Target::Operation(Operation::Text), Kind::Text) => {
                 self.at = pair.next;
                 let Err(status) = self.wrap(&pair, c) else { return };
                 self.open(c);
                 self.refuse_pair(&pair, target, status, c);
             }
-            (Target::Action(Action::Message), Kind::Text) => self.give_string(&pair, c),
+            (Target::Operation(Operation::Message), Kind::Text) => self.give_string(&pair, c),
             // It is told when everything else has been, so that a block may still be run.
-            (Target::Action(Action::Id), Kind::Number | Kind::Null) => self.identified = true,
-            (Target::Action(Action::Id), _) => {
+            (Target::Operation(Operation::Id), Kind::Number | Kind::Null) => self.identified = true,
+            (Target::Operation(Operation::Id), _) => {
                 self.status = Status::UnsupportedType;
                 self.phase = Phase::Warning;
             }
-            (Target::Action(Action::Exception), _) if !self.begun => {
+            (Target::Operation(Operation::Exception), _) if !self.begun => {
                 self.format = Format::json(c.machine.settings());
                 self.block = pair.name;
                 self.item = 0;
@@ -114,9 +114,9 @@ impl Request {
         let target = match resolve(prefix, pair.name.of(c.line)) {
             // A group has no groups, and no strings, in it.
             Target::Group(_) => Target::Unknown,
-            Target::Action(Action::Block | Action::Text | Action::Message | Action::Id) => {
-                Target::Unknown
-            }
+            Target::Operation(
+                Operation::Block | Operation::Text | Operation::Message | Operation::Id,
+            ) => Target::Unknown,
             target => target,
         };
         self.carry_out(&pair, target, c);

@@ -27,9 +27,9 @@ impl Place {
     pub fn of(token: Token) -> Option<Place> {
         let (axis, title) = match token.subject()? {
             Subject::Member(SHIFT, _, axis) => (axis, text!(" offset")),
-            Subject::Row(row, axis) if row.is_stored() => (axis, text!(" position")),
-            Subject::Row(row, axis) if row.is_tool() => (axis, text!(" length")),
-            Subject::Row(_, axis) => (axis, text!(" offset")),
+            Subject::TableRow(row, axis) if row.is_stored() => (axis, text!(" position")),
+            Subject::TableRow(row, axis) if row.is_tool() => (axis, text!(" length")),
+            Subject::TableRow(_, axis) => (axis, text!(" offset")),
             _ => return None,
         };
         Some(Place { token, axis, title })

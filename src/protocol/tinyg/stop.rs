@@ -1,7 +1,7 @@
 //! Which lines begin an alarm, before they are answered.
 
 use super::json;
-use super::token::{Action, Target, resolve};
+use super::token::{Operation, Target, resolve};
 use crate::config::Name;
 use crate::machine::Alarm;
 use crate::protocol::STOP_MAX;
@@ -18,7 +18,7 @@ pub fn asks_alarm(line: &[u8]) -> Option<Alarm> {
     let start = json::skip_blanks(line) + 1;
     let name = json::pair(line, start)?.name;
     match resolve(Name::new(), name.of(line)) {
-        Target::Action(Action::Raise(alarm)) => Some(alarm),
+        Target::Operation(Operation::Raise(alarm)) => Some(alarm),
         _ => None,
     }
 }

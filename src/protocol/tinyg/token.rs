@@ -8,7 +8,7 @@ use crate::config::name::{LONGEST, Name, axis_letter, axis_of, padded};
 use crate::config::rows::{find_row, row_name, value_name};
 use crate::config::table::Kind;
 use crate::config::{Fixed, Owner, Setting};
-use crate::gcode::tables::Row;
+use crate::gcode::tables::TableRow;
 use crate::machine::Alarm;
 use crate::progmem::Text;
 use crate::protocol::{Machine, Value};
@@ -34,7 +34,7 @@ pub enum Subject {
     /// A member of a vector: the vector's number, the vector, the member's number.
     Member(u8, Vector, u8),
     /// A value of the interpreter's tables.
-    Row(Row, u8),
+    TableRow(TableRow, u8),
 }
 
 /// A token's value, ready to be written.
@@ -86,7 +86,7 @@ impl Token {
     }
 
     /// The token of a value of a row.
-    fn row(row: Row, axis: u8) -> Token {
+    fn row(row: TableRow, axis: u8) -> Token {
         Token(FIRST_ROW + u16::from(row.number()) * AXES as u16 + u16::from(axis))
     }
 
@@ -138,7 +138,7 @@ impl Token {
                 .map(|vector| Subject::Member(number, vector, index));
         }
         let (row, axis) = by_axis((number - FIRST_ROW) as u8);
-        Row::from_number(row).map(|row| Subject::Row(row, axis))
+        TableRow::from_number(row).map(|row| Subject::TableRow(row, axis))
     }
 
     /// The setting it is, if it is one.
@@ -157,7 +157,7 @@ impl Token {
                 let group = Name::new().with_token(vector.token);
                 group.with(&[letter]).unwrap_or(group)
             }
-            Some(Subject::Row(row, axis)) => value_name(row, axis),
+            Some(Subject::TableRow(row, axis)) => value_name(row, axis),
             None => Name::new(),
         }
     }
@@ -182,7 +182,9 @@ impl Token {
             Some(Subject::Member(number, vector, index)) => {
                 (vector_value(number, index), vector.form(index))
             }
-            Some(Subject::Row(row, axis)) => (Source::Of(Value::Row(row, axis)), place_form(axis)),
+            Some(Subject::TableRow(row, axis)) => {
+                (Source::Of(Value::TableRow(row, axis)), place_form(axis))
+            }
             None => (Source::State, Form::Count),
         };
         Shown::Number(form.show(source.read(machine), inches))
@@ -219,30 +221,30 @@ progmem! {
     ];
 
     static ACTIONS: [Verb; 24] = [
-        verb("gc", Action::Block),
-        verb("clear", Action::Clear),
-        verb("clr", Action::Clear),
-        verb("alarm", Action::Raise(Alarm::Alarm)),
-        verb("shutd", Action::Raise(Alarm::Shutdown)),
-        verb("panic", Action::Raise(Alarm::Panic)),
-        verb("me", Action::Energize),
-        verb("md", Action::Release),
-        verb("test", Action::Test),
-        verb("prog", Action::Program),
-        verb("qf", Action::Flush),
-        verb("defa", Action::Defaults),
-        verb("h", Action::Help),
-        verb("help", Action::Help),
-        verb("txt", Action::Text),
-        verb("tid", Action::Id),
-        verb("msg", Action::Message),
-        verb("er", Action::Exception),
-        verb("jogx", Action::Jog),
-        verb("jogy", Action::Jog),
-        verb("jogz", Action::Jog),
-        verb("joga", Action::Jog),
-        verb("boot", Action::Boot),
-        verb("reset", Action::Reset),
+        verb("gc", Operation::Block),
+        verb("clear", Operation::Clear),
+        verb("clr", Operation::Clear),
+        verb("alarm", Operation::Raise(Alarm::Alarm)),
+        verb("shutd", Operation::Raise(Alarm::Shutdown)),
+        verb("panic", Operation::Raise(Alarm::Panic)),
+        verb("me", Operation::Energize),
+        verb("md", Operation::Release),
+        verb("test", Operation::Test),
+        verb("prog", Operation::Program),
+        verb("qf", Operation::Flush),
+        verb("defa", Operation::Defaults),
+        verb("h", Operation::Help),
+        verb("help", Operation::Help),
+        verb("txt", Operation::Text),
+        verb("tid", Operation::Id),
+        verb("msg", Operation::Message),
+        verb("er", Operation::Exception),
+        verb("jogx", Operation::Jog),
+        verb("jogy", Operation::Jog),
+        verb("jogz", Operation::Jog),
+        verb("joga", Operation::Jog),
+        verb("boot", Operation::Boot),
+        verb("reset", Operation::Reset),
     ];
 }
 
@@ -250,18 +252,18 @@ progmem! {
 #[derive(Clone, Copy)]
 struct Verb {
     token: [u8; LONGEST],
-    action: Action,
+    action: Operation,
 }
 
 named! { Verb, 5 }
 
-const fn verb(name: &str, action: Action) -> Verb {
+const fn verb(name: &str, action: Operation) -> Verb {
     Verb { token: padded(name), action }
 }
 
 /// What a request may have done.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Action {
+pub enum Operation {
     /// `gc`: run a block of G-code.
     Block,
     /// `clear`, `clr`: end the alarm.
@@ -306,7 +308,7 @@ pub enum Group {
     /// `pos` and its like, by their number in [`VECTORS`].
     Vector(u8),
     /// `g54`, `g28`, `tt1` and their like.
-    Row(Row),
+    TableRow(TableRow),
     /// A token alone.
     One(Token),
     /// `sr`, `srs`: the tokens of the status report.
@@ -332,7 +334,7 @@ impl Group {
         if let Some(owner) = Owner::called(name) {
             return Some(Group::Settings(owner));
         }
-        find_vector(name).map(Group::Vector).or_else(|| find_row(name).map(Group::Row))
+        find_vector(name).map(Group::Vector).or_else(|| find_row(name).map(Group::TableRow))
     }
 
     /// What comes before the names of its members.
@@ -342,7 +344,7 @@ impl Group {
             Group::Vector(number) => VECTORS
                 .at(usize::from(number))
                 .map_or(Name::new(), |vector| Name::new().with_token(vector.token)),
-            Group::Row(row) => row_name(row),
+            Group::TableRow(row) => row_name(row),
             Group::Report | Group::One(_) => Name::new(),
         }
     }
@@ -358,7 +360,7 @@ impl Group {
                 let members = VECTORS.at(usize::from(number))?.members;
                 (index < members).then(|| (from, Token::member(number, index)))
             }
-            Group::Row(row) => {
+            Group::TableRow(row) => {
                 let axis = (from..AXES as u8).find(|&axis| row.has(axis))?;
                 Some((axis, Token::row(row, axis)))
             }
@@ -386,7 +388,7 @@ pub enum Target {
     /// A setting or value.
     Token(Token),
     /// Something to do.
-    Action(Action),
+    Operation(Operation),
     /// Several settings or values.
     Group(Group),
     /// The name means nothing.
@@ -400,7 +402,7 @@ pub fn resolve(prefix: Name, name: &[u8]) -> Target {
     // First, for they are few: `tid` comes with each line of some senders.
     let verb = ACTIONS.slice().find(full.padded());
     if let Some(verb) = verb.and_then(|verb| ACTIONS.at(verb.into())) {
-        return Target::Action(verb.action);
+        return Target::Operation(verb.action);
     }
     if let Some(token) = Token::find(&full) {
         return Target::Token(token);

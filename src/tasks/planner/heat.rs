@@ -12,7 +12,7 @@ use crate::gcode::heating::{Heat, Wait};
 use crate::gcode::printing::EXTRUDER;
 use crate::hal::event::{Event, wait};
 use crate::motion::advance::Lead;
-use crate::motion::block::{Action, Block};
+use crate::motion::block::{Block, QueuedAction};
 use crate::motion::float::greater;
 use crate::motion::queue;
 use crate::motion::short::Short;
@@ -32,7 +32,7 @@ impl Planner {
     pub(super) fn heat(&mut self, heat: &Heat) -> bool {
         if heat.to.is_some() {
             self.heats = *heat != Heat::OFF;
-            let _ = self.queue.push_aside(Block::action(Action::Heat(*heat), self.line));
+            let _ = self.queue.push_aside(Block::action(QueuedAction::Heat(*heat), self.line));
             self.announce();
         }
         heat.wait != Wait::Nothing
@@ -72,7 +72,7 @@ impl Planner {
         let lead = self.wanted_lead();
         if lead != self.lead {
             self.lead = lead;
-            let _ = self.queue.push_aside(Block::action(Action::Advance(lead), self.line));
+            let _ = self.queue.push_aside(Block::action(QueuedAction::Advance(lead), self.line));
             self.announce();
         }
     }

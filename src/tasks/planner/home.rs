@@ -25,7 +25,7 @@ use super::square::Second;
 use crate::gcode::command::{Feed, Motion};
 use crate::hal::inputs;
 use crate::machine::{self, Event};
-use crate::motion::block::Action;
+use crate::motion::block::QueuedAction;
 use crate::status::Status;
 use crate::tasks::homing::{self, Homing};
 use crate::units::Length;
@@ -116,7 +116,7 @@ impl Planner {
         let mut done = self.check_homing(&mut at);
         while done.is_ok() {
             self.room().await;
-            self.pause(Action::Dwell(SETTLE_MS));
+            self.pause(QueuedAction::Dwell(SETTLE_MS));
             done = match self.standstill().await {
                 true => self.begin_stage(&mut at),
                 false => Err(Status::HomingFailed),

@@ -13,7 +13,7 @@
 //!
 //! **N words.** A block has that of its last line: it is finished when that is.
 
-use super::{Begun, News, Parts, Planner, Shared, Turn};
+use super::{Announcement, Begun, Parts, Planner, Shared, Turn};
 use crate::gcode::command::{Commands, Feed};
 use crate::hal::event::{Event, wait};
 use crate::hal::time::millis;
@@ -130,7 +130,7 @@ impl Planner {
     pub(super) fn make_up(&mut self) {
         if self.is_due() {
             self.take_up_changes();
-            while self.news != News::None {
+            while self.announcement != Announcement::None {
                 self.tell();
             }
             self.build_chain(false);

@@ -7,7 +7,7 @@ use crate::boards::outputs;
 use crate::capability::Capability;
 use crate::gcode::command::{Spindle, Surface};
 use crate::gcode::modal::{self, Coolant};
-use crate::motion::block::{Action, Outputs};
+use crate::motion::block::{Outputs, QueuedAction};
 
 impl Planner {
     #[inline(never)]
@@ -50,7 +50,7 @@ impl Planner {
         };
         self.has_surface = surface.is_some();
         self.outputs = Outputs { on: self.outputs.on & !which | on, speed };
-        self.pause(Action::Surface(self.outputs, surface.unwrap_or(Surface::NONE)));
+        self.pause(QueuedAction::Surface(self.outputs, surface.unwrap_or(Surface::NONE)));
     }
 
     /// Switches those of `which` on that are in `on`, the others of `which` off; the spindle is to have this speed.
@@ -60,7 +60,7 @@ impl Planner {
         let outputs = Outputs { on: self.outputs.on & !which | on, speed };
         if outputs != self.outputs {
             self.outputs = outputs;
-            self.pause(Action::Outputs(outputs));
+            self.pause(QueuedAction::Outputs(outputs));
         }
     }
 }

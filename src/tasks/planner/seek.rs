@@ -19,8 +19,8 @@ use crate::hal::Thread;
 use crate::hal::event::{Event, wait};
 use crate::hal::inputs;
 use crate::machine;
-use crate::motion::block::{Action, Outputs};
-use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};
+use crate::motion::block::{Outputs, QueuedAction};
+use crate::motion::dynamics::{MachineLimits, PER_SECOND_CUBED, PER_SECOND_SQUARED};
 use crate::motion::queue;
 use crate::motion::snapshot::Snapshot;
 use crate::tasks::common;
@@ -49,7 +49,7 @@ impl Planner {
     pub(super) async fn standstill(&mut self) -> bool {
         self.room().await;
         // Exec does not release it before.
-        self.pause(Action::Outputs(self.outputs));
+        self.pause(QueuedAction::Outputs(self.outputs));
         wait(self.links.thread, Event::BlockDone, || {
             (queue::used() == 0 || self.is_flushed()).then_some(())
         })
@@ -77,7 +77,7 @@ impl Planner {
         }
         self.seek_room().await;
         if !self.is_over() {
-            self.pause(Action::Outputs(self.outputs));
+            self.pause(QueuedAction::Outputs(self.outputs));
         }
         wait(self.links.thread, Event::BlockDone, || {
             (queue::used() == 0 || self.is_over()).then_some(())
@@ -140,7 +140,7 @@ impl Planner {
         for (n, axis) in self.dynamics.axes.iter_mut().enumerate().take(FIRST_ROTARY + 1) {
             let hard = settings.jerk_homing(n);
             if hard > 0.0 && axis.jerk.get() > 0.0 {
-                let accel = Machine::accel_max(&*settings, n) * PER_SECOND_SQUARED;
+                let accel = MachineLimits::accel_max(&*settings, n) * PER_SECOND_SQUARED;
                 axis.limit_change(accel, hard * PER_SECOND_CUBED);
             }
         }

@@ -14,7 +14,7 @@ use super::Planner;
 use super::parts::Ongoing;
 use crate::encoder::COUNTS_PER_S;
 use crate::gcode::command::{Feed, Motion};
-use crate::motion::block::{Action, Block};
+use crate::motion::block::{Block, QueuedAction};
 use crate::units::{FIRST_ROTARY, Length};
 
 /// The spindle has to turn round within the way that it has in so many seconds at its speed.
@@ -40,7 +40,7 @@ impl Planner {
     #[small]
     pub(super) fn queue_return(&mut self) {
         if !self.is_flushed() {
-            self.push(Block::action(Action::Return, self.line));
+            self.push(Block::action(QueuedAction::Return, self.line));
         }
     }
 

@@ -26,8 +26,8 @@ use crate::hal::event::{Event, wait};
 use crate::hal::time::millis;
 use crate::machine::Alarm;
 use crate::math::sqrt;
-use crate::motion::block::{Action, Block, Pass};
-use crate::motion::dynamics::{Machine, PER_SECOND_CUBED, PER_SECOND_SQUARED};
+use crate::motion::block::{Block, Pass, QueuedAction};
+use crate::motion::dynamics::{MachineLimits, PER_SECOND_CUBED, PER_SECOND_SQUARED};
 use crate::motion::float::{greater, some};
 use crate::motion::queue;
 use crate::motion::retract::Retract;
@@ -183,7 +183,7 @@ impl Planner {
     #[small]
     fn queue_end(&mut self) {
         if !self.returns() && !self.is_cut_short() {
-            self.pause(Action::EndThread);
+            self.pause(QueuedAction::EndThread);
         }
     }
 
@@ -243,7 +243,7 @@ impl Planner {
         match part {
             BACK_IN => {
                 self.set_pass(Status::Again);
-                self.pause(Action::EndThread);
+                self.pause(QueuedAction::EndThread);
                 self.take_up_changes();
                 return;
             }
@@ -297,10 +297,13 @@ impl Planner {
             (retract.way, retract.motors) = (way, retract.motors | 1 << motor);
         }
         let per_mm = f32::from(retract.way.unsigned_abs()) / (end.abs_diff(x.0) as f32 * 1e-4);
-        let velocity = Machine::velocity_max(&*settings, 0) * (1.0 / 60.0);
-        let jerk = Machine::jerk_max(&*settings, 0) * PER_SECOND_CUBED;
-        let accel =
-            mean_accel(Machine::accel_max(&*settings, 0) * PER_SECOND_SQUARED, jerk, velocity);
+        let velocity = MachineLimits::velocity_max(&*settings, 0) * (1.0 / 60.0);
+        let jerk = MachineLimits::jerk_max(&*settings, 0) * PER_SECOND_CUBED;
+        let accel = mean_accel(
+            MachineLimits::accel_max(&*settings, 0) * PER_SECOND_SQUARED,
+            jerk,
+            velocity,
+        );
         retract.accel = Short::new(accel * per_mm);
         retract.velocity = Short::new(velocity * per_mm);
         retract
@@ -360,8 +363,8 @@ impl Planner {
             }
         }
         for (n, (axis, speed)) in self.dynamics.axes.iter_mut().zip(speeds).enumerate() {
-            let jerk = Machine::jerk_max(&*settings, n) * PER_SECOND_CUBED;
-            let accel = Machine::accel_max(&*settings, n) * PER_SECOND_SQUARED;
+            let jerk = MachineLimits::jerk_max(&*settings, n) * PER_SECOND_CUBED;
+            let accel = MachineLimits::accel_max(&*settings, n) * PER_SECOND_SQUARED;
             let accel = mean_accel(accel, jerk, speed);
             axis.limit_change(accel, 0.0);
         }
@@ -376,7 +379,7 @@ impl Planner {
             let turn_at = if self.returns() { Self::overrun(turn, piece.lead) } else { 0.0 };
             let (limit, retract) = (self.error_limit(), self.retract());
             let pass = Pass { lead: piece.lead, limit, retract, turn_at };
-            self.push(Block::action(Action::Thread(pass), self.line));
+            self.push(Block::action(QueuedAction::Thread(pass), self.line));
         }
         Ok(true)
     }
@@ -449,7 +452,7 @@ impl Planner {
             return false;
         }
         let Some(Piece { lead, .. }) = self.piece(line, &self.position) else { return false };
-        let _ = self.queue.push_aside(Block::action(Action::Lead(lead), self.line));
+        let _ = self.queue.push_aside(Block::action(QueuedAction::Lead(lead), self.line));
         self.announce();
         true
     }

@@ -1,15 +1,15 @@
 //! Target `lines`: an input is lines, parted by line feeds, for one interpreter.
 //!
 //! After each line: a refused one has left the interpreter as it was and asks for nothing; the fast path
-//! for usual lines has either done nothing, or what the general path does; the chords of an arc stay on
+//! for plain lines has either done nothing, or what the slow path does; the chords of an arc stay on
 //! their circle and end at its end; the steps of a line lead to where the interpreter is. A second interpreter gets the same lines for a machine of odd axes.
 
 mod chords;
 
 use kerf::gcode::command::{Commands, Motion};
+use kerf::gcode::fast_path::Writer;
 use kerf::gcode::setup::{AxisMode, Setup, Usual};
 use kerf::gcode::steps::{Step, Steps};
-use kerf::gcode::usual::Writer;
 use kerf::gcode::{Info, Interpreter};
 use kerf::status::Status;
 use kerf::units::Length;
@@ -57,20 +57,20 @@ impl Outcome {
     }
 }
 
-/// The fast path alone, from `before` on, and the general one alone, against what both together did.
+/// The fast path alone, from `before` on, and the slow one alone, against what both together did.
 fn fast_path(before: &Interpreter, line: &[u8], after: &Interpreter, outcome: &Outcome) {
     for writer in [Writer::Plain, Writer::Numbers] {
         let (mut fast, mut out) = (*before, Commands::default());
-        if !fast.usual(line, writer, &Usual, &mut out) {
+        if !fast.fast_path(line, writer, &Usual, &mut out) {
             assert_eq!(fast, *before, "declined, changed all the same");
             assert_eq!(out, Commands::default(), "declined");
             continue;
         }
         assert_eq!(fast, *after, "{writer:?}");
         assert_eq!(Outcome { result: Ok(Info::default()), out }, *outcome);
-        let mut general = *before;
-        assert_eq!(Outcome::of(&mut general, line, &Endless), *outcome, "the general path");
-        assert_eq!(general, *after, "the general path");
+        let mut slow = *before;
+        assert_eq!(Outcome::of(&mut slow, line, &Endless), *outcome, "the slow path");
+        assert_eq!(slow, *after, "the slow path");
     }
 }
 

@@ -10,15 +10,15 @@
 
 mod ears;
 mod lines;
-mod talk;
+mod session;
 
-use talk::Talk;
+use session::Session;
 
 /// Sends an input to a new machine; panics where something does not hold.
 pub fn check(input: &[u8]) {
     let Some((how, text)) = input.split_first() else { return };
     let all_at_once = how & 1 == 1;
-    let talk = || Talk::begin(text).hold(text, all_at_once);
-    let held = std::thread::scope(|scope| scope.spawn(talk).join());
+    let session = || Session::begin(text).hold(text, all_at_once);
+    let held = std::thread::scope(|scope| scope.spawn(session).join());
     held.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
 }

@@ -48,7 +48,7 @@ impl Arrival {
     /// As [`Arrival::of`], with steps counted from `begun`. The board itself is asked, after a power cut.
     pub fn of_emulated(board: &mut Emulated, begun: &[(i64, u64)], job: &Path) -> Result<Arrival> {
         let lines = read_lines(job)?;
-        board.talk(Talks { open: true, reads: true });
+        board.session(Talks { open: true, reads: true });
         board.run_for_ms(SETTLE_MS)?;
         let ends = board.steps().into_iter().zip(board.totals()).zip(begun);
         let ends: Vec<_> = ends.map(|((at, total), from)| (at - from.0, total - from.1)).collect();

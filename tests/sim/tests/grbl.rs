@@ -1,13 +1,13 @@
 //! Random conversations in grbl's dialect with the image on the simulated chip: those of `tests/grbl_random.rs`, and shorter; what is judged is in
-//! `tests/support/grbl_talk.rs`.
+//! `tests/support/grbl_session.rs`.
 //!
 //! One machine has them all, one after the other: `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim --profile sim --test grbl` has one.
 
 mod common;
-#[path = "../../support/grbl_deeds.rs"]
-mod grbl_deeds;
-#[path = "../../support/grbl_talk.rs"]
-mod grbl_talk;
+#[path = "../../support/grbl_ops.rs"]
+mod grbl_ops;
+#[path = "../../support/grbl_session.rs"]
+mod grbl_session;
 #[path = "../../support/seeds.rs"]
 mod seeds;
 #[path = "../../support/side.rs"]
@@ -16,23 +16,23 @@ mod side;
 mod simulated;
 
 use common::firmware;
-use grbl_talk::Talk;
+use grbl_session::Session;
 use kerf::boards::MEGA2560_GRBL;
 use proptest::strategy::ValueTree;
 
-/// See [`Talk`]. The longest of 2,800 took 38 ms, at 64,000 steps a second in a ramp; 14 took more than 20.
+/// See [`Session`]. The longest of 2,800 took 38 ms, at 64,000 steps a second in a ramp; 14 took more than 20.
 const REPORT_MS: u64 = 40;
 
 #[test]
 fn any_conversation_keeps_to_the_dialect() {
-    let mut talk = Talk::new(firmware(&MEGA2560_GRBL), REPORT_MS);
-    let mut played = talk.begin();
+    let mut session = Session::new(firmware(&MEGA2560_GRBL), REPORT_MS);
+    let mut played = session.begin();
     for seed in seeds::seeds(60) {
-        let (tree, _) = seeds::case(seed, &grbl_deeds::conversation(20, 300));
-        played = played.and_then(|()| talk.play(&tree.current()));
+        let (tree, _) = seeds::case(seed, &grbl_ops::conversation(20, 300));
+        played = played.and_then(|()| session.play(&tree.current()));
         if let Err(why) = &played {
-            panic!("seed {seed}: {why}\n{}", talk.story());
+            panic!("seed {seed}: {why}\n{}", session.story());
         }
     }
-    talk.check_prompt();
+    session.check_prompt();
 }

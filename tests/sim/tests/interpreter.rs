@@ -20,7 +20,7 @@ fn cost(before: &[&str], line: &str) -> f64 {
     let run = |repeats: usize| {
         let mut machine = Machine::load(&elf, &MEGA2560_GRBL).unwrap();
         for (entry, name) in image.functions() {
-            if ["State>::usual::", ">::general::"].iter().any(|part| name.contains(part)) {
+            if ["State>::fast_path::", ">::slow_path::"].iter().any(|part| name.contains(part)) {
                 machine.add_stopwatch(Stopwatch::calls(*entry));
             }
         }

@@ -36,16 +36,16 @@ const LISTENS: Talks = Talks { open: true, reads: true };
 #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
 fn the_first_program_that_opens_the_port_is_greeted() {
     let mut board = board();
-    board.talk(CLOSED);
+    board.session(CLOSED);
     board.run_for_ms(300).unwrap();
     assert!(board.receive_from(USB).is_empty());
-    board.talk(LISTENS);
+    board.session(LISTENS);
     board.run_for_ms(20).unwrap();
     let heard = String::from_utf8(board.receive_from(USB)).unwrap();
     assert!(heard.contains("SYSTEM READY") && heard.ends_with('\n'), "{heard}");
-    board.talk(CLOSED);
+    board.session(CLOSED);
     board.run_for_ms(20).unwrap();
-    board.talk(LISTENS);
+    board.session(LISTENS);
     assert_eq!(ask(&mut board, USB, "", 20), "", "no other one is");
     assert!(ask(&mut board, USB, "{xvm:n}\n", 20).contains("xvm"));
 }
@@ -97,7 +97,7 @@ fn a_stop_acts_at_once_however_much_waits_before_it() {
 fn a_program_that_does_not_listen_keeps_nobody_else_waiting() {
     for talks in [DEAF, CLOSED] {
         let mut board = booted();
-        board.talk(talks);
+        board.session(talks);
         board.send_to(USB, "{xvm:n}\n{yvm:n}\n{zvm:n}\n{avm:n}\n{sys:n}\n".as_bytes());
         board.run_for_ms(100).unwrap();
         let answer = ask(&mut board, AUX, "{xvm:n}\n", 100);

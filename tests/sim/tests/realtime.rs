@@ -1,26 +1,26 @@
 //! Random conversations with the image on the simulated chip: lines and real-time characters on both ports, switches
 //! that change, resets. They are those of `tests/realtime.rs`, and shorter; what is judged is in
-//! `tests/support/talk.rs`.
+//! `tests/support/session.rs`.
 //!
 //! Each of two machines has half of them, one after the other. The seed of one that fails is told:
 //! `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim --profile sim --test realtime` has it alone, and from the first
 //! seed of its machine on with all that came before it.
 
 mod common;
-#[path = "../../support/deeds.rs"]
-mod deeds;
+#[path = "../../support/ops.rs"]
+mod ops;
+#[path = "../../support/position_model.rs"]
+mod position_model;
 #[path = "../../support/seeds.rs"]
 mod seeds;
 #[path = "../../support/sender.rs"]
 mod sender;
+#[path = "../../support/session.rs"]
+mod session;
 #[path = "../../support/side.rs"]
 mod side;
 #[path = "common/simulated.rs"]
 mod simulated;
-#[path = "../../support/talk.rs"]
-mod talk;
-#[path = "../../support/whereabouts.rs"]
-mod whereabouts;
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -28,47 +28,47 @@ use std::thread;
 use std::time::Instant;
 
 use common::firmware;
-use deeds::{Deed, Scale};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
+use ops::{Op, Scale};
 use proptest::strategy::ValueTree;
-use talk::Talk;
+use session::Session;
 
 /// About two seconds of the machine's time.
-const SCALE: Scale = Scale { deeds: 24, way: 1_500, radius: 1.0, wait: 300 };
+const SCALE: Scale = Scale { ops: 24, way: 1_500, radius: 1.0, wait: 300 };
 /// Machines that run at the same time.
 const MACHINES: u64 = 2;
 
-fn play(talk: &mut Talk<Machine>, deeds: &[Deed]) -> Result<(), String> {
-    let mut deeds = deeds;
-    while let Some(rest) = talk.play(deeds)? {
-        talk.greet()?;
-        deeds = rest;
+fn play(session: &mut Session<Machine>, ops: &[Op]) -> Result<(), String> {
+    let mut ops = ops;
+    while let Some(rest) = session.play(ops)? {
+        session.greet()?;
+        ops = rest;
     }
-    talk.finish()
+    session.finish()
 }
 
-/// Plays the deeds; a crash of the simulated chip is an error as well.
-fn try_to_play(talk: &mut Talk<Machine>, deeds: &[Deed]) -> Result<(), String> {
-    let played = catch_unwind(AssertUnwindSafe(|| play(talk, deeds)));
+/// Plays the ops; a crash of the simulated chip is an error as well.
+fn try_to_play(session: &mut Session<Machine>, ops: &[Op]) -> Result<(), String> {
+    let played = catch_unwind(AssertUnwindSafe(|| play(session, ops)));
     let played = played.unwrap_or_else(|_| Err("the chip crashes".to_string()));
-    played.map_err(|why| format!("{why}\n{}", talk.story()))
+    played.map_err(|why| format!("{why}\n{}", session.story()))
 }
 
 /// A machine that is ready.
-fn begun() -> Talk<Machine> {
-    let mut talk = Talk::new(firmware(&MEGA2560_GRBL));
-    talk.begin().unwrap_or_else(|why| panic!("{why}\n{}", talk.story()));
-    talk
+fn begun() -> Session<Machine> {
+    let mut session = Session::new(firmware(&MEGA2560_GRBL));
+    session.begin().unwrap_or_else(|why| panic!("{why}\n{}", session.story()));
+    session
 }
 
 /// The conversations of some seeds, with one machine.
 fn play_all(seeds: Range<u64>) {
     let (first, began) = (seeds.start, Instant::now());
-    let mut talk = begun();
+    let mut session = begun();
     for seed in seeds {
-        let (tree, _) = seeds::case(seed, &deeds::conversation(SCALE));
-        if let Err(why) = try_to_play(&mut talk, &tree.current()) {
+        let (tree, _) = seeds::case(seed, &ops::conversation(SCALE));
+        if let Err(why) = try_to_play(&mut session, &tree.current()) {
             let alone = alone(seed).err().unwrap_or_default();
             panic!("seed {seed}, on a machine that began with {first}: {why}\nAlone: {alone}");
         }
@@ -79,8 +79,8 @@ fn play_all(seeds: Range<u64>) {
 
 /// The conversation of a seed with a machine of its own; one that fails is made smaller.
 fn alone(seed: u64) -> Result<(), String> {
-    let play = |deeds: Vec<Deed>| try_to_play(&mut begun(), &deeds);
-    seeds::smallest(seed, &deeds::conversation(SCALE), play)
+    let play = |ops: Vec<Op>| try_to_play(&mut begun(), &ops);
+    seeds::smallest(seed, &ops::conversation(SCALE), play)
 }
 
 #[test]
@@ -98,13 +98,13 @@ fn any_conversation_ends_where_it_is_to() {
 /// An arc so fast that exec has no pause for as long as there are blocks: each time it comes again at once.
 #[test]
 fn exec_that_has_no_pause_does_not_pile_up() {
-    let line = |line: &str| Deed::Line(0, line.to_string());
-    let deeds = [
+    let line = |line: &str| Op::Line(0, line.to_string());
+    let ops = [
         line("g91 g1 f3000 x0.2 m3 s300"),
-        Deed::Characters(0, b"\x91\x91!"),
+        Op::Characters(0, b"\x91\x91!"),
         line("g91 g2 f3000 x0 i1 j0.3 p3"),
     ];
-    try_to_play(&mut begun(), &deeds).unwrap_or_else(|why| panic!("{why}"));
+    try_to_play(&mut begun(), &ops).unwrap_or_else(|why| panic!("{why}"));
 }
 
 /// The reader, woken together with a task that works long before it, may come to its place before the control task has

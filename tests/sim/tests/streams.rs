@@ -24,11 +24,11 @@ use common::{age, firmware};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
 use proptest::strategy::ValueTree;
-use stream::deeds::{Deed, Scale, Setup, conversation};
 use stream::dialogue::Dialogue;
+use stream::ops::{Op, Scale, Setup, conversation};
 
 /// About two seconds of the machine's time.
-const SCALE: Scale = Scale { deeds: 20, lines: 8, wait: 200, wrap: 0 };
+const SCALE: Scale = Scale { ops: 20, lines: 8, wait: 200, wrap: 0 };
 /// Within which questions are answered, ms; a ms of it is that of the test.
 const PROMPT_MS: f64 = 21.0;
 /// How many are usual: what CI has time for.
@@ -48,8 +48,8 @@ fn begun() -> Dialogue<Machine> {
 }
 
 /// Has a conversation, also if the simulator gives up.
-fn play(dialogue: &mut Dialogue<Machine>, setup: &Setup, deeds: &[Deed]) -> Result<(), String> {
-    let played = catch_unwind(AssertUnwindSafe(|| dialogue.play(setup, deeds)));
+fn play(dialogue: &mut Dialogue<Machine>, setup: &Setup, ops: &[Op]) -> Result<(), String> {
+    let played = catch_unwind(AssertUnwindSafe(|| dialogue.play(setup, ops)));
     let played = played.unwrap_or_else(|_| Err("the chip crashes".to_string()));
     played.map_err(|why| format!("{why}\n{}", dialogue.story()))
 }
@@ -60,9 +60,9 @@ fn play_all(seeds: Range<u64>) {
     let mut dialogue = begun();
     for seed in seeds {
         let (tree, _) = seeds::case(seed, &conversation(SCALE));
-        let (setup, deeds) = tree.current();
-        if let Err(why) = play(&mut dialogue, &setup, &deeds) {
-            let alone = |(setup, deeds): (Setup, Vec<Deed>)| play(&mut begun(), &setup, &deeds);
+        let (setup, ops) = tree.current();
+        if let Err(why) = play(&mut dialogue, &setup, &ops) {
+            let alone = |(setup, ops): (Setup, Vec<Op>)| play(&mut begun(), &setup, &ops);
             let alone = seeds::smallest(seed, &conversation(SCALE), alone).err();
             let alone = alone.unwrap_or_default();
             panic!("seed {seed}, on a machine that began with {first}: {why}\nAlone: {alone}");

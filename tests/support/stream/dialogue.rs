@@ -8,8 +8,8 @@ use kerf::boards::outputs;
 
 use super::answer::{Answer, Heard, read};
 use super::course::Course;
-use super::deeds::{Deed, Setup};
 use super::json::Value;
+use super::ops::{Op, Setup};
 use super::port::{BYTES_MS, Port, Put};
 use crate::side::Side;
 
@@ -105,26 +105,26 @@ impl<S: Side> Dialogue<S> {
     }
 
     /// Has a conversation.
-    pub fn play(&mut self, setup: &Setup, deeds: &[Deed]) -> Outcome<()> {
+    pub fn play(&mut self, setup: &Setup, ops: &[Op]) -> Outcome<()> {
         self.story.push(format!("{setup:?}"));
         self.set_up(setup)?;
-        for deed in deeds {
-            self.story.push(format!("{} ms: {deed:?}", self.now));
-            match deed {
-                Deed::Feed(main, lines) => {
+        for op in ops {
+            self.story.push(format!("{} ms: {op:?}", self.now));
+            match op {
+                Op::Feed(main, lines) => {
                     let port = if *main { setup.main } else { 1 - setup.main };
                     self.ports[port].queue.extend(lines.iter().cloned());
                 }
-                Deed::Characters(port, characters, after) => {
+                Op::Characters(port, characters, after) => {
                     // The pin may stop the sender between two of them.
                     let one = self.ports[*port].by_pin;
                     let characters = if one { &characters[..1] } else { characters };
                     self.ports[*port].inserts.push_back(((*after).into(), characters));
                 }
-                Deed::Hold(port, holds) => self.hold(*port, *holds),
-                Deed::Ask(port) => self.ports[*port].asks = true,
-                Deed::Wait(ms) => self.run((*ms).into())?,
-                Deed::Rest => self.rest()?,
+                Op::Hold(port, holds) => self.hold(*port, *holds),
+                Op::Ask(port) => self.ports[*port].asks = true,
+                Op::Wait(ms) => self.run((*ms).into())?,
+                Op::Rest => self.rest()?,
             }
         }
         self.rest()?;

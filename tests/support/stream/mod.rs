@@ -3,7 +3,7 @@
 //!
 //! | file | is |
 //! |---|---|
-//! | `deeds` | what a conversation is made of, at random |
+//! | `ops` | what a conversation is made of, at random |
 //! | `lines` | the lines, and what each is to do |
 //! | `port` | a sender: what it may put on the line, and when |
 //! | `ledger` | which lines wait for answers, and in which order these may come |
@@ -13,10 +13,10 @@
 
 pub mod answer;
 pub mod course;
-pub mod deeds;
 pub mod dialogue;
 pub mod json;
 mod judge;
 pub mod ledger;
 pub mod lines;
+pub mod ops;
 pub mod port;

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-use super::deeds::{Count, Setup};
 use super::ledger::{Cut, Ledger, Sent};
 use super::lines::{Effect, End, Kind, Line, Template, What};
+use super::ops::{Count, Setup};
 
 /// Bytes that arrive in a ms, at most.
 pub const BYTES_MS: usize = 11;

@@ -41,8 +41,8 @@ const HOT: &[&str] = &[
     "kerf::gcode::number::",
     "kerf::gcode::state::State>::advance::",
     "kerf::gcode::state::State>::carry_out",
-    "kerf::gcode::state::State>::usual::",
-    "kerf::gcode::usual::",
+    "kerf::gcode::state::State>::fast_path::",
+    "kerf::gcode::fast_path::",
     "kerf::motion::block::Line>::",
     "kerf::motion::chain::Slope>::is_above",
     "kerf::motion::constraint::",
@@ -100,7 +100,7 @@ pub const WARM: &[&str] = &[
     "kerf::gcode::state::State>::execute::",
     "kerf::gcode::state::State>::finish::",
     "kerf::gcode::state::State>::motion::",
-    "kerf::gcode::usual::Words>::integer",
+    "kerf::gcode::fast_path::Words>::integer",
     "kerf::motion::",
     "kerf::motion::limits::over",
     "kerf::motion::line::Builder>::line::",
@@ -139,7 +139,7 @@ pub const WARM: &[&str] = &[
 
 /// Of these, what seldom runs.
 const COLD: &[&str] = &[
-    "kerf::gcode::usual::Words>::feed",
+    "kerf::gcode::fast_path::Words>::feed",
     "kerf::motion::chain::Chain>::closed",
     "kerf::motion::curve::Curve>::of",
     "kerf::motion::curve::acceleration",

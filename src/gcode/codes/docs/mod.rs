@@ -19,7 +19,7 @@ pub use markdown::markdown;
 use super::super::command::Commands;
 use super::super::interpreter::Interpreter;
 use super::super::setup::{AxisMode, Setup};
-use super::super::tables::{Edit, Ram, Row, Tables};
+use super::super::tables::{Edit, Ram, TableRow, Tables};
 use super::Code;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
@@ -126,15 +126,15 @@ impl Fresh {
 }
 
 impl Tables for Fresh {
-    fn row(&self, row: Row) -> PerAxis<Length> {
+    fn row(&self, row: TableRow) -> PerAxis<Length> {
         self.0.row(row)
     }
 
-    fn is_stored(&self, _row: Row) -> bool {
+    fn is_stored(&self, _row: TableRow) -> bool {
         false
     }
 
-    fn takes(&self, row: Row) -> bool {
+    fn takes(&self, row: TableRow) -> bool {
         self.0.takes(row)
     }
 

@@ -21,7 +21,7 @@ fn every_token_has_a_name_that_finds_it() {
     for token in (0..small).chain(rows).map(Token) {
         match token.subject() {
             None => continue,
-            Some(Subject::Row(row, axis)) if !row.has(axis) => continue,
+            Some(Subject::TableRow(row, axis)) if !row.has(axis) => continue,
             Some(_) => {}
         }
         assert_eq!(Token::find(&token.name()), Some(token), "{}", text(token));
@@ -69,9 +69,9 @@ fn names_mean_what_they_should() {
     assert_eq!(resolved("N"), Target::Token(Token::single(0)));
     assert_eq!(resolved("4"), Target::Group(Group::Settings(Owner::Motor(3))));
     assert_eq!(resolved("pwr"), Target::Group(Group::Vector(6)));
-    assert_eq!(resolved("G59"), Target::Group(Group::Row(Row::system(5))));
+    assert_eq!(resolved("G59"), Target::Group(Group::TableRow(TableRow::system(5))));
     assert_eq!(resolve(name("g59"), b"1x"), resolved("g591x"));
-    assert_eq!(resolved("CLEAR"), Target::Action(Action::Clear));
+    assert_eq!(resolved("CLEAR"), Target::Operation(Operation::Clear));
     assert_eq!(resolved("sr"), Target::Group(Group::Report));
     assert_eq!(resolved("toolong"), Target::Unknown);
     assert_eq!(resolved("5"), Target::Unknown);

@@ -227,7 +227,7 @@ impl Emulated {
     }
 
     /// The program at the other end of USB goes on like this.
-    pub fn talk(&mut self, talks: Talks) {
+    pub fn session(&mut self, talks: Talks) {
         self.request.usb = Some(talks);
     }
 

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`reading`] | where each line must end, and what it asks of heaters |
 //! | [`path`] | whether every step is on the way from line to line |
-//! | [`talk`] | a printing host: line numbers, checksums, one line in flight |
+//! | [`session`] | a printing host: line numbers, checksums, one line in flight |
 //! | [`heat`] | how hot it was, and how well that was held |
 //!
 //! Settings are asked of a twin, in TinyG's dialect: the port that prints speaks that of printing hosts from its first line on. Steps count from the
@@ -13,7 +13,7 @@
 mod heat;
 mod path;
 pub mod reading;
-mod talk;
+mod session;
 
 use anyhow::{Context, Result, bail, ensure};
 use kerf::boards::{Board, MOTORS};
@@ -30,7 +30,7 @@ use crate::trace::Trace;
 pub use heat::Heat;
 pub use path::{Followed, Place};
 use reading::{Asked, Corner};
-use talk::Talk;
+use session::Session;
 
 /// The machine whose settings a print has unless its image has another than `careful`.
 const PRINTER: &str = "{mch:3}";
@@ -66,7 +66,7 @@ fn twin(machine: &Machine, lines: &Lines, settings: &[String]) -> Result<(Machin
 /// What is known of a print while it runs.
 struct Run<'a> {
     machine: &'a mut Machine,
-    talk: Talk,
+    session: Session,
     setup: Setup,
     corners: Result<Vec<Corner>, Unclear>,
     heat: heat::Meter,
@@ -90,8 +90,8 @@ pub fn run(
     machine.build(&crate::mechanics::Build::printer(machine.board(), &setup));
     machine.build_heaters();
     machine.recorder_mut().keep_log();
-    let mut talk = Talk::new();
-    talk.boot(machine, BOOT_MS)?;
+    let mut session = Session::new();
+    session.boot(machine, BOOT_MS)?;
     let began = machine.cycle();
     let trace = options.vcd.as_deref().map(|path| {
         let clock_hz = machine.board().clock_hz;
@@ -102,7 +102,7 @@ pub fn run(
     let corners = reading::read(lines);
     let heat = heat::Meter::default();
     let (home, progress_at) = (0, began);
-    let mut run = Run { machine, talk, setup, corners, heat, home, began, progress_at };
+    let mut run = Run { machine, session, setup, corners, heat, home, began, progress_at };
     run.count_from(0);
     let end = run.stream(lines, &mut progress).and_then(|()| run.settle());
     if let Some(trace) = run.machine.set_trace(None) {
@@ -113,18 +113,18 @@ pub fn run(
 
 impl Run<'_> {
     fn stream(&mut self, lines: &Lines, progress: &mut impl FnMut(usize)) -> Result<()> {
-        self.talk.set_number(self.machine, LINE_MS)?;
+        self.session.set_number(self.machine, LINE_MS)?;
         for (n, (number, text)) in lines.iter().enumerate() {
             let line = reading::without_comment(text);
             if !line.is_empty() {
                 self.asked(line);
-                self.talk.say(self.machine, *number, line, HEAT_MS)?;
+                self.session.say(self.machine, *number, line, HEAT_MS)?;
                 self.progress_at = self.machine.cycle();
                 self.answered(n);
             }
             progress(n + 1);
         }
-        self.talk.say(self.machine, 0, "M400", LINE_MS)
+        self.session.say(self.machine, 0, "M400", LINE_MS)
     }
 
     fn asked(&mut self, line: &str) {
@@ -190,7 +190,7 @@ impl Run<'_> {
         let end = self.machine.cycle() + self.machine.cycles(LINE_MS);
         let still = self.machine.cycles(STILL_MS);
         loop {
-            self.talk.run_for_ms(self.machine, STILL_MS / 4)?;
+            self.session.run_for_ms(self.machine, STILL_MS / 4)?;
             let now = self.machine.cycle();
             let moved = self.machine.recorder().last_step().unwrap_or(0);
             if now - moved.max(self.progress_at) > still {
@@ -224,12 +224,12 @@ impl Run<'_> {
             self.machine,
             Measured {
                 lines,
-                acknowledged: if end.is_ok() { lines } else { self.talk.answered() },
+                acknowledged: if end.is_ok() { lines } else { self.session.answered() },
                 skipped: 0,
-                rejected: self.talk.take_rejected(),
-                restarts: self.talk.starts(),
-                late_segments: Some(self.talk.late()),
-                strays: self.talk.strays().to_vec(),
+                rejected: self.session.take_rejected(),
+                restarts: self.session.starts(),
+                late_segments: Some(self.session.late()),
+                strays: self.session.strays().to_vec(),
                 seconds_to_idle: to_idle,
                 seconds_to_answer: to_answer,
                 setup: self.setup.clone(),

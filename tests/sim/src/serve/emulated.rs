@@ -73,7 +73,7 @@ impl Server {
     fn new(args: &ServeArgs, board: &'static Board) -> Result<Self> {
         let mut emulated = Emulated::load(&args.target.elf, board)?;
         emulated.wire(&switches(&around(board), board));
-        emulated.talk(Talks { open: false, reads: true });
+        emulated.session(Talks { open: false, reads: true });
         let mut pty = Pty::new()?;
         if let Some(link) = &args.link {
             pty.link(link)?;
@@ -97,7 +97,7 @@ impl Server {
             if is_open {
                 self.opened = steps(&self.board);
             }
-            self.board.talk(Talks { open: is_open, reads: true });
+            self.board.session(Talks { open: is_open, reads: true });
         }
         if is_open && self.board.waiting() < BACKLOG {
             let bytes = self.pty.read()?;

@@ -53,7 +53,7 @@ struct Axis {
 
 /// What is known of all of them.
 #[derive(Clone, Debug)]
-pub struct Whereabouts {
+pub struct PositionModel {
     axes: [Axis; 4],
     /// Other switches have changed since.
     disturbed: bool,
@@ -62,7 +62,7 @@ pub struct Whereabouts {
 /// A place that is known to the step, as cells of the grid.
 pub struct Place([i64; 4]);
 
-impl Whereabouts {
+impl PositionModel {
     /// Of a machine that has just started, and calls the place 0 to which its motors have made `steps`.
     pub fn at_start(steps: [i64; 4]) -> Self {
         let axis = |steps: i64| Axis { offset: -steps, exact: true, homed: false, doubted: false };

@@ -5,7 +5,7 @@ use proptest::sample::select;
 
 /// One thing that is done.
 #[derive(Clone, Debug)]
-pub enum Deed {
+pub enum Op {
     /// A line, with bytes that act put in before these of its bytes.
     Line(String, Vec<(usize, u8)>),
     /// Such bytes between lines.
@@ -20,19 +20,19 @@ pub enum Deed {
     Reset,
 }
 
-/// A conversation of so many deeds at most, with waits of so many ms.
-pub fn conversation(deeds: usize, wait: u64) -> impl Strategy<Value = Vec<Deed>> {
-    prop::collection::vec(deed(wait), 1..=deeds)
+/// A conversation of so many ops at most, with waits of so many ms.
+pub fn conversation(ops: usize, wait: u64) -> impl Strategy<Value = Vec<Op>> {
+    prop::collection::vec(op(wait), 1..=ops)
 }
 
-fn deed(wait: u64) -> impl Strategy<Value = Deed> {
+fn op(wait: u64) -> impl Strategy<Value = Op> {
     prop_oneof![
-        40 => (line(), within()).prop_map(|(line, within)| Deed::Line(line, within)),
-        15 => prop::collection::vec(select(ACTS), 1..4).prop_map(Deed::Bytes),
-        20 => prop_oneof![0..wait / 20, 0..wait].prop_map(Deed::Wait),
-        5 => select(ASIDE).prop_map(Deed::Aside),
-        3 => Just(Deed::Rest),
-        2 => Just(Deed::Reset),
+        40 => (line(), within()).prop_map(|(line, within)| Op::Line(line, within)),
+        15 => prop::collection::vec(select(ACTS), 1..4).prop_map(Op::Bytes),
+        20 => prop_oneof![0..wait / 20, 0..wait].prop_map(Op::Wait),
+        5 => select(ASIDE).prop_map(Op::Aside),
+        3 => Just(Op::Rest),
+        2 => Just(Op::Reset),
     ]
 }
 

@@ -6,7 +6,7 @@ use proptest::sample::select;
 
 /// One thing that is done.
 #[derive(Clone, Debug)]
-pub enum Deed {
+pub enum Op {
     /// A line on a port.
     Line(usize, String),
     /// Bytes between lines on a port.
@@ -28,8 +28,8 @@ pub enum Deed {
 /// How long a conversation takes.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
-    /// Most deeds.
-    pub deeds: usize,
+    /// Most ops.
+    pub ops: usize,
     /// Longest move of an axis, in 0.001 mm.
     pub way: i32,
     /// Radius of an arc of three turns, mm.
@@ -42,22 +42,22 @@ pub struct Scale {
 pub const BY_HAND: [usize; 4] = [Y_MIN, PROBE, DOOR, STOP];
 
 /// A conversation.
-pub fn conversation(scale: Scale) -> impl Strategy<Value = Vec<Deed>> {
-    prop::collection::vec(deed(scale), 1..=scale.deeds)
+pub fn conversation(scale: Scale) -> impl Strategy<Value = Vec<Op>> {
+    prop::collection::vec(op(scale), 1..=scale.ops)
 }
 
-fn deed(scale: Scale) -> impl Strategy<Value = Deed> {
+fn op(scale: Scale) -> impl Strategy<Value = Op> {
     prop_oneof![
-        30 => line(scale).prop_map(|line| Deed::Line(0, line)),
-        20 => select(CHARACTERS).prop_map(|characters| Deed::Characters(0, characters)),
-        20 => prop_oneof![0..scale.wait / 50, 0..scale.wait].prop_map(Deed::Wait),
-        3 => (select(HALVES), select(CHARACTERS)).prop_map(|((a, b), c)| Deed::Within(a, c, b)),
-        3 => select(ASIDE).prop_map(|line| Deed::Line(1, line.to_string())),
-        2 => select(CHARACTERS).prop_map(|characters| Deed::Characters(1, characters)),
-        1 => any::<bool>().prop_map(Deed::Hold),
-        4 => (select(&BY_HAND[..]), any::<bool>()).prop_map(|(input, closed)| Deed::Input(input, closed)),
-        3 => Just(Deed::Rest),
-        1 => Just(Deed::Reset),
+        30 => line(scale).prop_map(|line| Op::Line(0, line)),
+        20 => select(CHARACTERS).prop_map(|characters| Op::Characters(0, characters)),
+        20 => prop_oneof![0..scale.wait / 50, 0..scale.wait].prop_map(Op::Wait),
+        3 => (select(HALVES), select(CHARACTERS)).prop_map(|((a, b), c)| Op::Within(a, c, b)),
+        3 => select(ASIDE).prop_map(|line| Op::Line(1, line.to_string())),
+        2 => select(CHARACTERS).prop_map(|characters| Op::Characters(1, characters)),
+        1 => any::<bool>().prop_map(Op::Hold),
+        4 => (select(&BY_HAND[..]), any::<bool>()).prop_map(|(input, closed)| Op::Input(input, closed)),
+        3 => Just(Op::Rest),
+        1 => Just(Op::Reset),
     ]
 }
 

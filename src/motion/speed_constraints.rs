@@ -27,7 +27,7 @@
 //! limit k is 0, and it is the first.
 //!
 //! **Lowest keys.** Keys that come after a lower one matter once that has been passed; those before a
-//! lower one never. So the horizon keeps a list of rising keys ([`Horizon::seqs`]): adding a key drops
+//! lower one never. So [`SpeedConstraints`] keeps a list of rising keys ([`SpeedConstraints::seqs`]): adding a key drops
 //! those at the list's end that are not below it, passing a block drops it at the front. Each key is
 //! added once and dropped once. A block that does not limit what is limited already (same
 //! feed, no corner) needs no entry at all.
@@ -43,8 +43,8 @@
 //! the feed. A greater one waits for the keys.
 //!
 //! Potentials grow for ever. When they have got so large that floats would be coarse for a line, they are counted from
-//! zero again from that line on ([`Horizon::count_anew`]). Until exec has come there, what was left out
-//! ([`Horizon::lifted`]) is added where potentials on both sides meet. One such place is in the queue at a time: a slow line
+//! zero again from that line on ([`SpeedConstraints::count_anew`]). Until exec has come there, what was left out
+//! ([`SpeedConstraints::lifted`]) is added where potentials on both sides meet. One such place is in the queue at a time: a slow line
 //! behind fast ones that follow it has what is left, and the velocity at its end may be off by some 0.1 % of theirs.
 //!
 //! Cost: a push 1,000 cycles, and 700 for each key dropped.
@@ -113,7 +113,7 @@ impl Line {
 /// Keys of blocks in the queue, lowest first, which is nearest first too.
 #[derive(Debug)]
 #[repr(C)]
-pub struct Horizon {
+pub struct SpeedConstraints {
     // What is used most comes first: the CPU reaches 64 bytes from a pointer.
     front: Index,
     len: Index,
@@ -137,8 +137,8 @@ pub struct Horizon {
     entries: [u16; BLOCKS],
 }
 
-impl Horizon {
-    /// The horizon of an empty queue.
+impl SpeedConstraints {
+    /// The speed constraints of an empty queue.
     pub const fn new() -> Self {
         // All zero, so that it is not in flash as well: `begin` comes before anything else.
         let none = Factors { feed: 0.0, traverse: 0.0 };
@@ -283,7 +283,7 @@ impl Horizon {
     }
 }
 
-/// Keys that are to be those of the horizon, made from the last one to the first.
+/// Keys that are to be those of the speed constraints, made from the last one to the first.
 pub struct Keys {
     front: Index,
     seqs: [Index; BLOCKS],
@@ -307,7 +307,7 @@ impl Keys {
     }
 }
 
-/// See [`Horizon::older`].
+/// See [`SpeedConstraints::older`].
 #[derive(Clone, Copy)]
 pub struct Older {
     /// How many blocks are counted anew.
@@ -323,7 +323,7 @@ impl Older {
     }
 }
 
-impl Default for Horizon {
+impl Default for SpeedConstraints {
     fn default() -> Self {
         Self::new()
     }
@@ -335,11 +335,12 @@ mod tests {
     use proptest::prelude::*;
 
     /// What `slower` is to say, one key after the other.
-    fn expected(horizon: &Horizon, n: u8, velocity: Short) -> u8 {
+    fn expected(constraints: &SpeedConstraints, n: u8, velocity: Short) -> u8 {
         let stops = |n: &u8| {
-            horizon.nth(*n).is_some_and(|seq| seq & FIRM != 0) || horizon.entry(*n) < velocity
+            constraints.nth(*n).is_some_and(|seq| seq & FIRM != 0)
+                || constraints.entry(*n) < velocity
         };
-        (n..horizon.len).find(stops).unwrap_or(horizon.len.max(n))
+        (n..constraints.len).find(stops).unwrap_or(constraints.len.max(n))
     }
 
     proptest! {
@@ -350,13 +351,13 @@ mod tests {
             n in 0..BLOCKS as u8,
             velocity in 0u8..21,
         ) {
-            let mut horizon = Horizon { front, ..Horizon::new() };
+            let mut constraints = SpeedConstraints { front, ..SpeedConstraints::new() };
             for (entry, kind) in keys {
                 let firm = if kind == 0 { FIRM } else { 0 };
-                horizon.add(kind | firm, Short::new(entry.into()));
+                constraints.add(kind | firm, Short::new(entry.into()));
             }
-            let (n, velocity) = (n.min(horizon.len), Short::new(velocity.into()));
-            prop_assert_eq!(horizon.slower(n, velocity), expected(&horizon, n, velocity));
+            let (n, velocity) = (n.min(constraints.len), Short::new(velocity.into()));
+            prop_assert_eq!(constraints.slower(n, velocity), expected(&constraints, n, velocity));
         }
     }
 }

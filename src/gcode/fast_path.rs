@@ -1,4 +1,4 @@
-//! The usual line, read and carried out in one pass: axis words, with G0 or G1, F and N, while lengths
+//! The fast path: a line of the usual kind, read and carried out in one pass: axis words, with G0 or G1, F and N, while lengths
 //! are in millimetres.
 //!
 //! [`Interpreter::interpret`](super::Interpreter::interpret) asks here first. Any other line is declined before anything has changed,
@@ -66,11 +66,11 @@ struct Words<'a> {
 }
 
 impl State {
-    /// Carries a usual line out: with [`Interpreter::interpret`](super::Interpreter::interpret) it would be `Ok`,
+    /// Carries a line out by the fast path: with [`Interpreter::interpret`](super::Interpreter::interpret) it would be `Ok`,
     /// without a comment, and a move. False, and nothing done, if it is none. A line of a printing host is one that is written for the
     /// interpreter already but for E and G0.
     #[inline(never)]
-    pub fn usual(
+    pub fn fast_path(
         &mut self,
         line: &[u8],
         writer: Writer,
@@ -240,7 +240,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// Reads the line, whose lengths count from `from`. False if it is not usual.
+    /// Reads the line, whose lengths count from `from`. False if it is not for the fast path.
     #[inline(never)]
     fn read(&mut self, from: &PerAxis<Length>) -> bool {
         loop {
@@ -281,7 +281,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// A word that is none of an axis. False if it is not usual.
+    /// A word that is none of an axis. False if it is not for the fast path.
     #[inline(never)]
     fn other(&mut self, letter: u8) -> bool {
         self.step();
@@ -307,7 +307,7 @@ impl<'a> Words<'a> {
         true
     }
 
-    /// A number in ten-thousandths. One that is not usual leaves `BAD` to be read.
+    /// A number in ten-thousandths. One that is not for the fast path leaves `BAD` to be read.
     #[inline(never)]
     fn number(&mut self) -> i32 {
         let negative = self.byte == b'-';
@@ -374,7 +374,7 @@ impl<'a> Words<'a> {
         number.unwrap_or_default()
     }
 
-    /// A whole number below ten million. One that is longer is not usual: its next digit is no letter.
+    /// A whole number below ten million. One that is longer is not for the fast path: its next digit is no letter.
     #[inline(never)]
     fn integer(&mut self) -> u32 {
         let mut value = 0;

@@ -2,14 +2,14 @@
 //!
 //! Whatever is sent, and whatever switches do: the machine comes to rest, every line is answered once, jogs are said to
 //! have ended, outputs are as they are said to be, and where the machine says that it is its motors are, by the steps
-//! that were made ([`Whereabouts`]).
+//! that were made ([`PositionModel`]).
 
 use kerf::boards::outputs;
 
-use crate::deeds::{BY_HAND, Deed};
+use crate::ops::{BY_HAND, Op};
+use crate::position_model::{PositionModel, SETTINGS, SWITCHES, number};
 use crate::sender::Sender;
 use crate::side::Side;
-use crate::whereabouts::{SETTINGS, SWITCHES, Whereabouts, number};
 
 /// Lines in flight on each port.
 const IN_FLIGHT: [usize; 2] = [4, 2];
@@ -28,10 +28,10 @@ const BLOCKS: f64 = 61.0;
 const ROUNDED: f64 = 0.0016;
 
 /// A sender's side of a conversation, and what is known of the machine.
-pub struct Talk<S> {
+pub struct Session<S> {
     side: S,
     ports: [Sender; 2],
-    whereabouts: Whereabouts,
+    position_model: PositionModel,
     /// Inputs that are closed by hand, as bits.
     closed: u16,
     /// What has been done, for whoever looks for the reason of a failure.
@@ -40,13 +40,13 @@ pub struct Talk<S> {
 
 type Outcome<T> = Result<T, String>;
 
-impl<S: Side> Talk<S> {
+impl<S: Side> Session<S> {
     /// With a machine that has not booted, or is about to say that it has.
     pub fn new(mut side: S) -> Self {
         side.wire(&SWITCHES, 0);
         let ports = [Sender::new(0), Sender::new(1)];
-        let whereabouts = Whereabouts::at_start(side.steps());
-        Self { side, ports, whereabouts, closed: 0, log: Vec::new() }
+        let position_model = PositionModel::at_start(side.steps());
+        Self { side, ports, position_model, closed: 0, log: Vec::new() }
     }
 
     /// Boots a machine that has never been used.
@@ -72,37 +72,37 @@ impl<S: Side> Talk<S> {
                 return Err("no SYSTEM READY".to_string());
             }
         }
-        self.whereabouts = Whereabouts::at_start(self.side.steps());
+        self.position_model = PositionModel::at_start(self.side.steps());
         // Its port is decided for TinyG's dialect, in which a reset starts the board anew.
         self.line(0, "{stat:n}")
     }
 
     /// Does all that. After a reset it is the rest of it that is still to be done.
-    pub fn play<'a>(&mut self, deeds: &'a [Deed]) -> Outcome<Option<&'a [Deed]>> {
-        for (at, deed) in deeds.iter().enumerate() {
-            self.log.push(format!("{deed:?}"));
-            match deed {
-                Deed::Line(port, line) => self.line(*port, line)?,
-                Deed::Characters(port, characters) => self.send(*port, characters),
-                Deed::Within(before, characters, after) => {
+    pub fn play<'a>(&mut self, ops: &'a [Op]) -> Outcome<Option<&'a [Op]>> {
+        for (at, op) in ops.iter().enumerate() {
+            self.log.push(format!("{op:?}"));
+            match op {
+                Op::Line(port, line) => self.line(*port, line)?,
+                Op::Characters(port, characters) => self.send(*port, characters),
+                Op::Within(before, characters, after) => {
                     self.patience(0)?;
-                    self.whereabouts.expect(before);
-                    self.whereabouts.expect(after);
+                    self.position_model.expect(before);
+                    self.position_model.expect(after);
                     self.send(
                         0,
                         &[before.as_bytes(), characters, after.as_bytes(), b"\n"].concat(),
                     );
                 }
-                Deed::Input(input, closed) => self.work(*input, *closed),
-                Deed::Hold(hold) => self.side.set_aux_cts(*hold),
-                Deed::Wait(ms) => self.run(*ms)?,
-                Deed::Rest => self.rest()?,
-                Deed::Reset => {
+                Op::Input(input, closed) => self.work(*input, *closed),
+                Op::Hold(hold) => self.side.set_aux_cts(*hold),
+                Op::Wait(ms) => self.run(*ms)?,
+                Op::Rest => self.rest()?,
+                Op::Reset => {
                     self.relieve();
                     // Nothing is on its way that would come into the start.
                     self.run(20)?;
                     self.send(0, b"g91 g0 x\x18");
-                    return Ok(deeds.get(at + 1..));
+                    return Ok(ops.get(at + 1..));
                 }
             }
         }
@@ -112,10 +112,10 @@ impl<S: Side> Talk<S> {
     /// Comes to rest, and goes to a place that is known to the step, near where the motors were at first.
     pub fn finish(&mut self) -> Outcome<()> {
         self.rest()?;
-        let (place, line) = self.whereabouts.way_home();
+        let (place, line) = self.position_model.way_home();
         self.line(0, &line)?;
         self.rest()?;
-        self.whereabouts.arrive(&place, self.side.steps())?;
+        self.position_model.arrive(&place, self.side.steps())?;
         self.log.clear();
         self.ports.iter_mut().for_each(|port| port.heard.clear());
         Ok(())
@@ -148,7 +148,7 @@ impl<S: Side> Talk<S> {
     /// Sends a line when fewer than it may wait for their answers.
     fn line(&mut self, port: usize, line: &str) -> Outcome<()> {
         self.patience(port)?;
-        self.whereabouts.expect(line);
+        self.position_model.expect(line);
         self.send(port, format!("{line}\n").as_bytes());
         Ok(())
     }
@@ -184,7 +184,7 @@ impl<S: Side> Talk<S> {
     /// Works an input by hand.
     fn work(&mut self, input: usize, closed: bool) {
         self.closed = self.closed & !(1 << input) | u16::from(closed) << input;
-        self.whereabouts.disturb();
+        self.position_model.disturb();
         self.side.set_input(input, closed);
     }
 
@@ -241,7 +241,7 @@ impl<S: Side> Talk<S> {
 
     fn check_position(&mut self) -> Outcome<()> {
         let Some(told) = self.ask("{mpo:n}", "mpo")? else { return Err("no position".to_string()) };
-        self.whereabouts.compare(&told, self.side.steps())?;
+        self.position_model.compare(&told, self.side.steps())?;
         let called = self.ask("{pos:n,ofs:n}", "pos")?.ok_or("no position of the system")?;
         let (called, offset) = called.split_once("\"ofs\":").ok_or("no offset")?;
         for axis in ["\"x\":", "\"y\":", "\"z\":", "\"a\":"] {

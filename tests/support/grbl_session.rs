@@ -8,7 +8,7 @@
 
 use std::collections::VecDeque;
 
-use crate::grbl_deeds::Deed;
+use crate::grbl_ops::Op;
 use crate::side::Side;
 
 /// What a sender that counts characters takes for the size of the buffer.
@@ -44,7 +44,7 @@ struct Sent {
 }
 
 /// A sender's side of a conversation, and what is known of the machine.
-pub struct Talk<S> {
+pub struct Session<S> {
     side: S,
     /// Longest until a report has come, ms: 10 of these on the wire. What its port has been told before takes its time besides.
     report_ms: u64,
@@ -76,11 +76,11 @@ pub struct Talk<S> {
     log: Vec<String>,
 }
 
-impl<S: Side> Talk<S> {
+impl<S: Side> Session<S> {
     /// With a machine that is about to boot.
     pub fn new(side: S, report_ms: u64) -> Self {
         let base = side.steps();
-        Talk {
+        Session {
             side,
             report_ms,
             longest_ms: 0,
@@ -123,16 +123,16 @@ impl<S: Side> Talk<S> {
     }
 
     /// Has the conversation, to a rest.
-    pub fn play(&mut self, deeds: &[Deed]) -> Outcome<()> {
-        for deed in deeds {
-            self.log.push(format!("{deed:?}"));
-            match deed {
-                Deed::Line(line, within) => self.line(line, within)?,
-                Deed::Bytes(bytes) => bytes.iter().for_each(|byte| self.act(*byte)),
-                Deed::Aside(line) => self.aside(line)?,
-                Deed::Wait(ms) => self.run(*ms)?,
-                Deed::Rest => self.rest()?,
-                Deed::Reset => {
+    pub fn play(&mut self, ops: &[Op]) -> Outcome<()> {
+        for op in ops {
+            self.log.push(format!("{op:?}"));
+            match op {
+                Op::Line(line, within) => self.line(line, within)?,
+                Op::Bytes(bytes) => bytes.iter().for_each(|byte| self.act(*byte)),
+                Op::Aside(line) => self.aside(line)?,
+                Op::Wait(ms) => self.run(*ms)?,
+                Op::Rest => self.rest()?,
+                Op::Reset => {
                     self.side.send(b"G91 G0 X5");
                     self.reset()?;
                 }

@@ -29,7 +29,7 @@ const MUTING: [&[u8]; 7] = [b"jv", b"tv", b"baud", b"ee0", b"ee1", b"eet", b"dia
 struct TooLong;
 
 /// A machine, and what it has said.
-pub struct Talk {
+pub struct Session {
     machine: Machine,
     ears: Ears,
     events: u32,
@@ -39,11 +39,11 @@ pub struct Talk {
     turns: bool,
 }
 
-impl Talk {
+impl Session {
     /// Boots a machine that is going to be sent `text`.
     pub fn begin(text: &[u8]) -> Self {
         let machine = Machine::boot(BAUD).expect("one machine in each thread");
-        let mut talk = Self {
+        let mut session = Self {
             machine,
             ears: Ears::default(),
             events: 0,
@@ -51,16 +51,16 @@ impl Talk {
             turns: names_any(&THREADS, text),
         };
         // Greeted in both dialects.
-        talk.ears.deaf = true;
-        let greeted = talk.run(LAST_MS, |ears| ears.answers == 1);
+        session.ears.deaf = true;
+        let greeted = session.run(LAST_MS, |ears| ears.answers == 1);
         assert!(matches!(greeted, Ok(true)), "no greeting");
         // A line of JSON decides for TinyG's, whose answers are counted.
-        talk.machine.send(b"{fv:n}\n");
-        let decided = talk.run(LAST_MS, |ears| ears.answers == 2);
+        session.machine.send(b"{fv:n}\n");
+        let decided = session.run(LAST_MS, |ears| ears.answers == 2);
         assert!(matches!(decided, Ok(true)), "no answer");
-        talk.ears.answers = 0;
-        talk.ears.deaf = talk.mute;
-        talk
+        session.ears.answers = 0;
+        session.ears.deaf = session.mute;
+        session
     }
 
     /// Sends `text` and checks what comes of it.

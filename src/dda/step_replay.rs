@@ -13,15 +13,15 @@ use crate::boards::MOTORS;
 /// Steps in a phase.
 const STEP_LOG2: u32 = STEP.trailing_zeros();
 
-/// Follows the generator.
+/// A replay of the steps that the generator makes.
 #[derive(Clone, Debug, Default)]
-pub struct Follow {
+pub struct StepReplay {
     phase: [u16; MOTORS],
     backwards: u8,
     steps: [i32; MOTORS],
 }
 
-impl Follow {
+impl StepReplay {
     /// At no moment.
     pub const fn new() -> Self {
         Self { phase: [0; MOTORS], backwards: 0, steps: [0; MOTORS] }
@@ -158,10 +158,10 @@ mod tests {
                 dda.tick(&mut pins, &mut consumer);
             }
             if let Some((dda, position, waiting)) = at {
-                let mut follow = Follow::new();
-                follow.begin(&dda);
-                segments[segments.len() - waiting..].iter().for_each(|segment| follow.run(segment));
-                prop_assert_eq!(follow.before(&pins.position), position);
+                let mut replay = StepReplay::new();
+                replay.begin(&dda);
+                segments[segments.len() - waiting..].iter().for_each(|segment| replay.run(segment));
+                prop_assert_eq!(replay.before(&pins.position), position);
             }
         }
     }
@@ -170,8 +170,8 @@ mod tests {
     fn lockstep_is_a_step_each_tick() {
         let segment = segment([STEP, 0, STEP, 0], 100, 0b100);
         assert_eq!(segment.mode, LOCKSTEP | 0b101);
-        let mut follow = Follow::new();
-        follow.run(&segment);
-        assert_eq!(follow.before(&[0; MOTORS]), [-100, 0, 100, 0]);
+        let mut replay = StepReplay::new();
+        replay.run(&segment);
+        assert_eq!(replay.before(&[0; MOTORS]), [-100, 0, 100, 0]);
     }
 }

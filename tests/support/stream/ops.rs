@@ -38,7 +38,7 @@ pub struct Setup {
 
 /// One thing that is done.
 #[derive(Clone, Debug)]
-pub enum Deed {
+pub enum Op {
     /// Lines for the stream of the main port, or the other.
     Feed(bool, Vec<Template>),
     /// Characters in the stream of a port, after so many of its bytes.
@@ -56,8 +56,8 @@ pub enum Deed {
 /// How long a conversation takes.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
-    /// Most deeds, and most lines of one.
-    pub deeds: usize,
+    /// Most ops, and most lines of one.
+    pub ops: usize,
     pub lines: usize,
     /// Longest wait, ms.
     pub wait: u16,
@@ -66,8 +66,8 @@ pub struct Scale {
 }
 
 /// A conversation.
-pub fn conversation(scale: Scale) -> impl Strategy<Value = (Setup, Vec<Deed>)> {
-    (setup(scale), prop::collection::vec(deed(scale), 1..=scale.deeds))
+pub fn conversation(scale: Scale) -> impl Strategy<Value = (Setup, Vec<Op>)> {
+    (setup(scale), prop::collection::vec(op(scale), 1..=scale.ops))
 }
 
 fn setup(scale: Scale) -> impl Strategy<Value = Setup> {
@@ -88,16 +88,16 @@ fn setup(scale: Scale) -> impl Strategy<Value = Setup> {
     })
 }
 
-fn deed(scale: Scale) -> impl Strategy<Value = Deed> {
+fn op(scale: Scale) -> impl Strategy<Value = Op> {
     let lines = prop::collection::vec(template(), 1..=scale.lines);
     prop_oneof![
-        12 => (prop::bool::weighted(0.8), lines).prop_map(|(main, lines)| Deed::Feed(main, lines)),
+        12 => (prop::bool::weighted(0.8), lines).prop_map(|(main, lines)| Op::Feed(main, lines)),
         12 => (0..2usize, select(CHARACTERS), any::<u8>())
-            .prop_map(|(port, characters, after)| Deed::Characters(port, characters, after)),
-        6 => (0..2usize, any::<bool>()).prop_map(|(port, holds)| Deed::Hold(port, holds)),
-        8 => (0..2usize).prop_map(Deed::Ask),
-        12 => prop_oneof![0..40u16, 0..scale.wait].prop_map(Deed::Wait),
-        2 => Just(Deed::Rest),
+            .prop_map(|(port, characters, after)| Op::Characters(port, characters, after)),
+        6 => (0..2usize, any::<bool>()).prop_map(|(port, holds)| Op::Hold(port, holds)),
+        8 => (0..2usize).prop_map(Op::Ask),
+        12 => prop_oneof![0..40u16, 0..scale.wait].prop_map(Op::Wait),
+        2 => Just(Op::Rest),
     ]
 }
 

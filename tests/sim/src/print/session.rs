@@ -10,7 +10,7 @@ const LOOK_MS: u64 = 100;
 
 /// The host.
 #[derive(Default)]
-pub struct Talk {
+pub struct Session {
     number: i64,
     partial: Vec<u8>,
     /// Lines that came and were not looked at.
@@ -25,7 +25,7 @@ pub struct Talk {
 /// What comes unasked and is no fault.
 const NOTICES: [&str; 3] = ["echo:busy: processing", " T:", "{\"r\":{\"fv\":"];
 
-impl Talk {
+impl Session {
     pub fn new() -> Self {
         Self::default()
     }

@@ -1,15 +1,15 @@
-//! The quick way and the general way through the interpreter are one.
+//! The fast path and the slow path of the interpreter do the same.
 
 use std::string::String;
 
 use proptest::prelude::*;
 
 use crate::gcode::command::Commands;
+use crate::gcode::fast_path::Writer;
 use crate::gcode::interpreter::Interpreter;
 use crate::gcode::setup::Usual;
-use crate::gcode::usual::Writer;
 
-/// Lines that are usual, or almost.
+/// Lines that the fast path takes, or almost.
 fn line() -> impl Strategy<Value = String> {
     let word = prop_oneof![
         8 => "[XYZABCxyz][-+]?[0-9]{0,5}(\\.[0-9]{0,5})?",
@@ -24,13 +24,14 @@ fn line() -> impl Strategy<Value = String> {
 }
 
 fn both_ways(interpreter: &mut Interpreter, line: &[u8]) -> bool {
-    let mut general = *interpreter;
+    let mut slow = *interpreter;
     let (mut out, mut expected) = (Commands::default(), Commands::default());
-    let is_usual = { *interpreter }.usual(line, Writer::Numbers, &Usual, &mut Commands::default());
+    let is_fast =
+        { *interpreter }.fast_path(line, Writer::Numbers, &Usual, &mut Commands::default());
     let done = interpreter.interpret(line, &Usual, &mut out);
-    assert_eq!(done, general.general(line, &Usual, &mut expected), "{line:?}");
-    assert_eq!((*interpreter, out), (general, expected), "{line:?}");
-    is_usual
+    assert_eq!(done, slow.slow_path(line, &Usual, &mut expected), "{line:?}");
+    assert_eq!((*interpreter, out), (slow, expected), "{line:?}");
+    is_fast
 }
 
 proptest! {
@@ -45,7 +46,7 @@ proptest! {
 }
 
 #[test]
-fn what_is_usual() {
+fn what_is_fast() {
     let mut interpreter = Interpreter::new();
     for line in ["G0X1", "g1 x12.345 y-3.21 f800", "N99 X.5 Y-0", "A1.2345 F.5 G00", " X65529 Z1."]
     {
@@ -56,9 +57,9 @@ fn what_is_usual() {
     {
         assert!(!both_ways(&mut interpreter, line.as_bytes()), "{line}");
     }
-    assert!(!interpreter.usual(b"N1X1", Writer::Plain, &Usual, &mut Commands::default()));
-    for (line, usual) in [("G91", false), ("G0X.5", true), ("X.00001", false), ("X1", false)] {
-        assert_eq!(both_ways(&mut interpreter, line.as_bytes()), usual, "{line}");
+    assert!(!interpreter.fast_path(b"N1X1", Writer::Plain, &Usual, &mut Commands::default()));
+    for (line, fast) in [("G91", false), ("G0X.5", true), ("X.00001", false), ("X1", false)] {
+        assert_eq!(both_ways(&mut interpreter, line.as_bytes()), fast, "{line}");
     }
     both_ways(&mut interpreter, b"G90");
     for mode in ["G20", "G93"] {
@@ -83,8 +84,8 @@ fn printed() -> impl Strategy<Value = (String, String)> {
     ];
     ("G[01] ", prop::collection::vec(word, 1..5)).prop_map(|(code, words)| {
         let line = code + &words.join(" ");
-        let general = line.replace("G0", "G1").replace(['E', 'e'], "A");
-        (line, general.split(';').next().unwrap().into())
+        let slow = line.replace("G0", "G1").replace(['E', 'e'], "A");
+        (line, slow.split(';').next().unwrap().into())
     })
 }
 
@@ -107,15 +108,15 @@ proptest! {
                 }
                 _ => {}
             }
-            let mut general = interpreter;
+            let mut slow = interpreter;
             let (mut out, mut expected) = (Commands::default(), Commands::default());
-            if interpreter.usual(line.as_bytes(), Writer::Prints, &Usual, &mut out) {
-                let done = general.general(words.as_bytes(), &Usual, &mut expected);
+            if interpreter.fast_path(line.as_bytes(), Writer::Prints, &Usual, &mut out) {
+                let done = slow.slow_path(words.as_bytes(), &Usual, &mut expected);
                 prop_assert!(done.is_ok(), "{} {:?}", line, done);
-                prop_assert_eq!((interpreter, out), (general, expected), "{}", line);
+                prop_assert_eq!((interpreter, out), (slow, expected), "{}", line);
             } else {
-                prop_assert_eq!(interpreter, general);
-                let _ = interpreter.general(words.as_bytes(), &Usual, &mut out);
+                prop_assert_eq!(interpreter, slow);
+                let _ = interpreter.slow_path(words.as_bytes(), &Usual, &mut out);
             }
         }
     }
@@ -123,22 +124,22 @@ proptest! {
 
 #[cfg(feature = "dialect-reprap")]
 #[test]
-fn what_is_usual_of_a_printing_host() {
+fn what_is_fast_of_a_printing_host() {
     let mut interpreter = Interpreter::new();
     interpreter.begin_printing();
-    let usual = |interpreter: &mut Interpreter, line: &str| {
-        interpreter.usual(line.as_bytes(), Writer::Prints, &Usual, &mut Commands::default())
+    let is_fast = |interpreter: &mut Interpreter, line: &str| {
+        interpreter.fast_path(line.as_bytes(), Writer::Prints, &Usual, &mut Commands::default())
     };
     for line in ["G1 X10.125 Y3 E0.12345 F1800", "G0 X3 F9000", "G1 E-2.5", "X3 E.00004", "G1 E5"] {
-        assert!(usual(&mut interpreter, line), "{line}");
+        assert!(is_fast(&mut interpreter, line), "{line}");
     }
     interpreter.set_relative(true);
     for line in ["G1 X1 E0.12345", "G1 X2 E0.00004", "G1 X3 E0.00004", "G1 E-0.00009"] {
-        assert!(usual(&mut interpreter, line), "{line}");
+        assert!(is_fast(&mut interpreter, line), "{line}");
     }
     for line in ["G1 X1 E0.123456", "G28", "G1 E123456", "N3 G1 X1", "G1 X1 ; wall", "G2 X1 I1"] {
-        assert!(!usual(&mut interpreter, line), "{line}");
+        assert!(!is_fast(&mut interpreter, line), "{line}");
     }
     interpreter.set_flow(900);
-    assert!(!usual(&mut interpreter, "G1 X1"));
+    assert!(!is_fast(&mut interpreter, "G1 X1"));
 }
