@@ -1,7 +1,7 @@
 //! The encoder of the spindle: from pulses to turns a minute, and whether they fit one another.
 //!
 //! Two sensors: the *index* gives a pulse a turn, *sync* so many (`spn`). With `spn` 1 the index alone is read. The hardware counts pulses
-//! and takes their time ([`Pulses`], `hal::encoder`); [`Encoder::look`] makes of that what is known of the spindle. It is asked each 20 ms by
+//! and takes their time ([`Pulses`], `hal::encoder`); [`Encoder::sample`] makes of that what is known of the spindle. It is asked each 20 ms by
 //! the power task (`tasks::power`), under the ceiling lock. Nothing waits, and nothing can be full: between two samples any number of pulses may
 //! have come, of which the newest counts.
 //!

@@ -41,6 +41,12 @@ pub struct Feed {
     waits: bool,
 }
 
+impl Default for Feed {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 #[small]
 impl Feed {
     /// Nothing is under way.

@@ -195,13 +195,11 @@ fn over_the_wire(kept: &[u8; 4096], text: &str) -> f64 {
     let mut printer = Printer::started(machine);
     printer.ask("M302 P1");
     printer.said.clear();
-    let mut sent = 0;
-    for line in text.lines() {
+    for (sent, line) in text.lines().enumerate() {
         while sent - printer.said.matches("ok").count() >= 4 {
             printer.run(1);
         }
         printer.machine.send(format!("{line}\n").as_bytes());
-        sent += 1;
     }
     printer.run(2_000);
     let ((first, _), (last, _)) = printer.machine.recorder().span().unwrap();
