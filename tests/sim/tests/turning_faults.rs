@@ -98,7 +98,10 @@ impl Case {
             tells: random.below(2) == 0,
             share: random.below(700) as f64 * 1e-3 + 0.05,
             // Every other case has one alone.
-            faults: [fault(random), if seed.is_multiple_of(2) { Fault::Nothing } else { fault(random) }],
+            faults: [
+                fault(random),
+                if seed.is_multiple_of(2) { Fault::Nothing } else { fault(random) },
+            ],
         }
     }
 
