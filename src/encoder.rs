@@ -9,7 +9,7 @@
 //! is one of an index. With the index alone a pulse in less than 0.6 of the turn before is one; one that is
 //! missing looks like a slower spindle. Misfits are counted (`spx`), and the first is told (exception 40).
 //!
-//! **Direction.** A second sensor of sync, if there is one and `spq` says so, has pulses count down when the spindle turns backwards. One that turns round
+//! **Direction.** A second sensor of sync, if there is one and `spdi` says so, has pulses count down when the spindle turns backwards. One that turns round
 //! outside of G33.1 is measured anew. A pass is told pulses that count up, whichever way it goes ([`Encoder::of_pass`]).
 //!
 //! **Stop.** No pulse for half a second, or for twice as long as between the last two if that is more, is a spindle that

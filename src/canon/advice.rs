@@ -106,7 +106,7 @@ const ADVICE: &[(Status, &str, &str)] = &[
     (
         WrongWay,
         "A thread was to begin, and the second sync sensor says that the spindle turns the other way than M3 or M4 has asked for. Nothing has moved.",
-        "Swap the sync sensors, or the spindle's wires; see `spdp`. `{spq:0}` has the direction not looked at.",
+        "Swap the sync sensors, or the spindle's wires; see `spdp`. `{spdi:0}` has the direction not looked at.",
     ),
     (
         SensorOpen,

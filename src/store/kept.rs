@@ -102,6 +102,6 @@ mod tests {
         }
         let heaters = if Capability::Printer.is_built_in() { 16 } else { 0 };
         assert!(keys.len() <= usize::from(KEYS));
-        assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + 10 + 9 + 2 + 16 + heaters);
+        assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + 10 + 9 + 2 + 17 + heaters);
     }
 }

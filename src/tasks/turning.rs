@@ -43,7 +43,7 @@ pub fn set_up(thread: Thread, storage: &Storage) {
             None => false,
         }
     };
-    let tells = has_second && per_turn > 1 && setting(spindle::Q) != 0;
+    let tells = has_second && per_turn > 1 && setting(spindle::DI) != 0;
     let lines = match per_turn {
         0 => 0,
         1 => 1,

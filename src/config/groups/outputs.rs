@@ -65,7 +65,7 @@ group! {
         L "l": up_to(cold(3), 100_000).with(UNIT | IDLE), 0,
             length(text!("spindle thread error limit"), NONE),
             "How far the axes of a thread may be from where the spindle says, once they have been there; beyond that is an alarm (46). 0 for no limit.";
-        Q "q": choice().with(IDLE), 0,
+        DI "di": choice().with(IDLE), 0,
             words(text!("spindle direction sensor"), OFF_ON),
             "Whether the encoder has a second sync sensor, which tells the direction. Of no use with `spn` 0 and 1, or on a board without a pin for it.";
     }

@@ -127,7 +127,7 @@ fn setting(rest: &[u8]) -> Option<Command> {
             return None;
         }
         number = number * 10 + u16::from(digit);
-        if number > u8::MAX.into() {
+        if number > u16::from(u8::MAX) {
             return None;
         }
     }

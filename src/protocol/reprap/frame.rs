@@ -213,7 +213,7 @@ pub fn fast_path(line: &[u8], session: &mut Session) -> Option<Span> {
     let mut says = 0u16;
     for byte in stated {
         let digit = byte.wrapping_sub(b'0');
-        if digit > 9 || says > u8::MAX.into() {
+        if digit > 9 || says > u16::from(u8::MAX) {
             return None;
         }
         says = says * 10 + u16::from(digit);

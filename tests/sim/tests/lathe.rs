@@ -80,7 +80,7 @@ fn the_speed_is_that_of_a_turn() {
 fn a_second_sensor_tells_the_direction() {
     for (marks, rpm) in [(8, 300.0), (8, -300.0), (100, 1_000.0), (100, -1_000.0), (400, -600.0)] {
         let (mut machine, mut host) = turning(&MEGA2560_LATHE, marks, rpm, |_| {});
-        set(&mut machine, &mut host, "{spq:1}");
+        set(&mut machine, &mut host, "{spdi:1}");
         host.run_for_ms(&mut machine, 1_500).unwrap();
         let measured = asked(&mut machine, &mut host, "sps");
         assert!((measured / rpm - 1.0).abs() < 0.001, "{marks} at {rpm}: {measured}");
@@ -102,7 +102,7 @@ fn contacts_that_bounce_tell_the_direction_too() {
         let (mut machine, mut host) =
             turning(&MEGA2560_LATHE, 4, rpm, |sensors| sensors.bounce = bounce);
         set(&mut machine, &mut host, "{spb:500}");
-        set(&mut machine, &mut host, "{spq:1}");
+        set(&mut machine, &mut host, "{spdi:1}");
         host.run_for_ms(&mut machine, 2_000).unwrap();
         let measured = asked(&mut machine, &mut host, "sps");
         assert!((measured / rpm - 1.0).abs() < 0.001, "{measured}");
@@ -696,7 +696,7 @@ fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
         (100, 600.0, 900.0, 0.06, 10.005, true),
     ] {
         let (mut machine, mut host) = driven(marks, rpm, torque);
-        set(&mut machine, &mut host, &format!("{{spq:{}}}", u8::from(tells)));
+        set(&mut machine, &mut host, &format!("{{spdi:{}}}", u8::from(tells)));
         set(&mut machine, &mut host, &format!("m3 s{rpm}"));
         host.run_for_ms(&mut machine, 3_000).unwrap();
         set(&mut machine, &mut host, &format!("g91 g33.1 z-{deep} k1"));
@@ -835,7 +835,7 @@ fn a_spindle_that_turns_the_wrong_way_cuts_nothing() {
     const WRONG_WAY: u64 = 55;
     let begins = |rpm: f64, word: &str| {
         let (mut machine, mut host) = lathe(8, rpm, |_| {});
-        set(&mut machine, &mut host, "{spq:1}");
+        set(&mut machine, &mut host, "{spdi:1}");
         host.run_for_ms(&mut machine, 1_000).unwrap();
         // The simulated spindle is driven by hand.
         set(&mut machine, &mut host, word);
@@ -859,7 +859,7 @@ fn a_spindle_that_turns_the_wrong_way_cuts_nothing() {
 #[test]
 fn a_spindle_that_turns_round_in_the_pass_is_lost() {
     let (mut machine, mut host) = lathe(100, 300.0, |_| {});
-    set(&mut machine, &mut host, "{spq:1}");
+    set(&mut machine, &mut host, "{spdi:1}");
     host.run_for_ms(&mut machine, 1_000).unwrap();
     begin(&mut machine, &mut host, "g91 g33 z-12 k1", 4.0);
     machine.tamper(|mechanics, now| mechanics.force_spindle(-300.0, now));

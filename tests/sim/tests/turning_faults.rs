@@ -153,7 +153,7 @@ fn lathe(case: &Case) -> (Machine, Host) {
     let tells = u8::from(case.tells);
     for line in [
         format!("{{spn:{marks}}}"),
-        format!("{{spq:{tells}}}"),
+        format!("{{spdi:{tells}}}"),
         format!("{{spr:{retract}}}"),
         format!("{{spl:{limit}}}"),
     ] {

@@ -39,7 +39,7 @@ fn every_token_has_a_name_that_finds_it() {
             + 2 * 6
             + 2
             + 6 * 4
-            + 8
+            + 9
             + 11 * 6
             + 10 * 2
             + 10
