@@ -17,6 +17,7 @@ use super::codes::NonModal;
 use super::command::{Commands, Spindle, Surface};
 use super::fast_path::Writer;
 use super::modal::{Defaults, FeedMode, Modal, MotionMode, SpeedMode, Turn, Units, XMode};
+use super::printing::Kept;
 use super::setup::Setup;
 use super::state::State;
 use super::sticky::Sticky;
@@ -273,13 +274,14 @@ struct Before {
     line: u32,
     position: PerAxis<Length>,
     residue: PerAxis<i16>,
+    printing: Kept,
 }
 
 impl Before {
     #[inline(always)]
     fn of(state: &State) -> Self {
-        let State { modal, feed, feed_units, line, position, residue, .. } = *state;
-        Self { modal, feed, feed_units, line, position, residue }
+        let State { modal, feed, feed_units, line, position, residue, printing, .. } = *state;
+        Self { modal, feed, feed_units, line, position, residue, printing: printing.kept() }
     }
 
     #[inline(never)]
@@ -290,6 +292,7 @@ impl Before {
         state.line = self.line;
         state.position = self.position;
         state.residue = self.residue;
+        state.printing.take_back(self.printing);
     }
 }
 

@@ -25,6 +25,13 @@ const FEED: f32 = 1_500.0;
 /// How far from the origin the extruder gets before it is moved back, which is half of what a [`Length`] holds: 100 m.
 const FAR: i32 = 1_000_000_000;
 
+/// What of [`Printing`] a line changes that may be refused after that.
+#[cfg(feature = "dialect-reprap")]
+pub type Kept = Option<Distance>;
+/// What of [`Printing`] a line changes that may be refused after that: nothing.
+#[cfg(not(feature = "dialect-reprap"))]
+pub type Kept = ();
+
 /// How the extruder takes its words.
 #[cfg(feature = "dialect-reprap")]
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -61,6 +68,24 @@ impl Printing {
         self.own = None;
     }
 
+    /// What a line that is refused gives back: see [`Printing::take_back`].
+    #[inline(always)]
+    pub fn kept(self) -> Kept {
+        self.own
+    }
+
+    /// A line with G90 or G91 has been refused.
+    #[inline(always)]
+    pub fn take_back(&mut self, kept: Kept) {
+        self.own = kept;
+    }
+
+    /// The other axes measure their words by `distance` from now on; the extruder goes on as before.
+    #[inline(always)]
+    pub fn compare(&mut self, distance: Distance) {
+        self.own = self.own.filter(|own| *own != distance);
+    }
+
     /// M221, thousandths.
     #[inline(always)]
     pub fn flow(self) -> u16 {
@@ -94,6 +119,18 @@ impl Printing {
     /// Does nothing in an image that cannot print.
     #[inline(always)]
     pub fn follow(&mut self) {}
+
+    /// Nothing.
+    #[inline(always)]
+    pub fn kept(self) -> Kept {}
+
+    /// Does nothing in an image that cannot print.
+    #[inline(always)]
+    pub fn take_back(&mut self, (): Kept) {}
+
+    /// Does nothing in an image that cannot print.
+    #[inline(always)]
+    pub fn compare(&mut self, _distance: Distance) {}
 
     /// All of it.
     #[inline(always)]

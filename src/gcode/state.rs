@@ -344,6 +344,7 @@ impl State {
             _ => self.system(defaults.system, tables),
         };
         self.modal = Modal { motion: MotionMode::Feed, ..Modal::new(&defaults) };
+        self.printing.compare(self.modal.distance);
         self.feed = 0.0;
         (self.shift, self.shifted) = ([Length::ZERO; AXES], false);
         self.update_origin(&system)

@@ -8,6 +8,7 @@ use crate::gcode::command::Commands;
 use crate::gcode::fast_path::Writer;
 use crate::gcode::interpreter::Interpreter;
 use crate::gcode::setup::Usual;
+use crate::units::Length;
 
 /// Lines that the fast path takes, or almost.
 fn line() -> impl Strategy<Value = String> {
@@ -142,4 +143,18 @@ fn what_is_fast_of_a_printing_host() {
     }
     interpreter.set_flow(900);
     assert!(!is_fast(&mut interpreter, "G1 X1"));
+}
+
+/// M83 stays in force when a line with G90 or G91 is refused.
+#[cfg(feature = "dialect-reprap")]
+#[test]
+fn a_line_that_is_refused_leaves_the_extruder_its_mode() {
+    let mut interpreter = Interpreter::new();
+    interpreter.begin_printing();
+    interpreter.set_relative(true);
+    for (line, done) in [("G90 G2 X1 I0 J0", false), ("G1 A1 F60", true), ("G1 A1", true)] {
+        let is_done = interpreter.interpret(line.as_bytes(), &Usual, &mut Commands::default());
+        assert_eq!(is_done.is_ok(), done, "{line}");
+    }
+    assert_eq!(interpreter.position()[3], Length(20_000));
 }
