@@ -141,6 +141,10 @@ impl Device {
             Some(_) => return Err(Fault::Failed),
             None => {}
         }
+        if HASTE.get() != 0 && card::is_wanted() {
+            // A sensor on the same lines comes first.
+            return Err(Fault::Later);
+        }
         if self.stage != Stage::Ready || command(17, self.address(block)) != 0 {
             return Err(Fault::Failed);
         }

@@ -229,6 +229,9 @@ impl Card {
             None => Line::More,
             Some(_) => {
                 self.skips = false;
+                while line.last() == Some(&b' ') {
+                    line.pop();
+                }
                 if core::mem::take(&mut self.is_long) { Line::Long } else { Line::Whole }
             }
         }

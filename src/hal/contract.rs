@@ -206,6 +206,8 @@ contract! {
         fn select();
         /// Lets the card go, with a byte more in which it lets go of the line. Thread mode.
         fn release();
+        /// Whether a sensor waits until the card is let go: it has its turn within 40 ms then. Thread mode.
+        fn is_wanted() -> bool;
         /// Has the clock be 4 MHz, or, for a card that is new, 250 kHz. Thread mode.
         fn set_fast(fast: bool);
         /// Sends a byte; what came meanwhile. Thread mode. Cost: 60 at 4 MHz, 550 at 250 kHz.

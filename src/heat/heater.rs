@@ -15,6 +15,8 @@ use crate::status::Status;
 const MISSING: u8 = 3;
 /// Looks from one reading of a MAX6675 to the next: 240 ms.
 const ASKED_EVERY: u8 = 6;
+/// Samples at which it may be out of reach, while an SD card has a block on its way: 160 ms.
+const DENIED: u8 = 4;
 /// How long the hot end and the bed may take for two degrees, seconds.
 const RISE_S: [u16; HEATERS] = [20, 90];
 
@@ -36,6 +38,7 @@ pub struct Heater {
     /// What a MAX6675 has sent last, and looks until it is asked again.
     word: u16,
     rests: u8,
+    denied: u8,
     owed: u8,
     /// How hot it is, 1/64 degree.
     now: i16,
@@ -66,6 +69,7 @@ impl Heater {
         missing: 0,
         word: 0,
         rests: 0,
+        denied: 0,
         owed: 0,
         now: 0,
         level: 0,
@@ -125,7 +129,8 @@ impl Heater {
         in_units(to).saturating_sub(self.now)
     }
 
-    /// The reading of its sensor: what the converter has, or of a MAX6675 what `ask` has been sent, each sixth look. `None` is asked for again at the next.
+    /// The reading of its sensor: what the converter has, or of a MAX6675 what `ask` has been sent, each sixth sample. Where there is none
+    /// for now it is asked for again at the next sample, and counts as missing after [`DENIED`].
     pub fn reading(
         &mut self,
         converted: Option<u16>,
@@ -134,11 +139,14 @@ impl Heater {
         if self.kind != Kind::Max6675 {
             return converted;
         }
-        if self.rests == 0 {
-            self.word = ask()?;
-            self.rests = ASKED_EVERY;
+        match self.rests.checked_sub(1) {
+            Some(rests) => self.rests = rests,
+            None => match ask() {
+                Some(word) => (self.word, self.rests, self.denied) = (word, ASKED_EVERY - 1, 0),
+                None if self.denied >= DENIED => return None,
+                None => self.denied += 1,
+            },
         }
-        self.rests -= 1;
         Some(self.word)
     }
 

@@ -9,7 +9,7 @@
 use heapless::Vec;
 
 use super::links::Links;
-use super::parser::{FastPath, Line as Sender, is_free, run_block};
+use super::parser::{FastPath, Line as Sender, fast_path_of, is_free, run_block};
 use super::view::View;
 use crate::card::{LINE_MAX, Line};
 use crate::machine;
@@ -39,6 +39,8 @@ pub struct Feed {
     /// What it tells is under way.
     tx: Option<Sender>,
     waits: bool,
+    /// A line of the fast path has been interpreted: its move waits for the planner.
+    moves: bool,
 }
 
 impl Default for Feed {
@@ -51,7 +53,7 @@ impl Default for Feed {
 impl Feed {
     /// Nothing is under way.
     pub const fn new() -> Self {
-        Self { line: Vec::new(), request: None, tx: None, waits: false }
+        Self { line: Vec::new(), request: None, tx: None, waits: false, moves: false }
     }
 
     /// Whether a line is under way.
@@ -62,6 +64,11 @@ impl Feed {
     /// Whether it is to have a turn each millisecond.
     pub fn waits(&self) -> bool {
         self.waits
+    }
+
+    /// Whether a move is to be handed over, once.
+    pub fn take_move(&mut self) -> bool {
+        core::mem::take(&mut self.moves)
     }
 
     /// A turn. Whether there may be more to do at once.
@@ -105,7 +112,12 @@ impl Feed {
                 return Read::Nothing;
             }
             Line::Whole if !self.line.is_empty() => {
-                self.begin(links);
+                self.moves = fast_path_of(links, &self.line);
+                if self.moves {
+                    self.line.clear();
+                } else {
+                    self.begin(links);
+                }
                 return Read::Line;
             }
             Line::Whole => {}

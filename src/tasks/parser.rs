@@ -221,7 +221,11 @@ impl Parser {
     /// Goes on with the line of the SD card, or begins with the next one. Whether there may be more to do at once.
     #[cfg(feature = "sd")]
     fn feed(&mut self) -> bool {
-        self.is_quiet() && self.feed.turn(self.links)
+        let more = self.is_quiet() && self.feed.turn(self.links);
+        if self.feed.take_move() {
+            self.hand_over();
+        }
+        more
     }
 
     #[cfg(not(feature = "sd"))]
@@ -753,6 +757,19 @@ fn fast_path(links: &Links) -> FastPath {
     links.pool_space.signal();
     links.reporter_wake.signal();
     FastPath::Done
+}
+
+/// Interprets a line of the SD card, if the fast path can. Its move has to be handed over then.
+#[cfg(feature = "sd")]
+#[inline(never)]
+pub(super) fn fast_path_of(links: &Links, line: &[u8]) -> bool {
+    let port = links.told();
+    let settings = links.settings.borrow();
+    if machine::is_checking() || !is_printing(port, &settings) || !links.may_feed(port) {
+        return false;
+    }
+    let mut commands = links.commands.borrow_mut();
+    links.model.borrow_mut().fast_path(line, Writer::Prints, &*settings, &mut commands)
 }
 
 /// Whether the lines of a port are a printing host's, whose extruder is known to be one.

@@ -1,12 +1,13 @@
 //! The SD card's lines: SPI, and the pin that selects it. Thread mode.
 //!
-//! While the card is selected nobody else speaks on SPI ([`is_taken`]).
+//! While the card is selected nobody else speaks on SPI ([`is_free`]).
 
 use super::{gpio, spi};
 use crate::boards::ACTIVE;
 use crate::hal::byte::SharedByte;
 
 static TAKEN: SharedByte = SharedByte::new(0);
+static WANTED: SharedByte = SharedByte::new(0);
 static FAST: SharedByte = SharedByte::new(0);
 
 /// Selects the card.
@@ -29,9 +30,15 @@ pub fn release() {
     TAKEN.set(0);
 }
 
-/// Whether the card is selected.
-pub(super) fn is_taken() -> bool {
-    TAKEN.get() != 0
+/// Whether the lines are free for somebody else, who has to wait until the card is let go otherwise.
+pub(super) fn is_free() -> bool {
+    WANTED.set(TAKEN.get());
+    TAKEN.get() == 0
+}
+
+/// Whether somebody waits for the lines.
+pub fn is_wanted() -> bool {
+    WANTED.get() != 0
 }
 
 /// 4 MHz, or 250 kHz, from the next time on that it is selected.

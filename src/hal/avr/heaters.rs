@@ -136,7 +136,7 @@ pub fn reading() -> Option<u16> {
 #[small]
 pub fn word(heater: u8) -> Option<u16> {
     let Heaters { heaters: [hot_end, bed], .. } = ACTIVE.heaters?;
-    if super::card::is_taken() {
+    if !super::card::is_free() {
         return None;
     }
     // Each with its pin as a constant.

@@ -213,7 +213,7 @@ fn a_print_from_a_card_is_as_fast_as_the_planner() {
     let moves = 1_000;
     let wire = over_the_wire(&kept, &circle(moves));
     println!("over the wire {wire:.2} s");
-    for (access_us, most) in [(100, 1.1), (2_000, 1.1), (20_000, 1.2), (90_000, 2.5)] {
+    for (access_us, most) in [(100, 1.05), (2_000, 1.05), (20_000, 1.6), (90_000, 3.5)] {
         let mut machine = firmware(&RAMPS14_SD);
         machine.set_eeprom(&kept);
         machine.insert_card(image(FatType::Fat16, &[("A.G", circle(moves))]), true);
