@@ -29,6 +29,12 @@ def ask(line, text):
     return until(lambda: said(text))
 
 
+def settle():
+    """Waits until all that has been sent is carried out: M118 waits behind M400, whose ok begins as that of any line."""
+    host.send_now("M400")
+    ask("M118 all carried out", "all carried out")
+
+
 def place():
     words = ask("M114", "Count").split()
     return {word[0]: float(word[2:]) for word in words[:4]}
@@ -96,7 +102,7 @@ def prints():
     begin = len(heard)
     ensure(host.startprint(LightGCode(lines)), "it does not begin")
     until(lambda: not host.printing)
-    ask("M400", "ok")
+    settle()
     said = heard[begin:]
     resends = [line for line in said if line.startswith("Resend")]
     ensure(resends, "no line was damaged")
@@ -115,13 +121,13 @@ def pause():
     until(lambda: host.queueindex > 10)
     host.pause()
     ensure(host.paused, "it is not paused")
-    ask("M400", "ok")
+    settle()
     there, at = host.queueindex, place()
     time.sleep(0.5)
     ensure(host.queueindex == there and place() == at, f"it goes on, at {place()}")
     host.resume()
     until(lambda: not host.printing)
-    ask("M400", "ok")
+    settle()
     return f"stood at line {there}, went on, at {place()}"
 
 
@@ -134,7 +140,7 @@ def cancel():
     there = host.queueindex
     for line in ["G90", "G1 X0 F3000"]:
         host.send_now(line)
-    ask("M400", "ok")
+    settle()
     ensure(place()["X"] == 0, place())
     return f"at line {there}, back at 0"
 
