@@ -410,8 +410,15 @@ const DIFFERS: [&str; 9] = [
     "stored",
 ];
 /// Those with a spindle that turns: the emulated board has none.
-const TURNING: [&str; 5] =
-    ["grbl-lathe", "grbl-thread", "lathe-feed", "thread-reports", "thread-retract"];
+const TURNING: [&str; 7] = [
+    "grbl-lathe",
+    "grbl-thread",
+    "lathe-feed",
+    "thread-direction",
+    "thread-pass",
+    "thread-reports",
+    "thread-retract",
+];
 /// Those of a printer, which these boards are not yet.
 const PRINTING: [&str; 2] = ["heat", "reprap"];
 /// Those that move for long, minutes of the emulator's time each: `KERF_TRANSCRIPT` plays one.
