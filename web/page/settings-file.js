@@ -14,7 +14,7 @@ const FIXED = ['fb', 'fv', 'hp', 'hv', 'id', 'net', 'baud', 'kerf'];
 const TALK = ['ej', 'js', 'tv', 'ec', 'ee', 'ex', 'rxm', 'sv', 'si', 'qv', 'dia', 'jv'];
 const STOPPING = ['saf', 'est'];
 /// Settings that an image without their capability lacks, and what it does as if they were this: left out at that value.
-const OPTIONAL = { sp: { n: 0, b: 0, r: 0, l: 0 } };
+const OPTIONAL = { sp: { n: 0, b: 0, r: 0, l: 0, di: 0 } };
 /// Longest line.
 const LINE = 200;
 
