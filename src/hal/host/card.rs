@@ -1,4 +1,4 @@
-//! The SD card's lines: there is none.
+//! The SD card's lines on a chip without a card: the host, and the RP2040.
 
 /// Selects the card.
 pub fn select() {}

@@ -26,6 +26,7 @@
 
 #[path = "../host/arithmetic.rs"]
 pub mod arithmetic;
+#[path = "../host/card.rs"]
 pub mod card;
 mod drivers;
 pub mod eeprom;

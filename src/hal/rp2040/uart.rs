@@ -413,7 +413,7 @@ impl Line {
             }
             Came::Text if waits => {
                 self.last = byte;
-                // A packet fits: none is read before the last one has gone.
+                // A packet has room: the next one is read only when the last one has been taken.
                 let _ = self.behind.push_back(byte);
             }
             Came::Text => self.queue(byte, true),
@@ -430,7 +430,7 @@ impl Line {
         let (now, later) = text.split_at(room);
         ring.push_all(now.iter().copied());
         self.queued = self.queued.wrapping_add(room as u8);
-        // A packet fits: none is read before the last one has gone.
+        // A packet has room: the next one is read only when the last one has been taken.
         self.behind.extend(later.iter().copied().take(PACKET - self.behind.len()));
         flags::set(Event::Received);
         count
