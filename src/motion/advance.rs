@@ -14,7 +14,7 @@
 use kerf_macros::small;
 
 use super::divide::quotient;
-use super::float::{below, greater, least, less, ratio, scaled, some, whole};
+use super::float::{below, greater, least, less, ratio, scaled, size, some, whole};
 use super::short::Short;
 use crate::capability::Capability;
 use crate::dda::STEP;
@@ -126,8 +126,7 @@ impl Advance {
     /// differ by no more than that.
     fn ratio(&mut self, way: f32, length: f32) -> f32 {
         let (ways, lengths) = self.pushed;
-        let off = way * lengths - ways * length;
-        let off = f32::from_bits(off.to_bits() & 0x7FFF_FFFF);
+        let off = size(way * lengths - ways * length);
         let is_alike = below(off, ROUNDING * lengths);
         let mut pushed = if is_alike { (ways + way, lengths + length) } else { (way, length) };
         let mean = ratio(pushed.0, pushed.1);
@@ -143,9 +142,17 @@ impl Advance {
         self.made.unsigned_abs() < LITTLE && !some(self.speed)
     }
 
-    /// Whether the block has no lead, and none is left.
+    /// The block needs no lead, and the motor is where its line is, but for so little that it may stay until the machine rests.
     pub fn is_done(&self) -> bool {
         !some(self.factor) && self.goal == 0 && self.is_over()
+    }
+
+    /// Begins segments with a lead, if the one before had none; the motor's direction is that of its line then.
+    #[inline(always)]
+    pub fn take_up(&mut self, backwards: bool) {
+        if !self.leads {
+            (self.leads, self.backwards) = (true, backwards);
+        }
     }
 
     /// How far the motor is ahead.
@@ -244,7 +251,7 @@ fn seconds(ticks: u16, period: u16) -> f32 {
 #[inline(never)]
 #[small]
 fn rounded(x: f32) -> i32 {
-    let size = whole(f32::from_bits(x.to_bits() & 0x7FFF_FFFF) + 0.5) as i32;
+    let size = whole(size(x) + 0.5) as i32;
     if x.is_sign_negative() { -size } else { size }
 }
 

@@ -7,6 +7,7 @@
 
 use super::advance::Lead;
 use super::factors::{Factors, Reserve};
+use super::float::size;
 use super::pace::Drivers;
 use super::retract::Retract;
 use super::short::Short;
@@ -146,7 +147,7 @@ impl Extent {
     /// mm.
     #[inline(always)]
     pub fn length(self) -> f32 {
-        f32::from_bits(self.0.to_bits() & 0x7FFF_FFFF)
+        size(self.0)
     }
 
     /// Whether the way is in steps, not in 1/16 step.

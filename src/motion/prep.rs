@@ -295,10 +295,7 @@ impl Prep {
             extruder.end();
             return self.end_lead();
         }
-        if !extruder.leads {
-            extruder.leads = true;
-            extruder.backwards = self.backwards & bit != 0;
-        }
+        extruder.take_up(self.backwards & bit != 0);
         if self.full & bit != 0 && self.full != bit {
             self.full &= !bit;
             self.minor |= bit;
@@ -375,10 +372,7 @@ impl Prep {
             return false;
         }
         let bit = 1 << extruder.motor;
-        if !extruder.leads {
-            extruder.leads = true;
-            extruder.backwards = self.backwards & bit != 0;
-        }
+        extruder.take_up(self.backwards & bit != 0);
         let (ticks, period) = if extruder.rest() { ASIDE_LITTLE } else { ASIDE };
         self.pause(ticks, period, out);
         out.moving = bit;

@@ -26,7 +26,7 @@
 use kerf_macros::small;
 
 use super::block::Pass;
-use super::float::{greater, least, some};
+use super::float::{greater, least, size, some};
 use super::retract::Retract;
 use super::short::Short;
 use crate::encoder::{COUNTS_PER_S, Encoder, Pulses};
@@ -476,7 +476,7 @@ impl Thread {
                 self.ahead -= self.lead;
             }
         }
-        let size = f32::from_bits(way.to_bits() & 0x7FFF_FFFF);
+        let size = size(way);
         self.hold_against_limit(size, brakes);
         let change = least(GAIN * size, sqrt(2.0 * SHARE * accel * size));
         let wanted = if way.is_sign_negative() { speed - change } else { speed + change };
