@@ -89,7 +89,7 @@ impl Card {
             self.root = Some((volume, root));
             Ok(())
         });
-        self.status(opened)
+        status(opened)
     }
 
     /// Forgets the card, M22.
@@ -102,22 +102,11 @@ impl Card {
         }
     }
 
-    /// The print is at its end.
-    pub fn end(&mut self) {
-        self.close();
-    }
-
-    fn close(&mut self) {
+    /// Closes the file that is chosen, if one is: the print is at its end.
+    pub fn close(&mut self) {
         self.prints = false;
         if let Some(file) = self.file.take() {
             let _ = self.manager.close_file(file);
-        }
-    }
-
-    fn status<T>(&mut self, done: Result<T, Error>) -> Status {
-        match done {
-            Ok(_) => Status::Ok,
-            Err(_) => Status::CardError,
         }
     }
 
@@ -143,7 +132,7 @@ impl Card {
         let Some((_, root)) = self.root else { return Status::CardError };
         let Some(name) = text(name) else { return Status::CardError };
         let done = self.manager.delete_entry_in_dir(root, name.as_str());
-        self.status(done)
+        status(done)
     }
 
     /// Lines are taken from the file from now on, M24; or no longer, M25.
@@ -165,7 +154,7 @@ impl Card {
         let Some(file) = self.file else { return Status::CardError };
         self.skips = false;
         let done = self.manager.file_seek_from_start(file, at);
-        self.status(done)
+        status(done)
     }
 
     /// The next byte of the file, and how many it has.
@@ -191,10 +180,7 @@ impl Card {
             left = left.wrapping_sub(1);
             core::ops::ControlFlow::Continue(())
         });
-        match done {
-            Ok(()) => Ok(found),
-            Err(_) => Err(Status::CardError),
-        }
+        done.map(|()| found).map_err(|_| Status::CardError)
     }
 
     /// Reads on in the line that is being printed. Cost: 3,000 cycles, with a block 25,000 more.
@@ -256,6 +242,11 @@ impl Default for Card {
 /// Bytes that are read at once.
 const PIECE: usize = 40;
 const BLOCK: u32 = 512;
+
+#[small]
+fn status<T>(done: Result<T, Error>) -> Status {
+    if done.is_ok() { Status::Ok } else { Status::CardError }
+}
 
 #[small]
 fn named(name: &embedded_sdmmc::ShortFileName, size: u32) -> Entry {

@@ -132,7 +132,7 @@ impl Feed {
                 return Read::Nothing;
             }
             Line::End => {
-                links.card.borrow_mut().end();
+                links.card.borrow_mut().close();
                 links.except(Status::EndOfFile);
             }
         }
