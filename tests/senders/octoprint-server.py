@@ -12,6 +12,7 @@ import time
 import urllib.error
 import urllib.request
 
+import printing
 from steps import ensure, main, step, until
 
 PORT, JOB = sys.argv[1:]
@@ -89,14 +90,11 @@ def ask(line, text):
 
 
 def settle(name):
-    """Waits until all that has been sent is carried out: the text comes back behind the last move."""
-    send("M400")
-    ask(f"M118 {name}", name)
+    printing.settle(send, ask, name)
 
 
 def place():
-    words = ask("M114", "Count").split()
-    return {word[0]: float(word[2:]) for word in words[:4]}
+    return printing.place(ask)
 
 
 def hot_end():
@@ -137,15 +135,6 @@ def temperatures():
     return f"hot end {until(hot_end)}"
 
 
-def settings():
-    """Steps and limits of a printer."""
-    for line in ["M92 X80 Y80 Z400 E93", "M203 X150 Y150 Z10 E50", "M201 X1000 Y1000 Z100 E5000"]:
-        ask(line, "ok")
-    text = ask("M503", "M92")
-    ensure("X80.000 Y80.000 Z400.000 E93.000" in text, text)
-    return text
-
-
 def heat():
     """By the button for the hot end's temperature."""
     target = lambda degrees: call("printer/tool", {"command": "target", "targets": {"tool0": degrees}})
@@ -164,17 +153,13 @@ def jog():
     return "X by 2 mm and back"
 
 
-def there_and_back(moves):
-    return "G91\n" + "G1 X0.5 F1200\nG1 X-0.5\n" * moves + "G90\n"
-
-
 def progress():
     return call("job")["progress"]["filepos"] or 0
 
 
 def pause():
     """Pauses in the middle of a print of its own: the machine comes to rest, and goes on."""
-    upload("pause.gcode", there_and_back(300))
+    upload("pause.gcode", "".join(f"{line}\n" for line in printing.there_and_back(300)))
     until(lambda: progress() > 200)
     call("job", {"command": "pause", "action": "pause"})
     until(lambda: state() == "Paused")
@@ -190,7 +175,7 @@ def pause():
 
 def cancel():
     """Gives up a print of its own in the middle, and goes back to where it began."""
-    upload("cancel.gcode", there_and_back(300))
+    upload("cancel.gcode", "".join(f"{line}\n" for line in printing.there_and_back(300)))
     until(lambda: progress() > 400)
     there = progress()
     call("job", {"command": "cancel"})
@@ -236,7 +221,7 @@ def test():
     step("connect", 30, connect)
     step("temperatures", 20, temperatures)
     step("stop", 60, stop)
-    step("settings", 20, settings)
+    step("settings", 20, lambda: printing.settings(ask))
     step("jog", 30, jog)
     step("heat", 60, heat)
     step("pause", 90, pause)

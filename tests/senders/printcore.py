@@ -7,6 +7,7 @@ import sys
 import time
 
 from steps import ensure, main, step, until  # first: what the library prints is no step
+import printing
 from printrun.gcoder import LightGCode
 from printrun.printcore import printcore
 
@@ -29,15 +30,12 @@ def ask(line, text):
     return until(lambda: said(text))
 
 
-def settle():
-    """Waits until all that has been sent is carried out: M118 waits behind M400, whose ok begins as that of any line."""
-    host.send_now("M400")
-    ask("M118 all carried out", "all carried out")
-
-
 def place():
-    words = ask("M114", "Count").split()
-    return {word[0]: float(word[2:]) for word in words[:4]}
+    return printing.place(ask)
+
+
+def settle():
+    printing.settle(host.send_now, ask)
 
 
 def connect():
@@ -67,15 +65,6 @@ def stop():
     host.send_now("G1 X0 F3000")
     until(lambda: place()["X"] == 0)
     return f"at X {there} of {FAR}, M999, back at 0"
-
-
-def settings():
-    """Steps and limits of a printer."""
-    for line in ["M92 X80 Y80 Z400 E93", "M203 X150 Y150 Z10 E50", "M201 X1000 Y1000 Z100 E5000"]:
-        ask(line, "ok")
-    text = ask("M503", "M92")
-    ensure("X80.000 Y80.000 Z400.000 E93.000" in text, text)
-    return text
 
 
 def heat():
@@ -111,13 +100,9 @@ def prints():
     return f"{len(lines)} lines, {len(resends)} asked for again, at {place()}"
 
 
-def there_and_back(moves):
-    return ["G91"] + ["G1 X0.5 F1200", "G1 X-0.5"] * moves + ["G90"]
-
-
 def pause():
     """Pauses in the middle of a print of its own: the machine comes to rest, and goes on."""
-    host.startprint(LightGCode(there_and_back(300)))
+    host.startprint(LightGCode(printing.there_and_back(300)))
     until(lambda: host.queueindex > 10)
     host.pause()
     ensure(host.paused, "it is not paused")
@@ -133,7 +118,7 @@ def pause():
 
 def cancel():
     """Gives up a print of its own in the middle, and goes back to where it began."""
-    host.startprint(LightGCode(there_and_back(300)))
+    host.startprint(LightGCode(printing.there_and_back(300)))
     until(lambda: host.queueindex > 20)
     host.cancelprint()
     until(lambda: not host.printing)
@@ -155,7 +140,7 @@ def test():
     step("start", 10, lambda: f"printrun {version}, Python {sys.version.split()[0]}")
     step("connect", 30, connect)
     step("temperatures", 20, temperatures)
-    step("settings", 20, settings)
+    step("settings", 20, lambda: printing.settings(ask))
     step("heat", 60, heat)
     step("stop", 60, stop)
     step("pause", 60, pause)

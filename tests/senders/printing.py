@@ -1,0 +1,29 @@
+"""What drivers of printing hosts have in common. `ask(line, text)` sends a line and returns what comes with the text in it."""
+
+from steps import ensure
+
+
+def settings(ask):
+    """Steps and limits of a printer."""
+    for line in ["M92 X80 Y80 Z400 E93", "M203 X150 Y150 Z10 E50", "M201 X1000 Y1000 Z100 E5000"]:
+        ask(line, "ok")
+    text = ask("M503", "M92")
+    ensure("X80.000 Y80.000 Z400.000 E93.000" in text, text)
+    return text
+
+
+def place(ask):
+    """Where each axis is, by its letter."""
+    words = ask("M114", "Count").split()
+    return {word[0]: float(word[2:]) for word in words[:4]}
+
+
+def settle(send, ask, name="all carried out"):
+    """Waits until all that has been sent is carried out: M118 waits behind M400, whose ok begins as that of any line."""
+    send("M400")
+    ask(f"M118 {name}", name)
+
+
+def there_and_back(moves):
+    """The lines of a print that ends where it begins."""
+    return ["G91"] + ["G1 X0.5 F1200", "G1 X-0.5"] * moves + ["G90"]
