@@ -1,6 +1,9 @@
 //! Every row of the bench keeps to its floor.
 
 mod common;
+#[macro_use]
+#[path = "common/rows.rs"]
+mod rows;
 
 use common::image;
 use kerf::boards::{MEGA2560_GRBL, RAMPS14};
@@ -13,25 +16,7 @@ fn keeps_to_its_floor(name: &str) {
         // It is looked for beside the other one.
         image(&RAMPS14);
     }
-    let figure = (row.measure)(&bed).unwrap();
-    let said = format!("{}: {} {} ({})", row.what, figure.value, row.unit, figure.note);
-    println!("{said}");
-    let floor = row.floor.unwrap_or(figure.value);
-    assert!(row.better.reaches(figure.value, floor), "{said}, but the floor is {floor}");
-}
-
-macro_rules! rows {
-    ($($test:ident = $name:literal;)+) => {
-        $(#[test]
-        fn $test() {
-            keeps_to_its_floor($name);
-        })+
-
-        #[test]
-        fn every_row_is_tested() {
-            assert_eq!(ROWS.each_ref().map(|row| row.name), [$($name),+]);
-        }
-    };
+    row.keep_to_floor(&bed).unwrap();
 }
 
 rows! {

@@ -1,6 +1,9 @@
 //! Every row of the bench of `pico-cnc` keeps to its floor. Run as `pico.rs` is.
 
 mod common;
+#[macro_use]
+#[path = "common/rows.rs"]
+mod rows;
 
 use common::image;
 use kerf::boards::{PICO_CNC, PICO_CNC6};
@@ -10,29 +13,11 @@ fn keeps_to_its_floor(name: &str) {
     let row = named(name).unwrap();
     // It is looked for beside the other one.
     image(&PICO_CNC6);
-    let figure = (row.measure)(&PicoBed::new(&image(&PICO_CNC))).unwrap();
-    let said = format!("{}: {} {} ({})", row.what, figure.value, row.unit, figure.note);
-    println!("{said}");
-    let floor = row.floor.unwrap_or(figure.value);
-    assert!(row.better.reaches(figure.value, floor), "{said}, but the floor is {floor}");
-}
-
-macro_rules! rows {
-    ($($test:ident = $name:literal;)+) => {
-        $(#[test]
-        #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
-        fn $test() {
-            keeps_to_its_floor($name);
-        })+
-
-        #[test]
-        fn every_row_is_tested() {
-            assert_eq!(ROWS.each_ref().map(|row| row.name), [$($name),+]);
-        }
-    };
+    row.keep_to_floor(&PicoBed::new(&image(&PICO_CNC))).unwrap();
 }
 
 rows! {
+    #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
     one_motor = "rate-1";
     four_motors = "rate-4";
     six_motors = "rate-6";

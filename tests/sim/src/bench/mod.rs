@@ -26,7 +26,7 @@ pub use rows::ROWS;
 pub use table::{print, print_rows};
 pub use workload::Bed;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 /// Which way is up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -82,6 +82,18 @@ pub struct Row<B = Bed> {
     pub floor: Option<f64>,
     /// Measures it.
     pub measure: fn(&B) -> Result<Figure>,
+}
+
+impl<B> Row<B> {
+    /// Measures the row, prints its figure, and insists on its floor, if it has one.
+    pub fn keep_to_floor(&self, bed: &B) -> Result<()> {
+        let figure = (self.measure)(bed)?;
+        let said = format!("{}: {} {} ({})", self.what, figure.value, self.unit, figure.note);
+        println!("{said}");
+        let floor = self.floor.unwrap_or(figure.value);
+        ensure!(self.better.reaches(figure.value, floor), "{said}, but the floor is {floor}");
+        Ok(())
+    }
 }
 
 /// The row of this name.
