@@ -250,17 +250,21 @@ impl Transcript {
         })
     }
 
+    /// The pulses in a turn of the spindle that turns in it, if one does.
+    pub fn spindle_pulses(&self) -> Option<u32> {
+        self.events.iter().find_map(|(_, event)| match event {
+            Event::Spindle(_, pulses) => Some(*pulses),
+            _ => None,
+        })
+    }
+
     /// Plays it; the error says where it fails and how.
     pub fn play(&self, side: &mut impl Side) -> Result<(), String> {
         let near = |(_, event): &(usize, Event)| match event {
             Event::Near(input, step, opens) => Some((*input, *step, *opens)),
             _ => None,
         };
-        let pulses = |(_, event): &(usize, Event)| match event {
-            Event::Spindle(_, pulses) => Some(*pulses),
-            _ => None,
-        };
-        let pulses = self.events.iter().find_map(pulses).unwrap_or(0);
+        let pulses = self.spindle_pulses().unwrap_or(0);
         side.wire(&self.events.iter().filter_map(near).collect::<Vec<_>>(), pulses);
         let (ears, allowed) = Default::default();
         let mut player = Player { side, ears, allowed, greeted: false };

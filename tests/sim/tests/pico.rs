@@ -80,7 +80,7 @@ impl Side for Emulated {
     }
 
     fn turn_spindle(&mut self, _rpm: f64, _pulses: u32) {
-        panic!("the emulated board has no spindle: `TURNING` names the transcripts that turn one");
+        panic!("the emulated board has no spindle");
     }
 
     fn steps(&self) -> [i64; 4] {
@@ -409,16 +409,6 @@ const DIFFERS: [&str; 9] = [
     "start-anew",
     "stored",
 ];
-/// Those with a spindle that turns: the emulated board has none.
-const TURNING: [&str; 7] = [
-    "grbl-lathe",
-    "grbl-thread",
-    "lathe-feed",
-    "thread-direction",
-    "thread-pass",
-    "thread-reports",
-    "thread-retract",
-];
 /// Those of a printer, which these boards are not yet.
 const PRINTING: [&str; 2] = ["heat", "reprap"];
 /// Those that move for long, minutes of the emulator's time each: `KERF_TRANSCRIPT` plays one.
@@ -449,13 +439,11 @@ fn with_more_room(line: &str) -> String {
 #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
 fn the_image_keeps_to_the_transcripts() {
     let mut all = transcript::read_all(Path::new("../transcripts"));
-    let left_out = DIFFERS
-        .iter()
-        .chain(&TURNING)
-        .chain(&PRINTING)
-        .chain(LONG.iter().filter(|_| all.len() > 1));
+    let left_out = DIFFERS.iter().chain(&PRINTING).chain(LONG.iter().filter(|_| all.len() > 1));
     let left_out: Vec<_> = left_out.collect();
     all.retain(|one| !left_out.iter().any(|name| one.name.starts_with(**name)));
+    // The emulated board has no spindle.
+    all.retain(|one| one.spindle_pulses().is_none());
     all.iter_mut().for_each(|one| one.expect(with_more_room));
     transcript::play_all(all, 2, board);
 }
