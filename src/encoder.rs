@@ -496,7 +496,7 @@ mod tests {
         assert!(!spindle.encoder.turns_back() && spindle.encoder.speed() > 0);
         assert!(spindle.encoder.begin(Some(false)) && spindle.encoder.begin(None));
         assert!(!spindle.encoder.begin(Some(true)));
-        // Backwards: measured anew, and none is missing.
+        // Backwards: the speed is measured anew, and no pulse counts as missing.
         for turn in 0..5 {
             spindle.index();
             for _ in 0..8 {

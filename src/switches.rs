@@ -50,7 +50,7 @@ pub struct Switches {
 }
 
 impl Switches {
-    /// Switches of which none is worked.
+    /// No switch is active.
     pub const fn new() -> Self {
         Self { worked: 0, last: 0, locked: 0, left: 0, paused: false }
     }

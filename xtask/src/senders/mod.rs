@@ -97,7 +97,7 @@ impl Sender {
         matches!(self, Sender::Printcore | Sender::CncjsMarlin | Sender::Octoprint)
     }
 
-    /// The board whose image it speaks to, if none is asked for.
+    /// The board that this sender is tried with by default.
     fn board(self) -> Board {
         if self.prints() { Board::Ramps14 } else { Board::default() }
     }

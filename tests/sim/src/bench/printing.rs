@@ -28,7 +28,7 @@ pub fn plain(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, false, &["{dia:16}"])
 }
 
-/// The same with pressure advance.
+/// Moves of 0.2 mm of a printing host, with pressure advance.
 pub fn advanced(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, false, &["{he1pa:0.05}", "{dia:16}"])
 }
