@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | a switch's pin | has someone look at all switches ([`inputs`]) | 20, interrupts off |
 //! | an encoder's pin, none set up | the same | 25, interrupts off |
-//! | an encoder's pin | takes the time of a pulse ([`encoder`](super::encoder)) | 105 at most, 118 with a second one of sync, interrupts off for 31 and 25 |
+//! | an encoder's pin | takes the time of a pulse ([`encoder`](super::encoder)) | 106 at most, 119 with a second one of sync, interrupts off for 31 and 25 |
 //!
 //! A handler of an encoder's pin reads timer 5 first, 20 cycles after it has been entered. It masks both pins of the encoder and lets
 //! all other interrupts in but exec, as those of the serial ports do: it nests neither in itself nor in the other. An edge that comes
@@ -17,7 +17,7 @@ use avr_embassy::assembly;
 
 use super::encoder::{LINES, Line, SHARED, Shared};
 use super::inputs::{self, MASKS};
-use crate::boards::{ACTIVE, Encoder, Pin};
+use crate::boards::{ACTIVE, Encoder, Pin, inputs::COUNT};
 use crate::capability::Capability;
 
 /// INT0.
@@ -63,6 +63,22 @@ const fn second(vector: u8) -> u8 {
         (Some((_, 1)), Some(Encoder { second: Some(pin), .. })) => pin.bit,
         _ => 8,
     }
+}
+
+/// The pins that the vector watches in the port of its sensor. Others change without an interrupt, as a second pin of sync does.
+const fn watched(vector: u8) -> u8 {
+    let Some((sensor, _)) = sensor(vector) else { return 0 };
+    let mut bits = 1 << sensor.bit;
+    let mut i = 0;
+    while i < COUNT {
+        if let Some(pin) = ACTIVE.inputs[i]
+            && pin.port as u8 == sensor.port as u8
+        {
+            bits |= 1 << pin.bit;
+        }
+        i += 1;
+    }
+    bits
 }
 
 /// Whether the vectors of the encoder are those of pin changes.
@@ -138,6 +154,7 @@ macro_rules! edges {
                     "lds  r27, {state} + {levels}",
                     "sts  {state} + {levels}, r31",
                     "eor  r27, r31",
+                    "andi r27, {watched}",
                     "cpi  r27, 1 << {bit}",
                     "breq 1f",
                     "ldi  r26, {run}",
@@ -243,6 +260,7 @@ macro_rules! edges {
                     line = const line($vector),
                     pins = const place($vector).0,
                     bit = const place($vector).1,
+                    watched = const watched($vector),
                     second = const second($vector),
                     mask = const mask($vector).0,
                     masked = const mask($vector).1,

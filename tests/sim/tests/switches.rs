@@ -3,8 +3,8 @@
 mod common;
 
 use common::{booted, set};
-use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14, inputs};
-use kerf_sim::mechanics::{Bounce, Build, Wiring};
+use kerf::boards::{Board, MEGA2560_GRBL, MEGA2560_LATHE, RAMPS14, inputs};
+use kerf_sim::mechanics::{Bounce, Build, Sensors, Wiring};
 use kerf_sim::{Host, Machine};
 
 /// Cycles in a microsecond.
@@ -140,6 +140,28 @@ const CLOSED: &str = "avr_embassy::assembly::CLOSED";
 const POLL: &str = "avr_embassy::interrupt::avr::poll";
 
 /// Exec in the midst of exec would lose segments, or send them twice.
+#[test]
+fn edges_of_the_spindles_sensors_start_no_samples() {
+    let board = &MEGA2560_LATHE;
+    let mut build = Build::of(board);
+    build.spindle.sensors = Sensors::of(board, 100);
+    let (mut machine, mut host) = booted(board);
+    machine.build(&build);
+    ["{spn:100}", "{spdi:1}"].iter().for_each(|line| set(&mut machine, &mut host, line));
+    machine.tamper(|mechanics, now| mechanics.force_spindle(600.0, now));
+    host.run_for_ms(&mut machine, 100).unwrap();
+    machine.start_profile();
+    host.run_for_ms(&mut machine, 500).unwrap();
+    let profile = machine.profile();
+    let spent = |name: &str| -> u64 {
+        profile.iter().filter(|(function, _)| function.contains(name)).map(|(_, n)| n).sum()
+    };
+    // 500 pulses have come, each of two edges. Those of the index are on a pin of a switch in this build, which starts some.
+    assert!(spent("__vector_11") > 1_000 * 40, "{}", spent("__vector_11"));
+    let samples = spent("inputs::sample");
+    assert!(samples < 20 * 1_000, "{samples} cycles of samples");
+}
+
 #[test]
 fn a_look_within_the_tick_does_not_let_exec_interrupt_itself() {
     for phase in 0..4 {
