@@ -622,17 +622,17 @@ impl Exec {
         step(self.prep.segment(left, cycles, segment))
     }
 
-    /// Makes a segment of a stretch of a pass: its ticks are neither fine nor coarse.
+    /// Makes a segment of a stretch of a pass. Its ticks are coarse: the CPU's time goes to exec, which asks the spindle for each stretch.
     #[inline(never)]
     #[small]
-    fn hand_out_plainly(
+    fn hand_out_coarsely(
         &mut self,
         stretch: &Stretch,
         blocks: &mut BlockSource,
         out: &mut Snapshot,
         segment: &mut Segment,
     ) -> Step {
-        self.hand_out(stretch, blocks, out, segment, |_| (false, false))
+        self.hand_out(stretch, blocks, out, segment, |_| (false, true))
     }
 
     /// The pass in step with the spindle, if there is one.
@@ -754,7 +754,7 @@ impl Exec {
             self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
         };
         thread.handed(stretch.distance);
-        self.hand_out_plainly(&stretch, blocks, out, segment)
+        self.hand_out_coarsely(&stretch, blocks, out, segment)
     }
 
     /// The line waits for the spindle.
@@ -805,7 +805,7 @@ impl Exec {
             } else {
                 let (left, headroom) = (self.running.left, self.running.headroom);
                 let stretch = self.governor.halt_sharply(left, headroom, SEGMENT_S);
-                self.hand_out_plainly(&stretch, blocks, out, segment)
+                self.hand_out_coarsely(&stretch, blocks, out, segment)
             };
             if step != Step::Segment {
                 return step;

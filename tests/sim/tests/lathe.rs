@@ -137,8 +137,9 @@ fn pulses_that_are_missing_or_too_many_are_counted_and_the_first_is_told() {
             // It might be within another.
             continue;
         }
-        machine
-            .tamper(|mechanics, now| mechanics.encoder().unwrap().add(false, now + 40_000, 1_600));
+        machine.tamper(|mechanics, now| {
+            assert!(mechanics.encoder().unwrap().add(false, now + 40_000, 1_600));
+        });
         host.run_for_ms(&mut machine, 1_000).unwrap();
         assert_eq!(asked(&mut machine, &mut host, "spx"), 2.0, "{marks}");
     }

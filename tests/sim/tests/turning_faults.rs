@@ -23,9 +23,8 @@ const ASTRAY: u64 = 46;
 const STEPS: f64 = 200.0;
 const X: usize = 0;
 const Z: usize = 2;
-/// The longest way from a question's last byte to its answer, ms, while both ports ask and a report may be before it. The goal is 20, and is not reached
-/// where a pass ends before its time with 100 pulses a turn or more: of seeds 0 to 59 five take longer, 35 to 475, of seeds 0 to 11 two, 35 and 199.
-const ANSWERED_MS: f64 = 250.0;
+/// The longest way from a question's last byte to its answer, ms, while both ports ask.
+const ANSWERED_MS: f64 = 20.0;
 /// The state while the machine runs, and the one of an alarm.
 const RUNS: Option<i64> = Some(5);
 const ALARM: Option<i64> = Some(2);
@@ -211,6 +210,8 @@ fn judge(case: &Case, told: &[u64], stat: Option<i64>, way: [i64; 2]) {
         Fault::Reverses if case.tells && case.marks > 1 => {
             assert!(lost || may_stray && astray, "{case:?} {told:?}");
         }
+        // Two that are missing, one behind the other, may be a spindle that stops.
+        Fault::Misses(2..) if lost => assert_eq!(stat, ALARM, "{case:?} {told:?}"),
         Fault::Misses(_) if case.marks > 1 && !astray => {
             assert_eq!(told, [MISFIT], "{case:?}");
             ended("a pulse is missing");
@@ -238,6 +239,7 @@ fn judge(case: &Case, told: &[u64], stat: Option<i64>, way: [i64; 2]) {
         _ => {}
     }
     let alarmed = lost || astray || fault == Fault::Alarm;
+    assert!(stat != ALARM || alarmed, "an alarm without its reason: {case:?} {told:?}");
     if matches!(fault, Fault::Reset) || alarmed && !case.leaves() {
         return;
     }
@@ -248,7 +250,9 @@ fn judge(case: &Case, told: &[u64], stat: Option<i64>, way: [i64; 2]) {
     }
 }
 
-fn happen(machine: &mut Machine, host: &mut Host, fault: Fault) {
+/// Returns whether it has come to anything: a pulse within a mark is none.
+#[must_use]
+fn happen(machine: &mut Machine, host: &mut Host, fault: Fault) -> bool {
     match fault {
         Fault::Nothing => {}
         Fault::Stops => machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now)),
@@ -260,8 +264,13 @@ fn happen(machine: &mut Machine, host: &mut Host, fault: Fault) {
         Fault::Misses(n) => {
             machine.tamper(|mechanics, _| mechanics.encoder().unwrap().miss(false, n));
         }
-        Fault::Extra => machine
-            .tamper(|mechanics, now| mechanics.encoder().unwrap().add(false, now + 4_000, 1_600)),
+        Fault::Extra => {
+            let mut came = false;
+            machine.tamper(|mechanics, now| {
+                came = mechanics.encoder().unwrap().add(false, now + 4_000, 1_600);
+            });
+            return came;
+        }
         Fault::Hold => machine.send_now(b'!'),
         Fault::HoldAndGo => {
             machine.send_now(b'!');
@@ -274,6 +283,7 @@ fn happen(machine: &mut Machine, host: &mut Host, fault: Fault) {
             host.boot(machine, 1_000).unwrap();
         }
     }
+    true
 }
 
 /// The motors of X and Z, in steps.
@@ -284,7 +294,8 @@ fn motors(machine: &Machine) -> [i64; 2] {
 /// Runs until no step has come for half a second, and nothing runs.
 fn rest(machine: &mut Machine, host: &mut Host, why: &Case) {
     let mut quiet = 0;
-    for _ in 0..240 {
+    // A spindle that has slowed down to 30 a minute takes two minutes.
+    for _ in 0..600 {
         let before = machine.recorder().steps();
         host.run_for_ms(machine, 250).unwrap();
         quiet = if machine.recorder().steps() == before { quiet + 1 } else { 0 };
@@ -317,7 +328,7 @@ fn recover(machine: &mut Machine, host: &mut Host, zero: [i64; 2], why: &Case) {
 }
 
 fn play(seed: u64) -> Result<(), String> {
-    let case = Case::of(seed);
+    let mut case = Case::of(seed);
     let (mut machine, mut host) = lathe(&case);
     let (machine, host) = (&mut machine, &mut host);
     let start = motors(machine);
@@ -330,9 +341,11 @@ fn play(seed: u64) -> Result<(), String> {
     }
     host.run_until(machine, machine.cycle() + case.pass_us() * 16).unwrap();
     let mut longest = 0.0f64;
-    for fault in case.faults {
+    for (n, fault) in case.faults.into_iter().enumerate() {
         let resets = machine.resets();
-        happen(machine, host, fault);
+        if !happen(machine, host, fault) {
+            case.faults[n] = Fault::Nothing;
+        }
         if machine.resets() != resets {
             zero = motors(machine);
         }
@@ -356,4 +369,10 @@ fn play(seed: u64) -> Result<(), String> {
 #[test]
 fn a_thread_ends_where_the_machine_says_whatever_happens_in_it() {
     seeds::try_all(12, play);
+}
+
+/// Two of two pulses are missing: the spindle is lost, and pulses that do not fit are news of the same moment.
+#[test]
+fn the_reason_of_an_alarm_is_told_whatever_else_happens_at_once() {
+    play(262).unwrap();
 }

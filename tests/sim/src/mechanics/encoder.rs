@@ -82,15 +82,21 @@ impl Encoder {
         self.lines[usize::from(!index)].miss = Some(after);
     }
 
-    /// A pulse too many, of so many cycles.
-    pub fn add(&mut self, index: bool, at: u64, cycles: u64) {
+    /// A pulse too many, of so many cycles. False if the sensor sees a mark at that time, so that it is none.
+    pub fn add(&mut self, index: bool, at: u64, cycles: u64) -> bool {
         let line = &mut self.lines[usize::from(!index)];
-        let level =
-            line.edges.iter().take_while(|(edge, _)| *edge <= at).last().map(|(_, high)| *high);
-        if level.unwrap_or(true) {
+        let before = line.edges.iter().take_while(|(edge, _)| *edge <= at).last();
+        let first = line.edges.front();
+        let is_free = match (before, first) {
+            (Some((_, high)), _) => *high,
+            (None, Some((_, high))) => !high,
+            (None, None) => line.high,
+        };
+        if is_free {
             line.edges.extend([(at, false), (at + cycles, true)]);
             line.edges.make_contiguous().sort_by_key(|(at, _)| *at);
         }
+        is_free
     }
 
     /// The spindle turns from one angle to another, in turns, in this time; plans the edges on the way.
