@@ -333,6 +333,8 @@ impl Thread {
         let age = time.wrapping_sub(self.at) as f32;
         let overdue = match self.stage {
             Stage::Turning | Stage::Top | Stage::Turned | Stage::Waits => PATIENCE,
+            // The speed has not been measured since it turned round, and grows from nothing.
+            _ if matches!(self.kind, Kind::Tap { window: 0, .. }) => PATIENCE,
             _ => OVERDUE * self.interval + SLACK,
         };
         if self.stage >= Stage::Follows && self.stage < Stage::Lost && age > overdue {
@@ -659,6 +661,64 @@ mod tests {
                 );
                 assert!(pass.thread.fault().is_none());
             }
+        }
+    }
+
+    /// A spindle of 300 turns a minute is told to turn round the part `phase` of the way between two pulses behind a mark, and does within a second. Whether it is lost.
+    fn loses_what_turns_round(per_turn: u16, phase: f64) -> bool {
+        let per_second = f64::from(COUNTS_PER_S);
+        let rate = 5.0 * f64::from(per_turn);
+        // It is told at this time, s, and slows down by twice its speed in a second.
+        let told = (4.0 + phase) / rate;
+        // In pulses.
+        let place = |at: u64| {
+            let (seconds, late) = (at as f64 / per_second, at as f64 / per_second - told);
+            rate * seconds - if late > 0.0 { rate * late * late } else { 0.0 }
+        };
+        let interval = (per_second / rate) as f32;
+        let mut thread = Thread {
+            stage: Stage::Follows,
+            per_turn,
+            lead: 1.0,
+            interval,
+            kind: Kind::Tap { turn_at: 0.0, decel: 0.0, window: interval as u16 },
+            ..Thread::new()
+        };
+        thread.anchor(0, QUEUED * CYCLES);
+        let (mut time, mut count, mut sync_at, mut last, mut told_so) =
+            (0u64, 0u16, 0u64, 0.0, false);
+        let end = ((told + 1.0) * per_second) as u64;
+        while time < end {
+            if time as f64 > told * per_second && !told_so {
+                (thread.stage, told_so) = (Stage::Turning, true);
+            }
+            for at in time + 1..=time + u64::from(STRETCH) {
+                let mark = place(at).floor();
+                if mark != last {
+                    (count, sync_at, last) = (count.wrapping_add(1), at, mark);
+                }
+            }
+            time += u64::from(STRETCH);
+            let pulses =
+                Pulses { now: time as u16, sync: count, sync_at: sync_at as u16, ..Pulses::NONE };
+            let encoder = Encoder::at(time as u32, per_turn, COUNTS_PER_S / 5);
+            thread.note(&pulses, &encoder);
+            thread.velocity(0, 0.0, ACCEL, false);
+            thread.queued(STRETCH * CYCLES, false);
+            if thread.drop_rest() {
+                thread.turn_back();
+            }
+        }
+        thread.fault().is_some()
+    }
+
+    #[test]
+    fn a_spindle_that_turns_round_is_not_lost_wherever_it_does() {
+        for per_turn in [4, 20, 100] {
+            let lost: Vec<u32> = (0..100)
+                .filter(|n| loses_what_turns_round(per_turn, f64::from(*n) * 0.01))
+                .collect();
+            assert!(lost.is_empty(), "{per_turn} pulses a turn: {lost:?} hundredths behind a mark");
         }
     }
 
