@@ -65,7 +65,7 @@ impl Snapshot {
         }
     }
 
-    /// Where the motors are, in steps. Cost: 1,400 in motion, and 900 for each motor that moves.
+    /// Where the motors are, to the nearest step, as the step generator rounds. Cost: 1,400 in motion, and 900 for each motor that moves.
     #[inline(never)]
     #[small]
     pub fn positions(&self) -> [i32; MOTORS] {
@@ -76,7 +76,8 @@ impl Snapshot {
         let mut positions = self.target;
         for (position, steps) in positions.iter_mut().zip(self.steps) {
             if steps != 0 {
-                *position = position.wrapping_sub((f32::from(steps) * share) as i32);
+                let half = if steps < 0 { -0.5 } else { 0.5 };
+                *position = position.wrapping_sub((f32::from(steps) * share + half) as i32);
             }
         }
         positions
