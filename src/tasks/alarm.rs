@@ -44,7 +44,7 @@ pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
     hold::abandon(links);
     spindle::stop(links.thread);
     heat::stop(links);
-    links.except(reason);
+    links.except_at_once(reason);
 }
 
 /// The machine has started as nobody wanted it to: whoever sends to it is to look first. Before anything runs.

@@ -21,7 +21,7 @@ use crate::config::Settings;
 use crate::hal::event::{is_unheard, set_eager};
 use crate::hal::serial::{Flow, USB, is_shared};
 use crate::hal::uart;
-use crate::machine::Alarm;
+use crate::machine::{self, Alarm};
 use crate::protocol::{Remembers, Speech};
 use crate::status::Status;
 
@@ -278,8 +278,19 @@ impl Links {
         self.ports.iter().any(Port::is_resetting)
     }
 
-    /// Reports an exception to whoever feeds the machine.
+    /// Reports an exception to whoever feeds the machine, in the place of one that waits. In an alarm the one that waits may be its reason, and is kept.
+    #[inline(never)]
+    #[small]
     pub fn except(&self, status: Status) {
+        if machine::alarm() == Alarm::None || self.notices.exception.get().is_none() {
+            self.except_at_once(status);
+        }
+    }
+
+    /// Reports an exception in the place of one that waits: the reason of an alarm.
+    #[inline(never)]
+    #[small]
+    pub fn except_at_once(&self, status: Status) {
         self.notices.exception.set(Some(status));
         self.reporter_wake.signal();
     }

@@ -62,10 +62,12 @@ pub fn look(links: &Links) {
     if !Capability::Lathe.is_built_in() || !encoder::is_set_up() {
         return;
     }
+    // Another exception is told first.
+    let may_tell = links.notices.exception.get().is_none();
     let first_misfit = common::with(links.thread, |common| {
         // In here: exec must not have looked at newer ones. In a pass it is exec that finds a misfit.
         common.encoder.sample(&encoder::read());
-        common.encoder.take_misfit()
+        may_tell && common.encoder.take_misfit()
     });
     // Who waits for the spindle asks again.
     flags::set(Event::BlockDone);
