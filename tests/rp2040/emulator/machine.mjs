@@ -99,6 +99,7 @@ export class Machine {
     this.load = load;
     this.cycle = 0;
     this.edgeListeners = [];
+    this.byteListeners = [];
     this.resetListeners = [];
     this.heard = [[], [], []];
     this.computer = new Computer((byte) => this.listen(USB_PORT, byte));
@@ -245,6 +246,7 @@ export class Machine {
   listen(port, byte) {
     this.heard[port].push(byte);
     this.said++;
+    for (const listener of this.byteListeners) listener(port, byte);
     if (byte === 10) this.lines++;
   }
 

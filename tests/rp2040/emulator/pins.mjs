@@ -38,6 +38,7 @@ export class Motors {
     this.last = pins.map(() => undefined);
     this.lastStep = 0;
     this.wired = [];
+    this.stepListeners = [];
     // While someone records: when each motor's steps rise, and the shortest pulse.
     this.times = undefined;
     this.shortest = Infinity;
@@ -60,12 +61,14 @@ export class Motors {
   rose(gpio, cycle) {
     const motor = this.pins.findIndex((pins) => pins.step === gpio);
     if (motor < 0) return;
-    this.positions[motor] += this.machine.levels[this.pins[motor].dir] ? -1 : 1;
+    const sign = this.machine.levels[this.pins[motor].dir] ? -1 : 1;
+    this.positions[motor] += sign;
     this.totals[motor]++;
     this.gaps[motor] = Math.min(this.gaps[motor], cycle - (this.last[motor] ?? -Infinity));
     this.last[motor] = cycle;
     this.lastStep = cycle;
     this.times?.[motor].push(cycle);
+    for (const listener of this.stepListeners) listener(motor, sign, cycle);
     for (const pin of this.wired) if (pin.motors.includes(motor)) this.work(pin);
   }
 

@@ -37,6 +37,8 @@ struct Request {
     #[serde(skip_serializing_if = "Option::is_none")]
     wire: Option<Vec<Near>>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    drivers: Option<Vec<Driver>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     record: Option<bool>,
     until: u64,
     line: bool,
@@ -82,6 +84,23 @@ pub struct Near {
     pub opens: bool,
 }
 
+/// A TMC2209 on the line of drivers, its motor, and the stop that this is held up at.
+#[derive(Serialize, Clone, Copy, Debug)]
+pub struct Driver {
+    /// Its address.
+    pub address: u8,
+    /// The motor, from 0.
+    pub motor: usize,
+    /// The pin that its DIAG is at.
+    pub gpio: u8,
+    /// Where the stop is, full steps.
+    pub stop: i64,
+    /// The motor comes to it from below.
+    pub above: bool,
+    /// It has power.
+    pub powered: bool,
+}
+
 /// How the board stands after a request.
 #[derive(Deserialize, Clone, Default, Debug)]
 struct Answer {
@@ -99,6 +118,8 @@ struct Answer {
     gaps: Vec<Option<f64>>,
     #[serde(default)]
     last: f64,
+    #[serde(default)]
+    rotors: Vec<f64>,
     #[serde(default)]
     levels: u32,
     #[serde(default)]
@@ -264,6 +285,16 @@ impl Emulated {
     /// Puts switches where motors work them.
     pub fn wire(&mut self, switches: &[Near]) {
         self.request.wire = Some(switches.to_vec());
+    }
+
+    /// Puts drivers on their line, with their registers as after power-up.
+    pub fn drivers(&mut self, drivers: &[Driver]) {
+        self.request.drivers = Some(drivers.to_vec());
+    }
+
+    /// Where the motors of those drivers are, full steps from where they were put.
+    pub fn rotors(&self) -> &[f64] {
+        &self.answer.rotors
     }
 
     /// The edges of steps in the next milliseconds.

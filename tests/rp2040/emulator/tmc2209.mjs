@@ -1,0 +1,126 @@
+// TMC2209 drivers on the line of UART1: they take what is written to their registers, turn their motor, and DIAG tells a stall.
+//
+// TMC2209 data sheet: 4.1 (datagrams), 5.1 to 5.5 (registers), 11 (StallGuard4). A motor is held up at a stop. There it slips by an electrical period,
+// four full steps, whenever it lags by more than two, as a motor does that is stepped on. At each full step its load is measured: BLOCKED where it is
+// held up, FREE where it is not, and UNSURE, as low, if it is slow. DIAG is high from there to the next full step while the load is twice SGTHRS at
+// most, a 256th of a step takes TCOOLTHRS cycles of 12 MHz at most, and the chopper is stealthChop.
+import { CLOCK_HZ } from './machine.mjs';
+
+const FREE = 300;
+const BLOCKED = 20;
+const UNSURE = 30;
+// A 256th of a step of a slow motor, cycles: half a turn a second.
+const SLOW = 470;
+// Parts of a full step.
+const PARTS = 256;
+const PERIOD = 4 * PARTS;
+const OWN_HZ = 12e6;
+const [GCONF, CHOPCONF, TCOOLTHRS, SGTHRS] = [0x00, 0x6c, 0x14, 0x40];
+const SPREAD_CYCLE = 1 << 2;
+const BY_REGISTER = 1 << 7;
+// Microsteps by the address's pins.
+const BY_PINS = [8, 32, 64, 16];
+const SYNC = 5;
+
+function checksum(bytes) {
+  let crc = 0;
+  for (const byte of bytes) {
+    for (let bit = 0; bit < 8; bit++) crc = ((crc << 1) ^ (((crc >> 7) ^ (byte >> bit)) & 1 ? 7 : 0)) & 0xff;
+  }
+  return crc;
+}
+
+// A driver, its motor, and the pin that its DIAG is at; `stop` is where the motor is held up, full steps, and whether that is above. One that has no
+// power hears nothing, and its motor does not turn.
+class Driver {
+  constructor(machine, { address, motor, gpio, stop, above, powered }) {
+    Object.assign(this, { machine, address, motor, gpio, above, powered });
+    this.stop = stop * PARTS;
+    this.registers = new Map();
+    // Where steps say, how far the motor has slipped, and where it is, parts of a full step.
+    this.command = 0;
+    this.slip = 0;
+    this.rotor = 0;
+    this.isHeld = false;
+    this.last = -Infinity;
+    machine.drive(gpio, false);
+  }
+  get(register) { return this.registers.get(register) ?? 0; }
+  write(register, value) { if (this.powered) this.registers.set(register, value); }
+  get microsteps() {
+    return this.get(GCONF) & BY_REGISTER ? PARTS >> (this.get(CHOPCONF) >>> 24 & 0xf) : BY_PINS[this.address];
+  }
+
+  stepped(sign, cycle) {
+    if (!this.powered) return;
+    const parts = PARTS / this.microsteps;
+    const before = Math.floor(this.command / PARTS);
+    this.command += sign * parts;
+    this.turn();
+    const part = (cycle - this.last) / parts * OWN_HZ / CLOCK_HZ;
+    this.last = cycle;
+    if (Math.floor(this.command / PARTS) !== before) this.measure(part);
+  }
+
+  turn() {
+    const away = this.above ? -1 : 1;
+    const lag = () => away * (this.stop - this.command - this.slip);
+    if (lag() > 2 * PARTS) this.slip += away * PERIOD;
+    this.isHeld ||= lag() > 0;
+    this.rotor = this.command + this.slip + away * Math.max(0, lag());
+  }
+
+  // A full step has been made, a part of it in so many cycles of the driver.
+  measure(part) {
+    const load = this.isHeld ? BLOCKED : part > SLOW ? UNSURE : FREE;
+    this.isHeld = false;
+    const isQuiet = !(this.get(GCONF) & SPREAD_CYCLE);
+    const stalls = isQuiet && load <= 2 * this.get(SGTHRS) && part <= this.get(TCOOLTHRS);
+    this.machine.drive(this.gpio, stalls);
+    if (stalls) this.watch();
+  }
+
+  // A motor that stands still has no load: DIAG ends when a full step takes longer than TCOOLTHRS allows.
+  watch() {
+    const { machine } = this;
+    const most = this.get(TCOOLTHRS) * PARTS * CLOCK_HZ / OWN_HZ;
+    const alarm = machine.mcu.clock.createAlarm(() => {
+      const left = this.last + most - machine.cycle;
+      if (alarm !== this.alarm) return;
+      if (left <= 0) machine.drive(this.gpio, false);
+      else alarm.schedule(Math.max(left, 100) * 1e9 / CLOCK_HZ);
+    });
+    this.alarm = alarm;
+    alarm.schedule(most * 1e9 / CLOCK_HZ);
+  }
+}
+
+export class Drivers {
+  constructor(machine, motors) {
+    this.machine = machine;
+    this.drivers = [];
+    this.bytes = [];
+    machine.byteListeners.push((port, byte) => { if (port === 1) this.hear(byte); });
+    motors.stepListeners.push((motor, sign, cycle) => {
+      for (const driver of this.drivers) if (driver.motor === motor) driver.stepped(sign, cycle);
+    });
+  }
+
+  wire(drivers) { this.drivers = drivers.map((one) => new Driver(this.machine, one)); }
+
+  // Where motors are, full steps.
+  get rotors() { return this.drivers.map(({ rotor }) => rotor / PARTS); }
+
+  hear(byte) {
+    this.bytes.push(byte);
+    if (this.bytes[0] !== SYNC) this.bytes = [];
+    if (this.bytes.length < 8) return;
+    const datagram = this.bytes;
+    this.bytes = [];
+    if (checksum(datagram.slice(0, 7)) !== datagram[7]) return;
+    const [, address, register, ...value] = datagram;
+    if (!(register & 0x80)) return;
+    const driver = this.drivers.find((one) => one.address === address);
+    driver?.write(register & 0x7f, Buffer.from(value.slice(0, 4)).readUInt32BE());
+  }
+}
