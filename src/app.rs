@@ -34,7 +34,7 @@ use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
 use crate::tasks::wake::{ReporterWake, Wake};
 use crate::tasks::{
-    alarm, control, exec, heat, parser, planner, power, reader, reporter, spindle, storage,
+    alarm, control, drivers, exec, heat, parser, planner, power, reader, reporter, spindle, storage,
 };
 
 /// Bytes for all lines of USB together, and of the other port.
@@ -198,6 +198,7 @@ fn recall(settings: &mut Settings, storage: &Storage) -> Occasion {
     let (log, memory) = (storage.log(), Eeprom::take());
     settings.set_defaults();
     kept::load(&log, &memory, settings);
+    drivers::recall(settings, storage);
     match log.is_rubbish(&memory) {
         true => Occasion::Defaults,
         false => Occasion::Ready,

@@ -393,7 +393,7 @@ const fn vector(pin: Pin) -> u8 {
     }
 }
 
-/// TMC2209 drivers on one line, with 0.11 ohms: their currents are 31 mA (RMS) for each count above -1.
+/// TMC2209 drivers on one line, with sense resistors of 0.11 ohms. What they are told is in [`drivers`](crate::drivers).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Tmc2209 {
     /// Where the UART sends and, over the same line, receives.
@@ -402,10 +402,6 @@ pub struct Tmc2209 {
     pub rx: Pin,
     /// The address of each motor's driver, motor 1 first.
     pub addresses: &'static [u8],
-    /// The current of motion, 0 to 31.
-    pub run: u8,
-    /// The current at rest, 0 to 31.
-    pub hold: u8,
 }
 
 /// A heater: its pin, high for on, which is a hazard; and the channel of the converter that its sensor is on.

@@ -25,11 +25,13 @@ pub enum Capability {
     CoreXy,
     /// Printing from an SD card.
     Sd,
+    /// Settings of drivers that take them by UART, and homing by the load that such drivers measure.
+    Drivers,
 }
 
 impl Capability {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Cycles,
         Self::Probing,
         Self::Jobs,
@@ -38,6 +40,7 @@ impl Capability {
         Self::Printer,
         Self::CoreXy,
         Self::Sd,
+        Self::Drivers,
     ];
 
     /// Whether this image has it.
@@ -52,6 +55,7 @@ impl Capability {
             Self::Printer => cfg!(feature = "printer"),
             Self::CoreXy => cfg!(feature = "corexy"),
             Self::Sd => cfg!(feature = "sd"),
+            Self::Drivers => cfg!(feature = "drivers"),
         }
     }
 
@@ -73,6 +77,7 @@ impl Capability {
             Self::Printer => "printer",
             Self::CoreXy => "corexy",
             Self::Sd => "sd",
+            Self::Drivers => "drivers",
         }
     }
 }

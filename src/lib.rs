@@ -52,6 +52,7 @@ pub mod capability;
 pub mod card;
 pub mod config;
 pub mod dda;
+pub mod drivers;
 pub mod encoder;
 pub mod gcode;
 pub mod heat;

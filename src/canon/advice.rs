@@ -332,9 +332,13 @@ const ADVICE: &[(Status, &str, &str)] = &[
     (
         HomingSwitches,
         "The axis has no homing switch, or two.",
-        "One of `sn` and `sx` is 1 or 3, the other 0 or 2.",
+        "One of `sn` and `sx` is 1 or 3, the other 0 or 2. By a stall: `drc1` is 1, and no `sqsw`.",
     ),
-    (HomingClosed, "The homing switch stays closed.", "Check the switch and `st`; raise `lb`."),
+    (
+        HomingClosed,
+        "The homing switch stays closed.",
+        "Check the switch and `st`; raise `lb`. By a stall: the jumper for DIAG.",
+    ),
     (
         NotHomed,
         "G28 or G30 moves an axis that is not homed, and no position was ever stored.",

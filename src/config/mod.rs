@@ -6,6 +6,7 @@
 
 #[cfg(feature = "std")]
 pub mod docs;
+pub mod drive;
 pub mod groups;
 pub mod heating;
 pub mod machines;
@@ -31,6 +32,7 @@ use crate::boards::MOTORS;
 use crate::kinematics;
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
+use drive::{DRIVERS, Drive};
 use groups::motor;
 use heating::Heating;
 use setting::{LARGES, SMALLS, large_of, small_of};
@@ -46,6 +48,8 @@ pub struct Settings {
     octaves: u8,
     /// What lines may ask of heaters, in an image that has them.
     pub heating: [Heating; heating::PRINTERS],
+    /// What drivers are told, in an image that tells them anything.
+    pub drives: [Drive; DRIVERS],
 }
 
 impl Default for Settings {
@@ -71,6 +75,7 @@ impl Settings {
             ratios,
             octaves: 0,
             heating: [Heating::NONE; heating::PRINTERS],
+            drives: [Drive::DEFAULT; DRIVERS],
         }
     }
 
@@ -119,6 +124,9 @@ impl Settings {
             || (setting.is_mode() && !self.is_g2core());
         let value = limit(&row, row.max - i32::from(lacks_last), number, inches)?;
         if setting.is_baud() && baud::rate(value).is_none() {
+            return Err(Status::OutOfRange);
+        }
+        if !setting.suits_driver(value) {
             return Err(Status::OutOfRange);
         }
         if matches!(setting.owner(), Owner::Motor(_)) && row.is_place(Kind::Small, motor::MA) {

@@ -1,5 +1,7 @@
 //! A setting's handle: its row of the table and whose it is.
 
+#[cfg(feature = "drivers")]
+use super::groups::driver;
 use super::groups::{
     axis, bed, coolant, hot_end, job, motor, pwm, spindle, squaring, system, user,
 };
@@ -7,7 +9,7 @@ use super::machines;
 use super::name::{Name, axis_letter, axis_of, token};
 use super::table::{HOMING, IDLE, Kind, MODE, RADIUS, SettingRow, row_of};
 use super::words::Words;
-use crate::boards::MOTORS;
+use crate::boards::{ACTIVE, MOTORS};
 use crate::capability::Capability;
 use crate::progmem::Slice;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -22,12 +24,19 @@ const FIRST_COOLANT: u8 = FIRST_SPINDLE + spindle::COUNT as u8;
 const FIRST_SQUARING: u8 = FIRST_COOLANT + coolant::COUNT as u8;
 const FIRST_HOT_END: u8 = FIRST_SQUARING + squaring::COUNT as u8;
 const FIRST_BED: u8 = FIRST_HOT_END + HOT_END;
-const FIRST_USER: u8 = FIRST_BED + BED;
+const FIRST_DRIVER: u8 = FIRST_BED + BED;
+const FIRST_USER: u8 = FIRST_DRIVER + DRIVER;
 const FIRST_JOB: u8 = FIRST_USER + USERS * user::COUNT as u8;
 
 /// The rows of heaters: none in an image that cannot print.
 const HOT_END: u8 = if Capability::Printer.is_built_in() { hot_end::COUNT as u8 } else { 0 };
 const BED: u8 = if Capability::Printer.is_built_in() { bed::COUNT as u8 } else { 0 };
+
+/// The rows of drivers: none in an image that tells them nothing.
+#[cfg(feature = "drivers")]
+const DRIVER: u8 = driver::COUNT as u8;
+#[cfg(not(feature = "drivers"))]
+const DRIVER: u8 = 0;
 
 /// The groups of user data, `uda` to `udd`.
 pub const USERS: u8 = 4;
@@ -53,6 +62,9 @@ pub enum Owner {
     HotEnd,
     /// The bed.
     Bed,
+    /// The drivers of motors.
+    #[cfg(feature = "drivers")]
+    Drivers,
     /// A sender's own, 0 to 3.
     User(u8),
     /// A job's.
@@ -73,6 +85,8 @@ impl Owner {
             Owner::Squaring => squaring::COUNT as u8,
             Owner::HotEnd => HOT_END,
             Owner::Bed => BED,
+            #[cfg(feature = "drivers")]
+            Owner::Drivers => DRIVER,
             Owner::User(_) => user::COUNT as u8,
             Owner::Job => job::COUNT as u8,
         }
@@ -90,6 +104,8 @@ impl Owner {
             Owner::Squaring => named(token("sq")),
             Owner::HotEnd => named(token("he1")),
             Owner::Bed => named(token("he3")),
+            #[cfg(feature = "drivers")]
+            Owner::Drivers => named(token("dr")),
             Owner::User(group) => named([b'u', b'd', b'a' + group, 0]),
             Owner::Job => named(token("jid")),
         }
@@ -105,6 +121,8 @@ impl Owner {
             [b's', b'q', ..] => Some(Owner::Squaring),
             [b'h', b'e', b'1', ..] if HOT_END != 0 => Some(Owner::HotEnd),
             [b'h', b'e', b'3', ..] if BED != 0 => Some(Owner::Bed),
+            #[cfg(feature = "drivers")]
+            [b'd', b'r', ..] => Some(Owner::Drivers),
             [b'u', b'd', group @ b'a'..=b'd', ..] => Some(Owner::User(group - b'a')),
             [b'j', b'i', b'd', ..] => Some(Owner::Job),
             [letter, ..] => axis_of(letter).map(Owner::Axis),
@@ -142,6 +160,8 @@ impl Owner {
             Owner::Squaring => squaring::ROWS.slice(),
             Owner::HotEnd if HOT_END != 0 => hot_end::ROWS.slice(),
             Owner::Bed if BED != 0 => bed::ROWS.slice(),
+            #[cfg(feature = "drivers")]
+            Owner::Drivers => driver::ROWS.slice(),
             Owner::User(group) if group < USERS => user::ROWS.slice(),
             Owner::Job => job::ROWS.slice(),
             _ => return None,
@@ -187,6 +207,8 @@ impl Owner {
             Owner::HotEnd if HOT_END != 0 => hot_end::WORDS.slice(),
             Owner::Bed if BED != 0 => bed::WORDS.slice(),
             Owner::HotEnd | Owner::Bed => squaring::WORDS.slice(),
+            #[cfg(feature = "drivers")]
+            Owner::Drivers => driver::WORDS.slice(),
             Owner::User(_) => user::WORDS.slice(),
             Owner::Job => job::WORDS.slice(),
         }
@@ -250,6 +272,7 @@ const NUMBERS: usize = system::COUNT
     + squaring::COUNT
     + HOT_END as usize
     + BED as usize
+    + DRIVER as usize
     + USERS as usize * user::COUNT
     + job::COUNT;
 const _: () = assert!(
@@ -314,6 +337,8 @@ impl Setting {
             Owner::Squaring => FIRST_SQUARING,
             Owner::HotEnd => FIRST_HOT_END,
             Owner::Bed => FIRST_BED,
+            #[cfg(feature = "drivers")]
+            Owner::Drivers => FIRST_DRIVER,
             Owner::User(group) => FIRST_USER + group * user::COUNT as u8,
             Owner::Job => FIRST_JOB,
         };
@@ -340,6 +365,12 @@ impl Setting {
     pub fn is_microsteps(self) -> bool {
         matches!(self.owner(), Owner::Motor(_))
             && self.index() == const { row_of(&motor::LIST, "mi") }
+    }
+
+    /// Whether the drivers of the board can have it: microsteps are a power of two if drivers are told them.
+    pub(super) fn suits_driver(self, value: i32) -> bool {
+        const TOLD: bool = ACTIVE.drivers.is_some() && Capability::Drivers.is_built_in();
+        !TOLD || !self.is_microsteps() || value.count_ones() == 1
     }
 
     /// Whether it is refused while anything moves: a step, or what becomes of one, would change its
@@ -378,7 +409,7 @@ impl Setting {
     pub fn accepts(self, value: i32) -> bool {
         let row = self.row();
         let linear_mode = row.is(MODE) && !self.owner().is_rotary();
-        (row.min..=row.max - i32::from(linear_mode)).contains(&value)
+        (row.min..=row.max - i32::from(linear_mode)).contains(&value) && self.suits_driver(value)
     }
 
     /// Whether it is the machine's profile.
@@ -393,6 +424,10 @@ impl Setting {
 
     /// Whose it is.
     pub fn owner(self) -> Owner {
+        #[cfg(feature = "drivers")]
+        if (FIRST_DRIVER..FIRST_USER).contains(&self.0) {
+            return Owner::Drivers;
+        }
         if self.0 < FIRST_MOTOR {
             Owner::System
         } else if self.0 < FIRST_AXIS {
@@ -435,6 +470,8 @@ impl Setting {
             Owner::Squaring => self.0 - FIRST_SQUARING,
             Owner::HotEnd => self.0 - FIRST_HOT_END,
             Owner::Bed => self.0 - FIRST_BED,
+            #[cfg(feature = "drivers")]
+            Owner::Drivers => self.0 - FIRST_DRIVER,
             Owner::User(_) => (self.0 - FIRST_USER) % user::COUNT as u8,
             Owner::Job => self.0 - FIRST_JOB,
         }
@@ -487,6 +524,8 @@ impl Setting {
             Owner::HotEnd if HOT_END != 0 => hot_end::DEFAULTS.at(index),
             Owner::Bed if BED != 0 => bed::DEFAULTS.at(index),
             Owner::HotEnd | Owner::Bed => None,
+            #[cfg(feature = "drivers")]
+            Owner::Drivers => driver::DEFAULTS.at(index),
             Owner::Coolant | Owner::Squaring | Owner::User(_) | Owner::Job => None,
         };
         value.unwrap_or(0)

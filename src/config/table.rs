@@ -119,6 +119,14 @@ pub(super) const fn seconds(most: i32) -> SettingRow {
     row
 }
 
+/// The current of a driver, amperes of which three decimals are kept, in EEPROM.
+#[cfg(feature = "drivers")]
+pub(super) const fn current() -> SettingRow {
+    let mut row = up_to(cold(3), 1_400).with(RANGE);
+    row.min = 50;
+    row
+}
+
 /// Yes or no, in EEPROM.
 pub(super) const fn choice() -> SettingRow {
     whole(cold(0), 1)

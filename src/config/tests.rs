@@ -165,7 +165,8 @@ fn getters_have_their_units() {
 #[test]
 fn ram_is_accounted_for() {
     let heating = if heating::PRINTERS == 0 { 0 } else { 12 };
-    assert_eq!(size_of::<Settings>(), 436 + heating);
+    let drives = drive::DRIVERS * 6;
+    assert_eq!(size_of::<Settings>(), 436 + heating + drives);
     assert!(size_of::<SettingRow>() * 51 + (28 + 7 * 4 + 16 * 6) * 4 < 2048);
 }
 

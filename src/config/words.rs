@@ -50,6 +50,8 @@ pub(super) const JOB_ID: Text = text!("job id");
 pub(super) const SENSORS: Text =
     text!(" [0=none,1=Semitec,2=EPCOS,3=AD595,4=PT100,5=AD8495,6=MAX6675]");
 pub(super) const DEGREES: Text = text!(" C");
+#[cfg(feature = "drivers")]
+pub(super) const AMPERES: Text = text!(" A");
 pub(super) const SECONDS: Text = text!(" s");
 pub(super) const NONE: Text = text!("");
 

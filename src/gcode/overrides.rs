@@ -39,6 +39,9 @@ pub const FULL: u16 = 1_000;
 
 /// All of them, as bits.
 const ALL: u8 = 7;
+/// A bit beside those: feed rates are as programmed whatever overrides are.
+#[cfg(feature = "drivers")]
+const FIXED: u8 = 8;
 
 /// What becomes of overrides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -116,7 +119,21 @@ impl Overrides {
 
     /// What rates are multiplied by: the factor, or nothing if it does not count.
     pub fn in_force(&self, which: Override) -> u16 {
+        #[cfg(feature = "drivers")]
+        if which == Override::Feed && self.on & FIXED != 0 {
+            return FULL;
+        }
         if self.is_on(which) { self.factor(which) } else { FULL }
+    }
+
+    /// Has feed rates be as programmed, or not any more, whatever changes meanwhile.
+    #[cfg(feature = "drivers")]
+    pub fn fix_feed(&mut self, fixed: bool) {
+        if fixed {
+            self.on |= FIXED;
+        } else {
+            self.on &= !FIXED;
+        }
     }
 
     /// Whether rates are as programmed.
@@ -130,6 +147,21 @@ impl Overrides {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(feature = "drivers")]
+    fn a_feed_that_is_fixed_stays_so_until_it_is_not() {
+        let mut overrides = Overrides::NONE;
+        overrides.fix_feed(true);
+        for change in [Change::to(Override::Feed, 500), Change::ALL_OFF, Change::ALL_ON] {
+            overrides.change(change);
+            assert_eq!(overrides.in_force(Override::Feed), FULL);
+        }
+        overrides.change(Change::to(Override::Traverse, 250));
+        assert_eq!(overrides.in_force(Override::Traverse), 250);
+        overrides.fix_feed(false);
+        assert_eq!(overrides.in_force(Override::Feed), 500);
+    }
 
     #[test]
     fn a_factor_outlives_its_being_off() {

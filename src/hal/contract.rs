@@ -18,6 +18,7 @@ use super::ring::Producer;
 use super::serial::{AllEnds, Flow};
 use crate::boards::MOTORS;
 use crate::dda::{Dda, SEGMENTS, Segment, Ticks};
+use crate::drivers::REGISTERS;
 use crate::encoder::Pulses;
 use crate::realtime::Asked;
 use crate::store::Memory;
@@ -198,6 +199,13 @@ contract! {
         /// Gives the hot end, the bed and the fan their power, 255 for all: pulses where [`PULSED`](crate::boards::PULSED) says so, elsewhere
         /// on or, with 0, off. Thread mode. Cost: 60.
         fn drive(power: [u8; 3]);
+    }
+
+    /// Stepper drivers that are told by UART; of boards that have them.
+    trait Drivers in drivers {
+        /// What the registers of a motor's driver, 0 the first, are to be from now on, in the order of [`drivers`](crate::drivers). Each that is
+        /// another than before is sent within a millisecond for each that waits before it; all of them again and again. Thread mode.
+        fn tell(motor: u8, values: &[u32; REGISTERS]);
     }
 
     /// The lines of an SD card: SPI, and the pin that selects it. On a chip without one a line that nobody drives is high.

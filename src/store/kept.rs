@@ -101,7 +101,9 @@ mod tests {
             assert_ne!(key, NO_KEY);
         }
         let heaters = if Capability::Printer.is_built_in() { 16 } else { 0 };
+        let drivers = if Capability::Drivers.is_built_in() { 15 } else { 0 };
         assert!(keys.len() <= usize::from(KEYS));
-        assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + 10 + 9 + 2 + 17 + heaters);
+        let cold = 10 + 9 + 2 + 17 + heaters + drivers;
+        assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + cold);
     }
 }

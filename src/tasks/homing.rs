@@ -10,6 +10,8 @@
 //!      |<-zb->| here the axis is at tn                  here at tm
 //! ```
 //!
+//! An axis of which a motor's driver tells the load ([`Settings::homes_by_stall`]) needs no switch: the pin of that driver is in its place.
+//!
 //! Where the axis ends up, `zb` off the switch, is the end of its travel, so that machine coordinates and soft limits
 //! fit the machine: `tn` at a lower switch, `tm` at an upper one. It is 0 where that end is not set or both
 //! are the same.
@@ -131,6 +133,9 @@ pub fn of(settings: &Settings, axis: u8) -> Result<Homing, Status> {
         return Err(Status::HomingTravel);
     }
     let end = switch_of(settings, axis).ok_or(Status::HomingSwitches)?;
+    if settings.homes_by_stall(axis) && !settings.drives.get(a).is_some_and(|drive| drive.quiet) {
+        return Err(Status::HomingSwitches);
+    }
     let place = if end & 1 == 0 { low } else { high };
     let unset = low == high || place == TRAVEL_NONE;
     let place = if unset { Length::ZERO } else { place };

@@ -9,6 +9,7 @@ pub mod alarm;
 pub mod card;
 pub mod common;
 pub mod control;
+pub mod drivers;
 pub mod exec;
 pub mod health;
 pub mod heat;

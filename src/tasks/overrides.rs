@@ -42,6 +42,24 @@ pub fn change(thread: Thread, change: Change) {
     flags::set(Event::Realtime);
 }
 
+/// Has feed rates be as programmed whatever overrides are, or not any more. Planner only.
+#[cfg(feature = "drivers")]
+pub fn fix_feed(thread: Thread, fixed: bool) {
+    exec::lock(thread, |ceiling| {
+        let factors = Common.with(ceiling, |common| {
+            common.overrides.fix_feed(fixed);
+            factors(&common.overrides)
+        });
+        queue::store().want(factors, ceiling);
+    });
+    flags::set(Event::Realtime);
+}
+
+/// Nothing fixes them.
+#[cfg(not(feature = "drivers"))]
+#[inline(always)]
+pub fn fix_feed(_thread: Thread, _fixed: bool) {}
+
 /// The moves behind which the change stands have been prepared. Exec only.
 #[small]
 pub fn change_in_stream(overrides: &mut Overrides, change: Change, blocks: &mut BlockSource) {

@@ -15,6 +15,7 @@ use core::cell::Cell;
 use super::links::Links;
 use super::ports::COURTESY;
 use super::wake::Wake;
+use crate::capability::Capability;
 use crate::config::Setting;
 use crate::gcode::tables::{Edit, TableRow, Tables};
 use crate::hal::after_ms;
@@ -29,8 +30,8 @@ use crate::store::{Log, Memory, record, tables};
 use crate::units::{Length, PerAxis};
 
 /// Keys without a record if every setting and every value of all 21 rows on six axes has been set: then a line is refused with status
-/// 34. The program's area has the room.
-const LEFT_OUT: u16 = 16;
+/// 34. Those of drivers are as many more. The program's area has the room.
+const LEFT_OUT: u16 = if Capability::Drivers.is_built_in() { 31 } else { 16 };
 const _: () = assert!(
     kept::KEYS < Eeprom::LOG / record::SIZE + LEFT_OUT,
     "the log of the EEPROM has too few records for what is kept: make `AREA` of src/store/program.rs smaller by 11 bytes for each"

@@ -7,11 +7,14 @@
 //! It counts when it closes (with `st` 1, opens), not if it stands so: a machine can start on its limit and move
 //! off it. The ends of an axis that is being homed are no limits for as long as it goes (`spare`).
 //!
+//! The pins of an axis that homes by a stall ([`homing`](super::homing)) are at DIAG of its driver, which is high when it is worked, whatever `st` says.
+//!
 //! Door and emergency stop count as they stand, if `saf` and `est` say that there are any. The door is a hold
 //! that no tilde ends before it is shut; one that is open when nothing runs keeps what comes from beginning.
 
 use kerf_macros::small;
 
+use super::homing::AXES;
 use super::links::Links;
 use super::{alarm, hold};
 use crate::boards::{ACTIVE, inputs};
@@ -62,6 +65,9 @@ pub fn set_up(settings: &Settings) {
     }
     if settings.stop_switch() == OPENS {
         closing &= !(1 << inputs::STOP);
+    }
+    for axis in (0..AXES).filter(|axis| settings.homes_by_stall(*axis)) {
+        closing &= !(3 << (2 * axis));
     }
     let is_limit = |end: &u8| mode(settings, *end) & LIMIT != 0;
     let mut stops = (0..inputs::ENDS as u8).filter(is_limit).fold(0, |bits, end| bits | 1 << end);

@@ -10,6 +10,7 @@ use core::cell::{OnceCell, RefMut};
 
 use super::alarm;
 use super::common::{snapshot, with};
+use super::drivers;
 use super::health;
 use super::heat;
 use super::hold;
@@ -318,6 +319,10 @@ impl Machine for View<'_> {
                 return Err(Status::NotAccepted);
             }
             self.links.storage.set_cold(setting, value)?;
+            if drivers::set(&mut self.settings, setting, value) {
+                set_hardware(self.links.thread, &self.settings);
+                return Ok(Warning::None);
+            }
             if Capability::Printer.is_built_in() {
                 heat::set(&self.links.heat, &mut self.settings, setting, value);
                 // The planner asks for the extruder's lead.
@@ -496,6 +501,7 @@ impl Machine for View<'_> {
         self.report.restore();
         self.links.changes.note(Changes::STEPS | Changes::SETTINGS);
         self.links.storage.forget_cold();
+        drivers::recall(&mut self.settings, self.links.storage);
         spindle::set_all(self.links.thread, self.links.storage);
         heat::set_all(&self.links.heat, &mut self.settings, self.links.storage);
         self.links.storage.note(0, ITEMS);
@@ -826,6 +832,7 @@ pub fn set_hardware(thread: Thread, settings: &Settings) {
     power::set_modes(thread, settings);
     stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
     stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));
+    drivers::tell(settings);
 }
 
 /// The motors of which something is so, as bits.

@@ -14,8 +14,16 @@ fn owners() -> Vec<(String, Owner)> {
     };
     let motors = (0..4).map(Owner::Motor);
     let axes = (0..6).map(Owner::Axis);
-    let outputs =
-        [Owner::Pwm, Owner::Spindle, Owner::Coolant, Owner::Squaring, Owner::HotEnd, Owner::Bed];
+    let outputs = [
+        Owner::Pwm,
+        Owner::Spindle,
+        Owner::Coolant,
+        Owner::Squaring,
+        Owner::HotEnd,
+        Owner::Bed,
+        #[cfg(feature = "drivers")]
+        Owner::Drivers,
+    ];
     let user = (0..4).map(Owner::User);
     [Owner::System]
         .into_iter()
@@ -58,6 +66,8 @@ fn title(owner: Owner) -> &'static str {
         Owner::Squaring => "Squaring",
         Owner::HotEnd => "Hot end",
         Owner::Bed => "Bed",
+        #[cfg(feature = "drivers")]
+        Owner::Drivers => "Drivers",
         Owner::User(_) => "User data",
         Owner::Job => "Job",
     }

@@ -171,7 +171,9 @@ fn about(board: &Board) -> &'static str {
             "A Raspberry Pi Pico with six drivers: two more motors may share an axis with another, or move B and C. **3.3 V**, as `pico-cnc`."
         }
         "skr-pico" => {
-            "A BTT SKR Pico v1.0: motor 4 is its driver E. FAN1 cools the print, FAN2 and FAN3 are spindle and mist, the servo's pin is the spindle's speed. **3.3 V**, as `pico-cnc`."
+            "A BTT SKR Pico v1.0: motor 4 is its driver E. FAN1 cools the print, FAN2 and FAN3 are spindle and mist, the servo's pin is the spindle's speed. **3.3 V**, as `pico-cnc`. \
+             A jumper for DIAG puts the driver's pin in the place of the switches of X, Y or Z, for [homing by a stall](rp2040.md#homing-by-a-stall): without a switch there. \
+             The jumper of E stays off: its pin is the emergency stop's."
         }
         _ => "",
     }

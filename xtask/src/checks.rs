@@ -134,7 +134,16 @@ fn emulated() -> Result<()> {
     let mut test = host_cargo();
     test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());
     test.args(["test", "--package", "kerf-sim", "--profile", "sim"]);
-    test.args(["--test", "pico", "--test", "pico_usb", "--test", "pico_bench"]);
+    test.args([
+        "--test",
+        "pico",
+        "--test",
+        "pico_usb",
+        "--test",
+        "pico_drivers",
+        "--test",
+        "pico_bench",
+    ]);
     // The jobs of those take many minutes: `cargo xtask bench --board pico-cnc --row pauses-none` runs them.
     run_child(test.args(["--", "--ignored", "--skip", "pauses_"]))
 }

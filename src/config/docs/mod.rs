@@ -4,6 +4,8 @@ use std::format;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
+#[cfg(feature = "drivers")]
+use super::groups::driver;
 use super::groups::{
     Meaning, axis, bed, coolant, hot_end, job, motor, pwm, spindle, squaring, system, user,
 };
@@ -88,7 +90,7 @@ refused. A line is looked at when it is carried out, not before.
 
 /// All of it.
 pub fn markdown() -> String {
-    let groups: [(&str, &str, &[Owner], &[Meaning]); 11] = [
+    let groups: [(&str, &str, &[Owner], &[Meaning]); 11 + cfg!(feature = "drivers") as usize] = [
         (
             "The machine",
             "The group `sys`; names have no prefix.",
@@ -134,6 +136,13 @@ the spindle is off, S24000 is 10 V. A spindle of 12,000 RPM wants `{p1:{csh:1200
             "The group `he3`: `he3p`. Of images that can print.",
             &[Owner::Bed],
             &bed::MEANINGS,
+        ),
+        #[cfg(feature = "drivers")]
+        (
+            "Drivers",
+            "The group `dr`: `drr1`. Of images for boards whose drivers are told by UART ([rp2040.md](rp2040.md#skr-pico)).",
+            &[Owner::Drivers],
+            &driver::MEANINGS,
         ),
         (
             "User data",
@@ -362,6 +371,8 @@ mod tests {
             (Owner::HotEnd, &hot_end::MEANINGS),
             #[cfg(feature = "printer")]
             (Owner::Bed, &bed::MEANINGS),
+            #[cfg(feature = "drivers")]
+            (Owner::Drivers, &driver::MEANINGS),
             (Owner::User(0), &user::MEANINGS),
             (Owner::Job, &job::MEANINGS),
         ] {

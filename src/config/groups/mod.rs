@@ -16,6 +16,8 @@
 //! To add a setting, add its row, and a getter in `getters.rs`. A machine that wants another default has it in its file under `machines/`.
 
 mod axes;
+#[cfg(feature = "drivers")]
+mod drivers;
 mod heaters;
 mod machine;
 mod motors;
@@ -23,6 +25,8 @@ mod outputs;
 mod sender;
 
 pub use axes::axis;
+#[cfg(feature = "drivers")]
+pub use drivers::driver;
 pub use heaters::{bed, hot_end};
 pub use machine::system;
 pub use motors::{motor, squaring};

@@ -16,6 +16,7 @@
 
 pub mod arithmetic;
 pub mod card;
+pub mod drivers;
 mod edges;
 pub mod eeprom;
 pub mod encoder;

@@ -7,6 +7,8 @@
 
 pub mod arithmetic;
 pub mod card;
+#[path = "../avr/drivers.rs"]
+pub mod drivers;
 pub mod eeprom;
 pub mod encoder;
 pub mod flash;

@@ -28,7 +28,7 @@
 pub mod arithmetic;
 #[path = "../host/card.rs"]
 pub mod card;
-mod drivers;
+pub mod drivers;
 pub mod eeprom;
 pub mod encoder;
 #[path = "../host/flash.rs"]

@@ -11,6 +11,10 @@
 //! a while. Contacts are exact to the step ([`seek`](super::seek)), and so is the place, however fast the
 //! axis passed the switch. Without `lb` the place is counted from where the switch closed.
 //!
+//! An axis that homes by a stall (`drs1`) has no switch: its motor's driver raises DIAG while the motor is held up and its speed is about that of the search.
+//! So it only searches, and the place is counted from where the axis has come to rest: until then its motor has slipped at the stop by whole electrical
+//! periods of four full steps, and stands two full steps from the stop at most. DIAG that is high at standstill is a driver's fault, or a wire that is off.
+//!
 //! The limits of the axis are none meanwhile; those of others are. All settings are looked at before anything moves.
 //! What fails ends the cycle: exception with the axis and the reason, the axis not homed, the position where
 //! it is. A feedhold holds; a flush ends it as a failure. What waits behind the line is carried out after it.
@@ -22,12 +26,14 @@ use kerf_macros::small;
 use super::Planner;
 use super::seek::{Sought, drop_blocks};
 use super::square::Second;
+use crate::capability::Capability;
 use crate::gcode::command::{Feed, Motion};
 use crate::hal::inputs;
 use crate::machine::{self, Event};
 use crate::motion::block::QueuedAction;
 use crate::status::Status;
 use crate::tasks::homing::{self, Homing};
+use crate::tasks::overrides;
 use crate::units::Length;
 
 /// Longer than a switch is not asked again ([`LOCK_MS`](crate::switches::LOCK_MS)).
@@ -106,6 +112,16 @@ impl Progress {
             _ => Ok(()),
         }
     }
+
+    /// As `pass`, where no switch is looked for.
+    #[inline(always)]
+    fn pass_stall(&mut self, closed: u16) -> Result<(), Status> {
+        if self.stage == Stage::Clear {
+            self.stage = Stage::Search;
+        }
+        let is_worked = self.stage == Stage::Search && closed != 0;
+        if is_worked { Err(Status::HomingClosed) } else { Ok(()) }
+    }
 }
 
 impl Planner {
@@ -132,6 +148,12 @@ impl Planner {
             drop_blocks(self.links.thread).await;
         }
         self.end_homing(&at, done.err());
+    }
+
+    /// Whether an axis homes by the load of its motor.
+    #[inline(always)]
+    pub(super) fn homes_by_stall(&self, axis: u8) -> bool {
+        Capability::Drivers.is_built_in() && self.links.settings.borrow().homes_by_stall(axis)
     }
 
     /// What the line asks for: the axes, and whether their positions are set.
@@ -173,7 +195,12 @@ impl Planner {
         }
         let (own, second) = (homing.switch(), at.second.map_or(0, Second::switch));
         let closed = inputs::worked() & (own | second);
-        at.pass(&homing, closed, closed == own | second)?;
+        self.fix_search(at.axis);
+        if self.homes_by_stall(at.axis) {
+            at.pass_stall(closed)?;
+        } else {
+            at.pass(&homing, closed, closed == own | second)?;
+        }
         // From where, how far away from the switch, and which switches end it.
         let here = self.at(at.axis);
         // A motor may have gone as far beyond its own switch.
@@ -207,6 +234,9 @@ impl Planner {
             let contact = self.located(steps);
             at.contact = contact.get(usize::from(at.axis)).copied().unwrap_or_default();
         }
+        if self.homes_by_stall(at.axis) && at.stage == Stage::Search {
+            return self.end_stall(at, sought);
+        }
         if at.stage == Stage::Search {
             let beyond = self.at(at.axis).0.wrapping_sub(at.contact.0);
             at.beyond = Length(beyond.saturating_abs());
@@ -225,6 +255,26 @@ impl Planner {
             (Stage::Level, _) => Stage::Zero,
             (Stage::Zero | Stage::Place, _) => Stage::Place,
         };
+        Ok(true)
+    }
+
+    /// A search for a stall has the speed that its driver has been told of, whatever the feed override is.
+    #[inline(always)]
+    fn fix_search(&mut self, axis: u8) {
+        if Capability::Drivers.is_built_in() {
+            overrides::fix_feed(self.links.thread, self.homes_by_stall(axis));
+            self.replan();
+        }
+    }
+
+    /// What has come of a search that a stall ends.
+    #[inline(always)]
+    fn end_stall(&self, at: &mut Progress, sought: &Sought) -> Result<bool, Status> {
+        if !matches!(sought, Sought::Contact(_)) {
+            return Err(Status::HomingFailed);
+        }
+        at.contact = self.at(at.axis);
+        at.stage = Stage::Zero;
         Ok(true)
     }
 
@@ -307,6 +357,7 @@ impl Planner {
     #[small]
     fn end_homing(&mut self, at: &Progress, failure: Option<Status>) {
         let links = self.links;
+        overrides::fix_feed(links.thread, false);
         inputs::spare(0);
         let mut model = links.model.borrow_mut();
         // In a flush it is not here yet.

@@ -75,7 +75,9 @@ impl Planner {
             return Ok(None);
         };
         let wired = switches::WIRED >> input & 1 != 0;
-        if !wired || homing.has_pin(input) || homing.backoff == Length::ZERO {
+        // A motor that is pushed at a stop pushes the other one.
+        let stalls = self.homes_by_stall(axis);
+        if stalls || !wired || homing.has_pin(input) || homing.backoff == Length::ZERO {
             return Err(Status::HomingSwitches);
         }
         Ok(Some(Second { motor: motor as u8, input }))

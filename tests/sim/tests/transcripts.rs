@@ -24,7 +24,9 @@ const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 
 #[test]
 fn the_image_keeps_to_the_transcripts() {
-    let all = transcript::read_all(Path::new("../transcripts"));
+    let mut all = transcript::read_all(Path::new("../transcripts"));
+    // No image for this chip tells drivers anything.
+    all.retain(|one| !one.name.starts_with("drivers"));
     let begins = |names: &[&str], one: &transcript::Transcript| {
         names.iter().any(|name| one.name.starts_with(name))
     };

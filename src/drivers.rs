@@ -1,0 +1,179 @@
+//! TMC2209 drivers: the values of their registers, and the datagrams that write them. Pure: no pin, no UART.
+//!
+//! A driver is told its microsteps, its currents, its chopper, and at which load it raises its pin DIAG. It measures that load with
+//! stealthChop alone, and only while a 256th of a step takes TCOOLTHRS cycles of its clock at most: Kerf sets that to three quarters
+//! of the speed at which the axis searches, for the load of a slower motor cannot be told from a stall.
+//!
+//! Registers and datagrams: TMC2209 data sheet, 4.1 (UART datagram structure), 5.1 to 5.5 (register map), 9 (currents), 11 (StallGuard4).
+
+use crate::config::Settings;
+use crate::config::drive::Drive;
+
+/// How many registers a driver is told.
+pub const REGISTERS: usize = 5;
+
+/// Their addresses: GCONF, CHOPCONF, IHOLD_IRUN, TCOOLTHRS, SGTHRS.
+const ADDRESSES: [u8; REGISTERS] = [0x00, 0x6C, 0x10, 0x14, 0x40];
+
+/// GCONF: by UART, not by pins; microsteps from CHOPCONF; pulses filtered; the current not from the pin VREF.
+const GCONF: u32 = 1 << 6 | 1 << 7 | 1 << 8;
+const SPREAD_CYCLE: u32 = 1 << 2;
+/// CHOPCONF: microsteps made 256 by the driver; as after a reset otherwise.
+const CHOPCONF: u32 = 1 << 28 | 1 << 16 | 0x53;
+const LOW_RANGE: u32 = 1 << 17;
+const FIRST_RESOLUTION: u32 = 24;
+/// Microsteps that have the resolution 0, as a power of two.
+const FINEST: u32 = 8;
+/// IHOLD_IRUN: an eighth of a second and more from the current of motion to that of standstill.
+const HOLD_DELAY: u32 = 8 << 16;
+/// What all 32 counts of current are with sense resistors of 0.11 ohms, mA (RMS): of the low range, and of the high one.
+const LOW_FULL: u32 = 979;
+const HIGH_FULL: u32 = 1_768;
+/// Its own clock, Hz.
+const OWN_HZ: f32 = 12e6;
+/// TCOOLTHRS has 20 bits.
+const SLOWEST: u32 = 0xF_FFFF;
+/// Of the speed of the search a stall is told from here on.
+const SHARE: f32 = 0.75;
+/// Units of [`Length`](crate::units::Length) in a millimetre, or a degree.
+const UNITS: f32 = 1e4;
+
+/// What registers are until settings have been read.
+pub const FIRST: [u32; REGISTERS] = values(&Drive::DEFAULT, 8, 0);
+
+/// The values of the registers of a driver, by what settings say, microsteps, and the slowest 256th of a step at which a stall counts.
+const fn values(drive: &Drive, microsteps: u8, slowest: u32) -> [u32; REGISTERS] {
+    let (run, hold) = (drive.run as u32, drive.hold as u32);
+    let is_low = run <= LOW_FULL && hold <= LOW_FULL;
+    let (range, full) = if is_low { (LOW_RANGE, LOW_FULL) } else { (0, HIGH_FULL) };
+    let chopper = if drive.quiet { 0 } else { SPREAD_CYCLE };
+    let finer = if microsteps == 0 { 0 } else { microsteps.ilog2() };
+    [
+        GCONF | chopper,
+        CHOPCONF | range | (FINEST - finer) << FIRST_RESOLUTION,
+        HOLD_DELAY | counts(run, full) << 8 | counts(hold, full),
+        if drive.stall == 0 { 0 } else { slowest },
+        drive.stall as u32,
+    ]
+}
+
+/// The nearest count for a current, of which there are 32.
+const fn counts(current: u32, full: u32) -> u32 {
+    let counts = (current * 32 + full / 2) / full;
+    if counts == 0 {
+        0
+    } else if counts > 32 {
+        31
+    } else {
+        counts - 1
+    }
+}
+
+/// What the driver of a motor is to be told, by all settings. Cost: two divisions of floats.
+pub fn registers(settings: &Settings, motor: usize) -> [u32; REGISTERS] {
+    let drive = settings.drives.get(motor).copied().unwrap_or(Drive::DEFAULT);
+    values(&drive, settings.motor_microsteps(motor), slowest(settings, motor))
+}
+
+/// How many cycles of a driver's clock a 256th of a step takes at the slowest speed at which it tells a stall. Its DIAG pin is at the stop of the axis of
+/// its number, which searches.
+fn slowest(settings: &Settings, motor: usize) -> u32 {
+    let speed = settings.search_velocity(motor).min(settings.velocity_max(motor)) * SHARE;
+    let ratio = settings.step_ratio(motor);
+    let parts = 256.0 / f32::from(settings.motor_microsteps(motor).max(1));
+    let of_unit = ratio.num as f32 / ratio.den as f32 * parts;
+    let cycles = OWN_HZ * 60.0 / (speed * UNITS * of_unit);
+    // Also for a motor that never moves, by which cycles have no end.
+    (cycles as u32).min(SLOWEST)
+}
+
+/// What writes a register of the driver of an address: `number` is its place among [`REGISTERS`]. Cost on a Cortex-M0+: 1,000 cycles.
+pub fn datagram(address: u8, number: usize, value: u32) -> [u8; 8] {
+    let register = ADDRESSES.get(number).copied().unwrap_or(0);
+    let [a, b, c, d] = value.to_be_bytes();
+    let mut datagram = [0x05, address, register | 0x80, a, b, c, d, 0];
+    datagram[7] = checksum(&datagram[..7]);
+    datagram
+}
+
+/// CRC of x^8 + x^2 + x + 1, the lowest bit of each byte first.
+fn checksum(bytes: &[u8]) -> u8 {
+    let mut crc = 0u8;
+    for byte in bytes {
+        for bit in 0..8 {
+            let over = (crc >> 7) ^ (byte >> bit & 1);
+            crc = crc << 1 ^ if over != 0 { 0x07 } else { 0 };
+        }
+    }
+    crc
+}
+
+#[cfg(test)]
+#[cfg(feature = "drivers")]
+mod tests {
+    use super::*;
+    use crate::config::{Name, Number, Setting};
+
+    fn set(settings: &mut Settings, name: &str, value: &str) {
+        let setting = Setting::find(&Name::new().with(name.as_bytes()).unwrap()).unwrap();
+        let number = Number::parse(value.as_bytes()).unwrap();
+        let value = settings.check(setting, number, false).unwrap();
+        settings.store(setting, value);
+    }
+
+    fn drive(run: u16, hold: u16) -> Drive {
+        Drive { run, hold, ..Drive::DEFAULT }
+    }
+
+    #[test]
+    fn a_datagram_is_that_of_the_data_sheet() {
+        assert_eq!(FIRST, [0x1C0, 0x1503_0053, 0x0008_1209, 0, 0]);
+        assert_eq!(datagram(2, 0, 0x1C0)[..7], [5, 2, 0x80, 0, 0, 1, 0xC0]);
+        // That of a request to read GCONF.
+        assert_eq!(checksum(&[5, 0, 0]), 0x48);
+    }
+
+    #[test]
+    fn currents_are_the_nearest_of_the_finer_range() {
+        for (run, hold, low, counts) in [
+            (50, 50, true, (1, 1)),
+            (580, 310, true, (18, 9)),
+            (979, 50, true, (31, 1)),
+            (980, 310, false, (17, 5)),
+            (310, 1_000, false, (5, 17)),
+            (1_400, 1_400, false, (24, 24)),
+            (u16::MAX, 0, false, (31, 0)),
+        ] {
+            let [_, chopper, currents, ..] = values(&drive(run, hold), 8, 0);
+            assert_eq!(chopper & LOW_RANGE != 0, low, "{run} {hold}");
+            assert_eq!((currents >> 8 & 0xFF, currents & 0xFF), counts, "{run} {hold}");
+        }
+    }
+
+    #[test]
+    fn microsteps_are_a_resolution() {
+        let resolution = |microsteps| values(&Drive::DEFAULT, microsteps, 0)[1] >> 24 & 0xF;
+        assert_eq!([1, 2, 8, 16, 128].map(resolution), [8, 7, 5, 4, 1]);
+        assert_eq!([0, 3, 255].map(resolution), [8, 7, 1], "never beyond");
+    }
+
+    #[test]
+    fn a_stall_counts_from_three_quarters_of_the_search_on() {
+        let mut settings = Settings::new();
+        settings.drives[0].stall = 90;
+        // 600 mm/min are 8 turns of 1.25 mm a second, 409,600 parts of a step.
+        for (name, value) in [("xvm", "800"), ("xsv", "600")] {
+            set(&mut settings, name, value);
+        }
+        let told = |settings: &Settings| registers(settings, 0)[3..].to_vec();
+        assert_eq!(told(&settings), [39, 90]);
+        set(&mut settings, "1mi", "32");
+        assert_eq!(told(&settings), [39, 90], "parts are of full steps");
+        set(&mut settings, "xvm", "60");
+        assert_eq!(told(&settings), [390, 90], "no axis searches faster than it goes");
+        set(&mut settings, "xsv", "0.001");
+        assert_eq!(told(&settings), [SLOWEST, 90]);
+        settings.drives[0].stall = 0;
+        assert_eq!(told(&settings), [0, 0]);
+    }
+}

@@ -1,0 +1,45 @@
+//! Settings of drivers that are told by UART. An image without them has nothing here. Thread mode.
+
+use super::storage::Storage;
+use crate::config::{Setting, Settings};
+#[cfg(feature = "drivers")]
+use crate::{config::drive::DRIVERS, drivers::registers, hal::drivers};
+
+/// Takes over a setting, if it is one of theirs. Whether it is.
+#[cfg(feature = "drivers")]
+pub fn set(settings: &mut Settings, setting: Setting, value: i32) -> bool {
+    settings.set_drive(setting, value)
+}
+
+/// Takes over all of them, as they have been put away.
+#[cfg(feature = "drivers")]
+pub fn recall(settings: &mut Settings, storage: &Storage) {
+    for setting in (Setting::WARM..Setting::COLD).filter_map(Setting::from_number) {
+        settings.set_drive(setting, storage.cold(setting));
+    }
+}
+
+/// Tells the drivers what all settings say of them. Cost: eight divisions of floats.
+#[cfg(feature = "drivers")]
+pub fn tell(settings: &Settings) {
+    for motor in 0..DRIVERS {
+        drivers::tell(motor as u8, &registers(settings, motor));
+    }
+}
+
+/// There is no such setting.
+#[cfg(not(feature = "drivers"))]
+#[inline(always)]
+pub fn set(_settings: &mut Settings, _setting: Setting, _value: i32) -> bool {
+    false
+}
+
+/// There are none.
+#[cfg(not(feature = "drivers"))]
+#[inline(always)]
+pub fn recall(_settings: &mut Settings, _storage: &Storage) {}
+
+/// Nobody is told.
+#[cfg(not(feature = "drivers"))]
+#[inline(always)]
+pub fn tell(_settings: &Settings) {}

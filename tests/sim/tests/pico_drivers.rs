@@ -1,0 +1,301 @@
+//! The drivers of the SKR Pico, which are emulated with their motors and a stop that these are held up at: what drivers are told, and homing by a stall.
+//! They run as `pico.rs` says.
+
+mod common;
+
+use common::image;
+use kerf::boards::{SKR_PICO, gp};
+use kerf_sim::emulated::{DRIVERS, Driver, Emulated};
+use kerf_sim::{Host, LINES_IN_FLIGHT, Runs};
+
+/// Full steps in a millimetre of X and Y: 200 in a turn of 1.25 mm.
+const FULL_STEPS: f64 = 160.0;
+/// How far from the stop a motor may be that has slipped there, full steps.
+const SLIPS: f64 = 2.0;
+/// Where X is held up, full steps; it homes downwards.
+const STOP: i64 = -6 * FULL_STEPS as i64;
+
+/// A board that has been powered up, and a sender; X and Y have a driver each whose DIAG is at the stop of its axis.
+fn booted(x: Driver) -> (Emulated, Host) {
+    let mut board = Emulated::load(&image(&SKR_PICO), &SKR_PICO).unwrap();
+    let y = Driver { address: 2, motor: 1, gpio: 3, ..x };
+    board.drivers(&[x, y]);
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut board, 1_000).unwrap();
+    (board, host)
+}
+
+fn driver() -> Driver {
+    Driver { address: 0, motor: 0, gpio: 4, stop: STOP, above: false, powered: true }
+}
+
+/// The status of a line.
+fn status(board: &mut Emulated, host: &mut Host, line: &str) -> i64 {
+    host.ask(board, line, 5_000).unwrap().status
+}
+
+/// Sends a line that must be taken.
+fn set(board: &mut Emulated, host: &mut Host, line: &str) {
+    assert_eq!(status(board, host, line), 0, "{line}");
+}
+
+/// The value of a token.
+fn value(board: &mut Emulated, host: &mut Host, token: &str) -> f64 {
+    let response = host.ask(board, &format!("{{{token}:n}}"), 5_000).unwrap();
+    response.body[token].as_f64().unwrap_or_else(|| panic!("{}", response.raw))
+}
+
+/// Homes axes, and waits for the end. What is said of an exception.
+fn home(board: &mut Emulated, host: &mut Host, line: &str) -> String {
+    let answer = host.ask(board, line, 5_000).unwrap();
+    wait(board, host);
+    format!("{}{}", answer.raw, exceptions(host))
+}
+
+/// Waits until nothing moves.
+fn wait(board: &mut Emulated, host: &mut Host) {
+    for _ in 0..100 {
+        host.run_for_ms(board, 100).unwrap();
+        // Ready, at the end of a program or of a motion, or in an alarm.
+        if [1.0, 2.0, 3.0, 4.0].contains(&value(board, host, "stat")) {
+            return;
+        }
+    }
+    panic!("homing does not end");
+}
+
+/// What has been said besides answers.
+fn exceptions(host: &mut Host) -> String {
+    format!("{:?}{:?}", host.take_reports(), host.strays())
+}
+
+/// How far X stands from its stop, mm.
+fn from_stop(board: &mut Emulated) -> f64 {
+    (board.rotors()[0] - STOP as f64) / FULL_STEPS
+}
+
+/// What the drivers of the SKR Pico are told: address, register, value; each datagram with its checksum.
+fn told(bytes: &[u8]) -> Vec<(u8, u8, u32)> {
+    let crc = |bytes: &[u8]| {
+        let bits = bytes.iter().flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1));
+        bits.fold(0u8, |crc, bit| crc << 1 ^ if crc >> 7 != bit { 7 } else { 0 })
+    };
+    let datagrams = bytes.chunks_exact(8).map(|datagram| {
+        assert_eq!((datagram[0], datagram[7]), (5, crc(&datagram[..7])), "{datagram:x?}");
+        let value = u32::from_be_bytes(datagram[3..7].try_into().unwrap());
+        (datagram[1], datagram[2], value)
+    });
+    datagrams.collect()
+}
+
+/// What drivers have been told since the last call; `rest` is what has begun.
+fn take_told(board: &mut Emulated, rest: &mut Vec<u8>) -> Vec<(u8, u8, u32)> {
+    rest.extend(board.receive_line(DRIVERS));
+    let complete = rest.len() - rest.len() % 8;
+    told(&rest.drain(..complete).collect::<Vec<_>>())
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn drivers_are_told_their_settings() {
+    let (mut board, mut host) = booted(driver());
+    let mut rest = Vec::new();
+    host.run_for_ms(&mut board, 100).unwrap();
+    let told = take_told(&mut board, &mut rest);
+    for address in 0..4 {
+        for wanted in [(0x80, 0x1C0), (0xEC, 0x1503_0053), (0x90, 0x0008_1209), (0xC0, 0)] {
+            assert!(told.contains(&(address, wanted.0, wanted.1)), "{address}: {told:x?}");
+        }
+    }
+    for line in ["{drr2:1.4,drh2:0.05}", "{drc4:0}", "{3mi:64}", "{drs1:255}"] {
+        set(&mut board, &mut host, line);
+    }
+    // Address 2 is motor 2's, 1 is motor 3's. What is new does not wait for its turn.
+    host.run_for_ms(&mut board, 5).unwrap();
+    let told = take_told(&mut board, &mut rest);
+    for wanted in [
+        (2, 0x90, 0x0008_1800),
+        (2, 0xEC, 0x1501_0053),
+        (3, 0x80, 0x1C4),
+        (1, 0xEC, 0x1203_0053),
+        (0, 0xC0, 255),
+    ] {
+        assert!(told.contains(&wanted), "{wanted:x?} in {told:x?}");
+    }
+    for line in ["{drr1:1.401}", "{drh1:0.04}", "{drs1:256}", "{drs1:-1}", "{1mi:3}", "{1mi:255}"] {
+        assert_ne!(status(&mut board, &mut host, line), 0, "{line}");
+    }
+    host.run_for_ms(&mut board, 500).unwrap();
+    board.cut_power();
+    // The cut ends a datagram somewhere.
+    rest.clear();
+    board.receive_line(DRIVERS);
+    host.boot(&mut board, 2_000).unwrap();
+    assert_eq!(value(&mut board, &mut host, "drr2"), 1.4);
+    host.run_for_ms(&mut board, 100).unwrap();
+    let told = take_told(&mut board, &mut rest);
+    assert!(told.contains(&(2, 0x90, 0x0008_1800)) && told.contains(&(0, 0xC0, 255)), "{told:x?}");
+    assert_eq!(status(&mut board, &mut host, "{defa:1}"), 15);
+    host.run_for_ms(&mut board, 50).unwrap();
+    let told = take_told(&mut board, &mut rest);
+    assert!(told.contains(&(2, 0x90, 0x0008_1209)) && told.contains(&(0, 0xC0, 0)), "{told:x?}");
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn motors_turn_as_far_as_steps_say_with_any_microsteps() {
+    let (mut board, mut host) = booted(Driver { stop: -1_000_000, ..driver() });
+    for (microsteps, x, y) in [(8, 1.0, -0.5), (1, 2.0, 0.5), (128, 2.5, 1.0)] {
+        set(&mut board, &mut host, &format!("{{1mi:{microsteps},2mi:{microsteps}}}"));
+        set(&mut board, &mut host, &format!("g1 x{x} y{y} f600"));
+        host.run_for_ms(&mut board, 800).unwrap();
+        assert_eq!(board.rotors(), [x * FULL_STEPS, y * FULL_STEPS], "{microsteps}");
+    }
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn an_axis_homes_by_a_stall() {
+    for (settings, zero) in [
+        ("{xsv:500}", 1.0),
+        ("{xsv:600,xjh:1000}", 0.5),
+        ("{xsv:300,xjh:20,1mi:32}", 2.0),
+        ("{xsv:800,xlb:0,st:1}", 1.0),
+    ] {
+        let (mut board, mut host) = booted(driver());
+        for line in ["{drs1:60}", "{xsn:1,xtm:20}", settings, &format!("{{xzb:{zero}}}")] {
+            set(&mut board, &mut host, line);
+        }
+        for start in [0.0, 3.0] {
+            home(&mut board, &mut host, "g28.2 x0");
+            assert_eq!(value(&mut board, &mut host, "homx"), 1.0, "{settings}");
+            assert_eq!(value(&mut board, &mut host, "mpox"), 0.0, "{settings}");
+            let off = (from_stop(&mut board) - zero) * FULL_STEPS;
+            println!("{settings} from {start}: {off} full steps off");
+            assert!(off.abs() <= SLIPS, "{settings}: {off} full steps off");
+            // In a job nothing is lost on the way, and a stall ends no move: the fast ones have one at each full step of a motor that is held up.
+            let before = board.rotors()[0];
+            set(&mut board, &mut host, "g0 x3");
+            host.run_for_ms(&mut board, 1_000).unwrap();
+            assert_eq!(board.rotors()[0], before + 3.0 * FULL_STEPS);
+        }
+    }
+}
+
+/// Settings with which X and Y home by a stall, downwards.
+const HOMES: [&str; 2] = ["{drs1:60,drs2:60}", "{x:{sn:1,tm:9,zb:1},y:{sn:1,tm:9,zb:1}}"];
+
+/// A board like that.
+fn homes(x: Driver) -> (Emulated, Host) {
+    let (mut board, mut host) = booted(x);
+    for line in HOMES {
+        set(&mut board, &mut host, line);
+    }
+    (board, host)
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn an_axis_that_is_at_its_stop_homes() {
+    let (mut board, mut host) = homes(Driver { stop: 0, ..driver() });
+    home(&mut board, &mut host, "g28.2 x0 y0");
+    for rotor in board.rotors() {
+        assert!((rotor - FULL_STEPS).abs() <= SLIPS, "{:?}", board.rotors());
+    }
+    // Once more, from its stop, with an upper end.
+    let (mut board, mut host) = homes(Driver { stop: 0, above: true, ..driver() });
+    set(&mut board, &mut host, "{x:{sn:0,sx:1}}");
+    home(&mut board, &mut host, "g28.2 x0");
+    assert!((board.rotors()[0] + FULL_STEPS).abs() <= SLIPS, "{:?}", board.rotors());
+    assert_eq!(value(&mut board, &mut host, "mpox"), 9.0);
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn a_feed_override_slows_no_search_for_a_stall() {
+    for feed in ["{mfo:0.3}", "{mfo:1.8}"] {
+        let (mut board, mut host) = homes(driver());
+        set(&mut board, &mut host, feed);
+        home(&mut board, &mut host, "g28.2 x0");
+        assert_eq!(value(&mut board, &mut host, "homx"), 1.0, "{feed}");
+        assert!((from_stop(&mut board) - 1.0).abs() * FULL_STEPS <= SLIPS, "{feed}");
+    }
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn what_cannot_find_a_stall_says_so() {
+    let far = Driver { stop: -1_000_000, ..driver() };
+    for (x, lines, status, moves) in [
+        // No power, or not sensitive at all: it searches for all of its travel.
+        (Driver { powered: false, ..driver() }, vec![], 240, true),
+        (driver(), vec!["{drs1:1}"], 240, true),
+        // There is no switch that opens at rest.
+        (driver(), vec!["{drs1:0}"], 247, true),
+        // No stealthChop, no load.
+        (driver(), vec!["{drc1:0}"], 246, false),
+        (far, vec!["{1ma:0,2ma:0,sqsw:3}"], 246, false),
+    ] {
+        let (mut board, mut host) = homes(x);
+        for line in &lines {
+            set(&mut board, &mut host, line);
+        }
+        let said = home(&mut board, &mut host, "g28.2 x0");
+        assert!(said.contains(&status.to_string()), "{lines:?}: {said}");
+        assert_eq!(value(&mut board, &mut host, "homx"), 0.0, "{lines:?}");
+        assert_eq!(board.positions()[0] != 0, moves, "{lines:?}");
+    }
+    // The jumper is off, or the driver reports a fault: the pin is high at standstill.
+    let (mut board, mut host) = homes(driver());
+    board.drivers(&[]);
+    board.drive(gp(4), true);
+    assert!(home(&mut board, &mut host, "g28.2 x0").contains("247"));
+    assert_eq!(board.positions()[0], 0);
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn a_stall_stops_a_job_only_if_it_is_a_limit() {
+    for (mode, stopped) in [("{xsn:1}", false), ("{xsn:3}", true)] {
+        let (mut board, mut host) = homes(driver());
+        for line in ["{xvm:800,xsv:600}", mode, "g0 x-9"] {
+            set(&mut board, &mut host, line);
+        }
+        host.run_for_ms(&mut board, 1_500).unwrap();
+        let alarmed = value(&mut board, &mut host, "stat") == 2.0;
+        assert_eq!(alarmed, stopped, "{mode}");
+        assert_eq!(board.positions()[0] == -9 * 1_280, !stopped, "{mode}");
+    }
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn a_search_for_a_stall_is_held_and_ended_as_others_are() {
+    let (mut board, mut host) = homes(driver());
+    set(&mut board, &mut host, "g28.2 x0");
+    host.run_for_ms(&mut board, 300).unwrap();
+    assert_ne!(status(&mut board, &mut host, "{drs1:70}"), 0, "not while it moves");
+    board.send_now(b'!');
+    host.run_for_ms(&mut board, 300).unwrap();
+    let held = board.positions()[0];
+    host.run_for_ms(&mut board, 300).unwrap();
+    assert_eq!(board.positions()[0], held);
+    board.send_now(b'~');
+    wait(&mut board, &mut host);
+    assert!((from_stop(&mut board) - 1.0).abs() * FULL_STEPS <= SLIPS);
+    set(&mut board, &mut host, "g28.2 x0");
+    host.run_for_ms(&mut board, 300).unwrap();
+    for byte in *b"!%" {
+        board.send_now(byte);
+        host.run_for_ms(&mut board, 300).unwrap();
+    }
+    assert!(exceptions(&mut host).contains("240"));
+    assert_eq!(value(&mut board, &mut host, "homx"), 0.0);
+    // The feed override counts again.
+    set(&mut board, &mut host, "{mfo:0.5}");
+    let before = board.positions()[0];
+    set(&mut board, &mut host, "g91 g1 x5 f600");
+    host.run_for_ms(&mut board, 600).unwrap();
+    let way = (board.positions()[0] - before) as f64 / 1_280.0;
+    assert!((2.0..3.2).contains(&way), "{way} mm");
+}
