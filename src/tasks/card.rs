@@ -103,6 +103,8 @@ impl Feed {
         }
     }
 
+    // Apart from what carries a line out, which has the deepest stack.
+    #[inline(never)]
     fn read(&mut self, links: &'static Links) -> Read {
         let read = links.card.borrow_mut().line(&mut self.line);
         match read {
