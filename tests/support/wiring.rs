@@ -221,7 +221,7 @@ pub fn markdown() -> String {
         }
         text += "\n";
         if is_ramps {
-            text += "D8, D9 and D10, the outputs for heaters and fan, are driven low and never switched. D16 is the firmware's own: leave it open.\n\n";
+            text += "D10, D8 and D9 are hot end, bed and fan ([printing.md](printing.md#wiring-ramps)); they are low until a line switches them on, and after every fault. D16 is the firmware's own: leave it open.\n\n";
         } else {
             text += "D16 is the firmware's own: leave it open.\n\n";
         }
