@@ -5,6 +5,6 @@ use super::{Board, RAMPS14};
 /// RAMPS 1.4 with an SD card.
 pub const RAMPS14_SD: Board = Board {
     name: "ramps14-sd",
-    features: &["dialect-reprap", "probing", "printer", "corexy", "sd"],
+    features: &["dialect-reprap", "probing", "printer", "corexy", "sd", "bed-plane"],
     ..RAMPS14
 };

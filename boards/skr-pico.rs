@@ -19,6 +19,7 @@ pub const SKR_PICO: Board = Board {
         "corexy",
         "printer",
         "drivers",
+        "bed-plane",
     ],
     dialect: 0,
     clock_hz: 128_000_000,

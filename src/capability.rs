@@ -27,11 +27,13 @@ pub enum Capability {
     Sd,
     /// Settings of drivers that take them by UART, and homing by the load that such drivers measure.
     Drivers,
+    /// A bed that is a plane, which moves follow: G29 and M420.
+    BedPlane,
 }
 
 impl Capability {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Cycles,
         Self::Probing,
         Self::Jobs,
@@ -41,6 +43,7 @@ impl Capability {
         Self::CoreXy,
         Self::Sd,
         Self::Drivers,
+        Self::BedPlane,
     ];
 
     /// Whether this image has it.
@@ -56,6 +59,7 @@ impl Capability {
             Self::CoreXy => cfg!(feature = "corexy"),
             Self::Sd => cfg!(feature = "sd"),
             Self::Drivers => cfg!(feature = "drivers"),
+            Self::BedPlane => cfg!(feature = "bed-plane"),
         }
     }
 
@@ -78,6 +82,7 @@ impl Capability {
             Self::CoreXy => "corexy",
             Self::Sd => "sd",
             Self::Drivers => "drivers",
+            Self::BedPlane => "bed-plane",
         }
     }
 }

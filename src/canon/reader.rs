@@ -81,6 +81,9 @@ impl<S: Setup> Reader<S> {
             Step::Thread => self.pass(),
             Step::AwaitSpindle => {}
             Step::Arc | Step::Probe | Step::Home | Step::Jog | Step::Check => self.motion(),
+            // No line of a file asks for it.
+            #[cfg(feature = "bed-plane")]
+            Step::FollowBed(_) => {}
             Step::Heat(heat) => self.ready.push_back(Canon::Heat(heat)),
             Step::SetPosition(position) => {
                 self.place = position;

@@ -4,6 +4,7 @@
 //! [`Settings`], which cost a load. Values are integers scaled by a power of ten, so text goes in
 //! and out exactly. Those that are seldom asked for are in EEPROM alone, and `tasks::storage` has them.
 
+pub mod bed;
 #[cfg(feature = "std")]
 pub mod docs;
 pub mod drive;
@@ -32,6 +33,7 @@ use crate::boards::MOTORS;
 use crate::kinematics;
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
+use bed::{BEDS, Bed};
 use drive::{DRIVERS, Drive};
 use groups::motor;
 use heating::Heating;
@@ -50,6 +52,8 @@ pub struct Settings {
     pub heating: [Heating; heating::PRINTERS],
     /// What drivers are told, in an image that tells them anything.
     pub drives: [Drive; DRIVERS],
+    /// Where the bed of a printer is, in an image that follows it.
+    pub bed: [Bed; BEDS],
 }
 
 impl Default for Settings {
@@ -76,7 +80,14 @@ impl Settings {
             octaves: 0,
             heating: [Heating::NONE; heating::PRINTERS],
             drives: [Drive::DEFAULT; DRIVERS],
+            bed: [Bed::NONE; BEDS],
         }
+    }
+
+    /// The plane that moves follow, if they do.
+    #[inline(always)]
+    pub fn followed_bed(&self) -> Option<&Bed> {
+        self.bed.first().filter(|bed| bed.follows())
     }
 
     /// The value of a setting, scaled as kept.

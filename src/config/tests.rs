@@ -166,7 +166,8 @@ fn getters_have_their_units() {
 fn ram_is_accounted_for() {
     let heating = if heating::PRINTERS == 0 { 0 } else { 12 };
     let drives = drive::DRIVERS * 6;
-    assert_eq!(size_of::<Settings>(), 436 + heating + drives);
+    let bed = bed::BEDS * 48;
+    assert_eq!(size_of::<Settings>(), 436 + heating + drives + bed);
     assert!(size_of::<SettingRow>() * 51 + (28 + 7 * 4 + 16 * 6) * 4 < 2048);
 }
 

@@ -213,6 +213,9 @@ pub enum Motion {
     },
     /// `{chk:1}`, `{chk:0}`: from here on lines are checked only, or carried out again.
     Check,
+    /// From here on moves follow the plane of the bed, or do not.
+    #[cfg(feature = "bed-plane")]
+    FollowBed(bool),
     /// M104 to M190: heaters and the fan.
     Heat(Heat),
     /// G28.3: no motor moves; the present position is called this.

@@ -48,6 +48,8 @@ pub(super) fn check_reach(
     }
     let from = match motion {
         Motion::None | Motion::Home { .. } | Motion::Check | Motion::Heat(_) => return Ok(()),
+        #[cfg(feature = "bed-plane")]
+        Motion::FollowBed(_) => return Ok(()),
         Motion::SetPosition { .. } => end,
         _ => start,
     };
@@ -102,6 +104,8 @@ fn check_within(
         | Motion::Check
         | Motion::Heat(_)
         | Motion::SetPosition { .. } => return Ok(()),
+        #[cfg(feature = "bed-plane")]
+        Motion::FollowBed(_) => return Ok(()),
         Motion::Cycle(_) if !Capability::Cycles.is_built_in() => return Ok(()),
         Motion::Cycle(cycle) => return check_cycle(start, cycle, limits),
         Motion::ThreadCycle(_) if !Capability::Lathe.is_built_in() => return Ok(()),

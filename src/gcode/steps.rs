@@ -43,6 +43,9 @@ pub enum Step {
     Jog,
     /// Lines are checked only from here on, or carried out again.
     Check,
+    /// Moves follow the plane of the bed from here on, or do not.
+    #[cfg(feature = "bed-plane")]
+    FollowBed(bool),
     /// Heaters and the fan are to be so.
     Heat(Heat),
     /// The position is called this.
@@ -232,6 +235,8 @@ impl Steps {
             (Motion::Home { .. }, _) => Some(Step::Home),
             (Motion::Jog { .. }, _) => Some(Step::Jog),
             (Motion::Check, _) => Some(Step::Check),
+            #[cfg(feature = "bed-plane")]
+            (Motion::FollowBed(follows), _) => Some(Step::FollowBed(*follows)),
             (Motion::Heat(heat), _) => Some(Step::Heat(*heat)),
             (Motion::SetPosition { position }, _) => Some(Step::SetPosition(*position)),
             (Motion::Through { .. } | Motion::Cycle(_) | Motion::ThreadCycle(_), _) => None,

@@ -3,6 +3,7 @@
 use super::dialect::Memory;
 use super::value::Value;
 use crate::card::{Entry, Op};
+use crate::config::bed::{Bed, Point};
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::Change;
 use crate::gcode::tables::TableRow;
@@ -84,6 +85,17 @@ pub enum Cold {
     Allowed(bool),
     /// The temperature is set to this, degrees.
     Least(i16),
+}
+
+/// What G29 and M420 ask for, at rest.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Level {
+    /// Moves follow the plane of the bed from now on, if it is known, or do not.
+    Follow(bool),
+    /// A traverse to there, X Y Z of machine coordinates.
+    Go(Point),
+    /// There, at the speed at which Z leaves its homing switch, until the probe touches; an alarm if it does not.
+    Probe(Point),
 }
 
 /// The machine behind the dialects. Nothing here waits.
@@ -200,6 +212,17 @@ pub trait Machine {
     fn card_entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
         let _ = number;
         Err(Status::NotBuiltIn)
+    }
+
+    /// The points of the bed, in an image with [`Capability::BedPlane`](crate::capability::Capability).
+    fn bed(&mut self) -> Option<&mut Bed> {
+        None
+    }
+
+    /// Begins with something. [`Status::Again`] as of [`Self::extruder`].
+    fn level(&mut self, what: Level) -> Status {
+        let _ = what;
+        Status::NotBuiltIn
     }
 
     /// The origin of these axes, as bits, is no more where G92 has put it: it is where homing has.

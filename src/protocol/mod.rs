@@ -42,7 +42,7 @@ pub use dialect::{
     jog, may_be_control,
 };
 pub use line::{Ending, Next, Span};
-pub use machine::{Cold, Extruder, Hold, Machine, STARTUP_MAX, Store, Warning};
+pub use machine::{Cold, Extruder, Hold, Level, Machine, STARTUP_MAX, Store, Warning};
 pub use notice::{Notice, Occasion};
 pub use out::Out;
 pub use value::{Value, thousandths};

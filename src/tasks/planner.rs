@@ -5,6 +5,8 @@
 //! While the task waits for a line the parser has plain moves carried out itself ([`take_at_once`]).
 //! In a queue flush it forgets the line, has exec drop the blocks, and starts from where the motors are.
 
+#[cfg(feature = "bed-plane")]
+mod bed;
 mod check;
 #[cfg(feature = "printer")]
 mod heat;
@@ -396,7 +398,11 @@ impl Planner {
             }
             Step::Arc => self.begin_arc(&commands.motion),
             Step::Dwell(ms) => self.pause(QueuedAction::Dwell(*ms)),
-            Step::SetPosition(position) => self.set_position(position),
+            Step::SetPosition(position) => {
+                #[cfg(feature = "bed-plane")]
+                self.rename_bed(position);
+                self.set_position(position);
+            }
             Step::Override(change) => self.set_override(*change),
             Step::Spindle(spindle) => self.set_spindle(spindle),
             Step::Coolant(coolant) => self.set_coolant(*coolant),
@@ -427,6 +433,8 @@ impl Planner {
             Step::Home => return Turn::Home,
             Step::Jog => return Turn::Jog,
             Step::Check => self.check(),
+            #[cfg(feature = "bed-plane")]
+            Step::FollowBed(follows) => self.follow_bed(*follows),
             #[cfg(feature = "printer")]
             Step::Heat(heat) => {
                 if self.heat(heat) {
@@ -496,7 +504,12 @@ impl Planner {
             Ongoing::Arc(ArcWalk { curve, .. }) => Some(curve),
             _ => None,
         };
-        let line = Line { from: &self.position, to: target, feed, curve, may_merge };
+        let lifted =
+            settings.followed_bed().map(|bed| (bed.lifted(&self.position), bed.lifted(target)));
+        let (from, to) = lifted.as_ref().map_or((&self.position, target), |(from, to)| (from, to));
+        #[cfg(feature = "bed-plane")]
+        let may_merge = may_merge && (lifted.is_none() || bed::is_near(&self.position, target));
+        let line = Line { from, to, feed, curve, may_merge };
         let mut block = Move::default();
         let built = self.builder.line(&line, &self.dynamics, &*settings, &mut block);
         if let Built::Line(entry) = built {
@@ -543,7 +556,11 @@ impl Planner {
     #[small]
     fn set_position(&mut self, position: &PerAxis<Length>) {
         self.position = *position;
-        let action = self.builder.set_position(position, &*self.links.settings.borrow());
+        let settings = self.links.settings.borrow();
+        let lifted = settings.followed_bed().map(|bed| bed.lifted(position));
+        let position = lifted.as_ref().unwrap_or(position);
+        let action = self.builder.set_position(position, &*settings);
+        drop(settings);
         self.push(Block::action(action, self.line));
     }
 

@@ -28,11 +28,17 @@ use crate::boards::{MOTORS, inputs};
 use crate::capability::Capability;
 #[cfg(feature = "sd")]
 use crate::card::{Entry, Op};
+#[cfg(feature = "bed-plane")]
+use crate::config::bed::Bed;
 use crate::config::{Setting, Settings};
+#[cfg(feature = "bed-plane")]
+use crate::gcode::command::Feed;
 use crate::gcode::command::Motion;
 #[cfg(feature = "dialect-reprap")]
 use crate::gcode::heating::{Heat, Part, Wait};
 use crate::gcode::limits::is_near;
+#[cfg(feature = "bed-plane")]
+use crate::gcode::modal::MotionMode;
 use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::overrides::Change;
 use crate::gcode::printing::EXTRUDER;
@@ -51,6 +57,8 @@ use crate::machine::{self, Alarm, Cycle, Doing};
 use crate::motion::dynamics;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Program};
+#[cfg(feature = "bed-plane")]
+use crate::protocol::Level;
 #[cfg(feature = "dialect-reprap")]
 use crate::protocol::{Cold, Extruder};
 use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning, thousandths};
@@ -72,6 +80,10 @@ pub fn moves(doing: Doing, hold: Hold) -> bool {
 /// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
 const QUEUE_FREE_MIN: usize = 6;
+
+/// The axis that follows the bed.
+#[cfg(feature = "bed-plane")]
+const Z: usize = 2;
 
 /// A look at the machine.
 pub struct View<'a> {
@@ -186,7 +198,20 @@ impl<'a> View<'a> {
             return programmed;
         }
         // An axis that moves no motor is where it should be.
-        counted(&self.settings, &self.motion().position, axis, None).unwrap_or(programmed)
+        let at = counted(&self.settings, &self.motion().position, axis, None);
+        #[cfg(feature = "bed-plane")]
+        let at = at.map(|at| self.lowered(axis, at));
+        at.unwrap_or(programmed)
+    }
+
+    /// Where an axis is in machine coordinates, its motor being there: Z may follow the bed.
+    #[cfg(feature = "bed-plane")]
+    #[inline(never)]
+    fn lowered(&self, axis: usize, at: Length) -> Length {
+        let Some(bed) = self.settings.followed_bed().filter(|_| axis == Z) else { return at };
+        let place = |axis| counted(&self.settings, &self.motion().position, axis, None);
+        let [x, y] = [0, 1].map(|axis| place(axis).unwrap_or(Length::ZERO));
+        bed.lowered_z(x, y, at)
     }
 
     /// `home`: 2 while homing, 1 when all axes that have a switch for it are homed.
@@ -731,6 +756,50 @@ impl Machine for View<'_> {
     fn card_entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
         let mut card = self.links.card.borrow_mut();
         if card.prints() { Err(Status::NotAccepted) } else { card.entry(number) }
+    }
+
+    #[cfg(feature = "bed-plane")]
+    fn bed(&mut self) -> Option<&mut Bed> {
+        self.settings.bed.first_mut()
+    }
+
+    #[cfg(feature = "bed-plane")]
+    fn level(&mut self, what: Level) -> Status {
+        let (links, alarm) = (self.links, machine::alarm());
+        if alarm != Alarm::None {
+            return alarm.status();
+        }
+        if !links.may_feed(self.port) {
+            return Status::Muted;
+        }
+        if machine::is_checking() {
+            return Status::NotAccepted;
+        }
+        if links.commands_taken.get() || machine::is_flushing() {
+            return Status::Again;
+        }
+        let mut model = links.model.borrow_mut();
+        let mut target = *model.position();
+        if let Level::Go(to) | Level::Probe(to) = what {
+            target.iter_mut().zip(to).for_each(|(place, to)| *place = to);
+            if !is_near(&target, &*self.settings) {
+                return Status::OutOfRange;
+            }
+        }
+        let mut commands = links.commands.borrow_mut();
+        commands.clear();
+        commands.motion = match what {
+            Level::Follow(follows) => Motion::FollowBed(follows),
+            Level::Go(_) => Motion::Traverse { target },
+            Level::Probe(_) => {
+                let feed = Feed::PerMinute(self.settings.latch_velocity(Z));
+                Motion::Probe { target, feed, mode: MotionMode::ProbeTowards }
+            }
+        };
+        model.set_position(&target);
+        links.commands_taken.set(true);
+        links.planner_wake.signal();
+        Status::Ok
     }
 
     #[cfg(feature = "dialect-reprap")]

@@ -2,7 +2,8 @@
 
 use super::command::{has, value, words};
 use super::write::{cold, fixed, int, line_end, text};
-use super::{card, report, settings, tuning};
+use super::{bed, card, report, settings, tuning};
+use crate::capability::Capability;
 use crate::config::Fixed;
 use crate::gcode::overrides::{Change, Override};
 use crate::machine::{Alarm, Cycle, Doing};
@@ -47,6 +48,7 @@ pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
         // Without a name it ends the program.
         (b'M', 30) => !words(block).is_empty(),
         (b'G', 10 | 11 | 28 | 161 | 162) => true,
+        (b'G', 29) | (b'M', 420) => Capability::BedPlane.is_built_in(),
         (b'M', number) => matches!(
             number,
             17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 130..=134 | 155
@@ -72,6 +74,7 @@ pub fn part(
         (b'T', 0) => return Step::Done,
         (b'T', _) => return Step::Refused(Status::ToolInvalid),
         (b'G', 10 | 11) => return retract(code.1 == 10, machine, out),
+        (b'G', 29) | (b'M', 420) => return bed::part(code.1, at, block, machine, out),
         (b'G', number) => return home(at, number, block, machine),
         (_, number) => number,
     };

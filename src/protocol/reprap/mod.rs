@@ -11,6 +11,7 @@
 //! | [`request`] | a line on its way to its answer |
 //! | [`host`] | the codes that ask or set something |
 //! | [`settings`] | M92, M201 to M206, M503 |
+//! | [`bed`] | G29, M420: the plane of the bed |
 //! | [`card`] | M20 to M27, M30, M32: the SD card |
 //! | [`report`] | M105, M114, M115, M119 |
 //! | [`tuning`] | M301, M303, M304 |
@@ -22,6 +23,7 @@
 //! costs at most 15,000 cycles, with a setting that is in EEPROM 3 ms. Nothing here can be full. A plain move takes none of these steps: [`frame::fast_path`] looks at its number and
 //! checksum, and the interpreter reads it as it is.
 
+mod bed;
 mod card;
 mod command;
 mod frame;

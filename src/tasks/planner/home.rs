@@ -311,6 +311,8 @@ impl Planner {
     fn begin_axis(&mut self, at: &Progress, homing: &Homing) {
         inputs::spare(homing.ends() | at.second.map_or(0, Second::ends));
         if self.homed_by_line().1 {
+            #[cfg(feature = "bed-plane")]
+            self.follow_bed(false);
             self.links.model.borrow_mut().set_homed(at.axis, false);
         }
         self.brake_hard();

@@ -130,6 +130,8 @@ impl Planner {
         for (axis, place) in located.iter_mut().enumerate() {
             *place = counted(&settings, steps, axis, Some(&self.position)).unwrap_or(*place);
         }
+        #[cfg(feature = "bed-plane")]
+        self.lower(&settings, steps, &mut located);
         located
     }
 

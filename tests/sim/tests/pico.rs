@@ -378,7 +378,7 @@ const DIFFERS: [&str; 9] = [
     "stored",
 ];
 /// Those of a printer, which these boards are not yet.
-const PRINTING: [&str; 2] = ["heat", "reprap"];
+const PRINTING: [&str; 3] = ["bed", "heat", "reprap"];
 /// Those that move for long, minutes of the emulator's time each: `KERF_TRANSCRIPT` plays one.
 const LONG: [&str; 2] = ["far", "axis-modes"];
 

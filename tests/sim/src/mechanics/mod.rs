@@ -32,6 +32,8 @@ use spindle::Spindle;
 pub struct Mechanics {
     carriages: [Carriage; MOTORS],
     plate: Option<i64>,
+    /// How much the plate rises along X and along Y.
+    tilt: [f64; 2],
     lines: Vec<Line>,
     /// The line of each input.
     line_of: [Option<usize>; inputs::COUNT],
@@ -48,6 +50,7 @@ impl Mechanics {
         let mut mechanics = Mechanics {
             carriages: build.axes.each_ref().map(Carriage::new),
             plate: build.plate.map(|height| build.axes[2].steps(height)),
+            tilt: [0.0; 2],
             lines: Vec::new(),
             line_of: [None; inputs::COUNT],
             spindle: Spindle::new(build.spindle, board.clock_hz),
@@ -157,6 +160,11 @@ impl Mechanics {
         self.work_contacts(2, before, now);
     }
 
+    /// Tilts the plate: it rises by so much in a millimetre along X and along Y, from where their lower hard ends are.
+    pub fn tilt_plate(&mut self, tilt: [f64; 2]) {
+        self.tilt = tilt;
+    }
+
     /// From now on the contacts on the wire of an input bounce.
     pub fn bounce(&mut self, input: usize, bounce: Option<Bounce>) {
         self.with(input, |line| line.set_bounce(bounce));
@@ -190,8 +198,14 @@ impl Mechanics {
     /// What the carriage of an axis works: the switches at its lower and upper end, and the probe.
     fn contacts(&self, axis: usize) -> [bool; 3] {
         let [min, max] = self.carriages[axis].ends();
-        let touches = axis == 2 && self.plate.is_some_and(|z| self.carriages[2].steps() <= z);
-        [min, max, touches]
+        [min, max, self.touches()]
+    }
+
+    /// Whether the tool touches the plate.
+    fn touches(&self) -> bool {
+        let [x, y, z, _] = &self.carriages;
+        let rise = self.tilt[0] * x.position() + self.tilt[1] * y.position();
+        self.plate.is_some_and(|plate| z.steps() <= plate + z.steps_at(rise))
     }
 
     fn work_contacts(&mut self, axis: usize, before: [bool; 3], now: u64) {

@@ -1,0 +1,357 @@
+//! The bed of a printer as a plane through three points: how much Z is lifted at a place, so that moves follow the bed.
+//!
+//! Pure, and kept beside the settings: the planner, reports and G29 ask there. Lengths are of machine coordinates, and integers: whoever asks for the
+//! lift at a place gets the same number, so nothing drifts when the plane is taken away again.
+
+use crate::capability::Capability;
+use crate::units::{Length, PerAxis};
+
+/// How many machines have a bed that is a plane.
+pub const BEDS: usize = Capability::BedPlane.is_built_in() as usize;
+
+/// A place of the bed: X, Y, and Z where the nozzle touches it.
+pub type Point = [Length; 3];
+
+/// How many points make a plane.
+pub const POINTS: usize = 3;
+
+/// A slope has so many binary places: 0.1 um are off at 7 m.
+const PLACES: u8 = 26;
+/// The bed rises at most one in so many, along X and along Y.
+const STEEPEST: i64 = 20;
+/// How far a point may be from the origin: 10 m. Products of four such lengths fit 64 bits.
+const FAR: u32 = 100_000_000;
+/// The square of the longest side of the triangle is this at least: 10 mm.
+const LEAST: i64 = 100_000 * 100_000;
+/// The triangle is at least as high as its longest side divided by this.
+const THINNEST: i64 = 16;
+/// Bits of twice the triangle's area with which slopes are calculated.
+const AREA_BITS: u8 = 36;
+
+/// X, Y and Z among the axes.
+const X: usize = 0;
+const Y: usize = 1;
+const Z: usize = 2;
+
+/// Why there is no plane through a point.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Fault {
+    /// The points are on a line, or nearly so, or all within 10 mm.
+    Line,
+    /// The bed rises by more than 1 in 20.
+    Steep,
+    /// The point is more than 10 m away.
+    Far,
+    /// There are three others.
+    Full,
+}
+
+/// The points that are known, and the plane through them.
+#[derive(Clone, Copy, Debug)]
+pub struct Bed {
+    points: [Point; POINTS],
+    count: u8,
+    /// How much Z rises along X and along Y, 2^-26.
+    slopes: [i32; 2],
+    follows: bool,
+}
+
+#[small]
+impl Bed {
+    /// Nothing is known.
+    pub const NONE: Self =
+        Self { points: [[Length::ZERO; 3]; POINTS], count: 0, slopes: [0; 2], follows: false };
+
+    /// The points that are known.
+    pub fn points(&self) -> &[Point] {
+        self.points.get(..self.count.into()).unwrap_or(&[])
+    }
+
+    /// Whether the plane is known.
+    pub fn is_known(&self) -> bool {
+        usize::from(self.count) == POINTS
+    }
+
+    /// Whether moves follow the plane.
+    pub fn follows(&self) -> bool {
+        self.follows
+    }
+
+    /// Moves follow the plane from now on, if it is known, or do not. The planner alone says so, for what it calls its position changes.
+    pub fn follow(&mut self, follows: bool) {
+        self.follows = follows && self.is_known();
+    }
+
+    /// Forgets the points. Moves do not follow the plane by now.
+    pub fn forget(&mut self) {
+        self.count = 0;
+    }
+
+    /// The place `from` is called `to` from now on. Z of a followed bed is what it is called.
+    #[inline(never)]
+    pub fn rename(&mut self, from: &PerAxis<Length>, to: &PerAxis<Length>) {
+        for (axis, (from, to)) in from.iter().zip(to).enumerate() {
+            if axis == Z && self.follows {
+                continue;
+            }
+            for point in &mut self.points {
+                if let Some(at) = point.get_mut(axis) {
+                    at.0 = at.0.saturating_add(to.0.saturating_sub(from.0));
+                }
+            }
+        }
+    }
+
+    /// Adds a point, which takes the place of one at the same X and Y. With the third one the plane is known. Nothing is changed by a fault. Cost on AVR: 40,000
+    /// cycles with the third one.
+    #[inline(never)]
+    pub fn add(&mut self, point: Point) -> Result<(), Fault> {
+        if point.iter().any(|at| at.0.unsigned_abs() > FAR) {
+            return Err(Fault::Far);
+        }
+        let is_here =
+            |other: &Point| other.first() == point.first() && other.get(1) == point.get(1);
+        let at = self.points().iter().position(is_here).unwrap_or(self.count.into());
+        let mut points = self.points;
+        *points.get_mut(at).ok_or(Fault::Full)? = point;
+        let count = self.points().len().max(at + 1);
+        if count == POINTS {
+            self.slopes = slopes(&points)?;
+        }
+        (self.points, self.count) = (points, count as u8);
+        Ok(())
+    }
+
+    /// How much higher Z is at a place than it is called.
+    fn lift(&self, x: Length, y: Length) -> i32 {
+        let [[from_x, from_y, z], ..] = self.points;
+        let [along_x, along_y] = self.slopes;
+        let rise = |slope: i32, from: Length, to: Length| {
+            i64::from(slope) * (i64::from(to.0) - i64::from(from.0))
+        };
+        let rise = rise(along_x, from_x, x) + rise(along_y, from_y, y);
+        // A slope is less than 2^22, a way than 2^32.
+        ((rise + (1 << (PLACES - 1))) >> PLACES) as i32 + z.0
+    }
+
+    /// The place of the motors for a place in machine coordinates. Cost on AVR: 2,000 cycles.
+    #[inline(never)]
+    pub fn lifted(&self, at: &PerAxis<Length>) -> PerAxis<Length> {
+        let mut lifted = *at;
+        let [x, y, z, ..] = &mut lifted;
+        *z = self.lifted_z(*x, *y, *z);
+        lifted
+    }
+
+    /// Z of the motors for that in machine coordinates, at a place. Cost as of [`Self::lifted`].
+    #[inline(never)]
+    pub fn lifted_z(&self, x: Length, y: Length, z: Length) -> Length {
+        Length(z.0.saturating_add(self.lift(x, y)))
+    }
+
+    /// Z in machine coordinates for that of the motors, at a place: exactly the one that would be lifted there. Cost as of [`Self::lifted`].
+    #[inline(never)]
+    pub fn lowered_z(&self, x: Length, y: Length, z: Length) -> Length {
+        Length(z.0.saturating_sub(self.lift(x, y)))
+    }
+}
+
+/// A vector in the space of the machine.
+type Way = [i64; 3];
+
+/// The way between two points.
+#[small]
+fn way([from_x, from_y, from_z]: &Point, [x, y, z]: &Point) -> Way {
+    let of = |from: &Length, to: &Length| i64::from(to.0) - i64::from(from.0);
+    [of(from_x, x), of(from_y, y), of(from_z, z)]
+}
+
+/// The part across two axes of the cross product of two ways: twice the area that they enclose there.
+#[inline(never)]
+#[small]
+fn cross(u: &Way, v: &Way, first: usize, second: usize) -> i64 {
+    let along = |way: &Way, axis: usize| way.get(axis).copied().unwrap_or(0);
+    let product = |first, second| along(u, first).wrapping_mul(along(v, second));
+    product(first, second).wrapping_sub(product(second, first))
+}
+
+/// The square of a length in the plane of X and Y.
+#[inline(never)]
+#[small]
+fn square(way: &Way) -> i64 {
+    way.iter().take(Z).fold(0, |sum, way| way.wrapping_mul(*way).wrapping_add(sum))
+}
+
+/// How much the plane through the points rises along X and along Y.
+#[inline(never)]
+#[small]
+fn slopes([first, second, third]: &[Point; POINTS]) -> Result<[i32; 2], Fault> {
+    let (u, v) = (way(first, second), way(first, third));
+    let longest = square(&u).max(square(&v)).max(square(&way(second, third)));
+    // Twice the triangle's area, and what of that rises along X and along Y.
+    let area = cross(&u, &v, X, Y);
+    let (along_x, along_y) = (cross(&u, &v, Z, Y), cross(&u, &v, X, Z));
+    if longest < LEAST || area.unsigned_abs() < (longest / THINNEST).unsigned_abs() {
+        return Err(Fault::Line);
+    }
+    Ok([slope(along_x, area)?, slope(along_y, area)?])
+}
+
+/// A part of an area.
+#[inline(never)]
+#[small]
+fn slope(part: i64, area: i64) -> Result<i32, Fault> {
+    if part.unsigned_abs() * STEEPEST as u64 > area.unsigned_abs() {
+        return Err(Fault::Steep);
+    }
+    let (mut part, mut area) = (part, area);
+    while area.unsigned_abs() >> AREA_BITS != 0 {
+        (part, area) = (part >> 1, area >> 1);
+    }
+    Ok((part << PLACES).checked_div(area).unwrap_or(0) as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn point(x: i32, y: i32, z: i32) -> Point {
+        [Length(x), Length(y), Length(z)]
+    }
+
+    fn bed(points: &[Point]) -> Result<Bed, Fault> {
+        let mut bed = Bed::NONE;
+        points.iter().try_for_each(|point| bed.add(*point))?;
+        bed.follow(true);
+        Ok(bed)
+    }
+
+    fn lift(bed: &Bed, x: i32, y: i32) -> i32 {
+        bed.lifted(&[Length(x), Length(y), Length(0), Length(7), Length(8), Length(9)])[Z].0
+    }
+
+    #[test]
+    fn a_plane_goes_through_its_points_and_is_straight_between_them() {
+        let points = [point(0, 0, 0), point(1_000_000, 0, 10_000), point(0, 1_000_000, -20_000)];
+        let bed = bed(&points).unwrap();
+        assert_eq!(lift(&bed, 500_000, 0), 5_000);
+        assert_eq!(lift(&bed, 1_000_000, 1_000_000), -10_000);
+        assert_eq!(lift(&bed, -1_000_000, 0), -10_000);
+    }
+
+    #[test]
+    fn a_point_takes_the_place_of_another_and_a_fault_changes_nothing() {
+        let mut bed = Bed::NONE;
+        assert_eq!(bed.add(point(0, 0, 0)), Ok(()));
+        assert_eq!(bed.add(point(0, 0, 500)), Ok(()));
+        assert_eq!(bed.points(), [point(0, 0, 500)]);
+        bed.follow(true);
+        assert!(!bed.follows() && !bed.is_known());
+        assert_eq!(bed.add(point(1_000_000, 0, 500)), Ok(()));
+        for (third, fault) in [
+            (point(2_000_000, 0, 0), Fault::Line),
+            (point(500_000, 30_000, 0), Fault::Line),
+            (point(0, 1_000_000, 51_000), Fault::Steep),
+            (point(0, 1_000_000, -51_000), Fault::Steep),
+            (point(0, 100_000_001, 0), Fault::Far),
+            (point(0, 0, i32::MIN), Fault::Far),
+        ] {
+            assert_eq!(bed.add(third), Err(fault), "{third:?}");
+            assert_eq!(bed.points().len(), 2);
+        }
+        assert_eq!(bed.add(point(0, 1_000_000, 49_000)), Ok(()));
+        assert_eq!(bed.add(point(1, 1, 0)), Err(Fault::Full));
+        assert_eq!(bed.add(point(0, 1_000_000, 80_000)), Err(Fault::Steep));
+        bed.follow(true);
+        assert_eq!(lift(&bed, 0, 1_000_000), 49_000);
+        bed.forget();
+        assert!(bed.points().is_empty());
+    }
+
+    #[test]
+    fn a_bed_stays_where_it_is_when_places_are_called_otherwise() {
+        let points = [point(0, 0, 100), point(1_000_000, 0, 10_100), point(0, 1_000_000, 100)];
+        let mut bed = bed(&points).unwrap();
+        let (from, to) = ([0, 0, 50, 7, 0, 0].map(Length), [300_000, 0, 0, 9, 0, 0].map(Length));
+        bed.rename(&from, &to);
+        assert_eq!(lift(&bed, 300_000, 0), 100);
+        bed.follow(false);
+        bed.rename(&to, &from);
+        assert_eq!(bed.points(), points.map(|[x, y, z]| [x, y, Length(z.0 + 50)]));
+    }
+
+    #[test]
+    fn points_near_each_other_are_no_plane() {
+        let near = [point(0, 0, 0), point(50_000, 0, 0), point(0, 50_000, 0)];
+        assert_eq!(bed(&near).err(), Some(Fault::Line));
+        assert_eq!(bed(&near.map(|[x, y, z]| [Length(x.0 * 2), Length(y.0 * 2), z])).err(), None);
+    }
+
+    fn anywhere() -> impl Strategy<Value = Point> {
+        let axis = || -(FAR as i32)..=FAR as i32;
+        (axis(), axis(), -3_000_000..3_000_000).prop_map(|(x, y, z)| point(x, y, z))
+    }
+
+    fn within(mm: i32) -> impl Strategy<Value = Point> {
+        let axis = -mm * 10_000..=mm * 10_000;
+        (axis.clone(), axis, -30_000..30_000).prop_map(|(x, y, z)| point(x, y, z))
+    }
+
+    proptest! {
+        /// Each point is on the plane, to the unit; to 1 um where it is meters away.
+        #[test]
+        fn planes_go_through_their_points(
+            near in prop::collection::vec(within(300), 3),
+            far in prop::collection::vec(anywhere(), 3),
+        ) {
+            for (points, most) in [(near, 1), (far, 8)] {
+                let Ok(bed) = bed(&points) else { continue };
+                for [x, y, z] in points {
+                    let off = lift(&bed, x.0, y.0) - z.0;
+                    prop_assert!(off.abs() <= most, "{off}");
+                }
+            }
+        }
+
+        /// What has been lifted is lowered to where it was, wherever that is; X, Y and the others stay.
+        #[test]
+        fn what_is_lifted_is_lowered_exactly(
+            points in prop::collection::vec(within(200), 3),
+            at in prop::array::uniform6(any::<i32>()),
+            z in -1_000_000_000..1_000_000_000,
+        ) {
+            let Ok(bed) = bed(&points) else { return Ok(()) };
+            let mut at = at.map(Length);
+            at[Z] = Length(z);
+            let lifted = bed.lifted(&at);
+            prop_assert_eq!(bed.lowered_z(at[0], at[1], lifted[Z]), at[Z]);
+            prop_assert_eq!((lifted[0], lifted[1], lifted[3]), (at[0], at[1], at[3]));
+        }
+
+        /// The middle of a straight way is lifted by the mean of its ends: moves stay straight.
+        #[test]
+        fn straight_ways_stay_straight(
+            points in prop::collection::vec(within(200), 3),
+            from in within(200),
+            to in within(200),
+        ) {
+            let Ok(bed) = bed(&points) else { return Ok(()) };
+            let middle = |axis: usize| (from[axis].0 + to[axis].0) / 2;
+            let mean = (lift(&bed, from[0].0, from[1].0) + lift(&bed, to[0].0, to[1].0)) / 2;
+            prop_assert!((lift(&bed, middle(0), middle(1)) - mean).abs() <= 2);
+        }
+
+        /// No three points do more than be refused.
+        #[test]
+        fn no_point_panics(
+            points in prop::array::uniform3(prop::array::uniform3(any::<i32>())),
+            x: i32,
+            y: i32,
+        ) {
+            if let Ok(bed) = bed(&points.map(|at| at.map(Length))) {
+                lift(&bed, x, y);
+            }
+        }
+    }
+}

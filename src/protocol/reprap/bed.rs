@@ -1,0 +1,386 @@
+//! G29 and M420: the bed of a printer as a plane through three points, which moves follow.
+//!
+//! | code | does |
+//! |---|---|
+//! | G29 L R F B Z | probes three points that reach from L to R and from F to B; then moves follow the plane, and the points are told |
+//! | G29 S0 | tells the points |
+//! | G29 S1 X Y Z | adds a point: where the machine is, but for what is named; with the third moves follow the plane |
+//! | G29 S5 | forgets them |
+//! | M420 S1, S0 | moves follow the plane, or do not; without S as G29 S0 |
+//!
+//! All is done at rest, one thing at a time: while the machine moves the line waits. Words are lengths of machine coordinates. A move that somebody else
+//! ends, and an alarm, end the code; then no plane is known.
+
+use super::command::{has, number, value};
+use super::host::Step;
+use super::write::{int, length, line_end, text};
+use crate::boards::inputs;
+use crate::config::bed::{Bed, Fault, POINTS, Point};
+use crate::config::getters::TRAVEL_NONE;
+use crate::machine::{Doing, ProbeState};
+use crate::progmem::Text;
+use crate::protocol::{Level, Machine, Out, Value};
+use crate::status::Status;
+use crate::text;
+use crate::units::Length;
+
+/// The first part of a code: what it asks for is looked at.
+const BEGINS: u8 = 0;
+/// Moves do not follow the plane any more: points may change.
+const CHANGES: u8 = 1;
+/// What was asked for is done.
+const ENDS: u8 = 2;
+/// From this part on the points are told.
+const TELLS: u8 = 4;
+/// From this part on points are probed, in [`STAGES`] each.
+const PROBES: u8 = 16;
+/// Up, over the point, down to it, and what has come of that.
+const STAGES: u8 = 4;
+/// The part behind the last point: up.
+const RISES: u8 = PROBES + STAGES * POINTS as u8;
+
+/// How far above and below the lower end of Z the bed is looked for, without the word Z: 5 mm.
+const HEIGHT: i32 = 5 * Length::PER_MM;
+/// What Z may say: 0.5 to 50 mm.
+const HEIGHTS: core::ops::RangeInclusive<i32> = Length::PER_MM / 2..=50 * Length::PER_MM;
+/// Without words nothing is probed in this part of the travel at either end.
+const MARGIN: i32 = 10;
+
+/// Why a code is not carried out.
+enum Trouble {
+    Status(Status),
+    Bed(Fault),
+    NotHomed,
+    NoProbe,
+    Touches,
+    NoTravel,
+    NoPlane,
+}
+
+impl From<Status> for Trouble {
+    fn from(status: Status) -> Self {
+        Self::Status(status)
+    }
+}
+
+impl From<Fault> for Trouble {
+    fn from(fault: Fault) -> Self {
+        Self::Bed(fault)
+    }
+}
+
+/// What comes next.
+type Next = Result<Step, Trouble>;
+
+/// Does part `at` of a code.
+#[inline(never)]
+#[small]
+pub fn part(
+    code: u16,
+    at: u8,
+    block: &[u8],
+    machine: &mut impl Machine,
+    out: &mut impl Out,
+) -> Step {
+    if (TELLS..PROBES).contains(&at) {
+        return list(at - TELLS, machine, out);
+    }
+    if machine.value(Value::Working) != 0 {
+        return Step::Later(at);
+    }
+    if let Doing::Alarm(alarm) = machine.doing() {
+        return Step::Refused(alarm.status());
+    }
+    let next = match value(block, b'S', 0) {
+        None if has(block, b'S') => Err(Status::OutOfRange.into()),
+        what if code == 420 => switch(at, what, block, machine),
+        None => level(at, block, machine),
+        Some(what) => change(at, what, block, machine),
+    };
+    match next {
+        Ok(step) => step,
+        Err(Trouble::Status(Status::Again)) => Step::Later(at),
+        Err(Trouble::Status(status)) => Step::Refused(status),
+        Err(trouble) => {
+            text(out, text!("Error:"));
+            text(out, reason(&trouble));
+            line_end(out);
+            Step::Done
+        }
+    }
+}
+
+#[small]
+fn reason(trouble: &Trouble) -> Text {
+    match trouble {
+        Trouble::Bed(Fault::Line) => text!("points of the bed on a line, or too near"),
+        Trouble::Bed(Fault::Steep) => text!("bed tilted too much"),
+        Trouble::Bed(Fault::Far) => text!("point of the bed too far away"),
+        Trouble::Bed(Fault::Full) => text!("three points are known; G29 S5"),
+        Trouble::NotHomed => text!("X, Y or Z not homed; G28"),
+        Trouble::NoProbe => text!("no probe"),
+        Trouble::Touches => text!("probe touches already"),
+        Trouble::NoTravel => text!("no travel set; name L, R, F, B"),
+        Trouble::NoPlane => text!("fewer than three points; G29"),
+        Trouble::Status(_) => text!("not carried out"),
+    }
+}
+
+/// The length of a word, if it is there.
+#[inline(never)]
+#[small]
+fn word(block: &[u8], letter: u8, machine: &mut impl Machine) -> Result<Option<Length>, Trouble> {
+    if !has(block, letter) {
+        return Ok(None);
+    }
+    let inches = machine.inches();
+    let units = number(block, letter).and_then(|number| number.fixed(Length::DECIMALS, inches));
+    Ok(Some(Length(units.ok_or(Status::OutOfRange)?)))
+}
+
+/// M420. Moves follow the plane at any height: a height at which that ends, Z, is refused.
+#[inline(never)]
+#[small]
+fn switch(at: u8, follows: Option<i32>, block: &[u8], machine: &mut impl Machine) -> Next {
+    if at == ENDS {
+        return Ok(Step::Done);
+    }
+    if has(block, b'Z') {
+        return Err(Status::WordUnused.into());
+    }
+    let Some(follows) = follows else { return Ok(Step::At(TELLS)) };
+    if follows != 0 && !bed(machine)?.is_known() {
+        return Err(Trouble::NoPlane);
+    }
+    follow(follows != 0, ENDS, machine)
+}
+
+/// G29 S.
+#[inline(never)]
+#[small]
+fn change(at: u8, what: i32, block: &[u8], machine: &mut impl Machine) -> Next {
+    match (what, at) {
+        (0, _) => return Ok(Step::At(TELLS)),
+        (_, ENDS) => return Ok(Step::Done),
+        (1, BEGINS) => {
+            let point = point(block, machine)?;
+            // A point that is refused changes nothing.
+            let mut trial = *bed(machine)?;
+            trial.add(point)?;
+            return follow(false, CHANGES, machine);
+        }
+        (5, BEGINS) => return follow(false, CHANGES, machine),
+        (1, _) => {
+            let point = point(block, machine)?;
+            bed(machine)?.add(point)?;
+        }
+        (5, _) => bed(machine)?.forget(),
+        _ => return Err(Status::OutOfRange.into()),
+    }
+    let known = bed(machine)?.is_known();
+    follow(known, ENDS, machine)
+}
+
+/// The point that G29 S1 names: where the nozzle is, but for the words.
+#[inline(never)]
+#[small]
+fn point(block: &[u8], machine: &mut impl Machine) -> Result<Point, Trouble> {
+    let [x, y, mut z] = here(machine);
+    if let Some(bed) = machine.settings().followed_bed() {
+        z = bed.lifted_z(x, y, z);
+    }
+    let mut point = [x, y, z];
+    for (place, letter) in point.iter_mut().zip(*b"XYZ") {
+        *place = word(block, letter, machine)?.unwrap_or(*place);
+    }
+    Ok(point)
+}
+
+/// G29 without S.
+#[inline(never)]
+#[small]
+fn level(at: u8, block: &[u8], machine: &mut impl Machine) -> Next {
+    match at {
+        BEGINS => {
+            check(block, machine)?;
+            return follow(false, CHANGES, machine);
+        }
+        CHANGES => {
+            bed(machine)?.forget();
+            return Ok(Step::Later(PROBES));
+        }
+        ENDS => return Ok(Step::At(TELLS)),
+        _ => {}
+    }
+    let [low, high] = heights(block, machine)?;
+    let [x, y, z] = here(machine);
+    let up = Level::Go([x, y, z.max(high)]);
+    if at > RISES {
+        return follow(true, ENDS, machine);
+    }
+    if at == RISES {
+        return go(up, at, machine);
+    }
+    let (n, stage) = ((at - PROBES) / STAGES, (at - PROBES) % STAGES);
+    let [over_x, over_y] = places(block, machine)?.get(usize::from(n)).copied().unwrap_or_default();
+    match stage {
+        0 => go(up, at, machine),
+        1 if z >= high => go(Level::Go([over_x, over_y, high]), at, machine),
+        2 if [x, y, z] == [over_x, over_y, high] => match probe(machine) {
+            0 => go(Level::Probe([over_x, over_y, low]), at, machine),
+            _ => Err(Trouble::Touches),
+        },
+        3 if machine.value(Value::ProbeState) == ProbeState::Touched as i32 => {
+            let touched = Length(machine.value(Value::Probed(2)));
+            bed(machine)?.add([over_x, over_y, touched])?;
+            Ok(Step::Later(at + 1))
+        }
+        // Somebody has ended the move.
+        _ => Err(Status::Terminated.into()),
+    }
+}
+
+/// Whether three points can be probed, before anything moves.
+#[inline(never)]
+#[small]
+fn check(block: &[u8], machine: &mut impl Machine) -> Result<(), Trouble> {
+    for axis in 0..3 {
+        if machine.value(Value::Homed(axis)) == 0 {
+            return Err(Trouble::NotHomed);
+        }
+    }
+    if probe(machine) < 0 {
+        return Err(Trouble::NoProbe);
+    }
+    if machine.settings().latch_velocity(2) <= 0.0 {
+        return Err(Status::HomingLatch.into());
+    }
+    heights(block, machine)?;
+    let mut level = Bed::NONE;
+    for [x, y] in places(block, machine)? {
+        level.add([x, y, Length::ZERO])?;
+    }
+    // Some may be at one place.
+    if level.is_known() { Ok(()) } else { Err(Fault::Line.into()) }
+}
+
+/// 1 while the probe touches, 0 while it does not, -1 if there is none.
+#[small]
+fn probe(machine: &mut impl Machine) -> i32 {
+    machine.value(Value::Input(inputs::PROBE as u8))
+}
+
+/// From where to where an axis may go, if that is set.
+#[inline(never)]
+#[small]
+fn travel(axis: usize, machine: &mut impl Machine) -> Option<[Length; 2]> {
+    let settings = machine.settings();
+    let (low, high) = (settings.travel_min(axis), settings.travel_max(axis));
+    let is_set = low < high && low != TRAVEL_NONE;
+    is_set.then_some([low, high])
+}
+
+/// X and Y of the points.
+#[inline(never)]
+#[small]
+fn places(block: &[u8], machine: &mut impl Machine) -> Result<[[Length; 2]; POINTS], Trouble> {
+    let [left, right] = edges(0, *b"LR", block, machine)?;
+    let [front, back] = edges(1, *b"FB", block, machine)?;
+    let middle = Length(left.0 / 2 + right.0 / 2);
+    Ok([[left, front], [right, front], [middle, back]])
+}
+
+/// Where the outermost points are along an axis.
+#[inline(never)]
+#[small]
+fn edges(
+    axis: usize,
+    letters: [u8; 2],
+    block: &[u8],
+    machine: &mut impl Machine,
+) -> Result<[Length; 2], Trouble> {
+    let travel = travel(axis, machine);
+    let mut edges = [Length::ZERO; 2];
+    for (n, (edge, letter)) in edges.iter_mut().zip(letters).enumerate() {
+        *edge = match (word(block, letter, machine)?, travel) {
+            (Some(at), Some([low, high])) if at < low || at > high => {
+                return Err(Status::SoftLimit.into());
+            }
+            (Some(at), _) => at,
+            (None, Some([low, high])) => {
+                let margin = high.0 / MARGIN - low.0 / MARGIN;
+                Length(if n == 0 { low.0 + margin } else { high.0 - margin })
+            }
+            (None, None) => return Err(Trouble::NoTravel),
+        };
+    }
+    Ok(edges)
+}
+
+/// Z below which the bed is not, and above which it is not.
+#[inline(never)]
+#[small]
+fn heights(block: &[u8], machine: &mut impl Machine) -> Result<[Length; 2], Trouble> {
+    let height = word(block, b'Z', machine)?.map_or(HEIGHT, |height| height.0);
+    if !HEIGHTS.contains(&height) {
+        return Err(Status::OutOfRange.into());
+    }
+    let bottom = travel(2, machine).map_or(0, |[low, _]| low.0);
+    Ok([Length(bottom.saturating_sub(height)), Length(bottom.saturating_add(height))])
+}
+
+/// Where the machine is.
+#[inline(never)]
+#[small]
+fn here(machine: &mut impl Machine) -> Point {
+    let mut point = [Length::ZERO; 3];
+    for (axis, place) in point.iter_mut().enumerate() {
+        *place = Length(machine.value(Value::MachinePosition(axis as u8)));
+    }
+    point
+}
+
+fn bed(machine: &mut impl Machine) -> Result<&mut Bed, Trouble> {
+    machine.bed().ok_or(Trouble::Status(Status::NotBuiltIn))
+}
+
+/// Begins with a move. The next part is behind it.
+#[inline(never)]
+#[small]
+fn go(what: Level, at: u8, machine: &mut impl Machine) -> Next {
+    match machine.level(what) {
+        Status::Ok => Ok(Step::Later(at + 1)),
+        status => Err(status.into()),
+    }
+}
+
+/// Moves follow the plane from now on, or do not. The next part is `then`.
+#[small]
+fn follow(follows: bool, then: u8, machine: &mut impl Machine) -> Next {
+    go(Level::Follow(follows), then - 1, machine)
+}
+
+/// Part `at` of what is known.
+#[inline(never)]
+#[small]
+fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    let Some(bed) = machine.bed() else { return Step::Done };
+    if at == 0 {
+        text(out, text!("Bed leveling status: "));
+        text(out, if bed.follows() { text!("active (") } else { text!("not active (") });
+        int(out, bed.points().len() as i32);
+        text(out, text!(") positions registered\n"));
+        return Step::At(TELLS + 1);
+    }
+    let Some(point) = bed.points().get(usize::from(at) - 1) else { return Step::Done };
+    text(out, text!("  "));
+    int(out, i32::from(at) - 1);
+    text(out, text!(": G29 S1"));
+    for (letter, place) in b"XYZ".iter().zip(point) {
+        out.put(b' ');
+        out.put(*letter);
+        length(out, place.0);
+    }
+    line_end(out);
+    Step::At(TELLS + at + 1)
+}
