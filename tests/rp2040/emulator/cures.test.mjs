@@ -250,3 +250,98 @@ test('switches share a pin, and let go some steps back', () => {
   //                       0     -1    -2     -3     -2     -1     0     1     2      1      0
   assert.deepEqual(high, [true, true, false, false, false, false, true, true, false, false, true]);
 });
+
+// Numbers that look random, the same each time.
+function* numbers(seed) {
+  for (let x = seed; ; ) {
+    x ^= x << 13; x ^= x >>> 17; x ^= x << 5;
+    yield x >>> 0;
+  }
+}
+
+// Where instructions of the next test find words, and a core of which they are tried: registers and flags.
+const WINDOW = 0x20001000;
+function prepare(core, registers, flags) {
+  registers.forEach((value, i) => { core.registers[i] = value; });
+  [core.N, core.Z, core.C, core.V] = [1, 2, 4, 8].map((bit) => (flags & bit) > 0);
+  core.interruptsUpdated = false;
+}
+
+// What differs from rp2040js on purpose: the carry behind a shift by none, or by 32 and more, and the overflow where the carry takes the second number
+// across the ends of its range; and where BLX goes to by the link register, which rp2040js has written by then.
+function differs(op, registers, flags) {
+  const [row, second, carry] = [op >> 6, registers[op >> 3 & 7], flags & 4 ? 1 : 0];
+  const by = second & 0xff;
+  const isShift = [0x102, 0x103, 0x104].includes(row) && (by === 0 || by >= 32);
+  const isSum = (row === 0x105 && carry) || (row === 0x106 && !carry);
+  return { carry: isShift, overflow: isSum && second === 0x7fffffff, link: op === 0x47f0 };
+}
+
+test('each instruction of a sprint does what it does in rp2040js', () => {
+  const [theirs, ours] = [machine(LOOP), machine(LOOP)];
+  const next = numbers(1);
+  const number = () => next.next().value;
+  const values = [0, 1, 32, 0x7fffffff, 0x80000000, 0xffffffff];
+  const value = () => {
+    const kind = number() % 4;
+    return kind === 0 ? values[number() % 6] : kind === 1 ? number() : kind === 2 ? number() % 40 : WINDOW + 0x400 + number() % 64 * 4;
+  };
+  let taken = 0;
+  for (let op = 0; op < 65536; op++) {
+    const registers = Array.from({ length: 16 }, value);
+    [registers[13], registers[14], registers[15]] = [WINDOW + 0x400, 0x10000301, 0x10000400];
+    const [low, flags] = [op >> 11 === 0x1e ? 0xd000 | number() & 0x2fff : number() & 0xffff, number() & 15];
+    for (const { mcu } of [theirs, ours]) {
+      [op, low].forEach((half, i) => { mcu.flashView.setUint16(0x400 + 2 * i, half, true); });
+      prepare(mcu.core, registers, flags);
+    }
+    const spent = ours.sprint(1);
+    const state = ({ core }) => [...core.registers, core.N, core.Z, core.C, core.V];
+    if (!spent) {
+      assert.deepEqual(state(ours.mcu), state((prepare(theirs.mcu.core, registers, flags), theirs.mcu)), `${op.toString(16)} leaves all as it is`);
+      continue;
+    }
+    taken++;
+    assert.equal(spent, theirs.mcu.core.executeInstruction(), `cycles of ${op.toString(16)}`);
+    const [wanted, is, free] = [state(theirs.mcu), state(ours.mcu), differs(op, registers, flags)];
+    if (free.carry) is[18] = wanted[18];
+    if (free.overflow) is[19] = wanted[19];
+    if (free.link) is[15] = wanted[15];
+    assert.deepEqual(is, wanted, `${op.toString(16)} with ${registers.map((x) => x.toString(16))}, ${flags}`);
+    const [from, to] = [0x1000, 0x1800];
+    assert.equal(Buffer.compare(theirs.mcu.sram.subarray(from, to), ours.mcu.sram.subarray(from, to)), 0, `memory of ${op.toString(16)}`);
+  }
+  assert.ok(taken > 40_000, `${taken}`);
+});
+
+test('flags and places behind what rp2040js has wrong', () => {
+  const m = machine(LOOP);
+  const { core } = m.mcu;
+  const after = (op, first, second, flags) => {
+    m.mcu.flashView.setUint16(0x400, op, true);
+    prepare(core, [first, second], flags);
+    core.PC = 0x10000400;
+    m.sprint(1);
+    return [core.registers[0], core.C, core.V];
+  };
+  const CARRY = 4;
+  assert.deepEqual(after(0x4148, 0, 0x7fffffff, CARRY), [0x80000000, false, true], 'adcs');
+  assert.deepEqual(after(0x4188, 0, 0x7fffffff, 0), [0x80000000, false, false], 'sbcs');
+  assert.deepEqual(after(0x4088, 1, 0, CARRY), [1, true, false], 'lsls by 0');
+  assert.deepEqual(after(0x40c8, 0x80000000, 0, 0), [0x80000000, false, false], 'lsrs by 0');
+  assert.deepEqual(after(0x40c8, 0x80000000, 32, 0), [0, true, false], 'lsrs by 32');
+  assert.deepEqual(after(0x4108, 0x80000000, 40, 0), [0xffffffff, true, false], 'asrs by 40');
+  core.LR = 0x10000801;
+  after(0x47f0, 0, 0, 0);
+  assert.deepEqual([core.PC, core.LR], [0x10000800, 0x10000403], 'blx lr');
+});
+
+test('a sprint ends before what is not memory', () => {
+  // ldr r1, [r0]; str r1, [r2]; then the timer.
+  const m = machine([0x6801, 0x6011, ...LOOP]);
+  [m.mcu.core.registers[0], m.mcu.core.registers[2]] = [0x20000000, 0x40054000];
+  assert.equal(m.sprint(100), 2);
+  assert.equal(m.mcu.core.PC, 0x10000000 + CODE + 2);
+  m.step(m.cycle + 1);
+  assert.equal(m.mcu.core.PC, 0x10000000 + CODE + 4);
+});

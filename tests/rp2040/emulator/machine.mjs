@@ -3,6 +3,7 @@
 // What rp2040js lacks is put right here and in the files beside; `cures.test.mjs` has a test for each.
 import { readFileSync } from 'node:fs';
 import { BasePeripheral, ConsoleLogger, LogLevel, RP2040 } from 'rp2040js';
+import { quicken } from './core.mjs';
 import { Pio } from './pio.mjs';
 import { bootRom } from './rom.mjs';
 import { Uart } from './uart.mjs';
@@ -17,6 +18,8 @@ const VECTORS = FLASH + 0x100;
 // A Cortex-M0+ takes 15 cycles and more to enter an interrupt, and 11 to leave it; rp2040js none.
 const ENTRY = 15;
 const EXIT = 11;
+// The CPU runs for so many cycles at most before others are looked at.
+const SPRINT = 10_000;
 const WATCHDOG = 0x40058;
 // Ends whose rates differ by more do not understand each other.
 const GARBLES = 0.045;
@@ -112,7 +115,6 @@ export class Machine {
     this.lines = 0;
     // Bytes that have been heard.
     this.said = 0;
-    this.instructions = 0;
     this.asleep = 0;
     // Cycles of each exception's handler by itself, by its number; 0 is thread mode.
     this.spent = new Array(48).fill(0);
@@ -181,6 +183,7 @@ export class Machine {
     }
     this.endAborts();
     this.timeInterrupts();
+    this.sprint = quicken(mcu);
     mcu.core.VTOR = VECTORS;
     mcu.core.reset();
     mcu.core.PC = (mcu.core.PC & ~1) >>> 0;
@@ -279,26 +282,35 @@ export class Machine {
     }
   }
 
+  // Cycles until something happens that the CPU does not do itself, or `end`.
+  untilDue(end) {
+    const { clock } = this.mcu;
+    const { cycle, pios: [first, second], senders } = this;
+    // What a state machine does at a cycle is done behind it.
+    const due = Math.min(end, senders[0].due, senders[1].due, first.due() + 1, second.due() + 1);
+    const alarm = clock.nextAlarm ? clock.nanosToNextAlarm / NANOS : Infinity;
+    return Math.ceil(Math.min(due - cycle, alarm));
+  }
+
+  // Sleeps until something is due, or runs up to there.
   step(end) {
     const { mcu } = this;
     const { clock, core } = mcu;
     if (this.cycle >= this.senders[0].due || this.cycle >= this.senders[1].due) this.receive();
     let spent;
-    const level = core.IPSR;
     if (core.waiting) {
-      spent = end - this.cycle;
-      if (clock.nextAlarm) spent = Math.min(spent, clock.nanosToNextAlarm / NANOS);
-      const due = Math.min(this.senders[0].due, this.senders[1].due, this.pios[0].due());
-      spent = Math.max(1, Math.ceil(Math.min(spent, due - this.cycle)));
+      spent = Math.max(1, this.untilDue(end));
       this.asleep += spent;
       clock.tick(spent * NANOS);
       // A pending SysTick does not wake the core of rp2040js.
       if (core.interruptsUpdated && core.checkForInterrupts()) core.waiting = false;
     } else {
-      spent = core.executeInstruction() + this.extra;
+      if (core.interruptsUpdated) core.checkForInterrupts();
+      const level = core.IPSR;
+      spent = this.sprint(Math.min(this.untilDue(end), SPRINT)) || core.executeInstruction();
+      spent += this.extra;
       this.extra = 0;
       this.spent[level] += spent;
-      this.instructions++;
       clock.tick(spent * NANOS);
     }
     this.cycle += spent;
