@@ -144,8 +144,7 @@ fn emulated() -> Result<()> {
         "--test",
         "pico_bench",
     ]);
-    // The jobs of those take many minutes: `cargo xtask bench --board pico-cnc --row pauses-none` runs them.
-    run_child(test.args(["--", "--ignored", "--skip", "pauses_"]))
+    run_child(test.args(["--", "--ignored"]))
 }
 
 fn simulator_tests() -> Result<()> {

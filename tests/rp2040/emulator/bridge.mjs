@@ -2,13 +2,13 @@
 //
 // MOTORS is JSON, [[step, dir], ...]. Each line of the input is a request in JSON, each line of the output its answer:
 //
-//   {"cut": true, "stick": true, "panic": "file", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "drivers": [...], "record": bool, "until": cycle, "line": true}
+//   {"cut": true, "stick": true, "panic": "file", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "turn": rpm, "drivers": [...], "record": bool, "until": cycle, "line": true}
 //
 // Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does.
 // With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again; with `stick` the CPU gets stuck. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
 import { createInterface } from 'node:readline';
 import { Machine } from './machine.mjs';
-import { Motors } from './pins.mjs';
+import { Motors, Spindle } from './pins.mjs';
 import { Drivers } from './tmc2209.mjs';
 
 const [elf, pins] = process.argv.slice(2);
@@ -34,6 +34,8 @@ function act(request) {
   for (const [gpio, high] of request.drive ?? []) machine.drive(gpio, high);
   if (request.wire) motors.wire(request.wire);
   if (request.drivers) drivers.wire(request.drivers);
+  if (request.spindle) machine.spindle = new Spindle(machine, request.spindle);
+  if (request.turn !== undefined) machine.spindle.turn(request.turn);
   recorded = request.record === undefined ? undefined : motors.record(request.record);
   const lines = machine.lines;
   machine.runUntil(request.until ?? 0, () => request.line && machine.lines !== lines);

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { CLOCK_HZ, Machine } from './machine.mjs';
-import { Motors } from './pins.mjs';
+import { Motors, Spindle } from './pins.mjs';
 
 const RAM_END = 0x20042000;
 const CODE = 0x200;
@@ -344,4 +344,23 @@ test('a sprint ends before what is not memory', () => {
   assert.equal(m.mcu.core.PC, 0x10000000 + CODE + 2);
   m.step(m.cycle + 1);
   assert.equal(m.mcu.core.PC, 0x10000000 + CODE + 4);
+});
+
+test('the sensors of a spindle see their marks at its speed', () => {
+  const m = machine(SLEEP);
+  const seen = [];
+  m.drive = (gpio, high) => seen.push([gpio, high, m.cycle]);
+  m.spindle = new Spindle(m, { index: 5, sync: 6, pulses: 4 });
+  m.run(1e6);
+  assert.deepEqual(seen, [], 'it stands still');
+  m.spindle.turn(600);
+  m.run(2.55 * CLOCK_HZ / 10);
+  const falls = (gpio) => seen.filter(([pin, high]) => pin === gpio && !high).map(([, , cycle]) => cycle);
+  assert.deepEqual([falls(5).length, falls(6).length], [3, 10]);
+  const [first, second] = falls(5);
+  assert.equal(second - first, CLOCK_HZ / 10);
+  assert.equal(falls(6)[1] - falls(6)[0], CLOCK_HZ / 40);
+  m.spindle.turn(-300);
+  m.run(CLOCK_HZ);
+  assert.deepEqual([falls(5).length, falls(6).length], [8, 30]);
 });

@@ -107,6 +107,8 @@ export class Machine {
     this.heard = [[], [], []];
     this.computer = new Computer((byte) => this.listen(USB_PORT, byte));
     this.senders = [new Sender(), new Sender()];
+    // Whose sensors work pins; none by itself.
+    this.spindle = { due: Infinity };
     this.inputs = new Map();
     this.sensed = [0, 0, 0, 0, 0];
     this.levels = new Array(30).fill(0);
@@ -285,9 +287,9 @@ export class Machine {
   // Cycles until something happens that the CPU does not do itself, or `end`.
   untilDue(end) {
     const { clock } = this.mcu;
-    const { cycle, pios: [first, second], senders } = this;
+    const { cycle, pios: [first, second], senders, spindle } = this;
     // What a state machine does at a cycle is done behind it.
-    const due = Math.min(end, senders[0].due, senders[1].due, first.due() + 1, second.due() + 1);
+    const due = Math.min(end, senders[0].due, senders[1].due, spindle.due, first.due() + 1, second.due() + 1);
     const alarm = clock.nextAlarm ? clock.nanosToNextAlarm / NANOS : Infinity;
     return Math.ceil(Math.min(due - cycle, alarm));
   }
@@ -297,6 +299,7 @@ export class Machine {
     const { mcu } = this;
     const { clock, core } = mcu;
     if (this.cycle >= this.senders[0].due || this.cycle >= this.senders[1].due) this.receive();
+    while (this.cycle >= this.spindle.due) this.spindle.pass();
     let spent;
     if (core.waiting) {
       spent = Math.max(1, this.untilDue(end));

@@ -1,4 +1,6 @@
-// What is wired to the pins of the board: motors that count their steps, and switches that they work.
+// What is wired to the pins of the board: motors that count their steps, switches that they work, and the sensors of a spindle.
+
+import { CLOCK_HZ } from './machine.mjs';
 
 // A switch that is worked while a motor is at or beyond a step, and until it is `back` steps back.
 class Switch {
@@ -79,4 +81,41 @@ export class Motors {
   }
 
   work(pin) { this.machine.drive(pin.gpio, pin.isHigh(this.positions)); }
+}
+
+// The sensors of a spindle: they pull their pins low while marks pass. The index sees one in a turn, at its beginning; the other `pulses`, the first
+// half of the way between two behind that.
+const INDEX_WIDTH = 0.02;
+const WIDTH = 0.3;
+
+export class Spindle {
+  // Edges of a turn: at which angle, in turns, a pin goes where.
+  constructor(machine, { index, sync, pulses }) {
+    const mark = (gpio, at, width) => [{ at, gpio, high: false }, { at: at + width, gpio, high: true }];
+    const marks = Array.from({ length: pulses }, (_, n) => mark(sync, (n + 0.5) / pulses, WIDTH / pulses));
+    this.edges = [mark(index, 0, INDEX_WIDTH), ...marks].flat().sort((a, b) => a.at - b.at);
+    this.machine = machine;
+    // Turns up to a cycle, turns a cycle from there on, and the edge that comes next.
+    [this.angle, this.since, this.speed, this.next] = [0, machine.cycle, 0, 0];
+    this.plan();
+  }
+  // It turns so fast from now on, turns a minute, to either side alike.
+  turn(rpm) {
+    const { cycle } = this.machine;
+    this.angle += (cycle - this.since) * this.speed;
+    [this.since, this.speed] = [cycle, Math.abs(rpm) / 60 / CLOCK_HZ];
+    this.plan();
+  }
+  // When the next edge is due.
+  plan() {
+    const { edges, next } = this;
+    const angle = Math.floor(next / edges.length) + edges[next % edges.length].at;
+    this.due = this.speed ? this.since + (angle - this.angle) / this.speed : Infinity;
+  }
+  // The edge that is due passes.
+  pass() {
+    const { gpio, high } = this.edges[this.next++ % this.edges.length];
+    this.machine.drive(gpio, high);
+    this.plan();
+  }
 }

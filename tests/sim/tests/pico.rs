@@ -9,7 +9,7 @@ mod transcript;
 
 use std::path::Path;
 
-use common::image;
+use common::{image, kerf_sim};
 use kerf::boards::inputs::{ENDS, PROBE};
 use kerf::boards::{Board, PICO_CNC, PICO_CNC6, SKR_PICO, gp};
 use kerf::switches::{FIRST_US, SOON_US};
@@ -20,6 +20,7 @@ use kerf_sim::job::lines_of;
 use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Runs, USB};
 
 use side::Side;
+use transcript::Transcript;
 
 fn board() -> Emulated {
     Emulated::load(&image(&PICO_CNC), &PICO_CNC).unwrap()
@@ -65,11 +66,11 @@ impl Side for Emulated {
         }
     }
 
-    fn wire(&mut self, switches: &[(usize, i64, bool)], _pulses: u32) {
-        let board = self.board();
+    fn wire(&mut self, switches: &[(usize, i64, bool)], pulses: u32) {
+        let inputs = self.board().inputs;
         let near = |(input, step, opens): &(usize, i64, bool)| {
             Some(Near {
-                gpio: board.inputs[*input]?.bit,
+                gpio: inputs[*input]?.bit,
                 motor: if *input == PROBE { 2 } else { input / 2 },
                 step: *step,
                 above: *input < ENDS && input % 2 == 1,
@@ -78,10 +79,13 @@ impl Side for Emulated {
             })
         };
         Emulated::wire(self, &switches.iter().filter_map(near).collect::<Vec<_>>());
+        if pulses > 0 {
+            self.fit_spindle(pulses).unwrap();
+        }
     }
 
-    fn turn_spindle(&mut self, _rpm: f64, _pulses: u32) {
-        panic!("the emulated board has no spindle");
+    fn turn_spindle(&mut self, rpm: f64, _pulses: u32) {
+        Emulated::turn_spindle(self, rpm);
     }
 
     fn steps(&self) -> [i64; 4] {
@@ -115,6 +119,18 @@ fn jobs_end_on_their_steps() {
         let text = std::fs::read_to_string(format!("../../examples/{name}.gcode")).unwrap();
         print!("{}", run(name, &text, &[]));
     }
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn a_whole_job_ends_in_its_summary() {
+    let mut run = kerf_sim();
+    run.args(["run", "--board", "skr-pico", "--elf"]).arg(image(&SKR_PICO));
+    let output = run.arg("../../examples/bracket.gcode").output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    print!("{said}");
+    assert!(output.status.success() && said.contains("result: OK"), "{said}");
+    assert_eq!(said.matches(" as expected").count(), 3, "{said}");
 }
 
 /// A board that has been powered up, and a sender.
@@ -365,7 +381,7 @@ fn settings_may_change_often() {
 
 /// What is not so here, by the beginnings of names. More rates of the line can be made (`baud`), steps may come faster (`rates`, `settings-motor`,
 /// `grbl-settings`), no port has RTS and CTS (`ports-pins`), the sensors of a spindle have pins of their own
-/// (`encoder`), settings are kept sooner (`stored`), a reset cuts off the slower port's greeting (`start-anew`), and the boot loader, which is in ROM, is not emulated (`boot-loader`).
+/// (`encoder`), and no second one tells the direction (`thread-direction`), settings are kept sooner (`stored`), and the boot loader, which is in ROM, is not emulated (`boot-loader`).
 const DIFFERS: [&str; 9] = [
     "baud",
     "boot-loader",
@@ -374,13 +390,11 @@ const DIFFERS: [&str; 9] = [
     "ports-pins",
     "rates",
     "settings-motor",
-    "start-anew",
     "stored",
+    "thread-direction",
 ];
-/// Those of a printer, which these boards are not yet.
-const PRINTING: [&str; 3] = ["bed", "heat", "reprap"];
-/// Those that move for long, minutes of the emulator's time each: `KERF_TRANSCRIPT` plays one.
-const LONG: [&str; 2] = ["far", "axis-modes"];
+/// Those of a printer, and of drivers that are told by UART.
+const PRINTING: [&str; 4] = ["bed", "drivers", "heat", "reprap"];
 
 /// An answer of a machine with 61 blocks as this one gives it, with 1,024.
 fn with_more_room(line: &str) -> String {
@@ -407,16 +421,21 @@ fn with_more_room(line: &str) -> String {
 #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
 fn the_image_keeps_to_the_transcripts() {
     let mut all = transcript::read_all(Path::new("../transcripts"));
-    let left_out = DIFFERS.iter().chain(&PRINTING).chain(LONG.iter().filter(|_| all.len() > 1));
-    let left_out: Vec<_> = left_out.collect();
-    all.retain(|one| !left_out.iter().any(|name| one.name.starts_with(**name)));
-    // The emulated board has no spindle.
-    all.retain(|one| one.spindle_pulses().is_none());
+    let begins =
+        |names: &[&str], one: &Transcript| names.iter().any(|name| one.name.starts_with(name));
+    all.retain(|one| !begins(&DIFFERS, one));
     all.iter_mut().for_each(|one| one.expect(with_more_room));
-    let (driven, others): (Vec<_>, Vec<_>) =
-        all.into_iter().partition(|one| one.name.starts_with("drivers"));
-    transcript::play_all(driven, 2, || Emulated::load(&image(&SKR_PICO), &SKR_PICO).unwrap());
-    transcript::play_all(others, 2, board);
+    let (printing, others): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|one| begins(&PRINTING, one));
+    transcript::play_all(others, 2, || greeted(&PICO_CNC));
+    transcript::play_all(printing, 2, || greeted(&SKR_PICO));
+}
+
+/// A board that has greeted on both ports: a greeting takes 10 ms on the slower one.
+fn greeted(board: &'static Board) -> Emulated {
+    let mut board = Emulated::load(&image(board), board).unwrap();
+    board.run_for_ms(300).unwrap();
+    board
 }
 
 /// Moves of 0.03 mm at 100 mm/s: 3,333 blocks a second. With a jerk limit they are as many, and none comes late.

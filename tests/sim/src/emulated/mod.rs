@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
-use kerf::boards::{Board, MOTORS, Pin, Port, Usart};
+use kerf::boards::{Board, Encoder, MOTORS, Pin, Port, Usart};
 use serde::{Deserialize, Serialize};
 
 use crate::runs::Runs;
@@ -38,6 +38,10 @@ struct Request {
     wire: Option<Vec<Near>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     drivers: Option<Vec<Driver>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spindle: Option<Sensors>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    turn: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     record: Option<bool>,
     until: u64,
@@ -99,6 +103,15 @@ pub struct Driver {
     pub above: bool,
     /// It has power.
     pub powered: bool,
+}
+
+/// The sensors of a spindle, which pull their pins low.
+#[derive(Serialize, Clone, Copy, Debug)]
+struct Sensors {
+    index: u8,
+    sync: u8,
+    /// Marks that the sync sensor sees in a turn.
+    pulses: u32,
 }
 
 /// How the board stands after a request.
@@ -295,6 +308,20 @@ impl Emulated {
     /// Where the motors of those drivers are, full steps from where they were put.
     pub fn rotors(&self) -> &[f64] {
         &self.answer.rotors
+    }
+
+    /// Puts a spindle at the pins of its sensors, with so many marks; it stands still.
+    pub fn fit_spindle(&mut self, pulses: u32) -> Result<()> {
+        let encoder =
+            self.board.encoder.context("the board has no pins for a spindle's sensors")?;
+        let Encoder { index, sync, .. } = encoder;
+        self.request.spindle = Some(Sensors { index: index.bit, sync: sync.bit, pulses });
+        Ok(())
+    }
+
+    /// The spindle turns so fast from now on, turns a minute.
+    pub fn turn_spindle(&mut self, rpm: f64) {
+        self.request.turn = Some(rpm);
     }
 
     /// The edges of steps in the next milliseconds.
