@@ -117,6 +117,11 @@ contract! {
         fn look();
         /// Queues what has come and had no room. Thread mode, each turn of the main loop on a chip whose first port is its own USB.
         fn go_on();
+        /// Whether the chip sees that a program opens the first port: by its own USB. Any level.
+        fn sees_opening() -> bool;
+        /// Whether a program has opened the first port since the last call, but for the first one, which hears the greeting of the start. It
+        /// comes with [`Event::Realtime`](super::event::Event::Realtime). Thread mode.
+        fn take_opened() -> bool;
         /// Line ends lost since start-up, modulo 2^16. Thread mode.
         fn lost_ends(port: u8) -> u16;
         /// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for. Thread mode.

@@ -34,7 +34,7 @@ use super::jog;
 use super::lines::LinePool;
 use super::links::Links;
 use super::overrides;
-use super::ports::{self, GREETING, INTERRUPTED, OTHERS, Port};
+use super::ports::{self, GREETING, INTERRUPTED, OPENED, OTHERS, Port};
 use super::view::View;
 use crate::gcode::overrides::{Change, FULL, Override};
 use crate::hal::event::Event;
@@ -242,6 +242,9 @@ fn start_over(links: &Links, port: &Port, slot: Option<u8>, works: bool) {
     let homes = machine::cycle() == machine::Cycle::Homing;
     let interrupted = if homes { INTERRUPTED | ports::HOMING } else { INTERRUPTED };
     port.ask(if works { GREETING | interrupted } else { GREETING });
+    if uart::sees_opening() {
+        port.take_asked(OPENED);
+    }
     if port.is_undecided() {
         port.ask(OTHERS);
     }

@@ -611,7 +611,7 @@ impl Answer {
         begun: bool,
         awaited: bool,
     ) -> (Progress, bool) {
-        if port.is_resetting() && !begun && self.id != LineId::NONE {
+        if port.drops_unanswered() && !begun && self.id != LineId::NONE {
             // Nobody waits for it.
             return (Progress::Done, false);
         }
@@ -800,7 +800,7 @@ fn begin(links: &Links, chosen: &Chosen, tried: FastPath, session: &mut Session)
     if port.is_undecided() {
         links.decide_by(port, line);
     }
-    if port.is_resetting() && matches!(class, Class::Fault(_)) {
+    if port.drops_unanswered() && matches!(class, Class::Fault(_)) {
         return Begun::Silent;
     }
     let before = port.speech.get();

@@ -51,6 +51,9 @@ pub const HOMING: u8 = 8;
 /// A bit of [`Port::asked`]: the machine is to be reset, which control does.
 pub const RESET: u8 = 16;
 
+/// A bit of [`Port::asked`], beside [`GREETING`]: a program has opened the port, and nothing has been reset.
+pub const OPENED: u8 = 64;
+
 /// What has decided in which dialect a port is spoken to.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub enum Choice {
@@ -127,9 +130,14 @@ impl Port {
         asked & bit != 0
     }
 
-    /// Whether lines are dropped unanswered: the sender has reset the machine, and waits for the greeting.
+    /// Whether the sender waits for the greeting: it has reset the machine, or opened the port.
     pub fn is_resetting(&self) -> bool {
         self.asked.get() & GREETING != 0
+    }
+
+    /// Whether lines that nothing has been answered to are never answered: their sender has reset the machine.
+    pub fn drops_unanswered(&self) -> bool {
+        self.is_resetting() && !(uart::sees_opening() && self.asked.get() & OPENED != 0)
     }
 
     /// Whether nothing has been said that only one dialect says, so that the first such thing decides.
@@ -248,6 +256,28 @@ impl Links {
         port.speech.set(speech);
         port.choice.set(Choice::Said);
         self.decided(settings);
+    }
+
+    /// A program has opened the first port. While nothing runs it is greeted as at the start, and what it says first decides anew; else it is told nothing, for
+    /// many senders take a greeting for a reset.
+    #[inline(never)]
+    #[small]
+    pub fn open_anew(&self) {
+        let port = self.port(USB);
+        if View::of(self, port).is_busy() || self.has_data() || port.is_resetting() {
+            return;
+        }
+        if port.choice.get() == Choice::Said {
+            let settings = self.settings.borrow();
+            port.choice.set(Choice::Open);
+            port.speech.set(Speech::at_start(&settings, USB));
+            self.decided(&settings);
+        }
+        port.ask(GREETING | OPENED);
+        if port.is_undecided() {
+            port.ask(OTHERS);
+        }
+        self.reporter_wake.notify_now();
     }
 
     /// Ports may have begun to speak otherwise: which are eager ([`Port::is_eager`]), how the sides stop each other, and which motion mode there

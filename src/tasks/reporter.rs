@@ -14,7 +14,7 @@ use super::health;
 #[cfg(feature = "dialect-reprap")]
 use super::heat;
 use super::links::Links;
-use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, OTHERS, Port};
+use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, OPENED, OTHERS, Port};
 use super::turning;
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
@@ -82,8 +82,9 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             links.parser_wake.signal();
         }
         while let Some((number, notice)) = asked(links) {
+            let opened = uart::sees_opening() && links.port(number).take_asked(OPENED);
             tell(links, links.port(number), notice).await;
-            if matches!(notice, Notice::Greeting(_)) {
+            if matches!(notice, Notice::Greeting(_)) && !opened {
                 start_up(links);
             }
         }

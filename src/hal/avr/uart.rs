@@ -329,6 +329,16 @@ fn wait_less(port: u8) {
 /// Does nothing: bytes that find no room in the ring are lost.
 pub fn go_on() {}
 
+/// It does not: to open the port resets it.
+pub fn sees_opening() -> bool {
+    false
+}
+
+/// Never: see [`sees_opening`].
+pub fn take_opened() -> bool {
+    false
+}
+
 /// Line ends lost since start-up, modulo 2^16.
 pub fn lost_ends(port: u8) -> u16 {
     let [low, high] = &flags(port).lost_ends;

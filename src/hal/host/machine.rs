@@ -42,6 +42,11 @@ impl Machine {
         uart::send(USB, bytes);
     }
 
+    /// A program opens the first port, which is not the first to do so.
+    pub fn open_usb(&self) {
+        uart::open_usb();
+    }
+
     /// The sender puts a byte on the line that arrives damaged.
     pub fn send_damaged(&self) {
         uart::send_damaged(USB);

@@ -85,6 +85,8 @@ struct Line {
     cts: bool,
     /// The sender is held back by RTS.
     rts: bool,
+    /// A program has opened the port.
+    opened: bool,
     lost_ends: u16,
     /// Bytes queued, modulo 256.
     queued: u8,
@@ -118,6 +120,7 @@ impl Line {
             heeds_cts: false,
             cts: false,
             rts: false,
+            opened: false,
             lost_ends: 0,
             queued: 0,
             realtime: 0,
@@ -255,6 +258,22 @@ pub fn look() {
 
 /// Does nothing: bytes that find no room in the ring are lost.
 pub fn go_on() {}
+
+/// It does, for tests: [`Machine::open_usb`](super::Machine::open_usb).
+pub fn sees_opening() -> bool {
+    true
+}
+
+/// Whether a program has opened the first port since the last call.
+pub fn take_opened() -> bool {
+    with(USB, |line| core::mem::take(&mut line.opened))
+}
+
+/// A program opens the first port.
+pub(super) fn open_usb() {
+    with(USB, |line| line.opened = true);
+    flags::set(Event::Realtime);
+}
 
 /// Line ends lost since start-up, modulo 2^16.
 pub fn lost_ends(port: u8) -> u16 {

@@ -557,6 +557,16 @@ pub fn go_on() {
     }
 }
 
+/// Whether the first port is USB of the chip's own.
+pub fn sees_opening() -> bool {
+    registers(USB).is_none()
+}
+
+/// Whether a program has opened USB since the last call, but for the first. Thread mode.
+pub fn take_opened() -> bool {
+    usb::take_opened()
+}
+
 /// Takes what is to leave by USB next. How much that is.
 pub(super) fn take(packet: &mut [u8]) -> usize {
     let mut count = 0;

@@ -4,7 +4,7 @@
 //! packet that the receive ring has no room for is the last: the computer is told to wait (NAK) until it has gone.
 //!
 //! Nobody listens while no program has the port open, or the bus sleeps. What is said then is dropped, so that no task waits for it; but the
-//! first [`KEPT`] bytes after start-up, with the greeting, are kept for the first who opens it.
+//! first [`KEPT`] bytes after start-up, with the greeting, are kept for the first who opens it. That others do is told to tasks ([`take_opened`]).
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -21,8 +21,9 @@ use embassy_usb::{Builder, Config, Handler, UsbDevice};
 use heapless::Deque;
 use static_cell::StaticCell;
 
-use super::{last_words, uart};
+use super::{flags, last_words, uart};
 use crate::boards::ACTIVE;
+use crate::hal::event::Event;
 
 /// The longest packet of a full-speed bus.
 pub(super) const PACKET: usize = 64;
@@ -49,6 +50,9 @@ static NEWS: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static SENDS: AtomicBool = AtomicBool::new(false);
 /// The bus sleeps, or its cable is out.
 static ASLEEP: AtomicBool = AtomicBool::new(false);
+
+/// A program has opened the port that is not the first, which nobody has taken yet.
+static OPENED: AtomicBool = AtomicBool::new(false);
 
 /// Notices when the bus sleeps.
 struct Sleep;
@@ -102,6 +106,16 @@ pub(super) fn start() {
     });
 }
 
+/// Whether a program has opened the port since the last call, but for the first. Thread mode.
+pub(super) fn take_opened() -> bool {
+    let opened = OPENED.load(Ordering::Relaxed);
+    if opened {
+        // One that comes in between is greeted with this one.
+        OPENED.store(false, Ordering::Relaxed);
+    }
+    opened
+}
+
 /// There may be something to send. While lines wait their answers are gathered into full packets, for a millisecond at most: see [`flush`].
 /// Any level.
 pub(super) fn kick() {
@@ -142,8 +156,12 @@ async fn tell(mut sender: Sender<'static, Driver>, control: ControlChanged<'stat
     if let Some(line) = last_words::take() {
         first.keep(line.as_bytes());
     }
-    let mut packet = [0; PIECE];
+    let (mut packet, mut door) = ([0; PIECE], Door::default());
     loop {
+        if door.opens_again(control.dtr()) {
+            OPENED.store(true, Ordering::Relaxed);
+            flags::set(Event::Realtime);
+        }
         let hears = hears(&control);
         let kept = if hears { first.take(&mut packet) } else { 0 };
         let count = if kept > 0 { kept } else { uart::take(&mut packet) };
@@ -170,6 +188,24 @@ fn hears(control: &ControlChanged<'_>) -> bool {
 async fn silence(control: &ControlChanged<'_>) {
     while hears(control) {
         select(NEWS.wait(), control.control_changed()).await;
+    }
+}
+
+/// Whether a program has the port open, by the line (DTR) that says so, and whether one has had.
+#[derive(Default)]
+struct Door {
+    is_open: bool,
+    was_open: bool,
+}
+
+impl Door {
+    /// The line is so now. Whether a program has opened the port by that, and is not the first.
+    fn opens_again(&mut self, dtr: bool) -> bool {
+        let opens = dtr && !self.is_open;
+        let again = opens && self.was_open;
+        self.was_open |= opens;
+        self.is_open = dtr;
+        again
     }
 }
 

@@ -43,11 +43,37 @@ fn the_first_program_that_opens_the_port_is_greeted() {
     board.run_for_ms(20).unwrap();
     let heard = String::from_utf8(board.receive_from(USB)).unwrap();
     assert!(heard.contains("SYSTEM READY") && heard.ends_with('\n'), "{heard}");
+}
+
+/// The program closes the port, and another one opens it. What that one hears.
+fn reopen(board: &mut Emulated) -> String {
     board.session(CLOSED);
     board.run_for_ms(20).unwrap();
+    board.receive_from(USB);
     board.session(LISTENS);
-    assert_eq!(ask(&mut board, USB, "", 20), "", "no other one is");
-    assert!(ask(&mut board, USB, "{xvm:n}\n", 20).contains("xvm"));
+    ask(board, USB, "", 20)
+}
+
+#[test]
+#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+fn whoever_opens_the_port_is_greeted_unless_something_runs() {
+    let mut board = booted();
+    for _ in 0..2 {
+        let heard = reopen(&mut board);
+        assert!(heard.starts_with("\r\nGrbl ") && heard.ends_with("]}\n"), "{heard}");
+        assert_eq!(heard.matches("SYSTEM READY").count(), 1, "{heard}");
+        let answer = ask(&mut board, USB, "{xvm:n}\n", 20);
+        assert!(answer.starts_with("{\"r\":{\"xvm\":"), "{answer}");
+    }
+    // What it says first decides between dialects.
+    reopen(&mut board);
+    assert!(ask(&mut board, USB, "?", 20).starts_with("<Idle|"));
+    assert_eq!(ask(&mut board, USB, "g1x5f600\n", 20), "ok\r\n");
+    assert_eq!(reopen(&mut board), "", "a job goes on");
+    assert!(ask(&mut board, USB, "?", 20).starts_with("<Run|"));
+    board.run_for_ms(1_000).unwrap();
+    assert_eq!(Emulated::steps(&board)[0], 6_400);
+    assert!(reopen(&mut board).contains("SYSTEM READY"));
 }
 
 #[test]
