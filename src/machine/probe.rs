@@ -16,12 +16,24 @@ pub enum ProbeState {
     Waiting,
 }
 
+/// How far the reporter has come with the result.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+enum News {
+    /// There is nothing to tell.
+    #[default]
+    None,
+    /// Nobody has begun to tell it.
+    Waits,
+    /// It is being told.
+    Begun,
+}
+
 /// The last probing.
 #[derive(Default)]
 pub struct Probe {
     state: Cell<ProbeState>,
     at: Cell<[Length; FIRST_ROTARY]>,
-    news: Cell<bool>,
+    news: Cell<News>,
 }
 
 impl Probe {
@@ -49,7 +61,7 @@ impl Probe {
     /// Records that the probing move has come to its end, which is to be reported.
     pub fn tell(&self, state: ProbeState) {
         self.state.set(state);
-        self.news.set(true);
+        self.news.set(News::Waits);
     }
 
     /// Records that a probing move has been flushed, if one was under way: no contact was found, and nothing is reported.
@@ -61,11 +73,25 @@ impl Probe {
 
     /// Whether there is a result that nobody has begun to tell.
     pub fn is_news(&self) -> bool {
-        self.news.get()
+        self.news.get() == News::Waits
     }
 
-    /// Whether there is a result that nobody has begun to tell; the caller begins to tell it.
+    /// Whether there is a result that has not been told to its end.
+    pub fn is_untold(&self) -> bool {
+        self.news.get() != News::None
+    }
+
+    /// Whether there is a result that nobody has begun to tell; the caller tells it, and then says so ([`Self::has_been_told`]).
     pub fn take_news(&self) -> bool {
-        self.news.take()
+        let is_news = self.is_news();
+        if is_news {
+            self.news.set(News::Begun);
+        }
+        is_news
+    }
+
+    /// The result has been told.
+    pub fn has_been_told(&self) {
+        self.news.set(News::None);
     }
 }

@@ -117,6 +117,8 @@ pub enum Value {
     Input(u8),
     /// 0 no contact, 1 contact, 2 probing.
     ProbeState,
+    /// 1 while what a probing has come to, and the alarm that it has raised, is still to be told on this port.
+    ProbeUntold,
     /// Where the contact was, in units of a `Length`.
     Probed(u8),
     /// How hot a heater is, eighths of a degree Celsius: 0 the hot end, 1 the bed. 0 without it.

@@ -88,7 +88,8 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
                 start_up(links);
             }
         }
-        if let Some(status) = links.notices.exception.take() {
+        // All of them: what a probing has come to is told behind the alarm that it has raised.
+        while let Some(status) = links.notices.exception.take() {
             let notice = Notice::Exception(status);
             tell(links, links.told(), notice).await;
             // Whoever is at hand may have it go on.
@@ -100,6 +101,9 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             // The planner waits for it.
             flags::set(Event::BlockDone);
             tell(links, links.told(), Notice::Probing).await;
+            // An answer may wait for that.
+            links.probe.has_been_told();
+            links.parser_wake.signal();
         }
         if turning::take_news(links.thread) && links.settings.borrow().reports_each_turn() {
             tell(links, links.told(), Notice::SyncError).await;

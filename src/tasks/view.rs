@@ -445,6 +445,10 @@ impl Machine for View<'_> {
             Value::SelectedTool => self.links.model.borrow().selected_tool().into(),
             Value::Input(input) => self.input(input),
             Value::ProbeState => self.links.probe.state() as i32,
+            Value::ProbeUntold => {
+                let is_told = self.port.number == self.links.told().number;
+                i32::from(is_told && self.links.probe.is_untold())
+            }
             // An axis that turns stands still in a probing move.
             Value::Probed(axis) => {
                 let at = self.links.probe.at(axis);

@@ -258,7 +258,8 @@ impl Request {
         // A mode that is still in force without a move of this line is none of it.
         let probes =
             self.at == 0 && command::moves(line) && is_probing(machine.value(Value::MotionMode));
-        if probes && machine.value(Value::Working) != 0 {
+        let mut is = |value| machine.value(value) != 0;
+        if probes && (is(Value::Working) || is(Value::ProbeUntold)) {
             return Step::Later(0);
         }
         Step::Done
