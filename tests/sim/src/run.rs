@@ -89,7 +89,9 @@ fn run_emulated(args: &RunArgs, board: &'static Board, lines: &job::Lines) -> Re
     let mut machine = Emulated::load(&args.target.elf, board)?;
     let bar = progress_bar(lines.len(), args.quiet)?;
     let progress = |done| bar.set_position(done as u64);
-    let report = emulated::job::run(&mut machine, lines, &args.settings, args.in_flight, progress)?;
+    let (settings, in_flight) = (args.settings.clone(), args.in_flight);
+    let options = Options { settings, in_flight, ..Options::default() };
+    let report = emulated::job::run(&mut machine, lines, &options, progress)?;
     bar.finish_and_clear();
     let text = report.to_string();
     match args.quiet {

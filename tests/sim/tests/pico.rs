@@ -16,7 +16,7 @@ use kerf::switches::{FIRST_US, SOON_US};
 use kerf_sim::bench::{ideal, spiral};
 use kerf_sim::emulated::even::{FAST, evenness};
 use kerf_sim::emulated::{Emulated, Near, job};
-use kerf_sim::job::lines_of;
+use kerf_sim::job::{Options, lines_of};
 use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Runs, USB};
 
 use side::Side;
@@ -105,8 +105,9 @@ impl Side for Emulated {
 /// Runs a job, which must end on its exact steps.
 fn run(name: &str, text: &str, settings: &[&str]) -> String {
     let settings: Vec<_> = settings.iter().map(ToString::to_string).collect();
+    let options = Options { settings, ..Options::default() };
     let mut board = board();
-    let report = job::run(&mut board, &lines_of(text), &settings, LINES_IN_FLIGHT, |_| ());
+    let report = job::run(&mut board, &lines_of(text), &options, |_| ());
     let report = report.unwrap();
     assert!(report.problems.is_empty(), "{name}: {report}");
     report.to_string()

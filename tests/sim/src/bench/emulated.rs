@@ -6,12 +6,12 @@ use anyhow::{Context, Result, ensure};
 use kerf::boards::{Board, PICO_CNC, PICO_CNC6};
 
 use super::Better::{Higher, Lower};
-use super::workload::{How, USUAL_JERK, settings};
+use super::workload::{How, USUAL_JERK, disturbances, settings};
 use super::{Figure, Row, ideal, pauses, spiral};
 use crate::emulated::even::{FAST, evenness};
 use crate::emulated::{Emulated, Recorded, job};
 use crate::host::{Host, LINES_IN_FLIGHT};
-use crate::job::lines_of;
+use crate::job::{Options, lines_of};
 use crate::machine::USB;
 use crate::runs::Runs;
 
@@ -274,18 +274,25 @@ fn pauses_usual(bed: &PicoBed) -> Result<Figure> {
     late(bed, Some(USUAL_JERK))
 }
 
-/// Segments that came late in the jobs, which must end on their exact steps.
+/// Segments that came late in the jobs, each left alone and with holds and overrides. They must end on their exact steps.
 fn late(bed: &PicoBed, jerk: Option<f64>) -> Result<Figure> {
-    let settings = settings(How { jerk, ..How::default() }, true);
     let (mut sum, mut note) = (0, String::new());
-    for (name, text) in pauses::jobs() {
+    let jobs = pauses::jobs();
+    let twice = jobs.iter().flat_map(|(name, text)| [(name, text, false), (name, text, true)]);
+    for (seed, (name, text, disturbed)) in (1..).zip(twice) {
+        let options = Options {
+            settings: settings(How { jerk, ..How::default() }, true),
+            interjections: if disturbed { disturbances(seed) } else { Vec::new() },
+            ..Options::default()
+        };
         let mut board = Emulated::load(&bed.elf, &PICO_CNC)?;
-        let report = job::run(&mut board, &lines_of(&text), &settings, LINES_IN_FLIGHT, |_| ())?;
+        let report = job::run(&mut board, &lines_of(text), &options, |_| ())?;
         let problems = report.problems.join("; ");
         ensure!(problems.is_empty() || report.late > 0, "{name}: {problems}");
         sum += report.late;
         if report.late > 0 {
-            note += &format!("{name} {}, ", report.late);
+            let how = if disturbed { " with holds and overrides" } else { "" };
+            note += &format!("{name}{how} {}, ", report.late);
         }
     }
     Ok(Figure { value: sum as f64, note })

@@ -183,7 +183,7 @@ pub fn settings(how: How, has_acceleration: bool) -> Vec<String> {
 }
 
 /// Holds that are resumed, and overrides of feed and traverse, at random times.
-fn disturbances(seed: u64) -> Vec<(u64, u8)> {
+pub fn disturbances(seed: u64) -> Vec<(u64, u8)> {
     const OVERRIDES: [u8; 8] = [0x90, 0x91, 0x92, 0x93, 0x94, 0x95, 0x96, 0x97];
     let mut random = Random::new(seed);
     let (mut ms, mut all) = (100, Vec::new());

@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 
 use super::Emulated;
 use crate::host::Host;
-use crate::job::{BOOT_MS, Lines, POLL, Watch, ask_settings, read_setup};
+use crate::job::{BOOT_MS, Lines, Options, POLL, Watch, ask_settings, read_setup};
 use crate::oracle::{self, MotorSetup, Outcome, Unclear};
 use crate::protocol::STATUS_NOOP;
 use crate::runs::Runs;
@@ -31,22 +31,25 @@ struct Motor {
     highest_hz: Option<f64>,
 }
 
-/// Boots the board, sends settings and a job, and says how it went. `progress` gets the lines answered so far.
+/// Boots the board, sends settings and a job, and says how it went. `progress` gets the lines answered so far. USB has no speed to change, and
+/// no waveforms are written.
 pub fn run(
     board: &mut Emulated,
     lines: &Lines,
-    settings: &[String],
-    in_flight: usize,
+    options: &Options,
     progress: impl FnMut(usize),
 ) -> Result<Report> {
-    let mut host = Host::new(in_flight);
+    let mut host = Host::new(options.in_flight);
     host.boot(board, BOOT_MS)?;
-    ask_settings(board, &mut host, lines, settings)?;
+    ask_settings(board, &mut host, lines, &options.settings)?;
     let setup = read_setup(board, &mut host)?;
     let numbered = || lines.iter().map(|(n, l)| (*n, l.as_str()));
     let expected = oracle::run(numbered(), &setup);
     let banners = host.banners();
     let (began, slept) = (board.cycle(), board.asleep());
+    for (ms, byte) in &options.interjections {
+        host.interject(began + board.cycles(*ms), *byte);
+    }
     let mut problems = Vec::new();
     let mut watch = Watch::new(oracle::longest_dwell_ms(numbered(), &setup));
     let end = stream(board, &mut host, lines, &mut watch, &mut problems, progress)
