@@ -96,14 +96,16 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             if status == Status::ProgramStopped {
                 tell_others(links, notice).await;
             }
+            if !Speech::HAS_QUESTION {
+                break;
+            }
         }
         if links.probe.take_news() {
             // The planner waits for it.
             flags::set(Event::BlockDone);
             tell(links, links.told(), Notice::Probing).await;
-            // An answer may wait for that.
+            // An answer may wait for that, whose task has been woken.
             links.probe.has_been_told();
-            links.parser_wake.signal();
         }
         if turning::take_news(links.thread) && links.settings.borrow().reports_each_turn() {
             tell(links, links.told(), Notice::SyncError).await;

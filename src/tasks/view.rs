@@ -61,7 +61,9 @@ use crate::motion::snapshot::{Moment, Program};
 use crate::protocol::Level;
 #[cfg(feature = "dialect-reprap")]
 use crate::protocol::{Cold, Extruder};
-use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning, thousandths};
+use crate::protocol::{
+    Hold, Machine, Memory, Remembers, Speech, Store, Value, Warning, thousandths,
+};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
 use crate::store::program;
@@ -445,9 +447,10 @@ impl Machine for View<'_> {
             Value::SelectedTool => self.links.model.borrow().selected_tool().into(),
             Value::Input(input) => self.input(input),
             Value::ProbeState => self.links.probe.state() as i32,
+            // Only answers of a dialect in order wait for that.
             Value::ProbeUntold => {
-                let is_told = self.port.number == self.links.told().number;
-                i32::from(is_told && self.links.probe.is_untold())
+                let is_told = || self.port.number == self.links.told().number;
+                i32::from(Speech::HAS_QUESTION && self.links.probe.is_untold() && is_told())
             }
             // An axis that turns stands still in a probing move.
             Value::Probed(axis) => {
