@@ -74,7 +74,9 @@ pub fn part(
         (b'T', 0) => return Step::Done,
         (b'T', _) => return Step::Refused(Status::ToolInvalid),
         (b'G', 10 | 11) => return retract(code.1 == 10, machine, out),
-        (b'G', 29) | (b'M', 420) => return bed::part(code.1, at, block, machine, out),
+        (b'G', 29) | (b'M', 420) if Capability::BedPlane.is_built_in() => {
+            return bed::part(code.1, at, block, machine, out);
+        }
         (b'G', number) => return home(at, number, block, machine),
         (_, number) => number,
     };
