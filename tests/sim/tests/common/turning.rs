@@ -1,0 +1,337 @@
+//! A lathe on the simulated chip and its sender, in TinyG's or in grbl's dialect.
+//!
+//! X and Z have 200 steps/mm and 500 mm/s2, and no ends. What is said here in TinyG's names is said to the machine in its own dialect.
+
+use kerf::boards::{Board, MEGA2560_GRBL_LATHE};
+use kerf_sim::mechanics::{Build, Sensors};
+use kerf_sim::{AUX, Machine};
+
+use super::firmware;
+
+/// Steps of X and Z in a millimetre.
+pub const STEPS: f64 = 200.0;
+/// A step, mm.
+pub const STEP: f64 = 1.0 / STEPS + 1e-9;
+const X: usize = 0;
+const Z: usize = 2;
+/// Cycles of a byte on the wire.
+const BYTE: u64 = 1_389;
+/// Cycles of a quarter of a millisecond.
+const QUARTER_MS: u64 = 4_000;
+/// Edges of the index so soon behind one another are of one pulse.
+const BOUNCES_MS: u64 = 20;
+/// The longest wait for an answer, and for an end: minutes of a tap are none.
+const PATIENCE_MS: u64 = 20_000;
+
+/// How the machine says that it stands.
+#[derive(Debug)]
+pub struct Status {
+    /// `Idle`, `Run`, `Hold`, `Door`, `Alarm`.
+    pub state: String,
+    /// Where it says X and Z are, mm.
+    pub at: [f64; 2],
+    /// How long the answer took from the last byte of the question to its own first one, ms.
+    pub took_ms: f64,
+}
+
+/// What a pass has cut.
+pub struct Cut {
+    /// Where X and Z were before it, in steps.
+    pub start: [i64; 2],
+    /// Where they came to rest.
+    pub end: [i64; 2],
+    /// Where they were at each index pulse.
+    pub indexed: Vec<[i64; 2]>,
+}
+
+impl Cut {
+    /// How far X or Z were along a thread at index pulses, mm modulo its lead; without 1.5 leads at both ends.
+    pub fn phases(&self, axis: usize, lead: f64) -> Vec<f64> {
+        let length = (self.end[axis] - self.start[axis]).abs() as f64 / STEPS;
+        let inside = 1.5 * lead..=length - 1.5 * lead;
+        let ways = self.indexed.iter().map(|at| (at[axis] - self.start[axis]).abs() as f64 / STEPS);
+        ways.filter(|way| inside.contains(way)).map(|way| way.rem_euclid(lead)).collect()
+    }
+}
+
+/// How far two phases are apart, mm of a lead.
+pub fn apart(one: f64, other: f64, lead: f64) -> f64 {
+    let off = (one - other) / lead;
+    ((off - off.round()) * lead).abs()
+}
+
+/// The machine and what its sender hears.
+pub struct Lathe {
+    pub machine: Machine,
+    /// Whether it speaks grbl's dialect.
+    pub grbl: bool,
+    heard: Vec<String>,
+    partial: Vec<u8>,
+}
+
+impl Lathe {
+    /// A board beside a spindle at rest with so many pulses a turn, whose sensors are changed.
+    pub fn new(board: &'static Board, pulses: u32, change: impl Fn(&mut Sensors)) -> Self {
+        let mut build = Build::lathe(board, pulses).unwrap();
+        build.spindle.pwm = None;
+        change(build.spindle.sensors.as_mut().unwrap());
+        Self::of(board, &build, pulses)
+    }
+
+    /// A board in a machine.
+    pub fn of(board: &'static Board, build: &Build, pulses: u32) -> Self {
+        let mut machine = firmware(board);
+        machine.build(build);
+        let grbl = board.name == MEGA2560_GRBL_LATHE.name;
+        let mut lathe = Lathe { machine, grbl, heard: Vec::new(), partial: Vec::new() };
+        lathe.run_for_ms(1_000);
+        for motor in [1, 3] {
+            ["tr:4", "sa:1.8", "mi:4"].iter().for_each(|row| lathe.set(&format!("{motor}{row}")));
+        }
+        for axis in ['x', 'z'] {
+            let rows = ["fr:1500", "vm:1500", "ac:500", "jm:200000"];
+            rows.iter().for_each(|row| lathe.set(&format!("{axis}{row}")));
+        }
+        lathe.set(&format!("spn:{pulses}"));
+        lathe
+    }
+
+    /// Has the spindle turn so fast, and waits until that is measured.
+    pub fn turn(&mut self, rpm: f64) {
+        self.machine.tamper(|mechanics, now| mechanics.force_spindle(rpm, now));
+        self.run_for_ms(if rpm.abs() < 100.0 { 3_500 } else { 800 });
+    }
+
+    fn listen(&mut self) {
+        for byte in self.machine.receive() {
+            match byte {
+                b'\r' | b'\n' if self.partial.is_empty() => {}
+                b'\r' | b'\n' => {
+                    self.heard.push(String::from_utf8_lossy(&self.partial).into_owned());
+                    self.partial.clear();
+                }
+                byte => self.partial.push(byte),
+            }
+        }
+    }
+
+    pub fn run_for_ms(&mut self, ms: u64) {
+        self.machine.run_for_ms(ms).unwrap();
+        self.listen();
+    }
+
+    fn run_for_quarter(&mut self) {
+        self.machine.run_until(self.machine.cycle() + QUARTER_MS).unwrap();
+        self.listen();
+    }
+
+    /// Sends a line. Its answer.
+    pub fn ask(&mut self, line: &str) -> String {
+        let from = self.heard.len();
+        self.machine.send(format!("{line}\n").as_bytes());
+        let grbl = self.grbl;
+        let answers = |heard: &String| match grbl {
+            true => heard == "ok" || heard.starts_with("error:"),
+            false => heard.contains("\"f\":["),
+        };
+        for _ in 0..PATIENCE_MS {
+            self.run_for_ms(1);
+            if let Some(answer) = self.heard[from..].iter().find(|heard| answers(heard)) {
+                return answer.clone();
+            }
+        }
+        panic!("no answer to {line}: {:?}", &self.heard[from..]);
+    }
+
+    /// Sends a line, which has to be carried out.
+    pub fn take(&mut self, line: &str) {
+        let answer = self.ask(line);
+        assert!(answer == "ok" || answer.contains("[1,0,"), "{line} is answered by {answer}");
+    }
+
+    /// Sets something by TinyG's name, as `spn:4`.
+    pub fn set(&mut self, setting: &str) {
+        let line = match self.grbl {
+            true => format!("${}", setting.replace(':', "=")),
+            false => format!("{{{setting}}}"),
+        };
+        self.take(&line);
+    }
+
+    /// Asks for a setting or a value by TinyG's name.
+    pub fn value(&mut self, name: &str) -> f64 {
+        if self.grbl {
+            self.take(&format!("${name}"));
+            let answer = format!("${name}=");
+            let line = self.heard.iter().rev().find(|line| line.starts_with(&answer)).unwrap();
+            return line[answer.len()..].parse().unwrap();
+        }
+        let answer = self.ask(&format!("{{{name}:n}}"));
+        number(&answer, &format!("\"{name}\":"))
+    }
+
+    /// Asks how the machine stands.
+    pub fn status(&mut self) -> Status {
+        let from = self.heard.len();
+        let question: &[u8] = if self.grbl { b"?" } else { b"{stat:n,mpox:n,mpoz:n}\n" };
+        self.machine.send(question);
+        let asked = self.machine.cycle() + question.len() as u64 * BYTE;
+        let begins = if self.grbl { "<" } else { "{\"r\":{\"stat\"" };
+        let mut answered = None;
+        loop {
+            self.run_for_quarter();
+            if let Some(at) = self.heard[from..].iter().position(|one| one.starts_with(begins)) {
+                let at = from + at;
+                let answer = self.heard.remove(at);
+                let took = answered.map_or(0, |at: u64| at.saturating_sub(asked));
+                let took_ms = self.machine.seconds(took) * 1e3;
+                return if self.grbl {
+                    grbl_status(&answer, took_ms)
+                } else {
+                    tinyg_status(&answer, took_ms)
+                };
+            }
+            if self.partial.starts_with(&begins.as_bytes()[..1]) {
+                answered.get_or_insert(self.machine.cycle());
+            } else if !self.partial.is_empty() {
+                // Another line.
+                answered = None;
+            }
+            let late = self.machine.cycle().saturating_sub(asked);
+            assert!(
+                late < self.machine.cycles(PATIENCE_MS),
+                "nobody answers: {:?}",
+                &self.heard[from..]
+            );
+        }
+    }
+
+    /// Asks on the other port, which has to answer within so many ms.
+    pub fn ask_other_port(&mut self, ms: u64) {
+        let (question, answer): (&[u8], &str) =
+            if self.grbl { (b"?", "<") } else { (b"{mpoz:n}\n", "mpoz") };
+        drop(self.machine.receive_from(AUX));
+        self.machine.send_to(AUX, question);
+        self.run_for_ms(ms);
+        let heard = String::from_utf8(self.machine.receive_from(AUX)).unwrap();
+        assert!(heard.contains(answer), "the second port hears {heard:?}");
+    }
+
+    /// The motors of X and Z, in steps.
+    pub fn motors(&self) -> [i64; 2] {
+        [X, Z].map(|motor| self.machine.recorder().motors()[motor].position)
+    }
+
+    /// Where X and Z were at index pulses from the `since`-th on, in steps.
+    pub fn indexed(&self, since: usize) -> Vec<[i64; 2]> {
+        let all = &self.machine.mechanics().unwrap().indexed()[since..];
+        let mut kept: Vec<&(u64, _)> = Vec::new();
+        for one in all {
+            // What a contact that bounces does behind its edge is no pulse.
+            if kept.last().is_none_or(|last| one.0 > last.0 + self.machine.cycles(BOUNCES_MS)) {
+                kept.push(one);
+            }
+        }
+        kept.iter().map(|(_, steps): &&(u64, [i64; 4])| [steps[X], steps[Z]]).collect()
+    }
+
+    /// How many index pulses there were.
+    pub fn turns(&self) -> usize {
+        self.machine.mechanics().unwrap().indexed().len()
+    }
+
+    /// Begins a pass and runs until the axis of a thread has come so far, mm.
+    pub fn begin(&mut self, line: &str, axis: usize, far: f64) {
+        let start = self.motors()[axis];
+        self.machine.send(format!("{line}\n").as_bytes());
+        let patience = self.machine.cycle() + self.machine.cycles(PATIENCE_MS);
+        while ((self.motors()[axis] - start).abs() as f64) < far * STEPS {
+            self.run_for_quarter();
+            assert!(self.machine.cycle() < patience, "{line} does not begin: {:?}", self.heard);
+        }
+    }
+
+    /// Runs until nothing moves or waits to. How the machine stands then.
+    pub fn rest(&mut self) -> Status {
+        for _ in 0..PATIENCE_MS / 100 {
+            let before = self.machine.recorder().steps();
+            self.run_for_ms(100);
+            let status = self.status();
+            if status.state != "Run" && self.machine.recorder().steps() == before {
+                return status;
+            }
+        }
+        panic!("it does not come to rest: {:?}", self.heard);
+    }
+
+    /// Cuts a line.
+    pub fn cut(&mut self, line: &str) -> Cut {
+        let (start, since) = (self.motors(), self.turns());
+        self.take(line);
+        let status = self.rest();
+        assert_eq!(status.state, "Idle", "{line}: {:?}", self.heard);
+        Cut { start, end: self.motors(), indexed: self.indexed(since) }
+    }
+
+    /// Where the machine says that X and Z are, mm, is where its motors are, to the step.
+    pub fn agrees(&self, status: &Status, why: &str) {
+        for (told, steps) in status.at.into_iter().zip(self.motors()) {
+            let off = (told * STEPS - steps as f64).abs();
+            // The report has three digits, and a step five thousandths.
+            assert!(off < 1e-6, "{status:?}, the motors at {:?}: {why}", self.motors());
+        }
+    }
+
+    /// Leads the machine out of an alarm, and both axes back to 0.
+    pub fn recover(&mut self) {
+        self.take(if self.grbl { "$X" } else { "{clear:n}" });
+        self.take("g90 g53 g0 x0 z0");
+        self.rest();
+        assert_eq!(self.motors(), [0, 0], "the way back");
+    }
+
+    /// How often an exception was told, by its number in TinyG's dialect, or its line in grbl's; and forgets what was heard.
+    pub fn told(&mut self, exception: u16, line: &str) -> usize {
+        let token = if self.grbl { line.to_string() } else { format!("\"st\":{exception},") };
+        let is_it =
+            |one: &&String| (self.grbl || one.starts_with("{\"er\"")) && one.contains(&token);
+        self.heard.iter().filter(is_it).count()
+    }
+
+    /// The exceptions that were told, as they stand; in grbl's dialect alarms and messages.
+    pub fn exceptions(&self) -> Vec<&str> {
+        let begins = if self.grbl { ["ALARM:", "[MSG:"] } else { ["{\"er\"", "{\"er\""] };
+        let is_one = |one: &&String| begins.iter().any(|begin| one.starts_with(begin));
+        self.heard.iter().filter(is_one).map(String::as_str).collect()
+    }
+
+    /// Forgets what was heard.
+    pub fn forget(&mut self) {
+        self.heard.clear();
+    }
+}
+
+/// The number behind a name.
+fn number(text: &str, name: &str) -> f64 {
+    let (_, rest) = text.split_once(name).unwrap_or_else(|| panic!("no {name} in {text}"));
+    rest.split([',', '}', '|', '>']).next().unwrap().parse().unwrap()
+}
+
+fn tinyg_status(answer: &str, took_ms: f64) -> Status {
+    let state = match number(answer, "\"stat\":") as u8 {
+        2 | 11 | 13 => "Alarm",
+        5 => "Run",
+        6 => "Hold",
+        _ => "Idle",
+    };
+    let at = [number(answer, "\"mpox\":"), number(answer, "\"mpoz\":")];
+    Status { state: state.to_string(), at, took_ms }
+}
+
+fn grbl_status(answer: &str, took_ms: f64) -> Status {
+    let state = answer[1..].split(['|', ':']).next().unwrap().to_string();
+    let (_, rest) = answer.split_once("MPos:").unwrap();
+    let at: Vec<f64> =
+        rest.split(['|', '>']).next().unwrap().split(',').map(|one| one.parse().unwrap()).collect();
+    Status { state, at: [at[0], at[2]], took_ms }
+}
