@@ -8,7 +8,6 @@ mod common;
 #[allow(dead_code)]
 mod turning;
 
-use common::firmware;
 use kerf::boards::{Board, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
 use kerf_sim::mechanics::{Bounce, Sensors};
 

@@ -85,8 +85,8 @@ pub struct Spindle {
 pub struct Sensors {
     /// Sees a mark in a turn, at angle 0.
     pub index: Pin,
-    /// Sees so many.
-    pub sync: Pin,
+    /// Sees so many; `None` if there is no such sensor, and no second one.
+    pub sync: Option<Pin>,
     /// Sees the same marks half of their width behind it.
     pub second: Option<Pin>,
     /// See `sync`.
@@ -109,7 +109,7 @@ impl Sensors {
         let encoder = board.encoder?;
         Some(Sensors {
             index: encoder.index,
-            sync: encoder.sync,
+            sync: Some(encoder.sync),
             second: encoder.second,
             per_turn,
             index_width: 0.02,

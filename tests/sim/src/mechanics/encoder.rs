@@ -66,25 +66,24 @@ impl Encoder {
             Line { pin, marks, first, width, high, edges, miss }
         };
         let marks = f64::from(build.per_turn);
-        let mut lines = vec![
-            line(build.index, 1.0, 0.0, build.index_width),
-            line(build.sync, marks, build.phase, build.width / marks),
-        ];
-        if let Some(second) = build.second {
-            let behind = build.phase + 0.5 * build.width / marks;
-            lines.push(line(second, marks, behind, build.width / marks));
-        }
+        let behind = build.phase + 0.5 * build.width / marks;
+        let sync = [(build.sync, build.phase), (build.second, behind)].into_iter();
+        let sync = sync.map_while(|(pin, at)| Some(line(pin?, marks, at, build.width / marks)));
+        let index = line(build.index, 1.0, 0.0, build.index_width);
+        let lines = std::iter::once(index).chain(sync).collect();
         Encoder { build, lines }
     }
 
     /// Leaves out a pulse: the next but so many. Of the index if `index`, else of sync.
     pub fn miss(&mut self, index: bool, after: u64) {
-        self.lines[usize::from(!index)].miss = Some(after);
+        if let Some(line) = self.lines.get_mut(usize::from(!index)) {
+            line.miss = Some(after);
+        }
     }
 
     /// A pulse too many, of so many cycles. False if the sensor sees a mark at that time, so that it is none.
     pub fn add(&mut self, index: bool, at: u64, cycles: u64) -> bool {
-        let line = &mut self.lines[usize::from(!index)];
+        let Some(line) = self.lines.get_mut(usize::from(!index)) else { return false };
         let before = line.edges.iter().take_while(|(edge, _)| *edge <= at).last();
         let first = line.edges.front();
         let is_free = match (before, first) {

@@ -78,6 +78,10 @@ impl Side for Machine {
         }
         if pulses > 0 {
             build.spindle.sensors = Sensors::of(self.board(), pulses);
+            if let Some(sensors) = build.spindle.sensors.as_mut().filter(|_| pulses == 1) {
+                // With a single pulse there is the index alone, as on the host.
+                sensors.sync = None;
+            }
             // It turns by `turn_spindle` alone.
             build.spindle.rpm = 0.0;
         }

@@ -6,7 +6,7 @@ use kerf::boards::{Board, MEGA2560_GRBL_LATHE};
 use kerf_sim::mechanics::{Build, Sensors};
 use kerf_sim::{AUX, Machine};
 
-use super::firmware;
+use crate::common::firmware;
 
 /// Steps of X and Z in a millimetre.
 pub const STEPS: f64 = 200.0;
@@ -206,15 +206,23 @@ impl Lathe {
         }
     }
 
-    /// Asks on the other port, which has to answer within so many ms.
-    pub fn ask_other_port(&mut self, ms: u64) {
+    /// Asks on the other port. How long the answer took, ms.
+    pub fn ask_other_port(&mut self) -> f64 {
         let (question, answer): (&[u8], &str) =
             if self.grbl { (b"?", "<") } else { (b"{mpoz:n}\n", "mpoz") };
         drop(self.machine.receive_from(AUX));
         self.machine.send_to(AUX, question);
-        self.run_for_ms(ms);
-        let heard = String::from_utf8(self.machine.receive_from(AUX)).unwrap();
-        assert!(heard.contains(answer), "the second port hears {heard:?}");
+        let asked = self.machine.cycle() + question.len() as u64 * BYTE;
+        let mut heard = Vec::new();
+        loop {
+            self.run_for_quarter();
+            heard.extend(self.machine.receive_from(AUX));
+            let took = self.machine.cycle().saturating_sub(asked);
+            if String::from_utf8_lossy(&heard).contains(answer) {
+                return self.machine.seconds(took) * 1e3;
+            }
+            assert!(took < self.machine.cycles(PATIENCE_MS), "nobody answers the second port");
+        }
     }
 
     /// The motors of X and Z, in steps.
@@ -273,13 +281,10 @@ impl Lathe {
         Cut { start, end: self.motors(), indexed: self.indexed(since) }
     }
 
-    /// Where the machine says that X and Z are, mm, is where its motors are, to the step.
+    /// Where the machine says that X and Z are, in steps, is where its motors are. A line may have ended between two steps.
     pub fn agrees(&self, status: &Status, why: &str) {
-        for (told, steps) in status.at.into_iter().zip(self.motors()) {
-            let off = (told * STEPS - steps as f64).abs();
-            // The report has three digits, and a step five thousandths.
-            assert!(off < 1e-6, "{status:?}, the motors at {:?}: {why}", self.motors());
-        }
+        let told = status.at.map(|at| (at * STEPS).round() as i64);
+        assert_eq!(told, self.motors(), "{status:?}: {why}");
     }
 
     /// Leads the machine out of an alarm, and both axes back to 0.
