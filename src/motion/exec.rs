@@ -705,7 +705,7 @@ impl Exec {
         }
     }
 
-    /// Whether a pass in step with the spindle is to end at once, in the midst of the cut: for an alarm.
+    /// Whether a pass in step with the spindle is to end at once, in the midst of the cut: for an alarm, or as the program is killed.
     #[inline(always)]
     pub fn break_off(&mut self, at_once: bool) {
         self.breaks_off = at_once;

@@ -349,7 +349,7 @@ fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
         // The planner waits for it.
         flags::set(Event::BlockDone);
     }
-    exec.break_off(machine::is_alarmed());
+    exec.break_off(machine::is_alarmed() || machine::is_killing());
 }
 
 /// The pass has been left, for this reason.

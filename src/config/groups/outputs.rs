@@ -61,7 +61,7 @@ group! {
             "How long contacts of the encoder bounce: a pulse counts if its pin has been still for so long before.";
         R "r": shift(1_000_000).with(IDLE), 0,
             length(text!("spindle thread retract"), NONE),
-            "How far X leaves the cut when a thread ends before its time: the spindle is lost, the error is above `spl`, or a feedhold comes. Below 0 towards lower X. G76 goes to the side of its drive line whatever the sign. 0 has the axes stop in the cut, and a feedhold wait for the end of the pass.";
+            "How far X leaves the cut when a thread ends before its time: the spindle is lost, the error is above `spl`, or a feedhold comes. Below 0 towards lower X. G76 goes to the side of its drive line whatever the sign. X goes 32,767 steps at most. 0 has the axes stop in the cut, and a feedhold wait for the end of the pass.";
         L "l": up_to(cold(3), 100_000).with(UNIT | IDLE), 0,
             length(text!("spindle thread error limit"), NONE),
             "How far the axes of a thread may be from where the spindle says, once they have been there; beyond that is an alarm (46). 0 for no limit.";

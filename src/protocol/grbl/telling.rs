@@ -138,6 +138,7 @@ fn exception(status: Status, machine: &mut impl Machine, out: &mut impl Out) {
 #[small]
 fn spindle(status: Status, out: &mut impl Out) {
     match status {
+        Status::PulseMisfit => message(out, text!("Spindle pulses do not fit")),
         Status::SpindleLost => message(out, text!("Spindle lost in a thread")),
         Status::SpindleError => message(out, text!("Thread too far off")),
         Status::WrongWay => message(out, text!("Spindle turns the wrong way")),

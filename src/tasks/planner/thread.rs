@@ -50,6 +50,9 @@ const ANY_FEED: f32 = 1e6;
 /// Corners as sharp as any are taken at speed, mm/s^2.
 const ANY_CORNER: f32 = 1e7;
 
+/// The most steps that X leaves the cut by.
+const WAY_MAX: i32 = i16::MAX as i32;
+
 /// A line of a pass.
 pub(super) struct Piece {
     pub target: PerAxis<Length>,
@@ -104,7 +107,10 @@ impl Planner {
                 Err(status) => return self.refuse(status),
             };
             if !cuts {
-                return;
+                return match self.check_cycle(turn) {
+                    Ok(()) => {}
+                    Err(status) => self.refuse(status),
+                };
             }
             match self.begin_pass(turn) {
                 Ok(true) => {}
@@ -286,17 +292,19 @@ impl Planner {
             return Retract::NONE;
         }
         let mut retract = Retract::NONE;
+        let mut whole = 0;
         for motor in (0..MOTORS).filter(|motor| moved_by(&settings, *motor) == X) {
             let ratio = settings.step_ratio(motor);
             let way = ratio.steps(Length(end)).wrapping_sub(ratio.steps(x));
-            let Ok(way) = i16::try_from(way) else { return Retract::NONE };
             // Motors of an axis go alike, or the axis stays.
-            if way == 0 || retract.is_some() && retract.way != way {
+            if way == 0 || retract.is_some() && whole != way {
                 return Retract::NONE;
             }
-            (retract.way, retract.motors) = (way, retract.motors | 1 << motor);
+            whole = way;
+            retract.way = way.clamp(-WAY_MAX, WAY_MAX) as i16;
+            retract.motors |= 1 << motor;
         }
-        let per_mm = f32::from(retract.way.unsigned_abs()) / (end.abs_diff(x.0) as f32 * 1e-4);
+        let per_mm = whole.unsigned_abs() as f32 / (end.abs_diff(x.0) as f32 * 1e-4);
         let velocity = MachineLimits::velocity_max(&*settings, 0) * (1.0 / 60.0);
         let jerk = MachineLimits::jerk_max(&*settings, 0) * PER_SECOND_CUBED;
         let accel = mean_accel(
@@ -334,6 +342,21 @@ impl Planner {
             late.then_some(Err(if seen < ENOUGH { Status::NoIndex } else { Status::NoSync }))
         })
         .await
+    }
+
+    /// Whether the passes of G76 can be made, with so many counts a turn: before X goes to the first. How fast X is in a taper is looked at there.
+    #[inline(never)]
+    #[small]
+    fn check_cycle(&self, turn: u32) -> Result<(), Status> {
+        let commands = self.links.commands.borrow();
+        let Motion::ThreadCycle(cycle) = &commands.motion else { return Ok(()) };
+        if !self.turns_as_told() {
+            return Err(Status::WrongWay);
+        }
+        let [_, _, z, ..] = &self.dynamics.axes;
+        let turns_per_s = COUNTS_PER_S as f32 / turn as f32;
+        let is_fast = cycle.lead.0 as f32 * 1e-4 * turns_per_s > z.feed;
+        if is_fast { Err(Status::VelocityExceeded) } else { Ok(()) }
     }
 
     /// Tells exec of the pass, with so many counts a turn, and puts its limits into force. False if it goes nowhere.
