@@ -382,12 +382,14 @@ fn settings_may_change_often() {
 
 /// What is not so here, by the beginnings of names. More rates of the line can be made (`baud`), steps may come faster (`rates`, `settings-motor`,
 /// `grbl-settings`), no port has RTS and CTS (`ports-pins`), the sensors of a spindle have pins of their own
-/// (`encoder`), and no second one tells the direction (`thread-direction`), settings are kept sooner (`stored`), and the boot loader, which is in ROM, is not emulated (`boot-loader`).
-const DIFFERS: [&str; 9] = [
+/// (`encoder`), and no second one tells the direction (`thread-direction`, `lathe-tap-fails`, `grbl-lathe-cycles`), settings are kept sooner (`stored`), and the boot loader, which is in ROM, is not emulated (`boot-loader`).
+const DIFFERS: [&str; 11] = [
     "baud",
     "boot-loader",
     "encoder",
+    "grbl-lathe-cycles",
     "grbl-settings",
+    "lathe-tap-fails",
     "ports-pins",
     "rates",
     "settings-motor",
