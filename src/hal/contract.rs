@@ -120,7 +120,7 @@ contract! {
         /// Whether the chip sees that a program opens the first port: by its own USB. Any level.
         fn sees_opening() -> bool;
         /// Whether a program has opened the first port since the last call, but for the first one, which hears the greeting of the start. It
-        /// comes with [`Event::Realtime`](super::event::Event::Realtime). Thread mode.
+        /// comes with [`Event::Realtime`](crate::hal::event::Event::Realtime). Thread mode.
         fn take_opened() -> bool;
         /// Line ends lost since start-up, modulo 2^16. Thread mode.
         fn lost_ends(port: u8) -> u16;
