@@ -136,6 +136,12 @@ impl Encoder {
         Self { per_turn, time, turn, ..Self::new() }
     }
 
+    /// It, with pulses that tell the direction.
+    #[cfg(test)]
+    pub fn that_tells(self, tells: bool) -> Self {
+        Self { seen: if tells { self.seen | TELLS } else { self.seen }, ..self }
+    }
+
     /// Pulses of sync in a turn; 0 for no encoder.
     pub fn per_turn(&self) -> u16 {
         self.per_turn

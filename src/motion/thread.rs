@@ -56,6 +56,9 @@ const FORWARD: f32 = 0.85;
 /// A spindle that turns round has so long between two pulses, counts: 6 s.
 const PATIENCE: f32 = COUNTS_PER_S as f32 * 6.0;
 
+/// What is queued lasts so many counts at most, 16 ms.
+const QUEUED: f32 = COUNTS_PER_S as f32 * 0.016;
+
 /// CPU cycles of a count.
 const CYCLES: u32 = TIMER_HZ / COUNTS_PER_S;
 
@@ -333,8 +336,7 @@ impl Thread {
         let age = time.wrapping_sub(self.at) as f32;
         let overdue = match self.stage {
             Stage::Turning | Stage::Top | Stage::Turned | Stage::Waits => PATIENCE,
-            // The speed has not been measured since it turned round, and grows from nothing.
-            _ if matches!(self.kind, Kind::Tap { window: 0, .. }) => PATIENCE,
+            _ if self.starts_back() => PATIENCE,
             _ => OVERDUE * self.interval + SLACK,
         };
         if self.stage >= Stage::Follows && self.stage < Stage::Lost && age > overdue {
@@ -353,6 +355,16 @@ impl Thread {
 
     fn follows(&self) -> bool {
         matches!(self.stage, Stage::Follows | Stage::Met)
+    }
+
+    /// Whether the spindle has turned round and changes its speed so much from pulse to pulse that the time between two tells nothing of the next.
+    #[inline(never)]
+    fn starts_back(&self) -> bool {
+        match self.kind {
+            Kind::Tap { window: 0, .. } => true,
+            Kind::Tap { decel, .. } => size(decel) * self.interval * self.interval > 0.25,
+            Kind::Pass { .. } => false,
+        }
     }
 
     /// mm a pulse.
@@ -376,10 +388,12 @@ impl Thread {
     /// So many pulses have come, the last of them `at` this time.
     #[inline(never)]
     fn take(&mut self, new: u8, at: u32) {
-        let passed = at.wrapping_sub(self.at) as f32 / self.interval;
+        let after = at.wrapping_sub(self.at) as f32;
+        let (rate, decel) = self.pace();
+        let passed = (rate - 0.5 * decel * after) * after;
         let mut true_count = f32::from(new);
         let off = passed - true_count;
-        if !(-MISFIT..=MISFIT).contains(&off) && passed < 100.0 {
+        if !self.starts_back() && !(-MISFIT..=MISFIT).contains(&off) && passed < 100.0 {
             let fits = (passed + 0.5) as u16;
             self.mended = self.mended.saturating_add((fits as u8).wrapping_sub(new) as i8);
             true_count = f32::from(fits);
@@ -432,8 +446,8 @@ impl Thread {
         let way =
             if tells { f32::from(new as i8) + 1.0 } else { (rate - 0.5 * decel * after) * after };
         self.ahead += self.pitch() * way;
-        // No slower than a pulse in the time that it took.
-        self.interval = least(after, 1.0 / greater(back, 1e-9));
+        // Where it is not known how it slows down, as if it had gone a pulse in that time.
+        self.interval = if back > 0.0 { 1.0 / back } else { after };
         (self.at, self.since, self.measured) = (at, at, 0);
         if let Kind::Tap { decel, window, .. } = &mut self.kind {
             // The speed is that of this moment.
@@ -463,14 +477,20 @@ impl Thread {
         let late = end.wrapping_sub(self.at.wrapping_mul(CYCLES)) as i32;
         let counts = late as f32 * (1.0 / CYCLES as f32);
         let (rate, decel) = self.pace();
-        let speed = self.pitch() * COUNTS_PER_S as f32 * (rate - decel * counts);
-        let mut way = self.ahead + self.pitch() * (rate - 0.5 * decel * counts) * counts;
+        let mut speed = self.pitch() * COUNTS_PER_S as f32 * (rate - decel * counts);
+        let mut gone = (rate - 0.5 * decel * counts) * counts;
         if self.stage == Stage::Turning && speed < SLOWEST {
             self.stage = Stage::Top;
         }
         if self.rests() {
             return 0.0;
         }
+        // A spindle that turns round may stop dead: it is not beyond the next pulse until that comes.
+        let most = rate * QUEUED + 1.0;
+        if self.stage == Stage::Turning && gone > most {
+            (gone, speed) = (most, 0.0);
+        }
+        let mut way = self.ahead + self.pitch() * gone;
         if self.stage == Stage::Known {
             // What 4 ms bring is made up for.
             while way > 0.004 * speed {
@@ -515,7 +535,7 @@ mod tests {
     /// A stretch, counts and s.
     const STRETCH: u32 = COUNTS_PER_S / 500;
     /// How far what is queued is ahead of now, counts.
-    const QUEUED: u32 = 2_000;
+    const AHEAD: u32 = 2_000;
 
     /// A spindle at a steady speed, and axes that are as fast as they are told within their acceleration.
     struct Pass {
@@ -546,7 +566,7 @@ mod tests {
                 missing,
                 extra,
             };
-            pass.thread.anchor(begin as u32, QUEUED * CYCLES);
+            pass.thread.anchor(begin as u32, AHEAD * CYCLES);
             pass
         }
 
@@ -601,7 +621,7 @@ mod tests {
 
         /// Where the axes are against the line when what is queued ends, in turns.
         fn phase(&self) -> f64 {
-            let angle = (self.time + u64::from(QUEUED)) as f64 / f64::from(self.turn);
+            let angle = (self.time + u64::from(AHEAD)) as f64 / f64::from(self.turn);
             let phase = self.way - angle;
             phase - phase.round()
         }
@@ -664,8 +684,8 @@ mod tests {
         }
     }
 
-    /// A spindle of 300 turns a minute is told to turn round the part `phase` of the way between two pulses behind a mark, and does within a second. Whether it is lost.
-    fn loses_what_turns_round(per_turn: u16, phase: f64) -> bool {
+    /// A spindle of 300 turns a minute is told to turn round the part `phase` of the way between two pulses behind a mark, and does within a second. Whether it is lost, or the way back is not that of its pulses.
+    fn loses_what_turns_round(per_turn: u16, tells: bool, phase: f64) -> bool {
         let per_second = f64::from(COUNTS_PER_S);
         let rate = 5.0 * f64::from(per_turn);
         // It is told at this time, s, and slows down by twice its speed in a second.
@@ -684,9 +704,9 @@ mod tests {
             kind: Kind::Tap { turn_at: 0.0, decel: 0.0, window: interval as u16 },
             ..Thread::new()
         };
-        thread.anchor(0, QUEUED * CYCLES);
-        let (mut time, mut count, mut sync_at, mut last, mut told_so) =
-            (0u64, 0u16, 0u64, 0.0, false);
+        thread.anchor(0, AHEAD * CYCLES);
+        let (mut time, mut count, mut sync_at, mut last) = (0u64, 0u16, 0u64, 0.0);
+        let (mut told_so, mut mirrored) = (false, false);
         let end = ((told + 1.0) * per_second) as u64;
         while time < end {
             if time as f64 > told * per_second && !told_so {
@@ -695,30 +715,42 @@ mod tests {
             for at in time + 1..=time + u64::from(STRETCH) {
                 let mark = place(at).floor();
                 if mark != last {
-                    (count, sync_at, last) = (count.wrapping_add(1), at, mark);
+                    let one = if tells && mark < last { u16::MAX } else { 1 };
+                    (count, sync_at, last) = (count.wrapping_add(one), at, mark);
                 }
             }
             time += u64::from(STRETCH);
-            let pulses =
-                Pulses { now: time as u16, sync: count, sync_at: sync_at as u16, ..Pulses::NONE };
-            let encoder = Encoder::at(time as u32, per_turn, COUNTS_PER_S / 5);
-            thread.note(&pulses, &encoder);
+            let sync = if mirrored { count.wrapping_neg() } else { count };
+            let pulses = Pulses { now: time as u16, sync, sync_at: sync_at as u16, ..Pulses::NONE };
+            let encoder = Encoder::at(time as u32, per_turn, COUNTS_PER_S / 5).that_tells(tells);
+            if thread.note(&pulses, &encoder) && tells {
+                thread.mirror();
+                mirrored = true;
+            }
             thread.velocity(0, 0.0, ACCEL, false);
             thread.queued(STRETCH * CYCLES, false);
             if thread.drop_rest() {
                 thread.turn_back();
             }
         }
-        thread.fault().is_some()
+        let way = -thread.ahead * f32::from(per_turn);
+        // Behind the mark that it has come back over.
+        let off = way - (last + 1.0) as f32;
+        thread.fault().is_some() || off.abs() > if tells { 0.01 } else { 1.01 }
     }
 
     #[test]
     fn a_spindle_that_turns_round_is_not_lost_wherever_it_does() {
-        for per_turn in [4, 20, 100] {
+        for (per_turn, tells) in
+            [(4, false), (20, false), (100, false), (4, true), (20, true), (100, true)]
+        {
             let lost: Vec<u32> = (0..100)
-                .filter(|n| loses_what_turns_round(per_turn, f64::from(*n) * 0.01))
+                .filter(|n| loses_what_turns_round(per_turn, tells, f64::from(*n) * 0.01))
                 .collect();
-            assert!(lost.is_empty(), "{per_turn} pulses a turn: {lost:?} hundredths behind a mark");
+            assert!(
+                lost.is_empty(),
+                "{per_turn} pulses a turn, {tells}: {lost:?} hundredths behind a mark"
+            );
         }
     }
 

@@ -115,6 +115,35 @@ fn a_spindle_that_stops_dead_on_the_way_in_stops_a_tap() {
 }
 
 #[test]
+fn a_spindle_that_stops_dead_while_it_turns_round_stops_a_tap() {
+    // A pulse, what is queued, and the ramp, at a speed to which it has not slowed down; and a creep of 0.01 mm/s.
+    let most = 1.1 / f64::from(MARKS) + SPEED * 0.02 + SPEED * SPEED / 1_000.0 + 0.01;
+    let slowed = |lathe: &mut Lathe| {
+        let mut rpm = RPM;
+        lathe.machine.tamper(|mechanics, now| rpm = mechanics.spindle_rpm(now));
+        rpm < 0.9 * RPM
+    };
+    for board in BOARDS {
+        for later in [0, 20, 200, 350] {
+            let mut lathe = driven(board);
+            lathe.begin(TAP, Z, 4.0);
+            while !slowed(&mut lathe) {
+                lathe.run_for_ms(1);
+            }
+            lathe.run_for_ms(later);
+            lathe.machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
+            let at = lathe.motors()[Z];
+            lathe.run_for_ms(1_000);
+            let went = (at - lathe.motors()[Z]) as f64 / STEPS;
+            println!("{}: {later} ms later, Z goes on by {went:.3} mm of {most:.3}", board.name);
+            assert!((0.0..=most).contains(&went), "{later}: {went}");
+            lathe.run_for_ms(6_000);
+            failed(&mut lathe, 44, "[MSG:Spindle lost in a thread]");
+        }
+    }
+}
+
+#[test]
 fn a_feed_a_turn_ends_with_the_spindle_and_waits_six_seconds() {
     for board in BOARDS {
         let mut lathe = Lathe::new(board, MARKS, |_| {});
