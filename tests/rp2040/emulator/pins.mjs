@@ -92,7 +92,7 @@ export class Spindle {
   // Edges of a turn: at which angle, in turns, a pin goes where.
   constructor(machine, { index, sync, pulses }) {
     const mark = (gpio, at, width) => [{ at, gpio, high: false }, { at: at + width, gpio, high: true }];
-    const marks = Array.from({ length: pulses }, (_, n) => mark(sync, (n + 0.5) / pulses, WIDTH / pulses));
+    const marks = Array.from({ length: pulses > 1 ? pulses : 0 }, (_, n) => mark(sync, (n + 0.5) / pulses, WIDTH / pulses));
     this.edges = [mark(index, 0, INDEX_WIDTH), ...marks].flat().sort((a, b) => a.at - b.at);
     this.machine = machine;
     // Turns up to a cycle, turns a cycle from there on, and the edge that comes next.
