@@ -4,7 +4,7 @@
 //! asks for a first sample after [`FIRST_US`]; two samples in a row that agree, [`SOON_US`] apart, are believed. So
 //!
 //! - a pulse shorter than [`SOON_US`] is never believed, one longer than both times always;
-//! - a switch is believed 11 us after its edge, if nothing else has happened in the last [`LATER_US`], and
+//! - a switch is believed that long and [`FIRST_US`] after its edge, if nothing else has happened in the last [`LATER_US`], and
 //!   after 300 us in any case;
 //! - it is not asked again for [`LOCK_MS`] after that, so that its bouncing is one event, and then believed
 //!   as it stands.
@@ -13,10 +13,12 @@
 //! the CPU. While no switch moves nobody looks. Sets of switches are bits, as in
 //! [`inputs`](crate::boards::inputs).
 
+use crate::hal::SAMPLES_APART_US;
+
 /// From an edge to a sample, microseconds.
 pub const FIRST_US: u32 = 1;
 /// From there to the next.
-pub const SOON_US: u32 = 10;
+pub const SOON_US: u32 = SAMPLES_APART_US;
 /// Between samples while a switch is locked, and after one that found nothing.
 pub const LATER_US: u32 = 125;
 /// How long a switch that has changed is not asked again; up to twice that if others change meanwhile.

@@ -2,10 +2,10 @@
 //!
 //! | interrupt | does |
 //! |---|---|
-//! | IO_IRQ_BANK0, priority 0 | an edge: a sample is due in a microsecond; edges of the encoder |
+//! | IO_IRQ_BANK0, priority 0 | an edge: a sample; edges of the encoder |
 //! | TIMER_IRQ_1, priority 0 | a sample of all pins, as [`Switches`] wants it |
 //!
-//! While no switch moves none of them comes. A limit stops the steps right there, 18 us after its edge at most, of which 11 pass between the edge and the second sample. The place of a contact is where the
+//! While no switch moves none of them comes. A limit stops the steps right there, 9 us after its edge at most, of which 4 pass between the two samples. The place of a contact is where the
 //! generator's words were at the first of two samples; the feeder works it out ([`stepper::contact`]).
 
 use core::cell::UnsafeCell;
@@ -144,7 +144,11 @@ pub(super) extern "C" fn edges() {
         encoder::edges(changed);
     }
     if changed & !encoder::watched() != 0 {
-        with(State::ask);
+        with(|state| {
+            if !state.due {
+                sample(state);
+            }
+        });
     }
 }
 
