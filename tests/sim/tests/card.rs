@@ -293,3 +293,25 @@ fn a_pause_a_flush_and_a_card_that_is_pulled_end_it() {
     assert!(printer.ask("M24").is_empty());
     printer.until("Done printing file\n", 60_000);
 }
+
+#[test]
+fn a_print_begins_at_a_byte_of_the_file_or_at_once() {
+    let text = format!("G91\nG1 F3000\n{}", "G1 X1\n".repeat(10));
+    let (size, at) = (text.len(), text.len() - 3 * 6);
+    let mut printer = Printer::new(FatType::Fat16, true, &[("A.G", text)]);
+    printer.begin("A.G");
+    for line in ["G91", "G1 F3000"] {
+        assert_eq!(printer.ask(line), "", "{line}");
+    }
+    assert_eq!(printer.ask(&format!("M26 S{at}")), "");
+    assert_eq!(printer.ask("M27"), format!("SD printing byte {at}/{size}\n"));
+    printer.ask("M24");
+    printer.until("Done printing file\n", 5_000);
+    let place = printer.ask("M114");
+    assert!(place.contains("X:3.000"), "{place}");
+    let opened = printer.ask("M32 A.G");
+    assert!(opened.contains("File selected\n"), "{opened}");
+    printer.until("Done printing file\n", 10_000);
+    let place = printer.ask("M114");
+    assert!(place.contains("X:13.000"), "{place}");
+}
