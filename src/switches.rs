@@ -13,12 +13,10 @@
 //! the CPU. While no switch moves nobody looks. Sets of switches are bits, as in
 //! [`inputs`](crate::boards::inputs).
 
-use crate::hal::SAMPLES_APART_US;
-
 /// From an edge to a sample, microseconds.
 pub const FIRST_US: u32 = 1;
-/// From there to the next.
-pub const SOON_US: u32 = SAMPLES_APART_US;
+/// From there to the next; a chip that is fast enough takes it sooner.
+pub const SOON_US: u32 = 10;
 /// Between samples while a switch is locked, and after one that found nothing.
 pub const LATER_US: u32 = 125;
 /// How long a switch that has changed is not asked again; up to twice that if others change meanwhile.

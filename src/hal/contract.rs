@@ -263,8 +263,6 @@ pub trait Timing {
     const TICKS: [Ticks; MOTORS];
     /// Shortest block with steps, s: twice what exec takes for it while the step interrupt is busy. 1/1,024 at most.
     const BLOCK_S_MIN: f32 = 0.000_75;
-    /// From one sample of the switches to the next, us: two that agree are believed, and a shorter pulse is none.
-    const SAMPLES_APART_US: u32 = 10;
     /// Blocks that can wait at once: what RAM has room for.
     const LOOK_AHEAD: usize = if cfg!(feature = "sd") && !cfg!(feature = "std") { 38 } else { 61 };
     /// Lines that can wait on a port: at most 9, for brief answers tell by one digit how many more may come.
@@ -279,8 +277,6 @@ pub const TIMER_HZ: u32 = <imp::Chip as Timing>::TIMER_HZ;
 pub const PULSE_US: u8 = <imp::Chip as Timing>::PULSE_US;
 /// [`Timing::BLOCK_S_MIN`] of the chip of this image.
 pub const BLOCK_S_MIN: f32 = <imp::Chip as Timing>::BLOCK_S_MIN;
-/// [`Timing::SAMPLES_APART_US`] of the chip of this image.
-pub const SAMPLES_APART_US: u32 = <imp::Chip as Timing>::SAMPLES_APART_US;
 /// [`Timing::LOOK_AHEAD`] of the chip of this image.
 pub const LOOK_AHEAD: usize = <imp::Chip as Timing>::LOOK_AHEAD;
 /// [`Timing::LINES`] of the chip of this image.

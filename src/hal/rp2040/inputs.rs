@@ -18,8 +18,10 @@ use super::stepper::{self, Place};
 use super::{encoder, flags, gpio, mask};
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
-use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
+use crate::switches::{FIRST_US, LATER_US, Next, Switches};
 
+/// From the first of two samples to the second: a limit stops the steps within 10 us of its edge.
+const SOON_US: u32 = 4;
 /// The alarm of the samples.
 const ALARM: usize = 1;
 /// An alarm that is due at once is missed if the time has passed before it is set.

@@ -16,8 +16,6 @@ impl Timing for Chip {
     const TICKS: [Ticks; MOTORS] = [USUAL; MOTORS];
     /// Seven in the ring are the millisecond that the feeder is ahead, and most of another.
     const BLOCK_S_MIN: f32 = 0.000_25;
-    /// So that a limit stops the steps within 10 us of its edge.
-    const SAMPLES_APART_US: u32 = 4;
     const LOOK_AHEAD: usize = 1_024;
     const LINE_BYTES: [usize; 2] = [2_088, 1_040];
 }
