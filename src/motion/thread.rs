@@ -334,11 +334,8 @@ impl Thread {
         }
         self.pulses = count;
         let age = time.wrapping_sub(self.at) as f32;
-        let overdue = match self.stage {
-            Stage::Turning | Stage::Top | Stage::Turned | Stage::Waits => PATIENCE,
-            _ if self.starts_back() => PATIENCE,
-            _ => OVERDUE * self.interval + SLACK,
-        };
+        let overdue =
+            if self.turns_unevenly() { PATIENCE } else { OVERDUE * self.interval + SLACK };
         if self.stage >= Stage::Follows && self.stage < Stage::Lost && age > overdue {
             self.stage = Stage::Lost;
         }
@@ -357,10 +354,11 @@ impl Thread {
         matches!(self.stage, Stage::Follows | Stage::Met)
     }
 
-    /// Whether the spindle has turned round and changes its speed so much from pulse to pulse that the time between two tells nothing of the next.
+    /// Whether the time between two pulses tells nothing of the next: the spindle turns round, or has, and changes its speed too much from one to the other.
     #[inline(never)]
-    fn starts_back(&self) -> bool {
+    fn turns_unevenly(&self) -> bool {
         match self.kind {
+            _ if self.stage >= Stage::Turning => true,
             Kind::Tap { window: 0, .. } => true,
             Kind::Tap { decel, .. } => size(decel) * self.interval * self.interval > 0.25,
             Kind::Pass { .. } => false,
@@ -393,7 +391,7 @@ impl Thread {
         let passed = (rate - 0.5 * decel * after) * after;
         let mut true_count = f32::from(new);
         let off = passed - true_count;
-        if !self.starts_back() && !(-MISFIT..=MISFIT).contains(&off) && passed < 100.0 {
+        if !self.turns_unevenly() && !(-MISFIT..=MISFIT).contains(&off) && passed < 100.0 {
             let fits = (passed + 0.5) as u16;
             self.mended = self.mended.saturating_add((fits as u8).wrapping_sub(new) as i8);
             true_count = f32::from(fits);
@@ -485,9 +483,9 @@ impl Thread {
         if self.rests() {
             return 0.0;
         }
-        // A spindle that turns round may stop dead: it is not beyond the next pulse until that comes.
-        let most = rate * QUEUED + 1.0;
-        if self.stage == Stage::Turning && gone > most {
+        // A spindle that turns round may stop dead: it is not far beyond the next pulse until that comes.
+        let most = rate * QUEUED + 1.7;
+        if gone > most && self.turns_unevenly() {
             (gone, speed) = (most, 0.0);
         }
         let mut way = self.ahead + self.pitch() * gone;

@@ -124,7 +124,8 @@ fn a_spindle_that_stops_dead_while_it_turns_round_stops_a_tap() {
         rpm < 0.9 * RPM
     };
     for board in BOARDS {
-        for later in [0, 20, 200, 350] {
+        // It stands 440 ms later, and turns back then.
+        for later in [0, 20, 200, 350, 480, 520, 600] {
             let mut lathe = driven(board);
             lathe.begin(TAP, Z, 4.0);
             while !slowed(&mut lathe) {
@@ -134,7 +135,7 @@ fn a_spindle_that_stops_dead_while_it_turns_round_stops_a_tap() {
             lathe.machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
             let at = lathe.motors()[Z];
             lathe.run_for_ms(1_000);
-            let went = (at - lathe.motors()[Z]) as f64 / STEPS;
+            let went = (at - lathe.motors()[Z]).abs() as f64 / STEPS;
             println!("{}: {later} ms later, Z goes on by {went:.3} mm of {most:.3}", board.name);
             assert!((0.0..=most).contains(&went), "{later}: {went}");
             lathe.run_for_ms(6_000);
