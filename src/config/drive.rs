@@ -5,7 +5,7 @@ use super::Settings;
 use super::{Owner, Setting};
 use crate::capability::Capability;
 
-/// How many drivers are told what settings say; none in an image that tells them nothing.
+/// How many drivers get their currents from settings: 0 in an image without the capability `drivers`.
 pub const DRIVERS: usize = if Capability::Drivers.is_built_in() { 4 } else { 0 };
 
 /// What settings say of a motor's driver beside its microsteps.

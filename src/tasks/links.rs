@@ -10,7 +10,7 @@
 //! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |
 //! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | parser: the port waits, response half sent; reporter: waits |
 //! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
-//! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts, but in an alarm its reason |
+//! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
 //! | [`Port::seen`] | how the machine stood when the report under way first told of motion | 1 | 33 B each port | whoever tells it on the port | the same | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
 //! | [`Links::changes`] | what the planner has to look at before the next line | a bit each | 1 B | parser, planner | planner | bits merge |
