@@ -31,7 +31,7 @@ function act(request) {
   for (const [port, hex] of request.send ?? []) machine.send(port, Buffer.from(hex, 'hex'));
   for (const [port, byte] of request.now ?? []) machine.sendNow(port, byte);
   if (request.usb) machine.talk(request.usb);
-  for (const [gpio, high] of request.drive ?? []) machine.drive(gpio, high);
+  for (const [gpio, high] of request.drive ?? []) motors.drive(gpio, high);
   if (request.wire) motors.wire(request.wire);
   if (request.drivers) drivers.wire(request.drivers);
   if (request.spindle) machine.spindle = new Spindle(machine, request.spindle);

@@ -21,11 +21,12 @@ class Pin {
     this.opens = switches[0].opens;
     this.switches = switches.map((one) => new Switch(one));
     this.motors = this.switches.map(({ motor }) => motor);
+    this.isHeld = false;
   }
-  // Whether it is high: closed is low.
+  // Whether it is high: closed is low, and so is one that somebody holds.
   isHigh(positions) {
     const worked = this.switches.map((one) => one.isWorked(positions));
-    return worked.includes(true) === this.opens;
+    return !this.isHeld && worked.includes(true) === this.opens;
   }
 }
 
@@ -81,6 +82,13 @@ export class Motors {
   }
 
   work(pin) { this.machine.drive(pin.gpio, pin.isHigh(this.positions)); }
+
+  // Somebody drives a pin. Switches that close leave it low for as long as it is held so.
+  drive(gpio, high) {
+    const pin = this.wired.find((one) => one.gpio === gpio);
+    if (pin && !pin.opens) pin.isHeld = !high;
+    this.machine.drive(gpio, high);
+  }
 }
 
 // The sensors of a spindle: they pull their pins low while marks pass. The index sees one in a turn, at its beginning; the other `pulses`, the first

@@ -384,10 +384,8 @@ fn settings_may_change_often() {
 /// What is not so here, by the beginnings of names. More rates of the line can be made (`baud`), steps may come faster (`rates`, `settings-motor`,
 /// `grbl-settings`), no port has RTS and CTS (`ports-pins`), the sensors of a spindle have pins of their own
 /// (`encoder`), and no second one tells the direction (`thread-direction`, `lathe-tap-fails`, `grbl-lathe-cycles`), settings are kept sooner (`stored`), and the boot loader, which is in ROM, is not emulated (`boot-loader`).
-/// One ends otherwise in its last probing, and nobody knows why yet (`bed-plane`).
-const DIFFERS: [&str; 12] = [
+const DIFFERS: [&str; 11] = [
     "baud",
-    "bed-plane",
     "boot-loader",
     "encoder",
     "grbl-lathe-cycles",
@@ -400,7 +398,7 @@ const DIFFERS: [&str; 12] = [
     "thread-direction",
 ];
 /// Those of a printer, and of drivers that are told by UART.
-const PRINTING: [&str; 3] = ["drivers", "heat", "reprap"];
+const PRINTING: [&str; 4] = ["bed", "drivers", "heat", "reprap"];
 
 /// An answer of a machine with 61 blocks as this one gives it, with 1,024.
 fn with_more_room(line: &str) -> String {
