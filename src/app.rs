@@ -17,7 +17,7 @@ use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::ring::Producer;
-use crate::hal::serial::{AUX, AUX_RING, AllEnds, PORTS, RX_RING, Received, USB, hardware};
+use crate::hal::serial::{AUX, AllEnds, PORTS, Received, USB, hardware};
 use crate::hal::{LINE_BYTES, stepper, uart, watchdog};
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
@@ -172,17 +172,14 @@ impl crate::hal::imp::Machine {
 /// Starts the ports and makes the links. Not inlined, as [`place()`].
 #[inline(never)]
 #[small]
-fn connect(
-    thread: Thread,
-    rate: u32,
-) -> Option<(&'static Links, Received<RX_RING>, Option<Received<AUX_RING>>)> {
+fn connect(thread: Thread, rate: u32) -> Option<(&'static Links, Received, Option<Received>)> {
     let AllEnds { usb: (received, outgoing), aux } = uart::start(rate)?;
     let mut ports = Vec::<Port, PORTS>::new();
     ports
         .push(Port::new(USB, line_bytes!(LINES_USB), Tx::new(thread, outgoing, USB, rate)))
         .ok()?;
     let aux = match (aux, hardware(AUX)) {
-        (Some((received, outgoing)), Some(board)) => {
+        (Some((received, outgoing)), Some(board)) if PORTS > 1 => {
             let tx = Tx::new(thread, outgoing, AUX, board.rate);
             ports.push(Port::new(AUX, line_bytes!(LINES_AUX), tx)).ok()?;
             Some(received)
@@ -214,8 +211,8 @@ tasks! {
     ) = exec::run;
     fn reader_task(
         links: &'static Links,
-        usb: Received<RX_RING>,
-        aux: Option<Received<AUX_RING>>
+        usb: Received,
+        aux: Option<Received>
     ) = reader::run;
     fn planner_task(links: &'static Links, planner: &'static planner::Shared) = planner::run;
     fn reporter_task(links: &'static Links, occasion: Occasion) = reporter::run;

@@ -17,7 +17,9 @@ use core::marker::PhantomData;
 use core::mem::MaybeUninit;
 use core::ops::{Deref, DerefMut};
 
+mod view;
 mod window;
+pub use view::ConsumerView;
 pub use window::Window;
 
 pub use crate::Ceiling;
@@ -25,14 +27,17 @@ pub use crate::byte::Index;
 use crate::byte::{SharedByte, SharedIndex};
 
 /// The storage. `N` is 2 to 256, or to 65,536 where an [`Index`] has 16 bits.
+///
+/// What all rings have alike lies first, so that a [`ConsumerView`] finds it whatever `N` is.
+#[repr(C)]
 pub struct Ring<T, const N: usize> {
-    slots: UnsafeCell<[MaybeUninit<T>; N]>,
     /// The slot filled last; written by the producer only.
     head: SharedIndex,
     /// The slot read last; written by the consumer only.
     tail: SharedIndex,
     /// Which ends have been taken.
     taken: SharedByte,
+    slots: UnsafeCell<[MaybeUninit<T>; N]>,
 }
 
 /// The end of the producer.
@@ -563,7 +568,8 @@ mod tests {
     #[test]
     fn what_waits_is_replaced_in_place() {
         let ring: &'static Ring<u8, 8> = Box::leak(Box::new(Ring::new()));
-        let (mut p, mut c) = ring.split().unwrap();
+        let (mut p, c) = ring.split().unwrap();
+        let mut c = c.into_view();
         for round in 0..20 {
             for byte in [round, b'x', b'y'] {
                 p.push(byte).unwrap();

@@ -5,7 +5,7 @@
 //! three bits what the reader must know. Line ends that were lost are counted besides (`imp::uart::lost_ends`),
 //! so that each lost line is answered.
 
-use super::ring::{Consumer, Producer, Window};
+use super::ring::{ConsumerView, Producer, Window};
 use crate::boards::{ACTIVE, Serial, Usart};
 
 /// How many ports there are, and the numbers of the one that every board has and of the other.
@@ -112,20 +112,20 @@ pub const fn hardware(port: u8) -> Option<Serial> {
     if port < ACTIVE.serial.len() { Some(ACTIVE.serial[port]) } else { None }
 }
 
-/// Bytes received.
-pub type Received<const N: usize> = Consumer<u8, N>;
+/// Bytes received: a view, for rings differ in size.
+pub type Received = ConsumerView<u8>;
 /// Bytes to send. Call `imp::uart::kick` after filling it.
 pub type Outgoing = Producer<u8, TX_RING>;
 
 /// The ends of a port's rings that tasks have.
-pub type Ends<const N: usize> = (Received<N>, Outgoing);
+pub type Ends = (Received, Outgoing);
 
 /// The ends of all ports.
 pub struct AllEnds {
     /// The ends of USB.
-    pub usb: Ends<RX_RING>,
+    pub usb: Ends,
     /// The ends of the second port, if the board has one.
-    pub aux: Option<Ends<AUX_RING>>,
+    pub aux: Option<Ends>,
 }
 
 /// Whether others share the line of a port, so that it must not speak unasked.

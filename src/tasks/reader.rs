@@ -20,8 +20,8 @@ use super::realtime;
 use crate::hal::event::{Event, next, set_asked};
 use crate::hal::ring::Window;
 use crate::hal::serial::{
-    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, RETURNED, RX_RING, Received, TAKEN,
-    TAKEN_RETURN, USB, high_water, is_shared, low_water,
+    AUX, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, PORTS, RETURNED, Received, TAKEN, TAKEN_RETURN,
+    USB, high_water, is_shared, low_water,
 };
 use crate::hal::uart::{self, lost_ends};
 use crate::machine;
@@ -47,17 +47,17 @@ enum Left {
 /// The task.
 pub fn run(
     links: &'static Links,
-    usb: Received<RX_RING>,
-    aux: Option<Received<AUX_RING>>,
+    usb: Received,
+    aux: Option<Received>,
 ) -> impl Future<Output = Never> {
     let mut usb = Intake::new(links.port(USB), usb);
-    let mut aux = aux.map(|received| Intake::new(links.port(AUX), received));
+    let mut aux = aux.filter(|_| PORTS > 1).map(|received| Intake::new(links.port(AUX), received));
     async move {
         loop {
             jog::passes(links);
             let left = usb.take(links);
             let aux_left = match &mut aux {
-                Some(aux) if !aux.is_idle() => aux.take(links),
+                Some(aux) if PORTS > 1 && !aux.is_idle() => aux.take(links),
                 _ => Left::Nothing,
             };
             hold::here(links);
@@ -77,9 +77,9 @@ pub fn run(
 }
 
 /// The receiving end of a port.
-struct Intake<const N: usize> {
+struct Intake {
     port: &'static Port,
-    received: Received<N>,
+    received: Received,
     /// Lost line ends that have been seen to, of `lost_ends`.
     seen: u16,
     /// Lines that are still to be refused.
@@ -94,8 +94,8 @@ struct Intake<const N: usize> {
     scan: Scan,
 }
 
-impl<const N: usize> Intake<N> {
-    fn new(port: &'static Port, received: Received<N>) -> Self {
+impl Intake {
+    fn new(port: &'static Port, received: Received) -> Self {
         let seen = lost_ends(port.number);
         let has_pins = Flow::of(port.number, 2) == Flow::Pins;
         Self {
@@ -123,7 +123,7 @@ impl<const N: usize> Intake<N> {
             self.scan.pass(taken);
         }
         let left = self.turn(links);
-        self.control_flow(self.received.len(), N, links);
+        self.control_flow(self.received.len(), self.received.size(), links);
         match left {
             Left::Placed(mark) => hold::placed(links, self.port, mark),
             Left::Aside => hold::serve(links),

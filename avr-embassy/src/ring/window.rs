@@ -2,7 +2,7 @@
 
 use core::marker::PhantomData;
 
-use super::{Consumer, Ring};
+use super::{ConsumerView, Ring};
 
 /// The bytes that wait in a ring, for code that is the same for all sizes of rings.
 pub struct Window<'a> {
@@ -32,11 +32,16 @@ impl<const N: usize> Ring<u8, N> {
     }
 }
 
-impl<const N: usize> Consumer<u8, N> {
+impl ConsumerView<u8> {
     /// What waits now.
     pub fn window(&mut self) -> Window<'_> {
-        // SAFETY: this is the consumer.
-        unsafe { self.0.window() }
+        Window {
+            slots: self.slot(0),
+            last: self.last as u8,
+            tail: self.taken(),
+            len: self.len() as u8,
+            consumer: PhantomData,
+        }
     }
 }
 

@@ -76,10 +76,10 @@ impl<const N: usize> Shared<N> {
     }
 
     /// The ends that tasks have. The others are the interrupts', which push and pop in assembly.
-    fn split(&'static self) -> Option<Ends<N>> {
+    fn split(&'static self) -> Option<Ends> {
         let (_, rx) = self.rx.split()?;
         let (tx, _) = self.tx.split()?;
-        Some((rx, tx))
+        Some((rx.into_view(), tx))
     }
 }
 

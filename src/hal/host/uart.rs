@@ -163,7 +163,7 @@ fn split<const N: usize>(
     rx: &'static Ring<u8, N>,
     tx: &'static Ring<u8, TX_RING>,
     rate: u32,
-) -> Option<Ends<N>> {
+) -> Option<Ends> {
     let (rx_in, rx_out) = rx.split()?;
     let (tx_in, tx_out) = tx.split()?;
     with(port, |line| {
@@ -172,7 +172,7 @@ fn split<const N: usize>(
     });
     set_rate(port, rate);
     set_sender_rate(port, rate);
-    Some((rx_out, tx_in))
+    Some((rx_out.into_view(), tx_in))
 }
 
 /// Goes on at `rate` bits a second.

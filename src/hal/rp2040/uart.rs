@@ -206,11 +206,11 @@ fn split<const N: usize>(
     rx: &'static Ring<u8, N>,
     tx: &'static Ring<u8, TX_RING>,
     filling: impl FnOnce(Producer<u8, N>) -> Filling,
-) -> Option<Ends<N>> {
+) -> Option<Ends> {
     let (rx_in, rx_out) = rx.split()?;
     let (tx_in, tx_out) = tx.split()?;
     with(port, |line| (line.rx, line.tx) = (Some(filling(rx_in)), Some(tx_out)));
-    Some((rx_out, tx_in))
+    Some((rx_out.into_view(), tx_in))
 }
 
 fn begin(port: u8, rate: u32) {

@@ -270,7 +270,8 @@ fn lines_in_order_leave_the_reserve() {
 fn a_control_line_overtakes_what_is_coming_in() {
     let mut pool = LinePool::new(Box::leak(Box::new([0; 40])), 16);
     let ring: &'static Ring<u8, 32> = Box::leak(Box::new(Ring::new()));
-    let (mut put, mut got) = ring.split().unwrap();
+    let (mut put, got) = ring.split().unwrap();
+    let mut got = got.into_view();
     for _ in 0..9 {
         feed(&mut pool, b"g1x1\ng1x2 y");
         take(&mut pool, true);

@@ -1,0 +1,161 @@
+//! The end of a ring that reads, without the ring's size in its type.
+
+use core::marker::PhantomData;
+use core::ptr::NonNull;
+
+use super::{Consumer, Index, Ring};
+
+/// The end of a ring that reads, for code that is the same for all sizes of rings: the program has it once.
+///
+/// A call costs some cycles more than that of a [`Consumer`].
+pub struct ConsumerView<T: 'static> {
+    /// A `Ring<T, N>`. What a `Ring<T, 1>` has lies at the same places in it, but for the slots behind the first.
+    ring: NonNull<Ring<T, 1>>,
+    /// The highest index: one less than a power of two.
+    pub(super) last: Index,
+    /// It gives out references into the ring.
+    values: PhantomData<&'static T>,
+}
+
+// SAFETY: it is a `Consumer`, which may go to another level: all that both ends touch are shared indices.
+unsafe impl<T: Send> Send for ConsumerView<T> {}
+
+impl<T: Copy, const N: usize> Consumer<T, N> {
+    /// This end without the size in its type.
+    pub fn into_view(self) -> ConsumerView<T> {
+        const { assert!(N.is_power_of_two()) };
+        ConsumerView {
+            ring: NonNull::from(self.0).cast(),
+            last: (N - 1) as Index,
+            values: PhantomData,
+        }
+    }
+}
+
+impl<T: Copy> ConsumerView<T> {
+    /// What lies before the slots.
+    fn ring(&self) -> &Ring<T, 1> {
+        // SAFETY: `Ring` is laid out as in C, so one with more slots begins as one with one.
+        unsafe { self.ring.as_ref() }
+    }
+
+    /// Where a slot is. `index` is no higher than `last`.
+    pub(super) fn slot(&self, index: Index) -> *mut T {
+        let slots = self.ring.as_ptr().wrapping_byte_add(Ring::<T, 1>::SLOTS).cast::<T>();
+        slots.wrapping_add(index.into())
+    }
+
+    fn next(&self, index: Index) -> Index {
+        index.wrapping_add(1) & self.last
+    }
+
+    /// How many places there are in the ring, one of which stays empty.
+    pub fn size(&self) -> usize {
+        usize::from(self.last) + 1
+    }
+
+    /// Number of values waiting.
+    pub fn len(&self) -> usize {
+        let ring = self.ring();
+        usize::from(ring.head.get().wrapping_sub(ring.tail.get()) & self.last)
+    }
+
+    /// Whether none waits.
+    pub fn is_empty(&self) -> bool {
+        let ring = self.ring();
+        ring.head.get() == ring.tail.get()
+    }
+
+    /// The slot taken last.
+    pub fn taken(&self) -> u8 {
+        self.ring().tail()
+    }
+
+    /// The oldest values, as many as lie side by side; empty only if none waits.
+    pub fn waiting(&self) -> &[T] {
+        // Read once: the producer may move it meanwhile.
+        let head = self.ring().head.get();
+        let tail = self.ring().tail.get();
+        let start = self.next(tail);
+        let len = match head {
+            _ if head == tail => 0,
+            _ if head >= start => usize::from(head - start) + 1,
+            _ => usize::from(self.last - start) + 1,
+        };
+        // SAFETY: `head` has moved onto or past these slots, so they are filled, and the consumer's
+        // until `tail` moves, which takes `&mut self`.
+        unsafe { core::slice::from_raw_parts(self.slot(start), len) }
+    }
+
+    /// Releases the oldest `count` values, of those that [`ConsumerView::waiting`] gave.
+    pub fn release_many(&mut self, count: u8) {
+        let count = usize::from(count).min(self.len()) as Index;
+        let tail = &self.ring().tail;
+        tail.set(tail.get().wrapping_add(count) & self.last);
+    }
+
+    /// Takes the oldest value.
+    pub fn pop(&mut self) -> Option<T> {
+        if self.is_empty() {
+            return None;
+        }
+        let after = self.next(self.ring().tail.get());
+        // SAFETY: the slot is the consumer's until `tail` moves onto it and the producer wraps.
+        let value = unsafe { self.slot(after).read() };
+        self.ring().tail.set(after);
+        Some(value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ring::Producer;
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    fn ring<const N: usize>() -> (Producer<u32, N>, ConsumerView<u32>) {
+        let ring: &'static Ring<u32, N> = Box::leak(Box::new(Ring::new()));
+        let (put, got) = ring.split().expect("first split");
+        (put, got.into_view())
+    }
+
+    /// A view tells the values of its ring in order, side by side where they are, however often it goes round.
+    fn goes_round<const N: usize>() {
+        let (mut put, mut got) = ring::<N>();
+        assert_eq!((got.size(), got.len(), got.waiting().len()), (N, 0, 0));
+        let (mut next, mut expected) = (0u32.., 0);
+        for round in 0..2 * N {
+            while put.free() > round % 2 {
+                let _ = put.push(next.next().unwrap_or(0));
+            }
+            assert_eq!(got.len(), N - 1 - round % 2);
+            let mut seen: Vec<u32> = got.waiting().to_vec();
+            got.release_many(seen.len() as u8);
+            seen.extend(core::iter::from_fn(|| got.pop()));
+            for value in seen {
+                assert_eq!(value, expected);
+                expected += 1;
+            }
+            assert!(got.is_empty() && got.pop().is_none());
+        }
+    }
+
+    #[test]
+    fn a_view_tells_all_in_order() {
+        goes_round::<2>();
+        goes_round::<64>();
+        goes_round::<256>();
+    }
+
+    #[test]
+    fn no_more_is_released_than_waits() {
+        let (mut put, mut got) = ring::<8>();
+        put.push_all(0..5);
+        got.release_many(3);
+        assert_eq!((got.taken(), got.pop()), (3, Some(3)));
+        got.release_many(9);
+        assert!(got.is_empty());
+        assert_eq!(got.taken(), 5);
+    }
+}
