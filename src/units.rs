@@ -1,5 +1,7 @@
 //! The currency between modules: exact lengths and exact decimals. No floats here.
 
+use kerf_macros::small;
+
 /// A position or distance in units of 0.1 um for a linear axis, 0.0001 degree for a rotary one.
 ///
 /// The range is +-214 m (or degrees times 1000). 0.0001 mm is exactly one unit; an inch is exactly
@@ -22,14 +24,32 @@ impl Length {
         self.0 as f32 * 1e-4
     }
 
-    /// Sum, or `None` beyond the range.
+    /// Sum, or `None` beyond the range. A call: where lines are hot the integers are added.
+    #[inline(never)]
+    #[small]
     pub fn checked_add(self, other: Length) -> Option<Length> {
         self.0.checked_add(other.0).map(Length)
     }
 
     /// Difference, or `None` beyond the range.
+    #[inline(never)]
+    #[small]
     pub fn checked_sub(self, other: Length) -> Option<Length> {
         self.0.checked_sub(other.0).map(Length)
+    }
+
+    /// Sum, or the end of the range.
+    #[inline(never)]
+    #[small]
+    pub fn saturating_add(self, other: Length) -> Length {
+        Length(self.0.saturating_add(other.0))
+    }
+
+    /// Difference, or the end of the range.
+    #[inline(never)]
+    #[small]
+    pub fn saturating_sub(self, other: Length) -> Length {
+        Length(self.0.saturating_sub(other.0))
     }
 }
 

@@ -96,7 +96,7 @@ impl Bed {
             }
             for point in &mut self.points {
                 if let Some(at) = point.get_mut(axis) {
-                    at.0 = at.0.saturating_add(to.0.saturating_sub(from.0));
+                    *at = at.saturating_add(to.saturating_sub(*from));
                 }
             }
         }
@@ -146,13 +146,13 @@ impl Bed {
     /// Z of the motors for that in machine coordinates, at a place. Cost as of [`Self::lifted`].
     #[inline(never)]
     pub fn lifted_z(&self, x: Length, y: Length, z: Length) -> Length {
-        Length(z.0.saturating_add(self.lift(x, y)))
+        z.saturating_add(Length(self.lift(x, y)))
     }
 
     /// Z in machine coordinates for that of the motors, at a place: exactly the one that would be lifted there. Cost as of [`Self::lifted`].
     #[inline(never)]
     pub fn lowered_z(&self, x: Length, y: Length, z: Length) -> Length {
-        Length(z.0.saturating_sub(self.lift(x, y)))
+        z.saturating_sub(Length(self.lift(x, y)))
     }
 }
 

@@ -173,8 +173,8 @@ impl Walk {
         let mut point = self.start;
         for (at, target) in point.iter_mut().zip(target) {
             if at != target {
-                let way = target.0.saturating_sub(at.0);
-                at.0 = at.0.saturating_add(round(way as f32 * done));
+                let way = target.saturating_sub(*at).0;
+                *at = at.saturating_add(Length(round(way as f32 * done)));
             }
         }
         point
@@ -193,7 +193,7 @@ impl Walk {
         }
         let [first, second] = arc.center;
         [(first, offset[0]), (second, offset[1])]
-            .map(|(center, offset)| Length(center.0.saturating_add(round(offset))))
+            .map(|(center, offset)| center.saturating_add(Length(round(offset))))
     }
 }
 
@@ -255,7 +255,7 @@ pub(super) fn spoke(point: &PerAxis<Length>, arc: &Arc) -> [f32; 2] {
     let [first, second] = arc.center;
     [(arc.first, first), (arc.second, second)].map(|(axis, center)| {
         let at = point.get(usize::from(axis)).copied().unwrap_or_default();
-        at.0.saturating_sub(center.0) as f32
+        at.saturating_sub(center).0 as f32
     })
 }
 
@@ -286,6 +286,8 @@ pub(super) fn norm([x, y]: [f32; 2]) -> f32 {
     math::sqrt(x * x + y * y)
 }
 
+#[inline(never)]
+#[small]
 pub(super) fn round(x: f32) -> i32 {
     (if x < 0.0 { x - 0.5 } else { x + 0.5 }) as i32
 }

@@ -11,7 +11,8 @@ use crate::status::Status;
 use crate::units::{FIRST_ROTARY, Length};
 
 /// The length that a word gives, whatever the axis.
-#[inline(always)]
+#[inline(never)]
+#[small]
 pub(super) fn length(word: &Decimal, units: Units) -> Result<Exact, Status> {
     match units {
         Units::Inch => word.inch(),

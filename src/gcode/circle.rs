@@ -134,7 +134,7 @@ impl State {
 #[small]
 fn may_be_too_far(start: &PerAxis<Length>, arc: &Arc) -> bool {
     let from = in_plane(start, arc);
-    let way = |a: Length, b: Length| a.0.saturating_sub(b.0).saturating_abs();
+    let way = |a: Length, b: Length| a.saturating_sub(b).0.saturating_abs();
     let [first, second] = arc.center;
     let radius = way(from[0], first).saturating_add(way(from[1], second));
     [first, second].iter().any(|at| at.0.saturating_abs().saturating_add(radius) == i32::MAX)

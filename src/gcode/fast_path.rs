@@ -274,7 +274,7 @@ impl<'a> Words<'a> {
             let (Some(target), Some(origin)) = (self.target.get_mut(i), from.get(i)) else {
                 return false;
             };
-            match origin.checked_add(value) {
+            match origin.0.checked_add(value.0).map(Length) {
                 Some(sum) => *target = sum,
                 None => return false,
             }

@@ -223,8 +223,8 @@ pub(super) fn arc_is_within(
         let Some((low, high)) = limits else { continue };
         let mut out = [0.0; 2];
         for (out_here, within) in [
-            (radius, center.0.saturating_add(round(radius - slack)) <= high.0),
-            (-radius, center.0.saturating_add(round(slack - radius)) >= low.0),
+            (radius, center.saturating_add(Length(round(radius - slack))) <= high),
+            (-radius, center.saturating_add(Length(round(slack - radius))) >= low),
         ] {
             if let Some(component) = out.get_mut(i) {
                 *component = out_here;

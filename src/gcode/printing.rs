@@ -239,6 +239,7 @@ impl State {
     }
 
     /// Origin and G92 of the extruder, moved.
+    #[inline(never)]
     #[small]
     fn shifted_extruder(&self, by: i32) -> Option<(Length, Length)> {
         let (origin, shift) = (self.origin.get(EXTRUDER)?, self.shift.get(EXTRUDER)?);

@@ -172,6 +172,8 @@ impl Governor {
     }
 
     /// The machine stands still.
+    #[inline(never)]
+    #[small]
     pub fn stop(&mut self) {
         (self.velocity, self.alpha) = (0.0, 0.0);
         self.rest = Rest::NONE;

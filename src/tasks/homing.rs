@@ -84,7 +84,7 @@ impl Homing {
     /// The place that is `way` from `from` towards the switch.
     pub fn towards(&self, from: Length, way: Length) -> Length {
         let upper = self.end & 1 != 0;
-        Length(if upper { from.0.saturating_add(way.0) } else { from.0.saturating_sub(way.0) })
+        if upper { from.saturating_add(way) } else { from.saturating_sub(way) }
     }
 
     /// The place that is `way` from `from` away from the switch.
@@ -127,8 +127,8 @@ pub fn of(settings: &Settings, axis: u8) -> Result<Homing, Status> {
     }
     let (low, high) = (settings.travel_min(a), settings.travel_max(a));
     let backoff = settings.latch_backoff(a);
-    let travel = high.0.saturating_sub(low.0).saturating_abs();
-    let way = Length(travel.saturating_add(backoff.0));
+    let travel = high.saturating_sub(low).0.saturating_abs();
+    let way = Length(travel).saturating_add(backoff);
     if way == Length::ZERO {
         return Err(Status::HomingTravel);
     }

@@ -40,9 +40,10 @@ const STAGES: u8 = 4;
 const RISES: u8 = PROBES + STAGES * POINTS as u8;
 
 /// How far above and below the lower end of Z the bed is looked for, without the word Z: 5 mm.
-const HEIGHT: i32 = 5 * Length::PER_MM;
+const HEIGHT: Length = Length(5 * Length::PER_MM);
 /// What Z may say: 0.5 to 50 mm.
-const HEIGHTS: core::ops::RangeInclusive<i32> = Length::PER_MM / 2..=50 * Length::PER_MM;
+const HEIGHTS: core::ops::RangeInclusive<Length> =
+    Length(Length::PER_MM / 2)..=Length(50 * Length::PER_MM);
 /// Without words nothing is probed in this part of the travel at either end.
 const MARGIN: i32 = 10;
 
@@ -321,12 +322,12 @@ fn edges(
 #[inline(never)]
 #[small]
 fn heights(block: &[u8], machine: &mut impl Machine) -> Result<[Length; 2], Trouble> {
-    let height = word(block, b'Z', machine)?.map_or(HEIGHT, |height| height.0);
+    let height = word(block, b'Z', machine)?.unwrap_or(HEIGHT);
     if !HEIGHTS.contains(&height) {
         return Err(Status::OutOfRange.into());
     }
-    let bottom = travel(2, machine).map_or(0, |[low, _]| low.0);
-    Ok([Length(bottom.saturating_sub(height)), Length(bottom.saturating_add(height))])
+    let bottom = travel(2, machine).map_or(Length::ZERO, |[low, _]| low);
+    Ok([bottom.saturating_sub(height), bottom.saturating_add(height)])
 }
 
 /// Where the machine is.

@@ -204,14 +204,14 @@ impl Planner {
         // From where, how far away from the switch, and which switches end it.
         let here = self.at(at.axis);
         // A motor may have gone as far beyond its own switch.
-        let back = Length(homing.backoff.0.saturating_add(at.beyond.0));
+        let back = homing.backoff.saturating_add(at.beyond);
         let (from, way, armed) = match at.stage {
             Stage::Clear => (here, homing.backoff, 0),
             Stage::Search => (here, Length(-homing.way.0), own | second),
             Stage::Square => (here, Length(-homing.backoff.0), (own | second) & !closed),
             Stage::Latch => (here, back, own),
             Stage::LatchSecond => (here, back, second),
-            Stage::Level => (Length(here.0.saturating_add(at.off.0)), self.squaring_offset(), 0),
+            Stage::Level => (here.saturating_add(at.off), self.squaring_offset(), 0),
             Stage::Zero | Stage::Place => (at.contact, homing.zero, 0),
         };
         if let Some(motor) = at.second.filter(|_| at.stage.is_slow()) {

@@ -57,7 +57,7 @@ impl Planner {
         for (target, (start, bottom)) in target.iter_mut().zip(ends) {
             let (from, to) = if back { (bottom, start) } else { (start, bottom) };
             let more = to.0.wrapping_sub(from.0) as f32 * beyond;
-            *target = Length(to.0.saturating_add(more as i32));
+            *target = to.saturating_add(Length(more as i32));
         }
         self.straight(&target, Some(Feed::PerMinute(ANY_FEED)));
         true

@@ -244,7 +244,7 @@ impl Planner {
         }
         let mut target = self.position;
         let out = self.retract_length();
-        let beside = Length(x.0.saturating_add(out.0));
+        let beside = x.saturating_add(out);
         let [to_x, to_y, to_z, ..] = &mut target;
         match part {
             BACK_IN => {
@@ -283,7 +283,7 @@ impl Planner {
         let length = self.retract_length();
         let settings = self.links.settings.borrow();
         let [x, ..] = self.position;
-        let mut end = x.0.saturating_add(length.0);
+        let mut end = x.saturating_add(length).0;
         if let Some((low, high)) = Setup::travel(&*settings, X) {
             end = end.max(low.0).min(high.0);
         }
