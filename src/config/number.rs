@@ -170,6 +170,8 @@ impl Number {
     }
 
     /// Whether there is nothing behind the decimal point.
+    #[inline(never)]
+    #[small]
     pub fn is_integer(self) -> bool {
         let mut digits = self.digits;
         for _ in self.exponent..0 {

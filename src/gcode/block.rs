@@ -224,6 +224,8 @@ impl Block {
     }
 
     /// The number in a slot.
+    #[inline(never)]
+    #[small]
     pub fn get(&self, slot: u8) -> Option<&Decimal> {
         self.values.iter().find(|word| word.0 == slot).map(|word| &word.1)
     }

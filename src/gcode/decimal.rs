@@ -117,11 +117,15 @@ impl Decimal {
     }
 
     /// Whether it is 0.
+    #[inline(never)]
+    #[small]
     pub fn is_zero(&self) -> bool {
         self.whole == 0 && self.frac == 0 && self.tail == 0
     }
 
     /// The number as a whole number: 110 if negative, 102 with decimals.
+    #[inline(never)]
+    #[small]
     pub fn integer(&self) -> Result<u32, Status> {
         match self {
             Decimal { negative: true, .. } => Err(Status::OutOfRange),
@@ -139,6 +143,8 @@ impl Decimal {
     }
 
     /// The number as seconds, in milliseconds: 163 if negative, 110 beyond 32 bits.
+    #[inline(never)]
+    #[small]
     pub fn milliseconds(&self) -> Result<u32, Status> {
         if self.negative {
             return Err(Status::PWordNegative);
@@ -149,6 +155,8 @@ impl Decimal {
     }
 
     /// Rounded to a float: for feeds, never for positions.
+    #[inline(never)]
+    #[small]
     pub fn to_f32(self) -> f32 {
         let mut value = self.whole as f32;
         if self.frac != 0 || self.tail != 0 {

@@ -89,6 +89,8 @@ impl Control {
         self.power
     }
 
+    #[inline(never)]
+    #[small]
     fn measure(&mut self, now: i16) {
         let change = i32::from(now) - i32::from(self.last);
         let change = change.clamp(-200, 200) as i16;

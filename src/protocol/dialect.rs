@@ -434,7 +434,7 @@ macro_rules! dialects {
                 }
             }
 
-            #[inline(always)]
+            #[inline(never)]
             fn ran(&mut self, status: Status, comment: bool) {
                 match self {
                     $(#[cfg(feature = $feature)]

@@ -196,7 +196,7 @@ impl LinePool {
     }
 
     /// What to do with a line that has come whole.
-    #[inline(always)]
+    #[inline(never)]
     fn classify(&self, line: &[u8]) -> Class {
         if !self.in_order && is_control(line, self.is_plain()) {
             Class::Control
@@ -385,6 +385,8 @@ impl LinePool {
     }
 
     /// Bytes have come that are not kept.
+    #[inline(never)]
+    #[small]
     fn pass(&mut self, count: u8) {
         self.besides = self.besides.saturating_add(count.into());
     }

@@ -26,8 +26,9 @@ impl Memory for Eeprom {
     const SIZE: u16 = 4_096;
     const LOG: u16 = Self::SIZE - AREA;
 
-    /// Cost: 12 cycles.
-    #[inline(always)]
+    /// Cost: 20 cycles.
+    #[inline(never)]
+    #[small]
     fn read(&self, at: u16) -> u8 {
         while self.is_busy() {}
         // SAFETY: registers of the EEPROM, which thread mode alone touches; it is idle.

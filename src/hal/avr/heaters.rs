@@ -141,17 +141,27 @@ pub fn word(heater: u8) -> Option<u16> {
     }
     // Each with its pin as a constant.
     match heater {
-        0 => hot_end.select.map(|select| ask(|level| gpio::set(select, level))),
-        _ => bed.select.map(|select| ask(|level| gpio::set(select, level))),
+        0 => hot_end.select.map(ask),
+        _ => bed.select.map(ask),
     }
 }
 
 #[inline(always)]
-fn ask(select: impl Fn(bool)) -> u16 {
+fn ask(select: Pin) -> u16 {
+    exchange(select.port.address() as u16, 1 << select.bit)
+}
+
+/// Reads two bytes while one bit of a port is low.
+#[inline(never)]
+#[small]
+fn exchange(port: u16, bit: u8) -> u16 {
+    let port = usize::from(port) as *mut u8;
     spi::set_clock(spi::Clock::Mhz1);
-    select(false);
+    // SAFETY: the output port of a pin of the board; other levels write it with interrupts off or by single instructions.
+    avr_device::interrupt::free(|_| unsafe { port.write_volatile(port.read_volatile() & !bit) });
     let word = u16::from_be_bytes([spi::exchange(0), spi::exchange(0)]);
-    select(true);
+    // SAFETY: as above.
+    avr_device::interrupt::free(|_| unsafe { port.write_volatile(port.read_volatile() | bit) });
     word
 }
 

@@ -208,6 +208,8 @@ fn leading_number(block: &[u8]) -> i32 {
 }
 
 /// Byte `at` of the line if that is before `end`.
+#[inline(never)]
+#[small]
 pub(super) fn byte_of(line: &[u8], at: u8, end: u8) -> Option<u8> {
     line.get(usize::from(at)).copied().filter(|_| at < end)
 }
