@@ -6,7 +6,7 @@ use super::{Board, Encoder, Heater, Heaters, MotorPins, Pwm, Timer, USB, pin};
 /// Arduino Mega 2560 with RAMPS 1.4.
 pub const RAMPS14: Board = Board {
     name: "ramps14",
-    features: &["dialect-tinyg", "dialect-reprap", "probing", "printer", "corexy"],
+    features: &["dialect-tinyg", "dialect-reprap", "probing", "printer", "corexy", "bed-plane"],
     dialect: 0,
     clock_hz: 16_000_000,
     motors: &[

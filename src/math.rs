@@ -16,6 +16,13 @@ pub fn sqrt(x: f32) -> f32 {
     if (LEAST..=INFINITE).contains(&x.to_bits()) { float::sqrtf(x) } else { 0.0 }
 }
 
+/// The nearest whole number, or the end of the range.
+#[inline(never)]
+#[small]
+pub fn round(x: f32) -> i32 {
+    (if x < 0.0 { x - 0.5 } else { x + 0.5 }) as i32
+}
+
 /// Sine of an angle in radians.
 pub fn sin(x: f32) -> f32 {
     float::sinf(x)

@@ -174,7 +174,7 @@ impl Walk {
         for (at, target) in point.iter_mut().zip(target) {
             if at != target {
                 let way = target.saturating_sub(*at).0;
-                *at = at.saturating_add(Length(round(way as f32 * done)));
+                *at = at.saturating_add(Length(math::round(way as f32 * done)));
             }
         }
         point
@@ -193,7 +193,7 @@ impl Walk {
         }
         let [first, second] = arc.center;
         [(first, offset[0]), (second, offset[1])]
-            .map(|(center, offset)| center.saturating_add(Length(round(offset))))
+            .map(|(center, offset)| center.saturating_add(Length(math::round(offset))))
     }
 }
 
@@ -284,12 +284,6 @@ fn way(start: &PerAxis<Length>, target: &PerAxis<Length>, axis: u8) -> f32 {
 
 pub(super) fn norm([x, y]: [f32; 2]) -> f32 {
     math::sqrt(x * x + y * y)
-}
-
-#[inline(never)]
-#[small]
-pub(super) fn round(x: f32) -> i32 {
-    (if x < 0.0 { x - 0.5 } else { x + 0.5 }) as i32
 }
 
 #[cfg(test)]

@@ -211,7 +211,7 @@ fn radius_form(
     // 2 h / chord. To the left of the chord lies the centre of the short way counter-clockwise.
     let ratio = root(excess.max(0) as u64) / root(chord_squared as u64);
     let left = if arc.clockwise == (radius.0 < 0) { 0.5 } else { -0.5 };
-    let across = |component: i32| arc::round(component as f32 * ratio * left);
+    let across = |component: i32| math::round(component as f32 * ratio * left);
     let first = sum(from[0], chord[0] / 2).and_then(|middle| sum(middle, -across(chord[1])))?;
     let second = sum(from[1], chord[1] / 2).and_then(|middle| sum(middle, across(chord[0])))?;
     Ok([first, second])

@@ -77,7 +77,6 @@ impl Commands {
 
     /// Empties it, touching nothing but the tags: it is large.
     #[inline(never)]
-    #[small]
     pub fn clear(&mut self) {
         self.line = 0;
         self.tool = None;

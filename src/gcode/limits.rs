@@ -7,11 +7,12 @@
 
 use kerf_macros::small;
 
-use super::arc::{norm, part, round, spoke, turned};
+use super::arc::{norm, part, spoke, turned};
 use super::command::{Arc, Cycle, Motion};
 use super::setup::Setup;
 use super::threading::ThreadCycle;
 use crate::capability::Capability;
+use crate::math::round;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
 

@@ -107,7 +107,6 @@ pub fn free() -> usize {
 
 /// Blocks in the queue, with the one that runs.
 #[inline(never)]
-#[small]
 pub fn used() -> usize {
     store().ring.used()
 }

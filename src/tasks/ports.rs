@@ -235,7 +235,6 @@ impl Links {
 
     /// The port that is told what nobody asked for.
     #[inline(never)]
-    #[small]
     pub fn told(&self) -> &Port {
         let feeder = self.feeder.get();
         self.port(if is_shared(feeder) { USB } else { feeder })

@@ -20,8 +20,8 @@ use super::realtime;
 use crate::hal::event::{Event, next, set_asked};
 use crate::hal::ring::Window;
 use crate::hal::serial::{
-    AUX, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, PORTS, RETURNED, Received, TAKEN, TAKEN_RETURN,
-    USB, high_water, is_shared, low_water,
+    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, PORTS, RETURNED, RX_RING, Received,
+    TAKEN, TAKEN_RETURN, USB, high_water, is_shared, low_water,
 };
 use crate::hal::uart::{self, lost_ends};
 use crate::machine;
@@ -76,6 +76,27 @@ pub fn run(
     }
 }
 
+/// How many bytes wait in a ring when its sender is stopped, and when it may go on.
+struct Levels {
+    /// More stop it by XOFF.
+    characters: u8,
+    /// More stop it by a pin.
+    pins: u8,
+    /// With fewer it goes on.
+    low: u8,
+}
+
+impl Levels {
+    /// Those of a ring of so many bytes.
+    const fn of(ring: usize) -> Self {
+        Self {
+            characters: high_water(Flow::Characters, ring) as u8,
+            pins: high_water(Flow::Pins, ring) as u8,
+            low: low_water(ring) as u8,
+        }
+    }
+}
+
 /// The receiving end of a port.
 struct Intake {
     port: &'static Port,
@@ -123,7 +144,7 @@ impl Intake {
             self.scan.pass(taken);
         }
         let left = self.turn(links);
-        self.control_flow(self.received.len(), self.received.size(), links);
+        self.control_flow(self.received.len() as u8, links);
         match left {
             Left::Placed(mark) => hold::placed(links, self.port, mark),
             Left::Aside => hold::serve(links),
@@ -265,22 +286,25 @@ impl Intake {
 
     /// Stops the sender, or lets it go on, when so many bytes wait in a ring of so many.
     #[inline(never)]
-    fn control_flow(&mut self, waiting: usize, ring: usize, links: &Links) {
+    fn control_flow(&mut self, waiting: u8, links: &Links) {
+        let levels =
+            if self.port.number == USB { Levels::of(RX_RING) } else { Levels::of(AUX_RING) };
         if self.stopped == Flow::None && uart::is_stopped(self.port.number) {
             // By exec.
             self.stopped = Flow::Characters;
         }
         let stop = match self.stopped {
-            Flow::None if waiting <= high_water(Flow::Characters, ring) => false,
-            Flow::None => waiting > high_water(self.flow(links), ring),
-            _ => waiting >= low_water(ring),
+            Flow::None if waiting <= levels.characters => false,
+            Flow::None if self.flow(links) == Flow::Characters => true,
+            Flow::None => waiting > levels.pins,
+            _ => waiting >= levels.low,
         };
         // One that was stopped must not stay so when the setting changes.
         let flow = if stop { self.flow(links) } else { Flow::None };
         if flow != self.stopped {
             let port = self.port.number;
             // There is time to wait for the end of a line, unless it is late already.
-            let waits = waiting <= high_water(Flow::Pins, ring);
+            let waits = waiting <= levels.pins;
             uart::stop_sender(port, self.stopped, false, true);
             uart::stop_sender(port, flow, true, waits);
             self.stopped = flow;

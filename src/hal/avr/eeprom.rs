@@ -28,7 +28,6 @@ impl Memory for Eeprom {
 
     /// Cost: 20 cycles.
     #[inline(never)]
-    #[small]
     fn read(&self, at: u16) -> u8 {
         while self.is_busy() {}
         // SAFETY: registers of the EEPROM, which thread mode alone touches; it is idle.
