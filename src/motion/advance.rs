@@ -9,33 +9,42 @@
 //! ([`Advance::travel`]), within the velocity and the acceleration of the axis. Where a lead jumps, as at the end of a line that pushes, the
 //! motor so comes later than the model says.
 //!
-//! Units: phase units, s. Cost on AVR: 1,000 cycles a line, 2,500 a segment; with K 0 and no lead left 10.
+//! Units: phase units, s. Cost on AVR: 1,100 cycles a line, 3,000 a segment; with K 0 and no lead left 10.
 
 use kerf_macros::small;
 
+use super::block::{Line, PARTS_LOG2};
 use super::divide::quotient;
-use super::float::{below, greater, least, less, ratio, scaled, size, some, whole};
+use super::float::{below, greater, least, less, lesser, ratio, scaled, size, some, whole};
 use super::short::Short;
 use crate::capability::Capability;
+use crate::config::StepRatio;
 use crate::dda::STEP;
 use crate::hal::TIMER_HZ;
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
+use crate::units::Length;
 
 /// How many extruders there are.
 pub const EXTRUDERS: usize = Capability::Printer.is_built_in() as usize;
 
+/// The exponent of a step.
+const STEP_LOG2: i8 = STEP.trailing_zeros() as i8;
 /// What a unit of K is, s.
 const UNIT_S: f32 = 1e-4;
+/// No stretch counts as shorter, s.
+const SHORTEST: f32 = 1e-4;
 /// No lead is longer: 30,000 steps.
 const MOST: f32 = 1e9;
 /// A lead that may stay while others move: 1/32 step.
 const LITTLE: u32 = 1 << 10;
 
-/// What rounding takes off both ends of a line, or adds, at most: 3/16 step.
-const ROUNDING: f32 = 3.0 * STEP as f32 / 16.0;
-/// So far a mean counts at most: 32 steps.
-const ENOUGH: f32 = 32.0 * STEP as f32;
+/// Parts of what a way is counted in to which [`refine`] knows it: the logarithm of their number.
+const MORE_LOG2: u8 = 5;
+/// What rounding to 1/512 step takes off two ways, or adds.
+const ROUNDING: f32 = STEP as f32 / 256.0;
+/// How much filament a mean counts at most, in slacks: the logarithm of their number, 0.1 mm.
+const ENOUGH_LOG2: i8 = 6;
 
 /// What the extruder's lead is to be like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,11 +57,36 @@ pub struct Lead {
     pub accel: Short,
     /// How fast the motor may be with it, steps/s, not 0.
     pub velocity: Short,
+    /// By how much ways of lines that push alike differ, phase units: see [`Lead::slack`].
+    pub slack: Short,
 }
 
 impl Lead {
     /// None.
-    pub const NONE: Self = Self { motor: 0, time: 0, accel: Short::ZERO, velocity: Short::ZERO };
+    pub const NONE: Self =
+        Self { motor: 0, time: 0, accel: Short::ZERO, velocity: Short::ZERO, slack: Short::ZERO };
+
+    /// The slack of a motor with so many steps/mm: 0.0012 mm of filament, as files may have three decimals, and what parts of a step are rounded by.
+    pub fn slack(steps: f32) -> Short {
+        Short::new(steps * (12.0 * STEP as f32 / Length::PER_MM as f32) + ROUNDING)
+    }
+}
+
+/// Has a line that pushes filament say how far its extruder goes to 1/512 step, or 1/32 step where ways are in whole steps: 1/16 step, to which
+/// ends of lines are known, may be a tenth of a short line, and the lead would be off by as much. `travel` is that of its axis, in units of
+/// [`Length`].
+///
+/// Called by the planner while there is a K. Cost: 1,400.
+#[inline(never)]
+#[small]
+pub fn refine(line: &mut Line, motor: usize, ratio: StepRatio, travel: i32) {
+    let Some(&way) = line.way.get(motor) else { return };
+    if travel <= 0 {
+        return;
+    }
+    let parts = if line.extent.has_whole_steps() { MORE_LOG2 } else { MORE_LOG2 + PARTS_LOG2 };
+    let far = ratio.steps(Length(travel << parts));
+    line.extent.refine(far.wrapping_sub(in_parts(way)) as i8);
 }
 
 /// An extruder with its lead.
@@ -67,19 +101,26 @@ pub struct Advance {
     pub(super) backwards: bool,
     /// K, s.
     time: f32,
-    accel: f32,
+    /// steps/s^2.
+    accel: Short,
+    /// By how much ways of lines that push alike differ, phase units.
+    slack: Short,
     /// Its velocity limit, phase units in 256 CPU cycles.
     rate: u16,
     /// How far the motor has gone in lines that push alike, and how far they were, mm.
     pushed: (f32, f32),
     /// The lead in the block that runs, for each mm/s.
     factor: f32,
+    /// The block pushes otherwise than the one before: the lead jumps.
+    jumps: bool,
     /// How fast the lead changes.
     speed: f32,
     /// How far the motor is ahead of its line, in what has been prepared.
     made: i32,
     /// How far it is to be at the end of the stretch.
     goal: i32,
+    /// How fast that changes, phase units/s; 0 if it jumps.
+    pace: f32,
 }
 
 #[small]
@@ -91,13 +132,16 @@ impl Advance {
         motor: 0,
         backwards: false,
         time: 0.0,
-        accel: 0.0,
+        accel: Short::ZERO,
+        slack: Short::ZERO,
         rate: 0,
         pushed: (0.0, 0.0),
         factor: 0.0,
+        jumps: false,
         speed: 0.0,
         made: 0,
         goal: 0,
+        pace: 0.0,
     };
 
     /// From the next block on.
@@ -108,32 +152,40 @@ impl Advance {
         // What is left of a lead is taken back as it was made.
         if lead.time != 0 {
             self.motor = lead.motor;
-            self.accel = lead.accel.get() * f32::from(STEP);
+            self.accel = lead.accel;
+            self.slack = lead.slack;
             self.rate = whole(least(lead.velocity.get() * PER_256, 65_535.0)) as u16;
         }
         self.on = lead.time != 0 || self.made != 0;
     }
 
-    /// A block begins in which the motor goes `way` phase units forwards, 0 if it has no lead, of `length` mm. Whether there is a lead to be
-    /// made or taken back.
+    /// A block begins in which the motor goes `way` phase units forwards ([`pushed`]), 0 if it has no lead, of `length` mm. Whether there is a lead
+    /// to be made or taken back.
     #[inline(never)]
     pub fn begin(&mut self, way: u32, length: f32) -> bool {
-        self.factor = if way == 0 { 0.0 } else { self.time * self.ratio(way as f32, length) };
+        if way == 0 {
+            self.end();
+        } else {
+            self.factor = self.time * self.ratio(way as f32, length);
+        }
         some(self.factor) || !self.is_over()
     }
 
-    /// Phase units for each mm. Ends of lines are known to 1/16 step, which is much of a short line: so it is the mean of those before that
-    /// differ by no more than that.
+    /// Phase units for each mm. Files round the ends of lines, by 2 % of a short line's filament with four decimals: so it is the mean of the lines
+    /// before that differ by no more than [`Lead::slack`].
     fn ratio(&mut self, way: f32, length: f32) -> f32 {
-        let (ways, lengths) = self.pushed;
-        let off = size(way * lengths - ways * length);
-        let is_alike = below(off, ROUNDING * lengths);
-        let mut pushed = if is_alike { (ways + way, lengths + length) } else { (way, length) };
-        let mean = ratio(pushed.0, pushed.1);
-        if below(ENOUGH, pushed.0) {
-            pushed = (scaled(pushed.0, -1), scaled(pushed.1, -1));
+        let (mut ways, mut lengths) = self.pushed;
+        let slack = self.slack.get();
+        self.jumps = !below(size(way * lengths - ways * length), slack * lengths);
+        if self.jumps {
+            (ways, lengths) = (0.0, 0.0);
         }
-        self.pushed = pushed;
+        (ways, lengths) = (ways + way, lengths + length);
+        let mean = ratio(ways, lengths);
+        if below(scaled(slack, ENOUGH_LOG2), ways) {
+            (ways, lengths) = (scaled(ways, -1), scaled(lengths, -1));
+        }
+        self.pushed = (ways, lengths);
         mean
     }
 
@@ -162,7 +214,7 @@ impl Advance {
 
     /// The line ends, or nothing of it moves: there is no lead from here on.
     pub fn end(&mut self) {
-        (self.factor, self.goal) = (0.0, 0);
+        (self.factor, self.goal, self.pace) = (0.0, 0, 0.0);
     }
 
     /// The motor rests where it is, which is where its line is from now on.
@@ -177,11 +229,9 @@ impl Advance {
     pub fn aim(&mut self, velocity: f32, seconds: f32, pending: f32) {
         let end = whole(least(self.factor * velocity, MOST) + 0.5) as i32;
         let way = end - self.goal;
-        self.goal = if some(pending) && way != 0 {
-            self.goal + rounded(way as f32 * ratio(seconds, seconds + pending))
-        } else {
-            end
-        };
+        let pace = ratio(way as f32, greater(seconds + pending, SHORTEST));
+        self.goal += rounded(pace * seconds);
+        self.pace = if core::mem::take(&mut self.jumps) { 0.0 } else { pace };
     }
 
     /// How far the lead goes in each of so many ticks, towards what it is to be, signed; no more than a step.
@@ -197,26 +247,26 @@ impl Advance {
             return want;
         }
         let time = seconds(ticks, period);
-        let back = want < 0;
-        let far = want.unsigned_abs() as f32;
-        // Towards where it is to go.
-        let speed = if back { -self.speed } else { self.speed };
-        let gain = self.accel * time;
+        // How late it is, and how fast, as seen from a lead that is where it is to be: one that changes steadily is caught up with.
+        let late = want as f32 - self.pace * time;
+        let far = size(late);
+        let speed = turned(self.speed - self.pace, late);
+        let accel = scaled(self.accel.get(), STEP_LOG2);
+        let gain = accel * time;
         let (slow, fast) = (speed - gain, speed + gain);
         let next = if less(fast * time, far) {
             // From there it loses a gain at most in each segment behind this one.
-            let stops = sqrt(gain * gain + 2.0 * self.accel * far) - gain;
-            greater(if less(stops, fast) { stops } else { fast }, slow)
+            lesser(sqrt(gain * gain + 2.0 * accel * far) - gain, fast)
         } else {
-            greater(ratio(far, time), slow)
+            ratio(far, time)
         };
-        self.speed = if back { -next } else { next };
+        self.speed = self.pace + turned(greater(next, slow), late);
         per_tick(rounded(self.speed * time), ticks)
     }
 
     /// The machine rests: the lead is to be none. Whether so little is left of it that a tick takes it back.
     pub fn rest(&mut self) -> bool {
-        self.goal = 0;
+        (self.goal, self.pace) = (0, 0.0);
         let little = self.made.unsigned_abs() < LITTLE;
         if little {
             self.speed = 0.0;
@@ -242,9 +292,30 @@ impl Advance {
     }
 }
 
+/// How far the extruder goes in a line that says so ([`refine`]), phase units; 0 if it goes back or stands.
+#[inline(always)]
+pub(super) fn pushed(way: i16, line: &Line) -> u32 {
+    const LOG2: u8 = STEP_LOG2 as u8 - MORE_LOG2;
+    let far = in_parts(way) + i32::from(line.extent.more());
+    if way <= 0 || far <= 0 {
+        return 0;
+    }
+    (far as u32) << if line.extent.has_whole_steps() { LOG2 } else { LOG2 - PARTS_LOG2 }
+}
+
+/// A way in the parts that [`refine`] knows.
+fn in_parts(way: i16) -> i32 {
+    i32::from(way) << MORE_LOG2
+}
+
 /// How long so many ticks take.
 fn seconds(ticks: u16, period: u16) -> f32 {
     product(ticks, period) as f32 * (1.0 / TIMER_HZ as f32)
+}
+
+/// A number, or its negative if `sign` is negative.
+fn turned(x: f32, sign: f32) -> f32 {
+    f32::from_bits(x.to_bits() ^ (sign.to_bits() & (1 << 31)))
 }
 
 /// A number of either sign, rounded.
@@ -278,6 +349,7 @@ mod tests {
             time: 500,
             accel: Short::new(89_000.0),
             velocity: Short::new(4_400.0),
+            slack: Lead::slack(93.0),
         });
         advance
     }
@@ -318,6 +390,40 @@ mod tests {
         let rest = advance.travel(1, 16_000);
         advance.note(rest, rest, (1, 16_000));
         assert_eq!(advance.made(), 0);
+    }
+
+    #[test]
+    fn a_lead_that_is_late_catches_up_with_a_goal_that_moves() {
+        let mut advance = advance();
+        advance.begin((3.1 * f32::from(STEP)) as u32, 1.0);
+        // Without a jerk limit: from rest 2,000 mm/s^2 at once, 310 steps/s of lead.
+        let late = (1..=12u16).map(|n| {
+            let velocity = 4.0 * f32::from(n);
+            advance.aim(velocity, 0.002, 0.0);
+            0.05 * 3.1 * f64::from(velocity) - run(&mut advance, 1)[0]
+        });
+        let late: std::vec::Vec<_> = late.collect();
+        assert!(late.iter().all(|late| late.abs() < 0.5), "{late:?}");
+        assert!(late.iter().skip(8).all(|late| late.abs() < 0.02), "{late:?}");
+    }
+
+    #[test]
+    fn a_line_says_how_far_its_extruder_goes() {
+        let ratio = StepRatio { num: 93, den: 10_000 };
+        for (travel, way, length) in
+            [(67, 10i16, 0.2), (66, 10, 0.2), (66, 9, 0.2), (5_000, 46, -50.0)]
+        {
+            let mut line = Line::default();
+            line.way[3] = way;
+            line.extent = super::super::block::Extent::new(f32::abs(length), length < 0.0);
+            refine(&mut line, 3, ratio, travel);
+            let far = f64::from(pushed(way, &line)) / f64::from(STEP);
+            let off = far - f64::from(travel) * 0.0093;
+            assert!(off.abs() < if length < 0.0 { 0.016 } else { 0.001 }, "{travel}: {far}");
+            assert!((line.extent.length() / f32::abs(length) - 1.0).abs() < 2e-5);
+            assert_eq!(line.extent.has_whole_steps(), length < 0.0);
+            assert_eq!(pushed(-way, &line), 0);
+        }
     }
 
     #[test]

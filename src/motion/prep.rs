@@ -38,7 +38,7 @@
 //! Cost on AVR: 600 cycles a segment and 200 for each motor that moves; 400 for `begin`, and 300 for each
 //! motor when `k` changes.
 
-use super::advance::{Advance, EXTRUDERS, Lead};
+use super::advance::{Advance, EXTRUDERS, Lead, pushed};
 use super::block::{Line, PARTS_LOG2};
 use super::divide::{quotient, quotient_remainder};
 use super::pace::{COARSEST, Drivers, Pace, paces};
@@ -286,10 +286,7 @@ impl Prep {
         let bit = 1 << extruder.motor;
         let own = line.way.get(m).copied().unwrap_or(0);
         let travels = line.way.iter().enumerate().any(|(other, way)| other != m && *way != 0);
-        let way = match own > 0 && travels {
-            true => product(own as u16, if self.parts { PART } else { STEP }),
-            false => 0,
-        };
+        let way = if travels { pushed(own, line) } else { 0 };
         let leads = extruder.begin(way, line.extent.length()) && self.most != 0;
         if !leads {
             extruder.end();

@@ -513,6 +513,8 @@ impl Planner {
         let mut block = Move::default();
         let built = self.builder.line(&line, &self.dynamics, &*settings, &mut block);
         if let Built::Line(entry) = built {
+            #[cfg(feature = "printer")]
+            self.refine(&mut block, from, to);
             if let Ongoing::Arc(arc) = &mut self.walk {
                 arc.curve.go_on();
             }

@@ -7,6 +7,7 @@ use kerf::dda::{Dda, PHASE_MARGIN, Pins, SEGMENTS, STEP, Segment};
 use kerf::gcode::command::Feed;
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf::kinematics::{self, DIFFERENCE, SUM};
+use kerf::motion::advance;
 use kerf::motion::block::{Block, Line as Move};
 use kerf::motion::dynamics::{Dynamics, MachineLimits};
 use kerf::motion::exec::{Exec, Step};
@@ -212,7 +213,14 @@ impl Rig {
             Built::Nothing => {}
             Built::Parts(_) => panic!("too long for a test"),
             Built::Merge => unreachable!("it may not"),
-            Built::Line(entry) => assert!(self.queue.push_line(&mut block, entry, number)),
+            Built::Line(entry) => {
+                if let Some(motor) = self.leads {
+                    let axis = usize::from(self.config.drives[motor]);
+                    let travel = to[axis].0 - self.position[axis].0;
+                    advance::refine(&mut block, motor, self.config.ratio[motor], travel);
+                }
+                assert!(self.queue.push_line(&mut block, entry, number));
+            }
         }
         self.position = to;
     }

@@ -11,12 +11,12 @@ use crate::gcode::command::Motion;
 use crate::gcode::heating::{Heat, Wait};
 use crate::gcode::printing::EXTRUDER;
 use crate::hal::event::{Event, wait};
-use crate::motion::advance::Lead;
-use crate::motion::block::{Block, QueuedAction};
+use crate::motion::advance::{Lead, refine};
+use crate::motion::block::{Block, Line, QueuedAction};
 use crate::motion::float::greater;
 use crate::motion::queue;
 use crate::motion::short::Short;
-use crate::units::Length;
+use crate::units::{Length, PerAxis};
 
 /// No lead is slower, steps/s^2 and steps/s, whatever the limits of the axis: it would take minutes to come back. None is faster than [`MOST`].
 const ACCEL_LEAST: f32 = 1_000.0;
@@ -60,6 +60,7 @@ impl Planner {
                 time,
                 accel: of(axis.accel.get(), ACCEL_LEAST),
                 velocity: of(axis.feed, VELOCITY_LEAST),
+                slack: Lead::slack(steps),
             };
         }
         lead
@@ -74,6 +75,18 @@ impl Planner {
             self.lead = lead;
             let _ = self.queue.push_aside(Block::action(QueuedAction::Advance(lead), self.line));
             self.announce();
+        }
+    }
+
+    /// A line from here to there says how much filament it pushes, as exactly as a lead needs it.
+    #[inline(always)]
+    pub(super) fn refine(&self, line: &mut Line, from: &PerAxis<Length>, to: &PerAxis<Length>) {
+        if self.lead.time != 0
+            && let (Some(from), Some(to)) = (from.get(EXTRUDER), to.get(EXTRUDER))
+        {
+            let motor = usize::from(self.lead.motor);
+            let ratio = self.links.settings.borrow().step_ratio(motor);
+            refine(line, motor, ratio, to.0.wrapping_sub(from.0));
         }
     }
 

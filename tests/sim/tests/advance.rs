@@ -15,7 +15,6 @@ const X: f64 = 80.0;
 const E: f64 = 3_200.0 / 34.4086;
 /// Filament for each mm, and K.
 const RATIO: f64 = 0.0333;
-const K: f64 = 0.05;
 
 fn printer() -> (Machine, Host) {
     let (mut machine, mut host) = booted(&RAMPS14);
@@ -69,7 +68,7 @@ fn place(steps: &[u64], time: f64) -> f64 {
 }
 
 /// The worst that the extruder is off, steps.
-fn worst(log: &[Step]) -> f64 {
+fn worst(log: &[Step], k: f64) -> f64 {
     let x: Vec<_> = log.iter().filter(|step| step.motor == 0).map(|step| step.cycle).collect();
     let half = 0.003 * HZ;
     let (mut at, mut worst) = (0, 0f64);
@@ -77,7 +76,7 @@ fn worst(log: &[Step]) -> f64 {
         let time = step.cycle as f64;
         let way = place(&x, time + half) - place(&x, time - half);
         let velocity = way / X / (2.0 * half / HZ);
-        let model = (place(&x, time) / X + K * velocity) * RATIO * E;
+        let model = (place(&x, time) / X + k * velocity) * RATIO * E;
         // Half of the step lies before it.
         let way = if step.positive { 1 } else { -1 };
         worst = worst.max((f64::from(at) + f64::from(way) / 2.0 - model).abs());
@@ -88,16 +87,18 @@ fn worst(log: &[Step]) -> f64 {
 
 #[test]
 fn the_extruder_is_ahead_by_k_times_its_velocity() {
-    for (lines, length) in [(6, 10.0), (30, 1.0), (150, 0.2)] {
+    let jobs = [(6, 10.0), (30, 1.0), (150, 0.2)];
+    for (k, (lines, length)) in [0.05, 0.1].into_iter().flat_map(|k| jobs.map(|job| (k, job))) {
         let (mut machine, mut host) = printer();
+        set(&mut machine, &mut host, &format!("{{he1pa:{k}}}"));
         run(&mut machine, &mut host, &along_x(lines, length));
         let far = lines as f64 * length;
         let motors = machine.recorder().motors();
         assert_eq!(motors[0].position, (far * X).round() as i64);
         assert_eq!(motors[3].position, (far * RATIO * E).round() as i64);
-        let worst = worst(machine.recorder().log());
-        println!("{lines} lines of {length} mm: {worst:.2} steps");
-        assert!(worst < 1.0, "{lines} lines of {length} mm: {worst:.2} steps");
+        let worst = worst(machine.recorder().log(), k);
+        println!("K {k}, {lines} lines of {length} mm: {worst:.2} steps");
+        assert!(worst < 1.0, "K {k}, {lines} lines of {length} mm: {worst:.2} steps");
     }
 }
 
