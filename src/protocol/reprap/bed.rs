@@ -94,7 +94,7 @@ pub fn part(
     }
     let next = match value(block, b'S', 0) {
         None if has(block, b'S') => Err(Status::OutOfRange.into()),
-        what if code == 420 => switch(at, what, block, machine),
+        what if code == 420 => switch(at, what, machine),
         None => level(at, block, machine),
         Some(what) => change(at, what, block, machine),
     };
@@ -139,15 +139,12 @@ fn word(block: &[u8], letter: u8, machine: &mut impl Machine) -> Result<Option<L
     Ok(Some(Length(units.ok_or(Status::OutOfRange)?)))
 }
 
-/// M420. Moves follow the plane at any height: a height at which that ends, Z, is refused.
+/// M420. Moves follow the plane at any height: a height at which that ends, Z, is not read, for a plane needs none.
 #[inline(never)]
 #[small]
-fn switch(at: u8, follows: Option<i32>, block: &[u8], machine: &mut impl Machine) -> Next {
+fn switch(at: u8, follows: Option<i32>, machine: &mut impl Machine) -> Next {
     if at == ENDS {
         return Ok(Step::Done);
-    }
-    if has(block, b'Z') {
-        return Err(Status::WordUnused.into());
     }
     let Some(follows) = follows else { return Ok(Step::At(TELLS)) };
     if follows != 0 && !bed(machine)?.is_known() {

@@ -52,7 +52,7 @@ pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
         (b'M', number) => matches!(
             number,
             17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 130..=134 | 155
-                | 201 | 203..=208 | 220 | 221 | 301..=304 | 400 | 500..=503 | 900 | 999
+                | 201..=208 | 220 | 221 | 301..=304 | 400 | 500..=503 | 900 | 999
         ),
         (b'T', _) => true,
         _ => false,
@@ -121,7 +121,7 @@ pub fn part(
         134 | 500 if machine.value(Value::Kept) == 0 => Step::Later(0),
         502 => restore(at, machine),
         503 => settings::list(at, machine, out).map_or(Step::Done, Step::At),
-        92 | 201 | 203..=206 => settings::set(number, at, block, machine, out),
+        92 | 201..=206 => settings::set(number, at, block, machine, out),
         900 => advance(block, machine, out),
         999 => match machine.clear() {
             Status::Again => Step::Later(0),
@@ -239,10 +239,14 @@ fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
     if homed == 0 { Step::Refused(Status::HomingFailed) } else { Step::Done }
 }
 
-/// M84, M18: the motors of the axes that are named, or all, lose their power when the machine rests.
+/// M84, M18: the motors of the axes that are named, or all, lose their power when the machine rests. With S none does: that says how long motors have power
+/// at rest, which is a setting here.
 #[inline(never)]
 #[small]
 fn motors_off(block: &[u8], machine: &mut impl Machine) -> Step {
+    if has(block, b'S') {
+        return Step::Done;
+    }
     if machine.value(Value::Working) != 0 {
         return Step::Later(0);
     }

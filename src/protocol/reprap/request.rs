@@ -6,7 +6,7 @@
 use super::command;
 use super::frame::{Fault, Frame, Session};
 use super::host::{self, Code, Step};
-use super::status::{is_unknown, reason};
+use super::status::{is_passed_over, is_unknown, reason};
 use super::write::{cold, int, line_end, text};
 use crate::progmem::Text;
 use crate::protocol::{Answers, Extruder, Machine, Next, Out, Span};
@@ -145,7 +145,8 @@ impl Answers for Request {
             }
             What::Refused(status) => {
                 self.begun = true;
-                text(out, text!("Error:"));
+                let goes_on = is_passed_over(status, block);
+                text(out, if goes_on { text!("echo:") } else { text!("Error:") });
                 text(out, reason(status));
                 line_end(out);
                 self.what = What::Nothing;

@@ -1,4 +1,4 @@
-//! M92, M201, M203 to M206, M503: Kerf's settings under the codes of this dialect, in its units.
+//! M92, M201 to M206, M503: Kerf's settings under the codes of this dialect, in its units.
 //!
 //! Nothing is kept here. A setting is in memory by itself: M500 waits for that alone.
 
@@ -85,6 +85,15 @@ fn value(code: u16, axis: u8, machine: &mut impl Machine) -> Fixed {
     }
 }
 
+/// The letter of an axis behind a code. X, Y, Z and E of M205 are not read: they are speeds of another kind of planner, in mm/s.
+#[small]
+fn letter(code: u16, axis: u8) -> u8 {
+    match code {
+        205 => b'J',
+        _ => LETTERS.get(usize::from(axis)).copied().unwrap_or(b'E'),
+    }
+}
+
 /// What a code is called in M503.
 fn name(code: u16) -> Text {
     match code {
@@ -103,10 +112,14 @@ fn put(code: u16, at: u8, machine: &mut impl Machine, out: &mut impl Out) -> boo
         text(out, name(code));
     }
     out.put(b' ');
-    out.put(LETTERS.get(usize::from(at)).copied().unwrap_or(b'E'));
+    out.put(letter(code, at));
     fixed(out, value(code, at, machine));
-    // The extruder has no offset.
-    let last = if code == 206 { 2 } else { 3 };
+    // All axes have one J; the extruder has no offset.
+    let last = match code {
+        205 => 0,
+        206 => 2,
+        _ => 3,
+    };
     if at == last {
         line_end(out);
     }
@@ -142,7 +155,7 @@ pub fn set(
     out: &mut impl Out,
 ) -> Step {
     const TELLS: u8 = 8;
-    if code == 204 {
+    if matches!(code, 202 | 204) {
         // An axis has one acceleration: M201.
         return Step::Done;
     }
@@ -150,15 +163,14 @@ pub fn set(
         let more = put(code, at - TELLS, machine, out);
         return if more { Step::At(at + 1) } else { Step::Done };
     }
-    let names = |letter: &u8| number(block, *letter).is_some();
-    if at == 0 && !LETTERS.iter().any(names) && !(code == 205 && names(&b'J')) {
+    let word = |axis| number(block, letter(code, axis));
+    if at == 0 && !(0..LETTERS.len() as u8).any(|axis| word(axis).is_some()) {
         return Step::At(TELLS);
     }
-    let Some(letter) = LETTERS.get(usize::from(at)) else { return Step::Done };
-    let to = number(block, *letter);
-    // J of M205 is for all axes.
-    let all = if code == 205 { number(block, b'J') } else { None };
-    let Some(to) = to.or(all) else { return Step::Later(at + 1) };
+    if usize::from(at) >= LETTERS.len() {
+        return Step::Done;
+    }
+    let Some(to) = word(at) else { return Step::Later(at + 1) };
     match set_axis(code, at, to, machine) {
         Ok(()) => Step::Later(at + 1),
         // Settings of motors change at rest.

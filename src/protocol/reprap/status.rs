@@ -17,6 +17,15 @@ pub fn is_unknown(status: Status) -> bool {
     )
 }
 
+/// Whether a print goes on without a line that is refused: no move is missing, no heater is cold, and there is no alarm. Hosts leave the port when they read `Error:`.
+#[inline(never)]
+#[small]
+pub fn is_passed_over(status: Status, block: &[u8]) -> bool {
+    let moves = block.first().is_none_or(|letter| matches!(letter & !0x20, b'G' | b'X'..=b'Z'));
+    let of_words = Status::CardError as u8..=Status::WordConflict as u8;
+    !moves && of_words.contains(&(status as u8)) && status != Status::AboveMaximum
+}
+
 /// The reason.
 #[inline(never)]
 #[small]
@@ -38,7 +47,7 @@ pub fn reason(status: Status) -> Text {
         Status::BufferFull => text!("bytes were lost"),
         Status::Muted => text!("another port prints"),
         Status::WordUnused | Status::AxisNotAllowed => text!("a word belongs to no code"),
-        Status::ToolInvalid => text!("no such extruder"),
+        Status::ToolInvalid | Status::TWordInvalid => text!("no such extruder"),
         Status::SensorOpen => text!("temperature sensor open"),
         Status::SensorShort => text!("temperature sensor shorted"),
         Status::HeatRunaway => text!("heater out of control"),

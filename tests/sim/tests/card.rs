@@ -269,7 +269,7 @@ fn a_pause_a_flush_and_a_card_that_is_pulled_end_it() {
         assert!(!printer.ask(line).contains("Error"), "{line}");
     }
     for line in ["M20", "M21", "M22", "M23 A.G", "M30 A.G"] {
-        assert!(printer.ask(line).contains("Error:not possible now"), "{line}");
+        assert!(printer.ask(line).contains("echo:not possible now"), "{line}");
     }
     printer.run(300);
     assert_ne!(printer.steps(), paused);
