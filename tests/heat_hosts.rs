@@ -147,6 +147,32 @@ fn hosts_get_through_while_a_line_waits_for_a_temperature() {
     });
 }
 
+/// An `ok` that comes too early tells a host that it is hot.
+#[test]
+fn a_wait_for_a_temperature_is_answered_when_it_is_over() {
+    alone(|| {
+        let Some(mut printer) = Printer::new() else { return };
+        printer.said.clear();
+        printer.send("M109 S60");
+        printer.run(2_000);
+        assert!(!printer.said.contains("ok"), "{}", printer.said);
+        printer.run(60_000);
+        assert!(printer.said.ends_with("ok\n"), "{}", printer.said);
+        assert!(printer.plants[0].sensor > 57.0);
+        // Homing behind it keeps nobody waiting: M105 is answered, and M108 ends the wait.
+        printer.send("M109 S200");
+        printer.send("G28");
+        printer.run(1_000);
+        printer.said.clear();
+        assert!(printer.ask("M105").contains("ok T:"), "{}", printer.said);
+        printer.send("M108");
+        printer.run(500);
+        assert_eq!(printer.said.matches("ok").count(), 3, "{}", printer.said);
+        printer.run(120_000);
+        assert_eq!(printer.said.matches("ok").count(), 4, "{}", printer.said);
+    });
+}
+
 #[test]
 fn m112_in_a_wait_switches_off_and_m999_goes_on() {
     for stop in ["M112", "N5 M112*36", "m112 ; now"] {

@@ -190,16 +190,15 @@ fn ten_kilometres_of_filament() {
 #[test]
 fn a_stop_of_the_program_waits_for_m108() {
     let mut host = Host::boot(0);
-    for line in ["G1 X1 F3000", "M0 Change the filament"] {
-        assert_eq!(host.ask(line), "ok\n");
-    }
-    host.machine.send(b"G1 X2\n");
+    assert_eq!(host.ask("G1 X1 F3000"), "ok\n");
+    host.machine.send(b"M0 Change the filament\nG1 X2\n");
     host.machine.run_ms(5_000);
     let heard = String::from_utf8(host.machine.received()).unwrap();
     assert!(heard.contains("echo:busy: paused for user\n"), "{heard}");
     assert!(heard.contains("echo:busy: processing\n") && !heard.contains("ok"), "{heard}");
-    // Its own answer, and that of the move.
+    // Its own answer, and those of the stop and the move.
     assert_eq!(host.ask("M108"), "ok\n");
+    assert_eq!(host.hear(), "ok\n");
     assert_eq!(host.hear(), "ok\n");
     assert_eq!(host.steps()[0], 2 * 1_280);
 }

@@ -151,6 +151,11 @@ pub trait Answers {
     fn is_list(&self) -> bool {
         false
     }
+
+    /// Whether what is next is done at rest. Until then the line waits as G-code does, and others overtake it.
+    fn awaits_rest(&self) -> bool {
+        false
+    }
 }
 
 /// A notice that is being told.
@@ -471,6 +476,14 @@ macro_rules! dialects {
                 match self {
                     $(#[cfg(feature = $feature)]
                     Self::$name(request) => request.silence(),)+
+                }
+            }
+
+            #[inline(always)]
+            fn awaits_rest(&self) -> bool {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(request) => request.awaits_rest(),)+
                 }
             }
 

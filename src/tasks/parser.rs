@@ -118,6 +118,17 @@ enum Turn {
     Nothing,
 }
 
+/// Whether the next line of G-code of the feeder, which has its place in the order again when it is begun anew, waits for rest. Lines that overtake come before it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Deferred {
+    /// It does not.
+    No,
+    /// It is carried out at rest.
+    Line,
+    /// It has been carried out, and is answered at rest.
+    Answer,
+}
+
 /// The parser's own state.
 struct Parser {
     links: &'static Links,
@@ -129,6 +140,8 @@ struct Parser {
     last: u8,
     /// A line of G-code was begun last: others come before the next one.
     has_fed: bool,
+    /// The next line of G-code waits for rest.
+    deferred: Deferred,
     /// How many turns in a row have been left to others: by a long answer to short ones, by a line that waits to a report.
     waited: u8,
     /// The line of a file on the SD card.
@@ -148,6 +161,7 @@ pub fn run(
         lacking: 0,
         last: USB,
         has_fed: false,
+        deferred: Deferred::No,
         waited: 0,
         #[cfg(feature = "sd")]
         feed: super::card::Feed::new(),
@@ -177,7 +191,8 @@ impl Parser {
         let alarmed = machine::is_alarmed();
         let free = is_free(links);
         let runs_job = !links.job.get().is_none();
-        let data = free && !runs_job && !self.is_feeding();
+        let waits = self.deferred != Deferred::No && is_working(links);
+        let data = free && !runs_job && !self.is_feeding() && !waits;
         let straight = !alarmed && !machine::is_checking();
         // What a port is told at once goes first: an acknowledgement is not to wait for a move.
         let tells = links.ports.iter().any(Port::tells);
@@ -434,7 +449,7 @@ impl Parser {
     fn take(&mut self, chosen: Chosen, tried: FastPath) {
         let (links, awaited) = (self.links, self.is_awaited(chosen.port.number));
         let Some(session) = self.sessions.get_mut(usize::from(chosen.port.number)) else { return };
-        match begin(links, &chosen, tried, session) {
+        match begin(links, &chosen, tried, session, &mut self.deferred) {
             Begun::Answer => {
                 go_on(links, chosen.port, session, awaited);
             }
@@ -453,6 +468,10 @@ impl Parser {
             let waited = core::mem::replace(&mut asked, true);
             let woken = links.parser_wake.poll(cx);
             let mut ready = woken.is_ready();
+            if self.deferred != Deferred::No {
+                ready |= waited;
+                wake_after(links.thread, Event::Tick, cx.waker());
+            }
             #[cfg(feature = "sd")]
             if self.feed.waits() {
                 ready |= waited;
@@ -793,7 +812,13 @@ enum Begun {
 /// Begins with a line. One of G-code has run after that, for data lines are taken only while the
 /// planner is free.
 #[inline(never)]
-fn begin(links: &Links, chosen: &Chosen, tried: FastPath, session: &mut Session) -> Begun {
+fn begin(
+    links: &Links,
+    chosen: &Chosen,
+    tried: FastPath,
+    session: &mut Session,
+    deferred: &mut Deferred,
+) -> Begun {
     let Chosen { port, id, class } = *chosen;
     let lines = port.lines.borrow();
     let (line, length) = (lines.text(id), lines.length(id));
@@ -816,14 +841,26 @@ fn begin(links: &Links, chosen: &Chosen, tried: FastPath, session: &mut Session)
     drop(settings);
     port.speech.set(speech);
     port.has_stopped.set(class == Class::Control && asks_alarm(line, port.is_plain()).is_some());
-    if let Some(block) = request.gcode() {
-        let (status, commented) = run_block(links, port, block.of(line), tried);
+    let gcode = request.gcode();
+    if let Some(block) = gcode {
+        let (status, commented) = match *deferred {
+            Deferred::Answer => (Status::Ok, false),
+            _ => run_block(links, port, block.of(line), tried),
+        };
         if status == Status::Again {
             // Its number counts when it is begun for good.
             port.speech.set(before);
             return Begun::Again;
         }
         request.ran(status, commented);
+    }
+    if request.awaits_rest() && port.number == links.feeder.get() && is_working(links) {
+        port.speech.set(before);
+        *deferred = if gcode.is_some() { Deferred::Answer } else { Deferred::Line };
+        return Begun::Again;
+    }
+    if class != Class::Control {
+        *deferred = Deferred::No;
     }
     let echoes = links.settings.borrow().echo();
     *session = Session::Answer(Answer {

@@ -46,6 +46,13 @@ pub fn overtakes(frame: &Frame, line: &[u8]) -> bool {
     }
 }
 
+/// Whether a code is answered when it is done: hosts take its `ok` for the end of the wait.
+#[inline(never)]
+#[small]
+pub fn waits(code: Option<(u8, u16)>) -> bool {
+    matches!(code, Some((b'M', 0 | 1 | 109 | 116 | 190)))
+}
+
 /// What is behind the code of a block.
 #[inline(never)]
 #[small]

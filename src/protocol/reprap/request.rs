@@ -16,7 +16,7 @@ use crate::{plain, text};
 /// A line.
 pub struct Request {
     what: What,
-    /// How far it has come; what it says depends on `what`.
+    /// How far it has come; what it says depends on `what`. Of G-code: [`WAITS`], or 0.
     at: u8,
     block: Span,
     begun: bool,
@@ -44,6 +44,10 @@ enum What {
 
 /// Bytes of a line that are told in a step.
 const PART: usize = 40;
+/// G-code is answered when it is done.
+const WAITS: u8 = 1;
+/// M400.
+const FINISHED: Code = (b'M', 400);
 
 impl Request {
     /// Begins with a line.
@@ -58,7 +62,8 @@ impl Request {
             Ok(()) if block.is_empty() => What::Nothing,
             Ok(()) => host::of(code, block).map_or(What::Gcode, What::Host),
         };
-        Self { what, at: 0, block: frame.text(line), begun: false, silent: false }
+        let at = u8::from(matches!(what, What::Gcode) && command::waits(code));
+        Self { what, at, block: frame.text(line), begun: false, silent: false }
     }
 
     /// A line that could not be kept, or has been dropped.
@@ -100,10 +105,12 @@ impl Answers for Request {
 
     fn ran(&mut self, status: Status, _comment: bool) {
         self.what = match status {
+            Status::Ok if self.at == WAITS && !self.silent => What::Host(FINISHED),
             Status::Ok | Status::Noop => What::Nothing,
             Status::TooCold if matches!(self.what, What::Gcode) => What::Cold,
             status => What::Refused(status),
         };
+        self.at = 0;
     }
 
     #[inline(never)]
@@ -161,6 +168,12 @@ impl Answers for Request {
 
     fn silence(&mut self) {
         self.silent = true;
+    }
+
+    #[inline(never)]
+    #[small]
+    fn awaits_rest(&self) -> bool {
+        matches!(self.what, What::Host((b'M', 18 | 84 | 400) | (b'G', 28 | 161 | 162)))
     }
 }
 
