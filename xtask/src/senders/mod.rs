@@ -57,6 +57,7 @@ enum Sender {
     Printcore,
     CncjsMarlin,
     Octoprint,
+    MarlinHost,
 }
 
 impl Sender {
@@ -72,6 +73,7 @@ impl Sender {
             Sender::Printcore => "printcore",
             Sender::CncjsMarlin => "cncjs-marlin",
             Sender::Octoprint => "octoprint",
+            Sender::MarlinHost => "marlin-host",
         }
     }
 
@@ -87,6 +89,7 @@ impl Sender {
             Sender::Printcore => ("printcore.py", None),
             Sender::CncjsMarlin => ("cncjs-marlin.js", None),
             Sender::Octoprint => ("octoprint-server.py", None),
+            Sender::MarlinHost => ("marlin-host.py", None),
         }
     }
 }
@@ -94,7 +97,10 @@ impl Sender {
 impl Sender {
     /// Whether it is a host of printers.
     fn prints(self) -> bool {
-        matches!(self, Sender::Printcore | Sender::CncjsMarlin | Sender::Octoprint)
+        matches!(
+            self,
+            Sender::Printcore | Sender::CncjsMarlin | Sender::Octoprint | Sender::MarlinHost
+        )
     }
 
     /// The board that this sender is tried with by default.

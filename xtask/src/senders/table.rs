@@ -22,7 +22,7 @@ pub fn show(sessions: &[Done]) -> bool {
 }
 
 /// Senders with a job of their own.
-const OWN_JOB: [&str; 3] = ["cncjs-marlin", "octoprint", "printcore"];
+const OWN_JOB: [&str; 4] = ["cncjs-marlin", "marlin-host", "octoprint", "printcore"];
 
 /// Whether the motors have made the same steps, not only the same way on balance, for every sender.
 fn agree(sessions: &[Done]) -> bool {
