@@ -110,6 +110,7 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     let segments = stepper::start()?;
     let queue = queue::store().queue(thread)?;
     let (links, received, aux) = connect(thread, rate)?;
+    links.report.borrow_mut().restore();
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
     set_hardware(thread, &links.settings.borrow());
     spindle::set_all(thread, links.storage);

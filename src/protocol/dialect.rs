@@ -177,10 +177,10 @@ pub trait Tells {
 
 /// What is kept between reports.
 pub trait Remembers {
-    /// After a start.
+    /// At first. [`Remembers::restore`] comes when it is in its place, for there is little stack where it is made.
     fn new() -> Self;
 
-    /// Settings have their defaults again, and so has what reports hold.
+    /// Settings have their defaults, and so has what reports hold.
     fn restore(&mut self);
 
     /// The next report tells everything, for its reader has been told nothing so far.

@@ -43,9 +43,11 @@ pub struct Fake {
 
 impl Fake {
     pub fn new() -> Fake {
+        let mut memory = Memory::new();
+        memory.restore();
         Fake {
             settings: Settings::new(),
-            memory: Memory::new(),
+            memory,
             mode: Mode::Json,
             inches: false,
             position: 0,

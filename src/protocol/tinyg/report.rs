@@ -100,19 +100,17 @@ impl StatusReport {
     }
 }
 
-/// At first, and again with the defaults of settings, it is the default list.
+/// With the defaults of settings it is the default list.
 #[small]
 impl Remembers for StatusReport {
     fn new() -> Self {
-        let mut report = StatusReport {
+        StatusReport {
             low: [0; LONGEST_REPORT],
             high: [0; HIGH],
             sent: [[0; 3]; LONGEST_REPORT],
             len: 0,
             fresh: true,
-        };
-        report.restore();
-        report
+        }
     }
 
     fn restore(&mut self) {
