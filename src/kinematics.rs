@@ -53,6 +53,13 @@ pub fn place(drives: u8, place: &PerAxis<Length>) -> Option<Length> {
     place.get(usize::from(drives)).copied()
 }
 
+/// As [`place`], by a call: where nothing is hot.
+#[inline(never)]
+#[small]
+pub fn place_of(drives: u8, at: &PerAxis<Length>) -> Option<Length> {
+    place(drives, at)
+}
+
 /// How far a motor's coordinate goes when the axes go so far, in units of [`Length`]; none if the motor drives nothing.
 #[inline(always)]
 pub fn travel(drives: u8, travel: &PerAxis<i32>) -> Option<i32> {

@@ -221,6 +221,7 @@ impl Settings {
         self.small.get(usize::from(slot)).copied().unwrap_or(0)
     }
 
+    #[inline(never)]
     fn large(&self, slot: u8) -> i32 {
         self.large.get(usize::from(slot)).copied().unwrap_or(0)
     }

@@ -162,7 +162,7 @@ impl Builder {
         let mut parts = 0;
         for (m, motor) in self.motors.iter_mut().enumerate() {
             let drives = dynamics.drives[m];
-            let place = |at| kinematics::place(drives, at);
+            let place = |at| kinematics::place_of(drives, at);
             let (Some(from), Some(to)) = (place(line.from), place(line.to)) else { continue };
             if from == to {
                 continue;
@@ -195,7 +195,7 @@ impl Builder {
     ) {
         let all = self.motors.iter_mut().zip(ways).zip(&dynamics.drives);
         for (m, ((motor, &way), &drives)) in all.enumerate().take(driven.into()) {
-            let from = kinematics::place(drives, line.from);
+            let from = kinematics::place_of(drives, line.from);
             match (from, kinematics::travel(drives, &path.travel)) {
                 (Some(from), Some(travel)) if travel != 0 => {
                     motor.put_back(machine.ratio(m), from, way);
@@ -218,7 +218,7 @@ impl Builder {
         machine: &impl Motors,
     ) -> QueuedAction {
         for (m, motor) in self.motors.iter_mut().enumerate() {
-            if let Some(position) = kinematics::place(machine.motor_axis(m), position) {
+            if let Some(position) = kinematics::place_of(machine.motor_axis(m), position) {
                 motor.rename(machine.ratio(m), position);
             }
         }

@@ -234,6 +234,8 @@ pub trait Machine {
     fn go_on(&mut self) {}
 
     /// Whether lengths are in inches.
+    #[inline(never)]
+    #[small]
     fn inches(&mut self) -> bool {
         self.value(Value::Units) == 0
     }

@@ -24,6 +24,7 @@ use crate::hal::uart;
 use crate::machine::{self, Alarm};
 use crate::protocol::{Remembers, Speech};
 use crate::status::Status;
+use crate::units::{Length, PerAxis};
 
 /// How long control lines of USB may be that overtake, and those of the other port.
 const RESERVE: u8 = 40;
@@ -231,6 +232,13 @@ impl Links {
     #[inline(always)]
     pub fn feeder(&self) -> &Port {
         self.port(self.feeder.get())
+    }
+
+    /// The model of the machine is where the machine is.
+    #[inline(never)]
+    #[small]
+    pub fn set_position(&self, position: &PerAxis<Length>) {
+        self.model.borrow_mut().set_position(position);
     }
 
     /// The port that is told what nobody asked for.

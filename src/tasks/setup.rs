@@ -157,7 +157,7 @@ fn coordinate(
 ) -> Option<Length> {
     let motor = (0..MOTORS).find(|motor| moved_by(settings, *motor) == drives)?;
     let (ratio, steps) = (settings.step_ratio(motor), *steps.get(motor)?);
-    match end.and_then(|end| kinematics::place(drives, end)) {
+    match end.and_then(|end| kinematics::place_of(drives, end)) {
         Some(end) if ratio.steps(end) == steps => Some(end),
         _ => ratio.length(steps),
     }

@@ -32,7 +32,7 @@ impl Planner {
         if bed.follows() {
             *z = bed.lowered_z(*x, *y, *z);
         }
-        self.links.model.borrow_mut().set_position(&self.position);
+        self.links.set_position(&self.position);
     }
 
     /// G28.3 gives the place where the machine is another name: the bed is where it was.

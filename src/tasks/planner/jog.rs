@@ -34,7 +34,7 @@ impl Planner {
     fn end_jog(&mut self) {
         // In a flush it ends with that, when the position is known.
         if !self.is_flushed() {
-            self.links.model.borrow_mut().set_position(&self.position);
+            self.links.set_position(&self.position);
             self.links.notices.jogged.set(true);
             self.enter(Event::Done);
         }

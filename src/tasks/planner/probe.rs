@@ -71,7 +71,7 @@ impl Planner {
         if inputs::worked() & SWITCH == awaited {
             drop(commands);
             // The line says that the machine is at its end.
-            links.model.borrow_mut().set_position(&self.position);
+            links.set_position(&self.position);
             self.probe_failed();
             return false;
         }
@@ -102,7 +102,7 @@ impl Planner {
     fn probe_touched(&self) {
         // In a flush it is not here yet.
         if !self.is_flushed() {
-            self.links.model.borrow_mut().set_position(&self.position);
+            self.links.set_position(&self.position);
         }
         self.links.probe.tell(ProbeState::Touched);
     }

@@ -119,7 +119,7 @@ impl Planner {
         self.queue.restart();
         (self.walk, self.begun) = (Ongoing::None, Begun::Nothing);
         self.outputs = Outputs { on: motion.outputs, speed: motion.speed };
-        self.links.model.borrow_mut().set_position(&self.position);
+        self.links.set_position(&self.position);
     }
 
     /// The position of every axis that a motor moves, unless the step is that at which it was to end.

@@ -231,7 +231,7 @@ impl Planner {
         let start = core::mem::replace(&mut self.walk, Ongoing::None);
         self.relocate(&motion);
         self.walk = start;
-        self.links.model.borrow_mut().set_position(&end);
+        self.links.set_position(&end);
     }
 
     /// Queues a part of the way back to the start of a pass: X out of the cut, along it, and X back; or, of G33.1, the end of it and all at once.
@@ -491,7 +491,7 @@ impl Planner {
     #[small]
     fn refuse(&mut self, status: Status) {
         // The line says that the machine is at its end.
-        self.links.model.borrow_mut().set_position(&self.position);
+        self.links.set_position(&self.position);
         self.set_pass(status);
         alarm::raise_for(self.links, Alarm::Alarm, status);
     }
