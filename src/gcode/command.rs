@@ -75,9 +75,16 @@ impl Commands {
             && *stop == Stop::None
     }
 
-    /// Empties it, touching nothing but the tags: it is large.
+    /// Empties it, by a call.
     #[inline(never)]
+    #[small]
     pub fn clear(&mut self) {
+        self.clear_here();
+    }
+
+    /// Empties it, touching nothing but the tags: it is large.
+    #[inline(always)]
+    pub(super) fn clear_here(&mut self) {
         self.line = 0;
         self.tool = None;
         self.spindle = None;

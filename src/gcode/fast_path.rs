@@ -168,7 +168,7 @@ impl State {
         {
             *residue = words.rest;
         }
-        out.clear();
+        out.clear_here();
         out.line = words.line;
         out.exact_stop = self.modal.path == PathMode::ExactStop;
         out.blend = self.modal.blend();

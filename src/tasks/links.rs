@@ -182,7 +182,7 @@ impl QueueCount {
 
     /// Blocks removed since the last call.
     pub fn take_removed(&self) -> i32 {
-        let removed = self.added.get().wrapping_sub(queue::used() as u16);
+        let removed = self.added.get().wrapping_sub(queue::used_here() as u16);
         removed.wrapping_sub(self.told_removed.replace(removed)).into()
     }
 }

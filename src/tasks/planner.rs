@@ -166,7 +166,7 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
                 planner.begin();
                 loop {
                     planner.room().await;
-                    links.give_way(PATIENCE, || queue::used() >= ENOUGH).await;
+                    links.give_way(PATIENCE, || queue::used_here() >= ENOUGH).await;
                     let turn = planner.turn();
                     match turn {
                         Turn::Done => break,
@@ -264,7 +264,7 @@ impl Planner {
     /// Whether answers that are due come before the line: a long one takes up to 40,000 cycles.
     #[inline(always)]
     fn owes_answers(&self) -> bool {
-        is_asked() && queue::used() >= ENOUGH
+        is_asked() && queue::used_here() >= ENOUGH
     }
 
     /// Most lines are a straight move for which there is room: no need to be prepared for a wait. False,

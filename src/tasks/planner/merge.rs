@@ -143,7 +143,7 @@ impl Planner {
         let Begun::Chain(chain) = &self.begun else { return false };
         let is_stale =
             || !chain.is_closed() && (millis() as u16).wrapping_sub(self.waits_since) >= STALE_MS;
-        let is_due = queue::used() <= 1 || is_stale() && self.queue.free() >= BLOCKS;
+        let is_due = queue::used_here() <= 1 || is_stale() && self.queue.free() >= BLOCKS;
         is_due && !self.is_flushed()
     }
 }

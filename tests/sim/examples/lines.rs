@@ -19,13 +19,13 @@ fn main() -> Result<()> {
     let mut args = std::env::args().skip(1);
     let elf = args.next().context("which ELF?")?;
     let board = args.next().context("which board?")?;
-    let baud = args.next().context("which baud rate?")?.parse()?;
+    let baud: u32 = args.next().context("which baud rate?")?.parse()?;
     let path = args.next().context("which job?")?;
     let board = kerf::boards::by_name(&board).context("no such board")?;
     let mut machine = Machine::load(Path::new(&elf), board)?;
-    machine.set_baud(baud);
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut machine, 5_000)?;
+    host.change_speed(&mut machine, baud)?;
     for setting in args {
         host.ask(&mut machine, &setting, LINE_MS)?;
     }
