@@ -34,10 +34,10 @@ const ENDS: u8 = 2;
 const TELLS: u8 = 4;
 /// From this part on points are probed, in [`STAGES`] each.
 const PROBES: u8 = 16;
-/// Up, over the point, down to it, and what has come of that.
+/// Over the point, down to it, up, and what has come of that: a move that is ended leaves less than three points.
 const STAGES: u8 = 4;
-/// The part behind the last point: up.
-const RISES: u8 = PROBES + STAGES * POINTS as u8;
+/// The part behind the last point.
+const FOLLOWS: u8 = PROBES + STAGES * POINTS as u8;
 
 /// How far above and below the lower end of Z the bed is looked for, without the word Z: 5 mm.
 const HEIGHT: Length = Length(5 * Length::PER_MM);
@@ -203,32 +203,27 @@ fn level(at: u8, block: &[u8], machine: &mut impl Machine) -> Next {
             check(block, machine)?;
             return follow(false, CHANGES, machine);
         }
-        CHANGES => {
-            bed(machine)?.forget();
-            return Ok(Step::Later(PROBES));
-        }
+        CHANGES => bed(machine)?.forget(),
         ENDS => return Ok(Step::At(TELLS)),
+        FOLLOWS => return follow(true, ENDS, machine),
         _ => {}
     }
     let [low, high] = heights(block, machine)?;
     let [x, y, z] = here(machine);
     let up = Level::Go([x, y, z.max(high)]);
-    if at > RISES {
-        return follow(true, ENDS, machine);
-    }
-    if at == RISES {
-        return go(up, at, machine);
+    if at == CHANGES {
+        return go(up, PROBES - 1, machine);
     }
     let (n, stage) = ((at - PROBES) / STAGES, (at - PROBES) % STAGES);
     let [over_x, over_y] = places(block, machine)?.get(usize::from(n)).copied().unwrap_or_default();
     match stage {
-        0 => go(up, at, machine),
-        1 if z >= high => go(Level::Go([over_x, over_y, high]), at, machine),
-        2 if [x, y, z] == [over_x, over_y, high] => match probe(machine) {
+        0 if z >= high => go(Level::Go([over_x, over_y, high]), at, machine),
+        1 if [x, y, z] == [over_x, over_y, high] => match probe(machine) {
             0 => go(Level::Probe([over_x, over_y, low]), at, machine),
             _ => Err(Trouble::Touches),
         },
-        3 if machine.value(Value::ProbeState) == ProbeState::Touched as i32 => {
+        2 if machine.value(Value::ProbeState) == ProbeState::Touched as i32 => go(up, at, machine),
+        3 if z >= high => {
             let touched = Length(machine.value(Value::Probed(2)));
             bed(machine)?.add([over_x, over_y, touched])?;
             Ok(Step::Later(at + 1))
@@ -323,8 +318,13 @@ fn heights(block: &[u8], machine: &mut impl Machine) -> Result<[Length; 2], Trou
     if !HEIGHTS.contains(&height) {
         return Err(Status::OutOfRange.into());
     }
-    let bottom = travel(2, machine).map_or(Length::ZERO, |[low, _]| low);
-    Ok([bottom.saturating_sub(height), bottom.saturating_add(height)])
+    let travel = travel(2, machine);
+    let bottom = travel.map_or(Length::ZERO, |[low, _]| low);
+    let high = bottom.saturating_add(height);
+    if travel.is_some_and(|[_, top]| high > top) {
+        return Err(Status::SoftLimit.into());
+    }
+    Ok([bottom.saturating_sub(height), high])
 }
 
 /// Where the machine is.

@@ -18,9 +18,7 @@ use kerf::boards::{MEGA2560_GRBL, MEGA2560_GRBL_LATHE, MEGA2560_LATHE, RAMPS14};
 /// What only the image of a lathe can do.
 const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];
 /// What only the image of a printer can do.
-const PRINTING: [&str; 3] = ["corexy", "heat", "reprap"];
-/// What only the image of a printer without TinyG's dialect can do: it greets otherwise, and `bed.rs` tries it.
-const LEVELING: [&str; 1] = ["bed"];
+const PRINTING: [&str; 4] = ["bed", "corexy", "heat", "reprap"];
 /// What needs grbl's dialect besides.
 const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 
@@ -37,7 +35,6 @@ fn the_image_keeps_to_the_transcripts() {
         all.into_iter().filter(|one| !begins(&BOTH, one)).partition(|one| begins(&TURNING, one));
     let (printing, others): (Vec<_>, Vec<_>) =
         others.into_iter().partition(|one| begins(&PRINTING, one));
-    let others: Vec<_> = others.into_iter().filter(|one| !begins(&LEVELING, one)).collect();
     transcript::play_all(printing, 2, || firmware(&RAMPS14));
     transcript::play_all(others, 2, || firmware(&MEGA2560_GRBL));
     transcript::play_all(turning, 2, || firmware(&MEGA2560_LATHE));

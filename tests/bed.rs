@@ -1,0 +1,396 @@
+//! Programs of printing hosts with a bed that is followed: whatever moves, and whatever ends a move, Z is on the step that the plane says.
+
+#[path = "support/cases.rs"]
+mod cases;
+
+use std::thread;
+
+use cases::cases;
+use kerf::boards::inputs::{PROBE, X_MIN, Y_MIN, Z_MIN};
+use kerf::config::StepRatio;
+use kerf::config::bed::Bed;
+use kerf::hal::imp::Machine;
+use kerf::units::Length;
+use proptest::prelude::*;
+
+/// Steps of X, Y and Z in a unit of length, as `{mch:3}` has them: 80 and 400 in a mm.
+const RATIOS: [StepRatio; 3] =
+    [StepRatio { num: 1, den: 125 }, StepRatio { num: 1, den: 125 }, StepRatio { num: 1, den: 25 }];
+/// 10 um, in units of length.
+const HUNDREDTH: i32 = 100;
+
+/// A printer whose first port speaks to a printing host, and whose second one speaks TinyG's dialect.
+struct Printer {
+    machine: Machine,
+    heard: String,
+    /// Its first two motors drive X and Y together.
+    shared: bool,
+}
+
+impl Printer {
+    fn boot(shared: bool) -> Self {
+        let machine = Machine::boot(115_200).expect("one machine for each thread");
+        let mut printer = Self { machine, heard: String::new(), shared };
+        printer.machine.run_ms(100);
+        printer.control("{mch:3}");
+        // As fast as the tests are to be.
+        printer.control("{zvm:6000,zfr:6000,zjm:5000,zac:1000}");
+        if shared {
+            printer.control("{1ma:6}");
+            printer.control("{2ma:7}");
+        }
+        printer.machine.received();
+        assert!(printer.ask("M105").starts_with("ok T:"));
+        assert_eq!(printer.ask("M302 P1"), "ok\n");
+        printer
+    }
+
+    /// One that is homed, and has a bed 0.1 mm below the place that is called 0.
+    fn homed(shared: bool) -> Self {
+        let mut printer = Self::boot(shared);
+        // Switches go by motors. Those of X and Y never move far.
+        for (switch, step) in [(X_MIN, -80), (Y_MIN, -80), (Z_MIN, -400), (PROBE, -40)] {
+            printer.machine.set_near(switch, step, false);
+        }
+        assert_eq!(printer.ask("G28"), "ok\n");
+        printer
+    }
+
+    /// What the second port hears to a line.
+    fn control(&mut self, line: &str) -> String {
+        self.machine.received_aux();
+        self.machine.send_aux(format!("{line}\n").as_bytes());
+        self.machine.run_ms(60);
+        String::from_utf8(self.machine.received_aux()).expect("ASCII")
+    }
+
+    fn send(&mut self, line: &str) {
+        self.machine.send(format!("{line}\n").as_bytes());
+    }
+
+    /// What is heard before the next `ok`, and that.
+    fn hear(&mut self) -> String {
+        for _ in 0..600_000 {
+            if let Some(end) = self.heard.find("ok") {
+                if let Some(line) = self.heard[end..].find('\n') {
+                    let rest = self.heard.split_off(end + line + 1);
+                    let said = std::mem::replace(&mut self.heard, rest);
+                    return said.replace("echo:busy: processing\n", "");
+                }
+            }
+            self.machine.run_ms(1);
+            self.heard += &String::from_utf8(self.machine.received()).expect("ASCII");
+        }
+        panic!("no answer, but {:?}", self.heard);
+    }
+
+    fn ask(&mut self, line: &str) -> String {
+        self.send(line);
+        self.hear()
+    }
+
+    fn steps(&mut self) -> [i64; 3] {
+        assert_eq!(self.ask("M400"), "ok\n");
+        self.machine.run_ms(50);
+        let at = self.machine.emitted().position;
+        [at[0], at[1], at[2]]
+    }
+
+    /// Where the motors are when the nozzle is there.
+    fn steps_at(&self, [x, y, z]: [i32; 3]) -> [i64; 3] {
+        let drives = if self.shared { [x + y, x - y, z] } else { [x, y, z] };
+        [0, 1, 2].map(|n| i64::from(RATIOS[n].steps(Length(drives[n]))))
+    }
+
+    /// X, Y and Z that the second port tells, in units of length: to 1 um.
+    fn told(&mut self) -> [i32; 3] {
+        let told = self.control("{mpo:n}");
+        ["\"x\":", "\"y\":", "\"z\":"].map(|name| {
+            let (_, rest) = told.split_once(name).unwrap_or_else(|| panic!("{told}"));
+            let mm: f64 = rest.split([',', '}']).next().unwrap().parse().unwrap();
+            (mm * f64::from(Length::PER_MM)).round() as i32
+        })
+    }
+}
+
+/// On a thread of its own: a machine is a thread's.
+fn alone(play: impl FnOnce() + Send + 'static) -> bool {
+    thread::spawn(play).join().is_ok()
+}
+
+/// What a program does.
+#[derive(Clone, Debug)]
+enum Op {
+    /// To a place, in hundredths of a mm, at so many mm/s.
+    Go([i32; 3], u32),
+    /// So far, with G91.
+    By([i32; 3]),
+    /// To a place in X and Y on a half circle, and Z on the way.
+    Arc([i32; 3], bool),
+    /// A place is called otherwise, with G92.
+    Name([i32; 3]),
+    /// M420 S.
+    Follow(bool),
+    /// G29 S5 and three points: heights at the corners, and which of them comes first.
+    Bed([i32; 3], usize),
+    /// ms, then a hold of 300 ms.
+    Hold(u64),
+    /// ms, then what is queued is dropped.
+    Flush(u64),
+    /// The place of X is called otherwise for good, with G28.3.
+    Rename(i32),
+    Inches,
+}
+
+fn place() -> impl Strategy<Value = [i32; 3]> {
+    (-3_000..3_000, -3_000..3_000, 0..300).prop_map(|(x, y, z)| [x, y, z])
+}
+
+fn any_op() -> impl Strategy<Value = Op> {
+    prop_oneof![
+        5 => (place(), 10u32..200).prop_map(|(to, feed)| Op::Go(to, feed)),
+        2 => (prop::array::uniform3(-30..30)).prop_map(Op::By),
+        2 => (place(), any::<bool>()).prop_map(|(to, left)| Op::Arc(to, left)),
+        1 => place().prop_map(Op::Name),
+        1 => any::<bool>().prop_map(Op::Follow),
+        1 => (prop::array::uniform3(-150..150), 0usize..3).prop_map(|(z, first)| Op::Bed(z, first)),
+        1 => (0u64..400).prop_map(Op::Hold),
+        1 => (0u64..400).prop_map(Op::Flush),
+        1 => (-1_000..1_000).prop_map(Op::Rename),
+        1 => Just(Op::Inches),
+    ]
+}
+
+/// Where a machine should be.
+struct Model {
+    at: [i32; 3],
+    /// What G92 has it called: that less the place.
+    shift: [i32; 3],
+    /// How far motors are off what G28.3 has called them, in X.
+    base: i32,
+    /// How many steps X may be off: what is called otherwise is so to a step.
+    slack: i64,
+    bed: Bed,
+}
+
+impl Model {
+    /// The place of the motors.
+    fn motors(&self) -> [i32; 3] {
+        let [x, y, z] = self.at.map(Length);
+        let lifted = if self.bed.follows() { self.bed.lifted_z(x, y, z) } else { z };
+        [x.0, y.0, lifted.0]
+    }
+
+    fn follow(&mut self, follows: bool) {
+        let [.., z] = self.motors();
+        self.bed.follow(follows);
+        let [x, y, _] = self.at.map(Length);
+        self.at[2] =
+            if self.bed.follows() { self.bed.lowered_z(x, y, Length(z)).0 } else { z };
+    }
+
+    /// The words of a place.
+    fn words(&self, at: [i32; 3]) -> String {
+        let called = [0, 1, 2].map(|n| f64::from(at[n] + self.shift[n]) / 1e4);
+        format!("X{:.4} Y{:.4} Z{:.4}", called[0], called[1], called[2])
+    }
+}
+
+/// The corners by which a bed is named, in hundredths of a mm.
+const CORNERS: [[i32; 2]; 3] = [[0, 0], [3_000, 0], [0, 3_000]];
+
+fn carry_out(printer: &mut Printer, model: &mut Model, op: &Op) {
+    let units = |place: [i32; 3]| place.map(|at| at * HUNDREDTH);
+    match op {
+        Op::Go(to, feed) => {
+            model.at = units(*to);
+            let line = format!("G1 {} F{}", model.words(model.at), feed * 60);
+            assert_eq!(printer.ask(&line), "ok\n", "{line}");
+        }
+        Op::By(by) => {
+            let mm = by.map(|by| f64::from(by) / 100.0);
+            printer.ask("G91");
+            printer.ask(&format!("G1 X{:.2} Y{:.2} Z{:.2}", mm[0], mm[1], mm[2]));
+            printer.ask("G90");
+            for (at, by) in model.at.iter_mut().zip(by) {
+                *at += by * HUNDREDTH;
+            }
+        }
+        Op::Arc(to, left) => {
+            // Even, so that the center is a whole unit.
+            let to = to.map(|at| at * HUNDREDTH);
+            let half = [0, 1].map(|n| f64::from(to[n] - model.at[n]) / 2e4);
+            if half == [0.0; 2] {
+                return;
+            }
+            model.at = to;
+            let code = if *left { "G3" } else { "G2" };
+            let line = format!("{code} {} I{:.5} J{:.5}", model.words(to), half[0], half[1]);
+            assert_eq!(printer.ask(&line), "ok\n", "{line}");
+        }
+        Op::Name(called) => {
+            let called = units(*called);
+            model.shift = [0, 1, 2].map(|n| called[n] - model.at[n]);
+            assert_eq!(printer.ask(&format!("G92 {}", model.words(model.at))), "ok\n");
+        }
+        Op::Follow(follows) => {
+            let answer = printer.ask(&format!("M420 S{}", u8::from(*follows)));
+            if *follows && !model.bed.is_known() {
+                assert!(answer.contains("fewer than three points"), "{answer}");
+            } else {
+                assert_eq!(answer, "ok\n");
+                model.follow(*follows);
+            }
+        }
+        Op::Bed(heights, first) => {
+            assert_eq!(printer.ask("G29 S5"), "ok\n");
+            model.follow(false);
+            model.bed.forget();
+            for n in 0..3 {
+                let corner = (first + n) % 3;
+                let [x, y] = CORNERS[corner].map(|at| at * HUNDREDTH);
+                let z = heights[corner] * HUNDREDTH / 2;
+                let [mx, my, mz] = [x, y, z].map(|at| f64::from(at) / 1e4);
+                let line = format!("G29 S1 X{mx:.4} Y{my:.4} Z{mz:.4}");
+                let refused = model.bed.add([x, y, z].map(Length)).is_err();
+                let answer = printer.ask(&line);
+                assert_eq!(answer != "ok\n", refused, "{line}: {answer}");
+            }
+            model.follow(true);
+        }
+        Op::Hold(ms) => {
+            printer.machine.run_ms(*ms);
+            printer.control("!");
+            printer.machine.run_ms(300);
+            printer.control("~");
+        }
+        Op::Flush(ms) => {
+            printer.machine.run_ms(*ms);
+            printer.control("!");
+            printer.machine.run_ms(500);
+            printer.control("%");
+            printer.machine.run_ms(500);
+            printer.control("~");
+            let steps = printer.steps();
+            // It is told to 1 um, which is less than half a step.
+            model.at = printer.told();
+            near(printer, model, steps);
+        }
+        Op::Rename(x) => {
+            let x = x * HUNDREDTH;
+            let (from, mut to) = (model.at, model.at);
+            to[0] = x;
+            let all = |at: [i32; 3]| [at[0], at[1], at[2], 0, 0, 0].map(Length);
+            // A flush drops it if it waits.
+            printer.ask("M400");
+            assert_eq!(printer.ask(&format!("G28.3 X{:.4}", f64::from(x) / 1e4)), "ok\n");
+            printer.ask("M400");
+            // G28.3 names machine coordinates.
+            model.bed.rename(&all(from), &all(to));
+            model.base += from[0] - x;
+            model.slack += 1;
+            model.at = to;
+        }
+        Op::Inches => {
+            assert_eq!(printer.ask("G20"), "ok\n");
+            assert_eq!(printer.ask("G91"), "ok\n");
+            assert_eq!(printer.ask("G1 X0.1 Z0.01"), "ok\n");
+            assert_eq!(printer.ask("G21"), "ok\n");
+            assert_eq!(printer.ask("G90"), "ok\n");
+            model.at[0] += 25_400;
+            model.at[2] += 2_540;
+        }
+    }
+}
+
+/// The motors are where the model has them.
+fn near(printer: &Printer, model: &Model, steps: [i64; 3]) {
+    let [x, y, z] = model.motors();
+    let wanted = printer.steps_at([x + model.base, y, z]);
+    let slacks = [model.slack, model.slack, 1];
+    let near = (0..3).all(|n| (wanted[n] - steps[n]).abs() <= slacks[n]);
+    assert!(near, "{steps:?} instead of {wanted:?}, {:?}", model.bed);
+}
+
+fn play(ops: &[Op], shared: bool) {
+    let mut printer = Printer::boot(shared);
+    let mut model = Model { at: [0; 3], shift: [0; 3], base: 0, slack: 1, bed: Bed::NONE };
+    carry_out(&mut printer, &mut model, &Op::Bed([0, 150, -120], 0));
+    for op in ops {
+        carry_out(&mut printer, &mut model, op);
+    }
+    let steps = printer.steps();
+    near(&printer, &model, steps);
+    // What is told is where it is.
+    let told = printer.told();
+    let off = [0, 1, 2].map(|n| (told[n] - model.at[n]).abs());
+    assert!(off.iter().all(|off| *off <= 150), "{told:?} {:?}", model.at);
+    // Without the plane no motor moves, and the way to Z 0 is as long as it is.
+    model.follow(false);
+    assert_eq!(printer.ask("M420 S0"), "ok\n");
+    assert_eq!(printer.steps(), steps);
+    carry_out(&mut printer, &mut model, &Op::Go([500, 500, 0], 100));
+    let steps = printer.steps();
+    near(&printer, &model, steps);
+}
+
+/// How long it takes, and a little more.
+const LEVELING_MS: u64 = 5_500;
+
+/// Ends G29 so many ms after its beginning.
+fn end_leveling(ms: u64, by: &str) {
+    let mut printer = Printer::homed(false);
+    printer.send("G29 L0 R20 F0 B20 Z2");
+    printer.machine.run_ms(ms);
+    if by == "M112" {
+        printer.send(by);
+    } else {
+        by.bytes().for_each(|byte| {
+            printer.machine.send_aux(&[byte]);
+            printer.machine.run_ms(500);
+        });
+    }
+    let told = printer.hear();
+    let is_over = told.contains("Bed leveling status: active (3)");
+    if by == "M112" {
+        printer.hear();
+    }
+    printer.ask("M999");
+    let follows = printer.ask("M420 S1");
+    assert_eq!(follows.contains("fewer than three points"), !is_over, "{ms} {by}: {told}{follows}");
+}
+
+#[test]
+fn whatever_ends_g29_early_leaves_no_plane() {
+    for by in ["M112", "!%~"] {
+        let all = (0..LEVELING_MS).step_by(230);
+        for ms in all.chain((LEVELING_MS - 900..LEVELING_MS).step_by(25)) {
+            assert!(alone(move || end_leveling(ms, by)), "{by} after {ms} ms");
+        }
+    }
+}
+
+#[test]
+fn a_height_beyond_the_travel_of_z_is_refused() {
+    assert!(alone(|| {
+        let mut printer = Printer::homed(false);
+        printer.control("{ztm:10}");
+        let told = printer.ask("G29 L0 R20 F0 B20 Z12");
+        assert!(told.contains("Error:beyond a soft limit"), "{told}");
+        let told = printer.ask("G29 L0 R20 F0 B20 Z8");
+        assert!(told.contains("active (3)"), "{told}");
+    }));
+}
+
+proptest! {
+    #![proptest_config(cases(40))]
+
+    #[test]
+    fn any_program_ends_on_the_step_that_the_plane_says(
+        ops in prop::collection::vec(any_op(), 1..25),
+        shared: bool,
+    ) {
+        let done = alone(move || play(&ops, shared));
+        prop_assert!(done);
+    }
+}
