@@ -3,7 +3,7 @@
 mod common;
 
 use common::{booted, firmware, set};
-use kerf::boards::{RAMPS14, RAMPS14_SD};
+use kerf::boards::{Board, RAMPS14, RAMPS14_SD};
 use kerf_sim::Machine;
 use kerf_sim::mechanics::Build;
 
@@ -19,27 +19,46 @@ fn height(plane: [f64; 3], x: f64, y: f64) -> f64 {
     plane[0] + plane[1] * x + plane[2] * y
 }
 
+/// How X and Y are driven.
+#[derive(Clone, Copy, PartialEq)]
+enum Drive {
+    /// By a motor each.
+    Alone,
+    /// By the sum and the difference of two.
+    CoreXy,
+}
+
 struct Printer {
     machine: Machine,
+    drive: Drive,
     said: String,
 }
 
 impl Printer {
-    /// A printer of 200 mm that is homed.
-    fn homed() -> Self {
+    /// A printer of 200 mm that is homed, with the image of a board.
+    fn homed(board: &'static Board, drive: Drive) -> Self {
         let (mut machine, mut host) = booted(&RAMPS14);
         set(&mut machine, &mut host, "{mch:3}");
+        if drive == Drive::CoreXy {
+            set(&mut machine, &mut host, "{1ma:6}");
+            set(&mut machine, &mut host, "{2ma:7}");
+        }
         host.run_for_ms(&mut machine, 6_000).unwrap();
         let kept = *machine.eeprom();
-        let mut machine = firmware(&RAMPS14_SD);
+        let mut machine = firmware(board);
         machine.set_eeprom(&kept);
-        let mut build = Build::of(&RAMPS14_SD);
+        let mut build = Build::of(board);
         for ((axis, steps), start) in build.axes.iter_mut().zip(STEPS).zip([15.0, 12.0, 9.0]) {
             (axis.steps_per_mm, axis.start, axis.travel, axis.max) = (steps, start, 220.0, None);
         }
+        if drive == Drive::CoreXy {
+            build = build.core_xy(STEPS[0]);
+        }
         machine.build(&build);
-        let mut printer = Self { machine, said: String::new() };
+        let mut printer = Self { machine, drive, said: String::new() };
         printer.run(1_000);
+        // It decides for the dialect where there are several.
+        assert!(printer.ask_all("M105").starts_with("ok T:"));
         assert_eq!(printer.ask("M302 P1"), "");
         assert_eq!(printer.ask("G28"), "");
         printer
@@ -52,12 +71,18 @@ impl Printer {
 
     /// Sends a line and waits for `ok`: what came before it.
     fn ask(&mut self, line: &str) -> String {
+        let said = self.ask_all(line);
+        said.trim_end_matches("ok\n").to_owned()
+    }
+
+    /// Sends a line and waits for a line that begins with `ok`: all that is said.
+    fn ask_all(&mut self, line: &str) -> String {
         self.said.clear();
         self.machine.send(format!("{line}\n").as_bytes());
         for _ in 0..60_000 {
-            if self.said.ends_with("ok\n") {
-                let said = self.said.replace("echo:busy: processing\n", "");
-                return said.trim_end_matches("ok\n").to_owned();
+            let last = self.said.lines().next_back().unwrap_or_default();
+            if self.said.ends_with('\n') && last.starts_with("ok") {
+                return self.said.replace("echo:busy: processing\n", "");
             }
             self.run(1);
         }
@@ -66,6 +91,15 @@ impl Printer {
 
     fn steps(&self) -> [i64; 3] {
         [0, 1, 2].map(|motor| self.machine.recorder().motors()[motor].position)
+    }
+
+    /// Where X, Y and Z are, in steps of an axis, the motors being there.
+    fn axes(&self, [a, b, z]: [i64; 3]) -> [f64; 3] {
+        let [a, b, z] = [a, b, z].map(|steps| steps as f64);
+        match self.drive {
+            Drive::Alone => [a, b, z],
+            Drive::CoreXy => [(a + b) / 2.0, (a - b) / 2.0, z],
+        }
     }
 
     /// Where the machine is called 0, in steps.
@@ -100,7 +134,8 @@ impl Printer {
             if let Some(at) = at.get_mut(usize::from(step.motor)) {
                 *at += if step.positive { 1 } else { -1 };
             }
-            let place = [0, 1, 2].map(|n| (at[n] - zero[n]) as f64 / STEPS[n]);
+            let from_zero = self.axes([0, 1, 2].map(|n| at[n] - zero[n]));
+            let place = [0, 1, 2].map(|n| from_zero[n] / STEPS[n]);
             let off = place[2] - height(plane, place[0], place[1]);
             worst = worst.max(off.abs() * STEPS[2]);
         }
@@ -129,7 +164,18 @@ fn plane(told: &str) -> [f64; 3] {
 
 #[test]
 fn a_square_and_a_circle_follow_a_tilted_bed() {
-    let mut printer = Printer::homed();
+    for board in [&RAMPS14, &RAMPS14_SD] {
+        follow(Printer::homed(board, Drive::Alone));
+    }
+}
+
+#[test]
+fn a_core_xy_machine_follows_a_tilted_bed() {
+    follow(Printer::homed(&RAMPS14, Drive::CoreXy));
+}
+
+/// Finds the bed, follows it and homes again.
+fn follow(mut printer: Printer) {
     printer.place_bed();
     let told = printer.ask("G29");
     println!("{told}");
@@ -173,7 +219,7 @@ fn a_square_and_a_circle_follow_a_tilted_bed() {
 
 #[test]
 fn the_limits_of_z_hold_for_what_it_really_does() {
-    let mut printer = Printer::homed();
+    let mut printer = Printer::homed(&RAMPS14, Drive::Alone);
     for line in ["G29 S1 X0 Y0 Z0", "G29 S1 X200 Y0 Z8", "G29 S1 X0 Y200 Z0", "M203 Z1"] {
         assert_eq!(printer.ask(line), "", "{line}");
     }
@@ -196,7 +242,7 @@ fn the_limits_of_z_hold_for_what_it_really_does() {
 
 #[test]
 fn a_stop_within_it_and_a_probe_that_never_closes_leave_no_plane() {
-    let mut printer = Printer::homed();
+    let mut printer = Printer::homed(&RAMPS14, Drive::Alone);
     // No bed: Z goes down to its end, and no further.
     let told = printer.ask("G29 Z2");
     assert!(told.contains("Error:probing failed") && told.contains("Error:alarm"), "{told}");

@@ -29,7 +29,9 @@ pub struct Build {
 pub struct Axis {
     /// The motor that moves it, counted from 0.
     pub motor: usize,
-    /// Steps of that motor in a millimetre.
+    /// A second one that moves it as far with each step, as on a CoreXY machine; and whether a low direction pin of that moves it down.
+    pub second: Option<(usize, bool)>,
+    /// Steps in a millimetre, of both motors together.
     pub steps_per_mm: f64,
     /// Whether a low direction pin moves it down.
     pub reversed: bool,
@@ -176,6 +178,15 @@ impl Build {
         build
     }
 
+    /// This machine with X and Y driven by the sum and the difference of two motors of so many steps in a millimetre.
+    pub fn core_xy(mut self, steps_per_mm: f64) -> Build {
+        for (axis, reversed) in self.axes.iter_mut().zip([false, true]) {
+            (axis.motor, axis.second, axis.steps_per_mm) =
+                (0, Some((1, reversed)), 2.0 * steps_per_mm);
+        }
+        self
+    }
+
     /// This machine with all switches of axes wired as `wiring` says.
     pub fn wired(mut self, wiring: Wiring) -> Build {
         let ends = self.axes.iter_mut().flat_map(|axis| [&mut axis.min, &mut axis.max]);
@@ -191,6 +202,7 @@ fn linear(motor: usize, travel: f64) -> Axis {
     let switch = |at| Switch { at, hysteresis: 0.2, wiring: Wiring::NormallyOpen };
     Axis {
         motor,
+        second: None,
         steps_per_mm: 1_280.0,
         reversed: false,
         travel,
@@ -202,6 +214,7 @@ fn linear(motor: usize, travel: f64) -> Axis {
 
 fn rotary(motor: usize) -> Axis {
     let (min, max) = (None, None);
-    let travel = f64::INFINITY;
-    Axis { motor, steps_per_mm: 1_600.0 / 360.0, reversed: false, travel, start: 0.0, min, max }
+    let (second, travel) = (None, f64::INFINITY);
+    let steps_per_mm = 1_600.0 / 360.0;
+    Axis { motor, second, steps_per_mm, reversed: false, travel, start: 0.0, min, max }
 }

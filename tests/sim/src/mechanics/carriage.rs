@@ -6,6 +6,7 @@ use super::build::{Axis, Switch};
 pub struct Carriage {
     motor: usize,
     reversed: bool,
+    second: Option<(usize, bool)>,
     steps_per_mm: f64,
     /// `None` without ends.
     travel: Option<i64>,
@@ -39,6 +40,7 @@ impl Carriage {
         let mut carriage = Carriage {
             motor: axis.motor,
             reversed: axis.reversed,
+            second: axis.second,
             steps_per_mm: axis.steps_per_mm,
             travel: axis.travel.is_finite().then(|| axis.steps(axis.travel)),
             steps: axis.steps(axis.start),
@@ -78,10 +80,12 @@ impl Carriage {
 
     /// A motor steps.
     pub fn step(&mut self, motor: usize, positive: bool) {
-        if motor != self.motor {
-            return;
-        }
-        let next = self.steps + if positive != self.reversed { 1 } else { -1 };
+        let reversed = match self.second {
+            _ if motor == self.motor => self.reversed,
+            Some((second, reversed)) if motor == second => reversed,
+            _ => return,
+        };
+        let next = self.steps + if positive != reversed { 1 } else { -1 };
         match self.travel {
             Some(travel) if !(0..=travel).contains(&next) => self.lost += 1,
             _ => self.steps = next,
