@@ -46,9 +46,8 @@ impl Printer {
     }
 
     /// One that is homed, and has a bed 0.1 mm below the place that is called 0.
-    fn homed(shared: bool) -> Self {
-        let mut printer = Self::boot(shared);
-        // Switches go by motors. Those of X and Y never move far.
+    fn homed() -> Self {
+        let mut printer = Self::boot(false);
         for (switch, step) in [(X_MIN, -80), (Y_MIN, -80), (Z_MIN, -400), (PROBE, -40)] {
             printer.machine.set_near(switch, step, false);
         }
@@ -140,6 +139,10 @@ enum Op {
     /// The place of X is called otherwise for good, with G28.3.
     Rename(i32),
     Inches,
+    /// Filament is drawn back and pushed forward, the nozzle lifted meanwhile.
+    Hop,
+    /// The motors lose their power at rest.
+    Off,
 }
 
 fn place() -> impl Strategy<Value = [i32; 3]> {
@@ -158,6 +161,8 @@ fn any_op() -> impl Strategy<Value = Op> {
         1 => (0u64..400).prop_map(Op::Flush),
         1 => (-1_000..1_000).prop_map(Op::Rename),
         1 => Just(Op::Inches),
+        1 => Just(Op::Hop),
+        1 => Just(Op::Off),
     ]
 }
 
@@ -291,6 +296,17 @@ fn carry_out(printer: &mut Printer, model: &mut Model, op: &Op) {
             model.slack += 1;
             model.at = to;
         }
+        Op::Hop => {
+            for line in ["G10", "G91", "G1 Z1.5", "G1 X2 Y-3", "G1 Z-1.5", "G90", "G11"] {
+                assert_eq!(printer.ask(line), "ok\n", "{line}");
+            }
+            model.at[0] += 20_000;
+            model.at[1] -= 30_000;
+        }
+        Op::Off => {
+            assert_eq!(printer.ask("M84"), "ok\n");
+            printer.machine.run_ms(100);
+        }
         Op::Inches => {
             assert_eq!(printer.ask("G20"), "ok\n");
             assert_eq!(printer.ask("G91"), "ok\n");
@@ -339,7 +355,7 @@ const LEVELING_MS: u64 = 5_500;
 
 /// Ends G29 so many ms after its beginning.
 fn end_leveling(ms: u64, by: &str) {
-    let mut printer = Printer::homed(false);
+    let mut printer = Printer::homed();
     printer.send("G29 L0 R20 F0 B20 Z2");
     printer.machine.run_ms(ms);
     if by == "M112" {
@@ -373,13 +389,95 @@ fn whatever_ends_g29_early_leaves_no_plane() {
 #[test]
 fn a_height_beyond_the_travel_of_z_is_refused() {
     assert!(alone(|| {
-        let mut printer = Printer::homed(false);
+        let mut printer = Printer::homed();
         printer.control("{ztm:10}");
         let told = printer.ask("G29 L0 R20 F0 B20 Z12");
         assert!(told.contains("Error:beyond a soft limit"), "{told}");
         let told = printer.ask("G29 L0 R20 F0 B20 Z8");
         assert!(told.contains("active (3)"), "{told}");
     }));
+}
+
+/// A printer that follows a bed which rises by 1 in 50 along X and falls by 1 in 40 along Y.
+fn following(shared: bool) -> Printer {
+    // Switches go by motors here, so that CoreXY cannot home.
+    let mut printer = if shared { Printer::boot(true) } else { Printer::homed() };
+    for line in ["G29 S1 X0 Y0 Z0", "G29 S1 X100 Y0 Z2", "G29 S1 X0 Y100 Z-2.5"] {
+        assert_eq!(printer.ask(line), "ok\n", "{line}");
+    }
+    assert_eq!(printer.ask("G1 X10 Y10 Z1 F6000"), "ok\n");
+    printer.steps();
+    printer
+}
+
+#[test]
+fn reports_say_how_high_it_is_above_the_bed_on_the_way_too() {
+    for shared in [false, true] {
+        assert!(alone(move || {
+            let mut printer = following(shared);
+            assert_eq!(printer.ask("G1 X90 Y70 F1800"), "ok\n");
+            assert_eq!(printer.ask("G2 X50 Y30 I-40 J0"), "ok\n");
+            for _ in 0..60 {
+                let [x, y, z] = printer.told();
+                assert!((z - 10_000).abs() <= 60, "{x} {y} {z}");
+            }
+            printer.ask("M400");
+            assert_eq!(printer.told(), [500_000, 300_000, 10_000]);
+        }));
+    }
+}
+
+#[test]
+fn a_probe_tells_how_high_the_contact_is_above_the_plane() {
+    assert!(alone(|| {
+        let mut printer = following(false);
+        printer.machine.set_near(PROBE, 100, false);
+        assert_eq!(printer.ask("G1 X60 Y0 Z0.5"), "ok\n");
+        assert_eq!(printer.ask("G38.2 X50 Z-3 F100"), "ok\n");
+        let [.., z] = printer.steps();
+        let [x, y, told] = printer.told();
+        assert_eq!(y, 0);
+        // Homing has left Z 1 step off 0.
+        let wanted = (z - 1) * 25 - i64::from(x) / 50;
+        assert!((i64::from(told) - wanted).abs() <= 60, "{told} {wanted}");
+        assert!((z - 100).abs() <= 1, "{z}");
+    }));
+}
+
+#[test]
+fn z_of_other_steps_follows_by_those() {
+    assert!(alone(|| {
+        let mut printer = following(false);
+        let before = printer.steps();
+        assert_eq!(printer.ask("M92 Z800"), "ok\n");
+        assert_eq!(printer.steps(), before);
+        assert_eq!(printer.told(), [100_000, 100_000, 10_000]);
+        printer.ask("G1 X60 Y30 Z1");
+        let after = printer.steps();
+        // 1 mm up along X, half a mm down along Y.
+        assert!((after[2] - before[2] - 400).abs() <= 1, "{before:?} {after:?}");
+    }));
+}
+
+#[test]
+fn a_hold_keeps_g29_and_m420_waiting() {
+    for line in ["G29 L0 R20 F0 B20 Z2", "M420 S0", "G29 S5", "G29 S1 X0 Y0 Z1"] {
+        assert!(alone(move || {
+            let mut printer = following(false);
+            assert_eq!(printer.ask("G1 X90 F600"), "ok\n");
+            printer.machine.run_ms(300);
+            printer.control("!");
+            printer.send(line);
+            printer.machine.run_ms(1_000);
+            let held = printer.machine.emitted().position;
+            printer.machine.run_ms(3_000);
+            assert_eq!(printer.machine.emitted().position, held);
+            let heard = String::from_utf8(printer.machine.received()).unwrap();
+            assert_eq!(heard.replace("echo:busy: processing\n", ""), "", "{line}");
+            printer.control("~");
+            assert!(!printer.hear().contains("Error"), "{line}");
+        }));
+    }
 }
 
 proptest! {
