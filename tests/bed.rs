@@ -190,8 +190,7 @@ impl Model {
         let [.., z] = self.motors();
         self.bed.follow(follows);
         let [x, y, _] = self.at.map(Length);
-        self.at[2] =
-            if self.bed.follows() { self.bed.lowered_z(x, y, Length(z)).0 } else { z };
+        self.at[2] = if self.bed.follows() { self.bed.lowered_z(x, y, Length(z)).0 } else { z };
     }
 
     /// The words of a place.
@@ -383,6 +382,65 @@ fn whatever_ends_g29_early_leaves_no_plane() {
         for ms in all.chain((LEVELING_MS - 900..LEVELING_MS).step_by(25)) {
             assert!(alone(move || end_leveling(ms, by)), "{by} after {ms} ms");
         }
+    }
+}
+
+/// The second port has the machine do something else so many ms after the beginning of G29.
+fn interfere(ms: u64, line: &str) {
+    let mut printer = Printer::homed();
+    printer.send("G29 L0 R20 F0 B20 Z2");
+    printer.machine.run_ms(ms);
+    printer.control(line);
+    let told = printer.hear();
+    printer.control("{clear:n}");
+    printer.control("{chk:0}");
+    let points = printer.ask("M420");
+    for z in points.split(" Z").skip(1).filter_map(|rest| rest.lines().next()) {
+        let z: f64 = z.parse().unwrap();
+        assert!((z + 0.103).abs() < 0.005, "{line} {ms}: {told}{points}");
+    }
+    let is_known = points.contains("(3)");
+    assert_eq!(is_known, told.contains("active (3)"), "{line} {ms}: {told}{points}");
+    let follows = printer.ask("M420 S1");
+    assert_eq!(follows == "ok\n", is_known, "{line} {ms}: {follows}");
+}
+
+#[test]
+fn another_port_within_g29_leaves_the_plane_or_none() {
+    let lines = [
+        "g1 x5 f3000",
+        "g1 z1 f300",
+        "g0 z9",
+        "g28.3 x3",
+        "{home:1}",
+        "g28.2 z0",
+        "g30",
+        "g55",
+        "{jogx:7}",
+        "{chk:1}",
+        "g38.2 z-3 f100",
+        "\x04",
+        "{xtm:15}",
+        "{ztm:1}",
+        "m2",
+        "g92 x7",
+    ];
+    for line in lines {
+        for ms in (0..LEVELING_MS).step_by(330) {
+            assert!(alone(move || interfere(ms, line)), "{line} after {ms} ms");
+        }
+    }
+}
+
+#[test]
+fn codes_of_a_host_begin_where_another_port_has_fed_the_machine() {
+    for line in ["G29 S5", "M420 S0", "G10", "M900 K0.05"] {
+        assert!(alone(move || {
+            let mut printer = Printer::homed();
+            printer.control("g0 x1");
+            printer.machine.run_ms(2_000);
+            assert_eq!(printer.ask(line), "ok\n", "{line}");
+        }));
     }
 }
 

@@ -783,8 +783,12 @@ fn fast_path(links: &Links) -> FastPath {
 #[inline(never)]
 pub(super) fn fast_path_of(links: &Links, line: &[u8]) -> bool {
     let port = links.told();
+    // It borrows the settings, too.
+    if machine::is_checking() || !links.may_feed(port) {
+        return false;
+    }
     let settings = links.settings.borrow();
-    if machine::is_checking() || !is_printing(port, &settings) || !links.may_feed(port) {
+    if !is_printing(port, &settings) {
         return false;
     }
     let mut commands = links.commands.borrow_mut();

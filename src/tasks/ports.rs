@@ -22,7 +22,7 @@ use crate::hal::event::{is_unheard, set_eager};
 use crate::hal::serial::{Flow, USB, is_shared};
 use crate::hal::uart;
 use crate::machine::{self, Alarm};
-use crate::protocol::{Remembers, Speech};
+use crate::protocol::Speech;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
 
@@ -355,16 +355,7 @@ impl Links {
 
     /// Whether G-code of this port is taken. It feeds the machine from now on, if that is at rest.
     pub fn may_feed(&self, port: &Port) -> bool {
-        if port.number == self.feeder.get() {
-            return true;
-        }
-        let waits = self.feeder().lines.borrow().has_data();
-        let free = !waits && !View::of(self, port).is_busy();
-        if free {
-            self.feeder.set(port.number);
-            // It has been told nothing so far.
-            self.report.borrow_mut().refresh();
-        }
-        free
+        // A view borrows the settings.
+        port.number == self.feeder.get() || View::of(self, port).may_feed()
     }
 }

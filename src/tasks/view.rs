@@ -237,6 +237,22 @@ impl<'a> View<'a> {
         if busy { Err(Status::NotAccepted) } else { Ok(()) }
     }
 
+    /// As [`Links::may_feed`], where this view is at hand: there is one at a time.
+    pub fn may_feed(&mut self) -> bool {
+        let links = self.links;
+        if self.port.number == links.feeder.get() {
+            return true;
+        }
+        let waits = links.feeder().lines.borrow().has_data();
+        let free = !waits && !self.is_busy();
+        if free {
+            links.feeder.set(self.port.number);
+            // It has been told nothing so far.
+            self.report.refresh();
+        }
+        free
+    }
+
     /// Whether lines of G-code wait that are carried out first. Where lines are answered in their order those of the port come later.
     fn has_others(&self) -> bool {
         let in_order = self.port.speech.get().is_in_order() || self.port.is_plain();
@@ -696,7 +712,7 @@ impl Machine for View<'_> {
         if alarm != Alarm::None {
             return alarm.status();
         }
-        if !links.may_feed(self.port) {
+        if !self.may_feed() {
             return Status::Muted;
         }
         if let Err(status) = Setup::heats(&*self.settings, part) {
@@ -776,7 +792,7 @@ impl Machine for View<'_> {
         if alarm != Alarm::None {
             return alarm.status();
         }
-        if !links.may_feed(self.port) {
+        if !self.may_feed() {
             return Status::Muted;
         }
         if machine::is_checking() {
