@@ -848,7 +848,7 @@ fn begin(
     let gcode = request.gcode();
     if let Some(block) = gcode {
         let (status, commented) = match *deferred {
-            Deferred::Answer => (Status::Ok, false),
+            Deferred::Answer if port.number == links.feeder.get() => (Status::Ok, false),
             _ => run_block(links, port, block.of(line), tried),
         };
         if status == Status::Again {
@@ -858,12 +858,13 @@ fn begin(
         }
         request.ran(status, commented);
     }
-    if request.awaits_rest() && port.number == links.feeder.get() && is_working(links) {
+    let feeds = port.number == links.feeder.get();
+    if request.awaits_rest() && feeds && is_working(links) {
         port.speech.set(before);
         *deferred = if gcode.is_some() { Deferred::Answer } else { Deferred::Line };
         return Begun::Again;
     }
-    if class != Class::Control {
+    if class != Class::Control && feeds {
         *deferred = Deferred::No;
     }
     let echoes = links.settings.borrow().echo();
