@@ -236,7 +236,7 @@ impl Parser {
     /// Goes on with the line of the SD card, or begins with the next one. Whether there may be more to do at once.
     #[cfg(feature = "sd")]
     fn feed(&mut self) -> bool {
-        let more = self.is_quiet() && self.feed.turn(self.links);
+        let more = self.is_quiet() && self.deferred == Deferred::No && self.feed.turn(self.links);
         if self.feed.take_move() {
             self.hand_over();
         }

@@ -315,3 +315,16 @@ fn a_print_begins_at_a_byte_of_the_file_or_at_once() {
     let place = printer.ask("M114");
     assert!(place.contains("X:13.000"), "{place}");
 }
+
+/// What a host sends meanwhile has its turn, also if it is answered at rest: the print waits for it.
+#[test]
+fn a_host_waits_for_rest_while_a_card_prints() {
+    let mut printer = Printer::new(FatType::Fat16, true, &[("A.GCO", zigzag(3_000))]);
+    printer.begin("A.GCO");
+    printer.ask("M24");
+    for line in ["M400", "M109 S0", "G4 P10", "M84"] {
+        printer.run(500);
+        printer.ask(line);
+        assert!(printer.ask("M27").contains("SD printing byte"), "{line}");
+    }
+}
