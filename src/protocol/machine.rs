@@ -208,6 +208,11 @@ pub trait Machine {
         None
     }
 
+    /// Whether lines of that file are taken.
+    fn card_prints(&mut self) -> bool {
+        false
+    }
+
     /// The file of that number on the SD card. `Err`: it cannot be read.
     fn card_entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
         let _ = number;

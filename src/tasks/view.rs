@@ -776,6 +776,11 @@ impl Machine for View<'_> {
     }
 
     #[cfg(feature = "sd")]
+    fn card_prints(&mut self) -> bool {
+        self.links.card.borrow().prints()
+    }
+
+    #[cfg(feature = "sd")]
     fn card_entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
         let mut card = self.links.card.borrow_mut();
         if card.prints() { Err(Status::NotAccepted) } else { card.entry(number) }

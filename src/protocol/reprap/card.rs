@@ -123,9 +123,11 @@ fn open(number: u16, at: u8, block: &[u8], machine: &mut impl Machine, out: &mut
     if number == 32 { done(machine.card(Op::Print(true))) } else { Step::Done }
 }
 
+/// OctoPrint takes a print that is paused for one that has been begun at the printer, if its bytes are told.
 #[small]
 fn progress(machine: &mut impl Machine, out: &mut impl Out) {
-    let Some((at, of)) = machine.card_progress() else {
+    let prints = machine.card_prints();
+    let Some((at, of)) = machine.card_progress().filter(|_| prints) else {
         return text(out, text!("Not SD printing\n"));
     };
     text(out, text!("SD printing byte "));
