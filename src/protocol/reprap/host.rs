@@ -264,10 +264,17 @@ fn motors_off(block: &[u8], machine: &mut impl Machine) -> Step {
     Step::Done
 }
 
-/// M118: the text comes back.
+/// M118: the text comes back, with `A1` behind `//`, with `E1` behind `echo:`; `P0`, the port, is left out.
 #[small]
 fn echo(at: u8, block: &[u8], out: &mut impl Out) -> Step {
-    let rest = words(block).get(usize::from(at)..).unwrap_or(&[]);
+    let mut rest = words(block);
+    while let [letter @ (b'A' | b'E' | b'P'), b'0'..=b'9', b' ', behind @ ..] = rest {
+        if at == 0 && *letter != b'P' {
+            text(out, if *letter == b'A' { text!("//") } else { text!("echo:") });
+        }
+        rest = behind;
+    }
+    let rest = rest.get(usize::from(at)..).unwrap_or(&[]);
     let part = rest.get(..PART).unwrap_or(rest);
     out.put_all(part.iter().copied());
     if part.len() == PART {
