@@ -59,6 +59,8 @@ pub struct Card {
     /// The rest of the line is a comment, or too long.
     skips: bool,
     is_long: bool,
+    /// Another place in a file is read from: what has been read of a line counts for nothing.
+    jumps: bool,
 }
 
 #[small]
@@ -72,6 +74,7 @@ impl Card {
             prints: false,
             skips: false,
             is_long: false,
+            jumps: false,
         }
     }
 
@@ -104,7 +107,7 @@ impl Card {
 
     /// Closes the file that is chosen, if one is: the print is at its end.
     pub fn close(&mut self) {
-        self.prints = false;
+        (self.prints, self.jumps) = (false, true);
         if let Some(file) = self.file.take() {
             let _ = self.manager.close_file(file);
         }
@@ -152,7 +155,7 @@ impl Card {
     /// Goes to a byte of the file, M26.
     pub fn seek(&mut self, at: u32) -> Status {
         let Some(file) = self.file else { return Status::CardError };
-        self.skips = false;
+        (self.skips, self.is_long, self.jumps) = (false, false, true);
         let done = self.manager.file_seek_from_start(file, at);
         status(done)
     }
@@ -187,6 +190,9 @@ impl Card {
     #[inline(never)]
     pub fn line(&mut self, line: &mut Vec<u8, LINE_MAX>) -> Line {
         let Some(file) = self.file else { return Line::Failed };
+        if core::mem::take(&mut self.jumps) {
+            line.clear();
+        }
         let mut piece = [0; PIECE];
         let Some((at, size)) = self.progress() else { return Line::Failed };
         if at >= size {

@@ -78,8 +78,8 @@ impl Feed {
         if self.request.is_some() {
             return self.go_on(links);
         }
+        // What has been read of a line is kept: M24 goes on in it.
         if !links.card.borrow().prints() {
-            self.line.clear();
             return false;
         }
         if machine::is_alarmed() {

@@ -339,3 +339,21 @@ fn a_host_waits_for_rest_while_a_card_prints() {
     printer.ask("M24");
     assert!(printer.ask("M27").contains("SD printing byte"));
 }
+
+/// Lines that are longer than a read, and blocks that are waited for: a pause comes in the middle of many.
+#[test]
+fn a_pause_within_a_line_loses_none_of_it() {
+    let line = format!("G1 X0.1 Y0.1 F3600 ; {}\r\n", "long ".repeat(30));
+    let mut printer =
+        Printer::new(FatType::Fat16, true, &[("A.G", format!("G91\n{}", line.repeat(120)))]);
+    printer.begin("A.G");
+    printer.machine.card().unwrap().access_us = 20_000;
+    let mut pauses = 0;
+    while printer.ask("M24").is_empty() {
+        printer.run(11);
+        printer.ask("M25");
+        pauses += 1;
+    }
+    let place = printer.ask("M114");
+    assert!(place.contains("X:12.000 Y:12.000"), "{pauses} pauses: {place}");
+}
