@@ -53,7 +53,7 @@ pub fn place(drives: u8, place: &PerAxis<Length>) -> Option<Length> {
     place.get(usize::from(drives)).copied()
 }
 
-/// As [`place`], by a call: where nothing is hot.
+/// As [`place()`], by a call: where nothing is hot.
 #[inline(never)]
 #[small]
 pub fn place_of(drives: u8, at: &PerAxis<Length>) -> Option<Length> {

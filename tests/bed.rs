@@ -70,12 +70,12 @@ impl Printer {
     /// What is heard before the next `ok`, and that.
     fn hear(&mut self) -> String {
         for _ in 0..600_000 {
-            if let Some(end) = self.heard.find("ok") {
-                if let Some(line) = self.heard[end..].find('\n') {
-                    let rest = self.heard.split_off(end + line + 1);
-                    let said = std::mem::replace(&mut self.heard, rest);
-                    return said.replace("echo:busy: processing\n", "");
-                }
+            if let Some(end) = self.heard.find("ok")
+                && let Some(line) = self.heard[end..].find('\n')
+            {
+                let rest = self.heard.split_off(end + line + 1);
+                let said = std::mem::replace(&mut self.heard, rest);
+                return said.replace("echo:busy: processing\n", "");
             }
             self.machine.run_ms(1);
             self.heard += &String::from_utf8(self.machine.received()).expect("ASCII");
