@@ -250,7 +250,7 @@ fn is_after(number: u16, other: u16) -> bool {
 #[inline(always)]
 #[small]
 fn key_at<M: Memory>(memory: &M, start: u16) -> u16 {
-    u16::from_le_bytes([memory.read(start + 1), memory.read(start + 2)])
+    u16::from_le_bytes([memory.read_here(start + 1), memory.read_here(start + 2)])
 }
 
 #[small]

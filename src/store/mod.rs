@@ -36,6 +36,11 @@ pub trait Memory {
     const LOG: u16 = Self::SIZE;
     /// The byte at an address; waits for a write under way.
     fn read(&self, at: u16) -> u8;
+    /// As [`Memory::read`], without a call: where all slots are looked through.
+    #[inline(always)]
+    fn read_here(&self, at: u16) -> u8 {
+        self.read(at)
+    }
     /// Whether a byte is being written.
     fn is_busy(&self) -> bool;
     /// Begins to write a byte. Not while busy.
