@@ -24,6 +24,9 @@ use crate::run::board;
 const TICK: Duration = Duration::from_millis(2);
 /// AVR time between two looks at full speed.
 const SLICE_MS: u64 = 2;
+/// Cycles by which slices are no whole ms until the firmware listens: else each of them might end within the tick's interrupt, in which it
+/// does not.
+const STRIDE: u64 = 1_009;
 /// From opening to the reset, as on a board that DTR resets; senders flush their input meanwhile.
 const RESET_DELAY: Duration = Duration::from_millis(100);
 /// A machine further behind than this does not try to catch up.
@@ -188,7 +191,8 @@ impl Server {
 
     fn run(&mut self) -> Result<()> {
         let until = match self.speed {
-            Speed::Max => self.machine.cycle() + self.machine.cycles(SLICE_MS),
+            Speed::Max if self.listens => self.machine.cycle() + self.machine.cycles(SLICE_MS),
+            Speed::Max => self.machine.cycle() + self.machine.cycles(SLICE_MS) + STRIDE,
             Speed::Times(factor) => self.pace(factor),
         };
         let Some(gdb) = &mut self.gdb else { return Ok(self.machine.run_until(until)?) };
