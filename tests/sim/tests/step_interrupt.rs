@@ -17,7 +17,7 @@ const FIRST_TICK: u64 = 400;
 /// The latest that a pulse comes behind its tick, cycles: `settle`, and what else holds the interrupt up.
 const LATEST: u64 = 320;
 
-/// The ring of the chip: slots of 16 bytes, then the slots filled and read last, and which ends have been taken.
+/// The ring of the chip: the slots filled and read last, which ends have been taken, then slots of 16 bytes.
 struct ChipRing(u16);
 
 impl ChipRing {
@@ -28,9 +28,9 @@ impl ChipRing {
         ring
     }
 
-    /// The address of a byte behind the slots.
+    /// The address of a byte before the slots.
     fn byte(&self, which: u16) -> u16 {
-        self.0 + SEGMENTS as u16 * 16 + which
+        self.0 + which
     }
 
     fn head(&self, machine: &Machine) -> u8 {
@@ -38,7 +38,7 @@ impl ChipRing {
     }
 
     fn slot(&self, index: u8) -> u16 {
-        self.0 + u16::from(index) * 16
+        self.0 + 3 + u16::from(index) * 16
     }
 
     /// How long the segment in a slot lasts, cycles.
