@@ -284,7 +284,7 @@ impl Intake {
         cuts
     }
 
-    /// Stops the sender, or lets it go on, when so many bytes wait in a ring of so many.
+    /// Stops the sender, or lets it go on, when so many bytes wait.
     #[inline(never)]
     fn control_flow(&mut self, waiting: u8, links: &Links) {
         let levels =

@@ -146,24 +146,25 @@ pub fn read() -> Pulses {
                 && field(&raw const (*sync).count) == pulses.sync
             {
                 pulses.now = now();
-                settle(index, pulses.now);
-                settle(sync, pulses.now);
+                settle(index);
+                settle(sync);
                 return pulses;
             }
         }
     }
 }
 
-/// Says of a pin that it is quiet, if it has been still for longer than it bounces.
+/// Says of a pin that it is quiet, if it has been still for longer than it bounces. The time is read behind the edge: an edge later than the
+/// time would look like one of 262 ms ago.
 ///
 /// # Safety
 /// It is one of the lines.
-unsafe fn settle(line: *mut Line, now: u16) {
+unsafe fn settle(line: *mut Line) {
     // SAFETY: as in `read`; `edge` and `quiet` go together, so they are compared and set with interrupts off.
     unsafe {
         let edge = mask(|| (&raw const (*line).edge).read_volatile());
         let bounce = (&raw const (*SHARED.0.get()).bounce).read_volatile();
-        if now.wrapping_sub(edge) >= bounce {
+        if now().wrapping_sub(edge) >= bounce {
             mask(|| {
                 if (&raw const (*line).edge).read_volatile() == edge {
                     (&raw mut (*line).quiet).write_volatile(1);

@@ -214,12 +214,15 @@ const JITTER: u64 = 1_600;
 
 #[test]
 fn sensors_that_jitter_bounce_or_are_wide_cut_as_well() {
-    let sensors: [Sensed; 10] = [
+    let sensors: [Sensed; 12] = [
         (1, 1_000.0, |of| of.jitter = JITTER, 0),
         (4, 1_000.0, |of| of.jitter = JITTER, 0),
         (100, 1_000.0, |of| of.jitter = JITTER, 0),
         (4, 300.0, |of| of.bounce = Some(Bounce { times: 3, cycles: 3_000 }), 500),
         (8, 600.0, |of| of.bounce = Some(Bounce { times: 5, cycles: 1_500 }), 200),
+        // Some of 10,000 edges come while the handler's work is read.
+        (100, 300.0, |of| of.bounce = Some(Bounce { times: 3, cycles: 3_000 }), 250),
+        (100, 300.0, |of| of.bounce = Some(Bounce { times: 3, cycles: 3_000 }), 250),
         // 50 us of a turn of 100 ms, and all but 50 us of one.
         (4, 600.0, |of| (of.index_width, of.width) = (0.0006, 0.0024), 0),
         (100, 600.0, |of| (of.index_width, of.width) = (0.0006, 0.06), 0),
@@ -242,15 +245,6 @@ fn sensors_that_jitter_bounce_or_are_wide_cut_as_well() {
         let most = phases.iter().map(|phase| apart(*phase, -behind, 1.0)).fold(0.0, f64::max);
         println!("N {pulses}, {rpm} rpm, {of:?}: {most:.4} mm");
         assert!(phases.len() >= 5 && most < STEP + late, "N {pulses}, {of:?}: {phases:.4?}");
-        if lathe.grbl && bounces > 0 {
-            // A misfit may be told once, of the image of this board; the cut, asserted above, holds. Its cause is not known yet.
-            let told = lathe.exceptions();
-            assert!(
-                told.len() <= 1 && told.iter().all(|one| one.contains("do not fit")),
-                "{told:?}"
-            );
-        } else {
-            all_fit(&mut lathe, &format!("N {pulses}, {of:?}"));
-        }
+        all_fit(&mut lathe, &format!("N {pulses}, {of:?}"));
     }
 }
