@@ -2,7 +2,7 @@
 
 use kerf_macros::small;
 
-pub use crate::hal::arithmetic::whole;
+pub use crate::hal::arithmetic::{ratio, whole};
 
 /// The size of a number, without its sign. Cost: 1.
 #[inline(always)]
@@ -62,13 +62,6 @@ pub fn scaled(x: f32, power: i8) -> f32 {
     f32::from_bits(x.to_bits().wrapping_add_signed(i32::from(power) << 23))
 }
 
-/// The quotient. A function of its own, because the compiler makes a division, 450 cycles, where it may be needed, and not only where
-/// it is.
-#[inline(never)]
-pub fn ratio(a: f32, b: f32) -> f32 {
-    a / b
-}
-
 /// The logarithm of a positive number, or a little less: up to 0.09 [`OCTAVE`]s. Sums of these tell in 20
 /// cycles what products of floats would in 400, if the answer is plain.
 #[inline(always)]
@@ -120,6 +113,16 @@ mod tests {
         for a in numbers {
             for b in numbers.into_iter().filter(|b| a >= 0.0 || *b >= 0.0) {
                 assert_eq!(below(a, b), a < b, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn ratios_are_quotients() {
+        let numbers = [0.0, -0.0, 1e-40, 1e-30, 0.7, 1.0, -3.0, 1e30, f32::INFINITY, f32::NAN];
+        for a in numbers {
+            for b in numbers {
+                assert_eq!(ratio(a, b).to_bits(), (a / b).to_bits(), "{a} {b}");
             }
         }
     }

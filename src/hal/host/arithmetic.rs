@@ -61,6 +61,12 @@ pub fn passed_over(marks: &[Index], values: &[u16], least: u16) -> Index {
     marks.iter().zip(values).take(Index::MAX.into()).take_while(passes).count() as Index
 }
 
+/// `a / b`. Out of line, because the compiler makes a division where it may be needed, and not only where it is.
+#[inline(never)]
+pub fn ratio(a: f32, b: f32) -> f32 {
+    a / b
+}
+
 /// A number rounded down; one of 2^31 or more, or below 0, or a NaN, is 2^31.
 pub fn whole(x: f32) -> u32 {
     // As the chip does: -0 is below 0.
