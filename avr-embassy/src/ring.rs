@@ -113,9 +113,10 @@ impl<T: Copy, const N: usize> Ring<T, N> {
 
     /// Values put in and not yet released. Each side sees the other's doings at once or a little later.
     pub fn used(&self) -> usize {
-        let head = self.head.get() as usize;
-        let tail = self.tail.get() as usize;
-        if head >= tail { head - tail } else { N - (tail - head) }
+        // As wide as an index, which wraps. `N` may be one more than it holds, and is 0 then, which is as good.
+        let (head, tail) = (self.head.get(), self.tail.get());
+        let used = head.wrapping_sub(tail);
+        usize::from(if head >= tail { used } else { used.wrapping_add(N as Index) })
     }
 
     /// The slot filled last, if it has not been taken.
@@ -180,18 +181,43 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         self.0.head.get() as u8
     }
 
+    /// The slot behind the one filled last, if it is not the one taken last.
+    #[inline(always)]
+    fn vacant(&self) -> Option<Index> {
+        let after = next::<N>(self.0.head.get());
+        (after != self.0.tail.get()).then_some(after)
+    }
+
+    /// Writes a slot behind `head`: a vacant one, or that of `tail` if nothing has been taken from it.
+    #[inline(always)]
+    fn write(&mut self, index: Index, value: T) {
+        // SAFETY: a slot behind `head` is the producer's until `head` moves onto it.
+        unsafe { self.0.slot(index).write(value) };
+    }
+
     /// Puts a value in. Gives it back if the ring is full.
     #[inline]
     pub fn push(&mut self, value: T) -> Result<(), T> {
-        let head = self.0.head.get();
-        let after = next::<N>(head);
-        if after == self.0.tail.get() {
-            return Err(value);
-        }
-        // SAFETY: the slot behind `head` is the producer's until `head` moves onto it.
-        unsafe { self.0.slot(after).write(value) };
+        let Some(after) = self.vacant() else { return Err(value) };
+        self.write(after, value);
         self.0.head.set(after);
         Ok(())
+    }
+
+    /// Writes a value into every vacant slot. The consumer does not see them.
+    pub fn prefilled(mut self, value: T) -> Prefilled<T, N> {
+        let tail = self.0.tail.get();
+        let mut index = self.0.head.get();
+        loop {
+            index = next::<N>(index);
+            // The slot taken last holds a value, except slot 0 at first, from which nothing has been taken.
+            if index != tail || index == 0 {
+                self.write(index, value);
+            }
+            if index == tail {
+                return Prefilled(self);
+            }
+        }
     }
 
     /// The slot that the next value goes to, with `value` in it. None if the ring is full.
@@ -205,12 +231,8 @@ impl<T: Copy, const N: usize> Producer<T, N> {
     /// A free slot as [`Producer::slot`] gives, holding what `make` makes. `make` is not called if the ring is full.
     #[inline(always)]
     pub fn slot_with(&mut self, make: impl FnOnce() -> T) -> Option<Slot<'_, T, N>> {
-        let after = next::<N>(self.0.head.get());
-        if after == self.0.tail.get() {
-            return None;
-        }
-        // SAFETY: the slot behind `head` is the producer's until `head` moves onto it.
-        unsafe { self.0.slot(after).write(make()) };
+        let after = self.vacant()?;
+        self.write(after, make());
         Some(Slot { ring: self.0, after, producer: PhantomData })
     }
 
@@ -248,8 +270,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
             if after == tail {
                 break;
             }
-            // SAFETY: the slots from `head` to `tail` are the producer's.
-            unsafe { self.0.slot(after).write(value) };
+            self.write(after, value);
             head = after;
         }
         self.0.head.set(head);
@@ -332,6 +353,34 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         let head = self.0.head.get() as usize;
         let index = if head >= back { head - back } else { head + N - back };
         index as Index
+    }
+}
+
+/// The end that fills a ring in which every slot holds a value ([`Producer::prefilled`]). A slot is handed out as it is: to clear it would take
+/// time.
+pub struct Prefilled<T: 'static, const N: usize>(Producer<T, N>);
+
+impl<T: Copy, const N: usize> Prefilled<T, N> {
+    /// The slot that the next value goes to. It holds an older value. None if the ring is full.
+    #[inline(always)]
+    pub fn slot(&mut self) -> Option<Slot<'_, T, N>> {
+        let after = self.0.vacant()?;
+        Some(Slot { ring: self.0.0, after, producer: PhantomData })
+    }
+
+    /// The same end, to amend values that have been published.
+    #[inline(always)]
+    pub fn producer(&mut self) -> &mut Producer<T, N> {
+        &mut self.0
+    }
+}
+
+impl<T: Copy, const N: usize> Deref for Prefilled<T, N> {
+    type Target = Producer<T, N>;
+
+    #[inline(always)]
+    fn deref(&self) -> &Producer<T, N> {
+        &self.0
     }
 }
 
@@ -440,7 +489,7 @@ impl<T: Copy, const N: usize> Deref for Slot<'_, T, N> {
 
     #[inline(always)]
     fn deref(&self) -> &T {
-        // SAFETY: `Producer::slot` has written it, and it is the producer's until it is published.
+        // SAFETY: `Producer::slot` or `Producer::prefilled` has written it, and it is the producer's until it is published.
         unsafe { &*self.ring.slot(self.after) }
     }
 }
@@ -581,6 +630,28 @@ mod tests {
             let got: Vec<u8> = core::iter::from_fn(|| c.pop()).collect();
             assert_eq!(got, [round, b'x', b'z']);
         }
+    }
+
+    #[test]
+    fn prefilled_slots_are_filled_in_place() {
+        let (producer, mut c) = ring::<4>();
+        let mut p = producer.prefilled(7);
+        assert_eq!((p.used(), c.pop()), (0, None));
+        for round in 0..10 {
+            let mut slot = p.slot().expect("room");
+            assert_eq!(*slot, if round < 4 { 7 } else { round - 4 });
+            *slot = round;
+            slot.publish();
+            assert_eq!(c.pop(), Some(round));
+        }
+        for _ in 0..3 {
+            p.slot().expect("room").publish();
+        }
+        assert!(p.slot().is_none() && p.producer().push(1) == Err(1));
+        // What is full, or has been taken from, is left as it is.
+        let mut p = p.0.prefilled(9);
+        assert_eq!((c.pop(), c.pop(), c.pop()), (Some(6), Some(7), Some(8)));
+        assert_eq!(p.slot().map(|slot| *slot), Some(9));
     }
 
     #[test]
