@@ -92,6 +92,12 @@ impl Reserve {
     #[inline(always)]
     pub fn velocity(self, cruise: f32, factors: &Factors) -> f32 {
         let factor = if self == Self::TRAVERSE { factors.traverse } else { factors.feed };
+        self.velocity_by(cruise, factor)
+    }
+
+    /// What a line at `cruise` is to be run at when this is its factor.
+    #[inline(always)]
+    pub fn velocity_by(self, cruise: f32, factor: f32) -> f32 {
         if factor.to_bits() == 1.0f32.to_bits() {
             return cruise;
         }

@@ -52,6 +52,12 @@ impl BlockSource {
         self.ring.len()
     }
 
+    /// Changes with each block that is released.
+    #[inline(always)]
+    pub fn released(&self) -> Index {
+        self.oldest
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.ring.is_empty()
@@ -104,8 +110,12 @@ impl BlockSource {
     /// What the oldest block, a line, is run at, mm/s; it changes with the version. Cost: 100.
     #[inline(always)]
     pub fn cruise(&self) -> f32 {
-        let factors = self.constraints.look(SpeedConstraints::factors);
-        self.line(self.oldest, |line| line.velocity(&factors)).unwrap_or_default()
+        self.constraints.look(|constraints| {
+            self.line(self.oldest, |line| {
+                line.reserve.velocity_by(line.cruise, constraints.factor(line.reserve))
+            })
+            .unwrap_or_default()
+        })
     }
 
     /// Whether the oldest block is a traverse.
@@ -203,12 +213,27 @@ impl BlockSource {
         }
         // Where the next begins, if that is a line.
         let next = self.ring.peek(1, |block| match &block.body {
-            Body::Line(line) => Some(self.lifted(self.oldest.wrapping_add(1), line.start)),
+            Body::Line(line) => Some(line.start),
             _ => None,
         });
-        let end = next.flatten().unwrap_or_else(|| {
-            self.line(self.oldest, |line| line.start + line.gain()).unwrap_or(0.0)
-        });
+        match next {
+            Some(Some(start)) if !self.constraints.look(SpeedConstraints::is_mixed) => {
+                self.end.set(Some((version, start)));
+                start
+            }
+            _ => self.end_otherwise(version, next.flatten()),
+        }
+    }
+
+    /// The potential at the end of the oldest block, if no line follows, or one with this `start` while potentials are counted in two ways. A
+    /// function of its own, so that [`BlockSource::end`] saves few registers.
+    #[inline(never)]
+    #[small]
+    fn end_otherwise(&self, version: u8, start: Option<f32>) -> f32 {
+        let end = match start {
+            Some(start) => self.lifted_anew(self.oldest.wrapping_add(1), start),
+            None => self.line(self.oldest, |line| line.start + line.gain()).unwrap_or(0.0),
+        };
         self.end.set(Some((version, end)));
         end
     }

@@ -50,7 +50,7 @@
 //! Cost: a push 1,000 cycles, and 700 for each key dropped.
 
 use super::block::Line;
-use super::factors::Factors;
+use super::factors::{Factors, Reserve};
 use super::float::{OCTAVE, least, lesser, log, scaled, some};
 use super::queue::{BLOCKS, FIRM, SEQ};
 use super::short::Short;
@@ -275,6 +275,17 @@ impl SpeedConstraints {
     #[inline(always)]
     pub fn factors(&self) -> Factors {
         self.wanted.least(&self.planned)
+    }
+
+    /// The factor in force of a line with this reserve.
+    #[inline(always)]
+    pub fn factor(&self, reserve: Reserve) -> f32 {
+        // One of the two, because comparisons take time.
+        if reserve == Reserve::TRAVERSE {
+            least(self.wanted.traverse, self.planned.traverse)
+        } else {
+            least(self.wanted.feed, self.planned.feed)
+        }
     }
 
     fn slot(&self, n: Index) -> usize {
