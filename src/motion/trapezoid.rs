@@ -17,20 +17,36 @@ const PLAIN: i32 = OCTAVE / 5;
 const SCARCE: i32 = 3 * (OCTAVE / 8);
 
 impl Governor {
-    /// The next stretch, of about `nominal` seconds.
+    /// The next stretch, of about [`SEGMENT_S`], or twice that where the governor [`spares`](Governor::spares) velocity.
     #[inline(never)]
     pub(super) fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
-        let (v, seconds) = (self.velocity, self.nominal);
+        if self.stays(cruise, headroom) {
+            self.steadily(left)
+        } else {
+            self.change(left, cruise, headroom)
+        }
+    }
+
+    /// The next stretch at the velocity that the machine has.
+    #[inline(always)]
+    fn steadily(&self, left: f32) -> Stretch {
+        let v = self.velocity;
+        let (seconds, longest) = self.nominal();
+        // Logarithms mostly tell whether the block is over by then.
+        let beyond = log(v) + log(longest) - log(left);
+        if beyond > PLAIN || beyond > -PLAIN && below(left, v * longest) {
+            return Stretch { seconds: ratio(left, v), distance: left, ends: true };
+        }
+        Stretch { seconds, distance: v * seconds, ends: false }
+    }
+
+    /// The next stretch, with another velocity at its end. Out of line: it saves more registers.
+    #[inline(never)]
+    fn change(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
         // Rounding may put a stop before the end of the block.
         let headroom = if headroom.is_sign_negative() { 0.0 } else { headroom };
-        let longest = longest(seconds);
-        if self.stays(cruise, headroom) {
-            let distance = v * seconds;
-            if below(left, v * longest) {
-                return Stretch { seconds: ratio(left, v), distance: left, ends: true };
-            }
-            return Stretch { seconds, distance, ends: false };
-        }
+        let v = self.velocity;
+        let (seconds, longest) = self.nominal();
         // Mostly plain: a block that is run through in no more than one.
         if log(v) + log(longest) < log(left) + PLAIN && below(v * longest, left) {
             let gain = self.limits.accel * seconds;
@@ -55,12 +71,26 @@ impl Governor {
         self.finish(left, cruise, headroom)
     }
 
+    /// How long a stretch is to be, and the longest, s.
+    #[inline(always)]
+    fn nominal(&self) -> (f32, f32) {
+        if self.spares {
+            const TWICE: f32 = 2.0 * SEGMENT_S;
+            (TWICE, longest(TWICE))
+        } else {
+            (SEGMENT_S, longest(SEGMENT_S))
+        }
+    }
+
     /// Whether the velocity is kept: it is the limit, or, where stretches are longer for want of time, so near to what has to be reached
     /// at the end of the block that a gain would soon be lost again.
     #[inline(always)]
-    fn stays(&self, cruise: f32, headroom: f32) -> bool {
+    fn stays(&mut self, cruise: f32, headroom: f32) -> bool {
         let v = self.velocity;
-        let square = v * v;
+        if !same(self.squared, v) {
+            (self.squared, self.square) = (v, v * v);
+        }
+        let square = self.square;
         if below(headroom, square) || !some(v) {
             return false;
         }
@@ -78,7 +108,8 @@ impl Governor {
     /// All the rest of a block in one.
     #[inline(never)]
     fn finish(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
-        let (v, nominal) = (self.velocity, self.nominal);
+        let v = self.velocity;
+        let (nominal, _) = self.nominal();
         let gain = scaled(self.limits.accel * left, 1);
         let square = v * v + gain;
         let next = least(sqrt(least(square, headroom)), cruise);
@@ -91,7 +122,7 @@ impl Governor {
             || log(sum) + log(nominal) > log(left) + PLAIN
             || below(left, sum * nominal)
         {
-            seconds = scaled(left, 1) / sum;
+            seconds = ratio(scaled(left, 1), sum);
         } else if square > 0.0 {
             // From rest to rest or nearly so: there is a peak between.
             let peak = sqrt(0.5 * (square + next * next));
