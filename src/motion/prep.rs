@@ -641,14 +641,15 @@ impl Prep {
         // Ticks of a part, finer or coarser; and so many times the period.
         let (mut ticks, mut step, mut time) = (most, PART, cycles);
         if ticks > limit {
-            let mut half = 0;
-            while ticks > limit && step != STEP {
-                half = ticks & 1;
+            let (mut half, mut upper) = (0, (PART >> 8) as u8);
+            while ticks > limit && upper != (STEP >> 8) as u8 {
+                half = ticks as u8 & 1;
                 ticks >>= 1;
-                step <<= 1;
+                upper <<= 1;
                 time <<= 1;
             }
-            ticks += half;
+            ticks += u16::from(half);
+            step = u16::from(upper) << 8;
         } else {
             while ticks <= limit / 2 {
                 ticks *= 2;
@@ -683,8 +684,11 @@ impl Prep {
     ) {
         let used = product(out.ticks, out.period);
         // Time that cannot be caught up is let go, or the machine would race to do so. A tick may be half ahead.
-        let ahead = -1000 - i32::from(out.period / 2);
-        self.time = (cycles as i32 - used as i32).max(ahead);
+        let mut time = cycles as i32 - used as i32;
+        if time < -1000 {
+            time = time.max(-1000 - i32::from(out.period / 2));
+        }
+        self.time = time;
         out.backwards = self.backwards;
         out.moving = self.full | self.minor;
         let (full, moving) = (self.full, out.moving);
