@@ -91,16 +91,47 @@ pub enum Step {
     Switched,
     /// X is to leave the cut, in what is queued already too ([`Exec::lead`]): ask again.
     Leaves,
-    /// An override is to change, and nothing is to be queued: ask again.
-    Override(Change),
-    /// Heaters and the fan are to change, and nothing is to be queued: ask again.
-    Heat(Heat),
+    /// An override is to change, as [`take_override`] says, and nothing is to be queued: ask again then.
+    Override,
+    /// Heaters and the fan are to change, as [`take_heat`] says, and nothing is to be queued: ask again then.
+    Heat,
     /// A program stop, end or change of outputs is due: ask again when the steppers stand still.
     Standstill,
     /// No block.
     Idle,
     /// A feedhold is on, and the steppers stand still.
     Held,
+}
+
+/// Releases the oldest block, for which [`Step::Override`] was told: the change it asks for.
+#[inline(never)]
+#[small]
+pub fn take_override(blocks: &mut BlockSource) -> Change {
+    match take_action(blocks) {
+        Some(QueuedAction::Override(change)) => change,
+        // The program has ended.
+        _ => Change::ALL_ON,
+    }
+}
+
+/// Releases the oldest block, for which [`Step::Heat`] was told: what it asks for.
+#[inline(never)]
+#[small]
+pub fn take_heat(blocks: &mut BlockSource) -> Option<Heat> {
+    match take_action(blocks) {
+        Some(QueuedAction::Heat(heat)) => Some(heat),
+        _ => None,
+    }
+}
+
+#[inline(always)]
+fn take_action(blocks: &mut BlockSource) -> Option<QueuedAction> {
+    let block = blocks.oldest();
+    blocks.release();
+    match block?.body {
+        Body::QueuedAction(action) => Some(action),
+        Body::Line(_) => None,
+    }
 }
 
 /// The line that exec is running.
@@ -431,7 +462,12 @@ impl Exec {
                     QueuedAction::ProgramEnd => Program::Ended,
                     _ => Program::Stopped,
                 };
+                if matches!(action, QueuedAction::ProgramEnd) {
+                    return Step::Override;
+                }
             }
+            QueuedAction::Override(_) => return Step::Override,
+            QueuedAction::Heat(_) if Capability::Printer.is_built_in() => return Step::Heat,
             QueuedAction::Drivers(drivers) => self.prep.set_drivers(*drivers),
             QueuedAction::Advance(lead) if Capability::Printer.is_built_in() => {
                 self.prep.set_lead(lead)
@@ -462,12 +498,7 @@ impl Exec {
             _ => {}
         }
         blocks.release();
-        match action {
-            QueuedAction::Override(change) => Step::Override(*change),
-            QueuedAction::Heat(heat) if Capability::Printer.is_built_in() => Step::Heat(*heat),
-            QueuedAction::ProgramEnd => Step::Override(Change::ALL_ON),
-            _ => Step::Again,
-        }
+        Step::Again
     }
 
     fn halt(&mut self, out: &mut Snapshot) {
@@ -514,11 +545,8 @@ impl Exec {
         let length = line.extent.length();
         let long = below(scaled(line.cruise, FINE_LOG2), length);
         let short = line.jerk == Short::ZERO && below(length, scaled(line.cruise, SHORT_LOG2));
-        self.prep.begin(line, &mut out.steps, &mut out.target);
         out.length = length;
         out.running = true;
-        let jerk = line.jerk.get();
-        self.governor.begin(line.accel.get(), jerk);
         // Field by field: in place. The others are set before they are read.
         let running = &mut self.running;
         running.active = true;
@@ -527,7 +555,9 @@ impl Exec {
         running.version = version;
         running.fresh = true;
         running.done = false;
-        running.jerk = some(jerk);
+        running.jerk = line.jerk != Short::ZERO;
+        self.governor.begin(line.accel.get(), line.jerk.get());
+        self.prep.begin(line, &mut out.steps, &mut out.target);
     }
 
     /// Prepares the next stretch of the line being run. In place: copying its state would cost as
@@ -874,13 +904,17 @@ fn step(segment: bool) -> Step {
     if segment { Step::Segment } else { Step::Again }
 }
 
-/// CPU cycles in `seconds`; at least 1, at most what [`Prep`] takes. Cost: 350, 15 for a usual stretch.
+/// CPU cycles in `seconds`; at least 1, at most what [`Prep`] takes. Cost: 250, 25 for a usual stretch.
+#[inline(never)]
 fn cycles_of(seconds: f32) -> u32 {
     if same(seconds, SEGMENT_S) {
         return SEGMENT_CYCLES;
     }
     let cycles = (whole(seconds * HALVES_PER_S) + 1) >> 1;
-    cycles.clamp(1, CYCLES_MAX)
+    if cycles > CYCLES_MAX {
+        return CYCLES_MAX;
+    }
+    cycles | u32::from(cycles == 0)
 }
 
 #[cfg(test)]

@@ -14,10 +14,10 @@ use crate::encoder::Encoder;
 use crate::hal::Interrupt;
 use crate::hal::arithmetic::product;
 use crate::hal::event::{self, Event};
-use crate::hal::ring::Producer;
+use crate::hal::ring::{Prefilled, Producer};
 use crate::hal::{TIMER_HZ, encoder as sensors, exec, flags, stepper, uart};
 use crate::machine::{self, Alarm};
-use crate::motion::exec::{Exec, Step};
+use crate::motion::exec::{Exec, Step, take_heat, take_override};
 use crate::motion::finished::Finished;
 use crate::motion::queue::BlockSource;
 use crate::motion::snapshot::{Program, Snapshot};
@@ -46,21 +46,19 @@ const FIRST_TURN: u8 = 2;
 #[allow(clippy::manual_async_fn)] // See `tasks`.
 pub fn run(
     level: Interrupt,
-    mut common: InterruptEnd<Common>,
+    common: InterruptEnd<Common>,
     blocks: BlockSource,
     segments: Producer<Segment, SEGMENTS>,
 ) -> impl Future<Output = Never> {
     async move {
         // By itself: it would be made on the stack, and copied.
         let mut machine = Exec::new();
-        let mut runner = Runner::new(blocks, segments, &mut machine);
+        let mut task = Task::new(common, blocks, segments, &mut machine);
         loop {
-            exec::wait(level, || runner.is_due().then_some(())).await;
-            match runner.turn(&mut common) {
-                Next::Turn => continue,
+            match exec::wait(level, || task.go_on()).await {
                 Next::Idle => exec::pend_when_idle(),
                 Next::Room => exec::note_idle(),
-                Next::Block => links::wait_for_block(true),
+                Next::Block | Next::Turn => links::wait_for_block(true),
             }
             exec_asked_again(level).await;
             links::wait_for_block(false);
@@ -72,6 +70,7 @@ pub fn run(
 const FIRST_TICK: u32 = 400;
 
 /// What the task goes on with.
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Next {
     /// The next turn, as soon as there is room.
     Turn,
@@ -91,22 +90,53 @@ struct Runner<'a> {
     rests: bool,
     /// The reporter is to be told whether thread mode has been idle since the last segment.
     asked: bool,
-    segments: Producer<Segment, SEGMENTS>,
+    segments: Prefilled<Segment, SEGMENTS>,
     blocks: BlockSource,
     machine: &'a mut Exec,
 }
 
-impl<'a> Runner<'a> {
+/// The runner, with exec's end of what tasks share.
+struct Task<'a> {
+    runner: Runner<'a>,
+    common: InterruptEnd<Common>,
+}
+
+impl<'a> Task<'a> {
+    /// Out of line: it would be made on the stack, and copied.
+    #[inline(never)]
+    #[small]
     fn new(
+        common: InterruptEnd<Common>,
         blocks: BlockSource,
         segments: Producer<Segment, SEGMENTS>,
         machine: &'a mut Exec,
     ) -> Self {
+        let segments = segments.prefilled(Segment::default());
         let (waiting, finished) = (Waiting::new(), Finished::new());
-        Self { waiting, finished, rests: true, asked: false, segments, blocks, machine }
+        let (rests, asked) = (true, false);
+        let runner = Runner { waiting, finished, rests, asked, segments, blocks, machine };
+        Self { runner, common }
     }
 
+    /// Does what there is room for. What the task goes on with, or `None` if it waits for room.
+    ///
+    /// Out of line: the CPU reaches fields of the runner from a pointer to it, not from one to the future.
+    #[inline(never)]
+    fn go_on(&mut self) -> Option<Next> {
+        let Self { runner, common } = self;
+        while runner.is_due() {
+            let next = runner.turn(common);
+            if next != Next::Turn {
+                return Some(next);
+            }
+        }
+        None
+    }
+}
+
+impl Runner<'_> {
     /// Whether there is room for a segment, or a stop to be seen to.
+    #[inline(always)]
     fn is_due(&mut self) -> bool {
         health::answer(Sign::Exec);
         self.waiting.update(self.segments.used());
@@ -122,14 +152,14 @@ impl<'a> Runner<'a> {
     #[inline(always)]
     fn turn(&mut self, common: &mut InterruptEnd<Common>) -> Next {
         uart::stop_late();
-        let queued = self.blocks.len();
+        let released = self.blocks.released();
         let rested = self.rests;
         if contact::is_noted() {
             contact::catch_up(&self.segments);
         }
         let standstill = !stepper::running();
         let step = common.with(|common| self.step(standstill, common));
-        if self.blocks.len() != queued {
+        if self.blocks.released() != released {
             flags::set(Event::BlockDone);
         }
         match step {
@@ -142,9 +172,7 @@ impl<'a> Runner<'a> {
             }
             Step::Held if machine::rested() => Next::Turn,
             Step::Idle | Step::Standstill | Step::Held => Next::Block,
-            Step::Again | Step::Leaves | Step::Switched | Step::Override(_) | Step::Heat(_) => {
-                Next::Turn
-            }
+            Step::Again | Step::Leaves | Step::Switched | Step::Override | Step::Heat => Next::Turn,
         }
     }
 
@@ -188,11 +216,14 @@ impl<'a> Runner<'a> {
         }
         match step {
             Step::Segment => self.finished.queue(),
-            Step::Override(change) => {
+            Step::Override => {
+                let change = take_override(&mut self.blocks);
                 overrides::change_in_stream(overrides, change, &mut self.blocks)
             }
-            Step::Heat(wanted) if Capability::Printer.is_built_in() => {
-                if let Some(orders) = heat.first_mut() {
+            Step::Heat if Capability::Printer.is_built_in() => {
+                if let (Some(orders), Some(wanted)) =
+                    (heat.first_mut(), take_heat(&mut self.blocks))
+                {
                     orders.carry_out(&wanted);
                 }
             }
@@ -203,7 +234,7 @@ impl<'a> Runner<'a> {
             Step::Held => self.held(out, spindle),
             Step::Leaves if Capability::Lathe.is_built_in() => self.lead(out, motors),
             Step::Switched => self.machine.wait(spindle::switch(spindle, out, true), out),
-            Step::Again | Step::Leaves | Step::Idle | Step::Standstill | Step::Heat(_) => {}
+            Step::Again | Step::Leaves | Step::Idle | Step::Standstill | Step::Heat => {}
         }
         // A standstill stays one until a segment leads out of it; velocity is ahead of the segments.
         self.rests = out.velocity.to_bits() == 0 || (self.rests && step != Step::Segment);
@@ -216,7 +247,7 @@ impl<'a> Runner<'a> {
             return Step::Held;
         }
         // There is room: this task alone fills the ring.
-        let Some(mut slot) = self.segments.slot(Segment::default()) else {
+        let Some(mut slot) = self.segments.slot() else {
             return Step::Standstill;
         };
         let step = self.machine.step(&mut self.blocks, standstill, out, &mut slot);
@@ -282,9 +313,9 @@ impl<'a> Runner<'a> {
             let mode = Segment::mode_of(moving);
             machine.lead((waits.ticks, waits.period), out, |increment| {
                 // In two pieces: a step waits for 31 cycles at most. The first moves nothing.
-                segments.amend_masked(back, |segment| {
+                segments.producer().amend_masked(back, |segment| {
                     (segment.backwards, segment.mode) = (backwards, mode);
-                }) && segments.amend_masked(back, |segment| {
+                }) && segments.producer().amend_masked(back, |segment| {
                     if let Some(of) = segment.increment.get_mut(motor) {
                         *of = increment;
                     }
@@ -489,7 +520,7 @@ impl Waiting {
     #[inline(always)]
     fn update(&mut self, used: usize) {
         while self.used > used as u8 {
-            self.sum = self.sum.saturating_sub(self.length(self.used));
+            self.sum -= self.length(self.used);
             self.used -= 1;
         }
     }

@@ -5,12 +5,13 @@ use kerf::boards::MOTORS;
 use kerf::config::StepRatio;
 use kerf::dda::{Dda, PHASE_MARGIN, Pins, SEGMENTS, STEP, Segment};
 use kerf::gcode::command::Feed;
+use kerf::gcode::overrides::Change;
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf::kinematics::{self, DIFFERENCE, SUM};
 use kerf::motion::advance;
 use kerf::motion::block::{Block, Line as Move};
 use kerf::motion::dynamics::{Dynamics, MachineLimits};
-use kerf::motion::exec::{Exec, Step};
+use kerf::motion::exec::{Exec, Step, take_heat, take_override};
 use kerf::motion::factors::Factors;
 use kerf::motion::line::{Builder, Built, Line, Motors};
 use kerf::motion::queue::{BlockQueue, BlockSource, BlockStore};
@@ -156,6 +157,8 @@ pub struct Rig {
     pub position: PerAxis<Length>,
     pub emitted: Vec<Emitted>,
     pub keep: bool,
+    /// What the last block that asked for it wants of overrides.
+    pub change: Option<Change>,
     pub segments: u64,
     /// A motor that may be ahead of its line.
     pub leads: Option<usize>,
@@ -186,6 +189,7 @@ impl Rig {
             position: [Length::ZERO; AXES],
             emitted: Vec::new(),
             keep: true,
+            change: None,
             segments: 0,
             leads: None,
             travel: [0; MOTORS],
@@ -298,6 +302,11 @@ impl Rig {
             }
             self.fill.push(segment).expect("room");
             self.pins.stopped = false;
+        }
+        match step {
+            Step::Override => self.change = Some(take_override(&mut self.source)),
+            Step::Heat => drop(take_heat(&mut self.source)),
+            _ => {}
         }
         if self.source.len() < blocks {
             self.check_block();

@@ -78,7 +78,6 @@ const HOT: &[&str] = &[
     "kerf::tasks::ports::Port>::promise",
     "kerf::tasks::reader::run::",
     "kerf::tasks::tx::Tx",
-    "kerf::tasks::tx::Tx>::has_room",
     "kerf::tasks::view::View>::of",
     "kerf::tasks::wake::Wake>::",
 ];
