@@ -85,13 +85,19 @@ impl Commands {
     /// Empties it, touching nothing but the tags: it is large.
     #[inline(always)]
     pub(super) fn clear_here(&mut self) {
+        self.motion = Motion::None;
+        self.clear_beside_motion();
+    }
+
+    /// Empties it but for the motion.
+    #[inline(always)]
+    pub(super) fn clear_beside_motion(&mut self) {
         self.line = 0;
         self.tool = None;
         self.spindle = None;
         self.coolant = None;
         self.overrides = None;
         self.dwell_ms = None;
-        self.motion = Motion::None;
         self.exact_stop = false;
         self.blend = 0;
         self.stop = Stop::None;

@@ -46,11 +46,9 @@ pub enum Writer {
 
 /// A line that is being read, and what it has said so far.
 struct Words<'a> {
-    /// The byte to look at; 0 at the end.
-    byte: u8,
+    /// Where in the line reading is.
+    at: Cursor<'a>,
     text: &'a [u8],
-    /// Where in the line the byte behind it is.
-    next: u8,
     seen: u8,
     mode: Option<MotionMode>,
     feed: f32,
@@ -61,13 +59,11 @@ struct Words<'a> {
     carried: Option<i16>,
     /// What rounding takes from the E word.
     rest: i16,
-    /// Where to, machine coordinates, on the axes that were seen.
-    target: PerAxis<Length>,
 }
 
 impl State {
     /// Carries a line out by the fast path: with [`Interpreter::interpret`](super::Interpreter::interpret) it would be `Ok`,
-    /// without a comment, and a move. False, and nothing done, if it is none. A line of a printing host is one that is written for the
+    /// without a comment, and a move. False, and nothing done but that the motion in `out` may have changed, if it is none. A line of a printing host is one that is written for the
     /// interpreter already but for E and G0.
     #[inline(never)]
     pub fn fast_path(
@@ -117,11 +113,12 @@ impl State {
                 _ => None,
             };
         }
-        words.read(from)
+        let Some(target) = target_of(&mut out.motion) else { return false };
+        words.read(from, target)
             && are_usual(words.seen & AXES_SEEN, setup)
             && (!Capability::CoreXy.is_built_in()
                 || setup.reach().is_none()
-                || is_near(&words.target, setup))
+                || is_near(target, setup))
             && !(Capability::Printer.is_built_in()
                 && words.seen & 1 << EXTRUDER != 0
                 && setup.extrudes().is_err())
@@ -147,6 +144,7 @@ impl State {
 
     #[inline(never)]
     fn carry_out(&mut self, words: &Words, out: &mut Commands) -> bool {
+        let Motion::Feed { target, feed: per_minute } = &mut out.motion else { return false };
         let mode = words.mode.unwrap_or(self.modal.motion);
         let (feed, units) = match words.seen & F_SEEN {
             0 => (self.feed, self.feed_units),
@@ -161,36 +159,35 @@ impl State {
         self.modal.motion = mode;
         (self.feed, self.feed_units) = (feed, units);
         self.line = words.line;
-        self.go(words.seen & AXES_SEEN, &words.target);
+        self.go(words.seen & AXES_SEEN, target);
+        *per_minute = Feed::PerMinute(feed);
         if PRINTS
             && words.rest != 0
             && let Some(residue) = self.residue.get_mut(EXTRUDER)
         {
             *residue = words.rest;
         }
-        out.clear_here();
+        if mode == MotionMode::Traverse {
+            out.motion = Motion::Traverse { target: self.position };
+        }
+        out.clear_beside_motion();
         out.line = words.line;
         out.exact_stop = self.modal.path == PathMode::ExactStop;
         out.blend = self.modal.blend();
-        match mode {
-            MotionMode::Traverse => out.motion = Motion::Traverse { target: self.position },
-            _ => straight(&self.position, feed, out),
-        }
         true
     }
 
-    /// The position on the `named` axes.
+    /// Goes to the target on the `named` axes; the others stay, and the target is there, too.
     #[inline(always)]
-    fn go(&mut self, mut named: u8, target: &PerAxis<Length>) {
+    fn go(&mut self, mut named: u8, target: &mut PerAxis<Length>) {
         let axes = self.position.iter_mut().zip(&mut self.residue).zip(target);
         for ((position, residue), target) in axes {
             if named & 1 != 0 {
                 (*position, *residue) = (*target, 0);
+            } else {
+                *target = *position;
             }
             named >>= 1;
-            if named == 0 {
-                break;
-            }
         }
     }
 }
@@ -211,10 +208,16 @@ fn are_usual(mut named: u8, setup: &impl Setup) -> bool {
     true
 }
 
-/// By itself: of both moves in one place the compiler would make a third one, to copy.
-#[inline(never)]
-fn straight(target: &PerAxis<Length>, per_minute: f32, out: &mut Commands) {
-    out.motion = Motion::Feed { target: *target, feed: Feed::PerMinute(per_minute) };
+/// Where a line's target is put together: it need not be copied then, and of most lines before there is such a place.
+#[inline(always)]
+fn target_of(motion: &mut Motion) -> Option<&mut PerAxis<Length>> {
+    if !matches!(motion, Motion::Feed { .. }) {
+        *motion = Motion::Feed { target: [Length::ZERO; AXES], feed: Feed::PerMinute(0.0) };
+    }
+    match motion {
+        Motion::Feed { target, .. } => Some(target),
+        _ => None,
+    }
 }
 
 impl<'a> Words<'a> {
@@ -223,39 +226,28 @@ impl<'a> Words<'a> {
         let seen = if numbered { 0 } else { N_SEEN };
         // A byte 0 would pass for the end of the line.
         let byte = if text.last() == Some(&0) { BAD } else { b' ' };
-        let target = [Length::ZERO; AXES];
         let (prints, carried, rest) = (false, None, 0);
-        Words {
-            byte,
-            text,
-            next: 0,
-            seen,
-            mode: None,
-            feed: 0.0,
-            line: 0,
-            prints,
-            carried,
-            rest,
-            target,
-        }
+        let at = Cursor::new(byte, text);
+        Words { at, text, seen, mode: None, feed: 0.0, line: 0, prints, carried, rest }
     }
 
-    /// Reads the line, whose lengths count from `from`. False if it is not for the fast path.
-    #[inline(never)]
-    fn read(&mut self, from: &PerAxis<Length>) -> bool {
+    /// Reads the line, whose lengths count from `from`; where it goes on the axes that it names is put into `target`, machine coordinates. False
+    /// if it is not for the fast path.
+    #[inline(always)]
+    fn read(&mut self, from: &PerAxis<Length>, target: &mut PerAxis<Length>) -> bool {
         loop {
-            let letter = self.byte & !CASE;
+            let letter = self.at.byte & !CASE;
             let axis = match letter {
                 b'X'..=b'Z' => letter - b'X',
                 b'A'..=b'C' => letter - b'A' + FIRST_ROTARY as u8,
                 b'E' if PRINTS && self.prints => EXTRUDER as u8,
                 // A blank is that without `CASE`, too.
-                0 if self.byte == b' ' => {
-                    self.step();
+                0 if self.at.byte == b' ' => {
+                    self.at.step();
                     continue;
                 }
                 0 => {
-                    return usize::from(self.next) == self.text.len() && self.seen & AXES_SEEN != 0;
+                    return self.at.left() == 0 && self.seen & AXES_SEEN != 0;
                 }
                 _ if self.other(letter) => continue,
                 _ => return false,
@@ -265,13 +257,13 @@ impl<'a> Words<'a> {
                 return false;
             }
             self.seen |= bit;
-            self.step();
+            self.at.step();
             let mut value = Length(self.number());
             if PRINTS && self.prints && usize::from(axis) == EXTRUDER {
                 value = self.filament(value);
             }
             let i = usize::from(axis);
-            let (Some(target), Some(origin)) = (self.target.get_mut(i), from.get(i)) else {
+            let (Some(target), Some(origin)) = (target.get_mut(i), from.get(i)) else {
                 return false;
             };
             match origin.0.checked_add(value.0).map(Length) {
@@ -284,15 +276,11 @@ impl<'a> Words<'a> {
     /// A word that is none of an axis. False if it is not for the fast path.
     #[inline(never)]
     fn other(&mut self, letter: u8) -> bool {
-        self.step();
+        self.at.step();
         match letter {
             b'G' if self.mode.is_none() => {
-                self.mode = match self.number() {
-                    0 if PRINTS && self.prints => Some(MotionMode::Feed),
-                    0 => Some(MotionMode::Traverse),
-                    Length::PER_MM => Some(MotionMode::Feed),
-                    _ => return false,
-                };
+                self.mode = self.mode();
+                return self.mode.is_some();
             }
             b'F' if self.seen & F_SEEN == 0 => {
                 self.seen |= F_SEEN;
@@ -307,12 +295,32 @@ impl<'a> Words<'a> {
         true
     }
 
+    /// What a G word says. `None` if it is not for the fast path: neither 0 nor 1, of one digit or behind a zero.
+    #[inline(never)]
+    fn mode(&mut self) -> Option<MotionMode> {
+        let digit = self.at.byte;
+        self.at.step();
+        let has_more = matches!(self.at.byte, b'0'..=b'9' | b'.');
+        let value = match digit {
+            b'0' if has_more => self.number(),
+            b'0' => 0,
+            b'1' if !has_more => Length::PER_MM,
+            _ => return None,
+        };
+        match value {
+            0 if PRINTS && self.prints => Some(MotionMode::Feed),
+            0 => Some(MotionMode::Traverse),
+            Length::PER_MM => Some(MotionMode::Feed),
+            _ => None,
+        }
+    }
+
     /// A number in ten-thousandths. One that is not for the fast path leaves `BAD` to be read.
     #[inline(never)]
     fn number(&mut self) -> i32 {
-        let negative = self.byte == b'-';
+        let negative = self.at.byte == b'-';
         if negative {
-            self.step();
+            self.at.step();
         }
         let (whole, frac) = self.decimal();
         // 65,535.9999 at most: that fits.
@@ -320,19 +328,24 @@ impl<'a> Words<'a> {
         if negative { -value } else { value }
     }
 
+    /// Where in the line the byte behind the current one is.
+    fn next(&self) -> usize {
+        self.text.len().saturating_sub(self.at.left().into())
+    }
+
     /// An E word, whose first four decimals have been read, with a fifth one and what those before have left.
     #[inline(never)]
     fn filament(&mut self, value: Length) -> Length {
         let mut by = Exact { units: value, rest: 0 };
-        let point = usize::from(self.next).checked_sub(6).and_then(|at| self.text.get(at));
-        if self.byte.is_ascii_digit() && point == Some(&b'.') {
+        let point = self.next().checked_sub(6).and_then(|at| self.text.get(at));
+        if self.at.byte.is_ascii_digit() && point == Some(&b'.') {
             by = self.fifth(value);
         }
         match self.carried {
             None => {}
             Some(carried) => match by.carry(carried) {
                 Some(sum) => by = sum,
-                None => self.byte = BAD,
+                None => self.at.byte = BAD,
             },
         }
         self.rest = by.rest;
@@ -341,9 +354,9 @@ impl<'a> Words<'a> {
 
     /// With the fifth decimal; a sixth is left, where no word can begin with it.
     fn fifth(&mut self, value: Length) -> Exact {
-        let digit = i16::from(self.byte - b'0');
-        self.step();
-        let start = usize::from(self.next).saturating_sub(1);
+        let digit = i16::from(self.at.byte - b'0');
+        self.at.step();
+        let start = self.next().saturating_sub(1);
         let word = self.text.get(..start).unwrap_or(&[]);
         let negative =
             word.iter().rev().find(|byte| !matches!(byte, b'0'..=b'9' | b'.')) == Some(&b'-');
@@ -357,7 +370,7 @@ impl<'a> Words<'a> {
     #[inline(never)]
     fn feed(&mut self) -> f32 {
         let Ok(value) = u32::try_from(self.number()) else {
-            self.byte = BAD;
+            self.at.byte = BAD;
             return 0.0;
         };
         let (whole, frac) = (value / Length::PER_MM as u32, value % Length::PER_MM as u32);
@@ -366,11 +379,10 @@ impl<'a> Words<'a> {
 
     #[inline(always)]
     fn decimal(&mut self) -> (u16, u16) {
-        let rest = self.text.get(usize::from(self.next)..).unwrap_or(&[]);
-        let mut cursor = Cursor::new(self.byte, rest);
-        let number = decimal(&mut cursor);
-        self.next = self.text.len() as u8 - cursor.left();
-        self.byte = if number.is_some() { cursor.byte } else { BAD };
+        let number = decimal(&mut self.at);
+        if number.is_none() {
+            self.at.byte = BAD;
+        }
         number.unwrap_or_default()
     }
 
@@ -378,21 +390,13 @@ impl<'a> Words<'a> {
     #[inline(never)]
     fn integer(&mut self) -> u32 {
         let mut value = 0;
-        if !self.byte.is_ascii_digit() {
-            self.byte = BAD;
+        if !self.at.byte.is_ascii_digit() {
+            self.at.byte = BAD;
         }
-        while value < 1_000_000 && self.byte.is_ascii_digit() {
-            value = value * 10 + u32::from(self.byte - b'0');
-            self.step();
+        while value < 1_000_000 && self.at.byte.is_ascii_digit() {
+            value = value * 10 + u32::from(self.at.byte - b'0');
+            self.at.step();
         }
         value
-    }
-
-    #[inline(always)]
-    fn step(&mut self) {
-        match self.text.get(usize::from(self.next)) {
-            Some(byte) => (self.byte, self.next) = (*byte, self.next + 1),
-            None => self.byte = 0,
-        }
     }
 }
