@@ -11,7 +11,10 @@
 //! exactly one response for it either way. Senders may count characters, so every byte that comes belongs to a line:
 //! blanks before it, and what came between it and the line before, count with it. When the pool is full the reader leaves bytes in the receive ring.
 
-use heapless::Vec;
+mod entries;
+
+use entries::{Entries, Entry};
+use kerf_macros::small;
 
 use crate::hal::LINES;
 use crate::hal::ring::Window;
@@ -41,14 +44,6 @@ pub enum Class {
     Data,
     /// Could not be kept; answered with this status.
     Fault(Status),
-}
-
-#[derive(Clone, Copy)]
-struct Entry {
-    len: u8,
-    class: Class,
-    /// Bytes that came with it and are not kept, but for its end.
-    besides: u16,
 }
 
 /// Names a line in the pool until it is removed.
@@ -85,17 +80,18 @@ impl Aside {
 }
 
 /// The pool.
+// In this order: AVR reaches a field within 63 bytes of the first in one instruction.
+#[repr(C)]
 pub struct LinePool {
-    /// Complete lines, in order; their bytes lie end to end.
-    entries: Vec<Entry, { SLOTS + 1 }>,
-    /// How many of them are control lines.
-    controls: u8,
+    bytes: &'static mut [u8],
     /// Where the oldest line begins.
     start: u16,
     /// Behind the last complete line.
     end: u16,
     /// Bytes of the line that is coming in, from `end` on.
     partial: u8,
+    /// How many of them are control lines.
+    controls: u8,
     /// Bytes since the last line that are not kept.
     besides: u16,
     /// Why the line that is coming in cannot be kept.
@@ -115,7 +111,8 @@ pub struct LinePool {
     reserve: u8,
     /// The worst alarm that lines have begun which have come.
     stop: Alarm,
-    bytes: &'static mut [u8],
+    /// Complete lines, in order; their bytes lie end to end.
+    entries: Entries,
 }
 
 impl LinePool {
@@ -123,7 +120,7 @@ impl LinePool {
     pub const fn new(bytes: &'static mut [u8], reserve: u8) -> Self {
         let room = bytes.len().saturating_sub(reserve as usize);
         Self {
-            entries: Vec::new(),
+            entries: Entries::new(),
             controls: 0,
             start: 0,
             end: 0,
@@ -183,8 +180,10 @@ impl LinePool {
     #[small]
     fn put_in_order(&mut self) {
         self.controls = 0;
-        for entry in &mut self.entries {
-            if entry.class == Class::Control {
+        for index in 0..self.entries.len() {
+            if let Some(entry) = self.entries.get_mut(index)
+                && entry.class == Class::Control
+            {
                 entry.class = Class::Data;
             }
         }
@@ -272,7 +271,7 @@ impl LinePool {
             }
         }
         self.lay(ring, from, len, at);
-        if self.entries.push(Entry { len, class: Class::Control, besides }).is_ok() {
+        if self.entries.push(Entry { len, class: Class::Control, besides }) {
             self.end += u16::from(len);
             self.note_control(at, len);
         }
@@ -307,20 +306,24 @@ impl LinePool {
     #[inline(never)]
     pub fn put_text(&mut self, bytes: &[u8]) -> (u8, bool) {
         let begins = self.partial == 0;
-        if self.fault.is_some() || self.is_asking() || (begins && !self.may_begin(bytes)) {
+        let waits = if begins { !self.may_begin(bytes) } else { self.is_asking() };
+        if self.fault.is_some() || waits {
             return (0, false);
         }
         let text = if self.in_order { before_realtime(bytes) } else { bytes };
-        let room = usize::from(self.room().min((self.longest - self.partial).into()));
+        let most = usize::from(self.room().min((self.longest - self.partial).into()));
         let at = self.room_at();
         let slots = self.bytes.get_mut(at..).unwrap_or(&mut []);
-        let slots = slots.get_mut(..room.min(slots.len())).unwrap_or(&mut []);
+        let slots = slots.get_mut(..most.min(slots.len())).unwrap_or(&mut []);
         let count = copy_printing(text, slots);
         self.returned &= count == 0;
         self.partial += count;
         let has_end = begins && count > 0 && bytes.get(usize::from(count)) == Some(&b'\n');
         let ends = has_end && self.entries.len() < SLOTS && self.room() > 0;
-        (count + u8::from(ends), ends && self.end_line())
+        if ends {
+            self.keep_whole();
+        }
+        (count + u8::from(ends), ends)
     }
 
     /// Whether a line may begin with these bytes at once: [`LinePool::put`] sees to all others. A control line waits in the ring, where
@@ -506,26 +509,37 @@ impl LinePool {
         self.end_line()
     }
 
+    #[inline(never)]
     fn end_line(&mut self) -> bool {
-        let len = self.partial;
-        let class = match self.fault.take() {
-            Some(status) => Class::Fault(status),
-            None if len == 0 && !self.keep_empty => {
+        match self.fault.take() {
+            Some(status) => self.keep(Class::Fault(status)),
+            None if self.partial == 0 && !self.keep_empty => {
                 self.pass(1);
                 return false;
             }
-            None => self.classify(self.slice(usize::from(self.end), len)),
-        };
-        self.partial = 0;
+            None => self.keep_whole(),
+        }
+        true
+    }
+
+    /// The line that was coming in has come, without a fault.
+    #[inline(never)]
+    fn keep_whole(&mut self) {
+        self.keep(self.classify(self.slice(self.end.into(), self.partial)));
+    }
+
+    /// The line that was coming in has come.
+    #[inline(always)]
+    fn keep(&mut self, class: Class) {
+        let len = core::mem::take(&mut self.partial);
         let besides = core::mem::take(&mut self.besides);
-        if self.entries.push(Entry { len, class, besides }).is_ok() {
+        if self.entries.push(Entry { len, class, besides }) {
             let start = usize::from(self.end);
             self.end += u16::from(len);
             if class == Class::Control {
                 self.note_control(start, len);
             }
         }
-        true
     }
 
     fn slice(&self, start: usize, len: u8) -> &[u8] {
@@ -565,8 +579,20 @@ impl LinePool {
     }
 
     /// Removes it.
+    #[inline(never)]
     pub fn remove_oldest(&mut self) {
-        self.remove(LineId(0));
+        let Some(oldest) = self.entries.pop_first() else { return };
+        self.start += u16::from(oldest.len);
+        self.controls -= u8::from(oldest.class == Class::Control);
+        self.rewind();
+    }
+
+    /// Without any line the next one begins where the buffer does.
+    #[inline(always)]
+    fn rewind(&mut self) {
+        if self.entries.is_empty() && self.partial == 0 {
+            (self.start, self.end) = (0, 0);
+        }
     }
 
     /// The text of a line.
@@ -597,23 +623,19 @@ impl LinePool {
         before.fold(usize::from(self.start), |at, e| at + usize::from(e.len))
     }
 
-    /// Removes a line. The oldest costs next to nothing, any other about 8 cycles for each byte behind it.
+    /// Removes a line: the oldest, or any other for about 8 cycles for each byte behind it.
     #[inline(never)]
     pub fn remove(&mut self, id: LineId) {
         let index = usize::from(id.0);
+        if index == 0 {
+            return self.remove_oldest();
+        }
         let Some(Entry { len, class, .. }) = self.entries.get(index).copied() else {
             return;
         };
-        if index == 0 {
-            self.start += u16::from(len);
-        } else {
-            self.close_gap(self.start_of(index), len);
-        }
+        self.close_gap(self.start_of(index), len);
         self.controls -= u8::from(class == Class::Control);
         self.entries.remove(index);
-        if self.entries.is_empty() && self.partial == 0 {
-            (self.start, self.end) = (0, 0);
-        }
     }
 
     fn close_gap(&mut self, start: usize, len: u8) {

@@ -181,6 +181,9 @@ impl Intake {
                     self.ended(pool, looked, links);
                     continue;
                 }
+                if text > 0 && self.received.is_empty() {
+                    return Left::Nothing;
+                }
             }
             if !pool.ready() {
                 return Left::Full;
