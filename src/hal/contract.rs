@@ -129,6 +129,9 @@ contract! {
         /// Whether half of the second port's receive ring is full: the other half lasts 3 ms, so that whoever has much to do gives way to the
         /// reader. Thread mode.
         fn presses() -> bool;
+        /// Whether the reader is to have its turn before a line that waits is carried out
+        /// ([`serial::calls_reader`](crate::hal::serial::calls_reader)); on the second port any byte says so. Thread mode. Cost: 70.
+        fn calls_reader() -> bool;
         /// The slot of the receive ring with the byte that came last, if it still waits there. Thread mode.
         fn newest(port: u8) -> Option<u8>;
         /// The slot of the mark that stands for the last `%` or `^d`, if it has not been read. Thread mode. Cost: 12 a byte that waits.

@@ -55,10 +55,11 @@ pub fn is_unheard() -> bool {
     imp::flags::has(Event::Received) && imp::flags::has(Event::Tick)
 }
 
-/// Whether others should have their turn before a task goes on: see [`is_unheard`], or a real-time character or a switch has to be seen to.
+/// Whether others should have their turn before the next line is carried out: the reader for what [`is_unheard`], unless that can wait for some
+/// lines, and others for a real-time character or a switch.
 #[inline(always)]
 pub fn is_wanted() -> bool {
-    is_unheard() || imp::flags::has(Event::Realtime)
+    imp::flags::has(Event::Realtime) || is_unheard() && imp::uart::calls_reader()
 }
 
 /// Segments without a turn of the main loop after which bytes that have come count as a question.

@@ -82,6 +82,18 @@ pub const fn low_water(ring: usize) -> usize {
     if ring < RX_RING { ring / 16 } else { ring / 8 }
 }
 
+/// With so many bytes in the receive ring of the first port the reader has its turn: it may have to stop the sender.
+const MANY: u8 = high_water(Flow::Characters, RX_RING) as u8;
+
+/// Whether the reader is to have its turn before a line that waits is carried out: what is in the receive ring of the first port
+/// begins or ends like a control line, or is much. Cost: 60 cycles.
+pub fn calls_reader(ring: &Window<'_>) -> bool {
+    let len = ring.len();
+    let newest = ring.get(len.wrapping_sub(1));
+    let last = if newest < b' ' { ring.get(len.wrapping_sub(2)) } else { newest };
+    len > MANY || matches!(ring.get(0), b'{' | b'$' | b'?') || matches!(last, b'}' | b'?')
+}
+
 /// How the two sides of a line stop each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Flow {

@@ -55,8 +55,8 @@ const ECHO: usize = 62;
 const STEPS: u8 = 8;
 /// Most steps in a turn in which a millisecond has ended.
 const STEPS_LATE: u8 = 5;
-/// Lines of the fast path that are answered before others have their turn.
-const IN_A_ROW: u8 = 4;
+/// Lines of the fast path that are answered before others have their turn, if nobody waits for it ([`is_wanted`]): as many as may wait.
+const IN_A_ROW: u8 = 8;
 /// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
 
@@ -130,10 +130,11 @@ enum Deferred {
 }
 
 /// The parser's own state.
+// In this order: AVR reaches a field within 63 bytes of the first in one instruction.
+#[repr(C)]
 struct Parser {
     links: &'static Links,
     planner: &'static planner::Shared,
-    sessions: [Session; PORTS],
     /// The ports, as bits, that have something to say and lack room.
     lacking: u8,
     /// The port whose line had its turn last, the first turn of G-code of the feeder aside: it is the other one's turn.
@@ -144,6 +145,7 @@ struct Parser {
     deferred: Deferred,
     /// How many turns in a row have been left to others: by a long answer to short ones, by a line that waits to a report.
     waited: u8,
+    sessions: [Session; PORTS],
     /// The line of a file on the SD card.
     #[cfg(feature = "sd")]
     feed: super::card::Feed,
@@ -169,7 +171,7 @@ pub fn run(
     async move {
         let mut in_a_row = 0;
         loop {
-            if is_wanted() || in_a_row == IN_A_ROW {
+            if in_a_row == IN_A_ROW || is_wanted() {
                 in_a_row = 0;
                 yield_now().await;
             }

@@ -18,8 +18,8 @@ use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::byte::SharedByte;
 use crate::hal::ring::Ring;
 use crate::hal::serial::{
-    AUX, AUX_RING, AllEnds, Ends, Flow, LATE, PORTS, RX_RING, TX_RING, USB, WAIT_MS, XOFF, XON,
-    hardware, is_shared, last_mark, wait_ms,
+    self, AUX, AUX_RING, AllEnds, Ends, Flow, LATE, PORTS, RX_RING, TX_RING, USB, WAIT_MS, XOFF,
+    XON, hardware, is_shared, last_mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -365,6 +365,14 @@ pub fn room(port: u8) -> u8 {
 /// way to the reader. Thread mode.
 pub fn presses() -> bool {
     PORTS > 1 && AUX_SHARED.rx.used() >= AUX_RING / 2
+}
+
+/// Whether the reader is to have its turn before a line that waits is carried out: see [`serial::calls_reader`]; on the second port
+/// any byte says so. Thread mode.
+pub fn calls_reader() -> bool {
+    // SAFETY: the reader does not run meanwhile.
+    let ring = unsafe { USB_SHARED.rx.window() };
+    PORTS > 1 && AUX_SHARED.rx.used() > 0 || serial::calls_reader(&ring)
 }
 
 /// The slot of the receive ring with the byte that came last, if it still waits there. Thread mode.

@@ -12,8 +12,8 @@ use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::hal::serial::{
-    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS, RX_RING, STRAY,
-    TX_RING, USB, XOFF, XON, batch, hardware, high_water, last_mark, lose, mark, wait_ms,
+    self, AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS, RX_RING,
+    STRAY, TX_RING, USB, XOFF, XON, batch, hardware, high_water, last_mark, lose, mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -293,6 +293,14 @@ pub fn room(port: u8) -> u8 {
 /// way to the reader. Thread mode.
 pub fn presses() -> bool {
     aux_rx().used() >= AUX_RING / 2
+}
+
+/// Whether the reader is to have its turn before a line that waits is carried out: see [`serial::calls_reader`]; on the second port
+/// any byte says so. Thread mode.
+pub fn calls_reader() -> bool {
+    // SAFETY: the reader does not run meanwhile.
+    let ring = unsafe { usb_rx().window() };
+    aux_rx().used() > 0 || serial::calls_reader(&ring)
 }
 
 /// The slot of the receive ring with the byte that came last, if it still waits there.

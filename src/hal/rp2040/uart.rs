@@ -29,8 +29,8 @@ use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::hal::serial::{
-    AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS, RX_RING, STRAY,
-    TX_RING, USB, XOFF, XON, batch, hardware, last_mark, lose, mark, wait_ms,
+    self, AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS, RX_RING,
+    STRAY, TX_RING, USB, XOFF, XON, batch, hardware, last_mark, lose, mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -640,6 +640,14 @@ pub fn room(port: u8) -> u8 {
 /// Whether half of the second port's receive ring is full. Thread mode.
 pub fn presses() -> bool {
     PORTS > 1 && AUX_RX.used() >= AUX_RING / 2
+}
+
+/// Whether the reader is to have its turn before a line that waits is carried out: see [`serial::calls_reader`]; on the second port
+/// any byte says so. Thread mode.
+pub fn calls_reader() -> bool {
+    // SAFETY: the reader does not run meanwhile.
+    let ring = unsafe { USB_RX.window() };
+    PORTS > 1 && AUX_RX.used() > 0 || serial::calls_reader(&ring)
 }
 
 /// The slot of the receive ring with the byte that came last, if it still waits there. Thread mode.
