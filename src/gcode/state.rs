@@ -22,23 +22,25 @@ use crate::units::{AXES, Length, PerAxis};
 
 /// Everything a line may change, but for the tables.
 #[derive(Clone, Copy, PartialEq, Debug)]
+// In this order: AVR reaches a field within 63 bytes of the first in one instruction.
+#[repr(C)]
 pub struct State {
     pub modal: Modal,
-    /// F as written, with G94 or G95 in force; 0 if none.
-    pub feed: f32,
     /// The units of `feed`.
     pub feed_units: Units,
-    /// End of the last move, machine coordinates.
-    pub position: PerAxis<Length>,
+    /// F as written, with G94 or G95 in force; 0 if none.
+    pub feed: f32,
+    pub line: u32,
     /// What rounding took from `position`: ten-thousandths of a unit. Incremental moves carry it on.
     pub residue: PerAxis<i16>,
+    /// End of the last move, machine coordinates.
+    pub position: PerAxis<Length>,
     /// Machine coordinates of the work origin: coordinate system, G92 and tool length together.
     pub origin: PerAxis<Length>,
     /// The axes whose position has been set to what it is (G28.3), as bits.
     pub homed: u8,
     /// The axis that could not be homed last.
     pub blamed: u8,
-    pub line: u32,
     /// G92, whether or not it is in force.
     pub shift: PerAxis<Length>,
     pub shifted: bool,

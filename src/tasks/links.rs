@@ -48,60 +48,62 @@ use crate::motion::queue;
 use crate::protocol::Memory;
 
 /// The links. One for the machine, made at start-up.
+// In this order: AVR reaches a field within 63 bytes of the first in one instruction.
+#[repr(C)]
 pub struct Links {
     /// All of this is thread mode's.
     pub thread: Thread,
-    /// The serial ports.
-    pub ports: [Port; PORTS],
     /// The number of the port that feeds the machine.
     pub feeder: Cell<u8>,
-    /// The reader waits for it when a pool is full.
-    pub pool_space: Wake,
-    /// There is a line, or the planner is ready: the parser looks again.
-    pub parser_wake: Wake,
-    /// What the planner is to do; valid while `commands_taken`.
-    pub commands: RefCell<Commands>,
     /// The planner works on `commands`.
     pub commands_taken: Cell<bool>,
+    /// There is a line, or the planner is ready: the parser looks again.
+    pub parser_wake: Wake,
     /// `commands` was filled.
     pub planner_wake: Wake,
-    /// A chain of lines may wait for more: the power task has the planner look.
-    pub chain_waits: Cell<bool>,
-    /// A tilde: what has stopped goes on.
-    pub cycle_start: Wake,
-    /// What is still to be told. Any task writes, the reporter takes.
-    pub notices: Notices,
     /// Something that reports show may have changed.
     pub reporter_wake: ReporterWake,
-    /// Blocks that came and went, for queue reports.
-    pub queue_count: QueueCount,
+    /// The reader waits for it when a pool is full.
+    pub pool_space: Wake,
+    /// A chain of lines may wait for more: the power task has the planner look.
+    pub chain_waits: Cell<bool>,
     /// What the planner has to look at before the next line.
     pub changes: Changes,
+    /// The built-in job that runs.
+    pub job: Cell<Job>,
     /// A new rate of USB, in bits a second: the parser sets it when its response has left.
     pub rate: Cell<Option<u32>>,
+    /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.
+    pub restart: Cell<Option<bool>>,
+    /// What has to be put away, and where the rest is.
+    pub storage: &'static Storage,
+    /// A tilde: what has stopped goes on.
+    pub cycle_start: Wake,
+    /// Blocks that came and went, for queue reports.
+    pub queue_count: QueueCount,
     /// The number of the port that has asked last for the end of an alarm.
     pub cleared_by: Cell<u8>,
+    /// What is still to be told. Any task writes, the reporter takes.
+    pub notices: Notices,
+    /// What probing has found.
+    pub probe: Probe,
+    /// Real-time characters that have not had all their effect yet. Of the control task and the reader, with `tasks::hold`.
+    pub signs: Signs,
     /// How heaters stand, and what the planner waits for.
     pub heat: Heaters,
     /// The SD card, and the file that is printed from it.
     #[cfg(feature = "sd")]
     pub card: &'static RefCell<crate::card::Card>,
-    /// What probing has found.
-    pub probe: Probe,
-    /// Real-time characters that have not had all their effect yet. Of the control task and the reader, with `tasks::hold`.
-    pub signs: Signs,
     /// What dialects keep between reports.
     pub report: RefCell<Memory>,
-    /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.
-    pub restart: Cell<Option<bool>>,
-    /// The built-in job that runs.
-    pub job: Cell<Job>,
-    /// What has to be put away, and where the rest is.
-    pub storage: &'static Storage,
-    /// Settings in force.
-    pub settings: RefCell<Settings>,
+    /// The serial ports.
+    pub ports: [Port; PORTS],
+    /// What the planner is to do; valid while `commands_taken`.
+    pub commands: RefCell<Commands>,
     /// The G-code model. The parser advances it; reports read it.
     pub model: RefCell<Interpreter<&'static Storage>>,
+    /// Settings in force.
+    pub settings: RefCell<Settings>,
 }
 
 /// What has changed beside the lines: whoever changes it notes it, the planner takes it before the next line.

@@ -70,31 +70,39 @@ pub enum Choice {
 }
 
 /// What a port has to itself.
+// In this order: AVR reaches a field within 63 bytes of the first in one instruction.
+#[repr(C)]
 pub struct Port {
     /// Which one it is.
     pub number: u8,
-    /// Received lines.
-    pub lines: RefCell<LinePool>,
-    /// The line to the sender, for the parser and the reporter. The mutex knows of one task that waits, the reporter.
-    pub tx: Mutex<NoopRawMutex, Tx>,
     /// How the sender wants to be answered.
     pub speech: Cell<Speech>,
-    /// The line that is being answered has begun the alarm that it asks for when it arrived ([`stop`](super::stop)).
-    pub has_stopped: Cell<bool>,
-    /// The alarm that a line is to end which waits for the machine to come to rest.
-    pub clears: Cell<Alarm>,
-    /// The sender asks whether anybody is there: control sets it, the parser answers.
-    pub enquiry: Cell<bool>,
-    /// What a sender has asked for by a byte, as bits: the reporter answers, a [`REPORT`] the parser.
-    pub asked: Cell<u8>,
     /// What has decided in which dialect it is spoken.
     pub choice: Cell<Choice>,
-    /// How the machine stood when the report or group that is being told on this port first told of motion.
-    pub seen: Cell<Option<Seen>>,
+    /// What a sender has asked for by a byte, as bits: the reporter answers, a [`REPORT`] the parser.
+    pub asked: Cell<u8>,
+    /// The sender asks whether anybody is there: control sets it, the parser answers.
+    pub enquiry: Cell<bool>,
     /// Bytes have been lost, which the parser tells.
     pub lost: Cell<bool>,
     /// The slot of the receive ring up to which lines of G-code are dropped, by a kill or flush that has come behind it.
     pub cut: Cell<Option<u8>>,
+    /// The line that is being answered has begun the alarm that it asks for when it arrived ([`stop`](super::stop)).
+    pub has_stopped: Cell<bool>,
+    /// The alarm that a line is to end which waits for the machine to come to rest.
+    pub clears: Cell<Alarm>,
+    /// Received lines.
+    pub lines: RefCell<LinePool>,
+    /// The line to the sender, for the parser and the reporter. The mutex knows of one task that waits, the reporter.
+    pub tx: Mutex<NoopRawMutex, Tx>,
+    /// How the machine stood when the report or group that is being told on this port first told of motion.
+    pub seen: Cell<Option<Seen>>,
+}
+
+/// Of a port on which nothing has been told. By a call: the image would have all of a new port in RAM once more, to copy this from it.
+#[inline(never)]
+fn nothing_seen() -> Option<Seen> {
+    None
 }
 
 impl Port {
@@ -113,7 +121,7 @@ impl Port {
             enquiry: Cell::new(false),
             asked: Cell::new(0),
             choice: Cell::default(),
-            seen: Cell::new(None),
+            seen: Cell::new(nothing_seen()),
             lost: Cell::new(false),
             cut: Cell::new(None),
         }
