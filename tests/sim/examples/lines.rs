@@ -8,12 +8,16 @@ use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
+use kerf_sim::Host;
 use kerf_sim::Machine;
 use kerf_sim::job;
-use kerf_sim::{Host, LINES_IN_FLIGHT};
 
 /// How long the line of a job may take, ms of AVR time.
 const LINE_MS: u64 = 10_000;
+/// Settings are in the EEPROM after this, ms of AVR time.
+const KEEPS_MS: u64 = 4_000;
+/// Lines in flight: as many as the firmware has room for.
+const IN_FLIGHT: usize = 8;
 
 fn main() -> Result<()> {
     let mut args = std::env::args().skip(1);
@@ -23,12 +27,13 @@ fn main() -> Result<()> {
     let path = args.next().context("which job?")?;
     let board = kerf::boards::by_name(&board).context("no such board")?;
     let mut machine = Machine::load(Path::new(&elf), board)?;
-    let mut host = Host::new(LINES_IN_FLIGHT);
+    let mut host = Host::new(IN_FLIGHT);
     host.boot(&mut machine, 5_000)?;
     host.change_speed(&mut machine, baud)?;
     for setting in args {
         host.ask(&mut machine, &setting, LINE_MS)?;
     }
+    host.run_for_ms(&mut machine, KEEPS_MS)?;
     let lines = job::read_lines(Path::new(&path))?;
     for (number, line) in &lines {
         host.queue(*number, line);
@@ -57,7 +62,11 @@ fn print(machine: &Machine, lines: usize, passed: u64) -> Result<()> {
     println!("{:.0} lines a second", lines as f64 / machine.seconds(passed));
     let awake: u64 = machine.profile().iter().map(|(_, cycles)| cycles).sum();
     println!("{:8.0} cycles a line, {:.0} of them awake", per_line(passed), per_line(awake));
-    for (function, cycles) in machine.profile().into_iter().take(45) {
+    for (function, cycles) in machine
+        .profile()
+        .into_iter()
+        .take(std::env::var("KERF_TAKE").map_or(45, |n| n.parse().unwrap_or(45)))
+    {
         println!("{:8.0} {function}", per_line(cycles));
     }
     println!("interrupts off:");
