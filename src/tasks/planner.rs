@@ -287,12 +287,12 @@ impl Planner {
         if Capability::Lathe.is_built_in() && self.turns_otherwise(&commands.motion) {
             return false;
         }
-        if let Begun::Chain(chain) = &mut self.begun {
-            if chain.go_on(&self.position, target, feed, commands.blend) {
-                self.alone = 0;
-                self.wait_for_more(commands.line);
-                return true;
-            }
+        if let Begun::Chain(chain) = &mut self.begun
+            && chain.go_on(&self.position, target, feed, commands.blend)
+        {
+            self.alone = 0;
+            self.wait_for_more(commands.line);
+            return true;
         }
         // A block is to be planned, perhaps for other overrides.
         self.replan();
