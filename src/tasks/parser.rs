@@ -175,7 +175,7 @@ pub fn run(
                 in_a_row = 0;
                 yield_now().await;
             }
-            match parser.turn() {
+            match parser.turn(in_a_row == 0) {
                 Turn::FastPath => in_a_row += 1,
                 // The reader has its turn, and stops the sender in time.
                 Turn::More => yield_now().await,
@@ -186,9 +186,10 @@ pub fn run(
 }
 
 impl Parser {
-    /// Does what can be done at once.
+    /// Does what can be done at once. A row of lines of the fast path `begins` when nothing else is to be done: they come as fast as
+    /// they are answered, and would keep the other port waiting.
     #[inline(always)]
-    fn turn(&mut self) -> Turn {
+    fn turn(&mut self, begins: bool) -> Turn {
         let links = self.links;
         let alarmed = machine::is_alarmed();
         let free = is_free(links);
@@ -198,7 +199,8 @@ impl Parser {
         let straight = !alarmed && !machine::is_checking();
         // What a port is told at once goes first: an acknowledgement is not to wait for a move.
         let tells = links.ports.iter().any(Port::tells);
-        let tried = match data && straight && !tells && self.is_idle() {
+        let others = begins && self.has_more();
+        let tried = match data && straight && !tells && self.is_idle() && !others {
             true => fast_path(links),
             false => FastPath::NotTried,
         };
@@ -290,8 +292,8 @@ impl Parser {
             || self.links.rate.get().is_some()
     }
 
-    /// Whether there is anything to do before the planner has taken up the move of a line of the fast path.
-    #[inline(always)]
+    /// Whether there is anything to do besides lines of the fast path.
+    #[inline(never)]
     fn has_more(&self) -> bool {
         let feeder = self.links.feeder.get();
         let has_lines = |port: &Port| {
