@@ -111,7 +111,7 @@ fn drivers_are_told_their_settings() {
         set(&mut board, &mut host, line);
     }
     // Address 2 is motor 2's, 1 is motor 3's. What is new does not wait for its turn.
-    host.run_for_ms(&mut board, 5).unwrap();
+    host.run_for_ms(&mut board, 10).unwrap();
     let told = take_told(&mut board, &mut rest);
     for wanted in [
         (2, 0x90, 0x0008_1800),
