@@ -368,7 +368,7 @@ impl<T: Copy, const N: usize> Prefilled<T, N> {
         Some(Slot { ring: self.0.0, after, producer: PhantomData })
     }
 
-    /// The same end, to amend values that have been published.
+    /// The producer, which can change values that the consumer has not taken yet.
     #[inline(always)]
     pub fn producer(&mut self) -> &mut Producer<T, N> {
         &mut self.0

@@ -63,8 +63,8 @@ struct Words<'a> {
 
 impl State {
     /// Carries a line out by the fast path: with [`Interpreter::interpret`](super::Interpreter::interpret) it would be `Ok`,
-    /// without a comment, and a move. False, and nothing done but that the motion in `out` may have changed, if it is none. A line of a printing host is one that is written for the
-    /// interpreter already but for E and G0.
+    /// without a comment, and a move. If it is none: false, and nothing done, but the motion in `out` may have changed. A line of a printing host
+    /// is one that is written for the interpreter already but for E and G0.
     #[inline(never)]
     pub fn fast_path(
         &mut self,

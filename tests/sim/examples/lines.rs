@@ -8,9 +8,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use kerf_sim::Host;
-use kerf_sim::Machine;
-use kerf_sim::job;
+use kerf_sim::{Host, Machine, job};
 
 /// How long the line of a job may take, ms of AVR time.
 const LINE_MS: u64 = 10_000;
@@ -62,11 +60,7 @@ fn print(machine: &Machine, lines: usize, passed: u64) -> Result<()> {
     println!("{:.0} lines a second", lines as f64 / machine.seconds(passed));
     let awake: u64 = machine.profile().iter().map(|(_, cycles)| cycles).sum();
     println!("{:8.0} cycles a line, {:.0} of them awake", per_line(passed), per_line(awake));
-    for (function, cycles) in machine
-        .profile()
-        .into_iter()
-        .take(std::env::var("KERF_TAKE").map_or(45, |n| n.parse().unwrap_or(45)))
-    {
+    for (function, cycles) in machine.profile().into_iter().take(45) {
         println!("{:8.0} {function}", per_line(cycles));
     }
     println!("interrupts off:");
