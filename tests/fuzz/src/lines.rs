@@ -63,6 +63,8 @@ fn fast_path(before: &Interpreter, line: &[u8], after: &Interpreter, outcome: &O
         let (mut fast, mut out) = (*before, Commands::default());
         if !fast.fast_path(line, writer, &Usual, &mut out) {
             assert_eq!(fast, *before, "declined, changed all the same");
+            // The motion is whatever the slow path makes of it, which begins anew.
+            out.motion = Motion::None;
             assert_eq!(out, Commands::default(), "declined");
             continue;
         }
