@@ -74,10 +74,10 @@ const PERIOD_MAX: u32 = 0xFFFF;
 pub const FINE_LOG2: i8 = -4;
 
 /// Latest cycle of a tick at which the interrupt may find itself ready for its pulses.
-const SETTLE: u8 = 68;
+const SETTLE: u8 = 76;
 
 /// Latest cycle behind its tick at which a segment's directions stand.
-const TURNED: u16 = 150;
+const TURNED: u16 = 158;
 
 /// Ticks and period of a segment for motors beside a block that stands still.
 const ASIDE: (u16, u16) = (64, 500);

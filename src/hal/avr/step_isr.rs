@@ -13,6 +13,11 @@
 //! depend on whether the pin toggles. That makes pulses of all motors as exact as the tick, and the
 //! idle level (polarity) a matter of how the pins stand when nothing moves.
 //!
+//! Pulses rise at `settle`. If the interrupt comes early, as it mostly does, it counts the tick and moves the first motor on
+//! before they rise; of a segment's last tick it only counts. What it does then comes before or behind the pulses, but their times are the same.
+//!
+//! The interrupts of serial ports call it where a tick is due ([`uart`](super::uart)): it expects interrupts off, and its return address on the stack.
+//!
 //! It saves what it uses: r24 to r27 and SREG, and r30 and r31 to load a segment. The count of ticks is in
 //! general-purpose I/O registers 1 and 2, which are nobody else's.
 
@@ -32,6 +37,10 @@ const _: () = assert!(SEGMENTS.is_power_of_two() && SEGMENTS <= 16, "see above")
 
 type Segments = Ring<Segment, SEGMENTS>;
 
+/// From the first look at the counter to the second, cycles, where a tick is counted and a motor is added in between: so much
+/// time must be left.
+const AHEAD: u8 = 38;
+
 const fn pin_register(pin: Pin) -> usize {
     pin.port.address() - 2
 }
@@ -45,7 +54,7 @@ const fn mask(pin: Pin) -> u8 {
 /// Its body is one assembly block that uses no operand in a register, so the compiler adds nothing
 /// before or behind it: a naked function, on every toolchain.
 #[unsafe(no_mangle)]
-extern "C" fn __vector_17() -> ! {
+pub(super) extern "C" fn __vector_17() -> ! {
     // SAFETY: every register it changes is restored; it returns by `reti` with the stack as it was. It
     // alone touches the generator's state and takes segments while interrupts are on.
     unsafe {
@@ -60,18 +69,24 @@ extern "C" fn __vector_17() -> ! {
             "    sts  \\pin, r24",
             ".endif",
             ".endm",
+            ".macro KERF_STEP_TWO_PINS",
+            "    KERF_TOGGLE r26, 0, {step0}, {step_mask0}",
+            "    KERF_TOGGLE r26, 1, {step1}, {step_mask1}",
+            ".endm",
             ".macro KERF_STEP_PINS",
             "    KERF_TOGGLE r26, 0, {step0}, {step_mask0}",
             "    KERF_TOGGLE r26, 1, {step1}, {step_mask1}",
             "    KERF_TOGGLE r26, 2, {step2}, {step_mask2}",
             "    KERF_TOGGLE r26, 3, {step3}, {step_mask3}",
             ".endm",
-            // Waits until the counter is at `settle`, to the cycle, if that is still to come.
-            ".macro KERF_SETTLE",
+            // How long it is until the counter is at `settle`, cycles, in r25; carry if that is over.
+            ".macro KERF_TO_SETTLE",
             "    lds  r25, {state} + {settle}",
             "    lds  r24, 0x84",
             "    sub  r25, r24",
-            "    brcs 73f",
+            ".endm",
+            // Waits for so long, to the cycle.
+            ".macro KERF_WAIT",
             // A cycle for bit 0, two for bit 1, four for each of the rest.
             "    lsr  r25",
             "    brcs 70f",
@@ -86,6 +101,16 @@ extern "C" fn __vector_17() -> ! {
             "    brcs 73f",
             "    rjmp 71b",
             "73:",
+            ".endm",
+            ".macro KERF_SETTLE",
+            "    KERF_TO_SETTLE",
+            "    brcs 77f",
+            // As long as it takes to decide between waiting and working.
+            "    nop",
+            "    rjmp 78f",
+            "78:",
+            "    KERF_WAIT",
+            "77:",
             ".endm",
             // Counts a tick, or goes where the segment is used up.
             ".macro KERF_COUNT used_up",
@@ -165,9 +190,15 @@ extern "C" fn __vector_17() -> ! {
             "10:",
             "    tst  r26",
             "    breq 11f",
-            "    KERF_SETTLE",
-            "    KERF_TOGGLE r26, 0, {step0}, {step_mask0}",
-            "    KERF_TOGGLE r26, 1, {step1}, {step_mask1}",
+            "    KERF_TO_SETTLE",
+            "    brcs 13f",
+            "    cpi  r25, {ahead}",
+            "    brlo 16f",
+            "    rjmp 50f",
+            "16:",
+            "    KERF_WAIT",
+            "13:",
+            "    KERF_STEP_TWO_PINS",
             "11:",
             "    KERF_COUNT 20f",
             "12:",
@@ -178,10 +209,21 @@ extern "C" fn __vector_17() -> ! {
             "    tst  r26",
             "    breq 15f",
             "    KERF_WIDEN {width}",
-            "    KERF_TOGGLE r26, 0, {step0}, {step_mask0}",
-            "    KERF_TOGGLE r26, 1, {step1}, {step_mask1}",
+            "17:",
+            "    KERF_STEP_TWO_PINS",
             "15:",
             "    KERF_RETURN",
+            // There is more than a little time until then: half of the work is done in it.
+            "50:",
+            "    KERF_COUNT 61f",
+            "    clr  r27",
+            "    KERF_ADD 0",
+            "    KERF_SETTLE",
+            "    KERF_STEP_TWO_PINS",
+            "    KERF_ADD 1",
+            "    sts  {state} + {due}, r27",
+            "    KERF_WIDEN {short_width}",
+            "    rjmp 17b",
             // Lockstep: what was due is due again.
             "1:",
             "    KERF_SETTLE",
@@ -194,13 +236,21 @@ extern "C" fn __vector_17() -> ! {
             "40:",
             "    tst  r26",
             "    breq 41f",
-            "    KERF_SETTLE",
+            "    KERF_TO_SETTLE",
+            "    brcs 44f",
+            "    cpi  r25, {ahead}",
+            "    brlo 46f",
+            "    rjmp 60f",
+            "46:",
+            "    KERF_WAIT",
+            "44:",
             "    KERF_STEP_PINS",
             "41:",
             "    KERF_COUNT 20f",
             "42:",
             "    clr  r27",
             "    KERF_ADD 0",
+            "47:",
             "    KERF_ADD 1",
             "    KERF_ADD 2",
             "    KERF_ADD 3",
@@ -212,6 +262,16 @@ extern "C" fn __vector_17() -> ! {
             "    KERF_STEP_PINS",
             "45:",
             "    KERF_RETURN",
+            "60:",
+            "    KERF_COUNT 61f",
+            "    clr  r27",
+            "    KERF_ADD 0",
+            "    KERF_SETTLE",
+            "    KERF_STEP_PINS",
+            "    rjmp 47b",
+            "61:",
+            "    KERF_SETTLE",
+            "    KERF_STEP_PINS",
             // The segment is used up: where is the next?
             "20:",
             "    push r30",
@@ -330,6 +390,8 @@ extern "C" fn __vector_17() -> ! {
             last = const SEGMENTS - 1,
             running = sym stepper::RUNNING,
             width = sym stepper::WIDTH,
+            short_width = sym stepper::SHORT_WIDTH,
+            ahead = const AHEAD,
             lockstep_width = sym stepper::LOCKSTEP_WIDTH,
             halt = const stepper::HALT,
             pend = const assembly::PEND,

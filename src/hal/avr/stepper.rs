@@ -19,7 +19,7 @@ const _: () = assert!(matches!(ACTIVE.step_timer, Timer::T1), "the step timer is
 const TCCR1B: *mut u8 = 0x81 as *mut u8;
 const TCNT1: *mut u16 = 0x84 as *mut u16;
 const OCR1A: *mut u16 = 0x88 as *mut u16;
-const TIFR1: *mut u8 = 0x36 as *mut u8;
+const TIFR1: *mut u8 = (FLAGS + 0x20) as *mut u8;
 const TIMSK1: *mut u8 = 0x6F as *mut u8;
 /// General-purpose registers 1 and 2: the ticks left of the segment.
 const TICKS: [*mut u8; 2] = [0x4A as *mut u8, 0x4B as *mut u8];
@@ -27,7 +27,11 @@ const TICKS: [*mut u8; 2] = [0x4A as *mut u8, 0x4B as *mut u8];
 const RUN: u8 = 1 << 3 | 1;
 /// CTC with OCR1A as top, clock stopped.
 pub(super) const HALT: u8 = 1 << 3;
-const OCF1A: u8 = 1 << 1;
+const OCF1A: u8 = 1 << DUE;
+/// The timer's flags, in the I/O space.
+pub(super) const FLAGS: usize = 0x16;
+/// The bit of [`FLAGS`] that says that a tick is due.
+pub(super) const DUE: u8 = 1;
 const GPIOR1: *const u8 = 0x4A as *const u8;
 const GPIOR2: *const u8 = 0x4B as *const u8;
 
@@ -39,14 +43,19 @@ pub(super) static RUNNING: SharedByte = SharedByte::new(0);
 /// Set by [`stop`].
 static STOPPED: SharedByte = SharedByte::new(0);
 
-/// How long pulses last, cycles, that no turn of a loop widens: in lockstep, and else.
+/// How long pulses last, cycles, that no turn of a loop widens: in lockstep, with one motor left to add, and else.
 const LOCKSTEP_CYCLES: u16 = 21;
 /// See [`LOCKSTEP_CYCLES`].
-const CYCLES: u16 = 51;
+const SHORT_CYCLES: u16 = 26;
+/// See [`LOCKSTEP_CYCLES`].
+const CYCLES: u16 = 49;
 
-/// Turns of a loop of 3 cycles that widen a pulse, at least 1: in lockstep, and else.
+/// Turns of a loop of 3 cycles that widen a pulse, at least 1: in lockstep, with one motor left to add, and else.
 pub(super) static LOCKSTEP_WIDTH: SharedByte =
     SharedByte::new(width_turns(Drivers::USUAL.pulse_us, LOCKSTEP_CYCLES));
+/// See [`LOCKSTEP_WIDTH`].
+pub(super) static SHORT_WIDTH: SharedByte =
+    SharedByte::new(width_turns(Drivers::USUAL.pulse_us, SHORT_CYCLES));
 /// See [`LOCKSTEP_WIDTH`].
 pub(super) static WIDTH: SharedByte = SharedByte::new(width_turns(Drivers::USUAL.pulse_us, CYCLES));
 
@@ -183,6 +192,7 @@ pub fn set_inverted(motors: u8) {
 /// thread mode; a change only while nothing runs.
 pub fn set_step_output(pulse_us: u8, inverted: u8) {
     LOCKSTEP_WIDTH.set(width_turns(pulse_us, LOCKSTEP_CYCLES));
+    SHORT_WIDTH.set(width_turns(pulse_us, SHORT_CYCLES));
     WIDTH.set(width_turns(pulse_us, CYCLES));
     let changed = inverted ^ STEP_INVERTED.get();
     STEP_INVERTED.set(inverted);

@@ -271,6 +271,15 @@ impl Cpu {
             (*p).sreg[FLAG_I] = 0;
             (*p).interrupt_state = 0;
             (*p).pc = u32::from(vector) * u32::from((*p).vector_size);
+        }
+        self.adopt(vector)
+    }
+
+    /// Counts a handler that was called instead of entered. False when the nesting is deeper than any real program's.
+    pub fn adopt(self, vector: u8) -> bool {
+        let p = self.p();
+        // SAFETY: the core is initialised; the index into `running` is checked.
+        unsafe {
             let depth = (*p).interrupts.running_ptr as usize;
             if depth >= (*p).interrupts.running.len() {
                 return false;

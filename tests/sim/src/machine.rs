@@ -85,6 +85,8 @@ pub struct Machine {
     /// The pins of each port that are driven from outside, and their levels, by the port's letter.
     driven: [(u8, u8); 12],
     meters: Meters,
+    /// The step interrupt and where its handler begins, which other handlers call when a tick is due.
+    step_handler: Option<(u8, u32)>,
     image: Image,
     chip: &'static Chip,
     clock_hz: u32,
@@ -131,13 +133,16 @@ impl Machine {
         let step_timer = board.map(|board| board.step_timer as usize);
         let bus = Bus::install(cpu, chip, step_timer, wires);
         let probes = board.map(|board| recorder::attach(bus, cpu, board));
-        let meters = Meters::new(chip, step_timer.map(|n| chip.timers[n].vectors[COMPARE]));
+        let step_vector = step_timer.map(|n| chip.timers[n].vectors[COMPARE]);
+        let meters = Meters::new(chip, step_vector);
+        let handler = |vector: u8| Some((vector, image.function(&format!("__vector_{vector}"))?));
         Ok(Machine {
             cpu,
             bus,
             probes: probes.into_iter().collect(),
             driven: [(0, 0); 12],
             meters,
+            step_handler: step_vector.and_then(handler),
             image,
             chip,
             clock_hz,
@@ -173,6 +178,12 @@ impl Machine {
         let mut woken = false;
         if cpu.mode() == Mode::Running {
             let (pc, began) = (cpu.pc(), cpu.cycle());
+            if let Some((vector, handler)) = self.step_handler
+                && pc == handler
+                && !self.meters.is_in(vector)
+            {
+                self.called(vector)?;
+            }
             cpu.execute();
             self.meters.executed(cpu, pc, began);
             if let Some(spent) = self.profile.as_mut().and_then(|p| p.get_mut(pc as usize / 2)) {
@@ -311,6 +322,15 @@ impl Machine {
             cpu.native_acknowledge(vector);
         }
         self.meters.entered(vector, at, cpu.pc(), raised);
+        Ok(())
+    }
+
+    /// A handler has called another one.
+    fn called(&mut self, vector: u8) -> Result<(), Fault> {
+        if !self.cpu.adopt(vector) {
+            return Err(Fault::EndlessNesting);
+        }
+        self.meters.called(vector, self.cpu);
         Ok(())
     }
 

@@ -10,6 +10,9 @@ use crate::cpu::Cpu;
 const OUT_SPH: u16 = 0xBE0E;
 const OUT_MASK: u16 = 0xFE0F;
 
+/// The opcode of `sbic TIFR1, OCF1A`: a handler looks whether a tick is due, and calls the step interrupt then.
+const LOOKS_FOR_TICK: u16 = 0x99B1;
+
 /// The longest time with interrupts off in some context.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub struct Window {
@@ -98,7 +101,7 @@ impl Meters {
         self.services.get(usize::from(vector)).copied().unwrap_or_default()
     }
 
-    /// Longest time with interrupts off anywhere but in the step interrupt.
+    /// Longest time in which no tick came in, anywhere but in the step interrupt: interrupts were off, and nobody looked.
     pub fn window_outside(&self) -> Window {
         self.window_outside
     }
@@ -151,6 +154,10 @@ impl Meters {
         if on != self.was_on {
             self.was_on = on;
             if on { self.went_on(cpu, pc) } else { self.went_off(pc, began) }
+        } else if !on && cpu.opcode(pc) == LOOKS_FOR_TICK {
+            // Whoever looks calls the handler.
+            self.went_on(cpu, pc);
+            self.went_off(pc, cpu.cycle());
         }
         let sp = cpu.sp();
         if sp < self.lowest_sp {
@@ -200,6 +207,18 @@ impl Meters {
             let service = &mut self.services[usize::from(vector)];
             service.latency_max = service.latency_max.max(at.saturating_sub(raised));
         }
+    }
+
+    /// Whether this is the interrupt being served.
+    #[inline]
+    pub fn is_in(&self, vector: u8) -> bool {
+        self.frames.last().is_some_and(|frame| frame.vector == vector)
+    }
+
+    /// The handler of an interrupt was called by another one instead.
+    pub fn called(&mut self, vector: u8, cpu: Cpu) {
+        self.went_on(cpu, cpu.pc());
+        self.entered(vector, cpu.cycle(), cpu.pc(), None);
     }
 
     /// RETI ended at cycle `now`. Returns the time in interrupts, if this was the outermost.

@@ -14,8 +14,8 @@ const MOVE: &str = "g1 x40 f937.5";
 const MOVE_STEPS: u64 = 51_200;
 /// What a step may be late or early, cycles: 2 us.
 const JITTER: u64 = 32;
-/// Cycles with interrupts off, outside the step interrupt.
-const OFF_CYCLES: u64 = 32;
+/// Cycles in which no tick comes in, outside the step interrupt.
+const OFF_CYCLES: u64 = 42;
 /// Status of a line that was lost in part.
 const BUFFER_FULL: i64 = 13;
 

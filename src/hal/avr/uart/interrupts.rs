@@ -1,10 +1,12 @@
 //! The interrupts of a serial port, in assembly; each port has its own, made from the same text.
 //!
 //! The receive interrupt picks real-time characters off wherever they stand and never queues them.
-//! Both it and the transmit interrupt mask their own source and then let all others in: they do not nest in
-//! themselves, so bytes keep their order, and the step interrupt waits for no more than their first and last
-//! cycles. Exec would run far too long inside them, so they hold it off (`assembly::HOLD`): bytes would be lost, or a
-//! response would stop in its middle. The receive interrupt may nest in the transmit interrupt: the outermost lets exec in.
+//!
+//! Interrupts stay off from the first cycle to the last. A tick need not wait so long: the
+//! handlers look at the timer's flag again and again, half-way for a usual byte, and call the step interrupt's handler if it is set. That costs
+//! two cycles, where masking the port's own interrupt, holding exec off and `sei` cost 26. So neither handler nests in itself, bytes keep their
+//! order, and exec, which would run far too long in the midst of a byte, waits for its end. Other interrupts wait for all of it: 60 cycles, 130
+//! for a byte that is lost.
 //!
 //! A USART that the board does not use has interrupts that return at once, and nothing enables them.
 
@@ -13,9 +15,10 @@ use core::mem::offset_of;
 
 use avr_embassy::assembly;
 
+use super::super::{step_isr, stepper};
 use super::{
-    AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, PLAIN, RXCIE, STOPPED, Shared, TXC, TXCIE, U2X,
-    UDRIE, USB_SHARED,
+    AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, PLAIN, STOPPED, Shared, TXC, TXCIE, U2X, UDRIE,
+    USB_SHARED,
 };
 use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::event::Event;
@@ -68,49 +71,35 @@ macro_rules! interrupts {
         $port:ident on $usart:ident: $shared:ident, $ring:ident,
         $rx:ident, $empty:ident, $complete:ident
     ) => {
-        /// USARTn_RX: takes a byte, in 83 cycles.
+        /// USARTn_RX: takes a byte, in 60 cycles, a line end in 70.
         ///
-        /// Interrupts are off for 28 cycles on the way in and 25 on the way out, or 30 if exec has been held
-        /// off. The transmit interrupt waits for it: a byte that is taken late may be lost, one that is sent late is not. The reader is told at the ends of lines and every `batch` bytes.
+        /// A tick waits for 40 of them at most. The reader is told at the ends of lines and every `batch` bytes.
         #[unsafe(no_mangle)]
         extern "C" fn $rx() -> ! {
             // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only producer
-            // of the receive ring and the only one to write `lost_ends` and to set bits of `realtime`; its
-            // own source is off, so it does not nest in itself. UCSRnB is changed with interrupts off.
+            // of the receive ring and the only one to write `lost_ends` and to set bits of `realtime`. Interrupts are off, so it
+            // does not nest in itself. The handler of the step interrupt restores every register as well; its `reti` lets interrupts
+            // in, but none comes before the instruction behind it, which is `cli`. The flag that it is called for is cleared, as the chip does on the way there.
             unsafe {
                 asm!(
                     ".if {here}",
                     "push r24",
-                    "push r25",
-                    "in   r25, 0x3F",
-                    "lds  r24, {control}",
-                    // Whether the transmit interrupt is on stays in T.
-                    "bst  r24, {transmits}",
-                    "andi r24, {mask}",
-                    "sts  {control}, r24",
-                    // Whoever holds exec off already lets it in, too. In here that bit of the status is clear.
-                    "sbic {flags}, {hold_exec}",
-                    "ori  r25, 0x80",
-                    "sbi  {flags}, {hold_exec}",
-                    // A step comes in here.
-                    "sei",
-                    "push r31",
-                    "cli",
-                    // The status goes with the byte that is read after it: nothing comes in between, for an
-                    // instruction behind `sei` is executed first.
-                    "lds  r31, {status}",
-                    "sei",
-                    "lds  r24, {data}",
+                    "in   r24, 0x3F",
+                    "push r24",
                     "push r30",
+                    "push r31",
+                    // The status goes with the byte that is read after it.
+                    "lds  r31, {status}",
+                    "lds  r24, {data}",
                     // Letters, digits and dots, the most of it, are no real-time characters.
                     "cpi  r24, 0x26",
-                    "brlo 5f",
+                    "brlo 61f",
                     "cpi  r24, 0x7E",
                     "brsh 12f",
-                    // Queue it, unless a frame error or an overrun says that something was lost.
-                    "1:",
+                    // A frame error or an overrun says that something was lost.
+                    "60:",
                     "andi r31, 0x18",
-                    "brne 70f",
+                    "brne 64f",
                     "lds  r30, {shared} + {head}",
                     "inc  r30",
                     ".if {last} < 255",
@@ -118,69 +107,70 @@ macro_rules! interrupts {
                     ".endif",
                     "lds  r31, {shared} + {tail}",
                     "cp   r30, r31",
-                    "breq 80f",
+                    "breq 63f",
+                    "sbic {step_flags}, {due}",
+                    "rcall 68f",
                     "sts  {shared} + {head}, r30",
                     "mov  r31, r30",
                     "andi r31, {batch}",
-                    "breq 4f",
-                    "2:",
+                    "breq 62f",
+                    "65:",
                     "ldi  r31, 0",
                     "subi r30, lo8(-({shared} + {slots}))",
                     "sbci r31, hi8(-({shared} + {slots}))",
                     "st   Z, r24",
-                    "3:",
-                    "pop  r30",
+                    "66:",
                     "pop  r31",
-                    "cli",
-                    "lds  r24, {control}",
-                    "ori  r24, {unmask}",
-                    "bld  r24, {transmits}",
-                    "sts  {control}, r24",
-                    "sbrc r25, 7",
-                    "rjmp 23f",
-                    "cbi  {flags}, {hold_exec}",
-                    "sbic {flags}, {held_exec}",
-                    "rjmp 22f",
-                    "25:",
-                    "out  0x3F, r25",
-                    "pop  r25",
+                    "pop  r30",
+                    "pop  r24",
+                    "out  0x3F, r24",
                     "pop  r24",
                     "reti",
-                    // Exec is held off still.
-                    "23:",
-                    "andi r25, 0x7F",
-                    "rjmp 25b",
-                    // Exec has been asked for meanwhile.
-                    "22:",
-                    "cbi  {flags}, {held_exec}",
-                    "ldi  r24, {pended}",
-                    "sts  {pend}, r24",
-                    // Once more, for a jump would take two cycles with interrupts off.
-                    "out  0x3F, r25",
-                    "pop  r25",
-                    "pop  r24",
-                    "reti",
-                    "4:",
+                    "62:",
                     "sbi  {flags}, {received}",
                     ".if {rts_there}",
-                    "rjmp 30f",
+                    // The reader may come too late to stop the sender, where the ring is short.
+                    "sbic {step_flags}, {due}",
+                    "rcall 68f",
+                    "lds  r31, {shared} + {held}",
+                    "sbrs r31, 1",
+                    "rjmp 65b",
+                    "lds  r31, {shared} + {tail}",
+                    "sub  r31, r30",
+                    "neg  r31",
+                    "andi r31, {last}",
+                    "cpi  r31, {high}",
+                    "brlo 65b",
+                    "sbi  {rts_register}, {rts_bit}",
                     ".endif",
-                    "rjmp 2b",
-                    "70:",
-                    "rjmp 7f",
-                    "80:",
+                    "rjmp 65b",
+                    // A tick is due.
+                    "68:",
+                    "sbi  {step_flags}, {due}",
+                    "call {step}",
+                    "cli",
+                    "ret",
+                    "63:",
                     "rjmp 8f",
+                    "64:",
+                    "rjmp 7f",
                     "12:",
                     ".if {has_plain}",
                     "lds  r30, {shared} + {held}",
                     "sbrc r30, {plain}",
-                    "rjmp 1b",
+                    "rjmp 60b",
                     ".endif",
                     "rjmp 40f",
-                    // Up to a percent sign.
-                    "5:",
+                    // Up to a percent sign. A blank or a line end comes at once.
+                    "61:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 68b",
                     "cpi  r24, 0x20",
                     "brsh 6f",
+                    "cpi  r24, 0x0A",
+                    "breq 67f",
+                    "cpi  r24, 0x0D",
+                    "breq 67f",
                     "cpi  r24, 0x18",
                     "breq 13f",
                     "cpi  r24, 0x05",
@@ -188,28 +178,31 @@ macro_rules! interrupts {
                     "cpi  r24, 0x04",
                     "breq 15f",
                     "cpi  r24, {xon}",
-                    "breq 50f",
+                    "breq 52f",
                     "cpi  r24, {xoff}",
-                    "breq 50f",
+                    "breq 52f",
                     "53:",
-                    // A line end, or nearly: the reader is to look.
-                    "sbi  {flags}, {received}",
                     "cpi  r24, {marks}",
                     "brlo 54f",
-                    "rjmp 1b",
+                    // A line end, or nearly: the reader is to look.
+                    "67:",
+                    "sbi  {flags}, {received}",
+                    "rjmp 60b",
                     "54:",
                     "ldi  r24, {stray}",
-                    "rjmp 1b",
+                    "rjmp 67b",
+                    "52:",
+                    "rjmp 50f",
                     // From blank to percent: special are 0x21 and 0x25, those of odd number with bit 1 clear.
                     "6:",
                     "sbrs r24, 0",
-                    "rjmp 1b",
+                    "rjmp 60b",
                     "sbrc r24, 1",
-                    "rjmp 1b",
+                    "rjmp 60b",
                     ".if {has_plain}",
                     "lds  r30, {shared} + {held}",
                     "sbrc r30, {plain}",
-                    "rjmp 1b",
+                    "rjmp 60b",
                     ".endif",
                     "ldi  r30, {hold}",
                     "sbrc r24, 2",
@@ -225,6 +218,8 @@ macro_rules! interrupts {
                     "ldi  r30, {kill}",
                     // A real-time character. What was lost before it is still to be marked.
                     "16:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 68b",
                     "lds  r24, {shared} + {realtime}",
                     // Who says hold does not say resume any more (`realtime::with`).
                     "sbrc r30, {hold_bit}",
@@ -239,17 +234,22 @@ macro_rules! interrupts {
                     "andi r30, {placed}",
                     "breq 24f",
                     "sbi  {flags}, {received}",
-                    "rjmp 1b",
+                    "rjmp 60b",
+                    // All is done.
+                    "3:",
+                    "rjmp 66b",
                     "24:",
                     "ldi  r24, 0",
                     "andi r31, 0x18",
-                    "brne 7f",
-                    "rjmp 3b",
+                    "breq 3b",
+                    "rjmp 71f",
                     // XON or XOFF, if they count.
                     "50:",
                     "lds  r30, {shared} + {held}",
                     "sbrs r30, {heeds_xoff}",
                     "rjmp 53b",
+                    "sbic {step_flags}, {due}",
+                    "rcall 68b",
                     "ori  r30, {stopped}",
                     "cpi  r24, {xoff}",
                     "breq 51f",
@@ -263,6 +263,9 @@ macro_rules! interrupts {
                     "rjmp 24b",
                     // Something was lost: a mark for it, if there is room.
                     "7:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 68b",
+                    "71:",
                     "push r26",
                     "ldi  r26, 0",
                     "lds  r30, {shared} + {head}",
@@ -278,6 +281,8 @@ macro_rules! interrupts {
                     "rjmp 10f",
                     // The ring is full: the newest byte becomes a mark (`serial::mark`).
                     "8:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 68b",
                     // A resume goes without its place: nothing is lost for it.
                     "cpi  r24, {go}",
                     "brne 81f",
@@ -303,6 +308,8 @@ macro_rules! interrupts {
                     "ldi  r26, 0",
                     // One more byte is lost (`serial::lose`).
                     "10:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 68b",
                     "sbi  {flags}, {received}",
                     "cpi  r24, 0x0D",
                     "breq 17f",
@@ -341,6 +348,8 @@ macro_rules! interrupts {
                     // A tilde, or above: an override, or the end of a jog (`realtime::Asked`), unless it is damaged, or a
                     // part of a letter.
                     "40:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 68b",
                     "brne 39f",
                     "ldi  r30, {resume}",
                     "rjmp 16b",
@@ -354,6 +363,8 @@ macro_rules! interrupts {
                     "cpi  r30, 8",
                     "breq 41f",
                     "38:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 68b",
                     "mov  r30, r31",
                     "andi r30, 0x18",
                     "brne 41f",
@@ -367,8 +378,10 @@ macro_rules! interrupts {
                     "sbrs r30, 7",
                     "rjmp 42f",
                     "41:",
-                    "rjmp 1b",
+                    "rjmp 60b",
                     "42:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 68b",
                     "sbi  {flags}, {special}",
                     "lds  r30, {shared} + {asked} + 2",
                     "cpi  r24, {jog_end}",
@@ -426,28 +439,11 @@ macro_rules! interrupts {
                     "sts  {shared} + {asked} + 2, r30",
                     "ldi  r30, 0",
                     "ret",
-                    // The reader may come too late to stop the sender, where the ring is short.
-                    ".if {rts_there}",
-                    "30:",
-                    "lds  r31, {shared} + {held}",
-                    "sbrs r31, 1",
-                    "rjmp 2b",
-                    "lds  r31, {shared} + {tail}",
-                    "sub  r31, r30",
-                    "neg  r31",
-                    "andi r31, {last}",
-                    "cpi  r31, {high}",
-                    "brlo 31f",
-                    "sbi  {rts_register}, {rts_bit}",
-                    "31:",
-                    "rjmp 2b",
-                    ".endif",
                     ".else",
                     "reti",
                     ".endif",
                     here = const is_on($port, Usart::$usart) as u8,
                     status = const Usart::$usart.address(),
-                    control = const Usart::$usart.address() + 1,
                     data = const Usart::$usart.address() + 6,
                     shared = sym $shared,
                     last = const $ring - 1,
@@ -455,6 +451,9 @@ macro_rules! interrupts {
                     tail = const offset_of!(Shared<$ring>, rx) + Ring::<u8, $ring>::TAIL,
                     slots = const offset_of!(Shared<$ring>, rx) + Ring::<u8, $ring>::SLOTS,
                     lost_ends = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, lost_ends),
+                    step_flags = const stepper::FLAGS,
+                    due = const stepper::DUE,
+                    step = sym step_isr::__vector_17,
                     realtime = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, realtime),
                     rts_there = const rts($port).is_some() as u8,
                     rts_register = const place(rts($port), 2).0,
@@ -469,14 +468,7 @@ macro_rules! interrupts {
                     xon = const XON,
                     xoff = const XOFF,
                     let_go = const realtime::LET_GO,
-                    mask = const !(RXCIE | UDRIE),
-                    transmits = const UDRIE.trailing_zeros(),
-                    hold_exec = const assembly::HOLD,
-                    held_exec = const assembly::HELD,
                     flags = const assembly::FLAGS,
-                    pend = const assembly::PEND,
-                    pended = const assembly::PENDED,
-                    unmask = const RXCIE,
                     batch = const batch($ring) - 1,
                     marks = const MARKS,
                     stray = const STRAY,
@@ -510,42 +502,35 @@ macro_rules! interrupts {
             }
         }
 
-        /// USARTn_UDRE: sends a byte, in 69 cycles, or 81 while XOFF or XON waits, or stops asking when there is none.
+        /// USARTn_UDRE: sends a byte, in 59 cycles, 63 on a bus, or stops asking when there is none. While XOFF or XON waits, or the other
+        /// side may hold us back, 85.
         ///
-        /// Interrupts are off for 23 cycles on the way in and 21 on the way out, 26 on a bus.
+        /// A tick waits for 35 of them at most.
         #[unsafe(no_mangle)]
         extern "C" fn $empty() -> ! {
             // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only consumer
-            // of the transmit ring; its own source is off, so it does not nest in itself. UCSRnB is changed
-            // with interrupts off.
+            // of the transmit ring. Interrupts are off, so it does not nest in itself, and UCSRnB is changed in one piece. The step
+            // interrupt's handler is called as in the receive interrupt.
             unsafe {
                 asm!(
                     ".if {here}",
                     "push r24",
-                    "push r25",
-                    "in   r25, 0x3F",
-                    "lds  r24, {control}",
-                    "andi r24, {mask}",
-                    "sts  {control}, r24",
-                    // Whoever holds exec off already lets it in, too. In here that bit of the status is clear.
-                    "sbic {flags}, {hold_exec}",
-                    "ori  r25, 0x80",
-                    "sbi  {flags}, {hold_exec}",
-                    "sei",
+                    "in   r24, 0x3F",
+                    "push r24",
                     "push r30",
                     "push r31",
                     "lds  r24, {shared} + {ahead}",
-                    "tst  r24",
-                    "brne 3f",
-                    "10:",
-                    "lds  r24, {shared} + {held}",
-                    "andi r24, {holds}",
-                    "brne 5f",
+                    "lds  r30, {shared} + {held}",
+                    "andi r30, {holds}",
+                    "or   r24, r30",
+                    "brne 20f",
                     "6:",
                     "lds  r30, {shared} + {tail}",
                     "lds  r31, {shared} + {head}",
                     "cp   r30, r31",
-                    "breq 2f",
+                    "breq 24f",
+                    "sbic {step_flags}, {due}",
+                    "rcall 25f",
                     "inc  r30",
                     "andi r30, {last}",
                     "sts  {shared} + {tail}, r30",
@@ -554,55 +539,42 @@ macro_rules! interrupts {
                     "sbci r31, hi8(-({shared} + {slots}))",
                     "ld   r24, Z",
                     "4:",
-                    ".if !{bus}",
                     "sts  {data}, r24",
-                    ".endif",
-                    "sbi  {flags}, {transmitted}",
-                    "pop  r31",
-                    "pop  r30",
-                    "cli",
                     ".if {bus}",
                     // Complete is this byte, not one before it: no time may pass between the two.
-                    "sts  {data}, r24",
                     "ldi  r24, {complete}",
                     "sts  {status}, r24",
                     ".endif",
-                    "lds  r24, {control}",
-                    "ori  r24, {unmask}",
-                    "sts  {control}, r24",
-                    "1:",
-                    "sbrc r25, 7",
-                    "rjmp 7f",
-                    "cbi  {flags}, {hold_exec}",
-                    "sbic {flags}, {held_exec}",
-                    "rjmp 8f",
-                    "9:",
-                    "out  0x3F, r25",
-                    "pop  r25",
-                    "pop  r24",
-                    "reti",
-                    "7:",
-                    "andi r25, 0x7F",
-                    "rjmp 9b",
-                    // Exec has been asked for meanwhile.
-                    "8:",
-                    "cbi  {flags}, {held_exec}",
-                    "ldi  r24, {pended}",
-                    "sts  {pend}, r24",
-                    "rjmp 9b",
-                    // It stays masked until there is something to send.
-                    "2:",
+                    "sbi  {flags}, {transmitted}",
+                    "23:",
                     "pop  r31",
                     "pop  r30",
+                    "pop  r24",
+                    "out  0x3F, r24",
+                    "pop  r24",
+                    "reti",
+                    // A tick is due.
+                    "25:",
+                    "sbi  {step_flags}, {due}",
+                    "call {step}",
                     "cli",
-                    ".if {bus}",
+                    "ret",
+                    // It stays masked until there is something to send.
+                    "24:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 25b",
                     "lds  r24, {control}",
+                    "andi r24, {mask}",
+                    ".if {bus}",
                     "ori  r24, {when_complete}",
-                    "sts  {control}, r24",
                     ".endif",
-                    "rjmp 1b",
-                    // A byte that goes before all others, if it waits no more, or the byte sent last ends a line.
-                    "3:",
+                    "sts  {control}, r24",
+                    "rjmp 23b",
+                    // A byte goes before all others, if it waits no more, or the byte sent last ends a line.
+                    "20:",
+                    "lds  r24, {shared} + {ahead}",
+                    "tst  r24",
+                    "breq 5f",
                     "cpi  r24, {wait}",
                     "brlo 11f",
                     "lds  r30, {shared} + {tail}",
@@ -611,7 +583,7 @@ macro_rules! interrupts {
                     "sbci r31, hi8(-({shared} + {slots}))",
                     "ld   r31, Z",
                     "cpi  r31, {line_end}",
-                    "brsh 10b",
+                    "brsh 5f",
                     "andi r24, {wait} - 1",
                     "11:",
                     "ldi  r30, 0",
@@ -619,13 +591,18 @@ macro_rules! interrupts {
                     "rjmp 4b",
                     // The other side has said that it holds us back, or may say so by a pin.
                     "5:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 25b",
+                    "lds  r24, {shared} + {held}",
+                    "andi r24, {holds}",
+                    "breq 6b",
                     ".if {cts_mask}",
                     "sbrc r24, 0",
-                    "rjmp 2b",
+                    "rjmp 24b",
                     "sbis {cts_register}, {cts_bit}",
                     "rjmp 6b",
                     ".endif",
-                    "rjmp 2b",
+                    "rjmp 24b",
                     ".else",
                     "reti",
                     ".endif",
@@ -634,6 +611,9 @@ macro_rules! interrupts {
                     cts_mask = const cts($port).is_some() as u8,
                     cts_register = const place(cts($port), 0).0,
                     cts_bit = const place(cts($port), 0).1,
+                    step_flags = const stepper::FLAGS,
+                    due = const stepper::DUE,
+                    step = sym step_isr::__vector_17,
                     status = const Usart::$usart.address(),
                     control = const Usart::$usart.address() + 1,
                     data = const Usart::$usart.address() + 6,
@@ -648,12 +628,7 @@ macro_rules! interrupts {
                     line_end = const LINE_END,
                     holds = const STOPPED | HEEDS_CTS,
                     mask = const !UDRIE,
-                    unmask = const UDRIE,
-                    hold_exec = const assembly::HOLD,
-                    held_exec = const assembly::HELD,
                     flags = const assembly::FLAGS,
-                    pend = const assembly::PEND,
-                    pended = const assembly::PENDED,
                     when_complete = const TXCIE,
                     complete = const U2X | TXC,
                     transmitted = const Event::Transmitted as u8,

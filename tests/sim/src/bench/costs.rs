@@ -40,7 +40,7 @@ pub fn lines_jerk(bed: &Bed) -> Result<Figure> {
     Ok(lines_per_second(&report).into())
 }
 
-/// The longest time with interrupts off outside the step interrupt, cycles.
+/// The longest time in which no tick comes in outside the step interrupt, cycles.
 pub fn interrupts_off(bed: &Bed) -> Result<Figure> {
     let machines = [jitter::run(bed, 1_000)?, spiral_on_fast_line(bed, Vec::new())?.0];
     let windows = machines.iter().map(|m| (m.meters().window_outside(), m));
