@@ -74,7 +74,6 @@ const HOT: &[&str] = &[
     "kerf::tasks::planner::Planner>::close_chain",
     "kerf::tasks::planner::Planner>::is_due",
     "kerf::tasks::planner::Planner>::replan",
-    "kerf::tasks::planner::take_at_once",
     "kerf::tasks::planner::run::",
     "kerf::tasks::ports::Port>::promise",
     "kerf::tasks::reader::run::",
