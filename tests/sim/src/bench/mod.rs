@@ -20,7 +20,7 @@ mod spirals;
 mod table;
 mod workload;
 
-pub use spirals::{ideal, spiral};
+pub use spirals::{curve, ideal, spiral};
 
 pub use rows::ROWS;
 pub use table::{print, print_rows};

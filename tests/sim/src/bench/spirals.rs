@@ -15,7 +15,7 @@ use crate::report::Report;
 const MOVES: u32 = 2_000;
 /// mm/min.
 const FEED: f64 = 6_000.0;
-/// The feed of [`curve_lines`]: 910 moves a second would do.
+/// The feed of [`curve`]: 910 moves a second would do.
 const CURVE_FEED: f64 = 18_000.0;
 /// Where the spiral begins, mm from its centre: wide enough for no corner to limit the feed.
 const RADIUS: f64 = 30.0;
@@ -151,10 +151,10 @@ pub fn tenth_smooth(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, 0.1, How { jerk: Some(USUAL_JERK), ..fast() })
 }
 
-/// Moves of 0.33 mm in a second, on a curve on which no two of them lie on a line.
+/// Moves in a second on [`curve`].
 pub fn curve_lines(bed: &Bed) -> Result<Figure> {
     let how = How { acceleration: NO_LIMIT, ..fast() };
-    let (_, report) = bed.run(&spiral_at(0.33, CURVE_FEED), how)?;
+    let (_, report) = bed.run(&curve(), how)?;
     Ok(lines_per_second(&report).into())
 }
 
@@ -232,6 +232,11 @@ pub fn lines_per_second(report: &Report) -> f64 {
 /// The job. It begins where the machine stands, at 0.
 pub fn spiral(chord: f64) -> String {
     spiral_at(chord, FEED)
+}
+
+/// Moves of 0.33 mm on a curve on which no two of them lie on a line, faster than the CPU can plan them.
+pub fn curve() -> String {
+    spiral_at(0.33, CURVE_FEED)
 }
 
 /// The job at another feed, mm/min.
