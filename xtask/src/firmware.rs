@@ -141,7 +141,8 @@ fn keep(built: &Path, kept: &Path) -> Result<PathBuf> {
     Ok(kept.to_owned())
 }
 
-/// Builds and checks the examples of the runtime, `avr-embassy`; returns the folder where they lie, `CHIP/NAME.elf`.
+/// Builds and checks the examples of the runtime, `avr-embassy`, and what else runs on a bare chip; returns the folder of the examples, where they lie as
+/// `CHIP/NAME.elf`.
 ///
 /// That of a clock of which a millisecond is no whole number of counts is `CHIP-uneven-clock/blink.elf`.
 pub fn build_examples() -> Result<PathBuf> {
@@ -151,23 +152,48 @@ pub fn build_examples() -> Result<PathBuf> {
     }
     let uneven = folder.join(format!("{}-uneven-clock", ATMEGA1284P.name));
     build_examples_of(&ATMEGA1284P, "uneven-clock", &EXAMPLES[..1], &uneven)?;
+    build_parts()?;
     Ok(folder)
+}
+
+/// Builds and checks the images that try parts of Kerf on the chip of every board, as they are compiled for the usual board. They lie in `parts` beside the
+/// images of boards.
+fn build_parts() -> Result<()> {
+    let features = features(Board::default(), Machine::default(), &[])?;
+    let mut cargo = cargo_for(&ATMEGA2560)?;
+    cargo.args(["--package", "kerf", "--no-default-features", "--features"]).arg(features);
+    keep_examples(cargo, &ATMEGA2560, &PARTS, &directory().join("parts"))
 }
 
 /// Builds some examples for a chip, with a feature of the runtime, into a folder.
 fn build_examples_of(chip: &Chip, feature: &str, names: &[&str], folder: &Path) -> Result<()> {
+    let mut cargo = cargo_for(chip)?;
+    cargo.args(["--package", "avr-embassy", "--features"]);
+    cargo.arg(format!("{},{feature}", chip.name).trim_end_matches(','));
+    keep_examples(cargo, chip, names, folder)
+}
+
+/// What builds for a chip.
+fn cargo_for(chip: &Chip) -> Result<std::process::Command> {
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
-    let target = target(chip);
     link::write_script(&root().join(LINKER))?;
     let mut cargo = rust.cargo();
     cargo.current_dir(root()).env("RUSTFLAGS", flags(chip)).env(link::KEPT, "/dev/null");
     cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none"]);
-    cargo.args(["--package", "avr-embassy", "--features"]);
-    cargo.arg(format!("{},{feature}", chip.name).trim_end_matches(','));
-    cargo.args(names.iter().flat_map(|name| ["--example", name]));
-    run(cargo.arg("--target-dir").arg(&target))?;
+    cargo.arg("--target-dir").arg(target(chip));
+    Ok(cargo)
+}
+
+/// Has cargo build examples of a package for a chip, and checks and copies them into a folder.
+fn keep_examples(
+    mut cargo: std::process::Command,
+    chip: &Chip,
+    names: &[&str],
+    folder: &Path,
+) -> Result<()> {
+    run(cargo.args(names.iter().flat_map(|name| ["--example", name])))?;
     for name in names {
-        let built = target.join(format!("avr-none/release/examples/{name}.elf"));
+        let built = target(chip).join(format!("avr-none/release/examples/{name}.elf"));
         elf::check_compiled(&built, chip)?;
         keep(&built, &folder.join(format!("{name}.elf")))?;
     }
@@ -176,6 +202,8 @@ fn build_examples_of(chip: &Chip, feature: &str, names: &[&str], folder: &Path) 
 
 /// The examples of `avr-embassy`.
 const EXAMPLES: [&str; 4] = ["blink", "echo", "preempt", "costs"];
+/// What of `tests/chip` is an image.
+const PARTS: [&str; 1] = ["arithmetic"];
 
 /// `cargo xtask flash`
 #[derive(Args)]

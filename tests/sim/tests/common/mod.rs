@@ -58,13 +58,24 @@ pub fn word(machine: &Machine, name: &str) -> u16 {
     machine.peek_word(addr.unwrap_or_else(|| panic!("no variable {name}")))
 }
 
+/// Where images lie.
+fn images() -> PathBuf {
+    std::env::var_os("KERF_ELF_DIR")
+        .map_or_else(|| PathBuf::from("../../target/firmware"), PathBuf::from)
+}
+
 /// Where the firmware's image for a board lies.
 pub fn image(board: &Board) -> PathBuf {
-    let folder = std::env::var_os("KERF_ELF_DIR")
-        .map_or_else(|| PathBuf::from("../../target/firmware"), PathBuf::from);
-    let elf = folder.join(format!("{}.elf", board.name));
+    let elf = images().join(format!("{}.elf", board.name));
     let (elf_name, name) = (elf.display(), board.name);
     assert!(elf.exists(), "no {elf_name}: `cargo xtask build --board {name}` makes it");
+    elf
+}
+
+/// Where the image of a part of Kerf lies, which `cargo xtask examples` makes of `tests/chip`.
+pub fn part(name: &str) -> PathBuf {
+    let elf = images().join("parts").join(format!("{name}.elf"));
+    assert!(elf.exists(), "no {}: `cargo xtask examples` makes it", elf.display());
     elf
 }
 
