@@ -170,17 +170,32 @@ impl Log {
 
 #[small]
 impl Write {
-    /// Begins to write the next byte; false if there is none left. Not while memory is busy.
-    pub fn step<M: Memory>(&mut self, memory: &mut M) -> bool {
+    /// Where the next byte belongs, and the byte; `None` if there is none left.
+    #[inline(always)]
+    fn next(&self) -> Option<(u16, u8)> {
         let start = self.slot * SIZE;
-        let (at, byte) = match self.done {
+        Some(match self.done {
             0 => (start, BEGUN),
             i if u16::from(i) < SIZE => {
                 (start + u16::from(i), self.bytes.get(usize::from(i)).copied().unwrap_or(0))
             }
             i if u16::from(i) == SIZE => (start, record::VALID),
-            _ => return false,
-        };
+            _ => return None,
+        })
+    }
+
+    /// Whether memory does not take the next byte yet; behind the last one, whether it is busy.
+    #[inline(always)]
+    pub fn waits<M: Memory>(&self, memory: &M) -> bool {
+        match self.next() {
+            Some((at, _)) => !memory.takes(at),
+            None => memory.is_busy(),
+        }
+    }
+
+    /// Begins to write the next byte; false if there is none left. Not while it [`waits`](Self::waits).
+    pub fn step<M: Memory>(&mut self, memory: &mut M) -> bool {
+        let Some((at, byte)) = self.next() else { return false };
         self.done += 1;
         // A byte that is right already is spared.
         if memory.read(at) != byte {

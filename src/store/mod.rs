@@ -43,6 +43,11 @@ pub trait Memory {
     }
     /// Whether a byte is being written.
     fn is_busy(&self) -> bool;
-    /// Begins to write a byte. Not while busy.
+    /// Whether a byte may be written to an address at once: not while busy, unless the memory keeps it together with the one that is being written.
+    #[inline(always)]
+    fn takes(&self, _at: u16) -> bool {
+        !self.is_busy()
+    }
+    /// Begins to write a byte, which it [`takes`](Memory::takes).
     fn write(&mut self, at: u16, byte: u8);
 }

@@ -262,7 +262,7 @@ pub async fn run(links: &'static Links) -> ! {
                 };
                 while write.step(&mut memory) {
                     let mut pause = BYTE_MS;
-                    while memory.is_busy() {
+                    while write.waits(&memory) {
                         after_ms(pause).await;
                         pause = 1;
                     }

@@ -4,8 +4,8 @@
 //! map are written one behind the other over all sectors, which wear alike.
 //!
 //! **While the flash is written nothing else runs from it**: for 1 ms, and each 80 items for 45 ms, in which a sector is erased. So a piece waits
-//! until the motors rest and no byte has come for [`QUIET_MS`]; [`Memory::is_busy`] says so until then. One piece waits at most: who writes to
-//! another one before its turn has it written at once.
+//! until the motors rest and no byte has come for [`QUIET_MS`]; [`Memory::is_busy`] says so until then. Meanwhile it takes more bytes, so that a record of
+//! the log is two or three items, not one for each byte. One piece waits at most: who writes to another one before its turn has it written at once.
 //!
 //! Thread mode alone uses it, after start-up. RAM: 8.4 KB.
 
@@ -108,6 +108,11 @@ impl State {
     }
 }
 
+/// The number of the piece that has an address.
+fn number(at: u16) -> u8 {
+    (usize::from(at) / PIECE) as u8
+}
+
 /// Writes the piece that waits, if nothing is disturbed by it. Whether none waits any more.
 fn is_kept() -> bool {
     with(|state| {
@@ -141,8 +146,12 @@ impl Memory for Eeprom {
         !is_kept()
     }
 
+    fn takes(&self, at: u16) -> bool {
+        with(|state| state.waiting == Some(number(at))) || is_kept()
+    }
+
     fn write(&mut self, at: u16, byte: u8) {
-        let number = (usize::from(at) / PIECE) as u8;
+        let number = number(at);
         with(|state| {
             if state.waiting.is_some_and(|waiting| waiting != number) {
                 state.put_away();

@@ -1,5 +1,6 @@
 //! The log on a small memory whose power fails.
 
+use core::cell::Cell;
 use std::collections::HashMap;
 use std::vec::Vec;
 
@@ -121,6 +122,53 @@ fn rubbish_is_known() {
     let mut log = Log::open(&cells);
     assert!(put(&mut log, &mut cells, 3, 9));
     assert!(!log.is_rubbish(&cells));
+}
+
+/// A memory that keeps pieces of bytes, as the flash of the RP2040 does: one that waits takes more, and is kept for who waits.
+struct Pieces {
+    cells: Cells,
+    waiting: Cell<Option<u16>>,
+    kept: Cell<u32>,
+}
+
+const PIECE: u16 = 32;
+
+impl Memory for Pieces {
+    const SIZE: u16 = Cells::SIZE;
+
+    fn read(&self, at: u16) -> u8 {
+        self.cells.read(at)
+    }
+    fn is_busy(&self) -> bool {
+        self.kept.update(|kept| kept + u32::from(self.waiting.take().is_some()));
+        false
+    }
+    fn takes(&self, at: u16) -> bool {
+        self.waiting.get() == Some(at / PIECE) || !self.is_busy()
+    }
+    fn write(&mut self, at: u16, byte: u8) {
+        let piece = Some(at / PIECE);
+        assert!(self.waiting.get().is_none() || self.waiting.get() == piece);
+        self.waiting.set(piece);
+        self.cells.write(at, byte);
+    }
+}
+
+#[test]
+fn a_record_is_kept_in_one_piece_or_three() {
+    let mut pieces = Pieces { cells: Cells::new(), waiting: Cell::new(None), kept: Cell::new(0) };
+    let mut log = Log::open(&pieces);
+    for value in 0..100 {
+        let Put::Last(mut write) = log.put(&pieces, 5, value, 0) else { panic!("no room") };
+        pieces.kept.set(0);
+        while write.step(&mut pieces) {
+            assert!(!write.waits(&pieces));
+        }
+        // Its first byte is in the first piece, and written last.
+        assert!([1, 3].contains(&pieces.kept.get()), "{} pieces", pieces.kept.get());
+        assert!(pieces.waiting.get().is_none(), "all of it is kept");
+        assert_eq!(log.newest(&pieces, 5), Some(value));
+    }
 }
 
 proptest! {

@@ -110,8 +110,9 @@ fn drivers_are_told_their_settings() {
     for line in ["{drr2:1.4,drh2:0.05}", "{drc4:0}", "{3mi:64}", "{drs1:255}"] {
         set(&mut board, &mut host, line);
     }
-    // Address 2 is motor 2's, 1 is motor 3's. What is new does not wait for its turn.
-    host.run_for_ms(&mut board, 10).unwrap();
+    // Address 2 is motor 2's, 1 is motor 3's. What is new does not wait for its turn: two datagrams follow the last answer, a millisecond each, and
+    // the flash is written before them, a part of a millisecond each piece.
+    host.run_for_ms(&mut board, 5).unwrap();
     let told = take_told(&mut board, &mut rest);
     for wanted in [
         (2, 0x90, 0x0008_1800),
