@@ -199,7 +199,7 @@ fn number(random: &mut Random, most: u64) -> u64 {
 /// Operands of all kinds, and what is passed over.
 fn random_case(random: &mut Random) -> Case {
     let b = number(random, 32) as u32;
-    let mut case = match random.below(4) {
+    let mut case = match random.below(5) {
         0 => Case::new(number(random, 64), b),
         // A quotient of 16 bits that is exact, or nearly, or leaves the greatest rest.
         1 => {
@@ -212,6 +212,14 @@ fn random_case(random: &mut Random) -> Case {
             let b = u64::from(b.max(1));
             let rest = [0, 1, b - 1][random.below(3) as usize].min(b - 1);
             Case::new(number(random, 32) * b + rest, b as u32)
+        }
+        // Floats whose quotient is exact, or just beside: on the way the rest is the divisor, or just below.
+        3 => {
+            let length = 1 + random.below(23) as u32;
+            let mut of = |bits: u32| (1 << bits) + number(random, 32) as u32 % (1 << bits);
+            let (quotient, y) = (of(length - 1), of(23 - length));
+            let x = ((quotient * y) as f32).to_bits() + random.below(3) as u32 - 1;
+            Case::new(x.into(), (y as f32).to_bits())
         }
         // Floats that are alike.
         _ => {
