@@ -7,7 +7,7 @@
 //! | an encoder's pin | takes the time of a pulse ([`encoder`](super::encoder)) | 106 at most, 119 with a second one of sync, interrupts off for 31 and 25 |
 //!
 //! A handler of an encoder's pin reads timer 5 first, 20 cycles after it has been entered. It masks both pins of the encoder and lets
-//! all other interrupts in but exec, as those of the serial ports do: it nests neither in itself nor in the other. An edge that comes
+//! all other interrupts in but exec: it nests neither in itself nor in the other. An edge that comes
 //! meanwhile waits for its end. A pulse that is over before its handler reads the pin is none.
 
 use core::arch::asm;
@@ -118,7 +118,7 @@ macro_rules! edges {
         extern "C" fn $name() -> ! {
             // SAFETY: it restores every register it changes, T with the status, and returns by `reti`. With a sensor it is the only one to write the
             // sensor's `Line`, but for `quiet`, which thread mode and exec set with interrupts off; the mask that it changes is
-            // written by handlers of sensors alone, which do not nest. `HOLD` is set and cleared as the handlers of ports do.
+            // written by handlers of sensors alone, which do not nest. `HOLD` is set and cleared by them alone.
             unsafe {
                 asm!(
                     ".if {sensor} == 0",

@@ -186,7 +186,7 @@ pub fn kick(port: u8) {
 /// interrupt at the end of an earlier transmission would switch it off again.
 fn kick_bus(port: u8) {
     let control = register(port, 1);
-    // SAFETY: written whole; thread mode does not run while an interrupt has masked its own bit.
+    // SAFETY: written whole.
     unsafe { control.write_volatile(IDLE) };
     let next = if tx(port).used() > 0 {
         each_driver(port, gpio::high);
