@@ -4,6 +4,7 @@ mod arithmetic;
 mod disasm;
 mod flow;
 pub mod places;
+mod pointer;
 mod scratch;
 pub mod stack;
 mod stack_args;
@@ -95,6 +96,7 @@ pub fn check(path: &Path) -> Result<()> {
 pub fn check_compiled(path: &Path, chip: &Chip) -> Result<()> {
     let (image, code) = (Image::load(path)?, Code::load(path)?);
     scratch::check(&image, &code)?;
+    pointer::check(&image, &code)?;
     match chip.return_address {
         stack_args::RETURN_ADDRESS => stack_args::check(&image, &code),
         _ => Ok(()),
