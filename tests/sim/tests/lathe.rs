@@ -12,8 +12,8 @@ use kerf_sim::plot::{self, Look};
 use kerf_sim::threads::Threads;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
-/// The longest time with interrupts off outside the step interrupt.
-const OFF: u64 = 31;
+/// The longest time in which no tick comes in outside the step interrupt.
+const OFF: u64 = 42;
 
 /// The exception that tells of a spindle that is lost.
 const LOST: u64 = 44;

@@ -13,8 +13,8 @@ const US: u64 = 16;
 const STOP_US: u64 = 50;
 /// From the edge to the last step, at 85,000 steps a second, where the step interrupt leaves a fifth of the CPU.
 const STOP_FAST_US: u64 = 125;
-/// The longest time with interrupts off outside the step interrupt.
-const WINDOW: u64 = 31;
+/// The longest time in which no tick comes in outside the step interrupt.
+const WINDOW: u64 = 42;
 
 /// A machine with switches that moves X and Y, and these settings.
 fn running(board: &'static Board, build: &Build, settings: &[&str]) -> (Machine, Host) {
