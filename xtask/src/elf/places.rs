@@ -1,5 +1,7 @@
 //! Places in the code that the stack analysis starts from or has to know.
 
+use anyhow::{Result, ensure};
+
 use super::disasm::Code;
 use super::flow::Landmarks;
 use super::{Image, RAM_BASE};
@@ -58,6 +60,15 @@ pub fn function_at(image: &Image, insn: u32) -> &str {
         s.address <= u64::from(insn) && !s.is_data && !s.name.starts_with(TAKEN)
     };
     image.symbols.iter().rfind(before).map_or("code without a name", |symbol| &symbol.name)
+}
+
+/// Fails if there are any instructions that do what they must not, and says where they are and what helps.
+pub fn refuse(image: &Image, found: &[u32], does: &str, helps: &str) -> Result<()> {
+    let place = |at: &u32| format!("  {at:#x} in {}", function_at(image, *at));
+    let places: Vec<_> = found.iter().map(place).collect();
+    let shown = image.path.display();
+    ensure!(found.is_empty(), "{shown} {does}:\n{}\n{helps}", places.join("\n"));
+    Ok(())
 }
 
 /// `exec` of `<...TaskStorage<kerf::tasks::exec::run::{closure#0}>>::poll`.

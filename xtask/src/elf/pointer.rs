@@ -10,11 +10,11 @@
 //! Behind a load into one half of its own pointer, up to the next branch or call, the pointer must not be used before one of its
 //! halves has been written again.
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use super::Image;
 use super::disasm::{Code, Insn};
-use super::places::function_at;
+use super::places;
 
 /// A pointer of the chip: its name, and its halves.
 type Pointer = (char, [&'static str; 2]);
@@ -24,18 +24,13 @@ const POINTERS: [Pointer; 3] =
 
 /// Fails when some code uses half a pointer.
 pub fn check(image: &Image, code: &Code) -> Result<()> {
-    let found: Vec<_> = misused(code)
-        .into_iter()
-        .map(|at| format!("  {at:#x} in {}", function_at(image, at)))
-        .collect();
-    ensure!(
-        found.is_empty(),
-        "{} uses a pointer of which half has been overwritten:\n{}\n\
-         A defect of LLVM in atomic loads of 16 bits: load it a byte at a time, or out of line.",
-        image.path.display(),
-        found.join("\n")
-    );
-    Ok(())
+    let found = misused(code);
+    places::refuse(
+        image,
+        &found,
+        "uses a pointer of which half has been overwritten",
+        "A defect of LLVM in atomic loads of 16 bits: load it a byte at a time, or out of line.",
+    )
 }
 
 /// The addresses of instructions that use half a pointer.

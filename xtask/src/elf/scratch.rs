@@ -17,29 +17,23 @@
 
 use std::collections::HashSet;
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use super::Image;
 use super::disasm::{Code, Insn};
-use super::places::function_at;
+use super::places;
 
 const FLAGS: &str = "0x3f";
 
 /// Fails when some code reads r0 after flags were kept in it.
 pub fn check(image: &Image, code: &Code) -> Result<()> {
-    let found: Vec<_> = misread(code)
-        .into_iter()
-        .map(|at| format!("  {at:#x} in {}", function_at(image, at)))
-        .collect();
-    ensure!(
-        found.is_empty(),
-        "{} reads r0 as a result after the compiler kept the flags in it:\n{}\n\
-         A defect of LLVM in frames over 63 bytes: put `#[inline(never)]` on parts of the function to \
-         make its frame smaller.",
-        image.path.display(),
-        found.join("\n")
-    );
-    Ok(())
+    let found = misread(code);
+    places::refuse(
+        image,
+        &found,
+        "reads r0 as a result after the compiler kept the flags in it",
+        "A defect of LLVM in frames over 63 bytes: put `#[inline(never)]` on parts of the function to make its frame smaller.",
+    )
 }
 
 /// The addresses of instructions that take the flags for something else.

@@ -14,11 +14,11 @@
 //!
 //! Arguments go to the stack when they take more than 18 bytes, or do not fit what is left of them.
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use super::Image;
 use super::disasm::{Code, Insn, number};
-use super::places::{function_at, landmarks};
+use super::places::{self, landmarks};
 
 /// Bytes of a return address on the chips that the defect is of.
 pub const RETURN_ADDRESS: usize = 3;
@@ -26,19 +26,13 @@ pub const RETURN_ADDRESS: usize = 3;
 /// Fails when some code reaches behind the registers that it saved.
 pub fn check(image: &Image, code: &Code) -> Result<()> {
     let ends = landmarks(image).ends;
-    let found: Vec<_> = beyond(code, |address| ends.contains(&address))
-        .into_iter()
-        .map(|at| format!("  {at:#x} in {}", function_at(image, at)))
-        .collect();
-    ensure!(
-        found.is_empty(),
-        "{} takes arguments from the wrong place on the stack:\n{}\n\
-         A defect of LLVM on chips with three bytes of return address: give the function fewer arguments, \
-         18 bytes at most, for example by reference.",
-        image.path.display(),
-        found.join("\n")
-    );
-    Ok(())
+    let found = beyond(code, |address| ends.contains(&address));
+    places::refuse(
+        image,
+        &found,
+        "takes arguments from the wrong place on the stack",
+        "A defect of LLVM on chips with three bytes of return address: give the function fewer arguments, 18 bytes at most, for example by reference.",
+    )
 }
 
 /// The addresses of instructions that reach behind the saved registers of their function.
