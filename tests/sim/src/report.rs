@@ -159,7 +159,7 @@ pub struct Report {
     pub cpu_load: Option<f64>,
     /// Share of time in interrupts, likewise.
     pub interrupt_load: Option<f64>,
-    /// Longest time with interrupts off outside the step interrupt.
+    /// Longest time in which no tick could come in, outside the step interrupt.
     pub interrupts_off: WindowReport,
     /// Longest time with interrupts off inside it.
     pub interrupts_off_in_step: WindowReport,

@@ -207,7 +207,7 @@ fn random_case(random: &mut Random) -> Case {
             let rest = [0, 1, u32::from(b) - 1][random.below(3) as usize].min(u32::from(b) - 1);
             Case::new(u64::from(number(random, 16) as u32 * u32::from(b) + rest), b.into())
         }
-        // The same of 32 bits.
+        // A quotient of 32 bits that is exact, or nearly, or leaves the greatest rest.
         2 => {
             let b = u64::from(b.max(1));
             let rest = [0, 1, b - 1][random.below(3) as usize].min(b - 1);
