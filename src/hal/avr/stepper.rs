@@ -53,7 +53,7 @@ const CYCLES: u16 = 49;
 /// Turns of a loop of 3 cycles that widen a pulse, at least 1: in lockstep, with one motor left to add, and else.
 pub(super) static LOCKSTEP_WIDTH: SharedByte =
     SharedByte::new(width_turns(Drivers::USUAL.pulse_us, LOCKSTEP_CYCLES));
-/// See [`LOCKSTEP_WIDTH`]. Start-up sets it: a first value would lie in flash as well.
+/// See [`LOCKSTEP_WIDTH`]. [`set_step_output`] sets it at start-up: a first value would lie in flash as well.
 pub(super) static SHORT_WIDTH: SharedByte = SharedByte::new(0);
 /// See [`LOCKSTEP_WIDTH`].
 pub(super) static WIDTH: SharedByte = SharedByte::new(width_turns(Drivers::USUAL.pulse_us, CYCLES));
@@ -83,7 +83,6 @@ pub(super) static STATE: Owned = Owned(UnsafeCell::new(Dda::new()));
 pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
     // The interrupt is the consumer.
     let (producer, _) = SEGMENT_RING.split()?;
-    SHORT_WIDTH.set(const { width_turns(Drivers::USUAL.pulse_us, SHORT_CYCLES) });
     // SAFETY: interrupts are off, nobody else looks.
     unsafe {
         TCCR1B.write_volatile(HALT);
