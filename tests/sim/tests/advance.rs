@@ -1,13 +1,11 @@
 //! Pressure advance on the chip: the extruder's steps at the pins agree with its line and K times its velocity, no segment comes late, and at
 //! rest the extruder is where its line ends.
 
-mod common;
-
-use common::{booted, set};
 use kerf::boards::RAMPS14;
 use kerf_sim::job;
-
 use kerf_sim::{Host, Machine, Step};
+
+use crate::common::{booted, set};
 
 const HZ: f64 = 16e6;
 /// Steps of a mm along X, and of filament.

@@ -1,11 +1,10 @@
 //! Alarms on the image: how soon the spindle's outputs and the coolant's are off.
 
-mod common;
-
-use common::{MS, booted, say_line, say_now, set};
 use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14, inputs};
 use kerf_sim::mechanics::Build;
 use kerf_sim::{Host, Machine};
+
+use crate::common::{MS, booted, say_line, say_now, set};
 
 /// From the last bit of a line, which is read between others: 250 moves a second at 32,000 steps a second leave little of
 /// the CPU. Measured: 22.7 ms; in a long move 7.2.

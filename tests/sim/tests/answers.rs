@@ -1,11 +1,10 @@
 //! Thread mode has its turns however hard the mathematics of a ramp is: whoever asks in the midst of it is answered.
 
-mod common;
-
-use common::{booted, firmware, set};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::bench::{curve, spiral};
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
+
+use crate::common::{booted, firmware, set};
 
 /// The longest wait for an answer, ms of AVR time, with arcs of 1 mm at this jerk limit (millions of mm/min^3) and feed.
 fn longest(jerk: u32, feed: u32) -> f64 {

@@ -1,13 +1,12 @@
 //! The way of an arc on the image, not only its end: how far each motor goes in all.
 
-mod common;
-
 use std::fmt::Write;
 
-use common::{booted, firmware, set};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
+
+use crate::common::{booted, firmware, set};
 
 /// Steps in a millimetre.
 const MM: u64 = 1280;

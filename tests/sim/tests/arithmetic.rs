@@ -2,16 +2,15 @@
 //!
 //! `cargo xtask examples` makes the image that does it, of `tests/chip/arithmetic.rs`. `KERF_SEED` and `KERF_CASES` choose the random cases.
 
-mod common;
-
 use core::num::FpCategory;
 
-use common::part;
 use kerf::boards::MEGA2560_GRBL;
 use kerf::hal::arithmetic;
 use kerf::motion::divide;
 use kerf_sim::Machine;
 use kerf_sim::mechanics::Random;
+
+use crate::common::part;
 
 /// Random cases that are usual.
 const USUAL: u64 = 30_000;

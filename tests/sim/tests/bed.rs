@@ -1,11 +1,10 @@
 //! A tilted bed on the image: G29 finds it to the step, and Z follows it at the pins.
 
-mod common;
-
-use common::{booted, firmware, set};
 use kerf::boards::{Board, RAMPS14, RAMPS14_SD};
 use kerf_sim::Machine;
 use kerf_sim::mechanics::Build;
+
+use crate::common::{booted, firmware, set};
 
 /// Steps in a millimetre of X, Y and Z, as `{mch:3}` has them.
 const STEPS: [f64; 3] = [80.0, 80.0, 400.0];

@@ -1,13 +1,9 @@
 //! Every row of the bench keeps to its floor.
 
-mod common;
-#[macro_use]
-#[path = "common/rows.rs"]
-mod rows;
-
-use common::image;
 use kerf::boards::{MEGA2560_GRBL, RAMPS14};
 use kerf_sim::bench::{Bed, ROWS, row};
+
+use crate::common::image;
 
 fn keeps_to_its_floor(name: &str) {
     let row = row(name).unwrap();

@@ -2,16 +2,16 @@
 
 #[path = "../../../src/cli/check.rs"]
 mod check;
-mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use check::Question;
-use common::firmware;
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::job::{self, Options};
 use kerf_sim::report::Report;
+
+use crate::common::firmware;
 
 /// The profile of a router, and a machine that has been homed: G28 is refused before.
 const ROUTER: [&str; 2] = ["{mch:1}", "{gc:\"g28.3x0y0z0\"}"];

@@ -1,13 +1,12 @@
 //! A print from an SD card on the chip: files of a card that another program has formatted, steps at the pins, faults of the card.
 
-mod common;
-
 use std::io::{Cursor, Read, Seek, SeekFrom, Write};
 
-use common::{booted, firmware, set};
 use fatfs::{FatType, FileSystem, FormatVolumeOptions, FsOptions, format_volume};
 use kerf::boards::{RAMPS14, RAMPS14_SD};
 use kerf_sim::Machine;
+
+use crate::common::{booted, firmware, set};
 
 /// Where the partition begins, blocks.
 const FIRST: usize = 63;

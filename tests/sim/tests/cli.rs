@@ -1,13 +1,11 @@
 //! The program as its user sees it.
 
-mod common;
-
 use std::fs::{self, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};
 
-use common::{build, kerf_sim};
+use crate::common::{self, build, kerf_sim};
 
 fn scratch(name: &str, text: &str) -> PathBuf {
     let path = common::scratch(name);

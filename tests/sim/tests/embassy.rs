@@ -1,14 +1,12 @@
 //! The runtime, `avr-embassy`: its examples do what they say, and it costs what its README says.
 
-mod common;
-
 use std::path::PathBuf;
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::chip::{ATMEGA1284P, ATMEGA2560, Chip};
 use kerf_sim::{Image, Machine};
 
-use common::{MS, firmware};
+use crate::common::{MS, firmware};
 
 /// The vector of the tick.
 const TICK: &str = "TIMER0_COMPA";

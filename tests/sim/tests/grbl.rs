@@ -3,22 +3,12 @@
 //!
 //! One machine has them all, one after the other: `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim --profile sim --test grbl` has one.
 
-mod common;
-#[path = "../../support/grbl_ops.rs"]
-mod grbl_ops;
-#[path = "../../support/grbl_session.rs"]
-mod grbl_session;
-#[path = "../../support/seeds.rs"]
-mod seeds;
-#[path = "../../support/side.rs"]
-mod side;
-#[path = "common/simulated.rs"]
-mod simulated;
-
-use common::firmware;
-use grbl_session::Session;
 use kerf::boards::MEGA2560_GRBL;
 use proptest::strategy::ValueTree;
+
+use crate::common::firmware;
+use crate::grbl_session::Session;
+use crate::{grbl_ops, seeds};
 
 /// See [`Session`]. The longest of 2,800 took 38 ms, at 64,000 steps a second in a ramp; 14 took more than 20.
 const REPORT_MS: u64 = 40;

@@ -1,14 +1,11 @@
 //! Heaters on the chip: the converter, the pins, faults, and steps meanwhile.
 
-mod common;
-#[path = "../../support/plant.rs"]
-mod plant;
-
-use common::{booted, set};
 use kerf::boards::{Heater, Heaters, Pin, RAMPS14};
 use kerf::heat::sensor::{Kind, share};
 use kerf_sim::{Host, Machine};
-use plant::Plant;
+
+use crate::common::{booted, set};
+use crate::plant::Plant;
 
 /// The board's heaters.
 fn heaters() -> Heaters {

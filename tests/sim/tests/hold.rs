@@ -1,10 +1,9 @@
 //! Feedhold on the image: how soon it slows down, how far it goes on, and where it ends.
 
-mod common;
-
-use common::{booted, set};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::{Host, Machine};
+
+use crate::common::{booted, set};
 
 const CLOCK: f64 = 16e6;
 /// Steps in a mm, as axes are set up by default.

@@ -1,11 +1,10 @@
 //! Homing on the image: carriages, switches that bounce and stick.
 
-mod common;
-
-use common::{booted, set};
 use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14, inputs};
 use kerf_sim::mechanics::{Bounce, Build, Wiring};
 use kerf_sim::{Host, Machine};
+
+use crate::common::{booted, set};
 
 /// A machine whose carriages stand near their homing switches, that bounce for a millisecond or so.
 fn standing(board: &'static Board, wiring: Wiring, starts: [f64; 3]) -> (Machine, Host) {

@@ -1,12 +1,11 @@
 //! What it costs to interpret a line, lexing included, and to find a row of the tables, in cycles of the chip.
 
-mod common;
-
-use common::image;
 use kerf::boards::MEGA2560_GRBL;
 use kerf::store::record::{self, Record};
 use kerf_sim::job::{self, Options};
 use kerf_sim::{Image, Machine, Stopwatch};
+
+use crate::common::image;
 
 /// What a typical G1 line may cost.
 // Its functions share their ends, which takes 60 of them: flash is full.

@@ -3,18 +3,17 @@
 //! Each job runs once, two at a time, and the tests look at what was measured. On RAMPS the motors
 //! have coarser steps and higher speeds, so that the long job ends sooner and other numbers are seen.
 
-mod common;
-
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::{LazyLock, Mutex};
 use std::thread;
 
-use common::{booted, firmware};
 use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14};
 use kerf_sim::job::{self, Lines, Options};
 use kerf_sim::oracle::{self, Setup};
 use kerf_sim::report::Report;
+
+use crate::common::{booted, firmware};
 
 /// The longest first.
 const JOBS: [&str; 4] = ["bracket", "spiral", "engraving", "square"];

@@ -1,16 +1,15 @@
 //! The encoder of a spindle on the chip: its speed, pulses that do not fit, and what its interrupts cost.
 
-mod common;
-
-use common::{firmware, set};
-use kerf::boards::{Board, MEGA2560_LATHE};
 use std::path::Path;
 
+use kerf::boards::{Board, MEGA2560_LATHE};
 use kerf_sim::job::{self, Options};
 use kerf_sim::mechanics::{Bounce, Build, Sensors};
 use kerf_sim::plot::{self, Look};
 use kerf_sim::threads::Threads;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
+
+use crate::common::{firmware, scratch, set};
 
 /// The longest time in which no tick comes in outside the step interrupt.
 const OFF: u64 = 42;
@@ -455,7 +454,7 @@ fn the_example_cuts_a_thread() {
         threads.turns, threads.spread_mm
     );
     assert!(threads.turns >= 100 && most < 0.02, "{most}");
-    let file = common::scratch("thread.svg");
+    let file = scratch("thread.svg");
     plot::write(&file, &machine, &report.setup, &Look::default(), Some(&threads)).unwrap();
     assert!(std::fs::read_to_string(file).unwrap().contains("error of the thread"));
 }

@@ -1,11 +1,10 @@
 //! Machines chosen on the chip: how long it takes, that a job runs on each, and that it survives a power cut.
 
-mod common;
-
-use common::{booted, firmware, set};
 use kerf::boards::MEGA2560_GRBL;
 use kerf::config::machines::ALL;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
+
+use crate::common::{booted, firmware, set};
 
 fn value(machine: &mut Machine, host: &mut Host, name: &str) -> f64 {
     let response = host.ask(machine, &format!("{{{name}:n}}"), 5_000).unwrap();

@@ -1,11 +1,10 @@
 //! A machine around the chip, seen by programs that run on it.
 
-mod common;
-
-use common::{build, machine, word};
 use kerf::boards::{RAMPS14, inputs};
 use kerf_sim::Machine;
 use kerf_sim::mechanics::{Bounce, Build};
+
+use crate::common::{build, machine, word};
 
 #[test]
 fn a_level_from_outside_outlives_writes_to_its_port() {

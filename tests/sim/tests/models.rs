@@ -1,9 +1,8 @@
 //! The peripheral models, asked by programs that run on them.
 
-mod common;
-
-use common::{machine, machine_of, word};
 use kerf_sim::Fault;
+
+use crate::common::{machine, machine_of, word};
 
 fn asked(name: &str) -> u16 {
     let mut m = machine("models.c");

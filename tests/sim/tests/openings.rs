@@ -1,21 +1,17 @@
 //! How senders that cannot run here open a conversation, with the image on the simulated chip: those of `tests/openings.rs`.
 
-mod common;
 #[path = "../../support/openings.rs"]
-mod openings;
-#[path = "../../support/side.rs"]
-mod side;
-#[path = "common/simulated.rs"]
-mod simulated;
+mod by_sender;
 
-use common::firmware;
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
-use side::Side;
+
+use crate::common::firmware;
+use crate::side::Side;
 
 #[test]
 fn every_sender_finds_its_own() {
-    openings::all(boot);
+    by_sender::all(boot);
 }
 
 /// A machine that begins with this value of `dia`: it has been started anew.

@@ -1,10 +1,9 @@
 //! Overrides on the image: how soon after the byte that asks for one the steps follow.
 
-mod common;
-
-use common::{MS, booted, say_line, say_now, set};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::{Host, Machine, Stopwatch};
+
+use crate::common::{MS, booted, say_line, say_now, set};
 
 /// What every change keeps to.
 const LIMIT_MS: f64 = 20.0;

@@ -1,15 +1,8 @@
-//! The image of `pico-cnc` on the emulated RP2040. `cargo xtask test` runs these in a stage of their own, which installs the emulator; else
-//! `cargo test -p kerf-sim --profile sim --test pico -- --ignored` does, behind a `cargo xtask sim --board pico-cnc`.
-
-mod common;
-#[path = "../../support/side.rs"]
-mod side;
-#[path = "../../support/transcript.rs"]
-mod transcript;
+//! The image of `pico-cnc` on the emulated RP2040. `cargo xtask test` runs these, and installs the emulator; else
+//! `cargo test -p kerf-sim --profile sim pico -- --ignored` does, behind a `cargo xtask sim --board pico-cnc`.
 
 use std::path::Path;
 
-use common::{image, kerf_sim};
 use kerf::boards::inputs::{ENDS, PROBE};
 use kerf::boards::{Board, PICO_CNC, PICO_CNC6, SKR_PICO, gp};
 use kerf_sim::bench::{ideal, spiral};
@@ -18,8 +11,9 @@ use kerf_sim::emulated::{Emulated, Near, job};
 use kerf_sim::job::{Options, lines_of};
 use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Runs, USB};
 
-use side::Side;
-use transcript::Transcript;
+use crate::common::{image, kerf_sim};
+use crate::side::Side;
+use crate::transcript::{self, Transcript};
 
 fn board() -> Emulated {
     Emulated::load(&image(&PICO_CNC), &PICO_CNC).unwrap()
@@ -113,7 +107,7 @@ fn run(name: &str, text: &str, settings: &[&str]) -> String {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn jobs_end_on_their_steps() {
     for name in ["square", "spiral"] {
         let text = std::fs::read_to_string(format!("../../examples/{name}.gcode")).unwrap();
@@ -122,7 +116,7 @@ fn jobs_end_on_their_steps() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_whole_job_ends_in_its_summary() {
     let mut run = kerf_sim();
     run.args(["run", "--board", "skr-pico", "--elf"]).arg(image(&SKR_PICO));
@@ -162,7 +156,7 @@ fn assert_counted(board: &mut Emulated, host: &mut Host) {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_hold_loses_no_step_and_a_flush_counts_them() {
     let (mut board, mut host) = booted();
     set(&mut board, &mut host, "g1 x20 y13 f800");
@@ -190,7 +184,7 @@ fn a_hold_loses_no_step_and_a_flush_counts_them() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_million_steps_a_second_of_each_motor() {
     // How far the motors go, and the rate of the leading one.
     let moves = ["g0 x100", "g0 x100 y100 z100 a100", "g0 x100 y87.3 z-61.8 a29", "g0 x71 y-100"];
@@ -217,7 +211,7 @@ fn a_million_steps_a_second_of_each_motor() {
 
 /// X, A, and two motors each of Y and Z.
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn half_a_million_steps_a_second_of_six_motors() {
     let mut board = Emulated::load(&image(&PICO_CNC6), &PICO_CNC6).unwrap();
     let mut host = Host::new(LINES_IN_FLIGHT);
@@ -240,7 +234,7 @@ fn half_a_million_steps_a_second_of_six_motors() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_stuck_chip_is_bitten_and_says_so() {
     let (mut board, mut host) = booted();
     set(&mut board, &mut host, "m3 s1000");
@@ -260,7 +254,7 @@ fn a_stuck_chip_is_bitten_and_says_so() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_panic_stops_everything_and_is_told_after_the_reset() {
     let (mut board, mut host) = booted();
     set(&mut board, &mut host, "m3 s1000");
@@ -288,7 +282,7 @@ fn reading(ohms: f64) -> u16 {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn an_skr_pico_heats() {
     let mut board = Emulated::load(&image(&SKR_PICO), &SKR_PICO).unwrap();
     // A bed of 25 degrees, and a hot end of 150 (beta 4,267).
@@ -317,7 +311,7 @@ fn an_skr_pico_heats() {
 const STOP_US: f64 = 10.0;
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_limit_stops_at_once_and_steps_are_counted() {
     for wait_us in [0, 3, 7, 11, 15, 19, 23, 27, 31, 170, 411] {
         let (mut board, mut host) = booted();
@@ -345,7 +339,7 @@ fn a_limit_stops_at_once_and_steps_are_counted() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn settings_survive_a_power_cut_and_a_reset() {
     let (mut board, mut host) = booted();
     for line in ["{xvm:1234}", "{4mi:32}", "g10 l2 p3 x1.5 y-2"] {
@@ -368,7 +362,7 @@ fn settings_survive_a_power_cut_and_a_reset() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn settings_may_change_often() {
     let (mut board, mut host) = booted();
     for n in 0..20 {
@@ -422,7 +416,7 @@ fn with_more_room(line: &str) -> String {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn the_image_keeps_to_the_transcripts() {
     let mut all = transcript::read_all(Path::new("../transcripts"));
     let begins =
@@ -444,7 +438,7 @@ fn greeted(board: &'static Board) -> Emulated {
 
 /// Moves of 0.03 mm at 100 mm/s: 3,333 blocks a second. With a jerk limit they are as many, and none comes late.
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn tiny_moves_are_as_fast_as_could_be() {
     let [free, limited] = [1e6, 5e3].map(tiny_moves);
     println!("{free:.3}, {limited:.3}");
@@ -481,7 +475,7 @@ fn tiny_moves(jerk: f64) -> f64 {
 
 /// Four motors, each at a rate of its own up to 700,000 steps a second, by blocks of a quarter of a millisecond.
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn tiny_moves_of_fast_motors_come_in_time() {
     let (mut board, mut host) = booted();
     FAST.iter().for_each(|line| set(&mut board, &mut host, line));

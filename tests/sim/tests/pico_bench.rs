@@ -1,13 +1,9 @@
 //! Every row of the bench of `pico-cnc` keeps to its floor. Run as `pico.rs` is.
 
-mod common;
-#[macro_use]
-#[path = "common/rows.rs"]
-mod rows;
-
-use common::image;
 use kerf::boards::{PICO_CNC, PICO_CNC6};
 use kerf_sim::bench::emulated::{PicoBed, ROWS, named};
+
+use crate::common::image;
 
 fn keeps_to_its_floor(name: &str) {
     let row = named(name).unwrap();
@@ -17,7 +13,7 @@ fn keeps_to_its_floor(name: &str) {
 }
 
 rows! {
-    #[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+    #[ignore = "needs the emulator, which `cargo xtask test` installs"]
     one_motor = "rate-1";
     four_motors = "rate-4";
     six_motors = "rate-6";

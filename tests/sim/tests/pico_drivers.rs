@@ -1,12 +1,11 @@
 //! The drivers of the SKR Pico, which are emulated with their motors and a stop that these are held up at: what drivers are told, and homing by a stall.
 //! They run as `pico.rs` says.
 
-mod common;
-
-use common::image;
 use kerf::boards::{SKR_PICO, gp};
 use kerf_sim::emulated::{DRIVERS, Driver, Emulated};
 use kerf_sim::{Host, LINES_IN_FLIGHT, Runs};
+
+use crate::common::image;
 
 /// Full steps in a millimetre of X and Y: 200 in a turn of 1.25 mm.
 const FULL_STEPS: f64 = 160.0;
@@ -96,7 +95,7 @@ fn take_told(board: &mut Emulated, rest: &mut Vec<u8>) -> Vec<(u8, u8, u32)> {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn drivers_are_told_their_settings() {
     let (mut board, mut host) = booted(driver());
     let mut rest = Vec::new();
@@ -143,7 +142,7 @@ fn drivers_are_told_their_settings() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn motors_turn_as_far_as_steps_say_with_any_microsteps() {
     let (mut board, mut host) = booted(Driver { stop: -1_000_000, ..driver() });
     for (microsteps, x, y) in [(8, 1.0, -0.5), (1, 2.0, 0.5), (128, 2.5, 1.0)] {
@@ -155,7 +154,7 @@ fn motors_turn_as_far_as_steps_say_with_any_microsteps() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn an_axis_homes_by_a_stall() {
     for (settings, zero) in [
         ("{xsv:500}", 1.0),
@@ -196,7 +195,7 @@ fn homes(x: Driver) -> (Emulated, Host) {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn an_axis_that_is_at_its_stop_homes() {
     let (mut board, mut host) = homes(Driver { stop: 0, ..driver() });
     home(&mut board, &mut host, "g28.2 x0 y0");
@@ -212,7 +211,7 @@ fn an_axis_that_is_at_its_stop_homes() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_feed_override_slows_no_search_for_a_stall() {
     for feed in ["{mfo:0.3}", "{mfo:1.8}"] {
         let (mut board, mut host) = homes(driver());
@@ -224,7 +223,7 @@ fn a_feed_override_slows_no_search_for_a_stall() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn what_cannot_find_a_stall_says_so() {
     let far = Driver { stop: -1_000_000, ..driver() };
     for (x, lines, status, moves) in [
@@ -255,7 +254,7 @@ fn what_cannot_find_a_stall_says_so() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_stall_stops_a_job_only_if_it_is_a_limit() {
     for (mode, stopped) in [("{xsn:1}", false), ("{xsn:3}", true)] {
         let (mut board, mut host) = homes(driver());
@@ -270,7 +269,7 @@ fn a_stall_stops_a_job_only_if_it_is_a_limit() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_search_for_a_stall_is_held_and_ended_as_others_are() {
     let (mut board, mut host) = homes(driver());
     set(&mut board, &mut host, "g28.2 x0");

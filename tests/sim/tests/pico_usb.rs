@@ -1,11 +1,10 @@
 //! USB of the emulated RP2040: the port, back-pressure, a program that does not listen, both ports at once. Run as `pico.rs` is.
 
-mod common;
-
-use common::image;
 use kerf::boards::PICO_CNC;
 use kerf_sim::emulated::{Emulated, Talks};
 use kerf_sim::{AUX, Host, USB};
+
+use crate::common::image;
 
 /// A board that has just been powered up.
 fn board() -> Emulated {
@@ -33,7 +32,7 @@ const CLOSED: Talks = Talks { open: false, reads: true };
 const LISTENS: Talks = Talks { open: true, reads: true };
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn the_first_program_that_opens_the_port_is_greeted() {
     let mut board = board();
     board.session(CLOSED);
@@ -55,7 +54,7 @@ fn reopen(board: &mut Emulated) -> String {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn whoever_opens_the_port_is_greeted_unless_something_runs() {
     let mut board = booted();
     for _ in 0..2 {
@@ -77,7 +76,7 @@ fn whoever_opens_the_port_is_greeted_unless_something_runs() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn nothing_is_lost_though_nobody_waits_for_answers() {
     let mut board = booted();
     // More than blocks, pool and ring have room for.
@@ -99,7 +98,7 @@ fn nothing_is_lost_though_nobody_waits_for_answers() {
 /// The moves fill blocks, pool and ring; what stops comes behind them, in a packet of its own or in their last one. Beyond that the computer is
 /// held back, with what it has to say.
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_stop_acts_at_once_however_much_waits_before_it() {
     for (moves, behind) in [(4, "!"), (80, "!"), (95, "!"), (94, ""), (97, ""), (99, "")] {
         let mut board = booted();
@@ -119,7 +118,7 @@ fn a_stop_acts_at_once_however_much_waits_before_it() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_program_that_does_not_listen_keeps_nobody_else_waiting() {
     for talks in [DEAF, CLOSED] {
         let mut board = booted();
@@ -132,7 +131,7 @@ fn a_program_that_does_not_listen_keeps_nobody_else_waiting() {
 }
 
 #[test]
-#[ignore = "needs the emulator: a stage of `cargo xtask test`"]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn both_ports_are_answered_while_a_job_runs() {
     let mut board = booted();
     let mut answers = [0, 0];

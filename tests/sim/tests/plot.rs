@@ -1,16 +1,15 @@
 //! The pictures of a job: made from the steps, and read back.
 
-mod common;
-
 use std::fs::{self, File};
 use std::io::BufReader;
 
-use common::{firmware, scratch};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
 use kerf_sim::plot::{self, Look, Motion, WINDOW_MS};
 use kerf_sim::report::Report;
+
+use crate::common::{firmware, scratch};
 
 /// Steps a millimetre.
 const PER_MM: f64 = 1_280.0;

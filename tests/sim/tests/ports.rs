@@ -1,11 +1,10 @@
 //! Two serial ports at once, answers in time, and flow control by pins.
 
-mod common;
-
-use common::{booted, set};
 use kerf::boards::{MEGA2560_GRBL, RAMPS14};
 use kerf_sim::protocol::{Incoming, classify};
 use kerf_sim::{AUX, Host, Machine};
+
+use crate::common::{booted, set};
 
 /// Steps in a millimetre.
 const PER_MM: f64 = 1_280.0;

@@ -1,10 +1,9 @@
 //! Motors have power before they step, each by its own enable where the board has one.
 
-mod common;
-
-use common::{booted, set};
 use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14};
 use kerf_sim::Machine;
+
+use crate::common::{booted, set};
 
 /// Without a hot end axis A is no extruder, whose filament would have to be hot.
 const NO_SENSOR: &str = "{he1k:0}";

@@ -1,15 +1,14 @@
 //! The example of a print, on the chip with heaters around it: hot first, exact to the step, cold at the end.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{firmware, scratch};
 use kerf::boards::{MEGA2560_GRBL, RAMPS14};
 use kerf_sim::job::{self, Lines, Options};
 use kerf_sim::plot::{self, Look};
 use kerf_sim::print;
+
+use crate::common::{firmware, scratch};
 
 fn example() -> Lines {
     job::read_lines(Path::new("../../examples/print.gcode")).unwrap()

@@ -4,13 +4,12 @@
 //! fifth of a step. Where a plate is reached by a step that is less than the way to the next,
 //! and nothing is off; where the contact closes between two steps it may be one.
 
-mod common;
-
-use common::{booted, set};
 use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14, inputs};
 use kerf_sim::mechanics::{Bounce, Build};
 use kerf_sim::{Host, Machine};
 use serde_json::Value;
+
+use crate::common::{booted, set};
 
 /// Steps in a mm: a step is ten times what is told of a position, so that nothing is rounded.
 const STEPS: f64 = 100.0;

@@ -4,21 +4,18 @@
 //!
 //! `KERF_SEED` and `KERF_CASES` choose the jobs: `KERF_CASES=1000` for a thousand.
 
-mod common;
-#[path = "../../support/seeds.rs"]
-#[allow(dead_code)]
-mod seeds;
-
 use std::collections::VecDeque;
 use std::fmt::Write;
 use std::sync::Mutex;
 use std::thread;
 
-use common::firmware;
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::job::{self, Options};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
+
+use crate::common::firmware;
+use crate::seeds;
 
 /// Jobs unless asked otherwise: about two minutes on two cores.
 const CASES: u64 = 50;

@@ -1,11 +1,10 @@
 //! Step rates, high and low and mixed, measured pulse by pulse.
 
-mod common;
-
-use common::{booted, firmware, set};
 use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14};
 use kerf_sim::job::{self, Options};
 use kerf_sim::{Host, Machine};
+
+use crate::common::{booted, firmware, set};
 
 /// Cycles in a second.
 const SECOND: u64 = 16_000_000;

@@ -6,33 +6,19 @@
 //! `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim --profile sim --test realtime` has it alone, and from the first
 //! seed of its machine on with all that came before it.
 
-mod common;
-#[path = "../../support/ops.rs"]
-mod ops;
-#[path = "../../support/position_model.rs"]
-mod position_model;
-#[path = "../../support/seeds.rs"]
-mod seeds;
-#[path = "../../support/sender.rs"]
-mod sender;
-#[path = "../../support/session.rs"]
-mod session;
-#[path = "../../support/side.rs"]
-mod side;
-#[path = "common/simulated.rs"]
-mod simulated;
-
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::thread;
 use std::time::Instant;
 
-use common::firmware;
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
-use ops::{Op, Scale};
 use proptest::strategy::ValueTree;
-use session::Session;
+
+use crate::common::firmware;
+use crate::ops::{self, Op, Scale};
+use crate::seeds;
+use crate::session::Session;
 
 /// About two seconds of the machine's time.
 const SCALE: Scale = Scale { ops: 24, way: 1_500, radius: 1.0, wait: 300 };

@@ -1,11 +1,10 @@
 //! A job from boot to rest, on a stand-in for the firmware.
 
-mod common;
-
-use common::machine;
 use kerf_sim::Host;
 use kerf_sim::job::{self, Options};
 use kerf_sim::report::Report;
+
+use crate::common::machine;
 
 fn report(job: &str) -> Report {
     let mut m = machine("echo.c");

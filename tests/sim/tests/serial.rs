@@ -1,12 +1,11 @@
 //! The serial line at full speed, at too much speed, and while the planner is full.
 
-mod common;
-
-use common::{booted, set};
 use kerf::boards::MEGA2560_GRBL;
 use kerf::motion::queue::CAPACITY;
 use kerf_sim::Machine;
 use kerf_sim::protocol::{Incoming, classify};
+
+use crate::common::{booted, set};
 
 /// Status of a line that was lost in part.
 const BUFFER_FULL: i64 = 13;
@@ -154,7 +153,7 @@ fn lines_with_frame_errors_are_refused_and_no_other() {
 
 #[test]
 fn a_line_that_the_receiver_overruns_at_a_megabaud_is_never_carried_out() {
-    const LINES: usize = 600;
+    const LINES: usize = 1_800;
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     let axis = "vm:6000,fr:6000,jm:1e5";
     for line in ["{ex:0}", &format!("{{x:{{{axis}}},y:{{{axis}}}}}"), "g91 g1 f4000", "{jv:5}"] {

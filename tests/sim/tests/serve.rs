@@ -1,13 +1,12 @@
 //! A sender opens the simulated board like any serial port, and talks to the firmware.
 
-mod common;
-
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Lines, Read, Write};
 use std::process::{Child, Stdio};
 
-use common::{image, kerf_sim};
 use kerf::boards::MEGA2560_GRBL;
+
+use crate::common::{image, kerf_sim};
 
 /// Ends the server however the test ends.
 struct Server(Child);

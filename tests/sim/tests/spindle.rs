@@ -1,11 +1,10 @@
 //! The spindle's outputs on the chip: the width of its pulses, levels, and what a reset does to them.
 
-mod common;
-
-use common::{booted, firmware, set};
 use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14};
 use kerf_sim::mechanics::Build;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
+
+use crate::common::{booted, firmware, set};
 
 /// The count at which the spindle's timer turns round.
 fn top(machine: &Machine) -> f64 {

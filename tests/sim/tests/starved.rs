@@ -1,11 +1,10 @@
 //! What the firmware and the meter say when exec is held up in mid-motion, and when motion ends otherwise.
 
-mod common;
-
-use common::{booted, set};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::job;
 use kerf_sim::{Host, Machine};
+
+use crate::common::{booted, set};
 
 /// USART2_UDRE, the software interrupt that exec runs in.
 const EXEC_VECTOR: u8 = 52;

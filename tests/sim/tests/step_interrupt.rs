@@ -3,14 +3,13 @@
 //! The chip dwells, so that exec queues segments without steps; each is replaced in the ring by a random one before the
 //! interrupt takes it. A twin on the host, `Dda::tick`, gets the segments that each run of the timer had.
 
-mod common;
-
-use common::booted;
 use kerf::boards::{Board, MEGA2560_GRBL, MOTORS, RAMPS14};
 use kerf::dda::{Dda, Pins, SEGMENTS, STEP, Segment};
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf_sim::mechanics::Random;
 use kerf_sim::{Machine, Step};
+
+use crate::common::booted;
 
 /// Cycles from the start of the timer to the first tick.
 const FIRST_TICK: u64 = 400;

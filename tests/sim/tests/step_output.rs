@@ -1,11 +1,10 @@
 //! Step pulses as the drivers want them: width, polarity, and time for directions to settle.
 
-mod common;
-
-use common::firmware;
 use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14};
 use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
+
+use crate::common::firmware;
 
 /// Cycles in a microsecond.
 const US: u64 = 16;

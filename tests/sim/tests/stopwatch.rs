@@ -1,9 +1,8 @@
 //! The stopwatches, on a few instructions whose cycles are known.
 
-mod common;
-
-use common::machine_of;
 use kerf_sim::Stopwatch;
+
+use crate::common::machine_of;
 
 const NOP: u16 = 0x0000;
 const RET: u16 = 0x9508;

@@ -1,10 +1,9 @@
 //! Settings and offsets in EEPROM: they survive, whenever power fails, and writing them delays no step.
 
-mod common;
-
-use common::{booted, firmware, set};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
+
+use crate::common::{booted, firmware, set};
 
 /// A machine that finds this in its EEPROM.
 fn booted_with(eeprom: &[u8; 4096]) -> (Machine, Host) {

@@ -5,27 +5,19 @@
 //! `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim --profile sim --test streams` has it alone, and from the first seed
 //! of its machine on with all that came before it.
 
-mod common;
-#[path = "../../support/seeds.rs"]
-mod seeds;
-#[path = "../../support/side.rs"]
-mod side;
-#[path = "common/simulated.rs"]
-mod simulated;
-#[path = "../../support/stream/mod.rs"]
-mod stream;
-
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::thread;
 use std::time::Instant;
 
-use common::{age, firmware};
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
 use proptest::strategy::ValueTree;
-use stream::dialogue::Dialogue;
-use stream::ops::{Op, Scale, Setup, conversation};
+
+use crate::common::{age, firmware};
+use crate::seeds;
+use crate::stream::dialogue::Dialogue;
+use crate::stream::ops::{Op, Scale, Setup, conversation};
 
 /// About two seconds of the machine's time.
 const SCALE: Scale = Scale { ops: 20, lines: 8, wait: 200, wrap: 0 };

@@ -1,11 +1,10 @@
 //! Switches on the image: how fast a limit stops it, and what it takes for one.
 
-mod common;
-
-use common::{booted, set};
 use kerf::boards::{Board, MEGA2560_GRBL, MEGA2560_LATHE, RAMPS14, inputs};
 use kerf_sim::mechanics::{Bounce, Build, Sensors, Wiring};
 use kerf_sim::{Host, Machine};
+
+use crate::common::{booted, set};
 
 /// Cycles in a microsecond.
 const US: u64 = 16;

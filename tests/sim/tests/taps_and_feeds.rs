@@ -1,14 +1,9 @@
 //! G33.1, G95 and G96 at the pins of the chip, in both dialects: what goes well, and each fault of `docs/safety.md` from F8 to F13.
 
-mod common;
-#[path = "common/turning.rs"]
-#[allow(dead_code)]
-mod turning;
-
 use kerf::boards::{Board, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
 use kerf_sim::mechanics::Build;
 
-use turning::{Lathe, STEPS};
+use crate::common::turning::{Lathe, STEPS};
 
 const Z: usize = 1;
 const BOARDS: [&Board; 2] = [&MEGA2560_LATHE, &MEGA2560_GRBL_LATHE];

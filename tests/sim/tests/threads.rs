@@ -3,15 +3,10 @@
 //! Many passes are cut in one run of the simulator. Each begins where X and Z are 0. At an index pulse the thread has to be a whole number
 //! of leads from where it began, but for the angle between the index and the pulse of sync behind it.
 
-mod common;
-#[path = "common/turning.rs"]
-#[allow(dead_code)]
-mod turning;
-
 use kerf::boards::{Board, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
 use kerf_sim::mechanics::{Bounce, Sensors};
 
-use turning::{Lathe, STEP, STEPS, apart};
+use crate::common::turning::{Cut, Lathe, STEP, STEPS, apart};
 
 const X: usize = 0;
 const Z: usize = 1;
@@ -192,8 +187,7 @@ fn overrides_and_a_hold_within_a_pass_leave_the_thread_whole() {
         let status = lathe.status();
         assert_eq!((status.state.as_str(), lathe.motors()), ("Hold", [0, -2_800]));
         lathe.agrees(&status, "held");
-        let cut =
-            turning::Cut { start: [0, 0], end: lathe.motors(), indexed: lathe.indexed(since) };
+        let cut = Cut { start: [0, 0], end: lathe.motors(), indexed: lathe.indexed(since) };
         let phases = cut.phases(Z, 1.0);
         let most =
             phases.iter().map(|phase| apart(*phase, -behind(pulses), 1.0)).fold(0.0, f64::max);

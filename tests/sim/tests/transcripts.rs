@@ -1,19 +1,11 @@
 //! The transcripts, played to the firmware's image on the simulated chip.
 
-mod common;
-#[path = "../../support/pages.rs"]
-mod pages;
-#[path = "../../support/side.rs"]
-mod side;
-#[path = "common/simulated.rs"]
-mod simulated;
-#[path = "../../support/transcript.rs"]
-mod transcript;
-
 use std::path::Path;
 
-use common::firmware;
 use kerf::boards::{MEGA2560_GRBL, MEGA2560_GRBL_LATHE, MEGA2560_LATHE, RAMPS14};
+
+use crate::common::firmware;
+use crate::{pages, transcript};
 
 /// What only the image of a lathe can do.
 const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];

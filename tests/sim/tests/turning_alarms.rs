@@ -3,16 +3,11 @@
 //!
 //! Faults that leave the machine as it was come one behind the other in one run of the simulator.
 
-mod common;
-#[path = "common/turning.rs"]
-#[allow(dead_code)]
-mod turning;
-
 use kerf::boards::inputs::{DOOR, STOP};
 use kerf::boards::{Board, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
 use kerf_sim::mechanics::{Build, Switch, Wiring};
 
-use turning::{Lathe, STEPS, Status};
+use crate::common::turning::{Lathe, STEPS, Status};
 
 const X: usize = 0;
 const Z: usize = 1;

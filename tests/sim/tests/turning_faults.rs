@@ -4,15 +4,12 @@
 //!
 //! `KERF_SEED` and `KERF_CASES` choose the cases.
 
-mod common;
-#[path = "../../support/seeds.rs"]
-#[allow(dead_code)]
-mod seeds;
-
-use common::{firmware, set};
 use kerf::boards::MEGA2560_LATHE;
 use kerf_sim::mechanics::{Build, Random, Sensors};
 use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Machine};
+
+use crate::common::{firmware, set};
+use crate::seeds;
 
 /// Exceptions: pulses that do not fit, the spindle is lost, the error is above its limit.
 const MISFIT: u64 = 40;

@@ -1,10 +1,9 @@
 //! The millisecond count of the image wraps after 2^32 ms, 49.7 days. Each machine here is 3 s before it when it starts.
 
-mod common;
-
-use common::{age, firmware, set};
 use kerf::boards::RAMPS14;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
+
+use crate::common::{age, firmware, set};
 
 /// A machine that has run for 49.7 days but 3 s.
 fn old() -> (Machine, Host) {

@@ -1,5 +1,8 @@
 //! Building fixtures and running them, and the firmware itself.
-#![allow(dead_code)]
+#[macro_use]
+mod rows;
+mod simulated;
+pub mod turning;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
