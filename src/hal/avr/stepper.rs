@@ -20,7 +20,7 @@ const TCCR1B: *mut u8 = 0x81 as *mut u8;
 const TCNT1: *mut u16 = 0x84 as *mut u16;
 const OCR1A: *mut u16 = 0x88 as *mut u16;
 const TIFR1: *mut u8 = (FLAGS + 0x20) as *mut u8;
-const TIMSK1: *mut u8 = 0x6F as *mut u8;
+const TIMSK1: *mut u8 = MASK as *mut u8;
 /// General-purpose registers 1 and 2: the ticks left of the segment.
 const TICKS: [*mut u8; 2] = [0x4A as *mut u8, 0x4B as *mut u8];
 /// CTC with OCR1A as top, clock not divided.
@@ -30,7 +30,9 @@ pub(super) const HALT: u8 = 1 << 3;
 const OCF1A: u8 = 1 << DUE;
 /// The timer's flags, in the I/O space.
 pub(super) const FLAGS: usize = 0x16;
-/// The bit of [`FLAGS`] that says that a tick is due.
+/// The timer's mask of interrupts, for `lds`.
+pub(super) const MASK: usize = 0x6F;
+/// The bit of [`FLAGS`] that says that a tick is due, and the one of [`MASK`] that lets it interrupt.
 pub(super) const DUE: u8 = 1;
 const GPIOR1: *const u8 = 0x4A as *const u8;
 const GPIOR2: *const u8 = 0x4B as *const u8;
@@ -86,7 +88,7 @@ pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
     // SAFETY: interrupts are off, nobody else looks.
     unsafe {
         TCCR1B.write_volatile(HALT);
-        TIMSK1.write_volatile(1 << 1);
+        TIMSK1.write_volatile(1 << DUE);
     }
     Some(producer)
 }

@@ -97,7 +97,7 @@ pub fn reset(why: Mark) -> ! {
 
 /// WDT: something has got stuck. It never returns, so it saves nothing.
 #[unsafe(no_mangle)]
-extern "C" fn __vector_12() -> ! {
+pub(super) extern "C" fn __vector_12() -> ! {
     // SAFETY: interrupts are off; r1 is 0 for what is called.
     unsafe { asm!("clr r1", "jmp {starved}", starved = sym starved, options(noreturn)) }
 }

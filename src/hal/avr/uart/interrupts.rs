@@ -15,7 +15,7 @@ use core::mem::offset_of;
 
 use avr_embassy::assembly;
 
-use super::super::{step_isr, stepper};
+use super::super::{step_isr, stepper, watchdog};
 use super::{
     AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, PLAIN, STOPPED, Shared, TXC, TXCIE, U2X, UDRIE,
     USB_SHARED,
@@ -63,6 +63,26 @@ const fn driver(port: u8) -> Option<Pin> {
     match hardware(port) {
         Some(serial) => serial.driver_enable,
         None => None,
+    }
+}
+
+/// Behind a tick that a handler below has had made: one of which the interrupt is off would have been lost, and the motors crawl from byte to byte.
+/// It is never off while the firmware is well: otherwise the machine is stopped as by the watchdog.
+extern "C" fn check_step_interrupt() -> ! {
+    // SAFETY: it restores the register that it changes, and returns to where the handler goes on, or not at all. Interrupts are off.
+    unsafe {
+        asm!(
+            "push r24",
+            "lds  r24, {mask}",
+            "sbrs r24, {tick}",
+            "jmp  {starved}",
+            "pop  r24",
+            "ret",
+            mask = const stepper::MASK,
+            tick = const stepper::DUE,
+            starved = sym watchdog::__vector_12,
+            options(noreturn),
+        )
     }
 }
 
@@ -149,7 +169,7 @@ macro_rules! interrupts {
                     "sbi  {step_flags}, {due}",
                     "call {step}",
                     "cli",
-                    "ret",
+                    "jmp  {check}",
                     "63:",
                     "rjmp 8f",
                     "64:",
@@ -454,6 +474,7 @@ macro_rules! interrupts {
                     step_flags = const stepper::FLAGS,
                     due = const stepper::DUE,
                     step = sym step_isr::__vector_17,
+                    check = sym check_step_interrupt,
                     realtime = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, realtime),
                     rts_there = const rts($port).is_some() as u8,
                     rts_register = const place(rts($port), 2).0,
@@ -558,7 +579,7 @@ macro_rules! interrupts {
                     "sbi  {step_flags}, {due}",
                     "call {step}",
                     "cli",
-                    "ret",
+                    "jmp  {check}",
                     // It stays masked until there is something to send.
                     "24:",
                     "sbic {step_flags}, {due}",
@@ -614,6 +635,7 @@ macro_rules! interrupts {
                     step_flags = const stepper::FLAGS,
                     due = const stepper::DUE,
                     step = sym step_isr::__vector_17,
+                    check = sym check_step_interrupt,
                     status = const Usart::$usart.address(),
                     control = const Usart::$usart.address() + 1,
                     data = const Usart::$usart.address() + 6,
