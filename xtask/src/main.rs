@@ -113,6 +113,9 @@ struct BuildArgs {
     /// A feature of the board that the image is to lack, such as `help`; may be given several times
     #[arg(long, value_name = "FEATURE")]
     without: Vec<String>,
+    /// Build what the tests run instead: the images of all boards, and the examples
+    #[arg(long, conflicts_with_all = ["board", "machine", "without"])]
+    all: bool,
 }
 
 fn main() -> ExitCode {
@@ -153,10 +156,21 @@ const DESCRIBE: [&str; 8] =
     ["test", "--quiet", "--package", "kerf", "--test", "docs", "--", "--ignored"];
 
 fn build(args: &BuildArgs) -> anyhow::Result<()> {
+    if args.all {
+        return build_all();
+    }
     setup::ensure(if args.board.is_rp2040() { Scope::Arm } else { Scope::Firmware })?;
     let elf = firmware::build_without(args.board, args.machine, &args.without)?;
     println!("elf: {}", elf.display());
     Ok(())
+}
+
+fn build_all() -> anyhow::Result<()> {
+    setup::ensure(Scope::Arm)?;
+    for board in Board::all() {
+        println!("elf: {}", firmware::build(*board, Machine::default())?.display());
+    }
+    examples()
 }
 
 fn examples() -> anyhow::Result<()> {

@@ -1,10 +1,14 @@
 //! `cargo xtask test`: everything that must pass before a merge.
 
+mod beside;
+
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
+
+use beside::Beside;
 
 use crate::boards::Board;
 use crate::elf;
@@ -21,33 +25,42 @@ struct Stage {
     run: fn() -> Result<()>,
 }
 
-const STAGES: &[Stage] = &[
-    Stage { name: "tools", run: || setup::ensure(Scope::Emulator) },
+/// What needs no image. Images are built beside it: most of that time is a link, which takes one core.
+const WITHOUT_IMAGES: &[Stage] = &[
     Stage { name: "format", run: format },
     Stage { name: "lints", run: lints },
     Stage { name: "documentation", run: documentation },
     Stage { name: "host tests", run: host_tests },
-    Stage { name: "firmware of every board", run: build_all },
+];
+
+/// The simulator and the senders that talk to it come last.
+const WITH_IMAGES: &[Stage] = &[
     Stage { name: "an image without capabilities", run: build_without },
-    Stage { name: "examples of avr-embassy", run: || firmware::build_examples().map(drop) },
     Stage { name: "sizes and stack of every board", run: size_all },
-    Stage { name: "the emulated RP2040", run: emulated },
-    Stage { name: "simulator tests", run: simulator_tests },
+    Stage { name: "the emulator of the RP2040", run: emulator::test },
+    Stage { name: "simulated and emulated boards", run: simulator_tests },
     Stage { name: "real senders", run: || crate::senders::run(&Default::default()) },
     Stage { name: "real senders at the emulated RP2040", run: crate::senders::run_emulated },
     Stage { name: "the page in a browser", run: crate::web::test },
 ];
 
-/// Runs the stages; stops at the first that fails. The simulator and the senders that talk to it come last: they need the
-/// images.
+/// Runs all checks; stops at the first that fails.
 pub fn run() -> Result<()> {
-    for (index, stage) in STAGES.iter().enumerate() {
-        println!("\n=== {}/{} {} ===", index + 1, STAGES.len(), stage.name);
-        let start = Instant::now();
-        (stage.run)().with_context(|| format!("stage `{}`", stage.name))?;
-        println!("({} s)", start.elapsed().as_secs());
-    }
+    stage("tools", || setup::ensure(Scope::Emulator))?;
+    let images = Beside::start(&["build", "--all"])?;
+    WITHOUT_IMAGES.iter().try_for_each(|one| stage(one.name, one.run))?;
+    stage("the images", || images.wait())?;
+    WITH_IMAGES.iter().try_for_each(|one| stage(one.name, one.run))?;
     println!("\ncargo xtask test: all stages passed");
+    Ok(())
+}
+
+/// Runs a stage between its name and the time it took.
+fn stage(name: &str, run: impl FnOnce() -> Result<()>) -> Result<()> {
+    println!("\n=== {name} ===");
+    let start = Instant::now();
+    run().with_context(|| format!("stage `{name}`"))?;
+    println!("({} s)", start.elapsed().as_secs());
     Ok(())
 }
 
@@ -98,13 +111,6 @@ fn host_tests() -> Result<()> {
     cargo(&["test", "--package", "kerf-fuzz"])
 }
 
-fn build_all() -> Result<()> {
-    for board in Board::all() {
-        println!("elf: {}", firmware::build(*board, Machine::default())?.display());
-    }
-    Ok(())
-}
-
 /// What capabilities take of the flash, bytes, at the least: a check that leaving them out does leave them out.
 const CAPABILITIES: u64 = 8_000;
 
@@ -128,29 +134,12 @@ fn size_all() -> Result<()> {
     })
 }
 
-/// The board whose chip is emulated: what is put right in the emulator, and the image in it.
-fn emulated() -> Result<()> {
-    emulator::test()?;
-    let mut test = host_cargo();
-    test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());
-    test.args(["test", "--package", "kerf-sim", "--profile", "sim"]);
-    test.args([
-        "--test",
-        "pico",
-        "--test",
-        "pico_usb",
-        "--test",
-        "pico_drivers",
-        "--test",
-        "pico_bench",
-    ]);
-    run_child(test.args(["--", "--ignored"]))
-}
-
+/// With those on the emulated chip, which are ignored where there may be no emulator.
 fn simulator_tests() -> Result<()> {
     let mut test = host_cargo();
     test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());
-    run_child(test.args(["test", "--package", "kerf-sim", "--profile", "sim"]))
+    test.args(["test", "--package", "kerf-sim", "--profile", "sim", "--", "--include-ignored"]);
+    run_child(&mut test)
 }
 
 fn cargo(args: &[&str]) -> Result<()> {
