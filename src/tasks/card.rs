@@ -9,7 +9,8 @@
 use heapless::Vec;
 
 use super::links::Links;
-use super::parser::{FastPath, Line as Sender, fast_path_of, is_free, run_block};
+use super::parser::{Line as Sender, is_free, run_block};
+use super::row;
 use super::view::View;
 use crate::card::{LINE_MAX, Line};
 use crate::machine;
@@ -114,7 +115,7 @@ impl Feed {
                 return Read::Nothing;
             }
             Line::Whole if !self.line.is_empty() => {
-                self.moves = fast_path_of(links, &self.line);
+                self.moves = row::interpret(links, &self.line);
                 if self.moves {
                     self.line.clear();
                 } else {
@@ -181,7 +182,7 @@ impl Feed {
                         self.waits = true;
                         break;
                     }
-                    match run_block(links, port, block, FastPath::NotTried) {
+                    match run_block(links, port, block, false) {
                         (Status::Again, _) => {
                             self.waits = true;
                             break;

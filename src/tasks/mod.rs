@@ -27,6 +27,7 @@ pub mod power;
 pub mod reader;
 mod realtime;
 pub mod reporter;
+mod row;
 mod setup;
 pub mod spindle;
 mod stop;

@@ -4,7 +4,7 @@
 //! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
 //! data lines of the port that feeds the machine only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
 //! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
-//! keeps its slot until its response has been written. A plain move is done with at once, by [`fast_path`]. In an
+//! keeps its slot until its response has been written. Plain moves are done with at once, in a [`row`]. In an
 //! alarm lines of G-code are refused.
 //!
 //! Each port has a [`Session`] of its own, so that no port waits for the other's line: no line is begun before the first part
@@ -28,11 +28,10 @@ use super::links::Links;
 use super::planner;
 use super::ports::{Chosen, Port, REPORT};
 use super::reporter::{tell_at_once, tell_startup};
+use super::row::{self, Row};
 use super::tx::Tx;
 use super::view::View;
-use crate::config::Settings;
 use crate::gcode::command::Stop;
-use crate::gcode::fast_path::Writer;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::event::{
     Event, is_unheard, is_wanted, set_asked, wake_after, wake_after_transmitted,
@@ -45,7 +44,7 @@ use crate::hal::uart;
 use crate::jobs::Job;
 use crate::machine::alarm::is_program_end;
 use crate::machine::{self, Alarm, Cycle};
-use crate::protocol::{Answers, Ending, Next, Notice, Out, Request, Span, Speech, asks_alarm, jog};
+use crate::protocol::{Answers, Next, Notice, Out, Request, Span, asks_alarm, jog};
 use crate::status::Status;
 
 /// Bytes of an echo that are put at once.
@@ -55,8 +54,6 @@ const ECHO: usize = 62;
 const STEPS: u8 = 8;
 /// Most steps in a turn in which a millisecond has ended.
 const STEPS_LATE: u8 = 5;
-/// Lines of the fast path that are answered before others have their turn, if nobody waits for it ([`is_wanted`]): as many as may wait.
-const IN_A_ROW: u8 = 8;
 /// No step is begun when a turn has taken so long, ms.
 const TURN_MS: u32 = 4;
 
@@ -110,9 +107,7 @@ enum Progress {
 /// What has been done at once.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
-    /// A line of the fast path.
-    FastPath,
-    /// Something else; there may be more.
+    /// Something; there may be more.
     More,
     /// Nothing has been done.
     Nothing,
@@ -169,14 +164,11 @@ pub fn run(
         feed: super::card::Feed::new(),
     };
     async move {
-        let mut in_a_row = 0;
         loop {
-            if in_a_row == IN_A_ROW || is_wanted() {
-                in_a_row = 0;
+            if is_wanted() {
                 yield_now().await;
             }
-            match parser.turn(in_a_row == 0) {
-                Turn::FastPath => in_a_row += 1,
+            match parser.turn() {
                 // The reader has its turn, and stops the sender in time.
                 Turn::More => yield_now().await,
                 Turn::Nothing => parser.wait().await,
@@ -186,10 +178,10 @@ pub fn run(
 }
 
 impl Parser {
-    /// Does what can be done at once. A row of lines of the fast path `begins` when nothing else is to be done: they come as fast as
+    /// Does what can be done at once. A [row](row::run) of lines begins when nothing else is to be done: they come as fast as
     /// they are answered, and would keep the other port waiting.
     #[inline(always)]
-    fn turn(&mut self, begins: bool) -> Turn {
+    fn turn(&mut self) -> Turn {
         let links = self.links;
         let alarmed = machine::is_alarmed();
         let free = is_free(links);
@@ -198,16 +190,16 @@ impl Parser {
         let data = free && !runs_job && !self.is_feeding() && !waits;
         let straight = !alarmed && !machine::is_checking();
         // What a port is told at once goes first: an acknowledgement is not to wait for a move.
-        let tells = links.ports.iter().any(Port::tells);
-        let others = begins && self.has_more();
-        let tried = match data && straight && !tells && self.is_idle() && !others {
-            true => fast_path(links),
-            false => FastPath::NotTried,
+        let declined = if data && straight && self.is_idle() && !self.has_more() {
+            match row::run(links, self.planner) {
+                Row::Over => false,
+                Row::Declined => true,
+                Row::Handed if !self.has_more() => return Turn::Nothing,
+                Row::Full | Row::Handed => return Turn::More,
+            }
+        } else {
+            false
         };
-        if tried == FastPath::Done {
-            let more = self.hand_over() || self.has_more();
-            return if more { Turn::FastPath } else { Turn::Nothing };
-        }
         self.lacking = 0;
         if self.has_work() && self.go_on() {
             return Turn::More;
@@ -216,7 +208,7 @@ impl Parser {
             return Turn::More;
         }
         match self.next_line(data) {
-            Some(chosen) => self.take(chosen, tried),
+            Some(chosen) => self.take(chosen, declined),
             None if free && runs_job && !links.job.get().is_over() => {
                 if !has_room_for_startup(links) {
                     self.lacking |= 1 << links.told().number;
@@ -242,7 +234,7 @@ impl Parser {
     fn feed(&mut self) -> bool {
         let more = self.is_quiet() && self.deferred == Deferred::No && self.feed.turn(self.links);
         if self.feed.take_move() {
-            self.hand_over();
+            row::hand_over(self.links, self.planner.try_lock().ok().as_deref_mut());
         }
         more
     }
@@ -264,18 +256,6 @@ impl Parser {
     fn is_idle(&self) -> bool {
         let feeder = self.sessions.get(usize::from(self.links.feeder.get()));
         matches!(feeder, Some(Session::Idle))
-    }
-
-    /// Has the planner carry out the move of a line of the fast path, at once if that can be and no real-time character waits. Whether it has, and the next line
-    /// may be taken.
-    #[inline(always)]
-    fn hand_over(&self) -> bool {
-        let done = !flags::has(Event::Realtime) && planner::take_at_once(self.planner);
-        if !done {
-            self.links.commands_taken.set(true);
-            self.links.planner_wake.signal();
-        }
-        done
     }
 
     /// Whether nothing is under way.
@@ -450,10 +430,10 @@ impl Parser {
 
     /// Takes a line: most are answered to the end at once.
     #[inline(never)]
-    fn take(&mut self, chosen: Chosen, tried: FastPath) {
+    fn take(&mut self, chosen: Chosen, declined: bool) {
         let (links, awaited) = (self.links, self.is_awaited(chosen.port.number));
         let Some(session) = self.sessions.get_mut(usize::from(chosen.port.number)) else { return };
-        match begin(links, &chosen, tried, session, &mut self.deferred) {
+        match begin(links, &chosen, declined, session, &mut self.deferred) {
             Begun::Answer => {
                 go_on(links, chosen.port, session, awaited);
             }
@@ -712,7 +692,7 @@ fn job_line(links: &Links) {
     if !job.next_line(&Eeprom::take(), &mut line) {
         job.end();
     } else {
-        match interpret(links, &line, FastPath::NotTried).0 {
+        match interpret(links, &line, false).0 {
             Status::Again => return,
             status if startup.is_some() => {
                 if !line.is_empty() {
@@ -731,82 +711,6 @@ fn job_line(links: &Links) {
     links.reporter_wake.signal();
 }
 
-/// Whether the next line was one for the fast path.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum FastPath {
-    /// The line was one for the fast path, and has been answered.
-    Done,
-    /// The line is not for the fast path.
-    No,
-    /// The line has not been looked at.
-    NotTried,
-}
-
-/// Does all there is to do for a line of the fast path: a move that is answered with a brief response. Nothing is
-/// done if the next line is none, or if it has to wait for room to transmit. What the others do in
-/// four steps and with a [`Request`], in half the time.
-#[inline(never)]
-fn fast_path(links: &Links) -> FastPath {
-    let port = links.feeder();
-    let (mut speech, settings) = (port.speech.get(), links.settings.borrow());
-    let prints = is_printing(port, &settings);
-    let writer = match speech.brief(&settings) {
-        _ if prints => Writer::Prints,
-        Some(true) => Writer::Numbers,
-        Some(false) => Writer::Plain,
-        None => return FastPath::NotTried,
-    };
-    let Ok(mut tx) = port.tx.try_lock() else { return FastPath::NotTried };
-    let mut lines = port.lines.borrow_mut();
-    let Some(mut line) = lines.oldest() else { return FastPath::NotTried };
-    if !tx.has_room() || settings.echo() || port.is_resetting() {
-        return FastPath::NotTried;
-    }
-    if prints {
-        let Some(block) = speech.fast_path(line) else { return FastPath::NotTried };
-        line = block.of(line);
-    }
-    let mut commands = links.commands.borrow_mut();
-    if !links.model.borrow_mut().fast_path(line, writer, &*settings, &mut commands) {
-        return FastPath::No;
-    }
-    if prints {
-        port.speech.set(speech);
-    }
-    let ending = Ending { free: port.promise(&lines), length: lines.oldest_length() };
-    speech.put_brief(&settings, ending, &mut *tx);
-    tx.flush();
-    lines.remove_oldest();
-    links.pool_space.signal();
-    links.reporter_wake.signal();
-    FastPath::Done
-}
-
-/// Interprets a line of the SD card, if the fast path can. Its move has to be handed over then.
-#[cfg(feature = "sd")]
-#[inline(never)]
-pub(super) fn fast_path_of(links: &Links, line: &[u8]) -> bool {
-    let port = links.told();
-    // It borrows the settings, too.
-    if machine::is_checking() || !links.may_feed(port) {
-        return false;
-    }
-    let settings = links.settings.borrow();
-    if !is_printing(port, &settings) {
-        return false;
-    }
-    let mut commands = links.commands.borrow_mut();
-    links.model.borrow_mut().fast_path(line, Writer::Prints, &*settings, &mut commands)
-}
-
-/// Whether the lines of a port are a printing host's, whose extruder is known to be one.
-#[inline(always)]
-fn is_printing(port: &Port, settings: &Settings) -> bool {
-    Speech::HAS_PLAIN
-        && port.is_plain()
-        && settings.heating.first().is_none_or(|heating| heating.extruder)
-}
-
 /// How it goes on with a line.
 enum Begun {
     /// The line is being answered.
@@ -823,7 +727,7 @@ enum Begun {
 fn begin(
     links: &Links,
     chosen: &Chosen,
-    tried: FastPath,
+    declined: bool,
     session: &mut Session,
     deferred: &mut Deferred,
 ) -> Begun {
@@ -853,7 +757,7 @@ fn begin(
     if let Some(block) = gcode {
         let (status, commented) = match *deferred {
             Deferred::Answer if port.number == links.feeder.get() => (Status::Ok, false),
-            _ => run_block(links, port, block.of(line), tried),
+            _ => run_block(links, port, block.of(line), declined),
         };
         if status == Status::Again {
             // Its number counts when it is begun for good.
@@ -946,7 +850,7 @@ fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Reques
     if links.may_feed(port) && !is_free(links) {
         return false;
     }
-    let (status, commented) = run_block(links, port, block.of(lines.text(id)), FastPath::NotTried);
+    let (status, commented) = run_block(links, port, block.of(lines.text(id)), false);
     if status == Status::Again {
         return false;
     }
@@ -977,12 +881,12 @@ pub(super) fn run_block(
     links: &Links,
     port: &Port,
     block: &[u8],
-    tried: FastPath,
+    declined: bool,
 ) -> (Status, bool) {
     match links.may_feed(port) {
         #[cfg(feature = "dialect-reprap")]
         true if port.is_plain() => interpret_rewritten(links, port, block),
-        true => interpret(links, block, tried),
+        true => interpret(links, block, declined),
         false => (Status::Muted, true),
     }
 }
@@ -1002,7 +906,7 @@ fn interpret_rewritten(links: &Links, port: &Port, block: &[u8]) -> (Status, boo
     }
     drop(model);
     let done = match port.speech.get().rewrite(block, &mut text) {
-        Ok(block) => interpret(links, block, FastPath::NotTried),
+        Ok(block) => interpret(links, block, false),
         Err(status) => (status, true),
     };
     if done.0 != Status::Again {
@@ -1027,14 +931,14 @@ fn move_back(links: &Links) -> Status {
 /// Ends the program, as M2 does, for one that has been killed, or reset. The planner is free.
 pub fn end_program(links: &Links, resets: bool) {
     // It is never refused, not in an alarm either, and changes no table.
-    let _ = carry_out(links, b"M2", FastPath::NotTried);
+    let _ = carry_out(links, b"M2", false);
     if resets {
         links.model.borrow_mut().reset();
     }
 }
 
 /// Refuses a block in an alarm, unless it ends that, and else carries it out.
-fn interpret(links: &Links, block: &[u8], tried: FastPath) -> (Status, bool) {
+fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let alarm = machine::alarm();
     if alarm != Alarm::None {
         if !(alarm.ends_with_program() && is_program_end(block)) {
@@ -1043,7 +947,7 @@ fn interpret(links: &Links, block: &[u8], tried: FastPath) -> (Status, bool) {
         // The queue has been dropped, so that nothing is waited for.
         let _ = alarm::clear(links, &links.settings.borrow());
     }
-    let done = carry_out(links, block, tried);
+    let done = carry_out(links, block, declined);
     if machine::is_checking() && links.commands.borrow().stop == Stop::End {
         links.except(Status::ProgramChecked);
     }
@@ -1068,7 +972,7 @@ fn enter(jogs: bool) {
 /// Interprets a block and hands its commands to the planner, but in check mode. Returns also whether it may have a
 /// comment.
 #[inline(never)]
-fn carry_out(links: &Links, block: &[u8], tried: FastPath) -> (Status, bool) {
+fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let words = jog(block);
     let waits = || machine::is_held() || (machine::cycle() != Cycle::Jog && is_working(links));
     if words.is_some() && waits() {
@@ -1078,10 +982,10 @@ fn carry_out(links: &Links, block: &[u8], tried: FastPath) -> (Status, bool) {
     let mut commands = links.commands.borrow_mut();
     let settings = links.settings.borrow();
     let mut model = links.model.borrow_mut();
-    let done = match (words, tried) {
+    let done = match (words, declined) {
         (Some(words), _) => model.jog(words, &*settings, &mut commands),
         // No need to look twice.
-        (None, FastPath::No) => model.slow_path(block, &*settings, &mut commands),
+        (None, true) => model.slow_path(block, &*settings, &mut commands),
         _ => model.interpret(block, &*settings, &mut commands),
     };
     match done {

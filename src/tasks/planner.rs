@@ -144,7 +144,7 @@ enum Turn {
     Done,
 }
 
-/// The planner, lent to one at a time: to its task from a line's first block to the last one, to the parser ([`take_at_once`]) while the task waits
+/// The planner, lent to one at a time: to its task from a line's first block to the last one, to the parser, for a [row](super::row), while the task waits
 /// for a line.
 pub type Shared = Mutex<NoopRawMutex, Planner>;
 
@@ -209,11 +209,10 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
     }
 }
 
-/// Carries out the move in `Links::commands`, if the planner's task waits for a line and there is room: neither a wake-up of the task nor a turn of
+/// Carries out the move in `Links::commands`, while the planner's task waits for a line, if there is room: neither a wake-up of the task nor a turn of
 /// the executor comes between. False, and nothing done that the task would not do, if that has to. Thread mode, the parser's turn. Cost: that of a
 /// block, 9,000 cycles; of a move that goes on with those before it 1,400.
-pub fn take_at_once(shared: &Shared) -> bool {
-    let Ok(mut planner) = shared.try_lock() else { return false };
+pub fn take_at_once(planner: &mut Planner) -> bool {
     if planner.is_flushed() || planner.owes_answers() {
         return false;
     }

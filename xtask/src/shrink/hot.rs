@@ -117,6 +117,7 @@ pub const WARM: &[&str] = &[
     "kerf::tasks::common::snapshot",
     "kerf::tasks::links::Links>::may_feed",
     "kerf::tasks::parser::",
+    "kerf::tasks::row::",
     "kerf::tasks::planner::Planner>::announce",
     "kerf::tasks::planner::Planner>::begin",
     "kerf::tasks::planner::Planner>::build_chain",

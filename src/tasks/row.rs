@@ -1,0 +1,126 @@
+//! A row: lines of the [fast path](crate::gcode::fast_path) that the parser carries out one behind the other, without a turn for others in between.
+//!
+//! Each is a move that is answered with a brief response: what the [parser](super::parser) does in four steps and with a `Request`
+//! for other lines is done here in half the time. Whose line it is, how it is answered, the transmitter and the planner are asked for once a
+//! row. Real-time characters, alarms, and a reader that must not wait end a row ([`is_wanted`]); what stands in the way of lines and comes from thread mode cannot
+//! come in between.
+//!
+//! Thread mode, the parser's turn. Cost: 2,400 cycles a line and what its block takes.
+
+use super::links::Links;
+use super::planner::{self, Planner};
+use super::ports::Port;
+use crate::config::Settings;
+use crate::gcode::fast_path::Writer;
+use crate::hal::event::{Event, is_wanted};
+use crate::hal::flags;
+use crate::machine;
+use crate::protocol::{Ending, Speech};
+
+/// Lines at most: as many as may wait.
+const MOST: u8 = 8;
+
+/// How a row has ended.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Row {
+    /// There is no other line, or it has to wait for something.
+    Over,
+    /// The next line is not for the fast path.
+    Declined,
+    /// Others are to have their turn before there are more.
+    Full,
+    /// The planner's task carries out the last one: no more are taken before that is done.
+    Handed,
+}
+
+/// Carries out and answers lines of the port that feeds the machine. The caller has seen to it that they may be taken.
+#[inline(never)]
+pub(super) fn run(links: &Links, shared: &planner::Shared) -> Row {
+    let port = links.feeder();
+    let (mut speech, settings) = (port.speech.get(), links.settings.borrow());
+    let prints = is_printing(port, &settings);
+    let writer = match speech.brief(&settings) {
+        _ if prints => Writer::Prints,
+        Some(true) => Writer::Numbers,
+        Some(false) => Writer::Plain,
+        None => return Row::Over,
+    };
+    let Ok(mut tx) = port.tx.try_lock() else { return Row::Over };
+    if settings.echo() || port.is_resetting() {
+        return Row::Over;
+    }
+    let Ok(mut planner) = shared.try_lock() else { return Row::Over };
+    let mut lines = port.lines.borrow_mut();
+    let mut count = 0;
+    let end = loop {
+        let Some(mut line) = lines.oldest() else { break Row::Over };
+        if !tx.has_room() {
+            break Row::Over;
+        }
+        if prints {
+            let Some(block) = speech.fast_path(line) else { break Row::Over };
+            line = block.of(line);
+        }
+        let mut commands = links.commands.borrow_mut();
+        if !links.model.borrow_mut().fast_path(line, writer, &*settings, &mut commands) {
+            break Row::Declined;
+        }
+        drop(commands);
+        if prints {
+            port.speech.set(speech);
+        }
+        let ending = Ending { free: port.promise(&lines), length: lines.oldest_length() };
+        speech.put_brief(&settings, ending, &mut *tx);
+        tx.flush();
+        lines.remove_oldest();
+        count += 1;
+        if !hand_over(links, Some(&mut planner)) {
+            break Row::Handed;
+        }
+        if count == MOST || is_wanted() || machine::is_alarmed() {
+            break Row::Full;
+        }
+    };
+    if count > 0 {
+        links.pool_space.signal();
+        links.reporter_wake.signal();
+    }
+    end
+}
+
+/// Has the planner carry out the move of a line of the fast path, at once if that can be and no real-time character waits. Whether it has, and the next line
+/// may be taken.
+#[inline(always)]
+pub(super) fn hand_over(links: &Links, planner: Option<&mut Planner>) -> bool {
+    let done = !flags::has(Event::Realtime) && planner.is_some_and(planner::take_at_once);
+    if !done {
+        links.commands_taken.set(true);
+        links.planner_wake.signal();
+    }
+    done
+}
+
+/// Interprets a line of the SD card, if the fast path can. Its move has to be handed over then.
+#[cfg(feature = "sd")]
+#[inline(never)]
+pub(super) fn interpret(links: &Links, line: &[u8]) -> bool {
+    let port = links.told();
+    // It borrows the settings, too.
+    if machine::is_checking() || !links.may_feed(port) {
+        return false;
+    }
+    let settings = links.settings.borrow();
+    if !is_printing(port, &settings) {
+        return false;
+    }
+    let mut commands = links.commands.borrow_mut();
+    links.model.borrow_mut().fast_path(line, Writer::Prints, &*settings, &mut commands)
+}
+
+/// Whether the lines of a port are a printing host's, whose extruder is known to be one.
+#[inline(always)]
+fn is_printing(port: &Port, settings: &Settings) -> bool {
+    Speech::HAS_PLAIN
+        && port.is_plain()
+        && settings.heating.first().is_none_or(|heating| heating.extruder)
+}
