@@ -20,7 +20,7 @@ const TCCR1B: *mut u8 = 0x81 as *mut u8;
 const TCNT1: *mut u16 = 0x84 as *mut u16;
 const OCR1A: *mut u16 = 0x88 as *mut u16;
 const TIFR1: *mut u8 = (FLAGS + 0x20) as *mut u8;
-const TIMSK1: *mut u8 = MASK as *mut u8;
+const TIMSK1: *mut u8 = 0x6F as *mut u8;
 /// General-purpose registers 1 and 2: the ticks left of the segment.
 const TICKS: [*mut u8; 2] = [0x4A as *mut u8, 0x4B as *mut u8];
 /// CTC with OCR1A as top, clock not divided.
@@ -30,9 +30,7 @@ pub(super) const HALT: u8 = 1 << 3;
 const OCF1A: u8 = 1 << DUE;
 /// The timer's flags, in the I/O space.
 pub(super) const FLAGS: usize = 0x16;
-/// The timer's mask of interrupts, for `lds`.
-pub(super) const MASK: usize = 0x6F;
-/// The bit of [`FLAGS`] that says that a tick is due, and the one of [`MASK`] that lets it interrupt.
+/// The bit of [`FLAGS`] that says that a tick is due, and the one of [`TIMSK1`] that lets it interrupt.
 pub(super) const DUE: u8 = 1;
 const GPIOR1: *const u8 = 0x4A as *const u8;
 const GPIOR2: *const u8 = 0x4B as *const u8;
@@ -91,6 +89,13 @@ pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
         TIMSK1.write_volatile(1 << DUE);
     }
     Some(producer)
+}
+
+/// Whether ticks interrupt: always, behind [`start`].
+#[inline(always)]
+pub(super) fn is_on() -> bool {
+    // SAFETY: `start` alone writes it.
+    unsafe { TIMSK1.read_volatile() & 1 << DUE != 0 }
 }
 
 /// Starts the ticks if they have stopped. For exec, after it has queued a segment.

@@ -39,10 +39,10 @@ struct Flags {
     /// Real-time characters, as bits. The receive interrupt sets them, `take_realtime` clears them.
     realtime: SharedByte,
     /// A byte to send before all others, if it is not 0; [`WAIT_MS`] and above: when the line that is being sent is at
-    /// its end.
+    /// its end. Then `held` has [`AHEAD`].
     ahead: SharedByte,
-    /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`], [`HEEDS_XOFF`]; and [`PLAIN`]. The receive interrupt
-    /// changes the first.
+    /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`], [`HEEDS_XOFF`], [`AHEAD`]; and [`PLAIN`]. The receive interrupt
+    /// changes the first, the transmit interrupt takes [`AHEAD`] away: others change a bit with interrupts off.
     held: SharedByte,
     /// Not 0 if the sender has been stopped by XOFF. Exec sets it too, thread mode clears it.
     stopped: SharedByte,
@@ -58,6 +58,22 @@ const HEEDS_CTS: u8 = 1 << 1;
 const HEEDS_XOFF: u8 = 1 << 2;
 /// Real-time characters that print are text.
 const PLAIN: u8 = 1 << 3;
+/// There may be a byte to send before all others.
+const AHEAD: u8 = 1 << 4;
+
+impl Flags {
+    /// Has a byte sent before all others. Thread mode, and exec.
+    fn send_ahead(&self, byte: u8) {
+        self.ahead.set(byte);
+        avr_device::interrupt::free(|_| self.held.set(self.held.get() | AHEAD));
+    }
+
+    /// What the ring holds may have to wait for this from now on. Thread mode.
+    fn hold(&self, why: u8) {
+        // Exec may have a byte sent ahead meanwhile: the transmit interrupt looks whether there is one.
+        self.held.set(why | AHEAD);
+    }
+}
 
 impl<const N: usize> Shared<N> {
     const fn new() -> Self {
@@ -227,7 +243,7 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
             if stop {
                 flags.stopped.set(1);
             }
-            flags.ahead.set(wait + if stop { XOFF } else { XON });
+            flags.send_ahead(wait + if stop { XOFF } else { XON });
             flags.stopped.set(stop.into());
             kick(port);
         }
@@ -257,7 +273,7 @@ fn stop_now() {
     let waits = flags.ahead.get() > WAIT_MS + XON;
     if flags.held.get() & HEEDS_XOFF != 0 && (flags.stopped.get() == 0 || waits) {
         flags.stopped.set(1);
-        flags.ahead.set(XOFF);
+        flags.send_ahead(XOFF);
         kick(AUX);
     }
 }
@@ -279,7 +295,7 @@ fn set_rts(port: u8, stop: bool) {
 pub fn set_plain(port: u8, plain: bool) {
     // XOFF does not count on such a port, so that the receive interrupt writes nothing here.
     if plain {
-        flags(port).held.set(PLAIN);
+        flags(port).hold(PLAIN);
         kick(port);
     }
 }
@@ -293,9 +309,9 @@ pub fn set_flow(port: u8, flow: Flow) {
     };
     let held = flags(port).held.get();
     let heeds = if cfg!(feature = "dialect-reprap") { heeds | held & PLAIN } else { heeds };
-    if held & !STOPPED != heeds {
+    if held & !(STOPPED | AHEAD) != heeds {
         // An XOFF that has come does not count any more.
-        flags(port).held.set(heeds);
+        flags(port).hold(heeds);
         set_rts(port, false);
         kick(port);
     }

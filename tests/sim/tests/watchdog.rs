@@ -79,13 +79,8 @@ fn without_ticks_of_the_clock_it_resets() {
 fn without_the_step_interrupt_it_resets() {
     let (mut machine, _) = moving();
     machine.poke(TIMSK1, 0);
-    let steps = machine.recorder().steps();
     let (ms, said) = until_reset(&mut machine);
-    // A byte that comes or goes when a tick is due notices it before the watchdog.
-    assert!(ms < 650, "{ms} ms");
-    let crawled = machine.recorder().steps() - steps;
-    // One was under way.
-    assert!(crawled <= 2, "{crawled} steps from byte to byte, {ms} ms");
+    assert!((450..650).contains(&ms), "{ms} ms");
     assert!(said.contains(TOLD), "{said}");
     // The program that is being sent ends here.
     machine.send(b"g1 f400 x20\n");

@@ -15,10 +15,10 @@ use core::mem::offset_of;
 
 use avr_embassy::assembly;
 
-use super::super::{step_isr, stepper, watchdog};
+use super::super::{step_isr, stepper};
 use super::{
-    AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, PLAIN, STOPPED, Shared, TXC, TXCIE, U2X, UDRIE,
-    USB_SHARED,
+    AHEAD, AUX_SHARED, Flags, HEEDS_CTS, HEEDS_XOFF, PLAIN, STOPPED, Shared, TXC, TXCIE, U2X,
+    UDRIE, USB_SHARED,
 };
 use crate::boards::{Handshake, Pin, Serial, Usart};
 use crate::hal::event::Event;
@@ -63,26 +63,6 @@ const fn driver(port: u8) -> Option<Pin> {
     match hardware(port) {
         Some(serial) => serial.driver_enable,
         None => None,
-    }
-}
-
-/// Behind a tick that a handler below has had made: one of which the interrupt is off would have been lost, and the motors crawl from byte to byte.
-/// It is never off while the firmware is well: otherwise the machine is stopped as by the watchdog.
-extern "C" fn check_step_interrupt() -> ! {
-    // SAFETY: it restores the register that it changes, and returns to where the handler goes on, or not at all. Interrupts are off.
-    unsafe {
-        asm!(
-            "push r24",
-            "lds  r24, {mask}",
-            "sbrs r24, {tick}",
-            "jmp  {starved}",
-            "pop  r24",
-            "ret",
-            mask = const stepper::MASK,
-            tick = const stepper::DUE,
-            starved = sym watchdog::__vector_12,
-            options(noreturn),
-        )
     }
 }
 
@@ -169,7 +149,7 @@ macro_rules! interrupts {
                     "sbi  {step_flags}, {due}",
                     "call {step}",
                     "cli",
-                    "jmp  {check}",
+                    "ret",
                     "63:",
                     "rjmp 8f",
                     "64:",
@@ -474,7 +454,6 @@ macro_rules! interrupts {
                     step_flags = const stepper::FLAGS,
                     due = const stepper::DUE,
                     step = sym step_isr::__vector_17,
-                    check = sym check_step_interrupt,
                     realtime = const offset_of!(Shared<$ring>, flags) + offset_of!(Flags, realtime),
                     rts_there = const rts($port).is_some() as u8,
                     rts_register = const place(rts($port), 2).0,
@@ -523,7 +502,7 @@ macro_rules! interrupts {
             }
         }
 
-        /// USARTn_UDRE: sends a byte, in 59 cycles, 63 on a bus, or stops asking when there is none. While XOFF or XON waits, or the other
+        /// USARTn_UDRE: sends a byte, in 56 cycles, 60 on a bus, or stops asking when there is none. While XOFF or XON waits, or the other
         /// side may hold us back, 85.
         ///
         /// A tick waits for 35 of them at most.
@@ -540,10 +519,8 @@ macro_rules! interrupts {
                     "push r24",
                     "push r30",
                     "push r31",
-                    "lds  r24, {shared} + {ahead}",
-                    "lds  r30, {shared} + {held}",
-                    "andi r30, {holds}",
-                    "or   r24, r30",
+                    "lds  r24, {shared} + {held}",
+                    "andi r24, {holds} | {before}",
                     "brne 20f",
                     "6:",
                     "lds  r30, {shared} + {tail}",
@@ -579,7 +556,7 @@ macro_rules! interrupts {
                     "sbi  {step_flags}, {due}",
                     "call {step}",
                     "cli",
-                    "jmp  {check}",
+                    "ret",
                     // It stays masked until there is something to send.
                     "24:",
                     "sbic {step_flags}, {due}",
@@ -595,7 +572,7 @@ macro_rules! interrupts {
                     "20:",
                     "lds  r24, {shared} + {ahead}",
                     "tst  r24",
-                    "breq 5f",
+                    "breq 12f",
                     "cpi  r24, {wait}",
                     "brlo 11f",
                     "lds  r30, {shared} + {tail}",
@@ -610,13 +587,22 @@ macro_rules! interrupts {
                     "ldi  r30, 0",
                     "sts  {shared} + {ahead}, r30",
                     "rjmp 4b",
+                    // It has gone.
+                    "12:",
+                    "sbic {step_flags}, {due}",
+                    "rcall 25b",
+                    "lds  r24, {shared} + {held}",
+                    "andi r24, {not_before}",
+                    "sts  {shared} + {held}, r24",
                     // The other side has said that it holds us back, or may say so by a pin.
                     "5:",
                     "sbic {step_flags}, {due}",
                     "rcall 25b",
                     "lds  r24, {shared} + {held}",
                     "andi r24, {holds}",
-                    "breq 6b",
+                    "brne 26f",
+                    "rjmp 6b",
+                    "26:",
                     ".if {cts_mask}",
                     "sbrc r24, 0",
                     "rjmp 24b",
@@ -635,7 +621,6 @@ macro_rules! interrupts {
                     step_flags = const stepper::FLAGS,
                     due = const stepper::DUE,
                     step = sym step_isr::__vector_17,
-                    check = sym check_step_interrupt,
                     status = const Usart::$usart.address(),
                     control = const Usart::$usart.address() + 1,
                     data = const Usart::$usart.address() + 6,
@@ -649,6 +634,8 @@ macro_rules! interrupts {
                     wait = const WAIT_MS,
                     line_end = const LINE_END,
                     holds = const STOPPED | HEEDS_CTS,
+                    before = const AHEAD,
+                    not_before = const !AHEAD,
                     mask = const !UDRIE,
                     flags = const assembly::FLAGS,
                     when_complete = const TXCIE,
