@@ -265,7 +265,7 @@ pub const ROWS: [Row; 49] = [
         better: Higher,
         peers: ["291 at 115,200", "-", "115 at 115,200"],
         target: Some(1_000.0),
-        floor: Some(1_690.0),
+        floor: Some(1_820.0),
         measure: costs::lines,
     },
     Row {
@@ -298,7 +298,7 @@ pub const ROWS: [Row; 49] = [
         better: Higher,
         peers: NONE,
         target: Some(700.0),
-        floor: Some(580.0),
+        floor: Some(590.0),
         measure: spirals::curve_lines,
     },
     Row {
@@ -309,7 +309,7 @@ pub const ROWS: [Row; 49] = [
         better: Lower,
         peers: NONE,
         target: Some(16_000.0),
-        floor: Some(17_200.0),
+        floor: Some(16_800.0),
         measure: spirals::cycles_per_line,
     },
     Row {
