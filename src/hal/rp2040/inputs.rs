@@ -20,7 +20,7 @@ use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::switches::{FIRST_US, LATER_US, Next, Switches};
 
-/// From the first of two samples to the second: a limit stops the steps within 10 us of its edge.
+/// From the first of two samples to the second: a limit stops the steps within 11 us of its edge.
 const SOON_US: u32 = 4;
 /// The alarm of the samples.
 const ALARM: usize = 1;
