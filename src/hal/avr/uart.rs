@@ -42,7 +42,7 @@ struct Flags {
     /// its end. Then `held` has [`AHEAD`].
     ahead: SharedByte,
     /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`], [`HEEDS_XOFF`], [`AHEAD`]; and [`PLAIN`]. The receive interrupt
-    /// changes the first, the transmit interrupt takes [`AHEAD`] away: others change a bit with interrupts off.
+    /// changes the first, the transmit interrupt takes [`AHEAD`] away: who keeps their bits changes it with interrupts off.
     held: SharedByte,
     /// Not 0 if the sender has been stopped by XOFF. Exec sets it too, thread mode clears it.
     stopped: SharedByte,

@@ -1,4 +1,5 @@
 //! Building fixtures and running them, and the firmware itself.
+
 #[macro_use]
 mod rows;
 mod simulated;
