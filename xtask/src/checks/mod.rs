@@ -33,12 +33,16 @@ const WITHOUT_IMAGES: &[Stage] = &[
     Stage { name: "host tests", run: host_tests },
 ];
 
-/// The simulator and the senders that talk to it come last.
+/// What needs the images. Senders are installed beside it: most of that time is a network's.
 const WITH_IMAGES: &[Stage] = &[
     Stage { name: "an image without capabilities", run: build_without },
     Stage { name: "sizes and stack of every board", run: size_all },
     Stage { name: "the emulator of the RP2040", run: emulator::test },
     Stage { name: "simulated and emulated boards", run: simulator_tests },
+];
+
+/// What needs the senders that are installed beside [`WITH_IMAGES`], or a browser.
+const WITH_SENDERS: &[Stage] = &[
     Stage { name: "real senders", run: || crate::senders::run(&Default::default()) },
     Stage { name: "real senders at the emulated RP2040", run: crate::senders::run_emulated },
     Stage { name: "the page in a browser", run: crate::web::test },
@@ -50,7 +54,10 @@ pub fn run() -> Result<()> {
     let images = Beside::start(&["build", "--all"])?;
     WITHOUT_IMAGES.iter().try_for_each(|one| stage(one.name, one.run))?;
     stage("the images", || images.wait())?;
+    let senders = Beside::start(&["senders", "--install"])?;
     WITH_IMAGES.iter().try_for_each(|one| stage(one.name, one.run))?;
+    stage("senders, installed beside", || senders.wait())?;
+    WITH_SENDERS.iter().try_for_each(|one| stage(one.name, one.run))?;
     println!("\ncargo xtask test: all stages passed");
     Ok(())
 }

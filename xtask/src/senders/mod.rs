@@ -5,6 +5,7 @@
 //! | [`install`] | gets the senders by npm and pip |
 //! | [`job`] | what hosts of printers send |
 //! | [`board`] | the simulated board behind a serial port, and where its motors end |
+//! | [`pool`] | how many sessions run at once |
 //! | [`session`] | one sender at one board |
 //! | [`step`] | what a sender's driver tells of its steps |
 //! | [`table`] | what came of it all |
@@ -15,6 +16,7 @@
 mod board;
 mod install;
 mod job;
+mod pool;
 mod session;
 mod step;
 mod table;
@@ -43,6 +45,9 @@ pub struct SendersArgs {
     /// The board: of those whose chip is emulated pico-cnc, which senders that print are not for
     #[arg(long, value_enum)]
     board: Option<Board>,
+    /// Install the senders and run none
+    #[arg(long)]
+    install: bool,
 }
 
 /// A sender that there is a driver for.
@@ -118,18 +123,26 @@ impl Sender {
 pub fn run_emulated() -> Result<()> {
     for sender in [Sender::Cncjs, Sender::GrblStreamer] {
         let job = Some(root().join("examples/square.gcode"));
-        run(&SendersArgs { sender: Some(sender), job, board: Some(Board::PicoCnc) })?;
+        run(&SendersArgs {
+            sender: Some(sender),
+            job,
+            board: Some(Board::PicoCnc),
+            install: false,
+        })?;
     }
     Ok(())
 }
 
-/// Runs the senders, all at once, and shows what came of it. Fails if anything did.
+/// Runs the senders, a few at once, and shows what came of it. Fails if anything did.
 pub fn run(args: &SendersArgs) -> Result<()> {
     let job = args.job.clone().unwrap_or_else(|| root().join("examples/bracket.gcode"));
     ensure!(job.is_file(), "there is no job {}", job.display());
     let job = job.canonicalize()?;
     setup::ensure(Scope::Senders)?;
     let folder = install::senders()?;
+    if args.install {
+        return Ok(());
+    }
     let program = sim::build()?;
     let mut senders = args.sender.map_or(Sender::value_variants().to_vec(), |one| vec![one]);
     if let Some(board) = args.board {
@@ -150,12 +163,8 @@ pub fn run(args: &SendersArgs) -> Result<()> {
         let board = board_of(sender);
         Session { sender, program: &program, elf, board, job, folder: &folder }.run()
     };
-    let results: Vec<_> = std::thread::scope(|scope| {
-        let pairs = senders.iter().copied().zip(&elves);
-        let runs = pairs.map(|pair| scope.spawn(move || session(pair)));
-        let runs: Vec<_> = runs.collect();
-        runs.into_iter().map(|run| run.join().expect("a session does not panic")).collect()
-    });
+    let pairs: Vec<_> = senders.iter().copied().zip(&elves).collect();
+    let results = pool::run(&pairs, pool::at_once(), session);
     ensure!(table::show(&results), "a sender cannot work with the firmware");
     Ok(())
 }
