@@ -97,6 +97,8 @@ pub struct Machine {
     /// How often each word of flash ran, if the environment asks for it.
     counts: Option<Counts>,
     stopwatches: Vec<Stopwatch>,
+    /// Whether there is a profile, counts or a stopwatch: one question an instruction.
+    is_watched: bool,
     thermal: Option<Box<Thermal>>,
 }
 
@@ -135,6 +137,7 @@ impl Machine {
         let probes = board.map(|board| recorder::attach(bus, cpu, board));
         let step_vector = step_timer.map(|n| chip.timers[n].vectors[COMPARE]);
         let meters = Meters::new(chip, step_vector);
+        let counts = Counts::wanted();
         let handler = |vector: u8| Some((vector, image.function(&format!("__vector_{vector}"))?));
         Ok(Machine {
             cpu,
@@ -149,7 +152,8 @@ impl Machine {
             board,
             resets: 0,
             profile: None,
-            counts: Counts::wanted(),
+            is_watched: counts.is_some(),
+            counts,
             stopwatches: Vec::new(),
             thermal: None,
         })
@@ -172,10 +176,15 @@ impl Machine {
 
     /// Executes one instruction and serves at most one interrupt. Asleep, it goes on to the next
     /// event or to cycle `limit`, whichever is first.
-    #[inline]
     pub fn step(&mut self, limit: u64) -> Result<(), Fault> {
+        self.go_on(limit).map(|_| ())
+    }
+
+    /// [`Machine::step`], part of the loops that run it. True when an event came.
+    #[inline(always)]
+    fn go_on(&mut self, limit: u64) -> Result<bool, Fault> {
         let cpu = self.cpu;
-        let mut woken = false;
+        let (mut woken, mut event) = (false, false);
         if cpu.mode() == Mode::Running {
             let (pc, began) = (cpu.pc(), cpu.cycle());
             if let Some((vector, handler)) = self.step_handler
@@ -186,14 +195,8 @@ impl Machine {
             }
             cpu.execute();
             self.meters.executed(cpu, pc, began);
-            if let Some(spent) = self.profile.as_mut().and_then(|p| p.get_mut(pc as usize / 2)) {
-                *spent += cpu.cycle() - began;
-            }
-            if let Some(counts) = &mut self.counts {
-                counts.executed(pc);
-            }
-            if !self.stopwatches.is_empty() {
-                self.time(pc, began);
+            if self.is_watched {
+                self.watch(pc, began);
             }
             if usize::from(cpu.depth()) < self.meters.depth() {
                 self.leave();
@@ -203,6 +206,7 @@ impl Machine {
             woken = true;
         }
         if cpu.cycle() >= self.bus().due {
+            event = true;
             self.bus_mut().run(cpu.cycle());
             self.drive_changed();
             self.pass_heat();
@@ -211,17 +215,32 @@ impl Machine {
             self.was_reset();
         }
         if cpu.take_shadow() {
-            return Ok(());
+            return Ok(event);
         }
         if (self.bus().pending != 0 || cpu.native_pending()) && cpu.interrupts_on() {
-            return self.serve(woken);
+            self.serve(woken)?;
         }
-        Ok(())
+        Ok(event)
+    }
+
+    /// The instruction at `pc`, begun at `began`, was executed: tells whoever counts instructions.
+    #[cold]
+    fn watch(&mut self, pc: u32, began: u64) {
+        if let Some(spent) = self.profile.as_mut().and_then(|p| p.get_mut(pc as usize / 2)) {
+            *spent += self.cpu.cycle() - began;
+        }
+        if let Some(counts) = &mut self.counts {
+            counts.executed(pc);
+        }
+        if !self.stopwatches.is_empty() {
+            self.time(pc, began);
+        }
     }
 
     /// Measures something from now on; see [`Machine::stopwatches`].
     pub fn add_stopwatch(&mut self, stopwatch: Stopwatch) {
         self.stopwatches.push(stopwatch);
+        self.is_watched = true;
     }
 
     /// What measures, in the order of adding.
@@ -241,6 +260,7 @@ impl Machine {
     /// Counts from now on where cycles are spent.
     pub fn start_profile(&mut self) {
         self.profile = Some(vec![0; 1 << 17]);
+        self.is_watched = true;
     }
 
     /// Cycles spent in each function since [`Machine::start_profile`], most first.
@@ -263,15 +283,18 @@ impl Machine {
     /// Runs to a cycle. The last instruction may end a few cycles after it.
     pub fn run_until(&mut self, cycle: u64) -> Result<(), Fault> {
         while self.cpu.cycle() < cycle {
-            self.step(cycle)?;
+            self.go_on(cycle)?;
         }
         self.check()
     }
 
     /// Runs to a cycle, or until a whole line has come over the serial line.
     pub fn run_until_line(&mut self, cycle: u64) -> Result<(), Fault> {
-        while self.cpu.cycle() < cycle && !self.bus().wires[USB].1.has_line() {
-            self.step(cycle)?;
+        let has_line = |machine: &Self| machine.bus().wires[USB].1.has_line();
+        // A line is whole at an event.
+        let mut found = has_line(self);
+        while !found && self.cpu.cycle() < cycle {
+            found = self.go_on(cycle)? && has_line(self);
         }
         self.check()
     }
