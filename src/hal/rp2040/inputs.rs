@@ -5,7 +5,7 @@
 //! | IO_IRQ_BANK0, priority 0 | an edge: a sample; edges of the encoder |
 //! | TIMER_IRQ_1, priority 0 | a sample of all pins, as [`Switches`] wants it |
 //!
-//! While no switch moves none of them comes. A limit stops the steps right there, 9 us after its edge at most, of which 4 pass between the two samples. The place of a contact is where the
+//! While no switch moves none of them comes. A limit stops the steps right there, 9.4 us after its edge at most, of which 3 pass between the two samples. The place of a contact is where the
 //! generator's words were at the first of two samples; the feeder works it out ([`stepper::contact`]).
 
 use core::cell::UnsafeCell;
@@ -20,8 +20,8 @@ use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::switches::{FIRST_US, LATER_US, Next, Switches};
 
-/// From the first of two samples to the second: a limit stops the steps within 11 us of its edge.
-const SOON_US: u32 = 4;
+/// From the first of two samples to the second: a limit stops the steps within 10 us of its edge.
+const SOON_US: u32 = 3;
 /// The alarm of the samples.
 const ALARM: usize = 1;
 /// An alarm that is due at once is missed if the time has passed before it is set.

@@ -1,6 +1,6 @@
 //! The vector table, in RAM, with our own handler for edges at pins.
 //!
-//! `embassy-rp` has a handler for edges, which wakes tasks. A limit switch has to stop the steps within 11 us, whatever tasks do, so ours takes
+//! `embassy-rp` has a handler for edges, which wakes tasks. A limit switch has to stop the steps within 10 us, whatever tasks do, so ours takes
 //! its place.
 
 use core::cell::UnsafeCell;
