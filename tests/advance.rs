@@ -1,13 +1,6 @@
 //! Pressure advance: the extruder's steps agree with its line and K times its velocity, and at rest with its line alone, whatever holds, drops
 //! and stops come between.
 
-#[path = "support/cases.rs"]
-mod cases;
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/rig.rs"]
-mod rig;
-
-use cases::cases;
 use kerf::config::StepRatio;
 use kerf::dda::STEP;
 use kerf::motion::advance::Lead;
@@ -15,7 +8,9 @@ use kerf::motion::block::{Block, QueuedAction};
 use kerf::motion::exec::Step;
 use kerf::motion::short::Short;
 use proptest::prelude::*;
-use rig::{Config, Rig, at};
+
+use crate::cases::cases;
+use crate::rig::{Config, Rig, at};
 
 const E: usize = 3;
 /// Steps of a mm of X, Y and Z, and of filament.

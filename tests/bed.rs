@@ -1,17 +1,15 @@
 //! Programs of printing hosts with a bed that is followed: whatever moves, and whatever ends a move, Z is on the step that the plane says.
 
-#[path = "support/cases.rs"]
-mod cases;
-
 use std::thread;
 
-use cases::cases;
 use kerf::boards::inputs::{PROBE, X_MIN, Y_MIN, Z_MIN};
 use kerf::config::StepRatio;
 use kerf::config::bed::Bed;
 use kerf::hal::imp::Machine;
 use kerf::units::Length;
 use proptest::prelude::*;
+
+use crate::cases::cases;
 
 /// Steps of X, Y and Z in a unit of length, as `{mch:3}` has them: 80 and 400 in a mm.
 const RATIOS: [StepRatio; 3] =

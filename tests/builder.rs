@@ -1,9 +1,5 @@
 //! From moves to blocks: limits of axes, motors and feed, corners, steps, against f64.
 
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/rig.rs"]
-mod rig;
-
 use kerf::boards::MOTORS;
 use kerf::config::StepRatio;
 use kerf::gcode::command::Feed;
@@ -17,7 +13,8 @@ use kerf::motion::line::{Builder, Built, Line};
 use kerf::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 use proptest::prelude::*;
 use proptest::sample::select;
-use rig::{CORE_XY, Config, STRAIGHT, at};
+
+use crate::rig::{CORE_XY, Config, STRAIGHT, at};
 
 /// Limits are kept in two bytes, rounded down by at most so much.
 const SHORT: f64 = 1.0 / 256.0;

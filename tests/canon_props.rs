@@ -1,14 +1,12 @@
 //! Canonical commands, properties: written as plain G-code and read again they are the same.
 
-#[path = "support/plain.rs"]
-mod plain;
-
 use kerf::canon::{Canon, Reader, commands};
 use kerf::gcode::command::Feed;
 use kerf::gcode::setup::Usual;
-use plain::plain;
 use proptest::prelude::*;
 use proptest::sample::{select, subsequence};
+
+use crate::plain::plain;
 
 /// A number of two decimals, so that no arc is of a radius beyond what a float tells apart.
 fn number() -> impl Strategy<Value = String> {

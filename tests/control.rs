@@ -1,14 +1,9 @@
 //! Control gets through whatever data does, on the host: what is crowded and how is in `tests/support/crowd.rs`;
 //! `tests/sim/tests/control.rs` has the same with the image.
 
-#[path = "support/crowd.rs"]
-mod crowd;
-#[path = "support/host.rs"]
-mod host;
-#[path = "support/side.rs"]
-mod side;
-
 use kerf::hal::imp::Machine;
+
+use crate::crowd;
 
 crowd::tests!(boot);
 

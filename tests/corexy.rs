@@ -1,13 +1,11 @@
 //! A CoreXY machine: its first motor drives the sum of X and Y, the second their difference. Whatever moves, and whatever ends a
 //! move, both are where the position says.
 
-#[path = "support/cases.rs"]
-mod cases;
-
-use cases::cases;
 use kerf::boards::inputs::X_MIN;
 use kerf::hal::imp::Machine;
 use proptest::prelude::*;
+
+use crate::cases::cases;
 
 /// Steps in a mm, as motors are set up by default.
 const STEPS: f64 = 1_280.0;

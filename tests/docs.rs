@@ -1,14 +1,5 @@
 //! The documents that are made from tables are as the tables are.
 
-#[path = "support/codes.rs"]
-mod codes;
-#[path = "support/schema.rs"]
-mod schema;
-#[path = "support/tables.rs"]
-mod tables;
-#[path = "support/wiring.rs"]
-mod wiring;
-
 use std::collections::HashSet;
 use std::fs;
 use std::path::PathBuf;
@@ -16,6 +7,8 @@ use std::path::PathBuf;
 use kerf::config::docs as settings;
 use kerf::gcode::codes::docs as gcode;
 use kerf::protocol::tinyg::names;
+
+use crate::{codes, schema, tables, wiring};
 
 /// The documents, and what they should be.
 fn documents() -> Vec<(String, String)> {

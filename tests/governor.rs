@@ -2,16 +2,14 @@
 //!
 //! `KERF_SEED=n` plays one path and prints what happens.
 
-#[path = "support/optimum.rs"]
-mod optimum;
-
 use std::cell::Cell;
 
 use kerf::motion::governor::{Ahead, Governor};
 use kerf::motion::queue::Constraint;
 use kerf::motion::short::Short;
 use kerf::motion::speed_constraints;
-use optimum::rest_to_rest;
+
+use crate::optimum::rest_to_rest;
 
 /// Nominal time of a slice.
 const SLICE: f64 = 0.002;

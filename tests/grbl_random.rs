@@ -2,24 +2,15 @@
 //! resets, and TinyG's dialect on the second port. What is judged is in `tests/support/grbl_session.rs`; `tests/sim/tests/grbl.rs` has the
 //! same conversations with the image, and shorter ones.
 //!
-//! One that fails is made as small as it can be, and its seed is told: `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test grbl_random`.
-
-#[path = "support/grbl_ops.rs"]
-mod grbl_ops;
-#[path = "support/grbl_session.rs"]
-mod grbl_session;
-#[path = "support/host.rs"]
-mod host;
-#[path = "support/seeds.rs"]
-mod seeds;
-#[path = "support/side.rs"]
-mod side;
+//! One that fails is made as small as it can be, and its seed is told: `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test host grbl_random::`.
 
 use std::thread;
 
-use grbl_ops::Op;
-use grbl_session::Session;
 use kerf::hal::imp::Machine;
+
+use crate::grbl_ops::{self, Op};
+use crate::grbl_session::Session;
+use crate::seeds;
 
 /// See [`Session`].
 const REPORT_MS: u64 = 20;

@@ -1,12 +1,10 @@
 //! Heaters of the whole firmware, on simulated plants in mocked time.
 
-#[path = "support/plant.rs"]
-mod plant;
-
 use kerf::capability::Capability;
 use kerf::hal::imp::Machine;
 use kerf::heat::sensor::{Kind, SAMPLES, reading};
-use plant::{AIR, Plant};
+
+use crate::plant::{AIR, Plant};
 
 /// What is wrong with a sensor.
 #[derive(Clone, Copy, PartialEq)]

@@ -1,12 +1,10 @@
 //! Printing hosts and broken sensors while a printer heats, at many moments: what has to be off is off, and hosts get through.
 
-#[path = "support/plant.rs"]
-mod plant;
-
 use kerf::capability::Capability;
 use kerf::hal::imp::Machine;
 use kerf::heat::sensor::{Kind, SAMPLES, reading};
-use plant::Plant;
+
+use crate::plant::Plant;
 
 /// How often the plants are worked out, ms.
 const STEP: u64 = 10;

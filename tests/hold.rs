@@ -1,26 +1,16 @@
 //! Random jobs with feedholds at random times: they come to rest within the limits, go on, and end exactly;
 //! and what is dropped leaves the motors where they are.
 
-#[path = "support/cases.rs"]
-mod cases;
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/jobs.rs"]
-mod jobs;
-#[path = "support/keeps.rs"]
-mod keeps;
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/rig.rs"]
-mod rig;
-
-use cases::cases;
-use jobs::{Job, any_job, plan_held};
-use keeps::check_limits;
 use kerf::boards::MOTORS;
 use kerf::dda::SEGMENTS;
 use kerf::motion::block::{Block, Outputs, QueuedAction};
 use kerf::motion::exec::Step;
 use proptest::prelude::*;
-use rig::{Config, Rig, at};
+
+use crate::cases::cases;
+use crate::jobs::{Job, any_job, plan_held};
+use crate::keeps::check_limits;
+use crate::rig::{Config, Rig, at};
 
 /// A stop under any limits takes no more turns of exec: 300 mm/s at 20 mm/s^2, in stretches of 2 ms, and
 /// blocks without end.

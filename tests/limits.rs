@@ -3,22 +3,15 @@
 //!
 //! Each case is with a machine of its own. `KERF_SEED` and `KERF_CASES` choose those of three settings, as in `tests/streams.rs`.
 
-#[path = "support/extremes.rs"]
-mod extremes;
-#[path = "support/host.rs"]
-mod host;
-#[path = "support/seeds.rs"]
-mod seeds;
-#[path = "support/side.rs"]
-mod side;
-
 use std::thread;
 
-use extremes::Case;
 use kerf::config::Owner;
 use kerf::hal::imp::Machine;
 use proptest::prelude::*;
 use proptest::sample::select;
+
+use crate::extremes::{self, Case};
+use crate::seeds;
 
 /// Settings that keep the machine from moving, or from answering as others do.
 const APART: [&str; 6] = ["saf", "est", "jv", "ej", "dia", "js"];

@@ -1,24 +1,12 @@
 //! Random jobs through planner, exec and step generator, on the host: every block ends on its step, within
 //! the limits of every axis, and no later than need be.
 
-#[path = "support/cases.rs"]
-mod cases;
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/jobs.rs"]
-mod jobs;
-#[path = "support/keeps.rs"]
-mod keeps;
-#[path = "support/optimum.rs"]
-mod optimum;
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/rig.rs"]
-mod rig;
-
-use cases::cases;
-use jobs::{Planned, any_job, plan, run};
-use keeps::{STRETCH, check_limits};
-use optimum::rest_to_rest;
 use proptest::prelude::*;
+
+use crate::cases::cases;
+use crate::jobs::{Planned, any_job, plan, run};
+use crate::keeps::{STRETCH, check_limits};
+use crate::optimum::rest_to_rest;
 
 /// The time is no longer than with a stop at every corner.
 fn check_time(planned: &[Planned]) {

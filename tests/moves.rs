@@ -1,20 +1,11 @@
 //! Single moves on the host: their time against the optimum, their rate, and what takes time without steps.
 
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/jobs.rs"]
-mod jobs;
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/optimum.rs"]
-mod optimum;
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/rig.rs"]
-mod rig;
-
-use jobs::{Job, Move, plan};
 use kerf::motion::block::{Block, QueuedAction};
 use kerf::motion::factors::Factors;
-use optimum::rest_to_rest;
-use rig::{Config, Rig, at};
+
+use crate::jobs::{Job, Move, plan};
+use crate::optimum::rest_to_rest;
+use crate::rig::{self, Config, Rig, at};
 
 /// What the length of stretches costs a move at most, s: three and a half of them.
 const COST: f64 = 3.5 * kerf::motion::exec::SEGMENT_S as f64;

@@ -1,18 +1,14 @@
 //! Kerf's motions against those of another interpreter: `tests/nist`.
 
-#[path = "support/differences.rs"]
-mod differences;
-#[path = "support/motion_text.rs"]
-mod motion_text;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use differences::{DIFFERENCES, Difference, edited};
 use kerf::canon::Reader;
 use kerf::gcode::setup::{AxisMode, Setup};
 use kerf::units::Length;
-use motion_text::MotionText;
+
+use crate::differences::{DIFFERENCES, Difference, edited};
+use crate::motion_text::MotionText;
 
 /// How far coordinates may be apart, mm: the other interpreter's are exact to half of its last decimal in
 /// the program's unit, and they are sums.

@@ -1,12 +1,8 @@
 //! How senders that cannot run here open a conversation, with the firmware on the host: `tests/support/openings.rs` has them;
 //! `tests/sim/tests/openings.rs` has the same with the image.
 
-#[path = "support/host.rs"]
-mod host;
 #[path = "support/openings.rs"]
-mod openings;
-#[path = "support/side.rs"]
-mod side;
+mod by_sender;
 
 use std::thread;
 
@@ -14,7 +10,7 @@ use kerf::hal::imp::{Machine, eeprom};
 
 #[test]
 fn every_sender_finds_its_own() {
-    openings::all(boot);
+    by_sender::all(boot);
 }
 
 /// A machine that begins with this value of `dia`: its memory is filled by one in a thread of its own.

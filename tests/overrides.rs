@@ -1,27 +1,16 @@
 //! Random jobs with overrides that change at random times: they end exactly, within the limits of the machine, and
 //! what is queued follows at once.
 
-#[path = "support/cases.rs"]
-mod cases;
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/jobs.rs"]
-mod jobs;
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/keeps.rs"]
-mod keeps;
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/rig.rs"]
-mod rig;
-
-use cases::cases;
-use jobs::{Job, Planned, any_job, plan_changed};
-use keeps::{check_changes, check_corners};
 use kerf::gcode::overrides::{Change, Override};
 use kerf::motion::block::{Block, QueuedAction};
 use kerf::motion::exec::Step;
 use kerf::motion::factors::Factors;
 use proptest::prelude::*;
-use rig::{Config, Rig, at};
+
+use crate::cases::cases;
+use crate::jobs::{Job, Planned, any_job, plan_changed};
+use crate::keeps::{check_changes, check_corners};
+use crate::rig::{Config, Rig, at};
 
 /// What happens, and how many turns after the thing before.
 #[derive(Clone, Copy, Debug)]

@@ -1,15 +1,12 @@
 //! How near the emitted steps keep to the programmed path, and how evenly they come where one block follows another.
 
-#[allow(dead_code, reason = "each test uses a part")]
-#[path = "support/rig.rs"]
-mod rig;
-
 use kerf::boards::MOTORS;
 use kerf::config::StepRatio;
 use kerf::dda::STEP;
 use kerf::motion::exec::Step;
 use kerf::units::{Length, PerAxis};
-use rig::{Config, Rig, at};
+
+use crate::rig::{Config, Rig, at};
 
 /// Steps in a unit of length: `Config` has 80 a mm.
 const STEPS: f64 = 1.0 / 125.0;

@@ -3,29 +3,16 @@
 //! same conversations with the image, and shorter ones.
 //!
 //! Each is with a machine of its own. One that fails is made as small as it can be, and its seed is told:
-//! `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test realtime` has it again. A long run on all cores:
-//! `KERF_CASES=100000 cargo test --release -p kerf --test realtime`.
-
-#[path = "support/host.rs"]
-mod host;
-#[path = "support/ops.rs"]
-mod ops;
-#[path = "support/position_model.rs"]
-mod position_model;
-#[path = "support/seeds.rs"]
-mod seeds;
-#[path = "support/sender.rs"]
-mod sender;
-#[path = "support/session.rs"]
-mod session;
-#[path = "support/side.rs"]
-mod side;
+//! `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test host realtime::` has it again. A long run on all cores:
+//! `KERF_CASES=100000 cargo test --release -p kerf --test host realtime::`.
 
 use std::thread;
 
 use kerf::hal::imp::{Machine, eeprom, was_reset};
-use ops::{Op, Scale};
-use session::Session;
+
+use crate::ops::{self, Op, Scale};
+use crate::seeds;
+use crate::session::Session;
 
 /// Up to a minute of the machine's time.
 const SCALE: Scale = Scale { ops: 40, way: 3_000, radius: 1.5, wait: 1_500 };

@@ -1,13 +1,11 @@
 //! Axes with two motors and a switch for each: however askew they stand, homing makes them square, and whatever ends it
 //! before, no motor jumps in the next move.
 
-#[path = "support/cases.rs"]
-mod cases;
-
-use cases::cases;
 use kerf::boards::inputs::{X_MIN, Y_MIN};
 use kerf::hal::imp::Machine;
 use proptest::prelude::*;
+
+use crate::cases::cases;
 
 /// Steps in a mm, as motors are set up by default.
 const STEPS: i64 = 1_280;

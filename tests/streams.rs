@@ -2,23 +2,16 @@
 //! `tests/support/stream`; `tests/sim/tests/streams.rs` has the same with the image, and shorter ones.
 //!
 //! Each is with a machine of its own, whose count of milliseconds wraps within it. One that fails is made as small as
-//! it can be, and its seed is told: `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test streams` has it again. A
-//! long run on all cores: `KERF_CASES=100000 cargo test --release -p kerf --test streams`.
-
-#[path = "support/host.rs"]
-mod host;
-#[path = "support/seeds.rs"]
-mod seeds;
-#[path = "support/side.rs"]
-mod side;
-#[path = "support/stream/mod.rs"]
-mod stream;
+//! it can be, and its seed is told: `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test host streams::` has it again. A
+//! long run on all cores: `KERF_CASES=100000 cargo test --release -p kerf --test host streams::`.
 
 use std::thread;
 
 use kerf::hal::imp::Machine;
-use stream::dialogue::Dialogue;
-use stream::ops::{Op, Scale, Setup, conversation};
+
+use crate::seeds;
+use crate::stream::dialogue::Dialogue;
+use crate::stream::ops::{Op, Scale, Setup, conversation};
 
 /// Up to a minute of the machine's time.
 const SCALE: Scale = Scale { ops: 40, lines: 12, wait: 1_500, wrap: 20_000 };

@@ -1,14 +1,5 @@
 //! The transcripts, played to the firmware on the host: each on a machine of its own.
 
-#[path = "support/host.rs"]
-mod host;
-#[path = "support/requests.rs"]
-mod requests;
-#[path = "support/side.rs"]
-mod side;
-#[path = "support/transcript.rs"]
-mod transcript;
-
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -20,8 +11,9 @@ use kerf::hal::imp::Machine;
 use kerf::protocol::tinyg::{names, number};
 use kerf::status::Status;
 use kerf::units::Length;
-use requests::{Asked, pairs};
-use transcript::Transcript;
+
+use crate::requests::{Asked, pairs};
+use crate::transcript::{self, Transcript};
 
 fn read_all() -> Vec<Transcript> {
     transcript::read_all(Path::new("tests/transcripts"))

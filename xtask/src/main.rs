@@ -152,8 +152,8 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
 }
 
 /// Kerf's tests write it, so that this program need not be built with Kerf in it.
-const DESCRIBE: [&str; 8] =
-    ["test", "--quiet", "--package", "kerf", "--test", "docs", "--", "--ignored"];
+const DESCRIBE: [&str; 9] =
+    ["test", "--quiet", "--package", "kerf", "--test", "host", "docs::write", "--", "--ignored"];
 
 fn build(args: &BuildArgs) -> anyhow::Result<()> {
     if args.all {

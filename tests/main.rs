@@ -1,0 +1,100 @@
+//! The firmware and its parts on the host. All files are one program: each of its own would be optimised and linked apart,
+//! which took longer than the tests.
+//!
+//! Each test has a thread, and what a machine has one of is the thread's (`avr_embassy::machine_static`): tests share no machine.
+//!
+//! A name in front of `::` is a file here: `cargo test --test host hold::` are the tests of `hold.rs`.
+
+#[path = "support/cases.rs"]
+mod cases;
+#[path = "support/codes.rs"]
+mod codes;
+#[path = "support/crowd.rs"]
+mod crowd;
+#[path = "support/differences.rs"]
+mod differences;
+#[path = "support/extremes.rs"]
+mod extremes;
+#[path = "support/grbl_ops.rs"]
+mod grbl_ops;
+#[path = "support/grbl_session.rs"]
+mod grbl_session;
+#[path = "support/host.rs"]
+mod host;
+#[path = "support/jobs.rs"]
+mod jobs;
+#[path = "support/keeps.rs"]
+mod keeps;
+#[path = "support/motion_text.rs"]
+mod motion_text;
+#[path = "support/ops.rs"]
+mod ops;
+#[path = "support/optimum.rs"]
+mod optimum;
+#[path = "support/plain.rs"]
+mod plain;
+#[path = "support/plant.rs"]
+mod plant;
+#[path = "support/position_model.rs"]
+mod position_model;
+#[path = "support/requests.rs"]
+mod requests;
+#[path = "support/rig.rs"]
+mod rig;
+#[path = "support/schema.rs"]
+mod schema;
+#[path = "support/seeds.rs"]
+mod seeds;
+#[path = "support/sender.rs"]
+mod sender;
+#[path = "support/session.rs"]
+mod session;
+#[path = "support/side.rs"]
+mod side;
+#[path = "support/stream/mod.rs"]
+mod stream;
+#[path = "support/tables.rs"]
+mod tables;
+#[path = "support/transcript.rs"]
+mod transcript;
+#[path = "support/wiring.rs"]
+mod wiring;
+
+mod advance;
+mod arc_props;
+mod bed;
+mod builder;
+mod canon_props;
+mod chain;
+mod check;
+mod control;
+mod corexy;
+mod docs;
+mod gcode_props;
+mod governor;
+mod grbl;
+mod grbl_random;
+mod heat;
+mod heat_hosts;
+mod hold;
+mod limits;
+mod line;
+mod machine;
+mod machines;
+mod motion;
+mod moves;
+mod nist;
+mod offsets;
+mod openings;
+mod overrides;
+mod pages;
+mod path;
+mod probe_order;
+mod realtime;
+mod reprap;
+mod settings;
+mod squaring;
+mod streams;
+mod transcripts;
+mod usb_opens;
+mod wrap;
