@@ -165,12 +165,21 @@ fn build(args: &BuildArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Images for AVR and for the RP2040 beside each other: most of the time of each is a link, which takes one core.
 fn build_all() -> anyhow::Result<()> {
     setup::ensure(Scope::Arm)?;
-    for board in Board::all() {
-        println!("elf: {}", firmware::build(*board, Machine::default())?.display());
-    }
-    examples()
+    let (arm, avr): (Vec<_>, Vec<_>) = Board::all().iter().partition(|board| board.is_rp2040());
+    let each = |boards: &[Board]| {
+        boards.iter().try_for_each(|board| {
+            println!("elf: {}", firmware::build(*board, Machine::default())?.display());
+            anyhow::Ok(())
+        })
+    };
+    std::thread::scope(|scope| {
+        let arm = scope.spawn(|| each(&arm));
+        let avr = each(&avr).and_then(|()| examples());
+        arm.join().expect("a build does not panic").and(avr)
+    })
 }
 
 fn examples() -> anyhow::Result<()> {

@@ -24,6 +24,9 @@ use crate::run::board;
 const TICK: Duration = Duration::from_millis(2);
 /// AVR time between two looks at full speed.
 const SLICE_MS: u64 = 2;
+/// At full speed, how long a sender is waited for behind a slice in which nothing has happened: the computer is not kept busy by a machine at rest,
+/// whose time passes ten times as fast as real time still.
+const REST: Duration = Duration::from_micros(100);
 /// Cycles by which slices are no whole ms until the firmware listens: else each of them might end within the tick's interrupt, in which it
 /// does not.
 const STRIDE: u64 = 1_009;
@@ -53,6 +56,8 @@ struct Server {
     reset_at: Option<Instant>,
     /// The firmware has begun to take bytes since the last reset.
     listens: bool,
+    /// In the last turn no byte went either way, and no motor moved.
+    rests: bool,
     /// The cycle that belongs to an instant.
     anchor: (Instant, u64),
     boots: u64,
@@ -104,6 +109,15 @@ fn stop_with_input(stop: Arc<AtomicBool>) {
     });
 }
 
+/// What the other side is doing; with `rests`, waits [`REST`] for its bytes.
+fn wait(pty: &Pty, rests: bool) -> Result<Peer> {
+    let peer = pty.wait(if rests { REST } else { Duration::ZERO })?;
+    if rests && peer == Peer::Closed {
+        std::thread::sleep(REST);
+    }
+    Ok(peer)
+}
+
 impl Server {
     fn new(args: &ServeArgs) -> Result<Self> {
         let image = Image::read(&args.target.elf)?;
@@ -128,13 +142,16 @@ impl Server {
             peer: Peer::Closed,
             reset_at: None,
             listens: false,
+            rests: false,
             boots: 0,
         })
     }
 
     /// Looks at the sender, runs the machine, carries bytes both ways.
     fn turn(&mut self) -> Result<()> {
-        let peer = self.pty.wait(Duration::ZERO)?;
+        let peer = wait(&self.pty, self.rests && self.speed == Speed::Max)?;
+        let steps = self.machine.recorder().steps();
+        self.rests = self.machine.wire().backlog() == 0;
         if peer != self.peer {
             self.peer = peer;
             self.reset_at = (peer == Peer::Open).then(|| Instant::now() + RESET_DELAY);
@@ -149,10 +166,12 @@ impl Server {
                 Some(damage) => damage.pass(&bytes),
                 None => bytes,
             };
+            self.rests &= bytes.is_empty();
             self.machine.send(&bytes);
         }
         self.run()?;
         let answer = self.machine.receive();
+        self.rests &= answer.is_empty() && self.machine.recorder().steps() == steps;
         match self.peer {
             Peer::Open if self.reset_at.is_none() => self.pty.write(&answer)?,
             _ => self.pty.discard(),

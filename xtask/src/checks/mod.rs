@@ -31,6 +31,10 @@ const WITHOUT_IMAGES: &[Stage] = &[
     Stage { name: "lints", run: lints },
     Stage { name: "documentation", run: documentation },
     Stage { name: "host tests", run: host_tests },
+    Stage {
+        name: "tests of simulated boards, built",
+        run: || run_child(simulator_test().arg("--no-run")),
+    },
 ];
 
 /// What needs the images. Senders are installed beside it: most of that time is a network's.
@@ -143,10 +147,15 @@ fn size_all() -> Result<()> {
 
 /// With those on the emulated chip, which are ignored where there may be no emulator.
 fn simulator_tests() -> Result<()> {
+    run_child(simulator_test().args(["--", "--include-ignored"]))
+}
+
+/// What builds the tests of simulated boards, and runs them.
+fn simulator_test() -> Command {
     let mut test = host_cargo();
     test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());
-    test.args(["test", "--package", "kerf-sim", "--profile", "sim", "--", "--include-ignored"]);
-    run_child(&mut test)
+    test.args(["test", "--package", "kerf-sim", "--profile", "sim"]);
+    test
 }
 
 fn cargo(args: &[&str]) -> Result<()> {

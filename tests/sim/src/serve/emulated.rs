@@ -5,7 +5,7 @@
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use anyhow::Result;
 use kerf::boards::Board;
@@ -14,7 +14,7 @@ use kerf_sim::emulated::{Emulated, Near, Talks, job};
 use kerf_sim::mechanics::{Axis, Build};
 use kerf_sim::{Runs, USB};
 
-use super::{MAX_LAG, SLICE_MS, TICK, around};
+use super::{MAX_LAG, SLICE_MS, TICK, around, wait};
 use crate::arrival::Arrival;
 use crate::cli::{ServeArgs, Speed};
 use crate::pty::{Peer, Pty};
@@ -27,6 +27,8 @@ struct Server {
     pty: Pty,
     speed: Speed,
     peer: Peer,
+    /// In the last turn no byte went either way, and no motor moved.
+    rests: bool,
     /// Steps of each motor when the port was last opened: on balance, and in all.
     opened: Vec<(i64, u64)>,
     /// The cycle that belongs to an instant.
@@ -84,13 +86,16 @@ impl Server {
             pty,
             speed: args.speed,
             peer: Peer::Closed,
+            rests: false,
             opened: Vec::new(),
         })
     }
 
     /// Looks at the sender, runs the board, carries bytes both ways.
     fn turn(&mut self) -> Result<()> {
-        let peer = self.pty.wait(Duration::ZERO)?;
+        let peer = wait(&self.pty, self.rests && self.speed == Speed::Max)?;
+        let totals = self.board.totals();
+        self.rests = self.board.waiting() == 0;
         let is_open = peer == Peer::Open;
         if peer != self.peer {
             self.peer = peer;
@@ -101,12 +106,14 @@ impl Server {
         }
         if is_open && self.board.waiting() < BACKLOG {
             let bytes = self.pty.read()?;
+            self.rests &= bytes.is_empty();
             self.board.send_to(USB, &bytes);
         }
         let until = self.until();
         let ms = until.saturating_sub(self.board.cycle()) / self.board.cycles(1);
         self.board.run_for_ms(ms)?;
         let answer = self.board.receive_from(USB);
+        self.rests &= answer.is_empty() && self.board.totals() == totals;
         match is_open {
             true => self.pty.write(&answer)?,
             false => self.pty.discard(),
