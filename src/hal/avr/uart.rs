@@ -336,8 +336,10 @@ pub fn look() {
 fn wait_less(port: u8) {
     super::mask(|| {
         let ahead = &flags(port).ahead;
-        // The transmit interrupt may have sent it.
-        ahead.set(ahead.get().checked_sub(WAIT_MS).unwrap_or(0));
+        // The transmit interrupt may have sent it, or exec ordered one that does not wait.
+        if let Some(less) = ahead.get().checked_sub(WAIT_MS) {
+            ahead.set(less);
+        }
     });
     kick(port);
 }
