@@ -9,6 +9,7 @@ use super::line::Motors;
 use super::pace::Drivers;
 use super::short::Short;
 use crate::boards::MOTORS;
+use crate::config::StepRatio;
 use crate::math::sqrt;
 use crate::units::PerAxis;
 
@@ -84,6 +85,13 @@ pub struct Dynamics {
     pub drives: [u8; MOTORS],
     /// Highest step rate of each motor when so many move, less one; steps/s.
     pub rates: [f32; MOTORS],
+    /// Lines may be merged: no motor has so fine steps that a [chain](super::chain) had more than a block holds, on CoreXY either.
+    pub merges: bool,
+}
+
+/// With at most half a step a unit of length a way of 16 bits along two axes has less than 2^15 steps.
+fn is_coarse(ratio: StepRatio) -> bool {
+    ratio.num <= ratio.den / 2
 }
 
 impl Dynamics {
@@ -108,6 +116,7 @@ impl Dynamics {
         for (m, axis) in self.drives.iter_mut().enumerate() {
             *axis = machine.motor_axis(m);
         }
+        self.merges = (0..MOTORS).all(|m| is_coarse(machine.ratio(m)));
         self.junction = machine.junction_acceleration() * PER_SECOND_SQUARED;
         let drivers = machine.drivers();
         for (others, rate) in self.rates.iter_mut().enumerate() {

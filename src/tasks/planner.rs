@@ -299,7 +299,7 @@ impl Planner {
             return false;
         }
         let free = self.queue.free();
-        let may_merge = !commands.exact_stop && free < CAPACITY - 1;
+        let may_merge = !commands.exact_stop && free < CAPACITY - 1 && self.dynamics.merges;
         if may_merge && self.is_worth_a_chain() && self.begin_chain(target, feed, &commands) {
             return true;
         }

@@ -1,0 +1,32 @@
+//! Motors of more steps than a block holds in the length that lines are merged to.
+
+use kerf::hal::imp::Machine;
+
+/// Where motor 1, of 12,800 steps a mm, ends, and how far it has been.
+fn driven(last: &str) -> (i64, i64) {
+    let machine = Machine::boot(115_200).expect("one machine for each thread");
+    machine.run_ms(100);
+    for line in ["{sv:0}\n", "{1tr:1}\n", "{1mi:64}\n"] {
+        machine.send(line.as_bytes());
+        machine.run_ms(400);
+    }
+    for line in ["g1 y2 f100\n", "y3 f200\n", "x1 f16000\n", "x2\n", "x3\n", last] {
+        machine.send(line.as_bytes());
+    }
+    let mut most = 0;
+    for _ in 0..20_000 {
+        machine.run_ms(1);
+        most = most.max(machine.emitted().position[0]);
+    }
+    (machine.emitted().position[0], most)
+}
+
+#[test]
+fn lines_that_lie_on_a_line_are_driven_to_their_end() {
+    assert_eq!(driven(""), (3 * 12_800, 3 * 12_800));
+}
+
+#[test]
+fn the_way_out_is_driven_before_the_way_back() {
+    assert_eq!(driven("x0\n"), (0, 3 * 12_800));
+}
