@@ -188,7 +188,7 @@ impl Parser {
         let runs_job = !links.job.get().is_none();
         let waits = self.deferred != Deferred::No && is_working(links);
         let data = free && !runs_job && !self.is_feeding() && !waits;
-        let straight = !alarmed && !machine::is_checking();
+        let straight = !alarmed && !matches!(machine::cycle(), Cycle::Check | Cycle::Jog);
         // What a port is told at once goes first: an acknowledgement is not to wait for a move.
         let declined = if data && straight && self.is_idle() && !self.has_more() {
             match row::run(links, self.planner) {
@@ -762,6 +762,9 @@ fn begin(
         if status == Status::Again {
             // Its number counts when it is begun for good.
             port.speech.set(before);
+            if machine::cycle() == Cycle::Jog {
+                *deferred = Deferred::Line;
+            }
             return Begun::Again;
         }
         request.ran(status, commented);
@@ -937,7 +940,7 @@ pub fn end_program(links: &Links, resets: bool) {
     }
 }
 
-/// Refuses a block in an alarm, unless it ends that, and else carries it out.
+/// Refuses a block in an alarm, unless it ends that, and else carries it out. [`Status::Again`] while a jog is under way, unless it is another one.
 fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let alarm = machine::alarm();
     if alarm != Alarm::None {
@@ -946,6 +949,10 @@ fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
         }
         // The queue has been dropped, so that nothing is waited for.
         let _ = alarm::clear(links, &links.settings.borrow());
+    }
+    if machine::cycle() == Cycle::Jog && jog(block).is_none() && is_working(links) {
+        // The end of a jog drops what is queued: nothing that has been answered is to be behind it.
+        return (Status::Again, true);
     }
     let done = carry_out(links, block, declined);
     if machine::is_checking() && links.commands.borrow().stop == Stop::End {

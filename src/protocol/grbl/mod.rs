@@ -76,12 +76,14 @@ impl Dialect for Grbl {
 
     fn refuse(
         status: Status,
-        _line: &[u8],
+        line: &[u8],
         _length: u16,
         _speech: &mut (),
         _settings: &Settings,
     ) -> Request {
-        Request::refused(status)
+        // Of a jog that never begins grbl's senders are told that it is over; of a line of G-code that it is refused.
+        let drops_gcode = status == Status::Terminated && command::jog(line).is_none();
+        Request::refused(if drops_gcode { Status::Alarmed } else { status })
     }
 
     #[inline(always)]
