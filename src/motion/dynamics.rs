@@ -90,6 +90,8 @@ pub struct Dynamics {
 }
 
 /// With at most half a step a unit of length a way of 16 bits along two axes has less than 2^15 steps.
+#[inline(never)]
+#[small]
 fn is_coarse(ratio: StepRatio) -> bool {
     ratio.num <= ratio.den / 2
 }
@@ -113,10 +115,11 @@ impl Dynamics {
             let accel = machine.accel_max(n) * PER_SECOND_SQUARED;
             axis.limit_change(accel, machine.jerk_max(n) * PER_SECOND_CUBED);
         }
+        self.merges = true;
         for (m, axis) in self.drives.iter_mut().enumerate() {
             *axis = machine.motor_axis(m);
+            self.merges &= is_coarse(machine.ratio(m));
         }
-        self.merges = (0..MOTORS).all(|m| is_coarse(machine.ratio(m)));
         self.junction = machine.junction_acceleration() * PER_SECOND_SQUARED;
         let drivers = machine.drivers();
         for (others, rate) in self.rates.iter_mut().enumerate() {
