@@ -76,14 +76,12 @@ impl Dialect for Grbl {
 
     fn refuse(
         status: Status,
-        line: &[u8],
+        _line: &[u8],
         _length: u16,
         _speech: &mut (),
         _settings: &Settings,
     ) -> Request {
-        // Of a jog that never begins grbl's senders are told that it is over; of a line of G-code that it is refused.
-        let drops_gcode = status == Status::Terminated && command::jog(line).is_none();
-        Request::refused(if drops_gcode { Status::Alarmed } else { status })
+        Request::refused(status)
     }
 
     #[inline(always)]
