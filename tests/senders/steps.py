@@ -72,13 +72,13 @@ def main(test, stop=None):
 def session(*, connect, settings, jog, home, probe, stop, close, start, hold, finish, overrides=None):
     """Runs the steps that every sender has: from the first connection to the end of the whole job, over a reconnection."""
     step("connect", 20, connect)
-    step("settings", 60, settings)
-    step("jog", 60, jog)
+    step("settings", 180, settings)
+    step("jog", 180, jog)
     if overrides:
-        step("override", 30, overrides)
-    step("home", 60, home)
-    step("probe", 60, probe)
-    step("stop", 60, stop)
+        step("override", 180, overrides)
+    step("home", 180, home)
+    step("probe", 180, probe)
+    step("stop", 180, stop)
     step("close", 20, close)
     step("reconnect", 20, connect)
     step("stream", 20, start)
