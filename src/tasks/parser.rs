@@ -950,7 +950,8 @@ fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
         // The queue has been dropped, so that nothing is waited for.
         let _ = alarm::clear(links, &links.settings.borrow());
     }
-    if machine::cycle() == Cycle::Jog && jog(block).is_none() && is_working(links) {
+    let waits = !block.is_empty() && jog(block).is_none();
+    if waits && machine::cycle() == Cycle::Jog && is_working(links) {
         // The end of a jog drops what is queued: nothing that has been answered is to be behind it.
         return (Status::Again, true);
     }
