@@ -76,12 +76,15 @@ impl Dialect for Grbl {
 
     fn refuse(
         status: Status,
-        _line: &[u8],
+        line: &[u8],
         _length: u16,
         _speech: &mut (),
         _settings: &Settings,
     ) -> Request {
-        Request::refused(status)
+        // Of a jog that never begins grbl's senders are told that it is over, and so of an empty line; of a line of G-code that it is refused.
+        let is_gcode = !line.is_empty() && command::jog(line).is_none();
+        let drops_gcode = is_gcode && status == Status::Terminated;
+        Request::refused(if drops_gcode { Status::Alarmed } else { status })
     }
 
     #[inline(always)]
