@@ -940,7 +940,7 @@ pub fn end_program(links: &Links, resets: bool) {
     }
 }
 
-/// Refuses a block in an alarm, unless it ends that, and else carries it out. [`Status::Again`] while a jog is under way, unless it is another one.
+/// Refuses a block in an alarm, unless it ends that, and else carries it out.
 fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let alarm = machine::alarm();
     if alarm != Alarm::None {
@@ -949,11 +949,6 @@ fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
         }
         // The queue has been dropped, so that nothing is waited for.
         let _ = alarm::clear(links, &links.settings.borrow());
-    }
-    let waits = !block.is_empty() && jog(block).is_none();
-    if waits && machine::cycle() == Cycle::Jog && is_working(links) {
-        // The end of a jog drops what is queued: nothing that has been answered is to be behind it.
-        return (Status::Again, true);
     }
     let done = carry_out(links, block, declined);
     if machine::is_checking() && links.commands.borrow().stop == Stop::End {
@@ -978,14 +973,18 @@ fn enter(jogs: bool) {
 }
 
 /// Interprets a block and hands its commands to the planner, but in check mode. Returns also whether it may have a
-/// comment.
+/// comment. [`Status::Again`] while a jog is under way, unless it is another one.
 #[inline(never)]
 fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let words = jog(block);
-    let waits = || machine::is_held() || (machine::cycle() != Cycle::Jog && is_working(links));
-    if words.is_some() && waits() {
+    let jogs = machine::cycle() == Cycle::Jog;
+    if words.is_some() && (machine::is_held() || (!jogs && is_working(links))) {
         // It waits for nothing but other jogs.
         return (Status::NotAccepted, true);
+    }
+    if jogs && words.is_none() && !block.is_empty() && is_working(links) {
+        // The end of a jog drops what is queued: nothing that has been answered is to be behind it.
+        return (Status::Again, true);
     }
     let mut commands = links.commands.borrow_mut();
     let settings = links.settings.borrow();
@@ -1000,7 +999,7 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
             if !commands.is_empty() && !machine::is_checking() {
-                if words.is_some() != (machine::cycle() == Cycle::Jog) {
+                if words.is_some() != jogs {
                     enter(words.is_some());
                 }
                 links.commands_taken.set(true);
