@@ -2,6 +2,8 @@
 
 use kerf::hal::imp::Machine;
 
+use crate::apart::apart;
+
 fn say(machine: &Machine, text: &str, ms: u64) -> String {
     machine.send(text.as_bytes());
     machine.run_ms(ms);
@@ -17,11 +19,6 @@ fn boot() -> Machine {
     machine
 }
 
-/// A thread has one machine.
-fn elsewhere<R: Send>(test: impl FnOnce() -> R + Send) -> R {
-    std::thread::scope(|scope| scope.spawn(test).join().expect("the test passes"))
-}
-
 /// How far X has come when a jog to 20 mm is ended behind a line.
 fn ended_behind(line: &str) -> i64 {
     let machine = boot();
@@ -30,9 +27,9 @@ fn ended_behind(line: &str) -> i64 {
     assert_eq!(say(&machine, line, 100), "");
     machine.send(&[0x85]);
     machine.run_ms(5_000);
-    // It came before the end of the jog, and is dropped: senders count answers.
+    // It came before the end of the jog, and is refused.
     let heard = String::from_utf8_lossy(&machine.received()).into_owned();
-    assert!(heard.starts_with("ok\r\n"), "{line:?}: {heard:?}");
+    assert!(heard.starts_with("error:9\r\n"), "{line:?}: {heard:?}");
     assert!(say(&machine, "?", 20).starts_with("<Idle"));
     let at = machine.emitted().position[0];
     assert_eq!(say(&machine, "$J=G91 X1 F600\n", 1_000), "ok\r\n");
@@ -45,7 +42,7 @@ fn a_jog_ends_whatever_waits_behind_it() {
     for line in
         ["m8\n", "g54\n", "t1\n", "g4 p0.1\n", "g1 x0 f600\n", "g1 x0 f600 (c)\n", "g92 x1\n"]
     {
-        let at = elsewhere(|| ended_behind(line));
+        let at = apart(|| ended_behind(line));
         assert!((1_000..5_000).contains(&at), "{line:?}: {at}");
     }
 }
@@ -66,7 +63,7 @@ fn ends_behind(first: &str) -> i64 {
 #[test]
 fn what_is_answered_behind_a_jog_is_no_jog() {
     for first in ["g1 x6 f600\n", "g1 x6 f600 (c)\n"] {
-        assert_eq!(elsewhere(|| ends_behind(first)), 12 * 1_280, "{first:?}");
+        assert_eq!(apart(|| ends_behind(first)), 12 * 1_280, "{first:?}");
     }
 }
 

@@ -4,7 +4,8 @@ use kerf::boards::inputs;
 use kerf::config::machines::ALL;
 use kerf::hal::imp::{Machine, eeprom};
 use kerf::jobs::{Job, STORED};
-use std::thread;
+
+use crate::apart::apart;
 
 /// The machine just switched on, with a switch at each end of X, Y and Z, half a turn of the motor away.
 fn boot() -> Machine {
@@ -21,11 +22,6 @@ fn ask(machine: &Machine, line: &str) -> String {
     machine.send(format!("{line}\n").as_bytes());
     machine.run_ms(100);
     String::from_utf8(machine.received()).expect("ASCII")
-}
-
-/// On a thread of its own, as each machine needs.
-fn apart<T: Send>(job: impl FnOnce() -> T + Send) -> T {
-    thread::scope(|scope| scope.spawn(job).join().expect("no panic"))
 }
 
 /// Runs a job, and says with which status it has ended. At most an hour.

@@ -5,6 +5,8 @@
 //!
 //! A name in front of `::` is a file here: `cargo test --test host hold::` are the tests of `hold.rs`.
 
+#[path = "support/apart.rs"]
+mod apart;
 #[path = "support/cases.rs"]
 mod cases;
 #[path = "support/codes.rs"]

@@ -123,12 +123,8 @@ impl Sender {
 pub fn run_emulated() -> Result<()> {
     for sender in [Sender::Cncjs, Sender::GrblStreamer] {
         let job = Some(root().join("examples/square.gcode"));
-        run(&SendersArgs {
-            sender: Some(sender),
-            job,
-            board: Some(Board::PicoCnc),
-            install: false,
-        })?;
+        let board = Some(Board::PicoCnc);
+        run(&SendersArgs { sender: Some(sender), job, board, ..Default::default() })?;
     }
     Ok(())
 }
