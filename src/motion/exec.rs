@@ -772,7 +772,7 @@ impl Exec {
         let leaves = (breaks_off || self.hold) && retract.is_some() && fits;
         if leaves && self.prep.rest_of(retract.motors) {
             let why = thread.fault().unwrap_or(Status::Terminated);
-            let retreat = Retreat::new(retract, why);
+            let retreat = Retreat::new(retract, why, self.prep.debt_of(retract.motors));
             self.prep.join(retract.motors, retreat.is_backwards());
             self.follows = Follows::Retreats(retreat);
             return Step::Leaves;

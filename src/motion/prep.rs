@@ -476,6 +476,13 @@ impl Prep {
         (self.full | self.minor) & motors == 0
     }
 
+    /// The debt of the first of these motors, phase units.
+    #[small]
+    pub fn debt_of(&self, motors: u8) -> i16 {
+        let first = motors.trailing_zeros() as usize;
+        self.debt.get(first).copied().unwrap_or_default()
+    }
+
     /// These motors, which the block lets stand, are about to move this way, beside it. Segments have ticks for them from here on.
     #[inline(never)]
     #[small]

@@ -11,7 +11,7 @@
 
 use kerf_macros::small;
 
-use super::float::{least, some};
+use super::float::least;
 use super::short::Short;
 use crate::boards::MOTORS;
 use crate::dda::{STEP, Segment};
@@ -19,6 +19,11 @@ use crate::hal::TIMER_HZ;
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::status::Status;
+
+const STEP_LOG2: u32 = STEP.trailing_zeros();
+
+/// What is left at the end and not handed out, phase units: a step has been made well before it, and slower ones would be none in a tick.
+const END: u32 = STEP as u32 / 16;
 
 /// How a pass is left.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -49,25 +54,28 @@ pub struct Retreat {
     how: Retract,
     /// Why.
     pub why: Status,
-    /// What is left of the way, steps.
-    left: f32,
+    /// What is left of the way, phase units.
+    left: u32,
     /// steps/s.
     velocity: f32,
-    /// What has been handed out and is no whole step yet, phase units.
+    /// What has been handed out and is no whole step yet, and a half to round by, phase units.
     part: u16,
 }
 
 #[small]
 impl Retreat {
-    /// At rest, in the cut, for this reason.
-    pub fn new(how: Retract, why: Status) -> Self {
-        let left = f32::from(how.way.unsigned_abs());
-        Self { how, why, left, velocity: 0.0, part: 0 }
+    /// At rest, in the cut, for this reason. The motors have this debt, as of `Prep`, which is paid on the way.
+    pub fn new(how: Retract, why: Status, debt: i16) -> Self {
+        let ahead = if how.way < 0 { debt.wrapping_neg() } else { debt };
+        let left = u32::from(how.way.unsigned_abs()) << STEP_LOG2;
+        let left = left.saturating_add_signed(i32::from(ahead));
+        let part = (STEP / 2).saturating_add_signed(ahead.wrapping_neg());
+        Self { how, why, left, velocity: 0.0, part }
     }
 
     /// Whether X is out of the cut, at rest.
     pub fn is_done(&self) -> bool {
-        !some(self.left)
+        self.left == 0
     }
 
     /// The motors that move.
@@ -106,7 +114,8 @@ impl Retreat {
         let accel = self.how.accel.get();
         let gain = accel * (product(ticks, period) as f32 * (1.0 / HZ));
         // From there it loses a gain at most in each segment behind this one.
-        let stops = sqrt(gain * gain + 2.0 * accel * self.left) - gain;
+        let twice_left = self.left as f32 * (2.0 / f32::from(STEP));
+        let stops = sqrt(gain * gain + accel * twice_left) - gain;
         let period = f32::from(period);
         let wanted = least(self.velocity + gain, least(self.how.velocity.get(), stops));
         // A step in each tick at most.
@@ -114,8 +123,8 @@ impl Retreat {
         (self.velocity * period * (f32::from(STEP) / HZ) + 0.5) as u16
     }
 
-    /// X goes so far in each of so many ticks: whole steps are added to `target`, and what is handed out besides is a `debt` below
-    /// a step, as of `Prep`.
+    /// X goes so far in each of so many ticks: whole steps are added to `target`, and what is handed out besides is a `debt` of
+    /// half a step at most, as of `Prep`.
     #[inline(never)]
     pub fn note(
         &mut self,
@@ -125,14 +134,13 @@ impl Retreat {
         debt: &mut [i16; MOTORS],
     ) {
         let travel = product(increment, ticks);
-        // The last half step is none.
-        let left = self.left - travel as f32 * (1.0 / f32::from(STEP));
-        self.left = if left < 0.5 { 0.0 } else { left };
+        let left = self.left.saturating_sub(travel);
+        self.left = if left < END { 0 } else { left };
         let sum = travel + u32::from(self.part);
         self.part = sum as u16 & (STEP - 1);
-        let steps = (sum >> 15) as i32;
+        let steps = (sum >> STEP_LOG2) as i32;
         // What it has been told to go, less what it goes, modulo 2^16.
-        let owed = ((steps as u16) << 15).wrapping_sub(travel as u16);
+        let owed = ((steps as u16) << STEP_LOG2).wrapping_sub(travel as u16);
         let (steps, owed) =
             if self.is_backwards() { (-steps, owed.wrapping_neg()) } else { (steps, owed) };
         let mut bit = 1;
@@ -159,9 +167,9 @@ mod tests {
     const TICKS: u16 = 80;
 
     /// The velocity of each segment until it is out, steps/s, and how far it has gone.
-    fn run(how: Retract) -> (std::vec::Vec<f64>, i32, i16) {
-        let (mut target, mut debt) = ([0; MOTORS], [0; MOTORS]);
-        let mut retreat = Retreat::new(how, Status::Terminated);
+    fn run(how: Retract, debt: i16) -> (std::vec::Vec<f64>, i32, i16) {
+        let (mut target, mut debt) = ([0; MOTORS], [debt; MOTORS]);
+        let mut retreat = Retreat::new(how, Status::Terminated, debt[0]);
         let mut speeds = std::vec::Vec::new();
         while !retreat.is_done() {
             let mut segment = Segment { ticks: TICKS, period: PERIOD, ..Segment::default() };
@@ -180,12 +188,14 @@ mod tests {
             for (accel, velocity) in [(160_000.0, 6_400.0), (50_000.0, 30_000.0), (1e6, 1_000.0)] {
                 let limits = (Short::new(accel), Short::new(velocity));
                 let how = Retract { motors: 1, way, accel: limits.0, velocity: limits.1 };
-                let (speeds, steps, debt) = run(how);
-                let went = f64::from(steps) - f64::from(debt) / 32_768.0;
-                assert!(
-                    (went - f64::from(way)).abs() <= 0.55 + f64::from(way).abs() * 3e-4,
-                    "{way}: {went}"
-                );
+                for before in [-16_384, -9_000, 9_000, 16_383] {
+                    let (_, steps, debt) = run(how, before);
+                    assert_eq!(steps, i32::from(way), "{accel} {velocity} {before}");
+                    assert!(debt.unsigned_abs() < STEP / 8, "{way} {before}: {debt}");
+                }
+                let (speeds, steps, debt) = run(how, 0);
+                assert_eq!(steps, i32::from(way), "{accel} {velocity}");
+                assert!(debt.unsigned_abs() < STEP / 8, "{way}: {debt}");
                 let (mut before, mut most) = (0.0f64, 0.0f64);
                 for speed in &speeds {
                     // Of means of neighbours.
