@@ -363,7 +363,7 @@ impl<S: Side> Player<'_, S> {
     /// Sends a file as a sender does that waits for each answer.
     fn run(&mut self, file: &str) -> Result<(), String> {
         // Tests of the simulator run in their own folder.
-        let folder = if Path::new(file).exists() { "." } else { "../.." };
+        let folder = if Path::new(file).exists() { "." } else { "../../.." };
         let job = fs::read_to_string(Path::new(folder).join(file)).expect(file);
         for line in job.lines().filter(|line| !line.trim().is_empty()) {
             self.side.send(format!("{line}\n").as_bytes());

@@ -34,7 +34,7 @@ fn estimate(path: &Path) -> (f64, bool) {
 }
 
 fn files() -> Vec<PathBuf> {
-    let files = fs::read_dir("../cam").unwrap();
+    let files = fs::read_dir("../../cam").unwrap();
     let mut paths: Vec<_> = files.map(|file| file.unwrap().path()).collect();
     paths.sort();
     paths
@@ -50,7 +50,7 @@ fn files_as_posts_write_them_run() {
 }
 
 fn example(name: &str) -> PathBuf {
-    PathBuf::from(format!("../../examples/{name}.gcode"))
+    PathBuf::from(format!("../../../examples/{name}.gcode"))
 }
 
 /// By how much the time of a dry run differs from that of the board.

@@ -22,7 +22,7 @@ const CHIPS: [(&Chip, &str); 2] = [(&ATMEGA2560, "atmega2560"), (&ATMEGA1284P, "
 /// A chip at a clock that runs an example out of a folder.
 fn chip(chip: &'static Chip, clock_hz: u32, folder: &str, name: &str) -> Machine {
     let images = std::env::var_os("KERF_ELF_DIR")
-        .map_or_else(|| PathBuf::from("../../target/firmware"), PathBuf::from);
+        .map_or_else(|| PathBuf::from("../../../target/firmware"), PathBuf::from);
     let elf = images.join("avr-embassy").join(folder).join(format!("{name}.elf"));
     assert!(elf.exists(), "no {}: `cargo xtask examples` makes it", elf.display());
     Machine::bare(Image::read(&elf).unwrap(), chip, clock_hz).unwrap()
@@ -175,7 +175,7 @@ fn it_costs_what_the_readme_says() {
         "each tick takes {each} cycles, every 256 ms {carrying}, with interrupts off for {off}"
     ));
 
-    let readme = std::fs::read_to_string("../../avr-embassy/README.md").unwrap();
+    let readme = std::fs::read_to_string("../../../avr-embassy/README.md").unwrap();
     let readme = readme.replace('\n', " ");
     let wrong: Vec<_> = rows.iter().filter(|row| !readme.contains(*row)).collect();
     assert!(wrong.is_empty(), "avr-embassy/README.md is to have these:\n{}", rows.join("\n"));

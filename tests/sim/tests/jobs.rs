@@ -57,7 +57,7 @@ fn said(why: &(dyn std::any::Any + Send)) -> String {
 }
 
 fn lines(job: &str) -> Lines {
-    job::read_lines(Path::new(&format!("../../examples/{job}.gcode"))).unwrap()
+    job::read_lines(Path::new(&format!("../../../examples/{job}.gcode"))).unwrap()
 }
 
 fn settings(board: &Board) -> Vec<String> {

@@ -440,7 +440,7 @@ fn the_example_cuts_a_thread() {
     let mut machine = firmware(&MEGA2560_LATHE);
     machine.build(&Build::lathe(&MEGA2560_LATHE, 4).unwrap());
     machine.recorder_mut().keep_log();
-    let lines = job::read_lines(Path::new("../../examples/thread.gcode")).unwrap();
+    let lines = job::read_lines(Path::new("../../../examples/thread.gcode")).unwrap();
     let settings = vec!["{mch:4}".to_string(), "{spn:4}".to_string()];
     let options = Options { settings, ..Options::default() };
     let report = job::run(&mut machine, &lines, &options, |_| {}).unwrap();

@@ -1,5 +1,5 @@
 //! The image of `pico-cnc` on the emulated RP2040. `cargo xtask test` runs these, and installs the emulator; else
-//! `cargo test -p kerf-sim --profile sim pico -- --ignored` does, behind a `cargo xtask sim --board pico-cnc`.
+//! `cargo test -p kerf-sim-tests --profile sim pico -- --ignored` does, behind a `cargo xtask sim --board pico-cnc`.
 
 use std::path::Path;
 
@@ -110,7 +110,7 @@ fn run(name: &str, text: &str, settings: &[&str]) -> String {
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn jobs_end_on_their_steps() {
     for name in ["square", "spiral"] {
-        let text = std::fs::read_to_string(format!("../../examples/{name}.gcode")).unwrap();
+        let text = std::fs::read_to_string(format!("../../../examples/{name}.gcode")).unwrap();
         print!("{}", run(name, &text, &[]));
     }
 }
@@ -120,7 +120,7 @@ fn jobs_end_on_their_steps() {
 fn a_whole_job_ends_in_its_summary() {
     let mut run = kerf_sim();
     run.args(["run", "--board", "skr-pico", "--elf"]).arg(image(&SKR_PICO));
-    let output = run.arg("../../examples/bracket.gcode").output().unwrap();
+    let output = run.arg("../../../examples/bracket.gcode").output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout);
     print!("{said}");
     assert!(output.status.success() && said.contains("result: OK"), "{said}");
@@ -418,7 +418,7 @@ fn with_more_room(line: &str) -> String {
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn the_image_keeps_to_the_transcripts() {
-    let mut all = transcript::read_all(Path::new("../transcripts"));
+    let mut all = transcript::read_all(Path::new("../../transcripts"));
     let begins =
         |names: &[&str], one: &Transcript| names.iter().any(|name| one.name.starts_with(name));
     all.retain(|one| !begins(&DIFFERS, one));

@@ -11,7 +11,7 @@ use kerf_sim::print;
 use crate::common::{firmware, scratch};
 
 fn example() -> Lines {
-    job::read_lines(Path::new("../../examples/print.gcode")).unwrap()
+    job::read_lines(Path::new("../../../examples/print.gcode")).unwrap()
 }
 
 #[test]

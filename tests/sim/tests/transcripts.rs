@@ -16,7 +16,7 @@ const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 
 #[test]
 fn the_image_keeps_to_the_transcripts() {
-    let mut all = transcript::read_all(Path::new("../transcripts"));
+    let mut all = transcript::read_all(Path::new("../../transcripts"));
     // No image for this chip tells drivers anything, or has printing hosts and a second port: the emulated `skr-pico` has.
     let elsewhere = ["drivers", "reprap-ports"];
     all.retain(|one| !elsewhere.iter().any(|name| one.name.starts_with(name)));
@@ -36,6 +36,6 @@ fn the_image_keeps_to_the_transcripts() {
 
 #[test]
 fn the_image_does_what_the_pages_show() {
-    let pages = pages::read_all(Path::new("../../docs"));
+    let pages = pages::read_all(Path::new("../../../docs"));
     transcript::play_all(pages, 2, || firmware(&MEGA2560_GRBL));
 }

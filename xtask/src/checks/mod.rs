@@ -52,6 +52,9 @@ const WITH_SENDERS: &[Stage] = &[
     Stage { name: "the page in a browser", run: crate::web::test },
 ];
 
+/// What simulates boards, and what is tested on them: packages with a profile of their own.
+const SIMULATOR: [&str; 2] = ["kerf-sim", "kerf-sim-tests"];
+
 /// Runs all checks; stops at the first that fails.
 pub fn run() -> Result<()> {
     stage("tools", || setup::ensure(Scope::Emulator))?;
@@ -82,12 +85,15 @@ fn format() -> Result<()> {
     Ok(())
 }
 
-/// The simulator's package apart from the rest: in its own profile simavr is compiled once.
+/// The simulator's packages apart from the rest: in their own profile simavr is compiled once.
 fn lints() -> Result<()> {
     if has_component("clippy", "clippy") {
         let deny = ["--all-targets", "--", "-D", "warnings"];
-        cargo(&[&["clippy", "--workspace", "--exclude", "kerf-sim"], &deny[..]].concat())?;
-        cargo(&[&["clippy", "--package", "kerf-sim", "--profile", "sim"], &deny[..]].concat())?;
+        let [simulator, tests] = SIMULATOR;
+        let others = ["clippy", "--workspace", "--exclude", simulator, "--exclude", tests];
+        let own = ["clippy", "--profile", "sim", "--package", simulator, "--package", tests];
+        cargo(&[&others[..], &deny[..]].concat())?;
+        cargo(&[&own[..], &deny[..]].concat())?;
     }
     Ok(())
 }
@@ -150,11 +156,12 @@ fn simulator_tests() -> Result<()> {
     run_child(simulator_test().args(["--", "--include-ignored"]))
 }
 
-/// What builds the tests of simulated boards, and runs them.
+/// What builds the tests of simulated boards and of what simulates, and runs them. Some run the simulator's program.
 fn simulator_test() -> Command {
     let mut test = host_cargo();
     test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());
-    test.args(["test", "--package", "kerf-sim", "--profile", "sim"]);
+    test.args(["test", "--profile", "sim", "--lib", "--bins", "--tests"]);
+    test.args(SIMULATOR.map(|package| ["--package", package]).concat());
     test
 }
 

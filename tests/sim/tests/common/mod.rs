@@ -20,7 +20,10 @@ fn programs() -> PathBuf {
 
 /// The simulator's program.
 pub fn kerf_sim() -> Command {
-    Command::new(programs().join("kerf-sim"))
+    let program = programs().join("kerf-sim");
+    let name = program.display();
+    assert!(program.exists(), "no {name}: `cargo build -p kerf-sim --profile sim` makes it");
+    Command::new(program)
 }
 
 /// A file for a test to write.
@@ -32,7 +35,7 @@ pub fn scratch(name: &str) -> PathBuf {
 
 /// Compiles a fixture and returns the ELF file's path.
 pub fn build(name: &str) -> PathBuf {
-    let source = Path::new("fixtures").join(name);
+    let source = Path::new("../fixtures").join(name);
     // Tests run at the same time: each writes a file of its own.
     let unique = format!("{name}.{:?}.elf", std::thread::current().id());
     let elf = scratch(&unique.replace(['(', ')'], ""));
@@ -65,7 +68,7 @@ pub fn word(machine: &Machine, name: &str) -> u16 {
 /// Where images lie.
 fn images() -> PathBuf {
     std::env::var_os("KERF_ELF_DIR")
-        .map_or_else(|| PathBuf::from("../../target/firmware"), PathBuf::from)
+        .map_or_else(|| PathBuf::from("../../../target/firmware"), PathBuf::from)
 }
 
 /// Where the firmware's image for a board lies.
