@@ -95,12 +95,27 @@ def jog():
     return "X by 2 mm and back"
 
 
+def slide(name, value):
+    """Moves a slider, and again while the machine has another value: it counts from the last report, and if that was old, stops beside the value."""
+    bcnc.put(f"_Ov{name}", value)
+    moved = 0
+
+    def is_there():
+        nonlocal moved
+        if bcnc.get(f"Ov{name}") == value:
+            return True
+        if time.monotonic() - moved > 2:
+            moved = time.monotonic()
+            bcnc.put("_OvChanged", True)
+        return False
+
+    until(is_there)
+
+
 def overrides():
     """Its sliders, one at a time, for it forgets the others. Characters above 7F it sends as UTF-8: two bytes."""
     for name, value in [("Feed", 113), ("Rapid", 50), ("Spindle", 88), ("Feed", 100), ("Rapid", 100), ("Spindle", 100)]:
-        bcnc.put(f"_Ov{name}", value)
-        bcnc.put("_OvChanged", True)
-        until(lambda: bcnc.get(f"Ov{name}") == value)
+        slide(name, value)
     return "113, 50, 88 % and back"
 
 
