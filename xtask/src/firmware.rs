@@ -93,6 +93,13 @@ pub fn build_without(board: Board, machine: Machine, without: &[String]) -> Resu
     make_small(&text, &linked, &image)
 }
 
+/// Builds and checks the image of a board without any capability, dialects apart; returns where it lies.
+pub fn build_bare(board: Board) -> Result<PathBuf> {
+    let is_capability = |feature: &String| !feature.starts_with("dialect-");
+    let without: Vec<_> = board.features()?.into_iter().filter(is_capability).collect();
+    build_without(board, Machine::default(), &without)
+}
+
 /// The Cargo features of an image, separated by commas: what the board's file says, but for some.
 fn features(board: Board, machine: Machine, without: &[String]) -> Result<String> {
     let own = board.features()?;

@@ -113,7 +113,7 @@ struct BuildArgs {
     /// A feature of the board that the image is to lack, such as `help`; may be given several times
     #[arg(long, value_name = "FEATURE")]
     without: Vec<String>,
-    /// Build what the tests run instead: the images of all boards, and the examples
+    /// Build what the tests run instead: the images of all boards, one without capabilities, and the examples
     #[arg(long, conflicts_with_all = ["board", "machine", "without"])]
     all: bool,
 }
@@ -177,7 +177,8 @@ fn build_all() -> anyhow::Result<()> {
     };
     std::thread::scope(|scope| {
         let arm = scope.spawn(|| each(&arm));
-        let avr = each(&avr).and_then(|()| examples());
+        let avr =
+            each(&avr).and_then(|()| firmware::build_bare(Board::Ramps14)).and_then(|_| examples());
         arm.join().expect("a build does not panic").and(avr)
     })
 }

@@ -39,7 +39,7 @@ const WITHOUT_IMAGES: &[Stage] = &[
 
 /// What needs the images. Senders are installed beside it: most of that time is a network's.
 const WITH_IMAGES: &[Stage] = &[
-    Stage { name: "an image without capabilities", run: build_without },
+    Stage { name: "an image without capabilities", run: without_capabilities },
     Stage { name: "sizes and stack of every board", run: size_all },
     Stage { name: "the emulator of the RP2040", run: emulator::test },
     Stage { name: "simulated and emulated boards", run: simulator_tests },
@@ -121,9 +121,11 @@ fn has_component(subcommand: &str, component: &str) -> bool {
     found
 }
 
-/// With what the fuzzers do, done once, and with what the page is made of.
+/// With what the fuzzers do, done once, with what the page is made of, and with the firmware without capabilities, which refuses what it lacks.
 fn host_tests() -> Result<()> {
     cargo(&["test"])?;
+    let features = ["--no-default-features", "--features", "std,dialect-tinyg"];
+    cargo(&[&["test", "--package", "kerf", "--test", "capabilities"], &features[..]].concat())?;
     cargo(&["test", "--package", "kerf-web"])?;
     cargo(&["test", "--package", "kerf-fuzz"])
 }
@@ -131,18 +133,15 @@ fn host_tests() -> Result<()> {
 /// What capabilities take of the flash, bytes, at the least: a check that leaving them out does leave them out.
 const CAPABILITIES: u64 = 8_000;
 
-/// An image without capabilities is smaller, and refuses what it lacks.
-fn build_without() -> Result<()> {
+/// The image without capabilities, which is built with the others, is smaller.
+fn without_capabilities() -> Result<()> {
     let board = Board::Ramps14;
-    let is_capability = |feature: &String| !feature.starts_with("dialect-");
-    let without: Vec<_> = board.features()?.into_iter().filter(is_capability).collect();
     let flash = |elf: &Path| anyhow::Ok(elf::Image::load(elf)?.sizes.flash);
     let all = flash(&firmware::image(board, Machine::default()))?;
-    let least = flash(&firmware::build_without(board, Machine::default(), &without)?)?;
-    println!("{} take {} bytes of flash", without.join(", "), all.saturating_sub(least));
+    let least = flash(&firmware::build_bare(board)?)?;
+    println!("capabilities of {board} take {} bytes of flash", all.saturating_sub(least));
     ensure!(least + CAPABILITIES < all, "{least} bytes without capabilities, {all} with them");
-    let features = ["--no-default-features", "--features", "std,dialect-tinyg"];
-    cargo(&[&["test", "--package", "kerf", "--test", "capabilities"], &features[..]].concat())
+    Ok(())
 }
 
 fn size_all() -> Result<()> {
