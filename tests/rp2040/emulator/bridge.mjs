@@ -1,27 +1,31 @@
-// node bridge.mjs ELF MOTORS: an emulated board for a program that talks to it over standard input and output.
+// node bridge.mjs: an emulated board for a program that talks to it over standard input and output. Each line of the input is a request in JSON, each line of
+// the output its answer:
 //
-// MOTORS is JSON, [[step, dir], ...]. Each line of the input is a request in JSON, each line of the output its answer:
+//   {"board": {"elf": "file", "motors": [[step, dir], ...]}, "cut": true, "stick": true, "panic": "file", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "turn": rpm, "drivers": [...], "record": bool, "until": cycle, "line": true}
 //
-//   {"cut": true, "stick": true, "panic": "file", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "turn": rpm, "drivers": [...], "record": bool, "until": cycle, "line": true}
-//
-// Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does.
+// `board` comes first, and again where another board is to take the place of the one before. Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does.
 // With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again; with `stick` the CPU gets stuck. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
 import { createInterface } from 'node:readline';
 import { Machine } from './machine.mjs';
 import { Motors, Spindle } from './pins.mjs';
 import { Drivers } from './tmc2209.mjs';
 
-const [elf, pins] = process.argv.slice(2);
-const machine = new Machine(elf);
-const motors = new Motors(machine, JSON.parse(pins).map(([step, dir]) => ({ step, dir })));
-const drivers = new Drivers(machine, motors);
 const PWM = 0x40050000;
 const FUNCTION_PWM = 4;
 
+let elf, machine, motors, drivers;
 // What the answer tells of edges.
 let recorded;
 
+function powerUp(board) {
+  ({ elf } = board);
+  machine = new Machine(elf);
+  motors = new Motors(machine, board.motors.map(([step, dir]) => ({ step, dir })));
+  drivers = new Drivers(machine, motors);
+}
+
 function act(request) {
+  if (request.board) powerUp(request.board);
   if (request.cut) machine.cutPower();
   if (request.stick) machine.stick();
   if (request.panic) machine.panic(elf, request.panic);

@@ -5,13 +5,13 @@
 
 pub mod even;
 pub mod job;
+mod process;
 
-use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 use kerf::boards::{Board, Encoder, MOTORS, Pin, Port, Usart};
+use process::Process;
 use serde::{Deserialize, Serialize};
 
 use crate::runs::Runs;
@@ -22,6 +22,8 @@ const PROGRAM: &str = "rp2040-emulator/bridge.mjs";
 /// A request.
 #[derive(Serialize, Default, Debug)]
 struct Request {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    board: Option<PowerUp>,
     cut: bool,
     stick: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -46,6 +48,15 @@ struct Request {
     record: Option<bool>,
     until: u64,
     line: bool,
+}
+
+/// A board that is powered up.
+#[derive(Serialize, Debug)]
+struct PowerUp {
+    /// What is in its flash.
+    elf: PathBuf,
+    /// The pins of each motor, step and direction.
+    motors: Vec<(u8, u8)>,
 }
 
 /// What the program at the other end of USB does.
@@ -163,9 +174,8 @@ pub struct Recorded {
 /// The board.
 pub struct Emulated {
     board: &'static Board,
-    child: Child,
-    input: ChildStdin,
-    output: BufReader<ChildStdout>,
+    /// Always there, but for the end.
+    process: Option<Process>,
     request: Request,
     answer: Answer,
     heard: [Vec<u8>; LINES],
@@ -193,22 +203,11 @@ impl Emulated {
             program.display()
         );
         let pins = board.motors.iter().map(|motor| (motor.step.bit, motor.dir.bit));
-        let pins: Vec<_> = pins.collect();
-        let mut child = Command::new("node")
-            .arg(program)
-            .arg(elf)
-            .arg(serde_json::to_string(&pins)?)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .context("cannot start node")?;
-        let (input, output) = (child.stdin.take(), child.stdout.take());
+        let power_up = PowerUp { elf: elf.to_owned(), motors: pins.collect() };
         let mut board = Emulated {
             board,
-            child,
-            input: input.context("no standard input")?,
-            output: BufReader::new(output.context("no standard output")?),
-            request: Request::default(),
+            process: Some(Process::take(program)?),
+            request: Request { board: Some(power_up), ..Request::default() },
             answer: Answer::default(),
             heard: Default::default(),
         };
@@ -224,12 +223,9 @@ impl Emulated {
     /// Sends the request, and takes the answer.
     fn run(&mut self, until: u64, line: bool) -> Result<()> {
         (self.request.until, self.request.line) = (until, line);
-        let text = serde_json::to_string(&std::mem::take(&mut self.request))?;
-        writeln!(self.input, "{text}").context("the emulator has ended")?;
-        self.input.flush()?;
-        let mut text = String::new();
-        self.output.read_line(&mut text)?;
-        self.answer = serde_json::from_str(&text).context("the emulator has ended")?;
+        let request = serde_json::to_string(&std::mem::take(&mut self.request))?;
+        let answer = self.process.as_mut().context("no emulator")?.ask(&request)?;
+        self.answer = serde_json::from_str(&answer)?;
         if let Some(fault) = &self.answer.fault {
             bail!("the emulator fails: {fault}");
         }
@@ -388,9 +384,10 @@ impl Emulated {
 
 impl Drop for Emulated {
     fn drop(&mut self) {
-        // It has nothing to put away.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        // One that has failed is not kept.
+        if let Some(process) = self.process.take().filter(|_| self.answer.fault.is_none()) {
+            process.keep();
+        }
     }
 }
 
