@@ -29,6 +29,7 @@
 use std::collections::VecDeque;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use kerf::boards::inputs::PROBE;
 use kerf::config::VERSION;
@@ -119,14 +120,16 @@ pub fn play_all<S: Side>(
     at_once: usize,
     boot: impl Fn() -> S + Sync,
 ) {
-    let mut failed = Vec::new();
-    for some in transcripts.chunks(at_once) {
-        std::thread::scope(|scope| {
-            let played = some.iter().map(|t| scope.spawn(|| t.play(&mut boot()).err()));
-            let played: Vec<_> = played.collect();
-            failed.extend(played.into_iter().filter_map(|thread| thread.join().unwrap()));
-        });
-    }
+    let next = AtomicUsize::new(0);
+    let play = || {
+        let take = || transcripts.get(next.fetch_add(1, Ordering::Relaxed));
+        let played = std::iter::from_fn(take).map(|t| t.play(&mut boot()).err());
+        played.flatten().collect::<Vec<_>>()
+    };
+    let failed: Vec<_> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..at_once).map(|_| scope.spawn(play)).collect();
+        threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
+    });
     let (n, of) = (failed.len(), transcripts.len());
     assert!(failed.is_empty(), "{n} of {of} transcripts fail:\n{}", failed.join("\n"));
 }
