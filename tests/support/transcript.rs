@@ -30,6 +30,7 @@ use std::collections::VecDeque;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
 
 use kerf::boards::inputs::PROBE;
 use kerf::config::VERSION;
@@ -121,13 +122,16 @@ pub fn play_all<S: Side>(
     boot: impl Fn() -> S + Sync,
 ) {
     let next = AtomicUsize::new(0);
-    let play = || {
-        let take = || transcripts.get(next.fetch_add(1, Ordering::Relaxed));
-        let played = std::iter::from_fn(take).map(|t| t.play(&mut boot()).err());
-        played.flatten().collect::<Vec<_>>()
+    // A machine on the host is its thread's.
+    let play = |t: &Transcript| {
+        thread::scope(|own| own.spawn(|| t.play(&mut boot()).err()).join().unwrap())
     };
-    let failed: Vec<_> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..at_once).map(|_| scope.spawn(play)).collect();
+    let play_some = || {
+        let take = || transcripts.get(next.fetch_add(1, Ordering::Relaxed));
+        std::iter::from_fn(take).filter_map(play).collect::<Vec<_>>()
+    };
+    let failed: Vec<_> = thread::scope(|scope| {
+        let threads: Vec<_> = (0..at_once).map(|_| scope.spawn(play_some)).collect();
         threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
     });
     let (n, of) = (failed.len(), transcripts.len());
