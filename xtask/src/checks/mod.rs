@@ -17,6 +17,7 @@ use crate::machines::Machine;
 use crate::process::{host_cargo, probe, root, run as run_child, which};
 use crate::rp2040::emulator;
 use crate::setup::{self, Scope};
+use crate::sim;
 use crate::size;
 
 /// A check and what it is called.
@@ -31,10 +32,7 @@ const WITHOUT_IMAGES: &[Stage] = &[
     Stage { name: "lints", run: lints },
     Stage { name: "documentation", run: documentation },
     Stage { name: "host tests", run: host_tests },
-    Stage {
-        name: "tests of simulated boards, built",
-        run: || run_child(simulator_test().arg("--no-run")),
-    },
+    Stage { name: "tests of simulated boards, built", run: build_simulator_tests },
 ];
 
 /// What needs the images. Senders are installed beside it: most of that time is a network's.
@@ -150,12 +148,18 @@ fn size_all() -> Result<()> {
     })
 }
 
+/// With the simulator's program, which some of them run.
+fn build_simulator_tests() -> Result<()> {
+    sim::build()?;
+    run_child(simulator_test().arg("--no-run"))
+}
+
 /// With those on the emulated chip, which are ignored where there may be no emulator.
 fn simulator_tests() -> Result<()> {
     run_child(simulator_test().args(["--", "--include-ignored"]))
 }
 
-/// What builds the tests of simulated boards and of what simulates, and runs them. Some run the simulator's program.
+/// What builds the tests of simulated boards and of what simulates, and runs them.
 fn simulator_test() -> Command {
     let mut test = host_cargo();
     test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());
