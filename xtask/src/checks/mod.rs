@@ -16,6 +16,7 @@ use crate::firmware;
 use crate::machines::Machine;
 use crate::process::{host_cargo, probe, root, run as run_child, which};
 use crate::rp2040::emulator;
+use crate::senders;
 use crate::setup::{self, Scope};
 use crate::sim;
 use crate::size;
@@ -45,8 +46,8 @@ const WITH_IMAGES: &[Stage] = &[
 
 /// What needs the senders that are installed beside [`WITH_IMAGES`], or a browser.
 const WITH_SENDERS: &[Stage] = &[
-    Stage { name: "real senders", run: || crate::senders::run(&Default::default()) },
-    Stage { name: "real senders at the emulated RP2040", run: crate::senders::run_emulated },
+    Stage { name: "real senders", run: senders::run_short },
+    Stage { name: "real senders at the emulated RP2040", run: senders::run_emulated },
     Stage { name: "the page in a browser", run: crate::web::test },
 ];
 

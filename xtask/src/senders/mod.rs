@@ -119,6 +119,11 @@ impl Sender {
     }
 }
 
+/// All senders, with a job of half the usual one's time: what is tried are conversations. Whole jobs are the simulator's.
+pub fn run_short() -> Result<()> {
+    run(&SendersArgs { job: Some(root().join("examples/engraving.gcode")), ..Default::default() })
+}
+
 /// A sender of TinyG's dialect and one of grbl's at the emulated RP2040, one after the other: an emulator has a core of the computer to itself.
 pub fn run_emulated() -> Result<()> {
     for sender in [Sender::Cncjs, Sender::GrblStreamer] {
