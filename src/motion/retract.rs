@@ -107,7 +107,7 @@ impl Retreat {
         self.note(increment, segment.ticks, target, debt);
     }
 
-    /// How far X is to go in each of so many ticks, the next ones, phase units.
+    /// How far X is to go in each of so many ticks, the next ones, phase units; 1 at least until it is out.
     #[inline(never)]
     pub fn plan(&mut self, ticks: u16, period: u16) -> u16 {
         const HZ: f32 = TIMER_HZ as f32;
@@ -120,7 +120,9 @@ impl Retreat {
         let wanted = least(self.velocity + gain, least(self.how.velocity.get(), stops));
         // A step in each tick at most.
         self.velocity = least(wanted, HZ / period);
-        (self.velocity * period * (f32::from(STEP) / HZ) + 0.5) as u16
+        let increment = (self.velocity * period * (f32::from(STEP) / HZ) + 0.5) as u16;
+        // What is too slow for that would never come to its end.
+        increment.max((!self.is_done()).into())
     }
 
     /// X goes so far in each of so many ticks: whole steps are added to `target`, and what is handed out besides is a `debt` of
@@ -180,6 +182,16 @@ mod tests {
             assert!(speeds.len() < 20_000, "it does not come to its end");
         }
         (speeds, target[0], debt[0])
+    }
+
+    #[test]
+    fn it_comes_to_its_end_however_little_it_accelerates() {
+        for (way, accel) in [(1, 1e-3), (-1, 0.1), (20, 1.0), (-20, 2.0)] {
+            let (accel, velocity) = (Short::new(accel), Short::new(6_400.0));
+            let (_, steps, debt) = run(Retract { motors: 1, way, accel, velocity }, 0);
+            assert_eq!(steps, i32::from(way));
+            assert!(debt.unsigned_abs() < STEP / 8, "{way}: {debt}");
+        }
     }
 
     #[test]
