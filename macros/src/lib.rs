@@ -1,6 +1,9 @@
-//! Attributes of Kerf's source.
+//! Attributes and macros of Kerf's source.
 
-use proc_macro::{Delimiter, Group, TokenStream, TokenTree};
+mod text;
+
+use litrs::StringLit;
+use proc_macro::{Delimiter, Group, Literal, TokenStream, TokenTree};
 
 /// What is put in front of a function. The host's compiler is a stable one, and does not know `optimize`.
 const OPTIMIZE_SIZE: &str = "#[cfg_attr(target_arch = \"avr\", optimize(size))]";
@@ -51,4 +54,37 @@ fn functions(items: TokenStream) -> TokenStream {
 
 fn is(token: &TokenTree, word: &str) -> bool {
     matches!(token, TokenTree::Ident(ident) if ident.to_string() == word)
+}
+
+/// Packs a text: a literal, or `env!("NAME")`. What it makes is a literal of bytes.
+#[proc_macro]
+pub fn packed(text: TokenStream) -> TokenStream {
+    let Some(text) = string(text) else { return error("a literal or an `env!` is wanted") };
+    let Some(bytes) = text::pack(&text) else { return error("texts are ASCII") };
+    TokenTree::from(Literal::byte_string(&bytes)).into()
+}
+
+/// What the codes of [`packed!`] stand for, each two bytes or codes: an array of arrays of bytes.
+#[proc_macro]
+pub fn pairs(_: TokenStream) -> TokenStream {
+    format!("{:?}", text::pairs()).parse().expect("an array of arrays of numbers")
+}
+
+/// What a literal says, or a variable of the environment that `env!` names. What another macro passes on is in a group.
+fn string(tokens: TokenStream) -> Option<String> {
+    let tokens: Vec<_> = tokens.into_iter().collect();
+    match &tokens[..] {
+        [TokenTree::Group(group)] if group.delimiter() == Delimiter::None => string(group.stream()),
+        [TokenTree::Literal(literal)] => {
+            Some(StringLit::try_from(literal).ok()?.value().to_owned())
+        }
+        [name, _, TokenTree::Group(group)] if is(name, "env") => {
+            std::env::var(string(group.stream())?).ok()
+        }
+        _ => None,
+    }
+}
+
+fn error(what: &str) -> TokenStream {
+    format!("compile_error!({what:?})").parse().expect("a macro with a literal")
 }

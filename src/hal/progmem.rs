@@ -13,7 +13,8 @@ use core::mem::MaybeUninit;
 
 use super::imp::flash;
 
-pub use text::{Text, pack};
+pub use kerf_macros::packed;
+pub use text::Text;
 
 /// A value in program memory. Make one with [`progmem!`](crate::progmem!) only.
 #[repr(transparent)]
@@ -219,12 +220,21 @@ macro_rules! progmem {
 /// [`Plain`] bytes from a literal: `plain!("]}")`.
 #[macro_export]
 macro_rules! plain {
-    ($literal:literal) => {{
-        const BYTES: [u8; $literal.len()] = *$literal.as_bytes().first_chunk().unwrap();
-        $crate::progmem! { static PLAIN: [u8; BYTES.len()] = BYTES; }
+    ($literal:literal) => {
+        $crate::flash_bytes!($literal.as_bytes())
+    };
+}
+
+/// [`Plain`] bytes from a constant slice. For [`plain!`](crate::plain!) and [`text!`](crate::text!).
+#[doc(hidden)]
+#[macro_export]
+macro_rules! flash_bytes {
+    ($bytes:expr) => {{
+        const BYTES: &[u8] = $bytes;
+        $crate::progmem! { static TEXT: [u8; BYTES.len()] = *BYTES.first_chunk().unwrap(); }
         const {
             // SAFETY: `progmem!` placed it in program memory.
-            unsafe { $crate::progmem::Plain::new(&PLAIN) }
+            unsafe { $crate::progmem::Plain::new(&TEXT) }
         }
     }};
 }

@@ -169,7 +169,7 @@ impl Token {
             Some(Subject::Setting(setting)) => {
                 let row = setting.row();
                 return match row.kind {
-                    Kind::Text if row.max != 0 => Shown::Text(text!(crate::config::VERSION)),
+                    Kind::Text if row.max != 0 => Shown::Text(text!(env!("CARGO_PKG_VERSION"))),
                     Kind::Text => Shown::Text(text!("0000-KERF")),
                     Kind::Data | Kind::Job => Shown::Data(machine.setting(setting)),
                     _ => {

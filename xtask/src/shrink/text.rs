@@ -177,8 +177,9 @@ impl Program {
 
 /// The function whose address a line takes.
 fn address(line: &str) -> Option<&str> {
-    let (_, inside) = ["gs(", "pm("].iter().find_map(|start| line.split_once(start))?;
-    inside.split(')').next()
+    let (before, inside) = line.rsplit_once('(')?;
+    let is_address = before.ends_with("gs") || before.ends_with("pm");
+    is_address.then(|| inside.split(')').next())?
 }
 
 /// Whether a directive only tells a debugger or the linker of what it names, or holds text.

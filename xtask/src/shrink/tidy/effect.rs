@@ -82,7 +82,11 @@ pub fn register(operand: &str) -> Option<u8> {
 
 /// The operands of an instruction, at most two.
 pub fn operands(insn: &Insn) -> (&str, &str) {
-    insn.args.split_once(", ").unwrap_or((&insn.args, ""))
+    // A search for a character is many times as fast as one for a text, and this is asked more often than anything else.
+    match insn.args.split_once(',') {
+        Some((first, second)) => (first, second.trim_start()),
+        None => (&insn.args, ""),
+    }
 }
 
 /// The pointer that a memory operand goes by, and what is added to it.
