@@ -21,7 +21,7 @@ const APART: [(&str, &str); 6] = [
 /// The bottom of `hal`: what is arithmetic or reads flash, and touches no register.
 const PRIMITIVES: [&str; 4] = ["arithmetic", "flash", "float", "text"];
 /// Macros of theirs, which the crate has at its root.
-const MACROS: [&str; 4] = ["named", "plain", "progmem", "text"];
+const MACROS: [&str; 5] = ["flash_bytes", "named", "plain", "progmem", "text"];
 /// Not layers: they put the others together.
 const ENTRIES: [&str; 2] = ["lib", "main"];
 
