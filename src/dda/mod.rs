@@ -43,7 +43,9 @@ pub mod contact;
 pub mod step_replay;
 
 /// A step, in phase units.
-pub const STEP: u16 = 0x8000;
+pub const STEP: u16 = 1 << STEP_LOG2;
+/// The exponent of it.
+pub const STEP_LOG2: u8 = 15;
 
 /// Where phases start: a little past half a step, so that a position is rounded to the nearest step
 /// and a rest of up to [`PHASE_MARGIN`] left by the segments before never moves a step of a motor that

@@ -7,11 +7,8 @@
 //!
 //! Cost on AVR: 500 cycles a segment, nothing while there is no such moment.
 
-use super::{Dda, STEP, Segment};
+use super::{Dda, STEP, STEP_LOG2, Segment};
 use crate::boards::MOTORS;
-
-/// Steps in a phase.
-const STEP_LOG2: u32 = STEP.trailing_zeros();
 
 /// A replay of the steps that the generator makes.
 #[derive(Clone, Debug, Default)]

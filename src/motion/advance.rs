@@ -19,7 +19,7 @@ use super::float::{below, greater, least, less, lesser, ratio, scaled, size, som
 use super::short::Short;
 use crate::capability::Capability;
 use crate::config::StepRatio;
-use crate::dda::STEP;
+use crate::dda::{STEP, STEP_LOG2};
 use crate::hal::TIMER_HZ;
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
@@ -28,8 +28,6 @@ use crate::units::Length;
 /// How many extruders there are.
 pub const EXTRUDERS: usize = Capability::Printer.is_built_in() as usize;
 
-/// The exponent of a step.
-const STEP_LOG2: i8 = STEP.trailing_zeros() as i8;
 /// What a unit of K is, s.
 const UNIT_S: f32 = 1e-4;
 /// No stretch counts as shorter, s.
@@ -251,7 +249,7 @@ impl Advance {
         let late = want as f32 - self.pace * time;
         let far = size(late);
         let speed = turned(self.speed - self.pace, late);
-        let accel = scaled(self.accel.get(), STEP_LOG2);
+        let accel = scaled(self.accel.get(), STEP_LOG2 as i8);
         let gain = accel * time;
         let (slow, fast) = (speed - gain, speed + gain);
         let next = if less(fast * time, far) {
@@ -295,7 +293,7 @@ impl Advance {
 /// How far the extruder goes in a line that says so ([`refine`]), phase units; 0 if it goes back or stands.
 #[inline(always)]
 pub(super) fn pushed(way: i16, line: &Line) -> u32 {
-    const LOG2: u8 = STEP_LOG2 as u8 - MORE_LOG2;
+    const LOG2: u8 = STEP_LOG2 - MORE_LOG2;
     let far = in_parts(way) + i32::from(line.extent.more());
     if way <= 0 || far <= 0 {
         return 0;

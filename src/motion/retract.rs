@@ -14,13 +14,11 @@ use kerf_macros::small;
 use super::float::least;
 use super::short::Short;
 use crate::boards::MOTORS;
-use crate::dda::{STEP, Segment};
+use crate::dda::{STEP, STEP_LOG2, Segment};
 use crate::hal::TIMER_HZ;
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::status::Status;
-
-const STEP_LOG2: u32 = STEP.trailing_zeros();
 
 /// What is left at the end and not handed out, phase units: a step has been made well before it, and slower ones would be none in a tick.
 const END: u32 = STEP as u32 / 16;

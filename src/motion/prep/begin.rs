@@ -1,0 +1,145 @@
+//! A block begins: how far each motor goes in it, and which of them goes farthest.
+
+use super::super::block::{Line, PARTS_LOG2};
+use super::ticks::{is_little, parts_of, times};
+use super::{PART, PART_LOG2, Prep};
+use crate::boards::{MOTORS, each_motor};
+use crate::dda::{STEP, STEP_LOG2};
+use crate::hal::arithmetic::product;
+
+impl Prep {
+    /// Starts a block. The steps to the whole ones next to its end are put into `steps` and added to `target`.
+    #[inline(never)]
+    pub fn begin(&mut self, line: &Line, steps: &mut [i16; MOTORS], target: &mut [i32; MOTORS]) {
+        self.shift = u8::MAX;
+        (self.full, self.minor, self.most, self.others) = (0, 0, 0, u8::MAX);
+        self.parts = !line.extent.has_whole_steps();
+        if !self.parts {
+            self.begin_far(&line.way, steps, target);
+            if self.has_advance() {
+                self.begin_lead(line);
+            }
+            return;
+        }
+        each_motor!(M => {
+            let mut way = line.way[M];
+            let mut whole = 0;
+            let debt = self.debt[M];
+            if way != 0 {
+                self.debt[M] = debt.wrapping_add(way << PART_LOG2);
+                let sum = way + i16::from(self.fraction[M]);
+                self.fraction[M] = sum as u8 & 15;
+                whole = sum >> PARTS_LOG2;
+                target[M] = target[M].wrapping_add(whole.into());
+            }
+            steps[M] = whole;
+            if !is_little(debt) {
+                // With the parts of a step that it is short of.
+                way += parts_of(debt) >> PART_LOG2;
+            }
+            if way != 0 {
+                self.take_up(M, 1 << M, way, line.way[M]);
+            }
+        });
+        self.left = product(self.most, PART);
+        if self.most == 0 {
+            // Without motors there are no ticks to pace.
+            self.others = 0;
+        }
+        if self.has_advance() {
+            self.begin_lead(line);
+        }
+    }
+
+    /// Starts a block whose ways are in whole steps. Else as [`Prep::begin`].
+    #[inline(never)]
+    #[small]
+    fn begin_far(
+        &mut self,
+        ways: &[i16; MOTORS],
+        steps: &mut [i16; MOTORS],
+        target: &mut [i32; MOTORS],
+    ) {
+        *steps = *ways;
+        let mut bit = 1;
+        for (m, way) in ways.iter().enumerate() {
+            if *way != 0 {
+                target[m] = target[m].wrapping_add((*way).into());
+                self.take_up(m, bit, *way, *way);
+            }
+            bit <<= 1;
+        }
+        self.left = product(self.most, STEP);
+        self.lengthen();
+        for (debt, way) in self.debt.iter_mut().zip(ways) {
+            *debt = debt.wrapping_add(way << STEP_LOG2);
+        }
+    }
+
+    /// A motor goes this way in the block, of which it has `own` but for its debt.
+    #[inline(always)]
+    fn take_up(&mut self, m: usize, bit: u8, way: i16, own: i16) {
+        self.others = self.others.wrapping_add(1);
+        let (size, turned) = if way < 0 {
+            ((way as u16).wrapping_neg(), !self.backwards & bit)
+        } else {
+            (way as u16, self.backwards & bit)
+        };
+        if turned != 0 {
+            self.backwards ^= bit;
+            self.turned = true;
+        }
+        self.minors[m].way = size;
+        if size == self.most {
+            self.full |= bit;
+        } else if size > self.most {
+            self.minor |= self.full;
+            self.full = bit;
+            self.most = size;
+            self.own = own;
+            let at = self.fraction[m];
+            self.past = if way < 0 { !at } else { at };
+        } else {
+            self.minor |= bit;
+        }
+    }
+
+    /// In a block of whole steps the dominant motor makes up what it is short of, and with it those that go as far.
+    #[inline(never)]
+    #[small]
+    fn lengthen(&mut self) {
+        let mut due = None;
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            if self.full & bit != 0 {
+                let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
+                let due = *due.get_or_insert(parts_of(debt));
+                if (debt - due).unsigned_abs() > PART {
+                    // It goes as far, but not as what it was short of.
+                    self.full &= !bit;
+                    self.minor |= bit;
+                }
+            } else if self.minor & bit == 0 && !is_little(self.debt[m]) {
+                // It has no part in the line, but not arrived where that begins.
+                self.minor |= bit;
+                self.minors[m].way = 0;
+                self.others += 1;
+                if (self.debt[m] < 0) != (self.backwards & bit != 0) {
+                    self.backwards ^= bit;
+                    self.turned = true;
+                }
+            }
+            bit <<= 1;
+        }
+        let due = due.unwrap_or(0);
+        self.left = self.left.wrapping_add_signed(due.into());
+        // What makes the dominant motor's way longer makes theirs so in proportion, and they have their own debts.
+        let mut bit = 1;
+        for m in 0..MOTORS {
+            let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
+            let way = self.minors[m].way;
+            self.minors[m].owed = times(debt, self.most) - times(due, way);
+            bit <<= 1;
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! Pressure advance: the lead of the extruder in the segments of a block ([`Advance`] says how long it is).
+
+use super::super::advance::{Lead, pushed};
+use super::super::block::Line;
+use super::minor::Minor;
+use super::{ASIDE, ASIDE_LITTLE, Prep, TURNED};
+use crate::dda::Segment;
+
+impl Prep {
+    /// Whether there is a lead of the extruder, or may be one. Cost: 5.
+    #[inline(always)]
+    pub(super) fn has_advance(&self) -> bool {
+        self.extruder.first().is_some_and(|extruder| extruder.on)
+    }
+
+    /// Whether the extruder has a lead in the block, or takes one back: then exec says how fast the machine is ([`Prep::aim`]).
+    #[inline(always)]
+    pub fn leads(&self) -> bool {
+        self.extruder.first().is_some_and(|extruder| extruder.leads)
+    }
+
+    /// From the next block on this is the extruder's lead.
+    #[small]
+    pub fn set_lead(&mut self, lead: &Lead) {
+        if let Some(extruder) = self.extruder.first_mut() {
+            extruder.set(lead);
+        }
+    }
+
+    /// The machine is that fast, mm/s, at the end of a slice: see [`Advance::aim`].
+    #[inline(never)]
+    pub fn aim(&mut self, velocity: f32, seconds: f32, pending: f32) {
+        if let Some(extruder) = self.extruder.first_mut() {
+            extruder.aim(velocity, seconds, pending);
+        }
+    }
+
+    /// A block begins. If it pushes filament while others travel, the extruder has a lead in it. Its increments are its own then: it is no motor
+    /// that goes as far as others.
+    #[inline(never)]
+    #[small]
+    pub(super) fn begin_lead(&mut self, line: &Line) {
+        let Some(extruder) = self.extruder.first_mut() else { return };
+        let m = usize::from(extruder.motor);
+        let bit = 1 << extruder.motor;
+        let own = line.way.get(m).copied().unwrap_or(0);
+        let travels = line.way.iter().enumerate().any(|(other, way)| other != m && *way != 0);
+        let way = if travels { pushed(own, line) } else { 0 };
+        let leads = extruder.begin(way, line.extent.length()) && self.most != 0;
+        if !leads {
+            extruder.end();
+            return self.end_lead();
+        }
+        extruder.take_up(self.backwards & bit != 0);
+        if self.full & bit != 0 && self.full != bit {
+            self.full &= !bit;
+            self.minor |= bit;
+        } else if (self.full | self.minor) & bit == 0 {
+            self.minor |= bit;
+            self.others += 1;
+            if let Some(minor) = self.minors.get_mut(m) {
+                *minor = Minor::default();
+            }
+        } else if self.others == 0 {
+            // Alone: ticks are those of motors whose increments are not a step.
+            self.others = 1;
+        }
+    }
+
+    /// The extruder's lead is added to a segment that is complete but for its mode.
+    #[inline(never)]
+    pub(super) fn lead(&mut self, out: &mut Segment) {
+        let Some(extruder) = self.extruder.first_mut() else { return };
+        let more = extruder.travel(out.ticks, out.period);
+        let bit = 1 << extruder.motor;
+        let Some(increment) = out.increment.get_mut(usize::from(extruder.motor)) else { return };
+        let size = i32::from(*increment);
+        let own = if out.backwards & bit != 0 { -size } else { size };
+        let most = extruder.most(out.period).max(size);
+        let mut goes = (own + more).clamp(-most, most);
+        if goes != 0 && (goes < 0) != extruder.backwards {
+            extruder.backwards = goes < 0;
+            if out.period.saturating_sub(TURNED) < self.setup {
+                // The direction stands from here on, and the motor goes in the next segment.
+                goes = 0;
+            }
+        }
+        *increment = goes.unsigned_abs() as u16;
+        out.backwards = out.backwards & !bit | if extruder.backwards { bit } else { 0 };
+        extruder.note(goes - own, more, (out.ticks, out.period));
+        if extruder.is_done() {
+            self.end_lead();
+        }
+    }
+
+    /// The extruder is where its line is, but for little, and the block has no lead.
+    #[inline(never)]
+    #[small]
+    fn end_lead(&mut self) {
+        let Some(extruder) = self.extruder.first_mut() else { return };
+        let bit = 1 << extruder.motor;
+        if core::mem::take(&mut extruder.leads) {
+            // The next segment turns it round.
+            self.turned |= extruder.backwards != (self.backwards & bit != 0);
+        }
+        if self.full == bit && self.minor == 0 {
+            self.others = 0;
+        } else if self.minor & bit != 0
+            && self.minors.get(usize::from(extruder.motor)).is_some_and(Minor::stands)
+        {
+            self.minor &= !bit;
+            self.others = self.others.saturating_sub(1);
+        }
+    }
+
+    /// The machine rests at the end of its lines, or in a hold: a segment in which the extruder takes back what is left of its lead. False, and no
+    /// segment, if there is none.
+    #[inline(always)]
+    pub fn relax(&mut self, out: &mut Segment) -> bool {
+        self.has_advance() && self.takes_back(out)
+    }
+
+    #[inline(never)]
+    #[small]
+    fn takes_back(&mut self, out: &mut Segment) -> bool {
+        let Some(extruder) = self.extruder.first_mut() else { return false };
+        if extruder.made() == 0 {
+            return false;
+        }
+        let bit = 1 << extruder.motor;
+        extruder.take_up(self.backwards & bit != 0);
+        let (ticks, period) = if extruder.rest() { ASIDE_LITTLE } else { ASIDE };
+        self.pause(ticks, period, out);
+        out.moving = bit;
+        self.lead(out);
+        out.mode = Segment::mode_of(bit);
+        true
+    }
+}

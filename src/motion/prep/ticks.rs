@@ -1,0 +1,106 @@
+//! Ticks of a stretch: how many, and of how many phase units, in integers.
+
+use super::{LIMIT_MAX, PART};
+use crate::dda::STEP_LOG2;
+use crate::hal::arithmetic::product;
+
+/// Whether a debt is less than a part of a step, by rounding.
+#[inline(always)]
+pub(super) fn is_little(debt: i16) -> bool {
+    (debt as u16).wrapping_add(PART / 2) < PART
+}
+
+/// A debt rounded to parts of a step, in phase units.
+#[inline(always)]
+pub(super) fn parts_of(debt: i16) -> i16 {
+    (debt + (PART / 2) as i16) & !(PART as i16 - 1)
+}
+
+#[inline(never)]
+#[small]
+pub(super) fn times(a: i16, b: u16) -> i32 {
+    let size = product(a.unsigned_abs(), b) as i32;
+    if a < 0 { -size } else { size }
+}
+
+/// `1 << n`, up to [`STEP`]. Cost: 15; the compiler makes a loop of six cycles a bit.
+#[inline(always)]
+pub(super) fn bit(n: u8) -> u16 {
+    let pair = if n & 2 != 0 { 4 } else { 1 };
+    let nibble: u8 = if n & 1 != 0 { pair << 1 } else { pair };
+    let byte = if n & 4 != 0 { nibble << 4 } else { nibble };
+    if n & 8 != 0 { u16::from(byte) << 8 } else { byte.into() }
+}
+
+/// Parts of a tick for its period: 1/32, if the tick has as many phase units.
+pub(super) const FINE: u8 = 5;
+
+/// Most ticks of a limit, in such parts.
+const fn limit_in_parts(limit: u16) -> u16 {
+    limit << FINE | ((1 << FINE) - 1)
+}
+
+const _: () = assert!(limit_in_parts(LIMIT_MAX) >> FINE == LIMIT_MAX);
+
+/// A travel in parts of ticks, of which there are no more than `limit` if steps allow, and the exponent of a tick. Cost: 100.
+#[inline(never)]
+pub(super) fn coarsen(travel: u32, limit: u16) -> (u32, u8) {
+    let limit = limit_in_parts(limit);
+    if travel <= u32::from(limit) {
+        return coarsen_little(travel, limit);
+    }
+    let (mut fine, mut shift) = (travel, FINE);
+    if fine >> 8 > u32::from(limit) {
+        (fine, shift) = (fine >> 8, FINE + 8);
+    }
+    while fine > 0xFFFF && shift < STEP_LOG2 {
+        fine >>= 1;
+        shift += 1;
+    }
+    if fine > 0xFFFF {
+        return (fine, shift);
+    }
+    let mut few = fine as u16;
+    while few > limit && shift < STEP_LOG2 {
+        few >>= 1;
+        shift += 1;
+    }
+    (few.into(), shift)
+}
+
+/// A travel for which ticks of less than [`FINE`] bits do: it is its own parts.
+#[inline(never)]
+#[small]
+fn coarsen_little(travel: u32, limit: u16) -> (u32, u8) {
+    let (limit, mut ticks, mut shift) = (limit >> FINE, travel as u16, 0);
+    while ticks > limit && shift < FINE {
+        ticks >>= 1;
+        shift += 1;
+    }
+    (travel, shift)
+}
+
+/// A travel in parts of ticks of so many bits.
+#[inline(never)]
+#[small]
+pub(super) fn finer(travel: u32, shift: u8) -> u32 {
+    travel >> shift.saturating_sub(FINE)
+}
+
+/// Whole ticks of so many parts. Cost: 25.
+#[inline(always)]
+pub(super) fn whole_ticks(fine: u32, shift: u8) -> u32 {
+    if shift < FINE { fine >> shift } else { fine >> FINE }
+}
+
+/// The exponent of what a stretch's end is aligned to: a tick, up to an eighth of the stretch, up to a
+/// step.
+pub(super) fn grain(ticks: u32, shift: u8) -> u8 {
+    let mut grain = shift;
+    let mut eighth = ticks >> 4;
+    while eighth != 0 && grain < STEP_LOG2 {
+        eighth >>= 1;
+        grain += 1;
+    }
+    grain
+}
