@@ -20,16 +20,16 @@
 //! Cost on AVR: 6,300 cycles for a short block without a jerk limit, with [`Prep`], the task and its
 //! interrupt; a third of them are the governor's floats.
 
+mod spindle;
+
 use super::block::{Block, Body, Line, QueuedAction};
-use super::float::{below, greater, least, scaled, some, whole};
+use super::float::{below, greater, scaled, whole};
 use super::governor::{Ahead, Governor, Stretch, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{BlockSource, Constraint};
-use super::retract::Retreat;
 use super::short::Short;
 use super::snapshot::{Program, Snapshot};
 use super::thread::Thread;
-use crate::boards::outputs;
 use crate::capability::Capability;
 use crate::dda::Segment;
 use crate::gcode::heating::Heat;
@@ -37,7 +37,7 @@ use crate::gcode::overrides::Change;
 pub use crate::hal::BLOCK_S_MIN;
 use crate::hal::TIMER_HZ;
 use crate::hal::ring::Index;
-use crate::status::Status;
+use spindle::Follows;
 
 /// Half CPU cycles in a second.
 const HALVES_PER_S: f32 = 2.0 * TIMER_HZ as f32;
@@ -56,12 +56,6 @@ const SEGMENT_CYCLES: u32 = (TIMER_HZ as f32 * SEGMENT_S) as u32;
 
 /// Faster than this no line ends but at another one, mm/s.
 const SLOW: f32 = 5.0;
-
-/// A share of the spindle's speed has to change by so much to count.
-const CHANGE: f32 = 0.005;
-
-/// A feed waits so long for a spindle that stands still, s.
-const PATIENCE_S: f32 = 6.0;
 
 /// How long a pause is, s.
 const PAUSE_S: f32 = 0.001;
@@ -179,21 +173,6 @@ pub struct Exec {
     prep: Prep,
     // But for what few lines need.
     follows: Follows,
-}
-
-/// What lines have to do with the spindle.
-#[derive(Debug, Default)]
-enum Follows {
-    /// Lines do not depend on the spindle.
-    #[default]
-    Nothing,
-    /// G95. Feeds go by its measured speed: that share of what they were planned for. 0 or less if it stands still: minus the seconds for
-    /// which a feed has waited for it.
-    Speed(f32),
-    /// G33, a pass of G76: they follow its angle.
-    Angle(Thread),
-    /// A pass of G33 or G76 has ended before its time: X leaves the cut while the axes come to rest, and then what is queued waits to be dropped.
-    Retreats(Retreat),
 }
 
 /// What the governor sees of the queue.
@@ -413,15 +392,6 @@ impl Exec {
             blocks.release();
         }
         held
-    }
-
-    /// What was queued has been dropped for good: no line follows the spindle.
-    pub fn end_pass(&mut self) {
-        if let Follows::Angle(thread) = &self.follows
-            && thread.waits()
-        {
-            self.follows = Follows::Nothing;
-        }
     }
 
     /// Does what the oldest block asks for, which is no line.
@@ -665,215 +635,9 @@ impl Exec {
         self.hand_out(stretch, blocks, out, segment, |_| (false, true))
     }
 
-    /// The pass in step with the spindle, if there is one.
-    #[inline(always)]
-    pub fn thread(&mut self) -> Option<&mut Thread> {
-        match &mut self.follows {
-            Follows::Angle(thread) if Capability::Lathe.is_built_in() => Some(thread),
-            _ => None,
-        }
-    }
-
-    /// Whether the axes of G33.1 rest where the spindle has turned round, and what is left of the line is to be dropped.
-    pub fn has_turned(&self) -> bool {
-        match &self.follows {
-            Follows::Angle(thread) => thread.has_turned() && self.governor.is_at_rest(),
-            _ => false,
-        }
-    }
-
-    /// Why a pass has been left before its end, if one has, and the rest of it waits to be dropped: a hold of its own.
-    #[inline(always)]
-    pub fn has_left(&self) -> Option<Status> {
-        match &self.follows {
-            Follows::Retreats(retreat) if Capability::Lathe.is_built_in() => Some(retreat.why),
-            _ => None,
-        }
-    }
-
     /// Along the path at the end of what is queued, mm/s.
     pub fn velocity(&self) -> f32 {
         self.governor.velocity()
-    }
-
-    /// Whether feeds go by the measured speed of the spindle (G95).
-    #[inline(always)]
-    pub fn is_per_turn(&self) -> bool {
-        Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Speed(_))
-    }
-
-    /// G95 is in force for the lines from here on, or no more.
-    fn go_by_speed(&mut self, on: bool) {
-        self.follows = if on { Follows::Speed(1.0) } else { Follows::Nothing };
-    }
-
-    /// The spindle turns at this share of the speed that feeds were planned for; what is more than 1 is 1. A change of less than 0.5 % does
-    /// not count: each has ramps laid out anew.
-    #[inline(never)]
-    #[small]
-    pub fn set_share(&mut self, share: f32) {
-        let Follows::Speed(before) = &mut self.follows else { return };
-        let share = least(share, 1.0);
-        let off = share - *before;
-        let (stands, stood) = (!some(share), *before <= 0.0);
-        if stands != stood || !stands && !(-CHANGE..=CHANGE).contains(&off) {
-            *before = share;
-            self.governor.change_feed();
-            self.governor.look_again();
-        }
-    }
-
-    /// Whether a feed has waited for the spindle for too long. It says so once.
-    #[small]
-    pub fn takes_too_long(&mut self) -> bool {
-        match &mut self.follows {
-            Follows::Speed(share) if *share < -PATIENCE_S => {
-                *share = 0.0;
-                true
-            }
-            _ => false,
-        }
-    }
-
-    /// Whether a pass in step with the spindle is to end at once, in the midst of the cut: for an alarm, or as the program is killed.
-    #[inline(always)]
-    pub fn break_off(&mut self, at_once: bool) {
-        self.breaks_off = at_once;
-    }
-
-    /// Prepares the next stretch of a line that follows the spindle. A feedhold leaves the cut if there is a retract, else it waits for the end, and
-    /// overrides do not count.
-    #[inline(never)]
-    #[small]
-    fn follow(
-        &mut self,
-        blocks: &mut BlockSource,
-        out: &mut Snapshot,
-        segment: &mut Segment,
-    ) -> Step {
-        self.take_limits(blocks);
-        let velocity = self.governor.velocity();
-        let (kept, accel) = (self.prep.kept(), self.governor.accel());
-        let brakes = self.brakes_for_end(velocity, accel);
-        let at_rest = self.governor.is_at_rest();
-        let Follows::Angle(thread) = &mut self.follows else { return Step::Again };
-        let wanted = thread.velocity(kept, velocity, accel, brakes);
-        if thread.is_to_turn(self.running.left) {
-            // The task switches it.
-            out.outputs ^= outputs::COUNTERCLOCKWISE;
-        }
-        let breaks_off = self.breaks_off || thread.fault().is_some() || thread.rests();
-        if at_rest && (breaks_off || !some(wanted)) {
-            return self.await_spindle(out, segment);
-        }
-        let retract = thread.retract();
-        // The axes come to rest in this line, in which X stands still.
-        let fits = velocity * velocity < 2.0 * accel * self.running.left;
-        let leaves = (breaks_off || self.hold) && retract.is_some() && fits;
-        if leaves && self.prep.rest_of(retract.motors) {
-            let why = thread.fault().unwrap_or(Status::Terminated);
-            let retreat = Retreat::new(retract, why, self.prep.debt_of(retract.motors));
-            self.prep.join(retract.motors, retreat.is_backwards());
-            self.follows = Follows::Retreats(retreat);
-            return Step::Leaves;
-        }
-        let running = &self.running;
-        let stretch = if breaks_off {
-            self.governor.halt_sharply(running.left, running.headroom, SEGMENT_S)
-        } else {
-            self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
-        };
-        thread.handed(stretch.distance);
-        self.hand_out_coarsely(&stretch, blocks, out, segment)
-    }
-
-    /// The line waits for the spindle.
-    #[inline(never)]
-    #[small]
-    fn await_spindle(&mut self, out: &mut Snapshot, segment: &mut Segment) -> Step {
-        let (ticks, period) = PAUSE;
-        self.prep.pause(ticks, period, segment);
-        out.left = self.running.left;
-        Step::Segment
-    }
-
-    /// What a line that follows the spindle may do, as far as that has changed.
-    fn take_limits(&mut self, blocks: &mut BlockSource) {
-        let version = blocks.version();
-        let running = &mut self.running;
-        if version != running.version {
-            running.version = version;
-            running.cruise = blocks.feed();
-            blocks.take_changed();
-            running.headroom = blocks.headroom();
-        }
-    }
-
-    /// Whether the line slows down for its end within the next stretches.
-    fn brakes_for_end(&self, velocity: f32, accel: f32) -> bool {
-        let running = &self.running;
-        let far = running.left - 2.0 * SEGMENT_S * velocity;
-        velocity * velocity - running.headroom > 2.0 * accel * far
-    }
-
-    /// Prepares the next stretch of a pass that has ended before its time: its axes slow down, and X leaves the cut.
-    #[inline(never)]
-    #[small]
-    fn retreat(
-        &mut self,
-        blocks: &mut BlockSource,
-        out: &mut Snapshot,
-        segment: &mut Segment,
-    ) -> Step {
-        let Follows::Retreats(retreat) = &self.follows else { return Step::Again };
-        let (motors, backwards) = (retreat.motors(), retreat.is_backwards());
-        if self.running.active && (self.running.done || !self.governor.is_at_rest()) {
-            self.take_limits(blocks);
-            self.prep.join(motors, backwards);
-            let step = if self.running.done {
-                self.end(0, false, blocks, segment)
-            } else {
-                let (left, headroom) = (self.running.left, self.running.headroom);
-                let stretch = self.governor.halt_sharply(left, headroom, SEGMENT_S);
-                self.hand_out_coarsely(&stretch, blocks, out, segment)
-            };
-            if step != Step::Segment {
-                return step;
-            }
-        } else {
-            self.halt(out);
-            self.prep.join(motors, backwards);
-            self.prep.stand(motors, segment);
-        }
-        let Follows::Retreats(retreat) = &mut self.follows else { return Step::Segment };
-        self.prep.add(retreat, segment, &mut out.target);
-        Step::Segment
-    }
-
-    /// Has X go on in a segment of such ticks that is queued already: `write` is told how far in each tick, and is false if it is too late.
-    #[inline(always)]
-    pub fn lead(
-        &mut self,
-        (ticks, period): (u16, u16),
-        out: &mut Snapshot,
-        write: impl FnOnce(u16) -> bool,
-    ) {
-        let Follows::Retreats(retreat) = &mut self.follows else { return };
-        let increment = self.prep.plan_lead(retreat, ticks, period);
-        if increment != 0 && write(increment) {
-            self.prep.note_lead(retreat, increment, ticks, &mut out.target);
-        } else {
-            retreat.pause();
-        }
-    }
-
-    /// The motors of X that leave the cut, as bits, and whether they go backwards.
-    #[small]
-    pub fn leaving(&self) -> (u8, bool) {
-        match &self.follows {
-            Follows::Retreats(retreat) => (retreat.motors(), retreat.is_backwards()),
-            _ => (0, false),
-        }
     }
 
     /// Hands out what is left of the line being run.
